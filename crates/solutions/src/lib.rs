@@ -1,0 +1,26 @@
+//! Manufactured solutions as Rust functions: the generated modules, and the trait they implement.
+//!
+//! A manufactured solution is a displacement field `u(X, t)`, chosen freely, together with the body force `b`
+//! that makes it an exact solution of the equations of motion for a given material. This crate holds one
+//! generated module for each file in `mms-specs/`; everything else in it is what those modules need at run time.
+//! It knows nothing of specifications, symbols or solvers.
+//!
+//! # Conventions
+//!
+//! `X` is the reference position and `x = X + u` the current one. `F[i][J] = dx_i/dX_J` is the deformation
+//! gradient, `H = F - I` the displacement gradient, `J = det F`. `P` is the *first* Piola-Kirchhoff stress:
+//! `P = tau F^-T`, the traction on a surface with reference normal `N` is `P N`, and momentum balance reads
+//! `rho0 a_i = sum_J dP[i][J]/dX_J + rho0 b_i`. The body force `b` is a force per unit *mass*. In two dimensions
+//! the deformation is plane strain. All components are Cartesian.
+
+mod domain;
+mod generated;
+mod parameters;
+mod real;
+mod solution;
+
+pub use domain::{Boundary, Condition, Domain, Surface};
+pub use generated::*;
+pub use parameters::{Description, Parameter, ParameterError};
+pub use real::Real;
+pub use solution::{AnySolution, Fields, Material, Solution};

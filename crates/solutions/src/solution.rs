@@ -1,0 +1,89 @@
+//! What every manufactured solution can do.
+
+use crate::{Boundary, Domain, Real};
+use nalgebra::{SMatrix, SVector};
+
+/// The constitutive law of a solution, with its constants; what a solver needs to model the same material.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Material<T> {
+    /// `tau = lambda ln(J) I + mu (F F^T - I)`, plane strain in two dimensions.
+    NeoHookean {
+        /// First Lamé constant, a stress.
+        lambda: T,
+        /// Shear modulus, a stress.
+        mu: T,
+    },
+}
+
+/// Every field of a solution at one point, in Cartesian components.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fields<T: Real, const D: usize> {
+    /// Displacement, a length.
+    pub u: SVector<T, D>,
+    /// Velocity `du/dt` at fixed `X`.
+    pub v: SVector<T, D>,
+    /// Acceleration `d2u/dt2` at fixed `X`.
+    pub a: SVector<T, D>,
+    /// Displacement gradient `H[i][J] = du_i/dX_J`, with full relative accuracy however small it is.
+    pub H: SMatrix<T, D, D>,
+    /// Deformation gradient `F = I + H`.
+    pub F: SMatrix<T, D, D>,
+    /// `det F`.
+    pub J: T,
+    /// First Piola-Kirchhoff stress.
+    pub P: SMatrix<T, D, D>,
+    /// Body force per unit mass.
+    pub b: SVector<T, D>,
+}
+
+/// A manufactured solution in `D` dimensions, its parameters fixed.
+///
+/// Positions `X` are reference positions. Each function computes only what it needs; [`Solution::fields`]
+/// computes everything and shares the common parts.
+pub trait Solution<T: Real, const D: usize>: Send + Sync {
+    /// Displacement `u`, a length.
+    fn displacement(&self, X: &SVector<T, D>, t: T) -> SVector<T, D>;
+    /// Velocity `v = du/dt` at fixed `X`.
+    fn velocity(&self, X: &SVector<T, D>, t: T) -> SVector<T, D>;
+    /// Acceleration `a = d2u/dt2` at fixed `X`.
+    fn acceleration(&self, X: &SVector<T, D>, t: T) -> SVector<T, D>;
+    /// Displacement gradient `H[i][J] = du_i/dX_J`, dimensionless.
+    fn displacement_gradient(&self, X: &SVector<T, D>, t: T) -> SMatrix<T, D, D>;
+    /// Deformation gradient `F = I + H`, dimensionless.
+    fn deformation_gradient(&self, X: &SVector<T, D>, t: T) -> SMatrix<T, D, D>;
+    /// `J = det F`, the ratio of current to reference volume.
+    fn jacobian(&self, X: &SVector<T, D>, t: T) -> T;
+    /// First Piola-Kirchhoff stress `P[i][J]`, force in direction `i` per reference area with normal `J`.
+    fn first_piola_kirchhoff(&self, X: &SVector<T, D>, t: T) -> SMatrix<T, D, D>;
+    /// Body force `b` per unit mass, from `rho0 a = Div P + rho0 b`.
+    fn body_force(&self, X: &SVector<T, D>, t: T) -> SVector<T, D>;
+    /// All fields at once.
+    fn fields(&self, X: &SVector<T, D>, t: T) -> Fields<T, D>;
+
+    /// The body's shape in the reference configuration.
+    fn domain(&self) -> Domain<T, D>;
+    /// The conditions on the body's boundary.
+    fn boundaries(&self) -> &[Boundary];
+    /// The length that a cell count divides: the grid spacing is this length over the number of cells.
+    fn cell_length(&self) -> T;
+    /// The constitutive law and its constants.
+    fn material(&self) -> Material<T>;
+    /// Mass per reference volume.
+    fn density(&self) -> T;
+    /// The speed that CFL numbers refer to, `sqrt(E/rho0)` unless the specification says otherwise.
+    fn wave_speed(&self) -> T;
+    /// The time in which the motion repeats, or after which a study ends.
+    fn period(&self) -> T;
+}
+
+/// A solution whose dimension is known at run time only.
+#[non_exhaustive]
+pub enum AnySolution<T: Real> {
+    /// One dimension.
+    One(Box<dyn Solution<T, 1>>),
+    /// Two dimensions.
+    Two(Box<dyn Solution<T, 2>>),
+    /// Three dimensions.
+    Three(Box<dyn Solution<T, 3>>),
+}
