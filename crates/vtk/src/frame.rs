@@ -1,0 +1,125 @@
+//! One instant of a particle simulation, and the checks that it can become a file.
+
+use std::collections::HashSet;
+
+use crate::Error;
+
+/// The values of an [`Array`], one entry a particle, in the order of [`Frame::points`].
+#[derive(Clone, Debug, PartialEq)]
+pub enum Values {
+    /// One number a particle.
+    Scalar(Vec<f64>),
+    /// Three Cartesian components a particle; a plane problem leaves the third at zero.
+    Vector(Vec<[f64; 3]>),
+    /// Nine components a particle, row by row: XX XY XZ YX YY YZ ZX ZY ZZ.
+    Tensor(Vec<[f64; 9]>),
+    /// One whole number a particle, such as the particle's identity.
+    Id(Vec<u64>),
+}
+
+impl Values {
+    /// The number of particles that have a value.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Scalar(values) => values.len(),
+            Self::Vector(values) => values.len(),
+            Self::Tensor(values) => values.len(),
+            Self::Id(values) => values.len(),
+        }
+    }
+
+    /// Whether no particle has a value.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The components of all particles one after the other, and how many a particle has; none for whole numbers.
+    fn floats(&self) -> Option<(&[f64], usize)> {
+        match self {
+            Self::Scalar(values) => Some((values, 1)),
+            Self::Vector(values) => Some((values.as_flattened(), 3)),
+            Self::Tensor(values) => Some((values.as_flattened(), 9)),
+            Self::Id(_) => None,
+        }
+    }
+}
+
+/// A named quantity over the particles. Units are the caller's; the file carries none.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Array {
+    /// Letters, digits and underscores, at least one; unique in its frame.
+    pub name: String,
+    /// One entry a particle.
+    pub values: Values,
+}
+
+/// One instant of a particle simulation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// The simulated time, in the caller's unit of time; `TimeValue` in the file.
+    pub time: f64,
+    /// The number of steps taken so far; `Cycle` in the file.
+    pub step: u64,
+    /// The particles' positions, Cartesian; at least one.
+    pub points: Vec<[f64; 3]>,
+    /// The quantities over the particles, in the order in which the file holds them.
+    pub arrays: Vec<Array>,
+}
+
+impl Frame {
+    /// Whether the frame can become a file that every reader understands.
+    ///
+    /// # Errors
+    ///
+    /// Where there is no particle, or more than `u32::MAX`; where an array's length differs from the number of
+    /// particles; where a name is repeated or holds anything but `[A-Za-z0-9_]`; where the time, a position or a value
+    /// is infinite or not a number; and where the step exceeds `i64::MAX`.
+    pub fn check(&self) -> Result<(), Error> {
+        let particles = self.points.len();
+        if particles == 0 {
+            return Err(Error::NoParticles);
+        }
+        if u32::try_from(particles).is_err() {
+            return Err(Error::TooManyParticles { particles });
+        }
+        if !self.time.is_finite() {
+            return Err(Error::Time { time: self.time });
+        }
+        self.cycle()?;
+        check_finite("points", self.points.as_flattened(), 3)?;
+
+        let mut names = HashSet::new();
+        for Array { name, values } in &self.arrays {
+            if name.is_empty() || !name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_') {
+                return Err(Error::ArrayName { name: name.clone() });
+            }
+            if !names.insert(name) {
+                return Err(Error::RepeatedName { name: name.clone() });
+            }
+            if values.len() != particles {
+                return Err(Error::Length { array: name.clone(), found: values.len(), particles });
+            }
+            if let Some((floats, components)) = values.floats() {
+                check_finite(name, floats, components)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The step as the signed number that VTK's `Cycle` is.
+    pub(crate) fn cycle(&self) -> Result<i64, Error> {
+        i64::try_from(self.step).map_err(|_| Error::Step { step: self.step })
+    }
+}
+
+fn check_finite(array: &str, floats: &[f64], components: usize) -> Result<(), Error> {
+    match floats.iter().position(|value| !value.is_finite()) {
+        None => Ok(()),
+        Some(at) => Err(Error::NotFinite {
+            array: array.to_owned(),
+            particle: at / components,
+            component: at % components,
+            value: floats[at],
+        }),
+    }
+}

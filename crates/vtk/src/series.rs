@@ -1,0 +1,103 @@
+//! A folder of numbered frames with the list that readers open.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::{Error, Frame, to_bytes, whole_file};
+
+/// A folder with numbered `.vtu` files and one `.pvd` file that lists them with their times.
+///
+/// Every file is written whole: to a temporary name first (with `.tmp` at its end), and renamed once it is on the disk.
+/// The list is rewritten after each frame, so that the folder of a killed run can be opened.
+///
+/// A series may start in a folder that holds an older one of the same name. Its frames then replace the older ones one
+/// by one. From its first frame on the list names its own frames only; older frames with higher numbers stay on the
+/// disk, unlisted, until somebody deletes them. Until its first frame the older series stays as it is.
+#[derive(Debug)]
+pub struct Series {
+    folder: PathBuf,
+    name: String,
+    pvd: PathBuf,
+    /// The time and file name of each frame so far.
+    listed: Vec<(f64, String)>,
+}
+
+impl Series {
+    /// Starts a series: makes the folder, with its parents, and tries at once whether files can be written there.
+    ///
+    /// `name` begins the name of every file: `name.pvd`, `name-000000.vtu`, `name-000001.vtu`, ...
+    ///
+    /// # Errors
+    ///
+    /// Where the name is empty, begins with a dot, or holds a slash, a backslash or a control character; where the
+    /// folder cannot be made, or nothing can be written there.
+    pub fn create(folder: &Path, name: &str) -> Result<Self, Error> {
+        let misplaced = |c: char| c == '/' || c == '\\' || c.is_control();
+        if name.is_empty() || name.starts_with('.') || name.contains(misplaced) {
+            return Err(Error::SeriesName { name: name.to_owned() });
+        }
+        fs::create_dir_all(folder).map_err(|cause| Error::FileSystem {
+            action: "create the folder",
+            path: folder.to_owned(),
+            cause,
+        })?;
+        let pvd = folder.join(format!("{name}.pvd"));
+        whole_file::probe(&pvd)?;
+        Ok(Self { folder: folder.to_owned(), name: name.to_owned(), pvd, listed: vec![] })
+    }
+
+    /// Writes the next frame and adds it to the list; returns the path of the frame's file.
+    ///
+    /// Times should increase from frame to frame, since readers tell frames apart by them; this is not checked.
+    ///
+    /// # Errors
+    ///
+    /// Where [`Frame::check`] finds fault with the frame, or the file system refuses. The frames so far and their list
+    /// then remain whole, and the next call writes to the same number.
+    pub fn write(&mut self, frame: &Frame) -> Result<PathBuf, Error> {
+        let file = format!("{}-{:06}.vtu", self.name, self.listed.len());
+        let path = self.folder.join(&file);
+        whole_file::replace(&path, &to_bytes(frame)?)?;
+
+        self.listed.push((frame.time, file));
+        if let Err(error) = whole_file::replace(&self.pvd, self.list().as_bytes()) {
+            self.listed.pop();
+            return Err(error);
+        }
+        Ok(path)
+    }
+
+    /// The file that lists the frames: the one to open in ParaView. It is there once a frame is written.
+    pub fn pvd(&self) -> &Path {
+        &self.pvd
+    }
+
+    fn list(&self) -> String {
+        let mut list = String::from(
+            "<?xml version=\"1.0\"?>\n\
+             <VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n  <Collection>\n",
+        );
+        for (time, file) in &self.listed {
+            // Debug prints as many digits as it takes to read the same number back, and an exponent where needed.
+            let file = escape(file);
+            list += &format!("    <DataSet timestep=\"{time:?}\" part=\"0\" file=\"{file}\"/>\n");
+        }
+        list + "  </Collection>\n</VTKFile>\n"
+    }
+}
+
+/// The text as it stands between the quotes of an XML attribute.
+fn escape(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => escaped += "&amp;",
+            '<' => escaped += "&lt;",
+            '>' => escaped += "&gt;",
+            '"' => escaped += "&quot;",
+            '\'' => escaped += "&apos;",
+            c => escaped.push(c),
+        }
+    }
+    escaped
+}
