@@ -1,1 +1,41 @@
-//! To come.
+//! A material point solver for solids under large deformation, in one, two and three dimensions.
+//!
+//! Particles carry mass, velocity and deformation gradient; each step moves mass, momentum and internal forces to a
+//! background grid of cubic cells, solves there, and carries the change back ([`Simulation::step`]). Weights are hat
+//! functions or GIMP weights ([`Shape`]); time integration is USF, USL, MUSL or centred differences ([`Integrator`]).
+//!
+//! The scheme, for particle p and node i with weight `S_ip` and gradient `G_ip` taken at `x^n`:
+//!
+//! ```text
+//! m_i = sum m_p S_ip;  v_i = sum m_p v_p S_ip / m_i;  f_i = -sum V0_p tau_p G_ip + sum m_p b_p S_ip;  a_i = f_i / m_i
+//! v_p += dt sum S_ip a_i;   x_p += dt sum S_ip (v_i + dt a_i);   F_p <- (I + dt grad v) F_p
+//! ```
+//!
+//! Sources: Bardenhagen & Kober, "The generalized interpolation material point method", CMES 5 (2004) 477-495;
+//! Wallstedt & Guilkey, "An evaluation of explicit time integration schemes for use with the generalized
+//! interpolation material point method", J. Comput. Phys. 227 (2008) 9628-9642.
+//!
+//! # Conventions
+//!
+//! `X` is the reference and `x` the current position, `F[i][J] = dx_i/dX_J`, `J = det F`. Two-dimensional scenes are in
+//! plane strain, one-dimensional ones in uniaxial strain. Units are the caller's, as long as they are consistent.
+//! Runs are reproducible bit for bit, whatever the number of threads in the `rayon` pool around the calls.
+
+mod bands;
+mod body_force;
+mod error;
+mod grid;
+mod material;
+mod particles;
+mod simulation;
+mod step;
+mod tensor;
+mod transfer;
+mod weights;
+
+pub use body_force::{BodyForce, NoBodyForce};
+pub use error::{SetupError, StepError};
+pub use grid::Grid;
+pub use material::Material;
+pub use particles::Particles;
+pub use simulation::{Integrator, Settings, Shape, Simulation};

@@ -1,0 +1,134 @@
+//! Bands of grid rows: how scattering to the grid runs in parallel and still adds in a fixed order.
+//!
+//! The rows of the grid (nodes that share an index along the last axis) are cut into bands of a height that depends on
+//! nothing but the dimension, and every particle belongs to one band. A band writes to its own rows and to at most as
+//! many above: all even bands write to disjoint pieces of the node array, and so do all odd ones. Even bands run in
+//! parallel, then odd ones; within a band particles come in a fixed order. No sum depends on the number of threads.
+
+use rayon::prelude::*;
+
+use crate::grid::Layout;
+
+/// Rows that a particle may be lower than the band it was sorted into before everything is sorted anew.
+const SLACK: usize = 2;
+/// Rows in the highest band.
+pub(crate) const BAND_ROWS: usize = 256;
+
+/// Particles sorted by band, and within each band by cell at the time of sorting.
+#[derive(Debug)]
+pub(crate) struct Bands {
+    /// Rows in a band.
+    height: usize,
+    /// Band of every particle.
+    home: Vec<u32>,
+    /// Particle ids, band after band.
+    order: Vec<u32>,
+    /// Where each band starts in `order`, and where the last one ends.
+    starts: Vec<usize>,
+    /// Scratch of the sort: particles at each node, then where the next of them goes.
+    counts: Vec<u32>,
+    /// Scratch of the sort: first node of every particle.
+    keys: Vec<u32>,
+}
+
+impl Bands {
+    /// Bytes that sorting needs for each node.
+    pub(crate) const BYTES_PER_NODE: usize = size_of::<u32>();
+
+    /// Prepares for `particles` particles on the grid; `sort` has to follow.
+    pub(crate) fn new<const D: usize>(layout: &Layout<D>, particles: usize) -> Self {
+        // A row is one node in 1D; bands below some hundred particles would cost more to hand out than to compute.
+        let height = if D == 1 { BAND_ROWS } else { 8 };
+        let bands = layout.dims[D - 1] / height + 1;
+        Self {
+            height,
+            home: vec![0; particles],
+            order: vec![0; particles],
+            starts: vec![0; bands + 1],
+            counts: vec![0; layout.nodes + 1],
+            keys: vec![0; particles],
+        }
+    }
+
+    /// Whether a particle whose stencil has `width` rows from `row` on may stay in its band.
+    #[inline(always)]
+    pub(crate) fn fits(home: u32, height: usize, row: usize, width: usize) -> bool {
+        let first = home as usize * height;
+        first <= row && row + width <= first + 2 * height
+    }
+
+    /// Rows in a band.
+    pub(crate) fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Band of every particle.
+    pub(crate) fn home(&self) -> &[u32] {
+        &self.home
+    }
+
+    /// Sorts all particles by the first node of their stencils, which `first_node(particle)` computes.
+    pub(crate) fn sort<const D: usize>(
+        &mut self,
+        layout: &Layout<D>,
+        first_node: impl Fn(usize) -> usize + Sync,
+    ) {
+        let (height, row) = (self.height, layout.row());
+        self.keys.par_iter_mut().zip(&mut self.home).enumerate().for_each(|(p, (key, home))| {
+            let node = first_node(p);
+            *key = node as u32;
+            *home = ((node / row).saturating_sub(SLACK) / height) as u32;
+        });
+        self.counts.fill(0);
+        for &key in &self.keys {
+            self.counts[key as usize + 1] += 1;
+        }
+        for node in 1..self.counts.len() {
+            self.counts[node] += self.counts[node - 1];
+        }
+        let bands = self.starts.len() - 1;
+        self.starts[bands] = self.order.len();
+        for band in 1..bands {
+            let first_node = (band * height + SLACK) * row;
+            self.starts[band] =
+                self.counts.get(first_node).map_or(self.order.len(), |&start| start as usize);
+        }
+        for (p, &key) in self.keys.iter().enumerate() {
+            let place = &mut self.counts[key as usize];
+            self.order[*place as usize] = p as u32;
+            *place += 1;
+        }
+    }
+
+    /// Clears all nodes to `zero` and lets every particle add to them: `add(piece, first, particle)` with the piece of
+    /// the node array that its band may write to and the index of that piece's first node.
+    pub(crate) fn scatter<N, const D: usize>(
+        &self,
+        layout: &Layout<D>,
+        nodes: &mut [N],
+        clear: impl Fn(&mut N) + Sync,
+        add: impl Fn(&mut [N], usize, usize) + Sync,
+    ) where
+        N: Send,
+    {
+        let band_nodes = self.height * layout.row();
+        let run = |piece: &mut [N], band: usize| {
+            let Some(&[start, end]) = self.starts.get(band..band + 2).and_then(|s| s.first_chunk())
+            else {
+                return;
+            };
+            for &p in &self.order[start..end] {
+                add(piece, band * band_nodes, p as usize);
+            }
+        };
+        nodes.par_chunks_mut(2 * band_nodes).enumerate().for_each(|(pair, piece)| {
+            piece.iter_mut().for_each(&clear);
+            run(piece, 2 * pair);
+        });
+        if let Some(rest) = nodes.get_mut(band_nodes..) {
+            rest.par_chunks_mut(2 * band_nodes).enumerate().for_each(|(pair, piece)| {
+                run(piece, 2 * pair + 1);
+            });
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! What can go wrong: scenes that cannot be set up, and steps that cannot be completed.
+
+use thiserror::Error;
+
+/// Why a step could not be completed. Particle ids are indices into [`Particles`](crate::Particles).
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum StepError {
+    /// A deformation gradient lost its orientation.
+    #[error(
+        "step {step}, time {time:e}: particle {particle} is turned inside out (J = {J:e}); \
+         try a smaller time step, more particles per cell or gimp weights"
+    )]
+    Inverted {
+        /// Number of the failed step, counted from 1; 0 for the initial state.
+        step: usize,
+        /// Time at the end of that step.
+        time: f64,
+        /// Particle id.
+        particle: usize,
+        /// Its determinant of F, zero or negative.
+        J: f64,
+    },
+    /// A position or a deformation gradient overflowed or became NaN.
+    #[error(
+        "step {step}, time {time:e}: particle {particle} has a value that is not finite \
+         (x = {position:?}, J = {J:e}); the run is unstable, or the body force is not finite there"
+    )]
+    NotFinite {
+        /// Number of the failed step, counted from 1; 0 for the initial state.
+        step: usize,
+        /// Time at the end of that step.
+        time: f64,
+        /// Particle id.
+        particle: usize,
+        /// Its current position.
+        position: Vec<f64>,
+        /// Its determinant of F.
+        J: f64,
+    },
+    /// A particle's centre moved out of the grid.
+    #[error(
+        "step {step}, time {time:e}: particle {particle} left the grid at x = {position:?} \
+         (axis {axis}: {lower:e} to {upper:e}); make the grid larger or the time step smaller"
+    )]
+    LeftGrid {
+        /// Number of the failed step, counted from 1; 0 for the initial state.
+        step: usize,
+        /// Time at the end of that step.
+        time: f64,
+        /// Particle id.
+        particle: usize,
+        /// Its current position.
+        position: Vec<f64>,
+        /// The first axis along which it is outside.
+        axis: usize,
+        /// Lower end of the grid along that axis.
+        lower: f64,
+        /// Upper end of the grid along that axis.
+        upper: f64,
+    },
+    /// A particle box grew wider than the weights support.
+    #[error(
+        "step {step}, time {time:e}: the box of particle {particle} has half-size {half_size:e} along axis {axis}, \
+         more than the supported {limit:e} (two cells); use more particles per cell"
+    )]
+    TooLarge {
+        /// Number of the failed step, counted from 1; 0 for the initial state.
+        step: usize,
+        /// Time at the end of that step.
+        time: f64,
+        /// Particle id.
+        particle: usize,
+        /// Axis along which the box is too wide.
+        axis: usize,
+        /// The box's half-size along that axis.
+        half_size: f64,
+        /// The largest half-size that is supported.
+        limit: f64,
+    },
+}
+
+/// Why a simulation could not be set up.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum SetupError {
+    /// There is nothing to simulate.
+    #[error("there are no particles; is the grid too coarse, or the body outside it?")]
+    NoParticles,
+    /// More particles than ids.
+    #[error("{particles} particles are more than the supported {limit}")]
+    TooManyParticles {
+        /// Number of particles given.
+        particles: usize,
+        /// Largest supported number.
+        limit: usize,
+    },
+    /// The particle arrays do not have the same length.
+    #[error("the particle array `{array}` has {found} entries where `X` has {expected}")]
+    LengthMismatch {
+        /// Name of the array in [`Particles`](crate::Particles).
+        array: &'static str,
+        /// Its length.
+        found: usize,
+        /// The length of `X`.
+        expected: usize,
+    },
+    /// A quantity that has to be positive and finite is not.
+    #[error("{quantity} has to be positive and finite, not {value:e}")]
+    NotPositive {
+        /// What it is, for example "the time step" or "the mass of particle 7".
+        quantity: String,
+        /// The value given.
+        value: f64,
+    },
+    /// A quantity that has to be finite is not.
+    #[error("{quantity} has to be finite")]
+    NotFinite {
+        /// What it is, for example "the velocity of particle 7".
+        quantity: String,
+    },
+    /// An axis without cells.
+    #[error("the grid has no cells along axis {axis}")]
+    NoCells {
+        /// The axis.
+        axis: usize,
+    },
+    /// The grid's nodes do not fit into memory.
+    #[error(
+        "a grid of {cells:?} cells needs {bytes} bytes of memory, which cannot be had; use fewer cells"
+    )]
+    GridTooLarge {
+        /// Number of cells along each axis.
+        cells: Vec<usize>,
+        /// Bytes needed, saturating at the largest representable number.
+        bytes: u128,
+    },
+    /// Only centred differences start with half an acceleration.
+    #[error("a halved first acceleration belongs to centred differences only, not to {integrator}")]
+    HalvedStart {
+        /// The integrator asked for.
+        integrator: String,
+    },
+    /// A particle's initial state cannot be simulated: outside the grid, J <= 0, not finite, or too large a box.
+    #[error("the initial state is not admissible: {0}")]
+    InitialState(StepError),
+}

@@ -1,0 +1,216 @@
+//! The background grid: what a scene states of it, and how its nodes lie in memory.
+
+use nalgebra::{RealField, SVector};
+
+use crate::bands::BAND_ROWS;
+use crate::error::SetupError;
+use crate::tensor::real;
+
+/// Background grid: a box of cubic cells.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grid<T, const D: usize> {
+    /// The corner with the smallest coordinates, a length.
+    pub lower: SVector<T, D>,
+    /// Edge of a cell, a length.
+    pub spacing: T,
+    /// Number of cells along each axis.
+    pub cells: [usize; D],
+    /// `walls[axis][0]` and `[1]`: is the lower, the upper face across this axis a frictionless sliding wall? A symmetry
+    /// plane is the same thing. Faces that are not walls are open: no particle's centre may pass them.
+    pub walls: [[bool; 2]; D],
+}
+
+impl<T: RealField + Copy, const D: usize> Grid<T, D> {
+    /// The corner with the largest coordinates, a length.
+    pub fn upper(&self) -> SVector<T, D> {
+        SVector::from_fn(|a, _| self.lower[a] + self.spacing * real(self.cells[a] as f64))
+    }
+}
+
+/// Node layers below cell 0: a box of half-size 2 reaches two, and rounding may ask for one more.
+pub(crate) const PAD_BELOW: usize = 3;
+/// Node layers above the last cell: as many as the widest stencil of a particle on the upper face takes.
+const PAD_ABOVE: usize = 5;
+
+/// Node indices along an axis are formed in 32 bits.
+const MAX_LAYERS: usize = i32::MAX as usize;
+
+/// A layer of nodes beyond a wall, and its mirror image within.
+#[derive(Clone, Copy, Debug)]
+struct Ghost {
+    axis: usize,
+    layer: usize,
+    image: usize,
+    /// Whether the component across the wall changes its sign between the two (an odd number of reflections).
+    flips: bool,
+}
+
+/// Where the nodes lie in memory: axis 0 fastest, with padding on all sides.
+#[derive(Clone, Debug)]
+pub(crate) struct Layout<const D: usize> {
+    pub(crate) dims: [usize; D],
+    pub(crate) strides: [usize; D],
+    pub(crate) nodes: usize,
+    ghosts: Vec<Ghost>,
+    /// Axis and layer of each wall.
+    walls: Vec<(usize, usize)>,
+}
+
+impl<const D: usize> Layout<D> {
+    /// Lays out the nodes of `grid`, if `bytes_per_node` times their number can be addressed at all.
+    pub(crate) fn new<T>(grid: &Grid<T, D>, bytes_per_node: usize) -> Result<Self, SetupError> {
+        let too_large = || {
+            let nodes = grid.cells.iter().fold(1_u128, |n, &c| n.saturating_mul(c as u128 + 9));
+            let bytes = nodes.saturating_mul(bytes_per_node as u128);
+            SetupError::GridTooLarge { cells: grid.cells.to_vec(), bytes }
+        };
+        let mut layout =
+            Self { dims: [0; D], strides: [0; D], nodes: 1, ghosts: vec![], walls: vec![] };
+        for (axis, &cells) in grid.cells.iter().enumerate() {
+            if cells == 0 {
+                return Err(SetupError::NoCells { axis });
+            }
+            let dim = cells.checked_add(1 + PAD_BELOW + PAD_ABOVE).ok_or_else(too_large)?;
+            if dim > MAX_LAYERS {
+                return Err(too_large());
+            }
+            layout.dims[axis] = dim;
+            layout.strides[axis] = layout.nodes;
+            layout.nodes = layout.nodes.checked_mul(dim).ok_or_else(too_large)?;
+            let (first, last) = (PAD_BELOW, PAD_BELOW + cells);
+            let [lower, upper] = grid.walls[axis];
+            layout.walls.extend(lower.then_some((axis, first)));
+            layout.walls.extend(upper.then_some((axis, last)));
+            for layer in (0..dim).filter(|&l| (lower && l < first) || (upper && l > last)) {
+                // Between two walls on a coarse grid a far layer is mirrored more than once.
+                let (low, high) = (first as isize, last as isize);
+                let (mut image, mut flips) = (layer as isize, false);
+                while (lower && image < low) || (upper && image > high) {
+                    image = if lower && image < low { 2 * low - image } else { 2 * high - image };
+                    flips = !flips;
+                }
+                // Across from an open face the image may lie beyond all padding; no box reaches such a layer.
+                if let Ok(image) = usize::try_from(image)
+                    && image < dim
+                {
+                    layout.ghosts.push(Ghost { axis, layer, image, flips });
+                }
+            }
+        }
+        // One band of slack keeps the arithmetic on rows from overflowing.
+        let addressable =
+            layout.nodes.checked_mul(bytes_per_node).map(|b| b <= isize::MAX as usize);
+        if addressable != Some(true) || layout.nodes > usize::MAX / (2 * BAND_ROWS) {
+            return Err(too_large());
+        }
+        Ok(layout)
+    }
+
+    /// Nodes in a row: all that share an index along the last axis.
+    pub(crate) fn row(&self) -> usize {
+        self.strides[D - 1]
+    }
+
+    /// Calls `visit` with the index of every node in a layer across an axis.
+    fn for_layer(&self, axis: usize, layer: usize, mut visit: impl FnMut(usize)) {
+        let (stride, slab) = (self.strides[axis], self.strides[axis] * self.dims[axis]);
+        for start in (layer * stride..self.nodes).step_by(slab) {
+            (start..start + stride).for_each(&mut visit);
+        }
+    }
+
+    /// Adds what was deposited beyond walls to the mirror images: `add(image, ghost, Some(axis))`, the axis being that
+    /// of the component that changes its sign.
+    pub(crate) fn fold<N: Copy>(&self, nodes: &mut [N], add: impl Fn(&mut N, N, Option<usize>)) {
+        for g in &self.ghosts {
+            let flip = g.flips.then_some(g.axis);
+            self.for_layer(g.axis, g.layer, |index| {
+                let ghost = nodes[index];
+                add(&mut nodes[self.image(g, index)], ghost, flip);
+            });
+        }
+    }
+
+    /// Gives the nodes beyond walls the mirrored values: `mirror(image, Some(axis))`, with the axis as in `fold`.
+    pub(crate) fn unfold<N: Copy>(&self, nodes: &mut [N], mirror: impl Fn(N, Option<usize>) -> N) {
+        for g in &self.ghosts {
+            let flip = g.flips.then_some(g.axis);
+            self.for_layer(g.axis, g.layer, |index| {
+                nodes[index] = mirror(nodes[self.image(g, index)], flip);
+            });
+        }
+    }
+
+    fn image(&self, g: &Ghost, index: usize) -> usize {
+        index - g.layer * self.strides[g.axis] + g.image * self.strides[g.axis]
+    }
+
+    /// Calls `clear(node, axis)` for every node on a wall across `axis`.
+    pub(crate) fn on_walls<N>(&self, nodes: &mut [N], clear: impl Fn(&mut N, usize)) {
+        for &(axis, layer) in &self.walls {
+            self.for_layer(axis, layer, |index| clear(&mut nodes[index], axis));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grid(cells: [usize; 2], walls: [[bool; 2]; 2]) -> Grid<f64, 2> {
+        Grid { lower: SVector::zeros(), spacing: 1.0, cells, walls }
+    }
+
+    #[test]
+    fn folding_conserves_the_sum_and_unfolding_mirrors() {
+        for cells in [[1, 1], [2, 3], [5, 4]] {
+            let layout = Layout::new(&grid(cells, [[true; 2]; 2]), 8).unwrap();
+            // Weights that are symmetric about both walls of an axis unfold to what they were.
+            let mut nodes = vec![0.0; layout.nodes];
+            layout.fold(&mut nodes, |_, _, _| {});
+            for (index, node) in nodes.iter_mut().enumerate() {
+                *node = (index % 7) as f64;
+            }
+            let (mut inside, total) = (0.0, nodes.iter().sum::<f64>());
+            layout.fold(&mut nodes, |image, ghost, _| *image += ghost);
+            for j in PAD_BELOW..=PAD_BELOW + cells[1] {
+                for i in PAD_BELOW..=PAD_BELOW + cells[0] {
+                    inside += nodes[i + layout.row() * j];
+                }
+            }
+            assert_eq!(inside, total);
+
+            // A field that is odd about the walls across axis 0 and even about those across axis 1.
+            let wave = |i: usize, j: usize| {
+                let angle = |k: usize, n: usize| {
+                    std::f64::consts::PI * (k as f64 - PAD_BELOW as f64) / n as f64
+                };
+                angle(i, cells[0]).sin() * angle(j, cells[1]).cos()
+            };
+            let exact: Vec<f64> =
+                (0..layout.nodes).map(|k| wave(k % layout.row(), k / layout.row())).collect();
+            let mut field = exact.clone();
+            for (k, value) in field.iter_mut().enumerate() {
+                let (i, j) = (k % layout.row(), k / layout.row());
+                let within = |k: usize, n: usize| (PAD_BELOW..=PAD_BELOW + n).contains(&k);
+                if !within(i, cells[0]) || !within(j, cells[1]) {
+                    *value = f64::NAN;
+                }
+            }
+            layout.unfold(&mut field, |image, flip| if flip == Some(0) { -image } else { image });
+            for (a, b) in field.iter().zip(&exact) {
+                assert!((a - b).abs() < 1e-12, "{a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn grids_beyond_memory_are_refused() {
+        let huge = grid([usize::MAX / 2, 16], [[false; 2]; 2]);
+        assert!(matches!(Layout::new(&huge, 40), Err(SetupError::GridTooLarge { .. })));
+        let long = grid([usize::MAX, 1], [[false; 2]; 2]);
+        assert!(matches!(Layout::new(&long, 40), Err(SetupError::GridTooLarge { .. })));
+        let empty = grid([3, 0], [[false; 2]; 2]);
+        assert_eq!(Layout::new(&empty, 40).err(), Some(SetupError::NoCells { axis: 1 }));
+    }
+}

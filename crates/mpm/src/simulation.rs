@@ -1,0 +1,352 @@
+//! A simulation: set up once, then stepped.
+
+use std::fmt;
+
+use nalgebra::{RealField, SMatrix, SVector};
+
+use crate::bands::Bands;
+use crate::body_force::BodyForce;
+use crate::error::{SetupError, StepError};
+use crate::grid::{Grid, Layout};
+use crate::material::{Law, Material, NeoHookean, NeoHookeanNoLog};
+use crate::particles::Particles;
+use crate::step::{
+    Constants, Kernel, State, Trouble, axis_too_large, step_musl, step_usf, step_usl, trouble,
+};
+use crate::tensor::{determinant, real};
+use crate::transfer::Node;
+use crate::weights::{FixedBox, HALF_SIZE_LIMIT, Hat, Rule, StretchingBox};
+
+/// Weights by which particles and nodes exchange values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Shape {
+    /// Hat functions at the particle's centre.
+    Linear,
+    /// GIMP weights with boxes of fixed half-size l0.
+    Ugimp,
+    /// GIMP weights with boxes of half-size `l0 F_aa` along axis a (contiguous particles).
+    Gimp,
+}
+
+/// Time integration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Integrator {
+    /// Update stress first: F is updated before forces are computed.
+    Usf,
+    /// Update stress last: F is updated with the grid velocity at the end of the step.
+    Usl,
+    /// Modified update stress last: as `Usl`, with velocities projected anew from the updated particles.
+    Musl,
+    /// Centred differences: the arithmetic of `Usl`, with particle velocities half a step behind positions.
+    Cd,
+}
+
+/// How a scene is to be integrated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings<T> {
+    /// Weights.
+    pub shape: Shape,
+    /// Time integration.
+    pub integrator: Integrator,
+    /// Time step dt.
+    pub time_step: T,
+    /// Centred differences from velocities at time 0: halves the accelerations of the first step, so that they carry
+    /// the velocities to dt/2 only. Without it the initial velocities are those at -dt/2.
+    pub halve_first_acceleration: bool,
+}
+
+/// A running simulation.
+pub struct Simulation<T, const D: usize> {
+    grid: Grid<T, D>,
+    material: Material<T>,
+    settings: Settings<T>,
+    state: State<T, D>,
+    kernel: Kernel<T, D>,
+    steps_done: usize,
+    failed: Option<StepError>,
+}
+
+impl<T: RealField + Copy, const D: usize> Simulation<T, D> {
+    /// Sets up a simulation at time 0.
+    ///
+    /// # Errors
+    ///
+    /// Where the scene makes no sense (see [`SetupError`]) or does not fit into memory.
+    pub fn new(
+        grid: Grid<T, D>,
+        particles: Particles<T, D>,
+        material: Material<T>,
+        settings: Settings<T>,
+    ) -> Result<Self, SetupError> {
+        const { assert!(1 <= D && D <= 3, "one, two or three dimensions") };
+        check(&grid, &particles, &settings)?;
+        let state = allocate(&grid, particles, &settings)?;
+        let cells = state.particles.half_size / grid.spacing;
+        let (state, kernel) = match settings.shape {
+            Shape::Linear => with_rule(state, Hat, &material, &settings),
+            Shape::Ugimp => with_rule(state, FixedBox(cells), &material, &settings),
+            Shape::Gimp => with_rule(state, StretchingBox(cells), &material, &settings),
+        }?;
+        Ok(Self { grid, material, settings, state, kernel, steps_done: 0, failed: None })
+    }
+
+    /// Advances by one time step.
+    ///
+    /// # Errors
+    ///
+    /// Where a particle turns inside out, leaves the grid, grows too large or takes on values that are not finite. The
+    /// particles then keep the state in which that was found, and every further call returns the same error.
+    pub fn step(&mut self, body_force: &dyn BodyForce<T, D>) -> Result<(), StepError> {
+        if let Some(error) = &self.failed {
+            return Err(error.clone());
+        }
+        let halved = self.settings.halve_first_acceleration && self.steps_done == 0;
+        let scale = if halved { real(0.5) } else { T::one() };
+        let t = self.time();
+        let outcome = (self.kernel)(&mut self.state, body_force, t, scale);
+        if let Some((trouble, particle)) = outcome.failure {
+            let step = self.steps_done + 1;
+            let time = self.settings.time_step * real(step as f64);
+            let error = describe(&self.state, &self.settings, trouble, particle, step, time);
+            self.failed = Some(error.clone());
+            return Err(error);
+        }
+        self.steps_done += 1;
+        Ok(())
+    }
+
+    /// The particles at the current time; their velocities lag by [`velocity_lag`](Self::velocity_lag).
+    pub fn particles(&self) -> &Particles<T, D> {
+        &self.state.particles
+    }
+
+    /// Number of completed steps.
+    pub fn steps_done(&self) -> usize {
+        self.steps_done
+    }
+
+    /// Current time: completed steps times the time step.
+    pub fn time(&self) -> T {
+        self.settings.time_step * real(self.steps_done as f64)
+    }
+
+    /// The material.
+    pub fn material(&self) -> &Material<T> {
+        &self.material
+    }
+
+    /// The grid.
+    pub fn grid(&self) -> &Grid<T, D> {
+        &self.grid
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &Settings<T> {
+        &self.settings
+    }
+
+    /// How far the particle velocities lag behind [`time`](Self::time): dt/2 for centred differences, else 0.
+    ///
+    /// With a halved first acceleration that holds from the first step on; the initial velocities are those at time 0.
+    pub fn velocity_lag(&self) -> T {
+        match self.settings.integrator {
+            Integrator::Cd => self.settings.time_step * real(0.5),
+            Integrator::Usf | Integrator::Usl | Integrator::Musl => T::zero(),
+        }
+    }
+}
+
+impl<T: RealField, const D: usize> fmt::Debug for Simulation<T, D> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Simulation")
+            .field("grid", &self.grid)
+            .field("material", &self.material)
+            .field("settings", &self.settings)
+            .field("particles", &self.state.particles.X.len())
+            .field("steps_done", &self.steps_done)
+            .field("failed", &self.failed)
+            .finish_non_exhaustive()
+    }
+}
+
+/// For error messages, whatever the scalar type.
+fn figure<T: RealField>(value: T) -> f64 {
+    nalgebra::try_convert(value).unwrap_or(f64::NAN)
+}
+
+fn check<T: RealField + Copy, const D: usize>(
+    grid: &Grid<T, D>,
+    particles: &Particles<T, D>,
+    settings: &Settings<T>,
+) -> Result<(), SetupError> {
+    let positive = |quantity: &dyn Fn() -> String, value: T| {
+        if value > T::zero() && value.is_finite() {
+            return Ok(());
+        }
+        Err(SetupError::NotPositive { quantity: quantity(), value: figure(value) })
+    };
+    positive(&|| "the time step".into(), settings.time_step)?;
+    positive(&|| "the grid spacing".into(), grid.spacing)?;
+    if grid.lower.iter().any(|x| !x.is_finite()) {
+        return Err(SetupError::NotFinite { quantity: "the lower corner of the grid".into() });
+    }
+    if settings.halve_first_acceleration && settings.integrator != Integrator::Cd {
+        return Err(SetupError::HalvedStart { integrator: format!("{:?}", settings.integrator) });
+    }
+    let Particles { X, x, v, F, mass, volume, half_size } = particles;
+    let expected = X.len();
+    for (array, found) in [
+        ("x", x.len()),
+        ("v", v.len()),
+        ("F", F.len()),
+        ("mass", mass.len()),
+        ("volume", volume.len()),
+    ] {
+        if found != expected {
+            return Err(SetupError::LengthMismatch { array, found, expected });
+        }
+    }
+    if expected == 0 {
+        return Err(SetupError::NoParticles);
+    }
+    let limit = u32::MAX as usize;
+    if expected > limit {
+        return Err(SetupError::TooManyParticles { particles: expected, limit });
+    }
+    if settings.shape != Shape::Linear {
+        for (axis, &l) in half_size.iter().enumerate() {
+            positive(&|| format!("the half-size of particles along axis {axis}"), l)?;
+        }
+    }
+    for p in 0..expected {
+        positive(&|| format!("the mass of particle {p}"), mass[p])?;
+        positive(&|| format!("the volume of particle {p}"), volume[p])?;
+        for (name, values) in [("reference position", &X[p]), ("velocity", &v[p])] {
+            if values.iter().any(|value| !value.is_finite()) {
+                return Err(SetupError::NotFinite {
+                    quantity: format!("the {name} of particle {p}"),
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Reserves all memory of a run.
+fn allocate<T: RealField + Copy, const D: usize>(
+    grid: &Grid<T, D>,
+    particles: Particles<T, D>,
+    settings: &Settings<T>,
+) -> Result<State<T, D>, SetupError> {
+    let usf = settings.integrator == Integrator::Usf;
+    let musl = settings.integrator == Integrator::Musl;
+    let reprojected_bytes = if musl { size_of::<SVector<T, D>>() } else { 0 };
+    let bytes_per_node = size_of::<Node<T, D>>() + Bands::BYTES_PER_NODE + reprojected_bytes;
+    let layout = Layout::new(grid, bytes_per_node)?;
+    // Asking first turns a grid that is too large into an error instead of an abort.
+    let mut nodes = Vec::new();
+    nodes.try_reserve_exact(layout.nodes).map_err(|_| SetupError::GridTooLarge {
+        cells: grid.cells.to_vec(),
+        bytes: layout.nodes as u128 * bytes_per_node as u128,
+    })?;
+    nodes.resize(layout.nodes, Node::zero());
+    let bands = Bands::new(&layout, particles.len());
+    let least = particles.mass.iter().fold(particles.mass[0], |least, &m| least.min(m));
+    Ok(State {
+        constants: Constants::new(grid, &layout, &bands, settings.time_step, least),
+        nodes,
+        b: Vec::new(),
+        F_next: if usf { vec![SMatrix::identity(); particles.len()] } else { Vec::new() },
+        reprojected: vec![SVector::zeros(); if musl { layout.nodes } else { 0 }],
+        particles,
+        layout,
+        bands,
+    })
+}
+
+type Prepared<T, const D: usize> = Result<(State<T, D>, Kernel<T, D>), SetupError>;
+
+/// Checks the initial state, sorts the particles, and picks the kernel for these weights.
+fn with_rule<T, R, const D: usize, const W: usize>(
+    mut state: State<T, D>,
+    rule: R,
+    material: &Material<T>,
+    settings: &Settings<T>,
+) -> Prepared<T, D>
+where
+    T: RealField + Copy,
+    R: Rule<T, D, W>,
+{
+    let Particles { x, F, .. } = &state.particles;
+    for p in 0..x.len() {
+        if let Some(trouble) = trouble(&rule, &state.constants, &x[p], &F[p]) {
+            let error = describe(&state, settings, trouble, p, 0, T::zero());
+            return Err(SetupError::InitialState(error));
+        }
+    }
+    state.sort(rule);
+    let Material::NeoHookean { lambda, mu } = *material;
+    let kernel = if lambda == T::zero() {
+        with_law(rule, NeoHookeanNoLog { mu }, settings.integrator)
+    } else {
+        with_law(rule, NeoHookean { lambda, mu }, settings.integrator)
+    };
+    Ok((state, kernel))
+}
+
+/// The kernel for these weights and this law.
+fn with_law<T, R, L, const D: usize, const W: usize>(
+    rule: R,
+    law: L,
+    integrator: Integrator,
+) -> Kernel<T, D>
+where
+    T: RealField + Copy,
+    R: Rule<T, D, W>,
+    L: Law<T>,
+{
+    match integrator {
+        Integrator::Usl | Integrator::Cd => {
+            Box::new(move |s, b, t, scale| step_usl(s, (rule, law), b, t, scale))
+        }
+        Integrator::Musl => Box::new(move |s, b, t, scale| step_musl(s, (rule, law), b, t, scale)),
+        Integrator::Usf => Box::new(move |s, b, t, scale| step_usf(s, (rule, law), b, t, scale)),
+    }
+}
+
+/// The error for a particle in trouble, with the figures of its present state.
+fn describe<T: RealField + Copy, const D: usize>(
+    state: &State<T, D>,
+    settings: &Settings<T>,
+    trouble: Trouble,
+    particle: usize,
+    step: usize,
+    time: T,
+) -> StepError {
+    let (x, F) = (&state.particles.x[particle], &state.particles.F[particle]);
+    let position = x.iter().map(|&x| figure(x)).collect();
+    let (time, J) = (figure(time), figure(determinant(F)));
+    match trouble {
+        Trouble::Inverted => StepError::Inverted { step, time, particle, J },
+        Trouble::NotFinite => StepError::NotFinite { step, time, particle, position, J },
+        Trouble::LeftGrid => {
+            let axis = state.constants.axis_outside(x).unwrap_or(0);
+            let (lower, upper) = state.constants.range(axis);
+            let (lower, upper) = (figure(lower), figure(upper));
+            StepError::LeftGrid { step, time, particle, position, axis, lower, upper }
+        }
+        Trouble::TooLarge => {
+            let l0 = &state.particles.half_size;
+            let l = match settings.shape {
+                Shape::Gimp => SVector::from_fn(|a, _| (l0[a] * F[(a, a)]).abs()),
+                Shape::Linear | Shape::Ugimp => *l0,
+            };
+            let spacing = state.constants.spacing();
+            let axis = axis_too_large(&(l / spacing)).unwrap_or(0);
+            let limit = figure(spacing) * HALF_SIZE_LIMIT;
+            StepError::TooLarge { step, time, particle, axis, half_size: figure(l[axis]), limit }
+        }
+    }
+}

@@ -1,0 +1,260 @@
+//! Weights of particles at grid nodes, as products over the axes.
+//!
+//! Lengths are in cells here (`h = 1`) and positions count from the lower corner of the grid: `xi = (x - lower) / h`,
+//! half-size `l` in cells. Gradients are per cell as well.
+
+use nalgebra::{RealField, SMatrix, SVector};
+
+use crate::grid::PAD_BELOW;
+use crate::tensor::real;
+
+/// Largest supported half-size of a particle box, in cells.
+pub(crate) const HALF_SIZE_LIMIT: f64 = 2.0;
+/// Nodes per axis that the widest box touches.
+pub(crate) const WIDE: usize = 6;
+
+/// Weights and gradients at `W` successive nodes of one axis.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct AxisWeights<T, const W: usize> {
+    /// Index of the first node, counted in the padded grid.
+    pub(crate) base: usize,
+    pub(crate) S: [T; W],
+    pub(crate) G: [T; W],
+}
+
+/// A particle's weights at `W^D` nodes: one factor per axis.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stencil<T, const D: usize, const W: usize> {
+    pub(crate) axes: [AxisWeights<T, W>; D],
+}
+
+/// A kind of weights; `W` is the number of nodes per axis that it usually needs.
+pub(crate) trait Rule<T: RealField + Copy, const D: usize, const W: usize>:
+    Copy + Send + Sync + 'static
+{
+    /// Half-sizes of the box of a particle with deformation gradient `F`, in cells.
+    fn half_size(&self, F: &SMatrix<T, D, D>) -> SVector<T, D>;
+
+    /// The weights along one axis, for a half-size that is not `wide`.
+    fn along_axis(xi: T, l: T) -> AxisWeights<T, W>;
+
+    /// Weights of a particle whose box is not `wide`.
+    #[inline(always)]
+    fn stencil(&self, xi: &SVector<T, D>, l: &SVector<T, D>) -> Stencil<T, D, W> {
+        Stencil { axes: std::array::from_fn(|a| Self::along_axis(xi[a], l[a])) }
+    }
+}
+
+/// Hat functions at the particle's centre.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Hat;
+
+impl<T: RealField + Copy, const D: usize> Rule<T, D, 2> for Hat {
+    #[inline(always)]
+    fn half_size(&self, _F: &SMatrix<T, D, D>) -> SVector<T, D> {
+        SVector::zeros()
+    }
+
+    #[inline(always)]
+    fn along_axis(xi: T, _l: T) -> AxisWeights<T, 2> {
+        let (base, node) = node_below(xi);
+        let r = xi - node;
+        AxisWeights { base, S: [T::one() - r, r], G: [-T::one(), T::one()] }
+    }
+}
+
+/// GIMP weights for boxes of fixed size, half-sizes in cells ("uGIMP").
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FixedBox<T, const D: usize>(pub(crate) SVector<T, D>);
+
+impl<T: RealField + Copy, const D: usize> Rule<T, D, 3> for FixedBox<T, D> {
+    #[inline(always)]
+    fn half_size(&self, _F: &SMatrix<T, D, D>) -> SVector<T, D> {
+        self.0
+    }
+
+    #[inline(always)]
+    fn along_axis(xi: T, l: T) -> AxisWeights<T, 3> {
+        gimp_axis(xi, l)
+    }
+}
+
+/// GIMP weights for boxes that stretch with the diagonal of F, reference half-sizes in cells (contiguous particles).
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct StretchingBox<T, const D: usize>(pub(crate) SVector<T, D>);
+
+impl<T: RealField + Copy, const D: usize> Rule<T, D, 3> for StretchingBox<T, D> {
+    #[inline(always)]
+    fn half_size(&self, F: &SMatrix<T, D, D>) -> SVector<T, D> {
+        // A quarter turn makes F_aa zero, and the weights divide by l.
+        let smallest = real::<T>(1e-6);
+        SVector::from_fn(|a, _| (self.0[a] * F[(a, a)]).abs().max(smallest))
+    }
+
+    #[inline(always)]
+    fn along_axis(xi: T, l: T) -> AxisWeights<T, 3> {
+        gimp_axis(xi, l)
+    }
+}
+
+/// Whether a box may touch more than three nodes along some axis.
+#[inline(always)]
+pub(crate) fn wide<T: RealField + Copy, const D: usize>(l: &SVector<T, D>) -> bool {
+    l.iter().any(|&l| l > real(0.5))
+}
+
+/// Index in the padded grid of the node below `s`, and that node's position. Callers have seen to it that
+/// `s >= -PAD_BELOW`.
+#[inline(always)]
+fn node_below<T: RealField + Copy>(s: T) -> (usize, T) {
+    let base = nalgebra::convert_unchecked::<T, f64>(s + real(PAD_BELOW as f64)) as i32;
+    (base as usize, real(f64::from(base - PAD_BELOW as i32)))
+}
+
+/// Index of the first node along an axis, as in the weights.
+#[inline(always)]
+pub(crate) fn first_layer<T: RealField + Copy>(xi: T, l: T) -> usize {
+    node_below(xi - l).0
+}
+
+/// GIMP weights along one axis for `0 < l <= 1/2`.
+///
+/// For r = |xi - node|: `1 - (r^2 + l^2) / (2 l)` up to l, `1 - r` up to `1 - l`, `(1 + l - r)^2 / (4 l)` up to `1 + l`.
+/// The middle node takes what the outer two leave, which is the same and keeps the sum at one.
+#[inline(always)]
+fn gimp_axis<T: RealField + Copy>(xi: T, l: T) -> AxisWeights<T, 3> {
+    let one = T::one();
+    let (base, node) = node_below(xi - l);
+    let r = xi - node;
+    let half = real::<T>(0.5) / l;
+    let quarter = half * real(0.5);
+    let (near, far) = (one + l - r, (r + l - one).max(T::zero()));
+    let (S0, G0) =
+        if r < one - l { (one - r, -one) } else { (near * near * quarter, -near * half) };
+    let (S2, G2) = (far * far * quarter, far * half);
+    AxisWeights { base, S: [S0, one - S0 - S2, S2], G: [G0, -G0 - G2, G2] }
+}
+
+/// Exact mean of the hat functions over the box, for any `0 < l <= HALF_SIZE_LIMIT`.
+#[inline]
+fn wide_axis<T: RealField + Copy>(xi: T, l: T) -> AxisWeights<T, WIDE> {
+    let one = T::one();
+    let (base, node) = node_below(xi - l);
+    let edge = xi - l - node;
+    let scale = real::<T>(0.5) / l;
+    let hat = |s: T| (one - s.abs()).max(T::zero());
+    // The hat's antiderivative that vanishes at the centre.
+    let integral = |s: T| {
+        let s = s.clamp(-one, one);
+        s - s * s.abs() * real(0.5)
+    };
+    let from = |k: usize| edge - real(k as f64);
+    AxisWeights {
+        base,
+        S: std::array::from_fn(|k| (integral(from(k) + l + l) - integral(from(k))) * scale),
+        G: std::array::from_fn(|k| (hat(from(k) + l + l) - hat(from(k))) * scale),
+    }
+}
+
+/// Weights of a particle whose box is `wide` along some axis.
+#[inline(never)]
+pub(crate) fn wide_stencil<T: RealField + Copy, const D: usize>(
+    xi: &SVector<T, D>,
+    l: &SVector<T, D>,
+) -> Stencil<T, D, WIDE> {
+    Stencil { axes: std::array::from_fn(|a| wide_axis(xi[a], l[a])) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Weight and gradient of every node of one axis, by its position.
+    fn spread<const W: usize>(w: &AxisWeights<f64, W>) -> Vec<(f64, f64, f64)> {
+        (0..W).map(|k| ((w.base + k) as f64 - PAD_BELOW as f64, w.S[k], w.G[k])).collect()
+    }
+
+    fn at(spread: &[(f64, f64, f64)], node: f64) -> (f64, f64) {
+        spread.iter().find(|s| s.0 == node).map_or((0.0, 0.0), |s| (s.1, s.2))
+    }
+
+    fn check<const W: usize>(w: &AxisWeights<f64, W>, xi: f64) -> Result<(), TestCaseError> {
+        let nodes = spread(w);
+        prop_assert!((nodes.iter().map(|n| n.1).sum::<f64>() - 1.0).abs() < 1e-14);
+        prop_assert!(nodes.iter().map(|n| n.2).sum::<f64>().abs() < 1e-14);
+        prop_assert!((nodes.iter().map(|n| n.0 * n.1).sum::<f64>() - xi).abs() < 1e-12);
+        prop_assert!((nodes.iter().map(|n| n.0 * n.2).sum::<f64>() - 1.0).abs() < 1e-12);
+        prop_assert!(nodes.iter().all(|n| n.1 >= 0.0));
+        Ok(())
+    }
+
+    fn hat(xi: f64) -> AxisWeights<f64, 2> {
+        <Hat as Rule<f64, 1, 2>>::along_axis(xi, 0.0)
+    }
+
+    /// The formula as it is printed.
+    fn printed(r: f64, l: f64) -> f64 {
+        let r = r.abs();
+        if r < l {
+            1.0 - (r * r + l * l) / (2.0 * l)
+        } else if r < 1.0 - l {
+            1.0 - r
+        } else if r < 1.0 + l {
+            (1.0 + l - r).powi(2) / (4.0 * l)
+        } else {
+            0.0
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn linear_fields_are_reproduced(xi in 0.0..20.0_f64, l in 1e-3..0.5_f64, wide in 1e-2..2.0_f64) {
+            check(&hat(xi), xi)?;
+            check(&gimp_axis(xi, l), xi)?;
+            check(&wide_axis(xi, wide), xi)?;
+        }
+
+        #[test]
+        fn the_formula_is_the_exact_integral(xi in 0.0..20.0_f64, l in 1e-2..0.5_f64) {
+            let (formula, exact) = (spread(&gimp_axis(xi, l)), spread(&wide_axis(xi, l)));
+            for &(node, S, G) in &exact {
+                let (S1, G1) = at(&formula, node);
+                prop_assert!((S - S1).abs() < 1e-13 && (G - G1).abs() < 1e-12);
+                prop_assert!((S - printed(xi - node, l)).abs() < 1e-13);
+            }
+        }
+
+        #[test]
+        fn weights_are_continuous_where_the_formula_changes(xi in 0.0..20.0_f64) {
+            let (below, above) = (spread(&gimp_axis(xi, 0.5)), spread(&wide_axis(xi, 0.5 + 1e-12)));
+            for &(node, S, G) in &above {
+                let (S1, G1) = at(&below, node);
+                prop_assert!((S - S1).abs() < 1e-11 && (G - G1).abs() < 1e-11);
+            }
+        }
+
+        #[test]
+        fn gradients_are_derivatives(xi in 0.0..20.0_f64, l in 1e-2..0.5_f64, wide in 0.5..2.0_f64) {
+            let d = 1e-7;
+            for (minus, here, plus) in [
+                (spread(&gimp_axis(xi - d, l)), spread(&gimp_axis(xi, l)), spread(&gimp_axis(xi + d, l))),
+                (spread(&wide_axis(xi - d, wide)), spread(&wide_axis(xi, wide)), spread(&wide_axis(xi + d, wide))),
+            ] {
+                for &(node, _, G) in &here {
+                    let slope = (at(&plus, node).0 - at(&minus, node).0) / (2.0 * d);
+                    prop_assert!((G - slope).abs() < 1e-4, "{} {}", G, slope);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_stretching_box_follows_the_diagonal_of_F() {
+        let rule = StretchingBox(SVector::<f64, 2>::new(0.25, 0.125));
+        let F = SMatrix::<f64, 2, 2>::new(1.5, 0.3, -0.2, 0.0);
+        assert_eq!(rule.half_size(&F), SVector::<f64, 2>::new(0.375, 1e-6));
+        assert!(!wide(&rule.half_size(&F)));
+        assert!(wide(&SVector::<f64, 2>::new(0.25, 0.6)));
+    }
+}
