@@ -1,1 +1,35 @@
-//! To come.
+//! Measures how far field code and a solver are from a manufactured solution.
+//!
+//! - [`check`] proves the fields of a solution against each other, by finite differences and by the solver's own
+//!   constitutive law, and the declared boundary conditions at sampled boundary points.
+//! - [`run`] simulates one [`Case`] and measures the errors of displacement, velocity, deformation gradient and
+//!   stress; [`converge`] does so for a series of grids or time steps and adds the orders of accuracy.
+//! - [`evaluate()`] gives the exact fields at a point.
+//!
+//! Everything here takes a solution as a value, never by its name, and knows nothing of terminals or arguments.
+//! Lengths, times and stresses are in the units of the solution; errors are not divided by anything.
+
+mod case;
+mod check;
+mod difference;
+mod evaluate;
+mod frames;
+mod norms;
+mod order;
+mod points;
+mod scene;
+mod study;
+
+pub use case::{
+    Arithmetic, Case, CaseError, Outputs, Plan, Progress, Row, Start, Status, plan, run,
+};
+pub use check::{
+    BLUNT, CheckError, CheckReport, Finding, OWN_ERROR_FACTOR, TOLERANCE, Verdict, check,
+};
+pub use evaluate::{FieldRow, WrongLength, evaluate};
+pub use frames::FrameOutput;
+pub use mmsmith_mpm::{Integrator, Shape};
+pub use norms::{PerField, PerNorm};
+pub use order::Order;
+pub use scene::{Extent, SceneError};
+pub use study::{Study, StudyError, Sweep, converge};

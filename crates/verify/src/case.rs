@@ -1,0 +1,548 @@
+//! One simulation: its settings, its run, and the row of errors that comes out.
+
+use std::fmt;
+use std::time::Instant;
+
+use mmsmith_mpm::{Integrator, Particles, Settings, SetupError, Shape, Simulation, StepError};
+use mmsmith_solutions::{AnySolution, Material, Real, Solution};
+use nalgebra::SVector;
+use rayon::prelude::*;
+use serde::{Serialize, Serializer};
+use thiserror::Error;
+
+use crate::frames::{FrameOutput, FrameWriter};
+use crate::norms::{PerField, PerNorm, Tally};
+use crate::scene::{Extent, Scene, SceneError};
+
+/// Particles in a group that one thread works on; fixed, so that sums do not depend on the number of threads.
+const GROUP: usize = 512;
+/// Steps that no run should have; a typing error in a CFL number reaches it easily.
+const MOST_STEPS: f64 = 1e12;
+
+/// How the centred-difference integrator gets its first velocity, half a step before the start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// The exact velocity at minus half a step.
+    Exact,
+    /// From the data at time zero: `v0 - dt/2 a0`.
+    Data,
+    /// The velocity at time zero, with the first step's acceleration halved.
+    Halved,
+}
+
+/// The settings of one simulation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Case {
+    /// The weights between particles and grid.
+    pub shape: Shape,
+    /// The time integrator.
+    pub integrator: Integrator,
+    /// The start of centred differences; the other integrators ignore it.
+    pub start: Start,
+    /// Number of cells along the solution's cell length.
+    pub cells: usize,
+    /// Particles in a cell along each direction.
+    pub per_cell: usize,
+    /// `dt c/h` asked for; the step is then shortened so that whole steps end at the end time.
+    pub cfl: f64,
+    /// The end time in periods of the solution.
+    pub periods: f64,
+    /// How much of an annulus is modelled; `None` chooses the quarter where symmetry allows it.
+    pub extent: Option<Extent>,
+}
+
+impl Default for Case {
+    /// The settings of the original study that gave the best accuracy, on 32 cells.
+    fn default() -> Self {
+        Self {
+            shape: Shape::Gimp,
+            integrator: Integrator::Cd,
+            start: Start::Halved,
+            cells: 32,
+            per_cell: 2,
+            cfl: 0.4,
+            periods: 1.0,
+            extent: None,
+        }
+    }
+}
+
+/// The precision in which the solver computes; errors are always measured in double precision.
+#[derive(Clone, Copy)]
+pub enum Arithmetic<'a> {
+    /// `f64`.
+    Double,
+    /// `f32`, with the solution built in that precision for the body force.
+    Single(&'a AnySolution<f32>),
+}
+
+/// How far a run or a study is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Progress {
+    /// The number of the case under way, from 0.
+    pub case: usize,
+    /// Steps done in it.
+    pub step: u64,
+    /// Steps to its end.
+    pub steps: u64,
+    /// The share of all work that is done, where a particle's step is the unit of work.
+    pub share: f64,
+}
+
+/// What a run tells and writes on its way.
+pub struct Outputs<'a> {
+    /// Called after every step.
+    pub progress: &'a mut dyn FnMut(Progress),
+    /// Particle files, if any are wanted.
+    pub frames: Option<&'a FrameOutput>,
+}
+
+/// How a run ended.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Status {
+    /// At the end time.
+    Ok,
+    /// The solver gave up.
+    Stopped(StepError),
+    /// A particle was further from its exact position than the body is large.
+    Unstable {
+        /// The step, from 1.
+        step: u64,
+        /// Its time.
+        time: f64,
+        /// The particle of largest error.
+        particle: usize,
+        /// Its error, a length.
+        error: f64,
+        /// The body's largest extent.
+        size: f64,
+    },
+}
+
+impl fmt::Display for Status {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Ok => f.write_str("ok"),
+            Self::Stopped(error) => error.fmt(f),
+            Self::Unstable { step, time, particle, error, size } => write!(
+                f,
+                "unstable: position error {error:.3e} exceeds the body's size {size:.3e} at step {step}, \
+                 t = {time:.6e}, particle {particle}"
+            ),
+        }
+    }
+}
+
+impl Serialize for Status {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// What one simulation gave.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// Number of cells along the cell length.
+    pub cells: usize,
+    /// Grid spacing, a length.
+    pub h: f64,
+    /// Time step.
+    pub dt: f64,
+    /// `dt c/h`.
+    pub cfl: f64,
+    /// Steps to the end time, whether or not the run got there.
+    pub steps: u64,
+    /// Number of particles.
+    pub particles: usize,
+    /// Wall-clock time of the steps alone, without set-up, measuring and writing, in seconds.
+    pub wall_s: f64,
+    /// Particles times steps done over `wall_s`.
+    pub particle_steps_per_s: f64,
+    /// How it ended.
+    pub status: Status,
+    /// The errors until then.
+    pub errors: PerField<PerNorm<f64>>,
+}
+
+/// Why a case could not be run.
+#[derive(Debug, Error)]
+pub enum CaseError {
+    /// A setting that makes no sense.
+    #[error("{setting} = {value}: it must be {admissible}")]
+    Setting {
+        /// Which.
+        setting: &'static str,
+        /// Its value.
+        value: String,
+        /// What would be right.
+        admissible: &'static str,
+    },
+    /// More steps than anybody can wait for.
+    #[error(
+        "the end time {end:e} with steps of {dt:e} takes {steps:e} steps; at most {MOST_STEPS:e} are allowed"
+    )]
+    TooManySteps {
+        /// The end time.
+        end: f64,
+        /// The time step.
+        dt: f64,
+        /// The number of steps.
+        steps: f64,
+    },
+    /// The solution of the body force and the exact one differ in dimension, or have one that is not known here.
+    #[error(
+        "the solutions of both precisions must have one, two or three dimensions, and the same"
+    )]
+    Dimension,
+    /// The solution has no place on a grid.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The solver refused the set-up.
+    #[error(transparent)]
+    Setup(#[from] SetupError),
+    /// A particle file could not be written.
+    #[error(transparent)]
+    Frames(#[from] mmsmith_vtk::Error),
+}
+
+impl Case {
+    /// Checks the settings that need no solution to be judged.
+    ///
+    /// # Errors
+    ///
+    /// [`CaseError::Setting`] for a count of zero, or a number that is not positive and finite.
+    pub fn validate(&self) -> Result<(), CaseError> {
+        for (setting, value) in [("cells", self.cells), ("ppc", self.per_cell)] {
+            if value == 0 {
+                let value = value.to_string();
+                return Err(CaseError::Setting { setting, value, admissible: "at least 1" });
+            }
+        }
+        for (setting, value) in [("cfl", self.cfl), ("periods", self.periods)] {
+            if !(value > 0.0 && value.is_finite()) {
+                let (value, admissible) = (format!("{value:?}"), "a positive number");
+                return Err(CaseError::Setting { setting, value, admissible });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The steps of a run: `count` of equal length `dt` that end exactly at the end time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Steps {
+    count: u64,
+    dt: f64,
+    cfl: f64,
+}
+
+impl Steps {
+    fn new(case: &Case, end: f64, spacing: f64, speed: f64) -> Result<Self, CaseError> {
+        let longest = case.cfl * spacing / speed;
+        let exact = end / longest;
+        // Slightly more than a whole number is rounding, not another step.
+        let count = (exact - 1e-9).ceil().max(1.0);
+        if count.is_nan() || count > MOST_STEPS {
+            return Err(CaseError::TooManySteps { end, dt: longest, steps: count });
+        }
+        let dt = end / count;
+        let is_whole = (exact - count).abs() <= 1e-9;
+        let cfl = if is_whole { case.cfl } else { dt * speed / spacing };
+        Ok(Self { count: count as u64, dt, cfl })
+    }
+}
+
+/// What a case comes to, known without running it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plan {
+    /// Number of steps.
+    pub steps: u64,
+    /// Particles, estimated.
+    pub particles: f64,
+    /// Memory in bytes, estimated.
+    pub bytes: f64,
+}
+
+/// Judges a case without running it or allocating memory for it.
+///
+/// # Errors
+///
+/// [`CaseError`] for settings that cannot be run.
+pub fn plan(
+    exact: &AnySolution<f64>,
+    arithmetic: Arithmetic<'_>,
+    case: &Case,
+) -> Result<Plan, CaseError> {
+    let scalar = match arithmetic {
+        Arithmetic::Double => size_of::<f64>(),
+        Arithmetic::Single(_) => size_of::<f32>(),
+    };
+    match exact {
+        AnySolution::One(s) => plan_in(s.as_ref(), scalar, case),
+        AnySolution::Two(s) => plan_in(s.as_ref(), scalar, case),
+        AnySolution::Three(s) => plan_in(s.as_ref(), scalar, case),
+        _ => Err(CaseError::Dimension),
+    }
+}
+
+fn plan_in<const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    scalar: usize,
+    case: &Case,
+) -> Result<Plan, CaseError> {
+    let (scene, steps) = prepare(exact, case)?;
+    Ok(Plan {
+        steps: steps.count,
+        particles: scene.particles_expected(case.per_cell),
+        bytes: scene.bytes_expected(case.per_cell, scalar),
+    })
+}
+
+/// The scene and the steps of a case.
+fn prepare<const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    case: &Case,
+) -> Result<(Scene<D>, Steps), CaseError> {
+    case.validate()?;
+    let end = case.periods * exact.period();
+    let scene = Scene::new(exact, case, end)?;
+    let steps = Steps::new(case, end, scene.spacing, exact.wave_speed())?;
+    Ok((scene, steps))
+}
+
+/// Runs one simulation of `exact` and measures its errors after every step.
+///
+/// The solver starts from the exact positions, velocities and deformation gradients at time zero and is driven
+/// by the body force at the reference positions. `u` is compared as `(x - X) - u(X, t)`, `v` at the time where
+/// the integrator stores it, `F` directly, and `P` as the solver's own law gives it for the particle's `F`.
+/// A run that the solver gives up, or whose particles leave the exact ones by more than the body's size, ends
+/// early with a [`Status`] that says so; it is not an error of this function.
+///
+/// The errors do not depend on the number of threads.
+///
+/// # Errors
+///
+/// [`CaseError`] for settings that cannot be run, and for particle files that cannot be written.
+pub fn run(
+    exact: &AnySolution<f64>,
+    arithmetic: Arithmetic<'_>,
+    case: &Case,
+    outputs: &mut Outputs<'_>,
+) -> Result<Row, CaseError> {
+    use AnySolution::{One, Three, Two};
+    match (exact, arithmetic) {
+        (One(s), Arithmetic::Double) => run_in(s.as_ref(), s.as_ref(), case, outputs),
+        (Two(s), Arithmetic::Double) => run_in(s.as_ref(), s.as_ref(), case, outputs),
+        (Three(s), Arithmetic::Double) => run_in(s.as_ref(), s.as_ref(), case, outputs),
+        (One(s), Arithmetic::Single(One(m))) => run_in(s.as_ref(), m.as_ref(), case, outputs),
+        (Two(s), Arithmetic::Single(Two(m))) => run_in(s.as_ref(), m.as_ref(), case, outputs),
+        (Three(s), Arithmetic::Single(Three(m))) => run_in(s.as_ref(), m.as_ref(), case, outputs),
+        _ => Err(CaseError::Dimension),
+    }
+}
+
+fn run_in<T: Real, const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    model: &dyn Solution<T, D>,
+    case: &Case,
+    outputs: &mut Outputs<'_>,
+) -> Result<Row, CaseError> {
+    let (scene, steps) = prepare(exact, case)?;
+    let time_step: T = Real::from_f64(steps.dt);
+    // In single precision the solver's step is a rounded one, and its time is a multiple of that.
+    let dt = time_step.to_f64();
+
+    let grid = scene.grid::<T>();
+    let mut particles = scene.particles(&grid, case.per_cell, exact.density());
+    if particles.is_empty() {
+        return Err(SceneError::Empty { cells: case.cells }.into());
+    }
+    set_in_motion(&mut particles, exact, case, dt);
+    let settings = Settings {
+        shape: case.shape,
+        integrator: case.integrator,
+        time_step,
+        halve_first_acceleration: case.integrator == Integrator::Cd && case.start == Start::Halved,
+    };
+    let mut simulation = Simulation::new(grid, particles, law(model.material())?, settings)?;
+    let body_force = |X: &[SVector<T, D>], t: T, b: &mut [SVector<T, D>]| {
+        // The solver calls this from its own threads, each with a part of the particles.
+        b.iter_mut().zip(X).for_each(|(b, X)| *b = model.body_force(X, t));
+    };
+
+    let mut frames = match outputs.frames {
+        Some(output) => Some(FrameWriter::new(output, steps.count)?),
+        None => None,
+    };
+    if let Some(frames) = &mut frames {
+        frames.write(&simulation, exact, 0, 0.0)?;
+    }
+    let lag = simulation.velocity_lag().to_f64();
+    let at_start = measure(&simulation, exact, 0.0, lag).norms;
+    // Before the first step no velocity is stored yet that belongs to a time of the scheme.
+    let mut errors = PerField { v: PerNorm::default(), ..at_start };
+    let mut status = Status::Ok;
+    let (mut wall_s, mut done) = (0.0, 0_u64);
+    for step in 1..=steps.count {
+        let started = Instant::now();
+        let outcome = simulation.step(&body_force);
+        wall_s += started.elapsed().as_secs_f64();
+        if let Err(error) = outcome {
+            status = Status::Stopped(error);
+            break;
+        }
+        done = step;
+        let time = step as f64 * dt;
+        let measured = measure(&simulation, exact, time, lag);
+        errors = PerField::combine(&errors, &measured.norms, PerNorm::larger);
+        let error = measured.norms.u.linf;
+        if error > scene.size || error.is_nan() {
+            let particle = measured.worst_particle;
+            status = Status::Unstable { step, time, particle, error, size: scene.size };
+        }
+        if let Some(frames) = &mut frames {
+            frames.write(&simulation, exact, step, time)?;
+        }
+        let share = step as f64 / steps.count as f64;
+        (outputs.progress)(Progress { case: 0, step, steps: steps.count, share });
+        if status != Status::Ok {
+            break;
+        }
+    }
+    let count = simulation.particles().len();
+    let particle_steps = count as f64 * done as f64;
+    Ok(Row {
+        cells: case.cells,
+        h: scene.spacing,
+        dt,
+        cfl: steps.cfl,
+        steps: steps.count,
+        particles: count,
+        wall_s,
+        particle_steps_per_s: if wall_s > 0.0 { particle_steps / wall_s } else { 0.0 },
+        status,
+        errors,
+    })
+}
+
+/// The solver's hand-written law with the constants of the solution's material.
+pub(crate) fn law<T: Real>(material: Material<T>) -> Result<mmsmith_mpm::Material<T>, SceneError> {
+    match material {
+        Material::NeoHookean { lambda, mu } => Ok(mmsmith_mpm::Material::NeoHookean { lambda, mu }),
+        other => Err(SceneError::Unknown { what: "material", value: format!("{other:?}") }),
+    }
+}
+
+/// Gives particles at rest the exact state at time zero, with the velocity that the integrator starts from.
+fn set_in_motion<T: Real, const D: usize>(
+    particles: &mut Particles<T, D>,
+    exact: &dyn Solution<f64, D>,
+    case: &Case,
+    dt: f64,
+) {
+    for p in 0..particles.len() {
+        let X = particles.X[p].map(Real::to_f64);
+        let v = match (case.integrator, case.start) {
+            (Integrator::Cd, Start::Exact) => exact.velocity(&X, -dt / 2.0),
+            (Integrator::Cd, Start::Data) => {
+                exact.velocity(&X, 0.0) - exact.acceleration(&X, 0.0) * (dt / 2.0)
+            }
+            _ => exact.velocity(&X, 0.0),
+        };
+        particles.x[p] = (X + exact.displacement(&X, 0.0)).map(Real::from_f64);
+        particles.v[p] = v.map(Real::from_f64);
+        particles.F[p] = exact.deformation_gradient(&X, 0.0).map(Real::from_f64);
+    }
+}
+
+/// The errors at one instant.
+struct Measured {
+    norms: PerField<PerNorm<f64>>,
+    /// The particle of largest position error.
+    worst_particle: usize,
+}
+
+/// Compares every particle with the exact solution at `time`; the velocity `lag` earlier.
+fn measure<T: Real, const D: usize>(
+    simulation: &Simulation<T, D>,
+    exact: &dyn Solution<f64, D>,
+    time: f64,
+    lag: f64,
+) -> Measured {
+    let particles = simulation.particles();
+    let count = particles.len();
+    let group = |g: usize| {
+        let mut tally = PerField::<Tally>::default();
+        let mut worst = (0.0, g * GROUP);
+        for p in g * GROUP..count.min((g + 1) * GROUP) {
+            let X = particles.X[p].map(Real::to_f64);
+            let F = particles.F[p];
+            let displacement = particles.x[p].map(Real::to_f64) - X;
+            let u = (displacement - exact.displacement(&X, time)).norm();
+            let v = (particles.v[p].map(Real::to_f64) - exact.velocity(&X, time - lag)).norm();
+            let exact_F = exact.deformation_gradient(&X, time);
+            // A particle that is inside out has no stress; the solver stops at its next step.
+            let P = simulation.material().first_piola_kirchhoff(&F).map_or(f64::NAN, |P| {
+                (P.map(Real::to_f64) - exact.first_piola_kirchhoff(&X, time)).norm()
+            });
+            tally.u.add(u);
+            tally.v.add(v);
+            tally.F.add((F.map(Real::to_f64) - exact_F).norm());
+            tally.P.add(P);
+            if u > worst.0 || u.is_nan() {
+                worst = (u, p);
+            }
+        }
+        (tally, worst)
+    };
+    let groups: Vec<_> = (0..count.div_ceil(GROUP)).into_par_iter().map(group).collect();
+    let mut total = PerField::<Tally>::default();
+    let mut worst = (0.0, 0);
+    for (tally, candidate) in &groups {
+        total = PerField::combine(&total, tally, Tally::join);
+        if candidate.0 > worst.0 || candidate.0.is_nan() {
+            worst = *candidate;
+        }
+    }
+    let norms = PerField::combine(&total, &total, |tally, _| tally.norms(count));
+    Measured { norms, worst_particle: worst.1 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_steps_keep_the_cfl_number_and_others_shorten_the_step() {
+        let case = Case { cfl: 0.4, ..Case::default() };
+        let steps = Steps::new(&case, 0.02, 1.0 / 16.0, 100.0).unwrap();
+        assert_eq!((steps.count, steps.cfl), (80, 0.4));
+        assert_eq!(steps.dt, 0.02 / 80.0);
+        let case = Case { cfl: 0.3, ..Case::default() };
+        let steps = Steps::new(&case, 0.02, 1.0 / 16.0, 100.0).unwrap();
+        assert_eq!(steps.count, 107);
+        assert!((steps.cfl - 32.0 / 107.0).abs() < 1e-15 && steps.cfl < 0.3);
+    }
+
+    #[test]
+    fn a_step_longer_than_the_end_time_becomes_one_step() {
+        let case = Case { cfl: 1e9, ..Case::default() };
+        assert_eq!(Steps::new(&case, 0.02, 0.1, 100.0).unwrap().count, 1);
+        let case = Case { cfl: 1e-300, ..Case::default() };
+        assert!(matches!(Steps::new(&case, 0.02, 0.1, 100.0), Err(CaseError::TooManySteps { .. })));
+    }
+
+    #[test]
+    fn senseless_settings_are_named() {
+        for (case, name) in [
+            (Case { cells: 0, ..Case::default() }, "cells = 0"),
+            (Case { per_cell: 0, ..Case::default() }, "ppc = 0"),
+            (Case { cfl: -0.4, ..Case::default() }, "cfl = -0.4"),
+            (Case { cfl: f64::NAN, ..Case::default() }, "cfl = NaN"),
+            (Case { periods: f64::INFINITY, ..Case::default() }, "periods = inf"),
+        ] {
+            let message = case.validate().unwrap_err().to_string();
+            assert!(message.starts_with(name), "{message}");
+        }
+    }
+}

@@ -1,0 +1,399 @@
+//! Are the fields of a solution what they claim to be?
+//!
+//! Every field is compared with one that follows from the field below it, by a route that shares no formula with
+//! it: `v` with the rate of `u`, `a` with the rate of `v`, `H` and `F` with the gradient of `u`, `J` with the
+//! determinant of `F`, `P` with the solver's hand-written law, and `b` with `a - Div P / rho0`. `u` itself is the
+//! definition; nothing lies below it. Derivatives are extrapolated finite differences that know their own error.
+
+use mmsmith_mpm::Material;
+use mmsmith_solutions::{AnySolution, Boundary, Condition, Fields, Solution};
+use nalgebra::{SMatrix, SVector};
+use serde::Serialize;
+use thiserror::Error;
+
+use crate::case::law;
+use crate::difference::derivative;
+use crate::points;
+use crate::scene::SceneError;
+
+/// A difference up to this multiple of the check's own estimated error is no evidence against a field.
+pub const OWN_ERROR_FACTOR: f64 = 8.0;
+/// Difference, relative to the field's scale, that is allowed beyond the check's own error.
+pub const TOLERANCE: f64 = 1e-9;
+/// Above this own error, relative to the field's scale and with its factor, a comparison proves nothing.
+pub const BLUNT: f64 = 1e-6;
+/// Longest difference step, as a share of the body's size and of the period.
+const REACH: f64 = 0.1;
+
+/// The outcome of a comparison.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// All differences are within what is allowed.
+    Passed,
+    /// A difference is too large, or not a number.
+    Failed,
+    /// The check's own error is too large to tell.
+    Inconclusive,
+}
+
+/// One comparison over all points, told by its worst point.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    /// What was judged: a field, or a boundary condition with its surface.
+    pub what: String,
+    /// What it was compared with.
+    pub against: &'static str,
+    /// The worst difference, in the field's unit.
+    pub difference: f64,
+    /// The check's own estimated error at that point, in the field's unit.
+    pub own_error: f64,
+    /// The largest magnitude of the terms compared, over all points: what tolerances are relative to.
+    pub scale: f64,
+    /// The difference allowed there: `OWN_ERROR_FACTOR own_error + TOLERANCE scale`.
+    pub allowed: f64,
+    /// The worst point's reference position.
+    pub X: Vec<f64>,
+    /// The worst point's time.
+    pub t: f64,
+    /// The outcome.
+    pub verdict: Verdict,
+}
+
+/// The outcome of all comparisons of one solution.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CheckReport {
+    /// The number of points sampled in the body; as many on each surface with a condition.
+    pub points: usize,
+    /// The comparisons of fields, then those of boundary conditions.
+    pub findings: Vec<Finding>,
+}
+
+impl CheckReport {
+    /// Whether every comparison passed; one that proved nothing did not.
+    #[must_use]
+    pub fn passed(&self) -> bool {
+        self.findings.iter().all(|finding| finding.verdict == Verdict::Passed)
+    }
+}
+
+/// Why a solution could not be checked.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum CheckError {
+    /// No points to look at.
+    #[error("a check needs at least one point")]
+    NoPoints,
+    /// The shape or the material is not known here.
+    #[error(transparent)]
+    Unknown(#[from] SceneError),
+    /// A boundary condition on a surface that the body does not have.
+    #[error("a boundary condition is declared on {0:?}, which the body does not have")]
+    NoSuchSurface(Boundary),
+    /// The solution's dimension is not known here.
+    #[error("the solution is not in one, two or three dimensions")]
+    Dimension,
+}
+
+/// Compares every field of `solution` with the field below it at `count` points of the body and times within one
+/// period, and every declared boundary condition at as many points of its surface.
+///
+/// The points are always the same. Difference stencils stay inside the body and the period.
+///
+/// # Errors
+///
+/// [`CheckError`] where there is nothing to check or no way to; a field found wrong is a [`Finding`], no error.
+pub fn check(solution: &AnySolution<f64>, count: usize) -> Result<CheckReport, CheckError> {
+    match solution {
+        AnySolution::One(s) => check_in(s.as_ref(), count),
+        AnySolution::Two(s) => check_in(s.as_ref(), count),
+        AnySolution::Three(s) => check_in(s.as_ref(), count),
+        _ => Err(CheckError::Dimension),
+    }
+}
+
+fn check_in<const D: usize>(
+    solution: &dyn Solution<f64, D>,
+    count: usize,
+) -> Result<CheckReport, CheckError> {
+    if count == 0 {
+        return Err(CheckError::NoPoints);
+    }
+    let domain = solution.domain();
+    let law = law(solution.material())?;
+    let size = points::size(&domain)
+        .ok_or_else(|| SceneError::Unknown { what: "shape", value: format!("{domain:?}") })?;
+    let samples: Vec<_> =
+        (0..count).filter_map(|n| points::interior(&domain, solution.period(), n)).collect();
+    let mut findings = field_findings(solution, &law, &samples, size);
+    for boundary in solution.boundaries() {
+        let places: Vec<_> = (0..count)
+            .map_while(|n| {
+                let (X, N) = points::surface(&domain, boundary.surface, n)?;
+                let t = solution.period() * points::quasirandom(n, D, D + 1);
+                Some((X, N, t))
+            })
+            .collect();
+        if places.is_empty() {
+            return Err(CheckError::NoSuchSurface(*boundary));
+        }
+        findings.extend(boundary_findings(solution, boundary, &places, &samples));
+    }
+    Ok(CheckReport { points: count, findings })
+}
+
+/// Collects the differences of one comparison until its scale is known.
+struct Comparison<const D: usize> {
+    what: String,
+    against: &'static str,
+    scale: f64,
+    /// Difference, own error and place of every point.
+    points: Vec<(f64, f64, SVector<f64, D>, f64)>,
+}
+
+impl<const D: usize> Comparison<D> {
+    fn new(what: impl Into<String>, against: &'static str) -> Self {
+        Self { what: what.into(), against, scale: 0.0, points: Vec::new() }
+    }
+
+    /// Adds a point; `scale` is the magnitude of the terms that were compared there.
+    fn add(&mut self, at: (&SVector<f64, D>, f64), difference: f64, own_error: f64, scale: f64) {
+        self.scale = self.scale.max(scale);
+        self.points.push((difference, own_error, *at.0, at.1));
+    }
+
+    fn finding(self) -> Finding {
+        let Self { what, against, scale, points } = self;
+        let allowed = |own_error: f64| OWN_ERROR_FACTOR * own_error + TOLERANCE * scale;
+        // NaN counts as the largest excess there is.
+        let excess = |difference: f64, own_error: f64| {
+            let ratio = difference / allowed(own_error);
+            if difference == 0.0 {
+                0.0
+            } else if ratio.is_nan() {
+                f64::INFINITY
+            } else {
+                ratio
+            }
+        };
+        // Where nothing differs, as in a body at rest, nothing was left open.
+        let blunt = points.iter().any(|&(difference, own, ..)| {
+            difference != 0.0 && OWN_ERROR_FACTOR * own > BLUNT * scale
+        });
+        let worst = points
+            .into_iter()
+            .max_by(|a, b| excess(a.0, a.1).total_cmp(&excess(b.0, b.1)))
+            .unwrap_or((f64::NAN, f64::NAN, SVector::zeros(), 0.0));
+        let (difference, own_error, X, t) = worst;
+        let allowed = allowed(own_error);
+        // Written so that NaN fails.
+        let verdict = if difference <= allowed {
+            if blunt { Verdict::Inconclusive } else { Verdict::Passed }
+        } else {
+            Verdict::Failed
+        };
+        let X = X.iter().copied().collect();
+        Finding { what, against, difference, own_error, scale, allowed, X, t, verdict }
+    }
+}
+
+/// The gradient of a vector field with respect to `X`, and its estimated error.
+fn gradient<const D: usize>(
+    field: impl Fn(&SVector<f64, D>) -> SVector<f64, D>,
+    X: &SVector<f64, D>,
+    reach: impl Fn(usize) -> f64,
+) -> (SMatrix<f64, D, D>, f64) {
+    let (mut value, mut error) = (SMatrix::<f64, D, D>::zeros(), 0.0_f64);
+    for axis in 0..D {
+        let along = derivative(|s| field(&with(X, axis, s)), X[axis], reach(axis));
+        value.set_column(axis, &along.value);
+        error = error.max(along.error);
+    }
+    (value, error)
+}
+
+/// `X` with one coordinate replaced.
+fn with<const D: usize>(X: &SVector<f64, D>, axis: usize, value: f64) -> SVector<f64, D> {
+    let mut moved = *X;
+    moved[axis] = value;
+    moved
+}
+
+fn field_findings<const D: usize>(
+    solution: &dyn Solution<f64, D>,
+    law: &Material<f64>,
+    samples: &[(SVector<f64, D>, f64)],
+    size: f64,
+) -> Vec<Finding> {
+    let Material::NeoHookean { lambda, mu } = *law else { return Vec::new() };
+    let stiffness = lambda.abs() + 2.0 * mu.abs();
+    let (domain, period, density) = (solution.domain(), solution.period(), solution.density());
+    let mut v = Comparison::new("v", "du/dt");
+    let mut a = Comparison::new("a", "dv/dt");
+    let mut H = Comparison::new("H", "du/dX");
+    let mut F = Comparison::new("F", "I + du/dX");
+    let mut J = Comparison::new("J", "det F");
+    let mut P = Comparison::new("P", "solver's law of F");
+    let mut b = Comparison::new("b", "a - Div P / rho0");
+    let mut together = Comparison::new("all at once", "each on its own");
+    for (X, t) in samples {
+        let at = (X, *t);
+        let own = separately(solution, X, *t);
+        let reach = |axis| points::reach(&domain, X, axis).min(REACH * size);
+        let reach_t = t.min(period - t).min(REACH * period);
+
+        let rate = derivative(|s| solution.displacement(X, s), *t, reach_t);
+        v.add(at, (own.v - rate.value).amax(), rate.error, own.v.amax().max(own.u.amax() / period));
+        let rate = derivative(|s| solution.velocity(X, s), *t, reach_t);
+        a.add(at, (own.a - rate.value).amax(), rate.error, own.a.amax().max(own.v.amax() / period));
+
+        let (slope, error) = gradient(|X| solution.displacement(X, *t), X, reach);
+        let scale = own.H.amax().max(own.u.amax() / size);
+        H.add(at, (own.H - slope).amax(), error, scale);
+        let strain = own.F - SMatrix::identity();
+        let rounding = f64::EPSILON * own.F.amax();
+        F.add(at, (strain - slope).amax(), error + rounding, scale);
+
+        let entries = own.F.norm().max(1.0).powi(D as i32);
+        let rounding = f64::EPSILON * entries;
+        J.add(at, (own.J - determinant(&own.F)).abs(), rounding, own.J.abs().max(1.0));
+
+        // F^-1 is bounded by its cofactors; the law forms F - F^-T from a rounded F.
+        let inverse = own.F.norm().powi(D as i32 - 1) / own.J.abs();
+        let rounding = f64::EPSILON * stiffness * (own.F.norm() + inverse) * inverse.max(1.0);
+        let expected = law.first_piola_kirchhoff(&own.F);
+        let difference = expected.map_or(f64::NAN, |expected| (own.P - expected).amax());
+        P.add(at, difference, rounding, own.P.amax().max(stiffness * own.H.amax()));
+
+        let (mut divergence, mut error) = (SVector::<f64, D>::zeros(), 0.0);
+        let mut terms = own.b.amax().max(own.a.amax());
+        for axis in 0..D {
+            let column = |s| -> SVector<f64, D> {
+                let X = with(X, axis, s);
+                solution.first_piola_kirchhoff(&X, *t).column(axis).into_owned()
+            };
+            let along = derivative(column, X[axis], reach(axis));
+            divergence += along.value;
+            error += along.error;
+            terms = terms.max(along.value.amax() / density);
+        }
+        let error = error / density + 4.0 * f64::EPSILON * terms;
+        let expected = own.a - divergence / density;
+        b.add(at, (own.b - expected).amax(), error, terms);
+
+        let all = solution.fields(X, *t);
+        together.add(at, disagreement(&all, &own, stiffness, terms), 0.0, 1.0);
+    }
+    [v, a, H, F, J, P, b, together].into_iter().map(Comparison::finding).collect()
+}
+
+/// The fields from the functions that give one each.
+fn separately<const D: usize>(
+    solution: &dyn Solution<f64, D>,
+    X: &SVector<f64, D>,
+    t: f64,
+) -> Fields<f64, D> {
+    Fields {
+        u: solution.displacement(X, t),
+        v: solution.velocity(X, t),
+        a: solution.acceleration(X, t),
+        H: solution.displacement_gradient(X, t),
+        F: solution.deformation_gradient(X, t),
+        J: solution.jacobian(X, t),
+        P: solution.first_piola_kirchhoff(X, t),
+        b: solution.body_force(X, t),
+    }
+}
+
+/// The largest difference between two sets of fields, each relative to its own magnitude.
+fn disagreement<const D: usize>(
+    one: &Fields<f64, D>,
+    other: &Fields<f64, D>,
+    stiffness: f64,
+    force: f64,
+) -> f64 {
+    // Rounding may differ where terms cancel, so each field is measured by the terms that it is made of.
+    let relative = |difference: f64, scale: f64| {
+        if difference == 0.0 { 0.0 } else { difference / scale }
+    };
+    let strain = other.H.amax();
+    [
+        relative((one.u - other.u).amax(), other.u.amax()),
+        relative((one.v - other.v).amax(), other.v.amax()),
+        relative((one.a - other.a).amax(), other.a.amax()),
+        relative((one.H - other.H).amax(), strain),
+        relative((one.F - other.F).amax(), 1.0),
+        relative((one.J - other.J).abs(), 1.0),
+        relative((one.P - other.P).amax(), stiffness * strain),
+        relative((one.b - other.b).amax(), force),
+    ]
+    .into_iter()
+    .fold(0.0, |largest, next| if next > largest || next.is_nan() { next } else { largest })
+}
+
+fn boundary_findings<const D: usize>(
+    solution: &dyn Solution<f64, D>,
+    boundary: &Boundary,
+    places: &[(SVector<f64, D>, SVector<f64, D>, f64)],
+    samples: &[(SVector<f64, D>, f64)],
+) -> Vec<Finding> {
+    let name = |what: &str| format!("{what} on {:?}", boundary.surface);
+    // Scales are those of the whole body: on the boundary itself everything may vanish.
+    let largest = |field: &dyn Fn(&SVector<f64, D>, f64) -> f64| {
+        samples.iter().map(|(X, t)| field(X, *t)).fold(0.0, f64::max)
+    };
+    let stress = largest(&|X, t| solution.first_piola_kirchhoff(X, t).amax());
+    let traction = |X, N: &SVector<f64, D>, t| solution.first_piola_kirchhoff(X, t) * N;
+    match boundary.condition {
+        Condition::Sliding | Condition::Symmetry => {
+            let length = largest(&|X, t| solution.displacement(X, t).amax());
+            let mut normal = Comparison::new(name("u.N"), "0");
+            let mut shear = Comparison::new(name("shear"), "0");
+            for (X, N, t) in places {
+                let u = solution.displacement(X, *t).dot(N);
+                normal.add((X, *t), u.abs(), 4.0 * f64::EPSILON * length, length);
+                let traction = traction(X, N, *t);
+                let tangential = traction - N * traction.dot(N);
+                shear.add((X, *t), tangential.amax(), 4.0 * f64::EPSILON * stress, stress);
+            }
+            vec![normal.finding(), shear.finding()]
+        }
+        Condition::TractionFree => {
+            let mut free = Comparison::new(name("P N"), "0");
+            for (X, N, t) in places {
+                let own_error = 16.0 * f64::EPSILON * stress;
+                free.add((X, *t), traction(X, N, *t).amax(), own_error, stress);
+            }
+            vec![free.finding()]
+        }
+        // The solution's own motion or traction is imposed: there is nothing to prove.
+        Condition::PrescribedTraction | Condition::PrescribedMotion => Vec::new(),
+    }
+}
+
+/// The determinant of a matrix of at most three rows.
+fn determinant<const D: usize>(m: &SMatrix<f64, D, D>) -> f64 {
+    match D {
+        1 => m[(0, 0)],
+        2 => m[(0, 0)] * m[(1, 1)] - m[(0, 1)] * m[(1, 0)],
+        _ => (0..3)
+            .map(|j| {
+                let (k, l) = ((j + 1) % 3, (j + 2) % 3);
+                m[(0, j)] * (m[(1, k)] * m[(2, l)] - m[(1, l)] * m[(2, k)])
+            })
+            .sum(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::matrix;
+
+    #[test]
+    fn determinants() {
+        assert_eq!(determinant(&matrix![3.0]), 3.0);
+        assert_eq!(determinant(&matrix![1.0, 2.0; 3.0, 4.0]), -2.0);
+        let m = matrix![2.0, 0.0, 1.0; 1.0, 3.0, 2.0; 1.0, 1.0, 4.0];
+        assert!((determinant(&m) - m.determinant()).abs() < 1e-14);
+    }
+}

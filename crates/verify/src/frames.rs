@@ -1,0 +1,169 @@
+//! Particle frames of a run for viewers.
+
+use std::path::PathBuf;
+
+use mmsmith_mpm::Simulation;
+use mmsmith_solutions::{Real, Solution};
+use mmsmith_vtk::{Array, Error, Frame, Series, Values};
+use nalgebra::{Matrix3, SMatrix, SVector};
+
+/// Where and how often particle files are written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FrameOutput {
+    /// The folder.
+    pub folder: PathBuf,
+    /// The name that the files begin with.
+    pub name: String,
+    /// How many frames, spread evenly over the steps; the first and the last state are always among them.
+    pub count: u64,
+}
+
+/// Writes the frames of one run.
+pub(crate) struct FrameWriter {
+    series: Series,
+    count: u64,
+    steps: u64,
+    /// The number of the next frame.
+    next: u64,
+}
+
+impl FrameWriter {
+    pub(crate) fn new(output: &FrameOutput, steps: u64) -> Result<Self, Error> {
+        let series = Series::create(&output.folder, &output.name)?;
+        // More frames than states there are would repeat some.
+        let count = output.count.clamp(2, steps + 1);
+        Ok(Self { series, count, steps, next: 0 })
+    }
+
+    /// Writes the state after `step` if it is one of those wanted.
+    pub(crate) fn write<T: Real, const D: usize>(
+        &mut self,
+        simulation: &Simulation<T, D>,
+        exact: &dyn Solution<f64, D>,
+        step: u64,
+        time: f64,
+    ) -> Result<(), Error> {
+        if step < step_of_frame(self.next, self.count, self.steps) {
+            return Ok(());
+        }
+        self.next += 1;
+        match frame(simulation, exact, step, time) {
+            Some(frame) => self.series.write(&frame).map(|_| ()),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The step at which frame `index` of `count` is written.
+fn step_of_frame(index: u64, count: u64, steps: u64) -> u64 {
+    // In 128 bits, since a long run's steps times frames may not fit into 64.
+    let (index, last, steps) = (u128::from(index), u128::from(count - 1), u128::from(steps));
+    ((2 * index * steps + last) / (2 * last)) as u64
+}
+
+/// The particles with what the solver holds and what is exact.
+///
+/// The velocity is the stored one, which centred differences hold half a step earlier. Stress is Cauchy's, from
+/// the solver's law, with the component normal to the plane in two dimensions. `None` if a particle has no
+/// stress because it is inside out: no viewer reads numbers that are none.
+fn frame<T: Real, const D: usize>(
+    simulation: &Simulation<T, D>,
+    exact: &dyn Solution<f64, D>,
+    step: u64,
+    time: f64,
+) -> Option<Frame> {
+    let particles = simulation.particles();
+    let law = simulation.material();
+    let count = particles.len();
+    let mut points = Vec::with_capacity(count);
+    let mut displacement = Vec::with_capacity(count);
+    let mut velocity = Vec::with_capacity(count);
+    let mut gradient = Vec::with_capacity(count);
+    let mut stress = Vec::with_capacity(count);
+    let mut von_mises = Vec::with_capacity(count);
+    let mut exact_displacement = Vec::with_capacity(count);
+    let mut error = Vec::with_capacity(count);
+    let mut error_magnitude = Vec::with_capacity(count);
+    let mut volume = Vec::with_capacity(count);
+    for p in 0..count {
+        let X = particles.X[p].map(Real::to_f64);
+        let x = particles.x[p].map(Real::to_f64);
+        let F = particles.F[p].map(Real::to_f64);
+        let u = exact.displacement(&X, time);
+        let delta = (x - X) - u;
+        points.push(padded(&x));
+        displacement.push(padded(&(x - X)));
+        velocity.push(padded(&particles.v[p].map(Real::to_f64)));
+        let F_3D = in_space(&F);
+        gradient.push(by_rows(&F_3D));
+        // In three dimensions, which gives the stress normal to the plane as well.
+        let F_solver = F_3D.map(Real::from_f64);
+        stress.push(by_rows(&law.cauchy(&F_solver)?.map(Real::to_f64)));
+        von_mises.push(law.von_mises(&F_solver)?.to_f64());
+        exact_displacement.push(padded(&u));
+        error.push(padded(&delta));
+        error_magnitude.push(delta.norm());
+        volume.push(F_3D.determinant() * particles.volume[p].to_f64());
+    }
+    let array = |name: &str, values| Array { name: name.into(), values };
+    Some(Frame {
+        time,
+        step,
+        points,
+        arrays: vec![
+            array("displacement", Values::Vector(displacement)),
+            array("velocity", Values::Vector(velocity)),
+            array("deformation_gradient", Values::Tensor(gradient)),
+            array("stress", Values::Tensor(stress)),
+            array("von_mises", Values::Scalar(von_mises)),
+            array("exact_displacement", Values::Vector(exact_displacement)),
+            array("error", Values::Vector(error)),
+            array("error_magnitude", Values::Scalar(error_magnitude)),
+            array("volume", Values::Scalar(volume)),
+            array("id", Values::Id((0..count as u64).collect())),
+        ],
+    })
+}
+
+/// Three components, those that do not exist zero.
+fn padded<const D: usize>(vector: &SVector<f64, D>) -> [f64; 3] {
+    std::array::from_fn(|i| if i < D { vector[i] } else { 0.0 })
+}
+
+/// The deformation gradient in space: what does not exist in the plane is not stretched.
+fn in_space<const D: usize>(F: &SMatrix<f64, D, D>) -> Matrix3<f64> {
+    Matrix3::from_fn(|i, j| match (i, j) {
+        _ if i < D && j < D => F[(i, j)],
+        _ if i == j => 1.0,
+        _ => 0.0,
+    })
+}
+
+/// Nine components row by row.
+fn by_rows(tensor: &Matrix3<f64>) -> [f64; 9] {
+    std::array::from_fn(|k| tensor[(k / 3, k % 3)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{matrix, vector};
+
+    #[test]
+    fn frames_are_spread_evenly_with_first_and_last() {
+        let steps = |count, total| -> Vec<u64> {
+            (0..count).map(|index| step_of_frame(index, count, total)).collect()
+        };
+        assert_eq!(steps(5, 80), [0, 20, 40, 60, 80]);
+        assert_eq!(steps(2, 7), [0, 7]);
+        assert_eq!(steps(4, 3), [0, 1, 2, 3]);
+        assert_eq!(step_of_frame(19, 20, u64::MAX), u64::MAX);
+    }
+
+    #[test]
+    fn plane_quantities_are_padded_row_by_row() {
+        let F = in_space(&matrix![1.0, 2.0; 3.0, 4.0]);
+        assert_eq!(by_rows(&F), [1.0, 2.0, 0.0, 3.0, 4.0, 0.0, 0.0, 0.0, 1.0]);
+        assert_eq!(padded(&vector![1.0, 2.0]), [1.0, 2.0, 0.0]);
+    }
+}

@@ -1,0 +1,132 @@
+//! Error norms over particles and steps.
+//!
+//! The differences between computed and exact fields are formed first and squared afterwards; their magnitudes
+//! are Euclidean norms of vectors and Frobenius norms of tensors. Partial sums belong to fixed groups of
+//! particles and are added in order, so the result does not depend on the number of threads.
+
+use serde::Serialize;
+
+/// One value for each field whose error is measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct PerField<N> {
+    /// Displacement, a length.
+    pub u: N,
+    /// Velocity, at the time where the scheme stores it.
+    pub v: N,
+    /// Deformation gradient, dimensionless.
+    pub F: N,
+    /// First Piola-Kirchhoff stress.
+    pub P: N,
+}
+
+/// One value for each norm.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct PerNorm<V> {
+    /// Largest magnitude over all particles and steps.
+    pub linf: V,
+    /// Root of the mean square over the particles, the largest over the steps.
+    pub l2: V,
+    /// Mean magnitude over the particles, the largest over the steps.
+    pub l1: V,
+}
+
+impl<N> PerField<N> {
+    /// The fields' names with their values, in the order of the struct.
+    pub fn named(&self) -> [(&'static str, &N); 4] {
+        [("u", &self.u), ("v", &self.v), ("F", &self.F), ("P", &self.P)]
+    }
+
+    /// Builds one from a function of the field, given as a selector that works on any `PerField`.
+    pub(crate) fn combine<A, B>(a: &PerField<A>, b: &PerField<B>, f: impl Fn(&A, &B) -> N) -> Self {
+        Self { u: f(&a.u, &b.u), v: f(&a.v, &b.v), F: f(&a.F, &b.F), P: f(&a.P, &b.P) }
+    }
+}
+
+impl<V> PerNorm<V> {
+    /// The norms' names with their values, in the order of the struct.
+    pub fn named(&self) -> [(&'static str, &V); 3] {
+        [("linf", &self.linf), ("l2", &self.l2), ("l1", &self.l1)]
+    }
+}
+
+/// The larger of two magnitudes; unlike `f64::max`, NaN wins, so that it cannot hide.
+fn larger(a: f64, b: f64) -> f64 {
+    if a >= b || a.is_nan() { a } else { b }
+}
+
+/// Sums over one group of particles at one step.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Tally {
+    pub(crate) max: f64,
+    square: f64,
+    sum: f64,
+}
+
+impl Tally {
+    pub(crate) fn add(&mut self, magnitude: f64) {
+        self.max = larger(self.max, magnitude);
+        self.square += magnitude * magnitude;
+        self.sum += magnitude;
+    }
+
+    /// Appends the sums of the next group.
+    pub(crate) fn join(&self, next: &Self) -> Self {
+        Self {
+            max: larger(self.max, next.max),
+            square: self.square + next.square,
+            sum: self.sum + next.sum,
+        }
+    }
+
+    /// The norms over `count` particles.
+    pub(crate) fn norms(&self, count: usize) -> PerNorm<f64> {
+        let count = count as f64;
+        PerNorm { linf: self.max, l2: (self.square / count).sqrt(), l1: self.sum / count }
+    }
+}
+
+impl PerNorm<f64> {
+    /// Norm by norm, the larger of the two.
+    pub(crate) fn larger(&self, other: &Self) -> Self {
+        Self {
+            linf: larger(self.linf, other.linf),
+            l2: larger(self.l2, other.l2),
+            l1: larger(self.l1, other.l1),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn norms_of_a_known_set() {
+        let mut first = Tally::default();
+        first.add(3.0);
+        let mut second = Tally::default();
+        second.add(4.0);
+        second.add(0.0);
+        let norms = first.join(&second).norms(3);
+        assert_eq!(norms.linf, 4.0);
+        assert!((norms.l2 - (25.0_f64 / 3.0).sqrt()).abs() < 1e-15);
+        assert!((norms.l1 - 7.0 / 3.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn not_a_number_is_never_hidden_by_a_number() {
+        for magnitudes in [[1.0, f64::NAN], [f64::NAN, 1.0]] {
+            let mut tally = Tally::default();
+            magnitudes.iter().for_each(|m| tally.add(*m));
+            assert!(tally.norms(2).linf.is_nan());
+        }
+        assert!(larger(f64::NAN, 2.0).is_nan() && larger(2.0, f64::NAN).is_nan());
+    }
+
+    #[test]
+    fn the_largest_over_steps_is_taken_norm_by_norm() {
+        let a = PerNorm { linf: 2.0, l2: 1.0, l1: 0.5 };
+        let b = PerNorm { linf: 1.0, l2: 1.5, l1: 0.25 };
+        assert_eq!(a.larger(&b), PerNorm { linf: 2.0, l2: 1.5, l1: 0.5 });
+    }
+}

@@ -1,0 +1,147 @@
+//! Deterministic, evenly spread sample points in a body, on its boundary and in time.
+//!
+//! The sequence is the additive recurrence with the generalised golden ratio: coordinate `j` of point `n` is the
+//! fractional part of `1/2 + n g^-(j+1)`, `g` the positive root of `g^(d+1) = g + 1`. M. Roberts, "The
+//! unreasonable effectiveness of quasirandom sequences" (2018).
+
+use mmsmith_solutions::{Domain, Surface};
+use nalgebra::SVector;
+
+/// Share of the body's size, and of the time span, that samples keep away from the ends.
+///
+/// It leaves every sample room for difference stencils inside the body.
+pub(crate) const MARGIN: f64 = 0.02;
+
+/// Coordinate `j` of point `n` of the sequence in `[0, 1)^dimension`.
+pub(crate) fn quasirandom(n: usize, j: usize, dimension: usize) -> f64 {
+    let mut ratio = 2.0_f64;
+    for _ in 0..64 {
+        ratio = (1.0 + ratio).powf(1.0 / (dimension as f64 + 1.0));
+    }
+    (0.5 + (n as f64 + 1.0) * ratio.powi(-(j as i32 + 1))).fract()
+}
+
+/// `q` in `[0, 1)` moved into `[MARGIN, 1 - MARGIN)`.
+fn inside(q: f64) -> f64 {
+    MARGIN + (1.0 - 2.0 * MARGIN) * q
+}
+
+/// Sample `n`: a point inside the body and a time inside `[0, span]`.
+///
+/// `None` for a shape that is not known here.
+pub(crate) fn interior<const D: usize>(
+    domain: &Domain<f64, D>,
+    span: f64,
+    n: usize,
+) -> Option<(SVector<f64, D>, f64)> {
+    let q = |j| quasirandom(n, j, D + 1);
+    let t = span * inside(q(D));
+    let X = match domain {
+        Domain::Box { lower, upper } => {
+            SVector::from_fn(|j, _| lower[j] + (upper[j] - lower[j]) * inside(q(j)))
+        }
+        Domain::Annulus { inner, outer } => on_circle(inner + (outer - inner) * inside(q(0)), q(1)),
+        _ => return None,
+    };
+    Some((X, t))
+}
+
+/// The point at a distance `R` from the origin, `turn` of a full turn from the first axis.
+fn on_circle<const D: usize>(R: f64, turn: f64) -> SVector<f64, D> {
+    let (sin, cos) = (std::f64::consts::TAU * turn).sin_cos();
+    SVector::from_fn(|j, _| match j {
+        0 => R * cos,
+        1 => R * sin,
+        _ => 0.0,
+    })
+}
+
+/// How far one may go from `X` along any axis, in both directions, without leaving the body.
+pub(crate) fn reach<const D: usize>(
+    domain: &Domain<f64, D>,
+    X: &SVector<f64, D>,
+    axis: usize,
+) -> f64 {
+    match domain {
+        Domain::Box { lower, upper } => (X[axis] - lower[axis]).min(upper[axis] - X[axis]),
+        Domain::Annulus { inner, outer } => (X.norm() - inner).min(outer - X.norm()),
+        _ => 0.0,
+    }
+}
+
+/// The largest extent of the body.
+pub(crate) fn size<const D: usize>(domain: &Domain<f64, D>) -> Option<f64> {
+    match domain {
+        Domain::Box { lower, upper } => Some((upper - lower).norm()),
+        Domain::Annulus { outer, .. } => Some(2.0 * outer),
+        _ => None,
+    }
+}
+
+/// Sample `n` on a surface with its outward reference normal; `None` where the body has no such surface.
+pub(crate) fn surface<const D: usize>(
+    domain: &Domain<f64, D>,
+    surface: Surface,
+    n: usize,
+) -> Option<(SVector<f64, D>, SVector<f64, D>)> {
+    let q = |j| quasirandom(n, j, D + 1);
+    match (domain, surface) {
+        (Domain::Box { lower, upper }, Surface::Lower(axis) | Surface::Upper(axis)) if axis < D => {
+            let mut X = SVector::from_fn(|j, _| lower[j] + (upper[j] - lower[j]) * q(j));
+            let mut normal = SVector::zeros();
+            let is_upper = matches!(surface, Surface::Upper(_));
+            X[axis] = if is_upper { upper[axis] } else { lower[axis] };
+            normal[axis] = if is_upper { 1.0 } else { -1.0 };
+            Some((X, normal))
+        }
+        (Domain::Annulus { inner, outer }, Surface::Inner | Surface::Outer) => {
+            let (R, sign) = if surface == Surface::Inner { (*inner, -1.0) } else { (*outer, 1.0) };
+            Some((on_circle(R, q(0)), on_circle(sign, q(0))))
+        }
+        // The plane through the origin; the body lies on its positive side.
+        (Domain::Annulus { inner, outer }, Surface::Lower(axis)) if D == 2 && axis < D => {
+            let (mut X, mut normal) = (SVector::zeros(), SVector::zeros());
+            X[1 - axis] = inner + (outer - inner) * q(0);
+            normal[axis] = -1.0;
+            Some((X, normal))
+        }
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::vector;
+
+    #[test]
+    fn samples_fill_the_unit_interval_evenly() {
+        for j in 0..3 {
+            let mut bins = [0; 10];
+            (0..1000).for_each(|n| bins[(quasirandom(n, j, 3) * 10.0) as usize] += 1);
+            assert!(bins.iter().all(|count| (95..=105).contains(count)), "{bins:?}");
+        }
+    }
+
+    #[test]
+    fn samples_and_their_stencils_stay_inside() {
+        let ring = Domain::<f64, 2>::Annulus { inner: 0.5, outer: 1.0 };
+        let square = Domain::Box { lower: vector![0.0, -1.0], upper: vector![1.0, 1.0] };
+        for n in 0..200 {
+            for domain in [&ring, &square] {
+                let (X, t) = interior(domain, 3.0, n).unwrap();
+                assert!(t > 0.05 && t < 2.95);
+                for axis in 0..2 {
+                    let reach = reach(domain, &X, axis);
+                    assert!(reach >= 0.0099, "{reach}");
+                }
+            }
+            let (X, N) = surface(&ring, Surface::Inner, n).unwrap();
+            assert!((X.norm() - 0.5).abs() < 1e-15 && (N.norm() - 1.0).abs() < 1e-15);
+            assert!(X.dot(&N) < 0.0, "the inner rim's normal points to the origin");
+            let (X, N) = surface(&square, Surface::Upper(1), n).unwrap();
+            assert_eq!((X[1], N), (1.0, vector![0.0, 1.0]));
+        }
+        assert!(surface(&square, Surface::Inner, 0).is_none());
+    }
+}

@@ -1,0 +1,261 @@
+//! From a solution to a grid with walls and particles.
+
+use mmsmith_mpm::{Grid, Particles};
+use mmsmith_solutions::{Condition, Domain, Real, Solution, Surface};
+use nalgebra::SVector;
+use thiserror::Error;
+
+use crate::{Case, points};
+
+/// Free cells beyond the furthest place that a free surface reaches.
+const MARGIN_CELLS: f64 = 3.0;
+
+/// How much of an annulus is modelled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// The part of positive coordinates, between the declared planes of symmetry.
+    Quarter,
+    /// All of it, without planes of symmetry.
+    Full,
+}
+
+/// Why a solution could not be put onto a grid.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum SceneError {
+    /// The box's sides are not whole multiples of the spacing.
+    #[error(
+        "{cells} cells make the spacing {spacing:?}, which does not divide the box's sides {sides:?}; \
+         {}",
+        suggestion(fitting)
+    )]
+    Misfit {
+        /// The cell count asked for.
+        cells: usize,
+        /// The spacing that follows from it.
+        spacing: f64,
+        /// The box's sides.
+        sides: Vec<f64>,
+        /// The nearest cell counts that would fit.
+        fitting: Vec<usize>,
+    },
+    /// The solver has no model for a boundary condition.
+    #[error("the solver does not model the condition {condition:?} on {surface:?}")]
+    Unmodelled {
+        /// Where.
+        surface: Surface,
+        /// What.
+        condition: Condition,
+    },
+    /// The solver has no model for the body's shape or its material.
+    #[error("the solver does not model this {what}: {value}")]
+    Unknown {
+        /// `shape` or `material`.
+        what: &'static str,
+        /// Its debug form.
+        value: String,
+    },
+    /// An extent was asked for that the body does not have.
+    #[error("{0}")]
+    Extent(&'static str),
+    /// No lattice point lies in the body.
+    #[error("no particle lies inside the body with {cells} cells; use more cells or particles")]
+    Empty {
+        /// The cell count asked for.
+        cells: usize,
+    },
+}
+
+fn suggestion(fitting: &[usize]) -> String {
+    if fitting.is_empty() {
+        return "no cell count near it does".into();
+    }
+    let counts: Vec<_> = fitting.iter().map(usize::to_string).collect();
+    format!("cell counts that do: {}", counts.join(", "))
+}
+
+/// A body on a background grid, in double precision.
+pub(crate) struct Scene<const D: usize> {
+    pub(crate) lower: SVector<f64, D>,
+    pub(crate) spacing: f64,
+    pub(crate) cells: [usize; D],
+    walls: [[bool; 2]; D],
+    domain: Domain<f64, D>,
+    /// The largest extent of the body.
+    pub(crate) size: f64,
+}
+
+impl<const D: usize> Scene<D> {
+    /// Places `solution` on a grid of spacing `cell_length / case.cells`, with room for its motion until `end`.
+    pub(crate) fn new(
+        solution: &dyn Solution<f64, D>,
+        case: &Case,
+        end: f64,
+    ) -> Result<Self, SceneError> {
+        let domain = solution.domain();
+        let spacing = solution.cell_length() / case.cells as f64;
+        let unknown = || SceneError::Unknown { what: "shape", value: format!("{domain:?}") };
+        let size = points::size(&domain).ok_or_else(unknown)?;
+        let quarter = quarter(solution, case.extent)?;
+        let mut walls = [[false; 2]; D];
+        for boundary in solution.boundaries() {
+            let is_wall = match boundary.condition {
+                Condition::Sliding | Condition::Symmetry => true,
+                Condition::TractionFree => false,
+                condition => {
+                    return Err(SceneError::Unmodelled { surface: boundary.surface, condition });
+                }
+            };
+            match boundary.surface {
+                Surface::Lower(axis) if axis < D => walls[axis][0] |= is_wall && quarter,
+                Surface::Upper(axis) if axis < D => walls[axis][1] |= is_wall,
+                surface if is_wall => {
+                    return Err(SceneError::Unmodelled { surface, condition: boundary.condition });
+                }
+                _ => {}
+            }
+        }
+        let (lower, cells) = match &domain {
+            Domain::Box { lower, upper } => {
+                let sides: SVector<f64, D> = upper - lower;
+                let fit = |side: f64, spacing: f64| {
+                    let count = side / spacing;
+                    (count.round() >= 1.0 && (count - count.round()).abs() <= 1e-9 * count.max(1.0))
+                        .then(|| count.round() as usize)
+                };
+                let fits = |cells: usize| {
+                    let spacing = solution.cell_length() / cells as f64;
+                    sides.iter().all(|side| fit(*side, spacing).is_some())
+                };
+                let mut cells = [0; D];
+                for axis in 0..D {
+                    cells[axis] = fit(sides[axis], spacing).ok_or_else(|| {
+                        let near = case.cells.saturating_sub(32).max(1)..=case.cells + 32;
+                        let mut fitting: Vec<_> = near.filter(|count| fits(*count)).collect();
+                        fitting.sort_by_key(|count| count.abs_diff(case.cells));
+                        fitting.truncate(4);
+                        fitting.sort_unstable();
+                        SceneError::Misfit {
+                            cells: case.cells,
+                            spacing,
+                            sides: sides.iter().copied().collect(),
+                            fitting,
+                        }
+                    })?;
+                }
+                (*lower, cells)
+            }
+            Domain::Annulus { outer, .. } => {
+                let furthest = outer + largest_displacement(solution, end);
+                let half = (furthest / spacing).ceil() + MARGIN_CELLS;
+                // The origin stays a grid line, so that both extents have the same lattice of particles.
+                if quarter {
+                    (SVector::zeros(), [half as usize; D])
+                } else {
+                    (SVector::repeat(-half * spacing), [2 * half as usize; D])
+                }
+            }
+            _ => return Err(unknown()),
+        };
+        Ok(Self { lower, spacing, cells, walls, domain, size })
+    }
+
+    /// The grid in the solver's precision.
+    pub(crate) fn grid<T: Real>(&self) -> Grid<T, D> {
+        Grid {
+            lower: self.lower.map(Real::from_f64),
+            spacing: Real::from_f64(self.spacing),
+            cells: self.cells,
+            walls: self.walls,
+        }
+    }
+
+    /// About how many particles the body gets.
+    pub(crate) fn particles_expected(&self, per_cell: usize) -> f64 {
+        let cells: f64 = self.cells.iter().map(|&cells| cells as f64).product();
+        let body = match self.domain {
+            Domain::Annulus { inner, outer } => {
+                let turns = if self.lower[0] < 0.0 { 1.0 } else { 0.25 };
+                let area = turns * std::f64::consts::PI * (outer * outer - inner * inner);
+                area / (self.spacing * self.spacing)
+            }
+            _ => cells,
+        };
+        body * (per_cell as f64).powi(D as i32)
+    }
+
+    /// About how many bytes the solver and the measurement keep, for values of `scalar` bytes.
+    pub(crate) fn bytes_expected(&self, per_cell: usize, scalar: usize) -> f64 {
+        // X, x, v, b and the solver's copies of them; F twice, a stress; mass, volume and sorting.
+        let per_particle = 8 * D + 4 * D * D + 8;
+        // Mass, momentum or velocity, force and acceleration, with the padding beyond the walls.
+        let per_node = 6 * D + 4;
+        let nodes: f64 = self.cells.iter().map(|&cells| cells as f64 + 9.0).product();
+        let particles = self.particles_expected(per_cell);
+        scalar as f64 * (particles * per_particle as f64 + nodes * per_node as f64)
+    }
+
+    /// The particles at rest in the reference configuration: those whose centre lies in the body.
+    pub(crate) fn particles<T: Real>(
+        &self,
+        grid: &Grid<T, D>,
+        per_cell: usize,
+        density: f64,
+    ) -> Particles<T, D> {
+        let distance = self.spacing / per_cell as f64;
+        Particles::lattice(grid, per_cell, Real::from_f64(density), |X| {
+            // Decided on the exact centre, so that both precisions have the same particles.
+            let centre = SVector::<f64, D>::from_fn(|axis, _| {
+                let index = ((X[axis].to_f64() - self.lower[axis]) / distance - 0.5).round();
+                self.lower[axis] + (index + 0.5) * distance
+            });
+            match self.domain {
+                Domain::Annulus { inner, outer } => {
+                    let squared = centre.norm_squared();
+                    inner * inner <= squared && squared <= outer * outer
+                }
+                _ => true,
+            }
+        })
+    }
+}
+
+/// Whether the planes of symmetry are modelled as walls.
+fn quarter<const D: usize>(
+    solution: &dyn Solution<f64, D>,
+    extent: Option<Extent>,
+) -> Result<bool, SceneError> {
+    let is_annulus = matches!(solution.domain(), Domain::Annulus { .. });
+    let planes = |axis| {
+        solution.boundaries().iter().any(|boundary| {
+            boundary.surface == Surface::Lower(axis) && boundary.condition == Condition::Symmetry
+        })
+    };
+    match extent {
+        Some(_) if !is_annulus => Err(SceneError::Extent(
+            "the extent can be chosen for an annulus only, and this is a box",
+        )),
+        Some(Extent::Full) => Ok(false),
+        Some(Extent::Quarter) if !(0..D).all(planes) => {
+            Err(SceneError::Extent("the solution declares no planes of symmetry to cut a quarter"))
+        }
+        Some(Extent::Quarter) => Ok(true),
+        None => Ok(!is_annulus || (0..D).all(planes)),
+    }
+}
+
+/// The largest displacement on the outer rim at sampled places and times until `end`.
+fn largest_displacement<const D: usize>(solution: &dyn Solution<f64, D>, end: f64) -> f64 {
+    // Periodic motion repeats, so one period on a fine raster of times sees it all.
+    let span = end.min(solution.period());
+    let mut largest = 0.0_f64;
+    for place in 0..16 {
+        let Some((X, _)) = points::surface(&solution.domain(), Surface::Outer, place) else {
+            return largest;
+        };
+        for moment in 0..=128 {
+            let t = span * f64::from(moment) / 128.0;
+            largest = largest.max(solution.displacement(&X, t).norm());
+        }
+    }
+    largest
+}

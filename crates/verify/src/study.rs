@@ -1,0 +1,107 @@
+//! Convergence studies: the same case on several grids or with several time steps.
+
+use mmsmith_solutions::AnySolution;
+use serde::Serialize;
+use thiserror::Error;
+
+use crate::case::{Arithmetic, Case, CaseError, Outputs, Progress, Row, Status, plan, run};
+use crate::norms::{PerField, PerNorm};
+use crate::order::Order;
+
+/// What changes from row to row.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Sweep {
+    /// The cell count, at a fixed CFL number; orders are with respect to `h`.
+    Cells(Vec<usize>),
+    /// The CFL number, at a fixed cell count; orders are with respect to `dt`.
+    Cfls(Vec<f64>),
+}
+
+impl Sweep {
+    /// The cases, in order.
+    #[must_use]
+    pub fn cases(&self, base: &Case) -> Vec<Case> {
+        match self {
+            Self::Cells(cells) => cells.iter().map(|&cells| Case { cells, ..*base }).collect(),
+            Self::Cfls(cfls) => cfls.iter().map(|&cfl| Case { cfl, ..*base }).collect(),
+        }
+    }
+}
+
+/// Rows and their orders of accuracy.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Study {
+    /// One row for each case, in order.
+    pub rows: Vec<Row>,
+    /// The observed orders; rows whose run did not end well are left out.
+    pub orders: PerField<PerNorm<Order>>,
+}
+
+/// A case of a study could not be run.
+#[derive(Debug, Error)]
+#[error("case {}: {cause}", index + 1)]
+pub struct StudyError {
+    /// The case's number in the sweep, from 0.
+    pub index: usize,
+    /// Why.
+    #[source]
+    pub cause: CaseError,
+}
+
+/// Runs every case of `sweep` and derives the orders of accuracy in every field and norm.
+///
+/// `progress` is called after every step.
+///
+/// # Errors
+///
+/// [`StudyError`] for the first case that cannot be run; all of them are judged before the first run.
+pub fn converge(
+    exact: &AnySolution<f64>,
+    arithmetic: Arithmetic<'_>,
+    base: &Case,
+    sweep: &Sweep,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<Study, StudyError> {
+    let cases = sweep.cases(base);
+    let fail = |index| move |cause| StudyError { index, cause };
+    let mut work = Vec::with_capacity(cases.len());
+    for (index, case) in cases.iter().enumerate() {
+        let plan = plan(exact, arithmetic, case).map_err(fail(index))?;
+        work.push(plan.steps as f64 * plan.particles);
+    }
+    let total: f64 = work.iter().sum();
+    let mut rows = Vec::with_capacity(cases.len());
+    for (index, case) in cases.iter().enumerate() {
+        let before: f64 = work[..index].iter().sum();
+        let mut report = |done: Progress| {
+            let share = (before + done.share * work[index]) / total;
+            progress(Progress { case: index, share, ..done });
+        };
+        let mut outputs = Outputs { progress: &mut report, frames: None };
+        rows.push(run(exact, arithmetic, case, &mut outputs).map_err(fail(index))?);
+    }
+    let orders = orders(&rows, sweep);
+    Ok(Study { rows, orders })
+}
+
+/// The orders over the rows of a sweep.
+fn orders(rows: &[Row], sweep: &Sweep) -> PerField<PerNorm<Order>> {
+    let steps: Vec<f64> = rows
+        .iter()
+        .map(|row| match sweep {
+            Sweep::Cells(_) => row.h,
+            Sweep::Cfls(_) => row.dt,
+        })
+        .collect();
+    let order = |value: &dyn Fn(&PerField<PerNorm<f64>>) -> f64| {
+        let errors: Vec<_> =
+            rows.iter().map(|row| (row.status == Status::Ok).then(|| value(&row.errors))).collect();
+        Order::of(&steps, &errors)
+    };
+    let norms = |field: fn(&PerField<PerNorm<f64>>) -> &PerNorm<f64>| PerNorm {
+        linf: order(&|errors| field(errors).linf),
+        l2: order(&|errors| field(errors).l2),
+        l1: order(&|errors| field(errors).l1),
+    };
+    PerField { u: norms(|e| &e.u), v: norms(|e| &e.v), F: norms(|e| &e.F), P: norms(|e| &e.P) }
+}
