@@ -1,2 +1,81 @@
-//! To come.
-fn main() {}
+//! Tasks of the repository itself, behind the alias `cargo xtask`.
+
+use anyhow::{Context, bail};
+use clap::{Parser, Subcommand};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+mod generate;
+
+/// Tasks of the repository itself.
+#[derive(Parser)]
+#[command(name = "cargo xtask")]
+struct Arguments {
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Subcommand)]
+enum Task {
+    /// Generate the solutions in crates/solutions from the specifications in mms-specs.
+    Gen {
+        /// Change nothing; fail where a generated file differs from its specification.
+        #[arg(long)]
+        check: bool,
+        /// Write the module files into this folder instead, and no list of solutions.
+        #[arg(long, value_name = "DIR", conflicts_with = "check")]
+        out: Option<PathBuf>,
+        /// Specification files, or names of files in mms-specs; all of mms-specs where none is given.
+        #[arg(value_name = "SPEC")]
+        specs: Vec<PathBuf>,
+    },
+}
+
+fn main() -> ExitCode {
+    let Arguments { task: Task::Gen { check, out, specs } } = Arguments::parse();
+    match generate::run(&repository(), &specs, out.as_deref(), check) {
+        Ok(outcome) => {
+            for line in &outcome.lines {
+                say(line);
+            }
+            if outcome.stale { ExitCode::from(1) } else { ExitCode::SUCCESS }
+        }
+        Err(error) => {
+            complain(&format!("{error:#}"));
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// The folder of the workspace.
+fn repository() -> PathBuf {
+    let manifest = Path::new(env!("CARGO_MANIFEST_DIR"));
+    manifest.parent().unwrap_or(manifest).to_path_buf()
+}
+
+#[allow(clippy::print_stdout)]
+fn say(line: &str) {
+    println!("{line}");
+}
+
+#[allow(clippy::print_stderr)]
+fn complain(message: &str) {
+    eprintln!("{message}");
+}
+
+/// Reads a text file; the error names it.
+fn read(path: &Path) -> anyhow::Result<String> {
+    std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))
+}
+
+/// Replaces a file as a whole: a reader sees the old text or the new one, never a part.
+fn write(path: &Path, text: &str) -> anyhow::Result<()> {
+    let Some(folder) = path.parent() else { bail!("{} is not a file", path.display()) };
+    let context = || format!("cannot write {}", path.display());
+    std::fs::create_dir_all(folder).with_context(context)?;
+    let temporary = path.with_extension("rs.tmp");
+    std::fs::write(&temporary, text)
+        .and_then(|()| std::fs::rename(&temporary, path))
+        .inspect_err(|_| drop(std::fs::remove_file(&temporary)))
+        .with_context(context)
+}

@@ -1,1 +1,46 @@
-//! To come.
+//! Exact symbolic expressions, from Maple-style text to straight-line programs.
+//!
+//! The way of an expression through this crate:
+//!
+//! 1. [`Ast::parse`] reads text into a syntax tree that knows where each part stands in the text.
+//! 2. [`Graph::build`] turns the tree into an [`Expr`] of a hash-consed [`Graph`]: equal expressions are one
+//!    node, numbers are exact rationals, and sums and products have a canonical form.
+//! 3. [`Derivatives::of`] differentiates.
+//! 4. [`Program::lower`] turns expressions into a list of floating-point operations in which every common
+//!    subexpression is computed once. [`Program::evaluate`] runs it; code generators translate it.
+//!
+//! The canonical form never expands a product of sums, since that loses digits: it collects like terms,
+//! takes out factors that all terms share, and merges terms that differ in one factor only. Where an author
+//! wants a quantity to stay in one piece, for example a strain that is small while one plus it is not,
+//! [`Graph::whole`] keeps the algebra out.
+//!
+//! ```
+//! use mmsmith_expr::{Ast, Dependence, Derivatives, Graph, Program};
+//!
+//! let mut graph = Graph::new();
+//! let x = graph.symbol("x");
+//! let ast = Ast::parse("x*sin(Pi*x)").unwrap();
+//! let f = graph.build(&ast, &mut |_, name| (name == "x").then_some(x).ok_or("no such name".into())).unwrap();
+//! let df = Derivatives::default().of(&mut graph, f, x);
+//! assert_eq!(graph.print(df), "sin(Pi*x) + Pi*x*cos(Pi*x)");
+//!
+//! let program = Program::lower(&mut graph, &[(x, Dependence::default())], &[], &[df]);
+//! assert_eq!(program.evaluate(&[0.5]), [1.0]);
+//! ```
+
+mod build;
+mod cancel;
+mod canonical;
+mod derivative;
+mod graph;
+mod parse;
+mod print;
+mod program;
+mod rational;
+
+pub use build::BuildError;
+pub use derivative::Derivatives;
+pub use graph::{Expr, Function, Graph, Node};
+pub use parse::{Ast, AstKind, ParseError};
+pub use program::{Dependence, Operation, Program, Slot};
+pub use rational::{Rational, nearest_f64};

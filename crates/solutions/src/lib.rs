@@ -21,6 +21,8 @@ mod solution;
 
 pub use domain::{Boundary, Condition, Domain, Surface};
 pub use generated::*;
+/// The vectors and matrices of this crate's interface.
+pub use nalgebra;
 pub use parameters::{Description, Parameter, ParameterError};
 pub use real::Real;
 pub use solution::{AnySolution, Fields, Material, Solution};

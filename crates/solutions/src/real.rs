@@ -9,7 +9,7 @@ use nalgebra::RealField;
 /// `sin_pi(1)` is zero and a phase of a million periods loses no digits to the rounding of pi.
 pub trait Real: RealField + Copy {
     /// The nearest value of this type.
-    fn from_f64(value: f64) -> Self;
+    fn nearest(value: f64) -> Self;
     /// The value in double precision; exact for both types.
     fn to_f64(self) -> f64;
     /// `sin(pi x)`.
@@ -22,7 +22,7 @@ macro_rules! implement_real {
     ($float:ty, $pi:expr) => {
         impl Real for $float {
             #[inline]
-            fn from_f64(value: f64) -> Self {
+            fn nearest(value: f64) -> Self {
                 value as $float
             }
 

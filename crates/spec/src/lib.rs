@@ -1,1 +1,22 @@
-//! To come.
+//! Specifications of manufactured solutions: from a TOML file to every derived field, in symbols.
+//!
+//! [`Spec::parse`] reads and checks the text; [`Spec::derive`] derives the displacement gradient, the stresses
+//! and the body force from the displacement and the material. Errors in the text are [`Diagnostic`]s, which
+//! show the line, mark the place and say what would be right.
+//!
+//! The derivation works in the specification's own coordinates, on physical components, and turns to Cartesian
+//! components last: see [`Fields`].
+
+mod coordinates;
+mod derive;
+mod diagnostic;
+mod document;
+mod scope;
+mod spec;
+
+pub use coordinates::Coordinates;
+pub use derive::{DeriveError, Fields};
+pub use diagnostic::Diagnostic;
+pub use spec::{
+    Bound, Boundary, Condition, Domain, Material, Parameter, Relation, Requirement, Spec, Surface,
+};

@@ -1,0 +1,243 @@
+//! Identical cancellation among parameters, such as `lambda + 2 mu - E = 2 nu lambda`.
+//!
+//! The canonical form does not multiply out, so it does not see that the difference of two fractions vanishes
+//! or collapses to one term. Left alone, such a difference is computed with a loss of digits. Here the
+//! parameter-only coefficients of a sum are brought over their common denominator; where the numerator turns out
+//! to be zero or one single product, that form replaces the sum.
+
+use crate::{Expr, Graph, Node, Rational};
+use num_traits::{One, Signed, ToPrimitive, Zero};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Numerators with more terms than this are not worth the search.
+const MOST_TERMS: usize = 512;
+
+/// A product of atoms, each to a positive power.
+type Monomial = BTreeMap<Expr, u32>;
+/// A sum of monomials.
+type Polynomial = BTreeMap<Monomial, Rational>;
+
+/// A polynomial over a product of atoms.
+struct Fraction {
+    numerator: Polynomial,
+    denominator: Monomial,
+}
+
+impl Graph {
+    /// `expr` with every sum whose parameter-only parts cancel identically brought to the shorter form.
+    ///
+    /// Parameter-only is what contains none of `variables`.
+    pub fn cancel(&mut self, expr: Expr, variables: &BTreeSet<Expr>) -> Expr {
+        self.cancel_with(expr, variables, &mut BTreeMap::new())
+    }
+
+    fn cancel_with(
+        &mut self,
+        expr: Expr,
+        variables: &BTreeSet<Expr>,
+        done: &mut BTreeMap<Expr, Expr>,
+    ) -> Expr {
+        if let Some(&known) = done.get(&expr) {
+            return known;
+        }
+        let mapped =
+            self.map_children(expr, &mut |graph, child| graph.cancel_with(child, variables, done));
+        let result = self.cancel_root(mapped, variables);
+        done.insert(expr, result);
+        result
+    }
+
+    fn cancel_root(&mut self, expr: Expr, variables: &BTreeSet<Expr>) -> Expr {
+        let Node::Sum { constant, terms } = self.node(expr).clone() else { return expr };
+        let mut groups: BTreeMap<Expr, Vec<(Rational, Expr)>> = BTreeMap::new();
+        if !constant.is_zero() {
+            groups.entry(Graph::ONE).or_default().push((constant, Graph::ONE));
+        }
+        for (term, coefficient) in terms {
+            let (parameters, rest) = self.split_by_dependence(term, variables);
+            groups.entry(rest).or_default().push((coefficient, parameters));
+        }
+        let mut changed = false;
+        let mut parts = Vec::new();
+        for (rest, members) in groups {
+            let several = members.len() > 1;
+            let mut coefficient = self.sum(members);
+            if several && let Some(shorter) = self.collapse(coefficient) {
+                changed = true;
+                coefficient = shorter;
+            }
+            parts.push(self.mul(coefficient, rest));
+        }
+        if changed { self.sum_of(parts) } else { expr }
+    }
+
+    /// `term` as a parameter-only factor times a rest.
+    fn split_by_dependence(&mut self, term: Expr, variables: &BTreeSet<Expr>) -> (Expr, Expr) {
+        let factors = match self.node(term) {
+            Node::Product(factors) => factors.to_vec(),
+            _ => vec![(term, Rational::one())],
+        };
+        let (rest, parameters): (Vec<_>, Vec<_>) =
+            factors.into_iter().partition(|(base, _)| self.depends_on(*base, variables));
+        (self.product(parameters), self.product(rest))
+    }
+
+    /// Whether `expr` contains one of `variables`.
+    #[must_use]
+    pub fn depends_on(&self, expr: Expr, variables: &BTreeSet<Expr>) -> bool {
+        self.reachable(&[expr]).iter().any(|e| variables.contains(e))
+    }
+
+    /// The sum as one product or zero, where it is one.
+    fn collapse(&mut self, sum: Expr) -> Option<Expr> {
+        let Fraction { numerator, denominator } = self.fraction(sum)?;
+        if numerator.len() > 1 {
+            return None;
+        }
+        let Some((monomial, coefficient)) = numerator.into_iter().next() else {
+            return Some(Graph::ZERO);
+        };
+        let power = |(atom, n): (Expr, u32), sign: i64| {
+            (atom, Rational::from_integer((sign * i64::from(n)).into()))
+        };
+        let mut factors: Vec<_> = monomial.into_iter().map(|f| power(f, 1)).collect();
+        factors.extend(denominator.into_iter().map(|f| power(f, -1)));
+        factors.push((self.number(coefficient), Rational::one()));
+        Some(self.product(factors))
+    }
+
+    /// `expr` over a common denominator; `None` where that grows too large.
+    fn fraction(&mut self, expr: Expr) -> Option<Fraction> {
+        match self.node(expr).clone() {
+            Node::Number(value) => Some(Fraction::of(Monomial::new(), value)),
+            Node::Sum { constant, terms } => {
+                let mut total = Fraction::of(Monomial::new(), constant);
+                for (term, coefficient) in terms {
+                    let part = self.fraction(term)?;
+                    total = self.add_fractions(&total, &part, &coefficient)?;
+                }
+                Some(total)
+            }
+            Node::Product(factors) => {
+                let mut total = Fraction::of(Monomial::new(), Rational::one());
+                for (base, exponent) in factors {
+                    if !exponent.is_integer() {
+                        let atom = self.product([(base, exponent)]);
+                        total = total.times(&Fraction::of([(atom, 1)].into(), Rational::one()))?;
+                        continue;
+                    }
+                    let power = exponent.to_integer().abs().to_u32().filter(|&n| n <= 64)?;
+                    if exponent.is_negative() {
+                        *total.denominator.entry(base).or_insert(0) += power;
+                    } else {
+                        let factor = self.fraction(base)?;
+                        for _ in 0..power {
+                            total = total.times(&factor)?;
+                        }
+                    }
+                }
+                Some(total)
+            }
+            Node::Pi | Node::Symbol(_) | Node::Call(..) | Node::Whole(_) => {
+                Some(Fraction::of([(expr, 1)].into(), Rational::one()))
+            }
+        }
+    }
+
+    fn add_fractions(&mut self, a: &Fraction, b: &Fraction, scale: &Rational) -> Option<Fraction> {
+        let mut denominator = a.denominator.clone();
+        for (&atom, &n) in &b.denominator {
+            let entry = denominator.entry(atom).or_insert(0);
+            *entry = n.max(*entry);
+        }
+        let mut numerator = self.over(a, &denominator)?;
+        for (monomial, coefficient) in self.over(b, &denominator)? {
+            add_to(&mut numerator, monomial, &(coefficient * scale));
+        }
+        Some(Fraction { numerator, denominator })
+    }
+
+    /// The numerator of `fraction` over the larger `denominator`.
+    fn over(&mut self, fraction: &Fraction, denominator: &Monomial) -> Option<Polynomial> {
+        let mut numerator = fraction.numerator.clone();
+        for (&atom, &n) in denominator {
+            let missing = n - fraction.denominator.get(&atom).copied().unwrap_or(0);
+            if missing > 0 {
+                let factor = self.fraction(atom)?;
+                if !factor.denominator.is_empty() {
+                    return None;
+                }
+                for _ in 0..missing {
+                    numerator = multiply(&numerator, &factor.numerator)?;
+                }
+            }
+        }
+        Some(numerator)
+    }
+}
+
+impl Fraction {
+    fn of(monomial: Monomial, coefficient: Rational) -> Self {
+        let mut numerator = Polynomial::new();
+        add_to(&mut numerator, monomial, &coefficient);
+        Fraction { numerator, denominator: Monomial::new() }
+    }
+
+    fn times(&self, other: &Fraction) -> Option<Self> {
+        let mut denominator = self.denominator.clone();
+        for (&atom, &n) in &other.denominator {
+            *denominator.entry(atom).or_insert(0) += n;
+        }
+        Some(Fraction { numerator: multiply(&self.numerator, &other.numerator)?, denominator })
+    }
+}
+
+fn add_to(polynomial: &mut Polynomial, monomial: Monomial, coefficient: &Rational) {
+    let total = polynomial.remove(&monomial).unwrap_or_else(Rational::zero) + coefficient;
+    if !total.is_zero() {
+        polynomial.insert(monomial, total);
+    }
+}
+
+fn multiply(a: &Polynomial, b: &Polynomial) -> Option<Polynomial> {
+    let mut product = Polynomial::new();
+    for (m, c) in a {
+        for (n, d) in b {
+            let mut monomial = m.clone();
+            for (&atom, &power) in n {
+                *monomial.entry(atom).or_insert(0) += power;
+            }
+            add_to(&mut product, monomial, &(c * d));
+        }
+    }
+    (product.len() <= MOST_TERMS).then_some(product)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Ast, Graph};
+    use std::collections::BTreeSet;
+
+    fn cancelled(text: &str) -> String {
+        let mut graph = Graph::new();
+        let ast = Ast::parse(text).unwrap();
+        let expr = graph.build(&ast, &mut |g, name| Ok(g.symbol(name))).unwrap();
+        let variables = BTreeSet::from([graph.symbol("X")]);
+        let expr = graph.cancel(expr, &variables);
+        graph.print(expr)
+    }
+
+    #[test]
+    fn lame_constants() {
+        let text = "E*nu/((1+nu)*(1-2*nu)) + 2*E/(2*(1+nu)) - E";
+        assert_eq!(cancelled(text), "2*E*nu^2/((1 + nu)*(1 - 2*nu))");
+        let text = "sin(X)*E*nu/((1+nu)*(1-2*nu)) + ln(X) + sin(X)*E/(1+nu) - E*sin(X)";
+        assert_eq!(cancelled(text), "ln(X) + 2*sin(X)*E*nu^2/((1 + nu)*(1 - 2*nu))");
+    }
+
+    #[test]
+    fn zero_and_no_collapse() {
+        assert_eq!(cancelled("1/(1+a) + a/(1+a) - 1"), "0");
+        assert_eq!(cancelled("1/(1+a) + b"), "1/(1 + a) + b");
+    }
+}

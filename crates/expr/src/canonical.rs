@@ -1,0 +1,468 @@
+//! Constructors that keep sums, products, powers and function values in canonical form.
+//!
+//! Rules: nested sums and products are flattened; like terms and equal bases are collected; a numeric content
+//! and factors common to all terms of a sum stand outside it; terms `k S1 + k S2` with sums `S1`, `S2` are
+//! merged into `k (S1 + S2)`. Products of sums are never multiplied out.
+
+use crate::rational::exact_root;
+use crate::{Expr, Function, Graph, Node, Rational};
+use num_integer::Integer;
+use num_traits::{One, Signed, ToPrimitive, Zero};
+use std::collections::BTreeMap;
+
+/// Exact numbers beyond this size stay unevaluated powers.
+const LARGEST_NUMBER_BITS: u64 = 8192;
+
+impl Graph {
+    /// `sum of coefficient * term`.
+    pub fn sum(&mut self, terms: impl IntoIterator<Item = (Rational, Expr)>) -> Expr {
+        let mut constant = Rational::zero();
+        let mut collected = BTreeMap::new();
+        let terms: Vec<_> = terms.into_iter().collect();
+        for (coefficient, term) in terms {
+            self.add_term(&mut constant, &mut collected, &coefficient, term);
+        }
+        while self.merge_terms_of_equal_key(&mut constant, &mut collected) {}
+        self.sum_of_collected(constant, collected)
+    }
+
+    /// `a + b`.
+    pub fn add(&mut self, a: Expr, b: Expr) -> Expr {
+        self.sum([(Rational::one(), a), (Rational::one(), b)])
+    }
+
+    /// `a - b`.
+    pub fn sub(&mut self, a: Expr, b: Expr) -> Expr {
+        self.sum([(Rational::one(), a), (-Rational::one(), b)])
+    }
+
+    /// `-a`.
+    pub fn neg(&mut self, a: Expr) -> Expr {
+        self.sum([(-Rational::one(), a)])
+    }
+
+    /// The sum of `terms`.
+    pub fn sum_of(&mut self, terms: impl IntoIterator<Item = Expr>) -> Expr {
+        self.sum(terms.into_iter().map(|term| (Rational::one(), term)))
+    }
+
+    /// `a b`.
+    pub fn mul(&mut self, a: Expr, b: Expr) -> Expr {
+        self.product([(a, Rational::one()), (b, Rational::one())])
+    }
+
+    /// The product of `factors`.
+    pub fn product_of(&mut self, factors: impl IntoIterator<Item = Expr>) -> Expr {
+        self.product(factors.into_iter().map(|factor| (factor, Rational::one())))
+    }
+
+    /// `a / b`.
+    pub fn div(&mut self, a: Expr, b: Expr) -> Expr {
+        self.product([(a, Rational::one()), (b, -Rational::one())])
+    }
+
+    /// `base ^ exponent` for an integer exponent.
+    pub fn powi(&mut self, base: Expr, exponent: i64) -> Expr {
+        self.product([(base, Rational::from_integer(exponent.into()))])
+    }
+
+    /// The square root.
+    pub fn sqrt(&mut self, a: Expr) -> Expr {
+        self.product([(a, Rational::new(1.into(), 2.into()))])
+    }
+
+    fn add_term(
+        &mut self,
+        constant: &mut Rational,
+        collected: &mut BTreeMap<Expr, Rational>,
+        coefficient: &Rational,
+        term: Expr,
+    ) {
+        match self.node(term).clone() {
+            Node::Number(value) => *constant += coefficient * value,
+            Node::Sum { constant: inner, terms } => {
+                *constant += coefficient * inner;
+                for (inner_term, inner_coefficient) in terms {
+                    self.add_term(
+                        constant,
+                        collected,
+                        &(coefficient * inner_coefficient),
+                        inner_term,
+                    );
+                }
+            }
+            _ => {
+                let entry = collected.entry(term).or_insert_with(Rational::zero);
+                *entry += coefficient;
+                if entry.is_zero() {
+                    collected.remove(&term);
+                }
+            }
+        }
+    }
+
+    /// Replaces one group of terms `k S1, k S2, ...` by `k (S1 + S2 + ...)`; false where there is none.
+    fn merge_terms_of_equal_key(
+        &mut self,
+        constant: &mut Rational,
+        collected: &mut BTreeMap<Expr, Rational>,
+    ) -> bool {
+        let mut groups: BTreeMap<Expr, Vec<(Expr, Expr)>> = BTreeMap::new();
+        let terms: Vec<Expr> = collected.keys().copied().collect();
+        if terms.len() < 2 {
+            return false;
+        }
+        for &term in &terms {
+            if let Some((key, inner)) = self.split_off_sum(term) {
+                groups.entry(key).or_default().push((term, inner));
+            }
+        }
+        for (key, mut members) in groups {
+            if collected.contains_key(&key) {
+                members.push((key, Graph::ONE));
+            }
+            if members.len() < 2 {
+                continue;
+            }
+            let inner_terms: Vec<(Rational, Expr)> = members
+                .iter()
+                .filter_map(|&(term, inner)| Some((collected.remove(&term)?, inner)))
+                .collect();
+            let inner = self.sum(inner_terms);
+            let merged = self.mul(key, inner);
+            self.add_term(constant, collected, &Rational::one(), merged);
+            return true;
+        }
+        false
+    }
+
+    /// `term = key * sum` where exactly one factor of the term is a sum, to the first power.
+    fn split_off_sum(&mut self, term: Expr) -> Option<(Expr, Expr)> {
+        let Node::Product(factors) = self.node(term) else { return None };
+        let mut sums = factors.iter().filter(|(base, _)| matches!(self.node(*base), Node::Sum { .. }));
+        let (sum, exponent) = sums.next()?;
+        if sums.next().is_some() || !exponent.is_one() {
+            return None;
+        }
+        let sum = *sum;
+        let rest: Vec<_> = factors.iter().filter(|(base, _)| *base != sum).cloned().collect();
+        Some((self.product(rest), sum))
+    }
+
+    fn sum_of_collected(&mut self, constant: Rational, collected: BTreeMap<Expr, Rational>) -> Expr {
+        let mut terms: Vec<(Expr, Rational)> = collected.into_iter().collect();
+        match (terms.len(), constant.is_zero()) {
+            (0, _) => return self.number(constant),
+            (1, true) => {
+                let (term, coefficient) = terms.remove(0);
+                return self.scaled(term, coefficient);
+            }
+            (_, true) => {
+                let common = self.common_factors(&terms);
+                if !common.is_empty() {
+                    let outside = self.product(common);
+                    let inverse = (outside, -Rational::one());
+                    let inner: Vec<(Rational, Expr)> = terms
+                        .into_iter()
+                        .map(|(term, c)| (c, self.product([(term, Rational::one()), inverse.clone()])))
+                        .collect();
+                    let inside = self.sum(inner);
+                    return self.mul(outside, inside);
+                }
+            }
+            _ => {}
+        }
+        let content = content_of(&constant, &terms);
+        let sum = self.intern(Node::Sum {
+            constant: constant / &content,
+            terms: terms.into_iter().map(|(term, c)| (term, c / &content)).collect(),
+        });
+        self.scaled(sum, content)
+    }
+
+    fn scaled(&mut self, term: Expr, coefficient: Rational) -> Expr {
+        if coefficient.is_one() {
+            return term;
+        }
+        self.intern(Node::Sum { constant: Rational::zero(), terms: Box::new([(term, coefficient)]) })
+    }
+
+    /// The factors that every term has, to the smallest power that occurs.
+    fn common_factors(&self, terms: &[(Expr, Rational)]) -> Vec<(Expr, Rational)> {
+        let factors_of = |term: Expr| -> Vec<(Expr, Rational)> {
+            match self.node(term) {
+                Node::Product(factors) => factors.to_vec(),
+                _ => vec![(term, Rational::one())],
+            }
+        };
+        let mut common = factors_of(terms[0].0);
+        for &(term, _) in &terms[1..] {
+            let factors = factors_of(term);
+            common.retain_mut(|(base, exponent)| {
+                let Some((_, other)) = factors.iter().find(|(b, _)| b == base) else { return false };
+                if other.is_positive() != exponent.is_positive() {
+                    return false;
+                }
+                if other.abs() < exponent.abs() {
+                    *exponent = other.clone();
+                }
+                true
+            });
+        }
+        common
+    }
+
+    /// The product of `base ^ exponent`.
+    ///
+    /// Zero to a negative power stays in the product, where [`Graph::divides_by_zero`] finds it.
+    pub fn product(&mut self, factors: impl IntoIterator<Item = (Expr, Rational)>) -> Expr {
+        let mut coefficient = Rational::one();
+        let mut collected: BTreeMap<Expr, Rational> = BTreeMap::new();
+        let mut pending: Vec<(Expr, Rational)> = factors.into_iter().collect();
+        while let Some((base, exponent)) = pending.pop() {
+            if exponent.is_zero() {
+                continue;
+            }
+            if let Some(factors) = self.open_factor(base, &exponent, &mut coefficient) {
+                pending.extend(factors);
+                continue;
+            }
+            let entry = collected.entry(base).or_insert_with(Rational::zero);
+            *entry += &exponent;
+            let total = entry.clone();
+            // Powers that were out of reach one by one may have become whole together, as in sqrt(a b)^2.
+            if total.is_zero() {
+                collected.remove(&base);
+            } else if total != exponent && total.is_integer() && self.opens(base) {
+                collected.remove(&base);
+                pending.push((base, total));
+            }
+        }
+        if collected.contains_key(&Graph::ZERO) {
+            coefficient = Rational::one();
+        } else if coefficient.is_zero() {
+            return Graph::ZERO;
+        }
+        let term = match collected.len() {
+            0 => return self.number(coefficient),
+            1 if collected.values().all(One::is_one) => {
+                collected.into_keys().next().unwrap_or(Graph::ONE)
+            }
+            _ => self.intern(Node::Product(collected.into_iter().collect())),
+        };
+        self.scaled_flat(term, coefficient)
+    }
+
+    /// As [`Graph::scaled`], for a term that may itself be a scaled expression.
+    fn scaled_flat(&mut self, term: Expr, coefficient: Rational) -> Expr {
+        match self.node(term) {
+            Node::Sum { constant, terms } if constant.is_zero() && terms.len() == 1 => {
+                let (inner, c) = terms[0].clone();
+                self.scaled(inner, c * coefficient)
+            }
+            _ => self.scaled(term, coefficient),
+        }
+    }
+
+    fn opens(&self, base: Expr) -> bool {
+        match self.node(base) {
+            Node::Number(_) | Node::Product(_) => true,
+            Node::Sum { constant, terms } => constant.is_zero() && terms.len() == 1,
+            _ => false,
+        }
+    }
+
+    /// Takes `base ^ exponent` apart where that is exact; numbers go into `coefficient`.
+    fn open_factor(
+        &mut self,
+        base: Expr,
+        exponent: &Rational,
+        coefficient: &mut Rational,
+    ) -> Option<Vec<(Expr, Rational)>> {
+        match self.node(base).clone() {
+            Node::Number(value) => {
+                let power = rational_power(&value, exponent)?;
+                *coefficient *= power;
+                Some(Vec::new())
+            }
+            Node::Product(factors) => {
+                let simple = factors.len() == 1 && !factors[0].1.is_integer();
+                (exponent.is_integer() || simple)
+                    .then(|| factors.iter().map(|(b, e)| (*b, e * exponent)).collect())
+            }
+            Node::Sum { constant, terms } if constant.is_zero() && terms.len() == 1 => {
+                let (term, scale) = terms[0].clone();
+                let power = rational_power(&scale, exponent)?;
+                *coefficient *= power;
+                Some(vec![(term, exponent.clone())])
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether any part of `expr` is zero to a negative power.
+    #[must_use]
+    pub fn divides_by_zero(&self, expr: Expr) -> bool {
+        self.reachable(&[expr]).into_iter().any(|e| match self.node(e) {
+            Node::Product(factors) => factors.iter().any(|(base, _)| *base == Graph::ZERO),
+            _ => false,
+        })
+    }
+
+    /// `function(arguments)`, simplified at arguments where the value is known.
+    pub fn call(&mut self, function: Function, arguments: &[Expr]) -> Expr {
+        let x = arguments[0];
+        let odd = matches!(
+            function,
+            Function::Sin | Function::Tan | Function::Sinh | Function::Tanh | Function::Asin | Function::Atan
+        );
+        let even = matches!(function, Function::Cos | Function::Cosh);
+        if (odd || even) && self.has_negative_sign(x) {
+            let positive = self.neg(x);
+            let value = self.call(function, &[positive]);
+            return if odd { self.neg(value) } else { value };
+        }
+        match function {
+            Function::Sin | Function::Cos => {
+                if let Some(value) = self.trigonometric_value(function, x) {
+                    return value;
+                }
+            }
+            Function::Tan
+            | Function::Asin
+            | Function::Atan
+            | Function::Sinh
+            | Function::Tanh
+            | Function::Ln1p
+            | Function::Expm1
+                if x == Graph::ZERO =>
+            {
+                return Graph::ZERO;
+            }
+            Function::Cosh | Function::Exp if x == Graph::ZERO => return Graph::ONE,
+            Function::Ln if x == Graph::ONE => return Graph::ZERO,
+            Function::Exp => {
+                if let Node::Call(Function::Ln, inner) = self.node(x) {
+                    return inner[0];
+                }
+            }
+            Function::Ln => {
+                if let Node::Call(Function::Exp, inner) = self.node(x) {
+                    return inner[0];
+                }
+            }
+            _ => {}
+        }
+        self.intern(Node::Call(function, arguments.into()))
+    }
+
+    fn has_negative_sign(&self, expr: Expr) -> bool {
+        match self.node(expr) {
+            Node::Number(value) => value.is_negative(),
+            Node::Sum { constant, terms } => {
+                constant.is_zero() && terms.len() == 1 && terms[0].1.is_negative()
+            }
+            _ => false,
+        }
+    }
+
+    /// Sine or cosine of a multiple of pi/2.
+    fn trigonometric_value(&mut self, function: Function, x: Expr) -> Option<Expr> {
+        let pi = self.pi();
+        let turns = self.div(x, pi);
+        let halves = self.as_number(turns)? * Rational::from_integer(2.into());
+        if !halves.is_integer() {
+            return None;
+        }
+        let quarter = halves.to_integer().mod_floor(&4.into()).to_u8()?;
+        let quarter = if function == Function::Cos { (quarter + 1) % 4 } else { quarter };
+        Some(self.integer([0, 1, 0, -1][usize::from(quarter)]))
+    }
+
+    /// `expr` with each expression that `replacement` knows replaced, from the root downwards.
+    pub fn replace(&mut self, expr: Expr, replacement: &BTreeMap<Expr, Expr>) -> Expr {
+        self.replace_with(expr, replacement, &mut BTreeMap::new())
+    }
+
+    fn replace_with(
+        &mut self,
+        expr: Expr,
+        replacement: &BTreeMap<Expr, Expr>,
+        done: &mut BTreeMap<Expr, Expr>,
+    ) -> Expr {
+        if let Some(&known) = replacement.get(&expr).or_else(|| done.get(&expr)) {
+            return known;
+        }
+        let result = self.map_children(expr, &mut |graph, child| {
+            graph.replace_with(child, replacement, done)
+        });
+        done.insert(expr, result);
+        result
+    }
+
+    /// The node of `expr` built anew from what `map` makes of its children.
+    pub(crate) fn map_children(
+        &mut self,
+        expr: Expr,
+        map: &mut impl FnMut(&mut Graph, Expr) -> Expr,
+    ) -> Expr {
+        match self.node(expr).clone() {
+            Node::Number(_) | Node::Pi | Node::Symbol(_) => expr,
+            Node::Sum { constant, terms } => {
+                let mut mapped = vec![(constant, Graph::ONE)];
+                for (term, coefficient) in terms {
+                    mapped.push((coefficient, map(self, term)));
+                }
+                self.sum(mapped)
+            }
+            Node::Product(factors) => {
+                let mut mapped = Vec::new();
+                for (base, exponent) in factors {
+                    mapped.push((map(self, base), exponent));
+                }
+                self.product(mapped)
+            }
+            Node::Call(function, arguments) => {
+                let mapped: Vec<Expr> = arguments.iter().map(|&a| map(self, a)).collect();
+                self.call(function, &mapped)
+            }
+            Node::Whole(inner) => {
+                let mapped = map(self, inner);
+                self.whole(mapped)
+            }
+        }
+    }
+}
+
+/// `value ^ exponent` where it is rational and of reasonable size.
+fn rational_power(value: &Rational, exponent: &Rational) -> Option<Rational> {
+    if value.is_zero() && !exponent.is_positive() {
+        return None;
+    }
+    let root = exact_root_or_self(value, exponent)?;
+    let power = exponent.numer().to_i32()?;
+    let bits = root.numer().bits().max(root.denom().bits());
+    if bits.saturating_sub(1) * u64::from(power.unsigned_abs()) > LARGEST_NUMBER_BITS {
+        return None;
+    }
+    Some(num_traits::Pow::pow(&root, power))
+}
+
+fn exact_root_or_self(value: &Rational, exponent: &Rational) -> Option<Rational> {
+    if exponent.is_integer() {
+        return Some(value.clone());
+    }
+    exact_root(value, exponent.denom().to_u32()?)
+}
+
+/// The greatest number that divides all coefficients, with the sign of the first.
+fn content_of(constant: &Rational, terms: &[(Expr, Rational)]) -> Rational {
+    let leading_negative =
+        if constant.is_zero() { terms[0].1.is_negative() } else { constant.is_negative() };
+    let all = std::iter::once(constant).chain(terms.iter().map(|(_, c)| c)).filter(|c| !c.is_zero());
+    let content = all
+        .map(Signed::abs)
+        .reduce(|a, b| Rational::new(a.numer().gcd(b.numer()), a.denom().lcm(b.denom())))
+        .unwrap_or_else(Rational::one);
+    if leading_negative { -content } else { content }
+}

@@ -1,0 +1,268 @@
+//! The hash-consed graph: nodes, symbols, and questions about them.
+
+use crate::Rational;
+use num_traits::{One, Zero};
+use std::collections::{BTreeSet, HashMap};
+
+/// An expression: the handle of a node in a [`Graph`]. Equal handles of one graph mean equal expressions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Expr(pub(crate) u32);
+
+/// A function of one argument, or of two for [`Function::Atan2`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Function {
+    /// Sine.
+    Sin,
+    /// Cosine.
+    Cos,
+    /// Tangent.
+    Tan,
+    /// Inverse sine.
+    Asin,
+    /// Inverse cosine.
+    Acos,
+    /// Inverse tangent.
+    Atan,
+    /// Hyperbolic sine.
+    Sinh,
+    /// Hyperbolic cosine.
+    Cosh,
+    /// Hyperbolic tangent.
+    Tanh,
+    /// Exponential.
+    Exp,
+    /// Natural logarithm.
+    Ln,
+    /// `ln(1 + x)`, accurate for small `x`.
+    Ln1p,
+    /// `exp(x) - 1`, accurate for small `x`.
+    Expm1,
+    /// `atan2(y, x)`, the polar angle of the point `(x, y)`.
+    Atan2,
+}
+
+impl Function {
+    /// Every function, with the name that text uses for it.
+    pub const NAMES: &'static [(&'static str, Function)] = &[
+        ("sin", Function::Sin),
+        ("cos", Function::Cos),
+        ("tan", Function::Tan),
+        ("arcsin", Function::Asin),
+        ("arccos", Function::Acos),
+        ("arctan", Function::Atan),
+        ("sinh", Function::Sinh),
+        ("cosh", Function::Cosh),
+        ("tanh", Function::Tanh),
+        ("exp", Function::Exp),
+        ("ln", Function::Ln),
+        ("log1p", Function::Ln1p),
+        ("expm1", Function::Expm1),
+        ("atan2", Function::Atan2),
+        // Other usual spellings.
+        ("log", Function::Ln),
+        ("asin", Function::Asin),
+        ("acos", Function::Acos),
+        ("atan", Function::Atan),
+    ];
+
+    /// The function that text calls `name`.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::NAMES.iter().find(|(n, _)| *n == name).map(|&(_, f)| f)
+    }
+
+    /// The name that text uses for it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        Self::NAMES.iter().find(|&&(_, f)| f == self).map_or("?", |(n, _)| n)
+    }
+
+    /// The number of arguments.
+    #[must_use]
+    pub fn arity(self) -> usize {
+        if self == Function::Atan2 { 2 } else { 1 }
+    }
+}
+
+/// What a node holds.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum Node {
+    /// An exact number.
+    Number(Rational),
+    /// The circle number.
+    Pi,
+    /// A variable, by its index among the graph's symbols.
+    Symbol(u32),
+    /// `constant + sum of coefficient * term`; no term is a number, terms are sorted and differ, no coefficient
+    /// is zero. One term alone is a scaled expression.
+    Sum {
+        /// The number added.
+        constant: Rational,
+        /// The terms with their coefficients.
+        terms: Box<[(Expr, Rational)]>,
+    },
+    /// The product of `base ^ exponent`; bases are sorted and differ, no exponent is zero.
+    Product(Box<[(Expr, Rational)]>),
+    /// A function of its arguments.
+    Call(Function, Box<[Expr]>),
+    /// A quantity that algebra leaves in one piece.
+    Whole(Expr),
+}
+
+/// An arena of expressions in which equal expressions are one node.
+#[derive(Clone, Debug)]
+pub struct Graph {
+    nodes: Vec<Node>,
+    depth: Vec<u32>,
+    index: HashMap<Node, Expr>,
+    symbols: Vec<String>,
+}
+
+impl Default for Graph {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Graph {
+    /// The number zero.
+    pub const ZERO: Expr = Expr(0);
+    /// The number one.
+    pub const ONE: Expr = Expr(1);
+
+    /// A graph with nothing but zero and one.
+    #[must_use]
+    pub fn new() -> Self {
+        let mut graph =
+            Graph { nodes: Vec::new(), depth: Vec::new(), index: HashMap::new(), symbols: Vec::new() };
+        graph.intern(Node::Number(Rational::zero()));
+        graph.intern(Node::Number(Rational::one()));
+        graph
+    }
+
+    /// The handle of `node`; canonical form is the caller's duty.
+    pub(crate) fn intern(&mut self, node: Node) -> Expr {
+        if let Some(&expr) = self.index.get(&node) {
+            return expr;
+        }
+        let expr = Expr(u32::try_from(self.nodes.len()).unwrap_or(u32::MAX));
+        let depth = 1 + children(&node).map(|c| self.depth(c)).max().unwrap_or(0);
+        self.index.insert(node.clone(), expr);
+        self.nodes.push(node);
+        self.depth.push(depth);
+        expr
+    }
+
+    /// What the expression's root is.
+    #[must_use]
+    pub fn node(&self, expr: Expr) -> &Node {
+        &self.nodes[expr.0 as usize]
+    }
+
+    /// The length of the longest path from the root to a leaf.
+    #[must_use]
+    pub fn depth(&self, expr: Expr) -> u32 {
+        self.depth[expr.0 as usize]
+    }
+
+    /// The number of nodes made so far.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// Whether the graph is empty, which it never is: zero and one are always there.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
+    /// The variable `name`; the same name gives the same variable.
+    pub fn symbol(&mut self, name: &str) -> Expr {
+        let index = self.symbols.iter().position(|s| s == name).unwrap_or_else(|| {
+            self.symbols.push(name.to_owned());
+            self.symbols.len() - 1
+        });
+        self.intern(Node::Symbol(index as u32))
+    }
+
+    /// The name of a variable; `None` where the expression is not a variable.
+    #[must_use]
+    pub fn symbol_name(&self, expr: Expr) -> Option<&str> {
+        match self.node(expr) {
+            Node::Symbol(index) => Some(&self.symbols[*index as usize]),
+            _ => None,
+        }
+    }
+
+    /// The exact number `value`.
+    pub fn number(&mut self, value: Rational) -> Expr {
+        self.intern(Node::Number(value))
+    }
+
+    /// The integer `value`.
+    pub fn integer(&mut self, value: i64) -> Expr {
+        self.number(Rational::from_integer(value.into()))
+    }
+
+    /// The circle number.
+    pub fn pi(&mut self) -> Expr {
+        self.intern(Node::Pi)
+    }
+
+    /// The value, where the expression is a number.
+    #[must_use]
+    pub fn as_number(&self, expr: Expr) -> Option<&Rational> {
+        match self.node(expr) {
+            Node::Number(value) => Some(value),
+            _ => None,
+        }
+    }
+
+    /// `expr` as a quantity that algebra does not look into: sums that contain it are not merged with its terms.
+    /// It has the same value. Anything but a sum is returned as it is.
+    pub fn whole(&mut self, expr: Expr) -> Expr {
+        match self.node(expr) {
+            Node::Sum { .. } => self.intern(Node::Whole(expr)),
+            _ => expr,
+        }
+    }
+
+    /// The expressions that the root refers to directly.
+    pub fn children(&self, expr: Expr) -> impl Iterator<Item = Expr> + '_ {
+        children(self.node(expr))
+    }
+
+    /// The variables in any of `roots`.
+    #[must_use]
+    pub fn symbols_in(&self, roots: &[Expr]) -> BTreeSet<Expr> {
+        self.reachable(roots)
+            .into_iter()
+            .filter(|&e| matches!(self.node(e), Node::Symbol(_)))
+            .collect()
+    }
+
+    /// Every expression that `roots` consist of, themselves included.
+    #[must_use]
+    pub fn reachable(&self, roots: &[Expr]) -> BTreeSet<Expr> {
+        let mut seen = BTreeSet::new();
+        let mut stack = roots.to_vec();
+        while let Some(expr) = stack.pop() {
+            if seen.insert(expr) {
+                stack.extend(self.children(expr));
+            }
+        }
+        seen
+    }
+}
+
+fn children(node: &Node) -> impl Iterator<Item = Expr> + '_ {
+    let (pairs, arguments): (&[(Expr, Rational)], &[Expr]) = match node {
+        Node::Number(_) | Node::Pi | Node::Symbol(_) => (&[], &[]),
+        Node::Sum { terms, .. } => (terms, &[]),
+        Node::Product(factors) => (factors, &[]),
+        Node::Call(_, arguments) => (&[], arguments),
+        Node::Whole(inner) => (&[], std::slice::from_ref(inner)),
+    };
+    pairs.iter().map(|&(e, _)| e).chain(arguments.iter().copied())
+}

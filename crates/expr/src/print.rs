@@ -1,0 +1,122 @@
+//! Graph to text, in the notation that [`Ast::parse`](crate::Ast::parse) reads.
+
+use crate::{Expr, Graph, Node, Rational};
+use num_traits::{One, Signed, Zero};
+
+/// How tightly the printed text binds.
+#[derive(Clone, Copy, PartialEq, PartialOrd)]
+enum Binding {
+    Sum,
+    Product,
+    Atom,
+}
+
+impl Graph {
+    /// The expression as text that reads back as the same expression.
+    #[must_use]
+    pub fn print(&self, expr: Expr) -> String {
+        self.text(expr).0
+    }
+
+    fn text(&self, expr: Expr) -> (String, Binding) {
+        match self.node(expr) {
+            Node::Number(value) => number_text(value),
+            Node::Pi => ("Pi".into(), Binding::Atom),
+            Node::Symbol(_) => {
+                (self.symbol_name(expr).unwrap_or_default().to_owned(), Binding::Atom)
+            }
+            Node::Call(function, arguments) => {
+                let arguments: Vec<String> = arguments.iter().map(|&a| self.print(a)).collect();
+                (format!("{}({})", function.name(), arguments.join(", ")), Binding::Atom)
+            }
+            Node::Whole(inner) => self.text(*inner),
+            Node::Product(factors) => self.product_text(factors, &Rational::one()),
+            Node::Sum { constant, terms } => self.sum_text(constant, terms),
+        }
+    }
+
+    fn sum_text(&self, constant: &Rational, terms: &[(Expr, Rational)]) -> (String, Binding) {
+        if constant.is_zero()
+            && let [(term, coefficient)] = terms
+        {
+            return self.scaled_text(*term, coefficient);
+        }
+        let mut text = String::new();
+        if !constant.is_zero() {
+            text = number_text(constant).0;
+        }
+        for (term, coefficient) in terms {
+            let (part, binding) = self.scaled_text(*term, &coefficient.abs());
+            let part = if binding == Binding::Sum { format!("({part})") } else { part };
+            match (text.is_empty(), coefficient.is_negative()) {
+                (true, false) => text = part,
+                (true, true) => text = format!("-{part}"),
+                (false, false) => text += &format!(" + {part}"),
+                (false, true) => text += &format!(" - {part}"),
+            }
+        }
+        (text, Binding::Sum)
+    }
+
+    fn scaled_text(&self, term: Expr, coefficient: &Rational) -> (String, Binding) {
+        match self.node(term) {
+            _ if coefficient.is_one() => self.text(term),
+            Node::Product(factors) => self.product_text(factors, coefficient),
+            _ => self.product_text(&[(term, Rational::one())], coefficient),
+        }
+    }
+
+    fn product_text(
+        &self,
+        factors: &[(Expr, Rational)],
+        coefficient: &Rational,
+    ) -> (String, Binding) {
+        let integer = |n: &num_bigint::BigInt| Rational::from_integer(n.clone());
+        let mut above = Vec::new();
+        let mut below = Vec::new();
+        if !coefficient.numer().abs().is_one() {
+            above.push(number_text(&integer(coefficient.numer()).abs()).0);
+        }
+        if !coefficient.denom().is_one() {
+            below.push(number_text(&integer(coefficient.denom())).0);
+        }
+        for (base, exponent) in factors {
+            let place = if exponent.is_negative() { &mut below } else { &mut above };
+            place.push(self.power_text(*base, &exponent.abs()));
+        }
+        let above = if above.is_empty() { "1".to_owned() } else { above.join("*") };
+        let text = match below.as_slice() {
+            [] => above,
+            [one] => format!("{above}/{one}"),
+            many => format!("{above}/({})", many.join("*")),
+        };
+        if coefficient.is_negative() {
+            (format!("-{text}"), Binding::Sum)
+        } else {
+            (text, Binding::Product)
+        }
+    }
+
+    /// `base ^ exponent` for a positive exponent.
+    fn power_text(&self, base: Expr, exponent: &Rational) -> String {
+        if *exponent == Rational::new(1.into(), 2.into()) {
+            return format!("sqrt({})", self.print(base));
+        }
+        let (text, binding) = self.text(base);
+        let base = if binding == Binding::Atom { text } else { format!("({text})") };
+        match (exponent.is_one(), exponent.is_integer()) {
+            (true, _) => base,
+            (false, true) => format!("{base}^{exponent}"),
+            (false, false) => format!("{base}^({exponent})"),
+        }
+    }
+}
+
+fn number_text(value: &Rational) -> (String, Binding) {
+    let binding = match (value.is_negative(), value.is_integer()) {
+        (true, _) => Binding::Sum,
+        (false, true) => Binding::Atom,
+        (false, false) => Binding::Product,
+    };
+    (value.to_string(), binding)
+}

@@ -1,0 +1,450 @@
+//! Straight-line programs: what is computed, in which order, in floating point.
+//!
+//! Lowering decides on rounding, so it follows rules that keep digits: the constant of a sum is added last, after
+//! everything small; powers are products; `sin(Pi x)` is one operation on `x`; numbers are rounded once.
+//! It also keeps apart what changes at different rates. Factors and terms that depend on parameters only are
+//! combined before those that depend on time or on position, so that the slow parts are computed rarely.
+
+use crate::{Expr, Function, Graph, Node, Rational, nearest_f64};
+use num_traits::{One, Signed, ToPrimitive, Zero};
+use std::collections::HashMap;
+
+/// The place of a value in a program: the index of the operation that computes it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Slot(u32);
+
+impl Slot {
+    /// The index of the operation.
+    #[must_use]
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// One step of a program; operands are slots of earlier steps.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum Operation {
+    /// A constant.
+    Number(Rational),
+    /// The circle number.
+    Pi,
+    /// An input, by its index.
+    Input(usize),
+    /// Sum.
+    Add(Slot, Slot),
+    /// Difference.
+    Sub(Slot, Slot),
+    /// Product.
+    Mul(Slot, Slot),
+    /// Quotient.
+    Div(Slot, Slot),
+    /// Negation.
+    Neg(Slot),
+    /// Square root.
+    Sqrt(Slot),
+    /// A power with a positive exponent that is neither whole nor half.
+    Power(Slot, Rational),
+    /// `sin(Pi x)`.
+    SinPi(Slot),
+    /// `cos(Pi x)`.
+    CosPi(Slot),
+    /// A function of one argument.
+    Call(Function, Slot),
+    /// `atan2(y, x)`.
+    Atan2(Slot, Slot),
+}
+
+impl Operation {
+    /// The slots that it reads.
+    #[must_use]
+    pub fn operands(&self) -> Vec<Slot> {
+        match *self {
+            Operation::Number(_) | Operation::Pi | Operation::Input(_) => Vec::new(),
+            Operation::Add(a, b)
+            | Operation::Sub(a, b)
+            | Operation::Mul(a, b)
+            | Operation::Div(a, b)
+            | Operation::Atan2(a, b) => vec![a, b],
+            Operation::Neg(a)
+            | Operation::Sqrt(a)
+            | Operation::Power(a, _)
+            | Operation::SinPi(a)
+            | Operation::CosPi(a)
+            | Operation::Call(_, a) => vec![a],
+        }
+    }
+}
+
+/// What a value depends on, as a set of rates of change; nothing but parameters where both are false.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Dependence {
+    /// On the position `X`.
+    pub position: bool,
+    /// On the time `t`.
+    pub time: bool,
+}
+
+impl Dependence {
+    fn join(self, other: Self) -> Self {
+        Dependence { position: self.position || other.position, time: self.time || other.time }
+    }
+
+    /// Whether it depends on parameters only.
+    #[must_use]
+    pub fn is_fixed(self) -> bool {
+        !self.position && !self.time
+    }
+}
+
+/// A list of operations that computes several outputs from several inputs; equal operations occur once.
+#[derive(Clone, Debug, Default)]
+pub struct Program {
+    operations: Vec<Operation>,
+    dependence: Vec<Dependence>,
+    outputs: Vec<Slot>,
+}
+
+impl Program {
+    /// The program for `outputs` as functions of `inputs`.
+    ///
+    /// `definitions` say what further symbols mean, as that the polar radius is `sqrt(X^2 + Y^2)`. Symbols that
+    /// are neither count as not-a-number; [`Graph::symbols_in`] tells beforehand.
+    #[must_use]
+    pub fn lower(
+        graph: &mut Graph,
+        inputs: &[(Expr, Dependence)],
+        definitions: &[(Expr, Expr)],
+        outputs: &[Expr],
+    ) -> Self {
+        let mut lowering = Lowering {
+            graph,
+            program: Program::default(),
+            interned: HashMap::new(),
+            lowered: HashMap::new(),
+            inputs,
+            definitions,
+        };
+        let outputs: Vec<Slot> = outputs.iter().map(|&output| lowering.lower(output)).collect();
+        Program { outputs, ..lowering.program }
+    }
+
+    /// The operations, each after those that it reads.
+    #[must_use]
+    pub fn operations(&self) -> &[Operation] {
+        &self.operations
+    }
+
+    /// Where the outputs are, in the order in which they were asked for.
+    #[must_use]
+    pub fn outputs(&self) -> &[Slot] {
+        &self.outputs
+    }
+
+    /// What the value in `slot` depends on.
+    #[must_use]
+    pub fn dependence(&self, slot: Slot) -> Dependence {
+        self.dependence[slot.index()]
+    }
+
+    /// The slots of all operations, in order.
+    pub fn slots(&self) -> impl Iterator<Item = Slot> + use<> {
+        (0..self.operations.len()).map(|index| Slot(index as u32))
+    }
+
+    /// The outputs at the given input values, in double precision.
+    ///
+    /// An input that is not given counts as not-a-number.
+    #[must_use]
+    pub fn evaluate(&self, inputs: &[f64]) -> Vec<f64> {
+        let mut values: Vec<f64> = Vec::with_capacity(self.operations.len());
+        for operation in &self.operations {
+            let at = |slot: Slot| values[slot.index()];
+            let value = match *operation {
+                Operation::Number(ref value) => nearest_f64(value),
+                Operation::Pi => std::f64::consts::PI,
+                Operation::Input(index) => inputs.get(index).copied().unwrap_or(f64::NAN),
+                Operation::Add(a, b) => at(a) + at(b),
+                Operation::Sub(a, b) => at(a) - at(b),
+                Operation::Mul(a, b) => at(a) * at(b),
+                Operation::Div(a, b) => at(a) / at(b),
+                Operation::Neg(a) => -at(a),
+                Operation::Sqrt(a) => at(a).sqrt(),
+                Operation::Power(a, ref exponent) => at(a).powf(nearest_f64(exponent)),
+                Operation::SinPi(a) => sin_pi(at(a)),
+                Operation::CosPi(a) => sin_pi_shifted(at(a), 1),
+                Operation::Call(function, a) => call(function, at(a)),
+                Operation::Atan2(y, x) => at(y).atan2(at(x)),
+            };
+            values.push(value);
+        }
+        self.outputs.iter().map(|slot| values[slot.index()]).collect()
+    }
+}
+
+fn sin_pi(x: f64) -> f64 {
+    sin_pi_shifted(x, 0)
+}
+
+/// `sin(pi (x + quarters/2))`, the argument reduced exactly before it is multiplied by pi.
+fn sin_pi_shifted(x: f64, quarters: i64) -> f64 {
+    let n = (2.0 * x).round();
+    let r = (x - n / 2.0) * std::f64::consts::PI;
+    match (n.rem_euclid(4.0) as i64 + quarters).rem_euclid(4) {
+        0 => r.sin(),
+        1 => r.cos(),
+        2 => -r.sin(),
+        _ => -r.cos(),
+    }
+}
+
+fn call(function: Function, x: f64) -> f64 {
+    match function {
+        Function::Sin => x.sin(),
+        Function::Cos => x.cos(),
+        Function::Tan => x.tan(),
+        Function::Asin => x.asin(),
+        Function::Acos => x.acos(),
+        Function::Atan => x.atan(),
+        Function::Sinh => x.sinh(),
+        Function::Cosh => x.cosh(),
+        Function::Tanh => x.tanh(),
+        Function::Exp => x.exp(),
+        Function::Ln => x.ln(),
+        Function::Ln1p => x.ln_1p(),
+        Function::Expm1 => x.exp_m1(),
+        // Has an operation of its own.
+        Function::Atan2 => f64::NAN,
+    }
+}
+
+struct Lowering<'a> {
+    graph: &'a mut Graph,
+    program: Program,
+    interned: HashMap<Operation, Slot>,
+    lowered: HashMap<Expr, Slot>,
+    inputs: &'a [(Expr, Dependence)],
+    definitions: &'a [(Expr, Expr)],
+}
+
+impl Lowering<'_> {
+    fn push(&mut self, operation: Operation) -> Slot {
+        if let Some(&slot) = self.interned.get(&operation) {
+            return slot;
+        }
+        let dependence = match operation {
+            Operation::Input(index) => {
+                self.inputs.get(index).map_or_else(Dependence::default, |(_, d)| *d)
+            }
+            _ => operation
+                .operands()
+                .iter()
+                .map(|&slot| self.program.dependence(slot))
+                .fold(Dependence::default(), Dependence::join),
+        };
+        let slot = Slot(self.program.operations.len() as u32);
+        self.program.operations.push(operation.clone());
+        self.program.dependence.push(dependence);
+        self.interned.insert(operation, slot);
+        slot
+    }
+
+    fn lower(&mut self, expr: Expr) -> Slot {
+        if let Some(&slot) = self.lowered.get(&expr) {
+            return slot;
+        }
+        let slot = match self.graph.node(expr).clone() {
+            Node::Number(value) => self.number(value),
+            Node::Pi => self.push(Operation::Pi),
+            Node::Symbol(_) => self.symbol(expr),
+            Node::Whole(inner) => self.lower(inner),
+            Node::Product(factors) => self.product(&factors, &Rational::one()),
+            Node::Call(Function::Atan2, arguments) => {
+                let (y, x) = (self.lower(arguments[0]), self.lower(arguments[1]));
+                self.push(Operation::Atan2(y, x))
+            }
+            Node::Call(function, arguments) => self.call(function, arguments[0]),
+            Node::Sum { constant, terms } => self.sum(constant, &terms),
+        };
+        self.lowered.insert(expr, slot);
+        slot
+    }
+
+    fn number(&mut self, value: Rational) -> Slot {
+        if value.is_negative() {
+            let positive = self.push(Operation::Number(-value));
+            return self.push(Operation::Neg(positive));
+        }
+        self.push(Operation::Number(value))
+    }
+
+    fn symbol(&mut self, expr: Expr) -> Slot {
+        if let Some(&(_, meaning)) = self.definitions.iter().find(|(symbol, _)| *symbol == expr) {
+            return self.lower(meaning);
+        }
+        let index = self.inputs.iter().position(|(symbol, _)| *symbol == expr);
+        self.push(Operation::Input(index.unwrap_or(usize::MAX)))
+    }
+
+    fn call(&mut self, function: Function, argument: Expr) -> Slot {
+        if matches!(function, Function::Sin | Function::Cos) {
+            let pi = self.graph.pi();
+            let turns = self.graph.div(argument, pi);
+            if !self.contains_pi_as_factor(turns) {
+                let turns = self.lower(turns);
+                return self.push(match function {
+                    Function::Sin => Operation::SinPi(turns),
+                    _ => Operation::CosPi(turns),
+                });
+            }
+        }
+        let argument = self.lower(argument);
+        self.push(Operation::Call(function, argument))
+    }
+
+    /// Whether a power of pi stands in the product `expr`: then dividing by pi did not take it away.
+    fn contains_pi_as_factor(&self, expr: Expr) -> bool {
+        match self.graph.node(expr) {
+            Node::Pi => true,
+            Node::Product(factors) => {
+                factors.iter().any(|(base, _)| matches!(self.graph.node(*base), Node::Pi))
+            }
+            Node::Sum { constant, terms } if constant.is_zero() && terms.len() == 1 => {
+                self.contains_pi_as_factor(terms[0].0)
+            }
+            _ => false,
+        }
+    }
+
+    fn sum(&mut self, constant: Rational, terms: &[(Expr, Rational)]) -> Slot {
+        if !constant.is_zero() {
+            // The rest as an expression of its own: where it occurs elsewhere, as H does beside 1 + H, it is shared.
+            let rest = self.graph.sum(terms.iter().map(|(term, c)| (c.clone(), *term)));
+            let rest = self.signed(rest);
+            let constant = (constant.is_negative(), self.push(Operation::Number(constant.abs())));
+            let (negative, total) = self.add([rest, constant].to_vec());
+            return self.with_sign(negative, total);
+        }
+        let (negative, total) = self.terms(terms);
+        self.with_sign(negative, total)
+    }
+
+    /// The expression as a sign and a value, so that a leading minus costs no operation.
+    fn signed(&mut self, expr: Expr) -> (bool, Slot) {
+        match self.graph.node(expr).clone() {
+            Node::Sum { constant, terms } if constant.is_zero() && terms.len() == 1 => {
+                self.terms(&terms)
+            }
+            _ => (false, self.lower(expr)),
+        }
+    }
+
+    fn terms(&mut self, terms: &[(Expr, Rational)]) -> (bool, Slot) {
+        let mut by_rate: Vec<(Dependence, (bool, Slot))> = Vec::new();
+        for (term, coefficient) in terms {
+            let slot = self.scaled(*term, &coefficient.abs());
+            by_rate.push((self.program.dependence(slot), (coefficient.is_negative(), slot)));
+        }
+        by_rate.sort_by_key(|(dependence, _)| *dependence);
+        let mut groups = Vec::new();
+        for group in by_rate.chunk_by(|a, b| a.0 == b.0) {
+            groups.push(self.add(group.iter().map(|(_, part)| *part).collect()));
+        }
+        self.add(groups)
+    }
+
+    /// The sum of signed values; negative only where all of them are.
+    fn add(&mut self, mut parts: Vec<(bool, Slot)>) -> (bool, Slot) {
+        let all_negative = parts.iter().all(|(negative, _)| *negative);
+        let first = parts.iter().position(|(negative, _)| !negative).unwrap_or(0);
+        let (_, mut total) = parts.remove(first);
+        for (negative, slot) in parts {
+            total = if negative && !all_negative {
+                self.push(Operation::Sub(total, slot))
+            } else {
+                self.push(Operation::Add(total, slot))
+            };
+        }
+        (all_negative, total)
+    }
+
+    fn with_sign(&mut self, negative: bool, slot: Slot) -> Slot {
+        if negative { self.push(Operation::Neg(slot)) } else { slot }
+    }
+
+    fn scaled(&mut self, term: Expr, coefficient: &Rational) -> Slot {
+        match self.graph.node(term).clone() {
+            _ if coefficient.is_one() => self.lower(term),
+            Node::Product(factors) => self.product(&factors, coefficient),
+            _ => self.product(&[(term, Rational::one())], coefficient),
+        }
+    }
+
+    fn product(&mut self, factors: &[(Expr, Rational)], coefficient: &Rational) -> Slot {
+        // Value and whether it divides, in order of the rate of change.
+        let mut parts: Vec<(Dependence, bool, Slot)> = Vec::new();
+        if !coefficient.is_one() {
+            let number = self.push(Operation::Number(coefficient.clone()));
+            parts.push((Dependence::default(), false, number));
+        }
+        for (base, exponent) in factors {
+            let base = self.lower(*base);
+            let power = self.power(base, &exponent.abs());
+            parts.push((self.program.dependence(power), exponent.is_negative(), power));
+        }
+        parts.sort_by_key(|(dependence, divides, _)| (*dependence, *divides));
+        let mut total: Option<Slot> = None;
+        for group in parts.chunk_by(|a, b| a.0 == b.0) {
+            let numerator = self.multiply(group.iter().filter(|p| !p.1).map(|p| p.2).collect());
+            let denominator = self.multiply(group.iter().filter(|p| p.1).map(|p| p.2).collect());
+            let quotient = match (numerator, denominator) {
+                (Some(n), Some(d)) => Some(self.push(Operation::Div(n, d))),
+                (n, None) => n,
+                (None, Some(d)) => {
+                    // Nothing to divide in this group: divide what is there already.
+                    let n = total.take();
+                    let n = n.unwrap_or_else(|| self.push(Operation::Number(Rational::one())));
+                    total = Some(self.push(Operation::Div(n, d)));
+                    None
+                }
+            };
+            total = match (total, quotient) {
+                (Some(a), Some(b)) => Some(self.push(Operation::Mul(a, b))),
+                (a, b) => a.or(b),
+            };
+        }
+        total.unwrap_or_else(|| self.push(Operation::Number(Rational::one())))
+    }
+
+    fn multiply(&mut self, values: Vec<Slot>) -> Option<Slot> {
+        let mut values = values.into_iter();
+        let first = values.next()?;
+        Some(values.fold(first, |total, value| self.push(Operation::Mul(total, value))))
+    }
+
+    /// `base ^ exponent` for a positive exponent.
+    fn power(&mut self, base: Slot, exponent: &Rational) -> Slot {
+        let whole = exponent.to_integer().to_u32().unwrap_or(0);
+        let rest = exponent - Rational::from_integer(whole.into());
+        if rest.is_zero() {
+            return self.whole_power(base, whole);
+        }
+        if rest != Rational::new(1.into(), 2.into()) {
+            return self.push(Operation::Power(base, exponent.clone()));
+        }
+        let root = self.push(Operation::Sqrt(base));
+        if whole == 0 {
+            return root;
+        }
+        let power = self.whole_power(base, whole);
+        self.push(Operation::Mul(power, root))
+    }
+
+    fn whole_power(&mut self, base: Slot, exponent: u32) -> Slot {
+        if exponent == 1 {
+            return base;
+        }
+        let half = self.whole_power(base, exponent / 2);
+        let square = self.push(Operation::Mul(half, half));
+        if exponent % 2 == 0 { square } else { self.push(Operation::Mul(square, base)) }
+    }
+}

@@ -1,0 +1,77 @@
+//! Error messages that show the text they speak of.
+
+use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
+use std::fmt;
+use std::ops::Range;
+
+/// A mistake in a specification: what is wrong, where, and what would be right.
+///
+/// Its display is several lines: the message, `file:line:column`, and the line with the place marked.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Diagnostic {
+    /// What is wrong.
+    pub message: String,
+    /// The file, as the user called it.
+    pub file: String,
+    /// The whole text of the file.
+    pub source: String,
+    /// Where in the text, in bytes.
+    pub span: Range<usize>,
+    /// What would be right, where that can be said.
+    pub help: Option<String>,
+}
+
+impl Diagnostic {
+    /// Line and column of the place, both counted from one; columns count characters.
+    #[must_use]
+    pub fn line_and_column(&self) -> (usize, usize) {
+        let before = self.source.get(..self.span.start).unwrap_or(&self.source);
+        let line_start = before.rfind('\n').map_or(0, |at| at + 1);
+        let line = before.matches('\n').count() + 1;
+        (line, before[line_start..].chars().count() + 1)
+    }
+}
+
+impl fmt::Display for Diagnostic {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // An empty span at the end of a text has nothing to mark: mark the last character.
+        let end = self.span.end.clamp(self.span.start, self.source.len());
+        let start = self.span.start.min(self.source.len().saturating_sub(1));
+        let snippet = Snippet::source(&self.source)
+            .path(&self.file)
+            .annotation(AnnotationKind::Primary.span(start..end.max(start)));
+        let mut group = Level::ERROR.primary_title(&self.message).element(snippet);
+        if let Some(help) = &self.help {
+            group = group.element(Level::HELP.message(help));
+        }
+        f.write_str(&Renderer::plain().render(&[group]))
+    }
+}
+
+impl std::error::Error for Diagnostic {}
+
+/// The name among `known` that is closest to `name`, where one is close.
+pub(crate) fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    known
+        .into_iter()
+        .map(|candidate| (distance(name, candidate), candidate))
+        .filter(|(distance, candidate)| *distance * 2 <= candidate.chars().count().max(2))
+        .min()
+        .map(|(_, candidate)| candidate)
+}
+
+/// The number of single-character edits between two names, letter case ignored.
+fn distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.to_lowercase().chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.to_lowercase().chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, &y) in b.iter().enumerate() {
+            let substituted = diagonal + usize::from(x != y);
+            diagonal = row[j + 1];
+            row[j + 1] = substituted.min(row[j] + 1).min(diagonal + 1);
+        }
+    }
+    row[b.len()]
+}

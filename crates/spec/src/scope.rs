@@ -1,0 +1,278 @@
+//! Names and what they stand for: coordinates, time, parameters and `[let]` expressions.
+
+use crate::Diagnostic;
+use crate::diagnostic::nearest;
+use crate::document::Text;
+use mmsmith_expr::{Ast, AstKind, Expr, Function, Graph};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The text of a specification and its name, for messages.
+pub(crate) struct Source<'a> {
+    pub(crate) file: &'a str,
+    pub(crate) text: &'a str,
+}
+
+impl Source<'_> {
+    pub(crate) fn error(
+        &self,
+        message: impl Into<String>,
+        span: std::ops::Range<usize>,
+        help: Option<String>,
+    ) -> Diagnostic {
+        Diagnostic {
+            message: message.into(),
+            file: self.file.to_owned(),
+            source: self.text.to_owned(),
+            span,
+            help,
+        }
+    }
+
+    pub(crate) fn parse(&self, text: &Text) -> Result<Ast, Diagnostic> {
+        Ast::parse(&text.value)
+            .map_err(|e| self.error(e.message, text.locate(self.text, &e.span), None))
+    }
+}
+
+/// The names of one specification.
+pub(crate) struct Scope<'a> {
+    pub(crate) source: Source<'a>,
+    pub(crate) graph: Graph,
+    names: BTreeMap<String, Expr>,
+    /// Names that exist but not here, with the reason.
+    elsewhere: BTreeMap<String, String>,
+    pub(crate) coordinates: Vec<Expr>,
+    pub(crate) time: Expr,
+}
+
+impl<'a> Scope<'a> {
+    /// A scope with the coordinates `names` and the time `t`.
+    pub(crate) fn new(source: Source<'a>, coordinates: &[&str]) -> Self {
+        let mut graph = Graph::new();
+        let time = graph.symbol("t");
+        let mut names = BTreeMap::from([("t".to_owned(), time)]);
+        let mut symbols = Vec::new();
+        for &name in coordinates {
+            let symbol = graph.symbol(name);
+            names.insert(name.to_owned(), symbol);
+            symbols.push(symbol);
+        }
+        let listed = coordinates.join(", ");
+        let elsewhere = ["X", "Y", "Z", "R", "theta"]
+            .into_iter()
+            .filter(|name| !coordinates.contains(name))
+            .map(|name| (name.to_owned(), format!("the coordinates of this file are {listed}")))
+            .collect();
+        Scope { source, graph, names, elsewhere, coordinates: symbols, time }
+    }
+
+    /// Adds a parameter.
+    pub(crate) fn declare(
+        &mut self,
+        name: &str,
+        span: std::ops::Range<usize>,
+    ) -> Result<(), Diagnostic> {
+        self.check_new_name(name, span)?;
+        let symbol = self.graph.symbol(name);
+        self.names.insert(name.to_owned(), symbol);
+        Ok(())
+    }
+
+    fn check_new_name(&self, name: &str, span: std::ops::Range<usize>) -> Result<(), Diagnostic> {
+        let mut characters = name.chars();
+        let valid = characters.next().is_some_and(|c| c.is_ascii_alphabetic())
+            && characters.all(|c| c.is_ascii_alphanumeric() || c == '_');
+        if !valid {
+            let message = format!("'{name}' cannot be a name");
+            let help = "a name is a letter followed by letters, digits or '_'; Greek letters are \
+                        spelt out where they are declared, as in lambda";
+            return Err(self.source.error(message, span, Some(help.into())));
+        }
+        let builtin = name == "Pi" || name == "diff" || name == "sqrt";
+        if builtin || Function::from_name(name).is_some() {
+            let message = format!("'{name}' is built in and cannot be declared");
+            return Err(self.source.error(message, span, Some("choose another name".into())));
+        }
+        if self.names.contains_key(name) || self.elsewhere.contains_key(name) {
+            let what = if self.elsewhere.contains_key(name) || self.is_coordinate(name) {
+                "is reserved for a coordinate or the time"
+            } else {
+                "is declared twice"
+            };
+            let message = format!("the name '{name}' {what}");
+            return Err(self.source.error(message, span, Some("choose another name".into())));
+        }
+        Ok(())
+    }
+
+    fn is_coordinate(&self, name: &str) -> bool {
+        self.names
+            .get(name)
+            .is_some_and(|symbol| *symbol == self.time || self.coordinates.contains(symbol))
+    }
+
+    /// Adds the `[let]` expressions, which may refer to each other in any order but not in a circle.
+    pub(crate) fn define_all(
+        &mut self,
+        lets: &[(toml::Spanned<String>, Text)],
+    ) -> Result<(), Diagnostic> {
+        let mut syntax = Vec::new();
+        let mut index_of = BTreeMap::new();
+        for (index, (name, text)) in lets.iter().enumerate() {
+            self.check_new_name(name.get_ref(), name.span())?;
+            index_of.insert(name.get_ref().as_str(), index);
+            let ast = self.source.parse(text)?;
+            let mut used = BTreeSet::new();
+            collect_names(&ast, &mut used);
+            syntax.push((ast, used));
+        }
+        let uses: Vec<Vec<usize>> = syntax
+            .iter()
+            .map(|(_, used)| used.iter().filter_map(|n| index_of.get(n.as_str()).copied()).collect())
+            .collect();
+        let order = dependency_order(&uses).map_err(|circle| {
+            let path: Vec<&str> = circle.iter().map(|&i| lets[i].0.get_ref().as_str()).collect();
+            let (name, text) = &lets[circle[0]];
+            let message = format!("'{}' is defined by itself: {}", name.get_ref(), path.join(" -> "));
+            let help = "a [let] expression may use others, but not in a circle";
+            self.source.error(message, text.span.clone(), Some(help.into()))
+        })?;
+        for index in order {
+            let (name, text) = &lets[index];
+            let value = self.build(&syntax[index].0, text)?;
+            self.names.insert(name.get_ref().clone(), value);
+        }
+        Ok(())
+    }
+
+    /// The expression that `text` stands for.
+    pub(crate) fn expression(&mut self, text: &Text) -> Result<Expr, Diagnostic> {
+        let ast = self.source.parse(text)?;
+        self.build(&ast, text)
+    }
+
+    /// As [`Scope::expression`], for a quantity that may depend on parameters only.
+    pub(crate) fn constant(&mut self, text: &Text, what: &str) -> Result<Expr, Diagnostic> {
+        let expr = self.expression(text)?;
+        let variables: BTreeSet<Expr> =
+            self.coordinates.iter().copied().chain([self.time]).collect();
+        if self.graph.depends_on(expr, &variables) {
+            let message = format!("{what} may depend on parameters only, not on position or time");
+            return Err(self.source.error(message, text.span.clone(), None));
+        }
+        Ok(expr)
+    }
+
+    /// As [`Scope::constant`], for text that the specification leaves out: the conventional expression.
+    pub(crate) fn constant_or(
+        &mut self,
+        given: Option<&Text>,
+        usual: &str,
+        key: &str,
+        table: std::ops::Range<usize>,
+    ) -> Result<Expr, Diagnostic> {
+        if let Some(text) = given {
+            return self.constant(text, key);
+        }
+        let span = table.clone();
+        let missing = |message: String, scope: &Self| {
+            let message = format!("{key} is not given, and '{usual}' does not serve: {message}");
+            scope.source.error(message, table.clone(), Some(format!("give {key} = '...' here")))
+        };
+        let ast = Ast::parse(usual).map_err(|e| missing(e.message, self))?;
+        let text = Text { value: usual.to_owned(), span };
+        self.build(&ast, &text).map_err(|e| missing(e.message, self))
+    }
+
+    fn build(&mut self, ast: &Ast, text: &Text) -> Result<Expr, Diagnostic> {
+        let (names, elsewhere) = (&self.names, &self.elsewhere);
+        let mut unknown = None;
+        let result = self.graph.build(ast, &mut |_, name| {
+            names.get(name).copied().ok_or_else(|| {
+                unknown = Some(name.to_owned());
+                format!("nothing here is called '{name}'")
+            })
+        });
+        let expr = result.map_err(|e| {
+            let help = unknown.map(|name| match elsewhere.get(&name) {
+                Some(reason) => reason.clone(),
+                None => match nearest(&name, names.keys().map(String::as_str)) {
+                    Some(known) => format!("did you mean '{known}'?"),
+                    None => {
+                        let known: Vec<&str> = names.keys().map(String::as_str).collect();
+                        format!("declare it under [parameters] or [let]; known are {}", known.join(", "))
+                    }
+                },
+            });
+            self.source.error(e.message, text.locate(self.source.text, &e.span), help)
+        })?;
+        if self.graph.divides_by_zero(expr) {
+            let message = "this expression divides by zero, whatever the parameters are";
+            return Err(self.source.error(message, text.span.clone(), None));
+        }
+        Ok(expr)
+    }
+}
+
+fn collect_names(ast: &Ast, names: &mut BTreeSet<String>) {
+    match &ast.kind {
+        AstKind::Number(_) => {}
+        AstKind::Name(name) => {
+            names.insert(name.clone());
+        }
+        AstKind::Sum(parts) | AstKind::Product(parts) => {
+            parts.iter().for_each(|(_, part)| collect_names(part, names));
+        }
+        AstKind::Power(base, exponent) => {
+            collect_names(base, names);
+            collect_names(exponent, names);
+        }
+        AstKind::Call(_, arguments) => {
+            arguments.iter().for_each(|argument| collect_names(argument, names));
+        }
+    }
+}
+
+/// An order in which each item comes after those that it uses, or a circle.
+fn dependency_order(uses: &[Vec<usize>]) -> Result<Vec<usize>, Vec<usize>> {
+    #[derive(Clone, Copy, PartialEq)]
+    enum State {
+        New,
+        Open,
+        Done,
+    }
+    let mut state = vec![State::New; uses.len()];
+    let mut order = Vec::new();
+    for start in 0..uses.len() {
+        if state[start] != State::New {
+            continue;
+        }
+        // Depth first with a stack of its own: a chain of definitions may be long.
+        let mut path = vec![(start, 0)];
+        state[start] = State::Open;
+        while let Some((item, next)) = path.last_mut() {
+            let item = *item;
+            if let Some(&used) = uses[item].get(*next) {
+                *next += 1;
+                match state[used] {
+                    State::Done => {}
+                    State::New => {
+                        state[used] = State::Open;
+                        path.push((used, 0));
+                    }
+                    State::Open => {
+                        let from = path.iter().position(|(i, _)| *i == used).unwrap_or(0);
+                        let mut circle: Vec<usize> = path[from..].iter().map(|(i, _)| *i).collect();
+                        circle.push(used);
+                        return Err(circle);
+                    }
+                }
+            } else {
+                state[item] = State::Done;
+                order.push(item);
+                path.pop();
+            }
+        }
+    }
+    Ok(order)
+}

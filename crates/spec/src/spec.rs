@@ -1,0 +1,587 @@
+//! Reading a specification: from the document to checked names, numbers and expressions.
+
+use crate::coordinates::CARTESIAN;
+use crate::diagnostic::nearest;
+use crate::document::{BoundaryTable, Document, DomainTable, Text};
+use crate::scope::{Scope, Source};
+use crate::{Coordinates, DeriveError, Diagnostic, Fields};
+use mmsmith_expr::{Expr, Graph, Program};
+use toml::Spanned;
+
+/// A specification that has been read and checked.
+#[derive(Clone, Debug)]
+pub struct Spec {
+    /// Lower-case letters, digits and hyphens, starting with a letter; its words are no Rust keyword.
+    pub name: String,
+    /// One line for people.
+    pub title: String,
+    /// Where the solution comes from; may be empty.
+    pub reference: String,
+    /// The coordinates in which it is stated.
+    pub coordinates: Coordinates,
+    /// The number of space dimensions, 1 to 3.
+    pub dimension: usize,
+    /// The parameters in the order of the file.
+    pub parameters: Vec<Parameter>,
+    /// Conditions that the parameters must satisfy together.
+    pub requirements: Vec<Requirement>,
+    /// The graph that all expressions belong to.
+    pub graph: Graph,
+    /// Physical components of the displacement.
+    pub displacement: Vec<Expr>,
+    /// The constitutive law.
+    pub material: Material,
+    /// Mass per reference volume.
+    pub density: Expr,
+    /// The body's shape.
+    pub domain: Domain,
+    /// The length that a cell count divides.
+    pub cell_length: Expr,
+    /// The conditions on its boundary.
+    pub boundaries: Vec<Boundary>,
+    /// The speed that CFL numbers refer to.
+    pub wave_speed: Expr,
+    /// The time in which the motion repeats.
+    pub period: Expr,
+}
+
+/// A parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameter {
+    /// A valid identifier.
+    pub name: String,
+    /// Finite, and within the bounds.
+    pub default: f64,
+    /// The unit; may be empty.
+    pub unit: String,
+    /// What it means; may be empty.
+    pub description: String,
+    /// The bounds as the file states them; empty where there are none.
+    pub range: String,
+    /// The admissible values.
+    pub bounds: Vec<Bound>,
+}
+
+/// An order relation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Relation {
+    /// `<`
+    Less,
+    /// `<=`
+    LessOrEqual,
+    /// `>`
+    Greater,
+    /// `>=`
+    GreaterOrEqual,
+}
+
+impl Relation {
+    const SIGNS: [(&'static str, Relation); 4] = [
+        ("<=", Relation::LessOrEqual),
+        (">=", Relation::GreaterOrEqual),
+        ("<", Relation::Less),
+        (">", Relation::Greater),
+    ];
+
+    /// The sign, which is the same in Maple, Rust and C.
+    #[must_use]
+    pub fn sign(self) -> &'static str {
+        Self::SIGNS.iter().find(|(_, r)| *r == self).map_or("", |(sign, _)| sign)
+    }
+
+    fn holds(self, a: f64, b: f64) -> bool {
+        match self {
+            Relation::Less => a < b,
+            Relation::LessOrEqual => a <= b,
+            Relation::Greater => a > b,
+            Relation::GreaterOrEqual => a >= b,
+        }
+    }
+}
+
+/// One side of an admissible range: the value stands in `relation` to `limit`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bound {
+    /// How.
+    pub relation: Relation,
+    /// To what.
+    pub limit: f64,
+}
+
+/// A condition between expressions of the parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Requirement {
+    /// As the file states it.
+    pub text: String,
+    /// The left side.
+    pub left: Expr,
+    /// The relation that must hold.
+    pub relation: Relation,
+    /// The right side.
+    pub right: Expr,
+}
+
+/// A constitutive law with its constants as expressions of the parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Material {
+    /// `tau = lambda ln(J) I + mu (F F^T - I)`.
+    NeoHookean {
+        /// First Lamé constant.
+        lambda: Expr,
+        /// Shear modulus.
+        mu: Expr,
+    },
+}
+
+/// The shape of the body, its measures as expressions of the parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Domain {
+    /// The axis-aligned box between two corners.
+    Box {
+        /// Smallest coordinates.
+        lower: Vec<Expr>,
+        /// Largest coordinates.
+        upper: Vec<Expr>,
+    },
+    /// The points at a distance between two radii from the origin of the plane.
+    Annulus {
+        /// Inner radius.
+        inner: Expr,
+        /// Outer radius.
+        outer: Expr,
+    },
+}
+
+/// A part of the boundary.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Surface {
+    /// The face of smallest Cartesian coordinate along an axis, or the plane of symmetry normal to it.
+    Lower(usize),
+    /// The face of largest Cartesian coordinate along an axis.
+    Upper(usize),
+    /// The inner rim.
+    Inner,
+    /// The outer rim.
+    Outer,
+}
+
+/// What holds on a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Condition {
+    /// No normal displacement, no shear traction.
+    Sliding,
+    /// A plane of symmetry that cuts the body.
+    Symmetry,
+    /// No traction.
+    TractionFree,
+    /// The traction of the solution.
+    PrescribedTraction,
+    /// The displacement of the solution.
+    PrescribedMotion,
+}
+
+impl Condition {
+    const NAMES: [(&'static str, Condition); 5] = [
+        ("sliding", Condition::Sliding),
+        ("symmetry", Condition::Symmetry),
+        ("traction-free", Condition::TractionFree),
+        ("prescribed-traction", Condition::PrescribedTraction),
+        ("prescribed-motion", Condition::PrescribedMotion),
+    ];
+}
+
+/// A boundary condition.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Boundary {
+    /// Where.
+    pub surface: Surface,
+    /// What.
+    pub condition: Condition,
+}
+
+/// Words that cannot be the name of a Rust module or type.
+const RUST_WORDS: &[&str] = &[
+    "abstract", "as", "async", "await", "become", "box", "break", "const", "continue", "crate", "do",
+    "dyn", "else", "enum", "extern", "false", "final", "fn", "for", "gen", "if", "impl", "in", "let",
+    "loop", "macro", "match", "mod", "move", "mut", "override", "priv", "pub", "ref", "return", "self",
+    "static", "struct", "super", "trait", "true", "try", "type", "typeof", "union", "unsafe", "unsized",
+    "use", "virtual", "where", "while", "yield",
+];
+
+impl Spec {
+    /// Reads the text of a specification; `file` is what messages call it.
+    ///
+    /// # Errors
+    ///
+    /// A [`Diagnostic`] for the first mistake found.
+    pub fn parse(text: &str, file: &str) -> Result<Self, Diagnostic> {
+        let source = Source { file, text };
+        let document: Document = toml::from_str(text).map_err(|e| {
+            let span = e.span().unwrap_or(0..0);
+            source.error(e.message().to_owned(), span, None)
+        })?;
+        Reader::new(&document, source)?.read(&document)
+    }
+
+    /// Derives every field.
+    ///
+    /// # Errors
+    ///
+    /// [`DeriveError`] where a field is nowhere defined.
+    pub fn derive(&self) -> Result<Fields, DeriveError> {
+        Fields::derive(self)
+    }
+}
+
+struct Reader<'a> {
+    scope: Scope<'a>,
+    coordinates: Coordinates,
+    dimension: usize,
+}
+
+impl<'a> Reader<'a> {
+    fn new(document: &Document, source: Source<'a>) -> Result<Self, Diagnostic> {
+        check_name(&document.name, &source)?;
+        let Some(coordinates) = Coordinates::from_name(document.coordinates.get_ref()) else {
+            let message =
+                format!("'{}' are not coordinates that are known", document.coordinates.get_ref());
+            let help = format!("coordinates = {}", Coordinates::known());
+            return Err(source.error(message, document.coordinates.span(), Some(help)));
+        };
+        let dimension = *document.dimension.get_ref();
+        if !coordinates.allows_dimension(dimension) {
+            let message =
+                format!("{} coordinates do not come in {dimension} dimensions", coordinates.name());
+            let help = match coordinates {
+                Coordinates::Cartesian => "dimension = 1, 2 or 3",
+                Coordinates::Polar => "dimension = 2",
+            };
+            return Err(source.error(message, document.dimension.span(), Some(help.into())));
+        }
+        let scope = Scope::new(source, coordinates.coordinate_names(dimension));
+        Ok(Reader { scope, coordinates, dimension })
+    }
+
+    fn read(mut self, document: &Document) -> Result<Spec, Diagnostic> {
+        let parameters = self.parameters(document)?;
+        self.scope.define_all(&document.lets.0)?;
+        let requirements = self.requirements(document, &parameters)?;
+        let displacement = self.displacement(document)?;
+        let material = self.material(document)?;
+        let table = document.material.span();
+        let density = document.material.get_ref().density.as_ref();
+        let density = self.scope.constant_or(density, "rho0", "density", table)?;
+        let domain = self.domain(&document.domain)?;
+        let cell_length = match &document.domain.get_ref().cell_length {
+            Some(text) => self.scope.constant(text, "cell-length")?,
+            None => Graph::ONE,
+        };
+        let boundaries = document
+            .boundary
+            .iter()
+            .map(|table| self.boundary(table, &domain))
+            .collect::<Result<Vec<_>, _>>()?;
+        let time = document.time.get_ref();
+        let period = self.scope.constant(&time.period, "period")?;
+        let wave_speed = match &time.wave_speed {
+            Some(text) => self.scope.constant(text, "wave-speed")?,
+            None => self.bar_speed(&material, density),
+        };
+        Ok(Spec {
+            name: document.name.get_ref().clone(),
+            title: document.title.clone(),
+            reference: document.reference.clone(),
+            coordinates: self.coordinates,
+            dimension: self.dimension,
+            parameters,
+            requirements,
+            graph: self.scope.graph,
+            displacement,
+            material,
+            density,
+            domain,
+            cell_length,
+            boundaries,
+            wave_speed,
+            period,
+        })
+    }
+
+    fn parameters(&mut self, document: &Document) -> Result<Vec<Parameter>, Diagnostic> {
+        let mut parameters = Vec::new();
+        for (name, table) in &document.parameters.0 {
+            self.scope.declare(name.get_ref(), name.span())?;
+            let table = table.get_ref();
+            let default = *table.default.get_ref();
+            let bounds = match &table.range {
+                Some(range) => self.bounds(range)?,
+                None => Vec::new(),
+            };
+            let inside = bounds.iter().all(|bound| bound.relation.holds(default, bound.limit));
+            if !default.is_finite() || !inside {
+                let message =
+                    format!("the default {default:?} of '{}' is out of range", name.get_ref());
+                let help = match &table.range {
+                    Some(range) if default.is_finite() => {
+                        format!("it must be {}", range.value.trim())
+                    }
+                    _ => "it must be a finite number".into(),
+                };
+                return Err(self.scope.source.error(message, table.default.span(), Some(help)));
+            }
+            parameters.push(Parameter {
+                name: name.get_ref().clone(),
+                default,
+                unit: table.unit.clone(),
+                description: table.description.clone(),
+                range: table.range.as_ref().map_or(String::new(), |r| r.value.trim().to_owned()),
+                bounds,
+            });
+        }
+        Ok(parameters)
+    }
+
+    /// Reads `> -1, < 1/2`.
+    fn bounds(&mut self, range: &Text) -> Result<Vec<Bound>, Diagnostic> {
+        let help = "a range is one or two bounds with a comma between them, as in '> -1, < 1/2'";
+        let mut bounds = Vec::new();
+        for part in range.value.split(',') {
+            let trimmed = part.trim();
+            let start = trimmed.as_ptr() as usize - range.value.as_ptr() as usize;
+            let place = range.locate(self.scope.source.text, &(start..start + trimmed.len()));
+            let Some((relation, limit)) = Relation::SIGNS
+                .iter()
+                .find_map(|(sign, relation)| Some((*relation, trimmed.strip_prefix(sign)?)))
+            else {
+                let message = format!("'{trimmed}' is not a bound");
+                return Err(self.scope.source.error(message, place, Some(help.into())));
+            };
+            let text = Text { value: limit.to_owned(), span: place.clone() };
+            let expr = self.scope.constant(&text, "a bound")?;
+            if !self.scope.graph.symbols_in(&[expr]).is_empty() {
+                let message = "a bound is a number";
+                let help = "conditions between parameters go to require = ['...']";
+                return Err(self.scope.source.error(message, place, Some(help.into())));
+            }
+            let limit = Program::lower(&mut self.scope.graph, &[], &[], &[expr]).evaluate(&[])[0];
+            bounds.push(Bound { relation, limit });
+        }
+        Ok(bounds)
+    }
+
+    fn requirements(
+        &mut self,
+        document: &Document,
+        parameters: &[Parameter],
+    ) -> Result<Vec<Requirement>, Diagnostic> {
+        let mut requirements = Vec::new();
+        for text in &document.require {
+            let split = Relation::SIGNS
+                .iter()
+                .find_map(|(sign, relation)| Some((*relation, text.value.split_once(sign)?)));
+            let Some((relation, (left, right))) = split else {
+                let message = "a requirement compares two expressions";
+                let help = "for example require = ['Ri < Ro']";
+                return Err(self.scope.source.error(message, text.span.clone(), Some(help.into())));
+            };
+            let mut side = |value: &str| {
+                let side = Text { value: value.to_owned(), span: text.span.clone() };
+                self.scope.constant(&side, "a requirement")
+            };
+            let (left, right) = (side(left)?, side(right)?);
+            requirements.push(Requirement {
+                text: text.value.trim().to_owned(),
+                left,
+                relation,
+                right,
+            });
+            let inputs: Vec<_> = parameters
+                .iter()
+                .map(|p| (self.scope.graph.symbol(&p.name), Default::default()))
+                .collect();
+            let values: Vec<f64> = parameters.iter().map(|p| p.default).collect();
+            let sides =
+                Program::lower(&mut self.scope.graph, &inputs, &[], &[left, right]).evaluate(&values);
+            if !relation.holds(sides[0], sides[1]) {
+                let message = format!(
+                    "the defaults break this requirement: {:?} {} {:?} does not hold",
+                    sides[0],
+                    relation.sign(),
+                    sides[1]
+                );
+                return Err(self.scope.source.error(message, text.span.clone(), None));
+            }
+        }
+        Ok(requirements)
+    }
+
+    fn displacement(&mut self, document: &Document) -> Result<Vec<Expr>, Diagnostic> {
+        let names = self.coordinates.coordinate_names(self.dimension);
+        let mut components = vec![Graph::ZERO; self.dimension];
+        for (key, text) in &document.displacement.0 {
+            let Some(index) = names.iter().position(|name| name == key.get_ref()) else {
+                let message = format!(
+                    "there is no displacement component '{}' in {} {} coordinate(s)",
+                    key.get_ref(),
+                    self.dimension,
+                    self.coordinates.name()
+                );
+                let help = format!("the components are {}", names.join(", "));
+                return Err(self.scope.source.error(message, key.span(), Some(help)));
+            };
+            components[index] = self.scope.expression(text)?;
+        }
+        Ok(components)
+    }
+
+    fn material(&mut self, document: &Document) -> Result<Material, Diagnostic> {
+        let table = document.material.get_ref();
+        if table.law.get_ref() != "neo-hookean" {
+            let message = format!("the law '{}' is not known", table.law.get_ref());
+            let help = "law = 'neo-hookean'";
+            return Err(self.scope.source.error(message, table.law.span(), Some(help.into())));
+        }
+        let span = document.material.span();
+        let usual = "E*nu/((1 + nu)*(1 - 2*nu))";
+        let lambda = self.scope.constant_or(table.lambda.as_ref(), usual, "lambda", span.clone())?;
+        let mu = self.scope.constant_or(table.mu.as_ref(), "E/(2*(1 + nu))", "mu", span)?;
+        Ok(Material::NeoHookean { lambda, mu })
+    }
+
+    /// `sqrt(E/rho0)` with `E = mu (3 lambda + 2 mu)/(lambda + mu)`.
+    fn bar_speed(&mut self, material: &Material, density: Expr) -> Expr {
+        let Material::NeoHookean { lambda, mu } = *material;
+        let graph = &mut self.scope.graph;
+        let (three, two) = (graph.integer(3), graph.integer(2));
+        let (three_lambda, two_mu) = (graph.mul(three, lambda), graph.mul(two, mu));
+        let upper = graph.add(three_lambda, two_mu);
+        let lower = graph.add(lambda, mu);
+        let upper = graph.mul(mu, upper);
+        let lower = graph.mul(lower, density);
+        let quotient = graph.div(upper, lower);
+        graph.sqrt(quotient)
+    }
+
+    fn domain(&mut self, table: &Spanned<DomainTable>) -> Result<Domain, Diagnostic> {
+        let keys = table.get_ref();
+        let shape = keys.shape.get_ref().as_str();
+        let given = [
+            ("lower", keys.lower.is_some()),
+            ("upper", keys.upper.is_some()),
+            ("inner", keys.inner.is_some()),
+            ("outer", keys.outer.is_some()),
+        ];
+        let (needed, annulus) = match shape {
+            "box" => (["lower", "upper"], false),
+            "annulus" if self.dimension == 2 => (["inner", "outer"], true),
+            "annulus" => {
+                let message = "an annulus is a shape of the plane";
+                let help = "dimension = 2, or shape = 'box'";
+                return Err(self.scope.source.error(message, keys.shape.span(), Some(help.into())));
+            }
+            _ => {
+                let message = format!("the shape '{shape}' is not known");
+                let help = "shape = 'box' or 'annulus'";
+                return Err(self.scope.source.error(message, keys.shape.span(), Some(help.into())));
+            }
+        };
+        for (key, is_given) in given {
+            if is_given != needed.contains(&key) {
+                let verb = if is_given { "has no" } else { "needs" };
+                let message = format!("a domain of shape '{shape}' {verb} '{key}'");
+                let help = format!("give {} and {}", needed[0], needed[1]);
+                return Err(self.scope.source.error(message, table.span(), Some(help)));
+            }
+        }
+        if annulus {
+            let mut radius = |text: &Option<Text>, key: &str| match text {
+                Some(text) => self.scope.constant(text, key),
+                None => Ok(Graph::ZERO),
+            };
+            return Ok(Domain::Annulus {
+                inner: radius(&keys.inner, "inner")?,
+                outer: radius(&keys.outer, "outer")?,
+            });
+        }
+        Ok(Domain::Box { lower: self.corner(&keys.lower)?, upper: self.corner(&keys.upper)? })
+    }
+
+    fn corner(&mut self, texts: &Option<Spanned<Vec<Text>>>) -> Result<Vec<Expr>, Diagnostic> {
+        let Some(texts) = texts else { return Ok(Vec::new()) };
+        if texts.get_ref().len() != self.dimension {
+            let message = format!(
+                "{} coordinate(s) given for a corner in {} dimension(s)",
+                texts.get_ref().len(),
+                self.dimension
+            );
+            return Err(self.scope.source.error(message, texts.span(), None));
+        }
+        texts.get_ref().iter().map(|text| self.scope.constant(text, "a corner")).collect()
+    }
+
+    fn boundary(&mut self, table: &BoundaryTable, domain: &Domain) -> Result<Boundary, Diagnostic> {
+        let mut surfaces: Vec<(String, Surface)> = Vec::new();
+        for (axis, name) in CARTESIAN[..self.dimension].iter().enumerate() {
+            surfaces.push((format!("{name}-lower"), Surface::Lower(axis)));
+            if matches!(domain, Domain::Box { .. }) {
+                surfaces.push((format!("{name}-upper"), Surface::Upper(axis)));
+            }
+        }
+        if matches!(domain, Domain::Annulus { .. }) {
+            surfaces.push(("inner".into(), Surface::Inner));
+            surfaces.push(("outer".into(), Surface::Outer));
+        }
+        let known = surfaces.iter().map(|(name, surface)| (name.as_str(), *surface));
+        let surface = self.choice(&table.surface, "surface", known)?;
+        let condition = self.choice(&table.condition, "condition", Condition::NAMES)?;
+        let cut = matches!(domain, Domain::Annulus { .. }) && matches!(surface, Surface::Lower(_));
+        if cut && condition != Condition::Symmetry {
+            let message = "a plane through the middle of an annulus can only be one of symmetry";
+            let help = "condition = 'symmetry'";
+            return Err(self.scope.source.error(message, table.condition.span(), Some(help.into())));
+        }
+        Ok(Boundary { surface, condition })
+    }
+
+    fn choice<'b, T>(
+        &self,
+        word: &Spanned<String>,
+        what: &str,
+        known: impl IntoIterator<Item = (&'b str, T)>,
+    ) -> Result<T, Diagnostic> {
+        let known: Vec<(&str, T)> = known.into_iter().collect();
+        let names: Vec<&str> = known.iter().map(|(name, _)| *name).collect();
+        let position = names.iter().position(|name| name == word.get_ref());
+        match position.and_then(|index| known.into_iter().nth(index)) {
+            Some((_, value)) => Ok(value),
+            None => {
+                let message = format!("the {what} '{}' is not known", word.get_ref());
+                let mut help = format!("{what} is one of {}", names.join(", "));
+                if let Some(near) = nearest(word.get_ref(), names) {
+                    help = format!("did you mean '{near}'? {help}");
+                }
+                Err(self.scope.source.error(message, word.span(), Some(help)))
+            }
+        }
+    }
+}
+
+fn check_name(name: &Spanned<String>, source: &Source<'_>) -> Result<(), Diagnostic> {
+    let word = name.get_ref();
+    let valid = word.starts_with(|c: char| c.is_ascii_lowercase())
+        && word.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-')
+        && !word.ends_with('-')
+        && !word.contains("--")
+        && word.len() <= 64;
+    let help = "a name is a lower-case letter followed by lower-case letters, digits and single hyphens, \
+                as in 'axis-aligned'";
+    if !valid {
+        let message = format!("{word:?} cannot be the name of a solution");
+        return Err(source.error(message, name.span(), Some(help.into())));
+    }
+    if RUST_WORDS.contains(&word.as_str()) {
+        let message = format!("'{word}' is a word of the Rust language and cannot name a solution");
+        return Err(source.error(message, name.span(), Some("choose another name".into())));
+    }
+    Ok(())
+}
