@@ -41,31 +41,31 @@ pub enum ParameterError {
     #[error("{solution} has no parameter '{name}'; it has {}", known.join(", "))]
     Unknown {
         /// The solution.
-        solution: &'static str,
+        solution: String,
         /// The name asked for.
         name: String,
         /// The names it has.
-        known: Vec<&'static str>,
+        known: Vec<String>,
     },
     /// A value outside the admissible ones.
     #[error("parameter {name} = {value:?} of {solution} is not admissible: it must be {admissible}")]
     OutOfRange {
         /// The solution.
-        solution: &'static str,
+        solution: String,
         /// The parameter.
-        name: &'static str,
+        name: String,
         /// The value given.
         value: f64,
         /// What would be right.
-        admissible: &'static str,
+        admissible: String,
     },
     /// Values that are admissible one by one but not together.
     #[error("the parameters of {solution} must satisfy {requirement}, which does not hold for {values}")]
     Requirement {
         /// The solution.
-        solution: &'static str,
+        solution: String,
         /// The condition, as the specification states it.
-        requirement: &'static str,
+        requirement: String,
         /// The values given, as `name = value` pairs.
         values: String,
     },
@@ -88,9 +88,9 @@ impl Description {
                 Some(index) => values[index] = value,
                 None => {
                     return Err(ParameterError::Unknown {
-                        solution: self.name,
+                        solution: self.name.to_owned(),
                         name: name.to_owned(),
-                        known: self.parameters.iter().map(|p| p.name).collect(),
+                        known: self.parameters.iter().map(|p| p.name.to_owned()).collect(),
                     });
                 }
             }
@@ -103,7 +103,12 @@ impl Description {
     pub fn out_of_range(&self, index: usize, value: f64) -> ParameterError {
         let Parameter { name, admissible, .. } = self.parameters[index];
         let admissible = if admissible.is_empty() { "a finite number" } else { admissible };
-        ParameterError::OutOfRange { solution: self.name, name, value, admissible }
+        ParameterError::OutOfRange {
+            solution: self.name.to_owned(),
+            name: name.to_owned(),
+            value,
+            admissible: admissible.to_owned(),
+        }
     }
 
     /// The error for `values` that break `requirement`; used by generated code.
@@ -116,6 +121,10 @@ impl Description {
             .map(|(p, v)| format!("{} = {v:?}", p.name))
             .collect::<Vec<_>>()
             .join(", ");
-        ParameterError::Requirement { solution: self.name, requirement, values }
+        ParameterError::Requirement {
+            solution: self.name.to_owned(),
+            requirement: requirement.to_owned(),
+            values,
+        }
     }
 }

@@ -89,7 +89,9 @@ impl Relation {
         Self::SIGNS.iter().find(|(_, r)| *r == self).map_or("", |(sign, _)| sign)
     }
 
-    fn holds(self, a: f64, b: f64) -> bool {
+    /// Whether `a` stands in this relation to `b`.
+    #[must_use]
+    pub fn holds(self, a: f64, b: f64) -> bool {
         match self {
             Relation::Less => a < b,
             Relation::LessOrEqual => a <= b,
@@ -106,6 +108,14 @@ pub struct Bound {
     pub relation: Relation,
     /// To what.
     pub limit: f64,
+}
+
+impl Bound {
+    /// Whether the value is on the admissible side.
+    #[must_use]
+    pub fn admits(&self, value: f64) -> bool {
+        self.relation.holds(value, self.limit)
+    }
 }
 
 /// A condition between expressions of the parameters.
@@ -317,7 +327,7 @@ impl<'a> Reader<'a> {
                 Some(range) => self.bounds(range)?,
                 None => Vec::new(),
             };
-            let inside = bounds.iter().all(|bound| bound.relation.holds(default, bound.limit));
+            let inside = bounds.iter().all(|bound| bound.admits(default));
             if !default.is_finite() || !inside {
                 let message =
                     format!("the default {default:?} of '{}' is out of range", name.get_ref());

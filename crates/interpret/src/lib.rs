@@ -1,0 +1,258 @@
+//! Manufactured solutions evaluated straight from their specifications, without generated code.
+//!
+//! [`interpret`] turns a specification into the same interface that generated solutions have, so that a file can
+//! be checked before anything is generated from it. It evaluates the straight-line programs that the generator
+//! translates, in double precision; for work on many points the generated code is far faster.
+
+use mmsmith_expr::{Expr, Program};
+use mmsmith_solutions::nalgebra::{SMatrix, SVector};
+use mmsmith_solutions::{
+    AnySolution, Boundary, Condition, Domain, Fields, Material, ParameterError, Solution, Surface,
+};
+use mmsmith_spec::{self as spec, DeriveError, Spec};
+use thiserror::Error;
+
+/// Why a specification could not be interpreted.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum InterpretError {
+    /// A field is nowhere defined.
+    #[error(transparent)]
+    Derive(#[from] DeriveError),
+    /// A parameter value is not admissible.
+    #[error(transparent)]
+    Parameter(#[from] ParameterError),
+}
+
+/// The solution that `spec` describes, with the defaults of its parameters but for `overrides`.
+///
+/// # Errors
+///
+/// [`InterpretError`] where a field is nowhere defined or a parameter is unknown or not admissible.
+pub fn interpret<'a>(
+    spec: &Spec,
+    overrides: impl IntoIterator<Item = (&'a str, f64)>,
+) -> Result<AnySolution<f64>, InterpretError> {
+    let values = resolve(spec, overrides)?;
+    Ok(match spec.dimension {
+        1 => AnySolution::One(Box::new(Interpreted::<1>::new(spec, values)?)),
+        2 => AnySolution::Two(Box::new(Interpreted::<2>::new(spec, values)?)),
+        _ => AnySolution::Three(Box::new(Interpreted::<3>::new(spec, values)?)),
+    })
+}
+
+fn resolve<'a>(
+    spec: &Spec,
+    overrides: impl IntoIterator<Item = (&'a str, f64)>,
+) -> Result<Vec<f64>, ParameterError> {
+    let mut values: Vec<f64> = spec.parameters.iter().map(|p| p.default).collect();
+    for (name, value) in overrides {
+        let Some(index) = spec.parameters.iter().position(|p| p.name == name) else {
+            return Err(ParameterError::Unknown {
+                solution: spec.name.clone(),
+                name: name.to_owned(),
+                known: spec.parameters.iter().map(|p| p.name.clone()).collect(),
+            });
+        };
+        values[index] = value;
+    }
+    for (parameter, &value) in spec.parameters.iter().zip(&values) {
+        if !value.is_finite() || !parameter.bounds.iter().all(|bound| bound.admits(value)) {
+            let range = &parameter.range;
+            return Err(ParameterError::OutOfRange {
+                solution: spec.name.clone(),
+                name: parameter.name.clone(),
+                value,
+                admissible: if range.is_empty() { "a finite number".into() } else { range.clone() },
+            });
+        }
+    }
+    Ok(values)
+}
+
+/// The programs of one solution, with the values of its parameters.
+struct Interpreted<const D: usize> {
+    parameters: Vec<f64>,
+    displacement: Program,
+    velocity: Program,
+    acceleration: Program,
+    displacement_gradient: Program,
+    deformation_gradient: Program,
+    jacobian: Program,
+    first_piola_kirchhoff: Program,
+    body_force: Program,
+    domain: Domain<f64, D>,
+    boundaries: Vec<Boundary>,
+    cell_length: f64,
+    material: Material<f64>,
+    density: f64,
+    wave_speed: f64,
+    period: f64,
+}
+
+impl<const D: usize> Interpreted<D> {
+    fn new(spec: &Spec, parameters: Vec<f64>) -> Result<Self, InterpretError> {
+        let mut fields = spec.derive()?;
+        let (u, v, a, b) =
+            (fields.u.clone(), fields.v.clone(), fields.a.clone(), fields.b.clone());
+        let (H, F, P) = (fields.H.concat(), fields.F.concat(), fields.P.concat());
+        let J = [fields.J];
+
+        let spec::Material::NeoHookean { lambda, mu } = spec.material;
+        let mut constants =
+            vec![spec.cell_length, spec.density, spec.wave_speed, spec.period, lambda, mu];
+        match &spec.domain {
+            spec::Domain::Box { lower, upper } => constants.extend(lower.iter().chain(upper)),
+            spec::Domain::Annulus { inner, outer } => constants.extend([inner, outer]),
+        }
+        for requirement in &spec.requirements {
+            constants.extend([requirement.left, requirement.right]);
+        }
+        let mut program = |outputs: &[Expr]| fields.program(outputs);
+        let constants = program(&constants).evaluate(&inputs::<D>(&SVector::zeros(), 0.0, &parameters));
+        let sides = &constants[constants.len() - 2 * spec.requirements.len()..];
+        for (requirement, side) in spec.requirements.iter().zip(sides.chunks(2)) {
+            if !requirement.relation.holds(side[0], side[1]) {
+                let pairs = spec.parameters.iter().zip(&parameters);
+                let values: Vec<String> =
+                    pairs.map(|(p, value)| format!("{} = {value:?}", p.name)).collect();
+                return Err(InterpretError::Parameter(ParameterError::Requirement {
+                    solution: spec.name.clone(),
+                    requirement: requirement.text.clone(),
+                    values: values.join(", "),
+                }));
+            }
+        }
+        let domain = match spec.domain {
+            spec::Domain::Box { .. } => Domain::Box {
+                lower: SVector::from_row_slice(&constants[6..6 + D]),
+                upper: SVector::from_row_slice(&constants[6 + D..6 + 2 * D]),
+            },
+            spec::Domain::Annulus { .. } => {
+                Domain::Annulus { inner: constants[6], outer: constants[7] }
+            }
+        };
+        Ok(Interpreted {
+            displacement: program(&u),
+            velocity: program(&v),
+            acceleration: program(&a),
+            displacement_gradient: program(&H),
+            deformation_gradient: program(&F),
+            jacobian: program(&J),
+            first_piola_kirchhoff: program(&P),
+            body_force: program(&b),
+            domain,
+            boundaries: spec.boundaries.iter().map(boundary).collect(),
+            cell_length: constants[0],
+            material: Material::NeoHookean { lambda: constants[4], mu: constants[5] },
+            density: constants[1],
+            wave_speed: constants[2],
+            period: constants[3],
+            parameters,
+        })
+    }
+
+    fn vector(&self, program: &Program, X: &SVector<f64, D>, t: f64) -> SVector<f64, D> {
+        SVector::from_row_slice(&program.evaluate(&inputs(X, t, &self.parameters)))
+    }
+
+    fn matrix(&self, program: &Program, X: &SVector<f64, D>, t: f64) -> SMatrix<f64, D, D> {
+        SMatrix::from_row_slice(&program.evaluate(&inputs(X, t, &self.parameters)))
+    }
+}
+
+/// Coordinates, time and parameters, in the order of the programs' inputs.
+fn inputs<const D: usize>(X: &SVector<f64, D>, t: f64, parameters: &[f64]) -> Vec<f64> {
+    X.iter().copied().chain([t]).chain(parameters.iter().copied()).collect()
+}
+
+fn boundary(boundary: &spec::Boundary) -> Boundary {
+    let surface = match boundary.surface {
+        spec::Surface::Lower(axis) => Surface::Lower(axis),
+        spec::Surface::Upper(axis) => Surface::Upper(axis),
+        spec::Surface::Inner => Surface::Inner,
+        spec::Surface::Outer => Surface::Outer,
+    };
+    let condition = match boundary.condition {
+        spec::Condition::Sliding => Condition::Sliding,
+        spec::Condition::Symmetry => Condition::Symmetry,
+        spec::Condition::TractionFree => Condition::TractionFree,
+        spec::Condition::PrescribedTraction => Condition::PrescribedTraction,
+        spec::Condition::PrescribedMotion => Condition::PrescribedMotion,
+    };
+    Boundary { surface, condition }
+}
+
+impl<const D: usize> Solution<f64, D> for Interpreted<D> {
+    fn displacement(&self, X: &SVector<f64, D>, t: f64) -> SVector<f64, D> {
+        self.vector(&self.displacement, X, t)
+    }
+
+    fn velocity(&self, X: &SVector<f64, D>, t: f64) -> SVector<f64, D> {
+        self.vector(&self.velocity, X, t)
+    }
+
+    fn acceleration(&self, X: &SVector<f64, D>, t: f64) -> SVector<f64, D> {
+        self.vector(&self.acceleration, X, t)
+    }
+
+    fn displacement_gradient(&self, X: &SVector<f64, D>, t: f64) -> SMatrix<f64, D, D> {
+        self.matrix(&self.displacement_gradient, X, t)
+    }
+
+    fn deformation_gradient(&self, X: &SVector<f64, D>, t: f64) -> SMatrix<f64, D, D> {
+        self.matrix(&self.deformation_gradient, X, t)
+    }
+
+    fn jacobian(&self, X: &SVector<f64, D>, t: f64) -> f64 {
+        self.jacobian.evaluate(&inputs(X, t, &self.parameters))[0]
+    }
+
+    fn first_piola_kirchhoff(&self, X: &SVector<f64, D>, t: f64) -> SMatrix<f64, D, D> {
+        self.matrix(&self.first_piola_kirchhoff, X, t)
+    }
+
+    fn body_force(&self, X: &SVector<f64, D>, t: f64) -> SVector<f64, D> {
+        self.vector(&self.body_force, X, t)
+    }
+
+    fn fields(&self, X: &SVector<f64, D>, t: f64) -> Fields<f64, D> {
+        Fields {
+            u: self.displacement(X, t),
+            v: self.velocity(X, t),
+            a: self.acceleration(X, t),
+            H: self.displacement_gradient(X, t),
+            F: self.deformation_gradient(X, t),
+            J: self.jacobian(X, t),
+            P: self.first_piola_kirchhoff(X, t),
+            b: self.body_force(X, t),
+        }
+    }
+
+    fn domain(&self) -> Domain<f64, D> {
+        self.domain.clone()
+    }
+
+    fn boundaries(&self) -> &[Boundary] {
+        &self.boundaries
+    }
+
+    fn cell_length(&self) -> f64 {
+        self.cell_length
+    }
+
+    fn material(&self) -> Material<f64> {
+        self.material
+    }
+
+    fn density(&self) -> f64 {
+        self.density
+    }
+
+    fn wave_speed(&self) -> f64 {
+        self.wave_speed
+    }
+
+    fn period(&self) -> f64 {
+        self.period
+    }
+}
