@@ -1,0 +1,384 @@
+//! What every scheme has to keep: mass, momentum, rest, free flight, symmetry at walls, bits on any number of threads;
+//! and how runs and set-ups fail.
+
+use mmsmith_mpm::{
+    Grid, Integrator, Material, NoBodyForce, Particles, Settings, SetupError, Shape, Simulation,
+    StepError,
+};
+use nalgebra::{Matrix2, SMatrix, SVector, Vector1, Vector2, Vector3, vector};
+
+const SHAPES: [Shape; 3] = [Shape::Linear, Shape::Ugimp, Shape::Gimp];
+const INTEGRATORS: [Integrator; 4] =
+    [Integrator::Usf, Integrator::Usl, Integrator::Musl, Integrator::Cd];
+const SOFT: Material<f64> = Material::NeoHookean { lambda: 60.0, mu: 40.0 };
+
+fn schemes() -> impl Iterator<Item = (Shape, Integrator)> {
+    SHAPES.into_iter().flat_map(|shape| INTEGRATORS.map(|integrator| (shape, integrator)))
+}
+
+fn settings(shape: Shape, integrator: Integrator, time_step: f64) -> Settings<f64> {
+    Settings { shape, integrator, time_step, halve_first_acceleration: false }
+}
+
+fn open_grid<const D: usize>(cells: usize) -> Grid<f64, D> {
+    let spacing = 1.0 / cells as f64;
+    Grid { lower: SVector::zeros(), spacing, cells: [cells; D], walls: [[false; 2]; D] }
+}
+
+/// Different for every particle and component, and far from any regularity.
+fn noise(seed: usize) -> f64 {
+    (seed as f64 * 12.9898).sin() * 0.5
+}
+
+/// A distorted, moving block in the middle of the grid.
+fn block<const D: usize>(grid: &Grid<f64, D>) -> Particles<f64, D> {
+    let mut p = Particles::lattice(grid, 2, 2.0, |X| X.iter().all(|x| (0.25..0.75).contains(x)));
+    for k in 0..p.len() {
+        p.v[k] = SVector::from_fn(|a, _| 0.5 * noise(7 * k + a));
+        p.F[k] += SMatrix::from_fn(|i, j| 0.1 * noise(11 * k + 3 * i + j));
+        p.x[k] += SVector::from_fn(|a, _| 0.2 * grid.spacing * noise(13 * k + a));
+    }
+    p
+}
+
+fn momentum<const D: usize>(p: &Particles<f64, D>) -> SVector<f64, D> {
+    p.v.iter().zip(&p.mass).map(|(v, &m)| v * m).sum()
+}
+
+#[test]
+fn momentum_changes_by_the_body_force_only() {
+    fn check<const D: usize>() {
+        for (shape, integrator) in schemes() {
+            let grid = open_grid::<D>(8);
+            let particles = block(&grid);
+            let (before, mass) = (momentum(&particles), particles.mass.iter().sum::<f64>());
+            let force = SVector::<f64, D>::from_fn(|a, _| 1.0 + a as f64);
+            let b = |_: &[SVector<f64, D>], _: f64, b: &mut [SVector<f64, D>]| b.fill(force);
+            let dt = 1e-3;
+            let mut simulation =
+                Simulation::new(grid, particles, SOFT, settings(shape, integrator, dt)).unwrap();
+            for step in 1..=5 {
+                simulation.step(&b).unwrap();
+                let expected = before + force * (mass * dt * step as f64);
+                let found = momentum(simulation.particles());
+                assert!((found - expected).norm() < 1e-13, "{shape:?} {integrator:?}");
+            }
+        }
+    }
+    check::<1>();
+    check::<2>();
+    check::<3>();
+}
+
+#[test]
+fn a_body_at_rest_stays_exactly_at_rest() {
+    fn check<const D: usize>() {
+        for (shape, integrator) in schemes() {
+            let grid = Grid { walls: [[true, false]; D], ..open_grid::<D>(5) };
+            let particles = Particles::lattice(&grid, 2, 2.0, |X| X.iter().all(|&x| x < 0.5));
+            let initial = particles.clone();
+            let mut simulation =
+                Simulation::new(grid, particles, SOFT, settings(shape, integrator, 1e-3)).unwrap();
+            for _ in 0..3 {
+                simulation.step(&NoBodyForce).unwrap();
+            }
+            assert_eq!(simulation.particles(), &initial, "{shape:?} {integrator:?}");
+            assert_eq!(simulation.steps_done(), 3);
+        }
+    }
+    check::<1>();
+    check::<2>();
+    check::<3>();
+}
+
+#[test]
+fn a_free_body_flies_straight() {
+    fn check<const D: usize>() {
+        for (shape, integrator) in schemes() {
+            let grid = open_grid::<D>(10);
+            let mut particles =
+                Particles::lattice(&grid, 2, 2.0, |X| X.iter().all(|&x| (0.1..0.3).contains(&x)));
+            let v = SVector::<f64, D>::from_fn(|a, _| 1.0 - 0.3 * a as f64);
+            particles.v.fill(v);
+            let dt = 2e-3;
+            let mut simulation =
+                Simulation::new(grid, particles, SOFT, settings(shape, integrator, dt)).unwrap();
+            for _ in 0..250 {
+                simulation.step(&NoBodyForce).unwrap();
+            }
+            let p = simulation.particles();
+            for k in 0..p.len() {
+                let off = (p.x[k] - p.X[k] - v * 0.5).norm();
+                assert!(off < 1e-10, "{shape:?} {integrator:?}: {off:e}");
+                assert!((p.v[k] - v).norm() < 1e-10);
+                assert!((p.F[k] - SMatrix::identity()).norm() < 1e-9);
+            }
+        }
+    }
+    check::<1>();
+    check::<2>();
+    check::<3>();
+}
+
+/// Particles near a wall, and the same with their mirror images on a grid without that wall.
+#[test]
+fn a_wall_is_a_mirror() {
+    let h = 0.1;
+    let points = [vector![0.012, 0.213], vector![0.031, 0.344], vector![0.117, 0.262]];
+    for per_cell_size in [0.25, 0.45, 1.3] {
+        for (shape, integrator) in schemes() {
+            let body = |mirrored: bool| {
+                let mut p = Particles {
+                    X: vec![],
+                    x: vec![],
+                    v: vec![],
+                    F: vec![],
+                    mass: vec![],
+                    volume: vec![],
+                    half_size: Vector2::repeat(per_cell_size * h),
+                };
+                for side in if mirrored { vec![1.0, -1.0] } else { vec![1.0] } {
+                    for (k, X) in points.iter().enumerate() {
+                        let reflect = Matrix2::new(side, 0.0, 0.0, 1.0);
+                        p.X.push(reflect * X);
+                        p.x.push(reflect * X);
+                        p.v.push(reflect * vector![noise(k), noise(k + 9)]);
+                        let F = Matrix2::new(1.0 + 0.1 * noise(k + 1), 0.1, -0.05, 1.1);
+                        p.F.push(reflect * F * reflect);
+                        p.mass.push(1.0 + 0.1 * k as f64);
+                        p.volume.push(h * h / 4.0);
+                    }
+                }
+                p
+            };
+            let wall = Grid {
+                lower: vector![0.0, 0.0],
+                spacing: h,
+                cells: [6, 6],
+                walls: [[true, false], [false; 2]],
+            };
+            let open = Grid {
+                lower: vector![-0.6, 0.0],
+                cells: [12, 6],
+                walls: [[false; 2]; 2],
+                ..wall.clone()
+            };
+            let b = |X: &[Vector2<f64>], t: f64, b: &mut [Vector2<f64>]| {
+                for (X, b) in X.iter().zip(b) {
+                    *b = vector![3.0 * X[0], X[1] + t];
+                }
+            };
+            let settings = settings(shape, integrator, 1e-3);
+            let mut one = Simulation::new(wall, body(false), SOFT, settings).unwrap();
+            let mut two = Simulation::new(open, body(true), SOFT, settings).unwrap();
+            for _ in 0..20 {
+                one.step(&b).unwrap();
+                two.step(&b).unwrap();
+            }
+            let (one, two) = (one.particles(), two.particles());
+            for k in 0..one.len() {
+                let what = format!("{shape:?} {integrator:?} {per_cell_size} {k}");
+                assert!((one.x[k] - two.x[k]).norm() < 1e-12, "{what}");
+                assert!((one.v[k] - two.v[k]).norm() < 1e-11, "{what}");
+                assert!((one.F[k] - two.F[k]).norm() < 1e-11, "{what}");
+            }
+        }
+    }
+}
+
+#[test]
+fn bits_do_not_depend_on_the_number_of_threads() {
+    fn run<T: nalgebra::RealField + Copy, const D: usize>(
+        cells: usize,
+        scheme: (Shape, Integrator),
+        threads: usize,
+    ) -> Particles<T, D> {
+        fn real<T: nalgebra::RealField>(x: f64) -> T {
+            nalgebra::convert(x)
+        }
+        let grid = Grid {
+            lower: SVector::zeros(),
+            spacing: real(1.0 / cells as f64),
+            cells: [cells; D],
+            walls: [[true, false]; D],
+        };
+        // Along the wall across axis 0, and through many rows along the last axis.
+        let mut p = Particles::lattice(&grid, 2, real(2.0), |X| {
+            X.iter().all(|&x| x < real(0.5)) && X[D - 1] > real(0.2)
+        });
+        for k in 0..p.len() {
+            p.v[k] =
+                SVector::from_fn(|a, _| real::<T>(0.01 * noise(k + a)) + p.X[k][a] * real(0.1));
+            p.v[k][D - 1] += real(4.0);
+        }
+        let material = Material::NeoHookean { lambda: real(60.0), mu: real(40.0) };
+        let settings = Settings {
+            shape: scheme.0,
+            integrator: scheme.1,
+            time_step: real(if D == 1 { 3e-5 } else { 5e-4 }),
+            halve_first_acceleration: false,
+        };
+        let b = |X: &[SVector<T, D>], t: T, b: &mut [SVector<T, D>]| {
+            for (X, b) in X.iter().zip(b) {
+                *b = X * t;
+            }
+        };
+        let mut simulation = Simulation::new(grid, p, material, settings).unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        // Long enough for particles to be sorted anew.
+        pool.install(|| (0..200).try_for_each(|_| simulation.step(&b))).unwrap();
+        let p = simulation.particles();
+        assert!(p.x[0][D - 1] - p.X[0][D - 1] > simulation.grid().spacing * real(4.0));
+        simulation.particles().clone()
+    }
+    fn check<T: nalgebra::RealField + Copy, const D: usize>(cells: usize) {
+        for scheme in schemes() {
+            let one = run::<T, D>(cells, scheme, 1);
+            for threads in [2, 3] {
+                assert_eq!(
+                    one,
+                    run::<T, D>(cells, scheme, threads),
+                    "{scheme:?} {threads} threads"
+                );
+            }
+        }
+    }
+    check::<f64, 1>(600);
+    check::<f64, 2>(40);
+    check::<f32, 2>(40);
+    check::<f64, 3>(12);
+}
+
+#[test]
+fn one_stretched_cell_layer_in_3d_is_the_1d_bar() {
+    let bar = |X: f64| 0.3 * (X * std::f64::consts::PI).sin();
+    for (shape, integrator) in schemes() {
+        let (n, dt) = (8, 1e-3);
+        let line = Grid { walls: [[true; 2]], ..open_grid::<1>(n) };
+        let column = Grid {
+            lower: Vector3::zeros(),
+            spacing: line.spacing,
+            cells: [1, n, 1],
+            walls: [[true; 2]; 3],
+        };
+        let mut p1 = Particles::lattice(&line, 2, 1.0, |_| true);
+        let mut p3 = Particles::lattice(&column, 2, 1.0, |_| true);
+        for (v, X) in p1.v.iter_mut().zip(&p1.X) {
+            *v = Vector1::new(bar(X[0]));
+        }
+        for (v, X) in p3.v.iter_mut().zip(&p3.X) {
+            v[1] = bar(X[1]);
+        }
+        let settings = settings(shape, integrator, dt);
+        let mut s1 = Simulation::new(line, p1, SOFT, settings).unwrap();
+        let mut s3 = Simulation::new(column, p3, SOFT, settings).unwrap();
+        for _ in 0..30 {
+            s1.step(&NoBodyForce).unwrap();
+            s3.step(&NoBodyForce).unwrap();
+        }
+        let (p1, p3) = (s1.particles(), s3.particles());
+        for k in 0..p3.len() {
+            let j = (p3.X[k][1] * 2.0 * n as f64) as usize;
+            assert!((p3.x[k][1] - p1.x[j][0]).abs() < 1e-13, "{shape:?} {integrator:?}");
+            assert!((p3.F[k][(1, 1)] - p1.F[j][0]).abs() < 1e-12);
+            assert!((p3.x[k][0] - p3.X[k][0]).abs() < 1e-13);
+        }
+    }
+}
+
+#[test]
+fn a_step_that_fails_says_where_and_keeps_saying_it() {
+    let fly = |walls: [[bool; 2]; 2], v: Vector2<f64>, spread: f64, dt: f64, shape: Shape| {
+        let grid = Grid { walls, ..open_grid::<2>(8) };
+        let mut p = Particles::lattice(&grid, 2, 1.0, |X| X.iter().all(|&x| x > 0.5));
+        for (velocity, X) in p.v.iter_mut().zip(&p.X) {
+            *velocity = v + (X - Vector2::repeat(0.75)) * spread;
+        }
+        let mut s = Simulation::new(grid, p, SOFT, settings(shape, Integrator::Cd, dt)).unwrap();
+        let error = (0..1000).find_map(|_| s.step(&NoBodyForce).err()).unwrap();
+        assert_eq!(s.step(&NoBodyForce), Err(error.clone()));
+        assert!(error.to_string().contains("particle"));
+        error
+    };
+    let left = fly([[false; 2]; 2], vector![0.0, 1.0], 0.0, 1e-2, Shape::Gimp);
+    assert!(matches!(left, StepError::LeftGrid { axis: 1, step: 4, .. }), "{left}");
+    let inverted = fly([[false; 2]; 2], Vector2::zeros(), -150.0, 1e-2, Shape::Linear);
+    assert!(matches!(inverted, StepError::Inverted { step: 1, J, .. } if J <= 0.0), "{inverted}");
+
+    let grid = open_grid::<2>(8);
+    let mut wide = Particles::lattice(&grid, 2, 1.0, |X| (X[0] - 0.3).abs() < 0.05);
+    for (v, X) in wide.v.iter_mut().zip(&wide.X) {
+        v[0] = (X[0] - 0.3) * 100.0;
+    }
+    wide.half_size = Vector2::repeat(0.24);
+    let mut s =
+        Simulation::new(grid.clone(), wide, SOFT, settings(Shape::Gimp, Integrator::Cd, 1e-2))
+            .unwrap();
+    let error = (0..3).find_map(|_| s.step(&NoBodyForce).err());
+    assert!(matches!(error, Some(StepError::TooLarge { axis: 0, .. })), "{error:?}");
+
+    let p = block(&grid);
+    let mut s =
+        Simulation::new(grid, p, SOFT, settings(Shape::Gimp, Integrator::Cd, 1e-3)).unwrap();
+    let b = |X: &[Vector2<f64>], _: f64, b: &mut [Vector2<f64>]| {
+        for (X, b) in X.iter().zip(b) {
+            *b = Vector2::repeat((0.6 - X[0]).sqrt());
+        }
+    };
+    let error = s.step(&b).unwrap_err();
+    assert!(matches!(error, StepError::NotFinite { step: 1, .. }), "{error}");
+    assert_eq!(s.steps_done(), 0);
+}
+
+type Change<'a> = &'a dyn Fn(&mut Grid<f64, 2>, &mut Particles<f64, 2>, &mut Settings<f64>);
+
+#[test]
+fn scenes_that_make_no_sense_are_refused() {
+    let refuse = |change: Change| {
+        let mut grid = open_grid::<2>(8);
+        let mut p = block(&grid);
+        let mut settings = settings(Shape::Gimp, Integrator::Usl, 1e-3);
+        change(&mut grid, &mut p, &mut settings);
+        Simulation::new(grid, p, SOFT, settings).unwrap_err()
+    };
+    use SetupError as E;
+    assert!(matches!(
+        refuse(&|_, p, _| p.v.truncate(3)),
+        E::LengthMismatch { array: "v", found: 3, .. }
+    ));
+    assert!(matches!(
+        refuse(&|g, p, _| *p = Particles::lattice(g, 2, 1.0, |_| false)),
+        E::NoParticles
+    ));
+    for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert!(matches!(refuse(&|_, _, s| s.time_step = bad), E::NotPositive { .. }));
+        assert!(matches!(refuse(&|g, _, _| g.spacing = bad), E::NotPositive { .. }));
+        assert!(matches!(refuse(&|_, p, _| p.mass[5] = bad), E::NotPositive { .. }));
+        assert!(matches!(refuse(&|_, p, _| p.volume[5] = bad), E::NotPositive { .. }));
+        assert!(matches!(refuse(&|_, p, _| p.half_size[1] = bad), E::NotPositive { .. }));
+    }
+    assert!(matches!(refuse(&|_, p, _| p.v[2][0] = f64::NAN), E::NotFinite { .. }));
+    assert!(matches!(refuse(&|g, _, _| g.lower[0] = f64::NAN), E::NotFinite { .. }));
+    assert!(matches!(refuse(&|g, _, _| g.cells[1] = 0), E::NoCells { axis: 1 }));
+    assert!(matches!(refuse(&|_, _, s| s.halve_first_acceleration = true), E::HalvedStart { .. }));
+    assert!(matches!(
+        refuse(&|g, _, _| g.cells = [1 << 31, 1 << 20]),
+        E::GridTooLarge { bytes, .. } if bytes > 1 << 50
+    ));
+    assert!(matches!(
+        refuse(&|_, p, _| p.x[4][1] = -0.1),
+        E::InitialState(StepError::LeftGrid { particle: 4, axis: 1, step: 0, .. })
+    ));
+    assert!(matches!(
+        refuse(&|_, p, _| p.F[4] = -Matrix2::identity() + Matrix2::new(2.0, 0.0, 0.0, 0.0)),
+        E::InitialState(StepError::Inverted { particle: 4, .. })
+    ));
+    assert!(matches!(
+        refuse(&|_, p, _| p.x[4][1] = f64::NAN),
+        E::InitialState(StepError::NotFinite { particle: 4, .. })
+    ));
+    assert!(matches!(
+        refuse(&|_, p, _| p.half_size[0] = 1.0),
+        E::InitialState(StepError::TooLarge { axis: 0, .. })
+    ));
+}
