@@ -1,2 +1,40 @@
-//! To come.
-fn main() {}
+//! The command `mms`: arguments in, tables and JSON out. What is measured, and how, is the business of
+//! `mmsmith-verify`; nothing here computes with fields.
+//!
+//! Exit status: 0 done, and whatever was checked passed; 1 a check failed; 2 bad input, or output that could not
+//! be written.
+
+mod arguments;
+mod commands;
+mod json;
+mod library;
+mod memory;
+mod progress;
+mod table;
+mod terminal;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use arguments::{Arguments, Command};
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let outcome = match &arguments.command {
+        Command::List(options) => commands::list(options),
+        Command::Check(options) => commands::check(options),
+        Command::Eval(options) => commands::eval(options),
+        Command::Run(options) => commands::run(options),
+        Command::Converge(options) => commands::converge(options),
+        Command::Reproduce(options) => commands::reproduce(options),
+    };
+    match outcome {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::from(1),
+        Err(error) => {
+            terminal::complain(&format!("error: {error:#}\n"));
+            ExitCode::from(2)
+        }
+    }
+}

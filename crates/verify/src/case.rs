@@ -261,6 +261,8 @@ pub struct Plan {
     pub particles: f64,
     /// Memory in bytes, estimated.
     pub bytes: f64,
+    /// How much of an annulus is modelled; `None` for other shapes.
+    pub extent: Option<Extent>,
 }
 
 /// Judges a case without running it or allocating memory for it.
@@ -295,6 +297,7 @@ fn plan_in<const D: usize>(
         steps: steps.count,
         particles: scene.particles_expected(case.per_cell),
         bytes: scene.bytes_expected(case.per_cell, scalar),
+        extent: scene.extent(),
     })
 }
 
@@ -348,7 +351,7 @@ fn run_in<T: Real, const D: usize>(
     outputs: &mut Outputs<'_>,
 ) -> Result<Row, CaseError> {
     let (scene, steps) = prepare(exact, case)?;
-    let time_step: T = Real::from_f64(steps.dt);
+    let time_step: T = Real::nearest(steps.dt);
     // In single precision the solver's step is a rounded one, and its time is a multiple of that.
     let dt = time_step.to_f64();
 
@@ -449,9 +452,9 @@ fn set_in_motion<T: Real, const D: usize>(
             }
             _ => exact.velocity(&X, 0.0),
         };
-        particles.x[p] = (X + exact.displacement(&X, 0.0)).map(Real::from_f64);
-        particles.v[p] = v.map(Real::from_f64);
-        particles.F[p] = exact.deformation_gradient(&X, 0.0).map(Real::from_f64);
+        particles.x[p] = (X + exact.displacement(&X, 0.0)).map(Real::nearest);
+        particles.v[p] = v.map(Real::nearest);
+        particles.F[p] = exact.deformation_gradient(&X, 0.0).map(Real::nearest);
     }
 }
 

@@ -19,7 +19,7 @@ use crate::scene::SceneError;
 /// A difference up to this multiple of the check's own estimated error is no evidence against a field.
 pub const OWN_ERROR_FACTOR: f64 = 8.0;
 /// Difference, relative to the field's scale, that is allowed beyond the check's own error.
-pub const TOLERANCE: f64 = 1e-9;
+pub const TOLERANCE: f64 = 1e-10;
 /// Above this own error, relative to the field's scale and with its factor, a comparison proves nothing.
 pub const BLUNT: f64 = 1e-6;
 /// Longest difference step, as a share of the body's size and of the period.

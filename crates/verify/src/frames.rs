@@ -97,7 +97,7 @@ fn frame<T: Real, const D: usize>(
         let F_3D = in_space(&F);
         gradient.push(by_rows(&F_3D));
         // In three dimensions, which gives the stress normal to the plane as well.
-        let F_solver = F_3D.map(Real::from_f64);
+        let F_solver = F_3D.map(Real::nearest);
         stress.push(by_rows(&law.cauchy(&F_solver)?.map(Real::to_f64)));
         von_mises.push(law.von_mises(&F_solver)?.to_f64());
         exact_displacement.push(padded(&u));

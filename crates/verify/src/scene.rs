@@ -162,11 +162,21 @@ impl<const D: usize> Scene<D> {
     /// The grid in the solver's precision.
     pub(crate) fn grid<T: Real>(&self) -> Grid<T, D> {
         Grid {
-            lower: self.lower.map(Real::from_f64),
-            spacing: Real::from_f64(self.spacing),
+            lower: self.lower.map(Real::nearest),
+            spacing: Real::nearest(self.spacing),
             cells: self.cells,
             walls: self.walls,
         }
+    }
+
+    /// How much of an annulus is modelled; `None` for other shapes.
+    pub(crate) fn extent(&self) -> Option<Extent> {
+        let whole = self.lower[0] < 0.0;
+        matches!(self.domain, Domain::Annulus { .. }).then_some(if whole {
+            Extent::Full
+        } else {
+            Extent::Quarter
+        })
     }
 
     /// About how many particles the body gets.
@@ -174,7 +184,7 @@ impl<const D: usize> Scene<D> {
         let cells: f64 = self.cells.iter().map(|&cells| cells as f64).product();
         let body = match self.domain {
             Domain::Annulus { inner, outer } => {
-                let turns = if self.lower[0] < 0.0 { 1.0 } else { 0.25 };
+                let turns = if self.extent() == Some(Extent::Full) { 1.0 } else { 0.25 };
                 let area = turns * std::f64::consts::PI * (outer * outer - inner * inner);
                 area / (self.spacing * self.spacing)
             }
@@ -202,7 +212,7 @@ impl<const D: usize> Scene<D> {
         density: f64,
     ) -> Particles<T, D> {
         let distance = self.spacing / per_cell as f64;
-        Particles::lattice(grid, per_cell, Real::from_f64(density), |X| {
+        Particles::lattice(grid, per_cell, Real::nearest(density), |X| {
             // Decided on the exact centre, so that both precisions have the same particles.
             let centre = SVector::<f64, D>::from_fn(|axis, _| {
                 let index = ((X[axis].to_f64() - self.lower[axis]) / distance - 0.5).round();

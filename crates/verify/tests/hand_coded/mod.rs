@@ -34,7 +34,7 @@ fn wide<T: Real>(X: &SVector<T, 2>) -> Vector {
 }
 
 fn narrow<T: Real, const C: usize>(value: SMatrix<f64, 2, C>) -> SMatrix<T, 2, C> {
-    value.map(Real::from_f64)
+    value.map(Real::nearest)
 }
 
 impl<T: Real, S: Plane> Solution<T, 2> for Coded<S> {
@@ -80,7 +80,7 @@ impl<T: Real, S: Plane> Solution<T, 2> for Coded<S> {
                 Domain::Box { lower: narrow(lower), upper: narrow(upper) }
             }
             Domain::Annulus { inner, outer } => {
-                Domain::Annulus { inner: Real::from_f64(inner), outer: Real::from_f64(outer) }
+                Domain::Annulus { inner: Real::nearest(inner), outer: Real::nearest(outer) }
             }
             _ => unreachable!("the shapes of this file"),
         }
@@ -94,17 +94,17 @@ impl<T: Real, S: Plane> Solution<T, 2> for Coded<S> {
     fn material(&self) -> Material<T> {
         let [E, nu, _] = self.0.constants();
         let (lambda, mu) = lame(E, nu);
-        Material::NeoHookean { lambda: Real::from_f64(lambda), mu: Real::from_f64(mu) }
+        Material::NeoHookean { lambda: Real::nearest(lambda), mu: Real::nearest(mu) }
     }
     fn density(&self) -> T {
-        Real::from_f64(self.0.constants()[2])
+        Real::nearest(self.0.constants()[2])
     }
     fn wave_speed(&self) -> T {
         let [E, _, rho0] = self.0.constants();
-        Real::from_f64((E / rho0).sqrt())
+        Real::nearest((E / rho0).sqrt())
     }
     fn period(&self) -> T {
-        T::one() / <Self as Solution<T, 2>>::wave_speed(self) * Real::from_f64(2.0)
+        T::one() / <Self as Solution<T, 2>>::wave_speed(self) * Real::nearest(2.0)
     }
 }
 

@@ -1,0 +1,290 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use mmsmith_verify as verify;
+use serde::Serialize;
+
+/// Manufactured solutions for solid mechanics: check fields, run a material point solver, measure its order.
+#[derive(Parser)]
+#[command(name = "mms", version, max_term_width = 100)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Subcommand)]
+pub(crate) enum Command {
+    /// List the solutions and their parameters
+    List(ListOptions),
+    /// Compare every field of a solution with the field below it; all solutions when none is named
+    Check(CheckOptions),
+    /// Evaluate the exact fields at points of your own
+    Eval(EvalOptions),
+    /// Run one simulation and measure its errors
+    Run(RunOptions),
+    /// Measure orders of accuracy over grids (--cells 16,32,64) or time steps (--cells 32 --cfls 0.1,0.2,0.4)
+    Converge(ConvergeOptions),
+    /// Repeat the original study on both of its problems, with tables, data and particle files
+    Reproduce(ReproduceOptions),
+}
+
+#[derive(Args)]
+pub(crate) struct ListOptions {
+    /// Write the list to this JSON file too
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
+}
+
+#[derive(Args)]
+pub(crate) struct CheckOptions {
+    /// Solutions to check, by name, or specification files (SPEC.toml)
+    #[arg(value_name = "NAME|SPEC.toml")]
+    pub(crate) solutions: Vec<String>,
+    /// Number of sample points in the body and on each surface
+    #[arg(long, value_name = "N", default_value_t = 300, value_parser = sample_count)]
+    pub(crate) points: usize,
+    #[command(flatten)]
+    pub(crate) parameters: ParameterOptions,
+    /// Write the findings to this JSON file
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
+}
+
+#[derive(Args)]
+pub(crate) struct EvalOptions {
+    /// The solution
+    pub(crate) name: String,
+    /// The points: [ { "X": [0.1, 0.2], "t": 0.3, "par": { "A": 0.05 } }, ... ]; "par" may be left out
+    #[arg(long, value_name = "IN.json")]
+    pub(crate) points: PathBuf,
+    #[command(flatten)]
+    pub(crate) parameters: ParameterOptions,
+    /// Write the fields to this JSON file instead of standard output
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
+}
+
+#[derive(Args)]
+pub(crate) struct RunOptions {
+    /// The solution
+    pub(crate) name: String,
+    /// Number of cells along the solution's cell length
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser = positive_count)]
+    pub(crate) cells: usize,
+    #[command(flatten)]
+    pub(crate) scheme: SchemeOptions,
+    /// Write particle files (.vtu, and a .pvd that lists them) to this folder
+    #[arg(long, value_name = "DIR")]
+    pub(crate) vtk: Option<PathBuf>,
+    /// Number of particle files, spread evenly from the first state to the last
+    #[arg(long, value_name = "N", default_value_t = 20, requires = "vtk", value_parser = clap::value_parser!(u64).range(2..))]
+    pub(crate) frames: u64,
+}
+
+#[derive(Args)]
+pub(crate) struct ConvergeOptions {
+    /// The solution
+    pub(crate) name: String,
+    /// Cell counts, separated by commas; one of them with --cfls
+    #[arg(long, value_name = "N,...", required = true, value_delimiter = ',', value_parser = positive_count)]
+    pub(crate) cells: Vec<usize>,
+    /// CFL numbers, separated by commas, for orders in time on one grid
+    #[arg(long, value_name = "X,...", value_delimiter = ',', value_parser = positive_number, conflicts_with = "cfl")]
+    pub(crate) cfls: Vec<f64>,
+    #[command(flatten)]
+    pub(crate) scheme: SchemeOptions,
+}
+
+#[derive(Args)]
+pub(crate) struct ReproduceOptions {
+    /// Write everything to this folder
+    #[arg(long, value_name = "DIR", default_value = "target/reproduce")]
+    pub(crate) out: PathBuf,
+    /// Number of threads; all cores when left out
+    #[arg(long, value_name = "N", value_parser = thread_count)]
+    pub(crate) threads: Option<usize>,
+}
+
+/// Values for parameters of a solution.
+#[derive(Args)]
+pub(crate) struct ParameterOptions {
+    /// Give a parameter another value than its default; repeatable
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment)]
+    pub(crate) set: Vec<(String, f64)>,
+}
+
+/// How to simulate; what every measuring command shares.
+#[derive(Args)]
+pub(crate) struct SchemeOptions {
+    /// Weights between particles and grid
+    #[arg(long, value_enum, default_value_t = Shape::Gimp)]
+    pub(crate) shape: Shape,
+    /// Time integrator
+    #[arg(long, value_enum, default_value_t = Integrator::Cd)]
+    pub(crate) integrator: Integrator,
+    /// First velocity of the cd integrator; others ignore it
+    #[arg(long, value_enum, default_value_t = Start::Halved)]
+    pub(crate) start: Start,
+    /// Particles in a cell along each direction
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = positive_count)]
+    pub(crate) ppc: usize,
+    /// Time step times wave speed over grid spacing
+    #[arg(long, value_name = "X", default_value_t = 0.4, value_parser = positive_number)]
+    pub(crate) cfl: f64,
+    /// End time in periods of the solution
+    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = positive_number)]
+    pub(crate) periods: f64,
+    /// How much of a ring is modelled; a quarter where symmetry allows it
+    #[arg(long, value_enum)]
+    pub(crate) extent: Option<Extent>,
+    /// Precision of the solver; errors are always measured in f64
+    #[arg(long, value_enum, default_value_t = Precision::F64)]
+    pub(crate) precision: Precision,
+    #[command(flatten)]
+    pub(crate) parameters: ParameterOptions,
+    /// Number of threads; all cores when left out
+    #[arg(long, value_name = "N", value_parser = thread_count)]
+    pub(crate) threads: Option<usize>,
+    /// Write the result to this JSON file
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
+}
+
+/// Declares an argument's values with what they mean to the library.
+macro_rules! choices {
+    ($(#[$doc:meta])* $name:ident => $target:ty { $($(#[$value_doc:meta])* $value:ident,)+ }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+        #[serde(rename_all = "lowercase")]
+        pub(crate) enum $name { $($(#[$value_doc])* $value,)+ }
+
+        impl From<$name> for $target {
+            fn from(value: $name) -> Self {
+                match value { $($name::$value => Self::$value,)+ }
+            }
+        }
+    };
+}
+
+choices!(
+    /// Weights.
+    Shape => verify::Shape {
+        /// Hat functions at the particle's point
+        Linear,
+        /// GIMP weights of fixed size
+        Ugimp,
+        /// GIMP weights that follow the particle's stretch
+        Gimp,
+    }
+);
+choices!(
+    /// Time integrators.
+    Integrator => verify::Integrator {
+        /// Update stress first
+        Usf,
+        /// Update stress last
+        Usl,
+        /// Update stress last, with the velocity projected again
+        Musl,
+        /// Centred differences
+        Cd,
+    }
+);
+choices!(
+    /// Starts of centred differences.
+    Start => verify::Start {
+        /// The exact velocity half a step before time zero
+        Exact,
+        /// Velocity and acceleration at time zero
+        Data,
+        /// Velocity at time zero, first acceleration halved
+        Halved,
+    }
+);
+choices!(
+    /// How much of a ring.
+    Extent => verify::Extent {
+        /// The part between the planes of symmetry
+        Quarter,
+        /// All of it
+        Full,
+    }
+);
+
+/// Floating-point precision.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Precision {
+    /// Double
+    F64,
+    /// Single
+    F32,
+}
+
+fn positive_count(text: &str) -> Result<usize, String> {
+    match text.trim().parse() {
+        Ok(0) | Err(_) => Err("it must be a whole number, at least 1".into()),
+        Ok(count) => Ok(count),
+    }
+}
+
+fn sample_count(text: &str) -> Result<usize, String> {
+    positive_count(text)
+        .ok()
+        .filter(|count| *count <= 10_000_000)
+        .ok_or_else(|| "it must be a whole number from 1 to 10000000".into())
+}
+
+fn thread_count(text: &str) -> Result<usize, String> {
+    positive_count(text)
+        .ok()
+        .filter(|count| *count <= 1024)
+        .ok_or_else(|| "it must be a whole number from 1 to 1024".into())
+}
+
+fn positive_number(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("it must be a positive number, such as 0.4".into()),
+    }
+}
+
+fn assignment(text: &str) -> Result<(String, f64), String> {
+    let form = "expected NAME=VALUE, such as A=0.05";
+    let (name, value) = text.split_once('=').ok_or(form)?;
+    let name = name.trim();
+    if name.is_empty() {
+        return Err(form.into());
+    }
+    match value.trim().parse::<f64>() {
+        Ok(number) if number.is_finite() => Ok((name.to_owned(), number)),
+        _ => Err(format!("'{value}' is not a finite number; {form}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn values_that_make_no_sense_are_refused() {
+        for text in ["0", "-1", "2.5", "", "x", "99999999999999999999999"] {
+            assert!(positive_count(text).is_err(), "{text}");
+        }
+        for text in ["0", "-0.4", "nan", "inf", "1e999", "", "0,4"] {
+            assert!(positive_number(text).is_err(), "{text}");
+        }
+        for text in ["A", "=1", "A=", "A=x", "A=nan", "A=inf"] {
+            assert!(assignment(text).is_err(), "{text}");
+        }
+        assert_eq!(assignment("A = 5e-2"), Ok(("A".into(), 0.05)));
+    }
+}

@@ -1,0 +1,135 @@
+//! The commands, each in its own module.
+
+mod check;
+mod converge;
+mod eval;
+mod list;
+mod reproduce;
+mod run;
+
+pub(crate) use check::check;
+pub(crate) use converge::converge;
+pub(crate) use eval::eval;
+pub(crate) use list::list;
+pub(crate) use reproduce::reproduce;
+pub(crate) use run::run;
+
+use anyhow::{Context, Result};
+use mmsmith_solutions::AnySolution;
+use mmsmith_verify::{Arithmetic, Case, plan};
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use crate::arguments::{Extent, Precision, SchemeOptions};
+use crate::library::Selection;
+use crate::memory;
+
+/// A solution in the precisions that a simulation of it needs.
+struct Model {
+    exact: AnySolution<f64>,
+    single: Option<AnySolution<f32>>,
+}
+
+impl Model {
+    fn new(selection: &Selection, precision: Precision) -> Result<Self> {
+        let single = match precision {
+            Precision::F64 => None,
+            Precision::F32 => Some(selection.build()?),
+        };
+        Ok(Self { exact: selection.build()?, single })
+    }
+
+    fn arithmetic(&self) -> Arithmetic<'_> {
+        self.single.as_ref().map_or(Arithmetic::Double, Arithmetic::Single)
+    }
+
+    /// Refuses cases that cannot be run or do not fit; gives the extent that they will have.
+    fn admit(&self, cases: &[Case]) -> Result<Option<Extent>> {
+        let mut extent = None;
+        for case in cases {
+            let plan = plan(&self.exact, self.arithmetic(), case)?;
+            memory::require(plan.bytes, case.cells)?;
+            extent = plan.extent.map(|extent| match extent {
+                mmsmith_verify::Extent::Quarter => Extent::Quarter,
+                mmsmith_verify::Extent::Full => Extent::Full,
+            });
+        }
+        Ok(extent)
+    }
+}
+
+/// The case that the options describe.
+fn case(options: &SchemeOptions, cells: usize) -> Case {
+    Case {
+        shape: options.shape.into(),
+        integrator: options.integrator.into(),
+        start: options.start.into(),
+        cells,
+        per_cell: options.ppc,
+        cfl: options.cfl,
+        periods: options.periods,
+        extent: options.extent.map(Into::into),
+    }
+}
+
+/// Settings as they are written to JSON: everything that a result depends on. `cells` and `cfl` are a number or a
+/// list.
+fn settings(
+    selection: &Selection,
+    options: &SchemeOptions,
+    extent: Option<Extent>,
+    cells: impl Serialize,
+    cfl: impl Serialize,
+) -> Value {
+    json!({
+        "version": env!("CARGO_PKG_VERSION"),
+        "solution": selection.description.name,
+        "parameters": selection.parameters(),
+        "shape": options.shape,
+        "integrator": options.integrator,
+        "start": options.start,
+        "cells": cells,
+        "ppc": options.ppc,
+        "cfl": cfl,
+        "periods": options.periods,
+        "extent": extent,
+        "precision": options.precision,
+        "threads": rayon::current_num_threads(),
+    })
+}
+
+/// One line that says what was simulated.
+fn caption(selection: &Selection, options: &SchemeOptions, extent: Option<Extent>) -> String {
+    let word = |value: &dyn std::fmt::Debug| format!("{value:?}").to_lowercase();
+    let start = match options.integrator {
+        crate::arguments::Integrator::Cd => format!(" ({} start)", word(&options.start)),
+        _ => String::new(),
+    };
+    let extent = extent.map(|extent| format!(", {}", word(&extent))).unwrap_or_default();
+    let parameters: Vec<_> =
+        selection.parameters().iter().map(|(name, value)| format!("{name} = {value}")).collect();
+    format!(
+        "{} ({}){extent}: {} + {}{start}, {} particles per cell and direction, {} period(s), {}, {} thread(s)\n",
+        selection.description.name,
+        parameters.join(", "),
+        word(&options.shape),
+        word(&options.integrator),
+        options.ppc,
+        options.periods,
+        word(&options.precision),
+        rayon::current_num_threads(),
+    )
+}
+
+/// Does `work` with the number of threads asked for.
+fn with_threads<R: Send>(
+    threads: Option<usize>,
+    work: impl FnOnce() -> Result<R> + Send,
+) -> Result<R> {
+    // Zero lets rayon take all cores.
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads.unwrap_or(0))
+        .build()
+        .context("--threads: cannot start the threads")?
+        .install(work)
+}

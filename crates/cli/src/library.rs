@@ -1,0 +1,87 @@
+//! The solutions of the library: found by name, built with parameters.
+
+use std::collections::BTreeMap;
+
+use anyhow::{Context, Result, bail};
+use mmsmith_solutions::{AnySolution, CATALOGUE, Description, Real, build};
+
+/// A solution's description with its parameter values, in its own order.
+#[derive(Clone)]
+pub(crate) struct Selection {
+    pub(crate) description: &'static Description,
+    pub(crate) values: Vec<f64>,
+}
+
+impl Selection {
+    /// Finds `name` and puts `overrides` in place of its parameters' defaults.
+    pub(crate) fn new(name: &str, overrides: &[(String, f64)]) -> Result<Self> {
+        let description = find(name)?;
+        for (index, (name, _)) in overrides.iter().enumerate() {
+            if overrides[..index].iter().any(|(earlier, _)| earlier == name) {
+                bail!("--set {name}=... is given twice");
+            }
+        }
+        let overrides = overrides.iter().map(|(name, value)| (name.as_str(), *value));
+        let values = description.resolve(overrides).context("--set")?;
+        Ok(Self { description, values })
+    }
+
+    /// The solution in the precision asked for.
+    pub(crate) fn build<T: Real>(&self) -> Result<AnySolution<T>> {
+        let name = self.description.name;
+        match build(name, &self.values) {
+            Some(solution) => Ok(solution?),
+            None => bail!("the solution '{name}' is listed but cannot be built"),
+        }
+    }
+
+    /// Parameter values by name.
+    pub(crate) fn parameters(&self) -> BTreeMap<&'static str, f64> {
+        let names = self.description.parameters.iter().map(|parameter| parameter.name);
+        names.zip(self.values.iter().copied()).collect()
+    }
+}
+
+/// The description of the solution `name`; an unknown one is met with those there are.
+fn find(name: &str) -> Result<&'static Description> {
+    if let Some(description) = CATALOGUE.iter().find(|known| known.name == name) {
+        return Ok(description);
+    }
+    let names: Vec<_> = CATALOGUE.iter().map(|known| known.name).collect();
+    let nearest = names
+        .iter()
+        .min_by_key(|known| distance(known, name))
+        .filter(|known| distance(known, name) <= name.len().max(known.len()) / 2)
+        .map(|known| format!("; did you mean '{known}'?"))
+        .unwrap_or_default();
+    bail!("there is no solution '{name}'{nearest} (there are: {})", names.join(", "))
+}
+
+/// The number of letters to insert, delete or replace to turn one word into the other.
+fn distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, letter) in a.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for j in 0..b.len() {
+            let replace = diagonal + usize::from(letter != b[j]);
+            diagonal = row[j + 1];
+            row[j + 1] = replace.min(row[j] + 1).min(diagonal + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::distance;
+
+    #[test]
+    fn distances_between_words() {
+        assert_eq!(distance("ring", "ring"), 0);
+        assert_eq!(distance("ring", "rign"), 2);
+        assert_eq!(distance("axis-aligned", "axis-algned"), 1);
+        assert_eq!(distance("", "bar"), 3);
+    }
+}

@@ -1,0 +1,93 @@
+//! Tables for people.
+
+use std::fmt::Write;
+
+/// Rows of cells under a header; columns as wide as they need to be.
+pub(crate) struct Table {
+    rows: Vec<Vec<String>>,
+    /// Columns from the left that are aligned to the left; numbers go to the right.
+    words: usize,
+}
+
+impl Table {
+    pub(crate) fn new<S: Into<String>>(words: usize, header: impl IntoIterator<Item = S>) -> Self {
+        Self { rows: vec![header.into_iter().map(Into::into).collect()], words }
+    }
+
+    pub(crate) fn row<S: Into<String>>(&mut self, cells: impl IntoIterator<Item = S>) {
+        self.rows.push(cells.into_iter().map(Into::into).collect());
+    }
+
+    /// The table as text, each line indented by two spaces.
+    pub(crate) fn text(&self) -> String {
+        let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
+        let width = |column| {
+            let cells = self.rows.iter().filter_map(|row: &Vec<String>| row.get(column));
+            cells.map(|cell: &String| cell.chars().count()).max().unwrap_or(0)
+        };
+        let widths: Vec<usize> = (0..columns).map(width).collect();
+        let mut text = String::new();
+        for row in &self.rows {
+            let mut line = String::new();
+            for (column, cell) in row.iter().enumerate() {
+                let width = widths[column];
+                // Writing to a string cannot fail.
+                let _ = if column < self.words {
+                    write!(line, "  {cell:<width$}")
+                } else {
+                    write!(line, "  {cell:>width$}")
+                };
+            }
+            text.push_str(line.trim_end());
+            text.push('\n');
+        }
+        text
+    }
+
+    /// The table in Markdown.
+    pub(crate) fn markdown(&self) -> String {
+        let mut text = String::new();
+        for (index, row) in self.rows.iter().enumerate() {
+            let cells: Vec<_> = row.iter().map(|cell| cell.replace('|', "\\|")).collect();
+            let _ = writeln!(text, "| {} |", cells.join(" | "));
+            if index == 0 {
+                let rule = |column| if column < self.words { " --- |" } else { " ---: |" };
+                let _ = writeln!(text, "|{}", (0..row.len()).map(rule).collect::<String>());
+            }
+        }
+        text
+    }
+}
+
+/// An error: four digits, and an exponent.
+pub(crate) fn error(value: f64) -> String {
+    if value.is_finite() { format!("{value:.3e}") } else { "-".into() }
+}
+
+/// An order of accuracy: two decimals, or a dash where there is none.
+pub(crate) fn rate(value: Option<f64>) -> String {
+    value.map_or_else(|| "-".into(), |value| format!("{value:.2}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_line_up_to_the_right_and_words_to_the_left() {
+        let mut table = Table::new(1, ["field", "linf", "rate"]);
+        table.row(["u", "4.081e-3", "-"]);
+        table.row(["velocity", "1.0e-12", "2.00"]);
+        let expected =
+            "  field         linf  rate\n  u         4.081e-3     -\n  velocity   1.0e-12  2.00\n";
+        assert_eq!(table.text(), expected);
+        let markdown = table.markdown();
+        assert!(markdown.starts_with("| field | linf | rate |\n| --- | ---: | ---: |\n| u |"));
+    }
+
+    #[test]
+    fn numbers_that_are_none_become_dashes() {
+        assert_eq!((error(4.0812e-3), error(f64::NAN)), ("4.081e-3".into(), "-".into()));
+        assert_eq!((rate(Some(1.996)), rate(None)), ("2.00".into(), "-".into()));
+    }
+}
