@@ -94,7 +94,8 @@ fn generate(repository: &Path, path: &Path) -> anyhow::Result<(String, String)> 
     if path.file_stem().and_then(|stem| stem.to_str()) != Some(&spec.name) {
         bail!("{shown} holds a solution called '{0}'; the file must be called {0}.toml", spec.name);
     }
-    let text = module_source(&spec).with_context(|| format!("cannot derive the fields of {shown}"))?;
+    let text =
+        module_source(&spec).with_context(|| format!("cannot derive the fields of {shown}"))?;
     Ok((spec.name, text))
 }
 
@@ -145,10 +146,7 @@ fn compare(
     Ok(Outcome { lines, stale })
 }
 
-fn update(
-    repository: &Path,
-    files: &BTreeMap<PathBuf, Option<String>>,
-) -> anyhow::Result<Outcome> {
+fn update(repository: &Path, files: &BTreeMap<PathBuf, Option<String>>) -> anyhow::Result<Outcome> {
     let mut lines = Vec::new();
     for (path, wanted) in files {
         let shown = path.strip_prefix(repository).unwrap_or(path).display();

@@ -88,11 +88,7 @@ impl<'a> Translator<'a> {
         self.stored.get(&slot).or_else(|| names.get(&slot)).cloned().unwrap_or_default()
     }
 
-    fn operation(
-        &self,
-        operation: &Operation,
-        names: &BTreeMap<Slot, TokenStream>,
-    ) -> TokenStream {
+    fn operation(&self, operation: &Operation, names: &BTreeMap<Slot, TokenStream>) -> TokenStream {
         let at = |slot: Slot| self.operand(slot, names);
         match operation {
             Operation::Number(value) => number(value),

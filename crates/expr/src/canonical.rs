@@ -139,7 +139,8 @@ impl Graph {
     /// `term = key * sum` where exactly one factor of the term is a sum, to the first power.
     fn split_off_sum(&mut self, term: Expr) -> Option<(Expr, Expr)> {
         let Node::Product(factors) = self.node(term) else { return None };
-        let mut sums = factors.iter().filter(|(base, _)| matches!(self.node(*base), Node::Sum { .. }));
+        let mut sums =
+            factors.iter().filter(|(base, _)| matches!(self.node(*base), Node::Sum { .. }));
         let (sum, exponent) = sums.next()?;
         if sums.next().is_some() || !exponent.is_one() {
             return None;
@@ -149,7 +150,11 @@ impl Graph {
         Some((self.product(rest), sum))
     }
 
-    fn sum_of_collected(&mut self, constant: Rational, collected: BTreeMap<Expr, Rational>) -> Expr {
+    fn sum_of_collected(
+        &mut self,
+        constant: Rational,
+        collected: BTreeMap<Expr, Rational>,
+    ) -> Expr {
         let mut terms: Vec<(Expr, Rational)> = collected.into_iter().collect();
         match (terms.len(), constant.is_zero()) {
             (0, _) => return self.number(constant),
@@ -164,7 +169,9 @@ impl Graph {
                     let inverse = (outside, -Rational::one());
                     let inner: Vec<(Rational, Expr)> = terms
                         .into_iter()
-                        .map(|(term, c)| (c, self.product([(term, Rational::one()), inverse.clone()])))
+                        .map(|(term, c)| {
+                            (c, self.product([(term, Rational::one()), inverse.clone()]))
+                        })
                         .collect();
                     let inside = self.sum(inner);
                     return self.mul(outside, inside);
@@ -184,7 +191,10 @@ impl Graph {
         if coefficient.is_one() {
             return term;
         }
-        self.intern(Node::Sum { constant: Rational::zero(), terms: Box::new([(term, coefficient)]) })
+        self.intern(Node::Sum {
+            constant: Rational::zero(),
+            terms: Box::new([(term, coefficient)]),
+        })
     }
 
     /// The factors that every term has, to the smallest power that occurs.
@@ -199,7 +209,9 @@ impl Graph {
         for &(term, _) in &terms[1..] {
             let factors = factors_of(term);
             common.retain_mut(|(base, exponent)| {
-                let Some((_, other)) = factors.iter().find(|(b, _)| b == base) else { return false };
+                let Some((_, other)) = factors.iter().find(|(b, _)| b == base) else {
+                    return false;
+                };
                 if other.is_positive() != exponent.is_positive() {
                     return false;
                 }
@@ -314,7 +326,12 @@ impl Graph {
         let x = arguments[0];
         let odd = matches!(
             function,
-            Function::Sin | Function::Tan | Function::Sinh | Function::Tanh | Function::Asin | Function::Atan
+            Function::Sin
+                | Function::Tan
+                | Function::Sinh
+                | Function::Tanh
+                | Function::Asin
+                | Function::Atan
         );
         let even = matches!(function, Function::Cos | Function::Cosh);
         if (odd || even) && self.has_negative_sign(x) {
@@ -393,9 +410,8 @@ impl Graph {
         if let Some(&known) = replacement.get(&expr).or_else(|| done.get(&expr)) {
             return known;
         }
-        let result = self.map_children(expr, &mut |graph, child| {
-            graph.replace_with(child, replacement, done)
-        });
+        let result = self
+            .map_children(expr, &mut |graph, child| graph.replace_with(child, replacement, done));
         done.insert(expr, result);
         result
     }
@@ -459,7 +475,8 @@ fn exact_root_or_self(value: &Rational, exponent: &Rational) -> Option<Rational>
 fn content_of(constant: &Rational, terms: &[(Expr, Rational)]) -> Rational {
     let leading_negative =
         if constant.is_zero() { terms[0].1.is_negative() } else { constant.is_negative() };
-    let all = std::iter::once(constant).chain(terms.iter().map(|(_, c)| c)).filter(|c| !c.is_zero());
+    let all =
+        std::iter::once(constant).chain(terms.iter().map(|(_, c)| c)).filter(|c| !c.is_zero());
     let content = all
         .map(Signed::abs)
         .reduce(|a, b| Rational::new(a.numer().gcd(b.numer()), a.denom().lcm(b.denom())))

@@ -133,8 +133,12 @@ impl Graph {
     /// A graph with nothing but zero and one.
     #[must_use]
     pub fn new() -> Self {
-        let mut graph =
-            Graph { nodes: Vec::new(), depth: Vec::new(), index: HashMap::new(), symbols: Vec::new() };
+        let mut graph = Graph {
+            nodes: Vec::new(),
+            depth: Vec::new(),
+            index: HashMap::new(),
+            symbols: Vec::new(),
+        };
         graph.intern(Node::Number(Rational::zero()));
         graph.intern(Node::Number(Rational::one()));
         graph

@@ -22,7 +22,7 @@
 //! let ast = Ast::parse("x*sin(Pi*x)").unwrap();
 //! let f = graph.build(&ast, &mut |_, name| (name == "x").then_some(x).ok_or("no such name".into())).unwrap();
 //! let df = Derivatives::default().of(&mut graph, f, x);
-//! assert_eq!(graph.print(df), "sin(Pi*x) + Pi*x*cos(Pi*x)");
+//! assert_eq!(graph.print(df), "sin(x*Pi) + x*Pi*cos(x*Pi)");
 //!
 //! let program = Program::lower(&mut graph, &[(x, Dependence::default())], &[], &[df]);
 //! assert_eq!(program.evaluate(&[0.5]), [1.0]);

@@ -249,13 +249,10 @@ impl Parser {
                 Ok(span.end)
             }
             (Token::End, _) => Err(error("this '(' is never closed", open.clone())),
-            (Token::Name(_) | Token::Number(_) | Token::Open, span) => Err(error(
-                "an operator is missing here; multiplication is written with '*'",
-                span,
-            )),
-            (other, span) => {
-                Err(error(format!("')' is expected, not {}", other.describe()), span))
+            (Token::Name(_) | Token::Number(_) | Token::Open, span) => {
+                Err(error("an operator is missing here; multiplication is written with '*'", span))
             }
+            (other, span) => Err(error(format!("')' is expected, not {}", other.describe()), span)),
         }
     }
 }
@@ -321,7 +318,8 @@ fn tokens(text: &str) -> Result<Vec<(Token, Range<usize>)>, ParseError> {
                 ')' => Token::Close,
                 ',' => Token::Comma,
                 _ => {
-                    let message = format!("the character '{}' has no meaning here", c.escape_debug());
+                    let message =
+                        format!("the character '{}' has no meaning here", c.escape_debug());
                     return Err(error(message, start..end));
                 }
             };
@@ -359,12 +357,15 @@ fn number_end(text: &str, start: usize) -> usize {
 
 fn number(text: &str, span: Range<usize>) -> Result<Rational, ParseError> {
     let written = &text[span.clone()];
-    if matches!(text[span.end..].chars().next(), Some(c) if c.is_alphabetic() || c == '_' || c == '.') {
-        let message = format!("'{written}' runs into what follows; multiplication is written with '*'");
+    if matches!(text[span.end..].chars().next(), Some(c) if c.is_alphabetic() || c == '_' || c == '.')
+    {
+        let message =
+            format!("'{written}' runs into what follows; multiplication is written with '*'");
         return Err(error(message, span.start..span.end + 1));
     }
     if written.len() > MOST_DIGITS {
-        let message = format!("a number of {} characters; {MOST_DIGITS} are the limit", written.len());
+        let message =
+            format!("a number of {} characters; {MOST_DIGITS} are the limit", written.len());
         return Err(error(message, span));
     }
     let (mantissa, exponent) = match written.split_once(['e', 'E']) {
@@ -423,7 +424,10 @@ mod tests {
     fn places_of_errors() {
         assert_eq!(message("2*(a + b").1, 2..3);
         assert_eq!(message("a)").1, 1..2);
-        assert_eq!(message("2x"), ("'2' runs into what follows; multiplication is written with '*'".into(), 0..2));
+        assert_eq!(
+            message("2x"),
+            ("'2' runs into what follows; multiplication is written with '*'".into(), 0..2)
+        );
         assert_eq!(message("a b").1, 2..3);
         assert_eq!(message("a ^ b ^ c").1, 6..7);
         assert_eq!(message("a +").1, 3..3);

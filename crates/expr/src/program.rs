@@ -445,6 +445,6 @@ impl Lowering<'_> {
         }
         let half = self.whole_power(base, exponent / 2);
         let square = self.push(Operation::Mul(half, half));
-        if exponent % 2 == 0 { square } else { self.push(Operation::Mul(square, base)) }
+        if exponent.is_multiple_of(2) { square } else { self.push(Operation::Mul(square, base)) }
     }
 }

@@ -92,8 +92,7 @@ struct Interpreted<const D: usize> {
 impl<const D: usize> Interpreted<D> {
     fn new(spec: &Spec, parameters: Vec<f64>) -> Result<Self, InterpretError> {
         let mut fields = spec.derive()?;
-        let (u, v, a, b) =
-            (fields.u.clone(), fields.v.clone(), fields.a.clone(), fields.b.clone());
+        let (u, v, a, b) = (fields.u.clone(), fields.v.clone(), fields.a.clone(), fields.b.clone());
         let (H, F, P) = (fields.H.concat(), fields.F.concat(), fields.P.concat());
         let J = [fields.J];
 
@@ -108,7 +107,8 @@ impl<const D: usize> Interpreted<D> {
             constants.extend([requirement.left, requirement.right]);
         }
         let mut program = |outputs: &[Expr]| fields.program(outputs);
-        let constants = program(&constants).evaluate(&inputs::<D>(&SVector::zeros(), 0.0, &parameters));
+        let constants =
+            program(&constants).evaluate(&inputs::<D>(&SVector::zeros(), 0.0, &parameters));
         let sides = &constants[constants.len() - 2 * spec.requirements.len()..];
         for (requirement, side) in spec.requirements.iter().zip(sides.chunks(2)) {
             if !requirement.relation.holds(side[0], side[1]) {

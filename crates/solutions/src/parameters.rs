@@ -48,7 +48,9 @@ pub enum ParameterError {
         known: Vec<String>,
     },
     /// A value outside the admissible ones.
-    #[error("parameter {name} = {value:?} of {solution} is not admissible: it must be {admissible}")]
+    #[error(
+        "parameter {name} = {value:?} of {solution} is not admissible: it must be {admissible}"
+    )]
     OutOfRange {
         /// The solution.
         solution: String,
@@ -60,7 +62,9 @@ pub enum ParameterError {
         admissible: String,
     },
     /// Values that are admissible one by one but not together.
-    #[error("the parameters of {solution} must satisfy {requirement}, which does not hold for {values}")]
+    #[error(
+        "the parameters of {solution} must satisfy {requirement}, which does not hold for {values}"
+    )]
     Requirement {
         /// The solution.
         solution: String,

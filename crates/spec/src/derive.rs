@@ -123,7 +123,9 @@ impl Fields {
         let parts = vectors
             .iter()
             .map(|(field, x)| (*field, x.as_slice()))
-            .chain(matrices.iter().flat_map(|(field, A)| A.iter().map(|row| (*field, row.as_slice()))))
+            .chain(
+                matrices.iter().flat_map(|(field, A)| A.iter().map(|row| (*field, row.as_slice()))),
+            )
             .chain([("J", J.as_slice())]);
         for (field, expressions) in parts {
             if expressions.iter().any(|&e| self.graph.divides_by_zero(e)) {
@@ -216,8 +218,7 @@ impl NeoHookean {
         let n = H.len();
         let graph = &mut derivation.graph;
         let (lambda, mu) = (graph.whole(lambda), graph.whole(mu));
-        let H: Matrix =
-            H.iter().map(|row| row.iter().map(|&h| graph.whole(h)).collect()).collect();
+        let H: Matrix = H.iter().map(|row| row.iter().map(|&h| graph.whole(h)).collect()).collect();
         let mut F = H.clone();
         for i in 0..n {
             F[i][i] = graph.add(Graph::ONE, H[i][i]);
@@ -400,7 +401,7 @@ fn cofactor(graph: &mut Graph, A: &Matrix, i: usize, j: usize) -> Expr {
     let without = |skipped: usize| (0..A.len()).filter(move |&k| k != skipped);
     let minor: Matrix = without(i).map(|k| without(j).map(|l| A[k][l]).collect()).collect();
     let determinant = determinant(graph, &minor);
-    if (i + j) % 2 == 0 { determinant } else { graph.neg(determinant) }
+    if (i + j).is_multiple_of(2) { determinant } else { graph.neg(determinant) }
 }
 
 /// The determinants of all principal submatrices but the empty one; they add up to `det(I + A) - 1`.
@@ -409,7 +410,8 @@ fn principal_minors(graph: &mut Graph, A: &Matrix) -> Vec<Expr> {
     (1..1_usize << n)
         .map(|subset| {
             let indices: Vec<usize> = (0..n).filter(|i| subset >> i & 1 == 1).collect();
-            let minor = indices.iter().map(|&i| indices.iter().map(|&j| A[i][j]).collect()).collect();
+            let minor =
+                indices.iter().map(|&i| indices.iter().map(|&j| A[i][j]).collect()).collect();
             determinant(graph, &minor)
         })
         .collect()

@@ -128,12 +128,15 @@ impl<'a> Scope<'a> {
         }
         let uses: Vec<Vec<usize>> = syntax
             .iter()
-            .map(|(_, used)| used.iter().filter_map(|n| index_of.get(n.as_str()).copied()).collect())
+            .map(|(_, used)| {
+                used.iter().filter_map(|n| index_of.get(n.as_str()).copied()).collect()
+            })
             .collect();
         let order = dependency_order(&uses).map_err(|circle| {
             let path: Vec<&str> = circle.iter().map(|&i| lets[i].0.get_ref().as_str()).collect();
             let (name, text) = &lets[circle[0]];
-            let message = format!("'{}' is defined by itself: {}", name.get_ref(), path.join(" -> "));
+            let message =
+                format!("'{}' is defined by itself: {}", name.get_ref(), path.join(" -> "));
             let help = "a [let] expression may use others, but not in a circle";
             self.source.error(message, text.span.clone(), Some(help.into()))
         })?;
@@ -200,7 +203,10 @@ impl<'a> Scope<'a> {
                     Some(known) => format!("did you mean '{known}'?"),
                     None => {
                         let known: Vec<&str> = names.keys().map(String::as_str).collect();
-                        format!("declare it under [parameters] or [let]; known are {}", known.join(", "))
+                        format!(
+                            "declare it under [parameters] or [let]; known are {}",
+                            known.join(", ")
+                        )
                     }
                 },
             });

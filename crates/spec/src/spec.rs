@@ -211,11 +211,11 @@ pub struct Boundary {
 
 /// Words that cannot be the name of a Rust module or type.
 const RUST_WORDS: &[&str] = &[
-    "abstract", "as", "async", "await", "become", "box", "break", "const", "continue", "crate", "do",
-    "dyn", "else", "enum", "extern", "false", "final", "fn", "for", "gen", "if", "impl", "in", "let",
-    "loop", "macro", "match", "mod", "move", "mut", "override", "priv", "pub", "ref", "return", "self",
-    "static", "struct", "super", "trait", "true", "try", "type", "typeof", "union", "unsafe", "unsized",
-    "use", "virtual", "where", "while", "yield",
+    "abstract", "as", "async", "await", "become", "box", "break", "const", "continue", "crate",
+    "do", "dyn", "else", "enum", "extern", "false", "final", "fn", "for", "gen", "if", "impl",
+    "in", "let", "loop", "macro", "match", "mod", "move", "mut", "override", "priv", "pub", "ref",
+    "return", "self", "static", "struct", "super", "trait", "true", "try", "type", "typeof",
+    "union", "unsafe", "unsized", "use", "virtual", "where", "while", "yield",
 ];
 
 impl Spec {
@@ -410,8 +410,8 @@ impl<'a> Reader<'a> {
                 .map(|p| (self.scope.graph.symbol(&p.name), Default::default()))
                 .collect();
             let values: Vec<f64> = parameters.iter().map(|p| p.default).collect();
-            let sides =
-                Program::lower(&mut self.scope.graph, &inputs, &[], &[left, right]).evaluate(&values);
+            let sides = Program::lower(&mut self.scope.graph, &inputs, &[], &[left, right])
+                .evaluate(&values);
             if !relation.holds(sides[0], sides[1]) {
                 let message = format!(
                     "the defaults break this requirement: {:?} {} {:?} does not hold",
@@ -453,7 +453,8 @@ impl<'a> Reader<'a> {
         }
         let span = document.material.span();
         let usual = "E*nu/((1 + nu)*(1 - 2*nu))";
-        let lambda = self.scope.constant_or(table.lambda.as_ref(), usual, "lambda", span.clone())?;
+        let lambda =
+            self.scope.constant_or(table.lambda.as_ref(), usual, "lambda", span.clone())?;
         let mu = self.scope.constant_or(table.mu.as_ref(), "E/(2*(1 + nu))", "mu", span)?;
         Ok(Material::NeoHookean { lambda, mu })
     }
@@ -548,7 +549,11 @@ impl<'a> Reader<'a> {
         if cut && condition != Condition::Symmetry {
             let message = "a plane through the middle of an annulus can only be one of symmetry";
             let help = "condition = 'symmetry'";
-            return Err(self.scope.source.error(message, table.condition.span(), Some(help.into())));
+            return Err(self.scope.source.error(
+                message,
+                table.condition.span(),
+                Some(help.into()),
+            ));
         }
         Ok(Boundary { surface, condition })
     }

@@ -8,10 +8,8 @@ pub use axis_aligned::{AxisAligned, AxisAlignedParameters};
 mod ring;
 pub use ring::{Ring, RingParameters};
 /// Every solution of the library, in alphabetical order of the names.
-pub const CATALOGUE: &[&Description] = &[
-    &AxisAligned::<f64>::DESCRIPTION,
-    &Ring::<f64>::DESCRIPTION,
-];
+pub const CATALOGUE: &[&Description] =
+    &[&AxisAligned::<f64>::DESCRIPTION, &Ring::<f64>::DESCRIPTION];
 /// Builds the solution `name` with the given parameter values, in the order of its description.
 ///
 /// Returns `None` for a name that is not in the [`CATALOGUE`].
@@ -23,11 +21,9 @@ pub fn build<T: Real>(
     name: &str,
     values: &[f64],
 ) -> Option<Result<AnySolution<T>, ParameterError>> {
-    Some(
-        match name {
-            "axis-aligned" => AxisAligned::from_values(values).map(AnySolution::from),
-            "ring" => Ring::from_values(values).map(AnySolution::from),
-            _ => return None,
-        },
-    )
+    Some(match name {
+        "axis-aligned" => AxisAligned::from_values(values).map(AnySolution::from),
+        "ring" => Ring::from_values(values).map(AnySolution::from),
+        _ => return None,
+    })
 }

@@ -1,0 +1,150 @@
+//! Properties of the algebra: whatever the expression, printing reads back, canonical form keeps the value, and
+//! derivatives agree with differences.
+
+use mmsmith_expr::{Ast, Dependence, Derivatives, Expr, Graph, Program};
+use proptest::prelude::*;
+
+/// Expressions in `x` and `y` that are defined for `x` and `y` in [0.6, 1.4].
+fn expression() -> impl Strategy<Value = String> {
+    let leaf = prop_oneof![
+        Just("x".to_owned()),
+        Just("y".to_owned()),
+        Just("Pi".to_owned()),
+        (1..9_u32).prop_map(|n| n.to_string()),
+        (1..9_u32, 2..9_u32).prop_map(|(n, d)| format!("{n}/{d}")),
+        (1..99_u32).prop_map(|n| format!("0.{n}")),
+    ];
+    leaf.prop_recursive(5, 40, 4, |inner| {
+        let pair = (inner.clone(), inner.clone());
+        prop_oneof![
+            pair.clone().prop_map(|(a, b)| format!("({a}) + ({b})")),
+            pair.clone().prop_map(|(a, b)| format!("({a}) - ({b})")),
+            pair.clone().prop_map(|(a, b)| format!("({a})*({b})")),
+            pair.prop_map(|(a, b)| format!("({a})/(2 + ({b})^2)")),
+            (inner.clone(), 1..5_i32).prop_map(|(a, n)| format!("({a})^{n}")),
+            inner.clone().prop_map(|a| format!("sqrt(1 + ({a})^2)")),
+            inner.clone().prop_map(|a| format!("sin({a})")),
+            inner.clone().prop_map(|a| format!("cos(Pi*({a}))")),
+            inner.clone().prop_map(|a| format!("exp(-({a})^2)")),
+            inner.clone().prop_map(|a| format!("ln(1 + ({a})^2)")),
+            inner.prop_map(|a| format!("arctan({a})")),
+        ]
+    })
+}
+
+fn build(graph: &mut Graph, text: &str) -> Expr {
+    let ast = Ast::parse(text).unwrap_or_else(|e| panic!("{text}: {e} at {:?}", e.span));
+    graph.build(&ast, &mut |g, name| Ok(g.symbol(name))).unwrap_or_else(|e| panic!("{text}: {e}"))
+}
+
+fn value(graph: &mut Graph, expr: Expr, x: f64, y: f64) -> f64 {
+    let free = Dependence::default();
+    let inputs = [(graph.symbol("x"), free), (graph.symbol("y"), free)];
+    Program::lower(graph, &inputs, &[], &[expr]).evaluate(&[x, y])[0]
+}
+
+/// The value of the text, computed operation by operation as it is written, and the size of the largest
+/// intermediate value, which scales the rounding error.
+fn plain_value(ast: &Ast, x: f64, y: f64) -> (f64, f64) {
+    use mmsmith_expr::AstKind;
+    let sub = |ast: &Ast| plain_value(ast, x, y);
+    let (value, size) = match &ast.kind {
+        AstKind::Number(value) => (mmsmith_expr::nearest_f64(value), 0.0),
+        AstKind::Name(name) => match name.as_str() {
+            "x" => (x, 0.0),
+            "y" => (y, 0.0),
+            _ => (std::f64::consts::PI, 0.0),
+        },
+        AstKind::Sum(terms) => terms.iter().fold((0.0, 0.0), |(total, size), (minus, term)| {
+            let (value, inner) = sub(term);
+            (if *minus { total - value } else { total + value }, f64::max(size, inner))
+        }),
+        AstKind::Product(factors) => factors.iter().fold((1.0, 0.0), |(total, size), (over, f)| {
+            let (value, inner) = sub(f);
+            (if *over { total / value } else { total * value }, f64::max(size, inner))
+        }),
+        AstKind::Power(base, exponent) => {
+            let ((base, a), (exponent, b)) = (sub(base), sub(exponent));
+            (base.powf(exponent), a.max(b))
+        }
+        AstKind::Call(name, arguments) => {
+            let (x, size) = sub(&arguments[0]);
+            let value = match name.as_str() {
+                "sin" => x.sin(),
+                "cos" => x.cos(),
+                "exp" => x.exp(),
+                "ln" => x.ln(),
+                "sqrt" => x.sqrt(),
+                _ => x.atan(),
+            };
+            (value, size)
+        }
+    };
+    (value, size.max(value.abs()))
+}
+
+proptest! {
+    #[test]
+    fn printing_reads_back_as_the_same_expression(text in expression()) {
+        let mut graph = Graph::new();
+        let expr = build(&mut graph, &text);
+        let printed = graph.print(expr);
+        prop_assert_eq!(build(&mut graph, &printed), expr, "{} printed as {}", text, printed);
+    }
+
+    #[test]
+    fn canonical_form_keeps_the_value(text in expression(), x in 0.6..1.4, y in 0.6..1.4) {
+        let mut graph = Graph::new();
+        let expr = build(&mut graph, &text);
+        let (expected, size) = plain_value(&Ast::parse(&text).unwrap(), x, y);
+        prop_assume!(size < 1e6);
+        let found = value(&mut graph, expr, x, y);
+        prop_assert!((found - expected).abs() <= 1e-10 * (1.0 + size * size), "{} gives {} and {}", text, found, expected);
+    }
+
+    #[test]
+    fn derivatives_agree_with_differences(text in expression(), x in 0.6..1.4, y in 0.6..1.4) {
+        let mut graph = Graph::new();
+        let expr = build(&mut graph, &text);
+        let symbol = graph.symbol("x");
+        let derivative = Derivatives::default().of(&mut graph, expr, symbol);
+        let exact = value(&mut graph, derivative, x, y);
+        // Central differences with two steps: the error of the larger one is estimated by the smaller one.
+        let mut difference = |h: f64| {
+            (value(&mut graph, expr, x + h, y) - value(&mut graph, expr, x - h, y)) / (2.0 * h)
+        };
+        let (coarse, fine) = (difference(2e-5), difference(1e-5));
+        let size = plain_value(&Ast::parse(&text).unwrap(), x, y).1;
+        prop_assume!(size < 1e4 && (coarse - fine).abs() < 1e-4 * (1.0 + exact.abs()));
+        let tolerance = 4.0 * (coarse - fine).abs() + 1e-9 * (1.0 + size);
+        prop_assert!((exact - fine).abs() <= tolerance, "d/dx {} = {}, not {}", text, fine, exact);
+    }
+
+    #[test]
+    fn derivative_rules(a in expression(), b in expression()) {
+        let mut graph = Graph::new();
+        let (f, g) = (build(&mut graph, &a), build(&mut graph, &b));
+        let x = graph.symbol("x");
+        let mut derivatives = Derivatives::default();
+        let (df, dg) = (derivatives.of(&mut graph, f, x), derivatives.of(&mut graph, g, x));
+        let sum = graph.add(f, g);
+        let product = graph.mul(f, g);
+        let d_sum = derivatives.of(&mut graph, sum, x);
+        let d_product = derivatives.of(&mut graph, product, x);
+        let rule = { let (l, r) = (graph.mul(df, g), graph.mul(f, dg)); graph.add(l, r) };
+        let sum_rule = graph.add(df, dg);
+        for (expected, found) in [(sum_rule, d_sum), (rule, d_product)] {
+            let (e, f) = (value(&mut graph, expected, 0.9, 1.1), value(&mut graph, found, 0.9, 1.1));
+            prop_assume!(e.abs() < 1e6);
+            prop_assert!((e - f).abs() <= 1e-7 * (1.0 + e.abs()), "{} and {}", e, f);
+        }
+    }
+
+    #[test]
+    fn any_text_is_answered_without_a_panic(text in "[ -~\u{3b1}-\u{3c9}]{0,60}") {
+        if let Ok(ast) = Ast::parse(&text) {
+            let mut graph = Graph::new();
+            let _ = graph.build(&ast, &mut |g, name| Ok(g.symbol(name)));
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! Specifications as data: `ok/` holds specifications with the fields derived from them, `err/` holds mistakes
+//! with the messages that they get. `UPDATE_EXPECT=1` writes the expected files anew.
+
+use mmsmith_spec::{Diagnostic, Spec};
+use std::path::{Path, PathBuf};
+
+fn cases(folder: &str) -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(folder);
+    let mut cases: Vec<PathBuf> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|e| e == "toml"))
+        .collect();
+    cases.sort();
+    assert!(!cases.is_empty());
+    cases
+}
+
+fn parse(path: &Path) -> Result<Spec, Diagnostic> {
+    let file = path.file_name().unwrap().to_str().unwrap();
+    Spec::parse(&std::fs::read_to_string(path).unwrap(), file)
+}
+
+/// Compares with the file of expected output beside the input.
+fn expect(path: &Path, found: &str, failures: &mut Vec<String>) {
+    let expected_path = path.with_extension("txt");
+    if std::env::var_os("UPDATE_EXPECT").is_some() {
+        std::fs::write(&expected_path, found).unwrap();
+    }
+    let expected = std::fs::read_to_string(&expected_path).unwrap_or_default();
+    if expected != found {
+        failures.push(format!("{}\n--- expected\n{expected}\n--- found\n{found}", path.display()));
+    }
+}
+
+#[test]
+fn mistakes_get_the_expected_message() {
+    let mut failures = Vec::new();
+    for path in cases("err") {
+        match parse(&path) {
+            Ok(_) => failures.push(format!("{} was accepted", path.display())),
+            Err(diagnostic) => {
+                let shown = diagnostic.to_string();
+                let (line, column) = diagnostic.line_and_column();
+                assert!(shown.contains(&format!(":{line}:{column}")), "no place in\n{shown}");
+                assert!(shown.contains('^'), "no caret in\n{shown}");
+                expect(&path, &(shown + "\n"), &mut failures);
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n\n"));
+}
+
+#[test]
+fn fields_are_derived_as_expected() {
+    let mut failures = Vec::new();
+    for path in cases("ok") {
+        let spec = parse(&path).unwrap_or_else(|diagnostic| panic!("{diagnostic}"));
+        let fields = spec.derive().unwrap();
+        let mut text = String::new();
+        for (letter, vector) in
+            [("u", &fields.u), ("v", &fields.v), ("a", &fields.a), ("b", &fields.b)]
+        {
+            for (i, &component) in vector.iter().enumerate() {
+                text += &format!("{letter}[{i}] = {}\n", fields.graph.print(component));
+            }
+        }
+        for (letter, matrix) in [("H", &fields.H), ("P", &fields.P)] {
+            for (i, row) in matrix.iter().enumerate() {
+                for (j, &entry) in row.iter().enumerate() {
+                    text += &format!("{letter}[{i}][{j}] = {}\n", fields.graph.print(entry));
+                }
+            }
+        }
+        text += &format!("J = {}\n", fields.graph.print(fields.J));
+        expect(&path, &text, &mut failures);
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n\n"));
+}
+
+#[test]
+fn derivation_is_deterministic() {
+    for path in cases("ok") {
+        let mut programs = (0..2).map(|_| {
+            let mut fields = parse(&path).unwrap().derive().unwrap();
+            let outputs = fields.b.clone();
+            fields.program(&outputs).operations().to_vec()
+        });
+        assert_eq!(programs.next(), programs.next());
+    }
+}
