@@ -71,7 +71,6 @@ pub fn registry_source(names: &[&str]) -> String {
         let (module, solution, parameters) =
             (format_ident!("{module}"), format_ident!("{solution}"), format_ident!("{parameters}"));
         modules.extend(quote! {
-            #[rustfmt::skip]
             mod #module;
             pub use #module::{#solution, #parameters};
         });

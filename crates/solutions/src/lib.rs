@@ -14,6 +14,8 @@
 //! the deformation is plane strain. All components are Cartesian.
 
 mod domain;
+// Formatted by the generator; the formatter would differ in small things.
+#[rustfmt::skip]
 mod generated;
 mod parameters;
 mod real;

@@ -1,6 +1,8 @@
 //! Specifications as data: `ok/` holds specifications with the fields derived from them, `err/` holds mistakes
 //! with the messages that they get. `UPDATE_EXPECT=1` writes the expected files anew.
 
+#![allow(clippy::unwrap_used)]
+
 use mmsmith_spec::{Diagnostic, Spec};
 use std::path::{Path, PathBuf};
 
