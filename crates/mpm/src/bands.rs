@@ -4,6 +4,9 @@
 //! nothing but the dimension, and every particle belongs to one band. A band writes to its own rows and to at most as
 //! many above: all even bands write to disjoint pieces of the node array, and so do all odd ones. Even bands run in
 //! parallel, then odd ones; within a band particles come in a fixed order. No sum depends on the number of threads.
+//!
+//! A piece is higher than a band and its stencils need, so that particles may drift for some steps before all are
+//! sorted anew. The order is therefore state of the run: whoever continues a run to the same bits has to carry it over.
 
 use rayon::prelude::*;
 

@@ -15,6 +15,34 @@
 //! Wallstedt & Guilkey, "An evaluation of explicit time integration schemes for use with the generalized
 //! interpolation material point method", J. Comput. Phys. 227 (2008) 9628-9642.
 //!
+//! # Example
+//!
+//! A bar between two walls, set in motion:
+//!
+//! ```
+//! use mmsmith_mpm::{Grid, Integrator, Material, NoBodyForce, Particles, Settings, Shape, Simulation};
+//! use nalgebra::vector;
+//!
+//! let grid = Grid { lower: vector![0.0], spacing: 0.1, cells: [10], walls: [[true, true]] };
+//! let mut particles = Particles::lattice(&grid, 2, 1.0, |_| true);
+//! for (v, X) in particles.v.iter_mut().zip(&particles.X) {
+//!     *v = vector![(std::f64::consts::PI * X[0]).sin()];
+//! }
+//! let settings = Settings {
+//!     shape: Shape::Gimp,
+//!     integrator: Integrator::Cd,
+//!     time_step: 4e-4,
+//!     halve_first_acceleration: true,
+//! };
+//! let material = Material::NeoHookean { lambda: 5769.0, mu: 3846.0 };
+//! let mut simulation = Simulation::new(grid, particles, material, settings)?;
+//! for _ in 0..100 {
+//!     simulation.step(&NoBodyForce)?;
+//! }
+//! assert!((simulation.time() - 0.04_f64).abs() < 1e-12);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! # Conventions
 //!
 //! `X` is the reference and `x` the current position, `F[i][J] = dx_i/dX_J`, `J = det F`. Two-dimensional scenes are in

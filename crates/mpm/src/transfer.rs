@@ -72,6 +72,7 @@ impl<T: RealField + Copy, const D: usize, const W: usize> Stencil<T, D, W> {
             let factors = per_row(row.S, &row.G);
             let Some(nodes) = piece.get_mut(row.start..).and_then(|n| n.first_chunk_mut::<W>())
             else {
+                debug_assert!(false, "a stencil beyond its band");
                 return;
             };
             let AxisWeights { S, G, .. } = &self.axes[0];
@@ -96,6 +97,7 @@ impl<T: RealField + Copy, const D: usize, const W: usize> Stencil<T, D, W> {
         for index in 0..W.pow(D as u32 - 1) {
             let row = self.row(start, strides, index);
             let Some(nodes) = nodes.get(row.start..).and_then(|n| n.first_chunk::<W>()) else {
+                debug_assert!(false, "a stencil beyond the grid");
                 break;
             };
             let mut row_velocity = SVector::<T, D>::zeros();
