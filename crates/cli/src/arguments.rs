@@ -152,6 +152,20 @@ pub(crate) struct SchemeOptions {
     pub(crate) json: Option<PathBuf>,
 }
 
+impl SchemeOptions {
+    /// What holds where nothing is said, with the given scheme.
+    pub(crate) fn usual(shape: Shape, integrator: Integrator) -> Self {
+        /// Lets the parser fill in its own defaults, so that they stand in one place.
+        #[derive(Parser)]
+        struct Usual {
+            #[command(flatten)]
+            scheme: SchemeOptions,
+        }
+        let Usual { scheme } = Usual::parse_from(["mms"]);
+        Self { shape, integrator, ..scheme }
+    }
+}
+
 /// Declares an argument's values with what they mean to the library.
 macro_rules! choices {
     ($(#[$doc:meta])* $name:ident => $target:ty { $($(#[$value_doc:meta])* $value:ident,)+ }) => {

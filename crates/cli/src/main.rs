@@ -6,6 +6,7 @@
 
 mod arguments;
 mod commands;
+mod csv;
 mod json;
 mod library;
 mod memory;

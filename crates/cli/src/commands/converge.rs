@@ -1,11 +1,11 @@
 //! `mms converge`: orders of accuracy.
 
 use anyhow::{Result, bail};
-use mmsmith_verify::{Status, Study, Sweep, converge as measure};
-use serde_json::json;
+use mmsmith_verify::{Case, Status, Study, Sweep, converge as measure};
+use serde_json::{Value, json};
 
 use super::{Model, caption, case, settings, with_threads};
-use crate::arguments::ConvergeOptions;
+use crate::arguments::{ConvergeOptions, Extent, SchemeOptions};
 use crate::json::Output;
 use crate::library::Selection;
 use crate::progress::Bar;
@@ -39,18 +39,30 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
         text += &stops(&study);
         terminal::say(&text)?;
         if let Some(output) = output {
-            let settings = match &sweep {
-                Sweep::Cells(cells) => settings(&selection, scheme, extent, cells, scheme.cfl),
-                Sweep::Cfls(cfls) => settings(&selection, scheme, extent, options.cells[0], cfls),
-            };
-            output.write(&json!({
-                "schema": "mmsmith.converge/1",
-                "settings": settings,
-                "rows": study.rows,
-                "orders": study.orders,
-            }))?;
+            output.write(&document(&selection, scheme, extent, &base, &sweep, &study))?;
         }
         Ok(true)
+    })
+}
+
+/// A study as it is written to JSON.
+pub(super) fn document(
+    selection: &Selection,
+    scheme: &SchemeOptions,
+    extent: Option<Extent>,
+    base: &Case,
+    sweep: &Sweep,
+    study: &Study,
+) -> Value {
+    let settings = match sweep {
+        Sweep::Cells(cells) => settings(selection, scheme, extent, cells, base.cfl),
+        Sweep::Cfls(cfls) => settings(selection, scheme, extent, base.cells, cfls),
+    };
+    json!({
+        "schema": "mmsmith.converge/1",
+        "settings": settings,
+        "rows": study.rows,
+        "orders": study.orders,
     })
 }
 

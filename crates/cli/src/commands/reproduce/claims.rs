@@ -1,0 +1,257 @@
+//! What the original study claims, held against what was measured.
+
+use super::{CELLS, CFLS, GRID, Results, Series};
+use crate::table::Table;
+
+/// A claim, what was measured, and whether that bears it out.
+pub(super) struct Claim {
+    /// The study's words, or close to them.
+    text: &'static str,
+    /// What counts as confirmed.
+    criterion: &'static str,
+    /// The numbers.
+    measured: String,
+    confirmed: bool,
+}
+
+/// Judges every claim by the studies of both problems.
+pub(super) fn judge(axis_aligned: &Results, ring: &Results) -> Vec<Claim> {
+    vec![
+        second_order(axis_aligned),
+        shortcut(axis_aligned),
+        usl_in_space(axis_aligned),
+        ugimp(axis_aligned),
+        poor(axis_aligned),
+        no_temporal_order(axis_aligned),
+        usl_in_time(axis_aligned),
+        ring_order(ring),
+        ring_ugimp(ring),
+        ring_ugimp_in_time(ring),
+        best(axis_aligned, ring),
+    ]
+}
+
+/// The claims for the terminal, and as a section of the report.
+pub(super) fn texts(claims: &[Claim]) -> (String, String) {
+    let (mut brief, mut full) = (
+        Table::new(3, ["verdict", "claim", "measured"]),
+        Table::new(4, ["verdict", "claim", "measured", "confirmed if"]),
+    );
+    for claim in claims {
+        let verdict = if claim.confirmed { "confirmed" } else { "NOT CONFIRMED" };
+        brief.row([verdict, claim.text, &claim.measured]);
+        full.row([verdict, claim.text, &claim.measured, claim.criterion]);
+    }
+    (
+        format!("\nThe claims of the study\n{}", brief.text()),
+        format!("\n## The claims of the study\n\n{}", full.markdown()),
+    )
+}
+
+const FINEST: usize = CELLS.len() - 1;
+
+/// The series of a scheme; each one asked for here is measured by the parent module.
+fn find<'a>(series: &'a [Series], name: &str) -> Option<&'a Series> {
+    series.iter().find(|one| one.name() == name)
+}
+
+/// The error of a scheme in case `index`, if it got that far.
+fn error(series: &[Series], name: &str, index: usize) -> Option<f64> {
+    find(series, name)?.error(index)
+}
+
+/// The order of a scheme between the two finest grids.
+fn finest_order(series: &[Series], name: &str) -> Option<f64> {
+    find(series, name)?.study.orders.u.linf.local.last().copied().flatten()
+}
+
+/// `text` with the number in it, or that the run did not get there.
+fn told(value: Option<f64>, text: impl Fn(f64) -> String) -> String {
+    value.map_or_else(|| "a run stopped early".into(), text)
+}
+
+/// How many times larger the first error is.
+fn ratio(a: Option<f64>, b: Option<f64>) -> Option<f64> {
+    Some(a? / b?)
+}
+
+fn second_order(results: &Results) -> Claim {
+    let order = find(&results.space, "gimp+cd").and_then(|s| s.study.orders.u.linf.fit);
+    Claim {
+        text: "CD-GIMP is 2nd order",
+        criterion: "fitted order in h within 2.0 +/- 0.1",
+        measured: told(order, |order| format!("fitted order {order:.2}")),
+        confirmed: order.is_some_and(|order| (order - 2.0).abs() <= 0.1),
+    }
+}
+
+fn shortcut(results: &Results) -> Claim {
+    let index = CELLS.iter().position(|cells| *cells == GRID);
+    let halved = index.and_then(|index| error(&results.space, "gimp+cd", index));
+    let exact = results.exact_start.errors.u.linf;
+    let change = halved.map(|halved| halved / exact);
+    Claim {
+        text: "the initialization shortcut works (halved first acceleration)",
+        criterion: "error within 20 % of that of the exact start",
+        measured: told(change, |change| {
+            format!("{change:.3} times the error of the exact start ({exact:.3e})")
+        }),
+        confirmed: change.is_some_and(|change| (change - 1.0).abs() <= 0.2),
+    }
+}
+
+fn usl_in_space(results: &Results) -> Claim {
+    let order = finest_order(&results.space, "gimp+usl");
+    Claim {
+        text: "USL changes to 1st order",
+        criterion: "order in h below 1.25 on the finest pair of grids",
+        measured: told(order, |order| format!("order {order:.2} on the finest pair")),
+        confirmed: order.is_some_and(|order| order < 1.25),
+    }
+}
+
+fn ugimp(results: &Results) -> Claim {
+    let gimp = error(&results.space, "gimp+cd", FINEST);
+    let ugimp = ratio(error(&results.space, "ugimp+cd", FINEST), gimp);
+    let order = finest_order(&results.space, "ugimp+cd");
+    let order_text = told(order, |order| format!("its order there {order:.2}"));
+    Claim {
+        text: "minor change to UGIMP causes large error",
+        criterion: "more than 10 times gimp's error on the finest grid, and growing",
+        measured: told(ugimp, |times| format!("{times:.1} times gimp's error, {order_text}")),
+        confirmed: ugimp.is_some_and(|times| times > 10.0) && order.is_some_and(|o| o < 0.0),
+    }
+}
+
+fn poor(results: &Results) -> Claim {
+    // Hat functions do not reach the finest grids; the comparison is made where both do.
+    let times = |name: &str| {
+        (0..CELLS.len()).rev().find_map(|index| {
+            let gimp = error(&results.space, "gimp+cd", index);
+            Some((ratio(error(&results.space, name, index), gimp)?, CELLS[index]))
+        })
+    };
+    let (usf, linear) = (times("gimp+usf"), times("linear+cd"));
+    let tell = |name: &str, found: Option<(f64, usize)>| match found {
+        Some((times, cells)) => format!("{name}: {times:.1} times on {cells} cells"),
+        None => format!("{name}: all runs stopped early"),
+    };
+    Claim {
+        text: "USF and MPM have poor accuracy",
+        criterion: "more than 3 times the error of gimp+cd on the finest grid they reach",
+        measured: format!("{}; {}", tell("usf", usf), tell("linear", linear)),
+        confirmed: [usf, linear].iter().all(|found| found.is_none_or(|(times, _)| times > 3.0)),
+    }
+}
+
+/// The smallest and the largest error over the CFL numbers up to the largest stable one, and that one.
+fn stable_range(series: &Series) -> Option<(f64, f64, f64)> {
+    let stable = (0..CFLS.len()).map_while(|index| series.error(index)).collect::<Vec<_>>();
+    let smallest = stable.iter().copied().reduce(f64::min)?;
+    let largest = stable.iter().copied().reduce(f64::max)?;
+    Some((smallest, largest, CFLS[stable.len() - 1]))
+}
+
+fn no_temporal_order(results: &Results) -> Claim {
+    let range = find(&results.time, "gimp+cd").and_then(stable_range);
+    let spread = range.map(|(smallest, largest, _)| largest / smallest);
+    Claim {
+        text: "no temporal convergence until stability is lost: spatial error dominates",
+        criterion: "gimp+cd: errors at all stable CFL numbers within 30 %",
+        measured: match range {
+            Some((smallest, largest, cfl)) => {
+                format!("{smallest:.3e} to {largest:.3e} from CFL {} to {cfl}", CFLS[0])
+            }
+            None => "a run stopped early".into(),
+        },
+        confirmed: spread.is_some_and(|spread| spread <= 1.3),
+    }
+}
+
+fn usl_in_time(results: &Results) -> Claim {
+    // Local orders between CFL 0.4 and the last stable one, where the temporal error shows.
+    let orders: Vec<f64> = find(&results.time, "gimp+usl")
+        .map(|series| series.study.orders.u.linf.local.iter().skip(3).flatten().copied().collect())
+        .unwrap_or_default();
+    let mean = (!orders.is_empty()).then(|| orders.iter().sum::<f64>() / orders.len() as f64);
+    Claim {
+        text: "USL loses one spatial order, and gains one temporal",
+        criterion: "mean order of gimp+usl in dt from CFL 0.4 on within 1.0 +/- 0.25",
+        measured: told(mean, |order| format!("mean order {order:.2} in dt from CFL 0.4 on")),
+        confirmed: mean.is_some_and(|order| (order - 1.0).abs() <= 0.25),
+    }
+}
+
+fn ring_order(results: &Results) -> Claim {
+    let orders = find(&results.space, "gimp+cd").map(|series| &series.study.orders.u);
+    let fits = orders.and_then(|orders| Some((orders.linf.fit?, orders.l1.fit?)));
+    Claim {
+        text: "ring: mis-aligned particles and the stair-stepped surface reduce CD-GIMP to 1st order",
+        criterion: "fitted order in h at most 1.1",
+        measured: match fits {
+            Some((linf, l1)) => format!("fitted order {linf:.2} in L_inf, {l1:.2} in L1"),
+            None => "a run stopped early".into(),
+        },
+        confirmed: fits.is_some_and(|(linf, _)| linf <= 1.1),
+    }
+}
+
+fn ring_ugimp(results: &Results) -> Claim {
+    let times = |index| {
+        let gimp = error(&results.space, "gimp+cd", index);
+        ratio(error(&results.space, "ugimp+cd", index), gimp)
+    };
+    let coarser =
+        (0..FINEST).map(times).try_fold(0.0_f64, |largest, next| Some(largest.max(next?)));
+    let finest = times(FINEST);
+    Claim {
+        text: "ring: UGIMP gives up only for the highest resolutions",
+        criterion: "within 25 % of gimp's error on all grids but the finest, more than 25 % above it there",
+        measured: match (coarser, finest) {
+            (Some(coarser), Some(finest)) => format!(
+                "at most {coarser:.2} times gimp's error up to {} cells, {finest:.2} times on {}",
+                CELLS[FINEST - 1],
+                CELLS[FINEST]
+            ),
+            _ => "a run stopped early".into(),
+        },
+        confirmed: coarser.is_some_and(|times| times <= 1.25)
+            && finest.is_some_and(|times| times > 1.25),
+    }
+}
+
+fn ring_ugimp_in_time(results: &Results) -> Claim {
+    let times = |index| {
+        let gimp = error(&results.time, "gimp+cd", index);
+        ratio(error(&results.time, "ugimp+cd", index), gimp)
+    };
+    let found: Vec<f64> = (0..CFLS.len()).filter_map(times).collect();
+    let furthest = found.iter().copied().max_by(|a, b| a.ln().abs().total_cmp(&b.ln().abs()));
+    Claim {
+        text: "ring: UGIMP and GIMP have nearly the same accuracy at all CFL numbers",
+        criterion: "errors within 50 % of each other wherever both are stable",
+        measured: told(furthest, |times| format!("at most {times:.2} times gimp's error")),
+        confirmed: furthest.is_some_and(|times| times.ln().abs() <= 1.5_f64.ln()),
+    }
+}
+
+fn best(axis_aligned: &Results, ring: &Results) -> Claim {
+    let rank = |results: &Results| {
+        let own = error(&results.space, "gimp+cd", FINEST)?;
+        let others = results.space.iter().filter(|one| one.name() != "gimp+cd");
+        let next = others.filter_map(|one| one.error(FINEST)).reduce(f64::min)?;
+        Some(next / own)
+    };
+    let lead = rank(axis_aligned).zip(rank(ring));
+    Claim {
+        text: "CD-GIMP is significantly better than UGIMP, MPM, USF and USL",
+        criterion: "smallest error of all schemes on the finest grid of both problems",
+        measured: match lead {
+            Some((square, ring)) => format!(
+                "the next best scheme has {square:.2} times its error on the square, {ring:.2} times on the ring"
+            ),
+            None => "a run stopped early".into(),
+        },
+        confirmed: lead.is_some_and(|(square, ring)| square > 1.0 && ring > 1.0),
+    }
+}
