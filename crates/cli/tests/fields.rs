@@ -1,0 +1,116 @@
+//! `mms list`, `mms check` and `mms eval` as a user meets them.
+
+mod command;
+
+use command::{keys, mms, read_json, refuses};
+use std::fs;
+
+#[test]
+fn list_names_every_solution_and_its_parameters() {
+    let place = tempfile::tempdir().unwrap();
+    let called = mms(place.path(), "list --json list.json");
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    for word in ["axis-aligned", "ring", "rho0", "Young"] {
+        assert!(called.stdout.contains(word), "{}", called.stdout);
+    }
+    let list = read_json(&place.path().join("list.json"));
+    assert_eq!(list["schema"], "mmsmith.list/1");
+    assert!(list["rows"].as_array().unwrap().iter().any(|row| row["name"] == "ring"));
+}
+
+#[test]
+fn check_passes_every_solution_of_the_library() {
+    let place = tempfile::tempdir().unwrap();
+    let called = mms(place.path(), "check --json check.json");
+    assert_eq!(called.status, 0, "{}{}", called.stdout, called.stderr);
+    let check = read_json(&place.path().join("check.json"));
+    assert_eq!(check["schema"], "mmsmith.check/1");
+    assert_eq!(check["passed"], true);
+    for result in check["results"].as_array().unwrap() {
+        let findings = result["findings"].as_array().unwrap();
+        for field in ["v", "a", "H", "F", "J", "P", "b"] {
+            let finding = findings.iter().find(|finding| finding["what"] == field).unwrap();
+            assert_eq!(finding["verdict"], "passed");
+            let own_error = finding["own_error"].as_f64().unwrap();
+            assert!(own_error < 1e-9 * finding["scale"].as_f64().unwrap(), "{finding}");
+        }
+    }
+}
+
+#[test]
+fn check_takes_names_and_parameters() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let called = mms(place, "check ring --set A=1e-6 --points 50");
+    assert_eq!(called.status, 0, "{}{}", called.stdout, called.stderr);
+    assert!(!called.stdout.contains("axis-aligned"));
+    refuses(place, "check rings", &["did you mean 'ring'?"]);
+    refuses(place, "check ring --points 0", &["--points", "from 1"]);
+    refuses(place, "check none.toml", &["none.toml"]);
+}
+
+#[test]
+fn eval_gives_all_fields_at_each_point() {
+    let place = tempfile::tempdir().unwrap();
+    let points = r#"[ { "X": [0.25, 0.75], "t": 0.013 },
+                      { "X": [0.5, 0], "t": 0, "par": { "A": 0.05, "nu": 0 } } ]"#;
+    fs::write(place.path().join("in.json"), points).unwrap();
+    let called = mms(place.path(), "eval axis-aligned --points in.json");
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    let fields: serde_json::Value = serde_json::from_str(&called.stdout).unwrap();
+    assert_eq!(keys(&fields), "rows schema settings");
+    assert_eq!(fields["schema"], "mmsmith.eval/1");
+    let rows = fields["rows"].as_array().unwrap();
+    assert_eq!(rows.len(), 2);
+    assert_eq!(keys(&rows[0]), "F H J P a b u v");
+    assert_eq!(rows[1]["u"][0], 0.05);
+    assert_eq!(rows[0]["P"][1].as_array().unwrap().len(), 2);
+    let written = mms(place.path(), "eval axis-aligned --points in.json --json out.json");
+    assert_eq!((written.status, written.stdout.as_str()), (0, ""));
+    assert_eq!(read_json(&place.path().join("out.json")), fields);
+}
+
+#[test]
+fn numbers_of_eval_survive_a_round_trip() {
+    let place = tempfile::tempdir().unwrap();
+    let point = r#"[ { "X": [0.8650037822783405, 0.3346566410149667], "t": 0.5176979721900696,
+                       "par": { "E": 1, "nu": 0.49, "rho0": 1, "A": 0.14646623957057986 } } ]"#;
+    fs::write(place.path().join("in.json"), point).unwrap();
+    let called = mms(place.path(), "eval axis-aligned --points in.json");
+    let fields: serde_json::Value = serde_json::from_str(&called.stdout).unwrap();
+    // The first point of an independent high-precision computation.
+    let b = fields["rows"][0]["b"][0].as_f64().unwrap();
+    assert!((b / -3.891108510107518e-1 - 1.0).abs() < 1e-13, "{b:?}");
+    assert_eq!(serde_json::from_str::<f64>(&b.to_string()).unwrap(), b);
+}
+
+#[test]
+fn eval_names_the_entry_that_is_wrong() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let good = r#"{ "X": [0.6, 0.3], "t": 0.01 }"#;
+    for (bad, expected) in [
+        (r#"{ "X": [0.6], "t": 0.01 }"#, &["X has 1 coordinates", "2-dimensional"][..]),
+        (r#"{ "X": [0.6, "a"], "t": 0.01 }"#, &["a coordinate in X", "\"a\"", "number"]),
+        (r#"{ "X": 0.6, "t": 0.01 }"#, &["X is 0.6", "list of numbers"]),
+        (r#"{ "t": 0.01 }"#, &["X is missing"]),
+        (r#"{ "X": [0.6, 0.3] }"#, &["t is missing"]),
+        (r#"{ "X": [0.6, 0.3], "t": null }"#, &["t is null", "number"]),
+        (r#"{ "X": [0.6, 0.3], "t": 0, "par": { "B": 1 } }"#, &["no parameter 'B'", "rho0"]),
+        (r#"{ "X": [0.6, 0.3], "t": 0, "par": { "A": "1" } }"#, &["parameter A", "number"]),
+        (r#"{ "X": [0.6, 0.3], "t": 0, "par": { "E": -1 } }"#, &["E = -1", "must be"]),
+        (r#"{ "X": [0.6, 0.3], "t": 0, "par": [] }"#, &["par is []", "object"]),
+        (r#"{ "X": [0.6, 0.3], "t": 0, "pars": {} }"#, &["unknown key 'pars'"]),
+        ("7", &["expected {"]),
+    ] {
+        fs::write(place.join("in.json"), format!("[ {good}, {bad} ]")).unwrap();
+        let mut all = vec!["in.json", "entry 1"];
+        all.extend(expected);
+        refuses(place, "eval ring --points in.json --json out.json", &all);
+    }
+    fs::write(place.join("in.json"), "[ { \"X\": [0.6,, ] } ]").unwrap();
+    refuses(place, "eval ring --points in.json", &["in.json is not valid JSON", "line 1"]);
+    fs::write(place.join("in.json"), "{}").unwrap();
+    refuses(place, "eval ring --points in.json", &["expected a list of points"]);
+    refuses(place, "eval ring --points nowhere.json", &["nowhere.json"]);
+}

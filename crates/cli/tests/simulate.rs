@@ -1,0 +1,169 @@
+//! `mms run`, `mms converge` and `mms reproduce` as a user meets them.
+
+mod command;
+
+use command::{keys, mms, names, read_json, refuses};
+use serde_json::Value;
+
+const ROW: &str = "cells cfl dt errors h particle_steps_per_s particles status steps wall_s";
+
+fn assert_row(row: &Value) {
+    assert_eq!(keys(row), ROW);
+    assert_eq!(keys(&row["errors"]), "F P u v");
+    for field in ["u", "v", "F", "P"] {
+        assert_eq!(keys(&row["errors"][field]), "l1 l2 linf");
+    }
+}
+
+#[test]
+fn run_writes_exactly_the_promised_keys() {
+    let place = tempfile::tempdir().unwrap();
+    let called = mms(place.path(), "run axis-aligned --cells 8 --json row.json --set A=0.05");
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    assert!(called.stdout.contains("status: ok"), "{}", called.stdout);
+    assert_eq!(called.stderr, "", "no progress bar where nobody sees it");
+    assert_eq!(names(place.path()), ["row.json"]);
+    let result = read_json(&place.path().join("row.json"));
+    assert_eq!(keys(&result), "result schema settings");
+    assert_eq!(result["schema"], "mmsmith.run/1");
+    assert_eq!(result["settings"]["solution"], "axis-aligned");
+    assert_eq!(result["settings"]["parameters"]["A"], 0.05);
+    assert_row(&result["result"]);
+    assert_eq!(result["result"]["status"], "ok");
+    assert_eq!(result["result"]["cfl"], 0.4);
+}
+
+#[test]
+fn run_writes_particle_files_on_request_only() {
+    let place = tempfile::tempdir().unwrap();
+    let called = mms(place.path(), "run ring --cells 8 --vtk frames --frames 3");
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    let expected = ["ring-000000.vtu", "ring-000001.vtu", "ring-000002.vtu", "ring.pvd"];
+    assert_eq!(names(&place.path().join("frames")), expected);
+}
+
+#[test]
+fn an_unstable_run_is_a_result_with_its_status() {
+    let place = tempfile::tempdir().unwrap();
+    let called = mms(place.path(), "run axis-aligned --cells 8 --cfl 2 --json row.json");
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    assert!(called.stdout.contains("STOPPED"), "{}", called.stdout);
+    let status = read_json(&place.path().join("row.json"))["result"]["status"].clone();
+    let status = status.as_str().unwrap();
+    assert!(status.contains("step") && status.contains("particle"), "{status}");
+}
+
+#[test]
+fn converge_writes_rows_in_order_and_all_orders() {
+    let place = tempfile::tempdir().unwrap();
+    let called = mms(place.path(), "converge axis-aligned --cells 8,16 --json study.json");
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    assert!(called.stdout.contains("rate"), "{}", called.stdout);
+    let study = read_json(&place.path().join("study.json"));
+    assert_eq!(keys(&study), "orders rows schema settings");
+    assert_eq!(study["schema"], "mmsmith.converge/1");
+    let rows = study["rows"].as_array().unwrap();
+    assert_eq!([&rows[0]["cells"], &rows[1]["cells"]], [8, 16]);
+    rows.iter().for_each(assert_row);
+    for field in ["u", "v", "F", "P"] {
+        for norm in ["linf", "l2", "l1"] {
+            let order = &study["orders"][field][norm];
+            assert_eq!(keys(order), "fit local");
+            assert_eq!(order["local"].as_array().unwrap().len(), 1);
+        }
+    }
+    let order = study["orders"]["u"]["linf"]["local"][0].as_f64().unwrap();
+    assert!((order - 2.0).abs() < 0.05, "{order}");
+}
+
+#[test]
+fn converge_in_time_keeps_a_failed_case_as_a_row() {
+    let place = tempfile::tempdir().unwrap();
+    let call = "converge axis-aligned --cells 8 --cfls 0.2,0.4,2.0 --json study.json";
+    let called = mms(place.path(), call);
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    assert!(called.stdout.contains("STOPPED"), "{}", called.stdout);
+    let study = read_json(&place.path().join("study.json"));
+    assert_eq!(study["rows"].as_array().unwrap().len(), 3);
+    assert_ne!(study["rows"][2]["status"], "ok");
+    let local = &study["orders"]["u"]["linf"]["local"];
+    assert!(local[0].is_number() && local[1].is_null(), "{local}");
+}
+
+#[test]
+fn results_do_not_depend_on_the_number_of_threads() {
+    let place = tempfile::tempdir().unwrap();
+    let errors = ["1", "2"].map(|threads| {
+        let call = format!("run ring --cells 16 --threads {threads} --json row.json");
+        assert_eq!(mms(place.path(), &call).status, 0);
+        let result = read_json(&place.path().join("row.json"));
+        assert_eq!(result["settings"]["threads"].to_string(), threads);
+        result["result"]["errors"].to_string()
+    });
+    assert_eq!(errors[0], errors[1]);
+}
+
+#[test]
+fn single_precision_is_an_option() {
+    let place = tempfile::tempdir().unwrap();
+    let call = "run ring --cells 8 --precision f32 --extent full --json row.json";
+    assert_eq!(mms(place.path(), call).status, 0);
+    let result = read_json(&place.path().join("row.json"));
+    assert_eq!(result["settings"]["extent"], "full");
+    assert_eq!(result["result"]["particles"].as_u64().unwrap() % 4, 0);
+}
+
+#[test]
+fn bad_input_is_met_with_what_would_be_right() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    refuses(place, "run rign", &["no solution 'rign'", "did you mean 'ring'?", "axis-aligned"]);
+    refuses(place, "run ring --set B=1", &["no parameter 'B'", "A, E, rho0"]);
+    refuses(place, "run ring --set A", &["--set", "NAME=VALUE"]);
+    refuses(place, "run ring --set A=x", &["--set", "'x' is not a finite number"]);
+    refuses(place, "run ring --set A=0.1 --set A=0.2", &["A", "given twice"]);
+    refuses(place, "run axis-aligned --set nu=0.7", &["nu = 0.7", "must be"]);
+    refuses(place, "run ring --cells 0", &["--cells", "at least 1"]);
+    refuses(place, "run ring --ppc 0", &["--ppc", "at least 1"]);
+    refuses(place, "run ring --threads 0", &["--threads", "from 1"]);
+    refuses(place, "run ring --cfl=-0.4", &["--cfl", "positive"]);
+    refuses(place, "run ring --cfl nan", &["--cfl", "positive"]);
+    refuses(place, "run ring --cfl 1e-300", &["steps"]);
+    refuses(place, "run ring --cells 99999999", &["--cells 99999999", "GiB"]);
+    refuses(place, "run ring --extent full --cells 18446744073709551615", &["steps"]);
+    refuses(place, "run axis-aligned --extent full", &["annulus"]);
+    refuses(place, "run ring --shape cubic", &["linear", "ugimp", "gimp"]);
+    refuses(place, "run ring --frames 5", &["--vtk"]);
+    refuses(place, "converge ring --cells 8", &["at least two"]);
+    refuses(place, "converge ring --cells 8,16 --cfls 0.1,0.2", &["--cfls", "one grid"]);
+    refuses(place, "converge ring --cells 8 --cfls 0.1", &["--cfls", "at least two"]);
+    refuses(place, "converge ring --cells 8,x", &["--cells"]);
+}
+
+#[test]
+fn an_output_that_cannot_be_written_is_found_before_the_work() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    std::fs::write(place.join("file"), "mine").unwrap();
+    // 512 cells would take minutes.
+    for call in ["run ring", "converge ring"] {
+        let cells = if call == "run ring" { "512" } else { "512,1024" };
+        refuses(place, &format!("{call} --cells {cells} --json none/row.json"), &["none/row.json"]);
+        refuses(place, &format!("{call} --cells {cells} --json ."), &["folder"]);
+    }
+    refuses(place, "run ring --cells 512 --vtk file/frames", &["file/frames"]);
+    refuses(place, "reproduce --out file", &["--out"]);
+    assert_eq!(std::fs::read_to_string(place.join("file")).unwrap(), "mine");
+}
+
+#[test]
+fn an_older_result_is_replaced_whole_or_not_at_all() {
+    let place = tempfile::tempdir().unwrap();
+    let file = place.path().join("row.json");
+    std::fs::write(&file, "older").unwrap();
+    refuses(place.path(), "run ring --extent full --cells 99999999 --json row.json", &["GiB"]);
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), "older");
+    assert_eq!(mms(place.path(), "run ring --cells 8 --json row.json").status, 0);
+    assert_eq!(read_json(&file)["schema"], "mmsmith.run/1");
+    assert_eq!(names(place.path()), ["row.json"]);
+}
