@@ -10,7 +10,7 @@ use crate::material::Law;
 use crate::particles::Particles;
 use crate::tensor::{determinant, product, real};
 use crate::transfer::Node;
-use crate::weights::{HALF_SIZE_LIMIT, Rule, WIDE, first_layer, wide, wide_stencil};
+use crate::weights::{HALF_SIZE_LIMIT, Rule, WIDE, first_layer, wide_stencil};
 
 /// Particles handed to a thread at a time; fixed, so that nothing depends on the number of threads.
 const CHUNK: usize = 1024;
@@ -128,7 +128,7 @@ pub(crate) type Kernel<T, const D: usize> =
 macro_rules! with_stencil {
     ($rule:expr, $constants:expr, $x:expr, $F:expr, |$stencil:ident| $body:expr) => {{
         let (xi, l) = ($constants.in_cells($x), $rule.half_size($F));
-        if wide(&l) {
+        if $rule.is_wide(&l) {
             let $stencil = wide_stencil(&xi, &l);
             $body
         } else {
@@ -154,6 +154,16 @@ where
     s.evaluate(body_force, t);
     s.deposit(rule, law, body_force.is_absent());
     s.solve(scale);
+    finish_usl(s, rule)
+}
+
+/// USL after the solution on the grid. A function of its own, since it is the same for every law.
+#[inline(never)]
+fn finish_usl<T, R, const D: usize, const W: usize>(s: &mut State<T, D>, rule: R) -> Outcome
+where
+    T: RealField + Copy,
+    R: Rule<T, D, W>,
+{
     let State { particles, constants, nodes, bands, .. } = s;
     let (nodes, c) = (&nodes[..], *constants);
     let outcome = advance(particles, bands, c, rule, |_, x, v, F| {
@@ -183,6 +193,16 @@ where
     s.evaluate(body_force, t);
     s.deposit(rule, law, body_force.is_absent());
     s.solve(scale);
+    finish_musl(s, rule)
+}
+
+/// MUSL after the solution on the grid.
+#[inline(never)]
+fn finish_musl<T, R, const D: usize, const W: usize>(s: &mut State<T, D>, rule: R) -> Outcome
+where
+    T: RealField + Copy,
+    R: Rule<T, D, W>,
+{
     let State { particles, constants, nodes, bands, layout, reprojected, .. } = s;
     let (nodes, c) = (&nodes[..], *constants);
     let Particles { x, v, F, mass, .. } = particles;
@@ -253,6 +273,16 @@ where
     }
     s.deposit_force(rule, law, body_force.is_absent());
     s.solve_acceleration(scale);
+    finish_usf(s, rule)
+}
+
+/// USF after the solution on the grid.
+#[inline(never)]
+fn finish_usf<T, R, const D: usize, const W: usize>(s: &mut State<T, D>, rule: R) -> Outcome
+where
+    T: RealField + Copy,
+    R: Rule<T, D, W>,
+{
     let State { particles, constants, nodes, bands, F_next, .. } = s;
     let (nodes, c) = (&nodes[..], *constants);
     let outcome = advance(particles, bands, c, rule, |p, x, v, F| {
@@ -310,7 +340,7 @@ where
                 } else {
                     let l = rule.half_size(F);
                     let xi = c.in_cells(x);
-                    let width = if wide(&l) { WIDE } else { W };
+                    let width = if rule.is_wide(&l) { WIDE } else { W };
                     let row = first_layer(xi[D - 1], l[D - 1]);
                     outcome.resort |= !Bands::fits(home, c.band_height, row, width);
                 }
@@ -369,6 +399,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
     }
 
     /// Sorts the particles into bands.
+    #[inline(never)]
     pub(crate) fn sort<R, const W: usize>(&mut self, rule: R)
     where
         R: Rule<T, D, W>,
@@ -394,6 +425,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
     }
 
     /// Particles to grid: mass, momentum and force, folded at walls.
+    #[inline(never)]
     fn deposit<R, L, const W: usize>(&mut self, rule: R, law: L, no_body_force: bool)
     where
         R: Rule<T, D, W>,
@@ -460,6 +492,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
     }
 
     /// USF, first pass: velocities at the start of the step on the grid.
+    #[inline(never)]
     fn deposit_momentum<R, const W: usize>(&mut self, rule: R)
     where
         R: Rule<T, D, W>,
@@ -498,6 +531,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
     }
 
     /// USF, second pass: F at the end of the step, kept beside the old one.
+    #[inline(never)]
     fn stretch_first<R, const W: usize>(&mut self, rule: R) -> Outcome
     where
         R: Rule<T, D, W>,
@@ -526,6 +560,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
     }
 
     /// USF, third pass: force on the grid, from the updated F with the weights of the old one.
+    #[inline(never)]
     fn deposit_force<R, L, const W: usize>(&mut self, rule: R, law: L, no_body_force: bool)
     where
         R: Rule<T, D, W>,

@@ -2,7 +2,7 @@
 
 use nalgebra::{RealField, SMatrix, SVector};
 
-use crate::weights::{AxisWeights, Stencil};
+use crate::weights::{AxisWeights, Stencil, WIDE};
 
 /// Quantities at a node.
 #[derive(Clone, Copy, Debug)]
@@ -36,6 +36,14 @@ impl<T: RealField + Copy, const D: usize, const W: usize> Stencil<T, D, W> {
         (0..D).map(|a| self.axes[a].base * strides[a]).sum()
     }
 
+    /// Number of rows of nodes.
+    #[inline(always)]
+    fn rows() -> usize {
+        let rows = W.pow(D as u32 - 1);
+        // The wide stencil is rare: unrolling its rows would cost minutes of compile time for nothing.
+        if W == WIDE { std::hint::black_box(rows) } else { rows }
+    }
+
     #[inline(always)]
     fn row(&self, first: usize, strides: &[usize; D], index: usize) -> Row<T, D> {
         let mut row = Row { start: first, S: T::one(), G: [T::zero(); D] };
@@ -67,7 +75,7 @@ impl<T: RealField + Copy, const D: usize, const W: usize> Stencil<T, D, W> {
         add: impl Fn(&mut N, T, T, &A),
     ) {
         let start = self.first_node(strides) - first;
-        for index in 0..W.pow(D as u32 - 1) {
+        for index in 0..Self::rows() {
             let row = self.row(start, strides, index);
             let factors = per_row(row.S, &row.G);
             let Some(nodes) = piece.get_mut(row.start..).and_then(|n| n.first_chunk_mut::<W>())
@@ -94,7 +102,7 @@ impl<T: RealField + Copy, const D: usize, const W: usize> Stencil<T, D, W> {
         let mut gradient = SMatrix::zeros();
         let mut acceleration = SVector::zeros();
         let start = self.first_node(strides);
-        for index in 0..W.pow(D as u32 - 1) {
+        for index in 0..Self::rows() {
             let row = self.row(start, strides, index);
             let Some(nodes) = nodes.get(row.start..).and_then(|n| n.first_chunk::<W>()) else {
                 debug_assert!(false, "a stencil beyond the grid");

@@ -35,6 +35,12 @@ pub(crate) trait Rule<T: RealField + Copy, const D: usize, const W: usize>:
     /// Half-sizes of the box of a particle with deformation gradient `F`, in cells.
     fn half_size(&self, F: &SMatrix<T, D, D>) -> SVector<T, D>;
 
+    /// Whether a box of these half-sizes may touch more than the usual nodes.
+    #[inline(always)]
+    fn is_wide(&self, l: &SVector<T, D>) -> bool {
+        wide(l)
+    }
+
     /// The weights along one axis, for a half-size that is not `wide`.
     fn along_axis(xi: T, l: T) -> AxisWeights<T, W>;
 
@@ -53,6 +59,11 @@ impl<T: RealField + Copy, const D: usize> Rule<T, D, 2> for Hat {
     #[inline(always)]
     fn half_size(&self, _F: &SMatrix<T, D, D>) -> SVector<T, D> {
         SVector::zeros()
+    }
+
+    #[inline(always)]
+    fn is_wide(&self, _l: &SVector<T, D>) -> bool {
+        false
     }
 
     #[inline(always)]
@@ -99,7 +110,7 @@ impl<T: RealField + Copy, const D: usize> Rule<T, D, 3> for StretchingBox<T, D> 
 
 /// Whether a box may touch more than three nodes along some axis.
 #[inline(always)]
-pub(crate) fn wide<T: RealField + Copy, const D: usize>(l: &SVector<T, D>) -> bool {
+fn wide<T: RealField + Copy, const D: usize>(l: &SVector<T, D>) -> bool {
     l.iter().any(|&l| l > real(0.5))
 }
 
