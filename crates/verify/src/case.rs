@@ -6,18 +6,14 @@ use std::time::Instant;
 use mmsmith_mpm::{Integrator, Particles, Settings, SetupError, Shape, Simulation, StepError};
 use mmsmith_solutions::{AnySolution, Material, Real, Solution};
 use nalgebra::SVector;
-use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 use thiserror::Error;
 
 use crate::frames::{FrameOutput, FrameWriter};
-use crate::norms::{PerField, PerNorm, Tally};
-use crate::scene::{Extent, Scene, SceneError};
-
-/// Particles in a group that one thread works on; fixed, so that sums do not depend on the number of threads.
-const GROUP: usize = 512;
-/// Steps that no run should have; a typing error in a CFL number reaches it easily.
-const MOST_STEPS: f64 = 1e12;
+use crate::measure::measure;
+use crate::norms::{PerField, PerNorm};
+use crate::plan::{MOST_STEPS, prepare};
+use crate::scene::{Extent, SceneError};
 
 /// How the centred-difference integrator gets its first velocity, half a step before the start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -228,91 +224,6 @@ impl Case {
     }
 }
 
-/// The steps of a run: `count` of equal length `dt` that end exactly at the end time.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Steps {
-    count: u64,
-    dt: f64,
-    cfl: f64,
-}
-
-impl Steps {
-    fn new(case: &Case, end: f64, spacing: f64, speed: f64) -> Result<Self, CaseError> {
-        let longest = case.cfl * spacing / speed;
-        let exact = end / longest;
-        // Slightly more than a whole number is rounding, not another step.
-        let count = (exact - 1e-9).ceil().max(1.0);
-        if count.is_nan() || count > MOST_STEPS {
-            return Err(CaseError::TooManySteps { end, dt: longest, steps: count });
-        }
-        let dt = end / count;
-        let is_whole = (exact - count).abs() <= 1e-9;
-        let cfl = if is_whole { case.cfl } else { dt * speed / spacing };
-        Ok(Self { count: count as u64, dt, cfl })
-    }
-}
-
-/// What a case comes to, known without running it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plan {
-    /// Number of steps.
-    pub steps: u64,
-    /// Particles, estimated.
-    pub particles: f64,
-    /// Memory in bytes, estimated.
-    pub bytes: f64,
-    /// How much of an annulus is modelled; `None` for other shapes.
-    pub extent: Option<Extent>,
-}
-
-/// Judges a case without running it or allocating memory for it.
-///
-/// # Errors
-///
-/// [`CaseError`] for settings that cannot be run.
-pub fn plan(
-    exact: &AnySolution<f64>,
-    arithmetic: Arithmetic<'_>,
-    case: &Case,
-) -> Result<Plan, CaseError> {
-    let scalar = match arithmetic {
-        Arithmetic::Double => size_of::<f64>(),
-        Arithmetic::Single(_) => size_of::<f32>(),
-    };
-    match exact {
-        AnySolution::One(s) => plan_in(s.as_ref(), scalar, case),
-        AnySolution::Two(s) => plan_in(s.as_ref(), scalar, case),
-        AnySolution::Three(s) => plan_in(s.as_ref(), scalar, case),
-        _ => Err(CaseError::Dimension),
-    }
-}
-
-fn plan_in<const D: usize>(
-    exact: &dyn Solution<f64, D>,
-    scalar: usize,
-    case: &Case,
-) -> Result<Plan, CaseError> {
-    let (scene, steps) = prepare(exact, case)?;
-    Ok(Plan {
-        steps: steps.count,
-        particles: scene.particles_expected(case.per_cell),
-        bytes: scene.bytes_expected(case.per_cell, scalar),
-        extent: scene.extent(),
-    })
-}
-
-/// The scene and the steps of a case.
-fn prepare<const D: usize>(
-    exact: &dyn Solution<f64, D>,
-    case: &Case,
-) -> Result<(Scene<D>, Steps), CaseError> {
-    case.validate()?;
-    let end = case.periods * exact.period();
-    let scene = Scene::new(exact, case, end)?;
-    let steps = Steps::new(case, end, scene.spacing, exact.wave_speed())?;
-    Ok((scene, steps))
-}
-
 /// Runs one simulation of `exact` and measures its errors after every step.
 ///
 /// The solver starts from the exact positions, velocities and deformation gradients at time zero and is driven
@@ -458,81 +369,9 @@ fn set_in_motion<T: Real, const D: usize>(
     }
 }
 
-/// The errors at one instant.
-struct Measured {
-    norms: PerField<PerNorm<f64>>,
-    /// The particle of largest position error.
-    worst_particle: usize,
-}
-
-/// Compares every particle with the exact solution at `time`; the velocity `lag` earlier.
-fn measure<T: Real, const D: usize>(
-    simulation: &Simulation<T, D>,
-    exact: &dyn Solution<f64, D>,
-    time: f64,
-    lag: f64,
-) -> Measured {
-    let particles = simulation.particles();
-    let count = particles.len();
-    let group = |g: usize| {
-        let mut tally = PerField::<Tally>::default();
-        let mut worst = (0.0, g * GROUP);
-        for p in g * GROUP..count.min((g + 1) * GROUP) {
-            let X = particles.X[p].map(Real::to_f64);
-            let F = particles.F[p];
-            // One call for all fields shares their common parts; the velocity belongs to another time.
-            let at_time = exact.fields(&X, time);
-            let velocity = if lag == 0.0 { at_time.v } else { exact.velocity(&X, time - lag) };
-            let displacement = particles.x[p].map(Real::to_f64) - X;
-            let u = (displacement - at_time.u).norm();
-            tally.u.add(u);
-            tally.v.add((particles.v[p].map(Real::to_f64) - velocity).norm());
-            tally.F.add((F.map(Real::to_f64) - at_time.F).norm());
-            // A particle that is inside out has no stress; the solver stops at its next step.
-            let stress = simulation.material().first_piola_kirchhoff(&F);
-            tally.P.add(stress.map_or(f64::NAN, |P| (P.map(Real::to_f64) - at_time.P).norm()));
-            if u > worst.0 || u.is_nan() {
-                worst = (u, p);
-            }
-        }
-        (tally, worst)
-    };
-    let groups: Vec<_> = (0..count.div_ceil(GROUP)).into_par_iter().map(group).collect();
-    let mut total = PerField::<Tally>::default();
-    let mut worst = (0.0, 0);
-    for (tally, candidate) in &groups {
-        total = PerField::combine(&total, tally, Tally::join);
-        if candidate.0 > worst.0 || candidate.0.is_nan() {
-            worst = *candidate;
-        }
-    }
-    let norms = PerField::combine(&total, &total, |tally, _| tally.norms(count));
-    Measured { norms, worst_particle: worst.1 }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn whole_steps_keep_the_cfl_number_and_others_shorten_the_step() {
-        let case = Case { cfl: 0.4, ..Case::default() };
-        let steps = Steps::new(&case, 0.02, 1.0 / 16.0, 100.0).unwrap();
-        assert_eq!((steps.count, steps.cfl), (80, 0.4));
-        assert_eq!(steps.dt, 0.02 / 80.0);
-        let case = Case { cfl: 0.3, ..Case::default() };
-        let steps = Steps::new(&case, 0.02, 1.0 / 16.0, 100.0).unwrap();
-        assert_eq!(steps.count, 107);
-        assert!((steps.cfl - 32.0 / 107.0).abs() < 1e-15 && steps.cfl < 0.3);
-    }
-
-    #[test]
-    fn a_step_longer_than_the_end_time_becomes_one_step() {
-        let case = Case { cfl: 1e9, ..Case::default() };
-        assert_eq!(Steps::new(&case, 0.02, 0.1, 100.0).unwrap().count, 1);
-        let case = Case { cfl: 1e-300, ..Case::default() };
-        assert!(matches!(Steps::new(&case, 0.02, 0.1, 100.0), Err(CaseError::TooManySteps { .. })));
-    }
 
     #[test]
     fn senseless_settings_are_named() {

@@ -14,15 +14,15 @@ mod check;
 mod difference;
 mod evaluate;
 mod frames;
+mod measure;
 mod norms;
 mod order;
+mod plan;
 mod points;
 mod scene;
 mod study;
 
-pub use case::{
-    Arithmetic, Case, CaseError, Outputs, Plan, Progress, Row, Start, Status, plan, run,
-};
+pub use case::{Arithmetic, Case, CaseError, Outputs, Progress, Row, Start, Status, run};
 pub use check::{
     BLUNT, CheckError, CheckReport, Finding, OWN_ERROR_FACTOR, TOLERANCE, Verdict, check,
 };
@@ -31,5 +31,6 @@ pub use frames::FrameOutput;
 pub use mmsmith_mpm::{Integrator, Shape};
 pub use norms::{PerField, PerNorm};
 pub use order::Order;
+pub use plan::{Plan, plan};
 pub use scene::{Extent, SceneError};
 pub use study::{Study, StudyError, Sweep, converge};

@@ -36,7 +36,7 @@ impl<N> PerField<N> {
         [("u", &self.u), ("v", &self.v), ("F", &self.F), ("P", &self.P)]
     }
 
-    /// Builds one from a function of the field, given as a selector that works on any `PerField`.
+    /// Field by field, what `f` makes of two values.
     pub(crate) fn combine<A, B>(a: &PerField<A>, b: &PerField<B>, f: impl Fn(&A, &B) -> N) -> Self {
         Self { u: f(&a.u, &b.u), v: f(&a.v, &b.v), F: f(&a.F, &b.F), P: f(&a.P, &b.P) }
     }

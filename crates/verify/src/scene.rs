@@ -129,7 +129,8 @@ impl<const D: usize> Scene<D> {
                 let mut cells = [0; D];
                 for axis in 0..D {
                     cells[axis] = fit(sides[axis], spacing).ok_or_else(|| {
-                        let near = case.cells.saturating_sub(32).max(1)..=case.cells.saturating_add(32);
+                        let near =
+                            case.cells.saturating_sub(32).max(1)..=case.cells.saturating_add(32);
                         let mut fitting: Vec<_> = near.filter(|count| fits(*count)).collect();
                         fitting.sort_by_key(|count| count.abs_diff(case.cells));
                         fitting.truncate(4);

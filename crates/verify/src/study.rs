@@ -4,9 +4,10 @@ use mmsmith_solutions::AnySolution;
 use serde::Serialize;
 use thiserror::Error;
 
-use crate::case::{Arithmetic, Case, CaseError, Outputs, Progress, Row, Status, plan, run};
+use crate::case::{Arithmetic, Case, CaseError, Outputs, Progress, Row, Status, run};
 use crate::norms::{PerField, PerNorm};
 use crate::order::Order;
+use crate::plan::plan;
 
 /// What changes from row to row.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,0 +1,119 @@
+//! What a case comes to, judged before it is run: its steps, its size.
+
+use mmsmith_solutions::{AnySolution, Solution};
+
+use crate::case::{Arithmetic, Case, CaseError};
+use crate::scene::{Extent, Scene};
+
+/// Steps that no run should have; a typing error in a CFL number reaches it easily.
+pub(crate) const MOST_STEPS: f64 = 1e12;
+
+/// What a case comes to, known without running it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plan {
+    /// Number of steps.
+    pub steps: u64,
+    /// Particles, estimated.
+    pub particles: f64,
+    /// Memory in bytes, estimated.
+    pub bytes: f64,
+    /// How much of an annulus is modelled; `None` for other shapes.
+    pub extent: Option<Extent>,
+}
+
+/// Judges a case without running it or allocating memory for it.
+///
+/// # Errors
+///
+/// [`CaseError`] for settings that cannot be run.
+pub fn plan(
+    exact: &AnySolution<f64>,
+    arithmetic: Arithmetic<'_>,
+    case: &Case,
+) -> Result<Plan, CaseError> {
+    let scalar = match arithmetic {
+        Arithmetic::Double => size_of::<f64>(),
+        Arithmetic::Single(_) => size_of::<f32>(),
+    };
+    match exact {
+        AnySolution::One(s) => plan_in(s.as_ref(), scalar, case),
+        AnySolution::Two(s) => plan_in(s.as_ref(), scalar, case),
+        AnySolution::Three(s) => plan_in(s.as_ref(), scalar, case),
+        _ => Err(CaseError::Dimension),
+    }
+}
+
+fn plan_in<const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    scalar: usize,
+    case: &Case,
+) -> Result<Plan, CaseError> {
+    let (scene, steps) = prepare(exact, case)?;
+    Ok(Plan {
+        steps: steps.count,
+        particles: scene.particles_expected(case.per_cell),
+        bytes: scene.bytes_expected(case.per_cell, scalar),
+        extent: scene.extent(),
+    })
+}
+
+/// The scene and the steps of a case.
+pub(crate) fn prepare<const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    case: &Case,
+) -> Result<(Scene<D>, Steps), CaseError> {
+    case.validate()?;
+    let end = case.periods * exact.period();
+    let scene = Scene::new(exact, case, end)?;
+    let steps = Steps::new(case, end, scene.spacing, exact.wave_speed())?;
+    Ok((scene, steps))
+}
+
+/// The steps of a run: `count` of equal length `dt` that end exactly at the end time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Steps {
+    pub(crate) count: u64,
+    pub(crate) dt: f64,
+    pub(crate) cfl: f64,
+}
+
+impl Steps {
+    fn new(case: &Case, end: f64, spacing: f64, speed: f64) -> Result<Self, CaseError> {
+        let longest = case.cfl * spacing / speed;
+        let exact = end / longest;
+        // Slightly more than a whole number is rounding, not another step.
+        let count = (exact - 1e-9).ceil().max(1.0);
+        if count.is_nan() || count > MOST_STEPS {
+            return Err(CaseError::TooManySteps { end, dt: longest, steps: count });
+        }
+        let dt = end / count;
+        let is_whole = (exact - count).abs() <= 1e-9;
+        let cfl = if is_whole { case.cfl } else { dt * speed / spacing };
+        Ok(Self { count: count as u64, dt, cfl })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_steps_keep_the_cfl_number_and_others_shorten_the_step() {
+        let case = Case { cfl: 0.4, ..Case::default() };
+        let steps = Steps::new(&case, 0.02, 1.0 / 16.0, 100.0).unwrap();
+        assert_eq!((steps.count, steps.cfl), (80, 0.4));
+        assert_eq!(steps.dt, 0.02 / 80.0);
+        let case = Case { cfl: 0.3, ..Case::default() };
+        let steps = Steps::new(&case, 0.02, 1.0 / 16.0, 100.0).unwrap();
+        assert_eq!(steps.count, 107);
+        assert!((steps.cfl - 32.0 / 107.0).abs() < 1e-15 && steps.cfl < 0.3);
+    }
+
+    #[test]
+    fn a_step_longer_than_the_end_time_becomes_one_step() {
+        let case = Case { cfl: 1e9, ..Case::default() };
+        assert_eq!(Steps::new(&case, 0.02, 0.1, 100.0).unwrap().count, 1);
+        let case = Case { cfl: 1e-300, ..Case::default() };
+        assert!(matches!(Steps::new(&case, 0.02, 0.1, 100.0), Err(CaseError::TooManySteps { .. })));
+    }
+}
