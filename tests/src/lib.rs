@@ -1,1 +1,95 @@
-//! To come.
+//! What the tests in this package share: the commands as users run them, and their output as data.
+//!
+//! The tests themselves are in `tests/`, one file a subject: golden values, orders of accuracy, the claims of the
+//! original study, generation, bad input, particle files.
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+
+/// The root of the workspace.
+#[must_use]
+pub fn workspace() -> &'static Path {
+    let package = Path::new(env!("CARGO_MANIFEST_DIR"));
+    package.parent().unwrap_or(package)
+}
+
+/// The command `cargo`, in the workspace.
+#[must_use]
+pub fn cargo() -> Command {
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    command.current_dir(workspace());
+    command
+}
+
+/// The folder with the binaries of the profile that the tests were built with.
+///
+/// `cargo test --workspace` builds them, since their packages have tests of their own that need them. They are built
+/// here only where they are missing: a nested build would select other packages, and with them other features.
+fn binaries() -> &'static Path {
+    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
+    FOLDER.get_or_init(|| {
+        // Test programs are in TARGET/PROFILE/deps.
+        let this = std::env::current_exe().expect("the path of the test program is known");
+        let folder = this.ancestors().nth(2).expect("the program is in a folder of a folder");
+        if !(folder.join("mms").is_file() && folder.join("xtask").is_file()) {
+            let mut build = cargo();
+            build.args(["build", "--quiet", "--workspace", "--bins"]);
+            if !cfg!(debug_assertions) {
+                build.arg("--release");
+            }
+            let status = build.status().expect("cargo can be started");
+            assert!(status.success(), "the commands did not build");
+        }
+        folder.to_path_buf()
+    })
+}
+
+/// The command `mms`, in the workspace.
+#[must_use]
+pub fn mms() -> Command {
+    let mut command = Command::new(binaries().join("mms"));
+    command.current_dir(workspace());
+    command
+}
+
+/// The command `cargo xtask`, in the workspace.
+#[must_use]
+pub fn xtask() -> Command {
+    let mut command = Command::new(binaries().join("xtask"));
+    command.current_dir(workspace());
+    command
+}
+
+/// Runs a command; the exit status, and what it wrote to standard output and standard error.
+#[must_use]
+pub fn outcome(command: &mut Command) -> (Option<i32>, String, String) {
+    let Output { status, stdout, stderr } = command.output().expect("the command can be started");
+    let text = |bytes: Vec<u8>| String::from_utf8_lossy(&bytes).into_owned();
+    (status.code(), text(stdout), text(stderr))
+}
+
+/// Runs `mms` with the arguments and `--json`, and returns what it wrote.
+#[must_use]
+pub fn json(arguments: &[&str]) -> Value {
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let file = folder.path().join("out.json");
+    let (status, _, stderr) = outcome(mms().args(arguments).arg("--json").arg(&file));
+    assert_eq!(status, Some(0), "mms {}\n{stderr}", arguments.join(" "));
+    let text = std::fs::read_to_string(&file).expect("the file was written");
+    serde_json::from_str(&text).expect("the file is JSON")
+}
+
+/// The numbers at `path` in each row of a result.
+#[must_use]
+pub fn column(result: &Value, path: &[&str]) -> Vec<f64> {
+    let rows = result["rows"].as_array().expect("rows");
+    rows.iter().map(|row| at(row, path)).collect()
+}
+
+/// The number at `path`; not-a-number where there is none.
+#[must_use]
+pub fn at(value: &Value, path: &[&str]) -> f64 {
+    path.iter().fold(value, |value, key| &value[*key]).as_f64().unwrap_or(f64::NAN)
+}

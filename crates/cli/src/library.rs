@@ -1,9 +1,12 @@
 //! The solutions of the library: found by name, built with parameters.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use anyhow::{Context, Result, bail};
+use mmsmith_interpret::interpret;
 use mmsmith_solutions::{AnySolution, CATALOGUE, Description, Real, build};
+use mmsmith_spec::Spec;
 
 /// A solution's description with its parameter values, in its own order.
 #[derive(Clone)]
@@ -39,6 +42,41 @@ impl Selection {
     pub(crate) fn parameters(&self) -> BTreeMap<&'static str, f64> {
         let names = self.description.parameters.iter().map(|parameter| parameter.name);
         names.zip(self.values.iter().copied()).collect()
+    }
+}
+
+/// A solution to check, wherever it comes from.
+pub(crate) struct Subject {
+    pub(crate) name: String,
+    pub(crate) solution: AnySolution<f64>,
+    pub(crate) parameters: BTreeMap<String, f64>,
+}
+
+impl Subject {
+    /// The solution called `name`, or the one that the specification file `name` describes.
+    pub(crate) fn new(name: &str, overrides: &[(String, f64)]) -> Result<Self> {
+        if Path::new(name).extension().is_some_and(|extension| extension == "toml") {
+            return Self::interpreted(name, overrides);
+        }
+        let selection = Selection::new(name, overrides)?;
+        let parameters = selection.parameters();
+        Ok(Self {
+            name: name.to_owned(),
+            solution: selection.build()?,
+            parameters: parameters.into_iter().map(|(name, v)| (name.to_owned(), v)).collect(),
+        })
+    }
+
+    /// Evaluates the specification itself: nothing needs to have been generated from it.
+    fn interpreted(file: &str, overrides: &[(String, f64)]) -> Result<Self> {
+        let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {file}"))?;
+        let spec = Spec::parse(&text, file)?;
+        let values = overrides.iter().map(|(name, value)| (name.as_str(), *value));
+        let solution = interpret(&spec, values).with_context(|| file.to_owned())?;
+        let mut parameters: BTreeMap<String, f64> =
+            spec.parameters.iter().map(|p| (p.name.clone(), p.default)).collect();
+        parameters.extend(overrides.iter().cloned());
+        Ok(Self { name: spec.name, solution, parameters })
     }
 }
 

@@ -34,7 +34,11 @@ fn main() -> ExitCode {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(1),
         Err(error) => {
-            terminal::complain(&format!("error: {error:#}\n"));
+            // A diagnostic is laid out as a whole already.
+            match error.downcast_ref::<mmsmith_spec::Diagnostic>() {
+                Some(diagnostic) => terminal::complain(&format!("{diagnostic}\n")),
+                None => terminal::complain(&format!("error: {error:#}\n")),
+            }
             ExitCode::from(2)
         }
     }

@@ -9,7 +9,7 @@ use serde_json::json;
 
 use crate::arguments::CheckOptions;
 use crate::json::Output;
-use crate::library::Selection;
+use crate::library::Subject;
 use crate::table::{self, Table};
 use crate::terminal;
 
@@ -26,21 +26,17 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
     // All names and parameters are judged before the first check.
     let subjects = names
         .iter()
-        .map(|name| {
-            let selection = Selection::new(name, &options.parameters.set)?;
-            Ok((selection.build::<f64>()?, selection))
-        })
+        .map(|name| Subject::new(name, &options.parameters.set))
         .collect::<Result<Vec<_>>>()?;
     let mut results = Vec::new();
     let mut passed = true;
-    for (solution, selection) in &subjects {
-        let name = selection.description.name;
+    for Subject { name, solution, parameters } in &subjects {
         let report = check_fields(solution, options.points)?;
         terminal::say(&text(name, &report))?;
         passed &= report.passed();
         results.push(json!({
             "solution": name,
-            "parameters": selection.parameters(),
+            "parameters": parameters,
             "points": report.points,
             "findings": report.findings,
             "passed": report.passed(),

@@ -1,0 +1,100 @@
+//! A new solution is one file: checked before anything is generated, generated, expanded by the macro, compiled and
+//! evaluated.
+
+#![allow(clippy::unwrap_used)]
+
+use mmsmith_tests::{cargo, mms, outcome, workspace, xtask};
+use std::path::Path;
+
+/// A specification that nobody has seen before: F is not symmetric, and J differs from 1.
+const NEW: &str = r"
+name = 'my-shear'
+title = 'Shear and stretch together'
+coordinates = 'cartesian'
+dimension = 2
+
+[parameters]
+A = { default = 0.1, range = '> -1/4, < 1/4', unit = 'm', description = 'amplitude' }
+E = { default = 1000, range = '> 0', unit = 'Pa' }
+nu = { default = 0.25, range = '> -1, < 1/2' }
+rho0 = { default = 2, range = '> 0', unit = 'kg/m^3' }
+
+[let]
+c = 'sqrt(E/rho0)'
+
+[displacement]
+X = 'A*sin(Pi*X)*cos(Pi*Y/2)*cos(c*Pi*t)'
+Y = 'A*X^2*Y*sin(c*Pi*t)'
+
+[material]
+law = 'neo-hookean'
+
+[domain]
+shape = 'box'
+lower = [0, 0]
+upper = [1, 1]
+
+[time]
+period = '2/c'
+";
+
+/// Writes a package that uses the macro on a specification beside it, and runs it.
+fn run_package(folder: &Path, main: &str) -> String {
+    let crates = workspace().join("crates");
+    let manifest = format!(
+        "[package]\nname = 'user'\nversion = '0.0.0'\nedition = '2024'\n[workspace]\n[dependencies]\n\
+         mmsmith-macros = {{ path = '{0}/macros' }}\nmmsmith-solutions = {{ path = '{0}/solutions' }}\n",
+        crates.display()
+    );
+    std::fs::write(folder.join("Cargo.toml"), manifest).unwrap();
+    // The same versions as the workspace's: they are there already, and need no network.
+    std::fs::copy(workspace().join("Cargo.lock"), folder.join("Cargo.lock")).unwrap();
+    std::fs::create_dir(folder.join("src")).unwrap();
+    std::fs::write(folder.join("src/main.rs"), main).unwrap();
+    let mut command = cargo();
+    command.current_dir(folder).args(["run", "--quiet", "--offline"]);
+    command.env("CARGO_TARGET_DIR", workspace().join("target/new-solution"));
+    let (status, out, errors) = outcome(&mut command);
+    assert_eq!(status, Some(0), "{errors}");
+    out
+}
+
+#[test]
+fn a_new_solution_is_one_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let spec = folder.path().join("my-shear.toml");
+    std::fs::write(&spec, NEW).unwrap();
+
+    let (status, out, errors) = outcome(mms().arg("check").arg(&spec));
+    assert_eq!(status, Some(0), "{out}{errors}");
+
+    let generated = folder.path().join("generated");
+    let (status, _, errors) =
+        outcome(xtask().arg("gen").arg(&spec).arg("--out").arg(&generated));
+    assert_eq!(status, Some(0), "{errors}");
+    assert!(generated.join("my_shear.rs").is_file());
+
+    let main = r#"
+        mmsmith_macros::manufactured_solution!("../my-shear.toml");
+        use mmsmith_solutions::{Solution, nalgebra::SVector};
+        fn main() {
+            let solution = MyShear::new(MyShearParameters { A: 0.05, ..Default::default() }).unwrap();
+            let X = SVector::<f64, 2>::new(0.3, 0.6);
+            let u = solution.displacement(&X, 0.01);
+            println!("{:?} {:?}", u[0], u[1]);
+            let single = MyShear::<f32>::new(Default::default()).unwrap();
+            assert!(single.jacobian(&SVector::<f32, 2>::new(0.3, 0.6), 0.01) > 0.0);
+            assert!(MyShear::new(MyShearParameters { A: 0.5, ..Default::default() }).is_err());
+        }"#;
+    let out = run_package(folder.path(), main);
+    let u: Vec<f64> = out.split_whitespace().map(|word| word.parse().unwrap()).collect();
+    let c = (1000.0_f64 / 2.0).sqrt();
+    let pi = std::f64::consts::PI;
+    let expected = [
+        0.05 * (pi * 0.3).sin() * (pi * 0.3).cos() * (c * pi * 0.01).cos(),
+        0.05 * 0.09 * 0.6 * (c * pi * 0.01).sin(),
+    ];
+    for (found, expected) in u.iter().zip(expected) {
+        assert!((found - expected).abs() < 1e-15, "{found} is not {expected}");
+    }
+}

@@ -1,0 +1,129 @@
+//! `cargo xtask gen` through its binary: the committed code is current, output is deterministic, and bad input
+//! changes nothing.
+
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+use std::process::Command;
+
+fn workspace() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
+}
+
+fn xtask() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_xtask"));
+    command.current_dir(workspace());
+    command
+}
+
+/// The exit status, standard output and standard error.
+fn outcome(command: &mut Command) -> (Option<i32>, String, String) {
+    let output = command.output().unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    (output.status.code(), text(output.stdout), text(output.stderr))
+}
+
+/// A small specification.
+const SPEC: &str = r"name = 'small'
+title = 'Small'
+coordinates = 'cartesian'
+dimension = 1
+
+[parameters]
+A = { default = 0.1, range = '> -1/4, < 1/4' }
+E = { default = 1000, range = '> 0' }
+rho0 = { default = 2, range = '> 0' }
+
+[let]
+c = 'sqrt(E/rho0)'
+
+[displacement]
+X = 'A*sin(Pi*X)*cos(c*Pi*t)'
+
+[material]
+law = 'neo-hookean'
+lambda = 0
+mu = 'E/2'
+
+[domain]
+shape = 'box'
+lower = [0]
+upper = [1]
+
+[time]
+period = '2/c'
+";
+
+#[test]
+fn committed_code_is_what_the_specifications_generate() {
+    let (status, out, errors) = outcome(xtask().args(["gen", "--check"]));
+    assert_eq!(status, Some(0), "{out}{errors}");
+}
+
+#[test]
+fn a_stale_module_fails_the_check_and_names_the_command() {
+    // A copy of the parts that generation touches, with one specification changed.
+    let folder = tempfile::tempdir().unwrap();
+    let spec = workspace().join("mms-specs/ring.toml");
+    let text = std::fs::read_to_string(&spec).unwrap().replace("6*Ri*Ro/d", "7*Ri*Ro/d");
+    let changed = folder.path().join("ring.toml");
+    std::fs::write(&changed, text).unwrap();
+    let (status, out, _) = outcome(xtask().args(["gen", "--check"]).arg(&changed));
+    assert_eq!(status, Some(1), "{out}");
+    assert!(out.contains("stale: crates/solutions/src/generated/ring.rs"), "{out}");
+    assert!(out.contains("cargo xtask gen"), "{out}");
+}
+
+#[test]
+fn generation_is_deterministic_to_the_byte() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["axis-aligned", "ring"] {
+        let module = format!("{}.rs", name.replace('-', "_"));
+        let committed = workspace().join("crates/solutions/src/generated").join(&module);
+        let (status, _, errors) =
+            outcome(xtask().args(["gen", name, "--out"]).arg(folder.path()));
+        assert_eq!(status, Some(0), "{errors}");
+        let fresh = std::fs::read(folder.path().join(&module)).unwrap();
+        assert_eq!(fresh, std::fs::read(committed).unwrap(), "{name}");
+    }
+}
+
+#[test]
+fn a_mistake_in_one_specification_keeps_all_from_being_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let generated = folder.path().join("generated");
+    let good = folder.path().join("small.toml");
+    let bad = folder.path().join("bad.toml");
+    std::fs::write(&good, SPEC).unwrap();
+    std::fs::write(&bad, SPEC.replace("small", "bad").replace("A*sin", "A*(sin")).unwrap();
+    let (status, out, errors) =
+        outcome(xtask().arg("gen").arg(&good).arg(&bad).arg("--out").arg(&generated));
+    assert_eq!(status, Some(2), "{out}");
+    assert!(errors.contains("bad.toml:15:8") && errors.contains("never closed"), "{errors}");
+    assert!(errors.contains('^'), "{errors}");
+    assert!(!generated.exists(), "the good specification was written although the other one is bad");
+}
+
+#[test]
+fn a_file_must_be_called_as_its_solution() {
+    let folder = tempfile::tempdir().unwrap();
+    let spec = folder.path().join("other.toml");
+    std::fs::write(&spec, SPEC).unwrap();
+    let (status, _, errors) = outcome(xtask().arg("gen").arg(&spec).arg("--out").arg(folder.path()));
+    assert_eq!(status, Some(2));
+    assert!(errors.contains("must be called small.toml"), "{errors}");
+}
+
+#[test]
+fn a_missing_specification_and_an_unwritable_folder_are_named() {
+    let (status, _, errors) = outcome(xtask().args(["gen", "nowhere"]));
+    assert_eq!(status, Some(2));
+    assert!(errors.contains("there is no specification nowhere"), "{errors}");
+
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("file");
+    std::fs::write(&file, "").unwrap();
+    let (status, _, errors) = outcome(xtask().args(["gen", "ring", "--out"]).arg(&file));
+    assert_eq!(status, Some(2));
+    assert!(errors.contains("cannot write"), "{errors}");
+}
