@@ -31,7 +31,11 @@ fn flat(value: &Value) -> Vec<&Value> {
 /// The transpose of a list of rows: the golden file's P is the nominal stress, ours the first Piola-Kirchhoff one.
 fn transposed(matrix: &Value) -> Value {
     let rows = matrix.as_array().unwrap();
-    json!((0..rows.len()).map(|j| rows.iter().map(|row| &row[j]).collect::<Vec<_>>()).collect::<Vec<_>>())
+    json!(
+        (0..rows.len())
+            .map(|j| rows.iter().map(|row| &row[j]).collect::<Vec<_>>())
+            .collect::<Vec<_>>()
+    )
 }
 
 /// The K of the acceptance rule that this result needs.
@@ -41,7 +45,11 @@ fn factor(found: &Value, golden: &Value, sensitivity: &Value) -> f64 {
     let unit = BigRational::new(1.into(), num_traits::pow(2.into(), 53));
     let allowed = unit * (exact(sensitivity.as_str().unwrap()) + golden.abs());
     let difference = (found - golden).abs();
-    if difference.is_zero() { 0.0 } else { (difference / allowed).to_f64().unwrap_or(f64::INFINITY) }
+    if difference.is_zero() {
+        0.0
+    } else {
+        (difference / allowed).to_f64().unwrap_or(f64::INFINITY)
+    }
 }
 
 fn check(solution: &str, problem: &str) {

@@ -69,8 +69,7 @@ fn a_new_solution_is_one_file() {
     assert_eq!(status, Some(0), "{out}{errors}");
 
     let generated = folder.path().join("generated");
-    let (status, _, errors) =
-        outcome(xtask().arg("gen").arg(&spec).arg("--out").arg(&generated));
+    let (status, _, errors) = outcome(xtask().arg("gen").arg(&spec).arg("--out").arg(&generated));
     assert_eq!(status, Some(0), "{errors}");
     assert!(generated.join("my_shear.rs").is_file());
 

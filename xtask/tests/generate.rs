@@ -80,8 +80,7 @@ fn generation_is_deterministic_to_the_byte() {
     for name in ["axis-aligned", "ring"] {
         let module = format!("{}.rs", name.replace('-', "_"));
         let committed = workspace().join("crates/solutions/src/generated").join(&module);
-        let (status, _, errors) =
-            outcome(xtask().args(["gen", name, "--out"]).arg(folder.path()));
+        let (status, _, errors) = outcome(xtask().args(["gen", name, "--out"]).arg(folder.path()));
         assert_eq!(status, Some(0), "{errors}");
         let fresh = std::fs::read(folder.path().join(&module)).unwrap();
         assert_eq!(fresh, std::fs::read(committed).unwrap(), "{name}");
@@ -101,7 +100,10 @@ fn a_mistake_in_one_specification_keeps_all_from_being_written() {
     assert_eq!(status, Some(2), "{out}");
     assert!(errors.contains("bad.toml:15:8") && errors.contains("never closed"), "{errors}");
     assert!(errors.contains('^'), "{errors}");
-    assert!(!generated.exists(), "the good specification was written although the other one is bad");
+    assert!(
+        !generated.exists(),
+        "the good specification was written although the other one is bad"
+    );
 }
 
 #[test]
@@ -109,7 +111,8 @@ fn a_file_must_be_called_as_its_solution() {
     let folder = tempfile::tempdir().unwrap();
     let spec = folder.path().join("other.toml");
     std::fs::write(&spec, SPEC).unwrap();
-    let (status, _, errors) = outcome(xtask().arg("gen").arg(&spec).arg("--out").arg(folder.path()));
+    let (status, _, errors) =
+        outcome(xtask().arg("gen").arg(&spec).arg("--out").arg(folder.path()));
     assert_eq!(status, Some(2));
     assert!(errors.contains("must be called small.toml"), "{errors}");
 }

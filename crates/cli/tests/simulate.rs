@@ -134,9 +134,7 @@ fn bad_input_is_met_with_what_would_be_right() {
     refuses(place, "run axis-aligned --extent full", &["annulus"]);
     refuses(place, "run ring --shape cubic", &["linear", "ugimp", "gimp"]);
     refuses(place, "run ring --frames 5", &["--vtk"]);
-    refuses(place, "converge ring --cells 8", &["at least two"]);
     refuses(place, "converge ring --cells 8,16 --cfls 0.1,0.2", &["--cfls", "one grid"]);
-    refuses(place, "converge ring --cells 8 --cfls 0.1", &["--cfls", "at least two"]);
     refuses(place, "converge ring --cells 8,x", &["--cells"]);
 }
 
