@@ -6,37 +6,12 @@
 use mmsmith_tests::{cargo, mms, outcome, workspace, xtask};
 use std::path::Path;
 
-/// A specification that nobody has seen before: F is not symmetric, and J differs from 1.
-const NEW: &str = r"
-name = 'my-shear'
-title = 'Shear and stretch together'
-coordinates = 'cartesian'
-dimension = 2
-
-[parameters]
-A = { default = 0.1, range = '> -1/4, < 1/4', unit = 'm', description = 'amplitude' }
-E = { default = 1000, range = '> 0', unit = 'Pa' }
-nu = { default = 0.25, range = '> -1, < 1/2' }
-rho0 = { default = 2, range = '> 0', unit = 'kg/m^3' }
-
-[let]
-c = 'sqrt(E/rho0)'
-
-[displacement]
-X = 'A*sin(Pi*X)*cos(Pi*Y/2)*cos(c*Pi*t)'
-Y = 'A*X^2*Y*sin(c*Pi*t)'
-
-[material]
-law = 'neo-hookean'
-
-[domain]
-shape = 'box'
-lower = [0, 0]
-upper = [1, 1]
-
-[time]
-period = '2/c'
-";
+/// The specification that the README shows: F is not symmetric, and J differs from 1.
+fn readme_specification() -> String {
+    let readme = std::fs::read_to_string(workspace().join("README.md")).unwrap();
+    let (_, rest) = readme.split_once("```toml\n").unwrap();
+    rest.split_once("```").unwrap().0.to_owned()
+}
 
 /// Writes a package that uses the macro on a specification beside it, and runs it.
 fn run_package(folder: &Path, main: &str) -> String {
@@ -63,7 +38,7 @@ fn run_package(folder: &Path, main: &str) -> String {
 fn a_new_solution_is_one_file() {
     let folder = tempfile::tempdir().unwrap();
     let spec = folder.path().join("my-shear.toml");
-    std::fs::write(&spec, NEW).unwrap();
+    std::fs::write(&spec, readme_specification()).unwrap();
 
     let (status, out, errors) = outcome(mms().arg("check").arg(&spec));
     assert_eq!(status, Some(0), "{out}{errors}");
