@@ -1,0 +1,1 @@
+//! C listings as Maple prints them.
