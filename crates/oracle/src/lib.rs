@@ -1,1 +1,36 @@
-//! Expressions evaluated in arbitrary precision.
+//! Exact expressions evaluated in arbitrary precision: the truth that double-precision results are held against.
+//!
+//! - [`Oracle::evaluate`] computes expressions of a [`Graph`](mmsmith_expr::Graph) at exact inputs in a stated
+//!   number of bits; [`Oracle::settle`] raises the number of bits until the digits asked for stand still.
+//! - [`Sensitivity`] says how far a result moves when its inputs move: `sum over inputs q of |q dy/dq|`.
+//! - [`worst_factor`] is the factor `K` of the acceptance rule `|r - g| <= K 2^-53 (sens + |g|)` for a
+//!   double-precision result `r` of the exact value `g`.
+//!
+//! Inputs and results are exact rationals; every finite double is one ([`exact`]).
+//!
+//! ```
+//! use mmsmith_expr::{Ast, Graph};
+//! use mmsmith_oracle::{Oracle, Point, exact, scientific, worst_factor};
+//!
+//! let mut graph = Graph::new();
+//! let x = graph.symbol("x");
+//! let y = graph.build(&Ast::parse("sin(Pi*x)").unwrap(), &mut |_, _| Ok(x)).unwrap();
+//! let values = [(x, exact(0.1).unwrap())];
+//! let point = Point { graph: &graph, definitions: &[], values: &values };
+//! let mut oracle = Oracle::new(Oracle::USUAL_BITS).unwrap();
+//! let truth = oracle.settle(&point, &[y], 30).unwrap().remove(0);
+//! assert_eq!(scientific(&truth, 25), "3.090169943749474406445311e-1");
+//! assert!(worst_factor((std::f64::consts::PI * 0.1).sin(), &truth, &truth) < 2.0);
+//! ```
+
+mod acceptance;
+mod convert;
+mod evaluate;
+mod scientific;
+mod sensitivity;
+
+pub use acceptance::worst_factor;
+pub use convert::exact;
+pub use evaluate::{Oracle, OracleError, Point};
+pub use scientific::scientific;
+pub use sensitivity::Sensitivity;
