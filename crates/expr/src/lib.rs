@@ -6,7 +6,8 @@
 //! 2. [`Graph::build`] turns the tree into an [`Expr`] of a hash-consed [`Graph`]: equal expressions are one
 //!    node, numbers are exact rationals, and sums and products have a canonical form.
 //! 3. [`Derivatives::of`] differentiates.
-//! 4. [`Program::lower`] turns expressions into a list of floating-point operations in which every common
+//! 4. [`arrange`] rewrites expressions that are evaluated at the same points at many times, where asked to.
+//! 5. [`Program::lower`] turns expressions into a list of floating-point operations in which every common
 //!    subexpression is computed once. [`Program::evaluate`] runs it; code generators translate it.
 //!
 //! The canonical form never expands a product of sums, since that loses digits: it collects like terms,
@@ -28,6 +29,7 @@
 //! assert_eq!(program.evaluate(&[0.5]), [1.0]);
 //! ```
 
+mod arrange;
 mod build;
 mod cancel;
 mod canonical;
@@ -38,9 +40,12 @@ mod print;
 mod program;
 mod rational;
 
+pub use arrange::arrange;
 pub use build::BuildError;
 pub use derivative::Derivatives;
 pub use graph::{Expr, Function, Graph, Node};
 pub use parse::{Ast, AstKind, ParseError};
-pub use program::{Dependence, Operation, Program, Slot};
+pub use program::{
+    Dependence, Operation, OperationCount, OperationsByStage, Program, Slot,
+};
 pub use rational::{Rational, nearest_f64};

@@ -73,6 +73,26 @@ impl Operation {
             | Operation::Call(_, a) => vec![a],
         }
     }
+
+    /// The value, where `at` gives those of the operands.
+    fn value(&self, inputs: &[f64], at: impl Fn(Slot) -> f64) -> f64 {
+        match *self {
+            Operation::Number(ref value) => nearest_f64(value),
+            Operation::Pi => std::f64::consts::PI,
+            Operation::Input(index) => inputs.get(index).copied().unwrap_or(f64::NAN),
+            Operation::Add(a, b) => at(a) + at(b),
+            Operation::Sub(a, b) => at(a) - at(b),
+            Operation::Mul(a, b) => at(a) * at(b),
+            Operation::Div(a, b) => at(a) / at(b),
+            Operation::Neg(a) => -at(a),
+            Operation::Sqrt(a) => at(a).sqrt(),
+            Operation::Power(a, ref exponent) => at(a).powf(nearest_f64(exponent)),
+            Operation::SinPi(a) => sin_pi(at(a)),
+            Operation::CosPi(a) => sin_pi_shifted(at(a), 1),
+            Operation::Call(function, a) => call(function, at(a)),
+            Operation::Atan2(y, x) => at(y).atan2(at(x)),
+        }
+    }
 }
 
 /// What a value depends on, as a set of rates of change; nothing but parameters where both are false.
@@ -85,7 +105,7 @@ pub struct Dependence {
 }
 
 impl Dependence {
-    fn join(self, other: Self) -> Self {
+    pub(crate) fn join(self, other: Self) -> Self {
         Dependence { position: self.position || other.position, time: self.time || other.time }
     }
 
@@ -94,6 +114,65 @@ impl Dependence {
     pub fn is_fixed(self) -> bool {
         !self.position && !self.time
     }
+}
+
+/// How many operations of each kind there are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct OperationCount {
+    /// Sums, differences and changes of sign.
+    pub additions: usize,
+    /// Products.
+    pub multiplications: usize,
+    /// Quotients.
+    pub divisions: usize,
+    /// Square roots.
+    pub square_roots: usize,
+    /// Calls of all other functions.
+    pub calls: usize,
+}
+
+impl OperationCount {
+    /// The number of all operations.
+    #[must_use]
+    pub fn total(&self) -> usize {
+        self.additions + self.multiplications + self.divisions + self.square_roots + self.calls
+    }
+
+    /// A rough cost, in additions.
+    pub(crate) fn cost(&self) -> usize {
+        self.additions
+            + self.multiplications
+            + 8 * (self.divisions + self.square_roots)
+            + 40 * self.calls
+    }
+
+    fn count(&mut self, operation: &Operation) {
+        match operation {
+            Operation::Number(_) | Operation::Pi | Operation::Input(_) => {}
+            Operation::Add(..) | Operation::Sub(..) | Operation::Neg(_) => self.additions += 1,
+            Operation::Mul(..) => self.multiplications += 1,
+            Operation::Div(..) => self.divisions += 1,
+            Operation::Sqrt(_) => self.square_roots += 1,
+            Operation::Power(..)
+            | Operation::SinPi(_)
+            | Operation::CosPi(_)
+            | Operation::Call(..)
+            | Operation::Atan2(..) => self.calls += 1,
+        }
+    }
+}
+
+/// The operations of a program by how often they have to be done.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct OperationsByStage {
+    /// Once for given parameters.
+    pub fixed: OperationCount,
+    /// Once for each time.
+    pub time: OperationCount,
+    /// Once for each point.
+    pub point: OperationCount,
+    /// For each point at each time.
+    pub both: OperationCount,
 }
 
 /// A list of operations that computes several outputs from several inputs; equal operations occur once.
@@ -151,33 +230,93 @@ impl Program {
         (0..self.operations.len()).map(|index| Slot(index as u32))
     }
 
+    /// For each operation, whether `outputs` need it.
+    #[must_use]
+    pub fn needed(&self, outputs: &[Slot]) -> Vec<bool> {
+        let mut needed = vec![false; self.operations.len()];
+        let mut stack = outputs.to_vec();
+        while let Some(slot) = stack.pop() {
+            if !needed[slot.index()] {
+                needed[slot.index()] = true;
+                stack.extend(self.operations[slot.index()].operands());
+            }
+        }
+        needed
+    }
+
+    /// The operations that `outputs` need, by what they depend on.
+    #[must_use]
+    pub fn operations_by_stage(&self, outputs: &[Slot]) -> OperationsByStage {
+        let mut stages = OperationsByStage::default();
+        for (index, _) in self.needed(outputs).iter().enumerate().filter(|(_, needed)| **needed) {
+            let dependence = self.dependence[index];
+            let stage = match (dependence.position, dependence.time) {
+                (false, false) => &mut stages.fixed,
+                (false, true) => &mut stages.time,
+                (true, false) => &mut stages.point,
+                (true, true) => &mut stages.both,
+            };
+            stage.count(&self.operations[index]);
+        }
+        stages
+    }
+
+    /// Bounds, to first order, of the rounding errors of the outputs, in units of the rounding error of one operation.
+    ///
+    /// Inputs count as exact. Running error analysis: every operation adds its own rounding to what its operands
+    /// carry, and nothing cancels.
+    pub(crate) fn error_bounds(&self, inputs: &[f64]) -> Vec<f64> {
+        let values = self.values(inputs);
+        let mut errors: Vec<f64> = Vec::with_capacity(self.operations.len());
+        for (operation, &value) in self.operations.iter().zip(&values) {
+            let (at, error) =
+                (|slot: Slot| values[slot.index()], |slot: Slot| errors[slot.index()]);
+            // The derivative of a function by a difference: its accuracy does not matter.
+            let slope = |a: Slot| {
+                let step = 1e-6 * (1e-3 + at(a).abs());
+                let moved = operation.value( inputs, |slot| {
+                    if slot == a { at(slot) + step } else { at(slot) }
+                });
+                ((moved - value) / step).abs()
+            };
+            let carried = match *operation {
+                Operation::Number(_) | Operation::Pi | Operation::Input(_) => 0.0,
+                Operation::Add(a, b) | Operation::Sub(a, b) => error(a) + error(b),
+                Operation::Mul(a, b) => error(a) * at(b).abs() + error(b) * at(a).abs(),
+                Operation::Div(a, b) => (error(a) + error(b) * value.abs()) / at(b).abs(),
+                Operation::Neg(a) => error(a),
+                Operation::Atan2(a, b) => error(a) * slope(a) + error(b) * slope(b),
+                Operation::Sqrt(a)
+                | Operation::Power(a, _)
+                | Operation::SinPi(a)
+                | Operation::CosPi(a)
+                | Operation::Call(_, a) => error(a) * slope(a),
+            };
+            let own = match operation {
+                Operation::Number(_) | Operation::Input(_) | Operation::Neg(_) => 0.0,
+                _ => value.abs(),
+            };
+            errors.push(carried + own);
+        }
+        self.outputs.iter().map(|slot| errors[slot.index()]).collect()
+    }
+
     /// The outputs at the given input values, in double precision.
     ///
     /// An input that is not given counts as not-a-number.
     #[must_use]
     pub fn evaluate(&self, inputs: &[f64]) -> Vec<f64> {
+        let values = self.values(inputs);
+        self.outputs.iter().map(|slot| values[slot.index()]).collect()
+    }
+
+    /// The value of every operation.
+    fn values(&self, inputs: &[f64]) -> Vec<f64> {
         let mut values: Vec<f64> = Vec::with_capacity(self.operations.len());
         for operation in &self.operations {
-            let at = |slot: Slot| values[slot.index()];
-            let value = match *operation {
-                Operation::Number(ref value) => nearest_f64(value),
-                Operation::Pi => std::f64::consts::PI,
-                Operation::Input(index) => inputs.get(index).copied().unwrap_or(f64::NAN),
-                Operation::Add(a, b) => at(a) + at(b),
-                Operation::Sub(a, b) => at(a) - at(b),
-                Operation::Mul(a, b) => at(a) * at(b),
-                Operation::Div(a, b) => at(a) / at(b),
-                Operation::Neg(a) => -at(a),
-                Operation::Sqrt(a) => at(a).sqrt(),
-                Operation::Power(a, ref exponent) => at(a).powf(nearest_f64(exponent)),
-                Operation::SinPi(a) => sin_pi(at(a)),
-                Operation::CosPi(a) => sin_pi_shifted(at(a), 1),
-                Operation::Call(function, a) => call(function, at(a)),
-                Operation::Atan2(y, x) => at(y).atan2(at(x)),
-            };
-            values.push(value);
+            values.push(operation.value( inputs, |slot| values[slot.index()]));
         }
-        self.outputs.iter().map(|slot| values[slot.index()]).collect()
+        values
     }
 }
 
@@ -387,8 +526,7 @@ impl Lowering<'_> {
             parts.push((Dependence::default(), false, number));
         }
         for (base, exponent) in factors {
-            let base = self.lower(*base);
-            let power = self.power(base, &exponent.abs());
+            let power = self.power_of(*base, &exponent.abs());
             parts.push((self.program.dependence(power), exponent.is_negative(), power));
         }
         parts.sort_by_key(|(dependence, divides, _)| (*dependence, *divides));
@@ -419,6 +557,22 @@ impl Lowering<'_> {
         let mut values = values.into_iter();
         let first = values.next()?;
         Some(values.fold(first, |total, value| self.push(Operation::Mul(total, value))))
+    }
+
+    /// `base ^ exponent` for a positive exponent. Where a symbol stands for a square root, as the polar radius does, its
+    /// even powers need no root.
+    fn power_of(&mut self, base: Expr, exponent: &Rational) -> Slot {
+        let meaning = self.definitions.iter().find(|(symbol, _)| *symbol == base).map(|d| d.1);
+        if let Some(meaning) = meaning
+            && let Node::Product(factors) = self.graph.node(meaning)
+            && let [(square, half)] = &**factors
+        {
+            let (square, exponent) = (*square, half * exponent);
+            let square = self.lower(square);
+            return self.power(square, &exponent);
+        }
+        let base = self.lower(base);
+        self.power(base, exponent)
     }
 
     /// `base ^ exponent` for a positive exponent.
