@@ -26,7 +26,10 @@ fn errors_over_time_steps(name: &str, shape: &str, integrator: &str, cfls: &str)
 fn finished(result: &Value) -> Vec<f64> {
     let rows = result["rows"].as_array().unwrap();
     let errors = column(result, &["errors", "u", "linf"]);
-    rows.iter().zip(errors).map(|(r, e)| if r["status"] == "ok" { e } else { f64::INFINITY }).collect()
+    rows.iter()
+        .zip(errors)
+        .map(|(r, e)| if r["status"] == "ok" { e } else { f64::INFINITY })
+        .collect()
 }
 
 /// The order between the last two of a sequence of halved spacings.
