@@ -19,7 +19,7 @@
 //! let point = Point { graph: &graph, definitions: &[], values: &values };
 //! let mut oracle = Oracle::new(Oracle::USUAL_BITS).unwrap();
 //! let truth = oracle.settle(&point, &[y], 30).unwrap().remove(0);
-//! assert_eq!(scientific(&truth, 25), "3.090169943749474406445311e-1");
+//! assert_eq!(scientific(&truth, 25), "3.090169943749474406880937e-1");
 //! assert!(worst_factor((std::f64::consts::PI * 0.1).sin(), &truth, &truth) < 2.0);
 //! ```
 

@@ -1,0 +1,112 @@
+//! The oracle against values and sensitivities from an independent computation in 70 digits.
+#![allow(clippy::unwrap_used)]
+
+use mmsmith_expr::{Ast, Expr, Graph, Rational};
+use mmsmith_oracle::{Oracle, Point, Sensitivity, exact, scientific};
+use mmsmith_spec::{Fields, Spec};
+use num_traits::{Signed, Zero};
+use serde::Deserialize;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+#[derive(Deserialize)]
+struct Golden {
+    problems: BTreeMap<String, Vec<Case>>,
+}
+
+#[derive(Deserialize)]
+struct Case {
+    class: String,
+    X: Vec<f64>,
+    t: f64,
+    par: BTreeMap<String, f64>,
+    out: BTreeMap<String, Value>,
+    sens: BTreeMap<String, Value>,
+}
+
+fn read(path: &str) -> String {
+    std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(path)).unwrap()
+}
+
+fn decimal(value: &Value) -> Rational {
+    let mut graph = Graph::new();
+    let number = graph.build(&Ast::parse(value.as_str().unwrap()).unwrap(), &mut |_, _| Err("".into()));
+    graph.as_number(number.unwrap()).unwrap().clone()
+}
+
+/// The entries of a scalar, a vector or a matrix; the golden stress is the nominal one, the transpose of ours.
+fn entries(field: &str, value: &Value) -> Vec<Rational> {
+    let rows = match value {
+        Value::Array(rows) => rows.clone(),
+        scalar => vec![scalar.clone()],
+    };
+    if field == "P" {
+        let n = rows.len();
+        return (0..n * n).map(|k| decimal(&rows[k % n][k / n])).collect();
+    }
+    let row = |value: &Value| match value {
+        Value::Array(entries) => entries.iter().map(decimal).collect(),
+        scalar => vec![decimal(scalar)],
+    };
+    rows.iter().flat_map(row).collect()
+}
+
+/// Whether `a` is `b` to a relative `2^-bits`, or, printed as short as the file has it, the same.
+fn close(a: &Rational, b: &Rational, tolerance: f64) -> bool {
+    (a - b).abs() <= b.abs() * exact(tolerance).unwrap()
+}
+
+#[test]
+fn values_and_sensitivities() {
+    let golden: Golden = serde_json::from_str(&read("tests/data/golden.json")).unwrap();
+    for (problem, file) in [("axis-aligned-2d", "axis-aligned"), ("ring-2d", "ring")] {
+        let text = read(&format!("mms-specs/{file}.toml"));
+        let spec = Spec::parse(&text, file).unwrap();
+        let fields = spec.derive().unwrap();
+        let all = by_letter(&fields);
+        let expressions: Vec<Expr> = all.iter().flat_map(|(_, e)| e.clone()).collect();
+        let inputs: Vec<Expr> = fields.inputs.iter().map(|(e, _)| *e).collect();
+        let sensitivity = Sensitivity::new(&fields.graph, &fields.definitions, &inputs, &expressions);
+        let mut oracle = Oracle::new(Oracle::USUAL_BITS).unwrap();
+        for (k, case) in golden.problems[problem].iter().enumerate() {
+            let parameters = spec.parameters.iter().map(|p| case.par[&p.name]);
+            let doubles = case.X.iter().copied().chain([case.t]).chain(parameters);
+            let values: Vec<(Expr, Rational)> =
+                inputs.iter().copied().zip(doubles.map(|x| exact(x).unwrap())).collect();
+            let (graph, definitions) = (&fields.graph, fields.definitions.as_slice());
+            let point = Point { graph, definitions, values: &values };
+            let mut exact = oracle.settle(&point, &expressions, 40).unwrap().into_iter();
+            let mut sens = sensitivity.evaluate(&mut oracle, &values).unwrap().into_iter();
+            for (field, _) in &all {
+                let wanted = entries(field, &case.out[*field]);
+                for (i, (wanted, wanted_sens)) in
+                    wanted.iter().zip(entries(field, &case.sens[*field])).enumerate()
+                {
+                    let (value, sens) = (exact.next().unwrap(), sens.next().unwrap());
+                    let context = format!("{problem}, point {k} ({}), {field}[{i}]", case.class);
+                    let (found, stated) = (scientific(&value, 25), scientific(wanted, 25));
+                    assert!(close(&value, wanted, 1e-24), "{context}: {found} and {stated}");
+                    let (found, stated) = (scientific(&sens, 4), scientific(&wanted_sens, 4));
+                    assert!(
+                        close(&sens, &wanted_sens, 6e-4) || (value.is_zero() && wanted_sens.is_zero()),
+                        "{context}, sensitivity: {found} and {stated}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+fn by_letter(fields: &Fields) -> Vec<(&'static str, Vec<Expr>)> {
+    vec![
+        ("u", fields.u.clone()),
+        ("v", fields.v.clone()),
+        ("a", fields.a.clone()),
+        ("H", fields.H.concat()),
+        ("F", fields.F.concat()),
+        ("J", vec![fields.J]),
+        ("P", fields.P.concat()),
+        ("b", fields.b.clone()),
+    ]
+}
