@@ -45,7 +45,5 @@ pub use build::BuildError;
 pub use derivative::Derivatives;
 pub use graph::{Expr, Function, Graph, Node};
 pub use parse::{Ast, AstKind, ParseError};
-pub use program::{
-    Dependence, Operation, OperationCount, OperationsByStage, Program, Slot,
-};
+pub use program::{Dependence, Operation, OperationCount, OperationsByStage, Program, Slot};
 pub use rational::{Rational, nearest_f64};

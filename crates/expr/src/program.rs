@@ -274,9 +274,8 @@ impl Program {
             // The derivative of a function by a difference: its accuracy does not matter.
             let slope = |a: Slot| {
                 let step = 1e-6 * (1e-3 + at(a).abs());
-                let moved = operation.value( inputs, |slot| {
-                    if slot == a { at(slot) + step } else { at(slot) }
-                });
+                let moved = operation
+                    .value(inputs, |slot| if slot == a { at(slot) + step } else { at(slot) });
                 ((moved - value) / step).abs()
             };
             let carried = match *operation {
@@ -314,7 +313,7 @@ impl Program {
     fn values(&self, inputs: &[f64]) -> Vec<f64> {
         let mut values: Vec<f64> = Vec::with_capacity(self.operations.len());
         for operation in &self.operations {
-            values.push(operation.value( inputs, |slot| values[slot.index()]));
+            values.push(operation.value(inputs, |slot| values[slot.index()]));
         }
         values
     }
