@@ -28,9 +28,10 @@ fn integer(value: &BigInt) -> BigFloat {
     let words: Vec<Word> = digits
         .chunks(digits_a_word)
         .map(|chunk| {
-            chunk.iter().enumerate().fold(0, |word: Word, (i, &digit)| {
-                word | Word::from(digit) << (32 * i)
-            })
+            chunk
+                .iter()
+                .enumerate()
+                .fold(0, |word: Word, (i, &digit)| word | Word::from(digit) << (32 * i))
         })
         .collect();
     if words.is_empty() {

@@ -316,10 +316,8 @@ impl Evaluation<'_> {
     ) -> Result<BigFloat, OracleError> {
         let bits = self.bits;
         let value = self.value(base)?.clone();
-        let beyond = || OracleError::Exponent {
-            exponent: scientific(exponent, 5),
-            limit: LARGEST_POWER,
-        };
+        let beyond =
+            || OracleError::Exponent { exponent: scientific(exponent, 5), limit: LARGEST_POWER };
         let numerator = exponent.numer().abs().to_i64().filter(|&n| n <= LARGEST_POWER);
         let numerator = numerator.and_then(|n| usize::try_from(n).ok()).ok_or_else(beyond)?;
         if value.is_zero() {
@@ -342,8 +340,7 @@ impl Evaluation<'_> {
                 return Ok(value.pow(&exponent, bits, ROUNDING, self.constants));
             }
         };
-        let power =
-            if numerator == 1 { root } else { root.powi(numerator, bits_inside, ROUNDING) };
+        let power = if numerator == 1 { root } else { root.powi(numerator, bits_inside, ROUNDING) };
         Ok(if exponent.is_negative() { power.reciprocal(bits, ROUNDING) } else { power })
     }
 

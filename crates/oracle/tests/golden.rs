@@ -31,7 +31,8 @@ fn read(path: &str) -> String {
 
 fn decimal(value: &Value) -> Rational {
     let mut graph = Graph::new();
-    let number = graph.build(&Ast::parse(value.as_str().unwrap()).unwrap(), &mut |_, _| Err("".into()));
+    let number =
+        graph.build(&Ast::parse(value.as_str().unwrap()).unwrap(), &mut |_, _| Err("".into()));
     graph.as_number(number.unwrap()).unwrap().clone()
 }
 
@@ -67,7 +68,8 @@ fn values_and_sensitivities() {
         let all = by_letter(&fields);
         let expressions: Vec<Expr> = all.iter().flat_map(|(_, e)| e.clone()).collect();
         let inputs: Vec<Expr> = fields.inputs.iter().map(|(e, _)| *e).collect();
-        let sensitivity = Sensitivity::new(&fields.graph, &fields.definitions, &inputs, &expressions);
+        let sensitivity =
+            Sensitivity::new(&fields.graph, &fields.definitions, &inputs, &expressions);
         let mut oracle = Oracle::new(Oracle::USUAL_BITS).unwrap();
         for (k, case) in golden.problems[problem].iter().enumerate() {
             let parameters = spec.parameters.iter().map(|p| case.par[&p.name]);
@@ -89,7 +91,8 @@ fn values_and_sensitivities() {
                     assert!(close(&value, wanted, 1e-24), "{context}: {found} and {stated}");
                     let (found, stated) = (scientific(&sens, 4), scientific(&wanted_sens, 4));
                     assert!(
-                        close(&sens, &wanted_sens, 6e-4) || (value.is_zero() && wanted_sens.is_zero()),
+                        close(&sens, &wanted_sens, 6e-4)
+                            || (value.is_zero() && wanted_sens.is_zero()),
                         "{context}, sensitivity: {found} and {stated}"
                     );
                 }

@@ -15,7 +15,10 @@ const BITS: usize = 512;
 
 fn float(value: &Rational) -> Float {
     let integer = |n: &num_bigint::BigInt| {
-        dashu_float::DBig::from_str(&n.to_string()).unwrap().with_base_and_precision::<2>(BITS).value()
+        dashu_float::DBig::from_str(&n.to_string())
+            .unwrap()
+            .with_base_and_precision::<2>(BITS)
+            .value()
     };
     let numerator: FBig<_, 2> = integer(value.numer());
     let denominator: FBig<_, 2> = integer(value.denom());
@@ -44,7 +47,9 @@ fn evaluate(graph: &Graph, expr: Expr, x: &Float) -> Option<Float> {
             for (base, exponent) in factors {
                 let base = value(*base)?;
                 let zero = base.repr().significand().is_zero();
-                if (zero && exponent.is_negative()) || (base < Float::ZERO && !exponent.is_integer()) {
+                if (zero && exponent.is_negative())
+                    || (base < Float::ZERO && !exponent.is_integer())
+                {
                     return None;
                 }
                 let root = match exponent.denom().to_u32()? {
@@ -67,7 +72,11 @@ fn evaluate(graph: &Graph, expr: Expr, x: &Float) -> Option<Float> {
                 Function::Sin => argument.sin(),
                 Function::Cos => argument.cos(),
                 Function::Tan => argument.tan(),
-                Function::Asin | Function::Acos if argument.clone() > one || argument < -one.clone() => return None,
+                Function::Asin | Function::Acos
+                    if argument.clone() > one || argument < -one.clone() =>
+                {
+                    return None;
+                }
                 Function::Asin => argument.asin(),
                 Function::Acos => argument.acos(),
                 Function::Atan => argument.atan(),

@@ -1,0 +1,524 @@
+//! Tokens to assignments.
+
+use crate::token::{Placed, Token, tokens};
+use mmsmith_expr::{Ast, AstKind};
+use std::collections::BTreeMap;
+use std::ops::Range;
+use thiserror::Error;
+
+/// Parentheses, calls and signs may nest this deep.
+const DEEPEST: usize = 100;
+/// The longest listing accepted, in bytes.
+const LONGEST: usize = 1 << 18;
+/// The functions of C that listings may call, with the names that [`mmsmith_expr`] gives them; `pow` is a power.
+const FUNCTIONS: &[(&str, &str, usize)] = &[
+    ("pow", "pow", 2),
+    ("sqrt", "sqrt", 1),
+    ("sin", "sin", 1),
+    ("cos", "cos", 1),
+    ("tan", "tan", 1),
+    ("asin", "arcsin", 1),
+    ("acos", "arccos", 1),
+    ("atan", "arctan", 1),
+    ("atan2", "atan2", 2),
+    ("sinh", "sinh", 1),
+    ("cosh", "cosh", 1),
+    ("tanh", "tanh", 1),
+    ("exp", "exp", 1),
+    ("log", "ln", 1),
+    ("log1p", "log1p", 1),
+    ("expm1", "expm1", 1),
+];
+/// Words that may stand in front of an assignment.
+const TYPES: [&str; 6] = ["const", "static", "double", "float", "long", "real"];
+
+/// A listing that has been read: assignments, each of which uses earlier ones and free names.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Listing {
+    /// The assignments in their order.
+    pub assignments: Vec<Assignment>,
+}
+
+/// `target = value;`
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Assignment {
+    /// A name, or an array entry such as `b[0]`, without spaces.
+    pub target: String,
+    /// Where the target stands, in bytes from the start of the text.
+    pub span: Range<usize>,
+    /// The right-hand side; names keep their C spelling, functions have those of [`mmsmith_expr`].
+    pub value: Ast,
+}
+
+/// Why text is not a listing.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error("{problem}")]
+pub struct ListingError {
+    /// What is wrong, and what would be right.
+    pub problem: Problem,
+    /// Where, in bytes from the start of the text.
+    pub span: Range<usize>,
+}
+
+/// What may be wrong with a listing.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum Problem {
+    /// Two numbers, or a name and what may be the rest of it, with nothing but a line break between them.
+    #[error(
+        "{what} seems to be broken across lines {first_line} and {second_line}: join {first} and {second} to {joined}"
+    )]
+    Broken {
+        /// `a number` or `a name`.
+        what: &'static str,
+        /// The line of the first part, from 1.
+        first_line: usize,
+        /// The line of the second part, from 1.
+        second_line: usize,
+        /// The first part.
+        first: String,
+        /// The second part.
+        second: String,
+        /// Both.
+        joined: String,
+    },
+    /// Two values on one line with nothing between them.
+    #[error("an operator is missing before '{before}'; C writes multiplication with '*'")]
+    OperatorMissing {
+        /// The second value.
+        before: String,
+    },
+    /// Something else than what the grammar asks for.
+    #[error("{wanted} is expected here, not {found}")]
+    Expected {
+        /// What would be right.
+        wanted: &'static str,
+        /// What stands there.
+        found: String,
+    },
+    /// A temporary or an entry is used that is assigned further down, or in this very statement.
+    #[error("{name} is used before it is assigned")]
+    UsedBeforeAssigned {
+        /// Which.
+        name: String,
+    },
+    /// Two assignments to one target.
+    #[error("{name} is assigned twice, first on line {first_line}")]
+    AssignedTwice {
+        /// Which.
+        name: String,
+        /// The line of the first assignment, from 1.
+        first_line: usize,
+    },
+    /// A function that is not known.
+    #[error("no function is called '{name}'; there are {}", function_names())]
+    UnknownFunction {
+        /// Its name.
+        name: String,
+    },
+    /// A wrong number of arguments.
+    #[error("{function} takes {wanted} argument(s), not {given}")]
+    Arguments {
+        /// The function.
+        function: String,
+        /// The right number.
+        wanted: usize,
+        /// The number given.
+        given: usize,
+    },
+    /// A quotient of integers, which C truncates.
+    #[error("a quotient of integers, which C rounds towards zero; write {first}.0/{second}.0")]
+    IntegerQuotient {
+        /// The dividend.
+        first: String,
+        /// The divisor.
+        second: String,
+    },
+    /// A number directly followed by a letter or a second point.
+    #[error("'{number}' runs into what follows; C writes multiplication with '*'")]
+    NumberRunsOn {
+        /// The number.
+        number: String,
+    },
+    /// A number that is not one, or beyond the limits on digits and exponents.
+    #[error("{message}")]
+    Number {
+        /// Why.
+        message: String,
+    },
+    /// `^`, which is no power in C.
+    #[error("'^' is no power in C; write pow(a, b)")]
+    Caret,
+    /// A character that has no meaning in a listing.
+    #[error("the character '{}' has no meaning in a listing", character.escape_debug())]
+    Character {
+        /// Which.
+        character: char,
+    },
+    /// A comment without an end.
+    #[error("this comment is never closed")]
+    CommentOpen,
+    /// Too much nesting.
+    #[error("nested deeper than {limit} levels")]
+    TooDeep {
+        /// The number of levels accepted.
+        limit: usize,
+    },
+    /// Too much text.
+    #[error("a listing of {bytes} bytes; {limit} are the limit")]
+    TooLong {
+        /// Its size.
+        bytes: usize,
+        /// The largest size accepted.
+        limit: usize,
+    },
+    /// No assignment at all.
+    #[error("the listing assigns nothing; it needs lines such as 'b[0] = t1*t2;'")]
+    Empty,
+}
+
+fn function_names() -> String {
+    FUNCTIONS.iter().map(|(name, ..)| *name).collect::<Vec<_>>().join(", ")
+}
+
+impl Listing {
+    /// Reads a listing: assignments that end with `;`, with or without a type in front, and comments of C.
+    ///
+    /// A name that is assigned anywhere in the listing may be used below its assignment only; other names are free.
+    ///
+    /// # Errors
+    ///
+    /// [`ListingError`] with the place in the text. Nesting deeper than 100 and text beyond 256 KiB are refused.
+    pub fn parse(text: &str) -> Result<Self, ListingError> {
+        if text.len() > LONGEST {
+            let problem = Problem::TooLong { bytes: text.len(), limit: LONGEST };
+            return Err(ListingError { problem, span: 0..0 });
+        }
+        let mut parser = Parser { text, tokens: tokens(text)?, position: 0, depth: 0 };
+        let mut assignments = Vec::new();
+        while parser.peek() != Token::End {
+            if !parser.skip_sign(';') {
+                assignments.extend(parser.statement()?);
+            }
+        }
+        if assignments.is_empty() {
+            return Err(ListingError { problem: Problem::Empty, span: 0..text.len() });
+        }
+        check_order(text, &assignments)?;
+        Ok(Listing { assignments })
+    }
+}
+
+/// Each target is assigned once, and used below its assignment only.
+fn check_order(text: &str, assignments: &[Assignment]) -> Result<(), ListingError> {
+    let mut places: BTreeMap<&str, (usize, Range<usize>)> = BTreeMap::new();
+    for (index, assignment) in assignments.iter().enumerate() {
+        let name = assignment.target.as_str();
+        let place = (index, assignment.span.clone());
+        if let Some((_, first)) = places.insert(name, place) {
+            let first_line = line(text, first.start);
+            let problem = Problem::AssignedTwice { name: name.to_owned(), first_line };
+            return Err(ListingError { problem, span: assignment.span.clone() });
+        }
+    }
+    for (index, assignment) in assignments.iter().enumerate() {
+        let mut pending = vec![&assignment.value];
+        while let Some(ast) = pending.pop() {
+            match &ast.kind {
+                AstKind::Number(_) => {}
+                AstKind::Name(name) => {
+                    let late = places.get(name.as_str()).is_some_and(|(at, _)| *at >= index);
+                    if late || (name.contains('[') && !places.contains_key(name.as_str())) {
+                        let problem = Problem::UsedBeforeAssigned { name: name.clone() };
+                        return Err(ListingError { problem, span: ast.span.clone() });
+                    }
+                }
+                AstKind::Sum(parts) | AstKind::Product(parts) => {
+                    pending.extend(parts.iter().map(|(_, part)| part));
+                }
+                AstKind::Power(base, exponent) => pending.extend([&**base, &**exponent]),
+                AstKind::Call(_, arguments) => pending.extend(arguments),
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The line of a place in the text, from 1.
+fn line(text: &str, at: usize) -> usize {
+    1 + text.as_bytes()[..at].iter().filter(|&&b| b == b'\n').count()
+}
+
+struct Parser<'a> {
+    text: &'a str,
+    tokens: Vec<Placed>,
+    position: usize,
+    depth: usize,
+}
+
+impl Parser<'_> {
+    fn peek(&self) -> Token {
+        self.tokens[self.position].0
+    }
+
+    fn span(&self) -> Range<usize> {
+        self.tokens[self.position].1.clone()
+    }
+
+    fn written(&self) -> &str {
+        &self.text[self.span()]
+    }
+
+    fn advance(&mut self) {
+        if self.position + 1 < self.tokens.len() {
+            self.position += 1;
+        }
+    }
+
+    fn skip_sign(&mut self, sign: char) -> bool {
+        let found = self.peek() == Token::Sign(sign);
+        if found {
+            self.advance();
+        }
+        found
+    }
+
+    /// The error at the current token where `wanted` should stand; two values in a row get a message of their own.
+    fn expected(&self, wanted: &'static str) -> ListingError {
+        let span = self.span();
+        let is_value = |token: Token| matches!(token, Token::Number | Token::Name);
+        let previous = self.position.checked_sub(1).map(|i| &self.tokens[i]);
+        if let Some((token, before)) = previous.filter(|(token, _)| is_value(*token))
+            && is_value(self.peek())
+        {
+            let (first, second) = (&self.text[before.clone()], self.written());
+            let between = &self.text[before.end..span.start];
+            // No name starts with a digit, but the rest of a broken name may.
+            let joins = *token == Token::Name
+                || (self.peek() == Token::Number && joins_to_a_number(first, second));
+            if joins && between.contains('\n') && between.trim().is_empty() {
+                return ListingError {
+                    problem: Problem::Broken {
+                        what: if *token == Token::Number { "a number" } else { "a name" },
+                        first_line: line(self.text, before.start),
+                        second_line: line(self.text, span.start),
+                        first: first.to_owned(),
+                        second: second.to_owned(),
+                        joined: format!("{first}{second}"),
+                    },
+                    span: before.start..span.end,
+                };
+            }
+            return ListingError {
+                problem: Problem::OperatorMissing { before: second.to_owned() },
+                span,
+            };
+        }
+        let found = match self.peek() {
+            Token::End => "the end".to_owned(),
+            _ => format!("'{}'", self.written()),
+        };
+        ListingError { problem: Problem::Expected { wanted, found }, span }
+    }
+
+    fn expect(&mut self, sign: char, wanted: &'static str) -> Result<(), ListingError> {
+        if self.skip_sign(sign) { Ok(()) } else { Err(self.expected(wanted)) }
+    }
+
+    /// `double b[3], t1 = x, t2;` or the same without the type; declarations without value say nothing.
+    fn statement(&mut self) -> Result<Vec<Assignment>, ListingError> {
+        let mut typed = false;
+        while self.peek() == Token::Name && TYPES.contains(&self.written()) {
+            typed = true;
+            self.advance();
+        }
+        let mut assignments = Vec::new();
+        loop {
+            if self.peek() != Token::Name {
+                return Err(self.expected("a name to assign to"));
+            }
+            let (target, span) = self.reference()?;
+            if self.skip_sign('=') {
+                let value = self.sum()?;
+                assignments.push(Assignment { target, span, value });
+            } else if !typed {
+                return Err(self.expected("'='"));
+            }
+            if !(typed && self.skip_sign(',')) {
+                self.expect(';', "an operator or ';'")?;
+                return Ok(assignments);
+            }
+        }
+    }
+
+    /// A name with or without indices.
+    fn reference(&mut self) -> Result<(String, Range<usize>), ListingError> {
+        let mut name = self.written().to_owned();
+        let mut span = self.span();
+        self.advance();
+        while self.skip_sign('[') {
+            let digits = self.written().bytes().all(|b| b.is_ascii_digit());
+            if self.peek() != Token::Number || !digits {
+                return Err(self.expected("a whole number as index"));
+            }
+            name += &format!("[{}]", self.written());
+            self.advance();
+            span.end = self.span().end;
+            self.expect(']', "']'")?;
+        }
+        Ok((name, span))
+    }
+
+    fn nested<T>(
+        &mut self,
+        parse: impl FnOnce(&mut Self) -> Result<T, ListingError>,
+    ) -> Result<T, ListingError> {
+        if self.depth == DEEPEST {
+            let problem = Problem::TooDeep { limit: DEEPEST };
+            return Err(ListingError { problem, span: self.span() });
+        }
+        self.depth += 1;
+        let result = parse(self);
+        self.depth -= 1;
+        result
+    }
+
+    fn sum(&mut self) -> Result<Ast, ListingError> {
+        let start = self.span().start;
+        let mut terms = vec![(false, self.product()?)];
+        loop {
+            let subtracted = self.peek() == Token::Sign('-');
+            if !subtracted && self.peek() != Token::Sign('+') {
+                return Ok(single(terms, start, AstKind::Sum));
+            }
+            self.advance();
+            terms.push((subtracted, self.product()?));
+        }
+    }
+
+    fn product(&mut self) -> Result<Ast, ListingError> {
+        let start = self.span().start;
+        let first = self.position;
+        let mut factors = vec![(false, self.signed()?)];
+        loop {
+            let divided = self.peek() == Token::Sign('/');
+            if !divided && self.peek() != Token::Sign('*') {
+                return Ok(single(factors, start, AstKind::Product));
+            }
+            let before = self.position;
+            self.advance();
+            let divisor = self.position;
+            factors.push((divided, self.signed()?));
+            let whole = |range: Range<usize>| {
+                range.clone().any(|i| self.tokens[i].0 == Token::Number)
+                    && self.tokens[range].iter().all(|(token, span)| match token {
+                        Token::Number => {
+                            self.text[span.clone()].bytes().all(|b| b.is_ascii_digit())
+                        }
+                        Token::Sign(sign) => *sign != ',',
+                        _ => false,
+                    })
+            };
+            if divided && whole(first..before) && whole(divisor..self.position) {
+                let text = |range: Range<usize>| {
+                    let (from, to) = (&self.tokens[range.start].1, &self.tokens[range.end - 1].1);
+                    self.text[from.start..to.end].to_owned()
+                };
+                let (first, second) = (text(first..before), text(divisor..self.position));
+                let span = start..self.tokens[self.position - 1].1.end;
+                let problem = Problem::IntegerQuotient { first, second };
+                return Err(ListingError { problem, span });
+            }
+        }
+    }
+
+    /// Signs, and a primary.
+    fn signed(&mut self) -> Result<Ast, ListingError> {
+        let start = self.span().start;
+        let mut negative = false;
+        // Signs in a row are one sign: no recursion, however many there are.
+        while let Token::Sign(sign @ ('+' | '-')) = self.peek() {
+            negative ^= sign == '-';
+            self.advance();
+        }
+        let value = self.primary()?;
+        if !negative {
+            return Ok(value);
+        }
+        let span = start..value.span.end;
+        Ok(Ast { kind: AstKind::Sum(vec![(true, value)]), span })
+    }
+
+    fn primary(&mut self) -> Result<Ast, ListingError> {
+        let span = self.span();
+        match self.peek() {
+            Token::Number => {
+                let number = Ast::parse(self.written()).map_err(|error| ListingError {
+                    problem: Problem::Number { message: error.message },
+                    span: span.clone(),
+                })?;
+                self.advance();
+                Ok(Ast { kind: number.kind, span })
+            }
+            Token::Name if self.tokens[self.position + 1].0 == Token::Sign('(') => self.call(),
+            Token::Name => {
+                let (name, span) = self.reference()?;
+                Ok(Ast { kind: AstKind::Name(name), span })
+            }
+            Token::Sign('(') => {
+                self.advance();
+                let inner = self.nested(Self::sum)?;
+                let end = self.span().end;
+                self.expect(')', "an operator or ')'")?;
+                Ok(Ast { kind: inner.kind, span: span.start..end })
+            }
+            _ => Err(self.expected("a value")),
+        }
+    }
+
+    fn call(&mut self) -> Result<Ast, ListingError> {
+        let span = self.span();
+        let name = self.written().to_owned();
+        let Some(&(_, function, arity)) = FUNCTIONS.iter().find(|(c, ..)| *c == name) else {
+            return Err(ListingError { problem: Problem::UnknownFunction { name }, span });
+        };
+        self.advance();
+        self.advance();
+        let mut arguments = vec![self.nested(Self::sum)?];
+        while self.skip_sign(',') {
+            arguments.push(self.nested(Self::sum)?);
+        }
+        let span = span.start..self.span().end;
+        self.expect(')', "an operator or ')'")?;
+        let given = arguments.len();
+        if given != arity {
+            let problem = Problem::Arguments { function: name, wanted: arity, given };
+            return Err(ListingError { problem, span });
+        }
+        let kind = match (function, arguments.as_slice()) {
+            ("pow", [base, exponent]) => {
+                AstKind::Power(Box::new(base.clone()), Box::new(exponent.clone()))
+            }
+            _ => AstKind::Call(function.to_owned(), arguments),
+        };
+        Ok(Ast { kind, span })
+    }
+}
+
+/// Whether the two together are one number: at most one point and no exponent before it.
+fn joins_to_a_number(first: &str, second: &str) -> bool {
+    let exponent = first.contains(['e', 'E']);
+    let points = first.matches('.').count() + second.matches('.').count();
+    points <= 1 && !(exponent && second.contains(['.', 'e', 'E']))
+}
+
+fn single(
+    mut parts: Vec<(bool, Ast)>,
+    start: usize,
+    kind: impl FnOnce(Vec<(bool, Ast)>) -> AstKind,
+) -> Ast {
+    let end = parts.last().map_or(start, |(_, last)| last.span.end);
+    if parts.len() == 1 && !parts[0].0 {
+        return parts.remove(0).1;
+    }
+    Ast { kind: kind(parts), span: start..end }
+}
