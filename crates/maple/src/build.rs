@@ -1,10 +1,14 @@
 //! Assignments to expressions of a graph.
 
 use crate::Listing;
-use mmsmith_expr::{Expr, Graph};
+use mmsmith_expr::{Expr, Graph, Node, Rational};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use thiserror::Error;
+
+/// The longest numerator or denominator of an exact number that an assignment may make; chains of squares would
+/// double it with every line.
+const MOST_BITS: u64 = 4096;
 
 /// Why a listing has no meaning in a graph.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
@@ -44,8 +48,29 @@ impl Listing {
             });
             let value =
                 value.map_err(|error| BuildError { message: error.message, span: error.span })?;
+            let bits = largest_number(graph, value);
+            if bits > MOST_BITS {
+                let target = &assignment.target;
+                let message =
+                    format!("{target} has numbers of {bits} bits; {MOST_BITS} are the limit");
+                return Err(BuildError { message, span: assignment.span.clone() });
+            }
             built.insert(assignment.target.clone(), value);
         }
         Ok(built)
     }
+}
+
+/// The bits of the longest number in the root of `expr` and right below it, where new numbers come up.
+fn largest_number(graph: &Graph, expr: Expr) -> u64 {
+    let bits = |number: &Rational| number.numer().bits().max(number.denom().bits());
+    let in_node = |expr: Expr| match graph.node(expr) {
+        Node::Number(value) => bits(value),
+        Node::Sum { constant, terms } => {
+            terms.iter().map(|(_, c)| bits(c)).max().unwrap_or(0).max(bits(constant))
+        }
+        Node::Product(factors) => factors.iter().map(|(_, e)| bits(e)).max().unwrap_or(0),
+        Node::Pi | Node::Symbol(_) | Node::Call(..) | Node::Whole(_) => 0,
+    };
+    graph.children(expr).chain([expr]).map(in_node).max().unwrap_or(0)
 }

@@ -87,6 +87,12 @@ pub enum Problem {
         /// The second value.
         before: String,
     },
+    /// An assignment follows where the one before has not ended.
+    #[error("';' is missing before '{before}'")]
+    SemicolonMissing {
+        /// What the next assignment starts with.
+        before: String,
+    },
     /// Something else than what the grammar asks for.
     #[error("{wanted} is expected here, not {found}")]
     Expected {
@@ -292,6 +298,12 @@ impl Parser<'_> {
         {
             let (first, second) = (&self.text[before.clone()], self.written());
             let between = &self.text[before.end..span.start];
+            let after = self.tokens.get(self.position + 1).map(|(token, _)| *token);
+            let assigns = matches!(after, Some(Token::Sign('=' | '[')));
+            if self.peek() == Token::Name && (assigns || TYPES.contains(&second)) {
+                let problem = Problem::SemicolonMissing { before: second.to_owned() };
+                return ListingError { problem, span };
+            }
             // No name starts with a digit, but the rest of a broken name may.
             let joins = *token == Token::Name
                 || (self.peek() == Token::Number && joins_to_a_number(first, second));

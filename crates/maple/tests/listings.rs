@@ -27,7 +27,7 @@ fn what_is_accepted() {
     assert_eq!(built("const double t1 = sqrt(x)*asin(y); // root", "t1"), "sqrt(x)*arcsin(y)");
     assert_eq!(built("/* a\n b */ F[1][0] = x\n*\n-y;", "F[1][0]"), "-x*y");
     assert_eq!(built("double b[2]; b[0]=pi+0.1; b[1] = b[0]-Pi-M_PI+pi;", "b[1]"), "1/10");
-    assert_eq!(built("t1 = x - -y - 2/3*0.0 + 1.0/3.0*3;", "t1").len(), "1 + x + y".len());
+    assert_eq!(built("t1 = x - -y - 2*0.0 + 1/3.0*3;", "t1"), "1 + x + y");
 }
 
 #[test]
@@ -47,7 +47,7 @@ fn slides_break_a_number() {
     let error = Listing::parse(PRINTED).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "a number seems to be broken across lines 25 and 26: join 6 and 8.0 to 68.0"
+        "a number seems to be broken across lines 29 and 30: join 6 and 8.0 to 68.0"
     );
     assert_eq!(&PRINTED[error.span], "6\n8.0");
 }
@@ -98,6 +98,7 @@ fn chains_of_temporaries_end_in_errors_or_finish() {
             let listing = Listing::parse(&text).unwrap();
             let mut graph = Graph::new();
             let names = BTreeMap::from([("x".to_owned(), graph.symbol("x"))]);
+            // Either is right, as long as it comes soon.
             let _ = listing.build(&mut graph, &names);
         }
     }

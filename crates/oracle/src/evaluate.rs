@@ -121,7 +121,7 @@ impl Oracle {
     /// The least precision.
     pub const LEAST_BITS: usize = 64;
     /// The precision at which [`Oracle::settle`] gives up.
-    pub const MOST_BITS: usize = 1 << 12;
+    pub const MOST_BITS: usize = 1 << 11;
 
     /// An evaluator with results of about `bits` bits.
     ///
@@ -149,14 +149,14 @@ impl Oracle {
         point: &Point<'_>,
         expressions: &[Expr],
     ) -> Result<Vec<Rational>, OracleError> {
-        self.evaluate_in(point, expressions, self.bits)
+        Ok(self.evaluate_in(point, expressions, self.bits)?.0)
     }
 
     /// As [`Oracle::evaluate`], with the precision doubled until `digits` significant digits of every value stay the
     /// same.
     ///
-    /// A value that shrinks with the rounding errors all the way to [`Oracle::MOST_BITS`] is taken for the zero that
-    /// it approaches: were it another number, it would be smaller than its terms by a factor of `10^-600` at least.
+    /// A value that has not settled at [`Oracle::MOST_BITS`] and is smaller than the largest intermediate result
+    /// by a factor of `2^-1024` is rounding error, and is taken for the zero that it approaches.
     ///
     /// # Errors
     ///
@@ -169,24 +169,22 @@ impl Oracle {
     ) -> Result<Vec<Rational>, OracleError> {
         let tolerance = Rational::one() / Pow::pow(Rational::from_integer(10.into()), digits);
         let mut bits = self.bits;
-        let mut values = self.evaluate_in(point, expressions, bits)?;
-        let mut largest: Vec<Rational> = values.iter().map(Signed::abs).collect();
+        let mut values = self.evaluate_in(point, expressions, bits)?.0;
         let mut moving: Vec<usize> = (0..expressions.len()).collect();
         while !moving.is_empty() && bits < Self::MOST_BITS {
             bits = (2 * bits).min(Self::MOST_BITS);
             let open: Vec<Expr> = moving.iter().map(|&i| expressions[i]).collect();
-            let fine = self.evaluate_in(point, &open, bits)?;
+            let (fine, largest) = self.evaluate_in(point, &open, bits)?;
             let mut still = Vec::new();
             for (i, fine) in moving.into_iter().zip(fine) {
                 let coarse = std::mem::replace(&mut values[i], fine);
                 let fine = &values[i];
-                largest[i] = fine.abs().max(largest[i].clone());
                 if (fine - &coarse).abs() <= fine.abs() * &tolerance {
                     continue;
                 }
                 if bits < Self::MOST_BITS {
                     still.push(i);
-                } else if fine.abs() <= &largest[i] / power_of_two(bits / 2) {
+                } else if fine.abs() * power_of_two(bits / 2) <= largest {
                     values[i] = Rational::zero();
                 } else {
                     return Err(OracleError::Unsettled {
@@ -203,12 +201,13 @@ impl Oracle {
         Ok(values)
     }
 
+    /// The values, and a power of two at least as large as every intermediate result.
     fn evaluate_in(
         &mut self,
         point: &Point<'_>,
         expressions: &[Expr],
         bits: usize,
-    ) -> Result<Vec<Rational>, OracleError> {
+    ) -> Result<(Vec<Rational>, Rational), OracleError> {
         let bits = bits + GUARD_BITS;
         let mut evaluation = Evaluation {
             graph: point.graph,
@@ -217,14 +216,15 @@ impl Oracle {
             bits,
             constants: &mut self.constants,
         };
-        expressions
-            .iter()
-            .map(|&expression| {
-                evaluation.complete(expression)?;
-                let value = to_rational(evaluation.value(expression)?);
-                value.ok_or_else(|| evaluation.range(expression))
-            })
-            .collect()
+        let mut values = Vec::new();
+        for &expression in expressions {
+            evaluation.complete(expression)?;
+            let value = to_rational(evaluation.value(expression)?);
+            values.push(value.ok_or_else(|| evaluation.range(expression))?);
+        }
+        let exponents = evaluation.values.values().filter_map(BigFloat::exponent);
+        let largest = exponents.max().and_then(|e| usize::try_from(e).ok()).unwrap_or(0);
+        Ok((values, power_of_two(largest)))
     }
 }
 
