@@ -14,7 +14,8 @@ pub enum Domain<T: Real, const D: usize> {
         /// The corner with the largest coordinates.
         upper: SVector<T, D>,
     },
-    /// The points with `inner <= R <= outer`, `R` the distance from the origin, in two dimensions.
+    /// The points with `inner <= R <= outer`, `R` the distance from the origin: an annulus in two dimensions, a
+    /// spherical shell in three.
     Annulus {
         /// Inner radius.
         inner: T,

@@ -10,11 +10,20 @@ pub enum Coordinates {
     Cartesian,
     /// `R`, `theta` in the plane: `X = R cos(theta)`, `Y = R sin(theta)`.
     Polar,
+    /// `R`, `theta`, `Z`: polar coordinates in the plane of `X` and `Y`, and the height.
+    Cylindrical,
+    /// `R`, `theta`, `phi`: the distance from the origin, the angle from the axis `Z`, and the angle around it,
+    /// `X = R sin(theta) cos(phi)`, `Y = R sin(theta) sin(phi)`, `Z = R cos(theta)`.
+    Spherical,
 }
 
 impl Coordinates {
-    const NAMES: [(&'static str, Coordinates); 2] =
-        [("cartesian", Coordinates::Cartesian), ("polar", Coordinates::Polar)];
+    const NAMES: [(&'static str, Coordinates); 4] = [
+        ("cartesian", Coordinates::Cartesian),
+        ("polar", Coordinates::Polar),
+        ("cylindrical", Coordinates::Cylindrical),
+        ("spherical", Coordinates::Spherical),
+    ];
 
     /// The name that specifications use.
     #[must_use]
@@ -34,6 +43,16 @@ impl Coordinates {
         match self {
             Coordinates::Cartesian => (1..=3).contains(&dimension),
             Coordinates::Polar => dimension == 2,
+            Coordinates::Cylindrical | Coordinates::Spherical => dimension == 3,
+        }
+    }
+
+    /// The dimensions that it comes in, for messages.
+    pub(crate) fn dimensions(self) -> &'static str {
+        match self {
+            Coordinates::Cartesian => "1, 2 or 3",
+            Coordinates::Polar => "2",
+            Coordinates::Cylindrical | Coordinates::Spherical => "3",
         }
     }
 
@@ -43,6 +62,8 @@ impl Coordinates {
         match self {
             Coordinates::Cartesian => &CARTESIAN[..dimension.min(3)],
             Coordinates::Polar => &["R", "theta"],
+            Coordinates::Cylindrical => &["R", "theta", "Z"],
+            Coordinates::Spherical => &["R", "theta", "phi"],
         }
     }
 }
@@ -66,54 +87,145 @@ pub(crate) struct Geometry {
     pub(crate) definitions: Vec<(Expr, Expr)>,
     /// Expressions in `q_k` that have a shorter form in Cartesian symbols.
     pub(crate) shorter: BTreeMap<Expr, Expr>,
+    /// Spherical coordinates: `e_theta e_theta^T + e_phi e_phi^T` without the angles, which are not defined on the axis.
+    pub(crate) transverse: Option<Vec<Vec<Expr>>>,
 }
 
 impl Geometry {
     pub(crate) fn new(graph: &mut Graph, coordinates: Coordinates, dimension: usize) -> Self {
         let cartesian: Vec<Expr> =
             CARTESIAN[..dimension].iter().map(|name| graph.symbol(name)).collect();
-        let zeros = vec![vec![vec![Graph::ZERO; dimension]; dimension]; dimension];
         match coordinates {
             Coordinates::Cartesian => Geometry {
                 coordinates: cartesian.clone(),
                 scale: vec![Graph::ONE; dimension],
-                turning: zeros,
+                turning: no_turning(dimension),
                 rotation: identity(dimension),
                 cartesian,
                 definitions: Vec::new(),
                 shorter: BTreeMap::new(),
+                transverse: None,
             },
-            Coordinates::Polar => {
-                let (R, theta) = (graph.symbol("R"), graph.symbol("theta"));
-                let (X, Y) = (cartesian[0], cartesian[1]);
-                // d e_R / d theta = e_theta, d e_theta / d theta = -e_R.
-                let mut turning = zeros;
-                turning[1][0][1] = Graph::ONE;
-                turning[1][1][0] = graph.integer(-1);
-                let (XX, YY) = (graph.powi(X, 2), graph.powi(Y, 2));
-                let RR = graph.add(XX, YY);
-                let radius = graph.sqrt(RR);
-                let angle = graph.call(Function::Atan2, &[Y, X]);
-                let (cosine, sine) = (graph.div(X, R), graph.div(Y, R));
-                let minus_sine = graph.neg(sine);
-                let cos_theta = graph.call(Function::Cos, &[theta]);
-                let sin_theta = graph.call(Function::Sin, &[theta]);
-                Geometry {
-                    coordinates: vec![R, theta],
-                    scale: vec![Graph::ONE, R],
-                    turning,
-                    rotation: vec![vec![cosine, minus_sine], vec![sine, cosine]],
-                    cartesian,
-                    definitions: vec![(R, radius), (theta, angle)],
-                    shorter: BTreeMap::from([(cos_theta, cosine), (sin_theta, sine)]),
-                }
+            Coordinates::Polar | Coordinates::Cylindrical => Self::around_axis(graph, cartesian),
+            Coordinates::Spherical => Self::around_origin(graph, cartesian),
+        }
+    }
+
+    /// Polar coordinates, and cylindrical ones where there is a third dimension.
+    fn around_axis(graph: &mut Graph, cartesian: Vec<Expr>) -> Self {
+        let dimension = cartesian.len();
+        let (R, theta) = (graph.symbol("R"), graph.symbol("theta"));
+        let (X, Y) = (cartesian[0], cartesian[1]);
+        // d e_R / d theta = e_theta, d e_theta / d theta = -e_R.
+        let mut turning = no_turning(dimension);
+        turning[1][0][1] = Graph::ONE;
+        turning[1][1][0] = graph.integer(-1);
+        let radius = distance(graph, &[X, Y]);
+        let angle = graph.call(Function::Atan2, &[Y, X]);
+        let (cosine, sine) = (graph.div(X, R), graph.div(Y, R));
+        let cos_theta = graph.call(Function::Cos, &[theta]);
+        let sin_theta = graph.call(Function::Sin, &[theta]);
+        let mut rotation = identity(dimension);
+        rotation[0][0] = cosine;
+        rotation[0][1] = graph.neg(sine);
+        rotation[1][0] = sine;
+        rotation[1][1] = cosine;
+        let mut coordinates = vec![R, theta];
+        coordinates.extend(cartesian.get(2));
+        let mut scale = vec![Graph::ONE; dimension];
+        scale[1] = R;
+        Geometry {
+            coordinates,
+            scale,
+            turning,
+            rotation,
+            cartesian,
+            definitions: vec![(R, radius), (theta, angle)],
+            shorter: BTreeMap::from([(cos_theta, cosine), (sin_theta, sine)]),
+            transverse: None,
+        }
+    }
+
+    /// Spherical coordinates.
+    fn around_origin(graph: &mut Graph, cartesian: Vec<Expr>) -> Self {
+        let (R, theta, phi) = (graph.symbol("R"), graph.symbol("theta"), graph.symbol("phi"));
+        // The distance from the axis; no specification can have a name like this.
+        let s = graph.symbol("sqrt(X^2+Y^2)");
+        let (X, Y, Z) = (cartesian[0], cartesian[1], cartesian[2]);
+        let cos_theta = graph.call(Function::Cos, &[theta]);
+        let sin_theta = graph.call(Function::Sin, &[theta]);
+        let (minus_cos, minus_sin) = (graph.neg(cos_theta), graph.neg(sin_theta));
+        // d e_R / d theta = e_theta, d e_theta / d theta = -e_R; d e_R / d phi = sin(theta) e_phi,
+        // d e_theta / d phi = cos(theta) e_phi, d e_phi / d phi = -sin(theta) e_R - cos(theta) e_theta.
+        let mut turning = no_turning(3);
+        turning[1][0][1] = Graph::ONE;
+        turning[1][1][0] = graph.integer(-1);
+        turning[2][0][2] = sin_theta;
+        turning[2][1][2] = cos_theta;
+        turning[2][2][0] = minus_sin;
+        turning[2][2][1] = minus_cos;
+        let (Z_over_R, s_over_R) = (graph.div(Z, R), graph.div(s, R));
+        let (cos_phi, sin_phi) = (graph.div(X, s), graph.div(Y, s));
+        let minus_sin_phi = graph.neg(sin_phi);
+        let rotation = vec![
+            vec![graph.div(X, R), graph.mul(Z_over_R, cos_phi), minus_sin_phi],
+            vec![graph.div(Y, R), graph.mul(Z_over_R, sin_phi), cos_phi],
+            vec![Z_over_R, graph.neg(s_over_R), Graph::ZERO],
+        ];
+        // I - e_R e_R^T, with sums of squares on the diagonal.
+        let mut transverse = identity(3);
+        for i in 0..3 {
+            for j in 0..3 {
+                let numerator = if i == j {
+                    let squares: Vec<Expr> =
+                        (0..3).filter(|&k| k != i).map(|k| graph.powi(cartesian[k], 2)).collect();
+                    graph.sum_of(squares)
+                } else {
+                    let product = graph.mul(cartesian[i], cartesian[j]);
+                    graph.neg(product)
+                };
+                let RR = graph.powi(R, 2);
+                transverse[i][j] = graph.div(numerator, RR);
             }
+        }
+        let (radius, from_axis) = (distance(graph, &[X, Y, Z]), distance(graph, &[X, Y]));
+        let colatitude = graph.call(Function::Atan2, &[s, Z]);
+        let longitude = graph.call(Function::Atan2, &[Y, X]);
+        let (cos_of_phi, sin_of_phi) =
+            (graph.call(Function::Cos, &[phi]), graph.call(Function::Sin, &[phi]));
+        let scale = vec![Graph::ONE, R, graph.mul(R, sin_theta)];
+        Geometry {
+            coordinates: vec![R, theta, phi],
+            scale,
+            turning,
+            rotation,
+            cartesian,
+            definitions: vec![(R, radius), (s, from_axis), (theta, colatitude), (phi, longitude)],
+            shorter: BTreeMap::from([
+                (cos_theta, Z_over_R),
+                (sin_theta, s_over_R),
+                (cos_of_phi, cos_phi),
+                (sin_of_phi, sin_phi),
+            ]),
+            transverse: Some(transverse),
         }
     }
 
     pub(crate) fn dimension(&self) -> usize {
         self.coordinates.len()
     }
+}
+
+/// Unit vectors that do not turn.
+fn no_turning(dimension: usize) -> Vec<Vec<Vec<Expr>>> {
+    vec![vec![vec![Graph::ZERO; dimension]; dimension]; dimension]
+}
+
+/// The distance of a point from the origin.
+fn distance(graph: &mut Graph, components: &[Expr]) -> Expr {
+    let squares: Vec<Expr> = components.iter().map(|&x| graph.powi(x, 2)).collect();
+    let sum = graph.sum_of(squares);
+    graph.sqrt(sum)
 }
 
 /// The unit matrix.

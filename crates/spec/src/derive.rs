@@ -433,12 +433,22 @@ fn turn_vector(graph: &mut Graph, geometry: &Geometry, vector: &Vector) -> Vecto
 /// Physical components to Cartesian ones: `A_ij = sum_ab Q_ia A_ab Q_jb`.
 fn turn_matrix(graph: &mut Graph, geometry: &Geometry, matrix: &Matrix) -> Matrix {
     let n = geometry.dimension();
+    // With equal diagonal entries for both angles these need not be told apart, which nobody can on the axis.
+    let isotropic = geometry.transverse.is_some() && matrix[1][1] == matrix[2][2];
     let mut turned = identity(n);
     for i in 0..n {
         for j in 0..n {
             let mut terms = Vec::new();
+            if let (Some(transverse), true) = (&geometry.transverse, isotropic) {
+                let (Qi, Qj) = (geometry.rotation[i][0], geometry.rotation[j][0]);
+                terms.push(graph.product_of([Qi, matrix[0][0], Qj]));
+                terms.push(graph.mul(matrix[1][1], transverse[i][j]));
+            }
             for a in 0..n {
                 for b in 0..n {
+                    if isotropic && a == b {
+                        continue;
+                    }
                     let (Qia, Qjb) = (geometry.rotation[i][a], geometry.rotation[j][b]);
                     terms.push(graph.product_of([Qia, matrix[a][b], Qjb]));
                 }

@@ -58,7 +58,7 @@ impl<'a> Scope<'a> {
             symbols.push(symbol);
         }
         let listed = coordinates.join(", ");
-        let elsewhere = ["X", "Y", "Z", "R", "theta"]
+        let elsewhere = ["X", "Y", "Z", "R", "theta", "phi"]
             .into_iter()
             .filter(|name| !coordinates.contains(name))
             .map(|name| (name.to_owned(), format!("the coordinates of this file are {listed}")))

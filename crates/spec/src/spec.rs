@@ -153,7 +153,7 @@ pub enum Domain {
         /// Largest coordinates.
         upper: Vec<Expr>,
     },
-    /// The points at a distance between two radii from the origin of the plane.
+    /// The points at a distance between two radii from the origin: an annulus in the plane, a spherical shell in space.
     Annulus {
         /// Inner radius.
         inner: Expr,
@@ -262,11 +262,8 @@ impl<'a> Reader<'a> {
         if !coordinates.allows_dimension(dimension) {
             let message =
                 format!("{} coordinates do not come in {dimension} dimensions", coordinates.name());
-            let help = match coordinates {
-                Coordinates::Cartesian => "dimension = 1, 2 or 3",
-                Coordinates::Polar => "dimension = 2",
-            };
-            return Err(source.error(message, document.dimension.span(), Some(help.into())));
+            let help = format!("dimension = {}", coordinates.dimensions());
+            return Err(source.error(message, document.dimension.span(), Some(help)));
         }
         let scope = Scope::new(source, coordinates.coordinate_names(dimension));
         Ok(Reader { scope, coordinates, dimension })
@@ -485,14 +482,15 @@ impl<'a> Reader<'a> {
         let (needed, annulus) = match shape {
             "box" => (["lower", "upper"], false),
             "annulus" if self.dimension == 2 => (["inner", "outer"], true),
-            "annulus" => {
-                let message = "an annulus is a shape of the plane";
-                let help = "dimension = 2, or shape = 'box'";
+            "shell" if self.dimension == 3 => (["inner", "outer"], true),
+            "annulus" | "shell" => {
+                let message = "an annulus is a shape of the plane, a shell one of space";
+                let help = "shape = 'annulus' with dimension = 2, 'shell' with dimension = 3, or 'box'";
                 return Err(self.scope.source.error(message, keys.shape.span(), Some(help.into())));
             }
             _ => {
                 let message = format!("the shape '{shape}' is not known");
-                let help = "shape = 'box' or 'annulus'";
+                let help = "shape = 'box', 'annulus' or 'shell'";
                 return Err(self.scope.source.error(message, keys.shape.span(), Some(help.into())));
             }
         };

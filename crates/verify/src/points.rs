@@ -40,20 +40,21 @@ pub(crate) fn interior<const D: usize>(
         Domain::Box { lower, upper } => {
             SVector::from_fn(|j, _| lower[j] + (upper[j] - lower[j]) * inside(q(j)))
         }
-        Domain::Annulus { inner, outer } => on_circle(inner + (outer - inner) * inside(q(0)), q(1)),
+        Domain::Annulus { inner, outer } => {
+            direction(q(1), q(D - 1)) * (inner + (outer - inner) * inside(q(0)))
+        }
         _ => return None,
     };
     Some((X, t))
 }
 
-/// The point at a distance `R` from the origin, `turn` of a full turn from the first axis.
-fn on_circle<const D: usize>(R: f64, turn: f64) -> SVector<f64, D> {
+/// A unit vector: in the plane, `turn` of a full turn from the first axis; in space, with a last component that
+/// `height` spreads evenly, so that directions cover the sphere evenly.
+fn direction<const D: usize>(turn: f64, height: f64) -> SVector<f64, D> {
     let (sin, cos) = (std::f64::consts::TAU * turn).sin_cos();
-    SVector::from_fn(|j, _| match j {
-        0 => R * cos,
-        1 => R * sin,
-        _ => 0.0,
-    })
+    let z = if D == 3 { 2.0 * height - 1.0 } else { 0.0 };
+    let across = (1.0 - z * z).sqrt();
+    SVector::from_fn(|j, _| [across * cos, across * sin, z].get(j).copied().unwrap_or(0.0))
 }
 
 /// How far one may go from `X` along any axis, in both directions, without leaving the body.
@@ -96,14 +97,20 @@ pub(crate) fn surface<const D: usize>(
         }
         (Domain::Annulus { inner, outer }, Surface::Inner | Surface::Outer) => {
             let (R, sign) = if surface == Surface::Inner { (*inner, -1.0) } else { (*outer, 1.0) };
-            Some((on_circle(R, q(0)), on_circle(sign, q(0))))
+            let n = direction(q(0), q(1));
+            Some((n * R, n * sign))
         }
         // The plane through the origin; the body lies on its positive side.
-        (Domain::Annulus { inner, outer }, Surface::Lower(axis)) if D == 2 && axis < D => {
-            let (mut X, mut normal) = (SVector::zeros(), SVector::zeros());
-            X[1 - axis] = inner + (outer - inner) * q(0);
+        (Domain::Annulus { inner, outer }, Surface::Lower(axis)) if D > 1 && axis < D => {
+            let mut X: SVector<f64, D> = SVector::zeros();
+            let mut normal = SVector::zeros();
+            let (sin, cos) = (std::f64::consts::FRAC_PI_2 * q(1)).sin_cos();
+            X[(axis + 1) % D] = if D == 2 { 1.0 } else { cos };
+            if D == 3 {
+                X[(axis + 2) % D] = sin;
+            }
             normal[axis] = -1.0;
-            Some((X, normal))
+            Some((X * (inner + (outer - inner) * q(0)), normal))
         }
         _ => None,
     }
@@ -138,6 +145,11 @@ mod tests {
             }
             let (X, N) = surface(&ring, Surface::Inner, n).unwrap();
             assert!((X.norm() - 0.5).abs() < 1e-15 && (N.norm() - 1.0).abs() < 1e-15);
+            let shell = Domain::<f64, 3>::Annulus { inner: 0.5, outer: 1.0 };
+            let R = interior(&shell, 1.0, n).unwrap().0.norm();
+            assert!((0.5..1.0).contains(&R));
+            let (X, N) = surface(&shell, Surface::Lower(1), n).unwrap();
+            assert!(X[1] == 0.0 && X.min() >= 0.0 && X.dot(&N) == 0.0);
             assert!(X.dot(&N) < 0.0, "the inner rim's normal points to the origin");
             let (X, N) = surface(&square, Surface::Upper(1), n).unwrap();
             assert_eq!((X[1], N), (1.0, vector![0.0, 1.0]));

@@ -10,10 +10,11 @@ use crate::{Case, points};
 /// Free cells beyond the furthest place that a free surface reaches.
 const MARGIN_CELLS: f64 = 3.0;
 
-/// How much of an annulus is modelled.
+/// How much of an annulus or a spherical shell is modelled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {
-    /// The part of positive coordinates, between the declared planes of symmetry.
+    /// The part of positive coordinates, between the declared planes of symmetry: a quarter of the plane, an eighth of
+    /// space.
     Quarter,
     /// All of it, without planes of symmetry.
     Full,
@@ -45,6 +46,12 @@ pub enum SceneError {
         surface: Surface,
         /// What.
         condition: Condition,
+    },
+    /// A surface of the body without a boundary condition.
+    #[error("the solution declares no condition on {surface:?}, so the solver cannot know what holds there")]
+    Undeclared {
+        /// Where.
+        surface: Surface,
     },
     /// The solver has no model for the body's shape or its material.
     #[error("the solver does not model this {what}: {value}")]
@@ -96,6 +103,14 @@ impl<const D: usize> Scene<D> {
         let unknown = || SceneError::Unknown { what: "shape", value: format!("{domain:?}") };
         let size = points::size(&domain).ok_or_else(unknown)?;
         let quarter = quarter(solution, case.extent)?;
+        let surfaces: Vec<Surface> = match domain {
+            Domain::Annulus { .. } => vec![Surface::Inner, Surface::Outer],
+            _ => (0..D).flat_map(|axis| [Surface::Lower(axis), Surface::Upper(axis)]).collect(),
+        };
+        let declared = |s: &Surface| solution.boundaries().iter().any(|b| b.surface == *s);
+        if let Some(surface) = surfaces.into_iter().find(|surface| !declared(surface)) {
+            return Err(SceneError::Undeclared { surface });
+        }
         let mut walls = [[false; 2]; D];
         for boundary in solution.boundaries() {
             let is_wall = match boundary.condition {
@@ -185,9 +200,12 @@ impl<const D: usize> Scene<D> {
         let cells: f64 = self.cells.iter().map(|&cells| cells as f64).product();
         let body = match self.domain {
             Domain::Annulus { inner, outer } => {
-                let turns = if self.extent() == Some(Extent::Full) { 1.0 } else { 0.25 };
-                let area = turns * std::f64::consts::PI * (outer * outer - inner * inner);
-                area / (self.spacing * self.spacing)
+                let pi = std::f64::consts::PI;
+                let whole = self.extent() == Some(Extent::Full);
+                let part = if whole { 1.0 } else { 0.5_f64.powi(D as i32) };
+                let full_ball = if D == 3 { 4.0 / 3.0 * pi } else { pi };
+                let content = part * full_ball * (outer.powi(D as i32) - inner.powi(D as i32));
+                content / self.spacing.powi(D as i32)
             }
             _ => cells,
         };
