@@ -7,6 +7,7 @@ use quote::quote;
 use std::collections::BTreeMap;
 
 /// Translates one program, in which some values were computed beforehand and stored.
+#[derive(Clone)]
 pub(crate) struct Translator<'a> {
     program: &'a Program,
     /// How each input is written.
@@ -46,6 +47,27 @@ impl<'a> Translator<'a> {
 
     pub(crate) fn store(&mut self, slot: Slot, place: TokenStream) {
         self.stored.insert(slot, place);
+    }
+
+    /// What `outputs` need of the time alone and of the position alone: the values that are read where both come
+    /// together, or are results.
+    pub(crate) fn staged_slots(&self, outputs: &[Slot]) -> (Vec<Slot>, Vec<Slot>) {
+        let needed = self.needed(outputs);
+        let both = |slot: &Slot| {
+            let dependence = self.program.dependence(*slot);
+            dependence.position && dependence.time
+        };
+        let mut slots: Vec<Slot> = self
+            .program
+            .slots()
+            .filter(|slot| needed[slot.index()] && both(slot))
+            .flat_map(|slot| self.program.operations()[slot.index()].operands())
+            .chain(outputs.iter().copied())
+            .filter(|slot| !both(slot) && !self.program.dependence(*slot).is_fixed())
+            .collect();
+        slots.sort_unstable();
+        slots.dedup();
+        slots.into_iter().partition(|&slot| self.program.dependence(slot).time)
     }
 
     /// The statements that compute `outputs`, and the outputs as expressions.

@@ -1,7 +1,7 @@
 //! The items of one solution, and the files that hold them.
 
 use crate::function::{Translator, float};
-use mmsmith_expr::{Expr, Program, Slot};
+use mmsmith_expr::{Expr, Program, Slot, arrange};
 use mmsmith_spec::{Boundary, Condition, DeriveError, Domain, Fields, Material, Spec, Surface};
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{format_ident, quote};
@@ -145,6 +145,8 @@ struct Generator<'a> {
 impl<'a> Generator<'a> {
     fn new(spec: &'a Spec, mut fields: Fields, runtime: &'a TokenStream) -> Self {
         let formulas = formulas(spec, &fields);
+        // Solvers sample the body force at the same points in every step; the other fields are for checks.
+        let b = arrange(&mut fields.graph, &fields.inputs, &fields.definitions, &fields.b);
         let matrix = |A: &Vec<Vec<Expr>>| A.concat();
         let parts = [
             ("displacement", "u", Shape::Vector, fields.u.clone()),
@@ -154,7 +156,7 @@ impl<'a> Generator<'a> {
             ("deformation_gradient", "F", Shape::Matrix, matrix(&fields.F)),
             ("jacobian", "J", Shape::Scalar, vec![fields.J]),
             ("first_piola_kirchhoff", "P", Shape::Matrix, matrix(&fields.P)),
-            ("body_force", "b", Shape::Vector, fields.b.clone()),
+            ("body_force", "b", Shape::Vector, b),
         ];
         let constants = Self::constants(spec);
         let mut outputs: Vec<Expr> = parts.iter().flat_map(|(.., part)| part.clone()).collect();
@@ -206,8 +208,17 @@ impl<'a> Generator<'a> {
         }
         let parameter_items = self.parameter_items(&parameters, &names.solution);
         let inherent = self.inherent_items(&solution, &parameters, &fixed);
-        let solution_items = self.solution_items(&translator);
+        let mut solution_items = self.solution_items(&translator);
+        let (stages, time, point) = self.stages(&translator);
         let dimension = Literal::usize_unsuffixed(self.spec.dimension);
+        solution_items.extend(quote! {
+            fn body_force_at(
+                &self,
+                X: &[#runtime::nalgebra::SVector<T, #dimension>],
+            ) -> ::std::boxed::Box<dyn #runtime::BodyForceAtPoints<T, #dimension> + '_> {
+                ::std::boxed::Box::new(#runtime::StagedPoints::<Self, T, #time, #point>::new(*self, X))
+            }
+        });
         let count = Literal::usize_unsuffixed(fixed.len());
         let variant =
             format_ident!("{}", ["One", "Two", "Three"][self.spec.dimension.clamp(1, 3) - 1]);
@@ -237,6 +248,11 @@ impl<'a> Generator<'a> {
             #[allow(unused_variables, clippy::all, clippy::pedantic)]
             impl<T: #runtime::Real> #runtime::Solution<T, #dimension> for #solution<T> {
                 #solution_items
+            }
+
+            #[allow(unused_variables, clippy::all, clippy::pedantic)]
+            impl<T: #runtime::Real> #runtime::BodyForceStages<T, #dimension, #time, #point> for #solution<T> {
+                #stages
             }
 
             impl<T: #runtime::Real> From<#solution<T>> for #runtime::AnySolution<T> {
@@ -402,6 +418,50 @@ impl<'a> Generator<'a> {
                 }
             }
         }
+    }
+
+    /// The functions of the trait `BodyForceStages`, and how many values there are of the time and of the point.
+    fn stages(&self, translator: &Translator<'_>) -> (TokenStream, Literal, Literal) {
+        let runtime = self.runtime;
+        let n = Literal::usize_unsuffixed(self.spec.dimension);
+        let vector = quote!(#runtime::nalgebra::SVector<T, #n>);
+        let outputs: Vec<Slot> = self
+            .fields
+            .iter()
+            .filter(|field| field.method == "body_force")
+            .flat_map(|field| field.outputs.clone())
+            .collect();
+        let (time_slots, point_slots) = translator.staged_slots(&outputs);
+        let (time_statements, time_values) = translator.statements(&time_slots);
+        let (point_statements, point_values) = translator.statements(&point_slots);
+        let mut inner = translator.clone();
+        for (slots, place) in [(&time_slots, quote!(time)), (&point_slots, quote!(point))] {
+            for (index, &slot) in slots.iter().enumerate() {
+                let index = Literal::usize_unsuffixed(index);
+                inner.store(slot, quote!(#place[#index]));
+            }
+        }
+        let (statements, values) = inner.statements(&outputs);
+        let time = Literal::usize_unsuffixed(time_slots.len());
+        let point = Literal::usize_unsuffixed(point_slots.len());
+        let items = quote! {
+            #[inline]
+            fn body_force_time(&self, t: T) -> [T; #time] {
+                #time_statements
+                [#(#time_values),*]
+            }
+            #[inline]
+            fn body_force_point(&self, X: &#vector) -> [T; #point] {
+                #point_statements
+                [#(#point_values),*]
+            }
+            #[inline(always)]
+            fn body_force_staged(&self, time: &[T; #time], point: &[T; #point]) -> #vector {
+                #statements
+                #runtime::nalgebra::SVector::<T, #n>::new(#(#values),*)
+            }
+        };
+        (items, time, point)
     }
 
     fn solution_items(&self, translator: &Translator<'_>) -> TokenStream {

@@ -20,6 +20,7 @@ mod generated;
 mod parameters;
 mod real;
 mod solution;
+mod staged;
 
 pub use domain::{Boundary, Condition, Domain, Surface};
 pub use generated::*;
@@ -28,3 +29,4 @@ pub use nalgebra;
 pub use parameters::{Description, Parameter, ParameterError};
 pub use real::Real;
 pub use solution::{AnySolution, Fields, Material, Solution};
+pub use staged::{BLOCK, BodyForceAtPoints, BodyForceStages, StagedPoints};

@@ -19,7 +19,7 @@ pub trait Real: RealField + Copy {
 }
 
 macro_rules! implement_real {
-    ($float:ty, $pi:expr) => {
+    ($float:ty, $pi:expr, $shift:expr) => {
         impl Real for $float {
             #[inline]
             fn nearest(value: f64) -> Self {
@@ -33,10 +33,8 @@ macro_rules! implement_real {
 
             #[inline]
             fn sin_pi(self) -> Self {
-                // x = n/2 + r with |r| <= 1/4; n and r are exact.
-                let n = (self * 2.0).round();
-                let r = (self - n * 0.5) * $pi;
-                match n.rem_euclid(4.0) as u8 {
+                let (quadrant, r) = reduced(self);
+                match quadrant {
                     0 => r.sin(),
                     1 => r.cos(),
                     2 => -r.sin(),
@@ -46,9 +44,8 @@ macro_rules! implement_real {
 
             #[inline]
             fn cos_pi(self) -> Self {
-                let n = (self * 2.0).round();
-                let r = (self - n * 0.5) * $pi;
-                match n.rem_euclid(4.0) as u8 {
+                let (quadrant, r) = reduced(self);
+                match quadrant {
                     0 => r.cos(),
                     1 => -r.sin(),
                     2 => -r.cos(),
@@ -56,11 +53,36 @@ macro_rules! implement_real {
                 }
             }
         }
+
+        /// `x = n/2 + r/pi` with `|r| <= pi/4`: the remainder of `n` by four, and `r`.
+        #[inline]
+        fn reduced(x: $float) -> (u8, $float) {
+            // One and a half times the power of two from which on floats are whole numbers: adding it rounds, and the
+            // last two bits of the sum are those of the whole number.
+            const SHIFT: $float = $shift;
+            let halves = 2.0 * x;
+            let (n, quadrant) = if halves.abs() < SHIFT / 3.0 {
+                let shifted = halves + SHIFT;
+                (shifted - SHIFT, (shifted.to_bits() & 3) as u8)
+            } else {
+                // A whole number or not a number; both are rare.
+                let n = halves.round();
+                (n, n.rem_euclid(4.0) as u8)
+            };
+            // All but the product is exact.
+            (quadrant, (x - n * 0.5) * $pi)
+        }
     };
 }
 
-implement_real!(f32, std::f32::consts::PI);
-implement_real!(f64, std::f64::consts::PI);
+mod single {
+    use super::Real;
+    implement_real!(f32, std::f32::consts::PI, 12_582_912.0);
+}
+mod double {
+    use super::Real;
+    implement_real!(f64, std::f64::consts::PI, 6_755_399_441_055_744.0);
+}
 
 #[cfg(test)]
 mod tests {

@@ -1,6 +1,7 @@
 //! What every manufactured solution can do.
 
-use crate::{Boundary, Domain, Real};
+use crate::staged::PlainPoints;
+use crate::{BodyForceAtPoints, Boundary, Domain, Real};
 use nalgebra::{SMatrix, SVector};
 
 /// The constitutive law of a solution, with its constants; what a solver needs to model the same material.
@@ -58,6 +59,12 @@ pub trait Solution<T: Real, const D: usize>: Send + Sync {
     fn first_piola_kirchhoff(&self, X: &SVector<T, D>, t: T) -> SMatrix<T, D, D>;
     /// Body force `b` per unit mass, from `rho0 a = Div P + rho0 b`.
     fn body_force(&self, X: &SVector<T, D>, t: T) -> SVector<T, D>;
+    /// The body force at many fixed points: what depends on the points alone is computed here, once, and kept.
+    ///
+    /// Solutions that have no stages keep the positions and compute the rest at each evaluation.
+    fn body_force_at(&self, X: &[SVector<T, D>]) -> Box<dyn BodyForceAtPoints<T, D> + '_> {
+        Box::new(PlainPoints { solution: self, X: X.to_vec() })
+    }
     /// All fields at once.
     fn fields(&self, X: &SVector<T, D>, t: T) -> Fields<T, D>;
 

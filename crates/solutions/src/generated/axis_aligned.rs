@@ -38,7 +38,7 @@ impl<T: crate::Real> Default for AxisAlignedParameters<T> {
 pub struct AxisAligned<T: crate::Real> {
     parameters: AxisAlignedParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 11],
+    fixed: [T; 12],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> AxisAligned<T> {
@@ -137,14 +137,24 @@ impl<T: crate::Real> AxisAligned<T> {
         let t86 = parameters.rho0 * t47;
         let t87 = t86 * t50;
         let t88 = t85 / t87;
-        let t97 = t18 * parameters.E;
-        let t98 = t97 * parameters.nu;
-        let t99 = t98 / t62;
-        let t105 = t26 / parameters.rho0;
-        let t129 = T::nearest(2.0) / t7;
+        let t91 = parameters.A * parameters.A;
+        let t92 = t91 * parameters.A;
+        let t93 = t25 * t25;
+        let t95 = t63 + t67;
+        let t96 = t92 * t93;
+        let t97 = t96 * t95;
+        let t98 = t97 / parameters.rho0;
+        let t103 = t25 * T::pi();
+        let t104 = T::nearest(2.0) * t91;
+        let t105 = t104 * t103;
+        let t106 = t105 * t95;
+        let t107 = t106 / parameters.rho0;
+        let t113 = t27 * parameters.nu;
+        let t114 = t113 / t87;
+        let t141 = T::nearest(2.0) / t7;
         Ok(AxisAligned {
             parameters,
-            fixed: [t7, t18, t19, t28, t63, t67, t69, t88, t99, t105, t129],
+            fixed: [t7, t18, t19, t28, t63, t67, t69, t88, t98, t107, t114, t141],
         })
     }
     /// The solution with parameter values in the order of the description; missing ones take their
@@ -354,48 +364,45 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t58 = t57 + t56;
         let t59 = self.fixed[1] * t58;
         let t60 = t59.ln_1p();
-        let t64 = self.fixed[4] * t60;
-        let t70 = self.fixed[6] * t9;
-        let t71 = t70 * t35;
-        let t76 = self.fixed[6] * t14;
-        let t77 = t76 * t39;
-        let t89 = self.fixed[7] * t9;
-        let t90 = t89 * t2;
-        let t91 = t64 + t71;
-        let t92 = t91 / t43;
-        let t93 = t37 * t92;
-        let t94 = self.fixed[4] / t43;
-        let t95 = self.fixed[5] + t94;
-        let t96 = t37 * t95;
-        let t100 = self.fixed[8] * t9;
-        let t101 = t100 * t35;
-        let t102 = t91 - t93;
-        let t103 = t102 + t96;
-        let t104 = t103 + t101;
-        let t106 = self.fixed[9] * t9;
-        let t107 = t106 * t2;
-        let t108 = t104 / t43;
-        let t109 = t107 * t108;
-        let t110 = t90 - t109;
-        let t111 = self.fixed[7] * t14;
-        let t112 = t111 * t13;
-        let t113 = t64 + t77;
-        let t114 = t113 / t44;
-        let t115 = t41 * t114;
-        let t116 = self.fixed[4] / t44;
-        let t117 = self.fixed[5] + t116;
-        let t118 = t41 * t117;
-        let t119 = self.fixed[8] * t14;
-        let t120 = t119 * t39;
-        let t121 = t113 - t115;
-        let t122 = t121 + t118;
-        let t123 = t122 + t120;
-        let t124 = self.fixed[9] * t14;
-        let t125 = t124 * t13;
-        let t126 = t123 / t44;
-        let t127 = t125 * t126;
-        let t128 = t112 - t127;
-        crate::nalgebra::SVector::<T, 2>::new(t110, t128)
+        let t89 = self.fixed[7] * t2;
+        let t90 = t43 * t43;
+        let t94 = t35 * t35;
+        let t99 = t2 * t94;
+        let t100 = self.fixed[8] * t99;
+        let t101 = -t100;
+        let t102 = t9 * t101;
+        let t108 = t2 * t35;
+        let t109 = self.fixed[9] * t108;
+        let t110 = -t109;
+        let t111 = t110 + t102;
+        let t112 = t9 * t111;
+        let t115 = self.fixed[10] * t2;
+        let t116 = -t115;
+        let t117 = t116 * t60;
+        let t118 = t112 + t117;
+        let t119 = t118 / t90;
+        let t120 = t89 + t119;
+        let t121 = t9 * t120;
+        let t122 = self.fixed[7] * t13;
+        let t123 = t44 * t44;
+        let t124 = t39 * t39;
+        let t125 = t13 * t124;
+        let t126 = self.fixed[8] * t125;
+        let t127 = -t126;
+        let t128 = t14 * t127;
+        let t129 = t13 * t39;
+        let t130 = self.fixed[9] * t129;
+        let t131 = -t130;
+        let t132 = t131 + t128;
+        let t133 = t14 * t132;
+        let t134 = self.fixed[10] * t13;
+        let t135 = -t134;
+        let t136 = t135 * t60;
+        let t137 = t133 + t136;
+        let t138 = t137 / t123;
+        let t139 = t122 + t138;
+        let t140 = t14 * t139;
+        crate::nalgebra::SVector::<T, 2>::new(t121, t140)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t2 = X[0].sin_pi();
@@ -450,42 +457,44 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t78 = t77 * t75;
         let t79 = t64 + t78;
         let t80 = t79 / t44;
-        let t89 = self.fixed[7] * t9;
-        let t90 = t89 * t2;
-        let t91 = t64 + t71;
-        let t92 = t91 / t43;
-        let t93 = t37 * t92;
-        let t94 = self.fixed[4] / t43;
-        let t95 = self.fixed[5] + t94;
-        let t96 = t37 * t95;
-        let t100 = self.fixed[8] * t9;
-        let t101 = t100 * t35;
-        let t102 = t91 - t93;
-        let t103 = t102 + t96;
-        let t104 = t103 + t101;
-        let t106 = self.fixed[9] * t9;
-        let t107 = t106 * t2;
-        let t108 = t104 / t43;
-        let t109 = t107 * t108;
-        let t110 = t90 - t109;
-        let t111 = self.fixed[7] * t14;
-        let t112 = t111 * t13;
-        let t113 = t64 + t77;
-        let t114 = t113 / t44;
-        let t115 = t41 * t114;
-        let t116 = self.fixed[4] / t44;
-        let t117 = self.fixed[5] + t116;
-        let t118 = t41 * t117;
-        let t119 = self.fixed[8] * t14;
-        let t120 = t119 * t39;
-        let t121 = t113 - t115;
-        let t122 = t121 + t118;
-        let t123 = t122 + t120;
-        let t124 = self.fixed[9] * t14;
-        let t125 = t124 * t13;
-        let t126 = t123 / t44;
-        let t127 = t125 * t126;
-        let t128 = t112 - t127;
+        let t89 = self.fixed[7] * t2;
+        let t90 = t43 * t43;
+        let t94 = t35 * t35;
+        let t99 = t2 * t94;
+        let t100 = self.fixed[8] * t99;
+        let t101 = -t100;
+        let t102 = t9 * t101;
+        let t108 = t2 * t35;
+        let t109 = self.fixed[9] * t108;
+        let t110 = -t109;
+        let t111 = t110 + t102;
+        let t112 = t9 * t111;
+        let t115 = self.fixed[10] * t2;
+        let t116 = -t115;
+        let t117 = t116 * t60;
+        let t118 = t112 + t117;
+        let t119 = t118 / t90;
+        let t120 = t89 + t119;
+        let t121 = t9 * t120;
+        let t122 = self.fixed[7] * t13;
+        let t123 = t44 * t44;
+        let t124 = t39 * t39;
+        let t125 = t13 * t124;
+        let t126 = self.fixed[8] * t125;
+        let t127 = -t126;
+        let t128 = t14 * t127;
+        let t129 = t13 * t39;
+        let t130 = self.fixed[9] * t129;
+        let t131 = -t130;
+        let t132 = t131 + t128;
+        let t133 = t14 * t132;
+        let t134 = self.fixed[10] * t13;
+        let t135 = -t134;
+        let t136 = t135 * t60;
+        let t137 = t133 + t136;
+        let t138 = t137 / t123;
+        let t139 = t122 + t138;
+        let t140 = t14 * t139;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t11, t16),
             v: crate::nalgebra::SVector::<T, 2>::new(t22, t24),
@@ -494,7 +503,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t43, T::zero(), T::zero(), t44),
             J: t45,
             P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t74, T::zero(), T::zero(), t80),
-            b: crate::nalgebra::SVector::<T, 2>::new(t110, t128),
+            b: crate::nalgebra::SVector::<T, 2>::new(t121, t140),
         }
     }
     fn domain(&self) -> crate::Domain<T, 2> {
@@ -539,7 +548,93 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[10]
+        self.fixed[11]
+    }
+    fn body_force_at(
+        &self,
+        X: &[crate::nalgebra::SVector<T, 2>],
+    ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 5, 11>::new(*self, X))
+    }
+}
+#[allow(unused_variables, clippy::all, clippy::pedantic)]
+impl<T: crate::Real> crate::BodyForceStages<T, 2, 5, 11> for AxisAligned<T> {
+    #[inline]
+    fn body_force_time(&self, t: T) -> [T; 5] {
+        let t8 = self.fixed[0] * t;
+        let t9 = t8.cos_pi();
+        let t14 = t8.sin_pi();
+        let t36 = self.fixed[1] * t9;
+        let t40 = self.fixed[1] * t14;
+        let t53 = t9 * t14;
+        let t54 = self.fixed[1] * t53;
+        [t9, t14, t36, t40, t54]
+    }
+    #[inline]
+    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 11] {
+        let t2 = X[0].sin_pi();
+        let t13 = X[1].sin_pi();
+        let t35 = X[0].cos_pi();
+        let t39 = X[1].cos_pi();
+        let t55 = t35 * t39;
+        let t89 = self.fixed[7] * t2;
+        let t94 = t35 * t35;
+        let t99 = t2 * t94;
+        let t100 = self.fixed[8] * t99;
+        let t101 = -t100;
+        let t108 = t2 * t35;
+        let t109 = self.fixed[9] * t108;
+        let t110 = -t109;
+        let t115 = self.fixed[10] * t2;
+        let t116 = -t115;
+        let t122 = self.fixed[7] * t13;
+        let t124 = t39 * t39;
+        let t125 = t13 * t124;
+        let t126 = self.fixed[8] * t125;
+        let t127 = -t126;
+        let t129 = t13 * t39;
+        let t130 = self.fixed[9] * t129;
+        let t131 = -t130;
+        let t134 = self.fixed[10] * t13;
+        let t135 = -t134;
+        [t35, t39, t55, t89, t101, t110, t116, t122, t127, t131, t135]
+    }
+    #[inline(always)]
+    fn body_force_staged(
+        &self,
+        time: &[T; 5],
+        point: &[T; 11],
+    ) -> crate::nalgebra::SVector<T, 2> {
+        let t37 = time[2] * point[0];
+        let t41 = time[3] * point[1];
+        let t43 = t37 + T::one();
+        let t44 = t41 + T::one();
+        let t51 = time[0] * point[0];
+        let t52 = time[1] * point[1];
+        let t56 = time[4] * point[2];
+        let t57 = t51 + t52;
+        let t58 = t57 + t56;
+        let t59 = self.fixed[1] * t58;
+        let t60 = t59.ln_1p();
+        let t90 = t43 * t43;
+        let t102 = time[0] * point[4];
+        let t111 = point[5] + t102;
+        let t112 = time[0] * t111;
+        let t117 = point[6] * t60;
+        let t118 = t112 + t117;
+        let t119 = t118 / t90;
+        let t120 = point[3] + t119;
+        let t121 = time[0] * t120;
+        let t123 = t44 * t44;
+        let t128 = time[1] * point[8];
+        let t132 = point[9] + t128;
+        let t133 = time[1] * t132;
+        let t136 = point[10] * t60;
+        let t137 = t133 + t136;
+        let t138 = t137 / t123;
+        let t139 = point[7] + t138;
+        let t140 = time[1] * t139;
+        crate::nalgebra::SVector::<T, 2>::new(t121, t140)
     }
 }
 impl<T: crate::Real> From<AxisAligned<T>> for crate::AnySolution<T> {

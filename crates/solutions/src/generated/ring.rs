@@ -41,7 +41,7 @@ impl<T: crate::Real> Default for RingParameters<T> {
 pub struct Ring<T: crate::Real> {
     parameters: RingParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 21],
+    fixed: [T; 23],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Ring<T> {
@@ -128,42 +128,60 @@ impl<T: crate::Real> Ring<T> {
         let t11 = T::nearest(3.0) * parameters.Ri;
         let t12 = t11 - parameters.Ro;
         let t14 = T::nearest(6.0) * parameters.Ri;
-        let t23 = T::nearest(2.0) / parameters.Ro;
-        let t25 = parameters.Ri + parameters.Ro;
-        let t26 = T::nearest(3.0) * t25;
-        let t27 = t26 / parameters.Ro;
-        let t31 = parameters.Ro * t12;
-        let t32 = parameters.A / t31;
-        let t40 = parameters.A * t6;
-        let t41 = t40 * T::pi();
-        let t42 = t41 / t31;
-        let t48 = T::pi() * T::pi();
-        let t49 = parameters.A * parameters.E;
-        let t50 = t49 * t48;
-        let t51 = parameters.rho0 * parameters.Ro;
-        let t52 = t51 * t12;
-        let t53 = t50 / t52;
-        let t60 = T::one() / parameters.Ro;
-        let t63 = T::nearest(3.0) * parameters.Ro;
-        let t64 = t11 + t63;
-        let t76 = parameters.Ro * parameters.Ro;
-        let t80 = t76 * t12;
-        let t81 = parameters.A / t80;
-        let t95 = T::nearest(2.0) * parameters.A;
-        let t96 = t95 / t31;
-        let t104 = T::nearest(0.5) * parameters.E;
+        let t21 = T::nearest(2.0) / parameters.Ro;
+        let t24 = parameters.Ri + parameters.Ro;
+        let t25 = T::nearest(3.0) * t24;
+        let t26 = t25 / parameters.Ro;
+        let t30 = parameters.Ro * t12;
+        let t31 = parameters.A / t30;
+        let t39 = parameters.A * t6;
+        let t40 = t39 * T::pi();
+        let t41 = t40 / t30;
+        let t47 = T::pi() * T::pi();
+        let t48 = parameters.A * parameters.E;
+        let t49 = t48 * t47;
+        let t50 = parameters.rho0 * parameters.Ro;
+        let t51 = t50 * t12;
+        let t52 = t49 / t51;
+        let t59 = T::one() / parameters.Ro;
+        let t62 = T::nearest(3.0) * parameters.Ro;
+        let t63 = t11 + t62;
+        let t75 = parameters.Ro * parameters.Ro;
+        let t79 = t75 * t12;
+        let t80 = parameters.A / t79;
+        let t94 = T::nearest(2.0) * parameters.A;
+        let t95 = t94 / t30;
+        let t103 = T::nearest(0.5) * parameters.E;
         let t129 = T::nearest(9.0) * parameters.Ri;
         let t130 = T::nearest(9.0) * parameters.Ro;
         let t131 = t129 + t130;
-        let t137 = t49 / t52;
-        let t142 = T::nearest(6.0) * parameters.A;
-        let t143 = t142 / t80;
-        let t155 = parameters.A * parameters.A;
-        let t157 = t12 * t12;
-        let t159 = t76 * t157;
-        let t160 = t155 / t159;
-        let t167 = t104 / parameters.rho0;
-        let t174 = T::nearest(2.0) / t6;
+        let t137 = t48 / t51;
+        let t141 = parameters.A * parameters.A;
+        let t142 = t141 * t141;
+        let t143 = t75 * t75;
+        let t144 = t143 * parameters.Ro;
+        let t145 = t12 * t12;
+        let t146 = t145 * t145;
+        let t148 = T::nearest(4.0) * t142;
+        let t149 = t148 * t103;
+        let t150 = parameters.rho0 * t144;
+        let t151 = t150 * t146;
+        let t152 = t149 / t151;
+        let t157 = t141 * parameters.A;
+        let t158 = t75 * parameters.Ro;
+        let t159 = t145 * t12;
+        let t161 = T::nearest(3.0) / parameters.Ro;
+        let t167 = T::nearest(6.0) / parameters.Ro;
+        let t175 = T::nearest(4.0) * t157;
+        let t176 = t175 * t103;
+        let t177 = parameters.rho0 * t158;
+        let t178 = t177 * t159;
+        let t179 = t176 / t178;
+        let t187 = t141 * t103;
+        let t188 = parameters.rho0 * t75;
+        let t189 = t188 * t145;
+        let t190 = t187 / t189;
+        let t202 = T::nearest(2.0) / t6;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -176,24 +194,26 @@ impl<T: crate::Real> Ring<T> {
                 t6,
                 t11,
                 t14,
-                t23,
-                t25,
-                t27,
-                t32,
-                t42,
-                t48,
-                t53,
-                t60,
-                t64,
-                t81,
-                t96,
-                t104,
+                t21,
+                t24,
+                t26,
+                t31,
+                t41,
+                t47,
+                t52,
+                t59,
+                t63,
+                t80,
+                t95,
+                t103,
                 t131,
                 t137,
-                t143,
-                t160,
+                t152,
+                t161,
                 t167,
-                t174,
+                t179,
+                t190,
+                t202,
             ],
         })
     }
@@ -241,18 +261,17 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t17 = X[0] * X[0];
         let t19 = X[1] * X[1];
         let t20 = t17 + t19;
-        let t21 = t20.sqrt();
-        let t22 = t21 * t21;
-        let t24 = self.fixed[3] * t22;
-        let t28 = self.fixed[5] * t21;
-        let t29 = t24 - t28;
-        let t30 = self.fixed[2] + t29;
-        let t33 = self.fixed[6] * t8;
-        let t34 = t30 * X[0];
-        let t35 = t33 * t34;
-        let t36 = t30 * X[1];
-        let t37 = t33 * t36;
-        crate::nalgebra::SVector::<T, 2>::new(t35, t37)
+        let t22 = self.fixed[3] * t20;
+        let t23 = t20.sqrt();
+        let t27 = self.fixed[5] * t23;
+        let t28 = t22 - t27;
+        let t29 = self.fixed[2] + t28;
+        let t32 = self.fixed[6] * t8;
+        let t33 = t29 * X[0];
+        let t34 = t32 * t33;
+        let t35 = t29 * X[1];
+        let t36 = t32 * t35;
+        crate::nalgebra::SVector::<T, 2>::new(t34, t36)
     }
     #[inline]
     fn velocity(
@@ -264,21 +283,20 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t17 = X[0] * X[0];
         let t19 = X[1] * X[1];
         let t20 = t17 + t19;
-        let t21 = t20.sqrt();
-        let t22 = t21 * t21;
-        let t24 = self.fixed[3] * t22;
-        let t28 = self.fixed[5] * t21;
-        let t29 = t24 - t28;
-        let t30 = self.fixed[2] + t29;
-        let t34 = t30 * X[0];
-        let t36 = t30 * X[1];
-        let t39 = t7.sin_pi();
-        let t43 = self.fixed[7] * t39;
-        let t44 = t43 * t34;
-        let t45 = -t44;
-        let t46 = t43 * t36;
-        let t47 = -t46;
-        crate::nalgebra::SVector::<T, 2>::new(t45, t47)
+        let t22 = self.fixed[3] * t20;
+        let t23 = t20.sqrt();
+        let t27 = self.fixed[5] * t23;
+        let t28 = t22 - t27;
+        let t29 = self.fixed[2] + t28;
+        let t33 = t29 * X[0];
+        let t35 = t29 * X[1];
+        let t38 = t7.sin_pi();
+        let t42 = self.fixed[7] * t38;
+        let t43 = t42 * t33;
+        let t44 = -t43;
+        let t45 = t42 * t35;
+        let t46 = -t45;
+        crate::nalgebra::SVector::<T, 2>::new(t44, t46)
     }
     #[inline]
     fn acceleration(
@@ -291,20 +309,19 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t17 = X[0] * X[0];
         let t19 = X[1] * X[1];
         let t20 = t17 + t19;
-        let t21 = t20.sqrt();
-        let t22 = t21 * t21;
-        let t24 = self.fixed[3] * t22;
-        let t28 = self.fixed[5] * t21;
-        let t29 = t24 - t28;
-        let t30 = self.fixed[2] + t29;
-        let t34 = t30 * X[0];
-        let t36 = t30 * X[1];
-        let t54 = self.fixed[9] * t8;
-        let t55 = t54 * t34;
-        let t56 = -t55;
-        let t57 = t54 * t36;
-        let t58 = -t57;
-        crate::nalgebra::SVector::<T, 2>::new(t56, t58)
+        let t22 = self.fixed[3] * t20;
+        let t23 = t20.sqrt();
+        let t27 = self.fixed[5] * t23;
+        let t28 = t22 - t27;
+        let t29 = self.fixed[2] + t28;
+        let t33 = t29 * X[0];
+        let t35 = t29 * X[1];
+        let t53 = self.fixed[9] * t8;
+        let t54 = t53 * t33;
+        let t55 = -t54;
+        let t56 = t53 * t35;
+        let t57 = -t56;
+        crate::nalgebra::SVector::<T, 2>::new(t55, t57)
     }
     #[inline]
     fn displacement_gradient(
@@ -317,40 +334,39 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t17 = X[0] * X[0];
         let t19 = X[1] * X[1];
         let t20 = t17 + t19;
-        let t21 = t20.sqrt();
-        let t22 = t21 * t21;
-        let t24 = self.fixed[3] * t22;
-        let t28 = self.fixed[5] * t21;
-        let t29 = t24 - t28;
-        let t30 = self.fixed[2] + t29;
-        let t33 = self.fixed[6] * t8;
-        let t61 = self.fixed[10] * t22;
-        let t62 = T::nearest(2.0) * t21;
-        let t65 = t62 - self.fixed[11];
-        let t66 = t21 * t65;
-        let t67 = self.fixed[10] * t66;
-        let t68 = t61 + t67;
-        let t69 = self.fixed[1] + t68;
-        let t70 = t17 * t69;
-        let t71 = T::nearest(2.0) * t70;
-        let t72 = t30 * t19;
-        let t73 = t71 + t72;
-        let t74 = t73 / t22;
-        let t75 = t33 * t74;
-        let t78 = T::nearest(4.0) * t21;
-        let t79 = t78 - self.fixed[11];
-        let t82 = self.fixed[12] * t8;
-        let t83 = X[0] * X[1];
-        let t84 = t83 * t79;
-        let t85 = t84 / t21;
-        let t86 = t82 * t85;
-        let t87 = t19 * t69;
-        let t88 = T::nearest(2.0) * t87;
-        let t89 = t30 * t17;
-        let t90 = t88 + t89;
-        let t91 = t90 / t22;
-        let t92 = t33 * t91;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t75, t86, t86, t92)
+        let t22 = self.fixed[3] * t20;
+        let t23 = t20.sqrt();
+        let t27 = self.fixed[5] * t23;
+        let t28 = t22 - t27;
+        let t29 = self.fixed[2] + t28;
+        let t32 = self.fixed[6] * t8;
+        let t60 = self.fixed[10] * t20;
+        let t61 = T::nearest(2.0) * t23;
+        let t64 = t61 - self.fixed[11];
+        let t65 = t23 * t64;
+        let t66 = self.fixed[10] * t65;
+        let t67 = t60 + t66;
+        let t68 = self.fixed[1] + t67;
+        let t69 = t17 * t68;
+        let t70 = T::nearest(2.0) * t69;
+        let t71 = t29 * t19;
+        let t72 = t70 + t71;
+        let t73 = t72 / t20;
+        let t74 = t32 * t73;
+        let t77 = T::nearest(4.0) * t23;
+        let t78 = t77 - self.fixed[11];
+        let t81 = self.fixed[12] * t8;
+        let t82 = X[0] * X[1];
+        let t83 = t82 * t78;
+        let t84 = t83 / t23;
+        let t85 = t81 * t84;
+        let t86 = t19 * t68;
+        let t87 = T::nearest(2.0) * t86;
+        let t88 = t29 * t17;
+        let t89 = t87 + t88;
+        let t90 = t89 / t20;
+        let t91 = t32 * t90;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t74, t85, t85, t91)
     }
     #[inline]
     fn deformation_gradient(
@@ -363,42 +379,41 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t17 = X[0] * X[0];
         let t19 = X[1] * X[1];
         let t20 = t17 + t19;
-        let t21 = t20.sqrt();
-        let t22 = t21 * t21;
-        let t24 = self.fixed[3] * t22;
-        let t28 = self.fixed[5] * t21;
-        let t29 = t24 - t28;
-        let t30 = self.fixed[2] + t29;
-        let t33 = self.fixed[6] * t8;
-        let t61 = self.fixed[10] * t22;
-        let t62 = T::nearest(2.0) * t21;
-        let t65 = t62 - self.fixed[11];
-        let t66 = t21 * t65;
-        let t67 = self.fixed[10] * t66;
-        let t68 = t61 + t67;
-        let t69 = self.fixed[1] + t68;
-        let t70 = t17 * t69;
-        let t71 = T::nearest(2.0) * t70;
-        let t72 = t30 * t19;
-        let t73 = t71 + t72;
-        let t74 = t73 / t22;
-        let t75 = t33 * t74;
-        let t78 = T::nearest(4.0) * t21;
-        let t79 = t78 - self.fixed[11];
-        let t82 = self.fixed[12] * t8;
-        let t83 = X[0] * X[1];
-        let t84 = t83 * t79;
-        let t85 = t84 / t21;
-        let t86 = t82 * t85;
-        let t87 = t19 * t69;
-        let t88 = T::nearest(2.0) * t87;
-        let t89 = t30 * t17;
-        let t90 = t88 + t89;
-        let t91 = t90 / t22;
-        let t92 = t33 * t91;
-        let t93 = t75 + T::one();
-        let t94 = t92 + T::one();
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t93, t86, t86, t94)
+        let t22 = self.fixed[3] * t20;
+        let t23 = t20.sqrt();
+        let t27 = self.fixed[5] * t23;
+        let t28 = t22 - t27;
+        let t29 = self.fixed[2] + t28;
+        let t32 = self.fixed[6] * t8;
+        let t60 = self.fixed[10] * t20;
+        let t61 = T::nearest(2.0) * t23;
+        let t64 = t61 - self.fixed[11];
+        let t65 = t23 * t64;
+        let t66 = self.fixed[10] * t65;
+        let t67 = t60 + t66;
+        let t68 = self.fixed[1] + t67;
+        let t69 = t17 * t68;
+        let t70 = T::nearest(2.0) * t69;
+        let t71 = t29 * t19;
+        let t72 = t70 + t71;
+        let t73 = t72 / t20;
+        let t74 = t32 * t73;
+        let t77 = T::nearest(4.0) * t23;
+        let t78 = t77 - self.fixed[11];
+        let t81 = self.fixed[12] * t8;
+        let t82 = X[0] * X[1];
+        let t83 = t82 * t78;
+        let t84 = t83 / t23;
+        let t85 = t81 * t84;
+        let t86 = t19 * t68;
+        let t87 = T::nearest(2.0) * t86;
+        let t88 = t29 * t17;
+        let t89 = t87 + t88;
+        let t90 = t89 / t20;
+        let t91 = t32 * t90;
+        let t92 = t74 + T::one();
+        let t93 = t91 + T::one();
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t92, t85, t85, t93)
     }
     #[inline]
     fn jacobian(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> T {
@@ -407,27 +422,26 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t17 = X[0] * X[0];
         let t19 = X[1] * X[1];
         let t20 = t17 + t19;
-        let t21 = t20.sqrt();
-        let t22 = t21 * t21;
-        let t24 = self.fixed[3] * t22;
-        let t28 = self.fixed[5] * t21;
-        let t29 = t24 - t28;
-        let t30 = self.fixed[2] + t29;
-        let t33 = self.fixed[6] * t8;
-        let t61 = self.fixed[10] * t22;
-        let t62 = T::nearest(2.0) * t21;
-        let t65 = t62 - self.fixed[11];
-        let t66 = t21 * t65;
-        let t67 = self.fixed[10] * t66;
-        let t68 = t61 + t67;
-        let t69 = self.fixed[1] + t68;
-        let t97 = self.fixed[13] * t8;
-        let t98 = t97 * t69;
-        let t99 = t98 + T::one();
-        let t100 = t33 * t30;
-        let t101 = t100 + T::one();
-        let t102 = t99 * t101;
-        t102
+        let t22 = self.fixed[3] * t20;
+        let t23 = t20.sqrt();
+        let t27 = self.fixed[5] * t23;
+        let t28 = t22 - t27;
+        let t29 = self.fixed[2] + t28;
+        let t32 = self.fixed[6] * t8;
+        let t60 = self.fixed[10] * t20;
+        let t61 = T::nearest(2.0) * t23;
+        let t64 = t61 - self.fixed[11];
+        let t65 = t23 * t64;
+        let t66 = self.fixed[10] * t65;
+        let t67 = t60 + t66;
+        let t68 = self.fixed[1] + t67;
+        let t96 = self.fixed[13] * t8;
+        let t97 = t96 * t68;
+        let t98 = t97 + T::one();
+        let t99 = t32 * t29;
+        let t100 = t99 + T::one();
+        let t101 = t98 * t100;
+        t101
     }
     #[inline]
     fn first_piola_kirchhoff(
@@ -440,50 +454,49 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t17 = X[0] * X[0];
         let t19 = X[1] * X[1];
         let t20 = t17 + t19;
-        let t21 = t20.sqrt();
-        let t22 = t21 * t21;
-        let t24 = self.fixed[3] * t22;
-        let t28 = self.fixed[5] * t21;
-        let t29 = t24 - t28;
-        let t30 = self.fixed[2] + t29;
-        let t33 = self.fixed[6] * t8;
-        let t61 = self.fixed[10] * t22;
-        let t62 = T::nearest(2.0) * t21;
-        let t65 = t62 - self.fixed[11];
-        let t66 = t21 * t65;
-        let t67 = self.fixed[10] * t66;
-        let t68 = t61 + t67;
-        let t69 = self.fixed[1] + t68;
-        let t72 = t30 * t19;
-        let t83 = X[0] * X[1];
-        let t89 = t30 * t17;
-        let t97 = self.fixed[13] * t8;
-        let t98 = t97 * t69;
-        let t99 = t98 + T::one();
-        let t100 = t33 * t30;
-        let t101 = t100 + T::one();
-        let t105 = t98 + T::nearest(2.0);
-        let t106 = t98 * t105;
-        let t107 = t106 / t99;
-        let t108 = t17 * t107;
-        let t109 = t100 + T::nearest(2.0);
-        let t110 = t33 * t72;
-        let t111 = t109 / t101;
-        let t112 = t110 * t111;
-        let t113 = t108 + t112;
-        let t114 = self.fixed[14] / t22;
-        let t115 = t114 * t113;
-        let t116 = t100 * t111;
-        let t117 = t107 - t116;
-        let t118 = t83 / t22;
-        let t119 = self.fixed[14] * t118;
-        let t120 = t119 * t117;
-        let t121 = t19 * t107;
-        let t122 = t33 * t89;
-        let t123 = t122 * t111;
-        let t124 = t121 + t123;
-        let t125 = t114 * t124;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t115, t120, t120, t125)
+        let t22 = self.fixed[3] * t20;
+        let t23 = t20.sqrt();
+        let t27 = self.fixed[5] * t23;
+        let t28 = t22 - t27;
+        let t29 = self.fixed[2] + t28;
+        let t32 = self.fixed[6] * t8;
+        let t60 = self.fixed[10] * t20;
+        let t61 = T::nearest(2.0) * t23;
+        let t64 = t61 - self.fixed[11];
+        let t65 = t23 * t64;
+        let t66 = self.fixed[10] * t65;
+        let t67 = t60 + t66;
+        let t68 = self.fixed[1] + t67;
+        let t71 = t29 * t19;
+        let t82 = X[0] * X[1];
+        let t88 = t29 * t17;
+        let t96 = self.fixed[13] * t8;
+        let t97 = t96 * t68;
+        let t98 = t97 + T::one();
+        let t99 = t32 * t29;
+        let t100 = t99 + T::one();
+        let t104 = t97 + T::nearest(2.0);
+        let t105 = t97 * t104;
+        let t106 = t105 / t98;
+        let t107 = t17 * t106;
+        let t108 = t99 + T::nearest(2.0);
+        let t109 = t32 * t71;
+        let t110 = t108 / t100;
+        let t111 = t109 * t110;
+        let t112 = t107 + t111;
+        let t113 = self.fixed[14] / t20;
+        let t114 = t113 * t112;
+        let t115 = t99 * t110;
+        let t116 = t106 - t115;
+        let t117 = t82 / t20;
+        let t118 = self.fixed[14] * t117;
+        let t119 = t118 * t116;
+        let t120 = t19 * t106;
+        let t121 = t32 * t88;
+        let t122 = t121 * t110;
+        let t123 = t120 + t122;
+        let t124 = t113 * t123;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t114, t119, t119, t124)
     }
     #[inline]
     fn body_force(
@@ -496,61 +509,71 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t17 = X[0] * X[0];
         let t19 = X[1] * X[1];
         let t20 = t17 + t19;
-        let t21 = t20.sqrt();
-        let t22 = t21 * t21;
-        let t24 = self.fixed[3] * t22;
-        let t28 = self.fixed[5] * t21;
-        let t29 = t24 - t28;
-        let t30 = self.fixed[2] + t29;
-        let t33 = self.fixed[6] * t8;
-        let t61 = self.fixed[10] * t22;
-        let t62 = T::nearest(2.0) * t21;
-        let t65 = t62 - self.fixed[11];
-        let t66 = t21 * t65;
-        let t67 = self.fixed[10] * t66;
-        let t68 = t61 + t67;
-        let t69 = self.fixed[1] + t68;
-        let t97 = self.fixed[13] * t8;
-        let t98 = t97 * t69;
-        let t99 = t98 + T::one();
-        let t100 = t33 * t30;
-        let t101 = t100 + T::one();
-        let t127 = T::nearest(16.0) * t21;
+        let t22 = self.fixed[3] * t20;
+        let t23 = t20.sqrt();
+        let t27 = self.fixed[5] * t23;
+        let t28 = t22 - t27;
+        let t29 = self.fixed[2] + t28;
+        let t32 = self.fixed[6] * t8;
+        let t60 = self.fixed[10] * t20;
+        let t61 = T::nearest(2.0) * t23;
+        let t64 = t61 - self.fixed[11];
+        let t65 = t23 * t64;
+        let t66 = self.fixed[10] * t65;
+        let t67 = t60 + t66;
+        let t68 = self.fixed[1] + t67;
+        let t96 = self.fixed[13] * t8;
+        let t97 = t96 * t68;
+        let t98 = t97 + T::one();
+        let t99 = t32 * t29;
+        let t100 = t99 + T::one();
+        let t125 = X[0] / t23;
+        let t127 = T::nearest(16.0) * t23;
         let t132 = t127 - self.fixed[15];
         let t133 = self.fixed[10] * t132;
-        let t134 = t21 * t30;
+        let t134 = t23 * t29;
         let t135 = self.fixed[8] * t134;
         let t136 = t133 + t135;
-        let t138 = self.fixed[16] * t8;
-        let t139 = t138 * t136;
-        let t140 = -t139;
-        let t141 = t62 - self.fixed[4];
-        let t144 = self.fixed[17] * t8;
-        let t145 = t144 * t141;
-        let t146 = t98 / t99;
-        let t147 = T::nearest(2.0) - t146;
-        let t148 = t98 * t145;
-        let t149 = t148 * t147;
-        let t150 = t149 / t99;
-        let t151 = t98 * t98;
-        let t152 = T::one() / t21;
-        let t153 = t151 / t99;
-        let t154 = t152 * t153;
-        let t156 = t8 * t8;
-        let t158 = t30 * t30;
-        let t161 = self.fixed[18] * t156;
-        let t162 = t158 / t21;
-        let t163 = t161 * t162;
-        let t164 = t163 / t101;
-        let t165 = t150 + t154;
-        let t166 = t165 - t164;
-        let t168 = self.fixed[19] * t166;
-        let t169 = t140 + t168;
-        let t170 = X[0] / t21;
-        let t171 = t170 * t169;
-        let t172 = X[1] / t21;
-        let t173 = t172 * t169;
-        crate::nalgebra::SVector::<T, 2>::new(t171, t173)
+        let t138 = self.fixed[16] * t136;
+        let t139 = -t138;
+        let t140 = t98 * t98;
+        let t147 = t68 * t68;
+        let t153 = t29 * t147;
+        let t154 = t153 * t132;
+        let t155 = self.fixed[17] * t154;
+        let t156 = t8 * t155;
+        let t160 = t61 - self.fixed[4];
+        let t162 = self.fixed[18] * t160;
+        let t163 = t68 / t23;
+        let t164 = t162 + t163;
+        let t165 = t68 * t164;
+        let t166 = T::nearest(2.0) * t165;
+        let t168 = self.fixed[19] * t160;
+        let t169 = t168 + t163;
+        let t170 = t29 * t169;
+        let t171 = t29 * t29;
+        let t172 = t171 / t23;
+        let t173 = t166 + t170;
+        let t174 = t173 - t172;
+        let t180 = t68 * t174;
+        let t181 = self.fixed[20] * t180;
+        let t182 = t181 + t156;
+        let t183 = t8 * t182;
+        let t184 = t68 * t169;
+        let t185 = T::nearest(4.0) * t184;
+        let t186 = t172 - t185;
+        let t191 = self.fixed[21] * t186;
+        let t192 = -t191;
+        let t193 = t192 + t183;
+        let t194 = t140 * t100;
+        let t195 = t193 / t194;
+        let t196 = t8 * t195;
+        let t197 = t139 + t196;
+        let t198 = t8 * t197;
+        let t199 = t125 * t198;
+        let t200 = X[1] / t23;
+        let t201 = t200 * t198;
+        crate::nalgebra::SVector::<T, 2>::new(t199, t201)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t7 = self.fixed[0] * t;
@@ -558,127 +581,137 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t17 = X[0] * X[0];
         let t19 = X[1] * X[1];
         let t20 = t17 + t19;
-        let t21 = t20.sqrt();
-        let t22 = t21 * t21;
-        let t24 = self.fixed[3] * t22;
-        let t28 = self.fixed[5] * t21;
-        let t29 = t24 - t28;
-        let t30 = self.fixed[2] + t29;
-        let t33 = self.fixed[6] * t8;
-        let t34 = t30 * X[0];
-        let t35 = t33 * t34;
-        let t36 = t30 * X[1];
-        let t37 = t33 * t36;
-        let t39 = t7.sin_pi();
-        let t43 = self.fixed[7] * t39;
-        let t44 = t43 * t34;
-        let t45 = -t44;
-        let t46 = t43 * t36;
-        let t47 = -t46;
-        let t54 = self.fixed[9] * t8;
-        let t55 = t54 * t34;
-        let t56 = -t55;
-        let t57 = t54 * t36;
-        let t58 = -t57;
-        let t61 = self.fixed[10] * t22;
-        let t62 = T::nearest(2.0) * t21;
-        let t65 = t62 - self.fixed[11];
-        let t66 = t21 * t65;
-        let t67 = self.fixed[10] * t66;
-        let t68 = t61 + t67;
-        let t69 = self.fixed[1] + t68;
-        let t70 = t17 * t69;
-        let t71 = T::nearest(2.0) * t70;
-        let t72 = t30 * t19;
-        let t73 = t71 + t72;
-        let t74 = t73 / t22;
-        let t75 = t33 * t74;
-        let t78 = T::nearest(4.0) * t21;
-        let t79 = t78 - self.fixed[11];
-        let t82 = self.fixed[12] * t8;
-        let t83 = X[0] * X[1];
-        let t84 = t83 * t79;
-        let t85 = t84 / t21;
-        let t86 = t82 * t85;
-        let t87 = t19 * t69;
-        let t88 = T::nearest(2.0) * t87;
-        let t89 = t30 * t17;
-        let t90 = t88 + t89;
-        let t91 = t90 / t22;
-        let t92 = t33 * t91;
-        let t93 = t75 + T::one();
-        let t94 = t92 + T::one();
-        let t97 = self.fixed[13] * t8;
-        let t98 = t97 * t69;
-        let t99 = t98 + T::one();
-        let t100 = t33 * t30;
-        let t101 = t100 + T::one();
-        let t102 = t99 * t101;
-        let t105 = t98 + T::nearest(2.0);
-        let t106 = t98 * t105;
-        let t107 = t106 / t99;
-        let t108 = t17 * t107;
-        let t109 = t100 + T::nearest(2.0);
-        let t110 = t33 * t72;
-        let t111 = t109 / t101;
-        let t112 = t110 * t111;
-        let t113 = t108 + t112;
-        let t114 = self.fixed[14] / t22;
-        let t115 = t114 * t113;
-        let t116 = t100 * t111;
-        let t117 = t107 - t116;
-        let t118 = t83 / t22;
-        let t119 = self.fixed[14] * t118;
-        let t120 = t119 * t117;
-        let t121 = t19 * t107;
-        let t122 = t33 * t89;
-        let t123 = t122 * t111;
-        let t124 = t121 + t123;
-        let t125 = t114 * t124;
-        let t127 = T::nearest(16.0) * t21;
+        let t22 = self.fixed[3] * t20;
+        let t23 = t20.sqrt();
+        let t27 = self.fixed[5] * t23;
+        let t28 = t22 - t27;
+        let t29 = self.fixed[2] + t28;
+        let t32 = self.fixed[6] * t8;
+        let t33 = t29 * X[0];
+        let t34 = t32 * t33;
+        let t35 = t29 * X[1];
+        let t36 = t32 * t35;
+        let t38 = t7.sin_pi();
+        let t42 = self.fixed[7] * t38;
+        let t43 = t42 * t33;
+        let t44 = -t43;
+        let t45 = t42 * t35;
+        let t46 = -t45;
+        let t53 = self.fixed[9] * t8;
+        let t54 = t53 * t33;
+        let t55 = -t54;
+        let t56 = t53 * t35;
+        let t57 = -t56;
+        let t60 = self.fixed[10] * t20;
+        let t61 = T::nearest(2.0) * t23;
+        let t64 = t61 - self.fixed[11];
+        let t65 = t23 * t64;
+        let t66 = self.fixed[10] * t65;
+        let t67 = t60 + t66;
+        let t68 = self.fixed[1] + t67;
+        let t69 = t17 * t68;
+        let t70 = T::nearest(2.0) * t69;
+        let t71 = t29 * t19;
+        let t72 = t70 + t71;
+        let t73 = t72 / t20;
+        let t74 = t32 * t73;
+        let t77 = T::nearest(4.0) * t23;
+        let t78 = t77 - self.fixed[11];
+        let t81 = self.fixed[12] * t8;
+        let t82 = X[0] * X[1];
+        let t83 = t82 * t78;
+        let t84 = t83 / t23;
+        let t85 = t81 * t84;
+        let t86 = t19 * t68;
+        let t87 = T::nearest(2.0) * t86;
+        let t88 = t29 * t17;
+        let t89 = t87 + t88;
+        let t90 = t89 / t20;
+        let t91 = t32 * t90;
+        let t92 = t74 + T::one();
+        let t93 = t91 + T::one();
+        let t96 = self.fixed[13] * t8;
+        let t97 = t96 * t68;
+        let t98 = t97 + T::one();
+        let t99 = t32 * t29;
+        let t100 = t99 + T::one();
+        let t101 = t98 * t100;
+        let t104 = t97 + T::nearest(2.0);
+        let t105 = t97 * t104;
+        let t106 = t105 / t98;
+        let t107 = t17 * t106;
+        let t108 = t99 + T::nearest(2.0);
+        let t109 = t32 * t71;
+        let t110 = t108 / t100;
+        let t111 = t109 * t110;
+        let t112 = t107 + t111;
+        let t113 = self.fixed[14] / t20;
+        let t114 = t113 * t112;
+        let t115 = t99 * t110;
+        let t116 = t106 - t115;
+        let t117 = t82 / t20;
+        let t118 = self.fixed[14] * t117;
+        let t119 = t118 * t116;
+        let t120 = t19 * t106;
+        let t121 = t32 * t88;
+        let t122 = t121 * t110;
+        let t123 = t120 + t122;
+        let t124 = t113 * t123;
+        let t125 = X[0] / t23;
+        let t127 = T::nearest(16.0) * t23;
         let t132 = t127 - self.fixed[15];
         let t133 = self.fixed[10] * t132;
-        let t134 = t21 * t30;
+        let t134 = t23 * t29;
         let t135 = self.fixed[8] * t134;
         let t136 = t133 + t135;
-        let t138 = self.fixed[16] * t8;
-        let t139 = t138 * t136;
-        let t140 = -t139;
-        let t141 = t62 - self.fixed[4];
-        let t144 = self.fixed[17] * t8;
-        let t145 = t144 * t141;
-        let t146 = t98 / t99;
-        let t147 = T::nearest(2.0) - t146;
-        let t148 = t98 * t145;
-        let t149 = t148 * t147;
-        let t150 = t149 / t99;
-        let t151 = t98 * t98;
-        let t152 = T::one() / t21;
-        let t153 = t151 / t99;
-        let t154 = t152 * t153;
-        let t156 = t8 * t8;
-        let t158 = t30 * t30;
-        let t161 = self.fixed[18] * t156;
-        let t162 = t158 / t21;
-        let t163 = t161 * t162;
-        let t164 = t163 / t101;
-        let t165 = t150 + t154;
-        let t166 = t165 - t164;
-        let t168 = self.fixed[19] * t166;
-        let t169 = t140 + t168;
-        let t170 = X[0] / t21;
-        let t171 = t170 * t169;
-        let t172 = X[1] / t21;
-        let t173 = t172 * t169;
+        let t138 = self.fixed[16] * t136;
+        let t139 = -t138;
+        let t140 = t98 * t98;
+        let t147 = t68 * t68;
+        let t153 = t29 * t147;
+        let t154 = t153 * t132;
+        let t155 = self.fixed[17] * t154;
+        let t156 = t8 * t155;
+        let t160 = t61 - self.fixed[4];
+        let t162 = self.fixed[18] * t160;
+        let t163 = t68 / t23;
+        let t164 = t162 + t163;
+        let t165 = t68 * t164;
+        let t166 = T::nearest(2.0) * t165;
+        let t168 = self.fixed[19] * t160;
+        let t169 = t168 + t163;
+        let t170 = t29 * t169;
+        let t171 = t29 * t29;
+        let t172 = t171 / t23;
+        let t173 = t166 + t170;
+        let t174 = t173 - t172;
+        let t180 = t68 * t174;
+        let t181 = self.fixed[20] * t180;
+        let t182 = t181 + t156;
+        let t183 = t8 * t182;
+        let t184 = t68 * t169;
+        let t185 = T::nearest(4.0) * t184;
+        let t186 = t172 - t185;
+        let t191 = self.fixed[21] * t186;
+        let t192 = -t191;
+        let t193 = t192 + t183;
+        let t194 = t140 * t100;
+        let t195 = t193 / t194;
+        let t196 = t8 * t195;
+        let t197 = t139 + t196;
+        let t198 = t8 * t197;
+        let t199 = t125 * t198;
+        let t200 = X[1] / t23;
+        let t201 = t200 * t198;
         crate::Fields {
-            u: crate::nalgebra::SVector::<T, 2>::new(t35, t37),
-            v: crate::nalgebra::SVector::<T, 2>::new(t45, t47),
-            a: crate::nalgebra::SVector::<T, 2>::new(t56, t58),
-            H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t75, t86, t86, t92),
-            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t93, t86, t86, t94),
-            J: t102,
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t115, t120, t120, t125),
-            b: crate::nalgebra::SVector::<T, 2>::new(t171, t173),
+            u: crate::nalgebra::SVector::<T, 2>::new(t34, t36),
+            v: crate::nalgebra::SVector::<T, 2>::new(t44, t46),
+            a: crate::nalgebra::SVector::<T, 2>::new(t55, t57),
+            H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t74, t85, t85, t91),
+            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t92, t85, t85, t93),
+            J: t101,
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t114, t119, t119, t124),
+            b: crate::nalgebra::SVector::<T, 2>::new(t199, t201),
         }
     }
     fn domain(&self) -> crate::Domain<T, 2> {
@@ -723,7 +756,101 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[20]
+        self.fixed[22]
+    }
+    fn body_force_at(
+        &self,
+        X: &[crate::nalgebra::SVector<T, 2>],
+    ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 3, 8>::new(*self, X))
+    }
+}
+#[allow(unused_variables, clippy::all, clippy::pedantic)]
+impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 8> for Ring<T> {
+    #[inline]
+    fn body_force_time(&self, t: T) -> [T; 3] {
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.cos_pi();
+        let t32 = self.fixed[6] * t8;
+        let t96 = self.fixed[13] * t8;
+        [t8, t32, t96]
+    }
+    #[inline]
+    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 8] {
+        let t17 = X[0] * X[0];
+        let t19 = X[1] * X[1];
+        let t20 = t17 + t19;
+        let t22 = self.fixed[3] * t20;
+        let t23 = t20.sqrt();
+        let t27 = self.fixed[5] * t23;
+        let t28 = t22 - t27;
+        let t29 = self.fixed[2] + t28;
+        let t60 = self.fixed[10] * t20;
+        let t61 = T::nearest(2.0) * t23;
+        let t64 = t61 - self.fixed[11];
+        let t65 = t23 * t64;
+        let t66 = self.fixed[10] * t65;
+        let t67 = t60 + t66;
+        let t68 = self.fixed[1] + t67;
+        let t125 = X[0] / t23;
+        let t127 = T::nearest(16.0) * t23;
+        let t132 = t127 - self.fixed[15];
+        let t133 = self.fixed[10] * t132;
+        let t134 = t23 * t29;
+        let t135 = self.fixed[8] * t134;
+        let t136 = t133 + t135;
+        let t138 = self.fixed[16] * t136;
+        let t139 = -t138;
+        let t147 = t68 * t68;
+        let t153 = t29 * t147;
+        let t154 = t153 * t132;
+        let t155 = self.fixed[17] * t154;
+        let t160 = t61 - self.fixed[4];
+        let t162 = self.fixed[18] * t160;
+        let t163 = t68 / t23;
+        let t164 = t162 + t163;
+        let t165 = t68 * t164;
+        let t166 = T::nearest(2.0) * t165;
+        let t168 = self.fixed[19] * t160;
+        let t169 = t168 + t163;
+        let t170 = t29 * t169;
+        let t171 = t29 * t29;
+        let t172 = t171 / t23;
+        let t173 = t166 + t170;
+        let t174 = t173 - t172;
+        let t180 = t68 * t174;
+        let t181 = self.fixed[20] * t180;
+        let t184 = t68 * t169;
+        let t185 = T::nearest(4.0) * t184;
+        let t186 = t172 - t185;
+        let t191 = self.fixed[21] * t186;
+        let t192 = -t191;
+        let t200 = X[1] / t23;
+        [t29, t68, t125, t139, t155, t181, t192, t200]
+    }
+    #[inline(always)]
+    fn body_force_staged(
+        &self,
+        time: &[T; 3],
+        point: &[T; 8],
+    ) -> crate::nalgebra::SVector<T, 2> {
+        let t97 = time[2] * point[1];
+        let t98 = t97 + T::one();
+        let t99 = time[1] * point[0];
+        let t100 = t99 + T::one();
+        let t140 = t98 * t98;
+        let t156 = time[0] * point[4];
+        let t182 = point[5] + t156;
+        let t183 = time[0] * t182;
+        let t193 = point[6] + t183;
+        let t194 = t140 * t100;
+        let t195 = t193 / t194;
+        let t196 = time[0] * t195;
+        let t197 = point[3] + t196;
+        let t198 = time[0] * t197;
+        let t199 = point[2] * t198;
+        let t201 = point[7] * t198;
+        crate::nalgebra::SVector::<T, 2>::new(t199, t201)
     }
 }
 impl<T: crate::Real> From<Ring<T>> for crate::AnySolution<T> {
