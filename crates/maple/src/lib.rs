@@ -14,6 +14,26 @@
 //! one random point with a probability that is nil. Numbers are exact as printed; a listing with pi as
 //! `0.3141592653589793e1` agrees to 16 digits, and the report says so.
 //!
+//! ```
+//! use mmsmith_expr::{Ast, Graph};
+//! use mmsmith_maple::{CrossCheck, Listing, Target, cross_check, sample};
+//! use std::collections::BTreeMap;
+//!
+//! let mut graph = Graph::new();
+//! let x = graph.symbol("X");
+//! let derived = graph.build(&Ast::parse("sin(2*X)").unwrap(), &mut |_, _| Ok(x)).unwrap();
+//! let listing = Listing::parse("t1 = sin(x); b[0] = 2.0*t1*cos(x);").unwrap();
+//! let check = CrossCheck {
+//!     graph: &graph,
+//!     definitions: &[],
+//!     listing: &listing,
+//!     names: &BTreeMap::from([("x".into(), x)]),
+//!     targets: &[Target { entry: "b[0]".into(), derived }],
+//! };
+//! let report = cross_check(&check, sample(&[(x, [0.0, 1.0])], 20, 1)).unwrap();
+//! assert_eq!(report.to_string(), "b[0] agrees to 60 digits at 20 points\n");
+//! ```
+//!
 //! # The table of a specification
 //!
 //! A specification names its listings so that `mms check` can go through them:

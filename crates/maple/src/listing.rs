@@ -411,36 +411,41 @@ impl Parser<'_> {
         let start = self.span().start;
         let first = self.position;
         let mut factors = vec![(false, self.signed()?)];
+        let mut integer = self.is_integer(first..self.position);
         loop {
             let divided = self.peek() == Token::Sign('/');
             if !divided && self.peek() != Token::Sign('*') {
                 return Ok(single(factors, start, AstKind::Product));
             }
-            let before = self.position;
+            let dividend = first..self.position;
             self.advance();
             let divisor = self.position;
             factors.push((divided, self.signed()?));
-            let whole = |range: Range<usize>| {
-                range.clone().any(|i| self.tokens[i].0 == Token::Number)
-                    && self.tokens[range].iter().all(|(token, span)| match token {
-                        Token::Number => {
-                            self.text[span.clone()].bytes().all(|b| b.is_ascii_digit())
-                        }
-                        Token::Sign(sign) => *sign != ',',
-                        _ => false,
-                    })
-            };
-            if divided && whole(first..before) && whole(divisor..self.position) {
-                let text = |range: Range<usize>| {
-                    let (from, to) = (&self.tokens[range.start].1, &self.tokens[range.end - 1].1);
-                    self.text[from.start..to.end].to_owned()
-                };
-                let (first, second) = (text(first..before), text(divisor..self.position));
+            let divisor = divisor..self.position;
+            integer &= self.is_integer(divisor.clone());
+            if divided && integer {
                 let span = start..self.tokens[self.position - 1].1.end;
+                let (first, second) = (self.text_of(dividend), self.text_of(divisor));
                 let problem = Problem::IntegerQuotient { first, second };
                 return Err(ListingError { problem, span });
             }
         }
+    }
+
+    /// Whether C gives the tokens, a factor, the type of an integer: no names and no points.
+    fn is_integer(&self, factor: Range<usize>) -> bool {
+        self.tokens[factor].iter().all(|(token, span)| match token {
+            Token::Number => self.text[span.clone()].bytes().all(|b| b.is_ascii_digit()),
+            Token::Sign(_) => true,
+            Token::Name | Token::End => false,
+        })
+    }
+
+    fn text_of(&self, tokens: Range<usize>) -> String {
+        let spans = self.tokens[tokens].iter().map(|(_, span)| span);
+        let start = spans.clone().map(|span| span.start).min().unwrap_or(0);
+        let end = spans.map(|span| span.end).max().unwrap_or(start);
+        self.text[start..end].to_owned()
     }
 
     /// Signs, and a primary.

@@ -86,6 +86,17 @@ fn deep_nesting_and_length_are_refused() {
     assert_eq!(Listing::parse(&text).unwrap_err().to_string(), "nested deeper than 100 levels");
 }
 
+/// Long chains of every operator: reading takes time in proportion to the length.
+#[test]
+fn long_listings_are_read_at_once() {
+    for link in ["x/", "x*", "x+", "-", "2.0/", "+-x/", "x;t2=", "(x)*"] {
+        let text = format!("t1 = {}x;", link.repeat(250_000 / link.len()));
+        let _ = Listing::parse(&text);
+    }
+    let text = format!("t1 = {}{}1.0;", "-".repeat(100_000), "x/".repeat(70_000));
+    assert!(Listing::parse(&text).is_ok());
+}
+
 /// Squares of squares: the text is short, the number is not.
 #[test]
 fn chains_of_temporaries_end_in_errors_or_finish() {

@@ -12,7 +12,7 @@ const DIGITS: usize = 8;
 #[derive(Clone, Debug)]
 pub struct Sensitivity {
     graph: Graph,
-    /// For each expression, the derivatives that are not zero: what by, and the product `q dy/dq`.
+    /// For each expression `y`, the products `q dy/dq` that are not zero.
     products: Vec<Vec<Expr>>,
 }
 
