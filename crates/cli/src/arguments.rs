@@ -56,7 +56,8 @@ pub(crate) struct CheckOptions {
 pub(crate) struct EvalOptions {
     /// The solution
     pub(crate) name: String,
-    /// The points: [ { "X": [0.1, 0.2], "t": 0.3, "par": { "A": 0.05 } }, ... ]; "par" may be left out
+    /// The points: [ { "X": [0.1, 0.2], "t": 0.3, "par": { "A": 0.05 } }, ... ]; "par" may be left out, other keys
+    /// are ignored
     #[arg(long, value_name = "IN.json")]
     pub(crate) points: PathBuf,
     #[command(flatten)]

@@ -55,7 +55,7 @@ fn read(path: &Path) -> Result<Vec<Value>> {
 
 fn evaluate_entry(selection: &Selection, entry: &Value) -> Result<Value> {
     let Value::Object(entry) = entry else { bail!("expected {FORM}") };
-    if let Some(key) = entry.keys().find(|key| !["X", "t", "par"].contains(&key.as_str())) {
+    if let Some(key) = entry.keys().find(|key| is_misspelt(key)) {
         bail!("unknown key '{key}'; the keys are X, t and par");
     }
     let X = match entry.get("X") {
@@ -80,6 +80,14 @@ fn evaluate_entry(selection: &Selection, entry: &Value) -> Result<Value> {
     let values = selection.description.resolve(given)?;
     let solution = Selection { description: selection.description, values }.build()?;
     Ok(serde_json::to_value(evaluate(&solution, &X, t)?)?)
+}
+
+/// Whether a key must have been meant for one of X, t and par. Other keys are the caller's notes.
+fn is_misspelt(key: &str) -> bool {
+    let lower = key.to_lowercase();
+    !["X", "t", "par"].contains(&key)
+        && (["x", "t", "time", "point", "position"].contains(&lower.as_str())
+            || lower.starts_with("par"))
 }
 
 /// A number of JSON, which is always finite.
