@@ -1,0 +1,110 @@
+//! Arranging expressions in stages keeps their values and saves divisions.
+
+use mmsmith_expr::{Ast, Dependence, Expr, Graph, Program, arrange};
+use proptest::prelude::*;
+
+const POSITION: Dependence = Dependence { position: true, time: false };
+const TIME: Dependence = Dependence { position: false, time: true };
+
+struct Case {
+    graph: Graph,
+    inputs: Vec<(Expr, Dependence)>,
+    expr: Expr,
+}
+
+/// An expression in the position `x`, the time `t` and the parameter `a`.
+fn case(text: &str) -> Case {
+    let mut graph = Graph::new();
+    let inputs = [("x", POSITION), ("t", TIME), ("a", Dependence::default())]
+        .map(|(name, dependence)| (graph.symbol(name), dependence))
+        .to_vec();
+    let ast = Ast::parse(text).unwrap_or_else(|e| panic!("{text}: {e}"));
+    let expr = graph
+        .build(&ast, &mut |graph, name| Ok(graph.symbol(name)))
+        .unwrap_or_else(|e| panic!("{text}: {e}"));
+    Case { graph, inputs, expr }
+}
+
+impl Case {
+    fn programs(&mut self) -> (Program, Program) {
+        let arranged = arrange(&mut self.graph, &self.inputs, &[], &[self.expr]);
+        (
+            Program::lower(&mut self.graph, &self.inputs, &[], &[self.expr]),
+            Program::lower(&mut self.graph, &self.inputs, &[], &arranged),
+        )
+    }
+}
+
+/// Expressions that are defined for inputs in [0.6, 1.4].
+fn expression() -> impl Strategy<Value = String> {
+    let leaf = prop_oneof![
+        Just("x".to_owned()),
+        Just("t".to_owned()),
+        Just("a".to_owned()),
+        Just("x*t".to_owned()),
+        Just("cos(t)".to_owned()),
+        (1..9_u32).prop_map(|n| n.to_string()),
+    ];
+    leaf.prop_recursive(4, 24, 3, |inner| {
+        let pair = (inner.clone(), inner.clone());
+        prop_oneof![
+            pair.clone().prop_map(|(a, b)| format!("({a}) + ({b})")),
+            pair.clone().prop_map(|(a, b)| format!("({a}) - ({b})")),
+            pair.clone().prop_map(|(a, b)| format!("({a})*({b})")),
+            pair.clone().prop_map(|(a, b)| format!("({a})/(2 + ({b})^2)")),
+            pair.prop_map(|(a, b)| format!("({a})/(1 + ({b})^2) + ({b})/(1 + ({a})^2)")),
+            inner.prop_map(|a| format!("ln(1 + ({a})^2)")),
+        ]
+    })
+}
+
+proptest! {
+    #[test]
+    fn values_stay_and_no_division_is_added(
+        text in expression(), x in 0.6..1.4, t in 0.6..1.4, a in 0.6..1.4,
+    ) {
+        let (before, after) = case(&text).programs();
+        let (old, new) = (before.evaluate(&[x, t, a])[0], after.evaluate(&[x, t, a])[0]);
+        prop_assume!(old.abs() < 1e6);
+        prop_assert!((old - new).abs() <= 1e-9 * (1.0 + old.abs()), "{} gives {} and {}", text, old, new);
+        let inner = |program: &Program| program.operations_by_stage(program.outputs()).both;
+        prop_assert!(inner(&after).divisions <= inner(&before).divisions, "{}", text);
+        prop_assert!(inner(&after).calls <= inner(&before).calls, "{}", text);
+    }
+}
+
+#[test]
+fn fractions_share_one_denominator() {
+    let mut case = case("x*cos(t) + a*cos(t)*x^3/(1 + x*cos(t)) - cos(t)*x^2/(1 + a*x*cos(t))^2");
+    let (before, after) = case.programs();
+    let (before, after) =
+        (before.operations_by_stage(before.outputs()), after.operations_by_stage(after.outputs()));
+    assert_eq!((before.both.divisions, after.both.divisions), (2, 1));
+    assert_eq!(after.time.calls, 1);
+    assert_eq!(after.both.calls, 0);
+}
+
+#[test]
+fn what_cancels_identically_is_gone() {
+    // 1 - h/(1 + h) = 1/(1 + h)
+    let mut case = case("a*x - a*x*(x*t)/(1 + x*t) + a*x/(1 + x*t)");
+    let (before, after) = case.programs();
+    let count = |program: &Program| program.operations_by_stage(program.outputs()).both;
+    assert_eq!(count(&after).divisions, 1);
+    assert!(count(&after).total() <= count(&before).total());
+}
+
+#[test]
+fn even_powers_of_a_defined_root_need_no_root() {
+    let mut graph = Graph::new();
+    let (x, y, r) = (graph.symbol("x"), graph.symbol("y"), graph.symbol("r"));
+    let (xx, yy) = (graph.powi(x, 2), graph.powi(y, 2));
+    let square = graph.add(xx, yy);
+    let root = graph.sqrt(square);
+    let fourth = graph.powi(r, 4);
+    let program =
+        Program::lower(&mut graph, &[(x, POSITION), (y, POSITION)], &[(r, root)], &[fourth]);
+    let count = program.operations_by_stage(program.outputs());
+    assert_eq!((count.point.square_roots, count.point.multiplications), (0, 3));
+    assert_eq!(program.evaluate(&[1.0, 2.0]), [25.0]);
+}

@@ -1,0 +1,74 @@
+//! The body force at kept points is that of single calls, to the last bit.
+
+#![allow(clippy::unwrap_used)]
+
+use mmsmith_solutions::nalgebra::SVector;
+use mmsmith_solutions::{AnySolution, BLOCK, CATALOGUE, Real, Solution, build};
+
+/// Points in the unit cube, off its faces; a body force is defined there for every solution.
+fn points<T: Real, const D: usize>(count: usize) -> Vec<SVector<T, D>> {
+    (0..count)
+        .map(|n| {
+            SVector::from_fn(|d, _| {
+                let turns = 0.618_033_988_749_894_9 * n as f64 + 0.324_717_957_244_746 * d as f64;
+                T::nearest(0.05 + 0.9 * turns.fract())
+            })
+        })
+        .collect()
+}
+
+/// Equal to the last bit; not-a-number counts as equal to itself.
+fn same<T: Real, const D: usize>(a: &SVector<T, D>, b: &SVector<T, D>) -> bool {
+    a.iter().zip(b.iter()).all(|(a, b)| a.to_f64().to_bits() == b.to_f64().to_bits())
+}
+
+fn compare<T: Real, const D: usize>(name: &str, solution: &dyn Solution<T, D>) {
+    for count in [0, 1, BLOCK - 1, BLOCK, BLOCK + 1, 5 * BLOCK + 7] {
+        let X = points::<T, D>(count);
+        let kept = solution.body_force_at(&X);
+        assert_eq!((kept.len(), kept.is_empty()), (count, count == 0), "{name}");
+        let period = solution.period().to_f64();
+        let times = [0.0, 0.25, 0.3217, 1.0, 1e6].map(|turns| T::nearest(turns * period));
+        for t in times {
+            let single: Vec<_> = X.iter().map(|X| solution.body_force(X, t)).collect();
+            let middle = count / 2;
+            let runs = [(0, count), (middle, count), (0, middle), (middle / 2, count - middle / 2)];
+            for (first, end) in runs {
+                let mut b = vec![SVector::zeros(); end.saturating_sub(first)];
+                kept.evaluate(t, first, &mut b);
+                for (found, expected) in b.iter().zip(&single[first..]) {
+                    assert!(same(found, expected), "{name}, t = {t}: {found}, not {expected}");
+                }
+            }
+        }
+    }
+}
+
+fn compare_all<T: Real>() {
+    for description in CATALOGUE {
+        let name = description.name;
+        match build::<T>(name, &[]).unwrap().unwrap() {
+            AnySolution::One(solution) => compare(name, &*solution),
+            AnySolution::Two(solution) => compare(name, &*solution),
+            AnySolution::Three(solution) => compare(name, &*solution),
+            _ => panic!("{name} has an unknown dimension"),
+        }
+    }
+}
+
+#[test]
+fn double_precision() {
+    compare_all::<f64>();
+}
+
+#[test]
+fn single_precision() {
+    compare_all::<f32>();
+}
+
+#[test]
+#[should_panic(expected = "were asked for; there are 3")]
+fn points_beyond_the_last() {
+    let AnySolution::Two(ring) = build::<f64>("ring", &[]).unwrap().unwrap() else { return };
+    ring.body_force_at(&points(3)).evaluate(0.0, 1, &mut [SVector::zeros(); 3]);
+}
