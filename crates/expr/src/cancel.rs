@@ -5,7 +5,7 @@
 //! parameter-only coefficients of a sum are brought over their common denominator; where the numerator turns out
 //! to be zero or one single product, that form replaces the sum.
 
-use crate::{Expr, Graph, Node, Rational};
+use crate::{Expr, Function, Graph, Node, Rational};
 use num_traits::{One, Signed, ToPrimitive, Zero};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -86,6 +86,58 @@ impl Graph {
     #[must_use]
     pub fn depends_on(&self, expr: Expr, variables: &BTreeSet<Expr>) -> bool {
         self.reachable(&[expr]).iter().any(|e| variables.contains(e))
+    }
+
+    /// Whether `expr` is identically zero, as far as multiplying out and `cos^2 = 1 - sin^2` show.
+    ///
+    /// Quantities kept in one piece are looked into. False where that is not so, or where it grows too large to tell.
+    pub fn vanishes(&mut self, expr: Expr) -> bool {
+        let open = self.opened(expr, &mut BTreeMap::new());
+        self.fraction(open).is_some_and(|fraction| {
+            self.without_cosine_squares(fraction.numerator).is_some_and(|n| n.is_empty())
+        })
+    }
+
+    /// `expr` with nothing kept in one piece.
+    fn opened(&mut self, expr: Expr, done: &mut BTreeMap<Expr, Expr>) -> Expr {
+        if let Some(&known) = done.get(&expr) {
+            return known;
+        }
+        let result = match *self.node(expr) {
+            Node::Whole(inner) => self.opened(inner, done),
+            _ => self.map_children(expr, &mut |graph, child| graph.opened(child, done)),
+        };
+        done.insert(expr, result);
+        result
+    }
+
+    /// The polynomial with `cos(x)^2` replaced by `1 - sin(x)^2` until no cosine is squared.
+    fn without_cosine_squares(&mut self, polynomial: Polynomial) -> Option<Polynomial> {
+        let mut result = Polynomial::new();
+        let mut pending: Vec<(Monomial, Rational)> = polynomial.into_iter().collect();
+        while let Some((mut monomial, coefficient)) = pending.pop() {
+            if result.len() + pending.len() > MOST_TERMS {
+                return None;
+            }
+            let squared = monomial.iter().find_map(|(&atom, &power)| match self.node(atom) {
+                Node::Call(Function::Cos, arguments) if power >= 2 => Some((atom, arguments[0])),
+                _ => None,
+            });
+            let Some((cosine, argument)) = squared else {
+                add_to(&mut result, monomial, &coefficient);
+                continue;
+            };
+            let power = monomial.remove(&cosine).unwrap_or(2) - 2;
+            if power > 0 {
+                monomial.insert(cosine, power);
+            }
+            let sine = self.call(Function::Sin, &[argument]);
+            let mut with_sine = monomial.clone();
+            *with_sine.entry(sine).or_insert(0) += 2;
+            pending.push((monomial, coefficient.clone()));
+            pending.push((with_sine, -coefficient));
+        }
+        Some(result)
     }
 
     /// The sum as one product or zero, where it is one.
@@ -233,6 +285,20 @@ mod tests {
         assert_eq!(cancelled(text), "2*E*nu^2/((1 + nu)*(1 - 2*nu))");
         let text = "sin(X)*E*nu/((1+nu)*(1-2*nu)) + ln(X) + sin(X)*E/(1+nu) - E*sin(X)";
         assert_eq!(cancelled(text), "ln(X) + 2*sin(X)*E*nu^2/((1 + nu)*(1 - 2*nu))");
+    }
+
+    #[test]
+    fn a_rotation_has_no_strain() {
+        let mut graph = Graph::new();
+        let mut vanishes = |text: &str| {
+            let ast = Ast::parse(text).unwrap();
+            let expr = graph.build(&ast, &mut |g, name| Ok(g.symbol(name))).unwrap();
+            graph.vanishes(expr)
+        };
+        // H + H^T + H H^T for H = Rot - I, written with half the angle.
+        assert!(vanishes("-4*sin(a)^2 + 4*sin(a)^4 + 4*sin(a)^2*cos(a)^2"));
+        assert!(vanishes("cos(a)^4 - sin(a)^4 - cos(a)^2 + sin(a)^2"));
+        assert!(!vanishes("-4*sin(a)^2 + 4*sin(a)^4 + 4*sin(a)^2*cos(b)^2"));
     }
 
     #[test]

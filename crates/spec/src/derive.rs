@@ -235,6 +235,8 @@ impl NeoHookean {
         // J - 1 as the sum of the principal minors of H, small where H is small.
         let minors = principal_minors(graph, &H);
         let volume_change = graph.sum_of(minors);
+        let volume_change = zero_if_vanishing(graph, volume_change);
+        let J = if volume_change == Graph::ZERO { Graph::ONE } else { J };
         let volume_change = graph.whole(volume_change);
         let log_J = graph.call(Function::Ln1p, &[volume_change]);
         // Jacobi's formula, d ln J = F^-T : dH.
@@ -264,10 +266,14 @@ impl NeoHookean {
                 if i == j {
                     tau[i][j] = graph.add(tau[i][j], pressure);
                 }
+                tau[i][j] = zero_if_vanishing(graph, tau[i][j]);
                 tau[i][j] = graph.whole(tau[i][j]);
             }
         }
-        let P = matrix_product(graph, &tau, &inverse_transpose);
+        let mut P = matrix_product(graph, &tau, &inverse_transpose);
+        for entry in P.iter_mut().flatten() {
+            *entry = zero_if_vanishing(graph, *entry);
+        }
         NeoHookean { lambda, mu, H, inverse_transpose, J, log_J, P }
     }
 
@@ -311,8 +317,10 @@ impl NeoHookean {
             let isotropic = self.isotropic_remainder(derivation, i);
             let graph = &mut derivation.graph;
             let rest = graph.add(isotropic, remainder[i]);
+            let rest = zero_if_vanishing(graph, rest);
             let rest = graph.div(rest, density);
-            b.push(graph.sub(bracket, rest));
+            let component = graph.sub(bracket, rest);
+            b.push(zero_if_vanishing(graph, component));
         }
         b
     }
@@ -357,6 +365,11 @@ impl NeoHookean {
     fn transposed_gradient_times_inverse(&self, graph: &mut Graph) -> Matrix {
         matrix_product(graph, &transpose(&self.H), &self.inverse_transpose)
     }
+}
+
+/// The expression, or zero where it is zero at every point without looking so. Rounding would leave something there.
+fn zero_if_vanishing(graph: &mut Graph, expr: Expr) -> Expr {
+    if graph.vanishes(expr) { Graph::ZERO } else { expr }
 }
 
 /// What [`Graph::whole`] kept in one piece.

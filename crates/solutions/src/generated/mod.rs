@@ -3,12 +3,45 @@
 use crate::{AnySolution, Description, ParameterError, Real};
 mod axis_aligned;
 pub use axis_aligned::{AxisAligned, AxisAlignedParameters};
+mod axis_aligned_1d;
+pub use axis_aligned_1d::{AxisAligned1d, AxisAligned1dParameters};
+mod axis_aligned_3d;
+pub use axis_aligned_3d::{AxisAligned3d, AxisAligned3dParameters};
+mod bar;
+pub use bar::{Bar, BarParameters};
+mod rigid_motion;
+pub use rigid_motion::{RigidMotion, RigidMotionParameters};
 mod ring;
 pub use ring::{Ring, RingParameters};
+mod ring_nu;
+pub use ring_nu::{RingNu, RingNuParameters};
+mod shear_wave;
+pub use shear_wave::{ShearWave, ShearWaveParameters};
+mod skew_2d;
+pub use skew_2d::{Skew2d, Skew2dParameters};
+mod skew_3d;
+pub use skew_3d::{Skew3d, Skew3dParameters};
+mod sphere_shell;
+pub use sphere_shell::{SphereShell, SphereShellParameters};
+mod torsion;
+pub use torsion::{Torsion, TorsionParameters};
+mod vortex;
+pub use vortex::{Vortex, VortexParameters};
 /// Every solution of the library, in alphabetical order of the names.
 pub const CATALOGUE: &[&Description] = &[
     &AxisAligned::<f64>::DESCRIPTION,
+    &AxisAligned1d::<f64>::DESCRIPTION,
+    &AxisAligned3d::<f64>::DESCRIPTION,
+    &Bar::<f64>::DESCRIPTION,
+    &RigidMotion::<f64>::DESCRIPTION,
     &Ring::<f64>::DESCRIPTION,
+    &RingNu::<f64>::DESCRIPTION,
+    &ShearWave::<f64>::DESCRIPTION,
+    &Skew2d::<f64>::DESCRIPTION,
+    &Skew3d::<f64>::DESCRIPTION,
+    &SphereShell::<f64>::DESCRIPTION,
+    &Torsion::<f64>::DESCRIPTION,
+    &Vortex::<f64>::DESCRIPTION,
 ];
 /// Builds the solution `name` with the given parameter values, in the order of its description.
 ///
@@ -24,7 +57,22 @@ pub fn build<T: Real>(
     Some(
         match name {
             "axis-aligned" => AxisAligned::from_values(values).map(AnySolution::from),
+            "axis-aligned-1d" => {
+                AxisAligned1d::from_values(values).map(AnySolution::from)
+            }
+            "axis-aligned-3d" => {
+                AxisAligned3d::from_values(values).map(AnySolution::from)
+            }
+            "bar" => Bar::from_values(values).map(AnySolution::from),
+            "rigid-motion" => RigidMotion::from_values(values).map(AnySolution::from),
             "ring" => Ring::from_values(values).map(AnySolution::from),
+            "ring-nu" => RingNu::from_values(values).map(AnySolution::from),
+            "shear-wave" => ShearWave::from_values(values).map(AnySolution::from),
+            "skew-2d" => Skew2d::from_values(values).map(AnySolution::from),
+            "skew-3d" => Skew3d::from_values(values).map(AnySolution::from),
+            "sphere-shell" => SphereShell::from_values(values).map(AnySolution::from),
+            "torsion" => Torsion::from_values(values).map(AnySolution::from),
+            "vortex" => Vortex::from_values(values).map(AnySolution::from),
             _ => return None,
         },
     )

@@ -29,7 +29,7 @@ impl<T: crate::Real> Default for RingParameters<T> {
 /// Expanding ring with free surfaces.
 ///
 /// ```text
-/// u_R = R*A*cos(t*sqrt(E/rho0)*Pi)*(6*Ri + 2*R^2/Ro - 3*R*(Ri + Ro)/Ro)/(Ro*(3*Ri - Ro))
+/// u_R = A*cos(t*sqrt(E/rho0)*Pi)*(1 + (R - Ro)^2*(2*R - 3*Ri + Ro)/(Ro^2*(3*Ri - Ro)))
 /// u_theta = 0
 /// tau = lambda ln(J) I + mu (F F^T - I)
 /// lambda = 0
@@ -41,7 +41,7 @@ impl<T: crate::Real> Default for RingParameters<T> {
 pub struct Ring<T: crate::Real> {
     parameters: RingParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 23],
+    fixed: [T; 19],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Ring<T> {
@@ -123,95 +123,76 @@ impl<T: crate::Real> Ring<T> {
         if !(value.is_finite() && value > 0.0) {
             return Err(Self::DESCRIPTION.out_of_range(4, value));
         }
-        let t5 = parameters.E / parameters.rho0;
-        let t6 = t5.sqrt();
-        let t11 = T::nearest(3.0) * parameters.Ri;
-        let t12 = t11 - parameters.Ro;
-        let t14 = T::nearest(6.0) * parameters.Ri;
-        let t21 = T::nearest(2.0) / parameters.Ro;
-        let t24 = parameters.Ri + parameters.Ro;
-        let t25 = T::nearest(3.0) * t24;
-        let t26 = t25 / parameters.Ro;
-        let t30 = parameters.Ro * t12;
-        let t31 = parameters.A / t30;
-        let t39 = parameters.A * t6;
-        let t40 = t39 * T::pi();
-        let t41 = t40 / t30;
-        let t47 = T::pi() * T::pi();
-        let t48 = parameters.A * parameters.E;
-        let t49 = t48 * t47;
-        let t50 = parameters.rho0 * parameters.Ro;
-        let t51 = t50 * t12;
-        let t52 = t49 / t51;
-        let t59 = T::one() / parameters.Ro;
-        let t62 = T::nearest(3.0) * parameters.Ro;
-        let t63 = t11 + t62;
-        let t75 = parameters.Ro * parameters.Ro;
-        let t79 = t75 * t12;
-        let t80 = parameters.A / t79;
-        let t94 = T::nearest(2.0) * parameters.A;
-        let t95 = t94 / t30;
-        let t103 = T::nearest(0.5) * parameters.E;
-        let t129 = T::nearest(9.0) * parameters.Ri;
-        let t130 = T::nearest(9.0) * parameters.Ro;
-        let t131 = t129 + t130;
-        let t137 = t48 / t51;
-        let t141 = parameters.A * parameters.A;
-        let t142 = t141 * t141;
-        let t143 = t75 * t75;
-        let t144 = t143 * parameters.Ro;
-        let t145 = t12 * t12;
-        let t146 = t145 * t145;
-        let t148 = T::nearest(4.0) * t142;
-        let t149 = t148 * t103;
-        let t150 = parameters.rho0 * t144;
-        let t151 = t150 * t146;
-        let t152 = t149 / t151;
-        let t157 = t141 * parameters.A;
-        let t158 = t75 * parameters.Ro;
-        let t159 = t145 * t12;
-        let t161 = T::nearest(3.0) / parameters.Ro;
-        let t167 = T::nearest(6.0) / parameters.Ro;
-        let t175 = T::nearest(4.0) * t157;
-        let t176 = t175 * t103;
-        let t177 = parameters.rho0 * t158;
-        let t178 = t177 * t159;
-        let t179 = t176 / t178;
-        let t187 = t141 * t103;
-        let t188 = parameters.rho0 * t75;
-        let t189 = t188 * t145;
-        let t190 = t187 / t189;
-        let t202 = T::nearest(2.0) / t6;
+        let t10 = parameters.E / parameters.rho0;
+        let t11 = t10.sqrt();
+        let t15 = parameters.Ro * parameters.Ro;
+        let t18 = T::nearest(3.0) * parameters.Ri;
+        let t19 = t18 - parameters.Ro;
+        let t24 = parameters.Ro - t18;
+        let t26 = t15 * t19;
+        let t28 = T::one() / t26;
+        let t41 = parameters.A * t11;
+        let t42 = t41 * T::pi();
+        let t48 = T::pi() * T::pi();
+        let t49 = parameters.A * parameters.E;
+        let t50 = t49 * t48;
+        let t51 = t50 / parameters.rho0;
+        let t59 = T::nearest(6.0) / t26;
+        let t86 = T::nearest(6.0) * parameters.A;
+        let t87 = t86 / t26;
+        let t95 = T::nearest(0.5) * parameters.E;
+        let t118 = parameters.Ri + parameters.Ro;
+        let t128 = t49 / parameters.rho0;
+        let t133 = parameters.A * parameters.A;
+        let t134 = t133 * t133;
+        let t135 = t15 * t15;
+        let t136 = t19 * t19;
+        let t142 = T::nearest(36.0) * t134;
+        let t143 = t142 * t95;
+        let t144 = parameters.rho0 * t135;
+        let t145 = t144 * t136;
+        let t146 = t143 / t145;
+        let t155 = t133 * parameters.A;
+        let t163 = T::nearest(2.0) * parameters.Ri;
+        let t164 = T::nearest(2.0) * parameters.Ro;
+        let t165 = t163 + t164;
+        let t171 = T::nearest(3.0) / t26;
+        let t174 = T::nearest(12.0) * t155;
+        let t175 = t174 * t95;
+        let t176 = parameters.rho0 * t15;
+        let t177 = t176 * t19;
+        let t178 = t175 / t177;
+        let t184 = t135 * t136;
+        let t185 = T::nearest(36.0) / t184;
+        let t189 = t133 * t95;
+        let t190 = t189 / parameters.rho0;
+        let t202 = T::nearest(2.0) / t11;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
-        if !(parameters.Ro < t11) {
+        if !(parameters.Ro < t18) {
             return Err(Self::DESCRIPTION.requirement_broken("Ro < 3*Ri", &values));
         }
         Ok(Ring {
             parameters,
             fixed: [
-                t6,
                 t11,
-                t14,
-                t21,
+                t18,
                 t24,
-                t26,
-                t31,
-                t41,
-                t47,
-                t52,
+                t28,
+                t42,
+                t48,
+                t51,
                 t59,
-                t63,
-                t80,
+                t87,
                 t95,
-                t103,
-                t131,
-                t137,
-                t152,
-                t161,
-                t167,
-                t179,
+                t118,
+                t128,
+                t146,
+                t165,
+                t171,
+                t178,
+                t185,
                 t190,
                 t202,
             ],
@@ -256,22 +237,27 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t7 = self.fixed[0] * t;
-        let t8 = t7.cos_pi();
-        let t17 = X[0] * X[0];
-        let t19 = X[1] * X[1];
-        let t20 = t17 + t19;
-        let t22 = self.fixed[3] * t20;
-        let t23 = t20.sqrt();
-        let t27 = self.fixed[5] * t23;
-        let t28 = t22 - t27;
-        let t29 = self.fixed[2] + t28;
-        let t32 = self.fixed[6] * t8;
-        let t33 = t29 * X[0];
-        let t34 = t32 * t33;
-        let t35 = t29 * X[1];
-        let t36 = t32 * t35;
-        crate::nalgebra::SVector::<T, 2>::new(t34, t36)
+        let t1 = X[0] * X[0];
+        let t3 = X[1] * X[1];
+        let t4 = t1 + t3;
+        let t5 = t4.sqrt();
+        let t12 = self.fixed[0] * t;
+        let t13 = t12.cos_pi();
+        let t20 = t5 - self.parameters.Ro;
+        let t21 = t20 * t20;
+        let t23 = T::nearest(2.0) * t5;
+        let t25 = self.fixed[2] + t23;
+        let t29 = t21 * t25;
+        let t30 = self.fixed[3] * t29;
+        let t31 = t30 + T::one();
+        let t32 = self.parameters.A * t13;
+        let t33 = t31 * X[0];
+        let t34 = t33 / t5;
+        let t35 = t32 * t34;
+        let t36 = t31 * X[1];
+        let t37 = t36 / t5;
+        let t38 = t32 * t37;
+        crate::nalgebra::SVector::<T, 2>::new(t35, t38)
     }
     #[inline]
     fn velocity(
@@ -279,24 +265,29 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t7 = self.fixed[0] * t;
-        let t17 = X[0] * X[0];
-        let t19 = X[1] * X[1];
-        let t20 = t17 + t19;
-        let t22 = self.fixed[3] * t20;
-        let t23 = t20.sqrt();
-        let t27 = self.fixed[5] * t23;
-        let t28 = t22 - t27;
-        let t29 = self.fixed[2] + t28;
-        let t33 = t29 * X[0];
-        let t35 = t29 * X[1];
-        let t38 = t7.sin_pi();
-        let t42 = self.fixed[7] * t38;
-        let t43 = t42 * t33;
-        let t44 = -t43;
-        let t45 = t42 * t35;
-        let t46 = -t45;
-        crate::nalgebra::SVector::<T, 2>::new(t44, t46)
+        let t1 = X[0] * X[0];
+        let t3 = X[1] * X[1];
+        let t4 = t1 + t3;
+        let t5 = t4.sqrt();
+        let t12 = self.fixed[0] * t;
+        let t20 = t5 - self.parameters.Ro;
+        let t21 = t20 * t20;
+        let t23 = T::nearest(2.0) * t5;
+        let t25 = self.fixed[2] + t23;
+        let t29 = t21 * t25;
+        let t30 = self.fixed[3] * t29;
+        let t31 = t30 + T::one();
+        let t33 = t31 * X[0];
+        let t34 = t33 / t5;
+        let t36 = t31 * X[1];
+        let t37 = t36 / t5;
+        let t40 = t12.sin_pi();
+        let t43 = self.fixed[4] * t40;
+        let t44 = t43 * t34;
+        let t45 = -t44;
+        let t46 = t43 * t37;
+        let t47 = -t46;
+        crate::nalgebra::SVector::<T, 2>::new(t45, t47)
     }
     #[inline]
     fn acceleration(
@@ -304,24 +295,29 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t7 = self.fixed[0] * t;
-        let t8 = t7.cos_pi();
-        let t17 = X[0] * X[0];
-        let t19 = X[1] * X[1];
-        let t20 = t17 + t19;
-        let t22 = self.fixed[3] * t20;
-        let t23 = t20.sqrt();
-        let t27 = self.fixed[5] * t23;
-        let t28 = t22 - t27;
-        let t29 = self.fixed[2] + t28;
-        let t33 = t29 * X[0];
-        let t35 = t29 * X[1];
-        let t53 = self.fixed[9] * t8;
-        let t54 = t53 * t33;
-        let t55 = -t54;
-        let t56 = t53 * t35;
-        let t57 = -t56;
-        crate::nalgebra::SVector::<T, 2>::new(t55, t57)
+        let t1 = X[0] * X[0];
+        let t3 = X[1] * X[1];
+        let t4 = t1 + t3;
+        let t5 = t4.sqrt();
+        let t12 = self.fixed[0] * t;
+        let t13 = t12.cos_pi();
+        let t20 = t5 - self.parameters.Ro;
+        let t21 = t20 * t20;
+        let t23 = T::nearest(2.0) * t5;
+        let t25 = self.fixed[2] + t23;
+        let t29 = t21 * t25;
+        let t30 = self.fixed[3] * t29;
+        let t31 = t30 + T::one();
+        let t33 = t31 * X[0];
+        let t34 = t33 / t5;
+        let t36 = t31 * X[1];
+        let t37 = t36 / t5;
+        let t52 = self.fixed[6] * t13;
+        let t53 = t52 * t34;
+        let t54 = -t53;
+        let t55 = t52 * t37;
+        let t56 = -t55;
+        crate::nalgebra::SVector::<T, 2>::new(t54, t56)
     }
     #[inline]
     fn displacement_gradient(
@@ -329,44 +325,46 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
-        let t7 = self.fixed[0] * t;
-        let t8 = t7.cos_pi();
-        let t17 = X[0] * X[0];
-        let t19 = X[1] * X[1];
-        let t20 = t17 + t19;
-        let t22 = self.fixed[3] * t20;
-        let t23 = t20.sqrt();
-        let t27 = self.fixed[5] * t23;
-        let t28 = t22 - t27;
-        let t29 = self.fixed[2] + t28;
-        let t32 = self.fixed[6] * t8;
-        let t60 = self.fixed[10] * t20;
-        let t61 = T::nearest(2.0) * t23;
-        let t64 = t61 - self.fixed[11];
-        let t65 = t23 * t64;
-        let t66 = self.fixed[10] * t65;
-        let t67 = t60 + t66;
-        let t68 = self.fixed[1] + t67;
-        let t69 = t17 * t68;
-        let t70 = T::nearest(2.0) * t69;
-        let t71 = t29 * t19;
-        let t72 = t70 + t71;
-        let t73 = t72 / t20;
-        let t74 = t32 * t73;
-        let t77 = T::nearest(4.0) * t23;
-        let t78 = t77 - self.fixed[11];
-        let t81 = self.fixed[12] * t8;
-        let t82 = X[0] * X[1];
-        let t83 = t82 * t78;
-        let t84 = t83 / t23;
-        let t85 = t81 * t84;
-        let t86 = t19 * t68;
-        let t87 = T::nearest(2.0) * t86;
-        let t88 = t29 * t17;
-        let t89 = t87 + t88;
-        let t90 = t89 / t20;
-        let t91 = t32 * t90;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t74, t85, t85, t91)
+        let t1 = X[0] * X[0];
+        let t3 = X[1] * X[1];
+        let t4 = t1 + t3;
+        let t5 = t4.sqrt();
+        let t12 = self.fixed[0] * t;
+        let t13 = t12.cos_pi();
+        let t20 = t5 - self.parameters.Ro;
+        let t21 = t20 * t20;
+        let t23 = T::nearest(2.0) * t5;
+        let t25 = self.fixed[2] + t23;
+        let t29 = t21 * t25;
+        let t30 = self.fixed[3] * t29;
+        let t31 = t30 + T::one();
+        let t32 = self.parameters.A * t13;
+        let t58 = t5 - self.parameters.Ri;
+        let t60 = t20 * t1;
+        let t61 = t60 * t58;
+        let t62 = self.fixed[7] * t61;
+        let t63 = t31 * t3;
+        let t64 = t63 / t5;
+        let t65 = t62 + t64;
+        let t66 = t65 / t4;
+        let t67 = t32 * t66;
+        let t68 = t20 * t58;
+        let t69 = self.fixed[7] * t68;
+        let t70 = t31 / t5;
+        let t71 = t69 - t70;
+        let t72 = X[0] * X[1];
+        let t73 = t72 * t71;
+        let t74 = t73 / t4;
+        let t75 = t32 * t74;
+        let t76 = t20 * t3;
+        let t77 = t76 * t58;
+        let t78 = self.fixed[7] * t77;
+        let t79 = t31 * t1;
+        let t80 = t79 / t5;
+        let t81 = t78 + t80;
+        let t82 = t81 / t4;
+        let t83 = t32 * t82;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t67, t75, t75, t83)
     }
     #[inline]
     fn deformation_gradient(
@@ -374,74 +372,75 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
-        let t7 = self.fixed[0] * t;
-        let t8 = t7.cos_pi();
-        let t17 = X[0] * X[0];
-        let t19 = X[1] * X[1];
-        let t20 = t17 + t19;
-        let t22 = self.fixed[3] * t20;
-        let t23 = t20.sqrt();
-        let t27 = self.fixed[5] * t23;
-        let t28 = t22 - t27;
-        let t29 = self.fixed[2] + t28;
-        let t32 = self.fixed[6] * t8;
-        let t60 = self.fixed[10] * t20;
-        let t61 = T::nearest(2.0) * t23;
-        let t64 = t61 - self.fixed[11];
-        let t65 = t23 * t64;
-        let t66 = self.fixed[10] * t65;
-        let t67 = t60 + t66;
-        let t68 = self.fixed[1] + t67;
-        let t69 = t17 * t68;
-        let t70 = T::nearest(2.0) * t69;
-        let t71 = t29 * t19;
-        let t72 = t70 + t71;
-        let t73 = t72 / t20;
-        let t74 = t32 * t73;
-        let t77 = T::nearest(4.0) * t23;
-        let t78 = t77 - self.fixed[11];
-        let t81 = self.fixed[12] * t8;
-        let t82 = X[0] * X[1];
-        let t83 = t82 * t78;
-        let t84 = t83 / t23;
-        let t85 = t81 * t84;
-        let t86 = t19 * t68;
-        let t87 = T::nearest(2.0) * t86;
-        let t88 = t29 * t17;
-        let t89 = t87 + t88;
-        let t90 = t89 / t20;
-        let t91 = t32 * t90;
-        let t92 = t74 + T::one();
-        let t93 = t91 + T::one();
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t92, t85, t85, t93)
+        let t1 = X[0] * X[0];
+        let t3 = X[1] * X[1];
+        let t4 = t1 + t3;
+        let t5 = t4.sqrt();
+        let t12 = self.fixed[0] * t;
+        let t13 = t12.cos_pi();
+        let t20 = t5 - self.parameters.Ro;
+        let t21 = t20 * t20;
+        let t23 = T::nearest(2.0) * t5;
+        let t25 = self.fixed[2] + t23;
+        let t29 = t21 * t25;
+        let t30 = self.fixed[3] * t29;
+        let t31 = t30 + T::one();
+        let t32 = self.parameters.A * t13;
+        let t58 = t5 - self.parameters.Ri;
+        let t60 = t20 * t1;
+        let t61 = t60 * t58;
+        let t62 = self.fixed[7] * t61;
+        let t63 = t31 * t3;
+        let t64 = t63 / t5;
+        let t65 = t62 + t64;
+        let t66 = t65 / t4;
+        let t67 = t32 * t66;
+        let t68 = t20 * t58;
+        let t69 = self.fixed[7] * t68;
+        let t70 = t31 / t5;
+        let t71 = t69 - t70;
+        let t72 = X[0] * X[1];
+        let t73 = t72 * t71;
+        let t74 = t73 / t4;
+        let t75 = t32 * t74;
+        let t76 = t20 * t3;
+        let t77 = t76 * t58;
+        let t78 = self.fixed[7] * t77;
+        let t79 = t31 * t1;
+        let t80 = t79 / t5;
+        let t81 = t78 + t80;
+        let t82 = t81 / t4;
+        let t83 = t32 * t82;
+        let t84 = t67 + T::one();
+        let t85 = t83 + T::one();
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t84, t75, t75, t85)
     }
     #[inline]
     fn jacobian(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> T {
-        let t7 = self.fixed[0] * t;
-        let t8 = t7.cos_pi();
-        let t17 = X[0] * X[0];
-        let t19 = X[1] * X[1];
-        let t20 = t17 + t19;
-        let t22 = self.fixed[3] * t20;
-        let t23 = t20.sqrt();
-        let t27 = self.fixed[5] * t23;
-        let t28 = t22 - t27;
-        let t29 = self.fixed[2] + t28;
-        let t32 = self.fixed[6] * t8;
-        let t60 = self.fixed[10] * t20;
-        let t61 = T::nearest(2.0) * t23;
-        let t64 = t61 - self.fixed[11];
-        let t65 = t23 * t64;
-        let t66 = self.fixed[10] * t65;
-        let t67 = t60 + t66;
-        let t68 = self.fixed[1] + t67;
-        let t96 = self.fixed[13] * t8;
-        let t97 = t96 * t68;
-        let t98 = t97 + T::one();
-        let t99 = t32 * t29;
-        let t100 = t99 + T::one();
-        let t101 = t98 * t100;
-        t101
+        let t1 = X[0] * X[0];
+        let t3 = X[1] * X[1];
+        let t4 = t1 + t3;
+        let t5 = t4.sqrt();
+        let t12 = self.fixed[0] * t;
+        let t13 = t12.cos_pi();
+        let t20 = t5 - self.parameters.Ro;
+        let t21 = t20 * t20;
+        let t23 = T::nearest(2.0) * t5;
+        let t25 = self.fixed[2] + t23;
+        let t29 = t21 * t25;
+        let t30 = self.fixed[3] * t29;
+        let t31 = t30 + T::one();
+        let t32 = self.parameters.A * t13;
+        let t58 = t5 - self.parameters.Ri;
+        let t68 = t20 * t58;
+        let t70 = t31 / t5;
+        let t88 = self.fixed[8] * t13;
+        let t89 = t88 * t68;
+        let t90 = t89 + T::one();
+        let t91 = t32 * t70;
+        let t92 = t91 + T::one();
+        let t93 = t90 * t92;
+        t93
     }
     #[inline]
     fn first_piola_kirchhoff(
@@ -449,54 +448,55 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
-        let t7 = self.fixed[0] * t;
-        let t8 = t7.cos_pi();
-        let t17 = X[0] * X[0];
-        let t19 = X[1] * X[1];
-        let t20 = t17 + t19;
-        let t22 = self.fixed[3] * t20;
-        let t23 = t20.sqrt();
-        let t27 = self.fixed[5] * t23;
-        let t28 = t22 - t27;
-        let t29 = self.fixed[2] + t28;
-        let t32 = self.fixed[6] * t8;
-        let t60 = self.fixed[10] * t20;
-        let t61 = T::nearest(2.0) * t23;
-        let t64 = t61 - self.fixed[11];
-        let t65 = t23 * t64;
-        let t66 = self.fixed[10] * t65;
-        let t67 = t60 + t66;
-        let t68 = self.fixed[1] + t67;
-        let t71 = t29 * t19;
-        let t82 = X[0] * X[1];
-        let t88 = t29 * t17;
-        let t96 = self.fixed[13] * t8;
-        let t97 = t96 * t68;
-        let t98 = t97 + T::one();
-        let t99 = t32 * t29;
-        let t100 = t99 + T::one();
-        let t104 = t97 + T::nearest(2.0);
-        let t105 = t97 * t104;
-        let t106 = t105 / t98;
-        let t107 = t17 * t106;
-        let t108 = t99 + T::nearest(2.0);
-        let t109 = t32 * t71;
-        let t110 = t108 / t100;
-        let t111 = t109 * t110;
-        let t112 = t107 + t111;
-        let t113 = self.fixed[14] / t20;
-        let t114 = t113 * t112;
-        let t115 = t99 * t110;
-        let t116 = t106 - t115;
-        let t117 = t82 / t20;
-        let t118 = self.fixed[14] * t117;
-        let t119 = t118 * t116;
-        let t120 = t19 * t106;
-        let t121 = t32 * t88;
-        let t122 = t121 * t110;
-        let t123 = t120 + t122;
-        let t124 = t113 * t123;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t114, t119, t119, t124)
+        let t1 = X[0] * X[0];
+        let t3 = X[1] * X[1];
+        let t4 = t1 + t3;
+        let t5 = t4.sqrt();
+        let t12 = self.fixed[0] * t;
+        let t13 = t12.cos_pi();
+        let t20 = t5 - self.parameters.Ro;
+        let t21 = t20 * t20;
+        let t23 = T::nearest(2.0) * t5;
+        let t25 = self.fixed[2] + t23;
+        let t29 = t21 * t25;
+        let t30 = self.fixed[3] * t29;
+        let t31 = t30 + T::one();
+        let t32 = self.parameters.A * t13;
+        let t58 = t5 - self.parameters.Ri;
+        let t63 = t31 * t3;
+        let t64 = t63 / t5;
+        let t68 = t20 * t58;
+        let t70 = t31 / t5;
+        let t72 = X[0] * X[1];
+        let t79 = t31 * t1;
+        let t80 = t79 / t5;
+        let t88 = self.fixed[8] * t13;
+        let t89 = t88 * t68;
+        let t90 = t89 + T::one();
+        let t91 = t32 * t70;
+        let t92 = t91 + T::one();
+        let t96 = t89 + T::nearest(2.0);
+        let t97 = t89 * t96;
+        let t98 = t97 / t90;
+        let t99 = t1 * t98;
+        let t100 = t91 + T::nearest(2.0);
+        let t101 = t32 * t64;
+        let t102 = t100 / t92;
+        let t103 = t101 * t102;
+        let t104 = t99 + t103;
+        let t105 = self.fixed[9] / t4;
+        let t106 = t105 * t104;
+        let t107 = t91 * t102;
+        let t108 = t98 - t107;
+        let t109 = t72 / t4;
+        let t110 = self.fixed[9] * t109;
+        let t111 = t110 * t108;
+        let t112 = t3 * t98;
+        let t113 = t32 * t80;
+        let t114 = t113 * t102;
+        let t115 = t112 + t114;
+        let t116 = t105 * t115;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t106, t111, t111, t116)
     }
     #[inline]
     fn body_force(
@@ -504,213 +504,238 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t7 = self.fixed[0] * t;
-        let t8 = t7.cos_pi();
-        let t17 = X[0] * X[0];
-        let t19 = X[1] * X[1];
-        let t20 = t17 + t19;
-        let t22 = self.fixed[3] * t20;
-        let t23 = t20.sqrt();
-        let t27 = self.fixed[5] * t23;
-        let t28 = t22 - t27;
-        let t29 = self.fixed[2] + t28;
-        let t32 = self.fixed[6] * t8;
-        let t60 = self.fixed[10] * t20;
-        let t61 = T::nearest(2.0) * t23;
-        let t64 = t61 - self.fixed[11];
-        let t65 = t23 * t64;
-        let t66 = self.fixed[10] * t65;
-        let t67 = t60 + t66;
-        let t68 = self.fixed[1] + t67;
-        let t96 = self.fixed[13] * t8;
-        let t97 = t96 * t68;
-        let t98 = t97 + T::one();
-        let t99 = t32 * t29;
-        let t100 = t99 + T::one();
-        let t125 = X[0] / t23;
-        let t127 = T::nearest(16.0) * t23;
-        let t132 = t127 - self.fixed[15];
-        let t133 = self.fixed[10] * t132;
-        let t134 = t23 * t29;
-        let t135 = self.fixed[8] * t134;
-        let t136 = t133 + t135;
-        let t138 = self.fixed[16] * t136;
-        let t139 = -t138;
-        let t140 = t98 * t98;
-        let t147 = t68 * t68;
-        let t153 = t29 * t147;
-        let t154 = t153 * t132;
-        let t155 = self.fixed[17] * t154;
-        let t156 = t8 * t155;
-        let t160 = t61 - self.fixed[4];
-        let t162 = self.fixed[18] * t160;
-        let t163 = t68 / t23;
-        let t164 = t162 + t163;
-        let t165 = t68 * t164;
-        let t166 = T::nearest(2.0) * t165;
-        let t168 = self.fixed[19] * t160;
-        let t169 = t168 + t163;
-        let t170 = t29 * t169;
-        let t171 = t29 * t29;
-        let t172 = t171 / t23;
-        let t173 = t166 + t170;
-        let t174 = t173 - t172;
-        let t180 = t68 * t174;
-        let t181 = self.fixed[20] * t180;
-        let t182 = t181 + t156;
-        let t183 = t8 * t182;
-        let t184 = t68 * t169;
-        let t185 = T::nearest(4.0) * t184;
-        let t186 = t172 - t185;
-        let t191 = self.fixed[21] * t186;
+        let t1 = X[0] * X[0];
+        let t3 = X[1] * X[1];
+        let t4 = t1 + t3;
+        let t5 = t4.sqrt();
+        let t12 = self.fixed[0] * t;
+        let t13 = t12.cos_pi();
+        let t20 = t5 - self.parameters.Ro;
+        let t21 = t20 * t20;
+        let t23 = T::nearest(2.0) * t5;
+        let t25 = self.fixed[2] + t23;
+        let t29 = t21 * t25;
+        let t30 = self.fixed[3] * t29;
+        let t31 = t30 + T::one();
+        let t32 = self.parameters.A * t13;
+        let t58 = t5 - self.parameters.Ri;
+        let t68 = t20 * t58;
+        let t70 = t31 / t5;
+        let t88 = self.fixed[8] * t13;
+        let t89 = t88 * t68;
+        let t90 = t89 + T::one();
+        let t91 = t32 * t70;
+        let t92 = t91 + T::one();
+        let t117 = X[0] / t5;
+        let t119 = t23 - self.fixed[10];
+        let t120 = self.fixed[7] * t119;
+        let t121 = t31 / t4;
+        let t122 = t68 / t5;
+        let t123 = self.fixed[7] * t122;
+        let t124 = self.fixed[5] * t31;
+        let t125 = t120 - t121;
+        let t126 = t125 + t123;
+        let t127 = t126 + t124;
+        let t129 = self.fixed[11] * t127;
+        let t130 = -t129;
+        let t131 = t90 * t90;
+        let t137 = t58 * t58;
+        let t138 = t23 + t122;
+        let t139 = t138 - self.fixed[10];
+        let t140 = self.fixed[7] * t139;
+        let t141 = t121 - t140;
+        let t147 = t21 * t31;
+        let t148 = t147 * t137;
+        let t149 = t148 * t141;
+        let t150 = t149 / t5;
+        let t151 = self.fixed[12] * t150;
+        let t152 = -t151;
+        let t153 = t13 * t152;
+        let t156 = t4 * t5;
+        let t157 = t31 * t31;
+        let t158 = t157 / t156;
+        let t159 = t68 * t139;
+        let t160 = self.fixed[7] * t159;
+        let t162 = T::nearest(4.0) * t5;
+        let t166 = t162 + t122;
+        let t167 = t166 - self.fixed[13];
+        let t168 = t31 * t167;
+        let t169 = t168 / t5;
+        let t170 = t160 + t169;
+        let t172 = self.fixed[14] * t170;
+        let t173 = t158 - t172;
+        let t179 = t68 * t173;
+        let t180 = self.fixed[15] * t179;
+        let t181 = -t180;
+        let t182 = t181 + t153;
+        let t183 = t13 * t182;
+        let t186 = t68 * t167;
+        let t187 = self.fixed[16] * t186;
+        let t188 = t158 - t187;
+        let t191 = self.fixed[17] * t188;
         let t192 = -t191;
         let t193 = t192 + t183;
-        let t194 = t140 * t100;
+        let t194 = t131 * t92;
         let t195 = t193 / t194;
-        let t196 = t8 * t195;
-        let t197 = t139 + t196;
-        let t198 = t8 * t197;
-        let t199 = t125 * t198;
-        let t200 = X[1] / t23;
+        let t196 = t13 * t195;
+        let t197 = t130 + t196;
+        let t198 = t13 * t197;
+        let t199 = t117 * t198;
+        let t200 = X[1] / t5;
         let t201 = t200 * t198;
         crate::nalgebra::SVector::<T, 2>::new(t199, t201)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
-        let t7 = self.fixed[0] * t;
-        let t8 = t7.cos_pi();
-        let t17 = X[0] * X[0];
-        let t19 = X[1] * X[1];
-        let t20 = t17 + t19;
-        let t22 = self.fixed[3] * t20;
-        let t23 = t20.sqrt();
-        let t27 = self.fixed[5] * t23;
-        let t28 = t22 - t27;
-        let t29 = self.fixed[2] + t28;
-        let t32 = self.fixed[6] * t8;
-        let t33 = t29 * X[0];
-        let t34 = t32 * t33;
-        let t35 = t29 * X[1];
-        let t36 = t32 * t35;
-        let t38 = t7.sin_pi();
-        let t42 = self.fixed[7] * t38;
-        let t43 = t42 * t33;
-        let t44 = -t43;
-        let t45 = t42 * t35;
-        let t46 = -t45;
-        let t53 = self.fixed[9] * t8;
-        let t54 = t53 * t33;
-        let t55 = -t54;
-        let t56 = t53 * t35;
-        let t57 = -t56;
-        let t60 = self.fixed[10] * t20;
-        let t61 = T::nearest(2.0) * t23;
-        let t64 = t61 - self.fixed[11];
-        let t65 = t23 * t64;
-        let t66 = self.fixed[10] * t65;
-        let t67 = t60 + t66;
-        let t68 = self.fixed[1] + t67;
-        let t69 = t17 * t68;
-        let t70 = T::nearest(2.0) * t69;
-        let t71 = t29 * t19;
-        let t72 = t70 + t71;
-        let t73 = t72 / t20;
-        let t74 = t32 * t73;
-        let t77 = T::nearest(4.0) * t23;
-        let t78 = t77 - self.fixed[11];
-        let t81 = self.fixed[12] * t8;
-        let t82 = X[0] * X[1];
-        let t83 = t82 * t78;
-        let t84 = t83 / t23;
-        let t85 = t81 * t84;
-        let t86 = t19 * t68;
-        let t87 = T::nearest(2.0) * t86;
-        let t88 = t29 * t17;
-        let t89 = t87 + t88;
-        let t90 = t89 / t20;
-        let t91 = t32 * t90;
-        let t92 = t74 + T::one();
-        let t93 = t91 + T::one();
-        let t96 = self.fixed[13] * t8;
-        let t97 = t96 * t68;
-        let t98 = t97 + T::one();
-        let t99 = t32 * t29;
-        let t100 = t99 + T::one();
-        let t101 = t98 * t100;
-        let t104 = t97 + T::nearest(2.0);
-        let t105 = t97 * t104;
-        let t106 = t105 / t98;
-        let t107 = t17 * t106;
-        let t108 = t99 + T::nearest(2.0);
-        let t109 = t32 * t71;
-        let t110 = t108 / t100;
-        let t111 = t109 * t110;
-        let t112 = t107 + t111;
-        let t113 = self.fixed[14] / t20;
-        let t114 = t113 * t112;
-        let t115 = t99 * t110;
-        let t116 = t106 - t115;
-        let t117 = t82 / t20;
-        let t118 = self.fixed[14] * t117;
-        let t119 = t118 * t116;
-        let t120 = t19 * t106;
-        let t121 = t32 * t88;
-        let t122 = t121 * t110;
-        let t123 = t120 + t122;
-        let t124 = t113 * t123;
-        let t125 = X[0] / t23;
-        let t127 = T::nearest(16.0) * t23;
-        let t132 = t127 - self.fixed[15];
-        let t133 = self.fixed[10] * t132;
-        let t134 = t23 * t29;
-        let t135 = self.fixed[8] * t134;
-        let t136 = t133 + t135;
-        let t138 = self.fixed[16] * t136;
-        let t139 = -t138;
-        let t140 = t98 * t98;
-        let t147 = t68 * t68;
-        let t153 = t29 * t147;
-        let t154 = t153 * t132;
-        let t155 = self.fixed[17] * t154;
-        let t156 = t8 * t155;
-        let t160 = t61 - self.fixed[4];
-        let t162 = self.fixed[18] * t160;
-        let t163 = t68 / t23;
-        let t164 = t162 + t163;
-        let t165 = t68 * t164;
-        let t166 = T::nearest(2.0) * t165;
-        let t168 = self.fixed[19] * t160;
-        let t169 = t168 + t163;
-        let t170 = t29 * t169;
-        let t171 = t29 * t29;
-        let t172 = t171 / t23;
-        let t173 = t166 + t170;
-        let t174 = t173 - t172;
-        let t180 = t68 * t174;
-        let t181 = self.fixed[20] * t180;
-        let t182 = t181 + t156;
-        let t183 = t8 * t182;
-        let t184 = t68 * t169;
-        let t185 = T::nearest(4.0) * t184;
-        let t186 = t172 - t185;
-        let t191 = self.fixed[21] * t186;
+        let t1 = X[0] * X[0];
+        let t3 = X[1] * X[1];
+        let t4 = t1 + t3;
+        let t5 = t4.sqrt();
+        let t12 = self.fixed[0] * t;
+        let t13 = t12.cos_pi();
+        let t20 = t5 - self.parameters.Ro;
+        let t21 = t20 * t20;
+        let t23 = T::nearest(2.0) * t5;
+        let t25 = self.fixed[2] + t23;
+        let t29 = t21 * t25;
+        let t30 = self.fixed[3] * t29;
+        let t31 = t30 + T::one();
+        let t32 = self.parameters.A * t13;
+        let t33 = t31 * X[0];
+        let t34 = t33 / t5;
+        let t35 = t32 * t34;
+        let t36 = t31 * X[1];
+        let t37 = t36 / t5;
+        let t38 = t32 * t37;
+        let t40 = t12.sin_pi();
+        let t43 = self.fixed[4] * t40;
+        let t44 = t43 * t34;
+        let t45 = -t44;
+        let t46 = t43 * t37;
+        let t47 = -t46;
+        let t52 = self.fixed[6] * t13;
+        let t53 = t52 * t34;
+        let t54 = -t53;
+        let t55 = t52 * t37;
+        let t56 = -t55;
+        let t58 = t5 - self.parameters.Ri;
+        let t60 = t20 * t1;
+        let t61 = t60 * t58;
+        let t62 = self.fixed[7] * t61;
+        let t63 = t31 * t3;
+        let t64 = t63 / t5;
+        let t65 = t62 + t64;
+        let t66 = t65 / t4;
+        let t67 = t32 * t66;
+        let t68 = t20 * t58;
+        let t69 = self.fixed[7] * t68;
+        let t70 = t31 / t5;
+        let t71 = t69 - t70;
+        let t72 = X[0] * X[1];
+        let t73 = t72 * t71;
+        let t74 = t73 / t4;
+        let t75 = t32 * t74;
+        let t76 = t20 * t3;
+        let t77 = t76 * t58;
+        let t78 = self.fixed[7] * t77;
+        let t79 = t31 * t1;
+        let t80 = t79 / t5;
+        let t81 = t78 + t80;
+        let t82 = t81 / t4;
+        let t83 = t32 * t82;
+        let t84 = t67 + T::one();
+        let t85 = t83 + T::one();
+        let t88 = self.fixed[8] * t13;
+        let t89 = t88 * t68;
+        let t90 = t89 + T::one();
+        let t91 = t32 * t70;
+        let t92 = t91 + T::one();
+        let t93 = t90 * t92;
+        let t96 = t89 + T::nearest(2.0);
+        let t97 = t89 * t96;
+        let t98 = t97 / t90;
+        let t99 = t1 * t98;
+        let t100 = t91 + T::nearest(2.0);
+        let t101 = t32 * t64;
+        let t102 = t100 / t92;
+        let t103 = t101 * t102;
+        let t104 = t99 + t103;
+        let t105 = self.fixed[9] / t4;
+        let t106 = t105 * t104;
+        let t107 = t91 * t102;
+        let t108 = t98 - t107;
+        let t109 = t72 / t4;
+        let t110 = self.fixed[9] * t109;
+        let t111 = t110 * t108;
+        let t112 = t3 * t98;
+        let t113 = t32 * t80;
+        let t114 = t113 * t102;
+        let t115 = t112 + t114;
+        let t116 = t105 * t115;
+        let t117 = X[0] / t5;
+        let t119 = t23 - self.fixed[10];
+        let t120 = self.fixed[7] * t119;
+        let t121 = t31 / t4;
+        let t122 = t68 / t5;
+        let t123 = self.fixed[7] * t122;
+        let t124 = self.fixed[5] * t31;
+        let t125 = t120 - t121;
+        let t126 = t125 + t123;
+        let t127 = t126 + t124;
+        let t129 = self.fixed[11] * t127;
+        let t130 = -t129;
+        let t131 = t90 * t90;
+        let t137 = t58 * t58;
+        let t138 = t23 + t122;
+        let t139 = t138 - self.fixed[10];
+        let t140 = self.fixed[7] * t139;
+        let t141 = t121 - t140;
+        let t147 = t21 * t31;
+        let t148 = t147 * t137;
+        let t149 = t148 * t141;
+        let t150 = t149 / t5;
+        let t151 = self.fixed[12] * t150;
+        let t152 = -t151;
+        let t153 = t13 * t152;
+        let t156 = t4 * t5;
+        let t157 = t31 * t31;
+        let t158 = t157 / t156;
+        let t159 = t68 * t139;
+        let t160 = self.fixed[7] * t159;
+        let t162 = T::nearest(4.0) * t5;
+        let t166 = t162 + t122;
+        let t167 = t166 - self.fixed[13];
+        let t168 = t31 * t167;
+        let t169 = t168 / t5;
+        let t170 = t160 + t169;
+        let t172 = self.fixed[14] * t170;
+        let t173 = t158 - t172;
+        let t179 = t68 * t173;
+        let t180 = self.fixed[15] * t179;
+        let t181 = -t180;
+        let t182 = t181 + t153;
+        let t183 = t13 * t182;
+        let t186 = t68 * t167;
+        let t187 = self.fixed[16] * t186;
+        let t188 = t158 - t187;
+        let t191 = self.fixed[17] * t188;
         let t192 = -t191;
         let t193 = t192 + t183;
-        let t194 = t140 * t100;
+        let t194 = t131 * t92;
         let t195 = t193 / t194;
-        let t196 = t8 * t195;
-        let t197 = t139 + t196;
-        let t198 = t8 * t197;
-        let t199 = t125 * t198;
-        let t200 = X[1] / t23;
+        let t196 = t13 * t195;
+        let t197 = t130 + t196;
+        let t198 = t13 * t197;
+        let t199 = t117 * t198;
+        let t200 = X[1] / t5;
         let t201 = t200 * t198;
         crate::Fields {
-            u: crate::nalgebra::SVector::<T, 2>::new(t34, t36),
-            v: crate::nalgebra::SVector::<T, 2>::new(t44, t46),
-            a: crate::nalgebra::SVector::<T, 2>::new(t55, t57),
-            H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t74, t85, t85, t91),
-            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t92, t85, t85, t93),
-            J: t101,
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t114, t119, t119, t124),
+            u: crate::nalgebra::SVector::<T, 2>::new(t35, t38),
+            v: crate::nalgebra::SVector::<T, 2>::new(t45, t47),
+            a: crate::nalgebra::SVector::<T, 2>::new(t54, t56),
+            H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t67, t75, t75, t83),
+            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t84, t75, t75, t85),
+            J: t93,
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t106, t111, t111, t116),
             b: crate::nalgebra::SVector::<T, 2>::new(t199, t201),
         }
     }
@@ -746,7 +771,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
     fn material(&self) -> crate::Material<T> {
         crate::Material::NeoHookean {
             lambda: T::zero(),
-            mu: self.fixed[14],
+            mu: self.fixed[9],
         }
     }
     fn density(&self) -> T {
@@ -756,7 +781,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[22]
+        self.fixed[18]
     }
     fn body_force_at(
         &self,
@@ -769,64 +794,74 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
 impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 8> for Ring<T> {
     #[inline]
     fn body_force_time(&self, t: T) -> [T; 3] {
-        let t7 = self.fixed[0] * t;
-        let t8 = t7.cos_pi();
-        let t32 = self.fixed[6] * t8;
-        let t96 = self.fixed[13] * t8;
-        [t8, t32, t96]
+        let t12 = self.fixed[0] * t;
+        let t13 = t12.cos_pi();
+        let t32 = self.parameters.A * t13;
+        let t88 = self.fixed[8] * t13;
+        [t13, t32, t88]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 8] {
-        let t17 = X[0] * X[0];
-        let t19 = X[1] * X[1];
-        let t20 = t17 + t19;
-        let t22 = self.fixed[3] * t20;
-        let t23 = t20.sqrt();
-        let t27 = self.fixed[5] * t23;
-        let t28 = t22 - t27;
-        let t29 = self.fixed[2] + t28;
-        let t60 = self.fixed[10] * t20;
-        let t61 = T::nearest(2.0) * t23;
-        let t64 = t61 - self.fixed[11];
-        let t65 = t23 * t64;
-        let t66 = self.fixed[10] * t65;
-        let t67 = t60 + t66;
-        let t68 = self.fixed[1] + t67;
-        let t125 = X[0] / t23;
-        let t127 = T::nearest(16.0) * t23;
-        let t132 = t127 - self.fixed[15];
-        let t133 = self.fixed[10] * t132;
-        let t134 = t23 * t29;
-        let t135 = self.fixed[8] * t134;
-        let t136 = t133 + t135;
-        let t138 = self.fixed[16] * t136;
-        let t139 = -t138;
-        let t147 = t68 * t68;
-        let t153 = t29 * t147;
-        let t154 = t153 * t132;
-        let t155 = self.fixed[17] * t154;
-        let t160 = t61 - self.fixed[4];
-        let t162 = self.fixed[18] * t160;
-        let t163 = t68 / t23;
-        let t164 = t162 + t163;
-        let t165 = t68 * t164;
-        let t166 = T::nearest(2.0) * t165;
-        let t168 = self.fixed[19] * t160;
-        let t169 = t168 + t163;
-        let t170 = t29 * t169;
-        let t171 = t29 * t29;
-        let t172 = t171 / t23;
-        let t173 = t166 + t170;
-        let t174 = t173 - t172;
-        let t180 = t68 * t174;
-        let t181 = self.fixed[20] * t180;
-        let t184 = t68 * t169;
-        let t185 = T::nearest(4.0) * t184;
-        let t186 = t172 - t185;
-        let t191 = self.fixed[21] * t186;
+        let t1 = X[0] * X[0];
+        let t3 = X[1] * X[1];
+        let t4 = t1 + t3;
+        let t5 = t4.sqrt();
+        let t20 = t5 - self.parameters.Ro;
+        let t21 = t20 * t20;
+        let t23 = T::nearest(2.0) * t5;
+        let t25 = self.fixed[2] + t23;
+        let t29 = t21 * t25;
+        let t30 = self.fixed[3] * t29;
+        let t31 = t30 + T::one();
+        let t58 = t5 - self.parameters.Ri;
+        let t68 = t20 * t58;
+        let t70 = t31 / t5;
+        let t117 = X[0] / t5;
+        let t119 = t23 - self.fixed[10];
+        let t120 = self.fixed[7] * t119;
+        let t121 = t31 / t4;
+        let t122 = t68 / t5;
+        let t123 = self.fixed[7] * t122;
+        let t124 = self.fixed[5] * t31;
+        let t125 = t120 - t121;
+        let t126 = t125 + t123;
+        let t127 = t126 + t124;
+        let t129 = self.fixed[11] * t127;
+        let t130 = -t129;
+        let t137 = t58 * t58;
+        let t138 = t23 + t122;
+        let t139 = t138 - self.fixed[10];
+        let t140 = self.fixed[7] * t139;
+        let t141 = t121 - t140;
+        let t147 = t21 * t31;
+        let t148 = t147 * t137;
+        let t149 = t148 * t141;
+        let t150 = t149 / t5;
+        let t151 = self.fixed[12] * t150;
+        let t152 = -t151;
+        let t156 = t4 * t5;
+        let t157 = t31 * t31;
+        let t158 = t157 / t156;
+        let t159 = t68 * t139;
+        let t160 = self.fixed[7] * t159;
+        let t162 = T::nearest(4.0) * t5;
+        let t166 = t162 + t122;
+        let t167 = t166 - self.fixed[13];
+        let t168 = t31 * t167;
+        let t169 = t168 / t5;
+        let t170 = t160 + t169;
+        let t172 = self.fixed[14] * t170;
+        let t173 = t158 - t172;
+        let t179 = t68 * t173;
+        let t180 = self.fixed[15] * t179;
+        let t181 = -t180;
+        let t186 = t68 * t167;
+        let t187 = self.fixed[16] * t186;
+        let t188 = t158 - t187;
+        let t191 = self.fixed[17] * t188;
         let t192 = -t191;
-        let t200 = X[1] / t23;
-        [t29, t68, t125, t139, t155, t181, t192, t200]
+        let t200 = X[1] / t5;
+        [t68, t70, t117, t130, t152, t181, t192, t200]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -834,16 +869,16 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 8> for Ring<T> {
         time: &[T; 3],
         point: &[T; 8],
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t97 = time[2] * point[1];
-        let t98 = t97 + T::one();
-        let t99 = time[1] * point[0];
-        let t100 = t99 + T::one();
-        let t140 = t98 * t98;
-        let t156 = time[0] * point[4];
-        let t182 = point[5] + t156;
+        let t89 = time[2] * point[0];
+        let t90 = t89 + T::one();
+        let t91 = time[1] * point[1];
+        let t92 = t91 + T::one();
+        let t131 = t90 * t90;
+        let t153 = time[0] * point[4];
+        let t182 = point[5] + t153;
         let t183 = time[0] * t182;
         let t193 = point[6] + t183;
-        let t194 = t140 * t100;
+        let t194 = t131 * t92;
         let t195 = t193 / t194;
         let t196 = time[0] * t195;
         let t197 = point[3] + t196;
