@@ -1,6 +1,9 @@
 //! Syntax tree to graph.
 
-use crate::{Ast, AstKind, Derivatives, Expr, Function, Graph, Rational};
+use crate::graph::{LARGEST_SIZE, MOST_BITS, MOST_WORK, bits, numbers};
+use crate::{Ast, AstKind, Derivatives, Expr, Function, Graph, Node, Rational};
+use num_bigint::BigInt;
+use num_integer::Integer;
 use num_traits::{One, Signed};
 use std::ops::Range;
 use thiserror::Error;
@@ -9,8 +12,6 @@ use thiserror::Error;
 const LARGEST_EXPONENT: i64 = 1000;
 /// The deepest graph that is accepted from text; the recursive algorithms stay far from the end of the stack.
 const DEEPEST_GRAPH: u32 = 400;
-/// The largest number of nodes that text may make.
-const MOST_NODES: usize = 1 << 20;
 
 /// Why a syntax tree has no meaning.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
@@ -46,6 +47,9 @@ impl Graph {
                     let sign = if *subtracted { -Rational::one() } else { Rational::one() };
                     parts.push((sign, self.build(term, names)?));
                 }
+                if self.common_denominator_is_large(&parts) {
+                    return Err(fail(large_numbers()));
+                }
                 self.sum(parts)
             }
             AstKind::Product(factors) => {
@@ -59,6 +63,10 @@ impl Graph {
                     let exponent = if *divided { -Rational::one() } else { Rational::one() };
                     parts.push((value, exponent));
                 }
+                let coefficients = parts.iter().filter_map(|(value, _)| self.coefficient(*value));
+                if coefficients.map(|c| bits(c) - 2).sum::<u64>() > MOST_BITS {
+                    return Err(fail(large_numbers()));
+                }
                 self.product(parts)
             }
             AstKind::Power(base, exponent) => {
@@ -69,13 +77,42 @@ impl Graph {
             }
             AstKind::Call(name, arguments) => self.build_call(ast, name, arguments, names)?,
         };
-        if self.depth(expr) > DEEPEST_GRAPH {
-            return Err(fail(format!("nested deeper than {DEEPEST_GRAPH} operations")));
-        }
-        if self.len() > MOST_NODES {
-            return Err(fail(format!("more than {MOST_NODES} subexpressions")));
-        }
+        self.check_size(expr).map_err(fail)?;
         Ok(expr)
+    }
+
+    fn check_size(&self, expr: Expr) -> Result<(), String> {
+        if self.depth(expr) > DEEPEST_GRAPH {
+            return Err(format!("nested deeper than {DEEPEST_GRAPH} operations"));
+        }
+        if self.size() > LARGEST_SIZE {
+            return Err(format!("more than {LARGEST_SIZE} subexpressions"));
+        }
+        if self.work > MOST_WORK {
+            return Err("takes too long; name parts in [let], or differentiate less often".into());
+        }
+        if self.is_overgrown() { Err(large_numbers()) } else { Ok(()) }
+    }
+
+    /// The number that a product with `expr` would multiply.
+    fn coefficient(&self, expr: Expr) -> Option<&Rational> {
+        match self.node(expr) {
+            Node::Number(value) => Some(value),
+            Node::Sum { terms, .. } if terms.len() == 1 => Some(&terms[0].1),
+            _ => None,
+        }
+        .filter(|value| !num_traits::Zero::is_zero(*value))
+    }
+
+    fn common_denominator_is_large(&self, parts: &[(Rational, Expr)]) -> bool {
+        let mut common = BigInt::one();
+        let mut numbers = parts.iter().flat_map(|(_, part)| numbers(self.node(*part)));
+        numbers.any(|number| {
+            if !common.is_multiple_of(number.denom()) {
+                common = common.lcm(number.denom());
+            }
+            common.bits() > MOST_BITS
+        })
     }
 
     fn power(&mut self, base: Expr, exponent: Expr) -> Result<Expr, String> {
@@ -155,8 +192,14 @@ impl Graph {
                     "diff needs a coordinate, the time or a parameter here, not an expression";
                 return Err(BuildError { message: message.into(), span: variable.span.clone() });
             }
-            result = Derivatives::default().of(self, result, symbol);
+            result = Derivatives::limited().of(self, result, symbol);
+            self.check_size(result)
+                .map_err(|message| BuildError { message, span: ast.span.clone() })?;
         }
         Ok(result)
     }
+}
+
+fn large_numbers() -> String {
+    format!("numbers of more than {MOST_BITS} bits are not supported")
 }

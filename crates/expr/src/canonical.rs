@@ -78,6 +78,7 @@ impl Graph {
         coefficient: &Rational,
         term: Expr,
     ) {
+        self.work += 1 + (crate::graph::bits(coefficient) / 64) as usize;
         match self.node(term).clone() {
             Node::Number(value) => *constant += coefficient * value,
             Node::Sum { constant: inner, terms } => {
@@ -112,6 +113,7 @@ impl Graph {
         if terms.len() < 2 {
             return false;
         }
+        self.work += terms.len();
         for &term in &terms {
             if let Some((key, inner)) = self.split_off_sum(term) {
                 groups.entry(key).or_default().push((term, inner));
@@ -163,6 +165,7 @@ impl Graph {
                 return self.scaled(term, coefficient);
             }
             (_, true) => {
+                self.work += terms.len();
                 let common = self.common_factors(&terms);
                 if !common.is_empty() {
                     let outside = self.product(common);
@@ -209,9 +212,11 @@ impl Graph {
         for &(term, _) in &terms[1..] {
             let factors = factors_of(term);
             common.retain_mut(|(base, exponent)| {
-                let Some((_, other)) = factors.iter().find(|(b, _)| b == base) else {
+                // Factors are sorted by their bases.
+                let Ok(found) = factors.binary_search_by_key(base, |(base, _)| *base) else {
                     return false;
                 };
+                let other = &factors[found].1;
                 if other.is_positive() != exponent.is_positive() {
                     return false;
                 }
@@ -232,6 +237,7 @@ impl Graph {
         let mut collected: BTreeMap<Expr, Rational> = BTreeMap::new();
         let mut pending: Vec<(Expr, Rational)> = factors.into_iter().collect();
         while let Some((base, exponent)) = pending.pop() {
+            self.work += 1;
             if exponent.is_zero() {
                 continue;
             }

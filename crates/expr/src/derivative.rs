@@ -11,9 +11,17 @@ use std::collections::HashMap;
 #[derive(Clone, Debug, Default)]
 pub struct Derivatives {
     known: HashMap<(Expr, Expr), Expr>,
+    limited: bool,
 }
 
 impl Derivatives {
+    /// Derivatives that come to an early end, with no meaning, as soon as [`Graph::is_overgrown`]: for text from
+    /// anywhere. The caller asks the graph afterwards.
+    #[must_use]
+    pub fn limited() -> Self {
+        Derivatives { limited: true, ..Self::default() }
+    }
+
     /// States that the derivative of `expr` with respect to `variable` is `derivative`.
     pub fn define(&mut self, expr: Expr, variable: Expr, derivative: Expr) {
         self.known.insert((expr, variable), derivative);
@@ -21,6 +29,9 @@ impl Derivatives {
 
     /// The derivative of `expr` with respect to the symbol `variable`, other symbols held fixed.
     pub fn of(&mut self, graph: &mut Graph, expr: Expr, variable: Expr) -> Expr {
+        if self.limited && graph.is_overgrown() {
+            return Graph::ZERO;
+        }
         if expr == variable {
             return Graph::ONE;
         }

@@ -4,6 +4,14 @@ use crate::Rational;
 use num_traits::{One, Zero};
 use std::collections::{BTreeSet, HashMap};
 
+/// The most nodes and references that text may make.
+pub(crate) const LARGEST_SIZE: usize = 1 << 21;
+/// The largest number that text may make; arithmetic beyond it would be slow.
+pub(crate) const MOST_BITS: u64 = 1 << 14;
+
+/// The most operands that text may make sums and products handle, about a second's work.
+pub(crate) const MOST_WORK: usize = 1 << 20;
+
 /// An expression: the handle of a node in a [`Graph`]. Equal handles of one graph mean equal expressions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Expr(pub(crate) u32);
@@ -116,6 +124,12 @@ pub struct Graph {
     depth: Vec<u32>,
     index: HashMap<Node, Expr>,
     symbols: Vec<String>,
+    /// Nodes and references between them.
+    size: usize,
+    /// The bits of the largest number.
+    bits: u64,
+    /// Operands that sums and products have been made of, time and again.
+    pub(crate) work: usize,
 }
 
 impl Default for Graph {
@@ -138,6 +152,9 @@ impl Graph {
             depth: Vec::new(),
             index: HashMap::new(),
             symbols: Vec::new(),
+            size: 0,
+            bits: 0,
+            work: 0,
         };
         graph.intern(Node::Number(Rational::zero()));
         graph.intern(Node::Number(Rational::one()));
@@ -151,6 +168,8 @@ impl Graph {
         }
         let expr = Expr(u32::try_from(self.nodes.len()).unwrap_or(u32::MAX));
         let depth = 1 + children(&node).map(|c| self.depth(c)).max().unwrap_or(0);
+        self.size += 1 + children(&node).count();
+        self.bits = numbers(&node).map(bits).fold(self.bits, u64::max);
         self.index.insert(node.clone(), expr);
         self.nodes.push(node);
         self.depth.push(depth);
@@ -175,10 +194,21 @@ impl Graph {
         self.nodes.len()
     }
 
+    /// Nodes and the references between them.
+    pub(crate) fn size(&self) -> usize {
+        self.size
+    }
+
     /// Whether the graph is empty, which it never is: zero and one are always there.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.nodes.is_empty()
+    }
+
+    /// Whether the graph holds more, or larger numbers, or took more work, than text may cause.
+    #[must_use]
+    pub fn is_overgrown(&self) -> bool {
+        self.size > LARGEST_SIZE || self.bits > MOST_BITS || self.work > MOST_WORK
     }
 
     /// The variable `name`; the same name gives the same variable.
@@ -258,6 +288,22 @@ impl Graph {
         }
         seen
     }
+}
+
+/// The numbers in a node.
+pub(crate) fn numbers(node: &Node) -> impl Iterator<Item = &Rational> {
+    let (value, pairs): (Option<&Rational>, &[(Expr, Rational)]) = match node {
+        Node::Number(value) => (Some(value), &[]),
+        Node::Sum { constant, terms } => (Some(constant), terms),
+        Node::Product(factors) => (None, factors),
+        Node::Pi | Node::Symbol(_) | Node::Call(..) | Node::Whole(_) => (None, &[]),
+    };
+    value.into_iter().chain(pairs.iter().map(|(_, number)| number))
+}
+
+/// The bits of numerator and denominator together.
+pub(crate) fn bits(number: &Rational) -> u64 {
+    number.numer().bits() + number.denom().bits()
 }
 
 fn children(node: &Node) -> impl Iterator<Item = Expr> + '_ {

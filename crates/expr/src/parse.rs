@@ -357,11 +357,11 @@ fn number_end(text: &str, start: usize) -> usize {
 
 fn number(text: &str, span: Range<usize>) -> Result<Rational, ParseError> {
     let written = &text[span.clone()];
-    if matches!(text[span.end..].chars().next(), Some(c) if c.is_alphabetic() || c == '_' || c == '.')
-    {
+    let next = text[span.end..].chars().next();
+    if let Some(c) = next.filter(|&c| c.is_alphabetic() || c == '_' || c == '.') {
         let message =
             format!("'{written}' runs into what follows; multiplication is written with '*'");
-        return Err(error(message, span.start..span.end + 1));
+        return Err(error(message, span.start..span.end + c.len_utf8()));
     }
     if written.len() > MOST_DIGITS {
         let message =
