@@ -47,9 +47,12 @@ fn binaries() -> &'static Path {
 }
 
 /// The command `mms`, in the workspace.
+///
+/// The environment variable `MMSMITH_MMS` names another binary, such as one with optimisation for tests without.
 #[must_use]
 pub fn mms() -> Command {
-    let mut command = Command::new(binaries().join("mms"));
+    let given = std::env::var_os("MMSMITH_MMS").map(|path| workspace().join(path));
+    let mut command = Command::new(given.unwrap_or_else(|| binaries().join("mms")));
     command.current_dir(workspace());
     command
 }

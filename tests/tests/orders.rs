@@ -1,6 +1,7 @@
 //! Orders of accuracy and the figures of an independent implementation, through `mms converge`.
 //!
-//! These simulate for seconds each and run in release mode: `cargo test --release -p mmsmith-tests`.
+//! These simulate for seconds each and run in release mode: `cargo test --release -p mmsmith-tests`, or with
+//! `MMSMITH_MMS=target/release/mms` and `-- --include-ignored`.
 
 #![allow(clippy::unwrap_used)]
 

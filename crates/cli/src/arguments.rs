@@ -20,6 +20,8 @@ pub(crate) enum Command {
     List(ListOptions),
     /// Compare every field of a solution with the field below it; all solutions when none is named
     Check(CheckOptions),
+    /// Tell what a solution models, what it exercises, and what its body force costs
+    Explain(ExplainOptions),
     /// Evaluate the exact fields at points of your own
     Eval(EvalOptions),
     /// Run one simulation and measure its errors
@@ -48,6 +50,16 @@ pub(crate) struct CheckOptions {
     #[command(flatten)]
     pub(crate) parameters: ParameterOptions,
     /// Write the findings to this JSON file
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
+}
+
+#[derive(Args)]
+pub(crate) struct ExplainOptions {
+    /// The solution, by name, or a specification file (SPEC.toml)
+    #[arg(value_name = "NAME|SPEC.toml")]
+    pub(crate) name: String,
+    /// Write it to this JSON file too
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
 }

@@ -3,6 +3,7 @@
 mod check;
 mod converge;
 mod eval;
+mod explain;
 mod list;
 mod reproduce;
 mod run;
@@ -10,6 +11,7 @@ mod run;
 pub(crate) use check::check;
 pub(crate) use converge::converge;
 pub(crate) use eval::eval;
+pub(crate) use explain::explain;
 pub(crate) use list::list;
 pub(crate) use reproduce::reproduce;
 pub(crate) use run::run;

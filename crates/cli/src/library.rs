@@ -55,7 +55,7 @@ pub(crate) struct Subject {
 impl Subject {
     /// The solution called `name`, or the one that the specification file `name` describes.
     pub(crate) fn new(name: &str, overrides: &[(String, f64)]) -> Result<Self> {
-        if Path::new(name).extension().is_some_and(|extension| extension == "toml") {
+        if is_file(name) {
             return Self::interpreted(name, overrides);
         }
         let selection = Selection::new(name, overrides)?;
@@ -69,8 +69,7 @@ impl Subject {
 
     /// Evaluates the specification itself: nothing needs to have been generated from it.
     fn interpreted(file: &str, overrides: &[(String, f64)]) -> Result<Self> {
-        let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {file}"))?;
-        let spec = Spec::parse(&text, file)?;
+        let spec = specification(file)?;
         let values = overrides.iter().map(|(name, value)| (name.as_str(), *value));
         let solution = interpret(&spec, values).with_context(|| file.to_owned())?;
         let mut parameters: BTreeMap<String, f64> =
@@ -78,6 +77,21 @@ impl Subject {
         parameters.extend(overrides.iter().cloned());
         Ok(Self { name: spec.name, solution, parameters })
     }
+}
+
+/// The specification of the library's solution `name`, or the one in the file `name`.
+pub(crate) fn specification(name: &str) -> Result<Spec> {
+    if is_file(name) {
+        let text = std::fs::read_to_string(name).with_context(|| format!("cannot read {name}"))?;
+        return Ok(Spec::parse(&text, name)?);
+    }
+    let description = find(name)?;
+    Ok(Spec::parse(description.specification, &format!("{name}.toml"))?)
+}
+
+/// Whether the user means a specification file.
+fn is_file(name: &str) -> bool {
+    Path::new(name).extension().is_some_and(|extension| extension == "toml")
 }
 
 /// The description of the solution `name`; an unknown one is met with those there are.

@@ -25,6 +25,7 @@ fn main() -> ExitCode {
     let outcome = match &arguments.command {
         Command::List(options) => commands::list(options),
         Command::Check(options) => commands::check(options),
+        Command::Explain(options) => commands::explain(options),
         Command::Eval(options) => commands::eval(options),
         Command::Run(options) => commands::run(options),
         Command::Converge(options) => commands::converge(options),

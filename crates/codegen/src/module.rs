@@ -323,6 +323,7 @@ impl<'a> Generator<'a> {
             (&spec.name, one_line(&spec.title), one_line(&spec.reference));
         let coordinates = spec.coordinates.name();
         let dimension = Literal::usize_unsuffixed(spec.dimension);
+        let specification = &spec.source;
         let entries = spec.parameters.iter().map(|p| {
             let (name, unit, range) = (&p.name, one_line(&p.unit), one_line(&p.range));
             let description = one_line(&p.description);
@@ -375,6 +376,7 @@ impl<'a> Generator<'a> {
                     coordinates: #coordinates,
                     dimension: #dimension,
                     parameters: &[#(#entries,)*],
+                    specification: #specification,
                 };
 
                 /// The solution with the given parameters.

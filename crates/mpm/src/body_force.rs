@@ -5,9 +5,11 @@ use nalgebra::{RealField, SVector};
 /// Force per unit mass on many particles at once.
 pub trait BodyForce<T, const D: usize>: Sync {
     /// Writes into `b` the body force at the reference positions `X` and time `t`; both slices have the same length.
+    /// They belong to the particles from number `first` on, which never change places: whatever depends on the position
+    /// alone may have been kept from an earlier step.
     ///
     /// Called once a step from several threads, each with its own run of particles; what is in `b` before is unspecified.
-    fn evaluate(&self, X: &[SVector<T, D>], t: T, b: &mut [SVector<T, D>]);
+    fn evaluate(&self, first: usize, X: &[SVector<T, D>], t: T, b: &mut [SVector<T, D>]);
 
     /// Whether the force is zero everywhere and always, so that a step may leave it out.
     fn is_absent(&self) -> bool {
@@ -19,7 +21,7 @@ impl<T, const D: usize, B> BodyForce<T, D> for B
 where
     B: Fn(&[SVector<T, D>], T, &mut [SVector<T, D>]) + Sync,
 {
-    fn evaluate(&self, X: &[SVector<T, D>], t: T, b: &mut [SVector<T, D>]) {
+    fn evaluate(&self, _first: usize, X: &[SVector<T, D>], t: T, b: &mut [SVector<T, D>]) {
         self(X, t, b);
     }
 }
@@ -29,7 +31,7 @@ where
 pub struct NoBodyForce;
 
 impl<T: RealField, const D: usize> BodyForce<T, D> for NoBodyForce {
-    fn evaluate(&self, _X: &[SVector<T, D>], _t: T, b: &mut [SVector<T, D>]) {
+    fn evaluate(&self, _first: usize, _X: &[SVector<T, D>], _t: T, b: &mut [SVector<T, D>]) {
         b.fill(SVector::zeros());
     }
 

@@ -421,7 +421,8 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         self.b
             .par_chunks_mut(CHUNK)
             .zip(X.par_chunks(CHUNK))
-            .for_each(|(b, X)| body_force.evaluate(X, t, b));
+            .enumerate()
+            .for_each(|(chunk, (b, X))| body_force.evaluate(chunk * CHUNK, X, t, b));
     }
 
     /// Particles to grid: mass, momentum and force, folded at walls.

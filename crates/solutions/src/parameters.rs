@@ -32,6 +32,8 @@ pub struct Description {
     pub dimension: usize,
     /// The parameters, in the order in which values are passed.
     pub parameters: &'static [Parameter],
+    /// The text of the specification that it was generated from.
+    pub specification: &'static str,
 }
 
 /// Why a set of parameter values was refused.

@@ -10,9 +10,9 @@ use toml::Spanned;
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Document {
     pub(crate) name: Spanned<String>,
-    pub(crate) title: String,
-    #[serde(default)]
-    pub(crate) reference: String,
+    pub(crate) title: Spanned<String>,
+    #[serde(default = "no_text")]
+    pub(crate) reference: Spanned<String>,
     pub(crate) coordinates: Spanned<String>,
     pub(crate) dimension: Spanned<usize>,
     #[serde(default)]
@@ -27,6 +27,23 @@ pub(crate) struct Document {
     #[serde(default)]
     pub(crate) boundary: Vec<BoundaryTable>,
     pub(crate) time: Spanned<TimeTable>,
+}
+
+fn no_text() -> Spanned<String> {
+    Spanned::new(0..0, String::new())
+}
+
+impl Document {
+    /// Text for people, each with the place of what it belongs to.
+    pub(crate) fn free_text(&self) -> impl Iterator<Item = (&str, Range<usize>)> {
+        let parameters = self.parameters.0.iter().flat_map(|(name, table)| {
+            let (span, table) = (name.span(), table.get_ref());
+            [(table.unit.as_str(), span.clone()), (table.description.as_str(), span)]
+        });
+        let head =
+            [&self.title, &self.reference].map(|text| (text.get_ref().as_str(), text.span()));
+        head.into_iter().chain(parameters)
+    }
 }
 
 #[derive(serde::Deserialize)]

@@ -6,6 +6,9 @@ use crate::document::Text;
 use mmsmith_expr::{Ast, AstKind, Expr, Function, Graph};
 use std::collections::{BTreeMap, BTreeSet};
 
+/// Names have at most this many characters.
+const LONGEST_NAME: usize = 64;
+
 /// The text of a specification and its name, for messages.
 pub(crate) struct Source<'a> {
     pub(crate) file: &'a str,
@@ -87,6 +90,15 @@ impl<'a> Scope<'a> {
             let help = "a name is a letter followed by letters, digits or '_'; Greek letters are \
                         spelt out where they are declared, as in lambda";
             return Err(self.source.error(message, span, Some(help.into())));
+        }
+        if name.len() > LONGEST_NAME {
+            let message =
+                format!("a name of {} characters; {LONGEST_NAME} are the limit", name.len());
+            return Err(self.source.error(message, span, None));
+        }
+        if matches!(name, "self" | "Self" | "super" | "crate") {
+            let message = format!("'{name}' cannot be a name in generated code");
+            return Err(self.source.error(message, span, Some("choose another name".into())));
         }
         let builtin = name == "Pi" || name == "diff" || name == "sqrt";
         if builtin || Function::from_name(name).is_some() {

@@ -11,6 +11,8 @@ use toml::Spanned;
 /// A specification that has been read and checked.
 #[derive(Clone, Debug)]
 pub struct Spec {
+    /// The text that it was read from.
+    pub source: String,
     /// Lower-case letters, digits and hyphens, starting with a letter; its words are no Rust keyword.
     pub name: String,
     /// One line for people.
@@ -218,6 +220,45 @@ const RUST_WORDS: &[&str] = &[
     "union", "unsafe", "unsized", "use", "virtual", "where", "while", "yield",
 ];
 
+/// Words whose module or type would hide what generated code uses.
+const TAKEN_WORDS: &[&str] = &[
+    "alloc",
+    "any-solution",
+    "bool",
+    "char",
+    "core",
+    "default",
+    "description",
+    "err",
+    "f32",
+    "f64",
+    "from",
+    "i128",
+    "i16",
+    "i32",
+    "i64",
+    "i8",
+    "isize",
+    "mmsmith-solutions",
+    "nalgebra",
+    "none",
+    "ok",
+    "option",
+    "parameter-error",
+    "real",
+    "result",
+    "some",
+    "std",
+    "str",
+    "t",
+    "u128",
+    "u16",
+    "u32",
+    "u64",
+    "u8",
+    "usize",
+];
+
 impl Spec {
     /// Reads the text of a specification; `file` is what messages call it.
     ///
@@ -226,10 +267,19 @@ impl Spec {
     /// A [`Diagnostic`] for the first mistake found.
     pub fn parse(text: &str, file: &str) -> Result<Self, Diagnostic> {
         let source = Source { file, text };
+        if let Some((start, c)) = text.char_indices().find(|(_, c)| turns_text(*c)) {
+            return Err(turning_character(&source, c, start..start + c.len_utf8()));
+        }
         let document: Document = toml::from_str(text).map_err(|e| {
             let span = e.span().unwrap_or(0..0);
             source.error(e.message().to_owned(), span, None)
         })?;
+        // Escapes may hide them, too.
+        for (text, span) in document.free_text() {
+            if let Some(c) = text.chars().find(|c| turns_text(*c)) {
+                return Err(turning_character(&source, c, span));
+            }
+        }
         Reader::new(&document, source)?.read(&document)
     }
 
@@ -295,9 +345,10 @@ impl<'a> Reader<'a> {
             None => self.bar_speed(&material, density),
         };
         Ok(Spec {
+            source: self.scope.source.text.to_owned(),
             name: document.name.get_ref().clone(),
-            title: document.title.clone(),
-            reference: document.reference.clone(),
+            title: document.title.get_ref().clone(),
+            reference: document.reference.get_ref().clone(),
             coordinates: self.coordinates,
             dimension: self.dimension,
             parameters,
@@ -485,7 +536,8 @@ impl<'a> Reader<'a> {
             "shell" if self.dimension == 3 => (["inner", "outer"], true),
             "annulus" | "shell" => {
                 let message = "an annulus is a shape of the plane, a shell one of space";
-                let help = "shape = 'annulus' with dimension = 2, 'shell' with dimension = 3, or 'box'";
+                let help =
+                    "shape = 'annulus' with dimension = 2, 'shell' with dimension = 3, or 'box'";
                 return Err(self.scope.source.error(message, keys.shape.span(), Some(help.into())));
             }
             _ => {
@@ -579,6 +631,19 @@ impl<'a> Reader<'a> {
     }
 }
 
+/// Whether a character turns the direction in which text is shown, so that a reader sees other than what is there.
+fn turns_text(c: char) -> bool {
+    matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+fn turning_character(source: &Source<'_>, c: char, span: std::ops::Range<usize>) -> Diagnostic {
+    let message = format!(
+        "the character {} turns the direction of text and is not allowed",
+        c.escape_unicode()
+    );
+    source.error(message, span, None)
+}
+
 fn check_name(name: &Spanned<String>, source: &Source<'_>) -> Result<(), Diagnostic> {
     let word = name.get_ref();
     let valid = word.starts_with(|c: char| c.is_ascii_lowercase())
@@ -594,6 +659,10 @@ fn check_name(name: &Spanned<String>, source: &Source<'_>) -> Result<(), Diagnos
     }
     if RUST_WORDS.contains(&word.as_str()) {
         let message = format!("'{word}' is a word of the Rust language and cannot name a solution");
+        return Err(source.error(message, name.span(), Some("choose another name".into())));
+    }
+    if TAKEN_WORDS.contains(&word.as_str()) || word.ends_with("-parameters") {
+        let message = format!("'{word}' is the name of something else in generated code");
         return Err(source.error(message, name.span(), Some("choose another name".into())));
     }
     Ok(())

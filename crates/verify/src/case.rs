@@ -3,8 +3,10 @@
 use std::fmt;
 use std::time::Instant;
 
-use mmsmith_mpm::{Integrator, Particles, Settings, SetupError, Shape, Simulation, StepError};
-use mmsmith_solutions::{AnySolution, Material, Real, Solution};
+use mmsmith_mpm::{
+    BodyForce, Integrator, Particles, Settings, SetupError, Shape, Simulation, StepError,
+};
+use mmsmith_solutions::{AnySolution, BodyForceAtPoints, Material, Real, Solution};
 use nalgebra::SVector;
 use serde::{Serialize, Serializer};
 use thiserror::Error;
@@ -278,11 +280,8 @@ fn run_in<T: Real, const D: usize>(
         time_step,
         halve_first_acceleration: case.integrator == Integrator::Cd && case.start == Start::Halved,
     };
+    let body_force = ExactBodyForce(model.body_force_at(&particles.X));
     let mut simulation = Simulation::new(grid, particles, law(model.material())?, settings)?;
-    let body_force = |X: &[SVector<T, D>], t: T, b: &mut [SVector<T, D>]| {
-        // The solver calls this from its own threads, each with a part of the particles.
-        b.iter_mut().zip(X).for_each(|(b, X)| *b = model.body_force(X, t));
-    };
 
     let mut frames = match outputs.frames {
         Some(output) => Some(FrameWriter::new(output, steps.count)?),
@@ -337,6 +336,15 @@ fn run_in<T: Real, const D: usize>(
         status,
         errors,
     })
+}
+
+/// The exact body force at the particles; what depends on their reference positions alone is kept.
+struct ExactBodyForce<'a, T: Real, const D: usize>(Box<dyn BodyForceAtPoints<T, D> + 'a>);
+
+impl<T: Real, const D: usize> BodyForce<T, D> for ExactBodyForce<'_, T, D> {
+    fn evaluate(&self, first: usize, _X: &[SVector<T, D>], t: T, b: &mut [SVector<T, D>]) {
+        self.0.evaluate(t, first, b);
+    }
 }
 
 /// The solver's hand-written law with the constants of the solution's material.

@@ -48,7 +48,9 @@ pub enum SceneError {
         condition: Condition,
     },
     /// A surface of the body without a boundary condition.
-    #[error("the solution declares no condition on {surface:?}, so the solver cannot know what holds there")]
+    #[error(
+        "the solution declares no condition on {surface:?}, so the solver cannot know what holds there"
+    )]
     Undeclared {
         /// Where.
         surface: Surface,

@@ -89,6 +89,7 @@ impl<T: crate::Real> ShearWave<T> {
                 description: "wave length",
             },
         ],
+        specification: "# A plane shear wave of the linear theory that solves the nonlinear equations exactly: b = 0, in symbols. What a solver\n# returns is free of any mistake in b.\nname = 'shear-wave'\ntitle = 'Simple shear wave'\nreference = 'simple shear of a neo-Hookean body'\ncoordinates = 'cartesian'\ndimension = 2\n\n[parameters]\nA = { default = 0.05, unit = 'm', description = 'amplitude' }\nE = { default = 1.0e4, range = '> 0', unit = 'Pa', description = \"Young's modulus\" }\nnu = { default = 0.3, range = '> -1, < 1/2', description = \"Poisson's ratio\" }\nrho0 = { default = 1.0, range = '> 0', unit = 'kg/m^3', description = 'reference density' }\nL = { default = 1.0, range = '> 0', unit = 'm', description = 'wave length' }\n\n[let]\nmu = 'E/(2*(1 + nu))'\nk = '2*Pi/L'\nw = 'sqrt(mu*k^2/rho0)'\n\n[displacement]\nX = 'A*sin(k*Y)*sin(w*t)'\n\n[material]\nlaw = 'neo-hookean'\nmu = 'mu'\n\n[domain]\nshape = 'box'\nlower = [0, 0]\nupper = ['L', 'L']\ncell-length = 'L'\n\n[[boundary]]\nsurface = 'X-lower'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'X-upper'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Y-lower'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Y-upper'\ncondition = 'prescribed-motion'\n\n[time]\nperiod = '2*Pi/w'\nwave-speed = 'sqrt(E/rho0)'\n",
     };
     /// The solution with the given parameters.
     ///

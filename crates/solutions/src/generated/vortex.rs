@@ -79,6 +79,7 @@ impl<T: crate::Real> Vortex<T> {
                 description: "reference density",
             },
         ],
+        specification: "# Every circle turns rigidly by its own angle alpha(R, t), x = Rot(alpha) X: pure shear at large rotation, J = 1. The\n# cosine minus one is written with half the angle, which keeps its digits where alpha is small.\nname = 'vortex'\ntitle = 'Generalized vortex'\nreference = 'K. Kamojjala, R. Brannon, A. Sadeghirad and J. Guilkey, Verification tests in solid mechanics, Engineering with Computers 31 (2015)'\ncoordinates = 'polar'\ndimension = 2\n\n[parameters]\nA = { default = 1.0, description = 'largest angle, in radians' }\nE = { default = 1.0e3, range = '> 0', unit = 'Pa', description = \"Young's modulus\" }\nnu = { default = 0.3, range = '> -1, < 1/2', description = \"Poisson's ratio\" }\nrho0 = { default = 1.0e3, range = '> 0', unit = 'kg/m^3', description = 'reference density' }\n\n[let]\nc = 'sqrt(E/rho0)'\ns = '16*(R - 1)^2'\nhalf = 'A*sin(c*Pi*t)*(1 - s)^2/2'\n\n[displacement]\nR = '-2*R*sin(half)^2'\ntheta = '2*R*sin(half)*cos(half)'\n\n[material]\nlaw = 'neo-hookean'\n\n[domain]\nshape = 'annulus'\ninner = '3/4'\nouter = '5/4'\n\n[[boundary]]\nsurface = 'inner'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'outer'\ncondition = 'prescribed-motion'\n\n[time]\nperiod = '2/c'\nwave-speed = 'c'\n",
     };
     /// The solution with the given parameters.
     ///
