@@ -37,6 +37,8 @@ impl fmt::Display for Diagnostic {
         // An empty span at the end of a text has nothing to mark: mark the last character.
         let end = self.span.end.clamp(self.span.start, self.source.len());
         let start = self.span.start.min(self.source.len().saturating_sub(1));
+        let (start, end) =
+            (self.source.floor_char_boundary(start), self.source.ceil_char_boundary(end));
         let snippet = Snippet::source(&self.source)
             .path(&self.file)
             .annotation(AnnotationKind::Primary.span(start..end.max(start)));

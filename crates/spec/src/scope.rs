@@ -22,6 +22,9 @@ impl Source<'_> {
         span: std::ops::Range<usize>,
         help: Option<String>,
     ) -> Diagnostic {
+        // A place that the TOML reader gives may lie within a character.
+        let span =
+            self.text.floor_char_boundary(span.start)..self.text.ceil_char_boundary(span.end);
         Diagnostic {
             message: message.into(),
             file: self.file.to_owned(),
