@@ -29,9 +29,9 @@ fn a_wrong_declaration_fails_with_the_place() {
     let folder = tempfile::tempdir().unwrap();
     let spec = folder.path().join("ring.toml");
     let text = std::fs::read_to_string(workspace().join("mms-specs/ring.toml")).unwrap();
-    // With another coefficient the rims are no longer free of traction.
+    // With another factor the inner rim is no longer free of traction.
     std::fs::write(&spec, text.replace("2*R + Ro", "2.001*R + Ro")).unwrap();
     let (status, out, _) = outcome(mms().arg("check").arg(&spec));
     assert_eq!(status, Some(1), "{out}");
-    assert!(out.contains("P N on Outer is worst at X = ["), "{out}");
+    assert!(out.contains("P N on Inner is worst at X = ["), "{out}");
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use mmsmith_interpret::interpret;
 use mmsmith_solutions::{AnySolution, CATALOGUE, Description, Real, build};
-use mmsmith_spec::Spec;
+use mmsmith_spec::{Spec, nearest};
 
 /// A solution's description with its parameter values, in its own order.
 #[derive(Clone)]
@@ -100,40 +100,8 @@ fn find(name: &str) -> Result<&'static Description> {
         return Ok(description);
     }
     let names: Vec<_> = CATALOGUE.iter().map(|known| known.name).collect();
-    let nearest = names
-        .iter()
-        .min_by_key(|known| distance(known, name))
-        .filter(|known| distance(known, name) <= name.len().max(known.len()) / 2)
+    let nearest = nearest(name, names.iter().copied())
         .map(|known| format!("; did you mean '{known}'?"))
         .unwrap_or_default();
     bail!("there is no solution '{name}'{nearest} (there are: {})", names.join(", "))
-}
-
-/// The number of letters to insert, delete or replace to turn one word into the other.
-fn distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, letter) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for j in 0..b.len() {
-            let replace = diagonal + usize::from(letter != b[j]);
-            diagonal = row[j + 1];
-            row[j + 1] = replace.min(row[j] + 1).min(diagonal + 1);
-        }
-    }
-    row[b.len()]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::distance;
-
-    #[test]
-    fn distances_between_words() {
-        assert_eq!(distance("ring", "ring"), 0);
-        assert_eq!(distance("ring", "rign"), 2);
-        assert_eq!(distance("axis-aligned", "axis-algned"), 1);
-        assert_eq!(distance("", "bar"), 3);
-    }
 }

@@ -10,12 +10,10 @@
 
 use rayon::prelude::*;
 
-use crate::grid::Layout;
+use crate::grid::{BAND_ROWS, Layout};
 
 /// Rows that a particle may be lower than the band it was sorted into before everything is sorted anew.
 const SLACK: usize = 2;
-/// Rows in the highest band.
-pub(crate) const BAND_ROWS: usize = 256;
 
 /// Particles sorted by band, and within each band by cell at the time of sorting.
 #[derive(Debug)]

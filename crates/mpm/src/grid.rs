@@ -2,7 +2,6 @@
 
 use nalgebra::{RealField, SVector};
 
-use crate::bands::BAND_ROWS;
 use crate::error::SetupError;
 use crate::tensor::real;
 
@@ -27,6 +26,8 @@ impl<T: RealField + Copy, const D: usize> Grid<T, D> {
     }
 }
 
+/// Rows of nodes that the solver hands to one thread at a time, at most.
+pub(crate) const BAND_ROWS: usize = 256;
 /// Node layers below cell 0: a box of half-size 2 reaches two, and rounding may ask for one more.
 pub(crate) const PAD_BELOW: usize = 3;
 /// Node layers above the last cell: as many as the widest stencil of a particle on the upper face takes.

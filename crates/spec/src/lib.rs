@@ -16,7 +16,7 @@ mod spec;
 
 pub use coordinates::Coordinates;
 pub use derive::{DeriveError, Fields};
-pub use diagnostic::Diagnostic;
+pub use diagnostic::{Diagnostic, nearest};
 pub use spec::{
     Bound, Boundary, Condition, Domain, Material, Parameter, Relation, Requirement, Spec, Surface,
 };
