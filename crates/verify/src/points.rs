@@ -145,12 +145,12 @@ mod tests {
             }
             let (X, N) = surface(&ring, Surface::Inner, n).unwrap();
             assert!((X.norm() - 0.5).abs() < 1e-15 && (N.norm() - 1.0).abs() < 1e-15);
+            assert!(X.dot(&N) < 0.0, "the inner rim's normal points to the origin");
             let shell = Domain::<f64, 3>::Annulus { inner: 0.5, outer: 1.0 };
             let R = interior(&shell, 1.0, n).unwrap().0.norm();
             assert!((0.5..1.0).contains(&R));
             let (X, N) = surface(&shell, Surface::Lower(1), n).unwrap();
             assert!(X[1] == 0.0 && X.min() >= 0.0 && X.dot(&N) == 0.0);
-            assert!(X.dot(&N) < 0.0, "the inner rim's normal points to the origin");
             let (X, N) = surface(&square, Surface::Upper(1), n).unwrap();
             assert_eq!((X[1], N), (1.0, vector![0.0, 1.0]));
         }
