@@ -135,7 +135,7 @@ struct Generator<'a> {
     runtime: &'a TokenStream,
     program: Program,
     fields: Vec<Field>,
-    /// Slots of the scalars that depend on parameters only, in the order of [`Generator::constants`].
+    /// Slots of the scalars that depend on parameters only, in the order of [`Spec::constants`].
     constants: Vec<Slot>,
     /// Slots of the two sides of each requirement.
     requirements: Vec<(Slot, Slot)>,
@@ -158,7 +158,7 @@ impl<'a> Generator<'a> {
             ("first_piola_kirchhoff", "P", Shape::Matrix, matrix(&fields.P)),
             ("body_force", "b", Shape::Vector, b),
         ];
-        let constants = Self::constants(spec);
+        let constants = spec.constants();
         let mut outputs: Vec<Expr> = parts.iter().flat_map(|(.., part)| part.clone()).collect();
         outputs.extend(&constants);
         outputs.extend(spec.requirements.iter().flat_map(|r| [r.left, r.right]));
@@ -179,18 +179,6 @@ impl<'a> Generator<'a> {
         let requirements =
             spec.requirements.iter().map(|_| take(2)).map(|sides| (sides[0], sides[1])).collect();
         Generator { spec, runtime, program, fields, constants, requirements, formulas }
-    }
-
-    /// Cell length, density, wave speed, period, Lamé's constants, and the measures of the domain.
-    fn constants(spec: &Spec) -> Vec<Expr> {
-        let Material::NeoHookean { lambda, mu } = spec.material;
-        let mut constants =
-            vec![spec.cell_length, spec.density, spec.wave_speed, spec.period, lambda, mu];
-        match &spec.domain {
-            Domain::Box { lower, upper } => constants.extend(lower.iter().chain(upper)),
-            Domain::Annulus { inner, outer } => constants.extend([inner, outer]),
-        }
-        constants
     }
 
     fn items(&self) -> TokenStream {

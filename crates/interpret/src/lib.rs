@@ -96,13 +96,7 @@ impl<const D: usize> Interpreted<D> {
         let (H, F, P) = (fields.H.concat(), fields.F.concat(), fields.P.concat());
         let J = [fields.J];
 
-        let spec::Material::NeoHookean { lambda, mu } = spec.material;
-        let mut constants =
-            vec![spec.cell_length, spec.density, spec.wave_speed, spec.period, lambda, mu];
-        match &spec.domain {
-            spec::Domain::Box { lower, upper } => constants.extend(lower.iter().chain(upper)),
-            spec::Domain::Annulus { inner, outer } => constants.extend([inner, outer]),
-        }
+        let mut constants = spec.constants();
         for requirement in &spec.requirements {
             constants.extend([requirement.left, requirement.right]);
         }

@@ -111,7 +111,7 @@ fn gimp_with_centred_differences_has_the_reference_errors() {
 }
 
 #[test]
-#[ignore = "a minute without optimisation"]
+#[ignore = "a minute without optimisation; the orders test of the workspace has the same figure in release mode"]
 fn gimp_with_centred_differences_has_the_reference_error_on_a_fine_grid() {
     let error = error(Shape::Gimp, Integrator::Cd, Start::Halved, 128);
     assert!((error / 6.46e-5 - 1.0).abs() < 0.05, "{error:e}");

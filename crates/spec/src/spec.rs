@@ -283,6 +283,20 @@ impl Spec {
         Reader::new(&document, source)?.read(&document)
     }
 
+    /// The scalars that depend on parameters only: cell length, density, wave speed, period, Lamé's constants, and the
+    /// measures of the domain (both corners of a box, or both radii), in this order.
+    #[must_use]
+    pub fn constants(&self) -> Vec<Expr> {
+        let Material::NeoHookean { lambda, mu } = self.material;
+        let mut constants =
+            vec![self.cell_length, self.density, self.wave_speed, self.period, lambda, mu];
+        match &self.domain {
+            Domain::Box { lower, upper } => constants.extend(lower.iter().chain(upper)),
+            Domain::Annulus { inner, outer } => constants.extend([inner, outer]),
+        }
+        constants
+    }
+
     /// Derives every field.
     ///
     /// # Errors
