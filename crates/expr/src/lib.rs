@@ -35,6 +35,7 @@ mod cancel;
 mod canonical;
 mod derivative;
 mod graph;
+mod near_zero;
 mod parse;
 mod print;
 mod program;

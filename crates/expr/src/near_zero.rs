@@ -1,0 +1,233 @@
+//! Expressions of small quantities, such as a stress of a small strain, as their value at zero and the rest.
+//!
+//! Text says `mu*F - mu/F`; with `F = 1 + H` both terms are large where `H` is small, and their difference has lost
+//! its digits. Here each part of an expression is split into its value where the small quantities are zero and a
+//! remainder that is formed from the small quantities themselves, so that `mu/F - mu` becomes `-mu H/(1 + H)`. The
+//! values at zero then cancel in symbols, and what is computed has no large terms.
+
+use crate::{Expr, Function, Graph, Node, Rational};
+use num_traits::{Signed, ToPrimitive};
+use std::collections::{BTreeSet, HashMap};
+
+impl Graph {
+    /// `expr` as its value where all of `small` are zero, and a rest that is small with them.
+    ///
+    /// The two add up to `expr`. Where `expr` has no value at zero, as `ln(x)` at `x = 0`, all of it is the rest.
+    pub fn split_at_zero(&mut self, expr: Expr, small: &BTreeSet<Expr>) -> (Expr, Expr) {
+        Splitting { graph: self, small, known: HashMap::new() }.split(expr)
+    }
+}
+
+struct Splitting<'a> {
+    graph: &'a mut Graph,
+    small: &'a BTreeSet<Expr>,
+    known: HashMap<Expr, (Expr, Expr)>,
+}
+
+impl Splitting<'_> {
+    fn split(&mut self, expr: Expr) -> (Expr, Expr) {
+        if self.small.contains(&expr) {
+            return (Graph::ZERO, expr);
+        }
+        if let Some(&known) = self.known.get(&expr) {
+            return known;
+        }
+        let (value, rest) = match self.graph.node(expr).clone() {
+            Node::Number(_) | Node::Pi | Node::Symbol(_) => (expr, Graph::ZERO),
+            Node::Sum { constant, terms } => {
+                let mut values = vec![(constant, Graph::ONE)];
+                let mut rests = Vec::new();
+                for (term, coefficient) in terms {
+                    let (value, rest) = self.split(term);
+                    values.push((coefficient.clone(), value));
+                    rests.push((coefficient, rest));
+                }
+                (self.graph.sum(values), self.graph.sum(rests))
+            }
+            Node::Product(factors) => self.product(expr, &factors),
+            Node::Call(Function::Atan2, arguments) => {
+                let values: Vec<Expr> = arguments.iter().map(|&a| self.split(a).0).collect();
+                self.plain(expr, Function::Atan2, &values)
+            }
+            Node::Call(function, arguments) => {
+                let inner = self.split(arguments[0]);
+                self.call(expr, function, inner)
+            }
+            Node::Whole(inner) => {
+                let (value, rest) = self.split(inner);
+                (self.graph.whole(value), self.graph.whole(rest))
+            }
+        };
+        // A value at infinity is none.
+        let split =
+            if self.graph.divides_by_zero(value) { (Graph::ZERO, expr) } else { (value, rest) };
+        self.known.insert(expr, split);
+        split
+    }
+
+    /// `f1 f2 ... - k1 k2 ... = r1 f2 f3 ... + k1 r2 f3 ... + ...` for factors `f = k + r`.
+    fn product(&mut self, expr: Expr, factors: &[(Expr, Rational)]) -> (Expr, Expr) {
+        let mut parts = Vec::new();
+        for (base, exponent) in factors {
+            let Some((value, rest)) = self.power(*base, exponent) else {
+                return (Graph::ZERO, expr);
+            };
+            let factor = self.graph.product([(*base, exponent.clone())]);
+            parts.push((factor, value, rest));
+        }
+        // With a factor that is zero at zero in front, only the first of the sum's terms is left.
+        parts.sort_by_key(|&(_, value, _)| value != Graph::ZERO);
+        let mut terms = Vec::new();
+        for i in 0..parts.len() {
+            let before = parts[..i].iter().map(|part| part.1);
+            let after = parts[i + 1..].iter().map(|part| part.0);
+            let factors: Vec<Expr> = before.chain([parts[i].2]).chain(after).collect();
+            terms.push(self.graph.product_of(factors));
+        }
+        let value = self.graph.product_of(parts.iter().map(|part| part.1));
+        (value, self.graph.sum_of(terms))
+    }
+
+    fn power(&mut self, base: Expr, exponent: &Rational) -> Option<(Expr, Expr)> {
+        let (value, rest) = self.split(base);
+        let power = self.graph.product([(base, exponent.clone())]);
+        if rest == Graph::ZERO {
+            return Some((power, Graph::ZERO));
+        }
+        if value == Graph::ZERO {
+            // Small to a positive power is small; to a negative one it is infinite.
+            let rest = self.graph.product([(rest, exponent.clone())]);
+            return exponent.is_positive().then_some((Graph::ZERO, rest));
+        }
+        let at_zero = self.graph.product([(value, exponent.clone())]);
+        let small_integer = exponent.abs().to_integer().to_u32().filter(|&n| n <= 16);
+        if let (true, Some(n)) = (exponent.is_integer(), small_integer) {
+            // f^n - k^n = r (f^(n-1) + f^(n-2) k + ... + k^(n-1))
+            let terms: Vec<Expr> = (0..n)
+                .map(|m| {
+                    let of_base = self.graph.powi(base, i64::from(n - 1 - m));
+                    let of_value = self.graph.powi(value, i64::from(m));
+                    self.graph.product_of([rest, of_base, of_value])
+                })
+                .collect();
+            let difference = self.graph.sum_of(terms);
+            if exponent.is_positive() {
+                return Some((at_zero, difference));
+            }
+            // 1/f^n - 1/k^n = -(f^n - k^n)/(f^n k^n)
+            let scaled = self.graph.product_of([difference, power, at_zero]);
+            return Some((at_zero, self.graph.neg(scaled)));
+        }
+        // k^q (exp(q ln(1 + r/k)) - 1)
+        let ratio = self.graph.div(rest, value);
+        let logarithm = self.graph.call(Function::Ln1p, &[ratio]);
+        let scaled = self.graph.sum([(exponent.clone(), logarithm)]);
+        let relative = self.graph.call(Function::Expm1, &[scaled]);
+        Some((at_zero, self.graph.mul(at_zero, relative)))
+    }
+
+    fn call(
+        &mut self,
+        expr: Expr,
+        function: Function,
+        (value, rest): (Expr, Expr),
+    ) -> (Expr, Expr) {
+        if rest == Graph::ZERO {
+            return (expr, Graph::ZERO);
+        }
+        let graph = &mut *self.graph;
+        let at_zero = graph.call(function, &[value]);
+        let two = graph.integer(2);
+        match function {
+            Function::Exp | Function::Expm1 => {
+                let factor = graph.call(Function::Exp, &[value]);
+                let relative = graph.call(Function::Expm1, &[rest]);
+                (at_zero, graph.mul(factor, relative))
+            }
+            Function::Ln | Function::Ln1p => {
+                let base =
+                    if function == Function::Ln { value } else { graph.add(Graph::ONE, value) };
+                let ratio = graph.div(rest, base);
+                (at_zero, graph.call(Function::Ln1p, &[ratio]))
+            }
+            Function::Sin | Function::Cos | Function::Sinh | Function::Cosh => {
+                // f(k + r) - f(k) = 2 g(k + r/2) s(r/2)
+                let (outer, inner, sign) = match function {
+                    Function::Sin => (Function::Cos, Function::Sin, 1),
+                    Function::Cos => (Function::Sin, Function::Sin, -1),
+                    Function::Sinh => (Function::Cosh, Function::Sinh, 1),
+                    _ => (Function::Sinh, Function::Sinh, 1),
+                };
+                if value == Graph::ZERO && matches!(function, Function::Sin | Function::Sinh) {
+                    return (Graph::ZERO, graph.call(function, &[rest]));
+                }
+                let half = graph.div(rest, two);
+                let middle = graph.add(value, half);
+                let outer = graph.call(outer, &[middle]);
+                let inner = graph.call(inner, &[half]);
+                let sign = graph.integer(2 * sign);
+                (at_zero, graph.product_of([sign, outer, inner]))
+            }
+            _ if value == Graph::ZERO && at_zero == Graph::ZERO => {
+                (Graph::ZERO, graph.call(function, &[rest]))
+            }
+            _ => self.plain(expr, function, &[value]),
+        }
+    }
+
+    /// The rest as a plain difference, where no better form is known.
+    fn plain(&mut self, expr: Expr, function: Function, values: &[Expr]) -> (Expr, Expr) {
+        let value = self.graph.call(function, values);
+        (value, self.graph.sub(expr, value))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Ast, Graph, Program};
+    use std::collections::BTreeSet;
+
+    fn split(text: &str) -> (String, String, f64) {
+        let mut graph = Graph::new();
+        let ast = Ast::parse(text).unwrap();
+        let expr = graph.build(&ast, &mut |g, name| Ok(g.symbol(name))).unwrap();
+        let (h, mu) = (graph.symbol("h"), graph.symbol("mu"));
+        let (value, rest) = graph.split_at_zero(expr, &BTreeSet::from([h]));
+        // Where h is not small, the two parts add up to what the text says.
+        let inputs = [(h, Default::default()), (mu, Default::default())];
+        let program = Program::lower(&mut graph, &inputs, &[], &[expr, value, rest]);
+        let at = program.evaluate(&[0.3, 1.7]);
+        assert!((at[1] + at[2] - at[0]).abs() < 1e-14 * at[0].abs().max(1.0), "{text}: {at:?}");
+        (graph.print(value), graph.print(rest), program.evaluate(&[1e-30, 1.7])[2])
+    }
+
+    #[test]
+    fn values_at_zero_cancel() {
+        let cases = [
+            ("mu*(1+h) - mu/(1+h)", "0", 3.4e-30),
+            ("mu*(1+h)^2 - mu", "0", 3.4e-30),
+            ("1/(1+h)^3 - mu", "1 - mu", -3e-30),
+            ("(mu+h)^(2/3)/mu^(2/3) - 1", "0", 2.0 / 3.0 / 1.7 * 1e-30),
+            ("ln(mu+h) - ln(mu) + h^2", "0", 1e-30 / 1.7),
+            ("exp(mu+h)", "exp(mu)", 1.7_f64.exp() * 1e-30),
+            ("exp(h^2)-1", "0", 1e-60),
+            ("sqrt(4+h)", "2", 0.25e-30),
+            ("cos(h) - 1", "0", -0.5e-60),
+            ("sin(mu+h) - sin(mu)", "0", 1.7_f64.cos() * 1e-30),
+            ("cosh(h) - 1", "0", 0.5e-60),
+            ("h/(mu+h)", "0", 1e-30 / 1.7),
+        ];
+        for (text, value, small) in cases {
+            let (found, rest, at_small) = split(text);
+            assert_eq!(found, value, "{text}");
+            assert!((at_small / small - 1.0).abs() < 1e-14, "{text}: {rest} gives {at_small:e}");
+        }
+    }
+
+    #[test]
+    fn no_value_at_zero() {
+        assert_eq!(split("1/h + mu").0, "mu");
+        assert_eq!(split("sqrt(h)").0, "0");
+        assert_eq!(split("arccos(h)*mu").1, "mu*(arccos(h) - 1/2*Pi)".replace("1/2*Pi", "arccos(0)"));
+    }
+}
