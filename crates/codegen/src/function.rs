@@ -165,6 +165,9 @@ fn rust_name(function: Function) -> &'static str {
         Function::Ln1p => "ln_1p",
         Function::Expm1 => "exp_m1",
         Function::Atan2 => "atan2",
+        Function::LogRatioSquared => "log_ratio_squared",
+        Function::LogRatioSlope => "log_ratio_slope",
+        Function::LogRatioCurvature => "log_ratio_curvature",
     }
 }
 

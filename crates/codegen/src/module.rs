@@ -503,8 +503,9 @@ impl<'a> Generator<'a> {
         });
 
         let constant = |index: usize| self.constant(translator, index);
-        let (cell_length, density, wave_speed, period, lambda, mu) =
-            (constant(0), constant(1), constant(2), constant(3), constant(4), constant(5));
+        let (cell_length, density, wave_speed, period) =
+            (constant(0), constant(1), constant(2), constant(3));
+        let material = self.material(translator);
         let domain = self.domain(translator);
         let boundaries = self.spec.boundaries.iter().map(|b| boundary(runtime, b));
         items.extend(quote! {
@@ -518,7 +519,7 @@ impl<'a> Generator<'a> {
                 #cell_length
             }
             fn material(&self) -> #runtime::Material<T> {
-                #runtime::Material::NeoHookean { lambda: #lambda, mu: #mu }
+                #material
             }
             fn density(&self) -> T {
                 #density
@@ -543,10 +544,29 @@ impl<'a> Generator<'a> {
         }
     }
 
+    fn material(&self, translator: &Translator<'_>) -> TokenStream {
+        let runtime = self.runtime;
+        let constants = self.spec.material.constants();
+        let names = constants.iter().map(|(name, _)| format_ident!("{name}"));
+        let values = (0..constants.len()).map(|i| self.constant(translator, 4 + i));
+        let variant = match self.spec.material {
+            Material::NeoHookean { .. } => quote!(NeoHookean),
+            Material::StVenantKirchhoff { .. } => quote!(StVenantKirchhoff),
+            Material::Hencky { .. } => quote!(Hencky),
+            Material::LinearElastic { .. } => quote!(LinearElastic),
+            Material::MooneyRivlin { .. } => quote!(MooneyRivlin),
+            Material::Energy { .. } | Material::Stress { .. } => {
+                return quote!(#runtime::Material::Custom);
+            }
+        };
+        quote!(#runtime::Material::#variant { #(#names: #values),* })
+    }
+
     fn domain(&self, translator: &Translator<'_>) -> TokenStream {
         let runtime = self.runtime;
+        let first = 4 + self.spec.material.constants().len();
         let measures: Vec<TokenStream> =
-            (6..self.constants.len()).map(|i| self.constant(translator, i)).collect();
+            (first..self.constants.len()).map(|i| self.constant(translator, i)).collect();
         match &self.spec.domain {
             Domain::Box { lower, .. } => {
                 let (lower, upper) = measures.split_at(lower.len());
@@ -630,9 +650,9 @@ fn formulas(spec: &Spec, fields: &Fields) -> String {
     for (name, component) in names.iter().zip(&spec.displacement) {
         text += &format!("u_{name} = {}\n", fields.graph.print(*component));
     }
-    let Material::NeoHookean { lambda, mu } = spec.material;
-    text += "tau = lambda ln(J) I + mu (F F^T - I)\n";
-    text += &format!("lambda = {}\n", spec.graph.print(lambda));
-    text += &format!("mu = {}\n", spec.graph.print(mu));
+    for line in spec.material.formulas(&spec.graph) {
+        text += &line;
+        text.push('\n');
+    }
     text + "```"
 }

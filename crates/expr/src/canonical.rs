@@ -358,11 +358,16 @@ impl Graph {
             | Function::Tanh
             | Function::Ln1p
             | Function::Expm1
+            | Function::LogRatioSquared
+            | Function::LogRatioSlope
                 if x == Graph::ZERO =>
             {
                 return Graph::ZERO;
             }
             Function::Cosh | Function::Exp if x == Graph::ZERO => return Graph::ONE,
+            Function::LogRatioCurvature if x == Graph::ZERO => {
+                return self.number(Rational::new((-1).into(), 3.into()));
+            }
             Function::Ln if x == Graph::ONE => return Graph::ZERO,
             Function::Exp => {
                 if let Node::Call(Function::Ln, inner) = self.node(x) {

@@ -132,6 +132,26 @@ fn outer_derivative(graph: &mut Graph, function: Function, x: Expr) -> Expr {
             let denominator = graph.add(one, x);
             graph.powi(denominator, -1)
         }
+        Function::LogRatioSquared => {
+            let slope = graph.call(Function::LogRatioSlope, &[x]);
+            let shifted = graph.add(one, slope);
+            graph.sum([(Rational::from_integer(2.into()), shifted)])
+        }
+        Function::LogRatioSlope => graph.call(Function::LogRatioCurvature, &[x]),
+        Function::LogRatioCurvature => {
+            // From z (z + 2) s' = 1 - (1 + z)(1 + s), differentiated once more.
+            let slope = graph.call(Function::LogRatioSlope, &[x]);
+            let curvature = graph.call(Function::LogRatioCurvature, &[x]);
+            let (shifted, two) = (graph.add(one, x), graph.integer(2));
+            let product = graph.mul(shifted, curvature);
+            let three = Rational::from_integer(3.into());
+            let plain = Rational::one();
+            let numerator = graph.sum([(plain.clone(), one), (plain, slope), (three, product)]);
+            let denominator = graph.add(x, two);
+            let denominator = graph.mul(x, denominator);
+            let quotient = graph.div(numerator, denominator);
+            graph.neg(quotient)
+        }
         // Two arguments: handled by the caller.
         Function::Atan2 => Graph::ZERO,
     }

@@ -47,6 +47,12 @@ pub enum Function {
     Expm1,
     /// `atan2(y, x)`, the polar angle of the point `(x, y)`.
     Atan2,
+    /// `arcosh(1 + z)^2`: the squared logarithm of `a/b` for `z = (a - b)^2/(2 a b)`, smooth at zero.
+    LogRatioSquared,
+    /// Half the slope of [`Function::LogRatioSquared`] less one, `arcosh(1 + z)/sqrt(z (z + 2)) - 1`.
+    LogRatioSlope,
+    /// The derivative of [`Function::LogRatioSlope`].
+    LogRatioCurvature,
 }
 
 impl Function {
@@ -66,6 +72,9 @@ impl Function {
         ("log1p", Function::Ln1p),
         ("expm1", Function::Expm1),
         ("atan2", Function::Atan2),
+        ("lnratio2", Function::LogRatioSquared),
+        ("lnratio2_slope", Function::LogRatioSlope),
+        ("lnratio2_curvature", Function::LogRatioCurvature),
         // Other usual spellings.
         ("log", Function::Ln),
         ("asin", Function::Asin),

@@ -5,6 +5,7 @@
 //! It also keeps apart what changes at different rates. Factors and terms that depend on parameters only are
 //! combined before those that depend on time or on position, so that the slow parts are computed rarely.
 
+use crate::log_ratio;
 use crate::{Expr, Function, Graph, Node, Rational, nearest_f64};
 use num_traits::{One, Signed, ToPrimitive, Zero};
 use std::collections::HashMap;
@@ -350,6 +351,9 @@ fn call(function: Function, x: f64) -> f64 {
         Function::Ln => x.ln(),
         Function::Ln1p => x.ln_1p(),
         Function::Expm1 => x.exp_m1(),
+        Function::LogRatioSquared => log_ratio::squared(x),
+        Function::LogRatioSlope => log_ratio::slope(x),
+        Function::LogRatioCurvature => log_ratio::curvature(x),
         // Has an operation of its own.
         Function::Atan2 => f64::NAN,
     }

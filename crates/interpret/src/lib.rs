@@ -116,13 +116,15 @@ impl<const D: usize> Interpreted<D> {
                 }));
             }
         }
+        let (material_constants, measures) =
+            constants[4..].split_at(spec.material.constants().len());
         let domain = match spec.domain {
             spec::Domain::Box { .. } => Domain::Box {
-                lower: SVector::from_row_slice(&constants[6..6 + D]),
-                upper: SVector::from_row_slice(&constants[6 + D..6 + 2 * D]),
+                lower: SVector::from_row_slice(&measures[..D]),
+                upper: SVector::from_row_slice(&measures[D..2 * D]),
             },
             spec::Domain::Annulus { .. } => {
-                Domain::Annulus { inner: constants[6], outer: constants[7] }
+                Domain::Annulus { inner: measures[0], outer: measures[1] }
             }
         };
         Ok(Interpreted {
@@ -137,7 +139,7 @@ impl<const D: usize> Interpreted<D> {
             domain,
             boundaries: spec.boundaries.iter().map(boundary).collect(),
             cell_length: constants[0],
-            material: Material::NeoHookean { lambda: constants[4], mu: constants[5] },
+            material: material(&spec.material, material_constants),
             density: constants[1],
             wave_speed: constants[2],
             period: constants[3],
@@ -248,5 +250,22 @@ impl<const D: usize> Solution<f64, D> for Interpreted<D> {
 
     fn period(&self) -> f64 {
         self.period
+    }
+}
+
+fn material(material: &spec::Material, constants: &[f64]) -> Material<f64> {
+    match (material, constants) {
+        (spec::Material::NeoHookean { .. }, &[lambda, mu]) => Material::NeoHookean { lambda, mu },
+        (spec::Material::StVenantKirchhoff { .. }, &[lambda, mu]) => {
+            Material::StVenantKirchhoff { lambda, mu }
+        }
+        (spec::Material::Hencky { .. }, &[lambda, mu]) => Material::Hencky { lambda, mu },
+        (spec::Material::LinearElastic { .. }, &[lambda, mu]) => {
+            Material::LinearElastic { lambda, mu }
+        }
+        (spec::Material::MooneyRivlin { .. }, &[c1, c2, lambda]) => {
+            Material::MooneyRivlin { c1, c2, lambda }
+        }
+        _ => Material::Custom,
     }
 }

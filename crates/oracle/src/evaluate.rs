@@ -362,6 +362,9 @@ impl Evaluation<'_> {
         let defined = match function {
             Function::Ln => x.is_positive() && !x.is_zero(),
             Function::Ln1p => x.cmp(&minus_one).is_some_and(|c| c > 0),
+            Function::LogRatioSquared | Function::LogRatioSlope | Function::LogRatioCurvature => {
+                !x.is_negative()
+            }
             Function::Asin | Function::Acos => x.abs_cmp(&one).is_some_and(|c| c <= 0),
             // Beyond this the result would be out of range, and finding that out would take long.
             Function::Exp | Function::Expm1 | Function::Sinh | Function::Cosh
@@ -389,7 +392,7 @@ impl Evaluation<'_> {
             Function::Ln => x.ln(bits, ROUNDING, constants),
             Function::Ln1p | Function::Expm1 if x.is_zero() => x,
             Function::Ln1p | Function::Expm1 => {
-                let smallness = x.exponent().map_or(0, |e| usize::try_from(-e).unwrap_or(0));
+                let smallness = smallness(&x);
                 if smallness > bits {
                     // x -+ x^2/2: what is left out is below 2^-2bits.
                     let half_square = scaled(
@@ -410,6 +413,26 @@ impl Evaluation<'_> {
                 } else {
                     x.exp(wide, ROUNDING, constants).sub(&one, bits, ROUNDING)
                 }
+            }
+            Function::LogRatioSquared => {
+                let theta = log_ratio(&x, 2 * bits + smallness(&x), constants);
+                theta.mul(&theta, bits, ROUNDING)
+            }
+            Function::LogRatioSlope => log_ratio_slope(&x, bits, constants),
+            Function::LogRatioCurvature => {
+                // z (z + 2) s' = -(z + (1 + z) s), in which no large terms cancel.
+                if x.is_zero() {
+                    return Ok(BigFloat::from_i32(-1, bits).div(
+                        &BigFloat::from_i32(3, bits),
+                        bits,
+                        ROUNDING,
+                    ));
+                }
+                let wide = bits + GUARD_BITS;
+                let slope = log_ratio_slope(&x, wide, constants);
+                let product = one.add(&x, wide, ROUNDING).mul(&slope, wide, ROUNDING);
+                let numerator = x.add(&product, wide, ROUNDING);
+                numerator.div(&squared_sinh(&x, wide), bits, ROUNDING).neg()
             }
             Function::Atan2 => {
                 let abscissa = self.value(arguments[1])?.clone();
@@ -516,6 +539,41 @@ impl Evaluation<'_> {
     fn describe(&self, expression: Expr) -> String {
         describe(self.graph, expression)
     }
+}
+
+/// The leading zeros of the binary fraction.
+fn smallness(x: &BigFloat) -> usize {
+    x.exponent().map_or(0, |e| usize::try_from(-e).unwrap_or(0))
+}
+
+/// `z (z + 2) = sinh(arcosh(1 + z))^2`.
+fn squared_sinh(z: &BigFloat, bits: usize) -> BigFloat {
+    z.add(&BigFloat::from_word(2, bits), bits, ROUNDING).mul(z, bits, ROUNDING)
+}
+
+/// `arcosh(1 + z) = ln(1 + z + sqrt(z (z + 2)))`.
+fn log_ratio(z: &BigFloat, bits: usize, constants: &mut Consts) -> BigFloat {
+    let root = squared_sinh(z, bits).sqrt(bits, ROUNDING);
+    let one = BigFloat::from_word(1, bits);
+    one.add(z, bits, ROUNDING).add(&root, bits, ROUNDING).ln(bits, ROUNDING, constants)
+}
+
+/// `theta/sinh(theta) - 1` for `theta = arcosh(1 + z)`.
+fn log_ratio_slope(z: &BigFloat, bits: usize, constants: &mut Consts) -> BigFloat {
+    if z.is_zero() {
+        return z.clone();
+    }
+    let third = Rational::new((-1).into(), 3.into());
+    if smallness(z) > bits {
+        // -z/3 + 2 z^2/15: what is left out is below 2^-2bits.
+        let square = scaled(&z.mul(z, bits, ROUNDING), &Rational::new(2.into(), 15.into()), bits);
+        return scaled(z, &third, bits).add(&square, bits, ROUNDING);
+    }
+    // As many bits more as the logarithm and the difference with one take away.
+    let wide = bits + 2 * smallness(z) + GUARD_BITS;
+    let root = squared_sinh(z, wide).sqrt(wide, ROUNDING);
+    let ratio = log_ratio(z, wide, constants).div(&root, wide, ROUNDING);
+    ratio.sub(&BigFloat::from_word(1, wide), bits, ROUNDING)
 }
 
 /// `value` times an exact number.

@@ -90,6 +90,26 @@ fn evaluate(graph: &Graph, expr: Expr, x: &Float) -> Option<Float> {
                 Function::Ln1p => argument.ln_1p(),
                 Function::Expm1 => argument.exp_m1(),
                 Function::Atan2 => argument.atan2(&value(arguments[1])?),
+                Function::LogRatioSquared
+                | Function::LogRatioSlope
+                | Function::LogRatioCurvature => {
+                    if argument < Float::ZERO {
+                        return None;
+                    }
+                    let two = Float::from(2).with_precision(argument.precision()).value();
+                    let root = (argument.clone() * (argument.clone() + two)).sqrt();
+                    let theta = (argument.clone() + root.clone()).ln_1p();
+                    let slope = || theta.clone() / root.clone() - one.clone();
+                    match function {
+                        Function::LogRatioSquared => theta.clone() * theta,
+                        _ if argument == Float::ZERO => return None,
+                        Function::LogRatioSlope => slope(),
+                        _ => {
+                            let product = (one.clone() + argument.clone()) * slope();
+                            -(argument + product) / (root.clone() * root)
+                        }
+                    }
+                }
             }
         }
     })

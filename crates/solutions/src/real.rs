@@ -16,6 +16,54 @@ pub trait Real: RealField + Copy {
     fn sin_pi(self) -> Self;
     /// `cos(pi x)`.
     fn cos_pi(self) -> Self;
+
+    /// `arcosh(1 + z)^2`: the squared logarithm of the ratio of two stretches `a`, `b` for `z = (a - b)^2/(2 a b)`.
+    #[must_use]
+    fn log_ratio_squared(self) -> Self {
+        let theta = log_ratio(self);
+        theta * theta
+    }
+
+    /// `theta/sinh(theta) - 1` for `theta = arcosh(1 + z)`, half the derivative of [`Real::log_ratio_squared`] less one.
+    #[must_use]
+    fn log_ratio_slope(self) -> Self {
+        let two = Self::nearest(2.0);
+        let y = self / (self + two);
+        if y > Self::nearest(LARGEST_RATIO_IN_SERIES) {
+            return log_ratio(self) / (self * (self + two)).sqrt() - Self::one();
+        }
+        // -sum 2 y^k/(4 k^2 - 1) from k = 1 on: terms of one sign, small where z is small.
+        let sum = (1..=RATIO_TERMS).rev().fold(Self::zero(), |sum, k| {
+            let k = f64::from(k);
+            sum * y + Self::nearest(2.0 / (4.0 * k * k - 1.0))
+        });
+        -sum * y
+    }
+
+    /// The derivative of [`Real::log_ratio_slope`].
+    #[must_use]
+    fn log_ratio_curvature(self) -> Self {
+        let (one, two) = (Self::one(), Self::nearest(2.0));
+        let y = self / (self + two);
+        if y > Self::nearest(LARGEST_RATIO_IN_SERIES) {
+            return -(self + (one + self) * self.log_ratio_slope()) / (self * (self + two));
+        }
+        let sum = (1..=RATIO_TERMS).rev().fold(Self::zero(), |sum, k| {
+            let k = f64::from(k);
+            sum * y + Self::nearest(k / (4.0 * k * k - 1.0))
+        });
+        -sum * ((one - y) * (one - y))
+    }
+}
+
+/// The series in `y = z/(z + 2)` serves up to here; beyond, little cancels in the closed form.
+const LARGEST_RATIO_IN_SERIES: f64 = 0.25;
+/// As many terms leave out less than half a unit in the last place of a double there.
+const RATIO_TERMS: u32 = 24;
+
+/// `arcosh(1 + z)`.
+fn log_ratio<T: Real>(z: T) -> T {
+    (z + (z * (z + T::nearest(2.0))).sqrt()).ln_1p()
 }
 
 impl Real for f64 {

@@ -15,6 +15,38 @@ pub enum Material<T> {
         /// Shear modulus, a stress.
         mu: T,
     },
+    /// `S = lambda tr(E) I + 2 mu E` with Green's strain `E = (F^T F - I)/2`, `P = F S`.
+    StVenantKirchhoff {
+        /// First Lamé constant, a stress.
+        lambda: T,
+        /// Shear modulus, a stress.
+        mu: T,
+    },
+    /// `tau = lambda ln(J) I + 2 mu ln V` with the left stretch `V`.
+    Hencky {
+        /// First Lamé constant, a stress.
+        lambda: T,
+        /// Shear modulus, a stress.
+        mu: T,
+    },
+    /// `P = lambda tr(H) I + mu (H + H^T)`, geometrically linear.
+    LinearElastic {
+        /// First Lamé constant, a stress.
+        lambda: T,
+        /// Shear modulus, a stress.
+        mu: T,
+    },
+    /// `W = c1 (I1 - 3 - 2 ln J) + c2 (I2 - 3 - 4 ln J) + lambda/2 (ln J)^2`, `P = dW/dF`.
+    MooneyRivlin {
+        /// Half the part of the shear modulus that goes with `I1`, a stress.
+        c1: T,
+        /// Half the part of the shear modulus that goes with `I2`, a stress.
+        c2: T,
+        /// The factor of `(ln J)^2/2`, a stress.
+        lambda: T,
+    },
+    /// A law that only the specification states, as an energy or a stress of its own; a solver needs its own model of it.
+    Custom,
 }
 
 /// Every field of a solution at one point, in Cartesian components.

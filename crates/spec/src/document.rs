@@ -64,6 +64,12 @@ pub(crate) struct MaterialTable {
     pub(crate) law: Spanned<String>,
     pub(crate) lambda: Option<Text>,
     pub(crate) mu: Option<Text>,
+    pub(crate) c1: Option<Text>,
+    pub(crate) c2: Option<Text>,
+    #[serde(rename = "W")]
+    pub(crate) W: Option<Text>,
+    #[serde(rename = "P")]
+    pub(crate) P: Option<Entries<Text>>,
     pub(crate) density: Option<Text>,
 }
 

@@ -8,11 +8,14 @@
 //! components last: see [`Fields`].
 
 mod coordinates;
+mod derivation;
 mod derive;
 mod diagnostic;
 mod document;
+mod law;
 mod scope;
 mod spec;
+mod tensor;
 
 pub use coordinates::Coordinates;
 pub use derive::{DeriveError, Fields};

@@ -181,6 +181,29 @@ impl<'a> Scope<'a> {
         Ok(expr)
     }
 
+    /// As [`Scope::expression`], for a material's response: in `names`, which mean something here only, and in what
+    /// depends on parameters only.
+    pub(crate) fn response(
+        &mut self,
+        text: &Text,
+        what: &str,
+        names: &[String],
+    ) -> Result<Expr, Diagnostic> {
+        let declared = self.names.clone();
+        for name in names {
+            if declared.contains_key(name) {
+                let message = format!("'{name}' has a meaning of its own in {what}");
+                let help = format!("give what this file calls '{name}' another name");
+                return Err(self.source.error(message, text.span.clone(), Some(help)));
+            }
+            let symbol = self.graph.symbol(name);
+            self.names.insert(name.clone(), symbol);
+        }
+        let expr = self.constant(text, what);
+        self.names = declared;
+        expr
+    }
+
     /// As [`Scope::constant`], for text that the specification leaves out: the conventional expression.
     pub(crate) fn constant_or(
         &mut self,

@@ -2,7 +2,8 @@
 
 use crate::coordinates::CARTESIAN;
 use crate::diagnostic::nearest;
-use crate::document::{BoundaryTable, Document, DomainTable, Text};
+use crate::document::{BoundaryTable, Document, DomainTable, Entries, Text};
+use crate::law::energy::{INVARIANTS, component_names};
 use crate::scope::{Scope, Source};
 use crate::{Coordinates, DeriveError, Diagnostic, Fields};
 use mmsmith_expr::{Expr, Graph, Program};
@@ -143,6 +144,118 @@ pub enum Material {
         /// Shear modulus.
         mu: Expr,
     },
+    /// St. Venant-Kirchhoff, `S = lambda tr(E) I + 2 mu E` with Green's strain `E = (F^T F - I)/2`, `P = F S`.
+    StVenantKirchhoff {
+        /// First Lamé constant.
+        lambda: Expr,
+        /// Shear modulus.
+        mu: Expr,
+    },
+    /// Hencky, `tau = lambda ln(J) I + 2 mu ln V`.
+    Hencky {
+        /// First Lamé constant.
+        lambda: Expr,
+        /// Shear modulus.
+        mu: Expr,
+    },
+    /// Linear elasticity, `P = lambda tr(H) I + mu (H + H^T)`, not invariant under rotation.
+    LinearElastic {
+        /// First Lamé constant.
+        lambda: Expr,
+        /// Shear modulus.
+        mu: Expr,
+    },
+    /// Mooney-Rivlin, compressible: `W = c1 (I1 - 3 - 2 ln J) + c2 (I2 - 3 - 4 ln J) + lambda/2 (ln J)^2`.
+    MooneyRivlin {
+        /// Half the part of the shear modulus that goes with `I1`.
+        c1: Expr,
+        /// Half the part of the shear modulus that goes with `I2`.
+        c2: Expr,
+        /// The factor of `(ln J)^2/2`.
+        lambda: Expr,
+    },
+    /// A strain energy per reference volume, `P = dW/dF`.
+    Energy {
+        /// In the symbols `F11`, `C11`, ..., `J`, `I1` and `I2`.
+        W: Expr,
+    },
+    /// The first Piola-Kirchhoff stress, component by component.
+    Stress {
+        /// In the symbols `F11`, `C11`, ..., `J`, `I1` and `I2`.
+        P: Vec<Vec<Expr>>,
+    },
+}
+
+impl Material {
+    /// The laws by the names that specifications use.
+    pub const NAMES: [&'static str; 7] = [
+        "neo-hookean",
+        "st-venant-kirchhoff",
+        "hencky",
+        "linear-elastic",
+        "mooney-rivlin",
+        "energy",
+        "stress",
+    ];
+
+    /// The name that specifications use.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        Self::NAMES[match self {
+            Material::NeoHookean { .. } => 0,
+            Material::StVenantKirchhoff { .. } => 1,
+            Material::Hencky { .. } => 2,
+            Material::LinearElastic { .. } => 3,
+            Material::MooneyRivlin { .. } => 4,
+            Material::Energy { .. } => 5,
+            Material::Stress { .. } => 6,
+        }]
+    }
+
+    /// The constants that a solver needs, by name; none for a law that only the specification states.
+    #[must_use]
+    pub fn constants(&self) -> Vec<(&'static str, Expr)> {
+        match *self {
+            Material::NeoHookean { lambda, mu }
+            | Material::StVenantKirchhoff { lambda, mu }
+            | Material::Hencky { lambda, mu }
+            | Material::LinearElastic { lambda, mu } => vec![("lambda", lambda), ("mu", mu)],
+            Material::MooneyRivlin { c1, c2, lambda } => {
+                vec![("c1", c1), ("c2", c2), ("lambda", lambda)]
+            }
+            Material::Energy { .. } | Material::Stress { .. } => Vec::new(),
+        }
+    }
+
+    /// The law and its constants in lines for people.
+    #[must_use]
+    pub fn formulas(&self, graph: &Graph) -> Vec<String> {
+        let law = match self {
+            Material::NeoHookean { .. } => "tau = lambda ln(J) I + mu (F F^T - I)".into(),
+            Material::StVenantKirchhoff { .. } => {
+                "P = F (lambda tr(E) I + 2 mu E), E = (F^T F - I)/2".into()
+            }
+            Material::Hencky { .. } => "tau = lambda ln(J) I + 2 mu ln V".into(),
+            Material::LinearElastic { .. } => "P = lambda tr(H) I + mu (H + H^T)".into(),
+            Material::MooneyRivlin { .. } => {
+                "W = c1 (I1 - 3 - 2 ln J) + c2 (I2 - 3 - 4 ln J) + lambda/2 (ln J)^2".into()
+            }
+            Material::Energy { W } => format!("P = dW/dF, W = {}", graph.print(*W)),
+            Material::Stress { P } => {
+                let name = |i, j| format!("P{}{}", i + 1, j + 1);
+                let rows = P.iter().enumerate();
+                let entries = rows.flat_map(|(i, row)| {
+                    row.iter()
+                        .enumerate()
+                        .map(move |(j, &entry)| format!("{} = {}", name(i, j), graph.print(entry)))
+                });
+                return entries.collect();
+            }
+        };
+        let constants = self.constants();
+        let values = constants.iter().map(|(name, value)| format!("{name} = {}", graph.print(*value)));
+        std::iter::once(law).chain(values).collect()
+    }
 }
 
 /// The shape of the body, its measures as expressions of the parameters.
@@ -283,13 +396,12 @@ impl Spec {
         Reader::new(&document, source)?.read(&document)
     }
 
-    /// The scalars that depend on parameters only: cell length, density, wave speed, period, Lamé's constants, and the
-    /// measures of the domain (both corners of a box, or both radii), in this order.
+    /// The scalars that depend on parameters only: cell length, density, wave speed, period, those of
+    /// [`Material::constants`], and the measures of the domain (both corners of a box, or both radii), in this order.
     #[must_use]
     pub fn constants(&self) -> Vec<Expr> {
-        let Material::NeoHookean { lambda, mu } = self.material;
-        let mut constants =
-            vec![self.cell_length, self.density, self.wave_speed, self.period, lambda, mu];
+        let mut constants = vec![self.cell_length, self.density, self.wave_speed, self.period];
+        constants.extend(self.material.constants().into_iter().map(|(_, value)| value));
         match &self.domain {
             Domain::Box { lower, upper } => constants.extend(lower.iter().chain(upper)),
             Domain::Annulus { inner, outer } => constants.extend([inner, outer]),
@@ -356,7 +468,7 @@ impl<'a> Reader<'a> {
         let period = self.scope.constant(&time.period, "period")?;
         let wave_speed = match &time.wave_speed {
             Some(text) => self.scope.constant(text, "wave-speed")?,
-            None => self.bar_speed(&material, density),
+            None => self.bar_speed(&material, density, document.time.span())?,
         };
         Ok(Spec {
             source: self.scope.source.text.to_owned(),
@@ -508,23 +620,127 @@ impl<'a> Reader<'a> {
 
     fn material(&mut self, document: &Document) -> Result<Material, Diagnostic> {
         let table = document.material.get_ref();
-        if table.law.get_ref() != "neo-hookean" {
-            let message = format!("the law '{}' is not known", table.law.get_ref());
-            let help = "law = 'neo-hookean'";
-            return Err(self.scope.source.error(message, table.law.span(), Some(help.into())));
+        let law = self.choice(&table.law, "law", Material::NAMES.map(|name| (name, name)))?;
+        let keys: &[&str] = match law {
+            "mooney-rivlin" => &["c1", "c2", "lambda"],
+            "energy" => &["W"],
+            "stress" => &["P"],
+            _ => &["lambda", "mu"],
+        };
+        let given = [
+            ("lambda", table.lambda.as_ref().map(|text| text.span.clone())),
+            ("mu", table.mu.as_ref().map(|text| text.span.clone())),
+            ("c1", table.c1.as_ref().map(|text| text.span.clone())),
+            ("c2", table.c2.as_ref().map(|text| text.span.clone())),
+            ("W", table.W.as_ref().map(|text| text.span.clone())),
+            ("P", table.P.as_ref().map(|_| table.law.span())),
+        ];
+        for (key, span) in given {
+            if let (Some(span), false) = (span, keys.contains(&key)) {
+                let message = format!("the law '{law}' has no '{key}'");
+                let help = format!("it takes {}", keys.join(", "));
+                return Err(self.scope.source.error(message, span, Some(help)));
+            }
         }
         let span = document.material.span();
+        let missing = |scope: &Scope<'_>, key: &str, help: &str| {
+            let message = format!("the law '{law}' needs '{key}'");
+            scope.source.error(message, table.law.span(), Some(help.into()))
+        };
+        let mut required = |text: &Option<Text>, key: &str| match text {
+            Some(text) => self.scope.constant(text, key),
+            None => Err(missing(&self.scope, key, &format!("give {key} = '...' here"))),
+        };
+        match law {
+            "mooney-rivlin" => {
+                return Ok(Material::MooneyRivlin {
+                    c1: required(&table.c1, "c1")?,
+                    c2: required(&table.c2, "c2")?,
+                    lambda: required(&table.lambda, "lambda")?,
+                });
+            }
+            "energy" => {
+                let Some(text) = &table.W else {
+                    let help = "give it in J, I1, I2, F11, ..., C11, ..., for example \
+                                W = 'mu/2*(I1 - 3 - 2*ln(J)) + lambda/2*ln(J)^2'";
+                    return Err(missing(&self.scope, "W", help));
+                };
+                let names = self.response_names();
+                return Ok(Material::Energy { W: self.scope.response(text, "an energy", &names)? });
+            }
+            "stress" => {
+                let Some(entries) = &table.P else {
+                    let help = "give its components, as P = { 11 = 'mu*(F11 - 1/F11)', 12 = '...' }";
+                    return Err(missing(&self.scope, "P", help));
+                };
+                return self.stress_components(entries);
+            }
+            _ => {}
+        }
         let usual = "E*nu/((1 + nu)*(1 - 2*nu))";
         let lambda =
             self.scope.constant_or(table.lambda.as_ref(), usual, "lambda", span.clone())?;
         let mu = self.scope.constant_or(table.mu.as_ref(), "E/(2*(1 + nu))", "mu", span)?;
-        Ok(Material::NeoHookean { lambda, mu })
+        Ok(match law {
+            "st-venant-kirchhoff" => Material::StVenantKirchhoff { lambda, mu },
+            "hencky" => Material::Hencky { lambda, mu },
+            "linear-elastic" => Material::LinearElastic { lambda, mu },
+            _ => Material::NeoHookean { lambda, mu },
+        })
     }
 
-    /// `sqrt(E/rho0)` with `E = mu (3 lambda + 2 mu)/(lambda + mu)`.
-    fn bar_speed(&mut self, material: &Material, density: Expr) -> Expr {
-        let Material::NeoHookean { lambda, mu } = *material;
+    /// The names that a material's response may use.
+    fn response_names(&self) -> Vec<String> {
+        let components = ["F", "C"].map(|letter| component_names(letter, self.dimension).concat());
+        INVARIANTS.iter().map(|&name| name.to_owned()).chain(components.concat()).collect()
+    }
+
+    /// Components that are left out are zero.
+    fn stress_components(&mut self, entries: &Entries<Text>) -> Result<Material, Diagnostic> {
+        let n = self.dimension;
+        let names = self.response_names();
+        let keys = component_names("", n);
+        let mut P = vec![vec![Graph::ZERO; n]; n];
+        for (key, text) in &entries.0 {
+            let place = keys.iter().enumerate().find_map(|(i, row)| {
+                Some((i, row.iter().position(|name| name == key.get_ref())?))
+            });
+            let Some((i, j)) = place else {
+                let message = format!("there is no stress component '{}'", key.get_ref());
+                let help = format!("the components are {}", keys.concat().join(", "));
+                return Err(self.scope.source.error(message, key.span(), Some(help)));
+            };
+            P[i][j] = self.scope.response(text, "a stress", &names)?;
+        }
+        Ok(Material::Stress { P })
+    }
+
+    /// `sqrt(E/rho0)` with `E = mu (3 lambda + 2 mu)/(lambda + mu)`, from the moduli at small strain.
+    fn bar_speed(
+        &mut self,
+        material: &Material,
+        density: Expr,
+        table: std::ops::Range<usize>,
+    ) -> Result<Expr, Diagnostic> {
         let graph = &mut self.scope.graph;
+        let (lambda, mu) = match *material {
+            Material::NeoHookean { lambda, mu }
+            | Material::StVenantKirchhoff { lambda, mu }
+            | Material::Hencky { lambda, mu }
+            | Material::LinearElastic { lambda, mu } => (lambda, mu),
+            Material::MooneyRivlin { c1, c2, lambda } => {
+                let (two, four) = (graph.integer(2), graph.integer(4));
+                let sum = graph.add(c1, c2);
+                let stiffening = graph.mul(four, c2);
+                (graph.add(lambda, stiffening), graph.mul(two, sum))
+            }
+            Material::Energy { .. } | Material::Stress { .. } => {
+                let message =
+                    format!("the law '{}' does not tell the speed of waves", material.name());
+                let help = "give wave-speed = '...' here, the speed that CFL numbers refer to";
+                return Err(self.scope.source.error(message, table, Some(help.into())));
+            }
+        };
         let (three, two) = (graph.integer(3), graph.integer(2));
         let (three_lambda, two_mu) = (graph.mul(three, lambda), graph.mul(two, mu));
         let upper = graph.add(three_lambda, two_mu);
@@ -532,7 +748,7 @@ impl<'a> Reader<'a> {
         let upper = graph.mul(mu, upper);
         let lower = graph.mul(lower, density);
         let quotient = graph.div(upper, lower);
-        graph.sqrt(quotient)
+        Ok(graph.sqrt(quotient))
     }
 
     fn domain(&mut self, table: &Spanned<DomainTable>) -> Result<Domain, Diagnostic> {

@@ -117,9 +117,9 @@ fn text(spec: &Spec, exercises: &[Exercise], cost: &BodyForceCost) -> String {
     for (name, component) in names.iter().zip(&spec.displacement) {
         text += &format!("  u_{name} = {}\n", print(*component));
     }
-    let Material::NeoHookean { lambda, mu } = spec.material;
-    text += "  tau = lambda ln(J) I + mu (F F^T - I)\n";
-    text += &format!("  lambda = {}\n  mu = {}\n", print(lambda), print(mu));
+    for line in spec.material.formulas(&spec.graph) {
+        text += &format!("  {line}\n");
+    }
     text += &format!("  density = {}\n", print(spec.density));
     text +=
         &format!("  wave speed = {}\n  period = {}\n", print(spec.wave_speed), print(spec.period));

@@ -41,7 +41,7 @@ impl<T: crate::Real> Default for RingParameters<T> {
 pub struct Ring<T: crate::Real> {
     parameters: RingParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 19],
+    fixed: [T; 20],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Ring<T> {
@@ -148,26 +148,25 @@ impl<T: crate::Real> Ring<T> {
         let t134 = t133 * t133;
         let t135 = t15 * t15;
         let t136 = t19 * t19;
-        let t142 = T::nearest(36.0) * t134;
-        let t143 = t142 * t95;
-        let t144 = parameters.rho0 * t135;
-        let t145 = t144 * t136;
-        let t146 = t143 / t145;
-        let t155 = t133 * parameters.A;
-        let t163 = T::nearest(2.0) * parameters.Ri;
-        let t164 = T::nearest(2.0) * parameters.Ro;
-        let t165 = t163 + t164;
-        let t171 = T::nearest(3.0) / t26;
-        let t174 = T::nearest(12.0) * t155;
-        let t175 = t174 * t95;
-        let t176 = parameters.rho0 * t15;
-        let t177 = t176 * t19;
-        let t178 = t175 / t177;
-        let t184 = t135 * t136;
-        let t185 = T::nearest(36.0) / t184;
-        let t189 = t133 * t95;
-        let t190 = t189 / parameters.rho0;
-        let t202 = T::nearest(2.0) / t11;
+        let t140 = T::nearest(36.0) * t134;
+        let t141 = t140 * t95;
+        let t142 = parameters.rho0 * t135;
+        let t143 = t142 * t136;
+        let t144 = t141 / t143;
+        let t151 = t133 * parameters.A;
+        let t152 = t135 * t136;
+        let t153 = T::nearest(36.0) / t152;
+        let t164 = T::nearest(3.0) / t26;
+        let t167 = T::nearest(12.0) / t26;
+        let t171 = T::nearest(6.0) * t151;
+        let t172 = t171 * t95;
+        let t173 = parameters.rho0 * t15;
+        let t174 = t173 * t19;
+        let t175 = t172 / t174;
+        let t181 = T::nearest(72.0) / t152;
+        let t186 = t133 * t95;
+        let t187 = t186 / parameters.rho0;
+        let t198 = T::nearest(2.0) / t11;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -189,13 +188,14 @@ impl<T: crate::Real> Ring<T> {
                 t95,
                 t118,
                 t128,
-                t146,
-                t165,
-                t171,
-                t178,
-                t185,
-                t190,
-                t202,
+                t144,
+                t153,
+                t164,
+                t167,
+                t175,
+                t181,
+                t187,
+                t198,
             ],
         })
     }
@@ -521,7 +521,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t32 = self.parameters.A * t13;
         let t58 = t5 - self.parameters.Ri;
         let t68 = t20 * t58;
+        let t69 = self.fixed[7] * t68;
         let t70 = t31 / t5;
+        let t71 = t69 - t70;
         let t88 = self.fixed[8] * t13;
         let t89 = t88 * t68;
         let t90 = t89 + T::one();
@@ -541,50 +543,47 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t130 = -t129;
         let t131 = t90 * t90;
         let t137 = t58 * t58;
-        let t138 = t23 + t122;
-        let t139 = t138 - self.fixed[10];
-        let t140 = self.fixed[7] * t139;
-        let t141 = t121 - t140;
-        let t147 = t21 * t31;
-        let t148 = t147 * t137;
-        let t149 = t148 * t141;
-        let t150 = t149 / t5;
-        let t151 = self.fixed[12] * t150;
-        let t152 = -t151;
-        let t153 = t13 * t152;
-        let t156 = t4 * t5;
-        let t157 = t31 * t31;
-        let t158 = t157 / t156;
-        let t159 = t68 * t139;
-        let t160 = self.fixed[7] * t159;
-        let t162 = T::nearest(4.0) * t5;
-        let t166 = t162 + t122;
-        let t167 = t166 - self.fixed[13];
-        let t168 = t31 * t167;
-        let t169 = t168 / t5;
-        let t170 = t160 + t169;
-        let t172 = self.fixed[14] * t170;
-        let t173 = t158 - t172;
-        let t179 = t68 * t173;
-        let t180 = self.fixed[15] * t179;
-        let t181 = -t180;
-        let t182 = t181 + t153;
-        let t183 = t13 * t182;
-        let t186 = t68 * t167;
-        let t187 = self.fixed[16] * t186;
-        let t188 = t158 - t187;
-        let t191 = self.fixed[17] * t188;
-        let t192 = -t191;
-        let t193 = t192 + t183;
-        let t194 = t131 * t92;
-        let t195 = t193 / t194;
-        let t196 = t13 * t195;
-        let t197 = t130 + t196;
-        let t198 = t13 * t197;
-        let t199 = t117 * t198;
-        let t200 = X[1] / t5;
-        let t201 = t200 * t198;
-        crate::nalgebra::SVector::<T, 2>::new(t199, t201)
+        let t138 = t71 / t5;
+        let t139 = t120 + t138;
+        let t145 = t21 * t31;
+        let t146 = t145 * t137;
+        let t147 = t146 * t139;
+        let t148 = t147 / t5;
+        let t149 = self.fixed[12] * t148;
+        let t150 = t13 * t149;
+        let t154 = t21 * t137;
+        let t155 = self.fixed[13] * t154;
+        let t156 = t31 * t31;
+        let t157 = t156 / t4;
+        let t158 = t31 * t71;
+        let t159 = t158 / t5;
+        let t160 = t155 - t157;
+        let t161 = t160 + t159;
+        let t162 = t161 / t5;
+        let t165 = self.fixed[14] * t68;
+        let t166 = t165 + t70;
+        let t168 = t119 * t166;
+        let t169 = self.fixed[15] * t168;
+        let t170 = t162 + t169;
+        let t176 = t68 * t170;
+        let t177 = self.fixed[16] * t176;
+        let t178 = t177 + t150;
+        let t179 = t13 * t178;
+        let t182 = t68 * t119;
+        let t183 = self.fixed[17] * t182;
+        let t184 = t160 / t5;
+        let t185 = t183 + t184;
+        let t188 = self.fixed[18] * t185;
+        let t189 = t188 + t179;
+        let t190 = t131 * t92;
+        let t191 = t189 / t190;
+        let t192 = t13 * t191;
+        let t193 = t130 + t192;
+        let t194 = t13 * t193;
+        let t195 = t117 * t194;
+        let t196 = X[1] / t5;
+        let t197 = t196 * t194;
+        crate::nalgebra::SVector::<T, 2>::new(t195, t197)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t1 = X[0] * X[0];
@@ -686,49 +685,46 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t130 = -t129;
         let t131 = t90 * t90;
         let t137 = t58 * t58;
-        let t138 = t23 + t122;
-        let t139 = t138 - self.fixed[10];
-        let t140 = self.fixed[7] * t139;
-        let t141 = t121 - t140;
-        let t147 = t21 * t31;
-        let t148 = t147 * t137;
-        let t149 = t148 * t141;
-        let t150 = t149 / t5;
-        let t151 = self.fixed[12] * t150;
-        let t152 = -t151;
-        let t153 = t13 * t152;
-        let t156 = t4 * t5;
-        let t157 = t31 * t31;
-        let t158 = t157 / t156;
-        let t159 = t68 * t139;
-        let t160 = self.fixed[7] * t159;
-        let t162 = T::nearest(4.0) * t5;
-        let t166 = t162 + t122;
-        let t167 = t166 - self.fixed[13];
-        let t168 = t31 * t167;
-        let t169 = t168 / t5;
-        let t170 = t160 + t169;
-        let t172 = self.fixed[14] * t170;
-        let t173 = t158 - t172;
-        let t179 = t68 * t173;
-        let t180 = self.fixed[15] * t179;
-        let t181 = -t180;
-        let t182 = t181 + t153;
-        let t183 = t13 * t182;
-        let t186 = t68 * t167;
-        let t187 = self.fixed[16] * t186;
-        let t188 = t158 - t187;
-        let t191 = self.fixed[17] * t188;
-        let t192 = -t191;
-        let t193 = t192 + t183;
-        let t194 = t131 * t92;
-        let t195 = t193 / t194;
-        let t196 = t13 * t195;
-        let t197 = t130 + t196;
-        let t198 = t13 * t197;
-        let t199 = t117 * t198;
-        let t200 = X[1] / t5;
-        let t201 = t200 * t198;
+        let t138 = t71 / t5;
+        let t139 = t120 + t138;
+        let t145 = t21 * t31;
+        let t146 = t145 * t137;
+        let t147 = t146 * t139;
+        let t148 = t147 / t5;
+        let t149 = self.fixed[12] * t148;
+        let t150 = t13 * t149;
+        let t154 = t21 * t137;
+        let t155 = self.fixed[13] * t154;
+        let t156 = t31 * t31;
+        let t157 = t156 / t4;
+        let t158 = t31 * t71;
+        let t159 = t158 / t5;
+        let t160 = t155 - t157;
+        let t161 = t160 + t159;
+        let t162 = t161 / t5;
+        let t165 = self.fixed[14] * t68;
+        let t166 = t165 + t70;
+        let t168 = t119 * t166;
+        let t169 = self.fixed[15] * t168;
+        let t170 = t162 + t169;
+        let t176 = t68 * t170;
+        let t177 = self.fixed[16] * t176;
+        let t178 = t177 + t150;
+        let t179 = t13 * t178;
+        let t182 = t68 * t119;
+        let t183 = self.fixed[17] * t182;
+        let t184 = t160 / t5;
+        let t185 = t183 + t184;
+        let t188 = self.fixed[18] * t185;
+        let t189 = t188 + t179;
+        let t190 = t131 * t92;
+        let t191 = t189 / t190;
+        let t192 = t13 * t191;
+        let t193 = t130 + t192;
+        let t194 = t13 * t193;
+        let t195 = t117 * t194;
+        let t196 = X[1] / t5;
+        let t197 = t196 * t194;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t35, t38),
             v: crate::nalgebra::SVector::<T, 2>::new(t45, t47),
@@ -737,7 +733,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t84, t75, t75, t85),
             J: t93,
             P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t106, t111, t111, t116),
-            b: crate::nalgebra::SVector::<T, 2>::new(t199, t201),
+            b: crate::nalgebra::SVector::<T, 2>::new(t195, t197),
         }
     }
     fn domain(&self) -> crate::Domain<T, 2> {
@@ -782,7 +778,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[18]
+        self.fixed[19]
     }
     fn body_force_at(
         &self,
@@ -816,7 +812,9 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 8> for Ring<T> {
         let t31 = t30 + T::one();
         let t58 = t5 - self.parameters.Ri;
         let t68 = t20 * t58;
+        let t69 = self.fixed[7] * t68;
         let t70 = t31 / t5;
+        let t71 = t69 - t70;
         let t117 = X[0] / t5;
         let t119 = t23 - self.fixed[10];
         let t120 = self.fixed[7] * t119;
@@ -830,39 +828,36 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 8> for Ring<T> {
         let t129 = self.fixed[11] * t127;
         let t130 = -t129;
         let t137 = t58 * t58;
-        let t138 = t23 + t122;
-        let t139 = t138 - self.fixed[10];
-        let t140 = self.fixed[7] * t139;
-        let t141 = t121 - t140;
-        let t147 = t21 * t31;
-        let t148 = t147 * t137;
-        let t149 = t148 * t141;
-        let t150 = t149 / t5;
-        let t151 = self.fixed[12] * t150;
-        let t152 = -t151;
-        let t156 = t4 * t5;
-        let t157 = t31 * t31;
-        let t158 = t157 / t156;
-        let t159 = t68 * t139;
-        let t160 = self.fixed[7] * t159;
-        let t162 = T::nearest(4.0) * t5;
-        let t166 = t162 + t122;
-        let t167 = t166 - self.fixed[13];
-        let t168 = t31 * t167;
-        let t169 = t168 / t5;
-        let t170 = t160 + t169;
-        let t172 = self.fixed[14] * t170;
-        let t173 = t158 - t172;
-        let t179 = t68 * t173;
-        let t180 = self.fixed[15] * t179;
-        let t181 = -t180;
-        let t186 = t68 * t167;
-        let t187 = self.fixed[16] * t186;
-        let t188 = t158 - t187;
-        let t191 = self.fixed[17] * t188;
-        let t192 = -t191;
-        let t200 = X[1] / t5;
-        [t68, t70, t117, t130, t152, t181, t192, t200]
+        let t138 = t71 / t5;
+        let t139 = t120 + t138;
+        let t145 = t21 * t31;
+        let t146 = t145 * t137;
+        let t147 = t146 * t139;
+        let t148 = t147 / t5;
+        let t149 = self.fixed[12] * t148;
+        let t154 = t21 * t137;
+        let t155 = self.fixed[13] * t154;
+        let t156 = t31 * t31;
+        let t157 = t156 / t4;
+        let t158 = t31 * t71;
+        let t159 = t158 / t5;
+        let t160 = t155 - t157;
+        let t161 = t160 + t159;
+        let t162 = t161 / t5;
+        let t165 = self.fixed[14] * t68;
+        let t166 = t165 + t70;
+        let t168 = t119 * t166;
+        let t169 = self.fixed[15] * t168;
+        let t170 = t162 + t169;
+        let t176 = t68 * t170;
+        let t177 = self.fixed[16] * t176;
+        let t182 = t68 * t119;
+        let t183 = self.fixed[17] * t182;
+        let t184 = t160 / t5;
+        let t185 = t183 + t184;
+        let t188 = self.fixed[18] * t185;
+        let t196 = X[1] / t5;
+        [t68, t70, t117, t130, t149, t177, t188, t196]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -875,18 +870,18 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 8> for Ring<T> {
         let t91 = time[1] * point[1];
         let t92 = t91 + T::one();
         let t131 = t90 * t90;
-        let t153 = time[0] * point[4];
-        let t182 = point[5] + t153;
-        let t183 = time[0] * t182;
-        let t193 = point[6] + t183;
-        let t194 = t131 * t92;
-        let t195 = t193 / t194;
-        let t196 = time[0] * t195;
-        let t197 = point[3] + t196;
-        let t198 = time[0] * t197;
-        let t199 = point[2] * t198;
-        let t201 = point[7] * t198;
-        crate::nalgebra::SVector::<T, 2>::new(t199, t201)
+        let t150 = time[0] * point[4];
+        let t178 = point[5] + t150;
+        let t179 = time[0] * t178;
+        let t189 = point[6] + t179;
+        let t190 = t131 * t92;
+        let t191 = t189 / t190;
+        let t192 = time[0] * t191;
+        let t193 = point[3] + t192;
+        let t194 = time[0] * t193;
+        let t195 = point[2] * t194;
+        let t197 = point[7] * t194;
+        crate::nalgebra::SVector::<T, 2>::new(t195, t197)
     }
 }
 impl<T: crate::Real> From<Ring<T>> for crate::AnySolution<T> {

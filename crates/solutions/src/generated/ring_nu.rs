@@ -44,7 +44,7 @@ impl<T: crate::Real> Default for RingNuParameters<T> {
 pub struct RingNu<T: crate::Real> {
     parameters: RingNuParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 26],
+    fixed: [T; 24],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> RingNu<T> {
@@ -173,34 +173,33 @@ impl<T: crate::Real> RingNu<T> {
         let t157 = t156 * t156;
         let t158 = t15 * t15;
         let t159 = t19 * t19;
-        let t168 = T::nearest(36.0) * t157;
-        let t169 = parameters.rho0 * t158;
-        let t170 = t169 * t159;
-        let t171 = t168 / t170;
-        let t178 = t156 * parameters.A;
-        let t181 = T::nearest(2.0) * t108;
-        let t201 = t158 * t159;
-        let t202 = T::nearest(36.0) / t201;
-        let t214 = T::nearest(6.0) * t178;
-        let t215 = parameters.rho0 * t15;
-        let t216 = t215 * t19;
-        let t217 = t214 / t216;
-        let t229 = T::nearest(6.0) * t156;
-        let t230 = t229 * parameters.E;
-        let t231 = t230 * parameters.nu;
-        let t232 = t216 * t95;
-        let t233 = t232 * t97;
-        let t234 = t231 / t233;
-        let t240 = T::nearest(12.0) * t108;
-        let t241 = t240 / t26;
-        let t243 = T::nearest(6.0) * t108;
-        let t244 = t243 / t26;
-        let t253 = t156 / parameters.rho0;
-        let t259 = t49 * parameters.nu;
-        let t260 = parameters.rho0 * t95;
-        let t261 = t260 * t97;
-        let t262 = t259 / t261;
-        let t274 = T::nearest(2.0) / t11;
+        let t161 = t104 + t108;
+        let t162 = T::nearest(36.0) * t157;
+        let t163 = t162 * t161;
+        let t164 = parameters.rho0 * t158;
+        let t165 = t164 * t159;
+        let t166 = t163 / t165;
+        let t173 = t156 * parameters.A;
+        let t187 = t158 * t159;
+        let t188 = T::nearest(36.0) / t187;
+        let t209 = T::nearest(6.0) * t173;
+        let t210 = parameters.rho0 * t15;
+        let t211 = t210 * t19;
+        let t212 = t209 / t211;
+        let t217 = T::nearest(6.0) * t156;
+        let t218 = t217 * parameters.E;
+        let t219 = t218 * parameters.nu;
+        let t220 = t211 * t95;
+        let t221 = t220 * t97;
+        let t222 = t219 / t221;
+        let t227 = T::nearest(12.0) * t108;
+        let t228 = t227 / t26;
+        let t238 = t156 / parameters.rho0;
+        let t243 = t49 * parameters.nu;
+        let t244 = parameters.rho0 * t95;
+        let t245 = t244 * t97;
+        let t246 = t243 / t245;
+        let t257 = T::nearest(2.0) / t11;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -226,16 +225,14 @@ impl<T: crate::Real> RingNu<T> {
                 t143,
                 t148,
                 t151,
-                t171,
-                t181,
-                t202,
-                t217,
-                t234,
-                t241,
-                t244,
-                t253,
-                t262,
-                t274,
+                t166,
+                t188,
+                t212,
+                t222,
+                t228,
+                t238,
+                t246,
+                t257,
             ],
         })
     }
@@ -598,92 +595,76 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t153 = -t152;
         let t154 = t90 * t90;
         let t160 = t58 * t58;
-        let t161 = self.fixed[9] * t142;
-        let t162 = t23 + t139;
-        let t163 = t162 - self.fixed[12];
-        let t164 = self.fixed[7] * t163;
-        let t165 = t138 - t164;
-        let t166 = self.fixed[10] * t165;
-        let t167 = t161 - t166;
-        let t172 = t21 * t31;
-        let t173 = t172 * t160;
-        let t174 = t173 * t167;
-        let t175 = t174 / t5;
-        let t176 = self.fixed[16] * t175;
-        let t177 = t13 * t176;
-        let t179 = t4 * t5;
-        let t180 = t31 * t31;
-        let t182 = t180 / t179;
-        let t183 = self.fixed[17] * t182;
-        let t184 = t31 * t136;
-        let t185 = t68 * t71;
-        let t186 = t184 + t185;
-        let t187 = t186 / t5;
-        let t188 = self.fixed[9] * t187;
-        let t189 = t69 + t70;
-        let t190 = t136 * t189;
-        let t191 = self.fixed[10] * t190;
-        let t192 = t184 / t5;
-        let t193 = self.fixed[10] * t192;
-        let t194 = t68 * t189;
-        let t195 = t194 / t5;
-        let t196 = self.fixed[10] * t195;
-        let t197 = t188 + t191;
-        let t198 = t197 + t193;
-        let t199 = t198 + t196;
-        let t200 = self.fixed[7] * t199;
-        let t203 = t68 * t136;
-        let t204 = self.fixed[18] * t203;
-        let t205 = t31 * t71;
-        let t206 = t205 / t4;
-        let t207 = t31 * t142;
-        let t208 = t207 / t5;
-        let t209 = t204 + t206;
-        let t210 = t209 + t208;
-        let t211 = self.fixed[9] * t210;
-        let t212 = t183 - t200;
-        let t213 = t212 - t211;
-        let t218 = t68 * t213;
-        let t219 = self.fixed[19] * t218;
-        let t220 = -t219;
-        let t221 = t220 + t177;
-        let t222 = t13 * t221;
-        let t223 = t20 * t31;
-        let t224 = t223 * t58;
-        let t225 = t224 / t5;
-        let t226 = T::nearest(2.0) * t225;
-        let t227 = t184 + t194;
-        let t228 = t227 - t226;
-        let t235 = t228 / t5;
-        let t236 = self.fixed[20] * t235;
-        let t237 = t236 * t101;
-        let t238 = self.fixed[10] * t182;
-        let t242 = self.fixed[21] * t136;
-        let t245 = self.fixed[22] * t139;
-        let t246 = t161 + t242;
-        let t247 = t246 + t245;
-        let t248 = t68 * t247;
-        let t249 = self.fixed[7] * t248;
-        let t250 = self.fixed[9] * t209;
-        let t251 = t238 - t249;
-        let t252 = t251 - t250;
-        let t254 = self.fixed[23] * t252;
-        let t255 = -t254;
-        let t256 = t222 + t237;
-        let t257 = t255 + t256;
-        let t258 = t13 * t257;
-        let t263 = self.fixed[24] * t165;
-        let t264 = -t263;
-        let t265 = t264 * t101;
-        let t266 = t258 + t265;
-        let t267 = t154 * t92;
-        let t268 = t266 / t267;
-        let t269 = t153 + t268;
-        let t270 = t13 * t269;
-        let t271 = t133 * t270;
-        let t272 = X[1] / t5;
-        let t273 = t272 * t270;
-        crate::nalgebra::SVector::<T, 2>::new(t271, t273)
+        let t167 = t21 * t31;
+        let t168 = t167 * t160;
+        let t169 = t168 * t142;
+        let t170 = t169 / t5;
+        let t171 = self.fixed[16] * t170;
+        let t172 = t13 * t171;
+        let t174 = t31 * t136;
+        let t175 = t68 * t71;
+        let t176 = t174 + t175;
+        let t177 = t176 / t5;
+        let t178 = self.fixed[9] * t177;
+        let t179 = t69 + t70;
+        let t180 = t136 * t179;
+        let t181 = self.fixed[10] * t180;
+        let t182 = t174 / t5;
+        let t183 = self.fixed[10] * t182;
+        let t184 = t178 + t181;
+        let t185 = t184 + t183;
+        let t186 = self.fixed[7] * t185;
+        let t189 = t21 * t160;
+        let t190 = self.fixed[17] * t189;
+        let t191 = t31 * t31;
+        let t192 = t191 / t4;
+        let t193 = t31 * t71;
+        let t194 = t193 / t5;
+        let t195 = t190 - t192;
+        let t196 = t195 + t194;
+        let t197 = t196 / t5;
+        let t198 = self.fixed[10] * t197;
+        let t199 = t68 * t136;
+        let t200 = self.fixed[17] * t199;
+        let t201 = t193 / t4;
+        let t202 = t31 * t142;
+        let t203 = t202 / t5;
+        let t204 = t200 + t201;
+        let t205 = t204 + t203;
+        let t206 = self.fixed[9] * t205;
+        let t207 = t186 + t198;
+        let t208 = t207 + t206;
+        let t213 = t68 * t208;
+        let t214 = self.fixed[18] * t213;
+        let t215 = t214 + t172;
+        let t216 = t13 * t215;
+        let t223 = self.fixed[19] * t177;
+        let t224 = t223 * t101;
+        let t225 = self.fixed[9] * t142;
+        let t229 = self.fixed[20] * t136;
+        let t230 = t225 + t229;
+        let t231 = t68 * t230;
+        let t232 = self.fixed[7] * t231;
+        let t233 = t195 / t5;
+        let t234 = self.fixed[10] * t233;
+        let t235 = self.fixed[9] * t204;
+        let t236 = t232 + t234;
+        let t237 = t236 + t235;
+        let t239 = self.fixed[21] * t237;
+        let t240 = t216 + t224;
+        let t241 = t239 + t240;
+        let t242 = t13 * t241;
+        let t247 = self.fixed[22] * t142;
+        let t248 = t247 * t101;
+        let t249 = t242 + t248;
+        let t250 = t154 * t92;
+        let t251 = t249 / t250;
+        let t252 = t153 + t251;
+        let t253 = t13 * t252;
+        let t254 = t133 * t253;
+        let t255 = X[1] / t5;
+        let t256 = t255 * t253;
+        crate::nalgebra::SVector::<T, 2>::new(t254, t256)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t1 = X[0] * X[0];
@@ -797,91 +778,75 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t153 = -t152;
         let t154 = t90 * t90;
         let t160 = t58 * t58;
-        let t161 = self.fixed[9] * t142;
-        let t162 = t23 + t139;
-        let t163 = t162 - self.fixed[12];
-        let t164 = self.fixed[7] * t163;
-        let t165 = t138 - t164;
-        let t166 = self.fixed[10] * t165;
-        let t167 = t161 - t166;
-        let t172 = t21 * t31;
-        let t173 = t172 * t160;
-        let t174 = t173 * t167;
-        let t175 = t174 / t5;
-        let t176 = self.fixed[16] * t175;
-        let t177 = t13 * t176;
-        let t179 = t4 * t5;
-        let t180 = t31 * t31;
-        let t182 = t180 / t179;
-        let t183 = self.fixed[17] * t182;
-        let t184 = t31 * t136;
-        let t185 = t68 * t71;
-        let t186 = t184 + t185;
-        let t187 = t186 / t5;
-        let t188 = self.fixed[9] * t187;
-        let t189 = t69 + t70;
-        let t190 = t136 * t189;
-        let t191 = self.fixed[10] * t190;
-        let t192 = t184 / t5;
-        let t193 = self.fixed[10] * t192;
-        let t194 = t68 * t189;
-        let t195 = t194 / t5;
-        let t196 = self.fixed[10] * t195;
-        let t197 = t188 + t191;
-        let t198 = t197 + t193;
-        let t199 = t198 + t196;
-        let t200 = self.fixed[7] * t199;
-        let t203 = t68 * t136;
-        let t204 = self.fixed[18] * t203;
-        let t205 = t31 * t71;
-        let t206 = t205 / t4;
-        let t207 = t31 * t142;
-        let t208 = t207 / t5;
-        let t209 = t204 + t206;
-        let t210 = t209 + t208;
-        let t211 = self.fixed[9] * t210;
-        let t212 = t183 - t200;
-        let t213 = t212 - t211;
-        let t218 = t68 * t213;
-        let t219 = self.fixed[19] * t218;
-        let t220 = -t219;
-        let t221 = t220 + t177;
-        let t222 = t13 * t221;
-        let t223 = t20 * t31;
-        let t224 = t223 * t58;
-        let t225 = t224 / t5;
-        let t226 = T::nearest(2.0) * t225;
-        let t227 = t184 + t194;
-        let t228 = t227 - t226;
-        let t235 = t228 / t5;
-        let t236 = self.fixed[20] * t235;
-        let t237 = t236 * t101;
-        let t238 = self.fixed[10] * t182;
-        let t242 = self.fixed[21] * t136;
-        let t245 = self.fixed[22] * t139;
-        let t246 = t161 + t242;
-        let t247 = t246 + t245;
-        let t248 = t68 * t247;
-        let t249 = self.fixed[7] * t248;
-        let t250 = self.fixed[9] * t209;
-        let t251 = t238 - t249;
-        let t252 = t251 - t250;
-        let t254 = self.fixed[23] * t252;
-        let t255 = -t254;
-        let t256 = t222 + t237;
-        let t257 = t255 + t256;
-        let t258 = t13 * t257;
-        let t263 = self.fixed[24] * t165;
-        let t264 = -t263;
-        let t265 = t264 * t101;
-        let t266 = t258 + t265;
-        let t267 = t154 * t92;
-        let t268 = t266 / t267;
-        let t269 = t153 + t268;
-        let t270 = t13 * t269;
-        let t271 = t133 * t270;
-        let t272 = X[1] / t5;
-        let t273 = t272 * t270;
+        let t167 = t21 * t31;
+        let t168 = t167 * t160;
+        let t169 = t168 * t142;
+        let t170 = t169 / t5;
+        let t171 = self.fixed[16] * t170;
+        let t172 = t13 * t171;
+        let t174 = t31 * t136;
+        let t175 = t68 * t71;
+        let t176 = t174 + t175;
+        let t177 = t176 / t5;
+        let t178 = self.fixed[9] * t177;
+        let t179 = t69 + t70;
+        let t180 = t136 * t179;
+        let t181 = self.fixed[10] * t180;
+        let t182 = t174 / t5;
+        let t183 = self.fixed[10] * t182;
+        let t184 = t178 + t181;
+        let t185 = t184 + t183;
+        let t186 = self.fixed[7] * t185;
+        let t189 = t21 * t160;
+        let t190 = self.fixed[17] * t189;
+        let t191 = t31 * t31;
+        let t192 = t191 / t4;
+        let t193 = t31 * t71;
+        let t194 = t193 / t5;
+        let t195 = t190 - t192;
+        let t196 = t195 + t194;
+        let t197 = t196 / t5;
+        let t198 = self.fixed[10] * t197;
+        let t199 = t68 * t136;
+        let t200 = self.fixed[17] * t199;
+        let t201 = t193 / t4;
+        let t202 = t31 * t142;
+        let t203 = t202 / t5;
+        let t204 = t200 + t201;
+        let t205 = t204 + t203;
+        let t206 = self.fixed[9] * t205;
+        let t207 = t186 + t198;
+        let t208 = t207 + t206;
+        let t213 = t68 * t208;
+        let t214 = self.fixed[18] * t213;
+        let t215 = t214 + t172;
+        let t216 = t13 * t215;
+        let t223 = self.fixed[19] * t177;
+        let t224 = t223 * t101;
+        let t225 = self.fixed[9] * t142;
+        let t229 = self.fixed[20] * t136;
+        let t230 = t225 + t229;
+        let t231 = t68 * t230;
+        let t232 = self.fixed[7] * t231;
+        let t233 = t195 / t5;
+        let t234 = self.fixed[10] * t233;
+        let t235 = self.fixed[9] * t204;
+        let t236 = t232 + t234;
+        let t237 = t236 + t235;
+        let t239 = self.fixed[21] * t237;
+        let t240 = t216 + t224;
+        let t241 = t239 + t240;
+        let t242 = t13 * t241;
+        let t247 = self.fixed[22] * t142;
+        let t248 = t247 * t101;
+        let t249 = t242 + t248;
+        let t250 = t154 * t92;
+        let t251 = t249 / t250;
+        let t252 = t153 + t251;
+        let t253 = t13 * t252;
+        let t254 = t133 * t253;
+        let t255 = X[1] / t5;
+        let t256 = t255 * t253;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t35, t38),
             v: crate::nalgebra::SVector::<T, 2>::new(t45, t47),
@@ -890,7 +855,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t84, t75, t75, t85),
             J: t93,
             P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t125, t128, t128, t132),
-            b: crate::nalgebra::SVector::<T, 2>::new(t271, t273),
+            b: crate::nalgebra::SVector::<T, 2>::new(t254, t256),
         }
     }
     fn domain(&self) -> crate::Domain<T, 2> {
@@ -935,7 +900,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[25]
+        self.fixed[23]
     }
     fn body_force_at(
         &self,
@@ -990,77 +955,61 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         let t152 = self.fixed[15] * t150;
         let t153 = -t152;
         let t160 = t58 * t58;
-        let t161 = self.fixed[9] * t142;
-        let t162 = t23 + t139;
-        let t163 = t162 - self.fixed[12];
-        let t164 = self.fixed[7] * t163;
-        let t165 = t138 - t164;
-        let t166 = self.fixed[10] * t165;
-        let t167 = t161 - t166;
-        let t172 = t21 * t31;
-        let t173 = t172 * t160;
-        let t174 = t173 * t167;
-        let t175 = t174 / t5;
-        let t176 = self.fixed[16] * t175;
-        let t179 = t4 * t5;
-        let t180 = t31 * t31;
-        let t182 = t180 / t179;
-        let t183 = self.fixed[17] * t182;
-        let t184 = t31 * t136;
-        let t185 = t68 * t71;
-        let t186 = t184 + t185;
-        let t187 = t186 / t5;
-        let t188 = self.fixed[9] * t187;
-        let t189 = t69 + t70;
-        let t190 = t136 * t189;
-        let t191 = self.fixed[10] * t190;
-        let t192 = t184 / t5;
-        let t193 = self.fixed[10] * t192;
-        let t194 = t68 * t189;
-        let t195 = t194 / t5;
-        let t196 = self.fixed[10] * t195;
-        let t197 = t188 + t191;
-        let t198 = t197 + t193;
-        let t199 = t198 + t196;
-        let t200 = self.fixed[7] * t199;
-        let t203 = t68 * t136;
-        let t204 = self.fixed[18] * t203;
-        let t205 = t31 * t71;
-        let t206 = t205 / t4;
-        let t207 = t31 * t142;
-        let t208 = t207 / t5;
-        let t209 = t204 + t206;
-        let t210 = t209 + t208;
-        let t211 = self.fixed[9] * t210;
-        let t212 = t183 - t200;
-        let t213 = t212 - t211;
-        let t218 = t68 * t213;
-        let t219 = self.fixed[19] * t218;
-        let t220 = -t219;
-        let t223 = t20 * t31;
-        let t224 = t223 * t58;
-        let t225 = t224 / t5;
-        let t226 = T::nearest(2.0) * t225;
-        let t227 = t184 + t194;
-        let t228 = t227 - t226;
-        let t235 = t228 / t5;
-        let t236 = self.fixed[20] * t235;
-        let t238 = self.fixed[10] * t182;
-        let t242 = self.fixed[21] * t136;
-        let t245 = self.fixed[22] * t139;
-        let t246 = t161 + t242;
-        let t247 = t246 + t245;
-        let t248 = t68 * t247;
-        let t249 = self.fixed[7] * t248;
-        let t250 = self.fixed[9] * t209;
-        let t251 = t238 - t249;
-        let t252 = t251 - t250;
-        let t254 = self.fixed[23] * t252;
-        let t255 = -t254;
-        let t263 = self.fixed[24] * t165;
-        let t264 = -t263;
-        let t272 = X[1] / t5;
-        [t68, t70, t133, t153, t176, t220, t236, t255, t264, t272]
+        let t167 = t21 * t31;
+        let t168 = t167 * t160;
+        let t169 = t168 * t142;
+        let t170 = t169 / t5;
+        let t171 = self.fixed[16] * t170;
+        let t174 = t31 * t136;
+        let t175 = t68 * t71;
+        let t176 = t174 + t175;
+        let t177 = t176 / t5;
+        let t178 = self.fixed[9] * t177;
+        let t179 = t69 + t70;
+        let t180 = t136 * t179;
+        let t181 = self.fixed[10] * t180;
+        let t182 = t174 / t5;
+        let t183 = self.fixed[10] * t182;
+        let t184 = t178 + t181;
+        let t185 = t184 + t183;
+        let t186 = self.fixed[7] * t185;
+        let t189 = t21 * t160;
+        let t190 = self.fixed[17] * t189;
+        let t191 = t31 * t31;
+        let t192 = t191 / t4;
+        let t193 = t31 * t71;
+        let t194 = t193 / t5;
+        let t195 = t190 - t192;
+        let t196 = t195 + t194;
+        let t197 = t196 / t5;
+        let t198 = self.fixed[10] * t197;
+        let t199 = t68 * t136;
+        let t200 = self.fixed[17] * t199;
+        let t201 = t193 / t4;
+        let t202 = t31 * t142;
+        let t203 = t202 / t5;
+        let t204 = t200 + t201;
+        let t205 = t204 + t203;
+        let t206 = self.fixed[9] * t205;
+        let t207 = t186 + t198;
+        let t208 = t207 + t206;
+        let t213 = t68 * t208;
+        let t214 = self.fixed[18] * t213;
+        let t223 = self.fixed[19] * t177;
+        let t225 = self.fixed[9] * t142;
+        let t229 = self.fixed[20] * t136;
+        let t230 = t225 + t229;
+        let t231 = t68 * t230;
+        let t232 = self.fixed[7] * t231;
+        let t233 = t195 / t5;
+        let t234 = self.fixed[10] * t233;
+        let t235 = self.fixed[9] * t204;
+        let t236 = t232 + t234;
+        let t237 = t236 + t235;
+        let t239 = self.fixed[21] * t237;
+        let t247 = self.fixed[22] * t142;
+        let t255 = X[1] / t5;
+        [t68, t70, t133, t153, t171, t214, t223, t239, t247, t255]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -1077,22 +1026,22 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         let t100 = t99 + t98;
         let t101 = t100.ln_1p();
         let t154 = t90 * t90;
-        let t177 = time[0] * point[4];
-        let t221 = point[5] + t177;
-        let t222 = time[0] * t221;
-        let t237 = point[6] * t101;
-        let t256 = t222 + t237;
-        let t257 = point[7] + t256;
-        let t258 = time[0] * t257;
-        let t265 = point[8] * t101;
-        let t266 = t258 + t265;
-        let t267 = t154 * t92;
-        let t268 = t266 / t267;
-        let t269 = point[3] + t268;
-        let t270 = time[0] * t269;
-        let t271 = point[2] * t270;
-        let t273 = point[9] * t270;
-        crate::nalgebra::SVector::<T, 2>::new(t271, t273)
+        let t172 = time[0] * point[4];
+        let t215 = point[5] + t172;
+        let t216 = time[0] * t215;
+        let t224 = point[6] * t101;
+        let t240 = t216 + t224;
+        let t241 = point[7] + t240;
+        let t242 = time[0] * t241;
+        let t248 = point[8] * t101;
+        let t249 = t242 + t248;
+        let t250 = t154 * t92;
+        let t251 = t249 / t250;
+        let t252 = point[3] + t251;
+        let t253 = time[0] * t252;
+        let t254 = point[2] * t253;
+        let t256 = point[9] * t253;
+        crate::nalgebra::SVector::<T, 2>::new(t254, t256)
     }
 }
 impl<T: crate::Real> From<RingNu<T>> for crate::AnySolution<T> {

@@ -45,7 +45,7 @@ impl<T: crate::Real> Default for SphereShellParameters<T> {
 pub struct SphereShell<T: crate::Real> {
     parameters: SphereShellParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 29],
+    fixed: [T; 26],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> SphereShell<T> {
@@ -195,28 +195,25 @@ impl<T: crate::Real> SphereShell<T> {
         let t217 = t216 / t135;
         let t220 = T::nearest(8.0) / parameters.Ro;
         let t224 = T::nearest(3.0) * t140;
-        let t228 = T::nearest(6.0) * t140;
-        let t231 = T::nearest(2.0) * t140;
-        let t247 = T::nearest(12.0) * t207;
-        let t248 = parameters.rho0 * t209;
-        let t249 = t247 / t248;
-        let t260 = T::nearest(6.0) * t120;
-        let t261 = t260 * parameters.E;
-        let t262 = t261 * parameters.nu;
-        let t263 = parameters.rho0 * t121;
-        let t264 = t263 * t112;
-        let t265 = t264 * t114;
-        let t266 = t262 / t265;
-        let t272 = T::nearest(3.0) / parameters.Ro;
-        let t282 = T::nearest(2.0) * t120;
-        let t283 = t282 / t263;
-        let t290 = T::nearest(4.0) * parameters.A;
-        let t291 = t290 * parameters.E;
-        let t292 = t291 * parameters.nu;
-        let t293 = t48 * t112;
-        let t294 = t293 * t114;
-        let t295 = t292 / t294;
-        let t308 = T::nearest(2.0) / t16;
+        let t246 = T::nearest(12.0) * t207;
+        let t247 = parameters.rho0 * t209;
+        let t248 = t246 / t247;
+        let t254 = T::nearest(6.0) * t120;
+        let t255 = t254 * parameters.E;
+        let t256 = t255 * parameters.nu;
+        let t257 = parameters.rho0 * t121;
+        let t258 = t257 * t112;
+        let t259 = t258 * t114;
+        let t260 = t256 / t259;
+        let t274 = T::nearest(2.0) * t120;
+        let t275 = t274 / t257;
+        let t281 = T::nearest(4.0) * parameters.A;
+        let t282 = t281 * parameters.E;
+        let t283 = t282 * parameters.nu;
+        let t284 = t48 * t112;
+        let t285 = t284 * t114;
+        let t286 = t283 / t285;
+        let t299 = T::nearest(2.0) / t16;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -244,14 +241,11 @@ impl<T: crate::Real> SphereShell<T> {
                 t217,
                 t220,
                 t224,
-                t228,
-                t231,
-                t249,
-                t266,
-                t272,
-                t283,
-                t295,
-                t308,
+                t248,
+                t260,
+                t275,
+                t286,
+                t299,
             ],
         })
     }
@@ -675,65 +669,58 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t225 = t210 * t223;
         let t226 = self.fixed[20] * t225;
         let t227 = self.fixed[20] * t211;
-        let t229 = t61 * t223;
-        let t230 = self.fixed[21] * t229;
-        let t232 = self.fixed[22] * t123;
-        let t234 = t61 * t210;
-        let t235 = T::nearest(18.0) * t234;
-        let t236 = t23 * t71;
+        let t228 = t23 * t71;
+        let t230 = T::nearest(36.0) * t195;
+        let t231 = t228 + t230;
+        let t232 = t231 - t123;
+        let t233 = self.fixed[12] * t232;
+        let t235 = t61 * t210;
+        let t236 = T::nearest(18.0) * t235;
         let t237 = t23 * t180;
         let t238 = T::nearest(2.0) * t237;
-        let t239 = t235 + t236;
+        let t239 = t236 + t228;
         let t240 = t239 + t238;
         let t241 = self.fixed[11] * t240;
         let t242 = t218 + t226;
         let t243 = t242 + t227;
-        let t244 = t243 + t230;
-        let t245 = t244 - t232;
-        let t246 = t245 + t241;
-        let t250 = t7 * t61;
-        let t251 = t250 * t246;
-        let t252 = self.fixed[23] * t251;
-        let t253 = t252 + t205;
-        let t254 = t18 * t253;
-        let t255 = T::nearest(2.0) * t229;
-        let t256 = t23 * t61;
-        let t257 = T::nearest(4.0) * t256;
-        let t258 = t211 + t255;
-        let t259 = t258 - t257;
-        let t267 = t8 * t259;
-        let t268 = self.fixed[24] * t267;
-        let t269 = t268 * t133;
-        let t270 = self.fixed[12] * t123;
-        let t271 = self.fixed[11] * t180;
-        let t273 = self.fixed[25] * t8;
-        let t274 = T::nearest(2.0) - t273;
-        let t275 = self.fixed[20] * t274;
-        let t276 = t271 + t275;
-        let t277 = t61 * t276;
-        let t278 = T::nearest(12.0) * t277;
-        let t279 = self.fixed[11] * t239;
-        let t280 = t270 - t278;
-        let t281 = t280 - t279;
-        let t284 = t8 * t281;
-        let t285 = self.fixed[26] * t284;
-        let t286 = -t285;
-        let t287 = t254 + t269;
-        let t288 = t286 + t287;
-        let t289 = t18 * t288;
-        let t296 = self.fixed[27] * t180;
-        let t297 = t296 * t133;
-        let t298 = t289 + t297;
-        let t299 = t190 * t108;
-        let t300 = t298 / t299;
-        let t301 = t189 + t300;
-        let t302 = t18 * t301;
-        let t303 = t174 * t302;
-        let t304 = X[1] / t8;
-        let t305 = t304 * t302;
-        let t306 = X[2] / t8;
-        let t307 = t306 * t302;
-        crate::nalgebra::SVector::<T, 3>::new(t303, t305, t307)
+        let t244 = t243 + t233;
+        let t245 = t244 + t241;
+        let t249 = t7 * t61;
+        let t250 = t249 * t245;
+        let t251 = self.fixed[21] * t250;
+        let t252 = t251 + t205;
+        let t253 = t18 * t252;
+        let t261 = t8 * t214;
+        let t262 = self.fixed[22] * t261;
+        let t263 = t262 * t133;
+        let t264 = self.fixed[11] * t180;
+        let t265 = self.fixed[20] * t210;
+        let t266 = t264 + t265;
+        let t267 = t61 * t266;
+        let t268 = T::nearest(12.0) * t267;
+        let t269 = t230 - t123;
+        let t270 = self.fixed[12] * t269;
+        let t271 = self.fixed[11] * t239;
+        let t272 = t268 + t270;
+        let t273 = t272 + t271;
+        let t276 = t8 * t273;
+        let t277 = self.fixed[23] * t276;
+        let t278 = t253 + t263;
+        let t279 = t277 + t278;
+        let t280 = t18 * t279;
+        let t287 = self.fixed[24] * t180;
+        let t288 = t287 * t133;
+        let t289 = t280 + t288;
+        let t290 = t190 * t108;
+        let t291 = t289 / t290;
+        let t292 = t189 + t291;
+        let t293 = t18 * t292;
+        let t294 = t174 * t293;
+        let t295 = X[1] / t8;
+        let t296 = t295 * t293;
+        let t297 = X[2] / t8;
+        let t298 = t297 * t293;
+        crate::nalgebra::SVector::<T, 3>::new(t294, t296, t298)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> crate::Fields<T, 3> {
         let t1 = X[1] * X[1];
@@ -890,64 +877,57 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t225 = t210 * t223;
         let t226 = self.fixed[20] * t225;
         let t227 = self.fixed[20] * t211;
-        let t229 = t61 * t223;
-        let t230 = self.fixed[21] * t229;
-        let t232 = self.fixed[22] * t123;
-        let t234 = t61 * t210;
-        let t235 = T::nearest(18.0) * t234;
-        let t236 = t23 * t71;
+        let t228 = t23 * t71;
+        let t230 = T::nearest(36.0) * t195;
+        let t231 = t228 + t230;
+        let t232 = t231 - t123;
+        let t233 = self.fixed[12] * t232;
+        let t235 = t61 * t210;
+        let t236 = T::nearest(18.0) * t235;
         let t237 = t23 * t180;
         let t238 = T::nearest(2.0) * t237;
-        let t239 = t235 + t236;
+        let t239 = t236 + t228;
         let t240 = t239 + t238;
         let t241 = self.fixed[11] * t240;
         let t242 = t218 + t226;
         let t243 = t242 + t227;
-        let t244 = t243 + t230;
-        let t245 = t244 - t232;
-        let t246 = t245 + t241;
-        let t250 = t7 * t61;
-        let t251 = t250 * t246;
-        let t252 = self.fixed[23] * t251;
-        let t253 = t252 + t205;
-        let t254 = t18 * t253;
-        let t255 = T::nearest(2.0) * t229;
-        let t256 = t23 * t61;
-        let t257 = T::nearest(4.0) * t256;
-        let t258 = t211 + t255;
-        let t259 = t258 - t257;
-        let t267 = t8 * t259;
-        let t268 = self.fixed[24] * t267;
-        let t269 = t268 * t133;
-        let t270 = self.fixed[12] * t123;
-        let t271 = self.fixed[11] * t180;
-        let t273 = self.fixed[25] * t8;
-        let t274 = T::nearest(2.0) - t273;
-        let t275 = self.fixed[20] * t274;
-        let t276 = t271 + t275;
-        let t277 = t61 * t276;
-        let t278 = T::nearest(12.0) * t277;
-        let t279 = self.fixed[11] * t239;
-        let t280 = t270 - t278;
-        let t281 = t280 - t279;
-        let t284 = t8 * t281;
-        let t285 = self.fixed[26] * t284;
-        let t286 = -t285;
-        let t287 = t254 + t269;
-        let t288 = t286 + t287;
-        let t289 = t18 * t288;
-        let t296 = self.fixed[27] * t180;
-        let t297 = t296 * t133;
-        let t298 = t289 + t297;
-        let t299 = t190 * t108;
-        let t300 = t298 / t299;
-        let t301 = t189 + t300;
-        let t302 = t18 * t301;
-        let t303 = t174 * t302;
-        let t304 = X[1] / t8;
-        let t305 = t304 * t302;
-        let t306 = X[2] / t8;
-        let t307 = t306 * t302;
+        let t244 = t243 + t233;
+        let t245 = t244 + t241;
+        let t249 = t7 * t61;
+        let t250 = t249 * t245;
+        let t251 = self.fixed[21] * t250;
+        let t252 = t251 + t205;
+        let t253 = t18 * t252;
+        let t261 = t8 * t214;
+        let t262 = self.fixed[22] * t261;
+        let t263 = t262 * t133;
+        let t264 = self.fixed[11] * t180;
+        let t265 = self.fixed[20] * t210;
+        let t266 = t264 + t265;
+        let t267 = t61 * t266;
+        let t268 = T::nearest(12.0) * t267;
+        let t269 = t230 - t123;
+        let t270 = self.fixed[12] * t269;
+        let t271 = self.fixed[11] * t239;
+        let t272 = t268 + t270;
+        let t273 = t272 + t271;
+        let t276 = t8 * t273;
+        let t277 = self.fixed[23] * t276;
+        let t278 = t253 + t263;
+        let t279 = t277 + t278;
+        let t280 = t18 * t279;
+        let t287 = self.fixed[24] * t180;
+        let t288 = t287 * t133;
+        let t289 = t280 + t288;
+        let t290 = t190 * t108;
+        let t291 = t289 / t290;
+        let t292 = t189 + t291;
+        let t293 = t18 * t292;
+        let t294 = t174 * t293;
+        let t295 = X[1] / t8;
+        let t296 = t295 * t293;
+        let t297 = X[2] / t8;
+        let t298 = t297 * t293;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 3>::new(t28, t30, t32),
             v: crate::nalgebra::SVector::<T, 3>::new(t40, t42, t44),
@@ -968,7 +948,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 3,
                 3,
             >::new(t158, t161, t163, t161, t167, t169, t163, t169, t173),
-            b: crate::nalgebra::SVector::<T, 3>::new(t303, t305, t307),
+            b: crate::nalgebra::SVector::<T, 3>::new(t294, t296, t298),
         }
     }
     fn domain(&self) -> crate::Domain<T, 3> {
@@ -1017,7 +997,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[28]
+        self.fixed[25]
     }
     fn body_force_at(
         &self,
@@ -1083,50 +1063,43 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 5, 12> for SphereShell<T> {
         let t225 = t210 * t223;
         let t226 = self.fixed[20] * t225;
         let t227 = self.fixed[20] * t211;
-        let t229 = t61 * t223;
-        let t230 = self.fixed[21] * t229;
-        let t232 = self.fixed[22] * t123;
-        let t234 = t61 * t210;
-        let t235 = T::nearest(18.0) * t234;
-        let t236 = t23 * t71;
+        let t228 = t23 * t71;
+        let t230 = T::nearest(36.0) * t195;
+        let t231 = t228 + t230;
+        let t232 = t231 - t123;
+        let t233 = self.fixed[12] * t232;
+        let t235 = t61 * t210;
+        let t236 = T::nearest(18.0) * t235;
         let t237 = t23 * t180;
         let t238 = T::nearest(2.0) * t237;
-        let t239 = t235 + t236;
+        let t239 = t236 + t228;
         let t240 = t239 + t238;
         let t241 = self.fixed[11] * t240;
         let t242 = t218 + t226;
         let t243 = t242 + t227;
-        let t244 = t243 + t230;
-        let t245 = t244 - t232;
-        let t246 = t245 + t241;
-        let t250 = t7 * t61;
-        let t251 = t250 * t246;
-        let t252 = self.fixed[23] * t251;
-        let t255 = T::nearest(2.0) * t229;
-        let t256 = t23 * t61;
-        let t257 = T::nearest(4.0) * t256;
-        let t258 = t211 + t255;
-        let t259 = t258 - t257;
-        let t267 = t8 * t259;
-        let t268 = self.fixed[24] * t267;
-        let t270 = self.fixed[12] * t123;
-        let t271 = self.fixed[11] * t180;
-        let t273 = self.fixed[25] * t8;
-        let t274 = T::nearest(2.0) - t273;
-        let t275 = self.fixed[20] * t274;
-        let t276 = t271 + t275;
-        let t277 = t61 * t276;
-        let t278 = T::nearest(12.0) * t277;
-        let t279 = self.fixed[11] * t239;
-        let t280 = t270 - t278;
-        let t281 = t280 - t279;
-        let t284 = t8 * t281;
-        let t285 = self.fixed[26] * t284;
-        let t286 = -t285;
-        let t296 = self.fixed[27] * t180;
-        let t304 = X[1] / t8;
-        let t306 = X[2] / t8;
-        [t26, t104, t126, t174, t189, t204, t252, t268, t286, t296, t304, t306]
+        let t244 = t243 + t233;
+        let t245 = t244 + t241;
+        let t249 = t7 * t61;
+        let t250 = t249 * t245;
+        let t251 = self.fixed[21] * t250;
+        let t261 = t8 * t214;
+        let t262 = self.fixed[22] * t261;
+        let t264 = self.fixed[11] * t180;
+        let t265 = self.fixed[20] * t210;
+        let t266 = t264 + t265;
+        let t267 = t61 * t266;
+        let t268 = T::nearest(12.0) * t267;
+        let t269 = t230 - t123;
+        let t270 = self.fixed[12] * t269;
+        let t271 = self.fixed[11] * t239;
+        let t272 = t268 + t270;
+        let t273 = t272 + t271;
+        let t276 = t8 * t273;
+        let t277 = self.fixed[23] * t276;
+        let t287 = self.fixed[24] * t180;
+        let t295 = X[1] / t8;
+        let t297 = X[2] / t8;
+        [t26, t104, t126, t174, t189, t204, t251, t262, t277, t287, t295, t297]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -1149,22 +1122,22 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 5, 12> for SphereShell<T> {
         let t133 = t132.ln_1p();
         let t190 = t106 * t106;
         let t205 = time[0] * point[5];
-        let t253 = point[6] + t205;
-        let t254 = time[0] * t253;
-        let t269 = point[7] * t133;
-        let t287 = t254 + t269;
-        let t288 = point[8] + t287;
-        let t289 = time[0] * t288;
-        let t297 = point[9] * t133;
-        let t298 = t289 + t297;
-        let t299 = t190 * t108;
-        let t300 = t298 / t299;
-        let t301 = point[4] + t300;
-        let t302 = time[0] * t301;
-        let t303 = point[3] * t302;
-        let t305 = point[10] * t302;
-        let t307 = point[11] * t302;
-        crate::nalgebra::SVector::<T, 3>::new(t303, t305, t307)
+        let t252 = point[6] + t205;
+        let t253 = time[0] * t252;
+        let t263 = point[7] * t133;
+        let t278 = t253 + t263;
+        let t279 = point[8] + t278;
+        let t280 = time[0] * t279;
+        let t288 = point[9] * t133;
+        let t289 = t280 + t288;
+        let t290 = t190 * t108;
+        let t291 = t289 / t290;
+        let t292 = point[4] + t291;
+        let t293 = time[0] * t292;
+        let t294 = point[3] * t293;
+        let t296 = point[10] * t293;
+        let t298 = point[11] * t293;
+        crate::nalgebra::SVector::<T, 3>::new(t294, t296, t298)
     }
 }
 impl<T: crate::Real> From<SphereShell<T>> for crate::AnySolution<T> {

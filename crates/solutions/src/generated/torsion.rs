@@ -119,23 +119,23 @@ impl<T: crate::Real> Torsion<T> {
         let t51 = parameters.A * parameters.E;
         let t52 = t51 * t44;
         let t53 = t52 / parameters.rho0;
-        let t74 = parameters.nu + T::one();
-        let t75 = T::nearest(0.5) * parameters.E;
-        let t76 = t75 / t74;
+        let t78 = parameters.nu + T::one();
+        let t79 = T::nearest(0.5) * parameters.E;
+        let t80 = t79 / t78;
         let t98 = t11 * parameters.E;
         let t99 = t98 / parameters.rho0;
         let t100 = T::nearest(2.0) * t44;
-        let t104 = parameters.A / t74;
+        let t104 = parameters.A / t78;
         let t113 = T::nearest(2.0) / t8;
         let t114 = T::nearest(2.0) * parameters.nu;
         let t115 = T::one() - t114;
         let t116 = parameters.E * parameters.nu;
-        let t117 = t74 * t115;
+        let t117 = t78 * t115;
         let t118 = t116 / t117;
         let t119 = -T::nearest(0.5);
         Ok(Torsion {
             parameters,
-            fixed: [t8, t11, t35, t53, t76, t99, t100, t104, t113, t118, t119],
+            fixed: [t8, t11, t35, t53, t80, t99, t100, t104, t113, t118, t119],
         })
     }
     /// The solution with parameter values in the order of the description; missing ones take their
@@ -386,26 +386,26 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         let t68 = -t67;
         let t69 = t66 * t41;
         let t70 = -t69;
-        let t77 = t62 + T::one();
-        let t78 = t77 * t77;
-        let t79 = t65 * t64;
-        let t80 = t78 - t79;
-        let t81 = t68 * t80;
-        let t82 = t81 / t80;
+        let t73 = t62 + T::one();
+        let t74 = t73 * t73;
+        let t75 = t65 * t64;
+        let t76 = t74 - t75;
+        let t81 = t68 * t76;
+        let t82 = t81 / t76;
         let t83 = self.fixed[4] * t82;
-        let t84 = t70 * t80;
-        let t85 = t84 / t80;
+        let t84 = t70 * t76;
+        let t85 = t84 / t76;
         let t86 = self.fixed[4] * t85;
         let t87 = t65 * t70;
-        let t88 = t68 * t77;
+        let t88 = t68 * t73;
         let t89 = t87 - t88;
-        let t90 = t89 / t80;
+        let t90 = t89 / t76;
         let t91 = self.fixed[4] * t90;
         let t92 = -t91;
-        let t93 = t70 * t77;
+        let t93 = t70 * t73;
         let t94 = t68 * t64;
         let t95 = t93 - t94;
-        let t96 = t95 / t80;
+        let t96 = t95 / t76;
         let t97 = self.fixed[4] * t96;
         crate::nalgebra::SMatrix::<
             T,
@@ -513,26 +513,26 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         let t69 = t66 * t41;
         let t70 = -t69;
         let t72 = T::one() - t61;
-        let t77 = t62 + T::one();
-        let t78 = t77 * t77;
-        let t79 = t65 * t64;
-        let t80 = t78 - t79;
-        let t81 = t68 * t80;
-        let t82 = t81 / t80;
+        let t73 = t62 + T::one();
+        let t74 = t73 * t73;
+        let t75 = t65 * t64;
+        let t76 = t74 - t75;
+        let t81 = t68 * t76;
+        let t82 = t81 / t76;
         let t83 = self.fixed[4] * t82;
-        let t84 = t70 * t80;
-        let t85 = t84 / t80;
+        let t84 = t70 * t76;
+        let t85 = t84 / t76;
         let t86 = self.fixed[4] * t85;
         let t87 = t65 * t70;
-        let t88 = t68 * t77;
+        let t88 = t68 * t73;
         let t89 = t87 - t88;
-        let t90 = t89 / t80;
+        let t90 = t89 / t76;
         let t91 = self.fixed[4] * t90;
         let t92 = -t91;
-        let t93 = t70 * t77;
+        let t93 = t70 * t73;
         let t94 = t68 * t64;
         let t95 = t93 - t94;
-        let t96 = t95 / t80;
+        let t96 = t95 / t76;
         let t97 = self.fixed[4] * t96;
         let t101 = self.fixed[6] * X[2];
         let t102 = t101 * t50;

@@ -1,0 +1,166 @@
+//! What the momentum balance needs of a material: the first Piola-Kirchhoff stress and its divergence.
+
+pub(crate) mod energy;
+mod hencky;
+mod neo_hookean;
+
+use crate::derivation::Derivation;
+use crate::tensor::{Matrix, Vector, cofactor, determinant, principal_minors};
+use crate::{DeriveError, Material};
+use mmsmith_expr::{Expr, Function, Graph, Node};
+
+/// The deformation of one solution, in physical components.
+pub(crate) struct Deformation {
+    /// The displacement gradient as it was derived, for sums in which terms may cancel.
+    open: Matrix,
+    /// The displacement gradient with entries in one piece.
+    H: Matrix,
+    /// `F^-T`.
+    inverse_transpose: Matrix,
+    /// `det F`.
+    pub(crate) J: Expr,
+    /// `J - 1`, small where `H` is small.
+    volume_change: Expr,
+    log_J: Expr,
+}
+
+/// A stress, and its divergence in two parts.
+pub(crate) struct Stress {
+    /// First Piola-Kirchhoff stress.
+    pub(crate) P: Matrix,
+    /// The divergence of the part of `P` that is linear in `H`, open: it may cancel against the inertia.
+    pub(crate) linear: Vector,
+    /// The divergence of the rest, small where `H` is small.
+    pub(crate) remainder: Vector,
+}
+
+impl Deformation {
+    pub(crate) fn new(derivation: &mut Derivation, open: Matrix) -> Self {
+        let n = open.len();
+        let graph = &mut derivation.graph;
+        let H: Matrix =
+            open.iter().map(|row| row.iter().map(|&h| graph.whole(h)).collect()).collect();
+        let mut F = H.clone();
+        for i in 0..n {
+            F[i][i] = graph.add(Graph::ONE, H[i][i]);
+        }
+        let determinant = determinant(graph, &F);
+        let J = graph.whole(determinant);
+        let mut inverse_transpose = vec![vec![Graph::ZERO; n]; n];
+        for i in 0..n {
+            for k in 0..n {
+                let cofactor = cofactor(graph, &F, i, k);
+                inverse_transpose[i][k] = graph.div(cofactor, J);
+            }
+        }
+        // J - 1 as the sum of the principal minors of H, small where H is small.
+        let minors = principal_minors(graph, &H);
+        let volume_change = graph.sum_of(minors);
+        let volume_change = zero_if_vanishing(graph, volume_change);
+        let J = if volume_change == Graph::ZERO { Graph::ONE } else { J };
+        let volume_change = graph.whole(volume_change);
+        let log_J = graph.call(Function::Ln1p, &[volume_change]);
+        // Jacobi's formula, d ln J = F^-T : dH.
+        for k in 0..n {
+            let q = derivation.geometry.coordinates[k];
+            let mut terms = Vec::new();
+            for i in 0..n {
+                for j in 0..n {
+                    let derivative = derivation.derivative(H[i][j], q);
+                    terms.push(derivation.graph.mul(inverse_transpose[i][j], derivative));
+                }
+            }
+            let derivative = derivation.graph.sum_of(terms);
+            derivation.derivatives.define(log_J, q, derivative);
+        }
+        Deformation { open, H, inverse_transpose, J, volume_change, log_J }
+    }
+}
+
+/// The stress of `material` at a deformation.
+pub(crate) fn stress(
+    derivation: &mut Derivation,
+    deformation: &Deformation,
+    material: &Material,
+) -> Result<Stress, DeriveError> {
+    Ok(match material {
+        Material::NeoHookean { lambda, mu } => {
+            neo_hookean::stress(derivation, deformation, *lambda, *mu)
+        }
+        Material::LinearElastic { lambda, mu } => {
+            linear_elastic(derivation, deformation, *lambda, *mu)
+        }
+        _ => {
+            let law = energy::ComponentLaw::of(&mut derivation.graph, material, deformation)?;
+            law.stress(derivation, deformation)
+        }
+    })
+}
+
+/// `P = lambda tr(H) I + mu (H + H^T)`.
+fn linear_elastic(
+    derivation: &mut Derivation,
+    deformation: &Deformation,
+    lambda: Expr,
+    mu: Expr,
+) -> Stress {
+    let linear = linear_divergence(derivation, &deformation.open, lambda, mu);
+    let remainder = vec![Graph::ZERO; linear.len()];
+    let graph = &mut derivation.graph;
+    let (lambda, mu) = (graph.whole(lambda), graph.whole(mu));
+    let H = &deformation.H;
+    let n = H.len();
+    let trace = graph.sum_of((0..n).map(|i| H[i][i]));
+    let pressure = graph.mul(lambda, trace);
+    let mut P = vec![vec![Graph::ZERO; n]; n];
+    for i in 0..n {
+        for j in 0..n {
+            let strain = graph.add(H[i][j], H[j][i]);
+            let shear = graph.mul(mu, strain);
+            let normal = if i == j { pressure } else { Graph::ZERO };
+            let entry = graph.add(normal, shear);
+            P[i][j] = zero_if_vanishing(graph, entry);
+        }
+    }
+    Stress { P, linear, remainder }
+}
+
+/// The divergence of `lambda tr(H) I + mu (H + H^T)`, with the constants as they are written.
+fn linear_divergence(
+    derivation: &mut Derivation,
+    H: &Matrix,
+    lambda: Expr,
+    mu: Expr,
+) -> Vector {
+    let n = H.len();
+    let trace = derivation.graph.sum_of((0..n).map(|i| H[i][i]));
+    let mut symmetric = H.clone();
+    for i in 0..n {
+        for j in 0..n {
+            symmetric[i][j] = derivation.graph.add(H[i][j], H[j][i]);
+        }
+    }
+    let strain = derivation.divergence(&symmetric);
+    (0..n)
+        .map(|i| {
+            let dilation = derivation.along(trace, i);
+            let graph = &mut derivation.graph;
+            let dilation = graph.mul(lambda, dilation);
+            let shear = graph.mul(mu, strain[i]);
+            graph.add(dilation, shear)
+        })
+        .collect()
+}
+
+/// The expression, or zero where it is zero at every point without looking so. Rounding would leave something there.
+pub(crate) fn zero_if_vanishing(graph: &mut Graph, expr: Expr) -> Expr {
+    if graph.vanishes(expr) { Graph::ZERO } else { expr }
+}
+
+/// What [`Graph::whole`] kept in one piece.
+pub(crate) fn inside(graph: &Graph, expr: Expr) -> Expr {
+    match graph.node(expr) {
+        Node::Whole(inner) => *inner,
+        _ => expr,
+    }
+}

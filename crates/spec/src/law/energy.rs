@@ -1,0 +1,206 @@
+//! Any law that is stated as a strain energy, or as the stress itself, in the components of `F`.
+//!
+//! The energy `W` is written in the components `h` of the displacement gradient, and differentiated there:
+//! `P = dW/dF`, `A = dP/dF`. Each is split into its value at `h = 0` and a rest that is small with `h`
+//! ([`Graph::split_at_zero`]), so that no digits are lost at small strain. By the chain rule
+//! `Div P = A(0) : grad H + (A - A(0)) : grad H`, linear part and remainder.
+
+use super::{Deformation, Stress, zero_if_vanishing};
+use crate::derivation::Derivation;
+use crate::tensor::{Matrix, Vector, principal_minors};
+use crate::{DeriveError, Material};
+use mmsmith_expr::{Ast, Expr, Function, Graph};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The names that an energy may use, and the components of `F` and `C` with two indices after them.
+pub(crate) const INVARIANTS: [&str; 3] = ["J", "I1", "I2"];
+
+/// The names of the components of a tensor, as `F11`.
+pub(crate) fn component_names(letter: &str, dimension: usize) -> Vec<Vec<String>> {
+    let row = |i| (1..=dimension).map(|j| format!("{letter}{i}{j}")).collect();
+    (1..=dimension).map(row).collect()
+}
+
+/// A law in the components of the displacement gradient.
+pub(super) struct ComponentLaw {
+    /// The symbols that stand for the components.
+    h: Matrix,
+    P: Matrix,
+    /// Whether `P` is an isotropic function, so that the chain rule holds for whole tensors in any coordinates.
+    isotropic: bool,
+    /// Quantities of `h` that the deformation has in a form of its own.
+    known: BTreeMap<Expr, Expr>,
+}
+
+impl ComponentLaw {
+    pub(super) fn of(
+        graph: &mut Graph,
+        material: &Material,
+        deformation: &Deformation,
+    ) -> Result<Self, DeriveError> {
+        let n = deformation.H.len();
+        let h: Matrix = component_names("h ", n)
+            .iter()
+            .map(|row| row.iter().map(|name| graph.symbol(name)).collect())
+            .collect();
+        let (energy, isotropic) = match *material {
+            Material::StVenantKirchhoff { lambda, mu } => {
+                let text = "lambda/8*(I1-3)^2 + mu/4*((I1-3)^2 + 4*(I1-3) - 2*(I2-3))";
+                (named(graph, text, &[("lambda", lambda), ("mu", mu)]), true)
+            }
+            Material::MooneyRivlin { c1, c2, lambda } => {
+                let text = "c1*(I1-3-2*ln(J)) + c2*(I2-3-4*ln(J)) + lambda/2*ln(J)^2";
+                (named(graph, text, &[("c1", c1), ("c2", c2), ("lambda", lambda)]), true)
+            }
+            Material::Hencky { lambda, mu } => {
+                let (text, isotropic) = super::hencky::energy(graph, &deformation.H)?;
+                (named(graph, &text, &[("lambda", lambda), ("mu", mu)]), isotropic)
+            }
+            Material::Energy { W } => (W, uses_invariants_only(graph, W, n)),
+            Material::Stress { ref P } => {
+                let (replacement, known) = in_components(graph, &h, deformation);
+                let P: Matrix = P
+                    .iter()
+                    .map(|row| row.iter().map(|&p| graph.replace(p, &replacement)).collect())
+                    .collect();
+                return Ok(ComponentLaw { h, P, isotropic: false, known });
+            }
+            Material::NeoHookean { .. } | Material::LinearElastic { .. } => {
+                return Err(DeriveError::NoClosedForm("this law is not derived from an energy"));
+            }
+        };
+        let (replacement, known) = in_components(graph, &h, deformation);
+        let energy = graph.replace(energy, &replacement);
+        let mut derivatives = mmsmith_expr::Derivatives::limited();
+        let P = h
+            .iter()
+            .map(|row| row.iter().map(|&h| derivatives.of(graph, energy, h)).collect())
+            .collect();
+        Ok(ComponentLaw { h, P, isotropic, known })
+    }
+
+    pub(super) fn stress(&self, derivation: &mut Derivation, deformation: &Deformation) -> Stress {
+        let n = self.h.len();
+        let small: BTreeSet<Expr> = self.h.iter().flatten().copied().collect();
+        let mut actual = self.known.clone();
+        for (symbol, entry) in self.h.iter().flatten().zip(deformation.H.iter().flatten()) {
+            actual.insert(*symbol, *entry);
+        }
+        let graph = &mut derivation.graph;
+        let mut stress = self.P.clone();
+        for entry in stress.iter_mut().flatten() {
+            let (value, rest) = graph.split_at_zero(*entry, &small);
+            let value = zero_if_vanishing(graph, value);
+            *entry = graph.add(value, rest);
+        }
+        let mut P = stress.clone();
+        for entry in P.iter_mut().flatten() {
+            *entry = graph.replace(*entry, &actual);
+            *entry = zero_if_vanishing(graph, *entry);
+        }
+
+        let open = derivation.second_gradient(&deformation.open, self.isotropic);
+        let whole = derivation.second_gradient(&deformation.H, self.isotropic);
+        let mut derivatives = mmsmith_expr::Derivatives::limited();
+        let (mut linear, mut remainder) = (Vector::new(), Vector::new());
+        for i in 0..n {
+            let (mut first, mut second) = (Vec::new(), Vec::new());
+            for (J, k, L) in indices(n) {
+                if open[k][L][J] == Graph::ZERO && whole[k][L][J] == Graph::ZERO {
+                    continue;
+                }
+                let graph = &mut derivation.graph;
+                let modulus = derivatives.of(graph, stress[i][J], self.h[k][L]);
+                let (value, rest) = graph.split_at_zero(modulus, &small);
+                let value = zero_if_vanishing(graph, value);
+                first.push(graph.mul(value, open[k][L][J]));
+                let rest = graph.replace(rest, &actual);
+                second.push(graph.mul(rest, whole[k][L][J]));
+            }
+            if !self.isotropic {
+                second.extend(derivation.divergence_of_frame(&P, i));
+            }
+            linear.push(derivation.graph.sum_of(first));
+            remainder.push(derivation.graph.sum_of(second));
+        }
+        Stress { P, linear, remainder }
+    }
+}
+
+fn indices(n: usize) -> impl Iterator<Item = (usize, usize, usize)> {
+    (0..n * n * n).map(move |m| (m / (n * n), m / n % n, m % n))
+}
+
+/// The energy that `text` states, its constants in one piece.
+fn named(graph: &mut Graph, text: &str, constants: &[(&str, Expr)]) -> Expr {
+    let Ok(ast) = Ast::parse(text) else { return Graph::ZERO };
+    let energy = graph.build(&ast, &mut |graph, name| {
+        let constant = constants.iter().find(|(known, _)| *known == name);
+        Ok(match constant {
+            Some(&(_, value)) => graph.whole(value),
+            None => graph.symbol(name),
+        })
+    });
+    energy.unwrap_or(Graph::ZERO)
+}
+
+fn uses_invariants_only(graph: &mut Graph, energy: Expr, dimension: usize) -> bool {
+    let symbols = graph.symbols_in(&[energy]);
+    ["F", "C"]
+        .iter()
+        .flat_map(|letter| component_names(letter, dimension).concat())
+        .all(|name| !symbols.contains(&graph.symbol(&name)))
+}
+
+/// `F`, `C`, `J`, `I1` and `I2` in the components of the displacement gradient, and what the deformation has of them
+/// already. Invariants are those of the deformation in space: nothing stretches along the directions left out.
+fn in_components(
+    graph: &mut Graph,
+    h: &Matrix,
+    deformation: &Deformation,
+) -> (BTreeMap<Expr, Expr>, BTreeMap<Expr, Expr>) {
+    let n = h.len();
+    let mut replacement = BTreeMap::new();
+    // G = C - I = H + H^T + H^T H
+    let mut G = h.clone();
+    for k in 0..n {
+        for l in 0..n {
+            let mut terms = vec![h[k][l], h[l][k]];
+            terms.extend((0..n).map(|m| graph.mul(h[m][k], h[m][l])));
+            G[k][l] = graph.sum_of(terms);
+        }
+    }
+    for (letter, small) in [("F", h), ("C", &G)] {
+        for (k, row) in component_names(letter, n).iter().enumerate() {
+            for (l, name) in row.iter().enumerate() {
+                let diagonal = if k == l { Graph::ONE } else { Graph::ZERO };
+                replacement.insert(graph.symbol(name), graph.add(diagonal, small[k][l]));
+            }
+        }
+    }
+    let minors = principal_minors(graph, h);
+    let volume_change = graph.sum_of(minors);
+    let J = graph.add(Graph::ONE, volume_change);
+    let trace = graph.sum_of((0..n).map(|k| G[k][k]));
+    // I2 - 3 = 2 tr G + ((tr G)^2 - G : G)/2, and half the bracket is the sum of the second-order minors of G.
+    let mut terms = vec![trace, trace];
+    for k in 0..n {
+        for l in k + 1..n {
+            let (normal, shear) = (graph.mul(G[k][k], G[l][l]), graph.mul(G[k][l], G[l][k]));
+            terms.push(graph.sub(normal, shear));
+        }
+    }
+    let second = graph.sum_of(terms);
+    let three = graph.integer(3);
+    let (I1, I2) = (graph.add(three, trace), graph.add(three, second));
+    for (name, value) in INVARIANTS.iter().zip([J, I1, I2]) {
+        replacement.insert(graph.symbol(name), value);
+    }
+    let log_J = graph.call(Function::Ln1p, &[volume_change]);
+    let known = BTreeMap::from([
+        (J, deformation.J),
+        (volume_change, deformation.volume_change),
+        (log_J, deformation.log_J),
+    ]);
+    (replacement, known)
+}

@@ -1,0 +1,114 @@
+//! The compressible neo-Hookean law, `tau = lambda ln(J) I + mu (F F^T - I)`, in forms that keep digits.
+//!
+//! - Stress is formed from the displacement gradient `H`, never from `F - I`:
+//!   `tau = lambda log1p(J - 1) I + mu (H + H^T + H H^T)`, and `P = tau F^-T`.
+//! - `P` is the part linear in `H` and a remainder of second order,
+//!   `P = lambda tr(H) I + mu (H + H^T) + [lambda (ln J - tr H) I + lambda ln J (F^-T - I) - mu (H^T)^2 F^-T]`.
+//! - `d ln J = F^-T : dH` (Jacobi's formula), so that the gradient of `ln J - tr H` is `-(H^T F^-T) : dH`, exactly of
+//!   second order.
+
+use super::{Deformation, Stress, linear_divergence, zero_if_vanishing};
+use crate::derivation::Derivation;
+use crate::tensor::{Matrix, Vector, matrix_product, transpose};
+use mmsmith_expr::{Expr, Graph};
+
+pub(super) fn stress(
+    derivation: &mut Derivation,
+    deformation: &Deformation,
+    lambda: Expr,
+    mu: Expr,
+) -> Stress {
+    let linear = linear_divergence(derivation, &deformation.open, lambda, mu);
+    let graph = &mut derivation.graph;
+    let (lambda, mu) = (graph.whole(lambda), graph.whole(mu));
+    let law = NeoHookean { deformation, lambda, mu };
+    let P = law.first_piola_kirchhoff(graph);
+    let remainder = law.remainder_divergence(derivation);
+    Stress { P, linear, remainder }
+}
+
+struct NeoHookean<'a> {
+    deformation: &'a Deformation,
+    /// Lamé's constants, each in one piece.
+    lambda: Expr,
+    mu: Expr,
+}
+
+impl NeoHookean<'_> {
+    fn first_piola_kirchhoff(&self, graph: &mut Graph) -> Matrix {
+        let H = &self.deformation.H;
+        let n = H.len();
+        let pressure = graph.mul(self.lambda, self.deformation.log_J);
+        let mut tau = vec![vec![Graph::ZERO; n]; n];
+        for i in 0..n {
+            for j in 0..n {
+                // mu (H + H^T + H H^T) = mu (F F^T - I)
+                let mut terms = vec![H[i][j], H[j][i]];
+                terms.extend((0..n).map(|m| graph.mul(H[i][m], H[j][m])));
+                let strain = graph.sum_of(terms);
+                tau[i][j] = graph.mul(self.mu, strain);
+                if i == j {
+                    tau[i][j] = graph.add(tau[i][j], pressure);
+                }
+                tau[i][j] = zero_if_vanishing(graph, tau[i][j]);
+                tau[i][j] = graph.whole(tau[i][j]);
+            }
+        }
+        let mut P = matrix_product(graph, &tau, &self.deformation.inverse_transpose);
+        for entry in P.iter_mut().flatten() {
+            *entry = zero_if_vanishing(graph, *entry);
+        }
+        P
+    }
+
+    fn remainder_divergence(&self, derivation: &mut Derivation) -> Vector {
+        let remainder = self.remainder_without_isotropic_part(&mut derivation.graph);
+        let divergence = derivation.divergence(&remainder);
+        (0..divergence.len())
+            .map(|i| {
+                let isotropic = self.isotropic_remainder(derivation, i);
+                derivation.graph.add(isotropic, divergence[i])
+            })
+            .collect()
+    }
+
+    /// `lambda` times the derivative of `ln J - tr H` along `e_k`: `-lambda (H^T F^-T) : dH`.
+    fn isotropic_remainder(&self, derivation: &mut Derivation, k: usize) -> Expr {
+        let n = self.deformation.H.len();
+        let product = self.transposed_gradient_times_inverse(&mut derivation.graph);
+        let mut terms = Vec::new();
+        for i in 0..n {
+            for j in 0..n {
+                let derivative = derivation.along(self.deformation.H[i][j], k);
+                terms.push(derivation.graph.mul(product[i][j], derivative));
+            }
+        }
+        let graph = &mut derivation.graph;
+        let sum = graph.sum_of(terms);
+        let scaled = graph.mul(self.lambda, sum);
+        graph.neg(scaled)
+    }
+
+    /// `lambda ln J (F^-T - I) - mu (H^T)^2 F^-T`, with `F^-T - I = -H^T F^-T`.
+    fn remainder_without_isotropic_part(&self, graph: &mut Graph) -> Matrix {
+        let n = self.deformation.H.len();
+        let once = self.transposed_gradient_times_inverse(graph);
+        let twice = matrix_product(graph, &transpose(&self.deformation.H), &once);
+        let pressure = graph.mul(self.lambda, self.deformation.log_J);
+        let mut remainder = vec![vec![Graph::ZERO; n]; n];
+        for i in 0..n {
+            for j in 0..n {
+                let dilation = graph.mul(pressure, once[i][j]);
+                let shear = graph.mul(self.mu, twice[i][j]);
+                let sum = graph.add(dilation, shear);
+                remainder[i][j] = graph.neg(sum);
+            }
+        }
+        remainder
+    }
+
+    /// `H^T F^-T`.
+    fn transposed_gradient_times_inverse(&self, graph: &mut Graph) -> Matrix {
+        matrix_product(graph, &transpose(&self.deformation.H), &self.deformation.inverse_transpose)
+    }
+}

@@ -1,0 +1,57 @@
+//! Vectors and matrices of expressions.
+
+use crate::coordinates::identity;
+use mmsmith_expr::{Expr, Graph};
+
+pub(crate) type Vector = Vec<Expr>;
+pub(crate) type Matrix = Vec<Vec<Expr>>;
+
+pub(crate) fn transpose(A: &Matrix) -> Matrix {
+    (0..A.len()).map(|i| A.iter().map(|row| row[i]).collect()).collect()
+}
+
+pub(crate) fn matrix_product(graph: &mut Graph, A: &Matrix, B: &Matrix) -> Matrix {
+    let n = A.len();
+    let mut product = identity(n);
+    for i in 0..n {
+        for j in 0..n {
+            let terms: Vec<Expr> = (0..n).map(|m| graph.mul(A[i][m], B[m][j])).collect();
+            product[i][j] = graph.sum_of(terms);
+        }
+    }
+    product
+}
+
+/// The determinant, by expansion along the first row.
+pub(crate) fn determinant(graph: &mut Graph, A: &Matrix) -> Expr {
+    if A.is_empty() {
+        return Graph::ONE;
+    }
+    let mut terms = Vec::new();
+    for j in 0..A.len() {
+        let cofactor = cofactor(graph, A, 0, j);
+        terms.push(graph.mul(A[0][j], cofactor));
+    }
+    graph.sum_of(terms)
+}
+
+/// The cofactor of entry `(i, j)`.
+pub(crate) fn cofactor(graph: &mut Graph, A: &Matrix, i: usize, j: usize) -> Expr {
+    let without = |skipped: usize| (0..A.len()).filter(move |&k| k != skipped);
+    let minor: Matrix = without(i).map(|k| without(j).map(|l| A[k][l]).collect()).collect();
+    let determinant = determinant(graph, &minor);
+    if (i + j).is_multiple_of(2) { determinant } else { graph.neg(determinant) }
+}
+
+/// The determinants of all principal submatrices but the empty one; they add up to `det(I + A) - 1`.
+pub(crate) fn principal_minors(graph: &mut Graph, A: &Matrix) -> Vec<Expr> {
+    let n = A.len();
+    (1..1_usize << n)
+        .map(|subset| {
+            let indices: Vec<usize> = (0..n).filter(|i| subset >> i & 1 == 1).collect();
+            let minor =
+                indices.iter().map(|&i| indices.iter().map(|&j| A[i][j]).collect()).collect();
+            determinant(graph, &minor)
+        })
+        .collect()
+}
