@@ -8,7 +8,7 @@ use crate::bands::Bands;
 use crate::body_force::BodyForce;
 use crate::error::{SetupError, StepError};
 use crate::grid::{Grid, Layout};
-use crate::material::{Law, Material, NeoHookean, NeoHookeanNoLog};
+use crate::material::{AnyLaw, Law, Material, NeoHookean, NeoHookeanNoLog};
 use crate::particles::Particles;
 use crate::step::{
     Constants, Kernel, State, Trouble, axis_too_large, step_musl, step_usf, step_usl, trouble,
@@ -287,11 +287,14 @@ where
         }
     }
     state.sort(rule);
-    let Material::NeoHookean { lambda, mu } = *material;
-    let kernel = if lambda == T::zero() {
-        with_law(rule, NeoHookeanNoLog { mu }, settings.integrator)
-    } else {
-        with_law(rule, NeoHookean { lambda, mu }, settings.integrator)
+    let kernel = match *material {
+        Material::NeoHookean { lambda, mu } if lambda == T::zero() => {
+            with_law(rule, NeoHookeanNoLog { mu }, settings.integrator)
+        }
+        Material::NeoHookean { lambda, mu } => {
+            with_law(rule, NeoHookean { lambda, mu }, settings.integrator)
+        }
+        other => with_law(rule, AnyLaw(other), settings.integrator),
     };
     Ok((state, kernel))
 }

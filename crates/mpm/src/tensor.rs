@@ -52,15 +52,47 @@ pub(crate) fn inverse_transpose<T: RealField + Copy, const D: usize>(
             1 => T::one(),
             2 if i == j => F[(1 - i, 1 - j)],
             2 => -F[(1 - i, 1 - j)],
-            // Taking the rows and columns cyclically gives every 3x3 cofactor its sign.
-            _ => {
-                let (a, b) = ((i + 1) % 3, (i + 2) % 3);
-                let (c, d) = ((j + 1) % 3, (j + 2) % 3);
-                F[(a, c)] * F[(b, d)] - F[(a, d)] * F[(b, c)]
-            }
+            _ => cofactor(F, i, j),
         };
         cofactor / J
     })
+}
+
+/// `F^-T - I`, without cancellation at small strain; `det F` must not be zero.
+#[inline]
+pub(crate) fn inverse_transpose_minus_identity<T: RealField + Copy, const D: usize>(
+    F: &SMatrix<T, D, D>,
+) -> SMatrix<T, D, D> {
+    const { assert!(1 <= D && D <= 3, "one, two or three dimensions") };
+    let H = F - SMatrix::identity();
+    let trace = H.trace();
+    let growth = det_minus_one(&H);
+    if growth < real(-0.5) {
+        // Near inversion it is J itself whose digits count.
+        return inverse_transpose(F, determinant(F)) - SMatrix::identity();
+    }
+    let J = growth + T::one();
+    // The cofactors of F = I + H are those of I, which is I itself, and in two dimensions tr(H) I - H^T, to which a third one
+    // adds the cofactors of H.
+    SMatrix::from_fn(|i, j| {
+        let mut change = if D == 1 { T::zero() } else { -H[(j, i)] };
+        if i == j {
+            change += if D == 1 { T::zero() } else { trace } - growth;
+        }
+        if D == 3 {
+            change += cofactor(&H, i, j);
+        }
+        change / J
+    })
+}
+
+/// A cofactor of a 3x3 matrix.
+#[inline(always)]
+fn cofactor<T: RealField + Copy, const D: usize>(F: &SMatrix<T, D, D>, i: usize, j: usize) -> T {
+    // Taking the rows and columns cyclically gives every one its sign.
+    let (a, b) = ((i + 1) % 3, (i + 2) % 3);
+    let (c, d) = ((j + 1) % 3, (j + 2) % 3);
+    F[(a, c)] * F[(b, d)] - F[(a, d)] * F[(b, c)]
 }
 
 /// `A B`; the general product would branch on sizes first.
@@ -102,6 +134,22 @@ mod tests {
         assert!((residual - Matrix2::identity()).norm() < 1e-15);
         let residual = inverse_transpose(&f3, determinant(&f3)).transpose() * f3;
         assert!((residual - Matrix3::identity()).norm() < 1e-15);
+        check_small(&f1);
+        check_small(&f2);
+        check_small(&f3);
         assert!((product(&f3, &f3) - f3 * f3).norm() < 1e-15);
+    }
+
+    fn check_small<const D: usize>(F: &SMatrix<f64, D, D>) {
+        let H = F - SMatrix::identity();
+        let change = inverse_transpose_minus_identity(F);
+        let expected = inverse_transpose(F, determinant(F)) - SMatrix::identity();
+        assert!((change - expected).norm() < 1e-15);
+        // To first order it is -H^T, to second order that plus the square.
+        // Few bits, so that I + H is exact.
+        let tiny = H.map(|h| (h * 64.0).round()) * 2f64.powi(-40);
+        let series = (tiny * tiny - tiny).transpose();
+        let change = inverse_transpose_minus_identity(&(SMatrix::identity() + tiny));
+        assert!((change - series).norm() < 1e-15 * series.norm());
     }
 }

@@ -1,0 +1,28 @@
+//! Linear elasticity.
+
+use nalgebra::{RealField, SMatrix};
+
+use super::{Law, displacement_gradient, plus_diagonal};
+use crate::tensor::product;
+
+/// Linear elasticity, `W = lambda/2 (tr e)^2 + mu e:e` with `e = (H + H^T)/2`.
+#[derive(Clone, Copy)]
+pub(crate) struct LinearElastic<T> {
+    pub(crate) lambda: T,
+    pub(crate) mu: T,
+}
+
+impl<T: RealField + Copy> Law<T> for LinearElastic<T> {
+    fn kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
+        product(&self.first_piola_kirchhoff(F), &F.transpose())
+    }
+
+    fn kirchhoff_across<const D: usize>(&self, F: &SMatrix<T, D, D>) -> T {
+        self.lambda * displacement_gradient(F).trace()
+    }
+
+    fn first_piola_kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
+        let H = displacement_gradient(F);
+        plus_diagonal((H + H.transpose()) * self.mu, self.lambda * H.trace())
+    }
+}

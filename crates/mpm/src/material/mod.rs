@@ -1,0 +1,244 @@
+//! Constitutive laws, written by hand: they share no source with any derivation of exact solutions.
+//!
+//! All are hyperelastic but for [`Material::LinearElastic`], whose stress ignores how the body turns. Stresses are formed
+//! from H = F - I, so that small strains keep their digits.
+
+mod hencky;
+mod linear_elastic;
+mod mooney_rivlin;
+mod neo_hookean;
+mod st_venant_kirchhoff;
+#[cfg(test)]
+mod tests;
+
+use nalgebra::{RealField, SMatrix};
+
+pub(crate) use hencky::Hencky;
+pub(crate) use linear_elastic::LinearElastic;
+pub(crate) use mooney_rivlin::MooneyRivlin;
+pub(crate) use neo_hookean::{NeoHookean, NeoHookeanNoLog};
+pub(crate) use st_venant_kirchhoff::StVenantKirchhoff;
+
+use crate::tensor::{det_minus_one, determinant, product, real};
+
+/// An elastic material.
+///
+/// Every function takes the deformation gradient F and returns `None` where it is not a deformation: J <= 0, or an
+/// entry that is not finite. In 2D the deformation is plane strain (`F_zz = 1`), in 1D uniaxial strain.
+///
+/// Formulas are those of Bonet & Wood, "Nonlinear Continuum Mechanics for Finite Element Analysis", 2nd ed. (2008),
+/// chapter 6, and of Ciarlet, "Mathematical Elasticity" I (1988), chapter 4.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Material<T> {
+    /// Compressible neo-Hookean solid, `tau = lambda ln(J) I + mu (F F^T - I)`.
+    ///
+    /// With `lambda == 0` the simulation uses a law that computes no logarithm.
+    NeoHookean {
+        /// First Lame constant, a stress.
+        lambda: T,
+        /// Shear modulus, a stress.
+        mu: T,
+    },
+    /// St. Venant-Kirchhoff solid, `P = F S`, `S = lambda tr(E) I + 2 mu E`, `E = (F^T F - I)/2`.
+    ///
+    /// It softens without limit in compression; for small and moderate strain.
+    StVenantKirchhoff {
+        /// First Lame constant, a stress.
+        lambda: T,
+        /// Shear modulus, a stress.
+        mu: T,
+    },
+    /// Hencky's solid, `tau = lambda ln(J) I + 2 mu ln(V)`, `V = sqrt(F F^T)`.
+    Hencky {
+        /// First Lame constant, a stress.
+        lambda: T,
+        /// Shear modulus, a stress.
+        mu: T,
+    },
+    /// Compressible Mooney-Rivlin solid,
+    /// `W = c1 (I1 - 3 - 2 ln J) + c2 (I2 - 3 - 4 ln J) + lambda/2 (ln J)^2`, with the invariants of the
+    /// three-dimensional `C = F^T F`.
+    MooneyRivlin {
+        /// Factor of the first invariant, a stress.
+        c1: T,
+        /// Factor of the second invariant, a stress.
+        c2: T,
+        /// Resistance to changes of volume, a stress; the first Lame constant at small strain is `lambda + 4 c2`.
+        lambda: T,
+    },
+    /// Linear elasticity, `P = lambda tr(H) I + mu (H + H^T)`, `H = F - I`: linear in the displacement, whatever its
+    /// size, and not invariant under rotation. Its Kirchhoff stress `P F^T` is symmetric to first order only.
+    LinearElastic {
+        /// First Lame constant, a stress.
+        lambda: T,
+        /// Shear modulus, a stress.
+        mu: T,
+    },
+}
+
+/// Evaluates `$body` with `$law` bound to the law of a material, whichever it is.
+macro_rules! with_law {
+    ($material:expr, |$law:ident| $body:expr) => {
+        match *$material {
+            Material::NeoHookean { lambda, mu } => {
+                let $law = NeoHookean { lambda, mu };
+                $body
+            }
+            Material::StVenantKirchhoff { lambda, mu } => {
+                let $law = StVenantKirchhoff { lambda, mu };
+                $body
+            }
+            Material::Hencky { lambda, mu } => {
+                let $law = Hencky { lambda, mu };
+                $body
+            }
+            Material::MooneyRivlin { c1, c2, lambda } => {
+                let $law = MooneyRivlin { c1, c2, lambda };
+                $body
+            }
+            Material::LinearElastic { lambda, mu } => {
+                let $law = LinearElastic { lambda, mu };
+                $body
+            }
+        }
+    };
+}
+
+impl<T: RealField + Copy> Material<T> {
+    /// Kirchhoff stress `tau = J sigma = P F^T`.
+    pub fn kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> Option<SMatrix<T, D, D>> {
+        jacobian(F)?;
+        Some(with_law!(self, |law| law.kirchhoff(F)))
+    }
+
+    /// First Piola-Kirchhoff stress `P = tau F^-T`: force per reference area, traction `P N`.
+    pub fn first_piola_kirchhoff<const D: usize>(
+        &self,
+        F: &SMatrix<T, D, D>,
+    ) -> Option<SMatrix<T, D, D>> {
+        jacobian(F)?;
+        Some(with_law!(self, |law| law.first_piola_kirchhoff(F)))
+    }
+
+    /// Cauchy (true) stress `sigma = tau / J`.
+    pub fn cauchy<const D: usize>(&self, F: &SMatrix<T, D, D>) -> Option<SMatrix<T, D, D>> {
+        let J = jacobian(F)?;
+        Some(self.kirchhoff(F)? / J)
+    }
+
+    /// Von Mises stress of the symmetric part of the Cauchy stress, with the normal stresses that act out of the plane
+    /// in 2D and across the axis in 1D.
+    pub fn von_mises<const D: usize>(&self, F: &SMatrix<T, D, D>) -> Option<T> {
+        let J = jacobian(F)?;
+        let across = with_law!(self, |law| law.kirchhoff_across(F)) / J;
+        let sigma = self.cauchy(F)?;
+        let normal = |i: usize| if i < D { sigma[(i, i)] } else { across };
+        let mut sum = T::zero();
+        for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+            let difference = normal(i) - normal(j);
+            sum += difference * difference * real(0.5);
+            if i < D && j < D {
+                let shear = (sigma[(i, j)] + sigma[(j, i)]) * real(0.5);
+                sum += shear * shear * real(3.0);
+            }
+        }
+        Some(sum.sqrt())
+    }
+
+    /// The Lame constants `(lambda_0, mu_0)` that the law comes down to at small strain; the speed of P-waves in the
+    /// undeformed solid is `sqrt((lambda_0 + 2 mu_0) / rho0)`.
+    pub fn small_strain_moduli(&self) -> (T, T) {
+        match *self {
+            Self::NeoHookean { lambda, mu }
+            | Self::StVenantKirchhoff { lambda, mu }
+            | Self::Hencky { lambda, mu }
+            | Self::LinearElastic { lambda, mu } => (lambda, mu),
+            Self::MooneyRivlin { c1, c2, lambda } => {
+                (lambda + c2 * real(4.0), (c1 + c2) * real(2.0))
+            }
+        }
+    }
+}
+
+/// J, if F is a deformation.
+fn jacobian<T: RealField + Copy, const D: usize>(F: &SMatrix<T, D, D>) -> Option<T> {
+    let J = determinant(F);
+    (J > T::zero() && J.is_finite() && F.iter().all(|entry| entry.is_finite())).then_some(J)
+}
+
+/// A law, for deformation gradients whose J > 0 has been seen to already.
+pub(crate) trait Law<T: RealField + Copy>: Copy + Send + Sync + 'static {
+    /// Kirchhoff stress.
+    fn kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D>;
+
+    /// The normal Kirchhoff stress along the axes that F leaves out, where the stretch is one.
+    fn kirchhoff_across<const D: usize>(&self, F: &SMatrix<T, D, D>) -> T;
+
+    /// First Piola-Kirchhoff stress.
+    fn first_piola_kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D>;
+}
+
+/// A law that is looked up at every call: one instance of the kernels serves all laws that have none of their own.
+#[derive(Clone, Copy)]
+pub(crate) struct AnyLaw<T>(pub(crate) Material<T>);
+
+impl<T: RealField + Copy> Law<T> for AnyLaw<T> {
+    #[inline(never)]
+    fn kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
+        with_law!(&self.0, |law| law.kirchhoff(F))
+    }
+
+    fn kirchhoff_across<const D: usize>(&self, F: &SMatrix<T, D, D>) -> T {
+        with_law!(&self.0, |law| law.kirchhoff_across(F))
+    }
+
+    fn first_piola_kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
+        with_law!(&self.0, |law| law.first_piola_kirchhoff(F))
+    }
+}
+
+/// `H = F - I`.
+#[inline(always)]
+fn displacement_gradient<T: RealField + Copy, const D: usize>(
+    F: &SMatrix<T, D, D>,
+) -> SMatrix<T, D, D> {
+    F - SMatrix::identity()
+}
+
+/// `ln J`, to full relative accuracy at small strain and near inversion.
+#[inline(always)]
+fn log_jacobian<T: RealField + Copy, const D: usize>(F: &SMatrix<T, D, D>) -> T {
+    let growth = det_minus_one(&displacement_gradient(F));
+    if growth > real(-0.5) { growth.ln_1p() } else { determinant(F).ln() }
+}
+
+/// `F F^T - I`, to full relative accuracy at small strain.
+#[inline(always)]
+fn finger_minus_identity<T: RealField + Copy, const D: usize>(
+    F: &SMatrix<T, D, D>,
+) -> SMatrix<T, D, D> {
+    let H = displacement_gradient(F);
+    let H_T = H.transpose();
+    H + H_T + product(&H, &H_T)
+}
+
+/// `F^T F - I`, twice Green's strain, to full relative accuracy at small strain.
+#[inline(always)]
+fn green_twice<T: RealField + Copy, const D: usize>(F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
+    let H = displacement_gradient(F);
+    let H_T = H.transpose();
+    H + H_T + product(&H_T, &H)
+}
+
+/// Adds a multiple of the identity.
+#[inline(always)]
+fn plus_diagonal<T: RealField + Copy, const D: usize>(
+    mut A: SMatrix<T, D, D>,
+    value: T,
+) -> SMatrix<T, D, D> {
+    for i in 0..D {
+        A[(i, i)] += value;
+    }
+    A
+}

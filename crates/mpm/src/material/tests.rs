@@ -1,0 +1,223 @@
+use super::*;
+use nalgebra::{Matrix1, Matrix2, Matrix3, Rotation3};
+use proptest::prelude::*;
+
+const LAWS: [Material<f64>; 6] = [
+    Material::NeoHookean { lambda: 5.77, mu: 3.85 },
+    Material::NeoHookean { lambda: 0.0, mu: 3.85 },
+    Material::StVenantKirchhoff { lambda: 5.77, mu: 3.85 },
+    Material::Hencky { lambda: 5.77, mu: 3.85 },
+    Material::MooneyRivlin { c1: 1.3, c2: 0.625, lambda: 3.27 },
+    Material::LinearElastic { lambda: 5.77, mu: 3.85 },
+];
+
+/// The deformation in space, with unit stretch along the axes that are left out.
+fn in_space<const D: usize>(F: &SMatrix<f64, D, D>) -> Matrix3<f64> {
+    Matrix3::from_fn(|i, j| if i < D && j < D { F[(i, j)] } else { f64::from(u8::from(i == j)) })
+}
+
+/// Strain energy per reference volume as textbooks print it, from which P follows by differentiation.
+fn energy<const D: usize>(law: &Material<f64>, F: &SMatrix<f64, D, D>) -> f64 {
+    let F = in_space(F);
+    let C = F.transpose() * F;
+    let log_J = F.determinant().ln();
+    let (I1, I2) = (C.trace(), 0.5 * (C.trace().powi(2) - (C * C).trace()));
+    let quadratic = |lambda: f64, mu: f64, strain: Matrix3<f64>| {
+        0.5 * lambda * strain.trace().powi(2) + mu * strain.norm_squared()
+    };
+    match *law {
+        Material::NeoHookean { lambda, mu } => {
+            0.5 * lambda * log_J * log_J + 0.5 * mu * (I1 - 3.0 - 2.0 * log_J)
+        }
+        Material::StVenantKirchhoff { lambda, mu } => {
+            quadratic(lambda, mu, (C - Matrix3::identity()) * 0.5)
+        }
+        Material::Hencky { lambda, mu } => {
+            let stretches = F.singular_values();
+            quadratic(lambda, mu, Matrix3::from_diagonal(&stretches.map(f64::ln)))
+        }
+        Material::MooneyRivlin { c1, c2, lambda } => {
+            c1 * (I1 - 3.0 - 2.0 * log_J)
+                + c2 * (I2 - 3.0 - 4.0 * log_J)
+                + 0.5 * lambda * log_J * log_J
+        }
+        Material::LinearElastic { lambda, mu } => {
+            let H = F - Matrix3::identity();
+            quadratic(lambda, mu, (H + H.transpose()) * 0.5)
+        }
+    }
+}
+
+fn check_against_energy<const D: usize>(law: &Material<f64>, F: &SMatrix<f64, D, D>) {
+    let P = law.first_piola_kirchhoff(F).unwrap();
+    let step = 1e-5;
+    for i in 0..D {
+        for j in 0..D {
+            let (mut plus, mut minus) = (*F, *F);
+            plus[(i, j)] += step;
+            minus[(i, j)] -= step;
+            let slope = (energy(law, &plus) - energy(law, &minus)) / (2.0 * step);
+            assert!((P[(i, j)] - slope).abs() < 1e-7 * (1.0 + P.norm()), "{law:?} {P} {slope}");
+        }
+    }
+    let tau = law.kirchhoff(F).unwrap();
+    assert!((P * F.transpose() - tau).norm() < 1e-12 * (1.0 + tau.norm()), "{law:?} {F}");
+    let sigma = law.cauchy(F).unwrap();
+    assert!((sigma * determinant(F) - tau).norm() < 1e-13 * (1.0 + tau.norm()));
+}
+
+fn deformation() -> impl Strategy<Value = Matrix3<f64>> {
+    proptest::array::uniform9(-0.25..0.25_f64)
+        .prop_map(|H| Matrix3::identity() + Matrix3::from_row_slice(&H))
+}
+
+proptest! {
+    #[test]
+    fn stress_is_the_derivative_of_the_energy(F in deformation()) {
+        prop_assume!(F.determinant() > 0.2);
+        let F2 = F.fixed_view::<2, 2>(0, 0).into_owned();
+        prop_assume!(F2.determinant() > 0.2);
+        for law in &LAWS {
+            check_against_energy(law, &F);
+            check_against_energy(law, &F2);
+            check_against_energy(law, &Matrix1::new(F[(0, 0)]));
+        }
+    }
+
+    #[test]
+    fn a_rotation_rotates_tau(F in deformation(), axis in proptest::array::uniform3(-3.0..3.0_f64)) {
+        prop_assume!(F.determinant() > 0.2);
+        let Q = Rotation3::new(axis.into()).into_inner();
+        let turned = |law: &Material<f64>| {
+            let expected = Q * law.kirchhoff(&F).unwrap() * Q.transpose();
+            let tau = law.kirchhoff(&(Q * F)).unwrap();
+            (tau - expected).norm() / (1.0 + expected.norm())
+        };
+        for law in &LAWS[..5] {
+            prop_assert!(turned(law) < 1e-12, "{law:?}");
+            let von_mises = law.von_mises(&F).unwrap();
+            prop_assert!((law.von_mises(&(Q * F)).unwrap() - von_mises).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn the_law_for_any_material_and_the_one_of_its_own_agree(F in deformation()) {
+        prop_assume!(F.determinant() > 0.2);
+        let general = NeoHookean { lambda: 0.0, mu: 3.85 }.kirchhoff(&F);
+        let special = NeoHookeanNoLog { mu: 3.85 };
+        prop_assert_eq!(general, special.kirchhoff(&F));
+        prop_assert_eq!(Some(special.first_piola_kirchhoff(&F)), LAWS[1].first_piola_kirchhoff(&F));
+        for law in LAWS {
+            prop_assert_eq!(Some(AnyLaw(law).kirchhoff(&F)), law.kirchhoff(&F));
+        }
+    }
+
+    #[test]
+    fn plane_strain_is_the_3d_law_with_unit_stretch_across(F in deformation()) {
+        let F2 = F.fixed_view::<2, 2>(0, 0).into_owned();
+        let F1 = Matrix1::new(F[(0, 0)]);
+        prop_assume!(F2.determinant() > 0.2);
+        for law in &LAWS {
+            check_in_space(law, &F2);
+            check_in_space(law, &F1);
+        }
+    }
+}
+
+fn check_in_space<const D: usize>(law: &Material<f64>, F: &SMatrix<f64, D, D>) {
+    let (tau, in_3d) = (law.kirchhoff(F).unwrap(), law.kirchhoff(&in_space(F)).unwrap());
+    assert!((tau - in_3d.fixed_view::<D, D>(0, 0)).norm() < 1e-13, "{law:?} {tau} {in_3d}");
+    let (P, in_3d) =
+        (law.first_piola_kirchhoff(F).unwrap(), law.first_piola_kirchhoff(&in_space(F)).unwrap());
+    assert!((P - in_3d.fixed_view::<D, D>(0, 0)).norm() < 1e-13, "{law:?} {P} {in_3d}");
+    let (m, in_3d) = (law.von_mises(F).unwrap(), law.von_mises(&in_space(F)).unwrap());
+    assert!((m - in_3d).abs() < 1e-12, "{law:?} {m} {in_3d}");
+}
+
+/// Linear elasticity's stress for the moduli of a law at small strain.
+fn small_strain_stress<const D: usize>(
+    law: &Material<f64>,
+    H: &SMatrix<f64, D, D>,
+) -> SMatrix<f64, D, D> {
+    let (lambda, mu) = law.small_strain_moduli();
+    plus_diagonal((H + H.transpose()) * mu, lambda * H.trace())
+}
+
+#[test]
+fn at_small_strain_every_law_is_linear_elasticity_to_all_digits() {
+    // Powers of two, so that F = I + H is exact.
+    let bits = [[3.0, 1.0, -2.0], [-1.0, -2.0, 0.5], [1.5, 0.25, 1.0]];
+    let H3 = Matrix3::from_fn(|i, j| bits[i][j] * 2f64.powi(-45));
+    let H2 = H3.fixed_view::<2, 2>(0, 0).into_owned();
+    let H1 = Matrix1::new(H3[(0, 0)]);
+    fn check<const D: usize>(law: &Material<f64>, H: &SMatrix<f64, D, D>) {
+        let F = SMatrix::identity() + H;
+        let expected = small_strain_stress(law, H);
+        for stress in [law.kirchhoff(&F), law.first_piola_kirchhoff(&F), law.cauchy(&F)] {
+            let error = (stress.unwrap() - expected).norm() / expected.norm();
+            assert!(error < 1e-12, "{law:?} {error:e}");
+        }
+    }
+    for law in &LAWS {
+        check(law, &H1);
+        check(law, &H2);
+        check(law, &H3);
+    }
+    assert_eq!(LAWS[0].small_strain_moduli(), (5.77, 3.85));
+    let (lambda, mu) = LAWS[4].small_strain_moduli();
+    assert!((lambda - 5.77).abs() < 1e-15 && (mu - 3.85).abs() < 1e-15);
+}
+
+#[test]
+fn hencky_stress_is_linear_in_the_logarithm_of_very_flat_and_long_stretches() {
+    let (lambda, mu) = (5.77, 3.85);
+    let law = Material::Hencky { lambda, mu };
+    let turn = Rotation3::new([0.3, -0.8, 1.1].into()).into_inner();
+    for stretches in [[1e-6, 1.0, 2.0], [1e-3, 1e-3, 1e3], [1.0, 1.0, 1.0], [0.25, 0.25, 4.0]] {
+        let F = turn * Matrix3::from_diagonal(&stretches.into());
+        let logarithms: nalgebra::Vector3<f64> = stretches.map(f64::ln).into();
+        let principal = logarithms * (2.0 * mu);
+        let volume = lambda * logarithms.sum();
+        let expected =
+            turn * Matrix3::from_diagonal(&principal.add_scalar(volume)) * turn.transpose();
+        let tau = law.kirchhoff(&F).unwrap();
+        let error = (tau - expected).norm();
+        assert!(error < 1e-9 * (1.0 + expected.norm()), "{stretches:?}: {error:e}");
+        let plane = Matrix2::new(0.0, -stretches[1], stretches[0], 0.0);
+        let tau = law.kirchhoff(&plane).unwrap();
+        let volume = lambda * (logarithms[0] + logarithms[1]);
+        assert!((tau[(0, 0)] - principal[1] - volume).abs() < 1e-12 * (1.0 + tau.norm()));
+        assert!((tau[(1, 1)] - principal[0] - volume).abs() < 1e-12 * (1.0 + tau.norm()));
+        assert!(tau[(0, 1)].abs() < 1e-12);
+    }
+}
+
+#[test]
+fn linear_elasticity_takes_a_turn_for_a_strain() {
+    let law = LAWS[5];
+    let quarter = Matrix2::new(0.0, -1.0, 1.0, 0.0);
+    // H = R - I has H + H^T = -2 I in a quarter turn.
+    let P = law.first_piola_kirchhoff(&quarter).unwrap();
+    assert_eq!(P, Matrix2::identity() * (-2.0 * (5.77 + 3.85)));
+    // tau = P F^T need not be symmetric, and the von Mises stress is that of its symmetric part.
+    let tau = law.kirchhoff(&Matrix2::new(1.0, 0.5, 0.0, 1.25)).unwrap();
+    assert!((tau[(0, 1)] - tau[(1, 0)]).abs() > 0.1);
+}
+
+#[test]
+fn what_is_no_deformation_has_no_stress() {
+    for F in [
+        Matrix2::new(1.0, 2.0, 1.0, 1.0),
+        Matrix2::zeros(),
+        Matrix2::new(f64::NAN, 0.0, 0.0, 1.0),
+        Matrix2::new(f64::INFINITY, 0.0, 0.0, 1.0),
+        Matrix2::new(1.0, f64::NAN, 0.0, 1.0),
+    ] {
+        for law in &LAWS {
+            assert_eq!(law.kirchhoff(&F), None);
+            assert_eq!(law.first_piola_kirchhoff(&F), None);
+            assert_eq!(law.cauchy(&F), None);
+            assert_eq!(law.von_mises(&F), None);
+        }
+    }
+}
