@@ -10,5 +10,8 @@
 
 mod function;
 mod module;
+mod plan;
+mod text;
 
 pub use module::{Names, items, module_source, registry_source};
+pub use plan::Plan;

@@ -80,6 +80,7 @@ struct Interpreted<const D: usize> {
     jacobian: Program,
     first_piola_kirchhoff: Program,
     body_force: Program,
+    strain_energy: Option<Program>,
     domain: Domain<f64, D>,
     boundaries: Vec<Boundary>,
     cell_length: f64,
@@ -94,7 +95,7 @@ impl<const D: usize> Interpreted<D> {
         let mut fields = spec.derive()?;
         let (u, v, a, b) = (fields.u.clone(), fields.v.clone(), fields.a.clone(), fields.b.clone());
         let (H, F, P) = (fields.H.concat(), fields.F.concat(), fields.P.concat());
-        let J = [fields.J];
+        let (J, W) = ([fields.J], fields.W);
 
         let mut constants = spec.constants();
         for requirement in &spec.requirements {
@@ -136,6 +137,7 @@ impl<const D: usize> Interpreted<D> {
             jacobian: program(&J),
             first_piola_kirchhoff: program(&P),
             body_force: program(&b),
+            strain_energy: W.map(|W| program(&[W])),
             domain,
             boundaries: spec.boundaries.iter().map(boundary).collect(),
             cell_length: constants[0],
@@ -222,6 +224,11 @@ impl<const D: usize> Solution<f64, D> for Interpreted<D> {
             P: self.first_piola_kirchhoff(X, t),
             b: self.body_force(X, t),
         }
+    }
+
+    fn strain_energy(&self, X: &SVector<f64, D>, t: f64) -> Option<f64> {
+        let energy = self.strain_energy.as_ref()?;
+        energy.evaluate(&inputs(X, t, &self.parameters)).first().copied()
     }
 
     fn domain(&self) -> Domain<f64, D> {

@@ -97,6 +97,10 @@ pub trait Solution<T: Real, const D: usize>: Send + Sync {
     fn body_force_at(&self, X: &[SVector<T, D>]) -> Box<dyn BodyForceAtPoints<T, D> + '_> {
         Box::new(PlainPoints { solution: self, X: X.to_vec() })
     }
+    /// Strain energy per reference volume; `None` unless the specification gives the material by its energy.
+    fn strain_energy(&self, _X: &SVector<T, D>, _t: T) -> Option<T> {
+        None
+    }
     /// All fields at once.
     fn fields(&self, X: &SVector<T, D>, t: T) -> Fields<T, D>;
 

@@ -43,6 +43,8 @@ pub struct Fields {
     pub P: Matrix,
     /// Body force per unit mass.
     pub b: Vector,
+    /// Strain energy per reference volume, where the material is given by one.
+    pub W: Option<Expr>,
 }
 
 /// Why fields could not be derived.
@@ -96,6 +98,7 @@ impl Fields {
         let b = vector(&mut graph, &b);
         let H = turn_matrix(&mut graph, &geometry, &H);
         let P = turn_matrix(&mut graph, &geometry, &stress.P);
+        let W = stress.energy.map(|W| graph.replace(W, &geometry.shorter));
         let J = graph.replace(deformation.J, &geometry.shorter);
         let mut F = H.clone();
         for i in 0..n {
@@ -110,7 +113,7 @@ impl Fields {
             inputs.push((graph.symbol(&parameter.name), rate(false, false)));
         }
         let fields =
-            Fields { graph, inputs, definitions: geometry.definitions, u, v, a, H, F, J, P, b };
+            Fields { graph, inputs, definitions: geometry.definitions, u, v, a, H, F, J, P, b, W };
         fields.check()?;
         Ok(fields)
     }

@@ -32,6 +32,8 @@ pub(crate) struct Stress {
     pub(crate) linear: Vector,
     /// The divergence of the rest, small where `H` is small.
     pub(crate) remainder: Vector,
+    /// The strain energy, where the material is given by one.
+    pub(crate) energy: Option<Expr>,
 }
 
 impl Deformation {
@@ -122,7 +124,7 @@ fn linear_elastic(
             P[i][j] = zero_if_vanishing(graph, entry);
         }
     }
-    Stress { P, linear, remainder }
+    Stress { P, linear, remainder, energy: None }
 }
 
 /// The divergence of `lambda tr(H) I + mu (H + H^T)`, with the constants as they are written.

@@ -349,10 +349,18 @@ impl<T: Real, const D: usize> BodyForce<T, D> for ExactBodyForce<'_, T, D> {
 
 /// The solver's hand-written law with the constants of the solution's material.
 pub(crate) fn law<T: Real>(material: Material<T>) -> Result<mmsmith_mpm::Material<T>, SceneError> {
-    match material {
-        Material::NeoHookean { lambda, mu } => Ok(mmsmith_mpm::Material::NeoHookean { lambda, mu }),
-        other => Err(SceneError::Unknown { what: "material", value: format!("{other:?}") }),
-    }
+    use mmsmith_mpm::Material as Law;
+    Ok(match material {
+        Material::NeoHookean { lambda, mu } => Law::NeoHookean { lambda, mu },
+        Material::StVenantKirchhoff { lambda, mu } => Law::StVenantKirchhoff { lambda, mu },
+        Material::Hencky { lambda, mu } => Law::Hencky { lambda, mu },
+        Material::LinearElastic { lambda, mu } => Law::LinearElastic { lambda, mu },
+        Material::MooneyRivlin { c1, c2, lambda } => Law::MooneyRivlin { c1, c2, lambda },
+        Material::Custom => return Err(SceneError::NoLaw),
+        other => {
+            return Err(SceneError::Unknown { what: "material", value: format!("{other:?}") });
+        }
+    })
 }
 
 /// Gives particles at rest the exact state at time zero, with the velocity that the integrator starts from.

@@ -119,12 +119,15 @@ fn check_in<const D: usize>(
         return Err(CheckError::NoPoints);
     }
     let domain = solution.domain();
-    let law = law(solution.material())?;
+    let law = match law(solution.material()) {
+        Err(SceneError::NoLaw) => None,
+        known => Some(known?),
+    };
     let size = points::size(&domain)
         .ok_or_else(|| SceneError::Unknown { what: "shape", value: format!("{domain:?}") })?;
     let samples: Vec<_> =
         (0..count).filter_map(|n| points::interior(&domain, solution.period(), n)).collect();
-    let mut findings = field_findings(solution, &law, &samples, size);
+    let mut findings = field_findings(solution, law.as_ref(), &samples, size);
     for boundary in solution.boundaries() {
         let places: Vec<_> = (0..count)
             .map_while(|n| {
@@ -220,19 +223,25 @@ fn with<const D: usize>(X: &SVector<f64, D>, axis: usize, value: f64) -> SVector
 
 fn field_findings<const D: usize>(
     solution: &dyn Solution<f64, D>,
-    law: &Material<f64>,
+    law: Option<&Material<f64>>,
     samples: &[(SVector<f64, D>, f64)],
     size: f64,
 ) -> Vec<Finding> {
-    let Material::NeoHookean { lambda, mu } = *law else { return Vec::new() };
-    let stiffness = lambda.abs() + 2.0 * mu.abs();
     let (domain, period, density) = (solution.domain(), solution.period(), solution.density());
+    let stiffness = match law {
+        Some(law) => {
+            let (lambda, mu) = law.small_strain_moduli();
+            lambda.abs() + 2.0 * mu.abs()
+        }
+        None => density * solution.wave_speed().powi(2),
+    };
     let mut v = Comparison::new("v", "du/dt");
     let mut a = Comparison::new("a", "dv/dt");
     let mut H = Comparison::new("H", "du/dX");
     let mut F = Comparison::new("F", "I + du/dX");
     let mut J = Comparison::new("J", "det F");
     let mut P = Comparison::new("P", "solver's law of F");
+    let mut power = Comparison::new("P : dF", "dW");
     let mut b = Comparison::new("b", "a - Div P / rho0");
     let mut together = Comparison::new("all at once", "each on its own");
     for (X, t) in samples {
@@ -260,9 +269,26 @@ fn field_findings<const D: usize>(
         // F^-1 is bounded by its cofactors; the law forms F - F^-T from a rounded F.
         let inverse = own.F.norm().powi(D as i32 - 1) / own.J.abs();
         let rounding = f64::EPSILON * stiffness * (own.F.norm() + inverse) * inverse.max(1.0);
-        let expected = law.first_piola_kirchhoff(&own.F);
-        let difference = expected.map_or(f64::NAN, |expected| (own.P - expected).amax());
-        P.add(at, difference, rounding, own.P.amax().max(stiffness * own.H.amax()));
+        let strain = own.P.amax().max(stiffness * own.H.amax());
+        if let Some(law) = law {
+            let expected = law.first_piola_kirchhoff(&own.F);
+            let difference = expected.map_or(f64::NAN, |expected| (own.P - expected).amax());
+            P.add(at, difference, rounding, strain);
+        }
+        // Where the energy is known: P does the work that it stores, along each coordinate.
+        for axis in 0..if solution.strain_energy(X, *t).is_some() { D } else { 0 } {
+            let along = |s| {
+                let X = with(X, axis, s);
+                let energy = solution.strain_energy(&X, *t).unwrap_or(f64::NAN);
+                (solution.deformation_gradient(&X, *t), energy)
+            };
+            let dF = derivative(|s| along(s).0, X[axis], reach(axis));
+            let dW = derivative(|s| SVector::<f64, 1>::new(along(s).1), X[axis], reach(axis));
+            let work = own.P.dot(&dF.value);
+            let error = dW.error + own.P.norm() * dF.error;
+            let scale = strain * dF.value.norm();
+            power.add(at, (work - dW.value[0]).abs(), error + rounding * dF.value.norm(), scale);
+        }
 
         let (mut divergence, mut error) = (SVector::<f64, D>::zeros(), 0.0);
         let mut terms = own.b.amax().max(own.a.amax());
@@ -283,7 +309,11 @@ fn field_findings<const D: usize>(
         let all = solution.fields(X, *t);
         together.add(at, disagreement(&all, &own, stiffness, terms), 0.0, 1.0);
     }
-    [v, a, H, F, J, P, b, together].into_iter().map(Comparison::finding).collect()
+    [v, a, H, F, J, P, power, b, together]
+        .into_iter()
+        .filter(|comparison| !comparison.points.is_empty())
+        .map(Comparison::finding)
+        .collect()
 }
 
 /// The fields from the functions that give one each.

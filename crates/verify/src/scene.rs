@@ -63,6 +63,12 @@ pub enum SceneError {
         /// Its debug form.
         value: String,
     },
+    /// A material that the solver has no law of its own for.
+    #[error(
+        "only the specification states this material; the solver's laws are written by hand, and it has none to run it \
+         with (mms check and mms eval serve it all the same)"
+    )]
+    NoLaw,
     /// An extent was asked for that the body does not have.
     #[error("{0}")]
     Extent(&'static str),

@@ -28,6 +28,8 @@ pub(super) struct ComponentLaw {
     P: Matrix,
     /// Whether `P` is an isotropic function, so that the chain rule holds for whole tensors in any coordinates.
     isotropic: bool,
+    /// The energy, where the specification states one.
+    energy: Option<Expr>,
     /// Quantities of `h` that the deformation has in a form of its own.
     known: BTreeMap<Expr, Expr>,
 }
@@ -63,7 +65,7 @@ impl ComponentLaw {
                     .iter()
                     .map(|row| row.iter().map(|&p| graph.replace(p, &replacement)).collect())
                     .collect();
-                return Ok(ComponentLaw { h, P, isotropic: false, known });
+                return Ok(ComponentLaw { h, P, isotropic: false, energy: None, known });
             }
             Material::NeoHookean { .. } | Material::LinearElastic { .. } => {
                 return Err(DeriveError::NoClosedForm("this law is not derived from an energy"));
@@ -76,7 +78,8 @@ impl ComponentLaw {
             .iter()
             .map(|row| row.iter().map(|&h| derivatives.of(graph, energy, h)).collect())
             .collect();
-        Ok(ComponentLaw { h, P, isotropic, known })
+        let stated = matches!(material, Material::Energy { .. }).then_some(energy);
+        Ok(ComponentLaw { h, P, isotropic, energy: stated, known })
     }
 
     pub(super) fn stress(&self, derivation: &mut Derivation, deformation: &Deformation) -> Stress {
@@ -123,7 +126,8 @@ impl ComponentLaw {
             linear.push(derivation.graph.sum_of(first));
             remainder.push(derivation.graph.sum_of(second));
         }
-        Stress { P, linear, remainder }
+        let energy = self.energy.map(|energy| derivation.graph.replace(energy, &actual));
+        Stress { P, linear, remainder, energy }
     }
 }
 

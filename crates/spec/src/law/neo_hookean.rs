@@ -24,7 +24,7 @@ pub(super) fn stress(
     let law = NeoHookean { deformation, lambda, mu };
     let P = law.first_piola_kirchhoff(graph);
     let remainder = law.remainder_divergence(derivation);
-    Stress { P, linear, remainder }
+    Stress { P, linear, remainder, energy: None }
 }
 
 struct NeoHookean<'a> {

@@ -1,0 +1,352 @@
+//! What is computed when, before any language comes in.
+//!
+//! A plan sorts the operations of a solution's fields into stages: once for given parameters, once a time, once a
+//! point, and for each point at each time. It alone decides which values are kept between the stages and in which
+//! order; the Rust module and the C header are two renderings of the same plan, so that their results agree.
+
+use mmsmith_expr::{Dependence, Expr, Operation, Program, Rational, Slot, arrange};
+use mmsmith_spec::{DeriveError, Domain, Fields, Spec};
+use std::collections::BTreeMap;
+
+/// A solution whose fields are derived and staged, ready to be written down in Rust or in C.
+pub struct Plan<'a> {
+    pub(crate) spec: &'a Spec,
+    program: Program,
+    pub(crate) fields: Vec<Field>,
+    pub(crate) constants: Constants,
+    /// The strain energy, where the material is given by one.
+    pub(crate) energy: Option<Slot>,
+    /// The two sides of each requirement.
+    requirements: Vec<(Slot, Slot)>,
+    /// The displacement and the law, a line each, for people.
+    pub(crate) formulas: Vec<String>,
+    fixed: Vec<Slot>,
+    time: Vec<Slot>,
+    point: Vec<Slot>,
+}
+
+/// A field of the solution.
+pub(crate) struct Field {
+    /// Its name in words.
+    pub(crate) name: &'static str,
+    /// The letter that the literature uses.
+    pub(crate) letter: &'static str,
+    pub(crate) shape: Shape,
+    pub(crate) outputs: Vec<Slot>,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Shape {
+    Scalar,
+    Vector,
+    Matrix,
+}
+
+/// The scalars that depend on parameters only.
+pub(crate) struct Constants {
+    pub(crate) cell_length: Slot,
+    pub(crate) density: Slot,
+    pub(crate) wave_speed: Slot,
+    pub(crate) period: Slot,
+    /// Those of the law, by name.
+    pub(crate) material: Vec<(&'static str, Slot)>,
+    pub(crate) domain: Measures,
+}
+
+/// The measures of the body.
+pub(crate) enum Measures {
+    Box { lower: Vec<Slot>, upper: Vec<Slot> },
+    Annulus { inner: Slot, outer: Slot },
+}
+
+/// When a kept value is computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Stage {
+    /// Once for given parameters.
+    Fixed,
+    /// Once a time.
+    Time,
+    /// Once a point.
+    Point,
+}
+
+/// Where an operation finds a value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Operand<'a> {
+    /// Computed in the same block, by the operation of this index.
+    Temporary(usize),
+    Number(&'a Rational),
+    Pi,
+    /// Coordinate number `i`.
+    Coordinate(usize),
+    /// The time.
+    Time,
+    /// Parameter number `i`.
+    Parameter(usize),
+    /// Kept by an earlier stage, as its value number `i`.
+    Kept(Stage, usize),
+}
+
+/// Straight-line code: the operations that some outputs need, in order, given what earlier stages keep.
+pub(crate) struct Block<'a> {
+    program: &'a Program,
+    dimension: usize,
+    kept: BTreeMap<Slot, (Stage, usize)>,
+    steps: Vec<Slot>,
+    outputs: Vec<Slot>,
+}
+
+impl<'a> Plan<'a> {
+    /// Derives the fields of a specification and sorts their operations.
+    ///
+    /// # Errors
+    ///
+    /// [`DeriveError`] where a field is nowhere defined.
+    pub fn new(spec: &'a Spec) -> Result<Self, DeriveError> {
+        let mut fields = spec.derive()?;
+        let formulas = formulas(spec, &fields);
+        // Solvers sample the body force at the same points in every step; the other fields are for checks.
+        let b = arrange(&mut fields.graph, &fields.inputs, &fields.definitions, &fields.b);
+        let matrix = |A: &Vec<Vec<Expr>>| A.concat();
+        let parts = [
+            ("displacement", "u", Shape::Vector, fields.u.clone()),
+            ("velocity", "v", Shape::Vector, fields.v.clone()),
+            ("acceleration", "a", Shape::Vector, fields.a.clone()),
+            ("displacement_gradient", "H", Shape::Matrix, matrix(&fields.H)),
+            ("deformation_gradient", "F", Shape::Matrix, matrix(&fields.F)),
+            ("jacobian", "J", Shape::Scalar, vec![fields.J]),
+            ("first_piola_kirchhoff", "P", Shape::Matrix, matrix(&fields.P)),
+            ("body_force", "b", Shape::Vector, b),
+        ];
+        let constants = spec.constants();
+        let mut outputs: Vec<Expr> = parts.iter().flat_map(|(.., part)| part.clone()).collect();
+        outputs.extend(&constants);
+        let energy = fields.W;
+        outputs.extend(energy);
+        outputs.extend(spec.requirements.iter().flat_map(|r| [r.left, r.right]));
+        let program = fields.program(&outputs);
+
+        let mut slots = program.outputs().iter().copied();
+        let mut take = |n: usize| slots.by_ref().take(n).collect::<Vec<Slot>>();
+        let fields: Vec<Field> = parts
+            .into_iter()
+            .map(|(name, letter, shape, part)| Field {
+                name,
+                letter,
+                shape,
+                outputs: take(part.len()),
+            })
+            .collect();
+        let constants = Constants::new(spec, &take(constants.len()));
+        let energy = energy.and_then(|_| take(1).first().copied());
+        let requirements =
+            spec.requirements.iter().map(|_| take(2)).map(|sides| (sides[0], sides[1])).collect();
+
+        let fixed = fixed_slots(&program);
+        let kept = numbered(Stage::Fixed, &fixed).collect();
+        let b: Vec<Slot> = body_force(&fields).to_vec();
+        let (time, point) = staged_slots(&program, &kept, &b);
+        Ok(Plan {
+            spec,
+            program,
+            fields,
+            constants,
+            energy,
+            requirements,
+            formulas,
+            fixed,
+            time,
+            point,
+        })
+    }
+
+    /// How many values a stage keeps.
+    pub(crate) fn count(&self, stage: Stage) -> usize {
+        self.slots(stage).len()
+    }
+
+    fn slots(&self, stage: Stage) -> &[Slot] {
+        match stage {
+            Stage::Fixed => &self.fixed,
+            Stage::Time => &self.time,
+            Stage::Point => &self.point,
+        }
+    }
+
+    /// The values that `stage` keeps. Those of the parameters come after the two sides of each requirement.
+    pub(crate) fn stage(&self, stage: Stage) -> Block<'_> {
+        match stage {
+            Stage::Fixed => {
+                let sides = self.requirements.iter().flat_map(|&(left, right)| [left, right]);
+                self.block(&[], sides.chain(self.fixed.iter().copied()).collect())
+            }
+            Stage::Time | Stage::Point => self.after_parameters(self.slots(stage)),
+        }
+    }
+
+    /// The body force from what all stages keep.
+    pub(crate) fn body_force_staged(&self) -> Block<'_> {
+        let stages = [Stage::Fixed, Stage::Time, Stage::Point];
+        self.block(&stages, body_force(&self.fields).to_vec())
+    }
+
+    /// `outputs` from the coordinates, the time, and what the stage of the parameters keeps.
+    pub(crate) fn after_parameters(&self, outputs: &[Slot]) -> Block<'_> {
+        self.block(&[Stage::Fixed], outputs.to_vec())
+    }
+
+    /// All fields, in their order.
+    pub(crate) fn all_fields(&self) -> Block<'_> {
+        let outputs: Vec<Slot> = self.fields.iter().flat_map(|f| f.outputs.clone()).collect();
+        self.after_parameters(&outputs)
+    }
+
+    fn block(&self, stages: &[Stage], outputs: Vec<Slot>) -> Block<'_> {
+        let kept: BTreeMap<_, _> =
+            stages.iter().flat_map(|&stage| numbered(stage, self.slots(stage))).collect();
+        let needed = needed(&self.program, &kept, &outputs);
+        let steps = self
+            .program
+            .slots()
+            .filter(|slot| needed[slot.index()])
+            .filter(|slot| is_computed(&self.program, *slot))
+            .collect();
+        Block { program: &self.program, dimension: self.spec.dimension, kept, steps, outputs }
+    }
+}
+
+impl Constants {
+    /// From the slots of [`Spec::constants`].
+    fn new(spec: &Spec, slots: &[Slot]) -> Self {
+        let names = spec.material.constants();
+        let (material, measures) = slots[4..].split_at(names.len());
+        let material =
+            names.iter().zip(material).map(|(&(name, _), &slot)| (name, slot)).collect();
+        let domain = match &spec.domain {
+            Domain::Box { lower, .. } => {
+                let (lower, upper) = measures.split_at(lower.len());
+                Measures::Box { lower: lower.to_vec(), upper: upper.to_vec() }
+            }
+            Domain::Annulus { .. } => Measures::Annulus { inner: measures[0], outer: measures[1] },
+        };
+        Constants {
+            cell_length: slots[0],
+            density: slots[1],
+            wave_speed: slots[2],
+            period: slots[3],
+            material,
+            domain,
+        }
+    }
+}
+
+impl<'a> Block<'a> {
+    /// The operations, with the index that names the result of each.
+    pub(crate) fn steps(&self) -> impl Iterator<Item = (usize, &'a Operation)> {
+        self.steps.iter().map(|slot| (slot.index(), &self.program.operations()[slot.index()]))
+    }
+
+    pub(crate) fn outputs(&self) -> impl Iterator<Item = Operand<'a>> {
+        self.outputs.iter().map(|slot| self.operand(*slot))
+    }
+
+    pub(crate) fn operand(&self, slot: Slot) -> Operand<'a> {
+        if let Some(&(stage, index)) = self.kept.get(&slot) {
+            return Operand::Kept(stage, index);
+        }
+        match &self.program.operations()[slot.index()] {
+            Operation::Number(value) => Operand::Number(value),
+            Operation::Pi => Operand::Pi,
+            // The inputs are the coordinates, the time and the parameters, in this order.
+            Operation::Input(index) if *index < self.dimension => Operand::Coordinate(*index),
+            Operation::Input(index) if *index == self.dimension => Operand::Time,
+            Operation::Input(index) => Operand::Parameter(index - self.dimension - 1),
+            _ => Operand::Temporary(slot.index()),
+        }
+    }
+
+    /// Whether any operation or output reads such an operand.
+    pub(crate) fn reads(&self, such: impl Fn(Operand<'a>) -> bool) -> bool {
+        self.steps().flat_map(|(_, step)| step.operands()).any(|slot| such(self.operand(slot)))
+            || self.outputs().any(such)
+    }
+}
+
+fn body_force(fields: &[Field]) -> &[Slot] {
+    fields.iter().find(|field| field.letter == "b").map_or(&[], |field| &field.outputs)
+}
+
+fn numbered(stage: Stage, slots: &[Slot]) -> impl Iterator<Item = (Slot, (Stage, usize))> {
+    slots.iter().enumerate().map(move |(index, &slot)| (slot, (stage, index)))
+}
+
+/// Whether the value in `slot` takes an operation.
+fn is_computed(program: &Program, slot: Slot) -> bool {
+    let operation = &program.operations()[slot.index()];
+    !matches!(operation, Operation::Number(_) | Operation::Pi | Operation::Input(_))
+}
+
+/// The values of the parameters that are worth keeping: they cost something, and are read by an operation that depends
+/// on more, or are results themselves.
+fn fixed_slots(program: &Program) -> Vec<Slot> {
+    let read_later = program
+        .slots()
+        .filter(|&slot| !program.dependence(slot).is_fixed())
+        .flat_map(|slot| program.operations()[slot.index()].operands());
+    let mut slots: Vec<Slot> = read_later
+        .chain(program.outputs().iter().copied())
+        .filter(|&slot| program.dependence(slot).is_fixed() && is_computed(program, slot))
+        .collect();
+    slots.sort_unstable();
+    slots.dedup();
+    slots
+}
+
+/// What `outputs` need of the time alone and of the position alone: the values that are read where both come together,
+/// or are results.
+fn staged_slots(
+    program: &Program,
+    kept: &BTreeMap<Slot, (Stage, usize)>,
+    outputs: &[Slot],
+) -> (Vec<Slot>, Vec<Slot>) {
+    let needed = needed(program, kept, outputs);
+    let both = |slot: &Slot| {
+        let Dependence { position, time } = program.dependence(*slot);
+        position && time
+    };
+    let mut slots: Vec<Slot> = program
+        .slots()
+        .filter(|slot| needed[slot.index()] && both(slot))
+        .flat_map(|slot| program.operations()[slot.index()].operands())
+        .chain(outputs.iter().copied())
+        .filter(|slot| !both(slot) && !program.dependence(*slot).is_fixed())
+        .collect();
+    slots.sort_unstable();
+    slots.dedup();
+    slots.into_iter().partition(|&slot| program.dependence(slot).time)
+}
+
+/// Which operations `outputs` need, where kept values need none.
+fn needed(program: &Program, kept: &BTreeMap<Slot, (Stage, usize)>, outputs: &[Slot]) -> Vec<bool> {
+    let mut needed = vec![false; program.operations().len()];
+    let mut stack = outputs.to_vec();
+    while let Some(slot) = stack.pop() {
+        if !kept.contains_key(&slot) && !needed[slot.index()] {
+            needed[slot.index()] = true;
+            stack.extend(program.operations()[slot.index()].operands());
+        }
+    }
+    needed
+}
+
+/// The displacement and the law, a line each.
+fn formulas(spec: &Spec, fields: &Fields) -> Vec<String> {
+    let names = spec.coordinates.coordinate_names(spec.dimension);
+    let mut lines: Vec<String> = names
+        .iter()
+        .zip(&spec.displacement)
+        .map(|(name, component)| format!("u_{name} = {}", fields.graph.print(*component)))
+        .collect();
+    lines.extend(spec.material.formulas(&spec.graph));
+    lines
+}
