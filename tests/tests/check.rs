@@ -7,9 +7,21 @@ use mmsmith_tests::{mms, outcome, workspace};
 /// Motions without any symmetry, in each kind of coordinates: a mistake in the geometry shows in H, P or b.
 #[test]
 fn motions_without_symmetry_pass_in_all_coordinates() {
-    let folder = workspace().join("tests/data/specs");
-    let mut files: Vec<_> =
-        std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    all_pass("tests/data/specs");
+}
+
+/// Each law against the solver's own, and energies and stresses of the specification's own against their differences.
+#[test]
+fn every_material_passes() {
+    all_pass("tests/data/specs/materials");
+}
+
+fn all_pass(folder: &str) {
+    let mut files: Vec<_> = std::fs::read_dir(workspace().join(folder))
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|extension| extension == "toml"))
+        .collect();
     files.sort();
     assert!(!files.is_empty());
     let (status, out, errors) = outcome(mms().arg("check").args(&files));

@@ -4,7 +4,7 @@ use crate::function::{Translator, float};
 use crate::plan::{Measures, Plan, Shape, Stage};
 use crate::text::one_line;
 use mmsmith_expr::Slot;
-use mmsmith_spec::{Boundary, Condition, Material, DeriveError, Spec, Surface};
+use mmsmith_spec::{Boundary, Condition, DeriveError, Material, Spec, Surface};
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{format_ident, quote};
 
@@ -490,9 +490,8 @@ impl Generator<'_> {
     fn material(&self) -> TokenStream {
         let runtime = self.runtime;
         let constants = self.plan.constants.material.iter();
-        let (names, values): (Vec<Ident>, Vec<TokenStream>) = constants
-            .map(|&(name, slot)| (format_ident!("{name}"), self.constant(slot)))
-            .unzip();
+        let (names, values): (Vec<Ident>, Vec<TokenStream>) =
+            constants.map(|&(name, slot)| (format_ident!("{name}"), self.constant(slot))).unzip();
         let variant = match self.spec.material {
             Material::NeoHookean { .. } => quote!(NeoHookean),
             Material::StVenantKirchhoff { .. } => quote!(StVenantKirchhoff),

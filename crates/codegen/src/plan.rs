@@ -220,8 +220,7 @@ impl Constants {
     fn new(spec: &Spec, slots: &[Slot]) -> Self {
         let names = spec.material.constants();
         let (material, measures) = slots[4..].split_at(names.len());
-        let material =
-            names.iter().zip(material).map(|(&(name, _), &slot)| (name, slot)).collect();
+        let material = names.iter().zip(material).map(|(&(name, _), &slot)| (name, slot)).collect();
         let domain = match &spec.domain {
             Domain::Box { lower, .. } => {
                 let (lower, upper) = measures.split_at(lower.len());

@@ -228,6 +228,9 @@ mod tests {
     fn no_value_at_zero() {
         assert_eq!(split("1/h + mu").0, "mu");
         assert_eq!(split("sqrt(h)").0, "0");
-        assert_eq!(split("arccos(h)*mu").1, "mu*(arccos(h) - 1/2*Pi)".replace("1/2*Pi", "arccos(0)"));
+        assert_eq!(
+            split("arccos(h)*mu").1,
+            "mu*(arccos(h) - 1/2*Pi)".replace("1/2*Pi", "arccos(0)")
+        );
     }
 }

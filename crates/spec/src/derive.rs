@@ -60,7 +60,9 @@ pub enum DeriveError {
     #[error("{0}")]
     NoClosedForm(&'static str),
     /// The fields are larger than any that could be of use.
-    #[error("the fields of this solution grow too large to derive: {nodes} nodes of the expression graph")]
+    #[error(
+        "the fields of this solution grow too large to derive: {nodes} nodes of the expression graph"
+    )]
     TooLarge {
         /// The nodes made until then.
         nodes: usize,
@@ -139,12 +141,7 @@ impl Fields {
 }
 
 /// `b = [a - Div P_linear / rho0] - Div P_remainder / rho0`, the bracket joined in symbols.
-fn body_force(
-    derivation: &mut Derivation,
-    a: &Vector,
-    stress: &Stress,
-    density: Expr,
-) -> Vector {
+fn body_force(derivation: &mut Derivation, a: &Vector, stress: &Stress, density: Expr) -> Vector {
     let Derivation { graph, variables, .. } = derivation;
     let density = graph.whole(density);
     let open_density = inside(graph, density);

@@ -3,10 +3,12 @@
 pub(crate) mod energy;
 mod hencky;
 mod neo_hookean;
+mod st_venant_kirchhoff;
 
 use crate::derivation::Derivation;
 use crate::tensor::{Matrix, Vector, cofactor, determinant, principal_minors};
 use crate::{DeriveError, Material};
+use energy::ComponentLaw;
 use mmsmith_expr::{Expr, Function, Graph, Node};
 
 /// The deformation of one solution, in physical components.
@@ -89,13 +91,34 @@ pub(crate) fn stress(
         Material::NeoHookean { lambda, mu } => {
             neo_hookean::stress(derivation, deformation, *lambda, *mu)
         }
+        Material::StVenantKirchhoff { lambda, mu } => {
+            st_venant_kirchhoff::stress(derivation, deformation, *lambda, *mu)
+        }
         Material::LinearElastic { lambda, mu } => {
             linear_elastic(derivation, deformation, *lambda, *mu)
         }
-        _ => {
-            let law = energy::ComponentLaw::of(&mut derivation.graph, material, deformation)?;
-            law.stress(derivation, deformation)
+        Material::MooneyRivlin { c1, c2, lambda } => {
+            let text = "c1*(I1-3-2*ln(J)) + c2*(I2-3-4*ln(J)) + lambda/2*ln(J)^2";
+            let constants = [("c1", *c1), ("c2", *c2), ("lambda", *lambda)];
+            let W = energy::named(&mut derivation.graph, text, &constants);
+            ComponentLaw::of_energy(&mut derivation.graph, deformation, W, true)
+                .stress(derivation, deformation)
         }
+        Material::Hencky { lambda, mu } => {
+            let (text, isotropic) = hencky::energy(&derivation.graph, &deformation.H)?;
+            let constants = [("lambda", *lambda), ("mu", *mu)];
+            let W = energy::named(&mut derivation.graph, &text, &constants);
+            ComponentLaw::of_energy(&mut derivation.graph, deformation, W, isotropic)
+                .stress(derivation, deformation)
+        }
+        Material::Energy { W } => {
+            let isotropic =
+                energy::uses_invariants_only(&mut derivation.graph, *W, deformation.H.len());
+            ComponentLaw::of_energy(&mut derivation.graph, deformation, *W, isotropic)
+                .stress(derivation, deformation)
+        }
+        Material::Stress { P } => ComponentLaw::of_stress(&mut derivation.graph, deformation, P)
+            .stress(derivation, deformation),
     })
 }
 
@@ -128,12 +151,7 @@ fn linear_elastic(
 }
 
 /// The divergence of `lambda tr(H) I + mu (H + H^T)`, with the constants as they are written.
-fn linear_divergence(
-    derivation: &mut Derivation,
-    H: &Matrix,
-    lambda: Expr,
-    mu: Expr,
-) -> Vector {
+fn linear_divergence(derivation: &mut Derivation, H: &Matrix, lambda: Expr, mu: Expr) -> Vector {
     let n = H.len();
     let trace = derivation.graph.sum_of((0..n).map(|i| H[i][i]));
     let mut symmetric = H.clone();

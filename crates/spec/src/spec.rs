@@ -253,7 +253,8 @@ impl Material {
             }
         };
         let constants = self.constants();
-        let values = constants.iter().map(|(name, value)| format!("{name} = {}", graph.print(*value)));
+        let values =
+            constants.iter().map(|(name, value)| format!("{name} = {}", graph.print(*value)));
         std::iter::once(law).chain(values).collect()
     }
 }
@@ -670,7 +671,8 @@ impl<'a> Reader<'a> {
             }
             "stress" => {
                 let Some(entries) = &table.P else {
-                    let help = "give its components, as P = { 11 = 'mu*(F11 - 1/F11)', 12 = '...' }";
+                    let help =
+                        "give its components, as P = { 11 = 'mu*(F11 - 1/F11)', 12 = '...' }";
                     return Err(missing(&self.scope, "P", help));
                 };
                 return self.stress_components(entries);
@@ -702,9 +704,10 @@ impl<'a> Reader<'a> {
         let keys = component_names("", n);
         let mut P = vec![vec![Graph::ZERO; n]; n];
         for (key, text) in &entries.0 {
-            let place = keys.iter().enumerate().find_map(|(i, row)| {
-                Some((i, row.iter().position(|name| name == key.get_ref())?))
-            });
+            let place = keys
+                .iter()
+                .enumerate()
+                .find_map(|(i, row)| Some((i, row.iter().position(|name| name == key.get_ref())?)));
             let Some((i, j)) = place else {
                 let message = format!("there is no stress component '{}'", key.get_ref());
                 let help = format!("the components are {}", keys.concat().join(", "));

@@ -8,8 +8,7 @@
 use super::{Deformation, Stress, zero_if_vanishing};
 use crate::derivation::Derivation;
 use crate::tensor::{Matrix, Vector, principal_minors};
-use crate::{DeriveError, Material};
-use mmsmith_expr::{Ast, Expr, Function, Graph};
+use mmsmith_expr::{Ast, Derivatives, Expr, Function, Graph};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The names that an energy may use, and the components of `F` and `C` with two indices after them.
@@ -28,58 +27,40 @@ pub(super) struct ComponentLaw {
     P: Matrix,
     /// Whether `P` is an isotropic function, so that the chain rule holds for whole tensors in any coordinates.
     isotropic: bool,
-    /// The energy, where the specification states one.
+    /// The energy, where there is one.
     energy: Option<Expr>,
     /// Quantities of `h` that the deformation has in a form of its own.
     known: BTreeMap<Expr, Expr>,
 }
 
 impl ComponentLaw {
-    pub(super) fn of(
+    /// From the strain energy; `isotropic` where it is an isotropic function of every deformation.
+    pub(super) fn of_energy(
         graph: &mut Graph,
-        material: &Material,
         deformation: &Deformation,
-    ) -> Result<Self, DeriveError> {
-        let n = deformation.H.len();
-        let h: Matrix = component_names("h ", n)
-            .iter()
-            .map(|row| row.iter().map(|name| graph.symbol(name)).collect())
-            .collect();
-        let (energy, isotropic) = match *material {
-            Material::StVenantKirchhoff { lambda, mu } => {
-                let text = "lambda/8*(I1-3)^2 + mu/4*((I1-3)^2 + 4*(I1-3) - 2*(I2-3))";
-                (named(graph, text, &[("lambda", lambda), ("mu", mu)]), true)
-            }
-            Material::MooneyRivlin { c1, c2, lambda } => {
-                let text = "c1*(I1-3-2*ln(J)) + c2*(I2-3-4*ln(J)) + lambda/2*ln(J)^2";
-                (named(graph, text, &[("c1", c1), ("c2", c2), ("lambda", lambda)]), true)
-            }
-            Material::Hencky { lambda, mu } => {
-                let (text, isotropic) = super::hencky::energy(graph, &deformation.H)?;
-                (named(graph, &text, &[("lambda", lambda), ("mu", mu)]), isotropic)
-            }
-            Material::Energy { W } => (W, uses_invariants_only(graph, W, n)),
-            Material::Stress { ref P } => {
-                let (replacement, known) = in_components(graph, &h, deformation);
-                let P: Matrix = P
-                    .iter()
-                    .map(|row| row.iter().map(|&p| graph.replace(p, &replacement)).collect())
-                    .collect();
-                return Ok(ComponentLaw { h, P, isotropic: false, energy: None, known });
-            }
-            Material::NeoHookean { .. } | Material::LinearElastic { .. } => {
-                return Err(DeriveError::NoClosedForm("this law is not derived from an energy"));
-            }
-        };
+        W: Expr,
+        isotropic: bool,
+    ) -> Self {
+        let h = symbols(graph, deformation.H.len());
         let (replacement, known) = in_components(graph, &h, deformation);
-        let energy = graph.replace(energy, &replacement);
-        let mut derivatives = mmsmith_expr::Derivatives::limited();
+        let energy = graph.replace(W, &replacement);
+        let mut derivatives = Derivatives::limited();
         let P = h
             .iter()
             .map(|row| row.iter().map(|&h| derivatives.of(graph, energy, h)).collect())
             .collect();
-        let stated = matches!(material, Material::Energy { .. }).then_some(energy);
-        Ok(ComponentLaw { h, P, isotropic, energy: stated, known })
+        ComponentLaw { h, P, isotropic, energy: Some(energy), known }
+    }
+
+    /// From the components of the stress.
+    pub(super) fn of_stress(graph: &mut Graph, deformation: &Deformation, P: &Matrix) -> Self {
+        let h = symbols(graph, deformation.H.len());
+        let (replacement, known) = in_components(graph, &h, deformation);
+        let P = P
+            .iter()
+            .map(|row| row.iter().map(|&p| graph.replace(p, &replacement)).collect())
+            .collect();
+        ComponentLaw { h, P, isotropic: false, energy: None, known }
     }
 
     pub(super) fn stress(&self, derivation: &mut Derivation, deformation: &Deformation) -> Stress {
@@ -104,7 +85,7 @@ impl ComponentLaw {
 
         let open = derivation.second_gradient(&deformation.open, self.isotropic);
         let whole = derivation.second_gradient(&deformation.H, self.isotropic);
-        let mut derivatives = mmsmith_expr::Derivatives::limited();
+        let mut derivatives = Derivatives::limited();
         let (mut linear, mut remainder) = (Vector::new(), Vector::new());
         for i in 0..n {
             let (mut first, mut second) = (Vec::new(), Vec::new());
@@ -135,8 +116,15 @@ fn indices(n: usize) -> impl Iterator<Item = (usize, usize, usize)> {
     (0..n * n * n).map(move |m| (m / (n * n), m / n % n, m % n))
 }
 
+fn symbols(graph: &mut Graph, dimension: usize) -> Matrix {
+    component_names("h ", dimension)
+        .iter()
+        .map(|row| row.iter().map(|name| graph.symbol(name)).collect())
+        .collect()
+}
+
 /// The energy that `text` states, its constants in one piece.
-fn named(graph: &mut Graph, text: &str, constants: &[(&str, Expr)]) -> Expr {
+pub(super) fn named(graph: &mut Graph, text: &str, constants: &[(&str, Expr)]) -> Expr {
     let Ok(ast) = Ast::parse(text) else { return Graph::ZERO };
     let energy = graph.build(&ast, &mut |graph, name| {
         let constant = constants.iter().find(|(known, _)| *known == name);
@@ -148,7 +136,8 @@ fn named(graph: &mut Graph, text: &str, constants: &[(&str, Expr)]) -> Expr {
     energy.unwrap_or(Graph::ZERO)
 }
 
-fn uses_invariants_only(graph: &mut Graph, energy: Expr, dimension: usize) -> bool {
+/// Whether an energy is one of the invariants, and so isotropic.
+pub(super) fn uses_invariants_only(graph: &mut Graph, energy: Expr, dimension: usize) -> bool {
     let symbols = graph.symbols_in(&[energy]);
     ["F", "C"]
         .iter()

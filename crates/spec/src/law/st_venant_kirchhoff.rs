@@ -1,0 +1,64 @@
+//! The law of St. Venant and Kirchhoff, `P = F S` with `S = lambda tr(E) I + 2 mu E` and `E = (F^T F - I)/2`.
+//!
+//! With `G = 2 E = H + H^T + H^T H` it is `P = S + H S`: the part linear in `H` and the remainder
+//! `lambda/2 (H : H) I + mu H^T H + H S`, all of them sums in which nothing large cancels.
+
+use super::{Deformation, Stress, linear_divergence, zero_if_vanishing};
+use crate::derivation::Derivation;
+use crate::tensor::{Matrix, matrix_product, transpose};
+use mmsmith_expr::{Expr, Graph};
+
+pub(super) fn stress(
+    derivation: &mut Derivation,
+    deformation: &Deformation,
+    lambda: Expr,
+    mu: Expr,
+) -> Stress {
+    let linear = linear_divergence(derivation, &deformation.open, lambda, mu);
+    let graph = &mut derivation.graph;
+    let (lambda, mu) = (graph.whole(lambda), graph.whole(mu));
+    let H = &deformation.H;
+    let n = H.len();
+    let products = matrix_product(graph, &transpose(H), H);
+    let mut G = products.clone();
+    for i in 0..n {
+        for j in 0..n {
+            G[i][j] = graph.sum_of([H[i][j], H[j][i], products[i][j]]);
+            G[i][j] = zero_if_vanishing(graph, G[i][j]);
+        }
+    }
+    let mut second = isotropic(graph, &G, lambda, mu);
+    for entry in second.iter_mut().flatten() {
+        *entry = graph.whole(*entry);
+    }
+    let turned = matrix_product(graph, H, &second);
+    let mut P = second;
+    let mut remainder = isotropic(graph, &products, lambda, mu);
+    for i in 0..n {
+        for j in 0..n {
+            P[i][j] = graph.add(P[i][j], turned[i][j]);
+            P[i][j] = zero_if_vanishing(graph, P[i][j]);
+            remainder[i][j] = graph.add(remainder[i][j], turned[i][j]);
+        }
+    }
+    let remainder = derivation.divergence(&remainder);
+    Stress { P, linear, remainder, energy: None }
+}
+
+/// `lambda/2 tr(G) I + mu G`.
+fn isotropic(graph: &mut Graph, G: &Matrix, lambda: Expr, mu: Expr) -> Matrix {
+    let trace = graph.sum_of((0..G.len()).map(|k| G[k][k]));
+    let two = graph.integer(2);
+    let half = graph.div(trace, two);
+    let pressure = graph.mul(lambda, half);
+    let mut stress = G.clone();
+    for (i, row) in stress.iter_mut().enumerate() {
+        for (j, entry) in row.iter_mut().enumerate() {
+            *entry = graph.mul(mu, *entry);
+            if i == j {
+                *entry = graph.add(*entry, pressure);
+            }
+        }
+    }
+    stress
+}
