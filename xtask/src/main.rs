@@ -26,8 +26,8 @@ enum Task {
         /// Generate for this language only.
         #[arg(long, value_enum)]
         target: Option<Target>,
-        /// Write the files into this folder instead, and no list of solutions.
-        #[arg(long, value_name = "DIR", conflicts_with = "check")]
+        /// Write the files into this folder instead, or check those there, and no list of solutions.
+        #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
         /// Specification files, or names of files in mms-specs; all of mms-specs where none is given.
         #[arg(value_name = "SPEC")]
