@@ -4,6 +4,7 @@
 //! original study, generation, bad input, particle files.
 
 use serde_json::Value;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
@@ -63,6 +64,33 @@ pub fn xtask() -> Command {
     let mut command = Command::new(binaries().join("xtask"));
     command.current_dir(workspace());
     command
+}
+
+/// The C compiler: the environment variable `CC` names another one than `cc`.
+///
+/// # Panics
+///
+/// Panics where there is none: generated C that nothing compiles is not tested.
+#[must_use]
+pub fn c_compiler() -> Command {
+    let name = std::env::var_os("CC").unwrap_or_else(|| "cc".into());
+    assert!(
+        starts(&name),
+        "there is no C compiler {}: install gcc or clang, or name one in the environment variable CC",
+        name.display()
+    );
+    Command::new(name)
+}
+
+/// The C++ compiler, where there is one: `c++`, or what the environment variable `CXX` names.
+#[must_use]
+pub fn cpp_compiler() -> Option<Command> {
+    let name = std::env::var_os("CXX").unwrap_or_else(|| "c++".into());
+    starts(&name).then(|| Command::new(name))
+}
+
+fn starts(compiler: &OsStr) -> bool {
+    Command::new(compiler).arg("--version").output().is_ok_and(|output| output.status.success())
 }
 
 /// Runs a command; the exit status, and what it wrote to standard output and standard error.

@@ -1,10 +1,12 @@
 //! Text from a specification never becomes code: whatever stands in titles, descriptions and names, the generated
-//! module has the items and expressions that harmless text gives, or the specification is refused with a message.
+//! module and header have the items and expressions that harmless text gives, or the specification is refused with a
+//! message.
 
 #![allow(clippy::unwrap_used)]
 
-use mmsmith_codegen::{items, module_source};
+use mmsmith_codegen::{Plan, items, module_source};
 use mmsmith_spec::Spec;
+use mmsmith_tests::{c_compiler, cpp_compiler, outcome};
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use std::fmt::Write as _;
 
@@ -33,6 +35,12 @@ fn hostile() -> Vec<String> {
         "[`Owned`](https://example.org) <script>",
         "\0\u{1}\u{7f}\u{1b}[31m",
         "??/ ??> %:include <: :>",
+        "*??/\n/ int owned; /*",
+        "*\\\n/ int owned; /*",
+        "/\\\n* /??/\n* *\\",
+        "\n#define double int\n#include \"/etc/passwd\"\n",
+        "//\\",
+        "%s%n%hn",
         "caf\u{e9} \u{1d54f} \u{1f9ea} e\u{301}",
     ]
     .map(str::to_owned)
@@ -126,6 +134,190 @@ fn skeleton(tokens: TokenStream) -> Vec<String> {
         kept.push(part);
     }
     kept
+}
+
+/// The text of a C header without comments, and with every string literal empty.
+///
+/// The compiler first joins lines that end with a backslash, or with the trigraph for one; there must be none of either.
+fn c_skeleton(header: &str) -> String {
+    for sign in ["\\\n", "??", "\r"] {
+        assert!(!header.contains(sign), "{sign:?}");
+    }
+    assert!(header.is_ascii() || header.chars().all(|c| c.is_ascii() || c.is_alphanumeric()));
+    let mut skeleton = String::new();
+    let mut rest = header;
+    while let Some(place) = rest.find(['/', '"', '\'']) {
+        skeleton += &rest[..place];
+        rest = &rest[place..];
+        if let Some(comment) = rest.strip_prefix("/*") {
+            let (comment, code) = comment.split_once("*/").expect("the comment ends");
+            assert!(!comment.contains("/*"), "{comment}");
+            rest = code;
+        } else if let Some(text) = rest.strip_prefix('"') {
+            let mut escaped = false;
+            let end = text.find(|c| {
+                let ends = c == '"' && !escaped;
+                escaped = c == '\\' && !escaped;
+                assert!(c != '\n', "{text}");
+                ends
+            });
+            skeleton += "\"\"";
+            rest = &text[end.expect("the literal ends") + 1..];
+        } else {
+            assert!(!rest.starts_with("//") && !rest.starts_with('\''), "{rest}");
+            skeleton += "/";
+            rest = &rest[1..];
+        }
+    }
+    skeleton += rest;
+    // Comments of several lines leave none or some of white space.
+    skeleton.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+fn header(spec: &Spec) -> String {
+    let source = Plan::new(spec).unwrap().header_source();
+    for c in source.chars() {
+        assert!(c == '\n' || !c.is_control(), "{c:?} in {}", spec.name);
+        assert!(!DIRECTIONS.contains(&c), "{c:?} in {}", spec.name);
+    }
+    source
+}
+
+/// Compiles headers, as C and where possible as C++, after other headers that define many names.
+fn compile(headers: &[(String, String)]) {
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = String::from(
+        "#define _GNU_SOURCE 1\n#include <math.h>\n#ifndef __cplusplus\n#include <complex.h>\n#include <stdbool.h>\n\
+         #include <tgmath.h>\n#endif\n#include <errno.h>\n#include <float.h>\n#include <limits.h>\n\
+         #include <stdint.h>\n#include <stdio.h>\n#include <stdlib.h>\n",
+    );
+    for (name, header) in headers {
+        std::fs::write(folder.path().join(name), header).unwrap();
+        writeln!(text, "#include \"{name}\"").unwrap();
+    }
+    let source = folder.path().join("all.c");
+    std::fs::write(&source, text).unwrap();
+    let strict = ["-pedantic", "-Wall", "-Wextra", "-Werror", "-fsyntax-only"];
+    let (status, _, errors) = outcome(c_compiler().arg("-std=c99").args(strict).arg(&source));
+    assert_eq!(status, Some(0), "{errors}");
+    if let Some(mut compiler) = cpp_compiler() {
+        let command = compiler.args(["-x", "c++", "-std=c++17"]).args(strict).arg(&source);
+        let (status, _, errors) = outcome(command);
+        assert_eq!(status, Some(0), "{errors}");
+    }
+}
+
+/// A header in which the solution has another name than `hostile`, so that several can be compiled at once.
+fn renamed(header: &str, name: &str) -> (String, String) {
+    let text = header.replace("hostile_", &format!("{name}_")).replace("HOSTILE_H", name);
+    (format!("{name}.h"), text)
+}
+
+#[test]
+fn free_text_stays_text_in_c() {
+    let harmless = Spec::parse(&specification("harmless", "nu"), "harmless.toml").unwrap();
+    let harmless = c_skeleton(&header(&harmless));
+    assert!(harmless.contains("hostile_b_array"));
+    let mut headers = Vec::new();
+    for (number, text) in hostile().iter().enumerate() {
+        let shown: String = text.chars().take(60).collect();
+        let spec = Spec::parse(&specification(text, "nu"), "hostile.toml").unwrap();
+        let header = header(&spec);
+        assert!(c_skeleton(&header) == harmless, "{shown:?} changes the code");
+        headers.push(renamed(&header, &format!("text{number}")));
+    }
+    compile(&headers);
+}
+
+/// Names that parameters may have, and that are no names in C or C++, or macros of their headers.
+#[test]
+fn names_that_are_words_of_c_give_code() {
+    let words = [
+        "int",
+        "int_",
+        "double",
+        "default",
+        "register",
+        "restrict",
+        "inline",
+        "class",
+        "template",
+        "operator",
+        "new",
+        "this",
+        "namespace",
+        "bool",
+        "true",
+        "and",
+        "not_eq",
+        "nullptr",
+        "constexpr",
+        "thread_local",
+        "wchar_t",
+        "asm",
+        "typeof",
+        "M_PI",
+        "M_PI_",
+        "M_PI_2",
+        "I",
+        "complex",
+        "imaginary",
+        "NULL",
+        "NAN",
+        "INFINITY",
+        "HUGE_VAL",
+        "HUGE",
+        "EOF",
+        "DBL_MAX",
+        "DBL_EPSILON",
+        "INT_MAX",
+        "INT32_MAX",
+        "UINT8_MAX",
+        "FP_NAN",
+        "OVERFLOW",
+        "DOMAIN",
+        "errno",
+        "stdin",
+        "stdout",
+        "linux",
+        "unix",
+        "s",
+        "p",
+        "par",
+        "fixed",
+        "point",
+        "values",
+        "u",
+        "v",
+        "J",
+        "F",
+        "P",
+        "t0",
+        "t1",
+        "T",
+        "isnan",
+        "pow",
+        "sizeof",
+        "MMSMITH_FN",
+        "mmsmith_sine",
+        "hostile_b",
+        "hostile_parameters",
+    ];
+    let mut headers = Vec::new();
+    for (number, word) in words.into_iter().enumerate() {
+        let text = specification("harmless", word).replace("sin(Y)", &format!("sin({word}*Y)"));
+        let spec = Spec::parse(&text, "words.toml").unwrap_or_else(|d| panic!("{word}: {d}"));
+        headers.push(renamed(&header(&spec), &format!("word{number}")));
+    }
+    compile(&headers);
+    // Two names that could become one.
+    let text = specification("harmless", "int")
+        .replace("E = {", "int_ = { default = 1 }\nint__ = { default = 2 }\nE = {");
+    let source = header(&Spec::parse(&text, "words.toml").unwrap());
+    for member in ["double int_;", "double int__;", "double int___;"] {
+        assert_eq!(source.matches(member).count(), 1, "{member}");
+    }
+    compile(&[renamed(&source, "three")]);
 }
 
 /// The generated tokens and those of the module's text, after checking that the text parses.

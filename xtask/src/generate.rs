@@ -1,8 +1,9 @@
-//! `cargo xtask gen`: specifications to Rust modules.
+//! `cargo xtask gen`: specifications to Rust modules and C headers.
 
 use crate::{read, write};
 use anyhow::{Context, anyhow, bail};
-use mmsmith_codegen::{Names, module_source, registry_source};
+use clap::ValueEnum;
+use mmsmith_codegen::{Names, Plan, registry_source};
 use mmsmith_spec::Spec;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -13,52 +14,93 @@ pub(crate) struct Outcome {
     pub(crate) stale: bool,
 }
 
+/// A language that solutions are generated in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
+pub(crate) enum Target {
+    /// Modules of the crate of the solutions.
+    Rust,
+    /// C99 headers, for C, C++ and CUDA.
+    C,
+}
+
+impl Target {
+    /// Where the files of the library are.
+    fn folder(self, repository: &Path) -> PathBuf {
+        repository.join(match self {
+            Target::Rust => "crates/solutions/src/generated",
+            // A folder of its own, so that with its parent among the include paths no header hides one of the system.
+            Target::C => "crates/solutions/include/mmsmith",
+        })
+    }
+
+    fn extension(self) -> &'static str {
+        match self {
+            Target::Rust => "rs",
+            Target::C => "h",
+        }
+    }
+
+    fn source(self, plan: &Plan<'_>) -> String {
+        match self {
+            Target::Rust => plan.module_source(),
+            Target::C => plan.header_source(),
+        }
+    }
+}
+
 /// Generates from `given`, or from every specification of the repository.
 ///
 /// Every specification is read and derived before anything is written.
 pub(crate) fn run(
     repository: &Path,
     given: &[PathBuf],
+    targets: &[Target],
     out: Option<&Path>,
     check: bool,
 ) -> anyhow::Result<Outcome> {
     let library = repository.join("mms-specs");
-    let generated = repository.join("crates/solutions/src/generated");
     let all = library_specs(&library)?;
     let chosen = match given {
         [] => all.clone(),
         _ => given.iter().map(|path| locate(&library, path)).collect::<anyhow::Result<_>>()?,
     };
 
-    let mut modules: BTreeMap<String, String> = BTreeMap::new();
+    let mut sources: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for path in &chosen {
-        let (name, text) = generate(repository, path)?;
-        if modules.insert(name.clone(), text).is_some() {
+        let (name, texts) = generate(repository, path, targets)?;
+        if sources.insert(name.clone(), texts).is_some() {
             bail!("two specifications are called '{name}'; the second is {}", path.display());
         }
     }
-    let folder = out.unwrap_or(&generated);
-    let mut files: BTreeMap<PathBuf, Option<String>> = modules
-        .iter()
-        .map(|(name, text)| {
-            (folder.join(Names::of(name).module).with_extension("rs"), Some(text.clone()))
-        })
-        .collect();
+    let mut files: BTreeMap<PathBuf, Option<String>> = BTreeMap::new();
+    for (name, texts) in &sources {
+        for (target, text) in targets.iter().zip(texts) {
+            let folder = out.map_or_else(|| target.folder(repository), Path::to_path_buf);
+            let file = folder.join(Names::of(name).module).with_extension(target.extension());
+            files.insert(file, Some(text.clone()));
+        }
+    }
     if out.is_none() {
         let mut names: Vec<String> =
             all.iter().filter_map(|path| Some(path.file_stem()?.to_str()?.to_owned())).collect();
-        names.extend(modules.keys().cloned());
-        let orphans = orphans(&generated, &names)?;
-        if given.is_empty() {
-            // A module without a specification cannot be kept up to date.
-            files.extend(orphans.into_iter().map(|(path, _)| (path, None)));
-        } else {
-            names.extend(orphans.into_iter().map(|(_, name)| name));
+        names.extend(sources.keys().cloned());
+        let mut listed = names.clone();
+        for &target in targets {
+            let orphans = orphans(&target.folder(repository), target.extension(), &names)?;
+            if given.is_empty() {
+                // A file without a specification cannot be kept up to date.
+                files.extend(orphans.into_iter().map(|(path, _)| (path, None)));
+            } else if target == Target::Rust {
+                listed.extend(orphans.into_iter().map(|(_, name)| name));
+            }
         }
-        names.sort_unstable();
-        names.dedup();
-        let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        files.insert(generated.join("mod.rs"), Some(registry_source(&names)));
+        listed.sort_unstable();
+        listed.dedup();
+        let listed: Vec<&str> = listed.iter().map(String::as_str).collect();
+        let registry = registry_source(&listed)?;
+        if targets.contains(&Target::Rust) {
+            files.insert(Target::Rust.folder(repository).join("mod.rs"), Some(registry));
+        }
     }
     if check { compare(repository, &files) } else { update(repository, &files) }
 }
@@ -88,30 +130,39 @@ fn locate(library: &Path, given: &Path) -> anyhow::Result<PathBuf> {
     bail!("there is no specification {}, nor {}", given.display(), named.display())
 }
 
-fn generate(repository: &Path, path: &Path) -> anyhow::Result<(String, String)> {
+/// The name of a specification's solution, and its text for each target.
+fn generate(
+    repository: &Path,
+    path: &Path,
+    targets: &[Target],
+) -> anyhow::Result<(String, Vec<String>)> {
     let shown = path.strip_prefix(repository).unwrap_or(path).display().to_string();
     let spec = Spec::parse(&read(path)?, &shown).map_err(|e| anyhow!("{e}"))?;
     if path.file_stem().and_then(|stem| stem.to_str()) != Some(&spec.name) {
         bail!("{shown} holds a solution called '{0}'; the file must be called {0}.toml", spec.name);
     }
-    let text =
-        module_source(&spec).with_context(|| format!("cannot derive the fields of {shown}"))?;
-    Ok((spec.name, text))
+    let plan = Plan::new(&spec).with_context(|| format!("cannot derive the fields of {shown}"))?;
+    let texts = targets.iter().map(|target| target.source(&plan)).collect();
+    Ok((spec.name.clone(), texts))
 }
 
-/// Generated modules that belong to none of `names`, with the names that they stand for.
-fn orphans(generated: &Path, names: &[String]) -> anyhow::Result<Vec<(PathBuf, String)>> {
+/// Generated files that belong to none of `names`, with the names that they stand for.
+fn orphans(
+    folder: &Path,
+    extension: &str,
+    names: &[String],
+) -> anyhow::Result<Vec<(PathBuf, String)>> {
     let known: Vec<String> = names.iter().map(|name| Names::of(name).module).collect();
-    let context = || format!("cannot list {}", generated.display());
+    let context = || format!("cannot list {}", folder.display());
     let mut orphans = Vec::new();
-    if !generated.exists() {
+    if !folder.exists() {
         return Ok(orphans);
     }
-    for entry in std::fs::read_dir(generated).with_context(context)? {
+    for entry in std::fs::read_dir(folder).with_context(context)? {
         let path = entry.with_context(context)?.path();
         let Some(stem) = path.file_stem().and_then(|stem| stem.to_str()) else { continue };
-        let is_module = path.extension().is_some_and(|extension| extension == "rs");
-        if is_module && stem != "mod" && !known.iter().any(|module| module == stem) {
+        let is_generated = path.extension().is_some_and(|found| found == extension);
+        if is_generated && stem != "mod" && !known.iter().any(|module| module == stem) {
             orphans.push((path.clone(), stem.replace('_', "-")));
         }
     }

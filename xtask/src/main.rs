@@ -1,7 +1,8 @@
 //! Tasks of the repository itself, behind the alias `cargo xtask`.
 
 use anyhow::{Context, bail};
-use clap::{Parser, Subcommand};
+use clap::{Parser, Subcommand, ValueEnum};
+use generate::Target;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -17,13 +18,16 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Task {
-    /// Generate the solutions in crates/solutions from the specifications in mms-specs.
+    /// Generate the solutions in crates/solutions, in Rust and in C, from the specifications in mms-specs.
     Gen {
         /// Change nothing; fail where a generated file differs from its specification.
         #[arg(long)]
         check: bool,
-        /// Write the module files into this folder instead, and no list of solutions.
-        #[arg(long, value_name = "DIR", conflicts_with = "check")]
+        /// Generate for this language only.
+        #[arg(long, value_enum)]
+        target: Option<Target>,
+        /// Write the files into this folder instead, or check those there, and no list of solutions.
+        #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
         /// Specification files, or names of files in mms-specs; all of mms-specs where none is given.
         #[arg(value_name = "SPEC")]
@@ -32,8 +36,9 @@ enum Task {
 }
 
 fn main() -> ExitCode {
-    let Arguments { task: Task::Gen { check, out, specs } } = Arguments::parse();
-    match generate::run(&repository(), &specs, out.as_deref(), check) {
+    let Arguments { task: Task::Gen { check, target, out, specs } } = Arguments::parse();
+    let targets = target.map_or(Target::value_variants().to_vec(), |target| vec![target]);
+    match generate::run(&repository(), &specs, &targets, out.as_deref(), check) {
         Ok(outcome) => {
             for line in &outcome.lines {
                 say(line);
@@ -73,7 +78,7 @@ fn write(path: &Path, text: &str) -> anyhow::Result<()> {
     let Some(folder) = path.parent() else { bail!("{} is not a file", path.display()) };
     let context = || format!("cannot write {}", path.display());
     std::fs::create_dir_all(folder).with_context(context)?;
-    let temporary = path.with_extension("rs.tmp");
+    let temporary = path.with_extension("tmp");
     std::fs::write(&temporary, text)
         .and_then(|()| std::fs::rename(&temporary, path))
         .inspect_err(|_| drop(std::fs::remove_file(&temporary)))

@@ -71,6 +71,7 @@ fn a_stale_module_fails_the_check_and_names_the_command() {
     let (status, out, _) = outcome(xtask().args(["gen", "--check"]).arg(&changed));
     assert_eq!(status, Some(1), "{out}");
     assert!(out.contains("stale: crates/solutions/src/generated/ring.rs"), "{out}");
+    assert!(out.contains("stale: crates/solutions/include/mmsmith/ring.h"), "{out}");
     assert!(out.contains("cargo xtask gen"), "{out}");
 }
 
@@ -78,13 +79,73 @@ fn a_stale_module_fails_the_check_and_names_the_command() {
 fn generation_is_deterministic_to_the_byte() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["axis-aligned", "ring"] {
-        let module = format!("{}.rs", name.replace('-', "_"));
-        let committed = workspace().join("crates/solutions/src/generated").join(&module);
         let (status, _, errors) = outcome(xtask().args(["gen", name, "--out"]).arg(folder.path()));
         assert_eq!(status, Some(0), "{errors}");
-        let fresh = std::fs::read(folder.path().join(&module)).unwrap();
-        assert_eq!(fresh, std::fs::read(committed).unwrap(), "{name}");
+        let module = name.replace('-', "_");
+        for (committed, extension) in
+            [("crates/solutions/src/generated", "rs"), ("crates/solutions/include/mmsmith", "h")]
+        {
+            let file = format!("{module}.{extension}");
+            let committed = std::fs::read(workspace().join(committed).join(&file)).unwrap();
+            assert_eq!(std::fs::read(folder.path().join(&file)).unwrap(), committed, "{file}");
+        }
     }
+}
+
+#[test]
+fn one_target_leaves_the_other_alone() {
+    for (target, written, left) in [("rust", "ring.rs", "ring.h"), ("c", "ring.h", "ring.rs")] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut command = xtask();
+        command.args(["gen", "ring", "--target", target, "--out"]).arg(folder.path());
+        let (status, out, errors) = outcome(&mut command);
+        assert_eq!(status, Some(0), "{errors}");
+        assert!(out.contains(written) && !out.contains(left), "{out}");
+        assert!(folder.path().join(written).is_file() && !folder.path().join(left).exists());
+        // With --check nothing is written, and the committed files of that target are current.
+        let (status, out, _) = outcome(xtask().args(["gen", "--check", "--target", target]));
+        assert_eq!(status, Some(0), "{out}");
+    }
+    let (status, _, errors) = outcome(xtask().args(["gen", "--target", "fortran"]));
+    assert_eq!(status, Some(2));
+    assert!(errors.contains("rust") && errors.contains("c"), "{errors}");
+}
+
+#[test]
+fn check_compares_with_another_folder_and_writes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let check =
+        |folder: &Path| outcome(xtask().args(["gen", "ring", "--check", "--out"]).arg(folder));
+    let (status, out, _) = check(folder.path());
+    assert_eq!(status, Some(1), "{out}");
+    assert!(out.contains("ring.h") && out.contains("ring.rs"), "{out}");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    let (status, ..) = outcome(xtask().args(["gen", "ring", "--out"]).arg(folder.path()));
+    assert_eq!(status, Some(0));
+    assert_eq!(check(folder.path()).0, Some(0));
+    let header = folder.path().join("ring.h");
+    let changed = std::fs::read_to_string(&header).unwrap().replace("36.0 *", "35.0 *");
+    std::fs::write(&header, changed).unwrap();
+    let (status, out, _) = check(folder.path());
+    assert_eq!(status, Some(1));
+    assert!(out.contains("ring.h, from line") && !out.contains("ring.rs"), "{out}");
+}
+
+#[test]
+fn solutions_whose_names_differ_by_hyphens_only_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    // The library has `skew-2d`.
+    let spec = folder.path().join("skew2d.toml");
+    std::fs::write(&spec, SPEC.replace("small", "skew2d")).unwrap();
+    for arguments in [&["--check"][..], &["--target", "c"], &[]] {
+        let (status, out, errors) = outcome(xtask().arg("gen").args(arguments).arg(&spec));
+        assert_eq!(status, Some(2), "{out}");
+        assert!(errors.contains("'skew-2d'") && errors.contains("'skew2d'"), "{errors}");
+        assert!(errors.contains("type Skew2d") && errors.contains("rename"), "{errors}");
+    }
+    // Nothing was written.
+    let (status, out, _) = outcome(xtask().args(["gen", "--check"]));
+    assert_eq!(status, Some(0), "{out}");
 }
 
 #[test]

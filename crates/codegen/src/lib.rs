@@ -1,17 +1,18 @@
-//! Rust source for manufactured solutions, from their specifications.
+//! Rust and C source for manufactured solutions, from their specifications.
 //!
-//! [`items`] makes the items of one solution: a struct for its parameters, a struct for the solution and the
-//! implementation of the trait `Solution`. The command `cargo xtask gen` writes them to files, through
-//! [`module_source`] and [`registry_source`]; the macro `manufactured_solution!` puts them where it stands.
-//! Both come from the same call, so they cannot differ.
+//! A [`Plan`] derives the fields of a specification and decides what is computed when. It is written down as the items
+//! of a Rust module, a struct for the parameters, a struct for the solution and the implementation of the trait
+//! `Solution`, or as a C header with the same values in the same order. The command `cargo xtask gen` writes both to
+//! files; the macro `manufactured_solution!` puts the Rust items where it stands.
 //!
 //! The output is deterministic to the byte. Text from a specification reaches it only as checked identifiers, as
-//! numbers, and as string and doc literals, never as code.
+//! numbers, and as string literals and comments, never as code.
 
 mod function;
+mod header;
 mod module;
 mod plan;
 mod text;
 
-pub use module::{Names, items, module_source, registry_source};
+pub use module::{NameClash, Names, items, module_source, registry_source};
 pub use plan::Plan;

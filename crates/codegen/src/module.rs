@@ -2,11 +2,13 @@
 
 use crate::function::{Translator, float};
 use crate::plan::{Measures, Plan, Shape, Stage};
-use crate::text::one_line;
+use crate::text::{meaning, one_line};
 use mmsmith_expr::Slot;
 use mmsmith_spec::{Boundary, Condition, DeriveError, Material, Spec, Surface};
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{format_ident, quote};
+use std::collections::BTreeMap;
+use thiserror::Error;
 
 /// The names that a solution has in Rust.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -74,11 +76,36 @@ impl Plan<'_> {
     }
 }
 
+/// Two solutions whose names differ by hyphens only, so that their types have one name.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error(
+    "the solutions '{first}' and '{second}' would both be the Rust type {solution}; rename one of them so that they differ \
+     by more than hyphens"
+)]
+pub struct NameClash {
+    /// The one.
+    pub first: String,
+    /// The other.
+    pub second: String,
+    /// The type.
+    pub solution: String,
+}
+
 /// The text of the module that lists all solutions, from their names.
-#[must_use]
-pub fn registry_source(names: &[&str]) -> String {
+///
+/// # Errors
+///
+/// [`NameClash`] where two names lead to the same type.
+pub fn registry_source(names: &[&str]) -> Result<String, NameClash> {
     let mut names = names.to_vec();
     names.sort_unstable();
+    let mut types = BTreeMap::new();
+    for name in &names {
+        let solution = Names::of(name).solution;
+        if let Some(first) = types.insert(solution.clone(), *name) {
+            return Err(NameClash { first: first.into(), second: (*name).into(), solution });
+        }
+    }
     let mut modules = TokenStream::new();
     let mut descriptions = TokenStream::new();
     let mut arms = TokenStream::new();
@@ -119,7 +146,7 @@ pub fn registry_source(names: &[&str]) -> String {
             })
         }
     };
-    header.to_owned() + &pretty(items)
+    Ok(header.to_owned() + &pretty(items))
 }
 
 /// Tokens as formatted text. What this crate generates always parses; if it did not, the raw tokens tell why.
@@ -219,15 +246,8 @@ impl Generator<'_> {
             .parameters
             .iter()
             .map(|p| {
-                let what = if p.description.is_empty() { &p.name } else { &p.description };
-                let mut doc = format!(" {}", doc_line(what));
-                if !p.unit.is_empty() {
-                    doc += &format!(", in {}", doc_line(&p.unit));
-                }
-                if !p.range.is_empty() {
-                    doc += &format!("; must be {}", doc_line(&p.range));
-                }
-                doc + "."
+                let about = meaning(&p.name, &p.description, &p.unit, &p.range);
+                format!(" {}.", doc_line(&about))
             })
             .collect();
         let defaults: Vec<TokenStream> =

@@ -27,8 +27,10 @@ pub struct Plan<'a> {
 
 /// A field of the solution.
 pub(crate) struct Field {
-    /// Its name in words.
+    /// Its name in code.
     pub(crate) name: &'static str,
+    /// Its name in words.
+    pub(crate) title: &'static str,
     /// The letter that the literature uses.
     pub(crate) letter: &'static str,
     pub(crate) shape: Shape,
@@ -109,14 +111,26 @@ impl<'a> Plan<'a> {
         let b = arrange(&mut fields.graph, &fields.inputs, &fields.definitions, &fields.b);
         let matrix = |A: &Vec<Vec<Expr>>| A.concat();
         let parts = [
-            ("displacement", "u", Shape::Vector, fields.u.clone()),
-            ("velocity", "v", Shape::Vector, fields.v.clone()),
-            ("acceleration", "a", Shape::Vector, fields.a.clone()),
-            ("displacement_gradient", "H", Shape::Matrix, matrix(&fields.H)),
-            ("deformation_gradient", "F", Shape::Matrix, matrix(&fields.F)),
-            ("jacobian", "J", Shape::Scalar, vec![fields.J]),
-            ("first_piola_kirchhoff", "P", Shape::Matrix, matrix(&fields.P)),
-            ("body_force", "b", Shape::Vector, b),
+            ("displacement", "u", "displacement", Shape::Vector, fields.u.clone()),
+            ("velocity", "v", "velocity", Shape::Vector, fields.v.clone()),
+            ("acceleration", "a", "acceleration", Shape::Vector, fields.a.clone()),
+            (
+                "displacement_gradient",
+                "H",
+                "displacement gradient, F - I",
+                Shape::Matrix,
+                matrix(&fields.H),
+            ),
+            ("deformation_gradient", "F", "deformation gradient", Shape::Matrix, matrix(&fields.F)),
+            ("jacobian", "J", "det F, current by reference volume", Shape::Scalar, vec![fields.J]),
+            (
+                "first_piola_kirchhoff",
+                "P",
+                "first Piola-Kirchhoff stress",
+                Shape::Matrix,
+                matrix(&fields.P),
+            ),
+            ("body_force", "b", "body force per unit mass", Shape::Vector, b),
         ];
         let constants = spec.constants();
         let mut outputs: Vec<Expr> = parts.iter().flat_map(|(.., part)| part.clone()).collect();
@@ -130,8 +144,9 @@ impl<'a> Plan<'a> {
         let mut take = |n: usize| slots.by_ref().take(n).collect::<Vec<Slot>>();
         let fields: Vec<Field> = parts
             .into_iter()
-            .map(|(name, letter, shape, part)| Field {
+            .map(|(name, letter, title, shape, part)| Field {
                 name,
+                title,
                 letter,
                 shape,
                 outputs: take(part.len()),

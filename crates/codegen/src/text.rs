@@ -5,3 +5,106 @@ pub(crate) fn one_line(text: &str) -> String {
     let words: Vec<&str> = text.split_whitespace().collect();
     words.join(" ").chars().filter(|c| !c.is_control()).collect()
 }
+
+/// What a value may be and what it means: the description or the name, the unit, the range.
+pub(crate) fn meaning(name: &str, description: &str, unit: &str, range: &str) -> String {
+    let mut text = one_line(if description.is_empty() { name } else { description });
+    if !unit.is_empty() {
+        text += &format!(", in {}", one_line(unit));
+    }
+    if !range.is_empty() {
+        text += &format!("; must be {}", one_line(range));
+    }
+    text
+}
+
+/// Of longer text, C's comments and messages show the beginning.
+const LONGEST: usize = 2_000;
+/// ... and its messages this many characters, which stay below what every compiler takes when each is an escape of four.
+const LONGEST_MESSAGE: usize = 500;
+
+fn shortened(text: &str, longest: usize) -> String {
+    let mut characters = text.chars();
+    let kept: String = characters.by_ref().take(longest).collect();
+    if characters.next().is_some() { kept + "..." } else { kept }
+}
+
+/// Text for a C block comment: one line that neither ends the comment nor opens another, nor joins lines.
+pub(crate) fn comment(text: &str) -> String {
+    let mut safe = String::new();
+    for c in shortened(&one_line(text), LONGEST).chars() {
+        let c = match c {
+            // At the end of a line, this would join it with the next one.
+            '\\' => '_',
+            // Letters of any alphabet; everything else, as marks and spaces nobody sees, stays out.
+            c if !c.is_ascii() && !c.is_alphanumeric() => '_',
+            c => c,
+        };
+        // The end of a comment, the start of one, and trigraphs.
+        if matches!(
+            (safe.chars().last(), c),
+            (Some('*'), '/') | (Some('/'), '*') | (Some('?'), '?')
+        ) {
+            safe.push(' ');
+        }
+        safe.push(c);
+    }
+    safe
+}
+
+/// A C string literal.
+pub(crate) fn c_string(text: &str) -> String {
+    let mut literal = String::from("\"");
+    for byte in shortened(&one_line(text), LONGEST_MESSAGE).bytes() {
+        match byte {
+            // A question mark may start a trigraph.
+            b'"' | b'\\' | b'?' => literal.extend(['\\', char::from(byte)]),
+            b' '..=b'~' => literal.push(char::from(byte)),
+            // Three digits always: a digit that follows is not taken for a part.
+            _ => literal += &format!("\\{byte:03o}"),
+        }
+    }
+    literal + "\""
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn comments_stay_open() {
+        assert_eq!(comment("a*/b/*c"), "a* /b/ *c");
+        assert_eq!(comment("**//**/"), "** // ** /");
+        assert_eq!(comment("*??/\n/"), "*? ?/ /");
+        assert_eq!(comment("*\\\n/ x\\"), "*_ / x_");
+        assert_eq!(comment("https://example.org"), "https://example.org");
+    }
+
+    #[test]
+    fn literals_stay_closed() {
+        assert_eq!(c_string("a\"b\\"), r#""a\"b\\""#);
+        assert_eq!(c_string("??/\" é7"), r#""\?\?/\" \303\2517""#);
+    }
+
+    proptest! {
+        #[test]
+        fn no_text_ends_a_comment_or_a_literal(text in r#"([*/?\\"\n\r =()<>%:]|\PC){0,40}"#) {
+            let comment = comment(&text);
+            for sign in ["*/", "/*", "??", "\\", "\n", "\r"] {
+                prop_assert!(!comment.contains(sign), "{comment:?}");
+            }
+            let literal = c_string(&text);
+            let inner = &literal[1..literal.len() - 1];
+            prop_assert!(inner.is_ascii() && !inner.contains("??") && !inner.contains('\n'));
+            // Every quotation mark is escaped, and the last backslash escapes something.
+            let mut characters = inner.chars();
+            while let Some(c) = characters.next() {
+                prop_assert!(c != '"');
+                if c == '\\' {
+                    prop_assert!(characters.next().is_some());
+                }
+            }
+        }
+    }
+}

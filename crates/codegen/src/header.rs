@@ -1,0 +1,764 @@
+//! The C header of a solution.
+
+use crate::function::digits;
+use crate::module::Names;
+use crate::plan::{Block, Measures, Operand, Plan, Shape, Stage};
+use crate::text::{c_string, comment, meaning};
+use mmsmith_expr::{Function, Operation, Slot, nearest_f64};
+use mmsmith_spec::{Boundary, Condition, Parameter, Surface};
+
+/// What every header needs: macros, and `sin(pi x)` as the crate of the solutions computes it.
+const SUPPORT: &str = include_str!("support.h");
+
+/// The width of comments.
+const WIDTH: usize = 115;
+
+/// Words of C, C++ and CUDA, and macros of their usual headers, that cannot name a member of a structure.
+const C_WORDS: &[&str] = &[
+    "BUFSIZ",
+    "CHAR_BIT",
+    "DOMAIN",
+    "EDOM",
+    "EILSEQ",
+    "EOF",
+    "ERANGE",
+    "FILENAME_MAX",
+    "HUGE",
+    "HUGE_VAL",
+    "HUGE_VALF",
+    "HUGE_VALL",
+    "I",
+    "INFINITY",
+    "MAXFLOAT",
+    "NAN",
+    "NULL",
+    "OVERFLOW",
+    "PLOSS",
+    "RAND_MAX",
+    "SING",
+    "TLOSS",
+    "UNDERFLOW",
+    "alignas",
+    "alignof",
+    "and",
+    "and_eq",
+    "asm",
+    "assert",
+    "auto",
+    "bitand",
+    "bitor",
+    "bool",
+    "break",
+    "case",
+    "catch",
+    "char",
+    "char16_t",
+    "char32_t",
+    "char8_t",
+    "class",
+    "co_await",
+    "co_return",
+    "co_yield",
+    "compl",
+    "complex",
+    "concept",
+    "const",
+    "const_cast",
+    "consteval",
+    "constexpr",
+    "constinit",
+    "continue",
+    "decltype",
+    "default",
+    "delete",
+    "do",
+    "double",
+    "dynamic_cast",
+    "else",
+    "enum",
+    "errno",
+    "explicit",
+    "export",
+    "extern",
+    "false",
+    "far",
+    "float",
+    "for",
+    "fortran",
+    "friend",
+    "goto",
+    "i386",
+    "if",
+    "imaginary",
+    "inline",
+    "int",
+    "interface",
+    "linux",
+    "long",
+    "math_errhandling",
+    "max",
+    "min",
+    "mutable",
+    "namespace",
+    "near",
+    "new",
+    "noexcept",
+    "noreturn",
+    "not",
+    "not_eq",
+    "nullptr",
+    "operator",
+    "or",
+    "or_eq",
+    "private",
+    "protected",
+    "public",
+    "register",
+    "reinterpret_cast",
+    "requires",
+    "restrict",
+    "return",
+    "short",
+    "signed",
+    "sizeof",
+    "small",
+    "static",
+    "static_assert",
+    "static_cast",
+    "stderr",
+    "stdin",
+    "stdout",
+    "struct",
+    "switch",
+    "template",
+    "this",
+    "thread_local",
+    "throw",
+    "true",
+    "try",
+    "typedef",
+    "typeid",
+    "typename",
+    "typeof",
+    "typeof_unqual",
+    "union",
+    "unix",
+    "unsigned",
+    "using",
+    "virtual",
+    "void",
+    "volatile",
+    "wchar_t",
+    "while",
+    "xor",
+    "xor_eq",
+];
+
+/// Beginnings of families of macros.
+const C_FAMILIES: &[&str] = &[
+    "CHAR_", "DBL_", "DECIMAL_", "FE_", "FLT_", "FP_", "INT", "LDBL_", "LLONG_", "LONG_", "MATH_",
+    "MMSMITH_", "M_", "SCHAR_", "SHRT_", "SIZE_", "UCHAR_", "UINT", "ULLONG_", "ULONG_", "USHRT_",
+];
+
+/// The names of parameters as members of a structure: what is no name in C gets an underscore at its end, and more
+/// where another parameter is called so.
+fn members(parameters: &[Parameter]) -> Vec<String> {
+    let is_taken = |name: &str| {
+        C_WORDS.contains(&name) || C_FAMILIES.iter().any(|family| name.starts_with(family))
+    };
+    let plain = |name: &str| parameters.iter().any(|p| p.name == name && !is_taken(name));
+    let mut members: Vec<String> = Vec::new();
+    for parameter in parameters {
+        let mut member = parameter.name.clone();
+        if is_taken(&member) {
+            member.push('_');
+            while plain(&member) || members.contains(&member) {
+                member.push('_');
+            }
+        }
+        members.push(member);
+    }
+    members
+}
+
+impl Plan<'_> {
+    /// The text of the solution's C header.
+    #[must_use]
+    pub fn header_source(&self) -> String {
+        let prefix = Names::of(&self.spec.name).module;
+        let members = members(&self.spec.parameters);
+        let dimension = self.spec.dimension;
+        Header { plan: self, prefix, members, dimension, text: String::new() }.write()
+    }
+}
+
+struct Header<'a> {
+    plan: &'a Plan<'a>,
+    /// What all names begin with.
+    prefix: String,
+    /// The names of the parameters.
+    members: Vec<String>,
+    dimension: usize,
+    text: String,
+}
+
+impl Header<'_> {
+    fn write(mut self) -> String {
+        let guard = format!("MMSMITH_{}_H", self.prefix.to_ascii_uppercase());
+        self.introduction();
+        self.line(&format!("#ifndef {guard}"));
+        self.line(&format!("#define {guard} 1\n"));
+        self.line("#include <math.h>");
+        self.line("#include <stddef.h>\n");
+        self.text += SUPPORT;
+        self.line("");
+        self.types();
+        self.prepare();
+        self.fields();
+        self.stages();
+        self.constants();
+        self.line("#if defined(__clang__)\n#pragma STDC FP_CONTRACT DEFAULT\n#endif\n");
+        self.line(&format!("#endif /* {guard} */"));
+        self.text
+    }
+
+    fn line(&mut self, text: &str) {
+        self.text += text;
+        self.text.push('\n');
+    }
+
+    /// A block comment, each line made harmless and broken between words.
+    fn comment(&mut self, lines: &[String]) {
+        let mut broken = Vec::new();
+        for line in lines {
+            let mut text = String::new();
+            for word in comment(line).split(' ').filter(|word| !word.is_empty()) {
+                if text.len() + 1 + word.len() > WIDTH {
+                    broken.push(std::mem::take(&mut text));
+                    text.push_str("   ");
+                }
+                text.push(' ');
+                text += word;
+            }
+            broken.push(text);
+        }
+        let end = if broken.len() == 1 { " */" } else { "\n */" };
+        self.line(&format!("/*{}{end}", broken.join("\n *")));
+    }
+
+    fn introduction(&mut self) {
+        let (spec, prefix) = (self.plan.spec, self.prefix.clone());
+        let mut lines = vec![format!("{}.", spec.title)];
+        lines.push(format!(
+            "Generated by `cargo xtask gen` from `mms-specs/{}.toml`. Do not edit.",
+            spec.name
+        ));
+        lines.push(String::new());
+        lines.extend(self.plan.formulas.iter().cloned());
+        for boundary in &spec.boundaries {
+            lines.push(format!("surface {}: {}", surface(boundary), condition(boundary)));
+        }
+        if !spec.reference.is_empty() {
+            lines.push(String::new());
+            lines.push(format!("Source: {}.", spec.reference));
+        }
+        let conventions = format!(
+            "
+X is the reference position, x = X + u the current one, in Cartesian components; t is the time.
+u displacement, v = du/dt, a = d2u/dt2, H displacement gradient, F = I + H deformation gradient, J = det F,
+P first Piola-Kirchhoff stress (traction on a surface with reference normal N: P N), b body force per unit mass:
+rho0 a_i = sum_J dP_iJ/dX_J + rho0 b_i. In two dimensions the deformation is plane strain.
+Matrices are row-major: entry [i*{prefix}_dimension + J], row i spatial, column J reference.
+Units are those of the parameters; with SI units: u, X in m, P in Pa, b in m/s^2.
+
+{prefix}_parameters p = {prefix}_defaults(); gives the parameters, to be changed at will; then, once a run,
+message = {prefix}_prepare(&s, &p); is a null pointer, or says what is wrong with the parameters.
+{prefix}_u, _v, _a, _H, _F, _J, _P, _b compute one field, {prefix}_fields all of them.
+The body force at points that stay: {prefix}_point_array once a run, {prefix}_b_array once a step, or for single points
+{prefix}_at_point once a run, {prefix}_at_time once a step, {prefix}_b_staged. All ways give the same bits.
+
+C99, C++ and CUDA. MMSMITH_FN is what functions are declared with, `static inline` where nothing else is defined
+before. Results equal those of the Rust functions bit for bit where the compiler keeps every rounding:
+-ffp-contract=off where the processor fuses products and sums (nvcc: -fmad=false), and no -ffast-math."
+        );
+        lines.extend(conventions.lines().map(str::to_owned));
+        self.comment(&lines);
+    }
+
+    fn types(&mut self) {
+        let (prefix, d) = (self.prefix.clone(), self.dimension);
+        let (parameters, fixed, time, point) = (
+            self.members.len(),
+            self.plan.count(Stage::Fixed),
+            self.plan.count(Stage::Time),
+            self.plan.count(Stage::Point),
+        );
+        self.comment(&["Space dimensions, and the numbers of parameters and of values that the stages of b keep.".into()]);
+        self.line(&format!(
+            "enum {{\n    {prefix}_dimension = {d},\n    {prefix}_parameter_count = {parameters},\n    \
+             {prefix}_time_count = {time},\n    {prefix}_point_count = {point}\n}};\n"
+        ));
+        self.line(&format!("typedef struct {prefix}_parameters {{"));
+        for (parameter, member) in self.plan.spec.parameters.iter().zip(self.members.clone()) {
+            let Parameter { name, description, unit, range, .. } = parameter;
+            let about = comment(&meaning(name, description, unit, range));
+            self.line(&format!("    double {member}; /* {about} */"));
+        }
+        if self.members.is_empty() {
+            self.line("    double unused; /* there are no parameters */");
+        }
+        self.line(&format!("}} {prefix}_parameters;\n"));
+        self.comment(&["The parameters, and the values that depend on them only.".into()]);
+        let count = fixed.max(1);
+        self.line(&format!(
+            "typedef struct {prefix}_solution {{\n    {prefix}_parameters par;\n    double fixed[{count}];\n}} {prefix}_solution;\n"
+        ));
+        self.comment(&["What the body force needs of the time alone.".into()]);
+        let count = time.max(1);
+        self.line(&format!(
+            "typedef struct {prefix}_time_values {{\n    double values[{count}];\n}} {prefix}_time_values;\n"
+        ));
+        self.line(&format!("typedef struct {prefix}_field_values {{"));
+        for field in &self.plan.fields {
+            let shape = self.shape(field.shape);
+            self.text += &format!("    double {}{shape}; /* {} */\n", field.letter, field.title);
+        }
+        self.line(&format!("}} {prefix}_field_values;\n"));
+    }
+
+    fn prepare(&mut self) {
+        let prefix = self.prefix.clone();
+        let spec = self.plan.spec;
+        self.line(&format!("MMSMITH_FN {prefix}_parameters {prefix}_defaults(void)\n{{"));
+        self.line(&format!("    {prefix}_parameters p;"));
+        for (parameter, member) in spec.parameters.iter().zip(self.members.clone()) {
+            self.line(&format!("    p.{member} = {};", literal(parameter.default)));
+        }
+        if self.members.is_empty() {
+            self.line("    p.unused = 0.0;");
+        }
+        self.line("    return p;\n}\n");
+
+        self.comment(&["Checks the parameters and computes what depends on them only. Returns a null pointer, or a \
+                        message that says what is not admissible; *s is then as it was."
+            .into()]);
+        self.line(&format!(
+            "MMSMITH_FN const char *{prefix}_prepare({prefix}_solution *s, const {prefix}_parameters *p)\n{{"
+        ));
+        for (parameter, member) in spec.parameters.iter().zip(self.members.clone()) {
+            let bounds: String = parameter
+                .bounds
+                .iter()
+                .map(|bound| {
+                    format!(" && p->{member} {} {}", bound.relation.sign(), literal(bound.limit))
+                })
+                .collect();
+            let mut message =
+                format!("{} of {} must be a finite number", parameter.name, spec.name);
+            if !parameter.range.is_empty() {
+                message += &format!(" {}", parameter.range);
+            }
+            self.line(&format!("    if (!(mmsmith_is_finite(p->{member}){bounds})) {{"));
+            self.line(&format!("        return {};\n    }}", c_string(&message)));
+        }
+        let plan = self.plan;
+        let block = plan.stage(Stage::Fixed);
+        let outputs = self.statements(&block, "    ", Places::PREPARE);
+        let (sides, fixed) = outputs.split_at(2 * spec.requirements.len());
+        for (requirement, side) in spec.requirements.iter().zip(sides.chunks(2)) {
+            let message =
+                format!("the parameters of {} must satisfy {}", spec.name, requirement.text);
+            let sign = requirement.relation.sign();
+            self.line(&format!("    if (!({} {sign} {})) {{", side[0], side[1]));
+            self.line(&format!("        return {};\n    }}", c_string(&message)));
+        }
+        if self.members.is_empty() {
+            self.line("    (void)p;");
+        }
+        self.line("    s->par = *p;");
+        for (index, value) in fixed.iter().enumerate() {
+            self.line(&format!("    s->fixed[{index}] = {value};"));
+        }
+        if fixed.is_empty() {
+            self.line("    s->fixed[0] = 0.0;");
+        }
+        self.line("    return 0;\n}\n");
+    }
+
+    fn fields(&mut self) {
+        let (prefix, d, plan) = (self.prefix.clone(), self.dimension, self.plan);
+        for field in &plan.fields {
+            let letter = field.letter;
+            let block = plan.after_parameters(&field.outputs);
+            let given = format!("const {prefix}_solution *s, const double X[{d}], double t");
+            self.line(&format!("/* {} */", field.title));
+            if field.shape == Shape::Scalar {
+                self.line(&format!("MMSMITH_FN double {prefix}_{letter}({given})\n{{"));
+            } else {
+                let shape = self.shape(field.shape);
+                self.line(&format!(
+                    "MMSMITH_FN void {prefix}_{letter}({given}, double {letter}{shape})\n{{"
+                ));
+            }
+            self.unread(&block, &[Given::Solution, Given::Position, Given::Time]);
+            let outputs = self.statements(&block, "    ", Places::SINGLE);
+            for (index, value) in outputs.iter().enumerate() {
+                self.line(&match field.shape {
+                    Shape::Scalar => format!("    return {value};"),
+                    _ => format!("    {letter}[{index}] = {value};"),
+                });
+            }
+            self.line("}\n");
+        }
+
+        self.line("/* all fields */");
+        self.line(&format!(
+            "MMSMITH_FN void {prefix}_fields(const {prefix}_solution *s, const double X[{d}], double t, \
+             {prefix}_field_values *out)\n{{"
+        ));
+        let block = plan.all_fields();
+        self.unread(&block, &[Given::Solution, Given::Position, Given::Time]);
+        let outputs = self.statements(&block, "    ", Places::SINGLE);
+        let mut outputs = outputs.iter();
+        for field in &plan.fields {
+            for (index, value) in outputs.by_ref().take(field.outputs.len()).enumerate() {
+                self.line(&match field.shape {
+                    Shape::Scalar => format!("    out->{} = {value};", field.letter),
+                    _ => format!("    out->{}[{index}] = {value};", field.letter),
+                });
+            }
+        }
+        self.line("}\n");
+    }
+
+    fn stages(&mut self) {
+        let (prefix, d, plan) = (self.prefix.clone(), self.dimension, self.plan);
+        let (times, points) = (plan.count(Stage::Time), plan.count(Stage::Point));
+        let shown = points.max(1);
+
+        self.comment(&["What the body force needs of the time alone.".into()]);
+        self.line(&format!(
+            "MMSMITH_FN {prefix}_time_values {prefix}_at_time(const {prefix}_solution *s, double t)\n{{"
+        ));
+        self.line(&format!("    {prefix}_time_values time;"));
+        let block = plan.stage(Stage::Time);
+        self.unread(&block, &[Given::Solution, Given::Time]);
+        let outputs = self.statements(&block, "    ", Places::SINGLE);
+        for (index, value) in outputs.iter().enumerate() {
+            self.line(&format!("    time.values[{index}] = {value};"));
+        }
+        if times == 0 {
+            self.line("    time.values[0] = 0.0;");
+        }
+        self.line("    return time;\n}\n");
+
+        self.comment(&[format!(
+            "What the body force needs of the position alone, {points} values."
+        )]);
+        self.line(&format!(
+            "MMSMITH_FN void {prefix}_at_point(const {prefix}_solution *s, const double X[{d}], double point[{shown}])\n{{"
+        ));
+        let block = plan.stage(Stage::Point);
+        self.unread(&block, &[Given::Solution, Given::Position]);
+        let outputs = self.statements(&block, "    ", Places::SINGLE);
+        for (index, value) in outputs.iter().enumerate() {
+            self.line(&format!("    point[{index}] = {value};"));
+        }
+        if points == 0 {
+            self.line("    point[0] = 0.0;");
+        }
+        self.line("}\n");
+
+        self.comment(&[
+            "The body force from the values of one time and of one point. Value m of the point is point[m*stride]:".into(),
+            format!("stride 1 after {prefix}_at_point; for point p of {prefix}_point_array pass point + p and stride n."),
+        ]);
+        self.line(&format!(
+            "MMSMITH_FN void {prefix}_b_staged(const {prefix}_solution *s, const {prefix}_time_values *time,\n    \
+             const double *point, size_t stride, double b[{d}])\n{{"
+        ));
+        let block = plan.body_force_staged();
+        self.unread(&block, &[Given::Solution, Given::TimeValues, Given::PointValues]);
+        if !block.reads(|operand| matches!(operand, Operand::Kept(Stage::Point, 1..))) {
+            self.line("    (void)stride;");
+        }
+        let outputs = self.statements(&block, "    ", Places::STAGED);
+        for (index, value) in outputs.iter().enumerate() {
+            self.line(&format!("    b[{index}] = {value};"));
+        }
+        self.line("}\n");
+
+        self.comment(&[
+            "What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of".into(),
+            format!("point p goes to point[m*n + p]. The array `point` has n*{prefix}_point_count entries."),
+        ]);
+        self.line(&format!(
+            "MMSMITH_FN void {prefix}_point_array(const {prefix}_solution *s, size_t n, const double *MMSMITH_RESTRICT X,\n    \
+             double *MMSMITH_RESTRICT point)\n{{"
+        ));
+        if points == 0 {
+            self.line("    (void)s;\n    (void)n;\n    (void)X;\n    (void)point;\n}\n");
+        } else {
+            self.point_loop(points);
+        }
+
+        self.comment(&[
+            format!("The body force at time t of the points first, ..., first + count - 1 out of the n of {prefix}_point_array;"),
+            "component i of point p goes to b[p*dimension + i].".into(),
+        ]);
+        self.line(&format!(
+            "MMSMITH_FN void {prefix}_b_array(const {prefix}_solution *s, double t, size_t n,\n    \
+             const double *MMSMITH_RESTRICT point, size_t first, size_t count, double *MMSMITH_RESTRICT b)\n{{"
+        ));
+        self.line(&format!("    const {prefix}_time_values time = {prefix}_at_time(s, t);"));
+        let read: Vec<usize> = (0..points)
+            .filter(|&m| block.reads(|operand| operand == Operand::Kept(Stage::Point, m)))
+            .collect();
+        for m in &read {
+            self.line(&format!("    const double *const point{m} = point + {m} * n;"));
+        }
+        self.line("    const size_t end = first + count;\n    size_t p;");
+        if read.is_empty() {
+            self.line("    (void)point;\n    (void)n;");
+        }
+        if !block.reads(|operand| Given::TimeValues.is(operand)) {
+            self.line("    (void)time;");
+        }
+        self.line("    for (p = first; p < end; ++p) {");
+        let outputs = self.statements(&block, "        ", Places::ARRAY);
+        for (index, value) in outputs.iter().enumerate() {
+            self.line(&format!("        b[p * {d} + {index}] = {value};"));
+        }
+        self.line("    }\n}\n");
+    }
+
+    /// The rest of the function that fills the array of the points.
+    fn point_loop(&mut self, points: usize) {
+        let (prefix, d) = (self.prefix.clone(), self.dimension);
+        self.line("    size_t p, m;\n    for (p = 0; p < n; ++p) {");
+        self.line(&format!("        double values[{points}];"));
+        self.line(&format!("        {prefix}_at_point(s, X + p * {d}, values);"));
+        self.line(&format!("        for (m = 0; m < {points}; ++m) {{"));
+        self.line("            point[m * n + p] = values[m];\n        }\n    }\n}\n");
+    }
+
+    fn constants(&mut self) {
+        let constants = &self.plan.constants;
+        for (name, about, slot) in [
+            ("cell_length", "the length that a cell count divides", constants.cell_length),
+            ("density", "mass per reference volume", constants.density),
+            ("wave_speed", "the speed that CFL numbers refer to", constants.wave_speed),
+            ("period", "the time in which the motion repeats", constants.period),
+            ("lambda", "first Lame constant", constants.lambda),
+            ("mu", "shear modulus", constants.mu),
+        ] {
+            self.scalar(name, about, slot);
+        }
+        match &constants.domain {
+            Measures::Box { lower, upper } => {
+                self.corner("lower", "the body's corner of smallest coordinates", lower);
+                self.corner("upper", "the body's corner of largest coordinates", upper);
+            }
+            Measures::Annulus { inner, outer } => {
+                self.scalar("inner", "the body's inner radius", *inner);
+                self.scalar("outer", "the body's outer radius", *outer);
+            }
+        }
+    }
+
+    fn scalar(&mut self, name: &str, about: &str, slot: Slot) {
+        let prefix = self.prefix.clone();
+        self.line(&format!("/* {about} */"));
+        self.line(&format!("MMSMITH_FN double {prefix}_{name}(const {prefix}_solution *s)\n{{"));
+        let plan = self.plan;
+        let block = plan.after_parameters(&[slot]);
+        self.unread(&block, &[Given::Solution]);
+        for value in self.statements(&block, "    ", Places::SINGLE) {
+            self.line(&format!("    return {value};"));
+        }
+        self.line("}\n");
+    }
+
+    fn corner(&mut self, name: &str, about: &str, slots: &[Slot]) {
+        let (prefix, d) = (self.prefix.clone(), self.dimension);
+        self.line(&format!("/* {about} */"));
+        self.line(&format!(
+            "MMSMITH_FN void {prefix}_{name}(const {prefix}_solution *s, double {name}[{d}])\n{{"
+        ));
+        let plan = self.plan;
+        let block = plan.after_parameters(slots);
+        self.unread(&block, &[Given::Solution]);
+        for (index, value) in self.statements(&block, "    ", Places::SINGLE).iter().enumerate() {
+            self.line(&format!("    {name}[{index}] = {value};"));
+        }
+        self.line("}\n");
+    }
+
+    fn shape(&self, shape: Shape) -> String {
+        match shape {
+            Shape::Scalar => String::new(),
+            Shape::Vector => format!("[{}]", self.dimension),
+            Shape::Matrix => format!("[{}]", self.dimension * self.dimension),
+        }
+    }
+
+    /// Names what a block has no use for, so that compilers do not warn.
+    fn unread(&mut self, block: &Block<'_>, given: &[Given]) {
+        for given in given {
+            if !block.reads(|operand| given.is(operand)) {
+                self.line(&format!("    (void){};", given.name()));
+            }
+        }
+    }
+
+    /// Writes the statements of a block; returns its outputs as expressions.
+    fn statements(&mut self, block: &Block<'_>, indent: &str, places: Places) -> Vec<String> {
+        for (index, operation) in block.steps() {
+            let value = self.operation(block, operation, places);
+            self.line(&format!("{indent}const double t{index} = {value};"));
+        }
+        block.outputs().map(|operand| self.operand(operand, places)).collect()
+    }
+
+    fn operand(&self, operand: Operand<'_>, places: Places) -> String {
+        match operand {
+            Operand::Temporary(index) => format!("t{index}"),
+            Operand::Number(value) => literal(nearest_f64(value)),
+            Operand::Pi => literal(std::f64::consts::PI),
+            Operand::Coordinate(index) => format!("X[{index}]"),
+            Operand::Time => "t".into(),
+            Operand::Parameter(index) => format!("{}{}", places.parameters, self.members[index]),
+            Operand::Kept(Stage::Fixed, index) => format!("s->fixed[{index}]"),
+            Operand::Kept(Stage::Time, index) => format!("{}values[{index}]", places.time),
+            Operand::Kept(Stage::Point, index) => match (places.in_array, index) {
+                (true, _) => format!("point{index}[p]"),
+                (false, 0) => "point[0]".into(),
+                (false, 1) => "point[stride]".into(),
+                (false, _) => format!("point[{index} * stride]"),
+            },
+        }
+    }
+
+    fn operation(&self, block: &Block<'_>, operation: &Operation, places: Places) -> String {
+        let at = |slot: &Slot| self.operand(block.operand(*slot), places);
+        match operation {
+            // These are operands and no statements.
+            Operation::Number(value) => literal(nearest_f64(value)),
+            Operation::Pi => literal(std::f64::consts::PI),
+            Operation::Input(_) => String::new(),
+            Operation::Add(a, b) => format!("{} + {}", at(a), at(b)),
+            Operation::Sub(a, b) => format!("{} - {}", at(a), at(b)),
+            Operation::Mul(a, b) => format!("{} * {}", at(a), at(b)),
+            Operation::Div(a, b) => format!("{} / {}", at(a), at(b)),
+            Operation::Neg(a) => format!("-{}", at(a)),
+            Operation::Sqrt(a) => format!("sqrt({})", at(a)),
+            Operation::SinPi(a) => format!("mmsmith_sin_pi({})", at(a)),
+            Operation::CosPi(a) => format!("mmsmith_cos_pi({})", at(a)),
+            Operation::Call(function, a) => format!("{}({})", c_name(*function), at(a)),
+            Operation::Power(a, exponent) => {
+                format!("pow({}, {})", at(a), literal(nearest_f64(exponent)))
+            }
+            Operation::Atan2(y, x) => format!("atan2({}, {})", at(y), at(x)),
+        }
+    }
+}
+
+/// How a function refers to what is not computed in it.
+#[derive(Clone, Copy)]
+struct Places {
+    /// What stands before the name of a parameter.
+    parameters: &'static str,
+    /// What stands before the values of the time.
+    time: &'static str,
+    /// Whether point `p` is one of an array.
+    in_array: bool,
+}
+
+impl Places {
+    const PREPARE: Places = Places { parameters: "p->", ..Places::SINGLE };
+    const SINGLE: Places = Places { parameters: "s->par.", time: "time.", in_array: false };
+    const STAGED: Places = Places { time: "time->", ..Places::SINGLE };
+    const ARRAY: Places = Places { in_array: true, ..Places::SINGLE };
+}
+
+/// What a function is given.
+#[derive(Clone, Copy)]
+enum Given {
+    Solution,
+    Position,
+    Time,
+    TimeValues,
+    PointValues,
+}
+
+impl Given {
+    fn name(self) -> &'static str {
+        match self {
+            Given::Solution => "s",
+            Given::Position => "X",
+            Given::Time => "t",
+            Given::TimeValues => "time",
+            Given::PointValues => "point",
+        }
+    }
+
+    /// Whether the operand is found in it.
+    fn is(self, operand: Operand<'_>) -> bool {
+        match operand {
+            Operand::Temporary(_) | Operand::Number(_) | Operand::Pi => false,
+            Operand::Coordinate(_) => matches!(self, Given::Position),
+            Operand::Time => matches!(self, Given::Time),
+            Operand::Parameter(_) | Operand::Kept(Stage::Fixed, _) => {
+                matches!(self, Given::Solution)
+            }
+            Operand::Kept(Stage::Time, _) => matches!(self, Given::TimeValues),
+            Operand::Kept(Stage::Point, _) => matches!(self, Given::PointValues),
+        }
+    }
+}
+
+/// A double; negative ones with a minus sign.
+fn literal(value: f64) -> String {
+    let sign = if value.is_sign_negative() { "-" } else { "" };
+    let magnitude = if value.is_infinite() { "HUGE_VAL".into() } else { digits(value.abs()) };
+    format!("{sign}{magnitude}")
+}
+
+fn c_name(function: Function) -> &'static str {
+    match function {
+        Function::Sin => "sin",
+        Function::Cos => "cos",
+        Function::Tan => "tan",
+        Function::Asin => "asin",
+        Function::Acos => "acos",
+        Function::Atan => "atan",
+        Function::Sinh => "sinh",
+        Function::Cosh => "cosh",
+        Function::Tanh => "tanh",
+        Function::Exp => "exp",
+        Function::Ln => "log",
+        Function::Ln1p => "log1p",
+        Function::Expm1 => "expm1",
+        Function::Atan2 => "atan2",
+    }
+}
+
+fn surface(boundary: &Boundary) -> String {
+    let axis = |axis: usize| ["X", "Y", "Z"].get(axis).copied().unwrap_or_default();
+    match boundary.surface {
+        Surface::Lower(i) => format!("{}-lower", axis(i)),
+        Surface::Upper(i) => format!("{}-upper", axis(i)),
+        Surface::Inner => "inner".into(),
+        Surface::Outer => "outer".into(),
+    }
+}
+
+fn condition(boundary: &Boundary) -> &'static str {
+    match boundary.condition {
+        Condition::Sliding => "sliding",
+        Condition::Symmetry => "symmetry",
+        Condition::TractionFree => "traction-free",
+        Condition::PrescribedTraction => "prescribed traction",
+        Condition::PrescribedMotion => "prescribed motion",
+    }
+}
