@@ -8,6 +8,7 @@
 //! components last: see [`Fields`].
 
 mod coordinates;
+mod cross_check;
 mod derivation;
 mod derive;
 mod diagnostic;
@@ -18,6 +19,7 @@ mod spec;
 mod tensor;
 
 pub use coordinates::Coordinates;
+pub use cross_check::{CrossCheck, InlineText, ListingText};
 pub use derive::{DeriveError, Fields};
 pub use diagnostic::{Diagnostic, nearest};
 pub use spec::{

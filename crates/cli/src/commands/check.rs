@@ -1,11 +1,14 @@
 //! `mms check`: is the field code right?
 
 use anyhow::{Result, bail};
+use mmsmith_expr::nearest_f64;
+use mmsmith_prove::{Equality, Published, Report};
 use mmsmith_solutions::CATALOGUE;
+use mmsmith_spec::Spec;
 use mmsmith_verify::{
     BLUNT, CheckReport, OWN_ERROR_FACTOR, TOLERANCE, Verdict, check as check_fields,
 };
-use serde_json::json;
+use serde_json::{Map, Value, json};
 
 use crate::arguments::CheckOptions;
 use crate::json::Output;
@@ -28,18 +31,28 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
         .iter()
         .map(|name| Subject::new(name, &options.parameters.set))
         .collect::<Result<Vec<_>>>()?;
+    let listings = subjects
+        .iter()
+        .map(|subject| Published::read(&subject.spec, &subject.file, subject.folder.as_deref()))
+        .collect::<Result<Vec<_>, _>>()?;
     let mut results = Vec::new();
     let mut passed = true;
-    for Subject { name, solution, parameters } in &subjects {
+    for (Subject { name, solution, parameters, spec, .. }, listings) in
+        subjects.iter().zip(&listings)
+    {
         let report = check_fields(solution, options.points)?;
-        terminal::say(&text(name, &report))?;
-        passed &= report.passed();
+        let comparisons = compare(spec, listings)?;
+        let all_passed =
+            report.passed() && comparisons.iter().all(|comparison| comparison.report.proved());
+        terminal::say(&text(name, all_passed, &report, &comparisons))?;
+        passed &= all_passed;
         results.push(json!({
             "solution": name,
             "parameters": parameters,
             "points": report.points,
             "findings": report.findings,
-            "passed": report.passed(),
+            "cross_checks": comparisons.iter().map(Comparison::document).collect::<Vec<_>>(),
+            "passed": all_passed,
         }));
     }
     terminal::say(&format!(
@@ -64,9 +77,57 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
     Ok(passed)
 }
 
+/// What came out for one published listing.
+struct Comparison {
+    source: String,
+    report: Report,
+}
+
+impl Comparison {
+    fn document(&self) -> Value {
+        let components = self.report.components.iter().map(|component| match &component.verdict {
+            Equality::Proved { digits } => json!({
+                "entry": component.entry,
+                "points": component.points,
+                "verdict": "proved",
+                "digits": digits,
+            }),
+            Equality::Refuted { digits, differing, place, listing, derived } => json!({
+                "entry": component.entry,
+                "points": component.points,
+                "verdict": "refuted",
+                "digits": digits,
+                "differing": differing,
+                "place": place.iter().map(|(name, value)| (name.clone(), json!(value))).collect::<Map<_, _>>(),
+                "listing": nearest_f64(listing),
+                "derived": nearest_f64(derived),
+            }),
+        });
+        json!({
+            "source": self.source,
+            "components": components.collect::<Vec<_>>(),
+            "not_compared": self.report.unchecked,
+            "proved": self.report.proved(),
+        })
+    }
+}
+
+/// Holds published listings against the fields derived from `spec`.
+fn compare(spec: &Spec, listings: &[Published<'_>]) -> Result<Vec<Comparison>> {
+    if listings.is_empty() {
+        return Ok(Vec::new());
+    }
+    let fields = spec.derive()?;
+    let compare = |listing: &Published<'_>| {
+        let source = listing.source().to_owned();
+        Ok(Comparison { source, report: listing.compare(&fields)? })
+    };
+    listings.iter().map(compare).collect()
+}
+
 /// The findings of one solution as a table, and the place of each that did not pass.
-fn text(name: &str, report: &CheckReport) -> String {
-    let verdict = if report.passed() { "passed" } else { "FAILED" };
+fn text(name: &str, passed: bool, report: &CheckReport, comparisons: &[Comparison]) -> String {
+    let verdict = if passed { "passed" } else { "FAILED" };
     let mut text = format!("{name}: {verdict} at {} points\n", report.points);
     let header =
         ["field", "compared with", "verdict", "difference", "own error", "allowed", "scale"];
@@ -98,6 +159,12 @@ fn text(name: &str, report: &CheckReport) -> String {
     }
     text += &table.text();
     text += &places;
+    for Comparison { source, report } in comparisons {
+        text += &format!("  listing '{source}'\n");
+        for line in report.to_string().lines() {
+            text += &format!("    {line}\n");
+        }
+    }
     text.push('\n');
     text
 }
