@@ -130,3 +130,59 @@ fn a_listing_may_be_a_file_beside_the_specification() {
     assert_eq!(status, Some(2), "{errors}");
     assert!(errors.contains("ring.c:5:9"), "{errors}");
 }
+
+#[test]
+fn a_rim_that_is_nearly_free_is_refuted_with_the_worst_point() {
+    // Too little for the comparison in double precision to notice.
+    let (_folder, spec) =
+        changed_ring("2*R + Ro - 3*Ri)/d)'", "2.00000000000001*R + Ro - 3*Ri)/d)'");
+    let (status, out, _) = outcome(mms().arg("check").arg(&spec));
+    assert_eq!(status, Some(1), "{out}");
+    assert!(out.contains("P N on Inner: NOT zero: "), "{out}");
+    assert!(out.contains("zero in symbols, for all parameters: P N on Outer, shear"), "{out}");
+}
+
+#[test]
+fn what_symbols_do_not_show_is_shown_in_digits() {
+    let folder = tempfile::tempdir().unwrap();
+    let spec = folder.path().join("bar.toml");
+    let text = "name = 'free-bar'\ntitle = 'Free end'\ncoordinates = 'cartesian'\ndimension = 1\n\
+                [parameters]\nA = { default = 0.1 }\n\
+                [displacement]\n# The strain sin(2 X) - 2 sin(1) cos(1) is zero at the end.\n\
+                X = 'A*sin(t)*(-cos(2*X)/2 - 2*sin(1)*cos(1)*X)'\n\
+                [material]\nlaw = 'neo-hookean'\nlambda = 1\nmu = 1\ndensity = 1\n\
+                [domain]\nshape = 'box'\nlower = [0]\nupper = [1]\n\
+                [[boundary]]\nsurface = 'X-upper'\ncondition = 'traction-free'\n\
+                [time]\nperiod = '2*Pi'\n";
+    std::fs::write(&spec, text).unwrap();
+    let (status, out, errors) = outcome(mms().arg("check").arg(&spec));
+    assert_eq!(status, Some(0), "{out}{errors}");
+    assert!(out.contains("P N on Upper(0): zero to 60 digits at 20 points"), "{out}");
+    std::fs::write(&spec, text.replace("X-upper", "X-lower")).unwrap();
+    let (status, out, _) = outcome(mms().arg("check").arg(&spec));
+    assert_eq!(status, Some(1), "{out}");
+    assert!(out.contains("P N on Lower(0): NOT zero: "), "{out}");
+}
+
+/// Generated and interpreted tractions are those of the stress; on a free rim they are zero to the last bit.
+#[test]
+fn tractions() {
+    use mmsmith_solutions::{AnySolution, CATALOGUE, Solution, Surface, build, nalgebra::SVector};
+    let description = CATALOGUE.iter().find(|d| d.name == "ring").unwrap();
+    let values = description.resolve([]).unwrap();
+    let Some(Ok(AnySolution::Two(generated))) = build::<f64>("ring", &values) else { panic!() };
+    let spec = mmsmith_spec::Spec::parse(description.specification, "ring.toml").unwrap();
+    let AnySolution::Two(interpreted) = mmsmith_interpret::interpret(&spec, []).unwrap() else {
+        panic!()
+    };
+    let both: [&dyn Solution<f64, 2>; 2] = [generated.as_ref(), interpreted.as_ref()];
+    for solution in both {
+        let rim = SVector::from([0.3, 0.4]);
+        assert_eq!(solution.traction(Surface::Inner, &rim, 0.001), Some(SVector::zeros()));
+        assert_eq!(solution.traction(Surface::Upper(0), &rim, 0.001), None);
+        let X = SVector::from([0.0, 0.8]);
+        let P = solution.first_piola_kirchhoff(&X, 0.001);
+        let traction = solution.traction(Surface::Lower(0), &X, 0.001).unwrap();
+        assert!((traction + P.column(0)).amax() < 1e-12 * P.amax() && P.amax() > 1.0);
+    }
+}

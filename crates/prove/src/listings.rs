@@ -97,7 +97,7 @@ impl<'a> Published<'a> {
     pub fn compare(&self, fields: &Fields) -> Result<Report, Diagnostic> {
         let targets = self.targets(fields)?;
         let derived: Vec<Expr> = targets.iter().map(|target| target.derived).collect();
-        let points = points(self.spec, fields, &derived, POINTS, 1)
+        let points = points(self.spec, fields, &derived, None, POINTS)
             .map_err(|error| self.diagnostic(error.to_string(), &self.first_entry()))?;
         let check = mmsmith_maple::CrossCheck {
             graph: &fields.graph,

@@ -1,10 +1,10 @@
-//! Reproducible points in the body, for random admissible parameters.
+//! Reproducible points in the body and on its surfaces, for random admissible parameters.
 
 use mmsmith_expr::{Dependence, Expr, Graph, Program, Rational, nearest_f64};
 use mmsmith_maple::sample;
-use mmsmith_oracle::exact;
-use mmsmith_spec::{Domain, Fields, Parameter, Spec};
-use std::f64::consts::PI;
+use mmsmith_oracle::{Oracle, Point, exact};
+use mmsmith_spec::{Domain, Fields, Parameter, Spec, Surface};
+use num_traits::One;
 use thiserror::Error;
 
 /// Parameters vary by this share of their defaults; those that are zero by default, by this number.
@@ -19,29 +19,35 @@ const DRAWS: usize = 50;
      value, with parameters within {:.0} % of their defaults",
     100.0 * VARIATION
 )]
-pub(crate) struct PointsError {
+pub struct PointsError {
     /// How many points were found.
     pub found: usize,
     /// How many points were wanted.
     pub wanted: usize,
 }
 
-/// `count` points: a value for every input of `fields`. Positions are in the body, times within a period, parameters
-/// near their defaults, and the values of `expressions` are finite and `J > 0`.
+/// A value for every input of the fields.
+pub(crate) type Values = Vec<(Expr, Rational)>;
+
+/// `count` points. Positions are in the body, or on `surface` to far more digits than doubles have; times are within a
+/// period, parameters near their defaults; the values of `expressions` are finite and `J > 0`.
 pub(crate) fn points(
     spec: &Spec,
     fields: &Fields,
     expressions: &[Expr],
+    surface: Option<Surface>,
     count: usize,
-    seed: u64,
-) -> Result<Vec<Vec<(Expr, Rational)>>, PointsError> {
+) -> Result<Vec<Values>, PointsError> {
     let n = spec.dimension;
     let inputs: Vec<Expr> = fields.inputs.iter().map(|(input, _)| *input).collect();
     let mut graph = fields.graph.clone();
-    let constants = constants(spec, &mut graph, &inputs);
     let mut watched = vec![fields.J];
     watched.extend(expressions);
     let everything = Program::lower(&mut graph, &fields.inputs, &fields.definitions, &watched);
+    let sides: Vec<Expr> = spec.requirements.iter().flat_map(|r| [r.left, r.right]).collect();
+    let parameters: Vec<(Expr, Dependence)> =
+        inputs[n + 1..].iter().map(|&p| (p, Dependence::default())).collect();
+    let sides = Program::lower(&mut graph, &parameters, &[], &sides);
     // Coordinates and time as shares, parameters as they are.
     let bounds: Vec<(Expr, [f64; 2])> = inputs
         .iter()
@@ -52,53 +58,22 @@ pub(crate) fn points(
         })
         .collect();
     let mut found = Vec::new();
-    for draw in sample(&bounds, DRAWS * count, seed) {
-        let drawn: Vec<f64> = draw.iter().map(|(_, value)| nearest_f64(value)).collect();
-        let parameters = &drawn[n + 1..];
-        if !spec
-            .parameters
-            .iter()
-            .zip(parameters)
-            .all(|(p, v)| p.bounds.iter().all(|b| b.admits(*v)))
-        {
+    for draw in sample(&bounds, DRAWS * count, 1) {
+        let (shares, parameters) = draw.split_at(n + 1);
+        if !admissible(spec, &sides, parameters) {
             continue;
         }
-        let constants = constants.evaluate(parameters);
-        let (sides, measures) = constants.split_at(2 * spec.requirements.len());
-        if !spec.requirements.iter().zip(sides.chunks(2)).all(|(r, s)| r.relation.holds(s[0], s[1]))
-        {
-            continue;
+        let Some(values) = place(spec, &graph, surface, shares, parameters) else { continue };
+        let rounded: Vec<f64> = values.iter().map(|(_, value)| nearest_f64(value)).collect();
+        let fine = everything.evaluate(&rounded);
+        if fine[0] > 0.0 && fine.iter().all(|value| value.is_finite()) {
+            found.push(values);
         }
-        let (period, measures) = (measures[0], &measures[1..]);
-        let mut values = place(&spec.domain, measures, &drawn[..n]);
-        values.push(period * drawn[n]);
-        values.extend(parameters);
-        let fine = everything.evaluate(&values);
-        if !(fine[0] > 0.0) || !fine.iter().all(|value| value.is_finite()) {
-            continue;
-        }
-        let Some(values) = values.into_iter().map(exact).collect::<Option<Vec<Rational>>>() else {
-            continue;
-        };
-        found.push(inputs.iter().copied().zip(values).collect());
         if found.len() == count {
             return Ok(found);
         }
     }
     Err(PointsError { found: found.len(), wanted: count })
-}
-
-/// The program for the sides of the requirements, the period and the measures of the body, from the parameters.
-fn constants(spec: &Spec, graph: &mut Graph, inputs: &[Expr]) -> Program {
-    let mut outputs: Vec<Expr> = spec.requirements.iter().flat_map(|r| [r.left, r.right]).collect();
-    outputs.push(spec.period);
-    match &spec.domain {
-        Domain::Box { lower, upper } => outputs.extend(lower.iter().chain(upper)),
-        Domain::Annulus { inner, outer } => outputs.extend([inner, outer]),
-    }
-    let parameters: Vec<(Expr, Dependence)> =
-        inputs[spec.dimension + 1..].iter().map(|&p| (p, Dependence::default())).collect();
-    Program::lower(graph, &parameters, &[], &outputs)
 }
 
 /// Where a parameter is drawn from.
@@ -108,30 +83,76 @@ fn range(parameter: &Parameter) -> [f64; 2] {
     [middle - half, middle + half]
 }
 
-/// The point of the body that `shares` of its extents point to.
-fn place(domain: &Domain, measures: &[f64], shares: &[f64]) -> Vec<f64> {
-    let between = |low: f64, high: f64, share: f64| low + (high - low) * share;
-    match domain {
-        Domain::Box { .. } => {
-            let (lower, upper) = measures.split_at(shares.len());
-            (0..shares.len()).map(|i| between(lower[i], upper[i], shares[i])).collect()
-        }
-        Domain::Annulus { .. } => {
-            let radius = between(measures[0], measures[1], shares[0]);
-            direction(&shares[1..]).iter().map(|e| radius * e).collect()
-        }
-    }
+fn admissible(spec: &Spec, sides: &Program, parameters: &[(Expr, Rational)]) -> bool {
+    let values: Vec<f64> = parameters.iter().map(|(_, value)| nearest_f64(value)).collect();
+    let within = |(parameter, &value): (&Parameter, &f64)| {
+        parameter.bounds.iter().all(|bound| bound.admits(value))
+    };
+    let sides = sides.evaluate(&values);
+    spec.parameters.iter().zip(&values).all(within)
+        && spec.requirements.iter().zip(sides.chunks(2)).all(|(r, s)| r.relation.holds(s[0], s[1]))
 }
 
-/// A unit vector, in the plane for one share and in space for two.
-fn direction(shares: &[f64]) -> Vec<f64> {
-    let (sine, cosine) = (2.0 * PI * shares[0]).sin_cos();
-    match shares.get(1) {
-        None => vec![cosine, sine],
-        Some(share) => {
-            let height = 2.0 * share - 1.0;
-            let across = (1.0 - height * height).sqrt();
-            vec![across * cosine, across * sine, height]
-        }
+/// The point that `shares` of the body's extents and of the period point to; its position is rounded to doubles in
+/// the body, and exact on a surface.
+fn place(
+    spec: &Spec,
+    graph: &Graph,
+    surface: Option<Surface>,
+    shares: &[(Expr, Rational)],
+    parameters: &[(Expr, Rational)],
+) -> Option<Values> {
+    let mut measures = vec![spec.period];
+    match &spec.domain {
+        Domain::Box { lower, upper } => measures.extend(lower.iter().chain(upper)),
+        Domain::Annulus { inner, outer } => measures.extend([inner, outer]),
     }
+    let point = Point { graph, definitions: &[], values: parameters };
+    let measures = Oracle::new(Oracle::USUAL_BITS).ok()?.evaluate(&point, &measures).ok()?;
+    let (period, measures) = (&measures[0], &measures[1..]);
+    let n = shares.len() - 1;
+    let share = |i: usize| &shares[i].1;
+    let between = |low: &Rational, high: &Rational, share: &Rational| low + (high - low) * share;
+    let mut X: Vec<Rational> = match &spec.domain {
+        Domain::Box { .. } => {
+            (0..n).map(|i| between(&measures[i], &measures[n + i], share(i))).collect()
+        }
+        Domain::Annulus { .. } => {
+            let radius = match surface {
+                Some(Surface::Inner) => measures[0].clone(),
+                Some(Surface::Outer) => measures[1].clone(),
+                _ => between(&measures[0], &measures[1], share(0)),
+            };
+            let shares: Vec<&Rational> = (1..n).map(share).collect();
+            direction(&shares).into_iter().map(|e| e * &radius).collect()
+        }
+    };
+    match (surface, &spec.domain) {
+        (Some(Surface::Lower(axis)), Domain::Box { .. }) => X[axis] = measures[axis].clone(),
+        (Some(Surface::Upper(axis)), Domain::Box { .. }) => X[axis] = measures[n + axis].clone(),
+        // The cut may lie outside of the body's radii: the fields are the same formulas there.
+        (Some(Surface::Lower(axis)), Domain::Annulus { .. }) => X[axis] = Rational::default(),
+        _ => {}
+    }
+    let mut values = X;
+    values.push(period * share(n));
+    if surface.is_none() {
+        values = values.iter().map(|x| exact(nearest_f64(x))).collect::<Option<_>>()?;
+    }
+    let inputs = shares.iter().map(|(input, _)| *input);
+    Some(inputs.zip(values).chain(parameters.iter().cloned()).collect())
+}
+
+/// A unit vector with rational components, from one share in the plane and from two in space: the stereographic
+/// projection of a point within a few radii of the origin.
+fn direction(shares: &[&Rational]) -> Vec<Rational> {
+    let wide = Rational::from_integer(5.into());
+    let half = Rational::new(1.into(), 2.into());
+    let q: Vec<Rational> = shares.iter().map(|&share| (share - &half) * &wide).collect();
+    let square: Rational = q.iter().map(|q| q * q).sum();
+    let total = Rational::one() + &square;
+    let mut e: Vec<Rational> =
+        q.iter().map(|q| q * Rational::from_integer(2.into()) / &total).collect();
+    e.push((Rational::one() - square) / total);
+    e
 }

@@ -16,6 +16,7 @@ mod document;
 mod law;
 mod scope;
 mod spec;
+mod surface;
 mod tensor;
 
 pub use coordinates::Coordinates;
@@ -25,3 +26,4 @@ pub use diagnostic::{Diagnostic, nearest};
 pub use spec::{
     Bound, Boundary, Condition, Domain, Material, Parameter, Relation, Requirement, Spec, Surface,
 };
+pub use surface::{Claim, ClaimKind, SurfaceFields};

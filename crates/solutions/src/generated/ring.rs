@@ -41,7 +41,7 @@ impl<T: crate::Real> Default for RingParameters<T> {
 pub struct Ring<T: crate::Real> {
     parameters: RingParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 20],
+    fixed: [T; 21],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Ring<T> {
@@ -167,6 +167,7 @@ impl<T: crate::Real> Ring<T> {
         let t186 = t133 * t95;
         let t187 = t186 / parameters.rho0;
         let t198 = T::nearest(2.0) / t11;
+        let t201 = parameters.A * t95;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -196,6 +197,7 @@ impl<T: crate::Real> Ring<T> {
                 t181,
                 t187,
                 t198,
+                t201,
             ],
         })
     }
@@ -734,6 +736,80 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
             J: t93,
             P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t106, t111, t111, t116),
             b: crate::nalgebra::SVector::<T, 2>::new(t195, t197),
+        }
+    }
+    fn traction(
+        &self,
+        surface: crate::Surface,
+        X: &crate::nalgebra::SVector<T, 2>,
+        t: T,
+    ) -> Option<crate::nalgebra::SVector<T, 2>> {
+        match surface {
+            crate::Surface::Inner => {
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), T::zero()))
+            }
+            crate::Surface::Outer => {
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), T::zero()))
+            }
+            crate::Surface::Lower(0) => {
+                let t1 = X[0] * X[0];
+                let t3 = X[1] * X[1];
+                let t4 = t1 + t3;
+                let t5 = t4.sqrt();
+                let t12 = self.fixed[0] * t;
+                let t13 = t12.cos_pi();
+                let t20 = t5 - self.parameters.Ro;
+                let t21 = t20 * t20;
+                let t23 = T::nearest(2.0) * t5;
+                let t25 = self.fixed[2] + t23;
+                let t29 = t21 * t25;
+                let t30 = self.fixed[3] * t29;
+                let t31 = t30 + T::one();
+                let t32 = self.parameters.A * t13;
+                let t63 = t31 * t3;
+                let t70 = t31 / t5;
+                let t91 = t32 * t70;
+                let t92 = t91 + T::one();
+                let t100 = t91 + T::nearest(2.0);
+                let t102 = t100 / t92;
+                let t200 = t4 * t5;
+                let t202 = self.fixed[20] * t13;
+                let t203 = t63 / t200;
+                let t204 = t202 * t203;
+                let t205 = t204 * t102;
+                let t206 = -t205;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t206, T::zero()))
+            }
+            crate::Surface::Lower(1) => {
+                let t1 = X[0] * X[0];
+                let t3 = X[1] * X[1];
+                let t4 = t1 + t3;
+                let t5 = t4.sqrt();
+                let t12 = self.fixed[0] * t;
+                let t13 = t12.cos_pi();
+                let t20 = t5 - self.parameters.Ro;
+                let t21 = t20 * t20;
+                let t23 = T::nearest(2.0) * t5;
+                let t25 = self.fixed[2] + t23;
+                let t29 = t21 * t25;
+                let t30 = self.fixed[3] * t29;
+                let t31 = t30 + T::one();
+                let t32 = self.parameters.A * t13;
+                let t70 = t31 / t5;
+                let t79 = t31 * t1;
+                let t91 = t32 * t70;
+                let t92 = t91 + T::one();
+                let t100 = t91 + T::nearest(2.0);
+                let t102 = t100 / t92;
+                let t200 = t4 * t5;
+                let t202 = self.fixed[20] * t13;
+                let t207 = t79 / t200;
+                let t208 = t202 * t207;
+                let t209 = t208 * t102;
+                let t210 = -t209;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t210))
+            }
+            _ => None,
         }
     }
     fn domain(&self) -> crate::Domain<T, 2> {
