@@ -1,7 +1,7 @@
 //! The solutions of the library: found by name, built with parameters.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use mmsmith_interpret::interpret;
@@ -50,6 +50,11 @@ pub(crate) struct Subject {
     pub(crate) name: String,
     pub(crate) solution: AnySolution<f64>,
     pub(crate) parameters: BTreeMap<String, f64>,
+    pub(crate) spec: Spec,
+    /// What messages call the specification.
+    pub(crate) file: String,
+    /// Where other files of the specification are, if it is a file itself.
+    pub(crate) folder: Option<PathBuf>,
 }
 
 impl Subject {
@@ -64,6 +69,9 @@ impl Subject {
             name: name.to_owned(),
             solution: selection.build()?,
             parameters: parameters.into_iter().map(|(name, v)| (name.to_owned(), v)).collect(),
+            spec: specification(name)?,
+            file: format!("{name}.toml"),
+            folder: None,
         })
     }
 
@@ -75,7 +83,14 @@ impl Subject {
         let mut parameters: BTreeMap<String, f64> =
             spec.parameters.iter().map(|p| (p.name.clone(), p.default)).collect();
         parameters.extend(overrides.iter().cloned());
-        Ok(Self { name: spec.name, solution, parameters })
+        Ok(Self {
+            name: spec.name.clone(),
+            solution,
+            parameters,
+            spec,
+            file: file.to_owned(),
+            folder: Some(Path::new(file).parent().unwrap_or(Path::new("")).to_owned()),
+        })
     }
 }
 

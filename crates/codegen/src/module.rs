@@ -464,6 +464,7 @@ impl Generator<'_> {
                 }
             });
         }
+        items.extend(self.traction());
         let constants = &self.plan.constants;
         let [cell_length, density, wave_speed, period] =
             [constants.cell_length, constants.density, constants.wave_speed, constants.period]
@@ -495,6 +496,36 @@ impl Generator<'_> {
             }
         });
         items
+    }
+
+    fn traction(&self) -> TokenStream {
+        let runtime = self.runtime;
+        let n = Literal::usize_unsuffixed(self.spec.dimension);
+        let vector = quote!(#runtime::nalgebra::SVector<T, #n>);
+        let arms = self.plan.tractions.iter().map(|(surface, slots)| {
+            let pattern = surface_value(runtime, *surface);
+            let (statements, values) =
+                self.translator.statements(&self.plan.after_parameters(slots));
+            quote! {
+                #pattern => {
+                    #statements
+                    Some(#runtime::nalgebra::SVector::<T, #n>::new(#(#values),*))
+                }
+            }
+        });
+        quote! {
+            fn traction(
+                &self,
+                surface: #runtime::Surface,
+                X: &#vector,
+                t: T,
+            ) -> Option<#vector> {
+                match surface {
+                    #(#arms)*
+                    _ => None,
+                }
+            }
+        }
     }
 
     /// A parameter-only scalar as an expression: a number, a parameter or a kept value.
@@ -549,18 +580,7 @@ impl Generator<'_> {
 }
 
 fn boundary(runtime: &TokenStream, boundary: &Boundary) -> TokenStream {
-    let surface = match boundary.surface {
-        Surface::Lower(axis) => {
-            let axis = Literal::usize_unsuffixed(axis);
-            quote!(Lower(#axis))
-        }
-        Surface::Upper(axis) => {
-            let axis = Literal::usize_unsuffixed(axis);
-            quote!(Upper(#axis))
-        }
-        Surface::Inner => quote!(Inner),
-        Surface::Outer => quote!(Outer),
-    };
+    let surface = surface_value(runtime, boundary.surface);
     let condition = match boundary.condition {
         Condition::Sliding => quote!(Sliding),
         Condition::Symmetry => quote!(Symmetry),
@@ -570,9 +590,25 @@ fn boundary(runtime: &TokenStream, boundary: &Boundary) -> TokenStream {
     };
     quote! {
         #runtime::Boundary {
-            surface: #runtime::Surface::#surface,
+            surface: #surface,
             condition: #runtime::Condition::#condition,
         }
+    }
+}
+
+/// A surface as an expression, and as a pattern.
+fn surface_value(runtime: &TokenStream, surface: Surface) -> TokenStream {
+    match surface {
+        Surface::Lower(axis) => {
+            let axis = Literal::usize_unsuffixed(axis);
+            quote!(#runtime::Surface::Lower(#axis))
+        }
+        Surface::Upper(axis) => {
+            let axis = Literal::usize_unsuffixed(axis);
+            quote!(#runtime::Surface::Upper(#axis))
+        }
+        Surface::Inner => quote!(#runtime::Surface::Inner),
+        Surface::Outer => quote!(#runtime::Surface::Outer),
     }
 }
 

@@ -5,7 +5,7 @@
 //! order; the Rust module and the C header are two renderings of the same plan, so that their results agree.
 
 use mmsmith_expr::{Dependence, Expr, Operation, Program, Rational, Slot, arrange};
-use mmsmith_spec::{DeriveError, Domain, Fields, Spec};
+use mmsmith_spec::{DeriveError, Domain, Fields, Spec, Surface};
 use std::collections::BTreeMap;
 
 /// A solution whose fields are derived and staged, ready to be written down in Rust or in C.
@@ -16,6 +16,8 @@ pub struct Plan<'a> {
     pub(crate) constants: Constants,
     /// The strain energy, where the material is given by one.
     pub(crate) energy: Option<Slot>,
+    /// The traction on each surface.
+    pub(crate) tractions: Vec<(Surface, Vec<Slot>)>,
     /// The two sides of each requirement.
     requirements: Vec<(Slot, Slot)>,
     /// The displacement and the law, a line each, for people.
@@ -138,6 +140,8 @@ impl<'a> Plan<'a> {
         let energy = fields.W;
         outputs.extend(energy);
         outputs.extend(spec.requirements.iter().flat_map(|r| [r.left, r.right]));
+        let surfaces = std::mem::take(&mut fields.surfaces);
+        outputs.extend(surfaces.iter().flat_map(|s| &s.traction));
         let program = fields.program(&outputs);
 
         let mut slots = program.outputs().iter().copied();
@@ -156,6 +160,7 @@ impl<'a> Plan<'a> {
         let energy = energy.and_then(|_| take(1).first().copied());
         let requirements =
             spec.requirements.iter().map(|_| take(2)).map(|sides| (sides[0], sides[1])).collect();
+        let tractions = surfaces.iter().map(|s| (s.surface, take(s.traction.len()))).collect();
 
         let fixed = fixed_slots(&program);
         let kept = numbered(Stage::Fixed, &fixed).collect();
@@ -167,6 +172,7 @@ impl<'a> Plan<'a> {
             fields,
             constants,
             energy,
+            tractions,
             requirements,
             formulas,
             fixed,

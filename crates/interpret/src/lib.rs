@@ -81,6 +81,7 @@ struct Interpreted<const D: usize> {
     first_piola_kirchhoff: Program,
     body_force: Program,
     strain_energy: Option<Program>,
+    tractions: Vec<(Surface, Program)>,
     domain: Domain<f64, D>,
     boundaries: Vec<Boundary>,
     cell_length: f64,
@@ -96,6 +97,7 @@ impl<const D: usize> Interpreted<D> {
         let (u, v, a, b) = (fields.u.clone(), fields.v.clone(), fields.a.clone(), fields.b.clone());
         let (H, F, P) = (fields.H.concat(), fields.F.concat(), fields.P.concat());
         let (J, W) = ([fields.J], fields.W);
+        let surfaces = std::mem::take(&mut fields.surfaces);
 
         let mut constants = spec.constants();
         for requirement in &spec.requirements {
@@ -138,6 +140,10 @@ impl<const D: usize> Interpreted<D> {
             first_piola_kirchhoff: program(&P),
             body_force: program(&b),
             strain_energy: W.map(|W| program(&[W])),
+            tractions: surfaces
+                .iter()
+                .map(|s| (surface(s.surface), program(&s.traction)))
+                .collect(),
             domain,
             boundaries: spec.boundaries.iter().map(boundary).collect(),
             cell_length: constants[0],
@@ -164,12 +170,6 @@ fn inputs<const D: usize>(X: &SVector<f64, D>, t: f64, parameters: &[f64]) -> Ve
 }
 
 fn boundary(boundary: &spec::Boundary) -> Boundary {
-    let surface = match boundary.surface {
-        spec::Surface::Lower(axis) => Surface::Lower(axis),
-        spec::Surface::Upper(axis) => Surface::Upper(axis),
-        spec::Surface::Inner => Surface::Inner,
-        spec::Surface::Outer => Surface::Outer,
-    };
     let condition = match boundary.condition {
         spec::Condition::Sliding => Condition::Sliding,
         spec::Condition::Symmetry => Condition::Symmetry,
@@ -177,7 +177,16 @@ fn boundary(boundary: &spec::Boundary) -> Boundary {
         spec::Condition::PrescribedTraction => Condition::PrescribedTraction,
         spec::Condition::PrescribedMotion => Condition::PrescribedMotion,
     };
-    Boundary { surface, condition }
+    Boundary { surface: surface(boundary.surface), condition }
+}
+
+fn surface(surface: spec::Surface) -> Surface {
+    match surface {
+        spec::Surface::Lower(axis) => Surface::Lower(axis),
+        spec::Surface::Upper(axis) => Surface::Upper(axis),
+        spec::Surface::Inner => Surface::Inner,
+        spec::Surface::Outer => Surface::Outer,
+    }
 }
 
 impl<const D: usize> Solution<f64, D> for Interpreted<D> {
@@ -211,6 +220,11 @@ impl<const D: usize> Solution<f64, D> for Interpreted<D> {
 
     fn body_force(&self, X: &SVector<f64, D>, t: f64) -> SVector<f64, D> {
         self.vector(&self.body_force, X, t)
+    }
+
+    fn traction(&self, surface: Surface, X: &SVector<f64, D>, t: f64) -> Option<SVector<f64, D>> {
+        let (_, program) = self.tractions.iter().find(|(known, _)| *known == surface)?;
+        Some(self.vector(program, X, t))
     }
 
     fn fields(&self, X: &SVector<f64, D>, t: f64) -> Fields<f64, D> {

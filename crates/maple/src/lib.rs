@@ -49,11 +49,11 @@
 //! ```
 //!
 //! Names that the table leaves out mean what they mean in the specification: parameters, `[let]` and coordinates.
-//! Entries are `u[i]`, `v[i]`, `a[i]` and `b[i]`, and `F[i][j]` and `P[i][j]` as `F[n*i + j]` and `P[n*i + j]`. The
-//! check reports a line for each component, [`Component`]'s `Display`: `b[1] agrees to 60 digits at 20 points`, or
+//! Entries are `u[i]`, `v[i]`, `a[i]` and `b[i]`, Cartesian components, and `H`, `F` and `P` as `F[i][j]` or
+//! `F[n*i + j]`. The check reports a line for each component, [`Component`]'s `Display`: `b[1] agrees to 60 digits at 20 points`, or
 //! `b[1] differs at X = ..., t = ...: the listing gives ..., the derivation ...`; a refuted component makes the check
 //! fail. The call is [`cross_check`] with the names built by the specification's scope and the field's entries as
-//! targets.
+//! targets, made by the crate `mmsmith-prove`.
 
 mod build;
 mod cross_check;

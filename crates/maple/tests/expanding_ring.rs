@@ -89,6 +89,14 @@ impl Ring {
 }
 
 #[test]
+fn the_specification_has_this_listing() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../mms-specs/ring.toml");
+    let text = std::fs::read_to_string(path).unwrap();
+    let (_, code) = LISTING.split_once("*/\n").unwrap();
+    assert!(text.contains(&format!("listing = '''\n{code}'''")));
+}
+
+#[test]
 fn published_listing_is_proved() {
     let report = ring().check(LISTING).unwrap();
     println!("{report}");

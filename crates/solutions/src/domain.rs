@@ -24,6 +24,23 @@ pub enum Domain<T: Real, const D: usize> {
     },
 }
 
+impl<T: Real, const D: usize> Domain<T, D> {
+    /// The outward reference normal at a point `X` of a surface; `None` where the body has no such surface.
+    #[must_use]
+    pub fn normal(&self, surface: Surface, X: &SVector<T, D>) -> Option<SVector<T, D>> {
+        let axis = |axis: usize, sign: T| {
+            (axis < D).then(|| SVector::from_fn(|i, _| if i == axis { sign } else { T::zero() }))
+        };
+        match (self, surface) {
+            (Domain::Box { .. }, Surface::Upper(index)) => axis(index, T::one()),
+            (_, Surface::Lower(index)) => axis(index, -T::one()),
+            (Domain::Annulus { inner, .. }, Surface::Inner) => Some(X.map(|x| -x / *inner)),
+            (Domain::Annulus { outer, .. }, Surface::Outer) => Some(X.map(|x| x / *outer)),
+            _ => None,
+        }
+    }
+}
+
 /// A part of the body's boundary, or a plane that cuts the body in halves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Surface {

@@ -1,7 +1,7 @@
 //! What every manufactured solution can do.
 
 use crate::staged::PlainPoints;
-use crate::{BodyForceAtPoints, Boundary, Domain, Real};
+use crate::{BodyForceAtPoints, Boundary, Domain, Real, Surface};
 use nalgebra::{SMatrix, SVector};
 
 /// The constitutive law of a solution, with its constants; what a solver needs to model the same material.
@@ -100,6 +100,15 @@ pub trait Solution<T: Real, const D: usize>: Send + Sync {
     /// Strain energy per reference volume; `None` unless the specification gives the material by its energy.
     fn strain_energy(&self, _X: &SVector<T, D>, _t: T) -> Option<T> {
         None
+    }
+    /// Traction `P N` at a point `X` of a surface, force per reference area, `N` the outward reference normal; `None`
+    /// where the body has no such surface.
+    ///
+    /// Generated solutions put the coordinate that is fixed on the surface into the formula: a surface that is free
+    /// of traction gives zero, not rounding errors.
+    fn traction(&self, surface: Surface, X: &SVector<T, D>, t: T) -> Option<SVector<T, D>> {
+        let normal = self.domain().normal(surface, X)?;
+        Some(self.first_piola_kirchhoff(X, t) * normal)
     }
     /// All fields at once.
     fn fields(&self, X: &SVector<T, D>, t: T) -> Fields<T, D>;

@@ -12,6 +12,7 @@ use crate::Spec;
 use crate::coordinates::{Geometry, identity};
 use crate::derivation::Derivation;
 use crate::law::{self, Deformation, Stress, inside, zero_if_vanishing};
+use crate::surface::{Components, SurfaceFields, surface_fields};
 use crate::tensor::{Matrix, Vector};
 use mmsmith_expr::{Dependence, Expr, Graph, Program};
 use thiserror::Error;
@@ -45,6 +46,8 @@ pub struct Fields {
     pub b: Vector,
     /// Strain energy per reference volume, where the material is given by one.
     pub W: Option<Expr>,
+    /// Tractions and the claims of boundary conditions, for every surface of the body.
+    pub surfaces: Vec<SurfaceFields>,
 }
 
 /// Why fields could not be derived.
@@ -107,6 +110,9 @@ impl Fields {
             F[i][i] = graph.add(Graph::ONE, H[i][i]);
         }
 
+        let components = Components { own_u: &spec.displacement, own_P: &stress.P, u: &u, P: &P };
+        let surfaces = surface_fields(&mut graph, &geometry, spec, &components);
+
         let rate = |position, time| Dependence { position, time };
         let mut inputs: Vec<(Expr, Dependence)> =
             geometry.cartesian.iter().map(|&X| (X, rate(true, false))).collect();
@@ -114,8 +120,8 @@ impl Fields {
         for parameter in &spec.parameters {
             inputs.push((graph.symbol(&parameter.name), rate(false, false)));
         }
-        let fields =
-            Fields { graph, inputs, definitions: geometry.definitions, u, v, a, H, F, J, P, b, W };
+        let definitions = geometry.definitions;
+        let fields = Fields { graph, inputs, definitions, u, v, a, H, F, J, P, b, W, surfaces };
         fields.check()?;
         Ok(fields)
     }
@@ -160,7 +166,7 @@ fn body_force(derivation: &mut Derivation, a: &Vector, stress: &Stress, density:
 }
 
 /// Physical components to Cartesian ones: `x_i = sum_a Q_ia x_a`.
-fn turn_vector(graph: &mut Graph, geometry: &Geometry, vector: &Vector) -> Vector {
+pub(crate) fn turn_vector(graph: &mut Graph, geometry: &Geometry, vector: &[Expr]) -> Vector {
     (0..geometry.dimension())
         .map(|i| {
             let terms: Vec<Expr> = (0..geometry.dimension())

@@ -26,6 +26,8 @@ pub(crate) struct Document {
     pub(crate) domain: Spanned<DomainTable>,
     #[serde(default)]
     pub(crate) boundary: Vec<BoundaryTable>,
+    #[serde(default)]
+    pub(crate) cross_check: Vec<Spanned<CrossCheckTable>>,
     pub(crate) time: Spanned<TimeTable>,
 }
 
@@ -42,7 +44,9 @@ impl Document {
         });
         let head =
             [&self.title, &self.reference].map(|text| (text.get_ref().as_str(), text.span()));
-        head.into_iter().chain(parameters)
+        let listings = self.cross_check.iter().map(|table| &table.get_ref().source);
+        let listings = listings.map(|source| (source.get_ref().as_str(), source.span()));
+        head.into_iter().chain(parameters).chain(listings)
     }
 }
 
@@ -89,6 +93,16 @@ pub(crate) struct DomainTable {
 pub(crate) struct BoundaryTable {
     pub(crate) surface: Spanned<String>,
     pub(crate) condition: Spanned<String>,
+}
+
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(crate) struct CrossCheckTable {
+    pub(crate) source: Spanned<String>,
+    pub(crate) listing: Option<Text>,
+    pub(crate) file: Option<Spanned<String>>,
+    #[serde(default)]
+    pub(crate) names: Entries<Text>,
 }
 
 #[derive(serde::Deserialize)]

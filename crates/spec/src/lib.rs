@@ -8,6 +8,7 @@
 //! components last: see [`Fields`].
 
 mod coordinates;
+mod cross_check;
 mod derivation;
 mod derive;
 mod diagnostic;
@@ -15,11 +16,14 @@ mod document;
 mod law;
 mod scope;
 mod spec;
+mod surface;
 mod tensor;
 
 pub use coordinates::Coordinates;
+pub use cross_check::{CrossCheck, InlineText, ListingText};
 pub use derive::{DeriveError, Fields};
 pub use diagnostic::{Diagnostic, nearest};
 pub use spec::{
     Bound, Boundary, Condition, Domain, Material, Parameter, Relation, Requirement, Spec, Surface,
 };
+pub use surface::{Claim, ClaimKind, SurfaceFields};

@@ -72,6 +72,11 @@ impl<'a> Scope<'a> {
         Scope { source, graph, names, elsewhere, coordinates: symbols, time }
     }
 
+    /// Every name with its meaning.
+    pub(crate) fn names(&self) -> &BTreeMap<String, Expr> {
+        &self.names
+    }
+
     /// Adds a parameter.
     pub(crate) fn declare(
         &mut self,

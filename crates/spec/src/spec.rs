@@ -5,7 +5,7 @@ use crate::diagnostic::nearest;
 use crate::document::{BoundaryTable, Document, DomainTable, Entries, Text};
 use crate::law::energy::{INVARIANTS, component_names};
 use crate::scope::{Scope, Source};
-use crate::{Coordinates, DeriveError, Diagnostic, Fields};
+use crate::{Coordinates, CrossCheck, DeriveError, Diagnostic, Fields};
 use mmsmith_expr::{Expr, Graph, Program};
 use toml::Spanned;
 
@@ -42,6 +42,8 @@ pub struct Spec {
     pub cell_length: Expr,
     /// The conditions on its boundary.
     pub boundaries: Vec<Boundary>,
+    /// Published listings of the fields.
+    pub cross_checks: Vec<CrossCheck>,
     /// The speed that CFL numbers refer to.
     pub wave_speed: Expr,
     /// The time in which the motion repeats.
@@ -465,6 +467,11 @@ impl<'a> Reader<'a> {
             .iter()
             .map(|table| self.boundary(table, &domain))
             .collect::<Result<Vec<_>, _>>()?;
+        let cross_checks = document
+            .cross_check
+            .iter()
+            .map(|table| CrossCheck::read(&mut self.scope, table))
+            .collect::<Result<Vec<_>, _>>()?;
         let time = document.time.get_ref();
         let period = self.scope.constant(&time.period, "period")?;
         let wave_speed = match &time.wave_speed {
@@ -487,6 +494,7 @@ impl<'a> Reader<'a> {
             domain,
             cell_length,
             boundaries,
+            cross_checks,
             wave_speed,
             period,
         })

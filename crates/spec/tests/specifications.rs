@@ -3,7 +3,8 @@
 
 #![allow(clippy::unwrap_used)]
 
-use mmsmith_spec::{Diagnostic, Spec};
+use mmsmith_expr::Graph;
+use mmsmith_spec::{Diagnostic, Spec, Surface};
 use std::path::{Path, PathBuf};
 
 fn cases(folder: &str) -> Vec<PathBuf> {
@@ -75,6 +76,11 @@ fn fields_are_derived_as_expected() {
             }
         }
         text += &format!("J = {}\n", fields.graph.print(fields.J));
+        for fields_on in &fields.surfaces {
+            let traction: Vec<String> =
+                fields_on.traction.iter().map(|&t| fields.graph.print(t)).collect();
+            text += &format!("traction on {:?} = ({})\n", fields_on.surface, traction.join(", "));
+        }
         expect(&path, &text, &mut failures);
     }
     assert!(failures.is_empty(), "{}", failures.join("\n\n"));
@@ -89,5 +95,18 @@ fn derivation_is_deterministic() {
             fields.program(&outputs).operations().to_vec()
         });
         assert_eq!(programs.next(), programs.next());
+    }
+}
+
+/// Rims that are free of traction by construction are so in symbols, and loaded ones are not.
+#[test]
+fn free_rims_have_no_traction_in_symbols() {
+    let library = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../mms-specs");
+    for (name, free) in [("ring", true), ("ring-nu", false), ("sphere-shell", false)] {
+        let fields = parse(&library.join(format!("{name}.toml"))).unwrap().derive().unwrap();
+        for rim in [Surface::Inner, Surface::Outer] {
+            let found = fields.surfaces.iter().find(|s| s.surface == rim).unwrap();
+            assert_eq!(found.traction.iter().all(|&t| t == Graph::ZERO), free, "{name} {rim:?}");
+        }
     }
 }

@@ -6,7 +6,7 @@
 //! definition; nothing lies below it. Derivatives are extrapolated finite differences that know their own error.
 
 use mmsmith_mpm::Material;
-use mmsmith_solutions::{AnySolution, Boundary, Condition, Fields, Solution};
+use mmsmith_solutions::{AnySolution, Boundary, Condition, Fields, Solution, Surface};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 use thiserror::Error;
@@ -128,14 +128,19 @@ fn check_in<const D: usize>(
     let samples: Vec<_> =
         (0..count).filter_map(|n| points::interior(&domain, solution.period(), n)).collect();
     let mut findings = field_findings(solution, law.as_ref(), &samples, size);
+    let places = |surface: Surface| -> Vec<_> {
+        let place = |n| {
+            let (X, N) = points::surface(&domain, surface, n)?;
+            Some((X, N, solution.period() * points::quasirandom(n, D, D + 1)))
+        };
+        (0..count).map_while(place).collect()
+    };
+    let planes = (0..D).flat_map(|axis| [Surface::Lower(axis), Surface::Upper(axis)]);
+    for surface in [Surface::Inner, Surface::Outer].into_iter().chain(planes) {
+        findings.extend(traction_finding(solution, surface, &places(surface), &samples));
+    }
     for boundary in solution.boundaries() {
-        let places: Vec<_> = (0..count)
-            .map_while(|n| {
-                let (X, N) = points::surface(&domain, boundary.surface, n)?;
-                let t = solution.period() * points::quasirandom(n, D, D + 1);
-                Some((X, N, t))
-            })
-            .collect();
+        let places = places(boundary.surface);
         if places.is_empty() {
             return Err(CheckError::NoSuchSurface(*boundary));
         }
@@ -358,6 +363,28 @@ fn disagreement<const D: usize>(
     ]
     .into_iter()
     .fold(0.0, |largest, next| if next > largest || next.is_nan() { next } else { largest })
+}
+
+/// The traction on a surface against the stress there; nothing where the body has no such surface.
+fn traction_finding<const D: usize>(
+    solution: &dyn Solution<f64, D>,
+    surface: Surface,
+    places: &[(SVector<f64, D>, SVector<f64, D>, f64)],
+    samples: &[(SVector<f64, D>, f64)],
+) -> Option<Finding> {
+    if places.is_empty() {
+        return None;
+    }
+    let stress = |(X, t): &(SVector<f64, D>, f64)| solution.first_piola_kirchhoff(X, *t).amax();
+    let stress = samples.iter().map(stress).fold(0.0, f64::max);
+    let mut found = Comparison::new(format!("traction on {surface:?}"), "P N");
+    for (X, N, t) in places {
+        let expected = solution.first_piola_kirchhoff(X, *t) * N;
+        let traction = solution.traction(surface, X, *t);
+        let difference = traction.map_or(f64::NAN, |traction| (traction - expected).amax());
+        found.add((X, *t), difference, 16.0 * f64::EPSILON * stress, stress);
+    }
+    Some(found.finding())
 }
 
 fn boundary_findings<const D: usize>(

@@ -1,11 +1,16 @@
 //! `mms check`: is the field code right?
 
 use anyhow::{Result, bail};
+use mmsmith_expr::nearest_f64;
+use mmsmith_prove::{
+    Equality, Outcome, Published, Report, SurfaceProof, surfaces as prove_surfaces,
+};
 use mmsmith_solutions::CATALOGUE;
+use mmsmith_spec::{ClaimKind, Spec};
 use mmsmith_verify::{
     BLUNT, CheckReport, OWN_ERROR_FACTOR, TOLERANCE, Verdict, check as check_fields,
 };
-use serde_json::json;
+use serde_json::{Map, Value, json};
 
 use crate::arguments::CheckOptions;
 use crate::json::Output;
@@ -28,18 +33,28 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
         .iter()
         .map(|name| Subject::new(name, &options.parameters.set))
         .collect::<Result<Vec<_>>>()?;
+    let listings = subjects
+        .iter()
+        .map(|subject| Published::read(&subject.spec, &subject.file, subject.folder.as_deref()))
+        .collect::<Result<Vec<_>, _>>()?;
     let mut results = Vec::new();
     let mut passed = true;
-    for Subject { name, solution, parameters } in &subjects {
+    for (Subject { name, solution, parameters, spec, .. }, listings) in
+        subjects.iter().zip(&listings)
+    {
         let report = check_fields(solution, options.points)?;
-        terminal::say(&text(name, &report))?;
-        passed &= report.passed();
+        let claims = Claims::judge(spec, listings)?;
+        let all_passed = report.passed() && claims.hold();
+        terminal::say(&text(name, all_passed, &report, &claims))?;
+        passed &= all_passed;
         results.push(json!({
             "solution": name,
             "parameters": parameters,
             "points": report.points,
             "findings": report.findings,
-            "passed": report.passed(),
+            "surfaces": claims.surfaces.iter().map(surface_document).collect::<Vec<_>>(),
+            "cross_checks": claims.listings.iter().map(Comparison::document).collect::<Vec<_>>(),
+            "passed": all_passed,
         }));
     }
     terminal::say(&format!(
@@ -64,9 +79,134 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
     Ok(passed)
 }
 
+/// What came out for one published listing.
+struct Comparison {
+    source: String,
+    report: Report,
+}
+
+impl Comparison {
+    fn document(&self) -> Value {
+        let components = self.report.components.iter().map(|component| match &component.verdict {
+            Equality::Proved { digits } => json!({
+                "entry": component.entry,
+                "points": component.points,
+                "verdict": "proved",
+                "digits": digits,
+            }),
+            Equality::Refuted { digits, differing, place, listing, derived } => json!({
+                "entry": component.entry,
+                "points": component.points,
+                "verdict": "refuted",
+                "digits": digits,
+                "differing": differing,
+                "place": named(place),
+                "listing": nearest_f64(listing),
+                "derived": nearest_f64(derived),
+            }),
+        });
+        json!({
+            "source": self.source,
+            "components": components.collect::<Vec<_>>(),
+            "not_compared": self.report.unchecked,
+            "proved": self.report.proved(),
+        })
+    }
+}
+
+/// What a specification claims, and what became of it.
+struct Claims {
+    surfaces: Vec<SurfaceProof>,
+    listings: Vec<Comparison>,
+}
+
+impl Claims {
+    fn judge(spec: &Spec, listings: &[Published<'_>]) -> Result<Self> {
+        let fields = spec.derive()?;
+        let compare = |listing: &Published<'_>| {
+            let source = listing.source().to_owned();
+            Ok(Comparison { source, report: listing.compare(&fields)? })
+        };
+        Ok(Claims {
+            surfaces: prove_surfaces(spec, &fields)?,
+            listings: listings.iter().map(compare).collect::<Result<_>>()?,
+        })
+    }
+
+    fn hold(&self) -> bool {
+        self.surfaces.iter().all(SurfaceProof::holds)
+            && self.listings.iter().all(|comparison| comparison.report.proved())
+    }
+
+    fn text(&self) -> String {
+        let mut text = String::new();
+        let name = |proof: &SurfaceProof| format!("{} on {:?}", claim(proof.claim), proof.surface);
+        let symbolic = self.surfaces.iter().filter(|p| p.outcome == Outcome::Symbolic).map(name);
+        let symbolic = symbolic.collect::<Vec<_>>().join(", ");
+        if !symbolic.is_empty() {
+            text += &format!("  zero in symbols, for all parameters: {symbolic}\n");
+        }
+        for proof in &self.surfaces {
+            let outcome = match &proof.outcome {
+                Outcome::Symbolic => continue,
+                Outcome::Numerical { digits, points } => {
+                    format!("zero to {digits:.0} digits at {points} points with random parameters")
+                }
+                Outcome::Refuted { value, scale, place } => {
+                    let place: Vec<String> =
+                        place.iter().map(|(name, x)| format!("{name} = {x:?}")).collect();
+                    format!("NOT zero: {value:e} of {scale:e} at {}", place.join(", "))
+                }
+            };
+            text += &format!("  {}: {outcome}\n", name(proof));
+        }
+        for Comparison { source, report } in &self.listings {
+            text += &format!("  listing '{source}'\n");
+            for line in report.to_string().lines() {
+                text += &format!("    {line}\n");
+            }
+        }
+        text
+    }
+}
+
+/// A claim, as the table of findings names it.
+fn claim(kind: ClaimKind) -> &'static str {
+    match kind {
+        ClaimKind::Traction => "P N",
+        ClaimKind::Shear => "shear",
+        ClaimKind::NormalDisplacement => "u.N",
+    }
+}
+
+fn surface_document(proof: &SurfaceProof) -> Value {
+    let what = format!("{} on {:?}", claim(proof.claim), proof.surface);
+    match &proof.outcome {
+        Outcome::Symbolic => json!({ "what": what, "verdict": "proved", "by": "symbols" }),
+        Outcome::Numerical { digits, points } => json!({
+            "what": what,
+            "verdict": "proved",
+            "by": "digits",
+            "digits": digits,
+            "points": points,
+        }),
+        Outcome::Refuted { value, scale, place } => json!({
+            "what": what,
+            "verdict": "refuted",
+            "value": value,
+            "scale": scale,
+            "place": named(place),
+        }),
+    }
+}
+
+fn named(place: &[(String, f64)]) -> Map<String, Value> {
+    place.iter().map(|(name, value)| (name.clone(), json!(value))).collect()
+}
+
 /// The findings of one solution as a table, and the place of each that did not pass.
-fn text(name: &str, report: &CheckReport) -> String {
-    let verdict = if report.passed() { "passed" } else { "FAILED" };
+fn text(name: &str, passed: bool, report: &CheckReport, claims: &Claims) -> String {
+    let verdict = if passed { "passed" } else { "FAILED" };
     let mut text = format!("{name}: {verdict} at {} points\n", report.points);
     let header =
         ["field", "compared with", "verdict", "difference", "own error", "allowed", "scale"];
@@ -98,6 +238,7 @@ fn text(name: &str, report: &CheckReport) -> String {
     }
     text += &table.text();
     text += &places;
+    text += &claims.text();
     text.push('\n');
     text
 }

@@ -507,6 +507,116 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
             b: crate::nalgebra::SVector::<T, 2>::new(t121, t140),
         }
     }
+    fn traction(
+        &self,
+        surface: crate::Surface,
+        X: &crate::nalgebra::SVector<T, 2>,
+        t: T,
+    ) -> Option<crate::nalgebra::SVector<T, 2>> {
+        match surface {
+            crate::Surface::Lower(0) => {
+                let t8 = self.fixed[0] * t;
+                let t9 = t8.cos_pi();
+                let t14 = t8.sin_pi();
+                let t36 = self.fixed[1] * t9;
+                let t39 = X[1].cos_pi();
+                let t52 = t14 * t39;
+                let t53 = t9 * t14;
+                let t54 = self.fixed[1] * t53;
+                let t142 = t36 + T::one();
+                let t143 = t54 * t39;
+                let t144 = t52 + t143;
+                let t145 = t9 + t144;
+                let t146 = self.fixed[1] * t145;
+                let t147 = t146.ln_1p();
+                let t148 = self.fixed[4] * t147;
+                let t149 = t36 + T::nearest(2.0);
+                let t150 = t9 * t149;
+                let t151 = self.fixed[6] * t150;
+                let t152 = t151 + t148;
+                let t153 = T::one() / t142;
+                let t154 = t153 * t152;
+                let t155 = -t154;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t155, T::zero()))
+            }
+            crate::Surface::Upper(0) => {
+                let t8 = self.fixed[0] * t;
+                let t9 = t8.cos_pi();
+                let t14 = t8.sin_pi();
+                let t36 = self.fixed[1] * t9;
+                let t39 = X[1].cos_pi();
+                let t52 = t14 * t39;
+                let t53 = t9 * t14;
+                let t54 = self.fixed[1] * t53;
+                let t143 = t54 * t39;
+                let t156 = T::one() - t36;
+                let t157 = t143 - t52;
+                let t158 = t9 + t157;
+                let t159 = self.fixed[1] * t158;
+                let t160 = -t159;
+                let t161 = t160.ln_1p();
+                let t162 = self.fixed[4] * t161;
+                let t163 = T::nearest(2.0) - t36;
+                let t164 = t9 * t163;
+                let t165 = self.fixed[6] * t164;
+                let t166 = t162 - t165;
+                let t167 = T::one() / t156;
+                let t168 = t167 * t166;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t168, T::zero()))
+            }
+            crate::Surface::Lower(1) => {
+                let t8 = self.fixed[0] * t;
+                let t9 = t8.cos_pi();
+                let t14 = t8.sin_pi();
+                let t35 = X[0].cos_pi();
+                let t40 = self.fixed[1] * t14;
+                let t51 = t9 * t35;
+                let t53 = t9 * t14;
+                let t54 = self.fixed[1] * t53;
+                let t169 = t40 + T::one();
+                let t170 = t54 * t35;
+                let t171 = t51 + t170;
+                let t172 = t14 + t171;
+                let t173 = self.fixed[1] * t172;
+                let t174 = t173.ln_1p();
+                let t175 = self.fixed[4] * t174;
+                let t176 = t40 + T::nearest(2.0);
+                let t177 = t14 * t176;
+                let t178 = self.fixed[6] * t177;
+                let t179 = t178 + t175;
+                let t180 = T::one() / t169;
+                let t181 = t180 * t179;
+                let t182 = -t181;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t182))
+            }
+            crate::Surface::Upper(1) => {
+                let t8 = self.fixed[0] * t;
+                let t9 = t8.cos_pi();
+                let t14 = t8.sin_pi();
+                let t35 = X[0].cos_pi();
+                let t40 = self.fixed[1] * t14;
+                let t51 = t9 * t35;
+                let t53 = t9 * t14;
+                let t54 = self.fixed[1] * t53;
+                let t170 = t54 * t35;
+                let t183 = T::one() - t40;
+                let t184 = t170 - t51;
+                let t185 = t14 + t184;
+                let t186 = self.fixed[1] * t185;
+                let t187 = -t186;
+                let t188 = t187.ln_1p();
+                let t189 = self.fixed[4] * t188;
+                let t190 = T::nearest(2.0) - t40;
+                let t191 = t14 * t190;
+                let t192 = self.fixed[6] * t191;
+                let t193 = t189 - t192;
+                let t194 = T::one() / t183;
+                let t195 = t194 * t193;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t195))
+            }
+            _ => None,
+        }
+    }
     fn domain(&self) -> crate::Domain<T, 2> {
         crate::Domain::Box {
             lower: crate::nalgebra::SVector::from([T::zero(), T::zero()]),

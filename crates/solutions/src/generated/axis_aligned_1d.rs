@@ -377,6 +377,46 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
             b: crate::nalgebra::SVector::<T, 1>::new(t91),
         }
     }
+    fn traction(
+        &self,
+        surface: crate::Surface,
+        X: &crate::nalgebra::SVector<T, 1>,
+        t: T,
+    ) -> Option<crate::nalgebra::SVector<T, 1>> {
+        match surface {
+            crate::Surface::Lower(0) => {
+                let t8 = self.fixed[0] * t;
+                let t9 = t8.cos_pi();
+                let t27 = self.fixed[1] * t9;
+                let t94 = t27 + T::one();
+                let t95 = t27.ln_1p();
+                let t96 = self.fixed[4] * t95;
+                let t97 = t27 + T::nearest(2.0);
+                let t98 = t9 * t97;
+                let t99 = self.fixed[6] * t98;
+                let t100 = t96 + t99;
+                let t101 = t100 / t94;
+                let t102 = -t101;
+                Some(crate::nalgebra::SVector::<T, 1>::new(t102))
+            }
+            crate::Surface::Upper(0) => {
+                let t8 = self.fixed[0] * t;
+                let t9 = t8.cos_pi();
+                let t27 = self.fixed[1] * t9;
+                let t103 = T::one() - t27;
+                let t104 = -t27;
+                let t105 = t104.ln_1p();
+                let t106 = self.fixed[4] * t105;
+                let t107 = T::nearest(2.0) - t27;
+                let t108 = t9 * t107;
+                let t109 = self.fixed[6] * t108;
+                let t110 = t106 - t109;
+                let t111 = t110 / t103;
+                Some(crate::nalgebra::SVector::<T, 1>::new(t111))
+            }
+            _ => None,
+        }
+    }
     fn domain(&self) -> crate::Domain<T, 1> {
         crate::Domain::Box {
             lower: crate::nalgebra::SVector::from([T::zero()]),

@@ -774,6 +774,247 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
             b: crate::nalgebra::SVector::<T, 3>::new(t165, t196, t214),
         }
     }
+    fn traction(
+        &self,
+        surface: crate::Surface,
+        X: &crate::nalgebra::SVector<T, 3>,
+        t: T,
+    ) -> Option<crate::nalgebra::SVector<T, 3>> {
+        match surface {
+            crate::Surface::Lower(0) => {
+                let t8 = self.fixed[0] * t;
+                let t9 = t8.sin_pi();
+                let t17 = t8.cos_pi();
+                let t18 = self.fixed[1] * t17;
+                let t19 = t9 - t18;
+                let t26 = t9 + t18;
+                let t61 = self.fixed[3] * t9;
+                let t64 = X[1].cos_pi();
+                let t65 = self.fixed[5] * t19;
+                let t66 = t65 * t64;
+                let t67 = -t66;
+                let t68 = X[2].cos_pi();
+                let t69 = self.fixed[5] * t26;
+                let t70 = t69 * t68;
+                let t71 = -t70;
+                let t93 = t67 * t71;
+                let t216 = t61 + T::one();
+                let t217 = t61 * t67;
+                let t218 = t61 * t71;
+                let t219 = t61 * t93;
+                let t220 = t67 + t71;
+                let t221 = t220 + t93;
+                let t222 = t221 + t217;
+                let t223 = t222 + t218;
+                let t224 = t223 + t219;
+                let t225 = t61 + t224;
+                let t226 = t225.ln_1p();
+                let t227 = self.fixed[9] * t226;
+                let t228 = t61 + T::nearest(2.0);
+                let t229 = t9 * t228;
+                let t230 = self.fixed[11] * t229;
+                let t231 = t230 + t227;
+                let t232 = T::one() / t216;
+                let t233 = t232 * t231;
+                let t234 = -t233;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t234, T::zero(), T::zero()))
+            }
+            crate::Surface::Upper(0) => {
+                let t8 = self.fixed[0] * t;
+                let t9 = t8.sin_pi();
+                let t17 = t8.cos_pi();
+                let t18 = self.fixed[1] * t17;
+                let t19 = t9 - t18;
+                let t26 = t9 + t18;
+                let t61 = self.fixed[3] * t9;
+                let t64 = X[1].cos_pi();
+                let t65 = self.fixed[5] * t19;
+                let t66 = t65 * t64;
+                let t67 = -t66;
+                let t68 = X[2].cos_pi();
+                let t69 = self.fixed[5] * t26;
+                let t70 = t69 * t68;
+                let t71 = -t70;
+                let t93 = t67 * t71;
+                let t217 = t61 * t67;
+                let t218 = t61 * t71;
+                let t219 = t61 * t93;
+                let t220 = t67 + t71;
+                let t221 = t220 + t93;
+                let t235 = T::one() - t61;
+                let t236 = t221 - t217;
+                let t237 = t236 - t218;
+                let t238 = t237 - t219;
+                let t239 = t238 - t61;
+                let t240 = t239.ln_1p();
+                let t241 = self.fixed[9] * t240;
+                let t242 = T::nearest(2.0) - t61;
+                let t243 = t9 * t242;
+                let t244 = self.fixed[11] * t243;
+                let t245 = t241 - t244;
+                let t246 = T::one() / t235;
+                let t247 = t246 * t245;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t247, T::zero(), T::zero()))
+            }
+            crate::Surface::Lower(1) => {
+                let t8 = self.fixed[0] * t;
+                let t9 = t8.sin_pi();
+                let t17 = t8.cos_pi();
+                let t18 = self.fixed[1] * t17;
+                let t19 = t9 - t18;
+                let t26 = t9 + t18;
+                let t60 = X[0].cos_pi();
+                let t61 = self.fixed[3] * t9;
+                let t62 = t61 * t60;
+                let t65 = self.fixed[5] * t19;
+                let t68 = X[2].cos_pi();
+                let t69 = self.fixed[5] * t26;
+                let t70 = t69 * t68;
+                let t71 = -t70;
+                let t92 = t62 * t71;
+                let t248 = -t65;
+                let t249 = t248 + T::one();
+                let t250 = t9 * t248;
+                let t251 = self.fixed[3] * t250;
+                let t252 = t251 * t60;
+                let t253 = t248 * t71;
+                let t254 = t252 * t71;
+                let t255 = t62 + t71;
+                let t256 = t255 + t92;
+                let t257 = t256 + t252;
+                let t258 = t257 + t253;
+                let t259 = t258 + t254;
+                let t260 = t248 + t259;
+                let t261 = t260.ln_1p();
+                let t262 = self.fixed[9] * t261;
+                let t263 = t248 + T::nearest(2.0);
+                let t264 = t248 * t263;
+                let t265 = self.fixed[10] * t264;
+                let t266 = t265 + t262;
+                let t267 = T::one() / t249;
+                let t268 = t267 * t266;
+                let t269 = -t268;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t269, T::zero()))
+            }
+            crate::Surface::Upper(1) => {
+                let t8 = self.fixed[0] * t;
+                let t9 = t8.sin_pi();
+                let t17 = t8.cos_pi();
+                let t18 = self.fixed[1] * t17;
+                let t19 = t9 - t18;
+                let t26 = t9 + t18;
+                let t60 = X[0].cos_pi();
+                let t61 = self.fixed[3] * t9;
+                let t62 = t61 * t60;
+                let t65 = self.fixed[5] * t19;
+                let t68 = X[2].cos_pi();
+                let t69 = self.fixed[5] * t26;
+                let t70 = t69 * t68;
+                let t71 = -t70;
+                let t92 = t62 * t71;
+                let t255 = t62 + t71;
+                let t256 = t255 + t92;
+                let t270 = t65 + T::one();
+                let t271 = t9 * t65;
+                let t272 = self.fixed[3] * t271;
+                let t273 = t272 * t60;
+                let t274 = t65 * t71;
+                let t275 = t273 * t71;
+                let t276 = t256 + t273;
+                let t277 = t276 + t274;
+                let t278 = t277 + t275;
+                let t279 = t65 + t278;
+                let t280 = t279.ln_1p();
+                let t281 = self.fixed[9] * t280;
+                let t282 = t65 + T::nearest(2.0);
+                let t283 = t65 * t282;
+                let t284 = self.fixed[10] * t283;
+                let t285 = t284 + t281;
+                let t286 = T::one() / t270;
+                let t287 = t286 * t285;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t287, T::zero()))
+            }
+            crate::Surface::Lower(2) => {
+                let t8 = self.fixed[0] * t;
+                let t9 = t8.sin_pi();
+                let t17 = t8.cos_pi();
+                let t18 = self.fixed[1] * t17;
+                let t19 = t9 - t18;
+                let t26 = t9 + t18;
+                let t60 = X[0].cos_pi();
+                let t61 = self.fixed[3] * t9;
+                let t62 = t61 * t60;
+                let t64 = X[1].cos_pi();
+                let t65 = self.fixed[5] * t19;
+                let t66 = t65 * t64;
+                let t67 = -t66;
+                let t69 = self.fixed[5] * t26;
+                let t91 = t62 * t67;
+                let t95 = t62 + t67;
+                let t288 = -t69;
+                let t289 = t288 + T::one();
+                let t290 = t9 * t288;
+                let t291 = self.fixed[3] * t290;
+                let t292 = t291 * t60;
+                let t293 = t288 * t67;
+                let t294 = t292 * t67;
+                let t295 = t95 + t91;
+                let t296 = t295 + t292;
+                let t297 = t296 + t293;
+                let t298 = t297 + t294;
+                let t299 = t288 + t298;
+                let t300 = t299.ln_1p();
+                let t301 = self.fixed[9] * t300;
+                let t302 = t288 + T::nearest(2.0);
+                let t303 = t288 * t302;
+                let t304 = self.fixed[10] * t303;
+                let t305 = t304 + t301;
+                let t306 = T::one() / t289;
+                let t307 = t306 * t305;
+                let t308 = -t307;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t308))
+            }
+            crate::Surface::Upper(2) => {
+                let t8 = self.fixed[0] * t;
+                let t9 = t8.sin_pi();
+                let t17 = t8.cos_pi();
+                let t18 = self.fixed[1] * t17;
+                let t19 = t9 - t18;
+                let t26 = t9 + t18;
+                let t60 = X[0].cos_pi();
+                let t61 = self.fixed[3] * t9;
+                let t62 = t61 * t60;
+                let t64 = X[1].cos_pi();
+                let t65 = self.fixed[5] * t19;
+                let t66 = t65 * t64;
+                let t67 = -t66;
+                let t69 = self.fixed[5] * t26;
+                let t91 = t62 * t67;
+                let t95 = t62 + t67;
+                let t295 = t95 + t91;
+                let t309 = t69 + T::one();
+                let t310 = t9 * t69;
+                let t311 = self.fixed[3] * t310;
+                let t312 = t311 * t60;
+                let t313 = t69 * t67;
+                let t314 = t312 * t67;
+                let t315 = t295 + t312;
+                let t316 = t315 + t313;
+                let t317 = t316 + t314;
+                let t318 = t69 + t317;
+                let t319 = t318.ln_1p();
+                let t320 = self.fixed[9] * t319;
+                let t321 = t69 + T::nearest(2.0);
+                let t322 = t69 * t321;
+                let t323 = self.fixed[10] * t322;
+                let t324 = t323 + t320;
+                let t325 = T::one() / t309;
+                let t326 = t325 * t324;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t326))
+            }
+            _ => None,
+        }
+    }
     fn domain(&self) -> crate::Domain<T, 3> {
         crate::Domain::Box {
             lower: crate::nalgebra::SVector::from([T::zero(), T::zero(), T::zero()]),

@@ -440,6 +440,45 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
             b: crate::nalgebra::SVector::<T, 1>::new(t111),
         }
     }
+    fn traction(
+        &self,
+        surface: crate::Surface,
+        X: &crate::nalgebra::SVector<T, 1>,
+        t: T,
+    ) -> Option<crate::nalgebra::SVector<T, 1>> {
+        match surface {
+            crate::Surface::Lower(0) => {
+                let t13 = self.fixed[2] * t;
+                let t14 = t13.cos_pi();
+                let t38 = self.fixed[6] * t14;
+                let t116 = t38 + T::one();
+                let t117 = t38.ln_1p();
+                let t118 = self.fixed[7] * t117;
+                let t119 = t38 + T::nearest(2.0);
+                let t120 = t38 * t119;
+                let t121 = self.fixed[8] * t120;
+                let t122 = t118 + t121;
+                let t123 = t122 / t116;
+                let t124 = -t123;
+                Some(crate::nalgebra::SVector::<T, 1>::new(t124))
+            }
+            crate::Surface::Upper(0) => {
+                let t13 = self.fixed[2] * t;
+                let t14 = t13.cos_pi();
+                let t38 = self.fixed[6] * t14;
+                let t116 = t38 + T::one();
+                let t117 = t38.ln_1p();
+                let t118 = self.fixed[7] * t117;
+                let t119 = t38 + T::nearest(2.0);
+                let t120 = t38 * t119;
+                let t121 = self.fixed[8] * t120;
+                let t122 = t118 + t121;
+                let t123 = t122 / t116;
+                Some(crate::nalgebra::SVector::<T, 1>::new(t123))
+            }
+            _ => None,
+        }
+    }
     fn domain(&self) -> crate::Domain<T, 1> {
         crate::Domain::Box {
             lower: crate::nalgebra::SVector::from([T::zero()]),

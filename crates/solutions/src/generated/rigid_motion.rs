@@ -445,6 +445,28 @@ impl<T: crate::Real> crate::Solution<T, 2> for RigidMotion<T> {
             b: crate::nalgebra::SVector::<T, 2>::new(t76, t65),
         }
     }
+    fn traction(
+        &self,
+        surface: crate::Surface,
+        X: &crate::nalgebra::SVector<T, 2>,
+        t: T,
+    ) -> Option<crate::nalgebra::SVector<T, 2>> {
+        match surface {
+            crate::Surface::Lower(0) => {
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), T::zero()))
+            }
+            crate::Surface::Upper(0) => {
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), T::zero()))
+            }
+            crate::Surface::Lower(1) => {
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), T::zero()))
+            }
+            crate::Surface::Upper(1) => {
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), T::zero()))
+            }
+            _ => None,
+        }
+    }
     fn domain(&self) -> crate::Domain<T, 2> {
         crate::Domain::Box {
             lower: crate::nalgebra::SVector::from([T::zero(), T::zero()]),

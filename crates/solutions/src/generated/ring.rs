@@ -41,7 +41,7 @@ impl<T: crate::Real> Default for RingParameters<T> {
 pub struct Ring<T: crate::Real> {
     parameters: RingParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 20],
+    fixed: [T; 21],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Ring<T> {
@@ -89,7 +89,7 @@ impl<T: crate::Real> Ring<T> {
                 description: "outer radius",
             },
         ],
-        specification: "# Philip Wallstedt and James Guilkey's second problem: a ring that breathes, its rims free of traction. The radial\n# stress vanishes at Ri and Ro, and u_R(Ro) = T fixes the scale; Poisson's ratio is zero.\nname = 'ring'\ntitle = 'Expanding ring with free surfaces'\nreference = 'P. Wallstedt and J. Guilkey, Evaluation of Time Integration Schemes for the Generalized Interpolation Material Point Method (slides)'\ncoordinates = 'polar'\ndimension = 2\nrequire = ['Ri < Ro', 'Ro < 3*Ri']\n\n[parameters]\nA = { default = 0.1, unit = 'm', description = 'amplitude of the outer rim' }\nE = { default = 1.0e4, range = '> 0', unit = 'Pa', description = \"Young's modulus\" }\nrho0 = { default = 1.0, range = '> 0', unit = 'kg/m^3', description = 'reference density' }\nRi = { default = 0.5, range = '> 0', unit = 'm', description = 'inner radius' }\nRo = { default = 1.0, range = '> 0', unit = 'm', description = 'outer radius' }\n\n[let]\nc = 'sqrt(E/rho0)'\nT = 'A*cos(c*Pi*t)'\nd = 'Ro^2*(3*Ri - Ro)'\n\n[displacement]\n# In this form, which is T (c3 R^3 + c2 R^2 + c1 R) with the coefficients of the study\n#     c1 = 6 Ri Ro/d, c2 = -3 (Ri + Ro)/d, c3 = 2/d, d = Ro^2 (3 Ri - Ro),\n# no terms cancel next to the rims, where u_R = T and du_R/dR = 6 T (R - Ri) (R - Ro)/d.\nR = 'T*(1 + (Ro - R)^2*(2*R + Ro - 3*Ri)/d)'\n\n[material]\nlaw = 'neo-hookean'\nlambda = 0\nmu = 'E/2'\ndensity = 'rho0'\n\n[domain]\nshape = 'annulus'\ninner = 'Ri'\nouter = 'Ro'\n\n[[boundary]]\nsurface = 'inner'\ncondition = 'traction-free'\n\n[[boundary]]\nsurface = 'outer'\ncondition = 'traction-free'\n\n[[boundary]]\nsurface = 'X-lower'\ncondition = 'symmetry'\n\n[[boundary]]\nsurface = 'Y-lower'\ncondition = 'symmetry'\n\n[time]\nperiod = '2/c'\nwave-speed = 'c'\n",
+        specification: "# Philip Wallstedt and James Guilkey's second problem: a ring that breathes, its rims free of traction. The radial\n# stress vanishes at Ri and Ro, and u_R(Ro) = T fixes the scale; Poisson's ratio is zero.\nname = 'ring'\ntitle = 'Expanding ring with free surfaces'\nreference = 'P. Wallstedt and J. Guilkey, Evaluation of Time Integration Schemes for the Generalized Interpolation Material Point Method (slides)'\ncoordinates = 'polar'\ndimension = 2\nrequire = ['Ri < Ro', 'Ro < 3*Ri']\n\n[parameters]\nA = { default = 0.1, unit = 'm', description = 'amplitude of the outer rim' }\nE = { default = 1.0e4, range = '> 0', unit = 'Pa', description = \"Young's modulus\" }\nrho0 = { default = 1.0, range = '> 0', unit = 'kg/m^3', description = 'reference density' }\nRi = { default = 0.5, range = '> 0', unit = 'm', description = 'inner radius' }\nRo = { default = 1.0, range = '> 0', unit = 'm', description = 'outer radius' }\n\n[let]\nc = 'sqrt(E/rho0)'\nT = 'A*cos(c*Pi*t)'\nd = 'Ro^2*(3*Ri - Ro)'\n\n[displacement]\n# In this form, which is T (c3 R^3 + c2 R^2 + c1 R) with the coefficients of the study\n#     c1 = 6 Ri Ro/d, c2 = -3 (Ri + Ro)/d, c3 = 2/d, d = Ro^2 (3 Ri - Ro),\n# no terms cancel next to the rims, where u_R = T and du_R/dR = 6 T (R - Ri) (R - Ro)/d.\nR = 'T*(1 + (Ro - R)^2*(2*R + Ro - 3*Ri)/d)'\n\n[material]\nlaw = 'neo-hookean'\nlambda = 0\nmu = 'E/2'\ndensity = 'rho0'\n\n[domain]\nshape = 'annulus'\ninner = 'Ri'\nouter = 'Ro'\n\n[[boundary]]\nsurface = 'inner'\ncondition = 'traction-free'\n\n[[boundary]]\nsurface = 'outer'\ncondition = 'traction-free'\n\n[[boundary]]\nsurface = 'X-lower'\ncondition = 'symmetry'\n\n[[boundary]]\nsurface = 'Y-lower'\ncondition = 'symmetry'\n\n# The slides' code for b as Maple printed it, but for numbers and names that the slides break across lines.\n[[cross-check]]\nsource = 'P. Wallstedt and J. Guilkey (slides), closing listing'\nlisting = '''\nt1 = pi*pi;\nt3 = 1/rho;\nt4 = t1*E*t3;\nt5 = R*R;\nt6 = t5*R;\nt8 = c2*t5;\nt9 = c1*R;\nt11 = T*(c3*t6+t8+t9);\nt12 = cos(H);\nt17 = T*T;\nt18 = t17*T;\nt19 = c2*c2;\nt20 = t19*t19;\nt27 = c3*c3;\nt31 = T*c2;\nt34 = t17*c2;\nt35 = c1*c1;\nt39 = t35*c1;\nt42 = t27*t27;\nt44 = t5*t5;\nt48 = t19*c2;\nt52 = t27*c3;\nt54 = t44*R;\nt57 = t18*t27;\nt61 = t18*t52;\nt66 = t18*c3;\nt77 = t5*c1;\nt80 =\n12.0*t18*t20*t6+19.0*T*t19*R+68.0*T*t27*t6+12.0*t31*c1+9.0*t34*t35+3.0*t18*c2*t39+72.0*t18\n*t42*t44*t6+24.0*t17*t48*t5+120.0*t17*t52*t54+191.0*t57*\nt54*t19+195.0*t61*t44*t5*c2+8.0*t66*R*t39+56.0*t57*t6*t35+80.0*t66*t44*t48+24.0\n*t18*t48*t77;\nt82 = R*t35;\nt88 = t17*c3;\nt89 = t6*t19;\nt94 = t17*t27;\nt98 = t44*c2;\nt101 = t17*t19;\nt104 = T*c3;\nt124 =\n15.0*t18*t19*t82+120.0*t61*t54*c1+130.0*t88*t89+24.0*t88*t82+112.0*t94\n*t6*c1+221.0*t94*t98+30.0*t101*t9+32.0*t104*t9+76.0*t104*t8+6.0*c2+122.0*\nt88*t8*c1+61.0*t66*t8*t35+130.0*t66\n*t89*c1+221.0*t57*t98*c1+16.0*c3*R;\nt125 = t80+t124;\nt127 = t104*t5;\nt129 = t31*R;\nt131 = T*c1;\nt151 =\n1/(3.0*t127+2.0*t129+1.0+t131)/(1.0\n+3.0*t94*t44+5.0*t88*t6*c2+4.0*\nt88*t77+3.0*t34*t9+t17*t35+2.0*t131\n+2.0*t101*t5+3.0*t129+4.0*t127);\nt156 = sin(H);\nb[0] = -t4*t11*t12-\nt3*E*T*t12*t125*t151/2.0;\nb[1] = -t4*t11*t156-\nt3*t125*E*T*t156*t151/2.0;\nb[2] = 0.0;\n'''\n\n[cross-check.names]\nH = 'theta'\nrho = 'rho0'\nc1 = '6*Ri*Ro/d'\nc2 = '-3*(Ri + Ro)/d'\nc3 = '2/d'\n\n[time]\nperiod = '2/c'\nwave-speed = 'c'\n",
     };
     /// The solution with the given parameters.
     ///
@@ -167,6 +167,7 @@ impl<T: crate::Real> Ring<T> {
         let t186 = t133 * t95;
         let t187 = t186 / parameters.rho0;
         let t198 = T::nearest(2.0) / t11;
+        let t201 = parameters.A * t95;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -196,6 +197,7 @@ impl<T: crate::Real> Ring<T> {
                 t181,
                 t187,
                 t198,
+                t201,
             ],
         })
     }
@@ -734,6 +736,80 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
             J: t93,
             P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t106, t111, t111, t116),
             b: crate::nalgebra::SVector::<T, 2>::new(t195, t197),
+        }
+    }
+    fn traction(
+        &self,
+        surface: crate::Surface,
+        X: &crate::nalgebra::SVector<T, 2>,
+        t: T,
+    ) -> Option<crate::nalgebra::SVector<T, 2>> {
+        match surface {
+            crate::Surface::Inner => {
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), T::zero()))
+            }
+            crate::Surface::Outer => {
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), T::zero()))
+            }
+            crate::Surface::Lower(0) => {
+                let t1 = X[0] * X[0];
+                let t3 = X[1] * X[1];
+                let t4 = t1 + t3;
+                let t5 = t4.sqrt();
+                let t12 = self.fixed[0] * t;
+                let t13 = t12.cos_pi();
+                let t20 = t5 - self.parameters.Ro;
+                let t21 = t20 * t20;
+                let t23 = T::nearest(2.0) * t5;
+                let t25 = self.fixed[2] + t23;
+                let t29 = t21 * t25;
+                let t30 = self.fixed[3] * t29;
+                let t31 = t30 + T::one();
+                let t32 = self.parameters.A * t13;
+                let t63 = t31 * t3;
+                let t70 = t31 / t5;
+                let t91 = t32 * t70;
+                let t92 = t91 + T::one();
+                let t100 = t91 + T::nearest(2.0);
+                let t102 = t100 / t92;
+                let t200 = t4 * t5;
+                let t202 = self.fixed[20] * t13;
+                let t203 = t63 / t200;
+                let t204 = t202 * t203;
+                let t205 = t204 * t102;
+                let t206 = -t205;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t206, T::zero()))
+            }
+            crate::Surface::Lower(1) => {
+                let t1 = X[0] * X[0];
+                let t3 = X[1] * X[1];
+                let t4 = t1 + t3;
+                let t5 = t4.sqrt();
+                let t12 = self.fixed[0] * t;
+                let t13 = t12.cos_pi();
+                let t20 = t5 - self.parameters.Ro;
+                let t21 = t20 * t20;
+                let t23 = T::nearest(2.0) * t5;
+                let t25 = self.fixed[2] + t23;
+                let t29 = t21 * t25;
+                let t30 = self.fixed[3] * t29;
+                let t31 = t30 + T::one();
+                let t32 = self.parameters.A * t13;
+                let t70 = t31 / t5;
+                let t79 = t31 * t1;
+                let t91 = t32 * t70;
+                let t92 = t91 + T::one();
+                let t100 = t91 + T::nearest(2.0);
+                let t102 = t100 / t92;
+                let t200 = t4 * t5;
+                let t202 = self.fixed[20] * t13;
+                let t207 = t79 / t200;
+                let t208 = t202 * t207;
+                let t209 = t208 * t102;
+                let t210 = -t209;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t210))
+            }
+            _ => None,
         }
     }
     fn domain(&self) -> crate::Domain<T, 2> {

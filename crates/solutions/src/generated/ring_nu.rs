@@ -44,7 +44,7 @@ impl<T: crate::Real> Default for RingNuParameters<T> {
 pub struct RingNu<T: crate::Real> {
     parameters: RingNuParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 24],
+    fixed: [T; 28],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> RingNu<T> {
@@ -200,6 +200,20 @@ impl<T: crate::Real> RingNu<T> {
         let t245 = t244 * t97;
         let t246 = t243 / t245;
         let t257 = T::nearest(2.0) / t11;
+        let t258 = parameters.Ri - parameters.Ro;
+        let t259 = t258 * t258;
+        let t260 = t259 * t258;
+        let t261 = t260 / t26;
+        let t262 = T::one() - t261;
+        let t263 = parameters.A * t262;
+        let t264 = t263 / parameters.Ri;
+        let t267 = parameters.Ri * t95;
+        let t268 = t267 * t97;
+        let t269 = t102 / t268;
+        let t275 = parameters.A / parameters.Ro;
+        let t278 = parameters.Ro * t95;
+        let t279 = t278 * t97;
+        let t280 = t102 / t279;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -233,6 +247,10 @@ impl<T: crate::Real> RingNu<T> {
                 t238,
                 t246,
                 t257,
+                t264,
+                t269,
+                t275,
+                t280,
             ],
         })
     }
@@ -856,6 +874,114 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
             J: t93,
             P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t125, t128, t128, t132),
             b: crate::nalgebra::SVector::<T, 2>::new(t254, t256),
+        }
+    }
+    fn traction(
+        &self,
+        surface: crate::Surface,
+        X: &crate::nalgebra::SVector<T, 2>,
+        t: T,
+    ) -> Option<crate::nalgebra::SVector<T, 2>> {
+        match surface {
+            crate::Surface::Inner => {
+                let t12 = self.fixed[0] * t;
+                let t13 = t12.cos_pi();
+                let t265 = self.fixed[24] * t13;
+                let t266 = t265.ln_1p();
+                let t270 = self.fixed[25] * t266;
+                let t271 = t270 * X[0];
+                let t272 = -t271;
+                let t273 = t270 * X[1];
+                let t274 = -t273;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t272, t274))
+            }
+            crate::Surface::Outer => {
+                let t12 = self.fixed[0] * t;
+                let t13 = t12.cos_pi();
+                let t276 = self.fixed[26] * t13;
+                let t277 = t276.ln_1p();
+                let t281 = self.fixed[27] * t277;
+                let t282 = t281 * X[0];
+                let t283 = t281 * X[1];
+                Some(crate::nalgebra::SVector::<T, 2>::new(t282, t283))
+            }
+            crate::Surface::Lower(0) => {
+                let t1 = X[0] * X[0];
+                let t3 = X[1] * X[1];
+                let t4 = t1 + t3;
+                let t5 = t4.sqrt();
+                let t12 = self.fixed[0] * t;
+                let t13 = t12.cos_pi();
+                let t20 = t5 - self.parameters.Ro;
+                let t21 = t20 * t20;
+                let t23 = T::nearest(2.0) * t5;
+                let t25 = self.fixed[2] + t23;
+                let t29 = t21 * t25;
+                let t30 = self.fixed[3] * t29;
+                let t31 = t30 + T::one();
+                let t32 = self.parameters.A * t13;
+                let t58 = t5 - self.parameters.Ri;
+                let t68 = t20 * t58;
+                let t70 = t31 / t5;
+                let t88 = self.fixed[8] * t13;
+                let t89 = t88 * t68;
+                let t91 = t32 * t70;
+                let t92 = t91 + T::one();
+                let t98 = t91 * t89;
+                let t99 = t91 + t89;
+                let t100 = t99 + t98;
+                let t101 = t100.ln_1p();
+                let t105 = self.fixed[9] * t101;
+                let t115 = t91 + T::nearest(2.0);
+                let t117 = self.fixed[11] * t13;
+                let t118 = t117 * t70;
+                let t119 = t118 * t115;
+                let t120 = t105 + t119;
+                let t121 = t120 / t92;
+                let t284 = t3 / t4;
+                let t285 = t284 * t121;
+                let t286 = -t285;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t286, T::zero()))
+            }
+            crate::Surface::Lower(1) => {
+                let t1 = X[0] * X[0];
+                let t3 = X[1] * X[1];
+                let t4 = t1 + t3;
+                let t5 = t4.sqrt();
+                let t12 = self.fixed[0] * t;
+                let t13 = t12.cos_pi();
+                let t20 = t5 - self.parameters.Ro;
+                let t21 = t20 * t20;
+                let t23 = T::nearest(2.0) * t5;
+                let t25 = self.fixed[2] + t23;
+                let t29 = t21 * t25;
+                let t30 = self.fixed[3] * t29;
+                let t31 = t30 + T::one();
+                let t32 = self.parameters.A * t13;
+                let t58 = t5 - self.parameters.Ri;
+                let t68 = t20 * t58;
+                let t70 = t31 / t5;
+                let t88 = self.fixed[8] * t13;
+                let t89 = t88 * t68;
+                let t91 = t32 * t70;
+                let t92 = t91 + T::one();
+                let t98 = t91 * t89;
+                let t99 = t91 + t89;
+                let t100 = t99 + t98;
+                let t101 = t100.ln_1p();
+                let t105 = self.fixed[9] * t101;
+                let t115 = t91 + T::nearest(2.0);
+                let t117 = self.fixed[11] * t13;
+                let t118 = t117 * t70;
+                let t119 = t118 * t115;
+                let t120 = t105 + t119;
+                let t121 = t120 / t92;
+                let t288 = t1 / t4;
+                let t289 = t288 * t121;
+                let t290 = -t289;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t290))
+            }
+            _ => None,
         }
     }
     fn domain(&self) -> crate::Domain<T, 2> {

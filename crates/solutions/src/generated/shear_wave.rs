@@ -326,6 +326,52 @@ impl<T: crate::Real> crate::Solution<T, 2> for ShearWave<T> {
             b: crate::nalgebra::SVector::<T, 2>::new(T::zero(), T::zero()),
         }
     }
+    fn traction(
+        &self,
+        surface: crate::Surface,
+        X: &crate::nalgebra::SVector<T, 2>,
+        t: T,
+    ) -> Option<crate::nalgebra::SVector<T, 2>> {
+        match surface {
+            crate::Surface::Lower(0) => {
+                let t5 = self.fixed[0] * X[1];
+                let t22 = self.fixed[1] * t;
+                let t23 = t22.sin();
+                let t38 = t5.cos_pi();
+                let t41 = self.fixed[4] * t23;
+                let t42 = t41 * t38;
+                let t46 = self.fixed[5] * t42;
+                let t56 = -t46;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t56))
+            }
+            crate::Surface::Upper(0) => {
+                let t5 = self.fixed[0] * X[1];
+                let t22 = self.fixed[1] * t;
+                let t23 = t22.sin();
+                let t38 = t5.cos_pi();
+                let t41 = self.fixed[4] * t23;
+                let t42 = t41 * t38;
+                let t46 = self.fixed[5] * t42;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t46))
+            }
+            crate::Surface::Lower(1) => {
+                let t22 = self.fixed[1] * t;
+                let t23 = t22.sin();
+                let t41 = self.fixed[4] * t23;
+                let t57 = self.fixed[5] * t41;
+                let t58 = -t57;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t58, T::zero()))
+            }
+            crate::Surface::Upper(1) => {
+                let t22 = self.fixed[1] * t;
+                let t23 = t22.sin();
+                let t41 = self.fixed[4] * t23;
+                let t57 = self.fixed[5] * t41;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t57, T::zero()))
+            }
+            _ => None,
+        }
+    }
     fn domain(&self) -> crate::Domain<T, 2> {
         crate::Domain::Box {
             lower: crate::nalgebra::SVector::from([T::zero(), T::zero()]),

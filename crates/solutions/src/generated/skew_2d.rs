@@ -38,7 +38,7 @@ impl<T: crate::Real> Default for Skew2dParameters<T> {
 pub struct Skew2d<T: crate::Real> {
     parameters: Skew2dParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 58],
+    fixed: [T; 61],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Skew2d<T> {
@@ -222,6 +222,11 @@ impl<T: crate::Real> Skew2d<T> {
         let t558 = T::nearest(0.8) * parameters.A;
         let t597 = T::one() / parameters.rho0;
         let t601 = T::nearest(2.0) / t11;
+        let t606 = t33 * T::pi();
+        let t657 = T::nearest(2.0).cos();
+        let t658 = T::pi() * t657;
+        let t664 = T::nearest(2.0).sin();
+        let t665 = T::nearest(4.0) * t664;
         Ok(Skew2d {
             parameters,
             fixed: [
@@ -283,6 +288,9 @@ impl<T: crate::Real> Skew2d<T> {
                 t558,
                 t597,
                 t601,
+                t606,
+                t658,
+                t665,
             ],
         })
     }
@@ -1487,6 +1495,255 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
             J: t89,
             P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t127, t133, t145, t151),
             b: crate::nalgebra::SVector::<T, 2>::new(t475, t600),
+        }
+    }
+    fn traction(
+        &self,
+        surface: crate::Surface,
+        X: &crate::nalgebra::SVector<T, 2>,
+        t: T,
+    ) -> Option<crate::nalgebra::SVector<T, 2>> {
+        match surface {
+            crate::Surface::Lower(0) => {
+                let t12 = self.fixed[0] * t;
+                let t13 = t12.cos_pi();
+                let t14 = self.parameters.A * t13;
+                let t21 = T::nearest(0.5) * X[1];
+                let t25 = X[1] * X[1];
+                let t28 = T::nearest(3.0) * t13;
+                let t30 = t12.sin_pi();
+                let t31 = T::nearest(4.0) * t30;
+                let t32 = t28 + t31;
+                let t34 = self.fixed[1] * t32;
+                let t64 = self.fixed[7] * t13;
+                let t72 = t21.cos_pi();
+                let t108 = t13 * t13;
+                let t110 = self.fixed[10] * t108;
+                let t123 = self.fixed[11] * t13;
+                let t603 = X[1].cos();
+                let t604 = t64 * t603;
+                let t605 = t604 + T::one();
+                let t607 = self.fixed[58] * t32;
+                let t608 = t607 * t72;
+                let t609 = t608 + T::one();
+                let t610 = t605 * t609;
+                let t611 = t34 * t25;
+                let t612 = t14 * t603;
+                let t613 = t612 * t611;
+                let t614 = t610 - t613;
+                let t615 = t604 * t608;
+                let t616 = t604 + t608;
+                let t617 = t616 - t613;
+                let t618 = t617 + t615;
+                let t619 = t618.ln_1p();
+                let t620 = self.fixed[8] * t619;
+                let t621 = T::nearest(2.0) * t604;
+                let t622 = t604 * t604;
+                let t623 = t603 * t603;
+                let t624 = t110 * t623;
+                let t625 = t621 + t622;
+                let t626 = t625 + t624;
+                let t627 = self.fixed[9] * t626;
+                let t628 = t620 + t627;
+                let t629 = t609 * t628;
+                let t630 = t604 * t611;
+                let t631 = t612 * t608;
+                let t632 = t612 + t611;
+                let t633 = t632 + t630;
+                let t634 = t633 + t631;
+                let t635 = t123 * t603;
+                let t636 = t635 * t634;
+                let t637 = t629 - t636;
+                let t638 = t637 / t614;
+                let t639 = -t638;
+                let t640 = t609 * t634;
+                let t641 = self.fixed[9] * t640;
+                let t642 = T::nearest(2.0) * t608;
+                let t643 = t611 * t611;
+                let t644 = t608 * t608;
+                let t645 = t642 + t643;
+                let t646 = t645 + t644;
+                let t647 = self.fixed[9] * t646;
+                let t648 = t620 + t647;
+                let t649 = t612 * t648;
+                let t650 = t641 - t649;
+                let t651 = t650 / t614;
+                let t652 = -t651;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t639, t652))
+            }
+            crate::Surface::Upper(0) => {
+                let t12 = self.fixed[0] * t;
+                let t13 = t12.cos_pi();
+                let t14 = self.parameters.A * t13;
+                let t21 = T::nearest(0.5) * X[1];
+                let t22 = t21.sin_pi();
+                let t25 = X[1] * X[1];
+                let t28 = T::nearest(3.0) * t13;
+                let t30 = t12.sin_pi();
+                let t31 = T::nearest(4.0) * t30;
+                let t32 = t28 + t31;
+                let t34 = self.fixed[1] * t32;
+                let t64 = self.fixed[7] * t13;
+                let t72 = t21.cos_pi();
+                let t108 = t13 * t13;
+                let t110 = self.fixed[10] * t108;
+                let t123 = self.fixed[11] * t13;
+                let t328 = T::nearest(2.0) * X[1];
+                let t653 = X[1] + T::nearest(3.0);
+                let t654 = t653.cos();
+                let t655 = t64 * t654;
+                let t656 = t655 + T::one();
+                let t659 = self.fixed[59] * t72;
+                let t660 = t328 + t659;
+                let t661 = t34 * t660;
+                let t662 = t661 + T::one();
+                let t663 = t656 * t662;
+                let t666 = self.fixed[60] * t22;
+                let t667 = t25 - t666;
+                let t668 = t34 * t667;
+                let t669 = t14 * t654;
+                let t670 = t669 * t668;
+                let t671 = t663 - t670;
+                let t672 = t655 * t661;
+                let t673 = t655 + t661;
+                let t674 = t673 - t670;
+                let t675 = t674 + t672;
+                let t676 = t675.ln_1p();
+                let t677 = self.fixed[8] * t676;
+                let t678 = T::nearest(2.0) * t655;
+                let t679 = t655 * t655;
+                let t680 = t654 * t654;
+                let t681 = t110 * t680;
+                let t682 = t678 + t679;
+                let t683 = t682 + t681;
+                let t684 = self.fixed[9] * t683;
+                let t685 = t677 + t684;
+                let t686 = t662 * t685;
+                let t687 = t655 * t668;
+                let t688 = t669 * t661;
+                let t689 = t669 + t668;
+                let t690 = t689 + t687;
+                let t691 = t690 + t688;
+                let t692 = t123 * t654;
+                let t693 = t692 * t691;
+                let t694 = t686 - t693;
+                let t695 = t694 / t671;
+                let t696 = t662 * t691;
+                let t697 = self.fixed[9] * t696;
+                let t698 = T::nearest(2.0) * t661;
+                let t699 = t668 * t668;
+                let t700 = t661 * t661;
+                let t701 = t698 + t699;
+                let t702 = t701 + t700;
+                let t703 = self.fixed[9] * t702;
+                let t704 = t677 + t703;
+                let t705 = t669 * t704;
+                let t706 = t697 - t705;
+                let t707 = t706 / t671;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t695, t707))
+            }
+            crate::Surface::Lower(1) => {
+                let t3 = T::nearest(3.0) * X[0];
+                let t12 = self.fixed[0] * t;
+                let t13 = t12.cos_pi();
+                let t18 = T::nearest(2.0) * X[0];
+                let t19 = t18.cos();
+                let t28 = T::nearest(3.0) * t13;
+                let t30 = t12.sin_pi();
+                let t31 = T::nearest(4.0) * t30;
+                let t32 = t28 + t31;
+                let t64 = self.fixed[7] * t13;
+                let t123 = self.fixed[11] * t13;
+                let t607 = self.fixed[58] * t32;
+                let t708 = t3.cos();
+                let t709 = t123 * t708;
+                let t710 = -t709;
+                let t711 = t607 * t19;
+                let t712 = t711 + T::one();
+                let t713 = t64 * t708;
+                let t714 = t713 * t711;
+                let t715 = t713 + t711;
+                let t716 = t715 + t714;
+                let t717 = t716.ln_1p();
+                let t718 = self.fixed[8] * t717;
+                let t719 = t711 + T::nearest(2.0);
+                let t720 = t711 * t719;
+                let t721 = self.fixed[9] * t720;
+                let t722 = t718 + t721;
+                let t723 = t722 / t712;
+                let t724 = -t723;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t710, t724))
+            }
+            crate::Surface::Upper(1) => {
+                let t3 = T::nearest(3.0) * X[0];
+                let t12 = self.fixed[0] * t;
+                let t13 = t12.cos_pi();
+                let t14 = self.parameters.A * t13;
+                let t18 = T::nearest(2.0) * X[0];
+                let t28 = T::nearest(3.0) * t13;
+                let t30 = t12.sin_pi();
+                let t31 = T::nearest(4.0) * t30;
+                let t32 = t28 + t31;
+                let t34 = self.fixed[1] * t32;
+                let t64 = self.fixed[7] * t13;
+                let t67 = t18.sin();
+                let t108 = t13 * t13;
+                let t110 = self.fixed[10] * t108;
+                let t506 = self.fixed[45] * t32;
+                let t725 = t3 + T::one();
+                let t726 = t725.cos();
+                let t727 = t64 * t726;
+                let t728 = t727 + T::one();
+                let t729 = t506 * X[0];
+                let t730 = t729 + T::one();
+                let t731 = t728 * t730;
+                let t732 = T::nearest(4.0) * t67;
+                let t733 = T::one() - t732;
+                let t734 = t34 * t733;
+                let t735 = t14 * t726;
+                let t736 = t735 * t734;
+                let t737 = t731 - t736;
+                let t738 = t727 * t729;
+                let t739 = t727 + t729;
+                let t740 = t739 - t736;
+                let t741 = t740 + t738;
+                let t742 = t741.ln_1p();
+                let t743 = self.fixed[8] * t742;
+                let t744 = T::nearest(2.0) * t727;
+                let t745 = t727 * t727;
+                let t746 = t726 * t726;
+                let t747 = t110 * t746;
+                let t748 = t744 + t745;
+                let t749 = t748 + t747;
+                let t750 = self.fixed[9] * t749;
+                let t751 = t743 + t750;
+                let t752 = t734 * t751;
+                let t753 = t727 * t734;
+                let t754 = t735 * t729;
+                let t755 = t735 + t734;
+                let t756 = t755 + t753;
+                let t757 = t756 + t754;
+                let t758 = t728 * t757;
+                let t759 = self.fixed[9] * t758;
+                let t760 = t752 - t759;
+                let t761 = t760 / t737;
+                let t762 = -t761;
+                let t763 = t734 * t757;
+                let t764 = self.fixed[9] * t763;
+                let t765 = T::nearest(2.0) * t729;
+                let t766 = t734 * t734;
+                let t767 = t729 * t729;
+                let t768 = t765 + t766;
+                let t769 = t768 + t767;
+                let t770 = self.fixed[9] * t769;
+                let t771 = t743 + t770;
+                let t772 = t728 * t771;
+                let t773 = t764 - t772;
+                let t774 = t773 / t737;
+                let t775 = -t774;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t762, t775))
+            }
+            _ => None,
         }
     }
     fn domain(&self) -> crate::Domain<T, 2> {

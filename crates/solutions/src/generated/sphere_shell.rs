@@ -45,7 +45,7 @@ impl<T: crate::Real> Default for SphereShellParameters<T> {
 pub struct SphereShell<T: crate::Real> {
     parameters: SphereShellParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 26],
+    fixed: [T; 32],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> SphereShell<T> {
@@ -214,6 +214,27 @@ impl<T: crate::Real> SphereShell<T> {
         let t285 = t284 * t114;
         let t286 = t283 / t285;
         let t299 = T::nearest(2.0) / t16;
+        let t301 = parameters.Ri / parameters.Ro;
+        let t302 = T::one() - t301;
+        let t303 = t101 * parameters.Ri;
+        let t304 = t303 * t302;
+        let t305 = t304 / t11;
+        let t308 = T::nearest(2.0) * parameters.Ri;
+        let t309 = t308 / parameters.Ro;
+        let t310 = T::nearest(3.0) - t309;
+        let t311 = t115 * parameters.Ri;
+        let t312 = t311 * t310;
+        let t313 = t312 / t11;
+        let t317 = parameters.Ri * parameters.Ri;
+        let t318 = t310 * t310;
+        let t319 = t120 * t317;
+        let t320 = t319 * t318;
+        let t321 = t320 / t121;
+        let t335 = T::one() / parameters.Ri;
+        let t344 = parameters.A / parameters.Ro;
+        let t350 = parameters.Ro * t112;
+        let t351 = t350 * t114;
+        let t352 = t134 / t351;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -246,6 +267,12 @@ impl<T: crate::Real> SphereShell<T> {
                 t275,
                 t286,
                 t299,
+                t305,
+                t313,
+                t321,
+                t335,
+                t344,
+                t352,
             ],
         })
     }
@@ -949,6 +976,202 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 3,
             >::new(t158, t161, t163, t161, t167, t169, t163, t169, t173),
             b: crate::nalgebra::SVector::<T, 3>::new(t294, t296, t298),
+        }
+    }
+    fn traction(
+        &self,
+        surface: crate::Surface,
+        X: &crate::nalgebra::SVector<T, 3>,
+        t: T,
+    ) -> Option<crate::nalgebra::SVector<T, 3>> {
+        match surface {
+            crate::Surface::Inner => {
+                let t17 = self.fixed[0] * t;
+                let t18 = t17.cos_pi();
+                let t122 = t18 * t18;
+                let t306 = self.fixed[26] * t18;
+                let t307 = t306 + T::one();
+                let t314 = self.fixed[27] * t18;
+                let t315 = t18 * t306;
+                let t316 = self.fixed[27] * t315;
+                let t322 = self.fixed[28] * t122;
+                let t323 = t122 * t306;
+                let t324 = self.fixed[28] * t323;
+                let t325 = t306 + t314;
+                let t326 = t325 + t316;
+                let t327 = t326 + t322;
+                let t328 = t327 + t324;
+                let t329 = t328.ln_1p();
+                let t330 = self.fixed[11] * t329;
+                let t331 = t306 + T::nearest(2.0);
+                let t332 = t306 * t331;
+                let t333 = self.fixed[12] * t332;
+                let t334 = t330 + t333;
+                let t336 = t334 / t307;
+                let t337 = self.fixed[29] * t336;
+                let t338 = t337 * X[0];
+                let t339 = -t338;
+                let t340 = t337 * X[1];
+                let t341 = -t340;
+                let t342 = t337 * X[2];
+                let t343 = -t342;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t339, t341, t343))
+            }
+            crate::Surface::Outer => {
+                let t17 = self.fixed[0] * t;
+                let t18 = t17.cos_pi();
+                let t345 = self.fixed[30] * t18;
+                let t346 = t345 + T::nearest(2.0);
+                let t347 = t18 * t346;
+                let t348 = self.fixed[30] * t347;
+                let t349 = t348.ln_1p();
+                let t353 = self.fixed[31] * t349;
+                let t354 = t353 * X[0];
+                let t355 = t353 * X[1];
+                let t356 = t353 * X[2];
+                Some(crate::nalgebra::SVector::<T, 3>::new(t354, t355, t356))
+            }
+            crate::Surface::Lower(0) => {
+                let t1 = X[1] * X[1];
+                let t3 = X[2] * X[2];
+                let t5 = X[0] * X[0];
+                let t6 = t1 + t3;
+                let t7 = t6 + t5;
+                let t8 = t7.sqrt();
+                let t17 = self.fixed[0] * t;
+                let t18 = t17.cos_pi();
+                let t21 = self.fixed[1] * t8;
+                let t23 = T::nearest(3.0) - t21;
+                let t25 = self.fixed[2] * t18;
+                let t26 = t8 * t23;
+                let t60 = self.fixed[6] * t8;
+                let t61 = T::one() - t60;
+                let t103 = self.fixed[8] * t18;
+                let t104 = t8 * t61;
+                let t105 = t103 * t104;
+                let t107 = t25 * t26;
+                let t108 = t107 + T::one();
+                let t117 = self.fixed[9] * t18;
+                let t118 = t117 * t26;
+                let t119 = t118 * t105;
+                let t122 = t18 * t18;
+                let t123 = t23 * t23;
+                let t125 = self.fixed[10] * t122;
+                let t126 = t7 * t123;
+                let t127 = t125 * t126;
+                let t128 = t127 * t105;
+                let t129 = t118 + t105;
+                let t130 = t129 + t119;
+                let t131 = t130 + t127;
+                let t132 = t131 + t128;
+                let t133 = t132.ln_1p();
+                let t137 = self.fixed[11] * t133;
+                let t147 = t107 + T::nearest(2.0);
+                let t150 = self.fixed[13] * t18;
+                let t151 = t150 * t26;
+                let t152 = t151 * t147;
+                let t153 = t137 + t152;
+                let t154 = t153 / t108;
+                let t357 = t6 / t7;
+                let t358 = t357 * t154;
+                let t359 = -t358;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t359, T::zero(), T::zero()))
+            }
+            crate::Surface::Lower(1) => {
+                let t1 = X[1] * X[1];
+                let t3 = X[2] * X[2];
+                let t5 = X[0] * X[0];
+                let t6 = t1 + t3;
+                let t7 = t6 + t5;
+                let t8 = t7.sqrt();
+                let t17 = self.fixed[0] * t;
+                let t18 = t17.cos_pi();
+                let t21 = self.fixed[1] * t8;
+                let t23 = T::nearest(3.0) - t21;
+                let t25 = self.fixed[2] * t18;
+                let t26 = t8 * t23;
+                let t60 = self.fixed[6] * t8;
+                let t61 = T::one() - t60;
+                let t82 = t3 + t5;
+                let t103 = self.fixed[8] * t18;
+                let t104 = t8 * t61;
+                let t105 = t103 * t104;
+                let t107 = t25 * t26;
+                let t108 = t107 + T::one();
+                let t117 = self.fixed[9] * t18;
+                let t118 = t117 * t26;
+                let t119 = t118 * t105;
+                let t122 = t18 * t18;
+                let t123 = t23 * t23;
+                let t125 = self.fixed[10] * t122;
+                let t126 = t7 * t123;
+                let t127 = t125 * t126;
+                let t128 = t127 * t105;
+                let t129 = t118 + t105;
+                let t130 = t129 + t119;
+                let t131 = t130 + t127;
+                let t132 = t131 + t128;
+                let t133 = t132.ln_1p();
+                let t137 = self.fixed[11] * t133;
+                let t147 = t107 + T::nearest(2.0);
+                let t150 = self.fixed[13] * t18;
+                let t151 = t150 * t26;
+                let t152 = t151 * t147;
+                let t153 = t137 + t152;
+                let t154 = t153 / t108;
+                let t361 = t82 / t7;
+                let t362 = t361 * t154;
+                let t363 = -t362;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t363, T::zero()))
+            }
+            crate::Surface::Lower(2) => {
+                let t1 = X[1] * X[1];
+                let t3 = X[2] * X[2];
+                let t5 = X[0] * X[0];
+                let t6 = t1 + t3;
+                let t7 = t6 + t5;
+                let t8 = t7.sqrt();
+                let t17 = self.fixed[0] * t;
+                let t18 = t17.cos_pi();
+                let t21 = self.fixed[1] * t8;
+                let t23 = T::nearest(3.0) - t21;
+                let t25 = self.fixed[2] * t18;
+                let t26 = t8 * t23;
+                let t60 = self.fixed[6] * t8;
+                let t61 = T::one() - t60;
+                let t93 = t1 + t5;
+                let t103 = self.fixed[8] * t18;
+                let t104 = t8 * t61;
+                let t105 = t103 * t104;
+                let t107 = t25 * t26;
+                let t108 = t107 + T::one();
+                let t117 = self.fixed[9] * t18;
+                let t118 = t117 * t26;
+                let t119 = t118 * t105;
+                let t122 = t18 * t18;
+                let t123 = t23 * t23;
+                let t125 = self.fixed[10] * t122;
+                let t126 = t7 * t123;
+                let t127 = t125 * t126;
+                let t128 = t127 * t105;
+                let t129 = t118 + t105;
+                let t130 = t129 + t119;
+                let t131 = t130 + t127;
+                let t132 = t131 + t128;
+                let t133 = t132.ln_1p();
+                let t137 = self.fixed[11] * t133;
+                let t147 = t107 + T::nearest(2.0);
+                let t150 = self.fixed[13] * t18;
+                let t151 = t150 * t26;
+                let t152 = t151 * t147;
+                let t153 = t137 + t152;
+                let t154 = t153 / t108;
+                let t364 = t93 / t7;
+                let t365 = t364 * t154;
+                let t366 = -t365;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t366))
+            }
+            _ => None,
         }
     }
     fn domain(&self) -> crate::Domain<T, 3> {

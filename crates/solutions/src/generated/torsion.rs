@@ -39,7 +39,7 @@ impl<T: crate::Real> Default for TorsionParameters<T> {
 pub struct Torsion<T: crate::Real> {
     parameters: TorsionParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 11],
+    fixed: [T; 12],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Torsion<T> {
@@ -133,9 +133,10 @@ impl<T: crate::Real> Torsion<T> {
         let t117 = t78 * t115;
         let t118 = t116 / t117;
         let t119 = -T::nearest(0.5);
+        let t196 = parameters.A * t80;
         Ok(Torsion {
             parameters,
-            fixed: [t8, t11, t35, t53, t80, t99, t100, t104, t113, t118, t119],
+            fixed: [t8, t11, t35, t53, t80, t99, t100, t104, t113, t118, t119, t196],
         })
     }
     /// The solution with parameter values in the order of the description; missing ones take their
@@ -576,6 +577,222 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
                 T::zero(),
             ),
             b: crate::nalgebra::SVector::<T, 3>::new(t108, t112, T::zero()),
+        }
+    }
+    fn traction(
+        &self,
+        surface: crate::Surface,
+        X: &crate::nalgebra::SVector<T, 3>,
+        t: T,
+    ) -> Option<crate::nalgebra::SVector<T, 3>> {
+        match surface {
+            crate::Surface::Lower(0) => {
+                let t9 = self.fixed[0] * t;
+                let t10 = t9.sin_pi();
+                let t12 = self.fixed[1] * t10;
+                let t13 = t12 * X[2];
+                let t14 = t13.sin();
+                let t18 = t13.cos();
+                let t60 = t14 * t14;
+                let t61 = T::nearest(2.0) * t60;
+                let t62 = -t61;
+                let t63 = t18 * t14;
+                let t64 = T::nearest(2.0) * t63;
+                let t65 = -t64;
+                let t73 = t62 + T::one();
+                let t74 = t73 * t73;
+                let t75 = t65 * t64;
+                let t76 = t74 - t75;
+                let t120 = T::nearest(2.0) * X[1];
+                let t121 = t120 * t18;
+                let t122 = t14 - t121;
+                let t123 = t14 * t122;
+                let t124 = t120 * t14;
+                let t125 = t18 + t124;
+                let t126 = t18 * t125;
+                let t127 = t123 - t126;
+                let t128 = t12 * t127;
+                let t129 = t65 * t128;
+                let t130 = t14 * t125;
+                let t131 = t18 * t122;
+                let t132 = t130 + t131;
+                let t133 = t12 * t132;
+                let t134 = t73 * t133;
+                let t135 = t129 - t134;
+                let t136 = t135 / t76;
+                let t137 = self.fixed[4] * t136;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t137))
+            }
+            crate::Surface::Upper(0) => {
+                let t9 = self.fixed[0] * t;
+                let t10 = t9.sin_pi();
+                let t12 = self.fixed[1] * t10;
+                let t13 = t12 * X[2];
+                let t14 = t13.sin();
+                let t18 = t13.cos();
+                let t60 = t14 * t14;
+                let t61 = T::nearest(2.0) * t60;
+                let t62 = -t61;
+                let t63 = t18 * t14;
+                let t64 = T::nearest(2.0) * t63;
+                let t65 = -t64;
+                let t73 = t62 + T::one();
+                let t74 = t73 * t73;
+                let t75 = t65 * t64;
+                let t76 = t74 - t75;
+                let t120 = T::nearest(2.0) * X[1];
+                let t121 = t120 * t18;
+                let t124 = t120 * t14;
+                let t138 = t14 + t121;
+                let t139 = t14 * t138;
+                let t140 = t18 - t124;
+                let t141 = t18 * t140;
+                let t142 = t139 - t141;
+                let t143 = t12 * t142;
+                let t144 = -t143;
+                let t145 = t65 * t144;
+                let t146 = t14 * t140;
+                let t147 = t18 * t138;
+                let t148 = t146 + t147;
+                let t149 = t12 * t148;
+                let t150 = -t149;
+                let t151 = t73 * t150;
+                let t152 = t145 - t151;
+                let t153 = t152 / t76;
+                let t154 = self.fixed[4] * t153;
+                let t155 = -t154;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t155))
+            }
+            crate::Surface::Lower(1) => {
+                let t9 = self.fixed[0] * t;
+                let t10 = t9.sin_pi();
+                let t12 = self.fixed[1] * t10;
+                let t13 = t12 * X[2];
+                let t14 = t13.sin();
+                let t18 = t13.cos();
+                let t60 = t14 * t14;
+                let t61 = T::nearest(2.0) * t60;
+                let t62 = -t61;
+                let t63 = t18 * t14;
+                let t64 = T::nearest(2.0) * t63;
+                let t65 = -t64;
+                let t73 = t62 + T::one();
+                let t74 = t73 * t73;
+                let t75 = t65 * t64;
+                let t76 = t74 - t75;
+                let t156 = T::nearest(2.0) * X[0];
+                let t157 = t156 * t14;
+                let t158 = t18 - t157;
+                let t159 = t14 * t158;
+                let t160 = t156 * t18;
+                let t161 = t14 + t160;
+                let t162 = t18 * t161;
+                let t163 = t159 + t162;
+                let t164 = t12 * t163;
+                let t165 = t73 * t164;
+                let t166 = t14 * t161;
+                let t167 = t18 * t158;
+                let t168 = t166 - t167;
+                let t169 = t12 * t168;
+                let t170 = -t169;
+                let t171 = t64 * t170;
+                let t172 = t165 - t171;
+                let t173 = t172 / t76;
+                let t174 = self.fixed[4] * t173;
+                let t175 = -t174;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t175))
+            }
+            crate::Surface::Upper(1) => {
+                let t9 = self.fixed[0] * t;
+                let t10 = t9.sin_pi();
+                let t12 = self.fixed[1] * t10;
+                let t13 = t12 * X[2];
+                let t14 = t13.sin();
+                let t18 = t13.cos();
+                let t60 = t14 * t14;
+                let t61 = T::nearest(2.0) * t60;
+                let t62 = -t61;
+                let t63 = t18 * t14;
+                let t64 = T::nearest(2.0) * t63;
+                let t65 = -t64;
+                let t73 = t62 + T::one();
+                let t74 = t73 * t73;
+                let t75 = t65 * t64;
+                let t76 = t74 - t75;
+                let t156 = T::nearest(2.0) * X[0];
+                let t157 = t156 * t14;
+                let t160 = t156 * t18;
+                let t176 = t18 + t157;
+                let t177 = t14 * t176;
+                let t178 = t14 - t160;
+                let t179 = t18 * t178;
+                let t180 = t177 + t179;
+                let t181 = t12 * t180;
+                let t182 = -t181;
+                let t183 = t73 * t182;
+                let t184 = t14 * t178;
+                let t185 = t18 * t176;
+                let t186 = t184 - t185;
+                let t187 = t12 * t186;
+                let t188 = t64 * t187;
+                let t189 = t183 - t188;
+                let t190 = t189 / t76;
+                let t191 = self.fixed[4] * t190;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t191))
+            }
+            crate::Surface::Lower(2) => {
+                let t9 = self.fixed[0] * t;
+                let t10 = t9.sin_pi();
+                let t66 = self.parameters.A * t10;
+                let t192 = t66 * X[1];
+                let t193 = -t192;
+                let t194 = self.fixed[4] * t193;
+                let t195 = -t194;
+                let t197 = self.fixed[11] * t10;
+                let t198 = t197 * X[0];
+                let t199 = -t198;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t195, t199, T::zero()))
+            }
+            crate::Surface::Upper(2) => {
+                let t9 = self.fixed[0] * t;
+                let t10 = t9.sin_pi();
+                let t12 = self.fixed[1] * t10;
+                let t66 = self.parameters.A * t10;
+                let t200 = t12.sin();
+                let t201 = t12.cos();
+                let t202 = t201 * X[0];
+                let t203 = t200 * X[1];
+                let t204 = t202 - t203;
+                let t205 = t200 * t204;
+                let t206 = t200 * X[0];
+                let t207 = t201 * X[1];
+                let t208 = t206 + t207;
+                let t209 = t201 * t208;
+                let t210 = t205 + t209;
+                let t211 = t66 * t210;
+                let t212 = -t211;
+                let t213 = t200 * t200;
+                let t214 = T::nearest(2.0) * t213;
+                let t215 = -t214;
+                let t216 = t215 + T::one();
+                let t217 = t216 * t216;
+                let t218 = t200 * t201;
+                let t219 = T::nearest(2.0) * t218;
+                let t220 = -t219;
+                let t221 = t220 * t219;
+                let t222 = t217 - t221;
+                let t223 = t222 / t222;
+                let t224 = self.fixed[4] * t223;
+                let t225 = t224 * t212;
+                let t226 = t200 * t208;
+                let t227 = t201 * t204;
+                let t228 = t226 - t227;
+                let t229 = t66 * t228;
+                let t230 = -t229;
+                let t231 = t224 * t230;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t225, t231, T::zero()))
+            }
+            _ => None,
         }
     }
     fn domain(&self) -> crate::Domain<T, 3> {

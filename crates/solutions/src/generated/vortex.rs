@@ -1126,6 +1126,169 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
             b: crate::nalgebra::SVector::<T, 2>::new(t365, t370),
         }
     }
+    fn traction(
+        &self,
+        surface: crate::Surface,
+        X: &crate::nalgebra::SVector<T, 2>,
+        t: T,
+    ) -> Option<crate::nalgebra::SVector<T, 2>> {
+        match surface {
+            crate::Surface::Inner => {
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), T::zero()))
+            }
+            crate::Surface::Outer => {
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), T::zero()))
+            }
+            crate::Surface::Lower(0) => {
+                let t8 = self.fixed[1] * t;
+                let t9 = t8.sin_pi();
+                let t12 = X[0] * X[0];
+                let t14 = X[1] * X[1];
+                let t15 = t12 + t14;
+                let t16 = t15.sqrt();
+                let t18 = T::one() - t16;
+                let t19 = t18 * t18;
+                let t20 = T::nearest(16.0) * t19;
+                let t21 = T::one() - t20;
+                let t22 = t21 * t21;
+                let t24 = self.fixed[2] * t9;
+                let t25 = t24 * t22;
+                let t26 = t25.sin();
+                let t28 = t25.cos();
+                let t43 = t26 * t28;
+                let t45 = t26 * t26;
+                let t46 = t28 * t28;
+                let t94 = self.fixed[7] * t9;
+                let t95 = t16 * t18;
+                let t96 = t95 * t21;
+                let t97 = t94 * t96;
+                let t98 = t97 * t28;
+                let t99 = t26 + t98;
+                let t100 = t26 * t99;
+                let t106 = self.fixed[8] * t9;
+                let t107 = t106 * t96;
+                let t108 = t107 * t46;
+                let t109 = t107 * t45;
+                let t110 = t43 + t108;
+                let t111 = t110 - t109;
+                let t145 = T::nearest(2.0) * t100;
+                let t146 = -t145;
+                let t147 = t146 + T::one();
+                let t148 = T::nearest(2.0) * t45;
+                let t149 = -t148;
+                let t150 = t149 + T::one();
+                let t151 = t147 * t150;
+                let t152 = T::nearest(2.0) * t43;
+                let t153 = -t152;
+                let t154 = T::nearest(2.0) * t111;
+                let t155 = t153 * t154;
+                let t156 = t151 - t155;
+                let t161 = T::nearest(2.0) * t146;
+                let t162 = t146 * t146;
+                let t163 = t153 * t153;
+                let t164 = t161 + t162;
+                let t165 = t164 + t163;
+                let t167 = t146 * t154;
+                let t168 = t153 * t149;
+                let t169 = t153 + t154;
+                let t170 = t169 + t167;
+                let t171 = t170 + t168;
+                let t175 = t154 * t171;
+                let t176 = T::nearest(2.0) * t149;
+                let t177 = t154 * t154;
+                let t178 = t149 * t149;
+                let t179 = t176 + t177;
+                let t180 = t179 + t178;
+                let t181 = t147 * t180;
+                let t182 = t175 - t181;
+                let t184 = t154 * t165;
+                let t185 = t147 * t171;
+                let t188 = t184 - t185;
+                let t375 = t14 / t15;
+                let t376 = self.fixed[9] * t375;
+                let t377 = t182 / t156;
+                let t378 = t376 * t377;
+                let t379 = t188 / t156;
+                let t380 = t376 * t379;
+                let t381 = -t380;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t378, t381))
+            }
+            crate::Surface::Lower(1) => {
+                let t8 = self.fixed[1] * t;
+                let t9 = t8.sin_pi();
+                let t12 = X[0] * X[0];
+                let t14 = X[1] * X[1];
+                let t15 = t12 + t14;
+                let t16 = t15.sqrt();
+                let t18 = T::one() - t16;
+                let t19 = t18 * t18;
+                let t20 = T::nearest(16.0) * t19;
+                let t21 = T::one() - t20;
+                let t22 = t21 * t21;
+                let t24 = self.fixed[2] * t9;
+                let t25 = t24 * t22;
+                let t26 = t25.sin();
+                let t28 = t25.cos();
+                let t43 = t26 * t28;
+                let t45 = t26 * t26;
+                let t46 = t28 * t28;
+                let t94 = self.fixed[7] * t9;
+                let t95 = t16 * t18;
+                let t96 = t95 * t21;
+                let t97 = t94 * t96;
+                let t98 = t97 * t28;
+                let t99 = t26 + t98;
+                let t100 = t26 * t99;
+                let t106 = self.fixed[8] * t9;
+                let t107 = t106 * t96;
+                let t108 = t107 * t46;
+                let t109 = t107 * t45;
+                let t110 = t43 + t108;
+                let t111 = t110 - t109;
+                let t145 = T::nearest(2.0) * t100;
+                let t146 = -t145;
+                let t147 = t146 + T::one();
+                let t148 = T::nearest(2.0) * t45;
+                let t149 = -t148;
+                let t150 = t149 + T::one();
+                let t151 = t147 * t150;
+                let t152 = T::nearest(2.0) * t43;
+                let t153 = -t152;
+                let t154 = T::nearest(2.0) * t111;
+                let t155 = t153 * t154;
+                let t156 = t151 - t155;
+                let t161 = T::nearest(2.0) * t146;
+                let t162 = t146 * t146;
+                let t163 = t153 * t153;
+                let t164 = t161 + t162;
+                let t165 = t164 + t163;
+                let t167 = t146 * t154;
+                let t168 = t153 * t149;
+                let t169 = t153 + t154;
+                let t170 = t169 + t167;
+                let t171 = t170 + t168;
+                let t175 = t154 * t171;
+                let t176 = T::nearest(2.0) * t149;
+                let t177 = t154 * t154;
+                let t178 = t149 * t149;
+                let t179 = t176 + t177;
+                let t180 = t179 + t178;
+                let t181 = t147 * t180;
+                let t182 = t175 - t181;
+                let t184 = t154 * t165;
+                let t185 = t147 * t171;
+                let t188 = t184 - t185;
+                let t377 = t182 / t156;
+                let t379 = t188 / t156;
+                let t382 = t12 / t15;
+                let t383 = self.fixed[9] * t382;
+                let t384 = t383 * t379;
+                let t385 = t383 * t377;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t384, t385))
+            }
+            _ => None,
+        }
+    }
     fn domain(&self) -> crate::Domain<T, 2> {
         crate::Domain::Annulus {
             inner: T::nearest(0.75),

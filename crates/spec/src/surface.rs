@@ -1,0 +1,205 @@
+//! Fields on the surfaces of the body: tractions, and what the declared conditions say must be zero there.
+//!
+//! On a rim of a body stated in polar or spherical coordinates the normal is `-e_R` or `e_R`, and the traction is the
+//! first column of the stress in those coordinates with `R` put at the rim: where the rim is free of traction it
+//! simplifies to zero, in symbols.
+
+use crate::coordinates::Geometry;
+use crate::{Boundary, Condition, Coordinates, Domain, Spec, Surface};
+use mmsmith_expr::{Expr, Graph};
+use std::collections::BTreeMap;
+
+/// Fields on one surface of the body.
+#[derive(Clone, Debug)]
+pub struct SurfaceFields {
+    /// Which surface.
+    pub surface: Surface,
+    /// The traction `P N`, force per reference area with the outward reference normal `N`, in Cartesian components.
+    /// Its position is on the surface: the coordinate that is fixed there has been put in.
+    pub traction: Vec<Expr>,
+    /// What the conditions declared on this surface say is zero.
+    pub claims: Vec<Claim>,
+}
+
+/// Quantities that are zero on a surface if its condition is right.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Claim {
+    /// What they are.
+    pub what: ClaimKind,
+    /// The quantities: [`Graph::ZERO`] where that could be shown in symbols.
+    pub quantities: Vec<Expr>,
+}
+
+/// What a condition says about a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ClaimKind {
+    /// No traction.
+    Traction,
+    /// No traction along the surface.
+    Shear,
+    /// No displacement along the normal.
+    NormalDisplacement,
+}
+
+impl Domain {
+    /// Every surface of the body in `dimension` dimensions; for an annulus or a shell also the planes of symmetry that
+    /// may cut it.
+    #[must_use]
+    pub fn surfaces(&self, dimension: usize) -> Vec<Surface> {
+        let planes = (0..dimension).map(Surface::Lower);
+        match self {
+            Domain::Box { .. } => planes.flat_map(|lower| [lower, opposite(lower)]).collect(),
+            Domain::Annulus { .. } => {
+                [Surface::Inner, Surface::Outer].into_iter().chain(planes).collect()
+            }
+        }
+    }
+}
+
+fn opposite(surface: Surface) -> Surface {
+    match surface {
+        Surface::Lower(axis) => Surface::Upper(axis),
+        Surface::Upper(axis) => Surface::Lower(axis),
+        Surface::Inner => Surface::Outer,
+        Surface::Outer => Surface::Inner,
+    }
+}
+
+/// Displacement and stress, in the specification's own physical components and in Cartesian ones.
+pub(crate) struct Components<'a> {
+    pub(crate) own_u: &'a [Expr],
+    pub(crate) own_P: &'a [Vec<Expr>],
+    pub(crate) u: &'a [Expr],
+    pub(crate) P: &'a [Vec<Expr>],
+}
+
+/// The fields on every surface of the body.
+pub(crate) fn surface_fields(
+    graph: &mut Graph,
+    geometry: &Geometry,
+    spec: &Spec,
+    fields: &Components<'_>,
+) -> Vec<SurfaceFields> {
+    let surfaces = spec.domain.surfaces(spec.dimension).into_iter();
+    surfaces
+        .map(|surface| {
+            let mut on_surface = OnSurface { graph, geometry, spec, fields, surface };
+            on_surface.derive()
+        })
+        .collect()
+}
+
+struct OnSurface<'a, 'b> {
+    graph: &'a mut Graph,
+    geometry: &'a Geometry,
+    spec: &'a Spec,
+    fields: &'a Components<'b>,
+    surface: Surface,
+}
+
+impl OnSurface<'_, '_> {
+    fn derive(&mut self) -> SurfaceFields {
+        // The traction and the displacement in components of which one is along the normal, where there are such.
+        let radial = matches!(self.spec.coordinates, Coordinates::Polar | Coordinates::Spherical);
+        let (traction, displacement, normal) = match (self.plane(), self.radius()) {
+            (Some((axis, _)), _) => (self.column(self.fields.P, axis), self.fields.u, Some(axis)),
+            (None, _) if radial => (self.column(self.fields.own_P, 0), self.fields.own_u, Some(0)),
+            (None, radius) => (self.across(radius), self.fields.u, None),
+        };
+        let mut traction: Vec<Expr> = traction.into_iter().map(|t| self.placed(t)).collect();
+        let mut claims = Vec::new();
+        let declared: Vec<Condition> = self.conditions();
+        for condition in declared {
+            match condition {
+                Condition::TractionFree => {
+                    traction.iter_mut().for_each(|t| *t = self.zero_if_vanishing(*t));
+                    let (what, quantities) = (ClaimKind::Traction, traction.clone());
+                    claims.push(Claim { what, quantities });
+                }
+                Condition::Sliding | Condition::Symmetry => {
+                    let Some(normal) = normal else { continue };
+                    let mut quantities = Vec::new();
+                    for i in (0..traction.len()).filter(|&i| i != normal) {
+                        traction[i] = self.zero_if_vanishing(traction[i]);
+                        quantities.push(traction[i]);
+                    }
+                    claims.push(Claim { what: ClaimKind::Shear, quantities });
+                    let along = self.placed(displacement[normal]);
+                    let along = self.zero_if_vanishing(along);
+                    let what = ClaimKind::NormalDisplacement;
+                    claims.push(Claim { what, quantities: vec![along] });
+                }
+                Condition::PrescribedTraction | Condition::PrescribedMotion => {}
+            }
+        }
+        if self.plane().is_none() && radial {
+            traction = crate::derive::turn_vector(self.graph, self.geometry, &traction);
+            traction = traction.into_iter().map(|t| self.placed(t)).collect();
+        }
+        SurfaceFields { surface: self.surface, traction, claims }
+    }
+
+    fn conditions(&self) -> Vec<Condition> {
+        let here = |boundary: &&Boundary| boundary.surface == self.surface;
+        self.spec.boundaries.iter().filter(here).map(|boundary| boundary.condition).collect()
+    }
+
+    /// The axis and the place of a plane surface.
+    fn plane(&self) -> Option<(usize, Expr)> {
+        match (self.surface, &self.spec.domain) {
+            (Surface::Lower(axis), Domain::Box { lower, .. }) => Some((axis, lower[axis])),
+            (Surface::Upper(axis), Domain::Box { upper, .. }) => Some((axis, upper[axis])),
+            (Surface::Lower(axis) | Surface::Upper(axis), _) => Some((axis, Graph::ZERO)),
+            _ => None,
+        }
+    }
+
+    fn radius(&self) -> Expr {
+        match (self.surface, &self.spec.domain) {
+            (Surface::Inner, Domain::Annulus { inner, .. }) => *inner,
+            (_, Domain::Annulus { outer, .. }) => *outer,
+            _ => Graph::ONE,
+        }
+    }
+
+    /// Whether the outward normal points the way of the coordinate.
+    fn outward(&self) -> bool {
+        matches!(self.surface, Surface::Upper(_) | Surface::Outer)
+    }
+
+    fn column(&mut self, P: &[Vec<Expr>], j: usize) -> Vec<Expr> {
+        let outward = self.outward();
+        P.iter().map(|row| if outward { row[j] } else { self.graph.neg(row[j]) }).collect()
+    }
+
+    /// `P N` on a rim with `N = X/R` or `-X/R`, in Cartesian components.
+    fn across(&mut self, radius: Expr) -> Vec<Expr> {
+        let outward = self.outward();
+        let P = self.fields.P;
+        let X = &self.geometry.cartesian;
+        P.iter()
+            .map(|row| {
+                let terms: Vec<Expr> =
+                    row.iter().zip(X).map(|(&entry, &x)| self.graph.mul(entry, x)).collect();
+                let sum = self.graph.sum_of(terms);
+                let quotient = self.graph.div(sum, radius);
+                if outward { quotient } else { self.graph.neg(quotient) }
+            })
+            .collect()
+    }
+
+    /// The expression with the coordinate that is fixed on the surface put in, where that does not divide by zero.
+    fn placed(&mut self, expr: Expr) -> Expr {
+        let (symbol, value) = match self.plane() {
+            Some((axis, value)) => (self.geometry.cartesian[axis], value),
+            None if self.spec.coordinates == Coordinates::Cartesian => return expr,
+            None => (self.geometry.coordinates[0], self.radius()),
+        };
+        let placed = self.graph.replace(expr, &BTreeMap::from([(symbol, value)]));
+        if self.graph.divides_by_zero(placed) { expr } else { placed }
+    }
+
+    fn zero_if_vanishing(&mut self, expr: Expr) -> Expr {
+        if self.graph.vanishes(expr) { Graph::ZERO } else { expr }
+    }
+}
