@@ -5,7 +5,7 @@ use crate::module::Names;
 use crate::plan::{Block, Measures, Operand, Plan, Shape, Stage};
 use crate::text::{c_string, comment, meaning};
 use mmsmith_expr::{Function, Operation, Slot, nearest_f64};
-use mmsmith_spec::{Boundary, Condition, Parameter, Surface};
+use mmsmith_spec::{Boundary, Condition, Material, Parameter, Surface};
 
 /// What every header needs: macros, and `sin(pi x)` as the crate of the solutions computes it.
 const SUPPORT: &str = include_str!("support.h");
@@ -549,9 +549,17 @@ before. Results equal those of the Rust functions bit for bit where the compiler
             ("density", "mass per reference volume", constants.density),
             ("wave_speed", "the speed that CFL numbers refer to", constants.wave_speed),
             ("period", "the time in which the motion repeats", constants.period),
-            ("lambda", "first Lame constant", constants.lambda),
-            ("mu", "shear modulus", constants.mu),
         ] {
+            self.scalar(name, about, slot);
+        }
+        for &(name, slot) in &constants.material {
+            let about = match (&self.plan.spec.material, name) {
+                (Material::MooneyRivlin { .. }, "lambda") => "the factor of (ln J)^2/2",
+                (_, "lambda") => "first Lame constant",
+                (_, "mu") => "shear modulus",
+                (_, "c1") => "the factor of I1 in the strain energy",
+                _ => "the factor of I2 in the strain energy",
+            };
             self.scalar(name, about, slot);
         }
         match &constants.domain {
@@ -740,6 +748,9 @@ fn c_name(function: Function) -> &'static str {
         Function::Ln1p => "log1p",
         Function::Expm1 => "expm1",
         Function::Atan2 => "atan2",
+        Function::LogRatioSquared => "mmsmith_log_ratio_squared",
+        Function::LogRatioSlope => "mmsmith_log_ratio_slope",
+        Function::LogRatioCurvature => "mmsmith_log_ratio_curvature",
     }
 }
 

@@ -136,6 +136,49 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
     return mmsmith_sin_pi_shifted(x, 1);
 }
 
+/* arcosh(1 + z) */
+MMSMITH_FN double mmsmith_log_ratio(double z)
+{
+    return log1p(z + sqrt(z * (z + 2.0)));
+}
+
+/* arcosh(1 + z)^2: the squared logarithm of the ratio of two stretches a, b for z = (a - b)^2/(2 a b). */
+MMSMITH_FN double mmsmith_log_ratio_squared(double z)
+{
+    const double theta = mmsmith_log_ratio(z);
+    return theta * theta;
+}
+
+/* theta/sinh(theta) - 1 for theta = arcosh(1 + z). */
+MMSMITH_FN double mmsmith_log_ratio_slope(double z)
+{
+    const double y = z / (z + 2.0);
+    double sum = 0.0;
+    int k;
+    if (y > 0.25) {
+        return mmsmith_log_ratio(z) / sqrt(z * (z + 2.0)) - 1.0;
+    }
+    for (k = 24; k > 0; --k) {
+        sum = sum * y + 2.0 / (4.0 * k * k - 1.0);
+    }
+    return -sum * y;
+}
+
+/* The derivative of mmsmith_log_ratio_slope. */
+MMSMITH_FN double mmsmith_log_ratio_curvature(double z)
+{
+    const double y = z / (z + 2.0);
+    double sum = 0.0;
+    int k;
+    if (y > 0.25) {
+        return -(z + (1.0 + z) * mmsmith_log_ratio_slope(z)) / (z * (z + 2.0));
+    }
+    for (k = 24; k > 0; --k) {
+        sum = sum * y + k / (4.0 * k * k - 1.0);
+    }
+    return -sum * ((1.0 - y) * (1.0 - y));
+}
+
 #endif
 
 /* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
@@ -157,7 +200,7 @@ typedef struct ring_parameters {
 /* The parameters, and the values that depend on them only. */
 typedef struct ring_solution {
     ring_parameters par;
-    double fixed[19];
+    double fixed[21];
 } ring_solution;
 
 /* What the body force needs of the time alone. */
@@ -231,26 +274,26 @@ MMSMITH_FN const char *ring_prepare(ring_solution *s, const ring_parameters *p)
     const double t134 = t133 * t133;
     const double t135 = t15 * t15;
     const double t136 = t19 * t19;
-    const double t142 = 36.0 * t134;
-    const double t143 = t142 * t95;
-    const double t144 = p->rho0 * t135;
-    const double t145 = t144 * t136;
-    const double t146 = t143 / t145;
-    const double t155 = t133 * p->A;
-    const double t163 = 2.0 * p->Ri;
-    const double t164 = 2.0 * p->Ro;
-    const double t165 = t163 + t164;
-    const double t171 = 3.0 / t26;
-    const double t174 = 12.0 * t155;
-    const double t175 = t174 * t95;
-    const double t176 = p->rho0 * t15;
-    const double t177 = t176 * t19;
-    const double t178 = t175 / t177;
-    const double t184 = t135 * t136;
-    const double t185 = 36.0 / t184;
-    const double t189 = t133 * t95;
-    const double t190 = t189 / p->rho0;
-    const double t202 = 2.0 / t11;
+    const double t140 = 36.0 * t134;
+    const double t141 = t140 * t95;
+    const double t142 = p->rho0 * t135;
+    const double t143 = t142 * t136;
+    const double t144 = t141 / t143;
+    const double t151 = t133 * p->A;
+    const double t152 = t135 * t136;
+    const double t153 = 36.0 / t152;
+    const double t164 = 3.0 / t26;
+    const double t167 = 12.0 / t26;
+    const double t171 = 6.0 * t151;
+    const double t172 = t171 * t95;
+    const double t173 = p->rho0 * t15;
+    const double t174 = t173 * t19;
+    const double t175 = t172 / t174;
+    const double t181 = 72.0 / t152;
+    const double t186 = t133 * t95;
+    const double t187 = t186 / p->rho0;
+    const double t198 = 2.0 / t11;
+    const double t201 = p->A * t95;
     if (!(p->Ri < p->Ro)) {
         return "the parameters of ring must satisfy Ri < Ro";
     }
@@ -270,13 +313,15 @@ MMSMITH_FN const char *ring_prepare(ring_solution *s, const ring_parameters *p)
     s->fixed[9] = t95;
     s->fixed[10] = t118;
     s->fixed[11] = t128;
-    s->fixed[12] = t146;
-    s->fixed[13] = t165;
-    s->fixed[14] = t171;
-    s->fixed[15] = t178;
-    s->fixed[16] = t185;
-    s->fixed[17] = t190;
-    s->fixed[18] = t202;
+    s->fixed[12] = t144;
+    s->fixed[13] = t153;
+    s->fixed[14] = t164;
+    s->fixed[15] = t167;
+    s->fixed[16] = t175;
+    s->fixed[17] = t181;
+    s->fixed[18] = t187;
+    s->fixed[19] = t198;
+    s->fixed[20] = t201;
     return 0;
 }
 
@@ -568,7 +613,9 @@ MMSMITH_FN void ring_b(const ring_solution *s, const double X[2], double t, doub
     const double t32 = s->par.A * t13;
     const double t58 = t5 - s->par.Ri;
     const double t68 = t20 * t58;
+    const double t69 = s->fixed[7] * t68;
     const double t70 = t31 / t5;
+    const double t71 = t69 - t70;
     const double t88 = s->fixed[8] * t13;
     const double t89 = t88 * t68;
     const double t90 = t89 + 1.0;
@@ -588,51 +635,48 @@ MMSMITH_FN void ring_b(const ring_solution *s, const double X[2], double t, doub
     const double t130 = -t129;
     const double t131 = t90 * t90;
     const double t137 = t58 * t58;
-    const double t138 = t23 + t122;
-    const double t139 = t138 - s->fixed[10];
-    const double t140 = s->fixed[7] * t139;
-    const double t141 = t121 - t140;
-    const double t147 = t21 * t31;
-    const double t148 = t147 * t137;
-    const double t149 = t148 * t141;
-    const double t150 = t149 / t5;
-    const double t151 = s->fixed[12] * t150;
-    const double t152 = -t151;
-    const double t153 = t13 * t152;
-    const double t156 = t4 * t5;
-    const double t157 = t31 * t31;
-    const double t158 = t157 / t156;
-    const double t159 = t68 * t139;
-    const double t160 = s->fixed[7] * t159;
-    const double t162 = 4.0 * t5;
-    const double t166 = t162 + t122;
-    const double t167 = t166 - s->fixed[13];
-    const double t168 = t31 * t167;
-    const double t169 = t168 / t5;
-    const double t170 = t160 + t169;
-    const double t172 = s->fixed[14] * t170;
-    const double t173 = t158 - t172;
-    const double t179 = t68 * t173;
-    const double t180 = s->fixed[15] * t179;
-    const double t181 = -t180;
-    const double t182 = t181 + t153;
-    const double t183 = t13 * t182;
-    const double t186 = t68 * t167;
-    const double t187 = s->fixed[16] * t186;
-    const double t188 = t158 - t187;
-    const double t191 = s->fixed[17] * t188;
-    const double t192 = -t191;
-    const double t193 = t192 + t183;
-    const double t194 = t131 * t92;
-    const double t195 = t193 / t194;
-    const double t196 = t13 * t195;
-    const double t197 = t130 + t196;
-    const double t198 = t13 * t197;
-    const double t199 = t117 * t198;
-    const double t200 = X[1] / t5;
-    const double t201 = t200 * t198;
-    b[0] = t199;
-    b[1] = t201;
+    const double t138 = t71 / t5;
+    const double t139 = t120 + t138;
+    const double t145 = t21 * t31;
+    const double t146 = t145 * t137;
+    const double t147 = t146 * t139;
+    const double t148 = t147 / t5;
+    const double t149 = s->fixed[12] * t148;
+    const double t150 = t13 * t149;
+    const double t154 = t21 * t137;
+    const double t155 = s->fixed[13] * t154;
+    const double t156 = t31 * t31;
+    const double t157 = t156 / t4;
+    const double t158 = t31 * t71;
+    const double t159 = t158 / t5;
+    const double t160 = t155 - t157;
+    const double t161 = t160 + t159;
+    const double t162 = t161 / t5;
+    const double t165 = s->fixed[14] * t68;
+    const double t166 = t165 + t70;
+    const double t168 = t119 * t166;
+    const double t169 = s->fixed[15] * t168;
+    const double t170 = t162 + t169;
+    const double t176 = t68 * t170;
+    const double t177 = s->fixed[16] * t176;
+    const double t178 = t177 + t150;
+    const double t179 = t13 * t178;
+    const double t182 = t68 * t119;
+    const double t183 = s->fixed[17] * t182;
+    const double t184 = t160 / t5;
+    const double t185 = t183 + t184;
+    const double t188 = s->fixed[18] * t185;
+    const double t189 = t188 + t179;
+    const double t190 = t131 * t92;
+    const double t191 = t189 / t190;
+    const double t192 = t13 * t191;
+    const double t193 = t130 + t192;
+    const double t194 = t13 * t193;
+    const double t195 = t117 * t194;
+    const double t196 = X[1] / t5;
+    const double t197 = t196 * t194;
+    b[0] = t195;
+    b[1] = t197;
 }
 
 /* all fields */
@@ -737,49 +781,46 @@ MMSMITH_FN void ring_fields(const ring_solution *s, const double X[2], double t,
     const double t130 = -t129;
     const double t131 = t90 * t90;
     const double t137 = t58 * t58;
-    const double t138 = t23 + t122;
-    const double t139 = t138 - s->fixed[10];
-    const double t140 = s->fixed[7] * t139;
-    const double t141 = t121 - t140;
-    const double t147 = t21 * t31;
-    const double t148 = t147 * t137;
-    const double t149 = t148 * t141;
-    const double t150 = t149 / t5;
-    const double t151 = s->fixed[12] * t150;
-    const double t152 = -t151;
-    const double t153 = t13 * t152;
-    const double t156 = t4 * t5;
-    const double t157 = t31 * t31;
-    const double t158 = t157 / t156;
-    const double t159 = t68 * t139;
-    const double t160 = s->fixed[7] * t159;
-    const double t162 = 4.0 * t5;
-    const double t166 = t162 + t122;
-    const double t167 = t166 - s->fixed[13];
-    const double t168 = t31 * t167;
-    const double t169 = t168 / t5;
-    const double t170 = t160 + t169;
-    const double t172 = s->fixed[14] * t170;
-    const double t173 = t158 - t172;
-    const double t179 = t68 * t173;
-    const double t180 = s->fixed[15] * t179;
-    const double t181 = -t180;
-    const double t182 = t181 + t153;
-    const double t183 = t13 * t182;
-    const double t186 = t68 * t167;
-    const double t187 = s->fixed[16] * t186;
-    const double t188 = t158 - t187;
-    const double t191 = s->fixed[17] * t188;
-    const double t192 = -t191;
-    const double t193 = t192 + t183;
-    const double t194 = t131 * t92;
-    const double t195 = t193 / t194;
-    const double t196 = t13 * t195;
-    const double t197 = t130 + t196;
-    const double t198 = t13 * t197;
-    const double t199 = t117 * t198;
-    const double t200 = X[1] / t5;
-    const double t201 = t200 * t198;
+    const double t138 = t71 / t5;
+    const double t139 = t120 + t138;
+    const double t145 = t21 * t31;
+    const double t146 = t145 * t137;
+    const double t147 = t146 * t139;
+    const double t148 = t147 / t5;
+    const double t149 = s->fixed[12] * t148;
+    const double t150 = t13 * t149;
+    const double t154 = t21 * t137;
+    const double t155 = s->fixed[13] * t154;
+    const double t156 = t31 * t31;
+    const double t157 = t156 / t4;
+    const double t158 = t31 * t71;
+    const double t159 = t158 / t5;
+    const double t160 = t155 - t157;
+    const double t161 = t160 + t159;
+    const double t162 = t161 / t5;
+    const double t165 = s->fixed[14] * t68;
+    const double t166 = t165 + t70;
+    const double t168 = t119 * t166;
+    const double t169 = s->fixed[15] * t168;
+    const double t170 = t162 + t169;
+    const double t176 = t68 * t170;
+    const double t177 = s->fixed[16] * t176;
+    const double t178 = t177 + t150;
+    const double t179 = t13 * t178;
+    const double t182 = t68 * t119;
+    const double t183 = s->fixed[17] * t182;
+    const double t184 = t160 / t5;
+    const double t185 = t183 + t184;
+    const double t188 = s->fixed[18] * t185;
+    const double t189 = t188 + t179;
+    const double t190 = t131 * t92;
+    const double t191 = t189 / t190;
+    const double t192 = t13 * t191;
+    const double t193 = t130 + t192;
+    const double t194 = t13 * t193;
+    const double t195 = t117 * t194;
+    const double t196 = X[1] / t5;
+    const double t197 = t196 * t194;
     out->u[0] = t35;
     out->u[1] = t38;
     out->v[0] = t45;
@@ -799,8 +840,8 @@ MMSMITH_FN void ring_fields(const ring_solution *s, const double X[2], double t,
     out->P[1] = t111;
     out->P[2] = t111;
     out->P[3] = t116;
-    out->b[0] = t199;
-    out->b[1] = t201;
+    out->b[0] = t195;
+    out->b[1] = t197;
 }
 
 /* What the body force needs of the time alone. */
@@ -833,7 +874,9 @@ MMSMITH_FN void ring_at_point(const ring_solution *s, const double X[2], double 
     const double t31 = t30 + 1.0;
     const double t58 = t5 - s->par.Ri;
     const double t68 = t20 * t58;
+    const double t69 = s->fixed[7] * t68;
     const double t70 = t31 / t5;
+    const double t71 = t69 - t70;
     const double t117 = X[0] / t5;
     const double t119 = t23 - s->fixed[10];
     const double t120 = s->fixed[7] * t119;
@@ -847,46 +890,43 @@ MMSMITH_FN void ring_at_point(const ring_solution *s, const double X[2], double 
     const double t129 = s->fixed[11] * t127;
     const double t130 = -t129;
     const double t137 = t58 * t58;
-    const double t138 = t23 + t122;
-    const double t139 = t138 - s->fixed[10];
-    const double t140 = s->fixed[7] * t139;
-    const double t141 = t121 - t140;
-    const double t147 = t21 * t31;
-    const double t148 = t147 * t137;
-    const double t149 = t148 * t141;
-    const double t150 = t149 / t5;
-    const double t151 = s->fixed[12] * t150;
-    const double t152 = -t151;
-    const double t156 = t4 * t5;
-    const double t157 = t31 * t31;
-    const double t158 = t157 / t156;
-    const double t159 = t68 * t139;
-    const double t160 = s->fixed[7] * t159;
-    const double t162 = 4.0 * t5;
-    const double t166 = t162 + t122;
-    const double t167 = t166 - s->fixed[13];
-    const double t168 = t31 * t167;
-    const double t169 = t168 / t5;
-    const double t170 = t160 + t169;
-    const double t172 = s->fixed[14] * t170;
-    const double t173 = t158 - t172;
-    const double t179 = t68 * t173;
-    const double t180 = s->fixed[15] * t179;
-    const double t181 = -t180;
-    const double t186 = t68 * t167;
-    const double t187 = s->fixed[16] * t186;
-    const double t188 = t158 - t187;
-    const double t191 = s->fixed[17] * t188;
-    const double t192 = -t191;
-    const double t200 = X[1] / t5;
+    const double t138 = t71 / t5;
+    const double t139 = t120 + t138;
+    const double t145 = t21 * t31;
+    const double t146 = t145 * t137;
+    const double t147 = t146 * t139;
+    const double t148 = t147 / t5;
+    const double t149 = s->fixed[12] * t148;
+    const double t154 = t21 * t137;
+    const double t155 = s->fixed[13] * t154;
+    const double t156 = t31 * t31;
+    const double t157 = t156 / t4;
+    const double t158 = t31 * t71;
+    const double t159 = t158 / t5;
+    const double t160 = t155 - t157;
+    const double t161 = t160 + t159;
+    const double t162 = t161 / t5;
+    const double t165 = s->fixed[14] * t68;
+    const double t166 = t165 + t70;
+    const double t168 = t119 * t166;
+    const double t169 = s->fixed[15] * t168;
+    const double t170 = t162 + t169;
+    const double t176 = t68 * t170;
+    const double t177 = s->fixed[16] * t176;
+    const double t182 = t68 * t119;
+    const double t183 = s->fixed[17] * t182;
+    const double t184 = t160 / t5;
+    const double t185 = t183 + t184;
+    const double t188 = s->fixed[18] * t185;
+    const double t196 = X[1] / t5;
     point[0] = t68;
     point[1] = t70;
     point[2] = t117;
     point[3] = t130;
-    point[4] = t152;
-    point[5] = t181;
-    point[6] = t192;
-    point[7] = t200;
+    point[4] = t149;
+    point[5] = t177;
+    point[6] = t188;
+    point[7] = t196;
 }
 
 /* The body force from the values of one time and of one point. Value m of the point is point[m*stride]:
@@ -901,19 +941,19 @@ MMSMITH_FN void ring_b_staged(const ring_solution *s, const ring_time_values *ti
     const double t91 = time->values[1] * point[stride];
     const double t92 = t91 + 1.0;
     const double t131 = t90 * t90;
-    const double t153 = time->values[0] * point[4 * stride];
-    const double t182 = point[5 * stride] + t153;
-    const double t183 = time->values[0] * t182;
-    const double t193 = point[6 * stride] + t183;
-    const double t194 = t131 * t92;
-    const double t195 = t193 / t194;
-    const double t196 = time->values[0] * t195;
-    const double t197 = point[3 * stride] + t196;
-    const double t198 = time->values[0] * t197;
-    const double t199 = point[2 * stride] * t198;
-    const double t201 = point[7 * stride] * t198;
-    b[0] = t199;
-    b[1] = t201;
+    const double t150 = time->values[0] * point[4 * stride];
+    const double t178 = point[5 * stride] + t150;
+    const double t179 = time->values[0] * t178;
+    const double t189 = point[6 * stride] + t179;
+    const double t190 = t131 * t92;
+    const double t191 = t189 / t190;
+    const double t192 = time->values[0] * t191;
+    const double t193 = point[3 * stride] + t192;
+    const double t194 = time->values[0] * t193;
+    const double t195 = point[2 * stride] * t194;
+    const double t197 = point[7 * stride] * t194;
+    b[0] = t195;
+    b[1] = t197;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -955,19 +995,19 @@ MMSMITH_FN void ring_b_array(const ring_solution *s, double t, size_t n,
         const double t91 = time.values[1] * point1[p];
         const double t92 = t91 + 1.0;
         const double t131 = t90 * t90;
-        const double t153 = time.values[0] * point4[p];
-        const double t182 = point5[p] + t153;
-        const double t183 = time.values[0] * t182;
-        const double t193 = point6[p] + t183;
-        const double t194 = t131 * t92;
-        const double t195 = t193 / t194;
-        const double t196 = time.values[0] * t195;
-        const double t197 = point3[p] + t196;
-        const double t198 = time.values[0] * t197;
-        const double t199 = point2[p] * t198;
-        const double t201 = point7[p] * t198;
-        b[p * 2 + 0] = t199;
-        b[p * 2 + 1] = t201;
+        const double t150 = time.values[0] * point4[p];
+        const double t178 = point5[p] + t150;
+        const double t179 = time.values[0] * t178;
+        const double t189 = point6[p] + t179;
+        const double t190 = t131 * t92;
+        const double t191 = t189 / t190;
+        const double t192 = time.values[0] * t191;
+        const double t193 = point3[p] + t192;
+        const double t194 = time.values[0] * t193;
+        const double t195 = point2[p] * t194;
+        const double t197 = point7[p] * t194;
+        b[p * 2 + 0] = t195;
+        b[p * 2 + 1] = t197;
     }
 }
 
@@ -993,7 +1033,7 @@ MMSMITH_FN double ring_wave_speed(const ring_solution *s)
 /* the time in which the motion repeats */
 MMSMITH_FN double ring_period(const ring_solution *s)
 {
-    return s->fixed[18];
+    return s->fixed[19];
 }
 
 /* first Lame constant */

@@ -137,6 +137,49 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
     return mmsmith_sin_pi_shifted(x, 1);
 }
 
+/* arcosh(1 + z) */
+MMSMITH_FN double mmsmith_log_ratio(double z)
+{
+    return log1p(z + sqrt(z * (z + 2.0)));
+}
+
+/* arcosh(1 + z)^2: the squared logarithm of the ratio of two stretches a, b for z = (a - b)^2/(2 a b). */
+MMSMITH_FN double mmsmith_log_ratio_squared(double z)
+{
+    const double theta = mmsmith_log_ratio(z);
+    return theta * theta;
+}
+
+/* theta/sinh(theta) - 1 for theta = arcosh(1 + z). */
+MMSMITH_FN double mmsmith_log_ratio_slope(double z)
+{
+    const double y = z / (z + 2.0);
+    double sum = 0.0;
+    int k;
+    if (y > 0.25) {
+        return mmsmith_log_ratio(z) / sqrt(z * (z + 2.0)) - 1.0;
+    }
+    for (k = 24; k > 0; --k) {
+        sum = sum * y + 2.0 / (4.0 * k * k - 1.0);
+    }
+    return -sum * y;
+}
+
+/* The derivative of mmsmith_log_ratio_slope. */
+MMSMITH_FN double mmsmith_log_ratio_curvature(double z)
+{
+    const double y = z / (z + 2.0);
+    double sum = 0.0;
+    int k;
+    if (y > 0.25) {
+        return -(z + (1.0 + z) * mmsmith_log_ratio_slope(z)) / (z * (z + 2.0));
+    }
+    for (k = 24; k > 0; --k) {
+        sum = sum * y + k / (4.0 * k * k - 1.0);
+    }
+    return -sum * ((1.0 - y) * (1.0 - y));
+}
+
 #endif
 
 /* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
@@ -159,7 +202,7 @@ typedef struct ring_nu_parameters {
 /* The parameters, and the values that depend on them only. */
 typedef struct ring_nu_solution {
     ring_nu_parameters par;
-    double fixed[26];
+    double fixed[28];
 } ring_nu_solution;
 
 /* What the body force needs of the time alone. */
@@ -247,34 +290,47 @@ MMSMITH_FN const char *ring_nu_prepare(ring_nu_solution *s, const ring_nu_parame
     const double t157 = t156 * t156;
     const double t158 = t15 * t15;
     const double t159 = t19 * t19;
-    const double t168 = 36.0 * t157;
-    const double t169 = p->rho0 * t158;
-    const double t170 = t169 * t159;
-    const double t171 = t168 / t170;
-    const double t178 = t156 * p->A;
-    const double t181 = 2.0 * t108;
-    const double t201 = t158 * t159;
-    const double t202 = 36.0 / t201;
-    const double t214 = 6.0 * t178;
-    const double t215 = p->rho0 * t15;
-    const double t216 = t215 * t19;
-    const double t217 = t214 / t216;
-    const double t229 = 6.0 * t156;
-    const double t230 = t229 * p->E;
-    const double t231 = t230 * p->nu;
-    const double t232 = t216 * t95;
-    const double t233 = t232 * t97;
-    const double t234 = t231 / t233;
-    const double t240 = 12.0 * t108;
-    const double t241 = t240 / t26;
-    const double t243 = 6.0 * t108;
-    const double t244 = t243 / t26;
-    const double t253 = t156 / p->rho0;
-    const double t259 = t49 * p->nu;
-    const double t260 = p->rho0 * t95;
-    const double t261 = t260 * t97;
-    const double t262 = t259 / t261;
-    const double t274 = 2.0 / t11;
+    const double t161 = t104 + t108;
+    const double t162 = 36.0 * t157;
+    const double t163 = t162 * t161;
+    const double t164 = p->rho0 * t158;
+    const double t165 = t164 * t159;
+    const double t166 = t163 / t165;
+    const double t173 = t156 * p->A;
+    const double t187 = t158 * t159;
+    const double t188 = 36.0 / t187;
+    const double t209 = 6.0 * t173;
+    const double t210 = p->rho0 * t15;
+    const double t211 = t210 * t19;
+    const double t212 = t209 / t211;
+    const double t217 = 6.0 * t156;
+    const double t218 = t217 * p->E;
+    const double t219 = t218 * p->nu;
+    const double t220 = t211 * t95;
+    const double t221 = t220 * t97;
+    const double t222 = t219 / t221;
+    const double t227 = 12.0 * t108;
+    const double t228 = t227 / t26;
+    const double t238 = t156 / p->rho0;
+    const double t243 = t49 * p->nu;
+    const double t244 = p->rho0 * t95;
+    const double t245 = t244 * t97;
+    const double t246 = t243 / t245;
+    const double t257 = 2.0 / t11;
+    const double t258 = p->Ri - p->Ro;
+    const double t259 = t258 * t258;
+    const double t260 = t259 * t258;
+    const double t261 = t260 / t26;
+    const double t262 = 1.0 - t261;
+    const double t263 = p->A * t262;
+    const double t264 = t263 / p->Ri;
+    const double t267 = p->Ri * t95;
+    const double t268 = t267 * t97;
+    const double t269 = t102 / t268;
+    const double t275 = p->A / p->Ro;
+    const double t278 = p->Ro * t95;
+    const double t279 = t278 * t97;
+    const double t280 = t102 / t279;
     if (!(p->Ri < p->Ro)) {
         return "the parameters of ring-nu must satisfy Ri < Ro";
     }
@@ -298,16 +354,18 @@ MMSMITH_FN const char *ring_nu_prepare(ring_nu_solution *s, const ring_nu_parame
     s->fixed[13] = t143;
     s->fixed[14] = t148;
     s->fixed[15] = t151;
-    s->fixed[16] = t171;
-    s->fixed[17] = t181;
-    s->fixed[18] = t202;
-    s->fixed[19] = t217;
-    s->fixed[20] = t234;
-    s->fixed[21] = t241;
-    s->fixed[22] = t244;
-    s->fixed[23] = t253;
-    s->fixed[24] = t262;
-    s->fixed[25] = t274;
+    s->fixed[16] = t166;
+    s->fixed[17] = t188;
+    s->fixed[18] = t212;
+    s->fixed[19] = t222;
+    s->fixed[20] = t228;
+    s->fixed[21] = t238;
+    s->fixed[22] = t246;
+    s->fixed[23] = t257;
+    s->fixed[24] = t264;
+    s->fixed[25] = t269;
+    s->fixed[26] = t275;
+    s->fixed[27] = t280;
     return 0;
 }
 
@@ -633,93 +691,77 @@ MMSMITH_FN void ring_nu_b(const ring_nu_solution *s, const double X[2], double t
     const double t153 = -t152;
     const double t154 = t90 * t90;
     const double t160 = t58 * t58;
-    const double t161 = s->fixed[9] * t142;
-    const double t162 = t23 + t139;
-    const double t163 = t162 - s->fixed[12];
-    const double t164 = s->fixed[7] * t163;
-    const double t165 = t138 - t164;
-    const double t166 = s->fixed[10] * t165;
-    const double t167 = t161 - t166;
-    const double t172 = t21 * t31;
-    const double t173 = t172 * t160;
-    const double t174 = t173 * t167;
-    const double t175 = t174 / t5;
-    const double t176 = s->fixed[16] * t175;
-    const double t177 = t13 * t176;
-    const double t179 = t4 * t5;
-    const double t180 = t31 * t31;
-    const double t182 = t180 / t179;
-    const double t183 = s->fixed[17] * t182;
-    const double t184 = t31 * t136;
-    const double t185 = t68 * t71;
-    const double t186 = t184 + t185;
-    const double t187 = t186 / t5;
-    const double t188 = s->fixed[9] * t187;
-    const double t189 = t69 + t70;
-    const double t190 = t136 * t189;
-    const double t191 = s->fixed[10] * t190;
-    const double t192 = t184 / t5;
-    const double t193 = s->fixed[10] * t192;
-    const double t194 = t68 * t189;
-    const double t195 = t194 / t5;
-    const double t196 = s->fixed[10] * t195;
-    const double t197 = t188 + t191;
-    const double t198 = t197 + t193;
-    const double t199 = t198 + t196;
-    const double t200 = s->fixed[7] * t199;
-    const double t203 = t68 * t136;
-    const double t204 = s->fixed[18] * t203;
-    const double t205 = t31 * t71;
-    const double t206 = t205 / t4;
-    const double t207 = t31 * t142;
-    const double t208 = t207 / t5;
-    const double t209 = t204 + t206;
-    const double t210 = t209 + t208;
-    const double t211 = s->fixed[9] * t210;
-    const double t212 = t183 - t200;
-    const double t213 = t212 - t211;
-    const double t218 = t68 * t213;
-    const double t219 = s->fixed[19] * t218;
-    const double t220 = -t219;
-    const double t221 = t220 + t177;
-    const double t222 = t13 * t221;
-    const double t223 = t20 * t31;
-    const double t224 = t223 * t58;
-    const double t225 = t224 / t5;
-    const double t226 = 2.0 * t225;
-    const double t227 = t184 + t194;
-    const double t228 = t227 - t226;
-    const double t235 = t228 / t5;
-    const double t236 = s->fixed[20] * t235;
-    const double t237 = t236 * t101;
-    const double t238 = s->fixed[10] * t182;
-    const double t242 = s->fixed[21] * t136;
-    const double t245 = s->fixed[22] * t139;
-    const double t246 = t161 + t242;
-    const double t247 = t246 + t245;
-    const double t248 = t68 * t247;
-    const double t249 = s->fixed[7] * t248;
-    const double t250 = s->fixed[9] * t209;
-    const double t251 = t238 - t249;
-    const double t252 = t251 - t250;
-    const double t254 = s->fixed[23] * t252;
-    const double t255 = -t254;
-    const double t256 = t222 + t237;
-    const double t257 = t255 + t256;
-    const double t258 = t13 * t257;
-    const double t263 = s->fixed[24] * t165;
-    const double t264 = -t263;
-    const double t265 = t264 * t101;
-    const double t266 = t258 + t265;
-    const double t267 = t154 * t92;
-    const double t268 = t266 / t267;
-    const double t269 = t153 + t268;
-    const double t270 = t13 * t269;
-    const double t271 = t133 * t270;
-    const double t272 = X[1] / t5;
-    const double t273 = t272 * t270;
-    b[0] = t271;
-    b[1] = t273;
+    const double t167 = t21 * t31;
+    const double t168 = t167 * t160;
+    const double t169 = t168 * t142;
+    const double t170 = t169 / t5;
+    const double t171 = s->fixed[16] * t170;
+    const double t172 = t13 * t171;
+    const double t174 = t31 * t136;
+    const double t175 = t68 * t71;
+    const double t176 = t174 + t175;
+    const double t177 = t176 / t5;
+    const double t178 = s->fixed[9] * t177;
+    const double t179 = t69 + t70;
+    const double t180 = t136 * t179;
+    const double t181 = s->fixed[10] * t180;
+    const double t182 = t174 / t5;
+    const double t183 = s->fixed[10] * t182;
+    const double t184 = t178 + t181;
+    const double t185 = t184 + t183;
+    const double t186 = s->fixed[7] * t185;
+    const double t189 = t21 * t160;
+    const double t190 = s->fixed[17] * t189;
+    const double t191 = t31 * t31;
+    const double t192 = t191 / t4;
+    const double t193 = t31 * t71;
+    const double t194 = t193 / t5;
+    const double t195 = t190 - t192;
+    const double t196 = t195 + t194;
+    const double t197 = t196 / t5;
+    const double t198 = s->fixed[10] * t197;
+    const double t199 = t68 * t136;
+    const double t200 = s->fixed[17] * t199;
+    const double t201 = t193 / t4;
+    const double t202 = t31 * t142;
+    const double t203 = t202 / t5;
+    const double t204 = t200 + t201;
+    const double t205 = t204 + t203;
+    const double t206 = s->fixed[9] * t205;
+    const double t207 = t186 + t198;
+    const double t208 = t207 + t206;
+    const double t213 = t68 * t208;
+    const double t214 = s->fixed[18] * t213;
+    const double t215 = t214 + t172;
+    const double t216 = t13 * t215;
+    const double t223 = s->fixed[19] * t177;
+    const double t224 = t223 * t101;
+    const double t225 = s->fixed[9] * t142;
+    const double t229 = s->fixed[20] * t136;
+    const double t230 = t225 + t229;
+    const double t231 = t68 * t230;
+    const double t232 = s->fixed[7] * t231;
+    const double t233 = t195 / t5;
+    const double t234 = s->fixed[10] * t233;
+    const double t235 = s->fixed[9] * t204;
+    const double t236 = t232 + t234;
+    const double t237 = t236 + t235;
+    const double t239 = s->fixed[21] * t237;
+    const double t240 = t216 + t224;
+    const double t241 = t239 + t240;
+    const double t242 = t13 * t241;
+    const double t247 = s->fixed[22] * t142;
+    const double t248 = t247 * t101;
+    const double t249 = t242 + t248;
+    const double t250 = t154 * t92;
+    const double t251 = t249 / t250;
+    const double t252 = t153 + t251;
+    const double t253 = t13 * t252;
+    const double t254 = t133 * t253;
+    const double t255 = X[1] / t5;
+    const double t256 = t255 * t253;
+    b[0] = t254;
+    b[1] = t256;
 }
 
 /* all fields */
@@ -836,91 +878,75 @@ MMSMITH_FN void ring_nu_fields(const ring_nu_solution *s, const double X[2], dou
     const double t153 = -t152;
     const double t154 = t90 * t90;
     const double t160 = t58 * t58;
-    const double t161 = s->fixed[9] * t142;
-    const double t162 = t23 + t139;
-    const double t163 = t162 - s->fixed[12];
-    const double t164 = s->fixed[7] * t163;
-    const double t165 = t138 - t164;
-    const double t166 = s->fixed[10] * t165;
-    const double t167 = t161 - t166;
-    const double t172 = t21 * t31;
-    const double t173 = t172 * t160;
-    const double t174 = t173 * t167;
-    const double t175 = t174 / t5;
-    const double t176 = s->fixed[16] * t175;
-    const double t177 = t13 * t176;
-    const double t179 = t4 * t5;
-    const double t180 = t31 * t31;
-    const double t182 = t180 / t179;
-    const double t183 = s->fixed[17] * t182;
-    const double t184 = t31 * t136;
-    const double t185 = t68 * t71;
-    const double t186 = t184 + t185;
-    const double t187 = t186 / t5;
-    const double t188 = s->fixed[9] * t187;
-    const double t189 = t69 + t70;
-    const double t190 = t136 * t189;
-    const double t191 = s->fixed[10] * t190;
-    const double t192 = t184 / t5;
-    const double t193 = s->fixed[10] * t192;
-    const double t194 = t68 * t189;
-    const double t195 = t194 / t5;
-    const double t196 = s->fixed[10] * t195;
-    const double t197 = t188 + t191;
-    const double t198 = t197 + t193;
-    const double t199 = t198 + t196;
-    const double t200 = s->fixed[7] * t199;
-    const double t203 = t68 * t136;
-    const double t204 = s->fixed[18] * t203;
-    const double t205 = t31 * t71;
-    const double t206 = t205 / t4;
-    const double t207 = t31 * t142;
-    const double t208 = t207 / t5;
-    const double t209 = t204 + t206;
-    const double t210 = t209 + t208;
-    const double t211 = s->fixed[9] * t210;
-    const double t212 = t183 - t200;
-    const double t213 = t212 - t211;
-    const double t218 = t68 * t213;
-    const double t219 = s->fixed[19] * t218;
-    const double t220 = -t219;
-    const double t221 = t220 + t177;
-    const double t222 = t13 * t221;
-    const double t223 = t20 * t31;
-    const double t224 = t223 * t58;
-    const double t225 = t224 / t5;
-    const double t226 = 2.0 * t225;
-    const double t227 = t184 + t194;
-    const double t228 = t227 - t226;
-    const double t235 = t228 / t5;
-    const double t236 = s->fixed[20] * t235;
-    const double t237 = t236 * t101;
-    const double t238 = s->fixed[10] * t182;
-    const double t242 = s->fixed[21] * t136;
-    const double t245 = s->fixed[22] * t139;
-    const double t246 = t161 + t242;
-    const double t247 = t246 + t245;
-    const double t248 = t68 * t247;
-    const double t249 = s->fixed[7] * t248;
-    const double t250 = s->fixed[9] * t209;
-    const double t251 = t238 - t249;
-    const double t252 = t251 - t250;
-    const double t254 = s->fixed[23] * t252;
-    const double t255 = -t254;
-    const double t256 = t222 + t237;
-    const double t257 = t255 + t256;
-    const double t258 = t13 * t257;
-    const double t263 = s->fixed[24] * t165;
-    const double t264 = -t263;
-    const double t265 = t264 * t101;
-    const double t266 = t258 + t265;
-    const double t267 = t154 * t92;
-    const double t268 = t266 / t267;
-    const double t269 = t153 + t268;
-    const double t270 = t13 * t269;
-    const double t271 = t133 * t270;
-    const double t272 = X[1] / t5;
-    const double t273 = t272 * t270;
+    const double t167 = t21 * t31;
+    const double t168 = t167 * t160;
+    const double t169 = t168 * t142;
+    const double t170 = t169 / t5;
+    const double t171 = s->fixed[16] * t170;
+    const double t172 = t13 * t171;
+    const double t174 = t31 * t136;
+    const double t175 = t68 * t71;
+    const double t176 = t174 + t175;
+    const double t177 = t176 / t5;
+    const double t178 = s->fixed[9] * t177;
+    const double t179 = t69 + t70;
+    const double t180 = t136 * t179;
+    const double t181 = s->fixed[10] * t180;
+    const double t182 = t174 / t5;
+    const double t183 = s->fixed[10] * t182;
+    const double t184 = t178 + t181;
+    const double t185 = t184 + t183;
+    const double t186 = s->fixed[7] * t185;
+    const double t189 = t21 * t160;
+    const double t190 = s->fixed[17] * t189;
+    const double t191 = t31 * t31;
+    const double t192 = t191 / t4;
+    const double t193 = t31 * t71;
+    const double t194 = t193 / t5;
+    const double t195 = t190 - t192;
+    const double t196 = t195 + t194;
+    const double t197 = t196 / t5;
+    const double t198 = s->fixed[10] * t197;
+    const double t199 = t68 * t136;
+    const double t200 = s->fixed[17] * t199;
+    const double t201 = t193 / t4;
+    const double t202 = t31 * t142;
+    const double t203 = t202 / t5;
+    const double t204 = t200 + t201;
+    const double t205 = t204 + t203;
+    const double t206 = s->fixed[9] * t205;
+    const double t207 = t186 + t198;
+    const double t208 = t207 + t206;
+    const double t213 = t68 * t208;
+    const double t214 = s->fixed[18] * t213;
+    const double t215 = t214 + t172;
+    const double t216 = t13 * t215;
+    const double t223 = s->fixed[19] * t177;
+    const double t224 = t223 * t101;
+    const double t225 = s->fixed[9] * t142;
+    const double t229 = s->fixed[20] * t136;
+    const double t230 = t225 + t229;
+    const double t231 = t68 * t230;
+    const double t232 = s->fixed[7] * t231;
+    const double t233 = t195 / t5;
+    const double t234 = s->fixed[10] * t233;
+    const double t235 = s->fixed[9] * t204;
+    const double t236 = t232 + t234;
+    const double t237 = t236 + t235;
+    const double t239 = s->fixed[21] * t237;
+    const double t240 = t216 + t224;
+    const double t241 = t239 + t240;
+    const double t242 = t13 * t241;
+    const double t247 = s->fixed[22] * t142;
+    const double t248 = t247 * t101;
+    const double t249 = t242 + t248;
+    const double t250 = t154 * t92;
+    const double t251 = t249 / t250;
+    const double t252 = t153 + t251;
+    const double t253 = t13 * t252;
+    const double t254 = t133 * t253;
+    const double t255 = X[1] / t5;
+    const double t256 = t255 * t253;
     out->u[0] = t35;
     out->u[1] = t38;
     out->v[0] = t45;
@@ -940,8 +966,8 @@ MMSMITH_FN void ring_nu_fields(const ring_nu_solution *s, const double X[2], dou
     out->P[1] = t128;
     out->P[2] = t128;
     out->P[3] = t132;
-    out->b[0] = t271;
-    out->b[1] = t273;
+    out->b[0] = t254;
+    out->b[1] = t256;
 }
 
 /* What the body force needs of the time alone. */
@@ -995,86 +1021,70 @@ MMSMITH_FN void ring_nu_at_point(const ring_nu_solution *s, const double X[2], d
     const double t152 = s->fixed[15] * t150;
     const double t153 = -t152;
     const double t160 = t58 * t58;
-    const double t161 = s->fixed[9] * t142;
-    const double t162 = t23 + t139;
-    const double t163 = t162 - s->fixed[12];
-    const double t164 = s->fixed[7] * t163;
-    const double t165 = t138 - t164;
-    const double t166 = s->fixed[10] * t165;
-    const double t167 = t161 - t166;
-    const double t172 = t21 * t31;
-    const double t173 = t172 * t160;
-    const double t174 = t173 * t167;
-    const double t175 = t174 / t5;
-    const double t176 = s->fixed[16] * t175;
-    const double t179 = t4 * t5;
-    const double t180 = t31 * t31;
-    const double t182 = t180 / t179;
-    const double t183 = s->fixed[17] * t182;
-    const double t184 = t31 * t136;
-    const double t185 = t68 * t71;
-    const double t186 = t184 + t185;
-    const double t187 = t186 / t5;
-    const double t188 = s->fixed[9] * t187;
-    const double t189 = t69 + t70;
-    const double t190 = t136 * t189;
-    const double t191 = s->fixed[10] * t190;
-    const double t192 = t184 / t5;
-    const double t193 = s->fixed[10] * t192;
-    const double t194 = t68 * t189;
-    const double t195 = t194 / t5;
-    const double t196 = s->fixed[10] * t195;
-    const double t197 = t188 + t191;
-    const double t198 = t197 + t193;
-    const double t199 = t198 + t196;
-    const double t200 = s->fixed[7] * t199;
-    const double t203 = t68 * t136;
-    const double t204 = s->fixed[18] * t203;
-    const double t205 = t31 * t71;
-    const double t206 = t205 / t4;
-    const double t207 = t31 * t142;
-    const double t208 = t207 / t5;
-    const double t209 = t204 + t206;
-    const double t210 = t209 + t208;
-    const double t211 = s->fixed[9] * t210;
-    const double t212 = t183 - t200;
-    const double t213 = t212 - t211;
-    const double t218 = t68 * t213;
-    const double t219 = s->fixed[19] * t218;
-    const double t220 = -t219;
-    const double t223 = t20 * t31;
-    const double t224 = t223 * t58;
-    const double t225 = t224 / t5;
-    const double t226 = 2.0 * t225;
-    const double t227 = t184 + t194;
-    const double t228 = t227 - t226;
-    const double t235 = t228 / t5;
-    const double t236 = s->fixed[20] * t235;
-    const double t238 = s->fixed[10] * t182;
-    const double t242 = s->fixed[21] * t136;
-    const double t245 = s->fixed[22] * t139;
-    const double t246 = t161 + t242;
-    const double t247 = t246 + t245;
-    const double t248 = t68 * t247;
-    const double t249 = s->fixed[7] * t248;
-    const double t250 = s->fixed[9] * t209;
-    const double t251 = t238 - t249;
-    const double t252 = t251 - t250;
-    const double t254 = s->fixed[23] * t252;
-    const double t255 = -t254;
-    const double t263 = s->fixed[24] * t165;
-    const double t264 = -t263;
-    const double t272 = X[1] / t5;
+    const double t167 = t21 * t31;
+    const double t168 = t167 * t160;
+    const double t169 = t168 * t142;
+    const double t170 = t169 / t5;
+    const double t171 = s->fixed[16] * t170;
+    const double t174 = t31 * t136;
+    const double t175 = t68 * t71;
+    const double t176 = t174 + t175;
+    const double t177 = t176 / t5;
+    const double t178 = s->fixed[9] * t177;
+    const double t179 = t69 + t70;
+    const double t180 = t136 * t179;
+    const double t181 = s->fixed[10] * t180;
+    const double t182 = t174 / t5;
+    const double t183 = s->fixed[10] * t182;
+    const double t184 = t178 + t181;
+    const double t185 = t184 + t183;
+    const double t186 = s->fixed[7] * t185;
+    const double t189 = t21 * t160;
+    const double t190 = s->fixed[17] * t189;
+    const double t191 = t31 * t31;
+    const double t192 = t191 / t4;
+    const double t193 = t31 * t71;
+    const double t194 = t193 / t5;
+    const double t195 = t190 - t192;
+    const double t196 = t195 + t194;
+    const double t197 = t196 / t5;
+    const double t198 = s->fixed[10] * t197;
+    const double t199 = t68 * t136;
+    const double t200 = s->fixed[17] * t199;
+    const double t201 = t193 / t4;
+    const double t202 = t31 * t142;
+    const double t203 = t202 / t5;
+    const double t204 = t200 + t201;
+    const double t205 = t204 + t203;
+    const double t206 = s->fixed[9] * t205;
+    const double t207 = t186 + t198;
+    const double t208 = t207 + t206;
+    const double t213 = t68 * t208;
+    const double t214 = s->fixed[18] * t213;
+    const double t223 = s->fixed[19] * t177;
+    const double t225 = s->fixed[9] * t142;
+    const double t229 = s->fixed[20] * t136;
+    const double t230 = t225 + t229;
+    const double t231 = t68 * t230;
+    const double t232 = s->fixed[7] * t231;
+    const double t233 = t195 / t5;
+    const double t234 = s->fixed[10] * t233;
+    const double t235 = s->fixed[9] * t204;
+    const double t236 = t232 + t234;
+    const double t237 = t236 + t235;
+    const double t239 = s->fixed[21] * t237;
+    const double t247 = s->fixed[22] * t142;
+    const double t255 = X[1] / t5;
     point[0] = t68;
     point[1] = t70;
     point[2] = t133;
     point[3] = t153;
-    point[4] = t176;
-    point[5] = t220;
-    point[6] = t236;
-    point[7] = t255;
-    point[8] = t264;
-    point[9] = t272;
+    point[4] = t171;
+    point[5] = t214;
+    point[6] = t223;
+    point[7] = t239;
+    point[8] = t247;
+    point[9] = t255;
 }
 
 /* The body force from the values of one time and of one point. Value m of the point is point[m*stride]:
@@ -1093,23 +1103,23 @@ MMSMITH_FN void ring_nu_b_staged(const ring_nu_solution *s, const ring_nu_time_v
     const double t100 = t99 + t98;
     const double t101 = log1p(t100);
     const double t154 = t90 * t90;
-    const double t177 = time->values[0] * point[4 * stride];
-    const double t221 = point[5 * stride] + t177;
-    const double t222 = time->values[0] * t221;
-    const double t237 = point[6 * stride] * t101;
-    const double t256 = t222 + t237;
-    const double t257 = point[7 * stride] + t256;
-    const double t258 = time->values[0] * t257;
-    const double t265 = point[8 * stride] * t101;
-    const double t266 = t258 + t265;
-    const double t267 = t154 * t92;
-    const double t268 = t266 / t267;
-    const double t269 = point[3 * stride] + t268;
-    const double t270 = time->values[0] * t269;
-    const double t271 = point[2 * stride] * t270;
-    const double t273 = point[9 * stride] * t270;
-    b[0] = t271;
-    b[1] = t273;
+    const double t172 = time->values[0] * point[4 * stride];
+    const double t215 = point[5 * stride] + t172;
+    const double t216 = time->values[0] * t215;
+    const double t224 = point[6 * stride] * t101;
+    const double t240 = t216 + t224;
+    const double t241 = point[7 * stride] + t240;
+    const double t242 = time->values[0] * t241;
+    const double t248 = point[8 * stride] * t101;
+    const double t249 = t242 + t248;
+    const double t250 = t154 * t92;
+    const double t251 = t249 / t250;
+    const double t252 = point[3 * stride] + t251;
+    const double t253 = time->values[0] * t252;
+    const double t254 = point[2 * stride] * t253;
+    const double t256 = point[9 * stride] * t253;
+    b[0] = t254;
+    b[1] = t256;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -1157,23 +1167,23 @@ MMSMITH_FN void ring_nu_b_array(const ring_nu_solution *s, double t, size_t n,
         const double t100 = t99 + t98;
         const double t101 = log1p(t100);
         const double t154 = t90 * t90;
-        const double t177 = time.values[0] * point4[p];
-        const double t221 = point5[p] + t177;
-        const double t222 = time.values[0] * t221;
-        const double t237 = point6[p] * t101;
-        const double t256 = t222 + t237;
-        const double t257 = point7[p] + t256;
-        const double t258 = time.values[0] * t257;
-        const double t265 = point8[p] * t101;
-        const double t266 = t258 + t265;
-        const double t267 = t154 * t92;
-        const double t268 = t266 / t267;
-        const double t269 = point3[p] + t268;
-        const double t270 = time.values[0] * t269;
-        const double t271 = point2[p] * t270;
-        const double t273 = point9[p] * t270;
-        b[p * 2 + 0] = t271;
-        b[p * 2 + 1] = t273;
+        const double t172 = time.values[0] * point4[p];
+        const double t215 = point5[p] + t172;
+        const double t216 = time.values[0] * t215;
+        const double t224 = point6[p] * t101;
+        const double t240 = t216 + t224;
+        const double t241 = point7[p] + t240;
+        const double t242 = time.values[0] * t241;
+        const double t248 = point8[p] * t101;
+        const double t249 = t242 + t248;
+        const double t250 = t154 * t92;
+        const double t251 = t249 / t250;
+        const double t252 = point3[p] + t251;
+        const double t253 = time.values[0] * t252;
+        const double t254 = point2[p] * t253;
+        const double t256 = point9[p] * t253;
+        b[p * 2 + 0] = t254;
+        b[p * 2 + 1] = t256;
     }
 }
 
@@ -1199,7 +1209,7 @@ MMSMITH_FN double ring_nu_wave_speed(const ring_nu_solution *s)
 /* the time in which the motion repeats */
 MMSMITH_FN double ring_nu_period(const ring_nu_solution *s)
 {
-    return s->fixed[25];
+    return s->fixed[23];
 }
 
 /* first Lame constant */

@@ -136,6 +136,49 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
     return mmsmith_sin_pi_shifted(x, 1);
 }
 
+/* arcosh(1 + z) */
+MMSMITH_FN double mmsmith_log_ratio(double z)
+{
+    return log1p(z + sqrt(z * (z + 2.0)));
+}
+
+/* arcosh(1 + z)^2: the squared logarithm of the ratio of two stretches a, b for z = (a - b)^2/(2 a b). */
+MMSMITH_FN double mmsmith_log_ratio_squared(double z)
+{
+    const double theta = mmsmith_log_ratio(z);
+    return theta * theta;
+}
+
+/* theta/sinh(theta) - 1 for theta = arcosh(1 + z). */
+MMSMITH_FN double mmsmith_log_ratio_slope(double z)
+{
+    const double y = z / (z + 2.0);
+    double sum = 0.0;
+    int k;
+    if (y > 0.25) {
+        return mmsmith_log_ratio(z) / sqrt(z * (z + 2.0)) - 1.0;
+    }
+    for (k = 24; k > 0; --k) {
+        sum = sum * y + 2.0 / (4.0 * k * k - 1.0);
+    }
+    return -sum * y;
+}
+
+/* The derivative of mmsmith_log_ratio_slope. */
+MMSMITH_FN double mmsmith_log_ratio_curvature(double z)
+{
+    const double y = z / (z + 2.0);
+    double sum = 0.0;
+    int k;
+    if (y > 0.25) {
+        return -(z + (1.0 + z) * mmsmith_log_ratio_slope(z)) / (z * (z + 2.0));
+    }
+    for (k = 24; k > 0; --k) {
+        sum = sum * y + k / (4.0 * k * k - 1.0);
+    }
+    return -sum * ((1.0 - y) * (1.0 - y));
+}
+
 #endif
 
 /* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
@@ -156,7 +199,7 @@ typedef struct skew_2d_parameters {
 /* The parameters, and the values that depend on them only. */
 typedef struct skew_2d_solution {
     skew_2d_parameters par;
-    double fixed[58];
+    double fixed[61];
 } skew_2d_solution;
 
 /* What the body force needs of the time alone. */
@@ -315,6 +358,11 @@ MMSMITH_FN const char *skew_2d_prepare(skew_2d_solution *s, const skew_2d_parame
     const double t558 = 0.8 * p->A;
     const double t597 = 1.0 / p->rho0;
     const double t601 = 2.0 / t11;
+    const double t606 = t33 * 3.141592653589793;
+    const double t657 = cos(2.0);
+    const double t658 = 3.141592653589793 * t657;
+    const double t664 = sin(2.0);
+    const double t665 = 4.0 * t664;
     s->par = *p;
     s->fixed[0] = t11;
     s->fixed[1] = t33;
@@ -374,6 +422,9 @@ MMSMITH_FN const char *skew_2d_prepare(skew_2d_solution *s, const skew_2d_parame
     s->fixed[55] = t558;
     s->fixed[56] = t597;
     s->fixed[57] = t601;
+    s->fixed[58] = t606;
+    s->fixed[59] = t658;
+    s->fixed[60] = t665;
     return 0;
 }
 

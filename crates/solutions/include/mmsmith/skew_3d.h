@@ -139,6 +139,49 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
     return mmsmith_sin_pi_shifted(x, 1);
 }
 
+/* arcosh(1 + z) */
+MMSMITH_FN double mmsmith_log_ratio(double z)
+{
+    return log1p(z + sqrt(z * (z + 2.0)));
+}
+
+/* arcosh(1 + z)^2: the squared logarithm of the ratio of two stretches a, b for z = (a - b)^2/(2 a b). */
+MMSMITH_FN double mmsmith_log_ratio_squared(double z)
+{
+    const double theta = mmsmith_log_ratio(z);
+    return theta * theta;
+}
+
+/* theta/sinh(theta) - 1 for theta = arcosh(1 + z). */
+MMSMITH_FN double mmsmith_log_ratio_slope(double z)
+{
+    const double y = z / (z + 2.0);
+    double sum = 0.0;
+    int k;
+    if (y > 0.25) {
+        return mmsmith_log_ratio(z) / sqrt(z * (z + 2.0)) - 1.0;
+    }
+    for (k = 24; k > 0; --k) {
+        sum = sum * y + 2.0 / (4.0 * k * k - 1.0);
+    }
+    return -sum * y;
+}
+
+/* The derivative of mmsmith_log_ratio_slope. */
+MMSMITH_FN double mmsmith_log_ratio_curvature(double z)
+{
+    const double y = z / (z + 2.0);
+    double sum = 0.0;
+    int k;
+    if (y > 0.25) {
+        return -(z + (1.0 + z) * mmsmith_log_ratio_slope(z)) / (z * (z + 2.0));
+    }
+    for (k = 24; k > 0; --k) {
+        sum = sum * y + k / (4.0 * k * k - 1.0);
+    }
+    return -sum * ((1.0 - y) * (1.0 - y));
+}
+
 #endif
 
 /* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
@@ -159,7 +202,7 @@ typedef struct skew_3d_parameters {
 /* The parameters, and the values that depend on them only. */
 typedef struct skew_3d_solution {
     skew_3d_parameters par;
-    double fixed[45];
+    double fixed[50];
 } skew_3d_solution;
 
 /* What the body force needs of the time alone. */
@@ -279,6 +322,14 @@ MMSMITH_FN const char *skew_3d_prepare(skew_3d_solution *s, const skew_3d_parame
     const double t1065 = t1064 * p->E;
     const double t1066 = t1065 / p->rho0;
     const double t1191 = 2.0 / t17;
+    const double t1322 = cos(2.0);
+    const double t1323 = t112 * t1322;
+    const double t1327 = exp(0.5);
+    const double t1328 = t130 * t1327;
+    const double t1334 = t51 * t1327;
+    const double t1341 = sin(2.0);
+    const double t1342 = 2.0 * t1341;
+    const double t1347 = t122 * t1327;
     s->par = *p;
     s->fixed[0] = t17;
     s->fixed[1] = t37;
@@ -325,6 +376,11 @@ MMSMITH_FN const char *skew_3d_prepare(skew_3d_solution *s, const skew_3d_parame
     s->fixed[42] = t1058;
     s->fixed[43] = t1066;
     s->fixed[44] = t1191;
+    s->fixed[45] = t1323;
+    s->fixed[46] = t1328;
+    s->fixed[47] = t1334;
+    s->fixed[48] = t1342;
+    s->fixed[49] = t1347;
     return 0;
 }
 

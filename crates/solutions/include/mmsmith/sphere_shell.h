@@ -140,6 +140,49 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
     return mmsmith_sin_pi_shifted(x, 1);
 }
 
+/* arcosh(1 + z) */
+MMSMITH_FN double mmsmith_log_ratio(double z)
+{
+    return log1p(z + sqrt(z * (z + 2.0)));
+}
+
+/* arcosh(1 + z)^2: the squared logarithm of the ratio of two stretches a, b for z = (a - b)^2/(2 a b). */
+MMSMITH_FN double mmsmith_log_ratio_squared(double z)
+{
+    const double theta = mmsmith_log_ratio(z);
+    return theta * theta;
+}
+
+/* theta/sinh(theta) - 1 for theta = arcosh(1 + z). */
+MMSMITH_FN double mmsmith_log_ratio_slope(double z)
+{
+    const double y = z / (z + 2.0);
+    double sum = 0.0;
+    int k;
+    if (y > 0.25) {
+        return mmsmith_log_ratio(z) / sqrt(z * (z + 2.0)) - 1.0;
+    }
+    for (k = 24; k > 0; --k) {
+        sum = sum * y + 2.0 / (4.0 * k * k - 1.0);
+    }
+    return -sum * y;
+}
+
+/* The derivative of mmsmith_log_ratio_slope. */
+MMSMITH_FN double mmsmith_log_ratio_curvature(double z)
+{
+    const double y = z / (z + 2.0);
+    double sum = 0.0;
+    int k;
+    if (y > 0.25) {
+        return -(z + (1.0 + z) * mmsmith_log_ratio_slope(z)) / (z * (z + 2.0));
+    }
+    for (k = 24; k > 0; --k) {
+        sum = sum * y + k / (4.0 * k * k - 1.0);
+    }
+    return -sum * ((1.0 - y) * (1.0 - y));
+}
+
 #endif
 
 /* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
@@ -162,7 +205,7 @@ typedef struct sphere_shell_parameters {
 /* The parameters, and the values that depend on them only. */
 typedef struct sphere_shell_solution {
     sphere_shell_parameters par;
-    double fixed[29];
+    double fixed[32];
 } sphere_shell_solution;
 
 /* What the body force needs of the time alone. */
@@ -269,28 +312,46 @@ MMSMITH_FN const char *sphere_shell_prepare(sphere_shell_solution *s, const sphe
     const double t217 = t216 / t135;
     const double t220 = 8.0 / p->Ro;
     const double t224 = 3.0 * t140;
-    const double t228 = 6.0 * t140;
-    const double t231 = 2.0 * t140;
-    const double t247 = 12.0 * t207;
-    const double t248 = p->rho0 * t209;
-    const double t249 = t247 / t248;
-    const double t260 = 6.0 * t120;
-    const double t261 = t260 * p->E;
-    const double t262 = t261 * p->nu;
-    const double t263 = p->rho0 * t121;
-    const double t264 = t263 * t112;
-    const double t265 = t264 * t114;
-    const double t266 = t262 / t265;
-    const double t272 = 3.0 / p->Ro;
-    const double t282 = 2.0 * t120;
-    const double t283 = t282 / t263;
-    const double t290 = 4.0 * p->A;
-    const double t291 = t290 * p->E;
-    const double t292 = t291 * p->nu;
-    const double t293 = t48 * t112;
-    const double t294 = t293 * t114;
-    const double t295 = t292 / t294;
-    const double t308 = 2.0 / t16;
+    const double t246 = 12.0 * t207;
+    const double t247 = p->rho0 * t209;
+    const double t248 = t246 / t247;
+    const double t254 = 6.0 * t120;
+    const double t255 = t254 * p->E;
+    const double t256 = t255 * p->nu;
+    const double t257 = p->rho0 * t121;
+    const double t258 = t257 * t112;
+    const double t259 = t258 * t114;
+    const double t260 = t256 / t259;
+    const double t274 = 2.0 * t120;
+    const double t275 = t274 / t257;
+    const double t281 = 4.0 * p->A;
+    const double t282 = t281 * p->E;
+    const double t283 = t282 * p->nu;
+    const double t284 = t48 * t112;
+    const double t285 = t284 * t114;
+    const double t286 = t283 / t285;
+    const double t299 = 2.0 / t16;
+    const double t301 = p->Ri / p->Ro;
+    const double t302 = 1.0 - t301;
+    const double t303 = t101 * p->Ri;
+    const double t304 = t303 * t302;
+    const double t305 = t304 / t11;
+    const double t308 = 2.0 * p->Ri;
+    const double t309 = t308 / p->Ro;
+    const double t310 = 3.0 - t309;
+    const double t311 = t115 * p->Ri;
+    const double t312 = t311 * t310;
+    const double t313 = t312 / t11;
+    const double t317 = p->Ri * p->Ri;
+    const double t318 = t310 * t310;
+    const double t319 = t120 * t317;
+    const double t320 = t319 * t318;
+    const double t321 = t320 / t121;
+    const double t335 = 1.0 / p->Ri;
+    const double t344 = p->A / p->Ro;
+    const double t350 = p->Ro * t112;
+    const double t351 = t350 * t114;
+    const double t352 = t134 / t351;
     if (!(p->Ri < p->Ro)) {
         return "the parameters of sphere-shell must satisfy Ri < Ro";
     }
@@ -316,14 +377,17 @@ MMSMITH_FN const char *sphere_shell_prepare(sphere_shell_solution *s, const sphe
     s->fixed[18] = t217;
     s->fixed[19] = t220;
     s->fixed[20] = t224;
-    s->fixed[21] = t228;
-    s->fixed[22] = t231;
-    s->fixed[23] = t249;
-    s->fixed[24] = t266;
-    s->fixed[25] = t272;
-    s->fixed[26] = t283;
-    s->fixed[27] = t295;
-    s->fixed[28] = t308;
+    s->fixed[21] = t248;
+    s->fixed[22] = t260;
+    s->fixed[23] = t275;
+    s->fixed[24] = t286;
+    s->fixed[25] = t299;
+    s->fixed[26] = t305;
+    s->fixed[27] = t313;
+    s->fixed[28] = t321;
+    s->fixed[29] = t335;
+    s->fixed[30] = t344;
+    s->fixed[31] = t352;
     return 0;
 }
 
@@ -716,67 +780,60 @@ MMSMITH_FN void sphere_shell_b(const sphere_shell_solution *s, const double X[3]
     const double t225 = t210 * t223;
     const double t226 = s->fixed[20] * t225;
     const double t227 = s->fixed[20] * t211;
-    const double t229 = t61 * t223;
-    const double t230 = s->fixed[21] * t229;
-    const double t232 = s->fixed[22] * t123;
-    const double t234 = t61 * t210;
-    const double t235 = 18.0 * t234;
-    const double t236 = t23 * t71;
+    const double t228 = t23 * t71;
+    const double t230 = 36.0 * t195;
+    const double t231 = t228 + t230;
+    const double t232 = t231 - t123;
+    const double t233 = s->fixed[12] * t232;
+    const double t235 = t61 * t210;
+    const double t236 = 18.0 * t235;
     const double t237 = t23 * t180;
     const double t238 = 2.0 * t237;
-    const double t239 = t235 + t236;
+    const double t239 = t236 + t228;
     const double t240 = t239 + t238;
     const double t241 = s->fixed[11] * t240;
     const double t242 = t218 + t226;
     const double t243 = t242 + t227;
-    const double t244 = t243 + t230;
-    const double t245 = t244 - t232;
-    const double t246 = t245 + t241;
-    const double t250 = t7 * t61;
-    const double t251 = t250 * t246;
-    const double t252 = s->fixed[23] * t251;
-    const double t253 = t252 + t205;
-    const double t254 = t18 * t253;
-    const double t255 = 2.0 * t229;
-    const double t256 = t23 * t61;
-    const double t257 = 4.0 * t256;
-    const double t258 = t211 + t255;
-    const double t259 = t258 - t257;
-    const double t267 = t8 * t259;
-    const double t268 = s->fixed[24] * t267;
-    const double t269 = t268 * t133;
-    const double t270 = s->fixed[12] * t123;
-    const double t271 = s->fixed[11] * t180;
-    const double t273 = s->fixed[25] * t8;
-    const double t274 = 2.0 - t273;
-    const double t275 = s->fixed[20] * t274;
-    const double t276 = t271 + t275;
-    const double t277 = t61 * t276;
-    const double t278 = 12.0 * t277;
-    const double t279 = s->fixed[11] * t239;
-    const double t280 = t270 - t278;
-    const double t281 = t280 - t279;
-    const double t284 = t8 * t281;
-    const double t285 = s->fixed[26] * t284;
-    const double t286 = -t285;
-    const double t287 = t254 + t269;
-    const double t288 = t286 + t287;
-    const double t289 = t18 * t288;
-    const double t296 = s->fixed[27] * t180;
-    const double t297 = t296 * t133;
-    const double t298 = t289 + t297;
-    const double t299 = t190 * t108;
-    const double t300 = t298 / t299;
-    const double t301 = t189 + t300;
-    const double t302 = t18 * t301;
-    const double t303 = t174 * t302;
-    const double t304 = X[1] / t8;
-    const double t305 = t304 * t302;
-    const double t306 = X[2] / t8;
-    const double t307 = t306 * t302;
-    b[0] = t303;
-    b[1] = t305;
-    b[2] = t307;
+    const double t244 = t243 + t233;
+    const double t245 = t244 + t241;
+    const double t249 = t7 * t61;
+    const double t250 = t249 * t245;
+    const double t251 = s->fixed[21] * t250;
+    const double t252 = t251 + t205;
+    const double t253 = t18 * t252;
+    const double t261 = t8 * t214;
+    const double t262 = s->fixed[22] * t261;
+    const double t263 = t262 * t133;
+    const double t264 = s->fixed[11] * t180;
+    const double t265 = s->fixed[20] * t210;
+    const double t266 = t264 + t265;
+    const double t267 = t61 * t266;
+    const double t268 = 12.0 * t267;
+    const double t269 = t230 - t123;
+    const double t270 = s->fixed[12] * t269;
+    const double t271 = s->fixed[11] * t239;
+    const double t272 = t268 + t270;
+    const double t273 = t272 + t271;
+    const double t276 = t8 * t273;
+    const double t277 = s->fixed[23] * t276;
+    const double t278 = t253 + t263;
+    const double t279 = t277 + t278;
+    const double t280 = t18 * t279;
+    const double t287 = s->fixed[24] * t180;
+    const double t288 = t287 * t133;
+    const double t289 = t280 + t288;
+    const double t290 = t190 * t108;
+    const double t291 = t289 / t290;
+    const double t292 = t189 + t291;
+    const double t293 = t18 * t292;
+    const double t294 = t174 * t293;
+    const double t295 = X[1] / t8;
+    const double t296 = t295 * t293;
+    const double t297 = X[2] / t8;
+    const double t298 = t297 * t293;
+    b[0] = t294;
+    b[1] = t296;
+    b[2] = t298;
 }
 
 /* all fields */
@@ -936,64 +993,57 @@ MMSMITH_FN void sphere_shell_fields(const sphere_shell_solution *s, const double
     const double t225 = t210 * t223;
     const double t226 = s->fixed[20] * t225;
     const double t227 = s->fixed[20] * t211;
-    const double t229 = t61 * t223;
-    const double t230 = s->fixed[21] * t229;
-    const double t232 = s->fixed[22] * t123;
-    const double t234 = t61 * t210;
-    const double t235 = 18.0 * t234;
-    const double t236 = t23 * t71;
+    const double t228 = t23 * t71;
+    const double t230 = 36.0 * t195;
+    const double t231 = t228 + t230;
+    const double t232 = t231 - t123;
+    const double t233 = s->fixed[12] * t232;
+    const double t235 = t61 * t210;
+    const double t236 = 18.0 * t235;
     const double t237 = t23 * t180;
     const double t238 = 2.0 * t237;
-    const double t239 = t235 + t236;
+    const double t239 = t236 + t228;
     const double t240 = t239 + t238;
     const double t241 = s->fixed[11] * t240;
     const double t242 = t218 + t226;
     const double t243 = t242 + t227;
-    const double t244 = t243 + t230;
-    const double t245 = t244 - t232;
-    const double t246 = t245 + t241;
-    const double t250 = t7 * t61;
-    const double t251 = t250 * t246;
-    const double t252 = s->fixed[23] * t251;
-    const double t253 = t252 + t205;
-    const double t254 = t18 * t253;
-    const double t255 = 2.0 * t229;
-    const double t256 = t23 * t61;
-    const double t257 = 4.0 * t256;
-    const double t258 = t211 + t255;
-    const double t259 = t258 - t257;
-    const double t267 = t8 * t259;
-    const double t268 = s->fixed[24] * t267;
-    const double t269 = t268 * t133;
-    const double t270 = s->fixed[12] * t123;
-    const double t271 = s->fixed[11] * t180;
-    const double t273 = s->fixed[25] * t8;
-    const double t274 = 2.0 - t273;
-    const double t275 = s->fixed[20] * t274;
-    const double t276 = t271 + t275;
-    const double t277 = t61 * t276;
-    const double t278 = 12.0 * t277;
-    const double t279 = s->fixed[11] * t239;
-    const double t280 = t270 - t278;
-    const double t281 = t280 - t279;
-    const double t284 = t8 * t281;
-    const double t285 = s->fixed[26] * t284;
-    const double t286 = -t285;
-    const double t287 = t254 + t269;
-    const double t288 = t286 + t287;
-    const double t289 = t18 * t288;
-    const double t296 = s->fixed[27] * t180;
-    const double t297 = t296 * t133;
-    const double t298 = t289 + t297;
-    const double t299 = t190 * t108;
-    const double t300 = t298 / t299;
-    const double t301 = t189 + t300;
-    const double t302 = t18 * t301;
-    const double t303 = t174 * t302;
-    const double t304 = X[1] / t8;
-    const double t305 = t304 * t302;
-    const double t306 = X[2] / t8;
-    const double t307 = t306 * t302;
+    const double t244 = t243 + t233;
+    const double t245 = t244 + t241;
+    const double t249 = t7 * t61;
+    const double t250 = t249 * t245;
+    const double t251 = s->fixed[21] * t250;
+    const double t252 = t251 + t205;
+    const double t253 = t18 * t252;
+    const double t261 = t8 * t214;
+    const double t262 = s->fixed[22] * t261;
+    const double t263 = t262 * t133;
+    const double t264 = s->fixed[11] * t180;
+    const double t265 = s->fixed[20] * t210;
+    const double t266 = t264 + t265;
+    const double t267 = t61 * t266;
+    const double t268 = 12.0 * t267;
+    const double t269 = t230 - t123;
+    const double t270 = s->fixed[12] * t269;
+    const double t271 = s->fixed[11] * t239;
+    const double t272 = t268 + t270;
+    const double t273 = t272 + t271;
+    const double t276 = t8 * t273;
+    const double t277 = s->fixed[23] * t276;
+    const double t278 = t253 + t263;
+    const double t279 = t277 + t278;
+    const double t280 = t18 * t279;
+    const double t287 = s->fixed[24] * t180;
+    const double t288 = t287 * t133;
+    const double t289 = t280 + t288;
+    const double t290 = t190 * t108;
+    const double t291 = t289 / t290;
+    const double t292 = t189 + t291;
+    const double t293 = t18 * t292;
+    const double t294 = t174 * t293;
+    const double t295 = X[1] / t8;
+    const double t296 = t295 * t293;
+    const double t297 = X[2] / t8;
+    const double t298 = t297 * t293;
     out->u[0] = t28;
     out->u[1] = t30;
     out->u[2] = t32;
@@ -1031,9 +1081,9 @@ MMSMITH_FN void sphere_shell_fields(const sphere_shell_solution *s, const double
     out->P[6] = t163;
     out->P[7] = t169;
     out->P[8] = t173;
-    out->b[0] = t303;
-    out->b[1] = t305;
-    out->b[2] = t307;
+    out->b[0] = t294;
+    out->b[1] = t296;
+    out->b[2] = t298;
 }
 
 /* What the body force needs of the time alone. */
@@ -1100,61 +1150,54 @@ MMSMITH_FN void sphere_shell_at_point(const sphere_shell_solution *s, const doub
     const double t225 = t210 * t223;
     const double t226 = s->fixed[20] * t225;
     const double t227 = s->fixed[20] * t211;
-    const double t229 = t61 * t223;
-    const double t230 = s->fixed[21] * t229;
-    const double t232 = s->fixed[22] * t123;
-    const double t234 = t61 * t210;
-    const double t235 = 18.0 * t234;
-    const double t236 = t23 * t71;
+    const double t228 = t23 * t71;
+    const double t230 = 36.0 * t195;
+    const double t231 = t228 + t230;
+    const double t232 = t231 - t123;
+    const double t233 = s->fixed[12] * t232;
+    const double t235 = t61 * t210;
+    const double t236 = 18.0 * t235;
     const double t237 = t23 * t180;
     const double t238 = 2.0 * t237;
-    const double t239 = t235 + t236;
+    const double t239 = t236 + t228;
     const double t240 = t239 + t238;
     const double t241 = s->fixed[11] * t240;
     const double t242 = t218 + t226;
     const double t243 = t242 + t227;
-    const double t244 = t243 + t230;
-    const double t245 = t244 - t232;
-    const double t246 = t245 + t241;
-    const double t250 = t7 * t61;
-    const double t251 = t250 * t246;
-    const double t252 = s->fixed[23] * t251;
-    const double t255 = 2.0 * t229;
-    const double t256 = t23 * t61;
-    const double t257 = 4.0 * t256;
-    const double t258 = t211 + t255;
-    const double t259 = t258 - t257;
-    const double t267 = t8 * t259;
-    const double t268 = s->fixed[24] * t267;
-    const double t270 = s->fixed[12] * t123;
-    const double t271 = s->fixed[11] * t180;
-    const double t273 = s->fixed[25] * t8;
-    const double t274 = 2.0 - t273;
-    const double t275 = s->fixed[20] * t274;
-    const double t276 = t271 + t275;
-    const double t277 = t61 * t276;
-    const double t278 = 12.0 * t277;
-    const double t279 = s->fixed[11] * t239;
-    const double t280 = t270 - t278;
-    const double t281 = t280 - t279;
-    const double t284 = t8 * t281;
-    const double t285 = s->fixed[26] * t284;
-    const double t286 = -t285;
-    const double t296 = s->fixed[27] * t180;
-    const double t304 = X[1] / t8;
-    const double t306 = X[2] / t8;
+    const double t244 = t243 + t233;
+    const double t245 = t244 + t241;
+    const double t249 = t7 * t61;
+    const double t250 = t249 * t245;
+    const double t251 = s->fixed[21] * t250;
+    const double t261 = t8 * t214;
+    const double t262 = s->fixed[22] * t261;
+    const double t264 = s->fixed[11] * t180;
+    const double t265 = s->fixed[20] * t210;
+    const double t266 = t264 + t265;
+    const double t267 = t61 * t266;
+    const double t268 = 12.0 * t267;
+    const double t269 = t230 - t123;
+    const double t270 = s->fixed[12] * t269;
+    const double t271 = s->fixed[11] * t239;
+    const double t272 = t268 + t270;
+    const double t273 = t272 + t271;
+    const double t276 = t8 * t273;
+    const double t277 = s->fixed[23] * t276;
+    const double t287 = s->fixed[24] * t180;
+    const double t295 = X[1] / t8;
+    const double t297 = X[2] / t8;
     point[0] = t26;
     point[1] = t104;
     point[2] = t126;
     point[3] = t174;
     point[4] = t189;
     point[5] = t204;
-    point[6] = t252;
-    point[7] = t268;
-    point[8] = t286;
-    point[9] = t296;
-    point[10] = t304;
-    point[11] = t306;
+    point[6] = t251;
+    point[7] = t262;
+    point[8] = t277;
+    point[9] = t287;
+    point[10] = t295;
+    point[11] = t297;
 }
 
 /* The body force from the values of one time and of one point. Value m of the point is point[m*stride]:
@@ -1179,24 +1222,24 @@ MMSMITH_FN void sphere_shell_b_staged(const sphere_shell_solution *s, const sphe
     const double t133 = log1p(t132);
     const double t190 = t106 * t106;
     const double t205 = time->values[0] * point[5 * stride];
-    const double t253 = point[6 * stride] + t205;
-    const double t254 = time->values[0] * t253;
-    const double t269 = point[7 * stride] * t133;
-    const double t287 = t254 + t269;
-    const double t288 = point[8 * stride] + t287;
-    const double t289 = time->values[0] * t288;
-    const double t297 = point[9 * stride] * t133;
-    const double t298 = t289 + t297;
-    const double t299 = t190 * t108;
-    const double t300 = t298 / t299;
-    const double t301 = point[4 * stride] + t300;
-    const double t302 = time->values[0] * t301;
-    const double t303 = point[3 * stride] * t302;
-    const double t305 = point[10 * stride] * t302;
-    const double t307 = point[11 * stride] * t302;
-    b[0] = t303;
-    b[1] = t305;
-    b[2] = t307;
+    const double t252 = point[6 * stride] + t205;
+    const double t253 = time->values[0] * t252;
+    const double t263 = point[7 * stride] * t133;
+    const double t278 = t253 + t263;
+    const double t279 = point[8 * stride] + t278;
+    const double t280 = time->values[0] * t279;
+    const double t288 = point[9 * stride] * t133;
+    const double t289 = t280 + t288;
+    const double t290 = t190 * t108;
+    const double t291 = t289 / t290;
+    const double t292 = point[4 * stride] + t291;
+    const double t293 = time->values[0] * t292;
+    const double t294 = point[3 * stride] * t293;
+    const double t296 = point[10 * stride] * t293;
+    const double t298 = point[11 * stride] * t293;
+    b[0] = t294;
+    b[1] = t296;
+    b[2] = t298;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -1252,24 +1295,24 @@ MMSMITH_FN void sphere_shell_b_array(const sphere_shell_solution *s, double t, s
         const double t133 = log1p(t132);
         const double t190 = t106 * t106;
         const double t205 = time.values[0] * point5[p];
-        const double t253 = point6[p] + t205;
-        const double t254 = time.values[0] * t253;
-        const double t269 = point7[p] * t133;
-        const double t287 = t254 + t269;
-        const double t288 = point8[p] + t287;
-        const double t289 = time.values[0] * t288;
-        const double t297 = point9[p] * t133;
-        const double t298 = t289 + t297;
-        const double t299 = t190 * t108;
-        const double t300 = t298 / t299;
-        const double t301 = point4[p] + t300;
-        const double t302 = time.values[0] * t301;
-        const double t303 = point3[p] * t302;
-        const double t305 = point10[p] * t302;
-        const double t307 = point11[p] * t302;
-        b[p * 3 + 0] = t303;
-        b[p * 3 + 1] = t305;
-        b[p * 3 + 2] = t307;
+        const double t252 = point6[p] + t205;
+        const double t253 = time.values[0] * t252;
+        const double t263 = point7[p] * t133;
+        const double t278 = t253 + t263;
+        const double t279 = point8[p] + t278;
+        const double t280 = time.values[0] * t279;
+        const double t288 = point9[p] * t133;
+        const double t289 = t280 + t288;
+        const double t290 = t190 * t108;
+        const double t291 = t289 / t290;
+        const double t292 = point4[p] + t291;
+        const double t293 = time.values[0] * t292;
+        const double t294 = point3[p] * t293;
+        const double t296 = point10[p] * t293;
+        const double t298 = point11[p] * t293;
+        b[p * 3 + 0] = t294;
+        b[p * 3 + 1] = t296;
+        b[p * 3 + 2] = t298;
     }
 }
 
@@ -1295,7 +1338,7 @@ MMSMITH_FN double sphere_shell_wave_speed(const sphere_shell_solution *s)
 /* the time in which the motion repeats */
 MMSMITH_FN double sphere_shell_period(const sphere_shell_solution *s)
 {
-    return s->fixed[28];
+    return s->fixed[25];
 }
 
 /* first Lame constant */

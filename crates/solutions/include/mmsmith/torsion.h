@@ -141,6 +141,49 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
     return mmsmith_sin_pi_shifted(x, 1);
 }
 
+/* arcosh(1 + z) */
+MMSMITH_FN double mmsmith_log_ratio(double z)
+{
+    return log1p(z + sqrt(z * (z + 2.0)));
+}
+
+/* arcosh(1 + z)^2: the squared logarithm of the ratio of two stretches a, b for z = (a - b)^2/(2 a b). */
+MMSMITH_FN double mmsmith_log_ratio_squared(double z)
+{
+    const double theta = mmsmith_log_ratio(z);
+    return theta * theta;
+}
+
+/* theta/sinh(theta) - 1 for theta = arcosh(1 + z). */
+MMSMITH_FN double mmsmith_log_ratio_slope(double z)
+{
+    const double y = z / (z + 2.0);
+    double sum = 0.0;
+    int k;
+    if (y > 0.25) {
+        return mmsmith_log_ratio(z) / sqrt(z * (z + 2.0)) - 1.0;
+    }
+    for (k = 24; k > 0; --k) {
+        sum = sum * y + 2.0 / (4.0 * k * k - 1.0);
+    }
+    return -sum * y;
+}
+
+/* The derivative of mmsmith_log_ratio_slope. */
+MMSMITH_FN double mmsmith_log_ratio_curvature(double z)
+{
+    const double y = z / (z + 2.0);
+    double sum = 0.0;
+    int k;
+    if (y > 0.25) {
+        return -(z + (1.0 + z) * mmsmith_log_ratio_slope(z)) / (z * (z + 2.0));
+    }
+    for (k = 24; k > 0; --k) {
+        sum = sum * y + k / (4.0 * k * k - 1.0);
+    }
+    return -sum * ((1.0 - y) * (1.0 - y));
+}
+
 #endif
 
 /* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
@@ -161,7 +204,7 @@ typedef struct torsion_parameters {
 /* The parameters, and the values that depend on them only. */
 typedef struct torsion_solution {
     torsion_parameters par;
-    double fixed[11];
+    double fixed[12];
 } torsion_solution;
 
 /* What the body force needs of the time alone. */
@@ -216,32 +259,34 @@ MMSMITH_FN const char *torsion_prepare(torsion_solution *s, const torsion_parame
     const double t51 = p->A * p->E;
     const double t52 = t51 * t44;
     const double t53 = t52 / p->rho0;
-    const double t74 = p->nu + 1.0;
-    const double t75 = 0.5 * p->E;
-    const double t76 = t75 / t74;
+    const double t78 = p->nu + 1.0;
+    const double t79 = 0.5 * p->E;
+    const double t80 = t79 / t78;
     const double t98 = t11 * p->E;
     const double t99 = t98 / p->rho0;
     const double t100 = 2.0 * t44;
-    const double t104 = p->A / t74;
+    const double t104 = p->A / t78;
     const double t113 = 2.0 / t8;
     const double t114 = 2.0 * p->nu;
     const double t115 = 1.0 - t114;
     const double t116 = p->E * p->nu;
-    const double t117 = t74 * t115;
+    const double t117 = t78 * t115;
     const double t118 = t116 / t117;
     const double t119 = -0.5;
+    const double t196 = p->A * t80;
     s->par = *p;
     s->fixed[0] = t8;
     s->fixed[1] = t11;
     s->fixed[2] = t35;
     s->fixed[3] = t53;
-    s->fixed[4] = t76;
+    s->fixed[4] = t80;
     s->fixed[5] = t99;
     s->fixed[6] = t100;
     s->fixed[7] = t104;
     s->fixed[8] = t113;
     s->fixed[9] = t118;
     s->fixed[10] = t119;
+    s->fixed[11] = t196;
     return 0;
 }
 
@@ -469,26 +514,26 @@ MMSMITH_FN void torsion_P(const torsion_solution *s, const double X[3], double t
     const double t68 = -t67;
     const double t69 = t66 * t41;
     const double t70 = -t69;
-    const double t77 = t62 + 1.0;
-    const double t78 = t77 * t77;
-    const double t79 = t65 * t64;
-    const double t80 = t78 - t79;
-    const double t81 = t68 * t80;
-    const double t82 = t81 / t80;
+    const double t73 = t62 + 1.0;
+    const double t74 = t73 * t73;
+    const double t75 = t65 * t64;
+    const double t76 = t74 - t75;
+    const double t81 = t68 * t76;
+    const double t82 = t81 / t76;
     const double t83 = s->fixed[4] * t82;
-    const double t84 = t70 * t80;
-    const double t85 = t84 / t80;
+    const double t84 = t70 * t76;
+    const double t85 = t84 / t76;
     const double t86 = s->fixed[4] * t85;
     const double t87 = t65 * t70;
-    const double t88 = t68 * t77;
+    const double t88 = t68 * t73;
     const double t89 = t87 - t88;
-    const double t90 = t89 / t80;
+    const double t90 = t89 / t76;
     const double t91 = s->fixed[4] * t90;
     const double t92 = -t91;
-    const double t93 = t70 * t77;
+    const double t93 = t70 * t73;
     const double t94 = t68 * t64;
     const double t95 = t93 - t94;
-    const double t96 = t95 / t80;
+    const double t96 = t95 / t76;
     const double t97 = s->fixed[4] * t96;
     P[0] = 0.0;
     P[1] = 0.0;
@@ -603,26 +648,26 @@ MMSMITH_FN void torsion_fields(const torsion_solution *s, const double X[3], dou
     const double t69 = t66 * t41;
     const double t70 = -t69;
     const double t72 = 1.0 - t61;
-    const double t77 = t62 + 1.0;
-    const double t78 = t77 * t77;
-    const double t79 = t65 * t64;
-    const double t80 = t78 - t79;
-    const double t81 = t68 * t80;
-    const double t82 = t81 / t80;
+    const double t73 = t62 + 1.0;
+    const double t74 = t73 * t73;
+    const double t75 = t65 * t64;
+    const double t76 = t74 - t75;
+    const double t81 = t68 * t76;
+    const double t82 = t81 / t76;
     const double t83 = s->fixed[4] * t82;
-    const double t84 = t70 * t80;
-    const double t85 = t84 / t80;
+    const double t84 = t70 * t76;
+    const double t85 = t84 / t76;
     const double t86 = s->fixed[4] * t85;
     const double t87 = t65 * t70;
-    const double t88 = t68 * t77;
+    const double t88 = t68 * t73;
     const double t89 = t87 - t88;
-    const double t90 = t89 / t80;
+    const double t90 = t89 / t76;
     const double t91 = s->fixed[4] * t90;
     const double t92 = -t91;
-    const double t93 = t70 * t77;
+    const double t93 = t70 * t73;
     const double t94 = t68 * t64;
     const double t95 = t93 - t94;
-    const double t96 = t95 / t80;
+    const double t96 = t95 / t76;
     const double t97 = s->fixed[4] * t96;
     const double t101 = s->fixed[6] * X[2];
     const double t102 = t101 * t50;
