@@ -48,8 +48,9 @@ impl Selection {
 /// A solution to check, wherever it comes from.
 pub(crate) struct Subject {
     pub(crate) name: String,
-    pub(crate) solution: AnySolution<f64>,
-    pub(crate) parameters: BTreeMap<String, f64>,
+    /// With the parameters asked for, then with others: a mistake may hide at particular values.
+    pub(crate) solutions: Vec<AnySolution<f64>>,
+    pub(crate) parameters: Vec<BTreeMap<String, f64>>,
     pub(crate) spec: Spec,
     /// What messages call the specification.
     pub(crate) file: String,
@@ -63,35 +64,74 @@ impl Subject {
         if is_file(name) {
             return Self::interpreted(name, overrides);
         }
-        let selection = Selection::new(name, overrides)?;
-        let parameters = selection.parameters();
-        Ok(Self {
-            name: name.to_owned(),
-            solution: selection.build()?,
-            parameters: parameters.into_iter().map(|(name, v)| (name.to_owned(), v)).collect(),
-            spec: specification(name)?,
-            file: format!("{name}.toml"),
-            folder: None,
-        })
+        let spec = specification(name)?;
+        let folder = None;
+        Self::with_variations(
+            name.to_owned(),
+            spec,
+            format!("{name}.toml"),
+            folder,
+            overrides,
+            |_, set| Selection::new(name, set)?.build(),
+        )
     }
 
     /// Evaluates the specification itself: nothing needs to have been generated from it.
     fn interpreted(file: &str, overrides: &[(String, f64)]) -> Result<Self> {
         let spec = specification(file)?;
-        let values = overrides.iter().map(|(name, value)| (name.as_str(), *value));
-        let solution = interpret(&spec, values).with_context(|| file.to_owned())?;
+        let folder = Some(Path::new(file).parent().unwrap_or(Path::new("")).to_owned());
+        let name = spec.name.clone();
+        Self::with_variations(name, spec, file.to_owned(), folder, overrides, |spec, set| {
+            let values = set.iter().map(|(name, value)| (name.as_str(), *value));
+            interpret(spec, values).with_context(|| file.to_owned())
+        })
+    }
+
+    fn with_variations(
+        name: String,
+        spec: Spec,
+        file: String,
+        folder: Option<PathBuf>,
+        overrides: &[(String, f64)],
+        build: impl Fn(&Spec, &[(String, f64)]) -> Result<AnySolution<f64>>,
+    ) -> Result<Self> {
+        let mut solutions = vec![build(&spec, overrides)?];
         let mut parameters: BTreeMap<String, f64> =
             spec.parameters.iter().map(|p| (p.name.clone(), p.default)).collect();
         parameters.extend(overrides.iter().cloned());
-        Ok(Self {
-            name: spec.name.clone(),
-            solution,
-            parameters,
-            spec,
-            file: file.to_owned(),
-            folder: Some(Path::new(file).parent().unwrap_or(Path::new("")).to_owned()),
-        })
+        let mut sets = vec![parameters];
+        // What the user set stays; the rest varies, where the specification admits it.
+        for attempt in 1..=MOST_ATTEMPTS {
+            let set: Vec<(String, f64)> = spec
+                .parameters
+                .iter()
+                .enumerate()
+                .map(|(index, p)| match overrides.iter().find(|(name, _)| *name == p.name) {
+                    Some((_, value)) => (p.name.clone(), *value),
+                    None => (p.name.clone(), p.default * variation(attempt, index)),
+                })
+                .collect();
+            if let Ok(solution) = build(&spec, &set) {
+                solutions.push(solution);
+                sets.push(set.into_iter().collect());
+            }
+            if solutions.len() > VARIATIONS {
+                break;
+            }
+        }
+        Ok(Self { name, solutions, parameters: sets, spec, file, folder })
     }
+}
+
+/// Sets of parameters that are checked beside the one asked for.
+const VARIATIONS: usize = 2;
+/// As many sets are tried for that; the specification may refuse some.
+const MOST_ATTEMPTS: usize = 50;
+
+/// A factor between 0.75 and 1.25 that repeats for no two parameters.
+fn variation(attempt: usize, parameter: usize) -> f64 {
+    // Multiples of the golden ratio, spread evenly over the unit interval.
+    0.75 + 0.5 * ((attempt * 17 + parameter) as f64 * 0.618_033_988_749_894_9).fract()
 }
 
 /// The specification of the library's solution `name`, or the one in the file `name`.

@@ -32,11 +32,25 @@ pub fn interpret<'a>(
     spec: &Spec,
     overrides: impl IntoIterator<Item = (&'a str, f64)>,
 ) -> Result<AnySolution<f64>, InterpretError> {
+    interpret_fields(spec, spec.derive()?, overrides)
+}
+
+/// As [`interpret`], with fields that are not those of the specification's own derivation: to see what a check says of
+/// them. Their graph must have grown from the specification's own, which its constants refer to.
+///
+/// # Errors
+///
+/// [`InterpretError`] where a parameter is unknown or not admissible.
+pub fn interpret_fields<'a>(
+    spec: &Spec,
+    fields: spec::Fields,
+    overrides: impl IntoIterator<Item = (&'a str, f64)>,
+) -> Result<AnySolution<f64>, InterpretError> {
     let values = resolve(spec, overrides)?;
     Ok(match spec.dimension {
-        1 => AnySolution::One(Box::new(Interpreted::<1>::new(spec, values)?)),
-        2 => AnySolution::Two(Box::new(Interpreted::<2>::new(spec, values)?)),
-        _ => AnySolution::Three(Box::new(Interpreted::<3>::new(spec, values)?)),
+        1 => AnySolution::One(Box::new(Interpreted::<1>::new(spec, fields, values)?)),
+        2 => AnySolution::Two(Box::new(Interpreted::<2>::new(spec, fields, values)?)),
+        _ => AnySolution::Three(Box::new(Interpreted::<3>::new(spec, fields, values)?)),
     })
 }
 
@@ -92,8 +106,11 @@ struct Interpreted<const D: usize> {
 }
 
 impl<const D: usize> Interpreted<D> {
-    fn new(spec: &Spec, parameters: Vec<f64>) -> Result<Self, InterpretError> {
-        let mut fields = spec.derive()?;
+    fn new(
+        spec: &Spec,
+        mut fields: spec::Fields,
+        parameters: Vec<f64>,
+    ) -> Result<Self, InterpretError> {
         let (u, v, a, b) = (fields.u.clone(), fields.v.clone(), fields.a.clone(), fields.b.clone());
         let (H, F, P) = (fields.H.concat(), fields.F.concat(), fields.P.concat());
         let (J, W) = ([fields.J], fields.W);

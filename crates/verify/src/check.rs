@@ -58,6 +58,32 @@ pub struct Finding {
     pub t: f64,
     /// The outcome.
     pub verdict: Verdict,
+    /// Of several sets of parameters, the one that this is the worst of, counted from zero.
+    pub parameter_set: usize,
+}
+
+impl Finding {
+    /// How bad it is, for comparison with the same finding elsewhere.
+    fn excess(&self) -> (u8, f64) {
+        let rank = match self.verdict {
+            Verdict::Passed => 0,
+            Verdict::Inconclusive => 1,
+            Verdict::Failed => 2,
+        };
+        (rank, excess(self.difference, self.allowed))
+    }
+}
+
+/// The difference over what is allowed; not-a-number counts as the largest there is.
+fn excess(difference: f64, allowed: f64) -> f64 {
+    let ratio = difference / allowed;
+    if difference == 0.0 {
+        0.0
+    } else if ratio.is_nan() {
+        f64::INFINITY
+    } else {
+        ratio
+    }
 }
 
 /// The outcome of all comparisons of one solution.
@@ -70,6 +96,26 @@ pub struct CheckReport {
 }
 
 impl CheckReport {
+    /// The worst of each finding over reports of one solution with several sets of parameters.
+    ///
+    /// A mistake may hide at particular values, such as a density of one.
+    #[must_use]
+    pub fn worst_of(reports: Vec<CheckReport>) -> CheckReport {
+        let mut worst = CheckReport { points: 0, findings: Vec::new() };
+        for (set, report) in reports.into_iter().enumerate() {
+            worst.points += report.points;
+            for (index, mut finding) in report.findings.into_iter().enumerate() {
+                finding.parameter_set = set;
+                match worst.findings.get_mut(index) {
+                    None => worst.findings.push(finding),
+                    Some(known) if finding.excess() > known.excess() => *known = finding,
+                    Some(_) => {}
+                }
+            }
+        }
+        worst
+    }
+
     /// Whether every comparison passed; one that proved nothing did not.
     #[must_use]
     pub fn passed(&self) -> bool {
@@ -172,24 +218,16 @@ impl<const D: usize> Comparison<D> {
     fn finding(self) -> Finding {
         let Self { what, against, scale, points } = self;
         let allowed = |own_error: f64| OWN_ERROR_FACTOR * own_error + TOLERANCE * scale;
-        // NaN counts as the largest excess there is.
-        let excess = |difference: f64, own_error: f64| {
-            let ratio = difference / allowed(own_error);
-            if difference == 0.0 {
-                0.0
-            } else if ratio.is_nan() {
-                f64::INFINITY
-            } else {
-                ratio
-            }
-        };
         // Where nothing differs, as in a body at rest, nothing was left open.
         let blunt = points.iter().any(|&(difference, own, ..)| {
             difference != 0.0 && OWN_ERROR_FACTOR * own > BLUNT * scale
         });
         let worst = points
             .into_iter()
-            .max_by(|a, b| excess(a.0, a.1).total_cmp(&excess(b.0, b.1)))
+            .max_by(|a, b| {
+                let ratio = |point: &(f64, f64, _, _)| excess(point.0, allowed(point.1));
+                ratio(a).total_cmp(&ratio(b))
+            })
             .unwrap_or((f64::NAN, f64::NAN, SVector::zeros(), 0.0));
         let (difference, own_error, X, t) = worst;
         let allowed = allowed(own_error);
@@ -200,7 +238,18 @@ impl<const D: usize> Comparison<D> {
             Verdict::Failed
         };
         let X = X.iter().copied().collect();
-        Finding { what, against, difference, own_error, scale, allowed, X, t, verdict }
+        Finding {
+            what,
+            against,
+            difference,
+            own_error,
+            scale,
+            allowed,
+            X,
+            t,
+            verdict,
+            parameter_set: 0,
+        }
     }
 }
 

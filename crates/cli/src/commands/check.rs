@@ -11,6 +11,7 @@ use mmsmith_verify::{
     BLUNT, CheckReport, OWN_ERROR_FACTOR, TOLERANCE, Verdict, check as check_fields,
 };
 use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
 
 use crate::arguments::CheckOptions;
 use crate::json::Output;
@@ -39,17 +40,19 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
         .collect::<Result<Vec<_>, _>>()?;
     let mut results = Vec::new();
     let mut passed = true;
-    for (Subject { name, solution, parameters, spec, .. }, listings) in
+    for (Subject { name, solutions, parameters, spec, .. }, listings) in
         subjects.iter().zip(&listings)
     {
-        let report = check_fields(solution, options.points)?;
+        let reports = solutions.iter().map(|solution| check_fields(solution, options.points));
+        let report = CheckReport::worst_of(reports.collect::<Result<_, _>>()?);
         let claims = Claims::judge(spec, listings)?;
         let all_passed = report.passed() && claims.hold();
-        terminal::say(&text(name, all_passed, &report, &claims))?;
+        terminal::say(&text(name, all_passed, &report, parameters, &claims))?;
         passed &= all_passed;
         results.push(json!({
             "solution": name,
-            "parameters": parameters,
+            "parameters": parameters.first(),
+            "parameter_sets": parameters,
             "points": report.points,
             "findings": report.findings,
             "surfaces": claims.surfaces.iter().map(surface_document).collect::<Vec<_>>(),
@@ -205,9 +208,17 @@ fn named(place: &[(String, f64)]) -> Map<String, Value> {
 }
 
 /// The findings of one solution as a table, and the place of each that did not pass.
-fn text(name: &str, passed: bool, report: &CheckReport, claims: &Claims) -> String {
+fn text(
+    name: &str,
+    passed: bool,
+    report: &CheckReport,
+    parameters: &[BTreeMap<String, f64>],
+    claims: &Claims,
+) -> String {
     let verdict = if passed { "passed" } else { "FAILED" };
-    let mut text = format!("{name}: {verdict} at {} points\n", report.points);
+    let sets = parameters.len();
+    let mut text =
+        format!("{name}: {verdict} at {} points, {sets} set(s) of parameters\n", report.points);
     let header =
         ["field", "compared with", "verdict", "difference", "own error", "allowed", "scale"];
     let mut table = Table::new(3, header);
@@ -234,6 +245,11 @@ fn text(name: &str, passed: bool, report: &CheckReport, claims: &Claims) -> Stri
                 "  {} is worst at X = {:?}, t = {:?}: difference {:e}, allowed {:e}\n",
                 finding.what, finding.X, finding.t, finding.difference, finding.allowed
             );
+            if let Some(set) = parameters.get(finding.parameter_set) {
+                let values: Vec<String> =
+                    set.iter().map(|(name, value)| format!("{name} = {value:?}")).collect();
+                places += &format!("    with {}\n", values.join(", "));
+            }
         }
     }
     text += &table.text();
