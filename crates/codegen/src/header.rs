@@ -10,6 +10,9 @@ use mmsmith_spec::{Boundary, Condition, Material, Parameter, Surface};
 /// What every header needs: macros, and `sin(pi x)` as the crate of the solutions computes it.
 const SUPPORT: &str = include_str!("support.h");
 
+/// What laws need that have the logarithm of the stretch.
+const LOG_RATIO: &str = include_str!("log_ratio.h");
+
 /// The width of comments.
 const WIDTH: usize = 115;
 
@@ -211,6 +214,9 @@ impl Header<'_> {
         self.line("#include <math.h>");
         self.line("#include <stddef.h>\n");
         self.text += SUPPORT;
+        if self.plan.calls(is_log_ratio) {
+            self.text += LOG_RATIO;
+        }
         self.line("");
         self.types();
         self.prepare();
@@ -407,6 +413,19 @@ before. Results equal those of the Rust functions bit for bit where the compiler
                     Shape::Scalar => format!("    return {value};"),
                     _ => format!("    {letter}[{index}] = {value};"),
                 });
+            }
+            self.line("}\n");
+        }
+
+        if let Some(energy) = plan.energy {
+            self.line("/* strain energy per reference volume */");
+            self.line(&format!(
+                "MMSMITH_FN double {prefix}_W(const {prefix}_solution *s, const double X[{d}], double t)\n{{"
+            ));
+            let block = plan.after_parameters(&[energy]);
+            self.unread(&block, &[Given::Solution, Given::Position, Given::Time]);
+            for value in self.statements(&block, "    ", Places::SINGLE) {
+                self.line(&format!("    return {value};"));
             }
             self.line("}\n");
         }
@@ -730,6 +749,11 @@ fn literal(value: f64) -> String {
     let sign = if value.is_sign_negative() { "-" } else { "" };
     let magnitude = if value.is_infinite() { "HUGE_VAL".into() } else { digits(value.abs()) };
     format!("{sign}{magnitude}")
+}
+
+fn is_log_ratio(function: Function) -> bool {
+    use Function::{LogRatioCurvature, LogRatioSlope, LogRatioSquared};
+    matches!(function, LogRatioSquared | LogRatioSlope | LogRatioCurvature)
 }
 
 fn c_name(function: Function) -> &'static str {
