@@ -5,8 +5,8 @@
 use mmsmith_codegen::{Names, Plan};
 use mmsmith_solutions::nalgebra::{SMatrix, SVector};
 use mmsmith_solutions::{
-    AnySolution, CATALOGUE, Description, Domain, Fields, Material, Parameter, ParameterError,
-    Solution, build,
+    AnySolution, CATALOGUE, Description, Domain, Fields, Material, Parameter, ParameterError, Ring,
+    RingParameters, Solution, build,
 };
 use mmsmith_spec::Spec;
 use mmsmith_tests::{c_compiler, cpp_compiler, outcome, workspace};
@@ -395,9 +395,7 @@ fn the_example_of_the_readme_compiles_and_gives_the_body_force() {
     assert_eq!(status, Some(0), "{errors}");
     let found: Vec<f64> = out.split_whitespace().filter_map(|word| word.parse().ok()).collect();
 
-    let mut parameters = mmsmith_solutions::RingParameters::<f64>::default();
-    parameters.A = 0.05;
-    let ring = mmsmith_solutions::Ring::new(parameters).unwrap();
+    let ring = Ring::new(RingParameters { A: 0.05, ..RingParameters::default() }).unwrap();
     let expected: Vec<f64> = [[0.6, 0.0], [0.5, 0.5], [0.0, 0.9]]
         .iter()
         .flat_map(|X| ring.body_force(&(*X).into(), 1e-3).as_slice().to_vec())
