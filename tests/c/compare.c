@@ -2,9 +2,10 @@
  *
  * A case is the name of a solution, its parameters, a time, the number of points, and their coordinates. The answer is
  * a line "refused MESSAGE", or "values" and the bits: defaults, constants, measures of the domain, then for each point
- * u, v, a, H, F, J, P, b from one function each, the same from one call, the strain energy where there is one, b in
- * stages, and b from the array. headers.h includes the headers and defines SOLUTIONS, a list of what each offers:
- * SOLUTION(name, BOX or ANNULUS, LAME or MOONEY_RIVLIN or CUSTOM, ENERGY or NO_ENERGY).
+ * u, v, a, H, F, J, P, b from one function each, the same from one call, the strain energy where there is one, the
+ * tractions, b in stages, and b from the array. headers.h includes the headers and defines SOLUTIONS, a list of what each offers:
+ * SOLUTION(name, BOX or ANNULUS, LAME or MOONEY_RIVLIN or CUSTOM, ENERGY or NO_ENERGY),
+ * and TRACTIONS_name, a list of WRITE_TRACTION(name, surface).
  */
 #include "headers.h"
 #include <stdio.h>
@@ -75,6 +76,10 @@ static double *numbers(size_t n)
 #define WRITE_ENERGY(name) write_double(name##_W(&s, Xp, t));
 
 #define WRITE_NO_ENERGY(name)
+
+#define WRITE_TRACTION(name, surface)                                                              \
+    name##_##surface##_traction(&s, Xp, t, vector);                                                \
+    write_doubles(vector, d);
 
 #define SOLUTION(name, domain, law, energy)                                                        \
     static void run_##name(void)                                                                   \
@@ -154,6 +159,7 @@ static double *numbers(size_t n)
                 write_doubles(all.P, d * d);                                                       \
                 write_doubles(all.b, d);                                                           \
                 WRITE_##energy(name)                                                               \
+                TRACTIONS_##name                                                                   \
                 name##_at_point(&s, Xp, kept);                                                     \
                 name##_b_staged(&s, &time, kept, 1, vector);                                       \
                 write_doubles(vector, d);                                                          \

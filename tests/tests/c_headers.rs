@@ -6,7 +6,7 @@ use mmsmith_codegen::{Names, Plan};
 use mmsmith_solutions::nalgebra::{SMatrix, SVector};
 use mmsmith_solutions::{
     AnySolution, CATALOGUE, Description, Domain, Fields, Material, Parameter, ParameterError, Ring,
-    RingParameters, Solution, build,
+    RingParameters, Solution, Surface, build,
 };
 use mmsmith_spec::Spec;
 use mmsmith_tests::{c_compiler, cpp_compiler, outcome, workspace};
@@ -51,6 +51,18 @@ fn solutions() -> Vec<(&'static Description, Build)> {
     add!(Skew2dStVenantKirchhoff Skew2dStress TubeHencky);
     solutions
 }
+
+/// The surfaces, and how the headers call them.
+const SURFACES: [(Surface, &str); 8] = [
+    (Surface::Lower(0), "X_lower"),
+    (Surface::Lower(1), "Y_lower"),
+    (Surface::Lower(2), "Z_lower"),
+    (Surface::Upper(0), "X_upper"),
+    (Surface::Upper(1), "Y_upper"),
+    (Surface::Upper(2), "Z_upper"),
+    (Surface::Inner, "inner"),
+    (Surface::Outer, "outer"),
+];
 
 /// A generator of numbers that are the same in every run.
 struct Random(u64);
@@ -205,6 +217,11 @@ fn case<const D: usize>(
         if let Some(W) = solution.strain_energy(X, t) {
             add(&format!("point {n}, W"), &[W]);
         }
+        for (surface, name) in SURFACES {
+            if let Some(traction) = solution.traction(surface, X, t) {
+                add(&format!("point {n}, traction on {name}"), traction.as_slice());
+            }
+        }
         for way in ["in stages", "in stages with a stride", "in an array"] {
             add(&format!("point {n}, b {way}"), b[n].as_slice());
         }
@@ -267,9 +284,17 @@ fn write_list(folder: &Path) {
         };
         let energy = if offers("W") { "ENERGY" } else { "NO_ENERGY" };
         writeln!(text, "#include \"mmsmith/{name}.h\"").unwrap();
+        write!(text, "#define TRACTIONS_{name}").unwrap();
+        for (_, surface) in SURFACES {
+            if offers(&format!("{surface}_traction")) {
+                write!(text, " WRITE_TRACTION({name}, {surface})").unwrap();
+            }
+        }
+        text.push('\n');
         write!(list, " SOLUTION({name}, {domain}, {law}, {energy})").unwrap();
     }
     assert!(list.contains("MOONEY_RIVLIN") && list.contains("CUSTOM, ENERGY"), "{list}");
+    assert!(text.contains("(ring, inner)") && text.contains("(bar, X_upper)"), "{text}");
     std::fs::write(folder.join("headers.h"), text + &list + "\n").unwrap();
 }
 

@@ -262,7 +262,11 @@ impl Header<'_> {
         lines.push(String::new());
         lines.extend(self.plan.formulas.iter().cloned());
         for boundary in &spec.boundaries {
-            lines.push(format!("surface {}: {}", surface(boundary), condition(boundary)));
+            lines.push(format!(
+                "surface {}: {}",
+                surface_name(boundary.surface),
+                condition(boundary)
+            ));
         }
         if !spec.reference.is_empty() {
             lines.push(String::new());
@@ -279,7 +283,8 @@ Units are those of the parameters; with SI units: u, X in m, P in Pa, b in m/s^2
 
 {prefix}_parameters p = {prefix}_defaults(); gives the parameters, to be changed at will; then, once a run,
 message = {prefix}_prepare(&s, &p); is a null pointer, or says what is wrong with the parameters.
-{prefix}_u, _v, _a, _H, _F, _J, _P, _b compute one field, {prefix}_fields all of them.
+{prefix}_u, _v, _a, _H, _F, _J, _P, _b compute one field, {prefix}_fields all of them;
+the traction on a surface, at points X of it, has a function of its own.
 The body force at points that stay: {prefix}_point_array once a run, {prefix}_b_array once a step, or for single points
 {prefix}_at_point once a run, {prefix}_at_time once a step, {prefix}_b_staged. All ways give the same bits.
 
@@ -426,6 +431,23 @@ before. Results equal those of the Rust functions bit for bit where the compiler
             self.unread(&block, &[Given::Solution, Given::Position, Given::Time]);
             for value in self.statements(&block, "    ", Places::SINGLE) {
                 self.line(&format!("    return {value};"));
+            }
+            self.line("}\n");
+        }
+
+        for (surface, slots) in &plan.tractions {
+            let name = surface_name(*surface);
+            self.line(&format!("/* traction on the surface {name}, force per reference area */"));
+            self.line(&format!(
+                "MMSMITH_FN void {prefix}_{}_traction(const {prefix}_solution *s, const double X[{d}], double t,\n    \
+                 double traction[{d}])\n{{",
+                name.replace('-', "_")
+            ));
+            let block = plan.after_parameters(slots);
+            self.unread(&block, &[Given::Solution, Given::Position, Given::Time]);
+            for (index, value) in self.statements(&block, "    ", Places::SINGLE).iter().enumerate()
+            {
+                self.line(&format!("    traction[{index}] = {value};"));
             }
             self.line("}\n");
         }
@@ -778,9 +800,9 @@ fn c_name(function: Function) -> &'static str {
     }
 }
 
-fn surface(boundary: &Boundary) -> String {
+fn surface_name(surface: Surface) -> String {
     let axis = |axis: usize| ["X", "Y", "Z"].get(axis).copied().unwrap_or_default();
-    match boundary.surface {
+    match surface {
         Surface::Lower(i) => format!("{}-lower", axis(i)),
         Surface::Upper(i) => format!("{}-upper", axis(i)),
         Surface::Inner => "inner".into(),

@@ -19,7 +19,8 @@
  *
  * bar_parameters p = bar_defaults(); gives the parameters, to be changed at will; then, once a run,
  * message = bar_prepare(&s, &p); is a null pointer, or says what is wrong with the parameters.
- * bar_u, _v, _a, _H, _F, _J, _P, _b compute one field, bar_fields all of them.
+ * bar_u, _v, _a, _H, _F, _J, _P, _b compute one field, bar_fields all of them;
+ * the traction on a surface, at points X of it, has a function of its own.
  * The body force at points that stay: bar_point_array once a run, bar_b_array once a step, or for single points
  * bar_at_point once a run, bar_at_time once a step, bar_b_staged. All ways give the same bits.
  *
@@ -415,6 +416,45 @@ MMSMITH_FN void bar_b(const bar_solution *s, const double X[1], double t, double
     const double t110 = t68 + t109;
     const double t111 = t14 * t110;
     b[0] = t111;
+}
+
+/* traction on the surface X-lower, force per reference area */
+MMSMITH_FN void bar_X_lower_traction(const bar_solution *s, const double X[1], double t,
+    double traction[1])
+{
+    (void)X;
+    const double t13 = s->fixed[2] * t;
+    const double t14 = mmsmith_cos_pi(t13);
+    const double t38 = s->fixed[6] * t14;
+    const double t116 = t38 + 1.0;
+    const double t117 = log1p(t38);
+    const double t118 = s->fixed[7] * t117;
+    const double t119 = t38 + 2.0;
+    const double t120 = t38 * t119;
+    const double t121 = s->fixed[8] * t120;
+    const double t122 = t118 + t121;
+    const double t123 = t122 / t116;
+    const double t124 = -t123;
+    traction[0] = t124;
+}
+
+/* traction on the surface X-upper, force per reference area */
+MMSMITH_FN void bar_X_upper_traction(const bar_solution *s, const double X[1], double t,
+    double traction[1])
+{
+    (void)X;
+    const double t13 = s->fixed[2] * t;
+    const double t14 = mmsmith_cos_pi(t13);
+    const double t38 = s->fixed[6] * t14;
+    const double t116 = t38 + 1.0;
+    const double t117 = log1p(t38);
+    const double t118 = s->fixed[7] * t117;
+    const double t119 = t38 + 2.0;
+    const double t120 = t38 * t119;
+    const double t121 = s->fixed[8] * t120;
+    const double t122 = t118 + t121;
+    const double t123 = t122 / t116;
+    traction[0] = t123;
 }
 
 /* all fields */
