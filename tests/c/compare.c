@@ -2,8 +2,10 @@
  *
  * A case is the name of a solution, its parameters, a time, the number of points, and their coordinates. The answer is
  * a line "refused MESSAGE", or "values" and the bits: defaults, constants, measures of the domain, then for each point
- * u, v, a, H, F, J, P, b from one function each, the same from one call, b in stages, and b from the array.
- * headers.h includes the headers and lists the solutions as BOX(name) and ANNULUS(name).
+ * u, v, a, H, F, J, P, b from one function each, the same from one call, the strain energy where there is one, the
+ * tractions, b in stages, and b from the array. headers.h includes the headers and defines SOLUTIONS, a list of what each offers:
+ * SOLUTION(name, BOX or ANNULUS, LAME or MOONEY_RIVLIN or CUSTOM, ENERGY or NO_ENERGY),
+ * and TRACTIONS_name, a list of WRITE_TRACTION(name, surface).
  */
 #include "headers.h"
 #include <stdio.h>
@@ -60,7 +62,26 @@ static double *numbers(size_t n)
     write_double(name##_inner(&s));                                                                \
     write_double(name##_outer(&s));
 
-#define DEFINE(name, WRITE_DOMAIN)                                                                 \
+#define WRITE_LAME(name)                                                                           \
+    write_double(name##_lambda(&s));                                                               \
+    write_double(name##_mu(&s));
+
+#define WRITE_MOONEY_RIVLIN(name)                                                                  \
+    write_double(name##_c1(&s));                                                                   \
+    write_double(name##_c2(&s));                                                                   \
+    write_double(name##_lambda(&s));
+
+#define WRITE_CUSTOM(name)
+
+#define WRITE_ENERGY(name) write_double(name##_W(&s, Xp, t));
+
+#define WRITE_NO_ENERGY(name)
+
+#define WRITE_TRACTION(name, surface)                                                              \
+    name##_##surface##_traction(&s, Xp, t, vector);                                                \
+    write_doubles(vector, d);
+
+#define SOLUTION(name, domain, law, energy)                                                        \
     static void run_##name(void)                                                                   \
     {                                                                                              \
         const size_t d = name##_dimension;                                                         \
@@ -101,9 +122,8 @@ static double *numbers(size_t n)
             write_double(name##_density(&s));                                                      \
             write_double(name##_wave_speed(&s));                                                   \
             write_double(name##_period(&s));                                                       \
-            write_double(name##_lambda(&s));                                                       \
-            write_double(name##_mu(&s));                                                           \
-            WRITE_DOMAIN(name)                                                                     \
+            WRITE_##law(name)                                                                      \
+            WRITE_##domain(name)                                                                   \
             name##_point_array(&s, n, X, point);                                                   \
             /* In two parts, as threads would. */                                                  \
             name##_b_array(&s, t, n, point, 0, n / 3, b);                                          \
@@ -138,6 +158,8 @@ static double *numbers(size_t n)
                 write_double(all.J);                                                               \
                 write_doubles(all.P, d * d);                                                       \
                 write_doubles(all.b, d);                                                           \
+                WRITE_##energy(name)                                                               \
+                TRACTIONS_##name                                                                   \
                 name##_at_point(&s, Xp, kept);                                                     \
                 name##_b_staged(&s, &time, kept, 1, vector);                                       \
                 write_doubles(vector, d);                                                          \
@@ -152,19 +174,14 @@ static double *numbers(size_t n)
         free(b);                                                                                   \
     }
 
-#define BOX(name) DEFINE(name, WRITE_BOX)
-#define ANNULUS(name) DEFINE(name, WRITE_ANNULUS)
 SOLUTIONS
-#undef BOX
-#undef ANNULUS
+#undef SOLUTION
 
-#define CALL(name)                                                                                 \
+#define SOLUTION(name, domain, law, energy)                                                        \
     if (strcmp(given, #name) == 0) {                                                               \
         run_##name();                                                                              \
         continue;                                                                                  \
     }
-#define BOX CALL
-#define ANNULUS CALL
 
 int main(void)
 {

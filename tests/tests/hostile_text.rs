@@ -8,6 +8,7 @@ use mmsmith_codegen::{Plan, items, module_source};
 use mmsmith_spec::Spec;
 use mmsmith_tests::{c_compiler, cpp_compiler, outcome};
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
+use std::ffi::OsStr;
 use std::fmt::Write as _;
 
 /// Text that ends a literal or a comment, starts code, or hides in what a reader sees.
@@ -197,11 +198,16 @@ fn compile(headers: &[(String, String)]) {
     }
     let source = folder.path().join("all.c");
     std::fs::write(&source, text).unwrap();
-    let strict = ["-pedantic", "-Wall", "-Wextra", "-Werror", "-fsyntax-only"];
-    let (status, _, errors) = outcome(c_compiler().arg("-std=c99").args(strict).arg(&source));
+    let object = folder.path().join("all.o");
+    let strict: Vec<&OsStr> = ["-pedantic", "-Wall", "-Wextra", "-Werror", "-c", "-o"]
+        .into_iter()
+        .map(OsStr::new)
+        .chain([object.as_os_str()])
+        .collect();
+    let (status, _, errors) = outcome(c_compiler().arg("-std=c99").args(&strict).arg(&source));
     assert_eq!(status, Some(0), "{errors}");
     if let Some(mut compiler) = cpp_compiler() {
-        let command = compiler.args(["-x", "c++", "-std=c++17"]).args(strict).arg(&source);
+        let command = compiler.args(["-x", "c++", "-std=c++17"]).args(&strict).arg(&source);
         let (status, _, errors) = outcome(command);
         assert_eq!(status, Some(0), "{errors}");
     }

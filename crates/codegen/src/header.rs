@@ -10,6 +10,9 @@ use mmsmith_spec::{Boundary, Condition, Material, Parameter, Surface};
 /// What every header needs: macros, and `sin(pi x)` as the crate of the solutions computes it.
 const SUPPORT: &str = include_str!("support.h");
 
+/// What laws need that have the logarithm of the stretch.
+const LOG_RATIO: &str = include_str!("log_ratio.h");
+
 /// The width of comments.
 const WIDTH: usize = 115;
 
@@ -211,6 +214,9 @@ impl Header<'_> {
         self.line("#include <math.h>");
         self.line("#include <stddef.h>\n");
         self.text += SUPPORT;
+        if self.plan.calls(is_log_ratio) {
+            self.text += LOG_RATIO;
+        }
         self.line("");
         self.types();
         self.prepare();
@@ -256,7 +262,11 @@ impl Header<'_> {
         lines.push(String::new());
         lines.extend(self.plan.formulas.iter().cloned());
         for boundary in &spec.boundaries {
-            lines.push(format!("surface {}: {}", surface(boundary), condition(boundary)));
+            lines.push(format!(
+                "surface {}: {}",
+                surface_name(boundary.surface),
+                condition(boundary)
+            ));
         }
         if !spec.reference.is_empty() {
             lines.push(String::new());
@@ -273,7 +283,8 @@ Units are those of the parameters; with SI units: u, X in m, P in Pa, b in m/s^2
 
 {prefix}_parameters p = {prefix}_defaults(); gives the parameters, to be changed at will; then, once a run,
 message = {prefix}_prepare(&s, &p); is a null pointer, or says what is wrong with the parameters.
-{prefix}_u, _v, _a, _H, _F, _J, _P, _b compute one field, {prefix}_fields all of them.
+{prefix}_u, _v, _a, _H, _F, _J, _P, _b compute one field, {prefix}_fields all of them;
+the traction on a surface, at points X of it, has a function of its own.
 The body force at points that stay: {prefix}_point_array once a run, {prefix}_b_array once a step, or for single points
 {prefix}_at_point once a run, {prefix}_at_time once a step, {prefix}_b_staged. All ways give the same bits.
 
@@ -407,6 +418,36 @@ before. Results equal those of the Rust functions bit for bit where the compiler
                     Shape::Scalar => format!("    return {value};"),
                     _ => format!("    {letter}[{index}] = {value};"),
                 });
+            }
+            self.line("}\n");
+        }
+
+        if let Some(energy) = plan.energy {
+            self.line("/* strain energy per reference volume */");
+            self.line(&format!(
+                "MMSMITH_FN double {prefix}_W(const {prefix}_solution *s, const double X[{d}], double t)\n{{"
+            ));
+            let block = plan.after_parameters(&[energy]);
+            self.unread(&block, &[Given::Solution, Given::Position, Given::Time]);
+            for value in self.statements(&block, "    ", Places::SINGLE) {
+                self.line(&format!("    return {value};"));
+            }
+            self.line("}\n");
+        }
+
+        for (surface, slots) in &plan.tractions {
+            let name = surface_name(*surface);
+            self.line(&format!("/* traction on the surface {name}, force per reference area */"));
+            self.line(&format!(
+                "MMSMITH_FN void {prefix}_{}_traction(const {prefix}_solution *s, const double X[{d}], double t,\n    \
+                 double traction[{d}])\n{{",
+                name.replace('-', "_")
+            ));
+            let block = plan.after_parameters(slots);
+            self.unread(&block, &[Given::Solution, Given::Position, Given::Time]);
+            for (index, value) in self.statements(&block, "    ", Places::SINGLE).iter().enumerate()
+            {
+                self.line(&format!("    traction[{index}] = {value};"));
             }
             self.line("}\n");
         }
@@ -732,6 +773,11 @@ fn literal(value: f64) -> String {
     format!("{sign}{magnitude}")
 }
 
+fn is_log_ratio(function: Function) -> bool {
+    use Function::{LogRatioCurvature, LogRatioSlope, LogRatioSquared};
+    matches!(function, LogRatioSquared | LogRatioSlope | LogRatioCurvature)
+}
+
 fn c_name(function: Function) -> &'static str {
     match function {
         Function::Sin => "sin",
@@ -754,9 +800,9 @@ fn c_name(function: Function) -> &'static str {
     }
 }
 
-fn surface(boundary: &Boundary) -> String {
+fn surface_name(surface: Surface) -> String {
     let axis = |axis: usize| ["X", "Y", "Z"].get(axis).copied().unwrap_or_default();
-    match boundary.surface {
+    match surface {
         Surface::Lower(i) => format!("{}-lower", axis(i)),
         Surface::Upper(i) => format!("{}-upper", axis(i)),
         Surface::Inner => "inner".into(),

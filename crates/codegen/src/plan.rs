@@ -4,7 +4,7 @@
 //! point, and for each point at each time. It alone decides which values are kept between the stages and in which
 //! order; the Rust module and the C header are two renderings of the same plan, so that their results agree.
 
-use mmsmith_expr::{Dependence, Expr, Operation, Program, Rational, Slot, arrange};
+use mmsmith_expr::{Dependence, Expr, Function, Operation, Program, Rational, Slot, arrange};
 use mmsmith_spec::{DeriveError, Domain, Fields, Spec, Surface};
 use std::collections::BTreeMap;
 
@@ -179,6 +179,12 @@ impl<'a> Plan<'a> {
             time,
             point,
         })
+    }
+
+    /// Whether any operation calls such a function.
+    pub(crate) fn calls(&self, such: impl Fn(Function) -> bool) -> bool {
+        let mut operations = self.program.operations().iter();
+        operations.any(|operation| matches!(operation, Operation::Call(f, _) if such(*f)))
     }
 
     /// How many values a stage keeps.

@@ -86,6 +86,24 @@ fn deep_nesting_and_length_are_refused() {
     assert_eq!(Listing::parse(&text).unwrap_err().to_string(), "nested deeper than 100 levels");
 }
 
+#[test]
+fn large_exponents_and_nested_derivatives_are_refused() {
+    for exponent in ["1000000000", "1e9", "-1e9", "1000000000.5", "1e400"] {
+        let text = format!("t1 = pow(x, {exponent});");
+        let mut graph = Graph::new();
+        let names = BTreeMap::from([("x".to_owned(), graph.symbol("x"))]);
+        let message = match Listing::parse(&text) {
+            Ok(listing) => listing.build(&mut graph, &names).unwrap_err().to_string(),
+            Err(error) => error.to_string(),
+        };
+        assert!(message.contains("exponent") || message.contains("large"), "{text} {message}");
+    }
+    // A listing has no derivatives; the message says what it may have.
+    let text = format!("t1 = {}x{};", "diff(".repeat(50), ", x)".repeat(50));
+    let message = Listing::parse(&text).unwrap_err().to_string();
+    assert!(message.contains("diff") && message.contains("pow"), "{message}");
+}
+
 /// Long chains of every operator: reading takes time in proportion to the length.
 #[test]
 fn long_listings_are_read_at_once() {

@@ -114,6 +114,27 @@ fn sizes() {
     }
 }
 
+#[test]
+fn depths() {
+    let million = 1_000_000;
+    refused(with_lets(&format!("z = '{}X'", "(".repeat(million))), "nested deeper");
+    refused(with_lets(&format!("z = '{}'", ")".repeat(million))), "value is expected");
+    refused(with_lets("z = 'X^(-1000000000)'"), "exponent");
+    refused(with_lets("z = 'X^(10^9)'"), "exponent");
+    refused(with_lets("z = '(X + 1)**1e9'"), "exponent");
+    // Written out, and through definitions.
+    for (inner, depth) in [("X", 50), ("X^60", 50), ("exp(X*t)", 50), ("X*exp(sin(X))", 50)] {
+        let nested = "diff(".repeat(depth) + inner + &", X)".repeat(depth);
+        let _ = read(with_lets(&format!("z = '{nested}'")), false);
+        let chain: Vec<String> =
+            (0..depth).map(|i| format!("l{i} = 'diff(l{}, X)'", i + 1)).collect();
+        let chain = format!("{}\nl{depth} = '{inner}'\nz = 'l0'", chain.join("\n"));
+        let _ = read(with_lets(&chain), false);
+    }
+    let polynomial = "diff(".repeat(50) + "X^52" + &", X)".repeat(50);
+    read(with_lets(&format!("z = 'A*{polynomial}/10^60'")), true).unwrap();
+}
+
 /// Where a message is about an expression that stands in text with escapes, of any kind of string.
 #[test]
 fn places_in_strings() {

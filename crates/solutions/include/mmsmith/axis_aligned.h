@@ -24,7 +24,8 @@
  * axis_aligned_parameters p = axis_aligned_defaults(); gives the parameters, to be changed at will; then, once a
  *    run,
  * message = axis_aligned_prepare(&s, &p); is a null pointer, or says what is wrong with the parameters.
- * axis_aligned_u, _v, _a, _H, _F, _J, _P, _b compute one field, axis_aligned_fields all of them.
+ * axis_aligned_u, _v, _a, _H, _F, _J, _P, _b compute one field, axis_aligned_fields all of them;
+ * the traction on a surface, at points X of it, has a function of its own.
  * The body force at points that stay: axis_aligned_point_array once a run, axis_aligned_b_array once a step, or for
  *    single points
  * axis_aligned_at_point once a run, axis_aligned_at_time once a step, axis_aligned_b_staged. All ways give the same
@@ -137,49 +138,6 @@ MMSMITH_FN double mmsmith_sin_pi(double x)
 MMSMITH_FN double mmsmith_cos_pi(double x)
 {
     return mmsmith_sin_pi_shifted(x, 1);
-}
-
-/* arcosh(1 + z) */
-MMSMITH_FN double mmsmith_log_ratio(double z)
-{
-    return log1p(z + sqrt(z * (z + 2.0)));
-}
-
-/* arcosh(1 + z)^2: the squared logarithm of the ratio of two stretches a, b for z = (a - b)^2/(2 a b). */
-MMSMITH_FN double mmsmith_log_ratio_squared(double z)
-{
-    const double theta = mmsmith_log_ratio(z);
-    return theta * theta;
-}
-
-/* theta/sinh(theta) - 1 for theta = arcosh(1 + z). */
-MMSMITH_FN double mmsmith_log_ratio_slope(double z)
-{
-    const double y = z / (z + 2.0);
-    double sum = 0.0;
-    int k;
-    if (y > 0.25) {
-        return mmsmith_log_ratio(z) / sqrt(z * (z + 2.0)) - 1.0;
-    }
-    for (k = 24; k > 0; --k) {
-        sum = sum * y + 2.0 / (4.0 * k * k - 1.0);
-    }
-    return -sum * y;
-}
-
-/* The derivative of mmsmith_log_ratio_slope. */
-MMSMITH_FN double mmsmith_log_ratio_curvature(double z)
-{
-    const double y = z / (z + 2.0);
-    double sum = 0.0;
-    int k;
-    if (y > 0.25) {
-        return -(z + (1.0 + z) * mmsmith_log_ratio_slope(z)) / (z * (z + 2.0));
-    }
-    for (k = 24; k > 0; --k) {
-        sum = sum * y + k / (4.0 * k * k - 1.0);
-    }
-    return -sum * ((1.0 - y) * (1.0 - y));
 }
 
 #endif
@@ -520,6 +478,126 @@ MMSMITH_FN void axis_aligned_b(const axis_aligned_solution *s, const double X[2]
     const double t140 = t14 * t139;
     b[0] = t121;
     b[1] = t140;
+}
+
+/* traction on the surface X-lower, force per reference area */
+MMSMITH_FN void axis_aligned_X_lower_traction(const axis_aligned_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    const double t8 = s->fixed[0] * t;
+    const double t9 = mmsmith_cos_pi(t8);
+    const double t14 = mmsmith_sin_pi(t8);
+    const double t36 = s->fixed[1] * t9;
+    const double t39 = mmsmith_cos_pi(X[1]);
+    const double t52 = t14 * t39;
+    const double t53 = t9 * t14;
+    const double t54 = s->fixed[1] * t53;
+    const double t142 = t36 + 1.0;
+    const double t143 = t54 * t39;
+    const double t144 = t52 + t143;
+    const double t145 = t9 + t144;
+    const double t146 = s->fixed[1] * t145;
+    const double t147 = log1p(t146);
+    const double t148 = s->fixed[4] * t147;
+    const double t149 = t36 + 2.0;
+    const double t150 = t9 * t149;
+    const double t151 = s->fixed[6] * t150;
+    const double t152 = t151 + t148;
+    const double t153 = 1.0 / t142;
+    const double t154 = t153 * t152;
+    const double t155 = -t154;
+    traction[0] = t155;
+    traction[1] = 0.0;
+}
+
+/* traction on the surface X-upper, force per reference area */
+MMSMITH_FN void axis_aligned_X_upper_traction(const axis_aligned_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    const double t8 = s->fixed[0] * t;
+    const double t9 = mmsmith_cos_pi(t8);
+    const double t14 = mmsmith_sin_pi(t8);
+    const double t36 = s->fixed[1] * t9;
+    const double t39 = mmsmith_cos_pi(X[1]);
+    const double t52 = t14 * t39;
+    const double t53 = t9 * t14;
+    const double t54 = s->fixed[1] * t53;
+    const double t143 = t54 * t39;
+    const double t156 = 1.0 - t36;
+    const double t157 = t143 - t52;
+    const double t158 = t9 + t157;
+    const double t159 = s->fixed[1] * t158;
+    const double t160 = -t159;
+    const double t161 = log1p(t160);
+    const double t162 = s->fixed[4] * t161;
+    const double t163 = 2.0 - t36;
+    const double t164 = t9 * t163;
+    const double t165 = s->fixed[6] * t164;
+    const double t166 = t162 - t165;
+    const double t167 = 1.0 / t156;
+    const double t168 = t167 * t166;
+    traction[0] = t168;
+    traction[1] = 0.0;
+}
+
+/* traction on the surface Y-lower, force per reference area */
+MMSMITH_FN void axis_aligned_Y_lower_traction(const axis_aligned_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    const double t8 = s->fixed[0] * t;
+    const double t9 = mmsmith_cos_pi(t8);
+    const double t14 = mmsmith_sin_pi(t8);
+    const double t35 = mmsmith_cos_pi(X[0]);
+    const double t40 = s->fixed[1] * t14;
+    const double t51 = t9 * t35;
+    const double t53 = t9 * t14;
+    const double t54 = s->fixed[1] * t53;
+    const double t169 = t40 + 1.0;
+    const double t170 = t54 * t35;
+    const double t171 = t51 + t170;
+    const double t172 = t14 + t171;
+    const double t173 = s->fixed[1] * t172;
+    const double t174 = log1p(t173);
+    const double t175 = s->fixed[4] * t174;
+    const double t176 = t40 + 2.0;
+    const double t177 = t14 * t176;
+    const double t178 = s->fixed[6] * t177;
+    const double t179 = t178 + t175;
+    const double t180 = 1.0 / t169;
+    const double t181 = t180 * t179;
+    const double t182 = -t181;
+    traction[0] = 0.0;
+    traction[1] = t182;
+}
+
+/* traction on the surface Y-upper, force per reference area */
+MMSMITH_FN void axis_aligned_Y_upper_traction(const axis_aligned_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    const double t8 = s->fixed[0] * t;
+    const double t9 = mmsmith_cos_pi(t8);
+    const double t14 = mmsmith_sin_pi(t8);
+    const double t35 = mmsmith_cos_pi(X[0]);
+    const double t40 = s->fixed[1] * t14;
+    const double t51 = t9 * t35;
+    const double t53 = t9 * t14;
+    const double t54 = s->fixed[1] * t53;
+    const double t170 = t54 * t35;
+    const double t183 = 1.0 - t40;
+    const double t184 = t170 - t51;
+    const double t185 = t14 + t184;
+    const double t186 = s->fixed[1] * t185;
+    const double t187 = -t186;
+    const double t188 = log1p(t187);
+    const double t189 = s->fixed[4] * t188;
+    const double t190 = 2.0 - t40;
+    const double t191 = t14 * t190;
+    const double t192 = s->fixed[6] * t191;
+    const double t193 = t189 - t192;
+    const double t194 = 1.0 / t183;
+    const double t195 = t194 * t193;
+    traction[0] = 0.0;
+    traction[1] = t195;
 }
 
 /* all fields */

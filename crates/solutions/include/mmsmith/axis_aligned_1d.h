@@ -21,7 +21,8 @@
  * axis_aligned_1d_parameters p = axis_aligned_1d_defaults(); gives the parameters, to be changed at will; then, once
  *    a run,
  * message = axis_aligned_1d_prepare(&s, &p); is a null pointer, or says what is wrong with the parameters.
- * axis_aligned_1d_u, _v, _a, _H, _F, _J, _P, _b compute one field, axis_aligned_1d_fields all of them.
+ * axis_aligned_1d_u, _v, _a, _H, _F, _J, _P, _b compute one field, axis_aligned_1d_fields all of them;
+ * the traction on a surface, at points X of it, has a function of its own.
  * The body force at points that stay: axis_aligned_1d_point_array once a run, axis_aligned_1d_b_array once a step,
  *    or for single points
  * axis_aligned_1d_at_point once a run, axis_aligned_1d_at_time once a step, axis_aligned_1d_b_staged. All ways give
@@ -134,49 +135,6 @@ MMSMITH_FN double mmsmith_sin_pi(double x)
 MMSMITH_FN double mmsmith_cos_pi(double x)
 {
     return mmsmith_sin_pi_shifted(x, 1);
-}
-
-/* arcosh(1 + z) */
-MMSMITH_FN double mmsmith_log_ratio(double z)
-{
-    return log1p(z + sqrt(z * (z + 2.0)));
-}
-
-/* arcosh(1 + z)^2: the squared logarithm of the ratio of two stretches a, b for z = (a - b)^2/(2 a b). */
-MMSMITH_FN double mmsmith_log_ratio_squared(double z)
-{
-    const double theta = mmsmith_log_ratio(z);
-    return theta * theta;
-}
-
-/* theta/sinh(theta) - 1 for theta = arcosh(1 + z). */
-MMSMITH_FN double mmsmith_log_ratio_slope(double z)
-{
-    const double y = z / (z + 2.0);
-    double sum = 0.0;
-    int k;
-    if (y > 0.25) {
-        return mmsmith_log_ratio(z) / sqrt(z * (z + 2.0)) - 1.0;
-    }
-    for (k = 24; k > 0; --k) {
-        sum = sum * y + 2.0 / (4.0 * k * k - 1.0);
-    }
-    return -sum * y;
-}
-
-/* The derivative of mmsmith_log_ratio_slope. */
-MMSMITH_FN double mmsmith_log_ratio_curvature(double z)
-{
-    const double y = z / (z + 2.0);
-    double sum = 0.0;
-    int k;
-    if (y > 0.25) {
-        return -(z + (1.0 + z) * mmsmith_log_ratio_slope(z)) / (z * (z + 2.0));
-    }
-    for (k = 24; k > 0; --k) {
-        sum = sum * y + k / (4.0 * k * k - 1.0);
-    }
-    return -sum * ((1.0 - y) * (1.0 - y));
 }
 
 #endif
@@ -422,6 +380,46 @@ MMSMITH_FN void axis_aligned_1d_b(const axis_aligned_1d_solution *s, const doubl
     const double t90 = t59 + t89;
     const double t91 = t9 * t90;
     b[0] = t91;
+}
+
+/* traction on the surface X-lower, force per reference area */
+MMSMITH_FN void axis_aligned_1d_X_lower_traction(const axis_aligned_1d_solution *s, const double X[1], double t,
+    double traction[1])
+{
+    (void)X;
+    const double t8 = s->fixed[0] * t;
+    const double t9 = mmsmith_cos_pi(t8);
+    const double t27 = s->fixed[1] * t9;
+    const double t94 = t27 + 1.0;
+    const double t95 = log1p(t27);
+    const double t96 = s->fixed[4] * t95;
+    const double t97 = t27 + 2.0;
+    const double t98 = t9 * t97;
+    const double t99 = s->fixed[6] * t98;
+    const double t100 = t96 + t99;
+    const double t101 = t100 / t94;
+    const double t102 = -t101;
+    traction[0] = t102;
+}
+
+/* traction on the surface X-upper, force per reference area */
+MMSMITH_FN void axis_aligned_1d_X_upper_traction(const axis_aligned_1d_solution *s, const double X[1], double t,
+    double traction[1])
+{
+    (void)X;
+    const double t8 = s->fixed[0] * t;
+    const double t9 = mmsmith_cos_pi(t8);
+    const double t27 = s->fixed[1] * t9;
+    const double t103 = 1.0 - t27;
+    const double t104 = -t27;
+    const double t105 = log1p(t104);
+    const double t106 = s->fixed[4] * t105;
+    const double t107 = 2.0 - t27;
+    const double t108 = t9 * t107;
+    const double t109 = s->fixed[6] * t108;
+    const double t110 = t106 - t109;
+    const double t111 = t110 / t103;
+    traction[0] = t111;
 }
 
 /* all fields */

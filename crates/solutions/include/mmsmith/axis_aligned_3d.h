@@ -27,7 +27,8 @@
  * axis_aligned_3d_parameters p = axis_aligned_3d_defaults(); gives the parameters, to be changed at will; then, once
  *    a run,
  * message = axis_aligned_3d_prepare(&s, &p); is a null pointer, or says what is wrong with the parameters.
- * axis_aligned_3d_u, _v, _a, _H, _F, _J, _P, _b compute one field, axis_aligned_3d_fields all of them.
+ * axis_aligned_3d_u, _v, _a, _H, _F, _J, _P, _b compute one field, axis_aligned_3d_fields all of them;
+ * the traction on a surface, at points X of it, has a function of its own.
  * The body force at points that stay: axis_aligned_3d_point_array once a run, axis_aligned_3d_b_array once a step,
  *    or for single points
  * axis_aligned_3d_at_point once a run, axis_aligned_3d_at_time once a step, axis_aligned_3d_b_staged. All ways give
@@ -140,49 +141,6 @@ MMSMITH_FN double mmsmith_sin_pi(double x)
 MMSMITH_FN double mmsmith_cos_pi(double x)
 {
     return mmsmith_sin_pi_shifted(x, 1);
-}
-
-/* arcosh(1 + z) */
-MMSMITH_FN double mmsmith_log_ratio(double z)
-{
-    return log1p(z + sqrt(z * (z + 2.0)));
-}
-
-/* arcosh(1 + z)^2: the squared logarithm of the ratio of two stretches a, b for z = (a - b)^2/(2 a b). */
-MMSMITH_FN double mmsmith_log_ratio_squared(double z)
-{
-    const double theta = mmsmith_log_ratio(z);
-    return theta * theta;
-}
-
-/* theta/sinh(theta) - 1 for theta = arcosh(1 + z). */
-MMSMITH_FN double mmsmith_log_ratio_slope(double z)
-{
-    const double y = z / (z + 2.0);
-    double sum = 0.0;
-    int k;
-    if (y > 0.25) {
-        return mmsmith_log_ratio(z) / sqrt(z * (z + 2.0)) - 1.0;
-    }
-    for (k = 24; k > 0; --k) {
-        sum = sum * y + 2.0 / (4.0 * k * k - 1.0);
-    }
-    return -sum * y;
-}
-
-/* The derivative of mmsmith_log_ratio_slope. */
-MMSMITH_FN double mmsmith_log_ratio_curvature(double z)
-{
-    const double y = z / (z + 2.0);
-    double sum = 0.0;
-    int k;
-    if (y > 0.25) {
-        return -(z + (1.0 + z) * mmsmith_log_ratio_slope(z)) / (z * (z + 2.0));
-    }
-    for (k = 24; k > 0; --k) {
-        sum = sum * y + k / (4.0 * k * k - 1.0);
-    }
-    return -sum * ((1.0 - y) * (1.0 - y));
 }
 
 #endif
@@ -659,6 +617,273 @@ MMSMITH_FN void axis_aligned_3d_b(const axis_aligned_3d_solution *s, const doubl
     b[0] = t165;
     b[1] = t196;
     b[2] = t214;
+}
+
+/* traction on the surface X-lower, force per reference area */
+MMSMITH_FN void axis_aligned_3d_X_lower_traction(const axis_aligned_3d_solution *s, const double X[3], double t,
+    double traction[3])
+{
+    const double t8 = s->fixed[0] * t;
+    const double t9 = mmsmith_sin_pi(t8);
+    const double t17 = mmsmith_cos_pi(t8);
+    const double t18 = s->fixed[1] * t17;
+    const double t19 = t9 - t18;
+    const double t26 = t9 + t18;
+    const double t61 = s->fixed[3] * t9;
+    const double t64 = mmsmith_cos_pi(X[1]);
+    const double t65 = s->fixed[5] * t19;
+    const double t66 = t65 * t64;
+    const double t67 = -t66;
+    const double t68 = mmsmith_cos_pi(X[2]);
+    const double t69 = s->fixed[5] * t26;
+    const double t70 = t69 * t68;
+    const double t71 = -t70;
+    const double t93 = t67 * t71;
+    const double t216 = t61 + 1.0;
+    const double t217 = t61 * t67;
+    const double t218 = t61 * t71;
+    const double t219 = t61 * t93;
+    const double t220 = t67 + t71;
+    const double t221 = t220 + t93;
+    const double t222 = t221 + t217;
+    const double t223 = t222 + t218;
+    const double t224 = t223 + t219;
+    const double t225 = t61 + t224;
+    const double t226 = log1p(t225);
+    const double t227 = s->fixed[9] * t226;
+    const double t228 = t61 + 2.0;
+    const double t229 = t9 * t228;
+    const double t230 = s->fixed[11] * t229;
+    const double t231 = t230 + t227;
+    const double t232 = 1.0 / t216;
+    const double t233 = t232 * t231;
+    const double t234 = -t233;
+    traction[0] = t234;
+    traction[1] = 0.0;
+    traction[2] = 0.0;
+}
+
+/* traction on the surface X-upper, force per reference area */
+MMSMITH_FN void axis_aligned_3d_X_upper_traction(const axis_aligned_3d_solution *s, const double X[3], double t,
+    double traction[3])
+{
+    const double t8 = s->fixed[0] * t;
+    const double t9 = mmsmith_sin_pi(t8);
+    const double t17 = mmsmith_cos_pi(t8);
+    const double t18 = s->fixed[1] * t17;
+    const double t19 = t9 - t18;
+    const double t26 = t9 + t18;
+    const double t61 = s->fixed[3] * t9;
+    const double t64 = mmsmith_cos_pi(X[1]);
+    const double t65 = s->fixed[5] * t19;
+    const double t66 = t65 * t64;
+    const double t67 = -t66;
+    const double t68 = mmsmith_cos_pi(X[2]);
+    const double t69 = s->fixed[5] * t26;
+    const double t70 = t69 * t68;
+    const double t71 = -t70;
+    const double t93 = t67 * t71;
+    const double t217 = t61 * t67;
+    const double t218 = t61 * t71;
+    const double t219 = t61 * t93;
+    const double t220 = t67 + t71;
+    const double t221 = t220 + t93;
+    const double t235 = 1.0 - t61;
+    const double t236 = t221 - t217;
+    const double t237 = t236 - t218;
+    const double t238 = t237 - t219;
+    const double t239 = t238 - t61;
+    const double t240 = log1p(t239);
+    const double t241 = s->fixed[9] * t240;
+    const double t242 = 2.0 - t61;
+    const double t243 = t9 * t242;
+    const double t244 = s->fixed[11] * t243;
+    const double t245 = t241 - t244;
+    const double t246 = 1.0 / t235;
+    const double t247 = t246 * t245;
+    traction[0] = t247;
+    traction[1] = 0.0;
+    traction[2] = 0.0;
+}
+
+/* traction on the surface Y-lower, force per reference area */
+MMSMITH_FN void axis_aligned_3d_Y_lower_traction(const axis_aligned_3d_solution *s, const double X[3], double t,
+    double traction[3])
+{
+    const double t8 = s->fixed[0] * t;
+    const double t9 = mmsmith_sin_pi(t8);
+    const double t17 = mmsmith_cos_pi(t8);
+    const double t18 = s->fixed[1] * t17;
+    const double t19 = t9 - t18;
+    const double t26 = t9 + t18;
+    const double t60 = mmsmith_cos_pi(X[0]);
+    const double t61 = s->fixed[3] * t9;
+    const double t62 = t61 * t60;
+    const double t65 = s->fixed[5] * t19;
+    const double t68 = mmsmith_cos_pi(X[2]);
+    const double t69 = s->fixed[5] * t26;
+    const double t70 = t69 * t68;
+    const double t71 = -t70;
+    const double t92 = t62 * t71;
+    const double t248 = -t65;
+    const double t249 = t248 + 1.0;
+    const double t250 = t9 * t248;
+    const double t251 = s->fixed[3] * t250;
+    const double t252 = t251 * t60;
+    const double t253 = t248 * t71;
+    const double t254 = t252 * t71;
+    const double t255 = t62 + t71;
+    const double t256 = t255 + t92;
+    const double t257 = t256 + t252;
+    const double t258 = t257 + t253;
+    const double t259 = t258 + t254;
+    const double t260 = t248 + t259;
+    const double t261 = log1p(t260);
+    const double t262 = s->fixed[9] * t261;
+    const double t263 = t248 + 2.0;
+    const double t264 = t248 * t263;
+    const double t265 = s->fixed[10] * t264;
+    const double t266 = t265 + t262;
+    const double t267 = 1.0 / t249;
+    const double t268 = t267 * t266;
+    const double t269 = -t268;
+    traction[0] = 0.0;
+    traction[1] = t269;
+    traction[2] = 0.0;
+}
+
+/* traction on the surface Y-upper, force per reference area */
+MMSMITH_FN void axis_aligned_3d_Y_upper_traction(const axis_aligned_3d_solution *s, const double X[3], double t,
+    double traction[3])
+{
+    const double t8 = s->fixed[0] * t;
+    const double t9 = mmsmith_sin_pi(t8);
+    const double t17 = mmsmith_cos_pi(t8);
+    const double t18 = s->fixed[1] * t17;
+    const double t19 = t9 - t18;
+    const double t26 = t9 + t18;
+    const double t60 = mmsmith_cos_pi(X[0]);
+    const double t61 = s->fixed[3] * t9;
+    const double t62 = t61 * t60;
+    const double t65 = s->fixed[5] * t19;
+    const double t68 = mmsmith_cos_pi(X[2]);
+    const double t69 = s->fixed[5] * t26;
+    const double t70 = t69 * t68;
+    const double t71 = -t70;
+    const double t92 = t62 * t71;
+    const double t255 = t62 + t71;
+    const double t256 = t255 + t92;
+    const double t270 = t65 + 1.0;
+    const double t271 = t9 * t65;
+    const double t272 = s->fixed[3] * t271;
+    const double t273 = t272 * t60;
+    const double t274 = t65 * t71;
+    const double t275 = t273 * t71;
+    const double t276 = t256 + t273;
+    const double t277 = t276 + t274;
+    const double t278 = t277 + t275;
+    const double t279 = t65 + t278;
+    const double t280 = log1p(t279);
+    const double t281 = s->fixed[9] * t280;
+    const double t282 = t65 + 2.0;
+    const double t283 = t65 * t282;
+    const double t284 = s->fixed[10] * t283;
+    const double t285 = t284 + t281;
+    const double t286 = 1.0 / t270;
+    const double t287 = t286 * t285;
+    traction[0] = 0.0;
+    traction[1] = t287;
+    traction[2] = 0.0;
+}
+
+/* traction on the surface Z-lower, force per reference area */
+MMSMITH_FN void axis_aligned_3d_Z_lower_traction(const axis_aligned_3d_solution *s, const double X[3], double t,
+    double traction[3])
+{
+    const double t8 = s->fixed[0] * t;
+    const double t9 = mmsmith_sin_pi(t8);
+    const double t17 = mmsmith_cos_pi(t8);
+    const double t18 = s->fixed[1] * t17;
+    const double t19 = t9 - t18;
+    const double t26 = t9 + t18;
+    const double t60 = mmsmith_cos_pi(X[0]);
+    const double t61 = s->fixed[3] * t9;
+    const double t62 = t61 * t60;
+    const double t64 = mmsmith_cos_pi(X[1]);
+    const double t65 = s->fixed[5] * t19;
+    const double t66 = t65 * t64;
+    const double t67 = -t66;
+    const double t69 = s->fixed[5] * t26;
+    const double t91 = t62 * t67;
+    const double t95 = t62 + t67;
+    const double t288 = -t69;
+    const double t289 = t288 + 1.0;
+    const double t290 = t9 * t288;
+    const double t291 = s->fixed[3] * t290;
+    const double t292 = t291 * t60;
+    const double t293 = t288 * t67;
+    const double t294 = t292 * t67;
+    const double t295 = t95 + t91;
+    const double t296 = t295 + t292;
+    const double t297 = t296 + t293;
+    const double t298 = t297 + t294;
+    const double t299 = t288 + t298;
+    const double t300 = log1p(t299);
+    const double t301 = s->fixed[9] * t300;
+    const double t302 = t288 + 2.0;
+    const double t303 = t288 * t302;
+    const double t304 = s->fixed[10] * t303;
+    const double t305 = t304 + t301;
+    const double t306 = 1.0 / t289;
+    const double t307 = t306 * t305;
+    const double t308 = -t307;
+    traction[0] = 0.0;
+    traction[1] = 0.0;
+    traction[2] = t308;
+}
+
+/* traction on the surface Z-upper, force per reference area */
+MMSMITH_FN void axis_aligned_3d_Z_upper_traction(const axis_aligned_3d_solution *s, const double X[3], double t,
+    double traction[3])
+{
+    const double t8 = s->fixed[0] * t;
+    const double t9 = mmsmith_sin_pi(t8);
+    const double t17 = mmsmith_cos_pi(t8);
+    const double t18 = s->fixed[1] * t17;
+    const double t19 = t9 - t18;
+    const double t26 = t9 + t18;
+    const double t60 = mmsmith_cos_pi(X[0]);
+    const double t61 = s->fixed[3] * t9;
+    const double t62 = t61 * t60;
+    const double t64 = mmsmith_cos_pi(X[1]);
+    const double t65 = s->fixed[5] * t19;
+    const double t66 = t65 * t64;
+    const double t67 = -t66;
+    const double t69 = s->fixed[5] * t26;
+    const double t91 = t62 * t67;
+    const double t95 = t62 + t67;
+    const double t295 = t95 + t91;
+    const double t309 = t69 + 1.0;
+    const double t310 = t9 * t69;
+    const double t311 = s->fixed[3] * t310;
+    const double t312 = t311 * t60;
+    const double t313 = t69 * t67;
+    const double t314 = t312 * t67;
+    const double t315 = t295 + t312;
+    const double t316 = t315 + t313;
+    const double t317 = t316 + t314;
+    const double t318 = t69 + t317;
+    const double t319 = log1p(t318);
+    const double t320 = s->fixed[9] * t319;
+    const double t321 = t69 + 2.0;
+    const double t322 = t69 * t321;
+    const double t323 = s->fixed[10] * t322;
+    const double t324 = t323 + t320;
+    const double t325 = 1.0 / t309;
+    const double t326 = t325 * t324;
+    traction[0] = 0.0;
+    traction[1] = 0.0;
+    traction[2] = t326;
 }
 
 /* all fields */

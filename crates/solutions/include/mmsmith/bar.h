@@ -19,7 +19,8 @@
  *
  * bar_parameters p = bar_defaults(); gives the parameters, to be changed at will; then, once a run,
  * message = bar_prepare(&s, &p); is a null pointer, or says what is wrong with the parameters.
- * bar_u, _v, _a, _H, _F, _J, _P, _b compute one field, bar_fields all of them.
+ * bar_u, _v, _a, _H, _F, _J, _P, _b compute one field, bar_fields all of them;
+ * the traction on a surface, at points X of it, has a function of its own.
  * The body force at points that stay: bar_point_array once a run, bar_b_array once a step, or for single points
  * bar_at_point once a run, bar_at_time once a step, bar_b_staged. All ways give the same bits.
  *
@@ -130,49 +131,6 @@ MMSMITH_FN double mmsmith_sin_pi(double x)
 MMSMITH_FN double mmsmith_cos_pi(double x)
 {
     return mmsmith_sin_pi_shifted(x, 1);
-}
-
-/* arcosh(1 + z) */
-MMSMITH_FN double mmsmith_log_ratio(double z)
-{
-    return log1p(z + sqrt(z * (z + 2.0)));
-}
-
-/* arcosh(1 + z)^2: the squared logarithm of the ratio of two stretches a, b for z = (a - b)^2/(2 a b). */
-MMSMITH_FN double mmsmith_log_ratio_squared(double z)
-{
-    const double theta = mmsmith_log_ratio(z);
-    return theta * theta;
-}
-
-/* theta/sinh(theta) - 1 for theta = arcosh(1 + z). */
-MMSMITH_FN double mmsmith_log_ratio_slope(double z)
-{
-    const double y = z / (z + 2.0);
-    double sum = 0.0;
-    int k;
-    if (y > 0.25) {
-        return mmsmith_log_ratio(z) / sqrt(z * (z + 2.0)) - 1.0;
-    }
-    for (k = 24; k > 0; --k) {
-        sum = sum * y + 2.0 / (4.0 * k * k - 1.0);
-    }
-    return -sum * y;
-}
-
-/* The derivative of mmsmith_log_ratio_slope. */
-MMSMITH_FN double mmsmith_log_ratio_curvature(double z)
-{
-    const double y = z / (z + 2.0);
-    double sum = 0.0;
-    int k;
-    if (y > 0.25) {
-        return -(z + (1.0 + z) * mmsmith_log_ratio_slope(z)) / (z * (z + 2.0));
-    }
-    for (k = 24; k > 0; --k) {
-        sum = sum * y + k / (4.0 * k * k - 1.0);
-    }
-    return -sum * ((1.0 - y) * (1.0 - y));
 }
 
 #endif
@@ -458,6 +416,45 @@ MMSMITH_FN void bar_b(const bar_solution *s, const double X[1], double t, double
     const double t110 = t68 + t109;
     const double t111 = t14 * t110;
     b[0] = t111;
+}
+
+/* traction on the surface X-lower, force per reference area */
+MMSMITH_FN void bar_X_lower_traction(const bar_solution *s, const double X[1], double t,
+    double traction[1])
+{
+    (void)X;
+    const double t13 = s->fixed[2] * t;
+    const double t14 = mmsmith_cos_pi(t13);
+    const double t38 = s->fixed[6] * t14;
+    const double t116 = t38 + 1.0;
+    const double t117 = log1p(t38);
+    const double t118 = s->fixed[7] * t117;
+    const double t119 = t38 + 2.0;
+    const double t120 = t38 * t119;
+    const double t121 = s->fixed[8] * t120;
+    const double t122 = t118 + t121;
+    const double t123 = t122 / t116;
+    const double t124 = -t123;
+    traction[0] = t124;
+}
+
+/* traction on the surface X-upper, force per reference area */
+MMSMITH_FN void bar_X_upper_traction(const bar_solution *s, const double X[1], double t,
+    double traction[1])
+{
+    (void)X;
+    const double t13 = s->fixed[2] * t;
+    const double t14 = mmsmith_cos_pi(t13);
+    const double t38 = s->fixed[6] * t14;
+    const double t116 = t38 + 1.0;
+    const double t117 = log1p(t38);
+    const double t118 = s->fixed[7] * t117;
+    const double t119 = t38 + 2.0;
+    const double t120 = t38 * t119;
+    const double t121 = s->fixed[8] * t120;
+    const double t122 = t118 + t121;
+    const double t123 = t122 / t116;
+    traction[0] = t123;
 }
 
 /* all fields */

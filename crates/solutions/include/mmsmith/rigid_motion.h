@@ -24,7 +24,8 @@
  * rigid_motion_parameters p = rigid_motion_defaults(); gives the parameters, to be changed at will; then, once a
  *    run,
  * message = rigid_motion_prepare(&s, &p); is a null pointer, or says what is wrong with the parameters.
- * rigid_motion_u, _v, _a, _H, _F, _J, _P, _b compute one field, rigid_motion_fields all of them.
+ * rigid_motion_u, _v, _a, _H, _F, _J, _P, _b compute one field, rigid_motion_fields all of them;
+ * the traction on a surface, at points X of it, has a function of its own.
  * The body force at points that stay: rigid_motion_point_array once a run, rigid_motion_b_array once a step, or for
  *    single points
  * rigid_motion_at_point once a run, rigid_motion_at_time once a step, rigid_motion_b_staged. All ways give the same
@@ -137,49 +138,6 @@ MMSMITH_FN double mmsmith_sin_pi(double x)
 MMSMITH_FN double mmsmith_cos_pi(double x)
 {
     return mmsmith_sin_pi_shifted(x, 1);
-}
-
-/* arcosh(1 + z) */
-MMSMITH_FN double mmsmith_log_ratio(double z)
-{
-    return log1p(z + sqrt(z * (z + 2.0)));
-}
-
-/* arcosh(1 + z)^2: the squared logarithm of the ratio of two stretches a, b for z = (a - b)^2/(2 a b). */
-MMSMITH_FN double mmsmith_log_ratio_squared(double z)
-{
-    const double theta = mmsmith_log_ratio(z);
-    return theta * theta;
-}
-
-/* theta/sinh(theta) - 1 for theta = arcosh(1 + z). */
-MMSMITH_FN double mmsmith_log_ratio_slope(double z)
-{
-    const double y = z / (z + 2.0);
-    double sum = 0.0;
-    int k;
-    if (y > 0.25) {
-        return mmsmith_log_ratio(z) / sqrt(z * (z + 2.0)) - 1.0;
-    }
-    for (k = 24; k > 0; --k) {
-        sum = sum * y + 2.0 / (4.0 * k * k - 1.0);
-    }
-    return -sum * y;
-}
-
-/* The derivative of mmsmith_log_ratio_slope. */
-MMSMITH_FN double mmsmith_log_ratio_curvature(double z)
-{
-    const double y = z / (z + 2.0);
-    double sum = 0.0;
-    int k;
-    if (y > 0.25) {
-        return -(z + (1.0 + z) * mmsmith_log_ratio_slope(z)) / (z * (z + 2.0));
-    }
-    for (k = 24; k > 0; --k) {
-        sum = sum * y + k / (4.0 * k * k - 1.0);
-    }
-    return -sum * ((1.0 - y) * (1.0 - y));
 }
 
 #endif
@@ -485,6 +443,50 @@ MMSMITH_FN void rigid_motion_b(const rigid_motion_solution *s, const double X[2]
     const double t76 = s->fixed[7] * t53;
     b[0] = t76;
     b[1] = t65;
+}
+
+/* traction on the surface X-lower, force per reference area */
+MMSMITH_FN void rigid_motion_X_lower_traction(const rigid_motion_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    (void)s;
+    (void)X;
+    (void)t;
+    traction[0] = 0.0;
+    traction[1] = 0.0;
+}
+
+/* traction on the surface X-upper, force per reference area */
+MMSMITH_FN void rigid_motion_X_upper_traction(const rigid_motion_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    (void)s;
+    (void)X;
+    (void)t;
+    traction[0] = 0.0;
+    traction[1] = 0.0;
+}
+
+/* traction on the surface Y-lower, force per reference area */
+MMSMITH_FN void rigid_motion_Y_lower_traction(const rigid_motion_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    (void)s;
+    (void)X;
+    (void)t;
+    traction[0] = 0.0;
+    traction[1] = 0.0;
+}
+
+/* traction on the surface Y-upper, force per reference area */
+MMSMITH_FN void rigid_motion_Y_upper_traction(const rigid_motion_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    (void)s;
+    (void)X;
+    (void)t;
+    traction[0] = 0.0;
+    traction[1] = 0.0;
 }
 
 /* all fields */

@@ -23,7 +23,8 @@
  *
  * ring_parameters p = ring_defaults(); gives the parameters, to be changed at will; then, once a run,
  * message = ring_prepare(&s, &p); is a null pointer, or says what is wrong with the parameters.
- * ring_u, _v, _a, _H, _F, _J, _P, _b compute one field, ring_fields all of them.
+ * ring_u, _v, _a, _H, _F, _J, _P, _b compute one field, ring_fields all of them;
+ * the traction on a surface, at points X of it, has a function of its own.
  * The body force at points that stay: ring_point_array once a run, ring_b_array once a step, or for single points
  * ring_at_point once a run, ring_at_time once a step, ring_b_staged. All ways give the same bits.
  *
@@ -134,49 +135,6 @@ MMSMITH_FN double mmsmith_sin_pi(double x)
 MMSMITH_FN double mmsmith_cos_pi(double x)
 {
     return mmsmith_sin_pi_shifted(x, 1);
-}
-
-/* arcosh(1 + z) */
-MMSMITH_FN double mmsmith_log_ratio(double z)
-{
-    return log1p(z + sqrt(z * (z + 2.0)));
-}
-
-/* arcosh(1 + z)^2: the squared logarithm of the ratio of two stretches a, b for z = (a - b)^2/(2 a b). */
-MMSMITH_FN double mmsmith_log_ratio_squared(double z)
-{
-    const double theta = mmsmith_log_ratio(z);
-    return theta * theta;
-}
-
-/* theta/sinh(theta) - 1 for theta = arcosh(1 + z). */
-MMSMITH_FN double mmsmith_log_ratio_slope(double z)
-{
-    const double y = z / (z + 2.0);
-    double sum = 0.0;
-    int k;
-    if (y > 0.25) {
-        return mmsmith_log_ratio(z) / sqrt(z * (z + 2.0)) - 1.0;
-    }
-    for (k = 24; k > 0; --k) {
-        sum = sum * y + 2.0 / (4.0 * k * k - 1.0);
-    }
-    return -sum * y;
-}
-
-/* The derivative of mmsmith_log_ratio_slope. */
-MMSMITH_FN double mmsmith_log_ratio_curvature(double z)
-{
-    const double y = z / (z + 2.0);
-    double sum = 0.0;
-    int k;
-    if (y > 0.25) {
-        return -(z + (1.0 + z) * mmsmith_log_ratio_slope(z)) / (z * (z + 2.0));
-    }
-    for (k = 24; k > 0; --k) {
-        sum = sum * y + k / (4.0 * k * k - 1.0);
-    }
-    return -sum * ((1.0 - y) * (1.0 - y));
 }
 
 #endif
@@ -677,6 +635,96 @@ MMSMITH_FN void ring_b(const ring_solution *s, const double X[2], double t, doub
     const double t197 = t196 * t194;
     b[0] = t195;
     b[1] = t197;
+}
+
+/* traction on the surface inner, force per reference area */
+MMSMITH_FN void ring_inner_traction(const ring_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    (void)s;
+    (void)X;
+    (void)t;
+    traction[0] = 0.0;
+    traction[1] = 0.0;
+}
+
+/* traction on the surface outer, force per reference area */
+MMSMITH_FN void ring_outer_traction(const ring_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    (void)s;
+    (void)X;
+    (void)t;
+    traction[0] = 0.0;
+    traction[1] = 0.0;
+}
+
+/* traction on the surface X-lower, force per reference area */
+MMSMITH_FN void ring_X_lower_traction(const ring_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    const double t1 = X[0] * X[0];
+    const double t3 = X[1] * X[1];
+    const double t4 = t1 + t3;
+    const double t5 = sqrt(t4);
+    const double t12 = s->fixed[0] * t;
+    const double t13 = mmsmith_cos_pi(t12);
+    const double t20 = t5 - s->par.Ro;
+    const double t21 = t20 * t20;
+    const double t23 = 2.0 * t5;
+    const double t25 = s->fixed[2] + t23;
+    const double t29 = t21 * t25;
+    const double t30 = s->fixed[3] * t29;
+    const double t31 = t30 + 1.0;
+    const double t32 = s->par.A * t13;
+    const double t63 = t31 * t3;
+    const double t70 = t31 / t5;
+    const double t91 = t32 * t70;
+    const double t92 = t91 + 1.0;
+    const double t100 = t91 + 2.0;
+    const double t102 = t100 / t92;
+    const double t200 = t4 * t5;
+    const double t202 = s->fixed[20] * t13;
+    const double t203 = t63 / t200;
+    const double t204 = t202 * t203;
+    const double t205 = t204 * t102;
+    const double t206 = -t205;
+    traction[0] = t206;
+    traction[1] = 0.0;
+}
+
+/* traction on the surface Y-lower, force per reference area */
+MMSMITH_FN void ring_Y_lower_traction(const ring_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    const double t1 = X[0] * X[0];
+    const double t3 = X[1] * X[1];
+    const double t4 = t1 + t3;
+    const double t5 = sqrt(t4);
+    const double t12 = s->fixed[0] * t;
+    const double t13 = mmsmith_cos_pi(t12);
+    const double t20 = t5 - s->par.Ro;
+    const double t21 = t20 * t20;
+    const double t23 = 2.0 * t5;
+    const double t25 = s->fixed[2] + t23;
+    const double t29 = t21 * t25;
+    const double t30 = s->fixed[3] * t29;
+    const double t31 = t30 + 1.0;
+    const double t32 = s->par.A * t13;
+    const double t70 = t31 / t5;
+    const double t79 = t31 * t1;
+    const double t91 = t32 * t70;
+    const double t92 = t91 + 1.0;
+    const double t100 = t91 + 2.0;
+    const double t102 = t100 / t92;
+    const double t200 = t4 * t5;
+    const double t202 = s->fixed[20] * t13;
+    const double t207 = t79 / t200;
+    const double t208 = t202 * t207;
+    const double t209 = t208 * t102;
+    const double t210 = -t209;
+    traction[0] = 0.0;
+    traction[1] = t210;
 }
 
 /* all fields */

@@ -23,7 +23,8 @@
  *
  * ring_nu_parameters p = ring_nu_defaults(); gives the parameters, to be changed at will; then, once a run,
  * message = ring_nu_prepare(&s, &p); is a null pointer, or says what is wrong with the parameters.
- * ring_nu_u, _v, _a, _H, _F, _J, _P, _b compute one field, ring_nu_fields all of them.
+ * ring_nu_u, _v, _a, _H, _F, _J, _P, _b compute one field, ring_nu_fields all of them;
+ * the traction on a surface, at points X of it, has a function of its own.
  * The body force at points that stay: ring_nu_point_array once a run, ring_nu_b_array once a step, or for single
  *    points
  * ring_nu_at_point once a run, ring_nu_at_time once a step, ring_nu_b_staged. All ways give the same bits.
@@ -135,49 +136,6 @@ MMSMITH_FN double mmsmith_sin_pi(double x)
 MMSMITH_FN double mmsmith_cos_pi(double x)
 {
     return mmsmith_sin_pi_shifted(x, 1);
-}
-
-/* arcosh(1 + z) */
-MMSMITH_FN double mmsmith_log_ratio(double z)
-{
-    return log1p(z + sqrt(z * (z + 2.0)));
-}
-
-/* arcosh(1 + z)^2: the squared logarithm of the ratio of two stretches a, b for z = (a - b)^2/(2 a b). */
-MMSMITH_FN double mmsmith_log_ratio_squared(double z)
-{
-    const double theta = mmsmith_log_ratio(z);
-    return theta * theta;
-}
-
-/* theta/sinh(theta) - 1 for theta = arcosh(1 + z). */
-MMSMITH_FN double mmsmith_log_ratio_slope(double z)
-{
-    const double y = z / (z + 2.0);
-    double sum = 0.0;
-    int k;
-    if (y > 0.25) {
-        return mmsmith_log_ratio(z) / sqrt(z * (z + 2.0)) - 1.0;
-    }
-    for (k = 24; k > 0; --k) {
-        sum = sum * y + 2.0 / (4.0 * k * k - 1.0);
-    }
-    return -sum * y;
-}
-
-/* The derivative of mmsmith_log_ratio_slope. */
-MMSMITH_FN double mmsmith_log_ratio_curvature(double z)
-{
-    const double y = z / (z + 2.0);
-    double sum = 0.0;
-    int k;
-    if (y > 0.25) {
-        return -(z + (1.0 + z) * mmsmith_log_ratio_slope(z)) / (z * (z + 2.0));
-    }
-    for (k = 24; k > 0; --k) {
-        sum = sum * y + k / (4.0 * k * k - 1.0);
-    }
-    return -sum * ((1.0 - y) * (1.0 - y));
 }
 
 #endif
@@ -762,6 +720,124 @@ MMSMITH_FN void ring_nu_b(const ring_nu_solution *s, const double X[2], double t
     const double t256 = t255 * t253;
     b[0] = t254;
     b[1] = t256;
+}
+
+/* traction on the surface inner, force per reference area */
+MMSMITH_FN void ring_nu_inner_traction(const ring_nu_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    const double t12 = s->fixed[0] * t;
+    const double t13 = mmsmith_cos_pi(t12);
+    const double t265 = s->fixed[24] * t13;
+    const double t266 = log1p(t265);
+    const double t270 = s->fixed[25] * t266;
+    const double t271 = t270 * X[0];
+    const double t272 = -t271;
+    const double t273 = t270 * X[1];
+    const double t274 = -t273;
+    traction[0] = t272;
+    traction[1] = t274;
+}
+
+/* traction on the surface outer, force per reference area */
+MMSMITH_FN void ring_nu_outer_traction(const ring_nu_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    const double t12 = s->fixed[0] * t;
+    const double t13 = mmsmith_cos_pi(t12);
+    const double t276 = s->fixed[26] * t13;
+    const double t277 = log1p(t276);
+    const double t281 = s->fixed[27] * t277;
+    const double t282 = t281 * X[0];
+    const double t283 = t281 * X[1];
+    traction[0] = t282;
+    traction[1] = t283;
+}
+
+/* traction on the surface X-lower, force per reference area */
+MMSMITH_FN void ring_nu_X_lower_traction(const ring_nu_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    const double t1 = X[0] * X[0];
+    const double t3 = X[1] * X[1];
+    const double t4 = t1 + t3;
+    const double t5 = sqrt(t4);
+    const double t12 = s->fixed[0] * t;
+    const double t13 = mmsmith_cos_pi(t12);
+    const double t20 = t5 - s->par.Ro;
+    const double t21 = t20 * t20;
+    const double t23 = 2.0 * t5;
+    const double t25 = s->fixed[2] + t23;
+    const double t29 = t21 * t25;
+    const double t30 = s->fixed[3] * t29;
+    const double t31 = t30 + 1.0;
+    const double t32 = s->par.A * t13;
+    const double t58 = t5 - s->par.Ri;
+    const double t68 = t20 * t58;
+    const double t70 = t31 / t5;
+    const double t88 = s->fixed[8] * t13;
+    const double t89 = t88 * t68;
+    const double t91 = t32 * t70;
+    const double t92 = t91 + 1.0;
+    const double t98 = t91 * t89;
+    const double t99 = t91 + t89;
+    const double t100 = t99 + t98;
+    const double t101 = log1p(t100);
+    const double t105 = s->fixed[9] * t101;
+    const double t115 = t91 + 2.0;
+    const double t117 = s->fixed[11] * t13;
+    const double t118 = t117 * t70;
+    const double t119 = t118 * t115;
+    const double t120 = t105 + t119;
+    const double t121 = t120 / t92;
+    const double t284 = t3 / t4;
+    const double t285 = t284 * t121;
+    const double t286 = -t285;
+    traction[0] = t286;
+    traction[1] = 0.0;
+}
+
+/* traction on the surface Y-lower, force per reference area */
+MMSMITH_FN void ring_nu_Y_lower_traction(const ring_nu_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    const double t1 = X[0] * X[0];
+    const double t3 = X[1] * X[1];
+    const double t4 = t1 + t3;
+    const double t5 = sqrt(t4);
+    const double t12 = s->fixed[0] * t;
+    const double t13 = mmsmith_cos_pi(t12);
+    const double t20 = t5 - s->par.Ro;
+    const double t21 = t20 * t20;
+    const double t23 = 2.0 * t5;
+    const double t25 = s->fixed[2] + t23;
+    const double t29 = t21 * t25;
+    const double t30 = s->fixed[3] * t29;
+    const double t31 = t30 + 1.0;
+    const double t32 = s->par.A * t13;
+    const double t58 = t5 - s->par.Ri;
+    const double t68 = t20 * t58;
+    const double t70 = t31 / t5;
+    const double t88 = s->fixed[8] * t13;
+    const double t89 = t88 * t68;
+    const double t91 = t32 * t70;
+    const double t92 = t91 + 1.0;
+    const double t98 = t91 * t89;
+    const double t99 = t91 + t89;
+    const double t100 = t99 + t98;
+    const double t101 = log1p(t100);
+    const double t105 = s->fixed[9] * t101;
+    const double t115 = t91 + 2.0;
+    const double t117 = s->fixed[11] * t13;
+    const double t118 = t117 * t70;
+    const double t119 = t118 * t115;
+    const double t120 = t105 + t119;
+    const double t121 = t120 / t92;
+    const double t288 = t1 / t4;
+    const double t289 = t288 * t121;
+    const double t290 = -t289;
+    traction[0] = 0.0;
+    traction[1] = t290;
 }
 
 /* all fields */

@@ -22,7 +22,8 @@
  *
  * shear_wave_parameters p = shear_wave_defaults(); gives the parameters, to be changed at will; then, once a run,
  * message = shear_wave_prepare(&s, &p); is a null pointer, or says what is wrong with the parameters.
- * shear_wave_u, _v, _a, _H, _F, _J, _P, _b compute one field, shear_wave_fields all of them.
+ * shear_wave_u, _v, _a, _H, _F, _J, _P, _b compute one field, shear_wave_fields all of them;
+ * the traction on a surface, at points X of it, has a function of its own.
  * The body force at points that stay: shear_wave_point_array once a run, shear_wave_b_array once a step, or for
  *    single points
  * shear_wave_at_point once a run, shear_wave_at_time once a step, shear_wave_b_staged. All ways give the same bits.
@@ -134,49 +135,6 @@ MMSMITH_FN double mmsmith_sin_pi(double x)
 MMSMITH_FN double mmsmith_cos_pi(double x)
 {
     return mmsmith_sin_pi_shifted(x, 1);
-}
-
-/* arcosh(1 + z) */
-MMSMITH_FN double mmsmith_log_ratio(double z)
-{
-    return log1p(z + sqrt(z * (z + 2.0)));
-}
-
-/* arcosh(1 + z)^2: the squared logarithm of the ratio of two stretches a, b for z = (a - b)^2/(2 a b). */
-MMSMITH_FN double mmsmith_log_ratio_squared(double z)
-{
-    const double theta = mmsmith_log_ratio(z);
-    return theta * theta;
-}
-
-/* theta/sinh(theta) - 1 for theta = arcosh(1 + z). */
-MMSMITH_FN double mmsmith_log_ratio_slope(double z)
-{
-    const double y = z / (z + 2.0);
-    double sum = 0.0;
-    int k;
-    if (y > 0.25) {
-        return mmsmith_log_ratio(z) / sqrt(z * (z + 2.0)) - 1.0;
-    }
-    for (k = 24; k > 0; --k) {
-        sum = sum * y + 2.0 / (4.0 * k * k - 1.0);
-    }
-    return -sum * y;
-}
-
-/* The derivative of mmsmith_log_ratio_slope. */
-MMSMITH_FN double mmsmith_log_ratio_curvature(double z)
-{
-    const double y = z / (z + 2.0);
-    double sum = 0.0;
-    int k;
-    if (y > 0.25) {
-        return -(z + (1.0 + z) * mmsmith_log_ratio_slope(z)) / (z * (z + 2.0));
-    }
-    for (k = 24; k > 0; --k) {
-        sum = sum * y + k / (4.0 * k * k - 1.0);
-    }
-    return -sum * ((1.0 - y) * (1.0 - y));
 }
 
 #endif
@@ -394,6 +352,64 @@ MMSMITH_FN void shear_wave_b(const shear_wave_solution *s, const double X[2], do
     (void)t;
     b[0] = 0.0;
     b[1] = 0.0;
+}
+
+/* traction on the surface X-lower, force per reference area */
+MMSMITH_FN void shear_wave_X_lower_traction(const shear_wave_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    const double t5 = s->fixed[0] * X[1];
+    const double t22 = s->fixed[1] * t;
+    const double t23 = sin(t22);
+    const double t38 = mmsmith_cos_pi(t5);
+    const double t41 = s->fixed[4] * t23;
+    const double t42 = t41 * t38;
+    const double t46 = s->fixed[5] * t42;
+    const double t56 = -t46;
+    traction[0] = 0.0;
+    traction[1] = t56;
+}
+
+/* traction on the surface X-upper, force per reference area */
+MMSMITH_FN void shear_wave_X_upper_traction(const shear_wave_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    const double t5 = s->fixed[0] * X[1];
+    const double t22 = s->fixed[1] * t;
+    const double t23 = sin(t22);
+    const double t38 = mmsmith_cos_pi(t5);
+    const double t41 = s->fixed[4] * t23;
+    const double t42 = t41 * t38;
+    const double t46 = s->fixed[5] * t42;
+    traction[0] = 0.0;
+    traction[1] = t46;
+}
+
+/* traction on the surface Y-lower, force per reference area */
+MMSMITH_FN void shear_wave_Y_lower_traction(const shear_wave_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    (void)X;
+    const double t22 = s->fixed[1] * t;
+    const double t23 = sin(t22);
+    const double t41 = s->fixed[4] * t23;
+    const double t57 = s->fixed[5] * t41;
+    const double t58 = -t57;
+    traction[0] = t58;
+    traction[1] = 0.0;
+}
+
+/* traction on the surface Y-upper, force per reference area */
+MMSMITH_FN void shear_wave_Y_upper_traction(const shear_wave_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    (void)X;
+    const double t22 = s->fixed[1] * t;
+    const double t23 = sin(t22);
+    const double t41 = s->fixed[4] * t23;
+    const double t57 = s->fixed[5] * t41;
+    traction[0] = t57;
+    traction[1] = 0.0;
 }
 
 /* all fields */

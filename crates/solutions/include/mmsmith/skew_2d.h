@@ -22,7 +22,8 @@
  *
  * skew_2d_parameters p = skew_2d_defaults(); gives the parameters, to be changed at will; then, once a run,
  * message = skew_2d_prepare(&s, &p); is a null pointer, or says what is wrong with the parameters.
- * skew_2d_u, _v, _a, _H, _F, _J, _P, _b compute one field, skew_2d_fields all of them.
+ * skew_2d_u, _v, _a, _H, _F, _J, _P, _b compute one field, skew_2d_fields all of them;
+ * the traction on a surface, at points X of it, has a function of its own.
  * The body force at points that stay: skew_2d_point_array once a run, skew_2d_b_array once a step, or for single
  *    points
  * skew_2d_at_point once a run, skew_2d_at_time once a step, skew_2d_b_staged. All ways give the same bits.
@@ -134,49 +135,6 @@ MMSMITH_FN double mmsmith_sin_pi(double x)
 MMSMITH_FN double mmsmith_cos_pi(double x)
 {
     return mmsmith_sin_pi_shifted(x, 1);
-}
-
-/* arcosh(1 + z) */
-MMSMITH_FN double mmsmith_log_ratio(double z)
-{
-    return log1p(z + sqrt(z * (z + 2.0)));
-}
-
-/* arcosh(1 + z)^2: the squared logarithm of the ratio of two stretches a, b for z = (a - b)^2/(2 a b). */
-MMSMITH_FN double mmsmith_log_ratio_squared(double z)
-{
-    const double theta = mmsmith_log_ratio(z);
-    return theta * theta;
-}
-
-/* theta/sinh(theta) - 1 for theta = arcosh(1 + z). */
-MMSMITH_FN double mmsmith_log_ratio_slope(double z)
-{
-    const double y = z / (z + 2.0);
-    double sum = 0.0;
-    int k;
-    if (y > 0.25) {
-        return mmsmith_log_ratio(z) / sqrt(z * (z + 2.0)) - 1.0;
-    }
-    for (k = 24; k > 0; --k) {
-        sum = sum * y + 2.0 / (4.0 * k * k - 1.0);
-    }
-    return -sum * y;
-}
-
-/* The derivative of mmsmith_log_ratio_slope. */
-MMSMITH_FN double mmsmith_log_ratio_curvature(double z)
-{
-    const double y = z / (z + 2.0);
-    double sum = 0.0;
-    int k;
-    if (y > 0.25) {
-        return -(z + (1.0 + z) * mmsmith_log_ratio_slope(z)) / (z * (z + 2.0));
-    }
-    for (k = 24; k > 0; --k) {
-        sum = sum * y + k / (4.0 * k * k - 1.0);
-    }
-    return -sum * ((1.0 - y) * (1.0 - y));
 }
 
 #endif
@@ -1135,6 +1093,265 @@ MMSMITH_FN void skew_2d_b(const skew_2d_solution *s, const double X[2], double t
     const double t600 = t501 - t599;
     b[0] = t475;
     b[1] = t600;
+}
+
+/* traction on the surface X-lower, force per reference area */
+MMSMITH_FN void skew_2d_X_lower_traction(const skew_2d_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    const double t12 = s->fixed[0] * t;
+    const double t13 = mmsmith_cos_pi(t12);
+    const double t14 = s->par.A * t13;
+    const double t21 = 0.5 * X[1];
+    const double t25 = X[1] * X[1];
+    const double t28 = 3.0 * t13;
+    const double t30 = mmsmith_sin_pi(t12);
+    const double t31 = 4.0 * t30;
+    const double t32 = t28 + t31;
+    const double t34 = s->fixed[1] * t32;
+    const double t64 = s->fixed[7] * t13;
+    const double t72 = mmsmith_cos_pi(t21);
+    const double t108 = t13 * t13;
+    const double t110 = s->fixed[10] * t108;
+    const double t123 = s->fixed[11] * t13;
+    const double t603 = cos(X[1]);
+    const double t604 = t64 * t603;
+    const double t605 = t604 + 1.0;
+    const double t607 = s->fixed[58] * t32;
+    const double t608 = t607 * t72;
+    const double t609 = t608 + 1.0;
+    const double t610 = t605 * t609;
+    const double t611 = t34 * t25;
+    const double t612 = t14 * t603;
+    const double t613 = t612 * t611;
+    const double t614 = t610 - t613;
+    const double t615 = t604 * t608;
+    const double t616 = t604 + t608;
+    const double t617 = t616 - t613;
+    const double t618 = t617 + t615;
+    const double t619 = log1p(t618);
+    const double t620 = s->fixed[8] * t619;
+    const double t621 = 2.0 * t604;
+    const double t622 = t604 * t604;
+    const double t623 = t603 * t603;
+    const double t624 = t110 * t623;
+    const double t625 = t621 + t622;
+    const double t626 = t625 + t624;
+    const double t627 = s->fixed[9] * t626;
+    const double t628 = t620 + t627;
+    const double t629 = t609 * t628;
+    const double t630 = t604 * t611;
+    const double t631 = t612 * t608;
+    const double t632 = t612 + t611;
+    const double t633 = t632 + t630;
+    const double t634 = t633 + t631;
+    const double t635 = t123 * t603;
+    const double t636 = t635 * t634;
+    const double t637 = t629 - t636;
+    const double t638 = t637 / t614;
+    const double t639 = -t638;
+    const double t640 = t609 * t634;
+    const double t641 = s->fixed[9] * t640;
+    const double t642 = 2.0 * t608;
+    const double t643 = t611 * t611;
+    const double t644 = t608 * t608;
+    const double t645 = t642 + t643;
+    const double t646 = t645 + t644;
+    const double t647 = s->fixed[9] * t646;
+    const double t648 = t620 + t647;
+    const double t649 = t612 * t648;
+    const double t650 = t641 - t649;
+    const double t651 = t650 / t614;
+    const double t652 = -t651;
+    traction[0] = t639;
+    traction[1] = t652;
+}
+
+/* traction on the surface X-upper, force per reference area */
+MMSMITH_FN void skew_2d_X_upper_traction(const skew_2d_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    const double t12 = s->fixed[0] * t;
+    const double t13 = mmsmith_cos_pi(t12);
+    const double t14 = s->par.A * t13;
+    const double t21 = 0.5 * X[1];
+    const double t22 = mmsmith_sin_pi(t21);
+    const double t25 = X[1] * X[1];
+    const double t28 = 3.0 * t13;
+    const double t30 = mmsmith_sin_pi(t12);
+    const double t31 = 4.0 * t30;
+    const double t32 = t28 + t31;
+    const double t34 = s->fixed[1] * t32;
+    const double t64 = s->fixed[7] * t13;
+    const double t72 = mmsmith_cos_pi(t21);
+    const double t108 = t13 * t13;
+    const double t110 = s->fixed[10] * t108;
+    const double t123 = s->fixed[11] * t13;
+    const double t328 = 2.0 * X[1];
+    const double t653 = X[1] + 3.0;
+    const double t654 = cos(t653);
+    const double t655 = t64 * t654;
+    const double t656 = t655 + 1.0;
+    const double t659 = s->fixed[59] * t72;
+    const double t660 = t328 + t659;
+    const double t661 = t34 * t660;
+    const double t662 = t661 + 1.0;
+    const double t663 = t656 * t662;
+    const double t666 = s->fixed[60] * t22;
+    const double t667 = t25 - t666;
+    const double t668 = t34 * t667;
+    const double t669 = t14 * t654;
+    const double t670 = t669 * t668;
+    const double t671 = t663 - t670;
+    const double t672 = t655 * t661;
+    const double t673 = t655 + t661;
+    const double t674 = t673 - t670;
+    const double t675 = t674 + t672;
+    const double t676 = log1p(t675);
+    const double t677 = s->fixed[8] * t676;
+    const double t678 = 2.0 * t655;
+    const double t679 = t655 * t655;
+    const double t680 = t654 * t654;
+    const double t681 = t110 * t680;
+    const double t682 = t678 + t679;
+    const double t683 = t682 + t681;
+    const double t684 = s->fixed[9] * t683;
+    const double t685 = t677 + t684;
+    const double t686 = t662 * t685;
+    const double t687 = t655 * t668;
+    const double t688 = t669 * t661;
+    const double t689 = t669 + t668;
+    const double t690 = t689 + t687;
+    const double t691 = t690 + t688;
+    const double t692 = t123 * t654;
+    const double t693 = t692 * t691;
+    const double t694 = t686 - t693;
+    const double t695 = t694 / t671;
+    const double t696 = t662 * t691;
+    const double t697 = s->fixed[9] * t696;
+    const double t698 = 2.0 * t661;
+    const double t699 = t668 * t668;
+    const double t700 = t661 * t661;
+    const double t701 = t698 + t699;
+    const double t702 = t701 + t700;
+    const double t703 = s->fixed[9] * t702;
+    const double t704 = t677 + t703;
+    const double t705 = t669 * t704;
+    const double t706 = t697 - t705;
+    const double t707 = t706 / t671;
+    traction[0] = t695;
+    traction[1] = t707;
+}
+
+/* traction on the surface Y-lower, force per reference area */
+MMSMITH_FN void skew_2d_Y_lower_traction(const skew_2d_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    const double t3 = 3.0 * X[0];
+    const double t12 = s->fixed[0] * t;
+    const double t13 = mmsmith_cos_pi(t12);
+    const double t18 = 2.0 * X[0];
+    const double t19 = cos(t18);
+    const double t28 = 3.0 * t13;
+    const double t30 = mmsmith_sin_pi(t12);
+    const double t31 = 4.0 * t30;
+    const double t32 = t28 + t31;
+    const double t64 = s->fixed[7] * t13;
+    const double t123 = s->fixed[11] * t13;
+    const double t607 = s->fixed[58] * t32;
+    const double t708 = cos(t3);
+    const double t709 = t123 * t708;
+    const double t710 = -t709;
+    const double t711 = t607 * t19;
+    const double t712 = t711 + 1.0;
+    const double t713 = t64 * t708;
+    const double t714 = t713 * t711;
+    const double t715 = t713 + t711;
+    const double t716 = t715 + t714;
+    const double t717 = log1p(t716);
+    const double t718 = s->fixed[8] * t717;
+    const double t719 = t711 + 2.0;
+    const double t720 = t711 * t719;
+    const double t721 = s->fixed[9] * t720;
+    const double t722 = t718 + t721;
+    const double t723 = t722 / t712;
+    const double t724 = -t723;
+    traction[0] = t710;
+    traction[1] = t724;
+}
+
+/* traction on the surface Y-upper, force per reference area */
+MMSMITH_FN void skew_2d_Y_upper_traction(const skew_2d_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    const double t3 = 3.0 * X[0];
+    const double t12 = s->fixed[0] * t;
+    const double t13 = mmsmith_cos_pi(t12);
+    const double t14 = s->par.A * t13;
+    const double t18 = 2.0 * X[0];
+    const double t28 = 3.0 * t13;
+    const double t30 = mmsmith_sin_pi(t12);
+    const double t31 = 4.0 * t30;
+    const double t32 = t28 + t31;
+    const double t34 = s->fixed[1] * t32;
+    const double t64 = s->fixed[7] * t13;
+    const double t67 = sin(t18);
+    const double t108 = t13 * t13;
+    const double t110 = s->fixed[10] * t108;
+    const double t506 = s->fixed[45] * t32;
+    const double t725 = t3 + 1.0;
+    const double t726 = cos(t725);
+    const double t727 = t64 * t726;
+    const double t728 = t727 + 1.0;
+    const double t729 = t506 * X[0];
+    const double t730 = t729 + 1.0;
+    const double t731 = t728 * t730;
+    const double t732 = 4.0 * t67;
+    const double t733 = 1.0 - t732;
+    const double t734 = t34 * t733;
+    const double t735 = t14 * t726;
+    const double t736 = t735 * t734;
+    const double t737 = t731 - t736;
+    const double t738 = t727 * t729;
+    const double t739 = t727 + t729;
+    const double t740 = t739 - t736;
+    const double t741 = t740 + t738;
+    const double t742 = log1p(t741);
+    const double t743 = s->fixed[8] * t742;
+    const double t744 = 2.0 * t727;
+    const double t745 = t727 * t727;
+    const double t746 = t726 * t726;
+    const double t747 = t110 * t746;
+    const double t748 = t744 + t745;
+    const double t749 = t748 + t747;
+    const double t750 = s->fixed[9] * t749;
+    const double t751 = t743 + t750;
+    const double t752 = t734 * t751;
+    const double t753 = t727 * t734;
+    const double t754 = t735 * t729;
+    const double t755 = t735 + t734;
+    const double t756 = t755 + t753;
+    const double t757 = t756 + t754;
+    const double t758 = t728 * t757;
+    const double t759 = s->fixed[9] * t758;
+    const double t760 = t752 - t759;
+    const double t761 = t760 / t737;
+    const double t762 = -t761;
+    const double t763 = t734 * t757;
+    const double t764 = s->fixed[9] * t763;
+    const double t765 = 2.0 * t729;
+    const double t766 = t734 * t734;
+    const double t767 = t729 * t729;
+    const double t768 = t765 + t766;
+    const double t769 = t768 + t767;
+    const double t770 = s->fixed[9] * t769;
+    const double t771 = t743 + t770;
+    const double t772 = t728 * t771;
+    const double t773 = t764 - t772;
+    const double t774 = t773 / t737;
+    const double t775 = -t774;
+    traction[0] = t762;
+    traction[1] = t775;
 }
 
 /* all fields */

@@ -25,7 +25,8 @@
  * sphere_shell_parameters p = sphere_shell_defaults(); gives the parameters, to be changed at will; then, once a
  *    run,
  * message = sphere_shell_prepare(&s, &p); is a null pointer, or says what is wrong with the parameters.
- * sphere_shell_u, _v, _a, _H, _F, _J, _P, _b compute one field, sphere_shell_fields all of them.
+ * sphere_shell_u, _v, _a, _H, _F, _J, _P, _b compute one field, sphere_shell_fields all of them;
+ * the traction on a surface, at points X of it, has a function of its own.
  * The body force at points that stay: sphere_shell_point_array once a run, sphere_shell_b_array once a step, or for
  *    single points
  * sphere_shell_at_point once a run, sphere_shell_at_time once a step, sphere_shell_b_staged. All ways give the same
@@ -138,49 +139,6 @@ MMSMITH_FN double mmsmith_sin_pi(double x)
 MMSMITH_FN double mmsmith_cos_pi(double x)
 {
     return mmsmith_sin_pi_shifted(x, 1);
-}
-
-/* arcosh(1 + z) */
-MMSMITH_FN double mmsmith_log_ratio(double z)
-{
-    return log1p(z + sqrt(z * (z + 2.0)));
-}
-
-/* arcosh(1 + z)^2: the squared logarithm of the ratio of two stretches a, b for z = (a - b)^2/(2 a b). */
-MMSMITH_FN double mmsmith_log_ratio_squared(double z)
-{
-    const double theta = mmsmith_log_ratio(z);
-    return theta * theta;
-}
-
-/* theta/sinh(theta) - 1 for theta = arcosh(1 + z). */
-MMSMITH_FN double mmsmith_log_ratio_slope(double z)
-{
-    const double y = z / (z + 2.0);
-    double sum = 0.0;
-    int k;
-    if (y > 0.25) {
-        return mmsmith_log_ratio(z) / sqrt(z * (z + 2.0)) - 1.0;
-    }
-    for (k = 24; k > 0; --k) {
-        sum = sum * y + 2.0 / (4.0 * k * k - 1.0);
-    }
-    return -sum * y;
-}
-
-/* The derivative of mmsmith_log_ratio_slope. */
-MMSMITH_FN double mmsmith_log_ratio_curvature(double z)
-{
-    const double y = z / (z + 2.0);
-    double sum = 0.0;
-    int k;
-    if (y > 0.25) {
-        return -(z + (1.0 + z) * mmsmith_log_ratio_slope(z)) / (z * (z + 2.0));
-    }
-    for (k = 24; k > 0; --k) {
-        sum = sum * y + k / (4.0 * k * k - 1.0);
-    }
-    return -sum * ((1.0 - y) * (1.0 - y));
 }
 
 #endif
@@ -834,6 +792,222 @@ MMSMITH_FN void sphere_shell_b(const sphere_shell_solution *s, const double X[3]
     b[0] = t294;
     b[1] = t296;
     b[2] = t298;
+}
+
+/* traction on the surface inner, force per reference area */
+MMSMITH_FN void sphere_shell_inner_traction(const sphere_shell_solution *s, const double X[3], double t,
+    double traction[3])
+{
+    const double t17 = s->fixed[0] * t;
+    const double t18 = mmsmith_cos_pi(t17);
+    const double t122 = t18 * t18;
+    const double t306 = s->fixed[26] * t18;
+    const double t307 = t306 + 1.0;
+    const double t314 = s->fixed[27] * t18;
+    const double t315 = t18 * t306;
+    const double t316 = s->fixed[27] * t315;
+    const double t322 = s->fixed[28] * t122;
+    const double t323 = t122 * t306;
+    const double t324 = s->fixed[28] * t323;
+    const double t325 = t306 + t314;
+    const double t326 = t325 + t316;
+    const double t327 = t326 + t322;
+    const double t328 = t327 + t324;
+    const double t329 = log1p(t328);
+    const double t330 = s->fixed[11] * t329;
+    const double t331 = t306 + 2.0;
+    const double t332 = t306 * t331;
+    const double t333 = s->fixed[12] * t332;
+    const double t334 = t330 + t333;
+    const double t336 = t334 / t307;
+    const double t337 = s->fixed[29] * t336;
+    const double t338 = t337 * X[0];
+    const double t339 = -t338;
+    const double t340 = t337 * X[1];
+    const double t341 = -t340;
+    const double t342 = t337 * X[2];
+    const double t343 = -t342;
+    traction[0] = t339;
+    traction[1] = t341;
+    traction[2] = t343;
+}
+
+/* traction on the surface outer, force per reference area */
+MMSMITH_FN void sphere_shell_outer_traction(const sphere_shell_solution *s, const double X[3], double t,
+    double traction[3])
+{
+    const double t17 = s->fixed[0] * t;
+    const double t18 = mmsmith_cos_pi(t17);
+    const double t345 = s->fixed[30] * t18;
+    const double t346 = t345 + 2.0;
+    const double t347 = t18 * t346;
+    const double t348 = s->fixed[30] * t347;
+    const double t349 = log1p(t348);
+    const double t353 = s->fixed[31] * t349;
+    const double t354 = t353 * X[0];
+    const double t355 = t353 * X[1];
+    const double t356 = t353 * X[2];
+    traction[0] = t354;
+    traction[1] = t355;
+    traction[2] = t356;
+}
+
+/* traction on the surface X-lower, force per reference area */
+MMSMITH_FN void sphere_shell_X_lower_traction(const sphere_shell_solution *s, const double X[3], double t,
+    double traction[3])
+{
+    const double t1 = X[1] * X[1];
+    const double t3 = X[2] * X[2];
+    const double t5 = X[0] * X[0];
+    const double t6 = t1 + t3;
+    const double t7 = t6 + t5;
+    const double t8 = sqrt(t7);
+    const double t17 = s->fixed[0] * t;
+    const double t18 = mmsmith_cos_pi(t17);
+    const double t21 = s->fixed[1] * t8;
+    const double t23 = 3.0 - t21;
+    const double t25 = s->fixed[2] * t18;
+    const double t26 = t8 * t23;
+    const double t60 = s->fixed[6] * t8;
+    const double t61 = 1.0 - t60;
+    const double t103 = s->fixed[8] * t18;
+    const double t104 = t8 * t61;
+    const double t105 = t103 * t104;
+    const double t107 = t25 * t26;
+    const double t108 = t107 + 1.0;
+    const double t117 = s->fixed[9] * t18;
+    const double t118 = t117 * t26;
+    const double t119 = t118 * t105;
+    const double t122 = t18 * t18;
+    const double t123 = t23 * t23;
+    const double t125 = s->fixed[10] * t122;
+    const double t126 = t7 * t123;
+    const double t127 = t125 * t126;
+    const double t128 = t127 * t105;
+    const double t129 = t118 + t105;
+    const double t130 = t129 + t119;
+    const double t131 = t130 + t127;
+    const double t132 = t131 + t128;
+    const double t133 = log1p(t132);
+    const double t137 = s->fixed[11] * t133;
+    const double t147 = t107 + 2.0;
+    const double t150 = s->fixed[13] * t18;
+    const double t151 = t150 * t26;
+    const double t152 = t151 * t147;
+    const double t153 = t137 + t152;
+    const double t154 = t153 / t108;
+    const double t357 = t6 / t7;
+    const double t358 = t357 * t154;
+    const double t359 = -t358;
+    traction[0] = t359;
+    traction[1] = 0.0;
+    traction[2] = 0.0;
+}
+
+/* traction on the surface Y-lower, force per reference area */
+MMSMITH_FN void sphere_shell_Y_lower_traction(const sphere_shell_solution *s, const double X[3], double t,
+    double traction[3])
+{
+    const double t1 = X[1] * X[1];
+    const double t3 = X[2] * X[2];
+    const double t5 = X[0] * X[0];
+    const double t6 = t1 + t3;
+    const double t7 = t6 + t5;
+    const double t8 = sqrt(t7);
+    const double t17 = s->fixed[0] * t;
+    const double t18 = mmsmith_cos_pi(t17);
+    const double t21 = s->fixed[1] * t8;
+    const double t23 = 3.0 - t21;
+    const double t25 = s->fixed[2] * t18;
+    const double t26 = t8 * t23;
+    const double t60 = s->fixed[6] * t8;
+    const double t61 = 1.0 - t60;
+    const double t82 = t3 + t5;
+    const double t103 = s->fixed[8] * t18;
+    const double t104 = t8 * t61;
+    const double t105 = t103 * t104;
+    const double t107 = t25 * t26;
+    const double t108 = t107 + 1.0;
+    const double t117 = s->fixed[9] * t18;
+    const double t118 = t117 * t26;
+    const double t119 = t118 * t105;
+    const double t122 = t18 * t18;
+    const double t123 = t23 * t23;
+    const double t125 = s->fixed[10] * t122;
+    const double t126 = t7 * t123;
+    const double t127 = t125 * t126;
+    const double t128 = t127 * t105;
+    const double t129 = t118 + t105;
+    const double t130 = t129 + t119;
+    const double t131 = t130 + t127;
+    const double t132 = t131 + t128;
+    const double t133 = log1p(t132);
+    const double t137 = s->fixed[11] * t133;
+    const double t147 = t107 + 2.0;
+    const double t150 = s->fixed[13] * t18;
+    const double t151 = t150 * t26;
+    const double t152 = t151 * t147;
+    const double t153 = t137 + t152;
+    const double t154 = t153 / t108;
+    const double t361 = t82 / t7;
+    const double t362 = t361 * t154;
+    const double t363 = -t362;
+    traction[0] = 0.0;
+    traction[1] = t363;
+    traction[2] = 0.0;
+}
+
+/* traction on the surface Z-lower, force per reference area */
+MMSMITH_FN void sphere_shell_Z_lower_traction(const sphere_shell_solution *s, const double X[3], double t,
+    double traction[3])
+{
+    const double t1 = X[1] * X[1];
+    const double t3 = X[2] * X[2];
+    const double t5 = X[0] * X[0];
+    const double t6 = t1 + t3;
+    const double t7 = t6 + t5;
+    const double t8 = sqrt(t7);
+    const double t17 = s->fixed[0] * t;
+    const double t18 = mmsmith_cos_pi(t17);
+    const double t21 = s->fixed[1] * t8;
+    const double t23 = 3.0 - t21;
+    const double t25 = s->fixed[2] * t18;
+    const double t26 = t8 * t23;
+    const double t60 = s->fixed[6] * t8;
+    const double t61 = 1.0 - t60;
+    const double t93 = t1 + t5;
+    const double t103 = s->fixed[8] * t18;
+    const double t104 = t8 * t61;
+    const double t105 = t103 * t104;
+    const double t107 = t25 * t26;
+    const double t108 = t107 + 1.0;
+    const double t117 = s->fixed[9] * t18;
+    const double t118 = t117 * t26;
+    const double t119 = t118 * t105;
+    const double t122 = t18 * t18;
+    const double t123 = t23 * t23;
+    const double t125 = s->fixed[10] * t122;
+    const double t126 = t7 * t123;
+    const double t127 = t125 * t126;
+    const double t128 = t127 * t105;
+    const double t129 = t118 + t105;
+    const double t130 = t129 + t119;
+    const double t131 = t130 + t127;
+    const double t132 = t131 + t128;
+    const double t133 = log1p(t132);
+    const double t137 = s->fixed[11] * t133;
+    const double t147 = t107 + 2.0;
+    const double t150 = s->fixed[13] * t18;
+    const double t151 = t150 * t26;
+    const double t152 = t151 * t147;
+    const double t153 = t137 + t152;
+    const double t154 = t153 / t108;
+    const double t364 = t93 / t7;
+    const double t365 = t364 * t154;
+    const double t366 = -t365;
+    traction[0] = 0.0;
+    traction[1] = 0.0;
+    traction[2] = t366;
 }
 
 /* all fields */

@@ -27,7 +27,8 @@
  *
  * torsion_parameters p = torsion_defaults(); gives the parameters, to be changed at will; then, once a run,
  * message = torsion_prepare(&s, &p); is a null pointer, or says what is wrong with the parameters.
- * torsion_u, _v, _a, _H, _F, _J, _P, _b compute one field, torsion_fields all of them.
+ * torsion_u, _v, _a, _H, _F, _J, _P, _b compute one field, torsion_fields all of them;
+ * the traction on a surface, at points X of it, has a function of its own.
  * The body force at points that stay: torsion_point_array once a run, torsion_b_array once a step, or for single
  *    points
  * torsion_at_point once a run, torsion_at_time once a step, torsion_b_staged. All ways give the same bits.
@@ -139,49 +140,6 @@ MMSMITH_FN double mmsmith_sin_pi(double x)
 MMSMITH_FN double mmsmith_cos_pi(double x)
 {
     return mmsmith_sin_pi_shifted(x, 1);
-}
-
-/* arcosh(1 + z) */
-MMSMITH_FN double mmsmith_log_ratio(double z)
-{
-    return log1p(z + sqrt(z * (z + 2.0)));
-}
-
-/* arcosh(1 + z)^2: the squared logarithm of the ratio of two stretches a, b for z = (a - b)^2/(2 a b). */
-MMSMITH_FN double mmsmith_log_ratio_squared(double z)
-{
-    const double theta = mmsmith_log_ratio(z);
-    return theta * theta;
-}
-
-/* theta/sinh(theta) - 1 for theta = arcosh(1 + z). */
-MMSMITH_FN double mmsmith_log_ratio_slope(double z)
-{
-    const double y = z / (z + 2.0);
-    double sum = 0.0;
-    int k;
-    if (y > 0.25) {
-        return mmsmith_log_ratio(z) / sqrt(z * (z + 2.0)) - 1.0;
-    }
-    for (k = 24; k > 0; --k) {
-        sum = sum * y + 2.0 / (4.0 * k * k - 1.0);
-    }
-    return -sum * y;
-}
-
-/* The derivative of mmsmith_log_ratio_slope. */
-MMSMITH_FN double mmsmith_log_ratio_curvature(double z)
-{
-    const double y = z / (z + 2.0);
-    double sum = 0.0;
-    int k;
-    if (y > 0.25) {
-        return -(z + (1.0 + z) * mmsmith_log_ratio_slope(z)) / (z * (z + 2.0));
-    }
-    for (k = 24; k > 0; --k) {
-        sum = sum * y + k / (4.0 * k * k - 1.0);
-    }
-    return -sum * ((1.0 - y) * (1.0 - y));
 }
 
 #endif
@@ -591,6 +549,248 @@ MMSMITH_FN void torsion_b(const torsion_solution *s, const double X[3], double t
     b[0] = t108;
     b[1] = t112;
     b[2] = 0.0;
+}
+
+/* traction on the surface X-lower, force per reference area */
+MMSMITH_FN void torsion_X_lower_traction(const torsion_solution *s, const double X[3], double t,
+    double traction[3])
+{
+    const double t9 = s->fixed[0] * t;
+    const double t10 = mmsmith_sin_pi(t9);
+    const double t12 = s->fixed[1] * t10;
+    const double t13 = t12 * X[2];
+    const double t14 = sin(t13);
+    const double t18 = cos(t13);
+    const double t60 = t14 * t14;
+    const double t61 = 2.0 * t60;
+    const double t62 = -t61;
+    const double t63 = t18 * t14;
+    const double t64 = 2.0 * t63;
+    const double t65 = -t64;
+    const double t73 = t62 + 1.0;
+    const double t74 = t73 * t73;
+    const double t75 = t65 * t64;
+    const double t76 = t74 - t75;
+    const double t120 = 2.0 * X[1];
+    const double t121 = t120 * t18;
+    const double t122 = t14 - t121;
+    const double t123 = t14 * t122;
+    const double t124 = t120 * t14;
+    const double t125 = t18 + t124;
+    const double t126 = t18 * t125;
+    const double t127 = t123 - t126;
+    const double t128 = t12 * t127;
+    const double t129 = t65 * t128;
+    const double t130 = t14 * t125;
+    const double t131 = t18 * t122;
+    const double t132 = t130 + t131;
+    const double t133 = t12 * t132;
+    const double t134 = t73 * t133;
+    const double t135 = t129 - t134;
+    const double t136 = t135 / t76;
+    const double t137 = s->fixed[4] * t136;
+    traction[0] = 0.0;
+    traction[1] = 0.0;
+    traction[2] = t137;
+}
+
+/* traction on the surface X-upper, force per reference area */
+MMSMITH_FN void torsion_X_upper_traction(const torsion_solution *s, const double X[3], double t,
+    double traction[3])
+{
+    const double t9 = s->fixed[0] * t;
+    const double t10 = mmsmith_sin_pi(t9);
+    const double t12 = s->fixed[1] * t10;
+    const double t13 = t12 * X[2];
+    const double t14 = sin(t13);
+    const double t18 = cos(t13);
+    const double t60 = t14 * t14;
+    const double t61 = 2.0 * t60;
+    const double t62 = -t61;
+    const double t63 = t18 * t14;
+    const double t64 = 2.0 * t63;
+    const double t65 = -t64;
+    const double t73 = t62 + 1.0;
+    const double t74 = t73 * t73;
+    const double t75 = t65 * t64;
+    const double t76 = t74 - t75;
+    const double t120 = 2.0 * X[1];
+    const double t121 = t120 * t18;
+    const double t124 = t120 * t14;
+    const double t138 = t14 + t121;
+    const double t139 = t14 * t138;
+    const double t140 = t18 - t124;
+    const double t141 = t18 * t140;
+    const double t142 = t139 - t141;
+    const double t143 = t12 * t142;
+    const double t144 = -t143;
+    const double t145 = t65 * t144;
+    const double t146 = t14 * t140;
+    const double t147 = t18 * t138;
+    const double t148 = t146 + t147;
+    const double t149 = t12 * t148;
+    const double t150 = -t149;
+    const double t151 = t73 * t150;
+    const double t152 = t145 - t151;
+    const double t153 = t152 / t76;
+    const double t154 = s->fixed[4] * t153;
+    const double t155 = -t154;
+    traction[0] = 0.0;
+    traction[1] = 0.0;
+    traction[2] = t155;
+}
+
+/* traction on the surface Y-lower, force per reference area */
+MMSMITH_FN void torsion_Y_lower_traction(const torsion_solution *s, const double X[3], double t,
+    double traction[3])
+{
+    const double t9 = s->fixed[0] * t;
+    const double t10 = mmsmith_sin_pi(t9);
+    const double t12 = s->fixed[1] * t10;
+    const double t13 = t12 * X[2];
+    const double t14 = sin(t13);
+    const double t18 = cos(t13);
+    const double t60 = t14 * t14;
+    const double t61 = 2.0 * t60;
+    const double t62 = -t61;
+    const double t63 = t18 * t14;
+    const double t64 = 2.0 * t63;
+    const double t65 = -t64;
+    const double t73 = t62 + 1.0;
+    const double t74 = t73 * t73;
+    const double t75 = t65 * t64;
+    const double t76 = t74 - t75;
+    const double t156 = 2.0 * X[0];
+    const double t157 = t156 * t14;
+    const double t158 = t18 - t157;
+    const double t159 = t14 * t158;
+    const double t160 = t156 * t18;
+    const double t161 = t14 + t160;
+    const double t162 = t18 * t161;
+    const double t163 = t159 + t162;
+    const double t164 = t12 * t163;
+    const double t165 = t73 * t164;
+    const double t166 = t14 * t161;
+    const double t167 = t18 * t158;
+    const double t168 = t166 - t167;
+    const double t169 = t12 * t168;
+    const double t170 = -t169;
+    const double t171 = t64 * t170;
+    const double t172 = t165 - t171;
+    const double t173 = t172 / t76;
+    const double t174 = s->fixed[4] * t173;
+    const double t175 = -t174;
+    traction[0] = 0.0;
+    traction[1] = 0.0;
+    traction[2] = t175;
+}
+
+/* traction on the surface Y-upper, force per reference area */
+MMSMITH_FN void torsion_Y_upper_traction(const torsion_solution *s, const double X[3], double t,
+    double traction[3])
+{
+    const double t9 = s->fixed[0] * t;
+    const double t10 = mmsmith_sin_pi(t9);
+    const double t12 = s->fixed[1] * t10;
+    const double t13 = t12 * X[2];
+    const double t14 = sin(t13);
+    const double t18 = cos(t13);
+    const double t60 = t14 * t14;
+    const double t61 = 2.0 * t60;
+    const double t62 = -t61;
+    const double t63 = t18 * t14;
+    const double t64 = 2.0 * t63;
+    const double t65 = -t64;
+    const double t73 = t62 + 1.0;
+    const double t74 = t73 * t73;
+    const double t75 = t65 * t64;
+    const double t76 = t74 - t75;
+    const double t156 = 2.0 * X[0];
+    const double t157 = t156 * t14;
+    const double t160 = t156 * t18;
+    const double t176 = t18 + t157;
+    const double t177 = t14 * t176;
+    const double t178 = t14 - t160;
+    const double t179 = t18 * t178;
+    const double t180 = t177 + t179;
+    const double t181 = t12 * t180;
+    const double t182 = -t181;
+    const double t183 = t73 * t182;
+    const double t184 = t14 * t178;
+    const double t185 = t18 * t176;
+    const double t186 = t184 - t185;
+    const double t187 = t12 * t186;
+    const double t188 = t64 * t187;
+    const double t189 = t183 - t188;
+    const double t190 = t189 / t76;
+    const double t191 = s->fixed[4] * t190;
+    traction[0] = 0.0;
+    traction[1] = 0.0;
+    traction[2] = t191;
+}
+
+/* traction on the surface Z-lower, force per reference area */
+MMSMITH_FN void torsion_Z_lower_traction(const torsion_solution *s, const double X[3], double t,
+    double traction[3])
+{
+    const double t9 = s->fixed[0] * t;
+    const double t10 = mmsmith_sin_pi(t9);
+    const double t66 = s->par.A * t10;
+    const double t192 = t66 * X[1];
+    const double t193 = -t192;
+    const double t194 = s->fixed[4] * t193;
+    const double t195 = -t194;
+    const double t197 = s->fixed[11] * t10;
+    const double t198 = t197 * X[0];
+    const double t199 = -t198;
+    traction[0] = t195;
+    traction[1] = t199;
+    traction[2] = 0.0;
+}
+
+/* traction on the surface Z-upper, force per reference area */
+MMSMITH_FN void torsion_Z_upper_traction(const torsion_solution *s, const double X[3], double t,
+    double traction[3])
+{
+    const double t9 = s->fixed[0] * t;
+    const double t10 = mmsmith_sin_pi(t9);
+    const double t12 = s->fixed[1] * t10;
+    const double t66 = s->par.A * t10;
+    const double t200 = sin(t12);
+    const double t201 = cos(t12);
+    const double t202 = t201 * X[0];
+    const double t203 = t200 * X[1];
+    const double t204 = t202 - t203;
+    const double t205 = t200 * t204;
+    const double t206 = t200 * X[0];
+    const double t207 = t201 * X[1];
+    const double t208 = t206 + t207;
+    const double t209 = t201 * t208;
+    const double t210 = t205 + t209;
+    const double t211 = t66 * t210;
+    const double t212 = -t211;
+    const double t213 = t200 * t200;
+    const double t214 = 2.0 * t213;
+    const double t215 = -t214;
+    const double t216 = t215 + 1.0;
+    const double t217 = t216 * t216;
+    const double t218 = t200 * t201;
+    const double t219 = 2.0 * t218;
+    const double t220 = -t219;
+    const double t221 = t220 * t219;
+    const double t222 = t217 - t221;
+    const double t223 = t222 / t222;
+    const double t224 = s->fixed[4] * t223;
+    const double t225 = t224 * t212;
+    const double t226 = t200 * t208;
+    const double t227 = t201 * t204;
+    const double t228 = t226 - t227;
+    const double t229 = t66 * t228;
+    const double t230 = -t229;
+    const double t231 = t224 * t230;
+    traction[0] = t225;
+    traction[1] = t231;
+    traction[2] = 0.0;
 }
 
 /* all fields */

@@ -22,7 +22,8 @@
  *
  * vortex_parameters p = vortex_defaults(); gives the parameters, to be changed at will; then, once a run,
  * message = vortex_prepare(&s, &p); is a null pointer, or says what is wrong with the parameters.
- * vortex_u, _v, _a, _H, _F, _J, _P, _b compute one field, vortex_fields all of them.
+ * vortex_u, _v, _a, _H, _F, _J, _P, _b compute one field, vortex_fields all of them;
+ * the traction on a surface, at points X of it, has a function of its own.
  * The body force at points that stay: vortex_point_array once a run, vortex_b_array once a step, or for single
  *    points
  * vortex_at_point once a run, vortex_at_time once a step, vortex_b_staged. All ways give the same bits.
@@ -134,49 +135,6 @@ MMSMITH_FN double mmsmith_sin_pi(double x)
 MMSMITH_FN double mmsmith_cos_pi(double x)
 {
     return mmsmith_sin_pi_shifted(x, 1);
-}
-
-/* arcosh(1 + z) */
-MMSMITH_FN double mmsmith_log_ratio(double z)
-{
-    return log1p(z + sqrt(z * (z + 2.0)));
-}
-
-/* arcosh(1 + z)^2: the squared logarithm of the ratio of two stretches a, b for z = (a - b)^2/(2 a b). */
-MMSMITH_FN double mmsmith_log_ratio_squared(double z)
-{
-    const double theta = mmsmith_log_ratio(z);
-    return theta * theta;
-}
-
-/* theta/sinh(theta) - 1 for theta = arcosh(1 + z). */
-MMSMITH_FN double mmsmith_log_ratio_slope(double z)
-{
-    const double y = z / (z + 2.0);
-    double sum = 0.0;
-    int k;
-    if (y > 0.25) {
-        return mmsmith_log_ratio(z) / sqrt(z * (z + 2.0)) - 1.0;
-    }
-    for (k = 24; k > 0; --k) {
-        sum = sum * y + 2.0 / (4.0 * k * k - 1.0);
-    }
-    return -sum * y;
-}
-
-/* The derivative of mmsmith_log_ratio_slope. */
-MMSMITH_FN double mmsmith_log_ratio_curvature(double z)
-{
-    const double y = z / (z + 2.0);
-    double sum = 0.0;
-    int k;
-    if (y > 0.25) {
-        return -(z + (1.0 + z) * mmsmith_log_ratio_slope(z)) / (z * (z + 2.0));
-    }
-    for (k = 24; k > 0; --k) {
-        sum = sum * y + k / (4.0 * k * k - 1.0);
-    }
-    return -sum * ((1.0 - y) * (1.0 - y));
 }
 
 #endif
@@ -893,6 +851,185 @@ MMSMITH_FN void vortex_b(const vortex_solution *s, const double X[2], double t, 
     const double t370 = t221 * t369;
     b[0] = t365;
     b[1] = t370;
+}
+
+/* traction on the surface inner, force per reference area */
+MMSMITH_FN void vortex_inner_traction(const vortex_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    (void)s;
+    (void)X;
+    (void)t;
+    traction[0] = 0.0;
+    traction[1] = 0.0;
+}
+
+/* traction on the surface outer, force per reference area */
+MMSMITH_FN void vortex_outer_traction(const vortex_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    (void)s;
+    (void)X;
+    (void)t;
+    traction[0] = 0.0;
+    traction[1] = 0.0;
+}
+
+/* traction on the surface X-lower, force per reference area */
+MMSMITH_FN void vortex_X_lower_traction(const vortex_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    const double t8 = s->fixed[1] * t;
+    const double t9 = mmsmith_sin_pi(t8);
+    const double t12 = X[0] * X[0];
+    const double t14 = X[1] * X[1];
+    const double t15 = t12 + t14;
+    const double t16 = sqrt(t15);
+    const double t18 = 1.0 - t16;
+    const double t19 = t18 * t18;
+    const double t20 = 16.0 * t19;
+    const double t21 = 1.0 - t20;
+    const double t22 = t21 * t21;
+    const double t24 = s->fixed[2] * t9;
+    const double t25 = t24 * t22;
+    const double t26 = sin(t25);
+    const double t28 = cos(t25);
+    const double t43 = t26 * t28;
+    const double t45 = t26 * t26;
+    const double t46 = t28 * t28;
+    const double t94 = s->fixed[7] * t9;
+    const double t95 = t16 * t18;
+    const double t96 = t95 * t21;
+    const double t97 = t94 * t96;
+    const double t98 = t97 * t28;
+    const double t99 = t26 + t98;
+    const double t100 = t26 * t99;
+    const double t106 = s->fixed[8] * t9;
+    const double t107 = t106 * t96;
+    const double t108 = t107 * t46;
+    const double t109 = t107 * t45;
+    const double t110 = t43 + t108;
+    const double t111 = t110 - t109;
+    const double t145 = 2.0 * t100;
+    const double t146 = -t145;
+    const double t147 = t146 + 1.0;
+    const double t148 = 2.0 * t45;
+    const double t149 = -t148;
+    const double t150 = t149 + 1.0;
+    const double t151 = t147 * t150;
+    const double t152 = 2.0 * t43;
+    const double t153 = -t152;
+    const double t154 = 2.0 * t111;
+    const double t155 = t153 * t154;
+    const double t156 = t151 - t155;
+    const double t161 = 2.0 * t146;
+    const double t162 = t146 * t146;
+    const double t163 = t153 * t153;
+    const double t164 = t161 + t162;
+    const double t165 = t164 + t163;
+    const double t167 = t146 * t154;
+    const double t168 = t153 * t149;
+    const double t169 = t153 + t154;
+    const double t170 = t169 + t167;
+    const double t171 = t170 + t168;
+    const double t175 = t154 * t171;
+    const double t176 = 2.0 * t149;
+    const double t177 = t154 * t154;
+    const double t178 = t149 * t149;
+    const double t179 = t176 + t177;
+    const double t180 = t179 + t178;
+    const double t181 = t147 * t180;
+    const double t182 = t175 - t181;
+    const double t184 = t154 * t165;
+    const double t185 = t147 * t171;
+    const double t188 = t184 - t185;
+    const double t375 = t14 / t15;
+    const double t376 = s->fixed[9] * t375;
+    const double t377 = t182 / t156;
+    const double t378 = t376 * t377;
+    const double t379 = t188 / t156;
+    const double t380 = t376 * t379;
+    const double t381 = -t380;
+    traction[0] = t378;
+    traction[1] = t381;
+}
+
+/* traction on the surface Y-lower, force per reference area */
+MMSMITH_FN void vortex_Y_lower_traction(const vortex_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    const double t8 = s->fixed[1] * t;
+    const double t9 = mmsmith_sin_pi(t8);
+    const double t12 = X[0] * X[0];
+    const double t14 = X[1] * X[1];
+    const double t15 = t12 + t14;
+    const double t16 = sqrt(t15);
+    const double t18 = 1.0 - t16;
+    const double t19 = t18 * t18;
+    const double t20 = 16.0 * t19;
+    const double t21 = 1.0 - t20;
+    const double t22 = t21 * t21;
+    const double t24 = s->fixed[2] * t9;
+    const double t25 = t24 * t22;
+    const double t26 = sin(t25);
+    const double t28 = cos(t25);
+    const double t43 = t26 * t28;
+    const double t45 = t26 * t26;
+    const double t46 = t28 * t28;
+    const double t94 = s->fixed[7] * t9;
+    const double t95 = t16 * t18;
+    const double t96 = t95 * t21;
+    const double t97 = t94 * t96;
+    const double t98 = t97 * t28;
+    const double t99 = t26 + t98;
+    const double t100 = t26 * t99;
+    const double t106 = s->fixed[8] * t9;
+    const double t107 = t106 * t96;
+    const double t108 = t107 * t46;
+    const double t109 = t107 * t45;
+    const double t110 = t43 + t108;
+    const double t111 = t110 - t109;
+    const double t145 = 2.0 * t100;
+    const double t146 = -t145;
+    const double t147 = t146 + 1.0;
+    const double t148 = 2.0 * t45;
+    const double t149 = -t148;
+    const double t150 = t149 + 1.0;
+    const double t151 = t147 * t150;
+    const double t152 = 2.0 * t43;
+    const double t153 = -t152;
+    const double t154 = 2.0 * t111;
+    const double t155 = t153 * t154;
+    const double t156 = t151 - t155;
+    const double t161 = 2.0 * t146;
+    const double t162 = t146 * t146;
+    const double t163 = t153 * t153;
+    const double t164 = t161 + t162;
+    const double t165 = t164 + t163;
+    const double t167 = t146 * t154;
+    const double t168 = t153 * t149;
+    const double t169 = t153 + t154;
+    const double t170 = t169 + t167;
+    const double t171 = t170 + t168;
+    const double t175 = t154 * t171;
+    const double t176 = 2.0 * t149;
+    const double t177 = t154 * t154;
+    const double t178 = t149 * t149;
+    const double t179 = t176 + t177;
+    const double t180 = t179 + t178;
+    const double t181 = t147 * t180;
+    const double t182 = t175 - t181;
+    const double t184 = t154 * t165;
+    const double t185 = t147 * t171;
+    const double t188 = t184 - t185;
+    const double t377 = t182 / t156;
+    const double t379 = t188 / t156;
+    const double t382 = t12 / t15;
+    const double t383 = s->fixed[9] * t382;
+    const double t384 = t383 * t379;
+    const double t385 = t383 * t377;
+    traction[0] = t384;
+    traction[1] = t385;
 }
 
 /* all fields */
