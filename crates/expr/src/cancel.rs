@@ -99,6 +99,18 @@ impl Graph {
     }
 
     /// `expr` with nothing kept in one piece.
+    pub fn open(&mut self, expr: Expr) -> Expr {
+        self.opened(expr, &mut BTreeMap::new())
+    }
+
+    /// The numerator of `expr` over a common denominator, multiplied out: monomials, which are powers of atoms, with
+    /// their coefficients. Atoms are symbols, pi, function values and broken powers. `None` where it grows too large.
+    pub fn numerator(&mut self, expr: Expr) -> Option<Vec<(Vec<(Expr, u32)>, Rational)>> {
+        let open = self.open(expr);
+        let numerator = self.fraction(open)?.numerator;
+        Some(numerator.into_iter().map(|(m, c)| (m.into_iter().collect(), c)).collect())
+    }
+
     fn opened(&mut self, expr: Expr, done: &mut BTreeMap<Expr, Expr>) -> Expr {
         if let Some(&known) = done.get(&expr) {
             return known;

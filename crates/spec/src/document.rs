@@ -26,6 +26,7 @@ pub(crate) struct Document {
     pub(crate) domain: Spanned<DomainTable>,
     #[serde(default)]
     pub(crate) boundary: Vec<BoundaryTable>,
+    pub(crate) solve: Option<Spanned<SolveTable>>,
     #[serde(default)]
     pub(crate) cross_check: Vec<Spanned<CrossCheckTable>>,
     pub(crate) time: Spanned<TimeTable>,
@@ -93,6 +94,13 @@ pub(crate) struct DomainTable {
 pub(crate) struct BoundaryTable {
     pub(crate) surface: Spanned<String>,
     pub(crate) condition: Spanned<String>,
+}
+
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(crate) struct SolveTable {
+    pub(crate) unknowns: Vec<Spanned<String>>,
+    pub(crate) conditions: Vec<Text>,
 }
 
 #[derive(serde::Deserialize)]

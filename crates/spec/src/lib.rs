@@ -15,6 +15,7 @@ mod diagnostic;
 mod document;
 mod law;
 mod scope;
+mod solve;
 mod spec;
 mod surface;
 mod tensor;
@@ -23,6 +24,7 @@ pub use coordinates::Coordinates;
 pub use cross_check::{CrossCheck, InlineText, ListingText};
 pub use derive::{DeriveError, Fields};
 pub use diagnostic::{Diagnostic, nearest};
+pub use solve::{Solved, SolvedCondition};
 pub use spec::{
     Bound, Boundary, Condition, Domain, Material, Parameter, Relation, Requirement, Spec, Surface,
 };

@@ -49,6 +49,8 @@ pub(crate) struct Scope<'a> {
     elsewhere: BTreeMap<String, String>,
     pub(crate) coordinates: Vec<Expr>,
     pub(crate) time: Expr,
+    /// The unknowns of `[solve]`.
+    unknowns: BTreeSet<Expr>,
 }
 
 impl<'a> Scope<'a> {
@@ -69,7 +71,7 @@ impl<'a> Scope<'a> {
             .filter(|name| !coordinates.contains(name))
             .map(|name| (name.to_owned(), format!("the coordinates of this file are {listed}")))
             .collect();
-        Scope { source, graph, names, elsewhere, coordinates: symbols, time }
+        Scope { source, graph, names, elsewhere, coordinates: symbols, time, unknowns: BTreeSet::new() }
     }
 
     /// Every name with its meaning.
@@ -86,6 +88,17 @@ impl<'a> Scope<'a> {
         self.check_new_name(name, span)?;
         let symbol = self.graph.symbol(name);
         self.names.insert(name.to_owned(), symbol);
+        Ok(())
+    }
+
+    /// Adds an unknown of `[solve]`, of which only the displacement may make use.
+    pub(crate) fn declare_unknown(
+        &mut self,
+        name: &str,
+        span: std::ops::Range<usize>,
+    ) -> Result<(), Diagnostic> {
+        self.declare(name, span)?;
+        self.unknowns.insert(self.graph.symbol(name));
         Ok(())
     }
 
@@ -177,6 +190,11 @@ impl<'a> Scope<'a> {
     /// As [`Scope::expression`], for a quantity that may depend on parameters only.
     pub(crate) fn constant(&mut self, text: &Text, what: &str) -> Result<Expr, Diagnostic> {
         let expr = self.expression(text)?;
+        if self.graph.depends_on(expr, &self.unknowns) {
+            let message = format!("{what} may not depend on the unknowns of [solve]");
+            let help = "unknowns are for [displacement], and for [let] expressions that feed it";
+            return Err(self.source.error(message, text.span.clone(), Some(help.into())));
+        }
         let variables: BTreeSet<Expr> =
             self.coordinates.iter().copied().chain([self.time]).collect();
         if self.graph.depends_on(expr, &variables) {
