@@ -14,6 +14,7 @@ mod derive;
 mod diagnostic;
 mod document;
 mod law;
+mod rotation;
 mod scope;
 mod solve;
 mod spec;
@@ -24,6 +25,7 @@ pub use coordinates::Coordinates;
 pub use cross_check::{CrossCheck, InlineText, ListingText};
 pub use derive::{DeriveError, Fields};
 pub use diagnostic::{Diagnostic, nearest};
+pub use rotation::Rotation;
 pub use solve::{Solved, SolvedCondition};
 pub use spec::{
     Bound, Boundary, Condition, Domain, Material, Parameter, Relation, Requirement, Spec, Surface,

@@ -102,6 +102,11 @@ impl<'a> Scope<'a> {
         Ok(())
     }
 
+    /// Whether an expression contains unknowns of `[solve]`.
+    pub(crate) fn has_unknowns(&self, expr: Expr) -> bool {
+        self.graph.depends_on(expr, &self.unknowns)
+    }
+
     fn check_new_name(&self, name: &str, span: std::ops::Range<usize>) -> Result<(), Diagnostic> {
         let mut characters = name.chars();
         let valid = characters.next().is_some_and(|c| c.is_ascii_alphabetic())
@@ -190,7 +195,7 @@ impl<'a> Scope<'a> {
     /// As [`Scope::expression`], for a quantity that may depend on parameters only.
     pub(crate) fn constant(&mut self, text: &Text, what: &str) -> Result<Expr, Diagnostic> {
         let expr = self.expression(text)?;
-        if self.graph.depends_on(expr, &self.unknowns) {
+        if self.has_unknowns(expr) {
             let message = format!("{what} may not depend on the unknowns of [solve]");
             let help = "unknowns are for [displacement], and for [let] expressions that feed it";
             return Err(self.source.error(message, text.span.clone(), Some(help.into())));

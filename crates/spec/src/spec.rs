@@ -5,7 +5,7 @@ use crate::diagnostic::nearest;
 use crate::document::{BoundaryTable, Document, DomainTable, Entries, Text};
 use crate::law::energy::{INVARIANTS, component_names};
 use crate::scope::{Scope, Source};
-use crate::{Coordinates, CrossCheck, DeriveError, Diagnostic, Fields, Solved};
+use crate::{Coordinates, CrossCheck, DeriveError, Diagnostic, Fields, Rotation, Solved};
 use mmsmith_expr::{Expr, Graph, Program};
 use toml::Spanned;
 
@@ -42,6 +42,8 @@ pub struct Spec {
     pub cell_length: Expr,
     /// The conditions on its boundary.
     pub boundaries: Vec<Boundary>,
+    /// A rigid rotation that is superposed on the displacement, in all Cartesian fields.
+    pub rotation: Option<Rotation>,
     /// What `[solve]` has found; the displacement has it put in.
     pub solved: Option<Solved>,
     /// Published listings of the fields.
@@ -473,6 +475,11 @@ impl<'a> Reader<'a> {
             .iter()
             .map(|table| self.boundary(table, &domain))
             .collect::<Result<Vec<_>, _>>()?;
+        let mut rotation = None;
+        if let Some(table) = &document.with_rotation {
+            rotation = Some(Rotation::read(&mut self.scope, table, self.dimension)?);
+            Rotation::check(&self.scope, table, &material, &boundaries, &document.boundary)?;
+        }
         let cross_checks = document
             .cross_check
             .iter()
@@ -500,6 +507,7 @@ impl<'a> Reader<'a> {
             domain,
             cell_length,
             boundaries,
+            rotation,
             solved: None,
             cross_checks,
             wave_speed,

@@ -117,6 +117,9 @@ fn text(spec: &Spec, exercises: &[Exercise], cost: &BodyForceCost) -> String {
     for (name, component) in names.iter().zip(&spec.displacement) {
         text += &format!("  u_{name} = {}\n", print(*component));
     }
+    if let Some(rotation) = &spec.rotation {
+        text += &format!("  {}\n", rotation.formula(&spec.graph));
+    }
     if let Some(solved) = &spec.solved {
         for (name, value) in &solved.unknowns {
             text += &format!("  {name} = {}\n", print(*value));
@@ -217,6 +220,7 @@ fn document(spec: &Spec, exercises: &[Exercise], cost: &BodyForceCost) -> Value 
         "coordinates": spec.coordinates.name(),
         "dimension": spec.dimension,
         "displacement": displacement,
+        "rotation": spec.rotation.map(|rotation| rotation.formula(&spec.graph)),
         "solved": solved,
         "domain": domain(spec),
         "exercises": exercised,
