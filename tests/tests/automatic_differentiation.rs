@@ -89,6 +89,17 @@ fn displacement<D: Number>(
                 zero,
             ]
         }
+        "skew-2d-rotating" => {
+            // What turns is the current position.
+            let u = displacement("skew-2d", parameters, [x, y, z], t)?;
+            let (sine, cosine) = (t * p("Omega")).sin_cos();
+            let (current_x, current_y) = (x + u[0], y + u[1]);
+            [
+                current_x * cosine - current_y * sine - x,
+                current_x * sine + current_y * cosine - y,
+                zero,
+            ]
+        }
         "skew-3d" => {
             let (sine, cosine) = (t * (c * PI)).sin_cos();
             [

@@ -373,6 +373,7 @@ fn formulas(spec: &Spec, fields: &Fields) -> Vec<String> {
         .zip(&spec.displacement)
         .map(|(name, component)| format!("u_{name} = {}", fields.graph.print(*component)))
         .collect();
+    lines.extend(spec.rotation.map(|rotation| rotation.formula(&spec.graph)));
     lines.extend(spec.material.formulas(&spec.graph));
     lines
 }

@@ -99,6 +99,18 @@ impl Graph {
     }
 
     /// `expr` with nothing kept in one piece.
+    pub fn open(&mut self, expr: Expr) -> Expr {
+        self.opened(expr, &mut BTreeMap::new())
+    }
+
+    /// The numerator of `expr` over a common denominator, multiplied out: monomials, which are powers of atoms, with
+    /// their coefficients. Atoms are symbols, pi, function values and broken powers. `None` where it grows too large.
+    pub fn numerator(&mut self, expr: Expr) -> Option<Vec<(Vec<(Expr, u32)>, Rational)>> {
+        let open = self.open(expr);
+        let numerator = self.fraction(open)?.numerator;
+        Some(numerator.into_iter().map(|(m, c)| (m.into_iter().collect(), c)).collect())
+    }
+
     fn opened(&mut self, expr: Expr, done: &mut BTreeMap<Expr, Expr>) -> Expr {
         if let Some(&known) = done.get(&expr) {
             return known;
@@ -180,7 +192,7 @@ impl Graph {
                     }
                     let power = exponent.to_integer().abs().to_u32().filter(|&n| n <= 64)?;
                     if exponent.is_negative() {
-                        *total.denominator.entry(base).or_insert(0) += power;
+                        total = self.divided(total, base, power)?;
                     } else {
                         let factor = self.fraction(base)?;
                         for _ in 0..power {
@@ -194,6 +206,36 @@ impl Graph {
                 Some(Fraction::of([(expr, 1)].into(), Rational::one()))
             }
         }
+    }
+
+    /// `fraction / base ^ power`; a base that is itself a fraction does not stay in the denominator.
+    fn divided(&mut self, mut fraction: Fraction, base: Expr, power: u32) -> Option<Fraction> {
+        let Fraction { numerator, denominator } = self.fraction(base)?;
+        if numerator.is_empty() {
+            return None;
+        }
+        if denominator.is_empty() {
+            *fraction.denominator.entry(base).or_insert(0) += power;
+            return Some(fraction);
+        }
+        for (atom, n) in denominator {
+            let atom = self.fraction(atom)?;
+            for _ in 0..n * power {
+                fraction.numerator = multiply(&fraction.numerator, &atom.numerator)?;
+            }
+        }
+        let terms: Vec<(Rational, Expr)> = numerator
+            .into_iter()
+            .map(|(monomial, coefficient)| {
+                let factors = monomial
+                    .into_iter()
+                    .map(|(atom, n)| (atom, Rational::from_integer(i64::from(n).into())));
+                (coefficient, self.product(factors.collect::<Vec<_>>()))
+            })
+            .collect();
+        let numerator = self.sum(terms);
+        *fraction.denominator.entry(numerator).or_insert(0) += power;
+        Some(fraction)
     }
 
     fn add_fractions(&mut self, a: &Fraction, b: &Fraction, scale: &Rational) -> Option<Fraction> {
@@ -299,6 +341,22 @@ mod tests {
         assert!(vanishes("-4*sin(a)^2 + 4*sin(a)^4 + 4*sin(a)^2*cos(a)^2"));
         assert!(vanishes("cos(a)^4 - sin(a)^4 - cos(a)^2 + sin(a)^2"));
         assert!(!vanishes("-4*sin(a)^2 + 4*sin(a)^4 + 4*sin(a)^2*cos(b)^2"));
+    }
+
+    #[test]
+    fn fractions_of_fractions() {
+        let mut graph = Graph::new();
+        let mut vanishes = |text: &str| {
+            let ast = Ast::parse(text).unwrap();
+            let expr = graph.build(&ast, &mut |g, name| Ok(g.symbol(name))).unwrap();
+            graph.vanishes(expr)
+        };
+        assert!(vanishes("1/(1 + a/(b + c)) - (b + c)/(b + c + a)"));
+        assert!(vanishes("(1/(1/a + 1/b) - a*b/(a + b))/(1 + 1/(c + 1/d))"));
+        assert!(!vanishes("1/(1 + a/(b + c)) - (b + c)/(b + c - a)"));
+        // Nothing is said about a quotient by zero.
+        assert!(!vanishes("a/(b/(1 + c) + b*c/(1 + c) - b)"));
+        assert!(!vanishes("a/((b + c)^2 - b^2 - 2*b*c - c^2)"));
     }
 
     #[test]

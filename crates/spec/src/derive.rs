@@ -121,7 +121,10 @@ impl Fields {
             inputs.push((graph.symbol(&parameter.name), rate(false, false)));
         }
         let definitions = geometry.definitions;
-        let fields = Fields { graph, inputs, definitions, u, v, a, H, F, J, P, b, W, surfaces };
+        let mut fields = Fields { graph, inputs, definitions, u, v, a, H, F, J, P, b, W, surfaces };
+        if let Some(rotation) = &spec.rotation {
+            rotation.apply(&mut fields, &geometry.cartesian, time);
+        }
         fields.check()?;
         Ok(fields)
     }

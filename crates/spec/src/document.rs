@@ -26,6 +26,8 @@ pub(crate) struct Document {
     pub(crate) domain: Spanned<DomainTable>,
     #[serde(default)]
     pub(crate) boundary: Vec<BoundaryTable>,
+    pub(crate) solve: Option<Spanned<SolveTable>>,
+    pub(crate) with_rotation: Option<Spanned<RotationTable>>,
     #[serde(default)]
     pub(crate) cross_check: Vec<Spanned<CrossCheckTable>>,
     pub(crate) time: Spanned<TimeTable>,
@@ -93,6 +95,20 @@ pub(crate) struct DomainTable {
 pub(crate) struct BoundaryTable {
     pub(crate) surface: Spanned<String>,
     pub(crate) condition: Spanned<String>,
+}
+
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(crate) struct SolveTable {
+    pub(crate) unknowns: Vec<Spanned<String>>,
+    pub(crate) conditions: Vec<Text>,
+}
+
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(crate) struct RotationTable {
+    pub(crate) angle: Text,
+    pub(crate) axis: Option<Spanned<String>>,
 }
 
 #[derive(serde::Deserialize)]

@@ -14,7 +14,9 @@ mod derive;
 mod diagnostic;
 mod document;
 mod law;
+mod rotation;
 mod scope;
+mod solve;
 mod spec;
 mod surface;
 mod tensor;
@@ -23,6 +25,8 @@ pub use coordinates::Coordinates;
 pub use cross_check::{CrossCheck, InlineText, ListingText};
 pub use derive::{DeriveError, Fields};
 pub use diagnostic::{Diagnostic, nearest};
+pub use rotation::Rotation;
+pub use solve::{Solved, SolvedCondition};
 pub use spec::{
     Bound, Boundary, Condition, Domain, Material, Parameter, Relation, Requirement, Spec, Surface,
 };

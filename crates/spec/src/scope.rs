@@ -49,6 +49,8 @@ pub(crate) struct Scope<'a> {
     elsewhere: BTreeMap<String, String>,
     pub(crate) coordinates: Vec<Expr>,
     pub(crate) time: Expr,
+    /// The unknowns of `[solve]`.
+    unknowns: BTreeSet<Expr>,
 }
 
 impl<'a> Scope<'a> {
@@ -69,7 +71,7 @@ impl<'a> Scope<'a> {
             .filter(|name| !coordinates.contains(name))
             .map(|name| (name.to_owned(), format!("the coordinates of this file are {listed}")))
             .collect();
-        Scope { source, graph, names, elsewhere, coordinates: symbols, time }
+        Scope { source, graph, names, elsewhere, coordinates: symbols, time, unknowns: BTreeSet::new() }
     }
 
     /// Every name with its meaning.
@@ -87,6 +89,22 @@ impl<'a> Scope<'a> {
         let symbol = self.graph.symbol(name);
         self.names.insert(name.to_owned(), symbol);
         Ok(())
+    }
+
+    /// Adds an unknown of `[solve]`, of which only the displacement may make use.
+    pub(crate) fn declare_unknown(
+        &mut self,
+        name: &str,
+        span: std::ops::Range<usize>,
+    ) -> Result<(), Diagnostic> {
+        self.declare(name, span)?;
+        self.unknowns.insert(self.graph.symbol(name));
+        Ok(())
+    }
+
+    /// Whether an expression contains unknowns of `[solve]`.
+    pub(crate) fn has_unknowns(&self, expr: Expr) -> bool {
+        self.graph.depends_on(expr, &self.unknowns)
     }
 
     fn check_new_name(&self, name: &str, span: std::ops::Range<usize>) -> Result<(), Diagnostic> {
@@ -177,6 +195,11 @@ impl<'a> Scope<'a> {
     /// As [`Scope::expression`], for a quantity that may depend on parameters only.
     pub(crate) fn constant(&mut self, text: &Text, what: &str) -> Result<Expr, Diagnostic> {
         let expr = self.expression(text)?;
+        if self.has_unknowns(expr) {
+            let message = format!("{what} may not depend on the unknowns of [solve]");
+            let help = "unknowns are for [displacement], and for [let] expressions that feed it";
+            return Err(self.source.error(message, text.span.clone(), Some(help.into())));
+        }
         let variables: BTreeSet<Expr> =
             self.coordinates.iter().copied().chain([self.time]).collect();
         if self.graph.depends_on(expr, &variables) {

@@ -5,7 +5,7 @@ use crate::diagnostic::nearest;
 use crate::document::{BoundaryTable, Document, DomainTable, Entries, Text};
 use crate::law::energy::{INVARIANTS, component_names};
 use crate::scope::{Scope, Source};
-use crate::{Coordinates, CrossCheck, DeriveError, Diagnostic, Fields};
+use crate::{Coordinates, CrossCheck, DeriveError, Diagnostic, Fields, Rotation, Solved};
 use mmsmith_expr::{Expr, Graph, Program};
 use toml::Spanned;
 
@@ -42,6 +42,10 @@ pub struct Spec {
     pub cell_length: Expr,
     /// The conditions on its boundary.
     pub boundaries: Vec<Boundary>,
+    /// A rigid rotation that is superposed on the displacement, in all Cartesian fields.
+    pub rotation: Option<Rotation>,
+    /// What `[solve]` has found; the displacement has it put in.
+    pub solved: Option<Solved>,
     /// Published listings of the fields.
     pub cross_checks: Vec<CrossCheck>,
     /// The speed that CFL numbers refer to.
@@ -450,6 +454,10 @@ impl<'a> Reader<'a> {
 
     fn read(mut self, document: &Document) -> Result<Spec, Diagnostic> {
         let parameters = self.parameters(document)?;
+        let solve = document.solve.as_ref();
+        for unknown in solve.map_or(&[][..], |table| table.get_ref().unknowns.as_slice()) {
+            self.scope.declare_unknown(unknown.get_ref(), unknown.span())?;
+        }
         self.scope.define_all(&document.lets.0)?;
         let requirements = self.requirements(document, &parameters)?;
         let displacement = self.displacement(document)?;
@@ -467,6 +475,11 @@ impl<'a> Reader<'a> {
             .iter()
             .map(|table| self.boundary(table, &domain))
             .collect::<Result<Vec<_>, _>>()?;
+        let mut rotation = None;
+        if let Some(table) = &document.with_rotation {
+            rotation = Some(Rotation::read(&mut self.scope, table, self.dimension)?);
+            Rotation::check(&self.scope, table, &material, &boundaries, &document.boundary)?;
+        }
         let cross_checks = document
             .cross_check
             .iter()
@@ -478,7 +491,7 @@ impl<'a> Reader<'a> {
             Some(text) => self.scope.constant(text, "wave-speed")?,
             None => self.bar_speed(&material, density, document.time.span())?,
         };
-        Ok(Spec {
+        let mut spec = Spec {
             source: self.scope.source.text.to_owned(),
             name: document.name.get_ref().clone(),
             title: document.title.get_ref().clone(),
@@ -487,17 +500,23 @@ impl<'a> Reader<'a> {
             dimension: self.dimension,
             parameters,
             requirements,
-            graph: self.scope.graph,
+            graph: std::mem::take(&mut self.scope.graph),
             displacement,
             material,
             density,
             domain,
             cell_length,
             boundaries,
+            rotation,
+            solved: None,
             cross_checks,
             wave_speed,
             period,
-        })
+        };
+        if let Some(table) = solve {
+            spec.solve(&self.scope, table)?;
+        }
+        Ok(spec)
     }
 
     fn parameters(&mut self, document: &Document) -> Result<Vec<Parameter>, Diagnostic> {

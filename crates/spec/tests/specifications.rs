@@ -3,7 +3,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use mmsmith_expr::Graph;
+use mmsmith_expr::{Ast, Graph};
 use mmsmith_spec::{Diagnostic, Spec, Surface};
 use std::path::{Path, PathBuf};
 
@@ -61,6 +61,17 @@ fn fields_are_derived_as_expected() {
         let spec = parse(&path).unwrap_or_else(|diagnostic| panic!("{diagnostic}"));
         let fields = spec.derive().unwrap();
         let mut text = String::new();
+        for solved in spec.solved.iter() {
+            for (name, value) in &solved.unknowns {
+                text += &format!("{name} = {}\n", spec.graph.print(*value));
+            }
+            for condition in &solved.conditions {
+                text += &format!(
+                    "{}: {} = 0, not {:?}\n",
+                    condition.text, condition.factor, condition.others
+                );
+            }
+        }
         for (letter, vector) in
             [("u", &fields.u), ("v", &fields.v), ("a", &fields.a), ("b", &fields.b)]
         {
@@ -109,4 +120,30 @@ fn free_rims_have_no_traction_in_symbols() {
             assert_eq!(found.traction.iter().all(|&t| t == Graph::ZERO), free, "{name} {rim:?}");
         }
     }
+}
+
+/// The coefficients of the study, from its conditions; what comes of them are the fields of the library's ring.
+#[test]
+fn conditions_return_the_coefficients_of_the_study() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let solved = parse(&root.join("tests/data/specs/ring-solved.toml")).unwrap();
+    let mut graph = solved.graph.clone();
+    let found = solved.solved.unwrap().unknowns;
+    let study = [
+        ("c1", "6*Ri/((3*Ri - Ro)*Ro)"),
+        ("c2", "-3*(Ro + Ri)/(Ro^2*(3*Ri - Ro))"),
+        ("c3", "2/(Ro^2*(3*Ri - Ro))"),
+    ];
+    for ((name, value), (expected_name, expected)) in found.iter().zip(study) {
+        let ast = Ast::parse(expected).unwrap();
+        let expected = graph.build(&ast, &mut |graph, name| Ok(graph.symbol(name))).unwrap();
+        assert_eq!(name, expected_name);
+        assert_eq!(*value, expected, "{name} = {}", graph.print(*value));
+    }
+    // The displacement in the library is factored by hand.
+    let library = parse(&root.join("mms-specs/ring.toml")).unwrap();
+    let text = library.graph.print(library.displacement[0]);
+    let same = graph.build(&Ast::parse(&text).unwrap(), &mut |graph, name| Ok(graph.symbol(name)));
+    let difference = graph.sub(solved.displacement[0], same.unwrap());
+    assert!(graph.vanishes(difference));
 }

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use mmsmith_expr::{Dependence, Expr, Graph, OperationCount, Program, arrange};
-use mmsmith_spec::{Domain, Fields, Spec};
+use mmsmith_spec::{Domain, Fields, SolvedCondition, Spec};
 use serde_json::{Value, json};
 
 use crate::arguments::ExplainOptions;
@@ -117,6 +117,20 @@ fn text(spec: &Spec, exercises: &[Exercise], cost: &BodyForceCost) -> String {
     for (name, component) in names.iter().zip(&spec.displacement) {
         text += &format!("  u_{name} = {}\n", print(*component));
     }
+    if let Some(rotation) = &spec.rotation {
+        text += &format!("  {}\n", rotation.formula(&spec.graph));
+    }
+    if let Some(solved) = &spec.solved {
+        for (name, value) in &solved.unknowns {
+            text += &format!("  {name} = {}\n", print(*value));
+        }
+        for SolvedCondition { text: condition, factor, others } in &solved.conditions {
+            text += &format!("    from {condition}: {factor} = 0\n");
+            for other in others {
+                text += &format!("      and not {other} = 0, which no body at rest satisfies\n");
+            }
+        }
+    }
     for line in spec.material.formulas(&spec.graph) {
         text += &format!("  {line}\n");
     }
@@ -193,6 +207,12 @@ fn document(spec: &Spec, exercises: &[Exercise], cost: &BodyForceCost) -> Value 
         .zip(&spec.displacement)
         .map(|(name, u)| ((*name).to_owned(), Value::from(spec.graph.print(*u))))
         .collect();
+    let solved: serde_json::Map<String, Value> = spec
+        .solved
+        .iter()
+        .flat_map(|solved| &solved.unknowns)
+        .map(|(name, value)| (name.clone(), Value::from(spec.graph.print(*value))))
+        .collect();
     json!({
         "schema": "mmsmith.explain/1",
         "settings": { "version": env!("CARGO_PKG_VERSION"), "solution": spec.name },
@@ -200,6 +220,8 @@ fn document(spec: &Spec, exercises: &[Exercise], cost: &BodyForceCost) -> Value 
         "coordinates": spec.coordinates.name(),
         "dimension": spec.dimension,
         "displacement": displacement,
+        "rotation": spec.rotation.map(|rotation| rotation.formula(&spec.graph)),
+        "solved": solved,
         "domain": domain(spec),
         "exercises": exercised,
         "body_force": { "operations": stages, "kept_numbers_per_particle": cost.kept },

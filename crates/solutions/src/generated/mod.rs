@@ -19,6 +19,8 @@ mod shear_wave;
 pub use shear_wave::{ShearWave, ShearWaveParameters};
 mod skew_2d;
 pub use skew_2d::{Skew2d, Skew2dParameters};
+mod skew_2d_rotating;
+pub use skew_2d_rotating::{Skew2dRotating, Skew2dRotatingParameters};
 mod skew_3d;
 pub use skew_3d::{Skew3d, Skew3dParameters};
 mod sphere_shell;
@@ -38,6 +40,7 @@ pub const CATALOGUE: &[&Description] = &[
     &RingNu::<f64>::DESCRIPTION,
     &ShearWave::<f64>::DESCRIPTION,
     &Skew2d::<f64>::DESCRIPTION,
+    &Skew2dRotating::<f64>::DESCRIPTION,
     &Skew3d::<f64>::DESCRIPTION,
     &SphereShell::<f64>::DESCRIPTION,
     &Torsion::<f64>::DESCRIPTION,
@@ -69,6 +72,9 @@ pub fn build<T: Real>(
             "ring-nu" => RingNu::from_values(values).map(AnySolution::from),
             "shear-wave" => ShearWave::from_values(values).map(AnySolution::from),
             "skew-2d" => Skew2d::from_values(values).map(AnySolution::from),
+            "skew-2d-rotating" => {
+                Skew2dRotating::from_values(values).map(AnySolution::from)
+            }
             "skew-3d" => Skew3d::from_values(values).map(AnySolution::from),
             "sphere-shell" => SphereShell::from_values(values).map(AnySolution::from),
             "torsion" => Torsion::from_values(values).map(AnySolution::from),
