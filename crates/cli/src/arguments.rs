@@ -22,6 +22,8 @@ pub(crate) enum Command {
     Check(CheckOptions),
     /// Tell what a solution models, what it exercises, and what its body force costs
     Explain(ExplainOptions),
+    /// Measure which terms of the momentum balance each solution exercises, and name the fewest that test them all
+    Coverage(CoverageOptions),
     /// Evaluate the exact fields at points of your own
     Eval(EvalOptions),
     /// Run one simulation and measure its errors
@@ -50,6 +52,16 @@ pub(crate) struct CheckOptions {
     #[command(flatten)]
     pub(crate) parameters: ParameterOptions,
     /// Write the findings to this JSON file
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
+}
+
+#[derive(Args)]
+pub(crate) struct CoverageOptions {
+    /// Solutions, by name, or specification files (SPEC.toml); all of the library where none is given
+    #[arg(value_name = "NAME|SPEC.toml")]
+    pub(crate) solutions: Vec<String>,
+    /// Write it to this JSON file too
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
 }

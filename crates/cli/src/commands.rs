@@ -2,6 +2,7 @@
 
 mod check;
 mod converge;
+mod coverage;
 mod eval;
 mod explain;
 mod list;
@@ -10,6 +11,7 @@ mod run;
 
 pub(crate) use check::check;
 pub(crate) use converge::converge;
+pub(crate) use coverage::coverage;
 pub(crate) use eval::eval;
 pub(crate) use explain::explain;
 pub(crate) use list::list;

@@ -26,6 +26,7 @@ fn main() -> ExitCode {
         Command::List(options) => commands::list(options),
         Command::Check(options) => commands::check(options),
         Command::Explain(options) => commands::explain(options),
+        Command::Coverage(options) => commands::coverage(options),
         Command::Eval(options) => commands::eval(options),
         Command::Run(options) => commands::run(options),
         Command::Converge(options) => commands::converge(options),

@@ -269,7 +269,11 @@ fn gradient<const D: usize>(
 }
 
 /// `X` with one coordinate replaced.
-fn with<const D: usize>(X: &SVector<f64, D>, axis: usize, value: f64) -> SVector<f64, D> {
+pub(crate) fn with<const D: usize>(
+    X: &SVector<f64, D>,
+    axis: usize,
+    value: f64,
+) -> SVector<f64, D> {
     let mut moved = *X;
     moved[axis] = value;
     moved

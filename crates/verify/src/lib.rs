@@ -2,6 +2,7 @@
 //!
 //! - [`check`] proves the fields of a solution against each other, by finite differences and by the solver's own
 //!   constitutive law, and the declared boundary conditions at sampled boundary points.
+//! - [`coverage()`] measures which terms of the momentum balance a solution exercises.
 //! - [`run`] simulates one [`Case`] and measures the errors of displacement, velocity, deformation gradient and
 //!   stress; [`converge`] does so for a series of grids or time steps and adds the orders of accuracy.
 //! - [`evaluate()`] gives the exact fields at a point.
@@ -11,6 +12,7 @@
 
 mod case;
 mod check;
+mod coverage;
 mod difference;
 mod evaluate;
 mod frames;
@@ -26,6 +28,7 @@ pub use case::{Arithmetic, Case, CaseError, Outputs, Progress, Row, Start, Statu
 pub use check::{
     BLUNT, CheckError, CheckReport, Finding, OWN_ERROR_FACTOR, TOLERANCE, Verdict, check,
 };
+pub use coverage::{Part, Share, coverage, smallest_set};
 pub use evaluate::{FieldRow, WrongLength, evaluate};
 pub use frames::FrameOutput;
 pub use mmsmith_mpm::{Integrator, Shape};

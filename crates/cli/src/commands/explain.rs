@@ -1,13 +1,16 @@
 //! `mms explain`: what a solution models, which parts of a solver it exercises, and what its body force costs.
 
-use anyhow::Result;
-use mmsmith_expr::{Dependence, Expr, Graph, OperationCount, Program, arrange};
+use anyhow::{Result, bail};
+use mmsmith_expr::{Dependence, Expr, OperationCount, Program, arrange};
+use mmsmith_solutions::CATALOGUE;
 use mmsmith_spec::{Domain, Fields, SolvedCondition, Spec};
+use mmsmith_verify::{Part, Share, coverage};
 use serde_json::{Value, json};
 
+use super::coverage::{POINTS, THRESHOLD};
 use crate::arguments::ExplainOptions;
 use crate::json::Output;
-use crate::library::specification;
+use crate::library::{Subject, specification};
 use crate::table::Table;
 use crate::terminal;
 
@@ -15,7 +18,7 @@ pub(crate) fn explain(options: &ExplainOptions) -> Result<bool> {
     let output = Output::prepare_if(options.json.as_ref())?;
     let spec = specification(&options.name)?;
     let mut fields = spec.derive()?;
-    let exercises = exercises(&spec, &fields);
+    let exercises = exercises(&options.name)?;
     let cost = BodyForceCost::of(&mut fields);
     terminal::say(&text(&spec, &exercises, &cost))?;
     if let Some(output) = output {
@@ -24,43 +27,40 @@ pub(crate) fn explain(options: &ExplainOptions) -> Result<bool> {
     Ok(true)
 }
 
-/// Whether a solution can show a mistake in one part of a solver.
+/// How much of one part of the momentum balance there is in a solution.
 struct Exercise {
-    part: &'static str,
-    exercised: bool,
-    /// A solution that does, where this one does not.
-    instead: &'static str,
+    part: Part,
+    share: f64,
+    /// The solution of the library that has the most of it, where this one has next to nothing.
+    instead: Option<&'static str>,
 }
 
-fn exercises(spec: &Spec, fields: &Fields) -> Vec<Exercise> {
-    let without_lambda = spec.material.constants().contains(&("lambda", Graph::ZERO));
-    let n = spec.dimension;
-    let pairs = || (0..n).flat_map(|i| (0..i).map(move |j| (i, j)));
-    let vanishes = |entries: &[Expr]| entries.iter().all(|&entry| entry == Graph::ZERO);
-    let part = |part, exercised, instead| Exercise { part, exercised, instead };
-    let shear = pairs().any(|(i, j)| !vanishes(&[fields.H[i][j], fields.H[j][i]]));
-    let skew = |A: &[Vec<Expr>]| pairs().any(|(i, j)| A[i][j] != A[j][i]);
-    vec![
-        part("inertia", !vanishes(&fields.a), "axis-aligned"),
-        part("stress", !vanishes(&fields.P.concat()), "axis-aligned"),
-        part(
-            "the first Lame constant and ln J",
-            !without_lambda && fields.J != Graph::ONE,
-            "axis-aligned",
-        ),
-        part("change of volume", fields.J != Graph::ONE, "axis-aligned"),
-        part("shear strain", shear, "skew-2d"),
-        part("rotation: F is not symmetric", skew(&fields.H), "vortex"),
-        part("a transposed P", skew(&fields.P), "skew-2d"),
-        part("the body force", !vanishes(&fields.b), "axis-aligned"),
-        part("free or loaded surfaces", has_traction(spec), "ring"),
-        part("three dimensions", n == 3, "axis-aligned-3d"),
-    ]
+impl Exercise {
+    fn is_exercised(&self) -> bool {
+        self.share >= THRESHOLD
+    }
 }
 
-fn has_traction(spec: &Spec) -> bool {
-    use mmsmith_spec::Condition::{PrescribedTraction, TractionFree};
-    spec.boundaries.iter().any(|b| matches!(b.condition, PrescribedTraction | TractionFree))
+fn exercises(name: &str) -> Result<Vec<Exercise>> {
+    let shares_of = |name: &str| -> Result<Vec<Share>> {
+        let subject = Subject::new(name, &[])?;
+        let Some(solution) = subject.solutions.first() else { bail!("{name} cannot be built") };
+        Ok(coverage(solution, POINTS)?)
+    };
+    let library = CATALOGUE
+        .iter()
+        .map(|known| Ok((known.name, shares_of(known.name)?)))
+        .collect::<Result<Vec<_>>>()?;
+    let own = shares_of(name)?;
+    Ok(own
+        .into_iter()
+        .enumerate()
+        .map(|(row, Share { part, share })| {
+            let most = library.iter().max_by(|a, b| a.1[row].share.total_cmp(&b.1[row].share));
+            let instead = most.filter(|_| share < THRESHOLD).map(|(name, _)| *name);
+            Exercise { part, share, instead }
+        })
+        .collect())
 }
 
 /// Operations of the generated body force, by how often they are done.
@@ -142,10 +142,11 @@ fn text(spec: &Spec, exercises: &[Exercise], cost: &BodyForceCost) -> String {
         text += &format!("  {:?}: {:?}\n", boundary.surface, boundary.condition);
     }
     text += "\nwhat a solver can get wrong, and whether this solution would show it\n";
-    for Exercise { part, exercised, instead } in exercises {
-        text += &match exercised {
-            true => format!("  yes  {part}\n"),
-            false => format!("  no   {part} ({instead} would)\n"),
+    for exercise in exercises {
+        let Exercise { part, share, instead } = exercise;
+        text += &match instead {
+            None => format!("  yes  {part} ({:.1} %)\n", 100.0 * share),
+            Some(instead) => format!("  no   {part} ({instead} would)\n"),
         };
     }
     text += "\noperations of the body force, generated\n";
@@ -186,7 +187,9 @@ fn domain(spec: &Spec) -> String {
 
 fn document(spec: &Spec, exercises: &[Exercise], cost: &BodyForceCost) -> Value {
     let exercised: serde_json::Map<String, Value> =
-        exercises.iter().map(|e| (e.part.to_owned(), Value::from(e.exercised))).collect();
+        exercises.iter().map(|e| (e.part.to_string(), e.is_exercised().into())).collect();
+    let shares: serde_json::Map<String, Value> =
+        exercises.iter().map(|e| (e.part.to_string(), e.share.into())).collect();
     let stages: serde_json::Map<String, Value> = cost
         .stages
         .iter()
@@ -224,6 +227,7 @@ fn document(spec: &Spec, exercises: &[Exercise], cost: &BodyForceCost) -> Value 
         "solved": solved,
         "domain": domain(spec),
         "exercises": exercised,
+        "shares": shares,
         "body_force": { "operations": stages, "kept_numbers_per_particle": cost.kept },
     })
 }
