@@ -24,7 +24,8 @@
  * skew_2d_rotating_parameters p = skew_2d_rotating_defaults(); gives the parameters, to be changed at will; then,
  *    once a run,
  * message = skew_2d_rotating_prepare(&s, &p); is a null pointer, or says what is wrong with the parameters.
- * skew_2d_rotating_u, _v, _a, _H, _F, _J, _P, _b compute one field, skew_2d_rotating_fields all of them.
+ * skew_2d_rotating_u, _v, _a, _H, _F, _J, _P, _b compute one field, skew_2d_rotating_fields all of them;
+ * the traction on a surface, at points X of it, has a function of its own.
  * The body force at points that stay: skew_2d_rotating_point_array once a run, skew_2d_rotating_b_array once a step,
  *    or for single points
  * skew_2d_rotating_at_point once a run, skew_2d_rotating_at_time once a step, skew_2d_rotating_b_staged. All ways
@@ -137,49 +138,6 @@ MMSMITH_FN double mmsmith_sin_pi(double x)
 MMSMITH_FN double mmsmith_cos_pi(double x)
 {
     return mmsmith_sin_pi_shifted(x, 1);
-}
-
-/* arcosh(1 + z) */
-MMSMITH_FN double mmsmith_log_ratio(double z)
-{
-    return log1p(z + sqrt(z * (z + 2.0)));
-}
-
-/* arcosh(1 + z)^2: the squared logarithm of the ratio of two stretches a, b for z = (a - b)^2/(2 a b). */
-MMSMITH_FN double mmsmith_log_ratio_squared(double z)
-{
-    const double theta = mmsmith_log_ratio(z);
-    return theta * theta;
-}
-
-/* theta/sinh(theta) - 1 for theta = arcosh(1 + z). */
-MMSMITH_FN double mmsmith_log_ratio_slope(double z)
-{
-    const double y = z / (z + 2.0);
-    double sum = 0.0;
-    int k;
-    if (y > 0.25) {
-        return mmsmith_log_ratio(z) / sqrt(z * (z + 2.0)) - 1.0;
-    }
-    for (k = 24; k > 0; --k) {
-        sum = sum * y + 2.0 / (4.0 * k * k - 1.0);
-    }
-    return -sum * y;
-}
-
-/* The derivative of mmsmith_log_ratio_slope. */
-MMSMITH_FN double mmsmith_log_ratio_curvature(double z)
-{
-    const double y = z / (z + 2.0);
-    double sum = 0.0;
-    int k;
-    if (y > 0.25) {
-        return -(z + (1.0 + z) * mmsmith_log_ratio_slope(z)) / (z * (z + 2.0));
-    }
-    for (k = 24; k > 0; --k) {
-        sum = sum * y + k / (4.0 * k * k - 1.0);
-    }
-    return -sum * ((1.0 - y) * (1.0 - y));
 }
 
 #endif
@@ -1132,6 +1090,303 @@ MMSMITH_FN void skew_2d_rotating_b(const skew_2d_rotating_solution *s, const dou
     const double t479 = 0.1 * t478;
     b[0] = t474;
     b[1] = t479;
+}
+
+/* traction on the surface X-lower, force per reference area */
+MMSMITH_FN void skew_2d_rotating_X_lower_traction(const skew_2d_rotating_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    const double t14 = s->par.Omega * t;
+    const double t15 = sin(t14);
+    const double t27 = s->fixed[1] * t;
+    const double t28 = mmsmith_cos_pi(t27);
+    const double t29 = cos(t14);
+    const double t36 = 0.5 * X[1];
+    const double t40 = X[1] * X[1];
+    const double t43 = 3.0 * t28;
+    const double t45 = mmsmith_sin_pi(t27);
+    const double t46 = 4.0 * t45;
+    const double t47 = t43 + t46;
+    const double t68 = s->par.A * t28;
+    const double t145 = mmsmith_cos_pi(t36);
+    const double t176 = s->fixed[6] * t28;
+    const double t181 = s->fixed[7] * t47;
+    const double t207 = t28 * t28;
+    const double t209 = s->fixed[10] * t207;
+    const double t222 = s->fixed[11] * t28;
+    const double t482 = cos(X[1]);
+    const double t483 = t176 * t482;
+    const double t484 = t483 + 1.0;
+    const double t486 = s->fixed[25] * t47;
+    const double t487 = t486 * t145;
+    const double t488 = t487 + 1.0;
+    const double t489 = t484 * t488;
+    const double t490 = t181 * t40;
+    const double t491 = t68 * t482;
+    const double t492 = t491 * t490;
+    const double t493 = t489 - t492;
+    const double t494 = t483 * t487;
+    const double t495 = t483 + t487;
+    const double t496 = t495 - t492;
+    const double t497 = t496 + t494;
+    const double t498 = log1p(t497);
+    const double t499 = s->fixed[8] * t498;
+    const double t500 = 2.0 * t483;
+    const double t501 = t483 * t483;
+    const double t502 = t482 * t482;
+    const double t503 = t209 * t502;
+    const double t504 = t500 + t501;
+    const double t505 = t504 + t503;
+    const double t506 = s->fixed[9] * t505;
+    const double t507 = t499 + t506;
+    const double t508 = t488 * t507;
+    const double t509 = t483 * t490;
+    const double t510 = t491 * t487;
+    const double t511 = t491 + t490;
+    const double t512 = t511 + t509;
+    const double t513 = t512 + t510;
+    const double t514 = t222 * t482;
+    const double t515 = t514 * t513;
+    const double t516 = t508 - t515;
+    const double t517 = t29 * t516;
+    const double t518 = t488 * t513;
+    const double t519 = s->fixed[9] * t518;
+    const double t520 = 2.0 * t487;
+    const double t521 = t490 * t490;
+    const double t522 = t487 * t487;
+    const double t523 = t520 + t521;
+    const double t524 = t523 + t522;
+    const double t525 = s->fixed[9] * t524;
+    const double t526 = t499 + t525;
+    const double t527 = t491 * t526;
+    const double t528 = t519 - t527;
+    const double t529 = t15 * t528;
+    const double t530 = t517 - t529;
+    const double t531 = t530 / t493;
+    const double t532 = -t531;
+    const double t533 = t15 * t516;
+    const double t534 = t29 * t528;
+    const double t535 = t533 + t534;
+    const double t536 = t535 / t493;
+    const double t537 = -t536;
+    traction[0] = t532;
+    traction[1] = t537;
+}
+
+/* traction on the surface X-upper, force per reference area */
+MMSMITH_FN void skew_2d_rotating_X_upper_traction(const skew_2d_rotating_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    const double t14 = s->par.Omega * t;
+    const double t15 = sin(t14);
+    const double t27 = s->fixed[1] * t;
+    const double t28 = mmsmith_cos_pi(t27);
+    const double t29 = cos(t14);
+    const double t36 = 0.5 * X[1];
+    const double t37 = mmsmith_sin_pi(t36);
+    const double t40 = X[1] * X[1];
+    const double t43 = 3.0 * t28;
+    const double t45 = mmsmith_sin_pi(t27);
+    const double t46 = 4.0 * t45;
+    const double t47 = t43 + t46;
+    const double t68 = s->par.A * t28;
+    const double t145 = mmsmith_cos_pi(t36);
+    const double t176 = s->fixed[6] * t28;
+    const double t181 = s->fixed[7] * t47;
+    const double t207 = t28 * t28;
+    const double t209 = s->fixed[10] * t207;
+    const double t222 = s->fixed[11] * t28;
+    const double t538 = X[1] + 3.0;
+    const double t539 = cos(t538);
+    const double t540 = t176 * t539;
+    const double t541 = t540 + 1.0;
+    const double t542 = 2.0 * X[1];
+    const double t545 = s->fixed[26] * t145;
+    const double t546 = t542 + t545;
+    const double t547 = t181 * t546;
+    const double t548 = t547 + 1.0;
+    const double t549 = t541 * t548;
+    const double t552 = s->fixed[27] * t37;
+    const double t553 = t40 - t552;
+    const double t554 = t181 * t553;
+    const double t555 = t68 * t539;
+    const double t556 = t555 * t554;
+    const double t557 = t549 - t556;
+    const double t558 = t540 * t547;
+    const double t559 = t540 + t547;
+    const double t560 = t559 - t556;
+    const double t561 = t560 + t558;
+    const double t562 = log1p(t561);
+    const double t563 = s->fixed[8] * t562;
+    const double t564 = 2.0 * t540;
+    const double t565 = t540 * t540;
+    const double t566 = t539 * t539;
+    const double t567 = t209 * t566;
+    const double t568 = t564 + t565;
+    const double t569 = t568 + t567;
+    const double t570 = s->fixed[9] * t569;
+    const double t571 = t563 + t570;
+    const double t572 = t548 * t571;
+    const double t573 = t540 * t554;
+    const double t574 = t555 * t547;
+    const double t575 = t555 + t554;
+    const double t576 = t575 + t573;
+    const double t577 = t576 + t574;
+    const double t578 = t222 * t539;
+    const double t579 = t578 * t577;
+    const double t580 = t572 - t579;
+    const double t581 = t29 * t580;
+    const double t582 = t548 * t577;
+    const double t583 = s->fixed[9] * t582;
+    const double t584 = 2.0 * t547;
+    const double t585 = t554 * t554;
+    const double t586 = t547 * t547;
+    const double t587 = t584 + t585;
+    const double t588 = t587 + t586;
+    const double t589 = s->fixed[9] * t588;
+    const double t590 = t563 + t589;
+    const double t591 = t555 * t590;
+    const double t592 = t583 - t591;
+    const double t593 = t15 * t592;
+    const double t594 = t581 - t593;
+    const double t595 = t594 / t557;
+    const double t596 = t15 * t580;
+    const double t597 = t29 * t592;
+    const double t598 = t596 + t597;
+    const double t599 = t598 / t557;
+    traction[0] = t595;
+    traction[1] = t599;
+}
+
+/* traction on the surface Y-lower, force per reference area */
+MMSMITH_FN void skew_2d_rotating_Y_lower_traction(const skew_2d_rotating_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    const double t14 = s->par.Omega * t;
+    const double t15 = sin(t14);
+    const double t20 = 3.0 * X[0];
+    const double t27 = s->fixed[1] * t;
+    const double t28 = mmsmith_cos_pi(t27);
+    const double t29 = cos(t14);
+    const double t30 = t28 * t29;
+    const double t34 = 2.0 * X[0];
+    const double t35 = cos(t34);
+    const double t43 = 3.0 * t28;
+    const double t45 = mmsmith_sin_pi(t27);
+    const double t46 = 4.0 * t45;
+    const double t47 = t43 + t46;
+    const double t58 = t28 * t15;
+    const double t176 = s->fixed[6] * t28;
+    const double t486 = s->fixed[25] * t47;
+    const double t600 = cos(t20);
+    const double t601 = s->fixed[11] * t30;
+    const double t602 = t601 * t600;
+    const double t603 = t486 * t35;
+    const double t604 = t603 + 1.0;
+    const double t605 = t176 * t600;
+    const double t606 = t605 * t603;
+    const double t607 = t605 + t603;
+    const double t608 = t607 + t606;
+    const double t609 = log1p(t608);
+    const double t610 = s->fixed[8] * t609;
+    const double t611 = t603 + 2.0;
+    const double t612 = t603 * t611;
+    const double t613 = s->fixed[9] * t612;
+    const double t614 = t610 + t613;
+    const double t615 = t614 / t604;
+    const double t616 = t15 * t615;
+    const double t617 = t602 - t616;
+    const double t618 = -t617;
+    const double t619 = s->fixed[11] * t58;
+    const double t620 = t619 * t600;
+    const double t621 = t29 * t615;
+    const double t622 = t620 + t621;
+    const double t623 = -t622;
+    traction[0] = t618;
+    traction[1] = t623;
+}
+
+/* traction on the surface Y-upper, force per reference area */
+MMSMITH_FN void skew_2d_rotating_Y_upper_traction(const skew_2d_rotating_solution *s, const double X[2], double t,
+    double traction[2])
+{
+    const double t14 = s->par.Omega * t;
+    const double t15 = sin(t14);
+    const double t20 = 3.0 * X[0];
+    const double t27 = s->fixed[1] * t;
+    const double t28 = mmsmith_cos_pi(t27);
+    const double t29 = cos(t14);
+    const double t34 = 2.0 * X[0];
+    const double t43 = 3.0 * t28;
+    const double t45 = mmsmith_sin_pi(t27);
+    const double t46 = 4.0 * t45;
+    const double t47 = t43 + t46;
+    const double t68 = s->par.A * t28;
+    const double t134 = sin(t34);
+    const double t176 = s->fixed[6] * t28;
+    const double t181 = s->fixed[7] * t47;
+    const double t207 = t28 * t28;
+    const double t209 = s->fixed[10] * t207;
+    const double t304 = s->fixed[18] * t47;
+    const double t624 = t20 + 1.0;
+    const double t625 = cos(t624);
+    const double t626 = t176 * t625;
+    const double t627 = t626 + 1.0;
+    const double t628 = t304 * X[0];
+    const double t629 = t628 + 1.0;
+    const double t630 = t627 * t629;
+    const double t631 = 4.0 * t134;
+    const double t632 = 1.0 - t631;
+    const double t633 = t181 * t632;
+    const double t634 = t68 * t625;
+    const double t635 = t634 * t633;
+    const double t636 = t630 - t635;
+    const double t637 = t626 * t628;
+    const double t638 = t626 + t628;
+    const double t639 = t638 - t635;
+    const double t640 = t639 + t637;
+    const double t641 = log1p(t640);
+    const double t642 = s->fixed[8] * t641;
+    const double t643 = 2.0 * t626;
+    const double t644 = t626 * t626;
+    const double t645 = t625 * t625;
+    const double t646 = t209 * t645;
+    const double t647 = t643 + t644;
+    const double t648 = t647 + t646;
+    const double t649 = s->fixed[9] * t648;
+    const double t650 = t642 + t649;
+    const double t651 = t633 * t650;
+    const double t652 = t626 * t633;
+    const double t653 = t634 * t628;
+    const double t654 = t634 + t633;
+    const double t655 = t654 + t652;
+    const double t656 = t655 + t653;
+    const double t657 = t627 * t656;
+    const double t658 = s->fixed[9] * t657;
+    const double t659 = t651 - t658;
+    const double t660 = t29 * t659;
+    const double t661 = t633 * t656;
+    const double t662 = s->fixed[9] * t661;
+    const double t663 = 2.0 * t628;
+    const double t664 = t633 * t633;
+    const double t665 = t628 * t628;
+    const double t666 = t663 + t664;
+    const double t667 = t666 + t665;
+    const double t668 = s->fixed[9] * t667;
+    const double t669 = t642 + t668;
+    const double t670 = t627 * t669;
+    const double t671 = t662 - t670;
+    const double t672 = t15 * t671;
+    const double t673 = t660 - t672;
+    const double t674 = t673 / t636;
+    const double t675 = -t674;
+    const double t676 = t15 * t659;
+    const double t677 = t29 * t671;
+    const double t678 = t676 + t677;
+    const double t679 = t678 / t636;
+    const double t680 = -t679;
+    traction[0] = t675;
+    traction[1] = t680;
 }
 
 /* all fields */
