@@ -71,7 +71,15 @@ impl<'a> Scope<'a> {
             .filter(|name| !coordinates.contains(name))
             .map(|name| (name.to_owned(), format!("the coordinates of this file are {listed}")))
             .collect();
-        Scope { source, graph, names, elsewhere, coordinates: symbols, time, unknowns: BTreeSet::new() }
+        Scope {
+            source,
+            graph,
+            names,
+            elsewhere,
+            coordinates: symbols,
+            time,
+            unknowns: BTreeSet::new(),
+        }
     }
 
     /// Every name with its meaning.
