@@ -12,6 +12,9 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Numerators with more terms than this are not worth the search.
 const MOST_TERMS: usize = 512;
 
+/// A monomial, as atoms to positive powers, and its coefficient.
+pub type Term = (Vec<(Expr, u32)>, Rational);
+
 /// A product of atoms, each to a positive power.
 type Monomial = BTreeMap<Expr, u32>;
 /// A sum of monomials.
@@ -105,7 +108,7 @@ impl Graph {
 
     /// The numerator of `expr` over a common denominator, multiplied out: monomials, which are powers of atoms, with
     /// their coefficients. Atoms are symbols, pi, function values and broken powers. `None` where it grows too large.
-    pub fn numerator(&mut self, expr: Expr) -> Option<Vec<(Vec<(Expr, u32)>, Rational)>> {
+    pub fn numerator(&mut self, expr: Expr) -> Option<Vec<Term>> {
         let open = self.open(expr);
         let numerator = self.fraction(open)?.numerator;
         Some(numerator.into_iter().map(|(m, c)| (m.into_iter().collect(), c)).collect())

@@ -44,6 +44,7 @@ mod rational;
 
 pub use arrange::arrange;
 pub use build::BuildError;
+pub use cancel::Term;
 pub use derivative::Derivatives;
 pub use graph::{Expr, Function, Graph, Node};
 pub use parse::{Ast, AstKind, ParseError};

@@ -15,7 +15,7 @@ use crate::document::{SolveTable, Text};
 use crate::law::{self, Deformation};
 use crate::scope::Scope;
 use crate::{Diagnostic, Material, Spec};
-use mmsmith_expr::{Ast, AstKind, Expr, Function, Graph, Node, Program, Rational};
+use mmsmith_expr::{Ast, AstKind, Expr, Function, Graph, Node, Program, Rational, Term};
 use num_traits::{One, Signed, Zero};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -45,9 +45,6 @@ pub struct SolvedCondition {
     /// Other factors that contain unknowns; they are not zero.
     pub others: Vec<String>,
 }
-
-/// A monomial in atoms with its coefficient.
-type Term = (Vec<(Expr, u32)>, Rational);
 
 /// `sum of coefficient_k unknown_k + constant = 0`, the constant last; each is a sum of terms in the parameters.
 struct Equation {

@@ -40,11 +40,13 @@ fn read(text: String, derive: bool) -> Result<(), Diagnostic> {
     std::thread::Builder::new().stack_size(2 << 20).spawn(run).unwrap().join().unwrap()
 }
 
-/// The specifications of the library.
+/// The specifications of the library, and those that make use of more than it does.
 fn library() -> Vec<String> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../mms-specs");
-    let mut files: Vec<_> = std::fs::read_dir(folder)
-        .unwrap()
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let folders = ["mms-specs", "tests/data/specs"].map(|folder| root.join(folder));
+    let mut files: Vec<_> = folders
+        .iter()
+        .flat_map(|folder| std::fs::read_dir(folder).unwrap())
         .map(|entry| entry.unwrap().path())
         .filter(|path| path.extension().is_some_and(|e| e == "toml"))
         .collect();
