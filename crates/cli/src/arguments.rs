@@ -78,7 +78,8 @@ pub(crate) struct ExplainOptions {
 
 #[derive(Args)]
 pub(crate) struct EvalOptions {
-    /// The solution
+    /// The solution, by name, or a specification file (SPEC.toml)
+    #[arg(value_name = "NAME|SPEC.toml")]
     pub(crate) name: String,
     /// The points: [ { "X": [0.1, 0.2], "t": 0.3, "par": { "A": 0.05 } }, ... ]; "par" may be left out, other keys
     /// are ignored
@@ -93,7 +94,8 @@ pub(crate) struct EvalOptions {
 
 #[derive(Args)]
 pub(crate) struct RunOptions {
-    /// The solution
+    /// The solution, by name, or a specification file (SPEC.toml)
+    #[arg(value_name = "NAME|SPEC.toml")]
     pub(crate) name: String,
     /// Number of cells along the solution's cell length
     #[arg(long, value_name = "N", default_value_t = 32, value_parser = positive_count)]
@@ -110,7 +112,8 @@ pub(crate) struct RunOptions {
 
 #[derive(Args)]
 pub(crate) struct ConvergeOptions {
-    /// The solution
+    /// The solution, by name, or a specification file (SPEC.toml)
+    #[arg(value_name = "NAME|SPEC.toml")]
     pub(crate) name: String,
     /// Cell counts, separated by commas; one of them with --cfls
     #[arg(long, value_name = "N,...", required = true, value_delimiter = ',', value_parser = positive_count)]

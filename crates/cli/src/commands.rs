@@ -38,7 +38,7 @@ impl Model {
     fn new(selection: &Selection, precision: Precision) -> Result<Self> {
         let single = match precision {
             Precision::F64 => None,
-            Precision::F32 => Some(selection.build()?),
+            Precision::F32 => Some(selection.build_single()?),
         };
         Ok(Self { exact: selection.build()?, single })
     }
@@ -87,7 +87,7 @@ fn settings(
 ) -> Value {
     json!({
         "version": env!("CARGO_PKG_VERSION"),
-        "solution": selection.description.name,
+        "solution": selection.name(),
         "parameters": selection.parameters(),
         "shape": options.shape,
         "integrator": options.integrator,
@@ -114,7 +114,7 @@ fn caption(selection: &Selection, options: &SchemeOptions, extent: Option<Extent
         selection.parameters().iter().map(|(name, value)| format!("{name} = {value}")).collect();
     format!(
         "{} ({}){extent}: {} + {}{start}, {} particles per cell and direction, {} period(s), {}, {} thread(s)\n",
-        selection.description.name,
+        selection.name(),
         parameters.join(", "),
         word(&options.shape),
         word(&options.integrator),

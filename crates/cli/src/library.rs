@@ -2,46 +2,111 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use anyhow::{Context, Result, bail};
-use mmsmith_interpret::interpret;
+use mmsmith_interpret::{interpret, interpret_fields};
 use mmsmith_solutions::{AnySolution, CATALOGUE, Description, Real, build};
-use mmsmith_spec::{Spec, nearest};
+use mmsmith_spec::{Fields, Spec, nearest};
 
-/// A solution's description with its parameter values, in its own order.
+/// A solution with its parameter values.
 #[derive(Clone)]
 pub(crate) struct Selection {
-    pub(crate) description: &'static Description,
-    pub(crate) values: Vec<f64>,
+    source: Source,
+    parameters: BTreeMap<String, f64>,
+}
+
+/// Where a solution's fields come from.
+#[derive(Clone)]
+enum Source {
+    /// Code generated from the library's specifications.
+    Library(&'static Description),
+    /// A specification that is interpreted; nothing needs to have been generated from it.
+    File(Arc<(Spec, Fields)>),
 }
 
 impl Selection {
-    /// Finds `name` and puts `overrides` in place of its parameters' defaults.
+    /// Finds `name`, a solution of the library or a specification file, and puts `overrides` in place of its
+    /// parameters' defaults.
     pub(crate) fn new(name: &str, overrides: &[(String, f64)]) -> Result<Self> {
-        let description = find(name)?;
         for (index, (name, _)) in overrides.iter().enumerate() {
             if overrides[..index].iter().any(|(earlier, _)| earlier == name) {
                 bail!("--set {name}=... is given twice");
             }
         }
-        let overrides = overrides.iter().map(|(name, value)| (name.as_str(), *value));
-        let values = description.resolve(overrides).context("--set")?;
-        Ok(Self { description, values })
+        let (source, defaults): (Source, BTreeMap<String, f64>) = if is_file(name) {
+            let spec = specification(name)?;
+            let fields = spec.derive().with_context(|| name.to_owned())?;
+            let defaults = spec.parameters.iter().map(|p| (p.name.clone(), p.default)).collect();
+            (Source::File(Arc::new((spec, fields))), defaults)
+        } else {
+            let description = find(name)?;
+            let parameters = description.parameters.iter();
+            let defaults = parameters.map(|p| (p.name.to_owned(), p.default)).collect();
+            (Source::Library(description), defaults)
+        };
+        Self { source, parameters: defaults }.with(overrides).context("--set")
     }
 
-    /// The solution in the precision asked for.
-    pub(crate) fn build<T: Real>(&self) -> Result<AnySolution<T>> {
-        let name = self.description.name;
-        match build(name, &self.values) {
+    /// The same solution with other values of the parameters named; of two values for one name the later one holds.
+    pub(crate) fn with(&self, values: &[(String, f64)]) -> Result<Self> {
+        let mut changed = self.clone();
+        changed.parameters.extend(values.iter().cloned());
+        let pairs = changed.parameters.iter().map(|(name, value)| (name.as_str(), *value));
+        // Unknown names and values that are not admissible come to light here.
+        match &changed.source {
+            Source::Library(description) => {
+                build::<f64>(description.name, &description.resolve(pairs)?).transpose()?;
+            }
+            Source::File(source) => {
+                interpret_fields(&source.0, source.1.clone(), pairs)?;
+            }
+        }
+        Ok(changed)
+    }
+
+    /// The solution's name.
+    pub(crate) fn name(&self) -> &str {
+        match &self.source {
+            Source::Library(description) => description.name,
+            Source::File(source) => &source.0.name,
+        }
+    }
+
+    /// The solution in double precision.
+    pub(crate) fn build(&self) -> Result<AnySolution<f64>> {
+        match &self.source {
+            Source::Library(description) => self.generated(description),
+            Source::File(source) => {
+                let pairs = self.parameters.iter().map(|(name, value)| (name.as_str(), *value));
+                Ok(interpret_fields(&source.0, source.1.clone(), pairs)?)
+            }
+        }
+    }
+
+    /// The solution in single precision, for solvers that compute in it.
+    pub(crate) fn build_single(&self) -> Result<AnySolution<f32>> {
+        match &self.source {
+            Source::Library(description) => self.generated(description),
+            Source::File(source) => bail!(
+                "'{}' is interpreted from its specification, in double precision only; generate code from it with \
+                 cargo xtask gen, or use --precision f64",
+                source.0.name
+            ),
+        }
+    }
+
+    fn generated<T: Real>(&self, description: &Description) -> Result<AnySolution<T>> {
+        let pairs = self.parameters.iter().map(|(name, value)| (name.as_str(), *value));
+        match build(description.name, &description.resolve(pairs)?) {
             Some(solution) => Ok(solution?),
-            None => bail!("the solution '{name}' is listed but cannot be built"),
+            None => bail!("the solution '{}' is listed but cannot be built", description.name),
         }
     }
 
     /// Parameter values by name.
-    pub(crate) fn parameters(&self) -> BTreeMap<&'static str, f64> {
-        let names = self.description.parameters.iter().map(|parameter| parameter.name);
-        names.zip(self.values.iter().copied()).collect()
+    pub(crate) fn parameters(&self) -> &BTreeMap<String, f64> {
+        &self.parameters
     }
 }
 

@@ -28,7 +28,7 @@ pub(crate) fn eval(options: &EvalOptions) -> Result<bool> {
         "schema": "mmsmith.eval/1",
         "settings": {
             "version": env!("CARGO_PKG_VERSION"),
-            "solution": selection.description.name,
+            "solution": selection.name(),
             "parameters": selection.parameters(),
         },
         "rows": rows,
@@ -72,13 +72,11 @@ fn evaluate_entry(selection: &Selection, entry: &Value) -> Result<Value> {
         Some(Value::Object(parameters)) => parameters,
         Some(other) => bail!("par is {other}; it must be an object, {{ \"NAME\": number, ... }}"),
     };
-    let mut given = selection.parameters().into_iter().collect::<Vec<_>>();
-    for (name, value) in parameters {
-        given.push((name, number(value, &format!("parameter {name}"))?));
-    }
-    // Of two values for one name the later one holds.
-    let values = selection.description.resolve(given)?;
-    let solution = Selection { description: selection.description, values }.build()?;
+    let given = parameters
+        .iter()
+        .map(|(name, value)| Ok((name.clone(), number(value, &format!("parameter {name}"))?)))
+        .collect::<Result<Vec<_>>>()?;
+    let solution = selection.with(&given)?.build()?;
     Ok(serde_json::to_value(evaluate(&solution, &X, t)?)?)
 }
 

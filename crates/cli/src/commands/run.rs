@@ -21,7 +21,7 @@ pub(crate) fn run(options: &RunOptions) -> Result<bool> {
     let output = Output::prepare_if(scheme.json.as_ref())?;
     let frames = options.vtk.as_ref().map(|folder| FrameOutput {
         folder: folder.clone(),
-        name: selection.description.name.to_owned(),
+        name: selection.name().to_owned(),
         count: options.frames,
     });
     with_threads(scheme.threads, || {
