@@ -39,6 +39,7 @@ mod parse;
 mod print;
 mod program;
 mod rational;
+mod reciprocal;
 
 pub use arrange::arrange;
 pub use build::BuildError;

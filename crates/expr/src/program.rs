@@ -14,6 +14,10 @@ use std::collections::HashMap;
 pub struct Slot(u32);
 
 impl Slot {
+    pub(crate) fn at(index: usize) -> Self {
+        Slot(index as u32)
+    }
+
     /// The index of the operation.
     #[must_use]
     pub fn index(self) -> usize {
@@ -71,6 +75,24 @@ impl Operation {
             | Operation::SinPi(a)
             | Operation::CosPi(a)
             | Operation::Call(_, a) => vec![a],
+        }
+    }
+
+    /// The same operation on the slots that `place` says.
+    pub(crate) fn with_operands(&self, place: impl Fn(Slot) -> Slot) -> Self {
+        match *self {
+            Operation::Number(_) | Operation::Pi | Operation::Input(_) => self.clone(),
+            Operation::Add(a, b) => Operation::Add(place(a), place(b)),
+            Operation::Sub(a, b) => Operation::Sub(place(a), place(b)),
+            Operation::Mul(a, b) => Operation::Mul(place(a), place(b)),
+            Operation::Div(a, b) => Operation::Div(place(a), place(b)),
+            Operation::Neg(a) => Operation::Neg(place(a)),
+            Operation::Sqrt(a) => Operation::Sqrt(place(a)),
+            Operation::Power(a, ref exponent) => Operation::Power(place(a), exponent.clone()),
+            Operation::SinPi(a) => Operation::SinPi(place(a)),
+            Operation::CosPi(a) => Operation::CosPi(place(a)),
+            Operation::Call(function, a) => Operation::Call(function, place(a)),
+            Operation::Atan2(a, b) => Operation::Atan2(place(a), place(b)),
         }
     }
 
@@ -204,7 +226,32 @@ impl Program {
             definitions,
         };
         let outputs: Vec<Slot> = outputs.iter().map(|&output| lowering.lower(output)).collect();
-        Program { outputs, ..lowering.program }
+        Program { outputs, ..lowering.program }.with_shared_reciprocals()
+    }
+
+    /// A program of operations in order, with what each depends on.
+    pub(crate) fn from_parts(
+        operations: Vec<Operation>,
+        dependence: Vec<Dependence>,
+        outputs: Vec<Slot>,
+    ) -> Self {
+        Program { operations, dependence, outputs }
+    }
+
+    /// The program without operations that no output needs.
+    pub(crate) fn compacted(&self) -> Self {
+        let needed = self.needed(&self.outputs);
+        let mut places: Vec<Slot> = Vec::with_capacity(self.operations.len());
+        let mut program = Program::default();
+        for (index, operation) in self.operations.iter().enumerate() {
+            places.push(Slot::at(program.operations.len()));
+            if needed[index] {
+                program.operations.push(operation.with_operands(|slot| places[slot.index()]));
+                program.dependence.push(self.dependence[index]);
+            }
+        }
+        program.outputs = self.outputs.iter().map(|slot| places[slot.index()]).collect();
+        program
     }
 
     /// The operations, each after those that it reads.
@@ -227,7 +274,7 @@ impl Program {
 
     /// The slots of all operations, in order.
     pub fn slots(&self) -> impl Iterator<Item = Slot> + use<> {
-        (0..self.operations.len()).map(|index| Slot(index as u32))
+        (0..self.operations.len()).map(Slot::at)
     }
 
     /// For each operation, whether `outputs` need it.
@@ -364,6 +411,16 @@ struct Lowering<'a> {
     definitions: &'a [(Expr, Expr)],
 }
 
+/// Terms of a sum with a common factor.
+struct Group {
+    /// Whether further terms of this factor belong to it.
+    open: bool,
+    factor: Expr,
+    rate: Dependence,
+    /// The index of each term, and the term without the factor and without its sign.
+    members: Vec<(usize, Expr)>,
+}
+
 impl Lowering<'_> {
     fn push(&mut self, operation: Operation) -> Slot {
         if let Some(&slot) = self.interned.get(&operation) {
@@ -379,7 +436,7 @@ impl Lowering<'_> {
                 .map(|&slot| self.program.dependence(slot))
                 .fold(Dependence::default(), Dependence::join),
         };
-        let slot = Slot(self.program.operations.len() as u32);
+        let slot = Slot::at(self.program.operations.len());
         self.program.operations.push(operation.clone());
         self.program.dependence.push(dependence);
         self.interned.insert(operation, slot);
@@ -478,9 +535,23 @@ impl Lowering<'_> {
 
     fn terms(&mut self, terms: &[(Expr, Rational)]) -> (bool, Slot) {
         let mut by_rate: Vec<(Dependence, (bool, Slot))> = Vec::new();
-        for (term, coefficient) in terms {
-            let slot = self.scaled(*term, &coefficient.abs());
-            by_rate.push((self.program.dependence(slot), (coefficient.is_negative(), slot)));
+        for group in self.groups_of_equal_factor(terms) {
+            let part = match &*group.members {
+                [(index, _)] => {
+                    let (term, coefficient) = &terms[*index];
+                    (coefficient.is_negative(), self.scaled(*term, &coefficient.abs()))
+                }
+                members => {
+                    let inner = self.graph.sum(members.iter().map(|(index, rest)| {
+                        let sign = if terms[*index].1.is_negative() { -1 } else { 1 };
+                        (Rational::from_integer(sign.into()), *rest)
+                    }));
+                    let (negative, inner) = self.signed(inner);
+                    let factor = self.lower(group.factor);
+                    (negative, self.push(Operation::Mul(factor, inner)))
+                }
+            };
+            by_rate.push((self.program.dependence(part.1), part));
         }
         by_rate.sort_by_key(|(dependence, _)| *dependence);
         let mut groups = Vec::new();
@@ -488,6 +559,43 @@ impl Lowering<'_> {
             groups.push(self.add(group.iter().map(|(_, part)| *part).collect()));
         }
         self.add(groups)
+    }
+
+    /// The terms of a sum by their factor that depends on parameters only, their coefficient included, and by the rate
+    /// of the rest: a factor that several terms share is multiplied with their sum. Terms without such a factor, or
+    /// with nothing but it, stand alone.
+    fn groups_of_equal_factor(&mut self, terms: &[(Expr, Rational)]) -> Vec<Group> {
+        let mut groups: Vec<Group> = Vec::new();
+        for (index, (term, coefficient)) in terms.iter().enumerate() {
+            let (factor, rest, rate) = self.split_off_fixed(*term, &coefficient.abs());
+            let open = factor != Graph::ONE && rest != Graph::ONE;
+            let known = groups
+                .iter_mut()
+                .find(|group| open && group.open && group.factor == factor && group.rate == rate);
+            match known {
+                Some(group) => group.members.push((index, rest)),
+                None => groups.push(Group { open, factor, rate, members: vec![(index, rest)] }),
+            }
+        }
+        groups
+    }
+
+    /// `coefficient * term` as a factor that depends on parameters only and a rest, with what the rest depends on.
+    fn split_off_fixed(&mut self, term: Expr, coefficient: &Rational) -> (Expr, Expr, Dependence) {
+        let factors = match self.graph.node(term) {
+            Node::Product(factors) => factors.to_vec(),
+            _ => vec![(term, Rational::one())],
+        };
+        let mut fixed = vec![(self.graph.number(coefficient.clone()), Rational::one())];
+        let mut rest = Vec::new();
+        let mut rate = Dependence::default();
+        for (base, exponent) in factors {
+            let slot = self.lower(base);
+            let dependence = self.program.dependence(slot);
+            rate = rate.join(dependence);
+            if dependence.is_fixed() { &mut fixed } else { &mut rest }.push((base, exponent));
+        }
+        (self.graph.product(fixed), self.graph.product(rest), rate)
     }
 
     /// The sum of signed values; negative only where all of them are.

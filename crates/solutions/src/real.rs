@@ -107,10 +107,7 @@ fn cosine(x: f64) -> f64 {
             * square
             * (-2.755_731_435_139_066_3e-7
                 + z * (2.087_572_321_298_175e-9 + z * -1.135_964_755_778_819_5e-11));
-    let half = 0.5 * z;
-    let leading = 1.0 - half;
-    // What the rounding of the leading part left out comes back with the tail.
-    leading + (((1.0 - leading) - half) + z * tail)
+    (1.0 - 0.5 * z) + z * tail
 }
 
 #[cfg(test)]

@@ -130,32 +130,32 @@ impl<T: crate::Real> AxisAligned<T> {
         let t66 = T::nearest(0.5) * parameters.E;
         let t67 = t66 / t47;
         let t69 = t18 * t67;
-        let t81 = parameters.nu * parameters.nu;
-        let t82 = T::nearest(2.0) * parameters.A;
-        let t83 = t82 * t25;
-        let t84 = t83 * parameters.E;
-        let t85 = t84 * t81;
-        let t86 = parameters.rho0 * t47;
-        let t87 = t86 * t50;
-        let t88 = t85 / t87;
-        let t91 = parameters.A * parameters.A;
-        let t92 = t91 * parameters.A;
-        let t93 = t25 * t25;
-        let t95 = t63 + t67;
-        let t96 = t92 * t93;
-        let t97 = t96 * t95;
-        let t98 = t97 / parameters.rho0;
-        let t103 = t25 * T::pi();
-        let t104 = T::nearest(2.0) * t91;
-        let t105 = t104 * t103;
-        let t106 = t105 * t95;
-        let t107 = t106 / parameters.rho0;
-        let t113 = t27 * parameters.nu;
-        let t114 = t113 / t87;
-        let t141 = T::nearest(2.0) / t7;
+        let t83 = parameters.nu * parameters.nu;
+        let t84 = T::nearest(2.0) * parameters.A;
+        let t85 = t84 * t25;
+        let t86 = t85 * parameters.E;
+        let t87 = t86 * t83;
+        let t88 = parameters.rho0 * t47;
+        let t89 = t88 * t50;
+        let t90 = t87 / t89;
+        let t92 = parameters.A * parameters.A;
+        let t93 = t92 * parameters.A;
+        let t94 = t25 * t25;
+        let t96 = t63 + t67;
+        let t97 = t93 * t94;
+        let t98 = t97 * t96;
+        let t99 = t98 / parameters.rho0;
+        let t104 = t25 * T::pi();
+        let t105 = T::nearest(2.0) * t92;
+        let t106 = t105 * t104;
+        let t107 = t106 * t96;
+        let t108 = t107 / parameters.rho0;
+        let t114 = t27 * parameters.nu;
+        let t115 = t114 / t89;
+        let t143 = T::nearest(2.0) / t7;
         Ok(AxisAligned {
             parameters,
-            fixed: [t7, t18, t19, t28, t63, t67, t69, t88, t98, t107, t114, t141],
+            fixed: [t7, t18, t19, t28, t63, t67, t69, t90, t99, t108, t115, t143],
         })
     }
     /// The solution with parameter values in the order of the description; missing ones take their
@@ -327,14 +327,16 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t71 = t70 * t35;
         let t72 = t71 * t68;
         let t73 = t64 + t72;
-        let t74 = t73 / t43;
-        let t75 = t41 + T::nearest(2.0);
-        let t76 = self.fixed[6] * t14;
-        let t77 = t76 * t39;
-        let t78 = t77 * t75;
-        let t79 = t64 + t78;
-        let t80 = t79 / t44;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t74, T::zero(), T::zero(), t80)
+        let t74 = T::one() / t43;
+        let t75 = t73 * t74;
+        let t76 = t41 + T::nearest(2.0);
+        let t77 = self.fixed[6] * t14;
+        let t78 = t77 * t39;
+        let t79 = t78 * t76;
+        let t80 = t64 + t79;
+        let t81 = T::one() / t44;
+        let t82 = t80 * t81;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t75, T::zero(), T::zero(), t82)
     }
     #[inline]
     fn body_force(
@@ -365,45 +367,47 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t58 = t57 + t56;
         let t59 = self.fixed[1] * t58;
         let t60 = t59.ln_1p();
-        let t89 = self.fixed[7] * t2;
-        let t90 = t43 * t43;
-        let t94 = t35 * t35;
-        let t99 = t2 * t94;
-        let t100 = self.fixed[8] * t99;
-        let t101 = -t100;
-        let t102 = t9 * t101;
-        let t108 = t2 * t35;
-        let t109 = self.fixed[9] * t108;
-        let t110 = -t109;
-        let t111 = t110 + t102;
-        let t112 = t9 * t111;
-        let t115 = self.fixed[10] * t2;
-        let t116 = -t115;
-        let t117 = t116 * t60;
-        let t118 = t112 + t117;
-        let t119 = t118 / t90;
-        let t120 = t89 + t119;
-        let t121 = t9 * t120;
-        let t122 = self.fixed[7] * t13;
-        let t123 = t44 * t44;
-        let t124 = t39 * t39;
-        let t125 = t13 * t124;
-        let t126 = self.fixed[8] * t125;
-        let t127 = -t126;
-        let t128 = t14 * t127;
-        let t129 = t13 * t39;
-        let t130 = self.fixed[9] * t129;
-        let t131 = -t130;
-        let t132 = t131 + t128;
-        let t133 = t14 * t132;
-        let t134 = self.fixed[10] * t13;
-        let t135 = -t134;
-        let t136 = t135 * t60;
-        let t137 = t133 + t136;
-        let t138 = t137 / t123;
-        let t139 = t122 + t138;
-        let t140 = t14 * t139;
-        crate::nalgebra::SVector::<T, 2>::new(t121, t140)
+        let t74 = T::one() / t43;
+        let t81 = T::one() / t44;
+        let t91 = self.fixed[7] * t2;
+        let t95 = t35 * t35;
+        let t100 = t2 * t95;
+        let t101 = self.fixed[8] * t100;
+        let t102 = -t101;
+        let t103 = t9 * t102;
+        let t109 = t2 * t35;
+        let t110 = self.fixed[9] * t109;
+        let t111 = -t110;
+        let t112 = t111 + t103;
+        let t113 = t9 * t112;
+        let t116 = self.fixed[10] * t2;
+        let t117 = -t116;
+        let t118 = t117 * t60;
+        let t119 = t113 + t118;
+        let t120 = t74 * t74;
+        let t121 = t119 * t120;
+        let t122 = t91 + t121;
+        let t123 = t9 * t122;
+        let t124 = self.fixed[7] * t13;
+        let t125 = t39 * t39;
+        let t126 = t13 * t125;
+        let t127 = self.fixed[8] * t126;
+        let t128 = -t127;
+        let t129 = t14 * t128;
+        let t130 = t13 * t39;
+        let t131 = self.fixed[9] * t130;
+        let t132 = -t131;
+        let t133 = t132 + t129;
+        let t134 = t14 * t133;
+        let t135 = self.fixed[10] * t13;
+        let t136 = -t135;
+        let t137 = t136 * t60;
+        let t138 = t134 + t137;
+        let t139 = t81 * t81;
+        let t140 = t138 * t139;
+        let t141 = t124 + t140;
+        let t142 = t14 * t141;
+        crate::nalgebra::SVector::<T, 2>::new(t123, t142)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t2 = X[0].sin_pi();
@@ -451,51 +455,53 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t71 = t70 * t35;
         let t72 = t71 * t68;
         let t73 = t64 + t72;
-        let t74 = t73 / t43;
-        let t75 = t41 + T::nearest(2.0);
-        let t76 = self.fixed[6] * t14;
-        let t77 = t76 * t39;
-        let t78 = t77 * t75;
-        let t79 = t64 + t78;
-        let t80 = t79 / t44;
-        let t89 = self.fixed[7] * t2;
-        let t90 = t43 * t43;
-        let t94 = t35 * t35;
-        let t99 = t2 * t94;
-        let t100 = self.fixed[8] * t99;
-        let t101 = -t100;
-        let t102 = t9 * t101;
-        let t108 = t2 * t35;
-        let t109 = self.fixed[9] * t108;
-        let t110 = -t109;
-        let t111 = t110 + t102;
-        let t112 = t9 * t111;
-        let t115 = self.fixed[10] * t2;
-        let t116 = -t115;
-        let t117 = t116 * t60;
-        let t118 = t112 + t117;
-        let t119 = t118 / t90;
-        let t120 = t89 + t119;
-        let t121 = t9 * t120;
-        let t122 = self.fixed[7] * t13;
-        let t123 = t44 * t44;
-        let t124 = t39 * t39;
-        let t125 = t13 * t124;
-        let t126 = self.fixed[8] * t125;
-        let t127 = -t126;
-        let t128 = t14 * t127;
-        let t129 = t13 * t39;
-        let t130 = self.fixed[9] * t129;
-        let t131 = -t130;
-        let t132 = t131 + t128;
-        let t133 = t14 * t132;
-        let t134 = self.fixed[10] * t13;
-        let t135 = -t134;
-        let t136 = t135 * t60;
-        let t137 = t133 + t136;
-        let t138 = t137 / t123;
-        let t139 = t122 + t138;
-        let t140 = t14 * t139;
+        let t74 = T::one() / t43;
+        let t75 = t73 * t74;
+        let t76 = t41 + T::nearest(2.0);
+        let t77 = self.fixed[6] * t14;
+        let t78 = t77 * t39;
+        let t79 = t78 * t76;
+        let t80 = t64 + t79;
+        let t81 = T::one() / t44;
+        let t82 = t80 * t81;
+        let t91 = self.fixed[7] * t2;
+        let t95 = t35 * t35;
+        let t100 = t2 * t95;
+        let t101 = self.fixed[8] * t100;
+        let t102 = -t101;
+        let t103 = t9 * t102;
+        let t109 = t2 * t35;
+        let t110 = self.fixed[9] * t109;
+        let t111 = -t110;
+        let t112 = t111 + t103;
+        let t113 = t9 * t112;
+        let t116 = self.fixed[10] * t2;
+        let t117 = -t116;
+        let t118 = t117 * t60;
+        let t119 = t113 + t118;
+        let t120 = t74 * t74;
+        let t121 = t119 * t120;
+        let t122 = t91 + t121;
+        let t123 = t9 * t122;
+        let t124 = self.fixed[7] * t13;
+        let t125 = t39 * t39;
+        let t126 = t13 * t125;
+        let t127 = self.fixed[8] * t126;
+        let t128 = -t127;
+        let t129 = t14 * t128;
+        let t130 = t13 * t39;
+        let t131 = self.fixed[9] * t130;
+        let t132 = -t131;
+        let t133 = t132 + t129;
+        let t134 = t14 * t133;
+        let t135 = self.fixed[10] * t13;
+        let t136 = -t135;
+        let t137 = t136 * t60;
+        let t138 = t134 + t137;
+        let t139 = t81 * t81;
+        let t140 = t138 * t139;
+        let t141 = t124 + t140;
+        let t142 = t14 * t141;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t11, t16),
             v: crate::nalgebra::SVector::<T, 2>::new(t22, t24),
@@ -503,8 +509,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
             H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t37, T::zero(), T::zero(), t41),
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t43, T::zero(), T::zero(), t44),
             J: t45,
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t74, T::zero(), T::zero(), t80),
-            b: crate::nalgebra::SVector::<T, 2>::new(t121, t140),
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t75, T::zero(), T::zero(), t82),
+            b: crate::nalgebra::SVector::<T, 2>::new(t123, t142),
         }
     }
     fn domain(&self) -> crate::Domain<T, 2> {
@@ -578,27 +584,27 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 5, 11> for AxisAligned<T> {
         let t35 = X[0].cos_pi();
         let t39 = X[1].cos_pi();
         let t55 = t35 * t39;
-        let t89 = self.fixed[7] * t2;
-        let t94 = t35 * t35;
-        let t99 = t2 * t94;
-        let t100 = self.fixed[8] * t99;
-        let t101 = -t100;
-        let t108 = t2 * t35;
-        let t109 = self.fixed[9] * t108;
-        let t110 = -t109;
-        let t115 = self.fixed[10] * t2;
-        let t116 = -t115;
-        let t122 = self.fixed[7] * t13;
-        let t124 = t39 * t39;
-        let t125 = t13 * t124;
-        let t126 = self.fixed[8] * t125;
-        let t127 = -t126;
-        let t129 = t13 * t39;
-        let t130 = self.fixed[9] * t129;
-        let t131 = -t130;
-        let t134 = self.fixed[10] * t13;
-        let t135 = -t134;
-        [t35, t39, t55, t89, t101, t110, t116, t122, t127, t131, t135]
+        let t91 = self.fixed[7] * t2;
+        let t95 = t35 * t35;
+        let t100 = t2 * t95;
+        let t101 = self.fixed[8] * t100;
+        let t102 = -t101;
+        let t109 = t2 * t35;
+        let t110 = self.fixed[9] * t109;
+        let t111 = -t110;
+        let t116 = self.fixed[10] * t2;
+        let t117 = -t116;
+        let t124 = self.fixed[7] * t13;
+        let t125 = t39 * t39;
+        let t126 = t13 * t125;
+        let t127 = self.fixed[8] * t126;
+        let t128 = -t127;
+        let t130 = t13 * t39;
+        let t131 = self.fixed[9] * t130;
+        let t132 = -t131;
+        let t135 = self.fixed[10] * t13;
+        let t136 = -t135;
+        [t35, t39, t55, t91, t102, t111, t117, t124, t128, t132, t136]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -617,25 +623,27 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 5, 11> for AxisAligned<T> {
         let t58 = t57 + t56;
         let t59 = self.fixed[1] * t58;
         let t60 = t59.ln_1p();
-        let t90 = t43 * t43;
-        let t102 = time[0] * point[4];
-        let t111 = point[5] + t102;
-        let t112 = time[0] * t111;
-        let t117 = point[6] * t60;
-        let t118 = t112 + t117;
-        let t119 = t118 / t90;
-        let t120 = point[3] + t119;
-        let t121 = time[0] * t120;
-        let t123 = t44 * t44;
-        let t128 = time[1] * point[8];
-        let t132 = point[9] + t128;
-        let t133 = time[1] * t132;
-        let t136 = point[10] * t60;
-        let t137 = t133 + t136;
-        let t138 = t137 / t123;
-        let t139 = point[7] + t138;
-        let t140 = time[1] * t139;
-        crate::nalgebra::SVector::<T, 2>::new(t121, t140)
+        let t74 = T::one() / t43;
+        let t81 = T::one() / t44;
+        let t103 = time[0] * point[4];
+        let t112 = point[5] + t103;
+        let t113 = time[0] * t112;
+        let t118 = point[6] * t60;
+        let t119 = t113 + t118;
+        let t120 = t74 * t74;
+        let t121 = t119 * t120;
+        let t122 = point[3] + t121;
+        let t123 = time[0] * t122;
+        let t129 = time[1] * point[8];
+        let t133 = point[9] + t129;
+        let t134 = time[1] * t133;
+        let t137 = point[10] * t60;
+        let t138 = t134 + t137;
+        let t139 = t81 * t81;
+        let t140 = t138 * t139;
+        let t141 = point[7] + t140;
+        let t142 = time[1] * t141;
+        crate::nalgebra::SVector::<T, 2>::new(t123, t142)
     }
 }
 impl<T: crate::Real> From<AxisAligned<T>> for crate::AnySolution<T> {

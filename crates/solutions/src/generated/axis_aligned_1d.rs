@@ -129,14 +129,14 @@ impl<T: crate::Real> AxisAligned1d<T> {
         let t42 = T::nearest(0.5) * parameters.E;
         let t43 = t42 / t32;
         let t45 = t14 * t43;
-        let t51 = parameters.nu * parameters.nu;
-        let t52 = T::nearest(2.0) * parameters.A;
-        let t53 = t52 * t19;
-        let t54 = t53 * parameters.E;
-        let t55 = t54 * t51;
-        let t56 = parameters.rho0 * t32;
-        let t57 = t56 * t35;
-        let t58 = t55 / t57;
+        let t52 = parameters.nu * parameters.nu;
+        let t53 = T::nearest(2.0) * parameters.A;
+        let t54 = t53 * t19;
+        let t55 = t54 * parameters.E;
+        let t56 = t55 * t52;
+        let t57 = parameters.rho0 * t32;
+        let t58 = t57 * t35;
+        let t59 = t56 / t58;
         let t61 = parameters.A * parameters.A;
         let t62 = t61 * parameters.A;
         let t63 = t19 * t19;
@@ -150,11 +150,11 @@ impl<T: crate::Real> AxisAligned1d<T> {
         let t76 = t75 * t65;
         let t77 = t76 / parameters.rho0;
         let t83 = t21 * parameters.nu;
-        let t84 = t83 / t57;
-        let t92 = T::nearest(2.0) / t7;
+        let t84 = t83 / t58;
+        let t93 = T::nearest(2.0) / t7;
         Ok(AxisAligned1d {
             parameters,
-            fixed: [t7, t14, t15, t22, t39, t43, t45, t58, t68, t77, t84, t92],
+            fixed: [t7, t14, t15, t22, t39, t43, t45, t59, t68, t77, t84, t93],
         })
     }
     /// The solution with parameter values in the order of the description; missing ones take their
@@ -284,8 +284,9 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         let t47 = t46 * t26;
         let t48 = t47 * t44;
         let t49 = t40 + t48;
-        let t50 = t49 / t30;
-        crate::nalgebra::SMatrix::<T, 1, 1>::new(t50)
+        let t50 = T::one() / t30;
+        let t51 = t49 * t50;
+        crate::nalgebra::SMatrix::<T, 1, 1>::new(t51)
     }
     #[inline]
     fn body_force(
@@ -301,8 +302,8 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         let t28 = t27 * t26;
         let t30 = t28 + T::one();
         let t36 = t28.ln_1p();
-        let t59 = self.fixed[7] * t2;
-        let t60 = t30 * t30;
+        let t50 = T::one() / t30;
+        let t60 = self.fixed[7] * t2;
         let t64 = t26 * t26;
         let t69 = t2 * t64;
         let t70 = self.fixed[8] * t69;
@@ -317,10 +318,11 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         let t86 = -t85;
         let t87 = t86 * t36;
         let t88 = t82 + t87;
-        let t89 = t88 / t60;
-        let t90 = t59 + t89;
-        let t91 = t9 * t90;
-        crate::nalgebra::SVector::<T, 1>::new(t91)
+        let t89 = t50 * t50;
+        let t90 = t88 * t89;
+        let t91 = t60 + t90;
+        let t92 = t9 * t91;
+        crate::nalgebra::SVector::<T, 1>::new(t92)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 1>, t: T) -> crate::Fields<T, 1> {
         let t2 = X[0].sin_pi();
@@ -346,9 +348,9 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         let t47 = t46 * t26;
         let t48 = t47 * t44;
         let t49 = t40 + t48;
-        let t50 = t49 / t30;
-        let t59 = self.fixed[7] * t2;
-        let t60 = t30 * t30;
+        let t50 = T::one() / t30;
+        let t51 = t49 * t50;
+        let t60 = self.fixed[7] * t2;
         let t64 = t26 * t26;
         let t69 = t2 * t64;
         let t70 = self.fixed[8] * t69;
@@ -363,9 +365,10 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         let t86 = -t85;
         let t87 = t86 * t36;
         let t88 = t82 + t87;
-        let t89 = t88 / t60;
-        let t90 = t59 + t89;
-        let t91 = t9 * t90;
+        let t89 = t50 * t50;
+        let t90 = t88 * t89;
+        let t91 = t60 + t90;
+        let t92 = t9 * t91;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 1>::new(t11),
             v: crate::nalgebra::SVector::<T, 1>::new(t18),
@@ -373,8 +376,8 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
             H: crate::nalgebra::SMatrix::<T, 1, 1>::new(t28),
             F: crate::nalgebra::SMatrix::<T, 1, 1>::new(t30),
             J: t30,
-            P: crate::nalgebra::SMatrix::<T, 1, 1>::new(t50),
-            b: crate::nalgebra::SVector::<T, 1>::new(t91),
+            P: crate::nalgebra::SMatrix::<T, 1, 1>::new(t51),
+            b: crate::nalgebra::SVector::<T, 1>::new(t92),
         }
     }
     fn domain(&self) -> crate::Domain<T, 1> {
@@ -433,7 +436,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 5> for AxisAligned1d<T> {
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 1>) -> [T; 5] {
         let t2 = X[0].sin_pi();
         let t26 = X[0].cos_pi();
-        let t59 = self.fixed[7] * t2;
+        let t60 = self.fixed[7] * t2;
         let t64 = t26 * t26;
         let t69 = t2 * t64;
         let t70 = self.fixed[8] * t69;
@@ -443,7 +446,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 5> for AxisAligned1d<T> {
         let t80 = -t79;
         let t85 = self.fixed[10] * t2;
         let t86 = -t85;
-        [t26, t59, t71, t80, t86]
+        [t26, t60, t71, t80, t86]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -454,16 +457,17 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 5> for AxisAligned1d<T> {
         let t28 = time[1] * point[0];
         let t30 = t28 + T::one();
         let t36 = t28.ln_1p();
-        let t60 = t30 * t30;
+        let t50 = T::one() / t30;
         let t72 = time[0] * point[2];
         let t81 = point[3] + t72;
         let t82 = time[0] * t81;
         let t87 = point[4] * t36;
         let t88 = t82 + t87;
-        let t89 = t88 / t60;
-        let t90 = point[1] + t89;
-        let t91 = time[0] * t90;
-        crate::nalgebra::SVector::<T, 1>::new(t91)
+        let t89 = t50 * t50;
+        let t90 = t88 * t89;
+        let t91 = point[1] + t90;
+        let t92 = time[0] * t91;
+        crate::nalgebra::SVector::<T, 1>::new(t92)
     }
 }
 impl<T: crate::Real> From<AxisAligned1d<T>> for crate::AnySolution<T> {

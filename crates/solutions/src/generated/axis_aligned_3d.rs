@@ -138,41 +138,41 @@ impl<T: crate::Real> AxisAligned3d<T> {
         let t106 = T::nearest(0.5) * parameters.E;
         let t107 = t106 / t88;
         let t109 = t31 * t107;
-        let t125 = parameters.nu * parameters.nu;
-        let t126 = T::nearest(2.0) * parameters.A;
-        let t127 = t126 * t46;
-        let t128 = t127 * parameters.E;
-        let t129 = t128 * t125;
-        let t130 = parameters.rho0 * t88;
-        let t131 = t130 * t90;
-        let t132 = t129 / t131;
-        let t135 = parameters.A * parameters.A;
-        let t136 = t135 * parameters.A;
-        let t137 = t46 * t46;
-        let t139 = t104 + t107;
-        let t140 = t136 * t137;
-        let t141 = t140 * t139;
-        let t142 = t141 / parameters.rho0;
-        let t147 = t46 * T::pi();
-        let t148 = T::nearest(2.0) * t135;
-        let t149 = t148 * t147;
-        let t150 = t149 * t139;
-        let t151 = t150 / parameters.rho0;
-        let t157 = t48 * parameters.nu;
-        let t158 = t157 / t131;
-        let t166 = t48 * t125;
-        let t167 = t166 / t131;
-        let t173 = T::nearest(0.125) * t136;
-        let t174 = t173 * t137;
-        let t175 = t174 * t139;
-        let t176 = t175 / parameters.rho0;
-        let t180 = T::nearest(0.5) * t135;
-        let t181 = t180 * t147;
-        let t182 = t181 * t139;
-        let t183 = t182 / parameters.rho0;
-        let t189 = t54 * parameters.nu;
-        let t190 = t189 / t131;
-        let t215 = T::nearest(2.0) / t7;
+        let t128 = parameters.nu * parameters.nu;
+        let t129 = T::nearest(2.0) * parameters.A;
+        let t130 = t129 * t46;
+        let t131 = t130 * parameters.E;
+        let t132 = t131 * t128;
+        let t133 = parameters.rho0 * t88;
+        let t134 = t133 * t90;
+        let t135 = t132 / t134;
+        let t137 = parameters.A * parameters.A;
+        let t138 = t137 * parameters.A;
+        let t139 = t46 * t46;
+        let t141 = t104 + t107;
+        let t142 = t138 * t139;
+        let t143 = t142 * t141;
+        let t144 = t143 / parameters.rho0;
+        let t149 = t46 * T::pi();
+        let t150 = T::nearest(2.0) * t137;
+        let t151 = t150 * t149;
+        let t152 = t151 * t141;
+        let t153 = t152 / parameters.rho0;
+        let t159 = t48 * parameters.nu;
+        let t160 = t159 / t134;
+        let t169 = t48 * t128;
+        let t170 = t169 / t134;
+        let t175 = T::nearest(0.125) * t138;
+        let t176 = t175 * t139;
+        let t177 = t176 * t141;
+        let t178 = t177 / parameters.rho0;
+        let t182 = T::nearest(0.5) * t137;
+        let t183 = t182 * t149;
+        let t184 = t183 * t141;
+        let t185 = t184 / parameters.rho0;
+        let t191 = t54 * parameters.nu;
+        let t192 = t191 / t134;
+        let t218 = T::nearest(2.0) / t7;
         Ok(AxisAligned3d {
             parameters,
             fixed: [
@@ -188,15 +188,15 @@ impl<T: crate::Real> AxisAligned3d<T> {
                 t104,
                 t107,
                 t109,
-                t132,
-                t142,
-                t151,
-                t158,
-                t167,
-                t176,
-                t183,
-                t190,
-                t215,
+                t135,
+                t144,
+                t153,
+                t160,
+                t170,
+                t178,
+                t185,
+                t192,
+                t218,
             ],
         })
     }
@@ -454,31 +454,34 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t111 = t110 * t60;
         let t112 = t111 * t108;
         let t113 = t105 + t112;
-        let t114 = t113 / t73;
-        let t115 = t67 + T::nearest(2.0);
-        let t116 = t67 * t115;
-        let t117 = self.fixed[10] * t116;
-        let t118 = t105 + t117;
-        let t119 = t118 / t83;
-        let t120 = t71 + T::nearest(2.0);
-        let t121 = t71 * t120;
-        let t122 = self.fixed[10] * t121;
-        let t123 = t105 + t122;
-        let t124 = t123 / t84;
+        let t114 = T::one() / t73;
+        let t115 = t113 * t114;
+        let t116 = t67 + T::nearest(2.0);
+        let t117 = t67 * t116;
+        let t118 = self.fixed[10] * t117;
+        let t119 = t105 + t118;
+        let t120 = T::one() / t83;
+        let t121 = t119 * t120;
+        let t122 = t71 + T::nearest(2.0);
+        let t123 = t71 * t122;
+        let t124 = self.fixed[10] * t123;
+        let t125 = t105 + t124;
+        let t126 = T::one() / t84;
+        let t127 = t125 * t126;
         crate::nalgebra::SMatrix::<
             T,
             3,
             3,
         >::new(
-            t114,
+            t115,
             T::zero(),
             T::zero(),
             T::zero(),
-            t119,
+            t121,
             T::zero(),
             T::zero(),
             T::zero(),
-            t124,
+            t127,
         )
     }
     #[inline]
@@ -521,62 +524,65 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t99 = t98 + t93;
         let t100 = t99 + t94;
         let t101 = t100.ln_1p();
-        let t133 = self.fixed[12] * t2;
-        let t134 = t73 * t73;
-        let t138 = t60 * t60;
-        let t143 = t2 * t138;
-        let t144 = self.fixed[13] * t143;
-        let t145 = -t144;
-        let t146 = t9 * t145;
-        let t152 = t2 * t60;
-        let t153 = self.fixed[14] * t152;
-        let t154 = -t153;
-        let t155 = t154 + t146;
-        let t156 = t9 * t155;
-        let t159 = self.fixed[15] * t2;
-        let t160 = -t159;
-        let t161 = t160 * t101;
-        let t162 = t156 + t161;
-        let t163 = t162 / t134;
-        let t164 = t133 + t163;
-        let t165 = t9 * t164;
-        let t168 = self.fixed[16] * t14;
-        let t169 = -t168;
-        let t170 = t83 * t83;
-        let t172 = t64 * t64;
-        let t177 = t14 * t172;
-        let t178 = self.fixed[17] * t177;
-        let t179 = t19 * t178;
-        let t184 = t14 * t64;
-        let t185 = self.fixed[18] * t184;
-        let t186 = -t185;
-        let t187 = t186 + t179;
-        let t188 = t19 * t187;
-        let t191 = self.fixed[19] * t14;
-        let t192 = t191 * t101;
-        let t193 = t188 + t192;
-        let t194 = t193 / t170;
-        let t195 = t169 + t194;
-        let t196 = t19 * t195;
-        let t197 = self.fixed[16] * t25;
-        let t198 = -t197;
-        let t199 = t84 * t84;
-        let t200 = t68 * t68;
-        let t201 = t25 * t200;
-        let t202 = self.fixed[17] * t201;
-        let t203 = t26 * t202;
-        let t204 = t25 * t68;
-        let t205 = self.fixed[18] * t204;
-        let t206 = -t205;
-        let t207 = t206 + t203;
-        let t208 = t26 * t207;
-        let t209 = self.fixed[19] * t25;
-        let t210 = t209 * t101;
-        let t211 = t208 + t210;
-        let t212 = t211 / t199;
-        let t213 = t198 + t212;
-        let t214 = t26 * t213;
-        crate::nalgebra::SVector::<T, 3>::new(t165, t196, t214)
+        let t114 = T::one() / t73;
+        let t120 = T::one() / t83;
+        let t126 = T::one() / t84;
+        let t136 = self.fixed[12] * t2;
+        let t140 = t60 * t60;
+        let t145 = t2 * t140;
+        let t146 = self.fixed[13] * t145;
+        let t147 = -t146;
+        let t148 = t9 * t147;
+        let t154 = t2 * t60;
+        let t155 = self.fixed[14] * t154;
+        let t156 = -t155;
+        let t157 = t156 + t148;
+        let t158 = t9 * t157;
+        let t161 = self.fixed[15] * t2;
+        let t162 = -t161;
+        let t163 = t162 * t101;
+        let t164 = t158 + t163;
+        let t165 = t114 * t114;
+        let t166 = t164 * t165;
+        let t167 = t136 + t166;
+        let t168 = t9 * t167;
+        let t171 = self.fixed[16] * t14;
+        let t172 = -t171;
+        let t174 = t64 * t64;
+        let t179 = t14 * t174;
+        let t180 = self.fixed[17] * t179;
+        let t181 = t19 * t180;
+        let t186 = t14 * t64;
+        let t187 = self.fixed[18] * t186;
+        let t188 = -t187;
+        let t189 = t188 + t181;
+        let t190 = t19 * t189;
+        let t193 = self.fixed[19] * t14;
+        let t194 = t193 * t101;
+        let t195 = t190 + t194;
+        let t196 = t120 * t120;
+        let t197 = t195 * t196;
+        let t198 = t172 + t197;
+        let t199 = t19 * t198;
+        let t200 = self.fixed[16] * t25;
+        let t201 = -t200;
+        let t202 = t68 * t68;
+        let t203 = t25 * t202;
+        let t204 = self.fixed[17] * t203;
+        let t205 = t26 * t204;
+        let t206 = t25 * t68;
+        let t207 = self.fixed[18] * t206;
+        let t208 = -t207;
+        let t209 = t208 + t205;
+        let t210 = t26 * t209;
+        let t211 = self.fixed[19] * t25;
+        let t212 = t211 * t101;
+        let t213 = t210 + t212;
+        let t214 = t126 * t126;
+        let t215 = t213 * t214;
+        let t216 = t201 + t215;
+        let t217 = t26 * t216;
+        crate::nalgebra::SVector::<T, 3>::new(t168, t199, t217)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> crate::Fields<T, 3> {
         let t2 = X[0].sin_pi();
@@ -655,72 +661,75 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t111 = t110 * t60;
         let t112 = t111 * t108;
         let t113 = t105 + t112;
-        let t114 = t113 / t73;
-        let t115 = t67 + T::nearest(2.0);
-        let t116 = t67 * t115;
-        let t117 = self.fixed[10] * t116;
-        let t118 = t105 + t117;
-        let t119 = t118 / t83;
-        let t120 = t71 + T::nearest(2.0);
-        let t121 = t71 * t120;
-        let t122 = self.fixed[10] * t121;
-        let t123 = t105 + t122;
-        let t124 = t123 / t84;
-        let t133 = self.fixed[12] * t2;
-        let t134 = t73 * t73;
-        let t138 = t60 * t60;
-        let t143 = t2 * t138;
-        let t144 = self.fixed[13] * t143;
-        let t145 = -t144;
-        let t146 = t9 * t145;
-        let t152 = t2 * t60;
-        let t153 = self.fixed[14] * t152;
-        let t154 = -t153;
-        let t155 = t154 + t146;
-        let t156 = t9 * t155;
-        let t159 = self.fixed[15] * t2;
-        let t160 = -t159;
-        let t161 = t160 * t101;
-        let t162 = t156 + t161;
-        let t163 = t162 / t134;
-        let t164 = t133 + t163;
-        let t165 = t9 * t164;
-        let t168 = self.fixed[16] * t14;
-        let t169 = -t168;
-        let t170 = t83 * t83;
-        let t172 = t64 * t64;
-        let t177 = t14 * t172;
-        let t178 = self.fixed[17] * t177;
-        let t179 = t19 * t178;
-        let t184 = t14 * t64;
-        let t185 = self.fixed[18] * t184;
-        let t186 = -t185;
-        let t187 = t186 + t179;
-        let t188 = t19 * t187;
-        let t191 = self.fixed[19] * t14;
-        let t192 = t191 * t101;
-        let t193 = t188 + t192;
-        let t194 = t193 / t170;
-        let t195 = t169 + t194;
-        let t196 = t19 * t195;
-        let t197 = self.fixed[16] * t25;
-        let t198 = -t197;
-        let t199 = t84 * t84;
-        let t200 = t68 * t68;
-        let t201 = t25 * t200;
-        let t202 = self.fixed[17] * t201;
-        let t203 = t26 * t202;
-        let t204 = t25 * t68;
-        let t205 = self.fixed[18] * t204;
-        let t206 = -t205;
-        let t207 = t206 + t203;
-        let t208 = t26 * t207;
-        let t209 = self.fixed[19] * t25;
-        let t210 = t209 * t101;
-        let t211 = t208 + t210;
-        let t212 = t211 / t199;
-        let t213 = t198 + t212;
-        let t214 = t26 * t213;
+        let t114 = T::one() / t73;
+        let t115 = t113 * t114;
+        let t116 = t67 + T::nearest(2.0);
+        let t117 = t67 * t116;
+        let t118 = self.fixed[10] * t117;
+        let t119 = t105 + t118;
+        let t120 = T::one() / t83;
+        let t121 = t119 * t120;
+        let t122 = t71 + T::nearest(2.0);
+        let t123 = t71 * t122;
+        let t124 = self.fixed[10] * t123;
+        let t125 = t105 + t124;
+        let t126 = T::one() / t84;
+        let t127 = t125 * t126;
+        let t136 = self.fixed[12] * t2;
+        let t140 = t60 * t60;
+        let t145 = t2 * t140;
+        let t146 = self.fixed[13] * t145;
+        let t147 = -t146;
+        let t148 = t9 * t147;
+        let t154 = t2 * t60;
+        let t155 = self.fixed[14] * t154;
+        let t156 = -t155;
+        let t157 = t156 + t148;
+        let t158 = t9 * t157;
+        let t161 = self.fixed[15] * t2;
+        let t162 = -t161;
+        let t163 = t162 * t101;
+        let t164 = t158 + t163;
+        let t165 = t114 * t114;
+        let t166 = t164 * t165;
+        let t167 = t136 + t166;
+        let t168 = t9 * t167;
+        let t171 = self.fixed[16] * t14;
+        let t172 = -t171;
+        let t174 = t64 * t64;
+        let t179 = t14 * t174;
+        let t180 = self.fixed[17] * t179;
+        let t181 = t19 * t180;
+        let t186 = t14 * t64;
+        let t187 = self.fixed[18] * t186;
+        let t188 = -t187;
+        let t189 = t188 + t181;
+        let t190 = t19 * t189;
+        let t193 = self.fixed[19] * t14;
+        let t194 = t193 * t101;
+        let t195 = t190 + t194;
+        let t196 = t120 * t120;
+        let t197 = t195 * t196;
+        let t198 = t172 + t197;
+        let t199 = t19 * t198;
+        let t200 = self.fixed[16] * t25;
+        let t201 = -t200;
+        let t202 = t68 * t68;
+        let t203 = t25 * t202;
+        let t204 = self.fixed[17] * t203;
+        let t205 = t26 * t204;
+        let t206 = t25 * t68;
+        let t207 = self.fixed[18] * t206;
+        let t208 = -t207;
+        let t209 = t208 + t205;
+        let t210 = t26 * t209;
+        let t211 = self.fixed[19] * t25;
+        let t212 = t211 * t101;
+        let t213 = t210 + t212;
+        let t214 = t126 * t126;
+        let t215 = t213 * t214;
+        let t216 = t201 + t215;
+        let t217 = t26 * t216;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 3>::new(t11, t23, t29),
             v: crate::nalgebra::SVector::<T, 3>::new(t34, t41, t45),
@@ -761,17 +770,17 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 3,
                 3,
             >::new(
-                t114,
+                t115,
                 T::zero(),
                 T::zero(),
                 T::zero(),
-                t119,
+                t121,
                 T::zero(),
                 T::zero(),
                 T::zero(),
-                t124,
+                t127,
             ),
-            b: crate::nalgebra::SVector::<T, 3>::new(t165, t196, t214),
+            b: crate::nalgebra::SVector::<T, 3>::new(t168, t199, t217),
         }
     }
     fn domain(&self) -> crate::Domain<T, 3> {
@@ -856,50 +865,50 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 15> for AxisAligned3d<T> {
         let t60 = X[0].cos_pi();
         let t64 = X[1].cos_pi();
         let t68 = X[2].cos_pi();
-        let t133 = self.fixed[12] * t2;
-        let t138 = t60 * t60;
-        let t143 = t2 * t138;
-        let t144 = self.fixed[13] * t143;
-        let t145 = -t144;
-        let t152 = t2 * t60;
-        let t153 = self.fixed[14] * t152;
-        let t154 = -t153;
-        let t159 = self.fixed[15] * t2;
-        let t160 = -t159;
-        let t168 = self.fixed[16] * t14;
-        let t169 = -t168;
-        let t172 = t64 * t64;
-        let t177 = t14 * t172;
-        let t178 = self.fixed[17] * t177;
-        let t184 = t14 * t64;
-        let t185 = self.fixed[18] * t184;
-        let t186 = -t185;
-        let t191 = self.fixed[19] * t14;
-        let t197 = self.fixed[16] * t25;
-        let t198 = -t197;
-        let t200 = t68 * t68;
-        let t201 = t25 * t200;
-        let t202 = self.fixed[17] * t201;
-        let t204 = t25 * t68;
-        let t205 = self.fixed[18] * t204;
-        let t206 = -t205;
-        let t209 = self.fixed[19] * t25;
+        let t136 = self.fixed[12] * t2;
+        let t140 = t60 * t60;
+        let t145 = t2 * t140;
+        let t146 = self.fixed[13] * t145;
+        let t147 = -t146;
+        let t154 = t2 * t60;
+        let t155 = self.fixed[14] * t154;
+        let t156 = -t155;
+        let t161 = self.fixed[15] * t2;
+        let t162 = -t161;
+        let t171 = self.fixed[16] * t14;
+        let t172 = -t171;
+        let t174 = t64 * t64;
+        let t179 = t14 * t174;
+        let t180 = self.fixed[17] * t179;
+        let t186 = t14 * t64;
+        let t187 = self.fixed[18] * t186;
+        let t188 = -t187;
+        let t193 = self.fixed[19] * t14;
+        let t200 = self.fixed[16] * t25;
+        let t201 = -t200;
+        let t202 = t68 * t68;
+        let t203 = t25 * t202;
+        let t204 = self.fixed[17] * t203;
+        let t206 = t25 * t68;
+        let t207 = self.fixed[18] * t206;
+        let t208 = -t207;
+        let t211 = self.fixed[19] * t25;
         [
             t60,
             t64,
             t68,
-            t133,
-            t145,
-            t154,
-            t160,
-            t169,
-            t178,
-            t186,
-            t191,
-            t198,
-            t202,
-            t206,
-            t209,
+            t136,
+            t147,
+            t156,
+            t162,
+            t172,
+            t180,
+            t188,
+            t193,
+            t201,
+            t204,
+            t208,
+            t211,
         ]
     }
     #[inline(always)]
@@ -927,34 +936,37 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 15> for AxisAligned3d<T> {
         let t99 = t98 + t93;
         let t100 = t99 + t94;
         let t101 = t100.ln_1p();
-        let t134 = t73 * t73;
-        let t146 = time[0] * point[4];
-        let t155 = point[5] + t146;
-        let t156 = time[0] * t155;
-        let t161 = point[6] * t101;
-        let t162 = t156 + t161;
-        let t163 = t162 / t134;
-        let t164 = point[3] + t163;
-        let t165 = time[0] * t164;
-        let t170 = t83 * t83;
-        let t179 = time[1] * point[8];
-        let t187 = point[9] + t179;
-        let t188 = time[1] * t187;
-        let t192 = point[10] * t101;
-        let t193 = t188 + t192;
-        let t194 = t193 / t170;
-        let t195 = point[7] + t194;
-        let t196 = time[1] * t195;
-        let t199 = t84 * t84;
-        let t203 = time[2] * point[12];
-        let t207 = point[13] + t203;
-        let t208 = time[2] * t207;
-        let t210 = point[14] * t101;
-        let t211 = t208 + t210;
-        let t212 = t211 / t199;
-        let t213 = point[11] + t212;
-        let t214 = time[2] * t213;
-        crate::nalgebra::SVector::<T, 3>::new(t165, t196, t214)
+        let t114 = T::one() / t73;
+        let t120 = T::one() / t83;
+        let t126 = T::one() / t84;
+        let t148 = time[0] * point[4];
+        let t157 = point[5] + t148;
+        let t158 = time[0] * t157;
+        let t163 = point[6] * t101;
+        let t164 = t158 + t163;
+        let t165 = t114 * t114;
+        let t166 = t164 * t165;
+        let t167 = point[3] + t166;
+        let t168 = time[0] * t167;
+        let t181 = time[1] * point[8];
+        let t189 = point[9] + t181;
+        let t190 = time[1] * t189;
+        let t194 = point[10] * t101;
+        let t195 = t190 + t194;
+        let t196 = t120 * t120;
+        let t197 = t195 * t196;
+        let t198 = point[7] + t197;
+        let t199 = time[1] * t198;
+        let t205 = time[2] * point[12];
+        let t209 = point[13] + t205;
+        let t210 = time[2] * t209;
+        let t212 = point[14] * t101;
+        let t213 = t210 + t212;
+        let t214 = t126 * t126;
+        let t215 = t213 * t214;
+        let t216 = point[11] + t215;
+        let t217 = time[2] * t216;
+        crate::nalgebra::SVector::<T, 3>::new(t168, t199, t217)
     }
 }
 impl<T: crate::Real> From<AxisAligned3d<T>> for crate::AnySolution<T> {

@@ -147,13 +147,13 @@ impl<T: crate::Real> Bar<T> {
         let t49 = t47 / t48;
         let t52 = T::nearest(0.5) * parameters.E;
         let t53 = t52 / t43;
-        let t60 = parameters.nu / t45;
-        let t61 = t60 + T::one();
-        let t62 = T::nearest(4.0) * t61;
-        let t63 = t62 / t43;
-        let t64 = T::one() - t63;
-        let t65 = t28 * t64;
-        let t66 = t65 / t29;
+        let t61 = parameters.nu / t45;
+        let t62 = t61 + T::one();
+        let t63 = T::nearest(4.0) * t62;
+        let t64 = t63 / t43;
+        let t65 = T::one() - t64;
+        let t66 = t28 * t65;
+        let t67 = t66 / t29;
         let t71 = parameters.A * parameters.A;
         let t72 = t71 * parameters.A;
         let t73 = t25 * t25;
@@ -178,13 +178,13 @@ impl<T: crate::Real> Bar<T> {
         let t102 = t29 * t43;
         let t103 = t102 * t45;
         let t104 = t101 / t103;
-        let t112 = T::nearest(2.0) * parameters.L;
-        let t113 = t112 / t11;
-        let t115 = -t36;
+        let t113 = T::nearest(2.0) * parameters.L;
+        let t114 = t113 / t11;
+        let t116 = -t36;
         if !(t36 < parameters.L) {
             return Err(Self::DESCRIPTION.requirement_broken("2*Pi*A < L", &values));
         }
-        if !(t115 < parameters.L) {
+        if !(t116 < parameters.L) {
             return Err(Self::DESCRIPTION.requirement_broken("-2*Pi*A < L", &values));
         }
         Ok(Bar {
@@ -199,12 +199,12 @@ impl<T: crate::Real> Bar<T> {
                 t37,
                 t49,
                 t53,
-                t66,
+                t67,
                 t81,
                 t92,
                 t104,
-                t113,
-                t115,
+                t114,
+                t116,
             ],
         })
     }
@@ -344,8 +344,9 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
         let t55 = t39 * t54;
         let t56 = self.fixed[8] * t55;
         let t57 = t50 + t56;
-        let t58 = t57 / t41;
-        crate::nalgebra::SMatrix::<T, 1, 1>::new(t58)
+        let t58 = T::one() / t41;
+        let t59 = t57 * t58;
+        crate::nalgebra::SMatrix::<T, 1, 1>::new(t59)
     }
     #[inline]
     fn body_force(
@@ -362,9 +363,9 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
         let t39 = t38 * t34;
         let t41 = t39 + T::one();
         let t46 = t39.ln_1p();
-        let t67 = self.fixed[9] * t6;
-        let t68 = -t67;
-        let t69 = t41 * t41;
+        let t58 = T::one() / t41;
+        let t68 = self.fixed[9] * t6;
+        let t69 = -t68;
         let t75 = t34 * t34;
         let t82 = t6 * t75;
         let t83 = self.fixed[10] * t82;
@@ -379,10 +380,11 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
         let t106 = -t105;
         let t107 = t106 * t46;
         let t108 = t97 + t107;
-        let t109 = t108 / t69;
-        let t110 = t68 + t109;
-        let t111 = t14 * t110;
-        crate::nalgebra::SVector::<T, 1>::new(t111)
+        let t109 = t58 * t58;
+        let t110 = t108 * t109;
+        let t111 = t69 + t110;
+        let t112 = t14 * t111;
+        crate::nalgebra::SVector::<T, 1>::new(t112)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 1>, t: T) -> crate::Fields<T, 1> {
         let t5 = self.fixed[0] * X[0];
@@ -408,10 +410,10 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
         let t55 = t39 * t54;
         let t56 = self.fixed[8] * t55;
         let t57 = t50 + t56;
-        let t58 = t57 / t41;
-        let t67 = self.fixed[9] * t6;
-        let t68 = -t67;
-        let t69 = t41 * t41;
+        let t58 = T::one() / t41;
+        let t59 = t57 * t58;
+        let t68 = self.fixed[9] * t6;
+        let t69 = -t68;
         let t75 = t34 * t34;
         let t82 = t6 * t75;
         let t83 = self.fixed[10] * t82;
@@ -426,9 +428,10 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
         let t106 = -t105;
         let t107 = t106 * t46;
         let t108 = t97 + t107;
-        let t109 = t108 / t69;
-        let t110 = t68 + t109;
-        let t111 = t14 * t110;
+        let t109 = t58 * t58;
+        let t110 = t108 * t109;
+        let t111 = t69 + t110;
+        let t112 = t14 * t111;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 1>::new(t16),
             v: crate::nalgebra::SVector::<T, 1>::new(t24),
@@ -436,8 +439,8 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
             H: crate::nalgebra::SMatrix::<T, 1, 1>::new(t39),
             F: crate::nalgebra::SMatrix::<T, 1, 1>::new(t41),
             J: t41,
-            P: crate::nalgebra::SMatrix::<T, 1, 1>::new(t58),
-            b: crate::nalgebra::SVector::<T, 1>::new(t111),
+            P: crate::nalgebra::SMatrix::<T, 1, 1>::new(t59),
+            b: crate::nalgebra::SVector::<T, 1>::new(t112),
         }
     }
     fn domain(&self) -> crate::Domain<T, 1> {
@@ -497,8 +500,8 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 5> for Bar<T> {
         let t5 = self.fixed[0] * X[0];
         let t6 = t5.sin_pi();
         let t34 = t5.cos_pi();
-        let t67 = self.fixed[9] * t6;
-        let t68 = -t67;
+        let t68 = self.fixed[9] * t6;
+        let t69 = -t68;
         let t75 = t34 * t34;
         let t82 = t6 * t75;
         let t83 = self.fixed[10] * t82;
@@ -508,7 +511,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 5> for Bar<T> {
         let t95 = -t94;
         let t105 = self.fixed[12] * t6;
         let t106 = -t105;
-        [t34, t68, t84, t95, t106]
+        [t34, t69, t84, t95, t106]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -519,16 +522,17 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 5> for Bar<T> {
         let t39 = time[1] * point[0];
         let t41 = t39 + T::one();
         let t46 = t39.ln_1p();
-        let t69 = t41 * t41;
+        let t58 = T::one() / t41;
         let t85 = time[0] * point[2];
         let t96 = point[3] + t85;
         let t97 = time[0] * t96;
         let t107 = point[4] * t46;
         let t108 = t97 + t107;
-        let t109 = t108 / t69;
-        let t110 = point[1] + t109;
-        let t111 = time[0] * t110;
-        crate::nalgebra::SVector::<T, 1>::new(t111)
+        let t109 = t58 * t58;
+        let t110 = t108 * t109;
+        let t111 = point[1] + t110;
+        let t112 = time[0] * t111;
+        crate::nalgebra::SVector::<T, 1>::new(t112)
     }
 }
 impl<T: crate::Real> From<Bar<T>> for crate::AnySolution<T> {

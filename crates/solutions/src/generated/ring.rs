@@ -132,42 +132,42 @@ impl<T: crate::Real> Ring<T> {
         let t24 = parameters.Ro - t18;
         let t26 = t15 * t19;
         let t28 = T::one() / t26;
-        let t41 = parameters.A * t11;
-        let t42 = t41 * T::pi();
-        let t48 = T::pi() * T::pi();
-        let t49 = parameters.A * parameters.E;
-        let t50 = t49 * t48;
-        let t51 = t50 / parameters.rho0;
-        let t59 = T::nearest(6.0) / t26;
-        let t86 = T::nearest(6.0) * parameters.A;
-        let t87 = t86 / t26;
-        let t95 = T::nearest(0.5) * parameters.E;
-        let t118 = parameters.Ri + parameters.Ro;
-        let t128 = t49 / parameters.rho0;
-        let t133 = parameters.A * parameters.A;
-        let t134 = t133 * t133;
-        let t135 = t15 * t15;
-        let t136 = t19 * t19;
-        let t142 = T::nearest(36.0) * t134;
-        let t143 = t142 * t95;
-        let t144 = parameters.rho0 * t135;
-        let t145 = t144 * t136;
-        let t146 = t143 / t145;
-        let t155 = t133 * parameters.A;
-        let t163 = T::nearest(2.0) * parameters.Ri;
-        let t164 = T::nearest(2.0) * parameters.Ro;
-        let t165 = t163 + t164;
-        let t171 = T::nearest(3.0) / t26;
-        let t174 = T::nearest(12.0) * t155;
-        let t175 = t174 * t95;
-        let t176 = parameters.rho0 * t15;
-        let t177 = t176 * t19;
-        let t178 = t175 / t177;
-        let t184 = t135 * t136;
-        let t185 = T::nearest(36.0) / t184;
-        let t189 = t133 * t95;
-        let t190 = t189 / parameters.rho0;
-        let t202 = T::nearest(2.0) / t11;
+        let t42 = parameters.A * t11;
+        let t43 = t42 * T::pi();
+        let t49 = T::pi() * T::pi();
+        let t50 = parameters.A * parameters.E;
+        let t51 = t50 * t49;
+        let t52 = t51 / parameters.rho0;
+        let t60 = T::nearest(6.0) / t26;
+        let t88 = T::nearest(6.0) * parameters.A;
+        let t89 = t88 / t26;
+        let t97 = T::nearest(0.5) * parameters.E;
+        let t120 = parameters.Ri + parameters.Ro;
+        let t130 = t50 / parameters.rho0;
+        let t135 = parameters.A * parameters.A;
+        let t136 = t135 * t135;
+        let t137 = t15 * t15;
+        let t138 = t19 * t19;
+        let t144 = T::nearest(36.0) * t136;
+        let t145 = t144 * t97;
+        let t146 = parameters.rho0 * t137;
+        let t147 = t146 * t138;
+        let t148 = t145 / t147;
+        let t157 = t135 * parameters.A;
+        let t165 = T::nearest(2.0) * parameters.Ri;
+        let t166 = T::nearest(2.0) * parameters.Ro;
+        let t167 = t165 + t166;
+        let t173 = T::nearest(3.0) / t26;
+        let t176 = T::nearest(12.0) * t157;
+        let t177 = t176 * t97;
+        let t178 = parameters.rho0 * t15;
+        let t179 = t178 * t19;
+        let t180 = t177 / t179;
+        let t186 = t137 * t138;
+        let t187 = T::nearest(36.0) / t186;
+        let t191 = t135 * t97;
+        let t192 = t191 / parameters.rho0;
+        let t204 = T::nearest(2.0) / t11;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -181,21 +181,21 @@ impl<T: crate::Real> Ring<T> {
                 t18,
                 t24,
                 t28,
-                t42,
-                t48,
-                t51,
-                t59,
-                t87,
-                t95,
-                t118,
-                t128,
-                t146,
-                t165,
-                t171,
-                t178,
-                t185,
-                t190,
-                t202,
+                t43,
+                t49,
+                t52,
+                t60,
+                t89,
+                t97,
+                t120,
+                t130,
+                t148,
+                t167,
+                t173,
+                t180,
+                t187,
+                t192,
+                t204,
             ],
         })
     }
@@ -253,12 +253,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
         let t33 = t31 * X[0];
-        let t34 = t33 / t5;
-        let t35 = t32 * t34;
-        let t36 = t31 * X[1];
-        let t37 = t36 / t5;
-        let t38 = t32 * t37;
-        crate::nalgebra::SVector::<T, 2>::new(t35, t38)
+        let t34 = T::one() / t5;
+        let t35 = t33 * t34;
+        let t36 = t32 * t35;
+        let t37 = t31 * X[1];
+        let t38 = t37 * t34;
+        let t39 = t32 * t38;
+        crate::nalgebra::SVector::<T, 2>::new(t36, t39)
     }
     #[inline]
     fn velocity(
@@ -279,16 +280,17 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t33 = t31 * X[0];
-        let t34 = t33 / t5;
-        let t36 = t31 * X[1];
-        let t37 = t36 / t5;
-        let t40 = t12.sin_pi();
-        let t43 = self.fixed[4] * t40;
-        let t44 = t43 * t34;
-        let t45 = -t44;
-        let t46 = t43 * t37;
-        let t47 = -t46;
-        crate::nalgebra::SVector::<T, 2>::new(t45, t47)
+        let t34 = T::one() / t5;
+        let t35 = t33 * t34;
+        let t37 = t31 * X[1];
+        let t38 = t37 * t34;
+        let t41 = t12.sin_pi();
+        let t44 = self.fixed[4] * t41;
+        let t45 = t44 * t35;
+        let t46 = -t45;
+        let t47 = t44 * t38;
+        let t48 = -t47;
+        crate::nalgebra::SVector::<T, 2>::new(t46, t48)
     }
     #[inline]
     fn acceleration(
@@ -310,15 +312,16 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t33 = t31 * X[0];
-        let t34 = t33 / t5;
-        let t36 = t31 * X[1];
-        let t37 = t36 / t5;
-        let t52 = self.fixed[6] * t13;
-        let t53 = t52 * t34;
-        let t54 = -t53;
-        let t55 = t52 * t37;
-        let t56 = -t55;
-        crate::nalgebra::SVector::<T, 2>::new(t54, t56)
+        let t34 = T::one() / t5;
+        let t35 = t33 * t34;
+        let t37 = t31 * X[1];
+        let t38 = t37 * t34;
+        let t53 = self.fixed[6] * t13;
+        let t54 = t53 * t35;
+        let t55 = -t54;
+        let t56 = t53 * t38;
+        let t57 = -t56;
+        crate::nalgebra::SVector::<T, 2>::new(t55, t57)
     }
     #[inline]
     fn displacement_gradient(
@@ -340,32 +343,34 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t58 = t5 - self.parameters.Ri;
-        let t60 = t20 * t1;
-        let t61 = t60 * t58;
-        let t62 = self.fixed[7] * t61;
-        let t63 = t31 * t3;
-        let t64 = t63 / t5;
-        let t65 = t62 + t64;
-        let t66 = t65 / t4;
-        let t67 = t32 * t66;
-        let t68 = t20 * t58;
-        let t69 = self.fixed[7] * t68;
-        let t70 = t31 / t5;
-        let t71 = t69 - t70;
-        let t72 = X[0] * X[1];
-        let t73 = t72 * t71;
-        let t74 = t73 / t4;
-        let t75 = t32 * t74;
-        let t76 = t20 * t3;
-        let t77 = t76 * t58;
-        let t78 = self.fixed[7] * t77;
-        let t79 = t31 * t1;
-        let t80 = t79 / t5;
-        let t81 = t78 + t80;
-        let t82 = t81 / t4;
-        let t83 = t32 * t82;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t67, t75, t75, t83)
+        let t34 = T::one() / t5;
+        let t59 = t5 - self.parameters.Ri;
+        let t61 = t20 * t1;
+        let t62 = t61 * t59;
+        let t63 = self.fixed[7] * t62;
+        let t64 = t31 * t3;
+        let t65 = t64 * t34;
+        let t66 = t63 + t65;
+        let t67 = t34 * t34;
+        let t68 = t66 * t67;
+        let t69 = t32 * t68;
+        let t70 = t20 * t59;
+        let t71 = self.fixed[7] * t70;
+        let t72 = t31 * t34;
+        let t73 = t71 - t72;
+        let t74 = X[0] * X[1];
+        let t75 = t74 * t73;
+        let t76 = t75 * t67;
+        let t77 = t32 * t76;
+        let t78 = t20 * t3;
+        let t79 = t78 * t59;
+        let t80 = self.fixed[7] * t79;
+        let t81 = t31 * t1;
+        let t82 = t81 * t34;
+        let t83 = t80 + t82;
+        let t84 = t83 * t67;
+        let t85 = t32 * t84;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t69, t77, t77, t85)
     }
     #[inline]
     fn deformation_gradient(
@@ -387,34 +392,36 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t58 = t5 - self.parameters.Ri;
-        let t60 = t20 * t1;
-        let t61 = t60 * t58;
-        let t62 = self.fixed[7] * t61;
-        let t63 = t31 * t3;
-        let t64 = t63 / t5;
-        let t65 = t62 + t64;
-        let t66 = t65 / t4;
-        let t67 = t32 * t66;
-        let t68 = t20 * t58;
-        let t69 = self.fixed[7] * t68;
-        let t70 = t31 / t5;
-        let t71 = t69 - t70;
-        let t72 = X[0] * X[1];
-        let t73 = t72 * t71;
-        let t74 = t73 / t4;
-        let t75 = t32 * t74;
-        let t76 = t20 * t3;
-        let t77 = t76 * t58;
-        let t78 = self.fixed[7] * t77;
-        let t79 = t31 * t1;
-        let t80 = t79 / t5;
-        let t81 = t78 + t80;
-        let t82 = t81 / t4;
-        let t83 = t32 * t82;
-        let t84 = t67 + T::one();
-        let t85 = t83 + T::one();
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t84, t75, t75, t85)
+        let t34 = T::one() / t5;
+        let t59 = t5 - self.parameters.Ri;
+        let t61 = t20 * t1;
+        let t62 = t61 * t59;
+        let t63 = self.fixed[7] * t62;
+        let t64 = t31 * t3;
+        let t65 = t64 * t34;
+        let t66 = t63 + t65;
+        let t67 = t34 * t34;
+        let t68 = t66 * t67;
+        let t69 = t32 * t68;
+        let t70 = t20 * t59;
+        let t71 = self.fixed[7] * t70;
+        let t72 = t31 * t34;
+        let t73 = t71 - t72;
+        let t74 = X[0] * X[1];
+        let t75 = t74 * t73;
+        let t76 = t75 * t67;
+        let t77 = t32 * t76;
+        let t78 = t20 * t3;
+        let t79 = t78 * t59;
+        let t80 = self.fixed[7] * t79;
+        let t81 = t31 * t1;
+        let t82 = t81 * t34;
+        let t83 = t80 + t82;
+        let t84 = t83 * t67;
+        let t85 = t32 * t84;
+        let t86 = t69 + T::one();
+        let t87 = t85 + T::one();
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t86, t77, t77, t87)
     }
     #[inline]
     fn jacobian(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> T {
@@ -432,16 +439,17 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t58 = t5 - self.parameters.Ri;
-        let t68 = t20 * t58;
-        let t70 = t31 / t5;
-        let t88 = self.fixed[8] * t13;
-        let t89 = t88 * t68;
-        let t90 = t89 + T::one();
-        let t91 = t32 * t70;
+        let t34 = T::one() / t5;
+        let t59 = t5 - self.parameters.Ri;
+        let t70 = t20 * t59;
+        let t72 = t31 * t34;
+        let t90 = self.fixed[8] * t13;
+        let t91 = t90 * t70;
         let t92 = t91 + T::one();
-        let t93 = t90 * t92;
-        t93
+        let t93 = t32 * t72;
+        let t94 = t93 + T::one();
+        let t95 = t92 * t94;
+        t95
     }
     #[inline]
     fn first_piola_kirchhoff(
@@ -463,41 +471,43 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t58 = t5 - self.parameters.Ri;
-        let t63 = t31 * t3;
-        let t64 = t63 / t5;
-        let t68 = t20 * t58;
-        let t70 = t31 / t5;
-        let t72 = X[0] * X[1];
-        let t79 = t31 * t1;
-        let t80 = t79 / t5;
-        let t88 = self.fixed[8] * t13;
-        let t89 = t88 * t68;
-        let t90 = t89 + T::one();
-        let t91 = t32 * t70;
+        let t34 = T::one() / t5;
+        let t59 = t5 - self.parameters.Ri;
+        let t64 = t31 * t3;
+        let t65 = t64 * t34;
+        let t67 = t34 * t34;
+        let t70 = t20 * t59;
+        let t72 = t31 * t34;
+        let t74 = X[0] * X[1];
+        let t81 = t31 * t1;
+        let t82 = t81 * t34;
+        let t90 = self.fixed[8] * t13;
+        let t91 = t90 * t70;
         let t92 = t91 + T::one();
-        let t96 = t89 + T::nearest(2.0);
-        let t97 = t89 * t96;
-        let t98 = t97 / t90;
-        let t99 = t1 * t98;
-        let t100 = t91 + T::nearest(2.0);
-        let t101 = t32 * t64;
-        let t102 = t100 / t92;
-        let t103 = t101 * t102;
-        let t104 = t99 + t103;
-        let t105 = self.fixed[9] / t4;
-        let t106 = t105 * t104;
-        let t107 = t91 * t102;
-        let t108 = t98 - t107;
-        let t109 = t72 / t4;
-        let t110 = self.fixed[9] * t109;
-        let t111 = t110 * t108;
-        let t112 = t3 * t98;
-        let t113 = t32 * t80;
-        let t114 = t113 * t102;
-        let t115 = t112 + t114;
-        let t116 = t105 * t115;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t106, t111, t111, t116)
+        let t93 = t32 * t72;
+        let t94 = t93 + T::one();
+        let t98 = t91 + T::nearest(2.0);
+        let t99 = t91 * t98;
+        let t100 = t99 / t92;
+        let t101 = t1 * t100;
+        let t102 = t93 + T::nearest(2.0);
+        let t103 = t32 * t65;
+        let t104 = t102 / t94;
+        let t105 = t103 * t104;
+        let t106 = t101 + t105;
+        let t107 = self.fixed[9] * t67;
+        let t108 = t107 * t106;
+        let t109 = t93 * t104;
+        let t110 = t100 - t109;
+        let t111 = t74 * t67;
+        let t112 = self.fixed[9] * t111;
+        let t113 = t112 * t110;
+        let t114 = t3 * t100;
+        let t115 = t32 * t82;
+        let t116 = t115 * t104;
+        let t117 = t114 + t116;
+        let t118 = t107 * t117;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t108, t113, t113, t118)
     }
     #[inline]
     fn body_force(
@@ -519,72 +529,74 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t58 = t5 - self.parameters.Ri;
-        let t68 = t20 * t58;
-        let t70 = t31 / t5;
-        let t88 = self.fixed[8] * t13;
-        let t89 = t88 * t68;
-        let t90 = t89 + T::one();
-        let t91 = t32 * t70;
+        let t34 = T::one() / t5;
+        let t59 = t5 - self.parameters.Ri;
+        let t67 = t34 * t34;
+        let t70 = t20 * t59;
+        let t72 = t31 * t34;
+        let t90 = self.fixed[8] * t13;
+        let t91 = t90 * t70;
         let t92 = t91 + T::one();
-        let t117 = X[0] / t5;
-        let t119 = t23 - self.fixed[10];
-        let t120 = self.fixed[7] * t119;
-        let t121 = t31 / t4;
-        let t122 = t68 / t5;
-        let t123 = self.fixed[7] * t122;
-        let t124 = self.fixed[5] * t31;
-        let t125 = t120 - t121;
-        let t126 = t125 + t123;
-        let t127 = t126 + t124;
-        let t129 = self.fixed[11] * t127;
-        let t130 = -t129;
-        let t131 = t90 * t90;
-        let t137 = t58 * t58;
-        let t138 = t23 + t122;
-        let t139 = t138 - self.fixed[10];
-        let t140 = self.fixed[7] * t139;
-        let t141 = t121 - t140;
-        let t147 = t21 * t31;
-        let t148 = t147 * t137;
-        let t149 = t148 * t141;
-        let t150 = t149 / t5;
-        let t151 = self.fixed[12] * t150;
-        let t152 = -t151;
-        let t153 = t13 * t152;
-        let t156 = t4 * t5;
-        let t157 = t31 * t31;
-        let t158 = t157 / t156;
-        let t159 = t68 * t139;
-        let t160 = self.fixed[7] * t159;
-        let t162 = T::nearest(4.0) * t5;
-        let t166 = t162 + t122;
-        let t167 = t166 - self.fixed[13];
-        let t168 = t31 * t167;
-        let t169 = t168 / t5;
-        let t170 = t160 + t169;
-        let t172 = self.fixed[14] * t170;
-        let t173 = t158 - t172;
-        let t179 = t68 * t173;
-        let t180 = self.fixed[15] * t179;
-        let t181 = -t180;
-        let t182 = t181 + t153;
-        let t183 = t13 * t182;
-        let t186 = t68 * t167;
-        let t187 = self.fixed[16] * t186;
-        let t188 = t158 - t187;
-        let t191 = self.fixed[17] * t188;
-        let t192 = -t191;
-        let t193 = t192 + t183;
-        let t194 = t131 * t92;
-        let t195 = t193 / t194;
-        let t196 = t13 * t195;
-        let t197 = t130 + t196;
+        let t93 = t32 * t72;
+        let t94 = t93 + T::one();
+        let t119 = X[0] * t34;
+        let t121 = t23 - self.fixed[10];
+        let t122 = self.fixed[7] * t121;
+        let t123 = t31 * t67;
+        let t124 = t70 * t34;
+        let t125 = self.fixed[7] * t124;
+        let t126 = self.fixed[5] * t31;
+        let t127 = t122 - t123;
+        let t128 = t127 + t125;
+        let t129 = t128 + t126;
+        let t131 = self.fixed[11] * t129;
+        let t132 = -t131;
+        let t133 = t92 * t92;
+        let t139 = t59 * t59;
+        let t140 = t23 + t124;
+        let t141 = t140 - self.fixed[10];
+        let t142 = self.fixed[7] * t141;
+        let t143 = t123 - t142;
+        let t149 = t21 * t31;
+        let t150 = t149 * t139;
+        let t151 = t150 * t143;
+        let t152 = t151 * t34;
+        let t153 = self.fixed[12] * t152;
+        let t154 = -t153;
+        let t155 = t13 * t154;
+        let t158 = t31 * t31;
+        let t159 = t67 * t34;
+        let t160 = t158 * t159;
+        let t161 = t70 * t141;
+        let t162 = self.fixed[7] * t161;
+        let t164 = T::nearest(4.0) * t5;
+        let t168 = t164 + t124;
+        let t169 = t168 - self.fixed[13];
+        let t170 = t31 * t169;
+        let t171 = t170 * t34;
+        let t172 = t162 + t171;
+        let t174 = self.fixed[14] * t172;
+        let t175 = t160 - t174;
+        let t181 = t70 * t175;
+        let t182 = self.fixed[15] * t181;
+        let t183 = -t182;
+        let t184 = t183 + t155;
+        let t185 = t13 * t184;
+        let t188 = t70 * t169;
+        let t189 = self.fixed[16] * t188;
+        let t190 = t160 - t189;
+        let t193 = self.fixed[17] * t190;
+        let t194 = -t193;
+        let t195 = t194 + t185;
+        let t196 = t133 * t94;
+        let t197 = t195 / t196;
         let t198 = t13 * t197;
-        let t199 = t117 * t198;
-        let t200 = X[1] / t5;
-        let t201 = t200 * t198;
-        crate::nalgebra::SVector::<T, 2>::new(t199, t201)
+        let t199 = t132 + t198;
+        let t200 = t13 * t199;
+        let t201 = t119 * t200;
+        let t202 = X[1] * t34;
+        let t203 = t202 * t200;
+        crate::nalgebra::SVector::<T, 2>::new(t201, t203)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t1 = X[0] * X[0];
@@ -602,142 +614,144 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
         let t33 = t31 * X[0];
-        let t34 = t33 / t5;
-        let t35 = t32 * t34;
-        let t36 = t31 * X[1];
-        let t37 = t36 / t5;
-        let t38 = t32 * t37;
-        let t40 = t12.sin_pi();
-        let t43 = self.fixed[4] * t40;
-        let t44 = t43 * t34;
-        let t45 = -t44;
-        let t46 = t43 * t37;
-        let t47 = -t46;
-        let t52 = self.fixed[6] * t13;
-        let t53 = t52 * t34;
-        let t54 = -t53;
-        let t55 = t52 * t37;
-        let t56 = -t55;
-        let t58 = t5 - self.parameters.Ri;
-        let t60 = t20 * t1;
-        let t61 = t60 * t58;
-        let t62 = self.fixed[7] * t61;
-        let t63 = t31 * t3;
-        let t64 = t63 / t5;
-        let t65 = t62 + t64;
-        let t66 = t65 / t4;
-        let t67 = t32 * t66;
-        let t68 = t20 * t58;
-        let t69 = self.fixed[7] * t68;
-        let t70 = t31 / t5;
-        let t71 = t69 - t70;
-        let t72 = X[0] * X[1];
-        let t73 = t72 * t71;
-        let t74 = t73 / t4;
-        let t75 = t32 * t74;
-        let t76 = t20 * t3;
-        let t77 = t76 * t58;
-        let t78 = self.fixed[7] * t77;
-        let t79 = t31 * t1;
-        let t80 = t79 / t5;
-        let t81 = t78 + t80;
-        let t82 = t81 / t4;
-        let t83 = t32 * t82;
-        let t84 = t67 + T::one();
-        let t85 = t83 + T::one();
-        let t88 = self.fixed[8] * t13;
-        let t89 = t88 * t68;
-        let t90 = t89 + T::one();
-        let t91 = t32 * t70;
+        let t34 = T::one() / t5;
+        let t35 = t33 * t34;
+        let t36 = t32 * t35;
+        let t37 = t31 * X[1];
+        let t38 = t37 * t34;
+        let t39 = t32 * t38;
+        let t41 = t12.sin_pi();
+        let t44 = self.fixed[4] * t41;
+        let t45 = t44 * t35;
+        let t46 = -t45;
+        let t47 = t44 * t38;
+        let t48 = -t47;
+        let t53 = self.fixed[6] * t13;
+        let t54 = t53 * t35;
+        let t55 = -t54;
+        let t56 = t53 * t38;
+        let t57 = -t56;
+        let t59 = t5 - self.parameters.Ri;
+        let t61 = t20 * t1;
+        let t62 = t61 * t59;
+        let t63 = self.fixed[7] * t62;
+        let t64 = t31 * t3;
+        let t65 = t64 * t34;
+        let t66 = t63 + t65;
+        let t67 = t34 * t34;
+        let t68 = t66 * t67;
+        let t69 = t32 * t68;
+        let t70 = t20 * t59;
+        let t71 = self.fixed[7] * t70;
+        let t72 = t31 * t34;
+        let t73 = t71 - t72;
+        let t74 = X[0] * X[1];
+        let t75 = t74 * t73;
+        let t76 = t75 * t67;
+        let t77 = t32 * t76;
+        let t78 = t20 * t3;
+        let t79 = t78 * t59;
+        let t80 = self.fixed[7] * t79;
+        let t81 = t31 * t1;
+        let t82 = t81 * t34;
+        let t83 = t80 + t82;
+        let t84 = t83 * t67;
+        let t85 = t32 * t84;
+        let t86 = t69 + T::one();
+        let t87 = t85 + T::one();
+        let t90 = self.fixed[8] * t13;
+        let t91 = t90 * t70;
         let t92 = t91 + T::one();
-        let t93 = t90 * t92;
-        let t96 = t89 + T::nearest(2.0);
-        let t97 = t89 * t96;
-        let t98 = t97 / t90;
-        let t99 = t1 * t98;
-        let t100 = t91 + T::nearest(2.0);
-        let t101 = t32 * t64;
-        let t102 = t100 / t92;
-        let t103 = t101 * t102;
-        let t104 = t99 + t103;
-        let t105 = self.fixed[9] / t4;
-        let t106 = t105 * t104;
-        let t107 = t91 * t102;
-        let t108 = t98 - t107;
-        let t109 = t72 / t4;
-        let t110 = self.fixed[9] * t109;
-        let t111 = t110 * t108;
-        let t112 = t3 * t98;
-        let t113 = t32 * t80;
-        let t114 = t113 * t102;
-        let t115 = t112 + t114;
-        let t116 = t105 * t115;
-        let t117 = X[0] / t5;
-        let t119 = t23 - self.fixed[10];
-        let t120 = self.fixed[7] * t119;
-        let t121 = t31 / t4;
-        let t122 = t68 / t5;
-        let t123 = self.fixed[7] * t122;
-        let t124 = self.fixed[5] * t31;
-        let t125 = t120 - t121;
-        let t126 = t125 + t123;
-        let t127 = t126 + t124;
-        let t129 = self.fixed[11] * t127;
-        let t130 = -t129;
-        let t131 = t90 * t90;
-        let t137 = t58 * t58;
-        let t138 = t23 + t122;
-        let t139 = t138 - self.fixed[10];
-        let t140 = self.fixed[7] * t139;
-        let t141 = t121 - t140;
-        let t147 = t21 * t31;
-        let t148 = t147 * t137;
-        let t149 = t148 * t141;
-        let t150 = t149 / t5;
-        let t151 = self.fixed[12] * t150;
-        let t152 = -t151;
-        let t153 = t13 * t152;
-        let t156 = t4 * t5;
-        let t157 = t31 * t31;
-        let t158 = t157 / t156;
-        let t159 = t68 * t139;
-        let t160 = self.fixed[7] * t159;
-        let t162 = T::nearest(4.0) * t5;
-        let t166 = t162 + t122;
-        let t167 = t166 - self.fixed[13];
-        let t168 = t31 * t167;
-        let t169 = t168 / t5;
-        let t170 = t160 + t169;
-        let t172 = self.fixed[14] * t170;
-        let t173 = t158 - t172;
-        let t179 = t68 * t173;
-        let t180 = self.fixed[15] * t179;
-        let t181 = -t180;
-        let t182 = t181 + t153;
-        let t183 = t13 * t182;
-        let t186 = t68 * t167;
-        let t187 = self.fixed[16] * t186;
-        let t188 = t158 - t187;
-        let t191 = self.fixed[17] * t188;
-        let t192 = -t191;
-        let t193 = t192 + t183;
-        let t194 = t131 * t92;
-        let t195 = t193 / t194;
-        let t196 = t13 * t195;
-        let t197 = t130 + t196;
+        let t93 = t32 * t72;
+        let t94 = t93 + T::one();
+        let t95 = t92 * t94;
+        let t98 = t91 + T::nearest(2.0);
+        let t99 = t91 * t98;
+        let t100 = t99 / t92;
+        let t101 = t1 * t100;
+        let t102 = t93 + T::nearest(2.0);
+        let t103 = t32 * t65;
+        let t104 = t102 / t94;
+        let t105 = t103 * t104;
+        let t106 = t101 + t105;
+        let t107 = self.fixed[9] * t67;
+        let t108 = t107 * t106;
+        let t109 = t93 * t104;
+        let t110 = t100 - t109;
+        let t111 = t74 * t67;
+        let t112 = self.fixed[9] * t111;
+        let t113 = t112 * t110;
+        let t114 = t3 * t100;
+        let t115 = t32 * t82;
+        let t116 = t115 * t104;
+        let t117 = t114 + t116;
+        let t118 = t107 * t117;
+        let t119 = X[0] * t34;
+        let t121 = t23 - self.fixed[10];
+        let t122 = self.fixed[7] * t121;
+        let t123 = t31 * t67;
+        let t124 = t70 * t34;
+        let t125 = self.fixed[7] * t124;
+        let t126 = self.fixed[5] * t31;
+        let t127 = t122 - t123;
+        let t128 = t127 + t125;
+        let t129 = t128 + t126;
+        let t131 = self.fixed[11] * t129;
+        let t132 = -t131;
+        let t133 = t92 * t92;
+        let t139 = t59 * t59;
+        let t140 = t23 + t124;
+        let t141 = t140 - self.fixed[10];
+        let t142 = self.fixed[7] * t141;
+        let t143 = t123 - t142;
+        let t149 = t21 * t31;
+        let t150 = t149 * t139;
+        let t151 = t150 * t143;
+        let t152 = t151 * t34;
+        let t153 = self.fixed[12] * t152;
+        let t154 = -t153;
+        let t155 = t13 * t154;
+        let t158 = t31 * t31;
+        let t159 = t67 * t34;
+        let t160 = t158 * t159;
+        let t161 = t70 * t141;
+        let t162 = self.fixed[7] * t161;
+        let t164 = T::nearest(4.0) * t5;
+        let t168 = t164 + t124;
+        let t169 = t168 - self.fixed[13];
+        let t170 = t31 * t169;
+        let t171 = t170 * t34;
+        let t172 = t162 + t171;
+        let t174 = self.fixed[14] * t172;
+        let t175 = t160 - t174;
+        let t181 = t70 * t175;
+        let t182 = self.fixed[15] * t181;
+        let t183 = -t182;
+        let t184 = t183 + t155;
+        let t185 = t13 * t184;
+        let t188 = t70 * t169;
+        let t189 = self.fixed[16] * t188;
+        let t190 = t160 - t189;
+        let t193 = self.fixed[17] * t190;
+        let t194 = -t193;
+        let t195 = t194 + t185;
+        let t196 = t133 * t94;
+        let t197 = t195 / t196;
         let t198 = t13 * t197;
-        let t199 = t117 * t198;
-        let t200 = X[1] / t5;
-        let t201 = t200 * t198;
+        let t199 = t132 + t198;
+        let t200 = t13 * t199;
+        let t201 = t119 * t200;
+        let t202 = X[1] * t34;
+        let t203 = t202 * t200;
         crate::Fields {
-            u: crate::nalgebra::SVector::<T, 2>::new(t35, t38),
-            v: crate::nalgebra::SVector::<T, 2>::new(t45, t47),
-            a: crate::nalgebra::SVector::<T, 2>::new(t54, t56),
-            H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t67, t75, t75, t83),
-            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t84, t75, t75, t85),
-            J: t93,
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t106, t111, t111, t116),
-            b: crate::nalgebra::SVector::<T, 2>::new(t199, t201),
+            u: crate::nalgebra::SVector::<T, 2>::new(t36, t39),
+            v: crate::nalgebra::SVector::<T, 2>::new(t46, t48),
+            a: crate::nalgebra::SVector::<T, 2>::new(t55, t57),
+            H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t69, t77, t77, t85),
+            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t86, t77, t77, t87),
+            J: t95,
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t108, t113, t113, t118),
+            b: crate::nalgebra::SVector::<T, 2>::new(t201, t203),
         }
     }
     fn domain(&self) -> crate::Domain<T, 2> {
@@ -798,8 +812,8 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 8> for Ring<T> {
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
         let t32 = self.parameters.A * t13;
-        let t88 = self.fixed[8] * t13;
-        [t13, t32, t88]
+        let t90 = self.fixed[8] * t13;
+        [t13, t32, t90]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 8] {
@@ -814,55 +828,57 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 8> for Ring<T> {
         let t29 = t21 * t25;
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
-        let t58 = t5 - self.parameters.Ri;
-        let t68 = t20 * t58;
-        let t70 = t31 / t5;
-        let t117 = X[0] / t5;
-        let t119 = t23 - self.fixed[10];
-        let t120 = self.fixed[7] * t119;
-        let t121 = t31 / t4;
-        let t122 = t68 / t5;
-        let t123 = self.fixed[7] * t122;
-        let t124 = self.fixed[5] * t31;
-        let t125 = t120 - t121;
-        let t126 = t125 + t123;
-        let t127 = t126 + t124;
-        let t129 = self.fixed[11] * t127;
-        let t130 = -t129;
-        let t137 = t58 * t58;
-        let t138 = t23 + t122;
-        let t139 = t138 - self.fixed[10];
-        let t140 = self.fixed[7] * t139;
-        let t141 = t121 - t140;
-        let t147 = t21 * t31;
-        let t148 = t147 * t137;
-        let t149 = t148 * t141;
-        let t150 = t149 / t5;
-        let t151 = self.fixed[12] * t150;
-        let t152 = -t151;
-        let t156 = t4 * t5;
-        let t157 = t31 * t31;
-        let t158 = t157 / t156;
-        let t159 = t68 * t139;
-        let t160 = self.fixed[7] * t159;
-        let t162 = T::nearest(4.0) * t5;
-        let t166 = t162 + t122;
-        let t167 = t166 - self.fixed[13];
-        let t168 = t31 * t167;
-        let t169 = t168 / t5;
-        let t170 = t160 + t169;
-        let t172 = self.fixed[14] * t170;
-        let t173 = t158 - t172;
-        let t179 = t68 * t173;
-        let t180 = self.fixed[15] * t179;
-        let t181 = -t180;
-        let t186 = t68 * t167;
-        let t187 = self.fixed[16] * t186;
-        let t188 = t158 - t187;
-        let t191 = self.fixed[17] * t188;
-        let t192 = -t191;
-        let t200 = X[1] / t5;
-        [t68, t70, t117, t130, t152, t181, t192, t200]
+        let t34 = T::one() / t5;
+        let t59 = t5 - self.parameters.Ri;
+        let t67 = t34 * t34;
+        let t70 = t20 * t59;
+        let t72 = t31 * t34;
+        let t119 = X[0] * t34;
+        let t121 = t23 - self.fixed[10];
+        let t122 = self.fixed[7] * t121;
+        let t123 = t31 * t67;
+        let t124 = t70 * t34;
+        let t125 = self.fixed[7] * t124;
+        let t126 = self.fixed[5] * t31;
+        let t127 = t122 - t123;
+        let t128 = t127 + t125;
+        let t129 = t128 + t126;
+        let t131 = self.fixed[11] * t129;
+        let t132 = -t131;
+        let t139 = t59 * t59;
+        let t140 = t23 + t124;
+        let t141 = t140 - self.fixed[10];
+        let t142 = self.fixed[7] * t141;
+        let t143 = t123 - t142;
+        let t149 = t21 * t31;
+        let t150 = t149 * t139;
+        let t151 = t150 * t143;
+        let t152 = t151 * t34;
+        let t153 = self.fixed[12] * t152;
+        let t154 = -t153;
+        let t158 = t31 * t31;
+        let t159 = t67 * t34;
+        let t160 = t158 * t159;
+        let t161 = t70 * t141;
+        let t162 = self.fixed[7] * t161;
+        let t164 = T::nearest(4.0) * t5;
+        let t168 = t164 + t124;
+        let t169 = t168 - self.fixed[13];
+        let t170 = t31 * t169;
+        let t171 = t170 * t34;
+        let t172 = t162 + t171;
+        let t174 = self.fixed[14] * t172;
+        let t175 = t160 - t174;
+        let t181 = t70 * t175;
+        let t182 = self.fixed[15] * t181;
+        let t183 = -t182;
+        let t188 = t70 * t169;
+        let t189 = self.fixed[16] * t188;
+        let t190 = t160 - t189;
+        let t193 = self.fixed[17] * t190;
+        let t194 = -t193;
+        let t202 = X[1] * t34;
+        [t70, t72, t119, t132, t154, t183, t194, t202]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -870,23 +886,23 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 8> for Ring<T> {
         time: &[T; 3],
         point: &[T; 8],
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t89 = time[2] * point[0];
-        let t90 = t89 + T::one();
-        let t91 = time[1] * point[1];
+        let t91 = time[2] * point[0];
         let t92 = t91 + T::one();
-        let t131 = t90 * t90;
-        let t153 = time[0] * point[4];
-        let t182 = point[5] + t153;
-        let t183 = time[0] * t182;
-        let t193 = point[6] + t183;
-        let t194 = t131 * t92;
-        let t195 = t193 / t194;
-        let t196 = time[0] * t195;
-        let t197 = point[3] + t196;
+        let t93 = time[1] * point[1];
+        let t94 = t93 + T::one();
+        let t133 = t92 * t92;
+        let t155 = time[0] * point[4];
+        let t184 = point[5] + t155;
+        let t185 = time[0] * t184;
+        let t195 = point[6] + t185;
+        let t196 = t133 * t94;
+        let t197 = t195 / t196;
         let t198 = time[0] * t197;
-        let t199 = point[2] * t198;
-        let t201 = point[7] * t198;
-        crate::nalgebra::SVector::<T, 2>::new(t199, t201)
+        let t199 = point[3] + t198;
+        let t200 = time[0] * t199;
+        let t201 = point[2] * t200;
+        let t203 = point[7] * t200;
+        crate::nalgebra::SVector::<T, 2>::new(t201, t203)
     }
 }
 impl<T: crate::Real> From<Ring<T>> for crate::AnySolution<T> {

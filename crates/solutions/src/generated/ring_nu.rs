@@ -147,60 +147,60 @@ impl<T: crate::Real> RingNu<T> {
         let t24 = parameters.Ro - t18;
         let t26 = t15 * t19;
         let t28 = T::one() / t26;
-        let t41 = parameters.A * t11;
-        let t42 = t41 * T::pi();
-        let t48 = T::pi() * T::pi();
-        let t49 = parameters.A * parameters.E;
-        let t50 = t49 * t48;
-        let t51 = t50 / parameters.rho0;
-        let t59 = T::nearest(6.0) / t26;
-        let t86 = T::nearest(6.0) * parameters.A;
-        let t87 = t86 / t26;
-        let t95 = parameters.nu + T::one();
-        let t96 = T::nearest(2.0) * parameters.nu;
-        let t97 = T::one() - t96;
-        let t102 = parameters.E * parameters.nu;
-        let t103 = t95 * t97;
-        let t104 = t102 / t103;
-        let t107 = T::nearest(0.5) * parameters.E;
-        let t108 = t107 / t95;
-        let t116 = parameters.A * t108;
-        let t135 = parameters.Ri + parameters.Ro;
-        let t143 = parameters.nu / t97;
-        let t148 = T::one() / t95;
-        let t151 = t49 / parameters.rho0;
-        let t156 = parameters.A * parameters.A;
-        let t157 = t156 * t156;
-        let t158 = t15 * t15;
-        let t159 = t19 * t19;
-        let t168 = T::nearest(36.0) * t157;
-        let t169 = parameters.rho0 * t158;
-        let t170 = t169 * t159;
-        let t171 = t168 / t170;
-        let t178 = t156 * parameters.A;
-        let t181 = T::nearest(2.0) * t108;
-        let t201 = t158 * t159;
-        let t202 = T::nearest(36.0) / t201;
-        let t214 = T::nearest(6.0) * t178;
-        let t215 = parameters.rho0 * t15;
-        let t216 = t215 * t19;
-        let t217 = t214 / t216;
-        let t229 = T::nearest(6.0) * t156;
-        let t230 = t229 * parameters.E;
-        let t231 = t230 * parameters.nu;
-        let t232 = t216 * t95;
-        let t233 = t232 * t97;
-        let t234 = t231 / t233;
-        let t240 = T::nearest(12.0) * t108;
-        let t241 = t240 / t26;
-        let t243 = T::nearest(6.0) * t108;
-        let t244 = t243 / t26;
-        let t253 = t156 / parameters.rho0;
-        let t259 = t49 * parameters.nu;
-        let t260 = parameters.rho0 * t95;
-        let t261 = t260 * t97;
-        let t262 = t259 / t261;
-        let t274 = T::nearest(2.0) / t11;
+        let t42 = parameters.A * t11;
+        let t43 = t42 * T::pi();
+        let t49 = T::pi() * T::pi();
+        let t50 = parameters.A * parameters.E;
+        let t51 = t50 * t49;
+        let t52 = t51 / parameters.rho0;
+        let t60 = T::nearest(6.0) / t26;
+        let t88 = T::nearest(6.0) * parameters.A;
+        let t89 = t88 / t26;
+        let t97 = parameters.nu + T::one();
+        let t98 = T::nearest(2.0) * parameters.nu;
+        let t99 = T::one() - t98;
+        let t104 = parameters.E * parameters.nu;
+        let t105 = t97 * t99;
+        let t106 = t104 / t105;
+        let t109 = T::nearest(0.5) * parameters.E;
+        let t110 = t109 / t97;
+        let t118 = parameters.A * t110;
+        let t136 = parameters.Ri + parameters.Ro;
+        let t144 = parameters.nu / t99;
+        let t149 = T::one() / t97;
+        let t152 = t50 / parameters.rho0;
+        let t157 = parameters.A * parameters.A;
+        let t158 = t157 * t157;
+        let t159 = t15 * t15;
+        let t160 = t19 * t19;
+        let t169 = T::nearest(36.0) * t158;
+        let t170 = parameters.rho0 * t159;
+        let t171 = t170 * t160;
+        let t172 = t169 / t171;
+        let t179 = t157 * parameters.A;
+        let t181 = T::nearest(2.0) * t110;
+        let t202 = t159 * t160;
+        let t203 = T::nearest(36.0) / t202;
+        let t215 = T::nearest(6.0) * t179;
+        let t216 = parameters.rho0 * t15;
+        let t217 = t216 * t19;
+        let t218 = t215 / t217;
+        let t230 = T::nearest(6.0) * t157;
+        let t231 = t230 * parameters.E;
+        let t232 = t231 * parameters.nu;
+        let t233 = t217 * t97;
+        let t234 = t233 * t99;
+        let t235 = t232 / t234;
+        let t241 = T::nearest(12.0) * t110;
+        let t242 = t241 / t26;
+        let t244 = T::nearest(6.0) * t110;
+        let t245 = t244 / t26;
+        let t254 = t157 / parameters.rho0;
+        let t260 = t50 * parameters.nu;
+        let t261 = parameters.rho0 * t97;
+        let t262 = t261 * t99;
+        let t263 = t260 / t262;
+        let t275 = T::nearest(2.0) / t11;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -214,28 +214,28 @@ impl<T: crate::Real> RingNu<T> {
                 t18,
                 t24,
                 t28,
-                t42,
-                t48,
-                t51,
-                t59,
-                t87,
-                t104,
-                t108,
-                t116,
-                t135,
-                t143,
-                t148,
-                t151,
-                t171,
+                t43,
+                t49,
+                t52,
+                t60,
+                t89,
+                t106,
+                t110,
+                t118,
+                t136,
+                t144,
+                t149,
+                t152,
+                t172,
                 t181,
-                t202,
-                t217,
-                t234,
-                t241,
-                t244,
-                t253,
-                t262,
-                t274,
+                t203,
+                t218,
+                t235,
+                t242,
+                t245,
+                t254,
+                t263,
+                t275,
             ],
         })
     }
@@ -296,12 +296,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
         let t33 = t31 * X[0];
-        let t34 = t33 / t5;
-        let t35 = t32 * t34;
-        let t36 = t31 * X[1];
-        let t37 = t36 / t5;
-        let t38 = t32 * t37;
-        crate::nalgebra::SVector::<T, 2>::new(t35, t38)
+        let t34 = T::one() / t5;
+        let t35 = t33 * t34;
+        let t36 = t32 * t35;
+        let t37 = t31 * X[1];
+        let t38 = t37 * t34;
+        let t39 = t32 * t38;
+        crate::nalgebra::SVector::<T, 2>::new(t36, t39)
     }
     #[inline]
     fn velocity(
@@ -322,16 +323,17 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t33 = t31 * X[0];
-        let t34 = t33 / t5;
-        let t36 = t31 * X[1];
-        let t37 = t36 / t5;
-        let t40 = t12.sin_pi();
-        let t43 = self.fixed[4] * t40;
-        let t44 = t43 * t34;
-        let t45 = -t44;
-        let t46 = t43 * t37;
-        let t47 = -t46;
-        crate::nalgebra::SVector::<T, 2>::new(t45, t47)
+        let t34 = T::one() / t5;
+        let t35 = t33 * t34;
+        let t37 = t31 * X[1];
+        let t38 = t37 * t34;
+        let t41 = t12.sin_pi();
+        let t44 = self.fixed[4] * t41;
+        let t45 = t44 * t35;
+        let t46 = -t45;
+        let t47 = t44 * t38;
+        let t48 = -t47;
+        crate::nalgebra::SVector::<T, 2>::new(t46, t48)
     }
     #[inline]
     fn acceleration(
@@ -353,15 +355,16 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t33 = t31 * X[0];
-        let t34 = t33 / t5;
-        let t36 = t31 * X[1];
-        let t37 = t36 / t5;
-        let t52 = self.fixed[6] * t13;
-        let t53 = t52 * t34;
-        let t54 = -t53;
-        let t55 = t52 * t37;
-        let t56 = -t55;
-        crate::nalgebra::SVector::<T, 2>::new(t54, t56)
+        let t34 = T::one() / t5;
+        let t35 = t33 * t34;
+        let t37 = t31 * X[1];
+        let t38 = t37 * t34;
+        let t53 = self.fixed[6] * t13;
+        let t54 = t53 * t35;
+        let t55 = -t54;
+        let t56 = t53 * t38;
+        let t57 = -t56;
+        crate::nalgebra::SVector::<T, 2>::new(t55, t57)
     }
     #[inline]
     fn displacement_gradient(
@@ -383,32 +386,34 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t58 = t5 - self.parameters.Ri;
-        let t60 = t20 * t1;
-        let t61 = t60 * t58;
-        let t62 = self.fixed[7] * t61;
-        let t63 = t31 * t3;
-        let t64 = t63 / t5;
-        let t65 = t62 + t64;
-        let t66 = t65 / t4;
-        let t67 = t32 * t66;
-        let t68 = t20 * t58;
-        let t69 = self.fixed[7] * t68;
-        let t70 = t31 / t5;
-        let t71 = t69 - t70;
-        let t72 = X[0] * X[1];
-        let t73 = t72 * t71;
-        let t74 = t73 / t4;
-        let t75 = t32 * t74;
-        let t76 = t20 * t3;
-        let t77 = t76 * t58;
-        let t78 = self.fixed[7] * t77;
-        let t79 = t31 * t1;
-        let t80 = t79 / t5;
-        let t81 = t78 + t80;
-        let t82 = t81 / t4;
-        let t83 = t32 * t82;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t67, t75, t75, t83)
+        let t34 = T::one() / t5;
+        let t59 = t5 - self.parameters.Ri;
+        let t61 = t20 * t1;
+        let t62 = t61 * t59;
+        let t63 = self.fixed[7] * t62;
+        let t64 = t31 * t3;
+        let t65 = t64 * t34;
+        let t66 = t63 + t65;
+        let t67 = t34 * t34;
+        let t68 = t66 * t67;
+        let t69 = t32 * t68;
+        let t70 = t20 * t59;
+        let t71 = self.fixed[7] * t70;
+        let t72 = t31 * t34;
+        let t73 = t71 - t72;
+        let t74 = X[0] * X[1];
+        let t75 = t74 * t73;
+        let t76 = t75 * t67;
+        let t77 = t32 * t76;
+        let t78 = t20 * t3;
+        let t79 = t78 * t59;
+        let t80 = self.fixed[7] * t79;
+        let t81 = t31 * t1;
+        let t82 = t81 * t34;
+        let t83 = t80 + t82;
+        let t84 = t83 * t67;
+        let t85 = t32 * t84;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t69, t77, t77, t85)
     }
     #[inline]
     fn deformation_gradient(
@@ -430,34 +435,36 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t58 = t5 - self.parameters.Ri;
-        let t60 = t20 * t1;
-        let t61 = t60 * t58;
-        let t62 = self.fixed[7] * t61;
-        let t63 = t31 * t3;
-        let t64 = t63 / t5;
-        let t65 = t62 + t64;
-        let t66 = t65 / t4;
-        let t67 = t32 * t66;
-        let t68 = t20 * t58;
-        let t69 = self.fixed[7] * t68;
-        let t70 = t31 / t5;
-        let t71 = t69 - t70;
-        let t72 = X[0] * X[1];
-        let t73 = t72 * t71;
-        let t74 = t73 / t4;
-        let t75 = t32 * t74;
-        let t76 = t20 * t3;
-        let t77 = t76 * t58;
-        let t78 = self.fixed[7] * t77;
-        let t79 = t31 * t1;
-        let t80 = t79 / t5;
-        let t81 = t78 + t80;
-        let t82 = t81 / t4;
-        let t83 = t32 * t82;
-        let t84 = t67 + T::one();
-        let t85 = t83 + T::one();
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t84, t75, t75, t85)
+        let t34 = T::one() / t5;
+        let t59 = t5 - self.parameters.Ri;
+        let t61 = t20 * t1;
+        let t62 = t61 * t59;
+        let t63 = self.fixed[7] * t62;
+        let t64 = t31 * t3;
+        let t65 = t64 * t34;
+        let t66 = t63 + t65;
+        let t67 = t34 * t34;
+        let t68 = t66 * t67;
+        let t69 = t32 * t68;
+        let t70 = t20 * t59;
+        let t71 = self.fixed[7] * t70;
+        let t72 = t31 * t34;
+        let t73 = t71 - t72;
+        let t74 = X[0] * X[1];
+        let t75 = t74 * t73;
+        let t76 = t75 * t67;
+        let t77 = t32 * t76;
+        let t78 = t20 * t3;
+        let t79 = t78 * t59;
+        let t80 = self.fixed[7] * t79;
+        let t81 = t31 * t1;
+        let t82 = t81 * t34;
+        let t83 = t80 + t82;
+        let t84 = t83 * t67;
+        let t85 = t32 * t84;
+        let t86 = t69 + T::one();
+        let t87 = t85 + T::one();
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t86, t77, t77, t87)
     }
     #[inline]
     fn jacobian(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> T {
@@ -475,16 +482,17 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t58 = t5 - self.parameters.Ri;
-        let t68 = t20 * t58;
-        let t70 = t31 / t5;
-        let t88 = self.fixed[8] * t13;
-        let t89 = t88 * t68;
-        let t90 = t89 + T::one();
-        let t91 = t32 * t70;
+        let t34 = T::one() / t5;
+        let t59 = t5 - self.parameters.Ri;
+        let t70 = t20 * t59;
+        let t72 = t31 * t34;
+        let t90 = self.fixed[8] * t13;
+        let t91 = t90 * t70;
         let t92 = t91 + T::one();
-        let t93 = t90 * t92;
-        t93
+        let t93 = t32 * t72;
+        let t94 = t93 + T::one();
+        let t95 = t92 * t94;
+        t95
     }
     #[inline]
     fn first_piola_kirchhoff(
@@ -506,44 +514,45 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t58 = t5 - self.parameters.Ri;
-        let t68 = t20 * t58;
-        let t70 = t31 / t5;
-        let t72 = X[0] * X[1];
-        let t88 = self.fixed[8] * t13;
-        let t89 = t88 * t68;
-        let t90 = t89 + T::one();
-        let t91 = t32 * t70;
+        let t34 = T::one() / t5;
+        let t59 = t5 - self.parameters.Ri;
+        let t67 = t34 * t34;
+        let t70 = t20 * t59;
+        let t72 = t31 * t34;
+        let t74 = X[0] * X[1];
+        let t90 = self.fixed[8] * t13;
+        let t91 = t90 * t70;
         let t92 = t91 + T::one();
-        let t98 = t91 * t89;
-        let t99 = t91 + t89;
-        let t100 = t99 + t98;
-        let t101 = t100.ln_1p();
-        let t105 = self.fixed[9] * t101;
-        let t109 = t89 + T::nearest(2.0);
-        let t110 = t89 * t109;
-        let t111 = self.fixed[10] * t110;
-        let t112 = t105 + t111;
-        let t113 = t112 / t90;
-        let t114 = t1 * t113;
-        let t115 = t91 + T::nearest(2.0);
-        let t117 = self.fixed[11] * t13;
-        let t118 = t117 * t70;
-        let t119 = t118 * t115;
-        let t120 = t105 + t119;
-        let t121 = t120 / t92;
-        let t122 = t3 * t121;
-        let t123 = t114 + t122;
-        let t124 = T::one() / t4;
-        let t125 = t124 * t123;
-        let t126 = t113 - t121;
-        let t127 = t72 / t4;
-        let t128 = t127 * t126;
-        let t129 = t3 * t113;
-        let t130 = t1 * t121;
-        let t131 = t129 + t130;
-        let t132 = t124 * t131;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t125, t128, t128, t132)
+        let t93 = t32 * t72;
+        let t94 = t93 + T::one();
+        let t100 = t93 * t91;
+        let t101 = t93 + t91;
+        let t102 = t101 + t100;
+        let t103 = t102.ln_1p();
+        let t107 = self.fixed[9] * t103;
+        let t111 = t91 + T::nearest(2.0);
+        let t112 = t91 * t111;
+        let t113 = self.fixed[10] * t112;
+        let t114 = t107 + t113;
+        let t115 = t114 / t92;
+        let t116 = t1 * t115;
+        let t117 = t93 + T::nearest(2.0);
+        let t119 = self.fixed[11] * t13;
+        let t120 = t119 * t72;
+        let t121 = t120 * t117;
+        let t122 = t107 + t121;
+        let t123 = t122 / t94;
+        let t124 = t3 * t123;
+        let t125 = t116 + t124;
+        let t126 = t67 * t125;
+        let t127 = t115 - t123;
+        let t128 = t74 * t67;
+        let t129 = t128 * t127;
+        let t130 = t3 * t115;
+        let t131 = t1 * t123;
+        let t132 = t130 + t131;
+        let t133 = t67 * t132;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t126, t129, t129, t133)
     }
     #[inline]
     fn body_force(
@@ -565,125 +574,127 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t58 = t5 - self.parameters.Ri;
-        let t68 = t20 * t58;
-        let t69 = self.fixed[7] * t68;
-        let t70 = t31 / t5;
-        let t71 = t69 - t70;
-        let t88 = self.fixed[8] * t13;
-        let t89 = t88 * t68;
-        let t90 = t89 + T::one();
-        let t91 = t32 * t70;
+        let t34 = T::one() / t5;
+        let t59 = t5 - self.parameters.Ri;
+        let t67 = t34 * t34;
+        let t70 = t20 * t59;
+        let t71 = self.fixed[7] * t70;
+        let t72 = t31 * t34;
+        let t73 = t71 - t72;
+        let t90 = self.fixed[8] * t13;
+        let t91 = t90 * t70;
         let t92 = t91 + T::one();
-        let t98 = t91 * t89;
-        let t99 = t91 + t89;
-        let t100 = t99 + t98;
-        let t101 = t100.ln_1p();
-        let t133 = X[0] / t5;
-        let t134 = self.fixed[5] * t31;
-        let t136 = t23 - self.fixed[12];
-        let t137 = self.fixed[7] * t136;
-        let t138 = t31 / t4;
-        let t139 = t68 / t5;
-        let t140 = self.fixed[7] * t139;
-        let t141 = t71 / t5;
-        let t142 = t137 + t141;
-        let t144 = self.fixed[13] * t142;
-        let t145 = t137 - t138;
-        let t146 = t145 + t140;
-        let t147 = t146 + t144;
-        let t149 = self.fixed[14] * t147;
-        let t150 = t134 + t149;
-        let t152 = self.fixed[15] * t150;
-        let t153 = -t152;
-        let t154 = t90 * t90;
-        let t160 = t58 * t58;
-        let t161 = self.fixed[9] * t142;
-        let t162 = t23 + t139;
-        let t163 = t162 - self.fixed[12];
-        let t164 = self.fixed[7] * t163;
-        let t165 = t138 - t164;
-        let t166 = self.fixed[10] * t165;
-        let t167 = t161 - t166;
-        let t172 = t21 * t31;
-        let t173 = t172 * t160;
-        let t174 = t173 * t167;
-        let t175 = t174 / t5;
-        let t176 = self.fixed[16] * t175;
-        let t177 = t13 * t176;
-        let t179 = t4 * t5;
+        let t93 = t32 * t72;
+        let t94 = t93 + T::one();
+        let t100 = t93 * t91;
+        let t101 = t93 + t91;
+        let t102 = t101 + t100;
+        let t103 = t102.ln_1p();
+        let t134 = X[0] * t34;
+        let t135 = self.fixed[5] * t31;
+        let t137 = t23 - self.fixed[12];
+        let t138 = self.fixed[7] * t137;
+        let t139 = t31 * t67;
+        let t140 = t70 * t34;
+        let t141 = self.fixed[7] * t140;
+        let t142 = t73 * t34;
+        let t143 = t138 + t142;
+        let t145 = self.fixed[13] * t143;
+        let t146 = t138 - t139;
+        let t147 = t146 + t141;
+        let t148 = t147 + t145;
+        let t150 = self.fixed[14] * t148;
+        let t151 = t135 + t150;
+        let t153 = self.fixed[15] * t151;
+        let t154 = -t153;
+        let t155 = t92 * t92;
+        let t161 = t59 * t59;
+        let t162 = self.fixed[9] * t143;
+        let t163 = t23 + t140;
+        let t164 = t163 - self.fixed[12];
+        let t165 = self.fixed[7] * t164;
+        let t166 = t139 - t165;
+        let t167 = self.fixed[10] * t166;
+        let t168 = t162 - t167;
+        let t173 = t21 * t31;
+        let t174 = t173 * t161;
+        let t175 = t174 * t168;
+        let t176 = t175 * t34;
+        let t177 = self.fixed[16] * t176;
+        let t178 = t13 * t177;
         let t180 = t31 * t31;
-        let t182 = t180 / t179;
-        let t183 = self.fixed[17] * t182;
-        let t184 = t31 * t136;
-        let t185 = t68 * t71;
-        let t186 = t184 + t185;
-        let t187 = t186 / t5;
-        let t188 = self.fixed[9] * t187;
-        let t189 = t69 + t70;
-        let t190 = t136 * t189;
-        let t191 = self.fixed[10] * t190;
-        let t192 = t184 / t5;
-        let t193 = self.fixed[10] * t192;
-        let t194 = t68 * t189;
-        let t195 = t194 / t5;
-        let t196 = self.fixed[10] * t195;
-        let t197 = t188 + t191;
-        let t198 = t197 + t193;
-        let t199 = t198 + t196;
-        let t200 = self.fixed[7] * t199;
-        let t203 = t68 * t136;
-        let t204 = self.fixed[18] * t203;
-        let t205 = t31 * t71;
-        let t206 = t205 / t4;
-        let t207 = t31 * t142;
-        let t208 = t207 / t5;
-        let t209 = t204 + t206;
-        let t210 = t209 + t208;
-        let t211 = self.fixed[9] * t210;
-        let t212 = t183 - t200;
-        let t213 = t212 - t211;
-        let t218 = t68 * t213;
-        let t219 = self.fixed[19] * t218;
-        let t220 = -t219;
-        let t221 = t220 + t177;
-        let t222 = t13 * t221;
-        let t223 = t20 * t31;
-        let t224 = t223 * t58;
-        let t225 = t224 / t5;
-        let t226 = T::nearest(2.0) * t225;
-        let t227 = t184 + t194;
-        let t228 = t227 - t226;
-        let t235 = t228 / t5;
-        let t236 = self.fixed[20] * t235;
-        let t237 = t236 * t101;
-        let t238 = self.fixed[10] * t182;
-        let t242 = self.fixed[21] * t136;
-        let t245 = self.fixed[22] * t139;
-        let t246 = t161 + t242;
-        let t247 = t246 + t245;
-        let t248 = t68 * t247;
-        let t249 = self.fixed[7] * t248;
-        let t250 = self.fixed[9] * t209;
-        let t251 = t238 - t249;
-        let t252 = t251 - t250;
-        let t254 = self.fixed[23] * t252;
-        let t255 = -t254;
-        let t256 = t222 + t237;
-        let t257 = t255 + t256;
-        let t258 = t13 * t257;
-        let t263 = self.fixed[24] * t165;
-        let t264 = -t263;
-        let t265 = t264 * t101;
-        let t266 = t258 + t265;
-        let t267 = t154 * t92;
-        let t268 = t266 / t267;
-        let t269 = t153 + t268;
-        let t270 = t13 * t269;
-        let t271 = t133 * t270;
-        let t272 = X[1] / t5;
-        let t273 = t272 * t270;
-        crate::nalgebra::SVector::<T, 2>::new(t271, t273)
+        let t182 = t67 * t34;
+        let t183 = t180 * t182;
+        let t184 = self.fixed[17] * t183;
+        let t185 = t31 * t137;
+        let t186 = t70 * t73;
+        let t187 = t185 + t186;
+        let t188 = t187 * t34;
+        let t189 = self.fixed[9] * t188;
+        let t190 = t71 + t72;
+        let t191 = t137 * t190;
+        let t192 = self.fixed[10] * t191;
+        let t193 = t185 * t34;
+        let t194 = self.fixed[10] * t193;
+        let t195 = t70 * t190;
+        let t196 = t195 * t34;
+        let t197 = self.fixed[10] * t196;
+        let t198 = t189 + t192;
+        let t199 = t198 + t194;
+        let t200 = t199 + t197;
+        let t201 = self.fixed[7] * t200;
+        let t204 = t70 * t137;
+        let t205 = self.fixed[18] * t204;
+        let t206 = t31 * t73;
+        let t207 = t206 * t67;
+        let t208 = t31 * t143;
+        let t209 = t208 * t34;
+        let t210 = t205 + t207;
+        let t211 = t210 + t209;
+        let t212 = self.fixed[9] * t211;
+        let t213 = t184 - t201;
+        let t214 = t213 - t212;
+        let t219 = t70 * t214;
+        let t220 = self.fixed[19] * t219;
+        let t221 = -t220;
+        let t222 = t221 + t178;
+        let t223 = t13 * t222;
+        let t224 = t20 * t31;
+        let t225 = t224 * t59;
+        let t226 = t225 * t34;
+        let t227 = T::nearest(2.0) * t226;
+        let t228 = t185 + t195;
+        let t229 = t228 - t227;
+        let t236 = t229 * t34;
+        let t237 = self.fixed[20] * t236;
+        let t238 = t237 * t103;
+        let t239 = self.fixed[10] * t183;
+        let t243 = self.fixed[21] * t137;
+        let t246 = self.fixed[22] * t140;
+        let t247 = t162 + t243;
+        let t248 = t247 + t246;
+        let t249 = t70 * t248;
+        let t250 = self.fixed[7] * t249;
+        let t251 = self.fixed[9] * t210;
+        let t252 = t239 - t250;
+        let t253 = t252 - t251;
+        let t255 = self.fixed[23] * t253;
+        let t256 = -t255;
+        let t257 = t223 + t238;
+        let t258 = t256 + t257;
+        let t259 = t13 * t258;
+        let t264 = self.fixed[24] * t166;
+        let t265 = -t264;
+        let t266 = t265 * t103;
+        let t267 = t259 + t266;
+        let t268 = t155 * t94;
+        let t269 = t267 / t268;
+        let t270 = t154 + t269;
+        let t271 = t13 * t270;
+        let t272 = t134 * t271;
+        let t273 = X[1] * t34;
+        let t274 = t273 * t271;
+        crate::nalgebra::SVector::<T, 2>::new(t272, t274)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t1 = X[0] * X[0];
@@ -701,196 +712,197 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
         let t33 = t31 * X[0];
-        let t34 = t33 / t5;
-        let t35 = t32 * t34;
-        let t36 = t31 * X[1];
-        let t37 = t36 / t5;
-        let t38 = t32 * t37;
-        let t40 = t12.sin_pi();
-        let t43 = self.fixed[4] * t40;
-        let t44 = t43 * t34;
-        let t45 = -t44;
-        let t46 = t43 * t37;
-        let t47 = -t46;
-        let t52 = self.fixed[6] * t13;
-        let t53 = t52 * t34;
-        let t54 = -t53;
-        let t55 = t52 * t37;
-        let t56 = -t55;
-        let t58 = t5 - self.parameters.Ri;
-        let t60 = t20 * t1;
-        let t61 = t60 * t58;
-        let t62 = self.fixed[7] * t61;
-        let t63 = t31 * t3;
-        let t64 = t63 / t5;
-        let t65 = t62 + t64;
-        let t66 = t65 / t4;
-        let t67 = t32 * t66;
-        let t68 = t20 * t58;
-        let t69 = self.fixed[7] * t68;
-        let t70 = t31 / t5;
-        let t71 = t69 - t70;
-        let t72 = X[0] * X[1];
-        let t73 = t72 * t71;
-        let t74 = t73 / t4;
-        let t75 = t32 * t74;
-        let t76 = t20 * t3;
-        let t77 = t76 * t58;
-        let t78 = self.fixed[7] * t77;
-        let t79 = t31 * t1;
-        let t80 = t79 / t5;
-        let t81 = t78 + t80;
-        let t82 = t81 / t4;
-        let t83 = t32 * t82;
-        let t84 = t67 + T::one();
-        let t85 = t83 + T::one();
-        let t88 = self.fixed[8] * t13;
-        let t89 = t88 * t68;
-        let t90 = t89 + T::one();
-        let t91 = t32 * t70;
+        let t34 = T::one() / t5;
+        let t35 = t33 * t34;
+        let t36 = t32 * t35;
+        let t37 = t31 * X[1];
+        let t38 = t37 * t34;
+        let t39 = t32 * t38;
+        let t41 = t12.sin_pi();
+        let t44 = self.fixed[4] * t41;
+        let t45 = t44 * t35;
+        let t46 = -t45;
+        let t47 = t44 * t38;
+        let t48 = -t47;
+        let t53 = self.fixed[6] * t13;
+        let t54 = t53 * t35;
+        let t55 = -t54;
+        let t56 = t53 * t38;
+        let t57 = -t56;
+        let t59 = t5 - self.parameters.Ri;
+        let t61 = t20 * t1;
+        let t62 = t61 * t59;
+        let t63 = self.fixed[7] * t62;
+        let t64 = t31 * t3;
+        let t65 = t64 * t34;
+        let t66 = t63 + t65;
+        let t67 = t34 * t34;
+        let t68 = t66 * t67;
+        let t69 = t32 * t68;
+        let t70 = t20 * t59;
+        let t71 = self.fixed[7] * t70;
+        let t72 = t31 * t34;
+        let t73 = t71 - t72;
+        let t74 = X[0] * X[1];
+        let t75 = t74 * t73;
+        let t76 = t75 * t67;
+        let t77 = t32 * t76;
+        let t78 = t20 * t3;
+        let t79 = t78 * t59;
+        let t80 = self.fixed[7] * t79;
+        let t81 = t31 * t1;
+        let t82 = t81 * t34;
+        let t83 = t80 + t82;
+        let t84 = t83 * t67;
+        let t85 = t32 * t84;
+        let t86 = t69 + T::one();
+        let t87 = t85 + T::one();
+        let t90 = self.fixed[8] * t13;
+        let t91 = t90 * t70;
         let t92 = t91 + T::one();
-        let t93 = t90 * t92;
-        let t98 = t91 * t89;
-        let t99 = t91 + t89;
-        let t100 = t99 + t98;
-        let t101 = t100.ln_1p();
-        let t105 = self.fixed[9] * t101;
-        let t109 = t89 + T::nearest(2.0);
-        let t110 = t89 * t109;
-        let t111 = self.fixed[10] * t110;
-        let t112 = t105 + t111;
-        let t113 = t112 / t90;
-        let t114 = t1 * t113;
-        let t115 = t91 + T::nearest(2.0);
-        let t117 = self.fixed[11] * t13;
-        let t118 = t117 * t70;
-        let t119 = t118 * t115;
-        let t120 = t105 + t119;
-        let t121 = t120 / t92;
-        let t122 = t3 * t121;
-        let t123 = t114 + t122;
-        let t124 = T::one() / t4;
-        let t125 = t124 * t123;
-        let t126 = t113 - t121;
-        let t127 = t72 / t4;
-        let t128 = t127 * t126;
-        let t129 = t3 * t113;
-        let t130 = t1 * t121;
-        let t131 = t129 + t130;
-        let t132 = t124 * t131;
-        let t133 = X[0] / t5;
-        let t134 = self.fixed[5] * t31;
-        let t136 = t23 - self.fixed[12];
-        let t137 = self.fixed[7] * t136;
-        let t138 = t31 / t4;
-        let t139 = t68 / t5;
-        let t140 = self.fixed[7] * t139;
-        let t141 = t71 / t5;
-        let t142 = t137 + t141;
-        let t144 = self.fixed[13] * t142;
-        let t145 = t137 - t138;
-        let t146 = t145 + t140;
-        let t147 = t146 + t144;
-        let t149 = self.fixed[14] * t147;
-        let t150 = t134 + t149;
-        let t152 = self.fixed[15] * t150;
-        let t153 = -t152;
-        let t154 = t90 * t90;
-        let t160 = t58 * t58;
-        let t161 = self.fixed[9] * t142;
-        let t162 = t23 + t139;
-        let t163 = t162 - self.fixed[12];
-        let t164 = self.fixed[7] * t163;
-        let t165 = t138 - t164;
-        let t166 = self.fixed[10] * t165;
-        let t167 = t161 - t166;
-        let t172 = t21 * t31;
-        let t173 = t172 * t160;
-        let t174 = t173 * t167;
-        let t175 = t174 / t5;
-        let t176 = self.fixed[16] * t175;
-        let t177 = t13 * t176;
-        let t179 = t4 * t5;
+        let t93 = t32 * t72;
+        let t94 = t93 + T::one();
+        let t95 = t92 * t94;
+        let t100 = t93 * t91;
+        let t101 = t93 + t91;
+        let t102 = t101 + t100;
+        let t103 = t102.ln_1p();
+        let t107 = self.fixed[9] * t103;
+        let t111 = t91 + T::nearest(2.0);
+        let t112 = t91 * t111;
+        let t113 = self.fixed[10] * t112;
+        let t114 = t107 + t113;
+        let t115 = t114 / t92;
+        let t116 = t1 * t115;
+        let t117 = t93 + T::nearest(2.0);
+        let t119 = self.fixed[11] * t13;
+        let t120 = t119 * t72;
+        let t121 = t120 * t117;
+        let t122 = t107 + t121;
+        let t123 = t122 / t94;
+        let t124 = t3 * t123;
+        let t125 = t116 + t124;
+        let t126 = t67 * t125;
+        let t127 = t115 - t123;
+        let t128 = t74 * t67;
+        let t129 = t128 * t127;
+        let t130 = t3 * t115;
+        let t131 = t1 * t123;
+        let t132 = t130 + t131;
+        let t133 = t67 * t132;
+        let t134 = X[0] * t34;
+        let t135 = self.fixed[5] * t31;
+        let t137 = t23 - self.fixed[12];
+        let t138 = self.fixed[7] * t137;
+        let t139 = t31 * t67;
+        let t140 = t70 * t34;
+        let t141 = self.fixed[7] * t140;
+        let t142 = t73 * t34;
+        let t143 = t138 + t142;
+        let t145 = self.fixed[13] * t143;
+        let t146 = t138 - t139;
+        let t147 = t146 + t141;
+        let t148 = t147 + t145;
+        let t150 = self.fixed[14] * t148;
+        let t151 = t135 + t150;
+        let t153 = self.fixed[15] * t151;
+        let t154 = -t153;
+        let t155 = t92 * t92;
+        let t161 = t59 * t59;
+        let t162 = self.fixed[9] * t143;
+        let t163 = t23 + t140;
+        let t164 = t163 - self.fixed[12];
+        let t165 = self.fixed[7] * t164;
+        let t166 = t139 - t165;
+        let t167 = self.fixed[10] * t166;
+        let t168 = t162 - t167;
+        let t173 = t21 * t31;
+        let t174 = t173 * t161;
+        let t175 = t174 * t168;
+        let t176 = t175 * t34;
+        let t177 = self.fixed[16] * t176;
+        let t178 = t13 * t177;
         let t180 = t31 * t31;
-        let t182 = t180 / t179;
-        let t183 = self.fixed[17] * t182;
-        let t184 = t31 * t136;
-        let t185 = t68 * t71;
-        let t186 = t184 + t185;
-        let t187 = t186 / t5;
-        let t188 = self.fixed[9] * t187;
-        let t189 = t69 + t70;
-        let t190 = t136 * t189;
-        let t191 = self.fixed[10] * t190;
-        let t192 = t184 / t5;
-        let t193 = self.fixed[10] * t192;
-        let t194 = t68 * t189;
-        let t195 = t194 / t5;
-        let t196 = self.fixed[10] * t195;
-        let t197 = t188 + t191;
-        let t198 = t197 + t193;
-        let t199 = t198 + t196;
-        let t200 = self.fixed[7] * t199;
-        let t203 = t68 * t136;
-        let t204 = self.fixed[18] * t203;
-        let t205 = t31 * t71;
-        let t206 = t205 / t4;
-        let t207 = t31 * t142;
-        let t208 = t207 / t5;
-        let t209 = t204 + t206;
-        let t210 = t209 + t208;
-        let t211 = self.fixed[9] * t210;
-        let t212 = t183 - t200;
-        let t213 = t212 - t211;
-        let t218 = t68 * t213;
-        let t219 = self.fixed[19] * t218;
-        let t220 = -t219;
-        let t221 = t220 + t177;
-        let t222 = t13 * t221;
-        let t223 = t20 * t31;
-        let t224 = t223 * t58;
-        let t225 = t224 / t5;
-        let t226 = T::nearest(2.0) * t225;
-        let t227 = t184 + t194;
-        let t228 = t227 - t226;
-        let t235 = t228 / t5;
-        let t236 = self.fixed[20] * t235;
-        let t237 = t236 * t101;
-        let t238 = self.fixed[10] * t182;
-        let t242 = self.fixed[21] * t136;
-        let t245 = self.fixed[22] * t139;
-        let t246 = t161 + t242;
-        let t247 = t246 + t245;
-        let t248 = t68 * t247;
-        let t249 = self.fixed[7] * t248;
-        let t250 = self.fixed[9] * t209;
-        let t251 = t238 - t249;
-        let t252 = t251 - t250;
-        let t254 = self.fixed[23] * t252;
-        let t255 = -t254;
-        let t256 = t222 + t237;
-        let t257 = t255 + t256;
-        let t258 = t13 * t257;
-        let t263 = self.fixed[24] * t165;
-        let t264 = -t263;
-        let t265 = t264 * t101;
-        let t266 = t258 + t265;
-        let t267 = t154 * t92;
-        let t268 = t266 / t267;
-        let t269 = t153 + t268;
-        let t270 = t13 * t269;
-        let t271 = t133 * t270;
-        let t272 = X[1] / t5;
-        let t273 = t272 * t270;
+        let t182 = t67 * t34;
+        let t183 = t180 * t182;
+        let t184 = self.fixed[17] * t183;
+        let t185 = t31 * t137;
+        let t186 = t70 * t73;
+        let t187 = t185 + t186;
+        let t188 = t187 * t34;
+        let t189 = self.fixed[9] * t188;
+        let t190 = t71 + t72;
+        let t191 = t137 * t190;
+        let t192 = self.fixed[10] * t191;
+        let t193 = t185 * t34;
+        let t194 = self.fixed[10] * t193;
+        let t195 = t70 * t190;
+        let t196 = t195 * t34;
+        let t197 = self.fixed[10] * t196;
+        let t198 = t189 + t192;
+        let t199 = t198 + t194;
+        let t200 = t199 + t197;
+        let t201 = self.fixed[7] * t200;
+        let t204 = t70 * t137;
+        let t205 = self.fixed[18] * t204;
+        let t206 = t31 * t73;
+        let t207 = t206 * t67;
+        let t208 = t31 * t143;
+        let t209 = t208 * t34;
+        let t210 = t205 + t207;
+        let t211 = t210 + t209;
+        let t212 = self.fixed[9] * t211;
+        let t213 = t184 - t201;
+        let t214 = t213 - t212;
+        let t219 = t70 * t214;
+        let t220 = self.fixed[19] * t219;
+        let t221 = -t220;
+        let t222 = t221 + t178;
+        let t223 = t13 * t222;
+        let t224 = t20 * t31;
+        let t225 = t224 * t59;
+        let t226 = t225 * t34;
+        let t227 = T::nearest(2.0) * t226;
+        let t228 = t185 + t195;
+        let t229 = t228 - t227;
+        let t236 = t229 * t34;
+        let t237 = self.fixed[20] * t236;
+        let t238 = t237 * t103;
+        let t239 = self.fixed[10] * t183;
+        let t243 = self.fixed[21] * t137;
+        let t246 = self.fixed[22] * t140;
+        let t247 = t162 + t243;
+        let t248 = t247 + t246;
+        let t249 = t70 * t248;
+        let t250 = self.fixed[7] * t249;
+        let t251 = self.fixed[9] * t210;
+        let t252 = t239 - t250;
+        let t253 = t252 - t251;
+        let t255 = self.fixed[23] * t253;
+        let t256 = -t255;
+        let t257 = t223 + t238;
+        let t258 = t256 + t257;
+        let t259 = t13 * t258;
+        let t264 = self.fixed[24] * t166;
+        let t265 = -t264;
+        let t266 = t265 * t103;
+        let t267 = t259 + t266;
+        let t268 = t155 * t94;
+        let t269 = t267 / t268;
+        let t270 = t154 + t269;
+        let t271 = t13 * t270;
+        let t272 = t134 * t271;
+        let t273 = X[1] * t34;
+        let t274 = t273 * t271;
         crate::Fields {
-            u: crate::nalgebra::SVector::<T, 2>::new(t35, t38),
-            v: crate::nalgebra::SVector::<T, 2>::new(t45, t47),
-            a: crate::nalgebra::SVector::<T, 2>::new(t54, t56),
-            H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t67, t75, t75, t83),
-            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t84, t75, t75, t85),
-            J: t93,
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t125, t128, t128, t132),
-            b: crate::nalgebra::SVector::<T, 2>::new(t271, t273),
+            u: crate::nalgebra::SVector::<T, 2>::new(t36, t39),
+            v: crate::nalgebra::SVector::<T, 2>::new(t46, t48),
+            a: crate::nalgebra::SVector::<T, 2>::new(t55, t57),
+            H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t69, t77, t77, t85),
+            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t86, t77, t77, t87),
+            J: t95,
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t126, t129, t129, t133),
+            b: crate::nalgebra::SVector::<T, 2>::new(t272, t274),
         }
     }
     fn domain(&self) -> crate::Domain<T, 2> {
@@ -951,8 +963,8 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
         let t32 = self.parameters.A * t13;
-        let t88 = self.fixed[8] * t13;
-        [t13, t32, t88]
+        let t90 = self.fixed[8] * t13;
+        [t13, t32, t90]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 10] {
@@ -967,100 +979,102 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         let t29 = t21 * t25;
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
-        let t58 = t5 - self.parameters.Ri;
-        let t68 = t20 * t58;
-        let t69 = self.fixed[7] * t68;
-        let t70 = t31 / t5;
-        let t71 = t69 - t70;
-        let t133 = X[0] / t5;
-        let t134 = self.fixed[5] * t31;
-        let t136 = t23 - self.fixed[12];
-        let t137 = self.fixed[7] * t136;
-        let t138 = t31 / t4;
-        let t139 = t68 / t5;
-        let t140 = self.fixed[7] * t139;
-        let t141 = t71 / t5;
-        let t142 = t137 + t141;
-        let t144 = self.fixed[13] * t142;
-        let t145 = t137 - t138;
-        let t146 = t145 + t140;
-        let t147 = t146 + t144;
-        let t149 = self.fixed[14] * t147;
-        let t150 = t134 + t149;
-        let t152 = self.fixed[15] * t150;
-        let t153 = -t152;
-        let t160 = t58 * t58;
-        let t161 = self.fixed[9] * t142;
-        let t162 = t23 + t139;
-        let t163 = t162 - self.fixed[12];
-        let t164 = self.fixed[7] * t163;
-        let t165 = t138 - t164;
-        let t166 = self.fixed[10] * t165;
-        let t167 = t161 - t166;
-        let t172 = t21 * t31;
-        let t173 = t172 * t160;
-        let t174 = t173 * t167;
-        let t175 = t174 / t5;
-        let t176 = self.fixed[16] * t175;
-        let t179 = t4 * t5;
+        let t34 = T::one() / t5;
+        let t59 = t5 - self.parameters.Ri;
+        let t67 = t34 * t34;
+        let t70 = t20 * t59;
+        let t71 = self.fixed[7] * t70;
+        let t72 = t31 * t34;
+        let t73 = t71 - t72;
+        let t134 = X[0] * t34;
+        let t135 = self.fixed[5] * t31;
+        let t137 = t23 - self.fixed[12];
+        let t138 = self.fixed[7] * t137;
+        let t139 = t31 * t67;
+        let t140 = t70 * t34;
+        let t141 = self.fixed[7] * t140;
+        let t142 = t73 * t34;
+        let t143 = t138 + t142;
+        let t145 = self.fixed[13] * t143;
+        let t146 = t138 - t139;
+        let t147 = t146 + t141;
+        let t148 = t147 + t145;
+        let t150 = self.fixed[14] * t148;
+        let t151 = t135 + t150;
+        let t153 = self.fixed[15] * t151;
+        let t154 = -t153;
+        let t161 = t59 * t59;
+        let t162 = self.fixed[9] * t143;
+        let t163 = t23 + t140;
+        let t164 = t163 - self.fixed[12];
+        let t165 = self.fixed[7] * t164;
+        let t166 = t139 - t165;
+        let t167 = self.fixed[10] * t166;
+        let t168 = t162 - t167;
+        let t173 = t21 * t31;
+        let t174 = t173 * t161;
+        let t175 = t174 * t168;
+        let t176 = t175 * t34;
+        let t177 = self.fixed[16] * t176;
         let t180 = t31 * t31;
-        let t182 = t180 / t179;
-        let t183 = self.fixed[17] * t182;
-        let t184 = t31 * t136;
-        let t185 = t68 * t71;
-        let t186 = t184 + t185;
-        let t187 = t186 / t5;
-        let t188 = self.fixed[9] * t187;
-        let t189 = t69 + t70;
-        let t190 = t136 * t189;
-        let t191 = self.fixed[10] * t190;
-        let t192 = t184 / t5;
-        let t193 = self.fixed[10] * t192;
-        let t194 = t68 * t189;
-        let t195 = t194 / t5;
-        let t196 = self.fixed[10] * t195;
-        let t197 = t188 + t191;
-        let t198 = t197 + t193;
-        let t199 = t198 + t196;
-        let t200 = self.fixed[7] * t199;
-        let t203 = t68 * t136;
-        let t204 = self.fixed[18] * t203;
-        let t205 = t31 * t71;
-        let t206 = t205 / t4;
-        let t207 = t31 * t142;
-        let t208 = t207 / t5;
-        let t209 = t204 + t206;
-        let t210 = t209 + t208;
-        let t211 = self.fixed[9] * t210;
-        let t212 = t183 - t200;
-        let t213 = t212 - t211;
-        let t218 = t68 * t213;
-        let t219 = self.fixed[19] * t218;
-        let t220 = -t219;
-        let t223 = t20 * t31;
-        let t224 = t223 * t58;
-        let t225 = t224 / t5;
-        let t226 = T::nearest(2.0) * t225;
-        let t227 = t184 + t194;
-        let t228 = t227 - t226;
-        let t235 = t228 / t5;
-        let t236 = self.fixed[20] * t235;
-        let t238 = self.fixed[10] * t182;
-        let t242 = self.fixed[21] * t136;
-        let t245 = self.fixed[22] * t139;
-        let t246 = t161 + t242;
-        let t247 = t246 + t245;
-        let t248 = t68 * t247;
-        let t249 = self.fixed[7] * t248;
-        let t250 = self.fixed[9] * t209;
-        let t251 = t238 - t249;
-        let t252 = t251 - t250;
-        let t254 = self.fixed[23] * t252;
-        let t255 = -t254;
-        let t263 = self.fixed[24] * t165;
-        let t264 = -t263;
-        let t272 = X[1] / t5;
-        [t68, t70, t133, t153, t176, t220, t236, t255, t264, t272]
+        let t182 = t67 * t34;
+        let t183 = t180 * t182;
+        let t184 = self.fixed[17] * t183;
+        let t185 = t31 * t137;
+        let t186 = t70 * t73;
+        let t187 = t185 + t186;
+        let t188 = t187 * t34;
+        let t189 = self.fixed[9] * t188;
+        let t190 = t71 + t72;
+        let t191 = t137 * t190;
+        let t192 = self.fixed[10] * t191;
+        let t193 = t185 * t34;
+        let t194 = self.fixed[10] * t193;
+        let t195 = t70 * t190;
+        let t196 = t195 * t34;
+        let t197 = self.fixed[10] * t196;
+        let t198 = t189 + t192;
+        let t199 = t198 + t194;
+        let t200 = t199 + t197;
+        let t201 = self.fixed[7] * t200;
+        let t204 = t70 * t137;
+        let t205 = self.fixed[18] * t204;
+        let t206 = t31 * t73;
+        let t207 = t206 * t67;
+        let t208 = t31 * t143;
+        let t209 = t208 * t34;
+        let t210 = t205 + t207;
+        let t211 = t210 + t209;
+        let t212 = self.fixed[9] * t211;
+        let t213 = t184 - t201;
+        let t214 = t213 - t212;
+        let t219 = t70 * t214;
+        let t220 = self.fixed[19] * t219;
+        let t221 = -t220;
+        let t224 = t20 * t31;
+        let t225 = t224 * t59;
+        let t226 = t225 * t34;
+        let t227 = T::nearest(2.0) * t226;
+        let t228 = t185 + t195;
+        let t229 = t228 - t227;
+        let t236 = t229 * t34;
+        let t237 = self.fixed[20] * t236;
+        let t239 = self.fixed[10] * t183;
+        let t243 = self.fixed[21] * t137;
+        let t246 = self.fixed[22] * t140;
+        let t247 = t162 + t243;
+        let t248 = t247 + t246;
+        let t249 = t70 * t248;
+        let t250 = self.fixed[7] * t249;
+        let t251 = self.fixed[9] * t210;
+        let t252 = t239 - t250;
+        let t253 = t252 - t251;
+        let t255 = self.fixed[23] * t253;
+        let t256 = -t255;
+        let t264 = self.fixed[24] * t166;
+        let t265 = -t264;
+        let t273 = X[1] * t34;
+        [t70, t72, t134, t154, t177, t221, t237, t256, t265, t273]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -1068,31 +1082,31 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         time: &[T; 3],
         point: &[T; 10],
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t89 = time[2] * point[0];
-        let t90 = t89 + T::one();
-        let t91 = time[1] * point[1];
+        let t91 = time[2] * point[0];
         let t92 = t91 + T::one();
-        let t98 = t91 * t89;
-        let t99 = t91 + t89;
-        let t100 = t99 + t98;
-        let t101 = t100.ln_1p();
-        let t154 = t90 * t90;
-        let t177 = time[0] * point[4];
-        let t221 = point[5] + t177;
-        let t222 = time[0] * t221;
-        let t237 = point[6] * t101;
-        let t256 = t222 + t237;
-        let t257 = point[7] + t256;
-        let t258 = time[0] * t257;
-        let t265 = point[8] * t101;
-        let t266 = t258 + t265;
-        let t267 = t154 * t92;
-        let t268 = t266 / t267;
-        let t269 = point[3] + t268;
-        let t270 = time[0] * t269;
-        let t271 = point[2] * t270;
-        let t273 = point[9] * t270;
-        crate::nalgebra::SVector::<T, 2>::new(t271, t273)
+        let t93 = time[1] * point[1];
+        let t94 = t93 + T::one();
+        let t100 = t93 * t91;
+        let t101 = t93 + t91;
+        let t102 = t101 + t100;
+        let t103 = t102.ln_1p();
+        let t155 = t92 * t92;
+        let t178 = time[0] * point[4];
+        let t222 = point[5] + t178;
+        let t223 = time[0] * t222;
+        let t238 = point[6] * t103;
+        let t257 = t223 + t238;
+        let t258 = point[7] + t257;
+        let t259 = time[0] * t258;
+        let t266 = point[8] * t103;
+        let t267 = t259 + t266;
+        let t268 = t155 * t94;
+        let t269 = t267 / t268;
+        let t270 = point[3] + t269;
+        let t271 = time[0] * t270;
+        let t272 = point[2] * t271;
+        let t274 = point[9] * t271;
+        crate::nalgebra::SVector::<T, 2>::new(t272, t274)
     }
 }
 impl<T: crate::Real> From<RingNu<T>> for crate::AnySolution<T> {

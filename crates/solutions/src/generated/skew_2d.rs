@@ -134,10 +134,10 @@ impl<T: crate::Real> Skew2d<T> {
         let t104 = t103 / t91;
         let t107 = parameters.A * parameters.A;
         let t122 = parameters.A * t104;
-        let t152 = T::nearest(10.0) * t49;
-        let t166 = t92 / t93;
-        let t170 = T::one() / t91;
-        let t173 = t56 / parameters.rho0;
+        let t153 = T::nearest(10.0) * t49;
+        let t167 = t92 / t93;
+        let t171 = T::one() / t91;
+        let t174 = t56 / parameters.rho0;
         let t178 = t107 * t107;
         let t179 = t178 * parameters.A;
         let t180 = T::nearest(3.0) * T::pi();
@@ -214,14 +214,14 @@ impl<T: crate::Real> Skew2d<T> {
         let t465 = t464 * parameters.E;
         let t466 = t465 * parameters.nu;
         let t467 = t466 / t287;
-        let t477 = T::nearest(2.0) * t49;
-        let t490 = parameters.nu / t93;
-        let t497 = T::nearest(0.05) * parameters.A;
-        let t498 = t497 * parameters.E;
-        let t499 = t498 / parameters.rho0;
-        let t558 = T::nearest(0.8) * parameters.A;
-        let t597 = T::one() / parameters.rho0;
-        let t601 = T::nearest(2.0) / t11;
+        let t478 = T::nearest(2.0) * t49;
+        let t491 = parameters.nu / t93;
+        let t498 = T::nearest(0.05) * parameters.A;
+        let t499 = t498 * parameters.E;
+        let t500 = t499 / parameters.rho0;
+        let t559 = T::nearest(0.8) * parameters.A;
+        let t598 = T::one() / parameters.rho0;
+        let t602 = T::nearest(2.0) / t11;
         Ok(Skew2d {
             parameters,
             fixed: [
@@ -237,10 +237,10 @@ impl<T: crate::Real> Skew2d<T> {
                 t104,
                 t107,
                 t122,
-                t152,
-                t166,
-                t170,
-                t173,
+                t153,
+                t167,
+                t171,
+                t174,
                 t180,
                 t187,
                 t190,
@@ -276,13 +276,13 @@ impl<T: crate::Real> Skew2d<T> {
                 t458,
                 t464,
                 t467,
-                t477,
-                t490,
-                t497,
-                t499,
-                t558,
-                t597,
-                t601,
+                t478,
+                t491,
+                t498,
+                t500,
+                t559,
+                t598,
+                t602,
             ],
         })
     }
@@ -599,32 +599,33 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t124 = t123 * t62;
         let t125 = t124 * t121;
         let t126 = t116 - t125;
-        let t127 = t126 / t89;
-        let t128 = t71 * t115;
-        let t129 = t80 * t121;
-        let t130 = self.fixed[9] * t129;
-        let t131 = t128 - t130;
-        let t132 = t131 / t89;
-        let t133 = -t132;
-        let t134 = t86 * t121;
-        let t135 = self.fixed[9] * t134;
-        let t136 = T::nearest(2.0) * t78;
-        let t137 = t71 * t71;
-        let t138 = t78 * t78;
-        let t139 = t136 + t137;
-        let t140 = t139 + t138;
-        let t141 = self.fixed[9] * t140;
-        let t142 = t102 + t141;
-        let t143 = t66 * t142;
-        let t144 = t135 - t143;
-        let t145 = t144 / t89;
-        let t146 = t71 * t121;
-        let t147 = self.fixed[9] * t146;
-        let t148 = t80 * t142;
-        let t149 = t147 - t148;
-        let t150 = t149 / t89;
-        let t151 = -t150;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t127, t133, t145, t151)
+        let t127 = T::one() / t89;
+        let t128 = t126 * t127;
+        let t129 = t71 * t115;
+        let t130 = t80 * t121;
+        let t131 = self.fixed[9] * t130;
+        let t132 = t129 - t131;
+        let t133 = t132 * t127;
+        let t134 = -t133;
+        let t135 = t86 * t121;
+        let t136 = self.fixed[9] * t135;
+        let t137 = T::nearest(2.0) * t78;
+        let t138 = t71 * t71;
+        let t139 = t78 * t78;
+        let t140 = t137 + t138;
+        let t141 = t140 + t139;
+        let t142 = self.fixed[9] * t141;
+        let t143 = t102 + t142;
+        let t144 = t66 * t143;
+        let t145 = t136 - t144;
+        let t146 = t145 * t127;
+        let t147 = t71 * t121;
+        let t148 = self.fixed[9] * t147;
+        let t149 = t80 * t143;
+        let t150 = t148 - t149;
+        let t151 = t150 * t127;
+        let t152 = -t151;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t128, t134, t146, t152)
     }
     #[inline]
     fn body_force(
@@ -681,25 +682,25 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t98 = t97.ln_1p();
         let t102 = self.fixed[8] * t98;
         let t109 = t62 * t62;
-        let t153 = self.fixed[12] * t13;
-        let t154 = t153 * t6;
-        let t156 = T::nearest(95.0) * t13;
-        let t157 = t156 * t6;
-        let t158 = t67 * t72;
-        let t159 = T::pi() * t158;
-        let t160 = X[1] - t159;
-        let t161 = t32 * t160;
-        let t163 = T::nearest(45.0) * t13;
-        let t164 = t163 * t6;
-        let t165 = t164 - t161;
-        let t167 = self.fixed[13] * t165;
-        let t168 = t157 - t161;
-        let t169 = t168 + t167;
-        let t171 = self.fixed[14] * t169;
-        let t172 = t154 - t171;
-        let t174 = self.fixed[15] * t172;
-        let t175 = -t174;
-        let t176 = t89 * t89;
+        let t127 = T::one() / t89;
+        let t154 = self.fixed[12] * t13;
+        let t155 = t154 * t6;
+        let t157 = T::nearest(95.0) * t13;
+        let t158 = t157 * t6;
+        let t159 = t67 * t72;
+        let t160 = T::pi() * t159;
+        let t161 = X[1] - t160;
+        let t162 = t32 * t161;
+        let t164 = T::nearest(45.0) * t13;
+        let t165 = t164 * t6;
+        let t166 = t165 - t162;
+        let t168 = self.fixed[13] * t166;
+        let t169 = t158 - t162;
+        let t170 = t169 + t168;
+        let t172 = self.fixed[14] * t170;
+        let t173 = t155 - t172;
+        let t175 = self.fixed[15] * t173;
+        let t176 = -t175;
         let t181 = self.fixed[16] * t73;
         let t183 = T::nearest(6.0) * t75;
         let t184 = t70 - t181;
@@ -710,13 +711,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t193 = self.fixed[18] * t192;
         let t194 = -t193;
         let t195 = t13 * t194;
-        let t200 = t109 * t160;
+        let t200 = t109 * t161;
         let t201 = t200 * t186;
         let t202 = self.fixed[19] * t201;
         let t203 = t32 * t202;
         let t206 = t23 * t62;
         let t207 = T::nearest(8.0) * t206;
-        let t208 = t62 * t160;
+        let t208 = t62 * t161;
         let t209 = T::nearest(6.0) * t208;
         let t210 = t6 * t185;
         let t211 = T::nearest(3.0) * t210;
@@ -760,7 +761,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t253 = t251 + t252;
         let t254 = t13 * t253;
         let t259 = t62 * t77;
-        let t260 = t259 * t160;
+        let t260 = t259 * t161;
         let t261 = t260 * t185;
         let t262 = self.fixed[22] * t261;
         let t263 = -t262;
@@ -770,7 +771,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t269 = T::nearest(2.0) * t210;
         let t270 = T::nearest(12.0) * X[0];
         let t271 = T::nearest(4.0) * X[1];
-        let t273 = self.fixed[23] * t158;
+        let t273 = self.fixed[23] * t159;
         let t275 = self.fixed[24] * t23;
         let t276 = t270 - t271;
         let t277 = t276 + t273;
@@ -785,7 +786,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t296 = t77 * t221;
         let t297 = self.fixed[27] * t296;
         let t299 = t62 * t70;
-        let t300 = t299 * t160;
+        let t300 = t299 * t161;
         let t301 = self.fixed[28] * t300;
         let t304 = self.fixed[29] * t73;
         let t306 = T::nearest(18.0) * t75;
@@ -809,7 +810,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t326 = t325 - t324;
         let t327 = t6 * t326;
         let t328 = T::nearest(2.0) * X[1];
-        let t330 = self.fixed[32] * t158;
+        let t330 = self.fixed[32] * t159;
         let t331 = t270 - t328;
         let t332 = t331 + t330;
         let t333 = t332 - t275;
@@ -868,11 +869,11 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t409 = t406 + t408;
         let t410 = t13 * t409;
         let t411 = t77 * t77;
-        let t415 = t411 * t160;
+        let t415 = t411 * t161;
         let t416 = self.fixed[42] * t415;
         let t417 = t32 * t416;
         let t418 = t70 * t315;
-        let t419 = t77 * t160;
+        let t419 = t77 * t161;
         let t420 = T::nearest(4.0) * t419;
         let t421 = t418 - t420;
         let t426 = self.fixed[43] * t421;
@@ -887,7 +888,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t436 = t417 + t428;
         let t437 = t435 + t436;
         let t438 = t32 * t437;
-        let t443 = self.fixed[46] * t160;
+        let t443 = self.fixed[46] * t161;
         let t444 = t443 * t98;
         let t445 = t410 + t438;
         let t446 = t445 + t444;
@@ -906,123 +907,124 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t471 = t463 + t470;
         let t472 = t13 * t471;
         let t473 = t447 + t472;
-        let t474 = t473 / t176;
-        let t475 = t175 + t474;
-        let t478 = self.fixed[51] * t32;
-        let t479 = t478 * t27;
-        let t481 = T::nearest(30.0) * t13;
-        let t482 = t481 * t6;
-        let t483 = T::nearest(8.0) * t32;
-        let t484 = t483 * t23;
-        let t485 = t32 * t315;
-        let t487 = T::nearest(60.0) * t13;
-        let t488 = t487 * t6;
-        let t489 = t488 - t485;
-        let t491 = self.fixed[52] * t489;
-        let t492 = t482 + t484;
-        let t493 = t492 - t485;
-        let t494 = t493 + t491;
-        let t495 = self.fixed[14] * t494;
-        let t496 = t479 - t495;
-        let t500 = self.fixed[54] * t496;
-        let t501 = -t500;
-        let t502 = t15 * t71;
-        let t503 = t64 * t6;
-        let t504 = -t503;
-        let t505 = t86 * t504;
-        let t506 = self.fixed[45] * t32;
-        let t507 = t506 * t160;
-        let t508 = t66 * t507;
-        let t509 = self.fixed[53] * t32;
-        let t510 = t509 * t315;
-        let t511 = t80 * t510;
-        let t512 = t502 + t505;
-        let t513 = t512 - t508;
-        let t514 = t513 + t511;
-        let t515 = t78 * t80;
-        let t516 = t88 - t515;
-        let t517 = t514 * t516;
-        let t518 = t517 / t89;
-        let t519 = t6 * t71;
-        let t520 = t62 * t507;
-        let t521 = t519 - t520;
-        let t522 = t14 * t521;
-        let t523 = t78 * t504;
-        let t524 = t511 + t522;
-        let t525 = t524 + t523;
-        let t526 = t98 * t525;
-        let t527 = t518 - t526;
-        let t528 = self.fixed[8] * t527;
-        let t529 = t510 * t516;
-        let t530 = t78 * t525;
-        let t531 = t522 + t529;
-        let t532 = t531 - t530;
-        let t533 = self.fixed[9] * t532;
-        let t534 = t98 * t516;
-        let t535 = self.fixed[8] * t534;
-        let t536 = t78 * t516;
-        let t537 = t88 - t536;
-        let t538 = self.fixed[9] * t537;
-        let t539 = t535 - t538;
-        let t540 = t505 + t511;
-        let t541 = t540 + t522;
-        let t542 = t539 * t541;
-        let t543 = t542 / t89;
-        let t544 = t65 * t86;
-        let t545 = t78 - t88;
-        let t546 = t545 + t544;
-        let t547 = self.fixed[9] * t546;
-        let t548 = t102 + t547;
-        let t549 = T::nearest(3.0) * t6;
-        let t550 = t549 * t548;
-        let t551 = self.fixed[49] * t13;
-        let t552 = t551 * t6;
-        let t553 = -t552;
-        let t554 = t86 * t553;
-        let t555 = t80 * t507;
-        let t556 = t549 * t71;
-        let t559 = self.fixed[55] * t32;
-        let t560 = t559 * t23;
-        let t561 = -t560;
-        let t562 = t62 * t561;
-        let t563 = t556 - t562;
-        let t564 = t14 * t563;
-        let t565 = t554 + t555;
-        let t566 = t565 + t564;
-        let t567 = t548 * t566;
-        let t568 = t567 / t89;
-        let t569 = t62 * t568;
-        let t570 = t503 * t71;
-        let t571 = t66 * t561;
-        let t572 = t554 + t570;
-        let t573 = t572 - t571;
-        let t574 = t573 + t555;
-        let t575 = t574 / t89;
-        let t576 = self.fixed[8] * t575;
-        let t577 = t65 * t507;
-        let t578 = t507 + t554;
-        let t579 = t578 + t564;
-        let t580 = t579 + t577;
-        let t581 = self.fixed[9] * t580;
-        let t582 = t576 + t581;
-        let t583 = t62 * t582;
-        let t584 = t550 + t569;
-        let t585 = t584 - t583;
-        let t586 = t14 * t585;
-        let t587 = t88 - t544;
-        let t588 = t504 * t587;
-        let t589 = t502 - t508;
-        let t590 = t589 + t529;
-        let t591 = t590 + t588;
-        let t592 = self.fixed[8] * t591;
-        let t593 = t528 + t533;
-        let t594 = t593 - t543;
-        let t595 = t594 + t586;
-        let t596 = t595 + t592;
-        let t598 = t596 / t89;
-        let t599 = self.fixed[56] * t598;
-        let t600 = t501 - t599;
-        crate::nalgebra::SVector::<T, 2>::new(t475, t600)
+        let t474 = t127 * t127;
+        let t475 = t473 * t474;
+        let t476 = t176 + t475;
+        let t479 = self.fixed[51] * t32;
+        let t480 = t479 * t27;
+        let t482 = T::nearest(30.0) * t13;
+        let t483 = t482 * t6;
+        let t484 = T::nearest(8.0) * t32;
+        let t485 = t484 * t23;
+        let t486 = t32 * t315;
+        let t488 = T::nearest(60.0) * t13;
+        let t489 = t488 * t6;
+        let t490 = t489 - t486;
+        let t492 = self.fixed[52] * t490;
+        let t493 = t483 + t485;
+        let t494 = t493 - t486;
+        let t495 = t494 + t492;
+        let t496 = self.fixed[14] * t495;
+        let t497 = t480 - t496;
+        let t501 = self.fixed[54] * t497;
+        let t502 = -t501;
+        let t503 = t15 * t71;
+        let t504 = t64 * t6;
+        let t505 = -t504;
+        let t506 = t86 * t505;
+        let t507 = self.fixed[45] * t32;
+        let t508 = t507 * t161;
+        let t509 = t66 * t508;
+        let t510 = self.fixed[53] * t32;
+        let t511 = t510 * t315;
+        let t512 = t80 * t511;
+        let t513 = t503 + t506;
+        let t514 = t513 - t509;
+        let t515 = t514 + t512;
+        let t516 = t78 * t80;
+        let t517 = t88 - t516;
+        let t518 = t515 * t517;
+        let t519 = t518 * t127;
+        let t520 = t6 * t71;
+        let t521 = t62 * t508;
+        let t522 = t520 - t521;
+        let t523 = t14 * t522;
+        let t524 = t78 * t505;
+        let t525 = t512 + t523;
+        let t526 = t525 + t524;
+        let t527 = t98 * t526;
+        let t528 = t519 - t527;
+        let t529 = self.fixed[8] * t528;
+        let t530 = t511 * t517;
+        let t531 = t78 * t526;
+        let t532 = t523 + t530;
+        let t533 = t532 - t531;
+        let t534 = self.fixed[9] * t533;
+        let t535 = t98 * t517;
+        let t536 = self.fixed[8] * t535;
+        let t537 = t78 * t517;
+        let t538 = t88 - t537;
+        let t539 = self.fixed[9] * t538;
+        let t540 = t536 - t539;
+        let t541 = t506 + t512;
+        let t542 = t541 + t523;
+        let t543 = t540 * t542;
+        let t544 = t543 * t127;
+        let t545 = t65 * t86;
+        let t546 = t78 - t88;
+        let t547 = t546 + t545;
+        let t548 = self.fixed[9] * t547;
+        let t549 = t102 + t548;
+        let t550 = T::nearest(3.0) * t6;
+        let t551 = t550 * t549;
+        let t552 = self.fixed[49] * t13;
+        let t553 = t552 * t6;
+        let t554 = -t553;
+        let t555 = t86 * t554;
+        let t556 = t80 * t508;
+        let t557 = t550 * t71;
+        let t560 = self.fixed[55] * t32;
+        let t561 = t560 * t23;
+        let t562 = -t561;
+        let t563 = t62 * t562;
+        let t564 = t557 - t563;
+        let t565 = t14 * t564;
+        let t566 = t555 + t556;
+        let t567 = t566 + t565;
+        let t568 = t549 * t567;
+        let t569 = t568 * t127;
+        let t570 = t62 * t569;
+        let t571 = t504 * t71;
+        let t572 = t66 * t562;
+        let t573 = t555 + t571;
+        let t574 = t573 - t572;
+        let t575 = t574 + t556;
+        let t576 = t575 * t127;
+        let t577 = self.fixed[8] * t576;
+        let t578 = t65 * t508;
+        let t579 = t508 + t555;
+        let t580 = t579 + t565;
+        let t581 = t580 + t578;
+        let t582 = self.fixed[9] * t581;
+        let t583 = t577 + t582;
+        let t584 = t62 * t583;
+        let t585 = t551 + t570;
+        let t586 = t585 - t584;
+        let t587 = t14 * t586;
+        let t588 = t88 - t545;
+        let t589 = t505 * t588;
+        let t590 = t503 - t509;
+        let t591 = t590 + t530;
+        let t592 = t591 + t589;
+        let t593 = self.fixed[8] * t592;
+        let t594 = t529 + t534;
+        let t595 = t594 - t544;
+        let t596 = t595 + t587;
+        let t597 = t596 + t593;
+        let t599 = t597 * t127;
+        let t600 = self.fixed[56] * t599;
+        let t601 = t502 - t600;
+        crate::nalgebra::SVector::<T, 2>::new(t476, t601)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t3 = T::nearest(3.0) * X[0];
@@ -1112,50 +1114,50 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t124 = t123 * t62;
         let t125 = t124 * t121;
         let t126 = t116 - t125;
-        let t127 = t126 / t89;
-        let t128 = t71 * t115;
-        let t129 = t80 * t121;
-        let t130 = self.fixed[9] * t129;
-        let t131 = t128 - t130;
-        let t132 = t131 / t89;
-        let t133 = -t132;
-        let t134 = t86 * t121;
-        let t135 = self.fixed[9] * t134;
-        let t136 = T::nearest(2.0) * t78;
-        let t137 = t71 * t71;
-        let t138 = t78 * t78;
-        let t139 = t136 + t137;
-        let t140 = t139 + t138;
-        let t141 = self.fixed[9] * t140;
-        let t142 = t102 + t141;
-        let t143 = t66 * t142;
-        let t144 = t135 - t143;
-        let t145 = t144 / t89;
-        let t146 = t71 * t121;
-        let t147 = self.fixed[9] * t146;
-        let t148 = t80 * t142;
-        let t149 = t147 - t148;
-        let t150 = t149 / t89;
-        let t151 = -t150;
-        let t153 = self.fixed[12] * t13;
-        let t154 = t153 * t6;
-        let t156 = T::nearest(95.0) * t13;
-        let t157 = t156 * t6;
-        let t158 = t67 * t72;
-        let t159 = T::pi() * t158;
-        let t160 = X[1] - t159;
-        let t161 = t32 * t160;
-        let t163 = T::nearest(45.0) * t13;
-        let t164 = t163 * t6;
-        let t165 = t164 - t161;
-        let t167 = self.fixed[13] * t165;
-        let t168 = t157 - t161;
-        let t169 = t168 + t167;
-        let t171 = self.fixed[14] * t169;
-        let t172 = t154 - t171;
-        let t174 = self.fixed[15] * t172;
-        let t175 = -t174;
-        let t176 = t89 * t89;
+        let t127 = T::one() / t89;
+        let t128 = t126 * t127;
+        let t129 = t71 * t115;
+        let t130 = t80 * t121;
+        let t131 = self.fixed[9] * t130;
+        let t132 = t129 - t131;
+        let t133 = t132 * t127;
+        let t134 = -t133;
+        let t135 = t86 * t121;
+        let t136 = self.fixed[9] * t135;
+        let t137 = T::nearest(2.0) * t78;
+        let t138 = t71 * t71;
+        let t139 = t78 * t78;
+        let t140 = t137 + t138;
+        let t141 = t140 + t139;
+        let t142 = self.fixed[9] * t141;
+        let t143 = t102 + t142;
+        let t144 = t66 * t143;
+        let t145 = t136 - t144;
+        let t146 = t145 * t127;
+        let t147 = t71 * t121;
+        let t148 = self.fixed[9] * t147;
+        let t149 = t80 * t143;
+        let t150 = t148 - t149;
+        let t151 = t150 * t127;
+        let t152 = -t151;
+        let t154 = self.fixed[12] * t13;
+        let t155 = t154 * t6;
+        let t157 = T::nearest(95.0) * t13;
+        let t158 = t157 * t6;
+        let t159 = t67 * t72;
+        let t160 = T::pi() * t159;
+        let t161 = X[1] - t160;
+        let t162 = t32 * t161;
+        let t164 = T::nearest(45.0) * t13;
+        let t165 = t164 * t6;
+        let t166 = t165 - t162;
+        let t168 = self.fixed[13] * t166;
+        let t169 = t158 - t162;
+        let t170 = t169 + t168;
+        let t172 = self.fixed[14] * t170;
+        let t173 = t155 - t172;
+        let t175 = self.fixed[15] * t173;
+        let t176 = -t175;
         let t181 = self.fixed[16] * t73;
         let t183 = T::nearest(6.0) * t75;
         let t184 = t70 - t181;
@@ -1166,13 +1168,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t193 = self.fixed[18] * t192;
         let t194 = -t193;
         let t195 = t13 * t194;
-        let t200 = t109 * t160;
+        let t200 = t109 * t161;
         let t201 = t200 * t186;
         let t202 = self.fixed[19] * t201;
         let t203 = t32 * t202;
         let t206 = t23 * t62;
         let t207 = T::nearest(8.0) * t206;
-        let t208 = t62 * t160;
+        let t208 = t62 * t161;
         let t209 = T::nearest(6.0) * t208;
         let t210 = t6 * t185;
         let t211 = T::nearest(3.0) * t210;
@@ -1216,7 +1218,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t253 = t251 + t252;
         let t254 = t13 * t253;
         let t259 = t62 * t77;
-        let t260 = t259 * t160;
+        let t260 = t259 * t161;
         let t261 = t260 * t185;
         let t262 = self.fixed[22] * t261;
         let t263 = -t262;
@@ -1226,7 +1228,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t269 = T::nearest(2.0) * t210;
         let t270 = T::nearest(12.0) * X[0];
         let t271 = T::nearest(4.0) * X[1];
-        let t273 = self.fixed[23] * t158;
+        let t273 = self.fixed[23] * t159;
         let t275 = self.fixed[24] * t23;
         let t276 = t270 - t271;
         let t277 = t276 + t273;
@@ -1241,7 +1243,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t296 = t77 * t221;
         let t297 = self.fixed[27] * t296;
         let t299 = t62 * t70;
-        let t300 = t299 * t160;
+        let t300 = t299 * t161;
         let t301 = self.fixed[28] * t300;
         let t304 = self.fixed[29] * t73;
         let t306 = T::nearest(18.0) * t75;
@@ -1265,7 +1267,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t326 = t325 - t324;
         let t327 = t6 * t326;
         let t328 = T::nearest(2.0) * X[1];
-        let t330 = self.fixed[32] * t158;
+        let t330 = self.fixed[32] * t159;
         let t331 = t270 - t328;
         let t332 = t331 + t330;
         let t333 = t332 - t275;
@@ -1324,11 +1326,11 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t409 = t406 + t408;
         let t410 = t13 * t409;
         let t411 = t77 * t77;
-        let t415 = t411 * t160;
+        let t415 = t411 * t161;
         let t416 = self.fixed[42] * t415;
         let t417 = t32 * t416;
         let t418 = t70 * t315;
-        let t419 = t77 * t160;
+        let t419 = t77 * t161;
         let t420 = T::nearest(4.0) * t419;
         let t421 = t418 - t420;
         let t426 = self.fixed[43] * t421;
@@ -1343,7 +1345,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t436 = t417 + t428;
         let t437 = t435 + t436;
         let t438 = t32 * t437;
-        let t443 = self.fixed[46] * t160;
+        let t443 = self.fixed[46] * t161;
         let t444 = t443 * t98;
         let t445 = t410 + t438;
         let t446 = t445 + t444;
@@ -1362,122 +1364,123 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t471 = t463 + t470;
         let t472 = t13 * t471;
         let t473 = t447 + t472;
-        let t474 = t473 / t176;
-        let t475 = t175 + t474;
-        let t478 = self.fixed[51] * t32;
-        let t479 = t478 * t27;
-        let t481 = T::nearest(30.0) * t13;
-        let t482 = t481 * t6;
-        let t483 = T::nearest(8.0) * t32;
-        let t484 = t483 * t23;
-        let t485 = t32 * t315;
-        let t487 = T::nearest(60.0) * t13;
-        let t488 = t487 * t6;
-        let t489 = t488 - t485;
-        let t491 = self.fixed[52] * t489;
-        let t492 = t482 + t484;
-        let t493 = t492 - t485;
-        let t494 = t493 + t491;
-        let t495 = self.fixed[14] * t494;
-        let t496 = t479 - t495;
-        let t500 = self.fixed[54] * t496;
-        let t501 = -t500;
-        let t502 = t15 * t71;
-        let t503 = t64 * t6;
-        let t504 = -t503;
-        let t505 = t86 * t504;
-        let t506 = self.fixed[45] * t32;
-        let t507 = t506 * t160;
-        let t508 = t66 * t507;
-        let t509 = self.fixed[53] * t32;
-        let t510 = t509 * t315;
-        let t511 = t80 * t510;
-        let t512 = t502 + t505;
-        let t513 = t512 - t508;
-        let t514 = t513 + t511;
-        let t515 = t78 * t80;
-        let t516 = t88 - t515;
-        let t517 = t514 * t516;
-        let t518 = t517 / t89;
-        let t519 = t6 * t71;
-        let t520 = t62 * t507;
-        let t521 = t519 - t520;
-        let t522 = t14 * t521;
-        let t523 = t78 * t504;
-        let t524 = t511 + t522;
-        let t525 = t524 + t523;
-        let t526 = t98 * t525;
-        let t527 = t518 - t526;
-        let t528 = self.fixed[8] * t527;
-        let t529 = t510 * t516;
-        let t530 = t78 * t525;
-        let t531 = t522 + t529;
-        let t532 = t531 - t530;
-        let t533 = self.fixed[9] * t532;
-        let t534 = t98 * t516;
-        let t535 = self.fixed[8] * t534;
-        let t536 = t78 * t516;
-        let t537 = t88 - t536;
-        let t538 = self.fixed[9] * t537;
-        let t539 = t535 - t538;
-        let t540 = t505 + t511;
-        let t541 = t540 + t522;
-        let t542 = t539 * t541;
-        let t543 = t542 / t89;
-        let t544 = t65 * t86;
-        let t545 = t78 - t88;
-        let t546 = t545 + t544;
-        let t547 = self.fixed[9] * t546;
-        let t548 = t102 + t547;
-        let t549 = T::nearest(3.0) * t6;
-        let t550 = t549 * t548;
-        let t551 = self.fixed[49] * t13;
-        let t552 = t551 * t6;
-        let t553 = -t552;
-        let t554 = t86 * t553;
-        let t555 = t80 * t507;
-        let t556 = t549 * t71;
-        let t559 = self.fixed[55] * t32;
-        let t560 = t559 * t23;
-        let t561 = -t560;
-        let t562 = t62 * t561;
-        let t563 = t556 - t562;
-        let t564 = t14 * t563;
-        let t565 = t554 + t555;
-        let t566 = t565 + t564;
-        let t567 = t548 * t566;
-        let t568 = t567 / t89;
-        let t569 = t62 * t568;
-        let t570 = t503 * t71;
-        let t571 = t66 * t561;
-        let t572 = t554 + t570;
-        let t573 = t572 - t571;
-        let t574 = t573 + t555;
-        let t575 = t574 / t89;
-        let t576 = self.fixed[8] * t575;
-        let t577 = t65 * t507;
-        let t578 = t507 + t554;
-        let t579 = t578 + t564;
-        let t580 = t579 + t577;
-        let t581 = self.fixed[9] * t580;
-        let t582 = t576 + t581;
-        let t583 = t62 * t582;
-        let t584 = t550 + t569;
-        let t585 = t584 - t583;
-        let t586 = t14 * t585;
-        let t587 = t88 - t544;
-        let t588 = t504 * t587;
-        let t589 = t502 - t508;
-        let t590 = t589 + t529;
-        let t591 = t590 + t588;
-        let t592 = self.fixed[8] * t591;
-        let t593 = t528 + t533;
-        let t594 = t593 - t543;
-        let t595 = t594 + t586;
-        let t596 = t595 + t592;
-        let t598 = t596 / t89;
-        let t599 = self.fixed[56] * t598;
-        let t600 = t501 - t599;
+        let t474 = t127 * t127;
+        let t475 = t473 * t474;
+        let t476 = t176 + t475;
+        let t479 = self.fixed[51] * t32;
+        let t480 = t479 * t27;
+        let t482 = T::nearest(30.0) * t13;
+        let t483 = t482 * t6;
+        let t484 = T::nearest(8.0) * t32;
+        let t485 = t484 * t23;
+        let t486 = t32 * t315;
+        let t488 = T::nearest(60.0) * t13;
+        let t489 = t488 * t6;
+        let t490 = t489 - t486;
+        let t492 = self.fixed[52] * t490;
+        let t493 = t483 + t485;
+        let t494 = t493 - t486;
+        let t495 = t494 + t492;
+        let t496 = self.fixed[14] * t495;
+        let t497 = t480 - t496;
+        let t501 = self.fixed[54] * t497;
+        let t502 = -t501;
+        let t503 = t15 * t71;
+        let t504 = t64 * t6;
+        let t505 = -t504;
+        let t506 = t86 * t505;
+        let t507 = self.fixed[45] * t32;
+        let t508 = t507 * t161;
+        let t509 = t66 * t508;
+        let t510 = self.fixed[53] * t32;
+        let t511 = t510 * t315;
+        let t512 = t80 * t511;
+        let t513 = t503 + t506;
+        let t514 = t513 - t509;
+        let t515 = t514 + t512;
+        let t516 = t78 * t80;
+        let t517 = t88 - t516;
+        let t518 = t515 * t517;
+        let t519 = t518 * t127;
+        let t520 = t6 * t71;
+        let t521 = t62 * t508;
+        let t522 = t520 - t521;
+        let t523 = t14 * t522;
+        let t524 = t78 * t505;
+        let t525 = t512 + t523;
+        let t526 = t525 + t524;
+        let t527 = t98 * t526;
+        let t528 = t519 - t527;
+        let t529 = self.fixed[8] * t528;
+        let t530 = t511 * t517;
+        let t531 = t78 * t526;
+        let t532 = t523 + t530;
+        let t533 = t532 - t531;
+        let t534 = self.fixed[9] * t533;
+        let t535 = t98 * t517;
+        let t536 = self.fixed[8] * t535;
+        let t537 = t78 * t517;
+        let t538 = t88 - t537;
+        let t539 = self.fixed[9] * t538;
+        let t540 = t536 - t539;
+        let t541 = t506 + t512;
+        let t542 = t541 + t523;
+        let t543 = t540 * t542;
+        let t544 = t543 * t127;
+        let t545 = t65 * t86;
+        let t546 = t78 - t88;
+        let t547 = t546 + t545;
+        let t548 = self.fixed[9] * t547;
+        let t549 = t102 + t548;
+        let t550 = T::nearest(3.0) * t6;
+        let t551 = t550 * t549;
+        let t552 = self.fixed[49] * t13;
+        let t553 = t552 * t6;
+        let t554 = -t553;
+        let t555 = t86 * t554;
+        let t556 = t80 * t508;
+        let t557 = t550 * t71;
+        let t560 = self.fixed[55] * t32;
+        let t561 = t560 * t23;
+        let t562 = -t561;
+        let t563 = t62 * t562;
+        let t564 = t557 - t563;
+        let t565 = t14 * t564;
+        let t566 = t555 + t556;
+        let t567 = t566 + t565;
+        let t568 = t549 * t567;
+        let t569 = t568 * t127;
+        let t570 = t62 * t569;
+        let t571 = t504 * t71;
+        let t572 = t66 * t562;
+        let t573 = t555 + t571;
+        let t574 = t573 - t572;
+        let t575 = t574 + t556;
+        let t576 = t575 * t127;
+        let t577 = self.fixed[8] * t576;
+        let t578 = t65 * t508;
+        let t579 = t508 + t555;
+        let t580 = t579 + t565;
+        let t581 = t580 + t578;
+        let t582 = self.fixed[9] * t581;
+        let t583 = t577 + t582;
+        let t584 = t62 * t583;
+        let t585 = t551 + t570;
+        let t586 = t585 - t584;
+        let t587 = t14 * t586;
+        let t588 = t88 - t545;
+        let t589 = t505 * t588;
+        let t590 = t503 - t509;
+        let t591 = t590 + t530;
+        let t592 = t591 + t589;
+        let t593 = self.fixed[8] * t592;
+        let t594 = t529 + t534;
+        let t595 = t594 - t544;
+        let t596 = t595 + t587;
+        let t597 = t596 + t593;
+        let t599 = t597 * t127;
+        let t600 = self.fixed[56] * t599;
+        let t601 = t502 - t600;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t15, t35),
             v: crate::nalgebra::SVector::<T, 2>::new(t41, t48),
@@ -1485,8 +1488,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
             H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t65, t66, t71, t78),
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t80, t66, t71, t85),
             J: t89,
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t127, t133, t145, t151),
-            b: crate::nalgebra::SVector::<T, 2>::new(t475, t600),
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t128, t134, t146, t152),
+            b: crate::nalgebra::SVector::<T, 2>::new(t476, t601),
         }
     }
     fn domain(&self) -> crate::Domain<T, 2> {
@@ -1553,34 +1556,34 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 16, 26> for Skew2d<T> {
         let t32 = t28 + t31;
         let t34 = self.fixed[1] * t32;
         let t64 = self.fixed[7] * t13;
-        let t153 = self.fixed[12] * t13;
-        let t156 = T::nearest(95.0) * t13;
-        let t163 = T::nearest(45.0) * t13;
-        let t478 = self.fixed[51] * t32;
-        let t481 = T::nearest(30.0) * t13;
-        let t483 = T::nearest(8.0) * t32;
-        let t487 = T::nearest(60.0) * t13;
-        let t506 = self.fixed[45] * t32;
-        let t509 = self.fixed[53] * t32;
-        let t551 = self.fixed[49] * t13;
-        let t559 = self.fixed[55] * t32;
+        let t154 = self.fixed[12] * t13;
+        let t157 = T::nearest(95.0) * t13;
+        let t164 = T::nearest(45.0) * t13;
+        let t479 = self.fixed[51] * t32;
+        let t482 = T::nearest(30.0) * t13;
+        let t484 = T::nearest(8.0) * t32;
+        let t488 = T::nearest(60.0) * t13;
+        let t507 = self.fixed[45] * t32;
+        let t510 = self.fixed[53] * t32;
+        let t552 = self.fixed[49] * t13;
+        let t560 = self.fixed[55] * t32;
         [
             t13,
             t14,
             t32,
             t34,
             t64,
-            t153,
-            t156,
-            t163,
-            t478,
-            t481,
-            t483,
-            t487,
-            t506,
-            t509,
-            t551,
-            t559,
+            t154,
+            t157,
+            t164,
+            t479,
+            t482,
+            t484,
+            t488,
+            t507,
+            t510,
+            t552,
+            t560,
         ]
     }
     #[inline]
@@ -1609,9 +1612,9 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 16, 26> for Skew2d<T> {
         let t76 = T::nearest(2.0) * t75;
         let t77 = t74 + t76;
         let t109 = t62 * t62;
-        let t158 = t67 * t72;
-        let t159 = T::pi() * t158;
-        let t160 = X[1] - t159;
+        let t159 = t67 * t72;
+        let t160 = T::pi() * t159;
+        let t161 = X[1] - t160;
         let t181 = self.fixed[16] * t73;
         let t183 = T::nearest(6.0) * t75;
         let t184 = t70 - t181;
@@ -1621,12 +1624,12 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 16, 26> for Skew2d<T> {
         let t192 = t191 * t186;
         let t193 = self.fixed[18] * t192;
         let t194 = -t193;
-        let t200 = t109 * t160;
+        let t200 = t109 * t161;
         let t201 = t200 * t186;
         let t202 = self.fixed[19] * t201;
         let t206 = t23 * t62;
         let t207 = T::nearest(8.0) * t206;
-        let t208 = t62 * t160;
+        let t208 = t62 * t161;
         let t209 = T::nearest(6.0) * t208;
         let t210 = t6 * t185;
         let t211 = T::nearest(3.0) * t210;
@@ -1667,7 +1670,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 16, 26> for Skew2d<T> {
         let t250 = self.fixed[21] * t249;
         let t251 = -t250;
         let t259 = t62 * t77;
-        let t260 = t259 * t160;
+        let t260 = t259 * t161;
         let t261 = t260 * t185;
         let t262 = self.fixed[22] * t261;
         let t263 = -t262;
@@ -1676,7 +1679,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 16, 26> for Skew2d<T> {
         let t269 = T::nearest(2.0) * t210;
         let t270 = T::nearest(12.0) * X[0];
         let t271 = T::nearest(4.0) * X[1];
-        let t273 = self.fixed[23] * t158;
+        let t273 = self.fixed[23] * t159;
         let t275 = self.fixed[24] * t23;
         let t276 = t270 - t271;
         let t277 = t276 + t273;
@@ -1690,7 +1693,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 16, 26> for Skew2d<T> {
         let t296 = t77 * t221;
         let t297 = self.fixed[27] * t296;
         let t299 = t62 * t70;
-        let t300 = t299 * t160;
+        let t300 = t299 * t161;
         let t301 = self.fixed[28] * t300;
         let t304 = self.fixed[29] * t73;
         let t306 = T::nearest(18.0) * t75;
@@ -1714,7 +1717,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 16, 26> for Skew2d<T> {
         let t326 = t325 - t324;
         let t327 = t6 * t326;
         let t328 = T::nearest(2.0) * X[1];
-        let t330 = self.fixed[32] * t158;
+        let t330 = self.fixed[32] * t159;
         let t331 = t270 - t328;
         let t332 = t331 + t330;
         let t333 = t332 - t275;
@@ -1761,10 +1764,10 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 16, 26> for Skew2d<T> {
         let t403 = t402 - t399;
         let t406 = self.fixed[41] * t403;
         let t411 = t77 * t77;
-        let t415 = t411 * t160;
+        let t415 = t411 * t161;
         let t416 = self.fixed[42] * t415;
         let t418 = t70 * t315;
-        let t419 = t77 * t160;
+        let t419 = t77 * t161;
         let t420 = T::nearest(4.0) * t419;
         let t421 = t418 - t420;
         let t426 = self.fixed[43] * t421;
@@ -1775,7 +1778,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 16, 26> for Skew2d<T> {
         let t432 = t429 + t430;
         let t433 = t432 + t431;
         let t435 = self.fixed[44] * t433;
-        let t443 = self.fixed[46] * t160;
+        let t443 = self.fixed[46] * t161;
         let t452 = self.fixed[47] * t191;
         let t453 = -t452;
         let t459 = t6 * t62;
@@ -1783,7 +1786,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 16, 26> for Skew2d<T> {
         let t461 = -t460;
         let t468 = self.fixed[50] * t6;
         let t469 = -t468;
-        let t549 = T::nearest(3.0) * t6;
+        let t550 = T::nearest(3.0) * t6;
         [
             t6,
             t23,
@@ -1791,7 +1794,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 16, 26> for Skew2d<T> {
             t62,
             t70,
             t77,
-            t160,
+            t161,
             t194,
             t202,
             t251,
@@ -1810,7 +1813,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 16, 26> for Skew2d<T> {
             t453,
             t461,
             t469,
-            t549,
+            t550,
         ]
     }
     #[inline(always)]
@@ -1835,19 +1838,19 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 16, 26> for Skew2d<T> {
         let t97 = t96 + t94;
         let t98 = t97.ln_1p();
         let t102 = self.fixed[8] * t98;
-        let t154 = time[5] * point[0];
-        let t157 = time[6] * point[0];
-        let t161 = time[2] * point[6];
-        let t164 = time[7] * point[0];
-        let t165 = t164 - t161;
-        let t167 = self.fixed[13] * t165;
-        let t168 = t157 - t161;
-        let t169 = t168 + t167;
-        let t171 = self.fixed[14] * t169;
-        let t172 = t154 - t171;
-        let t174 = self.fixed[15] * t172;
-        let t175 = -t174;
-        let t176 = t89 * t89;
+        let t127 = T::one() / t89;
+        let t155 = time[5] * point[0];
+        let t158 = time[6] * point[0];
+        let t162 = time[2] * point[6];
+        let t165 = time[7] * point[0];
+        let t166 = t165 - t162;
+        let t168 = self.fixed[13] * t166;
+        let t169 = t158 - t162;
+        let t170 = t169 + t168;
+        let t172 = self.fixed[14] * t170;
+        let t173 = t155 - t172;
+        let t175 = self.fixed[15] * t173;
+        let t176 = -t175;
         let t195 = time[0] * point[7];
         let t203 = time[2] * point[8];
         let t252 = t195 + t203;
@@ -1883,114 +1886,115 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 16, 26> for Skew2d<T> {
         let t471 = t463 + t470;
         let t472 = time[0] * t471;
         let t473 = t447 + t472;
-        let t474 = t473 / t176;
-        let t475 = t175 + t474;
-        let t479 = time[8] * point[2];
-        let t482 = time[9] * point[0];
-        let t484 = time[10] * point[1];
-        let t485 = time[2] * point[12];
-        let t488 = time[11] * point[0];
-        let t489 = t488 - t485;
-        let t491 = self.fixed[52] * t489;
-        let t492 = t482 + t484;
-        let t493 = t492 - t485;
-        let t494 = t493 + t491;
-        let t495 = self.fixed[14] * t494;
-        let t496 = t479 - t495;
-        let t500 = self.fixed[54] * t496;
-        let t501 = -t500;
-        let t502 = t15 * t71;
-        let t503 = time[4] * point[0];
-        let t504 = -t503;
-        let t505 = t86 * t504;
-        let t507 = time[12] * point[6];
-        let t508 = t66 * t507;
-        let t510 = time[13] * point[12];
-        let t511 = t80 * t510;
-        let t512 = t502 + t505;
-        let t513 = t512 - t508;
-        let t514 = t513 + t511;
-        let t515 = t78 * t80;
-        let t516 = t88 - t515;
-        let t517 = t514 * t516;
-        let t518 = t517 / t89;
-        let t519 = point[0] * t71;
-        let t520 = point[3] * t507;
-        let t521 = t519 - t520;
-        let t522 = time[1] * t521;
-        let t523 = t78 * t504;
-        let t524 = t511 + t522;
-        let t525 = t524 + t523;
-        let t526 = t98 * t525;
-        let t527 = t518 - t526;
-        let t528 = self.fixed[8] * t527;
-        let t529 = t510 * t516;
-        let t530 = t78 * t525;
-        let t531 = t522 + t529;
-        let t532 = t531 - t530;
-        let t533 = self.fixed[9] * t532;
-        let t534 = t98 * t516;
-        let t535 = self.fixed[8] * t534;
-        let t536 = t78 * t516;
-        let t537 = t88 - t536;
-        let t538 = self.fixed[9] * t537;
-        let t539 = t535 - t538;
-        let t540 = t505 + t511;
-        let t541 = t540 + t522;
-        let t542 = t539 * t541;
-        let t543 = t542 / t89;
-        let t544 = t65 * t86;
-        let t545 = t78 - t88;
-        let t546 = t545 + t544;
-        let t547 = self.fixed[9] * t546;
-        let t548 = t102 + t547;
-        let t550 = point[25] * t548;
-        let t552 = time[14] * point[0];
-        let t553 = -t552;
-        let t554 = t86 * t553;
-        let t555 = t80 * t507;
-        let t556 = point[25] * t71;
-        let t560 = time[15] * point[1];
-        let t561 = -t560;
-        let t562 = point[3] * t561;
-        let t563 = t556 - t562;
-        let t564 = time[1] * t563;
-        let t565 = t554 + t555;
-        let t566 = t565 + t564;
-        let t567 = t548 * t566;
-        let t568 = t567 / t89;
-        let t569 = point[3] * t568;
-        let t570 = t503 * t71;
-        let t571 = t66 * t561;
-        let t572 = t554 + t570;
-        let t573 = t572 - t571;
-        let t574 = t573 + t555;
-        let t575 = t574 / t89;
-        let t576 = self.fixed[8] * t575;
-        let t577 = t65 * t507;
-        let t578 = t507 + t554;
-        let t579 = t578 + t564;
-        let t580 = t579 + t577;
-        let t581 = self.fixed[9] * t580;
-        let t582 = t576 + t581;
-        let t583 = point[3] * t582;
-        let t584 = t550 + t569;
-        let t585 = t584 - t583;
-        let t586 = time[1] * t585;
-        let t587 = t88 - t544;
-        let t588 = t504 * t587;
-        let t589 = t502 - t508;
-        let t590 = t589 + t529;
-        let t591 = t590 + t588;
-        let t592 = self.fixed[8] * t591;
-        let t593 = t528 + t533;
-        let t594 = t593 - t543;
-        let t595 = t594 + t586;
-        let t596 = t595 + t592;
-        let t598 = t596 / t89;
-        let t599 = self.fixed[56] * t598;
-        let t600 = t501 - t599;
-        crate::nalgebra::SVector::<T, 2>::new(t475, t600)
+        let t474 = t127 * t127;
+        let t475 = t473 * t474;
+        let t476 = t176 + t475;
+        let t480 = time[8] * point[2];
+        let t483 = time[9] * point[0];
+        let t485 = time[10] * point[1];
+        let t486 = time[2] * point[12];
+        let t489 = time[11] * point[0];
+        let t490 = t489 - t486;
+        let t492 = self.fixed[52] * t490;
+        let t493 = t483 + t485;
+        let t494 = t493 - t486;
+        let t495 = t494 + t492;
+        let t496 = self.fixed[14] * t495;
+        let t497 = t480 - t496;
+        let t501 = self.fixed[54] * t497;
+        let t502 = -t501;
+        let t503 = t15 * t71;
+        let t504 = time[4] * point[0];
+        let t505 = -t504;
+        let t506 = t86 * t505;
+        let t508 = time[12] * point[6];
+        let t509 = t66 * t508;
+        let t511 = time[13] * point[12];
+        let t512 = t80 * t511;
+        let t513 = t503 + t506;
+        let t514 = t513 - t509;
+        let t515 = t514 + t512;
+        let t516 = t78 * t80;
+        let t517 = t88 - t516;
+        let t518 = t515 * t517;
+        let t519 = t518 * t127;
+        let t520 = point[0] * t71;
+        let t521 = point[3] * t508;
+        let t522 = t520 - t521;
+        let t523 = time[1] * t522;
+        let t524 = t78 * t505;
+        let t525 = t512 + t523;
+        let t526 = t525 + t524;
+        let t527 = t98 * t526;
+        let t528 = t519 - t527;
+        let t529 = self.fixed[8] * t528;
+        let t530 = t511 * t517;
+        let t531 = t78 * t526;
+        let t532 = t523 + t530;
+        let t533 = t532 - t531;
+        let t534 = self.fixed[9] * t533;
+        let t535 = t98 * t517;
+        let t536 = self.fixed[8] * t535;
+        let t537 = t78 * t517;
+        let t538 = t88 - t537;
+        let t539 = self.fixed[9] * t538;
+        let t540 = t536 - t539;
+        let t541 = t506 + t512;
+        let t542 = t541 + t523;
+        let t543 = t540 * t542;
+        let t544 = t543 * t127;
+        let t545 = t65 * t86;
+        let t546 = t78 - t88;
+        let t547 = t546 + t545;
+        let t548 = self.fixed[9] * t547;
+        let t549 = t102 + t548;
+        let t551 = point[25] * t549;
+        let t553 = time[14] * point[0];
+        let t554 = -t553;
+        let t555 = t86 * t554;
+        let t556 = t80 * t508;
+        let t557 = point[25] * t71;
+        let t561 = time[15] * point[1];
+        let t562 = -t561;
+        let t563 = point[3] * t562;
+        let t564 = t557 - t563;
+        let t565 = time[1] * t564;
+        let t566 = t555 + t556;
+        let t567 = t566 + t565;
+        let t568 = t549 * t567;
+        let t569 = t568 * t127;
+        let t570 = point[3] * t569;
+        let t571 = t504 * t71;
+        let t572 = t66 * t562;
+        let t573 = t555 + t571;
+        let t574 = t573 - t572;
+        let t575 = t574 + t556;
+        let t576 = t575 * t127;
+        let t577 = self.fixed[8] * t576;
+        let t578 = t65 * t508;
+        let t579 = t508 + t555;
+        let t580 = t579 + t565;
+        let t581 = t580 + t578;
+        let t582 = self.fixed[9] * t581;
+        let t583 = t577 + t582;
+        let t584 = point[3] * t583;
+        let t585 = t551 + t570;
+        let t586 = t585 - t584;
+        let t587 = time[1] * t586;
+        let t588 = t88 - t545;
+        let t589 = t505 * t588;
+        let t590 = t503 - t509;
+        let t591 = t590 + t530;
+        let t592 = t591 + t589;
+        let t593 = self.fixed[8] * t592;
+        let t594 = t529 + t534;
+        let t595 = t594 - t544;
+        let t596 = t595 + t587;
+        let t597 = t596 + t593;
+        let t599 = t597 * t127;
+        let t600 = self.fixed[56] * t599;
+        let t601 = t502 - t600;
+        crate::nalgebra::SVector::<T, 2>::new(t476, t601)
     }
 }
 impl<T: crate::Real> From<Skew2d<T>> for crate::AnySolution<T> {

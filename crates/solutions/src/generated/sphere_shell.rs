@@ -156,67 +156,67 @@ impl<T: crate::Real> SphereShell<T> {
         let t48 = parameters.rho0 * t11;
         let t49 = t47 / t48;
         let t59 = T::one() / parameters.Ro;
-        let t69 = T::nearest(4.0) / parameters.Ro;
-        let t101 = T::nearest(6.0) * parameters.A;
-        let t102 = t101 / t11;
-        let t112 = parameters.nu + T::one();
-        let t113 = T::nearest(2.0) * parameters.nu;
-        let t114 = T::one() - t113;
-        let t115 = T::nearest(2.0) * parameters.A;
-        let t116 = t115 / t11;
-        let t120 = parameters.A * parameters.A;
-        let t121 = t11 * t11;
-        let t124 = t120 / t121;
-        let t134 = parameters.E * parameters.nu;
-        let t135 = t112 * t114;
-        let t136 = t134 / t135;
-        let t139 = T::nearest(0.5) * parameters.E;
-        let t140 = t139 / t112;
-        let t148 = parameters.A * t140;
-        let t149 = t148 / t11;
-        let t178 = T::nearest(5.0) / parameters.Ro;
-        let t181 = parameters.nu / t114;
-        let t182 = t181 + T::one();
-        let t183 = T::nearest(4.0) * t182;
-        let t184 = t183 / t112;
-        let t187 = t46 / t48;
-        let t193 = t120 * t120;
+        let t70 = T::nearest(4.0) / parameters.Ro;
+        let t102 = T::nearest(6.0) * parameters.A;
+        let t103 = t102 / t11;
+        let t113 = parameters.nu + T::one();
+        let t114 = T::nearest(2.0) * parameters.nu;
+        let t115 = T::one() - t114;
+        let t116 = T::nearest(2.0) * parameters.A;
+        let t117 = t116 / t11;
+        let t121 = parameters.A * parameters.A;
+        let t122 = t11 * t11;
+        let t125 = t121 / t122;
+        let t135 = parameters.E * parameters.nu;
+        let t136 = t113 * t115;
+        let t137 = t135 / t136;
+        let t140 = T::nearest(0.5) * parameters.E;
+        let t141 = t140 / t113;
+        let t149 = parameters.A * t141;
+        let t150 = t149 / t11;
+        let t179 = T::nearest(5.0) / parameters.Ro;
+        let t182 = parameters.nu / t115;
+        let t183 = t182 + T::one();
+        let t184 = T::nearest(4.0) * t183;
+        let t185 = t184 / t113;
+        let t188 = t46 / t48;
         let t194 = t121 * t121;
-        let t196 = t136 + t140;
-        let t197 = T::nearest(144.0) * t193;
-        let t198 = t197 * t196;
-        let t199 = parameters.rho0 * t194;
-        let t200 = t198 / t199;
-        let t207 = t120 * parameters.A;
-        let t208 = t11 * parameters.Ro;
-        let t209 = t208 * t208;
-        let t215 = T::nearest(3.0) * parameters.E;
-        let t216 = t215 * parameters.nu;
-        let t217 = t216 / t135;
-        let t220 = T::nearest(8.0) / parameters.Ro;
-        let t224 = T::nearest(3.0) * t140;
-        let t228 = T::nearest(6.0) * t140;
-        let t231 = T::nearest(2.0) * t140;
-        let t247 = T::nearest(12.0) * t207;
-        let t248 = parameters.rho0 * t209;
-        let t249 = t247 / t248;
-        let t260 = T::nearest(6.0) * t120;
-        let t261 = t260 * parameters.E;
-        let t262 = t261 * parameters.nu;
-        let t263 = parameters.rho0 * t121;
-        let t264 = t263 * t112;
-        let t265 = t264 * t114;
-        let t266 = t262 / t265;
-        let t272 = T::nearest(3.0) / parameters.Ro;
-        let t282 = T::nearest(2.0) * t120;
-        let t283 = t282 / t263;
-        let t290 = T::nearest(4.0) * parameters.A;
-        let t291 = t290 * parameters.E;
-        let t292 = t291 * parameters.nu;
-        let t293 = t48 * t112;
-        let t294 = t293 * t114;
-        let t295 = t292 / t294;
-        let t308 = T::nearest(2.0) / t16;
+        let t195 = t122 * t122;
+        let t197 = t137 + t141;
+        let t198 = T::nearest(144.0) * t194;
+        let t199 = t198 * t197;
+        let t200 = parameters.rho0 * t195;
+        let t201 = t199 / t200;
+        let t208 = t121 * parameters.A;
+        let t209 = t11 * parameters.Ro;
+        let t210 = t209 * t209;
+        let t216 = T::nearest(3.0) * parameters.E;
+        let t217 = t216 * parameters.nu;
+        let t218 = t217 / t136;
+        let t221 = T::nearest(8.0) / parameters.Ro;
+        let t225 = T::nearest(3.0) * t141;
+        let t229 = T::nearest(6.0) * t141;
+        let t232 = T::nearest(2.0) * t141;
+        let t248 = T::nearest(12.0) * t208;
+        let t249 = parameters.rho0 * t210;
+        let t250 = t248 / t249;
+        let t261 = T::nearest(6.0) * t121;
+        let t262 = t261 * parameters.E;
+        let t263 = t262 * parameters.nu;
+        let t264 = parameters.rho0 * t122;
+        let t265 = t264 * t113;
+        let t266 = t265 * t115;
+        let t267 = t263 / t266;
+        let t273 = T::nearest(3.0) / parameters.Ro;
+        let t283 = T::nearest(2.0) * t121;
+        let t284 = t283 / t264;
+        let t291 = T::nearest(4.0) * parameters.A;
+        let t292 = t291 * parameters.E;
+        let t293 = t292 * parameters.nu;
+        let t294 = t48 * t113;
+        let t295 = t294 * t115;
+        let t296 = t293 / t295;
+        let t309 = T::nearest(2.0) / t16;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -230,28 +230,28 @@ impl<T: crate::Real> SphereShell<T> {
                 t45,
                 t49,
                 t59,
-                t69,
-                t102,
-                t116,
-                t124,
-                t136,
-                t140,
-                t149,
-                t178,
-                t184,
-                t187,
-                t200,
-                t217,
-                t220,
-                t224,
-                t228,
-                t231,
-                t249,
-                t266,
-                t272,
-                t283,
-                t295,
-                t308,
+                t70,
+                t103,
+                t117,
+                t125,
+                t137,
+                t141,
+                t150,
+                t179,
+                t185,
+                t188,
+                t201,
+                t218,
+                t221,
+                t225,
+                t229,
+                t232,
+                t250,
+                t267,
+                t273,
+                t284,
+                t296,
+                t309,
             ],
         })
     }
@@ -398,41 +398,42 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t63 = T::nearest(6.0) * t62;
         let t64 = t23 * t6;
         let t65 = t63 + t64;
-        let t66 = t65 / t8;
-        let t67 = t25 * t66;
-        let t70 = self.fixed[7] * t8;
-        let t71 = T::nearest(3.0) - t70;
-        let t72 = X[0] * X[1];
-        let t73 = t72 * t71;
-        let t74 = t73 / t8;
-        let t75 = t25 * t74;
-        let t76 = X[0] * X[2];
-        let t77 = t76 * t71;
-        let t78 = t77 / t8;
-        let t79 = t25 * t78;
-        let t80 = t1 * t61;
-        let t81 = T::nearest(6.0) * t80;
-        let t82 = t3 + t5;
-        let t83 = t23 * t82;
-        let t84 = t81 + t83;
-        let t85 = t84 / t8;
-        let t86 = t25 * t85;
-        let t87 = X[1] * X[2];
-        let t88 = t87 * t71;
-        let t89 = t88 / t8;
-        let t90 = t25 * t89;
-        let t91 = t3 * t61;
-        let t92 = T::nearest(6.0) * t91;
-        let t93 = t1 + t5;
-        let t94 = t23 * t93;
-        let t95 = t92 + t94;
-        let t96 = t95 / t8;
-        let t97 = t25 * t96;
+        let t66 = T::one() / t8;
+        let t67 = t65 * t66;
+        let t68 = t25 * t67;
+        let t71 = self.fixed[7] * t8;
+        let t72 = T::nearest(3.0) - t71;
+        let t73 = X[0] * X[1];
+        let t74 = t73 * t72;
+        let t75 = t74 * t66;
+        let t76 = t25 * t75;
+        let t77 = X[0] * X[2];
+        let t78 = t77 * t72;
+        let t79 = t78 * t66;
+        let t80 = t25 * t79;
+        let t81 = t1 * t61;
+        let t82 = T::nearest(6.0) * t81;
+        let t83 = t3 + t5;
+        let t84 = t23 * t83;
+        let t85 = t82 + t84;
+        let t86 = t85 * t66;
+        let t87 = t25 * t86;
+        let t88 = X[1] * X[2];
+        let t89 = t88 * t72;
+        let t90 = t89 * t66;
+        let t91 = t25 * t90;
+        let t92 = t3 * t61;
+        let t93 = T::nearest(6.0) * t92;
+        let t94 = t1 + t5;
+        let t95 = t23 * t94;
+        let t96 = t93 + t95;
+        let t97 = t96 * t66;
+        let t98 = t25 * t97;
         crate::nalgebra::SMatrix::<
             T,
             3,
             3,
-        >::new(t67, t75, t79, t75, t86, t90, t79, t90, t97)
+        >::new(t68, t76, t80, t76, t87, t91, t80, t91, t98)
     }
     #[inline]
     fn deformation_gradient(
@@ -457,44 +458,45 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t63 = T::nearest(6.0) * t62;
         let t64 = t23 * t6;
         let t65 = t63 + t64;
-        let t66 = t65 / t8;
-        let t67 = t25 * t66;
-        let t70 = self.fixed[7] * t8;
-        let t71 = T::nearest(3.0) - t70;
-        let t72 = X[0] * X[1];
-        let t73 = t72 * t71;
-        let t74 = t73 / t8;
-        let t75 = t25 * t74;
-        let t76 = X[0] * X[2];
-        let t77 = t76 * t71;
-        let t78 = t77 / t8;
-        let t79 = t25 * t78;
-        let t80 = t1 * t61;
-        let t81 = T::nearest(6.0) * t80;
-        let t82 = t3 + t5;
-        let t83 = t23 * t82;
-        let t84 = t81 + t83;
-        let t85 = t84 / t8;
-        let t86 = t25 * t85;
-        let t87 = X[1] * X[2];
-        let t88 = t87 * t71;
-        let t89 = t88 / t8;
-        let t90 = t25 * t89;
-        let t91 = t3 * t61;
-        let t92 = T::nearest(6.0) * t91;
-        let t93 = t1 + t5;
-        let t94 = t23 * t93;
-        let t95 = t92 + t94;
-        let t96 = t95 / t8;
-        let t97 = t25 * t96;
-        let t98 = t67 + T::one();
-        let t99 = t86 + T::one();
-        let t100 = t97 + T::one();
+        let t66 = T::one() / t8;
+        let t67 = t65 * t66;
+        let t68 = t25 * t67;
+        let t71 = self.fixed[7] * t8;
+        let t72 = T::nearest(3.0) - t71;
+        let t73 = X[0] * X[1];
+        let t74 = t73 * t72;
+        let t75 = t74 * t66;
+        let t76 = t25 * t75;
+        let t77 = X[0] * X[2];
+        let t78 = t77 * t72;
+        let t79 = t78 * t66;
+        let t80 = t25 * t79;
+        let t81 = t1 * t61;
+        let t82 = T::nearest(6.0) * t81;
+        let t83 = t3 + t5;
+        let t84 = t23 * t83;
+        let t85 = t82 + t84;
+        let t86 = t85 * t66;
+        let t87 = t25 * t86;
+        let t88 = X[1] * X[2];
+        let t89 = t88 * t72;
+        let t90 = t89 * t66;
+        let t91 = t25 * t90;
+        let t92 = t3 * t61;
+        let t93 = T::nearest(6.0) * t92;
+        let t94 = t1 + t5;
+        let t95 = t23 * t94;
+        let t96 = t93 + t95;
+        let t97 = t96 * t66;
+        let t98 = t25 * t97;
+        let t99 = t68 + T::one();
+        let t100 = t87 + T::one();
+        let t101 = t98 + T::one();
         crate::nalgebra::SMatrix::<
             T,
             3,
             3,
-        >::new(t98, t75, t79, t75, t99, t90, t79, t90, t100)
+        >::new(t99, t76, t80, t76, t100, t91, t80, t91, t101)
     }
     #[inline]
     fn jacobian(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> T {
@@ -512,15 +514,15 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t26 = t8 * t23;
         let t60 = self.fixed[6] * t8;
         let t61 = T::one() - t60;
-        let t103 = self.fixed[8] * t18;
-        let t104 = t8 * t61;
-        let t105 = t103 * t104;
-        let t106 = t105 + T::one();
-        let t107 = t25 * t26;
-        let t108 = t107 + T::one();
-        let t109 = t108 * t108;
-        let t110 = t106 * t109;
-        t110
+        let t104 = self.fixed[8] * t18;
+        let t105 = t8 * t61;
+        let t106 = t104 * t105;
+        let t107 = t106 + T::one();
+        let t108 = t25 * t26;
+        let t109 = t108 + T::one();
+        let t110 = t109 * t109;
+        let t111 = t107 * t110;
+        t111
     }
     #[inline]
     fn first_piola_kirchhoff(
@@ -542,68 +544,69 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t26 = t8 * t23;
         let t60 = self.fixed[6] * t8;
         let t61 = T::one() - t60;
-        let t72 = X[0] * X[1];
-        let t76 = X[0] * X[2];
-        let t82 = t3 + t5;
-        let t87 = X[1] * X[2];
-        let t93 = t1 + t5;
-        let t103 = self.fixed[8] * t18;
-        let t104 = t8 * t61;
-        let t105 = t103 * t104;
-        let t106 = t105 + T::one();
-        let t107 = t25 * t26;
-        let t108 = t107 + T::one();
-        let t117 = self.fixed[9] * t18;
-        let t118 = t117 * t26;
-        let t119 = t118 * t105;
-        let t122 = t18 * t18;
-        let t123 = t23 * t23;
-        let t125 = self.fixed[10] * t122;
-        let t126 = t7 * t123;
-        let t127 = t125 * t126;
-        let t128 = t127 * t105;
-        let t129 = t118 + t105;
-        let t130 = t129 + t119;
-        let t131 = t130 + t127;
+        let t66 = T::one() / t8;
+        let t73 = X[0] * X[1];
+        let t77 = X[0] * X[2];
+        let t83 = t3 + t5;
+        let t88 = X[1] * X[2];
+        let t94 = t1 + t5;
+        let t104 = self.fixed[8] * t18;
+        let t105 = t8 * t61;
+        let t106 = t104 * t105;
+        let t107 = t106 + T::one();
+        let t108 = t25 * t26;
+        let t109 = t108 + T::one();
+        let t118 = self.fixed[9] * t18;
+        let t119 = t118 * t26;
+        let t120 = t119 * t106;
+        let t123 = t18 * t18;
+        let t124 = t23 * t23;
+        let t126 = self.fixed[10] * t123;
+        let t127 = t7 * t124;
+        let t128 = t126 * t127;
+        let t129 = t128 * t106;
+        let t130 = t119 + t106;
+        let t131 = t130 + t120;
         let t132 = t131 + t128;
-        let t133 = t132.ln_1p();
-        let t137 = self.fixed[11] * t133;
-        let t141 = t105 + T::nearest(2.0);
-        let t142 = t105 * t141;
-        let t143 = self.fixed[12] * t142;
-        let t144 = t137 + t143;
-        let t145 = t144 / t106;
-        let t146 = t5 * t145;
-        let t147 = t107 + T::nearest(2.0);
-        let t150 = self.fixed[13] * t18;
-        let t151 = t150 * t26;
-        let t152 = t151 * t147;
-        let t153 = t137 + t152;
-        let t154 = t153 / t108;
-        let t155 = t6 * t154;
-        let t156 = t146 + t155;
-        let t157 = T::one() / t7;
-        let t158 = t157 * t156;
-        let t159 = t145 - t154;
-        let t160 = t72 / t7;
-        let t161 = t160 * t159;
-        let t162 = t76 / t7;
-        let t163 = t162 * t159;
-        let t164 = t1 * t145;
-        let t165 = t82 * t154;
-        let t166 = t164 + t165;
-        let t167 = t157 * t166;
-        let t168 = t87 / t7;
-        let t169 = t168 * t159;
-        let t170 = t3 * t145;
-        let t171 = t93 * t154;
-        let t172 = t170 + t171;
-        let t173 = t157 * t172;
+        let t133 = t132 + t129;
+        let t134 = t133.ln_1p();
+        let t138 = self.fixed[11] * t134;
+        let t142 = t106 + T::nearest(2.0);
+        let t143 = t106 * t142;
+        let t144 = self.fixed[12] * t143;
+        let t145 = t138 + t144;
+        let t146 = t145 / t107;
+        let t147 = t5 * t146;
+        let t148 = t108 + T::nearest(2.0);
+        let t151 = self.fixed[13] * t18;
+        let t152 = t151 * t26;
+        let t153 = t152 * t148;
+        let t154 = t138 + t153;
+        let t155 = t154 / t109;
+        let t156 = t6 * t155;
+        let t157 = t147 + t156;
+        let t158 = t66 * t66;
+        let t159 = t158 * t157;
+        let t160 = t146 - t155;
+        let t161 = t73 * t158;
+        let t162 = t161 * t160;
+        let t163 = t77 * t158;
+        let t164 = t163 * t160;
+        let t165 = t1 * t146;
+        let t166 = t83 * t155;
+        let t167 = t165 + t166;
+        let t168 = t158 * t167;
+        let t169 = t88 * t158;
+        let t170 = t169 * t160;
+        let t171 = t3 * t146;
+        let t172 = t94 * t155;
+        let t173 = t171 + t172;
+        let t174 = t158 * t173;
         crate::nalgebra::SMatrix::<
             T,
             3,
             3,
-        >::new(t158, t161, t163, t161, t167, t169, t163, t169, t173)
+        >::new(t159, t162, t164, t162, t168, t170, t164, t170, t174)
     }
     #[inline]
     fn body_force(
@@ -625,115 +628,116 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t26 = t8 * t23;
         let t60 = self.fixed[6] * t8;
         let t61 = T::one() - t60;
-        let t70 = self.fixed[7] * t8;
-        let t71 = T::nearest(3.0) - t70;
-        let t103 = self.fixed[8] * t18;
-        let t104 = t8 * t61;
-        let t105 = t103 * t104;
-        let t106 = t105 + T::one();
-        let t107 = t25 * t26;
-        let t108 = t107 + T::one();
-        let t117 = self.fixed[9] * t18;
-        let t118 = t117 * t26;
-        let t119 = t118 * t105;
-        let t122 = t18 * t18;
-        let t123 = t23 * t23;
-        let t125 = self.fixed[10] * t122;
-        let t126 = t7 * t123;
-        let t127 = t125 * t126;
-        let t128 = t127 * t105;
-        let t129 = t118 + t105;
-        let t130 = t129 + t119;
-        let t131 = t130 + t127;
+        let t66 = T::one() / t8;
+        let t71 = self.fixed[7] * t8;
+        let t72 = T::nearest(3.0) - t71;
+        let t104 = self.fixed[8] * t18;
+        let t105 = t8 * t61;
+        let t106 = t104 * t105;
+        let t107 = t106 + T::one();
+        let t108 = t25 * t26;
+        let t109 = t108 + T::one();
+        let t118 = self.fixed[9] * t18;
+        let t119 = t118 * t26;
+        let t120 = t119 * t106;
+        let t123 = t18 * t18;
+        let t124 = t23 * t23;
+        let t126 = self.fixed[10] * t123;
+        let t127 = t7 * t124;
+        let t128 = t126 * t127;
+        let t129 = t128 * t106;
+        let t130 = t119 + t106;
+        let t131 = t130 + t120;
         let t132 = t131 + t128;
-        let t133 = t132.ln_1p();
-        let t174 = X[0] / t8;
-        let t175 = t7 * t23;
-        let t176 = self.fixed[4] * t175;
-        let t179 = self.fixed[14] * t8;
-        let t180 = T::nearest(3.0) - t179;
-        let t185 = self.fixed[15] * t180;
-        let t186 = t176 + t185;
-        let t188 = self.fixed[16] * t186;
-        let t189 = -t188;
-        let t190 = t106 * t106;
-        let t192 = t7 * t8;
-        let t195 = t61 * t61;
-        let t201 = t192 * t23;
-        let t202 = t201 * t195;
-        let t203 = t202 * t180;
-        let t204 = self.fixed[17] * t203;
-        let t205 = t18 * t204;
-        let t210 = T::one() - t21;
-        let t211 = t23 * t210;
-        let t212 = t61 * t71;
-        let t213 = T::nearest(2.0) * t212;
-        let t214 = t211 + t213;
-        let t218 = self.fixed[18] * t214;
-        let t221 = self.fixed[19] * t8;
-        let t223 = T::nearest(9.0) - t221;
-        let t225 = t210 * t223;
-        let t226 = self.fixed[20] * t225;
-        let t227 = self.fixed[20] * t211;
-        let t229 = t61 * t223;
-        let t230 = self.fixed[21] * t229;
-        let t232 = self.fixed[22] * t123;
-        let t234 = t61 * t210;
-        let t235 = T::nearest(18.0) * t234;
-        let t236 = t23 * t71;
-        let t237 = t23 * t180;
-        let t238 = T::nearest(2.0) * t237;
-        let t239 = t235 + t236;
-        let t240 = t239 + t238;
-        let t241 = self.fixed[11] * t240;
-        let t242 = t218 + t226;
-        let t243 = t242 + t227;
-        let t244 = t243 + t230;
-        let t245 = t244 - t232;
-        let t246 = t245 + t241;
-        let t250 = t7 * t61;
-        let t251 = t250 * t246;
-        let t252 = self.fixed[23] * t251;
-        let t253 = t252 + t205;
-        let t254 = t18 * t253;
-        let t255 = T::nearest(2.0) * t229;
-        let t256 = t23 * t61;
-        let t257 = T::nearest(4.0) * t256;
-        let t258 = t211 + t255;
-        let t259 = t258 - t257;
-        let t267 = t8 * t259;
-        let t268 = self.fixed[24] * t267;
-        let t269 = t268 * t133;
-        let t270 = self.fixed[12] * t123;
-        let t271 = self.fixed[11] * t180;
-        let t273 = self.fixed[25] * t8;
-        let t274 = T::nearest(2.0) - t273;
-        let t275 = self.fixed[20] * t274;
-        let t276 = t271 + t275;
-        let t277 = t61 * t276;
-        let t278 = T::nearest(12.0) * t277;
-        let t279 = self.fixed[11] * t239;
-        let t280 = t270 - t278;
-        let t281 = t280 - t279;
-        let t284 = t8 * t281;
-        let t285 = self.fixed[26] * t284;
-        let t286 = -t285;
-        let t287 = t254 + t269;
-        let t288 = t286 + t287;
-        let t289 = t18 * t288;
-        let t296 = self.fixed[27] * t180;
-        let t297 = t296 * t133;
-        let t298 = t289 + t297;
-        let t299 = t190 * t108;
-        let t300 = t298 / t299;
-        let t301 = t189 + t300;
-        let t302 = t18 * t301;
-        let t303 = t174 * t302;
-        let t304 = X[1] / t8;
-        let t305 = t304 * t302;
-        let t306 = X[2] / t8;
-        let t307 = t306 * t302;
-        crate::nalgebra::SVector::<T, 3>::new(t303, t305, t307)
+        let t133 = t132 + t129;
+        let t134 = t133.ln_1p();
+        let t175 = X[0] * t66;
+        let t176 = t7 * t23;
+        let t177 = self.fixed[4] * t176;
+        let t180 = self.fixed[14] * t8;
+        let t181 = T::nearest(3.0) - t180;
+        let t186 = self.fixed[15] * t181;
+        let t187 = t177 + t186;
+        let t189 = self.fixed[16] * t187;
+        let t190 = -t189;
+        let t191 = t107 * t107;
+        let t193 = t7 * t8;
+        let t196 = t61 * t61;
+        let t202 = t193 * t23;
+        let t203 = t202 * t196;
+        let t204 = t203 * t181;
+        let t205 = self.fixed[17] * t204;
+        let t206 = t18 * t205;
+        let t211 = T::one() - t21;
+        let t212 = t23 * t211;
+        let t213 = t61 * t72;
+        let t214 = T::nearest(2.0) * t213;
+        let t215 = t212 + t214;
+        let t219 = self.fixed[18] * t215;
+        let t222 = self.fixed[19] * t8;
+        let t224 = T::nearest(9.0) - t222;
+        let t226 = t211 * t224;
+        let t227 = self.fixed[20] * t226;
+        let t228 = self.fixed[20] * t212;
+        let t230 = t61 * t224;
+        let t231 = self.fixed[21] * t230;
+        let t233 = self.fixed[22] * t124;
+        let t235 = t61 * t211;
+        let t236 = T::nearest(18.0) * t235;
+        let t237 = t23 * t72;
+        let t238 = t23 * t181;
+        let t239 = T::nearest(2.0) * t238;
+        let t240 = t236 + t237;
+        let t241 = t240 + t239;
+        let t242 = self.fixed[11] * t241;
+        let t243 = t219 + t227;
+        let t244 = t243 + t228;
+        let t245 = t244 + t231;
+        let t246 = t245 - t233;
+        let t247 = t246 + t242;
+        let t251 = t7 * t61;
+        let t252 = t251 * t247;
+        let t253 = self.fixed[23] * t252;
+        let t254 = t253 + t206;
+        let t255 = t18 * t254;
+        let t256 = T::nearest(2.0) * t230;
+        let t257 = t23 * t61;
+        let t258 = T::nearest(4.0) * t257;
+        let t259 = t212 + t256;
+        let t260 = t259 - t258;
+        let t268 = t8 * t260;
+        let t269 = self.fixed[24] * t268;
+        let t270 = t269 * t134;
+        let t271 = self.fixed[12] * t124;
+        let t272 = self.fixed[11] * t181;
+        let t274 = self.fixed[25] * t8;
+        let t275 = T::nearest(2.0) - t274;
+        let t276 = self.fixed[20] * t275;
+        let t277 = t272 + t276;
+        let t278 = t61 * t277;
+        let t279 = T::nearest(12.0) * t278;
+        let t280 = self.fixed[11] * t240;
+        let t281 = t271 - t279;
+        let t282 = t281 - t280;
+        let t285 = t8 * t282;
+        let t286 = self.fixed[26] * t285;
+        let t287 = -t286;
+        let t288 = t255 + t270;
+        let t289 = t287 + t288;
+        let t290 = t18 * t289;
+        let t297 = self.fixed[27] * t181;
+        let t298 = t297 * t134;
+        let t299 = t290 + t298;
+        let t300 = t191 * t109;
+        let t301 = t299 / t300;
+        let t302 = t190 + t301;
+        let t303 = t18 * t302;
+        let t304 = t175 * t303;
+        let t305 = X[1] * t66;
+        let t306 = t305 * t303;
+        let t307 = X[2] * t66;
+        let t308 = t307 * t303;
+        crate::nalgebra::SVector::<T, 3>::new(t304, t306, t308)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> crate::Fields<T, 3> {
         let t1 = X[1] * X[1];
@@ -775,179 +779,180 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t63 = T::nearest(6.0) * t62;
         let t64 = t23 * t6;
         let t65 = t63 + t64;
-        let t66 = t65 / t8;
-        let t67 = t25 * t66;
-        let t70 = self.fixed[7] * t8;
-        let t71 = T::nearest(3.0) - t70;
-        let t72 = X[0] * X[1];
-        let t73 = t72 * t71;
-        let t74 = t73 / t8;
-        let t75 = t25 * t74;
-        let t76 = X[0] * X[2];
-        let t77 = t76 * t71;
-        let t78 = t77 / t8;
-        let t79 = t25 * t78;
-        let t80 = t1 * t61;
-        let t81 = T::nearest(6.0) * t80;
-        let t82 = t3 + t5;
-        let t83 = t23 * t82;
-        let t84 = t81 + t83;
-        let t85 = t84 / t8;
-        let t86 = t25 * t85;
-        let t87 = X[1] * X[2];
-        let t88 = t87 * t71;
-        let t89 = t88 / t8;
-        let t90 = t25 * t89;
-        let t91 = t3 * t61;
-        let t92 = T::nearest(6.0) * t91;
-        let t93 = t1 + t5;
-        let t94 = t23 * t93;
-        let t95 = t92 + t94;
-        let t96 = t95 / t8;
-        let t97 = t25 * t96;
-        let t98 = t67 + T::one();
-        let t99 = t86 + T::one();
-        let t100 = t97 + T::one();
-        let t103 = self.fixed[8] * t18;
-        let t104 = t8 * t61;
-        let t105 = t103 * t104;
-        let t106 = t105 + T::one();
-        let t107 = t25 * t26;
-        let t108 = t107 + T::one();
-        let t109 = t108 * t108;
-        let t110 = t106 * t109;
-        let t117 = self.fixed[9] * t18;
-        let t118 = t117 * t26;
-        let t119 = t118 * t105;
-        let t122 = t18 * t18;
-        let t123 = t23 * t23;
-        let t125 = self.fixed[10] * t122;
-        let t126 = t7 * t123;
-        let t127 = t125 * t126;
-        let t128 = t127 * t105;
-        let t129 = t118 + t105;
-        let t130 = t129 + t119;
-        let t131 = t130 + t127;
+        let t66 = T::one() / t8;
+        let t67 = t65 * t66;
+        let t68 = t25 * t67;
+        let t71 = self.fixed[7] * t8;
+        let t72 = T::nearest(3.0) - t71;
+        let t73 = X[0] * X[1];
+        let t74 = t73 * t72;
+        let t75 = t74 * t66;
+        let t76 = t25 * t75;
+        let t77 = X[0] * X[2];
+        let t78 = t77 * t72;
+        let t79 = t78 * t66;
+        let t80 = t25 * t79;
+        let t81 = t1 * t61;
+        let t82 = T::nearest(6.0) * t81;
+        let t83 = t3 + t5;
+        let t84 = t23 * t83;
+        let t85 = t82 + t84;
+        let t86 = t85 * t66;
+        let t87 = t25 * t86;
+        let t88 = X[1] * X[2];
+        let t89 = t88 * t72;
+        let t90 = t89 * t66;
+        let t91 = t25 * t90;
+        let t92 = t3 * t61;
+        let t93 = T::nearest(6.0) * t92;
+        let t94 = t1 + t5;
+        let t95 = t23 * t94;
+        let t96 = t93 + t95;
+        let t97 = t96 * t66;
+        let t98 = t25 * t97;
+        let t99 = t68 + T::one();
+        let t100 = t87 + T::one();
+        let t101 = t98 + T::one();
+        let t104 = self.fixed[8] * t18;
+        let t105 = t8 * t61;
+        let t106 = t104 * t105;
+        let t107 = t106 + T::one();
+        let t108 = t25 * t26;
+        let t109 = t108 + T::one();
+        let t110 = t109 * t109;
+        let t111 = t107 * t110;
+        let t118 = self.fixed[9] * t18;
+        let t119 = t118 * t26;
+        let t120 = t119 * t106;
+        let t123 = t18 * t18;
+        let t124 = t23 * t23;
+        let t126 = self.fixed[10] * t123;
+        let t127 = t7 * t124;
+        let t128 = t126 * t127;
+        let t129 = t128 * t106;
+        let t130 = t119 + t106;
+        let t131 = t130 + t120;
         let t132 = t131 + t128;
-        let t133 = t132.ln_1p();
-        let t137 = self.fixed[11] * t133;
-        let t141 = t105 + T::nearest(2.0);
-        let t142 = t105 * t141;
-        let t143 = self.fixed[12] * t142;
-        let t144 = t137 + t143;
-        let t145 = t144 / t106;
-        let t146 = t5 * t145;
-        let t147 = t107 + T::nearest(2.0);
-        let t150 = self.fixed[13] * t18;
-        let t151 = t150 * t26;
-        let t152 = t151 * t147;
-        let t153 = t137 + t152;
-        let t154 = t153 / t108;
-        let t155 = t6 * t154;
-        let t156 = t146 + t155;
-        let t157 = T::one() / t7;
-        let t158 = t157 * t156;
-        let t159 = t145 - t154;
-        let t160 = t72 / t7;
-        let t161 = t160 * t159;
-        let t162 = t76 / t7;
-        let t163 = t162 * t159;
-        let t164 = t1 * t145;
-        let t165 = t82 * t154;
-        let t166 = t164 + t165;
-        let t167 = t157 * t166;
-        let t168 = t87 / t7;
-        let t169 = t168 * t159;
-        let t170 = t3 * t145;
-        let t171 = t93 * t154;
-        let t172 = t170 + t171;
-        let t173 = t157 * t172;
-        let t174 = X[0] / t8;
-        let t175 = t7 * t23;
-        let t176 = self.fixed[4] * t175;
-        let t179 = self.fixed[14] * t8;
-        let t180 = T::nearest(3.0) - t179;
-        let t185 = self.fixed[15] * t180;
-        let t186 = t176 + t185;
-        let t188 = self.fixed[16] * t186;
-        let t189 = -t188;
-        let t190 = t106 * t106;
-        let t192 = t7 * t8;
-        let t195 = t61 * t61;
-        let t201 = t192 * t23;
-        let t202 = t201 * t195;
-        let t203 = t202 * t180;
-        let t204 = self.fixed[17] * t203;
-        let t205 = t18 * t204;
-        let t210 = T::one() - t21;
-        let t211 = t23 * t210;
-        let t212 = t61 * t71;
-        let t213 = T::nearest(2.0) * t212;
-        let t214 = t211 + t213;
-        let t218 = self.fixed[18] * t214;
-        let t221 = self.fixed[19] * t8;
-        let t223 = T::nearest(9.0) - t221;
-        let t225 = t210 * t223;
-        let t226 = self.fixed[20] * t225;
-        let t227 = self.fixed[20] * t211;
-        let t229 = t61 * t223;
-        let t230 = self.fixed[21] * t229;
-        let t232 = self.fixed[22] * t123;
-        let t234 = t61 * t210;
-        let t235 = T::nearest(18.0) * t234;
-        let t236 = t23 * t71;
-        let t237 = t23 * t180;
-        let t238 = T::nearest(2.0) * t237;
-        let t239 = t235 + t236;
-        let t240 = t239 + t238;
-        let t241 = self.fixed[11] * t240;
-        let t242 = t218 + t226;
-        let t243 = t242 + t227;
-        let t244 = t243 + t230;
-        let t245 = t244 - t232;
-        let t246 = t245 + t241;
-        let t250 = t7 * t61;
-        let t251 = t250 * t246;
-        let t252 = self.fixed[23] * t251;
-        let t253 = t252 + t205;
-        let t254 = t18 * t253;
-        let t255 = T::nearest(2.0) * t229;
-        let t256 = t23 * t61;
-        let t257 = T::nearest(4.0) * t256;
-        let t258 = t211 + t255;
-        let t259 = t258 - t257;
-        let t267 = t8 * t259;
-        let t268 = self.fixed[24] * t267;
-        let t269 = t268 * t133;
-        let t270 = self.fixed[12] * t123;
-        let t271 = self.fixed[11] * t180;
-        let t273 = self.fixed[25] * t8;
-        let t274 = T::nearest(2.0) - t273;
-        let t275 = self.fixed[20] * t274;
-        let t276 = t271 + t275;
-        let t277 = t61 * t276;
-        let t278 = T::nearest(12.0) * t277;
-        let t279 = self.fixed[11] * t239;
-        let t280 = t270 - t278;
-        let t281 = t280 - t279;
-        let t284 = t8 * t281;
-        let t285 = self.fixed[26] * t284;
-        let t286 = -t285;
-        let t287 = t254 + t269;
-        let t288 = t286 + t287;
-        let t289 = t18 * t288;
-        let t296 = self.fixed[27] * t180;
-        let t297 = t296 * t133;
-        let t298 = t289 + t297;
-        let t299 = t190 * t108;
-        let t300 = t298 / t299;
-        let t301 = t189 + t300;
-        let t302 = t18 * t301;
-        let t303 = t174 * t302;
-        let t304 = X[1] / t8;
-        let t305 = t304 * t302;
-        let t306 = X[2] / t8;
-        let t307 = t306 * t302;
+        let t133 = t132 + t129;
+        let t134 = t133.ln_1p();
+        let t138 = self.fixed[11] * t134;
+        let t142 = t106 + T::nearest(2.0);
+        let t143 = t106 * t142;
+        let t144 = self.fixed[12] * t143;
+        let t145 = t138 + t144;
+        let t146 = t145 / t107;
+        let t147 = t5 * t146;
+        let t148 = t108 + T::nearest(2.0);
+        let t151 = self.fixed[13] * t18;
+        let t152 = t151 * t26;
+        let t153 = t152 * t148;
+        let t154 = t138 + t153;
+        let t155 = t154 / t109;
+        let t156 = t6 * t155;
+        let t157 = t147 + t156;
+        let t158 = t66 * t66;
+        let t159 = t158 * t157;
+        let t160 = t146 - t155;
+        let t161 = t73 * t158;
+        let t162 = t161 * t160;
+        let t163 = t77 * t158;
+        let t164 = t163 * t160;
+        let t165 = t1 * t146;
+        let t166 = t83 * t155;
+        let t167 = t165 + t166;
+        let t168 = t158 * t167;
+        let t169 = t88 * t158;
+        let t170 = t169 * t160;
+        let t171 = t3 * t146;
+        let t172 = t94 * t155;
+        let t173 = t171 + t172;
+        let t174 = t158 * t173;
+        let t175 = X[0] * t66;
+        let t176 = t7 * t23;
+        let t177 = self.fixed[4] * t176;
+        let t180 = self.fixed[14] * t8;
+        let t181 = T::nearest(3.0) - t180;
+        let t186 = self.fixed[15] * t181;
+        let t187 = t177 + t186;
+        let t189 = self.fixed[16] * t187;
+        let t190 = -t189;
+        let t191 = t107 * t107;
+        let t193 = t7 * t8;
+        let t196 = t61 * t61;
+        let t202 = t193 * t23;
+        let t203 = t202 * t196;
+        let t204 = t203 * t181;
+        let t205 = self.fixed[17] * t204;
+        let t206 = t18 * t205;
+        let t211 = T::one() - t21;
+        let t212 = t23 * t211;
+        let t213 = t61 * t72;
+        let t214 = T::nearest(2.0) * t213;
+        let t215 = t212 + t214;
+        let t219 = self.fixed[18] * t215;
+        let t222 = self.fixed[19] * t8;
+        let t224 = T::nearest(9.0) - t222;
+        let t226 = t211 * t224;
+        let t227 = self.fixed[20] * t226;
+        let t228 = self.fixed[20] * t212;
+        let t230 = t61 * t224;
+        let t231 = self.fixed[21] * t230;
+        let t233 = self.fixed[22] * t124;
+        let t235 = t61 * t211;
+        let t236 = T::nearest(18.0) * t235;
+        let t237 = t23 * t72;
+        let t238 = t23 * t181;
+        let t239 = T::nearest(2.0) * t238;
+        let t240 = t236 + t237;
+        let t241 = t240 + t239;
+        let t242 = self.fixed[11] * t241;
+        let t243 = t219 + t227;
+        let t244 = t243 + t228;
+        let t245 = t244 + t231;
+        let t246 = t245 - t233;
+        let t247 = t246 + t242;
+        let t251 = t7 * t61;
+        let t252 = t251 * t247;
+        let t253 = self.fixed[23] * t252;
+        let t254 = t253 + t206;
+        let t255 = t18 * t254;
+        let t256 = T::nearest(2.0) * t230;
+        let t257 = t23 * t61;
+        let t258 = T::nearest(4.0) * t257;
+        let t259 = t212 + t256;
+        let t260 = t259 - t258;
+        let t268 = t8 * t260;
+        let t269 = self.fixed[24] * t268;
+        let t270 = t269 * t134;
+        let t271 = self.fixed[12] * t124;
+        let t272 = self.fixed[11] * t181;
+        let t274 = self.fixed[25] * t8;
+        let t275 = T::nearest(2.0) - t274;
+        let t276 = self.fixed[20] * t275;
+        let t277 = t272 + t276;
+        let t278 = t61 * t277;
+        let t279 = T::nearest(12.0) * t278;
+        let t280 = self.fixed[11] * t240;
+        let t281 = t271 - t279;
+        let t282 = t281 - t280;
+        let t285 = t8 * t282;
+        let t286 = self.fixed[26] * t285;
+        let t287 = -t286;
+        let t288 = t255 + t270;
+        let t289 = t287 + t288;
+        let t290 = t18 * t289;
+        let t297 = self.fixed[27] * t181;
+        let t298 = t297 * t134;
+        let t299 = t290 + t298;
+        let t300 = t191 * t109;
+        let t301 = t299 / t300;
+        let t302 = t190 + t301;
+        let t303 = t18 * t302;
+        let t304 = t175 * t303;
+        let t305 = X[1] * t66;
+        let t306 = t305 * t303;
+        let t307 = X[2] * t66;
+        let t308 = t307 * t303;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 3>::new(t28, t30, t32),
             v: crate::nalgebra::SVector::<T, 3>::new(t40, t42, t44),
@@ -956,19 +961,19 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 T,
                 3,
                 3,
-            >::new(t67, t75, t79, t75, t86, t90, t79, t90, t97),
+            >::new(t68, t76, t80, t76, t87, t91, t80, t91, t98),
             F: crate::nalgebra::SMatrix::<
                 T,
                 3,
                 3,
-            >::new(t98, t75, t79, t75, t99, t90, t79, t90, t100),
-            J: t110,
+            >::new(t99, t76, t80, t76, t100, t91, t80, t91, t101),
+            J: t111,
             P: crate::nalgebra::SMatrix::<
                 T,
                 3,
                 3,
-            >::new(t158, t161, t163, t161, t167, t169, t163, t169, t173),
-            b: crate::nalgebra::SVector::<T, 3>::new(t303, t305, t307),
+            >::new(t159, t162, t164, t162, t168, t170, t164, t170, t174),
+            b: crate::nalgebra::SVector::<T, 3>::new(t304, t306, t308),
         }
     }
     fn domain(&self) -> crate::Domain<T, 3> {
@@ -1033,11 +1038,11 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 5, 12> for SphereShell<T> {
         let t17 = self.fixed[0] * t;
         let t18 = t17.cos_pi();
         let t25 = self.fixed[2] * t18;
-        let t103 = self.fixed[8] * t18;
-        let t117 = self.fixed[9] * t18;
-        let t122 = t18 * t18;
-        let t125 = self.fixed[10] * t122;
-        [t18, t25, t103, t117, t125]
+        let t104 = self.fixed[8] * t18;
+        let t118 = self.fixed[9] * t18;
+        let t123 = t18 * t18;
+        let t126 = self.fixed[10] * t123;
+        [t18, t25, t104, t118, t126]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 12] {
@@ -1052,81 +1057,82 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 5, 12> for SphereShell<T> {
         let t26 = t8 * t23;
         let t60 = self.fixed[6] * t8;
         let t61 = T::one() - t60;
-        let t70 = self.fixed[7] * t8;
-        let t71 = T::nearest(3.0) - t70;
-        let t104 = t8 * t61;
-        let t123 = t23 * t23;
-        let t126 = t7 * t123;
-        let t174 = X[0] / t8;
-        let t175 = t7 * t23;
-        let t176 = self.fixed[4] * t175;
-        let t179 = self.fixed[14] * t8;
-        let t180 = T::nearest(3.0) - t179;
-        let t185 = self.fixed[15] * t180;
-        let t186 = t176 + t185;
-        let t188 = self.fixed[16] * t186;
-        let t189 = -t188;
-        let t192 = t7 * t8;
-        let t195 = t61 * t61;
-        let t201 = t192 * t23;
-        let t202 = t201 * t195;
-        let t203 = t202 * t180;
-        let t204 = self.fixed[17] * t203;
-        let t210 = T::one() - t21;
-        let t211 = t23 * t210;
-        let t212 = t61 * t71;
-        let t213 = T::nearest(2.0) * t212;
-        let t214 = t211 + t213;
-        let t218 = self.fixed[18] * t214;
-        let t221 = self.fixed[19] * t8;
-        let t223 = T::nearest(9.0) - t221;
-        let t225 = t210 * t223;
-        let t226 = self.fixed[20] * t225;
-        let t227 = self.fixed[20] * t211;
-        let t229 = t61 * t223;
-        let t230 = self.fixed[21] * t229;
-        let t232 = self.fixed[22] * t123;
-        let t234 = t61 * t210;
-        let t235 = T::nearest(18.0) * t234;
-        let t236 = t23 * t71;
-        let t237 = t23 * t180;
-        let t238 = T::nearest(2.0) * t237;
-        let t239 = t235 + t236;
-        let t240 = t239 + t238;
-        let t241 = self.fixed[11] * t240;
-        let t242 = t218 + t226;
-        let t243 = t242 + t227;
-        let t244 = t243 + t230;
-        let t245 = t244 - t232;
-        let t246 = t245 + t241;
-        let t250 = t7 * t61;
-        let t251 = t250 * t246;
-        let t252 = self.fixed[23] * t251;
-        let t255 = T::nearest(2.0) * t229;
-        let t256 = t23 * t61;
-        let t257 = T::nearest(4.0) * t256;
-        let t258 = t211 + t255;
-        let t259 = t258 - t257;
-        let t267 = t8 * t259;
-        let t268 = self.fixed[24] * t267;
-        let t270 = self.fixed[12] * t123;
-        let t271 = self.fixed[11] * t180;
-        let t273 = self.fixed[25] * t8;
-        let t274 = T::nearest(2.0) - t273;
-        let t275 = self.fixed[20] * t274;
-        let t276 = t271 + t275;
-        let t277 = t61 * t276;
-        let t278 = T::nearest(12.0) * t277;
-        let t279 = self.fixed[11] * t239;
-        let t280 = t270 - t278;
-        let t281 = t280 - t279;
-        let t284 = t8 * t281;
-        let t285 = self.fixed[26] * t284;
-        let t286 = -t285;
-        let t296 = self.fixed[27] * t180;
-        let t304 = X[1] / t8;
-        let t306 = X[2] / t8;
-        [t26, t104, t126, t174, t189, t204, t252, t268, t286, t296, t304, t306]
+        let t66 = T::one() / t8;
+        let t71 = self.fixed[7] * t8;
+        let t72 = T::nearest(3.0) - t71;
+        let t105 = t8 * t61;
+        let t124 = t23 * t23;
+        let t127 = t7 * t124;
+        let t175 = X[0] * t66;
+        let t176 = t7 * t23;
+        let t177 = self.fixed[4] * t176;
+        let t180 = self.fixed[14] * t8;
+        let t181 = T::nearest(3.0) - t180;
+        let t186 = self.fixed[15] * t181;
+        let t187 = t177 + t186;
+        let t189 = self.fixed[16] * t187;
+        let t190 = -t189;
+        let t193 = t7 * t8;
+        let t196 = t61 * t61;
+        let t202 = t193 * t23;
+        let t203 = t202 * t196;
+        let t204 = t203 * t181;
+        let t205 = self.fixed[17] * t204;
+        let t211 = T::one() - t21;
+        let t212 = t23 * t211;
+        let t213 = t61 * t72;
+        let t214 = T::nearest(2.0) * t213;
+        let t215 = t212 + t214;
+        let t219 = self.fixed[18] * t215;
+        let t222 = self.fixed[19] * t8;
+        let t224 = T::nearest(9.0) - t222;
+        let t226 = t211 * t224;
+        let t227 = self.fixed[20] * t226;
+        let t228 = self.fixed[20] * t212;
+        let t230 = t61 * t224;
+        let t231 = self.fixed[21] * t230;
+        let t233 = self.fixed[22] * t124;
+        let t235 = t61 * t211;
+        let t236 = T::nearest(18.0) * t235;
+        let t237 = t23 * t72;
+        let t238 = t23 * t181;
+        let t239 = T::nearest(2.0) * t238;
+        let t240 = t236 + t237;
+        let t241 = t240 + t239;
+        let t242 = self.fixed[11] * t241;
+        let t243 = t219 + t227;
+        let t244 = t243 + t228;
+        let t245 = t244 + t231;
+        let t246 = t245 - t233;
+        let t247 = t246 + t242;
+        let t251 = t7 * t61;
+        let t252 = t251 * t247;
+        let t253 = self.fixed[23] * t252;
+        let t256 = T::nearest(2.0) * t230;
+        let t257 = t23 * t61;
+        let t258 = T::nearest(4.0) * t257;
+        let t259 = t212 + t256;
+        let t260 = t259 - t258;
+        let t268 = t8 * t260;
+        let t269 = self.fixed[24] * t268;
+        let t271 = self.fixed[12] * t124;
+        let t272 = self.fixed[11] * t181;
+        let t274 = self.fixed[25] * t8;
+        let t275 = T::nearest(2.0) - t274;
+        let t276 = self.fixed[20] * t275;
+        let t277 = t272 + t276;
+        let t278 = t61 * t277;
+        let t279 = T::nearest(12.0) * t278;
+        let t280 = self.fixed[11] * t240;
+        let t281 = t271 - t279;
+        let t282 = t281 - t280;
+        let t285 = t8 * t282;
+        let t286 = self.fixed[26] * t285;
+        let t287 = -t286;
+        let t297 = self.fixed[27] * t181;
+        let t305 = X[1] * t66;
+        let t307 = X[2] * t66;
+        [t26, t105, t127, t175, t190, t205, t253, t269, t287, t297, t305, t307]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -1134,37 +1140,37 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 5, 12> for SphereShell<T> {
         time: &[T; 5],
         point: &[T; 12],
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t105 = time[2] * point[1];
-        let t106 = t105 + T::one();
-        let t107 = time[1] * point[0];
-        let t108 = t107 + T::one();
-        let t118 = time[3] * point[0];
-        let t119 = t118 * t105;
-        let t127 = time[4] * point[2];
-        let t128 = t127 * t105;
-        let t129 = t118 + t105;
-        let t130 = t129 + t119;
-        let t131 = t130 + t127;
+        let t106 = time[2] * point[1];
+        let t107 = t106 + T::one();
+        let t108 = time[1] * point[0];
+        let t109 = t108 + T::one();
+        let t119 = time[3] * point[0];
+        let t120 = t119 * t106;
+        let t128 = time[4] * point[2];
+        let t129 = t128 * t106;
+        let t130 = t119 + t106;
+        let t131 = t130 + t120;
         let t132 = t131 + t128;
-        let t133 = t132.ln_1p();
-        let t190 = t106 * t106;
-        let t205 = time[0] * point[5];
-        let t253 = point[6] + t205;
-        let t254 = time[0] * t253;
-        let t269 = point[7] * t133;
-        let t287 = t254 + t269;
-        let t288 = point[8] + t287;
-        let t289 = time[0] * t288;
-        let t297 = point[9] * t133;
-        let t298 = t289 + t297;
-        let t299 = t190 * t108;
-        let t300 = t298 / t299;
-        let t301 = point[4] + t300;
-        let t302 = time[0] * t301;
-        let t303 = point[3] * t302;
-        let t305 = point[10] * t302;
-        let t307 = point[11] * t302;
-        crate::nalgebra::SVector::<T, 3>::new(t303, t305, t307)
+        let t133 = t132 + t129;
+        let t134 = t133.ln_1p();
+        let t191 = t107 * t107;
+        let t206 = time[0] * point[5];
+        let t254 = point[6] + t206;
+        let t255 = time[0] * t254;
+        let t270 = point[7] * t134;
+        let t288 = t255 + t270;
+        let t289 = point[8] + t288;
+        let t290 = time[0] * t289;
+        let t298 = point[9] * t134;
+        let t299 = t290 + t298;
+        let t300 = t191 * t109;
+        let t301 = t299 / t300;
+        let t302 = point[4] + t301;
+        let t303 = time[0] * t302;
+        let t304 = point[3] * t303;
+        let t306 = point[10] * t303;
+        let t308 = point[11] * t303;
+        crate::nalgebra::SVector::<T, 3>::new(t304, t306, t308)
     }
 }
 impl<T: crate::Real> From<SphereShell<T>> for crate::AnySolution<T> {

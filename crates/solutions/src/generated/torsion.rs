@@ -122,20 +122,20 @@ impl<T: crate::Real> Torsion<T> {
         let t74 = parameters.nu + T::one();
         let t75 = T::nearest(0.5) * parameters.E;
         let t76 = t75 / t74;
-        let t98 = t11 * parameters.E;
-        let t99 = t98 / parameters.rho0;
-        let t100 = T::nearest(2.0) * t44;
-        let t104 = parameters.A / t74;
-        let t113 = T::nearest(2.0) / t8;
-        let t114 = T::nearest(2.0) * parameters.nu;
-        let t115 = T::one() - t114;
-        let t116 = parameters.E * parameters.nu;
-        let t117 = t74 * t115;
-        let t118 = t116 / t117;
-        let t119 = -T::nearest(0.5);
+        let t99 = t11 * parameters.E;
+        let t100 = t99 / parameters.rho0;
+        let t101 = T::nearest(2.0) * t44;
+        let t105 = parameters.A / t74;
+        let t114 = T::nearest(2.0) / t8;
+        let t115 = T::nearest(2.0) * parameters.nu;
+        let t116 = T::one() - t115;
+        let t117 = parameters.E * parameters.nu;
+        let t118 = t74 * t116;
+        let t119 = t117 / t118;
+        let t120 = -T::nearest(0.5);
         Ok(Torsion {
             parameters,
-            fixed: [t8, t11, t35, t53, t76, t99, t100, t104, t113, t118, t119],
+            fixed: [t8, t11, t35, t53, t76, t100, t101, t105, t114, t119, t120],
         })
     }
     /// The solution with parameter values in the order of the description; missing ones take their
@@ -391,27 +391,28 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         let t79 = t65 * t64;
         let t80 = t78 - t79;
         let t81 = t68 * t80;
-        let t82 = t81 / t80;
-        let t83 = self.fixed[4] * t82;
-        let t84 = t70 * t80;
-        let t85 = t84 / t80;
-        let t86 = self.fixed[4] * t85;
-        let t87 = t65 * t70;
-        let t88 = t68 * t77;
-        let t89 = t87 - t88;
-        let t90 = t89 / t80;
-        let t91 = self.fixed[4] * t90;
-        let t92 = -t91;
-        let t93 = t70 * t77;
-        let t94 = t68 * t64;
-        let t95 = t93 - t94;
-        let t96 = t95 / t80;
-        let t97 = self.fixed[4] * t96;
+        let t82 = T::one() / t80;
+        let t83 = t81 * t82;
+        let t84 = self.fixed[4] * t83;
+        let t85 = t70 * t80;
+        let t86 = t85 * t82;
+        let t87 = self.fixed[4] * t86;
+        let t88 = t65 * t70;
+        let t89 = t68 * t77;
+        let t90 = t88 - t89;
+        let t91 = t90 * t82;
+        let t92 = self.fixed[4] * t91;
+        let t93 = -t92;
+        let t94 = t70 * t77;
+        let t95 = t68 * t64;
+        let t96 = t94 - t95;
+        let t97 = t96 * t82;
+        let t98 = self.fixed[4] * t97;
         crate::nalgebra::SMatrix::<
             T,
             3,
             3,
-        >::new(T::zero(), T::zero(), t83, T::zero(), T::zero(), t86, t92, t97, T::zero())
+        >::new(T::zero(), T::zero(), t84, T::zero(), T::zero(), t87, t93, t98, T::zero())
     }
     #[inline]
     fn body_force(
@@ -447,18 +448,18 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         let t56 = t10 * t41;
         let t57 = t48 * t33;
         let t58 = t56 - t57;
-        let t101 = self.fixed[6] * X[2];
-        let t102 = t101 * t50;
-        let t103 = t10 * t10;
-        let t105 = self.fixed[7] * t103;
-        let t106 = t105 * t41;
-        let t107 = t102 - t106;
-        let t108 = self.fixed[5] * t107;
-        let t109 = t101 * t58;
-        let t110 = t105 * t33;
-        let t111 = t109 + t110;
-        let t112 = self.fixed[5] * t111;
-        crate::nalgebra::SVector::<T, 3>::new(t108, t112, T::zero())
+        let t102 = self.fixed[6] * X[2];
+        let t103 = t102 * t50;
+        let t104 = t10 * t10;
+        let t106 = self.fixed[7] * t104;
+        let t107 = t106 * t41;
+        let t108 = t103 - t107;
+        let t109 = self.fixed[5] * t108;
+        let t110 = t102 * t58;
+        let t111 = t106 * t33;
+        let t112 = t110 + t111;
+        let t113 = self.fixed[5] * t112;
+        crate::nalgebra::SVector::<T, 3>::new(t109, t113, T::zero())
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> crate::Fields<T, 3> {
         let t9 = self.fixed[0] * t;
@@ -518,33 +519,34 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         let t79 = t65 * t64;
         let t80 = t78 - t79;
         let t81 = t68 * t80;
-        let t82 = t81 / t80;
-        let t83 = self.fixed[4] * t82;
-        let t84 = t70 * t80;
-        let t85 = t84 / t80;
-        let t86 = self.fixed[4] * t85;
-        let t87 = t65 * t70;
-        let t88 = t68 * t77;
-        let t89 = t87 - t88;
-        let t90 = t89 / t80;
-        let t91 = self.fixed[4] * t90;
-        let t92 = -t91;
-        let t93 = t70 * t77;
-        let t94 = t68 * t64;
-        let t95 = t93 - t94;
-        let t96 = t95 / t80;
-        let t97 = self.fixed[4] * t96;
-        let t101 = self.fixed[6] * X[2];
-        let t102 = t101 * t50;
-        let t103 = t10 * t10;
-        let t105 = self.fixed[7] * t103;
-        let t106 = t105 * t41;
-        let t107 = t102 - t106;
-        let t108 = self.fixed[5] * t107;
-        let t109 = t101 * t58;
-        let t110 = t105 * t33;
-        let t111 = t109 + t110;
-        let t112 = self.fixed[5] * t111;
+        let t82 = T::one() / t80;
+        let t83 = t81 * t82;
+        let t84 = self.fixed[4] * t83;
+        let t85 = t70 * t80;
+        let t86 = t85 * t82;
+        let t87 = self.fixed[4] * t86;
+        let t88 = t65 * t70;
+        let t89 = t68 * t77;
+        let t90 = t88 - t89;
+        let t91 = t90 * t82;
+        let t92 = self.fixed[4] * t91;
+        let t93 = -t92;
+        let t94 = t70 * t77;
+        let t95 = t68 * t64;
+        let t96 = t94 - t95;
+        let t97 = t96 * t82;
+        let t98 = self.fixed[4] * t97;
+        let t102 = self.fixed[6] * X[2];
+        let t103 = t102 * t50;
+        let t104 = t10 * t10;
+        let t106 = self.fixed[7] * t104;
+        let t107 = t106 * t41;
+        let t108 = t103 - t107;
+        let t109 = self.fixed[5] * t108;
+        let t110 = t102 * t58;
+        let t111 = t106 * t33;
+        let t112 = t110 + t111;
+        let t113 = self.fixed[5] * t112;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 3>::new(t23, t28, T::zero()),
             v: crate::nalgebra::SVector::<T, 3>::new(t39, t43, T::zero()),
@@ -567,15 +569,15 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
             >::new(
                 T::zero(),
                 T::zero(),
-                t83,
+                t84,
                 T::zero(),
                 T::zero(),
-                t86,
-                t92,
-                t97,
+                t87,
+                t93,
+                t98,
                 T::zero(),
             ),
-            b: crate::nalgebra::SVector::<T, 3>::new(t108, t112, T::zero()),
+            b: crate::nalgebra::SVector::<T, 3>::new(t109, t113, T::zero()),
         }
     }
     fn domain(&self) -> crate::Domain<T, 3> {
@@ -655,14 +657,14 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 4> for Torsion<T> {
         let t31 = t9.cos_pi();
         let t46 = t31 * t31;
         let t47 = self.parameters.A * t46;
-        let t103 = t10 * t10;
-        let t105 = self.fixed[7] * t103;
-        [t10, t12, t47, t105]
+        let t104 = t10 * t10;
+        let t106 = self.fixed[7] * t104;
+        [t10, t12, t47, t106]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 4] {
-        let t101 = self.fixed[6] * X[2];
-        [X[2], X[0], X[1], t101]
+        let t102 = self.fixed[6] * X[2];
+        [X[2], X[0], X[1], t102]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -692,15 +694,15 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 4> for Torsion<T> {
         let t56 = time[0] * t41;
         let t57 = t48 * t33;
         let t58 = t56 - t57;
-        let t102 = point[3] * t50;
-        let t106 = time[3] * t41;
-        let t107 = t102 - t106;
-        let t108 = self.fixed[5] * t107;
-        let t109 = point[3] * t58;
-        let t110 = time[3] * t33;
-        let t111 = t109 + t110;
-        let t112 = self.fixed[5] * t111;
-        crate::nalgebra::SVector::<T, 3>::new(t108, t112, T::zero())
+        let t103 = point[3] * t50;
+        let t107 = time[3] * t41;
+        let t108 = t103 - t107;
+        let t109 = self.fixed[5] * t108;
+        let t110 = point[3] * t58;
+        let t111 = time[3] * t33;
+        let t112 = t110 + t111;
+        let t113 = self.fixed[5] * t112;
+        crate::nalgebra::SVector::<T, 3>::new(t109, t113, T::zero())
     }
 }
 impl<T: crate::Real> From<Torsion<T>> for crate::AnySolution<T> {
