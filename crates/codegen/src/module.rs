@@ -1,7 +1,7 @@
 //! The items of one solution, and the files that hold them.
 
 use crate::function::{Translator, float};
-use mmsmith_expr::{Expr, Program, Slot, arrange};
+use mmsmith_expr::{Expr, Program, Slot, arrange, reuse};
 use mmsmith_spec::{Boundary, Condition, DeriveError, Domain, Fields, Material, Spec, Surface};
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{format_ident, quote};
@@ -135,6 +135,8 @@ struct Generator<'a> {
     runtime: &'a TokenStream,
     program: Program,
     fields: Vec<Field>,
+    /// The body force arranged for evaluation in stages.
+    staged: Vec<Slot>,
     /// Slots of the scalars that depend on parameters only, in the order of [`Spec::constants`].
     constants: Vec<Slot>,
     /// Slots of the two sides of each requirement.
@@ -145,8 +147,9 @@ struct Generator<'a> {
 impl<'a> Generator<'a> {
     fn new(spec: &'a Spec, mut fields: Fields, runtime: &'a TokenStream) -> Self {
         let formulas = formulas(spec, &fields);
-        // Solvers sample the body force at the same points in every step; the other fields are for checks.
-        let b = arrange(&mut fields.graph, &fields.inputs, &fields.definitions, &fields.b);
+        // Solvers sample the body force at the same points in every step; a single call does all the work each time.
+        let single = reuse(&mut fields.graph, &fields.inputs, &fields.definitions, &fields.b);
+        let staged = arrange(&mut fields.graph, &fields.inputs, &fields.definitions, &fields.b);
         let matrix = |A: &Vec<Vec<Expr>>| A.concat();
         let parts = [
             ("displacement", "u", Shape::Vector, fields.u.clone()),
@@ -156,10 +159,11 @@ impl<'a> Generator<'a> {
             ("deformation_gradient", "F", Shape::Matrix, matrix(&fields.F)),
             ("jacobian", "J", Shape::Scalar, vec![fields.J]),
             ("first_piola_kirchhoff", "P", Shape::Matrix, matrix(&fields.P)),
-            ("body_force", "b", Shape::Vector, b),
+            ("body_force", "b", Shape::Vector, single),
         ];
         let constants = spec.constants();
         let mut outputs: Vec<Expr> = parts.iter().flat_map(|(.., part)| part.clone()).collect();
+        outputs.extend(&staged);
         outputs.extend(&constants);
         outputs.extend(spec.requirements.iter().flat_map(|r| [r.left, r.right]));
         let program = fields.program(&outputs);
@@ -175,10 +179,11 @@ impl<'a> Generator<'a> {
                 outputs: take(part.len()),
             })
             .collect();
+        let staged = take(staged.len());
         let constants = take(constants.len());
         let requirements =
             spec.requirements.iter().map(|_| take(2)).map(|sides| (sides[0], sides[1])).collect();
-        Generator { spec, runtime, program, fields, constants, requirements, formulas }
+        Generator { spec, runtime, program, fields, staged, constants, requirements, formulas }
     }
 
     fn items(&self) -> TokenStream {
@@ -415,13 +420,8 @@ impl<'a> Generator<'a> {
         let runtime = self.runtime;
         let n = Literal::usize_unsuffixed(self.spec.dimension);
         let vector = quote!(#runtime::nalgebra::SVector<T, #n>);
-        let outputs: Vec<Slot> = self
-            .fields
-            .iter()
-            .filter(|field| field.method == "body_force")
-            .flat_map(|field| field.outputs.clone())
-            .collect();
-        let (time_slots, point_slots) = translator.staged_slots(&outputs);
+        let outputs = &self.staged;
+        let (time_slots, point_slots) = translator.staged_slots(outputs);
         let (time_statements, time_values) = translator.statements(&time_slots);
         let (point_statements, point_values) = translator.statements(&point_slots);
         let mut inner = translator.clone();
@@ -431,7 +431,7 @@ impl<'a> Generator<'a> {
                 inner.store(slot, quote!(#place[#index]));
             }
         }
-        let (statements, values) = inner.statements(&outputs);
+        let (statements, values) = inner.statements(outputs);
         let time = Literal::usize_unsuffixed(time_slots.len());
         let point = Literal::usize_unsuffixed(point_slots.len());
         let items = quote! {

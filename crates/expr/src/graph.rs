@@ -262,6 +262,14 @@ impl Graph {
         }
     }
 
+    /// `expr` in one piece whatever it is but a number, so that algebra takes no factor out of it either.
+    pub(crate) fn opaque(&mut self, expr: Expr) -> Expr {
+        match self.node(expr) {
+            Node::Number(_) | Node::Whole(_) => expr,
+            _ => self.intern(Node::Whole(expr)),
+        }
+    }
+
     /// The expressions that the root refers to directly.
     pub fn children(&self, expr: Expr) -> impl Iterator<Item = Expr> + '_ {
         children(self.node(expr))

@@ -308,6 +308,12 @@ impl Program {
         stages
     }
 
+    /// A rough cost of one evaluation of the outputs at given parameters, in additions.
+    pub(crate) fn cost(&self) -> usize {
+        let stages = self.operations_by_stage(&self.outputs);
+        stages.time.cost() + stages.point.cost() + stages.both.cost()
+    }
+
     /// Bounds, to first order, of the rounding errors of the outputs, in units of the rounding error of one operation.
     ///
     /// Inputs count as exact. Running error analysis: every operation adds its own rounding to what its operands
@@ -539,13 +545,17 @@ impl Lowering<'_> {
             let part = match &*group.members {
                 [(index, _)] => {
                     let (term, coefficient) = &terms[*index];
-                    (coefficient.is_negative(), self.scaled(*term, &coefficient.abs()))
+                    let (turned, slot) = self.signed_term(*term, &coefficient.abs());
+                    (coefficient.is_negative() != turned, slot)
                 }
                 members => {
-                    let inner = self.graph.sum(members.iter().map(|(index, rest)| {
+                    let mut inner = Vec::new();
+                    for (index, rest) in members {
                         let sign = if terms[*index].1.is_negative() { -1 } else { 1 };
-                        (Rational::from_integer(sign.into()), *rest)
-                    }));
+                        // A sum that was a factor stays one quantity, as it may be used elsewhere.
+                        inner.push((Rational::from_integer(sign.into()), self.graph.whole(*rest)));
+                    }
+                    let inner = self.graph.sum(inner);
                     let (negative, inner) = self.signed(inner);
                     let factor = self.lower(group.factor);
                     (negative, self.push(Operation::Mul(factor, inner)))
@@ -559,6 +569,14 @@ impl Lowering<'_> {
             groups.push(self.add(group.iter().map(|(_, part)| *part).collect()));
         }
         self.add(groups)
+    }
+
+    /// `coefficient * term` as a sign and a value.
+    fn signed_term(&mut self, term: Expr, coefficient: &Rational) -> (bool, Slot) {
+        match *self.graph.node(term) {
+            Node::Whole(inner) if coefficient.is_one() => self.signed(inner),
+            _ => (false, self.scaled(term, coefficient)),
+        }
     }
 
     /// The terms of a sum by their factor that depends on parameters only, their coefficient included, and by the rate

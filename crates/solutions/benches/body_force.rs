@@ -235,7 +235,7 @@ fn check() {
     ring.body_force_at(&X).evaluate(TIME, 0, &mut kept);
     for (X, kept) in X.iter().zip(&kept) {
         let single = ring.body_force(X, TIME);
-        assert_eq!(*kept, single, "at {X}");
+        assert!((*kept - single).norm() < 1e-14 * single.norm(), "kept at {X}");
         for (way, other) in
             [("listing", case.listing(X, TIME)), ("num-dual", case.automatic(X, TIME))]
         {

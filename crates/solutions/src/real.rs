@@ -79,35 +79,36 @@ fn sin_pi_shifted(x: f64, quarters: u64) -> f64 {
         let n = halves.round();
         (n, n.rem_euclid(4.0) as u64)
     };
-    let r = (x - n * 0.5) * std::f64::consts::PI;
+    let r = x - n * 0.5;
     let quadrant = quadrant.wrapping_add(quarters);
     let value = if quadrant & 1 == 0 { sine(r) } else { cosine(r) };
     if quadrant & 2 == 0 { value } else { -value }
 }
 
-/// The sine for `|x| <= pi/4`, by the minimax polynomial of Sun's fdlibm.
+/// `sin(pi x)` for `|x| <= 1/4`: the minimax polynomial of Sun's fdlibm for the sine, with the powers of pi in its
+/// coefficients.
 #[inline]
 fn sine(x: f64) -> f64 {
     let z = x * x;
-    let tail = 8.333_333_333_322_49e-3
-        + z * (-1.984_126_982_985_795e-4 + z * 2.755_731_370_707_006_8e-6)
-        + z * (z * z) * (-2.505_076_025_340_686_3e-8 + z * 1.589_690_995_211_55e-10);
-    x + (z * x) * (-1.666_666_666_666_663_2e-1 + z * tail)
+    let even = -5.167_712_780_049_968_5
+        + (z * z) * (-5.992_645_289_761_195e-1 + (z * z) * -7.370_034_319_852_937e-3);
+    let odd = 2.550_164_039_874_027
+        + (z * z) * (8.214_587_016_569_905e-2 + (z * z) * 4.615_949_610_094_388e-4);
+    x * (std::f64::consts::PI + z * (even + z * odd))
 }
 
-/// The cosine for `|x| <= pi/4`, by the minimax polynomial of Sun's fdlibm.
+/// `cos(pi x)` for `|x| <= 1/4`, as the sine.
 #[inline]
 fn cosine(x: f64) -> f64 {
     let z = x * x;
     let square = z * z;
-    let tail = z
-        * (4.166_666_666_666_66e-2
-            + z * (-1.388_888_888_887_411e-3 + z * 2.480_158_728_947_673e-5))
+    let even = 4.058_712_126_416_762
         + square
-            * square
-            * (-2.755_731_435_139_066_3e-7
-                + z * (2.087_572_321_298_175e-9 + z * -1.135_964_755_778_819_5e-11));
-    (1.0 - 0.5 * z) + z * tail
+            * (2.353_306_302_439_816_5e-1 + square * 1.929_478_760_777_114_4e-3);
+    let odd = -1.335_262_768_853_168_6
+        + square
+            * (-2.580_688_682_692_376_7e-2 + square * -1.036_246_495_865_416_4e-4);
+    (1.0 - 4.934_802_200_544_679 * z) + square * (even + z * odd)
 }
 
 #[cfg(test)]

@@ -38,7 +38,7 @@ impl<T: crate::Real> Default for AxisAlignedParameters<T> {
 pub struct AxisAligned<T: crate::Real> {
     parameters: AxisAlignedParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 12],
+    fixed: [T; 13],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> AxisAligned<T> {
@@ -124,12 +124,12 @@ impl<T: crate::Real> AxisAligned<T> {
         let t47 = parameters.nu + T::one();
         let t49 = T::nearest(2.0) * parameters.nu;
         let t50 = T::one() - t49;
-        let t61 = parameters.E * parameters.nu;
-        let t62 = t47 * t50;
-        let t63 = t61 / t62;
-        let t66 = T::nearest(0.5) * parameters.E;
-        let t67 = t66 / t47;
-        let t69 = t18 * t67;
+        let t62 = T::nearest(0.5) * parameters.E;
+        let t63 = t62 / t47;
+        let t65 = parameters.E * parameters.nu;
+        let t66 = t47 * t50;
+        let t67 = t65 / t66;
+        let t69 = t18 * t63;
         let t83 = parameters.nu * parameters.nu;
         let t84 = T::nearest(2.0) * parameters.A;
         let t85 = t84 * t25;
@@ -138,24 +138,25 @@ impl<T: crate::Real> AxisAligned<T> {
         let t88 = parameters.rho0 * t47;
         let t89 = t88 * t50;
         let t90 = t87 / t89;
-        let t92 = parameters.A * parameters.A;
-        let t93 = t92 * parameters.A;
-        let t94 = t25 * t25;
-        let t96 = t63 + t67;
-        let t97 = t93 * t94;
-        let t98 = t97 * t96;
-        let t99 = t98 / parameters.rho0;
-        let t104 = t25 * T::pi();
-        let t105 = T::nearest(2.0) * t92;
-        let t106 = t105 * t104;
-        let t107 = t106 * t96;
-        let t108 = t107 / parameters.rho0;
-        let t114 = t27 * parameters.nu;
-        let t115 = t114 / t89;
-        let t143 = T::nearest(2.0) / t7;
+        let t113 = t26 / parameters.rho0;
+        let t142 = t67 + t63;
+        let t143 = parameters.A * parameters.A;
+        let t144 = t143 * parameters.A;
+        let t145 = t25 * t25;
+        let t147 = t144 * t145;
+        let t148 = t147 * t142;
+        let t149 = t148 / parameters.rho0;
+        let t153 = t25 * T::pi();
+        let t154 = T::nearest(2.0) * t143;
+        let t155 = t154 * t153;
+        let t156 = t155 * t142;
+        let t157 = t156 / parameters.rho0;
+        let t162 = t27 * parameters.nu;
+        let t163 = t162 / t89;
+        let t191 = T::nearest(2.0) / t7;
         Ok(AxisAligned {
             parameters,
-            fixed: [t7, t18, t19, t28, t63, t67, t69, t90, t99, t108, t115, t143],
+            fixed: [t7, t18, t19, t28, t63, t67, t69, t90, t113, t149, t157, t163, t191],
         })
     }
     /// The solution with parameter values in the order of the description; missing ones take their
@@ -321,19 +322,19 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t58 = t57 + t56;
         let t59 = self.fixed[1] * t58;
         let t60 = t59.ln_1p();
-        let t64 = self.fixed[4] * t60;
-        let t68 = t37 + T::nearest(2.0);
+        let t64 = t37 + T::nearest(2.0);
+        let t68 = self.fixed[5] * t60;
         let t70 = self.fixed[6] * t9;
         let t71 = t70 * t35;
-        let t72 = t71 * t68;
-        let t73 = t64 + t72;
+        let t72 = t71 * t64;
+        let t73 = t68 + t72;
         let t74 = T::one() / t43;
         let t75 = t73 * t74;
         let t76 = t41 + T::nearest(2.0);
         let t77 = self.fixed[6] * t14;
         let t78 = t77 * t39;
         let t79 = t78 * t76;
-        let t80 = t64 + t79;
+        let t80 = t68 + t79;
         let t81 = T::one() / t44;
         let t82 = t80 * t81;
         crate::nalgebra::SMatrix::<T, 2, 2>::new(t75, T::zero(), T::zero(), t82)
@@ -350,64 +351,60 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t13 = X[1].sin_pi();
         let t14 = t8.sin_pi();
         let t35 = X[0].cos_pi();
-        let t36 = self.fixed[1] * t9;
-        let t37 = t36 * t35;
         let t39 = X[1].cos_pi();
-        let t40 = self.fixed[1] * t14;
-        let t41 = t40 * t39;
-        let t43 = t37 + T::one();
-        let t44 = t41 + T::one();
         let t51 = t9 * t35;
         let t52 = t14 * t39;
-        let t53 = t9 * t14;
-        let t54 = self.fixed[1] * t53;
-        let t55 = t35 * t39;
-        let t56 = t54 * t55;
         let t57 = t51 + t52;
-        let t58 = t57 + t56;
-        let t59 = self.fixed[1] * t58;
-        let t60 = t59.ln_1p();
-        let t74 = T::one() / t43;
-        let t81 = T::one() / t44;
-        let t91 = self.fixed[7] * t2;
-        let t95 = t35 * t35;
-        let t100 = t2 * t95;
-        let t101 = self.fixed[8] * t100;
-        let t102 = -t101;
-        let t103 = t9 * t102;
-        let t109 = t2 * t35;
-        let t110 = self.fixed[9] * t109;
-        let t111 = -t110;
-        let t112 = t111 + t103;
-        let t113 = t9 * t112;
-        let t116 = self.fixed[10] * t2;
-        let t117 = -t116;
-        let t118 = t117 * t60;
-        let t119 = t113 + t118;
-        let t120 = t74 * t74;
-        let t121 = t119 * t120;
-        let t122 = t91 + t121;
-        let t123 = t9 * t122;
-        let t124 = self.fixed[7] * t13;
-        let t125 = t39 * t39;
-        let t126 = t13 * t125;
-        let t127 = self.fixed[8] * t126;
-        let t128 = -t127;
-        let t129 = t14 * t128;
-        let t130 = t13 * t39;
-        let t131 = self.fixed[9] * t130;
-        let t132 = -t131;
-        let t133 = t132 + t129;
-        let t134 = t14 * t133;
-        let t135 = self.fixed[10] * t13;
-        let t136 = -t135;
-        let t137 = t136 * t60;
-        let t138 = t134 + t137;
-        let t139 = t81 * t81;
-        let t140 = t138 * t139;
-        let t141 = t124 + t140;
-        let t142 = t14 * t141;
-        crate::nalgebra::SVector::<T, 2>::new(t123, t142)
+        let t91 = self.fixed[7] * t9;
+        let t92 = t91 * t2;
+        let t93 = self.fixed[1] * t51;
+        let t94 = t93 + T::one();
+        let t95 = t52 * t93;
+        let t96 = t57 + t95;
+        let t97 = self.fixed[1] * t96;
+        let t98 = t97.ln_1p();
+        let t99 = self.fixed[5] * t98;
+        let t100 = self.fixed[4] * t93;
+        let t101 = t99 + t100;
+        let t102 = T::one() / t94;
+        let t103 = self.fixed[5] * t102;
+        let t104 = self.fixed[4] + t103;
+        let t105 = t93 + t98;
+        let t106 = self.fixed[5] * t105;
+        let t107 = t93 * t101;
+        let t108 = t107 * t102;
+        let t109 = t93 * t104;
+        let t110 = t106 + t100;
+        let t111 = t110 - t108;
+        let t112 = t111 + t109;
+        let t114 = self.fixed[8] * t9;
+        let t115 = t114 * t2;
+        let t116 = t112 * t102;
+        let t117 = t115 * t116;
+        let t118 = t92 - t117;
+        let t119 = self.fixed[7] * t14;
+        let t120 = t119 * t13;
+        let t121 = self.fixed[1] * t52;
+        let t122 = t121 + T::one();
+        let t123 = self.fixed[4] * t121;
+        let t124 = t99 + t123;
+        let t125 = T::one() / t122;
+        let t126 = self.fixed[5] * t125;
+        let t127 = self.fixed[4] + t126;
+        let t128 = t98 + t121;
+        let t129 = self.fixed[5] * t128;
+        let t130 = t121 * t124;
+        let t131 = t130 * t125;
+        let t132 = t121 * t127;
+        let t133 = t129 + t123;
+        let t134 = t133 - t131;
+        let t135 = t134 + t132;
+        let t136 = self.fixed[8] * t14;
+        let t137 = t136 * t13;
+        let t138 = t135 * t125;
+        let t139 = t137 * t138;
+        let t140 = t120 - t139;
+        crate::nalgebra::SVector::<T, 2>::new(t118, t140)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t2 = X[0].sin_pi();
@@ -449,59 +446,70 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t58 = t57 + t56;
         let t59 = self.fixed[1] * t58;
         let t60 = t59.ln_1p();
-        let t64 = self.fixed[4] * t60;
-        let t68 = t37 + T::nearest(2.0);
+        let t64 = t37 + T::nearest(2.0);
+        let t68 = self.fixed[5] * t60;
         let t70 = self.fixed[6] * t9;
         let t71 = t70 * t35;
-        let t72 = t71 * t68;
-        let t73 = t64 + t72;
+        let t72 = t71 * t64;
+        let t73 = t68 + t72;
         let t74 = T::one() / t43;
         let t75 = t73 * t74;
         let t76 = t41 + T::nearest(2.0);
         let t77 = self.fixed[6] * t14;
         let t78 = t77 * t39;
         let t79 = t78 * t76;
-        let t80 = t64 + t79;
+        let t80 = t68 + t79;
         let t81 = T::one() / t44;
         let t82 = t80 * t81;
-        let t91 = self.fixed[7] * t2;
-        let t95 = t35 * t35;
-        let t100 = t2 * t95;
-        let t101 = self.fixed[8] * t100;
-        let t102 = -t101;
-        let t103 = t9 * t102;
-        let t109 = t2 * t35;
-        let t110 = self.fixed[9] * t109;
-        let t111 = -t110;
-        let t112 = t111 + t103;
-        let t113 = t9 * t112;
-        let t116 = self.fixed[10] * t2;
-        let t117 = -t116;
-        let t118 = t117 * t60;
-        let t119 = t113 + t118;
-        let t120 = t74 * t74;
-        let t121 = t119 * t120;
-        let t122 = t91 + t121;
-        let t123 = t9 * t122;
-        let t124 = self.fixed[7] * t13;
-        let t125 = t39 * t39;
-        let t126 = t13 * t125;
-        let t127 = self.fixed[8] * t126;
-        let t128 = -t127;
-        let t129 = t14 * t128;
-        let t130 = t13 * t39;
-        let t131 = self.fixed[9] * t130;
-        let t132 = -t131;
-        let t133 = t132 + t129;
-        let t134 = t14 * t133;
-        let t135 = self.fixed[10] * t13;
-        let t136 = -t135;
-        let t137 = t136 * t60;
-        let t138 = t134 + t137;
-        let t139 = t81 * t81;
-        let t140 = t138 * t139;
-        let t141 = t124 + t140;
-        let t142 = t14 * t141;
+        let t91 = self.fixed[7] * t9;
+        let t92 = t91 * t2;
+        let t93 = self.fixed[1] * t51;
+        let t94 = t93 + T::one();
+        let t95 = t52 * t93;
+        let t96 = t57 + t95;
+        let t97 = self.fixed[1] * t96;
+        let t98 = t97.ln_1p();
+        let t99 = self.fixed[5] * t98;
+        let t100 = self.fixed[4] * t93;
+        let t101 = t99 + t100;
+        let t102 = T::one() / t94;
+        let t103 = self.fixed[5] * t102;
+        let t104 = self.fixed[4] + t103;
+        let t105 = t93 + t98;
+        let t106 = self.fixed[5] * t105;
+        let t107 = t93 * t101;
+        let t108 = t107 * t102;
+        let t109 = t93 * t104;
+        let t110 = t106 + t100;
+        let t111 = t110 - t108;
+        let t112 = t111 + t109;
+        let t114 = self.fixed[8] * t9;
+        let t115 = t114 * t2;
+        let t116 = t112 * t102;
+        let t117 = t115 * t116;
+        let t118 = t92 - t117;
+        let t119 = self.fixed[7] * t14;
+        let t120 = t119 * t13;
+        let t121 = self.fixed[1] * t52;
+        let t122 = t121 + T::one();
+        let t123 = self.fixed[4] * t121;
+        let t124 = t99 + t123;
+        let t125 = T::one() / t122;
+        let t126 = self.fixed[5] * t125;
+        let t127 = self.fixed[4] + t126;
+        let t128 = t98 + t121;
+        let t129 = self.fixed[5] * t128;
+        let t130 = t121 * t124;
+        let t131 = t130 * t125;
+        let t132 = t121 * t127;
+        let t133 = t129 + t123;
+        let t134 = t133 - t131;
+        let t135 = t134 + t132;
+        let t136 = self.fixed[8] * t14;
+        let t137 = t136 * t13;
+        let t138 = t135 * t125;
+        let t139 = t137 * t138;
+        let t140 = t120 - t139;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t11, t16),
             v: crate::nalgebra::SVector::<T, 2>::new(t22, t24),
@@ -510,7 +518,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t43, T::zero(), T::zero(), t44),
             J: t45,
             P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t75, T::zero(), T::zero(), t82),
-            b: crate::nalgebra::SVector::<T, 2>::new(t123, t142),
+            b: crate::nalgebra::SVector::<T, 2>::new(t118, t140),
         }
     }
     fn domain(&self) -> crate::Domain<T, 2> {
@@ -544,8 +552,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
     }
     fn material(&self) -> crate::Material<T> {
         crate::Material::NeoHookean {
-            lambda: self.fixed[4],
-            mu: self.fixed[5],
+            lambda: self.fixed[5],
+            mu: self.fixed[4],
         }
     }
     fn density(&self) -> T {
@@ -555,7 +563,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[11]
+        self.fixed[12]
     }
     fn body_force_at(
         &self,
@@ -584,27 +592,25 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 5, 11> for AxisAligned<T> {
         let t35 = X[0].cos_pi();
         let t39 = X[1].cos_pi();
         let t55 = t35 * t39;
-        let t91 = self.fixed[7] * t2;
-        let t95 = t35 * t35;
-        let t100 = t2 * t95;
-        let t101 = self.fixed[8] * t100;
-        let t102 = -t101;
-        let t109 = t2 * t35;
-        let t110 = self.fixed[9] * t109;
-        let t111 = -t110;
-        let t116 = self.fixed[10] * t2;
-        let t117 = -t116;
-        let t124 = self.fixed[7] * t13;
-        let t125 = t39 * t39;
-        let t126 = t13 * t125;
-        let t127 = self.fixed[8] * t126;
-        let t128 = -t127;
-        let t130 = t13 * t39;
-        let t131 = self.fixed[9] * t130;
-        let t132 = -t131;
-        let t135 = self.fixed[10] * t13;
-        let t136 = -t135;
-        [t35, t39, t55, t91, t102, t111, t117, t124, t128, t132, t136]
+        let t141 = self.fixed[7] * t2;
+        let t146 = t35 * t35;
+        let t150 = t2 * t146;
+        let t151 = self.fixed[9] * t150;
+        let t152 = -t151;
+        let t158 = t2 * t35;
+        let t159 = self.fixed[10] * t158;
+        let t164 = self.fixed[11] * t2;
+        let t165 = -t164;
+        let t173 = self.fixed[7] * t13;
+        let t174 = t39 * t39;
+        let t175 = t13 * t174;
+        let t176 = self.fixed[9] * t175;
+        let t177 = -t176;
+        let t178 = t13 * t39;
+        let t179 = self.fixed[10] * t178;
+        let t182 = self.fixed[11] * t13;
+        let t183 = -t182;
+        [t35, t39, t55, t141, t152, t159, t165, t173, t177, t179, t183]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -625,25 +631,25 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 5, 11> for AxisAligned<T> {
         let t60 = t59.ln_1p();
         let t74 = T::one() / t43;
         let t81 = T::one() / t44;
-        let t103 = time[0] * point[4];
-        let t112 = point[5] + t103;
-        let t113 = time[0] * t112;
-        let t118 = point[6] * t60;
-        let t119 = t113 + t118;
-        let t120 = t74 * t74;
-        let t121 = t119 * t120;
-        let t122 = point[3] + t121;
-        let t123 = time[0] * t122;
-        let t129 = time[1] * point[8];
-        let t133 = point[9] + t129;
-        let t134 = time[1] * t133;
-        let t137 = point[10] * t60;
-        let t138 = t134 + t137;
-        let t139 = t81 * t81;
-        let t140 = t138 * t139;
-        let t141 = point[7] + t140;
-        let t142 = time[1] * t141;
-        crate::nalgebra::SVector::<T, 2>::new(t123, t142)
+        let t160 = time[0] * point[4];
+        let t161 = t160 - point[5];
+        let t166 = time[0] * t161;
+        let t167 = point[6] * t60;
+        let t168 = t166 + t167;
+        let t169 = t74 * t74;
+        let t170 = t168 * t169;
+        let t171 = point[3] + t170;
+        let t172 = time[0] * t171;
+        let t180 = time[1] * point[8];
+        let t181 = t180 - point[9];
+        let t184 = time[1] * t181;
+        let t185 = point[10] * t60;
+        let t186 = t184 + t185;
+        let t187 = t81 * t81;
+        let t188 = t186 * t187;
+        let t189 = point[7] + t188;
+        let t190 = time[1] * t189;
+        crate::nalgebra::SVector::<T, 2>::new(t172, t190)
     }
 }
 impl<T: crate::Real> From<AxisAligned<T>> for crate::AnySolution<T> {

@@ -37,7 +37,7 @@ impl<T: crate::Real> Default for AxisAligned1dParameters<T> {
 pub struct AxisAligned1d<T: crate::Real> {
     parameters: AxisAligned1dParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 12],
+    fixed: [T; 16],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> AxisAligned1d<T> {
@@ -123,38 +123,62 @@ impl<T: crate::Real> AxisAligned1d<T> {
         let t32 = parameters.nu + T::one();
         let t34 = T::nearest(2.0) * parameters.nu;
         let t35 = T::one() - t34;
-        let t37 = parameters.E * parameters.nu;
-        let t38 = t32 * t35;
-        let t39 = t37 / t38;
-        let t42 = T::nearest(0.5) * parameters.E;
-        let t43 = t42 / t32;
-        let t45 = t14 * t43;
-        let t52 = parameters.nu * parameters.nu;
-        let t53 = T::nearest(2.0) * parameters.A;
-        let t54 = t53 * t19;
-        let t55 = t54 * parameters.E;
-        let t56 = t55 * t52;
+        let t38 = T::nearest(0.5) * parameters.E;
+        let t39 = t38 / t32;
+        let t41 = parameters.E * parameters.nu;
+        let t42 = t32 * t35;
+        let t43 = t41 / t42;
+        let t45 = t14 * t39;
+        let t54 = parameters.nu * parameters.nu;
+        let t55 = T::nearest(2.0) * parameters.E;
+        let t56 = t55 * t54;
         let t57 = parameters.rho0 * t32;
         let t58 = t57 * t35;
         let t59 = t56 / t58;
-        let t61 = parameters.A * parameters.A;
-        let t62 = t61 * parameters.A;
-        let t63 = t19 * t19;
-        let t65 = t39 + t43;
-        let t66 = t62 * t63;
-        let t67 = t66 * t65;
-        let t68 = t67 / parameters.rho0;
-        let t73 = t19 * T::pi();
-        let t74 = T::nearest(2.0) * t61;
-        let t75 = t74 * t73;
-        let t76 = t75 * t65;
-        let t77 = t76 / parameters.rho0;
-        let t83 = t21 * parameters.nu;
-        let t84 = t83 / t58;
-        let t93 = T::nearest(2.0) / t7;
+        let t73 = T::pi() * parameters.E;
+        let t74 = t73 * parameters.nu;
+        let t75 = t74 / t42;
+        let t80 = t14 / parameters.rho0;
+        let t85 = T::nearest(2.0) * parameters.A;
+        let t86 = t85 * t19;
+        let t87 = t86 * parameters.E;
+        let t88 = t87 * t54;
+        let t89 = t88 / t58;
+        let t91 = t43 + t39;
+        let t92 = parameters.A * parameters.A;
+        let t93 = t92 * parameters.A;
+        let t94 = t19 * t19;
+        let t96 = t93 * t94;
+        let t97 = t96 * t91;
+        let t98 = t97 / parameters.rho0;
+        let t102 = t19 * T::pi();
+        let t103 = T::nearest(2.0) * t92;
+        let t104 = t103 * t102;
+        let t105 = t104 * t91;
+        let t106 = t105 / parameters.rho0;
+        let t111 = t21 * parameters.nu;
+        let t112 = t111 / t58;
+        let t122 = T::nearest(2.0) / t7;
         Ok(AxisAligned1d {
             parameters,
-            fixed: [t7, t14, t15, t22, t39, t43, t45, t59, t68, t77, t84, t93],
+            fixed: [
+                t7,
+                t14,
+                t15,
+                t20,
+                t22,
+                t39,
+                t43,
+                t45,
+                t59,
+                t75,
+                t80,
+                t89,
+                t98,
+                t106,
+                t112,
+                t122,
+            ],
         })
     }
     /// The solution with parameter values in the order of the description; missing ones take their
@@ -223,7 +247,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         let t2 = X[0].sin_pi();
         let t8 = self.fixed[0] * t;
         let t9 = t8.cos_pi();
-        let t23 = self.fixed[3] * t9;
+        let t23 = self.fixed[4] * t9;
         let t24 = t23 * t2;
         let t25 = -t24;
         crate::nalgebra::SVector::<T, 1>::new(t25)
@@ -278,12 +302,12 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         let t28 = t27 * t26;
         let t30 = t28 + T::one();
         let t36 = t28.ln_1p();
-        let t40 = self.fixed[4] * t36;
-        let t44 = t28 + T::nearest(2.0);
-        let t46 = self.fixed[6] * t9;
+        let t40 = t28 + T::nearest(2.0);
+        let t44 = self.fixed[6] * t36;
+        let t46 = self.fixed[7] * t9;
         let t47 = t46 * t26;
-        let t48 = t47 * t44;
-        let t49 = t40 + t48;
+        let t48 = t47 * t40;
+        let t49 = t44 + t48;
         let t50 = T::one() / t30;
         let t51 = t49 * t50;
         crate::nalgebra::SMatrix::<T, 1, 1>::new(t51)
@@ -302,27 +326,32 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         let t28 = t27 * t26;
         let t30 = t28 + T::one();
         let t36 = t28.ln_1p();
+        let t44 = self.fixed[6] * t36;
         let t50 = T::one() / t30;
-        let t60 = self.fixed[7] * t2;
-        let t64 = t26 * t26;
-        let t69 = t2 * t64;
-        let t70 = self.fixed[8] * t69;
-        let t71 = -t70;
-        let t72 = t9 * t71;
-        let t78 = t2 * t26;
-        let t79 = self.fixed[9] * t78;
-        let t80 = -t79;
-        let t81 = t80 + t72;
-        let t82 = t9 * t81;
-        let t85 = self.fixed[10] * t2;
-        let t86 = -t85;
-        let t87 = t86 * t36;
-        let t88 = t82 + t87;
-        let t89 = t50 * t50;
-        let t90 = t88 * t89;
-        let t91 = t60 + t90;
-        let t92 = t9 * t91;
-        crate::nalgebra::SVector::<T, 1>::new(t92)
+        let t52 = self.fixed[3] * t9;
+        let t53 = t52 * t2;
+        let t60 = self.fixed[8] * t53;
+        let t61 = self.fixed[5] * t28;
+        let t62 = t44 + t61;
+        let t63 = -t53;
+        let t64 = self.fixed[6] * t50;
+        let t65 = self.fixed[5] + t64;
+        let t66 = t65 * t28;
+        let t67 = t62 + t66;
+        let t68 = t2 * t67;
+        let t69 = T::pi() * t68;
+        let t70 = t63 * t62;
+        let t71 = t70 * t50;
+        let t72 = t26 * t71;
+        let t76 = self.fixed[9] * t2;
+        let t77 = t76 * t28;
+        let t78 = t69 + t72;
+        let t79 = t78 + t77;
+        let t81 = self.fixed[10] * t9;
+        let t82 = t79 * t50;
+        let t83 = t81 * t82;
+        let t84 = t60 - t83;
+        crate::nalgebra::SVector::<T, 1>::new(t84)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 1>, t: T) -> crate::Fields<T, 1> {
         let t2 = X[0].sin_pi();
@@ -334,7 +363,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         let t16 = self.fixed[2] * t13;
         let t17 = t16 * t2;
         let t18 = -t17;
-        let t23 = self.fixed[3] * t9;
+        let t23 = self.fixed[4] * t9;
         let t24 = t23 * t2;
         let t25 = -t24;
         let t26 = X[0].cos_pi();
@@ -342,33 +371,37 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         let t28 = t27 * t26;
         let t30 = t28 + T::one();
         let t36 = t28.ln_1p();
-        let t40 = self.fixed[4] * t36;
-        let t44 = t28 + T::nearest(2.0);
-        let t46 = self.fixed[6] * t9;
+        let t40 = t28 + T::nearest(2.0);
+        let t44 = self.fixed[6] * t36;
+        let t46 = self.fixed[7] * t9;
         let t47 = t46 * t26;
-        let t48 = t47 * t44;
-        let t49 = t40 + t48;
+        let t48 = t47 * t40;
+        let t49 = t44 + t48;
         let t50 = T::one() / t30;
         let t51 = t49 * t50;
-        let t60 = self.fixed[7] * t2;
-        let t64 = t26 * t26;
-        let t69 = t2 * t64;
-        let t70 = self.fixed[8] * t69;
-        let t71 = -t70;
-        let t72 = t9 * t71;
-        let t78 = t2 * t26;
-        let t79 = self.fixed[9] * t78;
-        let t80 = -t79;
-        let t81 = t80 + t72;
-        let t82 = t9 * t81;
-        let t85 = self.fixed[10] * t2;
-        let t86 = -t85;
-        let t87 = t86 * t36;
-        let t88 = t82 + t87;
-        let t89 = t50 * t50;
-        let t90 = t88 * t89;
-        let t91 = t60 + t90;
-        let t92 = t9 * t91;
+        let t52 = self.fixed[3] * t9;
+        let t53 = t52 * t2;
+        let t60 = self.fixed[8] * t53;
+        let t61 = self.fixed[5] * t28;
+        let t62 = t44 + t61;
+        let t63 = -t53;
+        let t64 = self.fixed[6] * t50;
+        let t65 = self.fixed[5] + t64;
+        let t66 = t65 * t28;
+        let t67 = t62 + t66;
+        let t68 = t2 * t67;
+        let t69 = T::pi() * t68;
+        let t70 = t63 * t62;
+        let t71 = t70 * t50;
+        let t72 = t26 * t71;
+        let t76 = self.fixed[9] * t2;
+        let t77 = t76 * t28;
+        let t78 = t69 + t72;
+        let t79 = t78 + t77;
+        let t81 = self.fixed[10] * t9;
+        let t82 = t79 * t50;
+        let t83 = t81 * t82;
+        let t84 = t60 - t83;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 1>::new(t11),
             v: crate::nalgebra::SVector::<T, 1>::new(t18),
@@ -377,7 +410,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
             F: crate::nalgebra::SMatrix::<T, 1, 1>::new(t30),
             J: t30,
             P: crate::nalgebra::SMatrix::<T, 1, 1>::new(t51),
-            b: crate::nalgebra::SVector::<T, 1>::new(t92),
+            b: crate::nalgebra::SVector::<T, 1>::new(t84),
         }
     }
     fn domain(&self) -> crate::Domain<T, 1> {
@@ -403,7 +436,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
     }
     fn material(&self) -> crate::Material<T> {
         crate::Material::NeoHookean {
-            lambda: self.fixed[4],
+            lambda: self.fixed[6],
             mu: self.fixed[5],
         }
     }
@@ -414,7 +447,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[11]
+        self.fixed[15]
     }
     fn body_force_at(
         &self,
@@ -436,17 +469,16 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 5> for AxisAligned1d<T> {
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 1>) -> [T; 5] {
         let t2 = X[0].sin_pi();
         let t26 = X[0].cos_pi();
-        let t60 = self.fixed[7] * t2;
-        let t64 = t26 * t26;
-        let t69 = t2 * t64;
-        let t70 = self.fixed[8] * t69;
-        let t71 = -t70;
-        let t78 = t2 * t26;
-        let t79 = self.fixed[9] * t78;
-        let t80 = -t79;
-        let t85 = self.fixed[10] * t2;
-        let t86 = -t85;
-        [t26, t60, t71, t80, t86]
+        let t90 = self.fixed[11] * t2;
+        let t95 = t26 * t26;
+        let t99 = t2 * t95;
+        let t100 = self.fixed[12] * t99;
+        let t101 = -t100;
+        let t107 = t2 * t26;
+        let t108 = self.fixed[13] * t107;
+        let t113 = self.fixed[14] * t2;
+        let t114 = -t113;
+        [t26, t90, t101, t108, t114]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -458,16 +490,16 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 5> for AxisAligned1d<T> {
         let t30 = t28 + T::one();
         let t36 = t28.ln_1p();
         let t50 = T::one() / t30;
-        let t72 = time[0] * point[2];
-        let t81 = point[3] + t72;
-        let t82 = time[0] * t81;
-        let t87 = point[4] * t36;
-        let t88 = t82 + t87;
-        let t89 = t50 * t50;
-        let t90 = t88 * t89;
-        let t91 = point[1] + t90;
-        let t92 = time[0] * t91;
-        crate::nalgebra::SVector::<T, 1>::new(t92)
+        let t109 = time[0] * point[2];
+        let t110 = t109 - point[3];
+        let t115 = time[0] * t110;
+        let t116 = point[4] * t36;
+        let t117 = t115 + t116;
+        let t118 = t50 * t50;
+        let t119 = t117 * t118;
+        let t120 = point[1] + t119;
+        let t121 = time[0] * t120;
+        crate::nalgebra::SVector::<T, 1>::new(t121)
     }
 }
 impl<T: crate::Real> From<AxisAligned1d<T>> for crate::AnySolution<T> {

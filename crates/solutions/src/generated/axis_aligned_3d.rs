@@ -39,7 +39,7 @@ impl<T: crate::Real> Default for AxisAligned3dParameters<T> {
 pub struct AxisAligned3d<T: crate::Real> {
     parameters: AxisAligned3dParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 21],
+    fixed: [T; 25],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> AxisAligned3d<T> {
@@ -132,12 +132,12 @@ impl<T: crate::Real> AxisAligned3d<T> {
         let t88 = parameters.nu + T::one();
         let t89 = T::nearest(2.0) * parameters.nu;
         let t90 = T::one() - t89;
-        let t102 = parameters.E * parameters.nu;
-        let t103 = t88 * t90;
-        let t104 = t102 / t103;
-        let t106 = T::nearest(0.5) * parameters.E;
-        let t107 = t106 / t88;
-        let t109 = t31 * t107;
+        let t102 = T::nearest(0.5) * parameters.E;
+        let t103 = t102 / t88;
+        let t105 = parameters.E * parameters.nu;
+        let t106 = t88 * t90;
+        let t107 = t105 / t106;
+        let t109 = t31 * t103;
         let t128 = parameters.nu * parameters.nu;
         let t129 = T::nearest(2.0) * parameters.A;
         let t130 = t129 * t46;
@@ -146,33 +146,38 @@ impl<T: crate::Real> AxisAligned3d<T> {
         let t133 = parameters.rho0 * t88;
         let t134 = t133 * t90;
         let t135 = t132 / t134;
-        let t137 = parameters.A * parameters.A;
-        let t138 = t137 * parameters.A;
-        let t139 = t46 * t46;
-        let t141 = t104 + t107;
-        let t142 = t138 * t139;
-        let t143 = t142 * t141;
-        let t144 = t143 / parameters.rho0;
-        let t149 = t46 * T::pi();
-        let t150 = T::nearest(2.0) * t137;
-        let t151 = t150 * t149;
-        let t152 = t151 * t141;
-        let t153 = t152 / parameters.rho0;
-        let t159 = t48 * parameters.nu;
-        let t160 = t159 / t134;
-        let t169 = t48 * t128;
-        let t170 = t169 / t134;
-        let t175 = T::nearest(0.125) * t138;
-        let t176 = t175 * t139;
-        let t177 = t176 * t141;
-        let t178 = t177 / parameters.rho0;
-        let t182 = T::nearest(0.5) * t137;
-        let t183 = t182 * t149;
-        let t184 = t183 * t141;
-        let t185 = t184 / parameters.rho0;
-        let t191 = t54 * parameters.nu;
-        let t192 = t191 / t134;
-        let t218 = T::nearest(2.0) / t7;
+        let t145 = t31 * parameters.E;
+        let t146 = t145 * parameters.nu;
+        let t147 = t146 / t106;
+        let t152 = t47 / parameters.rho0;
+        let t158 = t48 * t128;
+        let t159 = t158 / t134;
+        let t176 = T::one() / parameters.rho0;
+        let t202 = t107 + t103;
+        let t203 = parameters.A * parameters.A;
+        let t204 = t203 * parameters.A;
+        let t205 = t46 * t46;
+        let t207 = t204 * t205;
+        let t208 = t207 * t202;
+        let t209 = t208 / parameters.rho0;
+        let t213 = t46 * T::pi();
+        let t214 = T::nearest(2.0) * t203;
+        let t215 = t214 * t213;
+        let t216 = t215 * t202;
+        let t217 = t216 / parameters.rho0;
+        let t222 = t48 * parameters.nu;
+        let t223 = t222 / t134;
+        let t236 = T::nearest(0.125) * t204;
+        let t237 = t236 * t205;
+        let t238 = t237 * t202;
+        let t239 = t238 / parameters.rho0;
+        let t242 = T::nearest(0.5) * t203;
+        let t243 = t242 * t213;
+        let t244 = t243 * t202;
+        let t245 = t244 / parameters.rho0;
+        let t250 = t54 * parameters.nu;
+        let t251 = t250 / t134;
+        let t276 = T::nearest(2.0) / t7;
         Ok(AxisAligned3d {
             parameters,
             fixed: [
@@ -184,19 +189,23 @@ impl<T: crate::Real> AxisAligned3d<T> {
                 t37,
                 t38,
                 t49,
+                t53,
                 t55,
-                t104,
+                t103,
                 t107,
                 t109,
                 t135,
-                t144,
-                t153,
-                t160,
-                t170,
-                t178,
-                t185,
-                t192,
-                t218,
+                t147,
+                t152,
+                t159,
+                t176,
+                t209,
+                t217,
+                t223,
+                t239,
+                t245,
+                t251,
+                t276,
             ],
         })
     }
@@ -241,15 +250,15 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t9 = t8.sin_pi();
         let t10 = self.parameters.A * t9;
         let t11 = t10 * t2;
-        let t14 = X[1].sin_pi();
-        let t17 = t8.cos_pi();
-        let t18 = self.fixed[1] * t17;
-        let t19 = t9 - t18;
-        let t21 = self.fixed[2] * t19;
-        let t22 = t21 * t14;
+        let t13 = X[1].sin_pi();
+        let t15 = t8.cos_pi();
+        let t17 = self.fixed[1] * t15;
+        let t18 = t9 - t17;
+        let t21 = self.fixed[2] * t18;
+        let t22 = t21 * t13;
         let t23 = -t22;
         let t25 = X[2].sin_pi();
-        let t26 = t9 + t18;
+        let t26 = t9 + t17;
         let t27 = self.fixed[2] * t26;
         let t28 = t27 * t25;
         let t29 = -t28;
@@ -264,17 +273,17 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t2 = X[0].sin_pi();
         let t8 = self.fixed[0] * t;
         let t9 = t8.sin_pi();
-        let t14 = X[1].sin_pi();
-        let t17 = t8.cos_pi();
+        let t13 = X[1].sin_pi();
+        let t15 = t8.cos_pi();
         let t25 = X[2].sin_pi();
-        let t33 = self.fixed[4] * t17;
+        let t33 = self.fixed[4] * t15;
         let t34 = t33 * t2;
         let t35 = self.fixed[1] * t9;
-        let t36 = t17 + t35;
+        let t36 = t15 + t35;
         let t39 = self.fixed[6] * t36;
-        let t40 = t39 * t14;
+        let t40 = t39 * t13;
         let t41 = -t40;
-        let t42 = t17 - t35;
+        let t42 = t15 - t35;
         let t43 = self.fixed[6] * t42;
         let t44 = t43 * t25;
         let t45 = -t44;
@@ -289,18 +298,18 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t2 = X[0].sin_pi();
         let t8 = self.fixed[0] * t;
         let t9 = t8.sin_pi();
-        let t14 = X[1].sin_pi();
-        let t17 = t8.cos_pi();
-        let t18 = self.fixed[1] * t17;
-        let t19 = t9 - t18;
+        let t13 = X[1].sin_pi();
+        let t15 = t8.cos_pi();
+        let t17 = self.fixed[1] * t15;
+        let t18 = t9 - t17;
         let t25 = X[2].sin_pi();
-        let t26 = t9 + t18;
+        let t26 = t9 + t17;
         let t50 = self.fixed[7] * t9;
         let t51 = t50 * t2;
         let t52 = -t51;
-        let t56 = self.fixed[8] * t19;
-        let t57 = t56 * t14;
-        let t58 = self.fixed[8] * t26;
+        let t56 = self.fixed[9] * t18;
+        let t57 = t56 * t13;
+        let t58 = self.fixed[9] * t26;
         let t59 = t58 * t25;
         crate::nalgebra::SVector::<T, 3>::new(t52, t57, t59)
     }
@@ -312,15 +321,15 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
     ) -> crate::nalgebra::SMatrix<T, 3, 3> {
         let t8 = self.fixed[0] * t;
         let t9 = t8.sin_pi();
-        let t17 = t8.cos_pi();
-        let t18 = self.fixed[1] * t17;
-        let t19 = t9 - t18;
-        let t26 = t9 + t18;
+        let t15 = t8.cos_pi();
+        let t17 = self.fixed[1] * t15;
+        let t18 = t9 - t17;
+        let t26 = t9 + t17;
         let t60 = X[0].cos_pi();
         let t61 = self.fixed[3] * t9;
         let t62 = t61 * t60;
         let t64 = X[1].cos_pi();
-        let t65 = self.fixed[5] * t19;
+        let t65 = self.fixed[5] * t18;
         let t66 = t65 * t64;
         let t67 = -t66;
         let t68 = X[2].cos_pi();
@@ -351,17 +360,17 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
     ) -> crate::nalgebra::SMatrix<T, 3, 3> {
         let t8 = self.fixed[0] * t;
         let t9 = t8.sin_pi();
-        let t17 = t8.cos_pi();
-        let t18 = self.fixed[1] * t17;
-        let t19 = t9 - t18;
-        let t26 = t9 + t18;
+        let t15 = t8.cos_pi();
+        let t17 = self.fixed[1] * t15;
+        let t18 = t9 - t17;
+        let t26 = t9 + t17;
         let t60 = X[0].cos_pi();
         let t61 = self.fixed[3] * t9;
         let t62 = t61 * t60;
         let t64 = X[1].cos_pi();
         let t68 = X[2].cos_pi();
         let t73 = t62 + T::one();
-        let t74 = self.fixed[3] * t19;
+        let t74 = self.fixed[3] * t18;
         let t75 = t74 * t64;
         let t77 = T::nearest(2.0) - t75;
         let t78 = T::nearest(0.5) * t77;
@@ -389,15 +398,15 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
     fn jacobian(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> T {
         let t8 = self.fixed[0] * t;
         let t9 = t8.sin_pi();
-        let t17 = t8.cos_pi();
-        let t18 = self.fixed[1] * t17;
-        let t19 = t9 - t18;
-        let t26 = t9 + t18;
+        let t15 = t8.cos_pi();
+        let t17 = self.fixed[1] * t15;
+        let t18 = t9 - t17;
+        let t26 = t9 + t17;
         let t60 = X[0].cos_pi();
         let t61 = self.fixed[3] * t9;
         let t62 = t61 * t60;
         let t64 = X[1].cos_pi();
-        let t65 = self.fixed[5] * t19;
+        let t65 = self.fixed[5] * t18;
         let t66 = t65 * t64;
         let t67 = -t66;
         let t68 = X[2].cos_pi();
@@ -419,15 +428,15 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
     ) -> crate::nalgebra::SMatrix<T, 3, 3> {
         let t8 = self.fixed[0] * t;
         let t9 = t8.sin_pi();
-        let t17 = t8.cos_pi();
-        let t18 = self.fixed[1] * t17;
-        let t19 = t9 - t18;
-        let t26 = t9 + t18;
+        let t15 = t8.cos_pi();
+        let t17 = self.fixed[1] * t15;
+        let t18 = t9 - t17;
+        let t26 = t9 + t17;
         let t60 = X[0].cos_pi();
         let t61 = self.fixed[3] * t9;
         let t62 = t61 * t60;
         let t64 = X[1].cos_pi();
-        let t65 = self.fixed[5] * t19;
+        let t65 = self.fixed[5] * t18;
         let t66 = t65 * t64;
         let t67 = -t66;
         let t68 = X[2].cos_pi();
@@ -437,35 +446,35 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t73 = t62 + T::one();
         let t83 = t67 + T::one();
         let t84 = t71 + T::one();
-        let t91 = t62 * t67;
-        let t92 = t62 * t71;
-        let t93 = t67 * t71;
-        let t94 = t62 * t93;
-        let t95 = t62 + t67;
-        let t96 = t95 + t71;
-        let t97 = t96 + t91;
-        let t98 = t97 + t92;
-        let t99 = t98 + t93;
-        let t100 = t99 + t94;
+        let t91 = t67 * t71;
+        let t92 = t91 - t66;
+        let t93 = t92 - t70;
+        let t94 = t93 + T::one();
+        let t95 = t9 * t60;
+        let t96 = t95 * t94;
+        let t97 = self.fixed[3] * t96;
+        let t98 = t97 - t66;
+        let t99 = t98 - t70;
+        let t100 = t99 + t91;
         let t101 = t100.ln_1p();
-        let t105 = self.fixed[9] * t101;
-        let t108 = t62 + T::nearest(2.0);
-        let t110 = self.fixed[11] * t9;
+        let t104 = t62 + T::nearest(2.0);
+        let t108 = self.fixed[11] * t101;
+        let t110 = self.fixed[12] * t9;
         let t111 = t110 * t60;
-        let t112 = t111 * t108;
-        let t113 = t105 + t112;
+        let t112 = t111 * t104;
+        let t113 = t108 + t112;
         let t114 = T::one() / t73;
         let t115 = t113 * t114;
         let t116 = t67 + T::nearest(2.0);
         let t117 = t67 * t116;
         let t118 = self.fixed[10] * t117;
-        let t119 = t105 + t118;
+        let t119 = t108 + t118;
         let t120 = T::one() / t83;
         let t121 = t119 * t120;
         let t122 = t71 + T::nearest(2.0);
         let t123 = t71 * t122;
         let t124 = self.fixed[10] * t123;
-        let t125 = t105 + t124;
+        let t125 = t108 + t124;
         let t126 = T::one() / t84;
         let t127 = t125 * t126;
         crate::nalgebra::SMatrix::<
@@ -493,17 +502,17 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t2 = X[0].sin_pi();
         let t8 = self.fixed[0] * t;
         let t9 = t8.sin_pi();
-        let t14 = X[1].sin_pi();
-        let t17 = t8.cos_pi();
-        let t18 = self.fixed[1] * t17;
-        let t19 = t9 - t18;
+        let t13 = X[1].sin_pi();
+        let t15 = t8.cos_pi();
+        let t17 = self.fixed[1] * t15;
+        let t18 = t9 - t17;
         let t25 = X[2].sin_pi();
-        let t26 = t9 + t18;
+        let t26 = t9 + t17;
         let t60 = X[0].cos_pi();
         let t61 = self.fixed[3] * t9;
         let t62 = t61 * t60;
         let t64 = X[1].cos_pi();
-        let t65 = self.fixed[5] * t19;
+        let t65 = self.fixed[5] * t18;
         let t66 = t65 * t64;
         let t67 = -t66;
         let t68 = X[2].cos_pi();
@@ -513,76 +522,82 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t73 = t62 + T::one();
         let t83 = t67 + T::one();
         let t84 = t71 + T::one();
-        let t91 = t62 * t67;
-        let t92 = t62 * t71;
-        let t93 = t67 * t71;
-        let t94 = t62 * t93;
-        let t95 = t62 + t67;
-        let t96 = t95 + t71;
-        let t97 = t96 + t91;
-        let t98 = t97 + t92;
-        let t99 = t98 + t93;
-        let t100 = t99 + t94;
+        let t91 = t67 * t71;
+        let t92 = t91 - t66;
+        let t93 = t92 - t70;
+        let t94 = t93 + T::one();
+        let t95 = t9 * t60;
+        let t96 = t95 * t94;
+        let t97 = self.fixed[3] * t96;
+        let t98 = t97 - t66;
+        let t99 = t98 - t70;
+        let t100 = t99 + t91;
         let t101 = t100.ln_1p();
+        let t108 = self.fixed[11] * t101;
+        let t110 = self.fixed[12] * t9;
+        let t111 = t110 * t60;
         let t114 = T::one() / t73;
         let t120 = T::one() / t83;
         let t126 = T::one() / t84;
-        let t136 = self.fixed[12] * t2;
-        let t140 = t60 * t60;
-        let t145 = t2 * t140;
-        let t146 = self.fixed[13] * t145;
-        let t147 = -t146;
-        let t148 = t9 * t147;
-        let t154 = t2 * t60;
-        let t155 = self.fixed[14] * t154;
-        let t156 = -t155;
-        let t157 = t156 + t148;
-        let t158 = t9 * t157;
-        let t161 = self.fixed[15] * t2;
-        let t162 = -t161;
-        let t163 = t162 * t101;
-        let t164 = t158 + t163;
-        let t165 = t114 * t114;
-        let t166 = t164 * t165;
-        let t167 = t136 + t166;
-        let t168 = t9 * t167;
-        let t171 = self.fixed[16] * t14;
-        let t172 = -t171;
-        let t174 = t64 * t64;
-        let t179 = t14 * t174;
-        let t180 = self.fixed[17] * t179;
-        let t181 = t19 * t180;
-        let t186 = t14 * t64;
-        let t187 = self.fixed[18] * t186;
-        let t188 = -t187;
-        let t189 = t188 + t181;
-        let t190 = t19 * t189;
-        let t193 = self.fixed[19] * t14;
-        let t194 = t193 * t101;
-        let t195 = t190 + t194;
-        let t196 = t120 * t120;
-        let t197 = t195 * t196;
-        let t198 = t172 + t197;
-        let t199 = t19 * t198;
-        let t200 = self.fixed[16] * t25;
-        let t201 = -t200;
-        let t202 = t68 * t68;
-        let t203 = t25 * t202;
-        let t204 = self.fixed[17] * t203;
-        let t205 = t26 * t204;
-        let t206 = t25 * t68;
-        let t207 = self.fixed[18] * t206;
-        let t208 = -t207;
-        let t209 = t208 + t205;
-        let t210 = t26 * t209;
-        let t211 = self.fixed[19] * t25;
-        let t212 = t211 * t101;
-        let t213 = t210 + t212;
-        let t214 = t126 * t126;
-        let t215 = t213 * t214;
-        let t216 = t201 + t215;
-        let t217 = t26 * t216;
-        crate::nalgebra::SVector::<T, 3>::new(t168, t199, t217)
+        let t136 = self.fixed[13] * t9;
+        let t137 = t136 * t2;
+        let t138 = t108 + t111;
+        let t139 = self.fixed[11] * t114;
+        let t140 = t138 * t114;
+        let t141 = t139 - t140;
+        let t142 = self.fixed[10] + t141;
+        let t143 = t95 * t142;
+        let t144 = self.fixed[3] * t143;
+        let t148 = self.fixed[14] * t9;
+        let t149 = t148 * t60;
+        let t150 = t138 + t144;
+        let t151 = t150 + t149;
+        let t153 = self.fixed[15] * t9;
+        let t154 = t153 * t2;
+        let t155 = t151 * t114;
+        let t156 = t154 * t155;
+        let t157 = t137 - t156;
+        let t160 = self.fixed[16] * t18;
+        let t161 = t160 * t13;
+        let t162 = self.fixed[8] * t18;
+        let t163 = t162 * t13;
+        let t164 = self.fixed[10] * t67;
+        let t165 = t108 + t164;
+        let t166 = self.fixed[11] * t120;
+        let t167 = self.fixed[10] + t166;
+        let t168 = t101 - t66;
+        let t169 = self.fixed[11] * t168;
+        let t170 = t67 * t165;
+        let t171 = t170 * t120;
+        let t172 = t67 * t167;
+        let t173 = t169 + t164;
+        let t174 = t173 - t171;
+        let t175 = t174 + t172;
+        let t177 = t163 * t175;
+        let t178 = t177 * t120;
+        let t179 = self.fixed[17] * t178;
+        let t180 = t179 - t161;
+        let t181 = self.fixed[16] * t26;
+        let t182 = t181 * t25;
+        let t183 = self.fixed[8] * t26;
+        let t184 = t183 * t25;
+        let t185 = self.fixed[10] * t71;
+        let t186 = t108 + t185;
+        let t187 = self.fixed[11] * t126;
+        let t188 = self.fixed[10] + t187;
+        let t189 = t101 - t70;
+        let t190 = self.fixed[11] * t189;
+        let t191 = t71 * t186;
+        let t192 = t191 * t126;
+        let t193 = t71 * t188;
+        let t194 = t190 + t185;
+        let t195 = t194 - t192;
+        let t196 = t195 + t193;
+        let t197 = t184 * t196;
+        let t198 = t197 * t126;
+        let t199 = self.fixed[17] * t198;
+        let t200 = t199 - t182;
+        crate::nalgebra::SVector::<T, 3>::new(t157, t180, t200)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> crate::Fields<T, 3> {
         let t2 = X[0].sin_pi();
@@ -590,41 +605,41 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t9 = t8.sin_pi();
         let t10 = self.parameters.A * t9;
         let t11 = t10 * t2;
-        let t14 = X[1].sin_pi();
-        let t17 = t8.cos_pi();
-        let t18 = self.fixed[1] * t17;
-        let t19 = t9 - t18;
-        let t21 = self.fixed[2] * t19;
-        let t22 = t21 * t14;
+        let t13 = X[1].sin_pi();
+        let t15 = t8.cos_pi();
+        let t17 = self.fixed[1] * t15;
+        let t18 = t9 - t17;
+        let t21 = self.fixed[2] * t18;
+        let t22 = t21 * t13;
         let t23 = -t22;
         let t25 = X[2].sin_pi();
-        let t26 = t9 + t18;
+        let t26 = t9 + t17;
         let t27 = self.fixed[2] * t26;
         let t28 = t27 * t25;
         let t29 = -t28;
-        let t33 = self.fixed[4] * t17;
+        let t33 = self.fixed[4] * t15;
         let t34 = t33 * t2;
         let t35 = self.fixed[1] * t9;
-        let t36 = t17 + t35;
+        let t36 = t15 + t35;
         let t39 = self.fixed[6] * t36;
-        let t40 = t39 * t14;
+        let t40 = t39 * t13;
         let t41 = -t40;
-        let t42 = t17 - t35;
+        let t42 = t15 - t35;
         let t43 = self.fixed[6] * t42;
         let t44 = t43 * t25;
         let t45 = -t44;
         let t50 = self.fixed[7] * t9;
         let t51 = t50 * t2;
         let t52 = -t51;
-        let t56 = self.fixed[8] * t19;
-        let t57 = t56 * t14;
-        let t58 = self.fixed[8] * t26;
+        let t56 = self.fixed[9] * t18;
+        let t57 = t56 * t13;
+        let t58 = self.fixed[9] * t26;
         let t59 = t58 * t25;
         let t60 = X[0].cos_pi();
         let t61 = self.fixed[3] * t9;
         let t62 = t61 * t60;
         let t64 = X[1].cos_pi();
-        let t65 = self.fixed[5] * t19;
+        let t65 = self.fixed[5] * t18;
         let t66 = t65 * t64;
         let t67 = -t66;
         let t68 = X[2].cos_pi();
@@ -632,7 +647,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t70 = t69 * t68;
         let t71 = -t70;
         let t73 = t62 + T::one();
-        let t74 = self.fixed[3] * t19;
+        let t74 = self.fixed[3] * t18;
         let t75 = t74 * t64;
         let t77 = T::nearest(2.0) - t75;
         let t78 = T::nearest(0.5) * t77;
@@ -644,92 +659,95 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t84 = t71 + T::one();
         let t85 = t73 * t83;
         let t86 = t85 * t84;
-        let t91 = t62 * t67;
-        let t92 = t62 * t71;
-        let t93 = t67 * t71;
-        let t94 = t62 * t93;
-        let t95 = t62 + t67;
-        let t96 = t95 + t71;
-        let t97 = t96 + t91;
-        let t98 = t97 + t92;
-        let t99 = t98 + t93;
-        let t100 = t99 + t94;
+        let t91 = t67 * t71;
+        let t92 = t91 - t66;
+        let t93 = t92 - t70;
+        let t94 = t93 + T::one();
+        let t95 = t9 * t60;
+        let t96 = t95 * t94;
+        let t97 = self.fixed[3] * t96;
+        let t98 = t97 - t66;
+        let t99 = t98 - t70;
+        let t100 = t99 + t91;
         let t101 = t100.ln_1p();
-        let t105 = self.fixed[9] * t101;
-        let t108 = t62 + T::nearest(2.0);
-        let t110 = self.fixed[11] * t9;
+        let t104 = t62 + T::nearest(2.0);
+        let t108 = self.fixed[11] * t101;
+        let t110 = self.fixed[12] * t9;
         let t111 = t110 * t60;
-        let t112 = t111 * t108;
-        let t113 = t105 + t112;
+        let t112 = t111 * t104;
+        let t113 = t108 + t112;
         let t114 = T::one() / t73;
         let t115 = t113 * t114;
         let t116 = t67 + T::nearest(2.0);
         let t117 = t67 * t116;
         let t118 = self.fixed[10] * t117;
-        let t119 = t105 + t118;
+        let t119 = t108 + t118;
         let t120 = T::one() / t83;
         let t121 = t119 * t120;
         let t122 = t71 + T::nearest(2.0);
         let t123 = t71 * t122;
         let t124 = self.fixed[10] * t123;
-        let t125 = t105 + t124;
+        let t125 = t108 + t124;
         let t126 = T::one() / t84;
         let t127 = t125 * t126;
-        let t136 = self.fixed[12] * t2;
-        let t140 = t60 * t60;
-        let t145 = t2 * t140;
-        let t146 = self.fixed[13] * t145;
-        let t147 = -t146;
-        let t148 = t9 * t147;
-        let t154 = t2 * t60;
-        let t155 = self.fixed[14] * t154;
-        let t156 = -t155;
-        let t157 = t156 + t148;
-        let t158 = t9 * t157;
-        let t161 = self.fixed[15] * t2;
-        let t162 = -t161;
-        let t163 = t162 * t101;
-        let t164 = t158 + t163;
-        let t165 = t114 * t114;
-        let t166 = t164 * t165;
-        let t167 = t136 + t166;
-        let t168 = t9 * t167;
-        let t171 = self.fixed[16] * t14;
-        let t172 = -t171;
-        let t174 = t64 * t64;
-        let t179 = t14 * t174;
-        let t180 = self.fixed[17] * t179;
-        let t181 = t19 * t180;
-        let t186 = t14 * t64;
-        let t187 = self.fixed[18] * t186;
-        let t188 = -t187;
-        let t189 = t188 + t181;
-        let t190 = t19 * t189;
-        let t193 = self.fixed[19] * t14;
-        let t194 = t193 * t101;
-        let t195 = t190 + t194;
-        let t196 = t120 * t120;
-        let t197 = t195 * t196;
-        let t198 = t172 + t197;
-        let t199 = t19 * t198;
-        let t200 = self.fixed[16] * t25;
-        let t201 = -t200;
-        let t202 = t68 * t68;
-        let t203 = t25 * t202;
-        let t204 = self.fixed[17] * t203;
-        let t205 = t26 * t204;
-        let t206 = t25 * t68;
-        let t207 = self.fixed[18] * t206;
-        let t208 = -t207;
-        let t209 = t208 + t205;
-        let t210 = t26 * t209;
-        let t211 = self.fixed[19] * t25;
-        let t212 = t211 * t101;
-        let t213 = t210 + t212;
-        let t214 = t126 * t126;
-        let t215 = t213 * t214;
-        let t216 = t201 + t215;
-        let t217 = t26 * t216;
+        let t136 = self.fixed[13] * t9;
+        let t137 = t136 * t2;
+        let t138 = t108 + t111;
+        let t139 = self.fixed[11] * t114;
+        let t140 = t138 * t114;
+        let t141 = t139 - t140;
+        let t142 = self.fixed[10] + t141;
+        let t143 = t95 * t142;
+        let t144 = self.fixed[3] * t143;
+        let t148 = self.fixed[14] * t9;
+        let t149 = t148 * t60;
+        let t150 = t138 + t144;
+        let t151 = t150 + t149;
+        let t153 = self.fixed[15] * t9;
+        let t154 = t153 * t2;
+        let t155 = t151 * t114;
+        let t156 = t154 * t155;
+        let t157 = t137 - t156;
+        let t160 = self.fixed[16] * t18;
+        let t161 = t160 * t13;
+        let t162 = self.fixed[8] * t18;
+        let t163 = t162 * t13;
+        let t164 = self.fixed[10] * t67;
+        let t165 = t108 + t164;
+        let t166 = self.fixed[11] * t120;
+        let t167 = self.fixed[10] + t166;
+        let t168 = t101 - t66;
+        let t169 = self.fixed[11] * t168;
+        let t170 = t67 * t165;
+        let t171 = t170 * t120;
+        let t172 = t67 * t167;
+        let t173 = t169 + t164;
+        let t174 = t173 - t171;
+        let t175 = t174 + t172;
+        let t177 = t163 * t175;
+        let t178 = t177 * t120;
+        let t179 = self.fixed[17] * t178;
+        let t180 = t179 - t161;
+        let t181 = self.fixed[16] * t26;
+        let t182 = t181 * t25;
+        let t183 = self.fixed[8] * t26;
+        let t184 = t183 * t25;
+        let t185 = self.fixed[10] * t71;
+        let t186 = t108 + t185;
+        let t187 = self.fixed[11] * t126;
+        let t188 = self.fixed[10] + t187;
+        let t189 = t101 - t70;
+        let t190 = self.fixed[11] * t189;
+        let t191 = t71 * t186;
+        let t192 = t191 * t126;
+        let t193 = t71 * t188;
+        let t194 = t190 + t185;
+        let t195 = t194 - t192;
+        let t196 = t195 + t193;
+        let t197 = t184 * t196;
+        let t198 = t197 * t126;
+        let t199 = self.fixed[17] * t198;
+        let t200 = t199 - t182;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 3>::new(t11, t23, t29),
             v: crate::nalgebra::SVector::<T, 3>::new(t34, t41, t45),
@@ -780,7 +798,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 T::zero(),
                 t127,
             ),
-            b: crate::nalgebra::SVector::<T, 3>::new(t168, t199, t217),
+            b: crate::nalgebra::SVector::<T, 3>::new(t157, t180, t200),
         }
     }
     fn domain(&self) -> crate::Domain<T, 3> {
@@ -822,7 +840,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
     }
     fn material(&self) -> crate::Material<T> {
         crate::Material::NeoHookean {
-            lambda: self.fixed[9],
+            lambda: self.fixed[11],
             mu: self.fixed[10],
         }
     }
@@ -833,7 +851,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[20]
+        self.fixed[24]
     }
     fn body_force_at(
         &self,
@@ -848,67 +866,62 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 15> for AxisAligned3d<T> {
     fn body_force_time(&self, t: T) -> [T; 6] {
         let t8 = self.fixed[0] * t;
         let t9 = t8.sin_pi();
-        let t17 = t8.cos_pi();
-        let t18 = self.fixed[1] * t17;
-        let t19 = t9 - t18;
-        let t26 = t9 + t18;
+        let t15 = t8.cos_pi();
+        let t17 = self.fixed[1] * t15;
+        let t18 = t9 - t17;
+        let t26 = t9 + t17;
         let t61 = self.fixed[3] * t9;
-        let t65 = self.fixed[5] * t19;
+        let t65 = self.fixed[5] * t18;
         let t69 = self.fixed[5] * t26;
-        [t9, t19, t26, t61, t65, t69]
+        [t9, t18, t26, t61, t65, t69]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 15] {
         let t2 = X[0].sin_pi();
-        let t14 = X[1].sin_pi();
+        let t13 = X[1].sin_pi();
         let t25 = X[2].sin_pi();
         let t60 = X[0].cos_pi();
         let t64 = X[1].cos_pi();
         let t68 = X[2].cos_pi();
-        let t136 = self.fixed[12] * t2;
-        let t140 = t60 * t60;
-        let t145 = t2 * t140;
-        let t146 = self.fixed[13] * t145;
-        let t147 = -t146;
-        let t154 = t2 * t60;
-        let t155 = self.fixed[14] * t154;
-        let t156 = -t155;
-        let t161 = self.fixed[15] * t2;
-        let t162 = -t161;
-        let t171 = self.fixed[16] * t14;
-        let t172 = -t171;
-        let t174 = t64 * t64;
-        let t179 = t14 * t174;
-        let t180 = self.fixed[17] * t179;
-        let t186 = t14 * t64;
-        let t187 = self.fixed[18] * t186;
-        let t188 = -t187;
-        let t193 = self.fixed[19] * t14;
-        let t200 = self.fixed[16] * t25;
-        let t201 = -t200;
-        let t202 = t68 * t68;
-        let t203 = t25 * t202;
-        let t204 = self.fixed[17] * t203;
-        let t206 = t25 * t68;
-        let t207 = self.fixed[18] * t206;
-        let t208 = -t207;
-        let t211 = self.fixed[19] * t25;
+        let t201 = self.fixed[13] * t2;
+        let t206 = t60 * t60;
+        let t210 = t2 * t206;
+        let t211 = self.fixed[18] * t210;
+        let t212 = -t211;
+        let t218 = t2 * t60;
+        let t219 = self.fixed[19] * t218;
+        let t224 = self.fixed[20] * t2;
+        let t225 = -t224;
+        let t233 = self.fixed[16] * t13;
+        let t235 = t64 * t64;
+        let t240 = t13 * t235;
+        let t241 = self.fixed[21] * t240;
+        let t246 = t13 * t64;
+        let t247 = self.fixed[22] * t246;
+        let t252 = self.fixed[23] * t13;
+        let t260 = self.fixed[16] * t25;
+        let t261 = t68 * t68;
+        let t262 = t25 * t261;
+        let t263 = self.fixed[21] * t262;
+        let t264 = t25 * t68;
+        let t265 = self.fixed[22] * t264;
+        let t268 = self.fixed[23] * t25;
         [
             t60,
             t64,
             t68,
-            t136,
-            t147,
-            t156,
-            t162,
-            t172,
-            t180,
-            t188,
-            t193,
             t201,
-            t204,
-            t208,
-            t211,
+            t212,
+            t219,
+            t225,
+            t233,
+            t241,
+            t247,
+            t252,
+            t260,
+            t263,
+            t265,
+            t268,
         ]
     }
     #[inline(always)]
@@ -925,48 +938,48 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 15> for AxisAligned3d<T> {
         let t73 = t62 + T::one();
         let t83 = t67 + T::one();
         let t84 = t71 + T::one();
-        let t91 = t62 * t67;
-        let t92 = t62 * t71;
-        let t93 = t67 * t71;
-        let t94 = t62 * t93;
-        let t95 = t62 + t67;
-        let t96 = t95 + t71;
-        let t97 = t96 + t91;
-        let t98 = t97 + t92;
-        let t99 = t98 + t93;
-        let t100 = t99 + t94;
+        let t91 = t67 * t71;
+        let t92 = t91 - t66;
+        let t93 = t92 - t70;
+        let t94 = t93 + T::one();
+        let t95 = time[0] * point[0];
+        let t96 = t95 * t94;
+        let t97 = self.fixed[3] * t96;
+        let t98 = t97 - t66;
+        let t99 = t98 - t70;
+        let t100 = t99 + t91;
         let t101 = t100.ln_1p();
         let t114 = T::one() / t73;
         let t120 = T::one() / t83;
         let t126 = T::one() / t84;
-        let t148 = time[0] * point[4];
-        let t157 = point[5] + t148;
-        let t158 = time[0] * t157;
-        let t163 = point[6] * t101;
-        let t164 = t158 + t163;
-        let t165 = t114 * t114;
-        let t166 = t164 * t165;
-        let t167 = point[3] + t166;
-        let t168 = time[0] * t167;
-        let t181 = time[1] * point[8];
-        let t189 = point[9] + t181;
-        let t190 = time[1] * t189;
-        let t194 = point[10] * t101;
-        let t195 = t190 + t194;
-        let t196 = t120 * t120;
-        let t197 = t195 * t196;
-        let t198 = point[7] + t197;
-        let t199 = time[1] * t198;
-        let t205 = time[2] * point[12];
-        let t209 = point[13] + t205;
-        let t210 = time[2] * t209;
-        let t212 = point[14] * t101;
-        let t213 = t210 + t212;
-        let t214 = t126 * t126;
-        let t215 = t213 * t214;
-        let t216 = point[11] + t215;
-        let t217 = time[2] * t216;
-        crate::nalgebra::SVector::<T, 3>::new(t168, t199, t217)
+        let t220 = time[0] * point[4];
+        let t221 = t220 - point[5];
+        let t226 = time[0] * t221;
+        let t227 = point[6] * t101;
+        let t228 = t226 + t227;
+        let t229 = t114 * t114;
+        let t230 = t228 * t229;
+        let t231 = point[3] + t230;
+        let t232 = time[0] * t231;
+        let t248 = time[1] * point[8];
+        let t249 = t248 - point[9];
+        let t253 = time[1] * t249;
+        let t254 = point[10] * t101;
+        let t255 = t253 + t254;
+        let t256 = t120 * t120;
+        let t257 = t255 * t256;
+        let t258 = t257 - point[7];
+        let t259 = time[1] * t258;
+        let t266 = time[2] * point[12];
+        let t267 = t266 - point[13];
+        let t269 = time[2] * t267;
+        let t270 = point[14] * t101;
+        let t271 = t269 + t270;
+        let t272 = t126 * t126;
+        let t273 = t271 * t272;
+        let t274 = t273 - point[11];
+        let t275 = time[2] * t274;
+        crate::nalgebra::SVector::<T, 3>::new(t232, t259, t275)
     }
 }
 impl<T: crate::Real> From<AxisAligned3d<T>> for crate::AnySolution<T> {

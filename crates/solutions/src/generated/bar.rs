@@ -40,7 +40,7 @@ impl<T: crate::Real> Default for BarParameters<T> {
 pub struct Bar<T: crate::Real> {
     parameters: BarParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 15],
+    fixed: [T; 17],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Bar<T> {
@@ -142,49 +142,52 @@ impl<T: crate::Real> Bar<T> {
         let t43 = parameters.nu + T::one();
         let t44 = T::nearest(2.0) * parameters.nu;
         let t45 = T::one() - t44;
-        let t47 = parameters.E * parameters.nu;
-        let t48 = t43 * t45;
-        let t49 = t47 / t48;
-        let t52 = T::nearest(0.5) * parameters.E;
-        let t53 = t52 / t43;
-        let t61 = parameters.nu / t45;
-        let t62 = t61 + T::one();
-        let t63 = T::nearest(4.0) * t62;
+        let t48 = T::nearest(0.5) * parameters.E;
+        let t49 = t48 / t43;
+        let t51 = parameters.E * parameters.nu;
+        let t52 = t43 * t45;
+        let t53 = t51 / t52;
+        let t60 = parameters.nu / t45;
+        let t61 = t60 + T::one();
+        let t63 = T::nearest(4.0) * t61;
         let t64 = t63 / t43;
         let t65 = T::one() - t64;
         let t66 = t28 * t65;
         let t67 = t66 / t29;
-        let t71 = parameters.A * parameters.A;
-        let t72 = t71 * parameters.A;
-        let t73 = t25 * t25;
-        let t74 = t26 * t26;
-        let t76 = t49 + t53;
-        let t77 = T::nearest(16.0) * t72;
-        let t78 = t77 * t74;
-        let t79 = t78 * t76;
-        let t80 = parameters.rho0 * t73;
-        let t81 = t79 / t80;
-        let t86 = t25 * parameters.L;
-        let t87 = t26 * T::pi();
-        let t88 = T::nearest(16.0) * t71;
-        let t89 = t88 * t87;
-        let t90 = t89 * t76;
-        let t91 = parameters.rho0 * t86;
-        let t92 = t90 / t91;
-        let t98 = T::nearest(4.0) * parameters.A;
-        let t99 = t98 * parameters.E;
-        let t100 = t99 * parameters.nu;
-        let t101 = t100 * t26;
-        let t102 = t29 * t43;
-        let t103 = t102 * t45;
-        let t104 = t101 / t103;
-        let t113 = T::nearest(2.0) * parameters.L;
-        let t114 = t113 / t11;
-        let t116 = -t36;
+        let t70 = T::nearest(4.0) * parameters.A;
+        let t71 = t70 * t26;
+        let t72 = t71 / t25;
+        let t88 = T::one() / parameters.rho0;
+        let t94 = t53 + t49;
+        let t96 = parameters.A * parameters.A;
+        let t97 = t96 * parameters.A;
+        let t98 = t25 * t25;
+        let t99 = t26 * t26;
+        let t101 = T::nearest(16.0) * t97;
+        let t102 = t101 * t99;
+        let t103 = t102 * t94;
+        let t104 = parameters.rho0 * t98;
+        let t105 = t103 / t104;
+        let t109 = t25 * parameters.L;
+        let t110 = t26 * T::pi();
+        let t111 = T::nearest(16.0) * t96;
+        let t112 = t111 * t110;
+        let t113 = t112 * t94;
+        let t114 = parameters.rho0 * t109;
+        let t115 = t113 / t114;
+        let t120 = t70 * parameters.E;
+        let t121 = t120 * parameters.nu;
+        let t122 = t121 * t26;
+        let t123 = t29 * t43;
+        let t124 = t123 * t45;
+        let t125 = t122 / t124;
+        let t135 = T::nearest(2.0) * parameters.L;
+        let t136 = t135 / t11;
+        let t138 = -t36;
         if !(t36 < parameters.L) {
             return Err(Self::DESCRIPTION.requirement_broken("2*Pi*A < L", &values));
         }
-        if !(t116 < parameters.L) {
+        if !(t138 < parameters.L) {
             return Err(Self::DESCRIPTION.requirement_broken("-2*Pi*A < L", &values));
         }
         Ok(Bar {
@@ -200,11 +203,13 @@ impl<T: crate::Real> Bar<T> {
                 t49,
                 t53,
                 t67,
-                t81,
-                t92,
-                t104,
-                t114,
-                t116,
+                t72,
+                t88,
+                t105,
+                t115,
+                t125,
+                t136,
+                t138,
             ],
         })
     }
@@ -339,11 +344,11 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
         let t39 = t38 * t34;
         let t41 = t39 + T::one();
         let t46 = t39.ln_1p();
-        let t50 = self.fixed[7] * t46;
-        let t54 = t39 + T::nearest(2.0);
-        let t55 = t39 * t54;
-        let t56 = self.fixed[8] * t55;
-        let t57 = t50 + t56;
+        let t50 = t39 + T::nearest(2.0);
+        let t54 = self.fixed[8] * t46;
+        let t55 = t39 * t50;
+        let t56 = self.fixed[7] * t55;
+        let t57 = t54 + t56;
         let t58 = T::one() / t41;
         let t59 = t57 * t58;
         crate::nalgebra::SMatrix::<T, 1, 1>::new(t59)
@@ -363,28 +368,30 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
         let t39 = t38 * t34;
         let t41 = t39 + T::one();
         let t46 = t39.ln_1p();
+        let t54 = self.fixed[8] * t46;
         let t58 = T::one() / t41;
-        let t68 = self.fixed[9] * t6;
-        let t69 = -t68;
-        let t75 = t34 * t34;
-        let t82 = t6 * t75;
-        let t83 = self.fixed[10] * t82;
-        let t84 = -t83;
-        let t85 = t14 * t84;
-        let t93 = t6 * t34;
-        let t94 = self.fixed[11] * t93;
-        let t95 = -t94;
-        let t96 = t95 + t85;
-        let t97 = t14 * t96;
-        let t105 = self.fixed[12] * t6;
-        let t106 = -t105;
-        let t107 = t106 * t46;
-        let t108 = t97 + t107;
-        let t109 = t58 * t58;
-        let t110 = t108 * t109;
-        let t111 = t69 + t110;
-        let t112 = t14 * t111;
-        crate::nalgebra::SVector::<T, 1>::new(t112)
+        let t68 = self.fixed[9] * t14;
+        let t69 = t68 * t6;
+        let t73 = self.fixed[10] * t14;
+        let t74 = t73 * t6;
+        let t75 = -t74;
+        let t76 = self.fixed[7] * t39;
+        let t77 = t54 + t76;
+        let t78 = self.fixed[8] * t58;
+        let t79 = self.fixed[7] + t78;
+        let t80 = t39 + t46;
+        let t81 = self.fixed[8] * t80;
+        let t82 = t39 * t77;
+        let t83 = t82 * t58;
+        let t84 = t39 * t79;
+        let t85 = t81 + t76;
+        let t86 = t85 - t83;
+        let t87 = t86 + t84;
+        let t89 = t75 * t87;
+        let t90 = t89 * t58;
+        let t91 = self.fixed[11] * t90;
+        let t92 = t91 - t69;
+        crate::nalgebra::SVector::<T, 1>::new(t92)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 1>, t: T) -> crate::Fields<T, 1> {
         let t5 = self.fixed[0] * X[0];
@@ -405,33 +412,34 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
         let t39 = t38 * t34;
         let t41 = t39 + T::one();
         let t46 = t39.ln_1p();
-        let t50 = self.fixed[7] * t46;
-        let t54 = t39 + T::nearest(2.0);
-        let t55 = t39 * t54;
-        let t56 = self.fixed[8] * t55;
-        let t57 = t50 + t56;
+        let t50 = t39 + T::nearest(2.0);
+        let t54 = self.fixed[8] * t46;
+        let t55 = t39 * t50;
+        let t56 = self.fixed[7] * t55;
+        let t57 = t54 + t56;
         let t58 = T::one() / t41;
         let t59 = t57 * t58;
-        let t68 = self.fixed[9] * t6;
-        let t69 = -t68;
-        let t75 = t34 * t34;
-        let t82 = t6 * t75;
-        let t83 = self.fixed[10] * t82;
-        let t84 = -t83;
-        let t85 = t14 * t84;
-        let t93 = t6 * t34;
-        let t94 = self.fixed[11] * t93;
-        let t95 = -t94;
-        let t96 = t95 + t85;
-        let t97 = t14 * t96;
-        let t105 = self.fixed[12] * t6;
-        let t106 = -t105;
-        let t107 = t106 * t46;
-        let t108 = t97 + t107;
-        let t109 = t58 * t58;
-        let t110 = t108 * t109;
-        let t111 = t69 + t110;
-        let t112 = t14 * t111;
+        let t68 = self.fixed[9] * t14;
+        let t69 = t68 * t6;
+        let t73 = self.fixed[10] * t14;
+        let t74 = t73 * t6;
+        let t75 = -t74;
+        let t76 = self.fixed[7] * t39;
+        let t77 = t54 + t76;
+        let t78 = self.fixed[8] * t58;
+        let t79 = self.fixed[7] + t78;
+        let t80 = t39 + t46;
+        let t81 = self.fixed[8] * t80;
+        let t82 = t39 * t77;
+        let t83 = t82 * t58;
+        let t84 = t39 * t79;
+        let t85 = t81 + t76;
+        let t86 = t85 - t83;
+        let t87 = t86 + t84;
+        let t89 = t75 * t87;
+        let t90 = t89 * t58;
+        let t91 = self.fixed[11] * t90;
+        let t92 = t91 - t69;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 1>::new(t16),
             v: crate::nalgebra::SVector::<T, 1>::new(t24),
@@ -440,7 +448,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
             F: crate::nalgebra::SMatrix::<T, 1, 1>::new(t41),
             J: t41,
             P: crate::nalgebra::SMatrix::<T, 1, 1>::new(t59),
-            b: crate::nalgebra::SVector::<T, 1>::new(t112),
+            b: crate::nalgebra::SVector::<T, 1>::new(t92),
         }
     }
     fn domain(&self) -> crate::Domain<T, 1> {
@@ -466,8 +474,8 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
     }
     fn material(&self) -> crate::Material<T> {
         crate::Material::NeoHookean {
-            lambda: self.fixed[7],
-            mu: self.fixed[8],
+            lambda: self.fixed[8],
+            mu: self.fixed[7],
         }
     }
     fn density(&self) -> T {
@@ -477,7 +485,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
         self.fixed[1]
     }
     fn period(&self) -> T {
-        self.fixed[13]
+        self.fixed[15]
     }
     fn body_force_at(
         &self,
@@ -500,18 +508,16 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 5> for Bar<T> {
         let t5 = self.fixed[0] * X[0];
         let t6 = t5.sin_pi();
         let t34 = t5.cos_pi();
-        let t68 = self.fixed[9] * t6;
-        let t69 = -t68;
-        let t75 = t34 * t34;
-        let t82 = t6 * t75;
-        let t83 = self.fixed[10] * t82;
-        let t84 = -t83;
-        let t93 = t6 * t34;
-        let t94 = self.fixed[11] * t93;
-        let t95 = -t94;
-        let t105 = self.fixed[12] * t6;
-        let t106 = -t105;
-        [t34, t69, t84, t95, t106]
+        let t93 = self.fixed[9] * t6;
+        let t100 = t34 * t34;
+        let t106 = t6 * t100;
+        let t107 = self.fixed[12] * t106;
+        let t108 = -t107;
+        let t116 = t6 * t34;
+        let t117 = self.fixed[13] * t116;
+        let t126 = self.fixed[14] * t6;
+        let t127 = -t126;
+        [t34, t93, t108, t117, t127]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -523,16 +529,16 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 5> for Bar<T> {
         let t41 = t39 + T::one();
         let t46 = t39.ln_1p();
         let t58 = T::one() / t41;
-        let t85 = time[0] * point[2];
-        let t96 = point[3] + t85;
-        let t97 = time[0] * t96;
-        let t107 = point[4] * t46;
-        let t108 = t97 + t107;
-        let t109 = t58 * t58;
-        let t110 = t108 * t109;
-        let t111 = point[1] + t110;
-        let t112 = time[0] * t111;
-        crate::nalgebra::SVector::<T, 1>::new(t112)
+        let t118 = time[0] * point[2];
+        let t119 = t118 - point[3];
+        let t128 = time[0] * t119;
+        let t129 = point[4] * t46;
+        let t130 = t128 + t129;
+        let t131 = t58 * t58;
+        let t132 = t130 * t131;
+        let t133 = t132 - point[1];
+        let t134 = time[0] * t133;
+        crate::nalgebra::SVector::<T, 1>::new(t134)
     }
 }
 impl<T: crate::Real> From<Bar<T>> for crate::AnySolution<T> {

@@ -41,7 +41,7 @@ impl<T: crate::Real> Default for RingParameters<T> {
 pub struct Ring<T: crate::Real> {
     parameters: RingParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 19],
+    fixed: [T; 20],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Ring<T> {
@@ -132,42 +132,43 @@ impl<T: crate::Real> Ring<T> {
         let t24 = parameters.Ro - t18;
         let t26 = t15 * t19;
         let t28 = T::one() / t26;
-        let t42 = parameters.A * t11;
-        let t43 = t42 * T::pi();
-        let t49 = T::pi() * T::pi();
-        let t50 = parameters.A * parameters.E;
-        let t51 = t50 * t49;
-        let t52 = t51 / parameters.rho0;
-        let t60 = T::nearest(6.0) / t26;
+        let t43 = parameters.A * t11;
+        let t44 = t43 * T::pi();
+        let t50 = T::pi() * T::pi();
+        let t51 = parameters.A * parameters.E;
+        let t52 = t51 * t50;
+        let t53 = t52 / parameters.rho0;
+        let t61 = T::nearest(6.0) / t26;
         let t88 = T::nearest(6.0) * parameters.A;
         let t89 = t88 / t26;
         let t97 = T::nearest(0.5) * parameters.E;
-        let t120 = parameters.Ri + parameters.Ro;
-        let t130 = t50 / parameters.rho0;
-        let t135 = parameters.A * parameters.A;
-        let t136 = t135 * t135;
-        let t137 = t15 * t15;
-        let t138 = t19 * t19;
-        let t144 = T::nearest(36.0) * t136;
-        let t145 = t144 * t97;
-        let t146 = parameters.rho0 * t137;
-        let t147 = t146 * t138;
-        let t148 = t145 / t147;
-        let t157 = t135 * parameters.A;
-        let t165 = T::nearest(2.0) * parameters.Ri;
-        let t166 = T::nearest(2.0) * parameters.Ro;
-        let t167 = t165 + t166;
-        let t173 = T::nearest(3.0) / t26;
-        let t176 = T::nearest(12.0) * t157;
-        let t177 = t176 * t97;
-        let t178 = parameters.rho0 * t15;
-        let t179 = t178 * t19;
-        let t180 = t177 / t179;
-        let t186 = t137 * t138;
-        let t187 = T::nearest(36.0) / t186;
-        let t191 = t135 * t97;
-        let t192 = t191 / parameters.rho0;
-        let t204 = T::nearest(2.0) / t11;
+        let t121 = parameters.Ri + parameters.Ro;
+        let t130 = t51 / parameters.rho0;
+        let t145 = t97 / parameters.rho0;
+        let t158 = parameters.A * parameters.A;
+        let t159 = t158 * t158;
+        let t160 = t15 * t15;
+        let t161 = t19 * t19;
+        let t163 = T::nearest(36.0) * t159;
+        let t164 = t163 * t97;
+        let t165 = parameters.rho0 * t160;
+        let t166 = t165 * t161;
+        let t167 = t164 / t166;
+        let t176 = T::nearest(2.0) * parameters.Ri;
+        let t177 = T::nearest(2.0) * parameters.Ro;
+        let t178 = t176 + t177;
+        let t189 = T::nearest(3.0) / t26;
+        let t193 = t158 * parameters.A;
+        let t194 = T::nearest(12.0) * t193;
+        let t195 = t194 * t97;
+        let t196 = parameters.rho0 * t15;
+        let t197 = t196 * t19;
+        let t198 = t195 / t197;
+        let t203 = t160 * t161;
+        let t204 = T::nearest(36.0) / t203;
+        let t208 = t158 * t97;
+        let t209 = t208 / parameters.rho0;
+        let t222 = T::nearest(2.0) / t11;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -181,21 +182,22 @@ impl<T: crate::Real> Ring<T> {
                 t18,
                 t24,
                 t28,
-                t43,
-                t49,
-                t52,
-                t60,
+                t44,
+                t50,
+                t53,
+                t61,
                 t89,
                 t97,
-                t120,
+                t121,
                 t130,
-                t148,
+                t145,
                 t167,
-                t173,
-                t180,
-                t187,
-                t192,
+                t178,
+                t189,
+                t198,
                 t204,
+                t209,
+                t222,
             ],
         })
     }
@@ -238,9 +240,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -253,13 +255,14 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
         let t33 = t31 * X[0];
-        let t34 = T::one() / t5;
-        let t35 = t33 * t34;
-        let t36 = t32 * t35;
-        let t37 = t31 * X[1];
-        let t38 = t37 * t34;
-        let t39 = t32 * t38;
-        crate::nalgebra::SVector::<T, 2>::new(t36, t39)
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t36 = t33 * t35;
+        let t37 = t32 * t36;
+        let t38 = t31 * X[1];
+        let t39 = t38 * t35;
+        let t40 = t32 * t39;
+        crate::nalgebra::SVector::<T, 2>::new(t37, t40)
     }
     #[inline]
     fn velocity(
@@ -267,9 +270,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t20 = t5 - self.parameters.Ro;
@@ -280,17 +283,18 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t33 = t31 * X[0];
-        let t34 = T::one() / t5;
-        let t35 = t33 * t34;
-        let t37 = t31 * X[1];
-        let t38 = t37 * t34;
-        let t41 = t12.sin_pi();
-        let t44 = self.fixed[4] * t41;
-        let t45 = t44 * t35;
-        let t46 = -t45;
-        let t47 = t44 * t38;
-        let t48 = -t47;
-        crate::nalgebra::SVector::<T, 2>::new(t46, t48)
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t36 = t33 * t35;
+        let t38 = t31 * X[1];
+        let t39 = t38 * t35;
+        let t42 = t12.sin_pi();
+        let t45 = self.fixed[4] * t42;
+        let t46 = t45 * t36;
+        let t47 = -t46;
+        let t48 = t45 * t39;
+        let t49 = -t48;
+        crate::nalgebra::SVector::<T, 2>::new(t47, t49)
     }
     #[inline]
     fn acceleration(
@@ -298,9 +302,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -312,16 +316,17 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t33 = t31 * X[0];
-        let t34 = T::one() / t5;
-        let t35 = t33 * t34;
-        let t37 = t31 * X[1];
-        let t38 = t37 * t34;
-        let t53 = self.fixed[6] * t13;
-        let t54 = t53 * t35;
-        let t55 = -t54;
-        let t56 = t53 * t38;
-        let t57 = -t56;
-        crate::nalgebra::SVector::<T, 2>::new(t55, t57)
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t36 = t33 * t35;
+        let t38 = t31 * X[1];
+        let t39 = t38 * t35;
+        let t54 = self.fixed[6] * t13;
+        let t55 = t54 * t36;
+        let t56 = -t55;
+        let t57 = t54 * t39;
+        let t58 = -t57;
+        crate::nalgebra::SVector::<T, 2>::new(t56, t58)
     }
     #[inline]
     fn displacement_gradient(
@@ -329,9 +334,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -343,32 +348,32 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t34 = T::one() / t5;
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
         let t59 = t5 - self.parameters.Ri;
-        let t61 = t20 * t1;
-        let t62 = t61 * t59;
-        let t63 = self.fixed[7] * t62;
-        let t64 = t31 * t3;
-        let t65 = t64 * t34;
-        let t66 = t63 + t65;
-        let t67 = t34 * t34;
-        let t68 = t66 * t67;
+        let t62 = t20 * t2;
+        let t63 = t62 * t59;
+        let t64 = self.fixed[7] * t63;
+        let t65 = t31 * t3;
+        let t66 = t65 * t35;
+        let t67 = t64 + t66;
+        let t68 = t67 * t34;
         let t69 = t32 * t68;
         let t70 = t20 * t59;
         let t71 = self.fixed[7] * t70;
-        let t72 = t31 * t34;
+        let t72 = t31 * t35;
         let t73 = t71 - t72;
         let t74 = X[0] * X[1];
         let t75 = t74 * t73;
-        let t76 = t75 * t67;
+        let t76 = t75 * t34;
         let t77 = t32 * t76;
         let t78 = t20 * t3;
         let t79 = t78 * t59;
         let t80 = self.fixed[7] * t79;
-        let t81 = t31 * t1;
-        let t82 = t81 * t34;
+        let t81 = t31 * t2;
+        let t82 = t81 * t35;
         let t83 = t80 + t82;
-        let t84 = t83 * t67;
+        let t84 = t83 * t34;
         let t85 = t32 * t84;
         crate::nalgebra::SMatrix::<T, 2, 2>::new(t69, t77, t77, t85)
     }
@@ -378,9 +383,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -392,32 +397,32 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t34 = T::one() / t5;
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
         let t59 = t5 - self.parameters.Ri;
-        let t61 = t20 * t1;
-        let t62 = t61 * t59;
-        let t63 = self.fixed[7] * t62;
-        let t64 = t31 * t3;
-        let t65 = t64 * t34;
-        let t66 = t63 + t65;
-        let t67 = t34 * t34;
-        let t68 = t66 * t67;
+        let t62 = t20 * t2;
+        let t63 = t62 * t59;
+        let t64 = self.fixed[7] * t63;
+        let t65 = t31 * t3;
+        let t66 = t65 * t35;
+        let t67 = t64 + t66;
+        let t68 = t67 * t34;
         let t69 = t32 * t68;
         let t70 = t20 * t59;
         let t71 = self.fixed[7] * t70;
-        let t72 = t31 * t34;
+        let t72 = t31 * t35;
         let t73 = t71 - t72;
         let t74 = X[0] * X[1];
         let t75 = t74 * t73;
-        let t76 = t75 * t67;
+        let t76 = t75 * t34;
         let t77 = t32 * t76;
         let t78 = t20 * t3;
         let t79 = t78 * t59;
         let t80 = self.fixed[7] * t79;
-        let t81 = t31 * t1;
-        let t82 = t81 * t34;
+        let t81 = t31 * t2;
+        let t82 = t81 * t35;
         let t83 = t80 + t82;
-        let t84 = t83 * t67;
+        let t84 = t83 * t34;
         let t85 = t32 * t84;
         let t86 = t69 + T::one();
         let t87 = t85 + T::one();
@@ -425,9 +430,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
     }
     #[inline]
     fn jacobian(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> T {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -439,10 +444,11 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t34 = T::one() / t5;
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
         let t59 = t5 - self.parameters.Ri;
         let t70 = t20 * t59;
-        let t72 = t31 * t34;
+        let t72 = t31 * t35;
         let t90 = self.fixed[8] * t13;
         let t91 = t90 * t70;
         let t92 = t91 + T::one();
@@ -457,9 +463,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -471,43 +477,45 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t34 = T::one() / t5;
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
         let t59 = t5 - self.parameters.Ri;
-        let t64 = t31 * t3;
-        let t65 = t64 * t34;
-        let t67 = t34 * t34;
+        let t65 = t31 * t3;
+        let t66 = t65 * t35;
         let t70 = t20 * t59;
-        let t72 = t31 * t34;
+        let t72 = t31 * t35;
         let t74 = X[0] * X[1];
-        let t81 = t31 * t1;
-        let t82 = t81 * t34;
+        let t81 = t31 * t2;
+        let t82 = t81 * t35;
         let t90 = self.fixed[8] * t13;
         let t91 = t90 * t70;
         let t92 = t91 + T::one();
         let t93 = t32 * t72;
         let t94 = t93 + T::one();
         let t98 = t91 + T::nearest(2.0);
-        let t99 = t91 * t98;
-        let t100 = t99 / t92;
-        let t101 = t1 * t100;
-        let t102 = t93 + T::nearest(2.0);
-        let t103 = t32 * t65;
-        let t104 = t102 / t94;
-        let t105 = t103 * t104;
-        let t106 = t101 + t105;
-        let t107 = self.fixed[9] * t67;
-        let t108 = t107 * t106;
-        let t109 = t93 * t104;
-        let t110 = t100 - t109;
-        let t111 = t74 * t67;
-        let t112 = self.fixed[9] * t111;
-        let t113 = t112 * t110;
-        let t114 = t3 * t100;
-        let t115 = t32 * t82;
-        let t116 = t115 * t104;
-        let t117 = t114 + t116;
-        let t118 = t107 * t117;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t108, t113, t113, t118)
+        let t99 = t93 + T::nearest(2.0);
+        let t100 = t91 * t98;
+        let t101 = T::one() / t92;
+        let t102 = t100 * t101;
+        let t103 = t2 * t102;
+        let t104 = t32 * t66;
+        let t105 = T::one() / t94;
+        let t106 = t99 * t105;
+        let t107 = t104 * t106;
+        let t108 = t103 + t107;
+        let t109 = self.fixed[9] * t34;
+        let t110 = t109 * t108;
+        let t111 = t93 * t106;
+        let t112 = t102 - t111;
+        let t113 = t74 * t34;
+        let t114 = self.fixed[9] * t113;
+        let t115 = t114 * t112;
+        let t116 = t3 * t102;
+        let t117 = t32 * t82;
+        let t118 = t117 * t106;
+        let t119 = t116 + t118;
+        let t120 = t109 * t119;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t110, t115, t115, t120)
     }
     #[inline]
     fn body_force(
@@ -515,9 +523,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -529,79 +537,51 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t34 = T::one() / t5;
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
         let t59 = t5 - self.parameters.Ri;
-        let t67 = t34 * t34;
         let t70 = t20 * t59;
-        let t72 = t31 * t34;
+        let t72 = t31 * t35;
         let t90 = self.fixed[8] * t13;
         let t91 = t90 * t70;
         let t92 = t91 + T::one();
         let t93 = t32 * t72;
         let t94 = t93 + T::one();
-        let t119 = X[0] * t34;
-        let t121 = t23 - self.fixed[10];
-        let t122 = self.fixed[7] * t121;
-        let t123 = t31 * t67;
-        let t124 = t70 * t34;
+        let t101 = T::one() / t92;
+        let t105 = T::one() / t94;
+        let t122 = t23 - self.fixed[10];
+        let t123 = t70 * t35;
+        let t124 = t123 + t122;
         let t125 = self.fixed[7] * t124;
-        let t126 = self.fixed[5] * t31;
-        let t127 = t122 - t123;
-        let t128 = t127 + t125;
-        let t129 = t128 + t126;
-        let t131 = self.fixed[11] * t129;
-        let t132 = -t131;
-        let t133 = t92 * t92;
-        let t139 = t59 * t59;
-        let t140 = t23 + t124;
-        let t141 = t140 - self.fixed[10];
-        let t142 = self.fixed[7] * t141;
-        let t143 = t123 - t142;
-        let t149 = t21 * t31;
-        let t150 = t149 * t139;
-        let t151 = t150 * t143;
-        let t152 = t151 * t34;
-        let t153 = self.fixed[12] * t152;
-        let t154 = -t153;
-        let t155 = t13 * t154;
-        let t158 = t31 * t31;
-        let t159 = t67 * t34;
-        let t160 = t158 * t159;
-        let t161 = t70 * t141;
-        let t162 = self.fixed[7] * t161;
-        let t164 = T::nearest(4.0) * t5;
-        let t168 = t164 + t124;
-        let t169 = t168 - self.fixed[13];
-        let t170 = t31 * t169;
-        let t171 = t170 * t34;
-        let t172 = t162 + t171;
-        let t174 = self.fixed[14] * t172;
-        let t175 = t160 - t174;
-        let t181 = t70 * t175;
-        let t182 = self.fixed[15] * t181;
-        let t183 = -t182;
-        let t184 = t183 + t155;
-        let t185 = t13 * t184;
-        let t188 = t70 * t169;
-        let t189 = self.fixed[16] * t188;
-        let t190 = t160 - t189;
-        let t193 = self.fixed[17] * t190;
-        let t194 = -t193;
-        let t195 = t194 + t185;
-        let t196 = t133 * t94;
-        let t197 = t195 / t196;
-        let t198 = t13 * t197;
-        let t199 = t132 + t198;
-        let t200 = t13 * t199;
-        let t201 = t119 * t200;
-        let t202 = X[1] * t34;
-        let t203 = t202 * t200;
-        crate::nalgebra::SVector::<T, 2>::new(t201, t203)
+        let t126 = t31 * t34;
+        let t127 = self.fixed[5] * t31;
+        let t128 = t125 - t126;
+        let t129 = t128 + t127;
+        let t131 = self.fixed[11] * t13;
+        let t132 = t131 * t129;
+        let t133 = t90 * t122;
+        let t134 = t91 * t101;
+        let t135 = T::nearest(2.0) - t134;
+        let t136 = t133 * t135;
+        let t137 = t136 * t134;
+        let t138 = t91 * t134;
+        let t139 = t35 * t138;
+        let t140 = t93 * t93;
+        let t141 = t140 * t105;
+        let t142 = t35 * t141;
+        let t143 = t137 + t139;
+        let t144 = t143 - t142;
+        let t146 = self.fixed[12] * t144;
+        let t147 = t146 - t132;
+        let t148 = t35 * t147;
+        let t149 = X[0] * t148;
+        let t150 = X[1] * t148;
+        crate::nalgebra::SVector::<T, 2>::new(t149, t150)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -614,48 +594,48 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
         let t33 = t31 * X[0];
-        let t34 = T::one() / t5;
-        let t35 = t33 * t34;
-        let t36 = t32 * t35;
-        let t37 = t31 * X[1];
-        let t38 = t37 * t34;
-        let t39 = t32 * t38;
-        let t41 = t12.sin_pi();
-        let t44 = self.fixed[4] * t41;
-        let t45 = t44 * t35;
-        let t46 = -t45;
-        let t47 = t44 * t38;
-        let t48 = -t47;
-        let t53 = self.fixed[6] * t13;
-        let t54 = t53 * t35;
-        let t55 = -t54;
-        let t56 = t53 * t38;
-        let t57 = -t56;
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t36 = t33 * t35;
+        let t37 = t32 * t36;
+        let t38 = t31 * X[1];
+        let t39 = t38 * t35;
+        let t40 = t32 * t39;
+        let t42 = t12.sin_pi();
+        let t45 = self.fixed[4] * t42;
+        let t46 = t45 * t36;
+        let t47 = -t46;
+        let t48 = t45 * t39;
+        let t49 = -t48;
+        let t54 = self.fixed[6] * t13;
+        let t55 = t54 * t36;
+        let t56 = -t55;
+        let t57 = t54 * t39;
+        let t58 = -t57;
         let t59 = t5 - self.parameters.Ri;
-        let t61 = t20 * t1;
-        let t62 = t61 * t59;
-        let t63 = self.fixed[7] * t62;
-        let t64 = t31 * t3;
-        let t65 = t64 * t34;
-        let t66 = t63 + t65;
-        let t67 = t34 * t34;
-        let t68 = t66 * t67;
+        let t62 = t20 * t2;
+        let t63 = t62 * t59;
+        let t64 = self.fixed[7] * t63;
+        let t65 = t31 * t3;
+        let t66 = t65 * t35;
+        let t67 = t64 + t66;
+        let t68 = t67 * t34;
         let t69 = t32 * t68;
         let t70 = t20 * t59;
         let t71 = self.fixed[7] * t70;
-        let t72 = t31 * t34;
+        let t72 = t31 * t35;
         let t73 = t71 - t72;
         let t74 = X[0] * X[1];
         let t75 = t74 * t73;
-        let t76 = t75 * t67;
+        let t76 = t75 * t34;
         let t77 = t32 * t76;
         let t78 = t20 * t3;
         let t79 = t78 * t59;
         let t80 = self.fixed[7] * t79;
-        let t81 = t31 * t1;
-        let t82 = t81 * t34;
+        let t81 = t31 * t2;
+        let t82 = t81 * t35;
         let t83 = t80 + t82;
-        let t84 = t83 * t67;
+        let t84 = t83 * t34;
         let t85 = t32 * t84;
         let t86 = t69 + T::one();
         let t87 = t85 + T::one();
@@ -666,92 +646,64 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t94 = t93 + T::one();
         let t95 = t92 * t94;
         let t98 = t91 + T::nearest(2.0);
-        let t99 = t91 * t98;
-        let t100 = t99 / t92;
-        let t101 = t1 * t100;
-        let t102 = t93 + T::nearest(2.0);
-        let t103 = t32 * t65;
-        let t104 = t102 / t94;
-        let t105 = t103 * t104;
-        let t106 = t101 + t105;
-        let t107 = self.fixed[9] * t67;
-        let t108 = t107 * t106;
-        let t109 = t93 * t104;
-        let t110 = t100 - t109;
-        let t111 = t74 * t67;
-        let t112 = self.fixed[9] * t111;
-        let t113 = t112 * t110;
-        let t114 = t3 * t100;
-        let t115 = t32 * t82;
-        let t116 = t115 * t104;
-        let t117 = t114 + t116;
-        let t118 = t107 * t117;
-        let t119 = X[0] * t34;
-        let t121 = t23 - self.fixed[10];
-        let t122 = self.fixed[7] * t121;
-        let t123 = t31 * t67;
-        let t124 = t70 * t34;
+        let t99 = t93 + T::nearest(2.0);
+        let t100 = t91 * t98;
+        let t101 = T::one() / t92;
+        let t102 = t100 * t101;
+        let t103 = t2 * t102;
+        let t104 = t32 * t66;
+        let t105 = T::one() / t94;
+        let t106 = t99 * t105;
+        let t107 = t104 * t106;
+        let t108 = t103 + t107;
+        let t109 = self.fixed[9] * t34;
+        let t110 = t109 * t108;
+        let t111 = t93 * t106;
+        let t112 = t102 - t111;
+        let t113 = t74 * t34;
+        let t114 = self.fixed[9] * t113;
+        let t115 = t114 * t112;
+        let t116 = t3 * t102;
+        let t117 = t32 * t82;
+        let t118 = t117 * t106;
+        let t119 = t116 + t118;
+        let t120 = t109 * t119;
+        let t122 = t23 - self.fixed[10];
+        let t123 = t70 * t35;
+        let t124 = t123 + t122;
         let t125 = self.fixed[7] * t124;
-        let t126 = self.fixed[5] * t31;
-        let t127 = t122 - t123;
-        let t128 = t127 + t125;
-        let t129 = t128 + t126;
-        let t131 = self.fixed[11] * t129;
-        let t132 = -t131;
-        let t133 = t92 * t92;
-        let t139 = t59 * t59;
-        let t140 = t23 + t124;
-        let t141 = t140 - self.fixed[10];
-        let t142 = self.fixed[7] * t141;
-        let t143 = t123 - t142;
-        let t149 = t21 * t31;
-        let t150 = t149 * t139;
-        let t151 = t150 * t143;
-        let t152 = t151 * t34;
-        let t153 = self.fixed[12] * t152;
-        let t154 = -t153;
-        let t155 = t13 * t154;
-        let t158 = t31 * t31;
-        let t159 = t67 * t34;
-        let t160 = t158 * t159;
-        let t161 = t70 * t141;
-        let t162 = self.fixed[7] * t161;
-        let t164 = T::nearest(4.0) * t5;
-        let t168 = t164 + t124;
-        let t169 = t168 - self.fixed[13];
-        let t170 = t31 * t169;
-        let t171 = t170 * t34;
-        let t172 = t162 + t171;
-        let t174 = self.fixed[14] * t172;
-        let t175 = t160 - t174;
-        let t181 = t70 * t175;
-        let t182 = self.fixed[15] * t181;
-        let t183 = -t182;
-        let t184 = t183 + t155;
-        let t185 = t13 * t184;
-        let t188 = t70 * t169;
-        let t189 = self.fixed[16] * t188;
-        let t190 = t160 - t189;
-        let t193 = self.fixed[17] * t190;
-        let t194 = -t193;
-        let t195 = t194 + t185;
-        let t196 = t133 * t94;
-        let t197 = t195 / t196;
-        let t198 = t13 * t197;
-        let t199 = t132 + t198;
-        let t200 = t13 * t199;
-        let t201 = t119 * t200;
-        let t202 = X[1] * t34;
-        let t203 = t202 * t200;
+        let t126 = t31 * t34;
+        let t127 = self.fixed[5] * t31;
+        let t128 = t125 - t126;
+        let t129 = t128 + t127;
+        let t131 = self.fixed[11] * t13;
+        let t132 = t131 * t129;
+        let t133 = t90 * t122;
+        let t134 = t91 * t101;
+        let t135 = T::nearest(2.0) - t134;
+        let t136 = t133 * t135;
+        let t137 = t136 * t134;
+        let t138 = t91 * t134;
+        let t139 = t35 * t138;
+        let t140 = t93 * t93;
+        let t141 = t140 * t105;
+        let t142 = t35 * t141;
+        let t143 = t137 + t139;
+        let t144 = t143 - t142;
+        let t146 = self.fixed[12] * t144;
+        let t147 = t146 - t132;
+        let t148 = t35 * t147;
+        let t149 = X[0] * t148;
+        let t150 = X[1] * t148;
         crate::Fields {
-            u: crate::nalgebra::SVector::<T, 2>::new(t36, t39),
-            v: crate::nalgebra::SVector::<T, 2>::new(t46, t48),
-            a: crate::nalgebra::SVector::<T, 2>::new(t55, t57),
+            u: crate::nalgebra::SVector::<T, 2>::new(t37, t40),
+            v: crate::nalgebra::SVector::<T, 2>::new(t47, t49),
+            a: crate::nalgebra::SVector::<T, 2>::new(t56, t58),
             H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t69, t77, t77, t85),
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t86, t77, t77, t87),
             J: t95,
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t108, t113, t113, t118),
-            b: crate::nalgebra::SVector::<T, 2>::new(t201, t203),
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t110, t115, t115, t120),
+            b: crate::nalgebra::SVector::<T, 2>::new(t149, t150),
         }
     }
     fn domain(&self) -> crate::Domain<T, 2> {
@@ -796,7 +748,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[18]
+        self.fixed[19]
     }
     fn body_force_at(
         &self,
@@ -817,9 +769,9 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 8> for Ring<T> {
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 8] {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t20 = t5 - self.parameters.Ro;
         let t21 = t20 * t20;
@@ -828,57 +780,53 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 8> for Ring<T> {
         let t29 = t21 * t25;
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
-        let t34 = T::one() / t5;
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
         let t59 = t5 - self.parameters.Ri;
-        let t67 = t34 * t34;
         let t70 = t20 * t59;
-        let t72 = t31 * t34;
-        let t119 = X[0] * t34;
-        let t121 = t23 - self.fixed[10];
-        let t122 = self.fixed[7] * t121;
-        let t123 = t31 * t67;
-        let t124 = t70 * t34;
+        let t72 = t31 * t35;
+        let t122 = t23 - self.fixed[10];
+        let t123 = t70 * t35;
+        let t124 = t123 + t122;
         let t125 = self.fixed[7] * t124;
-        let t126 = self.fixed[5] * t31;
-        let t127 = t122 - t123;
-        let t128 = t127 + t125;
-        let t129 = t128 + t126;
-        let t131 = self.fixed[11] * t129;
-        let t132 = -t131;
-        let t139 = t59 * t59;
-        let t140 = t23 + t124;
-        let t141 = t140 - self.fixed[10];
-        let t142 = self.fixed[7] * t141;
-        let t143 = t123 - t142;
-        let t149 = t21 * t31;
-        let t150 = t149 * t139;
-        let t151 = t150 * t143;
-        let t152 = t151 * t34;
-        let t153 = self.fixed[12] * t152;
-        let t154 = -t153;
-        let t158 = t31 * t31;
-        let t159 = t67 * t34;
-        let t160 = t158 * t159;
-        let t161 = t70 * t141;
-        let t162 = self.fixed[7] * t161;
-        let t164 = T::nearest(4.0) * t5;
-        let t168 = t164 + t124;
-        let t169 = t168 - self.fixed[13];
-        let t170 = t31 * t169;
-        let t171 = t170 * t34;
-        let t172 = t162 + t171;
-        let t174 = self.fixed[14] * t172;
-        let t175 = t160 - t174;
-        let t181 = t70 * t175;
-        let t182 = self.fixed[15] * t181;
-        let t183 = -t182;
-        let t188 = t70 * t169;
-        let t189 = self.fixed[16] * t188;
-        let t190 = t160 - t189;
-        let t193 = self.fixed[17] * t190;
-        let t194 = -t193;
-        let t202 = X[1] * t34;
-        [t70, t72, t119, t132, t154, t183, t194, t202]
+        let t126 = t31 * t34;
+        let t127 = self.fixed[5] * t31;
+        let t128 = t125 - t126;
+        let t129 = t128 + t127;
+        let t151 = X[0] * t35;
+        let t152 = self.fixed[11] * t129;
+        let t153 = t23 + t123;
+        let t154 = t153 - self.fixed[10];
+        let t155 = self.fixed[7] * t154;
+        let t156 = t126 - t155;
+        let t162 = t59 * t59;
+        let t168 = t21 * t31;
+        let t169 = t168 * t162;
+        let t170 = t169 * t156;
+        let t171 = t170 * t35;
+        let t172 = self.fixed[13] * t171;
+        let t173 = -t172;
+        let t175 = T::nearest(4.0) * t5;
+        let t179 = t175 + t123;
+        let t180 = t179 - self.fixed[14];
+        let t181 = t70 * t154;
+        let t182 = self.fixed[7] * t181;
+        let t183 = t31 * t180;
+        let t184 = t183 * t35;
+        let t185 = t182 + t184;
+        let t186 = t31 * t31;
+        let t187 = t34 * t35;
+        let t188 = t186 * t187;
+        let t190 = self.fixed[15] * t185;
+        let t191 = t188 - t190;
+        let t199 = t70 * t191;
+        let t200 = self.fixed[16] * t199;
+        let t205 = t70 * t180;
+        let t206 = self.fixed[17] * t205;
+        let t207 = t188 - t206;
+        let t210 = self.fixed[18] * t207;
+        let t220 = X[1] * t35;
+        [t70, t72, t151, t152, t173, t200, t210, t220]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -890,19 +838,19 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 8> for Ring<T> {
         let t92 = t91 + T::one();
         let t93 = time[1] * point[1];
         let t94 = t93 + T::one();
-        let t133 = t92 * t92;
-        let t155 = time[0] * point[4];
-        let t184 = point[5] + t155;
-        let t185 = time[0] * t184;
-        let t195 = point[6] + t185;
-        let t196 = t133 * t94;
-        let t197 = t195 / t196;
-        let t198 = time[0] * t197;
-        let t199 = point[3] + t198;
-        let t200 = time[0] * t199;
-        let t201 = point[2] * t200;
-        let t203 = point[7] * t200;
-        crate::nalgebra::SVector::<T, 2>::new(t201, t203)
+        let t201 = time[0] * point[4];
+        let t202 = t201 - point[5];
+        let t211 = time[0] * t202;
+        let t212 = t211 - point[6];
+        let t213 = t92 * t92;
+        let t214 = t213 * t94;
+        let t215 = t212 / t214;
+        let t216 = time[0] * t215;
+        let t217 = t216 - point[3];
+        let t218 = time[0] * t217;
+        let t219 = point[2] * t218;
+        let t221 = point[7] * t218;
+        crate::nalgebra::SVector::<T, 2>::new(t219, t221)
     }
 }
 impl<T: crate::Real> From<Ring<T>> for crate::AnySolution<T> {

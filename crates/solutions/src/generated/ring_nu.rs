@@ -44,7 +44,7 @@ impl<T: crate::Real> Default for RingNuParameters<T> {
 pub struct RingNu<T: crate::Real> {
     parameters: RingNuParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 26],
+    fixed: [T; 28],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> RingNu<T> {
@@ -147,60 +147,61 @@ impl<T: crate::Real> RingNu<T> {
         let t24 = parameters.Ro - t18;
         let t26 = t15 * t19;
         let t28 = T::one() / t26;
-        let t42 = parameters.A * t11;
-        let t43 = t42 * T::pi();
-        let t49 = T::pi() * T::pi();
-        let t50 = parameters.A * parameters.E;
-        let t51 = t50 * t49;
-        let t52 = t51 / parameters.rho0;
-        let t60 = T::nearest(6.0) / t26;
+        let t43 = parameters.A * t11;
+        let t44 = t43 * T::pi();
+        let t50 = T::pi() * T::pi();
+        let t51 = parameters.A * parameters.E;
+        let t52 = t51 * t50;
+        let t53 = t52 / parameters.rho0;
+        let t61 = T::nearest(6.0) / t26;
         let t88 = T::nearest(6.0) * parameters.A;
         let t89 = t88 / t26;
         let t97 = parameters.nu + T::one();
         let t98 = T::nearest(2.0) * parameters.nu;
         let t99 = T::one() - t98;
-        let t104 = parameters.E * parameters.nu;
-        let t105 = t97 * t99;
-        let t106 = t104 / t105;
-        let t109 = T::nearest(0.5) * parameters.E;
-        let t110 = t109 / t97;
-        let t118 = parameters.A * t110;
+        let t106 = T::nearest(0.5) * parameters.E;
+        let t107 = t106 / t97;
+        let t109 = parameters.E * parameters.nu;
+        let t110 = t97 * t99;
+        let t111 = t109 / t110;
+        let t117 = parameters.A * t107;
         let t136 = parameters.Ri + parameters.Ro;
-        let t144 = parameters.nu / t99;
-        let t149 = T::one() / t97;
-        let t152 = t50 / parameters.rho0;
-        let t157 = parameters.A * parameters.A;
-        let t158 = t157 * t157;
-        let t159 = t15 * t15;
-        let t160 = t19 * t19;
-        let t169 = T::nearest(36.0) * t158;
-        let t170 = parameters.rho0 * t159;
-        let t171 = t170 * t160;
-        let t172 = t169 / t171;
-        let t179 = t157 * parameters.A;
-        let t181 = T::nearest(2.0) * t110;
-        let t202 = t159 * t160;
-        let t203 = T::nearest(36.0) / t202;
-        let t215 = T::nearest(6.0) * t179;
-        let t216 = parameters.rho0 * t15;
-        let t217 = t216 * t19;
-        let t218 = t215 / t217;
-        let t230 = T::nearest(6.0) * t157;
-        let t231 = t230 * parameters.E;
-        let t232 = t231 * parameters.nu;
-        let t233 = t217 * t97;
-        let t234 = t233 * t99;
-        let t235 = t232 / t234;
-        let t241 = T::nearest(12.0) * t110;
-        let t242 = t241 / t26;
-        let t244 = T::nearest(6.0) * t110;
-        let t245 = t244 / t26;
-        let t254 = t157 / parameters.rho0;
-        let t260 = t50 * parameters.nu;
-        let t261 = parameters.rho0 * t97;
-        let t262 = t261 * t99;
-        let t263 = t260 / t262;
-        let t275 = T::nearest(2.0) / t11;
+        let t142 = parameters.nu / t99;
+        let t151 = T::one() / t97;
+        let t154 = t51 / parameters.rho0;
+        let t197 = T::one() / parameters.rho0;
+        let t221 = parameters.A * parameters.A;
+        let t222 = t221 * t221;
+        let t223 = t15 * t15;
+        let t224 = t19 * t19;
+        let t226 = T::nearest(36.0) * t222;
+        let t227 = parameters.rho0 * t223;
+        let t228 = t227 * t224;
+        let t229 = t226 / t228;
+        let t249 = t223 * t224;
+        let t250 = T::nearest(36.0) / t249;
+        let t260 = T::nearest(2.0) * t107;
+        let t268 = t221 * parameters.A;
+        let t269 = T::nearest(6.0) * t268;
+        let t270 = parameters.rho0 * t15;
+        let t271 = t270 * t19;
+        let t272 = t269 / t271;
+        let t283 = T::nearest(6.0) * t221;
+        let t284 = t283 * parameters.E;
+        let t285 = t284 * parameters.nu;
+        let t286 = t271 * t97;
+        let t287 = t286 * t99;
+        let t288 = t285 / t287;
+        let t292 = T::nearest(12.0) * t107;
+        let t293 = t292 / t26;
+        let t295 = T::nearest(6.0) * t107;
+        let t296 = t295 / t26;
+        let t306 = t221 / parameters.rho0;
+        let t312 = t51 * parameters.nu;
+        let t313 = parameters.rho0 * t97;
+        let t314 = t313 * t99;
+        let t315 = t312 / t314;
+        let t329 = T::nearest(2.0) / t11;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -214,28 +215,30 @@ impl<T: crate::Real> RingNu<T> {
                 t18,
                 t24,
                 t28,
-                t43,
-                t49,
-                t52,
-                t60,
+                t44,
+                t50,
+                t53,
+                t61,
+                t88,
                 t89,
-                t106,
-                t110,
-                t118,
+                t107,
+                t111,
+                t117,
                 t136,
-                t144,
-                t149,
-                t152,
-                t172,
-                t181,
-                t203,
-                t218,
-                t235,
-                t242,
-                t245,
-                t254,
-                t263,
-                t275,
+                t142,
+                t151,
+                t154,
+                t197,
+                t229,
+                t250,
+                t260,
+                t272,
+                t288,
+                t293,
+                t296,
+                t306,
+                t315,
+                t329,
             ],
         })
     }
@@ -281,9 +284,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -296,13 +299,14 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
         let t33 = t31 * X[0];
-        let t34 = T::one() / t5;
-        let t35 = t33 * t34;
-        let t36 = t32 * t35;
-        let t37 = t31 * X[1];
-        let t38 = t37 * t34;
-        let t39 = t32 * t38;
-        crate::nalgebra::SVector::<T, 2>::new(t36, t39)
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t36 = t33 * t35;
+        let t37 = t32 * t36;
+        let t38 = t31 * X[1];
+        let t39 = t38 * t35;
+        let t40 = t32 * t39;
+        crate::nalgebra::SVector::<T, 2>::new(t37, t40)
     }
     #[inline]
     fn velocity(
@@ -310,9 +314,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t20 = t5 - self.parameters.Ro;
@@ -323,17 +327,18 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t33 = t31 * X[0];
-        let t34 = T::one() / t5;
-        let t35 = t33 * t34;
-        let t37 = t31 * X[1];
-        let t38 = t37 * t34;
-        let t41 = t12.sin_pi();
-        let t44 = self.fixed[4] * t41;
-        let t45 = t44 * t35;
-        let t46 = -t45;
-        let t47 = t44 * t38;
-        let t48 = -t47;
-        crate::nalgebra::SVector::<T, 2>::new(t46, t48)
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t36 = t33 * t35;
+        let t38 = t31 * X[1];
+        let t39 = t38 * t35;
+        let t42 = t12.sin_pi();
+        let t45 = self.fixed[4] * t42;
+        let t46 = t45 * t36;
+        let t47 = -t46;
+        let t48 = t45 * t39;
+        let t49 = -t48;
+        crate::nalgebra::SVector::<T, 2>::new(t47, t49)
     }
     #[inline]
     fn acceleration(
@@ -341,9 +346,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -355,16 +360,17 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t33 = t31 * X[0];
-        let t34 = T::one() / t5;
-        let t35 = t33 * t34;
-        let t37 = t31 * X[1];
-        let t38 = t37 * t34;
-        let t53 = self.fixed[6] * t13;
-        let t54 = t53 * t35;
-        let t55 = -t54;
-        let t56 = t53 * t38;
-        let t57 = -t56;
-        crate::nalgebra::SVector::<T, 2>::new(t55, t57)
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t36 = t33 * t35;
+        let t38 = t31 * X[1];
+        let t39 = t38 * t35;
+        let t54 = self.fixed[6] * t13;
+        let t55 = t54 * t36;
+        let t56 = -t55;
+        let t57 = t54 * t39;
+        let t58 = -t57;
+        crate::nalgebra::SVector::<T, 2>::new(t56, t58)
     }
     #[inline]
     fn displacement_gradient(
@@ -372,9 +378,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -386,32 +392,32 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t34 = T::one() / t5;
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
         let t59 = t5 - self.parameters.Ri;
-        let t61 = t20 * t1;
-        let t62 = t61 * t59;
-        let t63 = self.fixed[7] * t62;
-        let t64 = t31 * t3;
-        let t65 = t64 * t34;
-        let t66 = t63 + t65;
-        let t67 = t34 * t34;
-        let t68 = t66 * t67;
+        let t62 = t20 * t2;
+        let t63 = t62 * t59;
+        let t64 = self.fixed[7] * t63;
+        let t65 = t31 * t3;
+        let t66 = t65 * t35;
+        let t67 = t64 + t66;
+        let t68 = t67 * t34;
         let t69 = t32 * t68;
         let t70 = t20 * t59;
         let t71 = self.fixed[7] * t70;
-        let t72 = t31 * t34;
+        let t72 = t31 * t35;
         let t73 = t71 - t72;
         let t74 = X[0] * X[1];
         let t75 = t74 * t73;
-        let t76 = t75 * t67;
+        let t76 = t75 * t34;
         let t77 = t32 * t76;
         let t78 = t20 * t3;
         let t79 = t78 * t59;
         let t80 = self.fixed[7] * t79;
-        let t81 = t31 * t1;
-        let t82 = t81 * t34;
+        let t81 = t31 * t2;
+        let t82 = t81 * t35;
         let t83 = t80 + t82;
-        let t84 = t83 * t67;
+        let t84 = t83 * t34;
         let t85 = t32 * t84;
         crate::nalgebra::SMatrix::<T, 2, 2>::new(t69, t77, t77, t85)
     }
@@ -421,9 +427,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -435,32 +441,32 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t34 = T::one() / t5;
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
         let t59 = t5 - self.parameters.Ri;
-        let t61 = t20 * t1;
-        let t62 = t61 * t59;
-        let t63 = self.fixed[7] * t62;
-        let t64 = t31 * t3;
-        let t65 = t64 * t34;
-        let t66 = t63 + t65;
-        let t67 = t34 * t34;
-        let t68 = t66 * t67;
+        let t62 = t20 * t2;
+        let t63 = t62 * t59;
+        let t64 = self.fixed[7] * t63;
+        let t65 = t31 * t3;
+        let t66 = t65 * t35;
+        let t67 = t64 + t66;
+        let t68 = t67 * t34;
         let t69 = t32 * t68;
         let t70 = t20 * t59;
         let t71 = self.fixed[7] * t70;
-        let t72 = t31 * t34;
+        let t72 = t31 * t35;
         let t73 = t71 - t72;
         let t74 = X[0] * X[1];
         let t75 = t74 * t73;
-        let t76 = t75 * t67;
+        let t76 = t75 * t34;
         let t77 = t32 * t76;
         let t78 = t20 * t3;
         let t79 = t78 * t59;
         let t80 = self.fixed[7] * t79;
-        let t81 = t31 * t1;
-        let t82 = t81 * t34;
+        let t81 = t31 * t2;
+        let t82 = t81 * t35;
         let t83 = t80 + t82;
-        let t84 = t83 * t67;
+        let t84 = t83 * t34;
         let t85 = t32 * t84;
         let t86 = t69 + T::one();
         let t87 = t85 + T::one();
@@ -468,9 +474,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
     }
     #[inline]
     fn jacobian(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> T {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -482,11 +488,12 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t34 = T::one() / t5;
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
         let t59 = t5 - self.parameters.Ri;
         let t70 = t20 * t59;
-        let t72 = t31 * t34;
-        let t90 = self.fixed[8] * t13;
+        let t72 = t31 * t35;
+        let t90 = self.fixed[9] * t13;
         let t91 = t90 * t70;
         let t92 = t91 + T::one();
         let t93 = t32 * t72;
@@ -500,9 +507,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -514,45 +521,47 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t34 = T::one() / t5;
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
         let t59 = t5 - self.parameters.Ri;
-        let t67 = t34 * t34;
         let t70 = t20 * t59;
-        let t72 = t31 * t34;
+        let t72 = t31 * t35;
         let t74 = X[0] * X[1];
-        let t90 = self.fixed[8] * t13;
+        let t90 = self.fixed[9] * t13;
         let t91 = t90 * t70;
         let t92 = t91 + T::one();
         let t93 = t32 * t72;
         let t94 = t93 + T::one();
-        let t100 = t93 * t91;
-        let t101 = t93 + t91;
-        let t102 = t101 + t100;
-        let t103 = t102.ln_1p();
-        let t107 = self.fixed[9] * t103;
-        let t111 = t91 + T::nearest(2.0);
-        let t112 = t91 * t111;
-        let t113 = self.fixed[10] * t112;
-        let t114 = t107 + t113;
-        let t115 = t114 / t92;
-        let t116 = t1 * t115;
-        let t117 = t93 + T::nearest(2.0);
-        let t119 = self.fixed[11] * t13;
-        let t120 = t119 * t72;
-        let t121 = t120 * t117;
-        let t122 = t107 + t121;
-        let t123 = t122 / t94;
-        let t124 = t3 * t123;
-        let t125 = t116 + t124;
-        let t126 = t67 * t125;
-        let t127 = t115 - t123;
-        let t128 = t74 * t67;
-        let t129 = t128 * t127;
-        let t130 = t3 * t115;
-        let t131 = t1 * t123;
-        let t132 = t130 + t131;
-        let t133 = t67 * t132;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t126, t129, t129, t133)
+        let t100 = t13 * t72;
+        let t101 = t100 * t92;
+        let t102 = self.parameters.A * t101;
+        let t103 = t102 + t91;
+        let t104 = t103.ln_1p();
+        let t108 = t91 + T::nearest(2.0);
+        let t112 = self.fixed[11] * t104;
+        let t113 = t91 * t108;
+        let t114 = self.fixed[10] * t113;
+        let t115 = t112 + t114;
+        let t116 = t93 + T::nearest(2.0);
+        let t118 = self.fixed[12] * t13;
+        let t119 = t118 * t72;
+        let t120 = t119 * t116;
+        let t121 = t112 + t120;
+        let t122 = t115 / t92;
+        let t123 = t2 * t122;
+        let t124 = T::one() / t94;
+        let t125 = t121 * t124;
+        let t126 = t3 * t125;
+        let t127 = t123 + t126;
+        let t128 = t34 * t127;
+        let t129 = t122 - t125;
+        let t130 = t74 * t34;
+        let t131 = t130 * t129;
+        let t132 = t3 * t122;
+        let t133 = t2 * t125;
+        let t134 = t132 + t133;
+        let t135 = t34 * t134;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t128, t131, t131, t135)
     }
     #[inline]
     fn body_force(
@@ -560,9 +569,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -574,132 +583,85 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t34 = T::one() / t5;
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
         let t59 = t5 - self.parameters.Ri;
-        let t67 = t34 * t34;
         let t70 = t20 * t59;
         let t71 = self.fixed[7] * t70;
-        let t72 = t31 * t34;
+        let t72 = t31 * t35;
         let t73 = t71 - t72;
-        let t90 = self.fixed[8] * t13;
-        let t91 = t90 * t70;
-        let t92 = t91 + T::one();
+        let t90 = self.fixed[9] * t13;
         let t93 = t32 * t72;
         let t94 = t93 + T::one();
-        let t100 = t93 * t91;
-        let t101 = t93 + t91;
-        let t102 = t101 + t100;
-        let t103 = t102.ln_1p();
-        let t134 = X[0] * t34;
-        let t135 = self.fixed[5] * t31;
-        let t137 = t23 - self.fixed[12];
+        let t124 = T::one() / t94;
+        let t137 = t23 - self.fixed[13];
         let t138 = self.fixed[7] * t137;
-        let t139 = t31 * t67;
-        let t140 = t70 * t34;
-        let t141 = self.fixed[7] * t140;
-        let t142 = t73 * t34;
-        let t143 = t138 + t142;
-        let t145 = self.fixed[13] * t143;
-        let t146 = t138 - t139;
-        let t147 = t146 + t141;
-        let t148 = t147 + t145;
-        let t150 = self.fixed[14] * t148;
-        let t151 = t135 + t150;
-        let t153 = self.fixed[15] * t151;
-        let t154 = -t153;
-        let t155 = t92 * t92;
-        let t161 = t59 * t59;
-        let t162 = self.fixed[9] * t143;
-        let t163 = t23 + t140;
-        let t164 = t163 - self.fixed[12];
-        let t165 = self.fixed[7] * t164;
-        let t166 = t139 - t165;
-        let t167 = self.fixed[10] * t166;
-        let t168 = t162 - t167;
-        let t173 = t21 * t31;
-        let t174 = t173 * t161;
-        let t175 = t174 * t168;
-        let t176 = t175 * t34;
-        let t177 = self.fixed[16] * t176;
-        let t178 = t13 * t177;
-        let t180 = t31 * t31;
-        let t182 = t67 * t34;
-        let t183 = t180 * t182;
-        let t184 = self.fixed[17] * t183;
-        let t185 = t31 * t137;
-        let t186 = t70 * t73;
-        let t187 = t185 + t186;
-        let t188 = t187 * t34;
-        let t189 = self.fixed[9] * t188;
-        let t190 = t71 + t72;
-        let t191 = t137 * t190;
-        let t192 = self.fixed[10] * t191;
-        let t193 = t185 * t34;
-        let t194 = self.fixed[10] * t193;
-        let t195 = t70 * t190;
-        let t196 = t195 * t34;
-        let t197 = self.fixed[10] * t196;
-        let t198 = t189 + t192;
-        let t199 = t198 + t194;
-        let t200 = t199 + t197;
-        let t201 = self.fixed[7] * t200;
-        let t204 = t70 * t137;
-        let t205 = self.fixed[18] * t204;
-        let t206 = t31 * t73;
-        let t207 = t206 * t67;
-        let t208 = t31 * t143;
-        let t209 = t208 * t34;
-        let t210 = t205 + t207;
-        let t211 = t210 + t209;
-        let t212 = self.fixed[9] * t211;
-        let t213 = t184 - t201;
-        let t214 = t213 - t212;
-        let t219 = t70 * t214;
-        let t220 = self.fixed[19] * t219;
-        let t221 = -t220;
-        let t222 = t221 + t178;
-        let t223 = t13 * t222;
-        let t224 = t20 * t31;
-        let t225 = t224 * t59;
-        let t226 = t225 * t34;
-        let t227 = T::nearest(2.0) * t226;
-        let t228 = t185 + t195;
-        let t229 = t228 - t227;
-        let t236 = t229 * t34;
-        let t237 = self.fixed[20] * t236;
-        let t238 = t237 * t103;
-        let t239 = self.fixed[10] * t183;
-        let t243 = self.fixed[21] * t137;
-        let t246 = self.fixed[22] * t140;
-        let t247 = t162 + t243;
-        let t248 = t247 + t246;
-        let t249 = t70 * t248;
-        let t250 = self.fixed[7] * t249;
-        let t251 = self.fixed[9] * t210;
-        let t252 = t239 - t250;
-        let t253 = t252 - t251;
-        let t255 = self.fixed[23] * t253;
-        let t256 = -t255;
-        let t257 = t223 + t238;
-        let t258 = t256 + t257;
-        let t259 = t13 * t258;
-        let t264 = self.fixed[24] * t166;
-        let t265 = -t264;
-        let t266 = t265 * t103;
-        let t267 = t259 + t266;
-        let t268 = t155 * t94;
-        let t269 = t267 / t268;
-        let t270 = t154 + t269;
-        let t271 = t13 * t270;
-        let t272 = t134 * t271;
-        let t273 = X[1] * t34;
-        let t274 = t273 * t271;
-        crate::nalgebra::SVector::<T, 2>::new(t272, t274)
+        let t139 = t73 * t35;
+        let t140 = t138 + t139;
+        let t141 = self.fixed[3] * t70;
+        let t143 = self.fixed[14] * t140;
+        let t144 = t72 * t35;
+        let t145 = t141 * t35;
+        let t146 = T::nearest(6.0) * t145;
+        let t147 = t138 + t143;
+        let t148 = t147 - t144;
+        let t149 = t148 + t146;
+        let t150 = self.fixed[5] * t31;
+        let t152 = self.fixed[15] * t149;
+        let t153 = t150 + t152;
+        let t155 = self.fixed[16] * t13;
+        let t156 = t155 * t153;
+        let t157 = self.fixed[8] * t13;
+        let t158 = t157 * t141;
+        let t159 = t158 + T::one();
+        let t160 = t90 * t137;
+        let t161 = t158 * t93;
+        let t162 = t158 + t93;
+        let t163 = t162 + t161;
+        let t164 = t163.ln_1p();
+        let t165 = self.fixed[11] * t164;
+        let t166 = self.fixed[10] * t158;
+        let t167 = t165 + t166;
+        let t168 = T::one() / t159;
+        let t169 = t160 * t168;
+        let t170 = t158 * t169;
+        let t171 = t32 * t139;
+        let t172 = t171 * t124;
+        let t173 = t169 + t172;
+        let t174 = self.fixed[10] * t160;
+        let t175 = self.fixed[11] * t173;
+        let t176 = t174 + t175;
+        let t177 = t160 * t167;
+        let t178 = t167 * t170;
+        let t179 = t158 * t176;
+        let t180 = t177 - t178;
+        let t181 = t180 + t179;
+        let t182 = self.fixed[10] * t93;
+        let t183 = t165 + t182;
+        let t184 = t93 * t172;
+        let t185 = t170 + t184;
+        let t186 = t181 * t168;
+        let t187 = t158 * t167;
+        let t188 = t187 * t168;
+        let t189 = t35 * t188;
+        let t190 = t93 * t183;
+        let t191 = t190 * t124;
+        let t192 = t35 * t191;
+        let t193 = self.fixed[11] * t185;
+        let t194 = t186 + t189;
+        let t195 = t194 - t192;
+        let t196 = t195 + t193;
+        let t198 = self.fixed[17] * t196;
+        let t199 = t198 - t156;
+        let t200 = t35 * t199;
+        let t201 = X[0] * t200;
+        let t202 = X[1] * t200;
+        crate::nalgebra::SVector::<T, 2>::new(t201, t202)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -712,197 +674,157 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
         let t33 = t31 * X[0];
-        let t34 = T::one() / t5;
-        let t35 = t33 * t34;
-        let t36 = t32 * t35;
-        let t37 = t31 * X[1];
-        let t38 = t37 * t34;
-        let t39 = t32 * t38;
-        let t41 = t12.sin_pi();
-        let t44 = self.fixed[4] * t41;
-        let t45 = t44 * t35;
-        let t46 = -t45;
-        let t47 = t44 * t38;
-        let t48 = -t47;
-        let t53 = self.fixed[6] * t13;
-        let t54 = t53 * t35;
-        let t55 = -t54;
-        let t56 = t53 * t38;
-        let t57 = -t56;
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t36 = t33 * t35;
+        let t37 = t32 * t36;
+        let t38 = t31 * X[1];
+        let t39 = t38 * t35;
+        let t40 = t32 * t39;
+        let t42 = t12.sin_pi();
+        let t45 = self.fixed[4] * t42;
+        let t46 = t45 * t36;
+        let t47 = -t46;
+        let t48 = t45 * t39;
+        let t49 = -t48;
+        let t54 = self.fixed[6] * t13;
+        let t55 = t54 * t36;
+        let t56 = -t55;
+        let t57 = t54 * t39;
+        let t58 = -t57;
         let t59 = t5 - self.parameters.Ri;
-        let t61 = t20 * t1;
-        let t62 = t61 * t59;
-        let t63 = self.fixed[7] * t62;
-        let t64 = t31 * t3;
-        let t65 = t64 * t34;
-        let t66 = t63 + t65;
-        let t67 = t34 * t34;
-        let t68 = t66 * t67;
+        let t62 = t20 * t2;
+        let t63 = t62 * t59;
+        let t64 = self.fixed[7] * t63;
+        let t65 = t31 * t3;
+        let t66 = t65 * t35;
+        let t67 = t64 + t66;
+        let t68 = t67 * t34;
         let t69 = t32 * t68;
         let t70 = t20 * t59;
         let t71 = self.fixed[7] * t70;
-        let t72 = t31 * t34;
+        let t72 = t31 * t35;
         let t73 = t71 - t72;
         let t74 = X[0] * X[1];
         let t75 = t74 * t73;
-        let t76 = t75 * t67;
+        let t76 = t75 * t34;
         let t77 = t32 * t76;
         let t78 = t20 * t3;
         let t79 = t78 * t59;
         let t80 = self.fixed[7] * t79;
-        let t81 = t31 * t1;
-        let t82 = t81 * t34;
+        let t81 = t31 * t2;
+        let t82 = t81 * t35;
         let t83 = t80 + t82;
-        let t84 = t83 * t67;
+        let t84 = t83 * t34;
         let t85 = t32 * t84;
         let t86 = t69 + T::one();
         let t87 = t85 + T::one();
-        let t90 = self.fixed[8] * t13;
+        let t90 = self.fixed[9] * t13;
         let t91 = t90 * t70;
         let t92 = t91 + T::one();
         let t93 = t32 * t72;
         let t94 = t93 + T::one();
         let t95 = t92 * t94;
-        let t100 = t93 * t91;
-        let t101 = t93 + t91;
-        let t102 = t101 + t100;
-        let t103 = t102.ln_1p();
-        let t107 = self.fixed[9] * t103;
-        let t111 = t91 + T::nearest(2.0);
-        let t112 = t91 * t111;
-        let t113 = self.fixed[10] * t112;
-        let t114 = t107 + t113;
-        let t115 = t114 / t92;
-        let t116 = t1 * t115;
-        let t117 = t93 + T::nearest(2.0);
-        let t119 = self.fixed[11] * t13;
-        let t120 = t119 * t72;
-        let t121 = t120 * t117;
-        let t122 = t107 + t121;
-        let t123 = t122 / t94;
-        let t124 = t3 * t123;
-        let t125 = t116 + t124;
-        let t126 = t67 * t125;
-        let t127 = t115 - t123;
-        let t128 = t74 * t67;
-        let t129 = t128 * t127;
-        let t130 = t3 * t115;
-        let t131 = t1 * t123;
-        let t132 = t130 + t131;
-        let t133 = t67 * t132;
-        let t134 = X[0] * t34;
-        let t135 = self.fixed[5] * t31;
-        let t137 = t23 - self.fixed[12];
+        let t100 = t13 * t72;
+        let t101 = t100 * t92;
+        let t102 = self.parameters.A * t101;
+        let t103 = t102 + t91;
+        let t104 = t103.ln_1p();
+        let t108 = t91 + T::nearest(2.0);
+        let t112 = self.fixed[11] * t104;
+        let t113 = t91 * t108;
+        let t114 = self.fixed[10] * t113;
+        let t115 = t112 + t114;
+        let t116 = t93 + T::nearest(2.0);
+        let t118 = self.fixed[12] * t13;
+        let t119 = t118 * t72;
+        let t120 = t119 * t116;
+        let t121 = t112 + t120;
+        let t122 = t115 / t92;
+        let t123 = t2 * t122;
+        let t124 = T::one() / t94;
+        let t125 = t121 * t124;
+        let t126 = t3 * t125;
+        let t127 = t123 + t126;
+        let t128 = t34 * t127;
+        let t129 = t122 - t125;
+        let t130 = t74 * t34;
+        let t131 = t130 * t129;
+        let t132 = t3 * t122;
+        let t133 = t2 * t125;
+        let t134 = t132 + t133;
+        let t135 = t34 * t134;
+        let t137 = t23 - self.fixed[13];
         let t138 = self.fixed[7] * t137;
-        let t139 = t31 * t67;
-        let t140 = t70 * t34;
-        let t141 = self.fixed[7] * t140;
-        let t142 = t73 * t34;
-        let t143 = t138 + t142;
-        let t145 = self.fixed[13] * t143;
-        let t146 = t138 - t139;
-        let t147 = t146 + t141;
-        let t148 = t147 + t145;
-        let t150 = self.fixed[14] * t148;
-        let t151 = t135 + t150;
-        let t153 = self.fixed[15] * t151;
-        let t154 = -t153;
-        let t155 = t92 * t92;
-        let t161 = t59 * t59;
-        let t162 = self.fixed[9] * t143;
-        let t163 = t23 + t140;
-        let t164 = t163 - self.fixed[12];
-        let t165 = self.fixed[7] * t164;
-        let t166 = t139 - t165;
-        let t167 = self.fixed[10] * t166;
-        let t168 = t162 - t167;
-        let t173 = t21 * t31;
-        let t174 = t173 * t161;
-        let t175 = t174 * t168;
-        let t176 = t175 * t34;
-        let t177 = self.fixed[16] * t176;
-        let t178 = t13 * t177;
-        let t180 = t31 * t31;
-        let t182 = t67 * t34;
-        let t183 = t180 * t182;
-        let t184 = self.fixed[17] * t183;
-        let t185 = t31 * t137;
-        let t186 = t70 * t73;
-        let t187 = t185 + t186;
-        let t188 = t187 * t34;
-        let t189 = self.fixed[9] * t188;
-        let t190 = t71 + t72;
-        let t191 = t137 * t190;
-        let t192 = self.fixed[10] * t191;
-        let t193 = t185 * t34;
-        let t194 = self.fixed[10] * t193;
-        let t195 = t70 * t190;
-        let t196 = t195 * t34;
-        let t197 = self.fixed[10] * t196;
-        let t198 = t189 + t192;
-        let t199 = t198 + t194;
-        let t200 = t199 + t197;
-        let t201 = self.fixed[7] * t200;
-        let t204 = t70 * t137;
-        let t205 = self.fixed[18] * t204;
-        let t206 = t31 * t73;
-        let t207 = t206 * t67;
-        let t208 = t31 * t143;
-        let t209 = t208 * t34;
-        let t210 = t205 + t207;
-        let t211 = t210 + t209;
-        let t212 = self.fixed[9] * t211;
-        let t213 = t184 - t201;
-        let t214 = t213 - t212;
-        let t219 = t70 * t214;
-        let t220 = self.fixed[19] * t219;
-        let t221 = -t220;
-        let t222 = t221 + t178;
-        let t223 = t13 * t222;
-        let t224 = t20 * t31;
-        let t225 = t224 * t59;
-        let t226 = t225 * t34;
-        let t227 = T::nearest(2.0) * t226;
-        let t228 = t185 + t195;
-        let t229 = t228 - t227;
-        let t236 = t229 * t34;
-        let t237 = self.fixed[20] * t236;
-        let t238 = t237 * t103;
-        let t239 = self.fixed[10] * t183;
-        let t243 = self.fixed[21] * t137;
-        let t246 = self.fixed[22] * t140;
-        let t247 = t162 + t243;
-        let t248 = t247 + t246;
-        let t249 = t70 * t248;
-        let t250 = self.fixed[7] * t249;
-        let t251 = self.fixed[9] * t210;
-        let t252 = t239 - t250;
-        let t253 = t252 - t251;
-        let t255 = self.fixed[23] * t253;
-        let t256 = -t255;
-        let t257 = t223 + t238;
-        let t258 = t256 + t257;
-        let t259 = t13 * t258;
-        let t264 = self.fixed[24] * t166;
-        let t265 = -t264;
-        let t266 = t265 * t103;
-        let t267 = t259 + t266;
-        let t268 = t155 * t94;
-        let t269 = t267 / t268;
-        let t270 = t154 + t269;
-        let t271 = t13 * t270;
-        let t272 = t134 * t271;
-        let t273 = X[1] * t34;
-        let t274 = t273 * t271;
+        let t139 = t73 * t35;
+        let t140 = t138 + t139;
+        let t141 = self.fixed[3] * t70;
+        let t143 = self.fixed[14] * t140;
+        let t144 = t72 * t35;
+        let t145 = t141 * t35;
+        let t146 = T::nearest(6.0) * t145;
+        let t147 = t138 + t143;
+        let t148 = t147 - t144;
+        let t149 = t148 + t146;
+        let t150 = self.fixed[5] * t31;
+        let t152 = self.fixed[15] * t149;
+        let t153 = t150 + t152;
+        let t155 = self.fixed[16] * t13;
+        let t156 = t155 * t153;
+        let t157 = self.fixed[8] * t13;
+        let t158 = t157 * t141;
+        let t159 = t158 + T::one();
+        let t160 = t90 * t137;
+        let t161 = t158 * t93;
+        let t162 = t158 + t93;
+        let t163 = t162 + t161;
+        let t164 = t163.ln_1p();
+        let t165 = self.fixed[11] * t164;
+        let t166 = self.fixed[10] * t158;
+        let t167 = t165 + t166;
+        let t168 = T::one() / t159;
+        let t169 = t160 * t168;
+        let t170 = t158 * t169;
+        let t171 = t32 * t139;
+        let t172 = t171 * t124;
+        let t173 = t169 + t172;
+        let t174 = self.fixed[10] * t160;
+        let t175 = self.fixed[11] * t173;
+        let t176 = t174 + t175;
+        let t177 = t160 * t167;
+        let t178 = t167 * t170;
+        let t179 = t158 * t176;
+        let t180 = t177 - t178;
+        let t181 = t180 + t179;
+        let t182 = self.fixed[10] * t93;
+        let t183 = t165 + t182;
+        let t184 = t93 * t172;
+        let t185 = t170 + t184;
+        let t186 = t181 * t168;
+        let t187 = t158 * t167;
+        let t188 = t187 * t168;
+        let t189 = t35 * t188;
+        let t190 = t93 * t183;
+        let t191 = t190 * t124;
+        let t192 = t35 * t191;
+        let t193 = self.fixed[11] * t185;
+        let t194 = t186 + t189;
+        let t195 = t194 - t192;
+        let t196 = t195 + t193;
+        let t198 = self.fixed[17] * t196;
+        let t199 = t198 - t156;
+        let t200 = t35 * t199;
+        let t201 = X[0] * t200;
+        let t202 = X[1] * t200;
         crate::Fields {
-            u: crate::nalgebra::SVector::<T, 2>::new(t36, t39),
-            v: crate::nalgebra::SVector::<T, 2>::new(t46, t48),
-            a: crate::nalgebra::SVector::<T, 2>::new(t55, t57),
+            u: crate::nalgebra::SVector::<T, 2>::new(t37, t40),
+            v: crate::nalgebra::SVector::<T, 2>::new(t47, t49),
+            a: crate::nalgebra::SVector::<T, 2>::new(t56, t58),
             H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t69, t77, t77, t85),
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t86, t77, t77, t87),
             J: t95,
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t126, t129, t129, t133),
-            b: crate::nalgebra::SVector::<T, 2>::new(t272, t274),
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t128, t131, t131, t135),
+            b: crate::nalgebra::SVector::<T, 2>::new(t201, t202),
         }
     }
     fn domain(&self) -> crate::Domain<T, 2> {
@@ -936,7 +858,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
     }
     fn material(&self) -> crate::Material<T> {
         crate::Material::NeoHookean {
-            lambda: self.fixed[9],
+            lambda: self.fixed[11],
             mu: self.fixed[10],
         }
     }
@@ -947,7 +869,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[25]
+        self.fixed[27]
     }
     fn body_force_at(
         &self,
@@ -963,14 +885,14 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
         let t32 = self.parameters.A * t13;
-        let t90 = self.fixed[8] * t13;
+        let t90 = self.fixed[9] * t13;
         [t13, t32, t90]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 10] {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t20 = t5 - self.parameters.Ro;
         let t21 = t20 * t20;
@@ -979,102 +901,97 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         let t29 = t21 * t25;
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
-        let t34 = T::one() / t5;
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
         let t59 = t5 - self.parameters.Ri;
-        let t67 = t34 * t34;
         let t70 = t20 * t59;
         let t71 = self.fixed[7] * t70;
-        let t72 = t31 * t34;
+        let t72 = t31 * t35;
         let t73 = t71 - t72;
-        let t134 = X[0] * t34;
-        let t135 = self.fixed[5] * t31;
-        let t137 = t23 - self.fixed[12];
+        let t137 = t23 - self.fixed[13];
         let t138 = self.fixed[7] * t137;
-        let t139 = t31 * t67;
-        let t140 = t70 * t34;
-        let t141 = self.fixed[7] * t140;
-        let t142 = t73 * t34;
-        let t143 = t138 + t142;
-        let t145 = self.fixed[13] * t143;
-        let t146 = t138 - t139;
-        let t147 = t146 + t141;
-        let t148 = t147 + t145;
-        let t150 = self.fixed[14] * t148;
-        let t151 = t135 + t150;
-        let t153 = self.fixed[15] * t151;
-        let t154 = -t153;
-        let t161 = t59 * t59;
-        let t162 = self.fixed[9] * t143;
-        let t163 = t23 + t140;
-        let t164 = t163 - self.fixed[12];
-        let t165 = self.fixed[7] * t164;
-        let t166 = t139 - t165;
-        let t167 = self.fixed[10] * t166;
-        let t168 = t162 - t167;
-        let t173 = t21 * t31;
-        let t174 = t173 * t161;
-        let t175 = t174 * t168;
-        let t176 = t175 * t34;
-        let t177 = self.fixed[16] * t176;
-        let t180 = t31 * t31;
-        let t182 = t67 * t34;
-        let t183 = t180 * t182;
-        let t184 = self.fixed[17] * t183;
-        let t185 = t31 * t137;
-        let t186 = t70 * t73;
-        let t187 = t185 + t186;
-        let t188 = t187 * t34;
-        let t189 = self.fixed[9] * t188;
-        let t190 = t71 + t72;
-        let t191 = t137 * t190;
-        let t192 = self.fixed[10] * t191;
-        let t193 = t185 * t34;
-        let t194 = self.fixed[10] * t193;
-        let t195 = t70 * t190;
-        let t196 = t195 * t34;
-        let t197 = self.fixed[10] * t196;
-        let t198 = t189 + t192;
-        let t199 = t198 + t194;
-        let t200 = t199 + t197;
-        let t201 = self.fixed[7] * t200;
-        let t204 = t70 * t137;
-        let t205 = self.fixed[18] * t204;
-        let t206 = t31 * t73;
-        let t207 = t206 * t67;
-        let t208 = t31 * t143;
-        let t209 = t208 * t34;
-        let t210 = t205 + t207;
-        let t211 = t210 + t209;
-        let t212 = self.fixed[9] * t211;
-        let t213 = t184 - t201;
-        let t214 = t213 - t212;
-        let t219 = t70 * t214;
-        let t220 = self.fixed[19] * t219;
-        let t221 = -t220;
-        let t224 = t20 * t31;
-        let t225 = t224 * t59;
-        let t226 = t225 * t34;
-        let t227 = T::nearest(2.0) * t226;
-        let t228 = t185 + t195;
-        let t229 = t228 - t227;
-        let t236 = t229 * t34;
-        let t237 = self.fixed[20] * t236;
-        let t239 = self.fixed[10] * t183;
-        let t243 = self.fixed[21] * t137;
-        let t246 = self.fixed[22] * t140;
-        let t247 = t162 + t243;
-        let t248 = t247 + t246;
-        let t249 = t70 * t248;
-        let t250 = self.fixed[7] * t249;
-        let t251 = self.fixed[9] * t210;
-        let t252 = t239 - t250;
-        let t253 = t252 - t251;
-        let t255 = self.fixed[23] * t253;
-        let t256 = -t255;
-        let t264 = self.fixed[24] * t166;
-        let t265 = -t264;
-        let t273 = X[1] * t34;
-        [t70, t72, t134, t154, t177, t221, t237, t256, t265, t273]
+        let t139 = t73 * t35;
+        let t140 = t138 + t139;
+        let t143 = self.fixed[14] * t140;
+        let t150 = self.fixed[5] * t31;
+        let t203 = X[0] * t35;
+        let t204 = t70 * t35;
+        let t205 = t204 + t137;
+        let t206 = self.fixed[7] * t205;
+        let t207 = t31 * t34;
+        let t208 = t206 - t207;
+        let t209 = t208 + t143;
+        let t210 = self.fixed[15] * t209;
+        let t211 = t150 + t210;
+        let t212 = self.fixed[16] * t211;
+        let t213 = t23 + t204;
+        let t214 = t213 - self.fixed[13];
+        let t215 = self.fixed[7] * t214;
+        let t216 = t207 - t215;
+        let t217 = self.fixed[11] * t140;
+        let t218 = self.fixed[10] * t216;
+        let t219 = t217 - t218;
+        let t225 = t59 * t59;
+        let t230 = t21 * t31;
+        let t231 = t230 * t225;
+        let t232 = t231 * t219;
+        let t233 = t232 * t35;
+        let t234 = self.fixed[18] * t233;
+        let t235 = t31 * t137;
+        let t236 = t70 * t73;
+        let t237 = t235 + t236;
+        let t238 = t71 + t72;
+        let t239 = t237 * t35;
+        let t240 = self.fixed[11] * t239;
+        let t241 = t137 * t238;
+        let t242 = t235 * t35;
+        let t243 = t70 * t238;
+        let t244 = t243 * t35;
+        let t245 = t241 + t242;
+        let t246 = t245 + t244;
+        let t247 = self.fixed[10] * t246;
+        let t248 = t240 + t247;
+        let t251 = t70 * t137;
+        let t252 = self.fixed[19] * t251;
+        let t253 = t31 * t73;
+        let t254 = t253 * t34;
+        let t255 = t31 * t140;
+        let t256 = t255 * t35;
+        let t257 = t252 + t254;
+        let t258 = t257 + t256;
+        let t259 = t31 * t31;
+        let t261 = t34 * t35;
+        let t262 = t259 * t261;
+        let t263 = self.fixed[20] * t262;
+        let t264 = self.fixed[7] * t248;
+        let t265 = self.fixed[11] * t258;
+        let t266 = t263 - t264;
+        let t267 = t266 - t265;
+        let t273 = t70 * t267;
+        let t274 = self.fixed[21] * t273;
+        let t277 = t20 * t31;
+        let t278 = t277 * t59;
+        let t279 = t278 * t35;
+        let t280 = T::nearest(2.0) * t279;
+        let t281 = t235 + t243;
+        let t282 = t281 - t280;
+        let t289 = t282 * t35;
+        let t290 = self.fixed[22] * t289;
+        let t294 = self.fixed[23] * t137;
+        let t297 = self.fixed[24] * t204;
+        let t298 = t217 + t294;
+        let t299 = t298 + t297;
+        let t300 = self.fixed[10] * t262;
+        let t301 = t70 * t299;
+        let t302 = self.fixed[7] * t301;
+        let t303 = self.fixed[11] * t257;
+        let t304 = t300 - t302;
+        let t305 = t304 - t303;
+        let t307 = self.fixed[25] * t305;
+        let t316 = self.fixed[26] * t216;
+        let t317 = -t316;
+        let t327 = X[1] * t35;
+        [t70, t72, t203, t212, t234, t274, t290, t307, t317, t327]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -1086,27 +1003,28 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         let t92 = t91 + T::one();
         let t93 = time[1] * point[1];
         let t94 = t93 + T::one();
-        let t100 = t93 * t91;
-        let t101 = t93 + t91;
-        let t102 = t101 + t100;
-        let t103 = t102.ln_1p();
-        let t155 = t92 * t92;
-        let t178 = time[0] * point[4];
-        let t222 = point[5] + t178;
-        let t223 = time[0] * t222;
-        let t238 = point[6] * t103;
-        let t257 = t223 + t238;
-        let t258 = point[7] + t257;
-        let t259 = time[0] * t258;
-        let t266 = point[8] * t103;
-        let t267 = t259 + t266;
-        let t268 = t155 * t94;
-        let t269 = t267 / t268;
-        let t270 = point[3] + t269;
-        let t271 = time[0] * t270;
-        let t272 = point[2] * t271;
-        let t274 = point[9] * t271;
-        crate::nalgebra::SVector::<T, 2>::new(t272, t274)
+        let t100 = time[0] * point[1];
+        let t101 = t100 * t92;
+        let t102 = self.parameters.A * t101;
+        let t103 = t102 + t91;
+        let t104 = t103.ln_1p();
+        let t275 = time[0] * point[4];
+        let t276 = t275 - point[5];
+        let t308 = time[0] * t276;
+        let t309 = point[6] * t104;
+        let t310 = t308 + t309;
+        let t311 = t310 - point[7];
+        let t318 = time[0] * t311;
+        let t319 = point[8] * t104;
+        let t320 = t318 + t319;
+        let t321 = t92 * t92;
+        let t322 = t321 * t94;
+        let t323 = t320 / t322;
+        let t324 = t323 - point[3];
+        let t325 = time[0] * t324;
+        let t326 = point[2] * t325;
+        let t328 = point[9] * t325;
+        crate::nalgebra::SVector::<T, 2>::new(t326, t328)
     }
 }
 impl<T: crate::Real> From<RingNu<T>> for crate::AnySolution<T> {

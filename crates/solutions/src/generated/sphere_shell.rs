@@ -45,7 +45,7 @@ impl<T: crate::Real> Default for SphereShellParameters<T> {
 pub struct SphereShell<T: crate::Real> {
     parameters: SphereShellParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 29],
+    fixed: [T; 30],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> SphereShell<T> {
@@ -155,68 +155,69 @@ impl<T: crate::Real> SphereShell<T> {
         let t47 = t46 * t45;
         let t48 = parameters.rho0 * t11;
         let t49 = t47 / t48;
-        let t59 = T::one() / parameters.Ro;
-        let t70 = T::nearest(4.0) / parameters.Ro;
-        let t102 = T::nearest(6.0) * parameters.A;
-        let t103 = t102 / t11;
-        let t113 = parameters.nu + T::one();
-        let t114 = T::nearest(2.0) * parameters.nu;
-        let t115 = T::one() - t114;
-        let t116 = T::nearest(2.0) * parameters.A;
-        let t117 = t116 / t11;
-        let t121 = parameters.A * parameters.A;
-        let t122 = t11 * t11;
-        let t125 = t121 / t122;
-        let t135 = parameters.E * parameters.nu;
-        let t136 = t113 * t115;
-        let t137 = t135 / t136;
-        let t140 = T::nearest(0.5) * parameters.E;
-        let t141 = t140 / t113;
-        let t149 = parameters.A * t141;
-        let t150 = t149 / t11;
-        let t179 = T::nearest(5.0) / parameters.Ro;
-        let t182 = parameters.nu / t115;
-        let t183 = t182 + T::one();
-        let t184 = T::nearest(4.0) * t183;
-        let t185 = t184 / t113;
-        let t188 = t46 / t48;
-        let t194 = t121 * t121;
-        let t195 = t122 * t122;
-        let t197 = t137 + t141;
-        let t198 = T::nearest(144.0) * t194;
-        let t199 = t198 * t197;
-        let t200 = parameters.rho0 * t195;
-        let t201 = t199 / t200;
-        let t208 = t121 * parameters.A;
-        let t209 = t11 * parameters.Ro;
-        let t210 = t209 * t209;
-        let t216 = T::nearest(3.0) * parameters.E;
-        let t217 = t216 * parameters.nu;
-        let t218 = t217 / t136;
-        let t221 = T::nearest(8.0) / parameters.Ro;
-        let t225 = T::nearest(3.0) * t141;
-        let t229 = T::nearest(6.0) * t141;
-        let t232 = T::nearest(2.0) * t141;
-        let t248 = T::nearest(12.0) * t208;
-        let t249 = parameters.rho0 * t210;
-        let t250 = t248 / t249;
-        let t261 = T::nearest(6.0) * t121;
-        let t262 = t261 * parameters.E;
-        let t263 = t262 * parameters.nu;
-        let t264 = parameters.rho0 * t122;
-        let t265 = t264 * t113;
-        let t266 = t265 * t115;
-        let t267 = t263 / t266;
-        let t273 = T::nearest(3.0) / parameters.Ro;
-        let t283 = T::nearest(2.0) * t121;
-        let t284 = t283 / t264;
-        let t291 = T::nearest(4.0) * parameters.A;
-        let t292 = t291 * parameters.E;
-        let t293 = t292 * parameters.nu;
-        let t294 = t48 * t113;
-        let t295 = t294 * t115;
-        let t296 = t293 / t295;
-        let t309 = T::nearest(2.0) / t16;
+        let t58 = T::one() / parameters.Ro;
+        let t71 = T::nearest(4.0) / parameters.Ro;
+        let t103 = T::nearest(6.0) * parameters.A;
+        let t104 = t103 / t11;
+        let t114 = parameters.nu + T::one();
+        let t115 = T::nearest(2.0) * parameters.nu;
+        let t116 = T::one() - t115;
+        let t119 = T::nearest(2.0) * parameters.A;
+        let t120 = t119 / t11;
+        let t127 = parameters.A * parameters.A;
+        let t128 = t11 * t11;
+        let t129 = t127 / t128;
+        let t135 = T::nearest(0.5) * parameters.E;
+        let t136 = t135 / t114;
+        let t138 = parameters.E * parameters.nu;
+        let t139 = t114 * t116;
+        let t140 = t138 / t139;
+        let t146 = parameters.A * t136;
+        let t147 = t146 / t11;
+        let t176 = T::nearest(5.0) / parameters.Ro;
+        let t179 = parameters.nu / t116;
+        let t180 = t179 + T::one();
+        let t183 = T::nearest(4.0) * t180;
+        let t184 = t183 / t114;
+        let t187 = t46 / t48;
+        let t236 = T::one() / parameters.rho0;
+        let t245 = t140 + t136;
+        let t248 = t127 * t127;
+        let t249 = t128 * t128;
+        let t251 = T::nearest(144.0) * t248;
+        let t252 = t251 * t245;
+        let t253 = parameters.rho0 * t249;
+        let t254 = t252 / t253;
+        let t264 = T::nearest(8.0) / parameters.Ro;
+        let t276 = T::nearest(3.0) * parameters.E;
+        let t277 = t276 * parameters.nu;
+        let t278 = t277 / t139;
+        let t283 = T::nearest(3.0) * t136;
+        let t285 = T::nearest(6.0) * t136;
+        let t288 = T::nearest(2.0) * t136;
+        let t296 = t127 * parameters.A;
+        let t297 = t11 * parameters.Ro;
+        let t298 = t297 * t297;
+        let t299 = T::nearest(12.0) * t296;
+        let t300 = parameters.rho0 * t298;
+        let t301 = t299 / t300;
+        let t312 = T::nearest(6.0) * t127;
+        let t313 = t312 * parameters.E;
+        let t314 = t313 * parameters.nu;
+        let t315 = parameters.rho0 * t128;
+        let t316 = t315 * t114;
+        let t317 = t316 * t116;
+        let t318 = t314 / t317;
+        let t321 = T::nearest(3.0) / parameters.Ro;
+        let t333 = T::nearest(2.0) * t127;
+        let t334 = t333 / t315;
+        let t341 = T::nearest(4.0) * parameters.A;
+        let t342 = t341 * parameters.E;
+        let t343 = t342 * parameters.nu;
+        let t344 = t48 * t114;
+        let t345 = t344 * t116;
+        let t346 = t343 / t345;
+        let t361 = T::nearest(2.0) / t16;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -229,29 +230,30 @@ impl<T: crate::Real> SphereShell<T> {
                 t37,
                 t45,
                 t49,
-                t59,
-                t70,
-                t103,
-                t117,
-                t125,
-                t137,
-                t141,
-                t150,
-                t179,
-                t185,
-                t188,
-                t201,
-                t218,
-                t221,
-                t225,
-                t229,
-                t232,
-                t250,
-                t267,
-                t273,
-                t284,
-                t296,
-                t309,
+                t58,
+                t71,
+                t104,
+                t120,
+                t129,
+                t136,
+                t140,
+                t147,
+                t176,
+                t184,
+                t187,
+                t236,
+                t254,
+                t264,
+                t278,
+                t283,
+                t285,
+                t288,
+                t301,
+                t318,
+                t321,
+                t334,
+                t346,
+                t361,
             ],
         })
     }
@@ -297,10 +299,10 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t1 = X[1] * X[1];
-        let t3 = X[2] * X[2];
+        let t3 = X[1] * X[1];
+        let t4 = X[2] * X[2];
         let t5 = X[0] * X[0];
-        let t6 = t1 + t3;
+        let t6 = t3 + t4;
         let t7 = t6 + t5;
         let t8 = t7.sqrt();
         let t17 = self.fixed[0] * t;
@@ -323,10 +325,10 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t1 = X[1] * X[1];
-        let t3 = X[2] * X[2];
+        let t3 = X[1] * X[1];
+        let t4 = X[2] * X[2];
         let t5 = X[0] * X[0];
-        let t6 = t1 + t3;
+        let t6 = t3 + t4;
         let t7 = t6 + t5;
         let t8 = t7.sqrt();
         let t17 = self.fixed[0] * t;
@@ -352,10 +354,10 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t1 = X[1] * X[1];
-        let t3 = X[2] * X[2];
+        let t3 = X[1] * X[1];
+        let t4 = X[2] * X[2];
         let t5 = X[0] * X[0];
-        let t6 = t1 + t3;
+        let t6 = t3 + t4;
         let t7 = t6 + t5;
         let t8 = t7.sqrt();
         let t17 = self.fixed[0] * t;
@@ -381,10 +383,10 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 3, 3> {
-        let t1 = X[1] * X[1];
-        let t3 = X[2] * X[2];
+        let t3 = X[1] * X[1];
+        let t4 = X[2] * X[2];
         let t5 = X[0] * X[0];
-        let t6 = t1 + t3;
+        let t6 = t3 + t4;
         let t7 = t6 + t5;
         let t8 = t7.sqrt();
         let t17 = self.fixed[0] * t;
@@ -392,48 +394,49 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t21 = self.fixed[1] * t8;
         let t23 = T::nearest(3.0) - t21;
         let t25 = self.fixed[2] * t18;
-        let t60 = self.fixed[6] * t8;
-        let t61 = T::one() - t60;
-        let t62 = t5 * t61;
+        let t59 = self.fixed[6] * t8;
+        let t60 = T::one() - t59;
+        let t62 = t5 * t60;
         let t63 = T::nearest(6.0) * t62;
         let t64 = t23 * t6;
         let t65 = t63 + t64;
-        let t66 = T::one() / t8;
-        let t67 = t65 * t66;
-        let t68 = t25 * t67;
-        let t71 = self.fixed[7] * t8;
-        let t72 = T::nearest(3.0) - t71;
-        let t73 = X[0] * X[1];
-        let t74 = t73 * t72;
-        let t75 = t74 * t66;
-        let t76 = t25 * t75;
-        let t77 = X[0] * X[2];
-        let t78 = t77 * t72;
-        let t79 = t78 * t66;
-        let t80 = t25 * t79;
-        let t81 = t1 * t61;
-        let t82 = T::nearest(6.0) * t81;
-        let t83 = t3 + t5;
-        let t84 = t23 * t83;
-        let t85 = t82 + t84;
-        let t86 = t85 * t66;
-        let t87 = t25 * t86;
-        let t88 = X[1] * X[2];
-        let t89 = t88 * t72;
-        let t90 = t89 * t66;
-        let t91 = t25 * t90;
-        let t92 = t3 * t61;
-        let t93 = T::nearest(6.0) * t92;
-        let t94 = t1 + t5;
-        let t95 = t23 * t94;
-        let t96 = t93 + t95;
-        let t97 = t96 * t66;
-        let t98 = t25 * t97;
+        let t66 = T::one() / t7;
+        let t67 = t8 * t66;
+        let t68 = t65 * t67;
+        let t69 = t25 * t68;
+        let t72 = self.fixed[7] * t8;
+        let t73 = T::nearest(3.0) - t72;
+        let t74 = X[0] * X[1];
+        let t75 = t74 * t73;
+        let t76 = t75 * t67;
+        let t77 = t25 * t76;
+        let t78 = X[0] * X[2];
+        let t79 = t78 * t73;
+        let t80 = t79 * t67;
+        let t81 = t25 * t80;
+        let t82 = t4 + t5;
+        let t83 = t3 * t60;
+        let t84 = T::nearest(6.0) * t83;
+        let t85 = t23 * t82;
+        let t86 = t84 + t85;
+        let t87 = t86 * t67;
+        let t88 = t25 * t87;
+        let t89 = X[1] * X[2];
+        let t90 = t89 * t73;
+        let t91 = t90 * t67;
+        let t92 = t25 * t91;
+        let t93 = t3 + t5;
+        let t94 = t4 * t60;
+        let t95 = T::nearest(6.0) * t94;
+        let t96 = t23 * t93;
+        let t97 = t95 + t96;
+        let t98 = t97 * t67;
+        let t99 = t25 * t98;
         crate::nalgebra::SMatrix::<
             T,
             3,
             3,
-        >::new(t68, t76, t80, t76, t87, t91, t80, t91, t98)
+        >::new(t69, t77, t81, t77, t88, t92, t81, t92, t99)
     }
     #[inline]
     fn deformation_gradient(
@@ -441,10 +444,10 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 3, 3> {
-        let t1 = X[1] * X[1];
-        let t3 = X[2] * X[2];
+        let t3 = X[1] * X[1];
+        let t4 = X[2] * X[2];
         let t5 = X[0] * X[0];
-        let t6 = t1 + t3;
+        let t6 = t3 + t4;
         let t7 = t6 + t5;
         let t8 = t7.sqrt();
         let t17 = self.fixed[0] * t;
@@ -452,58 +455,59 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t21 = self.fixed[1] * t8;
         let t23 = T::nearest(3.0) - t21;
         let t25 = self.fixed[2] * t18;
-        let t60 = self.fixed[6] * t8;
-        let t61 = T::one() - t60;
-        let t62 = t5 * t61;
+        let t59 = self.fixed[6] * t8;
+        let t60 = T::one() - t59;
+        let t62 = t5 * t60;
         let t63 = T::nearest(6.0) * t62;
         let t64 = t23 * t6;
         let t65 = t63 + t64;
-        let t66 = T::one() / t8;
-        let t67 = t65 * t66;
-        let t68 = t25 * t67;
-        let t71 = self.fixed[7] * t8;
-        let t72 = T::nearest(3.0) - t71;
-        let t73 = X[0] * X[1];
-        let t74 = t73 * t72;
-        let t75 = t74 * t66;
-        let t76 = t25 * t75;
-        let t77 = X[0] * X[2];
-        let t78 = t77 * t72;
-        let t79 = t78 * t66;
-        let t80 = t25 * t79;
-        let t81 = t1 * t61;
-        let t82 = T::nearest(6.0) * t81;
-        let t83 = t3 + t5;
-        let t84 = t23 * t83;
-        let t85 = t82 + t84;
-        let t86 = t85 * t66;
-        let t87 = t25 * t86;
-        let t88 = X[1] * X[2];
-        let t89 = t88 * t72;
-        let t90 = t89 * t66;
-        let t91 = t25 * t90;
-        let t92 = t3 * t61;
-        let t93 = T::nearest(6.0) * t92;
-        let t94 = t1 + t5;
-        let t95 = t23 * t94;
-        let t96 = t93 + t95;
-        let t97 = t96 * t66;
-        let t98 = t25 * t97;
-        let t99 = t68 + T::one();
-        let t100 = t87 + T::one();
-        let t101 = t98 + T::one();
+        let t66 = T::one() / t7;
+        let t67 = t8 * t66;
+        let t68 = t65 * t67;
+        let t69 = t25 * t68;
+        let t72 = self.fixed[7] * t8;
+        let t73 = T::nearest(3.0) - t72;
+        let t74 = X[0] * X[1];
+        let t75 = t74 * t73;
+        let t76 = t75 * t67;
+        let t77 = t25 * t76;
+        let t78 = X[0] * X[2];
+        let t79 = t78 * t73;
+        let t80 = t79 * t67;
+        let t81 = t25 * t80;
+        let t82 = t4 + t5;
+        let t83 = t3 * t60;
+        let t84 = T::nearest(6.0) * t83;
+        let t85 = t23 * t82;
+        let t86 = t84 + t85;
+        let t87 = t86 * t67;
+        let t88 = t25 * t87;
+        let t89 = X[1] * X[2];
+        let t90 = t89 * t73;
+        let t91 = t90 * t67;
+        let t92 = t25 * t91;
+        let t93 = t3 + t5;
+        let t94 = t4 * t60;
+        let t95 = T::nearest(6.0) * t94;
+        let t96 = t23 * t93;
+        let t97 = t95 + t96;
+        let t98 = t97 * t67;
+        let t99 = t25 * t98;
+        let t100 = t69 + T::one();
+        let t101 = t88 + T::one();
+        let t102 = t99 + T::one();
         crate::nalgebra::SMatrix::<
             T,
             3,
             3,
-        >::new(t99, t76, t80, t76, t100, t91, t80, t91, t101)
+        >::new(t100, t77, t81, t77, t101, t92, t81, t92, t102)
     }
     #[inline]
     fn jacobian(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> T {
-        let t1 = X[1] * X[1];
-        let t3 = X[2] * X[2];
+        let t3 = X[1] * X[1];
+        let t4 = X[2] * X[2];
         let t5 = X[0] * X[0];
-        let t6 = t1 + t3;
+        let t6 = t3 + t4;
         let t7 = t6 + t5;
         let t8 = t7.sqrt();
         let t17 = self.fixed[0] * t;
@@ -512,17 +516,17 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t23 = T::nearest(3.0) - t21;
         let t25 = self.fixed[2] * t18;
         let t26 = t8 * t23;
-        let t60 = self.fixed[6] * t8;
-        let t61 = T::one() - t60;
-        let t104 = self.fixed[8] * t18;
-        let t105 = t8 * t61;
-        let t106 = t104 * t105;
-        let t107 = t106 + T::one();
-        let t108 = t25 * t26;
-        let t109 = t108 + T::one();
-        let t110 = t109 * t109;
-        let t111 = t107 * t110;
-        t111
+        let t59 = self.fixed[6] * t8;
+        let t60 = T::one() - t59;
+        let t105 = self.fixed[8] * t18;
+        let t106 = t8 * t60;
+        let t107 = t105 * t106;
+        let t108 = t107 + T::one();
+        let t109 = t25 * t26;
+        let t110 = t109 + T::one();
+        let t111 = t110 * t110;
+        let t112 = t108 * t111;
+        t112
     }
     #[inline]
     fn first_piola_kirchhoff(
@@ -530,10 +534,10 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 3, 3> {
-        let t1 = X[1] * X[1];
-        let t3 = X[2] * X[2];
+        let t3 = X[1] * X[1];
+        let t4 = X[2] * X[2];
         let t5 = X[0] * X[0];
-        let t6 = t1 + t3;
+        let t6 = t3 + t4;
         let t7 = t6 + t5;
         let t8 = t7.sqrt();
         let t17 = self.fixed[0] * t;
@@ -542,66 +546,65 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t23 = T::nearest(3.0) - t21;
         let t25 = self.fixed[2] * t18;
         let t26 = t8 * t23;
-        let t60 = self.fixed[6] * t8;
-        let t61 = T::one() - t60;
-        let t66 = T::one() / t8;
-        let t73 = X[0] * X[1];
-        let t77 = X[0] * X[2];
-        let t83 = t3 + t5;
-        let t88 = X[1] * X[2];
-        let t94 = t1 + t5;
-        let t104 = self.fixed[8] * t18;
-        let t105 = t8 * t61;
-        let t106 = t104 * t105;
-        let t107 = t106 + T::one();
-        let t108 = t25 * t26;
-        let t109 = t108 + T::one();
-        let t118 = self.fixed[9] * t18;
-        let t119 = t118 * t26;
-        let t120 = t119 * t106;
-        let t123 = t18 * t18;
-        let t124 = t23 * t23;
-        let t126 = self.fixed[10] * t123;
-        let t127 = t7 * t124;
-        let t128 = t126 * t127;
-        let t129 = t128 * t106;
-        let t130 = t119 + t106;
-        let t131 = t130 + t120;
-        let t132 = t131 + t128;
-        let t133 = t132 + t129;
-        let t134 = t133.ln_1p();
-        let t138 = self.fixed[11] * t134;
-        let t142 = t106 + T::nearest(2.0);
-        let t143 = t106 * t142;
-        let t144 = self.fixed[12] * t143;
-        let t145 = t138 + t144;
-        let t146 = t145 / t107;
-        let t147 = t5 * t146;
-        let t148 = t108 + T::nearest(2.0);
-        let t151 = self.fixed[13] * t18;
-        let t152 = t151 * t26;
-        let t153 = t152 * t148;
-        let t154 = t138 + t153;
-        let t155 = t154 / t109;
-        let t156 = t6 * t155;
-        let t157 = t147 + t156;
-        let t158 = t66 * t66;
-        let t159 = t158 * t157;
-        let t160 = t146 - t155;
-        let t161 = t73 * t158;
+        let t59 = self.fixed[6] * t8;
+        let t60 = T::one() - t59;
+        let t66 = T::one() / t7;
+        let t74 = X[0] * X[1];
+        let t78 = X[0] * X[2];
+        let t82 = t4 + t5;
+        let t89 = X[1] * X[2];
+        let t93 = t3 + t5;
+        let t105 = self.fixed[8] * t18;
+        let t106 = t8 * t60;
+        let t107 = t105 * t106;
+        let t108 = t107 + T::one();
+        let t109 = t25 * t26;
+        let t110 = t109 + T::one();
+        let t117 = t18 * t26;
+        let t118 = t117 * t108;
+        let t121 = self.fixed[9] * t118;
+        let t122 = t18 * t18;
+        let t123 = t23 * t23;
+        let t124 = t7 * t123;
+        let t125 = t122 * t124;
+        let t126 = t125 * t108;
+        let t130 = self.fixed[10] * t126;
+        let t131 = t121 + t107;
+        let t132 = t131 + t130;
+        let t133 = t132.ln_1p();
+        let t137 = t107 + T::nearest(2.0);
+        let t141 = self.fixed[12] * t133;
+        let t142 = t107 * t137;
+        let t143 = self.fixed[11] * t142;
+        let t144 = t141 + t143;
+        let t145 = t109 + T::nearest(2.0);
+        let t148 = self.fixed[13] * t18;
+        let t149 = t148 * t26;
+        let t150 = t149 * t145;
+        let t151 = t141 + t150;
+        let t152 = T::one() / t108;
+        let t153 = t144 * t152;
+        let t154 = t5 * t153;
+        let t155 = T::one() / t110;
+        let t156 = t151 * t155;
+        let t157 = t6 * t156;
+        let t158 = t154 + t157;
+        let t159 = t66 * t158;
+        let t160 = t153 - t156;
+        let t161 = t74 * t66;
         let t162 = t161 * t160;
-        let t163 = t77 * t158;
+        let t163 = t78 * t66;
         let t164 = t163 * t160;
-        let t165 = t1 * t146;
-        let t166 = t83 * t155;
+        let t165 = t3 * t153;
+        let t166 = t82 * t156;
         let t167 = t165 + t166;
-        let t168 = t158 * t167;
-        let t169 = t88 * t158;
+        let t168 = t66 * t167;
+        let t169 = t89 * t66;
         let t170 = t169 * t160;
-        let t171 = t3 * t146;
-        let t172 = t94 * t155;
+        let t171 = t4 * t153;
+        let t172 = t93 * t156;
         let t173 = t171 + t172;
-        let t174 = t158 * t173;
+        let t174 = t66 * t173;
         crate::nalgebra::SMatrix::<
             T,
             3,
@@ -614,10 +617,10 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t1 = X[1] * X[1];
-        let t3 = X[2] * X[2];
+        let t3 = X[1] * X[1];
+        let t4 = X[2] * X[2];
         let t5 = X[0] * X[0];
-        let t6 = t1 + t3;
+        let t6 = t3 + t4;
         let t7 = t6 + t5;
         let t8 = t7.sqrt();
         let t17 = self.fixed[0] * t;
@@ -626,124 +629,87 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t23 = T::nearest(3.0) - t21;
         let t25 = self.fixed[2] * t18;
         let t26 = t8 * t23;
-        let t60 = self.fixed[6] * t8;
-        let t61 = T::one() - t60;
-        let t66 = T::one() / t8;
-        let t71 = self.fixed[7] * t8;
-        let t72 = T::nearest(3.0) - t71;
-        let t104 = self.fixed[8] * t18;
-        let t105 = t8 * t61;
-        let t106 = t104 * t105;
-        let t107 = t106 + T::one();
-        let t108 = t25 * t26;
-        let t109 = t108 + T::one();
-        let t118 = self.fixed[9] * t18;
-        let t119 = t118 * t26;
-        let t120 = t119 * t106;
-        let t123 = t18 * t18;
-        let t124 = t23 * t23;
-        let t126 = self.fixed[10] * t123;
-        let t127 = t7 * t124;
-        let t128 = t126 * t127;
-        let t129 = t128 * t106;
-        let t130 = t119 + t106;
-        let t131 = t130 + t120;
-        let t132 = t131 + t128;
-        let t133 = t132 + t129;
-        let t134 = t133.ln_1p();
-        let t175 = X[0] * t66;
-        let t176 = t7 * t23;
-        let t177 = self.fixed[4] * t176;
-        let t180 = self.fixed[14] * t8;
-        let t181 = T::nearest(3.0) - t180;
-        let t186 = self.fixed[15] * t181;
-        let t187 = t177 + t186;
-        let t189 = self.fixed[16] * t187;
-        let t190 = -t189;
-        let t191 = t107 * t107;
-        let t193 = t7 * t8;
-        let t196 = t61 * t61;
-        let t202 = t193 * t23;
-        let t203 = t202 * t196;
-        let t204 = t203 * t181;
-        let t205 = self.fixed[17] * t204;
-        let t206 = t18 * t205;
-        let t211 = T::one() - t21;
-        let t212 = t23 * t211;
-        let t213 = t61 * t72;
-        let t214 = T::nearest(2.0) * t213;
-        let t215 = t212 + t214;
-        let t219 = self.fixed[18] * t215;
-        let t222 = self.fixed[19] * t8;
-        let t224 = T::nearest(9.0) - t222;
-        let t226 = t211 * t224;
-        let t227 = self.fixed[20] * t226;
-        let t228 = self.fixed[20] * t212;
-        let t230 = t61 * t224;
-        let t231 = self.fixed[21] * t230;
-        let t233 = self.fixed[22] * t124;
-        let t235 = t61 * t211;
-        let t236 = T::nearest(18.0) * t235;
-        let t237 = t23 * t72;
-        let t238 = t23 * t181;
-        let t239 = T::nearest(2.0) * t238;
-        let t240 = t236 + t237;
-        let t241 = t240 + t239;
-        let t242 = self.fixed[11] * t241;
-        let t243 = t219 + t227;
-        let t244 = t243 + t228;
-        let t245 = t244 + t231;
-        let t246 = t245 - t233;
-        let t247 = t246 + t242;
-        let t251 = t7 * t61;
-        let t252 = t251 * t247;
-        let t253 = self.fixed[23] * t252;
-        let t254 = t253 + t206;
-        let t255 = t18 * t254;
-        let t256 = T::nearest(2.0) * t230;
-        let t257 = t23 * t61;
-        let t258 = T::nearest(4.0) * t257;
-        let t259 = t212 + t256;
-        let t260 = t259 - t258;
-        let t268 = t8 * t260;
-        let t269 = self.fixed[24] * t268;
-        let t270 = t269 * t134;
-        let t271 = self.fixed[12] * t124;
-        let t272 = self.fixed[11] * t181;
-        let t274 = self.fixed[25] * t8;
-        let t275 = T::nearest(2.0) - t274;
-        let t276 = self.fixed[20] * t275;
-        let t277 = t272 + t276;
-        let t278 = t61 * t277;
-        let t279 = T::nearest(12.0) * t278;
-        let t280 = self.fixed[11] * t240;
-        let t281 = t271 - t279;
-        let t282 = t281 - t280;
-        let t285 = t8 * t282;
-        let t286 = self.fixed[26] * t285;
-        let t287 = -t286;
-        let t288 = t255 + t270;
-        let t289 = t287 + t288;
-        let t290 = t18 * t289;
-        let t297 = self.fixed[27] * t181;
-        let t298 = t297 * t134;
-        let t299 = t290 + t298;
-        let t300 = t191 * t109;
-        let t301 = t299 / t300;
-        let t302 = t190 + t301;
-        let t303 = t18 * t302;
-        let t304 = t175 * t303;
-        let t305 = X[1] * t66;
-        let t306 = t305 * t303;
-        let t307 = X[2] * t66;
-        let t308 = t307 * t303;
-        crate::nalgebra::SVector::<T, 3>::new(t304, t306, t308)
+        let t59 = self.fixed[6] * t8;
+        let t60 = T::one() - t59;
+        let t66 = T::one() / t7;
+        let t67 = t8 * t66;
+        let t72 = self.fixed[7] * t8;
+        let t73 = T::nearest(3.0) - t72;
+        let t105 = self.fixed[8] * t18;
+        let t106 = t8 * t60;
+        let t107 = t105 * t106;
+        let t108 = t107 + T::one();
+        let t109 = t25 * t26;
+        let t110 = t109 + T::one();
+        let t152 = T::one() / t108;
+        let t155 = T::one() / t110;
+        let t177 = self.fixed[14] * t8;
+        let t178 = T::nearest(3.0) - t177;
+        let t181 = t7 * t23;
+        let t182 = self.fixed[4] * t181;
+        let t185 = self.fixed[15] * t178;
+        let t186 = t182 + t185;
+        let t188 = self.fixed[16] * t18;
+        let t189 = t188 * t186;
+        let t190 = T::one() - t21;
+        let t191 = t105 * t190;
+        let t192 = t191 * t152;
+        let t193 = self.fixed[9] * t18;
+        let t194 = t193 * t73;
+        let t195 = t194 * t155;
+        let t196 = t192 + t195;
+        let t197 = self.fixed[12] * t196;
+        let t198 = self.fixed[11] * t191;
+        let t199 = t197 + t198;
+        let t200 = t107 * t109;
+        let t201 = t193 * t26;
+        let t202 = T::nearest(2.0) * t200;
+        let t203 = t109 * t109;
+        let t204 = t109 * t200;
+        let t205 = t201 + t107;
+        let t206 = t205 + t202;
+        let t207 = t206 + t203;
+        let t208 = t207 + t204;
+        let t209 = t208.ln_1p();
+        let t210 = self.fixed[11] * t107;
+        let t211 = self.fixed[12] * t209;
+        let t212 = t210 + t211;
+        let t213 = t107 * t192;
+        let t214 = t107 * t199;
+        let t215 = t191 * t212;
+        let t216 = t212 * t213;
+        let t217 = t214 + t215;
+        let t218 = t217 - t216;
+        let t219 = self.fixed[11] * t109;
+        let t220 = t211 + t219;
+        let t221 = t109 * t155;
+        let t222 = t194 * t221;
+        let t223 = t213 + t222;
+        let t224 = t218 * t152;
+        let t225 = T::nearest(2.0) * t67;
+        let t226 = t107 * t212;
+        let t227 = t226 * t152;
+        let t228 = t225 * t227;
+        let t229 = t193 * t23;
+        let t230 = t220 * t155;
+        let t231 = t229 * t230;
+        let t232 = self.fixed[12] * t223;
+        let t233 = t224 + t228;
+        let t234 = t233 - t231;
+        let t235 = t234 + t232;
+        let t237 = self.fixed[17] * t235;
+        let t238 = t237 - t189;
+        let t239 = t67 * t238;
+        let t240 = X[0] * t239;
+        let t241 = X[1] * t239;
+        let t242 = X[2] * t239;
+        crate::nalgebra::SVector::<T, 3>::new(t240, t241, t242)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> crate::Fields<T, 3> {
-        let t1 = X[1] * X[1];
-        let t3 = X[2] * X[2];
+        let t3 = X[1] * X[1];
+        let t4 = X[2] * X[2];
         let t5 = X[0] * X[0];
-        let t6 = t1 + t3;
+        let t6 = t3 + t4;
         let t7 = t6 + t5;
         let t8 = t7.sqrt();
         let t17 = self.fixed[0] * t;
@@ -773,186 +739,160 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t54 = -t53;
         let t55 = t50 * t31;
         let t56 = -t55;
-        let t60 = self.fixed[6] * t8;
-        let t61 = T::one() - t60;
-        let t62 = t5 * t61;
+        let t59 = self.fixed[6] * t8;
+        let t60 = T::one() - t59;
+        let t62 = t5 * t60;
         let t63 = T::nearest(6.0) * t62;
         let t64 = t23 * t6;
         let t65 = t63 + t64;
-        let t66 = T::one() / t8;
-        let t67 = t65 * t66;
-        let t68 = t25 * t67;
-        let t71 = self.fixed[7] * t8;
-        let t72 = T::nearest(3.0) - t71;
-        let t73 = X[0] * X[1];
-        let t74 = t73 * t72;
-        let t75 = t74 * t66;
-        let t76 = t25 * t75;
-        let t77 = X[0] * X[2];
-        let t78 = t77 * t72;
-        let t79 = t78 * t66;
-        let t80 = t25 * t79;
-        let t81 = t1 * t61;
-        let t82 = T::nearest(6.0) * t81;
-        let t83 = t3 + t5;
-        let t84 = t23 * t83;
-        let t85 = t82 + t84;
-        let t86 = t85 * t66;
-        let t87 = t25 * t86;
-        let t88 = X[1] * X[2];
-        let t89 = t88 * t72;
-        let t90 = t89 * t66;
-        let t91 = t25 * t90;
-        let t92 = t3 * t61;
-        let t93 = T::nearest(6.0) * t92;
-        let t94 = t1 + t5;
-        let t95 = t23 * t94;
-        let t96 = t93 + t95;
-        let t97 = t96 * t66;
-        let t98 = t25 * t97;
-        let t99 = t68 + T::one();
-        let t100 = t87 + T::one();
-        let t101 = t98 + T::one();
-        let t104 = self.fixed[8] * t18;
-        let t105 = t8 * t61;
-        let t106 = t104 * t105;
-        let t107 = t106 + T::one();
-        let t108 = t25 * t26;
-        let t109 = t108 + T::one();
-        let t110 = t109 * t109;
-        let t111 = t107 * t110;
-        let t118 = self.fixed[9] * t18;
-        let t119 = t118 * t26;
-        let t120 = t119 * t106;
-        let t123 = t18 * t18;
-        let t124 = t23 * t23;
-        let t126 = self.fixed[10] * t123;
-        let t127 = t7 * t124;
-        let t128 = t126 * t127;
-        let t129 = t128 * t106;
-        let t130 = t119 + t106;
-        let t131 = t130 + t120;
-        let t132 = t131 + t128;
-        let t133 = t132 + t129;
-        let t134 = t133.ln_1p();
-        let t138 = self.fixed[11] * t134;
-        let t142 = t106 + T::nearest(2.0);
-        let t143 = t106 * t142;
-        let t144 = self.fixed[12] * t143;
-        let t145 = t138 + t144;
-        let t146 = t145 / t107;
-        let t147 = t5 * t146;
-        let t148 = t108 + T::nearest(2.0);
-        let t151 = self.fixed[13] * t18;
-        let t152 = t151 * t26;
-        let t153 = t152 * t148;
-        let t154 = t138 + t153;
-        let t155 = t154 / t109;
-        let t156 = t6 * t155;
-        let t157 = t147 + t156;
-        let t158 = t66 * t66;
-        let t159 = t158 * t157;
-        let t160 = t146 - t155;
-        let t161 = t73 * t158;
+        let t66 = T::one() / t7;
+        let t67 = t8 * t66;
+        let t68 = t65 * t67;
+        let t69 = t25 * t68;
+        let t72 = self.fixed[7] * t8;
+        let t73 = T::nearest(3.0) - t72;
+        let t74 = X[0] * X[1];
+        let t75 = t74 * t73;
+        let t76 = t75 * t67;
+        let t77 = t25 * t76;
+        let t78 = X[0] * X[2];
+        let t79 = t78 * t73;
+        let t80 = t79 * t67;
+        let t81 = t25 * t80;
+        let t82 = t4 + t5;
+        let t83 = t3 * t60;
+        let t84 = T::nearest(6.0) * t83;
+        let t85 = t23 * t82;
+        let t86 = t84 + t85;
+        let t87 = t86 * t67;
+        let t88 = t25 * t87;
+        let t89 = X[1] * X[2];
+        let t90 = t89 * t73;
+        let t91 = t90 * t67;
+        let t92 = t25 * t91;
+        let t93 = t3 + t5;
+        let t94 = t4 * t60;
+        let t95 = T::nearest(6.0) * t94;
+        let t96 = t23 * t93;
+        let t97 = t95 + t96;
+        let t98 = t97 * t67;
+        let t99 = t25 * t98;
+        let t100 = t69 + T::one();
+        let t101 = t88 + T::one();
+        let t102 = t99 + T::one();
+        let t105 = self.fixed[8] * t18;
+        let t106 = t8 * t60;
+        let t107 = t105 * t106;
+        let t108 = t107 + T::one();
+        let t109 = t25 * t26;
+        let t110 = t109 + T::one();
+        let t111 = t110 * t110;
+        let t112 = t108 * t111;
+        let t117 = t18 * t26;
+        let t118 = t117 * t108;
+        let t121 = self.fixed[9] * t118;
+        let t122 = t18 * t18;
+        let t123 = t23 * t23;
+        let t124 = t7 * t123;
+        let t125 = t122 * t124;
+        let t126 = t125 * t108;
+        let t130 = self.fixed[10] * t126;
+        let t131 = t121 + t107;
+        let t132 = t131 + t130;
+        let t133 = t132.ln_1p();
+        let t137 = t107 + T::nearest(2.0);
+        let t141 = self.fixed[12] * t133;
+        let t142 = t107 * t137;
+        let t143 = self.fixed[11] * t142;
+        let t144 = t141 + t143;
+        let t145 = t109 + T::nearest(2.0);
+        let t148 = self.fixed[13] * t18;
+        let t149 = t148 * t26;
+        let t150 = t149 * t145;
+        let t151 = t141 + t150;
+        let t152 = T::one() / t108;
+        let t153 = t144 * t152;
+        let t154 = t5 * t153;
+        let t155 = T::one() / t110;
+        let t156 = t151 * t155;
+        let t157 = t6 * t156;
+        let t158 = t154 + t157;
+        let t159 = t66 * t158;
+        let t160 = t153 - t156;
+        let t161 = t74 * t66;
         let t162 = t161 * t160;
-        let t163 = t77 * t158;
+        let t163 = t78 * t66;
         let t164 = t163 * t160;
-        let t165 = t1 * t146;
-        let t166 = t83 * t155;
+        let t165 = t3 * t153;
+        let t166 = t82 * t156;
         let t167 = t165 + t166;
-        let t168 = t158 * t167;
-        let t169 = t88 * t158;
+        let t168 = t66 * t167;
+        let t169 = t89 * t66;
         let t170 = t169 * t160;
-        let t171 = t3 * t146;
-        let t172 = t94 * t155;
+        let t171 = t4 * t153;
+        let t172 = t93 * t156;
         let t173 = t171 + t172;
-        let t174 = t158 * t173;
-        let t175 = X[0] * t66;
-        let t176 = t7 * t23;
-        let t177 = self.fixed[4] * t176;
-        let t180 = self.fixed[14] * t8;
-        let t181 = T::nearest(3.0) - t180;
-        let t186 = self.fixed[15] * t181;
-        let t187 = t177 + t186;
-        let t189 = self.fixed[16] * t187;
-        let t190 = -t189;
-        let t191 = t107 * t107;
-        let t193 = t7 * t8;
-        let t196 = t61 * t61;
-        let t202 = t193 * t23;
-        let t203 = t202 * t196;
-        let t204 = t203 * t181;
-        let t205 = self.fixed[17] * t204;
-        let t206 = t18 * t205;
-        let t211 = T::one() - t21;
-        let t212 = t23 * t211;
-        let t213 = t61 * t72;
-        let t214 = T::nearest(2.0) * t213;
-        let t215 = t212 + t214;
-        let t219 = self.fixed[18] * t215;
-        let t222 = self.fixed[19] * t8;
-        let t224 = T::nearest(9.0) - t222;
-        let t226 = t211 * t224;
-        let t227 = self.fixed[20] * t226;
-        let t228 = self.fixed[20] * t212;
-        let t230 = t61 * t224;
-        let t231 = self.fixed[21] * t230;
-        let t233 = self.fixed[22] * t124;
-        let t235 = t61 * t211;
-        let t236 = T::nearest(18.0) * t235;
-        let t237 = t23 * t72;
-        let t238 = t23 * t181;
-        let t239 = T::nearest(2.0) * t238;
-        let t240 = t236 + t237;
-        let t241 = t240 + t239;
-        let t242 = self.fixed[11] * t241;
-        let t243 = t219 + t227;
-        let t244 = t243 + t228;
-        let t245 = t244 + t231;
-        let t246 = t245 - t233;
-        let t247 = t246 + t242;
-        let t251 = t7 * t61;
-        let t252 = t251 * t247;
-        let t253 = self.fixed[23] * t252;
-        let t254 = t253 + t206;
-        let t255 = t18 * t254;
-        let t256 = T::nearest(2.0) * t230;
-        let t257 = t23 * t61;
-        let t258 = T::nearest(4.0) * t257;
-        let t259 = t212 + t256;
-        let t260 = t259 - t258;
-        let t268 = t8 * t260;
-        let t269 = self.fixed[24] * t268;
-        let t270 = t269 * t134;
-        let t271 = self.fixed[12] * t124;
-        let t272 = self.fixed[11] * t181;
-        let t274 = self.fixed[25] * t8;
-        let t275 = T::nearest(2.0) - t274;
-        let t276 = self.fixed[20] * t275;
-        let t277 = t272 + t276;
-        let t278 = t61 * t277;
-        let t279 = T::nearest(12.0) * t278;
-        let t280 = self.fixed[11] * t240;
-        let t281 = t271 - t279;
-        let t282 = t281 - t280;
-        let t285 = t8 * t282;
-        let t286 = self.fixed[26] * t285;
-        let t287 = -t286;
-        let t288 = t255 + t270;
-        let t289 = t287 + t288;
-        let t290 = t18 * t289;
-        let t297 = self.fixed[27] * t181;
-        let t298 = t297 * t134;
-        let t299 = t290 + t298;
-        let t300 = t191 * t109;
-        let t301 = t299 / t300;
-        let t302 = t190 + t301;
-        let t303 = t18 * t302;
-        let t304 = t175 * t303;
-        let t305 = X[1] * t66;
-        let t306 = t305 * t303;
-        let t307 = X[2] * t66;
-        let t308 = t307 * t303;
+        let t174 = t66 * t173;
+        let t177 = self.fixed[14] * t8;
+        let t178 = T::nearest(3.0) - t177;
+        let t181 = t7 * t23;
+        let t182 = self.fixed[4] * t181;
+        let t185 = self.fixed[15] * t178;
+        let t186 = t182 + t185;
+        let t188 = self.fixed[16] * t18;
+        let t189 = t188 * t186;
+        let t190 = T::one() - t21;
+        let t191 = t105 * t190;
+        let t192 = t191 * t152;
+        let t193 = self.fixed[9] * t18;
+        let t194 = t193 * t73;
+        let t195 = t194 * t155;
+        let t196 = t192 + t195;
+        let t197 = self.fixed[12] * t196;
+        let t198 = self.fixed[11] * t191;
+        let t199 = t197 + t198;
+        let t200 = t107 * t109;
+        let t201 = t193 * t26;
+        let t202 = T::nearest(2.0) * t200;
+        let t203 = t109 * t109;
+        let t204 = t109 * t200;
+        let t205 = t201 + t107;
+        let t206 = t205 + t202;
+        let t207 = t206 + t203;
+        let t208 = t207 + t204;
+        let t209 = t208.ln_1p();
+        let t210 = self.fixed[11] * t107;
+        let t211 = self.fixed[12] * t209;
+        let t212 = t210 + t211;
+        let t213 = t107 * t192;
+        let t214 = t107 * t199;
+        let t215 = t191 * t212;
+        let t216 = t212 * t213;
+        let t217 = t214 + t215;
+        let t218 = t217 - t216;
+        let t219 = self.fixed[11] * t109;
+        let t220 = t211 + t219;
+        let t221 = t109 * t155;
+        let t222 = t194 * t221;
+        let t223 = t213 + t222;
+        let t224 = t218 * t152;
+        let t225 = T::nearest(2.0) * t67;
+        let t226 = t107 * t212;
+        let t227 = t226 * t152;
+        let t228 = t225 * t227;
+        let t229 = t193 * t23;
+        let t230 = t220 * t155;
+        let t231 = t229 * t230;
+        let t232 = self.fixed[12] * t223;
+        let t233 = t224 + t228;
+        let t234 = t233 - t231;
+        let t235 = t234 + t232;
+        let t237 = self.fixed[17] * t235;
+        let t238 = t237 - t189;
+        let t239 = t67 * t238;
+        let t240 = X[0] * t239;
+        let t241 = X[1] * t239;
+        let t242 = X[2] * t239;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 3>::new(t28, t30, t32),
             v: crate::nalgebra::SVector::<T, 3>::new(t40, t42, t44),
@@ -961,19 +901,19 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 T,
                 3,
                 3,
-            >::new(t68, t76, t80, t76, t87, t91, t80, t91, t98),
+            >::new(t69, t77, t81, t77, t88, t92, t81, t92, t99),
             F: crate::nalgebra::SMatrix::<
                 T,
                 3,
                 3,
-            >::new(t99, t76, t80, t76, t100, t91, t80, t91, t101),
-            J: t111,
+            >::new(t100, t77, t81, t77, t101, t92, t81, t92, t102),
+            J: t112,
             P: crate::nalgebra::SMatrix::<
                 T,
                 3,
                 3,
             >::new(t159, t162, t164, t162, t168, t170, t164, t170, t174),
-            b: crate::nalgebra::SVector::<T, 3>::new(t304, t306, t308),
+            b: crate::nalgebra::SVector::<T, 3>::new(t240, t241, t242),
         }
     }
     fn domain(&self) -> crate::Domain<T, 3> {
@@ -1011,8 +951,8 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
     }
     fn material(&self) -> crate::Material<T> {
         crate::Material::NeoHookean {
-            lambda: self.fixed[11],
-            mu: self.fixed[12],
+            lambda: self.fixed[12],
+            mu: self.fixed[11],
         }
     }
     fn density(&self) -> T {
@@ -1022,155 +962,152 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[28]
+        self.fixed[29]
     }
     fn body_force_at(
         &self,
         X: &[crate::nalgebra::SVector<T, 3>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 3> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 5, 12>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 4, 12>::new(*self, X))
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 3, 5, 12> for SphereShell<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 12> for SphereShell<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 5] {
+    fn body_force_time(&self, t: T) -> [T; 4] {
         let t17 = self.fixed[0] * t;
         let t18 = t17.cos_pi();
         let t25 = self.fixed[2] * t18;
-        let t104 = self.fixed[8] * t18;
-        let t118 = self.fixed[9] * t18;
-        let t123 = t18 * t18;
-        let t126 = self.fixed[10] * t123;
-        [t18, t25, t104, t118, t126]
+        let t105 = self.fixed[8] * t18;
+        let t122 = t18 * t18;
+        [t18, t25, t105, t122]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 12] {
-        let t1 = X[1] * X[1];
-        let t3 = X[2] * X[2];
+        let t3 = X[1] * X[1];
+        let t4 = X[2] * X[2];
         let t5 = X[0] * X[0];
-        let t6 = t1 + t3;
+        let t6 = t3 + t4;
         let t7 = t6 + t5;
         let t8 = t7.sqrt();
         let t21 = self.fixed[1] * t8;
         let t23 = T::nearest(3.0) - t21;
         let t26 = t8 * t23;
-        let t60 = self.fixed[6] * t8;
-        let t61 = T::one() - t60;
-        let t66 = T::one() / t8;
-        let t71 = self.fixed[7] * t8;
-        let t72 = T::nearest(3.0) - t71;
-        let t105 = t8 * t61;
-        let t124 = t23 * t23;
-        let t127 = t7 * t124;
-        let t175 = X[0] * t66;
-        let t176 = t7 * t23;
-        let t177 = self.fixed[4] * t176;
-        let t180 = self.fixed[14] * t8;
-        let t181 = T::nearest(3.0) - t180;
-        let t186 = self.fixed[15] * t181;
-        let t187 = t177 + t186;
-        let t189 = self.fixed[16] * t187;
-        let t190 = -t189;
-        let t193 = t7 * t8;
-        let t196 = t61 * t61;
-        let t202 = t193 * t23;
-        let t203 = t202 * t196;
-        let t204 = t203 * t181;
-        let t205 = self.fixed[17] * t204;
-        let t211 = T::one() - t21;
-        let t212 = t23 * t211;
-        let t213 = t61 * t72;
-        let t214 = T::nearest(2.0) * t213;
-        let t215 = t212 + t214;
-        let t219 = self.fixed[18] * t215;
-        let t222 = self.fixed[19] * t8;
-        let t224 = T::nearest(9.0) - t222;
-        let t226 = t211 * t224;
-        let t227 = self.fixed[20] * t226;
-        let t228 = self.fixed[20] * t212;
-        let t230 = t61 * t224;
-        let t231 = self.fixed[21] * t230;
-        let t233 = self.fixed[22] * t124;
-        let t235 = t61 * t211;
-        let t236 = T::nearest(18.0) * t235;
-        let t237 = t23 * t72;
-        let t238 = t23 * t181;
-        let t239 = T::nearest(2.0) * t238;
-        let t240 = t236 + t237;
-        let t241 = t240 + t239;
-        let t242 = self.fixed[11] * t241;
-        let t243 = t219 + t227;
-        let t244 = t243 + t228;
-        let t245 = t244 + t231;
-        let t246 = t245 - t233;
-        let t247 = t246 + t242;
-        let t251 = t7 * t61;
-        let t252 = t251 * t247;
-        let t253 = self.fixed[23] * t252;
-        let t256 = T::nearest(2.0) * t230;
-        let t257 = t23 * t61;
-        let t258 = T::nearest(4.0) * t257;
-        let t259 = t212 + t256;
-        let t260 = t259 - t258;
-        let t268 = t8 * t260;
-        let t269 = self.fixed[24] * t268;
-        let t271 = self.fixed[12] * t124;
-        let t272 = self.fixed[11] * t181;
-        let t274 = self.fixed[25] * t8;
-        let t275 = T::nearest(2.0) - t274;
-        let t276 = self.fixed[20] * t275;
-        let t277 = t272 + t276;
-        let t278 = t61 * t277;
-        let t279 = T::nearest(12.0) * t278;
-        let t280 = self.fixed[11] * t240;
-        let t281 = t271 - t279;
-        let t282 = t281 - t280;
-        let t285 = t8 * t282;
-        let t286 = self.fixed[26] * t285;
-        let t287 = -t286;
-        let t297 = self.fixed[27] * t181;
-        let t305 = X[1] * t66;
-        let t307 = X[2] * t66;
-        [t26, t105, t127, t175, t190, t205, t253, t269, t287, t297, t305, t307]
+        let t59 = self.fixed[6] * t8;
+        let t60 = T::one() - t59;
+        let t66 = T::one() / t7;
+        let t67 = t8 * t66;
+        let t72 = self.fixed[7] * t8;
+        let t73 = T::nearest(3.0) - t72;
+        let t106 = t8 * t60;
+        let t123 = t23 * t23;
+        let t124 = t7 * t123;
+        let t177 = self.fixed[14] * t8;
+        let t178 = T::nearest(3.0) - t177;
+        let t181 = t7 * t23;
+        let t182 = self.fixed[4] * t181;
+        let t185 = self.fixed[15] * t178;
+        let t186 = t182 + t185;
+        let t190 = T::one() - t21;
+        let t243 = X[0] * t67;
+        let t244 = self.fixed[16] * t186;
+        let t247 = t7 * t8;
+        let t250 = t60 * t60;
+        let t255 = t247 * t23;
+        let t256 = t255 * t250;
+        let t257 = t256 * t178;
+        let t258 = self.fixed[18] * t257;
+        let t259 = t23 * t190;
+        let t260 = t60 * t73;
+        let t261 = T::nearest(2.0) * t260;
+        let t262 = t259 + t261;
+        let t265 = self.fixed[19] * t8;
+        let t267 = T::nearest(9.0) - t265;
+        let t269 = t60 * t190;
+        let t270 = T::nearest(18.0) * t269;
+        let t271 = t23 * t73;
+        let t272 = t23 * t178;
+        let t273 = T::nearest(2.0) * t272;
+        let t274 = t270 + t271;
+        let t275 = t274 + t273;
+        let t279 = self.fixed[20] * t262;
+        let t280 = T::nearest(6.0) - t177;
+        let t281 = t280 * t190;
+        let t282 = T::nearest(2.0) * t281;
+        let t284 = self.fixed[21] * t282;
+        let t286 = t60 * t267;
+        let t287 = self.fixed[22] * t286;
+        let t289 = self.fixed[23] * t123;
+        let t290 = self.fixed[12] * t275;
+        let t291 = t279 + t284;
+        let t292 = t291 + t287;
+        let t293 = t292 - t289;
+        let t294 = t293 + t290;
+        let t302 = t7 * t60;
+        let t303 = t302 * t294;
+        let t304 = self.fixed[24] * t303;
+        let t307 = T::nearest(2.0) * t286;
+        let t308 = t23 * t60;
+        let t309 = T::nearest(4.0) * t308;
+        let t310 = t259 + t307;
+        let t311 = t310 - t309;
+        let t319 = t8 * t311;
+        let t320 = self.fixed[25] * t319;
+        let t322 = self.fixed[26] * t8;
+        let t323 = T::nearest(2.0) - t322;
+        let t324 = self.fixed[12] * t178;
+        let t325 = self.fixed[21] * t323;
+        let t326 = t324 + t325;
+        let t327 = self.fixed[11] * t123;
+        let t328 = t60 * t326;
+        let t329 = T::nearest(12.0) * t328;
+        let t330 = self.fixed[12] * t274;
+        let t331 = t327 - t329;
+        let t332 = t331 - t330;
+        let t335 = t8 * t332;
+        let t336 = self.fixed[27] * t335;
+        let t347 = self.fixed[28] * t178;
+        let t357 = X[1] * t67;
+        let t359 = X[2] * t67;
+        [t26, t106, t124, t243, t244, t258, t304, t320, t336, t347, t357, t359]
     }
     #[inline(always)]
     fn body_force_staged(
         &self,
-        time: &[T; 5],
+        time: &[T; 4],
         point: &[T; 12],
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t106 = time[2] * point[1];
-        let t107 = t106 + T::one();
-        let t108 = time[1] * point[0];
-        let t109 = t108 + T::one();
-        let t119 = time[3] * point[0];
-        let t120 = t119 * t106;
-        let t128 = time[4] * point[2];
-        let t129 = t128 * t106;
-        let t130 = t119 + t106;
-        let t131 = t130 + t120;
-        let t132 = t131 + t128;
-        let t133 = t132 + t129;
-        let t134 = t133.ln_1p();
-        let t191 = t107 * t107;
-        let t206 = time[0] * point[5];
-        let t254 = point[6] + t206;
-        let t255 = time[0] * t254;
-        let t270 = point[7] * t134;
-        let t288 = t255 + t270;
-        let t289 = point[8] + t288;
-        let t290 = time[0] * t289;
-        let t298 = point[9] * t134;
-        let t299 = t290 + t298;
-        let t300 = t191 * t109;
-        let t301 = t299 / t300;
-        let t302 = point[4] + t301;
-        let t303 = time[0] * t302;
-        let t304 = point[3] * t303;
-        let t306 = point[10] * t303;
-        let t308 = point[11] * t303;
-        crate::nalgebra::SVector::<T, 3>::new(t304, t306, t308)
+        let t107 = time[2] * point[1];
+        let t108 = t107 + T::one();
+        let t109 = time[1] * point[0];
+        let t110 = t109 + T::one();
+        let t117 = time[0] * point[0];
+        let t118 = t117 * t108;
+        let t121 = self.fixed[9] * t118;
+        let t125 = time[3] * point[2];
+        let t126 = t125 * t108;
+        let t130 = self.fixed[10] * t126;
+        let t131 = t121 + t107;
+        let t132 = t131 + t130;
+        let t133 = t132.ln_1p();
+        let t305 = time[0] * point[5];
+        let t306 = point[6] + t305;
+        let t337 = time[0] * t306;
+        let t338 = point[7] * t133;
+        let t339 = t337 + t338;
+        let t340 = t339 - point[8];
+        let t348 = time[0] * t340;
+        let t349 = point[9] * t133;
+        let t350 = t348 + t349;
+        let t351 = t108 * t108;
+        let t352 = t351 * t110;
+        let t353 = t350 / t352;
+        let t354 = t353 - point[4];
+        let t355 = time[0] * t354;
+        let t356 = point[3] * t355;
+        let t358 = point[10] * t355;
+        let t360 = point[11] * t355;
+        crate::nalgebra::SVector::<T, 3>::new(t356, t358, t360)
     }
 }
 impl<T: crate::Real> From<SphereShell<T>> for crate::AnySolution<T> {

@@ -110,10 +110,10 @@ impl<T: crate::Real> Torsion<T> {
         if !(value.is_finite() && value > 0.0) {
             return Err(Self::DESCRIPTION.out_of_range(3, value));
         }
-        let t7 = parameters.E / parameters.rho0;
-        let t8 = t7.sqrt();
-        let t11 = T::nearest(0.5) * parameters.A;
-        let t34 = parameters.A * t8;
+        let t5 = parameters.E / parameters.rho0;
+        let t6 = t5.sqrt();
+        let t10 = T::nearest(0.5) * parameters.A;
+        let t34 = parameters.A * t6;
         let t35 = t34 * T::pi();
         let t44 = T::pi() * T::pi();
         let t51 = parameters.A * parameters.E;
@@ -122,20 +122,20 @@ impl<T: crate::Real> Torsion<T> {
         let t74 = parameters.nu + T::one();
         let t75 = T::nearest(0.5) * parameters.E;
         let t76 = t75 / t74;
-        let t99 = t11 * parameters.E;
-        let t100 = t99 / parameters.rho0;
-        let t101 = T::nearest(2.0) * t44;
-        let t105 = parameters.A / t74;
-        let t114 = T::nearest(2.0) / t8;
-        let t115 = T::nearest(2.0) * parameters.nu;
-        let t116 = T::one() - t115;
-        let t117 = parameters.E * parameters.nu;
-        let t118 = t74 * t116;
-        let t119 = t117 / t118;
-        let t120 = -T::nearest(0.5);
+        let t99 = T::nearest(2.0) * t44;
+        let t102 = parameters.A / t74;
+        let t106 = t10 * parameters.E;
+        let t107 = t106 / parameters.rho0;
+        let t121 = T::nearest(2.0) / t6;
+        let t122 = T::nearest(2.0) * parameters.nu;
+        let t123 = T::one() - t122;
+        let t124 = parameters.E * parameters.nu;
+        let t125 = t74 * t123;
+        let t126 = t124 / t125;
+        let t127 = -T::nearest(0.5);
         Ok(Torsion {
             parameters,
-            fixed: [t8, t11, t35, t53, t76, t100, t101, t105, t114, t119, t120],
+            fixed: [t6, t10, t35, t53, t76, t99, t102, t107, t121, t126, t127],
         })
     }
     /// The solution with parameter values in the order of the description; missing ones take their
@@ -174,22 +174,22 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t9 = self.fixed[0] * t;
-        let t10 = t9.sin_pi();
-        let t12 = self.fixed[1] * t10;
-        let t13 = t12 * X[2];
-        let t14 = t13.sin();
-        let t16 = X[0] * t14;
-        let t18 = t13.cos();
-        let t19 = X[1] * t18;
-        let t20 = t16 + t19;
-        let t21 = t14 * t20;
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = self.fixed[1] * t8;
+        let t12 = t11 * X[2];
+        let t13 = t12.sin();
+        let t16 = t12.cos();
+        let t17 = X[0] * t13;
+        let t18 = X[1] * t16;
+        let t19 = t17 + t18;
+        let t21 = t13 * t19;
         let t22 = T::nearest(2.0) * t21;
         let t23 = -t22;
-        let t24 = X[0] * t18;
-        let t25 = X[1] * t14;
+        let t24 = X[0] * t16;
+        let t25 = X[1] * t13;
         let t26 = t24 - t25;
-        let t27 = t14 * t26;
+        let t27 = t13 * t26;
         let t28 = T::nearest(2.0) * t27;
         crate::nalgebra::SVector::<T, 3>::new(t23, t28, T::zero())
     }
@@ -199,28 +199,28 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t9 = self.fixed[0] * t;
-        let t10 = t9.sin_pi();
-        let t12 = self.fixed[1] * t10;
-        let t13 = t12 * X[2];
-        let t14 = t13.sin();
-        let t16 = X[0] * t14;
-        let t18 = t13.cos();
-        let t19 = X[1] * t18;
-        let t20 = t16 + t19;
-        let t21 = t14 * t20;
-        let t24 = X[0] * t18;
-        let t25 = X[1] * t14;
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = self.fixed[1] * t8;
+        let t12 = t11 * X[2];
+        let t13 = t12.sin();
+        let t16 = t12.cos();
+        let t17 = X[0] * t13;
+        let t18 = X[1] * t16;
+        let t19 = t17 + t18;
+        let t21 = t13 * t19;
+        let t24 = X[0] * t16;
+        let t25 = X[1] * t13;
         let t26 = t24 - t25;
-        let t27 = t14 * t26;
-        let t31 = t9.cos_pi();
-        let t32 = t18 * t20;
+        let t27 = t13 * t26;
+        let t31 = t7.cos_pi();
+        let t32 = t16 * t19;
         let t33 = t27 + t32;
         let t36 = self.fixed[2] * t31;
         let t37 = t36 * X[2];
         let t38 = t37 * t33;
         let t39 = -t38;
-        let t40 = t18 * t26;
+        let t40 = t16 * t26;
         let t41 = t21 - t40;
         let t42 = t37 * t41;
         let t43 = -t42;
@@ -232,26 +232,26 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t9 = self.fixed[0] * t;
-        let t10 = t9.sin_pi();
-        let t12 = self.fixed[1] * t10;
-        let t13 = t12 * X[2];
-        let t14 = t13.sin();
-        let t16 = X[0] * t14;
-        let t18 = t13.cos();
-        let t19 = X[1] * t18;
-        let t20 = t16 + t19;
-        let t21 = t14 * t20;
-        let t24 = X[0] * t18;
-        let t25 = X[1] * t14;
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = self.fixed[1] * t8;
+        let t12 = t11 * X[2];
+        let t13 = t12.sin();
+        let t16 = t12.cos();
+        let t17 = X[0] * t13;
+        let t18 = X[1] * t16;
+        let t19 = t17 + t18;
+        let t21 = t13 * t19;
+        let t24 = X[0] * t16;
+        let t25 = X[1] * t13;
         let t26 = t24 - t25;
-        let t27 = t14 * t26;
-        let t31 = t9.cos_pi();
-        let t32 = t18 * t20;
+        let t27 = t13 * t26;
+        let t31 = t7.cos_pi();
+        let t32 = t16 * t19;
         let t33 = t27 + t32;
-        let t40 = t18 * t26;
+        let t40 = t16 * t26;
         let t41 = t21 - t40;
-        let t45 = t10 * t33;
+        let t45 = t8 * t33;
         let t46 = t31 * t31;
         let t47 = self.parameters.A * t46;
         let t48 = t47 * X[2];
@@ -259,7 +259,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         let t50 = t45 + t49;
         let t54 = self.fixed[3] * X[2];
         let t55 = t54 * t50;
-        let t56 = t10 * t41;
+        let t56 = t8 * t41;
         let t57 = t48 * t33;
         let t58 = t56 - t57;
         let t59 = t54 * t58;
@@ -271,31 +271,31 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 3, 3> {
-        let t9 = self.fixed[0] * t;
-        let t10 = t9.sin_pi();
-        let t12 = self.fixed[1] * t10;
-        let t13 = t12 * X[2];
-        let t14 = t13.sin();
-        let t16 = X[0] * t14;
-        let t18 = t13.cos();
-        let t19 = X[1] * t18;
-        let t20 = t16 + t19;
-        let t21 = t14 * t20;
-        let t24 = X[0] * t18;
-        let t25 = X[1] * t14;
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = self.fixed[1] * t8;
+        let t12 = t11 * X[2];
+        let t13 = t12.sin();
+        let t16 = t12.cos();
+        let t17 = X[0] * t13;
+        let t18 = X[1] * t16;
+        let t19 = t17 + t18;
+        let t21 = t13 * t19;
+        let t24 = X[0] * t16;
+        let t25 = X[1] * t13;
         let t26 = t24 - t25;
-        let t27 = t14 * t26;
-        let t32 = t18 * t20;
+        let t27 = t13 * t26;
+        let t32 = t16 * t19;
         let t33 = t27 + t32;
-        let t40 = t18 * t26;
+        let t40 = t16 * t26;
         let t41 = t21 - t40;
-        let t60 = t14 * t14;
+        let t60 = t13 * t13;
         let t61 = T::nearest(2.0) * t60;
         let t62 = -t61;
-        let t63 = t18 * t14;
+        let t63 = t16 * t13;
         let t64 = T::nearest(2.0) * t63;
         let t65 = -t64;
-        let t66 = self.parameters.A * t10;
+        let t66 = self.parameters.A * t8;
         let t67 = t66 * t33;
         let t68 = -t67;
         let t69 = t66 * t41;
@@ -312,30 +312,30 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 3, 3> {
-        let t9 = self.fixed[0] * t;
-        let t10 = t9.sin_pi();
-        let t12 = self.fixed[1] * t10;
-        let t13 = t12 * X[2];
-        let t14 = t13.sin();
-        let t16 = X[0] * t14;
-        let t18 = t13.cos();
-        let t19 = X[1] * t18;
-        let t20 = t16 + t19;
-        let t21 = t14 * t20;
-        let t24 = X[0] * t18;
-        let t25 = X[1] * t14;
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = self.fixed[1] * t8;
+        let t12 = t11 * X[2];
+        let t13 = t12.sin();
+        let t16 = t12.cos();
+        let t17 = X[0] * t13;
+        let t18 = X[1] * t16;
+        let t19 = t17 + t18;
+        let t21 = t13 * t19;
+        let t24 = X[0] * t16;
+        let t25 = X[1] * t13;
         let t26 = t24 - t25;
-        let t27 = t14 * t26;
-        let t32 = t18 * t20;
+        let t27 = t13 * t26;
+        let t32 = t16 * t19;
         let t33 = t27 + t32;
-        let t40 = t18 * t26;
+        let t40 = t16 * t26;
         let t41 = t21 - t40;
-        let t60 = t14 * t14;
+        let t60 = t13 * t13;
         let t61 = T::nearest(2.0) * t60;
-        let t63 = t18 * t14;
+        let t63 = t16 * t13;
         let t64 = T::nearest(2.0) * t63;
         let t65 = -t64;
-        let t66 = self.parameters.A * t10;
+        let t66 = self.parameters.A * t8;
         let t67 = t66 * t33;
         let t68 = -t67;
         let t69 = t66 * t41;
@@ -357,31 +357,31 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 3, 3> {
-        let t9 = self.fixed[0] * t;
-        let t10 = t9.sin_pi();
-        let t12 = self.fixed[1] * t10;
-        let t13 = t12 * X[2];
-        let t14 = t13.sin();
-        let t16 = X[0] * t14;
-        let t18 = t13.cos();
-        let t19 = X[1] * t18;
-        let t20 = t16 + t19;
-        let t21 = t14 * t20;
-        let t24 = X[0] * t18;
-        let t25 = X[1] * t14;
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = self.fixed[1] * t8;
+        let t12 = t11 * X[2];
+        let t13 = t12.sin();
+        let t16 = t12.cos();
+        let t17 = X[0] * t13;
+        let t18 = X[1] * t16;
+        let t19 = t17 + t18;
+        let t21 = t13 * t19;
+        let t24 = X[0] * t16;
+        let t25 = X[1] * t13;
         let t26 = t24 - t25;
-        let t27 = t14 * t26;
-        let t32 = t18 * t20;
+        let t27 = t13 * t26;
+        let t32 = t16 * t19;
         let t33 = t27 + t32;
-        let t40 = t18 * t26;
+        let t40 = t16 * t26;
         let t41 = t21 - t40;
-        let t60 = t14 * t14;
+        let t60 = t13 * t13;
         let t61 = T::nearest(2.0) * t60;
         let t62 = -t61;
-        let t63 = t18 * t14;
+        let t63 = t16 * t13;
         let t64 = T::nearest(2.0) * t63;
         let t65 = -t64;
-        let t66 = self.parameters.A * t10;
+        let t66 = self.parameters.A * t8;
         let t67 = t66 * t33;
         let t68 = -t67;
         let t69 = t66 * t41;
@@ -420,77 +420,76 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t9 = self.fixed[0] * t;
-        let t10 = t9.sin_pi();
-        let t12 = self.fixed[1] * t10;
-        let t13 = t12 * X[2];
-        let t14 = t13.sin();
-        let t16 = X[0] * t14;
-        let t18 = t13.cos();
-        let t19 = X[1] * t18;
-        let t20 = t16 + t19;
-        let t21 = t14 * t20;
-        let t24 = X[0] * t18;
-        let t25 = X[1] * t14;
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = self.fixed[1] * t8;
+        let t12 = t11 * X[2];
+        let t13 = t12.sin();
+        let t16 = t12.cos();
+        let t17 = X[0] * t13;
+        let t18 = X[1] * t16;
+        let t19 = t17 + t18;
+        let t21 = t13 * t19;
+        let t24 = X[0] * t16;
+        let t25 = X[1] * t13;
         let t26 = t24 - t25;
-        let t27 = t14 * t26;
-        let t31 = t9.cos_pi();
-        let t32 = t18 * t20;
+        let t27 = t13 * t26;
+        let t31 = t7.cos_pi();
+        let t32 = t16 * t19;
         let t33 = t27 + t32;
-        let t40 = t18 * t26;
+        let t40 = t16 * t26;
         let t41 = t21 - t40;
-        let t45 = t10 * t33;
+        let t45 = t8 * t33;
         let t46 = t31 * t31;
         let t47 = self.parameters.A * t46;
         let t48 = t47 * X[2];
         let t49 = t48 * t41;
         let t50 = t45 + t49;
-        let t56 = t10 * t41;
+        let t56 = t8 * t41;
         let t57 = t48 * t33;
         let t58 = t56 - t57;
-        let t102 = self.fixed[6] * X[2];
-        let t103 = t102 * t50;
-        let t104 = t10 * t10;
-        let t106 = self.fixed[7] * t104;
-        let t107 = t106 * t41;
-        let t108 = t103 - t107;
-        let t109 = self.fixed[5] * t108;
-        let t110 = t102 * t58;
-        let t111 = t106 * t33;
-        let t112 = t110 + t111;
-        let t113 = self.fixed[5] * t112;
-        crate::nalgebra::SVector::<T, 3>::new(t109, t113, T::zero())
+        let t100 = self.fixed[5] * X[2];
+        let t101 = t100 * t50;
+        let t103 = self.fixed[6] * t8;
+        let t104 = t103 * t56;
+        let t105 = t101 - t104;
+        let t108 = self.fixed[7] * t105;
+        let t109 = t100 * t58;
+        let t110 = t103 * t45;
+        let t111 = t109 + t110;
+        let t112 = self.fixed[7] * t111;
+        crate::nalgebra::SVector::<T, 3>::new(t108, t112, T::zero())
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> crate::Fields<T, 3> {
-        let t9 = self.fixed[0] * t;
-        let t10 = t9.sin_pi();
-        let t12 = self.fixed[1] * t10;
-        let t13 = t12 * X[2];
-        let t14 = t13.sin();
-        let t16 = X[0] * t14;
-        let t18 = t13.cos();
-        let t19 = X[1] * t18;
-        let t20 = t16 + t19;
-        let t21 = t14 * t20;
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = self.fixed[1] * t8;
+        let t12 = t11 * X[2];
+        let t13 = t12.sin();
+        let t16 = t12.cos();
+        let t17 = X[0] * t13;
+        let t18 = X[1] * t16;
+        let t19 = t17 + t18;
+        let t21 = t13 * t19;
         let t22 = T::nearest(2.0) * t21;
         let t23 = -t22;
-        let t24 = X[0] * t18;
-        let t25 = X[1] * t14;
+        let t24 = X[0] * t16;
+        let t25 = X[1] * t13;
         let t26 = t24 - t25;
-        let t27 = t14 * t26;
+        let t27 = t13 * t26;
         let t28 = T::nearest(2.0) * t27;
-        let t31 = t9.cos_pi();
-        let t32 = t18 * t20;
+        let t31 = t7.cos_pi();
+        let t32 = t16 * t19;
         let t33 = t27 + t32;
         let t36 = self.fixed[2] * t31;
         let t37 = t36 * X[2];
         let t38 = t37 * t33;
         let t39 = -t38;
-        let t40 = t18 * t26;
+        let t40 = t16 * t26;
         let t41 = t21 - t40;
         let t42 = t37 * t41;
         let t43 = -t42;
-        let t45 = t10 * t33;
+        let t45 = t8 * t33;
         let t46 = t31 * t31;
         let t47 = self.parameters.A * t46;
         let t48 = t47 * X[2];
@@ -498,17 +497,17 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         let t50 = t45 + t49;
         let t54 = self.fixed[3] * X[2];
         let t55 = t54 * t50;
-        let t56 = t10 * t41;
+        let t56 = t8 * t41;
         let t57 = t48 * t33;
         let t58 = t56 - t57;
         let t59 = t54 * t58;
-        let t60 = t14 * t14;
+        let t60 = t13 * t13;
         let t61 = T::nearest(2.0) * t60;
         let t62 = -t61;
-        let t63 = t18 * t14;
+        let t63 = t16 * t13;
         let t64 = T::nearest(2.0) * t63;
         let t65 = -t64;
-        let t66 = self.parameters.A * t10;
+        let t66 = self.parameters.A * t8;
         let t67 = t66 * t33;
         let t68 = -t67;
         let t69 = t66 * t41;
@@ -536,17 +535,16 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         let t96 = t94 - t95;
         let t97 = t96 * t82;
         let t98 = self.fixed[4] * t97;
-        let t102 = self.fixed[6] * X[2];
-        let t103 = t102 * t50;
-        let t104 = t10 * t10;
-        let t106 = self.fixed[7] * t104;
-        let t107 = t106 * t41;
-        let t108 = t103 - t107;
-        let t109 = self.fixed[5] * t108;
-        let t110 = t102 * t58;
-        let t111 = t106 * t33;
-        let t112 = t110 + t111;
-        let t113 = self.fixed[5] * t112;
+        let t100 = self.fixed[5] * X[2];
+        let t101 = t100 * t50;
+        let t103 = self.fixed[6] * t8;
+        let t104 = t103 * t56;
+        let t105 = t101 - t104;
+        let t108 = self.fixed[7] * t105;
+        let t109 = t100 * t58;
+        let t110 = t103 * t45;
+        let t111 = t109 + t110;
+        let t112 = self.fixed[7] * t111;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 3>::new(t23, t28, T::zero()),
             v: crate::nalgebra::SVector::<T, 3>::new(t39, t43, T::zero()),
@@ -577,7 +575,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
                 t98,
                 T::zero(),
             ),
-            b: crate::nalgebra::SVector::<T, 3>::new(t109, t113, T::zero()),
+            b: crate::nalgebra::SVector::<T, 3>::new(t108, t112, T::zero()),
         }
     }
     fn domain(&self) -> crate::Domain<T, 3> {
@@ -651,20 +649,20 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
 impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 4> for Torsion<T> {
     #[inline]
     fn body_force_time(&self, t: T) -> [T; 4] {
-        let t9 = self.fixed[0] * t;
-        let t10 = t9.sin_pi();
-        let t12 = self.fixed[1] * t10;
-        let t31 = t9.cos_pi();
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = self.fixed[1] * t8;
+        let t31 = t7.cos_pi();
         let t46 = t31 * t31;
         let t47 = self.parameters.A * t46;
-        let t104 = t10 * t10;
-        let t106 = self.fixed[7] * t104;
-        [t10, t12, t47, t106]
+        let t113 = t8 * t8;
+        let t114 = self.fixed[6] * t113;
+        [t8, t11, t47, t114]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 4] {
-        let t102 = self.fixed[6] * X[2];
-        [X[2], X[0], X[1], t102]
+        let t100 = self.fixed[5] * X[2];
+        [X[2], X[0], X[1], t100]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -672,20 +670,20 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 4> for Torsion<T> {
         time: &[T; 4],
         point: &[T; 4],
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t13 = time[1] * point[0];
-        let t14 = t13.sin();
-        let t16 = point[1] * t14;
-        let t18 = t13.cos();
-        let t19 = point[2] * t18;
-        let t20 = t16 + t19;
-        let t21 = t14 * t20;
-        let t24 = point[1] * t18;
-        let t25 = point[2] * t14;
+        let t12 = time[1] * point[0];
+        let t13 = t12.sin();
+        let t16 = t12.cos();
+        let t17 = point[1] * t13;
+        let t18 = point[2] * t16;
+        let t19 = t17 + t18;
+        let t21 = t13 * t19;
+        let t24 = point[1] * t16;
+        let t25 = point[2] * t13;
         let t26 = t24 - t25;
-        let t27 = t14 * t26;
-        let t32 = t18 * t20;
+        let t27 = t13 * t26;
+        let t32 = t16 * t19;
         let t33 = t27 + t32;
-        let t40 = t18 * t26;
+        let t40 = t16 * t26;
         let t41 = t21 - t40;
         let t45 = time[0] * t33;
         let t48 = time[2] * point[0];
@@ -694,15 +692,15 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 4> for Torsion<T> {
         let t56 = time[0] * t41;
         let t57 = t48 * t33;
         let t58 = t56 - t57;
-        let t103 = point[3] * t50;
-        let t107 = time[3] * t41;
-        let t108 = t103 - t107;
-        let t109 = self.fixed[5] * t108;
-        let t110 = point[3] * t58;
-        let t111 = time[3] * t33;
-        let t112 = t110 + t111;
-        let t113 = self.fixed[5] * t112;
-        crate::nalgebra::SVector::<T, 3>::new(t109, t113, T::zero())
+        let t101 = point[3] * t50;
+        let t109 = point[3] * t58;
+        let t115 = time[3] * t41;
+        let t116 = t101 - t115;
+        let t117 = self.fixed[7] * t116;
+        let t118 = time[3] * t33;
+        let t119 = t109 + t118;
+        let t120 = self.fixed[7] * t119;
+        crate::nalgebra::SVector::<T, 3>::new(t117, t120, T::zero())
     }
 }
 impl<T: crate::Real> From<Torsion<T>> for crate::AnySolution<T> {
