@@ -417,14 +417,23 @@ struct Lowering<'a> {
     definitions: &'a [(Expr, Expr)],
 }
 
-/// Terms of a sum with a common factor.
+/// A part of a sum.
+enum Part {
+    Term(Expr, Rational),
+    /// A factor and what it multiplies.
+    Product(Expr, Expr),
+}
+
+/// Terms of a sum with a common factor that depends on parameters only.
 struct Group {
     /// Whether further terms of this factor belong to it.
     open: bool,
     factor: Expr,
     rate: Dependence,
-    /// The index of each term, and the term without the factor and without its sign.
-    members: Vec<(usize, Expr)>,
+    /// The sign of each term, and the term without the factor.
+    rests: Vec<(Rational, Expr)>,
+    /// The first of the terms.
+    term: (Expr, Rational),
 }
 
 impl Lowering<'_> {
@@ -541,23 +550,15 @@ impl Lowering<'_> {
 
     fn terms(&mut self, terms: &[(Expr, Rational)]) -> (bool, Slot) {
         let mut by_rate: Vec<(Dependence, (bool, Slot))> = Vec::new();
-        for group in self.groups_of_equal_factor(terms) {
-            let part = match &*group.members {
-                [(index, _)] => {
-                    let (term, coefficient) = &terms[*index];
-                    let (turned, slot) = self.signed_term(*term, &coefficient.abs());
+        for part in self.with_common_factors(terms) {
+            let part = match part {
+                Part::Term(term, coefficient) => {
+                    let (turned, slot) = self.signed_term(term, &coefficient.abs());
                     (coefficient.is_negative() != turned, slot)
                 }
-                members => {
-                    let mut inner = Vec::new();
-                    for (index, rest) in members {
-                        let sign = if terms[*index].1.is_negative() { -1 } else { 1 };
-                        // A sum that was a factor stays one quantity, as it may be used elsewhere.
-                        inner.push((Rational::from_integer(sign.into()), self.graph.whole(*rest)));
-                    }
-                    let inner = self.graph.sum(inner);
+                Part::Product(factor, inner) => {
                     let (negative, inner) = self.signed(inner);
-                    let factor = self.lower(group.factor);
+                    let factor = self.lower(factor);
                     (negative, self.push(Operation::Mul(factor, inner)))
                 }
             };
@@ -571,6 +572,96 @@ impl Lowering<'_> {
         self.add(groups)
     }
 
+    /// The parts of a sum: a factor that some of the terms share is multiplied with their sum.
+    ///
+    /// First what depends on parameters only, coefficients included, where the rests are of one rate. Then, among what
+    /// is left, the factor that most terms have, again and again.
+    fn with_common_factors(&mut self, terms: &[(Expr, Rational)]) -> Vec<Part> {
+        let mut groups: Vec<Group> = Vec::new();
+        for (term, coefficient) in terms {
+            let (factor, rest, rate) = self.split_off_fixed(*term, &coefficient.abs());
+            let open = factor != Graph::ONE && rest != Graph::ONE;
+            let sign =
+                Rational::from_integer(if coefficient.is_negative() { -1 } else { 1 }.into());
+            let known = groups
+                .iter_mut()
+                .find(|group| open && group.open && group.factor == factor && group.rate == rate);
+            match known {
+                Some(group) => group.rests.push((sign, rest)),
+                None => groups.push(Group {
+                    open,
+                    factor,
+                    rate,
+                    rests: vec![(sign, rest)],
+                    term: (*term, coefficient.clone()),
+                }),
+            }
+        }
+        let mut parts = Vec::new();
+        let mut single = Vec::new();
+        for group in groups {
+            if group.rests.len() > 1 {
+                parts.push(Part::Product(group.factor, self.sum_of_whole(group.rests)));
+            } else {
+                single.push(group.term);
+            }
+        }
+        while let Some(factor) = self.most_common_factor(&single) {
+            let mut rests = Vec::new();
+            let mut others = Vec::new();
+            for (term, coefficient) in single {
+                if self.factors(term).contains(&factor) {
+                    let inverse = (factor.0, -factor.1.clone());
+                    let rest = self.graph.product([(term, Rational::one()), inverse]);
+                    rests.push((coefficient, rest));
+                } else {
+                    others.push((term, coefficient));
+                }
+            }
+            let inner = self.sum_of_whole(rests);
+            parts.push(Part::Product(self.graph.product([factor]), inner));
+            single = others;
+        }
+        parts.extend(single.into_iter().map(|(term, coefficient)| Part::Term(term, coefficient)));
+        parts
+    }
+
+    /// The sum in which each term that is a sum stays one quantity, as it may be used elsewhere.
+    fn sum_of_whole(&mut self, terms: Vec<(Rational, Expr)>) -> Expr {
+        let terms: Vec<_> =
+            terms.into_iter().map(|(c, term)| (c, self.graph.whole(term))).collect();
+        self.graph.sum(terms)
+    }
+
+    /// The factor that most of the terms have, of several the first; `None` where each stands in one term only.
+    fn most_common_factor(&mut self, terms: &[(Expr, Rational)]) -> Option<(Expr, Rational)> {
+        if terms.len() < 2 {
+            return None;
+        }
+        let mut counts: Vec<((Expr, Rational), usize)> = Vec::new();
+        for (term, _) in terms {
+            for factor in self.factors(*term) {
+                let slot = self.lower(factor.0);
+                if self.program.dependence(slot).is_fixed() {
+                    continue;
+                }
+                match counts.iter_mut().find(|(known, _)| *known == factor) {
+                    Some((_, count)) => *count += 1,
+                    None => counts.push((factor, 1)),
+                }
+            }
+        }
+        let most = counts.iter().map(|(_, count)| *count).max().filter(|&count| count > 1)?;
+        counts.into_iter().find(|(_, count)| *count == most).map(|(factor, _)| factor)
+    }
+
+    fn factors(&self, term: Expr) -> Vec<(Expr, Rational)> {
+        match self.graph.node(term) {
+            Node::Product(factors) => factors.to_vec(),
+            _ => vec![(term, Rational::one())],
+        }
+    }
+
     /// `coefficient * term` as a sign and a value.
     fn signed_term(&mut self, term: Expr, coefficient: &Rational) -> (bool, Slot) {
         match *self.graph.node(term) {
@@ -579,31 +670,9 @@ impl Lowering<'_> {
         }
     }
 
-    /// The terms of a sum by their factor that depends on parameters only, their coefficient included, and by the rate
-    /// of the rest: a factor that several terms share is multiplied with their sum. Terms without such a factor, or
-    /// with nothing but it, stand alone.
-    fn groups_of_equal_factor(&mut self, terms: &[(Expr, Rational)]) -> Vec<Group> {
-        let mut groups: Vec<Group> = Vec::new();
-        for (index, (term, coefficient)) in terms.iter().enumerate() {
-            let (factor, rest, rate) = self.split_off_fixed(*term, &coefficient.abs());
-            let open = factor != Graph::ONE && rest != Graph::ONE;
-            let known = groups
-                .iter_mut()
-                .find(|group| open && group.open && group.factor == factor && group.rate == rate);
-            match known {
-                Some(group) => group.members.push((index, rest)),
-                None => groups.push(Group { open, factor, rate, members: vec![(index, rest)] }),
-            }
-        }
-        groups
-    }
-
     /// `coefficient * term` as a factor that depends on parameters only and a rest, with what the rest depends on.
     fn split_off_fixed(&mut self, term: Expr, coefficient: &Rational) -> (Expr, Expr, Dependence) {
-        let factors = match self.graph.node(term) {
-            Node::Product(factors) => factors.to_vec(),
-            _ => vec![(term, Rational::one())],
-        };
+        let factors = self.factors(term);
         let mut fixed = vec![(self.graph.number(coefficient.clone()), Rational::one())];
         let mut rest = Vec::new();
         let mut rate = Dependence::default();

@@ -56,7 +56,11 @@ impl Program {
                             } else {
                                 let root = builder.push(Operation::Sqrt(square), rate);
                                 let odd = builder.push(Operation::Mul(root, reciprocal), rate);
-                                if n == 1 { odd } else { builder.push(Operation::Mul(even, odd), rate) }
+                                if n == 1 {
+                                    odd
+                                } else {
+                                    builder.push(Operation::Mul(even, odd), rate)
+                                }
                             }
                         }
                         (Unit::Root, _) => builder.reciprocal(place(base), rate),
@@ -93,7 +97,8 @@ impl Program {
             }
             let unit = quotients.iter().fold(0, |unit: u32, (_, power)| unit.gcd(power));
             let first = quotients[0].0;
-            let at_hand = powers.iter().find(|(slot, power)| **power == (base, unit) && **slot < first);
+            let at_hand =
+                powers.iter().find(|(slot, power)| **power == (base, unit) && **slot < first);
             (base, at_hand.map_or(Unit::Slot(base, 1), |(&slot, _)| Unit::Slot(slot, unit)))
         };
         quotients.into_iter().map(unit_of).collect()

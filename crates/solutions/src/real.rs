@@ -67,19 +67,18 @@ impl Real for f32 {
 /// Sums and products only, the same on every processor.
 #[inline]
 fn sin_pi_shifted(x: f64, quarters: u64) -> f64 {
-    // x = n/2 + r with |r| <= 1/4; n and r are exact. Adding one and a half times 2^52, from where on doubles are whole
-    // numbers, rounds; the last two bits of the sum are those of n.
-    const SHIFT: f64 = 1.5 * 4_503_599_627_370_496.0;
-    let halves = 2.0 * x;
-    let (n, quadrant) = if halves.abs() < SHIFT / 3.0 {
-        let shifted = halves + SHIFT;
+    // x = n/2 + r with |r| <= 1/4; n and r are exact. Adding one and a half times 2^51, from where on doubles are
+    // multiples of 1/2, rounds; the last two bits of the sum are those of n.
+    const SHIFT: f64 = 1.5 * 2_251_799_813_685_248.0;
+    let (nearest, quadrant) = if x.abs() < SHIFT / 3.0 {
+        let shifted = x + SHIFT;
         (shifted - SHIFT, shifted.to_bits())
     } else {
-        // A whole number or not a number; both are rare.
-        let n = halves.round();
-        (n, n.rem_euclid(4.0) as u64)
+        // Very large or not a number; both are rare.
+        let n = (2.0 * x).round();
+        (0.5 * n, n.rem_euclid(4.0) as u64)
     };
-    let r = x - n * 0.5;
+    let r = x - nearest;
     let quadrant = quadrant.wrapping_add(quarters);
     let value = if quadrant & 1 == 0 { sine(r) } else { cosine(r) };
     if quadrant & 2 == 0 { value } else { -value }
@@ -90,11 +89,11 @@ fn sin_pi_shifted(x: f64, quarters: u64) -> f64 {
 #[inline]
 fn sine(x: f64) -> f64 {
     let z = x * x;
-    let even = -5.167_712_780_049_968_5
-        + (z * z) * (-5.992_645_289_761_195e-1 + (z * z) * -7.370_034_319_852_937e-3);
-    let odd = 2.550_164_039_874_027
-        + (z * z) * (8.214_587_016_569_905e-2 + (z * z) * 4.615_949_610_094_388e-4);
-    x * (std::f64::consts::PI + z * (even + z * odd))
+    let square = z * z;
+    let low = -5.167_712_780_049_968_5 + z * 2.550_164_039_874_027;
+    let middle = -5.992_645_289_761_195e-1 + z * 8.214_587_016_569_905e-2;
+    let high = -7.370_034_319_852_937e-3 + z * 4.615_949_610_094_388e-4;
+    x * (std::f64::consts::PI + z * (low + square * (middle + square * high)))
 }
 
 /// `cos(pi x)` for `|x| <= 1/4`, as the sine.
@@ -102,13 +101,10 @@ fn sine(x: f64) -> f64 {
 fn cosine(x: f64) -> f64 {
     let z = x * x;
     let square = z * z;
-    let even = 4.058_712_126_416_762
-        + square
-            * (2.353_306_302_439_816_5e-1 + square * 1.929_478_760_777_114_4e-3);
-    let odd = -1.335_262_768_853_168_6
-        + square
-            * (-2.580_688_682_692_376_7e-2 + square * -1.036_246_495_865_416_4e-4);
-    (1.0 - 4.934_802_200_544_679 * z) + square * (even + z * odd)
+    let low = 4.058_712_126_416_762 + z * -1.335_262_768_853_168_6;
+    let middle = 2.353_306_302_439_816_5e-1 + z * -2.580_688_682_692_376_7e-2;
+    let high = 1.929_478_760_777_114_4e-3 + z * -1.036_246_495_865_416_4e-4;
+    (1.0 - 4.934_802_200_544_679 * z) + square * (low + square * (middle + square * high))
 }
 
 #[cfg(test)]

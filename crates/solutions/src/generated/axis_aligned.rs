@@ -124,39 +124,39 @@ impl<T: crate::Real> AxisAligned<T> {
         let t47 = parameters.nu + T::one();
         let t49 = T::nearest(2.0) * parameters.nu;
         let t50 = T::one() - t49;
-        let t62 = T::nearest(0.5) * parameters.E;
-        let t63 = t62 / t47;
-        let t65 = parameters.E * parameters.nu;
-        let t66 = t47 * t50;
-        let t67 = t65 / t66;
-        let t69 = t18 * t63;
-        let t83 = parameters.nu * parameters.nu;
-        let t84 = T::nearest(2.0) * parameters.A;
-        let t85 = t84 * t25;
-        let t86 = t85 * parameters.E;
-        let t87 = t86 * t83;
-        let t88 = parameters.rho0 * t47;
-        let t89 = t88 * t50;
-        let t90 = t87 / t89;
-        let t113 = t26 / parameters.rho0;
-        let t142 = t67 + t63;
-        let t143 = parameters.A * parameters.A;
-        let t144 = t143 * parameters.A;
-        let t145 = t25 * t25;
-        let t147 = t144 * t145;
-        let t148 = t147 * t142;
-        let t149 = t148 / parameters.rho0;
-        let t153 = t25 * T::pi();
-        let t154 = T::nearest(2.0) * t143;
-        let t155 = t154 * t153;
-        let t156 = t155 * t142;
-        let t157 = t156 / parameters.rho0;
-        let t162 = t27 * parameters.nu;
-        let t163 = t162 / t89;
-        let t191 = T::nearest(2.0) / t7;
+        let t58 = T::nearest(0.5) * parameters.E;
+        let t59 = t58 / t47;
+        let t61 = parameters.E * parameters.nu;
+        let t62 = t47 * t50;
+        let t63 = t61 / t62;
+        let t65 = t18 * t59;
+        let t79 = parameters.nu * parameters.nu;
+        let t80 = T::nearest(2.0) * parameters.A;
+        let t81 = t80 * t25;
+        let t82 = t81 * parameters.E;
+        let t83 = t82 * t79;
+        let t84 = parameters.rho0 * t47;
+        let t85 = t84 * t50;
+        let t86 = t83 / t85;
+        let t110 = t26 / parameters.rho0;
+        let t138 = t63 + t59;
+        let t139 = parameters.A * parameters.A;
+        let t140 = t139 * parameters.A;
+        let t141 = t25 * t25;
+        let t143 = t140 * t141;
+        let t144 = t143 * t138;
+        let t145 = t144 / parameters.rho0;
+        let t149 = t25 * T::pi();
+        let t150 = T::nearest(2.0) * t139;
+        let t151 = t150 * t149;
+        let t152 = t151 * t138;
+        let t153 = t152 / parameters.rho0;
+        let t158 = t27 * parameters.nu;
+        let t159 = t158 / t85;
+        let t187 = T::nearest(2.0) / t7;
         Ok(AxisAligned {
             parameters,
-            fixed: [t7, t18, t19, t28, t63, t67, t69, t90, t113, t149, t157, t163, t191],
+            fixed: [t7, t18, t19, t28, t59, t63, t65, t86, t110, t145, t153, t159, t187],
         })
     }
     /// The solution with parameter values in the order of the description; missing ones take their
@@ -312,32 +312,28 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t41 = t40 * t39;
         let t43 = t37 + T::one();
         let t44 = t41 + T::one();
-        let t51 = t9 * t35;
-        let t52 = t14 * t39;
-        let t53 = t9 * t14;
-        let t54 = self.fixed[1] * t53;
-        let t55 = t35 * t39;
-        let t56 = t54 * t55;
-        let t57 = t51 + t52;
-        let t58 = t57 + t56;
-        let t59 = self.fixed[1] * t58;
-        let t60 = t59.ln_1p();
-        let t64 = t37 + T::nearest(2.0);
-        let t68 = self.fixed[5] * t60;
-        let t70 = self.fixed[6] * t9;
-        let t71 = t70 * t35;
-        let t72 = t71 * t64;
-        let t73 = t68 + t72;
-        let t74 = T::one() / t43;
-        let t75 = t73 * t74;
-        let t76 = t41 + T::nearest(2.0);
-        let t77 = self.fixed[6] * t14;
-        let t78 = t77 * t39;
-        let t79 = t78 * t76;
-        let t80 = t68 + t79;
-        let t81 = T::one() / t44;
-        let t82 = t80 * t81;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t75, T::zero(), T::zero(), t82)
+        let t51 = t35 * t44;
+        let t52 = t9 * t51;
+        let t53 = t14 * t39;
+        let t54 = t52 + t53;
+        let t55 = self.fixed[1] * t54;
+        let t56 = t55.ln_1p();
+        let t60 = t37 + T::nearest(2.0);
+        let t64 = self.fixed[5] * t56;
+        let t66 = self.fixed[6] * t9;
+        let t67 = t66 * t35;
+        let t68 = t67 * t60;
+        let t69 = t64 + t68;
+        let t70 = T::one() / t43;
+        let t71 = t69 * t70;
+        let t72 = t41 + T::nearest(2.0);
+        let t73 = self.fixed[6] * t14;
+        let t74 = t73 * t39;
+        let t75 = t74 * t72;
+        let t76 = t64 + t75;
+        let t77 = T::one() / t44;
+        let t78 = t76 * t77;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t71, T::zero(), T::zero(), t78)
     }
     #[inline]
     fn body_force(
@@ -352,59 +348,57 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t14 = t8.sin_pi();
         let t35 = X[0].cos_pi();
         let t39 = X[1].cos_pi();
-        let t51 = t9 * t35;
-        let t52 = t14 * t39;
-        let t57 = t51 + t52;
-        let t91 = self.fixed[7] * t9;
-        let t92 = t91 * t2;
-        let t93 = self.fixed[1] * t51;
-        let t94 = t93 + T::one();
-        let t95 = t52 * t93;
-        let t96 = t57 + t95;
-        let t97 = self.fixed[1] * t96;
-        let t98 = t97.ln_1p();
-        let t99 = self.fixed[5] * t98;
-        let t100 = self.fixed[4] * t93;
-        let t101 = t99 + t100;
-        let t102 = T::one() / t94;
-        let t103 = self.fixed[5] * t102;
-        let t104 = self.fixed[4] + t103;
-        let t105 = t93 + t98;
-        let t106 = self.fixed[5] * t105;
-        let t107 = t93 * t101;
-        let t108 = t107 * t102;
-        let t109 = t93 * t104;
-        let t110 = t106 + t100;
-        let t111 = t110 - t108;
-        let t112 = t111 + t109;
-        let t114 = self.fixed[8] * t9;
-        let t115 = t114 * t2;
-        let t116 = t112 * t102;
-        let t117 = t115 * t116;
-        let t118 = t92 - t117;
-        let t119 = self.fixed[7] * t14;
-        let t120 = t119 * t13;
-        let t121 = self.fixed[1] * t52;
-        let t122 = t121 + T::one();
-        let t123 = self.fixed[4] * t121;
-        let t124 = t99 + t123;
-        let t125 = T::one() / t122;
+        let t53 = t14 * t39;
+        let t87 = self.fixed[7] * t9;
+        let t88 = t87 * t2;
+        let t89 = t9 * t35;
+        let t90 = self.fixed[1] * t89;
+        let t91 = t90 + T::one();
+        let t92 = t39 * t91;
+        let t93 = t14 * t92;
+        let t94 = t93 + t89;
+        let t95 = self.fixed[1] * t94;
+        let t96 = t95.ln_1p();
+        let t97 = self.fixed[5] * t96;
+        let t98 = self.fixed[4] * t90;
+        let t99 = t97 + t98;
+        let t100 = T::one() / t91;
+        let t101 = self.fixed[5] * t100;
+        let t102 = self.fixed[4] + t101;
+        let t103 = t90 + t96;
+        let t104 = self.fixed[5] * t103;
+        let t105 = t99 * t100;
+        let t106 = t102 - t105;
+        let t107 = self.fixed[4] + t106;
+        let t108 = t90 * t107;
+        let t109 = t104 + t108;
+        let t111 = self.fixed[8] * t9;
+        let t112 = t111 * t2;
+        let t113 = t109 * t100;
+        let t114 = t112 * t113;
+        let t115 = t88 - t114;
+        let t116 = self.fixed[7] * t14;
+        let t117 = t116 * t13;
+        let t118 = self.fixed[1] * t53;
+        let t119 = t118 + T::one();
+        let t120 = self.fixed[4] * t118;
+        let t121 = t97 + t120;
+        let t122 = T::one() / t119;
+        let t123 = self.fixed[5] * t122;
+        let t124 = self.fixed[4] + t123;
+        let t125 = t96 + t118;
         let t126 = self.fixed[5] * t125;
-        let t127 = self.fixed[4] + t126;
-        let t128 = t98 + t121;
-        let t129 = self.fixed[5] * t128;
-        let t130 = t121 * t124;
-        let t131 = t130 * t125;
-        let t132 = t121 * t127;
-        let t133 = t129 + t123;
-        let t134 = t133 - t131;
-        let t135 = t134 + t132;
-        let t136 = self.fixed[8] * t14;
-        let t137 = t136 * t13;
-        let t138 = t135 * t125;
-        let t139 = t137 * t138;
-        let t140 = t120 - t139;
-        crate::nalgebra::SVector::<T, 2>::new(t118, t140)
+        let t127 = t121 * t122;
+        let t128 = t124 - t127;
+        let t129 = self.fixed[4] + t128;
+        let t130 = t118 * t129;
+        let t131 = t126 + t130;
+        let t132 = self.fixed[8] * t14;
+        let t133 = t132 * t13;
+        let t134 = t131 * t122;
+        let t135 = t133 * t134;
+        let t136 = t117 - t135;
+        crate::nalgebra::SVector::<T, 2>::new(t115, t136)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t2 = X[0].sin_pi();
@@ -436,80 +430,76 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t43 = t37 + T::one();
         let t44 = t41 + T::one();
         let t45 = t43 * t44;
-        let t51 = t9 * t35;
-        let t52 = t14 * t39;
-        let t53 = t9 * t14;
-        let t54 = self.fixed[1] * t53;
-        let t55 = t35 * t39;
-        let t56 = t54 * t55;
-        let t57 = t51 + t52;
-        let t58 = t57 + t56;
-        let t59 = self.fixed[1] * t58;
-        let t60 = t59.ln_1p();
-        let t64 = t37 + T::nearest(2.0);
-        let t68 = self.fixed[5] * t60;
-        let t70 = self.fixed[6] * t9;
-        let t71 = t70 * t35;
-        let t72 = t71 * t64;
-        let t73 = t68 + t72;
-        let t74 = T::one() / t43;
-        let t75 = t73 * t74;
-        let t76 = t41 + T::nearest(2.0);
-        let t77 = self.fixed[6] * t14;
-        let t78 = t77 * t39;
-        let t79 = t78 * t76;
-        let t80 = t68 + t79;
-        let t81 = T::one() / t44;
-        let t82 = t80 * t81;
-        let t91 = self.fixed[7] * t9;
-        let t92 = t91 * t2;
-        let t93 = self.fixed[1] * t51;
-        let t94 = t93 + T::one();
-        let t95 = t52 * t93;
-        let t96 = t57 + t95;
-        let t97 = self.fixed[1] * t96;
-        let t98 = t97.ln_1p();
-        let t99 = self.fixed[5] * t98;
-        let t100 = self.fixed[4] * t93;
-        let t101 = t99 + t100;
-        let t102 = T::one() / t94;
-        let t103 = self.fixed[5] * t102;
-        let t104 = self.fixed[4] + t103;
-        let t105 = t93 + t98;
-        let t106 = self.fixed[5] * t105;
-        let t107 = t93 * t101;
-        let t108 = t107 * t102;
-        let t109 = t93 * t104;
-        let t110 = t106 + t100;
-        let t111 = t110 - t108;
-        let t112 = t111 + t109;
-        let t114 = self.fixed[8] * t9;
-        let t115 = t114 * t2;
-        let t116 = t112 * t102;
-        let t117 = t115 * t116;
-        let t118 = t92 - t117;
-        let t119 = self.fixed[7] * t14;
-        let t120 = t119 * t13;
-        let t121 = self.fixed[1] * t52;
-        let t122 = t121 + T::one();
-        let t123 = self.fixed[4] * t121;
-        let t124 = t99 + t123;
-        let t125 = T::one() / t122;
+        let t51 = t35 * t44;
+        let t52 = t9 * t51;
+        let t53 = t14 * t39;
+        let t54 = t52 + t53;
+        let t55 = self.fixed[1] * t54;
+        let t56 = t55.ln_1p();
+        let t60 = t37 + T::nearest(2.0);
+        let t64 = self.fixed[5] * t56;
+        let t66 = self.fixed[6] * t9;
+        let t67 = t66 * t35;
+        let t68 = t67 * t60;
+        let t69 = t64 + t68;
+        let t70 = T::one() / t43;
+        let t71 = t69 * t70;
+        let t72 = t41 + T::nearest(2.0);
+        let t73 = self.fixed[6] * t14;
+        let t74 = t73 * t39;
+        let t75 = t74 * t72;
+        let t76 = t64 + t75;
+        let t77 = T::one() / t44;
+        let t78 = t76 * t77;
+        let t87 = self.fixed[7] * t9;
+        let t88 = t87 * t2;
+        let t89 = t9 * t35;
+        let t90 = self.fixed[1] * t89;
+        let t91 = t90 + T::one();
+        let t92 = t39 * t91;
+        let t93 = t14 * t92;
+        let t94 = t93 + t89;
+        let t95 = self.fixed[1] * t94;
+        let t96 = t95.ln_1p();
+        let t97 = self.fixed[5] * t96;
+        let t98 = self.fixed[4] * t90;
+        let t99 = t97 + t98;
+        let t100 = T::one() / t91;
+        let t101 = self.fixed[5] * t100;
+        let t102 = self.fixed[4] + t101;
+        let t103 = t90 + t96;
+        let t104 = self.fixed[5] * t103;
+        let t105 = t99 * t100;
+        let t106 = t102 - t105;
+        let t107 = self.fixed[4] + t106;
+        let t108 = t90 * t107;
+        let t109 = t104 + t108;
+        let t111 = self.fixed[8] * t9;
+        let t112 = t111 * t2;
+        let t113 = t109 * t100;
+        let t114 = t112 * t113;
+        let t115 = t88 - t114;
+        let t116 = self.fixed[7] * t14;
+        let t117 = t116 * t13;
+        let t118 = self.fixed[1] * t53;
+        let t119 = t118 + T::one();
+        let t120 = self.fixed[4] * t118;
+        let t121 = t97 + t120;
+        let t122 = T::one() / t119;
+        let t123 = self.fixed[5] * t122;
+        let t124 = self.fixed[4] + t123;
+        let t125 = t96 + t118;
         let t126 = self.fixed[5] * t125;
-        let t127 = self.fixed[4] + t126;
-        let t128 = t98 + t121;
-        let t129 = self.fixed[5] * t128;
-        let t130 = t121 * t124;
-        let t131 = t130 * t125;
-        let t132 = t121 * t127;
-        let t133 = t129 + t123;
-        let t134 = t133 - t131;
-        let t135 = t134 + t132;
-        let t136 = self.fixed[8] * t14;
-        let t137 = t136 * t13;
-        let t138 = t135 * t125;
-        let t139 = t137 * t138;
-        let t140 = t120 - t139;
+        let t127 = t121 * t122;
+        let t128 = t124 - t127;
+        let t129 = self.fixed[4] + t128;
+        let t130 = t118 * t129;
+        let t131 = t126 + t130;
+        let t132 = self.fixed[8] * t14;
+        let t133 = t132 * t13;
+        let t134 = t131 * t122;
+        let t135 = t133 * t134;
+        let t136 = t117 - t135;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t11, t16),
             v: crate::nalgebra::SVector::<T, 2>::new(t22, t24),
@@ -517,8 +507,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
             H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t37, T::zero(), T::zero(), t41),
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t43, T::zero(), T::zero(), t44),
             J: t45,
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t75, T::zero(), T::zero(), t82),
-            b: crate::nalgebra::SVector::<T, 2>::new(t118, t140),
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t71, T::zero(), T::zero(), t78),
+            b: crate::nalgebra::SVector::<T, 2>::new(t115, t136),
         }
     }
     fn domain(&self) -> crate::Domain<T, 2> {
@@ -569,87 +559,83 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 5, 11>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 4, 10>::new(*self, X))
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 2, 5, 11> for AxisAligned<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 2, 4, 10> for AxisAligned<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 5] {
+    fn body_force_time(&self, t: T) -> [T; 4] {
         let t8 = self.fixed[0] * t;
         let t9 = t8.cos_pi();
         let t14 = t8.sin_pi();
         let t36 = self.fixed[1] * t9;
         let t40 = self.fixed[1] * t14;
-        let t53 = t9 * t14;
-        let t54 = self.fixed[1] * t53;
-        [t9, t14, t36, t40, t54]
+        [t9, t14, t36, t40]
     }
     #[inline]
-    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 11] {
+    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 10] {
         let t2 = X[0].sin_pi();
         let t13 = X[1].sin_pi();
         let t35 = X[0].cos_pi();
         let t39 = X[1].cos_pi();
-        let t55 = t35 * t39;
-        let t141 = self.fixed[7] * t2;
-        let t146 = t35 * t35;
-        let t150 = t2 * t146;
-        let t151 = self.fixed[9] * t150;
-        let t152 = -t151;
-        let t158 = t2 * t35;
-        let t159 = self.fixed[10] * t158;
-        let t164 = self.fixed[11] * t2;
-        let t165 = -t164;
-        let t173 = self.fixed[7] * t13;
-        let t174 = t39 * t39;
-        let t175 = t13 * t174;
-        let t176 = self.fixed[9] * t175;
-        let t177 = -t176;
-        let t178 = t13 * t39;
-        let t179 = self.fixed[10] * t178;
-        let t182 = self.fixed[11] * t13;
-        let t183 = -t182;
-        [t35, t39, t55, t141, t152, t159, t165, t173, t177, t179, t183]
+        let t137 = self.fixed[7] * t2;
+        let t142 = t35 * t35;
+        let t146 = t2 * t142;
+        let t147 = self.fixed[9] * t146;
+        let t148 = -t147;
+        let t154 = t2 * t35;
+        let t155 = self.fixed[10] * t154;
+        let t160 = self.fixed[11] * t2;
+        let t161 = -t160;
+        let t169 = self.fixed[7] * t13;
+        let t170 = t39 * t39;
+        let t171 = t13 * t170;
+        let t172 = self.fixed[9] * t171;
+        let t173 = -t172;
+        let t174 = t13 * t39;
+        let t175 = self.fixed[10] * t174;
+        let t178 = self.fixed[11] * t13;
+        let t179 = -t178;
+        [t35, t39, t137, t148, t155, t161, t169, t173, t175, t179]
     }
     #[inline(always)]
     fn body_force_staged(
         &self,
-        time: &[T; 5],
-        point: &[T; 11],
+        time: &[T; 4],
+        point: &[T; 10],
     ) -> crate::nalgebra::SVector<T, 2> {
         let t37 = time[2] * point[0];
         let t41 = time[3] * point[1];
         let t43 = t37 + T::one();
         let t44 = t41 + T::one();
-        let t51 = time[0] * point[0];
-        let t52 = time[1] * point[1];
-        let t56 = time[4] * point[2];
-        let t57 = t51 + t52;
-        let t58 = t57 + t56;
-        let t59 = self.fixed[1] * t58;
-        let t60 = t59.ln_1p();
-        let t74 = T::one() / t43;
-        let t81 = T::one() / t44;
-        let t160 = time[0] * point[4];
-        let t161 = t160 - point[5];
-        let t166 = time[0] * t161;
-        let t167 = point[6] * t60;
-        let t168 = t166 + t167;
-        let t169 = t74 * t74;
-        let t170 = t168 * t169;
-        let t171 = point[3] + t170;
-        let t172 = time[0] * t171;
-        let t180 = time[1] * point[8];
-        let t181 = t180 - point[9];
-        let t184 = time[1] * t181;
-        let t185 = point[10] * t60;
-        let t186 = t184 + t185;
-        let t187 = t81 * t81;
-        let t188 = t186 * t187;
-        let t189 = point[7] + t188;
-        let t190 = time[1] * t189;
-        crate::nalgebra::SVector::<T, 2>::new(t172, t190)
+        let t51 = point[0] * t44;
+        let t52 = time[0] * t51;
+        let t53 = time[1] * point[1];
+        let t54 = t52 + t53;
+        let t55 = self.fixed[1] * t54;
+        let t56 = t55.ln_1p();
+        let t70 = T::one() / t43;
+        let t77 = T::one() / t44;
+        let t156 = time[0] * point[3];
+        let t157 = t156 - point[4];
+        let t162 = time[0] * t157;
+        let t163 = point[5] * t56;
+        let t164 = t162 + t163;
+        let t165 = t70 * t70;
+        let t166 = t164 * t165;
+        let t167 = point[2] + t166;
+        let t168 = time[0] * t167;
+        let t176 = time[1] * point[7];
+        let t177 = t176 - point[8];
+        let t180 = time[1] * t177;
+        let t181 = point[9] * t56;
+        let t182 = t180 + t181;
+        let t183 = t77 * t77;
+        let t184 = t182 * t183;
+        let t185 = point[6] + t184;
+        let t186 = time[1] * t185;
+        crate::nalgebra::SVector::<T, 2>::new(t168, t186)
     }
 }
 impl<T: crate::Real> From<AxisAligned<T>> for crate::AnySolution<T> {

@@ -37,7 +37,7 @@ impl<T: crate::Real> Default for AxisAligned1dParameters<T> {
 pub struct AxisAligned1d<T: crate::Real> {
     parameters: AxisAligned1dParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 16],
+    fixed: [T; 15],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> AxisAligned1d<T> {
@@ -129,36 +129,32 @@ impl<T: crate::Real> AxisAligned1d<T> {
         let t42 = t32 * t35;
         let t43 = t41 / t42;
         let t45 = t14 * t39;
-        let t54 = parameters.nu * parameters.nu;
-        let t55 = T::nearest(2.0) * parameters.E;
-        let t56 = t55 * t54;
+        let t52 = parameters.nu * parameters.nu;
+        let t53 = T::nearest(2.0) * parameters.A;
+        let t54 = t53 * t19;
+        let t55 = t54 * parameters.E;
+        let t56 = t55 * t52;
         let t57 = parameters.rho0 * t32;
         let t58 = t57 * t35;
         let t59 = t56 / t58;
-        let t73 = T::pi() * parameters.E;
-        let t74 = t73 * parameters.nu;
-        let t75 = t74 / t42;
+        let t67 = T::nearest(2.0) * t39;
+        let t68 = t43 + t67;
         let t80 = t14 / parameters.rho0;
-        let t85 = T::nearest(2.0) * parameters.A;
-        let t86 = t85 * t19;
-        let t87 = t86 * parameters.E;
-        let t88 = t87 * t54;
-        let t89 = t88 / t58;
-        let t91 = t43 + t39;
-        let t92 = parameters.A * parameters.A;
-        let t93 = t92 * parameters.A;
-        let t94 = t19 * t19;
-        let t96 = t93 * t94;
-        let t97 = t96 * t91;
-        let t98 = t97 / parameters.rho0;
-        let t102 = t19 * T::pi();
-        let t103 = T::nearest(2.0) * t92;
-        let t104 = t103 * t102;
-        let t105 = t104 * t91;
-        let t106 = t105 / parameters.rho0;
-        let t111 = t21 * parameters.nu;
-        let t112 = t111 / t58;
-        let t122 = T::nearest(2.0) / t7;
+        let t86 = t43 + t39;
+        let t87 = parameters.A * parameters.A;
+        let t88 = t87 * parameters.A;
+        let t89 = t19 * t19;
+        let t91 = t88 * t89;
+        let t92 = t91 * t86;
+        let t93 = t92 / parameters.rho0;
+        let t97 = t19 * T::pi();
+        let t98 = T::nearest(2.0) * t87;
+        let t99 = t98 * t97;
+        let t100 = t99 * t86;
+        let t101 = t100 / parameters.rho0;
+        let t106 = t21 * parameters.nu;
+        let t107 = t106 / t58;
+        let t117 = T::nearest(2.0) / t7;
         Ok(AxisAligned1d {
             parameters,
             fixed: [
@@ -171,13 +167,12 @@ impl<T: crate::Real> AxisAligned1d<T> {
                 t43,
                 t45,
                 t59,
-                t75,
+                t68,
                 t80,
-                t89,
-                t98,
-                t106,
-                t112,
-                t122,
+                t93,
+                t101,
+                t107,
+                t117,
             ],
         })
     }
@@ -327,30 +322,31 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         let t30 = t28 + T::one();
         let t36 = t28.ln_1p();
         let t44 = self.fixed[6] * t36;
+        let t46 = self.fixed[7] * t9;
+        let t47 = t46 * t26;
         let t50 = T::one() / t30;
-        let t52 = self.fixed[3] * t9;
-        let t53 = t52 * t2;
-        let t60 = self.fixed[8] * t53;
-        let t61 = self.fixed[5] * t28;
-        let t62 = t44 + t61;
-        let t63 = -t53;
-        let t64 = self.fixed[6] * t50;
-        let t65 = self.fixed[5] + t64;
-        let t66 = t65 * t28;
-        let t67 = t62 + t66;
-        let t68 = t2 * t67;
-        let t69 = T::pi() * t68;
-        let t70 = t63 * t62;
-        let t71 = t70 * t50;
-        let t72 = t26 * t71;
-        let t76 = self.fixed[9] * t2;
-        let t77 = t76 * t28;
-        let t78 = t69 + t72;
-        let t79 = t78 + t77;
+        let t60 = self.fixed[8] * t9;
+        let t61 = t60 * t2;
+        let t62 = t44 + t47;
+        let t63 = self.fixed[3] * t9;
+        let t64 = t63 * t2;
+        let t65 = -t64;
+        let t66 = self.fixed[6] * t50;
+        let t69 = self.fixed[9] + t66;
+        let t70 = self.fixed[1] * t26;
+        let t71 = t70 * t69;
+        let t72 = t9 * t71;
+        let t73 = t72 + t44;
+        let t74 = T::pi() * t73;
+        let t75 = t2 * t74;
+        let t76 = t62 * t65;
+        let t77 = t76 * t50;
+        let t78 = t26 * t77;
+        let t79 = t75 + t78;
         let t81 = self.fixed[10] * t9;
         let t82 = t79 * t50;
         let t83 = t81 * t82;
-        let t84 = t60 - t83;
+        let t84 = t61 - t83;
         crate::nalgebra::SVector::<T, 1>::new(t84)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 1>, t: T) -> crate::Fields<T, 1> {
@@ -379,29 +375,28 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         let t49 = t44 + t48;
         let t50 = T::one() / t30;
         let t51 = t49 * t50;
-        let t52 = self.fixed[3] * t9;
-        let t53 = t52 * t2;
-        let t60 = self.fixed[8] * t53;
-        let t61 = self.fixed[5] * t28;
-        let t62 = t44 + t61;
-        let t63 = -t53;
-        let t64 = self.fixed[6] * t50;
-        let t65 = self.fixed[5] + t64;
-        let t66 = t65 * t28;
-        let t67 = t62 + t66;
-        let t68 = t2 * t67;
-        let t69 = T::pi() * t68;
-        let t70 = t63 * t62;
-        let t71 = t70 * t50;
-        let t72 = t26 * t71;
-        let t76 = self.fixed[9] * t2;
-        let t77 = t76 * t28;
-        let t78 = t69 + t72;
-        let t79 = t78 + t77;
+        let t60 = self.fixed[8] * t9;
+        let t61 = t60 * t2;
+        let t62 = t44 + t47;
+        let t63 = self.fixed[3] * t9;
+        let t64 = t63 * t2;
+        let t65 = -t64;
+        let t66 = self.fixed[6] * t50;
+        let t69 = self.fixed[9] + t66;
+        let t70 = self.fixed[1] * t26;
+        let t71 = t70 * t69;
+        let t72 = t9 * t71;
+        let t73 = t72 + t44;
+        let t74 = T::pi() * t73;
+        let t75 = t2 * t74;
+        let t76 = t62 * t65;
+        let t77 = t76 * t50;
+        let t78 = t26 * t77;
+        let t79 = t75 + t78;
         let t81 = self.fixed[10] * t9;
         let t82 = t79 * t50;
         let t83 = t81 * t82;
-        let t84 = t60 - t83;
+        let t84 = t61 - t83;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 1>::new(t11),
             v: crate::nalgebra::SVector::<T, 1>::new(t18),
@@ -447,7 +442,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[15]
+        self.fixed[14]
     }
     fn body_force_at(
         &self,
@@ -469,16 +464,16 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 5> for AxisAligned1d<T> {
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 1>) -> [T; 5] {
         let t2 = X[0].sin_pi();
         let t26 = X[0].cos_pi();
-        let t90 = self.fixed[11] * t2;
-        let t95 = t26 * t26;
-        let t99 = t2 * t95;
-        let t100 = self.fixed[12] * t99;
-        let t101 = -t100;
-        let t107 = t2 * t26;
-        let t108 = self.fixed[13] * t107;
-        let t113 = self.fixed[14] * t2;
-        let t114 = -t113;
-        [t26, t90, t101, t108, t114]
+        let t85 = self.fixed[8] * t2;
+        let t90 = t26 * t26;
+        let t94 = t2 * t90;
+        let t95 = self.fixed[11] * t94;
+        let t96 = -t95;
+        let t102 = t2 * t26;
+        let t103 = self.fixed[12] * t102;
+        let t108 = self.fixed[13] * t2;
+        let t109 = -t108;
+        [t26, t85, t96, t103, t109]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -490,16 +485,16 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 5> for AxisAligned1d<T> {
         let t30 = t28 + T::one();
         let t36 = t28.ln_1p();
         let t50 = T::one() / t30;
-        let t109 = time[0] * point[2];
-        let t110 = t109 - point[3];
-        let t115 = time[0] * t110;
-        let t116 = point[4] * t36;
-        let t117 = t115 + t116;
-        let t118 = t50 * t50;
-        let t119 = t117 * t118;
-        let t120 = point[1] + t119;
-        let t121 = time[0] * t120;
-        crate::nalgebra::SVector::<T, 1>::new(t121)
+        let t104 = time[0] * point[2];
+        let t105 = t104 - point[3];
+        let t110 = time[0] * t105;
+        let t111 = point[4] * t36;
+        let t112 = t110 + t111;
+        let t113 = t50 * t50;
+        let t114 = t112 * t113;
+        let t115 = point[1] + t114;
+        let t116 = time[0] * t115;
+        crate::nalgebra::SVector::<T, 1>::new(t116)
     }
 }
 impl<T: crate::Real> From<AxisAligned1d<T>> for crate::AnySolution<T> {

@@ -132,52 +132,50 @@ impl<T: crate::Real> AxisAligned3d<T> {
         let t88 = parameters.nu + T::one();
         let t89 = T::nearest(2.0) * parameters.nu;
         let t90 = T::one() - t89;
-        let t102 = T::nearest(0.5) * parameters.E;
-        let t103 = t102 / t88;
-        let t105 = parameters.E * parameters.nu;
-        let t106 = t88 * t90;
-        let t107 = t105 / t106;
-        let t109 = t31 * t103;
-        let t128 = parameters.nu * parameters.nu;
-        let t129 = T::nearest(2.0) * parameters.A;
-        let t130 = t129 * t46;
-        let t131 = t130 * parameters.E;
-        let t132 = t131 * t128;
-        let t133 = parameters.rho0 * t88;
-        let t134 = t133 * t90;
-        let t135 = t132 / t134;
-        let t145 = t31 * parameters.E;
-        let t146 = t145 * parameters.nu;
-        let t147 = t146 / t106;
-        let t152 = t47 / parameters.rho0;
-        let t158 = t48 * t128;
-        let t159 = t158 / t134;
-        let t176 = T::one() / parameters.rho0;
-        let t202 = t107 + t103;
-        let t203 = parameters.A * parameters.A;
-        let t204 = t203 * parameters.A;
-        let t205 = t46 * t46;
-        let t207 = t204 * t205;
-        let t208 = t207 * t202;
-        let t209 = t208 / parameters.rho0;
-        let t213 = t46 * T::pi();
-        let t214 = T::nearest(2.0) * t203;
-        let t215 = t214 * t213;
-        let t216 = t215 * t202;
-        let t217 = t216 / parameters.rho0;
-        let t222 = t48 * parameters.nu;
-        let t223 = t222 / t134;
-        let t236 = T::nearest(0.125) * t204;
-        let t237 = t236 * t205;
-        let t238 = t237 * t202;
-        let t239 = t238 / parameters.rho0;
-        let t242 = T::nearest(0.5) * t203;
-        let t243 = t242 * t213;
-        let t244 = t243 * t202;
-        let t245 = t244 / parameters.rho0;
-        let t250 = t54 * parameters.nu;
-        let t251 = t250 / t134;
-        let t276 = T::nearest(2.0) / t7;
+        let t100 = T::nearest(0.5) * parameters.E;
+        let t101 = t100 / t88;
+        let t103 = parameters.E * parameters.nu;
+        let t104 = t88 * t90;
+        let t105 = t103 / t104;
+        let t107 = t31 * t101;
+        let t126 = parameters.nu * parameters.nu;
+        let t127 = T::nearest(2.0) * parameters.A;
+        let t128 = t127 * t46;
+        let t129 = t128 * parameters.E;
+        let t130 = t129 * t126;
+        let t131 = parameters.rho0 * t88;
+        let t132 = t131 * t90;
+        let t133 = t130 / t132;
+        let t142 = t105 + t101;
+        let t143 = t31 * t142;
+        let t148 = t47 / parameters.rho0;
+        let t154 = t48 * t126;
+        let t155 = t154 / t132;
+        let t171 = T::one() / parameters.rho0;
+        let t196 = parameters.A * parameters.A;
+        let t197 = t196 * parameters.A;
+        let t198 = t46 * t46;
+        let t200 = t197 * t198;
+        let t201 = t200 * t142;
+        let t202 = t201 / parameters.rho0;
+        let t206 = t46 * T::pi();
+        let t207 = T::nearest(2.0) * t196;
+        let t208 = t207 * t206;
+        let t209 = t208 * t142;
+        let t210 = t209 / parameters.rho0;
+        let t215 = t48 * parameters.nu;
+        let t216 = t215 / t132;
+        let t229 = T::nearest(0.125) * t197;
+        let t230 = t229 * t198;
+        let t231 = t230 * t142;
+        let t232 = t231 / parameters.rho0;
+        let t235 = T::nearest(0.5) * t196;
+        let t236 = t235 * t206;
+        let t237 = t236 * t142;
+        let t238 = t237 / parameters.rho0;
+        let t243 = t54 * parameters.nu;
+        let t244 = t243 / t132;
+        let t269 = T::nearest(2.0) / t7;
         Ok(AxisAligned3d {
             parameters,
             fixed: [
@@ -191,21 +189,21 @@ impl<T: crate::Real> AxisAligned3d<T> {
                 t49,
                 t53,
                 t55,
-                t103,
+                t101,
+                t105,
                 t107,
-                t109,
-                t135,
-                t147,
-                t152,
-                t159,
-                t176,
-                t209,
-                t217,
-                t223,
-                t239,
-                t245,
-                t251,
-                t276,
+                t133,
+                t143,
+                t148,
+                t155,
+                t171,
+                t202,
+                t210,
+                t216,
+                t232,
+                t238,
+                t244,
+                t269,
             ],
         })
     }
@@ -446,51 +444,49 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t73 = t62 + T::one();
         let t83 = t67 + T::one();
         let t84 = t71 + T::one();
-        let t91 = t67 * t71;
-        let t92 = t91 - t66;
-        let t93 = t92 - t70;
-        let t94 = t93 + T::one();
-        let t95 = t9 * t60;
-        let t96 = t95 * t94;
-        let t97 = self.fixed[3] * t96;
-        let t98 = t97 - t66;
-        let t99 = t98 - t70;
-        let t100 = t99 + t91;
-        let t101 = t100.ln_1p();
-        let t104 = t62 + T::nearest(2.0);
-        let t108 = self.fixed[11] * t101;
-        let t110 = self.fixed[12] * t9;
-        let t111 = t110 * t60;
-        let t112 = t111 * t104;
-        let t113 = t108 + t112;
-        let t114 = T::one() / t73;
-        let t115 = t113 * t114;
-        let t116 = t67 + T::nearest(2.0);
-        let t117 = t67 * t116;
-        let t118 = self.fixed[10] * t117;
-        let t119 = t108 + t118;
-        let t120 = T::one() / t83;
-        let t121 = t119 * t120;
-        let t122 = t71 + T::nearest(2.0);
-        let t123 = t71 * t122;
-        let t124 = self.fixed[10] * t123;
-        let t125 = t108 + t124;
-        let t126 = T::one() / t84;
-        let t127 = t125 * t126;
+        let t91 = t67 * t84;
+        let t92 = t91 - t70;
+        let t93 = t92 + T::one();
+        let t94 = t9 * t60;
+        let t95 = t94 * t93;
+        let t96 = self.fixed[3] * t95;
+        let t97 = t96 + t91;
+        let t98 = t97 - t70;
+        let t99 = t98.ln_1p();
+        let t102 = t62 + T::nearest(2.0);
+        let t106 = self.fixed[11] * t99;
+        let t108 = self.fixed[12] * t9;
+        let t109 = t108 * t60;
+        let t110 = t109 * t102;
+        let t111 = t106 + t110;
+        let t112 = T::one() / t73;
+        let t113 = t111 * t112;
+        let t114 = t67 + T::nearest(2.0);
+        let t115 = t67 * t114;
+        let t116 = self.fixed[10] * t115;
+        let t117 = t106 + t116;
+        let t118 = T::one() / t83;
+        let t119 = t117 * t118;
+        let t120 = t71 + T::nearest(2.0);
+        let t121 = t71 * t120;
+        let t122 = self.fixed[10] * t121;
+        let t123 = t106 + t122;
+        let t124 = T::one() / t84;
+        let t125 = t123 * t124;
         crate::nalgebra::SMatrix::<
             T,
             3,
             3,
         >::new(
-            t115,
+            t113,
             T::zero(),
             T::zero(),
             T::zero(),
-            t121,
+            t119,
             T::zero(),
             T::zero(),
             T::zero(),
-            t127,
+            t125,
         )
     }
     #[inline]
@@ -522,82 +518,77 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t73 = t62 + T::one();
         let t83 = t67 + T::one();
         let t84 = t71 + T::one();
-        let t91 = t67 * t71;
-        let t92 = t91 - t66;
-        let t93 = t92 - t70;
-        let t94 = t93 + T::one();
-        let t95 = t9 * t60;
-        let t96 = t95 * t94;
-        let t97 = self.fixed[3] * t96;
-        let t98 = t97 - t66;
-        let t99 = t98 - t70;
-        let t100 = t99 + t91;
-        let t101 = t100.ln_1p();
-        let t108 = self.fixed[11] * t101;
-        let t110 = self.fixed[12] * t9;
-        let t111 = t110 * t60;
-        let t114 = T::one() / t73;
-        let t120 = T::one() / t83;
-        let t126 = T::one() / t84;
-        let t136 = self.fixed[13] * t9;
-        let t137 = t136 * t2;
-        let t138 = t108 + t111;
-        let t139 = self.fixed[11] * t114;
-        let t140 = t138 * t114;
-        let t141 = t139 - t140;
-        let t142 = self.fixed[10] + t141;
-        let t143 = t95 * t142;
-        let t144 = self.fixed[3] * t143;
-        let t148 = self.fixed[14] * t9;
-        let t149 = t148 * t60;
-        let t150 = t138 + t144;
-        let t151 = t150 + t149;
-        let t153 = self.fixed[15] * t9;
-        let t154 = t153 * t2;
-        let t155 = t151 * t114;
-        let t156 = t154 * t155;
-        let t157 = t137 - t156;
-        let t160 = self.fixed[16] * t18;
-        let t161 = t160 * t13;
-        let t162 = self.fixed[8] * t18;
-        let t163 = t162 * t13;
-        let t164 = self.fixed[10] * t67;
-        let t165 = t108 + t164;
-        let t166 = self.fixed[11] * t120;
-        let t167 = self.fixed[10] + t166;
-        let t168 = t101 - t66;
-        let t169 = self.fixed[11] * t168;
-        let t170 = t67 * t165;
-        let t171 = t170 * t120;
-        let t172 = t67 * t167;
-        let t173 = t169 + t164;
-        let t174 = t173 - t171;
-        let t175 = t174 + t172;
-        let t177 = t163 * t175;
-        let t178 = t177 * t120;
-        let t179 = self.fixed[17] * t178;
-        let t180 = t179 - t161;
-        let t181 = self.fixed[16] * t26;
-        let t182 = t181 * t25;
-        let t183 = self.fixed[8] * t26;
-        let t184 = t183 * t25;
-        let t185 = self.fixed[10] * t71;
-        let t186 = t108 + t185;
-        let t187 = self.fixed[11] * t126;
+        let t91 = t67 * t84;
+        let t92 = t91 - t70;
+        let t93 = t92 + T::one();
+        let t94 = t9 * t60;
+        let t95 = t94 * t93;
+        let t96 = self.fixed[3] * t95;
+        let t97 = t96 + t91;
+        let t98 = t97 - t70;
+        let t99 = t98.ln_1p();
+        let t106 = self.fixed[11] * t99;
+        let t108 = self.fixed[12] * t9;
+        let t109 = t108 * t60;
+        let t112 = T::one() / t73;
+        let t118 = T::one() / t83;
+        let t124 = T::one() / t84;
+        let t134 = self.fixed[13] * t9;
+        let t135 = t134 * t2;
+        let t136 = t106 + t109;
+        let t137 = self.fixed[11] - t136;
+        let t138 = t112 * t137;
+        let t139 = self.fixed[10] + t138;
+        let t140 = t94 * t139;
+        let t141 = self.fixed[3] * t140;
+        let t144 = self.fixed[14] * t60;
+        let t145 = t9 * t144;
+        let t146 = t141 + t145;
+        let t147 = t146 + t106;
+        let t149 = self.fixed[15] * t9;
+        let t150 = t149 * t2;
+        let t151 = t147 * t112;
+        let t152 = t150 * t151;
+        let t153 = t135 - t152;
+        let t156 = self.fixed[16] * t18;
+        let t157 = t156 * t13;
+        let t158 = self.fixed[8] * t18;
+        let t159 = t158 * t13;
+        let t160 = self.fixed[10] * t67;
+        let t161 = t106 + t160;
+        let t162 = self.fixed[11] * t118;
+        let t163 = self.fixed[10] + t162;
+        let t164 = t99 - t66;
+        let t165 = self.fixed[11] * t164;
+        let t166 = t161 * t118;
+        let t167 = t163 - t166;
+        let t168 = self.fixed[10] + t167;
+        let t169 = t67 * t168;
+        let t170 = t165 + t169;
+        let t172 = t159 * t170;
+        let t173 = t172 * t118;
+        let t174 = self.fixed[17] * t173;
+        let t175 = t174 - t157;
+        let t176 = self.fixed[16] * t26;
+        let t177 = t176 * t25;
+        let t178 = self.fixed[8] * t26;
+        let t179 = t178 * t25;
+        let t180 = self.fixed[10] * t71;
+        let t181 = t106 + t180;
+        let t182 = self.fixed[11] * t124;
+        let t183 = self.fixed[10] + t182;
+        let t184 = t99 - t70;
+        let t185 = self.fixed[11] * t184;
+        let t186 = t181 * t124;
+        let t187 = t183 - t186;
         let t188 = self.fixed[10] + t187;
-        let t189 = t101 - t70;
-        let t190 = self.fixed[11] * t189;
-        let t191 = t71 * t186;
-        let t192 = t191 * t126;
-        let t193 = t71 * t188;
-        let t194 = t190 + t185;
-        let t195 = t194 - t192;
-        let t196 = t195 + t193;
-        let t197 = t184 * t196;
-        let t198 = t197 * t126;
-        let t199 = self.fixed[17] * t198;
-        let t200 = t199 - t182;
-        crate::nalgebra::SVector::<T, 3>::new(t157, t180, t200)
+        let t189 = t71 * t188;
+        let t190 = t185 + t189;
+        let t191 = t179 * t190;
+        let t192 = t191 * t124;
+        let t193 = self.fixed[17] * t192;
+        let t194 = t193 - t177;
+        crate::nalgebra::SVector::<T, 3>::new(t153, t175, t194)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> crate::Fields<T, 3> {
         let t2 = X[0].sin_pi();
@@ -659,95 +650,90 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t84 = t71 + T::one();
         let t85 = t73 * t83;
         let t86 = t85 * t84;
-        let t91 = t67 * t71;
-        let t92 = t91 - t66;
-        let t93 = t92 - t70;
-        let t94 = t93 + T::one();
-        let t95 = t9 * t60;
-        let t96 = t95 * t94;
-        let t97 = self.fixed[3] * t96;
-        let t98 = t97 - t66;
-        let t99 = t98 - t70;
-        let t100 = t99 + t91;
-        let t101 = t100.ln_1p();
-        let t104 = t62 + T::nearest(2.0);
-        let t108 = self.fixed[11] * t101;
-        let t110 = self.fixed[12] * t9;
-        let t111 = t110 * t60;
-        let t112 = t111 * t104;
-        let t113 = t108 + t112;
-        let t114 = T::one() / t73;
-        let t115 = t113 * t114;
-        let t116 = t67 + T::nearest(2.0);
-        let t117 = t67 * t116;
-        let t118 = self.fixed[10] * t117;
-        let t119 = t108 + t118;
-        let t120 = T::one() / t83;
-        let t121 = t119 * t120;
-        let t122 = t71 + T::nearest(2.0);
-        let t123 = t71 * t122;
-        let t124 = self.fixed[10] * t123;
-        let t125 = t108 + t124;
-        let t126 = T::one() / t84;
-        let t127 = t125 * t126;
-        let t136 = self.fixed[13] * t9;
-        let t137 = t136 * t2;
-        let t138 = t108 + t111;
-        let t139 = self.fixed[11] * t114;
-        let t140 = t138 * t114;
-        let t141 = t139 - t140;
-        let t142 = self.fixed[10] + t141;
-        let t143 = t95 * t142;
-        let t144 = self.fixed[3] * t143;
-        let t148 = self.fixed[14] * t9;
-        let t149 = t148 * t60;
-        let t150 = t138 + t144;
-        let t151 = t150 + t149;
-        let t153 = self.fixed[15] * t9;
-        let t154 = t153 * t2;
-        let t155 = t151 * t114;
-        let t156 = t154 * t155;
-        let t157 = t137 - t156;
-        let t160 = self.fixed[16] * t18;
-        let t161 = t160 * t13;
-        let t162 = self.fixed[8] * t18;
-        let t163 = t162 * t13;
-        let t164 = self.fixed[10] * t67;
-        let t165 = t108 + t164;
-        let t166 = self.fixed[11] * t120;
-        let t167 = self.fixed[10] + t166;
-        let t168 = t101 - t66;
-        let t169 = self.fixed[11] * t168;
-        let t170 = t67 * t165;
-        let t171 = t170 * t120;
-        let t172 = t67 * t167;
-        let t173 = t169 + t164;
-        let t174 = t173 - t171;
-        let t175 = t174 + t172;
-        let t177 = t163 * t175;
-        let t178 = t177 * t120;
-        let t179 = self.fixed[17] * t178;
-        let t180 = t179 - t161;
-        let t181 = self.fixed[16] * t26;
-        let t182 = t181 * t25;
-        let t183 = self.fixed[8] * t26;
-        let t184 = t183 * t25;
-        let t185 = self.fixed[10] * t71;
-        let t186 = t108 + t185;
-        let t187 = self.fixed[11] * t126;
+        let t91 = t67 * t84;
+        let t92 = t91 - t70;
+        let t93 = t92 + T::one();
+        let t94 = t9 * t60;
+        let t95 = t94 * t93;
+        let t96 = self.fixed[3] * t95;
+        let t97 = t96 + t91;
+        let t98 = t97 - t70;
+        let t99 = t98.ln_1p();
+        let t102 = t62 + T::nearest(2.0);
+        let t106 = self.fixed[11] * t99;
+        let t108 = self.fixed[12] * t9;
+        let t109 = t108 * t60;
+        let t110 = t109 * t102;
+        let t111 = t106 + t110;
+        let t112 = T::one() / t73;
+        let t113 = t111 * t112;
+        let t114 = t67 + T::nearest(2.0);
+        let t115 = t67 * t114;
+        let t116 = self.fixed[10] * t115;
+        let t117 = t106 + t116;
+        let t118 = T::one() / t83;
+        let t119 = t117 * t118;
+        let t120 = t71 + T::nearest(2.0);
+        let t121 = t71 * t120;
+        let t122 = self.fixed[10] * t121;
+        let t123 = t106 + t122;
+        let t124 = T::one() / t84;
+        let t125 = t123 * t124;
+        let t134 = self.fixed[13] * t9;
+        let t135 = t134 * t2;
+        let t136 = t106 + t109;
+        let t137 = self.fixed[11] - t136;
+        let t138 = t112 * t137;
+        let t139 = self.fixed[10] + t138;
+        let t140 = t94 * t139;
+        let t141 = self.fixed[3] * t140;
+        let t144 = self.fixed[14] * t60;
+        let t145 = t9 * t144;
+        let t146 = t141 + t145;
+        let t147 = t146 + t106;
+        let t149 = self.fixed[15] * t9;
+        let t150 = t149 * t2;
+        let t151 = t147 * t112;
+        let t152 = t150 * t151;
+        let t153 = t135 - t152;
+        let t156 = self.fixed[16] * t18;
+        let t157 = t156 * t13;
+        let t158 = self.fixed[8] * t18;
+        let t159 = t158 * t13;
+        let t160 = self.fixed[10] * t67;
+        let t161 = t106 + t160;
+        let t162 = self.fixed[11] * t118;
+        let t163 = self.fixed[10] + t162;
+        let t164 = t99 - t66;
+        let t165 = self.fixed[11] * t164;
+        let t166 = t161 * t118;
+        let t167 = t163 - t166;
+        let t168 = self.fixed[10] + t167;
+        let t169 = t67 * t168;
+        let t170 = t165 + t169;
+        let t172 = t159 * t170;
+        let t173 = t172 * t118;
+        let t174 = self.fixed[17] * t173;
+        let t175 = t174 - t157;
+        let t176 = self.fixed[16] * t26;
+        let t177 = t176 * t25;
+        let t178 = self.fixed[8] * t26;
+        let t179 = t178 * t25;
+        let t180 = self.fixed[10] * t71;
+        let t181 = t106 + t180;
+        let t182 = self.fixed[11] * t124;
+        let t183 = self.fixed[10] + t182;
+        let t184 = t99 - t70;
+        let t185 = self.fixed[11] * t184;
+        let t186 = t181 * t124;
+        let t187 = t183 - t186;
         let t188 = self.fixed[10] + t187;
-        let t189 = t101 - t70;
-        let t190 = self.fixed[11] * t189;
-        let t191 = t71 * t186;
-        let t192 = t191 * t126;
-        let t193 = t71 * t188;
-        let t194 = t190 + t185;
-        let t195 = t194 - t192;
-        let t196 = t195 + t193;
-        let t197 = t184 * t196;
-        let t198 = t197 * t126;
-        let t199 = self.fixed[17] * t198;
-        let t200 = t199 - t182;
+        let t189 = t71 * t188;
+        let t190 = t185 + t189;
+        let t191 = t179 * t190;
+        let t192 = t191 * t124;
+        let t193 = self.fixed[17] * t192;
+        let t194 = t193 - t177;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 3>::new(t11, t23, t29),
             v: crate::nalgebra::SVector::<T, 3>::new(t34, t41, t45),
@@ -788,17 +774,17 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 3,
                 3,
             >::new(
-                t115,
+                t113,
                 T::zero(),
                 T::zero(),
                 T::zero(),
-                t121,
+                t119,
                 T::zero(),
                 T::zero(),
                 T::zero(),
-                t127,
+                t125,
             ),
-            b: crate::nalgebra::SVector::<T, 3>::new(t157, t180, t200),
+            b: crate::nalgebra::SVector::<T, 3>::new(t153, t175, t194),
         }
     }
     fn domain(&self) -> crate::Domain<T, 3> {
@@ -883,45 +869,45 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 15> for AxisAligned3d<T> {
         let t60 = X[0].cos_pi();
         let t64 = X[1].cos_pi();
         let t68 = X[2].cos_pi();
-        let t201 = self.fixed[13] * t2;
-        let t206 = t60 * t60;
-        let t210 = t2 * t206;
-        let t211 = self.fixed[18] * t210;
-        let t212 = -t211;
-        let t218 = t2 * t60;
-        let t219 = self.fixed[19] * t218;
-        let t224 = self.fixed[20] * t2;
-        let t225 = -t224;
-        let t233 = self.fixed[16] * t13;
-        let t235 = t64 * t64;
-        let t240 = t13 * t235;
-        let t241 = self.fixed[21] * t240;
-        let t246 = t13 * t64;
-        let t247 = self.fixed[22] * t246;
-        let t252 = self.fixed[23] * t13;
-        let t260 = self.fixed[16] * t25;
-        let t261 = t68 * t68;
-        let t262 = t25 * t261;
-        let t263 = self.fixed[21] * t262;
-        let t264 = t25 * t68;
-        let t265 = self.fixed[22] * t264;
-        let t268 = self.fixed[23] * t25;
+        let t195 = self.fixed[13] * t2;
+        let t199 = t60 * t60;
+        let t203 = t2 * t199;
+        let t204 = self.fixed[18] * t203;
+        let t205 = -t204;
+        let t211 = t2 * t60;
+        let t212 = self.fixed[19] * t211;
+        let t217 = self.fixed[20] * t2;
+        let t218 = -t217;
+        let t226 = self.fixed[16] * t13;
+        let t228 = t64 * t64;
+        let t233 = t13 * t228;
+        let t234 = self.fixed[21] * t233;
+        let t239 = t13 * t64;
+        let t240 = self.fixed[22] * t239;
+        let t245 = self.fixed[23] * t13;
+        let t253 = self.fixed[16] * t25;
+        let t254 = t68 * t68;
+        let t255 = t25 * t254;
+        let t256 = self.fixed[21] * t255;
+        let t257 = t25 * t68;
+        let t258 = self.fixed[22] * t257;
+        let t261 = self.fixed[23] * t25;
         [
             t60,
             t64,
             t68,
-            t201,
+            t195,
+            t205,
             t212,
-            t219,
-            t225,
-            t233,
-            t241,
-            t247,
-            t252,
-            t260,
-            t263,
-            t265,
-            t268,
+            t218,
+            t226,
+            t234,
+            t240,
+            t245,
+            t253,
+            t256,
+            t258,
+            t261,
         ]
     }
     #[inline(always)]
@@ -938,48 +924,46 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 15> for AxisAligned3d<T> {
         let t73 = t62 + T::one();
         let t83 = t67 + T::one();
         let t84 = t71 + T::one();
-        let t91 = t67 * t71;
-        let t92 = t91 - t66;
-        let t93 = t92 - t70;
-        let t94 = t93 + T::one();
-        let t95 = time[0] * point[0];
-        let t96 = t95 * t94;
-        let t97 = self.fixed[3] * t96;
-        let t98 = t97 - t66;
-        let t99 = t98 - t70;
-        let t100 = t99 + t91;
-        let t101 = t100.ln_1p();
-        let t114 = T::one() / t73;
-        let t120 = T::one() / t83;
-        let t126 = T::one() / t84;
-        let t220 = time[0] * point[4];
-        let t221 = t220 - point[5];
-        let t226 = time[0] * t221;
-        let t227 = point[6] * t101;
-        let t228 = t226 + t227;
-        let t229 = t114 * t114;
-        let t230 = t228 * t229;
-        let t231 = point[3] + t230;
-        let t232 = time[0] * t231;
-        let t248 = time[1] * point[8];
-        let t249 = t248 - point[9];
-        let t253 = time[1] * t249;
-        let t254 = point[10] * t101;
-        let t255 = t253 + t254;
-        let t256 = t120 * t120;
-        let t257 = t255 * t256;
-        let t258 = t257 - point[7];
-        let t259 = time[1] * t258;
-        let t266 = time[2] * point[12];
-        let t267 = t266 - point[13];
-        let t269 = time[2] * t267;
-        let t270 = point[14] * t101;
-        let t271 = t269 + t270;
-        let t272 = t126 * t126;
-        let t273 = t271 * t272;
-        let t274 = t273 - point[11];
-        let t275 = time[2] * t274;
-        crate::nalgebra::SVector::<T, 3>::new(t232, t259, t275)
+        let t91 = t67 * t84;
+        let t92 = t91 - t70;
+        let t93 = t92 + T::one();
+        let t94 = time[0] * point[0];
+        let t95 = t94 * t93;
+        let t96 = self.fixed[3] * t95;
+        let t97 = t96 + t91;
+        let t98 = t97 - t70;
+        let t99 = t98.ln_1p();
+        let t112 = T::one() / t73;
+        let t118 = T::one() / t83;
+        let t124 = T::one() / t84;
+        let t213 = time[0] * point[4];
+        let t214 = t213 - point[5];
+        let t219 = time[0] * t214;
+        let t220 = point[6] * t99;
+        let t221 = t219 + t220;
+        let t222 = t112 * t112;
+        let t223 = t221 * t222;
+        let t224 = point[3] + t223;
+        let t225 = time[0] * t224;
+        let t241 = time[1] * point[8];
+        let t242 = t241 - point[9];
+        let t246 = time[1] * t242;
+        let t247 = point[10] * t99;
+        let t248 = t246 + t247;
+        let t249 = t118 * t118;
+        let t250 = t248 * t249;
+        let t251 = t250 - point[7];
+        let t252 = time[1] * t251;
+        let t259 = time[2] * point[12];
+        let t260 = t259 - point[13];
+        let t262 = time[2] * t260;
+        let t263 = point[14] * t99;
+        let t264 = t262 + t263;
+        let t265 = t124 * t124;
+        let t266 = t264 * t265;
+        let t267 = t266 - point[11];
+        let t268 = time[2] * t267;
+        crate::nalgebra::SVector::<T, 3>::new(t225, t252, t268)
     }
 }
 impl<T: crate::Real> From<AxisAligned3d<T>> for crate::AnySolution<T> {

@@ -157,37 +157,37 @@ impl<T: crate::Real> Bar<T> {
         let t70 = T::nearest(4.0) * parameters.A;
         let t71 = t70 * t26;
         let t72 = t71 / t25;
-        let t88 = T::one() / parameters.rho0;
-        let t94 = t53 + t49;
-        let t96 = parameters.A * parameters.A;
-        let t97 = t96 * parameters.A;
-        let t98 = t25 * t25;
-        let t99 = t26 * t26;
-        let t101 = T::nearest(16.0) * t97;
-        let t102 = t101 * t99;
-        let t103 = t102 * t94;
-        let t104 = parameters.rho0 * t98;
-        let t105 = t103 / t104;
-        let t109 = t25 * parameters.L;
-        let t110 = t26 * T::pi();
-        let t111 = T::nearest(16.0) * t96;
-        let t112 = t111 * t110;
-        let t113 = t112 * t94;
-        let t114 = parameters.rho0 * t109;
-        let t115 = t113 / t114;
-        let t120 = t70 * parameters.E;
-        let t121 = t120 * parameters.nu;
-        let t122 = t121 * t26;
-        let t123 = t29 * t43;
-        let t124 = t123 * t45;
-        let t125 = t122 / t124;
-        let t135 = T::nearest(2.0) * parameters.L;
-        let t136 = t135 / t11;
-        let t138 = -t36;
+        let t87 = T::one() / parameters.rho0;
+        let t93 = t53 + t49;
+        let t95 = parameters.A * parameters.A;
+        let t96 = t95 * parameters.A;
+        let t97 = t25 * t25;
+        let t98 = t26 * t26;
+        let t100 = T::nearest(16.0) * t96;
+        let t101 = t100 * t98;
+        let t102 = t101 * t93;
+        let t103 = parameters.rho0 * t97;
+        let t104 = t102 / t103;
+        let t108 = t25 * parameters.L;
+        let t109 = t26 * T::pi();
+        let t110 = T::nearest(16.0) * t95;
+        let t111 = t110 * t109;
+        let t112 = t111 * t93;
+        let t113 = parameters.rho0 * t108;
+        let t114 = t112 / t113;
+        let t119 = t70 * parameters.E;
+        let t120 = t119 * parameters.nu;
+        let t121 = t120 * t26;
+        let t122 = t29 * t43;
+        let t123 = t122 * t45;
+        let t124 = t121 / t123;
+        let t134 = T::nearest(2.0) * parameters.L;
+        let t135 = t134 / t11;
+        let t137 = -t36;
         if !(t36 < parameters.L) {
             return Err(Self::DESCRIPTION.requirement_broken("2*Pi*A < L", &values));
         }
-        if !(t138 < parameters.L) {
+        if !(t137 < parameters.L) {
             return Err(Self::DESCRIPTION.requirement_broken("-2*Pi*A < L", &values));
         }
         Ok(Bar {
@@ -204,12 +204,12 @@ impl<T: crate::Real> Bar<T> {
                 t53,
                 t67,
                 t72,
-                t88,
-                t105,
-                t115,
-                t125,
-                t136,
-                t138,
+                t87,
+                t104,
+                t114,
+                t124,
+                t135,
+                t137,
             ],
         })
     }
@@ -381,17 +381,16 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
         let t79 = self.fixed[7] + t78;
         let t80 = t39 + t46;
         let t81 = self.fixed[8] * t80;
-        let t82 = t39 * t77;
-        let t83 = t82 * t58;
-        let t84 = t39 * t79;
-        let t85 = t81 + t76;
-        let t86 = t85 - t83;
-        let t87 = t86 + t84;
-        let t89 = t75 * t87;
-        let t90 = t89 * t58;
-        let t91 = self.fixed[11] * t90;
-        let t92 = t91 - t69;
-        crate::nalgebra::SVector::<T, 1>::new(t92)
+        let t82 = t77 * t58;
+        let t83 = t79 - t82;
+        let t84 = self.fixed[7] + t83;
+        let t85 = t39 * t84;
+        let t86 = t81 + t85;
+        let t88 = t75 * t86;
+        let t89 = t88 * t58;
+        let t90 = self.fixed[11] * t89;
+        let t91 = t90 - t69;
+        crate::nalgebra::SVector::<T, 1>::new(t91)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 1>, t: T) -> crate::Fields<T, 1> {
         let t5 = self.fixed[0] * X[0];
@@ -430,16 +429,15 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
         let t79 = self.fixed[7] + t78;
         let t80 = t39 + t46;
         let t81 = self.fixed[8] * t80;
-        let t82 = t39 * t77;
-        let t83 = t82 * t58;
-        let t84 = t39 * t79;
-        let t85 = t81 + t76;
-        let t86 = t85 - t83;
-        let t87 = t86 + t84;
-        let t89 = t75 * t87;
-        let t90 = t89 * t58;
-        let t91 = self.fixed[11] * t90;
-        let t92 = t91 - t69;
+        let t82 = t77 * t58;
+        let t83 = t79 - t82;
+        let t84 = self.fixed[7] + t83;
+        let t85 = t39 * t84;
+        let t86 = t81 + t85;
+        let t88 = t75 * t86;
+        let t89 = t88 * t58;
+        let t90 = self.fixed[11] * t89;
+        let t91 = t90 - t69;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 1>::new(t16),
             v: crate::nalgebra::SVector::<T, 1>::new(t24),
@@ -448,7 +446,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
             F: crate::nalgebra::SMatrix::<T, 1, 1>::new(t41),
             J: t41,
             P: crate::nalgebra::SMatrix::<T, 1, 1>::new(t59),
-            b: crate::nalgebra::SVector::<T, 1>::new(t92),
+            b: crate::nalgebra::SVector::<T, 1>::new(t91),
         }
     }
     fn domain(&self) -> crate::Domain<T, 1> {
@@ -508,16 +506,16 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 5> for Bar<T> {
         let t5 = self.fixed[0] * X[0];
         let t6 = t5.sin_pi();
         let t34 = t5.cos_pi();
-        let t93 = self.fixed[9] * t6;
-        let t100 = t34 * t34;
-        let t106 = t6 * t100;
-        let t107 = self.fixed[12] * t106;
-        let t108 = -t107;
-        let t116 = t6 * t34;
-        let t117 = self.fixed[13] * t116;
-        let t126 = self.fixed[14] * t6;
-        let t127 = -t126;
-        [t34, t93, t108, t117, t127]
+        let t92 = self.fixed[9] * t6;
+        let t99 = t34 * t34;
+        let t105 = t6 * t99;
+        let t106 = self.fixed[12] * t105;
+        let t107 = -t106;
+        let t115 = t6 * t34;
+        let t116 = self.fixed[13] * t115;
+        let t125 = self.fixed[14] * t6;
+        let t126 = -t125;
+        [t34, t92, t107, t116, t126]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -529,16 +527,16 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 5> for Bar<T> {
         let t41 = t39 + T::one();
         let t46 = t39.ln_1p();
         let t58 = T::one() / t41;
-        let t118 = time[0] * point[2];
-        let t119 = t118 - point[3];
-        let t128 = time[0] * t119;
-        let t129 = point[4] * t46;
-        let t130 = t128 + t129;
-        let t131 = t58 * t58;
-        let t132 = t130 * t131;
-        let t133 = t132 - point[1];
-        let t134 = time[0] * t133;
-        crate::nalgebra::SVector::<T, 1>::new(t134)
+        let t117 = time[0] * point[2];
+        let t118 = t117 - point[3];
+        let t127 = time[0] * t118;
+        let t128 = point[4] * t46;
+        let t129 = t127 + t128;
+        let t130 = t58 * t58;
+        let t131 = t129 * t130;
+        let t132 = t131 - point[1];
+        let t133 = time[0] * t132;
+        crate::nalgebra::SVector::<T, 1>::new(t133)
     }
 }
 impl<T: crate::Real> From<Bar<T>> for crate::AnySolution<T> {

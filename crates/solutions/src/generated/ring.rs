@@ -143,32 +143,32 @@ impl<T: crate::Real> Ring<T> {
         let t89 = t88 / t26;
         let t97 = T::nearest(0.5) * parameters.E;
         let t121 = parameters.Ri + parameters.Ro;
-        let t130 = t51 / parameters.rho0;
-        let t145 = t97 / parameters.rho0;
-        let t158 = parameters.A * parameters.A;
-        let t159 = t158 * t158;
-        let t160 = t15 * t15;
-        let t161 = t19 * t19;
-        let t163 = T::nearest(36.0) * t159;
-        let t164 = t163 * t97;
-        let t165 = parameters.rho0 * t160;
-        let t166 = t165 * t161;
-        let t167 = t164 / t166;
-        let t176 = T::nearest(2.0) * parameters.Ri;
-        let t177 = T::nearest(2.0) * parameters.Ro;
-        let t178 = t176 + t177;
-        let t189 = T::nearest(3.0) / t26;
-        let t193 = t158 * parameters.A;
-        let t194 = T::nearest(12.0) * t193;
-        let t195 = t194 * t97;
-        let t196 = parameters.rho0 * t15;
-        let t197 = t196 * t19;
-        let t198 = t195 / t197;
-        let t203 = t160 * t161;
-        let t204 = T::nearest(36.0) / t203;
-        let t208 = t158 * t97;
-        let t209 = t208 / parameters.rho0;
-        let t222 = T::nearest(2.0) / t11;
+        let t129 = t51 / parameters.rho0;
+        let t143 = t97 / parameters.rho0;
+        let t157 = parameters.A * parameters.A;
+        let t158 = t157 * t157;
+        let t159 = t15 * t15;
+        let t160 = t19 * t19;
+        let t162 = T::nearest(36.0) * t158;
+        let t163 = t162 * t97;
+        let t164 = parameters.rho0 * t159;
+        let t165 = t164 * t160;
+        let t166 = t163 / t165;
+        let t175 = T::nearest(2.0) * parameters.Ri;
+        let t176 = T::nearest(2.0) * parameters.Ro;
+        let t177 = t175 + t176;
+        let t188 = T::nearest(3.0) / t26;
+        let t192 = t157 * parameters.A;
+        let t193 = T::nearest(12.0) * t192;
+        let t194 = t193 * t97;
+        let t195 = parameters.rho0 * t15;
+        let t196 = t195 * t19;
+        let t197 = t194 / t196;
+        let t202 = t159 * t160;
+        let t203 = T::nearest(36.0) / t202;
+        let t207 = t157 * t97;
+        let t208 = t207 / parameters.rho0;
+        let t221 = T::nearest(2.0) / t11;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -189,15 +189,15 @@ impl<T: crate::Real> Ring<T> {
                 t89,
                 t97,
                 t121,
-                t130,
-                t145,
-                t167,
-                t178,
-                t189,
-                t198,
-                t204,
-                t209,
-                t222,
+                t129,
+                t143,
+                t166,
+                t177,
+                t188,
+                t197,
+                t203,
+                t208,
+                t221,
             ],
         })
     }
@@ -553,30 +553,28 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t123 = t70 * t35;
         let t124 = t123 + t122;
         let t125 = self.fixed[7] * t124;
-        let t126 = t31 * t34;
-        let t127 = self.fixed[5] * t31;
-        let t128 = t125 - t126;
-        let t129 = t128 + t127;
-        let t131 = self.fixed[11] * t13;
-        let t132 = t131 * t129;
-        let t133 = t90 * t122;
-        let t134 = t91 * t101;
-        let t135 = T::nearest(2.0) - t134;
-        let t136 = t133 * t135;
-        let t137 = t136 * t134;
-        let t138 = t91 * t134;
-        let t139 = t35 * t138;
-        let t140 = t93 * t93;
-        let t141 = t140 * t105;
-        let t142 = t35 * t141;
-        let t143 = t137 + t139;
-        let t144 = t143 - t142;
-        let t146 = self.fixed[12] * t144;
-        let t147 = t146 - t132;
-        let t148 = t35 * t147;
-        let t149 = X[0] * t148;
-        let t150 = X[1] * t148;
-        crate::nalgebra::SVector::<T, 2>::new(t149, t150)
+        let t126 = t34 - self.fixed[5];
+        let t127 = t31 * t126;
+        let t128 = t125 - t127;
+        let t130 = self.fixed[11] * t13;
+        let t131 = t130 * t128;
+        let t132 = t90 * t122;
+        let t133 = t91 * t101;
+        let t134 = T::nearest(2.0) - t133;
+        let t135 = t132 * t134;
+        let t136 = t35 * t91;
+        let t137 = t135 + t136;
+        let t138 = t133 * t137;
+        let t139 = t93 * t93;
+        let t140 = t139 * t105;
+        let t141 = t35 * t140;
+        let t142 = t138 - t141;
+        let t144 = self.fixed[12] * t142;
+        let t145 = t144 - t131;
+        let t146 = t35 * t145;
+        let t147 = X[0] * t146;
+        let t148 = X[1] * t146;
+        crate::nalgebra::SVector::<T, 2>::new(t147, t148)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t2 = X[0] * X[0];
@@ -672,29 +670,27 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t123 = t70 * t35;
         let t124 = t123 + t122;
         let t125 = self.fixed[7] * t124;
-        let t126 = t31 * t34;
-        let t127 = self.fixed[5] * t31;
-        let t128 = t125 - t126;
-        let t129 = t128 + t127;
-        let t131 = self.fixed[11] * t13;
-        let t132 = t131 * t129;
-        let t133 = t90 * t122;
-        let t134 = t91 * t101;
-        let t135 = T::nearest(2.0) - t134;
-        let t136 = t133 * t135;
-        let t137 = t136 * t134;
-        let t138 = t91 * t134;
-        let t139 = t35 * t138;
-        let t140 = t93 * t93;
-        let t141 = t140 * t105;
-        let t142 = t35 * t141;
-        let t143 = t137 + t139;
-        let t144 = t143 - t142;
-        let t146 = self.fixed[12] * t144;
-        let t147 = t146 - t132;
-        let t148 = t35 * t147;
-        let t149 = X[0] * t148;
-        let t150 = X[1] * t148;
+        let t126 = t34 - self.fixed[5];
+        let t127 = t31 * t126;
+        let t128 = t125 - t127;
+        let t130 = self.fixed[11] * t13;
+        let t131 = t130 * t128;
+        let t132 = t90 * t122;
+        let t133 = t91 * t101;
+        let t134 = T::nearest(2.0) - t133;
+        let t135 = t132 * t134;
+        let t136 = t35 * t91;
+        let t137 = t135 + t136;
+        let t138 = t133 * t137;
+        let t139 = t93 * t93;
+        let t140 = t139 * t105;
+        let t141 = t35 * t140;
+        let t142 = t138 - t141;
+        let t144 = self.fixed[12] * t142;
+        let t145 = t144 - t131;
+        let t146 = t35 * t145;
+        let t147 = X[0] * t146;
+        let t148 = X[1] * t146;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t37, t40),
             v: crate::nalgebra::SVector::<T, 2>::new(t47, t49),
@@ -703,7 +699,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t86, t77, t77, t87),
             J: t95,
             P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t110, t115, t115, t120),
-            b: crate::nalgebra::SVector::<T, 2>::new(t149, t150),
+            b: crate::nalgebra::SVector::<T, 2>::new(t147, t148),
         }
     }
     fn domain(&self) -> crate::Domain<T, 2> {
@@ -789,44 +785,44 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 8> for Ring<T> {
         let t123 = t70 * t35;
         let t124 = t123 + t122;
         let t125 = self.fixed[7] * t124;
-        let t126 = t31 * t34;
-        let t127 = self.fixed[5] * t31;
-        let t128 = t125 - t126;
-        let t129 = t128 + t127;
-        let t151 = X[0] * t35;
-        let t152 = self.fixed[11] * t129;
-        let t153 = t23 + t123;
-        let t154 = t153 - self.fixed[10];
-        let t155 = self.fixed[7] * t154;
-        let t156 = t126 - t155;
-        let t162 = t59 * t59;
-        let t168 = t21 * t31;
-        let t169 = t168 * t162;
-        let t170 = t169 * t156;
-        let t171 = t170 * t35;
-        let t172 = self.fixed[13] * t171;
-        let t173 = -t172;
-        let t175 = T::nearest(4.0) * t5;
-        let t179 = t175 + t123;
-        let t180 = t179 - self.fixed[14];
-        let t181 = t70 * t154;
-        let t182 = self.fixed[7] * t181;
-        let t183 = t31 * t180;
-        let t184 = t183 * t35;
-        let t185 = t182 + t184;
-        let t186 = t31 * t31;
-        let t187 = t34 * t35;
-        let t188 = t186 * t187;
-        let t190 = self.fixed[15] * t185;
-        let t191 = t188 - t190;
-        let t199 = t70 * t191;
-        let t200 = self.fixed[16] * t199;
-        let t205 = t70 * t180;
-        let t206 = self.fixed[17] * t205;
-        let t207 = t188 - t206;
-        let t210 = self.fixed[18] * t207;
-        let t220 = X[1] * t35;
-        [t70, t72, t151, t152, t173, t200, t210, t220]
+        let t126 = t34 - self.fixed[5];
+        let t127 = t31 * t126;
+        let t128 = t125 - t127;
+        let t149 = X[0] * t35;
+        let t150 = self.fixed[11] * t128;
+        let t151 = t23 + t123;
+        let t152 = t151 - self.fixed[10];
+        let t153 = t31 * t34;
+        let t154 = self.fixed[7] * t152;
+        let t155 = t153 - t154;
+        let t161 = t59 * t59;
+        let t167 = t21 * t31;
+        let t168 = t167 * t161;
+        let t169 = t168 * t155;
+        let t170 = t169 * t35;
+        let t171 = self.fixed[13] * t170;
+        let t172 = -t171;
+        let t174 = T::nearest(4.0) * t5;
+        let t178 = t174 + t123;
+        let t179 = t178 - self.fixed[14];
+        let t180 = t70 * t152;
+        let t181 = self.fixed[7] * t180;
+        let t182 = t31 * t179;
+        let t183 = t182 * t35;
+        let t184 = t181 + t183;
+        let t185 = t31 * t31;
+        let t186 = t34 * t35;
+        let t187 = t185 * t186;
+        let t189 = self.fixed[15] * t184;
+        let t190 = t187 - t189;
+        let t198 = t70 * t190;
+        let t199 = self.fixed[16] * t198;
+        let t204 = t70 * t179;
+        let t205 = self.fixed[17] * t204;
+        let t206 = t187 - t205;
+        let t209 = self.fixed[18] * t206;
+        let t219 = X[1] * t35;
+        [t70, t72, t149, t150, t172, t199, t209, t219]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -838,19 +834,19 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 8> for Ring<T> {
         let t92 = t91 + T::one();
         let t93 = time[1] * point[1];
         let t94 = t93 + T::one();
-        let t201 = time[0] * point[4];
-        let t202 = t201 - point[5];
-        let t211 = time[0] * t202;
-        let t212 = t211 - point[6];
-        let t213 = t92 * t92;
-        let t214 = t213 * t94;
-        let t215 = t212 / t214;
-        let t216 = time[0] * t215;
-        let t217 = t216 - point[3];
-        let t218 = time[0] * t217;
-        let t219 = point[2] * t218;
-        let t221 = point[7] * t218;
-        crate::nalgebra::SVector::<T, 2>::new(t219, t221)
+        let t200 = time[0] * point[4];
+        let t201 = t200 - point[5];
+        let t210 = time[0] * t201;
+        let t211 = t210 - point[6];
+        let t212 = t92 * t92;
+        let t213 = t212 * t94;
+        let t214 = t211 / t213;
+        let t215 = time[0] * t214;
+        let t216 = t215 - point[3];
+        let t217 = time[0] * t216;
+        let t218 = point[2] * t217;
+        let t220 = point[7] * t217;
+        crate::nalgebra::SVector::<T, 2>::new(t218, t220)
     }
 }
 impl<T: crate::Real> From<Ring<T>> for crate::AnySolution<T> {

@@ -44,7 +44,7 @@ impl<T: crate::Real> Default for RingNuParameters<T> {
 pub struct RingNu<T: crate::Real> {
     parameters: RingNuParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 28],
+    fixed: [T; 29],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> RingNu<T> {
@@ -166,42 +166,43 @@ impl<T: crate::Real> RingNu<T> {
         let t111 = t109 / t110;
         let t117 = parameters.A * t107;
         let t136 = parameters.Ri + parameters.Ro;
-        let t142 = parameters.nu / t99;
-        let t151 = T::one() / t97;
-        let t154 = t51 / parameters.rho0;
-        let t197 = T::one() / parameters.rho0;
-        let t221 = parameters.A * parameters.A;
-        let t222 = t221 * t221;
-        let t223 = t15 * t15;
-        let t224 = t19 * t19;
-        let t226 = T::nearest(36.0) * t222;
-        let t227 = parameters.rho0 * t223;
-        let t228 = t227 * t224;
-        let t229 = t226 / t228;
-        let t249 = t223 * t224;
-        let t250 = T::nearest(36.0) / t249;
-        let t260 = T::nearest(2.0) * t107;
-        let t268 = t221 * parameters.A;
-        let t269 = T::nearest(6.0) * t268;
-        let t270 = parameters.rho0 * t15;
-        let t271 = t270 * t19;
-        let t272 = t269 / t271;
-        let t283 = T::nearest(6.0) * t221;
-        let t284 = t283 * parameters.E;
-        let t285 = t284 * parameters.nu;
-        let t286 = t271 * t97;
-        let t287 = t286 * t99;
-        let t288 = t285 / t287;
-        let t292 = T::nearest(12.0) * t107;
-        let t293 = t292 / t26;
-        let t295 = T::nearest(6.0) * t107;
-        let t296 = t295 / t26;
-        let t306 = t221 / parameters.rho0;
-        let t312 = t51 * parameters.nu;
-        let t313 = parameters.rho0 * t97;
-        let t314 = t313 * t99;
-        let t315 = t312 / t314;
-        let t329 = T::nearest(2.0) / t11;
+        let t145 = parameters.nu / t99;
+        let t150 = T::one() / t97;
+        let t153 = t51 / parameters.rho0;
+        let t193 = T::one() / parameters.rho0;
+        let t217 = parameters.A * parameters.A;
+        let t218 = t217 * t217;
+        let t219 = t15 * t15;
+        let t220 = t19 * t19;
+        let t222 = T::nearest(36.0) * t218;
+        let t223 = parameters.rho0 * t219;
+        let t224 = t223 * t220;
+        let t225 = t222 / t224;
+        let t244 = T::nearest(3.0) / t26;
+        let t250 = t219 * t220;
+        let t251 = T::nearest(36.0) / t250;
+        let t256 = T::nearest(2.0) * t107;
+        let t264 = t217 * parameters.A;
+        let t265 = T::nearest(6.0) * t264;
+        let t266 = parameters.rho0 * t15;
+        let t267 = t266 * t19;
+        let t268 = t265 / t267;
+        let t277 = T::nearest(6.0) * t217;
+        let t278 = t277 * parameters.E;
+        let t279 = t278 * parameters.nu;
+        let t280 = t267 * t97;
+        let t281 = t280 * t99;
+        let t282 = t279 / t281;
+        let t286 = T::nearest(12.0) * t107;
+        let t287 = t286 / t26;
+        let t289 = T::nearest(6.0) * t107;
+        let t290 = t289 / t26;
+        let t303 = t217 / parameters.rho0;
+        let t309 = t51 * parameters.nu;
+        let t310 = parameters.rho0 * t97;
+        let t311 = t310 * t99;
+        let t312 = t309 / t311;
+        let t326 = T::nearest(2.0) / t11;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -225,20 +226,21 @@ impl<T: crate::Real> RingNu<T> {
                 t111,
                 t117,
                 t136,
-                t142,
-                t151,
-                t154,
-                t197,
-                t229,
-                t250,
-                t260,
-                t272,
-                t288,
-                t293,
-                t296,
-                t306,
-                t315,
-                t329,
+                t145,
+                t150,
+                t153,
+                t193,
+                t225,
+                t244,
+                t251,
+                t256,
+                t268,
+                t282,
+                t287,
+                t290,
+                t303,
+                t312,
+                t326,
             ],
         })
     }
@@ -599,64 +601,60 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t139 = t73 * t35;
         let t140 = t138 + t139;
         let t141 = self.fixed[3] * t70;
-        let t143 = self.fixed[14] * t140;
-        let t144 = t72 * t35;
-        let t145 = t141 * t35;
-        let t146 = T::nearest(6.0) * t145;
-        let t147 = t138 + t143;
-        let t148 = t147 - t144;
-        let t149 = t148 + t146;
-        let t150 = self.fixed[5] * t31;
-        let t152 = self.fixed[15] * t149;
-        let t153 = t150 + t152;
-        let t155 = self.fixed[16] * t13;
-        let t156 = t155 * t153;
-        let t157 = self.fixed[8] * t13;
-        let t158 = t157 * t141;
-        let t159 = t158 + T::one();
-        let t160 = t90 * t137;
-        let t161 = t158 * t93;
-        let t162 = t158 + t93;
-        let t163 = t162 + t161;
-        let t164 = t163.ln_1p();
-        let t165 = self.fixed[11] * t164;
-        let t166 = self.fixed[10] * t158;
-        let t167 = t165 + t166;
-        let t168 = T::one() / t159;
-        let t169 = t160 * t168;
-        let t170 = t158 * t169;
-        let t171 = t32 * t139;
-        let t172 = t171 * t124;
-        let t173 = t169 + t172;
-        let t174 = self.fixed[10] * t160;
-        let t175 = self.fixed[11] * t173;
-        let t176 = t174 + t175;
-        let t177 = t160 * t167;
-        let t178 = t167 * t170;
-        let t179 = t158 * t176;
-        let t180 = t177 - t178;
-        let t181 = t180 + t179;
-        let t182 = self.fixed[10] * t93;
-        let t183 = t165 + t182;
-        let t184 = t93 * t172;
-        let t185 = t170 + t184;
-        let t186 = t181 * t168;
-        let t187 = t158 * t167;
-        let t188 = t187 * t168;
+        let t142 = T::nearest(6.0) * t141;
+        let t143 = t72 - t142;
+        let t144 = t35 * t143;
+        let t146 = self.fixed[14] * t140;
+        let t147 = t138 - t144;
+        let t148 = t147 + t146;
+        let t149 = self.fixed[5] * t31;
+        let t151 = self.fixed[15] * t148;
+        let t152 = t149 + t151;
+        let t154 = self.fixed[16] * t13;
+        let t155 = t154 * t152;
+        let t156 = self.fixed[8] * t13;
+        let t157 = t156 * t141;
+        let t158 = t157 + T::one();
+        let t159 = t90 * t137;
+        let t160 = t157 * t94;
+        let t161 = t160 + t93;
+        let t162 = t161.ln_1p();
+        let t163 = self.fixed[11] * t162;
+        let t164 = self.fixed[10] * t157;
+        let t165 = t163 + t164;
+        let t166 = T::one() / t158;
+        let t167 = t159 * t166;
+        let t168 = t157 * t167;
+        let t169 = t32 * t139;
+        let t170 = t169 * t124;
+        let t171 = t167 + t170;
+        let t172 = self.fixed[10] * t159;
+        let t173 = self.fixed[11] * t171;
+        let t174 = t172 + t173;
+        let t175 = t159 - t168;
+        let t176 = t165 * t175;
+        let t177 = t157 * t174;
+        let t178 = t176 + t177;
+        let t179 = self.fixed[10] * t93;
+        let t180 = t163 + t179;
+        let t181 = t93 * t170;
+        let t182 = t168 + t181;
+        let t183 = t157 * t165;
+        let t184 = t35 * t183;
+        let t185 = t184 + t178;
+        let t186 = t166 * t185;
+        let t187 = t93 * t180;
+        let t188 = t187 * t124;
         let t189 = t35 * t188;
-        let t190 = t93 * t183;
-        let t191 = t190 * t124;
-        let t192 = t35 * t191;
-        let t193 = self.fixed[11] * t185;
-        let t194 = t186 + t189;
-        let t195 = t194 - t192;
-        let t196 = t195 + t193;
-        let t198 = self.fixed[17] * t196;
-        let t199 = t198 - t156;
-        let t200 = t35 * t199;
-        let t201 = X[0] * t200;
-        let t202 = X[1] * t200;
-        crate::nalgebra::SVector::<T, 2>::new(t201, t202)
+        let t190 = self.fixed[11] * t182;
+        let t191 = t186 - t189;
+        let t192 = t191 + t190;
+        let t194 = self.fixed[17] * t192;
+        let t195 = t194 - t155;
+        let t196 = t35 * t195;
+        let t197 = X[0] * t196;
+        let t198 = X[1] * t196;
+        crate::nalgebra::SVector::<T, 2>::new(t197, t198)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t2 = X[0] * X[0];
@@ -759,63 +757,59 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t139 = t73 * t35;
         let t140 = t138 + t139;
         let t141 = self.fixed[3] * t70;
-        let t143 = self.fixed[14] * t140;
-        let t144 = t72 * t35;
-        let t145 = t141 * t35;
-        let t146 = T::nearest(6.0) * t145;
-        let t147 = t138 + t143;
-        let t148 = t147 - t144;
-        let t149 = t148 + t146;
-        let t150 = self.fixed[5] * t31;
-        let t152 = self.fixed[15] * t149;
-        let t153 = t150 + t152;
-        let t155 = self.fixed[16] * t13;
-        let t156 = t155 * t153;
-        let t157 = self.fixed[8] * t13;
-        let t158 = t157 * t141;
-        let t159 = t158 + T::one();
-        let t160 = t90 * t137;
-        let t161 = t158 * t93;
-        let t162 = t158 + t93;
-        let t163 = t162 + t161;
-        let t164 = t163.ln_1p();
-        let t165 = self.fixed[11] * t164;
-        let t166 = self.fixed[10] * t158;
-        let t167 = t165 + t166;
-        let t168 = T::one() / t159;
-        let t169 = t160 * t168;
-        let t170 = t158 * t169;
-        let t171 = t32 * t139;
-        let t172 = t171 * t124;
-        let t173 = t169 + t172;
-        let t174 = self.fixed[10] * t160;
-        let t175 = self.fixed[11] * t173;
-        let t176 = t174 + t175;
-        let t177 = t160 * t167;
-        let t178 = t167 * t170;
-        let t179 = t158 * t176;
-        let t180 = t177 - t178;
-        let t181 = t180 + t179;
-        let t182 = self.fixed[10] * t93;
-        let t183 = t165 + t182;
-        let t184 = t93 * t172;
-        let t185 = t170 + t184;
-        let t186 = t181 * t168;
-        let t187 = t158 * t167;
-        let t188 = t187 * t168;
+        let t142 = T::nearest(6.0) * t141;
+        let t143 = t72 - t142;
+        let t144 = t35 * t143;
+        let t146 = self.fixed[14] * t140;
+        let t147 = t138 - t144;
+        let t148 = t147 + t146;
+        let t149 = self.fixed[5] * t31;
+        let t151 = self.fixed[15] * t148;
+        let t152 = t149 + t151;
+        let t154 = self.fixed[16] * t13;
+        let t155 = t154 * t152;
+        let t156 = self.fixed[8] * t13;
+        let t157 = t156 * t141;
+        let t158 = t157 + T::one();
+        let t159 = t90 * t137;
+        let t160 = t157 * t94;
+        let t161 = t160 + t93;
+        let t162 = t161.ln_1p();
+        let t163 = self.fixed[11] * t162;
+        let t164 = self.fixed[10] * t157;
+        let t165 = t163 + t164;
+        let t166 = T::one() / t158;
+        let t167 = t159 * t166;
+        let t168 = t157 * t167;
+        let t169 = t32 * t139;
+        let t170 = t169 * t124;
+        let t171 = t167 + t170;
+        let t172 = self.fixed[10] * t159;
+        let t173 = self.fixed[11] * t171;
+        let t174 = t172 + t173;
+        let t175 = t159 - t168;
+        let t176 = t165 * t175;
+        let t177 = t157 * t174;
+        let t178 = t176 + t177;
+        let t179 = self.fixed[10] * t93;
+        let t180 = t163 + t179;
+        let t181 = t93 * t170;
+        let t182 = t168 + t181;
+        let t183 = t157 * t165;
+        let t184 = t35 * t183;
+        let t185 = t184 + t178;
+        let t186 = t166 * t185;
+        let t187 = t93 * t180;
+        let t188 = t187 * t124;
         let t189 = t35 * t188;
-        let t190 = t93 * t183;
-        let t191 = t190 * t124;
-        let t192 = t35 * t191;
-        let t193 = self.fixed[11] * t185;
-        let t194 = t186 + t189;
-        let t195 = t194 - t192;
-        let t196 = t195 + t193;
-        let t198 = self.fixed[17] * t196;
-        let t199 = t198 - t156;
-        let t200 = t35 * t199;
-        let t201 = X[0] * t200;
-        let t202 = X[1] * t200;
+        let t190 = self.fixed[11] * t182;
+        let t191 = t186 - t189;
+        let t192 = t191 + t190;
+        let t194 = self.fixed[17] * t192;
+        let t195 = t194 - t155;
+        let t196 = t35 * t195;
+        let t197 = X[0] * t196;
+        let t198 = X[1] * t196;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t37, t40),
             v: crate::nalgebra::SVector::<T, 2>::new(t47, t49),
@@ -824,7 +818,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t86, t77, t77, t87),
             J: t95,
             P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t128, t131, t131, t135),
-            b: crate::nalgebra::SVector::<T, 2>::new(t201, t202),
+            b: crate::nalgebra::SVector::<T, 2>::new(t197, t198),
         }
     }
     fn domain(&self) -> crate::Domain<T, 2> {
@@ -869,7 +863,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[27]
+        self.fixed[28]
     }
     fn body_force_at(
         &self,
@@ -912,86 +906,86 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         let t138 = self.fixed[7] * t137;
         let t139 = t73 * t35;
         let t140 = t138 + t139;
-        let t143 = self.fixed[14] * t140;
-        let t150 = self.fixed[5] * t31;
-        let t203 = X[0] * t35;
-        let t204 = t70 * t35;
-        let t205 = t204 + t137;
-        let t206 = self.fixed[7] * t205;
-        let t207 = t31 * t34;
-        let t208 = t206 - t207;
-        let t209 = t208 + t143;
-        let t210 = self.fixed[15] * t209;
-        let t211 = t150 + t210;
-        let t212 = self.fixed[16] * t211;
-        let t213 = t23 + t204;
-        let t214 = t213 - self.fixed[13];
-        let t215 = self.fixed[7] * t214;
-        let t216 = t207 - t215;
-        let t217 = self.fixed[11] * t140;
-        let t218 = self.fixed[10] * t216;
-        let t219 = t217 - t218;
-        let t225 = t59 * t59;
-        let t230 = t21 * t31;
-        let t231 = t230 * t225;
-        let t232 = t231 * t219;
-        let t233 = t232 * t35;
-        let t234 = self.fixed[18] * t233;
-        let t235 = t31 * t137;
-        let t236 = t70 * t73;
-        let t237 = t235 + t236;
-        let t238 = t71 + t72;
-        let t239 = t237 * t35;
-        let t240 = self.fixed[11] * t239;
-        let t241 = t137 * t238;
-        let t242 = t235 * t35;
-        let t243 = t70 * t238;
-        let t244 = t243 * t35;
-        let t245 = t241 + t242;
-        let t246 = t245 + t244;
-        let t247 = self.fixed[10] * t246;
-        let t248 = t240 + t247;
-        let t251 = t70 * t137;
-        let t252 = self.fixed[19] * t251;
-        let t253 = t31 * t73;
-        let t254 = t253 * t34;
-        let t255 = t31 * t140;
-        let t256 = t255 * t35;
-        let t257 = t252 + t254;
-        let t258 = t257 + t256;
-        let t259 = t31 * t31;
-        let t261 = t34 * t35;
-        let t262 = t259 * t261;
-        let t263 = self.fixed[20] * t262;
-        let t264 = self.fixed[7] * t248;
-        let t265 = self.fixed[11] * t258;
-        let t266 = t263 - t264;
-        let t267 = t266 - t265;
-        let t273 = t70 * t267;
-        let t274 = self.fixed[21] * t273;
-        let t277 = t20 * t31;
-        let t278 = t277 * t59;
-        let t279 = t278 * t35;
-        let t280 = T::nearest(2.0) * t279;
-        let t281 = t235 + t243;
-        let t282 = t281 - t280;
-        let t289 = t282 * t35;
-        let t290 = self.fixed[22] * t289;
-        let t294 = self.fixed[23] * t137;
-        let t297 = self.fixed[24] * t204;
-        let t298 = t217 + t294;
-        let t299 = t298 + t297;
-        let t300 = self.fixed[10] * t262;
-        let t301 = t70 * t299;
-        let t302 = self.fixed[7] * t301;
-        let t303 = self.fixed[11] * t257;
-        let t304 = t300 - t302;
-        let t305 = t304 - t303;
-        let t307 = self.fixed[25] * t305;
-        let t316 = self.fixed[26] * t216;
-        let t317 = -t316;
-        let t327 = X[1] * t35;
-        [t70, t72, t203, t212, t234, t274, t290, t307, t317, t327]
+        let t146 = self.fixed[14] * t140;
+        let t149 = self.fixed[5] * t31;
+        let t199 = X[0] * t35;
+        let t200 = t70 * t35;
+        let t201 = t200 + t137;
+        let t202 = self.fixed[7] * t201;
+        let t203 = t31 * t34;
+        let t204 = t202 - t203;
+        let t205 = t204 + t146;
+        let t206 = self.fixed[15] * t205;
+        let t207 = t149 + t206;
+        let t208 = self.fixed[16] * t207;
+        let t209 = t23 + t200;
+        let t210 = t209 - self.fixed[13];
+        let t211 = self.fixed[7] * t210;
+        let t212 = t203 - t211;
+        let t213 = self.fixed[11] * t140;
+        let t214 = self.fixed[10] * t212;
+        let t215 = t213 - t214;
+        let t221 = t59 * t59;
+        let t226 = t21 * t31;
+        let t227 = t226 * t221;
+        let t228 = t227 * t215;
+        let t229 = t228 * t35;
+        let t230 = self.fixed[18] * t229;
+        let t231 = t31 * t137;
+        let t232 = t70 * t73;
+        let t233 = t231 + t232;
+        let t234 = t71 + t72;
+        let t235 = t72 + t234;
+        let t236 = t137 * t235;
+        let t237 = t70 * t234;
+        let t238 = t237 * t35;
+        let t239 = t236 + t238;
+        let t240 = self.fixed[10] * t239;
+        let t241 = t233 * t35;
+        let t242 = self.fixed[11] * t241;
+        let t243 = t240 + t242;
+        let t245 = self.fixed[19] * t137;
+        let t246 = t245 + t139;
+        let t247 = t246 * t35;
+        let t248 = T::nearest(2.0) * t247;
+        let t249 = t31 * t248;
+        let t252 = t70 * t137;
+        let t253 = self.fixed[20] * t252;
+        let t254 = t249 + t253;
+        let t255 = t31 * t31;
+        let t257 = t34 * t35;
+        let t258 = t255 * t257;
+        let t259 = self.fixed[21] * t258;
+        let t260 = self.fixed[7] * t243;
+        let t261 = self.fixed[11] * t254;
+        let t262 = t259 - t260;
+        let t263 = t262 - t261;
+        let t269 = t70 * t263;
+        let t270 = self.fixed[22] * t269;
+        let t273 = T::nearest(2.0) * t200;
+        let t274 = t273 - t137;
+        let t275 = t31 * t274;
+        let t276 = t237 - t275;
+        let t283 = t276 * t35;
+        let t284 = self.fixed[23] * t283;
+        let t288 = self.fixed[24] * t137;
+        let t291 = self.fixed[25] * t200;
+        let t292 = t213 + t288;
+        let t293 = t292 + t291;
+        let t294 = t31 * t73;
+        let t295 = t294 * t34;
+        let t296 = t253 + t295;
+        let t297 = self.fixed[10] * t258;
+        let t298 = t70 * t293;
+        let t299 = self.fixed[7] * t298;
+        let t300 = self.fixed[11] * t296;
+        let t301 = t297 - t299;
+        let t302 = t301 - t300;
+        let t304 = self.fixed[26] * t302;
+        let t313 = self.fixed[27] * t212;
+        let t314 = -t313;
+        let t324 = X[1] * t35;
+        [t70, t72, t199, t208, t230, t270, t284, t304, t314, t324]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -1008,23 +1002,23 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         let t102 = self.parameters.A * t101;
         let t103 = t102 + t91;
         let t104 = t103.ln_1p();
-        let t275 = time[0] * point[4];
-        let t276 = t275 - point[5];
-        let t308 = time[0] * t276;
-        let t309 = point[6] * t104;
-        let t310 = t308 + t309;
-        let t311 = t310 - point[7];
-        let t318 = time[0] * t311;
-        let t319 = point[8] * t104;
-        let t320 = t318 + t319;
-        let t321 = t92 * t92;
-        let t322 = t321 * t94;
-        let t323 = t320 / t322;
-        let t324 = t323 - point[3];
-        let t325 = time[0] * t324;
-        let t326 = point[2] * t325;
-        let t328 = point[9] * t325;
-        crate::nalgebra::SVector::<T, 2>::new(t326, t328)
+        let t271 = time[0] * point[4];
+        let t272 = t271 - point[5];
+        let t305 = time[0] * t272;
+        let t306 = point[6] * t104;
+        let t307 = t305 + t306;
+        let t308 = t307 - point[7];
+        let t315 = time[0] * t308;
+        let t316 = point[8] * t104;
+        let t317 = t315 + t316;
+        let t318 = t92 * t92;
+        let t319 = t318 * t94;
+        let t320 = t317 / t319;
+        let t321 = t320 - point[3];
+        let t322 = time[0] * t321;
+        let t323 = point[2] * t322;
+        let t325 = point[9] * t322;
+        crate::nalgebra::SVector::<T, 2>::new(t323, t325)
     }
 }
 impl<T: crate::Real> From<RingNu<T>> for crate::AnySolution<T> {

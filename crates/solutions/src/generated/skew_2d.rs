@@ -127,101 +127,99 @@ impl<T: crate::Real> Skew2d<T> {
         let t91 = parameters.nu + T::one();
         let t92 = T::nearest(2.0) * parameters.nu;
         let t93 = T::one() - t92;
-        let t99 = T::nearest(0.5) * parameters.E;
-        let t100 = t99 / t91;
-        let t103 = parameters.A * parameters.A;
-        let t110 = parameters.E * parameters.nu;
-        let t111 = t91 * t93;
-        let t112 = t110 / t111;
-        let t123 = parameters.A * t100;
-        let t165 = t92 / t93;
+        let t98 = T::nearest(0.5) * parameters.E;
+        let t99 = t98 / t91;
+        let t102 = parameters.A * parameters.A;
+        let t109 = parameters.E * parameters.nu;
+        let t110 = t91 * t93;
+        let t111 = t109 / t110;
+        let t121 = parameters.A * t99;
+        let t163 = t92 / t93;
+        let t167 = T::nearest(10.0) * t49;
         let t170 = T::one() / t91;
-        let t172 = T::nearest(10.0) * t49;
-        let t175 = t56 / parameters.rho0;
-        let t180 = T::nearest(9.0) * parameters.A;
-        let t186 = T::nearest(0.8) * parameters.A;
-        let t190 = T::nearest(0.2) * parameters.A;
-        let t243 = T::nearest(0.05) * parameters.A;
-        let t285 = T::one() / parameters.rho0;
-        let t301 = parameters.nu / t93;
-        let t306 = T::nearest(2.0) * t49;
-        let t311 = t243 * parameters.E;
-        let t312 = t311 / parameters.rho0;
-        let t368 = T::nearest(3.0) * T::pi();
-        let t374 = t112 + t100;
-        let t376 = t103 * t103;
-        let t377 = t376 * parameters.A;
-        let t379 = T::nearest(0.09) * t377;
-        let t380 = t379 * t374;
-        let t381 = t380 / parameters.rho0;
-        let t387 = T::nearest(0.002) * t377;
-        let t388 = t387 * t374;
-        let t389 = t388 / parameters.rho0;
-        let t425 = T::nearest(12.0) * t100;
-        let t430 = T::nearest(0.01) * t376;
-        let t431 = t430 / parameters.rho0;
-        let t439 = T::nearest(0.004) * t376;
-        let t440 = t439 * t374;
-        let t441 = t440 / parameters.rho0;
-        let t449 = T::nearest(4.0) * T::pi();
-        let t451 = T::nearest(3.0) * t49;
-        let t464 = t103 * parameters.A;
-        let t465 = T::nearest(0.005) * t464;
-        let t466 = t465 * parameters.E;
-        let t467 = t466 * parameters.nu;
-        let t468 = parameters.rho0 * t91;
-        let t469 = t468 * t93;
-        let t470 = t467 / t469;
-        let t472 = T::nearest(9.0) * T::pi();
-        let t479 = T::nearest(6.0) * T::pi();
-        let t485 = T::nearest(2.0) * T::pi();
-        let t494 = T::nearest(2.0) * t100;
-        let t502 = T::nearest(4.0) * parameters.E;
-        let t503 = t502 * parameters.nu;
-        let t504 = t503 / t111;
-        let t513 = T::nearest(4.0) * t100;
-        let t515 = T::nearest(3.0) * t100;
-        let t519 = T::nearest(2.0) * parameters.E;
-        let t520 = t519 * parameters.nu;
-        let t521 = t520 / t111;
-        let t528 = t465 / parameters.rho0;
-        let t537 = T::nearest(5.4) * t376;
-        let t538 = t537 * t374;
-        let t539 = t538 / parameters.rho0;
-        let t550 = T::nearest(0.6) * t464;
-        let t551 = t550 / parameters.rho0;
-        let t556 = T::nearest(0.2) * t103;
-        let t557 = t556 * parameters.E;
-        let t558 = t557 * parameters.nu;
-        let t559 = t558 / t469;
-        let t561 = T::nearest(6.0) * parameters.E;
-        let t562 = t561 * parameters.nu;
-        let t563 = t562 / t111;
-        let t566 = T::nearest(6.0) * t100;
-        let t568 = T::nearest(3.0) * t374;
-        let t575 = T::nearest(0.1) * t103;
-        let t576 = t575 / parameters.rho0;
-        let t585 = T::nearest(0.002) * t464;
-        let t586 = t585 * t374;
-        let t587 = t586 / parameters.rho0;
-        let t594 = T::nearest(0.005) * t103;
-        let t595 = t594 * parameters.E;
-        let t596 = t595 * parameters.nu;
-        let t597 = t596 / t469;
-        let t605 = t594 / parameters.rho0;
-        let t611 = t190 * parameters.E;
-        let t612 = t611 * parameters.nu;
-        let t613 = t612 / t469;
-        let t621 = T::nearest(81.0) * t464;
-        let t622 = t621 * t374;
-        let t623 = t622 / parameters.rho0;
-        let t627 = T::nearest(54.0) * t103;
-        let t628 = t627 * t374;
-        let t629 = t628 / parameters.rho0;
-        let t634 = t180 * parameters.E;
-        let t635 = t634 * parameters.nu;
-        let t636 = t635 / t469;
-        let t740 = T::nearest(2.0) / t11;
+        let t173 = t56 / parameters.rho0;
+        let t176 = T::nearest(9.0) * parameters.A;
+        let t181 = T::nearest(0.8) * parameters.A;
+        let t186 = T::nearest(0.2) * parameters.A;
+        let t231 = T::nearest(0.05) * parameters.A;
+        let t271 = T::one() / parameters.rho0;
+        let t288 = parameters.nu / t93;
+        let t292 = T::nearest(2.0) * t49;
+        let t297 = t231 * parameters.E;
+        let t298 = t297 / parameters.rho0;
+        let t350 = T::nearest(3.0) * T::pi();
+        let t356 = t111 + t99;
+        let t358 = t102 * t102;
+        let t359 = t358 * parameters.A;
+        let t361 = T::nearest(0.09) * t359;
+        let t362 = t361 * t356;
+        let t363 = t362 / parameters.rho0;
+        let t369 = T::nearest(0.002) * t359;
+        let t370 = t369 * t356;
+        let t371 = t370 / parameters.rho0;
+        let t410 = T::nearest(12.0) * t99;
+        let t415 = T::nearest(0.01) * t358;
+        let t416 = t415 / parameters.rho0;
+        let t424 = T::nearest(0.004) * t358;
+        let t425 = t424 * t356;
+        let t426 = t425 / parameters.rho0;
+        let t434 = T::nearest(4.0) * T::pi();
+        let t436 = T::nearest(3.0) * t49;
+        let t449 = t102 * parameters.A;
+        let t450 = T::nearest(0.005) * t449;
+        let t451 = t450 * parameters.E;
+        let t452 = t451 * parameters.nu;
+        let t453 = parameters.rho0 * t91;
+        let t454 = t453 * t93;
+        let t455 = t452 / t454;
+        let t457 = T::nearest(9.0) * T::pi();
+        let t464 = T::nearest(6.0) * T::pi();
+        let t470 = T::nearest(2.0) * T::pi();
+        let t479 = T::nearest(2.0) * t99;
+        let t493 = T::nearest(4.0) * t99;
+        let t495 = T::nearest(3.0) * t99;
+        let t499 = T::nearest(4.0) * parameters.E;
+        let t500 = t499 * parameters.nu;
+        let t501 = t500 / t110;
+        let t504 = T::nearest(2.0) * parameters.E;
+        let t505 = t504 * parameters.nu;
+        let t506 = t505 / t110;
+        let t512 = t450 / parameters.rho0;
+        let t521 = T::nearest(5.4) * t358;
+        let t522 = t521 * t356;
+        let t523 = t522 / parameters.rho0;
+        let t534 = T::nearest(0.6) * t449;
+        let t535 = t534 / parameters.rho0;
+        let t540 = T::nearest(0.2) * t102;
+        let t541 = t540 * parameters.E;
+        let t542 = t541 * parameters.nu;
+        let t543 = t542 / t454;
+        let t545 = T::nearest(6.0) * t356;
+        let t549 = T::nearest(3.0) * t356;
+        let t553 = T::nearest(0.1) * t102;
+        let t554 = t553 / parameters.rho0;
+        let t563 = T::nearest(0.002) * t449;
+        let t564 = t563 * t356;
+        let t565 = t564 / parameters.rho0;
+        let t572 = T::nearest(0.005) * t102;
+        let t573 = t572 * parameters.E;
+        let t574 = t573 * parameters.nu;
+        let t575 = t574 / t454;
+        let t578 = T::nearest(4.0) * t356;
+        let t583 = t572 / parameters.rho0;
+        let t589 = t186 * parameters.E;
+        let t590 = t589 * parameters.nu;
+        let t591 = t590 / t454;
+        let t599 = T::nearest(81.0) * t449;
+        let t600 = t599 * t356;
+        let t601 = t600 / parameters.rho0;
+        let t605 = T::nearest(54.0) * t102;
+        let t606 = t605 * t356;
+        let t607 = t606 / parameters.rho0;
+        let t612 = t176 * parameters.E;
+        let t613 = t612 * parameters.nu;
+        let t614 = t613 / t454;
+        let t626 = T::nearest(2.0) / t11;
         Ok(Skew2d {
             parameters,
             fixed: [
@@ -233,56 +231,56 @@ impl<T: crate::Real> Skew2d<T> {
                 t52,
                 t58,
                 t63,
-                t100,
-                t103,
-                t112,
-                t123,
-                t165,
+                t99,
+                t102,
+                t111,
+                t121,
+                t163,
+                t167,
                 t170,
-                t172,
-                t175,
-                t180,
+                t173,
+                t176,
+                t181,
                 t186,
-                t190,
-                t243,
-                t285,
-                t301,
-                t306,
-                t312,
-                t368,
-                t374,
-                t381,
-                t389,
-                t425,
-                t431,
-                t441,
-                t449,
-                t451,
+                t231,
+                t271,
+                t288,
+                t292,
+                t298,
+                t350,
+                t356,
+                t363,
+                t371,
+                t410,
+                t416,
+                t426,
+                t434,
+                t436,
+                t455,
+                t457,
+                t464,
                 t470,
-                t472,
                 t479,
-                t485,
-                t494,
-                t504,
-                t513,
-                t515,
-                t521,
-                t528,
-                t539,
-                t551,
-                t559,
-                t563,
-                t566,
-                t568,
-                t576,
-                t587,
-                t597,
-                t605,
-                t613,
-                t623,
-                t629,
-                t636,
-                t740,
+                t493,
+                t495,
+                t501,
+                t506,
+                t512,
+                t523,
+                t535,
+                t543,
+                t545,
+                t549,
+                t554,
+                t565,
+                t575,
+                t578,
+                t583,
+                t591,
+                t601,
+                t607,
+                t614,
+                t626,
             ],
         })
     }
@@ -573,60 +571,58 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t87 = t80 * t86;
         let t88 = t66 * t71;
         let t89 = t87 - t88;
-        let t94 = t65 * t78;
-        let t95 = t65 + t78;
+        let t94 = t65 * t86;
+        let t95 = t94 + t78;
         let t96 = t95 - t88;
-        let t97 = t96 + t94;
-        let t98 = t97.ln_1p();
-        let t101 = T::nearest(2.0) * t65;
-        let t102 = t65 * t65;
-        let t104 = t13 * t13;
-        let t105 = t62 * t62;
-        let t106 = self.fixed[9] * t104;
-        let t107 = t106 * t105;
-        let t108 = t101 + t102;
-        let t109 = t108 + t107;
-        let t113 = self.fixed[10] * t98;
-        let t114 = self.fixed[8] * t109;
-        let t115 = t113 + t114;
-        let t116 = t13 * t62;
-        let t117 = t116 * t86;
-        let t118 = self.parameters.A * t117;
-        let t119 = t65 * t71;
-        let t120 = t118 + t71;
-        let t121 = t120 + t119;
-        let t122 = t86 * t115;
-        let t124 = self.fixed[11] * t13;
-        let t125 = t124 * t62;
-        let t126 = t125 * t121;
-        let t127 = t122 - t126;
-        let t128 = T::one() / t89;
-        let t129 = t127 * t128;
-        let t130 = t71 * t115;
-        let t131 = t80 * t121;
-        let t132 = self.fixed[8] * t131;
-        let t133 = t130 - t132;
-        let t134 = t133 * t128;
-        let t135 = -t134;
-        let t136 = T::nearest(2.0) * t78;
-        let t137 = t71 * t71;
-        let t138 = t78 * t78;
-        let t139 = t136 + t137;
-        let t140 = t139 + t138;
-        let t141 = self.fixed[8] * t140;
-        let t142 = t113 + t141;
-        let t143 = t86 * t121;
-        let t144 = self.fixed[8] * t143;
-        let t145 = t66 * t142;
-        let t146 = t144 - t145;
-        let t147 = t146 * t128;
-        let t148 = t71 * t121;
-        let t149 = self.fixed[8] * t148;
-        let t150 = t80 * t142;
-        let t151 = t149 - t150;
-        let t152 = t151 * t128;
-        let t153 = -t152;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t129, t135, t147, t153)
+        let t97 = t96.ln_1p();
+        let t100 = T::nearest(2.0) * t65;
+        let t101 = t65 * t65;
+        let t103 = t13 * t13;
+        let t104 = t62 * t62;
+        let t105 = self.fixed[9] * t103;
+        let t106 = t105 * t104;
+        let t107 = t100 + t101;
+        let t108 = t107 + t106;
+        let t112 = self.fixed[10] * t97;
+        let t113 = self.fixed[8] * t108;
+        let t114 = t112 + t113;
+        let t115 = t13 * t62;
+        let t116 = t115 * t86;
+        let t117 = self.parameters.A * t116;
+        let t118 = t71 * t80;
+        let t119 = t117 + t118;
+        let t120 = t86 * t114;
+        let t122 = self.fixed[11] * t13;
+        let t123 = t122 * t62;
+        let t124 = t123 * t119;
+        let t125 = t120 - t124;
+        let t126 = T::one() / t89;
+        let t127 = t125 * t126;
+        let t128 = t71 * t114;
+        let t129 = t80 * t119;
+        let t130 = self.fixed[8] * t129;
+        let t131 = t128 - t130;
+        let t132 = t131 * t126;
+        let t133 = -t132;
+        let t134 = T::nearest(2.0) * t78;
+        let t135 = t71 * t71;
+        let t136 = t78 * t78;
+        let t137 = t134 + t135;
+        let t138 = t137 + t136;
+        let t139 = self.fixed[8] * t138;
+        let t140 = t112 + t139;
+        let t141 = t86 * t119;
+        let t142 = self.fixed[8] * t141;
+        let t143 = t66 * t140;
+        let t144 = t142 - t143;
+        let t145 = t144 * t126;
+        let t146 = t71 * t119;
+        let t147 = self.fixed[8] * t146;
+        let t148 = t80 * t140;
+        let t149 = t147 - t148;
+        let t150 = t149 * t126;
+        let t151 = -t150;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t127, t133, t145, t151)
     }
     #[inline]
     fn body_force(
@@ -647,6 +643,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t22 = t18 * t21;
         let t23 = T::nearest(2.0) * t22;
         let t24 = X[1] * X[1];
+        let t25 = X[0] * t24;
+        let t26 = t23 + t25;
         let t27 = t12.sin_pi();
         let t28 = T::nearest(3.0) * t13;
         let t30 = T::nearest(4.0) * t27;
@@ -671,197 +669,191 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t80 = t65 + T::one();
         let t86 = t78 + T::one();
         let t87 = t80 * t86;
-        let t94 = t65 * t78;
-        let t95 = t65 + t78;
-        let t154 = t67 * t72;
-        let t155 = T::pi() * t154;
-        let t156 = X[1] - t155;
-        let t158 = T::nearest(45.0) * t13;
-        let t159 = t158 * t6;
-        let t160 = t31 * t156;
-        let t161 = t159 - t160;
-        let t163 = T::nearest(95.0) * t13;
-        let t164 = t163 * t6;
-        let t166 = self.fixed[12] * t161;
-        let t167 = t164 - t160;
-        let t168 = t167 + t166;
-        let t169 = t13 * t6;
-        let t171 = self.fixed[13] * t168;
-        let t173 = self.fixed[14] * t169;
-        let t174 = t171 - t173;
-        let t176 = self.fixed[15] * t174;
-        let t177 = t71 * t66;
-        let t178 = t87 - t177;
-        let t181 = self.fixed[16] * t169;
-        let t182 = -t181;
-        let t183 = self.parameters.A * t169;
-        let t184 = t31 * t22;
-        let t187 = self.fixed[17] * t184;
-        let t188 = -t187;
-        let t191 = self.fixed[18] * t160;
-        let t192 = t86 * t182;
-        let t193 = t71 * t183;
-        let t194 = T::nearest(3.0) * t193;
-        let t195 = t66 * t188;
-        let t196 = t80 * t191;
-        let t197 = t192 + t194;
-        let t198 = t197 - t195;
-        let t199 = t198 + t196;
-        let t200 = t65 * t86;
-        let t201 = t200 - t177;
-        let t202 = t95 + t94;
-        let t203 = t202 - t177;
-        let t204 = t203.ln_1p();
-        let t205 = T::nearest(3.0) * t6;
-        let t206 = t205 * t71;
-        let t207 = t62 * t188;
-        let t208 = t206 - t207;
-        let t209 = t14 * t208;
-        let t210 = t65 * t191;
-        let t211 = t192 + t209;
-        let t212 = t211 + t210;
-        let t213 = t199 * t201;
-        let t214 = T::one() / t178;
-        let t215 = t213 * t214;
-        let t216 = t204 * t212;
-        let t217 = t215 + t216;
-        let t218 = t182 * t201;
-        let t219 = t65 * t212;
-        let t220 = t209 - t218;
-        let t221 = t220 - t219;
-        let t222 = t65 * t201;
-        let t223 = t177 + t222;
-        let t224 = t201 * t204;
-        let t225 = self.fixed[10] * t224;
-        let t226 = self.fixed[8] * t223;
-        let t227 = t225 + t226;
-        let t228 = t192 + t196;
-        let t229 = t228 + t209;
-        let t230 = t78 * t80;
-        let t231 = t65 + t230;
-        let t232 = t231 - t177;
-        let t233 = self.fixed[10] * t204;
-        let t234 = self.fixed[8] * t232;
-        let t235 = t233 + t234;
-        let t236 = self.fixed[7] * t169;
-        let t237 = -t236;
-        let t238 = T::nearest(4.0) * X[0];
-        let t239 = self.fixed[4] * t22;
-        let t240 = t238 - t239;
-        let t241 = t31 * t240;
-        let t244 = self.fixed[19] * t241;
-        let t245 = t6 * t71;
-        let t246 = t62 * t191;
-        let t247 = t245 - t246;
-        let t248 = t86 * t237;
-        let t249 = t80 * t244;
-        let t250 = t14 * t247;
-        let t251 = t248 + t249;
-        let t252 = t251 + t250;
-        let t253 = t66 * t191;
-        let t254 = t193 + t248;
-        let t255 = t254 + t249;
-        let t256 = t255 - t253;
-        let t257 = t78 * t237;
-        let t258 = t249 - t236;
-        let t259 = t258 + t250;
-        let t260 = t259 + t257;
-        let t261 = t256 * t214;
-        let t262 = self.fixed[10] * t261;
-        let t263 = self.fixed[8] * t260;
-        let t264 = t262 + t263;
-        let t265 = t230 - t177;
-        let t266 = t191 * t265;
-        let t267 = t194 - t195;
-        let t268 = t267 - t218;
-        let t269 = t268 - t266;
-        let t270 = t217 - t269;
-        let t271 = self.fixed[10] * t270;
-        let t272 = self.fixed[8] * t221;
-        let t273 = t227 * t229;
-        let t274 = t273 * t214;
-        let t275 = t191 * t235;
-        let t276 = t71 * t235;
-        let t277 = t276 * t252;
-        let t278 = t277 * t214;
-        let t279 = t71 * t264;
-        let t280 = t271 - t272;
-        let t281 = t280 - t274;
-        let t282 = t281 + t275;
-        let t283 = t282 - t278;
-        let t284 = t283 + t279;
-        let t286 = t284 * t214;
-        let t287 = self.fixed[20] * t286;
-        let t288 = t176 + t287;
-        let t289 = X[1] * t75;
-        let t290 = t23 + t289;
-        let t292 = T::nearest(60.0) * t13;
-        let t293 = t292 * t6;
-        let t294 = t293 - t241;
-        let t296 = T::nearest(30.0) * t13;
-        let t297 = t296 * t6;
-        let t299 = T::nearest(8.0) * t31;
-        let t300 = t299 * t22;
-        let t302 = self.fixed[21] * t294;
-        let t303 = t297 + t300;
-        let t304 = t303 - t241;
-        let t305 = t304 + t302;
-        let t307 = self.fixed[22] * t31;
-        let t308 = t307 * t290;
-        let t309 = self.fixed[13] * t305;
-        let t310 = t308 - t309;
-        let t313 = self.fixed[23] * t310;
-        let t314 = t249 + t250;
-        let t315 = t314 + t257;
-        let t316 = t256 * t265;
-        let t317 = t316 * t214;
-        let t318 = t204 * t315;
-        let t319 = t317 + t318;
-        let t320 = t244 * t265;
-        let t321 = t78 * t315;
-        let t322 = t250 - t320;
-        let t323 = t322 - t321;
-        let t324 = t78 * t265;
-        let t325 = t177 + t324;
-        let t326 = t204 * t265;
-        let t327 = self.fixed[10] * t326;
-        let t328 = self.fixed[8] * t325;
-        let t329 = t327 + t328;
-        let t330 = t78 + t200;
-        let t331 = t330 - t177;
-        let t332 = self.fixed[8] * t331;
-        let t333 = t233 + t332;
-        let t334 = t192 + t191;
-        let t335 = t334 + t209;
-        let t336 = t335 + t210;
-        let t337 = t199 * t214;
+        let t88 = t66 * t71;
+        let t89 = t87 - t88;
+        let t94 = t65 * t86;
+        let t95 = t94 + t78;
+        let t96 = t95 - t88;
+        let t97 = t96.ln_1p();
+        let t112 = self.fixed[10] * t97;
+        let t126 = T::one() / t89;
+        let t152 = t67 * t72;
+        let t153 = T::pi() * t152;
+        let t154 = X[1] - t153;
+        let t156 = T::nearest(45.0) * t13;
+        let t157 = t156 * t6;
+        let t158 = t31 * t154;
+        let t159 = t157 - t158;
+        let t161 = T::nearest(95.0) * t13;
+        let t162 = t161 * t6;
+        let t164 = self.fixed[12] * t159;
+        let t165 = t162 - t158;
+        let t166 = t165 + t164;
+        let t168 = self.fixed[13] * t13;
+        let t169 = t168 * t6;
+        let t171 = self.fixed[14] * t166;
+        let t172 = t169 - t171;
+        let t174 = self.fixed[15] * t172;
+        let t177 = self.fixed[16] * t13;
+        let t178 = t177 * t6;
+        let t179 = -t178;
+        let t182 = self.fixed[17] * t31;
+        let t183 = t182 * t22;
+        let t184 = -t183;
+        let t187 = self.fixed[18] * t31;
+        let t188 = t187 * t154;
+        let t189 = T::nearest(3.0) * t6;
+        let t190 = t189 * t71;
+        let t191 = t62 * t184;
+        let t192 = t190 - t191;
+        let t193 = self.parameters.A * t192;
+        let t194 = t13 * t193;
+        let t195 = t86 * t179;
+        let t196 = t80 * t188;
+        let t197 = t194 + t195;
+        let t198 = t197 + t196;
+        let t199 = t88 - t94;
+        let t200 = t14 * t192;
+        let t201 = t65 * t188;
+        let t202 = t195 + t200;
+        let t203 = t202 + t201;
+        let t204 = t198 * t199;
+        let t205 = t204 * t126;
+        let t206 = t97 * t203;
+        let t207 = t205 - t206;
+        let t208 = t179 * t199;
+        let t209 = t65 * t203;
+        let t210 = t200 + t208;
+        let t211 = t210 - t209;
+        let t212 = t65 * t199;
+        let t213 = t88 - t212;
+        let t214 = t97 * t199;
+        let t215 = self.fixed[10] * t214;
+        let t216 = self.fixed[8] * t213;
+        let t217 = t215 - t216;
+        let t218 = t195 + t196;
+        let t219 = t218 + t200;
+        let t220 = t78 * t80;
+        let t221 = t65 - t88;
+        let t222 = t221 + t220;
+        let t223 = self.fixed[8] * t222;
+        let t224 = t112 + t223;
+        let t225 = t64 * t6;
+        let t226 = -t225;
+        let t227 = T::nearest(4.0) * X[0];
+        let t228 = self.fixed[4] * t22;
+        let t229 = t227 - t228;
+        let t232 = self.fixed[19] * t31;
+        let t233 = t232 * t229;
+        let t234 = t6 * t71;
+        let t235 = t62 * t188;
+        let t236 = t234 - t235;
+        let t237 = t86 * t226;
+        let t238 = t80 * t233;
+        let t239 = t14 * t236;
+        let t240 = t237 + t238;
+        let t241 = t240 + t239;
+        let t242 = t13 * t236;
+        let t243 = self.parameters.A * t242;
+        let t244 = t243 + t237;
+        let t245 = t244 + t238;
+        let t246 = t226 * t86;
+        let t247 = t246 + t238;
+        let t248 = t247 + t239;
+        let t249 = t245 * t126;
+        let t250 = self.fixed[10] * t249;
+        let t251 = self.fixed[8] * t248;
+        let t252 = t250 + t251;
+        let t253 = t88 - t220;
+        let t254 = t188 * t253;
+        let t255 = t194 + t208;
+        let t256 = t255 + t254;
+        let t257 = t207 + t256;
+        let t258 = self.fixed[10] * t257;
+        let t259 = t217 * t219;
+        let t260 = t71 * t224;
+        let t261 = t260 * t241;
+        let t262 = t259 - t261;
+        let t263 = t126 * t262;
+        let t264 = self.fixed[8] * t211;
+        let t265 = t188 * t224;
+        let t266 = t71 * t252;
+        let t267 = t258 - t263;
+        let t268 = t267 + t264;
+        let t269 = t268 - t265;
+        let t270 = t269 - t266;
+        let t272 = t270 * t126;
+        let t273 = self.fixed[20] * t272;
+        let t274 = t174 + t273;
+        let t275 = -t274;
+        let t277 = T::nearest(60.0) * t13;
+        let t278 = t277 * t6;
+        let t279 = t31 * t229;
+        let t280 = t278 - t279;
+        let t282 = T::nearest(8.0) * t22;
+        let t283 = t282 - t229;
+        let t284 = t31 * t283;
+        let t286 = T::nearest(30.0) * t13;
+        let t287 = t286 * t6;
+        let t289 = self.fixed[21] * t280;
+        let t290 = t284 + t287;
+        let t291 = t290 + t289;
+        let t293 = self.fixed[22] * t31;
+        let t294 = t293 * t26;
+        let t295 = self.fixed[14] * t291;
+        let t296 = t294 - t295;
+        let t299 = self.fixed[23] * t296;
+        let t300 = t78 * t226;
+        let t301 = t238 + t239;
+        let t302 = t301 + t300;
+        let t303 = t245 * t253;
+        let t304 = t303 * t126;
+        let t305 = t97 * t302;
+        let t306 = t304 - t305;
+        let t307 = t233 * t253;
+        let t308 = t78 * t302;
+        let t309 = t239 + t307;
+        let t310 = t309 - t308;
+        let t311 = t78 * t253;
+        let t312 = t88 - t311;
+        let t313 = t97 * t253;
+        let t314 = self.fixed[10] * t313;
+        let t315 = self.fixed[8] * t312;
+        let t316 = t314 - t315;
+        let t317 = t78 - t88;
+        let t318 = t317 + t94;
+        let t319 = self.fixed[8] * t318;
+        let t320 = t112 + t319;
+        let t321 = t188 * t80;
+        let t322 = t321 + t195;
+        let t323 = t322 + t200;
+        let t324 = t198 * t126;
+        let t325 = self.fixed[10] * t324;
+        let t326 = self.fixed[8] * t323;
+        let t327 = t325 + t326;
+        let t328 = t219 * t126;
+        let t329 = t62 * t328;
+        let t330 = t189 + t329;
+        let t331 = t320 * t330;
+        let t332 = t62 * t327;
+        let t333 = t331 - t332;
+        let t334 = t226 * t199;
+        let t335 = t243 + t307;
+        let t336 = t335 + t334;
+        let t337 = t306 + t336;
         let t338 = self.fixed[10] * t337;
-        let t339 = self.fixed[8] * t336;
-        let t340 = t338 + t339;
-        let t341 = t205 * t333;
-        let t342 = t229 * t333;
-        let t343 = t342 * t214;
-        let t344 = t62 * t343;
-        let t345 = t62 * t340;
-        let t346 = t341 + t344;
-        let t347 = t346 - t345;
-        let t348 = t201 * t237;
-        let t349 = t193 - t253;
-        let t350 = t349 - t320;
-        let t351 = t350 - t348;
-        let t352 = t319 - t351;
-        let t353 = self.fixed[10] * t352;
-        let t354 = self.fixed[8] * t323;
-        let t355 = t252 * t329;
-        let t356 = t355 * t214;
-        let t357 = t14 * t347;
-        let t358 = t353 - t354;
-        let t359 = t358 - t356;
-        let t360 = t359 - t357;
-        let t361 = t360 * t214;
-        let t362 = self.fixed[20] * t361;
-        let t363 = t362 - t313;
-        crate::nalgebra::SVector::<T, 2>::new(t288, t363)
+        let t339 = self.fixed[8] * t310;
+        let t340 = t316 * t241;
+        let t341 = t340 * t126;
+        let t342 = t14 * t333;
+        let t343 = t338 + t339;
+        let t344 = t343 - t341;
+        let t345 = t344 + t342;
+        let t346 = t345 * t126;
+        let t347 = self.fixed[20] * t346;
+        let t348 = t299 + t347;
+        let t349 = -t348;
+        crate::nalgebra::SVector::<T, 2>::new(t275, t349)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t4 = T::nearest(3.0) * X[0];
@@ -925,247 +917,233 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t87 = t80 * t86;
         let t88 = t66 * t71;
         let t89 = t87 - t88;
-        let t94 = t65 * t78;
-        let t95 = t65 + t78;
+        let t94 = t65 * t86;
+        let t95 = t94 + t78;
         let t96 = t95 - t88;
-        let t97 = t96 + t94;
-        let t98 = t97.ln_1p();
-        let t101 = T::nearest(2.0) * t65;
-        let t102 = t65 * t65;
-        let t104 = t13 * t13;
-        let t105 = t62 * t62;
-        let t106 = self.fixed[9] * t104;
-        let t107 = t106 * t105;
-        let t108 = t101 + t102;
-        let t109 = t108 + t107;
-        let t113 = self.fixed[10] * t98;
-        let t114 = self.fixed[8] * t109;
-        let t115 = t113 + t114;
-        let t116 = t13 * t62;
-        let t117 = t116 * t86;
-        let t118 = self.parameters.A * t117;
-        let t119 = t65 * t71;
-        let t120 = t118 + t71;
-        let t121 = t120 + t119;
-        let t122 = t86 * t115;
-        let t124 = self.fixed[11] * t13;
-        let t125 = t124 * t62;
-        let t126 = t125 * t121;
-        let t127 = t122 - t126;
-        let t128 = T::one() / t89;
-        let t129 = t127 * t128;
-        let t130 = t71 * t115;
-        let t131 = t80 * t121;
-        let t132 = self.fixed[8] * t131;
-        let t133 = t130 - t132;
-        let t134 = t133 * t128;
-        let t135 = -t134;
-        let t136 = T::nearest(2.0) * t78;
-        let t137 = t71 * t71;
-        let t138 = t78 * t78;
-        let t139 = t136 + t137;
-        let t140 = t139 + t138;
-        let t141 = self.fixed[8] * t140;
-        let t142 = t113 + t141;
-        let t143 = t86 * t121;
-        let t144 = self.fixed[8] * t143;
-        let t145 = t66 * t142;
-        let t146 = t144 - t145;
-        let t147 = t146 * t128;
-        let t148 = t71 * t121;
-        let t149 = self.fixed[8] * t148;
-        let t150 = t80 * t142;
-        let t151 = t149 - t150;
-        let t152 = t151 * t128;
-        let t153 = -t152;
-        let t154 = t67 * t72;
-        let t155 = T::pi() * t154;
-        let t156 = X[1] - t155;
-        let t158 = T::nearest(45.0) * t13;
-        let t159 = t158 * t6;
-        let t160 = t31 * t156;
-        let t161 = t159 - t160;
-        let t163 = T::nearest(95.0) * t13;
-        let t164 = t163 * t6;
-        let t166 = self.fixed[12] * t161;
-        let t167 = t164 - t160;
-        let t168 = t167 + t166;
-        let t169 = t13 * t6;
-        let t171 = self.fixed[13] * t168;
-        let t173 = self.fixed[14] * t169;
-        let t174 = t171 - t173;
-        let t176 = self.fixed[15] * t174;
-        let t177 = t71 * t66;
-        let t178 = t87 - t177;
-        let t181 = self.fixed[16] * t169;
-        let t182 = -t181;
-        let t183 = self.parameters.A * t169;
-        let t184 = t31 * t22;
-        let t187 = self.fixed[17] * t184;
-        let t188 = -t187;
-        let t191 = self.fixed[18] * t160;
-        let t192 = t86 * t182;
-        let t193 = t71 * t183;
-        let t194 = T::nearest(3.0) * t193;
-        let t195 = t66 * t188;
-        let t196 = t80 * t191;
-        let t197 = t192 + t194;
-        let t198 = t197 - t195;
-        let t199 = t198 + t196;
-        let t200 = t65 * t86;
-        let t201 = t200 - t177;
-        let t202 = t95 + t94;
-        let t203 = t202 - t177;
-        let t204 = t203.ln_1p();
-        let t205 = T::nearest(3.0) * t6;
-        let t206 = t205 * t71;
-        let t207 = t62 * t188;
-        let t208 = t206 - t207;
-        let t209 = t14 * t208;
-        let t210 = t65 * t191;
-        let t211 = t192 + t209;
-        let t212 = t211 + t210;
-        let t213 = t199 * t201;
-        let t214 = T::one() / t178;
-        let t215 = t213 * t214;
-        let t216 = t204 * t212;
-        let t217 = t215 + t216;
-        let t218 = t182 * t201;
-        let t219 = t65 * t212;
-        let t220 = t209 - t218;
-        let t221 = t220 - t219;
-        let t222 = t65 * t201;
-        let t223 = t177 + t222;
-        let t224 = t201 * t204;
-        let t225 = self.fixed[10] * t224;
-        let t226 = self.fixed[8] * t223;
-        let t227 = t225 + t226;
-        let t228 = t192 + t196;
-        let t229 = t228 + t209;
-        let t230 = t78 * t80;
-        let t231 = t65 + t230;
-        let t232 = t231 - t177;
-        let t233 = self.fixed[10] * t204;
-        let t234 = self.fixed[8] * t232;
-        let t235 = t233 + t234;
-        let t236 = self.fixed[7] * t169;
-        let t237 = -t236;
-        let t238 = T::nearest(4.0) * X[0];
-        let t239 = self.fixed[4] * t22;
-        let t240 = t238 - t239;
-        let t241 = t31 * t240;
-        let t244 = self.fixed[19] * t241;
-        let t245 = t6 * t71;
-        let t246 = t62 * t191;
-        let t247 = t245 - t246;
-        let t248 = t86 * t237;
-        let t249 = t80 * t244;
-        let t250 = t14 * t247;
-        let t251 = t248 + t249;
-        let t252 = t251 + t250;
-        let t253 = t66 * t191;
-        let t254 = t193 + t248;
-        let t255 = t254 + t249;
-        let t256 = t255 - t253;
-        let t257 = t78 * t237;
-        let t258 = t249 - t236;
-        let t259 = t258 + t250;
-        let t260 = t259 + t257;
-        let t261 = t256 * t214;
-        let t262 = self.fixed[10] * t261;
-        let t263 = self.fixed[8] * t260;
-        let t264 = t262 + t263;
-        let t265 = t230 - t177;
-        let t266 = t191 * t265;
-        let t267 = t194 - t195;
-        let t268 = t267 - t218;
-        let t269 = t268 - t266;
-        let t270 = t217 - t269;
-        let t271 = self.fixed[10] * t270;
-        let t272 = self.fixed[8] * t221;
-        let t273 = t227 * t229;
-        let t274 = t273 * t214;
-        let t275 = t191 * t235;
-        let t276 = t71 * t235;
-        let t277 = t276 * t252;
-        let t278 = t277 * t214;
-        let t279 = t71 * t264;
-        let t280 = t271 - t272;
-        let t281 = t280 - t274;
-        let t282 = t281 + t275;
-        let t283 = t282 - t278;
-        let t284 = t283 + t279;
-        let t286 = t284 * t214;
-        let t287 = self.fixed[20] * t286;
-        let t288 = t176 + t287;
-        let t289 = X[1] * t75;
-        let t290 = t23 + t289;
-        let t292 = T::nearest(60.0) * t13;
-        let t293 = t292 * t6;
-        let t294 = t293 - t241;
-        let t296 = T::nearest(30.0) * t13;
-        let t297 = t296 * t6;
-        let t299 = T::nearest(8.0) * t31;
-        let t300 = t299 * t22;
-        let t302 = self.fixed[21] * t294;
-        let t303 = t297 + t300;
-        let t304 = t303 - t241;
-        let t305 = t304 + t302;
-        let t307 = self.fixed[22] * t31;
-        let t308 = t307 * t290;
-        let t309 = self.fixed[13] * t305;
-        let t310 = t308 - t309;
-        let t313 = self.fixed[23] * t310;
-        let t314 = t249 + t250;
-        let t315 = t314 + t257;
-        let t316 = t256 * t265;
-        let t317 = t316 * t214;
-        let t318 = t204 * t315;
-        let t319 = t317 + t318;
-        let t320 = t244 * t265;
-        let t321 = t78 * t315;
-        let t322 = t250 - t320;
-        let t323 = t322 - t321;
-        let t324 = t78 * t265;
-        let t325 = t177 + t324;
-        let t326 = t204 * t265;
-        let t327 = self.fixed[10] * t326;
-        let t328 = self.fixed[8] * t325;
-        let t329 = t327 + t328;
-        let t330 = t78 + t200;
-        let t331 = t330 - t177;
-        let t332 = self.fixed[8] * t331;
-        let t333 = t233 + t332;
-        let t334 = t192 + t191;
-        let t335 = t334 + t209;
-        let t336 = t335 + t210;
-        let t337 = t199 * t214;
+        let t97 = t96.ln_1p();
+        let t100 = T::nearest(2.0) * t65;
+        let t101 = t65 * t65;
+        let t103 = t13 * t13;
+        let t104 = t62 * t62;
+        let t105 = self.fixed[9] * t103;
+        let t106 = t105 * t104;
+        let t107 = t100 + t101;
+        let t108 = t107 + t106;
+        let t112 = self.fixed[10] * t97;
+        let t113 = self.fixed[8] * t108;
+        let t114 = t112 + t113;
+        let t115 = t13 * t62;
+        let t116 = t115 * t86;
+        let t117 = self.parameters.A * t116;
+        let t118 = t71 * t80;
+        let t119 = t117 + t118;
+        let t120 = t86 * t114;
+        let t122 = self.fixed[11] * t13;
+        let t123 = t122 * t62;
+        let t124 = t123 * t119;
+        let t125 = t120 - t124;
+        let t126 = T::one() / t89;
+        let t127 = t125 * t126;
+        let t128 = t71 * t114;
+        let t129 = t80 * t119;
+        let t130 = self.fixed[8] * t129;
+        let t131 = t128 - t130;
+        let t132 = t131 * t126;
+        let t133 = -t132;
+        let t134 = T::nearest(2.0) * t78;
+        let t135 = t71 * t71;
+        let t136 = t78 * t78;
+        let t137 = t134 + t135;
+        let t138 = t137 + t136;
+        let t139 = self.fixed[8] * t138;
+        let t140 = t112 + t139;
+        let t141 = t86 * t119;
+        let t142 = self.fixed[8] * t141;
+        let t143 = t66 * t140;
+        let t144 = t142 - t143;
+        let t145 = t144 * t126;
+        let t146 = t71 * t119;
+        let t147 = self.fixed[8] * t146;
+        let t148 = t80 * t140;
+        let t149 = t147 - t148;
+        let t150 = t149 * t126;
+        let t151 = -t150;
+        let t152 = t67 * t72;
+        let t153 = T::pi() * t152;
+        let t154 = X[1] - t153;
+        let t156 = T::nearest(45.0) * t13;
+        let t157 = t156 * t6;
+        let t158 = t31 * t154;
+        let t159 = t157 - t158;
+        let t161 = T::nearest(95.0) * t13;
+        let t162 = t161 * t6;
+        let t164 = self.fixed[12] * t159;
+        let t165 = t162 - t158;
+        let t166 = t165 + t164;
+        let t168 = self.fixed[13] * t13;
+        let t169 = t168 * t6;
+        let t171 = self.fixed[14] * t166;
+        let t172 = t169 - t171;
+        let t174 = self.fixed[15] * t172;
+        let t177 = self.fixed[16] * t13;
+        let t178 = t177 * t6;
+        let t179 = -t178;
+        let t182 = self.fixed[17] * t31;
+        let t183 = t182 * t22;
+        let t184 = -t183;
+        let t187 = self.fixed[18] * t31;
+        let t188 = t187 * t154;
+        let t189 = T::nearest(3.0) * t6;
+        let t190 = t189 * t71;
+        let t191 = t62 * t184;
+        let t192 = t190 - t191;
+        let t193 = self.parameters.A * t192;
+        let t194 = t13 * t193;
+        let t195 = t86 * t179;
+        let t196 = t80 * t188;
+        let t197 = t194 + t195;
+        let t198 = t197 + t196;
+        let t199 = t88 - t94;
+        let t200 = t14 * t192;
+        let t201 = t65 * t188;
+        let t202 = t195 + t200;
+        let t203 = t202 + t201;
+        let t204 = t198 * t199;
+        let t205 = t204 * t126;
+        let t206 = t97 * t203;
+        let t207 = t205 - t206;
+        let t208 = t179 * t199;
+        let t209 = t65 * t203;
+        let t210 = t200 + t208;
+        let t211 = t210 - t209;
+        let t212 = t65 * t199;
+        let t213 = t88 - t212;
+        let t214 = t97 * t199;
+        let t215 = self.fixed[10] * t214;
+        let t216 = self.fixed[8] * t213;
+        let t217 = t215 - t216;
+        let t218 = t195 + t196;
+        let t219 = t218 + t200;
+        let t220 = t78 * t80;
+        let t221 = t65 - t88;
+        let t222 = t221 + t220;
+        let t223 = self.fixed[8] * t222;
+        let t224 = t112 + t223;
+        let t225 = t64 * t6;
+        let t226 = -t225;
+        let t227 = T::nearest(4.0) * X[0];
+        let t228 = self.fixed[4] * t22;
+        let t229 = t227 - t228;
+        let t232 = self.fixed[19] * t31;
+        let t233 = t232 * t229;
+        let t234 = t6 * t71;
+        let t235 = t62 * t188;
+        let t236 = t234 - t235;
+        let t237 = t86 * t226;
+        let t238 = t80 * t233;
+        let t239 = t14 * t236;
+        let t240 = t237 + t238;
+        let t241 = t240 + t239;
+        let t242 = t13 * t236;
+        let t243 = self.parameters.A * t242;
+        let t244 = t243 + t237;
+        let t245 = t244 + t238;
+        let t246 = t226 * t86;
+        let t247 = t246 + t238;
+        let t248 = t247 + t239;
+        let t249 = t245 * t126;
+        let t250 = self.fixed[10] * t249;
+        let t251 = self.fixed[8] * t248;
+        let t252 = t250 + t251;
+        let t253 = t88 - t220;
+        let t254 = t188 * t253;
+        let t255 = t194 + t208;
+        let t256 = t255 + t254;
+        let t257 = t207 + t256;
+        let t258 = self.fixed[10] * t257;
+        let t259 = t217 * t219;
+        let t260 = t71 * t224;
+        let t261 = t260 * t241;
+        let t262 = t259 - t261;
+        let t263 = t126 * t262;
+        let t264 = self.fixed[8] * t211;
+        let t265 = t188 * t224;
+        let t266 = t71 * t252;
+        let t267 = t258 - t263;
+        let t268 = t267 + t264;
+        let t269 = t268 - t265;
+        let t270 = t269 - t266;
+        let t272 = t270 * t126;
+        let t273 = self.fixed[20] * t272;
+        let t274 = t174 + t273;
+        let t275 = -t274;
+        let t277 = T::nearest(60.0) * t13;
+        let t278 = t277 * t6;
+        let t279 = t31 * t229;
+        let t280 = t278 - t279;
+        let t282 = T::nearest(8.0) * t22;
+        let t283 = t282 - t229;
+        let t284 = t31 * t283;
+        let t286 = T::nearest(30.0) * t13;
+        let t287 = t286 * t6;
+        let t289 = self.fixed[21] * t280;
+        let t290 = t284 + t287;
+        let t291 = t290 + t289;
+        let t293 = self.fixed[22] * t31;
+        let t294 = t293 * t26;
+        let t295 = self.fixed[14] * t291;
+        let t296 = t294 - t295;
+        let t299 = self.fixed[23] * t296;
+        let t300 = t78 * t226;
+        let t301 = t238 + t239;
+        let t302 = t301 + t300;
+        let t303 = t245 * t253;
+        let t304 = t303 * t126;
+        let t305 = t97 * t302;
+        let t306 = t304 - t305;
+        let t307 = t233 * t253;
+        let t308 = t78 * t302;
+        let t309 = t239 + t307;
+        let t310 = t309 - t308;
+        let t311 = t78 * t253;
+        let t312 = t88 - t311;
+        let t313 = t97 * t253;
+        let t314 = self.fixed[10] * t313;
+        let t315 = self.fixed[8] * t312;
+        let t316 = t314 - t315;
+        let t317 = t78 - t88;
+        let t318 = t317 + t94;
+        let t319 = self.fixed[8] * t318;
+        let t320 = t112 + t319;
+        let t321 = t188 * t80;
+        let t322 = t321 + t195;
+        let t323 = t322 + t200;
+        let t324 = t198 * t126;
+        let t325 = self.fixed[10] * t324;
+        let t326 = self.fixed[8] * t323;
+        let t327 = t325 + t326;
+        let t328 = t219 * t126;
+        let t329 = t62 * t328;
+        let t330 = t189 + t329;
+        let t331 = t320 * t330;
+        let t332 = t62 * t327;
+        let t333 = t331 - t332;
+        let t334 = t226 * t199;
+        let t335 = t243 + t307;
+        let t336 = t335 + t334;
+        let t337 = t306 + t336;
         let t338 = self.fixed[10] * t337;
-        let t339 = self.fixed[8] * t336;
-        let t340 = t338 + t339;
-        let t341 = t205 * t333;
-        let t342 = t229 * t333;
-        let t343 = t342 * t214;
-        let t344 = t62 * t343;
-        let t345 = t62 * t340;
-        let t346 = t341 + t344;
-        let t347 = t346 - t345;
-        let t348 = t201 * t237;
-        let t349 = t193 - t253;
-        let t350 = t349 - t320;
-        let t351 = t350 - t348;
-        let t352 = t319 - t351;
-        let t353 = self.fixed[10] * t352;
-        let t354 = self.fixed[8] * t323;
-        let t355 = t252 * t329;
-        let t356 = t355 * t214;
-        let t357 = t14 * t347;
-        let t358 = t353 - t354;
-        let t359 = t358 - t356;
-        let t360 = t359 - t357;
-        let t361 = t360 * t214;
-        let t362 = self.fixed[20] * t361;
-        let t363 = t362 - t313;
+        let t339 = self.fixed[8] * t310;
+        let t340 = t316 * t241;
+        let t341 = t340 * t126;
+        let t342 = t14 * t333;
+        let t343 = t338 + t339;
+        let t344 = t343 - t341;
+        let t345 = t344 + t342;
+        let t346 = t345 * t126;
+        let t347 = self.fixed[20] * t346;
+        let t348 = t299 + t347;
+        let t349 = -t348;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t15, t35),
             v: crate::nalgebra::SVector::<T, 2>::new(t41, t48),
@@ -1173,8 +1151,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
             H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t65, t66, t71, t78),
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t80, t66, t71, t85),
             J: t89,
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t129, t135, t147, t153),
-            b: crate::nalgebra::SVector::<T, 2>::new(t288, t363),
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t127, t133, t145, t151),
+            b: crate::nalgebra::SVector::<T, 2>::new(t275, t349),
         }
     }
     fn domain(&self) -> crate::Domain<T, 2> {
@@ -1225,13 +1203,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 16, 26>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 15, 27>::new(*self, X))
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 2, 16, 26> for Skew2d<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 2, 15, 27> for Skew2d<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 16] {
+    fn body_force_time(&self, t: T) -> [T; 15] {
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
         let t14 = self.parameters.A * t13;
@@ -1241,38 +1219,36 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 16, 26> for Skew2d<T> {
         let t31 = t28 + t30;
         let t34 = self.fixed[1] * t31;
         let t64 = self.fixed[7] * t13;
-        let t158 = T::nearest(45.0) * t13;
-        let t163 = T::nearest(95.0) * t13;
-        let t292 = T::nearest(60.0) * t13;
-        let t296 = T::nearest(30.0) * t13;
-        let t299 = T::nearest(8.0) * t31;
-        let t307 = self.fixed[22] * t31;
-        let t364 = self.fixed[14] * t13;
-        let t653 = self.fixed[18] * t31;
-        let t655 = self.fixed[19] * t31;
-        let t690 = self.fixed[16] * t13;
-        let t693 = self.fixed[17] * t31;
+        let t156 = T::nearest(45.0) * t13;
+        let t161 = T::nearest(95.0) * t13;
+        let t168 = self.fixed[13] * t13;
+        let t177 = self.fixed[16] * t13;
+        let t182 = self.fixed[17] * t31;
+        let t187 = self.fixed[18] * t31;
+        let t232 = self.fixed[19] * t31;
+        let t277 = T::nearest(60.0) * t13;
+        let t286 = T::nearest(30.0) * t13;
+        let t293 = self.fixed[22] * t31;
         [
             t13,
             t14,
             t31,
             t34,
             t64,
-            t158,
-            t163,
-            t292,
-            t296,
-            t299,
-            t307,
-            t364,
-            t653,
-            t655,
-            t690,
-            t693,
+            t156,
+            t161,
+            t168,
+            t177,
+            t182,
+            t187,
+            t232,
+            t277,
+            t286,
+            t293,
         ]
     }
     #[inline]
-    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 26] {
+    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 27] {
         let t4 = T::nearest(3.0) * X[0];
         let t5 = t4 + X[1];
         let t6 = t5.sin();
@@ -1296,170 +1272,170 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 16, 26> for Skew2d<T> {
         let t75 = X[0] * X[1];
         let t76 = T::nearest(2.0) * t75;
         let t77 = t74 + t76;
-        let t105 = t62 * t62;
-        let t154 = t67 * t72;
-        let t155 = T::pi() * t154;
-        let t156 = X[1] - t155;
-        let t205 = T::nearest(3.0) * t6;
-        let t238 = T::nearest(4.0) * X[0];
-        let t239 = self.fixed[4] * t22;
-        let t240 = t238 - t239;
-        let t369 = self.fixed[24] * t73;
-        let t371 = T::nearest(6.0) * t75;
-        let t372 = t70 - t369;
-        let t373 = t372 - t371;
-        let t378 = t373 * t373;
-        let t382 = t6 * t105;
-        let t383 = t382 * t378;
-        let t384 = self.fixed[26] * t383;
-        let t385 = -t384;
-        let t390 = t105 * t156;
-        let t391 = t390 * t378;
-        let t392 = self.fixed[27] * t391;
-        let t393 = t22 * t62;
-        let t394 = T::nearest(8.0) * t393;
-        let t395 = t62 * t156;
+        let t104 = t62 * t62;
+        let t152 = t67 * t72;
+        let t153 = T::pi() * t152;
+        let t154 = X[1] - t153;
+        let t189 = T::nearest(3.0) * t6;
+        let t227 = T::nearest(4.0) * X[0];
+        let t228 = self.fixed[4] * t22;
+        let t229 = t227 - t228;
+        let t282 = T::nearest(8.0) * t22;
+        let t283 = t282 - t229;
+        let t351 = self.fixed[24] * t73;
+        let t353 = T::nearest(6.0) * t75;
+        let t354 = t70 - t351;
+        let t355 = t354 - t353;
+        let t360 = t355 * t355;
+        let t364 = t6 * t104;
+        let t365 = t364 * t360;
+        let t366 = self.fixed[26] * t365;
+        let t367 = -t366;
+        let t372 = t104 * t154;
+        let t373 = t372 * t360;
+        let t374 = self.fixed[27] * t373;
+        let t375 = T::nearest(4.0) * t22;
+        let t376 = T::nearest(3.0) * t154;
+        let t377 = t375 + t376;
+        let t378 = T::nearest(2.0) * t377;
+        let t379 = t62 * t378;
+        let t380 = t6 * t355;
+        let t381 = T::nearest(3.0) * t380;
+        let t382 = t379 + t381;
+        let t383 = t6 * t70;
+        let t384 = T::nearest(3.0) * t383;
+        let t385 = t22 * t62;
+        let t386 = T::nearest(8.0) * t385;
+        let t387 = t384 + t386;
+        let t388 = t62 * t154;
+        let t389 = t388 + t380;
+        let t390 = T::nearest(3.0) * t389;
+        let t391 = T::nearest(4.0) * t385;
+        let t392 = t390 + t391;
+        let t393 = t388 * t355;
+        let t394 = t77 * t392;
+        let t395 = t393 + t394;
         let t396 = T::nearest(6.0) * t395;
-        let t397 = t6 * t373;
-        let t398 = T::nearest(3.0) * t397;
-        let t399 = t394 + t396;
-        let t400 = t399 + t398;
-        let t401 = t6 * t70;
-        let t402 = T::nearest(3.0) * t401;
-        let t403 = t402 + t394;
-        let t404 = T::nearest(4.0) * t393;
-        let t405 = t395 + t397;
-        let t406 = T::nearest(3.0) * t405;
-        let t407 = t404 + t406;
-        let t408 = t70 * t400;
-        let t409 = t395 * t373;
-        let t410 = t77 * t407;
-        let t411 = t409 + t410;
-        let t412 = T::nearest(6.0) * t411;
-        let t413 = t403 * t373;
-        let t414 = t408 - t412;
-        let t415 = t414 - t413;
-        let t416 = T::nearest(2.0) * t395;
-        let t417 = t6 * t77;
-        let t418 = T::nearest(3.0) * t417;
-        let t419 = t416 - t418;
-        let t420 = t373 * t419;
-        let t421 = T::nearest(6.0) * t420;
-        let t422 = self.fixed[10] * t421;
-        let t423 = self.fixed[8] * t415;
-        let t426 = self.fixed[28] * t409;
-        let t427 = t422 + t423;
-        let t428 = t427 + t426;
-        let t432 = t62 * t428;
-        let t433 = self.fixed[29] * t432;
-        let t442 = t62 * t77;
-        let t443 = t442 * t156;
-        let t444 = t443 * t373;
-        let t445 = self.fixed[30] * t444;
-        let t446 = -t445;
-        let t447 = T::nearest(12.0) * X[0];
-        let t448 = T::nearest(4.0) * X[1];
-        let t450 = self.fixed[31] * t154;
-        let t452 = self.fixed[32] * t22;
-        let t453 = t447 - t448;
-        let t454 = t453 + t450;
-        let t455 = t454 - t452;
-        let t456 = T::nearest(2.0) * t397;
-        let t457 = t62 * t455;
-        let t458 = t456 + t457;
-        let t459 = t77 * t400;
-        let t460 = T::nearest(2.0) * t459;
-        let t461 = t70 * t458;
-        let t462 = t460 - t461;
-        let t471 = self.fixed[33] * t462;
-        let t473 = self.fixed[34] * t73;
-        let t475 = T::nearest(18.0) * t75;
-        let t476 = T::nearest(2.0) * t417;
-        let t477 = t62 * t240;
-        let t478 = t476 - t477;
-        let t480 = self.fixed[35] * t73;
-        let t481 = T::nearest(12.0) * t75;
-        let t482 = t70 - t480;
-        let t483 = t482 - t481;
-        let t484 = T::nearest(2.0) * X[1];
-        let t486 = self.fixed[36] * t154;
-        let t487 = t447 - t484;
-        let t488 = t487 + t486;
-        let t489 = t488 - t452;
-        let t490 = t6 * t483;
-        let t491 = t62 * t489;
-        let t492 = t490 + t491;
-        let t493 = self.fixed[10] * t458;
-        let t495 = self.fixed[37] * t492;
-        let t496 = t493 + t495;
-        let t497 = T::nearest(2.0) * t409;
-        let t498 = t77 * t403;
-        let t499 = T::nearest(6.0) * t443;
-        let t500 = t497 + t498;
-        let t501 = t500 - t499;
-        let t505 = self.fixed[38] * t409;
-        let t506 = self.fixed[37] * t498;
-        let t507 = T::nearest(2.0) * t24;
-        let t508 = T::nearest(8.0) * t68;
-        let t509 = t507 - t508;
-        let t510 = t509 - t473;
-        let t511 = t510 - t475;
-        let t512 = t395 * t511;
-        let t514 = self.fixed[39] * t512;
-        let t516 = t70 * t478;
-        let t517 = self.fixed[40] * t516;
-        let t518 = t70 * t496;
-        let t522 = self.fixed[41] * t501;
-        let t523 = t505 + t506;
-        let t524 = t523 + t514;
-        let t525 = t524 - t517;
-        let t526 = t525 - t518;
-        let t527 = t526 + t522;
-        let t529 = self.fixed[42] * t527;
-        let t540 = t382 * t373;
-        let t541 = self.fixed[43] * t540;
-        let t542 = T::nearest(9.0) * t417;
-        let t543 = t404 + t542;
-        let t544 = t407 - t543;
-        let t545 = self.fixed[10] * t544;
-        let t546 = t395 + t490;
-        let t547 = self.fixed[40] * t546;
-        let t548 = t545 + t547;
-        let t552 = t62 * t548;
-        let t553 = self.fixed[44] * t552;
-        let t560 = self.fixed[45] * t407;
-        let t564 = self.fixed[46] * t395;
-        let t565 = self.fixed[8] * t403;
-        let t567 = self.fixed[47] * t395;
-        let t569 = self.fixed[48] * t401;
-        let t570 = self.fixed[10] * t403;
-        let t571 = t564 - t565;
-        let t572 = t571 + t567;
-        let t573 = t572 - t569;
-        let t574 = t573 - t570;
-        let t577 = self.fixed[49] * t574;
-        let t584 = t77 * t77;
-        let t588 = t584 * t156;
-        let t589 = self.fixed[50] * t588;
-        let t590 = t70 * t240;
-        let t591 = t77 * t156;
-        let t592 = T::nearest(4.0) * t591;
-        let t593 = t590 - t592;
-        let t598 = self.fixed[51] * t593;
-        let t599 = -t598;
-        let t600 = self.fixed[39] * t591;
-        let t601 = self.fixed[25] * t590;
-        let t602 = self.fixed[38] * t591;
-        let t603 = t600 + t601;
-        let t604 = t603 + t602;
-        let t606 = self.fixed[52] * t604;
-        let t614 = self.fixed[53] * t156;
-        let t624 = self.fixed[54] * t382;
-        let t625 = -t624;
-        let t630 = t6 * t62;
-        let t631 = self.fixed[55] * t630;
-        let t637 = self.fixed[56] * t6;
-        let t638 = -t637;
+        let t397 = t70 * t382;
+        let t398 = t387 * t355;
+        let t399 = t397 - t396;
+        let t400 = t399 - t398;
+        let t401 = T::nearest(2.0) * t388;
+        let t402 = t6 * t77;
+        let t403 = T::nearest(3.0) * t402;
+        let t404 = t401 - t403;
+        let t405 = t355 * t404;
+        let t406 = T::nearest(6.0) * t405;
+        let t407 = self.fixed[10] * t406;
+        let t408 = self.fixed[8] * t400;
+        let t411 = self.fixed[28] * t393;
+        let t412 = t407 + t408;
+        let t413 = t412 + t411;
+        let t417 = t62 * t413;
+        let t418 = self.fixed[29] * t417;
+        let t427 = t62 * t77;
+        let t428 = t427 * t154;
+        let t429 = t428 * t355;
+        let t430 = self.fixed[30] * t429;
+        let t431 = -t430;
+        let t432 = T::nearest(12.0) * X[0];
+        let t433 = T::nearest(4.0) * X[1];
+        let t435 = self.fixed[31] * t152;
+        let t437 = self.fixed[32] * t22;
+        let t438 = t432 - t433;
+        let t439 = t438 + t435;
+        let t440 = t439 - t437;
+        let t441 = T::nearest(2.0) * t380;
+        let t442 = t62 * t440;
+        let t443 = t441 + t442;
+        let t444 = t77 * t382;
+        let t445 = T::nearest(2.0) * t444;
+        let t446 = t70 * t443;
+        let t447 = t445 - t446;
+        let t456 = self.fixed[33] * t447;
+        let t458 = self.fixed[34] * t73;
+        let t460 = T::nearest(18.0) * t75;
+        let t461 = T::nearest(2.0) * t402;
+        let t462 = t62 * t229;
+        let t463 = t461 - t462;
+        let t465 = self.fixed[35] * t73;
+        let t466 = T::nearest(12.0) * t75;
+        let t467 = t70 - t465;
+        let t468 = t467 - t466;
+        let t469 = T::nearest(2.0) * X[1];
+        let t471 = self.fixed[36] * t152;
+        let t472 = t432 - t469;
+        let t473 = t472 + t471;
+        let t474 = t473 - t437;
+        let t475 = t6 * t468;
+        let t476 = t62 * t474;
+        let t477 = t475 + t476;
+        let t478 = self.fixed[10] * t443;
+        let t480 = self.fixed[37] * t477;
+        let t481 = t478 + t480;
+        let t482 = t154 * t468;
+        let t483 = T::nearest(2.0) * t482;
+        let t484 = t62 * t483;
+        let t485 = t77 * t387;
+        let t486 = t484 + t485;
+        let t487 = T::nearest(2.0) * t24;
+        let t488 = T::nearest(8.0) * t68;
+        let t489 = t487 - t488;
+        let t490 = t489 - t458;
+        let t491 = t490 - t460;
+        let t492 = t388 * t491;
+        let t494 = self.fixed[38] * t492;
+        let t496 = self.fixed[39] * t463;
+        let t497 = t496 + t481;
+        let t498 = t70 * t497;
+        let t502 = self.fixed[40] * t393;
+        let t503 = self.fixed[37] * t485;
+        let t507 = self.fixed[41] * t486;
+        let t508 = t494 - t498;
+        let t509 = t508 + t502;
+        let t510 = t509 + t503;
+        let t511 = t510 + t507;
+        let t513 = self.fixed[42] * t511;
+        let t524 = t364 * t355;
+        let t525 = self.fixed[43] * t524;
+        let t526 = T::nearest(9.0) * t402;
+        let t527 = t391 + t526;
+        let t528 = t392 - t527;
+        let t529 = self.fixed[10] * t528;
+        let t530 = t388 + t475;
+        let t531 = self.fixed[39] * t530;
+        let t532 = t529 + t531;
+        let t536 = t62 * t532;
+        let t537 = self.fixed[44] * t536;
+        let t544 = self.fixed[45] * t392;
+        let t546 = self.fixed[46] * t154;
+        let t547 = t62 * t546;
+        let t548 = t387 * self.fixed[25];
+        let t550 = self.fixed[47] * t383;
+        let t551 = t547 - t548;
+        let t552 = t551 - t550;
+        let t555 = self.fixed[48] * t552;
+        let t562 = t77 * t77;
+        let t566 = t562 * t154;
+        let t567 = self.fixed[49] * t566;
+        let t568 = t70 * t229;
+        let t569 = t77 * t154;
+        let t570 = T::nearest(4.0) * t569;
+        let t571 = t568 - t570;
+        let t576 = self.fixed[50] * t571;
+        let t577 = -t576;
+        let t579 = self.fixed[51] * t154;
+        let t580 = t77 * t579;
+        let t581 = self.fixed[25] * t568;
+        let t582 = t580 + t581;
+        let t584 = self.fixed[52] * t582;
+        let t592 = self.fixed[53] * t154;
+        let t602 = self.fixed[54] * t364;
+        let t603 = -t602;
+        let t608 = t6 * t62;
+        let t609 = self.fixed[55] * t608;
+        let t615 = self.fixed[56] * t6;
+        let t616 = -t615;
         [
             t6,
             t22,
@@ -1467,33 +1443,34 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 16, 26> for Skew2d<T> {
             t62,
             t70,
             t77,
-            t156,
-            t205,
-            t240,
-            t385,
-            t392,
-            t433,
-            t446,
-            t471,
-            t529,
-            t541,
-            t553,
-            t560,
+            t154,
+            t189,
+            t229,
+            t283,
+            t367,
+            t374,
+            t418,
+            t431,
+            t456,
+            t513,
+            t525,
+            t537,
+            t544,
+            t555,
+            t567,
             t577,
-            t589,
-            t599,
-            t606,
-            t614,
-            t625,
-            t631,
-            t638,
+            t584,
+            t592,
+            t603,
+            t609,
+            t616,
         ]
     }
     #[inline(always)]
     fn body_force_staged(
         &self,
-        time: &[T; 16],
-        point: &[T; 26],
+        time: &[T; 15],
+        point: &[T; 27],
     ) -> crate::nalgebra::SVector<T, 2> {
         let t65 = time[4] * point[3];
         let t66 = time[1] * point[3];
@@ -1504,165 +1481,159 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 16, 26> for Skew2d<T> {
         let t87 = t80 * t86;
         let t88 = t66 * t71;
         let t89 = t87 - t88;
-        let t94 = t65 * t78;
-        let t95 = t65 + t78;
+        let t94 = t65 * t86;
+        let t95 = t94 + t78;
         let t96 = t95 - t88;
-        let t97 = t96 + t94;
-        let t98 = t97.ln_1p();
-        let t113 = self.fixed[10] * t98;
-        let t128 = T::one() / t89;
-        let t159 = time[5] * point[0];
-        let t160 = time[2] * point[6];
-        let t161 = t159 - t160;
-        let t164 = time[6] * point[0];
-        let t166 = self.fixed[12] * t161;
-        let t167 = t164 - t160;
-        let t168 = t167 + t166;
-        let t171 = self.fixed[13] * t168;
-        let t200 = t65 * t86;
-        let t206 = point[7] * t71;
-        let t230 = t78 * t80;
-        let t241 = time[2] * point[8];
-        let t245 = point[0] * t71;
-        let t293 = time[7] * point[0];
-        let t294 = t293 - t241;
-        let t297 = time[8] * point[0];
-        let t300 = time[9] * point[1];
-        let t302 = self.fixed[21] * t294;
-        let t303 = t297 + t300;
-        let t304 = t303 - t241;
-        let t305 = t304 + t302;
-        let t309 = self.fixed[13] * t305;
-        let t365 = time[11] * point[0];
-        let t366 = t365 - t171;
-        let t367 = self.fixed[15] * t366;
-        let t434 = time[0] * point[9];
-        let t435 = time[2] * point[10];
-        let t436 = t434 + t435;
-        let t437 = t436 - point[11];
-        let t530 = time[0] * t437;
-        let t531 = time[2] * point[12];
-        let t532 = point[13] * t98;
-        let t533 = t530 + t531;
-        let t534 = t533 + t532;
-        let t535 = t534 - point[14];
-        let t554 = time[0] * point[15];
-        let t555 = point[16] + t554;
-        let t578 = time[2] * t535;
-        let t579 = time[0] * t555;
-        let t580 = point[17] * t98;
-        let t581 = t578 + t579;
-        let t582 = t581 + t580;
-        let t583 = point[18] + t582;
-        let t607 = time[2] * point[19];
-        let t608 = point[20] * t98;
-        let t609 = t607 + t608;
-        let t610 = point[21] + t609;
-        let t615 = time[0] * t583;
-        let t616 = time[2] * t610;
-        let t617 = point[22] * t98;
-        let t618 = t615 + t616;
-        let t619 = t618 + t617;
-        let t632 = time[0] * point[23];
-        let t633 = t632 - point[24];
-        let t639 = time[0] * t633;
-        let t640 = point[25] * t98;
-        let t641 = t639 + t640;
-        let t642 = time[2] * t619;
-        let t643 = time[0] * t641;
-        let t644 = t642 + t643;
-        let t645 = t128 * t128;
-        let t646 = t644 * t645;
-        let t647 = t646 - t367;
-        let t648 = time[10] * point[2];
-        let t649 = t648 - t309;
-        let t650 = self.fixed[23] * t649;
-        let t651 = time[4] * point[0];
-        let t652 = -t651;
-        let t654 = time[12] * point[6];
-        let t656 = time[13] * point[8];
-        let t657 = point[3] * t654;
-        let t658 = t245 - t657;
-        let t659 = time[0] * t658;
-        let t660 = self.parameters.A * t659;
-        let t661 = t86 * t652;
-        let t662 = t80 * t656;
-        let t663 = t660 + t661;
-        let t664 = t663 + t662;
-        let t665 = t88 - t230;
-        let t666 = time[1] * t658;
-        let t667 = t78 * t652;
-        let t668 = t662 + t666;
-        let t669 = t668 + t667;
-        let t670 = t664 * t665;
-        let t671 = t670 * t128;
-        let t672 = t98 * t669;
-        let t673 = t671 - t672;
-        let t674 = t656 * t665;
-        let t675 = t78 * t669;
-        let t676 = t666 + t674;
-        let t677 = t676 - t675;
-        let t678 = t78 * t665;
-        let t679 = t88 - t678;
-        let t680 = t98 * t665;
-        let t681 = self.fixed[10] * t680;
-        let t682 = self.fixed[8] * t679;
-        let t683 = t681 - t682;
-        let t684 = t661 + t662;
-        let t685 = t684 + t666;
-        let t686 = t78 - t88;
-        let t687 = t686 + t200;
-        let t688 = self.fixed[8] * t687;
-        let t689 = t113 + t688;
-        let t691 = time[14] * point[0];
-        let t692 = -t691;
-        let t694 = time[15] * point[1];
-        let t695 = -t694;
-        let t696 = point[3] * t695;
-        let t697 = t206 - t696;
-        let t698 = t86 * t692;
-        let t699 = t80 * t654;
-        let t700 = time[1] * t697;
-        let t701 = t698 + t699;
-        let t702 = t701 + t700;
-        let t703 = t651 * t71;
-        let t704 = t66 * t695;
-        let t705 = t698 + t703;
-        let t706 = t705 - t704;
-        let t707 = t706 + t699;
-        let t708 = t65 * t654;
-        let t709 = t654 + t698;
-        let t710 = t709 + t700;
-        let t711 = t710 + t708;
-        let t712 = t707 * t128;
-        let t713 = self.fixed[10] * t712;
-        let t714 = self.fixed[8] * t711;
-        let t715 = t713 + t714;
-        let t716 = point[7] * t689;
-        let t717 = t689 * t702;
-        let t718 = t717 * t128;
-        let t719 = point[3] * t718;
-        let t720 = point[3] * t715;
-        let t721 = t716 + t719;
-        let t722 = t721 - t720;
-        let t723 = t88 - t200;
-        let t724 = t652 * t723;
-        let t725 = t660 + t674;
-        let t726 = t725 + t724;
-        let t727 = t673 + t726;
-        let t728 = self.fixed[10] * t727;
-        let t729 = self.fixed[8] * t677;
-        let t730 = t683 * t685;
-        let t731 = t730 * t128;
-        let t732 = time[1] * t722;
-        let t733 = t728 + t729;
-        let t734 = t733 - t731;
-        let t735 = t734 + t732;
-        let t736 = t735 * t128;
-        let t737 = self.fixed[20] * t736;
-        let t738 = t650 + t737;
-        let t739 = -t738;
-        crate::nalgebra::SVector::<T, 2>::new(t647, t739)
+        let t97 = t96.ln_1p();
+        let t112 = self.fixed[10] * t97;
+        let t126 = T::one() / t89;
+        let t157 = time[5] * point[0];
+        let t158 = time[2] * point[6];
+        let t159 = t157 - t158;
+        let t162 = time[6] * point[0];
+        let t164 = self.fixed[12] * t159;
+        let t165 = t162 - t158;
+        let t166 = t165 + t164;
+        let t169 = time[7] * point[0];
+        let t171 = self.fixed[14] * t166;
+        let t172 = t169 - t171;
+        let t174 = self.fixed[15] * t172;
+        let t178 = time[8] * point[0];
+        let t179 = -t178;
+        let t183 = time[9] * point[1];
+        let t184 = -t183;
+        let t188 = time[10] * point[6];
+        let t190 = point[7] * t71;
+        let t191 = point[3] * t184;
+        let t192 = t190 - t191;
+        let t193 = self.parameters.A * t192;
+        let t194 = time[0] * t193;
+        let t195 = t86 * t179;
+        let t196 = t80 * t188;
+        let t197 = t194 + t195;
+        let t198 = t197 + t196;
+        let t199 = t88 - t94;
+        let t200 = time[1] * t192;
+        let t218 = t195 + t196;
+        let t219 = t218 + t200;
+        let t220 = t78 * t80;
+        let t225 = time[4] * point[0];
+        let t226 = -t225;
+        let t233 = time[11] * point[8];
+        let t234 = point[0] * t71;
+        let t235 = point[3] * t188;
+        let t236 = t234 - t235;
+        let t237 = t86 * t226;
+        let t238 = t80 * t233;
+        let t239 = time[1] * t236;
+        let t240 = t237 + t238;
+        let t241 = t240 + t239;
+        let t242 = time[0] * t236;
+        let t243 = self.parameters.A * t242;
+        let t244 = t243 + t237;
+        let t245 = t244 + t238;
+        let t253 = t88 - t220;
+        let t278 = time[12] * point[0];
+        let t279 = time[2] * point[8];
+        let t280 = t278 - t279;
+        let t284 = time[2] * point[9];
+        let t287 = time[13] * point[0];
+        let t289 = self.fixed[21] * t280;
+        let t290 = t284 + t287;
+        let t291 = t290 + t289;
+        let t294 = time[14] * point[2];
+        let t295 = self.fixed[14] * t291;
+        let t296 = t294 - t295;
+        let t299 = self.fixed[23] * t296;
+        let t300 = t78 * t226;
+        let t301 = t238 + t239;
+        let t302 = t301 + t300;
+        let t303 = t245 * t253;
+        let t304 = t303 * t126;
+        let t305 = t97 * t302;
+        let t306 = t304 - t305;
+        let t307 = t233 * t253;
+        let t308 = t78 * t302;
+        let t309 = t239 + t307;
+        let t310 = t309 - t308;
+        let t311 = t78 * t253;
+        let t312 = t88 - t311;
+        let t313 = t97 * t253;
+        let t314 = self.fixed[10] * t313;
+        let t315 = self.fixed[8] * t312;
+        let t316 = t314 - t315;
+        let t317 = t78 - t88;
+        let t318 = t317 + t94;
+        let t319 = self.fixed[8] * t318;
+        let t320 = t112 + t319;
+        let t321 = t188 * t80;
+        let t322 = t321 + t195;
+        let t323 = t322 + t200;
+        let t324 = t198 * t126;
+        let t325 = self.fixed[10] * t324;
+        let t326 = self.fixed[8] * t323;
+        let t327 = t325 + t326;
+        let t328 = t219 * t126;
+        let t329 = point[3] * t328;
+        let t330 = point[7] + t329;
+        let t331 = t320 * t330;
+        let t332 = point[3] * t327;
+        let t333 = t331 - t332;
+        let t334 = t226 * t199;
+        let t335 = t243 + t307;
+        let t336 = t335 + t334;
+        let t337 = t306 + t336;
+        let t338 = self.fixed[10] * t337;
+        let t339 = self.fixed[8] * t310;
+        let t340 = t316 * t241;
+        let t341 = t340 * t126;
+        let t342 = time[1] * t333;
+        let t343 = t338 + t339;
+        let t344 = t343 - t341;
+        let t345 = t344 + t342;
+        let t346 = t345 * t126;
+        let t347 = self.fixed[20] * t346;
+        let t348 = t299 + t347;
+        let t349 = -t348;
+        let t419 = time[0] * point[10];
+        let t420 = time[2] * point[11];
+        let t421 = t419 + t420;
+        let t422 = t421 - point[12];
+        let t514 = time[0] * t422;
+        let t515 = time[2] * point[13];
+        let t516 = point[14] * t97;
+        let t517 = t514 + t515;
+        let t518 = t517 + t516;
+        let t519 = t518 - point[15];
+        let t538 = time[0] * point[16];
+        let t539 = point[17] + t538;
+        let t556 = time[2] * t519;
+        let t557 = time[0] * t539;
+        let t558 = point[18] * t97;
+        let t559 = t556 + t557;
+        let t560 = t559 + t558;
+        let t561 = point[19] + t560;
+        let t585 = time[2] * point[20];
+        let t586 = point[21] * t97;
+        let t587 = t585 + t586;
+        let t588 = point[22] + t587;
+        let t593 = time[0] * t561;
+        let t594 = time[2] * t588;
+        let t595 = point[23] * t97;
+        let t596 = t593 + t594;
+        let t597 = t596 + t595;
+        let t610 = time[0] * point[24];
+        let t611 = t610 - point[25];
+        let t617 = time[0] * t611;
+        let t618 = point[26] * t97;
+        let t619 = t617 + t618;
+        let t620 = time[2] * t597;
+        let t621 = time[0] * t619;
+        let t622 = t620 + t621;
+        let t623 = t126 * t126;
+        let t624 = t622 * t623;
+        let t625 = t624 - t174;
+        crate::nalgebra::SVector::<T, 2>::new(t625, t349)
     }
 }
 impl<T: crate::Real> From<Skew2d<T>> for crate::AnySolution<T> {

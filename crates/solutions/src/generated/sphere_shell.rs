@@ -189,35 +189,35 @@ impl<T: crate::Real> SphereShell<T> {
         let t253 = parameters.rho0 * t249;
         let t254 = t252 / t253;
         let t264 = T::nearest(8.0) / parameters.Ro;
-        let t276 = T::nearest(3.0) * parameters.E;
-        let t277 = t276 * parameters.nu;
-        let t278 = t277 / t139;
-        let t283 = T::nearest(3.0) * t136;
-        let t285 = T::nearest(6.0) * t136;
-        let t288 = T::nearest(2.0) * t136;
-        let t296 = t127 * parameters.A;
-        let t297 = t11 * parameters.Ro;
-        let t298 = t297 * t297;
-        let t299 = T::nearest(12.0) * t296;
-        let t300 = parameters.rho0 * t298;
-        let t301 = t299 / t300;
-        let t312 = T::nearest(6.0) * t127;
-        let t313 = t312 * parameters.E;
-        let t314 = t313 * parameters.nu;
-        let t315 = parameters.rho0 * t128;
-        let t316 = t315 * t114;
-        let t317 = t316 * t116;
-        let t318 = t314 / t317;
-        let t321 = T::nearest(3.0) / parameters.Ro;
-        let t333 = T::nearest(2.0) * t127;
-        let t334 = t333 / t315;
-        let t341 = T::nearest(4.0) * parameters.A;
-        let t342 = t341 * parameters.E;
-        let t343 = t342 * parameters.nu;
-        let t344 = t48 * t114;
-        let t345 = t344 * t116;
-        let t346 = t343 / t345;
-        let t361 = T::nearest(2.0) / t16;
+        let t278 = T::nearest(3.0) * t136;
+        let t280 = T::nearest(3.0) * parameters.E;
+        let t281 = t280 * parameters.nu;
+        let t282 = t281 / t139;
+        let t284 = T::nearest(6.0) * t136;
+        let t287 = T::nearest(2.0) * t136;
+        let t295 = t127 * parameters.A;
+        let t296 = t11 * parameters.Ro;
+        let t297 = t296 * t296;
+        let t298 = T::nearest(12.0) * t295;
+        let t299 = parameters.rho0 * t297;
+        let t300 = t298 / t299;
+        let t311 = T::nearest(6.0) * t127;
+        let t312 = t311 * parameters.E;
+        let t313 = t312 * parameters.nu;
+        let t314 = parameters.rho0 * t128;
+        let t315 = t314 * t114;
+        let t316 = t315 * t116;
+        let t317 = t313 / t316;
+        let t320 = T::nearest(3.0) / parameters.Ro;
+        let t334 = T::nearest(2.0) * t127;
+        let t335 = t334 / t314;
+        let t342 = T::nearest(4.0) * parameters.A;
+        let t343 = t342 * parameters.E;
+        let t344 = t343 * parameters.nu;
+        let t345 = t48 * t114;
+        let t346 = t345 * t116;
+        let t347 = t344 / t346;
+        let t362 = T::nearest(2.0) / t16;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -245,15 +245,15 @@ impl<T: crate::Real> SphereShell<T> {
                 t254,
                 t264,
                 t278,
-                t283,
-                t285,
-                t288,
-                t301,
-                t318,
-                t321,
-                t334,
-                t346,
-                t361,
+                t282,
+                t284,
+                t287,
+                t300,
+                t317,
+                t320,
+                t335,
+                t347,
+                t362,
             ],
         })
     }
@@ -569,8 +569,8 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t125 = t122 * t124;
         let t126 = t125 * t108;
         let t130 = self.fixed[10] * t126;
-        let t131 = t121 + t107;
-        let t132 = t131 + t130;
+        let t131 = t121 + t130;
+        let t132 = t131 + t107;
         let t133 = t132.ln_1p();
         let t137 = t107 + T::nearest(2.0);
         let t141 = self.fixed[12] * t133;
@@ -662,41 +662,41 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t198 = self.fixed[11] * t191;
         let t199 = t197 + t198;
         let t200 = t107 * t109;
-        let t201 = t193 * t26;
-        let t202 = T::nearest(2.0) * t200;
-        let t203 = t109 * t109;
-        let t204 = t109 * t200;
-        let t205 = t201 + t107;
-        let t206 = t205 + t202;
-        let t207 = t206 + t203;
-        let t208 = t207 + t204;
-        let t209 = t208.ln_1p();
-        let t210 = self.fixed[11] * t107;
-        let t211 = self.fixed[12] * t209;
-        let t212 = t210 + t211;
-        let t213 = t107 * t192;
-        let t214 = t107 * t199;
-        let t215 = t191 * t212;
-        let t216 = t212 * t213;
-        let t217 = t214 + t215;
-        let t218 = t217 - t216;
-        let t219 = self.fixed[11] * t109;
-        let t220 = t211 + t219;
-        let t221 = t109 * t155;
-        let t222 = t194 * t221;
-        let t223 = t213 + t222;
-        let t224 = t218 * t152;
+        let t201 = t200 + T::nearest(2.0);
+        let t202 = t25 * t23;
+        let t203 = t202 * t201;
+        let t204 = t8 * t203;
+        let t205 = T::nearest(2.0) * t109;
+        let t206 = t205 + T::one();
+        let t207 = t107 * t206;
+        let t208 = t109 * t109;
+        let t209 = t204 + t207;
+        let t210 = t209 + t208;
+        let t211 = t210.ln_1p();
+        let t212 = self.fixed[11] * t107;
+        let t213 = self.fixed[12] * t211;
+        let t214 = t212 + t213;
+        let t215 = t107 * t192;
+        let t216 = t191 - t215;
+        let t217 = t214 * t216;
+        let t218 = t107 * t199;
+        let t219 = t217 + t218;
+        let t220 = self.fixed[11] * t109;
+        let t221 = t213 + t220;
+        let t222 = t109 * t155;
+        let t223 = t194 * t222;
+        let t224 = t215 + t223;
         let t225 = T::nearest(2.0) * t67;
-        let t226 = t107 * t212;
-        let t227 = t226 * t152;
-        let t228 = t225 * t227;
-        let t229 = t193 * t23;
-        let t230 = t220 * t155;
-        let t231 = t229 * t230;
-        let t232 = self.fixed[12] * t223;
-        let t233 = t224 + t228;
-        let t234 = t233 - t231;
-        let t235 = t234 + t232;
+        let t226 = t107 * t214;
+        let t227 = t225 * t226;
+        let t228 = t227 + t219;
+        let t229 = t152 * t228;
+        let t230 = t193 * t23;
+        let t231 = t221 * t155;
+        let t232 = t230 * t231;
+        let t233 = self.fixed[12] * t224;
+        let t234 = t229 - t232;
+        let t235 = t234 + t233;
         let t237 = self.fixed[17] * t235;
         let t238 = t237 - t189;
         let t239 = t67 * t238;
@@ -797,8 +797,8 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t125 = t122 * t124;
         let t126 = t125 * t108;
         let t130 = self.fixed[10] * t126;
-        let t131 = t121 + t107;
-        let t132 = t131 + t130;
+        let t131 = t121 + t130;
+        let t132 = t131 + t107;
         let t133 = t132.ln_1p();
         let t137 = t107 + T::nearest(2.0);
         let t141 = self.fixed[12] * t133;
@@ -852,41 +852,41 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t198 = self.fixed[11] * t191;
         let t199 = t197 + t198;
         let t200 = t107 * t109;
-        let t201 = t193 * t26;
-        let t202 = T::nearest(2.0) * t200;
-        let t203 = t109 * t109;
-        let t204 = t109 * t200;
-        let t205 = t201 + t107;
-        let t206 = t205 + t202;
-        let t207 = t206 + t203;
-        let t208 = t207 + t204;
-        let t209 = t208.ln_1p();
-        let t210 = self.fixed[11] * t107;
-        let t211 = self.fixed[12] * t209;
-        let t212 = t210 + t211;
-        let t213 = t107 * t192;
-        let t214 = t107 * t199;
-        let t215 = t191 * t212;
-        let t216 = t212 * t213;
-        let t217 = t214 + t215;
-        let t218 = t217 - t216;
-        let t219 = self.fixed[11] * t109;
-        let t220 = t211 + t219;
-        let t221 = t109 * t155;
-        let t222 = t194 * t221;
-        let t223 = t213 + t222;
-        let t224 = t218 * t152;
+        let t201 = t200 + T::nearest(2.0);
+        let t202 = t25 * t23;
+        let t203 = t202 * t201;
+        let t204 = t8 * t203;
+        let t205 = T::nearest(2.0) * t109;
+        let t206 = t205 + T::one();
+        let t207 = t107 * t206;
+        let t208 = t109 * t109;
+        let t209 = t204 + t207;
+        let t210 = t209 + t208;
+        let t211 = t210.ln_1p();
+        let t212 = self.fixed[11] * t107;
+        let t213 = self.fixed[12] * t211;
+        let t214 = t212 + t213;
+        let t215 = t107 * t192;
+        let t216 = t191 - t215;
+        let t217 = t214 * t216;
+        let t218 = t107 * t199;
+        let t219 = t217 + t218;
+        let t220 = self.fixed[11] * t109;
+        let t221 = t213 + t220;
+        let t222 = t109 * t155;
+        let t223 = t194 * t222;
+        let t224 = t215 + t223;
         let t225 = T::nearest(2.0) * t67;
-        let t226 = t107 * t212;
-        let t227 = t226 * t152;
-        let t228 = t225 * t227;
-        let t229 = t193 * t23;
-        let t230 = t220 * t155;
-        let t231 = t229 * t230;
-        let t232 = self.fixed[12] * t223;
-        let t233 = t224 + t228;
-        let t234 = t233 - t231;
-        let t235 = t234 + t232;
+        let t226 = t107 * t214;
+        let t227 = t225 * t226;
+        let t228 = t227 + t219;
+        let t229 = t152 * t228;
+        let t230 = t193 * t23;
+        let t231 = t221 * t155;
+        let t232 = t230 * t231;
+        let t233 = self.fixed[12] * t224;
+        let t234 = t229 - t232;
+        let t235 = t234 + t233;
         let t237 = self.fixed[17] * t235;
         let t238 = t237 - t189;
         let t239 = t67 * t238;
@@ -1023,53 +1023,54 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 12> for SphereShell<T> {
         let t262 = t259 + t261;
         let t265 = self.fixed[19] * t8;
         let t267 = T::nearest(9.0) - t265;
-        let t269 = t60 * t190;
-        let t270 = T::nearest(18.0) * t269;
-        let t271 = t23 * t73;
-        let t272 = t23 * t178;
-        let t273 = T::nearest(2.0) * t272;
-        let t274 = t270 + t271;
-        let t275 = t274 + t273;
-        let t279 = self.fixed[20] * t262;
-        let t280 = T::nearest(6.0) - t177;
-        let t281 = t280 * t190;
-        let t282 = T::nearest(2.0) * t281;
-        let t284 = self.fixed[21] * t282;
-        let t286 = t60 * t267;
-        let t287 = self.fixed[22] * t286;
-        let t289 = self.fixed[23] * t123;
-        let t290 = self.fixed[12] * t275;
-        let t291 = t279 + t284;
-        let t292 = t291 + t287;
-        let t293 = t292 - t289;
-        let t294 = t293 + t290;
-        let t302 = t7 * t60;
-        let t303 = t302 * t294;
-        let t304 = self.fixed[24] * t303;
-        let t307 = T::nearest(2.0) * t286;
-        let t308 = t23 * t60;
-        let t309 = T::nearest(4.0) * t308;
-        let t310 = t259 + t307;
-        let t311 = t310 - t309;
-        let t319 = t8 * t311;
-        let t320 = self.fixed[25] * t319;
-        let t322 = self.fixed[26] * t8;
-        let t323 = T::nearest(2.0) - t322;
-        let t324 = self.fixed[12] * t178;
-        let t325 = self.fixed[21] * t323;
-        let t326 = t324 + t325;
-        let t327 = self.fixed[11] * t123;
-        let t328 = t60 * t326;
-        let t329 = T::nearest(12.0) * t328;
-        let t330 = self.fixed[12] * t274;
-        let t331 = t327 - t329;
-        let t332 = t331 - t330;
-        let t335 = t8 * t332;
-        let t336 = self.fixed[27] * t335;
-        let t347 = self.fixed[28] * t178;
-        let t357 = X[1] * t67;
-        let t359 = X[2] * t67;
-        [t26, t106, t124, t243, t244, t258, t304, t320, t336, t347, t357, t359]
+        let t268 = T::nearest(2.0) * t178;
+        let t269 = t73 + t268;
+        let t270 = t23 * t269;
+        let t272 = t60 * t190;
+        let t273 = T::nearest(18.0) * t272;
+        let t274 = t270 + t273;
+        let t275 = T::nearest(6.0) - t177;
+        let t276 = t275 * t190;
+        let t277 = T::nearest(2.0) * t276;
+        let t279 = self.fixed[20] * t277;
+        let t283 = self.fixed[21] * t262;
+        let t285 = t60 * t267;
+        let t286 = self.fixed[22] * t285;
+        let t288 = self.fixed[23] * t123;
+        let t289 = self.fixed[12] * t274;
+        let t290 = t279 + t283;
+        let t291 = t290 + t286;
+        let t292 = t291 - t288;
+        let t293 = t292 + t289;
+        let t301 = t7 * t60;
+        let t302 = t301 * t293;
+        let t303 = self.fixed[24] * t302;
+        let t306 = T::nearest(4.0) * t60;
+        let t307 = t190 - t306;
+        let t308 = t23 * t307;
+        let t309 = T::nearest(2.0) * t285;
+        let t310 = t308 + t309;
+        let t318 = t8 * t310;
+        let t319 = self.fixed[25] * t318;
+        let t321 = self.fixed[26] * t8;
+        let t322 = T::nearest(2.0) - t321;
+        let t323 = self.fixed[12] * t178;
+        let t324 = self.fixed[20] * t322;
+        let t325 = t323 + t324;
+        let t326 = t23 * t73;
+        let t327 = t273 + t326;
+        let t328 = self.fixed[11] * t123;
+        let t329 = t60 * t325;
+        let t330 = T::nearest(12.0) * t329;
+        let t331 = self.fixed[12] * t327;
+        let t332 = t328 - t330;
+        let t333 = t332 - t331;
+        let t336 = t8 * t333;
+        let t337 = self.fixed[27] * t336;
+        let t348 = self.fixed[28] * t178;
+        let t358 = X[1] * t67;
+        let t360 = X[2] * t67;
+        [t26, t106, t124, t243, t244, t258, t303, t319, t337, t348, t358, t360]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -1087,27 +1088,27 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 12> for SphereShell<T> {
         let t125 = time[3] * point[2];
         let t126 = t125 * t108;
         let t130 = self.fixed[10] * t126;
-        let t131 = t121 + t107;
-        let t132 = t131 + t130;
+        let t131 = t121 + t130;
+        let t132 = t131 + t107;
         let t133 = t132.ln_1p();
-        let t305 = time[0] * point[5];
-        let t306 = point[6] + t305;
-        let t337 = time[0] * t306;
-        let t338 = point[7] * t133;
-        let t339 = t337 + t338;
-        let t340 = t339 - point[8];
-        let t348 = time[0] * t340;
-        let t349 = point[9] * t133;
-        let t350 = t348 + t349;
-        let t351 = t108 * t108;
-        let t352 = t351 * t110;
-        let t353 = t350 / t352;
-        let t354 = t353 - point[4];
-        let t355 = time[0] * t354;
-        let t356 = point[3] * t355;
-        let t358 = point[10] * t355;
-        let t360 = point[11] * t355;
-        crate::nalgebra::SVector::<T, 3>::new(t356, t358, t360)
+        let t304 = time[0] * point[5];
+        let t305 = point[6] + t304;
+        let t338 = time[0] * t305;
+        let t339 = point[7] * t133;
+        let t340 = t338 + t339;
+        let t341 = t340 - point[8];
+        let t349 = time[0] * t341;
+        let t350 = point[9] * t133;
+        let t351 = t349 + t350;
+        let t352 = t108 * t108;
+        let t353 = t352 * t110;
+        let t354 = t351 / t353;
+        let t355 = t354 - point[4];
+        let t356 = time[0] * t355;
+        let t357 = point[3] * t356;
+        let t359 = point[10] * t356;
+        let t361 = point[11] * t356;
+        crate::nalgebra::SVector::<T, 3>::new(t357, t359, t361)
     }
 }
 impl<T: crate::Real> From<SphereShell<T>> for crate::AnySolution<T> {
