@@ -203,6 +203,8 @@ pub struct Program {
     operations: Vec<Operation>,
     dependence: Vec<Dependence>,
     outputs: Vec<Slot>,
+    /// The numbers, rounded once; zero for all other operations.
+    numbers: Vec<f64>,
 }
 
 impl Program {
@@ -235,7 +237,7 @@ impl Program {
         dependence: Vec<Dependence>,
         outputs: Vec<Slot>,
     ) -> Self {
-        Program { operations, dependence, outputs }
+        Program { operations, dependence, outputs, numbers: Vec::new() }
     }
 
     /// The program without operations that no output needs.
@@ -251,6 +253,11 @@ impl Program {
             }
         }
         program.outputs = self.outputs.iter().map(|slot| places[slot.index()]).collect();
+        let number = |operation: &Operation| match operation {
+            Operation::Number(value) => nearest_f64(value),
+            _ => 0.0,
+        };
+        program.numbers = program.operations.iter().map(number).collect();
         program
     }
 
@@ -365,8 +372,11 @@ impl Program {
     /// The value of every operation.
     fn values(&self, inputs: &[f64]) -> Vec<f64> {
         let mut values: Vec<f64> = Vec::with_capacity(self.operations.len());
-        for operation in &self.operations {
-            values.push(operation.value(inputs, |slot| values[slot.index()]));
+        for (operation, &number) in self.operations.iter().zip(&self.numbers) {
+            values.push(match operation {
+                Operation::Number(_) => number,
+                _ => operation.value(inputs, |slot| values[slot.index()]),
+            });
         }
         values
     }

@@ -14,6 +14,10 @@ use crate::table::{self, Table};
 use crate::terminal;
 
 pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
+    if options.thorough {
+        return super::thorough::thorough(options);
+    }
+    let points = options.points.unwrap_or(300);
     let output = Output::prepare_if(options.json.as_ref())?;
     let names: Vec<String> = if options.solutions.is_empty() {
         CATALOGUE.iter().map(|known| known.name.to_owned()).collect()
@@ -31,7 +35,7 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
     let mut results = Vec::new();
     let mut passed = true;
     for Subject { name, solution, parameters } in &subjects {
-        let report = check_fields(solution, options.points)?;
+        let report = check_fields(solution, points)?;
         terminal::say(&text(name, &report))?;
         passed &= report.passed();
         results.push(json!({
@@ -52,7 +56,7 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
             "settings": {
                 "version": env!("CARGO_PKG_VERSION"),
                 "solutions": names,
-                "points": options.points,
+                "points": points,
                 "own_error_factor": OWN_ERROR_FACTOR,
                 "tolerance": TOLERANCE,
                 "blunt": BLUNT,
