@@ -8,6 +8,7 @@ mod explain;
 mod list;
 mod reproduce;
 mod run;
+mod thorough;
 
 pub(crate) use check::check;
 pub(crate) use converge::converge;

@@ -210,7 +210,7 @@ pub(crate) fn specification(name: &str) -> Result<Spec> {
 }
 
 /// Whether the user means a specification file.
-fn is_file(name: &str) -> bool {
+pub(crate) fn is_file(name: &str) -> bool {
     Path::new(name).extension().is_some_and(|extension| extension == "toml")
 }
 

@@ -28,12 +28,18 @@ impl Bar {
 
     /// Shows how far the work is; `what` names the case under way.
     pub(crate) fn show(&self, what: &str, progress: Progress) {
+        let steps = || format!("{what}, step {}/{}", progress.step, progress.steps);
+        self.show_share(steps, progress.share);
+    }
+
+    /// Shows the share of the work that is done, with the message that `what` gives.
+    pub(crate) fn show_share(&self, what: impl FnOnce() -> String, share: f64) {
         // Formatting a message costs more than some steps do.
         if self.0.is_hidden() {
             return;
         }
-        self.0.set_message(format!("{what}, step {}/{}", progress.step, progress.steps));
-        self.0.set_position((progress.share * LENGTH as f64) as u64);
+        self.0.set_message(what());
+        self.0.set_position((share * LENGTH as f64) as u64);
     }
 }
 

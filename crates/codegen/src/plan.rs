@@ -4,7 +4,7 @@
 //! point, and for each point at each time. It alone decides which values are kept between the stages and in which
 //! order; the Rust module and the C header are two renderings of the same plan, so that their results agree.
 
-use mmsmith_expr::{Dependence, Expr, Function, Operation, Program, Rational, Slot, arrange};
+use mmsmith_expr::{Dependence, Expr, Function, Operation, Program, Rational, Slot, arrange, reuse};
 use mmsmith_spec::{DeriveError, Domain, Fields, Spec, Surface};
 use std::collections::BTreeMap;
 
@@ -13,6 +13,8 @@ pub struct Plan<'a> {
     pub(crate) spec: &'a Spec,
     program: Program,
     pub(crate) fields: Vec<Field>,
+    /// The body force, arranged for evaluation in stages.
+    staged: Vec<Slot>,
     pub(crate) constants: Constants,
     /// The strain energy, where the material is given by one.
     pub(crate) energy: Option<Slot>,
@@ -109,8 +111,9 @@ impl<'a> Plan<'a> {
     pub fn new(spec: &'a Spec) -> Result<Self, DeriveError> {
         let mut fields = spec.derive()?;
         let formulas = formulas(spec, &fields);
-        // Solvers sample the body force at the same points in every step; the other fields are for checks.
-        let b = arrange(&mut fields.graph, &fields.inputs, &fields.definitions, &fields.b);
+        // Solvers sample the body force at the same points in every step; a single call does all the work each time.
+        let single = reuse(&mut fields.graph, &fields.inputs, &fields.definitions, &fields.b);
+        let staged = arrange(&mut fields.graph, &fields.inputs, &fields.definitions, &fields.b);
         let matrix = |A: &Vec<Vec<Expr>>| A.concat();
         let parts = [
             ("displacement", "u", "displacement", Shape::Vector, fields.u.clone()),
@@ -132,10 +135,11 @@ impl<'a> Plan<'a> {
                 Shape::Matrix,
                 matrix(&fields.P),
             ),
-            ("body_force", "b", "body force per unit mass", Shape::Vector, b),
+            ("body_force", "b", "body force per unit mass", Shape::Vector, single),
         ];
         let constants = spec.constants();
         let mut outputs: Vec<Expr> = parts.iter().flat_map(|(.., part)| part.clone()).collect();
+        outputs.extend(&staged);
         outputs.extend(&constants);
         let energy = fields.W;
         outputs.extend(energy);
@@ -156,6 +160,7 @@ impl<'a> Plan<'a> {
                 outputs: take(part.len()),
             })
             .collect();
+        let staged = take(staged.len());
         let constants = Constants::new(spec, &take(constants.len()));
         let energy = energy.and_then(|_| take(1).first().copied());
         let requirements =
@@ -164,12 +169,12 @@ impl<'a> Plan<'a> {
 
         let fixed = fixed_slots(&program);
         let kept = numbered(Stage::Fixed, &fixed).collect();
-        let b: Vec<Slot> = body_force(&fields).to_vec();
-        let (time, point) = staged_slots(&program, &kept, &b);
+        let (time, point) = staged_slots(&program, &kept, &staged);
         Ok(Plan {
             spec,
             program,
             fields,
+            staged,
             constants,
             energy,
             tractions,
@@ -214,7 +219,7 @@ impl<'a> Plan<'a> {
     /// The body force from what all stages keep.
     pub(crate) fn body_force_staged(&self) -> Block<'_> {
         let stages = [Stage::Fixed, Stage::Time, Stage::Point];
-        self.block(&stages, body_force(&self.fields).to_vec())
+        self.block(&stages, self.staged.clone())
     }
 
     /// `outputs` from the coordinates, the time, and what the stage of the parameters keeps.
@@ -296,10 +301,6 @@ impl<'a> Block<'a> {
         self.steps().flat_map(|(_, step)| step.operands()).any(|slot| such(self.operand(slot)))
             || self.outputs().any(such)
     }
-}
-
-fn body_force(fields: &[Field]) -> &[Slot] {
-    fields.iter().find(|field| field.letter == "b").map_or(&[], |field| &field.outputs)
 }
 
 fn numbered(stage: Stage, slots: &[Slot]) -> impl Iterator<Item = (Slot, (Stage, usize))> {

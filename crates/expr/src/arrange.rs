@@ -123,7 +123,7 @@ impl Arranging<'_> {
         let arranged = match self.graph.node(expr).clone() {
             Node::Whole(inner) => {
                 let arranged = self.arrange(inner);
-                if arranged == inner { expr } else { self.opaque(arranged) }
+                if arranged == inner { expr } else { self.graph.opaque(arranged) }
             }
             Node::Product(factors) => self.arrange_product(expr, &factors, &Rational::one()),
             Node::Sum { constant, terms } if constant.is_zero() && terms.len() == 1 => {
@@ -172,7 +172,7 @@ impl Arranging<'_> {
         if outside == Graph::ONE {
             return inside;
         }
-        let (outside, inside) = (self.opaque(outside), self.opaque(inside));
+        let (outside, inside) = (self.graph.opaque(outside), self.graph.opaque(inside));
         let candidate = self.graph.mul(outside, inside);
         self.better(expr, Some(candidate))
     }
@@ -379,7 +379,7 @@ impl Arranging<'_> {
         }
         let Some((atom, _)) = most else {
             let coefficient = polynomial.values().next().copied().unwrap_or(Graph::ZERO);
-            return self.opaque(coefficient);
+            return self.graph.opaque(coefficient);
         };
         let (mut with, mut without) = (Polynomial::new(), Polynomial::new());
         for (monomial, &coefficient) in polynomial {
@@ -405,14 +405,6 @@ impl Arranging<'_> {
         self.graph.add(rest, product)
     }
 
-    /// `expr` in one piece, so that algebra takes no factor out of it and computes it in its own stage.
-    fn opaque(&mut self, expr: Expr) -> Expr {
-        match self.graph.node(expr) {
-            Node::Number(_) | Node::Whole(_) => expr,
-            _ => self.graph.intern(Node::Whole(expr)),
-        }
-    }
-
     /// The candidate where it costs less and is as accurate.
     fn better(&mut self, present: Expr, candidate: Option<Expr>) -> Expr {
         let Some(candidate) = candidate.filter(|&candidate| candidate != present) else {
@@ -431,7 +423,7 @@ impl Arranging<'_> {
 
 /// Whether the error bound of `after` is hardly larger than that of `before`: at more than half of some sample points
 /// by little, and nowhere by much. At every other point one input is tiny, as an amplitude may be.
-fn as_accurate(before: &Program, after: &Program, inputs: usize) -> bool {
+pub(crate) fn as_accurate(before: &Program, after: &Program, inputs: usize) -> bool {
     // A fixed sequence: multiples of the golden ratio, a different start for each input.
     let sample = |point: usize, input: usize| {
         let turns = GOLDEN_RATIO * point as f64 + PLASTIC_RATIO * input as f64;

@@ -95,6 +95,10 @@ impl Graph {
     ///
     /// Quantities kept in one piece are looked into. False where that is not so, or where it grows too large to tell.
     pub fn vanishes(&mut self, expr: Expr) -> bool {
+        // Most expressions differ from zero at any place, which is soon seen; to multiply them out takes long.
+        if self.differs_from_zero(expr) {
+            return false;
+        }
         let open = self.opened(expr, &mut BTreeMap::new());
         self.fraction(open).is_some_and(|fraction| {
             self.without_cosine_squares(fraction.numerator).is_some_and(|n| n.is_empty())

@@ -1,6 +1,6 @@
 //! The hash-consed graph: nodes, symbols, and questions about them.
 
-use crate::Rational;
+use crate::{Rational, nearest_f64};
 use num_traits::{One, Zero};
 use std::collections::{BTreeSet, HashMap};
 
@@ -11,6 +11,9 @@ pub(crate) const MOST_BITS: u64 = 1 << 14;
 
 /// The most operands that text may make sums and products handle, about a second's work.
 pub(crate) const MOST_WORK: usize = 1 << 20;
+
+/// A value this much larger than its rounding error may be, relative to the magnitude of its parts, is not zero.
+const CERTAIN: f64 = 1e-6;
 
 /// An expression: the handle of a node in a [`Graph`]. Equal handles of one graph mean equal expressions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -139,6 +142,8 @@ pub struct Graph {
     bits: u64,
     /// Operands that sums and products have been made of, time and again.
     pub(crate) work: usize,
+    /// The values of the first nodes at one place, each with the magnitude of what it was summed up from.
+    samples: Vec<(f64, f64)>,
 }
 
 impl Default for Graph {
@@ -164,6 +169,7 @@ impl Graph {
             size: 0,
             bits: 0,
             work: 0,
+            samples: Vec::new(),
         };
         graph.intern(Node::Number(Rational::zero()));
         graph.intern(Node::Number(Rational::one()));
@@ -271,9 +277,71 @@ impl Graph {
         }
     }
 
+    /// `expr` in one piece whatever it is but a number, so that algebra takes no factor out of it either.
+    pub(crate) fn opaque(&mut self, expr: Expr) -> Expr {
+        match self.node(expr) {
+            Node::Number(_) | Node::Whole(_) => expr,
+            _ => self.intern(Node::Whole(expr)),
+        }
+    }
+
     /// The expressions that the root refers to directly.
     pub fn children(&self, expr: Expr) -> impl Iterator<Item = Expr> + '_ {
         children(self.node(expr))
+    }
+
+    /// Whether the value at one fixed place, in double precision, is beyond any doubt not zero.
+    pub(crate) fn differs_from_zero(&mut self, expr: Expr) -> bool {
+        // Children have smaller handles than their parents.
+        while self.samples.len() <= expr.0 as usize {
+            let sample = self.sample(&self.nodes[self.samples.len()]);
+            self.samples.push(sample);
+        }
+        let (value, magnitude) = self.samples[expr.0 as usize];
+        value.is_finite() && magnitude.is_finite() && value.abs() > CERTAIN * magnitude
+    }
+
+    /// The value of a node, and a magnitude such that the rounding error is a small multiple of `2^-53` times it.
+    fn sample(&self, node: &Node) -> (f64, f64) {
+        let at = |e: Expr| self.samples[e.0 as usize];
+        let value_alone = |value: f64| (value, value.abs());
+        match node {
+            Node::Number(value) => value_alone(nearest_f64(value)),
+            Node::Pi => value_alone(std::f64::consts::PI),
+            Node::Symbol(index) => {
+                value_alone(0.3 + (0.618_033_988_749_894_9 * f64::from(*index + 1)).fract())
+            }
+            Node::Sum { constant, terms } => {
+                let constant = nearest_f64(constant);
+                terms.iter().fold((constant, constant.abs()), |(sum, size), (term, coefficient)| {
+                    let ((value, magnitude), c) = (at(*term), nearest_f64(coefficient));
+                    (sum + c * value, size + c.abs() * magnitude)
+                })
+            }
+            Node::Product(factors) => {
+                factors.iter().fold((1.0, 1.0), |(product, size), (base, exponent)| {
+                    let ((value, magnitude), exponent) = (at(*base), nearest_f64(exponent));
+                    let power = value.powf(exponent);
+                    // The relative error grows with the exponent.
+                    let growth = (1.0 + exponent.abs()) * magnitude / value.abs();
+                    (product * power, size * power.abs() * growth)
+                })
+            }
+            Node::Call(function, arguments) => {
+                let (value, magnitude) = at(arguments[0]);
+                let (result, slope) = match function {
+                    Function::Sin => (value.sin(), 1.0),
+                    Function::Cos => (value.cos(), 1.0),
+                    Function::Exp => (value.exp(), value.exp()),
+                    Function::Ln => (value.ln(), 1.0 / value.abs()),
+                    Function::Ln1p => (value.ln_1p(), 1.0 / (1.0 + value).abs()),
+                    // The others are rare; nothing is said of them here.
+                    _ => (f64::NAN, f64::NAN),
+                };
+                (result, result.abs() + slope * magnitude)
+            }
+            Node::Whole(inner) => at(*inner),
+        }
     }
 
     /// The variables in any of `roots`.

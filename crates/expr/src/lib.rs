@@ -41,6 +41,8 @@ mod parse;
 mod print;
 mod program;
 mod rational;
+mod reciprocal;
+mod reuse;
 
 pub use arrange::arrange;
 pub use build::BuildError;
@@ -50,3 +52,4 @@ pub use graph::{Expr, Function, Graph, Node};
 pub use parse::{Ast, AstKind, ParseError};
 pub use program::{Dependence, Operation, OperationCount, OperationsByStage, Program, Slot};
 pub use rational::{Rational, nearest_f64};
+pub use reuse::reuse;

@@ -15,6 +15,10 @@ use std::collections::HashMap;
 pub struct Slot(u32);
 
 impl Slot {
+    pub(crate) fn at(index: usize) -> Self {
+        Slot(index as u32)
+    }
+
     /// The index of the operation.
     #[must_use]
     pub fn index(self) -> usize {
@@ -72,6 +76,24 @@ impl Operation {
             | Operation::SinPi(a)
             | Operation::CosPi(a)
             | Operation::Call(_, a) => vec![a],
+        }
+    }
+
+    /// The same operation on the slots that `place` says.
+    pub(crate) fn with_operands(&self, place: impl Fn(Slot) -> Slot) -> Self {
+        match *self {
+            Operation::Number(_) | Operation::Pi | Operation::Input(_) => self.clone(),
+            Operation::Add(a, b) => Operation::Add(place(a), place(b)),
+            Operation::Sub(a, b) => Operation::Sub(place(a), place(b)),
+            Operation::Mul(a, b) => Operation::Mul(place(a), place(b)),
+            Operation::Div(a, b) => Operation::Div(place(a), place(b)),
+            Operation::Neg(a) => Operation::Neg(place(a)),
+            Operation::Sqrt(a) => Operation::Sqrt(place(a)),
+            Operation::Power(a, ref exponent) => Operation::Power(place(a), exponent.clone()),
+            Operation::SinPi(a) => Operation::SinPi(place(a)),
+            Operation::CosPi(a) => Operation::CosPi(place(a)),
+            Operation::Call(function, a) => Operation::Call(function, place(a)),
+            Operation::Atan2(a, b) => Operation::Atan2(place(a), place(b)),
         }
     }
 
@@ -182,6 +204,8 @@ pub struct Program {
     operations: Vec<Operation>,
     dependence: Vec<Dependence>,
     outputs: Vec<Slot>,
+    /// The numbers, rounded once; zero for all other operations.
+    numbers: Vec<f64>,
 }
 
 impl Program {
@@ -205,7 +229,37 @@ impl Program {
             definitions,
         };
         let outputs: Vec<Slot> = outputs.iter().map(|&output| lowering.lower(output)).collect();
-        Program { outputs, ..lowering.program }
+        Program { outputs, ..lowering.program }.with_shared_reciprocals()
+    }
+
+    /// A program of operations in order, with what each depends on.
+    pub(crate) fn from_parts(
+        operations: Vec<Operation>,
+        dependence: Vec<Dependence>,
+        outputs: Vec<Slot>,
+    ) -> Self {
+        Program { operations, dependence, outputs, numbers: Vec::new() }
+    }
+
+    /// The program without operations that no output needs.
+    pub(crate) fn compacted(&self) -> Self {
+        let needed = self.needed(&self.outputs);
+        let mut places: Vec<Slot> = Vec::with_capacity(self.operations.len());
+        let mut program = Program::default();
+        for (index, operation) in self.operations.iter().enumerate() {
+            places.push(Slot::at(program.operations.len()));
+            if needed[index] {
+                program.operations.push(operation.with_operands(|slot| places[slot.index()]));
+                program.dependence.push(self.dependence[index]);
+            }
+        }
+        program.outputs = self.outputs.iter().map(|slot| places[slot.index()]).collect();
+        let number = |operation: &Operation| match operation {
+            Operation::Number(value) => nearest_f64(value),
+            _ => 0.0,
+        };
+        program.numbers = program.operations.iter().map(number).collect();
+        program
     }
 
     /// The operations, each after those that it reads.
@@ -228,7 +282,7 @@ impl Program {
 
     /// The slots of all operations, in order.
     pub fn slots(&self) -> impl Iterator<Item = Slot> + use<> {
-        (0..self.operations.len()).map(|index| Slot(index as u32))
+        (0..self.operations.len()).map(Slot::at)
     }
 
     /// For each operation, whether `outputs` need it.
@@ -260,6 +314,12 @@ impl Program {
             stage.count(&self.operations[index]);
         }
         stages
+    }
+
+    /// A rough cost of one evaluation of the outputs at given parameters, in additions.
+    pub(crate) fn cost(&self) -> usize {
+        let stages = self.operations_by_stage(&self.outputs);
+        stages.time.cost() + stages.point.cost() + stages.both.cost()
     }
 
     /// Bounds, to first order, of the rounding errors of the outputs, in units of the rounding error of one operation.
@@ -313,8 +373,11 @@ impl Program {
     /// The value of every operation.
     fn values(&self, inputs: &[f64]) -> Vec<f64> {
         let mut values: Vec<f64> = Vec::with_capacity(self.operations.len());
-        for operation in &self.operations {
-            values.push(operation.value(inputs, |slot| values[slot.index()]));
+        for (operation, &number) in self.operations.iter().zip(&self.numbers) {
+            values.push(match operation {
+                Operation::Number(_) => number,
+                _ => operation.value(inputs, |slot| values[slot.index()]),
+            });
         }
         values
     }
@@ -368,6 +431,25 @@ struct Lowering<'a> {
     definitions: &'a [(Expr, Expr)],
 }
 
+/// A part of a sum.
+enum Part {
+    Term(Expr, Rational),
+    /// A factor and what it multiplies.
+    Product(Expr, Expr),
+}
+
+/// Terms of a sum with a common factor that depends on parameters only.
+struct Group {
+    /// Whether further terms of this factor belong to it.
+    open: bool,
+    factor: Expr,
+    rate: Dependence,
+    /// The sign of each term, and the term without the factor.
+    rests: Vec<(Rational, Expr)>,
+    /// The first of the terms.
+    term: (Expr, Rational),
+}
+
 impl Lowering<'_> {
     fn push(&mut self, operation: Operation) -> Slot {
         if let Some(&slot) = self.interned.get(&operation) {
@@ -383,7 +465,7 @@ impl Lowering<'_> {
                 .map(|&slot| self.program.dependence(slot))
                 .fold(Dependence::default(), Dependence::join),
         };
-        let slot = Slot(self.program.operations.len() as u32);
+        let slot = Slot::at(self.program.operations.len());
         self.program.operations.push(operation.clone());
         self.program.dependence.push(dependence);
         self.interned.insert(operation, slot);
@@ -482,9 +564,19 @@ impl Lowering<'_> {
 
     fn terms(&mut self, terms: &[(Expr, Rational)]) -> (bool, Slot) {
         let mut by_rate: Vec<(Dependence, (bool, Slot))> = Vec::new();
-        for (term, coefficient) in terms {
-            let slot = self.scaled(*term, &coefficient.abs());
-            by_rate.push((self.program.dependence(slot), (coefficient.is_negative(), slot)));
+        for part in self.with_common_factors(terms) {
+            let part = match part {
+                Part::Term(term, coefficient) => {
+                    let (turned, slot) = self.signed_term(term, &coefficient.abs());
+                    (coefficient.is_negative() != turned, slot)
+                }
+                Part::Product(factor, inner) => {
+                    let (negative, inner) = self.signed(inner);
+                    let factor = self.lower(factor);
+                    (negative, self.push(Operation::Mul(factor, inner)))
+                }
+            };
+            by_rate.push((self.program.dependence(part.1), part));
         }
         by_rate.sort_by_key(|(dependence, _)| *dependence);
         let mut groups = Vec::new();
@@ -492,6 +584,119 @@ impl Lowering<'_> {
             groups.push(self.add(group.iter().map(|(_, part)| *part).collect()));
         }
         self.add(groups)
+    }
+
+    /// The parts of a sum: a factor that some of the terms share is multiplied with their sum.
+    ///
+    /// First what depends on parameters only, coefficients included, where the rests are of one rate. Then, among what
+    /// is left, the factor that most terms have, again and again.
+    fn with_common_factors(&mut self, terms: &[(Expr, Rational)]) -> Vec<Part> {
+        let mut groups: Vec<Group> = Vec::new();
+        for (term, coefficient) in terms {
+            let (factor, rest, rate) = self.split_off_fixed(*term, &coefficient.abs());
+            let open = factor != Graph::ONE && rest != Graph::ONE;
+            let sign =
+                Rational::from_integer(if coefficient.is_negative() { -1 } else { 1 }.into());
+            let known = groups
+                .iter_mut()
+                .find(|group| open && group.open && group.factor == factor && group.rate == rate);
+            match known {
+                Some(group) => group.rests.push((sign, rest)),
+                None => groups.push(Group {
+                    open,
+                    factor,
+                    rate,
+                    rests: vec![(sign, rest)],
+                    term: (*term, coefficient.clone()),
+                }),
+            }
+        }
+        let mut parts = Vec::new();
+        let mut single = Vec::new();
+        for group in groups {
+            if group.rests.len() > 1 {
+                parts.push(Part::Product(group.factor, self.sum_of_whole(group.rests)));
+            } else {
+                single.push(group.term);
+            }
+        }
+        while let Some(factor) = self.most_common_factor(&single) {
+            let mut rests = Vec::new();
+            let mut others = Vec::new();
+            for (term, coefficient) in single {
+                if self.factors(term).contains(&factor) {
+                    let inverse = (factor.0, -factor.1.clone());
+                    let rest = self.graph.product([(term, Rational::one()), inverse]);
+                    rests.push((coefficient, rest));
+                } else {
+                    others.push((term, coefficient));
+                }
+            }
+            let inner = self.sum_of_whole(rests);
+            parts.push(Part::Product(self.graph.product([factor]), inner));
+            single = others;
+        }
+        parts.extend(single.into_iter().map(|(term, coefficient)| Part::Term(term, coefficient)));
+        parts
+    }
+
+    /// The sum in which each term that is a sum stays one quantity, as it may be used elsewhere.
+    fn sum_of_whole(&mut self, terms: Vec<(Rational, Expr)>) -> Expr {
+        let terms: Vec<_> =
+            terms.into_iter().map(|(c, term)| (c, self.graph.whole(term))).collect();
+        self.graph.sum(terms)
+    }
+
+    /// The factor that most of the terms have, of several the first; `None` where each stands in one term only.
+    fn most_common_factor(&mut self, terms: &[(Expr, Rational)]) -> Option<(Expr, Rational)> {
+        if terms.len() < 2 {
+            return None;
+        }
+        let mut counts: Vec<((Expr, Rational), usize)> = Vec::new();
+        for (term, _) in terms {
+            for factor in self.factors(*term) {
+                let slot = self.lower(factor.0);
+                if self.program.dependence(slot).is_fixed() {
+                    continue;
+                }
+                match counts.iter_mut().find(|(known, _)| *known == factor) {
+                    Some((_, count)) => *count += 1,
+                    None => counts.push((factor, 1)),
+                }
+            }
+        }
+        let most = counts.iter().map(|(_, count)| *count).max().filter(|&count| count > 1)?;
+        counts.into_iter().find(|(_, count)| *count == most).map(|(factor, _)| factor)
+    }
+
+    fn factors(&self, term: Expr) -> Vec<(Expr, Rational)> {
+        match self.graph.node(term) {
+            Node::Product(factors) => factors.to_vec(),
+            _ => vec![(term, Rational::one())],
+        }
+    }
+
+    /// `coefficient * term` as a sign and a value.
+    fn signed_term(&mut self, term: Expr, coefficient: &Rational) -> (bool, Slot) {
+        match *self.graph.node(term) {
+            Node::Whole(inner) if coefficient.is_one() => self.signed(inner),
+            _ => (false, self.scaled(term, coefficient)),
+        }
+    }
+
+    /// `coefficient * term` as a factor that depends on parameters only and a rest, with what the rest depends on.
+    fn split_off_fixed(&mut self, term: Expr, coefficient: &Rational) -> (Expr, Expr, Dependence) {
+        let factors = self.factors(term);
+        let mut fixed = vec![(self.graph.number(coefficient.clone()), Rational::one())];
+        let mut rest = Vec::new();
+        let mut rate = Dependence::default();
+        for (base, exponent) in factors {
+            let slot = self.lower(base);
+            let dependence = self.program.dependence(slot);
+            rate = rate.join(dependence);
+            if dependence.is_fixed() { &mut fixed } else { &mut rest }.push((base, exponent));
+        }
+        (self.graph.product(fixed), self.graph.product(rest), rate)
     }
 
     /// The sum of signed values; negative only where all of them are.

@@ -108,3 +108,69 @@ fn even_powers_of_a_defined_root_need_no_root() {
     assert_eq!((count.point.square_roots, count.point.multiplications), (0, 3));
     assert_eq!(program.evaluate(&[1.0, 2.0]), [25.0]);
 }
+
+/// Quotients of one denominator and of its powers cost one division in all, by `R = sqrt(x^2 + 1)` not even after the root.
+#[test]
+fn several_quotients_share_a_reciprocal() {
+    for (text, divisions, value) in [
+        (
+            "sin(x)/(1+x*t) + cos(x)/(1+x*t)^2 + x",
+            1,
+            (0.5_f64.sin() / 1.125) + 0.5_f64.cos() / (1.125 * 1.125) + 0.5,
+        ),
+        ("a*cos(t)/x^2 + sin(t)/x^4", 1, 0.75 * 0.25_f64.cos() / 0.25 + 0.25_f64.sin() / 0.0625),
+        (
+            "sin(t)/sqrt(x^2+1) + cos(t)/(x^2+1)",
+            1,
+            0.25_f64.sin() / 1.25_f64.sqrt() + 0.25_f64.cos() / 1.25,
+        ),
+        ("sin(t)/(x+1)", 1, 0.25_f64.sin() / 1.5),
+    ] {
+        let mut case = case(text);
+        let program = Program::lower(&mut case.graph, &case.inputs, &[], &[case.expr]);
+        let count = program.operations_by_stage(program.outputs());
+        let found = count.time.divisions + count.point.divisions + count.both.divisions;
+        assert_eq!(found, divisions, "{text}: {:?}", program.operations());
+        let result = program.evaluate(&[0.5, 0.25, 0.75])[0];
+        assert!((result - value).abs() <= 1e-15 * value.abs(), "{text}: {result}, not {value}");
+    }
+}
+
+/// A factor of some terms of a sum is multiplied once.
+#[test]
+fn terms_with_a_common_factor_are_gathered() {
+    let mut case = case("a*sin(x) + a*cos(x) + x*t*sin(t) + x*t*cos(x)");
+    let program = Program::lower(&mut case.graph, &case.inputs, &[], &[case.expr]);
+    let count = program.operations_by_stage(program.outputs());
+    let products =
+        count.point.multiplications + count.both.multiplications + count.time.multiplications;
+    assert_eq!(products, 3, "{:?}", program.operations());
+}
+
+/// `h^2/(1+h)/x` is formed from `h`, which is computed anyway.
+#[test]
+fn products_within_products_are_used() {
+    let mut case = case("a*sin(t)*x^3");
+    let h = case.expr;
+    let one_more = case.graph.add(Graph::ONE, h);
+    let x = case.inputs[0].0;
+    let square = case.graph.mul(h, h);
+    let over = case.graph.mul(one_more, x);
+    let quotient = case.graph.div(square, over);
+    let outputs = [quotient, one_more];
+    let reused = mmsmith_expr::reuse(&mut case.graph, &case.inputs, &[], &outputs);
+    assert_ne!(reused, outputs);
+    let total = |graph: &mut Graph, outputs: &[Expr]| {
+        let program = Program::lower(graph, &case.inputs, &[], outputs);
+        let count = program.operations_by_stage(program.outputs());
+        let total =
+            count.fixed.total() + count.time.total() + count.point.total() + count.both.total();
+        (total, program.evaluate(&[0.5, 0.25, 0.75]))
+    };
+    let (before, values) = total(&mut case.graph, &outputs);
+    let (after, same) = total(&mut case.graph, &reused);
+    assert!(after < before, "{after} operations, {before} before");
+    for (a, b) in values.iter().zip(&same) {
+        assert!((a - b).abs() <= 1e-15 * a.abs(), "{same:?}, not {values:?}");
+    }
+}

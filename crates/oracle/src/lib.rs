@@ -5,6 +5,8 @@
 //! - [`Sensitivity`] says how far a result moves when its inputs move: `sum over inputs q of |q dy/dq|`.
 //! - [`worst_factor`] is the factor `K` of the acceptance rule `|r - g| <= K 2^-53 (sens + |g|)` for a
 //!   double-precision result `r` of the exact value `g`.
+//! - [`Accuracy`] measures the largest such factor over many points of a specification, by field and by [`Class`] of
+//!   inputs.
 //!
 //! Inputs and results are exact rationals; every finite double is one ([`exact`]).
 //!
@@ -24,13 +26,17 @@
 //! ```
 
 mod acceptance;
+mod accuracy;
 mod convert;
 mod evaluate;
+mod sample;
 mod scientific;
 mod sensitivity;
 
 pub use acceptance::worst_factor;
+pub use accuracy::{Accuracy, AccuracyError, ClassAccuracy, Judged, LARGEST_FACTOR, Worst};
 pub use convert::exact;
 pub use evaluate::{Oracle, OracleError, Point};
+pub use sample::{Class, Sampler};
 pub use scientific::scientific;
 pub use sensitivity::Sensitivity;

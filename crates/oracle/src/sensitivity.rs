@@ -1,7 +1,7 @@
 //! How far results move when their inputs move.
 
 use crate::{Oracle, OracleError, Point};
-use mmsmith_expr::{Derivatives, Expr, Graph, Rational};
+use mmsmith_expr::{Dependence, Derivatives, Expr, Graph, Program, Rational};
 use num_traits::{Signed, Zero};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -77,5 +77,35 @@ impl Sensitivity {
                 parts.fold(Rational::zero(), |sum, part| sum + part.abs())
             })
             .collect())
+    }
+
+    /// The sum for expression number `index` alone.
+    ///
+    /// # Errors
+    ///
+    /// As [`Sensitivity::evaluate`].
+    pub fn evaluate_one(
+        &self,
+        oracle: &mut Oracle,
+        values: &[(Expr, Rational)],
+        index: usize,
+    ) -> Result<Rational, OracleError> {
+        let point = Point { graph: &self.graph, definitions: &[], values };
+        let Some(products) = self.products.get(index) else { return Ok(Rational::zero()) };
+        let parts = oracle.settle(&point, products, DIGITS)?;
+        Ok(parts.into_iter().fold(Rational::zero(), |sum, part| sum + part.abs()))
+    }
+
+    /// The program that computes the products `q dy/dq` of all expressions from `inputs`, in double precision, and how many
+    /// there are for each expression.
+    #[must_use]
+    pub(crate) fn in_doubles(&self, inputs: &[Expr]) -> (Program, Vec<usize>) {
+        let mut graph = self.graph.clone();
+        let pi = graph.symbol("Pi");
+        let number = graph.pi();
+        let inputs: Vec<(Expr, Dependence)> =
+            inputs.iter().map(|&input| (input, Dependence::default())).collect();
+        let program = Program::lower(&mut graph, &inputs, &[(pi, number)], &self.products.concat());
+        (program, self.products.iter().map(Vec::len).collect())
     }
 }

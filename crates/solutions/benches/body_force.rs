@@ -235,10 +235,11 @@ fn check() {
     ring.body_force_at(&X).evaluate(TIME, 0, &mut kept);
     for (X, kept) in X.iter().zip(&kept) {
         let single = ring.body_force(X, TIME);
-        assert_eq!(*kept, single, "at {X}");
-        for (way, other) in
-            [("listing", case.listing(X, TIME)), ("num-dual", case.automatic(X, TIME))]
-        {
+        for (way, other) in [
+            ("at kept points", *kept),
+            ("listing", case.listing(X, TIME)),
+            ("num-dual", case.automatic(X, TIME)),
+        ] {
             let difference = (other - single).norm() / single.norm();
             assert!(difference < 1e-12, "{way} at {X}: {difference:e}");
         }

@@ -115,50 +115,44 @@ impl Real for f32 {
 /// Sums and products only, the same on every processor.
 #[inline]
 fn sin_pi_shifted(x: f64, quarters: u64) -> f64 {
-    // x = n/2 + r with |r| <= 1/4; n and r are exact. Adding one and a half times 2^52, from where on doubles are whole
-    // numbers, rounds; the last two bits of the sum are those of n.
-    const SHIFT: f64 = 1.5 * 4_503_599_627_370_496.0;
-    let halves = 2.0 * x;
-    let (n, quadrant) = if halves.abs() < SHIFT / 3.0 {
-        let shifted = halves + SHIFT;
+    // x = n/2 + r with |r| <= 1/4; n and r are exact. Adding one and a half times 2^51, from where on doubles are
+    // multiples of 1/2, rounds; the last two bits of the sum are those of n.
+    const SHIFT: f64 = 1.5 * 2_251_799_813_685_248.0;
+    let (nearest, quadrant) = if x.abs() < SHIFT / 3.0 {
+        let shifted = x + SHIFT;
         (shifted - SHIFT, shifted.to_bits())
     } else {
-        // A whole number or not a number; both are rare.
-        let n = halves.round();
-        (n, n.rem_euclid(4.0) as u64)
+        // Very large or not a number; both are rare.
+        let n = (2.0 * x).round();
+        (0.5 * n, n.rem_euclid(4.0) as u64)
     };
-    let r = (x - n * 0.5) * std::f64::consts::PI;
+    let r = x - nearest;
     let quadrant = quadrant.wrapping_add(quarters);
     let value = if quadrant & 1 == 0 { sine(r) } else { cosine(r) };
     if quadrant & 2 == 0 { value } else { -value }
 }
 
-/// The sine for `|x| <= pi/4`, by the minimax polynomial of Sun's fdlibm.
+/// `sin(pi x)` for `|x| <= 1/4`: the minimax polynomial of Sun's fdlibm for the sine, with the powers of pi in its
+/// coefficients.
 #[inline]
 fn sine(x: f64) -> f64 {
     let z = x * x;
-    let tail = 8.333_333_333_322_49e-3
-        + z * (-1.984_126_982_985_795e-4 + z * 2.755_731_370_707_006_8e-6)
-        + z * (z * z) * (-2.505_076_025_340_686_3e-8 + z * 1.589_690_995_211_55e-10);
-    x + (z * x) * (-1.666_666_666_666_663_2e-1 + z * tail)
+    let square = z * z;
+    let low = -5.167_712_780_049_968_5 + z * 2.550_164_039_874_027;
+    let middle = -5.992_645_289_761_195e-1 + z * 8.214_587_016_569_905e-2;
+    let high = -7.370_034_319_852_937e-3 + z * 4.615_949_610_094_388e-4;
+    x * (std::f64::consts::PI + z * (low + square * (middle + square * high)))
 }
 
-/// The cosine for `|x| <= pi/4`, by the minimax polynomial of Sun's fdlibm.
+/// `cos(pi x)` for `|x| <= 1/4`, as the sine.
 #[inline]
 fn cosine(x: f64) -> f64 {
     let z = x * x;
     let square = z * z;
-    let tail = z
-        * (4.166_666_666_666_66e-2
-            + z * (-1.388_888_888_887_411e-3 + z * 2.480_158_728_947_673e-5))
-        + square
-            * square
-            * (-2.755_731_435_139_066_3e-7
-                + z * (2.087_572_321_298_175e-9 + z * -1.135_964_755_778_819_5e-11));
-    let half = 0.5 * z;
-    let leading = 1.0 - half;
-    // What the rounding of the leading part left out comes back with the tail.
-    leading + (((1.0 - leading) - half) + z * tail)
+    let low = 4.058_712_126_416_762 + z * -1.335_262_768_853_168_6;
+    let middle = 2.353_306_302_439_816_5e-1 + z * -2.580_688_682_692_376_7e-2;
+    let high = 1.929_478_760_777_114_4e-3 + z * -1.036_246_495_865_416_4e-4;
+    (1.0 - 4.934_802_200_544_679 * z) + square * (low + square * (middle + square * high))
 }
 
 #[cfg(test)]

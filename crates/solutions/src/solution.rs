@@ -139,3 +139,41 @@ pub enum AnySolution<T: Real> {
     /// Three dimensions.
     Three(Box<dyn Solution<T, 3>>),
 }
+
+impl AnySolution<f64> {
+    /// Every field at position `X` and time `t`, each by its own function, with its letter and its entries row by row;
+    /// last, as `b staged`, the body force by way of [`Solution::body_force_at`].
+    ///
+    /// `None` where `X` has not as many coordinates as the solution has dimensions.
+    #[must_use]
+    pub fn each_field(&self, X: &[f64], t: f64) -> Option<Vec<(&'static str, Vec<f64>)>> {
+        match self {
+            AnySolution::One(solution) => each_field(&**solution, X, t),
+            AnySolution::Two(solution) => each_field(&**solution, X, t),
+            AnySolution::Three(solution) => each_field(&**solution, X, t),
+        }
+    }
+}
+
+fn each_field<const D: usize>(
+    solution: &dyn Solution<f64, D>,
+    X: &[f64],
+    t: f64,
+) -> Option<Vec<(&'static str, Vec<f64>)>> {
+    let X = &SVector::from(<[f64; D]>::try_from(X).ok()?);
+    let vector = |v: SVector<f64, D>| v.iter().copied().collect();
+    let matrix = |A: SMatrix<f64, D, D>| A.transpose().iter().copied().collect();
+    let mut staged = [SVector::zeros()];
+    solution.body_force_at(&[*X]).evaluate(t, 0, &mut staged);
+    Some(vec![
+        ("u", vector(solution.displacement(X, t))),
+        ("v", vector(solution.velocity(X, t))),
+        ("a", vector(solution.acceleration(X, t))),
+        ("H", matrix(solution.displacement_gradient(X, t))),
+        ("F", matrix(solution.deformation_gradient(X, t))),
+        ("J", vec![solution.jacobian(X, t)]),
+        ("P", matrix(solution.first_piola_kirchhoff(X, t))),
+        ("b", vector(solution.body_force(X, t))),
+        ("b staged", vector(staged[0])),
+    ])
+}

@@ -20,6 +20,10 @@ use crate::table::{self, Table};
 use crate::terminal;
 
 pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
+    if options.thorough {
+        return super::thorough::thorough(options);
+    }
+    let points = options.points.unwrap_or(300);
     let output = Output::prepare_if(options.json.as_ref())?;
     let names: Vec<String> = if options.solutions.is_empty() {
         CATALOGUE.iter().map(|known| known.name.to_owned()).collect()
@@ -43,7 +47,7 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
     for (Subject { name, solutions, parameters, spec, .. }, listings) in
         subjects.iter().zip(&listings)
     {
-        let reports = solutions.iter().map(|solution| check_fields(solution, options.points));
+        let reports = solutions.iter().map(|solution| check_fields(solution, points));
         let report = CheckReport::worst_of(reports.collect::<Result<_, _>>()?);
         let claims = Claims::judge(spec, listings)?;
         let all_passed = report.passed() && claims.hold();
@@ -70,7 +74,7 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
             "settings": {
                 "version": env!("CARGO_PKG_VERSION"),
                 "solutions": names,
-                "points": options.points,
+                "points": points,
                 "own_error_factor": OWN_ERROR_FACTOR,
                 "tolerance": TOLERANCE,
                 "blunt": BLUNT,

@@ -146,8 +146,8 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
 enum {
     axis_aligned_dimension = 2,
     axis_aligned_parameter_count = 4,
-    axis_aligned_time_count = 5,
-    axis_aligned_point_count = 11
+    axis_aligned_time_count = 4,
+    axis_aligned_point_count = 10
 };
 
 typedef struct axis_aligned_parameters {
@@ -160,12 +160,12 @@ typedef struct axis_aligned_parameters {
 /* The parameters, and the values that depend on them only. */
 typedef struct axis_aligned_solution {
     axis_aligned_parameters par;
-    double fixed[12];
+    double fixed[13];
 } axis_aligned_solution;
 
 /* What the body force needs of the time alone. */
 typedef struct axis_aligned_time_values {
-    double values[5];
+    double values[4];
 } axis_aligned_time_values;
 
 typedef struct axis_aligned_field_values {
@@ -217,48 +217,50 @@ MMSMITH_FN const char *axis_aligned_prepare(axis_aligned_solution *s, const axis
     const double t47 = p->nu + 1.0;
     const double t49 = 2.0 * p->nu;
     const double t50 = 1.0 - t49;
+    const double t58 = 0.5 * p->E;
+    const double t59 = t58 / t47;
     const double t61 = p->E * p->nu;
     const double t62 = t47 * t50;
     const double t63 = t61 / t62;
-    const double t66 = 0.5 * p->E;
-    const double t67 = t66 / t47;
-    const double t69 = t18 * t67;
-    const double t81 = p->nu * p->nu;
-    const double t82 = 2.0 * p->A;
-    const double t83 = t82 * t25;
-    const double t84 = t83 * p->E;
-    const double t85 = t84 * t81;
-    const double t86 = p->rho0 * t47;
-    const double t87 = t86 * t50;
-    const double t88 = t85 / t87;
-    const double t91 = p->A * p->A;
-    const double t92 = t91 * p->A;
-    const double t93 = t25 * t25;
-    const double t95 = t63 + t67;
-    const double t96 = t92 * t93;
-    const double t97 = t96 * t95;
-    const double t98 = t97 / p->rho0;
-    const double t103 = t25 * 3.141592653589793;
-    const double t104 = 2.0 * t91;
-    const double t105 = t104 * t103;
-    const double t106 = t105 * t95;
-    const double t107 = t106 / p->rho0;
-    const double t113 = t27 * p->nu;
-    const double t114 = t113 / t87;
-    const double t141 = 2.0 / t7;
+    const double t65 = t18 * t59;
+    const double t79 = p->nu * p->nu;
+    const double t80 = 2.0 * p->A;
+    const double t81 = t80 * t25;
+    const double t82 = t81 * p->E;
+    const double t83 = t82 * t79;
+    const double t84 = p->rho0 * t47;
+    const double t85 = t84 * t50;
+    const double t86 = t83 / t85;
+    const double t110 = t26 / p->rho0;
+    const double t138 = t63 + t59;
+    const double t139 = p->A * p->A;
+    const double t140 = t139 * p->A;
+    const double t141 = t25 * t25;
+    const double t143 = t140 * t141;
+    const double t144 = t143 * t138;
+    const double t145 = t144 / p->rho0;
+    const double t149 = t25 * 3.141592653589793;
+    const double t150 = 2.0 * t139;
+    const double t151 = t150 * t149;
+    const double t152 = t151 * t138;
+    const double t153 = t152 / p->rho0;
+    const double t158 = t27 * p->nu;
+    const double t159 = t158 / t85;
+    const double t187 = 2.0 / t7;
     s->par = *p;
     s->fixed[0] = t7;
     s->fixed[1] = t18;
     s->fixed[2] = t19;
     s->fixed[3] = t28;
-    s->fixed[4] = t63;
-    s->fixed[5] = t67;
-    s->fixed[6] = t69;
-    s->fixed[7] = t88;
-    s->fixed[8] = t98;
-    s->fixed[9] = t107;
-    s->fixed[10] = t114;
-    s->fixed[11] = t141;
+    s->fixed[4] = t59;
+    s->fixed[5] = t63;
+    s->fixed[6] = t65;
+    s->fixed[7] = t86;
+    s->fixed[8] = t110;
+    s->fixed[9] = t145;
+    s->fixed[10] = t153;
+    s->fixed[11] = t159;
+    s->fixed[12] = t187;
     return 0;
 }
 
@@ -383,33 +385,31 @@ MMSMITH_FN void axis_aligned_P(const axis_aligned_solution *s, const double X[2]
     const double t41 = t40 * t39;
     const double t43 = t37 + 1.0;
     const double t44 = t41 + 1.0;
-    const double t51 = t9 * t35;
-    const double t52 = t14 * t39;
-    const double t53 = t9 * t14;
-    const double t54 = s->fixed[1] * t53;
-    const double t55 = t35 * t39;
-    const double t56 = t54 * t55;
-    const double t57 = t51 + t52;
-    const double t58 = t57 + t56;
-    const double t59 = s->fixed[1] * t58;
-    const double t60 = log1p(t59);
-    const double t64 = s->fixed[4] * t60;
-    const double t68 = t37 + 2.0;
-    const double t70 = s->fixed[6] * t9;
-    const double t71 = t70 * t35;
-    const double t72 = t71 * t68;
-    const double t73 = t64 + t72;
-    const double t74 = t73 / t43;
-    const double t75 = t41 + 2.0;
-    const double t76 = s->fixed[6] * t14;
-    const double t77 = t76 * t39;
-    const double t78 = t77 * t75;
-    const double t79 = t64 + t78;
-    const double t80 = t79 / t44;
-    P[0] = t74;
+    const double t51 = t35 * t44;
+    const double t52 = t9 * t51;
+    const double t53 = t14 * t39;
+    const double t54 = t52 + t53;
+    const double t55 = s->fixed[1] * t54;
+    const double t56 = log1p(t55);
+    const double t60 = t37 + 2.0;
+    const double t64 = s->fixed[5] * t56;
+    const double t66 = s->fixed[6] * t9;
+    const double t67 = t66 * t35;
+    const double t68 = t67 * t60;
+    const double t69 = t64 + t68;
+    const double t70 = 1.0 / t43;
+    const double t71 = t69 * t70;
+    const double t72 = t41 + 2.0;
+    const double t73 = s->fixed[6] * t14;
+    const double t74 = t73 * t39;
+    const double t75 = t74 * t72;
+    const double t76 = t64 + t75;
+    const double t77 = 1.0 / t44;
+    const double t78 = t76 * t77;
+    P[0] = t71;
     P[1] = 0.0;
     P[2] = 0.0;
-    P[3] = t80;
+    P[3] = t78;
 }
 
 /* body force per unit mass */
@@ -421,63 +421,59 @@ MMSMITH_FN void axis_aligned_b(const axis_aligned_solution *s, const double X[2]
     const double t13 = mmsmith_sin_pi(X[1]);
     const double t14 = mmsmith_sin_pi(t8);
     const double t35 = mmsmith_cos_pi(X[0]);
-    const double t36 = s->fixed[1] * t9;
-    const double t37 = t36 * t35;
     const double t39 = mmsmith_cos_pi(X[1]);
-    const double t40 = s->fixed[1] * t14;
-    const double t41 = t40 * t39;
-    const double t43 = t37 + 1.0;
-    const double t44 = t41 + 1.0;
-    const double t51 = t9 * t35;
-    const double t52 = t14 * t39;
-    const double t53 = t9 * t14;
-    const double t54 = s->fixed[1] * t53;
-    const double t55 = t35 * t39;
-    const double t56 = t54 * t55;
-    const double t57 = t51 + t52;
-    const double t58 = t57 + t56;
-    const double t59 = s->fixed[1] * t58;
-    const double t60 = log1p(t59);
-    const double t89 = s->fixed[7] * t2;
-    const double t90 = t43 * t43;
-    const double t94 = t35 * t35;
-    const double t99 = t2 * t94;
-    const double t100 = s->fixed[8] * t99;
-    const double t101 = -t100;
-    const double t102 = t9 * t101;
-    const double t108 = t2 * t35;
-    const double t109 = s->fixed[9] * t108;
-    const double t110 = -t109;
-    const double t111 = t110 + t102;
-    const double t112 = t9 * t111;
-    const double t115 = s->fixed[10] * t2;
-    const double t116 = -t115;
-    const double t117 = t116 * t60;
-    const double t118 = t112 + t117;
-    const double t119 = t118 / t90;
-    const double t120 = t89 + t119;
-    const double t121 = t9 * t120;
-    const double t122 = s->fixed[7] * t13;
-    const double t123 = t44 * t44;
-    const double t124 = t39 * t39;
-    const double t125 = t13 * t124;
-    const double t126 = s->fixed[8] * t125;
-    const double t127 = -t126;
-    const double t128 = t14 * t127;
-    const double t129 = t13 * t39;
-    const double t130 = s->fixed[9] * t129;
-    const double t131 = -t130;
-    const double t132 = t131 + t128;
-    const double t133 = t14 * t132;
-    const double t134 = s->fixed[10] * t13;
-    const double t135 = -t134;
-    const double t136 = t135 * t60;
-    const double t137 = t133 + t136;
-    const double t138 = t137 / t123;
-    const double t139 = t122 + t138;
-    const double t140 = t14 * t139;
-    b[0] = t121;
-    b[1] = t140;
+    const double t53 = t14 * t39;
+    const double t87 = s->fixed[7] * t9;
+    const double t88 = t87 * t2;
+    const double t89 = t9 * t35;
+    const double t90 = s->fixed[1] * t89;
+    const double t91 = t90 + 1.0;
+    const double t92 = t39 * t91;
+    const double t93 = t14 * t92;
+    const double t94 = t93 + t89;
+    const double t95 = s->fixed[1] * t94;
+    const double t96 = log1p(t95);
+    const double t97 = s->fixed[5] * t96;
+    const double t98 = s->fixed[4] * t90;
+    const double t99 = t97 + t98;
+    const double t100 = 1.0 / t91;
+    const double t101 = s->fixed[5] * t100;
+    const double t102 = s->fixed[4] + t101;
+    const double t103 = t90 + t96;
+    const double t104 = s->fixed[5] * t103;
+    const double t105 = t99 * t100;
+    const double t106 = t102 - t105;
+    const double t107 = s->fixed[4] + t106;
+    const double t108 = t90 * t107;
+    const double t109 = t104 + t108;
+    const double t111 = s->fixed[8] * t9;
+    const double t112 = t111 * t2;
+    const double t113 = t109 * t100;
+    const double t114 = t112 * t113;
+    const double t115 = t88 - t114;
+    const double t116 = s->fixed[7] * t14;
+    const double t117 = t116 * t13;
+    const double t118 = s->fixed[1] * t53;
+    const double t119 = t118 + 1.0;
+    const double t120 = s->fixed[4] * t118;
+    const double t121 = t97 + t120;
+    const double t122 = 1.0 / t119;
+    const double t123 = s->fixed[5] * t122;
+    const double t124 = s->fixed[4] + t123;
+    const double t125 = t96 + t118;
+    const double t126 = s->fixed[5] * t125;
+    const double t127 = t121 * t122;
+    const double t128 = t124 - t127;
+    const double t129 = s->fixed[4] + t128;
+    const double t130 = t118 * t129;
+    const double t131 = t126 + t130;
+    const double t132 = s->fixed[8] * t14;
+    const double t133 = t132 * t13;
+    const double t134 = t131 * t122;
+    const double t135 = t133 * t134;
+    const double t136 = t117 - t135;
+    b[0] = t115;
+    b[1] = t136;
 }
 
 /* traction on the surface X-lower, force per reference area */
@@ -489,24 +485,24 @@ MMSMITH_FN void axis_aligned_X_lower_traction(const axis_aligned_solution *s, co
     const double t14 = mmsmith_sin_pi(t8);
     const double t36 = s->fixed[1] * t9;
     const double t39 = mmsmith_cos_pi(X[1]);
-    const double t52 = t14 * t39;
-    const double t53 = t9 * t14;
-    const double t54 = s->fixed[1] * t53;
-    const double t142 = t36 + 1.0;
-    const double t143 = t54 * t39;
-    const double t144 = t52 + t143;
-    const double t145 = t9 + t144;
-    const double t146 = s->fixed[1] * t145;
-    const double t147 = log1p(t146);
-    const double t148 = s->fixed[4] * t147;
-    const double t149 = t36 + 2.0;
-    const double t150 = t9 * t149;
-    const double t151 = s->fixed[6] * t150;
-    const double t152 = t151 + t148;
-    const double t153 = 1.0 / t142;
-    const double t154 = t153 * t152;
-    const double t155 = -t154;
-    traction[0] = t155;
+    const double t40 = s->fixed[1] * t14;
+    const double t41 = t40 * t39;
+    const double t44 = t41 + 1.0;
+    const double t53 = t14 * t39;
+    const double t188 = t36 + 1.0;
+    const double t189 = t9 * t44;
+    const double t190 = t189 + t53;
+    const double t191 = s->fixed[1] * t190;
+    const double t192 = log1p(t191);
+    const double t193 = t36 + 2.0;
+    const double t194 = s->fixed[5] * t192;
+    const double t195 = t9 * t193;
+    const double t196 = s->fixed[6] * t195;
+    const double t197 = t196 + t194;
+    const double t198 = 1.0 / t188;
+    const double t199 = t198 * t197;
+    const double t200 = -t199;
+    traction[0] = t200;
     traction[1] = 0.0;
 }
 
@@ -519,24 +515,24 @@ MMSMITH_FN void axis_aligned_X_upper_traction(const axis_aligned_solution *s, co
     const double t14 = mmsmith_sin_pi(t8);
     const double t36 = s->fixed[1] * t9;
     const double t39 = mmsmith_cos_pi(X[1]);
-    const double t52 = t14 * t39;
-    const double t53 = t9 * t14;
-    const double t54 = s->fixed[1] * t53;
-    const double t143 = t54 * t39;
-    const double t156 = 1.0 - t36;
-    const double t157 = t143 - t52;
-    const double t158 = t9 + t157;
-    const double t159 = s->fixed[1] * t158;
-    const double t160 = -t159;
-    const double t161 = log1p(t160);
-    const double t162 = s->fixed[4] * t161;
-    const double t163 = 2.0 - t36;
-    const double t164 = t9 * t163;
-    const double t165 = s->fixed[6] * t164;
-    const double t166 = t162 - t165;
-    const double t167 = 1.0 / t156;
-    const double t168 = t167 * t166;
-    traction[0] = t168;
+    const double t40 = s->fixed[1] * t14;
+    const double t41 = t40 * t39;
+    const double t44 = t41 + 1.0;
+    const double t53 = t14 * t39;
+    const double t189 = t9 * t44;
+    const double t201 = 1.0 - t36;
+    const double t202 = t189 - t53;
+    const double t203 = s->fixed[1] * t202;
+    const double t204 = -t203;
+    const double t205 = log1p(t204);
+    const double t206 = 2.0 - t36;
+    const double t207 = s->fixed[5] * t205;
+    const double t208 = t9 * t206;
+    const double t209 = s->fixed[6] * t208;
+    const double t210 = t207 - t209;
+    const double t211 = 1.0 / t201;
+    const double t212 = t211 * t210;
+    traction[0] = t212;
     traction[1] = 0.0;
 }
 
@@ -548,26 +544,26 @@ MMSMITH_FN void axis_aligned_Y_lower_traction(const axis_aligned_solution *s, co
     const double t9 = mmsmith_cos_pi(t8);
     const double t14 = mmsmith_sin_pi(t8);
     const double t35 = mmsmith_cos_pi(X[0]);
+    const double t36 = s->fixed[1] * t9;
+    const double t37 = t36 * t35;
     const double t40 = s->fixed[1] * t14;
-    const double t51 = t9 * t35;
-    const double t53 = t9 * t14;
-    const double t54 = s->fixed[1] * t53;
-    const double t169 = t40 + 1.0;
-    const double t170 = t54 * t35;
-    const double t171 = t51 + t170;
-    const double t172 = t14 + t171;
-    const double t173 = s->fixed[1] * t172;
-    const double t174 = log1p(t173);
-    const double t175 = s->fixed[4] * t174;
-    const double t176 = t40 + 2.0;
-    const double t177 = t14 * t176;
-    const double t178 = s->fixed[6] * t177;
-    const double t179 = t178 + t175;
-    const double t180 = 1.0 / t169;
-    const double t181 = t180 * t179;
-    const double t182 = -t181;
+    const double t43 = t37 + 1.0;
+    const double t89 = t9 * t35;
+    const double t213 = t40 + 1.0;
+    const double t214 = t14 * t43;
+    const double t215 = t214 + t89;
+    const double t216 = s->fixed[1] * t215;
+    const double t217 = log1p(t216);
+    const double t218 = t40 + 2.0;
+    const double t219 = s->fixed[5] * t217;
+    const double t220 = t14 * t218;
+    const double t221 = s->fixed[6] * t220;
+    const double t222 = t221 + t219;
+    const double t223 = 1.0 / t213;
+    const double t224 = t223 * t222;
+    const double t225 = -t224;
     traction[0] = 0.0;
-    traction[1] = t182;
+    traction[1] = t225;
 }
 
 /* traction on the surface Y-upper, force per reference area */
@@ -578,26 +574,26 @@ MMSMITH_FN void axis_aligned_Y_upper_traction(const axis_aligned_solution *s, co
     const double t9 = mmsmith_cos_pi(t8);
     const double t14 = mmsmith_sin_pi(t8);
     const double t35 = mmsmith_cos_pi(X[0]);
+    const double t36 = s->fixed[1] * t9;
+    const double t37 = t36 * t35;
     const double t40 = s->fixed[1] * t14;
-    const double t51 = t9 * t35;
-    const double t53 = t9 * t14;
-    const double t54 = s->fixed[1] * t53;
-    const double t170 = t54 * t35;
-    const double t183 = 1.0 - t40;
-    const double t184 = t170 - t51;
-    const double t185 = t14 + t184;
-    const double t186 = s->fixed[1] * t185;
-    const double t187 = -t186;
-    const double t188 = log1p(t187);
-    const double t189 = s->fixed[4] * t188;
-    const double t190 = 2.0 - t40;
-    const double t191 = t14 * t190;
-    const double t192 = s->fixed[6] * t191;
-    const double t193 = t189 - t192;
-    const double t194 = 1.0 / t183;
-    const double t195 = t194 * t193;
+    const double t43 = t37 + 1.0;
+    const double t89 = t9 * t35;
+    const double t214 = t14 * t43;
+    const double t226 = 1.0 - t40;
+    const double t227 = t214 - t89;
+    const double t228 = s->fixed[1] * t227;
+    const double t229 = -t228;
+    const double t230 = log1p(t229);
+    const double t231 = 2.0 - t40;
+    const double t232 = s->fixed[5] * t230;
+    const double t233 = t14 * t231;
+    const double t234 = s->fixed[6] * t233;
+    const double t235 = t232 - t234;
+    const double t236 = 1.0 / t226;
+    const double t237 = t236 * t235;
     traction[0] = 0.0;
-    traction[1] = t195;
+    traction[1] = t237;
 }
 
 /* all fields */
@@ -632,67 +628,76 @@ MMSMITH_FN void axis_aligned_fields(const axis_aligned_solution *s, const double
     const double t43 = t37 + 1.0;
     const double t44 = t41 + 1.0;
     const double t45 = t43 * t44;
-    const double t51 = t9 * t35;
-    const double t52 = t14 * t39;
-    const double t53 = t9 * t14;
-    const double t54 = s->fixed[1] * t53;
-    const double t55 = t35 * t39;
-    const double t56 = t54 * t55;
-    const double t57 = t51 + t52;
-    const double t58 = t57 + t56;
-    const double t59 = s->fixed[1] * t58;
-    const double t60 = log1p(t59);
-    const double t64 = s->fixed[4] * t60;
-    const double t68 = t37 + 2.0;
-    const double t70 = s->fixed[6] * t9;
-    const double t71 = t70 * t35;
-    const double t72 = t71 * t68;
-    const double t73 = t64 + t72;
-    const double t74 = t73 / t43;
-    const double t75 = t41 + 2.0;
-    const double t76 = s->fixed[6] * t14;
-    const double t77 = t76 * t39;
-    const double t78 = t77 * t75;
-    const double t79 = t64 + t78;
-    const double t80 = t79 / t44;
-    const double t89 = s->fixed[7] * t2;
-    const double t90 = t43 * t43;
-    const double t94 = t35 * t35;
-    const double t99 = t2 * t94;
-    const double t100 = s->fixed[8] * t99;
-    const double t101 = -t100;
-    const double t102 = t9 * t101;
-    const double t108 = t2 * t35;
-    const double t109 = s->fixed[9] * t108;
-    const double t110 = -t109;
-    const double t111 = t110 + t102;
-    const double t112 = t9 * t111;
-    const double t115 = s->fixed[10] * t2;
-    const double t116 = -t115;
-    const double t117 = t116 * t60;
-    const double t118 = t112 + t117;
-    const double t119 = t118 / t90;
-    const double t120 = t89 + t119;
-    const double t121 = t9 * t120;
-    const double t122 = s->fixed[7] * t13;
-    const double t123 = t44 * t44;
-    const double t124 = t39 * t39;
-    const double t125 = t13 * t124;
-    const double t126 = s->fixed[8] * t125;
-    const double t127 = -t126;
-    const double t128 = t14 * t127;
-    const double t129 = t13 * t39;
-    const double t130 = s->fixed[9] * t129;
-    const double t131 = -t130;
-    const double t132 = t131 + t128;
-    const double t133 = t14 * t132;
-    const double t134 = s->fixed[10] * t13;
-    const double t135 = -t134;
-    const double t136 = t135 * t60;
-    const double t137 = t133 + t136;
-    const double t138 = t137 / t123;
-    const double t139 = t122 + t138;
-    const double t140 = t14 * t139;
+    const double t51 = t35 * t44;
+    const double t52 = t9 * t51;
+    const double t53 = t14 * t39;
+    const double t54 = t52 + t53;
+    const double t55 = s->fixed[1] * t54;
+    const double t56 = log1p(t55);
+    const double t60 = t37 + 2.0;
+    const double t64 = s->fixed[5] * t56;
+    const double t66 = s->fixed[6] * t9;
+    const double t67 = t66 * t35;
+    const double t68 = t67 * t60;
+    const double t69 = t64 + t68;
+    const double t70 = 1.0 / t43;
+    const double t71 = t69 * t70;
+    const double t72 = t41 + 2.0;
+    const double t73 = s->fixed[6] * t14;
+    const double t74 = t73 * t39;
+    const double t75 = t74 * t72;
+    const double t76 = t64 + t75;
+    const double t77 = 1.0 / t44;
+    const double t78 = t76 * t77;
+    const double t87 = s->fixed[7] * t9;
+    const double t88 = t87 * t2;
+    const double t89 = t9 * t35;
+    const double t90 = s->fixed[1] * t89;
+    const double t91 = t90 + 1.0;
+    const double t92 = t39 * t91;
+    const double t93 = t14 * t92;
+    const double t94 = t93 + t89;
+    const double t95 = s->fixed[1] * t94;
+    const double t96 = log1p(t95);
+    const double t97 = s->fixed[5] * t96;
+    const double t98 = s->fixed[4] * t90;
+    const double t99 = t97 + t98;
+    const double t100 = 1.0 / t91;
+    const double t101 = s->fixed[5] * t100;
+    const double t102 = s->fixed[4] + t101;
+    const double t103 = t90 + t96;
+    const double t104 = s->fixed[5] * t103;
+    const double t105 = t99 * t100;
+    const double t106 = t102 - t105;
+    const double t107 = s->fixed[4] + t106;
+    const double t108 = t90 * t107;
+    const double t109 = t104 + t108;
+    const double t111 = s->fixed[8] * t9;
+    const double t112 = t111 * t2;
+    const double t113 = t109 * t100;
+    const double t114 = t112 * t113;
+    const double t115 = t88 - t114;
+    const double t116 = s->fixed[7] * t14;
+    const double t117 = t116 * t13;
+    const double t118 = s->fixed[1] * t53;
+    const double t119 = t118 + 1.0;
+    const double t120 = s->fixed[4] * t118;
+    const double t121 = t97 + t120;
+    const double t122 = 1.0 / t119;
+    const double t123 = s->fixed[5] * t122;
+    const double t124 = s->fixed[4] + t123;
+    const double t125 = t96 + t118;
+    const double t126 = s->fixed[5] * t125;
+    const double t127 = t121 * t122;
+    const double t128 = t124 - t127;
+    const double t129 = s->fixed[4] + t128;
+    const double t130 = t118 * t129;
+    const double t131 = t126 + t130;
+    const double t132 = s->fixed[8] * t14;
+    const double t133 = t132 * t13;
+    const double t134 = t131 * t122;
+    const double t135 = t133 * t134;
+    const double t136 = t117 - t135;
     out->u[0] = t11;
     out->u[1] = t16;
     out->v[0] = t22;
@@ -708,12 +713,12 @@ MMSMITH_FN void axis_aligned_fields(const axis_aligned_solution *s, const double
     out->F[2] = 0.0;
     out->F[3] = t44;
     out->J = t45;
-    out->P[0] = t74;
+    out->P[0] = t71;
     out->P[1] = 0.0;
     out->P[2] = 0.0;
-    out->P[3] = t80;
-    out->b[0] = t121;
-    out->b[1] = t140;
+    out->P[3] = t78;
+    out->b[0] = t115;
+    out->b[1] = t136;
 }
 
 /* What the body force needs of the time alone. */
@@ -725,55 +730,48 @@ MMSMITH_FN axis_aligned_time_values axis_aligned_at_time(const axis_aligned_solu
     const double t14 = mmsmith_sin_pi(t8);
     const double t36 = s->fixed[1] * t9;
     const double t40 = s->fixed[1] * t14;
-    const double t53 = t9 * t14;
-    const double t54 = s->fixed[1] * t53;
     time.values[0] = t9;
     time.values[1] = t14;
     time.values[2] = t36;
     time.values[3] = t40;
-    time.values[4] = t54;
     return time;
 }
 
-/* What the body force needs of the position alone, 11 values. */
-MMSMITH_FN void axis_aligned_at_point(const axis_aligned_solution *s, const double X[2], double point[11])
+/* What the body force needs of the position alone, 10 values. */
+MMSMITH_FN void axis_aligned_at_point(const axis_aligned_solution *s, const double X[2], double point[10])
 {
     const double t2 = mmsmith_sin_pi(X[0]);
     const double t13 = mmsmith_sin_pi(X[1]);
     const double t35 = mmsmith_cos_pi(X[0]);
     const double t39 = mmsmith_cos_pi(X[1]);
-    const double t55 = t35 * t39;
-    const double t89 = s->fixed[7] * t2;
-    const double t94 = t35 * t35;
-    const double t99 = t2 * t94;
-    const double t100 = s->fixed[8] * t99;
-    const double t101 = -t100;
-    const double t108 = t2 * t35;
-    const double t109 = s->fixed[9] * t108;
-    const double t110 = -t109;
-    const double t115 = s->fixed[10] * t2;
-    const double t116 = -t115;
-    const double t122 = s->fixed[7] * t13;
-    const double t124 = t39 * t39;
-    const double t125 = t13 * t124;
-    const double t126 = s->fixed[8] * t125;
-    const double t127 = -t126;
-    const double t129 = t13 * t39;
-    const double t130 = s->fixed[9] * t129;
-    const double t131 = -t130;
-    const double t134 = s->fixed[10] * t13;
-    const double t135 = -t134;
+    const double t137 = s->fixed[7] * t2;
+    const double t142 = t35 * t35;
+    const double t146 = t2 * t142;
+    const double t147 = s->fixed[9] * t146;
+    const double t148 = -t147;
+    const double t154 = t2 * t35;
+    const double t155 = s->fixed[10] * t154;
+    const double t160 = s->fixed[11] * t2;
+    const double t161 = -t160;
+    const double t169 = s->fixed[7] * t13;
+    const double t170 = t39 * t39;
+    const double t171 = t13 * t170;
+    const double t172 = s->fixed[9] * t171;
+    const double t173 = -t172;
+    const double t174 = t13 * t39;
+    const double t175 = s->fixed[10] * t174;
+    const double t178 = s->fixed[11] * t13;
+    const double t179 = -t178;
     point[0] = t35;
     point[1] = t39;
-    point[2] = t55;
-    point[3] = t89;
-    point[4] = t101;
-    point[5] = t110;
-    point[6] = t116;
-    point[7] = t122;
-    point[8] = t127;
-    point[9] = t131;
-    point[10] = t135;
+    point[2] = t137;
+    point[3] = t148;
+    point[4] = t155;
+    point[5] = t161;
+    point[6] = t169;
+    point[7] = t173;
+    point[8] = t175;
+    point[9] = t179;
 }
 
 /* The body force from the values of one time and of one point. Value m of the point is point[m*stride]:
@@ -786,33 +784,34 @@ MMSMITH_FN void axis_aligned_b_staged(const axis_aligned_solution *s, const axis
     const double t41 = time->values[3] * point[stride];
     const double t43 = t37 + 1.0;
     const double t44 = t41 + 1.0;
-    const double t51 = time->values[0] * point[0];
-    const double t52 = time->values[1] * point[stride];
-    const double t56 = time->values[4] * point[2 * stride];
-    const double t57 = t51 + t52;
-    const double t58 = t57 + t56;
-    const double t59 = s->fixed[1] * t58;
-    const double t60 = log1p(t59);
-    const double t90 = t43 * t43;
-    const double t102 = time->values[0] * point[4 * stride];
-    const double t111 = point[5 * stride] + t102;
-    const double t112 = time->values[0] * t111;
-    const double t117 = point[6 * stride] * t60;
-    const double t118 = t112 + t117;
-    const double t119 = t118 / t90;
-    const double t120 = point[3 * stride] + t119;
-    const double t121 = time->values[0] * t120;
-    const double t123 = t44 * t44;
-    const double t128 = time->values[1] * point[8 * stride];
-    const double t132 = point[9 * stride] + t128;
-    const double t133 = time->values[1] * t132;
-    const double t136 = point[10 * stride] * t60;
-    const double t137 = t133 + t136;
-    const double t138 = t137 / t123;
-    const double t139 = point[7 * stride] + t138;
-    const double t140 = time->values[1] * t139;
-    b[0] = t121;
-    b[1] = t140;
+    const double t51 = point[0] * t44;
+    const double t52 = time->values[0] * t51;
+    const double t53 = time->values[1] * point[stride];
+    const double t54 = t52 + t53;
+    const double t55 = s->fixed[1] * t54;
+    const double t56 = log1p(t55);
+    const double t70 = 1.0 / t43;
+    const double t77 = 1.0 / t44;
+    const double t156 = time->values[0] * point[3 * stride];
+    const double t157 = t156 - point[4 * stride];
+    const double t162 = time->values[0] * t157;
+    const double t163 = point[5 * stride] * t56;
+    const double t164 = t162 + t163;
+    const double t165 = t70 * t70;
+    const double t166 = t164 * t165;
+    const double t167 = point[2 * stride] + t166;
+    const double t168 = time->values[0] * t167;
+    const double t176 = time->values[1] * point[7 * stride];
+    const double t177 = t176 - point[8 * stride];
+    const double t180 = time->values[1] * t177;
+    const double t181 = point[9 * stride] * t56;
+    const double t182 = t180 + t181;
+    const double t183 = t77 * t77;
+    const double t184 = t182 * t183;
+    const double t185 = point[6 * stride] + t184;
+    const double t186 = time->values[1] * t185;
+    b[0] = t168;
+    b[1] = t186;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -823,9 +822,9 @@ MMSMITH_FN void axis_aligned_point_array(const axis_aligned_solution *s, size_t 
 {
     size_t p, m;
     for (p = 0; p < n; ++p) {
-        double values[11];
+        double values[10];
         axis_aligned_at_point(s, X + p * 2, values);
-        for (m = 0; m < 11; ++m) {
+        for (m = 0; m < 10; ++m) {
             point[m * n + p] = values[m];
         }
     }
@@ -848,7 +847,6 @@ MMSMITH_FN void axis_aligned_b_array(const axis_aligned_solution *s, double t, s
     const double *const point7 = point + 7 * n;
     const double *const point8 = point + 8 * n;
     const double *const point9 = point + 9 * n;
-    const double *const point10 = point + 10 * n;
     const size_t end = first + count;
     size_t p;
     for (p = first; p < end; ++p) {
@@ -856,33 +854,34 @@ MMSMITH_FN void axis_aligned_b_array(const axis_aligned_solution *s, double t, s
         const double t41 = time.values[3] * point1[p];
         const double t43 = t37 + 1.0;
         const double t44 = t41 + 1.0;
-        const double t51 = time.values[0] * point0[p];
-        const double t52 = time.values[1] * point1[p];
-        const double t56 = time.values[4] * point2[p];
-        const double t57 = t51 + t52;
-        const double t58 = t57 + t56;
-        const double t59 = s->fixed[1] * t58;
-        const double t60 = log1p(t59);
-        const double t90 = t43 * t43;
-        const double t102 = time.values[0] * point4[p];
-        const double t111 = point5[p] + t102;
-        const double t112 = time.values[0] * t111;
-        const double t117 = point6[p] * t60;
-        const double t118 = t112 + t117;
-        const double t119 = t118 / t90;
-        const double t120 = point3[p] + t119;
-        const double t121 = time.values[0] * t120;
-        const double t123 = t44 * t44;
-        const double t128 = time.values[1] * point8[p];
-        const double t132 = point9[p] + t128;
-        const double t133 = time.values[1] * t132;
-        const double t136 = point10[p] * t60;
-        const double t137 = t133 + t136;
-        const double t138 = t137 / t123;
-        const double t139 = point7[p] + t138;
-        const double t140 = time.values[1] * t139;
-        b[p * 2 + 0] = t121;
-        b[p * 2 + 1] = t140;
+        const double t51 = point0[p] * t44;
+        const double t52 = time.values[0] * t51;
+        const double t53 = time.values[1] * point1[p];
+        const double t54 = t52 + t53;
+        const double t55 = s->fixed[1] * t54;
+        const double t56 = log1p(t55);
+        const double t70 = 1.0 / t43;
+        const double t77 = 1.0 / t44;
+        const double t156 = time.values[0] * point3[p];
+        const double t157 = t156 - point4[p];
+        const double t162 = time.values[0] * t157;
+        const double t163 = point5[p] * t56;
+        const double t164 = t162 + t163;
+        const double t165 = t70 * t70;
+        const double t166 = t164 * t165;
+        const double t167 = point2[p] + t166;
+        const double t168 = time.values[0] * t167;
+        const double t176 = time.values[1] * point7[p];
+        const double t177 = t176 - point8[p];
+        const double t180 = time.values[1] * t177;
+        const double t181 = point9[p] * t56;
+        const double t182 = t180 + t181;
+        const double t183 = t77 * t77;
+        const double t184 = t182 * t183;
+        const double t185 = point6[p] + t184;
+        const double t186 = time.values[1] * t185;
+        b[p * 2 + 0] = t168;
+        b[p * 2 + 1] = t186;
     }
 }
 
@@ -908,19 +907,19 @@ MMSMITH_FN double axis_aligned_wave_speed(const axis_aligned_solution *s)
 /* the time in which the motion repeats */
 MMSMITH_FN double axis_aligned_period(const axis_aligned_solution *s)
 {
-    return s->fixed[11];
+    return s->fixed[12];
 }
 
 /* first Lame constant */
 MMSMITH_FN double axis_aligned_lambda(const axis_aligned_solution *s)
 {
-    return s->fixed[4];
+    return s->fixed[5];
 }
 
 /* shear modulus */
 MMSMITH_FN double axis_aligned_mu(const axis_aligned_solution *s)
 {
-    return s->fixed[5];
+    return s->fixed[4];
 }
 
 /* the body's corner of smallest coordinates */

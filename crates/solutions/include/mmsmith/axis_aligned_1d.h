@@ -157,7 +157,7 @@ typedef struct axis_aligned_1d_parameters {
 /* The parameters, and the values that depend on them only. */
 typedef struct axis_aligned_1d_solution {
     axis_aligned_1d_parameters par;
-    double fixed[12];
+    double fixed[15];
 } axis_aligned_1d_solution;
 
 /* What the body force needs of the time alone. */
@@ -214,48 +214,54 @@ MMSMITH_FN const char *axis_aligned_1d_prepare(axis_aligned_1d_solution *s, cons
     const double t32 = p->nu + 1.0;
     const double t34 = 2.0 * p->nu;
     const double t35 = 1.0 - t34;
-    const double t37 = p->E * p->nu;
-    const double t38 = t32 * t35;
-    const double t39 = t37 / t38;
-    const double t42 = 0.5 * p->E;
-    const double t43 = t42 / t32;
-    const double t45 = t14 * t43;
-    const double t51 = p->nu * p->nu;
-    const double t52 = 2.0 * p->A;
-    const double t53 = t52 * t19;
-    const double t54 = t53 * p->E;
-    const double t55 = t54 * t51;
-    const double t56 = p->rho0 * t32;
-    const double t57 = t56 * t35;
-    const double t58 = t55 / t57;
-    const double t61 = p->A * p->A;
-    const double t62 = t61 * p->A;
-    const double t63 = t19 * t19;
-    const double t65 = t39 + t43;
-    const double t66 = t62 * t63;
-    const double t67 = t66 * t65;
-    const double t68 = t67 / p->rho0;
-    const double t73 = t19 * 3.141592653589793;
-    const double t74 = 2.0 * t61;
-    const double t75 = t74 * t73;
-    const double t76 = t75 * t65;
-    const double t77 = t76 / p->rho0;
-    const double t83 = t21 * p->nu;
-    const double t84 = t83 / t57;
-    const double t92 = 2.0 / t7;
+    const double t38 = 0.5 * p->E;
+    const double t39 = t38 / t32;
+    const double t41 = p->E * p->nu;
+    const double t42 = t32 * t35;
+    const double t43 = t41 / t42;
+    const double t45 = t14 * t39;
+    const double t52 = p->nu * p->nu;
+    const double t53 = 2.0 * p->A;
+    const double t54 = t53 * t19;
+    const double t55 = t54 * p->E;
+    const double t56 = t55 * t52;
+    const double t57 = p->rho0 * t32;
+    const double t58 = t57 * t35;
+    const double t59 = t56 / t58;
+    const double t67 = 2.0 * t39;
+    const double t68 = t43 + t67;
+    const double t80 = t14 / p->rho0;
+    const double t86 = t43 + t39;
+    const double t87 = p->A * p->A;
+    const double t88 = t87 * p->A;
+    const double t89 = t19 * t19;
+    const double t91 = t88 * t89;
+    const double t92 = t91 * t86;
+    const double t93 = t92 / p->rho0;
+    const double t97 = t19 * 3.141592653589793;
+    const double t98 = 2.0 * t87;
+    const double t99 = t98 * t97;
+    const double t100 = t99 * t86;
+    const double t101 = t100 / p->rho0;
+    const double t106 = t21 * p->nu;
+    const double t107 = t106 / t58;
+    const double t117 = 2.0 / t7;
     s->par = *p;
     s->fixed[0] = t7;
     s->fixed[1] = t14;
     s->fixed[2] = t15;
-    s->fixed[3] = t22;
-    s->fixed[4] = t39;
-    s->fixed[5] = t43;
-    s->fixed[6] = t45;
-    s->fixed[7] = t58;
-    s->fixed[8] = t68;
-    s->fixed[9] = t77;
-    s->fixed[10] = t84;
-    s->fixed[11] = t92;
+    s->fixed[3] = t20;
+    s->fixed[4] = t22;
+    s->fixed[5] = t39;
+    s->fixed[6] = t43;
+    s->fixed[7] = t45;
+    s->fixed[8] = t59;
+    s->fixed[9] = t68;
+    s->fixed[10] = t80;
+    s->fixed[11] = t93;
+    s->fixed[12] = t101;
+    s->fixed[13] = t107;
+    s->fixed[14] = t117;
     return 0;
 }
 
@@ -288,7 +294,7 @@ MMSMITH_FN void axis_aligned_1d_a(const axis_aligned_1d_solution *s, const doubl
     const double t2 = mmsmith_sin_pi(X[0]);
     const double t8 = s->fixed[0] * t;
     const double t9 = mmsmith_cos_pi(t8);
-    const double t23 = s->fixed[3] * t9;
+    const double t23 = s->fixed[4] * t9;
     const double t24 = t23 * t2;
     const double t25 = -t24;
     a[0] = t25;
@@ -339,14 +345,15 @@ MMSMITH_FN void axis_aligned_1d_P(const axis_aligned_1d_solution *s, const doubl
     const double t28 = t27 * t26;
     const double t30 = t28 + 1.0;
     const double t36 = log1p(t28);
-    const double t40 = s->fixed[4] * t36;
-    const double t44 = t28 + 2.0;
-    const double t46 = s->fixed[6] * t9;
+    const double t40 = t28 + 2.0;
+    const double t44 = s->fixed[6] * t36;
+    const double t46 = s->fixed[7] * t9;
     const double t47 = t46 * t26;
-    const double t48 = t47 * t44;
-    const double t49 = t40 + t48;
-    const double t50 = t49 / t30;
-    P[0] = t50;
+    const double t48 = t47 * t40;
+    const double t49 = t44 + t48;
+    const double t50 = 1.0 / t30;
+    const double t51 = t49 * t50;
+    P[0] = t51;
 }
 
 /* body force per unit mass */
@@ -360,26 +367,33 @@ MMSMITH_FN void axis_aligned_1d_b(const axis_aligned_1d_solution *s, const doubl
     const double t28 = t27 * t26;
     const double t30 = t28 + 1.0;
     const double t36 = log1p(t28);
-    const double t59 = s->fixed[7] * t2;
-    const double t60 = t30 * t30;
-    const double t64 = t26 * t26;
-    const double t69 = t2 * t64;
-    const double t70 = s->fixed[8] * t69;
-    const double t71 = -t70;
+    const double t44 = s->fixed[6] * t36;
+    const double t46 = s->fixed[7] * t9;
+    const double t47 = t46 * t26;
+    const double t50 = 1.0 / t30;
+    const double t60 = s->fixed[8] * t9;
+    const double t61 = t60 * t2;
+    const double t62 = t44 + t47;
+    const double t63 = s->fixed[3] * t9;
+    const double t64 = t63 * t2;
+    const double t65 = -t64;
+    const double t66 = s->fixed[6] * t50;
+    const double t69 = s->fixed[9] + t66;
+    const double t70 = s->fixed[1] * t26;
+    const double t71 = t70 * t69;
     const double t72 = t9 * t71;
-    const double t78 = t2 * t26;
-    const double t79 = s->fixed[9] * t78;
-    const double t80 = -t79;
-    const double t81 = t80 + t72;
-    const double t82 = t9 * t81;
-    const double t85 = s->fixed[10] * t2;
-    const double t86 = -t85;
-    const double t87 = t86 * t36;
-    const double t88 = t82 + t87;
-    const double t89 = t88 / t60;
-    const double t90 = t59 + t89;
-    const double t91 = t9 * t90;
-    b[0] = t91;
+    const double t73 = t72 + t44;
+    const double t74 = 3.141592653589793 * t73;
+    const double t75 = t2 * t74;
+    const double t76 = t62 * t65;
+    const double t77 = t76 * t50;
+    const double t78 = t26 * t77;
+    const double t79 = t75 + t78;
+    const double t81 = s->fixed[10] * t9;
+    const double t82 = t79 * t50;
+    const double t83 = t81 * t82;
+    const double t84 = t61 - t83;
+    b[0] = t84;
 }
 
 /* traction on the surface X-lower, force per reference area */
@@ -390,16 +404,16 @@ MMSMITH_FN void axis_aligned_1d_X_lower_traction(const axis_aligned_1d_solution 
     const double t8 = s->fixed[0] * t;
     const double t9 = mmsmith_cos_pi(t8);
     const double t27 = s->fixed[1] * t9;
-    const double t94 = t27 + 1.0;
-    const double t95 = log1p(t27);
-    const double t96 = s->fixed[4] * t95;
-    const double t97 = t27 + 2.0;
-    const double t98 = t9 * t97;
-    const double t99 = s->fixed[6] * t98;
-    const double t100 = t96 + t99;
-    const double t101 = t100 / t94;
-    const double t102 = -t101;
-    traction[0] = t102;
+    const double t119 = t27 + 1.0;
+    const double t120 = log1p(t27);
+    const double t121 = t27 + 2.0;
+    const double t122 = s->fixed[6] * t120;
+    const double t123 = t9 * t121;
+    const double t124 = s->fixed[7] * t123;
+    const double t125 = t122 + t124;
+    const double t126 = t125 / t119;
+    const double t127 = -t126;
+    traction[0] = t127;
 }
 
 /* traction on the surface X-upper, force per reference area */
@@ -410,16 +424,16 @@ MMSMITH_FN void axis_aligned_1d_X_upper_traction(const axis_aligned_1d_solution 
     const double t8 = s->fixed[0] * t;
     const double t9 = mmsmith_cos_pi(t8);
     const double t27 = s->fixed[1] * t9;
-    const double t103 = 1.0 - t27;
-    const double t104 = -t27;
-    const double t105 = log1p(t104);
-    const double t106 = s->fixed[4] * t105;
-    const double t107 = 2.0 - t27;
-    const double t108 = t9 * t107;
-    const double t109 = s->fixed[6] * t108;
-    const double t110 = t106 - t109;
-    const double t111 = t110 / t103;
-    traction[0] = t111;
+    const double t128 = 1.0 - t27;
+    const double t129 = -t27;
+    const double t130 = log1p(t129);
+    const double t131 = 2.0 - t27;
+    const double t132 = s->fixed[6] * t130;
+    const double t133 = t9 * t131;
+    const double t134 = s->fixed[7] * t133;
+    const double t135 = t132 - t134;
+    const double t136 = t135 / t128;
+    traction[0] = t136;
 }
 
 /* all fields */
@@ -434,7 +448,7 @@ MMSMITH_FN void axis_aligned_1d_fields(const axis_aligned_1d_solution *s, const 
     const double t16 = s->fixed[2] * t13;
     const double t17 = t16 * t2;
     const double t18 = -t17;
-    const double t23 = s->fixed[3] * t9;
+    const double t23 = s->fixed[4] * t9;
     const double t24 = t23 * t2;
     const double t25 = -t24;
     const double t26 = mmsmith_cos_pi(X[0]);
@@ -442,40 +456,44 @@ MMSMITH_FN void axis_aligned_1d_fields(const axis_aligned_1d_solution *s, const 
     const double t28 = t27 * t26;
     const double t30 = t28 + 1.0;
     const double t36 = log1p(t28);
-    const double t40 = s->fixed[4] * t36;
-    const double t44 = t28 + 2.0;
-    const double t46 = s->fixed[6] * t9;
+    const double t40 = t28 + 2.0;
+    const double t44 = s->fixed[6] * t36;
+    const double t46 = s->fixed[7] * t9;
     const double t47 = t46 * t26;
-    const double t48 = t47 * t44;
-    const double t49 = t40 + t48;
-    const double t50 = t49 / t30;
-    const double t59 = s->fixed[7] * t2;
-    const double t60 = t30 * t30;
-    const double t64 = t26 * t26;
-    const double t69 = t2 * t64;
-    const double t70 = s->fixed[8] * t69;
-    const double t71 = -t70;
+    const double t48 = t47 * t40;
+    const double t49 = t44 + t48;
+    const double t50 = 1.0 / t30;
+    const double t51 = t49 * t50;
+    const double t60 = s->fixed[8] * t9;
+    const double t61 = t60 * t2;
+    const double t62 = t44 + t47;
+    const double t63 = s->fixed[3] * t9;
+    const double t64 = t63 * t2;
+    const double t65 = -t64;
+    const double t66 = s->fixed[6] * t50;
+    const double t69 = s->fixed[9] + t66;
+    const double t70 = s->fixed[1] * t26;
+    const double t71 = t70 * t69;
     const double t72 = t9 * t71;
-    const double t78 = t2 * t26;
-    const double t79 = s->fixed[9] * t78;
-    const double t80 = -t79;
-    const double t81 = t80 + t72;
-    const double t82 = t9 * t81;
-    const double t85 = s->fixed[10] * t2;
-    const double t86 = -t85;
-    const double t87 = t86 * t36;
-    const double t88 = t82 + t87;
-    const double t89 = t88 / t60;
-    const double t90 = t59 + t89;
-    const double t91 = t9 * t90;
+    const double t73 = t72 + t44;
+    const double t74 = 3.141592653589793 * t73;
+    const double t75 = t2 * t74;
+    const double t76 = t62 * t65;
+    const double t77 = t76 * t50;
+    const double t78 = t26 * t77;
+    const double t79 = t75 + t78;
+    const double t81 = s->fixed[10] * t9;
+    const double t82 = t79 * t50;
+    const double t83 = t81 * t82;
+    const double t84 = t61 - t83;
     out->u[0] = t11;
     out->v[0] = t18;
     out->a[0] = t25;
     out->H[0] = t28;
     out->F[0] = t30;
     out->J = t30;
-    out->P[0] = t50;
-    out->b[0] = t91;
+    out->P[0] = t51;
+    out->b[0] = t84;
 }
 
 /* What the body force needs of the time alone. */
@@ -495,21 +513,20 @@ MMSMITH_FN void axis_aligned_1d_at_point(const axis_aligned_1d_solution *s, cons
 {
     const double t2 = mmsmith_sin_pi(X[0]);
     const double t26 = mmsmith_cos_pi(X[0]);
-    const double t59 = s->fixed[7] * t2;
-    const double t64 = t26 * t26;
-    const double t69 = t2 * t64;
-    const double t70 = s->fixed[8] * t69;
-    const double t71 = -t70;
-    const double t78 = t2 * t26;
-    const double t79 = s->fixed[9] * t78;
-    const double t80 = -t79;
-    const double t85 = s->fixed[10] * t2;
-    const double t86 = -t85;
+    const double t85 = s->fixed[8] * t2;
+    const double t90 = t26 * t26;
+    const double t94 = t2 * t90;
+    const double t95 = s->fixed[11] * t94;
+    const double t96 = -t95;
+    const double t102 = t2 * t26;
+    const double t103 = s->fixed[12] * t102;
+    const double t108 = s->fixed[13] * t2;
+    const double t109 = -t108;
     point[0] = t26;
-    point[1] = t59;
-    point[2] = t71;
-    point[3] = t80;
-    point[4] = t86;
+    point[1] = t85;
+    point[2] = t96;
+    point[3] = t103;
+    point[4] = t109;
 }
 
 /* The body force from the values of one time and of one point. Value m of the point is point[m*stride]:
@@ -522,16 +539,17 @@ MMSMITH_FN void axis_aligned_1d_b_staged(const axis_aligned_1d_solution *s, cons
     const double t28 = time->values[1] * point[0];
     const double t30 = t28 + 1.0;
     const double t36 = log1p(t28);
-    const double t60 = t30 * t30;
-    const double t72 = time->values[0] * point[2 * stride];
-    const double t81 = point[3 * stride] + t72;
-    const double t82 = time->values[0] * t81;
-    const double t87 = point[4 * stride] * t36;
-    const double t88 = t82 + t87;
-    const double t89 = t88 / t60;
-    const double t90 = point[stride] + t89;
-    const double t91 = time->values[0] * t90;
-    b[0] = t91;
+    const double t50 = 1.0 / t30;
+    const double t104 = time->values[0] * point[2 * stride];
+    const double t105 = t104 - point[3 * stride];
+    const double t110 = time->values[0] * t105;
+    const double t111 = point[4 * stride] * t36;
+    const double t112 = t110 + t111;
+    const double t113 = t50 * t50;
+    const double t114 = t112 * t113;
+    const double t115 = point[stride] + t114;
+    const double t116 = time->values[0] * t115;
+    b[0] = t116;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -568,16 +586,17 @@ MMSMITH_FN void axis_aligned_1d_b_array(const axis_aligned_1d_solution *s, doubl
         const double t28 = time.values[1] * point0[p];
         const double t30 = t28 + 1.0;
         const double t36 = log1p(t28);
-        const double t60 = t30 * t30;
-        const double t72 = time.values[0] * point2[p];
-        const double t81 = point3[p] + t72;
-        const double t82 = time.values[0] * t81;
-        const double t87 = point4[p] * t36;
-        const double t88 = t82 + t87;
-        const double t89 = t88 / t60;
-        const double t90 = point1[p] + t89;
-        const double t91 = time.values[0] * t90;
-        b[p * 1 + 0] = t91;
+        const double t50 = 1.0 / t30;
+        const double t104 = time.values[0] * point2[p];
+        const double t105 = t104 - point3[p];
+        const double t110 = time.values[0] * t105;
+        const double t111 = point4[p] * t36;
+        const double t112 = t110 + t111;
+        const double t113 = t50 * t50;
+        const double t114 = t112 * t113;
+        const double t115 = point1[p] + t114;
+        const double t116 = time.values[0] * t115;
+        b[p * 1 + 0] = t116;
     }
 }
 
@@ -603,13 +622,13 @@ MMSMITH_FN double axis_aligned_1d_wave_speed(const axis_aligned_1d_solution *s)
 /* the time in which the motion repeats */
 MMSMITH_FN double axis_aligned_1d_period(const axis_aligned_1d_solution *s)
 {
-    return s->fixed[11];
+    return s->fixed[14];
 }
 
 /* first Lame constant */
 MMSMITH_FN double axis_aligned_1d_lambda(const axis_aligned_1d_solution *s)
 {
-    return s->fixed[4];
+    return s->fixed[6];
 }
 
 /* shear modulus */

@@ -154,7 +154,7 @@ typedef struct bar_parameters {
 /* The parameters, and the values that depend on them only. */
 typedef struct bar_solution {
     bar_parameters par;
-    double fixed[15];
+    double fixed[17];
 } bar_solution;
 
 /* What the body force needs of the time alone. */
@@ -223,49 +223,52 @@ MMSMITH_FN const char *bar_prepare(bar_solution *s, const bar_parameters *p)
     const double t43 = p->nu + 1.0;
     const double t44 = 2.0 * p->nu;
     const double t45 = 1.0 - t44;
-    const double t47 = p->E * p->nu;
-    const double t48 = t43 * t45;
-    const double t49 = t47 / t48;
-    const double t52 = 0.5 * p->E;
-    const double t53 = t52 / t43;
+    const double t48 = 0.5 * p->E;
+    const double t49 = t48 / t43;
+    const double t51 = p->E * p->nu;
+    const double t52 = t43 * t45;
+    const double t53 = t51 / t52;
     const double t60 = p->nu / t45;
     const double t61 = t60 + 1.0;
-    const double t62 = 4.0 * t61;
-    const double t63 = t62 / t43;
-    const double t64 = 1.0 - t63;
-    const double t65 = t28 * t64;
-    const double t66 = t65 / t29;
-    const double t71 = p->A * p->A;
-    const double t72 = t71 * p->A;
-    const double t73 = t25 * t25;
-    const double t74 = t26 * t26;
-    const double t76 = t49 + t53;
-    const double t77 = 16.0 * t72;
-    const double t78 = t77 * t74;
-    const double t79 = t78 * t76;
-    const double t80 = p->rho0 * t73;
-    const double t81 = t79 / t80;
-    const double t86 = t25 * p->L;
-    const double t87 = t26 * 3.141592653589793;
-    const double t88 = 16.0 * t71;
-    const double t89 = t88 * t87;
-    const double t90 = t89 * t76;
-    const double t91 = p->rho0 * t86;
-    const double t92 = t90 / t91;
-    const double t98 = 4.0 * p->A;
-    const double t99 = t98 * p->E;
-    const double t100 = t99 * p->nu;
-    const double t101 = t100 * t26;
-    const double t102 = t29 * t43;
-    const double t103 = t102 * t45;
-    const double t104 = t101 / t103;
-    const double t112 = 2.0 * p->L;
-    const double t113 = t112 / t11;
-    const double t115 = -t36;
+    const double t63 = 4.0 * t61;
+    const double t64 = t63 / t43;
+    const double t65 = 1.0 - t64;
+    const double t66 = t28 * t65;
+    const double t67 = t66 / t29;
+    const double t70 = 4.0 * p->A;
+    const double t71 = t70 * t26;
+    const double t72 = t71 / t25;
+    const double t87 = 1.0 / p->rho0;
+    const double t93 = t53 + t49;
+    const double t95 = p->A * p->A;
+    const double t96 = t95 * p->A;
+    const double t97 = t25 * t25;
+    const double t98 = t26 * t26;
+    const double t100 = 16.0 * t96;
+    const double t101 = t100 * t98;
+    const double t102 = t101 * t93;
+    const double t103 = p->rho0 * t97;
+    const double t104 = t102 / t103;
+    const double t108 = t25 * p->L;
+    const double t109 = t26 * 3.141592653589793;
+    const double t110 = 16.0 * t95;
+    const double t111 = t110 * t109;
+    const double t112 = t111 * t93;
+    const double t113 = p->rho0 * t108;
+    const double t114 = t112 / t113;
+    const double t119 = t70 * p->E;
+    const double t120 = t119 * p->nu;
+    const double t121 = t120 * t26;
+    const double t122 = t29 * t43;
+    const double t123 = t122 * t45;
+    const double t124 = t121 / t123;
+    const double t134 = 2.0 * p->L;
+    const double t135 = t134 / t11;
+    const double t137 = -t36;
     if (!(t36 < p->L)) {
         return "the parameters of bar must satisfy 2*Pi*A < L";
     }
-    if (!(t115 < p->L)) {
+    if (!(t137 < p->L)) {
         return "the parameters of bar must satisfy -2*Pi*A < L";
     }
     s->par = *p;
@@ -278,12 +281,14 @@ MMSMITH_FN const char *bar_prepare(bar_solution *s, const bar_parameters *p)
     s->fixed[6] = t37;
     s->fixed[7] = t49;
     s->fixed[8] = t53;
-    s->fixed[9] = t66;
-    s->fixed[10] = t81;
-    s->fixed[11] = t92;
+    s->fixed[9] = t67;
+    s->fixed[10] = t72;
+    s->fixed[11] = t87;
     s->fixed[12] = t104;
-    s->fixed[13] = t113;
-    s->fixed[14] = t115;
+    s->fixed[13] = t114;
+    s->fixed[14] = t124;
+    s->fixed[15] = t135;
+    s->fixed[16] = t137;
     return 0;
 }
 
@@ -374,13 +379,14 @@ MMSMITH_FN void bar_P(const bar_solution *s, const double X[1], double t, double
     const double t39 = t38 * t34;
     const double t41 = t39 + 1.0;
     const double t46 = log1p(t39);
-    const double t50 = s->fixed[7] * t46;
-    const double t54 = t39 + 2.0;
-    const double t55 = t39 * t54;
-    const double t56 = s->fixed[8] * t55;
-    const double t57 = t50 + t56;
-    const double t58 = t57 / t41;
-    P[0] = t58;
+    const double t50 = t39 + 2.0;
+    const double t54 = s->fixed[8] * t46;
+    const double t55 = t39 * t50;
+    const double t56 = s->fixed[7] * t55;
+    const double t57 = t54 + t56;
+    const double t58 = 1.0 / t41;
+    const double t59 = t57 * t58;
+    P[0] = t59;
 }
 
 /* body force per unit mass */
@@ -395,27 +401,29 @@ MMSMITH_FN void bar_b(const bar_solution *s, const double X[1], double t, double
     const double t39 = t38 * t34;
     const double t41 = t39 + 1.0;
     const double t46 = log1p(t39);
-    const double t67 = s->fixed[9] * t6;
-    const double t68 = -t67;
-    const double t69 = t41 * t41;
-    const double t75 = t34 * t34;
-    const double t82 = t6 * t75;
-    const double t83 = s->fixed[10] * t82;
-    const double t84 = -t83;
-    const double t85 = t14 * t84;
-    const double t93 = t6 * t34;
-    const double t94 = s->fixed[11] * t93;
-    const double t95 = -t94;
-    const double t96 = t95 + t85;
-    const double t97 = t14 * t96;
-    const double t105 = s->fixed[12] * t6;
-    const double t106 = -t105;
-    const double t107 = t106 * t46;
-    const double t108 = t97 + t107;
-    const double t109 = t108 / t69;
-    const double t110 = t68 + t109;
-    const double t111 = t14 * t110;
-    b[0] = t111;
+    const double t54 = s->fixed[8] * t46;
+    const double t58 = 1.0 / t41;
+    const double t68 = s->fixed[9] * t14;
+    const double t69 = t68 * t6;
+    const double t73 = s->fixed[10] * t14;
+    const double t74 = t73 * t6;
+    const double t75 = -t74;
+    const double t76 = s->fixed[7] * t39;
+    const double t77 = t54 + t76;
+    const double t78 = s->fixed[8] * t58;
+    const double t79 = s->fixed[7] + t78;
+    const double t80 = t39 + t46;
+    const double t81 = s->fixed[8] * t80;
+    const double t82 = t77 * t58;
+    const double t83 = t79 - t82;
+    const double t84 = s->fixed[7] + t83;
+    const double t85 = t39 * t84;
+    const double t86 = t81 + t85;
+    const double t88 = t75 * t86;
+    const double t89 = t88 * t58;
+    const double t90 = s->fixed[11] * t89;
+    const double t91 = t90 - t69;
+    b[0] = t91;
 }
 
 /* traction on the surface X-lower, force per reference area */
@@ -426,16 +434,16 @@ MMSMITH_FN void bar_X_lower_traction(const bar_solution *s, const double X[1], d
     const double t13 = s->fixed[2] * t;
     const double t14 = mmsmith_cos_pi(t13);
     const double t38 = s->fixed[6] * t14;
-    const double t116 = t38 + 1.0;
-    const double t117 = log1p(t38);
-    const double t118 = s->fixed[7] * t117;
-    const double t119 = t38 + 2.0;
-    const double t120 = t38 * t119;
-    const double t121 = s->fixed[8] * t120;
-    const double t122 = t118 + t121;
-    const double t123 = t122 / t116;
-    const double t124 = -t123;
-    traction[0] = t124;
+    const double t138 = t38 + 1.0;
+    const double t139 = log1p(t38);
+    const double t140 = t38 + 2.0;
+    const double t141 = s->fixed[8] * t139;
+    const double t142 = t38 * t140;
+    const double t143 = s->fixed[7] * t142;
+    const double t144 = t141 + t143;
+    const double t145 = t144 / t138;
+    const double t146 = -t145;
+    traction[0] = t146;
 }
 
 /* traction on the surface X-upper, force per reference area */
@@ -446,15 +454,15 @@ MMSMITH_FN void bar_X_upper_traction(const bar_solution *s, const double X[1], d
     const double t13 = s->fixed[2] * t;
     const double t14 = mmsmith_cos_pi(t13);
     const double t38 = s->fixed[6] * t14;
-    const double t116 = t38 + 1.0;
-    const double t117 = log1p(t38);
-    const double t118 = s->fixed[7] * t117;
-    const double t119 = t38 + 2.0;
-    const double t120 = t38 * t119;
-    const double t121 = s->fixed[8] * t120;
-    const double t122 = t118 + t121;
-    const double t123 = t122 / t116;
-    traction[0] = t123;
+    const double t138 = t38 + 1.0;
+    const double t139 = log1p(t38);
+    const double t140 = t38 + 2.0;
+    const double t141 = s->fixed[8] * t139;
+    const double t142 = t38 * t140;
+    const double t143 = s->fixed[7] * t142;
+    const double t144 = t141 + t143;
+    const double t145 = t144 / t138;
+    traction[0] = t145;
 }
 
 /* all fields */
@@ -478,40 +486,41 @@ MMSMITH_FN void bar_fields(const bar_solution *s, const double X[1], double t, b
     const double t39 = t38 * t34;
     const double t41 = t39 + 1.0;
     const double t46 = log1p(t39);
-    const double t50 = s->fixed[7] * t46;
-    const double t54 = t39 + 2.0;
-    const double t55 = t39 * t54;
-    const double t56 = s->fixed[8] * t55;
-    const double t57 = t50 + t56;
-    const double t58 = t57 / t41;
-    const double t67 = s->fixed[9] * t6;
-    const double t68 = -t67;
-    const double t69 = t41 * t41;
-    const double t75 = t34 * t34;
-    const double t82 = t6 * t75;
-    const double t83 = s->fixed[10] * t82;
-    const double t84 = -t83;
-    const double t85 = t14 * t84;
-    const double t93 = t6 * t34;
-    const double t94 = s->fixed[11] * t93;
-    const double t95 = -t94;
-    const double t96 = t95 + t85;
-    const double t97 = t14 * t96;
-    const double t105 = s->fixed[12] * t6;
-    const double t106 = -t105;
-    const double t107 = t106 * t46;
-    const double t108 = t97 + t107;
-    const double t109 = t108 / t69;
-    const double t110 = t68 + t109;
-    const double t111 = t14 * t110;
+    const double t50 = t39 + 2.0;
+    const double t54 = s->fixed[8] * t46;
+    const double t55 = t39 * t50;
+    const double t56 = s->fixed[7] * t55;
+    const double t57 = t54 + t56;
+    const double t58 = 1.0 / t41;
+    const double t59 = t57 * t58;
+    const double t68 = s->fixed[9] * t14;
+    const double t69 = t68 * t6;
+    const double t73 = s->fixed[10] * t14;
+    const double t74 = t73 * t6;
+    const double t75 = -t74;
+    const double t76 = s->fixed[7] * t39;
+    const double t77 = t54 + t76;
+    const double t78 = s->fixed[8] * t58;
+    const double t79 = s->fixed[7] + t78;
+    const double t80 = t39 + t46;
+    const double t81 = s->fixed[8] * t80;
+    const double t82 = t77 * t58;
+    const double t83 = t79 - t82;
+    const double t84 = s->fixed[7] + t83;
+    const double t85 = t39 * t84;
+    const double t86 = t81 + t85;
+    const double t88 = t75 * t86;
+    const double t89 = t88 * t58;
+    const double t90 = s->fixed[11] * t89;
+    const double t91 = t90 - t69;
     out->u[0] = t16;
     out->v[0] = t24;
     out->a[0] = t33;
     out->H[0] = t39;
     out->F[0] = t41;
     out->J = t41;
-    out->P[0] = t58;
-    out->b[0] = t111;
+    out->P[0] = t59;
+    out->b[0] = t91;
 }
 
 /* What the body force needs of the time alone. */
@@ -532,22 +541,20 @@ MMSMITH_FN void bar_at_point(const bar_solution *s, const double X[1], double po
     const double t5 = s->fixed[0] * X[0];
     const double t6 = mmsmith_sin_pi(t5);
     const double t34 = mmsmith_cos_pi(t5);
-    const double t67 = s->fixed[9] * t6;
-    const double t68 = -t67;
-    const double t75 = t34 * t34;
-    const double t82 = t6 * t75;
-    const double t83 = s->fixed[10] * t82;
-    const double t84 = -t83;
-    const double t93 = t6 * t34;
-    const double t94 = s->fixed[11] * t93;
-    const double t95 = -t94;
-    const double t105 = s->fixed[12] * t6;
-    const double t106 = -t105;
+    const double t92 = s->fixed[9] * t6;
+    const double t99 = t34 * t34;
+    const double t105 = t6 * t99;
+    const double t106 = s->fixed[12] * t105;
+    const double t107 = -t106;
+    const double t115 = t6 * t34;
+    const double t116 = s->fixed[13] * t115;
+    const double t125 = s->fixed[14] * t6;
+    const double t126 = -t125;
     point[0] = t34;
-    point[1] = t68;
-    point[2] = t84;
-    point[3] = t95;
-    point[4] = t106;
+    point[1] = t92;
+    point[2] = t107;
+    point[3] = t116;
+    point[4] = t126;
 }
 
 /* The body force from the values of one time and of one point. Value m of the point is point[m*stride]:
@@ -560,16 +567,17 @@ MMSMITH_FN void bar_b_staged(const bar_solution *s, const bar_time_values *time,
     const double t39 = time->values[1] * point[0];
     const double t41 = t39 + 1.0;
     const double t46 = log1p(t39);
-    const double t69 = t41 * t41;
-    const double t85 = time->values[0] * point[2 * stride];
-    const double t96 = point[3 * stride] + t85;
-    const double t97 = time->values[0] * t96;
-    const double t107 = point[4 * stride] * t46;
-    const double t108 = t97 + t107;
-    const double t109 = t108 / t69;
-    const double t110 = point[stride] + t109;
-    const double t111 = time->values[0] * t110;
-    b[0] = t111;
+    const double t58 = 1.0 / t41;
+    const double t117 = time->values[0] * point[2 * stride];
+    const double t118 = t117 - point[3 * stride];
+    const double t127 = time->values[0] * t118;
+    const double t128 = point[4 * stride] * t46;
+    const double t129 = t127 + t128;
+    const double t130 = t58 * t58;
+    const double t131 = t129 * t130;
+    const double t132 = t131 - point[stride];
+    const double t133 = time->values[0] * t132;
+    b[0] = t133;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -606,16 +614,17 @@ MMSMITH_FN void bar_b_array(const bar_solution *s, double t, size_t n,
         const double t39 = time.values[1] * point0[p];
         const double t41 = t39 + 1.0;
         const double t46 = log1p(t39);
-        const double t69 = t41 * t41;
-        const double t85 = time.values[0] * point2[p];
-        const double t96 = point3[p] + t85;
-        const double t97 = time.values[0] * t96;
-        const double t107 = point4[p] * t46;
-        const double t108 = t97 + t107;
-        const double t109 = t108 / t69;
-        const double t110 = point1[p] + t109;
-        const double t111 = time.values[0] * t110;
-        b[p * 1 + 0] = t111;
+        const double t58 = 1.0 / t41;
+        const double t117 = time.values[0] * point2[p];
+        const double t118 = t117 - point3[p];
+        const double t127 = time.values[0] * t118;
+        const double t128 = point4[p] * t46;
+        const double t129 = t127 + t128;
+        const double t130 = t58 * t58;
+        const double t131 = t129 * t130;
+        const double t132 = t131 - point1[p];
+        const double t133 = time.values[0] * t132;
+        b[p * 1 + 0] = t133;
     }
 }
 
@@ -640,19 +649,19 @@ MMSMITH_FN double bar_wave_speed(const bar_solution *s)
 /* the time in which the motion repeats */
 MMSMITH_FN double bar_period(const bar_solution *s)
 {
-    return s->fixed[13];
+    return s->fixed[15];
 }
 
 /* first Lame constant */
 MMSMITH_FN double bar_lambda(const bar_solution *s)
 {
-    return s->fixed[7];
+    return s->fixed[8];
 }
 
 /* shear modulus */
 MMSMITH_FN double bar_mu(const bar_solution *s)
 {
-    return s->fixed[8];
+    return s->fixed[7];
 }
 
 /* the body's corner of smallest coordinates */

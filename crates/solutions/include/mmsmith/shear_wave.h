@@ -209,13 +209,13 @@ MMSMITH_FN const char *shear_wave_prepare(shear_wave_solution *s, const shear_wa
         return "L of shear-wave must be a finite number > 0";
     }
     const double t4 = 2.0 / p->L;
-    const double t10 = p->L * p->L;
-    const double t13 = p->nu + 1.0;
+    const double t12 = p->nu + 1.0;
+    const double t14 = p->L * p->L;
     const double t15 = 3.141592653589793 * 3.141592653589793;
     const double t16 = 2.0 * p->E;
     const double t17 = t16 * t15;
-    const double t18 = p->rho0 * t10;
-    const double t19 = t18 * t13;
+    const double t18 = p->rho0 * t14;
+    const double t19 = t18 * t12;
     const double t20 = t17 / t19;
     const double t21 = sqrt(t20);
     const double t28 = p->A * t21;
@@ -226,7 +226,7 @@ MMSMITH_FN const char *shear_wave_prepare(shear_wave_solution *s, const shear_wa
     const double t39 = t31 * 3.141592653589793;
     const double t40 = t39 / p->L;
     const double t44 = 0.5 * p->E;
-    const double t45 = t44 / t13;
+    const double t45 = t44 / t12;
     const double t47 = p->E / p->rho0;
     const double t48 = sqrt(t47);
     const double t49 = 2.0 * 3.141592653589793;
@@ -234,7 +234,7 @@ MMSMITH_FN const char *shear_wave_prepare(shear_wave_solution *s, const shear_wa
     const double t51 = 2.0 * p->nu;
     const double t52 = 1.0 - t51;
     const double t53 = p->E * p->nu;
-    const double t54 = t13 * t52;
+    const double t54 = t12 * t52;
     const double t55 = t53 / t54;
     s->par = *p;
     s->fixed[0] = t4;

@@ -38,7 +38,7 @@ impl<T: crate::Real> Default for AxisAlignedParameters<T> {
 pub struct AxisAligned<T: crate::Real> {
     parameters: AxisAlignedParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 12],
+    fixed: [T; 13],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> AxisAligned<T> {
@@ -124,38 +124,39 @@ impl<T: crate::Real> AxisAligned<T> {
         let t47 = parameters.nu + T::one();
         let t49 = T::nearest(2.0) * parameters.nu;
         let t50 = T::one() - t49;
+        let t58 = T::nearest(0.5) * parameters.E;
+        let t59 = t58 / t47;
         let t61 = parameters.E * parameters.nu;
         let t62 = t47 * t50;
         let t63 = t61 / t62;
-        let t66 = T::nearest(0.5) * parameters.E;
-        let t67 = t66 / t47;
-        let t69 = t18 * t67;
-        let t81 = parameters.nu * parameters.nu;
-        let t82 = T::nearest(2.0) * parameters.A;
-        let t83 = t82 * t25;
-        let t84 = t83 * parameters.E;
-        let t85 = t84 * t81;
-        let t86 = parameters.rho0 * t47;
-        let t87 = t86 * t50;
-        let t88 = t85 / t87;
-        let t91 = parameters.A * parameters.A;
-        let t92 = t91 * parameters.A;
-        let t93 = t25 * t25;
-        let t95 = t63 + t67;
-        let t96 = t92 * t93;
-        let t97 = t96 * t95;
-        let t98 = t97 / parameters.rho0;
-        let t103 = t25 * T::pi();
-        let t104 = T::nearest(2.0) * t91;
-        let t105 = t104 * t103;
-        let t106 = t105 * t95;
-        let t107 = t106 / parameters.rho0;
-        let t113 = t27 * parameters.nu;
-        let t114 = t113 / t87;
-        let t141 = T::nearest(2.0) / t7;
+        let t65 = t18 * t59;
+        let t79 = parameters.nu * parameters.nu;
+        let t80 = T::nearest(2.0) * parameters.A;
+        let t81 = t80 * t25;
+        let t82 = t81 * parameters.E;
+        let t83 = t82 * t79;
+        let t84 = parameters.rho0 * t47;
+        let t85 = t84 * t50;
+        let t86 = t83 / t85;
+        let t110 = t26 / parameters.rho0;
+        let t138 = t63 + t59;
+        let t139 = parameters.A * parameters.A;
+        let t140 = t139 * parameters.A;
+        let t141 = t25 * t25;
+        let t143 = t140 * t141;
+        let t144 = t143 * t138;
+        let t145 = t144 / parameters.rho0;
+        let t149 = t25 * T::pi();
+        let t150 = T::nearest(2.0) * t139;
+        let t151 = t150 * t149;
+        let t152 = t151 * t138;
+        let t153 = t152 / parameters.rho0;
+        let t158 = t27 * parameters.nu;
+        let t159 = t158 / t85;
+        let t187 = T::nearest(2.0) / t7;
         Ok(AxisAligned {
             parameters,
-            fixed: [t7, t18, t19, t28, t63, t67, t69, t88, t98, t107, t114, t141],
+            fixed: [t7, t18, t19, t28, t59, t63, t65, t86, t110, t145, t153, t159, t187],
         })
     }
     /// The solution with parameter values in the order of the description; missing ones take their
@@ -311,30 +312,28 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t41 = t40 * t39;
         let t43 = t37 + T::one();
         let t44 = t41 + T::one();
-        let t51 = t9 * t35;
-        let t52 = t14 * t39;
-        let t53 = t9 * t14;
-        let t54 = self.fixed[1] * t53;
-        let t55 = t35 * t39;
-        let t56 = t54 * t55;
-        let t57 = t51 + t52;
-        let t58 = t57 + t56;
-        let t59 = self.fixed[1] * t58;
-        let t60 = t59.ln_1p();
-        let t64 = self.fixed[4] * t60;
-        let t68 = t37 + T::nearest(2.0);
-        let t70 = self.fixed[6] * t9;
-        let t71 = t70 * t35;
-        let t72 = t71 * t68;
-        let t73 = t64 + t72;
-        let t74 = t73 / t43;
-        let t75 = t41 + T::nearest(2.0);
-        let t76 = self.fixed[6] * t14;
-        let t77 = t76 * t39;
-        let t78 = t77 * t75;
-        let t79 = t64 + t78;
-        let t80 = t79 / t44;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t74, T::zero(), T::zero(), t80)
+        let t51 = t35 * t44;
+        let t52 = t9 * t51;
+        let t53 = t14 * t39;
+        let t54 = t52 + t53;
+        let t55 = self.fixed[1] * t54;
+        let t56 = t55.ln_1p();
+        let t60 = t37 + T::nearest(2.0);
+        let t64 = self.fixed[5] * t56;
+        let t66 = self.fixed[6] * t9;
+        let t67 = t66 * t35;
+        let t68 = t67 * t60;
+        let t69 = t64 + t68;
+        let t70 = T::one() / t43;
+        let t71 = t69 * t70;
+        let t72 = t41 + T::nearest(2.0);
+        let t73 = self.fixed[6] * t14;
+        let t74 = t73 * t39;
+        let t75 = t74 * t72;
+        let t76 = t64 + t75;
+        let t77 = T::one() / t44;
+        let t78 = t76 * t77;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t71, T::zero(), T::zero(), t78)
     }
     #[inline]
     fn body_force(
@@ -348,62 +347,58 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t13 = X[1].sin_pi();
         let t14 = t8.sin_pi();
         let t35 = X[0].cos_pi();
-        let t36 = self.fixed[1] * t9;
-        let t37 = t36 * t35;
         let t39 = X[1].cos_pi();
-        let t40 = self.fixed[1] * t14;
-        let t41 = t40 * t39;
-        let t43 = t37 + T::one();
-        let t44 = t41 + T::one();
-        let t51 = t9 * t35;
-        let t52 = t14 * t39;
-        let t53 = t9 * t14;
-        let t54 = self.fixed[1] * t53;
-        let t55 = t35 * t39;
-        let t56 = t54 * t55;
-        let t57 = t51 + t52;
-        let t58 = t57 + t56;
-        let t59 = self.fixed[1] * t58;
-        let t60 = t59.ln_1p();
-        let t89 = self.fixed[7] * t2;
-        let t90 = t43 * t43;
-        let t94 = t35 * t35;
-        let t99 = t2 * t94;
-        let t100 = self.fixed[8] * t99;
-        let t101 = -t100;
-        let t102 = t9 * t101;
-        let t108 = t2 * t35;
-        let t109 = self.fixed[9] * t108;
-        let t110 = -t109;
-        let t111 = t110 + t102;
-        let t112 = t9 * t111;
-        let t115 = self.fixed[10] * t2;
-        let t116 = -t115;
-        let t117 = t116 * t60;
-        let t118 = t112 + t117;
-        let t119 = t118 / t90;
-        let t120 = t89 + t119;
-        let t121 = t9 * t120;
-        let t122 = self.fixed[7] * t13;
-        let t123 = t44 * t44;
-        let t124 = t39 * t39;
-        let t125 = t13 * t124;
-        let t126 = self.fixed[8] * t125;
-        let t127 = -t126;
-        let t128 = t14 * t127;
-        let t129 = t13 * t39;
-        let t130 = self.fixed[9] * t129;
-        let t131 = -t130;
-        let t132 = t131 + t128;
-        let t133 = t14 * t132;
-        let t134 = self.fixed[10] * t13;
-        let t135 = -t134;
-        let t136 = t135 * t60;
-        let t137 = t133 + t136;
-        let t138 = t137 / t123;
-        let t139 = t122 + t138;
-        let t140 = t14 * t139;
-        crate::nalgebra::SVector::<T, 2>::new(t121, t140)
+        let t53 = t14 * t39;
+        let t87 = self.fixed[7] * t9;
+        let t88 = t87 * t2;
+        let t89 = t9 * t35;
+        let t90 = self.fixed[1] * t89;
+        let t91 = t90 + T::one();
+        let t92 = t39 * t91;
+        let t93 = t14 * t92;
+        let t94 = t93 + t89;
+        let t95 = self.fixed[1] * t94;
+        let t96 = t95.ln_1p();
+        let t97 = self.fixed[5] * t96;
+        let t98 = self.fixed[4] * t90;
+        let t99 = t97 + t98;
+        let t100 = T::one() / t91;
+        let t101 = self.fixed[5] * t100;
+        let t102 = self.fixed[4] + t101;
+        let t103 = t90 + t96;
+        let t104 = self.fixed[5] * t103;
+        let t105 = t99 * t100;
+        let t106 = t102 - t105;
+        let t107 = self.fixed[4] + t106;
+        let t108 = t90 * t107;
+        let t109 = t104 + t108;
+        let t111 = self.fixed[8] * t9;
+        let t112 = t111 * t2;
+        let t113 = t109 * t100;
+        let t114 = t112 * t113;
+        let t115 = t88 - t114;
+        let t116 = self.fixed[7] * t14;
+        let t117 = t116 * t13;
+        let t118 = self.fixed[1] * t53;
+        let t119 = t118 + T::one();
+        let t120 = self.fixed[4] * t118;
+        let t121 = t97 + t120;
+        let t122 = T::one() / t119;
+        let t123 = self.fixed[5] * t122;
+        let t124 = self.fixed[4] + t123;
+        let t125 = t96 + t118;
+        let t126 = self.fixed[5] * t125;
+        let t127 = t121 * t122;
+        let t128 = t124 - t127;
+        let t129 = self.fixed[4] + t128;
+        let t130 = t118 * t129;
+        let t131 = t126 + t130;
+        let t132 = self.fixed[8] * t14;
+        let t133 = t132 * t13;
+        let t134 = t131 * t122;
+        let t135 = t133 * t134;
+        let t136 = t117 - t135;
+        crate::nalgebra::SVector::<T, 2>::new(t115, t136)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t2 = X[0].sin_pi();
@@ -435,67 +430,76 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t43 = t37 + T::one();
         let t44 = t41 + T::one();
         let t45 = t43 * t44;
-        let t51 = t9 * t35;
-        let t52 = t14 * t39;
-        let t53 = t9 * t14;
-        let t54 = self.fixed[1] * t53;
-        let t55 = t35 * t39;
-        let t56 = t54 * t55;
-        let t57 = t51 + t52;
-        let t58 = t57 + t56;
-        let t59 = self.fixed[1] * t58;
-        let t60 = t59.ln_1p();
-        let t64 = self.fixed[4] * t60;
-        let t68 = t37 + T::nearest(2.0);
-        let t70 = self.fixed[6] * t9;
-        let t71 = t70 * t35;
-        let t72 = t71 * t68;
-        let t73 = t64 + t72;
-        let t74 = t73 / t43;
-        let t75 = t41 + T::nearest(2.0);
-        let t76 = self.fixed[6] * t14;
-        let t77 = t76 * t39;
-        let t78 = t77 * t75;
-        let t79 = t64 + t78;
-        let t80 = t79 / t44;
-        let t89 = self.fixed[7] * t2;
-        let t90 = t43 * t43;
-        let t94 = t35 * t35;
-        let t99 = t2 * t94;
-        let t100 = self.fixed[8] * t99;
-        let t101 = -t100;
-        let t102 = t9 * t101;
-        let t108 = t2 * t35;
-        let t109 = self.fixed[9] * t108;
-        let t110 = -t109;
-        let t111 = t110 + t102;
-        let t112 = t9 * t111;
-        let t115 = self.fixed[10] * t2;
-        let t116 = -t115;
-        let t117 = t116 * t60;
-        let t118 = t112 + t117;
-        let t119 = t118 / t90;
-        let t120 = t89 + t119;
-        let t121 = t9 * t120;
-        let t122 = self.fixed[7] * t13;
-        let t123 = t44 * t44;
-        let t124 = t39 * t39;
-        let t125 = t13 * t124;
-        let t126 = self.fixed[8] * t125;
-        let t127 = -t126;
-        let t128 = t14 * t127;
-        let t129 = t13 * t39;
-        let t130 = self.fixed[9] * t129;
-        let t131 = -t130;
-        let t132 = t131 + t128;
-        let t133 = t14 * t132;
-        let t134 = self.fixed[10] * t13;
-        let t135 = -t134;
-        let t136 = t135 * t60;
-        let t137 = t133 + t136;
-        let t138 = t137 / t123;
-        let t139 = t122 + t138;
-        let t140 = t14 * t139;
+        let t51 = t35 * t44;
+        let t52 = t9 * t51;
+        let t53 = t14 * t39;
+        let t54 = t52 + t53;
+        let t55 = self.fixed[1] * t54;
+        let t56 = t55.ln_1p();
+        let t60 = t37 + T::nearest(2.0);
+        let t64 = self.fixed[5] * t56;
+        let t66 = self.fixed[6] * t9;
+        let t67 = t66 * t35;
+        let t68 = t67 * t60;
+        let t69 = t64 + t68;
+        let t70 = T::one() / t43;
+        let t71 = t69 * t70;
+        let t72 = t41 + T::nearest(2.0);
+        let t73 = self.fixed[6] * t14;
+        let t74 = t73 * t39;
+        let t75 = t74 * t72;
+        let t76 = t64 + t75;
+        let t77 = T::one() / t44;
+        let t78 = t76 * t77;
+        let t87 = self.fixed[7] * t9;
+        let t88 = t87 * t2;
+        let t89 = t9 * t35;
+        let t90 = self.fixed[1] * t89;
+        let t91 = t90 + T::one();
+        let t92 = t39 * t91;
+        let t93 = t14 * t92;
+        let t94 = t93 + t89;
+        let t95 = self.fixed[1] * t94;
+        let t96 = t95.ln_1p();
+        let t97 = self.fixed[5] * t96;
+        let t98 = self.fixed[4] * t90;
+        let t99 = t97 + t98;
+        let t100 = T::one() / t91;
+        let t101 = self.fixed[5] * t100;
+        let t102 = self.fixed[4] + t101;
+        let t103 = t90 + t96;
+        let t104 = self.fixed[5] * t103;
+        let t105 = t99 * t100;
+        let t106 = t102 - t105;
+        let t107 = self.fixed[4] + t106;
+        let t108 = t90 * t107;
+        let t109 = t104 + t108;
+        let t111 = self.fixed[8] * t9;
+        let t112 = t111 * t2;
+        let t113 = t109 * t100;
+        let t114 = t112 * t113;
+        let t115 = t88 - t114;
+        let t116 = self.fixed[7] * t14;
+        let t117 = t116 * t13;
+        let t118 = self.fixed[1] * t53;
+        let t119 = t118 + T::one();
+        let t120 = self.fixed[4] * t118;
+        let t121 = t97 + t120;
+        let t122 = T::one() / t119;
+        let t123 = self.fixed[5] * t122;
+        let t124 = self.fixed[4] + t123;
+        let t125 = t96 + t118;
+        let t126 = self.fixed[5] * t125;
+        let t127 = t121 * t122;
+        let t128 = t124 - t127;
+        let t129 = self.fixed[4] + t128;
+        let t130 = t118 * t129;
+        let t131 = t126 + t130;
+        let t132 = self.fixed[8] * t14;
+        let t133 = t132 * t13;
+        let t134 = t131 * t122;
+        let t135 = t133 * t134;
+        let t136 = t117 - t135;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t11, t16),
             v: crate::nalgebra::SVector::<T, 2>::new(t22, t24),
@@ -503,8 +507,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
             H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t37, T::zero(), T::zero(), t41),
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t43, T::zero(), T::zero(), t44),
             J: t45,
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t74, T::zero(), T::zero(), t80),
-            b: crate::nalgebra::SVector::<T, 2>::new(t121, t140),
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t71, T::zero(), T::zero(), t78),
+            b: crate::nalgebra::SVector::<T, 2>::new(t115, t136),
         }
     }
     fn traction(
@@ -520,24 +524,24 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t14 = t8.sin_pi();
                 let t36 = self.fixed[1] * t9;
                 let t39 = X[1].cos_pi();
-                let t52 = t14 * t39;
-                let t53 = t9 * t14;
-                let t54 = self.fixed[1] * t53;
-                let t142 = t36 + T::one();
-                let t143 = t54 * t39;
-                let t144 = t52 + t143;
-                let t145 = t9 + t144;
-                let t146 = self.fixed[1] * t145;
-                let t147 = t146.ln_1p();
-                let t148 = self.fixed[4] * t147;
-                let t149 = t36 + T::nearest(2.0);
-                let t150 = t9 * t149;
-                let t151 = self.fixed[6] * t150;
-                let t152 = t151 + t148;
-                let t153 = T::one() / t142;
-                let t154 = t153 * t152;
-                let t155 = -t154;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t155, T::zero()))
+                let t40 = self.fixed[1] * t14;
+                let t41 = t40 * t39;
+                let t44 = t41 + T::one();
+                let t53 = t14 * t39;
+                let t188 = t36 + T::one();
+                let t189 = t9 * t44;
+                let t190 = t189 + t53;
+                let t191 = self.fixed[1] * t190;
+                let t192 = t191.ln_1p();
+                let t193 = t36 + T::nearest(2.0);
+                let t194 = self.fixed[5] * t192;
+                let t195 = t9 * t193;
+                let t196 = self.fixed[6] * t195;
+                let t197 = t196 + t194;
+                let t198 = T::one() / t188;
+                let t199 = t198 * t197;
+                let t200 = -t199;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t200, T::zero()))
             }
             crate::Surface::Upper(0) => {
                 let t8 = self.fixed[0] * t;
@@ -545,74 +549,74 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t14 = t8.sin_pi();
                 let t36 = self.fixed[1] * t9;
                 let t39 = X[1].cos_pi();
-                let t52 = t14 * t39;
-                let t53 = t9 * t14;
-                let t54 = self.fixed[1] * t53;
-                let t143 = t54 * t39;
-                let t156 = T::one() - t36;
-                let t157 = t143 - t52;
-                let t158 = t9 + t157;
-                let t159 = self.fixed[1] * t158;
-                let t160 = -t159;
-                let t161 = t160.ln_1p();
-                let t162 = self.fixed[4] * t161;
-                let t163 = T::nearest(2.0) - t36;
-                let t164 = t9 * t163;
-                let t165 = self.fixed[6] * t164;
-                let t166 = t162 - t165;
-                let t167 = T::one() / t156;
-                let t168 = t167 * t166;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t168, T::zero()))
+                let t40 = self.fixed[1] * t14;
+                let t41 = t40 * t39;
+                let t44 = t41 + T::one();
+                let t53 = t14 * t39;
+                let t189 = t9 * t44;
+                let t201 = T::one() - t36;
+                let t202 = t189 - t53;
+                let t203 = self.fixed[1] * t202;
+                let t204 = -t203;
+                let t205 = t204.ln_1p();
+                let t206 = T::nearest(2.0) - t36;
+                let t207 = self.fixed[5] * t205;
+                let t208 = t9 * t206;
+                let t209 = self.fixed[6] * t208;
+                let t210 = t207 - t209;
+                let t211 = T::one() / t201;
+                let t212 = t211 * t210;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t212, T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t8 = self.fixed[0] * t;
                 let t9 = t8.cos_pi();
                 let t14 = t8.sin_pi();
                 let t35 = X[0].cos_pi();
+                let t36 = self.fixed[1] * t9;
+                let t37 = t36 * t35;
                 let t40 = self.fixed[1] * t14;
-                let t51 = t9 * t35;
-                let t53 = t9 * t14;
-                let t54 = self.fixed[1] * t53;
-                let t169 = t40 + T::one();
-                let t170 = t54 * t35;
-                let t171 = t51 + t170;
-                let t172 = t14 + t171;
-                let t173 = self.fixed[1] * t172;
-                let t174 = t173.ln_1p();
-                let t175 = self.fixed[4] * t174;
-                let t176 = t40 + T::nearest(2.0);
-                let t177 = t14 * t176;
-                let t178 = self.fixed[6] * t177;
-                let t179 = t178 + t175;
-                let t180 = T::one() / t169;
-                let t181 = t180 * t179;
-                let t182 = -t181;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t182))
+                let t43 = t37 + T::one();
+                let t89 = t9 * t35;
+                let t213 = t40 + T::one();
+                let t214 = t14 * t43;
+                let t215 = t214 + t89;
+                let t216 = self.fixed[1] * t215;
+                let t217 = t216.ln_1p();
+                let t218 = t40 + T::nearest(2.0);
+                let t219 = self.fixed[5] * t217;
+                let t220 = t14 * t218;
+                let t221 = self.fixed[6] * t220;
+                let t222 = t221 + t219;
+                let t223 = T::one() / t213;
+                let t224 = t223 * t222;
+                let t225 = -t224;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t225))
             }
             crate::Surface::Upper(1) => {
                 let t8 = self.fixed[0] * t;
                 let t9 = t8.cos_pi();
                 let t14 = t8.sin_pi();
                 let t35 = X[0].cos_pi();
+                let t36 = self.fixed[1] * t9;
+                let t37 = t36 * t35;
                 let t40 = self.fixed[1] * t14;
-                let t51 = t9 * t35;
-                let t53 = t9 * t14;
-                let t54 = self.fixed[1] * t53;
-                let t170 = t54 * t35;
-                let t183 = T::one() - t40;
-                let t184 = t170 - t51;
-                let t185 = t14 + t184;
-                let t186 = self.fixed[1] * t185;
-                let t187 = -t186;
-                let t188 = t187.ln_1p();
-                let t189 = self.fixed[4] * t188;
-                let t190 = T::nearest(2.0) - t40;
-                let t191 = t14 * t190;
-                let t192 = self.fixed[6] * t191;
-                let t193 = t189 - t192;
-                let t194 = T::one() / t183;
-                let t195 = t194 * t193;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t195))
+                let t43 = t37 + T::one();
+                let t89 = t9 * t35;
+                let t214 = t14 * t43;
+                let t226 = T::one() - t40;
+                let t227 = t214 - t89;
+                let t228 = self.fixed[1] * t227;
+                let t229 = -t228;
+                let t230 = t229.ln_1p();
+                let t231 = T::nearest(2.0) - t40;
+                let t232 = self.fixed[5] * t230;
+                let t233 = t14 * t231;
+                let t234 = self.fixed[6] * t233;
+                let t235 = t232 - t234;
+                let t236 = T::one() / t226;
+                let t237 = t236 * t235;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t237))
             }
             _ => None,
         }
@@ -648,8 +652,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
     }
     fn material(&self) -> crate::Material<T> {
         crate::Material::NeoHookean {
-            lambda: self.fixed[4],
-            mu: self.fixed[5],
+            lambda: self.fixed[5],
+            mu: self.fixed[4],
         }
     }
     fn density(&self) -> T {
@@ -659,93 +663,89 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[11]
+        self.fixed[12]
     }
     fn body_force_at(
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 5, 11>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 4, 10>::new(*self, X))
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 2, 5, 11> for AxisAligned<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 2, 4, 10> for AxisAligned<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 5] {
+    fn body_force_time(&self, t: T) -> [T; 4] {
         let t8 = self.fixed[0] * t;
         let t9 = t8.cos_pi();
         let t14 = t8.sin_pi();
         let t36 = self.fixed[1] * t9;
         let t40 = self.fixed[1] * t14;
-        let t53 = t9 * t14;
-        let t54 = self.fixed[1] * t53;
-        [t9, t14, t36, t40, t54]
+        [t9, t14, t36, t40]
     }
     #[inline]
-    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 11] {
+    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 10] {
         let t2 = X[0].sin_pi();
         let t13 = X[1].sin_pi();
         let t35 = X[0].cos_pi();
         let t39 = X[1].cos_pi();
-        let t55 = t35 * t39;
-        let t89 = self.fixed[7] * t2;
-        let t94 = t35 * t35;
-        let t99 = t2 * t94;
-        let t100 = self.fixed[8] * t99;
-        let t101 = -t100;
-        let t108 = t2 * t35;
-        let t109 = self.fixed[9] * t108;
-        let t110 = -t109;
-        let t115 = self.fixed[10] * t2;
-        let t116 = -t115;
-        let t122 = self.fixed[7] * t13;
-        let t124 = t39 * t39;
-        let t125 = t13 * t124;
-        let t126 = self.fixed[8] * t125;
-        let t127 = -t126;
-        let t129 = t13 * t39;
-        let t130 = self.fixed[9] * t129;
-        let t131 = -t130;
-        let t134 = self.fixed[10] * t13;
-        let t135 = -t134;
-        [t35, t39, t55, t89, t101, t110, t116, t122, t127, t131, t135]
+        let t137 = self.fixed[7] * t2;
+        let t142 = t35 * t35;
+        let t146 = t2 * t142;
+        let t147 = self.fixed[9] * t146;
+        let t148 = -t147;
+        let t154 = t2 * t35;
+        let t155 = self.fixed[10] * t154;
+        let t160 = self.fixed[11] * t2;
+        let t161 = -t160;
+        let t169 = self.fixed[7] * t13;
+        let t170 = t39 * t39;
+        let t171 = t13 * t170;
+        let t172 = self.fixed[9] * t171;
+        let t173 = -t172;
+        let t174 = t13 * t39;
+        let t175 = self.fixed[10] * t174;
+        let t178 = self.fixed[11] * t13;
+        let t179 = -t178;
+        [t35, t39, t137, t148, t155, t161, t169, t173, t175, t179]
     }
     #[inline(always)]
     fn body_force_staged(
         &self,
-        time: &[T; 5],
-        point: &[T; 11],
+        time: &[T; 4],
+        point: &[T; 10],
     ) -> crate::nalgebra::SVector<T, 2> {
         let t37 = time[2] * point[0];
         let t41 = time[3] * point[1];
         let t43 = t37 + T::one();
         let t44 = t41 + T::one();
-        let t51 = time[0] * point[0];
-        let t52 = time[1] * point[1];
-        let t56 = time[4] * point[2];
-        let t57 = t51 + t52;
-        let t58 = t57 + t56;
-        let t59 = self.fixed[1] * t58;
-        let t60 = t59.ln_1p();
-        let t90 = t43 * t43;
-        let t102 = time[0] * point[4];
-        let t111 = point[5] + t102;
-        let t112 = time[0] * t111;
-        let t117 = point[6] * t60;
-        let t118 = t112 + t117;
-        let t119 = t118 / t90;
-        let t120 = point[3] + t119;
-        let t121 = time[0] * t120;
-        let t123 = t44 * t44;
-        let t128 = time[1] * point[8];
-        let t132 = point[9] + t128;
-        let t133 = time[1] * t132;
-        let t136 = point[10] * t60;
-        let t137 = t133 + t136;
-        let t138 = t137 / t123;
-        let t139 = point[7] + t138;
-        let t140 = time[1] * t139;
-        crate::nalgebra::SVector::<T, 2>::new(t121, t140)
+        let t51 = point[0] * t44;
+        let t52 = time[0] * t51;
+        let t53 = time[1] * point[1];
+        let t54 = t52 + t53;
+        let t55 = self.fixed[1] * t54;
+        let t56 = t55.ln_1p();
+        let t70 = T::one() / t43;
+        let t77 = T::one() / t44;
+        let t156 = time[0] * point[3];
+        let t157 = t156 - point[4];
+        let t162 = time[0] * t157;
+        let t163 = point[5] * t56;
+        let t164 = t162 + t163;
+        let t165 = t70 * t70;
+        let t166 = t164 * t165;
+        let t167 = point[2] + t166;
+        let t168 = time[0] * t167;
+        let t176 = time[1] * point[7];
+        let t177 = t176 - point[8];
+        let t180 = time[1] * t177;
+        let t181 = point[9] * t56;
+        let t182 = t180 + t181;
+        let t183 = t77 * t77;
+        let t184 = t182 * t183;
+        let t185 = point[6] + t184;
+        let t186 = time[1] * t185;
+        crate::nalgebra::SVector::<T, 2>::new(t168, t186)
     }
 }
 impl<T: crate::Real> From<AxisAligned<T>> for crate::AnySolution<T> {

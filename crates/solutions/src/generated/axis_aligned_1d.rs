@@ -37,7 +37,7 @@ impl<T: crate::Real> Default for AxisAligned1dParameters<T> {
 pub struct AxisAligned1d<T: crate::Real> {
     parameters: AxisAligned1dParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 12],
+    fixed: [T; 15],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> AxisAligned1d<T> {
@@ -123,38 +123,57 @@ impl<T: crate::Real> AxisAligned1d<T> {
         let t32 = parameters.nu + T::one();
         let t34 = T::nearest(2.0) * parameters.nu;
         let t35 = T::one() - t34;
-        let t37 = parameters.E * parameters.nu;
-        let t38 = t32 * t35;
-        let t39 = t37 / t38;
-        let t42 = T::nearest(0.5) * parameters.E;
-        let t43 = t42 / t32;
-        let t45 = t14 * t43;
-        let t51 = parameters.nu * parameters.nu;
-        let t52 = T::nearest(2.0) * parameters.A;
-        let t53 = t52 * t19;
-        let t54 = t53 * parameters.E;
-        let t55 = t54 * t51;
-        let t56 = parameters.rho0 * t32;
-        let t57 = t56 * t35;
-        let t58 = t55 / t57;
-        let t61 = parameters.A * parameters.A;
-        let t62 = t61 * parameters.A;
-        let t63 = t19 * t19;
-        let t65 = t39 + t43;
-        let t66 = t62 * t63;
-        let t67 = t66 * t65;
-        let t68 = t67 / parameters.rho0;
-        let t73 = t19 * T::pi();
-        let t74 = T::nearest(2.0) * t61;
-        let t75 = t74 * t73;
-        let t76 = t75 * t65;
-        let t77 = t76 / parameters.rho0;
-        let t83 = t21 * parameters.nu;
-        let t84 = t83 / t57;
-        let t92 = T::nearest(2.0) / t7;
+        let t38 = T::nearest(0.5) * parameters.E;
+        let t39 = t38 / t32;
+        let t41 = parameters.E * parameters.nu;
+        let t42 = t32 * t35;
+        let t43 = t41 / t42;
+        let t45 = t14 * t39;
+        let t52 = parameters.nu * parameters.nu;
+        let t53 = T::nearest(2.0) * parameters.A;
+        let t54 = t53 * t19;
+        let t55 = t54 * parameters.E;
+        let t56 = t55 * t52;
+        let t57 = parameters.rho0 * t32;
+        let t58 = t57 * t35;
+        let t59 = t56 / t58;
+        let t67 = T::nearest(2.0) * t39;
+        let t68 = t43 + t67;
+        let t80 = t14 / parameters.rho0;
+        let t86 = t43 + t39;
+        let t87 = parameters.A * parameters.A;
+        let t88 = t87 * parameters.A;
+        let t89 = t19 * t19;
+        let t91 = t88 * t89;
+        let t92 = t91 * t86;
+        let t93 = t92 / parameters.rho0;
+        let t97 = t19 * T::pi();
+        let t98 = T::nearest(2.0) * t87;
+        let t99 = t98 * t97;
+        let t100 = t99 * t86;
+        let t101 = t100 / parameters.rho0;
+        let t106 = t21 * parameters.nu;
+        let t107 = t106 / t58;
+        let t117 = T::nearest(2.0) / t7;
         Ok(AxisAligned1d {
             parameters,
-            fixed: [t7, t14, t15, t22, t39, t43, t45, t58, t68, t77, t84, t92],
+            fixed: [
+                t7,
+                t14,
+                t15,
+                t20,
+                t22,
+                t39,
+                t43,
+                t45,
+                t59,
+                t68,
+                t80,
+                t93,
+                t101,
+                t107,
+                t117,
+            ],
         })
     }
     /// The solution with parameter values in the order of the description; missing ones take their
@@ -223,7 +242,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         let t2 = X[0].sin_pi();
         let t8 = self.fixed[0] * t;
         let t9 = t8.cos_pi();
-        let t23 = self.fixed[3] * t9;
+        let t23 = self.fixed[4] * t9;
         let t24 = t23 * t2;
         let t25 = -t24;
         crate::nalgebra::SVector::<T, 1>::new(t25)
@@ -278,14 +297,15 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         let t28 = t27 * t26;
         let t30 = t28 + T::one();
         let t36 = t28.ln_1p();
-        let t40 = self.fixed[4] * t36;
-        let t44 = t28 + T::nearest(2.0);
-        let t46 = self.fixed[6] * t9;
+        let t40 = t28 + T::nearest(2.0);
+        let t44 = self.fixed[6] * t36;
+        let t46 = self.fixed[7] * t9;
         let t47 = t46 * t26;
-        let t48 = t47 * t44;
-        let t49 = t40 + t48;
-        let t50 = t49 / t30;
-        crate::nalgebra::SMatrix::<T, 1, 1>::new(t50)
+        let t48 = t47 * t40;
+        let t49 = t44 + t48;
+        let t50 = T::one() / t30;
+        let t51 = t49 * t50;
+        crate::nalgebra::SMatrix::<T, 1, 1>::new(t51)
     }
     #[inline]
     fn body_force(
@@ -301,26 +321,33 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         let t28 = t27 * t26;
         let t30 = t28 + T::one();
         let t36 = t28.ln_1p();
-        let t59 = self.fixed[7] * t2;
-        let t60 = t30 * t30;
-        let t64 = t26 * t26;
-        let t69 = t2 * t64;
-        let t70 = self.fixed[8] * t69;
-        let t71 = -t70;
+        let t44 = self.fixed[6] * t36;
+        let t46 = self.fixed[7] * t9;
+        let t47 = t46 * t26;
+        let t50 = T::one() / t30;
+        let t60 = self.fixed[8] * t9;
+        let t61 = t60 * t2;
+        let t62 = t44 + t47;
+        let t63 = self.fixed[3] * t9;
+        let t64 = t63 * t2;
+        let t65 = -t64;
+        let t66 = self.fixed[6] * t50;
+        let t69 = self.fixed[9] + t66;
+        let t70 = self.fixed[1] * t26;
+        let t71 = t70 * t69;
         let t72 = t9 * t71;
-        let t78 = t2 * t26;
-        let t79 = self.fixed[9] * t78;
-        let t80 = -t79;
-        let t81 = t80 + t72;
-        let t82 = t9 * t81;
-        let t85 = self.fixed[10] * t2;
-        let t86 = -t85;
-        let t87 = t86 * t36;
-        let t88 = t82 + t87;
-        let t89 = t88 / t60;
-        let t90 = t59 + t89;
-        let t91 = t9 * t90;
-        crate::nalgebra::SVector::<T, 1>::new(t91)
+        let t73 = t72 + t44;
+        let t74 = T::pi() * t73;
+        let t75 = t2 * t74;
+        let t76 = t62 * t65;
+        let t77 = t76 * t50;
+        let t78 = t26 * t77;
+        let t79 = t75 + t78;
+        let t81 = self.fixed[10] * t9;
+        let t82 = t79 * t50;
+        let t83 = t81 * t82;
+        let t84 = t61 - t83;
+        crate::nalgebra::SVector::<T, 1>::new(t84)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 1>, t: T) -> crate::Fields<T, 1> {
         let t2 = X[0].sin_pi();
@@ -332,7 +359,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         let t16 = self.fixed[2] * t13;
         let t17 = t16 * t2;
         let t18 = -t17;
-        let t23 = self.fixed[3] * t9;
+        let t23 = self.fixed[4] * t9;
         let t24 = t23 * t2;
         let t25 = -t24;
         let t26 = X[0].cos_pi();
@@ -340,32 +367,36 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         let t28 = t27 * t26;
         let t30 = t28 + T::one();
         let t36 = t28.ln_1p();
-        let t40 = self.fixed[4] * t36;
-        let t44 = t28 + T::nearest(2.0);
-        let t46 = self.fixed[6] * t9;
+        let t40 = t28 + T::nearest(2.0);
+        let t44 = self.fixed[6] * t36;
+        let t46 = self.fixed[7] * t9;
         let t47 = t46 * t26;
-        let t48 = t47 * t44;
-        let t49 = t40 + t48;
-        let t50 = t49 / t30;
-        let t59 = self.fixed[7] * t2;
-        let t60 = t30 * t30;
-        let t64 = t26 * t26;
-        let t69 = t2 * t64;
-        let t70 = self.fixed[8] * t69;
-        let t71 = -t70;
+        let t48 = t47 * t40;
+        let t49 = t44 + t48;
+        let t50 = T::one() / t30;
+        let t51 = t49 * t50;
+        let t60 = self.fixed[8] * t9;
+        let t61 = t60 * t2;
+        let t62 = t44 + t47;
+        let t63 = self.fixed[3] * t9;
+        let t64 = t63 * t2;
+        let t65 = -t64;
+        let t66 = self.fixed[6] * t50;
+        let t69 = self.fixed[9] + t66;
+        let t70 = self.fixed[1] * t26;
+        let t71 = t70 * t69;
         let t72 = t9 * t71;
-        let t78 = t2 * t26;
-        let t79 = self.fixed[9] * t78;
-        let t80 = -t79;
-        let t81 = t80 + t72;
-        let t82 = t9 * t81;
-        let t85 = self.fixed[10] * t2;
-        let t86 = -t85;
-        let t87 = t86 * t36;
-        let t88 = t82 + t87;
-        let t89 = t88 / t60;
-        let t90 = t59 + t89;
-        let t91 = t9 * t90;
+        let t73 = t72 + t44;
+        let t74 = T::pi() * t73;
+        let t75 = t2 * t74;
+        let t76 = t62 * t65;
+        let t77 = t76 * t50;
+        let t78 = t26 * t77;
+        let t79 = t75 + t78;
+        let t81 = self.fixed[10] * t9;
+        let t82 = t79 * t50;
+        let t83 = t81 * t82;
+        let t84 = t61 - t83;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 1>::new(t11),
             v: crate::nalgebra::SVector::<T, 1>::new(t18),
@@ -373,8 +404,8 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
             H: crate::nalgebra::SMatrix::<T, 1, 1>::new(t28),
             F: crate::nalgebra::SMatrix::<T, 1, 1>::new(t30),
             J: t30,
-            P: crate::nalgebra::SMatrix::<T, 1, 1>::new(t50),
-            b: crate::nalgebra::SVector::<T, 1>::new(t91),
+            P: crate::nalgebra::SMatrix::<T, 1, 1>::new(t51),
+            b: crate::nalgebra::SVector::<T, 1>::new(t84),
         }
     }
     fn traction(
@@ -388,31 +419,31 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
                 let t8 = self.fixed[0] * t;
                 let t9 = t8.cos_pi();
                 let t27 = self.fixed[1] * t9;
-                let t94 = t27 + T::one();
-                let t95 = t27.ln_1p();
-                let t96 = self.fixed[4] * t95;
-                let t97 = t27 + T::nearest(2.0);
-                let t98 = t9 * t97;
-                let t99 = self.fixed[6] * t98;
-                let t100 = t96 + t99;
-                let t101 = t100 / t94;
-                let t102 = -t101;
-                Some(crate::nalgebra::SVector::<T, 1>::new(t102))
+                let t119 = t27 + T::one();
+                let t120 = t27.ln_1p();
+                let t121 = t27 + T::nearest(2.0);
+                let t122 = self.fixed[6] * t120;
+                let t123 = t9 * t121;
+                let t124 = self.fixed[7] * t123;
+                let t125 = t122 + t124;
+                let t126 = t125 / t119;
+                let t127 = -t126;
+                Some(crate::nalgebra::SVector::<T, 1>::new(t127))
             }
             crate::Surface::Upper(0) => {
                 let t8 = self.fixed[0] * t;
                 let t9 = t8.cos_pi();
                 let t27 = self.fixed[1] * t9;
-                let t103 = T::one() - t27;
-                let t104 = -t27;
-                let t105 = t104.ln_1p();
-                let t106 = self.fixed[4] * t105;
-                let t107 = T::nearest(2.0) - t27;
-                let t108 = t9 * t107;
-                let t109 = self.fixed[6] * t108;
-                let t110 = t106 - t109;
-                let t111 = t110 / t103;
-                Some(crate::nalgebra::SVector::<T, 1>::new(t111))
+                let t128 = T::one() - t27;
+                let t129 = -t27;
+                let t130 = t129.ln_1p();
+                let t131 = T::nearest(2.0) - t27;
+                let t132 = self.fixed[6] * t130;
+                let t133 = t9 * t131;
+                let t134 = self.fixed[7] * t133;
+                let t135 = t132 - t134;
+                let t136 = t135 / t128;
+                Some(crate::nalgebra::SVector::<T, 1>::new(t136))
             }
             _ => None,
         }
@@ -440,7 +471,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
     }
     fn material(&self) -> crate::Material<T> {
         crate::Material::NeoHookean {
-            lambda: self.fixed[4],
+            lambda: self.fixed[6],
             mu: self.fixed[5],
         }
     }
@@ -451,7 +482,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[11]
+        self.fixed[14]
     }
     fn body_force_at(
         &self,
@@ -473,17 +504,16 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 5> for AxisAligned1d<T> {
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 1>) -> [T; 5] {
         let t2 = X[0].sin_pi();
         let t26 = X[0].cos_pi();
-        let t59 = self.fixed[7] * t2;
-        let t64 = t26 * t26;
-        let t69 = t2 * t64;
-        let t70 = self.fixed[8] * t69;
-        let t71 = -t70;
-        let t78 = t2 * t26;
-        let t79 = self.fixed[9] * t78;
-        let t80 = -t79;
-        let t85 = self.fixed[10] * t2;
-        let t86 = -t85;
-        [t26, t59, t71, t80, t86]
+        let t85 = self.fixed[8] * t2;
+        let t90 = t26 * t26;
+        let t94 = t2 * t90;
+        let t95 = self.fixed[11] * t94;
+        let t96 = -t95;
+        let t102 = t2 * t26;
+        let t103 = self.fixed[12] * t102;
+        let t108 = self.fixed[13] * t2;
+        let t109 = -t108;
+        [t26, t85, t96, t103, t109]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -494,16 +524,17 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 5> for AxisAligned1d<T> {
         let t28 = time[1] * point[0];
         let t30 = t28 + T::one();
         let t36 = t28.ln_1p();
-        let t60 = t30 * t30;
-        let t72 = time[0] * point[2];
-        let t81 = point[3] + t72;
-        let t82 = time[0] * t81;
-        let t87 = point[4] * t36;
-        let t88 = t82 + t87;
-        let t89 = t88 / t60;
-        let t90 = point[1] + t89;
-        let t91 = time[0] * t90;
-        crate::nalgebra::SVector::<T, 1>::new(t91)
+        let t50 = T::one() / t30;
+        let t104 = time[0] * point[2];
+        let t105 = t104 - point[3];
+        let t110 = time[0] * t105;
+        let t111 = point[4] * t36;
+        let t112 = t110 + t111;
+        let t113 = t50 * t50;
+        let t114 = t112 * t113;
+        let t115 = point[1] + t114;
+        let t116 = time[0] * t115;
+        crate::nalgebra::SVector::<T, 1>::new(t116)
     }
 }
 impl<T: crate::Real> From<AxisAligned1d<T>> for crate::AnySolution<T> {

@@ -39,7 +39,7 @@ impl<T: crate::Real> Default for AxisAligned3dParameters<T> {
 pub struct AxisAligned3d<T: crate::Real> {
     parameters: AxisAligned3dParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 21],
+    fixed: [T; 25],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> AxisAligned3d<T> {
@@ -132,47 +132,50 @@ impl<T: crate::Real> AxisAligned3d<T> {
         let t88 = parameters.nu + T::one();
         let t89 = T::nearest(2.0) * parameters.nu;
         let t90 = T::one() - t89;
-        let t102 = parameters.E * parameters.nu;
-        let t103 = t88 * t90;
-        let t104 = t102 / t103;
-        let t106 = T::nearest(0.5) * parameters.E;
-        let t107 = t106 / t88;
-        let t109 = t31 * t107;
-        let t125 = parameters.nu * parameters.nu;
-        let t126 = T::nearest(2.0) * parameters.A;
-        let t127 = t126 * t46;
-        let t128 = t127 * parameters.E;
-        let t129 = t128 * t125;
-        let t130 = parameters.rho0 * t88;
-        let t131 = t130 * t90;
-        let t132 = t129 / t131;
-        let t135 = parameters.A * parameters.A;
-        let t136 = t135 * parameters.A;
-        let t137 = t46 * t46;
-        let t139 = t104 + t107;
-        let t140 = t136 * t137;
-        let t141 = t140 * t139;
-        let t142 = t141 / parameters.rho0;
-        let t147 = t46 * T::pi();
-        let t148 = T::nearest(2.0) * t135;
-        let t149 = t148 * t147;
-        let t150 = t149 * t139;
-        let t151 = t150 / parameters.rho0;
-        let t157 = t48 * parameters.nu;
-        let t158 = t157 / t131;
-        let t166 = t48 * t125;
-        let t167 = t166 / t131;
-        let t173 = T::nearest(0.125) * t136;
-        let t174 = t173 * t137;
-        let t175 = t174 * t139;
-        let t176 = t175 / parameters.rho0;
-        let t180 = T::nearest(0.5) * t135;
-        let t181 = t180 * t147;
-        let t182 = t181 * t139;
-        let t183 = t182 / parameters.rho0;
-        let t189 = t54 * parameters.nu;
-        let t190 = t189 / t131;
-        let t215 = T::nearest(2.0) / t7;
+        let t100 = T::nearest(0.5) * parameters.E;
+        let t101 = t100 / t88;
+        let t103 = parameters.E * parameters.nu;
+        let t104 = t88 * t90;
+        let t105 = t103 / t104;
+        let t107 = t31 * t101;
+        let t126 = parameters.nu * parameters.nu;
+        let t127 = T::nearest(2.0) * parameters.A;
+        let t128 = t127 * t46;
+        let t129 = t128 * parameters.E;
+        let t130 = t129 * t126;
+        let t131 = parameters.rho0 * t88;
+        let t132 = t131 * t90;
+        let t133 = t130 / t132;
+        let t142 = t105 + t101;
+        let t143 = t31 * t142;
+        let t148 = t47 / parameters.rho0;
+        let t154 = t48 * t126;
+        let t155 = t154 / t132;
+        let t171 = T::one() / parameters.rho0;
+        let t196 = parameters.A * parameters.A;
+        let t197 = t196 * parameters.A;
+        let t198 = t46 * t46;
+        let t200 = t197 * t198;
+        let t201 = t200 * t142;
+        let t202 = t201 / parameters.rho0;
+        let t206 = t46 * T::pi();
+        let t207 = T::nearest(2.0) * t196;
+        let t208 = t207 * t206;
+        let t209 = t208 * t142;
+        let t210 = t209 / parameters.rho0;
+        let t215 = t48 * parameters.nu;
+        let t216 = t215 / t132;
+        let t229 = T::nearest(0.125) * t197;
+        let t230 = t229 * t198;
+        let t231 = t230 * t142;
+        let t232 = t231 / parameters.rho0;
+        let t235 = T::nearest(0.5) * t196;
+        let t236 = t235 * t206;
+        let t237 = t236 * t142;
+        let t238 = t237 / parameters.rho0;
+        let t243 = t54 * parameters.nu;
+        let t244 = t243 / t132;
+        let t269 = T::nearest(2.0) / t7;
         Ok(AxisAligned3d {
             parameters,
             fixed: [
@@ -184,19 +187,23 @@ impl<T: crate::Real> AxisAligned3d<T> {
                 t37,
                 t38,
                 t49,
+                t53,
                 t55,
-                t104,
+                t101,
+                t105,
                 t107,
-                t109,
-                t132,
-                t142,
-                t151,
-                t158,
-                t167,
-                t176,
-                t183,
-                t190,
-                t215,
+                t133,
+                t143,
+                t148,
+                t155,
+                t171,
+                t202,
+                t210,
+                t216,
+                t232,
+                t238,
+                t244,
+                t269,
             ],
         })
     }
@@ -241,15 +248,15 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t9 = t8.sin_pi();
         let t10 = self.parameters.A * t9;
         let t11 = t10 * t2;
-        let t14 = X[1].sin_pi();
-        let t17 = t8.cos_pi();
-        let t18 = self.fixed[1] * t17;
-        let t19 = t9 - t18;
-        let t21 = self.fixed[2] * t19;
-        let t22 = t21 * t14;
+        let t13 = X[1].sin_pi();
+        let t15 = t8.cos_pi();
+        let t17 = self.fixed[1] * t15;
+        let t18 = t9 - t17;
+        let t21 = self.fixed[2] * t18;
+        let t22 = t21 * t13;
         let t23 = -t22;
         let t25 = X[2].sin_pi();
-        let t26 = t9 + t18;
+        let t26 = t9 + t17;
         let t27 = self.fixed[2] * t26;
         let t28 = t27 * t25;
         let t29 = -t28;
@@ -264,17 +271,17 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t2 = X[0].sin_pi();
         let t8 = self.fixed[0] * t;
         let t9 = t8.sin_pi();
-        let t14 = X[1].sin_pi();
-        let t17 = t8.cos_pi();
+        let t13 = X[1].sin_pi();
+        let t15 = t8.cos_pi();
         let t25 = X[2].sin_pi();
-        let t33 = self.fixed[4] * t17;
+        let t33 = self.fixed[4] * t15;
         let t34 = t33 * t2;
         let t35 = self.fixed[1] * t9;
-        let t36 = t17 + t35;
+        let t36 = t15 + t35;
         let t39 = self.fixed[6] * t36;
-        let t40 = t39 * t14;
+        let t40 = t39 * t13;
         let t41 = -t40;
-        let t42 = t17 - t35;
+        let t42 = t15 - t35;
         let t43 = self.fixed[6] * t42;
         let t44 = t43 * t25;
         let t45 = -t44;
@@ -289,18 +296,18 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t2 = X[0].sin_pi();
         let t8 = self.fixed[0] * t;
         let t9 = t8.sin_pi();
-        let t14 = X[1].sin_pi();
-        let t17 = t8.cos_pi();
-        let t18 = self.fixed[1] * t17;
-        let t19 = t9 - t18;
+        let t13 = X[1].sin_pi();
+        let t15 = t8.cos_pi();
+        let t17 = self.fixed[1] * t15;
+        let t18 = t9 - t17;
         let t25 = X[2].sin_pi();
-        let t26 = t9 + t18;
+        let t26 = t9 + t17;
         let t50 = self.fixed[7] * t9;
         let t51 = t50 * t2;
         let t52 = -t51;
-        let t56 = self.fixed[8] * t19;
-        let t57 = t56 * t14;
-        let t58 = self.fixed[8] * t26;
+        let t56 = self.fixed[9] * t18;
+        let t57 = t56 * t13;
+        let t58 = self.fixed[9] * t26;
         let t59 = t58 * t25;
         crate::nalgebra::SVector::<T, 3>::new(t52, t57, t59)
     }
@@ -312,15 +319,15 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
     ) -> crate::nalgebra::SMatrix<T, 3, 3> {
         let t8 = self.fixed[0] * t;
         let t9 = t8.sin_pi();
-        let t17 = t8.cos_pi();
-        let t18 = self.fixed[1] * t17;
-        let t19 = t9 - t18;
-        let t26 = t9 + t18;
+        let t15 = t8.cos_pi();
+        let t17 = self.fixed[1] * t15;
+        let t18 = t9 - t17;
+        let t26 = t9 + t17;
         let t60 = X[0].cos_pi();
         let t61 = self.fixed[3] * t9;
         let t62 = t61 * t60;
         let t64 = X[1].cos_pi();
-        let t65 = self.fixed[5] * t19;
+        let t65 = self.fixed[5] * t18;
         let t66 = t65 * t64;
         let t67 = -t66;
         let t68 = X[2].cos_pi();
@@ -351,17 +358,17 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
     ) -> crate::nalgebra::SMatrix<T, 3, 3> {
         let t8 = self.fixed[0] * t;
         let t9 = t8.sin_pi();
-        let t17 = t8.cos_pi();
-        let t18 = self.fixed[1] * t17;
-        let t19 = t9 - t18;
-        let t26 = t9 + t18;
+        let t15 = t8.cos_pi();
+        let t17 = self.fixed[1] * t15;
+        let t18 = t9 - t17;
+        let t26 = t9 + t17;
         let t60 = X[0].cos_pi();
         let t61 = self.fixed[3] * t9;
         let t62 = t61 * t60;
         let t64 = X[1].cos_pi();
         let t68 = X[2].cos_pi();
         let t73 = t62 + T::one();
-        let t74 = self.fixed[3] * t19;
+        let t74 = self.fixed[3] * t18;
         let t75 = t74 * t64;
         let t77 = T::nearest(2.0) - t75;
         let t78 = T::nearest(0.5) * t77;
@@ -389,15 +396,15 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
     fn jacobian(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> T {
         let t8 = self.fixed[0] * t;
         let t9 = t8.sin_pi();
-        let t17 = t8.cos_pi();
-        let t18 = self.fixed[1] * t17;
-        let t19 = t9 - t18;
-        let t26 = t9 + t18;
+        let t15 = t8.cos_pi();
+        let t17 = self.fixed[1] * t15;
+        let t18 = t9 - t17;
+        let t26 = t9 + t17;
         let t60 = X[0].cos_pi();
         let t61 = self.fixed[3] * t9;
         let t62 = t61 * t60;
         let t64 = X[1].cos_pi();
-        let t65 = self.fixed[5] * t19;
+        let t65 = self.fixed[5] * t18;
         let t66 = t65 * t64;
         let t67 = -t66;
         let t68 = X[2].cos_pi();
@@ -419,15 +426,15 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
     ) -> crate::nalgebra::SMatrix<T, 3, 3> {
         let t8 = self.fixed[0] * t;
         let t9 = t8.sin_pi();
-        let t17 = t8.cos_pi();
-        let t18 = self.fixed[1] * t17;
-        let t19 = t9 - t18;
-        let t26 = t9 + t18;
+        let t15 = t8.cos_pi();
+        let t17 = self.fixed[1] * t15;
+        let t18 = t9 - t17;
+        let t26 = t9 + t17;
         let t60 = X[0].cos_pi();
         let t61 = self.fixed[3] * t9;
         let t62 = t61 * t60;
         let t64 = X[1].cos_pi();
-        let t65 = self.fixed[5] * t19;
+        let t65 = self.fixed[5] * t18;
         let t66 = t65 * t64;
         let t67 = -t66;
         let t68 = X[2].cos_pi();
@@ -437,40 +444,41 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t73 = t62 + T::one();
         let t83 = t67 + T::one();
         let t84 = t71 + T::one();
-        let t91 = t62 * t67;
-        let t92 = t62 * t71;
-        let t93 = t67 * t71;
-        let t94 = t62 * t93;
-        let t95 = t62 + t67;
-        let t96 = t95 + t71;
+        let t91 = t67 * t84;
+        let t92 = t91 - t70;
+        let t93 = t92 + T::one();
+        let t94 = t9 * t60;
+        let t95 = t94 * t93;
+        let t96 = self.fixed[3] * t95;
         let t97 = t96 + t91;
-        let t98 = t97 + t92;
-        let t99 = t98 + t93;
-        let t100 = t99 + t94;
-        let t101 = t100.ln_1p();
-        let t105 = self.fixed[9] * t101;
-        let t108 = t62 + T::nearest(2.0);
-        let t110 = self.fixed[11] * t9;
-        let t111 = t110 * t60;
-        let t112 = t111 * t108;
-        let t113 = t105 + t112;
-        let t114 = t113 / t73;
-        let t115 = t67 + T::nearest(2.0);
-        let t116 = t67 * t115;
-        let t117 = self.fixed[10] * t116;
-        let t118 = t105 + t117;
-        let t119 = t118 / t83;
+        let t98 = t97 - t70;
+        let t99 = t98.ln_1p();
+        let t102 = t62 + T::nearest(2.0);
+        let t106 = self.fixed[11] * t99;
+        let t108 = self.fixed[12] * t9;
+        let t109 = t108 * t60;
+        let t110 = t109 * t102;
+        let t111 = t106 + t110;
+        let t112 = T::one() / t73;
+        let t113 = t111 * t112;
+        let t114 = t67 + T::nearest(2.0);
+        let t115 = t67 * t114;
+        let t116 = self.fixed[10] * t115;
+        let t117 = t106 + t116;
+        let t118 = T::one() / t83;
+        let t119 = t117 * t118;
         let t120 = t71 + T::nearest(2.0);
         let t121 = t71 * t120;
         let t122 = self.fixed[10] * t121;
-        let t123 = t105 + t122;
-        let t124 = t123 / t84;
+        let t123 = t106 + t122;
+        let t124 = T::one() / t84;
+        let t125 = t123 * t124;
         crate::nalgebra::SMatrix::<
             T,
             3,
             3,
         >::new(
-            t114,
+            t113,
             T::zero(),
             T::zero(),
             T::zero(),
@@ -478,7 +486,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
             T::zero(),
             T::zero(),
             T::zero(),
-            t124,
+            t125,
         )
     }
     #[inline]
@@ -490,17 +498,17 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t2 = X[0].sin_pi();
         let t8 = self.fixed[0] * t;
         let t9 = t8.sin_pi();
-        let t14 = X[1].sin_pi();
-        let t17 = t8.cos_pi();
-        let t18 = self.fixed[1] * t17;
-        let t19 = t9 - t18;
+        let t13 = X[1].sin_pi();
+        let t15 = t8.cos_pi();
+        let t17 = self.fixed[1] * t15;
+        let t18 = t9 - t17;
         let t25 = X[2].sin_pi();
-        let t26 = t9 + t18;
+        let t26 = t9 + t17;
         let t60 = X[0].cos_pi();
         let t61 = self.fixed[3] * t9;
         let t62 = t61 * t60;
         let t64 = X[1].cos_pi();
-        let t65 = self.fixed[5] * t19;
+        let t65 = self.fixed[5] * t18;
         let t66 = t65 * t64;
         let t67 = -t66;
         let t68 = X[2].cos_pi();
@@ -510,73 +518,77 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t73 = t62 + T::one();
         let t83 = t67 + T::one();
         let t84 = t71 + T::one();
-        let t91 = t62 * t67;
-        let t92 = t62 * t71;
-        let t93 = t67 * t71;
-        let t94 = t62 * t93;
-        let t95 = t62 + t67;
-        let t96 = t95 + t71;
+        let t91 = t67 * t84;
+        let t92 = t91 - t70;
+        let t93 = t92 + T::one();
+        let t94 = t9 * t60;
+        let t95 = t94 * t93;
+        let t96 = self.fixed[3] * t95;
         let t97 = t96 + t91;
-        let t98 = t97 + t92;
-        let t99 = t98 + t93;
-        let t100 = t99 + t94;
-        let t101 = t100.ln_1p();
-        let t133 = self.fixed[12] * t2;
-        let t134 = t73 * t73;
-        let t138 = t60 * t60;
-        let t143 = t2 * t138;
-        let t144 = self.fixed[13] * t143;
-        let t145 = -t144;
-        let t146 = t9 * t145;
-        let t152 = t2 * t60;
-        let t153 = self.fixed[14] * t152;
-        let t154 = -t153;
-        let t155 = t154 + t146;
-        let t156 = t9 * t155;
-        let t159 = self.fixed[15] * t2;
-        let t160 = -t159;
-        let t161 = t160 * t101;
-        let t162 = t156 + t161;
-        let t163 = t162 / t134;
-        let t164 = t133 + t163;
-        let t165 = t9 * t164;
-        let t168 = self.fixed[16] * t14;
-        let t169 = -t168;
-        let t170 = t83 * t83;
-        let t172 = t64 * t64;
-        let t177 = t14 * t172;
-        let t178 = self.fixed[17] * t177;
-        let t179 = t19 * t178;
-        let t184 = t14 * t64;
-        let t185 = self.fixed[18] * t184;
-        let t186 = -t185;
-        let t187 = t186 + t179;
-        let t188 = t19 * t187;
-        let t191 = self.fixed[19] * t14;
-        let t192 = t191 * t101;
-        let t193 = t188 + t192;
-        let t194 = t193 / t170;
-        let t195 = t169 + t194;
-        let t196 = t19 * t195;
-        let t197 = self.fixed[16] * t25;
-        let t198 = -t197;
-        let t199 = t84 * t84;
-        let t200 = t68 * t68;
-        let t201 = t25 * t200;
-        let t202 = self.fixed[17] * t201;
-        let t203 = t26 * t202;
-        let t204 = t25 * t68;
-        let t205 = self.fixed[18] * t204;
-        let t206 = -t205;
-        let t207 = t206 + t203;
-        let t208 = t26 * t207;
-        let t209 = self.fixed[19] * t25;
-        let t210 = t209 * t101;
-        let t211 = t208 + t210;
-        let t212 = t211 / t199;
-        let t213 = t198 + t212;
-        let t214 = t26 * t213;
-        crate::nalgebra::SVector::<T, 3>::new(t165, t196, t214)
+        let t98 = t97 - t70;
+        let t99 = t98.ln_1p();
+        let t106 = self.fixed[11] * t99;
+        let t108 = self.fixed[12] * t9;
+        let t109 = t108 * t60;
+        let t112 = T::one() / t73;
+        let t118 = T::one() / t83;
+        let t124 = T::one() / t84;
+        let t134 = self.fixed[13] * t9;
+        let t135 = t134 * t2;
+        let t136 = t106 + t109;
+        let t137 = self.fixed[11] - t136;
+        let t138 = t112 * t137;
+        let t139 = self.fixed[10] + t138;
+        let t140 = t94 * t139;
+        let t141 = self.fixed[3] * t140;
+        let t144 = self.fixed[14] * t60;
+        let t145 = t9 * t144;
+        let t146 = t141 + t145;
+        let t147 = t146 + t106;
+        let t149 = self.fixed[15] * t9;
+        let t150 = t149 * t2;
+        let t151 = t147 * t112;
+        let t152 = t150 * t151;
+        let t153 = t135 - t152;
+        let t156 = self.fixed[16] * t18;
+        let t157 = t156 * t13;
+        let t158 = self.fixed[8] * t18;
+        let t159 = t158 * t13;
+        let t160 = self.fixed[10] * t67;
+        let t161 = t106 + t160;
+        let t162 = self.fixed[11] * t118;
+        let t163 = self.fixed[10] + t162;
+        let t164 = t99 - t66;
+        let t165 = self.fixed[11] * t164;
+        let t166 = t161 * t118;
+        let t167 = t163 - t166;
+        let t168 = self.fixed[10] + t167;
+        let t169 = t67 * t168;
+        let t170 = t165 + t169;
+        let t172 = t159 * t170;
+        let t173 = t172 * t118;
+        let t174 = self.fixed[17] * t173;
+        let t175 = t174 - t157;
+        let t176 = self.fixed[16] * t26;
+        let t177 = t176 * t25;
+        let t178 = self.fixed[8] * t26;
+        let t179 = t178 * t25;
+        let t180 = self.fixed[10] * t71;
+        let t181 = t106 + t180;
+        let t182 = self.fixed[11] * t124;
+        let t183 = self.fixed[10] + t182;
+        let t184 = t99 - t70;
+        let t185 = self.fixed[11] * t184;
+        let t186 = t181 * t124;
+        let t187 = t183 - t186;
+        let t188 = self.fixed[10] + t187;
+        let t189 = t71 * t188;
+        let t190 = t185 + t189;
+        let t191 = t179 * t190;
+        let t192 = t191 * t124;
+        let t193 = self.fixed[17] * t192;
+        let t194 = t193 - t177;
+        crate::nalgebra::SVector::<T, 3>::new(t153, t175, t194)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> crate::Fields<T, 3> {
         let t2 = X[0].sin_pi();
@@ -584,41 +596,41 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t9 = t8.sin_pi();
         let t10 = self.parameters.A * t9;
         let t11 = t10 * t2;
-        let t14 = X[1].sin_pi();
-        let t17 = t8.cos_pi();
-        let t18 = self.fixed[1] * t17;
-        let t19 = t9 - t18;
-        let t21 = self.fixed[2] * t19;
-        let t22 = t21 * t14;
+        let t13 = X[1].sin_pi();
+        let t15 = t8.cos_pi();
+        let t17 = self.fixed[1] * t15;
+        let t18 = t9 - t17;
+        let t21 = self.fixed[2] * t18;
+        let t22 = t21 * t13;
         let t23 = -t22;
         let t25 = X[2].sin_pi();
-        let t26 = t9 + t18;
+        let t26 = t9 + t17;
         let t27 = self.fixed[2] * t26;
         let t28 = t27 * t25;
         let t29 = -t28;
-        let t33 = self.fixed[4] * t17;
+        let t33 = self.fixed[4] * t15;
         let t34 = t33 * t2;
         let t35 = self.fixed[1] * t9;
-        let t36 = t17 + t35;
+        let t36 = t15 + t35;
         let t39 = self.fixed[6] * t36;
-        let t40 = t39 * t14;
+        let t40 = t39 * t13;
         let t41 = -t40;
-        let t42 = t17 - t35;
+        let t42 = t15 - t35;
         let t43 = self.fixed[6] * t42;
         let t44 = t43 * t25;
         let t45 = -t44;
         let t50 = self.fixed[7] * t9;
         let t51 = t50 * t2;
         let t52 = -t51;
-        let t56 = self.fixed[8] * t19;
-        let t57 = t56 * t14;
-        let t58 = self.fixed[8] * t26;
+        let t56 = self.fixed[9] * t18;
+        let t57 = t56 * t13;
+        let t58 = self.fixed[9] * t26;
         let t59 = t58 * t25;
         let t60 = X[0].cos_pi();
         let t61 = self.fixed[3] * t9;
         let t62 = t61 * t60;
         let t64 = X[1].cos_pi();
-        let t65 = self.fixed[5] * t19;
+        let t65 = self.fixed[5] * t18;
         let t66 = t65 * t64;
         let t67 = -t66;
         let t68 = X[2].cos_pi();
@@ -626,7 +638,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t70 = t69 * t68;
         let t71 = -t70;
         let t73 = t62 + T::one();
-        let t74 = self.fixed[3] * t19;
+        let t74 = self.fixed[3] * t18;
         let t75 = t74 * t64;
         let t77 = T::nearest(2.0) - t75;
         let t78 = T::nearest(0.5) * t77;
@@ -638,89 +650,90 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t84 = t71 + T::one();
         let t85 = t73 * t83;
         let t86 = t85 * t84;
-        let t91 = t62 * t67;
-        let t92 = t62 * t71;
-        let t93 = t67 * t71;
-        let t94 = t62 * t93;
-        let t95 = t62 + t67;
-        let t96 = t95 + t71;
+        let t91 = t67 * t84;
+        let t92 = t91 - t70;
+        let t93 = t92 + T::one();
+        let t94 = t9 * t60;
+        let t95 = t94 * t93;
+        let t96 = self.fixed[3] * t95;
         let t97 = t96 + t91;
-        let t98 = t97 + t92;
-        let t99 = t98 + t93;
-        let t100 = t99 + t94;
-        let t101 = t100.ln_1p();
-        let t105 = self.fixed[9] * t101;
-        let t108 = t62 + T::nearest(2.0);
-        let t110 = self.fixed[11] * t9;
-        let t111 = t110 * t60;
-        let t112 = t111 * t108;
-        let t113 = t105 + t112;
-        let t114 = t113 / t73;
-        let t115 = t67 + T::nearest(2.0);
-        let t116 = t67 * t115;
-        let t117 = self.fixed[10] * t116;
-        let t118 = t105 + t117;
-        let t119 = t118 / t83;
+        let t98 = t97 - t70;
+        let t99 = t98.ln_1p();
+        let t102 = t62 + T::nearest(2.0);
+        let t106 = self.fixed[11] * t99;
+        let t108 = self.fixed[12] * t9;
+        let t109 = t108 * t60;
+        let t110 = t109 * t102;
+        let t111 = t106 + t110;
+        let t112 = T::one() / t73;
+        let t113 = t111 * t112;
+        let t114 = t67 + T::nearest(2.0);
+        let t115 = t67 * t114;
+        let t116 = self.fixed[10] * t115;
+        let t117 = t106 + t116;
+        let t118 = T::one() / t83;
+        let t119 = t117 * t118;
         let t120 = t71 + T::nearest(2.0);
         let t121 = t71 * t120;
         let t122 = self.fixed[10] * t121;
-        let t123 = t105 + t122;
-        let t124 = t123 / t84;
-        let t133 = self.fixed[12] * t2;
-        let t134 = t73 * t73;
-        let t138 = t60 * t60;
-        let t143 = t2 * t138;
-        let t144 = self.fixed[13] * t143;
-        let t145 = -t144;
-        let t146 = t9 * t145;
-        let t152 = t2 * t60;
-        let t153 = self.fixed[14] * t152;
-        let t154 = -t153;
-        let t155 = t154 + t146;
-        let t156 = t9 * t155;
-        let t159 = self.fixed[15] * t2;
-        let t160 = -t159;
-        let t161 = t160 * t101;
-        let t162 = t156 + t161;
-        let t163 = t162 / t134;
-        let t164 = t133 + t163;
-        let t165 = t9 * t164;
-        let t168 = self.fixed[16] * t14;
-        let t169 = -t168;
-        let t170 = t83 * t83;
-        let t172 = t64 * t64;
-        let t177 = t14 * t172;
-        let t178 = self.fixed[17] * t177;
-        let t179 = t19 * t178;
-        let t184 = t14 * t64;
-        let t185 = self.fixed[18] * t184;
-        let t186 = -t185;
-        let t187 = t186 + t179;
-        let t188 = t19 * t187;
-        let t191 = self.fixed[19] * t14;
-        let t192 = t191 * t101;
-        let t193 = t188 + t192;
-        let t194 = t193 / t170;
-        let t195 = t169 + t194;
-        let t196 = t19 * t195;
-        let t197 = self.fixed[16] * t25;
-        let t198 = -t197;
-        let t199 = t84 * t84;
-        let t200 = t68 * t68;
-        let t201 = t25 * t200;
-        let t202 = self.fixed[17] * t201;
-        let t203 = t26 * t202;
-        let t204 = t25 * t68;
-        let t205 = self.fixed[18] * t204;
-        let t206 = -t205;
-        let t207 = t206 + t203;
-        let t208 = t26 * t207;
-        let t209 = self.fixed[19] * t25;
-        let t210 = t209 * t101;
-        let t211 = t208 + t210;
-        let t212 = t211 / t199;
-        let t213 = t198 + t212;
-        let t214 = t26 * t213;
+        let t123 = t106 + t122;
+        let t124 = T::one() / t84;
+        let t125 = t123 * t124;
+        let t134 = self.fixed[13] * t9;
+        let t135 = t134 * t2;
+        let t136 = t106 + t109;
+        let t137 = self.fixed[11] - t136;
+        let t138 = t112 * t137;
+        let t139 = self.fixed[10] + t138;
+        let t140 = t94 * t139;
+        let t141 = self.fixed[3] * t140;
+        let t144 = self.fixed[14] * t60;
+        let t145 = t9 * t144;
+        let t146 = t141 + t145;
+        let t147 = t146 + t106;
+        let t149 = self.fixed[15] * t9;
+        let t150 = t149 * t2;
+        let t151 = t147 * t112;
+        let t152 = t150 * t151;
+        let t153 = t135 - t152;
+        let t156 = self.fixed[16] * t18;
+        let t157 = t156 * t13;
+        let t158 = self.fixed[8] * t18;
+        let t159 = t158 * t13;
+        let t160 = self.fixed[10] * t67;
+        let t161 = t106 + t160;
+        let t162 = self.fixed[11] * t118;
+        let t163 = self.fixed[10] + t162;
+        let t164 = t99 - t66;
+        let t165 = self.fixed[11] * t164;
+        let t166 = t161 * t118;
+        let t167 = t163 - t166;
+        let t168 = self.fixed[10] + t167;
+        let t169 = t67 * t168;
+        let t170 = t165 + t169;
+        let t172 = t159 * t170;
+        let t173 = t172 * t118;
+        let t174 = self.fixed[17] * t173;
+        let t175 = t174 - t157;
+        let t176 = self.fixed[16] * t26;
+        let t177 = t176 * t25;
+        let t178 = self.fixed[8] * t26;
+        let t179 = t178 * t25;
+        let t180 = self.fixed[10] * t71;
+        let t181 = t106 + t180;
+        let t182 = self.fixed[11] * t124;
+        let t183 = self.fixed[10] + t182;
+        let t184 = t99 - t70;
+        let t185 = self.fixed[11] * t184;
+        let t186 = t181 * t124;
+        let t187 = t183 - t186;
+        let t188 = self.fixed[10] + t187;
+        let t189 = t71 * t188;
+        let t190 = t185 + t189;
+        let t191 = t179 * t190;
+        let t192 = t191 * t124;
+        let t193 = self.fixed[17] * t192;
+        let t194 = t193 - t177;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 3>::new(t11, t23, t29),
             v: crate::nalgebra::SVector::<T, 3>::new(t34, t41, t45),
@@ -761,7 +774,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 3,
                 3,
             >::new(
-                t114,
+                t113,
                 T::zero(),
                 T::zero(),
                 T::zero(),
@@ -769,9 +782,9 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 T::zero(),
                 T::zero(),
                 T::zero(),
-                t124,
+                t125,
             ),
-            b: crate::nalgebra::SVector::<T, 3>::new(t165, t196, t214),
+            b: crate::nalgebra::SVector::<T, 3>::new(t153, t175, t194),
         }
     }
     fn traction(
@@ -784,233 +797,205 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
             crate::Surface::Lower(0) => {
                 let t8 = self.fixed[0] * t;
                 let t9 = t8.sin_pi();
-                let t17 = t8.cos_pi();
-                let t18 = self.fixed[1] * t17;
-                let t19 = t9 - t18;
-                let t26 = t9 + t18;
+                let t15 = t8.cos_pi();
+                let t17 = self.fixed[1] * t15;
+                let t18 = t9 - t17;
+                let t26 = t9 + t17;
                 let t61 = self.fixed[3] * t9;
                 let t64 = X[1].cos_pi();
-                let t65 = self.fixed[5] * t19;
+                let t65 = self.fixed[5] * t18;
                 let t66 = t65 * t64;
                 let t67 = -t66;
                 let t68 = X[2].cos_pi();
                 let t69 = self.fixed[5] * t26;
                 let t70 = t69 * t68;
                 let t71 = -t70;
-                let t93 = t67 * t71;
-                let t216 = t61 + T::one();
-                let t217 = t61 * t67;
-                let t218 = t61 * t71;
-                let t219 = t61 * t93;
-                let t220 = t67 + t71;
-                let t221 = t220 + t93;
-                let t222 = t221 + t217;
-                let t223 = t222 + t218;
-                let t224 = t223 + t219;
-                let t225 = t61 + t224;
-                let t226 = t225.ln_1p();
-                let t227 = self.fixed[9] * t226;
-                let t228 = t61 + T::nearest(2.0);
-                let t229 = t9 * t228;
-                let t230 = self.fixed[11] * t229;
-                let t231 = t230 + t227;
-                let t232 = T::one() / t216;
-                let t233 = t232 * t231;
-                let t234 = -t233;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t234, T::zero(), T::zero()))
+                let t84 = t71 + T::one();
+                let t91 = t67 * t84;
+                let t92 = t91 - t70;
+                let t270 = t61 + T::one();
+                let t271 = t9 * t92;
+                let t272 = self.fixed[3] * t271;
+                let t273 = t272 + t91;
+                let t274 = t273 - t70;
+                let t275 = t61 + t274;
+                let t276 = t275.ln_1p();
+                let t277 = t61 + T::nearest(2.0);
+                let t278 = self.fixed[11] * t276;
+                let t279 = t9 * t277;
+                let t280 = self.fixed[12] * t279;
+                let t281 = t280 + t278;
+                let t282 = T::one() / t270;
+                let t283 = t282 * t281;
+                let t284 = -t283;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t284, T::zero(), T::zero()))
             }
             crate::Surface::Upper(0) => {
                 let t8 = self.fixed[0] * t;
                 let t9 = t8.sin_pi();
-                let t17 = t8.cos_pi();
-                let t18 = self.fixed[1] * t17;
-                let t19 = t9 - t18;
-                let t26 = t9 + t18;
+                let t15 = t8.cos_pi();
+                let t17 = self.fixed[1] * t15;
+                let t18 = t9 - t17;
+                let t26 = t9 + t17;
                 let t61 = self.fixed[3] * t9;
                 let t64 = X[1].cos_pi();
-                let t65 = self.fixed[5] * t19;
+                let t65 = self.fixed[5] * t18;
                 let t66 = t65 * t64;
                 let t67 = -t66;
                 let t68 = X[2].cos_pi();
                 let t69 = self.fixed[5] * t26;
                 let t70 = t69 * t68;
                 let t71 = -t70;
-                let t93 = t67 * t71;
-                let t217 = t61 * t67;
-                let t218 = t61 * t71;
-                let t219 = t61 * t93;
-                let t220 = t67 + t71;
-                let t221 = t220 + t93;
-                let t235 = T::one() - t61;
-                let t236 = t221 - t217;
-                let t237 = t236 - t218;
-                let t238 = t237 - t219;
-                let t239 = t238 - t61;
-                let t240 = t239.ln_1p();
-                let t241 = self.fixed[9] * t240;
-                let t242 = T::nearest(2.0) - t61;
-                let t243 = t9 * t242;
-                let t244 = self.fixed[11] * t243;
-                let t245 = t241 - t244;
-                let t246 = T::one() / t235;
-                let t247 = t246 * t245;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t247, T::zero(), T::zero()))
+                let t84 = t71 + T::one();
+                let t91 = t67 * t84;
+                let t92 = t91 - t70;
+                let t271 = t9 * t92;
+                let t272 = self.fixed[3] * t271;
+                let t285 = T::one() - t61;
+                let t286 = t91 - t272;
+                let t287 = t286 - t70;
+                let t288 = t287 - t61;
+                let t289 = t288.ln_1p();
+                let t290 = T::nearest(2.0) - t61;
+                let t291 = self.fixed[11] * t289;
+                let t292 = t9 * t290;
+                let t293 = self.fixed[12] * t292;
+                let t294 = t291 - t293;
+                let t295 = T::one() / t285;
+                let t296 = t295 * t294;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t296, T::zero(), T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t8 = self.fixed[0] * t;
                 let t9 = t8.sin_pi();
-                let t17 = t8.cos_pi();
-                let t18 = self.fixed[1] * t17;
-                let t19 = t9 - t18;
-                let t26 = t9 + t18;
+                let t15 = t8.cos_pi();
+                let t17 = self.fixed[1] * t15;
+                let t18 = t9 - t17;
+                let t26 = t9 + t17;
                 let t60 = X[0].cos_pi();
-                let t61 = self.fixed[3] * t9;
-                let t62 = t61 * t60;
-                let t65 = self.fixed[5] * t19;
+                let t65 = self.fixed[5] * t18;
                 let t68 = X[2].cos_pi();
                 let t69 = self.fixed[5] * t26;
                 let t70 = t69 * t68;
                 let t71 = -t70;
-                let t92 = t62 * t71;
-                let t248 = -t65;
-                let t249 = t248 + T::one();
-                let t250 = t9 * t248;
-                let t251 = self.fixed[3] * t250;
-                let t252 = t251 * t60;
-                let t253 = t248 * t71;
-                let t254 = t252 * t71;
-                let t255 = t62 + t71;
-                let t256 = t255 + t92;
-                let t257 = t256 + t252;
-                let t258 = t257 + t253;
-                let t259 = t258 + t254;
-                let t260 = t248 + t259;
-                let t261 = t260.ln_1p();
-                let t262 = self.fixed[9] * t261;
-                let t263 = t248 + T::nearest(2.0);
-                let t264 = t248 * t263;
-                let t265 = self.fixed[10] * t264;
-                let t266 = t265 + t262;
-                let t267 = T::one() / t249;
-                let t268 = t267 * t266;
-                let t269 = -t268;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t269, T::zero()))
+                let t94 = t9 * t60;
+                let t297 = -t65;
+                let t298 = t297 + T::one();
+                let t299 = t71 * t298;
+                let t300 = t299 - t65;
+                let t301 = t300 + T::one();
+                let t302 = t94 * t301;
+                let t303 = self.fixed[3] * t302;
+                let t304 = t303 + t299;
+                let t305 = t304 - t65;
+                let t306 = t305.ln_1p();
+                let t307 = t297 + T::nearest(2.0);
+                let t308 = self.fixed[11] * t306;
+                let t309 = t297 * t307;
+                let t310 = self.fixed[10] * t309;
+                let t311 = t310 + t308;
+                let t312 = T::one() / t298;
+                let t313 = t312 * t311;
+                let t314 = -t313;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t314, T::zero()))
             }
             crate::Surface::Upper(1) => {
                 let t8 = self.fixed[0] * t;
                 let t9 = t8.sin_pi();
-                let t17 = t8.cos_pi();
-                let t18 = self.fixed[1] * t17;
-                let t19 = t9 - t18;
-                let t26 = t9 + t18;
+                let t15 = t8.cos_pi();
+                let t17 = self.fixed[1] * t15;
+                let t18 = t9 - t17;
+                let t26 = t9 + t17;
                 let t60 = X[0].cos_pi();
-                let t61 = self.fixed[3] * t9;
-                let t62 = t61 * t60;
-                let t65 = self.fixed[5] * t19;
+                let t65 = self.fixed[5] * t18;
                 let t68 = X[2].cos_pi();
                 let t69 = self.fixed[5] * t26;
                 let t70 = t69 * t68;
                 let t71 = -t70;
-                let t92 = t62 * t71;
-                let t255 = t62 + t71;
-                let t256 = t255 + t92;
-                let t270 = t65 + T::one();
-                let t271 = t9 * t65;
-                let t272 = self.fixed[3] * t271;
-                let t273 = t272 * t60;
-                let t274 = t65 * t71;
-                let t275 = t273 * t71;
-                let t276 = t256 + t273;
-                let t277 = t276 + t274;
-                let t278 = t277 + t275;
-                let t279 = t65 + t278;
-                let t280 = t279.ln_1p();
-                let t281 = self.fixed[9] * t280;
-                let t282 = t65 + T::nearest(2.0);
-                let t283 = t65 * t282;
-                let t284 = self.fixed[10] * t283;
-                let t285 = t284 + t281;
-                let t286 = T::one() / t270;
-                let t287 = t286 * t285;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t287, T::zero()))
+                let t94 = t9 * t60;
+                let t315 = t65 + T::one();
+                let t316 = t71 * t315;
+                let t317 = t65 + t316;
+                let t318 = t317 + T::one();
+                let t319 = t94 * t318;
+                let t320 = self.fixed[3] * t319;
+                let t321 = t320 + t316;
+                let t322 = t65 + t321;
+                let t323 = t322.ln_1p();
+                let t324 = t65 + T::nearest(2.0);
+                let t325 = self.fixed[11] * t323;
+                let t326 = t65 * t324;
+                let t327 = self.fixed[10] * t326;
+                let t328 = t327 + t325;
+                let t329 = T::one() / t315;
+                let t330 = t329 * t328;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t330, T::zero()))
             }
             crate::Surface::Lower(2) => {
                 let t8 = self.fixed[0] * t;
                 let t9 = t8.sin_pi();
-                let t17 = t8.cos_pi();
-                let t18 = self.fixed[1] * t17;
-                let t19 = t9 - t18;
-                let t26 = t9 + t18;
+                let t15 = t8.cos_pi();
+                let t17 = self.fixed[1] * t15;
+                let t18 = t9 - t17;
+                let t26 = t9 + t17;
                 let t60 = X[0].cos_pi();
-                let t61 = self.fixed[3] * t9;
-                let t62 = t61 * t60;
                 let t64 = X[1].cos_pi();
-                let t65 = self.fixed[5] * t19;
+                let t65 = self.fixed[5] * t18;
                 let t66 = t65 * t64;
                 let t67 = -t66;
                 let t69 = self.fixed[5] * t26;
-                let t91 = t62 * t67;
-                let t95 = t62 + t67;
-                let t288 = -t69;
-                let t289 = t288 + T::one();
-                let t290 = t9 * t288;
-                let t291 = self.fixed[3] * t290;
-                let t292 = t291 * t60;
-                let t293 = t288 * t67;
-                let t294 = t292 * t67;
-                let t295 = t95 + t91;
-                let t296 = t295 + t292;
-                let t297 = t296 + t293;
-                let t298 = t297 + t294;
-                let t299 = t288 + t298;
-                let t300 = t299.ln_1p();
-                let t301 = self.fixed[9] * t300;
-                let t302 = t288 + T::nearest(2.0);
-                let t303 = t288 * t302;
-                let t304 = self.fixed[10] * t303;
-                let t305 = t304 + t301;
-                let t306 = T::one() / t289;
-                let t307 = t306 * t305;
-                let t308 = -t307;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t308))
+                let t94 = t9 * t60;
+                let t331 = -t69;
+                let t332 = t331 + T::one();
+                let t333 = t67 * t332;
+                let t334 = t333 - t69;
+                let t335 = t334 + T::one();
+                let t336 = t94 * t335;
+                let t337 = self.fixed[3] * t336;
+                let t338 = t337 + t333;
+                let t339 = t338 - t69;
+                let t340 = t339.ln_1p();
+                let t341 = t331 + T::nearest(2.0);
+                let t342 = self.fixed[11] * t340;
+                let t343 = t331 * t341;
+                let t344 = self.fixed[10] * t343;
+                let t345 = t344 + t342;
+                let t346 = T::one() / t332;
+                let t347 = t346 * t345;
+                let t348 = -t347;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t348))
             }
             crate::Surface::Upper(2) => {
                 let t8 = self.fixed[0] * t;
                 let t9 = t8.sin_pi();
-                let t17 = t8.cos_pi();
-                let t18 = self.fixed[1] * t17;
-                let t19 = t9 - t18;
-                let t26 = t9 + t18;
+                let t15 = t8.cos_pi();
+                let t17 = self.fixed[1] * t15;
+                let t18 = t9 - t17;
+                let t26 = t9 + t17;
                 let t60 = X[0].cos_pi();
-                let t61 = self.fixed[3] * t9;
-                let t62 = t61 * t60;
                 let t64 = X[1].cos_pi();
-                let t65 = self.fixed[5] * t19;
+                let t65 = self.fixed[5] * t18;
                 let t66 = t65 * t64;
                 let t67 = -t66;
                 let t69 = self.fixed[5] * t26;
-                let t91 = t62 * t67;
-                let t95 = t62 + t67;
-                let t295 = t95 + t91;
-                let t309 = t69 + T::one();
-                let t310 = t9 * t69;
-                let t311 = self.fixed[3] * t310;
-                let t312 = t311 * t60;
-                let t313 = t69 * t67;
-                let t314 = t312 * t67;
-                let t315 = t295 + t312;
-                let t316 = t315 + t313;
-                let t317 = t316 + t314;
-                let t318 = t69 + t317;
-                let t319 = t318.ln_1p();
-                let t320 = self.fixed[9] * t319;
-                let t321 = t69 + T::nearest(2.0);
-                let t322 = t69 * t321;
-                let t323 = self.fixed[10] * t322;
-                let t324 = t323 + t320;
-                let t325 = T::one() / t309;
-                let t326 = t325 * t324;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t326))
+                let t94 = t9 * t60;
+                let t349 = t69 + T::one();
+                let t350 = t67 * t349;
+                let t351 = t69 + t350;
+                let t352 = t351 + T::one();
+                let t353 = t94 * t352;
+                let t354 = self.fixed[3] * t353;
+                let t355 = t354 + t350;
+                let t356 = t69 + t355;
+                let t357 = t356.ln_1p();
+                let t358 = t69 + T::nearest(2.0);
+                let t359 = self.fixed[11] * t357;
+                let t360 = t69 * t358;
+                let t361 = self.fixed[10] * t360;
+                let t362 = t361 + t359;
+                let t363 = T::one() / t349;
+                let t364 = t363 * t362;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t364))
             }
             _ => None,
         }
@@ -1054,7 +1039,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
     }
     fn material(&self) -> crate::Material<T> {
         crate::Material::NeoHookean {
-            lambda: self.fixed[9],
+            lambda: self.fixed[11],
             mu: self.fixed[10],
         }
     }
@@ -1065,7 +1050,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[20]
+        self.fixed[24]
     }
     fn body_force_at(
         &self,
@@ -1080,67 +1065,62 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 15> for AxisAligned3d<T> {
     fn body_force_time(&self, t: T) -> [T; 6] {
         let t8 = self.fixed[0] * t;
         let t9 = t8.sin_pi();
-        let t17 = t8.cos_pi();
-        let t18 = self.fixed[1] * t17;
-        let t19 = t9 - t18;
-        let t26 = t9 + t18;
+        let t15 = t8.cos_pi();
+        let t17 = self.fixed[1] * t15;
+        let t18 = t9 - t17;
+        let t26 = t9 + t17;
         let t61 = self.fixed[3] * t9;
-        let t65 = self.fixed[5] * t19;
+        let t65 = self.fixed[5] * t18;
         let t69 = self.fixed[5] * t26;
-        [t9, t19, t26, t61, t65, t69]
+        [t9, t18, t26, t61, t65, t69]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 15] {
         let t2 = X[0].sin_pi();
-        let t14 = X[1].sin_pi();
+        let t13 = X[1].sin_pi();
         let t25 = X[2].sin_pi();
         let t60 = X[0].cos_pi();
         let t64 = X[1].cos_pi();
         let t68 = X[2].cos_pi();
-        let t133 = self.fixed[12] * t2;
-        let t138 = t60 * t60;
-        let t143 = t2 * t138;
-        let t144 = self.fixed[13] * t143;
-        let t145 = -t144;
-        let t152 = t2 * t60;
-        let t153 = self.fixed[14] * t152;
-        let t154 = -t153;
-        let t159 = self.fixed[15] * t2;
-        let t160 = -t159;
-        let t168 = self.fixed[16] * t14;
-        let t169 = -t168;
-        let t172 = t64 * t64;
-        let t177 = t14 * t172;
-        let t178 = self.fixed[17] * t177;
-        let t184 = t14 * t64;
-        let t185 = self.fixed[18] * t184;
-        let t186 = -t185;
-        let t191 = self.fixed[19] * t14;
-        let t197 = self.fixed[16] * t25;
-        let t198 = -t197;
-        let t200 = t68 * t68;
-        let t201 = t25 * t200;
-        let t202 = self.fixed[17] * t201;
-        let t204 = t25 * t68;
-        let t205 = self.fixed[18] * t204;
-        let t206 = -t205;
-        let t209 = self.fixed[19] * t25;
+        let t195 = self.fixed[13] * t2;
+        let t199 = t60 * t60;
+        let t203 = t2 * t199;
+        let t204 = self.fixed[18] * t203;
+        let t205 = -t204;
+        let t211 = t2 * t60;
+        let t212 = self.fixed[19] * t211;
+        let t217 = self.fixed[20] * t2;
+        let t218 = -t217;
+        let t226 = self.fixed[16] * t13;
+        let t228 = t64 * t64;
+        let t233 = t13 * t228;
+        let t234 = self.fixed[21] * t233;
+        let t239 = t13 * t64;
+        let t240 = self.fixed[22] * t239;
+        let t245 = self.fixed[23] * t13;
+        let t253 = self.fixed[16] * t25;
+        let t254 = t68 * t68;
+        let t255 = t25 * t254;
+        let t256 = self.fixed[21] * t255;
+        let t257 = t25 * t68;
+        let t258 = self.fixed[22] * t257;
+        let t261 = self.fixed[23] * t25;
         [
             t60,
             t64,
             t68,
-            t133,
-            t145,
-            t154,
-            t160,
-            t169,
-            t178,
-            t186,
-            t191,
-            t198,
-            t202,
-            t206,
-            t209,
+            t195,
+            t205,
+            t212,
+            t218,
+            t226,
+            t234,
+            t240,
+            t245,
+            t253,
+            t256,
+            t258,
+            t261,
         ]
     }
     #[inline(always)]
@@ -1157,45 +1137,46 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 15> for AxisAligned3d<T> {
         let t73 = t62 + T::one();
         let t83 = t67 + T::one();
         let t84 = t71 + T::one();
-        let t91 = t62 * t67;
-        let t92 = t62 * t71;
-        let t93 = t67 * t71;
-        let t94 = t62 * t93;
-        let t95 = t62 + t67;
-        let t96 = t95 + t71;
+        let t91 = t67 * t84;
+        let t92 = t91 - t70;
+        let t93 = t92 + T::one();
+        let t94 = time[0] * point[0];
+        let t95 = t94 * t93;
+        let t96 = self.fixed[3] * t95;
         let t97 = t96 + t91;
-        let t98 = t97 + t92;
-        let t99 = t98 + t93;
-        let t100 = t99 + t94;
-        let t101 = t100.ln_1p();
-        let t134 = t73 * t73;
-        let t146 = time[0] * point[4];
-        let t155 = point[5] + t146;
-        let t156 = time[0] * t155;
-        let t161 = point[6] * t101;
-        let t162 = t156 + t161;
-        let t163 = t162 / t134;
-        let t164 = point[3] + t163;
-        let t165 = time[0] * t164;
-        let t170 = t83 * t83;
-        let t179 = time[1] * point[8];
-        let t187 = point[9] + t179;
-        let t188 = time[1] * t187;
-        let t192 = point[10] * t101;
-        let t193 = t188 + t192;
-        let t194 = t193 / t170;
-        let t195 = point[7] + t194;
-        let t196 = time[1] * t195;
-        let t199 = t84 * t84;
-        let t203 = time[2] * point[12];
-        let t207 = point[13] + t203;
-        let t208 = time[2] * t207;
-        let t210 = point[14] * t101;
-        let t211 = t208 + t210;
-        let t212 = t211 / t199;
-        let t213 = point[11] + t212;
-        let t214 = time[2] * t213;
-        crate::nalgebra::SVector::<T, 3>::new(t165, t196, t214)
+        let t98 = t97 - t70;
+        let t99 = t98.ln_1p();
+        let t112 = T::one() / t73;
+        let t118 = T::one() / t83;
+        let t124 = T::one() / t84;
+        let t213 = time[0] * point[4];
+        let t214 = t213 - point[5];
+        let t219 = time[0] * t214;
+        let t220 = point[6] * t99;
+        let t221 = t219 + t220;
+        let t222 = t112 * t112;
+        let t223 = t221 * t222;
+        let t224 = point[3] + t223;
+        let t225 = time[0] * t224;
+        let t241 = time[1] * point[8];
+        let t242 = t241 - point[9];
+        let t246 = time[1] * t242;
+        let t247 = point[10] * t99;
+        let t248 = t246 + t247;
+        let t249 = t118 * t118;
+        let t250 = t248 * t249;
+        let t251 = t250 - point[7];
+        let t252 = time[1] * t251;
+        let t259 = time[2] * point[12];
+        let t260 = t259 - point[13];
+        let t262 = time[2] * t260;
+        let t263 = point[14] * t99;
+        let t264 = t262 + t263;
+        let t265 = t124 * t124;
+        let t266 = t264 * t265;
+        let t267 = t266 - point[11];
+        let t268 = time[2] * t267;
+        crate::nalgebra::SVector::<T, 3>::new(t225, t252, t268)
     }
 }
 impl<T: crate::Real> From<AxisAligned3d<T>> for crate::AnySolution<T> {

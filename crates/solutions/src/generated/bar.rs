@@ -40,7 +40,7 @@ impl<T: crate::Real> Default for BarParameters<T> {
 pub struct Bar<T: crate::Real> {
     parameters: BarParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 15],
+    fixed: [T; 17],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Bar<T> {
@@ -142,49 +142,52 @@ impl<T: crate::Real> Bar<T> {
         let t43 = parameters.nu + T::one();
         let t44 = T::nearest(2.0) * parameters.nu;
         let t45 = T::one() - t44;
-        let t47 = parameters.E * parameters.nu;
-        let t48 = t43 * t45;
-        let t49 = t47 / t48;
-        let t52 = T::nearest(0.5) * parameters.E;
-        let t53 = t52 / t43;
+        let t48 = T::nearest(0.5) * parameters.E;
+        let t49 = t48 / t43;
+        let t51 = parameters.E * parameters.nu;
+        let t52 = t43 * t45;
+        let t53 = t51 / t52;
         let t60 = parameters.nu / t45;
         let t61 = t60 + T::one();
-        let t62 = T::nearest(4.0) * t61;
-        let t63 = t62 / t43;
-        let t64 = T::one() - t63;
-        let t65 = t28 * t64;
-        let t66 = t65 / t29;
-        let t71 = parameters.A * parameters.A;
-        let t72 = t71 * parameters.A;
-        let t73 = t25 * t25;
-        let t74 = t26 * t26;
-        let t76 = t49 + t53;
-        let t77 = T::nearest(16.0) * t72;
-        let t78 = t77 * t74;
-        let t79 = t78 * t76;
-        let t80 = parameters.rho0 * t73;
-        let t81 = t79 / t80;
-        let t86 = t25 * parameters.L;
-        let t87 = t26 * T::pi();
-        let t88 = T::nearest(16.0) * t71;
-        let t89 = t88 * t87;
-        let t90 = t89 * t76;
-        let t91 = parameters.rho0 * t86;
-        let t92 = t90 / t91;
-        let t98 = T::nearest(4.0) * parameters.A;
-        let t99 = t98 * parameters.E;
-        let t100 = t99 * parameters.nu;
-        let t101 = t100 * t26;
-        let t102 = t29 * t43;
-        let t103 = t102 * t45;
-        let t104 = t101 / t103;
-        let t112 = T::nearest(2.0) * parameters.L;
-        let t113 = t112 / t11;
-        let t115 = -t36;
+        let t63 = T::nearest(4.0) * t61;
+        let t64 = t63 / t43;
+        let t65 = T::one() - t64;
+        let t66 = t28 * t65;
+        let t67 = t66 / t29;
+        let t70 = T::nearest(4.0) * parameters.A;
+        let t71 = t70 * t26;
+        let t72 = t71 / t25;
+        let t87 = T::one() / parameters.rho0;
+        let t93 = t53 + t49;
+        let t95 = parameters.A * parameters.A;
+        let t96 = t95 * parameters.A;
+        let t97 = t25 * t25;
+        let t98 = t26 * t26;
+        let t100 = T::nearest(16.0) * t96;
+        let t101 = t100 * t98;
+        let t102 = t101 * t93;
+        let t103 = parameters.rho0 * t97;
+        let t104 = t102 / t103;
+        let t108 = t25 * parameters.L;
+        let t109 = t26 * T::pi();
+        let t110 = T::nearest(16.0) * t95;
+        let t111 = t110 * t109;
+        let t112 = t111 * t93;
+        let t113 = parameters.rho0 * t108;
+        let t114 = t112 / t113;
+        let t119 = t70 * parameters.E;
+        let t120 = t119 * parameters.nu;
+        let t121 = t120 * t26;
+        let t122 = t29 * t43;
+        let t123 = t122 * t45;
+        let t124 = t121 / t123;
+        let t134 = T::nearest(2.0) * parameters.L;
+        let t135 = t134 / t11;
+        let t137 = -t36;
         if !(t36 < parameters.L) {
             return Err(Self::DESCRIPTION.requirement_broken("2*Pi*A < L", &values));
         }
-        if !(t115 < parameters.L) {
+        if !(t137 < parameters.L) {
             return Err(Self::DESCRIPTION.requirement_broken("-2*Pi*A < L", &values));
         }
         Ok(Bar {
@@ -199,12 +202,14 @@ impl<T: crate::Real> Bar<T> {
                 t37,
                 t49,
                 t53,
-                t66,
-                t81,
-                t92,
+                t67,
+                t72,
+                t87,
                 t104,
-                t113,
-                t115,
+                t114,
+                t124,
+                t135,
+                t137,
             ],
         })
     }
@@ -339,13 +344,14 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
         let t39 = t38 * t34;
         let t41 = t39 + T::one();
         let t46 = t39.ln_1p();
-        let t50 = self.fixed[7] * t46;
-        let t54 = t39 + T::nearest(2.0);
-        let t55 = t39 * t54;
-        let t56 = self.fixed[8] * t55;
-        let t57 = t50 + t56;
-        let t58 = t57 / t41;
-        crate::nalgebra::SMatrix::<T, 1, 1>::new(t58)
+        let t50 = t39 + T::nearest(2.0);
+        let t54 = self.fixed[8] * t46;
+        let t55 = t39 * t50;
+        let t56 = self.fixed[7] * t55;
+        let t57 = t54 + t56;
+        let t58 = T::one() / t41;
+        let t59 = t57 * t58;
+        crate::nalgebra::SMatrix::<T, 1, 1>::new(t59)
     }
     #[inline]
     fn body_force(
@@ -362,27 +368,29 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
         let t39 = t38 * t34;
         let t41 = t39 + T::one();
         let t46 = t39.ln_1p();
-        let t67 = self.fixed[9] * t6;
-        let t68 = -t67;
-        let t69 = t41 * t41;
-        let t75 = t34 * t34;
-        let t82 = t6 * t75;
-        let t83 = self.fixed[10] * t82;
-        let t84 = -t83;
-        let t85 = t14 * t84;
-        let t93 = t6 * t34;
-        let t94 = self.fixed[11] * t93;
-        let t95 = -t94;
-        let t96 = t95 + t85;
-        let t97 = t14 * t96;
-        let t105 = self.fixed[12] * t6;
-        let t106 = -t105;
-        let t107 = t106 * t46;
-        let t108 = t97 + t107;
-        let t109 = t108 / t69;
-        let t110 = t68 + t109;
-        let t111 = t14 * t110;
-        crate::nalgebra::SVector::<T, 1>::new(t111)
+        let t54 = self.fixed[8] * t46;
+        let t58 = T::one() / t41;
+        let t68 = self.fixed[9] * t14;
+        let t69 = t68 * t6;
+        let t73 = self.fixed[10] * t14;
+        let t74 = t73 * t6;
+        let t75 = -t74;
+        let t76 = self.fixed[7] * t39;
+        let t77 = t54 + t76;
+        let t78 = self.fixed[8] * t58;
+        let t79 = self.fixed[7] + t78;
+        let t80 = t39 + t46;
+        let t81 = self.fixed[8] * t80;
+        let t82 = t77 * t58;
+        let t83 = t79 - t82;
+        let t84 = self.fixed[7] + t83;
+        let t85 = t39 * t84;
+        let t86 = t81 + t85;
+        let t88 = t75 * t86;
+        let t89 = t88 * t58;
+        let t90 = self.fixed[11] * t89;
+        let t91 = t90 - t69;
+        crate::nalgebra::SVector::<T, 1>::new(t91)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 1>, t: T) -> crate::Fields<T, 1> {
         let t5 = self.fixed[0] * X[0];
@@ -403,32 +411,33 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
         let t39 = t38 * t34;
         let t41 = t39 + T::one();
         let t46 = t39.ln_1p();
-        let t50 = self.fixed[7] * t46;
-        let t54 = t39 + T::nearest(2.0);
-        let t55 = t39 * t54;
-        let t56 = self.fixed[8] * t55;
-        let t57 = t50 + t56;
-        let t58 = t57 / t41;
-        let t67 = self.fixed[9] * t6;
-        let t68 = -t67;
-        let t69 = t41 * t41;
-        let t75 = t34 * t34;
-        let t82 = t6 * t75;
-        let t83 = self.fixed[10] * t82;
-        let t84 = -t83;
-        let t85 = t14 * t84;
-        let t93 = t6 * t34;
-        let t94 = self.fixed[11] * t93;
-        let t95 = -t94;
-        let t96 = t95 + t85;
-        let t97 = t14 * t96;
-        let t105 = self.fixed[12] * t6;
-        let t106 = -t105;
-        let t107 = t106 * t46;
-        let t108 = t97 + t107;
-        let t109 = t108 / t69;
-        let t110 = t68 + t109;
-        let t111 = t14 * t110;
+        let t50 = t39 + T::nearest(2.0);
+        let t54 = self.fixed[8] * t46;
+        let t55 = t39 * t50;
+        let t56 = self.fixed[7] * t55;
+        let t57 = t54 + t56;
+        let t58 = T::one() / t41;
+        let t59 = t57 * t58;
+        let t68 = self.fixed[9] * t14;
+        let t69 = t68 * t6;
+        let t73 = self.fixed[10] * t14;
+        let t74 = t73 * t6;
+        let t75 = -t74;
+        let t76 = self.fixed[7] * t39;
+        let t77 = t54 + t76;
+        let t78 = self.fixed[8] * t58;
+        let t79 = self.fixed[7] + t78;
+        let t80 = t39 + t46;
+        let t81 = self.fixed[8] * t80;
+        let t82 = t77 * t58;
+        let t83 = t79 - t82;
+        let t84 = self.fixed[7] + t83;
+        let t85 = t39 * t84;
+        let t86 = t81 + t85;
+        let t88 = t75 * t86;
+        let t89 = t88 * t58;
+        let t90 = self.fixed[11] * t89;
+        let t91 = t90 - t69;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 1>::new(t16),
             v: crate::nalgebra::SVector::<T, 1>::new(t24),
@@ -436,8 +445,8 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
             H: crate::nalgebra::SMatrix::<T, 1, 1>::new(t39),
             F: crate::nalgebra::SMatrix::<T, 1, 1>::new(t41),
             J: t41,
-            P: crate::nalgebra::SMatrix::<T, 1, 1>::new(t58),
-            b: crate::nalgebra::SVector::<T, 1>::new(t111),
+            P: crate::nalgebra::SMatrix::<T, 1, 1>::new(t59),
+            b: crate::nalgebra::SVector::<T, 1>::new(t91),
         }
     }
     fn traction(
@@ -451,30 +460,30 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
                 let t13 = self.fixed[2] * t;
                 let t14 = t13.cos_pi();
                 let t38 = self.fixed[6] * t14;
-                let t116 = t38 + T::one();
-                let t117 = t38.ln_1p();
-                let t118 = self.fixed[7] * t117;
-                let t119 = t38 + T::nearest(2.0);
-                let t120 = t38 * t119;
-                let t121 = self.fixed[8] * t120;
-                let t122 = t118 + t121;
-                let t123 = t122 / t116;
-                let t124 = -t123;
-                Some(crate::nalgebra::SVector::<T, 1>::new(t124))
+                let t138 = t38 + T::one();
+                let t139 = t38.ln_1p();
+                let t140 = t38 + T::nearest(2.0);
+                let t141 = self.fixed[8] * t139;
+                let t142 = t38 * t140;
+                let t143 = self.fixed[7] * t142;
+                let t144 = t141 + t143;
+                let t145 = t144 / t138;
+                let t146 = -t145;
+                Some(crate::nalgebra::SVector::<T, 1>::new(t146))
             }
             crate::Surface::Upper(0) => {
                 let t13 = self.fixed[2] * t;
                 let t14 = t13.cos_pi();
                 let t38 = self.fixed[6] * t14;
-                let t116 = t38 + T::one();
-                let t117 = t38.ln_1p();
-                let t118 = self.fixed[7] * t117;
-                let t119 = t38 + T::nearest(2.0);
-                let t120 = t38 * t119;
-                let t121 = self.fixed[8] * t120;
-                let t122 = t118 + t121;
-                let t123 = t122 / t116;
-                Some(crate::nalgebra::SVector::<T, 1>::new(t123))
+                let t138 = t38 + T::one();
+                let t139 = t38.ln_1p();
+                let t140 = t38 + T::nearest(2.0);
+                let t141 = self.fixed[8] * t139;
+                let t142 = t38 * t140;
+                let t143 = self.fixed[7] * t142;
+                let t144 = t141 + t143;
+                let t145 = t144 / t138;
+                Some(crate::nalgebra::SVector::<T, 1>::new(t145))
             }
             _ => None,
         }
@@ -502,8 +511,8 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
     }
     fn material(&self) -> crate::Material<T> {
         crate::Material::NeoHookean {
-            lambda: self.fixed[7],
-            mu: self.fixed[8],
+            lambda: self.fixed[8],
+            mu: self.fixed[7],
         }
     }
     fn density(&self) -> T {
@@ -513,7 +522,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
         self.fixed[1]
     }
     fn period(&self) -> T {
-        self.fixed[13]
+        self.fixed[15]
     }
     fn body_force_at(
         &self,
@@ -536,18 +545,16 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 5> for Bar<T> {
         let t5 = self.fixed[0] * X[0];
         let t6 = t5.sin_pi();
         let t34 = t5.cos_pi();
-        let t67 = self.fixed[9] * t6;
-        let t68 = -t67;
-        let t75 = t34 * t34;
-        let t82 = t6 * t75;
-        let t83 = self.fixed[10] * t82;
-        let t84 = -t83;
-        let t93 = t6 * t34;
-        let t94 = self.fixed[11] * t93;
-        let t95 = -t94;
-        let t105 = self.fixed[12] * t6;
-        let t106 = -t105;
-        [t34, t68, t84, t95, t106]
+        let t92 = self.fixed[9] * t6;
+        let t99 = t34 * t34;
+        let t105 = t6 * t99;
+        let t106 = self.fixed[12] * t105;
+        let t107 = -t106;
+        let t115 = t6 * t34;
+        let t116 = self.fixed[13] * t115;
+        let t125 = self.fixed[14] * t6;
+        let t126 = -t125;
+        [t34, t92, t107, t116, t126]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -558,16 +565,17 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 5> for Bar<T> {
         let t39 = time[1] * point[0];
         let t41 = t39 + T::one();
         let t46 = t39.ln_1p();
-        let t69 = t41 * t41;
-        let t85 = time[0] * point[2];
-        let t96 = point[3] + t85;
-        let t97 = time[0] * t96;
-        let t107 = point[4] * t46;
-        let t108 = t97 + t107;
-        let t109 = t108 / t69;
-        let t110 = point[1] + t109;
-        let t111 = time[0] * t110;
-        crate::nalgebra::SVector::<T, 1>::new(t111)
+        let t58 = T::one() / t41;
+        let t117 = time[0] * point[2];
+        let t118 = t117 - point[3];
+        let t127 = time[0] * t118;
+        let t128 = point[4] * t46;
+        let t129 = t127 + t128;
+        let t130 = t58 * t58;
+        let t131 = t129 * t130;
+        let t132 = t131 - point[1];
+        let t133 = time[0] * t132;
+        crate::nalgebra::SVector::<T, 1>::new(t133)
     }
 }
 impl<T: crate::Real> From<Bar<T>> for crate::AnySolution<T> {

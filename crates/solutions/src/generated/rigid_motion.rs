@@ -126,21 +126,21 @@ impl<T: crate::Real> RigidMotion<T> {
         if !(value.is_finite()) {
             return Err(Self::DESCRIPTION.out_of_range(4, value));
         }
-        let t6 = parameters.E / parameters.rho0;
-        let t7 = t6.sqrt();
-        let t10 = T::nearest(0.5) * parameters.A;
-        let t36 = t7 * T::pi();
-        let t42 = parameters.A * t7;
+        let t4 = parameters.E / parameters.rho0;
+        let t5 = t4.sqrt();
+        let t9 = T::nearest(0.5) * parameters.A;
+        let t36 = t5 * T::pi();
+        let t42 = parameters.A * t5;
         let t43 = t42 * T::pi();
-        let t47 = T::pi() * T::pi();
-        let t49 = parameters.A * parameters.A;
-        let t54 = parameters.E * t47;
+        let t48 = parameters.A * parameters.A;
+        let t53 = T::pi() * T::pi();
+        let t54 = parameters.E * t53;
         let t55 = t54 / parameters.rho0;
         let t62 = parameters.A * parameters.E;
-        let t63 = t62 * t47;
+        let t63 = t62 * t53;
         let t64 = t63 / parameters.rho0;
         let t75 = -t55;
-        let t77 = T::nearest(2.0) / t7;
+        let t77 = T::nearest(2.0) / t5;
         let t79 = parameters.nu + T::one();
         let t80 = T::nearest(2.0) * parameters.nu;
         let t81 = T::one() - t80;
@@ -151,7 +151,7 @@ impl<T: crate::Real> RigidMotion<T> {
         let t86 = t85 / t79;
         Ok(RigidMotion {
             parameters,
-            fixed: [t7, t10, t36, t43, t49, t55, t64, t75, t77, t84, t86],
+            fixed: [t5, t9, t36, t43, t48, t55, t64, t75, t77, t84, t86],
         })
     }
     /// The solution with parameter values in the order of the description; missing ones take their
@@ -193,23 +193,23 @@ impl<T: crate::Real> crate::Solution<T, 2> for RigidMotion<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.sin_pi();
-        let t11 = self.fixed[1] * t9;
-        let t12 = t11.sin();
-        let t14 = t12 * X[0];
-        let t16 = t11.cos();
-        let t17 = t16 * X[1];
-        let t18 = t14 + t17;
-        let t19 = T::nearest(2.0) * t12;
-        let t20 = t19 * t18;
-        let t22 = self.parameters.U * t9;
-        let t23 = t20 - t22;
+        let t6 = self.fixed[0] * t;
+        let t7 = t6.sin_pi();
+        let t10 = self.fixed[1] * t7;
+        let t11 = t10.sin();
+        let t14 = t10.cos();
+        let t15 = t11 * X[0];
+        let t16 = t14 * X[1];
+        let t17 = t15 + t16;
+        let t20 = T::nearest(2.0) * t11;
+        let t21 = t20 * t17;
+        let t22 = self.parameters.U * t7;
+        let t23 = t21 - t22;
         let t24 = -t23;
-        let t25 = t16 * X[0];
-        let t26 = t12 * X[1];
+        let t25 = t14 * X[0];
+        let t26 = t11 * X[1];
         let t27 = t25 - t26;
-        let t28 = t19 * t27;
+        let t28 = t20 * t27;
         crate::nalgebra::SVector::<T, 2>::new(t24, t28)
     }
     #[inline]
@@ -218,27 +218,27 @@ impl<T: crate::Real> crate::Solution<T, 2> for RigidMotion<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.sin_pi();
-        let t11 = self.fixed[1] * t9;
-        let t12 = t11.sin();
-        let t14 = t12 * X[0];
-        let t16 = t11.cos();
-        let t17 = t16 * X[1];
-        let t18 = t14 + t17;
-        let t25 = t16 * X[0];
-        let t26 = t12 * X[1];
+        let t6 = self.fixed[0] * t;
+        let t7 = t6.sin_pi();
+        let t10 = self.fixed[1] * t7;
+        let t11 = t10.sin();
+        let t14 = t10.cos();
+        let t15 = t11 * X[0];
+        let t16 = t14 * X[1];
+        let t17 = t15 + t16;
+        let t25 = t14 * X[0];
+        let t26 = t11 * X[1];
         let t27 = t25 - t26;
-        let t30 = t8.cos_pi();
-        let t31 = t12 * t27;
-        let t32 = t16 * t18;
+        let t30 = t6.cos_pi();
+        let t31 = t11 * t27;
+        let t32 = t14 * t17;
         let t33 = t31 + t32;
         let t34 = self.parameters.A * t33;
         let t35 = self.parameters.U - t34;
         let t37 = self.fixed[2] * t30;
         let t38 = t37 * t35;
-        let t39 = t12 * t18;
-        let t40 = t16 * t27;
+        let t39 = t11 * t17;
+        let t40 = t14 * t27;
         let t41 = t39 - t40;
         let t44 = self.fixed[3] * t30;
         let t45 = t44 * t41;
@@ -251,35 +251,35 @@ impl<T: crate::Real> crate::Solution<T, 2> for RigidMotion<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.sin_pi();
-        let t11 = self.fixed[1] * t9;
-        let t12 = t11.sin();
-        let t14 = t12 * X[0];
-        let t16 = t11.cos();
-        let t17 = t16 * X[1];
-        let t18 = t14 + t17;
-        let t25 = t16 * X[0];
-        let t26 = t12 * X[1];
+        let t6 = self.fixed[0] * t;
+        let t7 = t6.sin_pi();
+        let t10 = self.fixed[1] * t7;
+        let t11 = t10.sin();
+        let t14 = t10.cos();
+        let t15 = t11 * X[0];
+        let t16 = t14 * X[1];
+        let t17 = t15 + t16;
+        let t25 = t14 * X[0];
+        let t26 = t11 * X[1];
         let t27 = t25 - t26;
-        let t30 = t8.cos_pi();
-        let t31 = t12 * t27;
-        let t32 = t16 * t18;
+        let t30 = t6.cos_pi();
+        let t31 = t11 * t27;
+        let t32 = t14 * t17;
         let t33 = t31 + t32;
         let t34 = self.parameters.A * t33;
         let t35 = self.parameters.U - t34;
-        let t39 = t12 * t18;
-        let t40 = t16 * t27;
+        let t39 = t11 * t17;
+        let t40 = t14 * t27;
         let t41 = t39 - t40;
-        let t48 = t9 * t35;
-        let t50 = t30 * t30;
-        let t51 = self.fixed[4] * t50;
-        let t52 = t51 * t41;
-        let t53 = t48 - t52;
-        let t56 = self.fixed[5] * t53;
+        let t47 = t7 * t35;
+        let t49 = t30 * t30;
+        let t50 = self.fixed[4] * t49;
+        let t51 = t50 * t41;
+        let t52 = t47 - t51;
+        let t56 = self.fixed[5] * t52;
         let t57 = -t56;
-        let t58 = t9 * t41;
-        let t59 = self.parameters.A * t50;
+        let t58 = t7 * t41;
+        let t59 = self.parameters.A * t49;
         let t60 = t59 * t33;
         let t61 = t58 - t60;
         let t65 = self.fixed[6] * t61;
@@ -291,15 +291,15 @@ impl<T: crate::Real> crate::Solution<T, 2> for RigidMotion<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.sin_pi();
-        let t11 = self.fixed[1] * t9;
-        let t12 = t11.sin();
-        let t16 = t11.cos();
-        let t66 = t12 * t12;
+        let t6 = self.fixed[0] * t;
+        let t7 = t6.sin_pi();
+        let t10 = self.fixed[1] * t7;
+        let t11 = t10.sin();
+        let t14 = t10.cos();
+        let t66 = t11 * t11;
         let t67 = T::nearest(2.0) * t66;
         let t68 = -t67;
-        let t69 = t16 * t12;
+        let t69 = t14 * t11;
         let t70 = T::nearest(2.0) * t69;
         let t71 = -t70;
         crate::nalgebra::SMatrix::<T, 2, 2>::new(t68, t71, t70, t68)
@@ -310,14 +310,14 @@ impl<T: crate::Real> crate::Solution<T, 2> for RigidMotion<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.sin_pi();
-        let t11 = self.fixed[1] * t9;
-        let t12 = t11.sin();
-        let t16 = t11.cos();
-        let t66 = t12 * t12;
+        let t6 = self.fixed[0] * t;
+        let t7 = t6.sin_pi();
+        let t10 = self.fixed[1] * t7;
+        let t11 = t10.sin();
+        let t14 = t10.cos();
+        let t66 = t11 * t11;
         let t67 = T::nearest(2.0) * t66;
-        let t69 = t16 * t12;
+        let t69 = t14 * t11;
         let t70 = T::nearest(2.0) * t69;
         let t71 = -t70;
         let t73 = T::one() - t67;
@@ -345,91 +345,91 @@ impl<T: crate::Real> crate::Solution<T, 2> for RigidMotion<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.sin_pi();
-        let t11 = self.fixed[1] * t9;
-        let t12 = t11.sin();
-        let t14 = t12 * X[0];
-        let t16 = t11.cos();
-        let t17 = t16 * X[1];
-        let t18 = t14 + t17;
-        let t25 = t16 * X[0];
-        let t26 = t12 * X[1];
+        let t6 = self.fixed[0] * t;
+        let t7 = t6.sin_pi();
+        let t10 = self.fixed[1] * t7;
+        let t11 = t10.sin();
+        let t14 = t10.cos();
+        let t15 = t11 * X[0];
+        let t16 = t14 * X[1];
+        let t17 = t15 + t16;
+        let t25 = t14 * X[0];
+        let t26 = t11 * X[1];
         let t27 = t25 - t26;
-        let t30 = t8.cos_pi();
-        let t31 = t12 * t27;
-        let t32 = t16 * t18;
+        let t30 = t6.cos_pi();
+        let t31 = t11 * t27;
+        let t32 = t14 * t17;
         let t33 = t31 + t32;
         let t34 = self.parameters.A * t33;
         let t35 = self.parameters.U - t34;
-        let t39 = t12 * t18;
-        let t40 = t16 * t27;
+        let t39 = t11 * t17;
+        let t40 = t14 * t27;
         let t41 = t39 - t40;
-        let t48 = t9 * t35;
-        let t50 = t30 * t30;
-        let t51 = self.fixed[4] * t50;
-        let t52 = t51 * t41;
-        let t53 = t48 - t52;
-        let t58 = t9 * t41;
-        let t59 = self.parameters.A * t50;
+        let t47 = t7 * t35;
+        let t49 = t30 * t30;
+        let t50 = self.fixed[4] * t49;
+        let t51 = t50 * t41;
+        let t52 = t47 - t51;
+        let t56 = self.fixed[5] * t52;
+        let t57 = -t56;
+        let t58 = t7 * t41;
+        let t59 = self.parameters.A * t49;
         let t60 = t59 * t33;
         let t61 = t58 - t60;
         let t65 = self.fixed[6] * t61;
-        let t76 = self.fixed[7] * t53;
-        crate::nalgebra::SVector::<T, 2>::new(t76, t65)
+        crate::nalgebra::SVector::<T, 2>::new(t57, t65)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.sin_pi();
-        let t11 = self.fixed[1] * t9;
-        let t12 = t11.sin();
-        let t14 = t12 * X[0];
-        let t16 = t11.cos();
-        let t17 = t16 * X[1];
-        let t18 = t14 + t17;
-        let t19 = T::nearest(2.0) * t12;
-        let t20 = t19 * t18;
-        let t22 = self.parameters.U * t9;
-        let t23 = t20 - t22;
+        let t6 = self.fixed[0] * t;
+        let t7 = t6.sin_pi();
+        let t10 = self.fixed[1] * t7;
+        let t11 = t10.sin();
+        let t14 = t10.cos();
+        let t15 = t11 * X[0];
+        let t16 = t14 * X[1];
+        let t17 = t15 + t16;
+        let t20 = T::nearest(2.0) * t11;
+        let t21 = t20 * t17;
+        let t22 = self.parameters.U * t7;
+        let t23 = t21 - t22;
         let t24 = -t23;
-        let t25 = t16 * X[0];
-        let t26 = t12 * X[1];
+        let t25 = t14 * X[0];
+        let t26 = t11 * X[1];
         let t27 = t25 - t26;
-        let t28 = t19 * t27;
-        let t30 = t8.cos_pi();
-        let t31 = t12 * t27;
-        let t32 = t16 * t18;
+        let t28 = t20 * t27;
+        let t30 = t6.cos_pi();
+        let t31 = t11 * t27;
+        let t32 = t14 * t17;
         let t33 = t31 + t32;
         let t34 = self.parameters.A * t33;
         let t35 = self.parameters.U - t34;
         let t37 = self.fixed[2] * t30;
         let t38 = t37 * t35;
-        let t39 = t12 * t18;
-        let t40 = t16 * t27;
+        let t39 = t11 * t17;
+        let t40 = t14 * t27;
         let t41 = t39 - t40;
         let t44 = self.fixed[3] * t30;
         let t45 = t44 * t41;
         let t46 = -t45;
-        let t48 = t9 * t35;
-        let t50 = t30 * t30;
-        let t51 = self.fixed[4] * t50;
-        let t52 = t51 * t41;
-        let t53 = t48 - t52;
-        let t56 = self.fixed[5] * t53;
+        let t47 = t7 * t35;
+        let t49 = t30 * t30;
+        let t50 = self.fixed[4] * t49;
+        let t51 = t50 * t41;
+        let t52 = t47 - t51;
+        let t56 = self.fixed[5] * t52;
         let t57 = -t56;
-        let t58 = t9 * t41;
-        let t59 = self.parameters.A * t50;
+        let t58 = t7 * t41;
+        let t59 = self.parameters.A * t49;
         let t60 = t59 * t33;
         let t61 = t58 - t60;
         let t65 = self.fixed[6] * t61;
-        let t66 = t12 * t12;
+        let t66 = t11 * t11;
         let t67 = T::nearest(2.0) * t66;
         let t68 = -t67;
-        let t69 = t16 * t12;
+        let t69 = t14 * t11;
         let t70 = T::nearest(2.0) * t69;
         let t71 = -t70;
         let t73 = T::one() - t67;
-        let t76 = self.fixed[7] * t53;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t24, t28),
             v: crate::nalgebra::SVector::<T, 2>::new(t38, t46),
@@ -442,7 +442,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RigidMotion<T> {
                 2,
                 2,
             >::new(T::zero(), T::zero(), T::zero(), T::zero()),
-            b: crate::nalgebra::SVector::<T, 2>::new(t76, t65),
+            b: crate::nalgebra::SVector::<T, 2>::new(t57, t65),
         }
     }
     fn traction(
@@ -522,16 +522,16 @@ impl<T: crate::Real> crate::Solution<T, 2> for RigidMotion<T> {
 impl<T: crate::Real> crate::BodyForceStages<T, 2, 5, 2> for RigidMotion<T> {
     #[inline]
     fn body_force_time(&self, t: T) -> [T; 5] {
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.sin_pi();
-        let t11 = self.fixed[1] * t9;
-        let t12 = t11.sin();
-        let t16 = t11.cos();
-        let t30 = t8.cos_pi();
-        let t50 = t30 * t30;
-        let t51 = self.fixed[4] * t50;
-        let t59 = self.parameters.A * t50;
-        [t9, t12, t16, t51, t59]
+        let t6 = self.fixed[0] * t;
+        let t7 = t6.sin_pi();
+        let t10 = self.fixed[1] * t7;
+        let t11 = t10.sin();
+        let t14 = t10.cos();
+        let t30 = t6.cos_pi();
+        let t49 = t30 * t30;
+        let t50 = self.fixed[4] * t49;
+        let t59 = self.parameters.A * t49;
+        [t7, t11, t14, t50, t59]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 2] {
@@ -543,28 +543,28 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 5, 2> for RigidMotion<T> {
         time: &[T; 5],
         point: &[T; 2],
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t14 = time[1] * point[0];
-        let t17 = time[2] * point[1];
-        let t18 = t14 + t17;
+        let t15 = time[1] * point[0];
+        let t16 = time[2] * point[1];
+        let t17 = t15 + t16;
         let t25 = time[2] * point[0];
         let t26 = time[1] * point[1];
         let t27 = t25 - t26;
         let t31 = time[1] * t27;
-        let t32 = time[2] * t18;
+        let t32 = time[2] * t17;
         let t33 = t31 + t32;
         let t34 = self.parameters.A * t33;
         let t35 = self.parameters.U - t34;
-        let t39 = time[1] * t18;
+        let t39 = time[1] * t17;
         let t40 = time[2] * t27;
         let t41 = t39 - t40;
-        let t48 = time[0] * t35;
-        let t52 = time[3] * t41;
-        let t53 = t48 - t52;
+        let t47 = time[0] * t35;
+        let t51 = time[3] * t41;
+        let t52 = t47 - t51;
         let t58 = time[0] * t41;
         let t60 = time[4] * t33;
         let t61 = t58 - t60;
         let t65 = self.fixed[6] * t61;
-        let t76 = self.fixed[7] * t53;
+        let t76 = self.fixed[7] * t52;
         crate::nalgebra::SVector::<T, 2>::new(t76, t65)
     }
 }

@@ -41,7 +41,7 @@ impl<T: crate::Real> Default for RingParameters<T> {
 pub struct Ring<T: crate::Real> {
     parameters: RingParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 21],
+    fixed: [T; 22],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Ring<T> {
@@ -132,42 +132,43 @@ impl<T: crate::Real> Ring<T> {
         let t24 = parameters.Ro - t18;
         let t26 = t15 * t19;
         let t28 = T::one() / t26;
-        let t41 = parameters.A * t11;
-        let t42 = t41 * T::pi();
-        let t48 = T::pi() * T::pi();
-        let t49 = parameters.A * parameters.E;
-        let t50 = t49 * t48;
-        let t51 = t50 / parameters.rho0;
-        let t59 = T::nearest(6.0) / t26;
-        let t86 = T::nearest(6.0) * parameters.A;
-        let t87 = t86 / t26;
-        let t95 = T::nearest(0.5) * parameters.E;
-        let t118 = parameters.Ri + parameters.Ro;
-        let t128 = t49 / parameters.rho0;
-        let t133 = parameters.A * parameters.A;
-        let t134 = t133 * t133;
-        let t135 = t15 * t15;
-        let t136 = t19 * t19;
-        let t140 = T::nearest(36.0) * t134;
-        let t141 = t140 * t95;
-        let t142 = parameters.rho0 * t135;
-        let t143 = t142 * t136;
-        let t144 = t141 / t143;
-        let t151 = t133 * parameters.A;
-        let t152 = t135 * t136;
-        let t153 = T::nearest(36.0) / t152;
-        let t164 = T::nearest(3.0) / t26;
-        let t167 = T::nearest(12.0) / t26;
-        let t171 = T::nearest(6.0) * t151;
-        let t172 = t171 * t95;
-        let t173 = parameters.rho0 * t15;
-        let t174 = t173 * t19;
-        let t175 = t172 / t174;
-        let t181 = T::nearest(72.0) / t152;
-        let t186 = t133 * t95;
-        let t187 = t186 / parameters.rho0;
-        let t198 = T::nearest(2.0) / t11;
-        let t201 = parameters.A * t95;
+        let t43 = parameters.A * t11;
+        let t44 = t43 * T::pi();
+        let t50 = T::pi() * T::pi();
+        let t51 = parameters.A * parameters.E;
+        let t52 = t51 * t50;
+        let t53 = t52 / parameters.rho0;
+        let t61 = T::nearest(6.0) / t26;
+        let t88 = T::nearest(6.0) * parameters.A;
+        let t89 = t88 / t26;
+        let t97 = T::nearest(0.5) * parameters.E;
+        let t121 = parameters.Ri + parameters.Ro;
+        let t129 = t51 / parameters.rho0;
+        let t143 = t97 / parameters.rho0;
+        let t155 = parameters.A * parameters.A;
+        let t156 = t155 * t155;
+        let t157 = t15 * t15;
+        let t158 = t19 * t19;
+        let t160 = T::nearest(36.0) * t156;
+        let t161 = t160 * t97;
+        let t162 = parameters.rho0 * t157;
+        let t163 = t162 * t158;
+        let t164 = t161 / t163;
+        let t170 = t157 * t158;
+        let t171 = T::nearest(36.0) / t170;
+        let t180 = T::nearest(3.0) / t26;
+        let t185 = T::nearest(12.0) / t26;
+        let t189 = t155 * parameters.A;
+        let t190 = T::nearest(6.0) * t189;
+        let t191 = t190 * t97;
+        let t192 = parameters.rho0 * t15;
+        let t193 = t192 * t19;
+        let t194 = t191 / t193;
+        let t200 = T::nearest(72.0) / t170;
+        let t205 = t155 * t97;
+        let t206 = t205 / parameters.rho0;
+        let t219 = T::nearest(2.0) / t11;
+        let t221 = parameters.A * t97;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -181,23 +182,24 @@ impl<T: crate::Real> Ring<T> {
                 t18,
                 t24,
                 t28,
-                t42,
-                t48,
-                t51,
-                t59,
-                t87,
-                t95,
-                t118,
-                t128,
-                t144,
-                t153,
+                t44,
+                t50,
+                t53,
+                t61,
+                t89,
+                t97,
+                t121,
+                t129,
+                t143,
                 t164,
-                t167,
-                t175,
-                t181,
-                t187,
-                t198,
-                t201,
+                t171,
+                t180,
+                t185,
+                t194,
+                t200,
+                t206,
+                t219,
+                t221,
             ],
         })
     }
@@ -240,9 +242,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -255,12 +257,14 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
         let t33 = t31 * X[0];
-        let t34 = t33 / t5;
-        let t35 = t32 * t34;
-        let t36 = t31 * X[1];
-        let t37 = t36 / t5;
-        let t38 = t32 * t37;
-        crate::nalgebra::SVector::<T, 2>::new(t35, t38)
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t36 = t33 * t35;
+        let t37 = t32 * t36;
+        let t38 = t31 * X[1];
+        let t39 = t38 * t35;
+        let t40 = t32 * t39;
+        crate::nalgebra::SVector::<T, 2>::new(t37, t40)
     }
     #[inline]
     fn velocity(
@@ -268,9 +272,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t20 = t5 - self.parameters.Ro;
@@ -281,16 +285,18 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t33 = t31 * X[0];
-        let t34 = t33 / t5;
-        let t36 = t31 * X[1];
-        let t37 = t36 / t5;
-        let t40 = t12.sin_pi();
-        let t43 = self.fixed[4] * t40;
-        let t44 = t43 * t34;
-        let t45 = -t44;
-        let t46 = t43 * t37;
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t36 = t33 * t35;
+        let t38 = t31 * X[1];
+        let t39 = t38 * t35;
+        let t42 = t12.sin_pi();
+        let t45 = self.fixed[4] * t42;
+        let t46 = t45 * t36;
         let t47 = -t46;
-        crate::nalgebra::SVector::<T, 2>::new(t45, t47)
+        let t48 = t45 * t39;
+        let t49 = -t48;
+        crate::nalgebra::SVector::<T, 2>::new(t47, t49)
     }
     #[inline]
     fn acceleration(
@@ -298,9 +304,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -312,15 +318,17 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t33 = t31 * X[0];
-        let t34 = t33 / t5;
-        let t36 = t31 * X[1];
-        let t37 = t36 / t5;
-        let t52 = self.fixed[6] * t13;
-        let t53 = t52 * t34;
-        let t54 = -t53;
-        let t55 = t52 * t37;
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t36 = t33 * t35;
+        let t38 = t31 * X[1];
+        let t39 = t38 * t35;
+        let t54 = self.fixed[6] * t13;
+        let t55 = t54 * t36;
         let t56 = -t55;
-        crate::nalgebra::SVector::<T, 2>::new(t54, t56)
+        let t57 = t54 * t39;
+        let t58 = -t57;
+        crate::nalgebra::SVector::<T, 2>::new(t56, t58)
     }
     #[inline]
     fn displacement_gradient(
@@ -328,9 +336,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -342,32 +350,34 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t58 = t5 - self.parameters.Ri;
-        let t60 = t20 * t1;
-        let t61 = t60 * t58;
-        let t62 = self.fixed[7] * t61;
-        let t63 = t31 * t3;
-        let t64 = t63 / t5;
-        let t65 = t62 + t64;
-        let t66 = t65 / t4;
-        let t67 = t32 * t66;
-        let t68 = t20 * t58;
-        let t69 = self.fixed[7] * t68;
-        let t70 = t31 / t5;
-        let t71 = t69 - t70;
-        let t72 = X[0] * X[1];
-        let t73 = t72 * t71;
-        let t74 = t73 / t4;
-        let t75 = t32 * t74;
-        let t76 = t20 * t3;
-        let t77 = t76 * t58;
-        let t78 = self.fixed[7] * t77;
-        let t79 = t31 * t1;
-        let t80 = t79 / t5;
-        let t81 = t78 + t80;
-        let t82 = t81 / t4;
-        let t83 = t32 * t82;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t67, t75, t75, t83)
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t59 = t5 - self.parameters.Ri;
+        let t62 = t20 * t2;
+        let t63 = t62 * t59;
+        let t64 = self.fixed[7] * t63;
+        let t65 = t31 * t3;
+        let t66 = t65 * t35;
+        let t67 = t64 + t66;
+        let t68 = t67 * t34;
+        let t69 = t32 * t68;
+        let t70 = t20 * t59;
+        let t71 = self.fixed[7] * t70;
+        let t72 = t31 * t35;
+        let t73 = t71 - t72;
+        let t74 = X[0] * X[1];
+        let t75 = t74 * t73;
+        let t76 = t75 * t34;
+        let t77 = t32 * t76;
+        let t78 = t20 * t3;
+        let t79 = t78 * t59;
+        let t80 = self.fixed[7] * t79;
+        let t81 = t31 * t2;
+        let t82 = t81 * t35;
+        let t83 = t80 + t82;
+        let t84 = t83 * t34;
+        let t85 = t32 * t84;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t69, t77, t77, t85)
     }
     #[inline]
     fn deformation_gradient(
@@ -375,9 +385,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -389,40 +399,42 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t58 = t5 - self.parameters.Ri;
-        let t60 = t20 * t1;
-        let t61 = t60 * t58;
-        let t62 = self.fixed[7] * t61;
-        let t63 = t31 * t3;
-        let t64 = t63 / t5;
-        let t65 = t62 + t64;
-        let t66 = t65 / t4;
-        let t67 = t32 * t66;
-        let t68 = t20 * t58;
-        let t69 = self.fixed[7] * t68;
-        let t70 = t31 / t5;
-        let t71 = t69 - t70;
-        let t72 = X[0] * X[1];
-        let t73 = t72 * t71;
-        let t74 = t73 / t4;
-        let t75 = t32 * t74;
-        let t76 = t20 * t3;
-        let t77 = t76 * t58;
-        let t78 = self.fixed[7] * t77;
-        let t79 = t31 * t1;
-        let t80 = t79 / t5;
-        let t81 = t78 + t80;
-        let t82 = t81 / t4;
-        let t83 = t32 * t82;
-        let t84 = t67 + T::one();
-        let t85 = t83 + T::one();
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t84, t75, t75, t85)
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t59 = t5 - self.parameters.Ri;
+        let t62 = t20 * t2;
+        let t63 = t62 * t59;
+        let t64 = self.fixed[7] * t63;
+        let t65 = t31 * t3;
+        let t66 = t65 * t35;
+        let t67 = t64 + t66;
+        let t68 = t67 * t34;
+        let t69 = t32 * t68;
+        let t70 = t20 * t59;
+        let t71 = self.fixed[7] * t70;
+        let t72 = t31 * t35;
+        let t73 = t71 - t72;
+        let t74 = X[0] * X[1];
+        let t75 = t74 * t73;
+        let t76 = t75 * t34;
+        let t77 = t32 * t76;
+        let t78 = t20 * t3;
+        let t79 = t78 * t59;
+        let t80 = self.fixed[7] * t79;
+        let t81 = t31 * t2;
+        let t82 = t81 * t35;
+        let t83 = t80 + t82;
+        let t84 = t83 * t34;
+        let t85 = t32 * t84;
+        let t86 = t69 + T::one();
+        let t87 = t85 + T::one();
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t86, t77, t77, t87)
     }
     #[inline]
     fn jacobian(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> T {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -434,16 +446,18 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t58 = t5 - self.parameters.Ri;
-        let t68 = t20 * t58;
-        let t70 = t31 / t5;
-        let t88 = self.fixed[8] * t13;
-        let t89 = t88 * t68;
-        let t90 = t89 + T::one();
-        let t91 = t32 * t70;
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t59 = t5 - self.parameters.Ri;
+        let t70 = t20 * t59;
+        let t72 = t31 * t35;
+        let t90 = self.fixed[8] * t13;
+        let t91 = t90 * t70;
         let t92 = t91 + T::one();
-        let t93 = t90 * t92;
-        t93
+        let t93 = t32 * t72;
+        let t94 = t93 + T::one();
+        let t95 = t92 * t94;
+        t95
     }
     #[inline]
     fn first_piola_kirchhoff(
@@ -451,9 +465,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -465,41 +479,45 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t58 = t5 - self.parameters.Ri;
-        let t63 = t31 * t3;
-        let t64 = t63 / t5;
-        let t68 = t20 * t58;
-        let t70 = t31 / t5;
-        let t72 = X[0] * X[1];
-        let t79 = t31 * t1;
-        let t80 = t79 / t5;
-        let t88 = self.fixed[8] * t13;
-        let t89 = t88 * t68;
-        let t90 = t89 + T::one();
-        let t91 = t32 * t70;
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t59 = t5 - self.parameters.Ri;
+        let t65 = t31 * t3;
+        let t66 = t65 * t35;
+        let t70 = t20 * t59;
+        let t72 = t31 * t35;
+        let t74 = X[0] * X[1];
+        let t81 = t31 * t2;
+        let t82 = t81 * t35;
+        let t90 = self.fixed[8] * t13;
+        let t91 = t90 * t70;
         let t92 = t91 + T::one();
-        let t96 = t89 + T::nearest(2.0);
-        let t97 = t89 * t96;
-        let t98 = t97 / t90;
-        let t99 = t1 * t98;
-        let t100 = t91 + T::nearest(2.0);
-        let t101 = t32 * t64;
-        let t102 = t100 / t92;
-        let t103 = t101 * t102;
-        let t104 = t99 + t103;
-        let t105 = self.fixed[9] / t4;
-        let t106 = t105 * t104;
-        let t107 = t91 * t102;
-        let t108 = t98 - t107;
-        let t109 = t72 / t4;
-        let t110 = self.fixed[9] * t109;
-        let t111 = t110 * t108;
-        let t112 = t3 * t98;
-        let t113 = t32 * t80;
-        let t114 = t113 * t102;
-        let t115 = t112 + t114;
-        let t116 = t105 * t115;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t106, t111, t111, t116)
+        let t93 = t32 * t72;
+        let t94 = t93 + T::one();
+        let t98 = t91 + T::nearest(2.0);
+        let t99 = t93 + T::nearest(2.0);
+        let t100 = t91 * t98;
+        let t101 = T::one() / t92;
+        let t102 = t100 * t101;
+        let t103 = t2 * t102;
+        let t104 = t32 * t66;
+        let t105 = T::one() / t94;
+        let t106 = t99 * t105;
+        let t107 = t104 * t106;
+        let t108 = t103 + t107;
+        let t109 = self.fixed[9] * t34;
+        let t110 = t109 * t108;
+        let t111 = t93 * t106;
+        let t112 = t102 - t111;
+        let t113 = t74 * t34;
+        let t114 = self.fixed[9] * t113;
+        let t115 = t114 * t112;
+        let t116 = t3 * t102;
+        let t117 = t32 * t82;
+        let t118 = t117 * t106;
+        let t119 = t116 + t118;
+        let t120 = t109 * t119;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t110, t115, t115, t120)
     }
     #[inline]
     fn body_force(
@@ -507,9 +525,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -521,76 +539,49 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t58 = t5 - self.parameters.Ri;
-        let t68 = t20 * t58;
-        let t69 = self.fixed[7] * t68;
-        let t70 = t31 / t5;
-        let t71 = t69 - t70;
-        let t88 = self.fixed[8] * t13;
-        let t89 = t88 * t68;
-        let t90 = t89 + T::one();
-        let t91 = t32 * t70;
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t59 = t5 - self.parameters.Ri;
+        let t70 = t20 * t59;
+        let t72 = t31 * t35;
+        let t90 = self.fixed[8] * t13;
+        let t91 = t90 * t70;
         let t92 = t91 + T::one();
-        let t117 = X[0] / t5;
-        let t119 = t23 - self.fixed[10];
-        let t120 = self.fixed[7] * t119;
-        let t121 = t31 / t4;
-        let t122 = t68 / t5;
-        let t123 = self.fixed[7] * t122;
-        let t124 = self.fixed[5] * t31;
-        let t125 = t120 - t121;
-        let t126 = t125 + t123;
-        let t127 = t126 + t124;
-        let t129 = self.fixed[11] * t127;
-        let t130 = -t129;
-        let t131 = t90 * t90;
-        let t137 = t58 * t58;
-        let t138 = t71 / t5;
-        let t139 = t120 + t138;
-        let t145 = t21 * t31;
-        let t146 = t145 * t137;
-        let t147 = t146 * t139;
-        let t148 = t147 / t5;
-        let t149 = self.fixed[12] * t148;
-        let t150 = t13 * t149;
-        let t154 = t21 * t137;
-        let t155 = self.fixed[13] * t154;
-        let t156 = t31 * t31;
-        let t157 = t156 / t4;
-        let t158 = t31 * t71;
-        let t159 = t158 / t5;
-        let t160 = t155 - t157;
-        let t161 = t160 + t159;
-        let t162 = t161 / t5;
-        let t165 = self.fixed[14] * t68;
-        let t166 = t165 + t70;
-        let t168 = t119 * t166;
-        let t169 = self.fixed[15] * t168;
-        let t170 = t162 + t169;
-        let t176 = t68 * t170;
-        let t177 = self.fixed[16] * t176;
-        let t178 = t177 + t150;
-        let t179 = t13 * t178;
-        let t182 = t68 * t119;
-        let t183 = self.fixed[17] * t182;
-        let t184 = t160 / t5;
-        let t185 = t183 + t184;
-        let t188 = self.fixed[18] * t185;
-        let t189 = t188 + t179;
-        let t190 = t131 * t92;
-        let t191 = t189 / t190;
-        let t192 = t13 * t191;
-        let t193 = t130 + t192;
-        let t194 = t13 * t193;
-        let t195 = t117 * t194;
-        let t196 = X[1] / t5;
-        let t197 = t196 * t194;
-        crate::nalgebra::SVector::<T, 2>::new(t195, t197)
+        let t93 = t32 * t72;
+        let t94 = t93 + T::one();
+        let t101 = T::one() / t92;
+        let t105 = T::one() / t94;
+        let t122 = t23 - self.fixed[10];
+        let t123 = t70 * t35;
+        let t124 = t123 + t122;
+        let t125 = self.fixed[7] * t124;
+        let t126 = t34 - self.fixed[5];
+        let t127 = t31 * t126;
+        let t128 = t125 - t127;
+        let t130 = self.fixed[11] * t13;
+        let t131 = t130 * t128;
+        let t132 = t91 * t101;
+        let t133 = t90 * t122;
+        let t134 = T::nearest(2.0) - t132;
+        let t135 = t91 * t132;
+        let t136 = t93 * t93;
+        let t137 = t136 * t105;
+        let t138 = t135 - t137;
+        let t139 = t35 * t138;
+        let t140 = t133 * t134;
+        let t141 = t140 * t132;
+        let t142 = t139 + t141;
+        let t144 = self.fixed[12] * t142;
+        let t145 = t144 - t131;
+        let t146 = t35 * t145;
+        let t147 = X[0] * t146;
+        let t148 = X[1] * t146;
+        crate::nalgebra::SVector::<T, 2>::new(t147, t148)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -603,139 +594,114 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
         let t33 = t31 * X[0];
-        let t34 = t33 / t5;
-        let t35 = t32 * t34;
-        let t36 = t31 * X[1];
-        let t37 = t36 / t5;
-        let t38 = t32 * t37;
-        let t40 = t12.sin_pi();
-        let t43 = self.fixed[4] * t40;
-        let t44 = t43 * t34;
-        let t45 = -t44;
-        let t46 = t43 * t37;
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t36 = t33 * t35;
+        let t37 = t32 * t36;
+        let t38 = t31 * X[1];
+        let t39 = t38 * t35;
+        let t40 = t32 * t39;
+        let t42 = t12.sin_pi();
+        let t45 = self.fixed[4] * t42;
+        let t46 = t45 * t36;
         let t47 = -t46;
-        let t52 = self.fixed[6] * t13;
-        let t53 = t52 * t34;
-        let t54 = -t53;
-        let t55 = t52 * t37;
+        let t48 = t45 * t39;
+        let t49 = -t48;
+        let t54 = self.fixed[6] * t13;
+        let t55 = t54 * t36;
         let t56 = -t55;
-        let t58 = t5 - self.parameters.Ri;
-        let t60 = t20 * t1;
-        let t61 = t60 * t58;
-        let t62 = self.fixed[7] * t61;
-        let t63 = t31 * t3;
-        let t64 = t63 / t5;
-        let t65 = t62 + t64;
-        let t66 = t65 / t4;
-        let t67 = t32 * t66;
-        let t68 = t20 * t58;
-        let t69 = self.fixed[7] * t68;
-        let t70 = t31 / t5;
-        let t71 = t69 - t70;
-        let t72 = X[0] * X[1];
-        let t73 = t72 * t71;
-        let t74 = t73 / t4;
-        let t75 = t32 * t74;
-        let t76 = t20 * t3;
-        let t77 = t76 * t58;
-        let t78 = self.fixed[7] * t77;
-        let t79 = t31 * t1;
-        let t80 = t79 / t5;
-        let t81 = t78 + t80;
-        let t82 = t81 / t4;
-        let t83 = t32 * t82;
-        let t84 = t67 + T::one();
-        let t85 = t83 + T::one();
-        let t88 = self.fixed[8] * t13;
-        let t89 = t88 * t68;
-        let t90 = t89 + T::one();
-        let t91 = t32 * t70;
+        let t57 = t54 * t39;
+        let t58 = -t57;
+        let t59 = t5 - self.parameters.Ri;
+        let t62 = t20 * t2;
+        let t63 = t62 * t59;
+        let t64 = self.fixed[7] * t63;
+        let t65 = t31 * t3;
+        let t66 = t65 * t35;
+        let t67 = t64 + t66;
+        let t68 = t67 * t34;
+        let t69 = t32 * t68;
+        let t70 = t20 * t59;
+        let t71 = self.fixed[7] * t70;
+        let t72 = t31 * t35;
+        let t73 = t71 - t72;
+        let t74 = X[0] * X[1];
+        let t75 = t74 * t73;
+        let t76 = t75 * t34;
+        let t77 = t32 * t76;
+        let t78 = t20 * t3;
+        let t79 = t78 * t59;
+        let t80 = self.fixed[7] * t79;
+        let t81 = t31 * t2;
+        let t82 = t81 * t35;
+        let t83 = t80 + t82;
+        let t84 = t83 * t34;
+        let t85 = t32 * t84;
+        let t86 = t69 + T::one();
+        let t87 = t85 + T::one();
+        let t90 = self.fixed[8] * t13;
+        let t91 = t90 * t70;
         let t92 = t91 + T::one();
-        let t93 = t90 * t92;
-        let t96 = t89 + T::nearest(2.0);
-        let t97 = t89 * t96;
-        let t98 = t97 / t90;
-        let t99 = t1 * t98;
-        let t100 = t91 + T::nearest(2.0);
-        let t101 = t32 * t64;
-        let t102 = t100 / t92;
-        let t103 = t101 * t102;
-        let t104 = t99 + t103;
-        let t105 = self.fixed[9] / t4;
-        let t106 = t105 * t104;
-        let t107 = t91 * t102;
-        let t108 = t98 - t107;
-        let t109 = t72 / t4;
-        let t110 = self.fixed[9] * t109;
-        let t111 = t110 * t108;
-        let t112 = t3 * t98;
-        let t113 = t32 * t80;
-        let t114 = t113 * t102;
-        let t115 = t112 + t114;
-        let t116 = t105 * t115;
-        let t117 = X[0] / t5;
-        let t119 = t23 - self.fixed[10];
-        let t120 = self.fixed[7] * t119;
-        let t121 = t31 / t4;
-        let t122 = t68 / t5;
-        let t123 = self.fixed[7] * t122;
-        let t124 = self.fixed[5] * t31;
-        let t125 = t120 - t121;
-        let t126 = t125 + t123;
-        let t127 = t126 + t124;
-        let t129 = self.fixed[11] * t127;
-        let t130 = -t129;
-        let t131 = t90 * t90;
-        let t137 = t58 * t58;
-        let t138 = t71 / t5;
-        let t139 = t120 + t138;
-        let t145 = t21 * t31;
-        let t146 = t145 * t137;
-        let t147 = t146 * t139;
-        let t148 = t147 / t5;
-        let t149 = self.fixed[12] * t148;
-        let t150 = t13 * t149;
-        let t154 = t21 * t137;
-        let t155 = self.fixed[13] * t154;
-        let t156 = t31 * t31;
-        let t157 = t156 / t4;
-        let t158 = t31 * t71;
-        let t159 = t158 / t5;
-        let t160 = t155 - t157;
-        let t161 = t160 + t159;
-        let t162 = t161 / t5;
-        let t165 = self.fixed[14] * t68;
-        let t166 = t165 + t70;
-        let t168 = t119 * t166;
-        let t169 = self.fixed[15] * t168;
-        let t170 = t162 + t169;
-        let t176 = t68 * t170;
-        let t177 = self.fixed[16] * t176;
-        let t178 = t177 + t150;
-        let t179 = t13 * t178;
-        let t182 = t68 * t119;
-        let t183 = self.fixed[17] * t182;
-        let t184 = t160 / t5;
-        let t185 = t183 + t184;
-        let t188 = self.fixed[18] * t185;
-        let t189 = t188 + t179;
-        let t190 = t131 * t92;
-        let t191 = t189 / t190;
-        let t192 = t13 * t191;
-        let t193 = t130 + t192;
-        let t194 = t13 * t193;
-        let t195 = t117 * t194;
-        let t196 = X[1] / t5;
-        let t197 = t196 * t194;
+        let t93 = t32 * t72;
+        let t94 = t93 + T::one();
+        let t95 = t92 * t94;
+        let t98 = t91 + T::nearest(2.0);
+        let t99 = t93 + T::nearest(2.0);
+        let t100 = t91 * t98;
+        let t101 = T::one() / t92;
+        let t102 = t100 * t101;
+        let t103 = t2 * t102;
+        let t104 = t32 * t66;
+        let t105 = T::one() / t94;
+        let t106 = t99 * t105;
+        let t107 = t104 * t106;
+        let t108 = t103 + t107;
+        let t109 = self.fixed[9] * t34;
+        let t110 = t109 * t108;
+        let t111 = t93 * t106;
+        let t112 = t102 - t111;
+        let t113 = t74 * t34;
+        let t114 = self.fixed[9] * t113;
+        let t115 = t114 * t112;
+        let t116 = t3 * t102;
+        let t117 = t32 * t82;
+        let t118 = t117 * t106;
+        let t119 = t116 + t118;
+        let t120 = t109 * t119;
+        let t122 = t23 - self.fixed[10];
+        let t123 = t70 * t35;
+        let t124 = t123 + t122;
+        let t125 = self.fixed[7] * t124;
+        let t126 = t34 - self.fixed[5];
+        let t127 = t31 * t126;
+        let t128 = t125 - t127;
+        let t130 = self.fixed[11] * t13;
+        let t131 = t130 * t128;
+        let t132 = t91 * t101;
+        let t133 = t90 * t122;
+        let t134 = T::nearest(2.0) - t132;
+        let t135 = t91 * t132;
+        let t136 = t93 * t93;
+        let t137 = t136 * t105;
+        let t138 = t135 - t137;
+        let t139 = t35 * t138;
+        let t140 = t133 * t134;
+        let t141 = t140 * t132;
+        let t142 = t139 + t141;
+        let t144 = self.fixed[12] * t142;
+        let t145 = t144 - t131;
+        let t146 = t35 * t145;
+        let t147 = X[0] * t146;
+        let t148 = X[1] * t146;
         crate::Fields {
-            u: crate::nalgebra::SVector::<T, 2>::new(t35, t38),
-            v: crate::nalgebra::SVector::<T, 2>::new(t45, t47),
-            a: crate::nalgebra::SVector::<T, 2>::new(t54, t56),
-            H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t67, t75, t75, t83),
-            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t84, t75, t75, t85),
-            J: t93,
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t106, t111, t111, t116),
-            b: crate::nalgebra::SVector::<T, 2>::new(t195, t197),
+            u: crate::nalgebra::SVector::<T, 2>::new(t37, t40),
+            v: crate::nalgebra::SVector::<T, 2>::new(t47, t49),
+            a: crate::nalgebra::SVector::<T, 2>::new(t56, t58),
+            H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t69, t77, t77, t85),
+            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t86, t77, t77, t87),
+            J: t95,
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t110, t115, t115, t120),
+            b: crate::nalgebra::SVector::<T, 2>::new(t147, t148),
         }
     }
     fn traction(
@@ -752,9 +718,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
                 Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), T::zero()))
             }
             crate::Surface::Lower(0) => {
-                let t1 = X[0] * X[0];
+                let t2 = X[0] * X[0];
                 let t3 = X[1] * X[1];
-                let t4 = t1 + t3;
+                let t4 = t2 + t3;
                 let t5 = t4.sqrt();
                 let t12 = self.fixed[0] * t;
                 let t13 = t12.cos_pi();
@@ -766,24 +732,27 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
                 let t30 = self.fixed[3] * t29;
                 let t31 = t30 + T::one();
                 let t32 = self.parameters.A * t13;
-                let t63 = t31 * t3;
-                let t70 = t31 / t5;
-                let t91 = t32 * t70;
-                let t92 = t91 + T::one();
-                let t100 = t91 + T::nearest(2.0);
-                let t102 = t100 / t92;
-                let t200 = t4 * t5;
-                let t202 = self.fixed[20] * t13;
-                let t203 = t63 / t200;
-                let t204 = t202 * t203;
-                let t205 = t204 * t102;
-                let t206 = -t205;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t206, T::zero()))
+                let t34 = T::one() / t4;
+                let t35 = t5 * t34;
+                let t65 = t31 * t3;
+                let t72 = t31 * t35;
+                let t93 = t32 * t72;
+                let t94 = t93 + T::one();
+                let t99 = t93 + T::nearest(2.0);
+                let t105 = T::one() / t94;
+                let t106 = t99 * t105;
+                let t222 = self.fixed[21] * t13;
+                let t223 = t34 * t35;
+                let t224 = t65 * t223;
+                let t225 = t222 * t224;
+                let t226 = t225 * t106;
+                let t227 = -t226;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t227, T::zero()))
             }
             crate::Surface::Lower(1) => {
-                let t1 = X[0] * X[0];
+                let t2 = X[0] * X[0];
                 let t3 = X[1] * X[1];
-                let t4 = t1 + t3;
+                let t4 = t2 + t3;
                 let t5 = t4.sqrt();
                 let t12 = self.fixed[0] * t;
                 let t13 = t12.cos_pi();
@@ -795,19 +764,22 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
                 let t30 = self.fixed[3] * t29;
                 let t31 = t30 + T::one();
                 let t32 = self.parameters.A * t13;
-                let t70 = t31 / t5;
-                let t79 = t31 * t1;
-                let t91 = t32 * t70;
-                let t92 = t91 + T::one();
-                let t100 = t91 + T::nearest(2.0);
-                let t102 = t100 / t92;
-                let t200 = t4 * t5;
-                let t202 = self.fixed[20] * t13;
-                let t207 = t79 / t200;
-                let t208 = t202 * t207;
-                let t209 = t208 * t102;
-                let t210 = -t209;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t210))
+                let t34 = T::one() / t4;
+                let t35 = t5 * t34;
+                let t72 = t31 * t35;
+                let t81 = t31 * t2;
+                let t93 = t32 * t72;
+                let t94 = t93 + T::one();
+                let t99 = t93 + T::nearest(2.0);
+                let t105 = T::one() / t94;
+                let t106 = t99 * t105;
+                let t222 = self.fixed[21] * t13;
+                let t223 = t34 * t35;
+                let t228 = t81 * t223;
+                let t229 = t222 * t228;
+                let t230 = t229 * t106;
+                let t231 = -t230;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t231))
             }
             _ => None,
         }
@@ -854,7 +826,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[19]
+        self.fixed[20]
     }
     fn body_force_at(
         &self,
@@ -870,14 +842,14 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 8> for Ring<T> {
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
         let t32 = self.parameters.A * t13;
-        let t88 = self.fixed[8] * t13;
-        [t13, t32, t88]
+        let t90 = self.fixed[8] * t13;
+        [t13, t32, t90]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 8] {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t20 = t5 - self.parameters.Ro;
         let t21 = t20 * t20;
@@ -886,54 +858,54 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 8> for Ring<T> {
         let t29 = t21 * t25;
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
-        let t58 = t5 - self.parameters.Ri;
-        let t68 = t20 * t58;
-        let t69 = self.fixed[7] * t68;
-        let t70 = t31 / t5;
-        let t71 = t69 - t70;
-        let t117 = X[0] / t5;
-        let t119 = t23 - self.fixed[10];
-        let t120 = self.fixed[7] * t119;
-        let t121 = t31 / t4;
-        let t122 = t68 / t5;
-        let t123 = self.fixed[7] * t122;
-        let t124 = self.fixed[5] * t31;
-        let t125 = t120 - t121;
-        let t126 = t125 + t123;
-        let t127 = t126 + t124;
-        let t129 = self.fixed[11] * t127;
-        let t130 = -t129;
-        let t137 = t58 * t58;
-        let t138 = t71 / t5;
-        let t139 = t120 + t138;
-        let t145 = t21 * t31;
-        let t146 = t145 * t137;
-        let t147 = t146 * t139;
-        let t148 = t147 / t5;
-        let t149 = self.fixed[12] * t148;
-        let t154 = t21 * t137;
-        let t155 = self.fixed[13] * t154;
-        let t156 = t31 * t31;
-        let t157 = t156 / t4;
-        let t158 = t31 * t71;
-        let t159 = t158 / t5;
-        let t160 = t155 - t157;
-        let t161 = t160 + t159;
-        let t162 = t161 / t5;
-        let t165 = self.fixed[14] * t68;
-        let t166 = t165 + t70;
-        let t168 = t119 * t166;
-        let t169 = self.fixed[15] * t168;
-        let t170 = t162 + t169;
-        let t176 = t68 * t170;
-        let t177 = self.fixed[16] * t176;
-        let t182 = t68 * t119;
-        let t183 = self.fixed[17] * t182;
-        let t184 = t160 / t5;
-        let t185 = t183 + t184;
-        let t188 = self.fixed[18] * t185;
-        let t196 = X[1] / t5;
-        [t68, t70, t117, t130, t149, t177, t188, t196]
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t59 = t5 - self.parameters.Ri;
+        let t70 = t20 * t59;
+        let t71 = self.fixed[7] * t70;
+        let t72 = t31 * t35;
+        let t73 = t71 - t72;
+        let t122 = t23 - self.fixed[10];
+        let t123 = t70 * t35;
+        let t124 = t123 + t122;
+        let t125 = self.fixed[7] * t124;
+        let t126 = t34 - self.fixed[5];
+        let t127 = t31 * t126;
+        let t128 = t125 - t127;
+        let t149 = X[0] * t35;
+        let t150 = self.fixed[11] * t128;
+        let t151 = self.fixed[7] * t122;
+        let t152 = t73 * t35;
+        let t153 = t151 + t152;
+        let t159 = t59 * t59;
+        let t165 = t21 * t31;
+        let t166 = t165 * t159;
+        let t167 = t166 * t153;
+        let t168 = t167 * t35;
+        let t169 = self.fixed[13] * t168;
+        let t172 = t21 * t159;
+        let t173 = self.fixed[14] * t172;
+        let t174 = t31 * t31;
+        let t175 = t174 * t34;
+        let t176 = t31 * t73;
+        let t177 = t176 * t35;
+        let t178 = t173 - t175;
+        let t179 = t178 + t177;
+        let t181 = self.fixed[15] * t70;
+        let t182 = t181 + t72;
+        let t183 = t179 * t35;
+        let t186 = t122 * t182;
+        let t187 = self.fixed[16] * t186;
+        let t188 = t183 + t187;
+        let t195 = t70 * t188;
+        let t196 = self.fixed[17] * t195;
+        let t201 = t70 * t122;
+        let t202 = self.fixed[18] * t201;
+        let t203 = t178 * t35;
+        let t204 = t202 + t203;
+        let t207 = self.fixed[19] * t204;
+        let t217 = X[1] * t35;
+        [t70, t72, t149, t150, t169, t196, t207, t217]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -941,23 +913,23 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 8> for Ring<T> {
         time: &[T; 3],
         point: &[T; 8],
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t89 = time[2] * point[0];
-        let t90 = t89 + T::one();
-        let t91 = time[1] * point[1];
+        let t91 = time[2] * point[0];
         let t92 = t91 + T::one();
-        let t131 = t90 * t90;
-        let t150 = time[0] * point[4];
-        let t178 = point[5] + t150;
-        let t179 = time[0] * t178;
-        let t189 = point[6] + t179;
-        let t190 = t131 * t92;
-        let t191 = t189 / t190;
-        let t192 = time[0] * t191;
-        let t193 = point[3] + t192;
-        let t194 = time[0] * t193;
-        let t195 = point[2] * t194;
-        let t197 = point[7] * t194;
-        crate::nalgebra::SVector::<T, 2>::new(t195, t197)
+        let t93 = time[1] * point[1];
+        let t94 = t93 + T::one();
+        let t197 = time[0] * point[4];
+        let t198 = point[5] + t197;
+        let t208 = time[0] * t198;
+        let t209 = point[6] + t208;
+        let t210 = t92 * t92;
+        let t211 = t210 * t94;
+        let t212 = t209 / t211;
+        let t213 = time[0] * t212;
+        let t214 = t213 - point[3];
+        let t215 = time[0] * t214;
+        let t216 = point[2] * t215;
+        let t218 = point[7] * t215;
+        crate::nalgebra::SVector::<T, 2>::new(t216, t218)
     }
 }
 impl<T: crate::Real> From<Ring<T>> for crate::AnySolution<T> {

@@ -44,7 +44,7 @@ impl<T: crate::Real> Default for RingNuParameters<T> {
 pub struct RingNu<T: crate::Real> {
     parameters: RingNuParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 28],
+    fixed: [T; 31],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> RingNu<T> {
@@ -147,73 +147,75 @@ impl<T: crate::Real> RingNu<T> {
         let t24 = parameters.Ro - t18;
         let t26 = t15 * t19;
         let t28 = T::one() / t26;
-        let t41 = parameters.A * t11;
-        let t42 = t41 * T::pi();
-        let t48 = T::pi() * T::pi();
-        let t49 = parameters.A * parameters.E;
-        let t50 = t49 * t48;
-        let t51 = t50 / parameters.rho0;
-        let t59 = T::nearest(6.0) / t26;
-        let t86 = T::nearest(6.0) * parameters.A;
-        let t87 = t86 / t26;
-        let t95 = parameters.nu + T::one();
-        let t96 = T::nearest(2.0) * parameters.nu;
-        let t97 = T::one() - t96;
-        let t102 = parameters.E * parameters.nu;
-        let t103 = t95 * t97;
-        let t104 = t102 / t103;
-        let t107 = T::nearest(0.5) * parameters.E;
-        let t108 = t107 / t95;
-        let t116 = parameters.A * t108;
-        let t135 = parameters.Ri + parameters.Ro;
-        let t143 = parameters.nu / t97;
-        let t148 = T::one() / t95;
-        let t151 = t49 / parameters.rho0;
-        let t156 = parameters.A * parameters.A;
-        let t157 = t156 * t156;
-        let t158 = t15 * t15;
-        let t159 = t19 * t19;
-        let t161 = t104 + t108;
-        let t162 = T::nearest(36.0) * t157;
-        let t163 = t162 * t161;
-        let t164 = parameters.rho0 * t158;
-        let t165 = t164 * t159;
-        let t166 = t163 / t165;
-        let t173 = t156 * parameters.A;
-        let t187 = t158 * t159;
-        let t188 = T::nearest(36.0) / t187;
-        let t209 = T::nearest(6.0) * t173;
-        let t210 = parameters.rho0 * t15;
-        let t211 = t210 * t19;
-        let t212 = t209 / t211;
-        let t217 = T::nearest(6.0) * t156;
-        let t218 = t217 * parameters.E;
-        let t219 = t218 * parameters.nu;
-        let t220 = t211 * t95;
-        let t221 = t220 * t97;
-        let t222 = t219 / t221;
-        let t227 = T::nearest(12.0) * t108;
-        let t228 = t227 / t26;
-        let t238 = t156 / parameters.rho0;
-        let t243 = t49 * parameters.nu;
-        let t244 = parameters.rho0 * t95;
-        let t245 = t244 * t97;
-        let t246 = t243 / t245;
-        let t257 = T::nearest(2.0) / t11;
-        let t258 = parameters.Ri - parameters.Ro;
-        let t259 = t258 * t258;
-        let t260 = t259 * t258;
-        let t261 = t260 / t26;
-        let t262 = T::one() - t261;
-        let t263 = parameters.A * t262;
-        let t264 = t263 / parameters.Ri;
-        let t267 = parameters.Ri * t95;
-        let t268 = t267 * t97;
-        let t269 = t102 / t268;
-        let t275 = parameters.A / parameters.Ro;
-        let t278 = parameters.Ro * t95;
-        let t279 = t278 * t97;
-        let t280 = t102 / t279;
+        let t43 = parameters.A * t11;
+        let t44 = t43 * T::pi();
+        let t50 = T::pi() * T::pi();
+        let t51 = parameters.A * parameters.E;
+        let t52 = t51 * t50;
+        let t53 = t52 / parameters.rho0;
+        let t61 = T::nearest(6.0) / t26;
+        let t88 = T::nearest(6.0) * parameters.A;
+        let t89 = t88 / t26;
+        let t97 = parameters.nu + T::one();
+        let t98 = T::nearest(2.0) * parameters.nu;
+        let t99 = T::one() - t98;
+        let t106 = T::nearest(0.5) * parameters.E;
+        let t107 = t106 / t97;
+        let t109 = parameters.E * parameters.nu;
+        let t110 = t97 * t99;
+        let t111 = t109 / t110;
+        let t117 = parameters.A * t107;
+        let t136 = parameters.Ri + parameters.Ro;
+        let t145 = parameters.nu / t99;
+        let t150 = T::one() / t97;
+        let t153 = t51 / parameters.rho0;
+        let t193 = T::one() / parameters.rho0;
+        let t209 = t111 + t107;
+        let t211 = parameters.A * parameters.A;
+        let t212 = t211 * t211;
+        let t213 = t15 * t15;
+        let t214 = t19 * t19;
+        let t216 = T::nearest(36.0) * t212;
+        let t217 = t216 * t209;
+        let t218 = parameters.rho0 * t213;
+        let t219 = t218 * t214;
+        let t220 = t217 / t219;
+        let t229 = T::nearest(3.0) / t26;
+        let t238 = t213 * t214;
+        let t239 = T::nearest(36.0) / t238;
+        let t262 = t211 * parameters.A;
+        let t263 = T::nearest(6.0) * t262;
+        let t264 = parameters.rho0 * t15;
+        let t265 = t264 * t19;
+        let t266 = t263 / t265;
+        let t271 = T::nearest(6.0) * t211;
+        let t272 = t271 * parameters.E;
+        let t273 = t272 * parameters.nu;
+        let t274 = t265 * t97;
+        let t275 = t274 * t99;
+        let t276 = t273 / t275;
+        let t280 = T::nearest(12.0) * t107;
+        let t281 = t280 / t26;
+        let t293 = t211 / parameters.rho0;
+        let t299 = t51 * parameters.nu;
+        let t300 = parameters.rho0 * t97;
+        let t301 = t300 * t99;
+        let t302 = t299 / t301;
+        let t315 = T::nearest(2.0) / t11;
+        let t316 = parameters.Ri - parameters.Ro;
+        let t317 = t316 * t316;
+        let t318 = t317 * t316;
+        let t319 = t318 / t26;
+        let t320 = T::one() - t319;
+        let t321 = parameters.A * t320;
+        let t322 = t321 / parameters.Ri;
+        let t325 = parameters.Ri * t97;
+        let t326 = t325 * t99;
+        let t327 = t109 / t326;
+        let t333 = parameters.A / parameters.Ro;
+        let t336 = parameters.Ro * t97;
+        let t337 = t336 * t99;
+        let t338 = t109 / t337;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -227,30 +229,33 @@ impl<T: crate::Real> RingNu<T> {
                 t18,
                 t24,
                 t28,
-                t42,
-                t48,
-                t51,
-                t59,
-                t87,
-                t104,
-                t108,
-                t116,
-                t135,
-                t143,
-                t148,
-                t151,
-                t166,
-                t188,
-                t212,
-                t222,
-                t228,
-                t238,
-                t246,
-                t257,
-                t264,
-                t269,
-                t275,
-                t280,
+                t44,
+                t50,
+                t53,
+                t61,
+                t88,
+                t89,
+                t107,
+                t111,
+                t117,
+                t136,
+                t145,
+                t150,
+                t153,
+                t193,
+                t220,
+                t229,
+                t239,
+                t266,
+                t276,
+                t281,
+                t293,
+                t302,
+                t315,
+                t322,
+                t327,
+                t333,
+                t338,
             ],
         })
     }
@@ -296,9 +301,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -311,12 +316,14 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
         let t33 = t31 * X[0];
-        let t34 = t33 / t5;
-        let t35 = t32 * t34;
-        let t36 = t31 * X[1];
-        let t37 = t36 / t5;
-        let t38 = t32 * t37;
-        crate::nalgebra::SVector::<T, 2>::new(t35, t38)
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t36 = t33 * t35;
+        let t37 = t32 * t36;
+        let t38 = t31 * X[1];
+        let t39 = t38 * t35;
+        let t40 = t32 * t39;
+        crate::nalgebra::SVector::<T, 2>::new(t37, t40)
     }
     #[inline]
     fn velocity(
@@ -324,9 +331,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t20 = t5 - self.parameters.Ro;
@@ -337,16 +344,18 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t33 = t31 * X[0];
-        let t34 = t33 / t5;
-        let t36 = t31 * X[1];
-        let t37 = t36 / t5;
-        let t40 = t12.sin_pi();
-        let t43 = self.fixed[4] * t40;
-        let t44 = t43 * t34;
-        let t45 = -t44;
-        let t46 = t43 * t37;
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t36 = t33 * t35;
+        let t38 = t31 * X[1];
+        let t39 = t38 * t35;
+        let t42 = t12.sin_pi();
+        let t45 = self.fixed[4] * t42;
+        let t46 = t45 * t36;
         let t47 = -t46;
-        crate::nalgebra::SVector::<T, 2>::new(t45, t47)
+        let t48 = t45 * t39;
+        let t49 = -t48;
+        crate::nalgebra::SVector::<T, 2>::new(t47, t49)
     }
     #[inline]
     fn acceleration(
@@ -354,9 +363,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -368,15 +377,17 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t33 = t31 * X[0];
-        let t34 = t33 / t5;
-        let t36 = t31 * X[1];
-        let t37 = t36 / t5;
-        let t52 = self.fixed[6] * t13;
-        let t53 = t52 * t34;
-        let t54 = -t53;
-        let t55 = t52 * t37;
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t36 = t33 * t35;
+        let t38 = t31 * X[1];
+        let t39 = t38 * t35;
+        let t54 = self.fixed[6] * t13;
+        let t55 = t54 * t36;
         let t56 = -t55;
-        crate::nalgebra::SVector::<T, 2>::new(t54, t56)
+        let t57 = t54 * t39;
+        let t58 = -t57;
+        crate::nalgebra::SVector::<T, 2>::new(t56, t58)
     }
     #[inline]
     fn displacement_gradient(
@@ -384,9 +395,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -398,32 +409,34 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t58 = t5 - self.parameters.Ri;
-        let t60 = t20 * t1;
-        let t61 = t60 * t58;
-        let t62 = self.fixed[7] * t61;
-        let t63 = t31 * t3;
-        let t64 = t63 / t5;
-        let t65 = t62 + t64;
-        let t66 = t65 / t4;
-        let t67 = t32 * t66;
-        let t68 = t20 * t58;
-        let t69 = self.fixed[7] * t68;
-        let t70 = t31 / t5;
-        let t71 = t69 - t70;
-        let t72 = X[0] * X[1];
-        let t73 = t72 * t71;
-        let t74 = t73 / t4;
-        let t75 = t32 * t74;
-        let t76 = t20 * t3;
-        let t77 = t76 * t58;
-        let t78 = self.fixed[7] * t77;
-        let t79 = t31 * t1;
-        let t80 = t79 / t5;
-        let t81 = t78 + t80;
-        let t82 = t81 / t4;
-        let t83 = t32 * t82;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t67, t75, t75, t83)
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t59 = t5 - self.parameters.Ri;
+        let t62 = t20 * t2;
+        let t63 = t62 * t59;
+        let t64 = self.fixed[7] * t63;
+        let t65 = t31 * t3;
+        let t66 = t65 * t35;
+        let t67 = t64 + t66;
+        let t68 = t67 * t34;
+        let t69 = t32 * t68;
+        let t70 = t20 * t59;
+        let t71 = self.fixed[7] * t70;
+        let t72 = t31 * t35;
+        let t73 = t71 - t72;
+        let t74 = X[0] * X[1];
+        let t75 = t74 * t73;
+        let t76 = t75 * t34;
+        let t77 = t32 * t76;
+        let t78 = t20 * t3;
+        let t79 = t78 * t59;
+        let t80 = self.fixed[7] * t79;
+        let t81 = t31 * t2;
+        let t82 = t81 * t35;
+        let t83 = t80 + t82;
+        let t84 = t83 * t34;
+        let t85 = t32 * t84;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t69, t77, t77, t85)
     }
     #[inline]
     fn deformation_gradient(
@@ -431,9 +444,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -445,40 +458,42 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t58 = t5 - self.parameters.Ri;
-        let t60 = t20 * t1;
-        let t61 = t60 * t58;
-        let t62 = self.fixed[7] * t61;
-        let t63 = t31 * t3;
-        let t64 = t63 / t5;
-        let t65 = t62 + t64;
-        let t66 = t65 / t4;
-        let t67 = t32 * t66;
-        let t68 = t20 * t58;
-        let t69 = self.fixed[7] * t68;
-        let t70 = t31 / t5;
-        let t71 = t69 - t70;
-        let t72 = X[0] * X[1];
-        let t73 = t72 * t71;
-        let t74 = t73 / t4;
-        let t75 = t32 * t74;
-        let t76 = t20 * t3;
-        let t77 = t76 * t58;
-        let t78 = self.fixed[7] * t77;
-        let t79 = t31 * t1;
-        let t80 = t79 / t5;
-        let t81 = t78 + t80;
-        let t82 = t81 / t4;
-        let t83 = t32 * t82;
-        let t84 = t67 + T::one();
-        let t85 = t83 + T::one();
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t84, t75, t75, t85)
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t59 = t5 - self.parameters.Ri;
+        let t62 = t20 * t2;
+        let t63 = t62 * t59;
+        let t64 = self.fixed[7] * t63;
+        let t65 = t31 * t3;
+        let t66 = t65 * t35;
+        let t67 = t64 + t66;
+        let t68 = t67 * t34;
+        let t69 = t32 * t68;
+        let t70 = t20 * t59;
+        let t71 = self.fixed[7] * t70;
+        let t72 = t31 * t35;
+        let t73 = t71 - t72;
+        let t74 = X[0] * X[1];
+        let t75 = t74 * t73;
+        let t76 = t75 * t34;
+        let t77 = t32 * t76;
+        let t78 = t20 * t3;
+        let t79 = t78 * t59;
+        let t80 = self.fixed[7] * t79;
+        let t81 = t31 * t2;
+        let t82 = t81 * t35;
+        let t83 = t80 + t82;
+        let t84 = t83 * t34;
+        let t85 = t32 * t84;
+        let t86 = t69 + T::one();
+        let t87 = t85 + T::one();
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t86, t77, t77, t87)
     }
     #[inline]
     fn jacobian(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> T {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -490,16 +505,18 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t58 = t5 - self.parameters.Ri;
-        let t68 = t20 * t58;
-        let t70 = t31 / t5;
-        let t88 = self.fixed[8] * t13;
-        let t89 = t88 * t68;
-        let t90 = t89 + T::one();
-        let t91 = t32 * t70;
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t59 = t5 - self.parameters.Ri;
+        let t70 = t20 * t59;
+        let t72 = t31 * t35;
+        let t90 = self.fixed[9] * t13;
+        let t91 = t90 * t70;
         let t92 = t91 + T::one();
-        let t93 = t90 * t92;
-        t93
+        let t93 = t32 * t72;
+        let t94 = t93 + T::one();
+        let t95 = t92 * t94;
+        t95
     }
     #[inline]
     fn first_piola_kirchhoff(
@@ -507,9 +524,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -521,44 +538,47 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t58 = t5 - self.parameters.Ri;
-        let t68 = t20 * t58;
-        let t70 = t31 / t5;
-        let t72 = X[0] * X[1];
-        let t88 = self.fixed[8] * t13;
-        let t89 = t88 * t68;
-        let t90 = t89 + T::one();
-        let t91 = t32 * t70;
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t59 = t5 - self.parameters.Ri;
+        let t70 = t20 * t59;
+        let t72 = t31 * t35;
+        let t74 = X[0] * X[1];
+        let t90 = self.fixed[9] * t13;
+        let t91 = t90 * t70;
         let t92 = t91 + T::one();
-        let t98 = t91 * t89;
-        let t99 = t91 + t89;
-        let t100 = t99 + t98;
-        let t101 = t100.ln_1p();
-        let t105 = self.fixed[9] * t101;
-        let t109 = t89 + T::nearest(2.0);
-        let t110 = t89 * t109;
-        let t111 = self.fixed[10] * t110;
-        let t112 = t105 + t111;
-        let t113 = t112 / t90;
-        let t114 = t1 * t113;
-        let t115 = t91 + T::nearest(2.0);
-        let t117 = self.fixed[11] * t13;
-        let t118 = t117 * t70;
-        let t119 = t118 * t115;
-        let t120 = t105 + t119;
-        let t121 = t120 / t92;
-        let t122 = t3 * t121;
-        let t123 = t114 + t122;
-        let t124 = T::one() / t4;
-        let t125 = t124 * t123;
-        let t126 = t113 - t121;
-        let t127 = t72 / t4;
-        let t128 = t127 * t126;
-        let t129 = t3 * t113;
-        let t130 = t1 * t121;
-        let t131 = t129 + t130;
-        let t132 = t124 * t131;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t125, t128, t128, t132)
+        let t93 = t32 * t72;
+        let t94 = t93 + T::one();
+        let t100 = t13 * t72;
+        let t101 = t100 * t92;
+        let t102 = self.parameters.A * t101;
+        let t103 = t102 + t91;
+        let t104 = t103.ln_1p();
+        let t108 = t91 + T::nearest(2.0);
+        let t112 = self.fixed[11] * t104;
+        let t113 = t91 * t108;
+        let t114 = self.fixed[10] * t113;
+        let t115 = t112 + t114;
+        let t116 = t93 + T::nearest(2.0);
+        let t118 = self.fixed[12] * t13;
+        let t119 = t118 * t72;
+        let t120 = t119 * t116;
+        let t121 = t112 + t120;
+        let t122 = t115 / t92;
+        let t123 = t2 * t122;
+        let t124 = T::one() / t94;
+        let t125 = t121 * t124;
+        let t126 = t3 * t125;
+        let t127 = t123 + t126;
+        let t128 = t34 * t127;
+        let t129 = t122 - t125;
+        let t130 = t74 * t34;
+        let t131 = t130 * t129;
+        let t132 = t3 * t122;
+        let t133 = t2 * t125;
+        let t134 = t132 + t133;
+        let t135 = t34 * t134;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t128, t131, t131, t135)
     }
     #[inline]
     fn body_force(
@@ -566,9 +586,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -580,114 +600,81 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t58 = t5 - self.parameters.Ri;
-        let t68 = t20 * t58;
-        let t69 = self.fixed[7] * t68;
-        let t70 = t31 / t5;
-        let t71 = t69 - t70;
-        let t88 = self.fixed[8] * t13;
-        let t89 = t88 * t68;
-        let t90 = t89 + T::one();
-        let t91 = t32 * t70;
-        let t92 = t91 + T::one();
-        let t98 = t91 * t89;
-        let t99 = t91 + t89;
-        let t100 = t99 + t98;
-        let t101 = t100.ln_1p();
-        let t133 = X[0] / t5;
-        let t134 = self.fixed[5] * t31;
-        let t136 = t23 - self.fixed[12];
-        let t137 = self.fixed[7] * t136;
-        let t138 = t31 / t4;
-        let t139 = t68 / t5;
-        let t140 = self.fixed[7] * t139;
-        let t141 = t71 / t5;
-        let t142 = t137 + t141;
-        let t144 = self.fixed[13] * t142;
-        let t145 = t137 - t138;
-        let t146 = t145 + t140;
-        let t147 = t146 + t144;
-        let t149 = self.fixed[14] * t147;
-        let t150 = t134 + t149;
-        let t152 = self.fixed[15] * t150;
-        let t153 = -t152;
-        let t154 = t90 * t90;
-        let t160 = t58 * t58;
-        let t167 = t21 * t31;
-        let t168 = t167 * t160;
-        let t169 = t168 * t142;
-        let t170 = t169 / t5;
-        let t171 = self.fixed[16] * t170;
-        let t172 = t13 * t171;
-        let t174 = t31 * t136;
-        let t175 = t68 * t71;
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t59 = t5 - self.parameters.Ri;
+        let t70 = t20 * t59;
+        let t71 = self.fixed[7] * t70;
+        let t72 = t31 * t35;
+        let t73 = t71 - t72;
+        let t90 = self.fixed[9] * t13;
+        let t93 = t32 * t72;
+        let t94 = t93 + T::one();
+        let t124 = T::one() / t94;
+        let t137 = t23 - self.fixed[13];
+        let t138 = self.fixed[7] * t137;
+        let t139 = t73 * t35;
+        let t140 = t138 + t139;
+        let t141 = self.fixed[3] * t70;
+        let t142 = T::nearest(6.0) * t141;
+        let t143 = t72 - t142;
+        let t144 = t35 * t143;
+        let t146 = self.fixed[14] * t140;
+        let t147 = t138 - t144;
+        let t148 = t147 + t146;
+        let t149 = self.fixed[5] * t31;
+        let t151 = self.fixed[15] * t148;
+        let t152 = t149 + t151;
+        let t154 = self.fixed[16] * t13;
+        let t155 = t154 * t152;
+        let t156 = self.fixed[8] * t13;
+        let t157 = t156 * t141;
+        let t158 = t157 + T::one();
+        let t159 = t157 * t94;
+        let t160 = t159 + t93;
+        let t161 = t160.ln_1p();
+        let t162 = self.fixed[11] * t161;
+        let t163 = self.fixed[10] * t157;
+        let t164 = t162 + t163;
+        let t165 = self.fixed[10] * t93;
+        let t166 = t162 + t165;
+        let t167 = t90 * t137;
+        let t168 = T::one() / t158;
+        let t169 = t167 * t168;
+        let t170 = t157 * t169;
+        let t171 = t32 * t139;
+        let t172 = t171 * t124;
+        let t173 = t169 + t172;
+        let t174 = self.fixed[10] * t167;
+        let t175 = self.fixed[11] * t173;
         let t176 = t174 + t175;
-        let t177 = t176 / t5;
-        let t178 = self.fixed[9] * t177;
-        let t179 = t69 + t70;
-        let t180 = t136 * t179;
-        let t181 = self.fixed[10] * t180;
-        let t182 = t174 / t5;
-        let t183 = self.fixed[10] * t182;
-        let t184 = t178 + t181;
-        let t185 = t184 + t183;
-        let t186 = self.fixed[7] * t185;
-        let t189 = t21 * t160;
-        let t190 = self.fixed[17] * t189;
-        let t191 = t31 * t31;
-        let t192 = t191 / t4;
-        let t193 = t31 * t71;
-        let t194 = t193 / t5;
-        let t195 = t190 - t192;
-        let t196 = t195 + t194;
-        let t197 = t196 / t5;
-        let t198 = self.fixed[10] * t197;
-        let t199 = t68 * t136;
-        let t200 = self.fixed[17] * t199;
-        let t201 = t193 / t4;
-        let t202 = t31 * t142;
-        let t203 = t202 / t5;
-        let t204 = t200 + t201;
-        let t205 = t204 + t203;
-        let t206 = self.fixed[9] * t205;
-        let t207 = t186 + t198;
-        let t208 = t207 + t206;
-        let t213 = t68 * t208;
-        let t214 = self.fixed[18] * t213;
-        let t215 = t214 + t172;
-        let t216 = t13 * t215;
-        let t223 = self.fixed[19] * t177;
-        let t224 = t223 * t101;
-        let t225 = self.fixed[9] * t142;
-        let t229 = self.fixed[20] * t136;
-        let t230 = t225 + t229;
-        let t231 = t68 * t230;
-        let t232 = self.fixed[7] * t231;
-        let t233 = t195 / t5;
-        let t234 = self.fixed[10] * t233;
-        let t235 = self.fixed[9] * t204;
-        let t236 = t232 + t234;
-        let t237 = t236 + t235;
-        let t239 = self.fixed[21] * t237;
-        let t240 = t216 + t224;
-        let t241 = t239 + t240;
-        let t242 = t13 * t241;
-        let t247 = self.fixed[22] * t142;
-        let t248 = t247 * t101;
-        let t249 = t242 + t248;
-        let t250 = t154 * t92;
-        let t251 = t249 / t250;
-        let t252 = t153 + t251;
-        let t253 = t13 * t252;
-        let t254 = t133 * t253;
-        let t255 = X[1] / t5;
-        let t256 = t255 * t253;
-        crate::nalgebra::SVector::<T, 2>::new(t254, t256)
+        let t177 = t167 - t170;
+        let t178 = t164 * t177;
+        let t179 = t157 * t176;
+        let t180 = t178 + t179;
+        let t181 = t93 * t172;
+        let t182 = t170 + t181;
+        let t183 = t157 * t164;
+        let t184 = t183 * t168;
+        let t185 = t93 * t166;
+        let t186 = t185 * t124;
+        let t187 = t184 - t186;
+        let t188 = t35 * t187;
+        let t189 = t180 * t168;
+        let t190 = self.fixed[11] * t182;
+        let t191 = t188 + t189;
+        let t192 = t191 + t190;
+        let t194 = self.fixed[17] * t192;
+        let t195 = t194 - t155;
+        let t196 = t35 * t195;
+        let t197 = X[0] * t196;
+        let t198 = X[1] * t196;
+        crate::nalgebra::SVector::<T, 2>::new(t197, t198)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
@@ -700,180 +687,153 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
         let t33 = t31 * X[0];
-        let t34 = t33 / t5;
-        let t35 = t32 * t34;
-        let t36 = t31 * X[1];
-        let t37 = t36 / t5;
-        let t38 = t32 * t37;
-        let t40 = t12.sin_pi();
-        let t43 = self.fixed[4] * t40;
-        let t44 = t43 * t34;
-        let t45 = -t44;
-        let t46 = t43 * t37;
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t36 = t33 * t35;
+        let t37 = t32 * t36;
+        let t38 = t31 * X[1];
+        let t39 = t38 * t35;
+        let t40 = t32 * t39;
+        let t42 = t12.sin_pi();
+        let t45 = self.fixed[4] * t42;
+        let t46 = t45 * t36;
         let t47 = -t46;
-        let t52 = self.fixed[6] * t13;
-        let t53 = t52 * t34;
-        let t54 = -t53;
-        let t55 = t52 * t37;
+        let t48 = t45 * t39;
+        let t49 = -t48;
+        let t54 = self.fixed[6] * t13;
+        let t55 = t54 * t36;
         let t56 = -t55;
-        let t58 = t5 - self.parameters.Ri;
-        let t60 = t20 * t1;
-        let t61 = t60 * t58;
-        let t62 = self.fixed[7] * t61;
-        let t63 = t31 * t3;
-        let t64 = t63 / t5;
-        let t65 = t62 + t64;
-        let t66 = t65 / t4;
-        let t67 = t32 * t66;
-        let t68 = t20 * t58;
-        let t69 = self.fixed[7] * t68;
-        let t70 = t31 / t5;
-        let t71 = t69 - t70;
-        let t72 = X[0] * X[1];
-        let t73 = t72 * t71;
-        let t74 = t73 / t4;
-        let t75 = t32 * t74;
-        let t76 = t20 * t3;
-        let t77 = t76 * t58;
-        let t78 = self.fixed[7] * t77;
-        let t79 = t31 * t1;
-        let t80 = t79 / t5;
-        let t81 = t78 + t80;
-        let t82 = t81 / t4;
-        let t83 = t32 * t82;
-        let t84 = t67 + T::one();
-        let t85 = t83 + T::one();
-        let t88 = self.fixed[8] * t13;
-        let t89 = t88 * t68;
-        let t90 = t89 + T::one();
-        let t91 = t32 * t70;
+        let t57 = t54 * t39;
+        let t58 = -t57;
+        let t59 = t5 - self.parameters.Ri;
+        let t62 = t20 * t2;
+        let t63 = t62 * t59;
+        let t64 = self.fixed[7] * t63;
+        let t65 = t31 * t3;
+        let t66 = t65 * t35;
+        let t67 = t64 + t66;
+        let t68 = t67 * t34;
+        let t69 = t32 * t68;
+        let t70 = t20 * t59;
+        let t71 = self.fixed[7] * t70;
+        let t72 = t31 * t35;
+        let t73 = t71 - t72;
+        let t74 = X[0] * X[1];
+        let t75 = t74 * t73;
+        let t76 = t75 * t34;
+        let t77 = t32 * t76;
+        let t78 = t20 * t3;
+        let t79 = t78 * t59;
+        let t80 = self.fixed[7] * t79;
+        let t81 = t31 * t2;
+        let t82 = t81 * t35;
+        let t83 = t80 + t82;
+        let t84 = t83 * t34;
+        let t85 = t32 * t84;
+        let t86 = t69 + T::one();
+        let t87 = t85 + T::one();
+        let t90 = self.fixed[9] * t13;
+        let t91 = t90 * t70;
         let t92 = t91 + T::one();
-        let t93 = t90 * t92;
-        let t98 = t91 * t89;
-        let t99 = t91 + t89;
-        let t100 = t99 + t98;
-        let t101 = t100.ln_1p();
-        let t105 = self.fixed[9] * t101;
-        let t109 = t89 + T::nearest(2.0);
-        let t110 = t89 * t109;
-        let t111 = self.fixed[10] * t110;
-        let t112 = t105 + t111;
-        let t113 = t112 / t90;
-        let t114 = t1 * t113;
-        let t115 = t91 + T::nearest(2.0);
-        let t117 = self.fixed[11] * t13;
-        let t118 = t117 * t70;
-        let t119 = t118 * t115;
-        let t120 = t105 + t119;
-        let t121 = t120 / t92;
-        let t122 = t3 * t121;
-        let t123 = t114 + t122;
-        let t124 = T::one() / t4;
-        let t125 = t124 * t123;
-        let t126 = t113 - t121;
-        let t127 = t72 / t4;
-        let t128 = t127 * t126;
-        let t129 = t3 * t113;
-        let t130 = t1 * t121;
-        let t131 = t129 + t130;
-        let t132 = t124 * t131;
-        let t133 = X[0] / t5;
-        let t134 = self.fixed[5] * t31;
-        let t136 = t23 - self.fixed[12];
-        let t137 = self.fixed[7] * t136;
-        let t138 = t31 / t4;
-        let t139 = t68 / t5;
-        let t140 = self.fixed[7] * t139;
-        let t141 = t71 / t5;
-        let t142 = t137 + t141;
-        let t144 = self.fixed[13] * t142;
-        let t145 = t137 - t138;
-        let t146 = t145 + t140;
-        let t147 = t146 + t144;
-        let t149 = self.fixed[14] * t147;
-        let t150 = t134 + t149;
-        let t152 = self.fixed[15] * t150;
-        let t153 = -t152;
-        let t154 = t90 * t90;
-        let t160 = t58 * t58;
-        let t167 = t21 * t31;
-        let t168 = t167 * t160;
-        let t169 = t168 * t142;
-        let t170 = t169 / t5;
-        let t171 = self.fixed[16] * t170;
-        let t172 = t13 * t171;
-        let t174 = t31 * t136;
-        let t175 = t68 * t71;
+        let t93 = t32 * t72;
+        let t94 = t93 + T::one();
+        let t95 = t92 * t94;
+        let t100 = t13 * t72;
+        let t101 = t100 * t92;
+        let t102 = self.parameters.A * t101;
+        let t103 = t102 + t91;
+        let t104 = t103.ln_1p();
+        let t108 = t91 + T::nearest(2.0);
+        let t112 = self.fixed[11] * t104;
+        let t113 = t91 * t108;
+        let t114 = self.fixed[10] * t113;
+        let t115 = t112 + t114;
+        let t116 = t93 + T::nearest(2.0);
+        let t118 = self.fixed[12] * t13;
+        let t119 = t118 * t72;
+        let t120 = t119 * t116;
+        let t121 = t112 + t120;
+        let t122 = t115 / t92;
+        let t123 = t2 * t122;
+        let t124 = T::one() / t94;
+        let t125 = t121 * t124;
+        let t126 = t3 * t125;
+        let t127 = t123 + t126;
+        let t128 = t34 * t127;
+        let t129 = t122 - t125;
+        let t130 = t74 * t34;
+        let t131 = t130 * t129;
+        let t132 = t3 * t122;
+        let t133 = t2 * t125;
+        let t134 = t132 + t133;
+        let t135 = t34 * t134;
+        let t137 = t23 - self.fixed[13];
+        let t138 = self.fixed[7] * t137;
+        let t139 = t73 * t35;
+        let t140 = t138 + t139;
+        let t141 = self.fixed[3] * t70;
+        let t142 = T::nearest(6.0) * t141;
+        let t143 = t72 - t142;
+        let t144 = t35 * t143;
+        let t146 = self.fixed[14] * t140;
+        let t147 = t138 - t144;
+        let t148 = t147 + t146;
+        let t149 = self.fixed[5] * t31;
+        let t151 = self.fixed[15] * t148;
+        let t152 = t149 + t151;
+        let t154 = self.fixed[16] * t13;
+        let t155 = t154 * t152;
+        let t156 = self.fixed[8] * t13;
+        let t157 = t156 * t141;
+        let t158 = t157 + T::one();
+        let t159 = t157 * t94;
+        let t160 = t159 + t93;
+        let t161 = t160.ln_1p();
+        let t162 = self.fixed[11] * t161;
+        let t163 = self.fixed[10] * t157;
+        let t164 = t162 + t163;
+        let t165 = self.fixed[10] * t93;
+        let t166 = t162 + t165;
+        let t167 = t90 * t137;
+        let t168 = T::one() / t158;
+        let t169 = t167 * t168;
+        let t170 = t157 * t169;
+        let t171 = t32 * t139;
+        let t172 = t171 * t124;
+        let t173 = t169 + t172;
+        let t174 = self.fixed[10] * t167;
+        let t175 = self.fixed[11] * t173;
         let t176 = t174 + t175;
-        let t177 = t176 / t5;
-        let t178 = self.fixed[9] * t177;
-        let t179 = t69 + t70;
-        let t180 = t136 * t179;
-        let t181 = self.fixed[10] * t180;
-        let t182 = t174 / t5;
-        let t183 = self.fixed[10] * t182;
-        let t184 = t178 + t181;
-        let t185 = t184 + t183;
-        let t186 = self.fixed[7] * t185;
-        let t189 = t21 * t160;
-        let t190 = self.fixed[17] * t189;
-        let t191 = t31 * t31;
-        let t192 = t191 / t4;
-        let t193 = t31 * t71;
-        let t194 = t193 / t5;
-        let t195 = t190 - t192;
-        let t196 = t195 + t194;
-        let t197 = t196 / t5;
-        let t198 = self.fixed[10] * t197;
-        let t199 = t68 * t136;
-        let t200 = self.fixed[17] * t199;
-        let t201 = t193 / t4;
-        let t202 = t31 * t142;
-        let t203 = t202 / t5;
-        let t204 = t200 + t201;
-        let t205 = t204 + t203;
-        let t206 = self.fixed[9] * t205;
-        let t207 = t186 + t198;
-        let t208 = t207 + t206;
-        let t213 = t68 * t208;
-        let t214 = self.fixed[18] * t213;
-        let t215 = t214 + t172;
-        let t216 = t13 * t215;
-        let t223 = self.fixed[19] * t177;
-        let t224 = t223 * t101;
-        let t225 = self.fixed[9] * t142;
-        let t229 = self.fixed[20] * t136;
-        let t230 = t225 + t229;
-        let t231 = t68 * t230;
-        let t232 = self.fixed[7] * t231;
-        let t233 = t195 / t5;
-        let t234 = self.fixed[10] * t233;
-        let t235 = self.fixed[9] * t204;
-        let t236 = t232 + t234;
-        let t237 = t236 + t235;
-        let t239 = self.fixed[21] * t237;
-        let t240 = t216 + t224;
-        let t241 = t239 + t240;
-        let t242 = t13 * t241;
-        let t247 = self.fixed[22] * t142;
-        let t248 = t247 * t101;
-        let t249 = t242 + t248;
-        let t250 = t154 * t92;
-        let t251 = t249 / t250;
-        let t252 = t153 + t251;
-        let t253 = t13 * t252;
-        let t254 = t133 * t253;
-        let t255 = X[1] / t5;
-        let t256 = t255 * t253;
+        let t177 = t167 - t170;
+        let t178 = t164 * t177;
+        let t179 = t157 * t176;
+        let t180 = t178 + t179;
+        let t181 = t93 * t172;
+        let t182 = t170 + t181;
+        let t183 = t157 * t164;
+        let t184 = t183 * t168;
+        let t185 = t93 * t166;
+        let t186 = t185 * t124;
+        let t187 = t184 - t186;
+        let t188 = t35 * t187;
+        let t189 = t180 * t168;
+        let t190 = self.fixed[11] * t182;
+        let t191 = t188 + t189;
+        let t192 = t191 + t190;
+        let t194 = self.fixed[17] * t192;
+        let t195 = t194 - t155;
+        let t196 = t35 * t195;
+        let t197 = X[0] * t196;
+        let t198 = X[1] * t196;
         crate::Fields {
-            u: crate::nalgebra::SVector::<T, 2>::new(t35, t38),
-            v: crate::nalgebra::SVector::<T, 2>::new(t45, t47),
-            a: crate::nalgebra::SVector::<T, 2>::new(t54, t56),
-            H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t67, t75, t75, t83),
-            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t84, t75, t75, t85),
-            J: t93,
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t125, t128, t128, t132),
-            b: crate::nalgebra::SVector::<T, 2>::new(t254, t256),
+            u: crate::nalgebra::SVector::<T, 2>::new(t37, t40),
+            v: crate::nalgebra::SVector::<T, 2>::new(t47, t49),
+            a: crate::nalgebra::SVector::<T, 2>::new(t56, t58),
+            H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t69, t77, t77, t85),
+            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t86, t77, t77, t87),
+            J: t95,
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t128, t131, t131, t135),
+            b: crate::nalgebra::SVector::<T, 2>::new(t197, t198),
         }
     }
     fn traction(
@@ -886,29 +846,29 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
             crate::Surface::Inner => {
                 let t12 = self.fixed[0] * t;
                 let t13 = t12.cos_pi();
-                let t265 = self.fixed[24] * t13;
-                let t266 = t265.ln_1p();
-                let t270 = self.fixed[25] * t266;
-                let t271 = t270 * X[0];
-                let t272 = -t271;
-                let t273 = t270 * X[1];
-                let t274 = -t273;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t272, t274))
+                let t323 = self.fixed[27] * t13;
+                let t324 = t323.ln_1p();
+                let t328 = self.fixed[28] * t324;
+                let t329 = t328 * X[0];
+                let t330 = -t329;
+                let t331 = t328 * X[1];
+                let t332 = -t331;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t330, t332))
             }
             crate::Surface::Outer => {
                 let t12 = self.fixed[0] * t;
                 let t13 = t12.cos_pi();
-                let t276 = self.fixed[26] * t13;
-                let t277 = t276.ln_1p();
-                let t281 = self.fixed[27] * t277;
-                let t282 = t281 * X[0];
-                let t283 = t281 * X[1];
-                Some(crate::nalgebra::SVector::<T, 2>::new(t282, t283))
+                let t334 = self.fixed[29] * t13;
+                let t335 = t334.ln_1p();
+                let t339 = self.fixed[30] * t335;
+                let t340 = t339 * X[0];
+                let t341 = t339 * X[1];
+                Some(crate::nalgebra::SVector::<T, 2>::new(t340, t341))
             }
             crate::Surface::Lower(0) => {
-                let t1 = X[0] * X[0];
+                let t2 = X[0] * X[0];
                 let t3 = X[1] * X[1];
-                let t4 = t1 + t3;
+                let t4 = t2 + t3;
                 let t5 = t4.sqrt();
                 let t12 = self.fixed[0] * t;
                 let t13 = t12.cos_pi();
@@ -920,33 +880,38 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
                 let t30 = self.fixed[3] * t29;
                 let t31 = t30 + T::one();
                 let t32 = self.parameters.A * t13;
-                let t58 = t5 - self.parameters.Ri;
-                let t68 = t20 * t58;
-                let t70 = t31 / t5;
-                let t88 = self.fixed[8] * t13;
-                let t89 = t88 * t68;
-                let t91 = t32 * t70;
+                let t34 = T::one() / t4;
+                let t35 = t5 * t34;
+                let t59 = t5 - self.parameters.Ri;
+                let t70 = t20 * t59;
+                let t72 = t31 * t35;
+                let t90 = self.fixed[9] * t13;
+                let t91 = t90 * t70;
                 let t92 = t91 + T::one();
-                let t98 = t91 * t89;
-                let t99 = t91 + t89;
-                let t100 = t99 + t98;
-                let t101 = t100.ln_1p();
-                let t105 = self.fixed[9] * t101;
-                let t115 = t91 + T::nearest(2.0);
-                let t117 = self.fixed[11] * t13;
-                let t118 = t117 * t70;
-                let t119 = t118 * t115;
-                let t120 = t105 + t119;
-                let t121 = t120 / t92;
-                let t284 = t3 / t4;
-                let t285 = t284 * t121;
-                let t286 = -t285;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t286, T::zero()))
+                let t93 = t32 * t72;
+                let t94 = t93 + T::one();
+                let t100 = t13 * t72;
+                let t101 = t100 * t92;
+                let t102 = self.parameters.A * t101;
+                let t103 = t102 + t91;
+                let t104 = t103.ln_1p();
+                let t112 = self.fixed[11] * t104;
+                let t116 = t93 + T::nearest(2.0);
+                let t118 = self.fixed[12] * t13;
+                let t119 = t118 * t72;
+                let t120 = t119 * t116;
+                let t121 = t112 + t120;
+                let t124 = T::one() / t94;
+                let t125 = t121 * t124;
+                let t342 = t3 * t34;
+                let t343 = t342 * t125;
+                let t344 = -t343;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t344, T::zero()))
             }
             crate::Surface::Lower(1) => {
-                let t1 = X[0] * X[0];
+                let t2 = X[0] * X[0];
                 let t3 = X[1] * X[1];
-                let t4 = t1 + t3;
+                let t4 = t2 + t3;
                 let t5 = t4.sqrt();
                 let t12 = self.fixed[0] * t;
                 let t13 = t12.cos_pi();
@@ -958,28 +923,33 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
                 let t30 = self.fixed[3] * t29;
                 let t31 = t30 + T::one();
                 let t32 = self.parameters.A * t13;
-                let t58 = t5 - self.parameters.Ri;
-                let t68 = t20 * t58;
-                let t70 = t31 / t5;
-                let t88 = self.fixed[8] * t13;
-                let t89 = t88 * t68;
-                let t91 = t32 * t70;
+                let t34 = T::one() / t4;
+                let t35 = t5 * t34;
+                let t59 = t5 - self.parameters.Ri;
+                let t70 = t20 * t59;
+                let t72 = t31 * t35;
+                let t90 = self.fixed[9] * t13;
+                let t91 = t90 * t70;
                 let t92 = t91 + T::one();
-                let t98 = t91 * t89;
-                let t99 = t91 + t89;
-                let t100 = t99 + t98;
-                let t101 = t100.ln_1p();
-                let t105 = self.fixed[9] * t101;
-                let t115 = t91 + T::nearest(2.0);
-                let t117 = self.fixed[11] * t13;
-                let t118 = t117 * t70;
-                let t119 = t118 * t115;
-                let t120 = t105 + t119;
-                let t121 = t120 / t92;
-                let t288 = t1 / t4;
-                let t289 = t288 * t121;
-                let t290 = -t289;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t290))
+                let t93 = t32 * t72;
+                let t94 = t93 + T::one();
+                let t100 = t13 * t72;
+                let t101 = t100 * t92;
+                let t102 = self.parameters.A * t101;
+                let t103 = t102 + t91;
+                let t104 = t103.ln_1p();
+                let t112 = self.fixed[11] * t104;
+                let t116 = t93 + T::nearest(2.0);
+                let t118 = self.fixed[12] * t13;
+                let t119 = t118 * t72;
+                let t120 = t119 * t116;
+                let t121 = t112 + t120;
+                let t124 = T::one() / t94;
+                let t125 = t121 * t124;
+                let t346 = t2 * t34;
+                let t347 = t346 * t125;
+                let t348 = -t347;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t348))
             }
             _ => None,
         }
@@ -1015,7 +985,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
     }
     fn material(&self) -> crate::Material<T> {
         crate::Material::NeoHookean {
-            lambda: self.fixed[9],
+            lambda: self.fixed[11],
             mu: self.fixed[10],
         }
     }
@@ -1026,7 +996,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[23]
+        self.fixed[26]
     }
     fn body_force_at(
         &self,
@@ -1042,14 +1012,14 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
         let t32 = self.parameters.A * t13;
-        let t88 = self.fixed[8] * t13;
-        [t13, t32, t88]
+        let t90 = self.fixed[9] * t13;
+        [t13, t32, t90]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 10] {
-        let t1 = X[0] * X[0];
+        let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
-        let t4 = t1 + t3;
+        let t4 = t2 + t3;
         let t5 = t4.sqrt();
         let t20 = t5 - self.parameters.Ro;
         let t21 = t20 * t20;
@@ -1058,84 +1028,87 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         let t29 = t21 * t25;
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
-        let t58 = t5 - self.parameters.Ri;
-        let t68 = t20 * t58;
-        let t69 = self.fixed[7] * t68;
-        let t70 = t31 / t5;
-        let t71 = t69 - t70;
-        let t133 = X[0] / t5;
-        let t134 = self.fixed[5] * t31;
-        let t136 = t23 - self.fixed[12];
-        let t137 = self.fixed[7] * t136;
-        let t138 = t31 / t4;
-        let t139 = t68 / t5;
-        let t140 = self.fixed[7] * t139;
-        let t141 = t71 / t5;
-        let t142 = t137 + t141;
-        let t144 = self.fixed[13] * t142;
-        let t145 = t137 - t138;
-        let t146 = t145 + t140;
-        let t147 = t146 + t144;
-        let t149 = self.fixed[14] * t147;
-        let t150 = t134 + t149;
-        let t152 = self.fixed[15] * t150;
-        let t153 = -t152;
-        let t160 = t58 * t58;
-        let t167 = t21 * t31;
-        let t168 = t167 * t160;
-        let t169 = t168 * t142;
-        let t170 = t169 / t5;
-        let t171 = self.fixed[16] * t170;
-        let t174 = t31 * t136;
-        let t175 = t68 * t71;
-        let t176 = t174 + t175;
-        let t177 = t176 / t5;
-        let t178 = self.fixed[9] * t177;
-        let t179 = t69 + t70;
-        let t180 = t136 * t179;
-        let t181 = self.fixed[10] * t180;
-        let t182 = t174 / t5;
-        let t183 = self.fixed[10] * t182;
-        let t184 = t178 + t181;
-        let t185 = t184 + t183;
-        let t186 = self.fixed[7] * t185;
-        let t189 = t21 * t160;
-        let t190 = self.fixed[17] * t189;
-        let t191 = t31 * t31;
-        let t192 = t191 / t4;
-        let t193 = t31 * t71;
-        let t194 = t193 / t5;
-        let t195 = t190 - t192;
-        let t196 = t195 + t194;
-        let t197 = t196 / t5;
-        let t198 = self.fixed[10] * t197;
-        let t199 = t68 * t136;
-        let t200 = self.fixed[17] * t199;
-        let t201 = t193 / t4;
-        let t202 = t31 * t142;
-        let t203 = t202 / t5;
-        let t204 = t200 + t201;
-        let t205 = t204 + t203;
-        let t206 = self.fixed[9] * t205;
-        let t207 = t186 + t198;
-        let t208 = t207 + t206;
-        let t213 = t68 * t208;
-        let t214 = self.fixed[18] * t213;
-        let t223 = self.fixed[19] * t177;
-        let t225 = self.fixed[9] * t142;
-        let t229 = self.fixed[20] * t136;
-        let t230 = t225 + t229;
-        let t231 = t68 * t230;
-        let t232 = self.fixed[7] * t231;
-        let t233 = t195 / t5;
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t59 = t5 - self.parameters.Ri;
+        let t70 = t20 * t59;
+        let t71 = self.fixed[7] * t70;
+        let t72 = t31 * t35;
+        let t73 = t71 - t72;
+        let t137 = t23 - self.fixed[13];
+        let t138 = self.fixed[7] * t137;
+        let t139 = t73 * t35;
+        let t140 = t138 + t139;
+        let t146 = self.fixed[14] * t140;
+        let t149 = self.fixed[5] * t31;
+        let t199 = X[0] * t35;
+        let t200 = t70 * t35;
+        let t201 = t200 + t137;
+        let t202 = self.fixed[7] * t201;
+        let t203 = t31 * t34;
+        let t204 = t202 - t203;
+        let t205 = t204 + t146;
+        let t206 = self.fixed[15] * t205;
+        let t207 = t149 + t206;
+        let t208 = self.fixed[16] * t207;
+        let t215 = t59 * t59;
+        let t221 = t21 * t31;
+        let t222 = t221 * t215;
+        let t223 = t222 * t140;
+        let t224 = t223 * t35;
+        let t225 = self.fixed[18] * t224;
+        let t226 = t31 * t137;
+        let t227 = t70 * t73;
+        let t228 = t226 + t227;
+        let t230 = self.fixed[19] * t70;
+        let t231 = t230 + t72;
+        let t232 = t137 * t231;
+        let t233 = T::nearest(2.0) * t232;
         let t234 = self.fixed[10] * t233;
-        let t235 = self.fixed[9] * t204;
-        let t236 = t232 + t234;
-        let t237 = t236 + t235;
-        let t239 = self.fixed[21] * t237;
-        let t247 = self.fixed[22] * t142;
-        let t255 = X[1] / t5;
-        [t68, t70, t133, t153, t171, t214, t223, t239, t247, t255]
+        let t235 = t228 * t35;
+        let t236 = self.fixed[11] * t235;
+        let t237 = t234 + t236;
+        let t240 = t21 * t215;
+        let t241 = self.fixed[20] * t240;
+        let t242 = t31 * t31;
+        let t243 = t242 * t34;
+        let t244 = t31 * t73;
+        let t245 = t244 * t35;
+        let t246 = t241 - t243;
+        let t247 = t246 + t245;
+        let t248 = self.fixed[19] * t137;
+        let t249 = t248 + t139;
+        let t250 = t249 * t35;
+        let t251 = T::nearest(2.0) * t250;
+        let t252 = t31 * t251;
+        let t253 = t70 * t137;
+        let t254 = self.fixed[20] * t253;
+        let t255 = t252 + t254;
+        let t256 = self.fixed[7] * t237;
+        let t257 = t247 * t35;
+        let t258 = self.fixed[10] * t257;
+        let t259 = self.fixed[11] * t255;
+        let t260 = t256 + t258;
+        let t261 = t260 + t259;
+        let t267 = t70 * t261;
+        let t268 = self.fixed[21] * t267;
+        let t277 = self.fixed[22] * t235;
+        let t278 = self.fixed[11] * t140;
+        let t282 = self.fixed[23] * t137;
+        let t283 = t278 + t282;
+        let t284 = t244 * t34;
+        let t285 = t254 + t284;
+        let t286 = t70 * t283;
+        let t287 = self.fixed[7] * t286;
+        let t288 = t246 * t35;
+        let t289 = self.fixed[10] * t288;
+        let t290 = self.fixed[11] * t285;
+        let t291 = t287 + t289;
+        let t292 = t291 + t290;
+        let t294 = self.fixed[24] * t292;
+        let t303 = self.fixed[25] * t140;
+        let t313 = X[1] * t35;
+        [t70, t72, t199, t208, t225, t268, t277, t294, t303, t313]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -1143,31 +1116,32 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         time: &[T; 3],
         point: &[T; 10],
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t89 = time[2] * point[0];
-        let t90 = t89 + T::one();
-        let t91 = time[1] * point[1];
+        let t91 = time[2] * point[0];
         let t92 = t91 + T::one();
-        let t98 = t91 * t89;
-        let t99 = t91 + t89;
-        let t100 = t99 + t98;
-        let t101 = t100.ln_1p();
-        let t154 = t90 * t90;
-        let t172 = time[0] * point[4];
-        let t215 = point[5] + t172;
-        let t216 = time[0] * t215;
-        let t224 = point[6] * t101;
-        let t240 = t216 + t224;
-        let t241 = point[7] + t240;
-        let t242 = time[0] * t241;
-        let t248 = point[8] * t101;
-        let t249 = t242 + t248;
-        let t250 = t154 * t92;
-        let t251 = t249 / t250;
-        let t252 = point[3] + t251;
-        let t253 = time[0] * t252;
-        let t254 = point[2] * t253;
-        let t256 = point[9] * t253;
-        crate::nalgebra::SVector::<T, 2>::new(t254, t256)
+        let t93 = time[1] * point[1];
+        let t94 = t93 + T::one();
+        let t100 = time[0] * point[1];
+        let t101 = t100 * t92;
+        let t102 = self.parameters.A * t101;
+        let t103 = t102 + t91;
+        let t104 = t103.ln_1p();
+        let t269 = time[0] * point[4];
+        let t270 = point[5] + t269;
+        let t295 = time[0] * t270;
+        let t296 = point[6] * t104;
+        let t297 = t295 + t296;
+        let t298 = point[7] + t297;
+        let t304 = time[0] * t298;
+        let t305 = point[8] * t104;
+        let t306 = t304 + t305;
+        let t307 = t92 * t92;
+        let t308 = t307 * t94;
+        let t309 = t306 / t308;
+        let t310 = t309 - point[3];
+        let t311 = time[0] * t310;
+        let t312 = point[2] * t311;
+        let t314 = point[9] * t311;
+        crate::nalgebra::SVector::<T, 2>::new(t312, t314)
     }
 }
 impl<T: crate::Real> From<RingNu<T>> for crate::AnySolution<T> {

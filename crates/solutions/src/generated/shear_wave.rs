@@ -127,13 +127,13 @@ impl<T: crate::Real> ShearWave<T> {
             return Err(Self::DESCRIPTION.out_of_range(4, value));
         }
         let t4 = T::nearest(2.0) / parameters.L;
-        let t10 = parameters.L * parameters.L;
-        let t13 = parameters.nu + T::one();
+        let t12 = parameters.nu + T::one();
+        let t14 = parameters.L * parameters.L;
         let t15 = T::pi() * T::pi();
         let t16 = T::nearest(2.0) * parameters.E;
         let t17 = t16 * t15;
-        let t18 = parameters.rho0 * t10;
-        let t19 = t18 * t13;
+        let t18 = parameters.rho0 * t14;
+        let t19 = t18 * t12;
         let t20 = t17 / t19;
         let t21 = t20.sqrt();
         let t28 = parameters.A * t21;
@@ -144,7 +144,7 @@ impl<T: crate::Real> ShearWave<T> {
         let t39 = t31 * T::pi();
         let t40 = t39 / parameters.L;
         let t44 = T::nearest(0.5) * parameters.E;
-        let t45 = t44 / t13;
+        let t45 = t44 / t12;
         let t47 = parameters.E / parameters.rho0;
         let t48 = t47.sqrt();
         let t49 = T::nearest(2.0) * T::pi();
@@ -152,7 +152,7 @@ impl<T: crate::Real> ShearWave<T> {
         let t51 = T::nearest(2.0) * parameters.nu;
         let t52 = T::one() - t51;
         let t53 = parameters.E * parameters.nu;
-        let t54 = t13 * t52;
+        let t54 = t12 * t52;
         let t55 = t53 / t54;
         Ok(ShearWave {
             parameters,

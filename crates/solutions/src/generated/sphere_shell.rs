@@ -155,86 +155,86 @@ impl<T: crate::Real> SphereShell<T> {
         let t47 = t46 * t45;
         let t48 = parameters.rho0 * t11;
         let t49 = t47 / t48;
-        let t59 = T::one() / parameters.Ro;
-        let t69 = T::nearest(4.0) / parameters.Ro;
-        let t101 = T::nearest(6.0) * parameters.A;
-        let t102 = t101 / t11;
-        let t112 = parameters.nu + T::one();
-        let t113 = T::nearest(2.0) * parameters.nu;
-        let t114 = T::one() - t113;
-        let t115 = T::nearest(2.0) * parameters.A;
-        let t116 = t115 / t11;
-        let t120 = parameters.A * parameters.A;
-        let t121 = t11 * t11;
-        let t124 = t120 / t121;
-        let t134 = parameters.E * parameters.nu;
-        let t135 = t112 * t114;
-        let t136 = t134 / t135;
-        let t139 = T::nearest(0.5) * parameters.E;
-        let t140 = t139 / t112;
-        let t148 = parameters.A * t140;
-        let t149 = t148 / t11;
-        let t178 = T::nearest(5.0) / parameters.Ro;
-        let t181 = parameters.nu / t114;
-        let t182 = t181 + T::one();
-        let t183 = T::nearest(4.0) * t182;
-        let t184 = t183 / t112;
+        let t58 = T::one() / parameters.Ro;
+        let t71 = T::nearest(4.0) / parameters.Ro;
+        let t103 = T::nearest(6.0) * parameters.A;
+        let t104 = t103 / t11;
+        let t114 = parameters.nu + T::one();
+        let t115 = T::nearest(2.0) * parameters.nu;
+        let t116 = T::one() - t115;
+        let t119 = T::nearest(2.0) * parameters.A;
+        let t120 = t119 / t11;
+        let t127 = parameters.A * parameters.A;
+        let t128 = t11 * t11;
+        let t129 = t127 / t128;
+        let t135 = T::nearest(0.5) * parameters.E;
+        let t136 = t135 / t114;
+        let t138 = parameters.E * parameters.nu;
+        let t139 = t114 * t116;
+        let t140 = t138 / t139;
+        let t146 = parameters.A * t136;
+        let t147 = t146 / t11;
+        let t176 = T::nearest(5.0) / parameters.Ro;
+        let t179 = parameters.nu / t116;
+        let t180 = t179 + T::one();
+        let t183 = T::nearest(4.0) * t180;
+        let t184 = t183 / t114;
         let t187 = t46 / t48;
-        let t193 = t120 * t120;
-        let t194 = t121 * t121;
-        let t196 = t136 + t140;
-        let t197 = T::nearest(144.0) * t193;
-        let t198 = t197 * t196;
-        let t199 = parameters.rho0 * t194;
-        let t200 = t198 / t199;
-        let t207 = t120 * parameters.A;
-        let t208 = t11 * parameters.Ro;
-        let t209 = t208 * t208;
-        let t215 = T::nearest(3.0) * parameters.E;
-        let t216 = t215 * parameters.nu;
-        let t217 = t216 / t135;
-        let t220 = T::nearest(8.0) / parameters.Ro;
-        let t224 = T::nearest(3.0) * t140;
-        let t246 = T::nearest(12.0) * t207;
-        let t247 = parameters.rho0 * t209;
-        let t248 = t246 / t247;
-        let t254 = T::nearest(6.0) * t120;
-        let t255 = t254 * parameters.E;
-        let t256 = t255 * parameters.nu;
-        let t257 = parameters.rho0 * t121;
-        let t258 = t257 * t112;
-        let t259 = t258 * t114;
-        let t260 = t256 / t259;
-        let t274 = T::nearest(2.0) * t120;
-        let t275 = t274 / t257;
-        let t281 = T::nearest(4.0) * parameters.A;
-        let t282 = t281 * parameters.E;
-        let t283 = t282 * parameters.nu;
-        let t284 = t48 * t112;
-        let t285 = t284 * t114;
-        let t286 = t283 / t285;
-        let t299 = T::nearest(2.0) / t16;
-        let t301 = parameters.Ri / parameters.Ro;
-        let t302 = T::one() - t301;
-        let t303 = t101 * parameters.Ri;
-        let t304 = t303 * t302;
-        let t305 = t304 / t11;
-        let t308 = T::nearest(2.0) * parameters.Ri;
-        let t309 = t308 / parameters.Ro;
-        let t310 = T::nearest(3.0) - t309;
-        let t311 = t115 * parameters.Ri;
-        let t312 = t311 * t310;
-        let t313 = t312 / t11;
-        let t317 = parameters.Ri * parameters.Ri;
-        let t318 = t310 * t310;
-        let t319 = t120 * t317;
-        let t320 = t319 * t318;
-        let t321 = t320 / t121;
-        let t335 = T::one() / parameters.Ri;
-        let t344 = parameters.A / parameters.Ro;
-        let t350 = parameters.Ro * t112;
-        let t351 = t350 * t114;
-        let t352 = t134 / t351;
+        let t236 = T::one() / parameters.rho0;
+        let t245 = t140 + t136;
+        let t248 = t127 * t127;
+        let t249 = t128 * t128;
+        let t251 = T::nearest(144.0) * t248;
+        let t252 = t251 * t245;
+        let t253 = parameters.rho0 * t249;
+        let t254 = t252 / t253;
+        let t278 = T::nearest(3.0) * t136;
+        let t280 = T::nearest(3.0) * parameters.E;
+        let t281 = t280 * parameters.nu;
+        let t282 = t281 / t139;
+        let t290 = t127 * parameters.A;
+        let t291 = t11 * parameters.Ro;
+        let t292 = t291 * t291;
+        let t293 = T::nearest(12.0) * t290;
+        let t294 = parameters.rho0 * t292;
+        let t295 = t293 / t294;
+        let t301 = T::nearest(6.0) * t127;
+        let t302 = t301 * parameters.E;
+        let t303 = t302 * parameters.nu;
+        let t304 = parameters.rho0 * t128;
+        let t305 = t304 * t114;
+        let t306 = t305 * t116;
+        let t307 = t303 / t306;
+        let t321 = T::nearest(2.0) * t127;
+        let t322 = t321 / t304;
+        let t329 = T::nearest(4.0) * parameters.A;
+        let t330 = t329 * parameters.E;
+        let t331 = t330 * parameters.nu;
+        let t332 = t48 * t114;
+        let t333 = t332 * t116;
+        let t334 = t331 / t333;
+        let t349 = T::nearest(2.0) / t16;
+        let t351 = parameters.Ri / parameters.Ro;
+        let t352 = T::one() - t351;
+        let t353 = t103 * parameters.Ri;
+        let t354 = t353 * t352;
+        let t355 = t354 / t11;
+        let t358 = T::nearest(2.0) * parameters.Ri;
+        let t359 = t358 / parameters.Ro;
+        let t360 = T::nearest(3.0) - t359;
+        let t362 = t119 * parameters.Ri;
+        let t363 = t362 * t360;
+        let t364 = t363 / t11;
+        let t367 = parameters.Ri * parameters.Ri;
+        let t368 = t360 * t360;
+        let t369 = t127 * t367;
+        let t370 = t369 * t368;
+        let t371 = t370 / t128;
+        let t381 = T::one() / parameters.Ri;
+        let t390 = parameters.A / parameters.Ro;
+        let t396 = parameters.Ro * t114;
+        let t397 = t396 * t116;
+        let t398 = t138 / t397;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -247,32 +247,32 @@ impl<T: crate::Real> SphereShell<T> {
                 t37,
                 t45,
                 t49,
-                t59,
-                t69,
-                t102,
-                t116,
-                t124,
+                t58,
+                t71,
+                t104,
+                t120,
+                t129,
                 t136,
                 t140,
-                t149,
-                t178,
+                t147,
+                t176,
                 t184,
                 t187,
-                t200,
-                t217,
-                t220,
-                t224,
-                t248,
-                t260,
-                t275,
-                t286,
-                t299,
-                t305,
-                t313,
-                t321,
-                t335,
-                t344,
-                t352,
+                t236,
+                t254,
+                t278,
+                t282,
+                t295,
+                t307,
+                t322,
+                t334,
+                t349,
+                t355,
+                t364,
+                t371,
+                t381,
+                t390,
+                t398,
             ],
         })
     }
@@ -318,10 +318,10 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t1 = X[1] * X[1];
-        let t3 = X[2] * X[2];
+        let t3 = X[1] * X[1];
+        let t4 = X[2] * X[2];
         let t5 = X[0] * X[0];
-        let t6 = t1 + t3;
+        let t6 = t3 + t4;
         let t7 = t6 + t5;
         let t8 = t7.sqrt();
         let t17 = self.fixed[0] * t;
@@ -344,10 +344,10 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t1 = X[1] * X[1];
-        let t3 = X[2] * X[2];
+        let t3 = X[1] * X[1];
+        let t4 = X[2] * X[2];
         let t5 = X[0] * X[0];
-        let t6 = t1 + t3;
+        let t6 = t3 + t4;
         let t7 = t6 + t5;
         let t8 = t7.sqrt();
         let t17 = self.fixed[0] * t;
@@ -373,10 +373,10 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t1 = X[1] * X[1];
-        let t3 = X[2] * X[2];
+        let t3 = X[1] * X[1];
+        let t4 = X[2] * X[2];
         let t5 = X[0] * X[0];
-        let t6 = t1 + t3;
+        let t6 = t3 + t4;
         let t7 = t6 + t5;
         let t8 = t7.sqrt();
         let t17 = self.fixed[0] * t;
@@ -402,10 +402,10 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 3, 3> {
-        let t1 = X[1] * X[1];
-        let t3 = X[2] * X[2];
+        let t3 = X[1] * X[1];
+        let t4 = X[2] * X[2];
         let t5 = X[0] * X[0];
-        let t6 = t1 + t3;
+        let t6 = t3 + t4;
         let t7 = t6 + t5;
         let t8 = t7.sqrt();
         let t17 = self.fixed[0] * t;
@@ -413,47 +413,49 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t21 = self.fixed[1] * t8;
         let t23 = T::nearest(3.0) - t21;
         let t25 = self.fixed[2] * t18;
-        let t60 = self.fixed[6] * t8;
-        let t61 = T::one() - t60;
-        let t62 = t5 * t61;
+        let t59 = self.fixed[6] * t8;
+        let t60 = T::one() - t59;
+        let t62 = t5 * t60;
         let t63 = T::nearest(6.0) * t62;
         let t64 = t23 * t6;
         let t65 = t63 + t64;
-        let t66 = t65 / t8;
-        let t67 = t25 * t66;
-        let t70 = self.fixed[7] * t8;
-        let t71 = T::nearest(3.0) - t70;
-        let t72 = X[0] * X[1];
-        let t73 = t72 * t71;
-        let t74 = t73 / t8;
-        let t75 = t25 * t74;
-        let t76 = X[0] * X[2];
-        let t77 = t76 * t71;
-        let t78 = t77 / t8;
-        let t79 = t25 * t78;
-        let t80 = t1 * t61;
-        let t81 = T::nearest(6.0) * t80;
-        let t82 = t3 + t5;
-        let t83 = t23 * t82;
-        let t84 = t81 + t83;
-        let t85 = t84 / t8;
-        let t86 = t25 * t85;
-        let t87 = X[1] * X[2];
-        let t88 = t87 * t71;
-        let t89 = t88 / t8;
-        let t90 = t25 * t89;
-        let t91 = t3 * t61;
-        let t92 = T::nearest(6.0) * t91;
-        let t93 = t1 + t5;
-        let t94 = t23 * t93;
-        let t95 = t92 + t94;
-        let t96 = t95 / t8;
-        let t97 = t25 * t96;
+        let t66 = T::one() / t7;
+        let t67 = t8 * t66;
+        let t68 = t65 * t67;
+        let t69 = t25 * t68;
+        let t72 = self.fixed[7] * t8;
+        let t73 = T::nearest(3.0) - t72;
+        let t74 = X[0] * X[1];
+        let t75 = t74 * t73;
+        let t76 = t75 * t67;
+        let t77 = t25 * t76;
+        let t78 = X[0] * X[2];
+        let t79 = t78 * t73;
+        let t80 = t79 * t67;
+        let t81 = t25 * t80;
+        let t82 = t4 + t5;
+        let t83 = t3 * t60;
+        let t84 = T::nearest(6.0) * t83;
+        let t85 = t23 * t82;
+        let t86 = t84 + t85;
+        let t87 = t86 * t67;
+        let t88 = t25 * t87;
+        let t89 = X[1] * X[2];
+        let t90 = t89 * t73;
+        let t91 = t90 * t67;
+        let t92 = t25 * t91;
+        let t93 = t3 + t5;
+        let t94 = t4 * t60;
+        let t95 = T::nearest(6.0) * t94;
+        let t96 = t23 * t93;
+        let t97 = t95 + t96;
+        let t98 = t97 * t67;
+        let t99 = t25 * t98;
         crate::nalgebra::SMatrix::<
             T,
             3,
             3,
-        >::new(t67, t75, t79, t75, t86, t90, t79, t90, t97)
+        >::new(t69, t77, t81, t77, t88, t92, t81, t92, t99)
     }
     #[inline]
     fn deformation_gradient(
@@ -461,10 +463,10 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 3, 3> {
-        let t1 = X[1] * X[1];
-        let t3 = X[2] * X[2];
+        let t3 = X[1] * X[1];
+        let t4 = X[2] * X[2];
         let t5 = X[0] * X[0];
-        let t6 = t1 + t3;
+        let t6 = t3 + t4;
         let t7 = t6 + t5;
         let t8 = t7.sqrt();
         let t17 = self.fixed[0] * t;
@@ -472,57 +474,59 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t21 = self.fixed[1] * t8;
         let t23 = T::nearest(3.0) - t21;
         let t25 = self.fixed[2] * t18;
-        let t60 = self.fixed[6] * t8;
-        let t61 = T::one() - t60;
-        let t62 = t5 * t61;
+        let t59 = self.fixed[6] * t8;
+        let t60 = T::one() - t59;
+        let t62 = t5 * t60;
         let t63 = T::nearest(6.0) * t62;
         let t64 = t23 * t6;
         let t65 = t63 + t64;
-        let t66 = t65 / t8;
-        let t67 = t25 * t66;
-        let t70 = self.fixed[7] * t8;
-        let t71 = T::nearest(3.0) - t70;
-        let t72 = X[0] * X[1];
-        let t73 = t72 * t71;
-        let t74 = t73 / t8;
-        let t75 = t25 * t74;
-        let t76 = X[0] * X[2];
-        let t77 = t76 * t71;
-        let t78 = t77 / t8;
-        let t79 = t25 * t78;
-        let t80 = t1 * t61;
-        let t81 = T::nearest(6.0) * t80;
-        let t82 = t3 + t5;
-        let t83 = t23 * t82;
-        let t84 = t81 + t83;
-        let t85 = t84 / t8;
-        let t86 = t25 * t85;
-        let t87 = X[1] * X[2];
-        let t88 = t87 * t71;
-        let t89 = t88 / t8;
-        let t90 = t25 * t89;
-        let t91 = t3 * t61;
-        let t92 = T::nearest(6.0) * t91;
-        let t93 = t1 + t5;
-        let t94 = t23 * t93;
-        let t95 = t92 + t94;
-        let t96 = t95 / t8;
-        let t97 = t25 * t96;
-        let t98 = t67 + T::one();
-        let t99 = t86 + T::one();
-        let t100 = t97 + T::one();
+        let t66 = T::one() / t7;
+        let t67 = t8 * t66;
+        let t68 = t65 * t67;
+        let t69 = t25 * t68;
+        let t72 = self.fixed[7] * t8;
+        let t73 = T::nearest(3.0) - t72;
+        let t74 = X[0] * X[1];
+        let t75 = t74 * t73;
+        let t76 = t75 * t67;
+        let t77 = t25 * t76;
+        let t78 = X[0] * X[2];
+        let t79 = t78 * t73;
+        let t80 = t79 * t67;
+        let t81 = t25 * t80;
+        let t82 = t4 + t5;
+        let t83 = t3 * t60;
+        let t84 = T::nearest(6.0) * t83;
+        let t85 = t23 * t82;
+        let t86 = t84 + t85;
+        let t87 = t86 * t67;
+        let t88 = t25 * t87;
+        let t89 = X[1] * X[2];
+        let t90 = t89 * t73;
+        let t91 = t90 * t67;
+        let t92 = t25 * t91;
+        let t93 = t3 + t5;
+        let t94 = t4 * t60;
+        let t95 = T::nearest(6.0) * t94;
+        let t96 = t23 * t93;
+        let t97 = t95 + t96;
+        let t98 = t97 * t67;
+        let t99 = t25 * t98;
+        let t100 = t69 + T::one();
+        let t101 = t88 + T::one();
+        let t102 = t99 + T::one();
         crate::nalgebra::SMatrix::<
             T,
             3,
             3,
-        >::new(t98, t75, t79, t75, t99, t90, t79, t90, t100)
+        >::new(t100, t77, t81, t77, t101, t92, t81, t92, t102)
     }
     #[inline]
     fn jacobian(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> T {
-        let t1 = X[1] * X[1];
-        let t3 = X[2] * X[2];
+        let t3 = X[1] * X[1];
+        let t4 = X[2] * X[2];
         let t5 = X[0] * X[0];
-        let t6 = t1 + t3;
+        let t6 = t3 + t4;
         let t7 = t6 + t5;
         let t8 = t7.sqrt();
         let t17 = self.fixed[0] * t;
@@ -531,17 +535,17 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t23 = T::nearest(3.0) - t21;
         let t25 = self.fixed[2] * t18;
         let t26 = t8 * t23;
-        let t60 = self.fixed[6] * t8;
-        let t61 = T::one() - t60;
-        let t103 = self.fixed[8] * t18;
-        let t104 = t8 * t61;
-        let t105 = t103 * t104;
-        let t106 = t105 + T::one();
-        let t107 = t25 * t26;
+        let t59 = self.fixed[6] * t8;
+        let t60 = T::one() - t59;
+        let t105 = self.fixed[8] * t18;
+        let t106 = t8 * t60;
+        let t107 = t105 * t106;
         let t108 = t107 + T::one();
-        let t109 = t108 * t108;
-        let t110 = t106 * t109;
-        t110
+        let t109 = t25 * t26;
+        let t110 = t109 + T::one();
+        let t111 = t110 * t110;
+        let t112 = t108 * t111;
+        t112
     }
     #[inline]
     fn first_piola_kirchhoff(
@@ -549,10 +553,10 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 3, 3> {
-        let t1 = X[1] * X[1];
-        let t3 = X[2] * X[2];
+        let t3 = X[1] * X[1];
+        let t4 = X[2] * X[2];
         let t5 = X[0] * X[0];
-        let t6 = t1 + t3;
+        let t6 = t3 + t4;
         let t7 = t6 + t5;
         let t8 = t7.sqrt();
         let t17 = self.fixed[0] * t;
@@ -561,70 +565,70 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t23 = T::nearest(3.0) - t21;
         let t25 = self.fixed[2] * t18;
         let t26 = t8 * t23;
-        let t60 = self.fixed[6] * t8;
-        let t61 = T::one() - t60;
-        let t72 = X[0] * X[1];
-        let t76 = X[0] * X[2];
-        let t82 = t3 + t5;
-        let t87 = X[1] * X[2];
-        let t93 = t1 + t5;
-        let t103 = self.fixed[8] * t18;
-        let t104 = t8 * t61;
-        let t105 = t103 * t104;
-        let t106 = t105 + T::one();
-        let t107 = t25 * t26;
+        let t59 = self.fixed[6] * t8;
+        let t60 = T::one() - t59;
+        let t66 = T::one() / t7;
+        let t74 = X[0] * X[1];
+        let t78 = X[0] * X[2];
+        let t82 = t4 + t5;
+        let t89 = X[1] * X[2];
+        let t93 = t3 + t5;
+        let t105 = self.fixed[8] * t18;
+        let t106 = t8 * t60;
+        let t107 = t105 * t106;
         let t108 = t107 + T::one();
-        let t117 = self.fixed[9] * t18;
-        let t118 = t117 * t26;
-        let t119 = t118 * t105;
+        let t109 = t25 * t26;
+        let t110 = t109 + T::one();
+        let t117 = t18 * t26;
+        let t118 = t117 * t108;
+        let t121 = self.fixed[9] * t118;
         let t122 = t18 * t18;
         let t123 = t23 * t23;
-        let t125 = self.fixed[10] * t122;
-        let t126 = t7 * t123;
-        let t127 = t125 * t126;
-        let t128 = t127 * t105;
-        let t129 = t118 + t105;
-        let t130 = t129 + t119;
-        let t131 = t130 + t127;
-        let t132 = t131 + t128;
+        let t124 = t7 * t123;
+        let t125 = t122 * t124;
+        let t126 = t125 * t108;
+        let t130 = self.fixed[10] * t126;
+        let t131 = t121 + t130;
+        let t132 = t131 + t107;
         let t133 = t132.ln_1p();
-        let t137 = self.fixed[11] * t133;
-        let t141 = t105 + T::nearest(2.0);
-        let t142 = t105 * t141;
-        let t143 = self.fixed[12] * t142;
-        let t144 = t137 + t143;
-        let t145 = t144 / t106;
-        let t146 = t5 * t145;
-        let t147 = t107 + T::nearest(2.0);
-        let t150 = self.fixed[13] * t18;
-        let t151 = t150 * t26;
-        let t152 = t151 * t147;
-        let t153 = t137 + t152;
-        let t154 = t153 / t108;
-        let t155 = t6 * t154;
-        let t156 = t146 + t155;
-        let t157 = T::one() / t7;
-        let t158 = t157 * t156;
-        let t159 = t145 - t154;
-        let t160 = t72 / t7;
-        let t161 = t160 * t159;
-        let t162 = t76 / t7;
-        let t163 = t162 * t159;
-        let t164 = t1 * t145;
-        let t165 = t82 * t154;
-        let t166 = t164 + t165;
-        let t167 = t157 * t166;
-        let t168 = t87 / t7;
-        let t169 = t168 * t159;
-        let t170 = t3 * t145;
-        let t171 = t93 * t154;
-        let t172 = t170 + t171;
-        let t173 = t157 * t172;
+        let t137 = t107 + T::nearest(2.0);
+        let t141 = self.fixed[12] * t133;
+        let t142 = t107 * t137;
+        let t143 = self.fixed[11] * t142;
+        let t144 = t141 + t143;
+        let t145 = t109 + T::nearest(2.0);
+        let t148 = self.fixed[13] * t18;
+        let t149 = t148 * t26;
+        let t150 = t149 * t145;
+        let t151 = t141 + t150;
+        let t152 = T::one() / t108;
+        let t153 = t144 * t152;
+        let t154 = t5 * t153;
+        let t155 = T::one() / t110;
+        let t156 = t151 * t155;
+        let t157 = t6 * t156;
+        let t158 = t154 + t157;
+        let t159 = t66 * t158;
+        let t160 = t153 - t156;
+        let t161 = t74 * t66;
+        let t162 = t161 * t160;
+        let t163 = t78 * t66;
+        let t164 = t163 * t160;
+        let t165 = t3 * t153;
+        let t166 = t82 * t156;
+        let t167 = t165 + t166;
+        let t168 = t66 * t167;
+        let t169 = t89 * t66;
+        let t170 = t169 * t160;
+        let t171 = t4 * t153;
+        let t172 = t93 * t156;
+        let t173 = t171 + t172;
+        let t174 = t66 * t173;
         crate::nalgebra::SMatrix::<
             T,
             3,
             3,
-        >::new(t158, t161, t163, t161, t167, t169, t163, t169, t173)
+        >::new(t159, t162, t164, t162, t168, t170, t164, t170, t174)
     }
     #[inline]
     fn body_force(
@@ -632,10 +636,10 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t1 = X[1] * X[1];
-        let t3 = X[2] * X[2];
+        let t3 = X[1] * X[1];
+        let t4 = X[2] * X[2];
         let t5 = X[0] * X[0];
-        let t6 = t1 + t3;
+        let t6 = t3 + t4;
         let t7 = t6 + t5;
         let t8 = t7.sqrt();
         let t17 = self.fixed[0] * t;
@@ -644,116 +648,87 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t23 = T::nearest(3.0) - t21;
         let t25 = self.fixed[2] * t18;
         let t26 = t8 * t23;
-        let t60 = self.fixed[6] * t8;
-        let t61 = T::one() - t60;
-        let t70 = self.fixed[7] * t8;
-        let t71 = T::nearest(3.0) - t70;
-        let t103 = self.fixed[8] * t18;
-        let t104 = t8 * t61;
-        let t105 = t103 * t104;
-        let t106 = t105 + T::one();
-        let t107 = t25 * t26;
+        let t59 = self.fixed[6] * t8;
+        let t60 = T::one() - t59;
+        let t66 = T::one() / t7;
+        let t67 = t8 * t66;
+        let t72 = self.fixed[7] * t8;
+        let t73 = T::nearest(3.0) - t72;
+        let t105 = self.fixed[8] * t18;
+        let t106 = t8 * t60;
+        let t107 = t105 * t106;
         let t108 = t107 + T::one();
-        let t117 = self.fixed[9] * t18;
-        let t118 = t117 * t26;
-        let t119 = t118 * t105;
-        let t122 = t18 * t18;
-        let t123 = t23 * t23;
-        let t125 = self.fixed[10] * t122;
-        let t126 = t7 * t123;
-        let t127 = t125 * t126;
-        let t128 = t127 * t105;
-        let t129 = t118 + t105;
-        let t130 = t129 + t119;
-        let t131 = t130 + t127;
-        let t132 = t131 + t128;
-        let t133 = t132.ln_1p();
-        let t174 = X[0] / t8;
-        let t175 = t7 * t23;
-        let t176 = self.fixed[4] * t175;
-        let t179 = self.fixed[14] * t8;
-        let t180 = T::nearest(3.0) - t179;
-        let t185 = self.fixed[15] * t180;
-        let t186 = t176 + t185;
-        let t188 = self.fixed[16] * t186;
-        let t189 = -t188;
-        let t190 = t106 * t106;
-        let t192 = t7 * t8;
-        let t195 = t61 * t61;
-        let t201 = t192 * t23;
-        let t202 = t201 * t195;
-        let t203 = t202 * t180;
-        let t204 = self.fixed[17] * t203;
-        let t205 = t18 * t204;
-        let t210 = T::one() - t21;
-        let t211 = t23 * t210;
-        let t212 = t61 * t71;
-        let t213 = T::nearest(2.0) * t212;
-        let t214 = t211 + t213;
-        let t218 = self.fixed[18] * t214;
-        let t221 = self.fixed[19] * t8;
-        let t223 = T::nearest(9.0) - t221;
-        let t225 = t210 * t223;
-        let t226 = self.fixed[20] * t225;
-        let t227 = self.fixed[20] * t211;
-        let t228 = t23 * t71;
-        let t230 = T::nearest(36.0) * t195;
-        let t231 = t228 + t230;
-        let t232 = t231 - t123;
-        let t233 = self.fixed[12] * t232;
-        let t235 = t61 * t210;
-        let t236 = T::nearest(18.0) * t235;
-        let t237 = t23 * t180;
-        let t238 = T::nearest(2.0) * t237;
-        let t239 = t236 + t228;
-        let t240 = t239 + t238;
-        let t241 = self.fixed[11] * t240;
-        let t242 = t218 + t226;
-        let t243 = t242 + t227;
-        let t244 = t243 + t233;
-        let t245 = t244 + t241;
-        let t249 = t7 * t61;
-        let t250 = t249 * t245;
-        let t251 = self.fixed[21] * t250;
-        let t252 = t251 + t205;
-        let t253 = t18 * t252;
-        let t261 = t8 * t214;
-        let t262 = self.fixed[22] * t261;
-        let t263 = t262 * t133;
-        let t264 = self.fixed[11] * t180;
-        let t265 = self.fixed[20] * t210;
-        let t266 = t264 + t265;
-        let t267 = t61 * t266;
-        let t268 = T::nearest(12.0) * t267;
-        let t269 = t230 - t123;
-        let t270 = self.fixed[12] * t269;
-        let t271 = self.fixed[11] * t239;
-        let t272 = t268 + t270;
-        let t273 = t272 + t271;
-        let t276 = t8 * t273;
-        let t277 = self.fixed[23] * t276;
-        let t278 = t253 + t263;
-        let t279 = t277 + t278;
-        let t280 = t18 * t279;
-        let t287 = self.fixed[24] * t180;
-        let t288 = t287 * t133;
-        let t289 = t280 + t288;
-        let t290 = t190 * t108;
-        let t291 = t289 / t290;
-        let t292 = t189 + t291;
-        let t293 = t18 * t292;
-        let t294 = t174 * t293;
-        let t295 = X[1] / t8;
-        let t296 = t295 * t293;
-        let t297 = X[2] / t8;
-        let t298 = t297 * t293;
-        crate::nalgebra::SVector::<T, 3>::new(t294, t296, t298)
+        let t109 = t25 * t26;
+        let t110 = t109 + T::one();
+        let t152 = T::one() / t108;
+        let t155 = T::one() / t110;
+        let t177 = self.fixed[14] * t8;
+        let t178 = T::nearest(3.0) - t177;
+        let t181 = t7 * t23;
+        let t182 = self.fixed[4] * t181;
+        let t185 = self.fixed[15] * t178;
+        let t186 = t182 + t185;
+        let t188 = self.fixed[16] * t18;
+        let t189 = t188 * t186;
+        let t190 = t107 * t109;
+        let t191 = t190 + T::nearest(2.0);
+        let t192 = t25 * t23;
+        let t193 = t192 * t191;
+        let t194 = t8 * t193;
+        let t195 = T::nearest(2.0) * t109;
+        let t196 = t195 + T::one();
+        let t197 = t107 * t196;
+        let t198 = t109 * t109;
+        let t199 = t194 + t197;
+        let t200 = t199 + t198;
+        let t201 = t200.ln_1p();
+        let t202 = self.fixed[11] * t107;
+        let t203 = self.fixed[12] * t201;
+        let t204 = t202 + t203;
+        let t205 = self.fixed[11] * t109;
+        let t206 = t203 + t205;
+        let t207 = T::one() - t21;
+        let t208 = t105 * t207;
+        let t209 = t208 * t152;
+        let t210 = self.fixed[9] * t18;
+        let t211 = t210 * t73;
+        let t212 = t211 * t155;
+        let t213 = t209 + t212;
+        let t214 = self.fixed[12] * t213;
+        let t215 = self.fixed[11] * t208;
+        let t216 = t214 + t215;
+        let t217 = t107 * t209;
+        let t218 = t208 - t217;
+        let t219 = t204 * t218;
+        let t220 = t107 * t216;
+        let t221 = t219 + t220;
+        let t222 = t109 * t155;
+        let t223 = t211 * t222;
+        let t224 = t217 + t223;
+        let t225 = T::nearest(2.0) * t67;
+        let t226 = t107 * t204;
+        let t227 = t225 * t226;
+        let t228 = t227 + t221;
+        let t229 = t152 * t228;
+        let t230 = t210 * t23;
+        let t231 = t206 * t155;
+        let t232 = t230 * t231;
+        let t233 = self.fixed[12] * t224;
+        let t234 = t229 - t232;
+        let t235 = t234 + t233;
+        let t237 = self.fixed[17] * t235;
+        let t238 = t237 - t189;
+        let t239 = t67 * t238;
+        let t240 = X[0] * t239;
+        let t241 = X[1] * t239;
+        let t242 = X[2] * t239;
+        crate::nalgebra::SVector::<T, 3>::new(t240, t241, t242)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> crate::Fields<T, 3> {
-        let t1 = X[1] * X[1];
-        let t3 = X[2] * X[2];
+        let t3 = X[1] * X[1];
+        let t4 = X[2] * X[2];
         let t5 = X[0] * X[0];
-        let t6 = t1 + t3;
+        let t6 = t3 + t4;
         let t7 = t6 + t5;
         let t8 = t7.sqrt();
         let t17 = self.fixed[0] * t;
@@ -783,178 +758,160 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t54 = -t53;
         let t55 = t50 * t31;
         let t56 = -t55;
-        let t60 = self.fixed[6] * t8;
-        let t61 = T::one() - t60;
-        let t62 = t5 * t61;
+        let t59 = self.fixed[6] * t8;
+        let t60 = T::one() - t59;
+        let t62 = t5 * t60;
         let t63 = T::nearest(6.0) * t62;
         let t64 = t23 * t6;
         let t65 = t63 + t64;
-        let t66 = t65 / t8;
-        let t67 = t25 * t66;
-        let t70 = self.fixed[7] * t8;
-        let t71 = T::nearest(3.0) - t70;
-        let t72 = X[0] * X[1];
-        let t73 = t72 * t71;
-        let t74 = t73 / t8;
-        let t75 = t25 * t74;
-        let t76 = X[0] * X[2];
-        let t77 = t76 * t71;
-        let t78 = t77 / t8;
-        let t79 = t25 * t78;
-        let t80 = t1 * t61;
-        let t81 = T::nearest(6.0) * t80;
-        let t82 = t3 + t5;
-        let t83 = t23 * t82;
-        let t84 = t81 + t83;
-        let t85 = t84 / t8;
-        let t86 = t25 * t85;
-        let t87 = X[1] * X[2];
-        let t88 = t87 * t71;
-        let t89 = t88 / t8;
-        let t90 = t25 * t89;
-        let t91 = t3 * t61;
-        let t92 = T::nearest(6.0) * t91;
-        let t93 = t1 + t5;
-        let t94 = t23 * t93;
-        let t95 = t92 + t94;
-        let t96 = t95 / t8;
-        let t97 = t25 * t96;
-        let t98 = t67 + T::one();
-        let t99 = t86 + T::one();
-        let t100 = t97 + T::one();
-        let t103 = self.fixed[8] * t18;
-        let t104 = t8 * t61;
-        let t105 = t103 * t104;
-        let t106 = t105 + T::one();
-        let t107 = t25 * t26;
+        let t66 = T::one() / t7;
+        let t67 = t8 * t66;
+        let t68 = t65 * t67;
+        let t69 = t25 * t68;
+        let t72 = self.fixed[7] * t8;
+        let t73 = T::nearest(3.0) - t72;
+        let t74 = X[0] * X[1];
+        let t75 = t74 * t73;
+        let t76 = t75 * t67;
+        let t77 = t25 * t76;
+        let t78 = X[0] * X[2];
+        let t79 = t78 * t73;
+        let t80 = t79 * t67;
+        let t81 = t25 * t80;
+        let t82 = t4 + t5;
+        let t83 = t3 * t60;
+        let t84 = T::nearest(6.0) * t83;
+        let t85 = t23 * t82;
+        let t86 = t84 + t85;
+        let t87 = t86 * t67;
+        let t88 = t25 * t87;
+        let t89 = X[1] * X[2];
+        let t90 = t89 * t73;
+        let t91 = t90 * t67;
+        let t92 = t25 * t91;
+        let t93 = t3 + t5;
+        let t94 = t4 * t60;
+        let t95 = T::nearest(6.0) * t94;
+        let t96 = t23 * t93;
+        let t97 = t95 + t96;
+        let t98 = t97 * t67;
+        let t99 = t25 * t98;
+        let t100 = t69 + T::one();
+        let t101 = t88 + T::one();
+        let t102 = t99 + T::one();
+        let t105 = self.fixed[8] * t18;
+        let t106 = t8 * t60;
+        let t107 = t105 * t106;
         let t108 = t107 + T::one();
-        let t109 = t108 * t108;
-        let t110 = t106 * t109;
-        let t117 = self.fixed[9] * t18;
-        let t118 = t117 * t26;
-        let t119 = t118 * t105;
+        let t109 = t25 * t26;
+        let t110 = t109 + T::one();
+        let t111 = t110 * t110;
+        let t112 = t108 * t111;
+        let t117 = t18 * t26;
+        let t118 = t117 * t108;
+        let t121 = self.fixed[9] * t118;
         let t122 = t18 * t18;
         let t123 = t23 * t23;
-        let t125 = self.fixed[10] * t122;
-        let t126 = t7 * t123;
-        let t127 = t125 * t126;
-        let t128 = t127 * t105;
-        let t129 = t118 + t105;
-        let t130 = t129 + t119;
-        let t131 = t130 + t127;
-        let t132 = t131 + t128;
+        let t124 = t7 * t123;
+        let t125 = t122 * t124;
+        let t126 = t125 * t108;
+        let t130 = self.fixed[10] * t126;
+        let t131 = t121 + t130;
+        let t132 = t131 + t107;
         let t133 = t132.ln_1p();
-        let t137 = self.fixed[11] * t133;
-        let t141 = t105 + T::nearest(2.0);
-        let t142 = t105 * t141;
-        let t143 = self.fixed[12] * t142;
-        let t144 = t137 + t143;
-        let t145 = t144 / t106;
-        let t146 = t5 * t145;
-        let t147 = t107 + T::nearest(2.0);
-        let t150 = self.fixed[13] * t18;
-        let t151 = t150 * t26;
-        let t152 = t151 * t147;
-        let t153 = t137 + t152;
-        let t154 = t153 / t108;
-        let t155 = t6 * t154;
-        let t156 = t146 + t155;
-        let t157 = T::one() / t7;
-        let t158 = t157 * t156;
-        let t159 = t145 - t154;
-        let t160 = t72 / t7;
-        let t161 = t160 * t159;
-        let t162 = t76 / t7;
-        let t163 = t162 * t159;
-        let t164 = t1 * t145;
-        let t165 = t82 * t154;
-        let t166 = t164 + t165;
-        let t167 = t157 * t166;
-        let t168 = t87 / t7;
-        let t169 = t168 * t159;
-        let t170 = t3 * t145;
-        let t171 = t93 * t154;
-        let t172 = t170 + t171;
-        let t173 = t157 * t172;
-        let t174 = X[0] / t8;
-        let t175 = t7 * t23;
-        let t176 = self.fixed[4] * t175;
-        let t179 = self.fixed[14] * t8;
-        let t180 = T::nearest(3.0) - t179;
-        let t185 = self.fixed[15] * t180;
-        let t186 = t176 + t185;
-        let t188 = self.fixed[16] * t186;
-        let t189 = -t188;
-        let t190 = t106 * t106;
-        let t192 = t7 * t8;
-        let t195 = t61 * t61;
-        let t201 = t192 * t23;
-        let t202 = t201 * t195;
-        let t203 = t202 * t180;
-        let t204 = self.fixed[17] * t203;
-        let t205 = t18 * t204;
-        let t210 = T::one() - t21;
-        let t211 = t23 * t210;
-        let t212 = t61 * t71;
-        let t213 = T::nearest(2.0) * t212;
-        let t214 = t211 + t213;
-        let t218 = self.fixed[18] * t214;
-        let t221 = self.fixed[19] * t8;
-        let t223 = T::nearest(9.0) - t221;
-        let t225 = t210 * t223;
-        let t226 = self.fixed[20] * t225;
-        let t227 = self.fixed[20] * t211;
-        let t228 = t23 * t71;
-        let t230 = T::nearest(36.0) * t195;
-        let t231 = t228 + t230;
-        let t232 = t231 - t123;
-        let t233 = self.fixed[12] * t232;
-        let t235 = t61 * t210;
-        let t236 = T::nearest(18.0) * t235;
-        let t237 = t23 * t180;
-        let t238 = T::nearest(2.0) * t237;
-        let t239 = t236 + t228;
-        let t240 = t239 + t238;
-        let t241 = self.fixed[11] * t240;
-        let t242 = t218 + t226;
-        let t243 = t242 + t227;
-        let t244 = t243 + t233;
-        let t245 = t244 + t241;
-        let t249 = t7 * t61;
-        let t250 = t249 * t245;
-        let t251 = self.fixed[21] * t250;
-        let t252 = t251 + t205;
-        let t253 = t18 * t252;
-        let t261 = t8 * t214;
-        let t262 = self.fixed[22] * t261;
-        let t263 = t262 * t133;
-        let t264 = self.fixed[11] * t180;
-        let t265 = self.fixed[20] * t210;
-        let t266 = t264 + t265;
-        let t267 = t61 * t266;
-        let t268 = T::nearest(12.0) * t267;
-        let t269 = t230 - t123;
-        let t270 = self.fixed[12] * t269;
-        let t271 = self.fixed[11] * t239;
-        let t272 = t268 + t270;
-        let t273 = t272 + t271;
-        let t276 = t8 * t273;
-        let t277 = self.fixed[23] * t276;
-        let t278 = t253 + t263;
-        let t279 = t277 + t278;
-        let t280 = t18 * t279;
-        let t287 = self.fixed[24] * t180;
-        let t288 = t287 * t133;
-        let t289 = t280 + t288;
-        let t290 = t190 * t108;
-        let t291 = t289 / t290;
-        let t292 = t189 + t291;
-        let t293 = t18 * t292;
-        let t294 = t174 * t293;
-        let t295 = X[1] / t8;
-        let t296 = t295 * t293;
-        let t297 = X[2] / t8;
-        let t298 = t297 * t293;
+        let t137 = t107 + T::nearest(2.0);
+        let t141 = self.fixed[12] * t133;
+        let t142 = t107 * t137;
+        let t143 = self.fixed[11] * t142;
+        let t144 = t141 + t143;
+        let t145 = t109 + T::nearest(2.0);
+        let t148 = self.fixed[13] * t18;
+        let t149 = t148 * t26;
+        let t150 = t149 * t145;
+        let t151 = t141 + t150;
+        let t152 = T::one() / t108;
+        let t153 = t144 * t152;
+        let t154 = t5 * t153;
+        let t155 = T::one() / t110;
+        let t156 = t151 * t155;
+        let t157 = t6 * t156;
+        let t158 = t154 + t157;
+        let t159 = t66 * t158;
+        let t160 = t153 - t156;
+        let t161 = t74 * t66;
+        let t162 = t161 * t160;
+        let t163 = t78 * t66;
+        let t164 = t163 * t160;
+        let t165 = t3 * t153;
+        let t166 = t82 * t156;
+        let t167 = t165 + t166;
+        let t168 = t66 * t167;
+        let t169 = t89 * t66;
+        let t170 = t169 * t160;
+        let t171 = t4 * t153;
+        let t172 = t93 * t156;
+        let t173 = t171 + t172;
+        let t174 = t66 * t173;
+        let t177 = self.fixed[14] * t8;
+        let t178 = T::nearest(3.0) - t177;
+        let t181 = t7 * t23;
+        let t182 = self.fixed[4] * t181;
+        let t185 = self.fixed[15] * t178;
+        let t186 = t182 + t185;
+        let t188 = self.fixed[16] * t18;
+        let t189 = t188 * t186;
+        let t190 = t107 * t109;
+        let t191 = t190 + T::nearest(2.0);
+        let t192 = t25 * t23;
+        let t193 = t192 * t191;
+        let t194 = t8 * t193;
+        let t195 = T::nearest(2.0) * t109;
+        let t196 = t195 + T::one();
+        let t197 = t107 * t196;
+        let t198 = t109 * t109;
+        let t199 = t194 + t197;
+        let t200 = t199 + t198;
+        let t201 = t200.ln_1p();
+        let t202 = self.fixed[11] * t107;
+        let t203 = self.fixed[12] * t201;
+        let t204 = t202 + t203;
+        let t205 = self.fixed[11] * t109;
+        let t206 = t203 + t205;
+        let t207 = T::one() - t21;
+        let t208 = t105 * t207;
+        let t209 = t208 * t152;
+        let t210 = self.fixed[9] * t18;
+        let t211 = t210 * t73;
+        let t212 = t211 * t155;
+        let t213 = t209 + t212;
+        let t214 = self.fixed[12] * t213;
+        let t215 = self.fixed[11] * t208;
+        let t216 = t214 + t215;
+        let t217 = t107 * t209;
+        let t218 = t208 - t217;
+        let t219 = t204 * t218;
+        let t220 = t107 * t216;
+        let t221 = t219 + t220;
+        let t222 = t109 * t155;
+        let t223 = t211 * t222;
+        let t224 = t217 + t223;
+        let t225 = T::nearest(2.0) * t67;
+        let t226 = t107 * t204;
+        let t227 = t225 * t226;
+        let t228 = t227 + t221;
+        let t229 = t152 * t228;
+        let t230 = t210 * t23;
+        let t231 = t206 * t155;
+        let t232 = t230 * t231;
+        let t233 = self.fixed[12] * t224;
+        let t234 = t229 - t232;
+        let t235 = t234 + t233;
+        let t237 = self.fixed[17] * t235;
+        let t238 = t237 - t189;
+        let t239 = t67 * t238;
+        let t240 = X[0] * t239;
+        let t241 = X[1] * t239;
+        let t242 = X[2] * t239;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 3>::new(t28, t30, t32),
             v: crate::nalgebra::SVector::<T, 3>::new(t40, t42, t44),
@@ -963,19 +920,19 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 T,
                 3,
                 3,
-            >::new(t67, t75, t79, t75, t86, t90, t79, t90, t97),
+            >::new(t69, t77, t81, t77, t88, t92, t81, t92, t99),
             F: crate::nalgebra::SMatrix::<
                 T,
                 3,
                 3,
-            >::new(t98, t75, t79, t75, t99, t90, t79, t90, t100),
-            J: t110,
+            >::new(t100, t77, t81, t77, t101, t92, t81, t92, t102),
+            J: t112,
             P: crate::nalgebra::SMatrix::<
                 T,
                 3,
                 3,
-            >::new(t158, t161, t163, t161, t167, t169, t163, t169, t173),
-            b: crate::nalgebra::SVector::<T, 3>::new(t294, t296, t298),
+            >::new(t159, t162, t164, t162, t168, t170, t164, t170, t174),
+            b: crate::nalgebra::SVector::<T, 3>::new(t240, t241, t242),
         }
     }
     fn traction(
@@ -989,53 +946,49 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t17 = self.fixed[0] * t;
                 let t18 = t17.cos_pi();
                 let t122 = t18 * t18;
-                let t306 = self.fixed[26] * t18;
-                let t307 = t306 + T::one();
-                let t314 = self.fixed[27] * t18;
-                let t315 = t18 * t306;
-                let t316 = self.fixed[27] * t315;
-                let t322 = self.fixed[28] * t122;
-                let t323 = t122 * t306;
-                let t324 = self.fixed[28] * t323;
-                let t325 = t306 + t314;
-                let t326 = t325 + t316;
-                let t327 = t326 + t322;
-                let t328 = t327 + t324;
-                let t329 = t328.ln_1p();
-                let t330 = self.fixed[11] * t329;
-                let t331 = t306 + T::nearest(2.0);
-                let t332 = t306 * t331;
-                let t333 = self.fixed[12] * t332;
-                let t334 = t330 + t333;
-                let t336 = t334 / t307;
-                let t337 = self.fixed[29] * t336;
-                let t338 = t337 * X[0];
-                let t339 = -t338;
-                let t340 = t337 * X[1];
-                let t341 = -t340;
-                let t342 = t337 * X[2];
-                let t343 = -t342;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t339, t341, t343))
+                let t356 = self.fixed[26] * t18;
+                let t357 = t356 + T::one();
+                let t361 = t18 * t357;
+                let t365 = self.fixed[27] * t361;
+                let t366 = t122 * t357;
+                let t372 = self.fixed[28] * t366;
+                let t373 = t365 + t372;
+                let t374 = t373 + t356;
+                let t375 = t374.ln_1p();
+                let t376 = t356 + T::nearest(2.0);
+                let t377 = self.fixed[12] * t375;
+                let t378 = t356 * t376;
+                let t379 = self.fixed[11] * t378;
+                let t380 = t377 + t379;
+                let t382 = t380 / t357;
+                let t383 = self.fixed[29] * t382;
+                let t384 = t383 * X[0];
+                let t385 = -t384;
+                let t386 = t383 * X[1];
+                let t387 = -t386;
+                let t388 = t383 * X[2];
+                let t389 = -t388;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t385, t387, t389))
             }
             crate::Surface::Outer => {
                 let t17 = self.fixed[0] * t;
                 let t18 = t17.cos_pi();
-                let t345 = self.fixed[30] * t18;
-                let t346 = t345 + T::nearest(2.0);
-                let t347 = t18 * t346;
-                let t348 = self.fixed[30] * t347;
-                let t349 = t348.ln_1p();
-                let t353 = self.fixed[31] * t349;
-                let t354 = t353 * X[0];
-                let t355 = t353 * X[1];
-                let t356 = t353 * X[2];
-                Some(crate::nalgebra::SVector::<T, 3>::new(t354, t355, t356))
+                let t391 = self.fixed[30] * t18;
+                let t392 = t391 + T::nearest(2.0);
+                let t393 = t18 * t392;
+                let t394 = self.fixed[30] * t393;
+                let t395 = t394.ln_1p();
+                let t399 = self.fixed[31] * t395;
+                let t400 = t399 * X[0];
+                let t401 = t399 * X[1];
+                let t402 = t399 * X[2];
+                Some(crate::nalgebra::SVector::<T, 3>::new(t400, t401, t402))
             }
             crate::Surface::Lower(0) => {
-                let t1 = X[1] * X[1];
-                let t3 = X[2] * X[2];
+                let t3 = X[1] * X[1];
+                let t4 = X[2] * X[2];
                 let t5 = X[0] * X[0];
-                let t6 = t1 + t3;
+                let t6 = t3 + t4;
                 let t7 = t6 + t5;
                 let t8 = t7.sqrt();
                 let t17 = self.fixed[0] * t;
@@ -1044,44 +997,45 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t23 = T::nearest(3.0) - t21;
                 let t25 = self.fixed[2] * t18;
                 let t26 = t8 * t23;
-                let t60 = self.fixed[6] * t8;
-                let t61 = T::one() - t60;
-                let t103 = self.fixed[8] * t18;
-                let t104 = t8 * t61;
-                let t105 = t103 * t104;
-                let t107 = t25 * t26;
+                let t59 = self.fixed[6] * t8;
+                let t60 = T::one() - t59;
+                let t66 = T::one() / t7;
+                let t105 = self.fixed[8] * t18;
+                let t106 = t8 * t60;
+                let t107 = t105 * t106;
                 let t108 = t107 + T::one();
-                let t117 = self.fixed[9] * t18;
-                let t118 = t117 * t26;
-                let t119 = t118 * t105;
+                let t109 = t25 * t26;
+                let t110 = t109 + T::one();
+                let t117 = t18 * t26;
+                let t118 = t117 * t108;
+                let t121 = self.fixed[9] * t118;
                 let t122 = t18 * t18;
                 let t123 = t23 * t23;
-                let t125 = self.fixed[10] * t122;
-                let t126 = t7 * t123;
-                let t127 = t125 * t126;
-                let t128 = t127 * t105;
-                let t129 = t118 + t105;
-                let t130 = t129 + t119;
-                let t131 = t130 + t127;
-                let t132 = t131 + t128;
+                let t124 = t7 * t123;
+                let t125 = t122 * t124;
+                let t126 = t125 * t108;
+                let t130 = self.fixed[10] * t126;
+                let t131 = t121 + t130;
+                let t132 = t131 + t107;
                 let t133 = t132.ln_1p();
-                let t137 = self.fixed[11] * t133;
-                let t147 = t107 + T::nearest(2.0);
-                let t150 = self.fixed[13] * t18;
-                let t151 = t150 * t26;
-                let t152 = t151 * t147;
-                let t153 = t137 + t152;
-                let t154 = t153 / t108;
-                let t357 = t6 / t7;
-                let t358 = t357 * t154;
-                let t359 = -t358;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t359, T::zero(), T::zero()))
+                let t141 = self.fixed[12] * t133;
+                let t145 = t109 + T::nearest(2.0);
+                let t148 = self.fixed[13] * t18;
+                let t149 = t148 * t26;
+                let t150 = t149 * t145;
+                let t151 = t141 + t150;
+                let t155 = T::one() / t110;
+                let t156 = t151 * t155;
+                let t403 = t6 * t66;
+                let t404 = t403 * t156;
+                let t405 = -t404;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t405, T::zero(), T::zero()))
             }
             crate::Surface::Lower(1) => {
-                let t1 = X[1] * X[1];
-                let t3 = X[2] * X[2];
+                let t3 = X[1] * X[1];
+                let t4 = X[2] * X[2];
                 let t5 = X[0] * X[0];
-                let t6 = t1 + t3;
+                let t6 = t3 + t4;
                 let t7 = t6 + t5;
                 let t8 = t7.sqrt();
                 let t17 = self.fixed[0] * t;
@@ -1090,45 +1044,46 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t23 = T::nearest(3.0) - t21;
                 let t25 = self.fixed[2] * t18;
                 let t26 = t8 * t23;
-                let t60 = self.fixed[6] * t8;
-                let t61 = T::one() - t60;
-                let t82 = t3 + t5;
-                let t103 = self.fixed[8] * t18;
-                let t104 = t8 * t61;
-                let t105 = t103 * t104;
-                let t107 = t25 * t26;
+                let t59 = self.fixed[6] * t8;
+                let t60 = T::one() - t59;
+                let t66 = T::one() / t7;
+                let t82 = t4 + t5;
+                let t105 = self.fixed[8] * t18;
+                let t106 = t8 * t60;
+                let t107 = t105 * t106;
                 let t108 = t107 + T::one();
-                let t117 = self.fixed[9] * t18;
-                let t118 = t117 * t26;
-                let t119 = t118 * t105;
+                let t109 = t25 * t26;
+                let t110 = t109 + T::one();
+                let t117 = t18 * t26;
+                let t118 = t117 * t108;
+                let t121 = self.fixed[9] * t118;
                 let t122 = t18 * t18;
                 let t123 = t23 * t23;
-                let t125 = self.fixed[10] * t122;
-                let t126 = t7 * t123;
-                let t127 = t125 * t126;
-                let t128 = t127 * t105;
-                let t129 = t118 + t105;
-                let t130 = t129 + t119;
-                let t131 = t130 + t127;
-                let t132 = t131 + t128;
+                let t124 = t7 * t123;
+                let t125 = t122 * t124;
+                let t126 = t125 * t108;
+                let t130 = self.fixed[10] * t126;
+                let t131 = t121 + t130;
+                let t132 = t131 + t107;
                 let t133 = t132.ln_1p();
-                let t137 = self.fixed[11] * t133;
-                let t147 = t107 + T::nearest(2.0);
-                let t150 = self.fixed[13] * t18;
-                let t151 = t150 * t26;
-                let t152 = t151 * t147;
-                let t153 = t137 + t152;
-                let t154 = t153 / t108;
-                let t361 = t82 / t7;
-                let t362 = t361 * t154;
-                let t363 = -t362;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t363, T::zero()))
+                let t141 = self.fixed[12] * t133;
+                let t145 = t109 + T::nearest(2.0);
+                let t148 = self.fixed[13] * t18;
+                let t149 = t148 * t26;
+                let t150 = t149 * t145;
+                let t151 = t141 + t150;
+                let t155 = T::one() / t110;
+                let t156 = t151 * t155;
+                let t407 = t82 * t66;
+                let t408 = t407 * t156;
+                let t409 = -t408;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t409, T::zero()))
             }
             crate::Surface::Lower(2) => {
-                let t1 = X[1] * X[1];
-                let t3 = X[2] * X[2];
+                let t3 = X[1] * X[1];
+                let t4 = X[2] * X[2];
                 let t5 = X[0] * X[0];
-                let t6 = t1 + t3;
+                let t6 = t3 + t4;
                 let t7 = t6 + t5;
                 let t8 = t7.sqrt();
                 let t17 = self.fixed[0] * t;
@@ -1137,39 +1092,40 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t23 = T::nearest(3.0) - t21;
                 let t25 = self.fixed[2] * t18;
                 let t26 = t8 * t23;
-                let t60 = self.fixed[6] * t8;
-                let t61 = T::one() - t60;
-                let t93 = t1 + t5;
-                let t103 = self.fixed[8] * t18;
-                let t104 = t8 * t61;
-                let t105 = t103 * t104;
-                let t107 = t25 * t26;
+                let t59 = self.fixed[6] * t8;
+                let t60 = T::one() - t59;
+                let t66 = T::one() / t7;
+                let t93 = t3 + t5;
+                let t105 = self.fixed[8] * t18;
+                let t106 = t8 * t60;
+                let t107 = t105 * t106;
                 let t108 = t107 + T::one();
-                let t117 = self.fixed[9] * t18;
-                let t118 = t117 * t26;
-                let t119 = t118 * t105;
+                let t109 = t25 * t26;
+                let t110 = t109 + T::one();
+                let t117 = t18 * t26;
+                let t118 = t117 * t108;
+                let t121 = self.fixed[9] * t118;
                 let t122 = t18 * t18;
                 let t123 = t23 * t23;
-                let t125 = self.fixed[10] * t122;
-                let t126 = t7 * t123;
-                let t127 = t125 * t126;
-                let t128 = t127 * t105;
-                let t129 = t118 + t105;
-                let t130 = t129 + t119;
-                let t131 = t130 + t127;
-                let t132 = t131 + t128;
+                let t124 = t7 * t123;
+                let t125 = t122 * t124;
+                let t126 = t125 * t108;
+                let t130 = self.fixed[10] * t126;
+                let t131 = t121 + t130;
+                let t132 = t131 + t107;
                 let t133 = t132.ln_1p();
-                let t137 = self.fixed[11] * t133;
-                let t147 = t107 + T::nearest(2.0);
-                let t150 = self.fixed[13] * t18;
-                let t151 = t150 * t26;
-                let t152 = t151 * t147;
-                let t153 = t137 + t152;
-                let t154 = t153 / t108;
-                let t364 = t93 / t7;
-                let t365 = t364 * t154;
-                let t366 = -t365;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t366))
+                let t141 = self.fixed[12] * t133;
+                let t145 = t109 + T::nearest(2.0);
+                let t148 = self.fixed[13] * t18;
+                let t149 = t148 * t26;
+                let t150 = t149 * t145;
+                let t151 = t141 + t150;
+                let t155 = T::one() / t110;
+                let t156 = t151 * t155;
+                let t410 = t93 * t66;
+                let t411 = t410 * t156;
+                let t412 = -t411;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t412))
             }
             _ => None,
         }
@@ -1209,8 +1165,8 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
     }
     fn material(&self) -> crate::Material<T> {
         crate::Material::NeoHookean {
-            lambda: self.fixed[11],
-            mu: self.fixed[12],
+            lambda: self.fixed[12],
+            mu: self.fixed[11],
         }
     }
     fn density(&self) -> T {
@@ -1226,141 +1182,139 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 3>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 3> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 5, 12>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 4, 12>::new(*self, X))
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 3, 5, 12> for SphereShell<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 12> for SphereShell<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 5] {
+    fn body_force_time(&self, t: T) -> [T; 4] {
         let t17 = self.fixed[0] * t;
         let t18 = t17.cos_pi();
         let t25 = self.fixed[2] * t18;
-        let t103 = self.fixed[8] * t18;
-        let t117 = self.fixed[9] * t18;
+        let t105 = self.fixed[8] * t18;
         let t122 = t18 * t18;
-        let t125 = self.fixed[10] * t122;
-        [t18, t25, t103, t117, t125]
+        [t18, t25, t105, t122]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 12] {
-        let t1 = X[1] * X[1];
-        let t3 = X[2] * X[2];
+        let t3 = X[1] * X[1];
+        let t4 = X[2] * X[2];
         let t5 = X[0] * X[0];
-        let t6 = t1 + t3;
+        let t6 = t3 + t4;
         let t7 = t6 + t5;
         let t8 = t7.sqrt();
         let t21 = self.fixed[1] * t8;
         let t23 = T::nearest(3.0) - t21;
         let t26 = t8 * t23;
-        let t60 = self.fixed[6] * t8;
-        let t61 = T::one() - t60;
-        let t70 = self.fixed[7] * t8;
-        let t71 = T::nearest(3.0) - t70;
-        let t104 = t8 * t61;
+        let t59 = self.fixed[6] * t8;
+        let t60 = T::one() - t59;
+        let t66 = T::one() / t7;
+        let t67 = t8 * t66;
+        let t72 = self.fixed[7] * t8;
+        let t73 = T::nearest(3.0) - t72;
+        let t106 = t8 * t60;
         let t123 = t23 * t23;
-        let t126 = t7 * t123;
-        let t174 = X[0] / t8;
-        let t175 = t7 * t23;
-        let t176 = self.fixed[4] * t175;
-        let t179 = self.fixed[14] * t8;
-        let t180 = T::nearest(3.0) - t179;
-        let t185 = self.fixed[15] * t180;
-        let t186 = t176 + t185;
-        let t188 = self.fixed[16] * t186;
-        let t189 = -t188;
-        let t192 = t7 * t8;
-        let t195 = t61 * t61;
-        let t201 = t192 * t23;
-        let t202 = t201 * t195;
-        let t203 = t202 * t180;
-        let t204 = self.fixed[17] * t203;
-        let t210 = T::one() - t21;
-        let t211 = t23 * t210;
-        let t212 = t61 * t71;
-        let t213 = T::nearest(2.0) * t212;
-        let t214 = t211 + t213;
-        let t218 = self.fixed[18] * t214;
-        let t221 = self.fixed[19] * t8;
-        let t223 = T::nearest(9.0) - t221;
-        let t225 = t210 * t223;
-        let t226 = self.fixed[20] * t225;
-        let t227 = self.fixed[20] * t211;
-        let t228 = t23 * t71;
-        let t230 = T::nearest(36.0) * t195;
-        let t231 = t228 + t230;
-        let t232 = t231 - t123;
-        let t233 = self.fixed[12] * t232;
-        let t235 = t61 * t210;
-        let t236 = T::nearest(18.0) * t235;
-        let t237 = t23 * t180;
-        let t238 = T::nearest(2.0) * t237;
-        let t239 = t236 + t228;
-        let t240 = t239 + t238;
-        let t241 = self.fixed[11] * t240;
-        let t242 = t218 + t226;
-        let t243 = t242 + t227;
-        let t244 = t243 + t233;
-        let t245 = t244 + t241;
-        let t249 = t7 * t61;
-        let t250 = t249 * t245;
-        let t251 = self.fixed[21] * t250;
-        let t261 = t8 * t214;
-        let t262 = self.fixed[22] * t261;
-        let t264 = self.fixed[11] * t180;
-        let t265 = self.fixed[20] * t210;
-        let t266 = t264 + t265;
-        let t267 = t61 * t266;
-        let t268 = T::nearest(12.0) * t267;
-        let t269 = t230 - t123;
-        let t270 = self.fixed[12] * t269;
-        let t271 = self.fixed[11] * t239;
-        let t272 = t268 + t270;
-        let t273 = t272 + t271;
-        let t276 = t8 * t273;
-        let t277 = self.fixed[23] * t276;
-        let t287 = self.fixed[24] * t180;
-        let t295 = X[1] / t8;
-        let t297 = X[2] / t8;
-        [t26, t104, t126, t174, t189, t204, t251, t262, t277, t287, t295, t297]
+        let t124 = t7 * t123;
+        let t177 = self.fixed[14] * t8;
+        let t178 = T::nearest(3.0) - t177;
+        let t181 = t7 * t23;
+        let t182 = self.fixed[4] * t181;
+        let t185 = self.fixed[15] * t178;
+        let t186 = t182 + t185;
+        let t207 = T::one() - t21;
+        let t243 = X[0] * t67;
+        let t244 = self.fixed[16] * t186;
+        let t247 = t7 * t8;
+        let t250 = t60 * t60;
+        let t255 = t247 * t23;
+        let t256 = t255 * t250;
+        let t257 = t256 * t178;
+        let t258 = self.fixed[18] * t257;
+        let t259 = t23 * t207;
+        let t260 = t60 * t73;
+        let t261 = T::nearest(2.0) * t260;
+        let t262 = t259 + t261;
+        let t263 = t23 * t73;
+        let t265 = T::nearest(36.0) * t250;
+        let t266 = t263 + t265;
+        let t267 = t266 - t123;
+        let t268 = T::nearest(2.0) * t178;
+        let t269 = t73 + t268;
+        let t270 = t23 * t269;
+        let t272 = t60 * t207;
+        let t273 = T::nearest(18.0) * t272;
+        let t274 = t270 + t273;
+        let t275 = T::nearest(6.0) - t177;
+        let t276 = t275 * t207;
+        let t277 = T::nearest(2.0) * t276;
+        let t279 = self.fixed[19] * t277;
+        let t283 = self.fixed[20] * t262;
+        let t284 = self.fixed[11] * t267;
+        let t285 = self.fixed[12] * t274;
+        let t286 = t279 + t283;
+        let t287 = t286 + t284;
+        let t288 = t287 + t285;
+        let t296 = t7 * t60;
+        let t297 = t296 * t288;
+        let t298 = self.fixed[21] * t297;
+        let t308 = t8 * t262;
+        let t309 = self.fixed[22] * t308;
+        let t310 = self.fixed[12] * t178;
+        let t311 = self.fixed[19] * t207;
+        let t312 = t310 + t311;
+        let t313 = t265 - t123;
+        let t314 = t273 + t263;
+        let t315 = t60 * t312;
+        let t316 = T::nearest(12.0) * t315;
+        let t317 = self.fixed[11] * t313;
+        let t318 = self.fixed[12] * t314;
+        let t319 = t316 + t317;
+        let t320 = t319 + t318;
+        let t323 = t8 * t320;
+        let t324 = self.fixed[23] * t323;
+        let t335 = self.fixed[24] * t178;
+        let t345 = X[1] * t67;
+        let t347 = X[2] * t67;
+        [t26, t106, t124, t243, t244, t258, t298, t309, t324, t335, t345, t347]
     }
     #[inline(always)]
     fn body_force_staged(
         &self,
-        time: &[T; 5],
+        time: &[T; 4],
         point: &[T; 12],
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t105 = time[2] * point[1];
-        let t106 = t105 + T::one();
-        let t107 = time[1] * point[0];
+        let t107 = time[2] * point[1];
         let t108 = t107 + T::one();
-        let t118 = time[3] * point[0];
-        let t119 = t118 * t105;
-        let t127 = time[4] * point[2];
-        let t128 = t127 * t105;
-        let t129 = t118 + t105;
-        let t130 = t129 + t119;
-        let t131 = t130 + t127;
-        let t132 = t131 + t128;
+        let t109 = time[1] * point[0];
+        let t110 = t109 + T::one();
+        let t117 = time[0] * point[0];
+        let t118 = t117 * t108;
+        let t121 = self.fixed[9] * t118;
+        let t125 = time[3] * point[2];
+        let t126 = t125 * t108;
+        let t130 = self.fixed[10] * t126;
+        let t131 = t121 + t130;
+        let t132 = t131 + t107;
         let t133 = t132.ln_1p();
-        let t190 = t106 * t106;
-        let t205 = time[0] * point[5];
-        let t252 = point[6] + t205;
-        let t253 = time[0] * t252;
-        let t263 = point[7] * t133;
-        let t278 = t253 + t263;
-        let t279 = point[8] + t278;
-        let t280 = time[0] * t279;
-        let t288 = point[9] * t133;
-        let t289 = t280 + t288;
-        let t290 = t190 * t108;
-        let t291 = t289 / t290;
-        let t292 = point[4] + t291;
-        let t293 = time[0] * t292;
-        let t294 = point[3] * t293;
-        let t296 = point[10] * t293;
-        let t298 = point[11] * t293;
-        crate::nalgebra::SVector::<T, 3>::new(t294, t296, t298)
+        let t299 = time[0] * point[5];
+        let t300 = point[6] + t299;
+        let t325 = time[0] * t300;
+        let t326 = point[7] * t133;
+        let t327 = t325 + t326;
+        let t328 = point[8] + t327;
+        let t336 = time[0] * t328;
+        let t337 = point[9] * t133;
+        let t338 = t336 + t337;
+        let t339 = t108 * t108;
+        let t340 = t339 * t110;
+        let t341 = t338 / t340;
+        let t342 = t341 - point[4];
+        let t343 = time[0] * t342;
+        let t344 = point[3] * t343;
+        let t346 = point[10] * t343;
+        let t348 = point[11] * t343;
+        crate::nalgebra::SVector::<T, 3>::new(t344, t346, t348)
     }
 }
 impl<T: crate::Real> From<SphereShell<T>> for crate::AnySolution<T> {

@@ -110,10 +110,10 @@ impl<T: crate::Real> Torsion<T> {
         if !(value.is_finite() && value > 0.0) {
             return Err(Self::DESCRIPTION.out_of_range(3, value));
         }
-        let t7 = parameters.E / parameters.rho0;
-        let t8 = t7.sqrt();
-        let t11 = T::nearest(0.5) * parameters.A;
-        let t34 = parameters.A * t8;
+        let t5 = parameters.E / parameters.rho0;
+        let t6 = t5.sqrt();
+        let t10 = T::nearest(0.5) * parameters.A;
+        let t34 = parameters.A * t6;
         let t35 = t34 * T::pi();
         let t44 = T::pi() * T::pi();
         let t51 = parameters.A * parameters.E;
@@ -122,21 +122,21 @@ impl<T: crate::Real> Torsion<T> {
         let t78 = parameters.nu + T::one();
         let t79 = T::nearest(0.5) * parameters.E;
         let t80 = t79 / t78;
-        let t98 = t11 * parameters.E;
-        let t99 = t98 / parameters.rho0;
-        let t100 = T::nearest(2.0) * t44;
-        let t104 = parameters.A / t78;
-        let t113 = T::nearest(2.0) / t8;
-        let t114 = T::nearest(2.0) * parameters.nu;
-        let t115 = T::one() - t114;
-        let t116 = parameters.E * parameters.nu;
-        let t117 = t78 * t115;
-        let t118 = t116 / t117;
-        let t119 = -T::nearest(0.5);
-        let t196 = parameters.A * t80;
+        let t99 = T::nearest(2.0) * t44;
+        let t102 = parameters.A / t78;
+        let t106 = t10 * parameters.E;
+        let t107 = t106 / parameters.rho0;
+        let t121 = T::nearest(2.0) / t6;
+        let t122 = T::nearest(2.0) * parameters.nu;
+        let t123 = T::one() - t122;
+        let t124 = parameters.E * parameters.nu;
+        let t125 = t78 * t123;
+        let t126 = t124 / t125;
+        let t127 = -T::nearest(0.5);
+        let t204 = parameters.A * t80;
         Ok(Torsion {
             parameters,
-            fixed: [t8, t11, t35, t53, t80, t99, t100, t104, t113, t118, t119, t196],
+            fixed: [t6, t10, t35, t53, t80, t99, t102, t107, t121, t126, t127, t204],
         })
     }
     /// The solution with parameter values in the order of the description; missing ones take their
@@ -175,22 +175,22 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t9 = self.fixed[0] * t;
-        let t10 = t9.sin_pi();
-        let t12 = self.fixed[1] * t10;
-        let t13 = t12 * X[2];
-        let t14 = t13.sin();
-        let t16 = X[0] * t14;
-        let t18 = t13.cos();
-        let t19 = X[1] * t18;
-        let t20 = t16 + t19;
-        let t21 = t14 * t20;
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = self.fixed[1] * t8;
+        let t12 = t11 * X[2];
+        let t13 = t12.sin();
+        let t16 = t12.cos();
+        let t17 = X[0] * t13;
+        let t18 = X[1] * t16;
+        let t19 = t17 + t18;
+        let t21 = t13 * t19;
         let t22 = T::nearest(2.0) * t21;
         let t23 = -t22;
-        let t24 = X[0] * t18;
-        let t25 = X[1] * t14;
+        let t24 = X[0] * t16;
+        let t25 = X[1] * t13;
         let t26 = t24 - t25;
-        let t27 = t14 * t26;
+        let t27 = t13 * t26;
         let t28 = T::nearest(2.0) * t27;
         crate::nalgebra::SVector::<T, 3>::new(t23, t28, T::zero())
     }
@@ -200,28 +200,28 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t9 = self.fixed[0] * t;
-        let t10 = t9.sin_pi();
-        let t12 = self.fixed[1] * t10;
-        let t13 = t12 * X[2];
-        let t14 = t13.sin();
-        let t16 = X[0] * t14;
-        let t18 = t13.cos();
-        let t19 = X[1] * t18;
-        let t20 = t16 + t19;
-        let t21 = t14 * t20;
-        let t24 = X[0] * t18;
-        let t25 = X[1] * t14;
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = self.fixed[1] * t8;
+        let t12 = t11 * X[2];
+        let t13 = t12.sin();
+        let t16 = t12.cos();
+        let t17 = X[0] * t13;
+        let t18 = X[1] * t16;
+        let t19 = t17 + t18;
+        let t21 = t13 * t19;
+        let t24 = X[0] * t16;
+        let t25 = X[1] * t13;
         let t26 = t24 - t25;
-        let t27 = t14 * t26;
-        let t31 = t9.cos_pi();
-        let t32 = t18 * t20;
+        let t27 = t13 * t26;
+        let t31 = t7.cos_pi();
+        let t32 = t16 * t19;
         let t33 = t27 + t32;
         let t36 = self.fixed[2] * t31;
         let t37 = t36 * X[2];
         let t38 = t37 * t33;
         let t39 = -t38;
-        let t40 = t18 * t26;
+        let t40 = t16 * t26;
         let t41 = t21 - t40;
         let t42 = t37 * t41;
         let t43 = -t42;
@@ -233,26 +233,26 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t9 = self.fixed[0] * t;
-        let t10 = t9.sin_pi();
-        let t12 = self.fixed[1] * t10;
-        let t13 = t12 * X[2];
-        let t14 = t13.sin();
-        let t16 = X[0] * t14;
-        let t18 = t13.cos();
-        let t19 = X[1] * t18;
-        let t20 = t16 + t19;
-        let t21 = t14 * t20;
-        let t24 = X[0] * t18;
-        let t25 = X[1] * t14;
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = self.fixed[1] * t8;
+        let t12 = t11 * X[2];
+        let t13 = t12.sin();
+        let t16 = t12.cos();
+        let t17 = X[0] * t13;
+        let t18 = X[1] * t16;
+        let t19 = t17 + t18;
+        let t21 = t13 * t19;
+        let t24 = X[0] * t16;
+        let t25 = X[1] * t13;
         let t26 = t24 - t25;
-        let t27 = t14 * t26;
-        let t31 = t9.cos_pi();
-        let t32 = t18 * t20;
+        let t27 = t13 * t26;
+        let t31 = t7.cos_pi();
+        let t32 = t16 * t19;
         let t33 = t27 + t32;
-        let t40 = t18 * t26;
+        let t40 = t16 * t26;
         let t41 = t21 - t40;
-        let t45 = t10 * t33;
+        let t45 = t8 * t33;
         let t46 = t31 * t31;
         let t47 = self.parameters.A * t46;
         let t48 = t47 * X[2];
@@ -260,7 +260,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         let t50 = t45 + t49;
         let t54 = self.fixed[3] * X[2];
         let t55 = t54 * t50;
-        let t56 = t10 * t41;
+        let t56 = t8 * t41;
         let t57 = t48 * t33;
         let t58 = t56 - t57;
         let t59 = t54 * t58;
@@ -272,31 +272,31 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 3, 3> {
-        let t9 = self.fixed[0] * t;
-        let t10 = t9.sin_pi();
-        let t12 = self.fixed[1] * t10;
-        let t13 = t12 * X[2];
-        let t14 = t13.sin();
-        let t16 = X[0] * t14;
-        let t18 = t13.cos();
-        let t19 = X[1] * t18;
-        let t20 = t16 + t19;
-        let t21 = t14 * t20;
-        let t24 = X[0] * t18;
-        let t25 = X[1] * t14;
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = self.fixed[1] * t8;
+        let t12 = t11 * X[2];
+        let t13 = t12.sin();
+        let t16 = t12.cos();
+        let t17 = X[0] * t13;
+        let t18 = X[1] * t16;
+        let t19 = t17 + t18;
+        let t21 = t13 * t19;
+        let t24 = X[0] * t16;
+        let t25 = X[1] * t13;
         let t26 = t24 - t25;
-        let t27 = t14 * t26;
-        let t32 = t18 * t20;
+        let t27 = t13 * t26;
+        let t32 = t16 * t19;
         let t33 = t27 + t32;
-        let t40 = t18 * t26;
+        let t40 = t16 * t26;
         let t41 = t21 - t40;
-        let t60 = t14 * t14;
+        let t60 = t13 * t13;
         let t61 = T::nearest(2.0) * t60;
         let t62 = -t61;
-        let t63 = t18 * t14;
+        let t63 = t16 * t13;
         let t64 = T::nearest(2.0) * t63;
         let t65 = -t64;
-        let t66 = self.parameters.A * t10;
+        let t66 = self.parameters.A * t8;
         let t67 = t66 * t33;
         let t68 = -t67;
         let t69 = t66 * t41;
@@ -313,30 +313,30 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 3, 3> {
-        let t9 = self.fixed[0] * t;
-        let t10 = t9.sin_pi();
-        let t12 = self.fixed[1] * t10;
-        let t13 = t12 * X[2];
-        let t14 = t13.sin();
-        let t16 = X[0] * t14;
-        let t18 = t13.cos();
-        let t19 = X[1] * t18;
-        let t20 = t16 + t19;
-        let t21 = t14 * t20;
-        let t24 = X[0] * t18;
-        let t25 = X[1] * t14;
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = self.fixed[1] * t8;
+        let t12 = t11 * X[2];
+        let t13 = t12.sin();
+        let t16 = t12.cos();
+        let t17 = X[0] * t13;
+        let t18 = X[1] * t16;
+        let t19 = t17 + t18;
+        let t21 = t13 * t19;
+        let t24 = X[0] * t16;
+        let t25 = X[1] * t13;
         let t26 = t24 - t25;
-        let t27 = t14 * t26;
-        let t32 = t18 * t20;
+        let t27 = t13 * t26;
+        let t32 = t16 * t19;
         let t33 = t27 + t32;
-        let t40 = t18 * t26;
+        let t40 = t16 * t26;
         let t41 = t21 - t40;
-        let t60 = t14 * t14;
+        let t60 = t13 * t13;
         let t61 = T::nearest(2.0) * t60;
-        let t63 = t18 * t14;
+        let t63 = t16 * t13;
         let t64 = T::nearest(2.0) * t63;
         let t65 = -t64;
-        let t66 = self.parameters.A * t10;
+        let t66 = self.parameters.A * t8;
         let t67 = t66 * t33;
         let t68 = -t67;
         let t69 = t66 * t41;
@@ -358,31 +358,31 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 3, 3> {
-        let t9 = self.fixed[0] * t;
-        let t10 = t9.sin_pi();
-        let t12 = self.fixed[1] * t10;
-        let t13 = t12 * X[2];
-        let t14 = t13.sin();
-        let t16 = X[0] * t14;
-        let t18 = t13.cos();
-        let t19 = X[1] * t18;
-        let t20 = t16 + t19;
-        let t21 = t14 * t20;
-        let t24 = X[0] * t18;
-        let t25 = X[1] * t14;
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = self.fixed[1] * t8;
+        let t12 = t11 * X[2];
+        let t13 = t12.sin();
+        let t16 = t12.cos();
+        let t17 = X[0] * t13;
+        let t18 = X[1] * t16;
+        let t19 = t17 + t18;
+        let t21 = t13 * t19;
+        let t24 = X[0] * t16;
+        let t25 = X[1] * t13;
         let t26 = t24 - t25;
-        let t27 = t14 * t26;
-        let t32 = t18 * t20;
+        let t27 = t13 * t26;
+        let t32 = t16 * t19;
         let t33 = t27 + t32;
-        let t40 = t18 * t26;
+        let t40 = t16 * t26;
         let t41 = t21 - t40;
-        let t60 = t14 * t14;
+        let t60 = t13 * t13;
         let t61 = T::nearest(2.0) * t60;
         let t62 = -t61;
-        let t63 = t18 * t14;
+        let t63 = t16 * t13;
         let t64 = T::nearest(2.0) * t63;
         let t65 = -t64;
-        let t66 = self.parameters.A * t10;
+        let t66 = self.parameters.A * t8;
         let t67 = t66 * t33;
         let t68 = -t67;
         let t69 = t66 * t41;
@@ -392,27 +392,28 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         let t75 = t65 * t64;
         let t76 = t74 - t75;
         let t81 = t68 * t76;
-        let t82 = t81 / t76;
-        let t83 = self.fixed[4] * t82;
-        let t84 = t70 * t76;
-        let t85 = t84 / t76;
-        let t86 = self.fixed[4] * t85;
-        let t87 = t65 * t70;
-        let t88 = t68 * t73;
-        let t89 = t87 - t88;
-        let t90 = t89 / t76;
-        let t91 = self.fixed[4] * t90;
-        let t92 = -t91;
-        let t93 = t70 * t73;
-        let t94 = t68 * t64;
-        let t95 = t93 - t94;
-        let t96 = t95 / t76;
-        let t97 = self.fixed[4] * t96;
+        let t82 = T::one() / t76;
+        let t83 = t81 * t82;
+        let t84 = self.fixed[4] * t83;
+        let t85 = t70 * t76;
+        let t86 = t85 * t82;
+        let t87 = self.fixed[4] * t86;
+        let t88 = t65 * t70;
+        let t89 = t68 * t73;
+        let t90 = t88 - t89;
+        let t91 = t90 * t82;
+        let t92 = self.fixed[4] * t91;
+        let t93 = -t92;
+        let t94 = t70 * t73;
+        let t95 = t68 * t64;
+        let t96 = t94 - t95;
+        let t97 = t96 * t82;
+        let t98 = self.fixed[4] * t97;
         crate::nalgebra::SMatrix::<
             T,
             3,
             3,
-        >::new(T::zero(), T::zero(), t83, T::zero(), T::zero(), t86, t92, t97, T::zero())
+        >::new(T::zero(), T::zero(), t84, T::zero(), T::zero(), t87, t93, t98, T::zero())
     }
     #[inline]
     fn body_force(
@@ -420,77 +421,76 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t9 = self.fixed[0] * t;
-        let t10 = t9.sin_pi();
-        let t12 = self.fixed[1] * t10;
-        let t13 = t12 * X[2];
-        let t14 = t13.sin();
-        let t16 = X[0] * t14;
-        let t18 = t13.cos();
-        let t19 = X[1] * t18;
-        let t20 = t16 + t19;
-        let t21 = t14 * t20;
-        let t24 = X[0] * t18;
-        let t25 = X[1] * t14;
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = self.fixed[1] * t8;
+        let t12 = t11 * X[2];
+        let t13 = t12.sin();
+        let t16 = t12.cos();
+        let t17 = X[0] * t13;
+        let t18 = X[1] * t16;
+        let t19 = t17 + t18;
+        let t21 = t13 * t19;
+        let t24 = X[0] * t16;
+        let t25 = X[1] * t13;
         let t26 = t24 - t25;
-        let t27 = t14 * t26;
-        let t31 = t9.cos_pi();
-        let t32 = t18 * t20;
+        let t27 = t13 * t26;
+        let t31 = t7.cos_pi();
+        let t32 = t16 * t19;
         let t33 = t27 + t32;
-        let t40 = t18 * t26;
+        let t40 = t16 * t26;
         let t41 = t21 - t40;
-        let t45 = t10 * t33;
+        let t45 = t8 * t33;
         let t46 = t31 * t31;
         let t47 = self.parameters.A * t46;
         let t48 = t47 * X[2];
         let t49 = t48 * t41;
         let t50 = t45 + t49;
-        let t56 = t10 * t41;
+        let t56 = t8 * t41;
         let t57 = t48 * t33;
         let t58 = t56 - t57;
-        let t101 = self.fixed[6] * X[2];
-        let t102 = t101 * t50;
-        let t103 = t10 * t10;
-        let t105 = self.fixed[7] * t103;
-        let t106 = t105 * t41;
-        let t107 = t102 - t106;
-        let t108 = self.fixed[5] * t107;
-        let t109 = t101 * t58;
-        let t110 = t105 * t33;
+        let t100 = self.fixed[5] * X[2];
+        let t101 = t100 * t50;
+        let t103 = self.fixed[6] * t8;
+        let t104 = t103 * t56;
+        let t105 = t101 - t104;
+        let t108 = self.fixed[7] * t105;
+        let t109 = t100 * t58;
+        let t110 = t103 * t45;
         let t111 = t109 + t110;
-        let t112 = self.fixed[5] * t111;
+        let t112 = self.fixed[7] * t111;
         crate::nalgebra::SVector::<T, 3>::new(t108, t112, T::zero())
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> crate::Fields<T, 3> {
-        let t9 = self.fixed[0] * t;
-        let t10 = t9.sin_pi();
-        let t12 = self.fixed[1] * t10;
-        let t13 = t12 * X[2];
-        let t14 = t13.sin();
-        let t16 = X[0] * t14;
-        let t18 = t13.cos();
-        let t19 = X[1] * t18;
-        let t20 = t16 + t19;
-        let t21 = t14 * t20;
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = self.fixed[1] * t8;
+        let t12 = t11 * X[2];
+        let t13 = t12.sin();
+        let t16 = t12.cos();
+        let t17 = X[0] * t13;
+        let t18 = X[1] * t16;
+        let t19 = t17 + t18;
+        let t21 = t13 * t19;
         let t22 = T::nearest(2.0) * t21;
         let t23 = -t22;
-        let t24 = X[0] * t18;
-        let t25 = X[1] * t14;
+        let t24 = X[0] * t16;
+        let t25 = X[1] * t13;
         let t26 = t24 - t25;
-        let t27 = t14 * t26;
+        let t27 = t13 * t26;
         let t28 = T::nearest(2.0) * t27;
-        let t31 = t9.cos_pi();
-        let t32 = t18 * t20;
+        let t31 = t7.cos_pi();
+        let t32 = t16 * t19;
         let t33 = t27 + t32;
         let t36 = self.fixed[2] * t31;
         let t37 = t36 * X[2];
         let t38 = t37 * t33;
         let t39 = -t38;
-        let t40 = t18 * t26;
+        let t40 = t16 * t26;
         let t41 = t21 - t40;
         let t42 = t37 * t41;
         let t43 = -t42;
-        let t45 = t10 * t33;
+        let t45 = t8 * t33;
         let t46 = t31 * t31;
         let t47 = self.parameters.A * t46;
         let t48 = t47 * X[2];
@@ -498,17 +498,17 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         let t50 = t45 + t49;
         let t54 = self.fixed[3] * X[2];
         let t55 = t54 * t50;
-        let t56 = t10 * t41;
+        let t56 = t8 * t41;
         let t57 = t48 * t33;
         let t58 = t56 - t57;
         let t59 = t54 * t58;
-        let t60 = t14 * t14;
+        let t60 = t13 * t13;
         let t61 = T::nearest(2.0) * t60;
         let t62 = -t61;
-        let t63 = t18 * t14;
+        let t63 = t16 * t13;
         let t64 = T::nearest(2.0) * t63;
         let t65 = -t64;
-        let t66 = self.parameters.A * t10;
+        let t66 = self.parameters.A * t8;
         let t67 = t66 * t33;
         let t68 = -t67;
         let t69 = t66 * t41;
@@ -519,33 +519,33 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         let t75 = t65 * t64;
         let t76 = t74 - t75;
         let t81 = t68 * t76;
-        let t82 = t81 / t76;
-        let t83 = self.fixed[4] * t82;
-        let t84 = t70 * t76;
-        let t85 = t84 / t76;
-        let t86 = self.fixed[4] * t85;
-        let t87 = t65 * t70;
-        let t88 = t68 * t73;
-        let t89 = t87 - t88;
-        let t90 = t89 / t76;
-        let t91 = self.fixed[4] * t90;
-        let t92 = -t91;
-        let t93 = t70 * t73;
-        let t94 = t68 * t64;
-        let t95 = t93 - t94;
-        let t96 = t95 / t76;
-        let t97 = self.fixed[4] * t96;
-        let t101 = self.fixed[6] * X[2];
-        let t102 = t101 * t50;
-        let t103 = t10 * t10;
-        let t105 = self.fixed[7] * t103;
-        let t106 = t105 * t41;
-        let t107 = t102 - t106;
-        let t108 = self.fixed[5] * t107;
-        let t109 = t101 * t58;
-        let t110 = t105 * t33;
+        let t82 = T::one() / t76;
+        let t83 = t81 * t82;
+        let t84 = self.fixed[4] * t83;
+        let t85 = t70 * t76;
+        let t86 = t85 * t82;
+        let t87 = self.fixed[4] * t86;
+        let t88 = t65 * t70;
+        let t89 = t68 * t73;
+        let t90 = t88 - t89;
+        let t91 = t90 * t82;
+        let t92 = self.fixed[4] * t91;
+        let t93 = -t92;
+        let t94 = t70 * t73;
+        let t95 = t68 * t64;
+        let t96 = t94 - t95;
+        let t97 = t96 * t82;
+        let t98 = self.fixed[4] * t97;
+        let t100 = self.fixed[5] * X[2];
+        let t101 = t100 * t50;
+        let t103 = self.fixed[6] * t8;
+        let t104 = t103 * t56;
+        let t105 = t101 - t104;
+        let t108 = self.fixed[7] * t105;
+        let t109 = t100 * t58;
+        let t110 = t103 * t45;
         let t111 = t109 + t110;
-        let t112 = self.fixed[5] * t111;
+        let t112 = self.fixed[7] * t111;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 3>::new(t23, t28, T::zero()),
             v: crate::nalgebra::SVector::<T, 3>::new(t39, t43, T::zero()),
@@ -568,12 +568,12 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
             >::new(
                 T::zero(),
                 T::zero(),
-                t83,
+                t84,
                 T::zero(),
                 T::zero(),
-                t86,
-                t92,
-                t97,
+                t87,
+                t93,
+                t98,
                 T::zero(),
             ),
             b: crate::nalgebra::SVector::<T, 3>::new(t108, t112, T::zero()),
@@ -587,210 +587,214 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
     ) -> Option<crate::nalgebra::SVector<T, 3>> {
         match surface {
             crate::Surface::Lower(0) => {
-                let t9 = self.fixed[0] * t;
-                let t10 = t9.sin_pi();
-                let t12 = self.fixed[1] * t10;
-                let t13 = t12 * X[2];
-                let t14 = t13.sin();
-                let t18 = t13.cos();
-                let t60 = t14 * t14;
+                let t7 = self.fixed[0] * t;
+                let t8 = t7.sin_pi();
+                let t11 = self.fixed[1] * t8;
+                let t12 = t11 * X[2];
+                let t13 = t12.sin();
+                let t16 = t12.cos();
+                let t60 = t13 * t13;
                 let t61 = T::nearest(2.0) * t60;
                 let t62 = -t61;
-                let t63 = t18 * t14;
+                let t63 = t16 * t13;
                 let t64 = T::nearest(2.0) * t63;
                 let t65 = -t64;
                 let t73 = t62 + T::one();
                 let t74 = t73 * t73;
                 let t75 = t65 * t64;
                 let t76 = t74 - t75;
-                let t120 = T::nearest(2.0) * X[1];
-                let t121 = t120 * t18;
-                let t122 = t14 - t121;
-                let t123 = t14 * t122;
-                let t124 = t120 * t14;
-                let t125 = t18 + t124;
-                let t126 = t18 * t125;
-                let t127 = t123 - t126;
-                let t128 = t12 * t127;
-                let t129 = t65 * t128;
-                let t130 = t14 * t125;
-                let t131 = t18 * t122;
-                let t132 = t130 + t131;
-                let t133 = t12 * t132;
-                let t134 = t73 * t133;
-                let t135 = t129 - t134;
-                let t136 = t135 / t76;
-                let t137 = self.fixed[4] * t136;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t137))
+                let t82 = T::one() / t76;
+                let t128 = T::nearest(2.0) * X[1];
+                let t129 = t128 * t16;
+                let t130 = t13 - t129;
+                let t131 = t128 * t13;
+                let t132 = t16 + t131;
+                let t133 = t13 * t130;
+                let t134 = t16 * t132;
+                let t135 = t133 - t134;
+                let t136 = t11 * t135;
+                let t137 = t13 * t132;
+                let t138 = t16 * t130;
+                let t139 = t137 + t138;
+                let t140 = t11 * t139;
+                let t141 = t65 * t136;
+                let t142 = t73 * t140;
+                let t143 = t141 - t142;
+                let t144 = t143 * t82;
+                let t145 = self.fixed[4] * t144;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t145))
             }
             crate::Surface::Upper(0) => {
-                let t9 = self.fixed[0] * t;
-                let t10 = t9.sin_pi();
-                let t12 = self.fixed[1] * t10;
-                let t13 = t12 * X[2];
-                let t14 = t13.sin();
-                let t18 = t13.cos();
-                let t60 = t14 * t14;
+                let t7 = self.fixed[0] * t;
+                let t8 = t7.sin_pi();
+                let t11 = self.fixed[1] * t8;
+                let t12 = t11 * X[2];
+                let t13 = t12.sin();
+                let t16 = t12.cos();
+                let t60 = t13 * t13;
                 let t61 = T::nearest(2.0) * t60;
                 let t62 = -t61;
-                let t63 = t18 * t14;
+                let t63 = t16 * t13;
                 let t64 = T::nearest(2.0) * t63;
                 let t65 = -t64;
                 let t73 = t62 + T::one();
                 let t74 = t73 * t73;
                 let t75 = t65 * t64;
                 let t76 = t74 - t75;
-                let t120 = T::nearest(2.0) * X[1];
-                let t121 = t120 * t18;
-                let t124 = t120 * t14;
-                let t138 = t14 + t121;
-                let t139 = t14 * t138;
-                let t140 = t18 - t124;
-                let t141 = t18 * t140;
-                let t142 = t139 - t141;
-                let t143 = t12 * t142;
-                let t144 = -t143;
-                let t145 = t65 * t144;
-                let t146 = t14 * t140;
-                let t147 = t18 * t138;
-                let t148 = t146 + t147;
-                let t149 = t12 * t148;
-                let t150 = -t149;
-                let t151 = t73 * t150;
-                let t152 = t145 - t151;
-                let t153 = t152 / t76;
-                let t154 = self.fixed[4] * t153;
-                let t155 = -t154;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t155))
+                let t82 = T::one() / t76;
+                let t128 = T::nearest(2.0) * X[1];
+                let t129 = t128 * t16;
+                let t131 = t128 * t13;
+                let t146 = t13 + t129;
+                let t147 = t16 - t131;
+                let t148 = t13 * t146;
+                let t149 = t16 * t147;
+                let t150 = t148 - t149;
+                let t151 = t11 * t150;
+                let t152 = -t151;
+                let t153 = t13 * t147;
+                let t154 = t16 * t146;
+                let t155 = t153 + t154;
+                let t156 = t11 * t155;
+                let t157 = -t156;
+                let t158 = t65 * t152;
+                let t159 = t73 * t157;
+                let t160 = t158 - t159;
+                let t161 = t160 * t82;
+                let t162 = self.fixed[4] * t161;
+                let t163 = -t162;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t163))
             }
             crate::Surface::Lower(1) => {
-                let t9 = self.fixed[0] * t;
-                let t10 = t9.sin_pi();
-                let t12 = self.fixed[1] * t10;
-                let t13 = t12 * X[2];
-                let t14 = t13.sin();
-                let t18 = t13.cos();
-                let t60 = t14 * t14;
+                let t7 = self.fixed[0] * t;
+                let t8 = t7.sin_pi();
+                let t11 = self.fixed[1] * t8;
+                let t12 = t11 * X[2];
+                let t13 = t12.sin();
+                let t16 = t12.cos();
+                let t60 = t13 * t13;
                 let t61 = T::nearest(2.0) * t60;
                 let t62 = -t61;
-                let t63 = t18 * t14;
+                let t63 = t16 * t13;
                 let t64 = T::nearest(2.0) * t63;
                 let t65 = -t64;
                 let t73 = t62 + T::one();
                 let t74 = t73 * t73;
                 let t75 = t65 * t64;
                 let t76 = t74 - t75;
-                let t156 = T::nearest(2.0) * X[0];
-                let t157 = t156 * t14;
-                let t158 = t18 - t157;
-                let t159 = t14 * t158;
-                let t160 = t156 * t18;
-                let t161 = t14 + t160;
-                let t162 = t18 * t161;
-                let t163 = t159 + t162;
-                let t164 = t12 * t163;
-                let t165 = t73 * t164;
-                let t166 = t14 * t161;
-                let t167 = t18 * t158;
-                let t168 = t166 - t167;
-                let t169 = t12 * t168;
-                let t170 = -t169;
-                let t171 = t64 * t170;
-                let t172 = t165 - t171;
-                let t173 = t172 / t76;
-                let t174 = self.fixed[4] * t173;
-                let t175 = -t174;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t175))
+                let t82 = T::one() / t76;
+                let t164 = T::nearest(2.0) * X[0];
+                let t165 = t164 * t13;
+                let t166 = t16 - t165;
+                let t167 = t164 * t16;
+                let t168 = t13 + t167;
+                let t169 = t13 * t166;
+                let t170 = t16 * t168;
+                let t171 = t169 + t170;
+                let t172 = t11 * t171;
+                let t173 = t13 * t168;
+                let t174 = t16 * t166;
+                let t175 = t173 - t174;
+                let t176 = t11 * t175;
+                let t177 = -t176;
+                let t178 = t73 * t172;
+                let t179 = t64 * t177;
+                let t180 = t178 - t179;
+                let t181 = t180 * t82;
+                let t182 = self.fixed[4] * t181;
+                let t183 = -t182;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t183))
             }
             crate::Surface::Upper(1) => {
-                let t9 = self.fixed[0] * t;
-                let t10 = t9.sin_pi();
-                let t12 = self.fixed[1] * t10;
-                let t13 = t12 * X[2];
-                let t14 = t13.sin();
-                let t18 = t13.cos();
-                let t60 = t14 * t14;
+                let t7 = self.fixed[0] * t;
+                let t8 = t7.sin_pi();
+                let t11 = self.fixed[1] * t8;
+                let t12 = t11 * X[2];
+                let t13 = t12.sin();
+                let t16 = t12.cos();
+                let t60 = t13 * t13;
                 let t61 = T::nearest(2.0) * t60;
                 let t62 = -t61;
-                let t63 = t18 * t14;
+                let t63 = t16 * t13;
                 let t64 = T::nearest(2.0) * t63;
                 let t65 = -t64;
                 let t73 = t62 + T::one();
                 let t74 = t73 * t73;
                 let t75 = t65 * t64;
                 let t76 = t74 - t75;
-                let t156 = T::nearest(2.0) * X[0];
-                let t157 = t156 * t14;
-                let t160 = t156 * t18;
-                let t176 = t18 + t157;
-                let t177 = t14 * t176;
-                let t178 = t14 - t160;
-                let t179 = t18 * t178;
-                let t180 = t177 + t179;
-                let t181 = t12 * t180;
-                let t182 = -t181;
-                let t183 = t73 * t182;
-                let t184 = t14 * t178;
-                let t185 = t18 * t176;
-                let t186 = t184 - t185;
-                let t187 = t12 * t186;
-                let t188 = t64 * t187;
-                let t189 = t183 - t188;
-                let t190 = t189 / t76;
-                let t191 = self.fixed[4] * t190;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t191))
+                let t82 = T::one() / t76;
+                let t164 = T::nearest(2.0) * X[0];
+                let t165 = t164 * t13;
+                let t167 = t164 * t16;
+                let t184 = t16 + t165;
+                let t185 = t13 - t167;
+                let t186 = t13 * t184;
+                let t187 = t16 * t185;
+                let t188 = t186 + t187;
+                let t189 = t11 * t188;
+                let t190 = -t189;
+                let t191 = t13 * t185;
+                let t192 = t16 * t184;
+                let t193 = t191 - t192;
+                let t194 = t11 * t193;
+                let t195 = t73 * t190;
+                let t196 = t64 * t194;
+                let t197 = t195 - t196;
+                let t198 = t197 * t82;
+                let t199 = self.fixed[4] * t198;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t199))
             }
             crate::Surface::Lower(2) => {
-                let t9 = self.fixed[0] * t;
-                let t10 = t9.sin_pi();
-                let t66 = self.parameters.A * t10;
-                let t192 = t66 * X[1];
-                let t193 = -t192;
-                let t194 = self.fixed[4] * t193;
-                let t195 = -t194;
-                let t197 = self.fixed[11] * t10;
-                let t198 = t197 * X[0];
-                let t199 = -t198;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t195, t199, T::zero()))
+                let t7 = self.fixed[0] * t;
+                let t8 = t7.sin_pi();
+                let t66 = self.parameters.A * t8;
+                let t200 = t66 * X[1];
+                let t201 = -t200;
+                let t202 = self.fixed[4] * t201;
+                let t203 = -t202;
+                let t205 = self.fixed[11] * t8;
+                let t206 = t205 * X[0];
+                let t207 = -t206;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t203, t207, T::zero()))
             }
             crate::Surface::Upper(2) => {
-                let t9 = self.fixed[0] * t;
-                let t10 = t9.sin_pi();
-                let t12 = self.fixed[1] * t10;
-                let t66 = self.parameters.A * t10;
-                let t200 = t12.sin();
-                let t201 = t12.cos();
-                let t202 = t201 * X[0];
-                let t203 = t200 * X[1];
-                let t204 = t202 - t203;
-                let t205 = t200 * t204;
-                let t206 = t200 * X[0];
-                let t207 = t201 * X[1];
-                let t208 = t206 + t207;
-                let t209 = t201 * t208;
-                let t210 = t205 + t209;
-                let t211 = t66 * t210;
-                let t212 = -t211;
-                let t213 = t200 * t200;
-                let t214 = T::nearest(2.0) * t213;
-                let t215 = -t214;
-                let t216 = t215 + T::one();
-                let t217 = t216 * t216;
-                let t218 = t200 * t201;
-                let t219 = T::nearest(2.0) * t218;
+                let t7 = self.fixed[0] * t;
+                let t8 = t7.sin_pi();
+                let t11 = self.fixed[1] * t8;
+                let t66 = self.parameters.A * t8;
+                let t208 = t11.sin();
+                let t209 = t11.cos();
+                let t210 = t209 * X[0];
+                let t211 = t208 * X[1];
+                let t212 = t210 - t211;
+                let t213 = t208 * X[0];
+                let t214 = t209 * X[1];
+                let t215 = t213 + t214;
+                let t216 = t208 * t212;
+                let t217 = t209 * t215;
+                let t218 = t216 + t217;
+                let t219 = t66 * t218;
                 let t220 = -t219;
-                let t221 = t220 * t219;
-                let t222 = t217 - t221;
-                let t223 = t222 / t222;
-                let t224 = self.fixed[4] * t223;
-                let t225 = t224 * t212;
-                let t226 = t200 * t208;
-                let t227 = t201 * t204;
-                let t228 = t226 - t227;
-                let t229 = t66 * t228;
-                let t230 = -t229;
-                let t231 = t224 * t230;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t225, t231, T::zero()))
+                let t221 = t208 * t208;
+                let t222 = T::nearest(2.0) * t221;
+                let t223 = -t222;
+                let t224 = t223 + T::one();
+                let t225 = t208 * t209;
+                let t226 = T::nearest(2.0) * t225;
+                let t227 = -t226;
+                let t228 = t224 * t224;
+                let t229 = t227 * t226;
+                let t230 = t228 - t229;
+                let t231 = t230 / t230;
+                let t232 = self.fixed[4] * t231;
+                let t233 = t232 * t220;
+                let t234 = t208 * t215;
+                let t235 = t209 * t212;
+                let t236 = t234 - t235;
+                let t237 = t66 * t236;
+                let t238 = -t237;
+                let t239 = t232 * t238;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t233, t239, T::zero()))
             }
             _ => None,
         }
@@ -866,20 +870,20 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
 impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 4> for Torsion<T> {
     #[inline]
     fn body_force_time(&self, t: T) -> [T; 4] {
-        let t9 = self.fixed[0] * t;
-        let t10 = t9.sin_pi();
-        let t12 = self.fixed[1] * t10;
-        let t31 = t9.cos_pi();
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = self.fixed[1] * t8;
+        let t31 = t7.cos_pi();
         let t46 = t31 * t31;
         let t47 = self.parameters.A * t46;
-        let t103 = t10 * t10;
-        let t105 = self.fixed[7] * t103;
-        [t10, t12, t47, t105]
+        let t113 = t8 * t8;
+        let t114 = self.fixed[6] * t113;
+        [t8, t11, t47, t114]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 4] {
-        let t101 = self.fixed[6] * X[2];
-        [X[2], X[0], X[1], t101]
+        let t100 = self.fixed[5] * X[2];
+        [X[2], X[0], X[1], t100]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -887,20 +891,20 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 4> for Torsion<T> {
         time: &[T; 4],
         point: &[T; 4],
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t13 = time[1] * point[0];
-        let t14 = t13.sin();
-        let t16 = point[1] * t14;
-        let t18 = t13.cos();
-        let t19 = point[2] * t18;
-        let t20 = t16 + t19;
-        let t21 = t14 * t20;
-        let t24 = point[1] * t18;
-        let t25 = point[2] * t14;
+        let t12 = time[1] * point[0];
+        let t13 = t12.sin();
+        let t16 = t12.cos();
+        let t17 = point[1] * t13;
+        let t18 = point[2] * t16;
+        let t19 = t17 + t18;
+        let t21 = t13 * t19;
+        let t24 = point[1] * t16;
+        let t25 = point[2] * t13;
         let t26 = t24 - t25;
-        let t27 = t14 * t26;
-        let t32 = t18 * t20;
+        let t27 = t13 * t26;
+        let t32 = t16 * t19;
         let t33 = t27 + t32;
-        let t40 = t18 * t26;
+        let t40 = t16 * t26;
         let t41 = t21 - t40;
         let t45 = time[0] * t33;
         let t48 = time[2] * point[0];
@@ -909,15 +913,15 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 4> for Torsion<T> {
         let t56 = time[0] * t41;
         let t57 = t48 * t33;
         let t58 = t56 - t57;
-        let t102 = point[3] * t50;
-        let t106 = time[3] * t41;
-        let t107 = t102 - t106;
-        let t108 = self.fixed[5] * t107;
+        let t101 = point[3] * t50;
         let t109 = point[3] * t58;
-        let t110 = time[3] * t33;
-        let t111 = t109 + t110;
-        let t112 = self.fixed[5] * t111;
-        crate::nalgebra::SVector::<T, 3>::new(t108, t112, T::zero())
+        let t115 = time[3] * t41;
+        let t116 = t101 - t115;
+        let t117 = self.fixed[7] * t116;
+        let t118 = time[3] * t33;
+        let t119 = t109 + t118;
+        let t120 = self.fixed[7] * t119;
+        crate::nalgebra::SVector::<T, 3>::new(t117, t120, T::zero())
     }
 }
 impl<T: crate::Real> From<Torsion<T>> for crate::AnySolution<T> {

@@ -1,0 +1,176 @@
+//! One reciprocal for several quotients of the same denominator.
+//!
+//! A processor starts a product every half cycle but a quotient only every four or more. Where a program divides more
+//! than once by one quantity or by powers of it, as polar fields divide by `R`, `R^2` and `R^3`, one reciprocal is
+//! formed, and the quotients become products with its powers. Each such product carries one rounding more than the
+//! quotient had, the same for small and for large values.
+
+use crate::{Dependence, Operation, Program, Rational, Slot};
+use num_integer::Integer;
+use num_traits::One;
+use std::collections::{BTreeMap, HashMap};
+
+/// A quantity and the power of it that some slot holds.
+type Power = (Slot, u32);
+
+/// Of what the reciprocal is formed.
+#[derive(Clone, Copy)]
+enum Unit {
+    /// Of the power of the quantity that a slot holds: the greatest of which all denominators are powers, where it is
+    /// at hand.
+    Slot(Slot, u32),
+    /// Of the square of the quantity, which is a square root.
+    Root,
+}
+
+impl Program {
+    /// The program with shared reciprocals, and without operations that no output needs.
+    pub(crate) fn with_shared_reciprocals(&self) -> Program {
+        let shared = self.shared_divisors();
+        if shared.is_empty() {
+            return self.compacted();
+        }
+        let powers = self.powers();
+        let mut builder = Builder::default();
+        let mut places: Vec<Option<Slot>> = vec![None; self.operations().len()];
+        for slot in self.slots() {
+            let operation = &self.operations()[slot.index()];
+            let quotient = self.divisor(slot, &powers);
+            let quotient = quotient.and_then(|(base, n)| Some((base, n, *shared.get(&base)?)));
+            let place = |slot: Slot| places[slot.index()].unwrap_or(slot);
+            let moved = match (quotient, operation) {
+                (Some((base, n, unit)), &Operation::Div(numerator, _)) => {
+                    let rate = self.dependence(base);
+                    let factor = match (unit, &self.operations()[base.index()]) {
+                        (Unit::Slot(divisor, power), _) => {
+                            let reciprocal = builder.reciprocal(place(divisor), rate);
+                            builder.power(reciprocal, n / power, rate)
+                        }
+                        // R/R^2 is ready sooner than 1/R, as the quotient need not wait for the root.
+                        (Unit::Root, &Operation::Sqrt(square)) => {
+                            let square = place(square);
+                            let reciprocal = builder.reciprocal(square, rate);
+                            let even = builder.power(reciprocal, n / 2, rate);
+                            if n.is_multiple_of(2) {
+                                even
+                            } else {
+                                let root = builder.push(Operation::Sqrt(square), rate);
+                                let odd = builder.push(Operation::Mul(root, reciprocal), rate);
+                                if n == 1 {
+                                    odd
+                                } else {
+                                    builder.push(Operation::Mul(even, odd), rate)
+                                }
+                            }
+                        }
+                        (Unit::Root, _) => builder.reciprocal(place(base), rate),
+                    };
+                    if self.operations()[numerator.index()] == Operation::Number(Rational::one()) {
+                        factor
+                    } else {
+                        let rate = self.dependence(slot);
+                        builder.push(Operation::Mul(place(numerator), factor), rate)
+                    }
+                }
+                _ => builder.push(operation.with_operands(place), self.dependence(slot)),
+            };
+            places[slot.index()] = Some(moved);
+        }
+        let outputs = self.outputs().iter().filter_map(|slot| places[slot.index()]).collect();
+        Program::from_parts(builder.operations, builder.dependence, outputs).compacted()
+    }
+
+    /// The quantities that several needed quotients divide by powers of, with the reciprocal to form.
+    fn shared_divisors(&self) -> BTreeMap<Slot, Unit> {
+        let powers = self.powers();
+        let needed = self.needed(self.outputs());
+        let mut quotients: BTreeMap<Slot, Vec<(Slot, u32)>> = BTreeMap::new();
+        for slot in self.slots().filter(|slot| needed[slot.index()]) {
+            if let Some((base, power)) = self.divisor(slot, &powers) {
+                quotients.entry(base).or_default().push((slot, power));
+            }
+        }
+        quotients.retain(|_, quotients| quotients.len() > 1);
+        let unit_of = |(base, quotients): (Slot, Vec<(Slot, u32)>)| {
+            if matches!(self.operations()[base.index()], Operation::Sqrt(_)) {
+                return (base, Unit::Root);
+            }
+            let unit = quotients.iter().fold(0, |unit: u32, (_, power)| unit.gcd(power));
+            let first = quotients[0].0;
+            let at_hand =
+                powers.iter().find(|(slot, power)| **power == (base, unit) && **slot < first);
+            (base, at_hand.map_or(Unit::Slot(base, 1), |(&slot, _)| Unit::Slot(slot, unit)))
+        };
+        quotients.into_iter().map(unit_of).collect()
+    }
+
+    /// The base and the power that the quotient in `slot` divides by; `None` where it is no quotient, or where its
+    /// denominator depends on parameters only.
+    fn divisor(&self, slot: Slot, powers: &BTreeMap<Slot, Power>) -> Option<Power> {
+        let Operation::Div(_, denominator) = self.operations()[slot.index()] else { return None };
+        if self.dependence(denominator).is_fixed() {
+            return None;
+        }
+        Some(powers.get(&denominator).copied().unwrap_or((denominator, 1)))
+    }
+
+    /// The slots that hold a power of another slot's value: `a^2`, `a^3`, ..., and `a` itself where `a` is the square
+    /// root of a slot.
+    fn powers(&self) -> BTreeMap<Slot, Power> {
+        let mut powers: BTreeMap<Slot, Power> = BTreeMap::new();
+        for slot in self.slots() {
+            if let Operation::Sqrt(square) = self.operations()[slot.index()] {
+                powers.insert(square, (slot, 2));
+                powers.insert(slot, (slot, 1));
+            }
+        }
+        for slot in self.slots() {
+            let Operation::Mul(a, b) = self.operations()[slot.index()] else { continue };
+            let power = |slot: Slot| powers.get(&slot).copied().unwrap_or((slot, 1));
+            let ((a, m), (b, n)) = (power(a), power(b));
+            if a == b && !powers.contains_key(&slot) {
+                powers.insert(slot, (a, m + n));
+            }
+        }
+        powers
+    }
+}
+
+/// A program in the making.
+#[derive(Default)]
+struct Builder {
+    operations: Vec<Operation>,
+    dependence: Vec<Dependence>,
+    known: HashMap<Operation, Slot>,
+}
+
+impl Builder {
+    fn push(&mut self, operation: Operation, dependence: Dependence) -> Slot {
+        if let Some(&slot) = self.known.get(&operation) {
+            return slot;
+        }
+        let slot = Slot::at(self.operations.len());
+        self.operations.push(operation.clone());
+        self.dependence.push(dependence);
+        self.known.insert(operation, slot);
+        slot
+    }
+
+    fn reciprocal(&mut self, slot: Slot, rate: Dependence) -> Slot {
+        let one = self.push(Operation::Number(Rational::one()), Dependence::default());
+        self.push(Operation::Div(one, slot), rate)
+    }
+
+    fn power(&mut self, base: Slot, exponent: u32, rate: Dependence) -> Slot {
+        if exponent <= 1 {
+            return base;
+        }
+        let half = self.power(base, exponent / 2, rate);
+        let square = self.push(Operation::Mul(half, half), rate);
+        if exponent.is_multiple_of(2) {
+            square
+        } else {
+            self.push(Operation::Mul(square, base), rate)
+        }
+    }
+}

@@ -1,0 +1,368 @@
+//! The worst factor of the acceptance rule, by field and class of inputs.
+
+use crate::{
+    Class, Oracle, OracleError, Point, Sampler, Sensitivity, exact, scientific, worst_factor,
+};
+use mmsmith_expr::{Expr, Program, Rational, arrange};
+use mmsmith_spec::{Fields, Spec};
+use rayon::prelude::*;
+use thiserror::Error;
+
+/// The factor `K` that every field of every solution keeps.
+pub const LARGEST_FACTOR: f64 = 8.0;
+
+/// Digits that the truth has at a place that is reported or doubtful.
+const DIGITS: usize = 40;
+/// The precision of the first look at a point.
+const QUICK_BITS: usize = 192;
+/// From this factor on the first look is not believed.
+const DOUBTFUL_FACTOR: f64 = 3.0;
+
+/// Where so many draws in a row find nothing that suits, a class is given up.
+const FIRST_DRAWS: u64 = 8;
+
+/// The fields that are judged: each with its letter and its entries, row by row.
+pub type Judged = Vec<(&'static str, Vec<f64>)>;
+
+/// Why accuracy could not be measured.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum AccuracyError {
+    /// The oracle has no value at a point.
+    #[error("there is no exact value at {place}: {error}")]
+    Oracle {
+        /// The inputs.
+        place: String,
+        /// The reason.
+        error: OracleError,
+    },
+    /// The code under test gave no fields, or other ones.
+    #[error("the fields could not be evaluated at {place}: {reason}")]
+    Evaluation {
+        /// The inputs.
+        place: String,
+        /// The reason.
+        reason: String,
+    },
+}
+
+/// The worst factor of one field in one class.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Worst {
+    /// The letter of the field, `b staged` for the staged body force.
+    pub field: &'static str,
+    /// The entry, row by row from 0.
+    pub entry: usize,
+    /// The factor `K`; infinite where the result is not finite.
+    pub factor: f64,
+    /// The inputs: position, time, parameters.
+    pub inputs: Vec<f64>,
+    /// What the code gave.
+    pub result: f64,
+    /// The exact value, to 20 digits.
+    pub exact: String,
+    /// The sum of `|q dy/dq|` over the inputs, to 4 digits.
+    pub sensitivity: String,
+}
+
+/// The accuracy of all fields in one class.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ClassAccuracy {
+    /// The class.
+    pub class: Class,
+    /// The points that were judged.
+    pub points: usize,
+    /// Why there are none, or fewer than were asked for.
+    pub remark: Option<&'static str>,
+    /// The worst of each field.
+    pub worst: Vec<Worst>,
+}
+
+/// Judges code against exact values.
+///
+/// The truth at a point comes from one evaluation in some 60 digits, and sensitivities from double precision, which is
+/// enough for two digits of `K`. Wherever `K` comes out above 3, and at the worst point of each field, both are computed
+/// anew in arbitrary precision, the truth until 40 digits stand still.
+pub struct Accuracy<'a> {
+    fields: Fields,
+    sampler: Sampler<'a>,
+    spec: &'a Spec,
+    /// Letter and expressions of each field.
+    expressions: Vec<(&'static str, Vec<Expr>)>,
+    /// All expressions, field after field.
+    flat: Vec<Expr>,
+    inputs: Vec<Expr>,
+    sensitivity: Sensitivity,
+    quick_sensitivity: Program,
+    /// How many products [`Sensitivity`] has for each expression.
+    products: Vec<usize>,
+}
+
+/// One entry at one point.
+struct Finding {
+    field: usize,
+    entry: usize,
+    factor: f64,
+}
+
+impl<'a> Accuracy<'a> {
+    /// Prepares the judgement of `spec`, whose fields are `fields`.
+    #[must_use]
+    pub fn new(spec: &'a Spec, mut fields: Fields) -> Self {
+        let expressions = by_letter(&fields);
+        let flat: Vec<Expr> = expressions.iter().flat_map(|(_, e)| e.clone()).collect();
+        let inputs: Vec<Expr> = fields.inputs.iter().map(|(e, _)| *e).collect();
+        let sampler = Sampler::new(spec, &mut fields);
+        let sensitivity = Sensitivity::new(&fields.graph, &fields.definitions, &inputs, &flat);
+        let (quick_sensitivity, products) = sensitivity.in_doubles(&inputs);
+        Accuracy {
+            fields,
+            sampler,
+            spec,
+            expressions,
+            flat,
+            inputs,
+            sensitivity,
+            quick_sensitivity,
+            products,
+        }
+    }
+
+    /// The programs that evaluate the specification without generated code, in the form that [`Accuracy::measure`]
+    /// judges.
+    #[must_use]
+    pub fn programs(&self) -> Vec<(&'static str, Program)> {
+        let mut fields = self.fields.clone();
+        let mut programs: Vec<_> = self
+            .expressions
+            .iter()
+            .map(|(letter, expressions)| (*letter, fields.program(expressions)))
+            .collect();
+        let staged = arrange(&mut fields.graph, &fields.inputs, &fields.definitions, &fields.b);
+        programs.retain(|(letter, _)| *letter != "b staged");
+        programs.push(("b staged", fields.program(&staged)));
+        programs
+    }
+
+    /// Judges `points` points of `class`; `judged` gives the fields at inputs, and `step` is called after each point.
+    ///
+    /// The result does not depend on the number of threads.
+    ///
+    /// # Errors
+    ///
+    /// [`AccuracyError`] at the first point, by number, where `judged` or the oracle fails.
+    pub fn measure(
+        &self,
+        class: Class,
+        points: usize,
+        judged: &(dyn Fn(&[f64]) -> Result<Judged, String> + Sync),
+        step: &(dyn Fn() + Sync),
+    ) -> Result<ClassAccuracy, AccuracyError> {
+        let none =
+            |remark| ClassAccuracy { class, points: 0, remark: Some(remark), worst: Vec::new() };
+        if let Some(remark) = self.sampler.not_applicable(class) {
+            return Ok(none(remark));
+        }
+        if (0..FIRST_DRAWS).into_par_iter().all(|index| self.sampler.draw(class, index).is_none()) {
+            return Ok(none(match class {
+                Class::NearInversion => {
+                    "the bounds of the parameters keep the smallest stretch above 1e-2"
+                }
+                _ => "the body would be inverted there",
+            }));
+        }
+        let found: Vec<Result<Option<Vec<Finding>>, AccuracyError>> = (0..points as u64)
+            .into_par_iter()
+            .map_init(
+                || Oracle::new(QUICK_BITS),
+                |oracle, index| {
+                    let Some(inputs) = self.sampler.draw(class, index) else { return Ok(None) };
+                    let oracle = oracle.as_mut().map_err(|e| self.no_value(&inputs, e.clone()))?;
+                    let findings = self.look(oracle, &inputs, judged);
+                    step();
+                    match findings {
+                        // Outside of the body a function such as exp may leave every range.
+                        Err(AccuracyError::Oracle { error: OracleError::Range { .. }, .. })
+                            if class == Class::Far =>
+                        {
+                            Ok(None)
+                        }
+                        findings => findings.map(Some),
+                    }
+                },
+            )
+            .collect();
+        let mut worst: Vec<Option<(u64, Finding)>> =
+            self.expressions.iter().map(|_| None).collect();
+        let mut count = 0;
+        for (index, findings) in found.into_iter().enumerate() {
+            let Some(findings) = findings? else { continue };
+            count += 1;
+            for finding in findings {
+                let known = &mut worst[finding.field];
+                if known.as_ref().is_none_or(|(_, known)| finding.factor > known.factor) {
+                    *known = Some((index as u64, finding));
+                }
+            }
+        }
+        let remark = (count < points).then_some("draws that do not suit were left out");
+        let mut confirmed = Vec::new();
+        for (index, finding) in worst.into_iter().flatten() {
+            let inputs = self.sampler.draw(class, index).unwrap_or_default();
+            confirmed.push(self.confirm(&inputs, &finding, judged)?);
+        }
+        Ok(ClassAccuracy { class, points: count, remark, worst: confirmed })
+    }
+
+    /// The worst entry of each field at one point.
+    fn look(
+        &self,
+        oracle: &mut Oracle,
+        inputs: &[f64],
+        judged: &(dyn Fn(&[f64]) -> Result<Judged, String> + Sync),
+    ) -> Result<Vec<Finding>, AccuracyError> {
+        let results = self.results(inputs, judged)?;
+        let values = self.exact_inputs(inputs);
+        let point = self.point(&values);
+        let truth =
+            oracle.evaluate(&point, &self.flat).map_err(|error| self.no_value(inputs, error))?;
+        let terms = self.quick_sensitivity.evaluate(inputs);
+        let mut terms = terms.iter();
+        let mut truth = truth.iter();
+        let mut products = self.products.iter();
+        let mut findings = Vec::new();
+        for (field, results) in results.iter().enumerate() {
+            let mut worst = Finding { field, entry: 0, factor: -1.0 };
+            for (entry, &result) in results.iter().enumerate() {
+                let (Some(truth), Some(&count)) = (truth.next(), products.next()) else { break };
+                let sens: f64 = terms.by_ref().take(count).map(|term| term.abs()).sum();
+                let quick = exact(sens).map(|sens| worst_factor(result, truth, &sens));
+                let factor = match quick {
+                    Some(factor) if factor < DOUBTFUL_FACTOR => factor,
+                    _ => self.settled(inputs, field, entry, result)?.0,
+                };
+                if factor > worst.factor {
+                    worst = Finding { field, entry, factor };
+                }
+            }
+            findings.push(worst);
+        }
+        Ok(findings)
+    }
+
+    /// The factor of one entry, its exact value and its sensitivity, in arbitrary precision.
+    fn settled(
+        &self,
+        inputs: &[f64],
+        field: usize,
+        entry: usize,
+        result: f64,
+    ) -> Result<(f64, Rational, Rational), AccuracyError> {
+        let values = self.exact_inputs(inputs);
+        let place: usize =
+            self.expressions[..field].iter().map(|(_, e)| e.len()).sum::<usize>() + entry;
+        let settle = || -> Result<(Rational, Rational), OracleError> {
+            let truth = Oracle::new(Oracle::USUAL_BITS)?.settle(
+                &self.point(&values),
+                &self.flat[place..=place],
+                DIGITS,
+            )?;
+            let sens = self.sensitivity.evaluate_one(&mut Oracle::new(128)?, &values, place)?;
+            Ok((truth.into_iter().next().unwrap_or_default(), sens))
+        };
+        let (truth, sens) = settle().map_err(|error| self.no_value(inputs, error))?;
+        Ok((worst_factor(result, &truth, &sens), truth, sens))
+    }
+
+    fn confirm(
+        &self,
+        inputs: &[f64],
+        finding: &Finding,
+        judged: &(dyn Fn(&[f64]) -> Result<Judged, String> + Sync),
+    ) -> Result<Worst, AccuracyError> {
+        let result = self.results(inputs, judged)?[finding.field][finding.entry];
+        let (factor, truth, sens) = self.settled(inputs, finding.field, finding.entry, result)?;
+        Ok(Worst {
+            field: self.expressions[finding.field].0,
+            entry: finding.entry,
+            factor,
+            inputs: inputs.to_vec(),
+            result,
+            exact: scientific(&truth, 20),
+            sensitivity: scientific(&sens, 4),
+        })
+    }
+
+    /// What the code under test gives, in the order of the fields and of the size that they have.
+    fn results(
+        &self,
+        inputs: &[f64],
+        judged: &(dyn Fn(&[f64]) -> Result<Judged, String> + Sync),
+    ) -> Result<Vec<Vec<f64>>, AccuracyError> {
+        let fail = |reason: String| AccuracyError::Evaluation { place: self.place(inputs), reason };
+        let given = judged(inputs).map_err(fail)?;
+        self.expressions
+            .iter()
+            .map(|(letter, expressions)| {
+                given
+                    .iter()
+                    .find(|(known, entries)| known == letter && entries.len() == expressions.len())
+                    .map(|(_, entries)| entries.clone())
+                    .ok_or_else(|| {
+                        fail(format!("there is no field {letter} of {} entries", expressions.len()))
+                    })
+            })
+            .collect()
+    }
+
+    fn exact_inputs(&self, inputs: &[f64]) -> Vec<(Expr, Rational)> {
+        let values = inputs.iter().map(|&x| exact(x).unwrap_or_default());
+        self.inputs.iter().copied().zip(values).collect()
+    }
+
+    fn point<'b>(&'b self, values: &'b [(Expr, Rational)]) -> Point<'b> {
+        Point { graph: &self.fields.graph, definitions: &self.fields.definitions, values }
+    }
+
+    fn no_value(&self, inputs: &[f64], error: OracleError) -> AccuracyError {
+        AccuracyError::Oracle { place: self.place(inputs), error }
+    }
+
+    /// The inputs with their names.
+    #[must_use]
+    pub fn place(&self, inputs: &[f64]) -> String {
+        let named: Vec<String> = self
+            .inputs
+            .iter()
+            .zip(inputs)
+            .map(|(e, x)| format!("{} = {x:?}", self.fields.graph.symbol_name(*e).unwrap_or("?")))
+            .collect();
+        named.join(", ")
+    }
+
+    /// The names of the inputs: coordinates, time, parameters.
+    #[must_use]
+    pub fn input_names(&self) -> Vec<&str> {
+        let name = |e: &Expr| self.fields.graph.symbol_name(*e).unwrap_or("?");
+        self.inputs.iter().map(name).collect()
+    }
+
+    /// The solution's number of coordinates.
+    #[must_use]
+    pub fn dimension(&self) -> usize {
+        self.spec.dimension
+    }
+}
+
+fn by_letter(fields: &Fields) -> Vec<(&'static str, Vec<Expr>)> {
+    vec![
+        ("u", fields.u.clone()),
+        ("v", fields.v.clone()),
+        ("a", fields.a.clone()),
+        ("H", fields.H.concat()),
+        ("F", fields.F.concat()),
+        ("J", vec![fields.J]),
+        ("P", fields.P.concat()),
+        ("b", fields.b.clone()),
+        ("b staged", fields.b.clone()),
+    ]
+}
