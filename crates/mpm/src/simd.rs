@@ -6,13 +6,13 @@
 use pulp::{Arch, Simd, WithSimd};
 
 /// A loop that is worth vector instructions. `run` and whatever it calls has to be `#[inline(always)]`.
-pub(crate) trait Kernel {
+pub(crate) trait Loop {
     fn run(self);
 }
 
-struct Instance<K>(K);
+struct Instance<L>(L);
 
-impl<K: Kernel> WithSimd for Instance<K> {
+impl<L: Loop> WithSimd for Instance<L> {
     type Output = ();
 
     #[inline(always)]
@@ -23,6 +23,6 @@ impl<K: Kernel> WithSimd for Instance<K> {
 
 /// Runs the widest instance that this processor supports.
 #[inline(never)]
-pub(crate) fn dispatch(kernel: impl Kernel) {
-    Arch::new().dispatch(Instance(kernel));
+pub(crate) fn dispatch(work: impl Loop) {
+    Arch::new().dispatch(Instance(work));
 }

@@ -6,11 +6,12 @@ use nalgebra::{RealField, SMatrix, SVector};
 use rayon::prelude::*;
 
 use crate::bands::Bands;
-use crate::block::{BLOCK, Block, Tensors};
+use crate::block::{BLOCK, Block};
 use crate::body_force::BodyForce;
 use crate::grid::{Grid, Layout};
 use crate::material::Law;
 use crate::particles::Particles;
+use crate::simd::{Loop, dispatch};
 use crate::tensor::{determinant, product, real};
 use crate::transfer::{Deposit, Gathered, Node};
 use crate::weights::{HALF_SIZE_LIMIT, Rule, WIDE, first_layer, is_wide};
@@ -53,7 +54,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
 
     /// Position in cells, from the lower corner.
     #[inline(always)]
-    fn in_cells(&self, x: &SVector<T, D>) -> [T; D] {
+    pub(crate) fn in_cells(&self, x: &SVector<T, D>) -> [T; D] {
         array::from_fn(|a| (x[a] - self.lower[a]) * self.inverse_spacing)
     }
 
@@ -96,23 +97,8 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
         well & (edge >= real(first)) & (edge < real(end))
     }
 
-    /// Fills a block with the weights of particles.
-    fn weigh<'a, R, const W: usize>(
-        &self,
-        block: &mut Block<T, D, W>,
-        rule: R,
-        particles: impl Iterator<Item = (&'a SVector<T, D>, &'a SMatrix<T, D, D>)>,
-    ) where
-        R: Rule<T, D, W>,
-    {
-        for (k, (x, F)) in particles.take(BLOCK).enumerate() {
-            block.place(k, &self.in_cells(x), F);
-        }
-        block.weigh(rule);
-    }
-
-    /// Adds to the piece of the grid that starts at node `first` what `give(ids, deposits)` states for each block of
-    /// particles.
+    /// Adds to the piece of the grid that starts at node `first` what `level(ids, deposits)` and then
+    /// `slope(block, ids, deposits)` state for each block of particles.
     #[expect(clippy::too_many_arguments, reason = "the arrays of a band's particles")]
     fn scatter<R, const W: usize>(
         &self,
@@ -122,38 +108,19 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
         piece: &mut [Node<T, D>],
         first: usize,
         ids: &[u32],
-        mut give: impl FnMut(&[u32], &mut [Deposit<T, D>; BLOCK]),
+        level: impl Fn(&[u32], &mut [Deposit<T, D>; BLOCK]),
+        slope: impl Fn(&mut Block<T, D, W>, &[u32], &mut [Deposit<T, D>; BLOCK]),
     ) where
         R: Rule<T, D, W>,
     {
         let mut block = Block::new();
         let mut deposits = [Deposit::zero(); BLOCK];
         for ids in ids.chunks(BLOCK) {
-            self.weigh(&mut block, rule, ids.iter().map(|&p| (&x[p as usize], &F[p as usize])));
-            give(ids, &mut deposits);
+            block.pick(self, ids, x, F);
+            level(ids, &mut deposits);
+            block.weigh(rule);
+            slope(&mut block, ids, &mut deposits);
             block.scatter(&self.strides, piece, first, &deposits[..ids.len()]);
-        }
-    }
-
-    /// The part of the deposits that comes from the stress.
-    fn force<L: Law<T>>(
-        &self,
-        tensors: &mut Tensors<T, D>,
-        law: L,
-        F: &[SMatrix<T, D, D>],
-        volume: &[T],
-        ids: &[u32],
-        deposits: &mut [Deposit<T, D>; BLOCK],
-    ) {
-        for (k, &p) in ids.iter().enumerate() {
-            tensors.set(k, &F[p as usize]);
-        }
-        tensors.stress(law);
-        for (k, (deposit, &p)) in deposits.iter_mut().zip(ids).enumerate() {
-            let traction = tensors.get(k) * -(volume[p as usize] * self.inverse_spacing);
-            for a in 0..D {
-                deposit.slope[a].set_acceleration(&traction.column(a).into_owned());
-            }
         }
     }
 
@@ -249,14 +216,9 @@ where
 {
     let State { particles, constants, nodes, bands, .. } = s;
     let (nodes, c) = (&nodes[..], *constants);
-    let outcome = advance(particles, bands, c, rule, |block, _, x, v, F| {
-        let gathered = &mut [Gathered::zero(); BLOCK][..x.len()];
+    let outcome = advance(particles, bands, c, rule, |block, gathered, _, x, v, F| {
         block.gather(&c.strides, nodes, gathered);
-        for (((x, v), F), gathered) in x.iter_mut().zip(v).zip(F).zip(gathered) {
-            *v += gathered.acceleration() * c.time_step;
-            *x += gathered.velocity() * c.time_step;
-            *F = c.stretch(&gathered.velocity_gradient(), F);
-        }
+        dispatch(Follow { c: &c, gathered, x, v, F });
     });
     s.resort_if(outcome, rule)
 }
@@ -295,7 +257,7 @@ where
             let mut block = Block::new();
             let blocks = v.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK));
             for ((v, x), F) in blocks {
-                c.weigh(&mut block, rule, x.iter().zip(F));
+                block.weigh_run(rule, &c, x, F);
                 let gathered = &mut [Gathered::zero(); BLOCK][..x.len()];
                 block.gather(&c.strides, nodes, gathered);
                 for (v, gathered) in v.iter_mut().zip(gathered) {
@@ -315,7 +277,7 @@ where
         reprojected,
         |node| *node = Node::zero(),
         |piece, first, ids| {
-            c.scatter(rule, x, F, piece, first, ids, give);
+            c.scatter(rule, x, F, piece, first, ids, give, |_, _, _| {});
         },
     );
     layout.fold(reprojected, |image, ghost, flip| image.add(&ghost.flipped(flip)));
@@ -328,8 +290,7 @@ where
     layout.on_walls(reprojected, Node::clear);
     layout.unfold(reprojected, Node::flipped);
     let reprojected = &reprojected[..];
-    let outcome = advance(particles, bands, c, rule, |block, _, x, _, F| {
-        let gathered = &mut [Gathered::zero(); BLOCK][..x.len()];
+    let outcome = advance(particles, bands, c, rule, |block, gathered, _, x, _, F| {
         block.gather(&c.strides, nodes, gathered);
         for (x, gathered) in x.iter_mut().zip(&*gathered) {
             *x += gathered.velocity() * c.time_step;
@@ -376,8 +337,7 @@ where
 {
     let State { particles, constants, nodes, bands, F_next, .. } = s;
     let (nodes, c) = (&nodes[..], *constants);
-    let outcome = advance(particles, bands, c, rule, |block, first, x, v, F| {
-        let gathered = &mut [Gathered::zero(); BLOCK][..x.len()];
+    let outcome = advance(particles, bands, c, rule, |block, gathered, first, x, v, F| {
         block.gather(&c.strides, nodes, gathered);
         for ((x, v), gathered) in x.iter_mut().zip(v).zip(gathered) {
             *v += gathered.acceleration() * c.time_step;
@@ -388,7 +348,7 @@ where
     s.resort_if(outcome, rule)
 }
 
-/// Calls `update(weights, first id, x, v, F)` for every block of particles, then looks whether each is well and still
+/// Calls `update(weights, room for what is gathered, first id, x, v, F)` for every block of particles, then looks whether each is well and still
 /// fits its band.
 fn advance<T, R, const D: usize, const W: usize>(
     particles: &mut Particles<T, D>,
@@ -397,6 +357,7 @@ fn advance<T, R, const D: usize, const W: usize>(
     rule: R,
     update: impl Fn(
         &Block<T, D, W>,
+        &mut [Gathered<T, D>],
         usize,
         &mut [SVector<T, D>],
         &mut [SVector<T, D>],
@@ -418,6 +379,7 @@ where
         .map(|(chunk, (((x, v), F), home))| {
             let mut outcome = Outcome::default();
             let mut block = Block::new();
+            let mut gathered = [Gathered::zero(); BLOCK];
             let blocks = x
                 .chunks_mut(BLOCK)
                 .zip(v.chunks_mut(BLOCK))
@@ -425,8 +387,13 @@ where
                 .zip(home.chunks(BLOCK));
             for (index, (((x, v), F), home)) in blocks.enumerate() {
                 let first = chunk * CHUNK + index * BLOCK;
-                c.weigh(&mut block, rule, x.iter().zip(&*F));
-                update(&block, first, x, v, F);
+                block.weigh_run(rule, &c, x, F);
+                update(&block, &mut gathered[..x.len()], first, x, v, F);
+                let mut all_well = true;
+                dispatch(Check { c: &c, rule, home, x, F, all_well: &mut all_well });
+                if all_well {
+                    continue;
+                }
                 for (k, ((x, F), &home)) in x.iter().zip(F).zip(home).enumerate() {
                     if !c.is_well(rule, home, x, F) {
                         let failure = trouble(&rule, &c, x, F).map(|trouble| (trouble, first + k));
@@ -531,15 +498,12 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
             nodes,
             |node| *node = Node::zero(),
             |piece, first, ids| {
-                let mut tensors = Tensors::new();
-                c.scatter(rule, x, F, piece, first, ids, |ids, deposits| {
-                    c.force(&mut tensors, law, F, volume, ids, deposits);
-                    for (deposit, &p) in deposits.iter_mut().zip(ids) {
-                        let p = p as usize;
-                        let m = mass[p];
-                        let weight = b.map_or(SVector::zeros(), |b| b[p] * m);
-                        deposit.level = Node::new(&(v[p] * m), &weight, m);
-                    }
+                let level = |ids: &[u32], deposits: &mut [Deposit<T, D>; BLOCK]| {
+                    dispatch(GiveLevel { ids, v: Some(v), b, mass, deposits });
+                };
+                c.scatter(rule, x, F, piece, first, ids, level, |block, ids, deposits| {
+                    block.stress(law);
+                    dispatch(GiveSlope { c: &c, block, ids, volume, deposits });
                 });
             },
         );
@@ -589,7 +553,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
             nodes,
             |node| *node = Node::zero(),
             |piece, first, ids| {
-                c.scatter(rule, x, F, piece, first, ids, give);
+                c.scatter(rule, x, F, piece, first, ids, give, |_, _, _| {});
             },
         );
         layout.fold(nodes, |image, ghost, flip| image.add(&ghost.flipped(flip)));
@@ -619,7 +583,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
                 let mut block = Block::new();
                 let blocks = F_next.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK));
                 for (index, ((F_next, x), F)) in blocks.enumerate() {
-                    c.weigh(&mut block, rule, x.iter().zip(F));
+                    block.weigh_run(rule, &c, x, F);
                     let gathered = &mut [Gathered::zero(); BLOCK][..x.len()];
                     block.gather(&c.strides, nodes, gathered);
                     let first = chunk * CHUNK + index * BLOCK;
@@ -650,13 +614,13 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let (c, F_next) = (*constants, &F_next[..]);
         let b = (!no_body_force).then_some(&b[..]);
         bands.scatter(layout, nodes, Node::clear_acceleration, |piece, first, ids| {
-            let mut tensors = Tensors::new();
-            c.scatter(rule, x, F, piece, first, ids, |ids, deposits| {
-                c.force(&mut tensors, law, F_next, volume, ids, deposits);
-                for (deposit, &p) in deposits.iter_mut().zip(ids) {
-                    let weight = b.map_or(SVector::zeros(), |b| b[p as usize] * mass[p as usize]);
-                    deposit.level = Node::new(&SVector::zeros(), &weight, T::zero());
-                }
+            let level = |ids: &[u32], deposits: &mut [Deposit<T, D>; BLOCK]| {
+                dispatch(GiveLevel { ids, v: None, b, mass, deposits });
+            };
+            c.scatter(rule, x, F, piece, first, ids, level, |block, ids, deposits| {
+                block.pick_F(&c, ids, F_next);
+                block.stress(law);
+                dispatch(GiveSlope { c: &c, block, ids, volume, deposits });
             });
         });
         layout.fold(nodes, |image, ghost, flip| image.add_acceleration(&ghost.flipped(flip)));
@@ -675,5 +639,98 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
             }
         });
         self.apply_walls();
+    }
+}
+
+/// States what the body force and, if `v` is there, mass and momentum of particles give to the grid.
+struct GiveLevel<'a, T, const D: usize> {
+    ids: &'a [u32],
+    v: Option<&'a [SVector<T, D>]>,
+    b: Option<&'a [SVector<T, D>]>,
+    mass: &'a [T],
+    deposits: &'a mut [Deposit<T, D>; BLOCK],
+}
+
+impl<T: RealField + Copy, const D: usize> Loop for GiveLevel<'_, T, D> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { ids, v, b, mass, deposits } = self;
+        for (deposit, &p) in deposits.iter_mut().zip(ids) {
+            let p = p as usize;
+            let m = mass[p];
+            let weight = b.map_or(SVector::zeros(), |b| b[p] * m);
+            deposit.level = v.map_or(Node::new(&SVector::zeros(), &weight, T::zero()), |v| {
+                Node::new(&(v[p] * m), &weight, m)
+            });
+        }
+    }
+}
+
+/// States what the stress of particles gives to the grid.
+struct GiveSlope<'a, T, const D: usize, const W: usize> {
+    c: &'a Constants<T, D>,
+    block: &'a Block<T, D, W>,
+    ids: &'a [u32],
+    volume: &'a [T],
+    deposits: &'a mut [Deposit<T, D>; BLOCK],
+}
+
+impl<T: RealField + Copy, const D: usize, const W: usize> Loop for GiveSlope<'_, T, D, W> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { c, block, ids, volume, deposits } = self;
+        for (k, (deposit, &p)) in deposits.iter_mut().zip(ids).enumerate() {
+            let traction = block.tensor(k) * -(volume[p as usize] * c.inverse_spacing);
+            for a in 0..D {
+                deposit.slope[a].set_acceleration(&traction.column(a).into_owned());
+            }
+        }
+    }
+}
+
+/// Moves and stretches particles as the grid tells.
+struct Follow<'a, T, const D: usize> {
+    c: &'a Constants<T, D>,
+    gathered: &'a [Gathered<T, D>],
+    x: &'a mut [SVector<T, D>],
+    v: &'a mut [SVector<T, D>],
+    F: &'a mut [SMatrix<T, D, D>],
+}
+
+impl<T: RealField + Copy, const D: usize> Loop for Follow<'_, T, D> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { c, gathered, x, v, F } = self;
+        for (((x, v), F), gathered) in x.iter_mut().zip(v).zip(F).zip(gathered) {
+            *v += gathered.acceleration() * c.time_step;
+            *x += gathered.velocity() * c.time_step;
+            *F = c.stretch(&gathered.velocity_gradient(), F);
+        }
+    }
+}
+
+/// Looks whether all of a run of particles are [well](Constants::is_well).
+struct Check<'a, T, R, const D: usize, const W: usize> {
+    c: &'a Constants<T, D>,
+    rule: R,
+    home: &'a [u32],
+    x: &'a [SVector<T, D>],
+    F: &'a [SMatrix<T, D, D>],
+    all_well: &'a mut bool,
+}
+
+impl<T, R, const D: usize, const W: usize> Loop for Check<'_, T, R, D, W>
+where
+    T: RealField + Copy,
+    R: Rule<T, D, W>,
+{
+    #[inline(always)]
+    fn run(self) {
+        let Self { c, rule, home, x, F, all_well } = self;
+        let mut well = true;
+        for ((x, F), &home) in x.iter().zip(F).zip(home) {
+            well &= c.is_well(rule, home, x, F);
+        }
+        *all_well = well;
     }
 }

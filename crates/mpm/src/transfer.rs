@@ -245,8 +245,9 @@ pub(crate) fn gather<T: RealField + Copy, const D: usize, const W: usize>(
         for (i, node) in nodes.iter().enumerate() {
             let (S, G) = (weights.S(0, i), weights.G(0, i));
             for q in 0..LANES {
-                row_level[q] += node.values[q] * S;
-                row_slope[q] += node.values[q] * G;
+                let (level, slope) = (node.values[q] * S, node.values[q] * G);
+                row_level[q] = if i == 0 { level } else { row_level[q] + level };
+                row_slope[q] = if i == 0 { slope } else { row_slope[q] + slope };
             }
         }
         for q in 0..LANES {
