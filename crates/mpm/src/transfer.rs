@@ -231,6 +231,8 @@ pub(crate) fn gather<T: RealField + Copy, const D: usize, const W: usize>(
     nodes: &[Node<T, D>],
     gathered: &mut Gathered<T, D>,
 ) {
+    // In one and two dimensions velocity and acceleration are half of a node's values.
+    let used = if D <= 2 { LANES / 2 } else { LANES };
     let mut level = [T::zero(); LANES];
     let mut slope = [[T::zero(); LANES]; D];
     let start = first_node(weights, strides);
@@ -244,13 +246,13 @@ pub(crate) fn gather<T: RealField + Copy, const D: usize, const W: usize>(
         let mut row_slope = [T::zero(); LANES];
         for (i, node) in nodes.iter().enumerate() {
             let (S, G) = (weights.S(0, i), weights.G(0, i));
-            for q in 0..LANES {
+            for q in 0..used {
                 let (level, slope) = (node.values[q] * S, node.values[q] * G);
                 row_level[q] = if i == 0 { level } else { row_level[q] + level };
                 row_slope[q] = if i == 0 { slope } else { row_slope[q] + slope };
             }
         }
-        for q in 0..LANES {
+        for q in 0..used {
             level[q] += row_level[q] * row.S;
             slope[0][q] += row_slope[q] * row.S;
             for a in 1..D {
@@ -258,8 +260,12 @@ pub(crate) fn gather<T: RealField + Copy, const D: usize, const W: usize>(
             }
         }
     }
-    gathered.level.values = level;
+    for q in 0..used {
+        gathered.level.values[q] = level[q];
+    }
     for a in 0..D {
-        gathered.slope[a].values = slope[a];
+        for q in 0..used {
+            gathered.slope[a].values[q] = slope[a][q];
+        }
     }
 }
