@@ -21,7 +21,8 @@ MMSMITH_FN double mmsmith_log_1p(double x)
     }
     /* With k = 0 x itself has digits that the sum has lost. */
     f = k == 0 ? x : m - 1.0;
-    correction = k == 0 ? 0.0 : lost / sum;
+    /* lost / sum, which two digits of 1/m are enough for. */
+    correction = k == 0 || k > 1022 ? 0.0 : lost * ldexp(1.0, -k) * (1.0 - f + f * f);
     s = f / (2.0 + f);
     z = s * s;
     w = z * z;

@@ -260,12 +260,8 @@ pub(crate) fn gather<T: RealField + Copy, const D: usize, const W: usize>(
             }
         }
     }
-    for q in 0..used {
-        gathered.level.values[q] = level[q];
-    }
+    gathered.level.values[..used].copy_from_slice(&level[..used]);
     for a in 0..D {
-        for q in 0..used {
-            gathered.slope[a].values[q] = slope[a][q];
-        }
+        gathered.slope[a].values[..used].copy_from_slice(&slope[a][..used]);
     }
 }

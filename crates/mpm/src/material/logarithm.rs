@@ -23,21 +23,25 @@ pub(super) fn log_of_ratio(growth: f64, ratio: f64) -> f64 {
     let (u, lost) = if near_zero { (ratio, 0.0) } else { (sum, lost) };
     // u = 2^k m with m between sqrt(1/2) and sqrt(2).
     let bits = u.to_bits().wrapping_add(ONE - ROOT_HALF);
-    let k = f64::from_bits((bits >> 52) | WHOLE) - (4_503_599_627_370_496.0 + 1023.0);
+    let exponent = bits >> 52;
+    let k = f64::from_bits(exponent | WHOLE) - (4_503_599_627_370_496.0 + 1023.0);
+    // 2^-k, or zero where that has no normal number.
+    let scale = f64::from_bits(2046_u64.wrapping_sub(exponent) << 52);
     let m = f64::from_bits((bits & MANTISSA).wrapping_add(ROOT_HALF));
     // With k = 0 growth itself has digits that the sum has lost.
     let exact = k == 0.0 && !near_zero;
     let f = if exact { growth } else { m - 1.0 };
-    let correction = if exact { 0.0 } else { lost / u };
+    // lost / u, which two digits of 1/m are enough for.
+    let correction = if exact { 0.0 } else { lost * scale * (1.0 - f + f * f) };
     let s = f / (2.0 + f);
     let z = s * s;
     let w = z * z;
     let even = w
-        * (3.999_999_999_940_941_9e-1
+        * (3.999_999_999_940_942e-1
             + w * (2.222_219_843_214_978_4e-1 + w * 1.531_383_769_920_937_3e-1));
     let odd = z
-        * (6.666_666_666_666_735_1e-1
-            + w * (2.857_142_874_366_239_1e-1
+        * (6.666_666_666_666_735e-1
+            + w * (2.857_142_874_366_239e-1
                 + w * (1.818_357_216_161_805e-1 + w * 1.479_819_860_511_658_6e-1)));
     let half_square = 0.5 * f * f;
     let tail = s * (half_square + (even + odd)) + (k * LN2_LOW + correction);
