@@ -189,13 +189,14 @@ fn log_1p(x: f64) -> f64 {
     let bits = sum.to_bits().wrapping_add(ONE - ROOT_HALF);
     let exponent = bits >> 52;
     let k = f64::from_bits(exponent | WHOLE) - (4_503_599_627_370_496.0 + 1023.0);
-    // 2^-k, or zero where that has no normal number.
+    // 2^-k, for k up to 1022.
     let scale = f64::from_bits(2046_u64.wrapping_sub(exponent) << 52);
     let m = f64::from_bits((bits & MANTISSA).wrapping_add(ROOT_HALF));
     // With k = 0 x itself has digits that the sum has lost.
     let f = if k == 0.0 { x } else { m - 1.0 };
     // lost / sum, which two digits of 1/m are enough for.
-    let correction = if k == 0.0 { 0.0 } else { lost * scale * (1.0 - f + f * f) };
+    let corrected = k != 0.0 && k <= 1022.0;
+    let correction = if corrected { lost * scale * (1.0 - f + f * f) } else { 0.0 };
     let s = f / (2.0 + f);
     let z = s * s;
     let w = z * z;
