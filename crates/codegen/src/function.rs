@@ -115,7 +115,7 @@ fn rust_name(function: Function) -> &'static str {
         Function::Tanh => "tanh",
         Function::Exp => "exp",
         Function::Ln => "ln",
-        Function::Ln1p => "ln_1p",
+        Function::Ln1p => "log_1p",
         Function::Expm1 => "exp_m1",
         Function::Atan2 => "atan2",
         Function::LogRatioSquared => "log_ratio_squared",

@@ -10,6 +10,9 @@ use mmsmith_spec::{Boundary, Condition, Material, Parameter, Surface};
 /// What every header needs: macros, and `sin(pi x)` as the crate of the solutions computes it.
 const SUPPORT: &str = include_str!("support.h");
 
+/// The logarithm of one plus a small number, as the crate of the solutions computes it.
+const LOG_1P: &str = include_str!("log_1p.h");
+
 /// What laws need that have the logarithm of the stretch.
 const LOG_RATIO: &str = include_str!("log_ratio.h");
 
@@ -214,6 +217,9 @@ impl Header<'_> {
         self.line("#include <math.h>");
         self.line("#include <stddef.h>\n");
         self.text += SUPPORT;
+        if self.plan.calls(|function| function == Function::Ln1p) {
+            self.text += LOG_1P;
+        }
         if self.plan.calls(is_log_ratio) {
             self.text += LOG_RATIO;
         }
@@ -791,7 +797,7 @@ fn c_name(function: Function) -> &'static str {
         Function::Tanh => "tanh",
         Function::Exp => "exp",
         Function::Ln => "log",
-        Function::Ln1p => "log1p",
+        Function::Ln1p => "mmsmith_log_1p",
         Function::Expm1 => "expm1",
         Function::Atan2 => "atan2",
         Function::LogRatioSquared => "mmsmith_log_ratio_squared",

@@ -10,7 +10,7 @@
 
 use rayon::prelude::*;
 
-use crate::grid::{BAND_ROWS, Layout};
+use crate::grid::{BAND_ROWS, Layout, PAD_BELOW};
 
 /// Rows that a particle may be lower than the band it was sorted into before everything is sorted anew.
 const SLACK: usize = 2;
@@ -51,11 +51,13 @@ impl Bands {
         }
     }
 
-    /// Whether a particle whose stencil has `width` rows from `row` on may stay in its band.
+    /// Where the lower edge of a particle's box may be along the last axis, in cells from the lower corner of the grid,
+    /// for the particle to stay in its band: from the first value on and below the second, if its stencil has `width`
+    /// rows.
     #[inline(always)]
-    pub(crate) fn fits(home: u32, height: usize, row: usize, width: usize) -> bool {
-        let first = home as usize * height;
-        first <= row && row + width <= first + 2 * height
+    pub(crate) fn range(home: u32, height: usize, width: usize) -> (f64, f64) {
+        let first = f64::from(home) * height as f64 - PAD_BELOW as f64;
+        (first, first + (2 * height + 1 - width) as f64)
     }
 
     /// Rows in a band.
@@ -101,14 +103,14 @@ impl Bands {
         }
     }
 
-    /// Clears all nodes to `zero` and lets every particle add to them: `add(piece, first, particle)` with the piece of
-    /// the node array that its band may write to and the index of that piece's first node.
+    /// Calls `clear` on all nodes and lets every band add to them: `add(piece, first, particles)` with the piece of the
+    /// node array that it may write to, the index of that piece's first node, and its particles in order.
     pub(crate) fn scatter<N, const D: usize>(
         &self,
         layout: &Layout<D>,
         nodes: &mut [N],
         clear: impl Fn(&mut N) + Sync,
-        add: impl Fn(&mut [N], usize, usize) + Sync,
+        add: impl Fn(&mut [N], usize, &[u32]) + Sync,
     ) where
         N: Send,
     {
@@ -118,9 +120,7 @@ impl Bands {
             else {
                 return;
             };
-            for &p in &self.order[start..end] {
-                add(piece, band * band_nodes, p as usize);
-            }
+            add(piece, band * band_nodes, &self.order[start..end]);
         };
         nodes.par_chunks_mut(2 * band_nodes).enumerate().for_each(|(pair, piece)| {
             piece.iter_mut().for_each(&clear);

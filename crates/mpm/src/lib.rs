@@ -50,11 +50,13 @@
 //! Runs are reproducible bit for bit, whatever the number of threads in the `rayon` pool around the calls.
 
 mod bands;
+mod block;
 mod body_force;
 mod error;
 mod grid;
 mod material;
 mod particles;
+mod simd;
 mod simulation;
 mod step;
 mod tensor;

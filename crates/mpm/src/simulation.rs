@@ -242,7 +242,7 @@ fn allocate<T: RealField + Copy, const D: usize>(
 ) -> Result<State<T, D>, SetupError> {
     let usf = settings.integrator == Integrator::Usf;
     let musl = settings.integrator == Integrator::Musl;
-    let reprojected_bytes = if musl { size_of::<SVector<T, D>>() } else { 0 };
+    let reprojected_bytes = if musl { size_of::<Node<T, D>>() } else { 0 };
     let bytes_per_node = size_of::<Node<T, D>>() + Bands::BYTES_PER_NODE + reprojected_bytes;
     let layout = Layout::new(grid, bytes_per_node)?;
     // Asking first turns a grid that is too large into an error instead of an abort.
@@ -259,7 +259,7 @@ fn allocate<T: RealField + Copy, const D: usize>(
         nodes,
         b: Vec::new(),
         F_next: if usf { vec![SMatrix::identity(); particles.len()] } else { Vec::new() },
-        reprojected: vec![SVector::zeros(); if musl { layout.nodes } else { 0 }],
+        reprojected: vec![Node::zero(); if musl { layout.nodes } else { 0 }],
         particles,
         layout,
         bands,

@@ -1,16 +1,20 @@
 //! One time step: the kernels, one instance for every combination of dimension, weights, integrator and law.
 
+use std::array;
+
 use nalgebra::{RealField, SMatrix, SVector};
 use rayon::prelude::*;
 
 use crate::bands::Bands;
+use crate::block::{BLOCK, Block};
 use crate::body_force::BodyForce;
 use crate::grid::{Grid, Layout};
 use crate::material::Law;
 use crate::particles::Particles;
+use crate::simd::{Loop, dispatch};
 use crate::tensor::{determinant, product, real};
-use crate::transfer::Node;
-use crate::weights::{HALF_SIZE_LIMIT, Rule, WIDE, first_layer, wide_stencil};
+use crate::transfer::{Deposit, Gathered, Node};
+use crate::weights::{HALF_SIZE_LIMIT, Rule, WIDE, first_layer, is_wide};
 
 /// Particles handed to a thread at a time; fixed, so that nothing depends on the number of threads.
 const CHUNK: usize = 1024;
@@ -50,14 +54,74 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
 
     /// Position in cells, from the lower corner.
     #[inline(always)]
-    fn in_cells(&self, x: &SVector<T, D>) -> SVector<T, D> {
-        (x - self.lower) * self.inverse_spacing
+    pub(crate) fn in_cells(&self, x: &SVector<T, D>) -> [T; D] {
+        array::from_fn(|a| (x[a] - self.lower[a]) * self.inverse_spacing)
     }
 
     /// `(I + dt L) F`, for `L` per cell.
     #[inline(always)]
     fn stretch(&self, L: &SMatrix<T, D, D>, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         F + product(&(L * (self.time_step * self.inverse_spacing)), F)
+    }
+
+    /// The reciprocal of a node's mass, or zero for a node that no particle reaches.
+    #[inline(always)]
+    fn inverse_mass(&self, node: &Node<T, D>) -> T {
+        if node.mass() > self.least_mass { node.mass().recip() } else { T::zero() }
+    }
+
+    /// Whether a particle is a deformed body within the grid that may stay in its band; nearly all are, and it takes one
+    /// branch to know.
+    #[inline(always)]
+    fn is_well<R, const W: usize>(
+        &self,
+        rule: R,
+        home: u32,
+        x: &SVector<T, D>,
+        F: &SMatrix<T, D, D>,
+    ) -> bool
+    where
+        R: Rule<T, D, W>,
+    {
+        let l: [T; D] = array::from_fn(|a| rule.half_size(a, F[(a, a)]));
+        let mut well = determinant(F) > T::zero();
+        let mut wide = false;
+        for a in 0..D {
+            well &=
+                (x[a] >= self.lower[a]) & (x[a] <= self.upper[a]) & (l[a] <= real(HALF_SIZE_LIMIT));
+            wide |= is_wide(l[a]);
+        }
+        let edge = (x[D - 1] - self.lower[D - 1]) * self.inverse_spacing - l[D - 1];
+        let width = if wide { WIDE } else { W };
+        let (first, end) = Bands::range(home, self.band_height, width);
+        well & (edge >= real(first)) & (edge < real(end))
+    }
+
+    /// Adds to the piece of the grid that starts at node `first` what `level(ids, deposits)` and then
+    /// `slope(block, ids, deposits)` state for each block of particles.
+    #[expect(clippy::too_many_arguments, reason = "the arrays of a band's particles")]
+    fn scatter<R, const W: usize>(
+        &self,
+        rule: R,
+        x: &[SVector<T, D>],
+        F: &[SMatrix<T, D, D>],
+        piece: &mut [Node<T, D>],
+        first: usize,
+        ids: &[u32],
+        level: impl Fn(&[u32], &mut [Deposit<T, D>; BLOCK]),
+        slope: impl Fn(&mut Block<T, D, W>, &[u32], &mut [Deposit<T, D>; BLOCK]),
+    ) where
+        R: Rule<T, D, W>,
+    {
+        let mut block = Block::new();
+        let mut deposits = [Deposit::zero(); BLOCK];
+        for ids in ids.chunks(BLOCK) {
+            block.pick(self, ids, x, F);
+            level(ids, &mut deposits);
+            block.weigh(rule);
+            slope(&mut block, ids, &mut deposits);
+            block.scatter(&self.strides, piece, first, &deposits[..ids.len()]);
+        }
     }
 
     /// Edge of a cell.
@@ -117,26 +181,12 @@ pub(crate) struct State<T, const D: usize> {
     /// USF: F at the end of the step, while the weights still need F at its start.
     pub(crate) F_next: Vec<SMatrix<T, D, D>>,
     /// MUSL: velocities projected from the updated particles, one per node.
-    pub(crate) reprojected: Vec<SVector<T, D>>,
+    pub(crate) reprojected: Vec<Node<T, D>>,
 }
 
 /// A kernel: takes the state, the body force, the time at the start of the step and a factor on all accelerations.
 pub(crate) type Kernel<T, const D: usize> =
     Box<dyn Fn(&mut State<T, D>, &dyn BodyForce<T, D>, T, T) -> Outcome + Send + Sync>;
-
-/// Evaluates `$body` with `$stencil` bound to the weights of a particle, whichever their number.
-macro_rules! with_stencil {
-    ($rule:expr, $constants:expr, $x:expr, $F:expr, |$stencil:ident| $body:expr) => {{
-        let (xi, l) = ($constants.in_cells($x), $rule.half_size($F));
-        if $rule.is_wide(&l) {
-            let $stencil = wide_stencil(&xi, &l);
-            $body
-        } else {
-            let $stencil = $rule.stencil(&xi, &l);
-            $body
-        }
-    }};
-}
 
 /// USL, and with it centred differences: stress from `F^n`, F updated with the end-of-step grid velocity.
 pub(crate) fn step_usl<T, R, L, const D: usize, const W: usize>(
@@ -166,13 +216,9 @@ where
 {
     let State { particles, constants, nodes, bands, .. } = s;
     let (nodes, c) = (&nodes[..], *constants);
-    let outcome = advance(particles, bands, c, rule, |_, x, v, F| {
-        let (velocity, L, a) = with_stencil!(rule, c, x, F, |stencil| {
-            stencil.gather(&c.strides, nodes, |n| (n.velocity, n.acceleration))
-        });
-        *v += a * c.time_step;
-        *x += velocity * c.time_step;
-        *F = c.stretch(&L, F);
+    let outcome = advance(particles, bands, c, rule, |block, gathered, _, x, v, F| {
+        block.gather(&c.strides, nodes, gathered);
+        dispatch(Follow { c: &c, gathered, x, v, F });
     });
     s.resort_if(outcome, rule)
 }
@@ -208,45 +254,51 @@ where
     let Particles { x, v, F, mass, .. } = particles;
     v.par_chunks_mut(CHUNK).zip(x.par_chunks(CHUNK)).zip(F.par_chunks(CHUNK)).for_each(
         |((v, x), F)| {
-            for ((v, x), F) in v.iter_mut().zip(x).zip(F) {
-                let (_, _, a) = with_stencil!(rule, c, x, F, |stencil| {
-                    stencil.gather(&c.strides, nodes, |n| (SVector::zeros(), n.acceleration))
-                });
-                *v += a * c.time_step;
+            let mut block = Block::new();
+            let blocks = v.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK));
+            for ((v, x), F) in blocks {
+                block.weigh_run(rule, &c, x, F);
+                let gathered = &mut [Gathered::zero(); BLOCK][..x.len()];
+                block.gather(&c.strides, nodes, gathered);
+                for (v, gathered) in v.iter_mut().zip(gathered) {
+                    *v += gathered.acceleration() * c.time_step;
+                }
             }
         },
     );
-    let add = |piece: &mut [SVector<T, D>], first: usize, p: usize| {
-        let momentum = v[p] * mass[p];
-        with_stencil!(rule, c, &x[p], &F[p], |stencil| {
-            stencil.scatter(
-                &c.strides,
-                piece,
-                first,
-                |S, _| momentum * S,
-                |node, S, _, along| *node += along * S,
-            )
-        });
+    let give = |ids: &[u32], deposits: &mut [Deposit<T, D>; BLOCK]| {
+        for (deposit, &p) in deposits.iter_mut().zip(ids) {
+            let p = p as usize;
+            deposit.level = Node::new(&(v[p] * mass[p]), &SVector::zeros(), T::zero());
+        }
     };
-    bands.scatter(layout, reprojected, |node| *node = SVector::zeros(), add);
-    layout.fold(reprojected, |image, ghost, flip| *image += flipped(ghost, flip));
-    reprojected.par_chunks_mut(CHUNK).zip(nodes.par_chunks(CHUNK)).for_each(|(v, nodes)| {
-        for (v, node) in v.iter_mut().zip(nodes) {
-            *v *= if node.mass > c.least_mass { node.mass.recip() } else { T::zero() };
+    bands.scatter(
+        layout,
+        reprojected,
+        |node| *node = Node::zero(),
+        |piece, first, ids| {
+            c.scatter(rule, x, F, piece, first, ids, give, |_, _, _| {});
+        },
+    );
+    layout.fold(reprojected, |image, ghost, flip| image.add(&ghost.flipped(flip)));
+    reprojected.par_chunks_mut(CHUNK).zip(nodes.par_chunks(CHUNK)).for_each(|(new, nodes)| {
+        for (new, node) in new.iter_mut().zip(nodes) {
+            let inverse = c.inverse_mass(node);
+            new.values.iter_mut().for_each(|value| *value *= inverse);
         }
     });
-    layout.on_walls(reprojected, |v, axis| v[axis] = T::zero());
-    layout.unfold(reprojected, flipped);
+    layout.on_walls(reprojected, Node::clear);
+    layout.unfold(reprojected, Node::flipped);
     let reprojected = &reprojected[..];
-    let outcome = advance(particles, bands, c, rule, |_, x, _, F| {
-        let (velocity, L) = with_stencil!(rule, c, x, F, |stencil| {
-            let (velocity, ..) =
-                stencil.gather(&c.strides, nodes, |n| (n.velocity, SVector::zeros()));
-            let (_, L, _) = stencil.gather(&c.strides, reprojected, |&v| (v, SVector::zeros()));
-            (velocity, L)
-        });
-        *x += velocity * c.time_step;
-        *F = c.stretch(&L, F);
+    let outcome = advance(particles, bands, c, rule, |block, gathered, _, x, _, F| {
+        block.gather(&c.strides, nodes, gathered);
+        for (x, gathered) in x.iter_mut().zip(&*gathered) {
+            *x += gathered.velocity() * c.time_step;
+        }
+        block.gather(&c.strides, reprojected, gathered);
+        for (F, gathered) in F.iter_mut().zip(gathered) {
+            *F = c.stretch(&gathered.velocity_gradient(), F);
+        }
     });
     s.resort_if(outcome, rule)
 }
@@ -285,36 +337,32 @@ where
 {
     let State { particles, constants, nodes, bands, F_next, .. } = s;
     let (nodes, c) = (&nodes[..], *constants);
-    let outcome = advance(particles, bands, c, rule, |p, x, v, F| {
-        let (velocity, _, a) = with_stencil!(rule, c, x, F, |stencil| {
-            stencil.gather(&c.strides, nodes, |n| (n.velocity, n.acceleration))
-        });
-        *v += a * c.time_step;
-        *x += velocity * c.time_step;
-        *F = F_next[p];
+    let outcome = advance(particles, bands, c, rule, |block, gathered, first, x, v, F| {
+        block.gather(&c.strides, nodes, gathered);
+        for ((x, v), gathered) in x.iter_mut().zip(v).zip(gathered) {
+            *v += gathered.acceleration() * c.time_step;
+            *x += gathered.velocity() * c.time_step;
+        }
+        F.copy_from_slice(&F_next[first..first + F.len()]);
     });
     s.resort_if(outcome, rule)
 }
 
-/// The vector, with one component's sign changed.
-#[inline(always)]
-fn flipped<T: RealField + Copy, const D: usize>(
-    mut v: SVector<T, D>,
-    axis: Option<usize>,
-) -> SVector<T, D> {
-    if let Some(a) = axis {
-        v[a] = -v[a];
-    }
-    v
-}
-
-/// Calls `update(id, x, v, F)` for every particle, then looks whether it is well and still fits its band.
+/// Calls `update(weights, room for what is gathered, first id, x, v, F)` for every block of particles, then looks whether each is well and still
+/// fits its band.
 fn advance<T, R, const D: usize, const W: usize>(
     particles: &mut Particles<T, D>,
     bands: &Bands,
     c: Constants<T, D>,
     rule: R,
-    update: impl Fn(usize, &mut SVector<T, D>, &mut SVector<T, D>, &mut SMatrix<T, D, D>) + Sync,
+    update: impl Fn(
+        &Block<T, D, W>,
+        &mut [Gathered<T, D>],
+        usize,
+        &mut [SVector<T, D>],
+        &mut [SVector<T, D>],
+        &mut [SMatrix<T, D, D>],
+    ) + Sync,
 ) -> Outcome
 where
     T: RealField + Copy,
@@ -330,19 +378,27 @@ where
         .enumerate()
         .map(|(chunk, (((x, v), F), home))| {
             let mut outcome = Outcome::default();
-            let particles = x.iter_mut().zip(v).zip(F).zip(home);
-            for (k, (((x, v), F), &home)) in particles.enumerate() {
-                let p = chunk * CHUNK + k;
-                update(p, x, v, F);
-                if let Some(trouble) = trouble(&rule, &c, x, F) {
-                    let failure = Some((trouble, p));
-                    outcome = outcome.merge(Outcome { failure, ..Outcome::default() });
-                } else {
-                    let l = rule.half_size(F);
-                    let xi = c.in_cells(x);
-                    let width = if rule.is_wide(&l) { WIDE } else { W };
-                    let row = first_layer(xi[D - 1], l[D - 1]);
-                    outcome.resort |= !Bands::fits(home, c.band_height, row, width);
+            let mut block = Block::new();
+            let mut gathered = [Gathered::zero(); BLOCK];
+            let blocks = x
+                .chunks_mut(BLOCK)
+                .zip(v.chunks_mut(BLOCK))
+                .zip(F.chunks_mut(BLOCK))
+                .zip(home.chunks(BLOCK));
+            for (index, (((x, v), F), home)) in blocks.enumerate() {
+                let first = chunk * CHUNK + index * BLOCK;
+                block.weigh_run(rule, &c, x, F);
+                update(&block, &mut gathered[..x.len()], first, x, v, F);
+                let mut all_well = true;
+                dispatch(Check { c: &c, rule, home, x, F, all_well: &mut all_well });
+                if all_well {
+                    continue;
+                }
+                for (k, ((x, F), &home)) in x.iter().zip(F).zip(home).enumerate() {
+                    if !c.is_well(rule, home, x, F) {
+                        let failure = trouble(&rule, &c, x, F).map(|trouble| (trouble, first + k));
+                        outcome = outcome.merge(Outcome { failure, resort: failure.is_none() });
+                    }
                 }
             }
             outcome
@@ -363,8 +419,8 @@ where
     R: Rule<T, D, W>,
 {
     let J = determinant(F);
-    if J > T::zero() && c.axis_outside(x).is_none() && axis_too_large(&rule.half_size(F)).is_none()
-    {
+    let l = SVector::<T, D>::from_fn(|a, _| rule.half_size(a, F[(a, a)]));
+    if J > T::zero() && c.axis_outside(x).is_none() && axis_too_large(&l).is_none() {
         return None;
     }
     Some(if J <= T::zero() {
@@ -406,8 +462,9 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
     {
         let (c, Particles { x, F, .. }) = (self.constants, &self.particles);
         self.bands.sort(&self.layout, |p| {
-            let (xi, l) = (c.in_cells(&x[p]), rule.half_size(&F[p]));
-            (0..D).map(|a| first_layer(xi[a], l[a]) * c.strides[a]).sum()
+            let xi = c.in_cells(&x[p]);
+            let layer = |a| first_layer(xi[a], rule.half_size(a, F[p][(a, a)]));
+            (0..D).map(|a| layer(a) as usize * c.strides[a]).sum()
         });
     }
 
@@ -435,34 +492,22 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let Self { particles, constants, layout, bands, nodes, b, .. } = self;
         let Particles { x, v, F, mass, volume, .. } = &*particles;
         let c = *constants;
-        let add = |piece: &mut [Node<T, D>], first: usize, p: usize| {
-            let m = mass[p];
-            let momentum = v[p] * m;
-            let traction = law.kirchhoff(&F[p]) * -(volume[p] * c.inverse_spacing);
-            let weight = if no_body_force { SVector::zeros() } else { b[p] * m };
-            with_stencil!(rule, c, &x[p], &F[p], |stencil| {
-                stencil.scatter(
-                    &c.strides,
-                    piece,
-                    first,
-                    |S, G| {
-                        let (along, across) = force_factors(&traction, S, G);
-                        (m * S, momentum * S, along, across + weight * S)
-                    },
-                    |node, S, G, (mass, momentum, along, across)| {
-                        node.mass += *mass * S;
-                        node.velocity += momentum * S;
-                        node.acceleration += along * G + across * S;
-                    },
-                )
-            });
-        };
-        bands.scatter(layout, nodes, |node| *node = Node::zero(), add);
-        layout.fold(nodes, |image, ghost, flip| {
-            image.mass += ghost.mass;
-            image.velocity += flipped(ghost.velocity, flip);
-            image.acceleration += flipped(ghost.acceleration, flip);
-        });
+        let b = (!no_body_force).then_some(&b[..]);
+        bands.scatter(
+            layout,
+            nodes,
+            |node| *node = Node::zero(),
+            |piece, first, ids| {
+                let level = |ids: &[u32], deposits: &mut [Deposit<T, D>; BLOCK]| {
+                    dispatch(GiveLevel { ids, v: Some(v), b, mass, deposits });
+                };
+                c.scatter(rule, x, F, piece, first, ids, level, |block, ids, deposits| {
+                    block.stress(law);
+                    dispatch(GiveSlope { c: &c, block, ids, volume, deposits });
+                });
+            },
+        );
+        layout.fold(nodes, |image, ghost, flip| image.add(&ghost.flipped(flip)));
     }
 
     /// On the grid: momentum and force to velocity at the end of the step and acceleration.
@@ -470,9 +515,12 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let Self { constants: c, nodes, .. } = self;
         nodes.par_chunks_mut(CHUNK).for_each(|nodes| {
             for node in nodes {
-                let inverse = if node.mass > c.least_mass { node.mass.recip() } else { T::zero() };
-                node.acceleration *= inverse * scale;
-                node.velocity = node.velocity * inverse + node.acceleration * c.time_step;
+                let inverse = c.inverse_mass(node);
+                for a in 0..D {
+                    let acceleration = node.values[D + a] * (inverse * scale);
+                    node.values[a] = node.values[a] * inverse + acceleration * c.time_step;
+                    node.values[D + a] = acceleration;
+                }
             }
         });
         self.apply_walls();
@@ -481,15 +529,8 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
     /// Clears what is normal to walls, and gives nodes beyond them the mirrored values.
     fn apply_walls(&mut self) {
         let Self { layout, nodes, .. } = self;
-        layout.on_walls(nodes, |node, axis| {
-            node.velocity[axis] = T::zero();
-            node.acceleration[axis] = T::zero();
-        });
-        layout.unfold(nodes, |image, flip| Node {
-            mass: image.mass,
-            velocity: flipped(image.velocity, flip),
-            acceleration: flipped(image.acceleration, flip),
-        });
+        layout.on_walls(nodes, Node::clear);
+        layout.unfold(nodes, Node::flipped);
     }
 
     /// USF, first pass: velocities at the start of the step on the grid.
@@ -501,31 +542,25 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let Self { particles, constants, layout, bands, nodes, .. } = self;
         let Particles { x, v, F, mass, .. } = &*particles;
         let c = *constants;
-        let add = |piece: &mut [Node<T, D>], first: usize, p: usize| {
-            let m = mass[p];
-            let momentum = v[p] * m;
-            with_stencil!(rule, c, &x[p], &F[p], |stencil| {
-                stencil.scatter(
-                    &c.strides,
-                    piece,
-                    first,
-                    |S, _| (m * S, momentum * S),
-                    |node, S, _, (mass, momentum)| {
-                        node.mass += *mass * S;
-                        node.velocity += momentum * S;
-                    },
-                )
-            });
+        let give = |ids: &[u32], deposits: &mut [Deposit<T, D>; BLOCK]| {
+            for (deposit, &p) in deposits.iter_mut().zip(ids) {
+                let (p, m) = (p as usize, mass[p as usize]);
+                deposit.level = Node::new(&(v[p] * m), &SVector::zeros(), m);
+            }
         };
-        bands.scatter(layout, nodes, |node| *node = Node::zero(), add);
-        layout.fold(nodes, |image, ghost, flip| {
-            image.mass += ghost.mass;
-            image.velocity += flipped(ghost.velocity, flip);
-        });
+        bands.scatter(
+            layout,
+            nodes,
+            |node| *node = Node::zero(),
+            |piece, first, ids| {
+                c.scatter(rule, x, F, piece, first, ids, give, |_, _, _| {});
+            },
+        );
+        layout.fold(nodes, |image, ghost, flip| image.add(&ghost.flipped(flip)));
         nodes.par_chunks_mut(CHUNK).for_each(|nodes| {
             for node in nodes {
-                node.velocity *=
-                    if node.mass > c.least_mass { node.mass.recip() } else { T::zero() };
+                let inverse = c.inverse_mass(node);
+                (0..D).for_each(|a| node.values[a] *= inverse);
             }
         });
         self.apply_walls();
@@ -545,14 +580,21 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
             .enumerate()
             .map(|(chunk, ((F_next, x), F))| {
                 let mut outcome = Outcome::default();
-                for (k, ((F_next, x), F)) in F_next.iter_mut().zip(x).zip(F).enumerate() {
-                    let (_, L, _) = with_stencil!(rule, c, x, F, |stencil| {
-                        stencil.gather(&c.strides, nodes, |n| (n.velocity, SVector::zeros()))
-                    });
-                    *F_next = c.stretch(&L, F);
-                    if let Some(trouble) = trouble(&rule, &c, x, F_next) {
-                        let failure = Some((trouble, chunk * CHUNK + k));
-                        outcome = outcome.merge(Outcome { failure, ..Outcome::default() });
+                let mut block = Block::new();
+                let blocks = F_next.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK));
+                for (index, ((F_next, x), F)) in blocks.enumerate() {
+                    block.weigh_run(rule, &c, x, F);
+                    let gathered = &mut [Gathered::zero(); BLOCK][..x.len()];
+                    block.gather(&c.strides, nodes, gathered);
+                    let first = chunk * CHUNK + index * BLOCK;
+                    for (k, (((F_next, gathered), x), F)) in
+                        F_next.iter_mut().zip(gathered).zip(x).zip(F).enumerate()
+                    {
+                        *F_next = c.stretch(&gathered.velocity_gradient(), F);
+                        if let Some(trouble) = trouble(&rule, &c, x, F_next) {
+                            let failure = Some((trouble, first + k));
+                            outcome = outcome.merge(Outcome { failure, ..Outcome::default() });
+                        }
                     }
                 }
                 outcome
@@ -570,26 +612,18 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let Self { particles, constants, layout, bands, nodes, b, F_next, .. } = self;
         let Particles { x, F, mass, volume, .. } = &*particles;
         let (c, F_next) = (*constants, &F_next[..]);
-        let add = |piece: &mut [Node<T, D>], first: usize, p: usize| {
-            let traction = law.kirchhoff(&F_next[p]) * -(volume[p] * c.inverse_spacing);
-            let weight = if no_body_force { SVector::zeros() } else { b[p] * mass[p] };
-            with_stencil!(rule, c, &x[p], &F[p], |stencil| {
-                stencil.scatter(
-                    &c.strides,
-                    piece,
-                    first,
-                    |S, G| {
-                        let (along, across) = force_factors(&traction, S, G);
-                        (along, across + weight * S)
-                    },
-                    |node, S, G, (along, across)| node.acceleration += along * G + across * S,
-                )
+        let b = (!no_body_force).then_some(&b[..]);
+        bands.scatter(layout, nodes, Node::clear_acceleration, |piece, first, ids| {
+            let level = |ids: &[u32], deposits: &mut [Deposit<T, D>; BLOCK]| {
+                dispatch(GiveLevel { ids, v: None, b, mass, deposits });
+            };
+            c.scatter(rule, x, F, piece, first, ids, level, |block, ids, deposits| {
+                block.pick_F(&c, ids, F_next);
+                block.stress(law);
+                dispatch(GiveSlope { c: &c, block, ids, volume, deposits });
             });
-        };
-        bands.scatter(layout, nodes, |node| node.acceleration = SVector::zeros(), add);
-        layout.fold(nodes, |image, ghost, flip| {
-            image.acceleration += flipped(ghost.acceleration, flip);
         });
+        layout.fold(nodes, |image, ghost, flip| image.add_acceleration(&ghost.flipped(flip)));
     }
 
     /// USF, on the grid: force to acceleration, velocity to that at the end of the step.
@@ -597,24 +631,106 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let Self { constants: c, nodes, .. } = self;
         nodes.par_chunks_mut(CHUNK).for_each(|nodes| {
             for node in nodes {
-                let inverse = if node.mass > c.least_mass { node.mass.recip() } else { T::zero() };
-                node.acceleration *= inverse * scale;
-                node.velocity += node.acceleration * c.time_step;
+                let inverse = c.inverse_mass(node) * scale;
+                for a in 0..D {
+                    node.values[D + a] *= inverse;
+                    node.values[a] += node.values[D + a] * c.time_step;
+                }
             }
         });
         self.apply_walls();
     }
 }
 
-/// The pair (A, B) with which a row's node of weight `S_0` and gradient `G_0` receives the force `A G_0 + B S_0`.
-#[inline(always)]
-fn force_factors<T: RealField + Copy, const D: usize>(
-    traction: &SMatrix<T, D, D>,
-    S: T,
-    G: &[T; D],
-) -> (SVector<T, D>, SVector<T, D>) {
-    let along = SVector::from_fn(|i, _| traction[(i, 0)] * S);
-    let across =
-        SVector::from_fn(|i, _| (1..D).fold(T::zero(), |sum, j| sum + traction[(i, j)] * G[j]));
-    (along, across)
+/// States what the body force and, if `v` is there, mass and momentum of particles give to the grid.
+struct GiveLevel<'a, T, const D: usize> {
+    ids: &'a [u32],
+    v: Option<&'a [SVector<T, D>]>,
+    b: Option<&'a [SVector<T, D>]>,
+    mass: &'a [T],
+    deposits: &'a mut [Deposit<T, D>; BLOCK],
+}
+
+impl<T: RealField + Copy, const D: usize> Loop for GiveLevel<'_, T, D> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { ids, v, b, mass, deposits } = self;
+        for (deposit, &p) in deposits.iter_mut().zip(ids) {
+            let p = p as usize;
+            let m = mass[p];
+            let weight = b.map_or(SVector::zeros(), |b| b[p] * m);
+            deposit.level = v.map_or(Node::new(&SVector::zeros(), &weight, T::zero()), |v| {
+                Node::new(&(v[p] * m), &weight, m)
+            });
+        }
+    }
+}
+
+/// States what the stress of particles gives to the grid.
+struct GiveSlope<'a, T, const D: usize, const W: usize> {
+    c: &'a Constants<T, D>,
+    block: &'a Block<T, D, W>,
+    ids: &'a [u32],
+    volume: &'a [T],
+    deposits: &'a mut [Deposit<T, D>; BLOCK],
+}
+
+impl<T: RealField + Copy, const D: usize, const W: usize> Loop for GiveSlope<'_, T, D, W> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { c, block, ids, volume, deposits } = self;
+        for (k, (deposit, &p)) in deposits.iter_mut().zip(ids).enumerate() {
+            let traction = block.tensor(k) * -(volume[p as usize] * c.inverse_spacing);
+            for a in 0..D {
+                deposit.slope[a].set_acceleration(&traction.column(a).into_owned());
+            }
+        }
+    }
+}
+
+/// Moves and stretches particles as the grid tells.
+struct Follow<'a, T, const D: usize> {
+    c: &'a Constants<T, D>,
+    gathered: &'a [Gathered<T, D>],
+    x: &'a mut [SVector<T, D>],
+    v: &'a mut [SVector<T, D>],
+    F: &'a mut [SMatrix<T, D, D>],
+}
+
+impl<T: RealField + Copy, const D: usize> Loop for Follow<'_, T, D> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { c, gathered, x, v, F } = self;
+        for (((x, v), F), gathered) in x.iter_mut().zip(v).zip(F).zip(gathered) {
+            *v += gathered.acceleration() * c.time_step;
+            *x += gathered.velocity() * c.time_step;
+            *F = c.stretch(&gathered.velocity_gradient(), F);
+        }
+    }
+}
+
+/// Looks whether all of a run of particles are [well](Constants::is_well).
+struct Check<'a, T, R, const D: usize, const W: usize> {
+    c: &'a Constants<T, D>,
+    rule: R,
+    home: &'a [u32],
+    x: &'a [SVector<T, D>],
+    F: &'a [SMatrix<T, D, D>],
+    all_well: &'a mut bool,
+}
+
+impl<T, R, const D: usize, const W: usize> Loop for Check<'_, T, R, D, W>
+where
+    T: RealField + Copy,
+    R: Rule<T, D, W>,
+{
+    #[inline(always)]
+    fn run(self) {
+        let Self { c, rule, home, x, F, all_well } = self;
+        let mut well = true;
+        for ((x, F), &home) in x.iter().zip(F).zip(home) {
+            well &= c.is_well(rule, home, x, F);
+        }
+        *all_well = well;
+    }
 }

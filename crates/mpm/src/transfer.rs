@@ -2,25 +2,138 @@
 
 use nalgebra::{RealField, SMatrix, SVector};
 
-use crate::weights::{AxisWeights, Stencil, WIDE};
+use crate::weights::WIDE;
 
-/// Quantities at a node.
+/// Numbers kept for a node: enough for three dimensions, and a whole vector register whatever their type.
+pub(crate) const LANES: usize = 8;
+
+/// Quantities at a node, one after the other so that they go through vector instructions together: the velocity
+/// (momentum while particles add to it), the acceleration (force while particles add to it), the mass, and zeros.
 #[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
 pub(crate) struct Node<T, const D: usize> {
-    pub(crate) mass: T,
-    /// Momentum while particles add to it, velocity afterwards.
-    pub(crate) velocity: SVector<T, D>,
-    /// Force while particles add to it, acceleration afterwards.
-    pub(crate) acceleration: SVector<T, D>,
+    pub(crate) values: [T; LANES],
 }
 
 impl<T: RealField + Copy, const D: usize> Node<T, D> {
     pub(crate) fn zero() -> Self {
-        Self { mass: T::zero(), velocity: SVector::zeros(), acceleration: SVector::zeros() }
+        Self { values: [T::zero(); LANES] }
+    }
+
+    #[inline(always)]
+    pub(crate) fn new(velocity: &SVector<T, D>, acceleration: &SVector<T, D>, mass: T) -> Self {
+        const { assert!(2 * D < LANES) };
+        let mut values = [T::zero(); LANES];
+        for a in 0..D {
+            values[a] = velocity[a];
+            values[D + a] = acceleration[a];
+        }
+        values[2 * D] = mass;
+        Self { values }
+    }
+
+    #[inline(always)]
+    pub(crate) fn mass(&self) -> T {
+        self.values[2 * D]
+    }
+
+    /// What a wall across `axis` does to velocity and acceleration.
+    #[inline(always)]
+    pub(crate) fn clear(&mut self, axis: usize) {
+        self.values[axis] = T::zero();
+        self.values[D + axis] = T::zero();
+    }
+
+    /// The node, with the signs of one component of velocity and acceleration changed.
+    #[inline(always)]
+    pub(crate) fn flipped(mut self, axis: Option<usize>) -> Self {
+        if let Some(a) = axis {
+            self.values[a] = -self.values[a];
+            self.values[D + a] = -self.values[D + a];
+        }
+        self
+    }
+
+    #[inline(always)]
+    pub(crate) fn set_acceleration(&mut self, acceleration: &SVector<T, D>) {
+        for a in 0..D {
+            self.values[D + a] = acceleration[a];
+        }
+    }
+
+    pub(crate) fn clear_acceleration(&mut self) {
+        self.set_acceleration(&SVector::zeros());
+    }
+
+    pub(crate) fn add_acceleration(&mut self, other: &Self) {
+        for a in 0..D {
+            self.values[D + a] += other.values[D + a];
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn add(&mut self, other: &Self) {
+        for q in 0..LANES {
+            self.values[q] += other.values[q];
+        }
     }
 }
 
-/// One row of `W` nodes along axis 0: the weights of all other axes multiplied.
+/// What the nodes around a particle say about its place: their values weighted, and the gradients of these per cell.
+///
+/// All values of the nodes are interpolated, the useful ones and the others, so that whole vectors are moved and stored.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Gathered<T, const D: usize> {
+    level: Node<T, D>,
+    slope: [Node<T, D>; D],
+}
+
+impl<T: RealField + Copy, const D: usize> Gathered<T, D> {
+    pub(crate) fn zero() -> Self {
+        Self { level: Node::zero(), slope: [Node::zero(); D] }
+    }
+
+    #[inline(always)]
+    pub(crate) fn velocity(&self) -> SVector<T, D> {
+        SVector::from_fn(|i, _| self.level.values[i])
+    }
+
+    #[inline(always)]
+    pub(crate) fn acceleration(&self) -> SVector<T, D> {
+        SVector::from_fn(|i, _| self.level.values[D + i])
+    }
+
+    /// Gradient of the velocity, per cell.
+    #[inline(always)]
+    pub(crate) fn velocity_gradient(&self) -> SMatrix<T, D, D> {
+        SMatrix::from_fn(|i, j| self.slope[j].values[i])
+    }
+}
+
+/// What a particle gives to the nodes around it: `level S + sum_a slope[a] G_a`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Deposit<T, const D: usize> {
+    pub(crate) level: Node<T, D>,
+    pub(crate) slope: [Node<T, D>; D],
+}
+
+impl<T: RealField + Copy, const D: usize> Deposit<T, D> {
+    pub(crate) fn zero() -> Self {
+        Self { level: Node::zero(), slope: [Node::zero(); D] }
+    }
+}
+
+/// The weights of one particle, wherever they are kept.
+pub(crate) trait Weights<T, const D: usize, const W: usize> {
+    /// Index of the first node along an axis.
+    fn base(&self, axis: usize) -> usize;
+    /// Weight of a node, by its place along an axis.
+    fn S(&self, axis: usize, place: usize) -> T;
+    /// Gradient of the weight.
+    fn G(&self, axis: usize, place: usize) -> T;
+}
+
+/// One row of nodes along axis 0: the weights of all other axes multiplied.
 struct Row<T, const D: usize> {
     start: usize,
     /// Product of the weights along axes 1 and up.
@@ -29,104 +142,126 @@ struct Row<T, const D: usize> {
     G: [T; D],
 }
 
-impl<T: RealField + Copy, const D: usize, const W: usize> Stencil<T, D, W> {
-    /// Index of the first node.
-    #[inline(always)]
-    pub(crate) fn first_node(&self, strides: &[usize; D]) -> usize {
-        (0..D).map(|a| self.axes[a].base * strides[a]).sum()
-    }
+/// Number of rows of nodes.
+#[inline(always)]
+fn rows<const D: usize, const W: usize>() -> usize {
+    let rows = W.pow(D as u32 - 1);
+    // The wide stencil is rare: unrolling its rows would cost minutes of compile time for nothing.
+    if W == WIDE { std::hint::black_box(rows) } else { rows }
+}
 
-    /// Number of rows of nodes.
-    #[inline(always)]
-    fn rows() -> usize {
-        let rows = W.pow(D as u32 - 1);
-        // The wide stencil is rare: unrolling its rows would cost minutes of compile time for nothing.
-        if W == WIDE { std::hint::black_box(rows) } else { rows }
-    }
-
-    #[inline(always)]
-    fn row(&self, first: usize, strides: &[usize; D], index: usize) -> Row<T, D> {
-        let mut row = Row { start: first, S: T::one(), G: [T::zero(); D] };
-        let mut rest = index;
-        for (a, (weights, stride)) in self.axes.iter().zip(strides).enumerate().skip(1) {
-            let k = rest % W;
-            rest /= W;
-            row.start += k * stride;
-            for b in 1..a {
-                row.G[b] *= weights.S[k];
-            }
-            row.G[a] = row.S * weights.G[k];
-            row.S *= weights.S[k];
+#[inline(always)]
+fn row<T: RealField + Copy, const D: usize, const W: usize>(
+    weights: &impl Weights<T, D, W>,
+    first: usize,
+    strides: &[usize; D],
+    index: usize,
+) -> Row<T, D> {
+    let mut row = Row { start: first, S: T::one(), G: [T::zero(); D] };
+    match D {
+        1 => {}
+        2 => {
+            row.start += index * strides[1];
+            row.S = weights.S(1, index);
+            row.G[1] = weights.G(1, index);
         }
-        row
-    }
-
-    /// Adds to every node of the piece of the grid that starts at node `first`.
-    ///
-    /// `per_row(S, G)` turns the product of the weights along axes 1 and up, and its gradient, into whatever is the same
-    /// for a whole row; `add(node, S_0, G_0, row)` adds it with the weight and gradient along axis 0.
-    #[inline(always)]
-    pub(crate) fn scatter<N, A>(
-        &self,
-        strides: &[usize; D],
-        piece: &mut [N],
-        first: usize,
-        per_row: impl Fn(T, &[T; D]) -> A,
-        add: impl Fn(&mut N, T, T, &A),
-    ) {
-        let start = self.first_node(strides) - first;
-        for index in 0..Self::rows() {
-            let row = self.row(start, strides, index);
-            let factors = per_row(row.S, &row.G);
-            let Some(nodes) = piece.get_mut(row.start..).and_then(|n| n.first_chunk_mut::<W>())
-            else {
-                debug_assert!(false, "a stencil beyond its band");
-                return;
-            };
-            let AxisWeights { S, G, .. } = &self.axes[0];
-            for ((node, &S), &G) in nodes.iter_mut().zip(S).zip(G) {
-                add(node, S, G, &factors);
-            }
+        _ => {
+            let (j, k) = (index % W, index / W);
+            row.start += j * strides[1] + k * strides[2];
+            row.S = weights.S(1, j) * weights.S(2, k);
+            row.G[1] = weights.G(1, j) * weights.S(2, k);
+            row.G[2] = weights.S(1, j) * weights.G(2, k);
         }
     }
+    row
+}
 
-    /// Interpolates two vector fields of the nodes, `read(node) = (v, a)`: `(sum S v, sum v G^T, sum S a)`.
-    #[inline(always)]
-    pub(crate) fn gather<N>(
-        &self,
-        strides: &[usize; D],
-        nodes: &[N],
-        read: impl Fn(&N) -> (SVector<T, D>, SVector<T, D>),
-    ) -> (SVector<T, D>, SMatrix<T, D, D>, SVector<T, D>) {
-        let mut velocity = SVector::zeros();
-        let mut gradient = SMatrix::zeros();
-        let mut acceleration = SVector::zeros();
-        let start = self.first_node(strides);
-        for index in 0..Self::rows() {
-            let row = self.row(start, strides, index);
-            let Some(nodes) = nodes.get(row.start..).and_then(|n| n.first_chunk::<W>()) else {
-                debug_assert!(false, "a stencil beyond the grid");
-                break;
-            };
-            let mut row_velocity = SVector::<T, D>::zeros();
-            let mut row_slope = SVector::<T, D>::zeros();
-            let mut row_acceleration = SVector::<T, D>::zeros();
-            let AxisWeights { S, G, .. } = &self.axes[0];
-            for ((node, &S), &G) in nodes.iter().zip(S).zip(G) {
-                let (v, a) = read(node);
-                row_velocity += v * S;
-                row_slope += v * G;
-                row_acceleration += a * S;
-            }
-            velocity += row_velocity * row.S;
-            acceleration += row_acceleration * row.S;
-            for i in 0..D {
-                gradient[(i, 0)] += row_slope[i] * row.S;
-                for j in 1..D {
-                    gradient[(i, j)] += row_velocity[i] * row.G[j];
-                }
+/// Index of a particle's first node.
+#[inline(always)]
+fn first_node<T, const D: usize, const W: usize>(
+    weights: &impl Weights<T, D, W>,
+    strides: &[usize; D],
+) -> usize {
+    let mut first = 0;
+    for a in 0..D {
+        first += weights.base(a) * strides[a];
+    }
+    first
+}
+
+/// Adds what a particle gives to the piece of the grid that starts at node `first`.
+#[inline(always)]
+pub(crate) fn scatter<T: RealField + Copy, const D: usize, const W: usize>(
+    weights: &impl Weights<T, D, W>,
+    strides: &[usize; D],
+    piece: &mut [Node<T, D>],
+    first: usize,
+    given: &Deposit<T, D>,
+) {
+    let start = first_node(weights, strides) - first;
+    for index in 0..rows::<D, W>() {
+        let row = row(weights, start, strides, index);
+        let mut level = given.level.values;
+        let mut slope = given.slope[0].values;
+        for q in 0..LANES {
+            level[q] *= row.S;
+            slope[q] *= row.S;
+            for a in 1..D {
+                level[q] += given.slope[a].values[q] * row.G[a];
             }
         }
-        (velocity, gradient, acceleration)
+        let Some(nodes) = piece.get_mut(row.start..).and_then(|n| n.first_chunk_mut::<W>()) else {
+            debug_assert!(false, "a stencil beyond its band");
+            return;
+        };
+        for (i, node) in nodes.iter_mut().enumerate() {
+            let (S, G) = (weights.S(0, i), weights.G(0, i));
+            for q in 0..LANES {
+                node.values[q] += level[q] * S + slope[q] * G;
+            }
+        }
+    }
+}
+
+/// Interpolates velocity and acceleration, and the velocity's gradient.
+#[inline(always)]
+pub(crate) fn gather<T: RealField + Copy, const D: usize, const W: usize>(
+    weights: &impl Weights<T, D, W>,
+    strides: &[usize; D],
+    nodes: &[Node<T, D>],
+    gathered: &mut Gathered<T, D>,
+) {
+    // In one and two dimensions velocity and acceleration are half of a node's values.
+    let used = if D <= 2 { LANES / 2 } else { LANES };
+    let mut level = [T::zero(); LANES];
+    let mut slope = [[T::zero(); LANES]; D];
+    let start = first_node(weights, strides);
+    for index in 0..rows::<D, W>() {
+        let row = row(weights, start, strides, index);
+        let Some(nodes) = nodes.get(row.start..).and_then(|n| n.first_chunk::<W>()) else {
+            debug_assert!(false, "a stencil beyond the grid");
+            break;
+        };
+        let mut row_level = [T::zero(); LANES];
+        let mut row_slope = [T::zero(); LANES];
+        for (i, node) in nodes.iter().enumerate() {
+            let (S, G) = (weights.S(0, i), weights.G(0, i));
+            for q in 0..used {
+                let (level, slope) = (node.values[q] * S, node.values[q] * G);
+                row_level[q] = if i == 0 { level } else { row_level[q] + level };
+                row_slope[q] = if i == 0 { slope } else { row_slope[q] + slope };
+            }
+        }
+        for q in 0..used {
+            level[q] += row_level[q] * row.S;
+            slope[0][q] += row_slope[q] * row.S;
+            for a in 1..D {
+                slope[a][q] += row_level[q] * row.G[a];
+            }
+        }
+    }
+    gathered.level.values[..used].copy_from_slice(&level[..used]);
+    for a in 0..D {
+        gathered.slope[a].values[..used].copy_from_slice(&slope[a][..used]);
     }
 }

@@ -3,10 +3,11 @@
 //! Lengths are in cells here (`h = 1`) and positions count from the lower corner of the grid: `xi = (x - lower) / h`,
 //! half-size `l` in cells. Gradients are per cell as well.
 
-use nalgebra::{RealField, SMatrix, SVector};
+use nalgebra::{RealField, SVector};
 
 use crate::grid::PAD_BELOW;
 use crate::tensor::real;
+use crate::transfer::Weights;
 
 /// Largest supported half-size of a particle box, in cells.
 pub(crate) const HALF_SIZE_LIMIT: f64 = 2.0;
@@ -17,38 +18,46 @@ pub(crate) const WIDE: usize = 6;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AxisWeights<T, const W: usize> {
     /// Index of the first node, counted in the padded grid.
-    pub(crate) base: usize,
+    pub(crate) base: i32,
     pub(crate) S: [T; W],
     pub(crate) G: [T; W],
 }
 
-/// A particle's weights at `W^D` nodes: one factor per axis.
+/// The weights of a particle whose box is wide along some axis.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Stencil<T, const D: usize, const W: usize> {
-    pub(crate) axes: [AxisWeights<T, W>; D],
+pub(crate) struct WideWeights<T, const D: usize>([AxisWeights<T, WIDE>; D]);
+
+impl<T: RealField + Copy, const D: usize> WideWeights<T, D> {
+    #[inline(never)]
+    pub(crate) fn new(xi: &[T; D], l: &[T; D]) -> Self {
+        Self(std::array::from_fn(|a| wide_axis(xi[a], l[a])))
+    }
+}
+
+impl<T: RealField + Copy, const D: usize> Weights<T, D, WIDE> for WideWeights<T, D> {
+    fn base(&self, axis: usize) -> usize {
+        self.0[axis].base as usize
+    }
+
+    fn S(&self, axis: usize, place: usize) -> T {
+        self.0[axis].S[place]
+    }
+
+    fn G(&self, axis: usize, place: usize) -> T {
+        self.0[axis].G[place]
+    }
 }
 
 /// A kind of weights; `W` is the number of nodes per axis that it usually needs.
 pub(crate) trait Rule<T: RealField + Copy, const D: usize, const W: usize>:
     Copy + Send + Sync + 'static
 {
-    /// Half-sizes of the box of a particle with deformation gradient `F`, in cells.
-    fn half_size(&self, F: &SMatrix<T, D, D>) -> SVector<T, D>;
+    /// Half-size along an axis of the box of a particle whose deformation gradient has the diagonal entry `F_aa`, in
+    /// cells.
+    fn half_size(&self, axis: usize, F_aa: T) -> T;
 
-    /// Whether a box of these half-sizes may touch more than the usual nodes.
-    #[inline(always)]
-    fn is_wide(&self, l: &SVector<T, D>) -> bool {
-        wide(l)
-    }
-
-    /// The weights along one axis, for a half-size that is not `wide`.
+    /// The weights along one axis, for a half-size that is not [wide](is_wide).
     fn along_axis(xi: T, l: T) -> AxisWeights<T, W>;
-
-    /// Weights of a particle whose box is not `wide`.
-    #[inline(always)]
-    fn stencil(&self, xi: &SVector<T, D>, l: &SVector<T, D>) -> Stencil<T, D, W> {
-        Stencil { axes: std::array::from_fn(|a| Self::along_axis(xi[a], l[a])) }
-    }
 }
 
 /// Hat functions at the particle's centre.
@@ -57,13 +66,8 @@ pub(crate) struct Hat;
 
 impl<T: RealField + Copy, const D: usize> Rule<T, D, 2> for Hat {
     #[inline(always)]
-    fn half_size(&self, _F: &SMatrix<T, D, D>) -> SVector<T, D> {
-        SVector::zeros()
-    }
-
-    #[inline(always)]
-    fn is_wide(&self, _l: &SVector<T, D>) -> bool {
-        false
+    fn half_size(&self, _axis: usize, _F_aa: T) -> T {
+        T::zero()
     }
 
     #[inline(always)]
@@ -80,8 +84,8 @@ pub(crate) struct FixedBox<T, const D: usize>(pub(crate) SVector<T, D>);
 
 impl<T: RealField + Copy, const D: usize> Rule<T, D, 3> for FixedBox<T, D> {
     #[inline(always)]
-    fn half_size(&self, _F: &SMatrix<T, D, D>) -> SVector<T, D> {
-        self.0
+    fn half_size(&self, axis: usize, _F_aa: T) -> T {
+        self.0[axis]
     }
 
     #[inline(always)]
@@ -96,10 +100,10 @@ pub(crate) struct StretchingBox<T, const D: usize>(pub(crate) SVector<T, D>);
 
 impl<T: RealField + Copy, const D: usize> Rule<T, D, 3> for StretchingBox<T, D> {
     #[inline(always)]
-    fn half_size(&self, F: &SMatrix<T, D, D>) -> SVector<T, D> {
+    fn half_size(&self, axis: usize, F_aa: T) -> T {
         // A quarter turn makes F_aa zero, and the weights divide by l.
-        let smallest = real::<T>(1e-6);
-        SVector::from_fn(|a, _| (self.0[a] * F[(a, a)]).abs().max(smallest))
+        let (l, smallest) = ((self.0[axis] * F_aa).abs(), real(1e-6));
+        if l > smallest { l } else { smallest }
     }
 
     #[inline(always)]
@@ -108,23 +112,29 @@ impl<T: RealField + Copy, const D: usize> Rule<T, D, 3> for StretchingBox<T, D> 
     }
 }
 
-/// Whether a box may touch more than three nodes along some axis.
+/// Whether a box of this half-size may touch more than three nodes.
 #[inline(always)]
-fn wide<T: RealField + Copy, const D: usize>(l: &SVector<T, D>) -> bool {
-    l.iter().any(|&l| l > real(0.5))
+pub(crate) fn is_wide<T: RealField + Copy>(l: T) -> bool {
+    l > real(0.5)
 }
 
 /// Index in the padded grid of the node below `s`, and that node's position. Callers have seen to it that
 /// `s >= -PAD_BELOW`.
+///
+/// Sums alone, which processors of any age do side by side; rounding down and whole numbers of 64 bits are not.
 #[inline(always)]
-fn node_below<T: RealField + Copy>(s: T) -> (usize, T) {
-    let base = nalgebra::convert_unchecked::<T, f64>(s + real(PAD_BELOW as f64)) as i32;
-    (base as usize, real(f64::from(base - PAD_BELOW as i32)))
+fn node_below<T: RealField + Copy>(s: T) -> (i32, T) {
+    /// From here on doubles are whole numbers, with those in their last bits.
+    const WHOLE: f64 = 4_503_599_627_370_496.0;
+    let padded = nalgebra::convert_unchecked::<T, f64>(s + real(PAD_BELOW as f64));
+    let nearest = (padded + WHOLE) - WHOLE;
+    let below = if nearest > padded { nearest - 1.0 } else { nearest };
+    ((below + WHOLE).to_bits() as i32, real(below - PAD_BELOW as f64))
 }
 
 /// Index of the first node along an axis, as in the weights.
 #[inline(always)]
-pub(crate) fn first_layer<T: RealField + Copy>(xi: T, l: T) -> usize {
+pub(crate) fn first_layer<T: RealField + Copy>(xi: T, l: T) -> i32 {
     node_below(xi - l).0
 }
 
@@ -139,9 +149,12 @@ fn gimp_axis<T: RealField + Copy>(xi: T, l: T) -> AxisWeights<T, 3> {
     let r = xi - node;
     let half = real::<T>(0.5) / l;
     let quarter = half * real(0.5);
-    let (near, far) = (one + l - r, (r + l - one).max(T::zero()));
-    let (S0, G0) =
-        if r < one - l { (one - r, -one) } else { (near * near * quarter, -near * half) };
+    // How deep the box reaches into the cell on either side of the middle node: into the first one at most with all of
+    // its width 2 l.
+    let (all, first, last) = (l + l, one + l - r, r + l - one);
+    let near = if first < all { first } else { all };
+    let far = if last > T::zero() { last } else { T::zero() };
+    let (S0, G0) = (near * near * quarter + (first - near), -near * half);
     let (S2, G2) = (far * far * quarter, far * half);
     AxisWeights { base, S: [S0, one - S0 - S2, S2], G: [G0, -G0 - G2, G2] }
 }
@@ -167,15 +180,6 @@ fn wide_axis<T: RealField + Copy>(xi: T, l: T) -> AxisWeights<T, WIDE> {
     }
 }
 
-/// Weights of a particle whose box is `wide` along some axis.
-#[inline(never)]
-pub(crate) fn wide_stencil<T: RealField + Copy, const D: usize>(
-    xi: &SVector<T, D>,
-    l: &SVector<T, D>,
-) -> Stencil<T, D, WIDE> {
-    Stencil { axes: std::array::from_fn(|a| wide_axis(xi[a], l[a])) }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -183,7 +187,7 @@ mod tests {
 
     /// Weight and gradient of every node of one axis, by its position.
     fn spread<const W: usize>(w: &AxisWeights<f64, W>) -> Vec<(f64, f64, f64)> {
-        (0..W).map(|k| ((w.base + k) as f64 - PAD_BELOW as f64, w.S[k], w.G[k])).collect()
+        (0..W).map(|k| (w.base as f64 + k as f64 - PAD_BELOW as f64, w.S[k], w.G[k])).collect()
     }
 
     fn at(spread: &[(f64, f64, f64)], node: f64) -> (f64, f64) {
@@ -263,9 +267,8 @@ mod tests {
     #[test]
     fn a_stretching_box_follows_the_diagonal_of_F() {
         let rule = StretchingBox(SVector::<f64, 2>::new(0.25, 0.125));
-        let F = SMatrix::<f64, 2, 2>::new(1.5, 0.3, -0.2, 0.0);
-        assert_eq!(rule.half_size(&F), SVector::<f64, 2>::new(0.375, 1e-6));
-        assert!(!wide(&rule.half_size(&F)));
-        assert!(wide(&SVector::<f64, 2>::new(0.25, 0.6)));
+        assert_eq!(rule.half_size(0, 1.5), 0.375);
+        assert_eq!(rule.half_size(1, -1.5), 0.1875);
+        assert_eq!(rule.half_size(1, 0.0), 1e-6);
     }
 }

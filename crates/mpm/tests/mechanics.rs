@@ -382,3 +382,34 @@ fn scenes_that_make_no_sense_are_refused() {
         E::InitialState(StepError::TooLarge { axis: 0, .. })
     ));
 }
+
+#[test]
+fn at_small_strain_every_law_moves_a_body_alike() {
+    let run = |material: Material<f64>| {
+        let grid = Grid { walls: [[true; 2]; 2], ..open_grid::<2>(6) };
+        let mut particles = Particles::lattice(&grid, 2, 2.0, |_| true);
+        for (v, X) in particles.v.iter_mut().zip(&particles.X) {
+            *v = X.map(|x| 1e-6 * (std::f64::consts::PI * x).sin());
+        }
+        let settings = settings(Shape::Gimp, Integrator::Usl, 2e-3);
+        let mut simulation = Simulation::new(grid, particles, material, settings).unwrap();
+        (0..100).for_each(|_| simulation.step(&NoBodyForce).unwrap());
+        simulation.particles().clone()
+    };
+    let expected = run(SOFT);
+    let moved = |p: &Particles<f64, 2>| -> Vec<Vector2<f64>> {
+        p.x.iter().zip(&p.X).map(|(x, X)| x - X).collect()
+    };
+    let largest = moved(&expected).iter().map(|u| u.amax()).fold(0.0, f64::max);
+    assert!(largest > 1e-8, "{largest:e}");
+    for material in [
+        Material::StVenantKirchhoff { lambda: 60.0, mu: 40.0 },
+        Material::Hencky { lambda: 60.0, mu: 40.0 },
+        Material::MooneyRivlin { c1: 13.0, c2: 7.0, lambda: 32.0 },
+        Material::LinearElastic { lambda: 60.0, mu: 40.0 },
+    ] {
+        for (u, expected) in moved(&run(material)).iter().zip(moved(&expected)) {
+            assert!((u - expected).amax() < 1e-4 * largest, "{material:?}: {u} {expected}");
+        }
+    }
+}

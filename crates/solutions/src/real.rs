@@ -16,6 +16,11 @@ pub trait Real: RealField + Copy {
     fn sin_pi(self) -> Self;
     /// `cos(pi x)`.
     fn cos_pi(self) -> Self;
+    /// `ln(1 + x)`, within one unit in the last place.
+    ///
+    /// Unlike `ln_1p` it is no call into the system's library: loops over many points use vector instructions, and
+    /// all processors give the same bits.
+    fn log_1p(self) -> Self;
 
     /// `arcosh(1 + z)^2`: the squared logarithm of the ratio of two stretches `a`, `b` for `z = (a - b)^2/(2 a b)`.
     #[must_use]
@@ -86,6 +91,11 @@ impl Real for f64 {
     fn cos_pi(self) -> Self {
         sin_pi_shifted(self, 1)
     }
+
+    #[inline(always)]
+    fn log_1p(self) -> Self {
+        log_1p(self)
+    }
 }
 
 impl Real for f32 {
@@ -107,6 +117,11 @@ impl Real for f32 {
     #[inline]
     fn cos_pi(self) -> Self {
         sin_pi_shifted(f64::from(self), 1) as f32
+    }
+
+    #[inline(always)]
+    fn log_1p(self) -> Self {
+        log_1p(f64::from(self)) as f32
     }
 }
 
@@ -155,6 +170,51 @@ fn cosine(x: f64) -> f64 {
     (1.0 - 4.934_802_200_544_679 * z) + square * (low + square * (middle + square * high))
 }
 
+/// `ln(1 + x)`, by the reduction and the polynomial of Sun's fdlibm, `s_log1p.c`, without branches.
+#[inline(always)]
+fn log_1p(x: f64) -> f64 {
+    /// The bits of sqrt(1/2), to 32 bits.
+    const ROOT_HALF: u64 = 0x3fe6_a09e_0000_0000;
+    const ONE: u64 = 0x3ff0_0000_0000_0000;
+    const MANTISSA: u64 = 0x000f_ffff_ffff_ffff;
+    /// 2^52 as a double; with a whole number in its last bits it is 2^52 plus that number.
+    const WHOLE: u64 = 0x4330_0000_0000_0000;
+    const LN2_HIGH: f64 = 6.931_471_803_691_238e-1;
+    const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
+
+    let sum = 1.0 + x;
+    // What rounding took from the sum.
+    let lost = if x < 1.0 { x - (sum - 1.0) } else { 1.0 - (sum - x) };
+    // sum = 2^k m with m between sqrt(1/2) and sqrt(2).
+    let bits = sum.to_bits().wrapping_add(ONE - ROOT_HALF);
+    let exponent = bits >> 52;
+    let k = f64::from_bits(exponent | WHOLE) - (4_503_599_627_370_496.0 + 1023.0);
+    // 2^-k, for k up to 1022.
+    let scale = f64::from_bits(2046_u64.wrapping_sub(exponent) << 52);
+    let m = f64::from_bits((bits & MANTISSA).wrapping_add(ROOT_HALF));
+    // With k = 0 x itself has digits that the sum has lost.
+    let f = if k == 0.0 { x } else { m - 1.0 };
+    // lost / sum, which two digits of 1/m are enough for.
+    let corrected = k != 0.0 && k <= 1022.0;
+    let correction = if corrected { lost * scale * (1.0 - f + f * f) } else { 0.0 };
+    let s = f / (2.0 + f);
+    let z = s * s;
+    let w = z * z;
+    let even = w
+        * (3.999_999_999_940_942e-1
+            + w * (2.222_219_843_214_978_4e-1 + w * 1.531_383_769_920_937_3e-1));
+    let odd = z
+        * (6.666_666_666_666_735e-1
+            + w * (2.857_142_874_366_239e-1
+                + w * (1.818_357_216_161_805e-1 + w * 1.479_819_860_511_658_6e-1)));
+    let half_square = 0.5 * f * f;
+    let tail = s * (half_square + (even + odd)) + (k * LN2_LOW + correction);
+    let value = k * LN2_HIGH - ((half_square - tail) - f);
+    let pole = if sum == 0.0 { f64::NEG_INFINITY } else { f64::NAN };
+    let outside = if sum > 0.0 { sum } else { pole };
+    if sum > 0.0 && x - x == 0.0 { value } else { outside }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -180,6 +240,28 @@ mod tests {
         let far = 2.0 * 1e6 + 0.25;
         assert_eq!(far.sin_pi(), 0.25_f64.sin_pi());
         assert_eq!(far.cos_pi(), 0.25_f64.cos_pi());
+    }
+
+    #[test]
+    fn the_logarithm_is_within_an_ulp_of_the_library_function() {
+        let mut worst: f64 = 0.0;
+        for n in 1..200_000 {
+            let x = f64::from(n) * 1e-5;
+            for x in [x - 1.0, 10.0 * x, x * 1e-9, -x * 1e-9, (50.0 * x - 50.0).exp()] {
+                let expected = x.ln_1p();
+                let ulp = (expected.abs() * f64::EPSILON).max(f64::MIN_POSITIVE);
+                worst = worst.max((x.log_1p() - expected).abs() / ulp);
+            }
+        }
+        assert!(worst <= 1.0, "{worst} units in the last place");
+        for x in [0.0, 1e-20, -1e-300, f64::MIN_POSITIVE, f64::INFINITY] {
+            assert_eq!(x.log_1p(), x);
+        }
+        assert_eq!((-1.0_f64).log_1p(), f64::NEG_INFINITY);
+        assert_eq!(f64::MAX.log_1p(), f64::MAX.ln());
+        assert!((-1.5_f64).log_1p().is_nan() && f64::NAN.log_1p().is_nan());
+        assert!(f64::NEG_INFINITY.log_1p().is_nan());
+        assert_eq!(0.5_f32.log_1p(), 0.5_f32.ln_1p());
     }
 
     #[test]

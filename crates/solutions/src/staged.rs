@@ -6,6 +6,7 @@
 
 use crate::{Real, Solution};
 use nalgebra::SVector;
+use pulp::{Arch, Simd, WithSimd};
 use std::array;
 
 /// The body force at many fixed points, as [`Solution::body_force_at`] prepares it.
@@ -59,8 +60,9 @@ pub trait BodyForceStages<T: Real, const D: usize, const TIME: usize, const POIN
 }
 
 /// Points that are evaluated together. Each of the values kept for them is one run of this length, so that a run of
-/// points fills the vector registers of any processor.
-pub const BLOCK: usize = 64;
+/// points fills the vector registers of any processor, and is no longer than the two cache lines that are read at once:
+/// blocks come from memory in the order in which they lie there.
+pub const BLOCK: usize = 16;
 
 /// The values kept for the points of a generated solution, in blocks.
 pub struct StagedPoints<S, T, const TIME: usize, const POINT: usize> {
@@ -102,6 +104,41 @@ fn point<T: Real, const POINT: usize>(block: &[[T; BLOCK]; POINT], i: usize) -> 
     array::from_fn(|m| block[m][i])
 }
 
+/// Blocks of points as loops of fixed length over separate runs. There is an instance of it for each kind of vector
+/// registers, and the processor's own is chosen when the program runs; all give the same bits, since nothing is
+/// contracted or reordered.
+struct WholeBlocks<'a, S, T: Real, const D: usize, const TIME: usize, const POINT: usize> {
+    solution: &'a S,
+    time: &'a [T; TIME],
+    blocks: &'a [[[T; BLOCK]; POINT]],
+    b: &'a mut [SVector<T, D>],
+}
+
+impl<S, T: Real, const D: usize, const TIME: usize, const POINT: usize> WithSimd
+    for WholeBlocks<'_, S, T, D, TIME, POINT>
+where
+    S: BodyForceStages<T, D, TIME, POINT>,
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<I: Simd>(self, _: I) {
+        let Self { solution, time, blocks, b } = self;
+        for (block, b) in blocks.iter().zip(b.chunks_exact_mut(BLOCK)) {
+            let mut components = [[T::zero(); BLOCK]; D];
+            for i in 0..BLOCK {
+                let value = solution.body_force_staged(time, &point(block, i));
+                for d in 0..D {
+                    components[d][i] = value[d];
+                }
+            }
+            for (i, b) in b.iter_mut().enumerate() {
+                *b = SVector::from_fn(|d, _| components[d][i]);
+            }
+        }
+    }
+}
+
 impl<S, T: Real, const D: usize, const TIME: usize, const POINT: usize> BodyForceAtPoints<T, D>
     for StagedPoints<S, T, TIME, POINT>
 where
@@ -115,30 +152,27 @@ where
             self.len
         );
         let time = self.solution.body_force_time(t);
-        let (mut next, mut rest) = (first, b);
-        while !rest.is_empty() {
-            let (block, offset) = (&self.blocks[next / BLOCK], next % BLOCK);
-            let (now, later) = rest.split_at_mut(rest.len().min(BLOCK - offset));
-            next += now.len();
-            if now.len() == BLOCK {
-                // A loop of fixed length over separate runs, which compilers turn into vector instructions.
-                let mut components = [[T::zero(); BLOCK]; D];
-                for i in 0..BLOCK {
-                    let value = self.solution.body_force_staged(&time, &point(block, i));
-                    for d in 0..D {
-                        components[d][i] = value[d];
-                    }
-                }
-                for (i, b) in now.iter_mut().enumerate() {
-                    *b = SVector::from_fn(|d, _| components[d][i]);
-                }
-            } else {
-                for (i, b) in (offset..).zip(now) {
-                    *b = self.solution.body_force_staged(&time, &point(block, i));
-                }
+        let one_by_one = |first: usize, b: &mut [SVector<T, D>]| {
+            for (n, b) in (first..).zip(b) {
+                let point = point(&self.blocks[n / BLOCK], n % BLOCK);
+                *b = self.solution.body_force_staged(&time, &point);
             }
-            rest = later;
+        };
+        let (before, rest) = b.split_at_mut(b.len().min(first.next_multiple_of(BLOCK) - first));
+        let start = first + before.len();
+        let (whole, after) = rest.split_at_mut(rest.len() / BLOCK * BLOCK);
+        let end = start + whole.len();
+        one_by_one(first, before);
+        if !whole.is_empty() {
+            let blocks = &self.blocks[start / BLOCK..end / BLOCK];
+            Arch::new().dispatch(WholeBlocks {
+                solution: &self.solution,
+                time: &time,
+                blocks,
+                b: whole,
+            });
         }
+        one_by_one(end, after);
     }
 
     fn len(&self) -> usize {

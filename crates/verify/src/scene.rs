@@ -224,11 +224,11 @@ impl<const D: usize> Scene<D> {
     pub(crate) fn bytes_expected(&self, per_cell: usize, scalar: usize) -> f64 {
         // X, x, v, b and the solver's copies of them; F twice, a stress; mass, volume and sorting.
         let per_particle = 8 * D + 4 * D * D + 8;
-        // Mass, momentum or velocity, force and acceleration, with the padding beyond the walls.
-        let per_node = 6 * D + 4;
+        // A cache line, another for MUSL, and what sorting counts; with the padding beyond the walls.
+        const PER_NODE: f64 = 64.0 + 64.0 + 4.0;
         let nodes: f64 = self.cells.iter().map(|&cells| cells as f64 + 9.0).product();
         let particles = self.particles_expected(per_cell);
-        scalar as f64 * (particles * per_particle as f64 + nodes * per_node as f64)
+        scalar as f64 * particles * per_particle as f64 + nodes * PER_NODE
     }
 
     /// The particles at rest in the reference configuration: those whose centre lies in the body.

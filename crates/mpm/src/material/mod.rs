@@ -5,6 +5,7 @@
 
 mod hencky;
 mod linear_elastic;
+mod logarithm;
 mod mooney_rivlin;
 mod neo_hookean;
 mod st_venant_kirchhoff;
@@ -15,6 +16,7 @@ use nalgebra::{RealField, SMatrix};
 
 pub(crate) use hencky::Hencky;
 pub(crate) use linear_elastic::LinearElastic;
+use logarithm::log_of_ratio;
 pub(crate) use mooney_rivlin::MooneyRivlin;
 pub(crate) use neo_hookean::{NeoHookean, NeoHookeanNoLog};
 pub(crate) use st_venant_kirchhoff::StVenantKirchhoff;
@@ -210,7 +212,11 @@ fn displacement_gradient<T: RealField + Copy, const D: usize>(
 #[inline(always)]
 fn log_jacobian<T: RealField + Copy, const D: usize>(F: &SMatrix<T, D, D>) -> T {
     let growth = det_minus_one(&displacement_gradient(F));
-    if growth > real(-0.5) { growth.ln_1p() } else { determinant(F).ln() }
+    let logarithm = log_of_ratio(
+        nalgebra::convert_unchecked(growth),
+        nalgebra::convert_unchecked(determinant(F)),
+    );
+    real(logarithm)
 }
 
 /// `F F^T - I`, to full relative accuracy at small strain.

@@ -141,6 +141,44 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
 
 #endif
 
+#ifndef MMSMITH_LOG_1P
+#define MMSMITH_LOG_1P 1
+
+/* ln(1 + x), within one unit in the last place, by the reduction and the polynomial of Sun's fdlibm. */
+MMSMITH_FN double mmsmith_log_1p(double x)
+{
+    const double sum = 1.0 + x;
+    /* What rounding took from the sum. */
+    const double lost = x < 1.0 ? x - (sum - 1.0) : 1.0 - (sum - x);
+    double m, f, correction, s, z, w, even, odd, half_square, tail;
+    int k;
+    if (!(sum > 0.0 && x - x == 0.0)) {
+        return sum == 0.0 ? -HUGE_VAL : sum > 0.0 ? sum : NAN;
+    }
+    /* sum = 2^k m with m between sqrt(1/2) and sqrt(2). */
+    m = frexp(sum, &k);
+    if (m < 0.7071065902709961) {
+        m += m;
+        --k;
+    }
+    /* With k = 0 x itself has digits that the sum has lost. */
+    f = k == 0 ? x : m - 1.0;
+    /* lost / sum, which two digits of 1/m are enough for. */
+    correction = k == 0 || k > 1022 ? 0.0 : lost * ldexp(1.0, -k) * (1.0 - f + f * f);
+    s = f / (2.0 + f);
+    z = s * s;
+    w = z * z;
+    even = w * (3.9999999999409419e-1 + w * (2.2222198432149784e-1 + w * 1.5313837699209373e-1));
+    odd = z
+        * (6.6666666666667351e-1
+            + w * (2.8571428743662391e-1 + w * (1.818357216161805e-1 + w * 1.4798198605116586e-1)));
+    half_square = 0.5 * f * f;
+    tail = s * (half_square + (even + odd)) + (k * 1.9082149292705877e-10 + correction);
+    return k * 6.931471803691238e-1 - ((half_square - tail) - f);
+}
+
+#endif
+
 /* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
 enum {
     axis_aligned_dimension = 2,
@@ -389,7 +427,7 @@ MMSMITH_FN void axis_aligned_P(const axis_aligned_solution *s, const double X[2]
     const double t53 = t14 * t39;
     const double t54 = t52 + t53;
     const double t55 = s->fixed[1] * t54;
-    const double t56 = log1p(t55);
+    const double t56 = mmsmith_log_1p(t55);
     const double t60 = t37 + 2.0;
     const double t64 = s->fixed[5] * t56;
     const double t66 = s->fixed[6] * t9;
@@ -431,7 +469,7 @@ MMSMITH_FN void axis_aligned_b(const axis_aligned_solution *s, const double X[2]
     const double t93 = t14 * t92;
     const double t94 = t93 + t89;
     const double t95 = s->fixed[1] * t94;
-    const double t96 = log1p(t95);
+    const double t96 = mmsmith_log_1p(t95);
     const double t97 = s->fixed[5] * t96;
     const double t98 = s->fixed[4] * t90;
     const double t99 = t97 + t98;
@@ -492,7 +530,7 @@ MMSMITH_FN void axis_aligned_X_lower_traction(const axis_aligned_solution *s, co
     const double t189 = t9 * t44;
     const double t190 = t189 + t53;
     const double t191 = s->fixed[1] * t190;
-    const double t192 = log1p(t191);
+    const double t192 = mmsmith_log_1p(t191);
     const double t193 = t36 + 2.0;
     const double t194 = s->fixed[5] * t192;
     const double t195 = t9 * t193;
@@ -523,7 +561,7 @@ MMSMITH_FN void axis_aligned_X_upper_traction(const axis_aligned_solution *s, co
     const double t202 = t189 - t53;
     const double t203 = s->fixed[1] * t202;
     const double t204 = -t203;
-    const double t205 = log1p(t204);
+    const double t205 = mmsmith_log_1p(t204);
     const double t206 = 2.0 - t36;
     const double t207 = s->fixed[5] * t205;
     const double t208 = t9 * t206;
@@ -552,7 +590,7 @@ MMSMITH_FN void axis_aligned_Y_lower_traction(const axis_aligned_solution *s, co
     const double t214 = t14 * t43;
     const double t215 = t214 + t89;
     const double t216 = s->fixed[1] * t215;
-    const double t217 = log1p(t216);
+    const double t217 = mmsmith_log_1p(t216);
     const double t218 = t40 + 2.0;
     const double t219 = s->fixed[5] * t217;
     const double t220 = t14 * t218;
@@ -583,7 +621,7 @@ MMSMITH_FN void axis_aligned_Y_upper_traction(const axis_aligned_solution *s, co
     const double t227 = t214 - t89;
     const double t228 = s->fixed[1] * t227;
     const double t229 = -t228;
-    const double t230 = log1p(t229);
+    const double t230 = mmsmith_log_1p(t229);
     const double t231 = 2.0 - t40;
     const double t232 = s->fixed[5] * t230;
     const double t233 = t14 * t231;
@@ -632,7 +670,7 @@ MMSMITH_FN void axis_aligned_fields(const axis_aligned_solution *s, const double
     const double t53 = t14 * t39;
     const double t54 = t52 + t53;
     const double t55 = s->fixed[1] * t54;
-    const double t56 = log1p(t55);
+    const double t56 = mmsmith_log_1p(t55);
     const double t60 = t37 + 2.0;
     const double t64 = s->fixed[5] * t56;
     const double t66 = s->fixed[6] * t9;
@@ -657,7 +695,7 @@ MMSMITH_FN void axis_aligned_fields(const axis_aligned_solution *s, const double
     const double t93 = t14 * t92;
     const double t94 = t93 + t89;
     const double t95 = s->fixed[1] * t94;
-    const double t96 = log1p(t95);
+    const double t96 = mmsmith_log_1p(t95);
     const double t97 = s->fixed[5] * t96;
     const double t98 = s->fixed[4] * t90;
     const double t99 = t97 + t98;
@@ -788,7 +826,7 @@ MMSMITH_FN void axis_aligned_b_staged(const axis_aligned_solution *s, const axis
     const double t53 = time->values[1] * point[stride];
     const double t54 = t52 + t53;
     const double t55 = s->fixed[1] * t54;
-    const double t56 = log1p(t55);
+    const double t56 = mmsmith_log_1p(t55);
     const double t70 = 1.0 / t43;
     const double t77 = 1.0 / t44;
     const double t156 = time->values[0] * point[3 * stride];
@@ -858,7 +896,7 @@ MMSMITH_FN void axis_aligned_b_array(const axis_aligned_solution *s, double t, s
         const double t53 = time.values[1] * point1[p];
         const double t54 = t52 + t53;
         const double t55 = s->fixed[1] * t54;
-        const double t56 = log1p(t55);
+        const double t56 = mmsmith_log_1p(t55);
         const double t70 = 1.0 / t43;
         const double t77 = 1.0 / t44;
         const double t156 = time.values[0] * point3[p];

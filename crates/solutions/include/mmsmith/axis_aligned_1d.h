@@ -138,6 +138,44 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
 
 #endif
 
+#ifndef MMSMITH_LOG_1P
+#define MMSMITH_LOG_1P 1
+
+/* ln(1 + x), within one unit in the last place, by the reduction and the polynomial of Sun's fdlibm. */
+MMSMITH_FN double mmsmith_log_1p(double x)
+{
+    const double sum = 1.0 + x;
+    /* What rounding took from the sum. */
+    const double lost = x < 1.0 ? x - (sum - 1.0) : 1.0 - (sum - x);
+    double m, f, correction, s, z, w, even, odd, half_square, tail;
+    int k;
+    if (!(sum > 0.0 && x - x == 0.0)) {
+        return sum == 0.0 ? -HUGE_VAL : sum > 0.0 ? sum : NAN;
+    }
+    /* sum = 2^k m with m between sqrt(1/2) and sqrt(2). */
+    m = frexp(sum, &k);
+    if (m < 0.7071065902709961) {
+        m += m;
+        --k;
+    }
+    /* With k = 0 x itself has digits that the sum has lost. */
+    f = k == 0 ? x : m - 1.0;
+    /* lost / sum, which two digits of 1/m are enough for. */
+    correction = k == 0 || k > 1022 ? 0.0 : lost * ldexp(1.0, -k) * (1.0 - f + f * f);
+    s = f / (2.0 + f);
+    z = s * s;
+    w = z * z;
+    even = w * (3.9999999999409419e-1 + w * (2.2222198432149784e-1 + w * 1.5313837699209373e-1));
+    odd = z
+        * (6.6666666666667351e-1
+            + w * (2.8571428743662391e-1 + w * (1.818357216161805e-1 + w * 1.4798198605116586e-1)));
+    half_square = 0.5 * f * f;
+    tail = s * (half_square + (even + odd)) + (k * 1.9082149292705877e-10 + correction);
+    return k * 6.931471803691238e-1 - ((half_square - tail) - f);
+}
+
+#endif
+
 /* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
 enum {
     axis_aligned_1d_dimension = 1,
@@ -343,7 +381,7 @@ MMSMITH_FN void axis_aligned_1d_P(const axis_aligned_1d_solution *s, const doubl
     const double t27 = s->fixed[1] * t9;
     const double t28 = t27 * t26;
     const double t30 = t28 + 1.0;
-    const double t36 = log1p(t28);
+    const double t36 = mmsmith_log_1p(t28);
     const double t40 = t28 + 2.0;
     const double t44 = s->fixed[6] * t36;
     const double t46 = s->fixed[7] * t9;
@@ -365,7 +403,7 @@ MMSMITH_FN void axis_aligned_1d_b(const axis_aligned_1d_solution *s, const doubl
     const double t27 = s->fixed[1] * t9;
     const double t28 = t27 * t26;
     const double t30 = t28 + 1.0;
-    const double t36 = log1p(t28);
+    const double t36 = mmsmith_log_1p(t28);
     const double t44 = s->fixed[6] * t36;
     const double t46 = s->fixed[7] * t9;
     const double t47 = t46 * t26;
@@ -404,7 +442,7 @@ MMSMITH_FN void axis_aligned_1d_X_lower_traction(const axis_aligned_1d_solution 
     const double t9 = mmsmith_cos_pi(t8);
     const double t27 = s->fixed[1] * t9;
     const double t119 = t27 + 1.0;
-    const double t120 = log1p(t27);
+    const double t120 = mmsmith_log_1p(t27);
     const double t121 = t27 + 2.0;
     const double t122 = s->fixed[6] * t120;
     const double t123 = t9 * t121;
@@ -425,7 +463,7 @@ MMSMITH_FN void axis_aligned_1d_X_upper_traction(const axis_aligned_1d_solution 
     const double t27 = s->fixed[1] * t9;
     const double t128 = 1.0 - t27;
     const double t129 = -t27;
-    const double t130 = log1p(t129);
+    const double t130 = mmsmith_log_1p(t129);
     const double t131 = 2.0 - t27;
     const double t132 = s->fixed[6] * t130;
     const double t133 = t9 * t131;
@@ -454,7 +492,7 @@ MMSMITH_FN void axis_aligned_1d_fields(const axis_aligned_1d_solution *s, const 
     const double t27 = s->fixed[1] * t9;
     const double t28 = t27 * t26;
     const double t30 = t28 + 1.0;
-    const double t36 = log1p(t28);
+    const double t36 = mmsmith_log_1p(t28);
     const double t40 = t28 + 2.0;
     const double t44 = s->fixed[6] * t36;
     const double t46 = s->fixed[7] * t9;
@@ -537,7 +575,7 @@ MMSMITH_FN void axis_aligned_1d_b_staged(const axis_aligned_1d_solution *s, cons
     (void)s;
     const double t28 = time->values[1] * point[0];
     const double t30 = t28 + 1.0;
-    const double t36 = log1p(t28);
+    const double t36 = mmsmith_log_1p(t28);
     const double t50 = 1.0 / t30;
     const double t104 = time->values[0] * point[2 * stride];
     const double t105 = t104 - point[3 * stride];
@@ -584,7 +622,7 @@ MMSMITH_FN void axis_aligned_1d_b_array(const axis_aligned_1d_solution *s, doubl
     for (p = first; p < end; ++p) {
         const double t28 = time.values[1] * point0[p];
         const double t30 = t28 + 1.0;
-        const double t36 = log1p(t28);
+        const double t36 = mmsmith_log_1p(t28);
         const double t50 = 1.0 / t30;
         const double t104 = time.values[0] * point2[p];
         const double t105 = t104 - point3[p];

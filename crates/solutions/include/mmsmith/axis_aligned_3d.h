@@ -144,6 +144,44 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
 
 #endif
 
+#ifndef MMSMITH_LOG_1P
+#define MMSMITH_LOG_1P 1
+
+/* ln(1 + x), within one unit in the last place, by the reduction and the polynomial of Sun's fdlibm. */
+MMSMITH_FN double mmsmith_log_1p(double x)
+{
+    const double sum = 1.0 + x;
+    /* What rounding took from the sum. */
+    const double lost = x < 1.0 ? x - (sum - 1.0) : 1.0 - (sum - x);
+    double m, f, correction, s, z, w, even, odd, half_square, tail;
+    int k;
+    if (!(sum > 0.0 && x - x == 0.0)) {
+        return sum == 0.0 ? -HUGE_VAL : sum > 0.0 ? sum : NAN;
+    }
+    /* sum = 2^k m with m between sqrt(1/2) and sqrt(2). */
+    m = frexp(sum, &k);
+    if (m < 0.7071065902709961) {
+        m += m;
+        --k;
+    }
+    /* With k = 0 x itself has digits that the sum has lost. */
+    f = k == 0 ? x : m - 1.0;
+    /* lost / sum, which two digits of 1/m are enough for. */
+    correction = k == 0 || k > 1022 ? 0.0 : lost * ldexp(1.0, -k) * (1.0 - f + f * f);
+    s = f / (2.0 + f);
+    z = s * s;
+    w = z * z;
+    even = w * (3.9999999999409419e-1 + w * (2.2222198432149784e-1 + w * 1.5313837699209373e-1));
+    odd = z
+        * (6.6666666666667351e-1
+            + w * (2.8571428743662391e-1 + w * (1.818357216161805e-1 + w * 1.4798198605116586e-1)));
+    half_square = 0.5 * f * f;
+    tail = s * (half_square + (even + odd)) + (k * 1.9082149292705877e-10 + correction);
+    return k * 6.931471803691238e-1 - ((half_square - tail) - f);
+}
+
+#endif
+
 /* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
 enum {
     axis_aligned_3d_dimension = 3,
@@ -497,7 +535,7 @@ MMSMITH_FN void axis_aligned_3d_P(const axis_aligned_3d_solution *s, const doubl
     const double t96 = s->fixed[3] * t95;
     const double t97 = t96 + t91;
     const double t98 = t97 - t70;
-    const double t99 = log1p(t98);
+    const double t99 = mmsmith_log_1p(t98);
     const double t102 = t62 + 2.0;
     const double t106 = s->fixed[11] * t99;
     const double t108 = s->fixed[12] * t9;
@@ -563,7 +601,7 @@ MMSMITH_FN void axis_aligned_3d_b(const axis_aligned_3d_solution *s, const doubl
     const double t96 = s->fixed[3] * t95;
     const double t97 = t96 + t91;
     const double t98 = t97 - t70;
-    const double t99 = log1p(t98);
+    const double t99 = mmsmith_log_1p(t98);
     const double t106 = s->fixed[11] * t99;
     const double t108 = s->fixed[12] * t9;
     const double t109 = t108 * t60;
@@ -658,7 +696,7 @@ MMSMITH_FN void axis_aligned_3d_X_lower_traction(const axis_aligned_3d_solution 
     const double t273 = t272 + t91;
     const double t274 = t273 - t70;
     const double t275 = t61 + t274;
-    const double t276 = log1p(t275);
+    const double t276 = mmsmith_log_1p(t275);
     const double t277 = t61 + 2.0;
     const double t278 = s->fixed[11] * t276;
     const double t279 = t9 * t277;
@@ -700,7 +738,7 @@ MMSMITH_FN void axis_aligned_3d_X_upper_traction(const axis_aligned_3d_solution 
     const double t286 = t91 - t272;
     const double t287 = t286 - t70;
     const double t288 = t287 - t61;
-    const double t289 = log1p(t288);
+    const double t289 = mmsmith_log_1p(t288);
     const double t290 = 2.0 - t61;
     const double t291 = s->fixed[11] * t289;
     const double t292 = t9 * t290;
@@ -739,7 +777,7 @@ MMSMITH_FN void axis_aligned_3d_Y_lower_traction(const axis_aligned_3d_solution 
     const double t303 = s->fixed[3] * t302;
     const double t304 = t303 + t299;
     const double t305 = t304 - t65;
-    const double t306 = log1p(t305);
+    const double t306 = mmsmith_log_1p(t305);
     const double t307 = t297 + 2.0;
     const double t308 = s->fixed[11] * t306;
     const double t309 = t297 * t307;
@@ -778,7 +816,7 @@ MMSMITH_FN void axis_aligned_3d_Y_upper_traction(const axis_aligned_3d_solution 
     const double t320 = s->fixed[3] * t319;
     const double t321 = t320 + t316;
     const double t322 = t65 + t321;
-    const double t323 = log1p(t322);
+    const double t323 = mmsmith_log_1p(t322);
     const double t324 = t65 + 2.0;
     const double t325 = s->fixed[11] * t323;
     const double t326 = t65 * t324;
@@ -817,7 +855,7 @@ MMSMITH_FN void axis_aligned_3d_Z_lower_traction(const axis_aligned_3d_solution 
     const double t337 = s->fixed[3] * t336;
     const double t338 = t337 + t333;
     const double t339 = t338 - t69;
-    const double t340 = log1p(t339);
+    const double t340 = mmsmith_log_1p(t339);
     const double t341 = t331 + 2.0;
     const double t342 = s->fixed[11] * t340;
     const double t343 = t331 * t341;
@@ -856,7 +894,7 @@ MMSMITH_FN void axis_aligned_3d_Z_upper_traction(const axis_aligned_3d_solution 
     const double t354 = s->fixed[3] * t353;
     const double t355 = t354 + t350;
     const double t356 = t69 + t355;
-    const double t357 = log1p(t356);
+    const double t357 = mmsmith_log_1p(t356);
     const double t358 = t69 + 2.0;
     const double t359 = s->fixed[11] * t357;
     const double t360 = t69 * t358;
@@ -939,7 +977,7 @@ MMSMITH_FN void axis_aligned_3d_fields(const axis_aligned_3d_solution *s, const 
     const double t96 = s->fixed[3] * t95;
     const double t97 = t96 + t91;
     const double t98 = t97 - t70;
-    const double t99 = log1p(t98);
+    const double t99 = mmsmith_log_1p(t98);
     const double t102 = t62 + 2.0;
     const double t106 = s->fixed[11] * t99;
     const double t108 = s->fixed[12] * t9;
@@ -1150,7 +1188,7 @@ MMSMITH_FN void axis_aligned_3d_b_staged(const axis_aligned_3d_solution *s, cons
     const double t96 = s->fixed[3] * t95;
     const double t97 = t96 + t91;
     const double t98 = t97 - t70;
-    const double t99 = log1p(t98);
+    const double t99 = mmsmith_log_1p(t98);
     const double t112 = 1.0 / t73;
     const double t118 = 1.0 / t83;
     const double t124 = 1.0 / t84;
@@ -1243,7 +1281,7 @@ MMSMITH_FN void axis_aligned_3d_b_array(const axis_aligned_3d_solution *s, doubl
         const double t96 = s->fixed[3] * t95;
         const double t97 = t96 + t91;
         const double t98 = t97 - t70;
-        const double t99 = log1p(t98);
+        const double t99 = mmsmith_log_1p(t98);
         const double t112 = 1.0 / t73;
         const double t118 = 1.0 / t83;
         const double t124 = 1.0 / t84;

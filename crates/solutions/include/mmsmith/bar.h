@@ -134,6 +134,44 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
 
 #endif
 
+#ifndef MMSMITH_LOG_1P
+#define MMSMITH_LOG_1P 1
+
+/* ln(1 + x), within one unit in the last place, by the reduction and the polynomial of Sun's fdlibm. */
+MMSMITH_FN double mmsmith_log_1p(double x)
+{
+    const double sum = 1.0 + x;
+    /* What rounding took from the sum. */
+    const double lost = x < 1.0 ? x - (sum - 1.0) : 1.0 - (sum - x);
+    double m, f, correction, s, z, w, even, odd, half_square, tail;
+    int k;
+    if (!(sum > 0.0 && x - x == 0.0)) {
+        return sum == 0.0 ? -HUGE_VAL : sum > 0.0 ? sum : NAN;
+    }
+    /* sum = 2^k m with m between sqrt(1/2) and sqrt(2). */
+    m = frexp(sum, &k);
+    if (m < 0.7071065902709961) {
+        m += m;
+        --k;
+    }
+    /* With k = 0 x itself has digits that the sum has lost. */
+    f = k == 0 ? x : m - 1.0;
+    /* lost / sum, which two digits of 1/m are enough for. */
+    correction = k == 0 || k > 1022 ? 0.0 : lost * ldexp(1.0, -k) * (1.0 - f + f * f);
+    s = f / (2.0 + f);
+    z = s * s;
+    w = z * z;
+    even = w * (3.9999999999409419e-1 + w * (2.2222198432149784e-1 + w * 1.5313837699209373e-1));
+    odd = z
+        * (6.6666666666667351e-1
+            + w * (2.8571428743662391e-1 + w * (1.818357216161805e-1 + w * 1.4798198605116586e-1)));
+    half_square = 0.5 * f * f;
+    tail = s * (half_square + (even + odd)) + (k * 1.9082149292705877e-10 + correction);
+    return k * 6.931471803691238e-1 - ((half_square - tail) - f);
+}
+
+#endif
+
 /* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
 enum {
     bar_dimension = 1,
@@ -377,7 +415,7 @@ MMSMITH_FN void bar_P(const bar_solution *s, const double X[1], double t, double
     const double t38 = s->fixed[6] * t14;
     const double t39 = t38 * t34;
     const double t41 = t39 + 1.0;
-    const double t46 = log1p(t39);
+    const double t46 = mmsmith_log_1p(t39);
     const double t50 = t39 + 2.0;
     const double t54 = s->fixed[8] * t46;
     const double t55 = t39 * t50;
@@ -399,7 +437,7 @@ MMSMITH_FN void bar_b(const bar_solution *s, const double X[1], double t, double
     const double t38 = s->fixed[6] * t14;
     const double t39 = t38 * t34;
     const double t41 = t39 + 1.0;
-    const double t46 = log1p(t39);
+    const double t46 = mmsmith_log_1p(t39);
     const double t54 = s->fixed[8] * t46;
     const double t58 = 1.0 / t41;
     const double t68 = s->fixed[9] * t14;
@@ -434,7 +472,7 @@ MMSMITH_FN void bar_X_lower_traction(const bar_solution *s, const double X[1], d
     const double t14 = mmsmith_cos_pi(t13);
     const double t38 = s->fixed[6] * t14;
     const double t138 = t38 + 1.0;
-    const double t139 = log1p(t38);
+    const double t139 = mmsmith_log_1p(t38);
     const double t140 = t38 + 2.0;
     const double t141 = s->fixed[8] * t139;
     const double t142 = t38 * t140;
@@ -454,7 +492,7 @@ MMSMITH_FN void bar_X_upper_traction(const bar_solution *s, const double X[1], d
     const double t14 = mmsmith_cos_pi(t13);
     const double t38 = s->fixed[6] * t14;
     const double t138 = t38 + 1.0;
-    const double t139 = log1p(t38);
+    const double t139 = mmsmith_log_1p(t38);
     const double t140 = t38 + 2.0;
     const double t141 = s->fixed[8] * t139;
     const double t142 = t38 * t140;
@@ -484,7 +522,7 @@ MMSMITH_FN void bar_fields(const bar_solution *s, const double X[1], double t, b
     const double t38 = s->fixed[6] * t14;
     const double t39 = t38 * t34;
     const double t41 = t39 + 1.0;
-    const double t46 = log1p(t39);
+    const double t46 = mmsmith_log_1p(t39);
     const double t50 = t39 + 2.0;
     const double t54 = s->fixed[8] * t46;
     const double t55 = t39 * t50;
@@ -565,7 +603,7 @@ MMSMITH_FN void bar_b_staged(const bar_solution *s, const bar_time_values *time,
     (void)s;
     const double t39 = time->values[1] * point[0];
     const double t41 = t39 + 1.0;
-    const double t46 = log1p(t39);
+    const double t46 = mmsmith_log_1p(t39);
     const double t58 = 1.0 / t41;
     const double t117 = time->values[0] * point[2 * stride];
     const double t118 = t117 - point[3 * stride];
@@ -612,7 +650,7 @@ MMSMITH_FN void bar_b_array(const bar_solution *s, double t, size_t n,
     for (p = first; p < end; ++p) {
         const double t39 = time.values[1] * point0[p];
         const double t41 = t39 + 1.0;
-        const double t46 = log1p(t39);
+        const double t46 = mmsmith_log_1p(t39);
         const double t58 = 1.0 / t41;
         const double t117 = time.values[0] * point2[p];
         const double t118 = t117 - point3[p];

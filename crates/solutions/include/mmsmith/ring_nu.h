@@ -139,6 +139,44 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
 
 #endif
 
+#ifndef MMSMITH_LOG_1P
+#define MMSMITH_LOG_1P 1
+
+/* ln(1 + x), within one unit in the last place, by the reduction and the polynomial of Sun's fdlibm. */
+MMSMITH_FN double mmsmith_log_1p(double x)
+{
+    const double sum = 1.0 + x;
+    /* What rounding took from the sum. */
+    const double lost = x < 1.0 ? x - (sum - 1.0) : 1.0 - (sum - x);
+    double m, f, correction, s, z, w, even, odd, half_square, tail;
+    int k;
+    if (!(sum > 0.0 && x - x == 0.0)) {
+        return sum == 0.0 ? -HUGE_VAL : sum > 0.0 ? sum : NAN;
+    }
+    /* sum = 2^k m with m between sqrt(1/2) and sqrt(2). */
+    m = frexp(sum, &k);
+    if (m < 0.7071065902709961) {
+        m += m;
+        --k;
+    }
+    /* With k = 0 x itself has digits that the sum has lost. */
+    f = k == 0 ? x : m - 1.0;
+    /* lost / sum, which two digits of 1/m are enough for. */
+    correction = k == 0 || k > 1022 ? 0.0 : lost * ldexp(1.0, -k) * (1.0 - f + f * f);
+    s = f / (2.0 + f);
+    z = s * s;
+    w = z * z;
+    even = w * (3.9999999999409419e-1 + w * (2.2222198432149784e-1 + w * 1.5313837699209373e-1));
+    odd = z
+        * (6.6666666666667351e-1
+            + w * (2.8571428743662391e-1 + w * (1.818357216161805e-1 + w * 1.4798198605116586e-1)));
+    half_square = 0.5 * f * f;
+    tail = s * (half_square + (even + odd)) + (k * 1.9082149292705877e-10 + correction);
+    return k * 6.931471803691238e-1 - ((half_square - tail) - f);
+}
+
+#endif
+
 /* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
 enum {
     ring_nu_dimension = 2,
@@ -587,7 +625,7 @@ MMSMITH_FN void ring_nu_P(const ring_nu_solution *s, const double X[2], double t
     const double t101 = t100 * t92;
     const double t102 = s->par.A * t101;
     const double t103 = t102 + t91;
-    const double t104 = log1p(t103);
+    const double t104 = mmsmith_log_1p(t103);
     const double t108 = t91 + 2.0;
     const double t112 = s->fixed[11] * t104;
     const double t113 = t91 * t108;
@@ -667,7 +705,7 @@ MMSMITH_FN void ring_nu_b(const ring_nu_solution *s, const double X[2], double t
     const double t158 = t157 + 1.0;
     const double t159 = t157 * t94;
     const double t160 = t159 + t93;
-    const double t161 = log1p(t160);
+    const double t161 = mmsmith_log_1p(t160);
     const double t162 = s->fixed[11] * t161;
     const double t163 = s->fixed[10] * t157;
     const double t164 = t162 + t163;
@@ -715,7 +753,7 @@ MMSMITH_FN void ring_nu_inner_traction(const ring_nu_solution *s, const double X
     const double t12 = s->fixed[0] * t;
     const double t13 = mmsmith_cos_pi(t12);
     const double t323 = s->fixed[27] * t13;
-    const double t324 = log1p(t323);
+    const double t324 = mmsmith_log_1p(t323);
     const double t328 = s->fixed[28] * t324;
     const double t329 = t328 * X[0];
     const double t330 = -t329;
@@ -732,7 +770,7 @@ MMSMITH_FN void ring_nu_outer_traction(const ring_nu_solution *s, const double X
     const double t12 = s->fixed[0] * t;
     const double t13 = mmsmith_cos_pi(t12);
     const double t334 = s->fixed[29] * t13;
-    const double t335 = log1p(t334);
+    const double t335 = mmsmith_log_1p(t334);
     const double t339 = s->fixed[30] * t335;
     const double t340 = t339 * X[0];
     const double t341 = t339 * X[1];
@@ -772,7 +810,7 @@ MMSMITH_FN void ring_nu_X_lower_traction(const ring_nu_solution *s, const double
     const double t101 = t100 * t92;
     const double t102 = s->par.A * t101;
     const double t103 = t102 + t91;
-    const double t104 = log1p(t103);
+    const double t104 = mmsmith_log_1p(t103);
     const double t112 = s->fixed[11] * t104;
     const double t116 = t93 + 2.0;
     const double t118 = s->fixed[12] * t13;
@@ -820,7 +858,7 @@ MMSMITH_FN void ring_nu_Y_lower_traction(const ring_nu_solution *s, const double
     const double t101 = t100 * t92;
     const double t102 = s->par.A * t101;
     const double t103 = t102 + t91;
-    const double t104 = log1p(t103);
+    const double t104 = mmsmith_log_1p(t103);
     const double t112 = s->fixed[11] * t104;
     const double t116 = t93 + 2.0;
     const double t118 = s->fixed[12] * t13;
@@ -909,7 +947,7 @@ MMSMITH_FN void ring_nu_fields(const ring_nu_solution *s, const double X[2], dou
     const double t101 = t100 * t92;
     const double t102 = s->par.A * t101;
     const double t103 = t102 + t91;
-    const double t104 = log1p(t103);
+    const double t104 = mmsmith_log_1p(t103);
     const double t108 = t91 + 2.0;
     const double t112 = s->fixed[11] * t104;
     const double t113 = t91 * t108;
@@ -955,7 +993,7 @@ MMSMITH_FN void ring_nu_fields(const ring_nu_solution *s, const double X[2], dou
     const double t158 = t157 + 1.0;
     const double t159 = t157 * t94;
     const double t160 = t159 + t93;
-    const double t161 = log1p(t160);
+    const double t161 = mmsmith_log_1p(t160);
     const double t162 = s->fixed[11] * t161;
     const double t163 = s->fixed[10] * t157;
     const double t164 = t162 + t163;
@@ -1149,7 +1187,7 @@ MMSMITH_FN void ring_nu_b_staged(const ring_nu_solution *s, const ring_nu_time_v
     const double t101 = t100 * t92;
     const double t102 = s->par.A * t101;
     const double t103 = t102 + t91;
-    const double t104 = log1p(t103);
+    const double t104 = mmsmith_log_1p(t103);
     const double t269 = time->values[0] * point[4 * stride];
     const double t270 = point[5 * stride] + t269;
     const double t295 = time->values[0] * t270;
@@ -1214,7 +1252,7 @@ MMSMITH_FN void ring_nu_b_array(const ring_nu_solution *s, double t, size_t n,
         const double t101 = t100 * t92;
         const double t102 = s->par.A * t101;
         const double t103 = t102 + t91;
-        const double t104 = log1p(t103);
+        const double t104 = mmsmith_log_1p(t103);
         const double t269 = time.values[0] * point4[p];
         const double t270 = point5[p] + t269;
         const double t295 = time.values[0] * t270;

@@ -138,6 +138,44 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
 
 #endif
 
+#ifndef MMSMITH_LOG_1P
+#define MMSMITH_LOG_1P 1
+
+/* ln(1 + x), within one unit in the last place, by the reduction and the polynomial of Sun's fdlibm. */
+MMSMITH_FN double mmsmith_log_1p(double x)
+{
+    const double sum = 1.0 + x;
+    /* What rounding took from the sum. */
+    const double lost = x < 1.0 ? x - (sum - 1.0) : 1.0 - (sum - x);
+    double m, f, correction, s, z, w, even, odd, half_square, tail;
+    int k;
+    if (!(sum > 0.0 && x - x == 0.0)) {
+        return sum == 0.0 ? -HUGE_VAL : sum > 0.0 ? sum : NAN;
+    }
+    /* sum = 2^k m with m between sqrt(1/2) and sqrt(2). */
+    m = frexp(sum, &k);
+    if (m < 0.7071065902709961) {
+        m += m;
+        --k;
+    }
+    /* With k = 0 x itself has digits that the sum has lost. */
+    f = k == 0 ? x : m - 1.0;
+    /* lost / sum, which two digits of 1/m are enough for. */
+    correction = k == 0 || k > 1022 ? 0.0 : lost * ldexp(1.0, -k) * (1.0 - f + f * f);
+    s = f / (2.0 + f);
+    z = s * s;
+    w = z * z;
+    even = w * (3.9999999999409419e-1 + w * (2.2222198432149784e-1 + w * 1.5313837699209373e-1));
+    odd = z
+        * (6.6666666666667351e-1
+            + w * (2.8571428743662391e-1 + w * (1.818357216161805e-1 + w * 1.4798198605116586e-1)));
+    half_square = 0.5 * f * f;
+    tail = s * (half_square + (even + odd)) + (k * 1.9082149292705877e-10 + correction);
+    return k * 6.931471803691238e-1 - ((half_square - tail) - f);
+}
+
+#endif
+
 /* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
 enum {
     skew_2d_dimension = 2,
@@ -641,7 +679,7 @@ MMSMITH_FN void skew_2d_P(const skew_2d_solution *s, const double X[2], double t
     const double t94 = t65 * t86;
     const double t95 = t94 + t78;
     const double t96 = t95 - t88;
-    const double t97 = log1p(t96);
+    const double t97 = mmsmith_log_1p(t96);
     const double t100 = 2.0 * t65;
     const double t101 = t65 * t65;
     const double t103 = t13 * t13;
@@ -742,7 +780,7 @@ MMSMITH_FN void skew_2d_b(const skew_2d_solution *s, const double X[2], double t
     const double t94 = t65 * t86;
     const double t95 = t94 + t78;
     const double t96 = t95 - t88;
-    const double t97 = log1p(t96);
+    const double t97 = mmsmith_log_1p(t96);
     const double t112 = s->fixed[10] * t97;
     const double t126 = 1.0 / t89;
     const double t152 = t67 * t72;
@@ -958,7 +996,7 @@ MMSMITH_FN void skew_2d_X_lower_traction(const skew_2d_solution *s, const double
     const double t640 = t629 * t634;
     const double t641 = t640 + t633;
     const double t642 = t641 - t638;
-    const double t643 = log1p(t642);
+    const double t643 = mmsmith_log_1p(t642);
     const double t644 = 2.0 * t629;
     const double t645 = t629 * t629;
     const double t646 = t628 * t628;
@@ -1036,7 +1074,7 @@ MMSMITH_FN void skew_2d_X_upper_traction(const skew_2d_solution *s, const double
     const double t697 = t680 * t687;
     const double t698 = t697 + t686;
     const double t699 = t698 - t695;
-    const double t700 = log1p(t699);
+    const double t700 = mmsmith_log_1p(t699);
     const double t701 = 2.0 * t680;
     const double t702 = t680 * t680;
     const double t703 = t679 * t679;
@@ -1097,7 +1135,7 @@ MMSMITH_FN void skew_2d_Y_lower_traction(const skew_2d_solution *s, const double
     const double t738 = t64 * t733;
     const double t739 = t738 * t737;
     const double t740 = t739 + t736;
-    const double t741 = log1p(t740);
+    const double t741 = mmsmith_log_1p(t740);
     const double t742 = t736 + 2.0;
     const double t743 = s->fixed[10] * t741;
     const double t744 = t736 * t742;
@@ -1144,7 +1182,7 @@ MMSMITH_FN void skew_2d_Y_upper_traction(const skew_2d_solution *s, const double
     const double t762 = t751 * t754;
     const double t763 = t762 + t753;
     const double t764 = t763 - t760;
-    const double t765 = log1p(t764);
+    const double t765 = mmsmith_log_1p(t764);
     const double t766 = 2.0 * t751;
     const double t767 = t751 * t751;
     const double t768 = t750 * t750;
@@ -1250,7 +1288,7 @@ MMSMITH_FN void skew_2d_fields(const skew_2d_solution *s, const double X[2], dou
     const double t94 = t65 * t86;
     const double t95 = t94 + t78;
     const double t96 = t95 - t88;
-    const double t97 = log1p(t96);
+    const double t97 = mmsmith_log_1p(t96);
     const double t100 = 2.0 * t65;
     const double t101 = t65 * t65;
     const double t103 = t13 * t13;
@@ -1775,7 +1813,7 @@ MMSMITH_FN void skew_2d_b_staged(const skew_2d_solution *s, const skew_2d_time_v
     const double t94 = t65 * t86;
     const double t95 = t94 + t78;
     const double t96 = t95 - t88;
-    const double t97 = log1p(t96);
+    const double t97 = mmsmith_log_1p(t96);
     const double t112 = s->fixed[10] * t97;
     const double t126 = 1.0 / t89;
     const double t157 = time->values[5] * point[0];
@@ -1993,7 +2031,7 @@ MMSMITH_FN void skew_2d_b_array(const skew_2d_solution *s, double t, size_t n,
         const double t94 = t65 * t86;
         const double t95 = t94 + t78;
         const double t96 = t95 - t88;
-        const double t97 = log1p(t96);
+        const double t97 = mmsmith_log_1p(t96);
         const double t112 = s->fixed[10] * t97;
         const double t126 = 1.0 / t89;
         const double t157 = time.values[5] * point0[p];

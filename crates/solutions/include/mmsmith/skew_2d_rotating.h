@@ -141,6 +141,44 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
 
 #endif
 
+#ifndef MMSMITH_LOG_1P
+#define MMSMITH_LOG_1P 1
+
+/* ln(1 + x), within one unit in the last place, by the reduction and the polynomial of Sun's fdlibm. */
+MMSMITH_FN double mmsmith_log_1p(double x)
+{
+    const double sum = 1.0 + x;
+    /* What rounding took from the sum. */
+    const double lost = x < 1.0 ? x - (sum - 1.0) : 1.0 - (sum - x);
+    double m, f, correction, s, z, w, even, odd, half_square, tail;
+    int k;
+    if (!(sum > 0.0 && x - x == 0.0)) {
+        return sum == 0.0 ? -HUGE_VAL : sum > 0.0 ? sum : NAN;
+    }
+    /* sum = 2^k m with m between sqrt(1/2) and sqrt(2). */
+    m = frexp(sum, &k);
+    if (m < 0.7071065902709961) {
+        m += m;
+        --k;
+    }
+    /* With k = 0 x itself has digits that the sum has lost. */
+    f = k == 0 ? x : m - 1.0;
+    /* lost / sum, which two digits of 1/m are enough for. */
+    correction = k == 0 || k > 1022 ? 0.0 : lost * ldexp(1.0, -k) * (1.0 - f + f * f);
+    s = f / (2.0 + f);
+    z = s * s;
+    w = z * z;
+    even = w * (3.9999999999409419e-1 + w * (2.2222198432149784e-1 + w * 1.5313837699209373e-1));
+    odd = z
+        * (6.6666666666667351e-1
+            + w * (2.8571428743662391e-1 + w * (1.818357216161805e-1 + w * 1.4798198605116586e-1)));
+    half_square = 0.5 * f * f;
+    tail = s * (half_square + (even + odd)) + (k * 1.9082149292705877e-10 + correction);
+    return k * 6.931471803691238e-1 - ((half_square - tail) - f);
+}
+
+#endif
+
 /* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
 enum {
     skew_2d_rotating_dimension = 2,
@@ -736,7 +774,7 @@ MMSMITH_FN void skew_2d_rotating_P(const skew_2d_rotating_solution *s, const dou
     const double t193 = t177 * t183;
     const double t194 = t193 + t182;
     const double t195 = t194 - t187;
-    const double t196 = log1p(t195);
+    const double t196 = mmsmith_log_1p(t195);
     const double t199 = 2.0 * t177;
     const double t200 = t177 * t177;
     const double t202 = t20 * t20;
@@ -898,7 +936,7 @@ MMSMITH_FN void skew_2d_rotating_b(const skew_2d_rotating_solution *s, const dou
     const double t309 = t308 + t306;
     const double t310 = t193 - t287;
     const double t311 = t194 - t287;
-    const double t312 = log1p(t311);
+    const double t312 = mmsmith_log_1p(t311);
     const double t313 = 3.0 * t14;
     const double t314 = t313 * t184;
     const double t315 = t130 * t298;
@@ -1119,7 +1157,7 @@ MMSMITH_FN void skew_2d_rotating_X_lower_traction(const skew_2d_rotating_solutio
     const double t670 = t659 * t664;
     const double t671 = t670 + t663;
     const double t672 = t671 - t668;
-    const double t673 = log1p(t672);
+    const double t673 = mmsmith_log_1p(t672);
     const double t674 = 2.0 * t659;
     const double t675 = t659 * t659;
     const double t676 = t658 * t658;
@@ -1206,7 +1244,7 @@ MMSMITH_FN void skew_2d_rotating_X_upper_traction(const skew_2d_rotating_solutio
     const double t734 = t716 * t724;
     const double t735 = t734 + t723;
     const double t736 = t735 - t732;
-    const double t737 = log1p(t736);
+    const double t737 = mmsmith_log_1p(t736);
     const double t738 = 2.0 * t716;
     const double t739 = t716 * t716;
     const double t740 = t715 * t715;
@@ -1275,7 +1313,7 @@ MMSMITH_FN void skew_2d_rotating_Y_lower_traction(const skew_2d_rotating_solutio
     const double t779 = t176 * t776;
     const double t780 = t779 * t778;
     const double t781 = t780 + t777;
-    const double t782 = log1p(t781);
+    const double t782 = mmsmith_log_1p(t781);
     const double t783 = t777 + 2.0;
     const double t784 = s->fixed[10] * t782;
     const double t785 = t777 * t783;
@@ -1334,7 +1372,7 @@ MMSMITH_FN void skew_2d_rotating_Y_upper_traction(const skew_2d_rotating_solutio
     const double t812 = t801 * t804;
     const double t813 = t812 + t803;
     const double t814 = t813 - t810;
-    const double t815 = log1p(t814);
+    const double t815 = mmsmith_log_1p(t814);
     const double t816 = 2.0 * t801;
     const double t817 = t801 * t801;
     const double t818 = t800 * t800;
@@ -1543,7 +1581,7 @@ MMSMITH_FN void skew_2d_rotating_fields(const skew_2d_rotating_solution *s, cons
     const double t193 = t177 * t183;
     const double t194 = t193 + t182;
     const double t195 = t194 - t187;
-    const double t196 = log1p(t195);
+    const double t196 = mmsmith_log_1p(t195);
     const double t199 = 2.0 * t177;
     const double t200 = t177 * t177;
     const double t202 = t20 * t20;
@@ -1639,7 +1677,7 @@ MMSMITH_FN void skew_2d_rotating_fields(const skew_2d_rotating_solution *s, cons
     const double t309 = t308 + t306;
     const double t310 = t193 - t287;
     const double t311 = t194 - t287;
-    const double t312 = log1p(t311);
+    const double t312 = mmsmith_log_1p(t311);
     const double t313 = 3.0 * t14;
     const double t314 = t313 * t184;
     const double t315 = t130 * t298;
@@ -2000,7 +2038,7 @@ MMSMITH_FN void skew_2d_rotating_b_staged(const skew_2d_rotating_solution *s, co
     const double t193 = t177 * t183;
     const double t194 = t193 + t182;
     const double t195 = t194 - t187;
-    const double t196 = log1p(t195);
+    const double t196 = mmsmith_log_1p(t195);
     const double t211 = s->fixed[10] * t196;
     const double t239 = 1.0 / t188;
     const double t268 = time->values[14] * point[stride];
@@ -2250,7 +2288,7 @@ MMSMITH_FN void skew_2d_rotating_b_array(const skew_2d_rotating_solution *s, dou
         const double t193 = t177 * t183;
         const double t194 = t193 + t182;
         const double t195 = t194 - t187;
-        const double t196 = log1p(t195);
+        const double t196 = mmsmith_log_1p(t195);
         const double t211 = s->fixed[10] * t196;
         const double t239 = 1.0 / t188;
         const double t268 = time.values[14] * point1[p];

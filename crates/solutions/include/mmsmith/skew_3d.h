@@ -141,6 +141,44 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
 
 #endif
 
+#ifndef MMSMITH_LOG_1P
+#define MMSMITH_LOG_1P 1
+
+/* ln(1 + x), within one unit in the last place, by the reduction and the polynomial of Sun's fdlibm. */
+MMSMITH_FN double mmsmith_log_1p(double x)
+{
+    const double sum = 1.0 + x;
+    /* What rounding took from the sum. */
+    const double lost = x < 1.0 ? x - (sum - 1.0) : 1.0 - (sum - x);
+    double m, f, correction, s, z, w, even, odd, half_square, tail;
+    int k;
+    if (!(sum > 0.0 && x - x == 0.0)) {
+        return sum == 0.0 ? -HUGE_VAL : sum > 0.0 ? sum : NAN;
+    }
+    /* sum = 2^k m with m between sqrt(1/2) and sqrt(2). */
+    m = frexp(sum, &k);
+    if (m < 0.7071065902709961) {
+        m += m;
+        --k;
+    }
+    /* With k = 0 x itself has digits that the sum has lost. */
+    f = k == 0 ? x : m - 1.0;
+    /* lost / sum, which two digits of 1/m are enough for. */
+    correction = k == 0 || k > 1022 ? 0.0 : lost * ldexp(1.0, -k) * (1.0 - f + f * f);
+    s = f / (2.0 + f);
+    z = s * s;
+    w = z * z;
+    even = w * (3.9999999999409419e-1 + w * (2.2222198432149784e-1 + w * 1.5313837699209373e-1));
+    odd = z
+        * (6.6666666666667351e-1
+            + w * (2.8571428743662391e-1 + w * (1.818357216161805e-1 + w * 1.4798198605116586e-1)));
+    half_square = 0.5 * f * f;
+    tail = s * (half_square + (even + odd)) + (k * 1.9082149292705877e-10 + correction);
+    return k * 6.931471803691238e-1 - ((half_square - tail) - f);
+}
+
+#endif
+
 /* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
 enum {
     skew_3d_dimension = 3,
@@ -796,7 +834,7 @@ MMSMITH_FN void skew_3d_P(const skew_3d_solution *s, const double X[3], double t
     const double t185 = t184 - t181;
     const double t186 = t185 - t151;
     const double t187 = t186 + t182;
-    const double t188 = log1p(t187);
+    const double t188 = mmsmith_log_1p(t187);
     const double t191 = 2.0 * t98;
     const double t192 = t98 * t98;
     const double t194 = t19 * t19;
@@ -1122,7 +1160,7 @@ MMSMITH_FN void skew_3d_b(const skew_3d_solution *s, const double X[3], double t
     const double t472 = t471 - t468;
     const double t473 = t472 - t378;
     const double t474 = t473 + t469;
-    const double t475 = log1p(t474);
+    const double t475 = mmsmith_log_1p(t474);
     const double t476 = t416 - t148;
     const double t477 = t376 * t476;
     const double t478 = t370 * t415;
@@ -1845,7 +1883,7 @@ MMSMITH_FN void skew_3d_X_lower_traction(const skew_3d_solution *s, const double
     const double t1855 = t1854 + t1850;
     const double t1856 = t1855 - t1852;
     const double t1857 = t1856 + t1853;
-    const double t1858 = log1p(t1857);
+    const double t1858 = mmsmith_log_1p(t1857);
     const double t1859 = 2.0 * t1816;
     const double t1860 = t1816 * t1816;
     const double t1861 = t1815 * t1815;
@@ -2011,7 +2049,7 @@ MMSMITH_FN void skew_3d_X_upper_traction(const skew_3d_solution *s, const double
     const double t1993 = t1992 - t1989;
     const double t1994 = t1993 - t1950;
     const double t1995 = t1994 + t1990;
-    const double t1996 = log1p(t1995);
+    const double t1996 = mmsmith_log_1p(t1995);
     const double t1997 = 2.0 * t1932;
     const double t1998 = t1932 * t1932;
     const double t1999 = t1931 * t1931;
@@ -2180,7 +2218,7 @@ MMSMITH_FN void skew_3d_Y_lower_traction(const skew_3d_solution *s, const double
     const double t2121 = t2120 - t2117;
     const double t2122 = t2121 - t2085;
     const double t2123 = t2122 + t2118;
-    const double t2124 = log1p(t2123);
+    const double t2124 = mmsmith_log_1p(t2123);
     const double t2125 = 2.0 * t2073;
     const double t2126 = t2073 * t2073;
     const double t2127 = t2072 * t2072;
@@ -2343,7 +2381,7 @@ MMSMITH_FN void skew_3d_Y_upper_traction(const skew_3d_solution *s, const double
     const double t2245 = t2244 - t2241;
     const double t2246 = t2245 - t2242;
     const double t2247 = t2246 + t2243;
-    const double t2248 = log1p(t2247);
+    const double t2248 = mmsmith_log_1p(t2247);
     const double t2249 = 2.0 * t2199;
     const double t2250 = t2199 * t2199;
     const double t2251 = t2198 * t2198;
@@ -2500,7 +2538,7 @@ MMSMITH_FN void skew_3d_Z_lower_traction(const skew_3d_solution *s, const double
     const double t2360 = t2359 + t2355;
     const double t2361 = t2360 - t2357;
     const double t2362 = t2361 + t2358;
-    const double t2363 = log1p(t2362);
+    const double t2363 = mmsmith_log_1p(t2362);
     const double t2364 = 2.0 * t2318;
     const double t2365 = t2318 * t2318;
     const double t2366 = t2317 * t2317;
@@ -2672,7 +2710,7 @@ MMSMITH_FN void skew_3d_Z_upper_traction(const skew_3d_solution *s, const double
     const double t2484 = t2483 - t2480;
     const double t2485 = t2484 - t2444;
     const double t2486 = t2485 + t2481;
-    const double t2487 = log1p(t2486);
+    const double t2487 = mmsmith_log_1p(t2486);
     const double t2488 = 2.0 * t2433;
     const double t2489 = t2433 * t2433;
     const double t2490 = t2432 * t2432;
@@ -2882,7 +2920,7 @@ MMSMITH_FN void skew_3d_fields(const skew_3d_solution *s, const double X[3], dou
     const double t185 = t184 - t181;
     const double t186 = t185 - t151;
     const double t187 = t186 + t182;
-    const double t188 = log1p(t187);
+    const double t188 = mmsmith_log_1p(t187);
     const double t191 = 2.0 * t98;
     const double t192 = t98 * t98;
     const double t194 = t19 * t19;
@@ -3139,7 +3177,7 @@ MMSMITH_FN void skew_3d_fields(const skew_3d_solution *s, const double X[3], dou
     const double t472 = t471 - t468;
     const double t473 = t472 - t378;
     const double t474 = t473 + t469;
-    const double t475 = log1p(t474);
+    const double t475 = mmsmith_log_1p(t474);
     const double t476 = t416 - t148;
     const double t477 = t376 * t476;
     const double t478 = t370 * t415;
@@ -4026,7 +4064,7 @@ MMSMITH_FN void skew_3d_b_staged(const skew_3d_solution *s, const skew_3d_time_v
     const double t185 = t184 - t181;
     const double t186 = t185 - t151;
     const double t187 = t186 + t182;
-    const double t188 = log1p(t187);
+    const double t188 = mmsmith_log_1p(t187);
     const double t208 = t99 * t149;
     const double t209 = t103 * t128;
     const double t210 = t208 - t209;
@@ -4822,7 +4860,7 @@ MMSMITH_FN void skew_3d_b_array(const skew_3d_solution *s, double t, size_t n,
         const double t185 = t184 - t181;
         const double t186 = t185 - t151;
         const double t187 = t186 + t182;
-        const double t188 = log1p(t187);
+        const double t188 = mmsmith_log_1p(t187);
         const double t208 = t99 * t149;
         const double t209 = t103 * t128;
         const double t210 = t208 - t209;

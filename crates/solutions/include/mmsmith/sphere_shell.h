@@ -142,6 +142,44 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
 
 #endif
 
+#ifndef MMSMITH_LOG_1P
+#define MMSMITH_LOG_1P 1
+
+/* ln(1 + x), within one unit in the last place, by the reduction and the polynomial of Sun's fdlibm. */
+MMSMITH_FN double mmsmith_log_1p(double x)
+{
+    const double sum = 1.0 + x;
+    /* What rounding took from the sum. */
+    const double lost = x < 1.0 ? x - (sum - 1.0) : 1.0 - (sum - x);
+    double m, f, correction, s, z, w, even, odd, half_square, tail;
+    int k;
+    if (!(sum > 0.0 && x - x == 0.0)) {
+        return sum == 0.0 ? -HUGE_VAL : sum > 0.0 ? sum : NAN;
+    }
+    /* sum = 2^k m with m between sqrt(1/2) and sqrt(2). */
+    m = frexp(sum, &k);
+    if (m < 0.7071065902709961) {
+        m += m;
+        --k;
+    }
+    /* With k = 0 x itself has digits that the sum has lost. */
+    f = k == 0 ? x : m - 1.0;
+    /* lost / sum, which two digits of 1/m are enough for. */
+    correction = k == 0 || k > 1022 ? 0.0 : lost * ldexp(1.0, -k) * (1.0 - f + f * f);
+    s = f / (2.0 + f);
+    z = s * s;
+    w = z * z;
+    even = w * (3.9999999999409419e-1 + w * (2.2222198432149784e-1 + w * 1.5313837699209373e-1));
+    odd = z
+        * (6.6666666666667351e-1
+            + w * (2.8571428743662391e-1 + w * (1.818357216161805e-1 + w * 1.4798198605116586e-1)));
+    half_square = 0.5 * f * f;
+    tail = s * (half_square + (even + odd)) + (k * 1.9082149292705877e-10 + correction);
+    return k * 6.931471803691238e-1 - ((half_square - tail) - f);
+}
+
+#endif
+
 /* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
 enum {
     sphere_shell_dimension = 3,
@@ -629,7 +667,7 @@ MMSMITH_FN void sphere_shell_P(const sphere_shell_solution *s, const double X[3]
     const double t130 = s->fixed[10] * t126;
     const double t131 = t121 + t130;
     const double t132 = t131 + t107;
-    const double t133 = log1p(t132);
+    const double t133 = mmsmith_log_1p(t132);
     const double t137 = t107 + 2.0;
     const double t141 = s->fixed[12] * t133;
     const double t142 = t107 * t137;
@@ -722,7 +760,7 @@ MMSMITH_FN void sphere_shell_b(const sphere_shell_solution *s, const double X[3]
     const double t198 = t109 * t109;
     const double t199 = t194 + t197;
     const double t200 = t199 + t198;
-    const double t201 = log1p(t200);
+    const double t201 = mmsmith_log_1p(t200);
     const double t202 = s->fixed[11] * t107;
     const double t203 = s->fixed[12] * t201;
     const double t204 = t202 + t203;
@@ -783,7 +821,7 @@ MMSMITH_FN void sphere_shell_inner_traction(const sphere_shell_solution *s, cons
     const double t372 = s->fixed[28] * t366;
     const double t373 = t365 + t372;
     const double t374 = t373 + t356;
-    const double t375 = log1p(t374);
+    const double t375 = mmsmith_log_1p(t374);
     const double t376 = t356 + 2.0;
     const double t377 = s->fixed[12] * t375;
     const double t378 = t356 * t376;
@@ -812,7 +850,7 @@ MMSMITH_FN void sphere_shell_outer_traction(const sphere_shell_solution *s, cons
     const double t392 = t391 + 2.0;
     const double t393 = t18 * t392;
     const double t394 = s->fixed[30] * t393;
-    const double t395 = log1p(t394);
+    const double t395 = mmsmith_log_1p(t394);
     const double t399 = s->fixed[31] * t395;
     const double t400 = t399 * X[0];
     const double t401 = t399 * X[1];
@@ -858,7 +896,7 @@ MMSMITH_FN void sphere_shell_X_lower_traction(const sphere_shell_solution *s, co
     const double t130 = s->fixed[10] * t126;
     const double t131 = t121 + t130;
     const double t132 = t131 + t107;
-    const double t133 = log1p(t132);
+    const double t133 = mmsmith_log_1p(t132);
     const double t141 = s->fixed[12] * t133;
     const double t145 = t109 + 2.0;
     const double t148 = s->fixed[13] * t18;
@@ -912,7 +950,7 @@ MMSMITH_FN void sphere_shell_Y_lower_traction(const sphere_shell_solution *s, co
     const double t130 = s->fixed[10] * t126;
     const double t131 = t121 + t130;
     const double t132 = t131 + t107;
-    const double t133 = log1p(t132);
+    const double t133 = mmsmith_log_1p(t132);
     const double t141 = s->fixed[12] * t133;
     const double t145 = t109 + 2.0;
     const double t148 = s->fixed[13] * t18;
@@ -966,7 +1004,7 @@ MMSMITH_FN void sphere_shell_Z_lower_traction(const sphere_shell_solution *s, co
     const double t130 = s->fixed[10] * t126;
     const double t131 = t121 + t130;
     const double t132 = t131 + t107;
-    const double t133 = log1p(t132);
+    const double t133 = mmsmith_log_1p(t132);
     const double t141 = s->fixed[12] * t133;
     const double t145 = t109 + 2.0;
     const double t148 = s->fixed[13] * t18;
@@ -1079,7 +1117,7 @@ MMSMITH_FN void sphere_shell_fields(const sphere_shell_solution *s, const double
     const double t130 = s->fixed[10] * t126;
     const double t131 = t121 + t130;
     const double t132 = t131 + t107;
-    const double t133 = log1p(t132);
+    const double t133 = mmsmith_log_1p(t132);
     const double t137 = t107 + 2.0;
     const double t141 = s->fixed[12] * t133;
     const double t142 = t107 * t137;
@@ -1132,7 +1170,7 @@ MMSMITH_FN void sphere_shell_fields(const sphere_shell_solution *s, const double
     const double t198 = t109 * t109;
     const double t199 = t194 + t197;
     const double t200 = t199 + t198;
-    const double t201 = log1p(t200);
+    const double t201 = mmsmith_log_1p(t200);
     const double t202 = s->fixed[11] * t107;
     const double t203 = s->fixed[12] * t201;
     const double t204 = t202 + t203;
@@ -1344,7 +1382,7 @@ MMSMITH_FN void sphere_shell_b_staged(const sphere_shell_solution *s, const sphe
     const double t130 = s->fixed[10] * t126;
     const double t131 = t121 + t130;
     const double t132 = t131 + t107;
-    const double t133 = log1p(t132);
+    const double t133 = mmsmith_log_1p(t132);
     const double t299 = time->values[0] * point[5 * stride];
     const double t300 = point[6 * stride] + t299;
     const double t325 = time->values[0] * t300;
@@ -1417,7 +1455,7 @@ MMSMITH_FN void sphere_shell_b_array(const sphere_shell_solution *s, double t, s
         const double t130 = s->fixed[10] * t126;
         const double t131 = t121 + t130;
         const double t132 = t131 + t107;
-        const double t133 = log1p(t132);
+        const double t133 = mmsmith_log_1p(t132);
         const double t299 = time.values[0] * point5[p];
         const double t300 = point6[p] + t299;
         const double t325 = time.values[0] * t300;

@@ -317,7 +317,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t53 = t14 * t39;
         let t54 = t52 + t53;
         let t55 = self.fixed[1] * t54;
-        let t56 = t55.ln_1p();
+        let t56 = t55.log_1p();
         let t60 = t37 + T::nearest(2.0);
         let t64 = self.fixed[5] * t56;
         let t66 = self.fixed[6] * t9;
@@ -358,7 +358,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t93 = t14 * t92;
         let t94 = t93 + t89;
         let t95 = self.fixed[1] * t94;
-        let t96 = t95.ln_1p();
+        let t96 = t95.log_1p();
         let t97 = self.fixed[5] * t96;
         let t98 = self.fixed[4] * t90;
         let t99 = t97 + t98;
@@ -435,7 +435,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t53 = t14 * t39;
         let t54 = t52 + t53;
         let t55 = self.fixed[1] * t54;
-        let t56 = t55.ln_1p();
+        let t56 = t55.log_1p();
         let t60 = t37 + T::nearest(2.0);
         let t64 = self.fixed[5] * t56;
         let t66 = self.fixed[6] * t9;
@@ -460,7 +460,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t93 = t14 * t92;
         let t94 = t93 + t89;
         let t95 = self.fixed[1] * t94;
-        let t96 = t95.ln_1p();
+        let t96 = t95.log_1p();
         let t97 = self.fixed[5] * t96;
         let t98 = self.fixed[4] * t90;
         let t99 = t97 + t98;
@@ -532,7 +532,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t189 = t9 * t44;
                 let t190 = t189 + t53;
                 let t191 = self.fixed[1] * t190;
-                let t192 = t191.ln_1p();
+                let t192 = t191.log_1p();
                 let t193 = t36 + T::nearest(2.0);
                 let t194 = self.fixed[5] * t192;
                 let t195 = t9 * t193;
@@ -558,7 +558,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t202 = t189 - t53;
                 let t203 = self.fixed[1] * t202;
                 let t204 = -t203;
-                let t205 = t204.ln_1p();
+                let t205 = t204.log_1p();
                 let t206 = T::nearest(2.0) - t36;
                 let t207 = self.fixed[5] * t205;
                 let t208 = t9 * t206;
@@ -582,7 +582,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t214 = t14 * t43;
                 let t215 = t214 + t89;
                 let t216 = self.fixed[1] * t215;
-                let t217 = t216.ln_1p();
+                let t217 = t216.log_1p();
                 let t218 = t40 + T::nearest(2.0);
                 let t219 = self.fixed[5] * t217;
                 let t220 = t14 * t218;
@@ -608,7 +608,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t227 = t214 - t89;
                 let t228 = self.fixed[1] * t227;
                 let t229 = -t228;
-                let t230 = t229.ln_1p();
+                let t230 = t229.log_1p();
                 let t231 = T::nearest(2.0) - t40;
                 let t232 = self.fixed[5] * t230;
                 let t233 = t14 * t231;
@@ -724,7 +724,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 4, 10> for AxisAligned<T> {
         let t53 = time[1] * point[1];
         let t54 = t52 + t53;
         let t55 = self.fixed[1] * t54;
-        let t56 = t55.ln_1p();
+        let t56 = t55.log_1p();
         let t70 = T::one() / t43;
         let t77 = T::one() / t44;
         let t156 = time[0] * point[3];

@@ -296,7 +296,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         let t27 = self.fixed[1] * t9;
         let t28 = t27 * t26;
         let t30 = t28 + T::one();
-        let t36 = t28.ln_1p();
+        let t36 = t28.log_1p();
         let t40 = t28 + T::nearest(2.0);
         let t44 = self.fixed[6] * t36;
         let t46 = self.fixed[7] * t9;
@@ -320,7 +320,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         let t27 = self.fixed[1] * t9;
         let t28 = t27 * t26;
         let t30 = t28 + T::one();
-        let t36 = t28.ln_1p();
+        let t36 = t28.log_1p();
         let t44 = self.fixed[6] * t36;
         let t46 = self.fixed[7] * t9;
         let t47 = t46 * t26;
@@ -366,7 +366,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         let t27 = self.fixed[1] * t9;
         let t28 = t27 * t26;
         let t30 = t28 + T::one();
-        let t36 = t28.ln_1p();
+        let t36 = t28.log_1p();
         let t40 = t28 + T::nearest(2.0);
         let t44 = self.fixed[6] * t36;
         let t46 = self.fixed[7] * t9;
@@ -420,7 +420,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
                 let t9 = t8.cos_pi();
                 let t27 = self.fixed[1] * t9;
                 let t119 = t27 + T::one();
-                let t120 = t27.ln_1p();
+                let t120 = t27.log_1p();
                 let t121 = t27 + T::nearest(2.0);
                 let t122 = self.fixed[6] * t120;
                 let t123 = t9 * t121;
@@ -436,7 +436,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
                 let t27 = self.fixed[1] * t9;
                 let t128 = T::one() - t27;
                 let t129 = -t27;
-                let t130 = t129.ln_1p();
+                let t130 = t129.log_1p();
                 let t131 = T::nearest(2.0) - t27;
                 let t132 = self.fixed[6] * t130;
                 let t133 = t9 * t131;
@@ -523,7 +523,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 5> for AxisAligned1d<T> {
     ) -> crate::nalgebra::SVector<T, 1> {
         let t28 = time[1] * point[0];
         let t30 = t28 + T::one();
-        let t36 = t28.ln_1p();
+        let t36 = t28.log_1p();
         let t50 = T::one() / t30;
         let t104 = time[0] * point[2];
         let t105 = t104 - point[3];

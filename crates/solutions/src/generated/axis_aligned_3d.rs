@@ -452,7 +452,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t96 = self.fixed[3] * t95;
         let t97 = t96 + t91;
         let t98 = t97 - t70;
-        let t99 = t98.ln_1p();
+        let t99 = t98.log_1p();
         let t102 = t62 + T::nearest(2.0);
         let t106 = self.fixed[11] * t99;
         let t108 = self.fixed[12] * t9;
@@ -526,7 +526,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t96 = self.fixed[3] * t95;
         let t97 = t96 + t91;
         let t98 = t97 - t70;
-        let t99 = t98.ln_1p();
+        let t99 = t98.log_1p();
         let t106 = self.fixed[11] * t99;
         let t108 = self.fixed[12] * t9;
         let t109 = t108 * t60;
@@ -658,7 +658,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t96 = self.fixed[3] * t95;
         let t97 = t96 + t91;
         let t98 = t97 - t70;
-        let t99 = t98.ln_1p();
+        let t99 = t98.log_1p();
         let t102 = t62 + T::nearest(2.0);
         let t106 = self.fixed[11] * t99;
         let t108 = self.fixed[12] * t9;
@@ -819,7 +819,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t273 = t272 + t91;
                 let t274 = t273 - t70;
                 let t275 = t61 + t274;
-                let t276 = t275.ln_1p();
+                let t276 = t275.log_1p();
                 let t277 = t61 + T::nearest(2.0);
                 let t278 = self.fixed[11] * t276;
                 let t279 = t9 * t277;
@@ -855,7 +855,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t286 = t91 - t272;
                 let t287 = t286 - t70;
                 let t288 = t287 - t61;
-                let t289 = t288.ln_1p();
+                let t289 = t288.log_1p();
                 let t290 = T::nearest(2.0) - t61;
                 let t291 = self.fixed[11] * t289;
                 let t292 = t9 * t290;
@@ -888,7 +888,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t303 = self.fixed[3] * t302;
                 let t304 = t303 + t299;
                 let t305 = t304 - t65;
-                let t306 = t305.ln_1p();
+                let t306 = t305.log_1p();
                 let t307 = t297 + T::nearest(2.0);
                 let t308 = self.fixed[11] * t306;
                 let t309 = t297 * t307;
@@ -921,7 +921,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t320 = self.fixed[3] * t319;
                 let t321 = t320 + t316;
                 let t322 = t65 + t321;
-                let t323 = t322.ln_1p();
+                let t323 = t322.log_1p();
                 let t324 = t65 + T::nearest(2.0);
                 let t325 = self.fixed[11] * t323;
                 let t326 = t65 * t324;
@@ -954,7 +954,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t337 = self.fixed[3] * t336;
                 let t338 = t337 + t333;
                 let t339 = t338 - t69;
-                let t340 = t339.ln_1p();
+                let t340 = t339.log_1p();
                 let t341 = t331 + T::nearest(2.0);
                 let t342 = self.fixed[11] * t340;
                 let t343 = t331 * t341;
@@ -987,7 +987,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t354 = self.fixed[3] * t353;
                 let t355 = t354 + t350;
                 let t356 = t69 + t355;
-                let t357 = t356.ln_1p();
+                let t357 = t356.log_1p();
                 let t358 = t69 + T::nearest(2.0);
                 let t359 = self.fixed[11] * t357;
                 let t360 = t69 * t358;
@@ -1145,7 +1145,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 15> for AxisAligned3d<T> {
         let t96 = self.fixed[3] * t95;
         let t97 = t96 + t91;
         let t98 = t97 - t70;
-        let t99 = t98.ln_1p();
+        let t99 = t98.log_1p();
         let t112 = T::one() / t73;
         let t118 = T::one() / t83;
         let t124 = T::one() / t84;

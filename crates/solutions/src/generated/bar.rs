@@ -343,7 +343,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
         let t38 = self.fixed[6] * t14;
         let t39 = t38 * t34;
         let t41 = t39 + T::one();
-        let t46 = t39.ln_1p();
+        let t46 = t39.log_1p();
         let t50 = t39 + T::nearest(2.0);
         let t54 = self.fixed[8] * t46;
         let t55 = t39 * t50;
@@ -367,7 +367,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
         let t38 = self.fixed[6] * t14;
         let t39 = t38 * t34;
         let t41 = t39 + T::one();
-        let t46 = t39.ln_1p();
+        let t46 = t39.log_1p();
         let t54 = self.fixed[8] * t46;
         let t58 = T::one() / t41;
         let t68 = self.fixed[9] * t14;
@@ -410,7 +410,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
         let t38 = self.fixed[6] * t14;
         let t39 = t38 * t34;
         let t41 = t39 + T::one();
-        let t46 = t39.ln_1p();
+        let t46 = t39.log_1p();
         let t50 = t39 + T::nearest(2.0);
         let t54 = self.fixed[8] * t46;
         let t55 = t39 * t50;
@@ -461,7 +461,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
                 let t14 = t13.cos_pi();
                 let t38 = self.fixed[6] * t14;
                 let t138 = t38 + T::one();
-                let t139 = t38.ln_1p();
+                let t139 = t38.log_1p();
                 let t140 = t38 + T::nearest(2.0);
                 let t141 = self.fixed[8] * t139;
                 let t142 = t38 * t140;
@@ -476,7 +476,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
                 let t14 = t13.cos_pi();
                 let t38 = self.fixed[6] * t14;
                 let t138 = t38 + T::one();
-                let t139 = t38.ln_1p();
+                let t139 = t38.log_1p();
                 let t140 = t38 + T::nearest(2.0);
                 let t141 = self.fixed[8] * t139;
                 let t142 = t38 * t140;
@@ -564,7 +564,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 5> for Bar<T> {
     ) -> crate::nalgebra::SVector<T, 1> {
         let t39 = time[1] * point[0];
         let t41 = t39 + T::one();
-        let t46 = t39.ln_1p();
+        let t46 = t39.log_1p();
         let t58 = T::one() / t41;
         let t117 = time[0] * point[2];
         let t118 = t117 - point[3];

@@ -553,7 +553,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t101 = t100 * t92;
         let t102 = self.parameters.A * t101;
         let t103 = t102 + t91;
-        let t104 = t103.ln_1p();
+        let t104 = t103.log_1p();
         let t108 = t91 + T::nearest(2.0);
         let t112 = self.fixed[11] * t104;
         let t113 = t91 * t108;
@@ -632,7 +632,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t158 = t157 + T::one();
         let t159 = t157 * t94;
         let t160 = t159 + t93;
-        let t161 = t160.ln_1p();
+        let t161 = t160.log_1p();
         let t162 = self.fixed[11] * t161;
         let t163 = self.fixed[10] * t157;
         let t164 = t162 + t163;
@@ -742,7 +742,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t101 = t100 * t92;
         let t102 = self.parameters.A * t101;
         let t103 = t102 + t91;
-        let t104 = t103.ln_1p();
+        let t104 = t103.log_1p();
         let t108 = t91 + T::nearest(2.0);
         let t112 = self.fixed[11] * t104;
         let t113 = t91 * t108;
@@ -788,7 +788,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t158 = t157 + T::one();
         let t159 = t157 * t94;
         let t160 = t159 + t93;
-        let t161 = t160.ln_1p();
+        let t161 = t160.log_1p();
         let t162 = self.fixed[11] * t161;
         let t163 = self.fixed[10] * t157;
         let t164 = t162 + t163;
@@ -847,7 +847,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
                 let t12 = self.fixed[0] * t;
                 let t13 = t12.cos_pi();
                 let t323 = self.fixed[27] * t13;
-                let t324 = t323.ln_1p();
+                let t324 = t323.log_1p();
                 let t328 = self.fixed[28] * t324;
                 let t329 = t328 * X[0];
                 let t330 = -t329;
@@ -859,7 +859,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
                 let t12 = self.fixed[0] * t;
                 let t13 = t12.cos_pi();
                 let t334 = self.fixed[29] * t13;
-                let t335 = t334.ln_1p();
+                let t335 = t334.log_1p();
                 let t339 = self.fixed[30] * t335;
                 let t340 = t339 * X[0];
                 let t341 = t339 * X[1];
@@ -894,7 +894,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
                 let t101 = t100 * t92;
                 let t102 = self.parameters.A * t101;
                 let t103 = t102 + t91;
-                let t104 = t103.ln_1p();
+                let t104 = t103.log_1p();
                 let t112 = self.fixed[11] * t104;
                 let t116 = t93 + T::nearest(2.0);
                 let t118 = self.fixed[12] * t13;
@@ -937,7 +937,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
                 let t101 = t100 * t92;
                 let t102 = self.parameters.A * t101;
                 let t103 = t102 + t91;
-                let t104 = t103.ln_1p();
+                let t104 = t103.log_1p();
                 let t112 = self.fixed[11] * t104;
                 let t116 = t93 + T::nearest(2.0);
                 let t118 = self.fixed[12] * t13;
@@ -1124,7 +1124,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         let t101 = t100 * t92;
         let t102 = self.parameters.A * t101;
         let t103 = t102 + t91;
-        let t104 = t103.ln_1p();
+        let t104 = t103.log_1p();
         let t269 = time[0] * point[4];
         let t270 = point[5] + t269;
         let t295 = time[0] * t270;

@@ -582,7 +582,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t94 = t65 * t86;
         let t95 = t94 + t78;
         let t96 = t95 - t88;
-        let t97 = t96.ln_1p();
+        let t97 = t96.log_1p();
         let t100 = T::nearest(2.0) * t65;
         let t101 = t65 * t65;
         let t103 = t13 * t13;
@@ -682,7 +682,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t94 = t65 * t86;
         let t95 = t94 + t78;
         let t96 = t95 - t88;
-        let t97 = t96.ln_1p();
+        let t97 = t96.log_1p();
         let t112 = self.fixed[10] * t97;
         let t126 = T::one() / t89;
         let t152 = t67 * t72;
@@ -928,7 +928,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t94 = t65 * t86;
         let t95 = t94 + t78;
         let t96 = t95 - t88;
-        let t97 = t96.ln_1p();
+        let t97 = t96.log_1p();
         let t100 = T::nearest(2.0) * t65;
         let t101 = t65 * t65;
         let t103 = t13 * t13;
@@ -1200,7 +1200,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t640 = t629 * t634;
                 let t641 = t640 + t633;
                 let t642 = t641 - t638;
-                let t643 = t642.ln_1p();
+                let t643 = t642.log_1p();
                 let t644 = T::nearest(2.0) * t629;
                 let t645 = t629 * t629;
                 let t646 = t628 * t628;
@@ -1273,7 +1273,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t697 = t680 * t687;
                 let t698 = t697 + t686;
                 let t699 = t698 - t695;
-                let t700 = t699.ln_1p();
+                let t700 = t699.log_1p();
                 let t701 = T::nearest(2.0) * t680;
                 let t702 = t680 * t680;
                 let t703 = t679 * t679;
@@ -1329,7 +1329,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t738 = t64 * t733;
                 let t739 = t738 * t737;
                 let t740 = t739 + t736;
-                let t741 = t740.ln_1p();
+                let t741 = t740.log_1p();
                 let t742 = t736 + T::nearest(2.0);
                 let t743 = self.fixed[10] * t741;
                 let t744 = t736 * t742;
@@ -1371,7 +1371,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t762 = t751 * t754;
                 let t763 = t762 + t753;
                 let t764 = t763 - t760;
-                let t765 = t764.ln_1p();
+                let t765 = t764.log_1p();
                 let t766 = T::nearest(2.0) * t751;
                 let t767 = t751 * t751;
                 let t768 = t750 * t750;
@@ -1740,7 +1740,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 15, 27> for Skew2d<T> {
         let t94 = t65 * t86;
         let t95 = t94 + t78;
         let t96 = t95 - t88;
-        let t97 = t96.ln_1p();
+        let t97 = t96.log_1p();
         let t112 = self.fixed[10] * t97;
         let t126 = T::one() / t89;
         let t157 = time[5] * point[0];

@@ -690,7 +690,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
         let t193 = t177 * t183;
         let t194 = t193 + t182;
         let t195 = t194 - t187;
-        let t196 = t195.ln_1p();
+        let t196 = t195.log_1p();
         let t199 = T::nearest(2.0) * t177;
         let t200 = t177 * t177;
         let t202 = t20 * t20;
@@ -851,7 +851,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
         let t309 = t308 + t306;
         let t310 = t193 - t287;
         let t311 = t194 - t287;
-        let t312 = t311.ln_1p();
+        let t312 = t311.log_1p();
         let t313 = T::nearest(3.0) * t14;
         let t314 = t313 * t184;
         let t315 = t130 * t298;
@@ -1196,7 +1196,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
         let t193 = t177 * t183;
         let t194 = t193 + t182;
         let t195 = t194 - t187;
-        let t196 = t195.ln_1p();
+        let t196 = t195.log_1p();
         let t199 = T::nearest(2.0) * t177;
         let t200 = t177 * t177;
         let t202 = t20 * t20;
@@ -1292,7 +1292,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
         let t309 = t308 + t306;
         let t310 = t193 - t287;
         let t311 = t194 - t287;
-        let t312 = t311.ln_1p();
+        let t312 = t311.log_1p();
         let t313 = T::nearest(3.0) * t14;
         let t314 = t313 * t184;
         let t315 = t130 * t298;
@@ -1524,7 +1524,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
                 let t670 = t659 * t664;
                 let t671 = t670 + t663;
                 let t672 = t671 - t668;
-                let t673 = t672.ln_1p();
+                let t673 = t672.log_1p();
                 let t674 = T::nearest(2.0) * t659;
                 let t675 = t659 * t659;
                 let t676 = t658 * t658;
@@ -1606,7 +1606,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
                 let t734 = t716 * t724;
                 let t735 = t734 + t723;
                 let t736 = t735 - t732;
-                let t737 = t736.ln_1p();
+                let t737 = t736.log_1p();
                 let t738 = T::nearest(2.0) * t716;
                 let t739 = t716 * t716;
                 let t740 = t715 * t715;
@@ -1670,7 +1670,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
                 let t779 = t176 * t776;
                 let t780 = t779 * t778;
                 let t781 = t780 + t777;
-                let t782 = t781.ln_1p();
+                let t782 = t781.log_1p();
                 let t783 = t777 + T::nearest(2.0);
                 let t784 = self.fixed[10] * t782;
                 let t785 = t777 * t783;
@@ -1724,7 +1724,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
                 let t812 = t801 * t804;
                 let t813 = t812 + t803;
                 let t814 = t813 - t810;
-                let t815 = t814.ln_1p();
+                let t815 = t814.log_1p();
                 let t816 = T::nearest(2.0) * t801;
                 let t817 = t801 * t801;
                 let t818 = t800 * t800;
@@ -1965,7 +1965,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 24, 12> for Skew2dRotating<T> 
         let t193 = t177 * t183;
         let t194 = t193 + t182;
         let t195 = t194 - t187;
-        let t196 = t195.ln_1p();
+        let t196 = t195.log_1p();
         let t211 = self.fixed[10] * t196;
         let t239 = T::one() / t188;
         let t268 = time[14] * point[1];

@@ -730,7 +730,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for Skew3d<T> {
         let t185 = t184 - t181;
         let t186 = t185 - t151;
         let t187 = t186 + t182;
-        let t188 = t187.ln_1p();
+        let t188 = t187.log_1p();
         let t191 = T::nearest(2.0) * t98;
         let t192 = t98 * t98;
         let t194 = t19 * t19;
@@ -1054,7 +1054,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for Skew3d<T> {
         let t472 = t471 - t468;
         let t473 = t472 - t378;
         let t474 = t473 + t469;
-        let t475 = t474.ln_1p();
+        let t475 = t474.log_1p();
         let t476 = t416 - t148;
         let t477 = t376 * t476;
         let t478 = t370 * t415;
@@ -1830,7 +1830,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for Skew3d<T> {
         let t185 = t184 - t181;
         let t186 = t185 - t151;
         let t187 = t186 + t182;
-        let t188 = t187.ln_1p();
+        let t188 = t187.log_1p();
         let t191 = T::nearest(2.0) * t98;
         let t192 = t98 * t98;
         let t194 = t19 * t19;
@@ -2087,7 +2087,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for Skew3d<T> {
         let t472 = t471 - t468;
         let t473 = t472 - t378;
         let t474 = t473 + t469;
-        let t475 = t474.ln_1p();
+        let t475 = t474.log_1p();
         let t476 = t416 - t148;
         let t477 = t376 * t476;
         let t478 = t370 * t415;
@@ -2832,7 +2832,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for Skew3d<T> {
                 let t1855 = t1854 + t1850;
                 let t1856 = t1855 - t1852;
                 let t1857 = t1856 + t1853;
-                let t1858 = t1857.ln_1p();
+                let t1858 = t1857.log_1p();
                 let t1859 = T::nearest(2.0) * t1816;
                 let t1860 = t1816 * t1816;
                 let t1861 = t1815 * t1815;
@@ -2992,7 +2992,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for Skew3d<T> {
                 let t1993 = t1992 - t1989;
                 let t1994 = t1993 - t1950;
                 let t1995 = t1994 + t1990;
-                let t1996 = t1995.ln_1p();
+                let t1996 = t1995.log_1p();
                 let t1997 = T::nearest(2.0) * t1932;
                 let t1998 = t1932 * t1932;
                 let t1999 = t1931 * t1931;
@@ -3155,7 +3155,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for Skew3d<T> {
                 let t2121 = t2120 - t2117;
                 let t2122 = t2121 - t2085;
                 let t2123 = t2122 + t2118;
-                let t2124 = t2123.ln_1p();
+                let t2124 = t2123.log_1p();
                 let t2125 = T::nearest(2.0) * t2073;
                 let t2126 = t2073 * t2073;
                 let t2127 = t2072 * t2072;
@@ -3312,7 +3312,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for Skew3d<T> {
                 let t2245 = t2244 - t2241;
                 let t2246 = t2245 - t2242;
                 let t2247 = t2246 + t2243;
-                let t2248 = t2247.ln_1p();
+                let t2248 = t2247.log_1p();
                 let t2249 = T::nearest(2.0) * t2199;
                 let t2250 = t2199 * t2199;
                 let t2251 = t2198 * t2198;
@@ -3463,7 +3463,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for Skew3d<T> {
                 let t2360 = t2359 + t2355;
                 let t2361 = t2360 - t2357;
                 let t2362 = t2361 + t2358;
-                let t2363 = t2362.ln_1p();
+                let t2363 = t2362.log_1p();
                 let t2364 = T::nearest(2.0) * t2318;
                 let t2365 = t2318 * t2318;
                 let t2366 = t2317 * t2317;
@@ -3629,7 +3629,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for Skew3d<T> {
                 let t2484 = t2483 - t2480;
                 let t2485 = t2484 - t2444;
                 let t2486 = t2485 + t2481;
-                let t2487 = t2486.ln_1p();
+                let t2487 = t2486.log_1p();
                 let t2488 = T::nearest(2.0) * t2433;
                 let t2489 = t2433 * t2433;
                 let t2490 = t2432 * t2432;
@@ -3967,7 +3967,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 36, 16> for Skew3d<T> {
         let t185 = t184 - t181;
         let t186 = t185 - t151;
         let t187 = t186 + t182;
-        let t188 = t187.ln_1p();
+        let t188 = t187.log_1p();
         let t208 = t99 * t149;
         let t209 = t103 * t128;
         let t210 = t208 - t209;

@@ -590,7 +590,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t130 = self.fixed[10] * t126;
         let t131 = t121 + t130;
         let t132 = t131 + t107;
-        let t133 = t132.ln_1p();
+        let t133 = t132.log_1p();
         let t137 = t107 + T::nearest(2.0);
         let t141 = self.fixed[12] * t133;
         let t142 = t107 * t137;
@@ -681,7 +681,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t198 = t109 * t109;
         let t199 = t194 + t197;
         let t200 = t199 + t198;
-        let t201 = t200.ln_1p();
+        let t201 = t200.log_1p();
         let t202 = self.fixed[11] * t107;
         let t203 = self.fixed[12] * t201;
         let t204 = t202 + t203;
@@ -818,7 +818,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t130 = self.fixed[10] * t126;
         let t131 = t121 + t130;
         let t132 = t131 + t107;
-        let t133 = t132.ln_1p();
+        let t133 = t132.log_1p();
         let t137 = t107 + T::nearest(2.0);
         let t141 = self.fixed[12] * t133;
         let t142 = t107 * t137;
@@ -871,7 +871,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t198 = t109 * t109;
         let t199 = t194 + t197;
         let t200 = t199 + t198;
-        let t201 = t200.ln_1p();
+        let t201 = t200.log_1p();
         let t202 = self.fixed[11] * t107;
         let t203 = self.fixed[12] * t201;
         let t204 = t202 + t203;
@@ -954,7 +954,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t372 = self.fixed[28] * t366;
                 let t373 = t365 + t372;
                 let t374 = t373 + t356;
-                let t375 = t374.ln_1p();
+                let t375 = t374.log_1p();
                 let t376 = t356 + T::nearest(2.0);
                 let t377 = self.fixed[12] * t375;
                 let t378 = t356 * t376;
@@ -977,7 +977,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t392 = t391 + T::nearest(2.0);
                 let t393 = t18 * t392;
                 let t394 = self.fixed[30] * t393;
-                let t395 = t394.ln_1p();
+                let t395 = t394.log_1p();
                 let t399 = self.fixed[31] * t395;
                 let t400 = t399 * X[0];
                 let t401 = t399 * X[1];
@@ -1017,7 +1017,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t130 = self.fixed[10] * t126;
                 let t131 = t121 + t130;
                 let t132 = t131 + t107;
-                let t133 = t132.ln_1p();
+                let t133 = t132.log_1p();
                 let t141 = self.fixed[12] * t133;
                 let t145 = t109 + T::nearest(2.0);
                 let t148 = self.fixed[13] * t18;
@@ -1065,7 +1065,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t130 = self.fixed[10] * t126;
                 let t131 = t121 + t130;
                 let t132 = t131 + t107;
-                let t133 = t132.ln_1p();
+                let t133 = t132.log_1p();
                 let t141 = self.fixed[12] * t133;
                 let t145 = t109 + T::nearest(2.0);
                 let t148 = self.fixed[13] * t18;
@@ -1113,7 +1113,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t130 = self.fixed[10] * t126;
                 let t131 = t121 + t130;
                 let t132 = t131 + t107;
-                let t133 = t132.ln_1p();
+                let t133 = t132.log_1p();
                 let t141 = self.fixed[12] * t133;
                 let t145 = t109 + T::nearest(2.0);
                 let t148 = self.fixed[13] * t18;
@@ -1296,7 +1296,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 12> for SphereShell<T> {
         let t130 = self.fixed[10] * t126;
         let t131 = t121 + t130;
         let t132 = t131 + t107;
-        let t133 = t132.ln_1p();
+        let t133 = t132.log_1p();
         let t299 = time[0] * point[5];
         let t300 = point[6] + t299;
         let t325 = time[0] * t300;

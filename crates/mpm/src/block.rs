@@ -1,0 +1,311 @@
+//! Blocks of particles whose weights and stresses are computed side by side, one lane a particle.
+
+use std::array;
+
+use nalgebra::{RealField, SMatrix, SVector};
+
+use crate::material::Law;
+use crate::simd::{Loop, dispatch};
+use crate::step::Constants;
+use crate::transfer::{Deposit, Gathered, Node, Weights, gather, scatter};
+use crate::weights::{Rule, WideWeights, is_wide};
+
+/// Particles in a block: as many as keep all of it in the first-level cache.
+pub(crate) const BLOCK: usize = 64;
+
+/// One number for every particle of a block.
+type Row<T> = [T; BLOCK];
+
+/// The weights and the stresses of up to `BLOCK` particles.
+///
+/// What comes out of one loop is used by another only after all of the block went through the first: vector loads wait
+/// for the narrower stores that they overlap.
+pub(crate) struct Block<T, const D: usize, const W: usize> {
+    /// Positions in cells, from the lower corner.
+    xi: [Row<T>; D],
+    /// F, and once it has been asked for the stress.
+    tensors: [[Row<T>; D]; D],
+    /// Half-sizes in cells.
+    l: [Row<T>; D],
+    /// Whether any particle's box takes more nodes than the rule's usual ones.
+    any_wide: bool,
+    base: [Row<i32>; D],
+    S: [[Row<T>; W]; D],
+    G: [[Row<T>; W]; D],
+}
+
+impl<T: RealField + Copy, const D: usize, const W: usize> Block<T, D, W> {
+    pub(crate) fn new() -> Self {
+        let zero = [T::zero(); BLOCK];
+        Self {
+            xi: [zero; D],
+            // Identities, which have a stress.
+            tensors: array::from_fn(|i| {
+                array::from_fn(|j| [if i == j { T::one() } else { T::zero() }; BLOCK])
+            }),
+            l: [zero; D],
+            any_wide: false,
+            base: [[0; BLOCK]; D],
+            S: [[zero; W]; D],
+            G: [[zero; W]; D],
+        }
+    }
+
+    /// Takes the particles `ids` of the arrays.
+    pub(crate) fn pick(
+        &mut self,
+        c: &Constants<T, D>,
+        ids: &[u32],
+        x: &[SVector<T, D>],
+        F: &[SMatrix<T, D, D>],
+    ) {
+        dispatch(Pick { block: self, c, ids, x: Some(x), F });
+    }
+
+    /// Replaces the deformation gradients by those of the particles `ids`.
+    pub(crate) fn pick_F(&mut self, c: &Constants<T, D>, ids: &[u32], F: &[SMatrix<T, D, D>]) {
+        dispatch(Pick { block: self, c, ids, x: None, F });
+    }
+
+    /// Takes a run of particles, and computes their weights.
+    pub(crate) fn weigh_run<R: Rule<T, D, W>>(
+        &mut self,
+        rule: R,
+        c: &Constants<T, D>,
+        x: &[SVector<T, D>],
+        F: &[SMatrix<T, D, D>],
+    ) {
+        dispatch(Weigh { block: self, rule, run: Some((c, x, F)) });
+    }
+
+    /// Computes the weights of the particles taken last.
+    pub(crate) fn weigh<R: Rule<T, D, W>>(&mut self, rule: R) {
+        dispatch(Weigh { block: self, rule, run: None });
+    }
+
+    /// Turns deformation gradients into Kirchhoff stresses.
+    pub(crate) fn stress<L: Law<T>>(&mut self, law: L) {
+        dispatch(Stress { tensors: &mut self.tensors, law });
+    }
+
+    /// The stress of particle `k`, or F until it has been asked for.
+    #[inline(always)]
+    pub(crate) fn tensor(&self, k: usize) -> SMatrix<T, D, D> {
+        SMatrix::from_fn(|i, j| self.tensors[i][j][k])
+    }
+
+    /// Position and half-sizes of a particle whose box takes more than the usual nodes.
+    #[inline(always)]
+    fn wide(&self, k: usize) -> Option<([T; D], [T; D])> {
+        let l = array::from_fn(|a| self.l[a][k]);
+        (self.any_wide && l.iter().any(|&l| is_wide(l)))
+            .then(|| (array::from_fn(|a| self.xi[a][k]), l))
+    }
+
+    /// Adds what the first `deposits.len()` particles give to the piece of the grid that starts at node `first`.
+    pub(crate) fn scatter(
+        &self,
+        strides: &[usize; D],
+        piece: &mut [Node<T, D>],
+        first: usize,
+        deposits: &[Deposit<T, D>],
+    ) {
+        dispatch(Scatter { block: self, strides, piece, first, deposits });
+    }
+
+    /// Interpolates for the first `gathered.len()` particles.
+    pub(crate) fn gather(
+        &self,
+        strides: &[usize; D],
+        nodes: &[Node<T, D>],
+        gathered: &mut [Gathered<T, D>],
+    ) {
+        dispatch(Gather { block: self, strides, nodes, gathered });
+    }
+}
+
+/// The weights of particle `k` of a block.
+struct Lane<'a, T, const D: usize, const W: usize> {
+    block: &'a Block<T, D, W>,
+    k: usize,
+}
+
+impl<T: RealField + Copy, const D: usize, const W: usize> Weights<T, D, W> for Lane<'_, T, D, W> {
+    #[inline(always)]
+    fn base(&self, axis: usize) -> usize {
+        self.block.base[axis][self.k] as usize
+    }
+
+    #[inline(always)]
+    fn S(&self, axis: usize, place: usize) -> T {
+        self.block.S[axis][place][self.k]
+    }
+
+    #[inline(always)]
+    fn G(&self, axis: usize, place: usize) -> T {
+        self.block.G[axis][place][self.k]
+    }
+}
+
+struct Pick<'a, T, const D: usize, const W: usize> {
+    block: &'a mut Block<T, D, W>,
+    c: &'a Constants<T, D>,
+    ids: &'a [u32],
+    x: Option<&'a [SVector<T, D>]>,
+    F: &'a [SMatrix<T, D, D>],
+}
+
+impl<T: RealField + Copy, const D: usize, const W: usize> Loop for Pick<'_, T, D, W> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { block, c, ids, x, F } = self;
+        for (k, &p) in ids.iter().take(BLOCK).enumerate() {
+            let F = &F[p as usize];
+            for i in 0..D {
+                for j in 0..D {
+                    block.tensors[i][j][k] = F[(i, j)];
+                }
+            }
+            if let Some(x) = x {
+                let xi = c.in_cells(&x[p as usize]);
+                for a in 0..D {
+                    block.xi[a][k] = xi[a];
+                }
+            }
+        }
+    }
+}
+
+/// The grid and a run of particles.
+type Run<'a, T, const D: usize> =
+    (&'a Constants<T, D>, &'a [SVector<T, D>], &'a [SMatrix<T, D, D>]);
+
+struct Weigh<'a, T, R, const D: usize, const W: usize> {
+    block: &'a mut Block<T, D, W>,
+    rule: R,
+    /// The particles to take first, if any.
+    run: Option<Run<'a, T, D>>,
+}
+
+impl<T, R, const D: usize, const W: usize> Loop for Weigh<'_, T, R, D, W>
+where
+    T: RealField + Copy,
+    R: Rule<T, D, W>,
+{
+    #[inline(always)]
+    fn run(self) {
+        let Self { block, rule, run } = self;
+        if let Some((c, x, F)) = run {
+            for a in 0..D {
+                for (xi, x) in block.xi[a].iter_mut().zip(x) {
+                    *xi = c.in_cells(x)[a];
+                }
+                for (stretch, F) in block.tensors[a][a].iter_mut().zip(F) {
+                    *stretch = F[(a, a)];
+                }
+            }
+        }
+        let mut any_wide = false;
+        for a in 0..D {
+            for k in 0..BLOCK {
+                let l = rule.half_size(a, block.tensors[a][a][k]);
+                any_wide |= is_wide(l);
+                block.l[a][k] = l;
+                let weights = R::along_axis(block.xi[a][k], l);
+                block.base[a][k] = weights.base;
+                for i in 0..W {
+                    block.S[a][i][k] = weights.S[i];
+                    block.G[a][i][k] = weights.G[i];
+                }
+            }
+        }
+        block.any_wide = any_wide;
+    }
+}
+
+struct Scatter<'a, T, const D: usize, const W: usize> {
+    block: &'a Block<T, D, W>,
+    strides: &'a [usize; D],
+    piece: &'a mut [Node<T, D>],
+    first: usize,
+    deposits: &'a [Deposit<T, D>],
+}
+
+impl<T: RealField + Copy, const D: usize, const W: usize> Loop for Scatter<'_, T, D, W> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { block, strides, piece, first, deposits } = self;
+        for (k, deposit) in deposits.iter().enumerate().take(BLOCK) {
+            if let Some((xi, l)) = block.wide(k) {
+                scatter_wide(&xi, &l, strides, piece, first, deposit);
+            } else {
+                scatter(&Lane { block, k }, strides, piece, first, deposit);
+            }
+        }
+    }
+}
+
+#[inline(never)]
+fn scatter_wide<T: RealField + Copy, const D: usize>(
+    xi: &[T; D],
+    l: &[T; D],
+    strides: &[usize; D],
+    piece: &mut [Node<T, D>],
+    first: usize,
+    deposit: &Deposit<T, D>,
+) {
+    scatter(&WideWeights::new(xi, l), strides, piece, first, deposit);
+}
+
+struct Gather<'a, T, const D: usize, const W: usize> {
+    block: &'a Block<T, D, W>,
+    strides: &'a [usize; D],
+    nodes: &'a [Node<T, D>],
+    gathered: &'a mut [Gathered<T, D>],
+}
+
+impl<T: RealField + Copy, const D: usize, const W: usize> Loop for Gather<'_, T, D, W> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { block, strides, nodes, gathered } = self;
+        for (k, gathered) in gathered.iter_mut().enumerate().take(BLOCK) {
+            if let Some((xi, l)) = block.wide(k) {
+                gather_wide(&xi, &l, strides, nodes, gathered);
+            } else {
+                gather(&Lane { block, k }, strides, nodes, gathered);
+            }
+        }
+    }
+}
+
+#[inline(never)]
+fn gather_wide<T: RealField + Copy, const D: usize>(
+    xi: &[T; D],
+    l: &[T; D],
+    strides: &[usize; D],
+    nodes: &[Node<T, D>],
+    gathered: &mut Gathered<T, D>,
+) {
+    gather(&WideWeights::new(xi, l), strides, nodes, gathered);
+}
+
+struct Stress<'a, T, L, const D: usize> {
+    tensors: &'a mut [[Row<T>; D]; D],
+    law: L,
+}
+
+impl<T: RealField + Copy, L: Law<T>, const D: usize> Loop for Stress<'_, T, L, D> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { tensors, law } = self;
+        for k in 0..BLOCK {
+            let F = SMatrix::<T, D, D>::from_fn(|i, j| tensors[i][j][k]);
+            let tau = law.kirchhoff(&F);
+            for i in 0..D {
+                for j in 0..D {
+                    tensors[i][j][k] = tau[(i, j)];
+                }
+            }
+        }
+    }
+}
