@@ -14,7 +14,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use mmsmith_solutions::{AnySolution, Domain, Solution};
-use mmsmith_vtk::foreign::{FrameFile, ReadError, Snapshot, frames};
+use mmsmith_vtk::foreign::{ArrayHead, FrameFile, ReadError, Snapshot, frames};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 use thiserror::Error;
@@ -29,7 +29,7 @@ use findings::Remarks;
 /// Share of the body's size by which a reference position may lie outside before it is told.
 const OUTSIDE: f64 = 1e-6;
 /// Share of the time span by which a frame may lie outside before it is told.
-const TIME_SLACK: f64 = 1e-9;
+const TIME_SLACK: f64 = 1e-6;
 /// Steps of Newton's method from a position back to its reference position.
 const MOST_ITERATIONS: usize = 50;
 
@@ -823,8 +823,8 @@ impl<const D: usize> FrameReader<'_, D> {
         time: f64,
         index: usize,
     ) -> Result<FrameData<D>, ScoreError> {
-        let ids = match self.chosen.name(Role::Id) {
-            Some(name) => snapshot.integers(name)?,
+        let ids = match self.head(Role::Id, snapshot)? {
+            Some(head) => snapshot.integers(&head.name)?,
             None => None,
         };
         self.identify(snapshot, index, ids.as_deref());
@@ -863,7 +863,12 @@ impl<const D: usize> FrameReader<'_, D> {
         };
         self.judge_places(&X, snapshot);
         let v = match (snapshot.field("VelocityTime"), self.has_velocity_times) {
-            (Some(own), _) => self.vector(Role::Velocity, snapshot)?.map(|v| (v, own)),
+            (Some(own), _) => {
+                let what = "frame(s) tell a time for their velocities that is not finite";
+                let first = || snapshot.path().display().to_string();
+                self.remarks.met("time-not-finite", true, usize::from(!own.is_finite()), what, first);
+                self.vector(Role::Velocity, snapshot)?.map(|v| (v, own))
+            }
             (None, true) => {
                 self.remarks.met(
                     "velocity-without-time",
@@ -891,7 +896,8 @@ impl<const D: usize> FrameReader<'_, D> {
         let known: Option<HashSet<i64>> = ids.map(|ids| ids.iter().copied().collect());
         if let Some(known) = &known {
             let what = "particle(s) have an identity that another one of their frame has";
-            self.remarks.met("repeated-id", true, particles - known.len(), what, path);
+            let repeated = ids.map_or(0, <[i64]>::len) - known.len();
+            self.remarks.met("repeated-id", true, repeated, what, path);
         }
         if index == 0 {
             self.first = Identities { particles, ids: known };
@@ -974,25 +980,34 @@ impl<const D: usize> FrameReader<'_, D> {
         Ok(Some(matrices(&flat, components)))
     }
 
-    /// The numbers of an array and how many a particle has; they must be as many as in the first frame.
+    /// The numbers of an array and how many a particle has.
     fn array(
         &self,
         role: Role,
         snapshot: &Snapshot,
     ) -> Result<Option<(Vec<f64>, usize)>, ScoreError> {
+        let Some(head) = self.head(role, snapshot)? else { return Ok(None) };
+        Ok(snapshot.floats(&head.name)?.map(|flat| (flat, head.components)))
+    }
+
+    /// The array for a role, whose shape may have changed since the first frame.
+    fn head<'s>(
+        &self,
+        role: Role,
+        snapshot: &'s Snapshot,
+    ) -> Result<Option<&'s ArrayHead>, ScoreError> {
         let Some(name) = self.chosen.name(role) else { return Ok(None) };
         let Some(head) = snapshot.array(name) else { return Ok(None) };
-        let components = head.components;
-        if !role.admits::<D>(components) {
-            return Err(ScoreError::Components {
-                path: snapshot.path().to_owned(),
-                role,
-                name: name.to_owned(),
-                components,
-                admissible: role.admissible::<D>(),
-            });
+        if role.admits::<D>(head.components) {
+            return Ok(Some(head));
         }
-        Ok(snapshot.floats(name)?.map(|flat| (flat, components)))
+        Err(ScoreError::Components {
+            path: snapshot.path().to_owned(),
+            role,
+            name: name.to_owned(),
+            components: head.components,
+            admissible: role.admissible::<D>(),
+        })
     }
 }
 

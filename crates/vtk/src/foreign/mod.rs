@@ -122,6 +122,11 @@ fn read(path: &Path) -> Result<Vec<u8>, ReadError> {
         "csv" if text.contains(&0) => return Err(malformed("it holds bytes that are no text")),
         _ => (),
     }
+    // Exactly as much as there is; growing step by step would take twice that.
+    let rest = usize::try_from(bytes).unwrap_or(usize::MAX).saturating_sub(content.len());
+    if content.try_reserve_exact(rest + 1).is_err() {
+        return Err(malformed(&format!("there is no memory for its {bytes} bytes")));
+    }
     // A file that grows while it is read, or a pipe, has no size to go by.
     file.take(LARGEST_FILE).read_to_end(&mut content).map_err(fail)?;
     if content.len() as u64 > LARGEST_FILE {
@@ -311,6 +316,10 @@ impl Snapshot {
         }
         let mut arrays: Vec<ArrayHead> = vec![];
         if let Some((first, others)) = contents.pieces.split_first() {
+            if others.iter().any(|piece| piece.points.components != first.points.components) {
+                let cause = "its pieces have points of different dimension".into();
+                return Err(ReadError::Malformed { path, cause });
+            }
             for entry in &first.arrays {
                 // What only some pieces have, or in different shape, is no array over all particles.
                 let is_same = |other: &Entry| {
