@@ -10,6 +10,7 @@ of `mms score ring` and, line by line, what it must say.
 """
 
 import base64
+import re
 import struct
 import sys
 import zlib
@@ -238,7 +239,12 @@ def write_err(err, ok):
     raw = (ok / "vtk-appended-raw-64" / "a_0.vtu").read_bytes()
     one("xml-cut", base[: len(base) // 2], "a.vtu", "cut off", options="--time 0")
     one("xml-cut-in-tag", base[:40], "a.vtu")
-    one("appended-cut", raw[: len(raw) - 700], "a.vtu, array `", "bytes")
+    one("appended-cut", raw[: len(raw) - 700], "a.vtu", "cut off")
+    one("appended-cut-at-end", raw[: len(raw) - 30], "a.vtu", "cut off")
+    far = re.sub(rb'(Name="displacement"[^>]*offset=")\d+', rb"\g<1>99999", raw)
+    one("appended-offset", far, "array `displacement`", "begins at byte 99999 of the appended data")
+    near = re.sub(rb'(Name="displacement"[^>]*offset=")\d+', rb"\g<1>8", raw)
+    one("appended-header", near, "array `displacement`", "its header promises", "its size says 144")
     one("appended-cut-early", raw[: raw.index(b"<AppendedData")], "a.vtu", "cut off")
     one("ascii-short", xml(array("0 0 0")), "array `displacement`", "3 numbers; its size says 6")
     one("ascii-long", xml(array(zeros + " 0")), "array `displacement`", "7 numbers; its size says 6")

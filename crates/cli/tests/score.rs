@@ -123,8 +123,14 @@ fn every_variant_of_the_formats_is_read() {
         for (field, expected) in FIELDS.iter().zip([1e-3, 1e-2, 1e-4, 1.0]) {
             for norm in NORMS {
                 let found = row["errors"][field][norm].as_f64().unwrap();
+                // meshio writes twelve digits in text: 5e-12 of an F of 1 are 5e-8 of its error.
+                let allowed = if path.ends_with("meshio-ascii") { 1e-7 } else { 1e-11 };
                 let ratio = found / expected;
-                assert!((ratio - 1.0).abs() < 1e-10, "{}: {norm} of {field} {found:e}", path.display());
+                assert!(
+                    (ratio - 1.0).abs() < allowed,
+                    "{}: {norm} of {field} {found:e}",
+                    path.display()
+                );
             }
         }
     }
@@ -242,8 +248,11 @@ fn velocities_that_lag_are_compared_at_their_own_time() {
     let place = tempfile::tempdir().unwrap();
     let place = place.path();
     assert_eq!(mms(place, "run ring --cells 8 --vtk f --frames 3").status, 0);
-    fs::write(place.join("points.json"), r#"[{ "X": [0.6, 0.3], "t": 0.004 }, { "X": [0.6, 0.3], "t": 0.003 }]"#)
-        .unwrap();
+    fs::write(
+        place.join("points.json"),
+        r#"[{ "X": [0.6, 0.3], "t": 0.004 }, { "X": [0.6, 0.3], "t": 0.003 }]"#,
+    )
+    .unwrap();
     assert_eq!(mms(place, "eval ring --points points.json --json exact.json").status, 0);
     let exact = read_json(&place.join("exact.json"));
     let (u, v) = (&exact["rows"][0]["u"], &exact["rows"][1]["v"]);
@@ -279,8 +288,9 @@ fn files_of_two_gigabytes_are_refused_in_bounded_memory() {
             fs::write(place.join(&name), head).unwrap();
             File::options().write(true).open(place.join(&name)).unwrap().set_len(bytes).unwrap();
             let mms = env!("CARGO_BIN_EXE_mms");
-            let limited =
-                format!("ulimit -v {MEMORY_KIB}; exec {mms} score ring {name} --time 0 --threads 1");
+            let limited = format!(
+                "ulimit -v {MEMORY_KIB}; exec {mms} score ring {name} --time 0 --threads 1"
+            );
             let output =
                 Command::new("sh").args(["-c", &limited]).current_dir(place).output().unwrap();
             let stderr = String::from_utf8_lossy(&output.stderr);

@@ -39,6 +39,7 @@ pub use order::Order;
 pub use plan::{Plan, plan};
 pub use scene::{Extent, SceneError};
 pub use score::{
-    Input, Points, Remark, Resolution, Role, Score, ScoreError, ScoreOptions, ScoreRow, Source, score,
+    Input, Points, Remark, Resolution, Role, Score, ScoreError, ScoreOptions, ScoreRow, Source,
+    score,
 };
 pub use study::{Study, StudyError, Sweep, converge};

@@ -91,7 +91,8 @@ fn orders(rows: &[Row], sweep: &Sweep) -> PerField<PerNorm<Order>> {
         Sweep::Cells(_) => row.h,
         Sweep::Cfls(_) => row.dt,
     };
-    let rows = rows.iter().map(|row| (step(row), (row.status == Status::Ok).then_some(&row.errors)));
+    let rows =
+        rows.iter().map(|row| (step(row), (row.status == Status::Ok).then_some(&row.errors)));
     orders_of(&rows.collect::<Vec<_>>())
 }
 

@@ -39,7 +39,13 @@ fn a_series_reads_back_bit_for_bit() {
 #[test]
 fn a_frame_without_arrays_reads_back() {
     let folder = tempfile::tempdir().unwrap();
-    let frame = Frame { time: 0.0, step: 0, velocity_time: Some(-0.125), points: vec![[1.0, 2.0, 3.0]], arrays: vec![] };
+    let frame = Frame {
+        time: 0.0,
+        step: 0,
+        velocity_time: Some(-0.125),
+        points: vec![[1.0, 2.0, 3.0]],
+        arrays: vec![],
+    };
     let path = Series::create(folder.path(), "bare").unwrap().write(&frame).unwrap();
     assert_eq!(read(&path).unwrap(), frame);
 }

@@ -152,9 +152,10 @@ fn errors(row: &ScoreRow) -> String {
 fn tables(score: &Score) -> Vec<(&'static str, Table)> {
     let Some(orders) = &score.orders else { return vec![] };
     let fields = orders.named();
-    let known = fields.iter().enumerate().filter(|(_, (field, _))| {
-        score.rows.iter().any(|row| row.fields.contains(field))
-    });
+    let known = fields
+        .iter()
+        .enumerate()
+        .filter(|(_, (field, _))| score.rows.iter().any(|row| row.fields.contains(field)));
     let table = |(field, (name, order)): (usize, &(&'static str, &mmsmith_verify::PerNorm<_>))| {
         let header =
             ["cells", "particles", "h", "linf", "rate", "l2", "rate", "l1", "rate", "status"];

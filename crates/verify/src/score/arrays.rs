@@ -60,9 +60,7 @@ impl Role {
                 "u",
                 "U",
             ],
-            Self::Velocity => {
-                &["velocity", "Velocity", "velocities", "VELOCITY", "vel", "v", "V"]
-            }
+            Self::Velocity => &["velocity", "Velocity", "velocities", "VELOCITY", "vel", "v", "V"],
             Self::DeformationGradient => &[
                 "deformation_gradient",
                 "DeformationGradient",
@@ -219,9 +217,7 @@ pub(super) fn vectors<const D: usize>(
 /// One matrix a particle from its rows; of nine components the first `D` rows and columns.
 pub(super) fn matrices<const D: usize>(flat: &[f64], components: usize) -> Vec<SMatrix<f64, D, D>> {
     let width = if components == 9 { 3 } else { D };
-    flat.chunks_exact(components)
-        .map(|row| SMatrix::from_fn(|i, j| row[width * i + j]))
-        .collect()
+    flat.chunks_exact(components).map(|row| SMatrix::from_fn(|i, j| row[width * i + j])).collect()
 }
 
 /// How many of the particles have a number that is none, and the first of them.

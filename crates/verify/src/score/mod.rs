@@ -410,12 +410,9 @@ fn recording<const D: usize>(
             };
         }
         let (norms, of_transposed) = data.errors(exact, frame.time);
-        for (count, is_there) in compared.iter_mut().zip([
-            true,
-            data.v.is_some(),
-            data.F.is_some(),
-            data.P.is_some(),
-        ]) {
+        for (count, is_there) in
+            compared.iter_mut().zip([true, data.v.is_some(), data.F.is_some(), data.P.is_some()])
+        {
             *count += usize::from(is_there);
         }
         errors = Some(match errors {
@@ -427,12 +424,8 @@ fn recording<const D: usize>(
 
     let mut errors = errors.unwrap_or_default();
     let absent = PerNorm { linf: f64::NAN, l2: f64::NAN, l1: f64::NAN };
-    let roles = [
-        Role::Displacement,
-        Role::Velocity,
-        Role::DeformationGradient,
-        Role::FirstPiolaKirchhoff,
-    ];
+    let roles =
+        [Role::Displacement, Role::Velocity, Role::DeformationGradient, Role::FirstPiolaKirchhoff];
     let mut fields = vec![];
     for ((field, role), count) in ["u", "v", "F", "P"].into_iter().zip(roles).zip(compared) {
         if count > 0 {
@@ -682,7 +675,8 @@ fn trace<const D: usize>(
             frame.time
         ),
     );
-    let places = ids.map(|ids| ids.into_iter().enumerate().map(|(place, id)| (id, place)).collect());
+    let places =
+        ids.map(|ids| ids.into_iter().enumerate().map(|(place, id)| (id, place)).collect());
     Ok(Scheme::Traced(Traced { X, places }))
 }
 
@@ -716,7 +710,8 @@ fn positions<const D: usize>(
         return Err(ScoreError::Coordinates { path: path(), found, expected: D });
     }
     if head.is_single {
-        let what = "points are 32-bit floats: errors below about 1e-7 of their coordinates are rounding";
+        let what =
+            "points are 32-bit floats: errors below about 1e-7 of their coordinates are rounding";
         remarks.note("single-precision", false, what);
     }
     let flat = snapshot.positions()?;
@@ -735,7 +730,8 @@ fn judged<const D: usize>(
     let (vectors, beyond) = vectors(flat, components);
     if let Some((count, first)) = beyond {
         let kind = "out-of-plane";
-        let what = format!("particle(s) whose {what} has a part beyond the solution's {D} dimension(s)");
+        let what =
+            format!("particle(s) whose {what} has a part beyond the solution's {D} dimension(s)");
         remarks.met(kind, true, count, what, || place(first, snapshot));
     }
     vectors
@@ -784,11 +780,8 @@ impl<const D: usize> FrameData<D> {
         let magnitudes = |p: usize| {
             let at_time = exact.fields(&self.X[p], time);
             let v = self.v.as_ref().map_or(0.0, |(v, v_time)| {
-                let exact_v = if *v_time == time {
-                    at_time.v
-                } else {
-                    exact.velocity(&self.X[p], *v_time)
-                };
+                let exact_v =
+                    if *v_time == time { at_time.v } else { exact.velocity(&self.X[p], *v_time) };
                 (v[p] - exact_v).norm()
             });
             let tensor = |given: &Option<Vec<SMatrix<f64, D, D>>>, exact: SMatrix<f64, D, D>| {
@@ -836,7 +829,8 @@ impl<const D: usize> FrameReader<'_, D> {
         };
         let (X, u) = match self.scheme {
             Scheme::Given { displacement } => {
-                let X = need(self.vector(Role::ReferencePosition, snapshot)?, Role::ReferencePosition)?;
+                let X =
+                    need(self.vector(Role::ReferencePosition, snapshot)?, Role::ReferencePosition)?;
                 let u = if *displacement {
                     need(self.vector(Role::Displacement, snapshot)?, Role::Displacement)?
                 } else {
@@ -866,7 +860,13 @@ impl<const D: usize> FrameReader<'_, D> {
             (Some(own), _) => {
                 let what = "frame(s) tell a time for their velocities that is not finite";
                 let first = || snapshot.path().display().to_string();
-                self.remarks.met("time-not-finite", true, usize::from(!own.is_finite()), what, first);
+                self.remarks.met(
+                    "time-not-finite",
+                    true,
+                    usize::from(!own.is_finite()),
+                    what,
+                    first,
+                );
                 self.vector(Role::Velocity, snapshot)?.map(|v| (v, own))
             }
             (None, true) => {
@@ -953,7 +953,9 @@ impl<const D: usize> FrameReader<'_, D> {
         let domain = self.exact.domain();
         let (count, furthest) = outside(&domain, X);
         let hint = match self.scheme {
-            Scheme::Recovered => "; if the points are reference positions already, --points reference tells so",
+            Scheme::Recovered => {
+                "; if the points are reference positions already, --points reference tells so"
+            }
             _ => "",
         };
         let what = format!("reference position(s) lie outside the body{hint}");

@@ -317,13 +317,15 @@ mod tests {
         );
         let contents = contents(text.as_bytes()).unwrap();
         let piece = &contents.pieces[0];
-        let names: Vec<_> =
-            piece.arrays.iter().map(|a| (a.name.as_str(), a.components)).collect();
+        let names: Vec<_> = piece.arrays.iter().map(|a| (a.name.as_str(), a.components)).collect();
         assert_eq!(names, [("mass", 1), ("u x", 3), ("F", 9), ("id", 1), ("v", 2)]);
         let numbers = |entry| contents.numbers::<f64>(text.as_bytes(), entry).unwrap();
         assert_eq!(numbers(&piece.arrays[0]), [1.0, 2.0]);
         assert_eq!(numbers(&piece.arrays[4]), [1.0, 2.0, 3.0, 4.0]);
-        assert_eq!((contents.fields[0].name.as_str(), numbers(&contents.fields[0])), ("TimeValue", vec![0.5]));
+        assert_eq!(
+            (contents.fields[0].name.as_str(), numbers(&contents.fields[0])),
+            ("TimeValue", vec![0.5])
+        );
     }
 
     #[test]
@@ -337,7 +339,10 @@ mod tests {
             (&format!("{HEAD}POINTS 99999999999999999 float\n0 0"), "2 of its"),
             (&format!("{HEAD}POINTS -1 float\n0 0"), "\"-1\" is no count"),
             (&format!("{HEAD}POINTS 1 words\n0 0"), "no kind of numbers"),
-            (&format!("{HEAD}POINTS 1 float\n0 0 0\nPOINT_DATA 2\nSCALARS m float\n1 2\n"), "2 entries for 1"),
+            (
+                &format!("{HEAD}POINTS 1 float\n0 0 0\nPOINT_DATA 2\nSCALARS m float\n1 2\n"),
+                "2 entries for 1",
+            ),
             (&format!("{HEAD}NONSENSE\n"), "\"NONSENSE\""),
             (HEAD, "no POINTS"),
         ] {

@@ -107,7 +107,8 @@ fn read(path: &Path) -> Result<Vec<u8>, ReadError> {
     }
     let mut content = vec![];
     file.by_ref().take(4096).read_to_end(&mut content).map_err(fail)?;
-    let malformed = |cause: &str| ReadError::Malformed { path: path.to_owned(), cause: cause.into() };
+    let malformed =
+        |cause: &str| ReadError::Malformed { path: path.to_owned(), cause: cause.into() };
     if content.is_empty() {
         return Err(malformed("the file is empty"));
     }
@@ -402,9 +403,7 @@ impl Snapshot {
     pub fn floats(&self, name: &str) -> Result<Option<Vec<f64>>, ReadError> {
         match &self.data {
             Data::File { .. } => self.numbers(name),
-            Data::Table { table, frame } => {
-                Ok(table.floats(name, table.frames[*frame].1.clone()))
-            }
+            Data::Table { table, frame } => Ok(table.floats(name, table.frames[*frame].1.clone())),
         }
     }
 

@@ -153,8 +153,7 @@ pub(super) fn decode<N: Number>(
 
 /// Exactly `expected` numbers between blanks.
 pub(super) fn parse<N: Number>(text: &[u8], expected: usize) -> Result<Vec<N>, String> {
-    let words =
-        text.split(|byte| byte.is_ascii_whitespace()).filter(|word| !word.is_empty());
+    let words = text.split(|byte| byte.is_ascii_whitespace()).filter(|word| !word.is_empty());
     // A number and the blank behind it take two bytes at least.
     let mut numbers = Vec::with_capacity(expected.min(text.len() / 2 + 1));
     let mut found = 0_usize;

@@ -31,10 +31,8 @@ const REFERENCE: &str = "X";
 impl Table {
     /// Reads a file with one header line.
     pub(super) fn read(bytes: &[u8]) -> Result<Self, String> {
-        let mut reader = csv::ReaderBuilder::new()
-            .trim(csv::Trim::All)
-            .comment(Some(b'#'))
-            .from_reader(bytes);
+        let mut reader =
+            csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(bytes);
         let header = reader.headers().map_err(|cause| cause.to_string())?.clone();
         let mut columns: Vec<Vec<f64>> = vec![vec![]; header.len()];
         let mut record = csv::StringRecord::new();
@@ -48,7 +46,8 @@ impl Table {
             }
         }
         let arrays = group(&header)?;
-        let time = header.iter().position(|name| ["t", "time", "Time", "TimeValue"].contains(&name));
+        let time =
+            header.iter().position(|name| ["t", "time", "Time", "TimeValue"].contains(&name));
         let rows = columns.first().map_or(0, Vec::len);
         let frames = frames(time.map(|time| &columns[time][..]), rows)?;
         Ok(Self { arrays, columns, frames })
@@ -69,16 +68,17 @@ impl Table {
         Some(rows.flat_map(row).collect())
     }
 
-    pub(super) fn integers(&self, name: &str, rows: Range<usize>) -> Option<Result<Vec<i64>, String>> {
+    pub(super) fn integers(
+        &self,
+        name: &str,
+        rows: Range<usize>,
+    ) -> Option<Result<Vec<i64>, String>> {
         Some(self.floats(name, rows)?.into_iter().map(to_whole).collect())
     }
 }
 
 /// Successive rows of one time are a frame.
-fn frames(
-    times: Option<&[f64]>,
-    rows: usize,
-) -> Result<Vec<(Option<f64>, Range<usize>)>, String> {
+fn frames(times: Option<&[f64]>, rows: usize) -> Result<Vec<(Option<f64>, Range<usize>)>, String> {
     let Some(times) = times else { return Ok(vec![(None, 0..rows)]) };
     let mut frames: Vec<(Option<f64>, Range<usize>)> = vec![];
     let mut seen = std::collections::HashSet::new();
@@ -163,10 +163,11 @@ fn group(header: &csv::StringRecord) -> Result<Vec<Columns>, String> {
                 9 => 3,
                 _ => 0,
             };
-            let is_whole = components.iter().enumerate().all(|(at, (component, _))| match component {
-                Component::Index(index) | Component::Vector(index) => *index == at && (at < 9),
-                Component::Tensor(i, j) => dimension > 0 && dimension * i + j == at,
-            });
+            let is_whole =
+                components.iter().enumerate().all(|(at, (component, _))| match component {
+                    Component::Index(index) | Component::Vector(index) => *index == at && (at < 9),
+                    Component::Tensor(i, j) => dimension > 0 && dimension * i + j == at,
+                });
             if is_whole {
                 let indices = components.into_iter().map(|(_, index)| index).collect();
                 return Ok(Columns { name: name.to_owned(), indices });

@@ -123,8 +123,7 @@ pub(super) fn contents(bytes: &[u8]) -> Result<Contents, String> {
                 let Some(contents) = &mut contents else {
                     return Err("<AppendedData> stands outside of <VTKFile>".into());
                 };
-                contents.appended =
-                    Some(appended(&Tag::new(element)?, bytes, position(&reader))?);
+                contents.appended = Some(appended(&Tag::new(element)?, bytes, position(&reader))?);
                 // What follows need not be XML.
                 is_complete = true;
                 break;
@@ -239,6 +238,9 @@ fn appended(tag: &Tag, bytes: &[u8], from: usize) -> Result<Appended, String> {
         None | Some("base64") => true,
         Some(other) => return Err(format!("the appended data's encoding {other:?} is unknown")),
     };
+    if !bytes.trim_ascii_end().ends_with(b"</VTKFile>") {
+        return Err("the file does not end with </VTKFile>: it was cut off".into());
+    }
     let rest = &bytes[from..];
     let blanks = rest.iter().take_while(|byte| byte.is_ascii_whitespace()).count();
     if rest.get(blanks) != Some(&b'_') {
