@@ -235,9 +235,9 @@ fn listed(path: &Path) -> Result<Vec<FrameFile>, ReadError> {
 fn rows(path: &Path) -> Result<Vec<FrameFile>, ReadError> {
     let malformed = |cause| ReadError::Malformed { path: path.to_owned(), cause };
     let table = Arc::new(Table::read(&read(path)?).map_err(malformed)?);
-    let frame = |(index, (time, _)): (usize, &(Option<f64>, _))| FrameFile {
+    let frame = |(index, rows): (usize, &table::Rows)| FrameFile {
         path: path.to_owned(),
-        time: *time,
+        time: rows.time,
         table: Some((Arc::clone(&table), index)),
     };
     Ok(table.frames.iter().enumerate().map(frame).collect())
@@ -296,7 +296,7 @@ impl Snapshot {
                 components: table.components(&columns.name).unwrap_or(0),
                 is_single: false,
             });
-            let (arrays, particles) = (arrays.collect(), table.frames[*index].1.len());
+            let (arrays, particles) = (arrays.collect(), table.frames[*index].range.len());
             let data = Data::Table { table: Arc::clone(table), frame: *index };
             return Ok(Self { path, particles, arrays, data });
         }
@@ -403,7 +403,9 @@ impl Snapshot {
     pub fn floats(&self, name: &str) -> Result<Option<Vec<f64>>, ReadError> {
         match &self.data {
             Data::File { .. } => self.numbers(name),
-            Data::Table { table, frame } => Ok(table.floats(name, table.frames[*frame].1.clone())),
+            Data::Table { table, frame } => {
+                Ok(table.floats(name, table.frames[*frame].range.clone()))
+            }
         }
     }
 
@@ -416,7 +418,7 @@ impl Snapshot {
         match &self.data {
             Data::File { .. } => self.numbers(name),
             Data::Table { table, frame } => table
-                .integers(name, table.frames[*frame].1.clone())
+                .integers(name, table.frames[*frame].range.clone())
                 .transpose()
                 .map_err(|cause| self.bad(name, cause)),
         }

@@ -1,6 +1,6 @@
 //! Particles in comma-separated values.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::ops::Range;
 use std::path::Path;
 
@@ -11,8 +11,16 @@ use super::numbers::to_whole;
 pub(super) struct Table {
     pub(super) arrays: Vec<Columns>,
     columns: Vec<Vec<f64>>,
-    /// The frames in order: their time, if there is a column of it, and their rows.
-    pub(super) frames: Vec<(Option<f64>, Range<usize>)>,
+    /// The frames, in order.
+    pub(super) frames: Vec<Rows>,
+}
+
+/// The rows of one frame.
+#[derive(Debug, PartialEq)]
+pub(super) struct Rows {
+    /// The frame's time, if there is a column of it.
+    pub(super) time: Option<f64>,
+    pub(super) range: Range<usize>,
 }
 
 /// The columns that make up one array.
@@ -78,14 +86,18 @@ impl Table {
 }
 
 /// Successive rows of one time are a frame.
-fn frames(times: Option<&[f64]>, rows: usize) -> Result<Vec<(Option<f64>, Range<usize>)>, String> {
-    let Some(times) = times else { return Ok(vec![(None, 0..rows)]) };
-    let mut frames: Vec<(Option<f64>, Range<usize>)> = vec![];
-    let mut seen = std::collections::HashSet::new();
-    for (row, time) in times.iter().enumerate() {
+fn frames(times: Option<&[f64]>, rows: usize) -> Result<Vec<Rows>, String> {
+    let Some(times) = times else { return Ok(vec![Rows { time: None, range: 0..rows }]) };
+    let mut frames: Vec<Rows> = vec![];
+    let mut seen = HashSet::new();
+    for (row, &time) in times.iter().enumerate() {
         match frames.last_mut() {
-            Some((Some(last), range)) if last.to_bits() == time.to_bits() => range.end = row + 1,
-            _ if seen.insert(time.to_bits()) => frames.push((Some(*time), row..row + 1)),
+            Some(last) if last.time.map(f64::to_bits) == Some(time.to_bits()) => {
+                last.range.end = row + 1;
+            }
+            _ if seen.insert(time.to_bits()) => {
+                frames.push(Rows { time: Some(time), range: row..row + 1 });
+            }
             _ => {
                 return Err(format!(
                     "rows of time {time:?} do not stand together: sort the rows by time"
@@ -94,7 +106,7 @@ fn frames(times: Option<&[f64]>, rows: usize) -> Result<Vec<(Option<f64>, Range<
         }
     }
     if frames.is_empty() {
-        frames.push((None, 0..0));
+        frames.push(Rows { time: None, range: 0..0 });
     }
     Ok(frames)
 }
@@ -197,7 +209,8 @@ mod tests {
                     2,2,1,0,4,3,5,6,7,8,9,10,0.5\n\
                     1,3,1,0.5,4,3,5,6,7,8,9,10,0.5\n";
         let table = Table::read(text.as_bytes()).unwrap();
-        assert_eq!(table.frames, [(Some(0.0), 0..2), (Some(0.5), 2..3)]);
+        let rows = |time, range| Rows { time: Some(time), range };
+        assert_eq!(table.frames, [rows(0.0, 0..2), rows(0.5, 2..3)]);
         assert_eq!(table.floats(POINTS, 2..3), Some(vec![1.0, 3.0]));
         assert_eq!(table.floats("u", 0..1), Some(vec![3.0, 4.0]));
         assert_eq!(table.floats("F", 0..1), Some(vec![5.0, 6.0, 7.0, 8.0]));

@@ -200,10 +200,10 @@ fn text(reader: &mut Reader<&[u8]>) -> Result<std::ops::Range<usize>, String> {
             .map_err(|cause| format!("bad XML at byte {}: {cause}", reader.error_position()))?;
         match event {
             // VTK puts descriptions of the array next to its numbers, as elements with texts of their own.
-            Event::Text(text) if depth == 0 && found.is_empty() => {
-                if !text.iter().all(u8::is_ascii_whitespace) {
-                    found = before..before + text.len();
-                }
+            Event::Text(text)
+                if depth == 0 && found.is_empty() && !text.iter().all(u8::is_ascii_whitespace) =>
+            {
+                found = before..before + text.len();
             }
             Event::Start(_) => depth += 1,
             Event::End(_) if depth == 0 => return Ok(found),
