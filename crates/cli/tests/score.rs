@@ -1,6 +1,8 @@
 //! `mms score` through the real binary: its own output to the bit, every variant of the formats, bad input, and what it
 //! has to say. The files in `tests/data/score` were written by `tests/python/write_variants.py`.
 
+#![allow(clippy::unwrap_used)]
+
 mod command;
 
 use command::{keys, mms, read_json, refuses};

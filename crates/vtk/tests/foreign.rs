@@ -1,5 +1,7 @@
 //! Files of other programs: what is in them, and that no damage makes the reader panic, hang or take memory.
 
+#![allow(clippy::unwrap_used)]
+
 use std::fs;
 use std::path::{Path, PathBuf};
 

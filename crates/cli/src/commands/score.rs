@@ -9,12 +9,12 @@ use serde_json::{Value, json};
 use super::with_threads;
 use crate::arguments::ScoreOptions;
 use crate::json::Output;
-use crate::library::Subject;
+use crate::library::Selection;
 use crate::table::{self, Table};
 use crate::terminal;
 
 pub(crate) fn score(options: &ScoreOptions) -> Result<bool> {
-    let subject = Subject::new(&options.name, &options.parameters.set)?;
+    let selection = Selection::new(&options.name, &options.parameters.set)?;
     let inputs = inputs(options)?;
     let mut map = BTreeMap::new();
     for (role, name) in &options.map {
@@ -31,10 +31,10 @@ pub(crate) fn score(options: &ScoreOptions) -> Result<bool> {
         periods: options.periods,
     };
     with_threads(options.threads, || {
-        let score = measure(&subject.solution, &inputs, &how)?;
-        terminal::say(&text(&subject, &score))?;
+        let score = measure(&selection.build()?, &inputs, &how)?;
+        terminal::say(&text(&selection, &score))?;
         if let Some(output) = output {
-            output.write(&document(&subject, options, &score))?;
+            output.write(&document(&selection, options, &score))?;
         }
         Ok(true)
     })
@@ -60,7 +60,7 @@ fn inputs(options: &ScoreOptions) -> Result<Vec<Input>> {
     Ok(recordings.into_iter().enumerate().map(input).collect())
 }
 
-fn document(subject: &Subject, options: &ScoreOptions, score: &Score) -> Value {
+fn document(selection: &Selection, options: &ScoreOptions, score: &Score) -> Value {
     let map: BTreeMap<_, _> = options.map.iter().map(|(role, name)| (role.name(), name)).collect();
     let mut findings = vec![];
     for (index, row) in score.rows.iter().enumerate() {
@@ -80,8 +80,8 @@ fn document(subject: &Subject, options: &ScoreOptions, score: &Score) -> Value {
         "schema": "mmsmith.score/1",
         "settings": {
             "version": env!("CARGO_PKG_VERSION"),
-            "solution": subject.name,
-            "parameters": subject.parameters,
+            "solution": selection.name(),
+            "parameters": selection.parameters(),
             "files": options.files,
             "series": options.series,
             "map": map,
@@ -99,10 +99,10 @@ fn document(subject: &Subject, options: &ScoreOptions, score: &Score) -> Value {
     document
 }
 
-fn text(subject: &Subject, score: &Score) -> String {
+fn text(selection: &Selection, score: &Score) -> String {
     let parameters: Vec<_> =
-        subject.parameters.iter().map(|(name, value)| format!("{name} = {value}")).collect();
-    let mut text = format!("{} ({})\n", subject.name, parameters.join(", "));
+        selection.parameters().iter().map(|(name, value)| format!("{name} = {value}")).collect();
+    let mut text = format!("{} ({})\n", selection.name(), parameters.join(", "));
     for row in &score.rows {
         text += &heading(row);
     }
