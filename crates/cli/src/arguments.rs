@@ -30,6 +30,8 @@ pub(crate) enum Command {
     Run(RunOptions),
     /// Measure orders of accuracy over grids (--cells 16,32,64) or time steps (--cells 32 --cfls 0.1,0.2,0.4)
     Converge(ConvergeOptions),
+    /// Measure errors and orders of what another solver wrote (.vtu, .vtp, .vtk, .pvd, .csv)
+    Score(ScoreOptions),
     /// Repeat the original study on both of its problems, with tables, data and particle files
     Reproduce(ReproduceOptions),
 }
@@ -128,6 +130,51 @@ pub(crate) struct ConvergeOptions {
     pub(crate) cfls: Vec<f64>,
     #[command(flatten)]
     pub(crate) scheme: SchemeOptions,
+}
+
+/// Where another solver's output is, and how it is to be read.
+#[derive(Args)]
+pub(crate) struct ScoreOptions {
+    /// The solution, by name, or a specification file (SPEC.toml)
+    #[arg(value_name = "NAME|SPEC.toml")]
+    pub(crate) name: String,
+    /// Recordings, one for each resolution: a .pvd list, a folder (with one .pvd list, or of frames), or a single .vtu,
+    /// .vtp, .vtk or .csv file
+    #[arg(value_name = "FILES", required = true)]
+    pub(crate) files: Vec<PathBuf>,
+    /// The files are the frames of one recording, in their order
+    #[arg(long)]
+    pub(crate) series: bool,
+    /// What an array is that has no usual name; repeatable. Roles: displacement, velocity, deformation_gradient,
+    /// first_piola_kirchhoff, reference_position, id
+    #[arg(long, value_name = "ROLE=NAME", value_parser = role)]
+    pub(crate) map: Vec<(verify::Role, String)>,
+    /// What the points of the files are
+    #[arg(long, value_enum, default_value_t = Points::Auto)]
+    pub(crate) points: Points,
+    /// The time of single frames that do not tell it
+    #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite_number)]
+    pub(crate) time: Option<f64>,
+    /// By how much velocities lag behind their frame's time: half a time step for staggered schemes
+    #[arg(long, value_name = "DT", default_value_t = 0.0, allow_negative_numbers = true, value_parser = finite_number)]
+    pub(crate) velocity_lag: f64,
+    /// The time in which frames are expected, in periods of the solution
+    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = positive_number)]
+    pub(crate) periods: f64,
+    /// Cell counts along the solution's cell length, one for each recording
+    #[arg(long, value_name = "N,...", value_delimiter = ',', value_parser = positive_count, conflicts_with = "h")]
+    pub(crate) cells: Vec<usize>,
+    /// Mesh sizes, one for each recording; estimated from the particles when neither is given
+    #[arg(long, value_name = "H,...", value_delimiter = ',', value_parser = positive_number)]
+    pub(crate) h: Vec<f64>,
+    #[command(flatten)]
+    pub(crate) parameters: ParameterOptions,
+    /// Number of threads; all cores when left out
+    #[arg(long, value_name = "N", value_parser = thread_count)]
+    pub(crate) threads: Option<usize>,
+    /// Write the result to this JSON file
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
 }
 
 #[derive(Args)]
@@ -260,6 +307,18 @@ choices!(
     }
 );
 
+choices!(
+    /// What the points of files are.
+    Points => verify::Points {
+        /// Reference positions if they stay while displacements change, else current ones
+        Auto,
+        /// Current positions
+        Current,
+        /// Reference positions
+        Reference,
+    }
+);
+
 /// Floating-point precision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -295,6 +354,24 @@ fn positive_number(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
         _ => Err("it must be a positive number, such as 0.4".into()),
+    }
+}
+
+fn finite_number(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err("it must be a finite number, such as 0.01".into()),
+    }
+}
+
+fn role(text: &str) -> Result<(verify::Role, String), String> {
+    let roles = || verify::Role::ALL.map(verify::Role::name).join(", ");
+    let form = || format!("expected ROLE=NAME, such as displacement=disp; roles: {}", roles());
+    let (role, name) = text.split_once('=').ok_or_else(form)?;
+    let known = verify::Role::ALL.into_iter().find(|known| known.name() == role.trim());
+    match known {
+        Some(known) if !name.is_empty() => Ok((known, name.to_owned())),
+        _ => Err(form()),
     }
 }
 

@@ -8,6 +8,7 @@ mod explain;
 mod list;
 mod reproduce;
 mod run;
+mod score;
 mod thorough;
 
 pub(crate) use check::check;
@@ -18,6 +19,7 @@ pub(crate) use explain::explain;
 pub(crate) use list::list;
 pub(crate) use reproduce::reproduce;
 pub(crate) use run::run;
+pub(crate) use score::score;
 
 use anyhow::{Context, Result};
 use mmsmith_solutions::AnySolution;

@@ -63,9 +63,10 @@ fn step_of_frame(index: u64, count: u64, steps: u64) -> u64 {
 
 /// The particles with what the solver holds and what is exact.
 ///
-/// The velocity is the stored one, which centred differences hold half a step earlier. Stress is Cauchy's, from
-/// the solver's law, with the component normal to the plane in two dimensions. `None` if a particle has no
-/// stress because it is inside out: no viewer reads numbers that are none.
+/// The velocity is the stored one, which centred differences hold half a step earlier; the frame tells its time, but for
+/// the first state, whose velocity belongs to no time of the scheme yet. `stress` is Cauchy's. Both stresses are from the
+/// solver's law, with the component normal to the plane in two dimensions. `None` if a particle has no stress because it
+/// is inside out: no viewer reads numbers that are none.
 fn frame<T: Real, const D: usize>(
     simulation: &Simulation<T, D>,
     exact: &dyn Solution<f64, D>,
@@ -80,7 +81,9 @@ fn frame<T: Real, const D: usize>(
     let mut velocity = Vec::with_capacity(count);
     let mut gradient = Vec::with_capacity(count);
     let mut stress = Vec::with_capacity(count);
+    let mut first_piola_kirchhoff = Vec::with_capacity(count);
     let mut von_mises = Vec::with_capacity(count);
+    let mut initial_position = Vec::with_capacity(count);
     let mut exact_displacement = Vec::with_capacity(count);
     let mut error = Vec::with_capacity(count);
     let mut error_magnitude = Vec::with_capacity(count);
@@ -99,6 +102,12 @@ fn frame<T: Real, const D: usize>(
         // In three dimensions, which gives the stress normal to the plane as well.
         let F_solver = F_3D.map(Real::nearest);
         stress.push(by_rows(&law.cauchy(&F_solver)?.map(Real::to_f64)));
+        // In the solver's own dimension, as errors are measured; only the rest is taken from three dimensions.
+        let mut P = law.first_piola_kirchhoff(&F_solver)?.map(Real::to_f64);
+        let in_plane = law.first_piola_kirchhoff(&particles.F[p])?.map(Real::to_f64);
+        P.fixed_view_mut::<D, D>(0, 0).copy_from(&in_plane);
+        first_piola_kirchhoff.push(by_rows(&P));
+        initial_position.push(padded(&X));
         von_mises.push(law.von_mises(&F_solver)?.to_f64());
         exact_displacement.push(padded(&u));
         error.push(padded(&delta));
@@ -109,17 +118,20 @@ fn frame<T: Real, const D: usize>(
     Some(Frame {
         time,
         step,
+        velocity_time: (step > 0).then(|| time - simulation.velocity_lag().to_f64()),
         points,
         arrays: vec![
             array("displacement", Values::Vector(displacement)),
             array("velocity", Values::Vector(velocity)),
             array("deformation_gradient", Values::Tensor(gradient)),
             array("stress", Values::Tensor(stress)),
+            array("first_piola_kirchhoff", Values::Tensor(first_piola_kirchhoff)),
             array("von_mises", Values::Scalar(von_mises)),
             array("exact_displacement", Values::Vector(exact_displacement)),
             array("error", Values::Vector(error)),
             array("error_magnitude", Values::Scalar(error_magnitude)),
             array("volume", Values::Scalar(volume)),
+            array("initial_position", Values::Vector(initial_position)),
             array("id", Values::Id((0..count as u64).collect())),
         ],
     })

@@ -5,6 +5,7 @@
 //! - [`coverage()`] measures which terms of the momentum balance a solution exercises.
 //! - [`run`] simulates one [`Case`] and measures the errors of displacement, velocity, deformation gradient and
 //!   stress; [`converge`] does so for a series of grids or time steps and adds the orders of accuracy.
+//! - [`score()`] measures what another solver wrote to files, in the same norms.
 //! - [`evaluate()`] gives the exact fields at a point.
 //!
 //! Everything here takes a solution as a value, never by its name, and knows nothing of terminals or arguments.
@@ -22,6 +23,7 @@ mod order;
 mod plan;
 mod points;
 mod scene;
+mod score;
 mod study;
 
 pub use case::{Arithmetic, Case, CaseError, Outputs, Progress, Row, Start, Status, run};
@@ -36,4 +38,8 @@ pub use norms::{PerField, PerNorm};
 pub use order::Order;
 pub use plan::{Plan, plan};
 pub use scene::{Extent, SceneError};
+pub use score::{
+    Input, Points, Remark, Resolution, Role, Score, ScoreError, ScoreOptions, ScoreRow, Source,
+    score,
+};
 pub use study::{Study, StudyError, Sweep, converge};

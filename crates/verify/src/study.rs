@@ -87,16 +87,22 @@ pub fn converge(
 
 /// The orders over the rows of a sweep.
 fn orders(rows: &[Row], sweep: &Sweep) -> PerField<PerNorm<Order>> {
-    let steps: Vec<f64> = rows
-        .iter()
-        .map(|row| match sweep {
-            Sweep::Cells(_) => row.h,
-            Sweep::Cfls(_) => row.dt,
-        })
-        .collect();
+    let step = |row: &Row| match sweep {
+        Sweep::Cells(_) => row.h,
+        Sweep::Cfls(_) => row.dt,
+    };
+    let rows =
+        rows.iter().map(|row| (step(row), (row.status == Status::Ok).then_some(&row.errors)));
+    orders_of(&rows.collect::<Vec<_>>())
+}
+
+/// The orders of errors, `None` where a case failed, with respect to the steps beside them.
+pub(crate) fn orders_of(
+    rows: &[(f64, Option<&PerField<PerNorm<f64>>>)],
+) -> PerField<PerNorm<Order>> {
+    let steps: Vec<f64> = rows.iter().map(|(step, _)| *step).collect();
     let order = |value: &dyn Fn(&PerField<PerNorm<f64>>) -> f64| {
-        let errors: Vec<_> =
-            rows.iter().map(|row| (row.status == Status::Ok).then(|| value(&row.errors))).collect();
+        let errors: Vec<_> = rows.iter().map(|(_, errors)| errors.map(value)).collect();
         Order::of(&steps, &errors)
     };
     let norms = |field: fn(&PerField<PerNorm<f64>>) -> &PerNorm<f64>| PerNorm {

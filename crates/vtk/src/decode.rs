@@ -7,13 +7,14 @@ use vtkio::IOBuffer;
 use vtkio::model::{Attribute, DataSet, Piece, Vtk};
 use vtkio::xml::{Data, DataArray, ScalarType};
 
-use crate::encode::{CYCLE, ENCODING, HEADER, TIME};
+use crate::encode::{CYCLE, ENCODING, HEADER, TIME, VELOCITY_TIME};
 use crate::{Array, Error, Frame, Values};
 
 /// What introduces an array in the file.
 const ARRAY: &str = "<DataArray";
 
-/// The arrays of every file that are not quantities over the particles: time, step, points and three for the cells.
+/// The arrays of every file that are not quantities over the particles: time, step, points and three for the cells. The
+/// time of the velocities may be one more.
 const FIXED_ARRAYS: usize = 6;
 
 /// Reads a `.vtu` file that [`to_bytes`](crate::to_bytes) or [`Series`](crate::Series) wrote; the frame equals the
@@ -52,6 +53,15 @@ fn decode(text: &str) -> Result<Frame, String> {
     };
     let step = u64::try_from(cycle).map_err(|_| format!("Cycle is {cycle}"))?;
 
+    let velocity_time = match text.contains(VELOCITY_TIME) {
+        false => None,
+        true => match decode_number(text, VELOCITY_TIME, ScalarType::Float64)? {
+            IOBuffer::F64(time) => Some(time[0]),
+            _ => return Err("VelocityTime is not f64".into()),
+        },
+    };
+    let fixed_arrays = FIXED_ARRAYS + usize::from(velocity_time.is_some());
+
     let vtk = Vtk::parse_xml(text.as_bytes()).map_err(|cause| cause.to_string())?;
     let DataSet::UnstructuredGrid { pieces, .. } = vtk.data else {
         return Err("it holds no unstructured grid".into());
@@ -65,11 +75,11 @@ fn decode(text: &str) -> Result<Frame, String> {
     let arrays: Vec<Array> =
         piece.data.point.into_iter().map(array).collect::<Result<_, String>>()?;
     // vtkio leaves out, without a word, what it cannot read.
-    if arrays.len() + FIXED_ARRAYS != array_count {
-        let (expected, found) = (array_count.saturating_sub(FIXED_ARRAYS), arrays.len());
+    if arrays.len() + fixed_arrays != array_count {
+        let (expected, found) = (array_count.saturating_sub(fixed_arrays), arrays.len());
         return Err(format!("{found} of {expected} arrays over the particles can be read"));
     }
-    Ok(Frame { time, step, points: rows(&points), arrays })
+    Ok(Frame { time, step, velocity_time, points: rows(&points), arrays })
 }
 
 /// Makes sure that every array holds base64 for at least the eight bytes of its length, without which vtkio would

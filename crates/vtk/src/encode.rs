@@ -23,6 +23,10 @@ pub(crate) const TIME: &str =
 pub(crate) const CYCLE: &str =
     r#"<DataArray type="Int64" Name="Cycle" NumberOfTuples="1" format="binary">"#;
 
+/// The tag that is followed by the time of the velocities, in frames that tell it.
+pub(crate) const VELOCITY_TIME: &str =
+    r#"<DataArray type="Float64" Name="VelocityTime" NumberOfTuples="1" format="binary">"#;
+
 /// How numbers become text.
 pub(crate) const ENCODING: EncodingInfo = EncodingInfo {
     byte_order: ByteOrder::LittleEndian,
@@ -108,8 +112,16 @@ fn insert_field_data(mut xml: String, frame: &Frame) -> Result<String, Error> {
     };
     let time = encode_number("TimeValue", IOBuffer::F64(vec![frame.time]))?;
     let cycle = encode_number("Cycle", IOBuffer::I64(vec![frame.cycle()?]))?;
-    let field_data =
-        format!("<FieldData>{TIME}{time}</DataArray>{CYCLE}{cycle}</DataArray></FieldData>");
+    let velocity_time = match frame.velocity_time {
+        None => String::new(),
+        Some(time) => {
+            let number = encode_number("VelocityTime", IOBuffer::F64(vec![time]))?;
+            format!("{VELOCITY_TIME}{number}</DataArray>")
+        }
+    };
+    let field_data = format!(
+        "<FieldData>{TIME}{time}</DataArray>{CYCLE}{cycle}</DataArray>{velocity_time}</FieldData>"
+    );
     xml.insert_str(mark + GRID.len(), &field_data);
     Ok(xml)
 }

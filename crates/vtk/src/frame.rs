@@ -60,6 +60,9 @@ pub struct Frame {
     pub time: f64,
     /// The number of steps taken so far; `Cycle` in the file.
     pub step: u64,
+    /// The time to which the velocities belong, where it is known; `VelocityTime` in the file. Schemes that stagger
+    /// positions and velocities hold them for different times.
+    pub velocity_time: Option<f64>,
     /// The particles' positions, Cartesian; at least one.
     pub points: Vec<[f64; 3]>,
     /// The quantities over the particles, in the order in which the file holds them.
@@ -72,7 +75,7 @@ impl Frame {
     /// # Errors
     ///
     /// Where there is no particle, or more than `u32::MAX`; where an array's length differs from the number of
-    /// particles; where a name is repeated or holds anything but `[A-Za-z0-9_]`; where the time, a position or a value
+    /// particles; where a name is repeated or holds anything but `[A-Za-z0-9_]`; where a time, a position or a value
     /// is infinite or not a number; and where the step exceeds `i64::MAX`.
     pub fn check(&self) -> Result<(), Error> {
         let particles = self.points.len();
@@ -82,8 +85,10 @@ impl Frame {
         if u32::try_from(particles).is_err() {
             return Err(Error::TooManyParticles { particles });
         }
-        if !self.time.is_finite() {
-            return Err(Error::Time { time: self.time });
+        for time in [Some(self.time), self.velocity_time].into_iter().flatten() {
+            if !time.is_finite() {
+                return Err(Error::Time { time });
+            }
         }
         self.cycle()?;
         check_finite("points", self.points.as_flattened(), 3)?;

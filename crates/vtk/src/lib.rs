@@ -5,6 +5,8 @@
 //! the same frame, bit for bit, and a [`Series`] writes frame after frame into a folder, with a `.pvd` file that lists
 //! them with their times. ParaView and pyvista open the `.pvd`; meshio opens the single `.vtu` files.
 //!
+//! [`foreign`] reads the particles and nodes that other programs write, in whatever variant.
+//!
 //! Of the many variants of the format the files use the one that all three readers understand without loss: version
 //! 1.0, little endian, inline base64, no compression. The same frame always gives the same bytes.
 //!
@@ -17,6 +19,7 @@
 //! series.write(&Frame {
 //!     time: 0.25,
 //!     step: 10,
+//!     velocity_time: None,
 //!     points: vec![[0.5, 0.0, 0.0], [1.0, 0.0, 0.0]],
 //!     arrays: vec![Array { name: "volume".into(), values: Values::Scalar(vec![0.1, 0.2]) }],
 //! })?;
@@ -28,6 +31,7 @@
 mod decode;
 mod encode;
 mod error;
+pub mod foreign;
 mod frame;
 mod series;
 mod whole_file;

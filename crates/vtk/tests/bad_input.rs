@@ -6,7 +6,7 @@ use std::path::Path;
 use mmsmith_vtk::{Array, Error, Frame, Series, Values, read, to_bytes};
 
 fn frame(arrays: Vec<Array>) -> Frame {
-    Frame { time: 0.5, step: 3, points: vec![[0.0; 3], [1.0; 3]], arrays }
+    Frame { time: 0.5, step: 3, velocity_time: None, points: vec![[0.0; 3], [1.0; 3]], arrays }
 }
 
 fn array(name: &str, values: Values) -> Array {
@@ -71,6 +71,10 @@ fn values_that_are_not_finite() {
     assert_eq!(
         refused(&Frame { points, ..frame(vec![]) }),
         "array `points`, particle 1, component 1: NaN is not finite"
+    );
+    assert_eq!(
+        refused(&Frame { velocity_time: Some(f64::NAN), ..frame(vec![]) }),
+        "the frame's time is NaN; it must be finite"
     );
     assert_eq!(
         refused(&Frame { time: f64::NAN, ..frame(vec![]) }),

@@ -15,6 +15,7 @@ fn frame(time: f64, particles: usize) -> Frame {
     Frame {
         time,
         step: 1,
+        velocity_time: None,
         points: vec![[time; 3]; particles],
         arrays: vec![Array {
             name: "stress".into(),

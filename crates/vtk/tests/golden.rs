@@ -13,6 +13,7 @@ fn two_particles() -> Frame {
     Frame {
         time: 0.1 + 0.2,
         step: 12,
+        velocity_time: None,
         points: vec![[0.25, -0.0, 0.0], [0.75, 5e-324, f64::MAX]],
         arrays: vec![
             array(

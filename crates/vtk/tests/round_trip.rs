@@ -39,7 +39,13 @@ fn a_series_reads_back_bit_for_bit() {
 #[test]
 fn a_frame_without_arrays_reads_back() {
     let folder = tempfile::tempdir().unwrap();
-    let frame = Frame { time: 0.0, step: 0, points: vec![[1.0, 2.0, 3.0]], arrays: vec![] };
+    let frame = Frame {
+        time: 0.0,
+        step: 0,
+        velocity_time: Some(-0.125),
+        points: vec![[1.0, 2.0, 3.0]],
+        arrays: vec![],
+    };
     let path = Series::create(folder.path(), "bare").unwrap().write(&frame).unwrap();
     assert_eq!(read(&path).unwrap(), frame);
 }
@@ -56,6 +62,7 @@ fn names_of_the_format_are_harmless() {
     let frame = Frame {
         time: 1.5,
         step: 7,
+        velocity_time: Some(1.25),
         points: vec![[1.0, 2.0, 3.0]],
         arrays: names.iter().enumerate().map(array).collect(),
     };

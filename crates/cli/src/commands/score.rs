@@ -1,0 +1,183 @@
+//! `mms score`: errors and orders of another solver's output.
+
+use std::collections::BTreeMap;
+
+use anyhow::{Result, bail};
+use mmsmith_verify::{Input, Resolution, Score, ScoreRow, score as measure};
+use serde_json::{Value, json};
+
+use super::with_threads;
+use crate::arguments::ScoreOptions;
+use crate::json::Output;
+use crate::library::Selection;
+use crate::table::{self, Table};
+use crate::terminal;
+
+pub(crate) fn score(options: &ScoreOptions) -> Result<bool> {
+    let selection = Selection::new(&options.name, &options.parameters.set)?;
+    let inputs = inputs(options)?;
+    let mut map = BTreeMap::new();
+    for (role, name) in &options.map {
+        if map.insert(*role, name.clone()).is_some() {
+            bail!("--map {role}=... is given twice");
+        }
+    }
+    let output = Output::prepare_if(options.json.as_ref())?;
+    let how = mmsmith_verify::ScoreOptions {
+        map,
+        points: options.points.into(),
+        time: options.time,
+        velocity_lag: options.velocity_lag,
+        periods: options.periods,
+    };
+    with_threads(options.threads, || {
+        let score = measure(&selection.build()?, &inputs, &how)?;
+        terminal::say(&text(&selection, &score))?;
+        if let Some(output) = output {
+            output.write(&document(&selection, options, &score))?;
+        }
+        Ok(true)
+    })
+}
+
+/// The recordings with their resolutions.
+fn inputs(options: &ScoreOptions) -> Result<Vec<Input>> {
+    let recordings: Vec<_> = match options.series {
+        true => vec![options.files.clone()],
+        false => options.files.iter().map(|file| vec![file.clone()]).collect(),
+    };
+    for (option, given) in [("--cells", options.cells.len()), ("--h", options.h.len())] {
+        if given > 0 && given != recordings.len() {
+            bail!("{option} has {given} value(s) for {} recording(s)", recordings.len());
+        }
+    }
+    let resolution = |index: usize| match (options.cells.get(index), options.h.get(index)) {
+        (Some(cells), _) => Resolution::Cells(*cells),
+        (None, Some(h)) => Resolution::Length(*h),
+        (None, None) => Resolution::Estimated,
+    };
+    let input = |(index, paths)| Input { paths, resolution: resolution(index) };
+    Ok(recordings.into_iter().enumerate().map(input).collect())
+}
+
+fn document(selection: &Selection, options: &ScoreOptions, score: &Score) -> Value {
+    let map: BTreeMap<_, _> = options.map.iter().map(|(role, name)| (role.name(), name)).collect();
+    let mut findings = vec![];
+    for (index, row) in score.rows.iter().enumerate() {
+        for finding in &row.findings {
+            findings.push(json!({
+                "row": index,
+                "file": row.file,
+                "kind": finding.kind,
+                "problem": finding.is_problem,
+                "count": finding.count,
+                "frames": finding.frames,
+                "message": finding.message,
+            }));
+        }
+    }
+    let mut document = json!({
+        "schema": "mmsmith.score/1",
+        "settings": {
+            "version": env!("CARGO_PKG_VERSION"),
+            "solution": selection.name(),
+            "parameters": selection.parameters(),
+            "files": options.files,
+            "series": options.series,
+            "map": map,
+            "points": options.points,
+            "time": options.time,
+            "velocity_lag": options.velocity_lag,
+            "periods": options.periods,
+        },
+        "rows": score.rows,
+        "findings": findings,
+    });
+    if let Some(orders) = &score.orders {
+        document["orders"] = json!(orders);
+    }
+    document
+}
+
+fn text(selection: &Selection, score: &Score) -> String {
+    let parameters: Vec<_> =
+        selection.parameters().iter().map(|(name, value)| format!("{name} = {value}")).collect();
+    let mut text = format!("{} ({})\n", selection.name(), parameters.join(", "));
+    for row in &score.rows {
+        text += &heading(row);
+    }
+    match &score.orders {
+        None => text += &score.rows.iter().map(errors).collect::<String>(),
+        Some(_) => {
+            for (field, table) in tables(score) {
+                text += &format!("\nerror of {field}\n{}", table.text());
+            }
+        }
+    }
+    text
+}
+
+/// What was read, and what is to be said about it.
+fn heading(row: &ScoreRow) -> String {
+    let mut text = format!(
+        "{}: {} particles, {} frame(s) from t = {:?} to {:?}, h = {:?}\n",
+        row.file, row.particles, row.frames, row.first_time, row.last_time, row.h
+    );
+    text += &format!("  reference positions: {}\n", row.reference_positions.words());
+    text += &format!("  displacements: {}\n", row.displacements.words());
+    if row.is_ok() {
+        text += "  status: ok\n";
+    }
+    for finding in &row.findings {
+        let label = if finding.is_problem { "PROBLEM" } else { "note" };
+        text += &format!("  {label}: {}\n", finding.message);
+    }
+    text
+}
+
+/// The errors of one recording.
+fn errors(row: &ScoreRow) -> String {
+    let mut table = Table::new(1, ["error", "linf", "l2", "l1"]);
+    for (field, norms) in row.errors.named() {
+        if row.fields.contains(&field) {
+            let mut cells = vec![field.to_owned()];
+            cells.extend(norms.named().map(|(_, value)| table::error(*value)));
+            table.row(cells);
+        }
+    }
+    table.text()
+}
+
+/// One table for each field that any recording has: a row a recording, and the rate right of each norm.
+fn tables(score: &Score) -> Vec<(&'static str, Table)> {
+    let Some(orders) = &score.orders else { return vec![] };
+    let fields = orders.named();
+    let known = fields
+        .iter()
+        .enumerate()
+        .filter(|(_, (field, _))| score.rows.iter().any(|row| row.fields.contains(field)));
+    let table = |(field, (name, order)): (usize, &(&'static str, &mmsmith_verify::PerNorm<_>))| {
+        let header =
+            ["cells", "particles", "h", "linf", "rate", "l2", "rate", "l1", "rate", "status"];
+        let mut table = Table::new(0, header);
+        for (index, row) in score.rows.iter().enumerate() {
+            let cells = row.cells.map_or_else(|| "-".into(), |cells| cells.to_string());
+            let mut line = vec![cells, row.particles.to_string(), table::error(row.h)];
+            let errors = row.errors.named()[field].1.named();
+            for ((_, value), (_, order)) in errors.iter().zip(order.named()) {
+                let order: &mmsmith_verify::Order = order;
+                let local = index.checked_sub(1).and_then(|pair| order.local[pair]);
+                line.extend([table::error(**value), table::rate(local)]);
+            }
+            line.push(if row.is_ok() { "ok" } else { "PROBLEM" }.into());
+            table.row(line);
+        }
+        let mut fit = vec!["fit in h".to_owned(), String::new(), String::new()];
+        for (_, order) in order.named() {
+            fit.extend([String::new(), table::rate(order.fit)]);
+        }
+        table.row(fit);
+        (*name, table)
+    };
+    known.map(table).collect()
+}

@@ -1,0 +1,304 @@
+//! `mms score` through the real binary: its own output to the bit, every variant of the formats, bad input, and what it
+//! has to say. The files in `tests/data/score` were written by `tests/python/write_variants.py`.
+
+#![allow(clippy::unwrap_used)]
+
+mod command;
+
+use command::{keys, mms, read_json, refuses};
+use serde_json::Value;
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const FIELDS: [&str; 4] = ["u", "v", "F", "P"];
+const NORMS: [&str; 3] = ["linf", "l2", "l1"];
+
+fn data(kind: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/score").join(kind)
+}
+
+/// What is in a folder of the data, which must not be empty.
+fn entries(kind: &str) -> Vec<PathBuf> {
+    let mut entries: Vec<_> =
+        fs::read_dir(data(kind)).unwrap().map(|entry| entry.unwrap().path()).collect();
+    entries.sort();
+    assert!(entries.len() > 5, "{kind}");
+    entries
+}
+
+/// The arguments of a case and what must be said.
+fn call(case: &Path) -> (String, Vec<String>) {
+    let text = fs::read_to_string(case.join("call.txt")).unwrap();
+    let mut lines = text.lines().map(str::to_owned);
+    (lines.next().unwrap(), lines.collect())
+}
+
+fn score(place: &Path, arguments: &str) -> Value {
+    let called = mms(place, &format!("score {arguments} --json score.json"));
+    assert_eq!(called.status, 0, "score {arguments}: {}", called.stderr);
+    read_json(&place.join("score.json"))
+}
+
+#[test]
+fn frames_of_every_step_have_the_errors_of_the_run_to_the_bit() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    for (index, call) in [
+        "ring --cells 16",
+        "ring --cells 8 --start data --precision f32 --extent full",
+        "ring --cells 8 --integrator usl --set A=0.02",
+        "axis-aligned --cells 8 --start exact",
+        "axis-aligned-1d --cells 8 --integrator musl",
+        "axis-aligned-3d --cells 4",
+    ]
+    .iter()
+    .enumerate()
+    {
+        // More frames than there are steps means all of them.
+        let run = format!("run {call} --vtk frames{index} --frames 1000000 --json run.json");
+        let called = mms(place, &run);
+        assert_eq!(called.status, 0, "{run}: {}", called.stderr);
+        let run = read_json(&place.join("run.json"));
+        let name = call.split_whitespace().next().unwrap();
+        let set = if call.contains("--set") { "--set A=0.02" } else { "" };
+        let scored = score(place, &format!("{name} frames{index} {set}"));
+        let row = &scored["rows"][0];
+        for field in FIELDS {
+            for norm in NORMS {
+                // Both are printed in the shortest form that reads back to the same bits.
+                let (found, expected) =
+                    (&row["errors"][field][norm], &run["result"]["errors"][field][norm]);
+                assert!(expected.as_f64().unwrap() > 0.0, "{call}");
+                assert_eq!(found, expected, "{call}: {norm} of {field}");
+            }
+        }
+        assert_eq!(row["status"], "ok");
+        assert_eq!(row["frames"], run["result"]["steps"].as_u64().unwrap() + 1);
+        assert_eq!(row["particles"], run["result"]["particles"]);
+    }
+}
+
+#[test]
+fn several_recordings_have_the_orders_of_converge() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    for cells in [8, 16] {
+        let run = format!("run axis-aligned --cells {cells} --vtk of{cells} --frames 1000000");
+        assert_eq!(mms(place, &run).status, 0);
+    }
+    assert_eq!(mms(place, "converge axis-aligned --cells 8,16 --json study.json").status, 0);
+    let study = read_json(&place.join("study.json"));
+    let scored = score(place, "axis-aligned of8 of16 --cells 8,16");
+    assert_eq!(scored["orders"], study["orders"]);
+    assert_eq!(keys(&scored), "findings orders rows schema settings");
+    assert_eq!(scored["schema"], "mmsmith.score/1");
+    for (row, expected) in
+        scored["rows"].as_array().unwrap().iter().zip(study["rows"].as_array().unwrap())
+    {
+        assert_eq!((&row["h"], &row["errors"]), (&expected["h"], &expected["errors"]));
+        assert_eq!(
+            keys(row),
+            "cells displacements errors fields file first_time frames h last_time particles \
+             reference_positions status"
+        );
+    }
+    // Only the ratio of h matters: an estimate from the particles gives nearly the same, and says so.
+    let estimated = score(place, "axis-aligned of8 of16");
+    let fit = |scored: &Value| scored["orders"]["u"]["linf"]["fit"].as_f64().unwrap();
+    assert!((fit(&estimated) - fit(&scored)).abs() < 0.25);
+    assert_eq!(estimated["findings"].as_array().unwrap().len(), 4);
+    assert!(estimated.to_string().contains("estimated-h"));
+    let told = score(place, "axis-aligned of8 of16 --h 0.125,0.0625");
+    assert_eq!(told["orders"], scored["orders"]);
+}
+
+#[test]
+fn every_variant_of_the_formats_is_read() {
+    let place = tempfile::tempdir().unwrap();
+    for path in entries("ok") {
+        let scored = score(place.path(), &format!("ring {}", path.display()));
+        let row = &scored["rows"][0];
+        assert_eq!(row["status"], "ok", "{}", path.display());
+        assert_eq!(row["fields"].as_array().unwrap().len(), 4, "{}", path.display());
+        assert_eq!((&row["particles"], &row["frames"]), (&6.into(), &2.into()));
+        for (field, expected) in FIELDS.iter().zip([1e-3, 1e-2, 1e-4, 1.0]) {
+            for norm in NORMS {
+                let found = row["errors"][field][norm].as_f64().unwrap();
+                // meshio writes twelve digits in text: 5e-12 of an F of 1 are 5e-8 of its error.
+                let allowed = if path.ends_with("meshio-ascii") { 1e-7 } else { 1e-11 };
+                let ratio = found / expected;
+                assert!(
+                    (ratio - 1.0).abs() < allowed,
+                    "{}: {norm} of {field} {found:e}",
+                    path.display()
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_binary_variant_is_read_to_the_bit() {
+    let place = tempfile::tempdir().unwrap();
+    let errors = |name: &str| {
+        let path = data("ok").join(name);
+        score(place.path(), &format!("ring {}", path.display()))["rows"][0]["errors"].clone()
+    };
+    let expected = errors("vtk-appended-raw-64");
+    for path in entries("ok") {
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        // Text has the digits that its writer gave it.
+        if !name.contains("ascii") {
+            assert_eq!(errors(&name), expected, "{name}");
+        }
+    }
+}
+
+#[test]
+fn bad_input_ends_with_status_two_and_says_what_is_wrong() {
+    let mut cases = 0;
+    for case in entries("err") {
+        let (arguments, expected) = call(&case);
+        let expected: Vec<_> = expected.iter().map(String::as_str).collect();
+        assert!(!expected.is_empty(), "{}", case.display());
+        refuses(&case, &format!("score ring {arguments}"), &expected);
+        cases += 1;
+    }
+    assert!(cases > 40);
+}
+
+#[test]
+fn what_has_to_be_known_is_told_with_counts() {
+    for case in entries("findings") {
+        let (arguments, expected) = call(&case);
+        let called = mms(&case, &format!("score ring {arguments}"));
+        assert_eq!(called.status, 0, "{}: {}", case.display(), called.stderr);
+        for part in &expected {
+            assert!(called.stdout.contains(part), "{}: {part}\n{}", case.display(), called.stdout);
+        }
+        let has_problem = called.stdout.contains("PROBLEM");
+        assert_ne!(has_problem, called.stdout.contains("status: ok"), "{}", called.stdout);
+    }
+}
+
+#[test]
+fn findings_are_in_the_json_and_a_row_with_a_problem_has_no_part_in_orders() {
+    let place = tempfile::tempdir().unwrap();
+    let bad = data("findings").join("not-a-number");
+    let good = data("ok").join("vtk-base64-64");
+    let (bad, good) = (bad.display(), good.display());
+    let scored = score(place.path(), &format!("ring {good} {bad} {good} --h 0.4,0.2,0.1"));
+    let finding = &scored["findings"][0];
+    assert_eq!(keys(finding), "count file frames kind message problem row");
+    assert_eq!((&finding["kind"], &finding["count"]), (&"not-finite".into(), &2.into()));
+    assert_eq!((&finding["row"], &finding["problem"]), (&1.into(), &true.into()));
+    let status = scored["rows"][1]["status"].as_str().unwrap();
+    assert!(status.contains("2 particle(s)"), "{status}");
+    // The number says nothing where a number is none; it is not taken over the rest in silence.
+    assert!(scored["rows"][1]["errors"]["u"]["linf"].is_null());
+    let orders = &scored["orders"]["u"]["l2"];
+    assert_eq!(orders["local"], serde_json::json!([null, null]));
+    assert_eq!(orders["fit"].as_f64().map(f64::abs), Some(0.0));
+}
+
+#[test]
+fn a_specification_file_and_transposed_tensors() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let spec = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../mms-specs/skew-2d.toml");
+    let points = r#"[{ "X": [0.3, 0.4], "t": 0.1 }]"#;
+    fs::write(place.join("points.json"), points).unwrap();
+    assert_eq!(mms(place, "eval skew-2d --points points.json --json exact.json").status, 0);
+    let exact = &read_json(&place.join("exact.json"))["rows"][0];
+    let number = |value: &Value| value.as_f64().unwrap();
+    let (u, F) = (&exact["u"], &exact["F"]);
+    let mut text = "t,X,Y,ux,uy,F11,F12,F21,F22\n0.1,0.3,0.4".to_owned();
+    // The transpose: F12 and F21 change places.
+    for value in [&u[0], &u[1], &F[0][0], &F[1][0], &F[0][1], &F[1][1]] {
+        text += &format!(",{:?}", number(value));
+    }
+    fs::write(place.join("turned.csv"), text).unwrap();
+    let scored = score(place, &format!("{} turned.csv --periods 1000", spec.display()));
+    assert_eq!(scored["settings"]["solution"], "skew-2d");
+    let row = &scored["rows"][0];
+    assert!(number(&row["errors"]["u"]["linf"]) < 1e-14, "{row}");
+    let skewness = (number(&F[0][1]) - number(&F[1][0])).abs() * 2.0_f64.sqrt();
+    assert!((number(&row["errors"]["F"]["linf"]) - skewness).abs() < 1e-12, "{row}");
+    assert!(scored["findings"].to_string().contains("transpose of F"), "{}", scored["findings"]);
+    assert_eq!(row["fields"], serde_json::json!(["u", "F"]));
+    assert!(row["errors"]["P"]["l2"].is_null());
+}
+
+#[test]
+fn files_given_as_a_series_are_one_recording() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = data("ok").join("vtk-base64-64");
+    let (first, second) = (folder.join("a_0.vtu"), folder.join("a_1.vtu"));
+    let (first, second) = (first.display(), second.display());
+    let series = score(place.path(), &format!("ring --series {first} {second}"));
+    assert_eq!(series["rows"].as_array().unwrap().len(), 1);
+    assert_eq!(series["rows"][0]["frames"], 2);
+    let apart = score(place.path(), &format!("ring {first} {second}"));
+    assert_eq!(apart["rows"].as_array().unwrap().len(), 2);
+    let error = series["rows"][0]["errors"]["u"]["linf"].as_f64().unwrap();
+    assert_eq!(apart["rows"][1]["errors"]["u"]["linf"].as_f64().unwrap(), error);
+}
+
+#[test]
+fn velocities_that_lag_are_compared_at_their_own_time() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    assert_eq!(mms(place, "run ring --cells 8 --vtk f --frames 3").status, 0);
+    fs::write(
+        place.join("points.json"),
+        r#"[{ "X": [0.6, 0.3], "t": 0.004 }, { "X": [0.6, 0.3], "t": 0.003 }]"#,
+    )
+    .unwrap();
+    assert_eq!(mms(place, "eval ring --points points.json --json exact.json").status, 0);
+    let exact = read_json(&place.join("exact.json"));
+    let (u, v) = (&exact["rows"][0]["u"], &exact["rows"][1]["v"]);
+    let text = format!("t,X,Y,ux,uy,vx,vy\n0.004,0.6,0.3,{},{},{},{}\n", u[0], u[1], v[0], v[1]);
+    fs::write(place.join("lagging.csv"), text).unwrap();
+    let error = |options: &str| {
+        let scored = score(place, &format!("ring lagging.csv {options}"));
+        scored["rows"][0]["errors"]["v"]["linf"].as_f64().unwrap()
+    };
+    assert!(error("") > 1.0);
+    assert!(error("--velocity-lag 0.001") < 1e-12);
+}
+
+/// Bytes of address space: less than any of the files below would take.
+const MEMORY_KIB: u64 = 1_500_000;
+
+#[test]
+#[cfg(target_os = "linux")]
+fn files_of_two_gigabytes_are_refused_in_bounded_memory() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    fs::create_dir(place.join("empty")).unwrap();
+    refuses(place, "score ring empty", &["empty", "no frame"]);
+    for kind in ["vtu", "vtp", "vtk", "csv", "pvd"] {
+        let name = format!("large.{kind}");
+        // Sparse: they take no room on the disk.
+        for (bytes, head, expected) in [
+            (2_u64 << 30, "", "at most"),
+            (1 << 29, "", "large."),
+            (1 << 29, "<?xml version=\"1.0\"?><VTKFile type=\"UnstructuredGrid\">", "large."),
+            (1 << 29, "# vtk DataFile Version 4.2\ntitle\nASCII\n", "large."),
+        ] {
+            fs::write(place.join(&name), head).unwrap();
+            File::options().write(true).open(place.join(&name)).unwrap().set_len(bytes).unwrap();
+            let mms = env!("CARGO_BIN_EXE_mms");
+            let limited = format!(
+                "ulimit -v {MEMORY_KIB}; exec {mms} score ring {name} --time 0 --threads 1"
+            );
+            let output =
+                Command::new("sh").args(["-c", &limited]).current_dir(place).output().unwrap();
+            let stderr = String::from_utf8_lossy(&output.stderr);
+            assert_eq!(output.status.code(), Some(2), "{name} with {bytes} bytes: {stderr}");
+            assert!(stderr.contains(expected) && stderr.contains("large."), "{stderr}");
+            fs::remove_file(place.join(&name)).unwrap();
+        }
+    }
+}

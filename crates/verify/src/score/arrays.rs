@@ -1,0 +1,260 @@
+//! Which array of a file is which field, and its numbers as vectors and matrices.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use mmsmith_vtk::foreign::{ArrayHead, Snapshot};
+use nalgebra::{SMatrix, SVector};
+use serde::Serialize;
+
+use super::ScoreError;
+use super::findings::Remarks;
+
+/// What an array of a file can be to a comparison.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Role {
+    /// Displacement `u`.
+    Displacement,
+    /// Velocity `v`.
+    Velocity,
+    /// Deformation gradient `F[i][J]`, row by row.
+    DeformationGradient,
+    /// First Piola-Kirchhoff stress `P[i][J]`, row by row.
+    FirstPiolaKirchhoff,
+    /// Reference position `X`.
+    ReferencePosition,
+    /// Identity of the particle, a whole number.
+    Id,
+}
+
+impl Role {
+    /// All of them.
+    pub const ALL: [Self; 6] = [
+        Self::Displacement,
+        Self::Velocity,
+        Self::DeformationGradient,
+        Self::FirstPiolaKirchhoff,
+        Self::ReferencePosition,
+        Self::Id,
+    ];
+
+    /// Its own name, which is the first one looked for.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        self.usual_names()[0]
+    }
+
+    /// The names under which programs write it, the likeliest first.
+    #[must_use]
+    pub fn usual_names(self) -> &'static [&'static str] {
+        match self {
+            Self::Displacement => &[
+                "displacement",
+                "Displacement",
+                "displacements",
+                "Displacements",
+                "DISPLACEMENT",
+                "disp",
+                "Disp",
+                "u",
+                "U",
+            ],
+            Self::Velocity => &["velocity", "Velocity", "velocities", "VELOCITY", "vel", "v", "V"],
+            Self::DeformationGradient => &[
+                "deformation_gradient",
+                "DeformationGradient",
+                "Deformation_Gradient",
+                "DEFORMATION_GRADIENT",
+                "defgrad",
+                "F",
+            ],
+            Self::FirstPiolaKirchhoff => &[
+                "first_piola_kirchhoff",
+                "FirstPiolaKirchhoff",
+                "first_piola_kirchhoff_stress",
+                "PK1",
+                "pk1",
+                "P",
+            ],
+            Self::ReferencePosition => &[
+                "reference_position",
+                "initial_position",
+                "ReferencePosition",
+                "InitialPosition",
+                "reference_positions",
+                "initial_positions",
+                "X",
+                "X0",
+                "x0",
+            ],
+            Self::Id => &["id", "ID", "Id", "particle_id", "ParticleId", "ParticleID", "pid"],
+        }
+    }
+
+    /// Whether an array of so many components can be it in `D` dimensions.
+    pub(super) fn admits<const D: usize>(self, components: usize) -> bool {
+        match self {
+            Self::Displacement | Self::Velocity | Self::ReferencePosition => {
+                (D..=3).contains(&components)
+            }
+            Self::DeformationGradient | Self::FirstPiolaKirchhoff => {
+                components == D * D || components == 9
+            }
+            Self::Id => components == 1,
+        }
+    }
+
+    pub(super) fn admissible<const D: usize>(self) -> String {
+        match self {
+            Self::Id => "1".into(),
+            Self::DeformationGradient | Self::FirstPiolaKirchhoff if D == 3 => "9".into(),
+            Self::DeformationGradient | Self::FirstPiolaKirchhoff => format!("{} or 9", D * D),
+            _ if D == 3 => "3".into(),
+            _ => format!("{D} to 3"),
+        }
+    }
+}
+
+impl fmt::Display for Role {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// The array for each role that a recording has, by its first frame.
+pub(super) struct Chosen(BTreeMap<Role, ArrayHead>);
+
+impl Chosen {
+    /// Looks for arrays by the names in `map`, else by usual names.
+    pub(super) fn find<const D: usize>(
+        snapshot: &Snapshot,
+        map: &BTreeMap<Role, String>,
+        remarks: &mut Remarks,
+    ) -> Result<Self, ScoreError> {
+        let mut chosen = BTreeMap::new();
+        for role in Role::ALL {
+            if let Some(name) = map.get(&role) {
+                let array = snapshot.array(name).ok_or_else(|| ScoreError::NoArray {
+                    path: snapshot.path().to_owned(),
+                    role,
+                    name: name.clone(),
+                    there: there(snapshot),
+                })?;
+                if !role.admits::<D>(array.components) {
+                    return Err(ScoreError::Components {
+                        path: snapshot.path().to_owned(),
+                        role,
+                        name: name.clone(),
+                        components: array.components,
+                        admissible: role.admissible::<D>(),
+                    });
+                }
+                chosen.insert(role, array.clone());
+                continue;
+            }
+            let mut found =
+                role.usual_names().iter().filter_map(|name| snapshot.array(name)).peekable();
+            let first = found.peek().copied();
+            match (found.find(|array| role.admits::<D>(array.components)), first) {
+                (Some(array), _) => {
+                    chosen.insert(role, array.clone());
+                }
+                (None, Some(array)) => remarks.note(
+                    "array-left-out",
+                    false,
+                    format!(
+                        "array `{}` has {} component(s) and is not taken for {role}, which has {}",
+                        array.name,
+                        array.components,
+                        role.admissible::<D>()
+                    ),
+                ),
+                (None, None) => (),
+            }
+        }
+        for array in chosen.values().filter(|array| array.is_single) {
+            remarks.note(
+                "single-precision",
+                false,
+                format!(
+                    "array `{}` holds 32-bit floats: errors below about 1e-7 of its values are rounding",
+                    array.name
+                ),
+            );
+        }
+        Ok(Self(chosen))
+    }
+
+    pub(super) fn name(&self, role: Role) -> Option<&str> {
+        self.0.get(&role).map(|array| array.name.as_str())
+    }
+}
+
+/// The names of a frame's arrays, for messages.
+fn there(snapshot: &Snapshot) -> String {
+    let names: Vec<_> = snapshot.arrays().iter().map(|array| array.name.as_str()).collect();
+    if names.is_empty() { "none".into() } else { names.join(", ") }
+}
+
+/// One vector a particle; components beyond `D`, which must vanish, are counted where they do not.
+pub(super) fn vectors<const D: usize>(
+    flat: &[f64],
+    components: usize,
+) -> (Vec<SVector<f64, D>>, Option<(usize, usize)>) {
+    let mut beyond: Option<(usize, usize)> = None;
+    let mut vectors = Vec::with_capacity(flat.len() / components.max(1));
+    for (index, row) in flat.chunks_exact(components).enumerate() {
+        vectors.push(SVector::from_fn(|i, _| row[i]));
+        if row[D..].iter().any(|value| *value != 0.0) {
+            let (count, first) = beyond.unwrap_or((0, index));
+            beyond = Some((count + 1, first));
+        }
+    }
+    (vectors, beyond)
+}
+
+/// One matrix a particle from its rows; of nine components the first `D` rows and columns.
+pub(super) fn matrices<const D: usize>(flat: &[f64], components: usize) -> Vec<SMatrix<f64, D, D>> {
+    let width = if components == 9 { 3 } else { D };
+    flat.chunks_exact(components).map(|row| SMatrix::from_fn(|i, j| row[width * i + j])).collect()
+}
+
+/// How many of the particles have a number that is none, and the first of them.
+pub(super) fn not_finite(flat: &[f64], components: usize) -> (usize, usize) {
+    let mut bad = flat
+        .chunks_exact(components)
+        .enumerate()
+        .filter(|(_, row)| row.iter().any(|value| !value.is_finite()))
+        .map(|(index, _)| index);
+    let first = bad.next();
+    (first.map_or(0, |_| 1 + bad.count()), first.unwrap_or(0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{matrix, vector};
+
+    #[test]
+    fn components_beyond_the_dimension_are_counted_unless_zero() {
+        let (vectors, beyond) = vectors::<2>(&[1.0, 2.0, 0.0, 3.0, 4.0, -0.5], 3);
+        assert_eq!(vectors, [vector![1.0, 2.0], vector![3.0, 4.0]]);
+        assert_eq!(beyond, Some((1, 1)));
+    }
+
+    #[test]
+    fn matrices_are_read_row_by_row_from_four_or_nine_components() {
+        let expected = matrix![1.0, 2.0; 3.0, 4.0];
+        assert_eq!(matrices::<2>(&[1.0, 2.0, 3.0, 4.0], 4), [expected]);
+        let nine = [1.0, 2.0, 0.0, 3.0, 4.0, 0.0, 0.0, 0.0, 1.0];
+        assert_eq!(matrices::<2>(&nine, 9), [expected]);
+        assert_eq!(matrices::<1>(&nine, 9), [matrix![1.0]]);
+    }
+
+    #[test]
+    fn particles_not_numbers_are_counted() {
+        assert_eq!(not_finite(&[0.0, f64::NAN, f64::INFINITY, f64::NAN, 1.0, 2.0], 2), (2, 0));
+        assert_eq!(not_finite(&[0.0, 1.0], 2), (0, 0));
+    }
+}

@@ -1,0 +1,108 @@
+//! Where the arrays of a VTK file are, found without decoding them.
+
+use std::ops::Range;
+
+use super::numbers::{Base64, ByteOrder, Kind, MOST_NUMBERS, Number, Packing, decode, parse};
+
+/// What a file holds, as places in its bytes.
+#[derive(Debug)]
+pub(super) struct Contents {
+    pub(super) packing: Packing,
+    pub(super) appended: Option<Appended>,
+    /// Numbers that belong to the file as a whole, such as its time.
+    pub(super) fields: Vec<Entry>,
+    /// Parts of the cloud, to be put one behind the other.
+    pub(super) pieces: Vec<Piece>,
+}
+
+/// A part of the particles.
+#[derive(Debug)]
+pub(super) struct Piece {
+    pub(super) particles: usize,
+    pub(super) points: Entry,
+    pub(super) arrays: Vec<Entry>,
+}
+
+/// The data behind all XML elements.
+#[derive(Debug)]
+pub(super) struct Appended {
+    pub(super) is_base64: bool,
+    /// Where offsets count from.
+    pub(super) start: usize,
+    pub(super) end: usize,
+}
+
+/// One array.
+#[derive(Clone, Debug)]
+pub(super) struct Entry {
+    pub(super) name: String,
+    pub(super) kind: Kind,
+    pub(super) components: usize,
+    /// How many tuples of `components` numbers it must have.
+    pub(super) tuples: usize,
+    pub(super) place: Place,
+}
+
+/// Where and how the numbers of an array stand.
+#[derive(Clone, Debug)]
+pub(super) enum Place {
+    /// Numbers between blanks.
+    Ascii(Range<usize>),
+    /// Base64 of header and data.
+    Base64(Range<usize>),
+    /// Nothing but the numbers.
+    Plain(Range<usize>),
+    /// From this offset of the appended data.
+    Appended(usize),
+}
+
+impl Contents {
+    /// The numbers of an array.
+    pub(super) fn numbers<N: Number>(&self, bytes: &[u8], entry: &Entry) -> Result<Vec<N>, String> {
+        let too_many = || {
+            format!(
+                "its size is {} x {} numbers; at most {MOST_NUMBERS} are read",
+                entry.tuples, entry.components
+            )
+        };
+        let count = entry.tuples.checked_mul(entry.components).ok_or_else(too_many)?;
+        if count > MOST_NUMBERS {
+            return Err(too_many());
+        }
+        let size = count * entry.kind.size();
+        let unpacked = match &entry.place {
+            Place::Ascii(range) => return parse(&bytes[range.clone()], count),
+            Place::Plain(range) => {
+                return decode(&bytes[range.clone()], entry.kind, self.packing.order);
+            }
+            Place::Base64(range) => self.packing.unpack(
+                Base64::new(&bytes[range.clone()]),
+                range.len() / 4 * 3,
+                size,
+            )?,
+            Place::Appended(offset) => {
+                let appended = self.appended.as_ref().ok_or("the file has no appended data")?;
+                let whole = &bytes[appended.start..appended.end];
+                let data = whole.get(*offset..).ok_or_else(|| {
+                    format!(
+                        "it begins at byte {offset} of the appended data, of which there are {}",
+                        whole.len()
+                    )
+                })?;
+                if appended.is_base64 {
+                    self.packing.unpack(Base64::new(data), data.len() / 4 * 3, size)?
+                } else {
+                    self.packing.unpack(data, data.len(), size)?
+                }
+            }
+        };
+        decode(&unpacked, entry.kind, self.packing.order)
+    }
+}
+
+impl Packing {
+    /// Numbers without any header.
+    pub(super) fn plain(order: ByteOrder) -> Self {
+        Self { header: 8, order, zlib: false }
+    }
+}

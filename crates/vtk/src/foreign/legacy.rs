@@ -1,0 +1,353 @@
+//! The arrays of legacy `.vtk` files, in text or binary.
+
+use super::contents::{Contents, Entry, Piece, Place};
+use super::numbers::{ByteOrder, Kind, Packing};
+
+/// Finds the arrays of a legacy file.
+pub(super) fn contents(bytes: &[u8]) -> Result<Contents, String> {
+    let mut scan = Scan { bytes, at: 0, is_binary: false };
+    let version = scan.line()?.to_owned();
+    let version = version
+        .strip_prefix("# vtk DataFile Version ")
+        .ok_or("it does not begin with \"# vtk DataFile Version\"")?;
+    let major = version.trim().split('.').next().and_then(|major| major.parse::<u32>().ok());
+    let major = major.ok_or_else(|| format!("version {version:?} is unknown"))?;
+    scan.line()?;
+    scan.is_binary = match scan.line()?.trim() {
+        "ASCII" => false,
+        "BINARY" => true,
+        other => return Err(format!("its third line is {other:?}, neither ASCII nor BINARY")),
+    };
+
+    let mut fields = vec![];
+    let mut points: Option<(usize, Entry)> = None;
+    let mut arrays = vec![];
+    // The tuples of the arrays that come next, and whether they belong to points.
+    let mut section: Option<(usize, bool)> = None;
+    while let Some(keyword) = scan.keyword()? {
+        let keyword = keyword.to_ascii_uppercase();
+        match (keyword.as_str(), section) {
+            ("DATASET", _) => match scan.word()?.to_ascii_uppercase().as_str() {
+                "UNSTRUCTURED_GRID" | "POLYDATA" | "STRUCTURED_GRID" => (),
+                other => {
+                    return Err(format!(
+                        "its dataset is {other}, which lists no points; use UNSTRUCTURED_GRID or POLYDATA"
+                    ));
+                }
+            },
+            ("POINTS", _) => {
+                let count = scan.count("POINTS")?;
+                let kind = scan.kind("POINTS")?;
+                points = Some((count, scan.array("", kind, 3, count)?));
+            }
+            ("DIMENSIONS", _) => {
+                for _ in 0..3 {
+                    scan.count("DIMENSIONS")?;
+                }
+            }
+            ("CELLS" | "VERTICES" | "LINES" | "POLYGONS" | "TRIANGLE_STRIPS", _) => {
+                let (first, second) = (scan.count(&keyword)?, scan.count(&keyword)?);
+                if major < 5 {
+                    scan.array(&keyword, Kind::I32, 1, second)?;
+                } else {
+                    for (part, count) in [("OFFSETS", first), ("CONNECTIVITY", second)] {
+                        let found = scan.word()?;
+                        if found != part {
+                            return Err(format!("{keyword}: {found:?} where {part} should be"));
+                        }
+                        let kind = scan.kind(part)?;
+                        scan.array(part, kind, 1, count)?;
+                    }
+                }
+            }
+            ("CELL_TYPES", _) => {
+                let count = scan.count("CELL_TYPES")?;
+                scan.array("CELL_TYPES", Kind::I32, 1, count)?;
+            }
+            ("METADATA", _) => scan.skip_paragraph(),
+            ("POINT_DATA", _) => section = Some((scan.count("POINT_DATA")?, true)),
+            ("CELL_DATA", _) => section = Some((scan.count("CELL_DATA")?, false)),
+            ("FIELD", _) => {
+                scan.word()?;
+                for _ in 0..scan.count("FIELD")? {
+                    let Some(entry) = scan.field()? else { continue };
+                    match section {
+                        None => fields.push(entry),
+                        // VTK puts fields of the whole file among those of the points where it has no other place.
+                        Some((tuples, true)) if entry.tuples == tuples => arrays.push(entry),
+                        Some((_, true)) if entry.tuples == 1 => fields.push(entry),
+                        Some((tuples, true)) => {
+                            return Err(format!(
+                                "array `{}` has {} entries for {tuples} points",
+                                entry.name, entry.tuples
+                            ));
+                        }
+                        Some((_, false)) => (),
+                    }
+                }
+            }
+            ("LOOKUP_TABLE", _) => {
+                scan.word()?;
+                let colours = scan.count("LOOKUP_TABLE")?;
+                let kind = if scan.is_binary { Kind::U8 } else { Kind::F32 };
+                scan.array("LOOKUP_TABLE", kind, 4, colours)?;
+            }
+            (_, Some((tuples, of_points))) => {
+                let entry = scan.attribute(&keyword, tuples)?;
+                if of_points {
+                    arrays.push(entry);
+                }
+            }
+            (other, None) => return Err(format!("{other:?} at byte {} is unknown", scan.at)),
+        }
+    }
+    let (particles, points) = points.ok_or("it has no POINTS")?;
+    if let Some(entry) = arrays.iter().find(|entry| entry.tuples != particles) {
+        let Entry { name, tuples, .. } = entry;
+        return Err(format!("array `{name}` has {tuples} entries for {particles} points"));
+    }
+    Ok(Contents {
+        packing: Packing::plain(ByteOrder::Big),
+        appended: None,
+        fields,
+        pieces: vec![Piece { particles, points, arrays }],
+    })
+}
+
+/// Reads the file from front to back.
+struct Scan<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    is_binary: bool,
+}
+
+impl<'a> Scan<'a> {
+    /// The rest of the line.
+    fn line(&mut self) -> Result<&'a str, String> {
+        let rest = &self.bytes[self.at..];
+        let length = rest.iter().position(|byte| *byte == b'\n').unwrap_or(rest.len());
+        let line = &rest[..length];
+        if line.len() > 4096 {
+            return Err(format!("a line of {} bytes at byte {}", line.len(), self.at));
+        }
+        self.at += (length + 1).min(rest.len());
+        std::str::from_utf8(line)
+            .map(|line| line.trim_end_matches('\r'))
+            .map_err(|_| format!("no text where text should be, before byte {}", self.at))
+    }
+
+    /// The next word; `None` at the end.
+    fn keyword(&mut self) -> Result<Option<&'a str>, String> {
+        let rest = &self.bytes[self.at..];
+        let blanks = rest.iter().take_while(|byte| byte.is_ascii_whitespace()).count();
+        let word = &rest[blanks..];
+        let length = word.iter().position(u8::is_ascii_whitespace).unwrap_or(word.len());
+        let word = &word[..length];
+        self.at += blanks + length;
+        if word.is_empty() {
+            return Ok(None);
+        }
+        match std::str::from_utf8(word) {
+            Ok(text) if word.len() <= 1024 => Ok(Some(text)),
+            _ => Err(format!("no keyword where one should be, before byte {}", self.at)),
+        }
+    }
+
+    fn word(&mut self) -> Result<&'a str, String> {
+        self.keyword()?.ok_or_else(|| "the file ends too early: it was cut off".into())
+    }
+
+    fn count(&mut self, of: &str) -> Result<usize, String> {
+        let word = self.word()?;
+        word.parse().map_err(|_| format!("{of}: {word:?} is no count"))
+    }
+
+    fn kind(&mut self, of: &str) -> Result<Kind, String> {
+        let word = self.word()?;
+        Kind::of_legacy(word).ok_or_else(|| format!("{of}: {word:?} is no kind of numbers"))
+    }
+
+    /// Steps over an array's numbers, which begin on the next line.
+    fn array(
+        &mut self,
+        name: &str,
+        kind: Kind,
+        components: usize,
+        tuples: usize,
+    ) -> Result<Entry, String> {
+        let name = unescape(name);
+        let cut = |found: String| {
+            let shown = if name.is_empty() { "POINTS" } else { &name };
+            format!(
+                "array `{shown}`: {found} of its {tuples} x {components} numbers are there: the file was cut off"
+            )
+        };
+        let count = tuples.checked_mul(components).ok_or_else(|| cut("not all".into()))?;
+        let place = if self.is_binary {
+            self.line()?;
+            let there = self.bytes.len() - self.at;
+            let size = count.checked_mul(kind.size()).filter(|size| *size <= there);
+            let size = size.ok_or_else(|| cut((there / kind.size()).to_string()))?;
+            let start = self.at;
+            self.at += size;
+            Place::Plain(start..self.at)
+        } else {
+            let start = self.at;
+            for found in 0..count {
+                if self.keyword()?.is_none() {
+                    return Err(cut(found.to_string()));
+                }
+            }
+            Place::Ascii(start..self.at)
+        };
+        Ok(Entry { name, kind, components, tuples, place })
+    }
+
+    /// An array of a FIELD; `None` for texts.
+    fn field(&mut self) -> Result<Option<Entry>, String> {
+        let mut name = self.word()?;
+        // VTK puts this between the arrays of a field.
+        while name == "METADATA" {
+            self.skip_paragraph();
+            name = self.word()?;
+        }
+        let (components, tuples) = (self.count(name)?, self.count(name)?);
+        let kind = self.word()?;
+        if kind == "string" && !self.is_binary {
+            self.line()?;
+            for _ in 0..tuples.saturating_mul(components) {
+                if self.at == self.bytes.len() {
+                    return Err(format!("array `{name}` ends too early: the file was cut off"));
+                }
+                self.line()?;
+            }
+            return Ok(None);
+        }
+        let kind = Kind::of_legacy(kind)
+            .ok_or_else(|| format!("array `{name}`: {kind:?} is no kind of numbers"))?;
+        self.array(name, kind, components, tuples).map(Some)
+    }
+
+    /// An array of POINT_DATA or CELL_DATA that begins with a keyword of its own.
+    fn attribute(&mut self, keyword: &str, tuples: usize) -> Result<Entry, String> {
+        let name = self.word()?;
+        let (kind, components) = match keyword {
+            "SCALARS" => {
+                let kind = self.kind(name)?;
+                // The number of components is optional, and so is the table of colours.
+                let mut rest = self.line()?.split_whitespace();
+                let components = match rest.next() {
+                    None => 1,
+                    Some(word) => {
+                        word.parse().map_err(|_| format!("{name}: {word:?} is no count"))?
+                    }
+                };
+                let before = self.at;
+                if self.keyword()? == Some("LOOKUP_TABLE") {
+                    self.word()?;
+                } else {
+                    // One byte back is the end of the line, which the array expects.
+                    self.at = before - 1;
+                }
+                (kind, components)
+            }
+            "VECTORS" | "NORMALS" => (self.kind(name)?, 3),
+            "TENSORS" => (self.kind(name)?, 9),
+            "TENSORS6" => (self.kind(name)?, 6),
+            "GLOBAL_IDS" | "PEDIGREE_IDS" | "EDGE_FLAGS" => (self.kind(name)?, 1),
+            "TEXTURE_COORDINATES" => {
+                let components = self.count(name)?;
+                (self.kind(name)?, components)
+            }
+            "COLOR_SCALARS" => {
+                let components = self.count(name)?;
+                (if self.is_binary { Kind::U8 } else { Kind::F32 }, components)
+            }
+            other => return Err(format!("{other:?} at byte {} is unknown", self.at)),
+        };
+        self.array(name, kind, components, tuples)
+    }
+
+    /// Steps over everything to the next empty line.
+    fn skip_paragraph(&mut self) {
+        let end = self.bytes[self.at..].windows(2).position(|pair| pair == b"\n\n");
+        self.at = end.map_or(self.bytes.len(), |end| self.at + end + 1);
+    }
+}
+
+/// VTK writes blanks and other special characters of names as `%20`.
+fn unescape(name: &str) -> String {
+    let mut bytes = Vec::with_capacity(name.len());
+    let mut rest = name.as_bytes();
+    while let Some((&byte, after)) = rest.split_first() {
+        let digits = after.get(..2).and_then(|pair| std::str::from_utf8(pair).ok());
+        match digits.and_then(|pair| u8::from_str_radix(pair, 16).ok()) {
+            Some(code) if byte == b'%' => {
+                bytes.push(code);
+                rest = &after[2..];
+            }
+            _ => {
+                bytes.push(byte);
+                rest = after;
+            }
+        }
+    }
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(text: &str) -> String {
+        contents(text.as_bytes()).expect_err("it is accepted")
+    }
+
+    const HEAD: &str = "# vtk DataFile Version 4.2\ntitle\nASCII\nDATASET UNSTRUCTURED_GRID\n";
+
+    #[test]
+    fn every_attribute_of_the_points_is_found_and_those_of_cells_are_not() {
+        let text = format!(
+            "{HEAD}FIELD FieldData 2\nTimeValue 1 1 double\n0.5\nlabel 1 1 string\nsome text\n\
+             POINTS 2 float\n0 0 0 1 0 0\nCELLS 2 4\n1 0\n1 1\nCELL_TYPES 2\n1 1\n\
+             CELL_DATA 2\nSCALARS colour double\nLOOKUP_TABLE default\n5 6\n\
+             POINT_DATA 2\nSCALARS mass double\n1 2\nVECTORS u%20x double\n1 2 3 4 5 6\n\
+             TENSORS F double\n1 0 0 0 1 0 0 0 1\n1 0 0 0 1 0 0 0 1\n\
+             FIELD FieldData 2\nid 1 2 long\n7 9\nMETADATA\nINFORMATION 0\n\nv 2 2 double\n1 2 3 4\n"
+        );
+        let contents = contents(text.as_bytes()).unwrap();
+        let piece = &contents.pieces[0];
+        let names: Vec<_> = piece.arrays.iter().map(|a| (a.name.as_str(), a.components)).collect();
+        assert_eq!(names, [("mass", 1), ("u x", 3), ("F", 9), ("id", 1), ("v", 2)]);
+        let numbers = |entry| contents.numbers::<f64>(text.as_bytes(), entry).unwrap();
+        assert_eq!(numbers(&piece.arrays[0]), [1.0, 2.0]);
+        assert_eq!(numbers(&piece.arrays[4]), [1.0, 2.0, 3.0, 4.0]);
+        assert_eq!(
+            (contents.fields[0].name.as_str(), numbers(&contents.fields[0])),
+            ("TimeValue", vec![0.5])
+        );
+    }
+
+    #[test]
+    fn what_is_wrong_is_told() {
+        for (text, expected) in [
+            ("", "does not begin"),
+            ("# vtk DataFile Version x\n\n\n", "version"),
+            ("# vtk DataFile Version 4.2\n\nHEX\n", "neither ASCII nor BINARY"),
+            ("# vtk DataFile Version 4.2\n\nASCII\nDATASET STRUCTURED_POINTS\n", "lists no points"),
+            (&format!("{HEAD}POINTS 2 float\n0 0 0 1 0"), "5 of its 2 x 3"),
+            (&format!("{HEAD}POINTS 99999999999999999 float\n0 0"), "2 of its"),
+            (&format!("{HEAD}POINTS -1 float\n0 0"), "\"-1\" is no count"),
+            (&format!("{HEAD}POINTS 1 words\n0 0"), "no kind of numbers"),
+            (
+                &format!("{HEAD}POINTS 1 float\n0 0 0\nPOINT_DATA 2\nSCALARS m float\n1 2\n"),
+                "2 entries for 1",
+            ),
+            (&format!("{HEAD}NONSENSE\n"), "\"NONSENSE\""),
+            (HEAD, "no POINTS"),
+        ] {
+            let message = refused(text);
+            assert!(message.contains(expected), "{text:?}: {message}");
+        }
+    }
+}

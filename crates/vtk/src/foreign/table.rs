@@ -1,0 +1,237 @@
+//! Particles in comma-separated values.
+
+use std::collections::{BTreeMap, HashSet};
+use std::ops::Range;
+use std::path::Path;
+
+use super::numbers::to_whole;
+
+/// The columns of a CSV file, and the rows that belong to one time each.
+#[derive(Debug)]
+pub(super) struct Table {
+    pub(super) arrays: Vec<Columns>,
+    columns: Vec<Vec<f64>>,
+    /// The frames, in order.
+    pub(super) frames: Vec<Rows>,
+}
+
+/// The rows of one frame.
+#[derive(Debug, PartialEq)]
+pub(super) struct Rows {
+    /// The frame's time, if there is a column of it.
+    pub(super) time: Option<f64>,
+    pub(super) range: Range<usize>,
+}
+
+/// The columns that make up one array.
+#[derive(Debug)]
+pub(super) struct Columns {
+    pub(super) name: String,
+    /// Their indices, component by component.
+    indices: Vec<usize>,
+}
+
+/// The name of the array that holds the positions.
+pub(super) const POINTS: &str = "Points";
+/// The name of the array that holds reference positions given by `X`, `Y`, `Z`.
+const REFERENCE: &str = "X";
+
+impl Table {
+    /// Reads a file with one header line.
+    pub(super) fn read(bytes: &[u8]) -> Result<Self, String> {
+        let mut reader =
+            csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(bytes);
+        let header = reader.headers().map_err(|cause| cause.to_string())?.clone();
+        let mut columns: Vec<Vec<f64>> = vec![vec![]; header.len()];
+        let mut record = csv::StringRecord::new();
+        while reader.read_record(&mut record).map_err(|cause| cause.to_string())? {
+            for (index, (column, word)) in columns.iter_mut().zip(&record).enumerate() {
+                let value = word.parse().map_err(|_| {
+                    let line = record.position().map_or(0, csv::Position::line);
+                    format!("line {line}, column `{}`: {word:?} is no number", &header[index])
+                })?;
+                column.push(value);
+            }
+        }
+        let arrays = group(&header)?;
+        let time =
+            header.iter().position(|name| ["t", "time", "Time", "TimeValue"].contains(&name));
+        let rows = columns.first().map_or(0, Vec::len);
+        let frames = frames(time.map(|time| &columns[time][..]), rows)?;
+        Ok(Self { arrays, columns, frames })
+    }
+
+    pub(super) fn components(&self, name: &str) -> Option<usize> {
+        self.find(name).map(|columns| columns.indices.len())
+    }
+
+    fn find(&self, name: &str) -> Option<&Columns> {
+        self.arrays.iter().find(|array| array.name == name)
+    }
+
+    /// The components of an array in some rows, row by row.
+    pub(super) fn floats(&self, name: &str, rows: Range<usize>) -> Option<Vec<f64>> {
+        let indices = &self.find(name)?.indices;
+        let row = |row| indices.iter().map(move |index| self.columns[*index][row]);
+        Some(rows.flat_map(row).collect())
+    }
+
+    pub(super) fn integers(
+        &self,
+        name: &str,
+        rows: Range<usize>,
+    ) -> Option<Result<Vec<i64>, String>> {
+        Some(self.floats(name, rows)?.into_iter().map(to_whole).collect())
+    }
+}
+
+/// Successive rows of one time are a frame.
+fn frames(times: Option<&[f64]>, rows: usize) -> Result<Vec<Rows>, String> {
+    let Some(times) = times else { return Ok(vec![Rows { time: None, range: 0..rows }]) };
+    let mut frames: Vec<Rows> = vec![];
+    let mut seen = HashSet::new();
+    for (row, &time) in times.iter().enumerate() {
+        match frames.last_mut() {
+            Some(last) if last.time.map(f64::to_bits) == Some(time.to_bits()) => {
+                last.range.end = row + 1;
+            }
+            _ if seen.insert(time.to_bits()) => {
+                frames.push(Rows { time: Some(time), range: row..row + 1 });
+            }
+            _ => {
+                return Err(format!(
+                    "rows of time {time:?} do not stand together: sort the rows by time"
+                ));
+            }
+        }
+    }
+    if frames.is_empty() {
+        frames.push(Rows { time: None, range: 0..0 });
+    }
+    Ok(frames)
+}
+
+/// What a component's ending means: its row and column, or its index alone.
+fn component(ending: &str) -> Option<Component> {
+    let axis = |c: u8| b"xyz".iter().position(|a| *a == c.to_ascii_lowercase());
+    let digit = |c: u8| b"123".iter().position(|a| *a == c);
+    match ending.as_bytes() {
+        [c] => axis(*c).map(Component::Vector),
+        [i, j] => {
+            let pair = axis(*i).zip(axis(*j)).or_else(|| digit(*i).zip(digit(*j)));
+            pair.map(|(i, j)| Component::Tensor(i, j))
+        }
+        _ => None,
+    }
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Component {
+    Index(usize),
+    Vector(usize),
+    Tensor(usize, usize),
+}
+
+/// The array and the component that a column's name stands for; `None` where it is an array by itself.
+fn split(column: &str) -> Option<(&str, Component)> {
+    match column {
+        "x" | "y" | "z" => return Some((POINTS, component(column)?)),
+        "X" | "Y" | "Z" => return Some((REFERENCE, component(column)?)),
+        _ => (),
+    }
+    // As ParaView's table writer and many scripts name components.
+    if let Some((name, index)) = column.rsplit_once(':') {
+        return index.parse().ok().map(|index| (name, Component::Index(index)));
+    }
+    if let Some((name, ending)) = column.rsplit_once('_') {
+        let known = component(ending);
+        let index = || ending.parse().ok().filter(|index| *index < 9).map(Component::Index);
+        return known.or_else(index).map(|component| (name, component));
+    }
+    let is_short = matches!(column.as_bytes().first(), Some(b'u' | b'v' | b'F' | b'P'));
+    let ending = column.get(1..).filter(|_| is_short)?;
+    component(ending).map(|component| (&column[..1], component))
+}
+
+fn group(header: &csv::StringRecord) -> Result<Vec<Columns>, String> {
+    let mut order: Vec<&str> = vec![];
+    let mut members: BTreeMap<&str, Vec<(Component, usize)>> = BTreeMap::new();
+    for (index, column) in header.iter().enumerate() {
+        let (name, component) = split(column).unwrap_or((column, Component::Index(0)));
+        if !members.contains_key(name) {
+            order.push(name);
+        }
+        members.entry(name).or_default().push((component, index));
+    }
+    order
+        .into_iter()
+        .map(|name| {
+            let mut components = members.remove(name).unwrap_or_default();
+            components.sort_unstable();
+            let size = components.len();
+            let dimension = match components.len() {
+                1 => 1,
+                4 => 2,
+                9 => 3,
+                _ => 0,
+            };
+            let is_whole =
+                components.iter().enumerate().all(|(at, (component, _))| match component {
+                    Component::Index(index) | Component::Vector(index) => *index == at && (at < 9),
+                    Component::Tensor(i, j) => dimension > 0 && dimension * i + j == at,
+                });
+            if is_whole {
+                let indices = components.into_iter().map(|(_, index)| index).collect();
+                return Ok(Columns { name: name.to_owned(), indices });
+            }
+            let columns: Vec<_> = components.iter().map(|(_, index)| &header[*index]).collect();
+            Err(format!(
+                "the {size} column(s) {} are no complete vector or tensor `{name}`",
+                columns.join(", ")
+            ))
+        })
+        .collect()
+}
+
+/// Whether a path names such a file.
+pub(super) fn is_csv(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_become_arrays_whatever_their_order_and_rows_frames() {
+        let text = "id,y,x,t,u_y,u_x,F11,F12,F21,F22,v:0,v:1,mass\n\
+                    1,2,1,0,4,3,5,6,7,8,9,10,0.5\n\
+                    2,2,1,0,4,3,5,6,7,8,9,10,0.5\n\
+                    1,3,1,0.5,4,3,5,6,7,8,9,10,0.5\n";
+        let table = Table::read(text.as_bytes()).unwrap();
+        let rows = |time, range| Rows { time: Some(time), range };
+        assert_eq!(table.frames, [rows(0.0, 0..2), rows(0.5, 2..3)]);
+        assert_eq!(table.floats(POINTS, 2..3), Some(vec![1.0, 3.0]));
+        assert_eq!(table.floats("u", 0..1), Some(vec![3.0, 4.0]));
+        assert_eq!(table.floats("F", 0..1), Some(vec![5.0, 6.0, 7.0, 8.0]));
+        assert_eq!(table.floats("v", 0..1), Some(vec![9.0, 10.0]));
+        assert_eq!(table.integers("id", 0..2), Some(Ok(vec![1, 2])));
+        assert_eq!(table.components("mass"), Some(1));
+        assert_eq!(table.floats("w", 0..1), None);
+    }
+
+    #[test]
+    fn what_is_wrong_is_told() {
+        for (text, expected) in [
+            ("x,y\n1,z\n", "line 2, column `y`: \"z\""),
+            ("x,y\n1\n", "fields"),
+            ("x,z\n1,2\n", "no complete vector or tensor `Points`"),
+            ("F11,F12,F21\n1,2,3\n", "no complete vector or tensor `F`"),
+            ("t,x\n0,1\n1,1\n0,2\n", "sort the rows by time"),
+            ("x,x\n0,1\n", "no complete"),
+        ] {
+            let message = Table::read(text.as_bytes()).expect_err(text);
+            assert!(message.contains(expected), "{text:?}: {message}");
+        }
+    }
+}
