@@ -125,8 +125,9 @@ fn every_variant_of_the_formats_is_read() {
         for (field, expected) in FIELDS.iter().zip([1e-3, 1e-2, 1e-4, 1.0]) {
             for norm in NORMS {
                 let found = row["errors"][field][norm].as_f64().unwrap();
-                // meshio writes twelve digits in text: 5e-12 of an F of 1 are 5e-8 of its error.
-                let allowed = if path.ends_with("meshio-ascii") { 1e-7 } else { 1e-11 };
+                // VTK's legacy text has eleven digits, and meshio's twelve: 5e-11 of an F of 1 are 5e-7 of its error.
+                let is_text = path.to_string_lossy().contains("-ascii");
+                let allowed = if is_text { 1e-6 } else { 1e-11 };
                 let ratio = found / expected;
                 assert!(
                     (ratio - 1.0).abs() < allowed,
