@@ -138,13 +138,13 @@ pub(crate) struct ScoreOptions {
     /// The solution, by name, or a specification file (SPEC.toml)
     #[arg(value_name = "NAME|SPEC.toml")]
     pub(crate) name: String,
-    /// Recordings, one for each resolution: a .pvd list, a folder (with one .pvd list, or of frames), or a single .vtu,
-    /// .vtp, .vtk or .csv file
+    /// Recordings, one for each resolution: a .pvd list, a folder (with one .pvd list, or of frames), or .vtu, .vtp, .vtk
+    /// or .csv files; those of one folder are the frames of one recording, unless --cells or --h has a value for each
     #[arg(value_name = "FILES", required = true)]
     pub(crate) files: Vec<PathBuf>,
-    /// The files are the frames of one recording, in their order
+    /// Each file is a recording of its own
     #[arg(long)]
-    pub(crate) series: bool,
+    pub(crate) each: bool,
     /// What an array is that has no usual name; repeatable. Roles: displacement, velocity, deformation_gradient,
     /// first_piola_kirchhoff, reference_position, id
     #[arg(long, value_name = "ROLE=NAME", value_parser = role)]

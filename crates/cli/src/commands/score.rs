@@ -1,6 +1,7 @@
 //! `mms score`: errors and orders of another solver's output.
 
 use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use mmsmith_verify::{Input, Resolution, Score, ScoreRow, score as measure};
@@ -42,10 +43,23 @@ pub(crate) fn score(options: &ScoreOptions) -> Result<bool> {
 
 /// The recordings with their resolutions.
 fn inputs(options: &ScoreOptions) -> Result<Vec<Input>> {
-    let recordings: Vec<_> = match options.series {
-        true => vec![options.files.clone()],
-        false => options.files.iter().map(|file| vec![file.clone()]).collect(),
-    };
+    let values = options.cells.len() + options.h.len();
+    let mut recordings: Vec<Vec<PathBuf>> = vec![];
+    for file in &options.files {
+        match recordings.last_mut() {
+            Some(frames)
+                if !options.each
+                    && values != options.files.len()
+                    && is_frame(file)
+                    && frames
+                        .iter()
+                        .all(|frame| is_frame(frame) && frame.parent() == file.parent()) =>
+            {
+                frames.push(file.clone());
+            }
+            _ => recordings.push(vec![file.clone()]),
+        }
+    }
     for (option, given) in [("--cells", options.cells.len()), ("--h", options.h.len())] {
         if given > 0 && given != recordings.len() {
             bail!("{option} has {given} value(s) for {} recording(s)", recordings.len());
@@ -58,6 +72,11 @@ fn inputs(options: &ScoreOptions) -> Result<Vec<Input>> {
     };
     let input = |(index, paths)| Input { paths, resolution: resolution(index) };
     Ok(recordings.into_iter().enumerate().map(input).collect())
+}
+
+/// Whether a path names a single frame, not a list or a folder.
+fn is_frame(path: &Path) -> bool {
+    !path.is_dir() && path.extension().is_some_and(|extension| extension != "pvd")
 }
 
 fn document(selection: &Selection, options: &ScoreOptions, score: &Score) -> Value {
@@ -83,7 +102,7 @@ fn document(selection: &Selection, options: &ScoreOptions, score: &Score) -> Val
             "solution": selection.name(),
             "parameters": selection.parameters(),
             "files": options.files,
-            "series": options.series,
+            "each": options.each,
             "map": map,
             "points": options.points,
             "time": options.time,

@@ -163,34 +163,39 @@ fn group(header: &csv::StringRecord) -> Result<Vec<Columns>, String> {
         }
         members.entry(name).or_default().push((component, index));
     }
-    order
-        .into_iter()
-        .map(|name| {
-            let mut components = members.remove(name).unwrap_or_default();
-            components.sort_unstable();
-            let size = components.len();
-            let dimension = match components.len() {
-                1 => 1,
-                4 => 2,
-                9 => 3,
-                _ => 0,
-            };
-            let is_whole =
-                components.iter().enumerate().all(|(at, (component, _))| match component {
-                    Component::Index(index) | Component::Vector(index) => *index == at && (at < 9),
-                    Component::Tensor(i, j) => dimension > 0 && dimension * i + j == at,
-                });
-            if is_whole {
-                let indices = components.into_iter().map(|(_, index)| index).collect();
-                return Ok(Columns { name: name.to_owned(), indices });
-            }
-            let columns: Vec<_> = components.iter().map(|(_, index)| &header[*index]).collect();
-            Err(format!(
+    let mut arrays = vec![];
+    for name in order {
+        let mut components = members.remove(name).unwrap_or_default();
+        components.sort_unstable();
+        let width = match components.len() {
+            4 => 2,
+            9 => 3,
+            _ => 1,
+        };
+        let is_whole = components.iter().enumerate().all(|(at, (component, _))| match component {
+            Component::Index(index) | Component::Vector(index) => *index == at,
+            Component::Tensor(i, j) => width * i + j == at,
+        });
+        let columns: Vec<_> =
+            components.iter().map(|(_, index)| (&header[*index], *index)).collect();
+        if is_whole {
+            let indices = columns.into_iter().map(|(_, index)| index).collect();
+            arrays.push(Columns { name: name.to_owned(), indices });
+        } else if [POINTS, REFERENCE, "u", "v", "F", "P"].contains(&name) {
+            let (size, columns): (_, Vec<_>) =
+                (columns.len(), columns.iter().map(|(column, _)| *column).collect());
+            return Err(format!(
                 "the {size} column(s) {} are no complete vector or tensor `{name}`",
                 columns.join(", ")
-            ))
-        })
-        .collect()
+            ));
+        } else {
+            // Names that end like components but are none.
+            for (column, index) in columns {
+                arrays.push(Columns { name: column.to_owned(), indices: vec![index] });
+            }
+        }
+    }
+    Ok(arrays)
 }
 
 /// Whether a path names such a file.
@@ -218,6 +223,9 @@ mod tests {
         assert_eq!(table.integers("id", 0..2), Some(Ok(vec![1, 2])));
         assert_eq!(table.components("mass"), Some(1));
         assert_eq!(table.floats("w", 0..1), None);
+        let table = Table::read(b"x,node_1,node_3,S12\n1,2,3,4\n").unwrap();
+        assert_eq!(table.floats("node_3", 0..1), Some(vec![3.0]));
+        assert_eq!(table.floats("S12", 0..1), Some(vec![4.0]));
     }
 
     #[test]

@@ -1,0 +1,151 @@
+//! Why a recording cannot be scored.
+
+use std::path::PathBuf;
+
+use mmsmith_vtk::foreign::ReadError;
+use thiserror::Error;
+
+use super::Role;
+
+/// Why a recording cannot be scored.
+#[derive(Debug, Error)]
+pub enum ScoreError {
+    /// A file cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The solution has a dimension that is not known here.
+    #[error("the solution must have one, two or three dimensions")]
+    Dimension,
+    /// There is no such array.
+    #[error("{}: there is no array `{name}` for {role} (there are: {there})", path.display())]
+    NoArray {
+        /// The file.
+        path: PathBuf,
+        /// What it should be.
+        role: Role,
+        /// The name.
+        name: String,
+        /// The names that there are.
+        there: String,
+    },
+    /// An array has the wrong number of components for what it should be.
+    #[error("{}: array `{name}` has {components} component(s); {role} has {admissible}", path.display())]
+    Components {
+        /// The file.
+        path: PathBuf,
+        /// What it should be.
+        role: Role,
+        /// The array.
+        name: String,
+        /// Its components.
+        components: usize,
+        /// How many there should be.
+        admissible: String,
+    },
+    /// A frame without particles.
+    #[error("{}: the frame holds no particle", path.display())]
+    NoParticles {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A frame without points, which only CSV files can have.
+    #[error("{}: there are no positions (columns x, y, z)", path.display())]
+    NoPositions {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The points have fewer coordinates than the solution.
+    #[error("{}: points have {found} coordinate(s); the solution has {expected}", path.display())]
+    Coordinates {
+        /// The file.
+        path: PathBuf,
+        /// How many there are.
+        found: usize,
+        /// How many there should be.
+        expected: usize,
+    },
+    /// Nothing tells displacements.
+    #[error(
+        "{}: nothing tells displacements: give an array of displacements or of reference positions \
+         (--map displacement=NAME or --map reference_position=NAME), or more than one frame", path.display()
+    )]
+    NoDisplacement {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A frame lacks an array that the first one has, and that all need.
+    #[error("{}: there is no array `{name}`, which the first frame has", path.display())]
+    Missing {
+        /// The file.
+        path: PathBuf,
+        /// The array.
+        name: String,
+    },
+    /// Particles of two frames cannot be told apart.
+    #[error(
+        "{}: it holds {found} particles, the first frame {expected}, and there is no array of identities \
+         (--map id=NAME) to find them by", path.display()
+    )]
+    Unmatched {
+        /// The file.
+        path: PathBuf,
+        /// Its particles.
+        found: usize,
+        /// Those of the first frame.
+        expected: usize,
+    },
+    /// A frame does not tell its time.
+    #[error(
+        "{}: nothing tells its time: list the frames with times in a .pvd file, write a field TimeValue, or a \
+         column t, or give --time for a single frame", path.display()
+    )]
+    NoTime {
+        /// The file.
+        path: PathBuf,
+    },
+    /// One time is given for several frames.
+    #[error("--time is for a single frame; {} holds {frames}", path.display())]
+    OneTime {
+        /// The recording.
+        path: PathBuf,
+        /// Its frames.
+        frames: usize,
+    },
+    /// No frame has a time that is a number.
+    #[error("{}: none of its {frames} frame(s) has a finite time; the first one's is {first:?}", path.display())]
+    TimesNotFinite {
+        /// The recording.
+        path: PathBuf,
+        /// Its frames.
+        frames: usize,
+        /// The first time.
+        first: f64,
+    },
+    /// No frame lies in the time in which the solution is looked at.
+    #[error(
+        "{}: its times, {first:?} to {last:?}, do not overlap the solution's, 0 to {end:?} ({periods} period(s)); \
+         is another unit meant? Longer simulations need --periods", path.display()
+    )]
+    NoOverlap {
+        /// The recording.
+        path: PathBuf,
+        /// The earliest time.
+        first: f64,
+        /// The latest time.
+        last: f64,
+        /// The end of the solution's time.
+        end: f64,
+        /// That end in periods.
+        periods: f64,
+    },
+    /// A number that makes no sense.
+    #[error("{what} = {value:?}: it must be {admissible}")]
+    Setting {
+        /// What.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// What would be right.
+        admissible: &'static str,
+    },
+}

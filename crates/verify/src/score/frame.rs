@@ -1,0 +1,351 @@
+//! What one frame gives for the comparison.
+
+use std::collections::HashSet;
+
+use mmsmith_solutions::{Domain, Solution};
+use mmsmith_vtk::foreign::{ArrayHead, Snapshot};
+use nalgebra::{SMatrix, SVector};
+
+use super::arrays::{Chosen, Role, matrices, not_finite, vectors};
+use super::findings::Remarks;
+use super::reference::{Scheme, Traced};
+use super::{ScoreError, ScoreOptions};
+use crate::measure::over_particles;
+use crate::norms::{PerField, PerNorm};
+
+/// Share of the body's size by which a reference position may lie outside before it is told.
+const OUTSIDE: f64 = 1e-6;
+
+/// The points of a frame in `D` dimensions.
+pub(super) fn positions<const D: usize>(
+    snapshot: &Snapshot,
+    remarks: &mut Remarks,
+) -> Result<Vec<SVector<f64, D>>, ScoreError> {
+    let path = || snapshot.path().to_owned();
+    let head = snapshot.points().ok_or_else(|| ScoreError::NoPositions { path: path() })?;
+    if head.components < D || head.components > 3 {
+        let found = head.components;
+        return Err(ScoreError::Coordinates { path: path(), found, expected: D });
+    }
+    if head.is_single {
+        let what =
+            "points are 32-bit floats: errors below about 1e-7 of their coordinates are rounding";
+        remarks.note("single-precision", false, what);
+    }
+    let flat = snapshot.positions()?;
+    Ok(judged(&flat, head.components, "position", snapshot, remarks))
+}
+
+/// Vectors from numbers, and what is to be said about them.
+fn judged<const D: usize>(
+    flat: &[f64],
+    components: usize,
+    what: &str,
+    snapshot: &Snapshot,
+    remarks: &mut Remarks,
+) -> Vec<SVector<f64, D>> {
+    count_not_finite(flat, components, what, snapshot, remarks);
+    let (vectors, beyond) = vectors(flat, components);
+    if let Some((count, first)) = beyond {
+        let kind = "out-of-plane";
+        let what =
+            format!("particle(s) whose {what} has a part beyond the solution's {D} dimension(s)");
+        remarks.met(kind, true, count, what, || place(first, snapshot));
+    }
+    vectors
+}
+
+fn count_not_finite(
+    flat: &[f64],
+    components: usize,
+    what: &str,
+    snapshot: &Snapshot,
+    remarks: &mut Remarks,
+) {
+    let (count, first) = not_finite(flat, components);
+    let what = format!("particle(s) whose {what} is not finite");
+    remarks.met("not-finite", true, count, what, || place(first, snapshot));
+}
+
+fn place(particle: usize, snapshot: &Snapshot) -> String {
+    format!("particle {particle} of {}", snapshot.path().display())
+}
+
+/// The particles of the first frame, by which later frames are judged.
+#[derive(Default)]
+pub(super) struct Identities {
+    particles: usize,
+    ids: Option<HashSet<i64>>,
+}
+
+/// What a frame gives for the comparison.
+pub(super) struct FrameData<const D: usize> {
+    pub(super) X: Vec<SVector<f64, D>>,
+    pub(super) u: Vec<SVector<f64, D>>,
+    /// With the time to which they belong.
+    pub(super) v: Option<(Vec<SVector<f64, D>>, f64)>,
+    pub(super) F: Option<Vec<SMatrix<f64, D, D>>>,
+    pub(super) P: Option<Vec<SMatrix<f64, D, D>>>,
+}
+
+impl<const D: usize> FrameData<D> {
+    /// The error norms of the frame, zero for fields that it lacks; and those of F and P if they were transposed.
+    pub(super) fn errors(
+        &self,
+        exact: &dyn Solution<f64, D>,
+        time: f64,
+    ) -> (PerField<PerNorm<f64>>, [PerNorm<f64>; 2]) {
+        let magnitudes = |p: usize| {
+            let at_time = exact.fields(&self.X[p], time);
+            let v = self.v.as_ref().map_or(0.0, |(v, v_time)| {
+                let exact_v =
+                    if *v_time == time { at_time.v } else { exact.velocity(&self.X[p], *v_time) };
+                (v[p] - exact_v).norm()
+            });
+            let tensor = |given: &Option<Vec<SMatrix<f64, D, D>>>, exact: SMatrix<f64, D, D>| {
+                given.as_ref().map_or((0.0, 0.0), |given| {
+                    ((given[p] - exact).norm(), (given[p].transpose() - exact).norm())
+                })
+            };
+            let (F, F_turned) = tensor(&self.F, at_time.F);
+            let (P, P_turned) = tensor(&self.P, at_time.P);
+            [(self.u[p] - at_time.u).norm(), v, F, P, F_turned, P_turned]
+        };
+        let ([u, v, F, P, F_turned, P_turned], _) = over_particles(self.X.len(), magnitudes);
+        (PerField { u, v, F, P }, [F_turned, P_turned])
+    }
+}
+
+/// Reads frame after frame.
+pub(super) struct FrameReader<'a, const D: usize> {
+    pub(super) exact: &'a dyn Solution<f64, D>,
+    pub(super) chosen: &'a Chosen,
+    pub(super) scheme: &'a Scheme<D>,
+    pub(super) options: &'a ScoreOptions,
+    pub(super) has_velocity_times: bool,
+    pub(super) remarks: &'a mut Remarks,
+    pub(super) first: Identities,
+}
+
+impl<const D: usize> FrameReader<'_, D> {
+    pub(super) fn frame(
+        &mut self,
+        snapshot: &Snapshot,
+        time: f64,
+        index: usize,
+    ) -> Result<FrameData<D>, ScoreError> {
+        let ids = match self.head(Role::Id, snapshot)? {
+            Some(head) => snapshot.integers(&head.name)?,
+            None => None,
+        };
+        self.identify(snapshot, index, ids.as_deref());
+        let need = |name: Option<Vec<SVector<f64, D>>>, role| {
+            name.ok_or_else(|| ScoreError::Missing {
+                path: snapshot.path().to_owned(),
+                name: self.chosen.name(role).unwrap_or_default().to_owned(),
+            })
+        };
+        let (X, u) = match self.scheme {
+            Scheme::Given { displacement } => {
+                let X =
+                    need(self.vector(Role::ReferencePosition, snapshot)?, Role::ReferencePosition)?;
+                let u = if *displacement {
+                    need(self.vector(Role::Displacement, snapshot)?, Role::Displacement)?
+                } else {
+                    let x = positions(snapshot, self.remarks)?;
+                    x.iter().zip(&X).map(|(x, X)| x - X).collect()
+                };
+                (X, u)
+            }
+            Scheme::PointsAtRest => {
+                let u = need(self.vector(Role::Displacement, snapshot)?, Role::Displacement)?;
+                (positions(snapshot, self.remarks)?, u)
+            }
+            Scheme::Recovered => {
+                let u = need(self.vector(Role::Displacement, snapshot)?, Role::Displacement)?;
+                let x = positions(snapshot, self.remarks)?;
+                (x.iter().zip(&u).map(|(x, u)| x - u).collect(), u)
+            }
+            Scheme::Traced(traced) => {
+                let x = positions(snapshot, self.remarks)?;
+                let X = self.traced(traced, snapshot, ids.as_deref())?;
+                let u = x.iter().zip(&X).map(|(x, X)| x - X).collect();
+                (X, u)
+            }
+        };
+        self.judge_places(&X, snapshot);
+        let v = match (snapshot.field("VelocityTime"), self.has_velocity_times) {
+            (Some(own), _) => {
+                let what = "frame(s) tell a time for their velocities that is not finite";
+                let first = || snapshot.path().display().to_string();
+                self.remarks.met(
+                    "time-not-finite",
+                    true,
+                    usize::from(!own.is_finite()),
+                    what,
+                    first,
+                );
+                self.vector(Role::Velocity, snapshot)?.map(|v| (v, own))
+            }
+            (None, true) => {
+                self.remarks.met(
+                    "velocity-without-time",
+                    false,
+                    1,
+                    "frame(s) do not tell the time of their velocities, as others do; those are not compared",
+                    || snapshot.path().display().to_string(),
+                );
+                None
+            }
+            (None, false) => {
+                let own = time - self.options.velocity_lag;
+                self.vector(Role::Velocity, snapshot)?.map(|v| (v, own))
+            }
+        };
+        let F = self.tensor(Role::DeformationGradient, snapshot)?;
+        let P = self.tensor(Role::FirstPiolaKirchhoff, snapshot)?;
+        Ok(FrameData { X, u, v, F, P })
+    }
+
+    /// Holds the particles against those of the first frame.
+    fn identify(&mut self, snapshot: &Snapshot, index: usize, ids: Option<&[i64]>) {
+        let particles = snapshot.particles();
+        let path = || snapshot.path().display().to_string();
+        let known: Option<HashSet<i64>> = ids.map(|ids| ids.iter().copied().collect());
+        if let Some(known) = &known {
+            let what = "particle(s) have an identity that another one of their frame has";
+            let repeated = ids.map_or(0, <[i64]>::len) - known.len();
+            self.remarks.met("repeated-id", true, repeated, what, path);
+        }
+        if index == 0 {
+            self.first = Identities { particles, ids: known };
+            return;
+        }
+        if particles != self.first.particles {
+            let what = format!(
+                "frame(s) hold another number of particles than the first one's {}",
+                self.first.particles
+            );
+            let first = || format!("{} holds {particles}", snapshot.path().display());
+            self.remarks.met("unequal-particles", true, 1, what, first);
+        }
+        if let (Some(known), Some(first)) = (&known, &self.first.ids) {
+            for (kind, what, one, other) in [
+                ("missing-particles", "particle(s) of the first frame are missing", first, known),
+                ("new-particles", "particle(s) are not in the first frame", known, first),
+            ] {
+                let odd = || one.difference(other);
+                let place = || {
+                    let id = odd().min().copied().unwrap_or(0);
+                    format!("id {id} of {}", snapshot.path().display())
+                };
+                self.remarks.met(kind, true, odd().count(), what, place);
+            }
+        }
+    }
+
+    /// The reference positions of the frame's particles.
+    fn traced(
+        &mut self,
+        traced: &Traced<D>,
+        snapshot: &Snapshot,
+        ids: Option<&[i64]>,
+    ) -> Result<Vec<SVector<f64, D>>, ScoreError> {
+        match (&traced.places, ids) {
+            // Particles that the first frame lacks have no reference position; `identify` has told of them.
+            (Some(places), Some(ids)) => Ok(ids
+                .iter()
+                .map(|id| places.get(id).map_or(SVector::repeat(f64::NAN), |p| traced.X[*p]))
+                .collect()),
+            _ if snapshot.particles() == traced.X.len() => Ok(traced.X.clone()),
+            _ => Err(ScoreError::Unmatched {
+                path: snapshot.path().to_owned(),
+                found: snapshot.particles(),
+                expected: traced.X.len(),
+            }),
+        }
+    }
+
+    /// Tells of reference positions that no part of the body has.
+    fn judge_places(&mut self, X: &[SVector<f64, D>], snapshot: &Snapshot) {
+        let domain = self.exact.domain();
+        let (count, furthest) = outside(&domain, X);
+        let hint = match self.scheme {
+            Scheme::Recovered => {
+                "; if the points are reference positions already, --points reference tells so"
+            }
+            _ => "",
+        };
+        let what = format!("reference position(s) lie outside the body{hint}");
+        let first = || format!("the furthest by {furthest:.3e} in {}", snapshot.path().display());
+        self.remarks.met("outside-body", false, count, what, first);
+    }
+
+    fn vector(
+        &mut self,
+        role: Role,
+        snapshot: &Snapshot,
+    ) -> Result<Option<Vec<SVector<f64, D>>>, ScoreError> {
+        let Some((flat, components)) = self.array(role, snapshot)? else { return Ok(None) };
+        Ok(Some(judged(&flat, components, role.name(), snapshot, self.remarks)))
+    }
+
+    fn tensor(
+        &mut self,
+        role: Role,
+        snapshot: &Snapshot,
+    ) -> Result<Option<Vec<SMatrix<f64, D, D>>>, ScoreError> {
+        let Some((flat, components)) = self.array(role, snapshot)? else { return Ok(None) };
+        count_not_finite(&flat, components, role.name(), snapshot, self.remarks);
+        Ok(Some(matrices(&flat, components)))
+    }
+
+    /// The numbers of an array and how many a particle has.
+    fn array(
+        &self,
+        role: Role,
+        snapshot: &Snapshot,
+    ) -> Result<Option<(Vec<f64>, usize)>, ScoreError> {
+        let Some(head) = self.head(role, snapshot)? else { return Ok(None) };
+        Ok(snapshot.floats(&head.name)?.map(|flat| (flat, head.components)))
+    }
+
+    /// The array for a role, whose shape may have changed since the first frame.
+    fn head<'s>(
+        &self,
+        role: Role,
+        snapshot: &'s Snapshot,
+    ) -> Result<Option<&'s ArrayHead>, ScoreError> {
+        let Some(name) = self.chosen.name(role) else { return Ok(None) };
+        let Some(head) = snapshot.array(name) else { return Ok(None) };
+        if role.admits::<D>(head.components) {
+            return Ok(Some(head));
+        }
+        Err(ScoreError::Components {
+            path: snapshot.path().to_owned(),
+            role,
+            name: name.to_owned(),
+            components: head.components,
+            admissible: role.admissible::<D>(),
+        })
+    }
+}
+
+/// How many places lie outside of the body, and the furthest of them.
+fn outside<const D: usize>(domain: &Domain<f64, D>, X: &[SVector<f64, D>]) -> (usize, f64) {
+    let size = match domain {
+        Domain::Box { lower, upper } => (upper - lower).amax(),
+        Domain::Annulus { outer, .. } => *outer,
+        _ => return (0, 0.0),
+    };
+    let distance = |X: &SVector<f64, D>| match domain {
+        Domain::Box { lower, upper } => {
+            let beyond = |i: usize| (lower[i] - X[i]).max(X[i] - upper[i]);
+            (0..D).map(beyond).fold(f64::NEG_INFINITY, f64::max)
+        }
+        Domain::Annulus { inner, outer } => (inner - X.norm()).max(X.norm() - outer),
+        _ => 0.0,
+    };
+    let distances = X.iter().map(distance).filter(|distance| *distance > OUTSIDE * size);
+    distances.fold((0, 0.0), |(count, furthest), distance| (count + 1, furthest.max(distance)))
+}

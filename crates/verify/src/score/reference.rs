@@ -1,0 +1,149 @@
+//! Where reference positions and displacements come from.
+
+use std::collections::HashMap;
+
+use mmsmith_solutions::Solution;
+use mmsmith_vtk::foreign::Snapshot;
+use nalgebra::SVector;
+
+use super::arrays::{Chosen, Role};
+use super::findings::Remarks;
+use super::frame::positions;
+use super::{Points, ScoreError, ScoreOptions, Timed, open};
+
+/// Steps of Newton's method from a position back to its reference position.
+const MOST_ITERATIONS: usize = 50;
+
+/// How reference positions and displacements come about.
+pub(super) enum Scheme<const D: usize> {
+    /// `X` is an array; displacements are another, or positions minus it.
+    Given { displacement: bool },
+    /// Points are `X`.
+    PointsAtRest,
+    /// `X` is position minus displacement.
+    Recovered,
+    /// `X` was found for each particle of the first frame.
+    Traced(Traced<D>),
+}
+
+/// The reference positions of the first frame's particles.
+pub(super) struct Traced<const D: usize> {
+    pub(super) X: Vec<SVector<f64, D>>,
+    /// The place in `X` of each identity; none where particles keep their order.
+    pub(super) places: Option<HashMap<i64, usize>>,
+}
+
+/// Decides how reference positions and displacements come about.
+pub(super) fn scheme<const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    timed: &[Timed<'_>],
+    first: &Snapshot,
+    chosen: &Chosen,
+    options: &ScoreOptions,
+    remarks: &mut Remarks,
+) -> Result<Scheme<D>, ScoreError> {
+    let displacement = chosen.name(Role::Displacement);
+    if chosen.name(Role::ReferencePosition).is_some() {
+        return Ok(Scheme::Given { displacement: displacement.is_some() });
+    }
+    if displacement.is_some() {
+        let is_at_rest = match options.points {
+            Points::Reference => true,
+            Points::Current => false,
+            Points::Auto => points_are_at_rest(timed, first, chosen)?,
+        };
+        if is_at_rest && options.points == Points::Auto {
+            remarks.note(
+                "points-at-rest",
+                false,
+                "the points do not move while displacements change: they are taken as reference positions",
+            );
+        }
+        return Ok(if is_at_rest { Scheme::PointsAtRest } else { Scheme::Recovered });
+    }
+    if timed.len() < 2 {
+        return Err(ScoreError::NoDisplacement { path: first.path().to_owned() });
+    }
+    trace(exact, &timed[0], first, chosen, remarks)
+}
+
+/// Whether points stay where they are, to the bit, while displacements change.
+fn points_are_at_rest(
+    timed: &[Timed<'_>],
+    first: &Snapshot,
+    chosen: &Chosen,
+) -> Result<bool, ScoreError> {
+    let Some(name) = chosen.name(Role::Displacement) else { return Ok(false) };
+    let positions = first.positions()?;
+    let displacement = first.floats(name)?;
+    for frame in &timed[1..] {
+        let snapshot = open(frame.file)?;
+        if snapshot.floats(name)? != displacement {
+            return Ok(snapshot.positions()? == positions);
+        }
+    }
+    Ok(false)
+}
+
+/// Finds the reference positions behind the positions of the first frame.
+fn trace<const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    frame: &Timed<'_>,
+    first: &Snapshot,
+    chosen: &Chosen,
+    remarks: &mut Remarks,
+) -> Result<Scheme<D>, ScoreError> {
+    let x = positions(first, remarks)?;
+    let mut lost = (0, 0);
+    let X = x
+        .iter()
+        .enumerate()
+        .map(|(p, x)| {
+            reference_position(exact, x, frame.time).unwrap_or_else(|| {
+                lost = if lost.0 == 0 { (1, p) } else { (lost.0 + 1, lost.1) };
+                SVector::repeat(f64::NAN)
+            })
+        })
+        .collect();
+    remarks.met(
+        "not-traced",
+        true,
+        lost.0,
+        "particle(s) of the first frame lie where the exact motion brings no material point",
+        || format!("particle {} of {}", lost.1, first.path().display()),
+    );
+    let ids = match chosen.name(Role::Id) {
+        Some(name) => first.integers(name)?,
+        None => None,
+    };
+    let found_by = if ids.is_some() { "identity" } else { "order" };
+    remarks.note(
+        "first-frame",
+        false,
+        format!(
+            "the first frame's positions are taken to be exact at t = {:?}; particles are found again by {found_by}",
+            frame.time
+        ),
+    );
+    let places =
+        ids.map(|ids| ids.into_iter().enumerate().map(|(place, id)| (id, place)).collect());
+    Ok(Scheme::Traced(Traced { X, places }))
+}
+
+/// The reference position that the exact motion brings to `x`, by Newton's method.
+fn reference_position<const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    x: &SVector<f64, D>,
+    time: f64,
+) -> Option<SVector<f64, D>> {
+    let mut X = x - exact.displacement(x, time);
+    for _ in 0..MOST_ITERATIONS {
+        let miss = X + exact.displacement(&X, time) - x;
+        let step = exact.deformation_gradient(&X, time).try_inverse()? * miss;
+        X -= step;
+        if step.norm() <= 4.0 * f64::EPSILON * X.norm().max(x.norm()) {
+            return Some(X);
+        }
+    }
+    None
+}
