@@ -311,6 +311,11 @@ impl<const D: usize> TotalLagrangian<D> {
         &self.particles
     }
 
+    /// The particles as they were at the last call of [`observe`](Self::observe), or at rest.
+    pub fn particles(&self) -> &Particles<f64, D> {
+        &self.particles
+    }
+
     /// Number of completed steps.
     pub fn steps_done(&self) -> usize {
         self.steps_done
