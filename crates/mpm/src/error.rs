@@ -9,7 +9,7 @@ pub enum StepError {
     /// A deformation gradient lost its orientation.
     #[error(
         "step {step}, time {time:e}: particle {particle} is turned inside out (J = {J:e}); \
-         try a smaller time step, more particles per cell or gimp weights"
+         try a smaller time step, more particles per cell or smoother weights"
     )]
     Inverted {
         /// Number of the failed step, counted from 1; 0 for the initial state.

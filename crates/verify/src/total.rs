@@ -1,9 +1,9 @@
 //! Runs in the reference configuration: from a solution to splines, a layout of particles, and their motion.
 
+use mmsmith_mpm::Integrator;
 use mmsmith_mpm::total_lagrangian::{
     Axis, Composition, Coordinates, End, Grid, Layout, MassMatrix, Scheme, TotalLagrangian,
 };
-use mmsmith_mpm::Integrator;
 use mmsmith_solutions::{AnySolution, Domain, Solution};
 use std::f64::consts::FRAC_PI_2;
 
@@ -43,10 +43,7 @@ pub enum CflSpeed {
 }
 
 impl CflSpeed {
-    pub(crate) fn of<const D: usize>(
-        self,
-        exact: &dyn Solution<f64, D>,
-    ) -> Result<f64, CaseError> {
+    pub(crate) fn of<const D: usize>(self, exact: &dyn Solution<f64, D>) -> Result<f64, CaseError> {
         match self {
             Self::Bar => Ok(exact.wave_speed()),
             Self::PWave => {
@@ -161,8 +158,7 @@ fn run_in<const D: usize>(
     let (scene, steps) = prepare(exact, case)?;
     let grid = total.grid(&scene, case.per_cell)?;
     let material = law(exact.material())?;
-    let mut body =
-        TotalLagrangian::new(grid, total.scheme, material, exact.density(), steps.dt)?;
+    let mut body = TotalLagrangian::new(grid, total.scheme, material, exact.density(), steps.dt)?;
     let X = body.positions();
     let body_force = ExactBodyForce(exact.body_force_at(X));
     let u: Vec<_> = X.iter().map(|X| exact.displacement(X, 0.0)).collect();

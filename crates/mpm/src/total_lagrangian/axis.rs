@@ -52,7 +52,8 @@ impl Axis {
             Layout::Gauss => gauss_legendre(per_cell),
         };
         let h = self.spacing();
-        let cell = |c: usize| rule.iter().map(move |(x, w)| (self.lower + (c as f64 + x) * h, w * h));
+        let cell =
+            |c: usize| rule.iter().map(move |(x, w)| (self.lower + (c as f64 + x) * h, w * h));
         (0..self.cells).flat_map(cell).unzip()
     }
 }
@@ -103,7 +104,9 @@ mod tests {
                 assert!((sum - exact).abs() < 4e-15, "{count} points, power {power}: {sum}");
             }
             let beyond: f64 = rule.iter().map(|(x, w)| w * x.powi(2 * count as i32)).sum();
-            assert!((beyond - 1.0 / (2.0 * count as f64 + 1.0)).abs() > 1e-16 * f64::from(count < 12));
+            assert!(
+                (beyond - 1.0 / (2.0 * count as f64 + 1.0)).abs() > 1e-16 * f64::from(count < 12)
+            );
         }
     }
 

@@ -364,9 +364,8 @@ mod tests {
                     basis.evaluate(part, inner, &a, &mut forth);
                     let mut back = vec![0.0; a.len()];
                     basis.integrate(part, inner, &b, &mut back);
-                    let dot = |x: &[f64], y: &[f64]| -> f64 {
-                        x.iter().zip(y).map(|(x, y)| x * y).sum()
-                    };
+                    let dot =
+                        |x: &[f64], y: &[f64]| -> f64 { x.iter().zip(y).map(|(x, y)| x * y).sum() };
                     let (left, right) = (dot(&forth, &b), dot(&a, &back));
                     assert!((left - right).abs() < 1e-11 * left.abs().max(1.0), "{left} {right}");
                 }

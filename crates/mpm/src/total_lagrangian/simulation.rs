@@ -114,6 +114,7 @@ impl<const D: usize> TotalLagrangian<D> {
     ) -> Result<Self, SetupError> {
         const { assert!(1 <= D && D <= 3, "one, two or three dimensions") };
         check(&grid, &scheme, density, time_step)?;
+        reserve(&grid, scheme.degree)?;
         let mut lines = Vec::with_capacity(D);
         for (k, axis) in grid.axes.iter().enumerate() {
             let (points, mut weights) = axis.points(grid.per_cell, grid.layout);
@@ -122,11 +123,12 @@ impl<const D: usize> TotalLagrangian<D> {
             }
             lines.push((points, weights));
         }
-        let basis = |k: usize, normal: bool| {
-            let axis = &grid.axes[k];
-            Basis::new(axis, scheme.degree, normal, &lines[k].0)
-                .ok_or(SetupError::TooFewCells { axis: k, cells: axis.cells, least: 2 })
-        };
+        let basis =
+            |k: usize, normal: bool| {
+                let axis = &grid.axes[k];
+                Basis::new(axis, scheme.degree, normal, &lines[k].0)
+                    .ok_or(SetupError::TooFewCells { axis: k, cells: axis.cells, least: 2 })
+            };
         let mut bases = Vec::with_capacity(D);
         let mut masses = Vec::with_capacity(D);
         for k in 0..D {
@@ -149,7 +151,6 @@ impl<const D: usize> TotalLagrangian<D> {
         }
         let bases: [[Basis; 2]; D] = array::from_fn(|k| bases[k].clone());
         let mass: [[Mass; 2]; D] = array::from_fn(|k| masses[k].clone());
-        reserve(&grid, &bases)?;
         let particles = particles(&grid, &lines, density);
         let zeros: [Vec<f64>; D] = array::from_fn(|component| {
             let sizes = (0..D).map(|k| bases[k][usize::from(k == component)].functions);
@@ -206,7 +207,8 @@ impl<const D: usize> TotalLagrangian<D> {
         }
         let mut consistent = Vec::with_capacity(D);
         for k in 0..D {
-            let (points, mut weights) = self.grid.axes[k].points(self.grid.per_cell, self.grid.layout);
+            let (points, mut weights) =
+                self.grid.axes[k].points(self.grid.per_cell, self.grid.layout);
             if !self.reciprocal_radius.is_empty() && k == 0 {
                 weights.iter_mut().zip(&points).for_each(|(w, R)| *w *= R);
             }
@@ -228,7 +230,7 @@ impl<const D: usize> TotalLagrangian<D> {
     fn fit(&mut self, mass: &[[Mass; 2]; D], values: &[SVector<f64, D>]) -> [Vec<f64>; D] {
         let row = self.row();
         for (p, value) in values.iter().enumerate() {
-            let value = self.to_components(p / row, value);
+            let value = self.components(p / row, value);
             for component in 0..D {
                 self.work.values[component][p] = value[component] * self.particles.volume[p];
             }
@@ -286,7 +288,7 @@ impl<const D: usize> TotalLagrangian<D> {
         }
         for p in 0..self.particles.len() {
             let local = SVector::from_fn(|i, _| self.work.values[i][p]);
-            self.particles.v[p] = self.from_components(p / row, &local);
+            self.particles.v[p] = self.cartesian(p / row, &local);
         }
         for component in 0..D {
             self.evaluate(component, Field::Displacement, true);
@@ -306,7 +308,7 @@ impl<const D: usize> TotalLagrangian<D> {
                 H = Q * H * Q.transpose();
             }
             self.particles.F[p] = SMatrix::identity() + H;
-            self.particles.x[p] = self.particles.X[p] + self.from_components(p / row, &local);
+            self.particles.x[p] = self.particles.X[p] + self.cartesian(p / row, &local);
         }
         &self.particles
     }
@@ -347,15 +349,15 @@ impl<const D: usize> TotalLagrangian<D> {
     }
 
     /// A vector's components that the unknowns stand for, in row `row` of particles.
-    fn to_components(&self, row: usize, vector: &SVector<f64, D>) -> SVector<f64, D> {
+    fn components(&self, row: usize, vector: &SVector<f64, D>) -> SVector<f64, D> {
         match self.direction.get(row) {
             Some(&[cos, sin]) => turn(vector, cos, -sin),
             None => *vector,
         }
     }
 
-    /// The inverse of [`to_components`](Self::to_components).
-    fn from_components(&self, row: usize, components: &SVector<f64, D>) -> SVector<f64, D> {
+    /// The inverse of [`components`](Self::components).
+    fn cartesian(&self, row: usize, components: &SVector<f64, D>) -> SVector<f64, D> {
         match self.direction.get(row) {
             Some(&[cos, sin]) => turn(components, cos, sin),
             None => *components,
@@ -709,13 +711,21 @@ fn check<const D: usize>(
 }
 
 /// Asks for all the memory of a run first, which turns a grid that is too large into an error instead of an abort.
-fn reserve<const D: usize>(grid: &Grid<D>, bases: &[[Basis; 2]; D]) -> Result<(), SetupError> {
-    let product = |of_particles: bool| {
-        bases.iter().fold(1_u128, |n, pair| n.saturating_mul(layer(pair, of_particles) as u128))
-    };
-    // Positions, velocities, gradients, masses, values, slopes, partial sums and the body force; three fields of coefficients.
+fn reserve<const D: usize>(grid: &Grid<D>, degree: usize) -> Result<(), SetupError> {
+    let (mut particles, mut functions, mut along) = (1_u128, 1_u128, 0_u128);
+    for axis in &grid.axes {
+        let points = axis.cells as u128 * grid.per_cell as u128;
+        particles = particles.saturating_mul(points);
+        functions = functions.saturating_mul(axis.cells as u128 + degree as u128);
+        // Values and slopes of both kinds of components, places, weights, and factors of the mass.
+        along = along.saturating_add(points.saturating_mul(4 * (degree as u128 + 2)));
+    }
+    // Positions, velocities, gradients, masses, values, slopes, partial sums and the body force.
     let at_particles = (5 * D + 4 * D * D + 2) as u128;
-    let doubles = product(true).saturating_mul(at_particles) + product(false) * (3 * D) as u128;
+    let doubles = particles
+        .saturating_mul(at_particles)
+        .saturating_add(functions.saturating_mul(3 * D as u128))
+        .saturating_add(along);
     let bytes = doubles.saturating_mul(size_of::<f64>() as u128);
     let too_large = || SetupError::GridTooLarge {
         cells: grid.axes.iter().map(|axis| axis.cells).collect(),
