@@ -118,7 +118,11 @@ impl TotalScheme {
                 std::array::from_fn(|k| if k == 0 { radial } else { around })
             }
             (Domain::Annulus { .. }, _) if D != 2 => {
-                return refuse("cartesian", "that of a box or of a ring in two dimensions");
+                return Err(CaseError::Setting {
+                    setting: "frame",
+                    value: "total".into(),
+                    admissible: "updated for a spherical shell",
+                });
             }
             (Domain::Annulus { .. }, _) => {
                 return refuse("cartesian", "polar for a ring in the total frame");

@@ -181,21 +181,49 @@ impl Basis {
         let blocks = input.chunks_exact(self.points * inner);
         for (input, output) in blocks.zip(output.chunks_exact_mut(self.functions * inner)) {
             if inner == 1 {
-                for ((&first, row), &input) in self.first.iter().zip(rows).zip(input) {
+                // The particles of a cell share their window, which is written once.
+                let mut window = (0, [0.0; W]);
+                let mut flush = |(first, sums): (usize, [f64; W])| {
                     let window = &mut output[first..first + W];
                     for k in 0..W {
-                        window[k] += row[k] * input;
+                        window[k] += sums[k];
+                    }
+                };
+                for ((&first, row), &input) in self.first.iter().zip(rows).zip(input) {
+                    if first != window.0 {
+                        flush(window);
+                        window = (first, [0.0; W]);
+                    }
+                    for k in 0..W {
+                        window.1[k] += row[k] * input;
                     }
                 }
+                flush(window);
                 continue;
             }
-            let inputs = input.chunks_exact(inner);
-            for ((&first, row), input) in self.first.iter().zip(rows).zip(inputs) {
-                for k in 0..W {
-                    let line = &mut output[(first + k) * inner..][..inner];
-                    for i in 0..inner {
-                        line[i] += row[k] * input[i];
+            let mut q = 0;
+            while q < self.points {
+                let first = self.first[q];
+                let line = |q: usize| &input[q * inner..][..inner];
+                let output = &mut output[first * inner..][..W * inner];
+                // Two particles of a cell at a time, for half of the loads and stores.
+                if q + 1 < self.points && self.first[q + 1] == first {
+                    let (a, b) = (line(q), line(q + 1));
+                    for (k, output) in output.chunks_exact_mut(inner).enumerate() {
+                        let (of_a, of_b) = (rows[q][k], rows[q + 1][k]);
+                        for i in 0..inner {
+                            output[i] += of_a * a[i] + of_b * b[i];
+                        }
                     }
+                    q += 2;
+                } else {
+                    let a = line(q);
+                    for (k, output) in output.chunks_exact_mut(inner).enumerate() {
+                        for i in 0..inner {
+                            output[i] += rows[q][k] * a[i];
+                        }
+                    }
+                    q += 1;
                 }
             }
         }
