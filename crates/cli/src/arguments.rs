@@ -201,6 +201,24 @@ pub(crate) struct SchemeOptions {
     /// Weights between particles and grid
     #[arg(long, value_enum, default_value_t = Shape::Gimp)]
     pub(crate) shape: Shape,
+    /// Configuration that the weights belong to: updated in each step, or the reference one throughout
+    #[arg(long, value_enum, default_value_t = Frame::Updated)]
+    pub(crate) frame: Frame,
+    /// Mass matrix of the total frame; consistent where nothing is said
+    #[arg(long, value_enum)]
+    pub(crate) mass: Option<Mass>,
+    /// Order of the symmetric composition of leapfrog in the total frame; where nothing is said 4, and 6 for splines of degree 4 and 5
+    #[arg(long, value_enum)]
+    pub(crate) composition: Option<Composition>,
+    /// Where the particles lie in a cell; Gauss points in the total frame only
+    #[arg(long, value_enum, default_value_t = Layout::Lattice)]
+    pub(crate) layout: Layout,
+    /// Coordinates of the background grid; polar for rings in the total frame
+    #[arg(long, value_enum, default_value_t = Grid::Cartesian)]
+    pub(crate) grid: Grid,
+    /// Speed that the CFL number refers to
+    #[arg(long, value_enum, default_value_t = CflSpeed::Bar)]
+    pub(crate) cfl_speed: CflSpeed,
     /// Time integrator
     #[arg(long, value_enum, default_value_t = Integrator::Cd)]
     pub(crate) integrator: Integrator,
@@ -251,7 +269,7 @@ macro_rules! choices {
     ($(#[$doc:meta])* $name:ident => $target:ty { $($(#[$value_doc:meta])* $value:ident,)+ }) => {
         $(#[$doc])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
-        #[serde(rename_all = "lowercase")]
+        #[serde(rename_all = "kebab-case")]
         pub(crate) enum $name { $($(#[$value_doc])* $value,)+ }
 
         impl From<$name> for $target {
@@ -262,17 +280,50 @@ macro_rules! choices {
     };
 }
 
-choices!(
-    /// Weights.
-    Shape => verify::Shape {
-        /// Hat functions at the particle's point
-        Linear,
-        /// GIMP weights of fixed size
-        Ugimp,
-        /// GIMP weights that follow the particle's stretch
-        Gimp,
-    }
-);
+/// Weights.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Shape {
+    /// Hat functions at the particle's point
+    Linear,
+    /// GIMP weights of fixed size
+    Ugimp,
+    /// GIMP weights that follow the particle's stretch
+    Gimp,
+    /// Quadratic splines (total frame)
+    Bspline2,
+    /// Cubic splines (total frame)
+    Bspline3,
+    /// Quartic splines (total frame)
+    Bspline4,
+    /// Quintic splines (total frame)
+    Bspline5,
+}
+
+/// Configurations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Frame {
+    /// The current one, weights anew in each step
+    Updated,
+    /// The reference configuration, weights once
+    Total,
+}
+
+/// Orders in time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Composition {
+    /// Leapfrog
+    #[value(name = "2")]
+    Order2,
+    /// Five stages
+    #[value(name = "4")]
+    Order4,
+    /// Nine stages
+    #[value(name = "6")]
+    Order6,
+}
+
 choices!(
     /// Time integrators.
     Integrator => verify::Integrator {
@@ -295,6 +346,42 @@ choices!(
         Data,
         /// Velocity at time zero, first acceleration halved
         Halved,
+    }
+);
+choices!(
+    /// Mass matrices.
+    Mass => verify::MassMatrix {
+        /// Row sums on the diagonal
+        Lumped,
+        /// Integrated over the particles
+        Consistent,
+    }
+);
+choices!(
+    /// Layouts of particles.
+    Layout => verify::Layout {
+        /// Centres of equal parts of a cell
+        Lattice,
+        /// Gauss-Legendre points
+        Gauss,
+    }
+);
+choices!(
+    /// Coordinates of background grids.
+    Grid => verify::Coordinates {
+        /// Cartesian
+        Cartesian,
+        /// Radius and angle
+        Polar,
+    }
+);
+choices!(
+    /// Speeds of CFL numbers.
+    CflSpeed => verify::CflSpeed {
+        /// That of waves in a bar, sqrt(E/rho0), unless the solution has its own
+        Bar,
+        /// That of P-waves in the undeformed solid, sqrt((lambda + 2 mu)/rho0)
+        PWave,
     }
 );
 choices!(

@@ -8,6 +8,7 @@ mod explain;
 mod list;
 mod reproduce;
 mod run;
+mod scheme;
 mod score;
 mod thorough;
 
@@ -27,7 +28,7 @@ use mmsmith_verify::{Arithmetic, Case, plan};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::arguments::{Extent, Precision, SchemeOptions};
+use crate::arguments::{Extent, Frame, Precision, SchemeOptions};
 use crate::library::Selection;
 use crate::memory;
 
@@ -66,9 +67,10 @@ impl Model {
 }
 
 /// The case that the options describe.
-fn case(options: &SchemeOptions, cells: usize) -> Case {
-    Case {
-        shape: options.shape.into(),
+fn case(options: &SchemeOptions, cells: usize) -> Result<Case> {
+    let (shape, frame) = scheme::of(options)?;
+    Ok(Case {
+        shape,
         integrator: options.integrator.into(),
         start: options.start.into(),
         cells,
@@ -76,7 +78,9 @@ fn case(options: &SchemeOptions, cells: usize) -> Case {
         cfl: options.cfl,
         periods: options.periods,
         extent: options.extent.map(Into::into),
-    }
+        frame,
+        cfl_speed: options.cfl_speed.into(),
+    })
 }
 
 /// Settings as they are written to JSON: everything that a result depends on. `cells` and `cfl` are a number or a
@@ -88,11 +92,18 @@ fn settings(
     cells: impl Serialize,
     cfl: impl Serialize,
 ) -> Value {
+    let (mass, composition) = scheme::echo(options);
     json!({
         "version": env!("CARGO_PKG_VERSION"),
         "solution": selection.name(),
         "parameters": selection.parameters(),
+        "frame": options.frame,
         "shape": options.shape,
+        "mass": mass,
+        "composition": composition,
+        "layout": options.layout,
+        "grid": options.grid,
+        "cfl_speed": options.cfl_speed,
         "integrator": options.integrator,
         "start": options.start,
         "cells": cells,
@@ -108,8 +119,9 @@ fn settings(
 /// One line that says what was simulated.
 fn caption(selection: &Selection, options: &SchemeOptions, extent: Option<Extent>) -> String {
     let word = |value: &dyn std::fmt::Debug| format!("{value:?}").to_lowercase();
-    let start = match options.integrator {
-        crate::arguments::Integrator::Cd => format!(" ({} start)", word(&options.start)),
+    let start = match (options.frame, options.integrator) {
+        (Frame::Total, _) => scheme::words(options),
+        (_, crate::arguments::Integrator::Cd) => format!(" ({} start)", word(&options.start)),
         _ => String::new(),
     };
     let extent = extent.map(|extent| format!(", {}", word(&extent))).unwrap_or_default();

@@ -114,6 +114,32 @@ fn single_precision_is_an_option() {
 }
 
 #[test]
+fn the_total_frame_echoes_its_scheme() {
+    let place = tempfile::tempdir().unwrap();
+    let call = "run ring --cells 8 --frame total --shape bspline4 --grid polar --layout gauss --ppc 3 \
+                --cfl 0.1 --cfl-speed p-wave --json row.json --vtk frames --frames 2";
+    let called = mms(place.path(), call);
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    let result = read_json(&place.path().join("row.json"));
+    assert_row(&result["result"]);
+    assert_eq!(result["result"]["status"], "ok");
+    let settings = &result["settings"];
+    for (key, value) in [
+        ("frame", "total"),
+        ("shape", "bspline4"),
+        ("mass", "consistent"),
+        ("layout", "gauss"),
+        ("grid", "polar"),
+        ("cfl_speed", "p-wave"),
+        ("extent", "quarter"),
+    ] {
+        assert_eq!(settings[key], value, "{key}");
+    }
+    assert_eq!(settings["composition"], 6);
+    assert_eq!(names(&place.path().join("frames")).len(), 3);
+}
+
+#[test]
 fn bad_input_is_met_with_what_would_be_right() {
     let place = tempfile::tempdir().unwrap();
     let place = place.path();
@@ -134,6 +160,21 @@ fn bad_input_is_met_with_what_would_be_right() {
     refuses(place, "run axis-aligned --extent full", &["annulus"]);
     refuses(place, "run ring --shape cubic", &["linear", "ugimp", "gimp"]);
     refuses(place, "run ring --frames 5", &["--vtk"]);
+    let total = "run axis-aligned --frame total --shape bspline3";
+    refuses(place, "run ring --frame total", &["--shape gimp", "bspline3"]);
+    refuses(place, "run ring --shape bspline3", &["--frame total"]);
+    refuses(place, "run ring --mass consistent", &["--mass", "--frame total"]);
+    refuses(place, "run ring --composition 4", &["--composition", "--frame total"]);
+    refuses(place, "run ring --layout gauss", &["--layout", "--frame total"]);
+    refuses(place, "run ring --grid polar", &["--grid", "--frame total"]);
+    refuses(place, &format!("{total} --grid polar"), &["polar", "cartesian for a box"]);
+    refuses(place, &format!("{total} --integrator usl"), &["usl", "cd"]);
+    refuses(place, &format!("{total} --precision f32"), &["f32", "f64"]);
+    refuses(place, &format!("{total} --ppc 1"), &["singular", "use more"]);
+    refuses(place, &format!("{total} --cells 1"), &["at least 2"]);
+    refuses(place, "run ring --frame total --shape bspline3", &["cartesian", "polar"]);
+    let full = "run ring --frame total --shape bspline3 --grid polar --extent full";
+    refuses(place, full, &["full", "quarter"]);
     refuses(place, "converge ring --cells 8,16 --cfls 0.1,0.2", &["--cfls", "one grid"]);
     refuses(place, "converge ring --cells 8,x", &["--cells"]);
 }

@@ -9,7 +9,7 @@ pub enum StepError {
     /// A deformation gradient lost its orientation.
     #[error(
         "step {step}, time {time:e}: particle {particle} is turned inside out (J = {J:e}); \
-         try a smaller time step, more particles per cell or gimp weights"
+         try a smaller time step, more particles per cell or smoother weights"
     )]
     Inverted {
         /// Number of the failed step, counted from 1; 0 for the initial state.
@@ -134,6 +134,41 @@ pub enum SetupError {
         cells: Vec<usize>,
         /// Bytes needed, saturating at the largest representable number.
         bytes: u128,
+    },
+    /// A degree of splines that there is no kernel for.
+    #[error("splines of degree {degree} are not supported; the degree has to be 2 to {most}")]
+    Degree {
+        /// The degree asked for.
+        degree: usize,
+        /// The largest degree.
+        most: usize,
+    },
+    /// An axis with too few cells for the splines on it.
+    #[error("{cells} cells along axis {axis} are too few for these splines; use at least {least}")]
+    TooFewCells {
+        /// The axis.
+        axis: usize,
+        /// Its cells.
+        cells: usize,
+        /// What would be enough.
+        least: usize,
+    },
+    /// The particles do not determine the splines' coefficients.
+    #[error(
+        "the mass matrix along axis {axis} is singular: {per_cell} particles per cell do not determine the splines' \
+         coefficients; use more"
+    )]
+    SingularMass {
+        /// The axis.
+        axis: usize,
+        /// Particles in a cell along it.
+        per_cell: usize,
+    },
+    /// Polar coordinates in a dimension other than two.
+    #[error("polar grids are two-dimensional; this one has dimension {dimension}")]
+    PolarDimension {
+        /// The grid's dimension.
+        dimension: usize,
     },
     /// Only centred differences start with half an acceleration.
     #[error("a halved first acceleration belongs to centred differences only, not to {integrator}")]

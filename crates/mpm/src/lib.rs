@@ -60,6 +60,7 @@ mod simd;
 mod simulation;
 mod step;
 mod tensor;
+pub mod total_lagrangian;
 mod transfer;
 mod weights;
 

@@ -14,8 +14,10 @@ use thiserror::Error;
 use crate::frames::{FrameOutput, FrameWriter};
 use crate::measure::measure;
 use crate::norms::{PerField, PerNorm};
-use crate::plan::{MOST_STEPS, prepare};
-use crate::scene::{Extent, SceneError};
+use crate::plan::{MOST_STEPS, Steps, prepare};
+use crate::scene::{Extent, Scene, SceneError};
+use crate::solver::Solver;
+use crate::total::{self, CflSpeed, Frame};
 
 /// How the centred-difference integrator gets its first velocity, half a step before the start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,6 +49,10 @@ pub struct Case {
     pub periods: f64,
     /// How much of an annulus is modelled; `None` chooses the quarter where symmetry allows it.
     pub extent: Option<Extent>,
+    /// The configuration that weights belong to; in the total frame `shape` has no meaning.
+    pub frame: Frame,
+    /// The speed `c` that `cfl` refers to.
+    pub cfl_speed: CflSpeed,
 }
 
 impl Default for Case {
@@ -61,6 +67,8 @@ impl Default for Case {
             cfl: 0.4,
             periods: 1.0,
             extent: None,
+            frame: Frame::Updated,
+            cfl_speed: CflSpeed::Bar,
         }
     }
 }
@@ -222,7 +230,10 @@ impl Case {
                 return Err(CaseError::Setting { setting, value, admissible });
             }
         }
-        Ok(())
+        match &self.frame {
+            Frame::Updated => Ok(()),
+            Frame::Total(total) => total.validate(self),
+        }
     }
 }
 
@@ -246,6 +257,9 @@ pub fn run(
     outputs: &mut Outputs<'_>,
 ) -> Result<Row, CaseError> {
     use AnySolution::{One, Three, Two};
+    if let Frame::Total(total) = &case.frame {
+        return total::run(exact, arithmetic, total, case, outputs);
+    }
     match (exact, arithmetic) {
         (One(s), Arithmetic::Double) => run_in(s.as_ref(), s.as_ref(), case, outputs),
         (Two(s), Arithmetic::Double) => run_in(s.as_ref(), s.as_ref(), case, outputs),
@@ -281,24 +295,37 @@ fn run_in<T: Real, const D: usize>(
         halve_first_acceleration: case.integrator == Integrator::Cd && case.start == Start::Halved,
     };
     let body_force = ExactBodyForce(model.body_force_at(&particles.X));
-    let mut simulation = Simulation::new(grid, particles, law(model.material())?, settings)?;
+    let simulation = Simulation::new(grid, particles, law(model.material())?, settings)?;
+    follow(simulation, &body_force, exact, case, &scene, Steps { dt, ..steps }, outputs)
+}
 
+/// Steps to the end and measures the errors on the way.
+pub(crate) fn follow<T: Real, const D: usize>(
+    mut solver: impl Solver<T, D>,
+    body_force: &dyn BodyForce<T, D>,
+    exact: &dyn Solution<f64, D>,
+    case: &Case,
+    scene: &Scene<D>,
+    steps: Steps,
+    outputs: &mut Outputs<'_>,
+) -> Result<Row, CaseError> {
+    let dt = steps.dt;
     let mut frames = match outputs.frames {
         Some(output) => Some(FrameWriter::new(output, steps.count)?),
         None => None,
     };
     if let Some(frames) = &mut frames {
-        frames.write(&simulation, exact, 0, 0.0)?;
+        frames.write(solver.observe(), exact, 0, 0.0)?;
     }
-    let lag = simulation.velocity_lag().to_f64();
-    let at_start = measure(&simulation, exact, 0.0, lag).norms;
+    let lag = solver.velocity_lag();
+    let at_start = measure(solver.observe(), exact, 0.0, lag).norms;
     // Before the first step no velocity is stored yet that belongs to a time of the scheme.
     let mut errors = PerField { v: PerNorm::default(), ..at_start };
     let mut status = Status::Ok;
     let (mut wall_s, mut done) = (0.0, 0_u64);
     for step in 1..=steps.count {
         let started = Instant::now();
-        let outcome = simulation.step(&body_force);
+        let outcome = solver.step(body_force);
         wall_s += started.elapsed().as_secs_f64();
         if let Err(error) = outcome {
             status = Status::Stopped(error);
@@ -306,7 +333,7 @@ fn run_in<T: Real, const D: usize>(
         }
         done = step;
         let time = step as f64 * dt;
-        let measured = measure(&simulation, exact, time, lag);
+        let measured = measure(solver.observe(), exact, time, lag);
         errors = PerField::combine(&errors, &measured.norms, PerNorm::larger);
         let error = measured.norms.u.linf;
         if error > scene.size || error.is_nan() {
@@ -314,7 +341,7 @@ fn run_in<T: Real, const D: usize>(
             status = Status::Unstable { step, time, particle, error, size: scene.size };
         }
         if let Some(frames) = &mut frames {
-            frames.write(&simulation, exact, step, time)?;
+            frames.write(solver.observe(), exact, step, time)?;
         }
         let share = step as f64 / steps.count as f64;
         (outputs.progress)(Progress { case: 0, step, steps: steps.count, share });
@@ -322,7 +349,7 @@ fn run_in<T: Real, const D: usize>(
             break;
         }
     }
-    let count = simulation.particles().len();
+    let count = solver.observe().0.len();
     let particle_steps = count as f64 * done as f64;
     Ok(Row {
         cells: case.cells,
@@ -339,7 +366,9 @@ fn run_in<T: Real, const D: usize>(
 }
 
 /// The exact body force at the particles; what depends on their reference positions alone is kept.
-struct ExactBodyForce<'a, T: Real, const D: usize>(Box<dyn BodyForceAtPoints<T, D> + 'a>);
+pub(crate) struct ExactBodyForce<'a, T: Real, const D: usize>(
+    pub(crate) Box<dyn BodyForceAtPoints<T, D> + 'a>,
+);
 
 impl<T: Real, const D: usize> BodyForce<T, D> for ExactBodyForce<'_, T, D> {
     fn evaluate(&self, first: usize, _X: &[SVector<T, D>], t: T, b: &mut [SVector<T, D>]) {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use mmsmith_mpm::Simulation;
+use mmsmith_mpm::{Material, Particles};
 use mmsmith_solutions::{Real, Solution};
 use mmsmith_vtk::{Array, Error, Frame, Series, Values};
 use nalgebra::{Matrix3, SMatrix, SVector};
@@ -38,7 +38,7 @@ impl FrameWriter {
     /// Writes the state after `step` if it is one of those wanted.
     pub(crate) fn write<T: Real, const D: usize>(
         &mut self,
-        simulation: &Simulation<T, D>,
+        state: (&Particles<T, D>, &Material<T>),
         exact: &dyn Solution<f64, D>,
         step: u64,
         time: f64,
@@ -47,7 +47,7 @@ impl FrameWriter {
             return Ok(());
         }
         self.next += 1;
-        match frame(simulation, exact, step, time) {
+        match frame(state, exact, step, time) {
             Some(frame) => self.series.write(&frame).map(|_| ()),
             None => Ok(()),
         }
@@ -68,13 +68,11 @@ fn step_of_frame(index: u64, count: u64, steps: u64) -> u64 {
 /// solver's law, with the component normal to the plane in two dimensions. `None` if a particle has no stress because it
 /// is inside out: no viewer reads numbers that are none.
 fn frame<T: Real, const D: usize>(
-    simulation: &Simulation<T, D>,
+    (particles, law): (&Particles<T, D>, &Material<T>),
     exact: &dyn Solution<f64, D>,
     step: u64,
     time: f64,
 ) -> Option<Frame> {
-    let particles = simulation.particles();
-    let law = simulation.material();
     let count = particles.len();
     let mut points = Vec::with_capacity(count);
     let mut displacement = Vec::with_capacity(count);

@@ -24,7 +24,9 @@ mod plan;
 mod points;
 mod scene;
 mod score;
+mod solver;
 mod study;
+mod total;
 
 pub use case::{Arithmetic, Case, CaseError, Outputs, Progress, Row, Start, Status, run};
 pub use check::{
@@ -33,6 +35,7 @@ pub use check::{
 pub use coverage::{Part, Share, coverage, smallest_set};
 pub use evaluate::{FieldRow, WrongLength, evaluate};
 pub use frames::FrameOutput;
+pub use mmsmith_mpm::total_lagrangian::{Composition, Coordinates, Layout, MassMatrix, Scheme};
 pub use mmsmith_mpm::{Integrator, Shape};
 pub use norms::{PerField, PerNorm};
 pub use order::Order;
@@ -43,3 +46,4 @@ pub use score::{
     score,
 };
 pub use study::{Study, StudyError, Sweep, converge};
+pub use total::{CflSpeed, Frame, TotalScheme};

@@ -1,6 +1,6 @@
 //! The errors of all particles at one instant.
 
-use mmsmith_mpm::Simulation;
+use mmsmith_mpm::{Material, Particles};
 use mmsmith_solutions::{Real, Solution};
 use rayon::prelude::*;
 
@@ -18,12 +18,11 @@ pub(crate) struct Measured {
 
 /// Compares every particle with the exact solution at `time`; the velocity `lag` earlier.
 pub(crate) fn measure<T: Real, const D: usize>(
-    simulation: &Simulation<T, D>,
+    (particles, material): (&Particles<T, D>, &Material<T>),
     exact: &dyn Solution<f64, D>,
     time: f64,
     lag: f64,
 ) -> Measured {
-    let particles = simulation.particles();
     let magnitudes = |p: usize| {
         let X = particles.X[p].map(Real::to_f64);
         let F = particles.F[p];
@@ -32,7 +31,7 @@ pub(crate) fn measure<T: Real, const D: usize>(
         let velocity = if lag == 0.0 { at_time.v } else { exact.velocity(&X, time - lag) };
         let displacement = particles.x[p].map(Real::to_f64) - X;
         // A particle that is inside out has no stress; the solver stops at its next step.
-        let stress = simulation.material().first_piola_kirchhoff(&F);
+        let stress = material.first_piola_kirchhoff(&F);
         [
             (displacement - at_time.u).norm(),
             (particles.v[p].map(Real::to_f64) - velocity).norm(),

@@ -4,6 +4,7 @@ use mmsmith_solutions::{AnySolution, Solution};
 
 use crate::case::{Arithmetic, Case, CaseError};
 use crate::scene::{Extent, Scene};
+use crate::total::Frame;
 
 /// Steps that no run should have; a typing error in a CFL number reaches it easily.
 pub(crate) const MOST_STEPS: f64 = 1e12;
@@ -49,6 +50,9 @@ fn plan_in<const D: usize>(
     case: &Case,
 ) -> Result<Plan, CaseError> {
     let (scene, steps) = prepare(exact, case)?;
+    if let Frame::Total(total) = &case.frame {
+        total.grid(&scene, case.per_cell)?;
+    }
     Ok(Plan {
         steps: steps.count,
         particles: scene.particles_expected(case.per_cell),
@@ -65,7 +69,7 @@ pub(crate) fn prepare<const D: usize>(
     case.validate()?;
     let end = case.periods * exact.period();
     let scene = Scene::new(exact, case, end)?;
-    let steps = Steps::new(case, end, scene.spacing, exact.wave_speed())?;
+    let steps = Steps::new(case, end, scene.spacing, case.cfl_speed.of(exact)?)?;
     Ok((scene, steps))
 }
 

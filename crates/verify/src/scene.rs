@@ -93,8 +93,8 @@ pub(crate) struct Scene<const D: usize> {
     pub(crate) lower: SVector<f64, D>,
     pub(crate) spacing: f64,
     pub(crate) cells: [usize; D],
-    walls: [[bool; 2]; D],
-    domain: Domain<f64, D>,
+    pub(crate) walls: [[bool; 2]; D],
+    pub(crate) domain: Domain<f64, D>,
     /// The largest extent of the body.
     pub(crate) size: f64,
 }

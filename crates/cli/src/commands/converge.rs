@@ -17,7 +17,7 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
     let selection = Selection::new(&options.name, &scheme.parameters.set)?;
     let sweep = sweep(options)?;
     let model = Model::new(&selection, scheme.precision)?;
-    let base = case(scheme, options.cells[0]);
+    let base = case(scheme, options.cells[0])?;
     let extent = model.admit(&sweep.cases(&base))?;
     let output = Output::prepare_if(scheme.json.as_ref())?;
     with_threads(scheme.threads, || {

@@ -103,7 +103,7 @@ fn measure_problem(problem: &'static str, folder: &Path) -> Result<Results> {
     let model = Model::new(&selection, Precision::F64)?;
     let series = |kind: &str, scheme: (Shape, Integrator), sweep: &Sweep| -> Result<Series> {
         let options = SchemeOptions::usual(scheme.0, scheme.1);
-        let base = case(&options, GRID);
+        let base = case(&options, GRID)?;
         let extent = model.admit(&sweep.cases(&base))?;
         let stem = format!("{kind}-{}-{}", word(scheme.0), word(scheme.1));
         let json = Output::prepare(&folder.join(format!("{stem}.json")))?;
@@ -128,7 +128,7 @@ fn measure_problem(problem: &'static str, folder: &Path) -> Result<Results> {
         Output::prepare(&folder.join(format!("{kind}.svg")))?.write_text(&svg)?;
     }
 
-    let base = case(&SchemeOptions::usual(Shape::Gimp, Integrator::Cd), GRID);
+    let base = case(&SchemeOptions::usual(Shape::Gimp, Integrator::Cd), GRID)?;
     let frames =
         FrameOutput { folder: folder.join("particles"), name: problem.to_owned(), count: FRAMES };
     let mut outputs = Outputs { progress: &mut |_| (), frames: Some(&frames) };

@@ -16,7 +16,7 @@ pub(crate) fn run(options: &RunOptions) -> Result<bool> {
     let scheme = &options.scheme;
     let selection = Selection::new(&options.name, &scheme.parameters.set)?;
     let model = Model::new(&selection, scheme.precision)?;
-    let case = case(scheme, options.cells);
+    let case = case(scheme, options.cells)?;
     let extent = model.admit(&[case])?;
     let output = Output::prepare_if(scheme.json.as_ref())?;
     let frames = options.vtk.as_ref().map(|folder| FrameOutput {

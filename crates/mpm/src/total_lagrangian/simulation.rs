@@ -1,0 +1,736 @@
+//! The simulation: coefficients of displacement and velocity, and the forces on them.
+
+use std::array;
+
+use nalgebra::{SMatrix, SVector};
+
+use super::axis::{Axis, End, Layout};
+use super::basis::{Basis, MOST_DEGREE, Part};
+use super::composition::Composition;
+use super::mass::Mass;
+use crate::body_force::BodyForce;
+use crate::error::{SetupError, StepError};
+use crate::material::{AnyLaw, Law, Material, NeoHookean, NeoHookeanNoLog};
+use crate::particles::Particles;
+use crate::tensor::determinant;
+
+/// What the coordinates of a grid mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Coordinates {
+    /// Reference positions.
+    Cartesian,
+    /// Radius and angle of the reference position, in two dimensions. Unknowns are the components along `e_R` and
+    /// `e_theta` at the reference position, so that planes of symmetry through the origin are ends of the angle's axis.
+    Polar,
+}
+
+/// A tensor-product grid that covers the body, with the particles in it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grid<const D: usize> {
+    /// The axes of the coordinates.
+    pub axes: [Axis; D],
+    /// What the coordinates mean.
+    pub coordinates: Coordinates,
+    /// Particles in a cell along each direction.
+    pub per_cell: usize,
+    /// Where they lie.
+    pub layout: Layout,
+}
+
+/// Mass matrices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MassMatrix {
+    /// Row sums on the diagonal: of second order whatever the degree.
+    Lumped,
+    /// `M_ij = sum m_p N_i N_j`.
+    Consistent,
+}
+
+/// The discretisation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Scheme {
+    /// The splines' degree, 2 to 5.
+    pub degree: usize,
+    /// The mass matrix.
+    pub mass: MassMatrix,
+    /// The integration in time.
+    pub composition: Composition,
+}
+
+/// A running simulation in the reference configuration.
+///
+/// Runs on the calling thread alone, so that its results do not depend on the number of threads.
+#[derive(Clone, Debug)]
+pub struct TotalLagrangian<const D: usize> {
+    grid: Grid<D>,
+    scheme: Scheme,
+    material: Material<f64>,
+    time_step: f64,
+    /// For each axis, the functions of components along it and of the others: `[across as usize]`.
+    bases: [[Basis; 2]; D],
+    /// Solves for accelerations, by axis as `bases`.
+    mass: [[Mass; 2]; D],
+    /// Coefficients by component, axis 0 fastest.
+    u: [Vec<f64>; D],
+    v: [Vec<f64>; D],
+    /// Accelerations at the current state; forces before the solution.
+    a: [Vec<f64>; D],
+    a_is_current: bool,
+    particles: Particles<f64, D>,
+    density: f64,
+    /// Polar coordinates: reciprocal radius by place along axis 0, and cosine and sine by place along axis 1.
+    reciprocal_radius: Vec<f64>,
+    direction: Vec<[f64; 2]>,
+    work: Work<D>,
+    steps_done: usize,
+    failed: Option<StepError>,
+}
+
+/// Arrays that the force computation works in.
+#[derive(Clone, Debug)]
+struct Work<const D: usize> {
+    /// Values at the particles, by component; then the factors of the functions' values in the forces.
+    values: [Vec<f64>; D],
+    /// Slopes at the particles, by component and axis; then the factors of the functions' slopes.
+    slopes: [[Vec<f64>; D]; D],
+    /// For each axis but the last, values and slopes along axes so far, between the axes: particles up to that axis,
+    /// coefficients after it.
+    partial: Vec<Vec<Vec<f64>>>,
+    b: Vec<SVector<f64, D>>,
+}
+
+impl<const D: usize> TotalLagrangian<D> {
+    /// Sets up a body at rest and undeformed, of density `density` per reference volume, at time 0.
+    ///
+    /// # Errors
+    ///
+    /// Where the scene makes no sense (see [`SetupError`]) or does not fit into memory.
+    pub fn new(
+        grid: Grid<D>,
+        scheme: Scheme,
+        material: Material<f64>,
+        density: f64,
+        time_step: f64,
+    ) -> Result<Self, SetupError> {
+        const { assert!(1 <= D && D <= 3, "one, two or three dimensions") };
+        check(&grid, &scheme, density, time_step)?;
+        reserve(&grid, scheme.degree)?;
+        let mut lines = Vec::with_capacity(D);
+        for (k, axis) in grid.axes.iter().enumerate() {
+            let (points, mut weights) = axis.points(grid.per_cell, grid.layout);
+            if grid.coordinates == Coordinates::Polar && k == 0 {
+                weights.iter_mut().zip(&points).for_each(|(w, R)| *w *= R);
+            }
+            lines.push((points, weights));
+        }
+        let basis =
+            |k: usize, normal: bool| {
+                let axis = &grid.axes[k];
+                Basis::new(axis, scheme.degree, normal, &lines[k].0)
+                    .ok_or(SetupError::TooFewCells { axis: k, cells: axis.cells, least: 2 })
+            };
+        let mut bases = Vec::with_capacity(D);
+        let mut masses = Vec::with_capacity(D);
+        for k in 0..D {
+            let pair = [basis(k, false)?, basis(k, true)?];
+            // The density belongs to the product over the axes, so to one of them.
+            let factor = if k == 0 { density } else { 1.0 };
+            let weights: Vec<f64> = lines[k].1.iter().map(|w| w * factor).collect();
+            let mass = |normal: usize| match scheme.mass {
+                MassMatrix::Consistent => Mass::consistent(&pair[normal], &weights),
+                MassMatrix::Lumped => {
+                    let on_wall = scheme.degree % 2 == 1 && grid.axes[k].ends[0] == End::Wall;
+                    let skipped = usize::from(on_wall && normal == 1);
+                    Some(Mass::lumped(&pair[0], &weights, skipped, pair[normal].functions))
+                }
+            };
+            let singular = SetupError::SingularMass { axis: k, per_cell: grid.per_cell };
+            let pair_of_masses = mass(0).zip(mass(1)).ok_or(singular)?;
+            masses.push(<[Mass; 2]>::from(pair_of_masses));
+            bases.push(pair);
+        }
+        let bases: [[Basis; 2]; D] = array::from_fn(|k| bases[k].clone());
+        let mass: [[Mass; 2]; D] = array::from_fn(|k| masses[k].clone());
+        let particles = particles(&grid, &lines, density);
+        let zeros: [Vec<f64>; D] = array::from_fn(|component| {
+            let sizes = (0..D).map(|k| bases[k][usize::from(k == component)].functions);
+            vec![0.0; sizes.product()]
+        });
+        let polar = grid.coordinates == Coordinates::Polar;
+        let direction = |theta: &f64| [theta.cos(), theta.sin()];
+        Ok(Self {
+            reciprocal_radius: match polar {
+                true => lines[0].0.iter().map(|R| R.recip()).collect(),
+                false => Vec::new(),
+            },
+            direction: if polar { lines[1].0.iter().map(direction).collect() } else { Vec::new() },
+            work: Work::new(&bases, particles.len()),
+            u: zeros.clone(),
+            v: zeros.clone(),
+            a: zeros,
+            a_is_current: false,
+            grid,
+            scheme,
+            material,
+            time_step,
+            bases,
+            mass,
+            particles,
+            density,
+            steps_done: 0,
+            failed: None,
+        })
+    }
+
+    /// The particles' reference positions, Cartesian.
+    pub fn positions(&self) -> &[SVector<f64, D>] {
+        &self.particles.X
+    }
+
+    /// Starts anew at time 0 from the displacements and velocities nearest to those given at the particles, in the
+    /// mean of squares weighted with the particles' masses.
+    ///
+    /// # Errors
+    ///
+    /// [`SetupError::SingularMass`] where lumped masses hide that the particles do not determine the coefficients, and
+    /// [`SetupError::LengthMismatch`] for slices of another length than [`positions`](Self::positions).
+    pub fn start(
+        &mut self,
+        u: &[SVector<f64, D>],
+        v: &[SVector<f64, D>],
+    ) -> Result<(), SetupError> {
+        let expected = self.particles.len();
+        for (array, found) in [("u", u.len()), ("v", v.len())] {
+            if found != expected {
+                return Err(SetupError::LengthMismatch { array, found, expected });
+            }
+        }
+        let mut consistent = Vec::with_capacity(D);
+        for k in 0..D {
+            let (points, mut weights) =
+                self.grid.axes[k].points(self.grid.per_cell, self.grid.layout);
+            if !self.reciprocal_radius.is_empty() && k == 0 {
+                weights.iter_mut().zip(&points).for_each(|(w, R)| *w *= R);
+            }
+            let mass = |basis: &Basis| Mass::consistent(basis, &weights);
+            let singular = SetupError::SingularMass { axis: k, per_cell: self.grid.per_cell };
+            let [even, odd] = &self.bases[k];
+            consistent.push(<[Mass; 2]>::from(mass(even).zip(mass(odd)).ok_or(singular)?));
+        }
+        let consistent: [[Mass; 2]; D] = array::from_fn(|k| consistent[k].clone());
+        self.u = self.fit(&consistent, u);
+        self.v = self.fit(&consistent, v);
+        self.a_is_current = false;
+        self.steps_done = 0;
+        self.failed = None;
+        Ok(())
+    }
+
+    /// The coefficients of the field nearest to given values.
+    fn fit(&mut self, mass: &[[Mass; 2]; D], values: &[SVector<f64, D>]) -> [Vec<f64>; D] {
+        let row = self.row();
+        for (p, value) in values.iter().enumerate() {
+            let value = self.components(p / row, value);
+            for component in 0..D {
+                self.work.values[component][p] = value[component] * self.particles.volume[p];
+            }
+        }
+        array::from_fn(|component| {
+            let mut fitted = vec![0.0; self.u[component].len()];
+            self.integrate(component, Factors::Values, &mut fitted);
+            self.solve(mass, component, &mut fitted);
+            fitted
+        })
+    }
+
+    /// Advances by one time step.
+    ///
+    /// # Errors
+    ///
+    /// Where a particle turns inside out or takes on values that are not finite, at any stage of the step. Every
+    /// further call returns the same error.
+    pub fn step(&mut self, body_force: &dyn BodyForce<f64, D>) -> Result<(), StepError> {
+        if let Some(error) = &self.failed {
+            return Err(error.clone());
+        }
+        let outcome = self.advance(body_force);
+        if let Err(error) = &outcome {
+            self.failed = Some(error.clone());
+        }
+        outcome
+    }
+
+    fn advance(&mut self, body_force: &dyn BodyForce<f64, D>) -> Result<(), StepError> {
+        let start = self.time();
+        if !self.a_is_current {
+            self.accelerate(body_force, start)?;
+            self.a_is_current = true;
+        }
+        // The step's part that is done: time is a variable of the drift, or the composition would lose its order.
+        let mut done = 0.0;
+        for gamma in self.scheme.composition.stages() {
+            let part = gamma * self.time_step;
+            add(&mut self.v, 0.5 * part, &self.a);
+            add(&mut self.u, part, &self.v);
+            done += gamma;
+            self.accelerate(body_force, start + done * self.time_step)?;
+            add(&mut self.v, 0.5 * part, &self.a);
+        }
+        self.steps_done += 1;
+        Ok(())
+    }
+
+    /// The particles as they are now, with velocities of the same time; computed at each call.
+    pub fn observe(&mut self) -> &Particles<f64, D> {
+        let row = self.row();
+        for component in 0..D {
+            self.evaluate(component, Field::Velocity, true);
+        }
+        for p in 0..self.particles.len() {
+            let local = SVector::from_fn(|i, _| self.work.values[i][p]);
+            self.particles.v[p] = self.cartesian(p / row, &local);
+        }
+        for component in 0..D {
+            self.evaluate(component, Field::Displacement, true);
+        }
+        for p in 0..self.particles.len() {
+            let Work { values, slopes, .. } = &self.work;
+            let local = SVector::from_fn(|i, _| values[i][p]);
+            let mut H = SMatrix::from_fn(|i, k| slopes[i][k][p]);
+            if let Some(reciprocal_radius) = self.reciprocal_radius.get(p % row) {
+                H = polar_gradient(&local, &H, *reciprocal_radius);
+                let [cos, sin] = self.direction[p / row];
+                let Q = SMatrix::<f64, D, D>::from_fn(|i, k| match (i, k) {
+                    (0, 1) => -sin,
+                    (1, 0) => sin,
+                    _ => cos,
+                });
+                H = Q * H * Q.transpose();
+            }
+            self.particles.F[p] = SMatrix::identity() + H;
+            self.particles.x[p] = self.particles.X[p] + self.cartesian(p / row, &local);
+        }
+        &self.particles
+    }
+
+    /// The particles as they were at the last call of [`observe`](Self::observe), or at rest.
+    pub fn particles(&self) -> &Particles<f64, D> {
+        &self.particles
+    }
+
+    /// Number of completed steps.
+    pub fn steps_done(&self) -> usize {
+        self.steps_done
+    }
+
+    /// Current time: completed steps times the time step.
+    pub fn time(&self) -> f64 {
+        self.time_step * self.steps_done as f64
+    }
+
+    /// The material.
+    pub fn material(&self) -> &Material<f64> {
+        &self.material
+    }
+
+    /// The grid.
+    pub fn grid(&self) -> &Grid<D> {
+        &self.grid
+    }
+
+    /// The discretisation.
+    pub fn scheme(&self) -> Scheme {
+        self.scheme
+    }
+
+    /// Particles along axis 0.
+    fn row(&self) -> usize {
+        self.bases[0][0].points
+    }
+
+    /// A vector's components that the unknowns stand for, in row `row` of particles.
+    fn components(&self, row: usize, vector: &SVector<f64, D>) -> SVector<f64, D> {
+        match self.direction.get(row) {
+            Some(&[cos, sin]) => turn(vector, cos, -sin),
+            None => *vector,
+        }
+    }
+
+    /// The inverse of [`components`](Self::components).
+    fn cartesian(&self, row: usize, components: &SVector<f64, D>) -> SVector<f64, D> {
+        match self.direction.get(row) {
+            Some(&[cos, sin]) => turn(components, cos, sin),
+            None => *components,
+        }
+    }
+
+    /// The accelerations at the current displacement and at `time`.
+    fn accelerate(
+        &mut self,
+        body_force: &dyn BodyForce<f64, D>,
+        time: f64,
+    ) -> Result<(), StepError> {
+        let polar = self.grid.coordinates == Coordinates::Polar;
+        for component in 0..D {
+            self.evaluate(component, Field::Displacement, polar);
+        }
+        let forced = !body_force.is_absent();
+        if forced {
+            body_force.evaluate(0, &self.particles.X, time, &mut self.work.b);
+        }
+        let bad = match self.material {
+            Material::NeoHookean { lambda: 0.0, mu } => {
+                self.stress(NeoHookeanNoLog { mu }, polar, forced)
+            }
+            Material::NeoHookean { lambda, mu } => {
+                self.stress(NeoHookean { lambda, mu }, polar, forced)
+            }
+            other => self.stress(AnyLaw(other), polar, forced),
+        };
+        if bad {
+            return Err(self.describe());
+        }
+        let factors = if polar || forced { Factors::Both } else { Factors::Slopes };
+        for component in 0..D {
+            let mut a = std::mem::take(&mut self.a[component]);
+            self.integrate(component, factors, &mut a);
+            self.solve(&self.mass, component, &mut a);
+            self.a[component] = a;
+        }
+        Ok(())
+    }
+
+    /// Turns displacements and their slopes at the particles into the factors of the functions' values and slopes in the
+    /// forces. True where a particle has no stress.
+    fn stress<L: Law<f64>>(&mut self, law: L, polar: bool, forced: bool) -> bool {
+        let row = self.row();
+        let Work { values, slopes, b, .. } = &mut self.work;
+        let mut bad = false;
+        for (index, volume) in self.particles.volume.chunks_exact(row).enumerate() {
+            let range = index * row..(index + 1) * row;
+            let values = values.each_mut().map(|array| &mut array[range.clone()]);
+            let slopes = slopes
+                .each_mut()
+                .map(|arrays| arrays.each_mut().map(|array| &mut array[range.clone()]));
+            for i in 0..row {
+                let mut H = SMatrix::<f64, D, D>::from_fn(|c, k| slopes[c][k][i]);
+                if polar {
+                    let u = SVector::from_fn(|c, _| values[c][i]);
+                    H = polar_gradient(&u, &H, self.reciprocal_radius[i]);
+                }
+                let F = SMatrix::identity() + H;
+                bad |= !is_deformation(&F);
+                let force = law.first_piola_kirchhoff(&F) * -volume[i];
+                for c in 0..D {
+                    for k in 0..D {
+                        slopes[c][k][i] = force[(c, k)];
+                    }
+                }
+                if polar {
+                    let reciprocal = self.reciprocal_radius[i];
+                    for c in 0..D {
+                        slopes[c][1][i] *= reciprocal;
+                    }
+                    values[0][i] = force[(1, 1)] * reciprocal;
+                    values[1][i] = -force[(0, 1)] * reciprocal;
+                }
+            }
+            if forced {
+                for (i, b) in b[range].iter().enumerate() {
+                    let mut b = b * (volume[i] * self.density);
+                    if polar {
+                        let [cos, sin] = self.direction[index];
+                        b = turn(&b, cos, -sin);
+                    }
+                    for c in 0..D {
+                        values[c][i] = if polar { values[c][i] + b[c] } else { b[c] };
+                    }
+                }
+            }
+        }
+        bad
+    }
+
+    /// What is wrong with the current displacement.
+    #[cold]
+    fn describe(&mut self) -> StepError {
+        let step = self.steps_done + 1;
+        let time = self.time_step * step as f64;
+        let particles = self.observe();
+        let is_bad = |F: &SMatrix<f64, D, D>| !is_deformation(F);
+        let particle = particles.F.iter().position(is_bad).unwrap_or(0);
+        let J = determinant(&particles.F[particle]);
+        let position = &particles.x[particle];
+        if J.is_finite() && position.iter().all(|x| x.is_finite()) {
+            StepError::Inverted { step, time, particle, J }
+        } else {
+            let position = position.iter().copied().collect();
+            StepError::NotFinite { step, time, particle, position, J }
+        }
+    }
+
+    /// Evaluates a component and its slopes at the particles; its values only if they are needed.
+    fn evaluate(&mut self, component: usize, field: Field, with_values: bool) {
+        let coefficients = match field {
+            Field::Displacement => &self.u[component],
+            Field::Velocity => &self.v[component],
+        };
+        let Work { values, slopes, partial, .. } = &mut self.work;
+        let (mut inner, mut size) = (1, coefficients.len());
+        for k in 0..D {
+            let basis = &self.bases[k][usize::from(k == component)];
+            let next = size / basis.functions * basis.points;
+            let (before, after) = partial.split_at_mut(k);
+            let source = |part: usize| match before.last() {
+                Some(arrays) => &arrays[part][..size],
+                None => &coefficients[..],
+            };
+            match after.first_mut() {
+                Some(arrays) => {
+                    for part in 0..=k {
+                        basis.evaluate(Part::Value, inner, source(part), &mut arrays[part][..next]);
+                    }
+                    basis.evaluate(Part::Slope, inner, source(0), &mut arrays[k + 1][..next]);
+                }
+                None => {
+                    let slopes = &mut slopes[component];
+                    if with_values {
+                        basis.evaluate(Part::Value, inner, source(0), &mut values[component]);
+                    }
+                    for j in 0..k {
+                        basis.evaluate(Part::Value, inner, source(j + 1), &mut slopes[j]);
+                    }
+                    basis.evaluate(Part::Slope, inner, source(0), &mut slopes[k]);
+                }
+            }
+            (inner, size) = (inner * basis.points, next);
+        }
+    }
+
+    /// Integrates what stands at the particles, as factors of values or of slopes or of both, against the functions of a
+    /// component.
+    fn integrate(&mut self, component: usize, of: Factors, coefficients: &mut [f64]) {
+        let Work { values, slopes, partial, .. } = &mut self.work;
+        let (mut inner, mut size) = (values[component].len(), values[component].len());
+        for k in (0..D).rev() {
+            let basis = &self.bases[k][usize::from(k == component)];
+            inner /= basis.points;
+            let next = size / basis.points * basis.functions;
+            let (before, after) = partial.split_at_mut(k);
+            let is_first = k == D - 1;
+            // Values come first, then slopes by axis.
+            let source = |part: usize| match after.first() {
+                Some(arrays) => &arrays[part][..size],
+                None if part == 0 => &values[component][..],
+                None => &slopes[component][part - 1][..],
+            };
+            let mut target = |part: usize, terms: &[(Part, usize)]| {
+                let array = match before.last_mut() {
+                    Some(arrays) => &mut arrays[part][..next],
+                    None => &mut *coefficients,
+                };
+                array.fill(0.0);
+                for &(weights, part) in terms {
+                    basis.integrate(weights, inner, source(part), array);
+                }
+            };
+            let (of_values, of_slopes) = ((Part::Value, 0), (Part::Slope, k + 1));
+            match of {
+                Factors::Values => target(0, &[of_values]),
+                Factors::Slopes if is_first => target(0, &[of_slopes]),
+                Factors::Slopes | Factors::Both => target(0, &[of_values, of_slopes]),
+            }
+            if of != Factors::Values {
+                for j in 1..=k {
+                    target(j, &[(Part::Value, j)]);
+                }
+            }
+            size = next;
+        }
+    }
+
+    /// Solves for a component's coefficients in place.
+    fn solve(&self, mass: &[[Mass; 2]; D], component: usize, coefficients: &mut [f64]) {
+        let mut inner = 1;
+        for k in 0..D {
+            let normal = usize::from(k == component);
+            mass[k][normal].solve(inner, coefficients);
+            inner *= self.bases[k][normal].functions;
+        }
+    }
+}
+
+/// A field that coefficients stand for.
+#[derive(Clone, Copy)]
+enum Field {
+    Displacement,
+    Velocity,
+}
+
+/// What is integrated against the functions.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Factors {
+    Values,
+    Slopes,
+    Both,
+}
+
+impl<const D: usize> Work<D> {
+    fn new(bases: &[[Basis; 2]; D], particles: usize) -> Self {
+        let size = |axis: usize| (0..D).map(|k| layer(&bases[k], k <= axis)).product::<usize>();
+        let stage = |axis: usize| vec![vec![0.0; size(axis)]; axis + 2];
+        let points = || vec![0.0; particles];
+        Self {
+            values: array::from_fn(|_| points()),
+            slopes: array::from_fn(|_| array::from_fn(|_| points())),
+            partial: (0..D - 1).map(stage).collect(),
+            b: vec![SVector::zeros(); particles],
+        }
+    }
+}
+
+/// Places along an axis: particles, or at most so many coefficients.
+fn layer(bases: &[Basis; 2], of_particles: bool) -> usize {
+    let [even, odd] = bases;
+    if of_particles { even.points } else { even.functions.max(odd.functions) }
+}
+
+/// Whether F is a deformation gradient; false where it is not a number, too.
+#[inline(always)]
+fn is_deformation<const D: usize>(F: &SMatrix<f64, D, D>) -> bool {
+    let J = determinant(F);
+    J > 0.0 && J < f64::INFINITY
+}
+
+/// `target += factor * source`, component by component.
+fn add<const D: usize>(target: &mut [Vec<f64>; D], factor: f64, source: &[Vec<f64>; D]) {
+    for (target, source) in target.iter_mut().zip(source) {
+        target.iter_mut().zip(source).for_each(|(x, y)| *x += factor * y);
+    }
+}
+
+/// A vector of the plane, turned.
+fn turn<const D: usize>(vector: &SVector<f64, D>, cos: f64, sin: f64) -> SVector<f64, D> {
+    let mut turned = *vector;
+    turned[0] = cos * vector[0] - sin * vector[1];
+    turned[1] = sin * vector[0] + cos * vector[1];
+    turned
+}
+
+/// The displacement gradient in the basis `e_R, e_theta` from the components and their derivatives by R and theta.
+#[inline(always)]
+fn polar_gradient<const D: usize>(
+    u: &SVector<f64, D>,
+    slopes: &SMatrix<f64, D, D>,
+    reciprocal_radius: f64,
+) -> SMatrix<f64, D, D> {
+    let mut H = *slopes;
+    H[(0, 1)] = (slopes[(0, 1)] - u[1]) * reciprocal_radius;
+    H[(1, 1)] = (slopes[(1, 1)] + u[0]) * reciprocal_radius;
+    H
+}
+
+/// The body at rest.
+fn particles<const D: usize>(
+    grid: &Grid<D>,
+    lines: &[(Vec<f64>, Vec<f64>)],
+    density: f64,
+) -> Particles<f64, D> {
+    let count = lines.iter().map(|(points, _)| points.len()).product();
+    let mut X = Vec::with_capacity(count);
+    let mut volume = Vec::with_capacity(count);
+    for p in 0..count {
+        let mut rest = p;
+        let mut weight = 1.0;
+        let place = SVector::<f64, D>::from_fn(|k, _| {
+            let (points, weights) = &lines[k];
+            let index = rest % points.len();
+            rest /= points.len();
+            weight *= weights[index];
+            points[index]
+        });
+        X.push(match grid.coordinates {
+            Coordinates::Cartesian => place,
+            Coordinates::Polar => {
+                let (R, theta) = (place[0], place[1]);
+                let mut along = SVector::zeros();
+                along[0] = R;
+                turn(&along, theta.cos(), theta.sin())
+            }
+        });
+        volume.push(weight);
+    }
+    Particles {
+        x: X.clone(),
+        v: vec![SVector::zeros(); count],
+        F: vec![SMatrix::identity(); count],
+        mass: volume.iter().map(|V| V * density).collect(),
+        half_size: SVector::from_fn(|k, _| grid.axes[k].spacing() / (2.0 * grid.per_cell as f64)),
+        X,
+        volume,
+    }
+}
+
+fn check<const D: usize>(
+    grid: &Grid<D>,
+    scheme: &Scheme,
+    density: f64,
+    time_step: f64,
+) -> Result<(), SetupError> {
+    let positive = |quantity: &str, value: f64| {
+        if value > 0.0 && value.is_finite() {
+            return Ok(());
+        }
+        Err(SetupError::NotPositive { quantity: quantity.into(), value })
+    };
+    positive("the time step", time_step)?;
+    positive("the density", density)?;
+    positive("the number of particles per cell", grid.per_cell as f64)?;
+    let degree = scheme.degree;
+    if !(2..=MOST_DEGREE).contains(&degree) {
+        return Err(SetupError::Degree { degree, most: MOST_DEGREE });
+    }
+    for (k, axis) in grid.axes.iter().enumerate() {
+        if axis.cells == 0 {
+            return Err(SetupError::NoCells { axis: k });
+        }
+        positive(&format!("the length of axis {k}"), axis.upper - axis.lower)?;
+        // The mirror images of splines at a wall have to be splines: those at a free end are not.
+        let mixed = axis.ends[0] != axis.ends[1];
+        if mixed && axis.cells < degree {
+            return Err(SetupError::TooFewCells { axis: k, cells: axis.cells, least: degree });
+        }
+    }
+    if grid.coordinates == Coordinates::Polar {
+        if D != 2 {
+            return Err(SetupError::PolarDimension { dimension: D });
+        }
+        positive("the inner radius", grid.axes[0].lower)?;
+    }
+    Ok(())
+}
+
+/// Asks for all the memory of a run first, which turns a grid that is too large into an error instead of an abort.
+fn reserve<const D: usize>(grid: &Grid<D>, degree: usize) -> Result<(), SetupError> {
+    let (mut particles, mut functions, mut along) = (1_u128, 1_u128, 0_u128);
+    for axis in &grid.axes {
+        let points = axis.cells as u128 * grid.per_cell as u128;
+        particles = particles.saturating_mul(points);
+        functions = functions.saturating_mul(axis.cells as u128 + degree as u128);
+        // Values and slopes of both kinds of components, places, weights, and factors of the mass.
+        along = along.saturating_add(points.saturating_mul(4 * (degree as u128 + 2)));
+    }
+    // Positions, velocities, gradients, masses, values, slopes, partial sums and the body force.
+    let at_particles = (5 * D + 4 * D * D + 2) as u128;
+    let doubles = particles
+        .saturating_mul(at_particles)
+        .saturating_add(functions.saturating_mul(3 * D as u128))
+        .saturating_add(along);
+    let bytes = doubles.saturating_mul(size_of::<f64>() as u128);
+    let too_large = || SetupError::GridTooLarge {
+        cells: grid.axes.iter().map(|axis| axis.cells).collect(),
+        bytes,
+    };
+    let size = usize::try_from(bytes).map_err(|_| too_large())?;
+    Vec::<u8>::new().try_reserve_exact(size).map_err(|_| too_large())
+}

@@ -1,0 +1,44 @@
+//! What measuring and writing need of a solver, whatever its frame.
+
+use mmsmith_mpm::total_lagrangian::TotalLagrangian;
+use mmsmith_mpm::{BodyForce, Material, Particles, Simulation, StepError};
+use mmsmith_solutions::Real;
+
+/// A solver that can be stepped and looked at.
+pub(crate) trait Solver<T: Real, const D: usize> {
+    /// Advances by one time step.
+    fn step(&mut self, body_force: &dyn BodyForce<T, D>) -> Result<(), StepError>;
+    /// The particles as they are now, and their law.
+    fn observe(&mut self) -> (&Particles<T, D>, &Material<T>);
+    /// How far velocities lag behind positions.
+    fn velocity_lag(&self) -> f64;
+}
+
+impl<T: Real, const D: usize> Solver<T, D> for Simulation<T, D> {
+    fn step(&mut self, body_force: &dyn BodyForce<T, D>) -> Result<(), StepError> {
+        Simulation::step(self, body_force)
+    }
+
+    fn observe(&mut self) -> (&Particles<T, D>, &Material<T>) {
+        (self.particles(), self.material())
+    }
+
+    fn velocity_lag(&self) -> f64 {
+        Simulation::velocity_lag(self).to_f64()
+    }
+}
+
+impl<const D: usize> Solver<f64, D> for TotalLagrangian<D> {
+    fn step(&mut self, body_force: &dyn BodyForce<f64, D>) -> Result<(), StepError> {
+        TotalLagrangian::step(self, body_force)
+    }
+
+    fn observe(&mut self) -> (&Particles<f64, D>, &Material<f64>) {
+        TotalLagrangian::observe(self);
+        (self.particles(), self.material())
+    }
+
+    fn velocity_lag(&self) -> f64 {
+        0.0
+    }
+}

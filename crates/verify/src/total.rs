@@ -1,0 +1,172 @@
+//! Runs in the reference configuration: from a solution to splines, a layout of particles, and their motion.
+
+use mmsmith_mpm::Integrator;
+use mmsmith_mpm::total_lagrangian::{
+    Axis, Composition, Coordinates, End, Grid, Layout, MassMatrix, Scheme, TotalLagrangian,
+};
+use mmsmith_solutions::{AnySolution, Domain, Solution};
+use std::f64::consts::FRAC_PI_2;
+
+use crate::case::{Arithmetic, Case, CaseError, ExactBodyForce, Outputs, Row, follow, law};
+use crate::plan::prepare;
+use crate::scene::{Extent, Scene};
+
+/// The configuration that the weights belong to.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Frame {
+    /// Weights anew in each step, at the current positions.
+    #[default]
+    Updated,
+    /// Weights once, at the reference positions.
+    Total(TotalScheme),
+}
+
+/// A scheme in the reference configuration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TotalScheme {
+    /// Degree of the splines, mass matrix and composition of leapfrog.
+    pub scheme: Scheme,
+    /// Where the particles lie in a cell.
+    pub layout: Layout,
+    /// What the grid's coordinates mean.
+    pub coordinates: Coordinates,
+}
+
+/// The speed that CFL numbers refer to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CflSpeed {
+    /// The solution's own, of waves in a bar unless its specification says otherwise.
+    #[default]
+    Bar,
+    /// P-waves in the undeformed solid, `sqrt((lambda + 2 mu)/rho0)`.
+    PWave,
+}
+
+impl CflSpeed {
+    pub(crate) fn of<const D: usize>(self, exact: &dyn Solution<f64, D>) -> Result<f64, CaseError> {
+        match self {
+            Self::Bar => Ok(exact.wave_speed()),
+            Self::PWave => {
+                let (lambda, mu) = law::<f64>(exact.material())?.small_strain_moduli();
+                Ok(((lambda + 2.0 * mu) / exact.density()).sqrt())
+            }
+        }
+    }
+}
+
+impl TotalScheme {
+    /// Splines of a degree with what goes best with them: consistent mass, and a composition of no lower order.
+    #[must_use]
+    pub fn of_degree(degree: usize) -> Self {
+        let composition = if degree > 3 { Composition::Order6 } else { Composition::Order4 };
+        Self {
+            scheme: Scheme { degree, mass: MassMatrix::Consistent, composition },
+            layout: Layout::Lattice,
+            coordinates: Coordinates::Cartesian,
+        }
+    }
+
+    /// Refuses what this scheme has no meaning for.
+    pub(crate) fn validate(&self, case: &Case) -> Result<(), CaseError> {
+        let refuse = |setting, value: String, admissible| {
+            Err(CaseError::Setting { setting, value, admissible })
+        };
+        if case.integrator != Integrator::Cd {
+            let value = format!("{:?}", case.integrator).to_lowercase();
+            return refuse("integrator", value, "cd in the total frame");
+        }
+        if case.extent == Some(Extent::Full) {
+            return refuse("extent", "full".into(), "quarter in the total frame");
+        }
+        Ok(())
+    }
+
+    /// The grid that covers the body of a scene.
+    pub(crate) fn grid<const D: usize>(
+        &self,
+        scene: &Scene<D>,
+        per_cell: usize,
+    ) -> Result<Grid<D>, CaseError> {
+        let refuse = |value: &str, admissible| {
+            Err(CaseError::Setting { setting: "grid", value: value.into(), admissible })
+        };
+        let axes = match (&scene.domain, self.coordinates) {
+            (Domain::Box { lower, upper }, Coordinates::Cartesian) => {
+                std::array::from_fn(|k| Axis {
+                    lower: lower[k],
+                    upper: upper[k],
+                    cells: scene.cells[k],
+                    ends: scene.walls[k].map(|wall| if wall { End::Wall } else { End::Free }),
+                })
+            }
+            (Domain::Annulus { inner, outer }, Coordinates::Polar) if D == 2 => {
+                // As many cells as make none longer than the spacing across, and along the mean circle.
+                let count = |length: f64| (length / scene.spacing - 1e-9).ceil().max(2.0) as usize;
+                let radius = 0.5 * (inner + outer);
+                let radial = Axis {
+                    lower: *inner,
+                    upper: *outer,
+                    cells: count(outer - inner),
+                    ends: [End::Free; 2],
+                };
+                let around = Axis {
+                    lower: 0.0,
+                    upper: FRAC_PI_2,
+                    cells: count(FRAC_PI_2 * radius),
+                    ends: [End::Wall; 2],
+                };
+                std::array::from_fn(|k| if k == 0 { radial } else { around })
+            }
+            (Domain::Annulus { .. }, _) if D != 2 => {
+                return Err(CaseError::Setting {
+                    setting: "frame",
+                    value: "total".into(),
+                    admissible: "updated for a spherical shell",
+                });
+            }
+            (Domain::Annulus { .. }, _) => {
+                return refuse("cartesian", "polar for a ring in the total frame");
+            }
+            _ => return refuse("polar", "cartesian for a box"),
+        };
+        Ok(Grid { axes, coordinates: self.coordinates, per_cell, layout: self.layout })
+    }
+}
+
+/// Runs one case in the total frame.
+pub(crate) fn run(
+    exact: &AnySolution<f64>,
+    arithmetic: Arithmetic<'_>,
+    total: &TotalScheme,
+    case: &Case,
+    outputs: &mut Outputs<'_>,
+) -> Result<Row, CaseError> {
+    if matches!(arithmetic, Arithmetic::Single(_)) {
+        let (setting, value) = ("precision", "f32".into());
+        return Err(CaseError::Setting { setting, value, admissible: "f64 in the total frame" });
+    }
+    match exact {
+        AnySolution::One(solution) => run_in(solution.as_ref(), total, case, outputs),
+        AnySolution::Two(solution) => run_in(solution.as_ref(), total, case, outputs),
+        AnySolution::Three(solution) => run_in(solution.as_ref(), total, case, outputs),
+        _ => Err(CaseError::Dimension),
+    }
+}
+
+fn run_in<const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    total: &TotalScheme,
+    case: &Case,
+    outputs: &mut Outputs<'_>,
+) -> Result<Row, CaseError> {
+    let (scene, steps) = prepare(exact, case)?;
+    let grid = total.grid(&scene, case.per_cell)?;
+    let material = law(exact.material())?;
+    let mut body = TotalLagrangian::new(grid, total.scheme, material, exact.density(), steps.dt)?;
+    let X = body.positions();
+    let body_force = ExactBodyForce(exact.body_force_at(X));
+    let u: Vec<_> = X.iter().map(|X| exact.displacement(X, 0.0)).collect();
+    let v: Vec<_> = X.iter().map(|X| exact.velocity(X, 0.0)).collect();
+    body.start(&u, &v)?;
+    follow(body, &body_force, exact, case, &scene, steps, outputs)
+}
