@@ -15,7 +15,7 @@ use crate::frames::{FrameOutput, FrameWriter};
 use crate::measure::measure;
 use crate::norms::{PerField, PerNorm};
 use crate::plan::{MOST_STEPS, prepare};
-use crate::scene::{Extent, SceneError};
+use crate::scene::{Extent, Scene, SceneError};
 
 /// How the centred-difference integrator gets its first velocity, half a step before the start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -268,20 +268,7 @@ fn run_in<T: Real, const D: usize>(
     // In single precision the solver's step is a rounded one, and its time is a multiple of that.
     let dt = time_step.to_f64();
 
-    let grid = scene.grid::<T>();
-    let mut particles = scene.particles(&grid, case.per_cell, exact.density());
-    if particles.is_empty() {
-        return Err(SceneError::Empty { cells: case.cells }.into());
-    }
-    set_in_motion(&mut particles, exact, case, dt);
-    let settings = Settings {
-        shape: case.shape,
-        integrator: case.integrator,
-        time_step,
-        halve_first_acceleration: case.integrator == Integrator::Cd && case.start == Start::Halved,
-    };
-    let body_force = ExactBodyForce(model.body_force_at(&particles.X));
-    let mut simulation = Simulation::new(grid, particles, law(model.material())?, settings)?;
+    let (mut simulation, body_force) = set_up(exact, model, case, &scene, time_step)?;
 
     let mut frames = match outputs.frames {
         Some(output) => Some(FrameWriter::new(output, steps.count)?),
@@ -338,8 +325,34 @@ fn run_in<T: Real, const D: usize>(
     })
 }
 
+/// The solver at time zero with steps of `time_step`, and the body force that drives it.
+pub(crate) fn set_up<'a, T: Real, const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    model: &'a dyn Solution<T, D>,
+    case: &Case,
+    scene: &Scene<D>,
+    time_step: T,
+) -> Result<(Simulation<T, D>, ExactBodyForce<'a, T, D>), CaseError> {
+    let grid = scene.grid::<T>();
+    let mut particles = scene.particles(&grid, case.per_cell, exact.density());
+    if particles.is_empty() {
+        return Err(SceneError::Empty { cells: case.cells }.into());
+    }
+    set_in_motion(&mut particles, exact, case, time_step.to_f64());
+    let settings = Settings {
+        shape: case.shape,
+        integrator: case.integrator,
+        time_step,
+        halve_first_acceleration: case.integrator == Integrator::Cd && case.start == Start::Halved,
+    };
+    let body_force = ExactBodyForce(model.body_force_at(&particles.X));
+    Ok((Simulation::new(grid, particles, law(model.material())?, settings)?, body_force))
+}
+
 /// The exact body force at the particles; what depends on their reference positions alone is kept.
-struct ExactBodyForce<'a, T: Real, const D: usize>(Box<dyn BodyForceAtPoints<T, D> + 'a>);
+pub(crate) struct ExactBodyForce<'a, T: Real, const D: usize>(
+    Box<dyn BodyForceAtPoints<T, D> + 'a>,
+);
 
 impl<T: Real, const D: usize> BodyForce<T, D> for ExactBodyForce<'_, T, D> {
     fn evaluate(&self, first: usize, _X: &[SVector<T, D>], t: T, b: &mut [SVector<T, D>]) {
