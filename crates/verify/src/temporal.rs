@@ -142,9 +142,8 @@ fn over<T: Real, const D: usize>(
         }
     });
     let rows: Vec<_> = rows.collect();
-    let values = rows.iter().map(|row| {
-        (row.dt, (row.status == Status::Ok).then_some(&row.differences))
-    });
+    let values =
+        rows.iter().map(|row| (row.dt, (row.status == Status::Ok).then_some(&row.differences)));
     let orders = orders_of(&values.collect::<Vec<_>>());
     let times = (1..=INSTANTS).map(|part| end * part as f64 / INSTANTS as f64).collect();
     Ok(Temporal { times, rows, orders })

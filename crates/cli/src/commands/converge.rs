@@ -116,7 +116,7 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
         }
         if let Some(file) = plot {
             let floor = round_off(&model, &base, &sweep)?;
-            let title = format!("{}: error of u", selection.description.name);
+            let title = format!("{}: error of u", selection.name());
             let found = differences.as_ref().map(|(found, _)| found);
             file.write_text(&picture(&title, &study, &sweep, found, floor))?;
         }

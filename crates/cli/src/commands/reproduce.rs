@@ -159,7 +159,7 @@ fn measure_differences(
     let stem = format!("{kind}-{}-{}", word(scheme.0), word(scheme.1));
     let json = Output::prepare(&folder.join(format!("{stem}.json")))?;
     let csv = Output::prepare(&folder.join(format!("{stem}.csv")))?;
-    let what = format!("{}, {kind}, {}", selection.description.name, name(scheme));
+    let what = format!("{}, {kind}, {}", selection.name(), name(scheme));
     let found = differences(model, &base, cfls, &what)?;
     let verdicts = judge_differences(&found, &expected_in_time(&base), ORDER_TOLERANCE);
     json.write(&json!({

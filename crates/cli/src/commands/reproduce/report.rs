@@ -3,7 +3,9 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
+use mmsmith_solutions::{CATALOGUE, Description};
+use mmsmith_verify::{Row, Sweep};
 use sha2::{Digest, Sha256};
 
 use super::claims::{Claim, difference_orders, told_orders};
@@ -12,11 +14,9 @@ use super::{
     SMALL_STEP_CELLS, SPACE, TIME, compare, difference_plot, difference_tables, name, pictures,
     space_plot, stops, tables, time_plot, verdict_table, word,
 };
-use crate::library::Selection;
 use crate::machine;
 use crate::svg::escape;
 use crate::table::{self, Table};
-use mmsmith_verify::{Row, Sweep};
 
 const STYLE: &str = include_str!("report.css");
 
@@ -130,14 +130,18 @@ fn sum_section(results: &[Results], gentle: &[Differences]) -> String {
 
 fn problem_section(out: &Path, results: &Results) -> Result<String> {
     let problem = results.problem;
-    let selection = Selection::new(problem, &[])?;
+    let description = describe(problem)?;
     let mut text = format!(
         "<section id=\"{problem}\">\n<h2>{problem}</h2>\n<p>{}</p>\n",
-        escape(selection.description.title)
+        escape(description.title)
     );
     let mut parameters = Table::new(1, ["parameter", "value", "unit"]);
-    for (parameter, value) in selection.description.parameters.iter().zip(&selection.values) {
-        parameters.row([parameter.name.to_owned(), value.to_string(), parameter.unit.to_string()]);
+    for parameter in description.parameters {
+        parameters.row([
+            parameter.name.to_owned(),
+            parameter.default.to_string(),
+            parameter.unit.to_owned(),
+        ]);
     }
     text += &parameters.html(&format!("{problem}: parameters"));
 
@@ -210,6 +214,12 @@ fn problem_section(out: &Path, results: &Results) -> Result<String> {
     Ok(text)
 }
 
+/// What the library says of a problem.
+fn describe(problem: &str) -> Result<&'static Description> {
+    let found = CATALOGUE.iter().copied().find(|known| known.name == problem);
+    found.with_context(|| format!("the library has no solution '{problem}'"))
+}
+
 /// Whether the largest error of F on the finest grid is no smaller than on the coarsest.
 fn does_not_converge(results: &Results) -> bool {
     let rows = &results.space[0].study.rows;
@@ -256,7 +266,7 @@ fn setting_section() -> Result<String> {
     table.row(["cores".to_owned(), machine::cores().to_string()]);
     table.row(["threads".to_owned(), rayon::current_num_threads().to_string()]);
     for problem in PROBLEMS {
-        let text = Selection::new(problem, &[])?.description.specification;
+        let text = describe(problem)?.specification;
         let hash: String = Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect();
         table.row([format!("SHA-256 of {problem}.toml"), hash]);
     }
