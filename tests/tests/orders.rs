@@ -28,6 +28,49 @@ fn axis_aligned_gimp_with_centred_differences_has_the_reference_errors_and_order
     assert!((fit - 2.0).abs() < 0.05, "{fit}");
 }
 
+/// The local orders in `dt` of the differences of `u` on one grid, in all norms.
+fn orders_in_time(integrator: &str, amplitude: &str, cells: &str, cfls: &str) -> Vec<f64> {
+    let grid = ["--set", amplitude, "--cells", cells, "--cfls", cfls];
+    let scheme = ["converge", "axis-aligned", "--integrator", integrator];
+    let result = json(&[&scheme[..], &grid].concat());
+    let norms = ["linf", "l2", "l1"];
+    norms.iter().flat_map(|norm| local_orders(&result["temporal"], "u", norm)).collect()
+}
+
+#[test]
+#[cfg_attr(debug_assertions, ignore = "simulates for long; runs in release mode")]
+fn by_differences_on_one_grid_usl_is_first_order_in_time() {
+    for (amplitude, cells, cfls) in
+        [("A=0.001", "64", "0.6,0.4,0.2"), ("A=0.1", "32", "0.4,0.2,0.1,0.05")]
+    {
+        let orders = orders_in_time("usl", amplitude, cells, cfls);
+        assert!(orders.len() >= 6 && orders.iter().all(|o| (o - 1.0).abs() < 0.05), "{orders:?}");
+    }
+}
+
+#[test]
+#[cfg_attr(debug_assertions, ignore = "simulates for long; runs in release mode")]
+fn by_differences_on_one_grid_centred_differences_are_second_order_in_time() {
+    let orders = orders_in_time("cd", "A=0.001", "64", "0.6,0.4,0.2");
+    assert!(orders.len() == 6 && orders.iter().all(|o| (o - 2.0).abs() < 0.05), "{orders:?}");
+    // The term in dt h^2 that joins the one in dt^2 is more visible on a coarser grid.
+    let coarse = orders_in_time("cd", "A=0.001", "32", "0.6,0.4,0.2");
+    assert!(
+        coarse.iter().zip(&orders).all(|(coarse, fine)| coarse < fine),
+        "{coarse:?} {orders:?}"
+    );
+}
+
+#[test]
+#[cfg_attr(debug_assertions, ignore = "simulates for long; runs in release mode")]
+fn at_a_small_time_step_usl_is_second_order_in_space() {
+    let cells = ["--cells", "16,32,64", "--cfl", "0.05"];
+    let scheme = ["converge", "axis-aligned", "--integrator", "usl"];
+    let result = json(&[&scheme[..], &cells].concat());
+    let orders = local_orders(&result, "u", "linf");
+    assert!(orders.len() == 2 && orders.iter().all(|o| (o - 2.0).abs() < 0.1), "{orders:?}");
+}
+
 #[test]
 #[cfg_attr(debug_assertions, ignore = "simulates for long; runs in release mode")]
 fn every_pair_of_shape_and_integrator_runs_on_both_problems_or_says_why_not() {

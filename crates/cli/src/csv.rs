@@ -1,25 +1,21 @@
-//! A study as comma-separated values.
+//! Studies as comma-separated values.
 
 use std::fmt::Write;
 
-use mmsmith_verify::Study;
+use mmsmith_verify::{Order, PerField, PerNorm, Study, Temporal};
 
-/// One line for each row; numbers in shortest round-trip form, empty where there is none.
+use crate::table;
+
+/// One line for each row: numbers in shortest round-trip form, empty where there is none; right of each error its rate
+/// against the row before, two decimals, `-` where there is none.
 pub(crate) fn text(study: &Study) -> String {
     let mut text = "cells,h,dt,cfl,steps,particles,wall_s,particle_steps_per_s,status".to_owned();
-    if let Some(row) = study.rows.first() {
-        for (field, norms) in row.errors.named() {
-            for (norm, _) in norms.named() {
-                text += &format!(",{field}_{norm}");
-            }
-        }
-    }
-    text.push('\n');
-    for row in &study.rows {
+    head(&mut text, &study.orders);
+    for (index, row) in study.rows.iter().enumerate() {
         // Writing to a string cannot fail.
         let _ = write!(
             text,
-            "{},{:?},{:?},{:?},{},{},{:?},{:?},\"{}\"",
+            "{},{:?},{:?},{:?},{},{},{:?},{:?},{}",
             row.cells,
             row.h,
             row.dt,
@@ -28,17 +24,58 @@ pub(crate) fn text(study: &Study) -> String {
             row.particles,
             row.wall_s,
             row.particle_steps_per_s,
-            row.status.to_string().replace('"', "\"\"")
+            quoted(&row.status.to_string())
         );
-        for (_, norms) in row.errors.named() {
-            for (_, value) in norms.named() {
-                text.push(',');
-                if value.is_finite() {
-                    let _ = write!(text, "{value:?}");
-                }
-            }
-        }
-        text.push('\n');
+        values(&mut text, index, &row.errors, &study.orders);
     }
     text
+}
+
+/// The same for differences on one grid.
+pub(crate) fn temporal(temporal: &Temporal) -> String {
+    let mut text = "cells,h,dt,cfl,steps,status".to_owned();
+    head(&mut text, &temporal.orders);
+    for (index, row) in temporal.rows.iter().enumerate() {
+        let _ = write!(
+            text,
+            "{},{:?},{:?},{:?},{},{}",
+            row.cells,
+            row.h,
+            row.dt,
+            row.cfl,
+            row.steps,
+            quoted(&row.status.to_string())
+        );
+        values(&mut text, index, &row.differences, &temporal.orders);
+    }
+    text
+}
+
+fn quoted(text: &str) -> String {
+    format!("\"{}\"", text.replace('"', "\"\""))
+}
+
+fn head(text: &mut String, orders: &PerField<PerNorm<Order>>) {
+    for (field, norms) in orders.named() {
+        for (norm, _) in norms.named() {
+            let _ = write!(text, ",{field}_{norm},{field}_{norm}_rate");
+        }
+    }
+    text.push('\n');
+}
+
+fn values(
+    text: &mut String,
+    index: usize,
+    errors: &PerField<PerNorm<f64>>,
+    orders: &PerField<PerNorm<Order>>,
+) {
+    for ((_, norms), (_, orders)) in errors.named().iter().zip(orders.named()) {
+        for ((_, value), (_, order)) in norms.named().iter().zip(orders.named()) {
+            let value = if value.is_finite() { format!("{value:?}") } else { String::new() };
+            let local = index.checked_sub(1).and_then(|pair| order.local[pair]);
+            let _ = write!(text, ",{value},{}", table::rate(local));
+        }
+    }
+    text.push('\n');
 }

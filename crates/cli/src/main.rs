@@ -7,10 +7,13 @@
 mod arguments;
 mod commands;
 mod csv;
+mod expect;
 mod json;
 mod library;
+mod machine;
 mod memory;
 mod progress;
+mod svg;
 mod table;
 mod terminal;
 

@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use crate::svg::escape;
+
 /// Rows of cells under a header; columns as wide as they need to be.
 pub(crate) struct Table {
     rows: Vec<Vec<String>>,
@@ -57,6 +59,71 @@ impl Table {
         }
         text
     }
+
+    /// The table in LaTeX, with the rules of the package booktabs.
+    pub(crate) fn latex(&self) -> String {
+        let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
+        let place = |column| if column < self.words { 'l' } else { 'r' };
+        let places: String = (0..columns).map(place).collect();
+        let mut text = format!("\\begin{{tabular}}{{{places}}}\n\\toprule\n");
+        for (index, row) in self.rows.iter().enumerate() {
+            let cells: Vec<_> = row.iter().map(|cell| latex(cell)).collect();
+            let _ = writeln!(text, "{} \\\\", cells.join(" & "));
+            if index == 0 {
+                text.push_str("\\midrule\n");
+            }
+        }
+        text.push_str("\\bottomrule\n\\end{tabular}\n");
+        text
+    }
+
+    /// The table in HTML, told by `caption`, in a box of its own that scrolls where the page is narrow.
+    pub(crate) fn html(&self, caption: &str) -> String {
+        let caption = escape(caption);
+        let mut text = format!(
+            "<div class=\"scroll\" role=\"region\" aria-label=\"{caption}\" tabindex=\"0\">\n<table>\n\
+             <caption>{caption}</caption>\n"
+        );
+        for (index, row) in self.rows.iter().enumerate() {
+            let cells = row.iter().enumerate().map(|(column, cell)| {
+                let cell = escape(cell);
+                match (index, column < self.words) {
+                    (0, true) => format!("<th scope=\"col\">{cell}</th>"),
+                    (0, false) => format!("<th scope=\"col\" class=\"number\">{cell}</th>"),
+                    (_, true) => format!("<td>{cell}</td>"),
+                    (_, false) => format!("<td class=\"number\">{cell}</td>"),
+                }
+            });
+            let _ = writeln!(text, "<tr>{}</tr>", cells.collect::<String>());
+        }
+        text.push_str("</table>\n</div>\n");
+        text
+    }
+}
+
+/// A cell in LaTeX: numbers with an exponent in mathematics, all else as it reads.
+fn latex(cell: &str) -> String {
+    let bare = cell.trim_start_matches('(').trim_end_matches(')');
+    if let Some((mantissa, exponent)) = bare.split_once('e')
+        && mantissa.parse::<f64>().is_ok()
+        && exponent.parse::<i32>().is_ok()
+    {
+        let number = format!("${mantissa}\\cdot 10^{{{exponent}}}$");
+        return if bare.len() == cell.len() { number } else { format!("({number})") };
+    }
+    if cell.parse::<f64>().is_ok_and(|number| number < 0.0) {
+        return format!("${cell}$");
+    }
+    cell.chars()
+        .map(|character| match character {
+            '&' | '%' | '$' | '#' | '_' | '{' | '}' => format!("\\{character}"),
+            '~' => "\\textasciitilde{}".into(),
+            '^' => "\\textasciicircum{}".into(),
+            '\\' => "\\textbackslash{}".into(),
+            '<' | '>' => format!("${character}$"),
+            other => other.to_string(),
+        })
+        .collect()
 }
 
 /// An error: four digits, and an exponent.
@@ -89,5 +156,26 @@ mod tests {
     fn numbers_that_are_none_become_dashes() {
         assert_eq!((error(4.0812e-3), error(f64::NAN)), ("4.081e-3".into(), "-".into()));
         assert_eq!((rate(Some(1.996)), rate(None)), ("2.00".into(), "-".into()));
+    }
+
+    #[test]
+    fn latex_text_is_escaped_and_numbers_are_set_as_such() {
+        let mut table = Table::new(1, ["a_b", "50 %"]);
+        table.row(["x & y", "(4.077e-3)"]);
+        table.row(["~^\\", "-0.25"]);
+        let expected = "\\begin{tabular}{lr}\n\\toprule\na\\_b & 50 \\% \\\\\n\\midrule\n\
+                        x \\& y & ($4.077\\cdot 10^{-3}$) \\\\\n\
+                        \\textasciitilde{}\\textasciicircum{}\\textbackslash{} & $-0.25$ \\\\\n\
+                        \\bottomrule\n\\end{tabular}\n";
+        assert_eq!(table.latex(), expected);
+    }
+
+    #[test]
+    fn html_text_cannot_leave_its_cell() {
+        let mut table = Table::new(1, ["what", "n"]);
+        table.row(["<b>", "1"]);
+        let text = table.html("a & b");
+        assert!(text.contains("<td>&lt;b&gt;</td><td class=\"number\">1</td>"), "{text}");
+        assert!(text.contains("<caption>a &amp; b</caption>"), "{text}");
     }
 }

@@ -60,7 +60,11 @@ fn converge_writes_rows_in_order_and_all_orders() {
     assert_eq!(called.status, 0, "{}", called.stderr);
     assert!(called.stdout.contains("rate"), "{}", called.stdout);
     let study = read_json(&place.path().join("study.json"));
-    assert_eq!(keys(&study), "orders rows schema settings");
+    assert_eq!(keys(&study), "orders rows schema settings verdicts");
+    let verdict = &study["verdicts"]["u"]["linf"];
+    assert_eq!(verdict["passed"], true);
+    assert_eq!(verdict["expected"], 2.0);
+    assert_eq!(study["verdicts"]["F"]["linf"]["passed"], Value::Null);
     assert_eq!(study["schema"], "mmsmith.converge/1");
     let rows = study["rows"].as_array().unwrap();
     assert_eq!([&rows[0]["cells"], &rows[1]["cells"]], [8, 16]);
@@ -88,6 +92,102 @@ fn converge_in_time_keeps_a_failed_case_as_a_row() {
     assert_ne!(study["rows"][2]["status"], "ok");
     let local = &study["orders"]["u"]["linf"]["local"];
     assert!(local[0].is_number() && local[1].is_null(), "{local}");
+}
+
+#[test]
+fn differences_on_one_grid_show_the_order_in_time_that_total_errors_hide() {
+    let place = tempfile::tempdir().unwrap();
+    let call = "converge axis-aligned --integrator usl --cells 8 --cfls 0.2,0.1,0.05 --expect 1 --json study.json";
+    let called = mms(place.path(), call);
+    assert_eq!(called.status, 0, "{}", called.stdout);
+    assert!(called.stdout.contains("difference of u on this grid"), "{}", called.stdout);
+    let study = read_json(&place.path().join("study.json"));
+    assert_eq!(keys(&study["temporal"]), "orders rows times verdicts");
+    assert_eq!(study["temporal"]["times"].as_array().unwrap().len(), 5);
+    let row = &study["temporal"]["rows"][0];
+    assert_eq!(keys(row), "cells cfl differences dt h status steps");
+    let order = |study: &Value| study["orders"]["u"]["l2"]["fit"].as_f64().unwrap();
+    assert!((order(&study["temporal"]) - 1.0).abs() < 0.05, "{}", study["temporal"]["orders"]);
+    assert!((order(&study) - 1.0).abs() > 0.5, "{}", study["orders"]);
+}
+
+#[test]
+fn a_difference_of_runs_that_fail_is_a_row_with_its_status() {
+    let place = tempfile::tempdir().unwrap();
+    let call =
+        "converge axis-aligned --cells 8 --cfls 4.0,0.4,0.2 --json study.json --csv study.csv";
+    assert_eq!(mms(place.path(), call).status, 0);
+    let study = read_json(&place.path().join("study.json"));
+    let rows = &study["temporal"]["rows"];
+    assert!(rows[0]["status"].as_str().unwrap().contains("step"), "{rows}");
+    assert!(rows[0]["differences"]["u"]["linf"].is_null(), "{rows}");
+    assert_eq!(rows[1]["status"], "ok");
+    let local = &study["temporal"]["orders"]["u"]["linf"]["local"];
+    assert!(local[0].is_null() && local[1].is_number(), "{local}");
+    let csv = std::fs::read_to_string(place.path().join("study.csv")).unwrap();
+    assert_eq!(csv.split("\n\n").count(), 2, "two tables: {csv}");
+}
+
+#[test]
+fn a_missed_order_is_status_1_only_where_one_was_asked_for() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    for (options, status) in [
+        ("", 0),
+        ("--expect 2", 0),
+        ("--expect u=2", 0),
+        ("--tolerance 0.1", 0),
+        ("--tolerance 1e-9", 1),
+        ("--expect 3", 1),
+        ("--expect u=2,F.linf=3", 1),
+        ("--expect 3 --tolerance 1.1", 0),
+    ] {
+        let called = mms(place, &format!("converge axis-aligned --cells 8,16 {options}"));
+        assert_eq!(called.status, status, "{options}: {}", called.stdout);
+        assert_eq!(called.stdout.contains("FAILED"), status == 1, "{options}: {}", called.stdout);
+    }
+    // A single case has no order, so what was asked for is not there.
+    assert_eq!(mms(place, "converge axis-aligned --cells 8 --expect 2").status, 1);
+    refuses(place, "converge ring --cells 8,16 --expect w=2", &["--expect", "no field 'w'"]);
+    refuses(place, "converge ring --cells 8,16 --tolerance 0", &["--tolerance", "positive"]);
+}
+
+#[test]
+fn nothing_is_expected_of_the_ring_and_its_failure_to_converge_is_shown() {
+    let place = tempfile::tempdir().unwrap();
+    let called = mms(place.path(), "converge ring --cells 8,16,32 --json study.json");
+    assert_eq!(called.status, 0);
+    assert!(called.stdout.contains("DOES NOT CONVERGE"), "{}", called.stdout);
+    let verdicts = &read_json(&place.path().join("study.json"))["verdicts"];
+    assert_eq!(verdicts["F"]["linf"]["behaviour"], "does-not-converge");
+    for field in ["u", "v", "F", "P"] {
+        assert_eq!(verdicts[field]["l2"]["passed"], Value::Null);
+    }
+}
+
+#[test]
+fn tables_and_a_plot_are_written_where_asked_for() {
+    let place = tempfile::tempdir().unwrap();
+    let call =
+        "converge axis-aligned --cells 8,16 --plot p.svg --csv t.csv --markdown t.md --latex t.tex";
+    assert_eq!(mms(place.path(), call).status, 0);
+    let read = |name: &str| std::fs::read_to_string(place.path().join(name)).unwrap();
+    assert_eq!(names(place.path()), ["p.svg", "t.csv", "t.md", "t.tex"]);
+    let csv = read("t.csv");
+    let lines: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
+    let column = lines[0].iter().position(|name| *name == "u_linf_rate").unwrap();
+    assert_eq!(lines[0][column - 1], "u_linf");
+    assert_eq!((lines[1][column], lines[2][column]), ("-", "2.00"));
+    assert!(lines.iter().all(|line| line.len() == lines[0].len()));
+    let markdown = read("t.md");
+    assert!(markdown.contains("| 8 | 256 | 1.250e-1 | 0.4000 | 1.626e-2 | - |"), "{markdown}");
+    let latex = read("t.tex");
+    assert!(latex.contains("$1.626\\cdot 10^{-2}$ & - &"), "{latex}");
+    assert_eq!(latex.matches("\\begin{tabular}").count(), 5, "{latex}");
+    let plot = read("p.svg");
+    assert_eq!(plot.matches("class=\"curve\"").count(), 3);
+    assert!(plot.contains("L_inf: slope 2.00"), "{plot}");
+    refuses(place.path(), "converge ring --cells 512,1024 --plot none/p.svg", &["none/p.svg"]);
 }
 
 #[test]

@@ -282,22 +282,10 @@ fn run_in<T: Real, const D: usize>(
     // In single precision the solver's step is a rounded one, and its time is a multiple of that.
     let dt = time_step.to_f64();
 
-    let grid = scene.grid::<T>();
-    let mut particles = scene.particles(&grid, case.per_cell, exact.density());
-    if particles.is_empty() {
-        return Err(SceneError::Empty { cells: case.cells }.into());
-    }
-    set_in_motion(&mut particles, exact, case, dt);
-    let settings = Settings {
-        shape: case.shape,
-        integrator: case.integrator,
-        time_step,
-        halve_first_acceleration: case.integrator == Integrator::Cd && case.start == Start::Halved,
-    };
-    let body_force = ExactBodyForce(model.body_force_at(&particles.X));
-    let simulation = Simulation::new(grid, particles, law(model.material())?, settings)?;
+    let (simulation, body_force) = set_up(exact, model, case, &scene, time_step)?;
     follow(simulation, &body_force, exact, case, &scene, Steps { dt, ..steps }, outputs)
 }
+
 
 /// Steps to the end and measures the errors on the way.
 pub(crate) fn follow<T: Real, const D: usize>(
@@ -363,6 +351,30 @@ pub(crate) fn follow<T: Real, const D: usize>(
         status,
         errors,
     })
+}
+
+/// The solver at time zero with steps of `time_step`, and the body force that drives it.
+pub(crate) fn set_up<'a, T: Real, const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    model: &'a dyn Solution<T, D>,
+    case: &Case,
+    scene: &Scene<D>,
+    time_step: T,
+) -> Result<(Simulation<T, D>, ExactBodyForce<'a, T, D>), CaseError> {
+    let grid = scene.grid::<T>();
+    let mut particles = scene.particles(&grid, case.per_cell, exact.density());
+    if particles.is_empty() {
+        return Err(SceneError::Empty { cells: case.cells }.into());
+    }
+    set_in_motion(&mut particles, exact, case, time_step.to_f64());
+    let settings = Settings {
+        shape: case.shape,
+        integrator: case.integrator,
+        time_step,
+        halve_first_acceleration: case.integrator == Integrator::Cd && case.start == Start::Halved,
+    };
+    let body_force = ExactBodyForce(model.body_force_at(&particles.X));
+    Ok((Simulation::new(grid, particles, law(model.material())?, settings)?, body_force))
 }
 
 /// The exact body force at the particles; what depends on their reference positions alone is kept.

@@ -6,6 +6,7 @@
 //! - [`run`] simulates one [`Case`] and measures the errors of displacement, velocity, deformation gradient and
 //!   stress; [`converge`] does so for a series of grids or time steps and adds the orders of accuracy.
 //! - [`score()`] measures what another solver wrote to files, in the same norms.
+//! - [`temporal()`] measures the error of time stepping alone, and [`verdicts`] judges orders.
 //! - [`evaluate()`] gives the exact fields at a point.
 //!
 //! Everything here takes a solution as a value, never by its name, and knows nothing of terminals or arguments.
@@ -26,7 +27,9 @@ mod scene;
 mod score;
 mod solver;
 mod study;
+mod temporal;
 mod total;
+mod verdict;
 
 pub use case::{Arithmetic, Case, CaseError, Outputs, Progress, Row, Start, Status, run};
 pub use check::{
@@ -46,4 +49,9 @@ pub use score::{
     score,
 };
 pub use study::{Study, StudyError, Sweep, converge};
+pub use temporal::{Temporal, TemporalRow, temporal};
 pub use total::{CflSpeed, Frame, TotalScheme};
+pub use verdict::{
+    Behaviour, Expected, ORDER_TOLERANCE, Verdict as OrderVerdict, expected_in_space,
+    expected_in_time, verdicts,
+};

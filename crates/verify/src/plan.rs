@@ -20,6 +20,9 @@ pub struct Plan {
     pub bytes: f64,
     /// How much of an annulus is modelled; `None` for other shapes.
     pub extent: Option<Extent>,
+    /// The error of `u` that rounding alone may cause, a length: half a unit in the last place of the body's size
+    /// at each step, added up as a random walk.
+    pub round_off: f64,
 }
 
 /// Judges a case without running it or allocating memory for it.
@@ -32,14 +35,14 @@ pub fn plan(
     arithmetic: Arithmetic<'_>,
     case: &Case,
 ) -> Result<Plan, CaseError> {
-    let scalar = match arithmetic {
-        Arithmetic::Double => size_of::<f64>(),
-        Arithmetic::Single(_) => size_of::<f32>(),
+    let (scalar, unit) = match arithmetic {
+        Arithmetic::Double => (size_of::<f64>(), f64::EPSILON / 2.0),
+        Arithmetic::Single(_) => (size_of::<f32>(), f64::from(f32::EPSILON) / 2.0),
     };
     match exact {
-        AnySolution::One(s) => plan_in(s.as_ref(), scalar, case),
-        AnySolution::Two(s) => plan_in(s.as_ref(), scalar, case),
-        AnySolution::Three(s) => plan_in(s.as_ref(), scalar, case),
+        AnySolution::One(s) => plan_in(s.as_ref(), scalar, unit, case),
+        AnySolution::Two(s) => plan_in(s.as_ref(), scalar, unit, case),
+        AnySolution::Three(s) => plan_in(s.as_ref(), scalar, unit, case),
         _ => Err(CaseError::Dimension),
     }
 }
@@ -47,6 +50,7 @@ pub fn plan(
 fn plan_in<const D: usize>(
     exact: &dyn Solution<f64, D>,
     scalar: usize,
+    unit: f64,
     case: &Case,
 ) -> Result<Plan, CaseError> {
     let (scene, steps) = prepare(exact, case)?;
@@ -58,6 +62,7 @@ fn plan_in<const D: usize>(
         particles: scene.particles_expected(case.per_cell),
         bytes: scene.bytes_expected(case.per_cell, scalar),
         extent: scene.extent(),
+        round_off: unit * scene.size * (steps.count as f64).sqrt(),
     })
 }
 

@@ -101,14 +101,20 @@ pub(crate) fn orders_of(
     rows: &[(f64, Option<&PerField<PerNorm<f64>>>)],
 ) -> PerField<PerNorm<Order>> {
     let steps: Vec<f64> = rows.iter().map(|(step, _)| *step).collect();
-    let order = |value: &dyn Fn(&PerField<PerNorm<f64>>) -> f64| {
-        let errors: Vec<_> = rows.iter().map(|(_, errors)| errors.map(value)).collect();
-        Order::of(&steps, &errors)
+    let values: Vec<_> = rows.iter().map(|(_, errors)| *errors).collect();
+    each_norm(&values, |_, _, errors| Order::of(&steps, errors))
+}
+
+/// What `judge` makes of the series of values of every field and norm, which it is told by number.
+pub(crate) fn each_norm<R>(
+    values: &[Option<&PerField<PerNorm<f64>>>],
+    judge: impl Fn(usize, usize, &[Option<f64>]) -> R,
+) -> PerField<PerNorm<R>> {
+    let one = |field: usize, norm: usize| {
+        let pick = |value: &PerField<PerNorm<f64>>| *value.named()[field].1.named()[norm].1;
+        let series: Vec<_> = values.iter().map(|value| value.map(pick)).collect();
+        judge(field, norm, &series)
     };
-    let norms = |field: fn(&PerField<PerNorm<f64>>) -> &PerNorm<f64>| PerNorm {
-        linf: order(&|errors| field(errors).linf),
-        l2: order(&|errors| field(errors).l2),
-        l1: order(&|errors| field(errors).l1),
-    };
-    PerField { u: norms(|e| &e.u), v: norms(|e| &e.v), F: norms(|e| &e.F), P: norms(|e| &e.P) }
+    let norms = |field| PerNorm { linf: one(field, 0), l2: one(field, 1), l1: one(field, 2) };
+    PerField { u: norms(0), v: norms(1), F: norms(2), P: norms(3) }
 }

@@ -1,7 +1,11 @@
 //! `mms converge`: orders of accuracy.
 
-use anyhow::{Result, bail};
-use mmsmith_verify::{Case, Status, Study, Sweep, converge as measure};
+use anyhow::{Context, Result, bail};
+use mmsmith_verify::{
+    Behaviour, Case, Expected, ORDER_TOLERANCE, Order, OrderVerdict, PerField, PerNorm, Status,
+    Study, Sweep, Temporal, converge as measure, expected_in_space, expected_in_time, plan,
+    temporal as measure_differences, verdicts,
+};
 use serde_json::{Value, json};
 
 use super::{Model, caption, case, settings, with_threads};
@@ -9,17 +13,27 @@ use crate::arguments::{ConvergeOptions, Extent, SchemeOptions};
 use crate::json::Output;
 use crate::library::Selection;
 use crate::progress::Bar;
+use crate::svg::{Curve, Plot};
 use crate::table::{self, Table};
-use crate::terminal;
+use crate::{csv, expect, terminal};
+
+/// Orders of every field and norm, judged.
+pub(super) type Verdicts = PerField<PerNorm<OrderVerdict>>;
 
 pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
     let scheme = &options.scheme;
     let selection = Selection::new(&options.name, &scheme.parameters.set)?;
     let sweep = sweep(options)?;
+    let asked = options.expect.as_deref().map(expect::parse).transpose()?;
+    let tolerance = options.tolerance.unwrap_or(ORDER_TOLERANCE);
     let model = Model::new(&selection, scheme.precision)?;
     let base = case(scheme, options.cells[0])?;
     let extent = model.admit(&sweep.cases(&base))?;
     let output = Output::prepare_if(scheme.json.as_ref())?;
+    let [plot, values, markdown, latex] =
+        [&options.plot, &options.csv, &options.markdown, &options.latex]
+            .map(|path| Output::prepare_if(path.as_ref()));
+    let (plot, values, markdown, latex) = (plot?, values?, markdown?, latex?);
     with_threads(scheme.threads, || {
         let study = {
             let bar = Bar::new();
@@ -32,17 +46,129 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
             };
             measure(&model.exact, model.arithmetic(), &base, &sweep, &mut show)?
         };
-        let mut text = caption(&selection, scheme, extent);
-        for (field, table) in tables(&study, &sweep) {
-            text += &format!("\nerror of {field}\n{}", table.text());
+        // In time the expectation is about the differences; the total error is mostly a spatial one.
+        let in_space = match (&sweep, asked) {
+            (Sweep::Cells(_), Some(asked)) => asked,
+            (Sweep::Cells(_), None) => expected_in_space(&model.exact, &base),
+            (Sweep::Cfls(_), _) => Expected::default(),
+        };
+        let judged = judge(&study, &sweep, &in_space, tolerance);
+        let differences = match &sweep {
+            // In the total frame the order in time is that of the composition, far below the error in space.
+            Sweep::Cfls(cfls) if base.frame == Frame::Updated => {
+                let found = differences(&model, &base, cfls, "difference")?;
+                let expected = asked.unwrap_or_else(|| expected_in_time(&base));
+                let judged = judge_differences(&found, &expected, tolerance);
+                Some((found, judged))
+            }
+            Sweep::Cells(_) | Sweep::Cfls(_) => None,
+        };
+
+        let caption = caption(&selection, scheme, extent);
+        let mut sections: Vec<(String, Table)> = Vec::new();
+        for (field, table) in tables(&study, &sweep, &judged) {
+            sections.push((format!("error of {field}"), table));
         }
-        text += &stops(&study);
-        terminal::say(&text)?;
+        let mut notes = stops(&study);
+        if let Some((found, judged)) = &differences {
+            for (field, table) in difference_tables(found, judged) {
+                sections.push((format!("difference of {field} on this grid"), table));
+            }
+            sections.push(("verdicts on the differences".into(), verdict_table(judged, "dt")));
+            notes += "A difference is that of a run and the run with half its time step: what the time step alone does.\n";
+        }
+        let what = if differences.is_some() { "verdicts on the errors" } else { "verdicts" };
+        sections.push((what.into(), verdict_table(&judged, step_name(&sweep))));
+        if has_range(&judged) || differences.as_ref().is_some_and(|(_, judged)| has_range(judged)) {
+            notes += "Rows in parentheses are outside the asymptotic range.\n";
+        }
+        let mut text = caption.clone();
+        for (title, table) in &sections {
+            text += &format!("\n{title}\n{}", table.text());
+        }
+        terminal::say(&(text + &notes))?;
+
         if let Some(output) = output {
-            output.write(&document(&selection, scheme, extent, &base, &sweep, &study))?;
+            let mut document = document(&selection, scheme, extent, &base, &sweep, &study, &judged);
+            if let Some((found, judged)) = &differences {
+                document["temporal"] = temporal_document(found, judged);
+            }
+            output.write(&document)?;
         }
-        Ok(true)
+        if let Some(file) = values {
+            let mut text = csv::text(&study);
+            if let Some((found, _)) = &differences {
+                // A second table, set apart by an empty line.
+                text += &format!("\n{}", csv::temporal(found));
+            }
+            file.write_text(&text)?;
+        }
+        if let Some(file) = markdown {
+            let sections = sections
+                .iter()
+                .map(|(title, table)| format!("\n## {title}\n\n{}", table.markdown()));
+            file.write_text(&format!("# {caption}{}", sections.collect::<String>()))?;
+        }
+        if let Some(file) = latex {
+            let sections =
+                sections.iter().map(|(title, table)| format!("\n% {title}\n{}", table.latex()));
+            let head = "% Needs \\usepackage{booktabs}.\n";
+            file.write_text(&format!("% {caption}{head}{}", sections.collect::<String>()))?;
+        }
+        if let Some(file) = plot {
+            let floor = round_off(&model, &base, &sweep)?;
+            let title = format!("{}: error of u", selection.name());
+            let found = differences.as_ref().map(|(found, _)| found);
+            file.write_text(&picture(&title, &study, &sweep, found, floor))?;
+        }
+        let decisive = match &differences {
+            Some((_, judged)) => judged,
+            None => &judged,
+        };
+        let strict = options.expect.is_some() || options.tolerance.is_some();
+        let failed = decisive
+            .named()
+            .iter()
+            .any(|(_, norms)| norms.named().iter().any(|(_, one)| one.passed == Some(false)));
+        Ok(!(strict && failed))
     })
+}
+
+/// The differences over `cfls` on the grid of `base`, with a progress bar that says `what`.
+pub(super) fn differences(
+    model: &Model,
+    base: &Case,
+    cfls: &[f64],
+    what: &str,
+) -> Result<Temporal> {
+    let bar = Bar::new();
+    let mut show = |progress: mmsmith_verify::Progress| {
+        bar.show(&format!("{what}, CFL {}", cfls[progress.case]), progress);
+    };
+    Ok(measure_differences(&model.exact, model.arithmetic(), base, cfls, &mut show)?)
+}
+
+/// Judges the errors of a study.
+pub(super) fn judge(study: &Study, sweep: &Sweep, expected: &Expected, tolerance: f64) -> Verdicts {
+    let steps: Vec<f64> = study
+        .rows
+        .iter()
+        .map(|row| if matches!(sweep, Sweep::Cells(_)) { row.h } else { row.dt })
+        .collect();
+    let errors = study.rows.iter().map(|row| (row.status == Status::Ok).then_some(&row.errors));
+    verdicts(&steps, &errors.collect::<Vec<_>>(), expected, tolerance)
+}
+
+/// Judges the differences on one grid.
+pub(super) fn judge_differences(
+    temporal: &Temporal,
+    expected: &Expected,
+    tolerance: f64,
+) -> Verdicts {
+    let steps: Vec<f64> = temporal.rows.iter().map(|row| row.dt).collect();
+    let rows = temporal.rows.iter();
+    let values = rows.map(|row| (row.status == Status::Ok).then_some(&row.differences));
+    verdicts(&steps, &values.collect::<Vec<_>>(), expected, tolerance)
 }
 
 /// A study as it is written to JSON.
@@ -53,6 +179,7 @@ pub(super) fn document(
     base: &Case,
     sweep: &Sweep,
     study: &Study,
+    judged: &Verdicts,
 ) -> Value {
     let settings = match sweep {
         Sweep::Cells(cells) => settings(selection, scheme, extent, cells, base.cfl),
@@ -63,6 +190,17 @@ pub(super) fn document(
         "settings": settings,
         "rows": study.rows,
         "orders": study.orders,
+        "verdicts": judged,
+    })
+}
+
+/// Differences as they are written to JSON.
+pub(super) fn temporal_document(temporal: &Temporal, judged: &Verdicts) -> Value {
+    json!({
+        "times": temporal.times,
+        "rows": temporal.rows,
+        "orders": temporal.orders,
+        "verdicts": judged,
     })
 }
 
@@ -76,26 +214,22 @@ fn sweep(options: &ConvergeOptions) -> Result<Sweep> {
     Ok(Sweep::Cfls(options.cfls.clone()))
 }
 
+fn step_name(sweep: &Sweep) -> &'static str {
+    if matches!(sweep, Sweep::Cells(_)) { "h" } else { "dt" }
+}
+
+const NORMS: [&str; 6] = ["linf", "rate", "l2", "rate", "l1", "rate"];
+
 /// One table for each field: a row a case, and the rate right of each norm.
-pub(super) fn tables(study: &Study, sweep: &Sweep) -> [(&'static str, Table); 4] {
-    let (errors, orders) = (study.rows.iter().map(|row| row.errors.named()), study.orders.named());
-    let errors: Vec<_> = errors.collect();
+pub(super) fn tables(
+    study: &Study,
+    sweep: &Sweep,
+    judged: &Verdicts,
+) -> [(&'static str, Table); 4] {
+    let errors: Vec<_> = study.rows.iter().map(|row| &row.errors).collect();
     std::array::from_fn(|field| {
-        let header = [
-            "cells",
-            "particles",
-            "h",
-            "CFL",
-            "linf",
-            "rate",
-            "l2",
-            "rate",
-            "l1",
-            "rate",
-            "status",
-        ];
+        let header = ["cells", "particles", "h", "CFL"].into_iter().chain(NORMS).chain(["status"]);
         let mut table = Table::new(0, header);
-        let (name, order) = orders[field];
         for (index, row) in study.rows.iter().enumerate() {
             let mut cells = vec![
                 row.cells.to_string(),
@@ -103,22 +237,118 @@ pub(super) fn tables(study: &Study, sweep: &Sweep) -> [(&'static str, Table); 4]
                 table::error(row.h),
                 format!("{:.4}", row.cfl),
             ];
-            for ((_, value), (_, order)) in errors[index][field].1.named().iter().zip(order.named())
-            {
-                let local = index.checked_sub(1).and_then(|pair| order.local[pair]);
-                cells.extend([table::error(**value), table::rate(local)]);
-            }
+            cells.extend(norms(index, field, errors[index], &study.orders, judged));
             cells.push(if row.status == Status::Ok { "ok" } else { "STOPPED" }.into());
             table.row(cells);
         }
-        let step = if matches!(sweep, Sweep::Cells(_)) { "h" } else { "dt" };
-        let mut fit = vec![format!("fit in {step}"), String::new(), String::new(), String::new()];
-        for (_, order) in order.named() {
-            fit.extend([String::new(), table::rate(order.fit)]);
-        }
-        table.row(fit);
-        (name, table)
+        let empty = String::new;
+        table.row(fits(
+            [format!("fit in {}", step_name(sweep)), empty(), empty(), empty()],
+            field,
+            &study.orders,
+        ));
+        (study.orders.named()[field].0, table)
     })
+}
+
+/// The same for differences on one grid.
+pub(super) fn difference_tables(
+    temporal: &Temporal,
+    judged: &Verdicts,
+) -> [(&'static str, Table); 4] {
+    std::array::from_fn(|field| {
+        let header = ["dt", "CFL", "steps"].into_iter().chain(NORMS).chain(["status"]);
+        let mut table = Table::new(0, header);
+        for (index, row) in temporal.rows.iter().enumerate() {
+            let mut cells =
+                vec![table::error(row.dt), format!("{:.4}", row.cfl), row.steps.to_string()];
+            cells.extend(norms(index, field, &row.differences, &temporal.orders, judged));
+            cells.push(if row.status == Status::Ok { "ok" } else { "STOPPED" }.into());
+            table.row(cells);
+        }
+        let empty = String::new;
+        table.row(fits(["fit in dt".into(), empty(), empty()], field, &temporal.orders));
+        (temporal.orders.named()[field].0, table)
+    })
+}
+
+/// Error and rate in each norm; in parentheses outside the asymptotic range, if there is one.
+fn norms(
+    row: usize,
+    field: usize,
+    errors: &PerField<PerNorm<f64>>,
+    orders: &PerField<PerNorm<Order>>,
+    judged: &Verdicts,
+) -> Vec<String> {
+    let errors = errors.named()[field].1.named();
+    let orders = orders.named()[field].1.named();
+    let judged = judged.named()[field].1.named();
+    (0..errors.len())
+        .flat_map(|norm| {
+            let range = &judged[norm].1.asymptotic_rows;
+            let error = table::error(*errors[norm].1);
+            let outside = !range.is_empty() && !range.contains(&row) && error != "-";
+            let local = row.checked_sub(1).and_then(|pair| orders[norm].1.local[pair]);
+            [if outside { format!("({error})") } else { error }, table::rate(local)]
+        })
+        .collect()
+}
+
+fn fits<const N: usize>(
+    first: [String; N],
+    field: usize,
+    orders: &PerField<PerNorm<Order>>,
+) -> Vec<String> {
+    let mut cells = first.to_vec();
+    for (_, order) in orders.named()[field].1.named() {
+        cells.extend([String::new(), table::rate(order.fit)]);
+    }
+    cells
+}
+
+fn has_range(judged: &Verdicts) -> bool {
+    judged
+        .named()
+        .iter()
+        .any(|(_, norms)| norms.named().iter().any(|(_, one)| !one.asymptotic_rows.is_empty()))
+}
+
+/// What each field and norm shows, a row each.
+pub(super) fn verdict_table(judged: &Verdicts, step: &str) -> Table {
+    let header = ["field", "norm", "expected", "finest pair", "leading term", "verdict"];
+    let mut table = Table::new(2, header);
+    for (field, norms) in judged.named() {
+        for (norm, one) in norms.named() {
+            let term = one
+                .coefficient
+                .zip(one.exponent)
+                .map_or_else(|| "-".into(), |(c, p)| format!("{c:.3e} {step}^{p:.2}"));
+            let behaviour = match one.behaviour {
+                Behaviour::Asymptotic => "asymptotic",
+                Behaviour::NotSettled => "no asymptotic range",
+                Behaviour::DoesNotConverge => "DOES NOT CONVERGE",
+                Behaviour::Stopped => "the finest run STOPPED",
+                Behaviour::NoOrder => "no order",
+            };
+            let verdict = match one.passed {
+                None => behaviour.to_owned(),
+                Some(true) => format!("passed, {behaviour}"),
+                Some(false) => format!("FAILED, {behaviour}"),
+            };
+            let expected = one
+                .expected
+                .map_or_else(|| "-".into(), |order| format!("{order} +/- {}", one.tolerance));
+            table.row([
+                field.to_owned(),
+                norm.to_owned(),
+                expected,
+                table::rate(one.finest),
+                term,
+                verdict,
+            ]);
+        }
+    }
+    table
 }
 
 /// A line for each case that did not reach its end time.
@@ -129,4 +359,50 @@ pub(super) fn stops(study: &Study) -> String {
             format!("STOPPED with {} cells, CFL {:.4}: {}\n", row.cells, row.cfl, row.status)
         })
         .collect()
+}
+
+/// The largest error of `u` that rounding alone may cause in any case of the sweep.
+fn round_off(model: &Model, base: &Case, sweep: &Sweep) -> Result<f64> {
+    let mut largest = 0.0_f64;
+    for case in sweep.cases(base) {
+        let plan = plan(&model.exact, model.arithmetic(), &case).context("--plot")?;
+        largest = largest.max(plan.round_off);
+    }
+    Ok(largest)
+}
+
+/// The displacement error of one study in all norms, and in time the largest difference.
+fn picture(
+    title: &str,
+    study: &Study,
+    sweep: &Sweep,
+    differences: Option<&Temporal>,
+    floor: f64,
+) -> String {
+    let (x, orders) = match sweep {
+        Sweep::Cells(_) => ("grid spacing h", &study.orders.u),
+        Sweep::Cfls(_) => ("time step dt", &study.orders.u),
+    };
+    let curve = |norm: usize, name: &str| {
+        let cases = study.rows.iter().map(|row| {
+            let step = if matches!(sweep, Sweep::Cells(_)) { row.h } else { row.dt };
+            let error = *row.errors.u.named()[norm].1;
+            (step, (row.status == Status::Ok).then_some(error))
+        });
+        Curve::new(name, cases, orders.named()[norm].1.fit)
+    };
+    let mut curves = vec![curve(0, "L_inf"), curve(1, "L2"), curve(2, "L1")];
+    if let Some(found) = differences {
+        curves.push(difference_curve("L_inf of the difference", found));
+    }
+    Plot { title, x, y: "error of u", curves, orders: &[1, 2], floor: Some(floor) }.svg()
+}
+
+/// The largest difference of `u` over the time step.
+pub(super) fn difference_curve(name: impl Into<String>, found: &Temporal) -> Curve {
+    let cases = found
+        .rows
+        .iter()
+        .map(|row| (row.dt, (row.status == Status::Ok).then_some(row.differences.u.linf)));
+    Curve::new(name, cases, found.orders.u.linf.fit)
 }

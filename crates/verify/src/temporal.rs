@@ -1,0 +1,249 @@
+//! The error of time stepping alone, by differences between runs on one grid.
+//!
+//! Against the exact solution the temporal error hides behind the spatial one, which is larger and may have the
+//! opposite sign. Between two runs that differ in nothing but the time step the spatial error is common and drops
+//! out. What is measured is the difference between a run and the same run with half the time step: for an error
+//! `C dt^p` that difference is `(1 - 2^-p) C dt^p`, so its slope over `dt` is `p`, whatever time steps were asked
+//! for. A run with a very small time step as the reference would bend that slope, by a tenth for `p = 1` and a
+//! reference 16 times finer.
+
+use std::collections::BTreeMap;
+
+use mmsmith_solutions::{AnySolution, Real, Solution};
+use nalgebra::{SMatrix, SVector};
+use serde::Serialize;
+
+use crate::case::{Arithmetic, Case, CaseError, Progress, Status, set_up};
+use crate::norms::{PerField, PerNorm, Tally};
+use crate::order::Order;
+use crate::plan::{MOST_STEPS, prepare};
+use crate::study::{StudyError, orders_of};
+
+/// The runs are compared at this many times, evenly spread, the last one the end.
+///
+/// Not a divisor of the period: at quarters of it a standing wave has errors of amplitude only, at others of phase.
+const INSTANTS: u64 = 5;
+
+/// The differences over a series of time steps, and their orders.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Temporal {
+    /// The times at which runs are compared.
+    pub times: Vec<f64>,
+    /// One row for each CFL number, in order.
+    pub rows: Vec<TemporalRow>,
+    /// The observed orders in `dt`; rows of which a run did not end well are left out.
+    pub orders: PerField<PerNorm<Order>>,
+}
+
+/// A run compared with the one of half its time step.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TemporalRow {
+    /// Number of cells along the cell length.
+    pub cells: usize,
+    /// Grid spacing, a length.
+    pub h: f64,
+    /// The larger of the two time steps.
+    pub dt: f64,
+    /// `dt c/h` for it.
+    pub cfl: f64,
+    /// Steps to the end time with it; the other run takes twice as many.
+    pub steps: u64,
+    /// How the two runs ended: the first one that failed is told.
+    pub status: Status,
+    /// Norms of the difference over particles, the largest over the times; NaN where a run failed.
+    ///
+    /// Velocities are compared at the common time; where they lag, the mean of those half a step before and after it
+    /// is formed.
+    pub differences: PerField<PerNorm<f64>>,
+}
+
+/// Compares, for every CFL number, the run of `base` with the one of half the time step.
+///
+/// A CFL number is lowered until its steps divide the run into five equal parts, at whose ends the runs are
+/// compared. `progress` is called after every step.
+///
+/// # Errors
+///
+/// [`StudyError`] for the first CFL number that cannot be run; a run that fails on the way is a row with its status.
+pub fn temporal(
+    exact: &AnySolution<f64>,
+    arithmetic: Arithmetic<'_>,
+    base: &Case,
+    cfls: &[f64],
+    progress: &mut dyn FnMut(Progress),
+) -> Result<Temporal, StudyError> {
+    use AnySolution::{One, Three, Two};
+    match (exact, arithmetic) {
+        (One(s), Arithmetic::Double) => over(s.as_ref(), s.as_ref(), base, cfls, progress),
+        (Two(s), Arithmetic::Double) => over(s.as_ref(), s.as_ref(), base, cfls, progress),
+        (Three(s), Arithmetic::Double) => over(s.as_ref(), s.as_ref(), base, cfls, progress),
+        (One(s), Arithmetic::Single(One(m))) => over(s.as_ref(), m.as_ref(), base, cfls, progress),
+        (Two(s), Arithmetic::Single(Two(m))) => over(s.as_ref(), m.as_ref(), base, cfls, progress),
+        (Three(s), Arithmetic::Single(Three(m))) => {
+            over(s.as_ref(), m.as_ref(), base, cfls, progress)
+        }
+        _ => Err(StudyError { index: 0, cause: CaseError::Dimension }),
+    }
+}
+
+fn over<T: Real, const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    model: &dyn Solution<T, D>,
+    base: &Case,
+    cfls: &[f64],
+    progress: &mut dyn FnMut(Progress),
+) -> Result<Temporal, StudyError> {
+    let end = base.periods * exact.period();
+    let mut counts = Vec::with_capacity(cfls.len());
+    for (index, &cfl) in cfls.iter().enumerate() {
+        let fail = |cause| StudyError { index, cause };
+        let (_, steps) = prepare(exact, &Case { cfl, ..*base }).map_err(fail)?;
+        let count = steps.count.div_ceil(INSTANTS) * INSTANTS;
+        if 2.0 * count as f64 > MOST_STEPS {
+            let (dt, steps) = (end / (2 * count) as f64, 2.0 * count as f64);
+            return Err(fail(CaseError::TooManySteps { end, dt, steps }));
+        }
+        counts.push(count);
+    }
+    // Halves of one row are often the whole of the next.
+    let mut runs = BTreeMap::new();
+    for (index, &count) in counts.iter().enumerate() {
+        runs.entry(count).or_insert(index);
+        runs.entry(2 * count).or_insert(index);
+    }
+    let total: u64 = runs.keys().sum();
+    let mut before = 0;
+    let mut states = BTreeMap::new();
+    for (&count, &index) in &runs {
+        let mut report = |step| {
+            let share = (before + step) as f64 / total as f64;
+            progress(Progress { case: index, step, steps: count, share });
+        };
+        let run = observe(exact, model, base, count, &mut report);
+        states.insert(count, run.map_err(|cause| StudyError { index, cause })?);
+        before += count;
+    }
+    let (scene, _) = prepare(exact, base).map_err(|cause| StudyError { index: 0, cause })?;
+    let rows = counts.iter().map(|&count| {
+        let dt = end / count as f64;
+        let (status, differences) = match (&states[&count], &states[&(2 * count)]) {
+            (Ok(coarse), Ok(fine)) => (Status::Ok, largest_difference(coarse, fine)),
+            (Err(status), _) | (_, Err(status)) => (status.clone(), not_known()),
+        };
+        let cfl = dt * exact.wave_speed() / scene.spacing;
+        TemporalRow {
+            cells: base.cells,
+            h: scene.spacing,
+            dt,
+            cfl,
+            steps: count,
+            status,
+            differences,
+        }
+    });
+    let rows: Vec<_> = rows.collect();
+    let values =
+        rows.iter().map(|row| (row.dt, (row.status == Status::Ok).then_some(&row.differences)));
+    let orders = orders_of(&values.collect::<Vec<_>>());
+    let times = (1..=INSTANTS).map(|part| end * part as f64 / INSTANTS as f64).collect();
+    Ok(Temporal { times, rows, orders })
+}
+
+/// All particles at one of the common times.
+struct State<const D: usize> {
+    x: Vec<SVector<f64, D>>,
+    v: Vec<SVector<f64, D>>,
+    F: Vec<SMatrix<f64, D, D>>,
+    P: Vec<SMatrix<f64, D, D>>,
+}
+
+/// The states at the common times of a run with `count` steps, or how it failed.
+fn observe<T: Real, const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    model: &dyn Solution<T, D>,
+    case: &Case,
+    count: u64,
+    progress: &mut dyn FnMut(u64),
+) -> Result<Result<Vec<State<D>>, Status>, CaseError> {
+    let (scene, _) = prepare(exact, case)?;
+    let time_step: T = Real::nearest(case.periods * exact.period() / count as f64);
+    let (mut simulation, body_force) = set_up(exact, model, case, &scene, time_step)?;
+    let lags = simulation.velocity_lag().to_f64() > 0.0;
+    let mut states: Vec<State<D>> = Vec::new();
+    // One step more than the run has: the last velocity at a full step needs it.
+    for step in 1..=count + u64::from(lags) {
+        if let Err(error) = simulation.step(&body_force) {
+            return Ok(Err(Status::Stopped(error)));
+        }
+        let particles = simulation.particles();
+        let v = || particles.v.iter().map(|v| v.map(Real::to_f64));
+        if lags
+            && (step - 1) % (count / INSTANTS) == 0
+            && let Some(state) = states.last_mut()
+        {
+            state
+                .v
+                .iter_mut()
+                .zip(v())
+                .for_each(|(before, after)| *before = (*before + after) / 2.0);
+        }
+        if step % (count / INSTANTS) == 0 && step <= count {
+            let x: Vec<_> = particles.x.iter().map(|x| x.map(Real::to_f64)).collect();
+            let time = step as f64 * time_step.to_f64();
+            for (particle, x) in x.iter().enumerate() {
+                let X = particles.X[particle].map(Real::to_f64);
+                let error = (x - X - exact.displacement(&X, time)).norm();
+                if error > scene.size || error.is_nan() {
+                    let size = scene.size;
+                    return Ok(Err(Status::Unstable { step, time, particle, error, size }));
+                }
+            }
+            let law = simulation.material();
+            // A particle that is inside out has no stress; the solver stops at its next step.
+            let none = SMatrix::repeat(f64::NAN);
+            let stress = |F: &SMatrix<T, D, D>| {
+                law.first_piola_kirchhoff(F).map_or(none, |P| P.map(Real::to_f64))
+            };
+            states.push(State {
+                x,
+                v: v().collect(),
+                F: particles.F.iter().map(|F| F.map(Real::to_f64)).collect(),
+                P: particles.F.iter().map(stress).collect(),
+            });
+        }
+        progress(step.min(count));
+    }
+    Ok(Ok(states))
+}
+
+/// The norms of the difference over the particles, the largest over the times.
+fn largest_difference<const D: usize>(
+    coarse: &[State<D>],
+    fine: &[State<D>],
+) -> PerField<PerNorm<f64>> {
+    let mut largest = PerField::<PerNorm<f64>>::default();
+    for (a, b) in coarse.iter().zip(fine) {
+        let norms = PerField {
+            u: difference(&a.x, &b.x),
+            v: difference(&a.v, &b.v),
+            F: difference(&a.F, &b.F),
+            P: difference(&a.P, &b.P),
+        };
+        largest = PerField::combine(&largest, &norms, PerNorm::larger);
+    }
+    largest
+}
+
+fn difference<const R: usize, const C: usize>(
+    a: &[SMatrix<f64, R, C>],
+    b: &[SMatrix<f64, R, C>],
+) -> PerNorm<f64> {
+    let mut tally = Tally::default();
+    a.iter().zip(b).for_each(|(a, b)| tally.add((a - b).norm()));
+    tally.norms(a.len())
+}
+
+fn not_known() -> PerField<PerNorm<f64>> {
+    let none = PerNorm { linf: f64::NAN, l2: f64::NAN, l1: f64::NAN };
+    PerField { u: none, v: none, F: none, P: none }
+}

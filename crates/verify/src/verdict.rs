@@ -1,0 +1,245 @@
+//! What a series of errors shows: its order on the finest grids, from where on that order holds, and whether it is
+//! the expected one.
+
+use mmsmith_solutions::{AnySolution, Domain, Solution};
+use serde::Serialize;
+
+use crate::case::Case;
+use crate::norms::{PerField, PerNorm};
+use crate::{Integrator, Shape, points};
+
+/// How far an order on the finest pair of cases may be from the expected one where nothing else is said.
+pub const ORDER_TOLERANCE: f64 = 0.1;
+
+/// Points at which a motion is looked at to find out whether its axes stay aligned with the grid.
+const SAMPLES: usize = 64;
+
+/// Orders that theory promises, field by field and norm by norm; `None` where it promises nothing.
+pub type Expected = PerField<PerNorm<Option<f64>>>;
+
+/// What the errors do as the step becomes smaller.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Behaviour {
+    /// At least two successive pairs, the finest among them, have the same positive order within the tolerance.
+    Asymptotic,
+    /// The error falls, but its local orders still change by more than the tolerance, or there is one pair only.
+    NotSettled,
+    /// The error does not fall over the finest pair: its order there is not above the tolerance.
+    DoesNotConverge,
+    /// The finest case did not reach its end.
+    Stopped,
+    /// Fewer than two cases with an error and different steps.
+    NoOrder,
+}
+
+/// What one error norm shows.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Verdict {
+    /// The order that was expected, if any.
+    pub expected: Option<f64>,
+    /// How far from it the order on the finest pair may be.
+    pub tolerance: f64,
+    /// The order on the finest pair of cases.
+    pub finest: Option<f64>,
+    /// What the errors do.
+    pub behaviour: Behaviour,
+    /// The rows inside the asymptotic range, numbered from 0, in the order of the rows; empty where there is none.
+    pub asymptotic_rows: Vec<usize>,
+    /// `C` of the leading term `C s^p` in the step `s`, from the finest case.
+    pub coefficient: Option<f64>,
+    /// The `p` of that term: the expected order if it was met, else that of the finest pair.
+    pub exponent: Option<f64>,
+    /// Whether the expectation was met; `None` where there is none.
+    pub passed: Option<bool>,
+}
+
+impl Verdict {
+    /// Judges errors (`None` where a case failed) over `steps`, in any order.
+    #[must_use]
+    pub fn of(
+        steps: &[f64],
+        errors: &[Option<f64>],
+        expected: Option<f64>,
+        tolerance: f64,
+    ) -> Self {
+        let mut rows: Vec<usize> = (0..steps.len().min(errors.len())).collect();
+        rows.sort_by(|&a, &b| steps[b].total_cmp(&steps[a]));
+        rows.dedup_by(|a, b| steps[*a] == steps[*b]);
+        let log = |row: usize| errors[row].filter(|e| e.is_finite() && *e > 0.0).map(f64::ln);
+        let local = |pair: &[usize]| {
+            let (coarse, fine) = (log(pair[0])?, log(pair[1])?);
+            Some((fine - coarse) / (steps[pair[1]] / steps[pair[0]]).ln())
+        };
+        let orders: Vec<Option<f64>> = rows.windows(2).map(local).collect();
+        let finest = orders.last().copied().flatten();
+        // From the finest pair on for as long as the order stays the same.
+        let settled = finest.map_or(0, |finest| {
+            let same =
+                |order: &&Option<f64>| order.is_some_and(|o| (o - finest).abs() <= tolerance);
+            orders.iter().rev().take_while(same).count()
+        });
+        let stopped = rows.last().is_some_and(|&row| errors[row].is_none_or(|e| !e.is_finite()));
+        let behaviour = match finest {
+            _ if rows.len() < 2 => Behaviour::NoOrder,
+            _ if stopped => Behaviour::Stopped,
+            None => Behaviour::NoOrder,
+            Some(order) if order <= tolerance => Behaviour::DoesNotConverge,
+            Some(_) if settled >= 2 => Behaviour::Asymptotic,
+            Some(_) => Behaviour::NotSettled,
+        };
+        let mut asymptotic_rows = match behaviour {
+            Behaviour::Asymptotic => rows[rows.len() - settled - 1..].to_vec(),
+            _ => Vec::new(),
+        };
+        asymptotic_rows.sort_unstable();
+        // Room for the rounding of a tolerance such as 0.1 itself.
+        let met = |(order, expected): (f64, f64)| (order - expected).abs() <= tolerance + 1e-12;
+        let passed = expected.map(|expected| finest.is_some_and(|order| met((order, expected))));
+        let exponent = if passed == Some(true) { expected } else { finest };
+        let last = rows.last().copied().filter(|_| exponent.is_some());
+        let coefficient = last
+            .and_then(|row| Some(errors[row]? / steps[row].powf(exponent?)))
+            .filter(|value| value.is_finite());
+        Self {
+            expected,
+            tolerance,
+            finest,
+            behaviour,
+            asymptotic_rows,
+            coefficient,
+            exponent,
+            passed,
+        }
+    }
+}
+
+/// Judges every field and norm; `values` are `None` where a case failed.
+#[must_use]
+pub fn verdicts(
+    steps: &[f64],
+    values: &[Option<&PerField<PerNorm<f64>>>],
+    expected: &Expected,
+    tolerance: f64,
+) -> PerField<PerNorm<Verdict>> {
+    crate::study::each_norm(values, |field, norm, errors| {
+        let expected = *expected.named()[field].1.named()[norm].1;
+        Verdict::of(steps, errors, expected, tolerance)
+    })
+}
+
+/// The orders in `h` at a fixed CFL number that theory promises for `case`: second order in the displacement for
+/// centred differences with GIMP weights where the particles' edges stay aligned with the grid and the boundary is
+/// met exactly, which is a box whose motion has a diagonal deformation gradient. Nothing else is promised.
+///
+/// Wallstedt and Guilkey, Evaluation of Time Integration Schemes for the Generalized Interpolation Material Point
+/// Method.
+#[must_use]
+pub fn expected_in_space(exact: &AnySolution<f64>, case: &Case) -> Expected {
+    let aligned = match exact {
+        AnySolution::One(s) => stays_aligned(s.as_ref()),
+        AnySolution::Two(s) => stays_aligned(s.as_ref()),
+        AnySolution::Three(s) => stays_aligned(s.as_ref()),
+        _ => false,
+    };
+    let second = case.frame == Frame::Updated
+        && case.shape == Shape::Gimp
+        && case.integrator == Integrator::Cd
+        && aligned;
+    let order = second.then_some(2.0);
+    PerField { u: PerNorm { linf: order, l2: order, l1: order }, ..Expected::default() }
+}
+
+/// The orders in `dt` of the differences on one grid ([`temporal`](crate::temporal())) that theory promises for the
+/// displacement: 1 for the integrators that evaluate all at one end of the step.
+///
+/// Nothing is promised for centred differences. They are formally of second order, but particles are moved with the
+/// nodal acceleration as it is, while their velocities keep what its interpolation and projection with lumped masses
+/// leave of it. The two differ by `O(h^2)`, so that a term `dt h^2` joins the one in `dt^2`, and takes over where `dt` is
+/// small against `h^2`.
+#[must_use]
+pub fn expected_in_time(case: &Case) -> Expected {
+    let order = match case.integrator {
+        Integrator::Usf | Integrator::Usl | Integrator::Musl => Some(1.0),
+        _ => None,
+    };
+    PerField { u: PerNorm { linf: order, l2: order, l1: order }, ..Expected::default() }
+}
+
+fn stays_aligned<const D: usize>(exact: &dyn Solution<f64, D>) -> bool {
+    let domain = exact.domain();
+    matches!(domain, Domain::Box { .. })
+        && (0..SAMPLES).all(|n| {
+            points::interior(&domain, exact.period(), n).is_some_and(|(X, t)| {
+                let F = exact.deformation_gradient(&X, t);
+                (0..D).all(|i| (0..D).all(|j| i == j || F[(i, j)] == 0.0))
+            })
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn judge(errors: &[f64], expected: Option<f64>) -> Verdict {
+        let steps: Vec<f64> = (0..errors.len()).map(|k| 0.5_f64.powi(k as i32)).collect();
+        let errors: Vec<_> = errors.iter().map(|e| e.is_finite().then_some(*e)).collect();
+        Verdict::of(&steps, &errors, expected, 0.1)
+    }
+
+    #[test]
+    fn the_asymptotic_range_starts_where_the_orders_have_settled() {
+        // Orders 1, 2, 2, 2.
+        let verdict = judge(&[8.0, 4.0, 1.0, 0.25, 0.0625], Some(2.0));
+        assert_eq!(verdict.behaviour, Behaviour::Asymptotic);
+        assert_eq!(verdict.asymptotic_rows, [1, 2, 3, 4]);
+        assert_eq!((verdict.finest, verdict.passed), (Some(2.0), Some(true)));
+        // 4 at h = 1/2.
+        assert_eq!((verdict.coefficient, verdict.exponent), (Some(16.0), Some(2.0)));
+    }
+
+    #[test]
+    fn rows_may_come_in_any_order_and_are_told_by_their_own_numbers() {
+        let steps = [0.25, 1.0, 0.5];
+        let verdict = Verdict::of(&steps, &[Some(0.0625), Some(1.0), Some(0.25)], None, 0.1);
+        assert_eq!(verdict.asymptotic_rows, [0, 1, 2]);
+        assert_eq!((verdict.finest, verdict.passed), (Some(2.0), None));
+    }
+
+    #[test]
+    fn a_wrong_order_fails_and_so_does_one_that_is_too_high() {
+        assert_eq!(judge(&[4.0, 2.0, 1.0], Some(2.0)).passed, Some(false));
+        assert_eq!(judge(&[64.0, 8.0, 1.0], Some(2.0)).passed, Some(false));
+        assert_eq!(judge(&[4.0, 2.0, 1.0], None).passed, None);
+    }
+
+    #[test]
+    fn a_plateau_and_a_growing_error_are_called_so() {
+        for errors in [[4.0, 1.0, 0.98], [1.0, 1.0, 1.0], [1.0, 2.0, 4.0]] {
+            let verdict = judge(&errors, Some(2.0));
+            assert_eq!(verdict.behaviour, Behaviour::DoesNotConverge);
+            assert_eq!(verdict.passed, Some(false));
+            assert!(verdict.asymptotic_rows.is_empty());
+        }
+    }
+
+    #[test]
+    fn a_stopped_finest_case_fails_whatever_the_others_say() {
+        let verdict = judge(&[4.0, 1.0, f64::NAN], Some(2.0));
+        assert_eq!((verdict.behaviour, verdict.passed), (Behaviour::Stopped, Some(false)));
+        assert_eq!(verdict.coefficient, None);
+    }
+
+    #[test]
+    fn one_pair_is_no_range_and_one_case_is_no_order() {
+        assert_eq!(judge(&[4.0, 1.0], None).behaviour, Behaviour::NotSettled);
+        assert_eq!(judge(&[4.0], Some(2.0)).behaviour, Behaviour::NoOrder);
+        assert_eq!(judge(&[4.0], Some(2.0)).passed, Some(false));
+        assert_eq!(judge(&[], None).behaviour, Behaviour::NoOrder);
+    }
+
+    #[test]
+    fn errors_of_zero_have_no_order() {
+        assert_eq!(judge(&[0.0, 0.0, 0.0], None).behaviour, Behaviour::NoOrder);
+    }
+}

@@ -1,0 +1,258 @@
+"""Opens a report in headless Chromium and looks for its curves.
+
+    python report.py REPORT.html SCREENSHOTS
+
+At 1280 and at 400 pixels width the page must write nothing to the console, ask for nothing outside itself, be no wider
+than the window, and show every plot: pixels of each curve's own colour inside the plot's box, found in a screenshot.
+The screenshots stay in the folder SCREENSHOTS. Before the report, a page with one fault of each kind is opened, so
+that a check that sees nothing is found out.
+
+Chromium is spoken to over a pair of pipes (--remote-debugging-pipe); nothing but it and Pillow is needed.
+
+Exit status: 0 where all is well, 1 where anything is not, 2 for a wrong call.
+"""
+
+import base64
+import io
+import json
+import os
+import select
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from PIL import Image
+
+WIDTHS = (1280, 400)
+HEIGHT = 900
+PATIENCE = 60.0
+# A curve is at least a marker; the dots of a band of colours may be fewer.
+PIXELS = {"curve": 40, "dots": 4}
+# How far a channel may be from the colour asked for.
+NEAR = 12
+
+# Boxes in pixels of the page, with the colours that must be seen in each.
+PLOTS = """
+JSON.stringify([...document.querySelectorAll('svg')].map(svg => {
+  const box = svg.getBoundingClientRect();
+  return {
+    title: svg.querySelector('title')?.textContent ?? '',
+    label: svg.getAttribute('aria-label') ?? '',
+    box: [box.left + scrollX, box.top + scrollY, box.width, box.height],
+    font: Math.min(...[...svg.querySelectorAll('text')].map(t =>
+      parseFloat(getComputedStyle(t).fontSize) * box.width / svg.viewBox.baseVal.width)),
+    marks: [...svg.querySelectorAll('.curve, .dots')].map(mark => ({
+      kind: mark.classList.contains('curve') ? 'curve' : 'dots',
+      name: mark.dataset.name ?? mark.dataset.colour,
+      colour: mark.dataset.colour,
+    })),
+  };
+}))
+"""
+
+FAULTS = """<!DOCTYPE html><html><head><title>faults</title></head><body>
+<img src="https://example.org/outside.png" alt="">
+<script>console.error('planted');</script>
+<div style="width: 3000px; height: 1px"></div>
+<svg class="plot" viewBox="0 0 100 100" aria-label="faulty" width="300">
+<title>faulty</title>
+<text x="1" y="9" font-size="9">t</text>
+<g class="curve" data-name="unseen" data-colour="#0072b2"></g>
+</svg></body></html>
+"""
+
+
+class Browser:
+    """Chromium, and the messages it sends."""
+
+    def __init__(self, profile):
+        program = shutil.which("chromium") or shutil.which("chromium-browser")
+        if program is None:
+            raise SystemExit("chromium is not installed: apt-get install chromium")
+        to_read, self.to_browser = os.pipe()
+        self.from_browser, to_write = os.pipe()
+
+        def connect():
+            # Chromium reads from 3 and writes to 4. Copies first, since either may be in the other's place.
+            os.dup2(to_read, 103)
+            os.dup2(to_write, 104)
+            os.dup2(103, 3)
+            os.dup2(104, 4)
+
+        self.process = subprocess.Popen(
+            [
+                program,
+                "--headless=new",
+                "--no-sandbox",
+                "--disable-gpu",
+                "--disable-dev-shm-usage",
+                "--disable-background-networking",
+                "--no-first-run",
+                "--hide-scrollbars",
+                "--force-color-profile=srgb",
+                "--host-resolver-rules=MAP * ~NOTFOUND",
+                "--remote-debugging-pipe",
+                f"--user-data-dir={profile}",
+            ],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            close_fds=False,
+            preexec_fn=connect,
+        )
+        os.close(to_read)
+        os.close(to_write)
+        self.number = 0
+        self.rest = b""
+        self.events = []
+        target = self.call("Target.createTarget", url="about:blank")["targetId"]
+        self.session = None
+        attached = self.call("Target.attachToTarget", targetId=target, flatten=True)
+        self.session = attached["sessionId"]
+        for domain in ("Page", "Runtime", "Log", "Network"):
+            self.call(f"{domain}.enable")
+
+    def message(self):
+        """The next message from the browser."""
+        end = time.monotonic() + PATIENCE
+        while b"\0" not in self.rest:
+            ready, _, _ = select.select([self.from_browser], [], [], max(0.0, end - time.monotonic()))
+            part = os.read(self.from_browser, 1 << 20) if ready else b""
+            if not part:
+                raise SystemExit("chromium went away or is silent")
+            self.rest += part
+        text, self.rest = self.rest.split(b"\0", 1)
+        return json.loads(text)
+
+    def call(self, method, **parameters):
+        self.number += 1
+        request = {"id": self.number, "method": method, "params": parameters}
+        if getattr(self, "session", None):
+            request["sessionId"] = self.session
+        os.write(self.to_browser, json.dumps(request).encode() + b"\0")
+        while True:
+            message = self.message()
+            if message.get("id") == self.number:
+                if "error" in message:
+                    raise SystemExit(f"{method}: {message['error']['message']}")
+                return message["result"]
+            self.events.append(message)
+
+    def evaluate(self, expression):
+        return self.call("Runtime.evaluate", expression=expression, returnByValue=True)["result"]["value"]
+
+    def open(self, address, width):
+        """Opens a page and returns what it said and asked for."""
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=HEIGHT, deviceScaleFactor=1, mobile=False)
+        self.events = []
+        self.call("Page.navigate", url=address)
+        end = time.monotonic() + PATIENCE
+        while self.evaluate("document.readyState") != "complete" and time.monotonic() < end:
+            time.sleep(0.05)
+        time.sleep(0.3)
+        self.evaluate("0")
+        return self.events
+
+    def screenshot(self):
+        size = self.call("Page.getLayoutMetrics")["cssContentSize"]
+        clip = {"x": 0, "y": 0, "width": size["width"], "height": size["height"], "scale": 1}
+        data = self.call("Page.captureScreenshot", format="png", captureBeyondViewport=True, clip=clip)["data"]
+        return Image.open(io.BytesIO(base64.b64decode(data))).convert("RGB")
+
+    def close(self):
+        self.process.terminate()
+        self.process.wait()
+
+
+def count(image, colour):
+    """Pixels of about this colour."""
+    wanted = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
+    masks = [
+        channel.point(lambda v, w=w: 255 if abs(v - w) <= NEAR else 0)
+        for channel, w in zip(image.split(), wanted)
+    ]
+    both = Image.composite(masks[0], Image.new("L", image.size), masks[1])
+    return Image.composite(both, Image.new("L", image.size), masks[2]).histogram()[255]
+
+
+def inspect(browser, address, width, picture):
+    """All that is wrong with a page at this width, and how many plots and curves it has."""
+    wrong = []
+    for event in browser.open(address, width):
+        method, parameters = event.get("method"), event.get("params", {})
+        if method == "Runtime.consoleAPICalled":
+            said = " ".join(str(a.get("value", "")) for a in parameters["args"])
+            wrong.append(f"console: {parameters['type']}: {said}")
+        elif method == "Runtime.exceptionThrown":
+            wrong.append(f"console: exception: {parameters['exceptionDetails'].get('text')}")
+        elif method == "Log.entryAdded":
+            wrong.append(f"console: {parameters['entry']['text']}")
+        elif method == "Network.requestWillBeSent":
+            asked = parameters["request"]["url"]
+            if asked != address and not asked.startswith("data:"):
+                wrong.append(f"outside request: {asked}")
+    total = browser.evaluate("document.documentElement.scrollWidth")
+    if total > width:
+        wrong.append(f"the page is {total} pixels wide")
+    image = browser.screenshot()
+    image.save(picture)
+    plots = json.loads(browser.evaluate(PLOTS))
+    for plot in plots:
+        title, (left, top, across, down) = plot["title"], plot["box"]
+        if not plot["label"]:
+            wrong.append(f"{title}: no words for a screen reader")
+        if across < 200 or left < 0 or left + across > width + 1:
+            wrong.append(f"{title}: from {left:.0f} to {left + across:.0f} pixels")
+        if plot["font"] < 9:
+            wrong.append(f"{title}: letters of {plot['font']:.1f} pixels")
+        box = image.crop((int(left), int(top), int(left + across), int(top + down)))
+        # Below this are the legend's own lines, which prove nothing.
+        inside = box.crop((0, 0, box.width, int(box.width * 370 / 480)))
+        if not plot["marks"]:
+            wrong.append(f"{title}: nothing drawn")
+        for mark in plot["marks"]:
+            found = count(inside, mark["colour"])
+            if found < PIXELS[mark["kind"]]:
+                wrong.append(f"{title}: {mark['name']} is not visible: {found} pixels of {mark['colour']}")
+    return wrong, len(plots), sum(len(plot["marks"]) for plot in plots)
+
+
+def main(arguments):
+    if len(arguments) != 2:
+        print("usage: python report.py REPORT.html SCREENSHOTS", file=sys.stderr)
+        return 2
+    report, pictures = Path(arguments[0]).resolve(), Path(arguments[1])
+    if not report.is_file():
+        print(f"{report}: no such file", file=sys.stderr)
+        return 2
+    pictures.mkdir(parents=True, exist_ok=True)
+    failed = 0
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        browser = Browser(f"{folder}/profile")
+        try:
+            faulty = Path(folder) / "faults.html"
+            faulty.write_text(FAULTS, encoding="utf-8")
+            wrong, _, _ = inspect(browser, faulty.as_uri(), WIDTHS[0], f"{folder}/faults.png")
+            for part in ("console: error: planted", "outside request", "pixels wide", "unseen is not visible"):
+                if not any(part in line for line in wrong):
+                    failed += 1
+                    print(f"FAILED: the planted fault '{part}' was not found in {wrong}")
+            for width in WIDTHS:
+                picture = pictures / f"report-{width}.png"
+                wrong, plots, marks = inspect(browser, report.as_uri(), width, picture)
+                # Space, time and two pictures for each problem, and three of differences.
+                if plots != 11:
+                    wrong.append(f"{plots} plots, not 11")
+                failed += len(wrong)
+                print(f"{width} pixels: {plots} plots, {marks} curves and colours; {picture}")
+                for line in wrong:
+                    print(f"FAILED at {width} pixels: {line}")
+        finally:
+            browser.close()
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
