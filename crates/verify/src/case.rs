@@ -298,14 +298,14 @@ pub(crate) fn follow<T: Real, const D: usize>(
     outputs: &mut Outputs<'_>,
 ) -> Result<Row, CaseError> {
     let dt = steps.dt;
+    let lag = solver.velocity_lag();
     let mut frames = match outputs.frames {
-        Some(output) => Some(FrameWriter::new(output, steps.count)?),
+        Some(output) => Some(FrameWriter::new(output, steps.count, lag)?),
         None => None,
     };
     if let Some(frames) = &mut frames {
         frames.write(solver.observe(), exact, 0, 0.0)?;
     }
-    let lag = solver.velocity_lag();
     let at_start = measure(solver.observe(), exact, 0.0, lag).norms;
     // Before the first step no velocity is stored yet that belongs to a time of the scheme.
     let mut errors = PerField { v: PerNorm::default(), ..at_start };

@@ -18,21 +18,24 @@ pub struct FrameOutput {
     pub count: u64,
 }
 
-/// Writes the frames of one run.
+/// Writes the frames of one run. Frames tell the time of their velocities, but for the first state, whose velocity belongs to
+/// no time of the scheme yet.
 pub(crate) struct FrameWriter {
     series: Series,
     count: u64,
     steps: u64,
+    /// How far velocities lag behind positions.
+    velocity_lag: f64,
     /// The number of the next frame.
     next: u64,
 }
 
 impl FrameWriter {
-    pub(crate) fn new(output: &FrameOutput, steps: u64) -> Result<Self, Error> {
+    pub(crate) fn new(output: &FrameOutput, steps: u64, velocity_lag: f64) -> Result<Self, Error> {
         let series = Series::create(&output.folder, &output.name)?;
         // More frames than states there are would repeat some.
         let count = output.count.clamp(2, steps + 1);
-        Ok(Self { series, count, steps, next: 0 })
+        Ok(Self { series, count, steps, velocity_lag, next: 0 })
     }
 
     /// Writes the state after `step` if it is one of those wanted.
@@ -48,7 +51,10 @@ impl FrameWriter {
         }
         self.next += 1;
         match frame(state, exact, step, time) {
-            Some(frame) => self.series.write(&frame).map(|_| ()),
+            Some(frame) => {
+                let velocity_time = (step > 0).then_some(time - self.velocity_lag);
+                self.series.write(&Frame { velocity_time, ..frame }).map(|_| ())
+            }
             None => Ok(()),
         }
     }
@@ -63,8 +69,7 @@ fn step_of_frame(index: u64, count: u64, steps: u64) -> u64 {
 
 /// The particles with what the solver holds and what is exact.
 ///
-/// The velocity is the stored one, which centred differences hold half a step earlier; the frame tells its time, but for
-/// the first state, whose velocity belongs to no time of the scheme yet. `stress` is Cauchy's. Both stresses are from the
+/// The velocity is the stored one, which centred differences hold half a step earlier. `stress` is Cauchy's. Both stresses are from the
 /// solver's law, with the component normal to the plane in two dimensions. `None` if a particle has no stress because it
 /// is inside out: no viewer reads numbers that are none.
 fn frame<T: Real, const D: usize>(
@@ -116,7 +121,7 @@ fn frame<T: Real, const D: usize>(
     Some(Frame {
         time,
         step,
-        velocity_time: (step > 0).then(|| time - simulation.velocity_lag().to_f64()),
+        velocity_time: None,
         points,
         arrays: vec![
             array("displacement", Values::Vector(displacement)),
