@@ -309,15 +309,14 @@ pub(crate) fn follow<T: Real, const D: usize>(
     steps: Steps,
     outputs: &mut Outputs<'_>,
 ) -> Result<Row, CaseError> {
-    let dt = steps.dt;
+    let (dt, lag) = (steps.dt, solver.velocity_lag());
     let mut frames = match outputs.frames {
         Some(output) => Some(FrameWriter::new(output, steps.count)?),
         None => None,
     };
     if let Some(frames) = &mut frames {
-        frames.write(solver.observe(), exact, 0, 0.0)?;
+        frames.write(solver.observe(), exact, 0, (0.0, lag))?;
     }
-    let lag = solver.velocity_lag();
     let at_start = measure(solver.observe(), exact, 0.0, lag).norms;
     // Before the first step no velocity is stored yet that belongs to a time of the scheme.
     let mut errors = PerField { v: PerNorm::default(), ..at_start };
@@ -341,7 +340,7 @@ pub(crate) fn follow<T: Real, const D: usize>(
             status = Status::Unstable { step, time, particle, error, size: scene.size };
         }
         if let Some(frames) = &mut frames {
-            frames.write(solver.observe(), exact, step, time)?;
+            frames.write(solver.observe(), exact, step, (time, lag))?;
         }
         let share = step as f64 / steps.count as f64;
         (outputs.progress)(Progress { case: 0, step, steps: steps.count, share });

@@ -35,19 +35,19 @@ impl FrameWriter {
         Ok(Self { series, count, steps, next: 0 })
     }
 
-    /// Writes the state after `step` if it is one of those wanted.
+    /// Writes the state after `step` if it is one of those wanted; velocities belong to a time `lag` earlier.
     pub(crate) fn write<T: Real, const D: usize>(
         &mut self,
         state: (&Particles<T, D>, &Material<T>),
         exact: &dyn Solution<f64, D>,
         step: u64,
-        time: f64,
+        (time, lag): (f64, f64),
     ) -> Result<(), Error> {
         if step < step_of_frame(self.next, self.count, self.steps) {
             return Ok(());
         }
         self.next += 1;
-        match frame(state, exact, step, time) {
+        match frame(state, exact, step, (time, lag)) {
             Some(frame) => self.series.write(&frame).map(|_| ()),
             None => Ok(()),
         }
@@ -71,7 +71,7 @@ fn frame<T: Real, const D: usize>(
     (particles, law): (&Particles<T, D>, &Material<T>),
     exact: &dyn Solution<f64, D>,
     step: u64,
-    time: f64,
+    (time, lag): (f64, f64),
 ) -> Option<Frame> {
     let count = particles.len();
     let mut points = Vec::with_capacity(count);
@@ -116,7 +116,7 @@ fn frame<T: Real, const D: usize>(
     Some(Frame {
         time,
         step,
-        velocity_time: (step > 0).then(|| time - simulation.velocity_lag().to_f64()),
+        velocity_time: (step > 0).then(|| time - lag),
         points,
         arrays: vec![
             array("displacement", Values::Vector(displacement)),
