@@ -116,7 +116,7 @@ fn frame<T: Real, const D: usize>(
     Some(Frame {
         time,
         step,
-        velocity_time: (step > 0).then(|| time - lag),
+        velocity_time: (step > 0).then_some(time - lag),
         points,
         arrays: vec![
             array("displacement", Values::Vector(displacement)),
