@@ -75,7 +75,7 @@ fn text(names: &[String], shares: &[Vec<Share>], set: &[&String], missing: &[Par
     let mut table = Table::new(1, header);
     for (row, part) in Part::all().into_iter().enumerate() {
         let cells = shares.iter().map(|shares| match shares[row].share {
-            share if share == 0.0 => ".".to_owned(),
+            0.0 => ".".to_owned(),
             share if share < 0.001 => "<0.1".to_owned(),
             share => format!("{:.1}", 100.0 * share),
         });
