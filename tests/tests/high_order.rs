@@ -38,7 +38,7 @@ const SERIES: &[Series] = &[
         reference: &[1.2e-5, 5.4e-7, 3.9e-8, 2.5e-9],
         order: 3.8,
     },
-    // No reference: the figures are twice what was measured when this was written.
+    // No outside figures: what was measured when this was written, with the same factor of two.
     Series {
         call: "axis-aligned-1d --shape bspline3 --composition 4 --set A=0.05",
         cells: "8,16,32,64",
