@@ -286,7 +286,6 @@ fn run_in<T: Real, const D: usize>(
     follow(simulation, &body_force, exact, case, &scene, Steps { dt, ..steps }, outputs)
 }
 
-
 /// Steps to the end and measures the errors on the way.
 pub(crate) fn follow<T: Real, const D: usize>(
     mut solver: impl Solver<T, D>,

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::case::Case;
 use crate::norms::{PerField, PerNorm};
-use crate::{Integrator, Shape, points};
+use crate::{Frame, Integrator, Shape, points};
 
 /// How far an order on the finest pair of cases may be from the expected one where nothing else is said.
 pub const ORDER_TOLERANCE: f64 = 0.1;

@@ -154,7 +154,7 @@ fn measure_differences(
     folder: &Path,
 ) -> Result<Differences> {
     let options = SchemeOptions::usual(scheme.0, scheme.1);
-    let base = case(&options, cells);
+    let base = case(&options, cells)?;
     let extent = model.admit(&[base])?;
     let stem = format!("{kind}-{}-{}", word(scheme.0), word(scheme.1));
     let json = Output::prepare(&folder.join(format!("{stem}.json")))?;
