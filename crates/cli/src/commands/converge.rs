@@ -55,7 +55,7 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
         let judged = judge(&study, &sweep, &in_space, tolerance);
         let differences = match &sweep {
             // In the total frame the order in time is that of the composition, far below the error in space.
-            Sweep::Cfls(cfls) if base.frame == Frame::Updated => {
+            Sweep::Cfls(cfls) if base.frame == mmsmith_verify::Frame::Updated => {
                 let found = differences(&model, &base, cfls, "difference")?;
                 let expected = asked.unwrap_or_else(|| expected_in_time(&base));
                 let judged = judge_differences(&found, &expected, tolerance);
