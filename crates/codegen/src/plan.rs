@@ -4,7 +4,9 @@
 //! point, and for each point at each time. It alone decides which values are kept between the stages and in which
 //! order; the Rust module and the C header are two renderings of the same plan, so that their results agree.
 
-use mmsmith_expr::{Dependence, Expr, Function, Operation, Program, Rational, Slot, arrange, reuse};
+use mmsmith_expr::{
+    Dependence, Expr, Function, Operation, Program, Rational, Slot, arrange, reuse,
+};
 use mmsmith_spec::{DeriveError, Domain, Fields, Spec, Surface};
 use std::collections::BTreeMap;
 

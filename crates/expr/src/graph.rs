@@ -361,7 +361,9 @@ impl Graph {
                     Function::Cos => (value.cos(), 1.0),
                     Function::Exp => (value.exp(), value.exp()),
                     Function::Ln => (value.ln(), 1.0 / value.abs()),
-                    Function::Ln1p | Function::LnOfBoth => (value.ln_1p(), 1.0 / (1.0 + value).abs()),
+                    Function::Ln1p | Function::LnOfBoth => {
+                        (value.ln_1p(), 1.0 / (1.0 + value).abs())
+                    }
                     // The others are rare; nothing is said of them here.
                     _ => (f64::NAN, f64::NAN),
                 };

@@ -156,10 +156,8 @@ impl Shortening<'_> {
                 for (base, exponent) in factors {
                     if !self.turns(base) {
                         let power = self.graph.product([(base, exponent)]);
-                        total = self.times(
-                            &total,
-                            &Polynomial::from([(Monomial::new(), power)]),
-                        )?;
+                        total =
+                            self.times(&total, &Polynomial::from([(Monomial::new(), power)]))?;
                         continue;
                     }
                     let whole = exponent.is_integer() && exponent.is_positive();
@@ -252,7 +250,13 @@ mod tests {
     fn the_rotation_drops_out_of_a_strain() {
         let mut graph = Graph::new();
         // 2 H_XX + H_XX^2 + H_XY^2 + H_XZ^2 for H_XX = -2 s^2, H_XY = -2 s c.
-        let texts = ["-2*sin(a)^2", "-2*sin(a)^2", "4*sin(a)^4", "4*sin(a)^2*cos(a)^2", "(x*sin(a)+y*cos(a))^2"];
+        let texts = [
+            "-2*sin(a)^2",
+            "-2*sin(a)^2",
+            "4*sin(a)^4",
+            "4*sin(a)^2*cos(a)^2",
+            "(x*sin(a)+y*cos(a))^2",
+        ];
         let terms: Vec<Expr> = texts.iter().map(|text| build(&mut graph, text)).collect();
         let left = graph.without_vanishing_part(&terms);
         assert_eq!(left, [terms[4]]);
