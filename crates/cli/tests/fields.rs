@@ -50,6 +50,41 @@ fn check_takes_names_and_parameters() {
 }
 
 #[test]
+fn thorough_check_states_the_worst_factor_of_each_field_in_each_class() {
+    let place = tempfile::tempdir().unwrap();
+    let called = mms(place.path(), "check --thorough torsion bar --points 3 --json thorough.json");
+    assert_eq!(called.status, 0, "{}{}", called.stdout, called.stderr);
+    let check = read_json(&place.path().join("thorough.json"));
+    assert_eq!(check["schema"], "mmsmith.check/1");
+    assert_eq!(check["passed"], true);
+    let results = check["results"].as_array().unwrap();
+    assert_eq!(results.len(), 2);
+    for result in results {
+        assert_eq!(result["code"], "generated");
+        let rows = result["accuracy"].as_array().unwrap();
+        for field in ["u", "v", "a", "H", "F", "J", "P", "b", "b staged"] {
+            let row = rows.iter().find(|row| row["field"] == field && row["class"] == "ordinary");
+            assert!(row.unwrap()["K"].as_f64().unwrap() <= 8.0, "{field}");
+        }
+    }
+}
+
+/// A displacement written as a difference of numbers near one has no digits where it is small.
+#[test]
+fn thorough_check_fails_what_loses_digits() {
+    let place = tempfile::tempdir().unwrap();
+    let spec = include_str!("../../../mms-specs/bar.toml");
+    let from = spec.lines().find(|line| line.starts_with("X = ")).unwrap();
+    let (_, formula) = from.split_once("= '").unwrap();
+    let careless = format!("X = '(1 + {})^3 - 1'", formula.trim_end_matches('\''));
+    fs::write(place.path().join("careless.toml"), spec.replace(from, &careless)).unwrap();
+    let called = mms(place.path(), "check --thorough careless.toml --points 20 --json out.json");
+    assert_eq!(called.status, 1, "{}{}", called.stdout, called.stderr);
+    assert!(called.stdout.contains("FAILED"), "{}", called.stdout);
+    assert_eq!(read_json(&place.path().join("out.json"))["passed"], false);
+}
+
+#[test]
 fn eval_gives_all_fields_at_each_point() {
     let place = tempfile::tempdir().unwrap();
     let points = r#"[ { "X": [0.25, 0.75], "t": 0.013 },

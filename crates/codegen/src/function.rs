@@ -85,6 +85,10 @@ impl Translator {
                 let (y, x) = (at(y), at(x));
                 quote!(#y.atan2(#x))
             }
+            Operation::LnOfBoth(x, y) => {
+                let (x, y) = (at(x), at(y));
+                quote!(#x.ln_of_both(#y))
+            }
         }
     }
 }
@@ -118,6 +122,7 @@ fn rust_name(function: Function) -> &'static str {
         Function::Ln1p => "log_1p",
         Function::Expm1 => "exp_m1",
         Function::Atan2 => "atan2",
+        Function::LnOfBoth => "ln_of_both",
         Function::LogRatioSquared => "log_ratio_squared",
         Function::LogRatioSlope => "log_ratio_slope",
         Function::LogRatioCurvature => "log_ratio_curvature",

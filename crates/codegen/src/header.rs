@@ -714,6 +714,9 @@ before. Results equal those of the Rust functions bit for bit where the compiler
                 format!("pow({}, {})", at(a), literal(nearest_f64(exponent)))
             }
             Operation::Atan2(y, x) => format!("atan2({}, {})", at(y), at(x)),
+            Operation::LnOfBoth(x, y) => {
+                format!("({x} < -0.5 ? log({y}) : log1p({x}))", x = at(x), y = at(y))
+            }
         }
     }
 }
@@ -800,6 +803,8 @@ fn c_name(function: Function) -> &'static str {
         Function::Ln1p => "mmsmith_log_1p",
         Function::Expm1 => "expm1",
         Function::Atan2 => "atan2",
+        // Written out.
+        Function::LnOfBoth => "",
         Function::LogRatioSquared => "mmsmith_log_ratio_squared",
         Function::LogRatioSlope => "mmsmith_log_ratio_slope",
         Function::LogRatioCurvature => "mmsmith_log_ratio_curvature",

@@ -138,11 +138,7 @@ impl Graph {
             if result.len() + pending.len() > MOST_TERMS {
                 return None;
             }
-            let squared = monomial.iter().find_map(|(&atom, &power)| match self.node(atom) {
-                Node::Call(Function::Cos, arguments) if power >= 2 => Some((atom, arguments[0])),
-                _ => None,
-            });
-            let Some((cosine, argument)) = squared else {
+            let Some((cosine, argument)) = self.squared_cosine(&monomial) else {
                 add_to(&mut result, monomial, &coefficient);
                 continue;
             };
@@ -157,6 +153,14 @@ impl Graph {
             pending.push((with_sine, -coefficient));
         }
         Some(result)
+    }
+
+    /// A cosine that is squared in a product of powers, and its argument.
+    pub(crate) fn squared_cosine(&self, monomial: &BTreeMap<Expr, u32>) -> Option<(Expr, Expr)> {
+        monomial.iter().find_map(|(&atom, &power)| match self.node(atom) {
+            Node::Call(Function::Cos, arguments) if power >= 2 => Some((atom, arguments[0])),
+            _ => None,
+        })
     }
 
     /// The sum as one product or zero, where it is one.

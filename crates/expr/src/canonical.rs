@@ -357,6 +357,7 @@ impl Graph {
             | Function::Sinh
             | Function::Tanh
             | Function::Ln1p
+            | Function::LnOfBoth
             | Function::Expm1
             | Function::LogRatioSquared
             | Function::LogRatioSlope

@@ -64,6 +64,10 @@ impl Derivatives {
                 graph.sum(parts)
             }
             Node::Call(Function::Atan2, arguments) => self.atan2(graph, &arguments, variable),
+            Node::Call(Function::LnOfBoth, arguments) => {
+                let change = self.of(graph, arguments[0], variable);
+                graph.div(change, arguments[1])
+            }
             Node::Call(function, arguments) => {
                 let inner = self.of(graph, arguments[0], variable);
                 if inner == Graph::ZERO {
@@ -153,6 +157,6 @@ fn outer_derivative(graph: &mut Graph, function: Function, x: Expr) -> Expr {
             graph.neg(quotient)
         }
         // Two arguments: handled by the caller.
-        Function::Atan2 => Graph::ZERO,
+        Function::Atan2 | Function::LnOfBoth => Graph::ZERO,
     }
 }

@@ -19,7 +19,7 @@ const CERTAIN: f64 = 1e-6;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Expr(pub(crate) u32);
 
-/// A function of one argument, or of two for [`Function::Atan2`].
+/// A function of one argument, or of two for [`Function::Atan2`] and [`Function::LnOfBoth`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Function {
     /// Sine.
@@ -46,6 +46,9 @@ pub enum Function {
     Ln,
     /// `ln(1 + x)`, accurate for small `x`.
     Ln1p,
+    /// `ln(y)` of `y = 1 + x`, given as `(x, y)`: accurate next to one, where `x` has the digits, and next to zero,
+    /// where `y` has them.
+    LnOfBoth,
     /// `exp(x) - 1`, accurate for small `x`.
     Expm1,
     /// `atan2(y, x)`, the polar angle of the point `(x, y)`.
@@ -76,6 +79,7 @@ impl Function {
         ("expm1", Function::Expm1),
         ("atan2", Function::Atan2),
         ("lnratio2", Function::LogRatioSquared),
+        ("lnboth", Function::LnOfBoth),
         ("lnratio2_slope", Function::LogRatioSlope),
         ("lnratio2_curvature", Function::LogRatioCurvature),
         // Other usual spellings.
@@ -100,7 +104,7 @@ impl Function {
     /// The number of arguments.
     #[must_use]
     pub fn arity(self) -> usize {
-        if self == Function::Atan2 { 2 } else { 1 }
+        if matches!(self, Function::Atan2 | Function::LnOfBoth) { 2 } else { 1 }
     }
 }
 
@@ -292,13 +296,36 @@ impl Graph {
 
     /// Whether the value at one fixed place, in double precision, is beyond any doubt not zero.
     pub(crate) fn differs_from_zero(&mut self, expr: Expr) -> bool {
+        let (value, magnitude) = self.sampled(expr);
+        certainly_not_zero(value, magnitude)
+    }
+
+    /// As [`Graph::differs_from_zero`], for a sum that need not be a node.
+    pub(crate) fn sum_differs_from_zero(&mut self, terms: impl Iterator<Item = Expr>) -> bool {
+        let (value, magnitude) = terms.fold((0.0, 0.0), |(sum, size), term| {
+            let (value, magnitude) = self.sampled(term);
+            (sum + value, size + magnitude)
+        });
+        certainly_not_zero(value, magnitude)
+    }
+
+    /// Whether all of `terms` have values at the one fixed place.
+    pub(crate) fn sum_is_sampled(&mut self, terms: &[Expr]) -> bool {
+        terms.iter().all(|&term| self.magnitude(term).is_finite())
+    }
+
+    /// The magnitude of what `expr` is summed up from, at one fixed place.
+    pub(crate) fn magnitude(&mut self, expr: Expr) -> f64 {
+        self.sampled(expr).1
+    }
+
+    fn sampled(&mut self, expr: Expr) -> (f64, f64) {
         // Children have smaller handles than their parents.
         while self.samples.len() <= expr.0 as usize {
             let sample = self.sample(&self.nodes[self.samples.len()]);
             self.samples.push(sample);
         }
-        let (value, magnitude) = self.samples[expr.0 as usize];
-        value.is_finite() && magnitude.is_finite() && value.abs() > CERTAIN * magnitude
+        self.samples[expr.0 as usize]
     }
 
     /// The value of a node, and a magnitude such that the rounding error is a small multiple of `2^-53` times it.
@@ -334,7 +361,9 @@ impl Graph {
                     Function::Cos => (value.cos(), 1.0),
                     Function::Exp => (value.exp(), value.exp()),
                     Function::Ln => (value.ln(), 1.0 / value.abs()),
-                    Function::Ln1p => (value.ln_1p(), 1.0 / (1.0 + value).abs()),
+                    Function::Ln1p | Function::LnOfBoth => {
+                        (value.ln_1p(), 1.0 / (1.0 + value).abs())
+                    }
                     // The others are rare; nothing is said of them here.
                     _ => (f64::NAN, f64::NAN),
                 };
@@ -365,6 +394,10 @@ impl Graph {
         }
         seen
     }
+}
+
+fn certainly_not_zero(value: f64, magnitude: f64) -> bool {
+    value.is_finite() && magnitude.is_finite() && value.abs() > CERTAIN * magnitude
 }
 
 /// The numbers in a node.

@@ -40,6 +40,7 @@ mod near_zero;
 mod parse;
 mod print;
 mod program;
+mod pythagoras;
 mod rational;
 mod reciprocal;
 mod reuse;

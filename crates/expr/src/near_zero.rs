@@ -45,9 +45,9 @@ impl Splitting<'_> {
                 (self.graph.sum(values), self.graph.sum(rests))
             }
             Node::Product(factors) => self.product(expr, &factors),
-            Node::Call(Function::Atan2, arguments) => {
+            Node::Call(function @ (Function::Atan2 | Function::LnOfBoth), arguments) => {
                 let values: Vec<Expr> = arguments.iter().map(|&a| self.split(a).0).collect();
-                self.plain(expr, Function::Atan2, &values)
+                self.plain(expr, function, &values)
             }
             Node::Call(function, arguments) => {
                 let inner = self.split(arguments[0]);

@@ -57,6 +57,8 @@ pub enum Operation {
     Call(Function, Slot),
     /// `atan2(y, x)`.
     Atan2(Slot, Slot),
+    /// `ln(y)` of `y = 1 + x`, given as `(x, y)`: by `y` where `x < -1/2`, else by `x`.
+    LnOfBoth(Slot, Slot),
 }
 
 impl Operation {
@@ -69,7 +71,8 @@ impl Operation {
             | Operation::Sub(a, b)
             | Operation::Mul(a, b)
             | Operation::Div(a, b)
-            | Operation::Atan2(a, b) => vec![a, b],
+            | Operation::Atan2(a, b)
+            | Operation::LnOfBoth(a, b) => vec![a, b],
             Operation::Neg(a)
             | Operation::Sqrt(a)
             | Operation::Power(a, _)
@@ -94,6 +97,7 @@ impl Operation {
             Operation::CosPi(a) => Operation::CosPi(place(a)),
             Operation::Call(function, a) => Operation::Call(function, place(a)),
             Operation::Atan2(a, b) => Operation::Atan2(place(a), place(b)),
+            Operation::LnOfBoth(a, b) => Operation::LnOfBoth(place(a), place(b)),
         }
     }
 
@@ -114,6 +118,13 @@ impl Operation {
             Operation::CosPi(a) => sin_pi_shifted(at(a), 1),
             Operation::Call(function, a) => call(function, at(a)),
             Operation::Atan2(y, x) => at(y).atan2(at(x)),
+            Operation::LnOfBoth(x, y) => {
+                if at(x) < -0.5 {
+                    at(y).ln()
+                } else {
+                    at(x).ln_1p()
+                }
+            }
         }
     }
 }
@@ -180,7 +191,8 @@ impl OperationCount {
             | Operation::SinPi(_)
             | Operation::CosPi(_)
             | Operation::Call(..)
-            | Operation::Atan2(..) => self.calls += 1,
+            | Operation::Atan2(..)
+            | Operation::LnOfBoth(..) => self.calls += 1,
         }
     }
 }
@@ -345,7 +357,9 @@ impl Program {
                 Operation::Mul(a, b) => error(a) * at(b).abs() + error(b) * at(a).abs(),
                 Operation::Div(a, b) => (error(a) + error(b) * value.abs()) / at(b).abs(),
                 Operation::Neg(a) => error(a),
-                Operation::Atan2(a, b) => error(a) * slope(a) + error(b) * slope(b),
+                Operation::Atan2(a, b) | Operation::LnOfBoth(a, b) => {
+                    error(a) * slope(a) + error(b) * slope(b)
+                }
                 Operation::Sqrt(a)
                 | Operation::Power(a, _)
                 | Operation::SinPi(a)
@@ -417,8 +431,8 @@ fn call(function: Function, x: f64) -> f64 {
         Function::LogRatioSquared => log_ratio::squared(x),
         Function::LogRatioSlope => log_ratio::slope(x),
         Function::LogRatioCurvature => log_ratio::curvature(x),
-        // Has an operation of its own.
-        Function::Atan2 => f64::NAN,
+        // These have operations of their own.
+        Function::Atan2 | Function::LnOfBoth => f64::NAN,
     }
 }
 
@@ -485,6 +499,10 @@ impl Lowering<'_> {
             Node::Call(Function::Atan2, arguments) => {
                 let (y, x) = (self.lower(arguments[0]), self.lower(arguments[1]));
                 self.push(Operation::Atan2(y, x))
+            }
+            Node::Call(Function::LnOfBoth, arguments) => {
+                let (x, y) = (self.lower(arguments[0]), self.lower(arguments[1]));
+                self.push(Operation::LnOfBoth(x, y))
             }
             Node::Call(function, arguments) => self.call(function, arguments[0]),
             Node::Sum { constant, terms } => self.sum(constant, &terms),

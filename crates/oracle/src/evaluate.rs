@@ -356,6 +356,8 @@ impl Evaluation<'_> {
         {
             return self.trigonometric(expression, function, &half_turns);
         }
+        // Precision enough makes up for the digits that only the second argument has in doubles.
+        let function = if function == Function::LnOfBoth { Function::Ln1p } else { function };
         let x = self.value(arguments[0])?.clone();
         let one = BigFloat::from_word(1, bits);
         let minus_one = one.neg();
@@ -391,7 +393,7 @@ impl Evaluation<'_> {
             Function::Exp => x.exp(bits, ROUNDING, constants),
             Function::Ln => x.ln(bits, ROUNDING, constants),
             Function::Ln1p | Function::Expm1 if x.is_zero() => x,
-            Function::Ln1p | Function::Expm1 => {
+            Function::Ln1p | Function::LnOfBoth | Function::Expm1 => {
                 let smallness = smallness(&x);
                 if smallness > bits {
                     // x -+ x^2/2: what is left out is below 2^-2bits.

@@ -9,17 +9,20 @@ use mmsmith_solutions::build;
 use mmsmith_spec::Spec;
 use std::path::Path;
 
-const POINTS_A_CLASS: usize = 6;
+/// In each class, for the library's solutions and for the further specifications.
+const POINTS: usize = 60;
+const POINTS_OF_FURTHER: usize = 6;
 
 fn judge(
     spec: &Spec,
     way: &str,
     accuracy: &Accuracy<'_>,
+    points: usize,
     judged: &(dyn Fn(&[f64]) -> Result<Judged, String> + Sync),
     failures: &mut Vec<String>,
 ) {
     for class in Class::ALL {
-        let found = accuracy.measure(class, POINTS_A_CLASS, judged, &|| ()).unwrap();
+        let found = accuracy.measure(class, points, judged, &|| ()).unwrap();
         let row: Vec<String> =
             found.worst.iter().map(|worst| format!("{:5.2e}", worst.factor)).collect();
         let remark = found.remark.unwrap_or_default();
@@ -64,12 +67,37 @@ fn every_specification_in_every_class() {
             let solution = solution.map_err(|error| error.to_string())?;
             solution.each_field(&inputs[..n], inputs[n]).ok_or("wrong dimension".into())
         };
-        judge(&spec, "generated", &accuracy, &generated, &mut failures);
+        judge(&spec, "generated", &accuracy, POINTS, &generated, &mut failures);
         let programs = accuracy.programs();
         let interpreted = |inputs: &[f64]| -> Result<Judged, String> {
             Ok(programs.iter().map(|(letter, p)| (*letter, p.evaluate(inputs))).collect())
         };
-        judge(&spec, "program", &accuracy, &interpreted, &mut failures);
+        judge(&spec, "program", &accuracy, POINTS / 4, &interpreted, &mut failures);
+    }
+    assert!(failures.is_empty(), "beyond K = {LARGEST_FACTOR}:\n{}", failures.join("\n"));
+}
+
+/// Laws and coordinates that no solution of the library has, by the programs alone.
+#[test]
+fn further_specifications() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/specs");
+    let mut files: Vec<_> = [folder.clone(), folder.join("materials")]
+        .iter()
+        .flat_map(|folder| std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().path()))
+        .filter(|f| f.extension().is_some_and(|e| e == "toml"))
+        .collect();
+    files.sort();
+    assert!(files.len() > 10, "{files:?}");
+    let mut failures = Vec::new();
+    for file in files {
+        let text = std::fs::read_to_string(&file).unwrap();
+        let spec = Spec::parse(&text, &file.display().to_string()).unwrap();
+        let accuracy = Accuracy::new(&spec, spec.derive().unwrap());
+        let programs = accuracy.programs();
+        let interpreted = |inputs: &[f64]| -> Result<Judged, String> {
+            Ok(programs.iter().map(|(letter, p)| (*letter, p.evaluate(inputs))).collect())
+        };
+        judge(&spec, "program", &accuracy, POINTS_OF_FURTHER, &interpreted, &mut failures);
     }
     assert!(failures.is_empty(), "beyond K = {LARGEST_FACTOR}:\n{}", failures.join("\n"));
 }

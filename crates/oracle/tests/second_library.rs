@@ -86,8 +86,8 @@ fn evaluate(graph: &Graph, expr: Expr, x: &Float) -> Option<Float> {
                 Function::Exp => argument.exp(),
                 Function::Ln if argument <= Float::ZERO => return None,
                 Function::Ln => argument.ln(),
-                Function::Ln1p if argument <= -one.clone() => return None,
-                Function::Ln1p => argument.ln_1p(),
+                Function::Ln1p | Function::LnOfBoth if argument <= -one.clone() => return None,
+                Function::Ln1p | Function::LnOfBoth => argument.ln_1p(),
                 Function::Expm1 => argument.exp_m1(),
                 Function::Atan2 => argument.atan2(&value(arguments[1])?),
                 Function::LogRatioSquared

@@ -22,6 +22,15 @@ pub trait Real: RealField + Copy {
     /// all processors give the same bits.
     fn log_1p(self) -> Self;
 
+    /// `ln(y)` of `y = 1 + x`, where `x` is `self`: by `y` where `x < -1/2`, else by `x`.
+    ///
+    /// A ratio of volumes next to one has its digits in `x`, one next to zero, as a product of stretches, in `y`.
+    #[must_use]
+    #[inline]
+    fn ln_of_both(self, y: Self) -> Self {
+        if self < Self::nearest(-0.5) { y.ln() } else { self.ln_1p() }
+    }
+
     /// `arcosh(1 + z)^2`: the squared logarithm of the ratio of two stretches `a`, `b` for `z = (a - b)^2/(2 a b)`.
     #[must_use]
     fn log_ratio_squared(self) -> Self {

@@ -92,6 +92,11 @@ pub(crate) struct Geometry {
 }
 
 impl Geometry {
+    /// Whether the unit vectors are the Cartesian ones.
+    pub(crate) fn is_cartesian(&self) -> bool {
+        self.definitions.is_empty()
+    }
+
     pub(crate) fn new(graph: &mut Graph, coordinates: Coordinates, dimension: usize) -> Self {
         let cartesian: Vec<Expr> =
             CARTESIAN[..dimension].iter().map(|name| graph.symbol(name)).collect();

@@ -102,7 +102,14 @@ impl Fields {
         let a = vector(&mut graph, &a);
         let b = vector(&mut graph, &b);
         let H = turn_matrix(&mut graph, &geometry, &H);
-        let P = turn_matrix(&mut graph, &geometry, &stress.P);
+        let mut P = stress.P.clone();
+        if !geometry.is_cartesian() {
+            P = turn_matrix(&mut graph, &geometry, &stress.anisotropic);
+            let isotropic = graph.replace(stress.isotropic, &geometry.shorter);
+            for (i, row) in P.iter_mut().enumerate() {
+                row[i] = graph.add(isotropic, row[i]);
+            }
+        }
         let W = stress.energy.map(|W| graph.replace(W, &geometry.shorter));
         let J = graph.replace(deformation.J, &geometry.shorter);
         let mut F = H.clone();

@@ -30,6 +30,10 @@ pub(crate) struct Deformation {
 pub(crate) struct Stress {
     /// First Piola-Kirchhoff stress.
     pub(crate) P: Matrix,
+    /// A multiple of the identity within `P`, and the rest. Of the two, which are the same in all directions and not,
+    /// only the second meets the turn to Cartesian unit vectors, where differences of diagonal entries are formed.
+    pub(crate) isotropic: Expr,
+    pub(crate) anisotropic: Matrix,
     /// The divergence of the part of `P` that is linear in `H`, open: it may cancel against the inertia.
     pub(crate) linear: Vector,
     /// The divergence of the rest, small where `H` is small.
@@ -50,6 +54,12 @@ impl Deformation {
         }
         let determinant = determinant(graph, &F);
         let J = graph.whole(determinant);
+        // J - 1 as the sum of the principal minors of H, small where H is small.
+        let minors = principal_minors(graph, &H);
+        let volume_change = graph.sum_of(minors);
+        let volume_change = zero_if_vanishing(graph, volume_change);
+        let J = if volume_change == Graph::ZERO { Graph::ONE } else { J };
+        let volume_change = graph.whole(volume_change);
         let mut inverse_transpose = vec![vec![Graph::ZERO; n]; n];
         for i in 0..n {
             for k in 0..n {
@@ -57,13 +67,11 @@ impl Deformation {
                 inverse_transpose[i][k] = graph.div(cofactor, J);
             }
         }
-        // J - 1 as the sum of the principal minors of H, small where H is small.
-        let minors = principal_minors(graph, &H);
-        let volume_change = graph.sum_of(minors);
-        let volume_change = zero_if_vanishing(graph, volume_change);
-        let J = if volume_change == Graph::ZERO { Graph::ONE } else { J };
-        let volume_change = graph.whole(volume_change);
-        let log_J = graph.call(Function::Ln1p, &[volume_change]);
+        // A product of stretches has digits next to zero that the sum J - 1 lacks.
+        let log_J = match graph.node(J) {
+            Node::Product(_) => graph.call(Function::LnOfBoth, &[volume_change, J]),
+            _ => graph.call(Function::Ln1p, &[volume_change]),
+        };
         // Jacobi's formula, d ln J = F^-T : dH.
         for k in 0..n {
             let q = derivation.geometry.coordinates[k];
@@ -138,16 +146,18 @@ fn linear_elastic(
     let trace = graph.sum_of((0..n).map(|i| H[i][i]));
     let pressure = graph.mul(lambda, trace);
     let mut P = vec![vec![Graph::ZERO; n]; n];
+    let mut anisotropic = P.clone();
     for i in 0..n {
         for j in 0..n {
             let strain = graph.add(H[i][j], H[j][i]);
             let shear = graph.mul(mu, strain);
+            anisotropic[i][j] = zero_if_vanishing(graph, shear);
             let normal = if i == j { pressure } else { Graph::ZERO };
             let entry = graph.add(normal, shear);
             P[i][j] = zero_if_vanishing(graph, entry);
         }
     }
-    Stress { P, linear, remainder, energy: None }
+    Stress { P, isotropic: pressure, anisotropic, linear, remainder, energy: None }
 }
 
 /// The divergence of `lambda tr(H) I + mu (H + H^T)`, with the constants as they are written.

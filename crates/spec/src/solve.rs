@@ -461,8 +461,10 @@ impl<'a> Solver<'a> {
                 let atom_text = self.shown(*atom);
                 let message =
                     format!("'{text}' has no closed form: unknowns are inside of {atom_text}");
-                let logarithm =
-                    matches!(self.graph.node(*atom), Node::Call(Function::Ln1p | Function::Ln, _));
+                let logarithm = matches!(
+                    self.graph.node(*atom),
+                    Node::Call(Function::Ln1p | Function::LnOfBoth | Function::Ln, _)
+                );
                 let help = if logarithm && self.has_lambda {
                     format!(
                         "with lambda = 0 the stress has no ln(J), and may be a product of parts linear in {names}"

@@ -128,7 +128,7 @@ fn text(name: &str, passed: bool, accuracy: &Accuracy<'_>, classes: &[ClassAccur
         .unwrap_or_default();
     let mut table = Table::new(1, ["class", "points"].into_iter().chain(letters));
     for class in classes {
-        let factors = class.worst.iter().map(|worst| format!("{:.2}", worst.factor));
+        let factors = class.worst.iter().map(|worst| factor(worst.factor));
         let row = [class.class.name().to_owned(), class.points.to_string()];
         table.row(row.into_iter().chain(factors));
     }
@@ -155,6 +155,10 @@ fn text(name: &str, passed: bool, accuracy: &Accuracy<'_>, classes: &[ClassAccur
     }
     text.push('\n');
     text
+}
+
+fn factor(K: f64) -> String {
+    if K < 1e4 { format!("{K:.2}") } else { format!("{K:.1e}") }
 }
 
 fn rows(solution: &str, accuracy: &Accuracy<'_>, classes: &[ClassAccuracy]) -> Vec<Value> {

@@ -141,44 +141,6 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
 
 #endif
 
-#ifndef MMSMITH_LOG_1P
-#define MMSMITH_LOG_1P 1
-
-/* ln(1 + x), within one unit in the last place, by the reduction and the polynomial of Sun's fdlibm. */
-MMSMITH_FN double mmsmith_log_1p(double x)
-{
-    const double sum = 1.0 + x;
-    /* What rounding took from the sum. */
-    const double lost = x < 1.0 ? x - (sum - 1.0) : 1.0 - (sum - x);
-    double m, f, correction, s, z, w, even, odd, half_square, tail;
-    int k;
-    if (!(sum > 0.0 && x - x == 0.0)) {
-        return sum == 0.0 ? -HUGE_VAL : sum > 0.0 ? sum : NAN;
-    }
-    /* sum = 2^k m with m between sqrt(1/2) and sqrt(2). */
-    m = frexp(sum, &k);
-    if (m < 0.7071065902709961) {
-        m += m;
-        --k;
-    }
-    /* With k = 0 x itself has digits that the sum has lost. */
-    f = k == 0 ? x : m - 1.0;
-    /* lost / sum, which two digits of 1/m are enough for. */
-    correction = k == 0 || k > 1022 ? 0.0 : lost * ldexp(1.0, -k) * (1.0 - f + f * f);
-    s = f / (2.0 + f);
-    z = s * s;
-    w = z * z;
-    even = w * (3.9999999999409419e-1 + w * (2.2222198432149784e-1 + w * 1.5313837699209373e-1));
-    odd = z
-        * (6.6666666666667351e-1
-            + w * (2.8571428743662391e-1 + w * (1.818357216161805e-1 + w * 1.4798198605116586e-1)));
-    half_square = 0.5 * f * f;
-    tail = s * (half_square + (even + odd)) + (k * 1.9082149292705877e-10 + correction);
-    return k * 6.931471803691238e-1 - ((half_square - tail) - f);
-}
-
-#endif
-
 /* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
 enum {
     axis_aligned_dimension = 2,
@@ -268,22 +230,22 @@ MMSMITH_FN const char *axis_aligned_prepare(axis_aligned_solution *s, const axis
     const double t84 = p->rho0 * t47;
     const double t85 = t84 * t50;
     const double t86 = t83 / t85;
-    const double t110 = t26 / p->rho0;
-    const double t138 = t63 + t59;
-    const double t139 = p->A * p->A;
-    const double t140 = t139 * p->A;
-    const double t141 = t25 * t25;
-    const double t143 = t140 * t141;
-    const double t144 = t143 * t138;
-    const double t145 = t144 / p->rho0;
-    const double t149 = t25 * 3.141592653589793;
-    const double t150 = 2.0 * t139;
-    const double t151 = t150 * t149;
-    const double t152 = t151 * t138;
-    const double t153 = t152 / p->rho0;
-    const double t158 = t27 * p->nu;
-    const double t159 = t158 / t85;
-    const double t187 = 2.0 / t7;
+    const double t113 = t26 / p->rho0;
+    const double t139 = t63 + t59;
+    const double t140 = p->A * p->A;
+    const double t141 = t140 * p->A;
+    const double t142 = t25 * t25;
+    const double t144 = t141 * t142;
+    const double t145 = t144 * t139;
+    const double t146 = t145 / p->rho0;
+    const double t150 = t25 * 3.141592653589793;
+    const double t151 = 2.0 * t140;
+    const double t152 = t151 * t150;
+    const double t153 = t152 * t139;
+    const double t154 = t153 / p->rho0;
+    const double t159 = t27 * p->nu;
+    const double t160 = t159 / t85;
+    const double t188 = 2.0 / t7;
     s->par = *p;
     s->fixed[0] = t7;
     s->fixed[1] = t18;
@@ -293,11 +255,11 @@ MMSMITH_FN const char *axis_aligned_prepare(axis_aligned_solution *s, const axis
     s->fixed[5] = t63;
     s->fixed[6] = t65;
     s->fixed[7] = t86;
-    s->fixed[8] = t110;
-    s->fixed[9] = t145;
-    s->fixed[10] = t153;
-    s->fixed[11] = t159;
-    s->fixed[12] = t187;
+    s->fixed[8] = t113;
+    s->fixed[9] = t146;
+    s->fixed[10] = t154;
+    s->fixed[11] = t160;
+    s->fixed[12] = t188;
     return 0;
 }
 
@@ -422,12 +384,13 @@ MMSMITH_FN void axis_aligned_P(const axis_aligned_solution *s, const double X[2]
     const double t41 = t40 * t39;
     const double t43 = t37 + 1.0;
     const double t44 = t41 + 1.0;
+    const double t45 = t43 * t44;
     const double t51 = t35 * t44;
     const double t52 = t9 * t51;
     const double t53 = t14 * t39;
     const double t54 = t52 + t53;
     const double t55 = s->fixed[1] * t54;
-    const double t56 = mmsmith_log_1p(t55);
+    const double t56 = (t55 < -0.5 ? log(t45) : log1p(t55));
     const double t60 = t37 + 2.0;
     const double t64 = s->fixed[5] * t56;
     const double t66 = s->fixed[6] * t9;
@@ -469,48 +432,49 @@ MMSMITH_FN void axis_aligned_b(const axis_aligned_solution *s, const double X[2]
     const double t93 = t14 * t92;
     const double t94 = t93 + t89;
     const double t95 = s->fixed[1] * t94;
-    const double t96 = mmsmith_log_1p(t95);
-    const double t97 = s->fixed[5] * t96;
-    const double t98 = s->fixed[4] * t90;
-    const double t99 = t97 + t98;
-    const double t100 = 1.0 / t91;
-    const double t101 = s->fixed[5] * t100;
-    const double t102 = s->fixed[4] + t101;
-    const double t103 = t90 + t96;
+    const double t96 = s->fixed[1] * t53;
+    const double t97 = t96 + 1.0;
+    const double t98 = t91 * t97;
+    const double t99 = (t95 < -0.5 ? log(t98) : log1p(t95));
+    const double t100 = s->fixed[5] * t99;
+    const double t101 = s->fixed[4] * t90;
+    const double t102 = t100 + t101;
+    const double t103 = 1.0 / t91;
     const double t104 = s->fixed[5] * t103;
-    const double t105 = t99 * t100;
-    const double t106 = t102 - t105;
-    const double t107 = s->fixed[4] + t106;
-    const double t108 = t90 * t107;
-    const double t109 = t104 + t108;
-    const double t111 = s->fixed[8] * t9;
-    const double t112 = t111 * t2;
-    const double t113 = t109 * t100;
-    const double t114 = t112 * t113;
-    const double t115 = t88 - t114;
-    const double t116 = s->fixed[7] * t14;
-    const double t117 = t116 * t13;
-    const double t118 = s->fixed[1] * t53;
-    const double t119 = t118 + 1.0;
-    const double t120 = s->fixed[4] * t118;
-    const double t121 = t97 + t120;
-    const double t122 = 1.0 / t119;
-    const double t123 = s->fixed[5] * t122;
-    const double t124 = s->fixed[4] + t123;
-    const double t125 = t96 + t118;
-    const double t126 = s->fixed[5] * t125;
-    const double t127 = t121 * t122;
-    const double t128 = t124 - t127;
-    const double t129 = s->fixed[4] + t128;
-    const double t130 = t118 * t129;
-    const double t131 = t126 + t130;
-    const double t132 = s->fixed[8] * t14;
-    const double t133 = t132 * t13;
-    const double t134 = t131 * t122;
-    const double t135 = t133 * t134;
-    const double t136 = t117 - t135;
-    b[0] = t115;
-    b[1] = t136;
+    const double t105 = s->fixed[4] + t104;
+    const double t106 = t90 + t99;
+    const double t107 = s->fixed[5] * t106;
+    const double t108 = t102 * t103;
+    const double t109 = t105 - t108;
+    const double t110 = s->fixed[4] + t109;
+    const double t111 = t90 * t110;
+    const double t112 = t107 + t111;
+    const double t114 = s->fixed[8] * t9;
+    const double t115 = t114 * t2;
+    const double t116 = t112 * t103;
+    const double t117 = t115 * t116;
+    const double t118 = t88 - t117;
+    const double t119 = s->fixed[7] * t14;
+    const double t120 = t119 * t13;
+    const double t121 = s->fixed[4] * t96;
+    const double t122 = t100 + t121;
+    const double t123 = 1.0 / t97;
+    const double t124 = s->fixed[5] * t123;
+    const double t125 = s->fixed[4] + t124;
+    const double t126 = t99 + t96;
+    const double t127 = s->fixed[5] * t126;
+    const double t128 = t122 * t123;
+    const double t129 = t125 - t128;
+    const double t130 = s->fixed[4] + t129;
+    const double t131 = t96 * t130;
+    const double t132 = t127 + t131;
+    const double t133 = s->fixed[8] * t14;
+    const double t134 = t133 * t13;
+    const double t135 = t132 * t123;
+    const double t136 = t134 * t135;
+    const double t137 = t120 - t136;
+    b[0] = t118;
+    b[1] = t137;
 }
 
 /* traction on the surface X-lower, force per reference area */
@@ -526,20 +490,21 @@ MMSMITH_FN void axis_aligned_X_lower_traction(const axis_aligned_solution *s, co
     const double t41 = t40 * t39;
     const double t44 = t41 + 1.0;
     const double t53 = t14 * t39;
-    const double t188 = t36 + 1.0;
-    const double t189 = t9 * t44;
-    const double t190 = t189 + t53;
-    const double t191 = s->fixed[1] * t190;
-    const double t192 = mmsmith_log_1p(t191);
-    const double t193 = t36 + 2.0;
-    const double t194 = s->fixed[5] * t192;
-    const double t195 = t9 * t193;
-    const double t196 = s->fixed[6] * t195;
-    const double t197 = t196 + t194;
-    const double t198 = 1.0 / t188;
-    const double t199 = t198 * t197;
-    const double t200 = -t199;
-    traction[0] = t200;
+    const double t189 = t36 + 1.0;
+    const double t190 = t9 * t44;
+    const double t191 = t190 + t53;
+    const double t192 = s->fixed[1] * t191;
+    const double t193 = t189 * t44;
+    const double t194 = (t192 < -0.5 ? log(t193) : log1p(t192));
+    const double t195 = t36 + 2.0;
+    const double t196 = s->fixed[5] * t194;
+    const double t197 = t9 * t195;
+    const double t198 = s->fixed[6] * t197;
+    const double t199 = t198 + t196;
+    const double t200 = 1.0 / t189;
+    const double t201 = t200 * t199;
+    const double t202 = -t201;
+    traction[0] = t202;
     traction[1] = 0.0;
 }
 
@@ -556,20 +521,21 @@ MMSMITH_FN void axis_aligned_X_upper_traction(const axis_aligned_solution *s, co
     const double t41 = t40 * t39;
     const double t44 = t41 + 1.0;
     const double t53 = t14 * t39;
-    const double t189 = t9 * t44;
-    const double t201 = 1.0 - t36;
-    const double t202 = t189 - t53;
-    const double t203 = s->fixed[1] * t202;
-    const double t204 = -t203;
-    const double t205 = mmsmith_log_1p(t204);
-    const double t206 = 2.0 - t36;
-    const double t207 = s->fixed[5] * t205;
-    const double t208 = t9 * t206;
-    const double t209 = s->fixed[6] * t208;
-    const double t210 = t207 - t209;
-    const double t211 = 1.0 / t201;
-    const double t212 = t211 * t210;
-    traction[0] = t212;
+    const double t190 = t9 * t44;
+    const double t203 = 1.0 - t36;
+    const double t204 = t190 - t53;
+    const double t205 = s->fixed[1] * t204;
+    const double t206 = -t205;
+    const double t207 = t203 * t44;
+    const double t208 = (t206 < -0.5 ? log(t207) : log1p(t206));
+    const double t209 = 2.0 - t36;
+    const double t210 = s->fixed[5] * t208;
+    const double t211 = t9 * t209;
+    const double t212 = s->fixed[6] * t211;
+    const double t213 = t210 - t212;
+    const double t214 = 1.0 / t203;
+    const double t215 = t214 * t213;
+    traction[0] = t215;
     traction[1] = 0.0;
 }
 
@@ -586,21 +552,22 @@ MMSMITH_FN void axis_aligned_Y_lower_traction(const axis_aligned_solution *s, co
     const double t40 = s->fixed[1] * t14;
     const double t43 = t37 + 1.0;
     const double t89 = t9 * t35;
-    const double t213 = t40 + 1.0;
-    const double t214 = t14 * t43;
-    const double t215 = t214 + t89;
-    const double t216 = s->fixed[1] * t215;
-    const double t217 = mmsmith_log_1p(t216);
-    const double t218 = t40 + 2.0;
-    const double t219 = s->fixed[5] * t217;
-    const double t220 = t14 * t218;
-    const double t221 = s->fixed[6] * t220;
-    const double t222 = t221 + t219;
-    const double t223 = 1.0 / t213;
-    const double t224 = t223 * t222;
-    const double t225 = -t224;
+    const double t216 = t40 + 1.0;
+    const double t217 = t14 * t43;
+    const double t218 = t217 + t89;
+    const double t219 = s->fixed[1] * t218;
+    const double t220 = t216 * t43;
+    const double t221 = (t219 < -0.5 ? log(t220) : log1p(t219));
+    const double t222 = t40 + 2.0;
+    const double t223 = s->fixed[5] * t221;
+    const double t224 = t14 * t222;
+    const double t225 = s->fixed[6] * t224;
+    const double t226 = t225 + t223;
+    const double t227 = 1.0 / t216;
+    const double t228 = t227 * t226;
+    const double t229 = -t228;
     traction[0] = 0.0;
-    traction[1] = t225;
+    traction[1] = t229;
 }
 
 /* traction on the surface Y-upper, force per reference area */
@@ -616,21 +583,22 @@ MMSMITH_FN void axis_aligned_Y_upper_traction(const axis_aligned_solution *s, co
     const double t40 = s->fixed[1] * t14;
     const double t43 = t37 + 1.0;
     const double t89 = t9 * t35;
-    const double t214 = t14 * t43;
-    const double t226 = 1.0 - t40;
-    const double t227 = t214 - t89;
-    const double t228 = s->fixed[1] * t227;
-    const double t229 = -t228;
-    const double t230 = mmsmith_log_1p(t229);
-    const double t231 = 2.0 - t40;
-    const double t232 = s->fixed[5] * t230;
-    const double t233 = t14 * t231;
-    const double t234 = s->fixed[6] * t233;
-    const double t235 = t232 - t234;
-    const double t236 = 1.0 / t226;
-    const double t237 = t236 * t235;
+    const double t217 = t14 * t43;
+    const double t230 = 1.0 - t40;
+    const double t231 = t217 - t89;
+    const double t232 = s->fixed[1] * t231;
+    const double t233 = -t232;
+    const double t234 = t230 * t43;
+    const double t235 = (t233 < -0.5 ? log(t234) : log1p(t233));
+    const double t236 = 2.0 - t40;
+    const double t237 = s->fixed[5] * t235;
+    const double t238 = t14 * t236;
+    const double t239 = s->fixed[6] * t238;
+    const double t240 = t237 - t239;
+    const double t241 = 1.0 / t230;
+    const double t242 = t241 * t240;
     traction[0] = 0.0;
-    traction[1] = t237;
+    traction[1] = t242;
 }
 
 /* all fields */
@@ -670,7 +638,7 @@ MMSMITH_FN void axis_aligned_fields(const axis_aligned_solution *s, const double
     const double t53 = t14 * t39;
     const double t54 = t52 + t53;
     const double t55 = s->fixed[1] * t54;
-    const double t56 = mmsmith_log_1p(t55);
+    const double t56 = (t55 < -0.5 ? log(t45) : log1p(t55));
     const double t60 = t37 + 2.0;
     const double t64 = s->fixed[5] * t56;
     const double t66 = s->fixed[6] * t9;
@@ -695,46 +663,47 @@ MMSMITH_FN void axis_aligned_fields(const axis_aligned_solution *s, const double
     const double t93 = t14 * t92;
     const double t94 = t93 + t89;
     const double t95 = s->fixed[1] * t94;
-    const double t96 = mmsmith_log_1p(t95);
-    const double t97 = s->fixed[5] * t96;
-    const double t98 = s->fixed[4] * t90;
-    const double t99 = t97 + t98;
-    const double t100 = 1.0 / t91;
-    const double t101 = s->fixed[5] * t100;
-    const double t102 = s->fixed[4] + t101;
-    const double t103 = t90 + t96;
+    const double t96 = s->fixed[1] * t53;
+    const double t97 = t96 + 1.0;
+    const double t98 = t91 * t97;
+    const double t99 = (t95 < -0.5 ? log(t98) : log1p(t95));
+    const double t100 = s->fixed[5] * t99;
+    const double t101 = s->fixed[4] * t90;
+    const double t102 = t100 + t101;
+    const double t103 = 1.0 / t91;
     const double t104 = s->fixed[5] * t103;
-    const double t105 = t99 * t100;
-    const double t106 = t102 - t105;
-    const double t107 = s->fixed[4] + t106;
-    const double t108 = t90 * t107;
-    const double t109 = t104 + t108;
-    const double t111 = s->fixed[8] * t9;
-    const double t112 = t111 * t2;
-    const double t113 = t109 * t100;
-    const double t114 = t112 * t113;
-    const double t115 = t88 - t114;
-    const double t116 = s->fixed[7] * t14;
-    const double t117 = t116 * t13;
-    const double t118 = s->fixed[1] * t53;
-    const double t119 = t118 + 1.0;
-    const double t120 = s->fixed[4] * t118;
-    const double t121 = t97 + t120;
-    const double t122 = 1.0 / t119;
-    const double t123 = s->fixed[5] * t122;
-    const double t124 = s->fixed[4] + t123;
-    const double t125 = t96 + t118;
-    const double t126 = s->fixed[5] * t125;
-    const double t127 = t121 * t122;
-    const double t128 = t124 - t127;
-    const double t129 = s->fixed[4] + t128;
-    const double t130 = t118 * t129;
-    const double t131 = t126 + t130;
-    const double t132 = s->fixed[8] * t14;
-    const double t133 = t132 * t13;
-    const double t134 = t131 * t122;
-    const double t135 = t133 * t134;
-    const double t136 = t117 - t135;
+    const double t105 = s->fixed[4] + t104;
+    const double t106 = t90 + t99;
+    const double t107 = s->fixed[5] * t106;
+    const double t108 = t102 * t103;
+    const double t109 = t105 - t108;
+    const double t110 = s->fixed[4] + t109;
+    const double t111 = t90 * t110;
+    const double t112 = t107 + t111;
+    const double t114 = s->fixed[8] * t9;
+    const double t115 = t114 * t2;
+    const double t116 = t112 * t103;
+    const double t117 = t115 * t116;
+    const double t118 = t88 - t117;
+    const double t119 = s->fixed[7] * t14;
+    const double t120 = t119 * t13;
+    const double t121 = s->fixed[4] * t96;
+    const double t122 = t100 + t121;
+    const double t123 = 1.0 / t97;
+    const double t124 = s->fixed[5] * t123;
+    const double t125 = s->fixed[4] + t124;
+    const double t126 = t99 + t96;
+    const double t127 = s->fixed[5] * t126;
+    const double t128 = t122 * t123;
+    const double t129 = t125 - t128;
+    const double t130 = s->fixed[4] + t129;
+    const double t131 = t96 * t130;
+    const double t132 = t127 + t131;
+    const double t133 = s->fixed[8] * t14;
+    const double t134 = t133 * t13;
+    const double t135 = t132 * t123;
+    const double t136 = t134 * t135;
+    const double t137 = t120 - t136;
     out->u[0] = t11;
     out->u[1] = t16;
     out->v[0] = t22;
@@ -754,8 +723,8 @@ MMSMITH_FN void axis_aligned_fields(const axis_aligned_solution *s, const double
     out->P[1] = 0.0;
     out->P[2] = 0.0;
     out->P[3] = t78;
-    out->b[0] = t115;
-    out->b[1] = t136;
+    out->b[0] = t118;
+    out->b[1] = t137;
 }
 
 /* What the body force needs of the time alone. */
@@ -781,34 +750,34 @@ MMSMITH_FN void axis_aligned_at_point(const axis_aligned_solution *s, const doub
     const double t13 = mmsmith_sin_pi(X[1]);
     const double t35 = mmsmith_cos_pi(X[0]);
     const double t39 = mmsmith_cos_pi(X[1]);
-    const double t137 = s->fixed[7] * t2;
-    const double t142 = t35 * t35;
-    const double t146 = t2 * t142;
-    const double t147 = s->fixed[9] * t146;
-    const double t148 = -t147;
-    const double t154 = t2 * t35;
-    const double t155 = s->fixed[10] * t154;
-    const double t160 = s->fixed[11] * t2;
-    const double t161 = -t160;
-    const double t169 = s->fixed[7] * t13;
-    const double t170 = t39 * t39;
-    const double t171 = t13 * t170;
-    const double t172 = s->fixed[9] * t171;
-    const double t173 = -t172;
-    const double t174 = t13 * t39;
-    const double t175 = s->fixed[10] * t174;
-    const double t178 = s->fixed[11] * t13;
-    const double t179 = -t178;
+    const double t138 = s->fixed[7] * t2;
+    const double t143 = t35 * t35;
+    const double t147 = t2 * t143;
+    const double t148 = s->fixed[9] * t147;
+    const double t149 = -t148;
+    const double t155 = t2 * t35;
+    const double t156 = s->fixed[10] * t155;
+    const double t161 = s->fixed[11] * t2;
+    const double t162 = -t161;
+    const double t170 = s->fixed[7] * t13;
+    const double t171 = t39 * t39;
+    const double t172 = t13 * t171;
+    const double t173 = s->fixed[9] * t172;
+    const double t174 = -t173;
+    const double t175 = t13 * t39;
+    const double t176 = s->fixed[10] * t175;
+    const double t179 = s->fixed[11] * t13;
+    const double t180 = -t179;
     point[0] = t35;
     point[1] = t39;
-    point[2] = t137;
-    point[3] = t148;
-    point[4] = t155;
-    point[5] = t161;
-    point[6] = t169;
-    point[7] = t173;
-    point[8] = t175;
-    point[9] = t179;
+    point[2] = t138;
+    point[3] = t149;
+    point[4] = t156;
+    point[5] = t162;
+    point[6] = t170;
+    point[7] = t174;
+    point[8] = t176;
+    point[9] = t180;
 }
 
 /* The body force from the values of one time and of one point. Value m of the point is point[m*stride]:
@@ -821,34 +790,35 @@ MMSMITH_FN void axis_aligned_b_staged(const axis_aligned_solution *s, const axis
     const double t41 = time->values[3] * point[stride];
     const double t43 = t37 + 1.0;
     const double t44 = t41 + 1.0;
+    const double t45 = t43 * t44;
     const double t51 = point[0] * t44;
     const double t52 = time->values[0] * t51;
     const double t53 = time->values[1] * point[stride];
     const double t54 = t52 + t53;
     const double t55 = s->fixed[1] * t54;
-    const double t56 = mmsmith_log_1p(t55);
+    const double t56 = (t55 < -0.5 ? log(t45) : log1p(t55));
     const double t70 = 1.0 / t43;
     const double t77 = 1.0 / t44;
-    const double t156 = time->values[0] * point[3 * stride];
-    const double t157 = t156 - point[4 * stride];
-    const double t162 = time->values[0] * t157;
-    const double t163 = point[5 * stride] * t56;
-    const double t164 = t162 + t163;
-    const double t165 = t70 * t70;
-    const double t166 = t164 * t165;
-    const double t167 = point[2 * stride] + t166;
-    const double t168 = time->values[0] * t167;
-    const double t176 = time->values[1] * point[7 * stride];
-    const double t177 = t176 - point[8 * stride];
-    const double t180 = time->values[1] * t177;
-    const double t181 = point[9 * stride] * t56;
-    const double t182 = t180 + t181;
-    const double t183 = t77 * t77;
-    const double t184 = t182 * t183;
-    const double t185 = point[6 * stride] + t184;
-    const double t186 = time->values[1] * t185;
-    b[0] = t168;
-    b[1] = t186;
+    const double t157 = time->values[0] * point[3 * stride];
+    const double t158 = t157 - point[4 * stride];
+    const double t163 = time->values[0] * t158;
+    const double t164 = point[5 * stride] * t56;
+    const double t165 = t163 + t164;
+    const double t166 = t70 * t70;
+    const double t167 = t165 * t166;
+    const double t168 = point[2 * stride] + t167;
+    const double t169 = time->values[0] * t168;
+    const double t177 = time->values[1] * point[7 * stride];
+    const double t178 = t177 - point[8 * stride];
+    const double t181 = time->values[1] * t178;
+    const double t182 = point[9 * stride] * t56;
+    const double t183 = t181 + t182;
+    const double t184 = t77 * t77;
+    const double t185 = t183 * t184;
+    const double t186 = point[6 * stride] + t185;
+    const double t187 = time->values[1] * t186;
+    b[0] = t169;
+    b[1] = t187;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -891,34 +861,35 @@ MMSMITH_FN void axis_aligned_b_array(const axis_aligned_solution *s, double t, s
         const double t41 = time.values[3] * point1[p];
         const double t43 = t37 + 1.0;
         const double t44 = t41 + 1.0;
+        const double t45 = t43 * t44;
         const double t51 = point0[p] * t44;
         const double t52 = time.values[0] * t51;
         const double t53 = time.values[1] * point1[p];
         const double t54 = t52 + t53;
         const double t55 = s->fixed[1] * t54;
-        const double t56 = mmsmith_log_1p(t55);
+        const double t56 = (t55 < -0.5 ? log(t45) : log1p(t55));
         const double t70 = 1.0 / t43;
         const double t77 = 1.0 / t44;
-        const double t156 = time.values[0] * point3[p];
-        const double t157 = t156 - point4[p];
-        const double t162 = time.values[0] * t157;
-        const double t163 = point5[p] * t56;
-        const double t164 = t162 + t163;
-        const double t165 = t70 * t70;
-        const double t166 = t164 * t165;
-        const double t167 = point2[p] + t166;
-        const double t168 = time.values[0] * t167;
-        const double t176 = time.values[1] * point7[p];
-        const double t177 = t176 - point8[p];
-        const double t180 = time.values[1] * t177;
-        const double t181 = point9[p] * t56;
-        const double t182 = t180 + t181;
-        const double t183 = t77 * t77;
-        const double t184 = t182 * t183;
-        const double t185 = point6[p] + t184;
-        const double t186 = time.values[1] * t185;
-        b[p * 2 + 0] = t168;
-        b[p * 2 + 1] = t186;
+        const double t157 = time.values[0] * point3[p];
+        const double t158 = t157 - point4[p];
+        const double t163 = time.values[0] * t158;
+        const double t164 = point5[p] * t56;
+        const double t165 = t163 + t164;
+        const double t166 = t70 * t70;
+        const double t167 = t165 * t166;
+        const double t168 = point2[p] + t167;
+        const double t169 = time.values[0] * t168;
+        const double t177 = time.values[1] * point7[p];
+        const double t178 = t177 - point8[p];
+        const double t181 = time.values[1] * t178;
+        const double t182 = point9[p] * t56;
+        const double t183 = t181 + t182;
+        const double t184 = t77 * t77;
+        const double t185 = t183 * t184;
+        const double t186 = point6[p] + t185;
+        const double t187 = time.values[1] * t186;
+        b[p * 2 + 0] = t169;
+        b[p * 2 + 1] = t187;
     }
 }
 

@@ -144,44 +144,6 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
 
 #endif
 
-#ifndef MMSMITH_LOG_1P
-#define MMSMITH_LOG_1P 1
-
-/* ln(1 + x), within one unit in the last place, by the reduction and the polynomial of Sun's fdlibm. */
-MMSMITH_FN double mmsmith_log_1p(double x)
-{
-    const double sum = 1.0 + x;
-    /* What rounding took from the sum. */
-    const double lost = x < 1.0 ? x - (sum - 1.0) : 1.0 - (sum - x);
-    double m, f, correction, s, z, w, even, odd, half_square, tail;
-    int k;
-    if (!(sum > 0.0 && x - x == 0.0)) {
-        return sum == 0.0 ? -HUGE_VAL : sum > 0.0 ? sum : NAN;
-    }
-    /* sum = 2^k m with m between sqrt(1/2) and sqrt(2). */
-    m = frexp(sum, &k);
-    if (m < 0.7071065902709961) {
-        m += m;
-        --k;
-    }
-    /* With k = 0 x itself has digits that the sum has lost. */
-    f = k == 0 ? x : m - 1.0;
-    /* lost / sum, which two digits of 1/m are enough for. */
-    correction = k == 0 || k > 1022 ? 0.0 : lost * ldexp(1.0, -k) * (1.0 - f + f * f);
-    s = f / (2.0 + f);
-    z = s * s;
-    w = z * z;
-    even = w * (3.9999999999409419e-1 + w * (2.2222198432149784e-1 + w * 1.5313837699209373e-1));
-    odd = z
-        * (6.6666666666667351e-1
-            + w * (2.8571428743662391e-1 + w * (1.818357216161805e-1 + w * 1.4798198605116586e-1)));
-    half_square = 0.5 * f * f;
-    tail = s * (half_square + (even + odd)) + (k * 1.9082149292705877e-10 + correction);
-    return k * 6.931471803691238e-1 - ((half_square - tail) - f);
-}
-
-#endif
-
 /* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
 enum {
     axis_aligned_3d_dimension = 3,
@@ -527,6 +489,8 @@ MMSMITH_FN void axis_aligned_3d_P(const axis_aligned_3d_solution *s, const doubl
     const double t73 = t62 + 1.0;
     const double t83 = t67 + 1.0;
     const double t84 = t71 + 1.0;
+    const double t85 = t73 * t83;
+    const double t86 = t85 * t84;
     const double t91 = t67 * t84;
     const double t92 = t91 - t70;
     const double t93 = t92 + 1.0;
@@ -535,7 +499,7 @@ MMSMITH_FN void axis_aligned_3d_P(const axis_aligned_3d_solution *s, const doubl
     const double t96 = s->fixed[3] * t95;
     const double t97 = t96 + t91;
     const double t98 = t97 - t70;
-    const double t99 = mmsmith_log_1p(t98);
+    const double t99 = (t98 < -0.5 ? log(t86) : log1p(t98));
     const double t102 = t62 + 2.0;
     const double t106 = s->fixed[11] * t99;
     const double t108 = s->fixed[12] * t9;
@@ -593,6 +557,8 @@ MMSMITH_FN void axis_aligned_3d_b(const axis_aligned_3d_solution *s, const doubl
     const double t73 = t62 + 1.0;
     const double t83 = t67 + 1.0;
     const double t84 = t71 + 1.0;
+    const double t85 = t73 * t83;
+    const double t86 = t85 * t84;
     const double t91 = t67 * t84;
     const double t92 = t91 - t70;
     const double t93 = t92 + 1.0;
@@ -601,7 +567,7 @@ MMSMITH_FN void axis_aligned_3d_b(const axis_aligned_3d_solution *s, const doubl
     const double t96 = s->fixed[3] * t95;
     const double t97 = t96 + t91;
     const double t98 = t97 - t70;
-    const double t99 = mmsmith_log_1p(t98);
+    const double t99 = (t98 < -0.5 ? log(t86) : log1p(t98));
     const double t106 = s->fixed[11] * t99;
     const double t108 = s->fixed[12] * t9;
     const double t109 = t108 * t60;
@@ -687,6 +653,7 @@ MMSMITH_FN void axis_aligned_3d_X_lower_traction(const axis_aligned_3d_solution 
     const double t69 = s->fixed[5] * t26;
     const double t70 = t69 * t68;
     const double t71 = -t70;
+    const double t83 = t67 + 1.0;
     const double t84 = t71 + 1.0;
     const double t91 = t67 * t84;
     const double t92 = t91 - t70;
@@ -696,16 +663,18 @@ MMSMITH_FN void axis_aligned_3d_X_lower_traction(const axis_aligned_3d_solution 
     const double t273 = t272 + t91;
     const double t274 = t273 - t70;
     const double t275 = t61 + t274;
-    const double t276 = mmsmith_log_1p(t275);
-    const double t277 = t61 + 2.0;
-    const double t278 = s->fixed[11] * t276;
-    const double t279 = t9 * t277;
-    const double t280 = s->fixed[12] * t279;
-    const double t281 = t280 + t278;
-    const double t282 = 1.0 / t270;
-    const double t283 = t282 * t281;
-    const double t284 = -t283;
-    traction[0] = t284;
+    const double t276 = t83 * t84;
+    const double t277 = t270 * t276;
+    const double t278 = (t275 < -0.5 ? log(t277) : log1p(t275));
+    const double t279 = t61 + 2.0;
+    const double t280 = s->fixed[11] * t278;
+    const double t281 = t9 * t279;
+    const double t282 = s->fixed[12] * t281;
+    const double t283 = t282 + t280;
+    const double t284 = 1.0 / t270;
+    const double t285 = t284 * t283;
+    const double t286 = -t285;
+    traction[0] = t286;
     traction[1] = 0.0;
     traction[2] = 0.0;
 }
@@ -729,24 +698,27 @@ MMSMITH_FN void axis_aligned_3d_X_upper_traction(const axis_aligned_3d_solution 
     const double t69 = s->fixed[5] * t26;
     const double t70 = t69 * t68;
     const double t71 = -t70;
+    const double t83 = t67 + 1.0;
     const double t84 = t71 + 1.0;
     const double t91 = t67 * t84;
     const double t92 = t91 - t70;
     const double t271 = t9 * t92;
     const double t272 = s->fixed[3] * t271;
-    const double t285 = 1.0 - t61;
-    const double t286 = t91 - t272;
-    const double t287 = t286 - t70;
-    const double t288 = t287 - t61;
-    const double t289 = mmsmith_log_1p(t288);
-    const double t290 = 2.0 - t61;
-    const double t291 = s->fixed[11] * t289;
-    const double t292 = t9 * t290;
-    const double t293 = s->fixed[12] * t292;
-    const double t294 = t291 - t293;
-    const double t295 = 1.0 / t285;
-    const double t296 = t295 * t294;
-    traction[0] = t296;
+    const double t276 = t83 * t84;
+    const double t287 = 1.0 - t61;
+    const double t288 = t91 - t272;
+    const double t289 = t288 - t70;
+    const double t290 = t289 - t61;
+    const double t291 = t287 * t276;
+    const double t292 = (t290 < -0.5 ? log(t291) : log1p(t290));
+    const double t293 = 2.0 - t61;
+    const double t294 = s->fixed[11] * t292;
+    const double t295 = t9 * t293;
+    const double t296 = s->fixed[12] * t295;
+    const double t297 = t294 - t296;
+    const double t298 = 1.0 / t287;
+    const double t299 = t298 * t297;
+    traction[0] = t299;
     traction[1] = 0.0;
     traction[2] = 0.0;
 }
@@ -762,32 +734,38 @@ MMSMITH_FN void axis_aligned_3d_Y_lower_traction(const axis_aligned_3d_solution 
     const double t18 = t9 - t17;
     const double t26 = t9 + t17;
     const double t60 = mmsmith_cos_pi(X[0]);
+    const double t61 = s->fixed[3] * t9;
+    const double t62 = t61 * t60;
     const double t65 = s->fixed[5] * t18;
     const double t68 = mmsmith_cos_pi(X[2]);
     const double t69 = s->fixed[5] * t26;
     const double t70 = t69 * t68;
     const double t71 = -t70;
+    const double t73 = t62 + 1.0;
+    const double t84 = t71 + 1.0;
     const double t94 = t9 * t60;
-    const double t297 = -t65;
-    const double t298 = t297 + 1.0;
-    const double t299 = t71 * t298;
-    const double t300 = t299 - t65;
+    const double t300 = -t65;
     const double t301 = t300 + 1.0;
-    const double t302 = t94 * t301;
-    const double t303 = s->fixed[3] * t302;
-    const double t304 = t303 + t299;
-    const double t305 = t304 - t65;
-    const double t306 = mmsmith_log_1p(t305);
-    const double t307 = t297 + 2.0;
-    const double t308 = s->fixed[11] * t306;
-    const double t309 = t297 * t307;
-    const double t310 = s->fixed[10] * t309;
-    const double t311 = t310 + t308;
-    const double t312 = 1.0 / t298;
-    const double t313 = t312 * t311;
-    const double t314 = -t313;
+    const double t302 = t71 * t301;
+    const double t303 = t302 - t65;
+    const double t304 = t303 + 1.0;
+    const double t305 = t94 * t304;
+    const double t306 = s->fixed[3] * t305;
+    const double t307 = t306 + t302;
+    const double t308 = t307 - t65;
+    const double t309 = t73 * t84;
+    const double t310 = t301 * t309;
+    const double t311 = (t308 < -0.5 ? log(t310) : log1p(t308));
+    const double t312 = t300 + 2.0;
+    const double t313 = s->fixed[11] * t311;
+    const double t314 = t300 * t312;
+    const double t315 = s->fixed[10] * t314;
+    const double t316 = t315 + t313;
+    const double t317 = 1.0 / t301;
+    const double t318 = t317 * t316;
+    const double t319 = -t318;
     traction[0] = 0.0;
-    traction[1] = t314;
+    traction[1] = t319;
     traction[2] = 0.0;
 }
 
@@ -802,30 +780,36 @@ MMSMITH_FN void axis_aligned_3d_Y_upper_traction(const axis_aligned_3d_solution 
     const double t18 = t9 - t17;
     const double t26 = t9 + t17;
     const double t60 = mmsmith_cos_pi(X[0]);
+    const double t61 = s->fixed[3] * t9;
+    const double t62 = t61 * t60;
     const double t65 = s->fixed[5] * t18;
     const double t68 = mmsmith_cos_pi(X[2]);
     const double t69 = s->fixed[5] * t26;
     const double t70 = t69 * t68;
     const double t71 = -t70;
+    const double t73 = t62 + 1.0;
+    const double t84 = t71 + 1.0;
     const double t94 = t9 * t60;
-    const double t315 = t65 + 1.0;
-    const double t316 = t71 * t315;
-    const double t317 = t65 + t316;
-    const double t318 = t317 + 1.0;
-    const double t319 = t94 * t318;
-    const double t320 = s->fixed[3] * t319;
-    const double t321 = t320 + t316;
+    const double t309 = t73 * t84;
+    const double t320 = t65 + 1.0;
+    const double t321 = t71 * t320;
     const double t322 = t65 + t321;
-    const double t323 = mmsmith_log_1p(t322);
-    const double t324 = t65 + 2.0;
-    const double t325 = s->fixed[11] * t323;
-    const double t326 = t65 * t324;
-    const double t327 = s->fixed[10] * t326;
-    const double t328 = t327 + t325;
-    const double t329 = 1.0 / t315;
-    const double t330 = t329 * t328;
+    const double t323 = t322 + 1.0;
+    const double t324 = t94 * t323;
+    const double t325 = s->fixed[3] * t324;
+    const double t326 = t325 + t321;
+    const double t327 = t65 + t326;
+    const double t328 = t320 * t309;
+    const double t329 = (t327 < -0.5 ? log(t328) : log1p(t327));
+    const double t330 = t65 + 2.0;
+    const double t331 = s->fixed[11] * t329;
+    const double t332 = t65 * t330;
+    const double t333 = s->fixed[10] * t332;
+    const double t334 = t333 + t331;
+    const double t335 = 1.0 / t320;
+    const double t336 = t335 * t334;
     traction[0] = 0.0;
-    traction[1] = t330;
+    traction[1] = t336;
     traction[2] = 0.0;
 }
 
@@ -840,33 +824,39 @@ MMSMITH_FN void axis_aligned_3d_Z_lower_traction(const axis_aligned_3d_solution 
     const double t18 = t9 - t17;
     const double t26 = t9 + t17;
     const double t60 = mmsmith_cos_pi(X[0]);
+    const double t61 = s->fixed[3] * t9;
+    const double t62 = t61 * t60;
     const double t64 = mmsmith_cos_pi(X[1]);
     const double t65 = s->fixed[5] * t18;
     const double t66 = t65 * t64;
     const double t67 = -t66;
     const double t69 = s->fixed[5] * t26;
+    const double t73 = t62 + 1.0;
+    const double t83 = t67 + 1.0;
+    const double t85 = t73 * t83;
     const double t94 = t9 * t60;
-    const double t331 = -t69;
-    const double t332 = t331 + 1.0;
-    const double t333 = t67 * t332;
-    const double t334 = t333 - t69;
-    const double t335 = t334 + 1.0;
-    const double t336 = t94 * t335;
-    const double t337 = s->fixed[3] * t336;
-    const double t338 = t337 + t333;
-    const double t339 = t338 - t69;
-    const double t340 = mmsmith_log_1p(t339);
-    const double t341 = t331 + 2.0;
-    const double t342 = s->fixed[11] * t340;
-    const double t343 = t331 * t341;
-    const double t344 = s->fixed[10] * t343;
-    const double t345 = t344 + t342;
-    const double t346 = 1.0 / t332;
-    const double t347 = t346 * t345;
-    const double t348 = -t347;
+    const double t337 = -t69;
+    const double t338 = t337 + 1.0;
+    const double t339 = t67 * t338;
+    const double t340 = t339 - t69;
+    const double t341 = t340 + 1.0;
+    const double t342 = t94 * t341;
+    const double t343 = s->fixed[3] * t342;
+    const double t344 = t343 + t339;
+    const double t345 = t344 - t69;
+    const double t346 = t338 * t85;
+    const double t347 = (t345 < -0.5 ? log(t346) : log1p(t345));
+    const double t348 = t337 + 2.0;
+    const double t349 = s->fixed[11] * t347;
+    const double t350 = t337 * t348;
+    const double t351 = s->fixed[10] * t350;
+    const double t352 = t351 + t349;
+    const double t353 = 1.0 / t338;
+    const double t354 = t353 * t352;
+    const double t355 = -t354;
     traction[0] = 0.0;
     traction[1] = 0.0;
-    traction[2] = t348;
+    traction[2] = t355;
 }
 
 /* traction on the surface Z-upper, force per reference area */
@@ -880,31 +870,37 @@ MMSMITH_FN void axis_aligned_3d_Z_upper_traction(const axis_aligned_3d_solution 
     const double t18 = t9 - t17;
     const double t26 = t9 + t17;
     const double t60 = mmsmith_cos_pi(X[0]);
+    const double t61 = s->fixed[3] * t9;
+    const double t62 = t61 * t60;
     const double t64 = mmsmith_cos_pi(X[1]);
     const double t65 = s->fixed[5] * t18;
     const double t66 = t65 * t64;
     const double t67 = -t66;
     const double t69 = s->fixed[5] * t26;
+    const double t73 = t62 + 1.0;
+    const double t83 = t67 + 1.0;
+    const double t85 = t73 * t83;
     const double t94 = t9 * t60;
-    const double t349 = t69 + 1.0;
-    const double t350 = t67 * t349;
-    const double t351 = t69 + t350;
-    const double t352 = t351 + 1.0;
-    const double t353 = t94 * t352;
-    const double t354 = s->fixed[3] * t353;
-    const double t355 = t354 + t350;
-    const double t356 = t69 + t355;
-    const double t357 = mmsmith_log_1p(t356);
-    const double t358 = t69 + 2.0;
-    const double t359 = s->fixed[11] * t357;
-    const double t360 = t69 * t358;
-    const double t361 = s->fixed[10] * t360;
-    const double t362 = t361 + t359;
-    const double t363 = 1.0 / t349;
-    const double t364 = t363 * t362;
+    const double t356 = t69 + 1.0;
+    const double t357 = t67 * t356;
+    const double t358 = t69 + t357;
+    const double t359 = t358 + 1.0;
+    const double t360 = t94 * t359;
+    const double t361 = s->fixed[3] * t360;
+    const double t362 = t361 + t357;
+    const double t363 = t69 + t362;
+    const double t364 = t356 * t85;
+    const double t365 = (t363 < -0.5 ? log(t364) : log1p(t363));
+    const double t366 = t69 + 2.0;
+    const double t367 = s->fixed[11] * t365;
+    const double t368 = t69 * t366;
+    const double t369 = s->fixed[10] * t368;
+    const double t370 = t369 + t367;
+    const double t371 = 1.0 / t356;
+    const double t372 = t371 * t370;
     traction[0] = 0.0;
     traction[1] = 0.0;
-    traction[2] = t364;
+    traction[2] = t372;
 }
 
 /* all fields */
@@ -977,7 +973,7 @@ MMSMITH_FN void axis_aligned_3d_fields(const axis_aligned_3d_solution *s, const 
     const double t96 = s->fixed[3] * t95;
     const double t97 = t96 + t91;
     const double t98 = t97 - t70;
-    const double t99 = mmsmith_log_1p(t98);
+    const double t99 = (t98 < -0.5 ? log(t86) : log1p(t98));
     const double t102 = t62 + 2.0;
     const double t106 = s->fixed[11] * t99;
     const double t108 = s->fixed[12] * t9;
@@ -1180,6 +1176,8 @@ MMSMITH_FN void axis_aligned_3d_b_staged(const axis_aligned_3d_solution *s, cons
     const double t73 = t62 + 1.0;
     const double t83 = t67 + 1.0;
     const double t84 = t71 + 1.0;
+    const double t85 = t73 * t83;
+    const double t86 = t85 * t84;
     const double t91 = t67 * t84;
     const double t92 = t91 - t70;
     const double t93 = t92 + 1.0;
@@ -1188,7 +1186,7 @@ MMSMITH_FN void axis_aligned_3d_b_staged(const axis_aligned_3d_solution *s, cons
     const double t96 = s->fixed[3] * t95;
     const double t97 = t96 + t91;
     const double t98 = t97 - t70;
-    const double t99 = mmsmith_log_1p(t98);
+    const double t99 = (t98 < -0.5 ? log(t86) : log1p(t98));
     const double t112 = 1.0 / t73;
     const double t118 = 1.0 / t83;
     const double t124 = 1.0 / t84;
@@ -1273,6 +1271,8 @@ MMSMITH_FN void axis_aligned_3d_b_array(const axis_aligned_3d_solution *s, doubl
         const double t73 = t62 + 1.0;
         const double t83 = t67 + 1.0;
         const double t84 = t71 + 1.0;
+        const double t85 = t73 * t83;
+        const double t86 = t85 * t84;
         const double t91 = t67 * t84;
         const double t92 = t91 - t70;
         const double t93 = t92 + 1.0;
@@ -1281,7 +1281,7 @@ MMSMITH_FN void axis_aligned_3d_b_array(const axis_aligned_3d_solution *s, doubl
         const double t96 = s->fixed[3] * t95;
         const double t97 = t96 + t91;
         const double t98 = t97 - t70;
-        const double t99 = mmsmith_log_1p(t98);
+        const double t99 = (t98 < -0.5 ? log(t86) : log1p(t98));
         const double t112 = 1.0 / t73;
         const double t118 = 1.0 / t83;
         const double t124 = 1.0 / t84;

@@ -216,34 +216,34 @@ MMSMITH_FN const char *torsion_prepare(torsion_solution *s, const torsion_parame
     const double t51 = p->A * p->E;
     const double t52 = t51 * t44;
     const double t53 = t52 / p->rho0;
-    const double t78 = p->nu + 1.0;
-    const double t79 = 0.5 * p->E;
-    const double t80 = t79 / t78;
-    const double t99 = 2.0 * t44;
-    const double t102 = p->A / t78;
-    const double t106 = t10 * p->E;
-    const double t107 = t106 / p->rho0;
-    const double t121 = 2.0 / t6;
-    const double t122 = 2.0 * p->nu;
-    const double t123 = 1.0 - t122;
-    const double t124 = p->E * p->nu;
-    const double t125 = t78 * t123;
-    const double t126 = t124 / t125;
-    const double t127 = -0.5;
-    const double t204 = p->A * t80;
+    const double t74 = p->nu + 1.0;
+    const double t75 = 0.5 * p->E;
+    const double t76 = t75 / t74;
+    const double t78 = p->A * t76;
+    const double t87 = 2.0 * t44;
+    const double t90 = p->A / t74;
+    const double t94 = t10 * p->E;
+    const double t95 = t94 / p->rho0;
+    const double t109 = 2.0 / t6;
+    const double t110 = 2.0 * p->nu;
+    const double t111 = 1.0 - t110;
+    const double t112 = p->E * p->nu;
+    const double t113 = t74 * t111;
+    const double t114 = t112 / t113;
+    const double t115 = -0.5;
     s->par = *p;
     s->fixed[0] = t6;
     s->fixed[1] = t10;
     s->fixed[2] = t35;
     s->fixed[3] = t53;
-    s->fixed[4] = t80;
-    s->fixed[5] = t99;
-    s->fixed[6] = t102;
-    s->fixed[7] = t107;
-    s->fixed[8] = t121;
-    s->fixed[9] = t126;
-    s->fixed[10] = t127;
-    s->fixed[11] = t204;
+    s->fixed[4] = t76;
+    s->fixed[5] = t78;
+    s->fixed[6] = t87;
+    s->fixed[7] = t90;
+    s->fixed[8] = t95;
+    s->fixed[9] = t109;
+    s->fixed[10] = t114;
+    s->fixed[11] = t115;
     return 0;
 }
 
@@ -452,55 +452,29 @@ MMSMITH_FN void torsion_P(const torsion_solution *s, const double X[3], double t
     const double t18 = X[1] * t16;
     const double t19 = t17 + t18;
     const double t21 = t13 * t19;
+    const double t22 = 2.0 * t21;
     const double t24 = X[0] * t16;
     const double t25 = X[1] * t13;
     const double t26 = t24 - t25;
     const double t27 = t13 * t26;
-    const double t32 = t16 * t19;
-    const double t33 = t27 + t32;
-    const double t40 = t16 * t26;
-    const double t41 = t21 - t40;
-    const double t60 = t13 * t13;
-    const double t61 = 2.0 * t60;
-    const double t62 = -t61;
-    const double t63 = t16 * t13;
-    const double t64 = 2.0 * t63;
-    const double t65 = -t64;
-    const double t66 = s->par.A * t8;
-    const double t67 = t66 * t33;
-    const double t68 = -t67;
-    const double t69 = t66 * t41;
-    const double t70 = -t69;
-    const double t73 = t62 + 1.0;
-    const double t74 = t73 * t73;
-    const double t75 = t65 * t64;
-    const double t76 = t74 - t75;
-    const double t81 = t68 * t76;
-    const double t82 = 1.0 / t76;
-    const double t83 = t81 * t82;
-    const double t84 = s->fixed[4] * t83;
-    const double t85 = t70 * t76;
-    const double t86 = t85 * t82;
-    const double t87 = s->fixed[4] * t86;
-    const double t88 = t65 * t70;
-    const double t89 = t68 * t73;
-    const double t90 = t88 - t89;
-    const double t91 = t90 * t82;
-    const double t92 = s->fixed[4] * t91;
-    const double t93 = -t92;
-    const double t94 = t70 * t73;
-    const double t95 = t68 * t64;
-    const double t96 = t94 - t95;
-    const double t97 = t96 * t82;
-    const double t98 = s->fixed[4] * t97;
+    const double t28 = 2.0 * t27;
+    const double t77 = X[1] + t28;
+    const double t79 = s->fixed[5] * t8;
+    const double t80 = t79 * t77;
+    const double t81 = -t80;
+    const double t82 = X[0] - t22;
+    const double t83 = t79 * t82;
+    const double t84 = t79 * X[1];
+    const double t85 = -t84;
+    const double t86 = t79 * X[0];
     P[0] = 0.0;
     P[1] = 0.0;
-    P[2] = t84;
+    P[2] = t81;
     P[3] = 0.0;
     P[4] = 0.0;
-    P[5] = t87;
-    P[6] = t93;
-    P[7] = t98;
+    P[5] = t83;
+    P[6] = t85;
+    P[7] = t86;
     P[8] = 0.0;
 }
 
@@ -535,18 +509,18 @@ MMSMITH_FN void torsion_b(const torsion_solution *s, const double X[3], double t
     const double t56 = t8 * t41;
     const double t57 = t48 * t33;
     const double t58 = t56 - t57;
-    const double t100 = s->fixed[5] * X[2];
-    const double t101 = t100 * t50;
-    const double t103 = s->fixed[6] * t8;
-    const double t104 = t103 * t56;
-    const double t105 = t101 - t104;
-    const double t108 = s->fixed[7] * t105;
-    const double t109 = t100 * t58;
-    const double t110 = t103 * t45;
-    const double t111 = t109 + t110;
-    const double t112 = s->fixed[7] * t111;
-    b[0] = t108;
-    b[1] = t112;
+    const double t88 = s->fixed[6] * X[2];
+    const double t89 = t88 * t50;
+    const double t91 = s->fixed[7] * t8;
+    const double t92 = t91 * t56;
+    const double t93 = t89 - t92;
+    const double t96 = s->fixed[8] * t93;
+    const double t97 = t88 * t58;
+    const double t98 = t91 * t45;
+    const double t99 = t97 + t98;
+    const double t100 = s->fixed[8] * t99;
+    b[0] = t96;
+    b[1] = t100;
     b[2] = 0.0;
 }
 
@@ -556,42 +530,11 @@ MMSMITH_FN void torsion_X_lower_traction(const torsion_solution *s, const double
 {
     const double t7 = s->fixed[0] * t;
     const double t8 = mmsmith_sin_pi(t7);
-    const double t11 = s->fixed[1] * t8;
-    const double t12 = t11 * X[2];
-    const double t13 = sin(t12);
-    const double t16 = cos(t12);
-    const double t60 = t13 * t13;
-    const double t61 = 2.0 * t60;
-    const double t62 = -t61;
-    const double t63 = t16 * t13;
-    const double t64 = 2.0 * t63;
-    const double t65 = -t64;
-    const double t73 = t62 + 1.0;
-    const double t74 = t73 * t73;
-    const double t75 = t65 * t64;
-    const double t76 = t74 - t75;
-    const double t82 = 1.0 / t76;
-    const double t128 = 2.0 * X[1];
-    const double t129 = t128 * t16;
-    const double t130 = t13 - t129;
-    const double t131 = t128 * t13;
-    const double t132 = t16 + t131;
-    const double t133 = t13 * t130;
-    const double t134 = t16 * t132;
-    const double t135 = t133 - t134;
-    const double t136 = t11 * t135;
-    const double t137 = t13 * t132;
-    const double t138 = t16 * t130;
-    const double t139 = t137 + t138;
-    const double t140 = t11 * t139;
-    const double t141 = t65 * t136;
-    const double t142 = t73 * t140;
-    const double t143 = t141 - t142;
-    const double t144 = t143 * t82;
-    const double t145 = s->fixed[4] * t144;
+    const double t79 = s->fixed[5] * t8;
+    const double t84 = t79 * X[1];
     traction[0] = 0.0;
     traction[1] = 0.0;
-    traction[2] = t145;
+    traction[2] = t84;
 }
 
 /* traction on the surface X-upper, force per reference area */
@@ -600,45 +543,12 @@ MMSMITH_FN void torsion_X_upper_traction(const torsion_solution *s, const double
 {
     const double t7 = s->fixed[0] * t;
     const double t8 = mmsmith_sin_pi(t7);
-    const double t11 = s->fixed[1] * t8;
-    const double t12 = t11 * X[2];
-    const double t13 = sin(t12);
-    const double t16 = cos(t12);
-    const double t60 = t13 * t13;
-    const double t61 = 2.0 * t60;
-    const double t62 = -t61;
-    const double t63 = t16 * t13;
-    const double t64 = 2.0 * t63;
-    const double t65 = -t64;
-    const double t73 = t62 + 1.0;
-    const double t74 = t73 * t73;
-    const double t75 = t65 * t64;
-    const double t76 = t74 - t75;
-    const double t82 = 1.0 / t76;
-    const double t128 = 2.0 * X[1];
-    const double t129 = t128 * t16;
-    const double t131 = t128 * t13;
-    const double t146 = t13 + t129;
-    const double t147 = t16 - t131;
-    const double t148 = t13 * t146;
-    const double t149 = t16 * t147;
-    const double t150 = t148 - t149;
-    const double t151 = t11 * t150;
-    const double t152 = -t151;
-    const double t153 = t13 * t147;
-    const double t154 = t16 * t146;
-    const double t155 = t153 + t154;
-    const double t156 = t11 * t155;
-    const double t157 = -t156;
-    const double t158 = t65 * t152;
-    const double t159 = t73 * t157;
-    const double t160 = t158 - t159;
-    const double t161 = t160 * t82;
-    const double t162 = s->fixed[4] * t161;
-    const double t163 = -t162;
+    const double t79 = s->fixed[5] * t8;
+    const double t84 = t79 * X[1];
+    const double t85 = -t84;
     traction[0] = 0.0;
     traction[1] = 0.0;
-    traction[2] = t163;
+    traction[2] = t85;
 }
 
 /* traction on the surface Y-lower, force per reference area */
@@ -647,44 +557,12 @@ MMSMITH_FN void torsion_Y_lower_traction(const torsion_solution *s, const double
 {
     const double t7 = s->fixed[0] * t;
     const double t8 = mmsmith_sin_pi(t7);
-    const double t11 = s->fixed[1] * t8;
-    const double t12 = t11 * X[2];
-    const double t13 = sin(t12);
-    const double t16 = cos(t12);
-    const double t60 = t13 * t13;
-    const double t61 = 2.0 * t60;
-    const double t62 = -t61;
-    const double t63 = t16 * t13;
-    const double t64 = 2.0 * t63;
-    const double t65 = -t64;
-    const double t73 = t62 + 1.0;
-    const double t74 = t73 * t73;
-    const double t75 = t65 * t64;
-    const double t76 = t74 - t75;
-    const double t82 = 1.0 / t76;
-    const double t164 = 2.0 * X[0];
-    const double t165 = t164 * t13;
-    const double t166 = t16 - t165;
-    const double t167 = t164 * t16;
-    const double t168 = t13 + t167;
-    const double t169 = t13 * t166;
-    const double t170 = t16 * t168;
-    const double t171 = t169 + t170;
-    const double t172 = t11 * t171;
-    const double t173 = t13 * t168;
-    const double t174 = t16 * t166;
-    const double t175 = t173 - t174;
-    const double t176 = t11 * t175;
-    const double t177 = -t176;
-    const double t178 = t73 * t172;
-    const double t179 = t64 * t177;
-    const double t180 = t178 - t179;
-    const double t181 = t180 * t82;
-    const double t182 = s->fixed[4] * t181;
-    const double t183 = -t182;
+    const double t79 = s->fixed[5] * t8;
+    const double t86 = t79 * X[0];
+    const double t116 = -t86;
     traction[0] = 0.0;
     traction[1] = 0.0;
-    traction[2] = t183;
+    traction[2] = t116;
 }
 
 /* traction on the surface Y-upper, force per reference area */
@@ -693,43 +571,11 @@ MMSMITH_FN void torsion_Y_upper_traction(const torsion_solution *s, const double
 {
     const double t7 = s->fixed[0] * t;
     const double t8 = mmsmith_sin_pi(t7);
-    const double t11 = s->fixed[1] * t8;
-    const double t12 = t11 * X[2];
-    const double t13 = sin(t12);
-    const double t16 = cos(t12);
-    const double t60 = t13 * t13;
-    const double t61 = 2.0 * t60;
-    const double t62 = -t61;
-    const double t63 = t16 * t13;
-    const double t64 = 2.0 * t63;
-    const double t65 = -t64;
-    const double t73 = t62 + 1.0;
-    const double t74 = t73 * t73;
-    const double t75 = t65 * t64;
-    const double t76 = t74 - t75;
-    const double t82 = 1.0 / t76;
-    const double t164 = 2.0 * X[0];
-    const double t165 = t164 * t13;
-    const double t167 = t164 * t16;
-    const double t184 = t16 + t165;
-    const double t185 = t13 - t167;
-    const double t186 = t13 * t184;
-    const double t187 = t16 * t185;
-    const double t188 = t186 + t187;
-    const double t189 = t11 * t188;
-    const double t190 = -t189;
-    const double t191 = t13 * t185;
-    const double t192 = t16 * t184;
-    const double t193 = t191 - t192;
-    const double t194 = t11 * t193;
-    const double t195 = t73 * t190;
-    const double t196 = t64 * t194;
-    const double t197 = t195 - t196;
-    const double t198 = t197 * t82;
-    const double t199 = s->fixed[4] * t198;
+    const double t79 = s->fixed[5] * t8;
+    const double t86 = t79 * X[0];
     traction[0] = 0.0;
     traction[1] = 0.0;
-    traction[2] = t199;
+    traction[2] = t86;
 }
 
 /* traction on the surface Z-lower, force per reference area */
@@ -738,16 +584,12 @@ MMSMITH_FN void torsion_Z_lower_traction(const torsion_solution *s, const double
 {
     const double t7 = s->fixed[0] * t;
     const double t8 = mmsmith_sin_pi(t7);
-    const double t66 = s->par.A * t8;
-    const double t200 = t66 * X[1];
-    const double t201 = -t200;
-    const double t202 = s->fixed[4] * t201;
-    const double t203 = -t202;
-    const double t205 = s->fixed[11] * t8;
-    const double t206 = t205 * X[0];
-    const double t207 = -t206;
-    traction[0] = t203;
-    traction[1] = t207;
+    const double t79 = s->fixed[5] * t8;
+    const double t84 = t79 * X[1];
+    const double t86 = t79 * X[0];
+    const double t116 = -t86;
+    traction[0] = t84;
+    traction[1] = t116;
     traction[2] = 0.0;
 }
 
@@ -758,41 +600,26 @@ MMSMITH_FN void torsion_Z_upper_traction(const torsion_solution *s, const double
     const double t7 = s->fixed[0] * t;
     const double t8 = mmsmith_sin_pi(t7);
     const double t11 = s->fixed[1] * t8;
-    const double t66 = s->par.A * t8;
-    const double t208 = sin(t11);
-    const double t209 = cos(t11);
-    const double t210 = t209 * X[0];
-    const double t211 = t208 * X[1];
-    const double t212 = t210 - t211;
-    const double t213 = t208 * X[0];
-    const double t214 = t209 * X[1];
-    const double t215 = t213 + t214;
-    const double t216 = t208 * t212;
-    const double t217 = t209 * t215;
-    const double t218 = t216 + t217;
-    const double t219 = t66 * t218;
-    const double t220 = -t219;
-    const double t221 = t208 * t208;
-    const double t222 = 2.0 * t221;
-    const double t223 = -t222;
-    const double t224 = t223 + 1.0;
-    const double t225 = t208 * t209;
-    const double t226 = 2.0 * t225;
-    const double t227 = -t226;
-    const double t228 = t224 * t224;
-    const double t229 = t227 * t226;
-    const double t230 = t228 - t229;
-    const double t231 = t230 / t230;
-    const double t232 = s->fixed[4] * t231;
-    const double t233 = t232 * t220;
-    const double t234 = t208 * t215;
-    const double t235 = t209 * t212;
-    const double t236 = t234 - t235;
-    const double t237 = t66 * t236;
-    const double t238 = -t237;
-    const double t239 = t232 * t238;
-    traction[0] = t233;
-    traction[1] = t239;
+    const double t79 = s->fixed[5] * t8;
+    const double t117 = cos(t11);
+    const double t118 = sin(t11);
+    const double t119 = t117 * X[0];
+    const double t120 = t118 * X[1];
+    const double t121 = t119 - t120;
+    const double t122 = t118 * t121;
+    const double t123 = 2.0 * t122;
+    const double t124 = X[1] + t123;
+    const double t125 = t79 * t124;
+    const double t126 = -t125;
+    const double t127 = t117 * X[1];
+    const double t128 = t118 * X[0];
+    const double t129 = t127 + t128;
+    const double t130 = t118 * t129;
+    const double t131 = 2.0 * t130;
+    const double t132 = X[0] - t131;
+    const double t133 = t79 * t132;
+    traction[0] = t126;
+    traction[1] = t133;
     traction[2] = 0.0;
 }
 
@@ -851,38 +678,25 @@ MMSMITH_FN void torsion_fields(const torsion_solution *s, const double X[3], dou
     const double t69 = t66 * t41;
     const double t70 = -t69;
     const double t72 = 1.0 - t61;
-    const double t73 = t62 + 1.0;
-    const double t74 = t73 * t73;
-    const double t75 = t65 * t64;
-    const double t76 = t74 - t75;
-    const double t81 = t68 * t76;
-    const double t82 = 1.0 / t76;
-    const double t83 = t81 * t82;
-    const double t84 = s->fixed[4] * t83;
-    const double t85 = t70 * t76;
-    const double t86 = t85 * t82;
-    const double t87 = s->fixed[4] * t86;
-    const double t88 = t65 * t70;
-    const double t89 = t68 * t73;
-    const double t90 = t88 - t89;
-    const double t91 = t90 * t82;
-    const double t92 = s->fixed[4] * t91;
-    const double t93 = -t92;
-    const double t94 = t70 * t73;
-    const double t95 = t68 * t64;
-    const double t96 = t94 - t95;
-    const double t97 = t96 * t82;
-    const double t98 = s->fixed[4] * t97;
-    const double t100 = s->fixed[5] * X[2];
-    const double t101 = t100 * t50;
-    const double t103 = s->fixed[6] * t8;
-    const double t104 = t103 * t56;
-    const double t105 = t101 - t104;
-    const double t108 = s->fixed[7] * t105;
-    const double t109 = t100 * t58;
-    const double t110 = t103 * t45;
-    const double t111 = t109 + t110;
-    const double t112 = s->fixed[7] * t111;
+    const double t77 = X[1] + t28;
+    const double t79 = s->fixed[5] * t8;
+    const double t80 = t79 * t77;
+    const double t81 = -t80;
+    const double t82 = X[0] - t22;
+    const double t83 = t79 * t82;
+    const double t84 = t79 * X[1];
+    const double t85 = -t84;
+    const double t86 = t79 * X[0];
+    const double t88 = s->fixed[6] * X[2];
+    const double t89 = t88 * t50;
+    const double t91 = s->fixed[7] * t8;
+    const double t92 = t91 * t56;
+    const double t93 = t89 - t92;
+    const double t96 = s->fixed[8] * t93;
+    const double t97 = t88 * t58;
+    const double t98 = t91 * t45;
+    const double t99 = t97 + t98;
+    const double t100 = s->fixed[8] * t99;
     out->u[0] = t23;
     out->u[1] = t28;
     out->u[2] = 0.0;
@@ -913,15 +727,15 @@ MMSMITH_FN void torsion_fields(const torsion_solution *s, const double X[3], dou
     out->J = 1.0;
     out->P[0] = 0.0;
     out->P[1] = 0.0;
-    out->P[2] = t84;
+    out->P[2] = t81;
     out->P[3] = 0.0;
     out->P[4] = 0.0;
-    out->P[5] = t87;
-    out->P[6] = t93;
-    out->P[7] = t98;
+    out->P[5] = t83;
+    out->P[6] = t85;
+    out->P[7] = t86;
     out->P[8] = 0.0;
-    out->b[0] = t108;
-    out->b[1] = t112;
+    out->b[0] = t96;
+    out->b[1] = t100;
     out->b[2] = 0.0;
 }
 
@@ -935,23 +749,23 @@ MMSMITH_FN torsion_time_values torsion_at_time(const torsion_solution *s, double
     const double t31 = mmsmith_cos_pi(t7);
     const double t46 = t31 * t31;
     const double t47 = s->par.A * t46;
-    const double t113 = t8 * t8;
-    const double t114 = s->fixed[6] * t113;
+    const double t101 = t8 * t8;
+    const double t102 = s->fixed[7] * t101;
     time.values[0] = t8;
     time.values[1] = t11;
     time.values[2] = t47;
-    time.values[3] = t114;
+    time.values[3] = t102;
     return time;
 }
 
 /* What the body force needs of the position alone, 4 values. */
 MMSMITH_FN void torsion_at_point(const torsion_solution *s, const double X[3], double point[4])
 {
-    const double t100 = s->fixed[5] * X[2];
+    const double t88 = s->fixed[6] * X[2];
     point[0] = X[2];
     point[1] = X[0];
     point[2] = X[1];
-    point[3] = t100;
+    point[3] = t88;
 }
 
 /* The body force from the values of one time and of one point. Value m of the point is point[m*stride]:
@@ -982,16 +796,16 @@ MMSMITH_FN void torsion_b_staged(const torsion_solution *s, const torsion_time_v
     const double t56 = time->values[0] * t41;
     const double t57 = t48 * t33;
     const double t58 = t56 - t57;
-    const double t101 = point[3 * stride] * t50;
-    const double t109 = point[3 * stride] * t58;
-    const double t115 = time->values[3] * t41;
-    const double t116 = t101 - t115;
-    const double t117 = s->fixed[7] * t116;
-    const double t118 = time->values[3] * t33;
-    const double t119 = t109 + t118;
-    const double t120 = s->fixed[7] * t119;
-    b[0] = t117;
-    b[1] = t120;
+    const double t89 = point[3 * stride] * t50;
+    const double t97 = point[3 * stride] * t58;
+    const double t103 = time->values[3] * t41;
+    const double t104 = t89 - t103;
+    const double t105 = s->fixed[8] * t104;
+    const double t106 = time->values[3] * t33;
+    const double t107 = t97 + t106;
+    const double t108 = s->fixed[8] * t107;
+    b[0] = t105;
+    b[1] = t108;
     b[2] = 0.0;
 }
 
@@ -1047,16 +861,16 @@ MMSMITH_FN void torsion_b_array(const torsion_solution *s, double t, size_t n,
         const double t56 = time.values[0] * t41;
         const double t57 = t48 * t33;
         const double t58 = t56 - t57;
-        const double t101 = point3[p] * t50;
-        const double t109 = point3[p] * t58;
-        const double t115 = time.values[3] * t41;
-        const double t116 = t101 - t115;
-        const double t117 = s->fixed[7] * t116;
-        const double t118 = time.values[3] * t33;
-        const double t119 = t109 + t118;
-        const double t120 = s->fixed[7] * t119;
-        b[p * 3 + 0] = t117;
-        b[p * 3 + 1] = t120;
+        const double t89 = point3[p] * t50;
+        const double t97 = point3[p] * t58;
+        const double t103 = time.values[3] * t41;
+        const double t104 = t89 - t103;
+        const double t105 = s->fixed[8] * t104;
+        const double t106 = time.values[3] * t33;
+        const double t107 = t97 + t106;
+        const double t108 = s->fixed[8] * t107;
+        b[p * 3 + 0] = t105;
+        b[p * 3 + 1] = t108;
         b[p * 3 + 2] = 0.0;
     }
 }
@@ -1083,13 +897,13 @@ MMSMITH_FN double torsion_wave_speed(const torsion_solution *s)
 /* the time in which the motion repeats */
 MMSMITH_FN double torsion_period(const torsion_solution *s)
 {
-    return s->fixed[8];
+    return s->fixed[9];
 }
 
 /* first Lame constant */
 MMSMITH_FN double torsion_lambda(const torsion_solution *s)
 {
-    return s->fixed[9];
+    return s->fixed[10];
 }
 
 /* shear modulus */
@@ -1101,8 +915,8 @@ MMSMITH_FN double torsion_mu(const torsion_solution *s)
 /* the body's corner of smallest coordinates */
 MMSMITH_FN void torsion_lower(const torsion_solution *s, double lower[3])
 {
-    lower[0] = s->fixed[10];
-    lower[1] = s->fixed[10];
+    lower[0] = s->fixed[11];
+    lower[1] = s->fixed[11];
     lower[2] = 0.0;
 }
 

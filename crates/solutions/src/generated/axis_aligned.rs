@@ -138,25 +138,25 @@ impl<T: crate::Real> AxisAligned<T> {
         let t84 = parameters.rho0 * t47;
         let t85 = t84 * t50;
         let t86 = t83 / t85;
-        let t110 = t26 / parameters.rho0;
-        let t138 = t63 + t59;
-        let t139 = parameters.A * parameters.A;
-        let t140 = t139 * parameters.A;
-        let t141 = t25 * t25;
-        let t143 = t140 * t141;
-        let t144 = t143 * t138;
-        let t145 = t144 / parameters.rho0;
-        let t149 = t25 * T::pi();
-        let t150 = T::nearest(2.0) * t139;
-        let t151 = t150 * t149;
-        let t152 = t151 * t138;
-        let t153 = t152 / parameters.rho0;
-        let t158 = t27 * parameters.nu;
-        let t159 = t158 / t85;
-        let t187 = T::nearest(2.0) / t7;
+        let t113 = t26 / parameters.rho0;
+        let t139 = t63 + t59;
+        let t140 = parameters.A * parameters.A;
+        let t141 = t140 * parameters.A;
+        let t142 = t25 * t25;
+        let t144 = t141 * t142;
+        let t145 = t144 * t139;
+        let t146 = t145 / parameters.rho0;
+        let t150 = t25 * T::pi();
+        let t151 = T::nearest(2.0) * t140;
+        let t152 = t151 * t150;
+        let t153 = t152 * t139;
+        let t154 = t153 / parameters.rho0;
+        let t159 = t27 * parameters.nu;
+        let t160 = t159 / t85;
+        let t188 = T::nearest(2.0) / t7;
         Ok(AxisAligned {
             parameters,
-            fixed: [t7, t18, t19, t28, t59, t63, t65, t86, t110, t145, t153, t159, t187],
+            fixed: [t7, t18, t19, t28, t59, t63, t65, t86, t113, t146, t154, t160, t188],
         })
     }
     /// The solution with parameter values in the order of the description; missing ones take their
@@ -312,12 +312,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t41 = t40 * t39;
         let t43 = t37 + T::one();
         let t44 = t41 + T::one();
+        let t45 = t43 * t44;
         let t51 = t35 * t44;
         let t52 = t9 * t51;
         let t53 = t14 * t39;
         let t54 = t52 + t53;
         let t55 = self.fixed[1] * t54;
-        let t56 = t55.log_1p();
+        let t56 = t55.ln_of_both(t45);
         let t60 = t37 + T::nearest(2.0);
         let t64 = self.fixed[5] * t56;
         let t66 = self.fixed[6] * t9;
@@ -358,47 +359,48 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t93 = t14 * t92;
         let t94 = t93 + t89;
         let t95 = self.fixed[1] * t94;
-        let t96 = t95.log_1p();
-        let t97 = self.fixed[5] * t96;
-        let t98 = self.fixed[4] * t90;
-        let t99 = t97 + t98;
-        let t100 = T::one() / t91;
-        let t101 = self.fixed[5] * t100;
-        let t102 = self.fixed[4] + t101;
-        let t103 = t90 + t96;
+        let t96 = self.fixed[1] * t53;
+        let t97 = t96 + T::one();
+        let t98 = t91 * t97;
+        let t99 = t95.ln_of_both(t98);
+        let t100 = self.fixed[5] * t99;
+        let t101 = self.fixed[4] * t90;
+        let t102 = t100 + t101;
+        let t103 = T::one() / t91;
         let t104 = self.fixed[5] * t103;
-        let t105 = t99 * t100;
-        let t106 = t102 - t105;
-        let t107 = self.fixed[4] + t106;
-        let t108 = t90 * t107;
-        let t109 = t104 + t108;
-        let t111 = self.fixed[8] * t9;
-        let t112 = t111 * t2;
-        let t113 = t109 * t100;
-        let t114 = t112 * t113;
-        let t115 = t88 - t114;
-        let t116 = self.fixed[7] * t14;
-        let t117 = t116 * t13;
-        let t118 = self.fixed[1] * t53;
-        let t119 = t118 + T::one();
-        let t120 = self.fixed[4] * t118;
-        let t121 = t97 + t120;
-        let t122 = T::one() / t119;
-        let t123 = self.fixed[5] * t122;
-        let t124 = self.fixed[4] + t123;
-        let t125 = t96 + t118;
-        let t126 = self.fixed[5] * t125;
-        let t127 = t121 * t122;
-        let t128 = t124 - t127;
-        let t129 = self.fixed[4] + t128;
-        let t130 = t118 * t129;
-        let t131 = t126 + t130;
-        let t132 = self.fixed[8] * t14;
-        let t133 = t132 * t13;
-        let t134 = t131 * t122;
-        let t135 = t133 * t134;
-        let t136 = t117 - t135;
-        crate::nalgebra::SVector::<T, 2>::new(t115, t136)
+        let t105 = self.fixed[4] + t104;
+        let t106 = t90 + t99;
+        let t107 = self.fixed[5] * t106;
+        let t108 = t102 * t103;
+        let t109 = t105 - t108;
+        let t110 = self.fixed[4] + t109;
+        let t111 = t90 * t110;
+        let t112 = t107 + t111;
+        let t114 = self.fixed[8] * t9;
+        let t115 = t114 * t2;
+        let t116 = t112 * t103;
+        let t117 = t115 * t116;
+        let t118 = t88 - t117;
+        let t119 = self.fixed[7] * t14;
+        let t120 = t119 * t13;
+        let t121 = self.fixed[4] * t96;
+        let t122 = t100 + t121;
+        let t123 = T::one() / t97;
+        let t124 = self.fixed[5] * t123;
+        let t125 = self.fixed[4] + t124;
+        let t126 = t99 + t96;
+        let t127 = self.fixed[5] * t126;
+        let t128 = t122 * t123;
+        let t129 = t125 - t128;
+        let t130 = self.fixed[4] + t129;
+        let t131 = t96 * t130;
+        let t132 = t127 + t131;
+        let t133 = self.fixed[8] * t14;
+        let t134 = t133 * t13;
+        let t135 = t132 * t123;
+        let t136 = t134 * t135;
+        let t137 = t120 - t136;
+        crate::nalgebra::SVector::<T, 2>::new(t118, t137)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t2 = X[0].sin_pi();
@@ -435,7 +437,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t53 = t14 * t39;
         let t54 = t52 + t53;
         let t55 = self.fixed[1] * t54;
-        let t56 = t55.log_1p();
+        let t56 = t55.ln_of_both(t45);
         let t60 = t37 + T::nearest(2.0);
         let t64 = self.fixed[5] * t56;
         let t66 = self.fixed[6] * t9;
@@ -460,46 +462,47 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t93 = t14 * t92;
         let t94 = t93 + t89;
         let t95 = self.fixed[1] * t94;
-        let t96 = t95.log_1p();
-        let t97 = self.fixed[5] * t96;
-        let t98 = self.fixed[4] * t90;
-        let t99 = t97 + t98;
-        let t100 = T::one() / t91;
-        let t101 = self.fixed[5] * t100;
-        let t102 = self.fixed[4] + t101;
-        let t103 = t90 + t96;
+        let t96 = self.fixed[1] * t53;
+        let t97 = t96 + T::one();
+        let t98 = t91 * t97;
+        let t99 = t95.ln_of_both(t98);
+        let t100 = self.fixed[5] * t99;
+        let t101 = self.fixed[4] * t90;
+        let t102 = t100 + t101;
+        let t103 = T::one() / t91;
         let t104 = self.fixed[5] * t103;
-        let t105 = t99 * t100;
-        let t106 = t102 - t105;
-        let t107 = self.fixed[4] + t106;
-        let t108 = t90 * t107;
-        let t109 = t104 + t108;
-        let t111 = self.fixed[8] * t9;
-        let t112 = t111 * t2;
-        let t113 = t109 * t100;
-        let t114 = t112 * t113;
-        let t115 = t88 - t114;
-        let t116 = self.fixed[7] * t14;
-        let t117 = t116 * t13;
-        let t118 = self.fixed[1] * t53;
-        let t119 = t118 + T::one();
-        let t120 = self.fixed[4] * t118;
-        let t121 = t97 + t120;
-        let t122 = T::one() / t119;
-        let t123 = self.fixed[5] * t122;
-        let t124 = self.fixed[4] + t123;
-        let t125 = t96 + t118;
-        let t126 = self.fixed[5] * t125;
-        let t127 = t121 * t122;
-        let t128 = t124 - t127;
-        let t129 = self.fixed[4] + t128;
-        let t130 = t118 * t129;
-        let t131 = t126 + t130;
-        let t132 = self.fixed[8] * t14;
-        let t133 = t132 * t13;
-        let t134 = t131 * t122;
-        let t135 = t133 * t134;
-        let t136 = t117 - t135;
+        let t105 = self.fixed[4] + t104;
+        let t106 = t90 + t99;
+        let t107 = self.fixed[5] * t106;
+        let t108 = t102 * t103;
+        let t109 = t105 - t108;
+        let t110 = self.fixed[4] + t109;
+        let t111 = t90 * t110;
+        let t112 = t107 + t111;
+        let t114 = self.fixed[8] * t9;
+        let t115 = t114 * t2;
+        let t116 = t112 * t103;
+        let t117 = t115 * t116;
+        let t118 = t88 - t117;
+        let t119 = self.fixed[7] * t14;
+        let t120 = t119 * t13;
+        let t121 = self.fixed[4] * t96;
+        let t122 = t100 + t121;
+        let t123 = T::one() / t97;
+        let t124 = self.fixed[5] * t123;
+        let t125 = self.fixed[4] + t124;
+        let t126 = t99 + t96;
+        let t127 = self.fixed[5] * t126;
+        let t128 = t122 * t123;
+        let t129 = t125 - t128;
+        let t130 = self.fixed[4] + t129;
+        let t131 = t96 * t130;
+        let t132 = t127 + t131;
+        let t133 = self.fixed[8] * t14;
+        let t134 = t133 * t13;
+        let t135 = t132 * t123;
+        let t136 = t134 * t135;
+        let t137 = t120 - t136;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t11, t16),
             v: crate::nalgebra::SVector::<T, 2>::new(t22, t24),
@@ -508,7 +511,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t43, T::zero(), T::zero(), t44),
             J: t45,
             P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t71, T::zero(), T::zero(), t78),
-            b: crate::nalgebra::SVector::<T, 2>::new(t115, t136),
+            b: crate::nalgebra::SVector::<T, 2>::new(t118, t137),
         }
     }
     fn traction(
@@ -528,20 +531,21 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t41 = t40 * t39;
                 let t44 = t41 + T::one();
                 let t53 = t14 * t39;
-                let t188 = t36 + T::one();
-                let t189 = t9 * t44;
-                let t190 = t189 + t53;
-                let t191 = self.fixed[1] * t190;
-                let t192 = t191.log_1p();
-                let t193 = t36 + T::nearest(2.0);
-                let t194 = self.fixed[5] * t192;
-                let t195 = t9 * t193;
-                let t196 = self.fixed[6] * t195;
-                let t197 = t196 + t194;
-                let t198 = T::one() / t188;
-                let t199 = t198 * t197;
-                let t200 = -t199;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t200, T::zero()))
+                let t189 = t36 + T::one();
+                let t190 = t9 * t44;
+                let t191 = t190 + t53;
+                let t192 = self.fixed[1] * t191;
+                let t193 = t189 * t44;
+                let t194 = t192.ln_of_both(t193);
+                let t195 = t36 + T::nearest(2.0);
+                let t196 = self.fixed[5] * t194;
+                let t197 = t9 * t195;
+                let t198 = self.fixed[6] * t197;
+                let t199 = t198 + t196;
+                let t200 = T::one() / t189;
+                let t201 = t200 * t199;
+                let t202 = -t201;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t202, T::zero()))
             }
             crate::Surface::Upper(0) => {
                 let t8 = self.fixed[0] * t;
@@ -553,20 +557,21 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t41 = t40 * t39;
                 let t44 = t41 + T::one();
                 let t53 = t14 * t39;
-                let t189 = t9 * t44;
-                let t201 = T::one() - t36;
-                let t202 = t189 - t53;
-                let t203 = self.fixed[1] * t202;
-                let t204 = -t203;
-                let t205 = t204.log_1p();
-                let t206 = T::nearest(2.0) - t36;
-                let t207 = self.fixed[5] * t205;
-                let t208 = t9 * t206;
-                let t209 = self.fixed[6] * t208;
-                let t210 = t207 - t209;
-                let t211 = T::one() / t201;
-                let t212 = t211 * t210;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t212, T::zero()))
+                let t190 = t9 * t44;
+                let t203 = T::one() - t36;
+                let t204 = t190 - t53;
+                let t205 = self.fixed[1] * t204;
+                let t206 = -t205;
+                let t207 = t203 * t44;
+                let t208 = t206.ln_of_both(t207);
+                let t209 = T::nearest(2.0) - t36;
+                let t210 = self.fixed[5] * t208;
+                let t211 = t9 * t209;
+                let t212 = self.fixed[6] * t211;
+                let t213 = t210 - t212;
+                let t214 = T::one() / t203;
+                let t215 = t214 * t213;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t215, T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t8 = self.fixed[0] * t;
@@ -578,20 +583,21 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t40 = self.fixed[1] * t14;
                 let t43 = t37 + T::one();
                 let t89 = t9 * t35;
-                let t213 = t40 + T::one();
-                let t214 = t14 * t43;
-                let t215 = t214 + t89;
-                let t216 = self.fixed[1] * t215;
-                let t217 = t216.log_1p();
-                let t218 = t40 + T::nearest(2.0);
-                let t219 = self.fixed[5] * t217;
-                let t220 = t14 * t218;
-                let t221 = self.fixed[6] * t220;
-                let t222 = t221 + t219;
-                let t223 = T::one() / t213;
-                let t224 = t223 * t222;
-                let t225 = -t224;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t225))
+                let t216 = t40 + T::one();
+                let t217 = t14 * t43;
+                let t218 = t217 + t89;
+                let t219 = self.fixed[1] * t218;
+                let t220 = t216 * t43;
+                let t221 = t219.ln_of_both(t220);
+                let t222 = t40 + T::nearest(2.0);
+                let t223 = self.fixed[5] * t221;
+                let t224 = t14 * t222;
+                let t225 = self.fixed[6] * t224;
+                let t226 = t225 + t223;
+                let t227 = T::one() / t216;
+                let t228 = t227 * t226;
+                let t229 = -t228;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t229))
             }
             crate::Surface::Upper(1) => {
                 let t8 = self.fixed[0] * t;
@@ -603,20 +609,21 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t40 = self.fixed[1] * t14;
                 let t43 = t37 + T::one();
                 let t89 = t9 * t35;
-                let t214 = t14 * t43;
-                let t226 = T::one() - t40;
-                let t227 = t214 - t89;
-                let t228 = self.fixed[1] * t227;
-                let t229 = -t228;
-                let t230 = t229.log_1p();
-                let t231 = T::nearest(2.0) - t40;
-                let t232 = self.fixed[5] * t230;
-                let t233 = t14 * t231;
-                let t234 = self.fixed[6] * t233;
-                let t235 = t232 - t234;
-                let t236 = T::one() / t226;
-                let t237 = t236 * t235;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t237))
+                let t217 = t14 * t43;
+                let t230 = T::one() - t40;
+                let t231 = t217 - t89;
+                let t232 = self.fixed[1] * t231;
+                let t233 = -t232;
+                let t234 = t230 * t43;
+                let t235 = t233.ln_of_both(t234);
+                let t236 = T::nearest(2.0) - t40;
+                let t237 = self.fixed[5] * t235;
+                let t238 = t14 * t236;
+                let t239 = self.fixed[6] * t238;
+                let t240 = t237 - t239;
+                let t241 = T::one() / t230;
+                let t242 = t241 * t240;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t242))
             }
             _ => None,
         }
@@ -689,25 +696,25 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 4, 10> for AxisAligned<T> {
         let t13 = X[1].sin_pi();
         let t35 = X[0].cos_pi();
         let t39 = X[1].cos_pi();
-        let t137 = self.fixed[7] * t2;
-        let t142 = t35 * t35;
-        let t146 = t2 * t142;
-        let t147 = self.fixed[9] * t146;
-        let t148 = -t147;
-        let t154 = t2 * t35;
-        let t155 = self.fixed[10] * t154;
-        let t160 = self.fixed[11] * t2;
-        let t161 = -t160;
-        let t169 = self.fixed[7] * t13;
-        let t170 = t39 * t39;
-        let t171 = t13 * t170;
-        let t172 = self.fixed[9] * t171;
-        let t173 = -t172;
-        let t174 = t13 * t39;
-        let t175 = self.fixed[10] * t174;
-        let t178 = self.fixed[11] * t13;
-        let t179 = -t178;
-        [t35, t39, t137, t148, t155, t161, t169, t173, t175, t179]
+        let t138 = self.fixed[7] * t2;
+        let t143 = t35 * t35;
+        let t147 = t2 * t143;
+        let t148 = self.fixed[9] * t147;
+        let t149 = -t148;
+        let t155 = t2 * t35;
+        let t156 = self.fixed[10] * t155;
+        let t161 = self.fixed[11] * t2;
+        let t162 = -t161;
+        let t170 = self.fixed[7] * t13;
+        let t171 = t39 * t39;
+        let t172 = t13 * t171;
+        let t173 = self.fixed[9] * t172;
+        let t174 = -t173;
+        let t175 = t13 * t39;
+        let t176 = self.fixed[10] * t175;
+        let t179 = self.fixed[11] * t13;
+        let t180 = -t179;
+        [t35, t39, t138, t149, t156, t162, t170, t174, t176, t180]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -719,33 +726,34 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 4, 10> for AxisAligned<T> {
         let t41 = time[3] * point[1];
         let t43 = t37 + T::one();
         let t44 = t41 + T::one();
+        let t45 = t43 * t44;
         let t51 = point[0] * t44;
         let t52 = time[0] * t51;
         let t53 = time[1] * point[1];
         let t54 = t52 + t53;
         let t55 = self.fixed[1] * t54;
-        let t56 = t55.log_1p();
+        let t56 = t55.ln_of_both(t45);
         let t70 = T::one() / t43;
         let t77 = T::one() / t44;
-        let t156 = time[0] * point[3];
-        let t157 = t156 - point[4];
-        let t162 = time[0] * t157;
-        let t163 = point[5] * t56;
-        let t164 = t162 + t163;
-        let t165 = t70 * t70;
-        let t166 = t164 * t165;
-        let t167 = point[2] + t166;
-        let t168 = time[0] * t167;
-        let t176 = time[1] * point[7];
-        let t177 = t176 - point[8];
-        let t180 = time[1] * t177;
-        let t181 = point[9] * t56;
-        let t182 = t180 + t181;
-        let t183 = t77 * t77;
-        let t184 = t182 * t183;
-        let t185 = point[6] + t184;
-        let t186 = time[1] * t185;
-        crate::nalgebra::SVector::<T, 2>::new(t168, t186)
+        let t157 = time[0] * point[3];
+        let t158 = t157 - point[4];
+        let t163 = time[0] * t158;
+        let t164 = point[5] * t56;
+        let t165 = t163 + t164;
+        let t166 = t70 * t70;
+        let t167 = t165 * t166;
+        let t168 = point[2] + t167;
+        let t169 = time[0] * t168;
+        let t177 = time[1] * point[7];
+        let t178 = t177 - point[8];
+        let t181 = time[1] * t178;
+        let t182 = point[9] * t56;
+        let t183 = t181 + t182;
+        let t184 = t77 * t77;
+        let t185 = t183 * t184;
+        let t186 = point[6] + t185;
+        let t187 = time[1] * t186;
+        crate::nalgebra::SVector::<T, 2>::new(t169, t187)
     }
 }
 impl<T: crate::Real> From<AxisAligned<T>> for crate::AnySolution<T> {

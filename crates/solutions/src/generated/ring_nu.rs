@@ -44,7 +44,7 @@ impl<T: crate::Real> Default for RingNuParameters<T> {
 pub struct RingNu<T: crate::Real> {
     parameters: RingNuParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 31],
+    fixed: [T; 30],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> RingNu<T> {
@@ -164,58 +164,57 @@ impl<T: crate::Real> RingNu<T> {
         let t109 = parameters.E * parameters.nu;
         let t110 = t97 * t99;
         let t111 = t109 / t110;
-        let t117 = parameters.A * t107;
-        let t136 = parameters.Ri + parameters.Ro;
-        let t145 = parameters.nu / t99;
-        let t150 = T::one() / t97;
-        let t153 = t51 / parameters.rho0;
-        let t193 = T::one() / parameters.rho0;
-        let t209 = t111 + t107;
-        let t211 = parameters.A * parameters.A;
-        let t212 = t211 * t211;
-        let t213 = t15 * t15;
-        let t214 = t19 * t19;
-        let t216 = T::nearest(36.0) * t212;
-        let t217 = t216 * t209;
-        let t218 = parameters.rho0 * t213;
-        let t219 = t218 * t214;
-        let t220 = t217 / t219;
-        let t229 = T::nearest(3.0) / t26;
-        let t238 = t213 * t214;
-        let t239 = T::nearest(36.0) / t238;
-        let t262 = t211 * parameters.A;
-        let t263 = T::nearest(6.0) * t262;
-        let t264 = parameters.rho0 * t15;
-        let t265 = t264 * t19;
-        let t266 = t263 / t265;
-        let t271 = T::nearest(6.0) * t211;
-        let t272 = t271 * parameters.E;
-        let t273 = t272 * parameters.nu;
-        let t274 = t265 * t97;
-        let t275 = t274 * t99;
-        let t276 = t273 / t275;
-        let t280 = T::nearest(12.0) * t107;
-        let t281 = t280 / t26;
-        let t293 = t211 / parameters.rho0;
-        let t299 = t51 * parameters.nu;
-        let t300 = parameters.rho0 * t97;
-        let t301 = t300 * t99;
-        let t302 = t299 / t301;
-        let t315 = T::nearest(2.0) / t11;
-        let t316 = parameters.Ri - parameters.Ro;
-        let t317 = t316 * t316;
-        let t318 = t317 * t316;
-        let t319 = t318 / t26;
-        let t320 = T::one() - t319;
-        let t321 = parameters.A * t320;
-        let t322 = t321 / parameters.Ri;
-        let t325 = parameters.Ri * t97;
-        let t326 = t325 * t99;
-        let t327 = t109 / t326;
-        let t333 = parameters.A / parameters.Ro;
-        let t336 = parameters.Ro * t97;
-        let t337 = t336 * t99;
-        let t338 = t109 / t337;
+        let t138 = parameters.Ri + parameters.Ro;
+        let t147 = parameters.nu / t99;
+        let t152 = T::one() / t97;
+        let t155 = t51 / parameters.rho0;
+        let t196 = T::one() / parameters.rho0;
+        let t212 = t111 + t107;
+        let t214 = parameters.A * parameters.A;
+        let t215 = t214 * t214;
+        let t216 = t15 * t15;
+        let t217 = t19 * t19;
+        let t219 = T::nearest(36.0) * t215;
+        let t220 = t219 * t212;
+        let t221 = parameters.rho0 * t216;
+        let t222 = t221 * t217;
+        let t223 = t220 / t222;
+        let t232 = T::nearest(3.0) / t26;
+        let t241 = t216 * t217;
+        let t242 = T::nearest(36.0) / t241;
+        let t265 = t214 * parameters.A;
+        let t266 = T::nearest(6.0) * t265;
+        let t267 = parameters.rho0 * t15;
+        let t268 = t267 * t19;
+        let t269 = t266 / t268;
+        let t274 = T::nearest(6.0) * t214;
+        let t275 = t274 * parameters.E;
+        let t276 = t275 * parameters.nu;
+        let t277 = t268 * t97;
+        let t278 = t277 * t99;
+        let t279 = t276 / t278;
+        let t283 = T::nearest(12.0) * t107;
+        let t284 = t283 / t26;
+        let t296 = t214 / parameters.rho0;
+        let t302 = t51 * parameters.nu;
+        let t303 = parameters.rho0 * t97;
+        let t304 = t303 * t99;
+        let t305 = t302 / t304;
+        let t318 = T::nearest(2.0) / t11;
+        let t319 = parameters.Ri - parameters.Ro;
+        let t320 = t319 * t319;
+        let t321 = t320 * t319;
+        let t322 = t321 / t26;
+        let t323 = T::one() - t322;
+        let t324 = parameters.A * t323;
+        let t325 = t324 / parameters.Ri;
+        let t329 = parameters.Ri * t97;
+        let t330 = t329 * t99;
+        let t331 = t109 / t330;
+        let t337 = parameters.A / parameters.Ro;
+        let t341 = parameters.Ro * t97;
+        let t342 = t341 * t99;
+        let t343 = t109 / t342;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -237,25 +236,24 @@ impl<T: crate::Real> RingNu<T> {
                 t89,
                 t107,
                 t111,
-                t117,
-                t136,
-                t145,
-                t150,
-                t153,
-                t193,
-                t220,
-                t229,
-                t239,
-                t266,
-                t276,
-                t281,
-                t293,
-                t302,
-                t315,
-                t322,
-                t327,
-                t333,
-                t338,
+                t138,
+                t147,
+                t152,
+                t155,
+                t196,
+                t223,
+                t232,
+                t242,
+                t269,
+                t279,
+                t284,
+                t296,
+                t305,
+                t318,
+                t325,
+                t331,
+                t337,
+                t343,
             ],
         })
     }
@@ -549,36 +547,40 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t92 = t91 + T::one();
         let t93 = t32 * t72;
         let t94 = t93 + T::one();
+        let t95 = t92 * t94;
         let t100 = t13 * t72;
         let t101 = t100 * t92;
         let t102 = self.parameters.A * t101;
         let t103 = t102 + t91;
-        let t104 = t103.log_1p();
+        let t104 = t103.ln_of_both(t95);
         let t108 = t91 + T::nearest(2.0);
         let t112 = self.fixed[11] * t104;
-        let t113 = t91 * t108;
-        let t114 = self.fixed[10] * t113;
-        let t115 = t112 + t114;
-        let t116 = t93 + T::nearest(2.0);
-        let t118 = self.fixed[12] * t13;
-        let t119 = t118 * t72;
-        let t120 = t119 * t116;
-        let t121 = t112 + t120;
-        let t122 = t115 / t92;
+        let t113 = self.fixed[10] * t108;
+        let t114 = t112 - t113;
+        let t115 = t91 * t114;
+        let t116 = -t115;
+        let t117 = t93 + T::nearest(2.0);
+        let t118 = self.fixed[10] * t117;
+        let t119 = t112 - t118;
+        let t120 = t93 * t119;
+        let t121 = -t120;
+        let t122 = t116 / t92;
         let t123 = t2 * t122;
         let t124 = T::one() / t94;
         let t125 = t121 * t124;
         let t126 = t3 * t125;
         let t127 = t123 + t126;
         let t128 = t34 * t127;
-        let t129 = t122 - t125;
-        let t130 = t74 * t34;
-        let t131 = t130 * t129;
-        let t132 = t3 * t122;
-        let t133 = t2 * t125;
-        let t134 = t132 + t133;
-        let t135 = t34 * t134;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t128, t131, t131, t135)
+        let t129 = t112 + t128;
+        let t130 = t122 - t125;
+        let t131 = t74 * t34;
+        let t132 = t131 * t130;
+        let t133 = t3 * t122;
+        let t134 = t2 * t125;
+        let t135 = t133 + t134;
+        let t136 = t34 * t135;
+        let t137 = t112 + t136;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t129, t132, t132, t137)
     }
     #[inline]
     fn body_force(
@@ -611,65 +613,66 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t93 = t32 * t72;
         let t94 = t93 + T::one();
         let t124 = T::one() / t94;
-        let t137 = t23 - self.fixed[13];
-        let t138 = self.fixed[7] * t137;
-        let t139 = t73 * t35;
-        let t140 = t138 + t139;
-        let t141 = self.fixed[3] * t70;
-        let t142 = T::nearest(6.0) * t141;
-        let t143 = t72 - t142;
-        let t144 = t35 * t143;
-        let t146 = self.fixed[14] * t140;
-        let t147 = t138 - t144;
-        let t148 = t147 + t146;
-        let t149 = self.fixed[5] * t31;
-        let t151 = self.fixed[15] * t148;
-        let t152 = t149 + t151;
-        let t154 = self.fixed[16] * t13;
-        let t155 = t154 * t152;
-        let t156 = self.fixed[8] * t13;
-        let t157 = t156 * t141;
-        let t158 = t157 + T::one();
-        let t159 = t157 * t94;
-        let t160 = t159 + t93;
-        let t161 = t160.log_1p();
-        let t162 = self.fixed[11] * t161;
-        let t163 = self.fixed[10] * t157;
-        let t164 = t162 + t163;
-        let t165 = self.fixed[10] * t93;
-        let t166 = t162 + t165;
-        let t167 = t90 * t137;
-        let t168 = T::one() / t158;
-        let t169 = t167 * t168;
-        let t170 = t157 * t169;
-        let t171 = t32 * t139;
-        let t172 = t171 * t124;
-        let t173 = t169 + t172;
-        let t174 = self.fixed[10] * t167;
-        let t175 = self.fixed[11] * t173;
-        let t176 = t174 + t175;
-        let t177 = t167 - t170;
-        let t178 = t164 * t177;
-        let t179 = t157 * t176;
-        let t180 = t178 + t179;
-        let t181 = t93 * t172;
-        let t182 = t170 + t181;
-        let t183 = t157 * t164;
-        let t184 = t183 * t168;
-        let t185 = t93 * t166;
-        let t186 = t185 * t124;
-        let t187 = t184 - t186;
-        let t188 = t35 * t187;
-        let t189 = t180 * t168;
-        let t190 = self.fixed[11] * t182;
-        let t191 = t188 + t189;
-        let t192 = t191 + t190;
-        let t194 = self.fixed[17] * t192;
-        let t195 = t194 - t155;
-        let t196 = t35 * t195;
-        let t197 = X[0] * t196;
-        let t198 = X[1] * t196;
-        crate::nalgebra::SVector::<T, 2>::new(t197, t198)
+        let t139 = t23 - self.fixed[12];
+        let t140 = self.fixed[7] * t139;
+        let t141 = t73 * t35;
+        let t142 = t140 + t141;
+        let t143 = self.fixed[3] * t70;
+        let t144 = T::nearest(6.0) * t143;
+        let t145 = t72 - t144;
+        let t146 = t35 * t145;
+        let t148 = self.fixed[13] * t142;
+        let t149 = t140 - t146;
+        let t150 = t149 + t148;
+        let t151 = self.fixed[5] * t31;
+        let t153 = self.fixed[14] * t150;
+        let t154 = t151 + t153;
+        let t156 = self.fixed[15] * t13;
+        let t157 = t156 * t154;
+        let t158 = self.fixed[8] * t13;
+        let t159 = t158 * t143;
+        let t160 = t159 + T::one();
+        let t161 = t159 * t94;
+        let t162 = t161 + t93;
+        let t163 = t160 * t94;
+        let t164 = t162.ln_of_both(t163);
+        let t165 = self.fixed[11] * t164;
+        let t166 = self.fixed[10] * t159;
+        let t167 = t165 + t166;
+        let t168 = self.fixed[10] * t93;
+        let t169 = t165 + t168;
+        let t170 = t90 * t139;
+        let t171 = T::one() / t160;
+        let t172 = t170 * t171;
+        let t173 = t159 * t172;
+        let t174 = t32 * t141;
+        let t175 = t174 * t124;
+        let t176 = t172 + t175;
+        let t177 = self.fixed[10] * t170;
+        let t178 = self.fixed[11] * t176;
+        let t179 = t177 + t178;
+        let t180 = t170 - t173;
+        let t181 = t167 * t180;
+        let t182 = t159 * t179;
+        let t183 = t181 + t182;
+        let t184 = t93 * t175;
+        let t185 = t173 + t184;
+        let t186 = t159 * t167;
+        let t187 = t186 * t171;
+        let t188 = t93 * t169;
+        let t189 = t188 * t124;
+        let t190 = t187 - t189;
+        let t191 = t35 * t190;
+        let t192 = t183 * t171;
+        let t193 = self.fixed[11] * t185;
+        let t194 = t191 + t192;
+        let t195 = t194 + t193;
+        let t197 = self.fixed[16] * t195;
+        let t198 = t197 - t157;
+        let t199 = t35 * t198;
+        let t200 = X[0] * t199;
+        let t201 = X[1] * t199;
+        crate::nalgebra::SVector::<T, 2>::new(t200, t201)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t2 = X[0] * X[0];
@@ -742,89 +745,93 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t101 = t100 * t92;
         let t102 = self.parameters.A * t101;
         let t103 = t102 + t91;
-        let t104 = t103.log_1p();
+        let t104 = t103.ln_of_both(t95);
         let t108 = t91 + T::nearest(2.0);
         let t112 = self.fixed[11] * t104;
-        let t113 = t91 * t108;
-        let t114 = self.fixed[10] * t113;
-        let t115 = t112 + t114;
-        let t116 = t93 + T::nearest(2.0);
-        let t118 = self.fixed[12] * t13;
-        let t119 = t118 * t72;
-        let t120 = t119 * t116;
-        let t121 = t112 + t120;
-        let t122 = t115 / t92;
+        let t113 = self.fixed[10] * t108;
+        let t114 = t112 - t113;
+        let t115 = t91 * t114;
+        let t116 = -t115;
+        let t117 = t93 + T::nearest(2.0);
+        let t118 = self.fixed[10] * t117;
+        let t119 = t112 - t118;
+        let t120 = t93 * t119;
+        let t121 = -t120;
+        let t122 = t116 / t92;
         let t123 = t2 * t122;
         let t124 = T::one() / t94;
         let t125 = t121 * t124;
         let t126 = t3 * t125;
         let t127 = t123 + t126;
         let t128 = t34 * t127;
-        let t129 = t122 - t125;
-        let t130 = t74 * t34;
-        let t131 = t130 * t129;
-        let t132 = t3 * t122;
-        let t133 = t2 * t125;
-        let t134 = t132 + t133;
-        let t135 = t34 * t134;
-        let t137 = t23 - self.fixed[13];
-        let t138 = self.fixed[7] * t137;
-        let t139 = t73 * t35;
-        let t140 = t138 + t139;
-        let t141 = self.fixed[3] * t70;
-        let t142 = T::nearest(6.0) * t141;
-        let t143 = t72 - t142;
-        let t144 = t35 * t143;
-        let t146 = self.fixed[14] * t140;
-        let t147 = t138 - t144;
-        let t148 = t147 + t146;
-        let t149 = self.fixed[5] * t31;
-        let t151 = self.fixed[15] * t148;
-        let t152 = t149 + t151;
-        let t154 = self.fixed[16] * t13;
-        let t155 = t154 * t152;
-        let t156 = self.fixed[8] * t13;
-        let t157 = t156 * t141;
-        let t158 = t157 + T::one();
-        let t159 = t157 * t94;
-        let t160 = t159 + t93;
-        let t161 = t160.log_1p();
-        let t162 = self.fixed[11] * t161;
-        let t163 = self.fixed[10] * t157;
-        let t164 = t162 + t163;
-        let t165 = self.fixed[10] * t93;
-        let t166 = t162 + t165;
-        let t167 = t90 * t137;
-        let t168 = T::one() / t158;
-        let t169 = t167 * t168;
-        let t170 = t157 * t169;
-        let t171 = t32 * t139;
-        let t172 = t171 * t124;
-        let t173 = t169 + t172;
-        let t174 = self.fixed[10] * t167;
-        let t175 = self.fixed[11] * t173;
-        let t176 = t174 + t175;
-        let t177 = t167 - t170;
-        let t178 = t164 * t177;
-        let t179 = t157 * t176;
-        let t180 = t178 + t179;
-        let t181 = t93 * t172;
-        let t182 = t170 + t181;
-        let t183 = t157 * t164;
-        let t184 = t183 * t168;
-        let t185 = t93 * t166;
-        let t186 = t185 * t124;
-        let t187 = t184 - t186;
-        let t188 = t35 * t187;
-        let t189 = t180 * t168;
-        let t190 = self.fixed[11] * t182;
-        let t191 = t188 + t189;
-        let t192 = t191 + t190;
-        let t194 = self.fixed[17] * t192;
-        let t195 = t194 - t155;
-        let t196 = t35 * t195;
-        let t197 = X[0] * t196;
-        let t198 = X[1] * t196;
+        let t129 = t112 + t128;
+        let t130 = t122 - t125;
+        let t131 = t74 * t34;
+        let t132 = t131 * t130;
+        let t133 = t3 * t122;
+        let t134 = t2 * t125;
+        let t135 = t133 + t134;
+        let t136 = t34 * t135;
+        let t137 = t112 + t136;
+        let t139 = t23 - self.fixed[12];
+        let t140 = self.fixed[7] * t139;
+        let t141 = t73 * t35;
+        let t142 = t140 + t141;
+        let t143 = self.fixed[3] * t70;
+        let t144 = T::nearest(6.0) * t143;
+        let t145 = t72 - t144;
+        let t146 = t35 * t145;
+        let t148 = self.fixed[13] * t142;
+        let t149 = t140 - t146;
+        let t150 = t149 + t148;
+        let t151 = self.fixed[5] * t31;
+        let t153 = self.fixed[14] * t150;
+        let t154 = t151 + t153;
+        let t156 = self.fixed[15] * t13;
+        let t157 = t156 * t154;
+        let t158 = self.fixed[8] * t13;
+        let t159 = t158 * t143;
+        let t160 = t159 + T::one();
+        let t161 = t159 * t94;
+        let t162 = t161 + t93;
+        let t163 = t160 * t94;
+        let t164 = t162.ln_of_both(t163);
+        let t165 = self.fixed[11] * t164;
+        let t166 = self.fixed[10] * t159;
+        let t167 = t165 + t166;
+        let t168 = self.fixed[10] * t93;
+        let t169 = t165 + t168;
+        let t170 = t90 * t139;
+        let t171 = T::one() / t160;
+        let t172 = t170 * t171;
+        let t173 = t159 * t172;
+        let t174 = t32 * t141;
+        let t175 = t174 * t124;
+        let t176 = t172 + t175;
+        let t177 = self.fixed[10] * t170;
+        let t178 = self.fixed[11] * t176;
+        let t179 = t177 + t178;
+        let t180 = t170 - t173;
+        let t181 = t167 * t180;
+        let t182 = t159 * t179;
+        let t183 = t181 + t182;
+        let t184 = t93 * t175;
+        let t185 = t173 + t184;
+        let t186 = t159 * t167;
+        let t187 = t186 * t171;
+        let t188 = t93 * t169;
+        let t189 = t188 * t124;
+        let t190 = t187 - t189;
+        let t191 = t35 * t190;
+        let t192 = t183 * t171;
+        let t193 = self.fixed[11] * t185;
+        let t194 = t191 + t192;
+        let t195 = t194 + t193;
+        let t197 = self.fixed[16] * t195;
+        let t198 = t197 - t157;
+        let t199 = t35 * t198;
+        let t200 = X[0] * t199;
+        let t201 = X[1] * t199;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t37, t40),
             v: crate::nalgebra::SVector::<T, 2>::new(t47, t49),
@@ -832,8 +839,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
             H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t69, t77, t77, t85),
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t86, t77, t77, t87),
             J: t95,
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t128, t131, t131, t135),
-            b: crate::nalgebra::SVector::<T, 2>::new(t197, t198),
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t129, t132, t132, t137),
+            b: crate::nalgebra::SVector::<T, 2>::new(t200, t201),
         }
     }
     fn traction(
@@ -846,24 +853,26 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
             crate::Surface::Inner => {
                 let t12 = self.fixed[0] * t;
                 let t13 = t12.cos_pi();
-                let t323 = self.fixed[27] * t13;
-                let t324 = t323.log_1p();
-                let t328 = self.fixed[28] * t324;
-                let t329 = t328 * X[0];
-                let t330 = -t329;
-                let t331 = t328 * X[1];
-                let t332 = -t331;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t330, t332))
+                let t326 = self.fixed[26] * t13;
+                let t327 = t326 + T::one();
+                let t328 = t326.ln_of_both(t327);
+                let t332 = self.fixed[27] * t328;
+                let t333 = t332 * X[0];
+                let t334 = -t333;
+                let t335 = t332 * X[1];
+                let t336 = -t335;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t334, t336))
             }
             crate::Surface::Outer => {
                 let t12 = self.fixed[0] * t;
                 let t13 = t12.cos_pi();
-                let t334 = self.fixed[29] * t13;
-                let t335 = t334.log_1p();
-                let t339 = self.fixed[30] * t335;
-                let t340 = t339 * X[0];
-                let t341 = t339 * X[1];
-                Some(crate::nalgebra::SVector::<T, 2>::new(t340, t341))
+                let t338 = self.fixed[28] * t13;
+                let t339 = t338 + T::one();
+                let t340 = t338.ln_of_both(t339);
+                let t344 = self.fixed[29] * t340;
+                let t345 = t344 * X[0];
+                let t346 = t344 * X[1];
+                Some(crate::nalgebra::SVector::<T, 2>::new(t345, t346))
             }
             crate::Surface::Lower(0) => {
                 let t2 = X[0] * X[0];
@@ -890,23 +899,25 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
                 let t92 = t91 + T::one();
                 let t93 = t32 * t72;
                 let t94 = t93 + T::one();
+                let t95 = t92 * t94;
                 let t100 = t13 * t72;
                 let t101 = t100 * t92;
                 let t102 = self.parameters.A * t101;
                 let t103 = t102 + t91;
-                let t104 = t103.log_1p();
+                let t104 = t103.ln_of_both(t95);
                 let t112 = self.fixed[11] * t104;
-                let t116 = t93 + T::nearest(2.0);
-                let t118 = self.fixed[12] * t13;
-                let t119 = t118 * t72;
-                let t120 = t119 * t116;
-                let t121 = t112 + t120;
+                let t117 = t93 + T::nearest(2.0);
+                let t118 = self.fixed[10] * t117;
+                let t119 = t112 - t118;
+                let t120 = t93 * t119;
+                let t121 = -t120;
                 let t124 = T::one() / t94;
                 let t125 = t121 * t124;
-                let t342 = t3 * t34;
-                let t343 = t342 * t125;
-                let t344 = -t343;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t344, T::zero()))
+                let t347 = t3 * t34;
+                let t348 = t347 * t125;
+                let t349 = t112 + t348;
+                let t350 = -t349;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t350, T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t2 = X[0] * X[0];
@@ -933,23 +944,25 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
                 let t92 = t91 + T::one();
                 let t93 = t32 * t72;
                 let t94 = t93 + T::one();
+                let t95 = t92 * t94;
                 let t100 = t13 * t72;
                 let t101 = t100 * t92;
                 let t102 = self.parameters.A * t101;
                 let t103 = t102 + t91;
-                let t104 = t103.log_1p();
+                let t104 = t103.ln_of_both(t95);
                 let t112 = self.fixed[11] * t104;
-                let t116 = t93 + T::nearest(2.0);
-                let t118 = self.fixed[12] * t13;
-                let t119 = t118 * t72;
-                let t120 = t119 * t116;
-                let t121 = t112 + t120;
+                let t117 = t93 + T::nearest(2.0);
+                let t118 = self.fixed[10] * t117;
+                let t119 = t112 - t118;
+                let t120 = t93 * t119;
+                let t121 = -t120;
                 let t124 = T::one() / t94;
                 let t125 = t121 * t124;
-                let t346 = t2 * t34;
-                let t347 = t346 * t125;
-                let t348 = -t347;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t348))
+                let t352 = t2 * t34;
+                let t353 = t352 * t125;
+                let t354 = t112 + t353;
+                let t355 = -t354;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t355))
             }
             _ => None,
         }
@@ -996,7 +1009,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[26]
+        self.fixed[25]
     }
     fn body_force_at(
         &self,
@@ -1035,80 +1048,80 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         let t71 = self.fixed[7] * t70;
         let t72 = t31 * t35;
         let t73 = t71 - t72;
-        let t137 = t23 - self.fixed[13];
-        let t138 = self.fixed[7] * t137;
-        let t139 = t73 * t35;
-        let t140 = t138 + t139;
-        let t146 = self.fixed[14] * t140;
-        let t149 = self.fixed[5] * t31;
-        let t199 = X[0] * t35;
-        let t200 = t70 * t35;
-        let t201 = t200 + t137;
-        let t202 = self.fixed[7] * t201;
-        let t203 = t31 * t34;
-        let t204 = t202 - t203;
-        let t205 = t204 + t146;
-        let t206 = self.fixed[15] * t205;
-        let t207 = t149 + t206;
-        let t208 = self.fixed[16] * t207;
-        let t215 = t59 * t59;
-        let t221 = t21 * t31;
-        let t222 = t221 * t215;
-        let t223 = t222 * t140;
-        let t224 = t223 * t35;
-        let t225 = self.fixed[18] * t224;
-        let t226 = t31 * t137;
-        let t227 = t70 * t73;
-        let t228 = t226 + t227;
-        let t230 = self.fixed[19] * t70;
-        let t231 = t230 + t72;
-        let t232 = t137 * t231;
-        let t233 = T::nearest(2.0) * t232;
-        let t234 = self.fixed[10] * t233;
-        let t235 = t228 * t35;
-        let t236 = self.fixed[11] * t235;
-        let t237 = t234 + t236;
-        let t240 = t21 * t215;
-        let t241 = self.fixed[20] * t240;
-        let t242 = t31 * t31;
-        let t243 = t242 * t34;
-        let t244 = t31 * t73;
-        let t245 = t244 * t35;
-        let t246 = t241 - t243;
-        let t247 = t246 + t245;
-        let t248 = self.fixed[19] * t137;
-        let t249 = t248 + t139;
-        let t250 = t249 * t35;
-        let t251 = T::nearest(2.0) * t250;
-        let t252 = t31 * t251;
-        let t253 = t70 * t137;
-        let t254 = self.fixed[20] * t253;
-        let t255 = t252 + t254;
-        let t256 = self.fixed[7] * t237;
-        let t257 = t247 * t35;
-        let t258 = self.fixed[10] * t257;
-        let t259 = self.fixed[11] * t255;
-        let t260 = t256 + t258;
-        let t261 = t260 + t259;
-        let t267 = t70 * t261;
-        let t268 = self.fixed[21] * t267;
-        let t277 = self.fixed[22] * t235;
-        let t278 = self.fixed[11] * t140;
-        let t282 = self.fixed[23] * t137;
-        let t283 = t278 + t282;
-        let t284 = t244 * t34;
-        let t285 = t254 + t284;
-        let t286 = t70 * t283;
-        let t287 = self.fixed[7] * t286;
-        let t288 = t246 * t35;
-        let t289 = self.fixed[10] * t288;
-        let t290 = self.fixed[11] * t285;
-        let t291 = t287 + t289;
-        let t292 = t291 + t290;
-        let t294 = self.fixed[24] * t292;
-        let t303 = self.fixed[25] * t140;
-        let t313 = X[1] * t35;
-        [t70, t72, t199, t208, t225, t268, t277, t294, t303, t313]
+        let t139 = t23 - self.fixed[12];
+        let t140 = self.fixed[7] * t139;
+        let t141 = t73 * t35;
+        let t142 = t140 + t141;
+        let t148 = self.fixed[13] * t142;
+        let t151 = self.fixed[5] * t31;
+        let t202 = X[0] * t35;
+        let t203 = t70 * t35;
+        let t204 = t203 + t139;
+        let t205 = self.fixed[7] * t204;
+        let t206 = t31 * t34;
+        let t207 = t205 - t206;
+        let t208 = t207 + t148;
+        let t209 = self.fixed[14] * t208;
+        let t210 = t151 + t209;
+        let t211 = self.fixed[15] * t210;
+        let t218 = t59 * t59;
+        let t224 = t21 * t31;
+        let t225 = t224 * t218;
+        let t226 = t225 * t142;
+        let t227 = t226 * t35;
+        let t228 = self.fixed[17] * t227;
+        let t229 = t31 * t139;
+        let t230 = t70 * t73;
+        let t231 = t229 + t230;
+        let t233 = self.fixed[18] * t70;
+        let t234 = t233 + t72;
+        let t235 = t139 * t234;
+        let t236 = T::nearest(2.0) * t235;
+        let t237 = self.fixed[10] * t236;
+        let t238 = t231 * t35;
+        let t239 = self.fixed[11] * t238;
+        let t240 = t237 + t239;
+        let t243 = t21 * t218;
+        let t244 = self.fixed[19] * t243;
+        let t245 = t31 * t31;
+        let t246 = t245 * t34;
+        let t247 = t31 * t73;
+        let t248 = t247 * t35;
+        let t249 = t244 - t246;
+        let t250 = t249 + t248;
+        let t251 = self.fixed[18] * t139;
+        let t252 = t251 + t141;
+        let t253 = t252 * t35;
+        let t254 = T::nearest(2.0) * t253;
+        let t255 = t31 * t254;
+        let t256 = t70 * t139;
+        let t257 = self.fixed[19] * t256;
+        let t258 = t255 + t257;
+        let t259 = self.fixed[7] * t240;
+        let t260 = t250 * t35;
+        let t261 = self.fixed[10] * t260;
+        let t262 = self.fixed[11] * t258;
+        let t263 = t259 + t261;
+        let t264 = t263 + t262;
+        let t270 = t70 * t264;
+        let t271 = self.fixed[20] * t270;
+        let t280 = self.fixed[21] * t238;
+        let t281 = self.fixed[11] * t142;
+        let t285 = self.fixed[22] * t139;
+        let t286 = t281 + t285;
+        let t287 = t247 * t34;
+        let t288 = t257 + t287;
+        let t289 = t70 * t286;
+        let t290 = self.fixed[7] * t289;
+        let t291 = t249 * t35;
+        let t292 = self.fixed[10] * t291;
+        let t293 = self.fixed[11] * t288;
+        let t294 = t290 + t292;
+        let t295 = t294 + t293;
+        let t297 = self.fixed[23] * t295;
+        let t306 = self.fixed[24] * t142;
+        let t316 = X[1] * t35;
+        [t70, t72, t202, t211, t228, t271, t280, t297, t306, t316]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -1120,28 +1133,29 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         let t92 = t91 + T::one();
         let t93 = time[1] * point[1];
         let t94 = t93 + T::one();
+        let t95 = t92 * t94;
         let t100 = time[0] * point[1];
         let t101 = t100 * t92;
         let t102 = self.parameters.A * t101;
         let t103 = t102 + t91;
-        let t104 = t103.log_1p();
-        let t269 = time[0] * point[4];
-        let t270 = point[5] + t269;
-        let t295 = time[0] * t270;
-        let t296 = point[6] * t104;
-        let t297 = t295 + t296;
-        let t298 = point[7] + t297;
-        let t304 = time[0] * t298;
-        let t305 = point[8] * t104;
-        let t306 = t304 + t305;
-        let t307 = t92 * t92;
-        let t308 = t307 * t94;
-        let t309 = t306 / t308;
-        let t310 = t309 - point[3];
-        let t311 = time[0] * t310;
-        let t312 = point[2] * t311;
-        let t314 = point[9] * t311;
-        crate::nalgebra::SVector::<T, 2>::new(t312, t314)
+        let t104 = t103.ln_of_both(t95);
+        let t272 = time[0] * point[4];
+        let t273 = point[5] + t272;
+        let t298 = time[0] * t273;
+        let t299 = point[6] * t104;
+        let t300 = t298 + t299;
+        let t301 = point[7] + t300;
+        let t307 = time[0] * t301;
+        let t308 = point[8] * t104;
+        let t309 = t307 + t308;
+        let t310 = t92 * t92;
+        let t311 = t310 * t94;
+        let t312 = t309 / t311;
+        let t313 = t312 - point[3];
+        let t314 = time[0] * t313;
+        let t315 = point[2] * t314;
+        let t317 = point[9] * t314;
+        crate::nalgebra::SVector::<T, 2>::new(t315, t317)
     }
 }
 impl<T: crate::Real> From<RingNu<T>> for crate::AnySolution<T> {

@@ -172,69 +172,70 @@ impl<T: crate::Real> SphereShell<T> {
         let t138 = parameters.E * parameters.nu;
         let t139 = t114 * t116;
         let t140 = t138 / t139;
-        let t146 = parameters.A * t136;
-        let t147 = t146 / t11;
-        let t176 = T::nearest(5.0) / parameters.Ro;
-        let t179 = parameters.nu / t116;
-        let t180 = t179 + T::one();
-        let t183 = T::nearest(4.0) * t180;
-        let t184 = t183 / t114;
-        let t187 = t46 / t48;
-        let t236 = T::one() / parameters.rho0;
-        let t245 = t140 + t136;
-        let t248 = t127 * t127;
-        let t249 = t128 * t128;
-        let t251 = T::nearest(144.0) * t248;
-        let t252 = t251 * t245;
-        let t253 = parameters.rho0 * t249;
-        let t254 = t252 / t253;
-        let t278 = T::nearest(3.0) * t136;
-        let t280 = T::nearest(3.0) * parameters.E;
-        let t281 = t280 * parameters.nu;
-        let t282 = t281 / t139;
-        let t290 = t127 * parameters.A;
-        let t291 = t11 * parameters.Ro;
-        let t292 = t291 * t291;
-        let t293 = T::nearest(12.0) * t290;
-        let t294 = parameters.rho0 * t292;
-        let t295 = t293 / t294;
-        let t301 = T::nearest(6.0) * t127;
-        let t302 = t301 * parameters.E;
-        let t303 = t302 * parameters.nu;
-        let t304 = parameters.rho0 * t128;
-        let t305 = t304 * t114;
-        let t306 = t305 * t116;
-        let t307 = t303 / t306;
-        let t321 = T::nearest(2.0) * t127;
-        let t322 = t321 / t304;
-        let t329 = T::nearest(4.0) * parameters.A;
-        let t330 = t329 * parameters.E;
-        let t331 = t330 * parameters.nu;
-        let t332 = t48 * t114;
-        let t333 = t332 * t116;
-        let t334 = t331 / t333;
-        let t349 = T::nearest(2.0) / t16;
-        let t351 = parameters.Ri / parameters.Ro;
-        let t352 = T::one() - t351;
-        let t353 = t103 * parameters.Ri;
-        let t354 = t353 * t352;
-        let t355 = t354 / t11;
-        let t358 = T::nearest(2.0) * parameters.Ri;
-        let t359 = t358 / parameters.Ro;
-        let t360 = T::nearest(3.0) - t359;
-        let t362 = t119 * parameters.Ri;
-        let t363 = t362 * t360;
-        let t364 = t363 / t11;
-        let t367 = parameters.Ri * parameters.Ri;
-        let t368 = t360 * t360;
-        let t369 = t127 * t367;
-        let t370 = t369 * t368;
-        let t371 = t370 / t128;
-        let t381 = T::one() / parameters.Ri;
-        let t390 = parameters.A / parameters.Ro;
-        let t396 = parameters.Ro * t114;
-        let t397 = t396 * t116;
-        let t398 = t138 / t397;
+        let t178 = T::nearest(5.0) / parameters.Ro;
+        let t181 = parameters.nu / t116;
+        let t182 = t181 + T::one();
+        let t185 = T::nearest(4.0) * t182;
+        let t186 = t185 / t114;
+        let t189 = t46 / t48;
+        let t238 = T::one() / parameters.rho0;
+        let t247 = t140 + t136;
+        let t250 = t127 * t127;
+        let t251 = t128 * t128;
+        let t253 = T::nearest(144.0) * t250;
+        let t254 = t253 * t247;
+        let t255 = parameters.rho0 * t251;
+        let t256 = t254 / t255;
+        let t280 = T::nearest(3.0) * t136;
+        let t282 = T::nearest(3.0) * parameters.E;
+        let t283 = t282 * parameters.nu;
+        let t284 = t283 / t139;
+        let t292 = t127 * parameters.A;
+        let t293 = t11 * parameters.Ro;
+        let t294 = t293 * t293;
+        let t295 = T::nearest(12.0) * t292;
+        let t296 = parameters.rho0 * t294;
+        let t297 = t295 / t296;
+        let t303 = T::nearest(6.0) * t127;
+        let t304 = t303 * parameters.E;
+        let t305 = t304 * parameters.nu;
+        let t306 = parameters.rho0 * t128;
+        let t307 = t306 * t114;
+        let t308 = t307 * t116;
+        let t309 = t305 / t308;
+        let t323 = T::nearest(2.0) * t127;
+        let t324 = t323 / t306;
+        let t331 = T::nearest(4.0) * parameters.A;
+        let t332 = t331 * parameters.E;
+        let t333 = t332 * parameters.nu;
+        let t334 = t48 * t114;
+        let t335 = t334 * t116;
+        let t336 = t333 / t335;
+        let t351 = T::nearest(2.0) / t16;
+        let t353 = parameters.Ri / parameters.Ro;
+        let t354 = T::one() - t353;
+        let t355 = t103 * parameters.Ri;
+        let t356 = t355 * t354;
+        let t357 = t356 / t11;
+        let t360 = T::nearest(2.0) * parameters.Ri;
+        let t361 = t360 / parameters.Ro;
+        let t362 = T::nearest(3.0) - t361;
+        let t364 = t119 * parameters.Ri;
+        let t365 = t364 * t362;
+        let t366 = t365 / t11;
+        let t369 = parameters.Ri * parameters.Ri;
+        let t370 = t362 * t362;
+        let t371 = t127 * t369;
+        let t372 = t371 * t370;
+        let t373 = t372 / t128;
+        let t377 = parameters.A * parameters.Ri;
+        let t378 = t377 * t362;
+        let t379 = t378 / t11;
+        let t390 = T::one() / parameters.Ri;
+        let t399 = parameters.A / parameters.Ro;
+        let t407 = parameters.Ro * t114;
+        let t408 = t407 * t116;
+        let t409 = t138 / t408;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -254,25 +255,25 @@ impl<T: crate::Real> SphereShell<T> {
                 t129,
                 t136,
                 t140,
-                t147,
-                t176,
-                t184,
-                t187,
-                t236,
-                t254,
-                t278,
-                t282,
-                t295,
-                t307,
-                t322,
-                t334,
-                t349,
-                t355,
-                t364,
-                t371,
-                t381,
+                t178,
+                t186,
+                t189,
+                t238,
+                t256,
+                t280,
+                t284,
+                t297,
+                t309,
+                t324,
+                t336,
+                t351,
+                t357,
+                t366,
+                t373,
+                t379,
                 t390,
-                t398,
+                t399,
+                t409,
             ],
         })
     }
@@ -579,6 +580,8 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t108 = t107 + T::one();
         let t109 = t25 * t26;
         let t110 = t109 + T::one();
+        let t111 = t110 * t110;
+        let t112 = t108 * t111;
         let t117 = t18 * t26;
         let t118 = t117 * t108;
         let t121 = self.fixed[9] * t118;
@@ -590,45 +593,49 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t130 = self.fixed[10] * t126;
         let t131 = t121 + t130;
         let t132 = t131 + t107;
-        let t133 = t132.log_1p();
+        let t133 = t132.ln_of_both(t112);
         let t137 = t107 + T::nearest(2.0);
         let t141 = self.fixed[12] * t133;
-        let t142 = t107 * t137;
-        let t143 = self.fixed[11] * t142;
-        let t144 = t141 + t143;
-        let t145 = t109 + T::nearest(2.0);
-        let t148 = self.fixed[13] * t18;
-        let t149 = t148 * t26;
-        let t150 = t149 * t145;
-        let t151 = t141 + t150;
-        let t152 = T::one() / t108;
-        let t153 = t144 * t152;
-        let t154 = t5 * t153;
-        let t155 = T::one() / t110;
-        let t156 = t151 * t155;
-        let t157 = t6 * t156;
-        let t158 = t154 + t157;
-        let t159 = t66 * t158;
-        let t160 = t153 - t156;
+        let t142 = self.fixed[11] * t137;
+        let t143 = t141 - t142;
+        let t144 = t107 * t143;
+        let t145 = -t144;
+        let t146 = t109 + T::nearest(2.0);
+        let t147 = self.fixed[11] * t146;
+        let t148 = t141 - t147;
+        let t149 = t109 * t148;
+        let t150 = -t149;
+        let t151 = T::one() / t108;
+        let t152 = t145 * t151;
+        let t153 = t5 * t152;
+        let t154 = T::one() / t110;
+        let t155 = t150 * t154;
+        let t156 = t6 * t155;
+        let t157 = t153 + t156;
+        let t158 = t66 * t157;
+        let t159 = t141 + t158;
+        let t160 = t152 - t155;
         let t161 = t74 * t66;
         let t162 = t161 * t160;
         let t163 = t78 * t66;
         let t164 = t163 * t160;
-        let t165 = t3 * t153;
-        let t166 = t82 * t156;
+        let t165 = t3 * t152;
+        let t166 = t82 * t155;
         let t167 = t165 + t166;
         let t168 = t66 * t167;
-        let t169 = t89 * t66;
-        let t170 = t169 * t160;
-        let t171 = t4 * t153;
-        let t172 = t93 * t156;
-        let t173 = t171 + t172;
-        let t174 = t66 * t173;
+        let t169 = t141 + t168;
+        let t170 = t89 * t66;
+        let t171 = t170 * t160;
+        let t172 = t4 * t152;
+        let t173 = t93 * t155;
+        let t174 = t172 + t173;
+        let t175 = t66 * t174;
+        let t176 = t141 + t175;
         crate::nalgebra::SMatrix::<
             T,
             3,
             3,
-        >::new(t159, t162, t164, t162, t168, t170, t164, t170, t174)
+        >::new(t159, t162, t164, t162, t169, t171, t164, t171, t176)
     }
     #[inline]
     fn body_force(
@@ -660,69 +667,71 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t108 = t107 + T::one();
         let t109 = t25 * t26;
         let t110 = t109 + T::one();
-        let t152 = T::one() / t108;
-        let t155 = T::one() / t110;
-        let t177 = self.fixed[14] * t8;
-        let t178 = T::nearest(3.0) - t177;
-        let t181 = t7 * t23;
-        let t182 = self.fixed[4] * t181;
-        let t185 = self.fixed[15] * t178;
-        let t186 = t182 + t185;
-        let t188 = self.fixed[16] * t18;
-        let t189 = t188 * t186;
-        let t190 = t107 * t109;
-        let t191 = t190 + T::nearest(2.0);
-        let t192 = t25 * t23;
-        let t193 = t192 * t191;
-        let t194 = t8 * t193;
-        let t195 = T::nearest(2.0) * t109;
-        let t196 = t195 + T::one();
-        let t197 = t107 * t196;
-        let t198 = t109 * t109;
-        let t199 = t194 + t197;
-        let t200 = t199 + t198;
-        let t201 = t200.log_1p();
-        let t202 = self.fixed[11] * t107;
-        let t203 = self.fixed[12] * t201;
-        let t204 = t202 + t203;
-        let t205 = self.fixed[11] * t109;
-        let t206 = t203 + t205;
-        let t207 = T::one() - t21;
-        let t208 = t105 * t207;
-        let t209 = t208 * t152;
-        let t210 = self.fixed[9] * t18;
-        let t211 = t210 * t73;
-        let t212 = t211 * t155;
-        let t213 = t209 + t212;
-        let t214 = self.fixed[12] * t213;
-        let t215 = self.fixed[11] * t208;
-        let t216 = t214 + t215;
-        let t217 = t107 * t209;
-        let t218 = t208 - t217;
-        let t219 = t204 * t218;
-        let t220 = t107 * t216;
-        let t221 = t219 + t220;
-        let t222 = t109 * t155;
-        let t223 = t211 * t222;
-        let t224 = t217 + t223;
-        let t225 = T::nearest(2.0) * t67;
-        let t226 = t107 * t204;
-        let t227 = t225 * t226;
-        let t228 = t227 + t221;
-        let t229 = t152 * t228;
-        let t230 = t210 * t23;
-        let t231 = t206 * t155;
-        let t232 = t230 * t231;
-        let t233 = self.fixed[12] * t224;
-        let t234 = t229 - t232;
-        let t235 = t234 + t233;
-        let t237 = self.fixed[17] * t235;
-        let t238 = t237 - t189;
-        let t239 = t67 * t238;
-        let t240 = X[0] * t239;
-        let t241 = X[1] * t239;
-        let t242 = X[2] * t239;
-        crate::nalgebra::SVector::<T, 3>::new(t240, t241, t242)
+        let t111 = t110 * t110;
+        let t112 = t108 * t111;
+        let t151 = T::one() / t108;
+        let t154 = T::one() / t110;
+        let t179 = self.fixed[13] * t8;
+        let t180 = T::nearest(3.0) - t179;
+        let t183 = t7 * t23;
+        let t184 = self.fixed[4] * t183;
+        let t187 = self.fixed[14] * t180;
+        let t188 = t184 + t187;
+        let t190 = self.fixed[15] * t18;
+        let t191 = t190 * t188;
+        let t192 = t107 * t109;
+        let t193 = t192 + T::nearest(2.0);
+        let t194 = t25 * t23;
+        let t195 = t194 * t193;
+        let t196 = t8 * t195;
+        let t197 = T::nearest(2.0) * t109;
+        let t198 = t197 + T::one();
+        let t199 = t107 * t198;
+        let t200 = t109 * t109;
+        let t201 = t196 + t199;
+        let t202 = t201 + t200;
+        let t203 = t202.ln_of_both(t112);
+        let t204 = self.fixed[11] * t107;
+        let t205 = self.fixed[12] * t203;
+        let t206 = t204 + t205;
+        let t207 = self.fixed[11] * t109;
+        let t208 = t205 + t207;
+        let t209 = T::one() - t21;
+        let t210 = t105 * t209;
+        let t211 = t210 * t151;
+        let t212 = self.fixed[9] * t18;
+        let t213 = t212 * t73;
+        let t214 = t213 * t154;
+        let t215 = t211 + t214;
+        let t216 = self.fixed[12] * t215;
+        let t217 = self.fixed[11] * t210;
+        let t218 = t216 + t217;
+        let t219 = t107 * t211;
+        let t220 = t210 - t219;
+        let t221 = t206 * t220;
+        let t222 = t107 * t218;
+        let t223 = t221 + t222;
+        let t224 = t109 * t154;
+        let t225 = t213 * t224;
+        let t226 = t219 + t225;
+        let t227 = T::nearest(2.0) * t67;
+        let t228 = t107 * t206;
+        let t229 = t227 * t228;
+        let t230 = t229 + t223;
+        let t231 = t151 * t230;
+        let t232 = t212 * t23;
+        let t233 = t208 * t154;
+        let t234 = t232 * t233;
+        let t235 = self.fixed[12] * t226;
+        let t236 = t231 - t234;
+        let t237 = t236 + t235;
+        let t239 = self.fixed[16] * t237;
+        let t240 = t239 - t191;
+        let t241 = t67 * t240;
+        let t242 = X[0] * t241;
+        let t243 = X[1] * t241;
+        let t244 = X[2] * t241;
+        crate::nalgebra::SVector::<T, 3>::new(t242, t243, t244)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> crate::Fields<T, 3> {
         let t3 = X[1] * X[1];
@@ -818,100 +827,104 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t130 = self.fixed[10] * t126;
         let t131 = t121 + t130;
         let t132 = t131 + t107;
-        let t133 = t132.log_1p();
+        let t133 = t132.ln_of_both(t112);
         let t137 = t107 + T::nearest(2.0);
         let t141 = self.fixed[12] * t133;
-        let t142 = t107 * t137;
-        let t143 = self.fixed[11] * t142;
-        let t144 = t141 + t143;
-        let t145 = t109 + T::nearest(2.0);
-        let t148 = self.fixed[13] * t18;
-        let t149 = t148 * t26;
-        let t150 = t149 * t145;
-        let t151 = t141 + t150;
-        let t152 = T::one() / t108;
-        let t153 = t144 * t152;
-        let t154 = t5 * t153;
-        let t155 = T::one() / t110;
-        let t156 = t151 * t155;
-        let t157 = t6 * t156;
-        let t158 = t154 + t157;
-        let t159 = t66 * t158;
-        let t160 = t153 - t156;
+        let t142 = self.fixed[11] * t137;
+        let t143 = t141 - t142;
+        let t144 = t107 * t143;
+        let t145 = -t144;
+        let t146 = t109 + T::nearest(2.0);
+        let t147 = self.fixed[11] * t146;
+        let t148 = t141 - t147;
+        let t149 = t109 * t148;
+        let t150 = -t149;
+        let t151 = T::one() / t108;
+        let t152 = t145 * t151;
+        let t153 = t5 * t152;
+        let t154 = T::one() / t110;
+        let t155 = t150 * t154;
+        let t156 = t6 * t155;
+        let t157 = t153 + t156;
+        let t158 = t66 * t157;
+        let t159 = t141 + t158;
+        let t160 = t152 - t155;
         let t161 = t74 * t66;
         let t162 = t161 * t160;
         let t163 = t78 * t66;
         let t164 = t163 * t160;
-        let t165 = t3 * t153;
-        let t166 = t82 * t156;
+        let t165 = t3 * t152;
+        let t166 = t82 * t155;
         let t167 = t165 + t166;
         let t168 = t66 * t167;
-        let t169 = t89 * t66;
-        let t170 = t169 * t160;
-        let t171 = t4 * t153;
-        let t172 = t93 * t156;
-        let t173 = t171 + t172;
-        let t174 = t66 * t173;
-        let t177 = self.fixed[14] * t8;
-        let t178 = T::nearest(3.0) - t177;
-        let t181 = t7 * t23;
-        let t182 = self.fixed[4] * t181;
-        let t185 = self.fixed[15] * t178;
-        let t186 = t182 + t185;
-        let t188 = self.fixed[16] * t18;
-        let t189 = t188 * t186;
-        let t190 = t107 * t109;
-        let t191 = t190 + T::nearest(2.0);
-        let t192 = t25 * t23;
-        let t193 = t192 * t191;
-        let t194 = t8 * t193;
-        let t195 = T::nearest(2.0) * t109;
-        let t196 = t195 + T::one();
-        let t197 = t107 * t196;
-        let t198 = t109 * t109;
-        let t199 = t194 + t197;
-        let t200 = t199 + t198;
-        let t201 = t200.log_1p();
-        let t202 = self.fixed[11] * t107;
-        let t203 = self.fixed[12] * t201;
-        let t204 = t202 + t203;
-        let t205 = self.fixed[11] * t109;
-        let t206 = t203 + t205;
-        let t207 = T::one() - t21;
-        let t208 = t105 * t207;
-        let t209 = t208 * t152;
-        let t210 = self.fixed[9] * t18;
-        let t211 = t210 * t73;
-        let t212 = t211 * t155;
-        let t213 = t209 + t212;
-        let t214 = self.fixed[12] * t213;
-        let t215 = self.fixed[11] * t208;
-        let t216 = t214 + t215;
-        let t217 = t107 * t209;
-        let t218 = t208 - t217;
-        let t219 = t204 * t218;
-        let t220 = t107 * t216;
-        let t221 = t219 + t220;
-        let t222 = t109 * t155;
-        let t223 = t211 * t222;
-        let t224 = t217 + t223;
-        let t225 = T::nearest(2.0) * t67;
-        let t226 = t107 * t204;
-        let t227 = t225 * t226;
-        let t228 = t227 + t221;
-        let t229 = t152 * t228;
-        let t230 = t210 * t23;
-        let t231 = t206 * t155;
-        let t232 = t230 * t231;
-        let t233 = self.fixed[12] * t224;
-        let t234 = t229 - t232;
-        let t235 = t234 + t233;
-        let t237 = self.fixed[17] * t235;
-        let t238 = t237 - t189;
-        let t239 = t67 * t238;
-        let t240 = X[0] * t239;
-        let t241 = X[1] * t239;
-        let t242 = X[2] * t239;
+        let t169 = t141 + t168;
+        let t170 = t89 * t66;
+        let t171 = t170 * t160;
+        let t172 = t4 * t152;
+        let t173 = t93 * t155;
+        let t174 = t172 + t173;
+        let t175 = t66 * t174;
+        let t176 = t141 + t175;
+        let t179 = self.fixed[13] * t8;
+        let t180 = T::nearest(3.0) - t179;
+        let t183 = t7 * t23;
+        let t184 = self.fixed[4] * t183;
+        let t187 = self.fixed[14] * t180;
+        let t188 = t184 + t187;
+        let t190 = self.fixed[15] * t18;
+        let t191 = t190 * t188;
+        let t192 = t107 * t109;
+        let t193 = t192 + T::nearest(2.0);
+        let t194 = t25 * t23;
+        let t195 = t194 * t193;
+        let t196 = t8 * t195;
+        let t197 = T::nearest(2.0) * t109;
+        let t198 = t197 + T::one();
+        let t199 = t107 * t198;
+        let t200 = t109 * t109;
+        let t201 = t196 + t199;
+        let t202 = t201 + t200;
+        let t203 = t202.ln_of_both(t112);
+        let t204 = self.fixed[11] * t107;
+        let t205 = self.fixed[12] * t203;
+        let t206 = t204 + t205;
+        let t207 = self.fixed[11] * t109;
+        let t208 = t205 + t207;
+        let t209 = T::one() - t21;
+        let t210 = t105 * t209;
+        let t211 = t210 * t151;
+        let t212 = self.fixed[9] * t18;
+        let t213 = t212 * t73;
+        let t214 = t213 * t154;
+        let t215 = t211 + t214;
+        let t216 = self.fixed[12] * t215;
+        let t217 = self.fixed[11] * t210;
+        let t218 = t216 + t217;
+        let t219 = t107 * t211;
+        let t220 = t210 - t219;
+        let t221 = t206 * t220;
+        let t222 = t107 * t218;
+        let t223 = t221 + t222;
+        let t224 = t109 * t154;
+        let t225 = t213 * t224;
+        let t226 = t219 + t225;
+        let t227 = T::nearest(2.0) * t67;
+        let t228 = t107 * t206;
+        let t229 = t227 * t228;
+        let t230 = t229 + t223;
+        let t231 = t151 * t230;
+        let t232 = t212 * t23;
+        let t233 = t208 * t154;
+        let t234 = t232 * t233;
+        let t235 = self.fixed[12] * t226;
+        let t236 = t231 - t234;
+        let t237 = t236 + t235;
+        let t239 = self.fixed[16] * t237;
+        let t240 = t239 - t191;
+        let t241 = t67 * t240;
+        let t242 = X[0] * t241;
+        let t243 = X[1] * t241;
+        let t244 = X[2] * t241;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 3>::new(t28, t30, t32),
             v: crate::nalgebra::SVector::<T, 3>::new(t40, t42, t44),
@@ -931,8 +944,8 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 T,
                 3,
                 3,
-            >::new(t159, t162, t164, t162, t168, t170, t164, t170, t174),
-            b: crate::nalgebra::SVector::<T, 3>::new(t240, t241, t242),
+            >::new(t159, t162, t164, t162, t169, t171, t164, t171, t176),
+            b: crate::nalgebra::SVector::<T, 3>::new(t242, t243, t244),
         }
     }
     fn traction(
@@ -946,43 +959,49 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t17 = self.fixed[0] * t;
                 let t18 = t17.cos_pi();
                 let t122 = t18 * t18;
-                let t356 = self.fixed[26] * t18;
-                let t357 = t356 + T::one();
-                let t361 = t18 * t357;
-                let t365 = self.fixed[27] * t361;
-                let t366 = t122 * t357;
-                let t372 = self.fixed[28] * t366;
-                let t373 = t365 + t372;
-                let t374 = t373 + t356;
-                let t375 = t374.log_1p();
-                let t376 = t356 + T::nearest(2.0);
-                let t377 = self.fixed[12] * t375;
-                let t378 = t356 * t376;
-                let t379 = self.fixed[11] * t378;
-                let t380 = t377 + t379;
-                let t382 = t380 / t357;
-                let t383 = self.fixed[29] * t382;
-                let t384 = t383 * X[0];
-                let t385 = -t384;
-                let t386 = t383 * X[1];
-                let t387 = -t386;
-                let t388 = t383 * X[2];
-                let t389 = -t388;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t385, t387, t389))
+                let t358 = self.fixed[25] * t18;
+                let t359 = t358 + T::one();
+                let t363 = t18 * t359;
+                let t367 = self.fixed[26] * t363;
+                let t368 = t122 * t359;
+                let t374 = self.fixed[27] * t368;
+                let t375 = t367 + t374;
+                let t376 = t375 + t358;
+                let t380 = self.fixed[28] * t18;
+                let t381 = t380 + T::one();
+                let t382 = t381 * t381;
+                let t383 = t359 * t382;
+                let t384 = t376.ln_of_both(t383);
+                let t385 = t358 + T::nearest(2.0);
+                let t386 = self.fixed[12] * t384;
+                let t387 = t358 * t385;
+                let t388 = self.fixed[11] * t387;
+                let t389 = t386 + t388;
+                let t391 = t389 / t359;
+                let t392 = self.fixed[29] * t391;
+                let t393 = t392 * X[0];
+                let t394 = -t393;
+                let t395 = t392 * X[1];
+                let t396 = -t395;
+                let t397 = t392 * X[2];
+                let t398 = -t397;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t394, t396, t398))
             }
             crate::Surface::Outer => {
                 let t17 = self.fixed[0] * t;
                 let t18 = t17.cos_pi();
-                let t391 = self.fixed[30] * t18;
-                let t392 = t391 + T::nearest(2.0);
-                let t393 = t18 * t392;
-                let t394 = self.fixed[30] * t393;
-                let t395 = t394.log_1p();
-                let t399 = self.fixed[31] * t395;
-                let t400 = t399 * X[0];
-                let t401 = t399 * X[1];
-                let t402 = t399 * X[2];
-                Some(crate::nalgebra::SVector::<T, 3>::new(t400, t401, t402))
+                let t400 = self.fixed[30] * t18;
+                let t401 = t400 + T::nearest(2.0);
+                let t402 = t18 * t401;
+                let t403 = self.fixed[30] * t402;
+                let t404 = t400 + T::one();
+                let t405 = t404 * t404;
+                let t406 = t403.ln_of_both(t405);
+                let t410 = self.fixed[31] * t406;
+                let t411 = t410 * X[0];
+                let t412 = t410 * X[1];
+                let t413 = t410 * X[2];
+                Some(crate::nalgebra::SVector::<T, 3>::new(t411, t412, t413))
             }
             crate::Surface::Lower(0) => {
                 let t3 = X[1] * X[1];
@@ -1006,6 +1025,8 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t108 = t107 + T::one();
                 let t109 = t25 * t26;
                 let t110 = t109 + T::one();
+                let t111 = t110 * t110;
+                let t112 = t108 * t111;
                 let t117 = t18 * t26;
                 let t118 = t117 * t108;
                 let t121 = self.fixed[9] * t118;
@@ -1017,19 +1038,20 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t130 = self.fixed[10] * t126;
                 let t131 = t121 + t130;
                 let t132 = t131 + t107;
-                let t133 = t132.log_1p();
+                let t133 = t132.ln_of_both(t112);
                 let t141 = self.fixed[12] * t133;
-                let t145 = t109 + T::nearest(2.0);
-                let t148 = self.fixed[13] * t18;
-                let t149 = t148 * t26;
-                let t150 = t149 * t145;
-                let t151 = t141 + t150;
-                let t155 = T::one() / t110;
-                let t156 = t151 * t155;
-                let t403 = t6 * t66;
-                let t404 = t403 * t156;
-                let t405 = -t404;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t405, T::zero(), T::zero()))
+                let t146 = t109 + T::nearest(2.0);
+                let t147 = self.fixed[11] * t146;
+                let t148 = t141 - t147;
+                let t149 = t109 * t148;
+                let t150 = -t149;
+                let t154 = T::one() / t110;
+                let t155 = t150 * t154;
+                let t414 = t6 * t66;
+                let t415 = t414 * t155;
+                let t416 = t141 + t415;
+                let t417 = -t416;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t417, T::zero(), T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t3 = X[1] * X[1];
@@ -1054,6 +1076,8 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t108 = t107 + T::one();
                 let t109 = t25 * t26;
                 let t110 = t109 + T::one();
+                let t111 = t110 * t110;
+                let t112 = t108 * t111;
                 let t117 = t18 * t26;
                 let t118 = t117 * t108;
                 let t121 = self.fixed[9] * t118;
@@ -1065,19 +1089,20 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t130 = self.fixed[10] * t126;
                 let t131 = t121 + t130;
                 let t132 = t131 + t107;
-                let t133 = t132.log_1p();
+                let t133 = t132.ln_of_both(t112);
                 let t141 = self.fixed[12] * t133;
-                let t145 = t109 + T::nearest(2.0);
-                let t148 = self.fixed[13] * t18;
-                let t149 = t148 * t26;
-                let t150 = t149 * t145;
-                let t151 = t141 + t150;
-                let t155 = T::one() / t110;
-                let t156 = t151 * t155;
-                let t407 = t82 * t66;
-                let t408 = t407 * t156;
-                let t409 = -t408;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t409, T::zero()))
+                let t146 = t109 + T::nearest(2.0);
+                let t147 = self.fixed[11] * t146;
+                let t148 = t141 - t147;
+                let t149 = t109 * t148;
+                let t150 = -t149;
+                let t154 = T::one() / t110;
+                let t155 = t150 * t154;
+                let t419 = t82 * t66;
+                let t420 = t419 * t155;
+                let t421 = t141 + t420;
+                let t422 = -t421;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t422, T::zero()))
             }
             crate::Surface::Lower(2) => {
                 let t3 = X[1] * X[1];
@@ -1102,6 +1127,8 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t108 = t107 + T::one();
                 let t109 = t25 * t26;
                 let t110 = t109 + T::one();
+                let t111 = t110 * t110;
+                let t112 = t108 * t111;
                 let t117 = t18 * t26;
                 let t118 = t117 * t108;
                 let t121 = self.fixed[9] * t118;
@@ -1113,19 +1140,20 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t130 = self.fixed[10] * t126;
                 let t131 = t121 + t130;
                 let t132 = t131 + t107;
-                let t133 = t132.log_1p();
+                let t133 = t132.ln_of_both(t112);
                 let t141 = self.fixed[12] * t133;
-                let t145 = t109 + T::nearest(2.0);
-                let t148 = self.fixed[13] * t18;
-                let t149 = t148 * t26;
-                let t150 = t149 * t145;
-                let t151 = t141 + t150;
-                let t155 = T::one() / t110;
-                let t156 = t151 * t155;
-                let t410 = t93 * t66;
-                let t411 = t410 * t156;
-                let t412 = -t411;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t412))
+                let t146 = t109 + T::nearest(2.0);
+                let t147 = self.fixed[11] * t146;
+                let t148 = t141 - t147;
+                let t149 = t109 * t148;
+                let t150 = -t149;
+                let t154 = T::one() / t110;
+                let t155 = t150 * t154;
+                let t423 = t93 * t66;
+                let t424 = t423 * t155;
+                let t425 = t141 + t424;
+                let t426 = -t425;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t426))
             }
             _ => None,
         }
@@ -1176,7 +1204,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[25]
+        self.fixed[24]
     }
     fn body_force_at(
         &self,
@@ -1216,67 +1244,67 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 12> for SphereShell<T> {
         let t106 = t8 * t60;
         let t123 = t23 * t23;
         let t124 = t7 * t123;
-        let t177 = self.fixed[14] * t8;
-        let t178 = T::nearest(3.0) - t177;
-        let t181 = t7 * t23;
-        let t182 = self.fixed[4] * t181;
-        let t185 = self.fixed[15] * t178;
-        let t186 = t182 + t185;
-        let t207 = T::one() - t21;
-        let t243 = X[0] * t67;
-        let t244 = self.fixed[16] * t186;
-        let t247 = t7 * t8;
-        let t250 = t60 * t60;
-        let t255 = t247 * t23;
-        let t256 = t255 * t250;
-        let t257 = t256 * t178;
-        let t258 = self.fixed[18] * t257;
-        let t259 = t23 * t207;
-        let t260 = t60 * t73;
-        let t261 = T::nearest(2.0) * t260;
-        let t262 = t259 + t261;
-        let t263 = t23 * t73;
-        let t265 = T::nearest(36.0) * t250;
-        let t266 = t263 + t265;
-        let t267 = t266 - t123;
-        let t268 = T::nearest(2.0) * t178;
-        let t269 = t73 + t268;
-        let t270 = t23 * t269;
-        let t272 = t60 * t207;
-        let t273 = T::nearest(18.0) * t272;
-        let t274 = t270 + t273;
-        let t275 = T::nearest(6.0) - t177;
-        let t276 = t275 * t207;
-        let t277 = T::nearest(2.0) * t276;
-        let t279 = self.fixed[19] * t277;
-        let t283 = self.fixed[20] * t262;
-        let t284 = self.fixed[11] * t267;
-        let t285 = self.fixed[12] * t274;
-        let t286 = t279 + t283;
-        let t287 = t286 + t284;
-        let t288 = t287 + t285;
-        let t296 = t7 * t60;
-        let t297 = t296 * t288;
-        let t298 = self.fixed[21] * t297;
-        let t308 = t8 * t262;
-        let t309 = self.fixed[22] * t308;
-        let t310 = self.fixed[12] * t178;
-        let t311 = self.fixed[19] * t207;
-        let t312 = t310 + t311;
-        let t313 = t265 - t123;
-        let t314 = t273 + t263;
-        let t315 = t60 * t312;
-        let t316 = T::nearest(12.0) * t315;
-        let t317 = self.fixed[11] * t313;
-        let t318 = self.fixed[12] * t314;
-        let t319 = t316 + t317;
-        let t320 = t319 + t318;
-        let t323 = t8 * t320;
-        let t324 = self.fixed[23] * t323;
-        let t335 = self.fixed[24] * t178;
-        let t345 = X[1] * t67;
-        let t347 = X[2] * t67;
-        [t26, t106, t124, t243, t244, t258, t298, t309, t324, t335, t345, t347]
+        let t179 = self.fixed[13] * t8;
+        let t180 = T::nearest(3.0) - t179;
+        let t183 = t7 * t23;
+        let t184 = self.fixed[4] * t183;
+        let t187 = self.fixed[14] * t180;
+        let t188 = t184 + t187;
+        let t209 = T::one() - t21;
+        let t245 = X[0] * t67;
+        let t246 = self.fixed[15] * t188;
+        let t249 = t7 * t8;
+        let t252 = t60 * t60;
+        let t257 = t249 * t23;
+        let t258 = t257 * t252;
+        let t259 = t258 * t180;
+        let t260 = self.fixed[17] * t259;
+        let t261 = t23 * t209;
+        let t262 = t60 * t73;
+        let t263 = T::nearest(2.0) * t262;
+        let t264 = t261 + t263;
+        let t265 = t23 * t73;
+        let t267 = T::nearest(36.0) * t252;
+        let t268 = t265 + t267;
+        let t269 = t268 - t123;
+        let t270 = T::nearest(2.0) * t180;
+        let t271 = t73 + t270;
+        let t272 = t23 * t271;
+        let t274 = t60 * t209;
+        let t275 = T::nearest(18.0) * t274;
+        let t276 = t272 + t275;
+        let t277 = T::nearest(6.0) - t179;
+        let t278 = t277 * t209;
+        let t279 = T::nearest(2.0) * t278;
+        let t281 = self.fixed[18] * t279;
+        let t285 = self.fixed[19] * t264;
+        let t286 = self.fixed[11] * t269;
+        let t287 = self.fixed[12] * t276;
+        let t288 = t281 + t285;
+        let t289 = t288 + t286;
+        let t290 = t289 + t287;
+        let t298 = t7 * t60;
+        let t299 = t298 * t290;
+        let t300 = self.fixed[20] * t299;
+        let t310 = t8 * t264;
+        let t311 = self.fixed[21] * t310;
+        let t312 = self.fixed[12] * t180;
+        let t313 = self.fixed[18] * t209;
+        let t314 = t312 + t313;
+        let t315 = t267 - t123;
+        let t316 = t275 + t265;
+        let t317 = t60 * t314;
+        let t318 = T::nearest(12.0) * t317;
+        let t319 = self.fixed[11] * t315;
+        let t320 = self.fixed[12] * t316;
+        let t321 = t318 + t319;
+        let t322 = t321 + t320;
+        let t325 = t8 * t322;
+        let t326 = self.fixed[22] * t325;
+        let t337 = self.fixed[23] * t180;
+        let t347 = X[1] * t67;
+        let t349 = X[2] * t67;
+        [t26, t106, t124, t245, t246, t260, t300, t311, t326, t337, t347, t349]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -1288,6 +1316,8 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 12> for SphereShell<T> {
         let t108 = t107 + T::one();
         let t109 = time[1] * point[0];
         let t110 = t109 + T::one();
+        let t111 = t110 * t110;
+        let t112 = t108 * t111;
         let t117 = time[0] * point[0];
         let t118 = t117 * t108;
         let t121 = self.fixed[9] * t118;
@@ -1296,25 +1326,25 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 12> for SphereShell<T> {
         let t130 = self.fixed[10] * t126;
         let t131 = t121 + t130;
         let t132 = t131 + t107;
-        let t133 = t132.log_1p();
-        let t299 = time[0] * point[5];
-        let t300 = point[6] + t299;
-        let t325 = time[0] * t300;
-        let t326 = point[7] * t133;
-        let t327 = t325 + t326;
-        let t328 = point[8] + t327;
-        let t336 = time[0] * t328;
-        let t337 = point[9] * t133;
-        let t338 = t336 + t337;
-        let t339 = t108 * t108;
-        let t340 = t339 * t110;
-        let t341 = t338 / t340;
-        let t342 = t341 - point[4];
-        let t343 = time[0] * t342;
-        let t344 = point[3] * t343;
-        let t346 = point[10] * t343;
-        let t348 = point[11] * t343;
-        crate::nalgebra::SVector::<T, 3>::new(t344, t346, t348)
+        let t133 = t132.ln_of_both(t112);
+        let t301 = time[0] * point[5];
+        let t302 = point[6] + t301;
+        let t327 = time[0] * t302;
+        let t328 = point[7] * t133;
+        let t329 = t327 + t328;
+        let t330 = point[8] + t329;
+        let t338 = time[0] * t330;
+        let t339 = point[9] * t133;
+        let t340 = t338 + t339;
+        let t341 = t108 * t108;
+        let t342 = t341 * t110;
+        let t343 = t340 / t342;
+        let t344 = t343 - point[4];
+        let t345 = time[0] * t344;
+        let t346 = point[3] * t345;
+        let t348 = point[10] * t345;
+        let t350 = point[11] * t345;
+        crate::nalgebra::SVector::<T, 3>::new(t346, t348, t350)
     }
 }
 impl<T: crate::Real> From<SphereShell<T>> for crate::AnySolution<T> {

@@ -119,24 +119,24 @@ impl<T: crate::Real> Torsion<T> {
         let t51 = parameters.A * parameters.E;
         let t52 = t51 * t44;
         let t53 = t52 / parameters.rho0;
-        let t78 = parameters.nu + T::one();
-        let t79 = T::nearest(0.5) * parameters.E;
-        let t80 = t79 / t78;
-        let t99 = T::nearest(2.0) * t44;
-        let t102 = parameters.A / t78;
-        let t106 = t10 * parameters.E;
-        let t107 = t106 / parameters.rho0;
-        let t121 = T::nearest(2.0) / t6;
-        let t122 = T::nearest(2.0) * parameters.nu;
-        let t123 = T::one() - t122;
-        let t124 = parameters.E * parameters.nu;
-        let t125 = t78 * t123;
-        let t126 = t124 / t125;
-        let t127 = -T::nearest(0.5);
-        let t204 = parameters.A * t80;
+        let t74 = parameters.nu + T::one();
+        let t75 = T::nearest(0.5) * parameters.E;
+        let t76 = t75 / t74;
+        let t78 = parameters.A * t76;
+        let t87 = T::nearest(2.0) * t44;
+        let t90 = parameters.A / t74;
+        let t94 = t10 * parameters.E;
+        let t95 = t94 / parameters.rho0;
+        let t109 = T::nearest(2.0) / t6;
+        let t110 = T::nearest(2.0) * parameters.nu;
+        let t111 = T::one() - t110;
+        let t112 = parameters.E * parameters.nu;
+        let t113 = t74 * t111;
+        let t114 = t112 / t113;
+        let t115 = -T::nearest(0.5);
         Ok(Torsion {
             parameters,
-            fixed: [t6, t10, t35, t53, t80, t99, t102, t107, t121, t126, t127, t204],
+            fixed: [t6, t10, t35, t53, t76, t78, t87, t90, t95, t109, t114, t115],
         })
     }
     /// The solution with parameter values in the order of the description; missing ones take their
@@ -368,52 +368,26 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         let t18 = X[1] * t16;
         let t19 = t17 + t18;
         let t21 = t13 * t19;
+        let t22 = T::nearest(2.0) * t21;
         let t24 = X[0] * t16;
         let t25 = X[1] * t13;
         let t26 = t24 - t25;
         let t27 = t13 * t26;
-        let t32 = t16 * t19;
-        let t33 = t27 + t32;
-        let t40 = t16 * t26;
-        let t41 = t21 - t40;
-        let t60 = t13 * t13;
-        let t61 = T::nearest(2.0) * t60;
-        let t62 = -t61;
-        let t63 = t16 * t13;
-        let t64 = T::nearest(2.0) * t63;
-        let t65 = -t64;
-        let t66 = self.parameters.A * t8;
-        let t67 = t66 * t33;
-        let t68 = -t67;
-        let t69 = t66 * t41;
-        let t70 = -t69;
-        let t73 = t62 + T::one();
-        let t74 = t73 * t73;
-        let t75 = t65 * t64;
-        let t76 = t74 - t75;
-        let t81 = t68 * t76;
-        let t82 = T::one() / t76;
-        let t83 = t81 * t82;
-        let t84 = self.fixed[4] * t83;
-        let t85 = t70 * t76;
-        let t86 = t85 * t82;
-        let t87 = self.fixed[4] * t86;
-        let t88 = t65 * t70;
-        let t89 = t68 * t73;
-        let t90 = t88 - t89;
-        let t91 = t90 * t82;
-        let t92 = self.fixed[4] * t91;
-        let t93 = -t92;
-        let t94 = t70 * t73;
-        let t95 = t68 * t64;
-        let t96 = t94 - t95;
-        let t97 = t96 * t82;
-        let t98 = self.fixed[4] * t97;
+        let t28 = T::nearest(2.0) * t27;
+        let t77 = X[1] + t28;
+        let t79 = self.fixed[5] * t8;
+        let t80 = t79 * t77;
+        let t81 = -t80;
+        let t82 = X[0] - t22;
+        let t83 = t79 * t82;
+        let t84 = t79 * X[1];
+        let t85 = -t84;
+        let t86 = t79 * X[0];
         crate::nalgebra::SMatrix::<
             T,
             3,
             3,
-        >::new(T::zero(), T::zero(), t84, T::zero(), T::zero(), t87, t93, t98, T::zero())
+        >::new(T::zero(), T::zero(), t81, T::zero(), T::zero(), t83, t85, t86, T::zero())
     }
     #[inline]
     fn body_force(
@@ -449,17 +423,17 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         let t56 = t8 * t41;
         let t57 = t48 * t33;
         let t58 = t56 - t57;
-        let t100 = self.fixed[5] * X[2];
-        let t101 = t100 * t50;
-        let t103 = self.fixed[6] * t8;
-        let t104 = t103 * t56;
-        let t105 = t101 - t104;
-        let t108 = self.fixed[7] * t105;
-        let t109 = t100 * t58;
-        let t110 = t103 * t45;
-        let t111 = t109 + t110;
-        let t112 = self.fixed[7] * t111;
-        crate::nalgebra::SVector::<T, 3>::new(t108, t112, T::zero())
+        let t88 = self.fixed[6] * X[2];
+        let t89 = t88 * t50;
+        let t91 = self.fixed[7] * t8;
+        let t92 = t91 * t56;
+        let t93 = t89 - t92;
+        let t96 = self.fixed[8] * t93;
+        let t97 = t88 * t58;
+        let t98 = t91 * t45;
+        let t99 = t97 + t98;
+        let t100 = self.fixed[8] * t99;
+        crate::nalgebra::SVector::<T, 3>::new(t96, t100, T::zero())
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> crate::Fields<T, 3> {
         let t7 = self.fixed[0] * t;
@@ -514,38 +488,25 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         let t69 = t66 * t41;
         let t70 = -t69;
         let t72 = T::one() - t61;
-        let t73 = t62 + T::one();
-        let t74 = t73 * t73;
-        let t75 = t65 * t64;
-        let t76 = t74 - t75;
-        let t81 = t68 * t76;
-        let t82 = T::one() / t76;
-        let t83 = t81 * t82;
-        let t84 = self.fixed[4] * t83;
-        let t85 = t70 * t76;
-        let t86 = t85 * t82;
-        let t87 = self.fixed[4] * t86;
-        let t88 = t65 * t70;
-        let t89 = t68 * t73;
-        let t90 = t88 - t89;
-        let t91 = t90 * t82;
-        let t92 = self.fixed[4] * t91;
-        let t93 = -t92;
-        let t94 = t70 * t73;
-        let t95 = t68 * t64;
-        let t96 = t94 - t95;
-        let t97 = t96 * t82;
-        let t98 = self.fixed[4] * t97;
-        let t100 = self.fixed[5] * X[2];
-        let t101 = t100 * t50;
-        let t103 = self.fixed[6] * t8;
-        let t104 = t103 * t56;
-        let t105 = t101 - t104;
-        let t108 = self.fixed[7] * t105;
-        let t109 = t100 * t58;
-        let t110 = t103 * t45;
-        let t111 = t109 + t110;
-        let t112 = self.fixed[7] * t111;
+        let t77 = X[1] + t28;
+        let t79 = self.fixed[5] * t8;
+        let t80 = t79 * t77;
+        let t81 = -t80;
+        let t82 = X[0] - t22;
+        let t83 = t79 * t82;
+        let t84 = t79 * X[1];
+        let t85 = -t84;
+        let t86 = t79 * X[0];
+        let t88 = self.fixed[6] * X[2];
+        let t89 = t88 * t50;
+        let t91 = self.fixed[7] * t8;
+        let t92 = t91 * t56;
+        let t93 = t89 - t92;
+        let t96 = self.fixed[8] * t93;
+        let t97 = t88 * t58;
+        let t98 = t91 * t45;
+        let t99 = t97 + t98;
+        let t100 = self.fixed[8] * t99;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 3>::new(t23, t28, T::zero()),
             v: crate::nalgebra::SVector::<T, 3>::new(t39, t43, T::zero()),
@@ -568,15 +529,15 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
             >::new(
                 T::zero(),
                 T::zero(),
-                t84,
+                t81,
                 T::zero(),
                 T::zero(),
-                t87,
-                t93,
-                t98,
+                t83,
+                t85,
+                t86,
                 T::zero(),
             ),
-            b: crate::nalgebra::SVector::<T, 3>::new(t108, t112, T::zero()),
+            b: crate::nalgebra::SVector::<T, 3>::new(t96, t100, T::zero()),
         }
     }
     fn traction(
@@ -589,212 +550,65 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
             crate::Surface::Lower(0) => {
                 let t7 = self.fixed[0] * t;
                 let t8 = t7.sin_pi();
-                let t11 = self.fixed[1] * t8;
-                let t12 = t11 * X[2];
-                let t13 = t12.sin();
-                let t16 = t12.cos();
-                let t60 = t13 * t13;
-                let t61 = T::nearest(2.0) * t60;
-                let t62 = -t61;
-                let t63 = t16 * t13;
-                let t64 = T::nearest(2.0) * t63;
-                let t65 = -t64;
-                let t73 = t62 + T::one();
-                let t74 = t73 * t73;
-                let t75 = t65 * t64;
-                let t76 = t74 - t75;
-                let t82 = T::one() / t76;
-                let t128 = T::nearest(2.0) * X[1];
-                let t129 = t128 * t16;
-                let t130 = t13 - t129;
-                let t131 = t128 * t13;
-                let t132 = t16 + t131;
-                let t133 = t13 * t130;
-                let t134 = t16 * t132;
-                let t135 = t133 - t134;
-                let t136 = t11 * t135;
-                let t137 = t13 * t132;
-                let t138 = t16 * t130;
-                let t139 = t137 + t138;
-                let t140 = t11 * t139;
-                let t141 = t65 * t136;
-                let t142 = t73 * t140;
-                let t143 = t141 - t142;
-                let t144 = t143 * t82;
-                let t145 = self.fixed[4] * t144;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t145))
+                let t79 = self.fixed[5] * t8;
+                let t84 = t79 * X[1];
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t84))
             }
             crate::Surface::Upper(0) => {
                 let t7 = self.fixed[0] * t;
                 let t8 = t7.sin_pi();
-                let t11 = self.fixed[1] * t8;
-                let t12 = t11 * X[2];
-                let t13 = t12.sin();
-                let t16 = t12.cos();
-                let t60 = t13 * t13;
-                let t61 = T::nearest(2.0) * t60;
-                let t62 = -t61;
-                let t63 = t16 * t13;
-                let t64 = T::nearest(2.0) * t63;
-                let t65 = -t64;
-                let t73 = t62 + T::one();
-                let t74 = t73 * t73;
-                let t75 = t65 * t64;
-                let t76 = t74 - t75;
-                let t82 = T::one() / t76;
-                let t128 = T::nearest(2.0) * X[1];
-                let t129 = t128 * t16;
-                let t131 = t128 * t13;
-                let t146 = t13 + t129;
-                let t147 = t16 - t131;
-                let t148 = t13 * t146;
-                let t149 = t16 * t147;
-                let t150 = t148 - t149;
-                let t151 = t11 * t150;
-                let t152 = -t151;
-                let t153 = t13 * t147;
-                let t154 = t16 * t146;
-                let t155 = t153 + t154;
-                let t156 = t11 * t155;
-                let t157 = -t156;
-                let t158 = t65 * t152;
-                let t159 = t73 * t157;
-                let t160 = t158 - t159;
-                let t161 = t160 * t82;
-                let t162 = self.fixed[4] * t161;
-                let t163 = -t162;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t163))
+                let t79 = self.fixed[5] * t8;
+                let t84 = t79 * X[1];
+                let t85 = -t84;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t85))
             }
             crate::Surface::Lower(1) => {
                 let t7 = self.fixed[0] * t;
                 let t8 = t7.sin_pi();
-                let t11 = self.fixed[1] * t8;
-                let t12 = t11 * X[2];
-                let t13 = t12.sin();
-                let t16 = t12.cos();
-                let t60 = t13 * t13;
-                let t61 = T::nearest(2.0) * t60;
-                let t62 = -t61;
-                let t63 = t16 * t13;
-                let t64 = T::nearest(2.0) * t63;
-                let t65 = -t64;
-                let t73 = t62 + T::one();
-                let t74 = t73 * t73;
-                let t75 = t65 * t64;
-                let t76 = t74 - t75;
-                let t82 = T::one() / t76;
-                let t164 = T::nearest(2.0) * X[0];
-                let t165 = t164 * t13;
-                let t166 = t16 - t165;
-                let t167 = t164 * t16;
-                let t168 = t13 + t167;
-                let t169 = t13 * t166;
-                let t170 = t16 * t168;
-                let t171 = t169 + t170;
-                let t172 = t11 * t171;
-                let t173 = t13 * t168;
-                let t174 = t16 * t166;
-                let t175 = t173 - t174;
-                let t176 = t11 * t175;
-                let t177 = -t176;
-                let t178 = t73 * t172;
-                let t179 = t64 * t177;
-                let t180 = t178 - t179;
-                let t181 = t180 * t82;
-                let t182 = self.fixed[4] * t181;
-                let t183 = -t182;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t183))
+                let t79 = self.fixed[5] * t8;
+                let t86 = t79 * X[0];
+                let t116 = -t86;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t116))
             }
             crate::Surface::Upper(1) => {
                 let t7 = self.fixed[0] * t;
                 let t8 = t7.sin_pi();
-                let t11 = self.fixed[1] * t8;
-                let t12 = t11 * X[2];
-                let t13 = t12.sin();
-                let t16 = t12.cos();
-                let t60 = t13 * t13;
-                let t61 = T::nearest(2.0) * t60;
-                let t62 = -t61;
-                let t63 = t16 * t13;
-                let t64 = T::nearest(2.0) * t63;
-                let t65 = -t64;
-                let t73 = t62 + T::one();
-                let t74 = t73 * t73;
-                let t75 = t65 * t64;
-                let t76 = t74 - t75;
-                let t82 = T::one() / t76;
-                let t164 = T::nearest(2.0) * X[0];
-                let t165 = t164 * t13;
-                let t167 = t164 * t16;
-                let t184 = t16 + t165;
-                let t185 = t13 - t167;
-                let t186 = t13 * t184;
-                let t187 = t16 * t185;
-                let t188 = t186 + t187;
-                let t189 = t11 * t188;
-                let t190 = -t189;
-                let t191 = t13 * t185;
-                let t192 = t16 * t184;
-                let t193 = t191 - t192;
-                let t194 = t11 * t193;
-                let t195 = t73 * t190;
-                let t196 = t64 * t194;
-                let t197 = t195 - t196;
-                let t198 = t197 * t82;
-                let t199 = self.fixed[4] * t198;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t199))
+                let t79 = self.fixed[5] * t8;
+                let t86 = t79 * X[0];
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t86))
             }
             crate::Surface::Lower(2) => {
                 let t7 = self.fixed[0] * t;
                 let t8 = t7.sin_pi();
-                let t66 = self.parameters.A * t8;
-                let t200 = t66 * X[1];
-                let t201 = -t200;
-                let t202 = self.fixed[4] * t201;
-                let t203 = -t202;
-                let t205 = self.fixed[11] * t8;
-                let t206 = t205 * X[0];
-                let t207 = -t206;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t203, t207, T::zero()))
+                let t79 = self.fixed[5] * t8;
+                let t84 = t79 * X[1];
+                let t86 = t79 * X[0];
+                let t116 = -t86;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t84, t116, T::zero()))
             }
             crate::Surface::Upper(2) => {
                 let t7 = self.fixed[0] * t;
                 let t8 = t7.sin_pi();
                 let t11 = self.fixed[1] * t8;
-                let t66 = self.parameters.A * t8;
-                let t208 = t11.sin();
-                let t209 = t11.cos();
-                let t210 = t209 * X[0];
-                let t211 = t208 * X[1];
-                let t212 = t210 - t211;
-                let t213 = t208 * X[0];
-                let t214 = t209 * X[1];
-                let t215 = t213 + t214;
-                let t216 = t208 * t212;
-                let t217 = t209 * t215;
-                let t218 = t216 + t217;
-                let t219 = t66 * t218;
-                let t220 = -t219;
-                let t221 = t208 * t208;
-                let t222 = T::nearest(2.0) * t221;
-                let t223 = -t222;
-                let t224 = t223 + T::one();
-                let t225 = t208 * t209;
-                let t226 = T::nearest(2.0) * t225;
-                let t227 = -t226;
-                let t228 = t224 * t224;
-                let t229 = t227 * t226;
-                let t230 = t228 - t229;
-                let t231 = t230 / t230;
-                let t232 = self.fixed[4] * t231;
-                let t233 = t232 * t220;
-                let t234 = t208 * t215;
-                let t235 = t209 * t212;
-                let t236 = t234 - t235;
-                let t237 = t66 * t236;
-                let t238 = -t237;
-                let t239 = t232 * t238;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t233, t239, T::zero()))
+                let t79 = self.fixed[5] * t8;
+                let t117 = t11.cos();
+                let t118 = t11.sin();
+                let t119 = t117 * X[0];
+                let t120 = t118 * X[1];
+                let t121 = t119 - t120;
+                let t122 = t118 * t121;
+                let t123 = T::nearest(2.0) * t122;
+                let t124 = X[1] + t123;
+                let t125 = t79 * t124;
+                let t126 = -t125;
+                let t127 = t117 * X[1];
+                let t128 = t118 * X[0];
+                let t129 = t127 + t128;
+                let t130 = t118 * t129;
+                let t131 = T::nearest(2.0) * t130;
+                let t132 = X[0] - t131;
+                let t133 = t79 * t132;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t126, t133, T::zero()))
             }
             _ => None,
         }
@@ -802,8 +616,8 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
     fn domain(&self) -> crate::Domain<T, 3> {
         crate::Domain::Box {
             lower: crate::nalgebra::SVector::from([
-                self.fixed[10],
-                self.fixed[10],
+                self.fixed[11],
+                self.fixed[11],
                 T::zero(),
             ]),
             upper: crate::nalgebra::SVector::from([
@@ -846,7 +660,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
     }
     fn material(&self) -> crate::Material<T> {
         crate::Material::NeoHookean {
-            lambda: self.fixed[9],
+            lambda: self.fixed[10],
             mu: self.fixed[4],
         }
     }
@@ -857,7 +671,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[8]
+        self.fixed[9]
     }
     fn body_force_at(
         &self,
@@ -876,14 +690,14 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 4> for Torsion<T> {
         let t31 = t7.cos_pi();
         let t46 = t31 * t31;
         let t47 = self.parameters.A * t46;
-        let t113 = t8 * t8;
-        let t114 = self.fixed[6] * t113;
-        [t8, t11, t47, t114]
+        let t101 = t8 * t8;
+        let t102 = self.fixed[7] * t101;
+        [t8, t11, t47, t102]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 4] {
-        let t100 = self.fixed[5] * X[2];
-        [X[2], X[0], X[1], t100]
+        let t88 = self.fixed[6] * X[2];
+        [X[2], X[0], X[1], t88]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -913,15 +727,15 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 4> for Torsion<T> {
         let t56 = time[0] * t41;
         let t57 = t48 * t33;
         let t58 = t56 - t57;
-        let t101 = point[3] * t50;
-        let t109 = point[3] * t58;
-        let t115 = time[3] * t41;
-        let t116 = t101 - t115;
-        let t117 = self.fixed[7] * t116;
-        let t118 = time[3] * t33;
-        let t119 = t109 + t118;
-        let t120 = self.fixed[7] * t119;
-        crate::nalgebra::SVector::<T, 3>::new(t117, t120, T::zero())
+        let t89 = point[3] * t50;
+        let t97 = point[3] * t58;
+        let t103 = time[3] * t41;
+        let t104 = t89 - t103;
+        let t105 = self.fixed[8] * t104;
+        let t106 = time[3] * t33;
+        let t107 = t97 + t106;
+        let t108 = self.fixed[8] * t107;
+        crate::nalgebra::SVector::<T, 3>::new(t105, t108, T::zero())
     }
 }
 impl<T: crate::Real> From<Torsion<T>> for crate::AnySolution<T> {

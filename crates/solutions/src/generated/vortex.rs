@@ -38,7 +38,7 @@ impl<T: crate::Real> Default for VortexParameters<T> {
 pub struct Vortex<T: crate::Real> {
     parameters: VortexParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 19],
+    fixed: [T; 21],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Vortex<T> {
@@ -121,22 +121,24 @@ impl<T: crate::Real> Vortex<T> {
         let t82 = t81 / parameters.rho0;
         let t92 = T::nearest(64.0) * parameters.A;
         let t102 = T::nearest(32.0) * parameters.A;
-        let t159 = parameters.nu + T::one();
-        let t160 = T::nearest(0.5) * parameters.E;
-        let t161 = t160 / t159;
-        let t244 = T::nearest(2.0) * parameters.nu;
-        let t245 = T::one() - t244;
-        let t263 = t244 / t245;
-        let t272 = parameters.A * t79;
-        let t276 = T::nearest(2.0) / t159;
-        let t302 = T::nearest(128.0) * parameters.A;
-        let t335 = parameters.E * parameters.nu;
-        let t336 = t159 * t245;
-        let t337 = t335 / t336;
-        let t340 = T::one() / parameters.rho0;
-        let t353 = T::nearest(32.0) / t159;
-        let t358 = t80 / parameters.rho0;
-        let t368 = T::nearest(2.0) / t5;
+        let t146 = parameters.nu + T::one();
+        let t147 = T::nearest(0.5) * parameters.E;
+        let t148 = t147 / t146;
+        let t157 = T::nearest(128.0) * parameters.A;
+        let t158 = t157 * t148;
+        let t171 = t92 * t148;
+        let t193 = T::nearest(2.0) * parameters.nu;
+        let t194 = T::one() - t193;
+        let t212 = t193 / t194;
+        let t220 = parameters.A * t79;
+        let t224 = T::nearest(2.0) / t146;
+        let t285 = parameters.E * parameters.nu;
+        let t286 = t146 * t194;
+        let t287 = t285 / t286;
+        let t290 = T::one() / parameters.rho0;
+        let t302 = T::nearest(32.0) / t146;
+        let t307 = t80 / parameters.rho0;
+        let t317 = T::nearest(2.0) / t5;
         Ok(Vortex {
             parameters,
             fixed: [
@@ -149,16 +151,18 @@ impl<T: crate::Real> Vortex<T> {
                 t82,
                 t92,
                 t102,
-                t161,
-                t263,
-                t272,
-                t276,
+                t148,
+                t157,
+                t158,
+                t171,
+                t212,
+                t220,
+                t224,
+                t287,
+                t290,
                 t302,
-                t337,
-                t340,
-                t353,
-                t358,
-                t368,
+                t307,
+                t317,
             ],
         })
     }
@@ -501,99 +505,32 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t25 = t24.sin();
         let t26 = t24.cos();
         let t42 = t25 * t25;
-        let t43 = t26 * t26;
-        let t44 = t42 - t43;
         let t46 = t25 * t26;
-        let t93 = self.fixed[7] * t7;
-        let t94 = t13 * t15;
-        let t95 = t94 * t19;
-        let t96 = t93 * t95;
-        let t97 = t96 * t26;
-        let t98 = t25 + t97;
-        let t99 = t7 * t95;
-        let t100 = t99 * t44;
-        let t103 = self.fixed[8] * t100;
-        let t104 = t46 - t103;
         let t109 = X[0] * X[1];
         let t114 = T::one() / t12;
-        let t145 = t25 * t98;
-        let t146 = T::nearest(2.0) * t145;
-        let t147 = -t146;
-        let t148 = t147 + T::one();
         let t149 = T::nearest(2.0) * t42;
-        let t150 = -t149;
-        let t151 = t150 + T::one();
-        let t152 = T::nearest(2.0) * t46;
-        let t153 = -t152;
-        let t154 = T::nearest(2.0) * t104;
-        let t155 = t148 * t151;
-        let t156 = t153 * t154;
-        let t157 = t155 - t156;
-        let t162 = T::nearest(2.0) * t147;
-        let t163 = t147 * t147;
-        let t164 = t153 * t153;
-        let t165 = t162 + t163;
-        let t166 = t165 + t164;
-        let t167 = t153 * t151;
-        let t168 = t154 * t148;
-        let t169 = t167 + t168;
-        let t170 = t151 * t166;
-        let t171 = t153 * t169;
-        let t172 = t170 - t171;
-        let t173 = T::nearest(2.0) * t150;
-        let t174 = t154 * t154;
-        let t175 = t150 * t150;
-        let t176 = t173 + t174;
-        let t177 = t176 + t175;
-        let t178 = t154 * t169;
-        let t179 = t148 * t177;
-        let t180 = t178 - t179;
-        let t181 = t148 + t151;
-        let t182 = t169 * t181;
-        let t183 = t154 * t166;
-        let t184 = t153 * t177;
-        let t185 = t183 - t182;
-        let t186 = t185 + t184;
-        let t187 = t10 * t172;
-        let t188 = t11 * t180;
-        let t189 = t109 * t186;
-        let t190 = t187 - t188;
-        let t191 = t190 + t189;
-        let t192 = self.fixed[9] * t114;
-        let t193 = T::one() / t157;
-        let t194 = t191 * t193;
-        let t195 = t192 * t194;
-        let t196 = t148 * t169;
-        let t197 = t183 - t196;
-        let t198 = t151 * t169;
-        let t199 = t198 - t184;
-        let t200 = t152 + t154;
-        let t201 = -t200;
-        let t202 = t169 * t201;
-        let t203 = t170 - t202;
-        let t204 = t203 - t179;
-        let t205 = t10 * t197;
-        let t206 = t11 * t199;
-        let t207 = t109 * t204;
-        let t208 = t205 + t206;
-        let t209 = t208 - t207;
-        let t210 = t209 * t193;
-        let t211 = t192 * t210;
-        let t212 = -t211;
-        let t213 = t11 * t197;
-        let t214 = t10 * t199;
-        let t215 = t207 + t213;
-        let t216 = t215 + t214;
-        let t217 = t216 * t193;
-        let t218 = t192 * t217;
-        let t219 = t11 * t172;
-        let t220 = t10 * t180;
-        let t221 = t189 - t219;
-        let t222 = t221 + t220;
-        let t223 = t222 * t193;
-        let t224 = t192 * t223;
-        let t225 = -t224;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t195, t212, t218, t225)
+        let t150 = T::one() - t149;
+        let t151 = t10 - t11;
+        let t152 = t151 * t26;
+        let t153 = t25 * t152;
+        let t154 = t109 * t150;
+        let t155 = t153 + t154;
+        let t159 = self.fixed[11] * t7;
+        let t160 = t15 * t19;
+        let t161 = t13 * t114;
+        let t162 = t160 * t161;
+        let t163 = t159 * t162;
+        let t164 = t163 * t155;
+        let t165 = -t164;
+        let t166 = t150 * t151;
+        let t168 = T::nearest(4.0) * t109;
+        let t169 = t168 * t46;
+        let t170 = t169 - t166;
+        let t172 = self.fixed[12] * t7;
+        let t173 = t172 * t162;
+        let t174 = t173 * t170;
+        let t175 = -t174;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t165, t175, t175, t164)
     }
     #[inline]
     fn body_force(
@@ -645,149 +582,139 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t103 = self.fixed[8] * t100;
         let t104 = t46 - t103;
         let t114 = T::one() / t12;
-        let t145 = t25 * t98;
-        let t146 = T::nearest(2.0) * t145;
-        let t147 = -t146;
-        let t148 = t147 + T::one();
         let t149 = T::nearest(2.0) * t42;
-        let t150 = -t149;
-        let t151 = t150 + T::one();
-        let t152 = T::nearest(2.0) * t46;
-        let t153 = -t152;
-        let t154 = T::nearest(2.0) * t104;
-        let t155 = t148 * t151;
-        let t156 = t153 * t154;
-        let t157 = t155 - t156;
-        let t193 = T::one() / t157;
-        let t226 = T::nearest(2.0) * t13;
-        let t228 = T::nearest(3.0) * t15;
-        let t229 = t226 - t228;
-        let t230 = t19 * t229;
-        let t231 = t13 * t17;
-        let t232 = T::nearest(64.0) * t231;
-        let t233 = t232 - t230;
-        let t234 = t26 * t233;
-        let t235 = t231 * t21;
-        let t236 = t93 * t235;
-        let t237 = t236 * t25;
-        let t238 = t234 - t237;
-        let t239 = t15 * t19;
-        let t240 = t26 * t98;
-        let t241 = t239 * t240;
-        let t242 = t25 * t238;
-        let t243 = t241 + t242;
-        let t246 = self.fixed[8] * t7;
-        let t247 = t246 * t95;
-        let t248 = t247 * t26;
-        let t249 = t25 + t248;
-        let t250 = T::nearest(2.0) * t15;
-        let t251 = t13 - t250;
-        let t252 = t19 * t251;
-        let t253 = T::nearest(32.0) * t231;
-        let t254 = t253 - t252;
-        let t255 = t26 * t254;
-        let t256 = t246 * t235;
-        let t257 = t256 * t25;
-        let t258 = t255 - t257;
-        let t259 = t26 * t249;
-        let t260 = t239 * t259;
-        let t261 = t25 * t258;
-        let t262 = t260 + t261;
-        let t264 = self.fixed[10] * t262;
-        let t265 = t243 + t264;
-        let t266 = self.fixed[8] * t265;
-        let t267 = t7 * t266;
-        let t268 = t96 * t46;
-        let t269 = t13 * t114;
-        let t270 = t269 * t268;
-        let t271 = t267 + t270;
-        let t273 = t13 * t21;
-        let t274 = self.fixed[11] * t273;
-        let t275 = t274 * t69;
-        let t277 = self.fixed[12] * t271;
-        let t278 = t275 - t277;
-        let t279 = self.fixed[0] * t278;
-        let t280 = t93 * t239;
-        let t281 = t280 * t44;
-        let t282 = t13 - t15;
-        let t283 = t19 * t282;
-        let t284 = t253 - t283;
-        let t285 = t26 * t284;
-        let t286 = t285 - t237;
-        let t287 = t25 * t284;
-        let t288 = t236 * t26;
-        let t289 = t287 + t288;
-        let t290 = t239 * t44;
-        let t291 = t26 * t286;
-        let t292 = t25 * t289;
-        let t293 = t290 - t291;
-        let t294 = t293 + t292;
-        let t295 = t93 * t294;
-        let t296 = -t295;
-        let t297 = t93 * t243;
-        let t298 = -t297;
-        let t299 = t147 * t151;
-        let t300 = t156 - t299;
-        let t303 = self.fixed[13] * t7;
-        let t304 = t303 * t239;
-        let t305 = t304 * t46;
-        let t306 = -t305;
-        let t307 = t151 * t298;
-        let t308 = t154 * t281;
-        let t309 = t153 * t296;
-        let t310 = t147 * t306;
-        let t311 = t307 - t308;
-        let t312 = t311 - t309;
-        let t313 = t312 + t310;
-        let t314 = t147 * t300;
-        let t315 = t156 - t314;
-        let t316 = t148 * t306;
-        let t317 = t312 + t316;
-        let t318 = t150 * t148;
-        let t319 = t156 - t318;
-        let t320 = t150 * t319;
-        let t321 = t314 - t320;
-        let t322 = t298 * t300;
-        let t323 = t147 * t313;
-        let t324 = t315 * t317;
-        let t325 = t324 * t193;
-        let t326 = t269 * t321;
-        let t327 = t308 + t309;
-        let t328 = t327 - t322;
-        let t329 = t328 + t323;
-        let t330 = t329 - t325;
-        let t331 = t330 - t326;
-        let t332 = t306 * t319;
-        let t333 = t328 - t332;
-        let t334 = self.fixed[9] * t331;
-        let t338 = self.fixed[14] * t333;
-        let t339 = t334 + t338;
-        let t341 = t339 * t193;
-        let t342 = self.fixed[15] * t341;
-        let t343 = t342 - t279;
-        let t344 = t13 - t228;
-        let t345 = t19 * t344;
-        let t346 = t253 - t345;
-        let t347 = t44 * t346;
-        let t348 = t303 * t235;
-        let t349 = t348 * t46;
-        let t350 = t347 + t349;
-        let t351 = self.fixed[5] * t273;
-        let t352 = t351 * t75;
-        let t354 = self.fixed[16] * t7;
-        let t355 = t354 * t350;
-        let t356 = t352 + t355;
-        let t357 = X[0] * t343;
-        let t359 = self.fixed[17] * X[1];
-        let t360 = t359 * t356;
-        let t361 = t357 - t360;
-        let t362 = t269 * t361;
-        let t363 = X[1] * t343;
-        let t364 = self.fixed[17] * X[0];
-        let t365 = t364 * t356;
-        let t366 = t363 + t365;
-        let t367 = t269 * t366;
-        crate::nalgebra::SVector::<T, 2>::new(t362, t367)
+        let t160 = t15 * t19;
+        let t161 = t13 * t114;
+        let t176 = T::nearest(2.0) * t13;
+        let t178 = T::nearest(3.0) * t15;
+        let t179 = t176 - t178;
+        let t180 = t19 * t179;
+        let t181 = t13 * t17;
+        let t182 = T::nearest(64.0) * t181;
+        let t183 = t182 - t180;
+        let t184 = t26 * t183;
+        let t185 = t181 * t21;
+        let t186 = t93 * t185;
+        let t187 = t186 * t25;
+        let t188 = t184 - t187;
+        let t189 = t26 * t98;
+        let t190 = t160 * t189;
+        let t191 = t25 * t188;
+        let t192 = t190 + t191;
+        let t195 = self.fixed[8] * t7;
+        let t196 = t195 * t95;
+        let t197 = t196 * t26;
+        let t198 = t25 + t197;
+        let t199 = T::nearest(2.0) * t15;
+        let t200 = t13 - t199;
+        let t201 = t19 * t200;
+        let t202 = T::nearest(32.0) * t181;
+        let t203 = t202 - t201;
+        let t204 = t26 * t203;
+        let t205 = t195 * t185;
+        let t206 = t205 * t25;
+        let t207 = t204 - t206;
+        let t208 = t26 * t198;
+        let t209 = t160 * t208;
+        let t210 = t25 * t207;
+        let t211 = t209 + t210;
+        let t213 = self.fixed[13] * t211;
+        let t214 = t192 + t213;
+        let t215 = self.fixed[8] * t214;
+        let t216 = t7 * t215;
+        let t217 = t96 * t46;
+        let t218 = t161 * t217;
+        let t219 = t216 + t218;
+        let t221 = t13 * t21;
+        let t222 = self.fixed[14] * t221;
+        let t223 = t222 * t69;
+        let t225 = self.fixed[15] * t219;
+        let t226 = t223 - t225;
+        let t227 = self.fixed[0] * t226;
+        let t228 = T::nearest(2.0) * t104;
+        let t229 = t93 * t160;
+        let t230 = t229 * t44;
+        let t231 = T::nearest(2.0) * t46;
+        let t232 = -t231;
+        let t233 = t13 - t15;
+        let t234 = t19 * t233;
+        let t235 = t202 - t234;
+        let t236 = t26 * t235;
+        let t237 = t236 - t187;
+        let t238 = t25 * t235;
+        let t239 = t186 * t26;
+        let t240 = t238 + t239;
+        let t241 = t160 * t44;
+        let t242 = t26 * t237;
+        let t243 = t25 * t240;
+        let t244 = t241 - t242;
+        let t245 = t244 + t243;
+        let t246 = t93 * t245;
+        let t247 = -t246;
+        let t248 = t93 * t192;
+        let t249 = -t248;
+        let t250 = t25 * t98;
+        let t251 = T::nearest(2.0) * t250;
+        let t252 = -t251;
+        let t253 = -t149;
+        let t254 = t253 + T::one();
+        let t255 = t232 * t228;
+        let t256 = t252 * t254;
+        let t257 = t255 - t256;
+        let t258 = self.fixed[10] * t7;
+        let t259 = t258 * t160;
+        let t260 = t259 * t46;
+        let t261 = -t260;
+        let t262 = t254 * t249;
+        let t263 = t228 * t230;
+        let t264 = t232 * t247;
+        let t265 = t252 * t261;
+        let t266 = t262 - t263;
+        let t267 = t266 - t264;
+        let t268 = t267 + t265;
+        let t269 = t252 + T::one();
+        let t270 = t253 * t269;
+        let t271 = t255 - t270;
+        let t272 = t252 * t257;
+        let t273 = t253 * t271;
+        let t274 = t272 - t273;
+        let t275 = t249 * t257;
+        let t276 = t252 * t268;
+        let t277 = t161 * t274;
+        let t278 = t263 + t264;
+        let t279 = t278 - t275;
+        let t280 = t279 + t276;
+        let t281 = t280 - t277;
+        let t282 = t261 * t271;
+        let t283 = t279 - t282;
+        let t284 = self.fixed[9] * t281;
+        let t288 = self.fixed[16] * t283;
+        let t289 = t284 + t288;
+        let t291 = self.fixed[17] * t289;
+        let t292 = t291 - t227;
+        let t293 = t13 - t178;
+        let t294 = t19 * t293;
+        let t295 = t202 - t294;
+        let t296 = t44 * t295;
+        let t297 = t258 * t185;
+        let t298 = t297 * t46;
+        let t299 = t296 + t298;
+        let t300 = self.fixed[5] * t221;
+        let t301 = t300 * t75;
+        let t303 = self.fixed[18] * t7;
+        let t304 = t303 * t299;
+        let t305 = t301 + t304;
+        let t306 = X[0] * t292;
+        let t308 = self.fixed[19] * X[1];
+        let t309 = t308 * t305;
+        let t310 = t306 - t309;
+        let t311 = t161 * t310;
+        let t312 = X[1] * t292;
+        let t313 = self.fixed[19] * X[0];
+        let t314 = t313 * t305;
+        let t315 = t312 + t314;
+        let t316 = t161 * t315;
+        crate::nalgebra::SVector::<T, 2>::new(t311, t316)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t6 = self.fixed[1] * t;
@@ -910,211 +837,157 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t142 = -t141;
         let t143 = T::one() - t116;
         let t144 = T::one() - t141;
-        let t145 = t25 * t98;
-        let t146 = T::nearest(2.0) * t145;
-        let t147 = -t146;
-        let t148 = t147 + T::one();
         let t149 = T::nearest(2.0) * t42;
-        let t150 = -t149;
-        let t151 = t150 + T::one();
-        let t152 = T::nearest(2.0) * t46;
-        let t153 = -t152;
-        let t154 = T::nearest(2.0) * t104;
-        let t155 = t148 * t151;
-        let t156 = t153 * t154;
-        let t157 = t155 - t156;
-        let t162 = T::nearest(2.0) * t147;
-        let t163 = t147 * t147;
-        let t164 = t153 * t153;
-        let t165 = t162 + t163;
-        let t166 = t165 + t164;
-        let t167 = t153 * t151;
-        let t168 = t154 * t148;
-        let t169 = t167 + t168;
-        let t170 = t151 * t166;
-        let t171 = t153 * t169;
-        let t172 = t170 - t171;
-        let t173 = T::nearest(2.0) * t150;
-        let t174 = t154 * t154;
-        let t175 = t150 * t150;
-        let t176 = t173 + t174;
-        let t177 = t176 + t175;
-        let t178 = t154 * t169;
-        let t179 = t148 * t177;
-        let t180 = t178 - t179;
-        let t181 = t148 + t151;
-        let t182 = t169 * t181;
-        let t183 = t154 * t166;
-        let t184 = t153 * t177;
-        let t185 = t183 - t182;
-        let t186 = t185 + t184;
-        let t187 = t10 * t172;
-        let t188 = t11 * t180;
-        let t189 = t109 * t186;
-        let t190 = t187 - t188;
-        let t191 = t190 + t189;
-        let t192 = self.fixed[9] * t114;
-        let t193 = T::one() / t157;
-        let t194 = t191 * t193;
-        let t195 = t192 * t194;
-        let t196 = t148 * t169;
-        let t197 = t183 - t196;
-        let t198 = t151 * t169;
-        let t199 = t198 - t184;
-        let t200 = t152 + t154;
-        let t201 = -t200;
-        let t202 = t169 * t201;
-        let t203 = t170 - t202;
-        let t204 = t203 - t179;
-        let t205 = t10 * t197;
-        let t206 = t11 * t199;
-        let t207 = t109 * t204;
-        let t208 = t205 + t206;
-        let t209 = t208 - t207;
-        let t210 = t209 * t193;
-        let t211 = t192 * t210;
-        let t212 = -t211;
-        let t213 = t11 * t197;
-        let t214 = t10 * t199;
-        let t215 = t207 + t213;
-        let t216 = t215 + t214;
-        let t217 = t216 * t193;
-        let t218 = t192 * t217;
-        let t219 = t11 * t172;
-        let t220 = t10 * t180;
-        let t221 = t189 - t219;
-        let t222 = t221 + t220;
-        let t223 = t222 * t193;
-        let t224 = t192 * t223;
-        let t225 = -t224;
-        let t226 = T::nearest(2.0) * t13;
-        let t228 = T::nearest(3.0) * t15;
-        let t229 = t226 - t228;
-        let t230 = t19 * t229;
-        let t231 = t13 * t17;
-        let t232 = T::nearest(64.0) * t231;
-        let t233 = t232 - t230;
-        let t234 = t26 * t233;
-        let t235 = t231 * t21;
-        let t236 = t93 * t235;
-        let t237 = t236 * t25;
-        let t238 = t234 - t237;
-        let t239 = t15 * t19;
-        let t240 = t26 * t98;
-        let t241 = t239 * t240;
-        let t242 = t25 * t238;
-        let t243 = t241 + t242;
-        let t246 = self.fixed[8] * t7;
-        let t247 = t246 * t95;
-        let t248 = t247 * t26;
-        let t249 = t25 + t248;
-        let t250 = T::nearest(2.0) * t15;
-        let t251 = t13 - t250;
-        let t252 = t19 * t251;
-        let t253 = T::nearest(32.0) * t231;
-        let t254 = t253 - t252;
-        let t255 = t26 * t254;
-        let t256 = t246 * t235;
-        let t257 = t256 * t25;
-        let t258 = t255 - t257;
-        let t259 = t26 * t249;
-        let t260 = t239 * t259;
-        let t261 = t25 * t258;
-        let t262 = t260 + t261;
-        let t264 = self.fixed[10] * t262;
-        let t265 = t243 + t264;
-        let t266 = self.fixed[8] * t265;
-        let t267 = t7 * t266;
-        let t268 = t96 * t46;
-        let t269 = t13 * t114;
-        let t270 = t269 * t268;
-        let t271 = t267 + t270;
-        let t273 = t13 * t21;
-        let t274 = self.fixed[11] * t273;
-        let t275 = t274 * t69;
-        let t277 = self.fixed[12] * t271;
-        let t278 = t275 - t277;
-        let t279 = self.fixed[0] * t278;
-        let t280 = t93 * t239;
-        let t281 = t280 * t44;
-        let t282 = t13 - t15;
-        let t283 = t19 * t282;
-        let t284 = t253 - t283;
-        let t285 = t26 * t284;
-        let t286 = t285 - t237;
-        let t287 = t25 * t284;
-        let t288 = t236 * t26;
-        let t289 = t287 + t288;
-        let t290 = t239 * t44;
-        let t291 = t26 * t286;
-        let t292 = t25 * t289;
-        let t293 = t290 - t291;
-        let t294 = t293 + t292;
-        let t295 = t93 * t294;
-        let t296 = -t295;
-        let t297 = t93 * t243;
-        let t298 = -t297;
-        let t299 = t147 * t151;
-        let t300 = t156 - t299;
-        let t303 = self.fixed[13] * t7;
-        let t304 = t303 * t239;
-        let t305 = t304 * t46;
-        let t306 = -t305;
-        let t307 = t151 * t298;
-        let t308 = t154 * t281;
-        let t309 = t153 * t296;
-        let t310 = t147 * t306;
-        let t311 = t307 - t308;
-        let t312 = t311 - t309;
-        let t313 = t312 + t310;
-        let t314 = t147 * t300;
-        let t315 = t156 - t314;
-        let t316 = t148 * t306;
-        let t317 = t312 + t316;
-        let t318 = t150 * t148;
-        let t319 = t156 - t318;
-        let t320 = t150 * t319;
-        let t321 = t314 - t320;
-        let t322 = t298 * t300;
-        let t323 = t147 * t313;
-        let t324 = t315 * t317;
-        let t325 = t324 * t193;
-        let t326 = t269 * t321;
-        let t327 = t308 + t309;
-        let t328 = t327 - t322;
-        let t329 = t328 + t323;
-        let t330 = t329 - t325;
-        let t331 = t330 - t326;
-        let t332 = t306 * t319;
-        let t333 = t328 - t332;
-        let t334 = self.fixed[9] * t331;
-        let t338 = self.fixed[14] * t333;
-        let t339 = t334 + t338;
-        let t341 = t339 * t193;
-        let t342 = self.fixed[15] * t341;
-        let t343 = t342 - t279;
-        let t344 = t13 - t228;
-        let t345 = t19 * t344;
-        let t346 = t253 - t345;
-        let t347 = t44 * t346;
-        let t348 = t303 * t235;
-        let t349 = t348 * t46;
-        let t350 = t347 + t349;
-        let t351 = self.fixed[5] * t273;
-        let t352 = t351 * t75;
-        let t354 = self.fixed[16] * t7;
-        let t355 = t354 * t350;
-        let t356 = t352 + t355;
-        let t357 = X[0] * t343;
-        let t359 = self.fixed[17] * X[1];
-        let t360 = t359 * t356;
-        let t361 = t357 - t360;
-        let t362 = t269 * t361;
-        let t363 = X[1] * t343;
-        let t364 = self.fixed[17] * X[0];
-        let t365 = t364 * t356;
-        let t366 = t363 + t365;
-        let t367 = t269 * t366;
+        let t150 = T::one() - t149;
+        let t151 = t10 - t11;
+        let t152 = t151 * t26;
+        let t153 = t25 * t152;
+        let t154 = t109 * t150;
+        let t155 = t153 + t154;
+        let t159 = self.fixed[11] * t7;
+        let t160 = t15 * t19;
+        let t161 = t13 * t114;
+        let t162 = t160 * t161;
+        let t163 = t159 * t162;
+        let t164 = t163 * t155;
+        let t165 = -t164;
+        let t166 = t150 * t151;
+        let t168 = T::nearest(4.0) * t109;
+        let t169 = t168 * t46;
+        let t170 = t169 - t166;
+        let t172 = self.fixed[12] * t7;
+        let t173 = t172 * t162;
+        let t174 = t173 * t170;
+        let t175 = -t174;
+        let t176 = T::nearest(2.0) * t13;
+        let t178 = T::nearest(3.0) * t15;
+        let t179 = t176 - t178;
+        let t180 = t19 * t179;
+        let t181 = t13 * t17;
+        let t182 = T::nearest(64.0) * t181;
+        let t183 = t182 - t180;
+        let t184 = t26 * t183;
+        let t185 = t181 * t21;
+        let t186 = t93 * t185;
+        let t187 = t186 * t25;
+        let t188 = t184 - t187;
+        let t189 = t26 * t98;
+        let t190 = t160 * t189;
+        let t191 = t25 * t188;
+        let t192 = t190 + t191;
+        let t195 = self.fixed[8] * t7;
+        let t196 = t195 * t95;
+        let t197 = t196 * t26;
+        let t198 = t25 + t197;
+        let t199 = T::nearest(2.0) * t15;
+        let t200 = t13 - t199;
+        let t201 = t19 * t200;
+        let t202 = T::nearest(32.0) * t181;
+        let t203 = t202 - t201;
+        let t204 = t26 * t203;
+        let t205 = t195 * t185;
+        let t206 = t205 * t25;
+        let t207 = t204 - t206;
+        let t208 = t26 * t198;
+        let t209 = t160 * t208;
+        let t210 = t25 * t207;
+        let t211 = t209 + t210;
+        let t213 = self.fixed[13] * t211;
+        let t214 = t192 + t213;
+        let t215 = self.fixed[8] * t214;
+        let t216 = t7 * t215;
+        let t217 = t96 * t46;
+        let t218 = t161 * t217;
+        let t219 = t216 + t218;
+        let t221 = t13 * t21;
+        let t222 = self.fixed[14] * t221;
+        let t223 = t222 * t69;
+        let t225 = self.fixed[15] * t219;
+        let t226 = t223 - t225;
+        let t227 = self.fixed[0] * t226;
+        let t228 = T::nearest(2.0) * t104;
+        let t229 = t93 * t160;
+        let t230 = t229 * t44;
+        let t231 = T::nearest(2.0) * t46;
+        let t232 = -t231;
+        let t233 = t13 - t15;
+        let t234 = t19 * t233;
+        let t235 = t202 - t234;
+        let t236 = t26 * t235;
+        let t237 = t236 - t187;
+        let t238 = t25 * t235;
+        let t239 = t186 * t26;
+        let t240 = t238 + t239;
+        let t241 = t160 * t44;
+        let t242 = t26 * t237;
+        let t243 = t25 * t240;
+        let t244 = t241 - t242;
+        let t245 = t244 + t243;
+        let t246 = t93 * t245;
+        let t247 = -t246;
+        let t248 = t93 * t192;
+        let t249 = -t248;
+        let t250 = t25 * t98;
+        let t251 = T::nearest(2.0) * t250;
+        let t252 = -t251;
+        let t253 = -t149;
+        let t254 = t253 + T::one();
+        let t255 = t232 * t228;
+        let t256 = t252 * t254;
+        let t257 = t255 - t256;
+        let t258 = self.fixed[10] * t7;
+        let t259 = t258 * t160;
+        let t260 = t259 * t46;
+        let t261 = -t260;
+        let t262 = t254 * t249;
+        let t263 = t228 * t230;
+        let t264 = t232 * t247;
+        let t265 = t252 * t261;
+        let t266 = t262 - t263;
+        let t267 = t266 - t264;
+        let t268 = t267 + t265;
+        let t269 = t252 + T::one();
+        let t270 = t253 * t269;
+        let t271 = t255 - t270;
+        let t272 = t252 * t257;
+        let t273 = t253 * t271;
+        let t274 = t272 - t273;
+        let t275 = t249 * t257;
+        let t276 = t252 * t268;
+        let t277 = t161 * t274;
+        let t278 = t263 + t264;
+        let t279 = t278 - t275;
+        let t280 = t279 + t276;
+        let t281 = t280 - t277;
+        let t282 = t261 * t271;
+        let t283 = t279 - t282;
+        let t284 = self.fixed[9] * t281;
+        let t288 = self.fixed[16] * t283;
+        let t289 = t284 + t288;
+        let t291 = self.fixed[17] * t289;
+        let t292 = t291 - t227;
+        let t293 = t13 - t178;
+        let t294 = t19 * t293;
+        let t295 = t202 - t294;
+        let t296 = t44 * t295;
+        let t297 = t258 * t185;
+        let t298 = t297 * t46;
+        let t299 = t296 + t298;
+        let t300 = self.fixed[5] * t221;
+        let t301 = t300 * t75;
+        let t303 = self.fixed[18] * t7;
+        let t304 = t303 * t299;
+        let t305 = t301 + t304;
+        let t306 = X[0] * t292;
+        let t308 = self.fixed[19] * X[1];
+        let t309 = t308 * t305;
+        let t310 = t306 - t309;
+        let t311 = t161 * t310;
+        let t312 = X[1] * t292;
+        let t313 = self.fixed[19] * X[0];
+        let t314 = t313 * t305;
+        let t315 = t312 + t314;
+        let t316 = t161 * t315;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t33, t39),
             v: crate::nalgebra::SVector::<T, 2>::new(t55, t61),
@@ -1122,8 +995,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
             H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t117, t127, t135, t142),
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t143, t127, t135, t144),
             J: T::one(),
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t195, t212, t218, t225),
-            b: crate::nalgebra::SVector::<T, 2>::new(t362, t367),
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t165, t175, t175, t164),
+            b: crate::nalgebra::SVector::<T, 2>::new(t311, t316),
         }
     }
     fn traction(
@@ -1156,61 +1029,22 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
                 let t25 = t24.sin();
                 let t26 = t24.cos();
                 let t42 = t25 * t25;
-                let t43 = t26 * t26;
-                let t44 = t42 - t43;
                 let t46 = t25 * t26;
-                let t93 = self.fixed[7] * t7;
-                let t94 = t13 * t15;
-                let t95 = t94 * t19;
-                let t96 = t93 * t95;
-                let t97 = t96 * t26;
-                let t98 = t25 + t97;
-                let t99 = t7 * t95;
-                let t100 = t99 * t44;
-                let t103 = self.fixed[8] * t100;
-                let t104 = t46 - t103;
                 let t114 = T::one() / t12;
-                let t145 = t25 * t98;
-                let t146 = T::nearest(2.0) * t145;
-                let t147 = -t146;
-                let t148 = t147 + T::one();
                 let t149 = T::nearest(2.0) * t42;
-                let t150 = -t149;
-                let t151 = t150 + T::one();
-                let t152 = T::nearest(2.0) * t46;
-                let t153 = -t152;
-                let t154 = T::nearest(2.0) * t104;
-                let t155 = t148 * t151;
-                let t156 = t153 * t154;
-                let t157 = t155 - t156;
-                let t162 = T::nearest(2.0) * t147;
-                let t163 = t147 * t147;
-                let t164 = t153 * t153;
-                let t165 = t162 + t163;
-                let t166 = t165 + t164;
-                let t167 = t153 * t151;
-                let t168 = t154 * t148;
-                let t169 = t167 + t168;
-                let t173 = T::nearest(2.0) * t150;
-                let t174 = t154 * t154;
-                let t175 = t150 * t150;
-                let t176 = t173 + t174;
-                let t177 = t176 + t175;
-                let t178 = t154 * t169;
-                let t179 = t148 * t177;
-                let t180 = t178 - t179;
-                let t183 = t154 * t166;
-                let t193 = T::one() / t157;
-                let t196 = t148 * t169;
-                let t197 = t183 - t196;
-                let t372 = t11 * t114;
-                let t373 = self.fixed[9] * t372;
-                let t374 = t180 * t193;
-                let t375 = t373 * t374;
-                let t376 = t197 * t193;
-                let t377 = t373 * t376;
-                let t378 = -t377;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t375, t378))
+                let t150 = T::one() - t149;
+                let t159 = self.fixed[11] * t7;
+                let t160 = t15 * t19;
+                let t161 = t13 * t114;
+                let t172 = self.fixed[12] * t7;
+                let t321 = t160 * t11;
+                let t322 = t321 * t161;
+                let t323 = t159 * t322;
+                let t324 = t323 * t46;
+                let t325 = -t324;
+                let t326 = t172 * t322;
+                let t327 = t326 * t150;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t325, t327))
             }
             crate::Surface::Lower(1) => {
                 let t6 = self.fixed[1] * t;
@@ -1229,60 +1063,23 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
                 let t25 = t24.sin();
                 let t26 = t24.cos();
                 let t42 = t25 * t25;
-                let t43 = t26 * t26;
-                let t44 = t42 - t43;
                 let t46 = t25 * t26;
-                let t93 = self.fixed[7] * t7;
-                let t94 = t13 * t15;
-                let t95 = t94 * t19;
-                let t96 = t93 * t95;
-                let t97 = t96 * t26;
-                let t98 = t25 + t97;
-                let t99 = t7 * t95;
-                let t100 = t99 * t44;
-                let t103 = self.fixed[8] * t100;
-                let t104 = t46 - t103;
                 let t114 = T::one() / t12;
-                let t145 = t25 * t98;
-                let t146 = T::nearest(2.0) * t145;
-                let t147 = -t146;
-                let t148 = t147 + T::one();
                 let t149 = T::nearest(2.0) * t42;
-                let t150 = -t149;
-                let t151 = t150 + T::one();
-                let t152 = T::nearest(2.0) * t46;
-                let t153 = -t152;
-                let t154 = T::nearest(2.0) * t104;
-                let t155 = t148 * t151;
-                let t156 = t153 * t154;
-                let t157 = t155 - t156;
-                let t162 = T::nearest(2.0) * t147;
-                let t163 = t147 * t147;
-                let t164 = t153 * t153;
-                let t165 = t162 + t163;
-                let t166 = t165 + t164;
-                let t167 = t153 * t151;
-                let t168 = t154 * t148;
-                let t169 = t167 + t168;
-                let t173 = T::nearest(2.0) * t150;
-                let t174 = t154 * t154;
-                let t175 = t150 * t150;
-                let t176 = t173 + t174;
-                let t177 = t176 + t175;
-                let t178 = t154 * t169;
-                let t179 = t148 * t177;
-                let t180 = t178 - t179;
-                let t183 = t154 * t166;
-                let t193 = T::one() / t157;
-                let t196 = t148 * t169;
-                let t197 = t183 - t196;
-                let t374 = t180 * t193;
-                let t376 = t197 * t193;
-                let t379 = t10 * t114;
-                let t380 = self.fixed[9] * t379;
-                let t381 = t380 * t376;
-                let t382 = t380 * t374;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t381, t382))
+                let t150 = T::one() - t149;
+                let t159 = self.fixed[11] * t7;
+                let t160 = t15 * t19;
+                let t161 = t13 * t114;
+                let t172 = self.fixed[12] * t7;
+                let t328 = t160 * t10;
+                let t329 = t328 * t161;
+                let t330 = t172 * t329;
+                let t331 = t330 * t150;
+                let t332 = -t331;
+                let t333 = t159 * t329;
+                let t334 = t333 * t46;
+                let t335 = -t334;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t332, t335))
             }
             _ => None,
         }
@@ -1310,7 +1107,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
     }
     fn material(&self) -> crate::Material<T> {
         crate::Material::NeoHookean {
-            lambda: self.fixed[14],
+            lambda: self.fixed[16],
             mu: self.fixed[9],
         }
     }
@@ -1321,7 +1118,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         self.fixed[1]
     }
     fn period(&self) -> T {
-        self.fixed[18]
+        self.fixed[20]
     }
     fn body_force_at(
         &self,
@@ -1342,10 +1139,10 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 15> for Vortex<T> {
         let t66 = T::nearest(2.0) * t7;
         let t72 = self.fixed[4] * t62;
         let t93 = self.fixed[7] * t7;
-        let t246 = self.fixed[8] * t7;
-        let t303 = self.fixed[13] * t7;
-        let t354 = self.fixed[16] * t7;
-        [t7, t23, t62, t66, t72, t93, t246, t303, t354]
+        let t195 = self.fixed[8] * t7;
+        let t258 = self.fixed[10] * t7;
+        let t303 = self.fixed[18] * t7;
+        [t7, t23, t62, t66, t72, t93, t195, t258, t303]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 15] {
@@ -1361,48 +1158,48 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 15> for Vortex<T> {
         let t94 = t13 * t15;
         let t95 = t94 * t19;
         let t114 = T::one() / t12;
-        let t226 = T::nearest(2.0) * t13;
-        let t228 = T::nearest(3.0) * t15;
-        let t229 = t226 - t228;
-        let t230 = t19 * t229;
-        let t231 = t13 * t17;
-        let t232 = T::nearest(64.0) * t231;
-        let t233 = t232 - t230;
-        let t235 = t231 * t21;
-        let t239 = t15 * t19;
-        let t250 = T::nearest(2.0) * t15;
-        let t251 = t13 - t250;
-        let t252 = t19 * t251;
-        let t253 = T::nearest(32.0) * t231;
-        let t254 = t253 - t252;
-        let t269 = t13 * t114;
-        let t273 = t13 * t21;
-        let t274 = self.fixed[11] * t273;
-        let t282 = t13 - t15;
-        let t283 = t19 * t282;
-        let t284 = t253 - t283;
-        let t344 = t13 - t228;
-        let t345 = t19 * t344;
-        let t346 = t253 - t345;
-        let t351 = self.fixed[5] * t273;
-        let t359 = self.fixed[17] * X[1];
-        let t364 = self.fixed[17] * X[0];
+        let t160 = t15 * t19;
+        let t161 = t13 * t114;
+        let t176 = T::nearest(2.0) * t13;
+        let t178 = T::nearest(3.0) * t15;
+        let t179 = t176 - t178;
+        let t180 = t19 * t179;
+        let t181 = t13 * t17;
+        let t182 = T::nearest(64.0) * t181;
+        let t183 = t182 - t180;
+        let t185 = t181 * t21;
+        let t199 = T::nearest(2.0) * t15;
+        let t200 = t13 - t199;
+        let t201 = t19 * t200;
+        let t202 = T::nearest(32.0) * t181;
+        let t203 = t202 - t201;
+        let t221 = t13 * t21;
+        let t222 = self.fixed[14] * t221;
+        let t233 = t13 - t15;
+        let t234 = t19 * t233;
+        let t235 = t202 - t234;
+        let t293 = t13 - t178;
+        let t294 = t19 * t293;
+        let t295 = t202 - t294;
+        let t300 = self.fixed[5] * t221;
+        let t308 = self.fixed[19] * X[1];
+        let t313 = self.fixed[19] * X[0];
         [
             X[0],
             X[1],
             t21,
             t95,
-            t233,
+            t160,
+            t161,
+            t183,
+            t185,
+            t203,
+            t222,
             t235,
-            t239,
-            t254,
-            t269,
-            t274,
-            t284,
-            t346,
-            t351,
-            t359,
-            t364,
+            t295,
+            t300,
+            t308,
+            t313,
         ]
     }
     #[inline(always)]
@@ -1435,120 +1232,110 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 15> for Vortex<T> {
         let t100 = t99 * t44;
         let t103 = self.fixed[8] * t100;
         let t104 = t46 - t103;
-        let t145 = t25 * t98;
-        let t146 = T::nearest(2.0) * t145;
-        let t147 = -t146;
-        let t148 = t147 + T::one();
         let t149 = T::nearest(2.0) * t42;
-        let t150 = -t149;
-        let t151 = t150 + T::one();
-        let t152 = T::nearest(2.0) * t46;
-        let t153 = -t152;
-        let t154 = T::nearest(2.0) * t104;
-        let t155 = t148 * t151;
-        let t156 = t153 * t154;
-        let t157 = t155 - t156;
-        let t193 = T::one() / t157;
-        let t234 = t26 * point[4];
-        let t236 = time[5] * point[5];
-        let t237 = t236 * t25;
-        let t238 = t234 - t237;
-        let t240 = t26 * t98;
-        let t241 = point[6] * t240;
-        let t242 = t25 * t238;
-        let t243 = t241 + t242;
-        let t247 = time[6] * point[3];
-        let t248 = t247 * t26;
-        let t249 = t25 + t248;
-        let t255 = t26 * point[7];
-        let t256 = time[6] * point[5];
-        let t257 = t256 * t25;
-        let t258 = t255 - t257;
-        let t259 = t26 * t249;
-        let t260 = point[6] * t259;
-        let t261 = t25 * t258;
-        let t262 = t260 + t261;
-        let t264 = self.fixed[10] * t262;
-        let t265 = t243 + t264;
-        let t266 = self.fixed[8] * t265;
-        let t267 = time[0] * t266;
-        let t268 = t96 * t46;
-        let t270 = point[8] * t268;
-        let t271 = t267 + t270;
-        let t275 = point[9] * t69;
-        let t277 = self.fixed[12] * t271;
-        let t278 = t275 - t277;
-        let t279 = self.fixed[0] * t278;
-        let t280 = time[5] * point[6];
-        let t281 = t280 * t44;
-        let t285 = t26 * point[10];
-        let t286 = t285 - t237;
-        let t287 = t25 * point[10];
-        let t288 = t236 * t26;
-        let t289 = t287 + t288;
-        let t290 = point[6] * t44;
-        let t291 = t26 * t286;
-        let t292 = t25 * t289;
-        let t293 = t290 - t291;
-        let t294 = t293 + t292;
-        let t295 = time[5] * t294;
-        let t296 = -t295;
-        let t297 = time[5] * t243;
-        let t298 = -t297;
-        let t299 = t147 * t151;
-        let t300 = t156 - t299;
-        let t304 = time[7] * point[6];
-        let t305 = t304 * t46;
-        let t306 = -t305;
-        let t307 = t151 * t298;
-        let t308 = t154 * t281;
-        let t309 = t153 * t296;
-        let t310 = t147 * t306;
-        let t311 = t307 - t308;
-        let t312 = t311 - t309;
-        let t313 = t312 + t310;
-        let t314 = t147 * t300;
-        let t315 = t156 - t314;
-        let t316 = t148 * t306;
-        let t317 = t312 + t316;
-        let t318 = t150 * t148;
-        let t319 = t156 - t318;
-        let t320 = t150 * t319;
-        let t321 = t314 - t320;
-        let t322 = t298 * t300;
-        let t323 = t147 * t313;
-        let t324 = t315 * t317;
-        let t325 = t324 * t193;
-        let t326 = point[8] * t321;
-        let t327 = t308 + t309;
-        let t328 = t327 - t322;
-        let t329 = t328 + t323;
-        let t330 = t329 - t325;
-        let t331 = t330 - t326;
-        let t332 = t306 * t319;
-        let t333 = t328 - t332;
-        let t334 = self.fixed[9] * t331;
-        let t338 = self.fixed[14] * t333;
-        let t339 = t334 + t338;
-        let t341 = t339 * t193;
-        let t342 = self.fixed[15] * t341;
-        let t343 = t342 - t279;
-        let t347 = t44 * point[11];
-        let t348 = time[7] * point[5];
-        let t349 = t348 * t46;
-        let t350 = t347 + t349;
-        let t352 = point[12] * t75;
-        let t355 = time[8] * t350;
-        let t356 = t352 + t355;
-        let t357 = point[0] * t343;
-        let t360 = point[13] * t356;
-        let t361 = t357 - t360;
-        let t362 = point[8] * t361;
-        let t363 = point[1] * t343;
-        let t365 = point[14] * t356;
-        let t366 = t363 + t365;
-        let t367 = point[8] * t366;
-        crate::nalgebra::SVector::<T, 2>::new(t362, t367)
+        let t184 = t26 * point[6];
+        let t186 = time[5] * point[7];
+        let t187 = t186 * t25;
+        let t188 = t184 - t187;
+        let t189 = t26 * t98;
+        let t190 = point[4] * t189;
+        let t191 = t25 * t188;
+        let t192 = t190 + t191;
+        let t196 = time[6] * point[3];
+        let t197 = t196 * t26;
+        let t198 = t25 + t197;
+        let t204 = t26 * point[8];
+        let t205 = time[6] * point[7];
+        let t206 = t205 * t25;
+        let t207 = t204 - t206;
+        let t208 = t26 * t198;
+        let t209 = point[4] * t208;
+        let t210 = t25 * t207;
+        let t211 = t209 + t210;
+        let t213 = self.fixed[13] * t211;
+        let t214 = t192 + t213;
+        let t215 = self.fixed[8] * t214;
+        let t216 = time[0] * t215;
+        let t217 = t96 * t46;
+        let t218 = point[5] * t217;
+        let t219 = t216 + t218;
+        let t223 = point[9] * t69;
+        let t225 = self.fixed[15] * t219;
+        let t226 = t223 - t225;
+        let t227 = self.fixed[0] * t226;
+        let t228 = T::nearest(2.0) * t104;
+        let t229 = time[5] * point[4];
+        let t230 = t229 * t44;
+        let t231 = T::nearest(2.0) * t46;
+        let t232 = -t231;
+        let t236 = t26 * point[10];
+        let t237 = t236 - t187;
+        let t238 = t25 * point[10];
+        let t239 = t186 * t26;
+        let t240 = t238 + t239;
+        let t241 = point[4] * t44;
+        let t242 = t26 * t237;
+        let t243 = t25 * t240;
+        let t244 = t241 - t242;
+        let t245 = t244 + t243;
+        let t246 = time[5] * t245;
+        let t247 = -t246;
+        let t248 = time[5] * t192;
+        let t249 = -t248;
+        let t250 = t25 * t98;
+        let t251 = T::nearest(2.0) * t250;
+        let t252 = -t251;
+        let t253 = -t149;
+        let t254 = t253 + T::one();
+        let t255 = t232 * t228;
+        let t256 = t252 * t254;
+        let t257 = t255 - t256;
+        let t259 = time[7] * point[4];
+        let t260 = t259 * t46;
+        let t261 = -t260;
+        let t262 = t254 * t249;
+        let t263 = t228 * t230;
+        let t264 = t232 * t247;
+        let t265 = t252 * t261;
+        let t266 = t262 - t263;
+        let t267 = t266 - t264;
+        let t268 = t267 + t265;
+        let t269 = t252 + T::one();
+        let t270 = t253 * t269;
+        let t271 = t255 - t270;
+        let t272 = t252 * t257;
+        let t273 = t253 * t271;
+        let t274 = t272 - t273;
+        let t275 = t249 * t257;
+        let t276 = t252 * t268;
+        let t277 = point[5] * t274;
+        let t278 = t263 + t264;
+        let t279 = t278 - t275;
+        let t280 = t279 + t276;
+        let t281 = t280 - t277;
+        let t282 = t261 * t271;
+        let t283 = t279 - t282;
+        let t284 = self.fixed[9] * t281;
+        let t288 = self.fixed[16] * t283;
+        let t289 = t284 + t288;
+        let t291 = self.fixed[17] * t289;
+        let t292 = t291 - t227;
+        let t296 = t44 * point[11];
+        let t297 = time[7] * point[7];
+        let t298 = t297 * t46;
+        let t299 = t296 + t298;
+        let t301 = point[12] * t75;
+        let t304 = time[8] * t299;
+        let t305 = t301 + t304;
+        let t306 = point[0] * t292;
+        let t309 = point[13] * t305;
+        let t310 = t306 - t309;
+        let t311 = point[5] * t310;
+        let t312 = point[1] * t292;
+        let t314 = point[14] * t305;
+        let t315 = t312 + t314;
+        let t316 = point[5] * t315;
+        crate::nalgebra::SVector::<T, 2>::new(t311, t316)
     }
 }
 impl<T: crate::Real> From<Vortex<T>> for crate::AnySolution<T> {

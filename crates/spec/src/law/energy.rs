@@ -108,7 +108,8 @@ impl ComponentLaw {
             remainder.push(derivation.graph.sum_of(second));
         }
         let energy = self.energy.map(|energy| derivation.graph.replace(energy, &actual));
-        Stress { P, linear, remainder, energy }
+        let anisotropic = P.clone();
+        Stress { P, isotropic: Graph::ZERO, anisotropic, linear, remainder, energy }
     }
 }
 

@@ -22,9 +22,15 @@ pub(super) fn stress(
     let graph = &mut derivation.graph;
     let (lambda, mu) = (graph.whole(lambda), graph.whole(mu));
     let law = NeoHookean { deformation, lambda, mu };
-    let P = law.first_piola_kirchhoff(graph);
+    let strain = law.strain(graph);
+    let P = law.first_piola_kirchhoff(graph, &strain);
+    let (isotropic, anisotropic) = if derivation.geometry.is_cartesian() {
+        (Graph::ZERO, P.clone())
+    } else {
+        law.isotropic_and_rest(graph, &strain, &P)
+    };
     let remainder = law.remainder_divergence(derivation);
-    Stress { P, linear, remainder, energy: None }
+    Stress { P, isotropic, anisotropic, linear, remainder, energy: None }
 }
 
 struct NeoHookean<'a> {
@@ -35,18 +41,31 @@ struct NeoHookean<'a> {
 }
 
 impl NeoHookean<'_> {
-    fn first_piola_kirchhoff(&self, graph: &mut Graph) -> Matrix {
+    /// `H + H^T + H H^T = F F^T - I`.
+    fn strain(&self, graph: &mut Graph) -> Matrix {
         let H = &self.deformation.H;
         let n = H.len();
+        let mut strain = vec![vec![Graph::ZERO; n]; n];
+        for i in 0..n {
+            for j in 0..n {
+                let mut terms = vec![H[i][j], H[j][i]];
+                terms.extend((0..n).map(|m| graph.mul(H[i][m], H[j][m])));
+                // What a rotation leaves behind cancels identically.
+                let terms = graph.without_vanishing_part(&terms);
+                let sum = graph.sum_of(terms);
+                strain[i][j] = graph.shortened(sum);
+            }
+        }
+        strain
+    }
+
+    fn first_piola_kirchhoff(&self, graph: &mut Graph, strain: &Matrix) -> Matrix {
+        let n = strain.len();
         let pressure = graph.mul(self.lambda, self.deformation.log_J);
         let mut tau = vec![vec![Graph::ZERO; n]; n];
         for i in 0..n {
             for j in 0..n {
-                // mu (H + H^T + H H^T) = mu (F F^T - I)
-                let mut terms = vec![H[i][j], H[j][i]];
-                terms.extend((0..n).map(|m| graph.mul(H[i][m], H[j][m])));
-                let strain = graph.sum_of(terms);
-                tau[i][j] = graph.mul(self.mu, strain);
+                tau[i][j] = graph.mul(self.mu, strain[i][j]);
                 if i == j {
                     tau[i][j] = graph.add(tau[i][j], pressure);
                 }
@@ -57,8 +76,32 @@ impl NeoHookean<'_> {
         let mut P = matrix_product(graph, &tau, &self.deformation.inverse_transpose);
         for entry in P.iter_mut().flatten() {
             *entry = zero_if_vanishing(graph, *entry);
+            *entry = graph.shortened(*entry);
         }
         P
+    }
+
+    /// `p = lambda ln J`, and `P - p I = [mu (F F^T - I) - p H^T] F^-T`.
+    fn isotropic_and_rest(&self, graph: &mut Graph, strain: &Matrix, P: &Matrix) -> (Expr, Matrix) {
+        let H = &self.deformation.H;
+        let pressure = graph.mul(self.lambda, self.deformation.log_J);
+        if pressure == Graph::ZERO {
+            return (pressure, P.clone());
+        }
+        let mut rest = strain.clone();
+        for (i, row) in rest.iter_mut().enumerate() {
+            for (j, entry) in row.iter_mut().enumerate() {
+                let shear = graph.mul(self.mu, *entry);
+                let turned = graph.mul(pressure, H[j][i]);
+                *entry = graph.sub(shear, turned);
+                *entry = graph.whole(*entry);
+            }
+        }
+        let mut rest = matrix_product(graph, &rest, &self.deformation.inverse_transpose);
+        for entry in rest.iter_mut().flatten() {
+            *entry = zero_if_vanishing(graph, *entry);
+        }
+        (pressure, rest)
     }
 
     fn remainder_divergence(&self, derivation: &mut Derivation) -> Vector {

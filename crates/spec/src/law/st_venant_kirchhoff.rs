@@ -23,8 +23,12 @@ pub(super) fn stress(
     let mut G = products.clone();
     for i in 0..n {
         for j in 0..n {
-            G[i][j] = graph.sum_of([H[i][j], H[j][i], products[i][j]]);
-            G[i][j] = zero_if_vanishing(graph, G[i][j]);
+            let mut terms = vec![H[i][j], H[j][i]];
+            terms.extend((0..n).map(|m| graph.mul(H[m][i], H[m][j])));
+            // What a rotation leaves behind cancels identically.
+            let terms = graph.without_vanishing_part(&terms);
+            let sum = graph.sum_of(terms);
+            G[i][j] = graph.shortened(sum);
         }
     }
     let mut second = isotropic(graph, &G, lambda, mu);
@@ -38,11 +42,13 @@ pub(super) fn stress(
         for j in 0..n {
             P[i][j] = graph.add(P[i][j], turned[i][j]);
             P[i][j] = zero_if_vanishing(graph, P[i][j]);
+            P[i][j] = graph.shortened(P[i][j]);
             remainder[i][j] = graph.add(remainder[i][j], turned[i][j]);
         }
     }
     let remainder = derivation.divergence(&remainder);
-    Stress { P, linear, remainder, energy: None }
+    let anisotropic = P.clone();
+    Stress { P, isotropic: Graph::ZERO, anisotropic, linear, remainder, energy: None }
 }
 
 /// `lambda/2 tr(G) I + mu G`.

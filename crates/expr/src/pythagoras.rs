@@ -1,0 +1,298 @@
+//! Identical cancellation among sines and cosines: what a rotation within a motion leaves behind.
+//!
+//! The strain of a motion that turns, `H + H^T + H H^T`, holds terms such as `-4 s^2 + 4 s^4 + 4 s^2 c^2`, which
+//! are zero since `s^2 + c^2 = 1`. Computed one by one they leave their rounding errors, which are large next to a
+//! small strain. [`Graph::without_vanishing_part`] drops such terms; [`Graph::shortened`] multiplies out what contains
+//! sines and cosines, and keeps the result where terms cancel and it is the shorter form.
+
+use crate::{Expr, Function, Graph, Node, Rational};
+use num_traits::{One, Signed, ToPrimitive};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Sums with more terms than this are not searched for parts that vanish.
+const MOST_PARTS: usize = 8;
+/// What would multiply out to more terms than this is left as it is.
+const MOST_TERMS: usize = 64;
+/// Powers beyond this are not multiplied out.
+const LARGEST_POWER: u32 = 8;
+
+/// A product of sines and cosines, each to a positive power.
+type Monomial = BTreeMap<Expr, u32>;
+/// A sum of monomials, each with a coefficient that is not multiplied out.
+type Polynomial = BTreeMap<Monomial, Expr>;
+
+impl Graph {
+    /// The terms without the largest part of them whose sum [vanishes](Graph::vanishes).
+    pub fn without_vanishing_part(&mut self, terms: &[Expr]) -> Vec<Expr> {
+        let terms: Vec<Expr> = terms.iter().copied().filter(|&e| e != Graph::ZERO).collect();
+        if terms.len() > MOST_PARTS {
+            return terms;
+        }
+        let mut parts: Vec<usize> = (1..1_usize << terms.len()).collect();
+        // Stable, so that the choice is definite.
+        parts.sort_by_key(|part| std::cmp::Reverse(part.count_ones()));
+        if !self.sum_is_sampled(&terms) {
+            // With nothing to sort out by, only the whole sum is worth a look.
+            parts.truncate(1);
+        }
+        for part in parts {
+            let of_part = |inside: bool| {
+                let chosen = terms.iter().enumerate();
+                chosen.filter(move |(i, _)| (part >> i & 1 == 1) == inside).map(|(_, &e)| e)
+            };
+            // The sum is not made where a look at one place tells.
+            if self.sum_differs_from_zero(of_part(true)) {
+                continue;
+            }
+            let sum = self.sum_of(of_part(true));
+            if self.vanishes(sum) {
+                return of_part(false).collect();
+            }
+        }
+        terms
+    }
+
+    /// `expr` multiplied out in sines and cosines, with `cos^2 = 1 - sin^2`, where terms cancel and the result is
+    /// shorter; else `expr` itself.
+    ///
+    /// What contains neither the sine nor the cosine of an angle that occurs with both is never multiplied out.
+    pub fn shortened(&mut self, expr: Expr) -> Expr {
+        let (mut sines, mut cosines) = (BTreeSet::new(), BTreeSet::new());
+        self.collect_angles(expr, &mut sines, &mut cosines, &mut BTreeSet::new());
+        let angles: BTreeSet<Expr> = sines.intersection(&cosines).copied().collect();
+        if angles.is_empty() {
+            return expr;
+        }
+        let mut shortening = Shortening { graph: self, angles, turning: BTreeMap::new() };
+        let Some(polynomial) = shortening.polynomial(expr) else { return expr };
+        let before = polynomial.len();
+        let Some(polynomial) = shortening.without_cosine_squares(polynomial) else { return expr };
+        // Where little cancels, what is multiplied out only hides the quantities that its parts share.
+        if 2 * polynomial.len() > before {
+            return expr;
+        }
+        let candidate = shortening.rebuild(polynomial);
+        let size = |graph: &Graph, e| graph.reachable(&[e]).len();
+        let shorter = size(self, candidate) < size(self, expr);
+        if shorter && self.magnitude(candidate) <= self.magnitude(expr) { candidate } else { expr }
+    }
+
+    /// The angles of the sines and cosines of which `expr` is a polynomial.
+    fn collect_angles(
+        &self,
+        expr: Expr,
+        sines: &mut BTreeSet<Expr>,
+        cosines: &mut BTreeSet<Expr>,
+        seen: &mut BTreeSet<Expr>,
+    ) {
+        if !seen.insert(expr) {
+            return;
+        }
+        match self.node(expr) {
+            Node::Call(Function::Sin, arguments) => {
+                sines.insert(arguments[0]);
+            }
+            Node::Call(Function::Cos, arguments) => {
+                cosines.insert(arguments[0]);
+            }
+            Node::Call(..) => {}
+            _ => {
+                for child in self.children(expr) {
+                    self.collect_angles(child, sines, cosines, seen);
+                }
+            }
+        }
+    }
+}
+
+struct Shortening<'a> {
+    graph: &'a mut Graph,
+    /// The angles whose sines and cosines are multiplied out.
+    angles: BTreeSet<Expr>,
+    /// Whether an expression contains one of them, outside of function values.
+    turning: BTreeMap<Expr, bool>,
+}
+
+impl Shortening<'_> {
+    fn turns(&mut self, expr: Expr) -> bool {
+        if let Some(&known) = self.turning.get(&expr) {
+            return known;
+        }
+        let turns = match self.graph.node(expr) {
+            Node::Call(Function::Sin | Function::Cos, arguments) => {
+                self.angles.contains(&arguments[0])
+            }
+            Node::Call(..) => false,
+            _ => {
+                let children: Vec<Expr> = self.graph.children(expr).collect();
+                children.into_iter().any(|child| self.turns(child))
+            }
+        };
+        self.turning.insert(expr, turns);
+        turns
+    }
+
+    /// `None` where a sine or cosine is under a quotient or a root, or where it grows too large.
+    fn polynomial(&mut self, expr: Expr) -> Option<Polynomial> {
+        if !self.turns(expr) {
+            return Some(Polynomial::from([(Monomial::new(), expr)]));
+        }
+        match self.graph.node(expr).clone() {
+            Node::Sum { constant, terms } => {
+                let mut total = Polynomial::new();
+                let constant = self.graph.number(constant);
+                self.add_to(&mut total, Monomial::new(), constant);
+                for (term, coefficient) in terms {
+                    let coefficient = self.graph.number(coefficient);
+                    for (monomial, factor) in self.polynomial(term)? {
+                        let factor = self.graph.mul(coefficient, factor);
+                        self.add_to(&mut total, monomial, factor);
+                    }
+                }
+                (total.len() <= MOST_TERMS).then_some(total)
+            }
+            Node::Product(factors) => {
+                let mut total = Polynomial::from([(Monomial::new(), Graph::ONE)]);
+                for (base, exponent) in factors {
+                    if !self.turns(base) {
+                        let power = self.graph.product([(base, exponent)]);
+                        total =
+                            self.times(&total, &Polynomial::from([(Monomial::new(), power)]))?;
+                        continue;
+                    }
+                    let whole = exponent.is_integer() && exponent.is_positive();
+                    let power = exponent.to_integer().to_u32().filter(|&n| n <= LARGEST_POWER);
+                    let power = power.filter(|_| whole)?;
+                    let factor = self.polynomial(base)?;
+                    for _ in 0..power {
+                        total = self.times(&total, &factor)?;
+                    }
+                }
+                Some(total)
+            }
+            Node::Whole(inner) => self.polynomial(inner),
+            _ => Some(Polynomial::from([(Monomial::from([(expr, 1)]), Graph::ONE)])),
+        }
+    }
+
+    fn times(&mut self, a: &Polynomial, b: &Polynomial) -> Option<Polynomial> {
+        if a.len() * b.len() > 4 * MOST_TERMS {
+            return None;
+        }
+        let mut product = Polynomial::new();
+        for (m, &c) in a {
+            for (n, &d) in b {
+                let mut monomial = m.clone();
+                for (&atom, &power) in n {
+                    *monomial.entry(atom).or_insert(0) += power;
+                }
+                let coefficient = self.graph.mul(c, d);
+                self.add_to(&mut product, monomial, coefficient);
+            }
+        }
+        (product.len() <= MOST_TERMS).then_some(product)
+    }
+
+    fn add_to(&mut self, polynomial: &mut Polynomial, monomial: Monomial, coefficient: Expr) {
+        let known = polynomial.remove(&monomial).unwrap_or(Graph::ZERO);
+        let total = self.graph.add(known, coefficient);
+        if total != Graph::ZERO {
+            polynomial.insert(monomial, total);
+        }
+    }
+
+    fn without_cosine_squares(&mut self, polynomial: Polynomial) -> Option<Polynomial> {
+        let mut result = Polynomial::new();
+        let mut pending: Vec<(Monomial, Expr)> = polynomial.into_iter().collect();
+        while let Some((mut monomial, coefficient)) = pending.pop() {
+            if result.len() + pending.len() > 2 * MOST_TERMS {
+                return None;
+            }
+            let Some((cosine, argument)) = self.graph.squared_cosine(&monomial) else {
+                self.add_to(&mut result, monomial, coefficient);
+                continue;
+            };
+            let power = monomial.remove(&cosine).unwrap_or(2) - 2;
+            if power > 0 {
+                monomial.insert(cosine, power);
+            }
+            let sine = self.graph.call(Function::Sin, &[argument]);
+            let mut with_sine = monomial.clone();
+            *with_sine.entry(sine).or_insert(0) += 2;
+            let negative = self.graph.neg(coefficient);
+            pending.push((monomial, coefficient));
+            pending.push((with_sine, negative));
+        }
+        Some(result)
+    }
+
+    fn rebuild(&mut self, polynomial: Polynomial) -> Expr {
+        let mut terms = Vec::new();
+        for (monomial, coefficient) in polynomial {
+            let powers = monomial.into_iter().map(|(e, n)| (e, Rational::from_integer(n.into())));
+            let product = self.graph.product(powers.chain([(coefficient, Rational::one())]));
+            terms.push(product);
+        }
+        self.graph.sum_of(terms)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Ast, Expr, Graph};
+
+    fn build(graph: &mut Graph, text: &str) -> Expr {
+        let ast = Ast::parse(text).unwrap();
+        graph.build(&ast, &mut |g, name| Ok(g.symbol(name))).unwrap()
+    }
+
+    #[test]
+    fn the_rotation_drops_out_of_a_strain() {
+        let mut graph = Graph::new();
+        // 2 H_XX + H_XX^2 + H_XY^2 + H_XZ^2 for H_XX = -2 s^2, H_XY = -2 s c.
+        let texts = [
+            "-2*sin(a)^2",
+            "-2*sin(a)^2",
+            "4*sin(a)^4",
+            "4*sin(a)^2*cos(a)^2",
+            "(x*sin(a)+y*cos(a))^2",
+        ];
+        let terms: Vec<Expr> = texts.iter().map(|text| build(&mut graph, text)).collect();
+        let left = graph.without_vanishing_part(&terms);
+        assert_eq!(left, [terms[4]]);
+        // Without one of them nothing vanishes.
+        assert_eq!(graph.without_vanishing_part(&terms[1..]), terms[1..]);
+        assert!(graph.without_vanishing_part(&terms[..4]).is_empty());
+    }
+
+    #[test]
+    fn shorter_where_terms_cancel() {
+        let cases = [
+            ("(x*sin(a)+y*cos(a))*cos(a) + (x*cos(a)-y*sin(a))*(-sin(a))", "y"),
+            ("((r-1)^2*cos(a) - x)*cos(a) + (r-1)^2*sin(a)^2 + cos(a)*x", "(-1 + r)^2"),
+            ("sin(a)*(cos(a)^2 + sin(a)^2)*f", "f*sin(a)"),
+        ];
+        for (text, shorter) in cases {
+            let mut graph = Graph::new();
+            let (expr, expected) = (build(&mut graph, text), build(&mut graph, shorter));
+            let found = graph.shortened(expr);
+            assert_eq!(graph.print(found), graph.print(expected), "{text}");
+        }
+    }
+
+    #[test]
+    fn left_alone() {
+        // Nothing cancels; another angle; a quotient; nothing to gain.
+        let cases = [
+            "(x*sin(a)+y*cos(a))^2",
+            "cos(a)^2 + sin(b)^2",
+            "(sin(a)^2 + cos(a)^2*x)/(1 + sin(a))",
+            "1 - sin(a)^2*cos(a)",
+        ];
+        for text in cases {
+            let mut graph = Graph::new();
+            let expr = build(&mut graph, text);
+            assert_eq!(graph.shortened(expr), expr, "{text}");
+        }
+    }
+}
