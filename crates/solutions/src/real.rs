@@ -221,7 +221,7 @@ fn log_1p(x: f64) -> f64 {
     let value = k * LN2_HIGH - ((half_square - tail) - f);
     let pole = if sum == 0.0 { f64::NEG_INFINITY } else { f64::NAN };
     let outside = if sum > 0.0 { sum } else { pole };
-    if sum > 0.0 && x - x == 0.0 { value } else { outside }
+    if sum > 0.0 && x < f64::INFINITY { value } else { outside }
 }
 
 #[cfg(test)]

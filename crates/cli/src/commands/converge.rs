@@ -2,8 +2,8 @@
 
 use anyhow::{Context, Result, bail};
 use mmsmith_verify::{
-    Behaviour, Case, Expected, Frame, ORDER_TOLERANCE, Order, OrderVerdict, PerField, PerNorm,
-    Status, Study, Sweep, Temporal, converge as measure, expected_in_space, expected_in_time, plan,
+    Behaviour, Case, Expected, ORDER_TOLERANCE, Order, OrderVerdict, PerField, PerNorm, Status,
+    Study, Sweep, Temporal, converge as measure, expected_in_space, expected_in_time, plan,
     temporal as measure_differences, verdicts,
 };
 use serde_json::{Value, json};
