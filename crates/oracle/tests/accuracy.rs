@@ -2,7 +2,7 @@
 //!
 //! A few points of each class; `mms check --thorough` takes as many as you like. Prints a table of the worst factor `K` of
 //! the acceptance rule, by field and class of inputs.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::print_stdout, clippy::unwrap_used)]
 
 use mmsmith_oracle::{Accuracy, Class, Judged, LARGEST_FACTOR};
 use mmsmith_solutions::build;
