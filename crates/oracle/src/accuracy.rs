@@ -190,10 +190,10 @@ impl<'a> Accuracy<'a> {
                             Ok(None)
                         }
                         // Where two stretches pass zero together, J stays positive in an inverted body, in which
-                        // a law need not have a value.
+                        // a law need not have a value; nor far from the body.
                         Err(AccuracyError::Oracle {
                             error: OracleError::Domain { .. }, ..
-                        }) if class == Class::NearInversion => Ok(None),
+                        }) if matches!(class, Class::NearInversion | Class::Far) => Ok(None),
                         findings => findings.map(Some),
                     }
                 },
