@@ -18,6 +18,9 @@ const QUICK_BITS: usize = 192;
 /// From this factor on the first look is not believed.
 const DOUBTFUL_FACTOR: f64 = 3.0;
 
+/// Far from the body, what is smaller than this is not judged.
+const SMALLEST_FAR: f64 = 1e-280;
+
 /// Where so many draws in a row find nothing that suits, a class is given up.
 const FIRST_DRAWS: u64 = 8;
 
@@ -177,7 +180,7 @@ impl<'a> Accuracy<'a> {
                 |oracle, index| {
                     let Some(inputs) = self.sampler.draw(class, index) else { return Ok(None) };
                     let oracle = oracle.as_mut().map_err(|e| self.no_value(&inputs, e.clone()))?;
-                    let findings = self.look(oracle, &inputs, judged);
+                    let findings = self.look(class, oracle, &inputs, judged);
                     step();
                     match findings {
                         // Outside of the body a function such as exp may leave every range.
@@ -186,6 +189,11 @@ impl<'a> Accuracy<'a> {
                         {
                             Ok(None)
                         }
+                        // Where two stretches pass zero together, J stays positive in an inverted body, in which
+                        // a law need not have a value; nor far from the body.
+                        Err(AccuracyError::Oracle {
+                            error: OracleError::Domain { .. }, ..
+                        }) if matches!(class, Class::NearInversion | Class::Far) => Ok(None),
                         findings => findings.map(Some),
                     }
                 },
@@ -216,6 +224,7 @@ impl<'a> Accuracy<'a> {
     /// The worst entry of each field at one point.
     fn look(
         &self,
+        class: Class,
         oracle: &mut Oracle,
         inputs: &[f64],
         judged: &(dyn Fn(&[f64]) -> Result<Judged, String> + Sync),
@@ -237,6 +246,8 @@ impl<'a> Accuracy<'a> {
                 let sens: f64 = terms.by_ref().take(count).map(|term| term.abs()).sum();
                 let quick = exact(sens).map(|sens| worst_factor(result, truth, &sens));
                 let factor = match quick {
+                    // Far outside an exponential leaves the range of normal numbers, and its digits with it.
+                    _ if class == Class::Far && sens < SMALLEST_FAR => 0.0,
                     Some(factor) if factor < DOUBTFUL_FACTOR => factor,
                     _ => self.settled(inputs, field, entry, result)?.0,
                 };
