@@ -1,6 +1,8 @@
 //! What splines in the reference configuration have to keep: momentum, energy to the order in time, the way back; and
 //! how runs and set-ups fail.
 
+#![allow(clippy::unwrap_used)]
+
 use mmsmith_mpm::total_lagrangian::{
     Axis, Composition, Coordinates, End, Grid, Layout, MassMatrix, Scheme, TotalLagrangian,
 };
