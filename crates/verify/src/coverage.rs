@@ -291,7 +291,7 @@ mod tests {
         let solutions =
             [shares(&[0.5, 0.0, 0.0]), shares(&[0.5, 0.2, 0.001]), shares(&[0.0, 0.1, 0.9])];
         assert_eq!(smallest_set(&solutions, 0.01), [0, 2]);
-        assert_eq!(smallest_set(&solutions, 0.15), [0, 1, 2]);
+        assert_eq!(smallest_set(&solutions, 0.15), [1, 2]);
         assert_eq!(smallest_set(&solutions, 1.0), Vec::<usize>::new());
         assert_eq!(smallest_set(&[], 0.1), Vec::<usize>::new());
     }
