@@ -120,7 +120,10 @@ const FAULTS: &[(&str, &str, Plant)] = &[
                 .reachable(&[*entry])
                 .into_iter()
                 .filter_map(|e| match f.graph.node(e) {
-                    Node::Call(Function::Ln1p, arguments) => Some((e, arguments[0])),
+                    // ln J, from J - 1 alone or from both.
+                    Node::Call(Function::Ln1p | Function::LnOfBoth, arguments) => {
+                        Some((e, arguments[0]))
+                    }
                     _ => None,
                 })
                 .collect();

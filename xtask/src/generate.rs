@@ -7,6 +7,7 @@ use mmsmith_codegen::{Names, Plan, registry_source};
 use mmsmith_spec::Spec;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 /// What was done, in lines for people.
 pub(crate) struct Outcome {
@@ -48,6 +49,15 @@ impl Target {
     }
 }
 
+/// How the generator is run.
+#[derive(Clone, Copy)]
+pub(crate) struct Options {
+    /// Change nothing, and tell what is stale.
+    pub(crate) check: bool,
+    /// Tell how long each specification took.
+    pub(crate) times: bool,
+}
+
 /// Generates from `given`, or from every specification of the repository.
 ///
 /// Every specification is read and derived before anything is written.
@@ -56,7 +66,7 @@ pub(crate) fn run(
     given: &[PathBuf],
     targets: &[Target],
     out: Option<&Path>,
-    check: bool,
+    Options { check, times: tell_times }: Options,
 ) -> anyhow::Result<Outcome> {
     let library = repository.join("mms-specs");
     let all = library_specs(&library)?;
@@ -66,8 +76,11 @@ pub(crate) fn run(
     };
 
     let mut sources: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    let mut times = vec!["milliseconds: read, derive and stage, write down (Rust, C)".to_owned()];
     for path in &chosen {
-        let (name, texts) = generate(repository, path, targets)?;
+        let Generated { name, texts, times: spent } = generate(repository, path, targets)?;
+        let spent: Vec<String> = spent.iter().map(|t| format!("{:7.1}", 1e3 * t)).collect();
+        times.push(format!("{name:<18} {}", spent.join(" ")));
         if sources.insert(name.clone(), texts).is_some() {
             bail!("two specifications are called '{name}'; the second is {}", path.display());
         }
@@ -102,7 +115,12 @@ pub(crate) fn run(
             files.insert(Target::Rust.folder(repository).join("mod.rs"), Some(registry));
         }
     }
-    if check { compare(repository, &files) } else { update(repository, &files) }
+    let mut outcome =
+        if check { compare(repository, &files)? } else { update(repository, &files)? };
+    if tell_times {
+        outcome.lines.extend(times);
+    }
+    Ok(outcome)
 }
 
 fn library_specs(library: &Path) -> anyhow::Result<Vec<PathBuf>> {
@@ -131,19 +149,36 @@ fn locate(library: &Path, given: &Path) -> anyhow::Result<PathBuf> {
 }
 
 /// The name of a specification's solution, and its text for each target.
-fn generate(
-    repository: &Path,
-    path: &Path,
-    targets: &[Target],
-) -> anyhow::Result<(String, Vec<String>)> {
+/// The code of one specification.
+struct Generated {
+    name: String,
+    /// For each target.
+    texts: Vec<String>,
+    /// Seconds for reading, for deriving and staging, and for each text.
+    times: Vec<f64>,
+}
+
+fn generate(repository: &Path, path: &Path, targets: &[Target]) -> anyhow::Result<Generated> {
     let shown = path.strip_prefix(repository).unwrap_or(path).display().to_string();
+    let mut started = Instant::now();
+    let mut times = Vec::new();
+    let mut lap = || {
+        times.push(started.elapsed().as_secs_f64());
+        started = Instant::now();
+    };
     let spec = Spec::parse(&read(path)?, &shown).map_err(|e| anyhow!("{e}"))?;
     if path.file_stem().and_then(|stem| stem.to_str()) != Some(&spec.name) {
         bail!("{shown} holds a solution called '{0}'; the file must be called {0}.toml", spec.name);
     }
+    lap();
     let plan = Plan::new(&spec).with_context(|| format!("cannot derive the fields of {shown}"))?;
-    let texts = targets.iter().map(|target| target.source(&plan)).collect();
-    Ok((spec.name.clone(), texts))
+    lap();
+    let mut texts = Vec::new();
+    for target in targets {
+        texts.push(target.source(&plan));
+        lap();
+    }
+    Ok(Generated { name: spec.name.clone(), texts, times })
 }
 
 /// Generated files that belong to none of `names`, with the names that they stand for.

@@ -2,7 +2,7 @@
 
 use anyhow::{Context, bail};
 use clap::{Parser, Subcommand, ValueEnum};
-use generate::Target;
+use generate::{Options, Target};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -23,6 +23,9 @@ enum Task {
         /// Change nothing; fail where a generated file differs from its specification.
         #[arg(long)]
         check: bool,
+        /// Tell how long each specification took.
+        #[arg(long)]
+        times: bool,
         /// Generate for this language only.
         #[arg(long, value_enum)]
         target: Option<Target>,
@@ -36,9 +39,9 @@ enum Task {
 }
 
 fn main() -> ExitCode {
-    let Arguments { task: Task::Gen { check, target, out, specs } } = Arguments::parse();
+    let Arguments { task: Task::Gen { check, times, target, out, specs } } = Arguments::parse();
     let targets = target.map_or(Target::value_variants().to_vec(), |target| vec![target]);
-    match generate::run(&repository(), &specs, &targets, out.as_deref(), check) {
+    match generate::run(&repository(), &specs, &targets, out.as_deref(), Options { check, times }) {
         Ok(outcome) => {
             for line in &outcome.lines {
                 say(line);

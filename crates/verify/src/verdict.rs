@@ -153,10 +153,10 @@ pub fn expected_in_space(exact: &AnySolution<f64>, case: &Case) -> Expected {
 /// The orders in `dt` of the differences on one grid ([`temporal`](crate::temporal())) that theory promises for the
 /// displacement: 1 for the integrators that evaluate all at one end of the step.
 ///
-/// Nothing is promised for centred differences. They are formally of second order, but particles are moved with the
-/// nodal acceleration as it is, while their velocities keep what its interpolation and projection with lumped masses
-/// leave of it. The two differ by `O(h^2)`, so that a term `dt h^2` joins the one in `dt^2`, and takes over where `dt` is
-/// small against `h^2`.
+/// Nothing is promised for centred differences. They are formally of second order, but the measured order falls towards
+/// 1 where `dt` is small against `h^2`. A likely reason: particles are moved with the nodal acceleration as it is, while
+/// their velocities keep what its interpolation and projection with lumped masses leave of it, which would add a term in
+/// `dt h^2`.
 #[must_use]
 pub fn expected_in_time(case: &Case) -> Expected {
     let order = match case.integrator {

@@ -53,8 +53,7 @@ const SMALL_STEP: f64 = 0.05;
 const DIFFERENCES: [(Shape, Integrator); 2] =
     [(Shape::Gimp, Integrator::Cd), (Shape::Gimp, Integrator::Usl)];
 const DIFFERENCE_CFLS: [f64; 4] = [0.4, 0.2, 0.1, 0.05];
-/// The same with an amplitude so small that no noise of particles crossing cells covers the difference, on a grid
-/// so fine that the term in `dt h^2` does not either.
+/// The same with a small amplitude on a fine grid, where the order of centred differences shows.
 const GENTLE: f64 = 1e-3;
 const GENTLE_GRID: usize = 64;
 const GENTLE_CFLS: [f64; 4] = [0.6, 0.4, 0.2, 0.1];

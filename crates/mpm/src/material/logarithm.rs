@@ -33,7 +33,8 @@ pub(super) fn log_of_ratio(growth: f64, ratio: f64) -> f64 {
     let f = if exact { growth } else { m - 1.0 };
     // lost / u, which two digits of 1/m are enough for.
     let corrected = !exact && k <= 1022.0;
-    let correction = if corrected { lost * scale * (1.0 - f + f * f) } else { 0.0 };
+    // What is not a number stays so.
+    let correction = lost * if corrected { scale * (1.0 - f + f * f) } else { 0.0 };
     let s = f / (2.0 + f);
     let z = s * s;
     let w = z * z;

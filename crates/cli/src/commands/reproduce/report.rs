@@ -114,13 +114,12 @@ fn sum_section(results: &[Results], gentle: &[Differences]) -> String {
          No spatial order was lost.</li>\n\
          <li>By differences on one grid, where the spatial error drops out, the order of USL in dt is {in_time}.</li>\n\
          <li>For CD the order in dt is {cd}, at the amplitude {GENTLE} on {GENTLE_GRID} cells. At the amplitude 0.1 on {GRID} \
-         cells it is {cd_usual}: the motion of particles through cells excites modes of the grid's own length, \
-         which differ from one time step to the next.</li>\n</ul>\n\
-         <p>That the order of CD falls as dt becomes smaller has its reason in the scheme. Particles are moved with the \
-         nodal acceleration as it is, while their velocities keep what interpolation and the projection with lumped masses \
-         leave of it. The two differ by a term in h², so that a term dt h² joins the one in dt². It is smaller than the \
-         spatial error at every time step, but for dt → 0 on one grid it is what remains. Total errors hide all this: the \
-         spatial error dominates, and has the opposite sign.</p>\n\
+         cells it is {cd_usual}; no order shows there.</li>\n</ul>\n\
+         <p>The order of CD falls as dt becomes smaller. A likely reason, not proved here, lies in the scheme: particles are \
+         moved with the nodal acceleration as it is, while their velocities keep what interpolation and the projection with \
+         lumped masses leave of it. If the two differ by a term in h², a term dt h² joins the one in dt², and is what \
+         remains for dt → 0 on one grid. Total errors hide all this: the spatial error dominates, and has the opposite \
+         sign.</p>\n\
          <div class=\"figures\">\n{figure}{usual}</div>\n{small_step}{differences}</section>\n",
         order(at_fixed_cfl),
         order(small),
