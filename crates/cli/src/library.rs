@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Context, Result, bail};
-use mmsmith_interpret::{interpret, interpret_fields};
+use mmsmith_interpret::interpret_fields;
 use mmsmith_solutions::{AnySolution, CATALOGUE, Description, Real, build};
 use mmsmith_spec::{Fields, Spec, nearest};
 
@@ -126,65 +126,34 @@ pub(crate) struct Subject {
 impl Subject {
     /// The solution called `name`, or the one that the specification file `name` describes.
     pub(crate) fn new(name: &str, overrides: &[(String, f64)]) -> Result<Self> {
-        if is_file(name) {
-            return Self::interpreted(name, overrides);
-        }
+        let selection = Selection::new(name, overrides)?;
         let spec = specification(name)?;
-        let folder = None;
-        Self::with_variations(
-            name.to_owned(),
-            spec,
-            format!("{name}.toml"),
-            folder,
-            overrides,
-            |_, set| Selection::new(name, set)?.build(),
-        )
-    }
-
-    /// Evaluates the specification itself: nothing needs to have been generated from it.
-    fn interpreted(file: &str, overrides: &[(String, f64)]) -> Result<Self> {
-        let spec = specification(file)?;
-        let folder = Some(Path::new(file).parent().unwrap_or(Path::new("")).to_owned());
-        let name = spec.name.clone();
-        Self::with_variations(name, spec, file.to_owned(), folder, overrides, |spec, set| {
-            let values = set.iter().map(|(name, value)| (name.as_str(), *value));
-            interpret(spec, values).with_context(|| file.to_owned())
-        })
-    }
-
-    fn with_variations(
-        name: String,
-        spec: Spec,
-        file: String,
-        folder: Option<PathBuf>,
-        overrides: &[(String, f64)],
-        build: impl Fn(&Spec, &[(String, f64)]) -> Result<AnySolution<f64>>,
-    ) -> Result<Self> {
-        let mut solutions = vec![build(&spec, overrides)?];
-        let mut parameters: BTreeMap<String, f64> =
-            spec.parameters.iter().map(|p| (p.name.clone(), p.default)).collect();
-        parameters.extend(overrides.iter().cloned());
-        let mut sets = vec![parameters];
+        let mut solutions = vec![selection.build()?];
+        let mut parameters = vec![selection.parameters().clone()];
         // What the user set stays; the rest varies, where the specification admits it.
         for attempt in 1..=MOST_ATTEMPTS {
             let set: Vec<(String, f64)> = spec
                 .parameters
                 .iter()
                 .enumerate()
-                .map(|(index, p)| match overrides.iter().find(|(name, _)| *name == p.name) {
-                    Some((_, value)) => (p.name.clone(), *value),
-                    None => (p.name.clone(), p.default * variation(attempt, index)),
-                })
+                .filter(|(_, p)| overrides.iter().all(|(name, _)| *name != p.name))
+                .map(|(index, p)| (p.name.clone(), p.default * variation(attempt, index)))
                 .collect();
-            if let Ok(solution) = build(&spec, &set) {
-                solutions.push(solution);
-                sets.push(set.into_iter().collect());
+            if let Ok(varied) = selection.with(&set) {
+                solutions.push(varied.build()?);
+                parameters.push(varied.parameters().clone());
             }
             if solutions.len() > VARIATIONS {
                 break;
             }
         }
-        Ok(Self { name, solutions, parameters: sets, spec, file, folder })
+        let folder = Path::new(name).parent().unwrap_or(Path::new("")).to_owned();
+        let (file, folder) = if is_file(name) {
+            (name.to_owned(), Some(folder))
+        } else {
+            (format!("{name}.toml"), None)
+        };
+        Ok(Self { name: selection.name().to_owned(), solutions, parameters, spec, file, folder })
     }
 }
 
