@@ -11,7 +11,7 @@ use mmsmith_spec::{Boundary, Condition, Material, Parameter, Surface};
 const SUPPORT: &str = include_str!("support.h");
 
 /// The logarithm of one plus a small number, as the crate of the solutions computes it.
-const LOG_1P: &str = include_str!("log_1p.h");
+const LOGARITHM: &str = include_str!("logarithm.h");
 
 /// What laws need that have the logarithm of the stretch.
 const LOG_RATIO: &str = include_str!("log_ratio.h");
@@ -217,8 +217,8 @@ impl Header<'_> {
         self.line("#include <math.h>");
         self.line("#include <stddef.h>\n");
         self.text += SUPPORT;
-        if self.plan.calls(|function| function == Function::Ln1p) {
-            self.text += LOG_1P;
+        if self.plan.calls(|f| matches!(f, Function::Ln1p | Function::LnOfBoth)) {
+            self.text += LOGARITHM;
         }
         if self.plan.calls(is_log_ratio) {
             self.text += LOG_RATIO;
@@ -715,7 +715,7 @@ before. Results equal those of the Rust functions bit for bit where the compiler
             }
             Operation::Atan2(y, x) => format!("atan2({}, {})", at(y), at(x)),
             Operation::LnOfBoth(x, y) => {
-                format!("({x} < -0.5 ? log({y}) : log1p({x}))", x = at(x), y = at(y))
+                format!("mmsmith_ln_of_both({}, {})", at(x), at(y))
             }
         }
     }
@@ -803,8 +803,7 @@ fn c_name(function: Function) -> &'static str {
         Function::Ln1p => "mmsmith_log_1p",
         Function::Expm1 => "expm1",
         Function::Atan2 => "atan2",
-        // Written out.
-        Function::LnOfBoth => "",
+        Function::LnOfBoth => "mmsmith_ln_of_both",
         Function::LogRatioSquared => "mmsmith_log_ratio_squared",
         Function::LogRatioSlope => "mmsmith_log_ratio_slope",
         Function::LogRatioCurvature => "mmsmith_log_ratio_curvature",

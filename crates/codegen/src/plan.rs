@@ -191,7 +191,11 @@ impl<'a> Plan<'a> {
     /// Whether any operation calls such a function.
     pub(crate) fn calls(&self, such: impl Fn(Function) -> bool) -> bool {
         let mut operations = self.program.operations().iter();
-        operations.any(|operation| matches!(operation, Operation::Call(f, _) if such(*f)))
+        operations.any(|operation| match operation {
+            Operation::Call(function, _) => such(*function),
+            Operation::LnOfBoth(..) => such(Function::LnOfBoth),
+            _ => false,
+        })
     }
 
     /// How many values a stage keeps.
@@ -331,28 +335,28 @@ fn fixed_slots(program: &Program) -> Vec<Slot> {
     slots
 }
 
-/// What `outputs` need of the time alone and of the position alone: the values that are read where both come together,
-/// or are results.
+/// What `outputs` need of the time alone and of the position alone: the values of the time that are read where both come
+/// together, or are results, and [those of the position](Program::kept_at_points) that are worth keeping.
 fn staged_slots(
     program: &Program,
     kept: &BTreeMap<Slot, (Stage, usize)>,
     outputs: &[Slot],
 ) -> (Vec<Slot>, Vec<Slot>) {
     let needed = needed(program, kept, outputs);
-    let both = |slot: &Slot| {
+    let of_time = |slot: &Slot| {
         let Dependence { position, time } = program.dependence(*slot);
-        position && time
+        time && !position
     };
-    let mut slots: Vec<Slot> = program
+    let mut time: Vec<Slot> = program
         .slots()
-        .filter(|slot| needed[slot.index()] && both(slot))
+        .filter(|slot| needed[slot.index()] && !of_time(slot))
         .flat_map(|slot| program.operations()[slot.index()].operands())
         .chain(outputs.iter().copied())
-        .filter(|slot| !both(slot) && !program.dependence(*slot).is_fixed())
+        .filter(of_time)
         .collect();
-    slots.sort_unstable();
-    slots.dedup();
-    slots.into_iter().partition(|&slot| program.dependence(slot).time)
+    time.sort_unstable();
+    time.dedup();
+    (time, program.kept_at_points(outputs))
 }
 
 /// Which operations `outputs` need, where kept values need none.

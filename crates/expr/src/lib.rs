@@ -35,6 +35,7 @@ mod cancel;
 mod canonical;
 mod derivative;
 mod graph;
+mod keep;
 mod log_ratio;
 mod near_zero;
 mod parse;

@@ -180,7 +180,13 @@ impl OperationCount {
             + 40 * self.calls
     }
 
-    fn count(&mut self, operation: &Operation) {
+    pub(crate) fn of(operation: &Operation) -> Self {
+        let mut count = Self::default();
+        count.count(operation);
+        count
+    }
+
+    pub(crate) fn count(&mut self, operation: &Operation) {
         match operation {
             Operation::Number(_) | Operation::Pi | Operation::Input(_) => {}
             Operation::Add(..) | Operation::Sub(..) | Operation::Neg(_) => self.additions += 1,

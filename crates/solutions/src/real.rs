@@ -24,12 +24,10 @@ pub trait Real: RealField + Copy {
 
     /// `ln(y)` of `y = 1 + x`, where `x` is `self`: by `y` where `x < -1/2`, else by `x`.
     ///
-    /// A ratio of volumes next to one has its digits in `x`, one next to zero, as a product of stretches, in `y`.
+    /// A ratio of volumes next to one has its digits in `x`, one next to zero, as a product of stretches, in `y`. Within
+    /// one and a half units in the last place, and without a call, as [`Real::log_1p`].
     #[must_use]
-    #[inline]
-    fn ln_of_both(self, y: Self) -> Self {
-        if self < Self::nearest(-0.5) { y.ln() } else { self.ln_1p() }
-    }
+    fn ln_of_both(self, y: Self) -> Self;
 
     /// `arcosh(1 + z)^2`: the squared logarithm of the ratio of two stretches `a`, `b` for `z = (a - b)^2/(2 a b)`.
     #[must_use]
@@ -103,7 +101,12 @@ impl Real for f64 {
 
     #[inline(always)]
     fn log_1p(self) -> Self {
-        log_1p(self)
+        logarithm(self, self, false)
+    }
+
+    #[inline(always)]
+    fn ln_of_both(self, y: Self) -> Self {
+        logarithm(self, y, self < -0.5)
     }
 }
 
@@ -130,7 +133,12 @@ impl Real for f32 {
 
     #[inline(always)]
     fn log_1p(self) -> Self {
-        log_1p(f64::from(self)) as f32
+        f64::from(self).log_1p() as f32
+    }
+
+    #[inline(always)]
+    fn ln_of_both(self, y: Self) -> Self {
+        f64::from(self).ln_of_both(f64::from(y)) as f32
     }
 }
 
@@ -179,9 +187,10 @@ fn cosine(x: f64) -> f64 {
     (1.0 - 4.934_802_200_544_679 * z) + square * (low + square * (middle + square * high))
 }
 
-/// `ln(1 + x)`, by the reduction and the polynomial of Sun's fdlibm, `s_log1p.c`, without branches.
+/// `ln(y)` where `by_y`, else `ln(1 + x)`, by the reduction and the polynomial of Sun's fdlibm, `s_log1p.c`, without
+/// branches.
 #[inline(always)]
-fn log_1p(x: f64) -> f64 {
+fn logarithm(x: f64, y: f64, by_y: bool) -> f64 {
     /// The bits of sqrt(1/2), to 32 bits.
     const ROOT_HALF: u64 = 0x3fe6_a09e_0000_0000;
     const ONE: u64 = 0x3ff0_0000_0000_0000;
@@ -190,21 +199,26 @@ fn log_1p(x: f64) -> f64 {
     const WHOLE: u64 = 0x4330_0000_0000_0000;
     const LN2_HIGH: f64 = 6.931_471_803_691_238e-1;
     const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
+    const TWO_TO_54: f64 = 18_014_398_509_481_984.0;
 
     let sum = 1.0 + x;
     // What rounding took from the sum.
     let lost = if x < 1.0 { x - (sum - 1.0) } else { 1.0 - (sum - x) };
-    // sum = 2^k m with m between sqrt(1/2) and sqrt(2).
-    let bits = sum.to_bits().wrapping_add(ONE - ROOT_HALF);
+    let (u, lost) = if by_y { (y, 0.0) } else { (sum, lost) };
+    let subnormal = by_y && y < f64::MIN_POSITIVE;
+    let (normal, shift) = if subnormal { (u * TWO_TO_54, 54.0) } else { (u, 0.0) };
+    // u = 2^k m with m between sqrt(1/2) and sqrt(2).
+    let bits = normal.to_bits().wrapping_add(ONE - ROOT_HALF);
     let exponent = bits >> 52;
-    let k = f64::from_bits(exponent | WHOLE) - (4_503_599_627_370_496.0 + 1023.0);
+    let k = f64::from_bits(exponent | WHOLE) - (4_503_599_627_370_496.0 + 1023.0) - shift;
     // 2^-k, for k up to 1022.
     let scale = f64::from_bits(2046_u64.wrapping_sub(exponent) << 52);
     let m = f64::from_bits((bits & MANTISSA).wrapping_add(ROOT_HALF));
     // With k = 0 x itself has digits that the sum has lost.
-    let f = if k == 0.0 { x } else { m - 1.0 };
-    // lost / sum, which two digits of 1/m are enough for.
-    let corrected = k != 0.0 && k <= 1022.0;
+    let exact = k == 0.0 && !by_y;
+    let f = if exact { x } else { m - 1.0 };
+    // lost / u, which two digits of 1/m are enough for.
+    let corrected = !exact && !by_y && k <= 1022.0;
     let correction = if corrected { lost * scale * (1.0 - f + f * f) } else { 0.0 };
     let s = f / (2.0 + f);
     let z = s * s;
@@ -219,9 +233,9 @@ fn log_1p(x: f64) -> f64 {
     let half_square = 0.5 * f * f;
     let tail = s * (half_square + (even + odd)) + (k * LN2_LOW + correction);
     let value = k * LN2_HIGH - ((half_square - tail) - f);
-    let pole = if sum == 0.0 { f64::NEG_INFINITY } else { f64::NAN };
-    let outside = if sum > 0.0 { sum } else { pole };
-    if sum > 0.0 && x < f64::INFINITY { value } else { outside }
+    let pole = if u == 0.0 { f64::NEG_INFINITY } else { f64::NAN };
+    let outside = if u > 0.0 { u } else { pole };
+    if u > 0.0 && u < f64::INFINITY { value } else { outside }
 }
 
 #[cfg(test)]
@@ -271,6 +285,28 @@ mod tests {
         assert!((-1.5_f64).log_1p().is_nan() && f64::NAN.log_1p().is_nan());
         assert!(f64::NEG_INFINITY.log_1p().is_nan());
         assert_eq!(0.5_f32.log_1p(), 0.5_f32.ln_1p());
+    }
+
+    #[test]
+    fn the_logarithm_of_both_takes_the_one_that_has_the_digits() {
+        let mut worst: f64 = 0.0;
+        for n in 0..200_000 {
+            let x = f64::from(n) * 1e-5;
+            for x in [x - 0.5, 10.0 * x, x * 1e-9, -x * 1e-6] {
+                assert_eq!(x.ln_of_both(f64::NAN), x.log_1p());
+            }
+            let y = (-350.0 * x - 0.7).exp();
+            let expected = y.ln();
+            if y > 0.0 {
+                let error = ((y - 1.0).ln_of_both(y) - expected) / expected;
+                worst = worst.max(error.abs() / f64::EPSILON);
+            }
+        }
+        assert!(worst <= 1.5, "{worst} units in the last place");
+        assert_eq!((-1.0_f64).ln_of_both(0.0), f64::NEG_INFINITY);
+        assert!((-1.0_f64).ln_of_both(f64::NAN).is_nan() && (-1.0_f64).ln_of_both(-1e-9).is_nan());
+        assert!(f64::NAN.ln_of_both(1.0).is_nan());
+        assert_eq!((-0.75_f32).ln_of_both(0.25), 0.25_f32.ln());
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! `mms explain`: what a solution models, which parts of a solver it exercises, and what its body force costs.
 
 use anyhow::{Result, bail};
-use mmsmith_expr::{Dependence, Expr, OperationCount, Program, arrange};
+use mmsmith_expr::{Expr, OperationCount, Program, arrange};
 use mmsmith_solutions::CATALOGUE;
 use mmsmith_spec::{Domain, Fields, SolvedCondition, Spec};
 use mmsmith_verify::{Part, Share, coverage};
@@ -74,20 +74,8 @@ impl BodyForceCost {
     fn of(fields: &mut Fields) -> Self {
         let b = arrange(&mut fields.graph, &fields.inputs, &fields.definitions, &fields.b);
         let program: Program = fields.program(&b);
-        let count = program.operations_by_stage(program.outputs());
-        // What depends on the position alone and is read by what depends on more, or is an output.
-        let point = Dependence { position: true, time: false };
-        let needed = program.needed(program.outputs());
-        let later = program
-            .slots()
-            .filter(|slot| needed[slot.index()] && program.dependence(*slot) != point)
-            .flat_map(|slot| program.operations()[slot.index()].operands());
-        let mut kept: Vec<_> = later
-            .chain(program.outputs().iter().copied())
-            .filter(|&slot| program.dependence(slot) == point)
-            .collect();
-        kept.sort_unstable();
-        kept.dedup();
+        let kept = program.kept_at_points(program.outputs());
+        let count = program.operations_with_kept(program.outputs(), &kept);
         BodyForceCost {
             stages: [
                 ("once a run", count.fixed),

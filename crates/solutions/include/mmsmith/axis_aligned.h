@@ -141,12 +141,65 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
 
 #endif
 
+#ifndef MMSMITH_LOGARITHM
+#define MMSMITH_LOGARITHM 1
+
+/* ln(y) where by_y, else ln(1 + x), by the reduction and the polynomial of Sun's fdlibm. */
+MMSMITH_FN double mmsmith_logarithm(double x, double y, int by_y)
+{
+    const double sum = 1.0 + x;
+    const double u = by_y ? y : sum;
+    /* What rounding took from the sum. */
+    const double lost = by_y ? 0.0 : x < 1.0 ? x - (sum - 1.0) : 1.0 - (sum - x);
+    double m, f, correction, s, z, w, even, odd, half_square, tail;
+    int k, exact;
+    if (!(u > 0.0 && u - u == 0.0)) {
+        return u == 0.0 ? -HUGE_VAL : u > 0.0 ? u : NAN;
+    }
+    /* u = 2^k m with m between sqrt(1/2) and sqrt(2). */
+    m = frexp(u, &k);
+    if (m < 0.7071065902709961) {
+        m += m;
+        --k;
+    }
+    /* With k = 0 x itself has digits that the sum has lost. */
+    exact = k == 0 && !by_y;
+    f = exact ? x : m - 1.0;
+    /* lost / u, which two digits of 1/m are enough for. */
+    correction =
+        exact || by_y || k > 1022 ? 0.0 : lost * ldexp(1.0, -k) * (1.0 - f + f * f);
+    s = f / (2.0 + f);
+    z = s * s;
+    w = z * z;
+    even = w * (3.9999999999409419e-1 + w * (2.2222198432149784e-1 + w * 1.5313837699209373e-1));
+    odd = z
+        * (6.6666666666667351e-1
+            + w * (2.8571428743662391e-1 + w * (1.818357216161805e-1 + w * 1.4798198605116586e-1)));
+    half_square = 0.5 * f * f;
+    tail = s * (half_square + (even + odd)) + (k * 1.9082149292705877e-10 + correction);
+    return k * 6.931471803691238e-1 - ((half_square - tail) - f);
+}
+
+/* ln(1 + x), within one unit in the last place. */
+MMSMITH_FN double mmsmith_log_1p(double x)
+{
+    return mmsmith_logarithm(x, x, 0);
+}
+
+/* ln(y) of y = 1 + x: by y where x < -1/2, else by x. */
+MMSMITH_FN double mmsmith_ln_of_both(double x, double y)
+{
+    return mmsmith_logarithm(x, y, x < -0.5);
+}
+
+#endif
+
 /* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
 enum {
     axis_aligned_dimension = 2,
     axis_aligned_parameter_count = 4,
     axis_aligned_time_count = 4,
-    axis_aligned_point_count = 10
+    axis_aligned_point_count = 4
 };
 
 typedef struct axis_aligned_parameters {
@@ -390,7 +443,7 @@ MMSMITH_FN void axis_aligned_P(const axis_aligned_solution *s, const double X[2]
     const double t53 = t14 * t39;
     const double t54 = t52 + t53;
     const double t55 = s->fixed[1] * t54;
-    const double t56 = (t55 < -0.5 ? log(t45) : log1p(t55));
+    const double t56 = mmsmith_ln_of_both(t55, t45);
     const double t60 = t37 + 2.0;
     const double t64 = s->fixed[5] * t56;
     const double t66 = s->fixed[6] * t9;
@@ -435,7 +488,7 @@ MMSMITH_FN void axis_aligned_b(const axis_aligned_solution *s, const double X[2]
     const double t96 = s->fixed[1] * t53;
     const double t97 = t96 + 1.0;
     const double t98 = t91 * t97;
-    const double t99 = (t95 < -0.5 ? log(t98) : log1p(t95));
+    const double t99 = mmsmith_ln_of_both(t95, t98);
     const double t100 = s->fixed[5] * t99;
     const double t101 = s->fixed[4] * t90;
     const double t102 = t100 + t101;
@@ -495,7 +548,7 @@ MMSMITH_FN void axis_aligned_X_lower_traction(const axis_aligned_solution *s, co
     const double t191 = t190 + t53;
     const double t192 = s->fixed[1] * t191;
     const double t193 = t189 * t44;
-    const double t194 = (t192 < -0.5 ? log(t193) : log1p(t192));
+    const double t194 = mmsmith_ln_of_both(t192, t193);
     const double t195 = t36 + 2.0;
     const double t196 = s->fixed[5] * t194;
     const double t197 = t9 * t195;
@@ -527,7 +580,7 @@ MMSMITH_FN void axis_aligned_X_upper_traction(const axis_aligned_solution *s, co
     const double t205 = s->fixed[1] * t204;
     const double t206 = -t205;
     const double t207 = t203 * t44;
-    const double t208 = (t206 < -0.5 ? log(t207) : log1p(t206));
+    const double t208 = mmsmith_ln_of_both(t206, t207);
     const double t209 = 2.0 - t36;
     const double t210 = s->fixed[5] * t208;
     const double t211 = t9 * t209;
@@ -557,7 +610,7 @@ MMSMITH_FN void axis_aligned_Y_lower_traction(const axis_aligned_solution *s, co
     const double t218 = t217 + t89;
     const double t219 = s->fixed[1] * t218;
     const double t220 = t216 * t43;
-    const double t221 = (t219 < -0.5 ? log(t220) : log1p(t219));
+    const double t221 = mmsmith_ln_of_both(t219, t220);
     const double t222 = t40 + 2.0;
     const double t223 = s->fixed[5] * t221;
     const double t224 = t14 * t222;
@@ -589,7 +642,7 @@ MMSMITH_FN void axis_aligned_Y_upper_traction(const axis_aligned_solution *s, co
     const double t232 = s->fixed[1] * t231;
     const double t233 = -t232;
     const double t234 = t230 * t43;
-    const double t235 = (t233 < -0.5 ? log(t234) : log1p(t233));
+    const double t235 = mmsmith_ln_of_both(t233, t234);
     const double t236 = 2.0 - t40;
     const double t237 = s->fixed[5] * t235;
     const double t238 = t14 * t236;
@@ -638,7 +691,7 @@ MMSMITH_FN void axis_aligned_fields(const axis_aligned_solution *s, const double
     const double t53 = t14 * t39;
     const double t54 = t52 + t53;
     const double t55 = s->fixed[1] * t54;
-    const double t56 = (t55 < -0.5 ? log(t45) : log1p(t55));
+    const double t56 = mmsmith_ln_of_both(t55, t45);
     const double t60 = t37 + 2.0;
     const double t64 = s->fixed[5] * t56;
     const double t66 = s->fixed[6] * t9;
@@ -666,7 +719,7 @@ MMSMITH_FN void axis_aligned_fields(const axis_aligned_solution *s, const double
     const double t96 = s->fixed[1] * t53;
     const double t97 = t96 + 1.0;
     const double t98 = t91 * t97;
-    const double t99 = (t95 < -0.5 ? log(t98) : log1p(t95));
+    const double t99 = mmsmith_ln_of_both(t95, t98);
     const double t100 = s->fixed[5] * t99;
     const double t101 = s->fixed[4] * t90;
     const double t102 = t100 + t101;
@@ -743,41 +796,18 @@ MMSMITH_FN axis_aligned_time_values axis_aligned_at_time(const axis_aligned_solu
     return time;
 }
 
-/* What the body force needs of the position alone, 10 values. */
-MMSMITH_FN void axis_aligned_at_point(const axis_aligned_solution *s, const double X[2], double point[10])
+/* What the body force needs of the position alone, 4 values. */
+MMSMITH_FN void axis_aligned_at_point(const axis_aligned_solution *s, const double X[2], double point[4])
 {
+    (void)s;
     const double t2 = mmsmith_sin_pi(X[0]);
     const double t13 = mmsmith_sin_pi(X[1]);
     const double t35 = mmsmith_cos_pi(X[0]);
     const double t39 = mmsmith_cos_pi(X[1]);
-    const double t138 = s->fixed[7] * t2;
-    const double t143 = t35 * t35;
-    const double t147 = t2 * t143;
-    const double t148 = s->fixed[9] * t147;
-    const double t149 = -t148;
-    const double t155 = t2 * t35;
-    const double t156 = s->fixed[10] * t155;
-    const double t161 = s->fixed[11] * t2;
-    const double t162 = -t161;
-    const double t170 = s->fixed[7] * t13;
-    const double t171 = t39 * t39;
-    const double t172 = t13 * t171;
-    const double t173 = s->fixed[9] * t172;
-    const double t174 = -t173;
-    const double t175 = t13 * t39;
-    const double t176 = s->fixed[10] * t175;
-    const double t179 = s->fixed[11] * t13;
-    const double t180 = -t179;
-    point[0] = t35;
-    point[1] = t39;
-    point[2] = t138;
-    point[3] = t149;
-    point[4] = t156;
-    point[5] = t162;
-    point[6] = t170;
-    point[7] = t174;
-    point[8] = t176;
-    point[9] = t180;
+    point[0] = t2;
+    point[1] = t13;
+    point[2] = t35;
+    point[3] = t39;
 }
 
 /* The body force from the values of one time and of one point. Value m of the point is point[m*stride]:
@@ -786,36 +816,54 @@ MMSMITH_FN void axis_aligned_at_point(const axis_aligned_solution *s, const doub
 MMSMITH_FN void axis_aligned_b_staged(const axis_aligned_solution *s, const axis_aligned_time_values *time,
     const double *point, size_t stride, double b[2])
 {
-    const double t37 = time->values[2] * point[0];
-    const double t41 = time->values[3] * point[stride];
+    const double t37 = time->values[2] * point[2 * stride];
+    const double t41 = time->values[3] * point[3 * stride];
     const double t43 = t37 + 1.0;
     const double t44 = t41 + 1.0;
     const double t45 = t43 * t44;
-    const double t51 = point[0] * t44;
+    const double t51 = point[2 * stride] * t44;
     const double t52 = time->values[0] * t51;
-    const double t53 = time->values[1] * point[stride];
+    const double t53 = time->values[1] * point[3 * stride];
     const double t54 = t52 + t53;
     const double t55 = s->fixed[1] * t54;
-    const double t56 = (t55 < -0.5 ? log(t45) : log1p(t55));
+    const double t56 = mmsmith_ln_of_both(t55, t45);
     const double t70 = 1.0 / t43;
     const double t77 = 1.0 / t44;
-    const double t157 = time->values[0] * point[3 * stride];
-    const double t158 = t157 - point[4 * stride];
+    const double t138 = s->fixed[7] * point[0];
+    const double t143 = point[2 * stride] * point[2 * stride];
+    const double t147 = point[0] * t143;
+    const double t148 = s->fixed[9] * t147;
+    const double t149 = -t148;
+    const double t155 = point[0] * point[2 * stride];
+    const double t156 = s->fixed[10] * t155;
+    const double t157 = time->values[0] * t149;
+    const double t158 = t157 - t156;
+    const double t161 = s->fixed[11] * point[0];
+    const double t162 = -t161;
     const double t163 = time->values[0] * t158;
-    const double t164 = point[5 * stride] * t56;
+    const double t164 = t162 * t56;
     const double t165 = t163 + t164;
     const double t166 = t70 * t70;
     const double t167 = t165 * t166;
-    const double t168 = point[2 * stride] + t167;
+    const double t168 = t138 + t167;
     const double t169 = time->values[0] * t168;
-    const double t177 = time->values[1] * point[7 * stride];
-    const double t178 = t177 - point[8 * stride];
+    const double t170 = s->fixed[7] * point[stride];
+    const double t171 = point[3 * stride] * point[3 * stride];
+    const double t172 = point[stride] * t171;
+    const double t173 = s->fixed[9] * t172;
+    const double t174 = -t173;
+    const double t175 = point[stride] * point[3 * stride];
+    const double t176 = s->fixed[10] * t175;
+    const double t177 = time->values[1] * t174;
+    const double t178 = t177 - t176;
+    const double t179 = s->fixed[11] * point[stride];
+    const double t180 = -t179;
     const double t181 = time->values[1] * t178;
-    const double t182 = point[9 * stride] * t56;
+    const double t182 = t180 * t56;
     const double t183 = t181 + t182;
     const double t184 = t77 * t77;
     const double t185 = t183 * t184;
-    const double t186 = point[6 * stride] + t185;
+    const double t186 = t170 + t185;
     const double t187 = time->values[1] * t186;
     b[0] = t169;
     b[1] = t187;
@@ -829,9 +877,9 @@ MMSMITH_FN void axis_aligned_point_array(const axis_aligned_solution *s, size_t 
 {
     size_t p, m;
     for (p = 0; p < n; ++p) {
-        double values[10];
+        double values[4];
         axis_aligned_at_point(s, X + p * 2, values);
-        for (m = 0; m < 10; ++m) {
+        for (m = 0; m < 4; ++m) {
             point[m * n + p] = values[m];
         }
     }
@@ -848,45 +896,57 @@ MMSMITH_FN void axis_aligned_b_array(const axis_aligned_solution *s, double t, s
     const double *const point1 = point + 1 * n;
     const double *const point2 = point + 2 * n;
     const double *const point3 = point + 3 * n;
-    const double *const point4 = point + 4 * n;
-    const double *const point5 = point + 5 * n;
-    const double *const point6 = point + 6 * n;
-    const double *const point7 = point + 7 * n;
-    const double *const point8 = point + 8 * n;
-    const double *const point9 = point + 9 * n;
     const size_t end = first + count;
     size_t p;
     for (p = first; p < end; ++p) {
-        const double t37 = time.values[2] * point0[p];
-        const double t41 = time.values[3] * point1[p];
+        const double t37 = time.values[2] * point2[p];
+        const double t41 = time.values[3] * point3[p];
         const double t43 = t37 + 1.0;
         const double t44 = t41 + 1.0;
         const double t45 = t43 * t44;
-        const double t51 = point0[p] * t44;
+        const double t51 = point2[p] * t44;
         const double t52 = time.values[0] * t51;
-        const double t53 = time.values[1] * point1[p];
+        const double t53 = time.values[1] * point3[p];
         const double t54 = t52 + t53;
         const double t55 = s->fixed[1] * t54;
-        const double t56 = (t55 < -0.5 ? log(t45) : log1p(t55));
+        const double t56 = mmsmith_ln_of_both(t55, t45);
         const double t70 = 1.0 / t43;
         const double t77 = 1.0 / t44;
-        const double t157 = time.values[0] * point3[p];
-        const double t158 = t157 - point4[p];
+        const double t138 = s->fixed[7] * point0[p];
+        const double t143 = point2[p] * point2[p];
+        const double t147 = point0[p] * t143;
+        const double t148 = s->fixed[9] * t147;
+        const double t149 = -t148;
+        const double t155 = point0[p] * point2[p];
+        const double t156 = s->fixed[10] * t155;
+        const double t157 = time.values[0] * t149;
+        const double t158 = t157 - t156;
+        const double t161 = s->fixed[11] * point0[p];
+        const double t162 = -t161;
         const double t163 = time.values[0] * t158;
-        const double t164 = point5[p] * t56;
+        const double t164 = t162 * t56;
         const double t165 = t163 + t164;
         const double t166 = t70 * t70;
         const double t167 = t165 * t166;
-        const double t168 = point2[p] + t167;
+        const double t168 = t138 + t167;
         const double t169 = time.values[0] * t168;
-        const double t177 = time.values[1] * point7[p];
-        const double t178 = t177 - point8[p];
+        const double t170 = s->fixed[7] * point1[p];
+        const double t171 = point3[p] * point3[p];
+        const double t172 = point1[p] * t171;
+        const double t173 = s->fixed[9] * t172;
+        const double t174 = -t173;
+        const double t175 = point1[p] * point3[p];
+        const double t176 = s->fixed[10] * t175;
+        const double t177 = time.values[1] * t174;
+        const double t178 = t177 - t176;
+        const double t179 = s->fixed[11] * point1[p];
+        const double t180 = -t179;
         const double t181 = time.values[1] * t178;
-        const double t182 = point9[p] * t56;
+        const double t182 = t180 * t56;
         const double t183 = t181 + t182;
         const double t184 = t77 * t77;
         const double t185 = t183 * t184;
-        const double t186 = point6[p] + t185;
+        const double t186 = t170 + t185;
         const double t187 = time.values[1] * t186;
         b[p * 2 + 0] = t169;
         b[p * 2 + 1] = t187;

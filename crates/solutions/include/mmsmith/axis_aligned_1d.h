@@ -138,30 +138,33 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
 
 #endif
 
-#ifndef MMSMITH_LOG_1P
-#define MMSMITH_LOG_1P 1
+#ifndef MMSMITH_LOGARITHM
+#define MMSMITH_LOGARITHM 1
 
-/* ln(1 + x), within one unit in the last place, by the reduction and the polynomial of Sun's fdlibm. */
-MMSMITH_FN double mmsmith_log_1p(double x)
+/* ln(y) where by_y, else ln(1 + x), by the reduction and the polynomial of Sun's fdlibm. */
+MMSMITH_FN double mmsmith_logarithm(double x, double y, int by_y)
 {
     const double sum = 1.0 + x;
+    const double u = by_y ? y : sum;
     /* What rounding took from the sum. */
-    const double lost = x < 1.0 ? x - (sum - 1.0) : 1.0 - (sum - x);
+    const double lost = by_y ? 0.0 : x < 1.0 ? x - (sum - 1.0) : 1.0 - (sum - x);
     double m, f, correction, s, z, w, even, odd, half_square, tail;
-    int k;
-    if (!(sum > 0.0 && x - x == 0.0)) {
-        return sum == 0.0 ? -HUGE_VAL : sum > 0.0 ? sum : NAN;
+    int k, exact;
+    if (!(u > 0.0 && u - u == 0.0)) {
+        return u == 0.0 ? -HUGE_VAL : u > 0.0 ? u : NAN;
     }
-    /* sum = 2^k m with m between sqrt(1/2) and sqrt(2). */
-    m = frexp(sum, &k);
+    /* u = 2^k m with m between sqrt(1/2) and sqrt(2). */
+    m = frexp(u, &k);
     if (m < 0.7071065902709961) {
         m += m;
         --k;
     }
     /* With k = 0 x itself has digits that the sum has lost. */
-    f = k == 0 ? x : m - 1.0;
-    /* lost / sum, which two digits of 1/m are enough for. */
-    correction = k == 0 || k > 1022 ? 0.0 : lost * ldexp(1.0, -k) * (1.0 - f + f * f);
+    exact = k == 0 && !by_y;
+    f = exact ? x : m - 1.0;
+    /* lost / u, which two digits of 1/m are enough for. */
+    correction =
+        exact || by_y || k > 1022 ? 0.0 : lost * ldexp(1.0, -k) * (1.0 - f + f * f);
     s = f / (2.0 + f);
     z = s * s;
     w = z * z;
@@ -174,6 +177,18 @@ MMSMITH_FN double mmsmith_log_1p(double x)
     return k * 6.931471803691238e-1 - ((half_square - tail) - f);
 }
 
+/* ln(1 + x), within one unit in the last place. */
+MMSMITH_FN double mmsmith_log_1p(double x)
+{
+    return mmsmith_logarithm(x, x, 0);
+}
+
+/* ln(y) of y = 1 + x: by y where x < -1/2, else by x. */
+MMSMITH_FN double mmsmith_ln_of_both(double x, double y)
+{
+    return mmsmith_logarithm(x, y, x < -0.5);
+}
+
 #endif
 
 /* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
@@ -181,7 +196,7 @@ enum {
     axis_aligned_1d_dimension = 1,
     axis_aligned_1d_parameter_count = 4,
     axis_aligned_1d_time_count = 2,
-    axis_aligned_1d_point_count = 5
+    axis_aligned_1d_point_count = 2
 };
 
 typedef struct axis_aligned_1d_parameters {
@@ -545,25 +560,14 @@ MMSMITH_FN axis_aligned_1d_time_values axis_aligned_1d_at_time(const axis_aligne
     return time;
 }
 
-/* What the body force needs of the position alone, 5 values. */
-MMSMITH_FN void axis_aligned_1d_at_point(const axis_aligned_1d_solution *s, const double X[1], double point[5])
+/* What the body force needs of the position alone, 2 values. */
+MMSMITH_FN void axis_aligned_1d_at_point(const axis_aligned_1d_solution *s, const double X[1], double point[2])
 {
+    (void)s;
     const double t2 = mmsmith_sin_pi(X[0]);
     const double t26 = mmsmith_cos_pi(X[0]);
-    const double t85 = s->fixed[8] * t2;
-    const double t90 = t26 * t26;
-    const double t94 = t2 * t90;
-    const double t95 = s->fixed[11] * t94;
-    const double t96 = -t95;
-    const double t102 = t2 * t26;
-    const double t103 = s->fixed[12] * t102;
-    const double t108 = s->fixed[13] * t2;
-    const double t109 = -t108;
-    point[0] = t26;
-    point[1] = t85;
-    point[2] = t96;
-    point[3] = t103;
-    point[4] = t109;
+    point[0] = t2;
+    point[1] = t26;
 }
 
 /* The body force from the values of one time and of one point. Value m of the point is point[m*stride]:
@@ -572,19 +576,27 @@ MMSMITH_FN void axis_aligned_1d_at_point(const axis_aligned_1d_solution *s, cons
 MMSMITH_FN void axis_aligned_1d_b_staged(const axis_aligned_1d_solution *s, const axis_aligned_1d_time_values *time,
     const double *point, size_t stride, double b[1])
 {
-    (void)s;
-    const double t28 = time->values[1] * point[0];
+    const double t28 = time->values[1] * point[stride];
     const double t30 = t28 + 1.0;
     const double t36 = mmsmith_log_1p(t28);
     const double t50 = 1.0 / t30;
-    const double t104 = time->values[0] * point[2 * stride];
-    const double t105 = t104 - point[3 * stride];
+    const double t85 = s->fixed[8] * point[0];
+    const double t90 = point[stride] * point[stride];
+    const double t94 = point[0] * t90;
+    const double t95 = s->fixed[11] * t94;
+    const double t96 = -t95;
+    const double t102 = point[0] * point[stride];
+    const double t103 = s->fixed[12] * t102;
+    const double t104 = time->values[0] * t96;
+    const double t105 = t104 - t103;
+    const double t108 = s->fixed[13] * point[0];
+    const double t109 = -t108;
     const double t110 = time->values[0] * t105;
-    const double t111 = point[4 * stride] * t36;
+    const double t111 = t109 * t36;
     const double t112 = t110 + t111;
     const double t113 = t50 * t50;
     const double t114 = t112 * t113;
-    const double t115 = point[stride] + t114;
+    const double t115 = t85 + t114;
     const double t116 = time->values[0] * t115;
     b[0] = t116;
 }
@@ -597,9 +609,9 @@ MMSMITH_FN void axis_aligned_1d_point_array(const axis_aligned_1d_solution *s, s
 {
     size_t p, m;
     for (p = 0; p < n; ++p) {
-        double values[5];
+        double values[2];
         axis_aligned_1d_at_point(s, X + p * 1, values);
-        for (m = 0; m < 5; ++m) {
+        for (m = 0; m < 2; ++m) {
             point[m * n + p] = values[m];
         }
     }
@@ -614,24 +626,30 @@ MMSMITH_FN void axis_aligned_1d_b_array(const axis_aligned_1d_solution *s, doubl
     const axis_aligned_1d_time_values time = axis_aligned_1d_at_time(s, t);
     const double *const point0 = point + 0 * n;
     const double *const point1 = point + 1 * n;
-    const double *const point2 = point + 2 * n;
-    const double *const point3 = point + 3 * n;
-    const double *const point4 = point + 4 * n;
     const size_t end = first + count;
     size_t p;
     for (p = first; p < end; ++p) {
-        const double t28 = time.values[1] * point0[p];
+        const double t28 = time.values[1] * point1[p];
         const double t30 = t28 + 1.0;
         const double t36 = mmsmith_log_1p(t28);
         const double t50 = 1.0 / t30;
-        const double t104 = time.values[0] * point2[p];
-        const double t105 = t104 - point3[p];
+        const double t85 = s->fixed[8] * point0[p];
+        const double t90 = point1[p] * point1[p];
+        const double t94 = point0[p] * t90;
+        const double t95 = s->fixed[11] * t94;
+        const double t96 = -t95;
+        const double t102 = point0[p] * point1[p];
+        const double t103 = s->fixed[12] * t102;
+        const double t104 = time.values[0] * t96;
+        const double t105 = t104 - t103;
+        const double t108 = s->fixed[13] * point0[p];
+        const double t109 = -t108;
         const double t110 = time.values[0] * t105;
-        const double t111 = point4[p] * t36;
+        const double t111 = t109 * t36;
         const double t112 = t110 + t111;
         const double t113 = t50 * t50;
         const double t114 = t112 * t113;
-        const double t115 = point1[p] + t114;
+        const double t115 = t85 + t114;
         const double t116 = time.values[0] * t115;
         b[p * 1 + 0] = t116;
     }

@@ -144,12 +144,65 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
 
 #endif
 
+#ifndef MMSMITH_LOGARITHM
+#define MMSMITH_LOGARITHM 1
+
+/* ln(y) where by_y, else ln(1 + x), by the reduction and the polynomial of Sun's fdlibm. */
+MMSMITH_FN double mmsmith_logarithm(double x, double y, int by_y)
+{
+    const double sum = 1.0 + x;
+    const double u = by_y ? y : sum;
+    /* What rounding took from the sum. */
+    const double lost = by_y ? 0.0 : x < 1.0 ? x - (sum - 1.0) : 1.0 - (sum - x);
+    double m, f, correction, s, z, w, even, odd, half_square, tail;
+    int k, exact;
+    if (!(u > 0.0 && u - u == 0.0)) {
+        return u == 0.0 ? -HUGE_VAL : u > 0.0 ? u : NAN;
+    }
+    /* u = 2^k m with m between sqrt(1/2) and sqrt(2). */
+    m = frexp(u, &k);
+    if (m < 0.7071065902709961) {
+        m += m;
+        --k;
+    }
+    /* With k = 0 x itself has digits that the sum has lost. */
+    exact = k == 0 && !by_y;
+    f = exact ? x : m - 1.0;
+    /* lost / u, which two digits of 1/m are enough for. */
+    correction =
+        exact || by_y || k > 1022 ? 0.0 : lost * ldexp(1.0, -k) * (1.0 - f + f * f);
+    s = f / (2.0 + f);
+    z = s * s;
+    w = z * z;
+    even = w * (3.9999999999409419e-1 + w * (2.2222198432149784e-1 + w * 1.5313837699209373e-1));
+    odd = z
+        * (6.6666666666667351e-1
+            + w * (2.8571428743662391e-1 + w * (1.818357216161805e-1 + w * 1.4798198605116586e-1)));
+    half_square = 0.5 * f * f;
+    tail = s * (half_square + (even + odd)) + (k * 1.9082149292705877e-10 + correction);
+    return k * 6.931471803691238e-1 - ((half_square - tail) - f);
+}
+
+/* ln(1 + x), within one unit in the last place. */
+MMSMITH_FN double mmsmith_log_1p(double x)
+{
+    return mmsmith_logarithm(x, x, 0);
+}
+
+/* ln(y) of y = 1 + x: by y where x < -1/2, else by x. */
+MMSMITH_FN double mmsmith_ln_of_both(double x, double y)
+{
+    return mmsmith_logarithm(x, y, x < -0.5);
+}
+
+#endif
+
 /* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
 enum {
     axis_aligned_3d_dimension = 3,
     axis_aligned_3d_parameter_count = 4,
     axis_aligned_3d_time_count = 6,
-    axis_aligned_3d_point_count = 15
+    axis_aligned_3d_point_count = 6
 };
 
 typedef struct axis_aligned_3d_parameters {
@@ -499,7 +552,7 @@ MMSMITH_FN void axis_aligned_3d_P(const axis_aligned_3d_solution *s, const doubl
     const double t96 = s->fixed[3] * t95;
     const double t97 = t96 + t91;
     const double t98 = t97 - t70;
-    const double t99 = (t98 < -0.5 ? log(t86) : log1p(t98));
+    const double t99 = mmsmith_ln_of_both(t98, t86);
     const double t102 = t62 + 2.0;
     const double t106 = s->fixed[11] * t99;
     const double t108 = s->fixed[12] * t9;
@@ -567,7 +620,7 @@ MMSMITH_FN void axis_aligned_3d_b(const axis_aligned_3d_solution *s, const doubl
     const double t96 = s->fixed[3] * t95;
     const double t97 = t96 + t91;
     const double t98 = t97 - t70;
-    const double t99 = (t98 < -0.5 ? log(t86) : log1p(t98));
+    const double t99 = mmsmith_ln_of_both(t98, t86);
     const double t106 = s->fixed[11] * t99;
     const double t108 = s->fixed[12] * t9;
     const double t109 = t108 * t60;
@@ -665,7 +718,7 @@ MMSMITH_FN void axis_aligned_3d_X_lower_traction(const axis_aligned_3d_solution 
     const double t275 = t61 + t274;
     const double t276 = t83 * t84;
     const double t277 = t270 * t276;
-    const double t278 = (t275 < -0.5 ? log(t277) : log1p(t275));
+    const double t278 = mmsmith_ln_of_both(t275, t277);
     const double t279 = t61 + 2.0;
     const double t280 = s->fixed[11] * t278;
     const double t281 = t9 * t279;
@@ -710,7 +763,7 @@ MMSMITH_FN void axis_aligned_3d_X_upper_traction(const axis_aligned_3d_solution 
     const double t289 = t288 - t70;
     const double t290 = t289 - t61;
     const double t291 = t287 * t276;
-    const double t292 = (t290 < -0.5 ? log(t291) : log1p(t290));
+    const double t292 = mmsmith_ln_of_both(t290, t291);
     const double t293 = 2.0 - t61;
     const double t294 = s->fixed[11] * t292;
     const double t295 = t9 * t293;
@@ -755,7 +808,7 @@ MMSMITH_FN void axis_aligned_3d_Y_lower_traction(const axis_aligned_3d_solution 
     const double t308 = t307 - t65;
     const double t309 = t73 * t84;
     const double t310 = t301 * t309;
-    const double t311 = (t308 < -0.5 ? log(t310) : log1p(t308));
+    const double t311 = mmsmith_ln_of_both(t308, t310);
     const double t312 = t300 + 2.0;
     const double t313 = s->fixed[11] * t311;
     const double t314 = t300 * t312;
@@ -800,7 +853,7 @@ MMSMITH_FN void axis_aligned_3d_Y_upper_traction(const axis_aligned_3d_solution 
     const double t326 = t325 + t321;
     const double t327 = t65 + t326;
     const double t328 = t320 * t309;
-    const double t329 = (t327 < -0.5 ? log(t328) : log1p(t327));
+    const double t329 = mmsmith_ln_of_both(t327, t328);
     const double t330 = t65 + 2.0;
     const double t331 = s->fixed[11] * t329;
     const double t332 = t65 * t330;
@@ -845,7 +898,7 @@ MMSMITH_FN void axis_aligned_3d_Z_lower_traction(const axis_aligned_3d_solution 
     const double t344 = t343 + t339;
     const double t345 = t344 - t69;
     const double t346 = t338 * t85;
-    const double t347 = (t345 < -0.5 ? log(t346) : log1p(t345));
+    const double t347 = mmsmith_ln_of_both(t345, t346);
     const double t348 = t337 + 2.0;
     const double t349 = s->fixed[11] * t347;
     const double t350 = t337 * t348;
@@ -890,7 +943,7 @@ MMSMITH_FN void axis_aligned_3d_Z_upper_traction(const axis_aligned_3d_solution 
     const double t362 = t361 + t357;
     const double t363 = t69 + t362;
     const double t364 = t356 * t85;
-    const double t365 = (t363 < -0.5 ? log(t364) : log1p(t363));
+    const double t365 = mmsmith_ln_of_both(t363, t364);
     const double t366 = t69 + 2.0;
     const double t367 = s->fixed[11] * t365;
     const double t368 = t69 * t366;
@@ -973,7 +1026,7 @@ MMSMITH_FN void axis_aligned_3d_fields(const axis_aligned_3d_solution *s, const 
     const double t96 = s->fixed[3] * t95;
     const double t97 = t96 + t91;
     const double t98 = t97 - t70;
-    const double t99 = (t98 < -0.5 ? log(t86) : log1p(t98));
+    const double t99 = mmsmith_ln_of_both(t98, t86);
     const double t102 = t62 + 2.0;
     const double t106 = s->fixed[11] * t99;
     const double t108 = s->fixed[12] * t9;
@@ -1113,53 +1166,22 @@ MMSMITH_FN axis_aligned_3d_time_values axis_aligned_3d_at_time(const axis_aligne
     return time;
 }
 
-/* What the body force needs of the position alone, 15 values. */
-MMSMITH_FN void axis_aligned_3d_at_point(const axis_aligned_3d_solution *s, const double X[3], double point[15])
+/* What the body force needs of the position alone, 6 values. */
+MMSMITH_FN void axis_aligned_3d_at_point(const axis_aligned_3d_solution *s, const double X[3], double point[6])
 {
+    (void)s;
     const double t2 = mmsmith_sin_pi(X[0]);
     const double t13 = mmsmith_sin_pi(X[1]);
     const double t25 = mmsmith_sin_pi(X[2]);
     const double t60 = mmsmith_cos_pi(X[0]);
     const double t64 = mmsmith_cos_pi(X[1]);
     const double t68 = mmsmith_cos_pi(X[2]);
-    const double t195 = s->fixed[13] * t2;
-    const double t199 = t60 * t60;
-    const double t203 = t2 * t199;
-    const double t204 = s->fixed[18] * t203;
-    const double t205 = -t204;
-    const double t211 = t2 * t60;
-    const double t212 = s->fixed[19] * t211;
-    const double t217 = s->fixed[20] * t2;
-    const double t218 = -t217;
-    const double t226 = s->fixed[16] * t13;
-    const double t228 = t64 * t64;
-    const double t233 = t13 * t228;
-    const double t234 = s->fixed[21] * t233;
-    const double t239 = t13 * t64;
-    const double t240 = s->fixed[22] * t239;
-    const double t245 = s->fixed[23] * t13;
-    const double t253 = s->fixed[16] * t25;
-    const double t254 = t68 * t68;
-    const double t255 = t25 * t254;
-    const double t256 = s->fixed[21] * t255;
-    const double t257 = t25 * t68;
-    const double t258 = s->fixed[22] * t257;
-    const double t261 = s->fixed[23] * t25;
-    point[0] = t60;
-    point[1] = t64;
-    point[2] = t68;
-    point[3] = t195;
-    point[4] = t205;
-    point[5] = t212;
-    point[6] = t218;
-    point[7] = t226;
-    point[8] = t234;
-    point[9] = t240;
-    point[10] = t245;
-    point[11] = t253;
-    point[12] = t256;
-    point[13] = t258;
-    point[14] = t261;
+    point[0] = t2;
+    point[1] = t13;
+    point[2] = t25;
+    point[3] = t60;
+    point[4] = t64;
+    point[5] = t68;
 }
 
 /* The body force from the values of one time and of one point. Value m of the point is point[m*stride]:
@@ -1168,10 +1190,10 @@ MMSMITH_FN void axis_aligned_3d_at_point(const axis_aligned_3d_solution *s, cons
 MMSMITH_FN void axis_aligned_3d_b_staged(const axis_aligned_3d_solution *s, const axis_aligned_3d_time_values *time,
     const double *point, size_t stride, double b[3])
 {
-    const double t62 = time->values[3] * point[0];
-    const double t66 = time->values[4] * point[stride];
+    const double t62 = time->values[3] * point[3 * stride];
+    const double t66 = time->values[4] * point[4 * stride];
     const double t67 = -t66;
-    const double t70 = time->values[5] * point[2 * stride];
+    const double t70 = time->values[5] * point[5 * stride];
     const double t71 = -t70;
     const double t73 = t62 + 1.0;
     const double t83 = t67 + 1.0;
@@ -1181,41 +1203,64 @@ MMSMITH_FN void axis_aligned_3d_b_staged(const axis_aligned_3d_solution *s, cons
     const double t91 = t67 * t84;
     const double t92 = t91 - t70;
     const double t93 = t92 + 1.0;
-    const double t94 = time->values[0] * point[0];
+    const double t94 = time->values[0] * point[3 * stride];
     const double t95 = t94 * t93;
     const double t96 = s->fixed[3] * t95;
     const double t97 = t96 + t91;
     const double t98 = t97 - t70;
-    const double t99 = (t98 < -0.5 ? log(t86) : log1p(t98));
+    const double t99 = mmsmith_ln_of_both(t98, t86);
     const double t112 = 1.0 / t73;
     const double t118 = 1.0 / t83;
     const double t124 = 1.0 / t84;
-    const double t213 = time->values[0] * point[4 * stride];
-    const double t214 = t213 - point[5 * stride];
+    const double t195 = s->fixed[13] * point[0];
+    const double t199 = point[3 * stride] * point[3 * stride];
+    const double t203 = point[0] * t199;
+    const double t204 = s->fixed[18] * t203;
+    const double t205 = -t204;
+    const double t211 = point[0] * point[3 * stride];
+    const double t212 = s->fixed[19] * t211;
+    const double t213 = time->values[0] * t205;
+    const double t214 = t213 - t212;
+    const double t217 = s->fixed[20] * point[0];
+    const double t218 = -t217;
     const double t219 = time->values[0] * t214;
-    const double t220 = point[6 * stride] * t99;
+    const double t220 = t218 * t99;
     const double t221 = t219 + t220;
     const double t222 = t112 * t112;
     const double t223 = t221 * t222;
-    const double t224 = point[3 * stride] + t223;
+    const double t224 = t195 + t223;
     const double t225 = time->values[0] * t224;
-    const double t241 = time->values[1] * point[8 * stride];
-    const double t242 = t241 - point[9 * stride];
+    const double t226 = s->fixed[16] * point[stride];
+    const double t228 = point[4 * stride] * point[4 * stride];
+    const double t233 = point[stride] * t228;
+    const double t234 = s->fixed[21] * t233;
+    const double t239 = point[stride] * point[4 * stride];
+    const double t240 = s->fixed[22] * t239;
+    const double t241 = time->values[1] * t234;
+    const double t242 = t241 - t240;
+    const double t245 = s->fixed[23] * point[stride];
     const double t246 = time->values[1] * t242;
-    const double t247 = point[10 * stride] * t99;
+    const double t247 = t245 * t99;
     const double t248 = t246 + t247;
     const double t249 = t118 * t118;
     const double t250 = t248 * t249;
-    const double t251 = t250 - point[7 * stride];
+    const double t251 = t250 - t226;
     const double t252 = time->values[1] * t251;
-    const double t259 = time->values[2] * point[12 * stride];
-    const double t260 = t259 - point[13 * stride];
+    const double t253 = s->fixed[16] * point[2 * stride];
+    const double t254 = point[5 * stride] * point[5 * stride];
+    const double t255 = point[2 * stride] * t254;
+    const double t256 = s->fixed[21] * t255;
+    const double t257 = point[2 * stride] * point[5 * stride];
+    const double t258 = s->fixed[22] * t257;
+    const double t259 = time->values[2] * t256;
+    const double t260 = t259 - t258;
+    const double t261 = s->fixed[23] * point[2 * stride];
     const double t262 = time->values[2] * t260;
-    const double t263 = point[14 * stride] * t99;
+    const double t263 = t261 * t99;
     const double t264 = t262 + t263;
     const double t265 = t124 * t124;
     const double t266 = t264 * t265;
-    const double t267 = t266 - point[11 * stride];
+    const double t267 = t266 - t253;
     const double t268 = time->values[2] * t267;
     b[0] = t225;
     b[1] = t252;
@@ -1230,9 +1275,9 @@ MMSMITH_FN void axis_aligned_3d_point_array(const axis_aligned_3d_solution *s, s
 {
     size_t p, m;
     for (p = 0; p < n; ++p) {
-        double values[15];
+        double values[6];
         axis_aligned_3d_at_point(s, X + p * 3, values);
-        for (m = 0; m < 15; ++m) {
+        for (m = 0; m < 6; ++m) {
             point[m * n + p] = values[m];
         }
     }
@@ -1251,22 +1296,13 @@ MMSMITH_FN void axis_aligned_3d_b_array(const axis_aligned_3d_solution *s, doubl
     const double *const point3 = point + 3 * n;
     const double *const point4 = point + 4 * n;
     const double *const point5 = point + 5 * n;
-    const double *const point6 = point + 6 * n;
-    const double *const point7 = point + 7 * n;
-    const double *const point8 = point + 8 * n;
-    const double *const point9 = point + 9 * n;
-    const double *const point10 = point + 10 * n;
-    const double *const point11 = point + 11 * n;
-    const double *const point12 = point + 12 * n;
-    const double *const point13 = point + 13 * n;
-    const double *const point14 = point + 14 * n;
     const size_t end = first + count;
     size_t p;
     for (p = first; p < end; ++p) {
-        const double t62 = time.values[3] * point0[p];
-        const double t66 = time.values[4] * point1[p];
+        const double t62 = time.values[3] * point3[p];
+        const double t66 = time.values[4] * point4[p];
         const double t67 = -t66;
-        const double t70 = time.values[5] * point2[p];
+        const double t70 = time.values[5] * point5[p];
         const double t71 = -t70;
         const double t73 = t62 + 1.0;
         const double t83 = t67 + 1.0;
@@ -1276,41 +1312,64 @@ MMSMITH_FN void axis_aligned_3d_b_array(const axis_aligned_3d_solution *s, doubl
         const double t91 = t67 * t84;
         const double t92 = t91 - t70;
         const double t93 = t92 + 1.0;
-        const double t94 = time.values[0] * point0[p];
+        const double t94 = time.values[0] * point3[p];
         const double t95 = t94 * t93;
         const double t96 = s->fixed[3] * t95;
         const double t97 = t96 + t91;
         const double t98 = t97 - t70;
-        const double t99 = (t98 < -0.5 ? log(t86) : log1p(t98));
+        const double t99 = mmsmith_ln_of_both(t98, t86);
         const double t112 = 1.0 / t73;
         const double t118 = 1.0 / t83;
         const double t124 = 1.0 / t84;
-        const double t213 = time.values[0] * point4[p];
-        const double t214 = t213 - point5[p];
+        const double t195 = s->fixed[13] * point0[p];
+        const double t199 = point3[p] * point3[p];
+        const double t203 = point0[p] * t199;
+        const double t204 = s->fixed[18] * t203;
+        const double t205 = -t204;
+        const double t211 = point0[p] * point3[p];
+        const double t212 = s->fixed[19] * t211;
+        const double t213 = time.values[0] * t205;
+        const double t214 = t213 - t212;
+        const double t217 = s->fixed[20] * point0[p];
+        const double t218 = -t217;
         const double t219 = time.values[0] * t214;
-        const double t220 = point6[p] * t99;
+        const double t220 = t218 * t99;
         const double t221 = t219 + t220;
         const double t222 = t112 * t112;
         const double t223 = t221 * t222;
-        const double t224 = point3[p] + t223;
+        const double t224 = t195 + t223;
         const double t225 = time.values[0] * t224;
-        const double t241 = time.values[1] * point8[p];
-        const double t242 = t241 - point9[p];
+        const double t226 = s->fixed[16] * point1[p];
+        const double t228 = point4[p] * point4[p];
+        const double t233 = point1[p] * t228;
+        const double t234 = s->fixed[21] * t233;
+        const double t239 = point1[p] * point4[p];
+        const double t240 = s->fixed[22] * t239;
+        const double t241 = time.values[1] * t234;
+        const double t242 = t241 - t240;
+        const double t245 = s->fixed[23] * point1[p];
         const double t246 = time.values[1] * t242;
-        const double t247 = point10[p] * t99;
+        const double t247 = t245 * t99;
         const double t248 = t246 + t247;
         const double t249 = t118 * t118;
         const double t250 = t248 * t249;
-        const double t251 = t250 - point7[p];
+        const double t251 = t250 - t226;
         const double t252 = time.values[1] * t251;
-        const double t259 = time.values[2] * point12[p];
-        const double t260 = t259 - point13[p];
+        const double t253 = s->fixed[16] * point2[p];
+        const double t254 = point5[p] * point5[p];
+        const double t255 = point2[p] * t254;
+        const double t256 = s->fixed[21] * t255;
+        const double t257 = point2[p] * point5[p];
+        const double t258 = s->fixed[22] * t257;
+        const double t259 = time.values[2] * t256;
+        const double t260 = t259 - t258;
+        const double t261 = s->fixed[23] * point2[p];
         const double t262 = time.values[2] * t260;
-        const double t263 = point14[p] * t99;
+        const double t263 = t261 * t99;
         const double t264 = t262 + t263;
         const double t265 = t124 * t124;
         const double t266 = t264 * t265;
-        const double t267 = t266 - point11[p];
+        const double t267 = t266 - t253;
         const double t268 = time.values[2] * t267;
         b[p * 3 + 0] = t225;
         b[p * 3 + 1] = t252;

@@ -134,30 +134,33 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
 
 #endif
 
-#ifndef MMSMITH_LOG_1P
-#define MMSMITH_LOG_1P 1
+#ifndef MMSMITH_LOGARITHM
+#define MMSMITH_LOGARITHM 1
 
-/* ln(1 + x), within one unit in the last place, by the reduction and the polynomial of Sun's fdlibm. */
-MMSMITH_FN double mmsmith_log_1p(double x)
+/* ln(y) where by_y, else ln(1 + x), by the reduction and the polynomial of Sun's fdlibm. */
+MMSMITH_FN double mmsmith_logarithm(double x, double y, int by_y)
 {
     const double sum = 1.0 + x;
+    const double u = by_y ? y : sum;
     /* What rounding took from the sum. */
-    const double lost = x < 1.0 ? x - (sum - 1.0) : 1.0 - (sum - x);
+    const double lost = by_y ? 0.0 : x < 1.0 ? x - (sum - 1.0) : 1.0 - (sum - x);
     double m, f, correction, s, z, w, even, odd, half_square, tail;
-    int k;
-    if (!(sum > 0.0 && x - x == 0.0)) {
-        return sum == 0.0 ? -HUGE_VAL : sum > 0.0 ? sum : NAN;
+    int k, exact;
+    if (!(u > 0.0 && u - u == 0.0)) {
+        return u == 0.0 ? -HUGE_VAL : u > 0.0 ? u : NAN;
     }
-    /* sum = 2^k m with m between sqrt(1/2) and sqrt(2). */
-    m = frexp(sum, &k);
+    /* u = 2^k m with m between sqrt(1/2) and sqrt(2). */
+    m = frexp(u, &k);
     if (m < 0.7071065902709961) {
         m += m;
         --k;
     }
     /* With k = 0 x itself has digits that the sum has lost. */
-    f = k == 0 ? x : m - 1.0;
-    /* lost / sum, which two digits of 1/m are enough for. */
-    correction = k == 0 || k > 1022 ? 0.0 : lost * ldexp(1.0, -k) * (1.0 - f + f * f);
+    exact = k == 0 && !by_y;
+    f = exact ? x : m - 1.0;
+    /* lost / u, which two digits of 1/m are enough for. */
+    correction =
+        exact || by_y || k > 1022 ? 0.0 : lost * ldexp(1.0, -k) * (1.0 - f + f * f);
     s = f / (2.0 + f);
     z = s * s;
     w = z * z;
@@ -170,6 +173,18 @@ MMSMITH_FN double mmsmith_log_1p(double x)
     return k * 6.931471803691238e-1 - ((half_square - tail) - f);
 }
 
+/* ln(1 + x), within one unit in the last place. */
+MMSMITH_FN double mmsmith_log_1p(double x)
+{
+    return mmsmith_logarithm(x, x, 0);
+}
+
+/* ln(y) of y = 1 + x: by y where x < -1/2, else by x. */
+MMSMITH_FN double mmsmith_ln_of_both(double x, double y)
+{
+    return mmsmith_logarithm(x, y, x < -0.5);
+}
+
 #endif
 
 /* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
@@ -177,7 +192,7 @@ enum {
     bar_dimension = 1,
     bar_parameter_count = 5,
     bar_time_count = 2,
-    bar_point_count = 5
+    bar_point_count = 2
 };
 
 typedef struct bar_parameters {
@@ -572,26 +587,14 @@ MMSMITH_FN bar_time_values bar_at_time(const bar_solution *s, double t)
     return time;
 }
 
-/* What the body force needs of the position alone, 5 values. */
-MMSMITH_FN void bar_at_point(const bar_solution *s, const double X[1], double point[5])
+/* What the body force needs of the position alone, 2 values. */
+MMSMITH_FN void bar_at_point(const bar_solution *s, const double X[1], double point[2])
 {
     const double t5 = s->fixed[0] * X[0];
     const double t6 = mmsmith_sin_pi(t5);
     const double t34 = mmsmith_cos_pi(t5);
-    const double t92 = s->fixed[9] * t6;
-    const double t99 = t34 * t34;
-    const double t105 = t6 * t99;
-    const double t106 = s->fixed[12] * t105;
-    const double t107 = -t106;
-    const double t115 = t6 * t34;
-    const double t116 = s->fixed[13] * t115;
-    const double t125 = s->fixed[14] * t6;
-    const double t126 = -t125;
-    point[0] = t34;
-    point[1] = t92;
-    point[2] = t107;
-    point[3] = t116;
-    point[4] = t126;
+    point[0] = t6;
+    point[1] = t34;
 }
 
 /* The body force from the values of one time and of one point. Value m of the point is point[m*stride]:
@@ -600,19 +603,27 @@ MMSMITH_FN void bar_at_point(const bar_solution *s, const double X[1], double po
 MMSMITH_FN void bar_b_staged(const bar_solution *s, const bar_time_values *time,
     const double *point, size_t stride, double b[1])
 {
-    (void)s;
-    const double t39 = time->values[1] * point[0];
+    const double t39 = time->values[1] * point[stride];
     const double t41 = t39 + 1.0;
     const double t46 = mmsmith_log_1p(t39);
     const double t58 = 1.0 / t41;
-    const double t117 = time->values[0] * point[2 * stride];
-    const double t118 = t117 - point[3 * stride];
+    const double t92 = s->fixed[9] * point[0];
+    const double t99 = point[stride] * point[stride];
+    const double t105 = point[0] * t99;
+    const double t106 = s->fixed[12] * t105;
+    const double t107 = -t106;
+    const double t115 = point[0] * point[stride];
+    const double t116 = s->fixed[13] * t115;
+    const double t117 = time->values[0] * t107;
+    const double t118 = t117 - t116;
+    const double t125 = s->fixed[14] * point[0];
+    const double t126 = -t125;
     const double t127 = time->values[0] * t118;
-    const double t128 = point[4 * stride] * t46;
+    const double t128 = t126 * t46;
     const double t129 = t127 + t128;
     const double t130 = t58 * t58;
     const double t131 = t129 * t130;
-    const double t132 = t131 - point[stride];
+    const double t132 = t131 - t92;
     const double t133 = time->values[0] * t132;
     b[0] = t133;
 }
@@ -625,9 +636,9 @@ MMSMITH_FN void bar_point_array(const bar_solution *s, size_t n, const double *M
 {
     size_t p, m;
     for (p = 0; p < n; ++p) {
-        double values[5];
+        double values[2];
         bar_at_point(s, X + p * 1, values);
-        for (m = 0; m < 5; ++m) {
+        for (m = 0; m < 2; ++m) {
             point[m * n + p] = values[m];
         }
     }
@@ -642,24 +653,30 @@ MMSMITH_FN void bar_b_array(const bar_solution *s, double t, size_t n,
     const bar_time_values time = bar_at_time(s, t);
     const double *const point0 = point + 0 * n;
     const double *const point1 = point + 1 * n;
-    const double *const point2 = point + 2 * n;
-    const double *const point3 = point + 3 * n;
-    const double *const point4 = point + 4 * n;
     const size_t end = first + count;
     size_t p;
     for (p = first; p < end; ++p) {
-        const double t39 = time.values[1] * point0[p];
+        const double t39 = time.values[1] * point1[p];
         const double t41 = t39 + 1.0;
         const double t46 = mmsmith_log_1p(t39);
         const double t58 = 1.0 / t41;
-        const double t117 = time.values[0] * point2[p];
-        const double t118 = t117 - point3[p];
+        const double t92 = s->fixed[9] * point0[p];
+        const double t99 = point1[p] * point1[p];
+        const double t105 = point0[p] * t99;
+        const double t106 = s->fixed[12] * t105;
+        const double t107 = -t106;
+        const double t115 = point0[p] * point1[p];
+        const double t116 = s->fixed[13] * t115;
+        const double t117 = time.values[0] * t107;
+        const double t118 = t117 - t116;
+        const double t125 = s->fixed[14] * point0[p];
+        const double t126 = -t125;
         const double t127 = time.values[0] * t118;
-        const double t128 = point4[p] * t46;
+        const double t128 = t126 * t46;
         const double t129 = t127 + t128;
         const double t130 = t58 * t58;
         const double t131 = t129 * t130;
-        const double t132 = t131 - point1[p];
+        const double t132 = t131 - t92;
         const double t133 = time.values[0] * t132;
         b[p * 1 + 0] = t133;
     }

@@ -139,6 +139,59 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
 
 #endif
 
+#ifndef MMSMITH_LOGARITHM
+#define MMSMITH_LOGARITHM 1
+
+/* ln(y) where by_y, else ln(1 + x), by the reduction and the polynomial of Sun's fdlibm. */
+MMSMITH_FN double mmsmith_logarithm(double x, double y, int by_y)
+{
+    const double sum = 1.0 + x;
+    const double u = by_y ? y : sum;
+    /* What rounding took from the sum. */
+    const double lost = by_y ? 0.0 : x < 1.0 ? x - (sum - 1.0) : 1.0 - (sum - x);
+    double m, f, correction, s, z, w, even, odd, half_square, tail;
+    int k, exact;
+    if (!(u > 0.0 && u - u == 0.0)) {
+        return u == 0.0 ? -HUGE_VAL : u > 0.0 ? u : NAN;
+    }
+    /* u = 2^k m with m between sqrt(1/2) and sqrt(2). */
+    m = frexp(u, &k);
+    if (m < 0.7071065902709961) {
+        m += m;
+        --k;
+    }
+    /* With k = 0 x itself has digits that the sum has lost. */
+    exact = k == 0 && !by_y;
+    f = exact ? x : m - 1.0;
+    /* lost / u, which two digits of 1/m are enough for. */
+    correction =
+        exact || by_y || k > 1022 ? 0.0 : lost * ldexp(1.0, -k) * (1.0 - f + f * f);
+    s = f / (2.0 + f);
+    z = s * s;
+    w = z * z;
+    even = w * (3.9999999999409419e-1 + w * (2.2222198432149784e-1 + w * 1.5313837699209373e-1));
+    odd = z
+        * (6.6666666666667351e-1
+            + w * (2.8571428743662391e-1 + w * (1.818357216161805e-1 + w * 1.4798198605116586e-1)));
+    half_square = 0.5 * f * f;
+    tail = s * (half_square + (even + odd)) + (k * 1.9082149292705877e-10 + correction);
+    return k * 6.931471803691238e-1 - ((half_square - tail) - f);
+}
+
+/* ln(1 + x), within one unit in the last place. */
+MMSMITH_FN double mmsmith_log_1p(double x)
+{
+    return mmsmith_logarithm(x, x, 0);
+}
+
+/* ln(y) of y = 1 + x: by y where x < -1/2, else by x. */
+MMSMITH_FN double mmsmith_ln_of_both(double x, double y)
+{
+    return mmsmith_logarithm(x, y, x < -0.5);
+}
+
+#endif
+
 /* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
 enum {
     ring_nu_dimension = 2,
@@ -586,7 +639,7 @@ MMSMITH_FN void ring_nu_P(const ring_nu_solution *s, const double X[2], double t
     const double t101 = t100 * t92;
     const double t102 = s->par.A * t101;
     const double t103 = t102 + t91;
-    const double t104 = (t103 < -0.5 ? log(t95) : log1p(t103));
+    const double t104 = mmsmith_ln_of_both(t103, t95);
     const double t108 = t91 + 2.0;
     const double t112 = s->fixed[11] * t104;
     const double t113 = s->fixed[10] * t108;
@@ -670,7 +723,7 @@ MMSMITH_FN void ring_nu_b(const ring_nu_solution *s, const double X[2], double t
     const double t161 = t159 * t94;
     const double t162 = t161 + t93;
     const double t163 = t160 * t94;
-    const double t164 = (t162 < -0.5 ? log(t163) : log1p(t162));
+    const double t164 = mmsmith_ln_of_both(t162, t163);
     const double t165 = s->fixed[11] * t164;
     const double t166 = s->fixed[10] * t159;
     const double t167 = t165 + t166;
@@ -719,7 +772,7 @@ MMSMITH_FN void ring_nu_inner_traction(const ring_nu_solution *s, const double X
     const double t13 = mmsmith_cos_pi(t12);
     const double t326 = s->fixed[26] * t13;
     const double t327 = t326 + 1.0;
-    const double t328 = (t326 < -0.5 ? log(t327) : log1p(t326));
+    const double t328 = mmsmith_ln_of_both(t326, t327);
     const double t332 = s->fixed[27] * t328;
     const double t333 = t332 * X[0];
     const double t334 = -t333;
@@ -737,7 +790,7 @@ MMSMITH_FN void ring_nu_outer_traction(const ring_nu_solution *s, const double X
     const double t13 = mmsmith_cos_pi(t12);
     const double t338 = s->fixed[28] * t13;
     const double t339 = t338 + 1.0;
-    const double t340 = (t338 < -0.5 ? log(t339) : log1p(t338));
+    const double t340 = mmsmith_ln_of_both(t338, t339);
     const double t344 = s->fixed[29] * t340;
     const double t345 = t344 * X[0];
     const double t346 = t344 * X[1];
@@ -778,7 +831,7 @@ MMSMITH_FN void ring_nu_X_lower_traction(const ring_nu_solution *s, const double
     const double t101 = t100 * t92;
     const double t102 = s->par.A * t101;
     const double t103 = t102 + t91;
-    const double t104 = (t103 < -0.5 ? log(t95) : log1p(t103));
+    const double t104 = mmsmith_ln_of_both(t103, t95);
     const double t112 = s->fixed[11] * t104;
     const double t117 = t93 + 2.0;
     const double t118 = s->fixed[10] * t117;
@@ -828,7 +881,7 @@ MMSMITH_FN void ring_nu_Y_lower_traction(const ring_nu_solution *s, const double
     const double t101 = t100 * t92;
     const double t102 = s->par.A * t101;
     const double t103 = t102 + t91;
-    const double t104 = (t103 < -0.5 ? log(t95) : log1p(t103));
+    const double t104 = mmsmith_ln_of_both(t103, t95);
     const double t112 = s->fixed[11] * t104;
     const double t117 = t93 + 2.0;
     const double t118 = s->fixed[10] * t117;
@@ -918,7 +971,7 @@ MMSMITH_FN void ring_nu_fields(const ring_nu_solution *s, const double X[2], dou
     const double t101 = t100 * t92;
     const double t102 = s->par.A * t101;
     const double t103 = t102 + t91;
-    const double t104 = (t103 < -0.5 ? log(t95) : log1p(t103));
+    const double t104 = mmsmith_ln_of_both(t103, t95);
     const double t108 = t91 + 2.0;
     const double t112 = s->fixed[11] * t104;
     const double t113 = s->fixed[10] * t108;
@@ -968,7 +1021,7 @@ MMSMITH_FN void ring_nu_fields(const ring_nu_solution *s, const double X[2], dou
     const double t161 = t159 * t94;
     const double t162 = t161 + t93;
     const double t163 = t160 * t94;
-    const double t164 = (t162 < -0.5 ? log(t163) : log1p(t162));
+    const double t164 = mmsmith_ln_of_both(t162, t163);
     const double t165 = s->fixed[11] * t164;
     const double t166 = s->fixed[10] * t159;
     const double t167 = t165 + t166;
@@ -1163,7 +1216,7 @@ MMSMITH_FN void ring_nu_b_staged(const ring_nu_solution *s, const ring_nu_time_v
     const double t101 = t100 * t92;
     const double t102 = s->par.A * t101;
     const double t103 = t102 + t91;
-    const double t104 = (t103 < -0.5 ? log(t95) : log1p(t103));
+    const double t104 = mmsmith_ln_of_both(t103, t95);
     const double t272 = time->values[0] * point[4 * stride];
     const double t273 = point[5 * stride] + t272;
     const double t298 = time->values[0] * t273;
@@ -1229,7 +1282,7 @@ MMSMITH_FN void ring_nu_b_array(const ring_nu_solution *s, double t, size_t n,
         const double t101 = t100 * t92;
         const double t102 = s->par.A * t101;
         const double t103 = t102 + t91;
-        const double t104 = (t103 < -0.5 ? log(t95) : log1p(t103));
+        const double t104 = mmsmith_ln_of_both(t103, t95);
         const double t272 = time.values[0] * point4[p];
         const double t273 = point5[p] + t272;
         const double t298 = time.values[0] * t273;

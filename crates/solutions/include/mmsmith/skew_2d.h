@@ -138,30 +138,33 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
 
 #endif
 
-#ifndef MMSMITH_LOG_1P
-#define MMSMITH_LOG_1P 1
+#ifndef MMSMITH_LOGARITHM
+#define MMSMITH_LOGARITHM 1
 
-/* ln(1 + x), within one unit in the last place, by the reduction and the polynomial of Sun's fdlibm. */
-MMSMITH_FN double mmsmith_log_1p(double x)
+/* ln(y) where by_y, else ln(1 + x), by the reduction and the polynomial of Sun's fdlibm. */
+MMSMITH_FN double mmsmith_logarithm(double x, double y, int by_y)
 {
     const double sum = 1.0 + x;
+    const double u = by_y ? y : sum;
     /* What rounding took from the sum. */
-    const double lost = x < 1.0 ? x - (sum - 1.0) : 1.0 - (sum - x);
+    const double lost = by_y ? 0.0 : x < 1.0 ? x - (sum - 1.0) : 1.0 - (sum - x);
     double m, f, correction, s, z, w, even, odd, half_square, tail;
-    int k;
-    if (!(sum > 0.0 && x - x == 0.0)) {
-        return sum == 0.0 ? -HUGE_VAL : sum > 0.0 ? sum : NAN;
+    int k, exact;
+    if (!(u > 0.0 && u - u == 0.0)) {
+        return u == 0.0 ? -HUGE_VAL : u > 0.0 ? u : NAN;
     }
-    /* sum = 2^k m with m between sqrt(1/2) and sqrt(2). */
-    m = frexp(sum, &k);
+    /* u = 2^k m with m between sqrt(1/2) and sqrt(2). */
+    m = frexp(u, &k);
     if (m < 0.7071065902709961) {
         m += m;
         --k;
     }
     /* With k = 0 x itself has digits that the sum has lost. */
-    f = k == 0 ? x : m - 1.0;
-    /* lost / sum, which two digits of 1/m are enough for. */
-    correction = k == 0 || k > 1022 ? 0.0 : lost * ldexp(1.0, -k) * (1.0 - f + f * f);
+    exact = k == 0 && !by_y;
+    f = exact ? x : m - 1.0;
+    /* lost / u, which two digits of 1/m are enough for. */
+    correction =
+        exact || by_y || k > 1022 ? 0.0 : lost * ldexp(1.0, -k) * (1.0 - f + f * f);
     s = f / (2.0 + f);
     z = s * s;
     w = z * z;
@@ -174,6 +177,18 @@ MMSMITH_FN double mmsmith_log_1p(double x)
     return k * 6.931471803691238e-1 - ((half_square - tail) - f);
 }
 
+/* ln(1 + x), within one unit in the last place. */
+MMSMITH_FN double mmsmith_log_1p(double x)
+{
+    return mmsmith_logarithm(x, x, 0);
+}
+
+/* ln(y) of y = 1 + x: by y where x < -1/2, else by x. */
+MMSMITH_FN double mmsmith_ln_of_both(double x, double y)
+{
+    return mmsmith_logarithm(x, y, x < -0.5);
+}
+
 #endif
 
 /* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
@@ -181,7 +196,7 @@ enum {
     skew_2d_dimension = 2,
     skew_2d_parameter_count = 4,
     skew_2d_time_count = 15,
-    skew_2d_point_count = 27
+    skew_2d_point_count = 18
 };
 
 typedef struct skew_2d_parameters {
@@ -1576,8 +1591,8 @@ MMSMITH_FN skew_2d_time_values skew_2d_at_time(const skew_2d_solution *s, double
     return time;
 }
 
-/* What the body force needs of the position alone, 27 values. */
-MMSMITH_FN void skew_2d_at_point(const skew_2d_solution *s, const double X[2], double point[27])
+/* What the body force needs of the position alone, 18 values. */
+MMSMITH_FN void skew_2d_at_point(const skew_2d_solution *s, const double X[2], double point[18])
 {
     const double t4 = 3.0 * X[0];
     const double t5 = t4 + X[1];
@@ -1602,28 +1617,16 @@ MMSMITH_FN void skew_2d_at_point(const skew_2d_solution *s, const double X[2], d
     const double t75 = X[0] * X[1];
     const double t76 = 2.0 * t75;
     const double t77 = t74 + t76;
-    const double t104 = t62 * t62;
     const double t152 = t67 * t72;
     const double t153 = 3.141592653589793 * t152;
     const double t154 = X[1] - t153;
-    const double t189 = 3.0 * t6;
     const double t227 = 4.0 * X[0];
     const double t228 = s->fixed[4] * t22;
     const double t229 = t227 - t228;
-    const double t282 = 8.0 * t22;
-    const double t283 = t282 - t229;
     const double t351 = s->fixed[24] * t73;
     const double t353 = 6.0 * t75;
     const double t354 = t70 - t351;
     const double t355 = t354 - t353;
-    const double t360 = t355 * t355;
-    const double t364 = t6 * t104;
-    const double t365 = t364 * t360;
-    const double t366 = s->fixed[26] * t365;
-    const double t367 = -t366;
-    const double t372 = t104 * t154;
-    const double t373 = t372 * t360;
-    const double t374 = s->fixed[27] * t373;
     const double t375 = 4.0 * t22;
     const double t376 = 3.0 * t154;
     const double t377 = t375 + t376;
@@ -1726,8 +1729,6 @@ MMSMITH_FN void skew_2d_at_point(const skew_2d_solution *s, const double X[2], d
     const double t510 = t509 + t503;
     const double t511 = t510 + t507;
     const double t513 = s->fixed[42] * t511;
-    const double t524 = t364 * t355;
-    const double t525 = s->fixed[43] * t524;
     const double t526 = 9.0 * t402;
     const double t527 = t391 + t526;
     const double t528 = t392 - t527;
@@ -1745,9 +1746,6 @@ MMSMITH_FN void skew_2d_at_point(const skew_2d_solution *s, const double X[2], d
     const double t551 = t547 - t548;
     const double t552 = t551 - t550;
     const double t555 = s->fixed[48] * t552;
-    const double t562 = t77 * t77;
-    const double t566 = t562 * t154;
-    const double t567 = s->fixed[49] * t566;
     const double t568 = t70 * t229;
     const double t569 = t77 * t154;
     const double t570 = 4.0 * t569;
@@ -1759,13 +1757,6 @@ MMSMITH_FN void skew_2d_at_point(const skew_2d_solution *s, const double X[2], d
     const double t581 = s->fixed[25] * t568;
     const double t582 = t580 + t581;
     const double t584 = s->fixed[52] * t582;
-    const double t592 = s->fixed[53] * t154;
-    const double t602 = s->fixed[54] * t364;
-    const double t603 = -t602;
-    const double t608 = t6 * t62;
-    const double t609 = s->fixed[55] * t608;
-    const double t615 = s->fixed[56] * t6;
-    const double t616 = -t615;
     point[0] = t6;
     point[1] = t22;
     point[2] = t26;
@@ -1773,26 +1764,17 @@ MMSMITH_FN void skew_2d_at_point(const skew_2d_solution *s, const double X[2], d
     point[4] = t70;
     point[5] = t77;
     point[6] = t154;
-    point[7] = t189;
-    point[8] = t229;
-    point[9] = t283;
-    point[10] = t367;
-    point[11] = t374;
-    point[12] = t418;
-    point[13] = t431;
-    point[14] = t456;
-    point[15] = t513;
-    point[16] = t525;
-    point[17] = t537;
-    point[18] = t544;
-    point[19] = t555;
-    point[20] = t567;
-    point[21] = t577;
-    point[22] = t584;
-    point[23] = t592;
-    point[24] = t603;
-    point[25] = t609;
-    point[26] = t616;
+    point[7] = t229;
+    point[8] = t355;
+    point[9] = t418;
+    point[10] = t431;
+    point[11] = t456;
+    point[12] = t513;
+    point[13] = t537;
+    point[14] = t544;
+    point[15] = t555;
+    point[16] = t577;
+    point[17] = t584;
 }
 
 /* The body force from the values of one time and of one point. Value m of the point is point[m*stride]:
@@ -1814,6 +1796,7 @@ MMSMITH_FN void skew_2d_b_staged(const skew_2d_solution *s, const skew_2d_time_v
     const double t95 = t94 + t78;
     const double t96 = t95 - t88;
     const double t97 = mmsmith_log_1p(t96);
+    const double t104 = point[3 * stride] * point[3 * stride];
     const double t112 = s->fixed[10] * t97;
     const double t126 = 1.0 / t89;
     const double t157 = time->values[5] * point[0];
@@ -1832,7 +1815,8 @@ MMSMITH_FN void skew_2d_b_staged(const skew_2d_solution *s, const skew_2d_time_v
     const double t183 = time->values[9] * point[stride];
     const double t184 = -t183;
     const double t188 = time->values[10] * point[6 * stride];
-    const double t190 = point[7 * stride] * t71;
+    const double t189 = 3.0 * point[0];
+    const double t190 = t189 * t71;
     const double t191 = point[3 * stride] * t184;
     const double t192 = t190 - t191;
     const double t193 = s->par.A * t192;
@@ -1848,7 +1832,7 @@ MMSMITH_FN void skew_2d_b_staged(const skew_2d_solution *s, const skew_2d_time_v
     const double t220 = t78 * t80;
     const double t225 = time->values[4] * point[0];
     const double t226 = -t225;
-    const double t233 = time->values[11] * point[8 * stride];
+    const double t233 = time->values[11] * point[7 * stride];
     const double t234 = point[0] * t71;
     const double t235 = point[3 * stride] * t188;
     const double t236 = t234 - t235;
@@ -1863,9 +1847,11 @@ MMSMITH_FN void skew_2d_b_staged(const skew_2d_solution *s, const skew_2d_time_v
     const double t245 = t244 + t238;
     const double t253 = t88 - t220;
     const double t278 = time->values[12] * point[0];
-    const double t279 = time->values[2] * point[8 * stride];
+    const double t279 = time->values[2] * point[7 * stride];
     const double t280 = t278 - t279;
-    const double t284 = time->values[2] * point[9 * stride];
+    const double t282 = 8.0 * point[stride];
+    const double t283 = t282 - point[7 * stride];
+    const double t284 = time->values[2] * t283;
     const double t287 = time->values[13] * point[0];
     const double t289 = s->fixed[21] * t280;
     const double t290 = t284 + t287;
@@ -1904,7 +1890,7 @@ MMSMITH_FN void skew_2d_b_staged(const skew_2d_solution *s, const skew_2d_time_v
     const double t327 = t325 + t326;
     const double t328 = t219 * t126;
     const double t329 = point[3 * stride] * t328;
-    const double t330 = point[7 * stride] + t329;
+    const double t330 = t189 + t329;
     const double t331 = t320 * t330;
     const double t332 = point[3 * stride] * t327;
     const double t333 = t331 - t332;
@@ -1924,37 +1910,57 @@ MMSMITH_FN void skew_2d_b_staged(const skew_2d_solution *s, const skew_2d_time_v
     const double t347 = s->fixed[20] * t346;
     const double t348 = t299 + t347;
     const double t349 = -t348;
-    const double t419 = time->values[0] * point[10 * stride];
-    const double t420 = time->values[2] * point[11 * stride];
+    const double t360 = point[8 * stride] * point[8 * stride];
+    const double t364 = point[0] * t104;
+    const double t365 = t364 * t360;
+    const double t366 = s->fixed[26] * t365;
+    const double t367 = -t366;
+    const double t372 = t104 * point[6 * stride];
+    const double t373 = t372 * t360;
+    const double t374 = s->fixed[27] * t373;
+    const double t419 = time->values[0] * t367;
+    const double t420 = time->values[2] * t374;
     const double t421 = t419 + t420;
-    const double t422 = t421 - point[12 * stride];
+    const double t422 = t421 - point[9 * stride];
     const double t514 = time->values[0] * t422;
-    const double t515 = time->values[2] * point[13 * stride];
-    const double t516 = point[14 * stride] * t97;
+    const double t515 = time->values[2] * point[10 * stride];
+    const double t516 = point[11 * stride] * t97;
     const double t517 = t514 + t515;
     const double t518 = t517 + t516;
-    const double t519 = t518 - point[15 * stride];
-    const double t538 = time->values[0] * point[16 * stride];
-    const double t539 = point[17 * stride] + t538;
+    const double t519 = t518 - point[12 * stride];
+    const double t524 = t364 * point[8 * stride];
+    const double t525 = s->fixed[43] * t524;
+    const double t538 = time->values[0] * t525;
+    const double t539 = point[13 * stride] + t538;
     const double t556 = time->values[2] * t519;
     const double t557 = time->values[0] * t539;
-    const double t558 = point[18 * stride] * t97;
+    const double t558 = point[14 * stride] * t97;
     const double t559 = t556 + t557;
     const double t560 = t559 + t558;
-    const double t561 = point[19 * stride] + t560;
-    const double t585 = time->values[2] * point[20 * stride];
-    const double t586 = point[21 * stride] * t97;
+    const double t561 = point[15 * stride] + t560;
+    const double t562 = point[5 * stride] * point[5 * stride];
+    const double t566 = t562 * point[6 * stride];
+    const double t567 = s->fixed[49] * t566;
+    const double t585 = time->values[2] * t567;
+    const double t586 = point[16 * stride] * t97;
     const double t587 = t585 + t586;
-    const double t588 = point[22 * stride] + t587;
+    const double t588 = point[17 * stride] + t587;
+    const double t592 = s->fixed[53] * point[6 * stride];
     const double t593 = time->values[0] * t561;
     const double t594 = time->values[2] * t588;
-    const double t595 = point[23 * stride] * t97;
+    const double t595 = t592 * t97;
     const double t596 = t593 + t594;
     const double t597 = t596 + t595;
-    const double t610 = time->values[0] * point[24 * stride];
-    const double t611 = t610 - point[25 * stride];
+    const double t602 = s->fixed[54] * t364;
+    const double t603 = -t602;
+    const double t608 = point[0] * point[3 * stride];
+    const double t609 = s->fixed[55] * t608;
+    const double t610 = time->values[0] * t603;
+    const double t611 = t610 - t609;
+    const double t615 = s->fixed[56] * point[0];
+    const double t616 = -t615;
     const double t617 = time->values[0] * t611;
-    const double t618 = point[26 * stride] * t97;
+    const double t618 = t616 * t97;
     const double t619 = t617 + t618;
     const double t620 = time->values[2] * t597;
     const double t621 = time->values[0] * t619;
@@ -1974,9 +1980,9 @@ MMSMITH_FN void skew_2d_point_array(const skew_2d_solution *s, size_t n, const d
 {
     size_t p, m;
     for (p = 0; p < n; ++p) {
-        double values[27];
+        double values[18];
         skew_2d_at_point(s, X + p * 2, values);
-        for (m = 0; m < 27; ++m) {
+        for (m = 0; m < 18; ++m) {
             point[m * n + p] = values[m];
         }
     }
@@ -2007,15 +2013,6 @@ MMSMITH_FN void skew_2d_b_array(const skew_2d_solution *s, double t, size_t n,
     const double *const point15 = point + 15 * n;
     const double *const point16 = point + 16 * n;
     const double *const point17 = point + 17 * n;
-    const double *const point18 = point + 18 * n;
-    const double *const point19 = point + 19 * n;
-    const double *const point20 = point + 20 * n;
-    const double *const point21 = point + 21 * n;
-    const double *const point22 = point + 22 * n;
-    const double *const point23 = point + 23 * n;
-    const double *const point24 = point + 24 * n;
-    const double *const point25 = point + 25 * n;
-    const double *const point26 = point + 26 * n;
     const size_t end = first + count;
     size_t p;
     for (p = first; p < end; ++p) {
@@ -2032,6 +2029,7 @@ MMSMITH_FN void skew_2d_b_array(const skew_2d_solution *s, double t, size_t n,
         const double t95 = t94 + t78;
         const double t96 = t95 - t88;
         const double t97 = mmsmith_log_1p(t96);
+        const double t104 = point3[p] * point3[p];
         const double t112 = s->fixed[10] * t97;
         const double t126 = 1.0 / t89;
         const double t157 = time.values[5] * point0[p];
@@ -2050,7 +2048,8 @@ MMSMITH_FN void skew_2d_b_array(const skew_2d_solution *s, double t, size_t n,
         const double t183 = time.values[9] * point1[p];
         const double t184 = -t183;
         const double t188 = time.values[10] * point6[p];
-        const double t190 = point7[p] * t71;
+        const double t189 = 3.0 * point0[p];
+        const double t190 = t189 * t71;
         const double t191 = point3[p] * t184;
         const double t192 = t190 - t191;
         const double t193 = s->par.A * t192;
@@ -2066,7 +2065,7 @@ MMSMITH_FN void skew_2d_b_array(const skew_2d_solution *s, double t, size_t n,
         const double t220 = t78 * t80;
         const double t225 = time.values[4] * point0[p];
         const double t226 = -t225;
-        const double t233 = time.values[11] * point8[p];
+        const double t233 = time.values[11] * point7[p];
         const double t234 = point0[p] * t71;
         const double t235 = point3[p] * t188;
         const double t236 = t234 - t235;
@@ -2081,9 +2080,11 @@ MMSMITH_FN void skew_2d_b_array(const skew_2d_solution *s, double t, size_t n,
         const double t245 = t244 + t238;
         const double t253 = t88 - t220;
         const double t278 = time.values[12] * point0[p];
-        const double t279 = time.values[2] * point8[p];
+        const double t279 = time.values[2] * point7[p];
         const double t280 = t278 - t279;
-        const double t284 = time.values[2] * point9[p];
+        const double t282 = 8.0 * point1[p];
+        const double t283 = t282 - point7[p];
+        const double t284 = time.values[2] * t283;
         const double t287 = time.values[13] * point0[p];
         const double t289 = s->fixed[21] * t280;
         const double t290 = t284 + t287;
@@ -2122,7 +2123,7 @@ MMSMITH_FN void skew_2d_b_array(const skew_2d_solution *s, double t, size_t n,
         const double t327 = t325 + t326;
         const double t328 = t219 * t126;
         const double t329 = point3[p] * t328;
-        const double t330 = point7[p] + t329;
+        const double t330 = t189 + t329;
         const double t331 = t320 * t330;
         const double t332 = point3[p] * t327;
         const double t333 = t331 - t332;
@@ -2142,37 +2143,57 @@ MMSMITH_FN void skew_2d_b_array(const skew_2d_solution *s, double t, size_t n,
         const double t347 = s->fixed[20] * t346;
         const double t348 = t299 + t347;
         const double t349 = -t348;
-        const double t419 = time.values[0] * point10[p];
-        const double t420 = time.values[2] * point11[p];
+        const double t360 = point8[p] * point8[p];
+        const double t364 = point0[p] * t104;
+        const double t365 = t364 * t360;
+        const double t366 = s->fixed[26] * t365;
+        const double t367 = -t366;
+        const double t372 = t104 * point6[p];
+        const double t373 = t372 * t360;
+        const double t374 = s->fixed[27] * t373;
+        const double t419 = time.values[0] * t367;
+        const double t420 = time.values[2] * t374;
         const double t421 = t419 + t420;
-        const double t422 = t421 - point12[p];
+        const double t422 = t421 - point9[p];
         const double t514 = time.values[0] * t422;
-        const double t515 = time.values[2] * point13[p];
-        const double t516 = point14[p] * t97;
+        const double t515 = time.values[2] * point10[p];
+        const double t516 = point11[p] * t97;
         const double t517 = t514 + t515;
         const double t518 = t517 + t516;
-        const double t519 = t518 - point15[p];
-        const double t538 = time.values[0] * point16[p];
-        const double t539 = point17[p] + t538;
+        const double t519 = t518 - point12[p];
+        const double t524 = t364 * point8[p];
+        const double t525 = s->fixed[43] * t524;
+        const double t538 = time.values[0] * t525;
+        const double t539 = point13[p] + t538;
         const double t556 = time.values[2] * t519;
         const double t557 = time.values[0] * t539;
-        const double t558 = point18[p] * t97;
+        const double t558 = point14[p] * t97;
         const double t559 = t556 + t557;
         const double t560 = t559 + t558;
-        const double t561 = point19[p] + t560;
-        const double t585 = time.values[2] * point20[p];
-        const double t586 = point21[p] * t97;
+        const double t561 = point15[p] + t560;
+        const double t562 = point5[p] * point5[p];
+        const double t566 = t562 * point6[p];
+        const double t567 = s->fixed[49] * t566;
+        const double t585 = time.values[2] * t567;
+        const double t586 = point16[p] * t97;
         const double t587 = t585 + t586;
-        const double t588 = point22[p] + t587;
+        const double t588 = point17[p] + t587;
+        const double t592 = s->fixed[53] * point6[p];
         const double t593 = time.values[0] * t561;
         const double t594 = time.values[2] * t588;
-        const double t595 = point23[p] * t97;
+        const double t595 = t592 * t97;
         const double t596 = t593 + t594;
         const double t597 = t596 + t595;
-        const double t610 = time.values[0] * point24[p];
-        const double t611 = t610 - point25[p];
+        const double t602 = s->fixed[54] * t364;
+        const double t603 = -t602;
+        const double t608 = point0[p] * point3[p];
+        const double t609 = s->fixed[55] * t608;
+        const double t610 = time.values[0] * t603;
+        const double t611 = t610 - t609;
+        const double t615 = s->fixed[56] * point0[p];
+        const double t616 = -t615;
         const double t617 = time.values[0] * t611;
-        const double t618 = point26[p] * t97;
+        const double t618 = t616 * t97;
         const double t619 = t617 + t618;
         const double t620 = time.values[2] * t597;
         const double t621 = time.values[0] * t619;

@@ -141,30 +141,33 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
 
 #endif
 
-#ifndef MMSMITH_LOG_1P
-#define MMSMITH_LOG_1P 1
+#ifndef MMSMITH_LOGARITHM
+#define MMSMITH_LOGARITHM 1
 
-/* ln(1 + x), within one unit in the last place, by the reduction and the polynomial of Sun's fdlibm. */
-MMSMITH_FN double mmsmith_log_1p(double x)
+/* ln(y) where by_y, else ln(1 + x), by the reduction and the polynomial of Sun's fdlibm. */
+MMSMITH_FN double mmsmith_logarithm(double x, double y, int by_y)
 {
     const double sum = 1.0 + x;
+    const double u = by_y ? y : sum;
     /* What rounding took from the sum. */
-    const double lost = x < 1.0 ? x - (sum - 1.0) : 1.0 - (sum - x);
+    const double lost = by_y ? 0.0 : x < 1.0 ? x - (sum - 1.0) : 1.0 - (sum - x);
     double m, f, correction, s, z, w, even, odd, half_square, tail;
-    int k;
-    if (!(sum > 0.0 && x - x == 0.0)) {
-        return sum == 0.0 ? -HUGE_VAL : sum > 0.0 ? sum : NAN;
+    int k, exact;
+    if (!(u > 0.0 && u - u == 0.0)) {
+        return u == 0.0 ? -HUGE_VAL : u > 0.0 ? u : NAN;
     }
-    /* sum = 2^k m with m between sqrt(1/2) and sqrt(2). */
-    m = frexp(sum, &k);
+    /* u = 2^k m with m between sqrt(1/2) and sqrt(2). */
+    m = frexp(u, &k);
     if (m < 0.7071065902709961) {
         m += m;
         --k;
     }
     /* With k = 0 x itself has digits that the sum has lost. */
-    f = k == 0 ? x : m - 1.0;
-    /* lost / sum, which two digits of 1/m are enough for. */
-    correction = k == 0 || k > 1022 ? 0.0 : lost * ldexp(1.0, -k) * (1.0 - f + f * f);
+    exact = k == 0 && !by_y;
+    f = exact ? x : m - 1.0;
+    /* lost / u, which two digits of 1/m are enough for. */
+    correction =
+        exact || by_y || k > 1022 ? 0.0 : lost * ldexp(1.0, -k) * (1.0 - f + f * f);
     s = f / (2.0 + f);
     z = s * s;
     w = z * z;
@@ -177,6 +180,18 @@ MMSMITH_FN double mmsmith_log_1p(double x)
     return k * 6.931471803691238e-1 - ((half_square - tail) - f);
 }
 
+/* ln(1 + x), within one unit in the last place. */
+MMSMITH_FN double mmsmith_log_1p(double x)
+{
+    return mmsmith_logarithm(x, x, 0);
+}
+
+/* ln(y) of y = 1 + x: by y where x < -1/2, else by x. */
+MMSMITH_FN double mmsmith_ln_of_both(double x, double y)
+{
+    return mmsmith_logarithm(x, y, x < -0.5);
+}
+
 #endif
 
 /* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
@@ -184,7 +199,7 @@ enum {
     skew_2d_rotating_dimension = 2,
     skew_2d_rotating_parameter_count = 5,
     skew_2d_rotating_time_count = 24,
-    skew_2d_rotating_point_count = 12
+    skew_2d_rotating_point_count = 9
 };
 
 typedef struct skew_2d_rotating_parameters {
@@ -1946,9 +1961,10 @@ MMSMITH_FN skew_2d_rotating_time_values skew_2d_rotating_at_time(const skew_2d_r
     return time;
 }
 
-/* What the body force needs of the position alone, 12 values. */
-MMSMITH_FN void skew_2d_rotating_at_point(const skew_2d_rotating_solution *s, const double X[2], double point[12])
+/* What the body force needs of the position alone, 9 values. */
+MMSMITH_FN void skew_2d_rotating_at_point(const skew_2d_rotating_solution *s, const double X[2], double point[9])
 {
+    (void)s;
     const double t12 = 3.0 * X[0];
     const double t13 = t12 + X[1];
     const double t14 = sin(t13);
@@ -1976,12 +1992,6 @@ MMSMITH_FN void skew_2d_rotating_at_point(const skew_2d_rotating_solution *s, co
     const double t263 = t131 * t144;
     const double t264 = 3.141592653589793 * t263;
     const double t265 = X[1] - t264;
-    const double t313 = 3.0 * t14;
-    const double t346 = 4.0 * X[0];
-    const double t347 = s->fixed[4] * t27;
-    const double t348 = t346 - t347;
-    const double t402 = 8.0 * t27;
-    const double t403 = t402 - t348;
     point[0] = X[0];
     point[1] = t14;
     point[2] = t27;
@@ -1991,9 +2001,6 @@ MMSMITH_FN void skew_2d_rotating_at_point(const skew_2d_rotating_solution *s, co
     point[6] = t134;
     point[7] = t149;
     point[8] = t265;
-    point[9] = t313;
-    point[10] = t348;
-    point[11] = t403;
 }
 
 /* The body force from the values of one time and of one point. Value m of the point is point[m*stride]:
@@ -2049,13 +2056,19 @@ MMSMITH_FN void skew_2d_rotating_b_staged(const skew_2d_rotating_solution *s, co
     const double t276 = t273 - t269;
     const double t277 = t276 + t275;
     const double t280 = s->fixed[13] * t277;
-    const double t314 = point[9 * stride] * t184;
+    const double t313 = 3.0 * point[stride];
+    const double t314 = t313 * t184;
     const double t338 = t182 * t179;
-    const double t349 = time->values[3] * point[10 * stride];
+    const double t346 = 4.0 * point[0];
+    const double t347 = s->fixed[4] * point[2 * stride];
+    const double t348 = t346 - t347;
+    const double t349 = time->values[3] * t348;
     const double t353 = point[stride] * t184;
     const double t399 = time->values[16] * point[stride];
     const double t400 = t399 - t349;
-    const double t404 = time->values[3] * point[11 * stride];
+    const double t402 = 8.0 * point[2 * stride];
+    const double t403 = t402 - t348;
+    const double t404 = time->values[3] * t403;
     const double t406 = time->values[17] * point[stride];
     const double t408 = s->fixed[21] * t400;
     const double t409 = t404 + t406;
@@ -2104,7 +2117,7 @@ MMSMITH_FN void skew_2d_rotating_b_staged(const skew_2d_rotating_solution *s, co
     const double t546 = t211 + t545;
     const double t547 = time->values[12] * point[stride];
     const double t548 = -t547;
-    const double t550 = time->values[23] * point[10 * stride];
+    const double t550 = time->values[23] * t348;
     const double t551 = point[5 * stride] * t513;
     const double t552 = t353 - t551;
     const double t553 = t183 * t548;
@@ -2178,7 +2191,7 @@ MMSMITH_FN void skew_2d_rotating_b_staged(const skew_2d_rotating_solution *s, co
     const double t621 = t619 + t620;
     const double t622 = t542 * t239;
     const double t623 = point[5 * stride] * t622;
-    const double t624 = point[9 * stride] + t623;
+    const double t624 = t313 + t623;
     const double t625 = t614 * t624;
     const double t626 = point[5 * stride] * t621;
     const double t627 = t625 - t626;
@@ -2222,9 +2235,9 @@ MMSMITH_FN void skew_2d_rotating_point_array(const skew_2d_rotating_solution *s,
 {
     size_t p, m;
     for (p = 0; p < n; ++p) {
-        double values[12];
+        double values[9];
         skew_2d_rotating_at_point(s, X + p * 2, values);
-        for (m = 0; m < 12; ++m) {
+        for (m = 0; m < 9; ++m) {
             point[m * n + p] = values[m];
         }
     }
@@ -2246,9 +2259,6 @@ MMSMITH_FN void skew_2d_rotating_b_array(const skew_2d_rotating_solution *s, dou
     const double *const point6 = point + 6 * n;
     const double *const point7 = point + 7 * n;
     const double *const point8 = point + 8 * n;
-    const double *const point9 = point + 9 * n;
-    const double *const point10 = point + 10 * n;
-    const double *const point11 = point + 11 * n;
     const size_t end = first + count;
     size_t p;
     for (p = first; p < end; ++p) {
@@ -2299,13 +2309,19 @@ MMSMITH_FN void skew_2d_rotating_b_array(const skew_2d_rotating_solution *s, dou
         const double t276 = t273 - t269;
         const double t277 = t276 + t275;
         const double t280 = s->fixed[13] * t277;
-        const double t314 = point9[p] * t184;
+        const double t313 = 3.0 * point1[p];
+        const double t314 = t313 * t184;
         const double t338 = t182 * t179;
-        const double t349 = time.values[3] * point10[p];
+        const double t346 = 4.0 * point0[p];
+        const double t347 = s->fixed[4] * point2[p];
+        const double t348 = t346 - t347;
+        const double t349 = time.values[3] * t348;
         const double t353 = point1[p] * t184;
         const double t399 = time.values[16] * point1[p];
         const double t400 = t399 - t349;
-        const double t404 = time.values[3] * point11[p];
+        const double t402 = 8.0 * point2[p];
+        const double t403 = t402 - t348;
+        const double t404 = time.values[3] * t403;
         const double t406 = time.values[17] * point1[p];
         const double t408 = s->fixed[21] * t400;
         const double t409 = t404 + t406;
@@ -2354,7 +2370,7 @@ MMSMITH_FN void skew_2d_rotating_b_array(const skew_2d_rotating_solution *s, dou
         const double t546 = t211 + t545;
         const double t547 = time.values[12] * point1[p];
         const double t548 = -t547;
-        const double t550 = time.values[23] * point10[p];
+        const double t550 = time.values[23] * t348;
         const double t551 = point5[p] * t513;
         const double t552 = t353 - t551;
         const double t553 = t183 * t548;
@@ -2428,7 +2444,7 @@ MMSMITH_FN void skew_2d_rotating_b_array(const skew_2d_rotating_solution *s, dou
         const double t621 = t619 + t620;
         const double t622 = t542 * t239;
         const double t623 = point5[p] * t622;
-        const double t624 = point9[p] + t623;
+        const double t624 = t313 + t623;
         const double t625 = t614 * t624;
         const double t626 = point5[p] * t621;
         const double t627 = t625 - t626;

@@ -141,30 +141,33 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
 
 #endif
 
-#ifndef MMSMITH_LOG_1P
-#define MMSMITH_LOG_1P 1
+#ifndef MMSMITH_LOGARITHM
+#define MMSMITH_LOGARITHM 1
 
-/* ln(1 + x), within one unit in the last place, by the reduction and the polynomial of Sun's fdlibm. */
-MMSMITH_FN double mmsmith_log_1p(double x)
+/* ln(y) where by_y, else ln(1 + x), by the reduction and the polynomial of Sun's fdlibm. */
+MMSMITH_FN double mmsmith_logarithm(double x, double y, int by_y)
 {
     const double sum = 1.0 + x;
+    const double u = by_y ? y : sum;
     /* What rounding took from the sum. */
-    const double lost = x < 1.0 ? x - (sum - 1.0) : 1.0 - (sum - x);
+    const double lost = by_y ? 0.0 : x < 1.0 ? x - (sum - 1.0) : 1.0 - (sum - x);
     double m, f, correction, s, z, w, even, odd, half_square, tail;
-    int k;
-    if (!(sum > 0.0 && x - x == 0.0)) {
-        return sum == 0.0 ? -HUGE_VAL : sum > 0.0 ? sum : NAN;
+    int k, exact;
+    if (!(u > 0.0 && u - u == 0.0)) {
+        return u == 0.0 ? -HUGE_VAL : u > 0.0 ? u : NAN;
     }
-    /* sum = 2^k m with m between sqrt(1/2) and sqrt(2). */
-    m = frexp(sum, &k);
+    /* u = 2^k m with m between sqrt(1/2) and sqrt(2). */
+    m = frexp(u, &k);
     if (m < 0.7071065902709961) {
         m += m;
         --k;
     }
     /* With k = 0 x itself has digits that the sum has lost. */
-    f = k == 0 ? x : m - 1.0;
-    /* lost / sum, which two digits of 1/m are enough for. */
-    correction = k == 0 || k > 1022 ? 0.0 : lost * ldexp(1.0, -k) * (1.0 - f + f * f);
+    exact = k == 0 && !by_y;
+    f = exact ? x : m - 1.0;
+    /* lost / u, which two digits of 1/m are enough for. */
+    correction =
+        exact || by_y || k > 1022 ? 0.0 : lost * ldexp(1.0, -k) * (1.0 - f + f * f);
     s = f / (2.0 + f);
     z = s * s;
     w = z * z;
@@ -177,6 +180,18 @@ MMSMITH_FN double mmsmith_log_1p(double x)
     return k * 6.931471803691238e-1 - ((half_square - tail) - f);
 }
 
+/* ln(1 + x), within one unit in the last place. */
+MMSMITH_FN double mmsmith_log_1p(double x)
+{
+    return mmsmith_logarithm(x, x, 0);
+}
+
+/* ln(y) of y = 1 + x: by y where x < -1/2, else by x. */
+MMSMITH_FN double mmsmith_ln_of_both(double x, double y)
+{
+    return mmsmith_logarithm(x, y, x < -0.5);
+}
+
 #endif
 
 /* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
@@ -184,7 +199,7 @@ enum {
     skew_3d_dimension = 3,
     skew_3d_parameter_count = 4,
     skew_3d_time_count = 36,
-    skew_3d_point_count = 16
+    skew_3d_point_count = 11
 };
 
 typedef struct skew_3d_parameters {
@@ -3923,8 +3938,8 @@ MMSMITH_FN skew_3d_time_values skew_3d_at_time(const skew_3d_solution *s, double
     return time;
 }
 
-/* What the body force needs of the position alone, 16 values. */
-MMSMITH_FN void skew_3d_at_point(const skew_3d_solution *s, const double X[3], double point[16])
+/* What the body force needs of the position alone, 11 values. */
+MMSMITH_FN void skew_3d_at_point(const skew_3d_solution *s, const double X[3], double point[11])
 {
     const double t5 = 6.0 * X[0];
     const double t7 = 2.0 * X[1];
@@ -3937,9 +3952,6 @@ MMSMITH_FN void skew_3d_at_point(const skew_3d_solution *s, const double X[3], d
     const double t24 = 0.5 * X[1];
     const double t25 = mmsmith_sin_pi(t24);
     const double t26 = t23 * t25;
-    const double t27 = X[2] * X[2];
-    const double t28 = X[0] * t27;
-    const double t29 = t26 + t28;
     const double t40 = 0.5 * X[0];
     const double t41 = exp(t40);
     const double t42 = 2.0 * X[2];
@@ -3950,37 +3962,27 @@ MMSMITH_FN void skew_3d_at_point(const skew_3d_solution *s, const double X[3], d
     const double t104 = sin(t22);
     const double t105 = t25 * t104;
     const double t106 = 2.0 * t105;
-    const double t107 = t27 - t106;
     const double t109 = mmsmith_cos_pi(t24);
     const double t114 = t23 * t109;
-    const double t119 = X[0] * X[2];
     const double t125 = sin(t43);
     const double t126 = t41 * t125;
     const double t331 = t104 * t109;
-    const double t480 = 3.0 * t12;
-    const double t679 = 2.0 * t95;
     const double t1548 = s->fixed[44] * t25;
     const double t1549 = t23 * t1548;
     const double t1550 = 4.0 * X[0];
     const double t1551 = t1550 - t1549;
     const double t1552 = 13.0 * t1551;
-    const double t1627 = s->par.A * t95;
     point[0] = X[0];
     point[1] = X[2];
     point[2] = t12;
     point[3] = t26;
-    point[4] = t29;
-    point[5] = t53;
-    point[6] = t95;
-    point[7] = t107;
-    point[8] = t114;
-    point[9] = t119;
-    point[10] = t126;
-    point[11] = t331;
-    point[12] = t480;
-    point[13] = t679;
-    point[14] = t1552;
-    point[15] = t1627;
+    point[4] = t53;
+    point[5] = t95;
+    point[6] = t106;
+    point[7] = t114;
+    point[8] = t126;
+    point[9] = t331;
+    point[10] = t1552;
 }
 
 /* The body force from the values of one time and of one point. Value m of the point is point[m*stride]:
@@ -3990,18 +3992,23 @@ MMSMITH_FN void skew_3d_b_staged(const skew_3d_solution *s, const skew_3d_time_v
     const double *point, size_t stride, double b[3])
 {
     const double t21 = time->values[1] * point[2 * stride];
-    const double t54 = time->values[4] * point[5 * stride];
-    const double t98 = time->values[5] * point[6 * stride];
-    const double t99 = time->values[1] * point[6 * stride];
-    const double t102 = time->values[6] * point[6 * stride];
+    const double t27 = point[stride] * point[stride];
+    const double t28 = point[0] * t27;
+    const double t29 = point[3 * stride] + t28;
+    const double t54 = time->values[4] * point[4 * stride];
+    const double t98 = time->values[5] * point[5 * stride];
+    const double t99 = time->values[1] * point[5 * stride];
+    const double t102 = time->values[6] * point[5 * stride];
     const double t103 = -t102;
-    const double t108 = time->values[3] * point[7 * stride];
-    const double t115 = time->values[7] * point[8 * stride];
-    const double t120 = time->values[8] * point[9 * stride];
-    const double t124 = time->values[9] * point[5 * stride];
-    const double t127 = time->values[4] * point[10 * stride];
+    const double t107 = t27 - point[6 * stride];
+    const double t108 = time->values[3] * t107;
+    const double t115 = time->values[7] * point[7 * stride];
+    const double t119 = point[0] * point[stride];
+    const double t120 = time->values[8] * t119;
+    const double t124 = time->values[9] * point[4 * stride];
+    const double t127 = time->values[4] * point[8 * stride];
     const double t128 = -t127;
-    const double t132 = time->values[10] * point[10 * stride];
+    const double t132 = time->values[10] * point[8 * stride];
     const double t133 = -t132;
     const double t135 = t98 + 1.0;
     const double t148 = t115 + 1.0;
@@ -4025,7 +4032,7 @@ MMSMITH_FN void skew_3d_b_staged(const skew_3d_solution *s, const skew_3d_time_v
     const double t170 = t115 * t133;
     const double t171 = t151 - t170;
     const double t172 = 1.0 - t171;
-    const double t173 = time->values[0] * point[6 * stride];
+    const double t173 = time->values[0] * point[5 * stride];
     const double t174 = t173 * t155;
     const double t175 = s->par.A * t174;
     const double t176 = t98 - t132;
@@ -4060,14 +4067,14 @@ MMSMITH_FN void skew_3d_b_staged(const skew_3d_solution *s, const skew_3d_time_v
     const double t247 = t99 * t108;
     const double t248 = t135 * t148;
     const double t249 = t247 - t248;
-    const double t325 = time->values[11] * point[10 * stride];
+    const double t325 = time->values[11] * point[8 * stride];
     const double t328 = time->values[12] * point[2 * stride];
-    const double t332 = time->values[13] * point[11 * stride];
+    const double t332 = time->values[13] * point[9 * stride];
     const double t333 = t325 + t328;
     const double t334 = t333 + t332;
-    const double t337 = time->values[14] * point[10 * stride];
+    const double t337 = time->values[14] * point[8 * stride];
     const double t340 = time->values[15] * point[2 * stride];
-    const double t344 = time->values[16] * point[11 * stride];
+    const double t344 = time->values[16] * point[9 * stride];
     const double t348 = s->fixed[22] * t334;
     const double t349 = t337 + t340;
     const double t350 = t349 + t344;
@@ -4075,21 +4082,23 @@ MMSMITH_FN void skew_3d_b_staged(const skew_3d_solution *s, const skew_3d_time_v
     const double t354 = s->fixed[23] * t351;
     const double t413 = time->values[8] * point[stride];
     const double t473 = t413 - t148;
-    const double t488 = point[6 * stride] * t413;
-    const double t687 = point[13 * stride] * t413;
+    const double t480 = 3.0 * point[2 * stride];
+    const double t488 = point[5 * stride] * t413;
+    const double t679 = 2.0 * point[5 * stride];
+    const double t687 = t679 * t413;
     const double t688 = point[2 * stride] * t108;
     const double t689 = t687 + t688;
     const double t690 = time->values[1] * t689;
-    const double t850 = time->values[17] * point[5 * stride];
+    const double t850 = time->values[17] * point[4 * stride];
     const double t853 = time->values[18] * point[2 * stride];
     const double t856 = t850 + t853;
-    const double t862 = time->values[14] * point[5 * stride];
+    const double t862 = time->values[14] * point[4 * stride];
     const double t865 = time->values[19] * point[2 * stride];
-    const double t874 = time->values[20] * point[4 * stride];
-    const double t1011 = time->values[21] * point[5 * stride];
+    const double t874 = time->values[20] * t29;
+    const double t1011 = time->values[21] * point[4 * stride];
     const double t1014 = time->values[22] * point[2 * stride];
     const double t1015 = t1011 - t1014;
-    const double t1018 = time->values[23] * point[5 * stride];
+    const double t1018 = time->values[23] * point[4 * stride];
     const double t1021 = time->values[24] * point[2 * stride];
     const double t1024 = s->fixed[39] * t1015;
     const double t1025 = t1018 - t1021;
@@ -4104,10 +4113,10 @@ MMSMITH_FN void skew_3d_b_staged(const skew_3d_solution *s, const skew_3d_time_v
     const double t1153 = time->values[27] * point[2 * stride];
     const double t1155 = time->values[28] * point[3 * stride];
     const double t1156 = -t1155;
-    const double t1159 = time->values[29] * point[11 * stride];
+    const double t1159 = time->values[29] * point[9 * stride];
     const double t1160 = -t1159;
-    const double t1162 = time->values[30] * point[5 * stride];
-    const double t1163 = time->values[9] * point[10 * stride];
+    const double t1162 = time->values[30] * point[4 * stride];
+    const double t1163 = time->values[9] * point[8 * stride];
     const double t1164 = -t1163;
     const double t1165 = t152 * t1151;
     const double t1166 = time->values[5] * point[2 * stride];
@@ -4137,15 +4146,15 @@ MMSMITH_FN void skew_3d_b_staged(const skew_3d_solution *s, const skew_3d_time_v
     const double t1190 = t120 * t1164;
     const double t1191 = t1189 - t1188;
     const double t1192 = t1191 - t1190;
-    const double t1193 = point[6 * stride] * t128;
-    const double t1194 = point[12 * stride] * t149;
+    const double t1193 = point[5 * stride] * t128;
+    const double t1194 = t480 * t149;
     const double t1195 = t1193 - t1194;
     const double t1196 = time->values[1] * t1195;
     const double t1197 = t128 * t1153;
     const double t1198 = t103 * t1164;
     const double t1199 = t1196 - t1197;
     const double t1200 = t1199 - t1198;
-    const double t1201 = point[12 * stride] * t120;
+    const double t1201 = t480 * t120;
     const double t1202 = t1201 - t488;
     const double t1203 = time->values[1] * t1202;
     const double t1204 = t148 * t1153;
@@ -4189,8 +4198,8 @@ MMSMITH_FN void skew_3d_b_staged(const skew_3d_solution *s, const skew_3d_time_v
     const double t1242 = t156 + t1239;
     const double t1243 = t1242 - t1240;
     const double t1244 = t1243 - t1241;
-    const double t1245 = point[12 * stride] * t155;
-    const double t1246 = point[6 * stride] * t1244;
+    const double t1245 = t480 * t155;
+    const double t1246 = point[5 * stride] * t1244;
     const double t1247 = t1245 - t1246;
     const double t1248 = t128 * t1156;
     const double t1249 = t108 * t1164;
@@ -4211,7 +4220,7 @@ MMSMITH_FN void skew_3d_b_staged(const skew_3d_solution *s, const skew_3d_time_v
     const double t1267 = time->values[31] * point[3 * stride];
     const double t1268 = -t1267;
     const double t1269 = -t54;
-    const double t1270 = time->values[10] * point[5 * stride];
+    const double t1270 = time->values[10] * point[4 * stride];
     const double t1271 = -t1270;
     const double t1272 = t21 * t155;
     const double t1273 = t152 * t1262;
@@ -4283,7 +4292,7 @@ MMSMITH_FN void skew_3d_b_staged(const skew_3d_solution *s, const skew_3d_time_v
     const double t1339 = t1336 + t1337;
     const double t1340 = t1339 - t1338;
     const double t1341 = point[2 * stride] * t155;
-    const double t1342 = point[6 * stride] * t1294;
+    const double t1342 = point[5 * stride] * t1294;
     const double t1343 = t1341 - t1342;
     const double t1344 = t128 * t1160;
     const double t1345 = t108 * t1269;
@@ -4302,7 +4311,7 @@ MMSMITH_FN void skew_3d_b_staged(const skew_3d_solution *s, const skew_3d_time_v
     const double t1359 = time->values[32] * point[2 * stride];
     const double t1360 = -t1359;
     const double t1361 = time->values[8] * point[0];
-    const double t1363 = time->values[33] * point[5 * stride];
+    const double t1363 = time->values[33] * point[4 * stride];
     const double t1364 = -t1363;
     const double t1365 = t152 * t1153;
     const double t1366 = t158 * t1360;
@@ -4325,7 +4334,7 @@ MMSMITH_FN void skew_3d_b_staged(const skew_3d_solution *s, const skew_3d_time_v
     const double t1383 = t1382 - t1381;
     const double t1384 = t1188 + t1292;
     const double t1385 = -t1384;
-    const double t1386 = point[13 * stride] * t128;
+    const double t1386 = t679 * t128;
     const double t1387 = point[2 * stride] * t124;
     const double t1388 = t1386 + t1387;
     const double t1389 = t1197 + t1297;
@@ -4375,7 +4384,7 @@ MMSMITH_FN void skew_3d_b_staged(const skew_3d_solution *s, const skew_3d_time_v
     const double t1433 = t151 - t1430;
     const double t1434 = t1433 - t1431;
     const double t1435 = t1434 + t1432;
-    const double t1436 = point[13 * stride] * t1435;
+    const double t1436 = t679 * t1435;
     const double t1437 = t1341 - t1436;
     const double t1438 = t135 * t1429;
     const double t1439 = t103 * t1385;
@@ -4485,7 +4494,7 @@ MMSMITH_FN void skew_3d_b_staged(const skew_3d_solution *s, const skew_3d_time_v
     const double t1543 = 0.5 * t1542;
     const double t1545 = time->values[34] * point[3 * stride];
     const double t1546 = t856 + t1545;
-    const double t1553 = time->values[2] * point[14 * stride];
+    const double t1553 = time->values[2] * point[10 * stride];
     const double t1554 = s->fixed[36] * t1546;
     const double t1555 = t862 - t1553;
     const double t1556 = t1555 + t865;
@@ -4494,8 +4503,8 @@ MMSMITH_FN void skew_3d_b_staged(const skew_3d_solution *s, const skew_3d_time_v
     const double t1559 = t874 - t1558;
     const double t1560 = s->fixed[38] * t1559;
     const double t1561 = -t1560;
-    const double t1562 = point[12 * stride] * t152;
-    const double t1563 = point[6 * stride] * t1192;
+    const double t1562 = t480 * t152;
+    const double t1563 = point[5 * stride] * t1192;
     const double t1564 = t1562 - t1563;
     const double t1565 = t128 * t1207;
     const double t1566 = time->values[1] * t1564;
@@ -4537,7 +4546,7 @@ MMSMITH_FN void skew_3d_b_staged(const skew_3d_solution *s, const skew_3d_time_v
     const double t1602 = s->fixed[17] * t1599;
     const double t1603 = t1601 + t1602;
     const double t1604 = point[2 * stride] * t158;
-    const double t1605 = point[13 * stride] * t1385;
+    const double t1605 = t679 * t1385;
     const double t1606 = t1604 - t1605;
     const double t1607 = 2.0 * t1279;
     const double t1608 = t128 * t1394;
@@ -4559,7 +4568,8 @@ MMSMITH_FN void skew_3d_b_staged(const skew_3d_solution *s, const skew_3d_time_v
     const double t1624 = s->fixed[17] * t1621;
     const double t1625 = t1623 - t1624;
     const double t1626 = 2.0 * t232;
-    const double t1628 = point[15 * stride] * t1448;
+    const double t1627 = s->par.A * point[5 * stride];
+    const double t1628 = t1627 * t1448;
     const double t1629 = time->values[0] * t1628;
     const double t1630 = 6.0 * t103;
     const double t1631 = t1630 + t135;
@@ -4567,7 +4577,7 @@ MMSMITH_FN void skew_3d_b_staged(const skew_3d_solution *s, const skew_3d_time_v
     const double t1633 = t1626 + t1629;
     const double t1634 = t1633 - t1632;
     const double t1635 = 2.0 * t235;
-    const double t1636 = point[15 * stride] * t1454;
+    const double t1636 = t1627 * t1454;
     const double t1637 = time->values[0] * t1636;
     const double t1638 = t148 * t1631;
     const double t1639 = t1637 - t1635;
@@ -4578,7 +4588,7 @@ MMSMITH_FN void skew_3d_b_staged(const skew_3d_solution *s, const skew_3d_time_v
     const double t1644 = t1641 - t1642;
     const double t1645 = t1644 + t1643;
     const double t1646 = point[2 * stride] * t1645;
-    const double t1647 = point[6 * stride] * t1470;
+    const double t1647 = point[5 * stride] * t1470;
     const double t1648 = t1646 - t1647;
     const double t1649 = t1160 * t1224;
     const double t1650 = t1164 * t1229;
@@ -4625,7 +4635,7 @@ MMSMITH_FN void skew_3d_b_staged(const skew_3d_solution *s, const skew_3d_time_v
     const double t1691 = s->fixed[34] * t1690;
     const double t1692 = t1689 + t1691;
     const double t1693 = 0.5 * t1692;
-    const double t1695 = time->values[35] * point[5 * stride];
+    const double t1695 = time->values[35] * point[4 * stride];
     const double t1696 = t1695 - t1027;
     const double t1697 = s->fixed[41] * t1696;
     const double t1698 = -t1697;
@@ -4751,9 +4761,9 @@ MMSMITH_FN void skew_3d_point_array(const skew_3d_solution *s, size_t n, const d
 {
     size_t p, m;
     for (p = 0; p < n; ++p) {
-        double values[16];
+        double values[11];
         skew_3d_at_point(s, X + p * 3, values);
-        for (m = 0; m < 16; ++m) {
+        for (m = 0; m < 11; ++m) {
             point[m * n + p] = values[m];
         }
     }
@@ -4777,27 +4787,27 @@ MMSMITH_FN void skew_3d_b_array(const skew_3d_solution *s, double t, size_t n,
     const double *const point8 = point + 8 * n;
     const double *const point9 = point + 9 * n;
     const double *const point10 = point + 10 * n;
-    const double *const point11 = point + 11 * n;
-    const double *const point12 = point + 12 * n;
-    const double *const point13 = point + 13 * n;
-    const double *const point14 = point + 14 * n;
-    const double *const point15 = point + 15 * n;
     const size_t end = first + count;
     size_t p;
     for (p = first; p < end; ++p) {
         const double t21 = time.values[1] * point2[p];
-        const double t54 = time.values[4] * point5[p];
-        const double t98 = time.values[5] * point6[p];
-        const double t99 = time.values[1] * point6[p];
-        const double t102 = time.values[6] * point6[p];
+        const double t27 = point1[p] * point1[p];
+        const double t28 = point0[p] * t27;
+        const double t29 = point3[p] + t28;
+        const double t54 = time.values[4] * point4[p];
+        const double t98 = time.values[5] * point5[p];
+        const double t99 = time.values[1] * point5[p];
+        const double t102 = time.values[6] * point5[p];
         const double t103 = -t102;
-        const double t108 = time.values[3] * point7[p];
-        const double t115 = time.values[7] * point8[p];
-        const double t120 = time.values[8] * point9[p];
-        const double t124 = time.values[9] * point5[p];
-        const double t127 = time.values[4] * point10[p];
+        const double t107 = t27 - point6[p];
+        const double t108 = time.values[3] * t107;
+        const double t115 = time.values[7] * point7[p];
+        const double t119 = point0[p] * point1[p];
+        const double t120 = time.values[8] * t119;
+        const double t124 = time.values[9] * point4[p];
+        const double t127 = time.values[4] * point8[p];
         const double t128 = -t127;
-        const double t132 = time.values[10] * point10[p];
+        const double t132 = time.values[10] * point8[p];
         const double t133 = -t132;
         const double t135 = t98 + 1.0;
         const double t148 = t115 + 1.0;
@@ -4821,7 +4831,7 @@ MMSMITH_FN void skew_3d_b_array(const skew_3d_solution *s, double t, size_t n,
         const double t170 = t115 * t133;
         const double t171 = t151 - t170;
         const double t172 = 1.0 - t171;
-        const double t173 = time.values[0] * point6[p];
+        const double t173 = time.values[0] * point5[p];
         const double t174 = t173 * t155;
         const double t175 = s->par.A * t174;
         const double t176 = t98 - t132;
@@ -4856,14 +4866,14 @@ MMSMITH_FN void skew_3d_b_array(const skew_3d_solution *s, double t, size_t n,
         const double t247 = t99 * t108;
         const double t248 = t135 * t148;
         const double t249 = t247 - t248;
-        const double t325 = time.values[11] * point10[p];
+        const double t325 = time.values[11] * point8[p];
         const double t328 = time.values[12] * point2[p];
-        const double t332 = time.values[13] * point11[p];
+        const double t332 = time.values[13] * point9[p];
         const double t333 = t325 + t328;
         const double t334 = t333 + t332;
-        const double t337 = time.values[14] * point10[p];
+        const double t337 = time.values[14] * point8[p];
         const double t340 = time.values[15] * point2[p];
-        const double t344 = time.values[16] * point11[p];
+        const double t344 = time.values[16] * point9[p];
         const double t348 = s->fixed[22] * t334;
         const double t349 = t337 + t340;
         const double t350 = t349 + t344;
@@ -4871,21 +4881,23 @@ MMSMITH_FN void skew_3d_b_array(const skew_3d_solution *s, double t, size_t n,
         const double t354 = s->fixed[23] * t351;
         const double t413 = time.values[8] * point1[p];
         const double t473 = t413 - t148;
-        const double t488 = point6[p] * t413;
-        const double t687 = point13[p] * t413;
+        const double t480 = 3.0 * point2[p];
+        const double t488 = point5[p] * t413;
+        const double t679 = 2.0 * point5[p];
+        const double t687 = t679 * t413;
         const double t688 = point2[p] * t108;
         const double t689 = t687 + t688;
         const double t690 = time.values[1] * t689;
-        const double t850 = time.values[17] * point5[p];
+        const double t850 = time.values[17] * point4[p];
         const double t853 = time.values[18] * point2[p];
         const double t856 = t850 + t853;
-        const double t862 = time.values[14] * point5[p];
+        const double t862 = time.values[14] * point4[p];
         const double t865 = time.values[19] * point2[p];
-        const double t874 = time.values[20] * point4[p];
-        const double t1011 = time.values[21] * point5[p];
+        const double t874 = time.values[20] * t29;
+        const double t1011 = time.values[21] * point4[p];
         const double t1014 = time.values[22] * point2[p];
         const double t1015 = t1011 - t1014;
-        const double t1018 = time.values[23] * point5[p];
+        const double t1018 = time.values[23] * point4[p];
         const double t1021 = time.values[24] * point2[p];
         const double t1024 = s->fixed[39] * t1015;
         const double t1025 = t1018 - t1021;
@@ -4900,10 +4912,10 @@ MMSMITH_FN void skew_3d_b_array(const skew_3d_solution *s, double t, size_t n,
         const double t1153 = time.values[27] * point2[p];
         const double t1155 = time.values[28] * point3[p];
         const double t1156 = -t1155;
-        const double t1159 = time.values[29] * point11[p];
+        const double t1159 = time.values[29] * point9[p];
         const double t1160 = -t1159;
-        const double t1162 = time.values[30] * point5[p];
-        const double t1163 = time.values[9] * point10[p];
+        const double t1162 = time.values[30] * point4[p];
+        const double t1163 = time.values[9] * point8[p];
         const double t1164 = -t1163;
         const double t1165 = t152 * t1151;
         const double t1166 = time.values[5] * point2[p];
@@ -4933,15 +4945,15 @@ MMSMITH_FN void skew_3d_b_array(const skew_3d_solution *s, double t, size_t n,
         const double t1190 = t120 * t1164;
         const double t1191 = t1189 - t1188;
         const double t1192 = t1191 - t1190;
-        const double t1193 = point6[p] * t128;
-        const double t1194 = point12[p] * t149;
+        const double t1193 = point5[p] * t128;
+        const double t1194 = t480 * t149;
         const double t1195 = t1193 - t1194;
         const double t1196 = time.values[1] * t1195;
         const double t1197 = t128 * t1153;
         const double t1198 = t103 * t1164;
         const double t1199 = t1196 - t1197;
         const double t1200 = t1199 - t1198;
-        const double t1201 = point12[p] * t120;
+        const double t1201 = t480 * t120;
         const double t1202 = t1201 - t488;
         const double t1203 = time.values[1] * t1202;
         const double t1204 = t148 * t1153;
@@ -4985,8 +4997,8 @@ MMSMITH_FN void skew_3d_b_array(const skew_3d_solution *s, double t, size_t n,
         const double t1242 = t156 + t1239;
         const double t1243 = t1242 - t1240;
         const double t1244 = t1243 - t1241;
-        const double t1245 = point12[p] * t155;
-        const double t1246 = point6[p] * t1244;
+        const double t1245 = t480 * t155;
+        const double t1246 = point5[p] * t1244;
         const double t1247 = t1245 - t1246;
         const double t1248 = t128 * t1156;
         const double t1249 = t108 * t1164;
@@ -5007,7 +5019,7 @@ MMSMITH_FN void skew_3d_b_array(const skew_3d_solution *s, double t, size_t n,
         const double t1267 = time.values[31] * point3[p];
         const double t1268 = -t1267;
         const double t1269 = -t54;
-        const double t1270 = time.values[10] * point5[p];
+        const double t1270 = time.values[10] * point4[p];
         const double t1271 = -t1270;
         const double t1272 = t21 * t155;
         const double t1273 = t152 * t1262;
@@ -5079,7 +5091,7 @@ MMSMITH_FN void skew_3d_b_array(const skew_3d_solution *s, double t, size_t n,
         const double t1339 = t1336 + t1337;
         const double t1340 = t1339 - t1338;
         const double t1341 = point2[p] * t155;
-        const double t1342 = point6[p] * t1294;
+        const double t1342 = point5[p] * t1294;
         const double t1343 = t1341 - t1342;
         const double t1344 = t128 * t1160;
         const double t1345 = t108 * t1269;
@@ -5098,7 +5110,7 @@ MMSMITH_FN void skew_3d_b_array(const skew_3d_solution *s, double t, size_t n,
         const double t1359 = time.values[32] * point2[p];
         const double t1360 = -t1359;
         const double t1361 = time.values[8] * point0[p];
-        const double t1363 = time.values[33] * point5[p];
+        const double t1363 = time.values[33] * point4[p];
         const double t1364 = -t1363;
         const double t1365 = t152 * t1153;
         const double t1366 = t158 * t1360;
@@ -5121,7 +5133,7 @@ MMSMITH_FN void skew_3d_b_array(const skew_3d_solution *s, double t, size_t n,
         const double t1383 = t1382 - t1381;
         const double t1384 = t1188 + t1292;
         const double t1385 = -t1384;
-        const double t1386 = point13[p] * t128;
+        const double t1386 = t679 * t128;
         const double t1387 = point2[p] * t124;
         const double t1388 = t1386 + t1387;
         const double t1389 = t1197 + t1297;
@@ -5171,7 +5183,7 @@ MMSMITH_FN void skew_3d_b_array(const skew_3d_solution *s, double t, size_t n,
         const double t1433 = t151 - t1430;
         const double t1434 = t1433 - t1431;
         const double t1435 = t1434 + t1432;
-        const double t1436 = point13[p] * t1435;
+        const double t1436 = t679 * t1435;
         const double t1437 = t1341 - t1436;
         const double t1438 = t135 * t1429;
         const double t1439 = t103 * t1385;
@@ -5281,7 +5293,7 @@ MMSMITH_FN void skew_3d_b_array(const skew_3d_solution *s, double t, size_t n,
         const double t1543 = 0.5 * t1542;
         const double t1545 = time.values[34] * point3[p];
         const double t1546 = t856 + t1545;
-        const double t1553 = time.values[2] * point14[p];
+        const double t1553 = time.values[2] * point10[p];
         const double t1554 = s->fixed[36] * t1546;
         const double t1555 = t862 - t1553;
         const double t1556 = t1555 + t865;
@@ -5290,8 +5302,8 @@ MMSMITH_FN void skew_3d_b_array(const skew_3d_solution *s, double t, size_t n,
         const double t1559 = t874 - t1558;
         const double t1560 = s->fixed[38] * t1559;
         const double t1561 = -t1560;
-        const double t1562 = point12[p] * t152;
-        const double t1563 = point6[p] * t1192;
+        const double t1562 = t480 * t152;
+        const double t1563 = point5[p] * t1192;
         const double t1564 = t1562 - t1563;
         const double t1565 = t128 * t1207;
         const double t1566 = time.values[1] * t1564;
@@ -5333,7 +5345,7 @@ MMSMITH_FN void skew_3d_b_array(const skew_3d_solution *s, double t, size_t n,
         const double t1602 = s->fixed[17] * t1599;
         const double t1603 = t1601 + t1602;
         const double t1604 = point2[p] * t158;
-        const double t1605 = point13[p] * t1385;
+        const double t1605 = t679 * t1385;
         const double t1606 = t1604 - t1605;
         const double t1607 = 2.0 * t1279;
         const double t1608 = t128 * t1394;
@@ -5355,7 +5367,8 @@ MMSMITH_FN void skew_3d_b_array(const skew_3d_solution *s, double t, size_t n,
         const double t1624 = s->fixed[17] * t1621;
         const double t1625 = t1623 - t1624;
         const double t1626 = 2.0 * t232;
-        const double t1628 = point15[p] * t1448;
+        const double t1627 = s->par.A * point5[p];
+        const double t1628 = t1627 * t1448;
         const double t1629 = time.values[0] * t1628;
         const double t1630 = 6.0 * t103;
         const double t1631 = t1630 + t135;
@@ -5363,7 +5376,7 @@ MMSMITH_FN void skew_3d_b_array(const skew_3d_solution *s, double t, size_t n,
         const double t1633 = t1626 + t1629;
         const double t1634 = t1633 - t1632;
         const double t1635 = 2.0 * t235;
-        const double t1636 = point15[p] * t1454;
+        const double t1636 = t1627 * t1454;
         const double t1637 = time.values[0] * t1636;
         const double t1638 = t148 * t1631;
         const double t1639 = t1637 - t1635;
@@ -5374,7 +5387,7 @@ MMSMITH_FN void skew_3d_b_array(const skew_3d_solution *s, double t, size_t n,
         const double t1644 = t1641 - t1642;
         const double t1645 = t1644 + t1643;
         const double t1646 = point2[p] * t1645;
-        const double t1647 = point6[p] * t1470;
+        const double t1647 = point5[p] * t1470;
         const double t1648 = t1646 - t1647;
         const double t1649 = t1160 * t1224;
         const double t1650 = t1164 * t1229;
@@ -5421,7 +5434,7 @@ MMSMITH_FN void skew_3d_b_array(const skew_3d_solution *s, double t, size_t n,
         const double t1691 = s->fixed[34] * t1690;
         const double t1692 = t1689 + t1691;
         const double t1693 = 0.5 * t1692;
-        const double t1695 = time.values[35] * point5[p];
+        const double t1695 = time.values[35] * point4[p];
         const double t1696 = t1695 - t1027;
         const double t1697 = s->fixed[41] * t1696;
         const double t1698 = -t1697;

@@ -142,6 +142,59 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
 
 #endif
 
+#ifndef MMSMITH_LOGARITHM
+#define MMSMITH_LOGARITHM 1
+
+/* ln(y) where by_y, else ln(1 + x), by the reduction and the polynomial of Sun's fdlibm. */
+MMSMITH_FN double mmsmith_logarithm(double x, double y, int by_y)
+{
+    const double sum = 1.0 + x;
+    const double u = by_y ? y : sum;
+    /* What rounding took from the sum. */
+    const double lost = by_y ? 0.0 : x < 1.0 ? x - (sum - 1.0) : 1.0 - (sum - x);
+    double m, f, correction, s, z, w, even, odd, half_square, tail;
+    int k, exact;
+    if (!(u > 0.0 && u - u == 0.0)) {
+        return u == 0.0 ? -HUGE_VAL : u > 0.0 ? u : NAN;
+    }
+    /* u = 2^k m with m between sqrt(1/2) and sqrt(2). */
+    m = frexp(u, &k);
+    if (m < 0.7071065902709961) {
+        m += m;
+        --k;
+    }
+    /* With k = 0 x itself has digits that the sum has lost. */
+    exact = k == 0 && !by_y;
+    f = exact ? x : m - 1.0;
+    /* lost / u, which two digits of 1/m are enough for. */
+    correction =
+        exact || by_y || k > 1022 ? 0.0 : lost * ldexp(1.0, -k) * (1.0 - f + f * f);
+    s = f / (2.0 + f);
+    z = s * s;
+    w = z * z;
+    even = w * (3.9999999999409419e-1 + w * (2.2222198432149784e-1 + w * 1.5313837699209373e-1));
+    odd = z
+        * (6.6666666666667351e-1
+            + w * (2.8571428743662391e-1 + w * (1.818357216161805e-1 + w * 1.4798198605116586e-1)));
+    half_square = 0.5 * f * f;
+    tail = s * (half_square + (even + odd)) + (k * 1.9082149292705877e-10 + correction);
+    return k * 6.931471803691238e-1 - ((half_square - tail) - f);
+}
+
+/* ln(1 + x), within one unit in the last place. */
+MMSMITH_FN double mmsmith_log_1p(double x)
+{
+    return mmsmith_logarithm(x, x, 0);
+}
+
+/* ln(y) of y = 1 + x: by y where x < -1/2, else by x. */
+MMSMITH_FN double mmsmith_ln_of_both(double x, double y)
+{
+    return mmsmith_logarithm(x, y, x < -0.5);
+}
+
+#endif
+
 /* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
 enum {
     sphere_shell_dimension = 3,
@@ -632,7 +685,7 @@ MMSMITH_FN void sphere_shell_P(const sphere_shell_solution *s, const double X[3]
     const double t130 = s->fixed[10] * t126;
     const double t131 = t121 + t130;
     const double t132 = t131 + t107;
-    const double t133 = (t132 < -0.5 ? log(t112) : log1p(t132));
+    const double t133 = mmsmith_ln_of_both(t132, t112);
     const double t137 = t107 + 2.0;
     const double t141 = s->fixed[12] * t133;
     const double t142 = s->fixed[11] * t137;
@@ -731,7 +784,7 @@ MMSMITH_FN void sphere_shell_b(const sphere_shell_solution *s, const double X[3]
     const double t200 = t109 * t109;
     const double t201 = t196 + t199;
     const double t202 = t201 + t200;
-    const double t203 = (t202 < -0.5 ? log(t112) : log1p(t202));
+    const double t203 = mmsmith_ln_of_both(t202, t112);
     const double t204 = s->fixed[11] * t107;
     const double t205 = s->fixed[12] * t203;
     const double t206 = t204 + t205;
@@ -796,7 +849,7 @@ MMSMITH_FN void sphere_shell_inner_traction(const sphere_shell_solution *s, cons
     const double t381 = t380 + 1.0;
     const double t382 = t381 * t381;
     const double t383 = t359 * t382;
-    const double t384 = (t376 < -0.5 ? log(t383) : log1p(t376));
+    const double t384 = mmsmith_ln_of_both(t376, t383);
     const double t385 = t358 + 2.0;
     const double t386 = s->fixed[12] * t384;
     const double t387 = t358 * t385;
@@ -827,7 +880,7 @@ MMSMITH_FN void sphere_shell_outer_traction(const sphere_shell_solution *s, cons
     const double t403 = s->fixed[30] * t402;
     const double t404 = t400 + 1.0;
     const double t405 = t404 * t404;
-    const double t406 = (t403 < -0.5 ? log(t405) : log1p(t403));
+    const double t406 = mmsmith_ln_of_both(t403, t405);
     const double t410 = s->fixed[31] * t406;
     const double t411 = t410 * X[0];
     const double t412 = t410 * X[1];
@@ -875,7 +928,7 @@ MMSMITH_FN void sphere_shell_X_lower_traction(const sphere_shell_solution *s, co
     const double t130 = s->fixed[10] * t126;
     const double t131 = t121 + t130;
     const double t132 = t131 + t107;
-    const double t133 = (t132 < -0.5 ? log(t112) : log1p(t132));
+    const double t133 = mmsmith_ln_of_both(t132, t112);
     const double t141 = s->fixed[12] * t133;
     const double t146 = t109 + 2.0;
     const double t147 = s->fixed[11] * t146;
@@ -932,7 +985,7 @@ MMSMITH_FN void sphere_shell_Y_lower_traction(const sphere_shell_solution *s, co
     const double t130 = s->fixed[10] * t126;
     const double t131 = t121 + t130;
     const double t132 = t131 + t107;
-    const double t133 = (t132 < -0.5 ? log(t112) : log1p(t132));
+    const double t133 = mmsmith_ln_of_both(t132, t112);
     const double t141 = s->fixed[12] * t133;
     const double t146 = t109 + 2.0;
     const double t147 = s->fixed[11] * t146;
@@ -989,7 +1042,7 @@ MMSMITH_FN void sphere_shell_Z_lower_traction(const sphere_shell_solution *s, co
     const double t130 = s->fixed[10] * t126;
     const double t131 = t121 + t130;
     const double t132 = t131 + t107;
-    const double t133 = (t132 < -0.5 ? log(t112) : log1p(t132));
+    const double t133 = mmsmith_ln_of_both(t132, t112);
     const double t141 = s->fixed[12] * t133;
     const double t146 = t109 + 2.0;
     const double t147 = s->fixed[11] * t146;
@@ -1103,7 +1156,7 @@ MMSMITH_FN void sphere_shell_fields(const sphere_shell_solution *s, const double
     const double t130 = s->fixed[10] * t126;
     const double t131 = t121 + t130;
     const double t132 = t131 + t107;
-    const double t133 = (t132 < -0.5 ? log(t112) : log1p(t132));
+    const double t133 = mmsmith_ln_of_both(t132, t112);
     const double t137 = t107 + 2.0;
     const double t141 = s->fixed[12] * t133;
     const double t142 = s->fixed[11] * t137;
@@ -1160,7 +1213,7 @@ MMSMITH_FN void sphere_shell_fields(const sphere_shell_solution *s, const double
     const double t200 = t109 * t109;
     const double t201 = t196 + t199;
     const double t202 = t201 + t200;
-    const double t203 = (t202 < -0.5 ? log(t112) : log1p(t202));
+    const double t203 = mmsmith_ln_of_both(t202, t112);
     const double t204 = s->fixed[11] * t107;
     const double t205 = s->fixed[12] * t203;
     const double t206 = t204 + t205;
@@ -1374,7 +1427,7 @@ MMSMITH_FN void sphere_shell_b_staged(const sphere_shell_solution *s, const sphe
     const double t130 = s->fixed[10] * t126;
     const double t131 = t121 + t130;
     const double t132 = t131 + t107;
-    const double t133 = (t132 < -0.5 ? log(t112) : log1p(t132));
+    const double t133 = mmsmith_ln_of_both(t132, t112);
     const double t301 = time->values[0] * point[5 * stride];
     const double t302 = point[6 * stride] + t301;
     const double t327 = time->values[0] * t302;
@@ -1449,7 +1502,7 @@ MMSMITH_FN void sphere_shell_b_array(const sphere_shell_solution *s, double t, s
         const double t130 = s->fixed[10] * t126;
         const double t131 = t121 + t130;
         const double t132 = t131 + t107;
-        const double t133 = (t132 < -0.5 ? log(t112) : log1p(t132));
+        const double t133 = mmsmith_ln_of_both(t132, t112);
         const double t301 = time.values[0] * point5[p];
         const double t302 = point6[p] + t301;
         const double t327 = time.values[0] * t302;

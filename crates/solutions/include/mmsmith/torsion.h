@@ -148,7 +148,7 @@ enum {
     torsion_dimension = 3,
     torsion_parameter_count = 4,
     torsion_time_count = 4,
-    torsion_point_count = 4
+    torsion_point_count = 3
 };
 
 typedef struct torsion_parameters {
@@ -758,14 +758,13 @@ MMSMITH_FN torsion_time_values torsion_at_time(const torsion_solution *s, double
     return time;
 }
 
-/* What the body force needs of the position alone, 4 values. */
-MMSMITH_FN void torsion_at_point(const torsion_solution *s, const double X[3], double point[4])
+/* What the body force needs of the position alone, 3 values. */
+MMSMITH_FN void torsion_at_point(const torsion_solution *s, const double X[3], double point[3])
 {
-    const double t88 = s->fixed[6] * X[2];
+    (void)s;
     point[0] = X[2];
     point[1] = X[0];
     point[2] = X[1];
-    point[3] = t88;
 }
 
 /* The body force from the values of one time and of one point. Value m of the point is point[m*stride]:
@@ -796,8 +795,9 @@ MMSMITH_FN void torsion_b_staged(const torsion_solution *s, const torsion_time_v
     const double t56 = time->values[0] * t41;
     const double t57 = t48 * t33;
     const double t58 = t56 - t57;
-    const double t89 = point[3 * stride] * t50;
-    const double t97 = point[3 * stride] * t58;
+    const double t88 = s->fixed[6] * point[0];
+    const double t89 = t88 * t50;
+    const double t97 = t88 * t58;
     const double t103 = time->values[3] * t41;
     const double t104 = t89 - t103;
     const double t105 = s->fixed[8] * t104;
@@ -817,9 +817,9 @@ MMSMITH_FN void torsion_point_array(const torsion_solution *s, size_t n, const d
 {
     size_t p, m;
     for (p = 0; p < n; ++p) {
-        double values[4];
+        double values[3];
         torsion_at_point(s, X + p * 3, values);
-        for (m = 0; m < 4; ++m) {
+        for (m = 0; m < 3; ++m) {
             point[m * n + p] = values[m];
         }
     }
@@ -835,7 +835,6 @@ MMSMITH_FN void torsion_b_array(const torsion_solution *s, double t, size_t n,
     const double *const point0 = point + 0 * n;
     const double *const point1 = point + 1 * n;
     const double *const point2 = point + 2 * n;
-    const double *const point3 = point + 3 * n;
     const size_t end = first + count;
     size_t p;
     for (p = first; p < end; ++p) {
@@ -861,8 +860,9 @@ MMSMITH_FN void torsion_b_array(const torsion_solution *s, double t, size_t n,
         const double t56 = time.values[0] * t41;
         const double t57 = t48 * t33;
         const double t58 = t56 - t57;
-        const double t89 = point3[p] * t50;
-        const double t97 = point3[p] * t58;
+        const double t88 = s->fixed[6] * point0[p];
+        const double t89 = t88 * t50;
+        const double t97 = t88 * t58;
         const double t103 = time.values[3] * t41;
         const double t104 = t89 - t103;
         const double t105 = s->fixed[8] * t104;

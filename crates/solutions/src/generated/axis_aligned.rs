@@ -676,11 +676,11 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 4, 10>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 4, 4>::new(*self, X))
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 2, 4, 10> for AxisAligned<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 2, 4, 4> for AxisAligned<T> {
     #[inline]
     fn body_force_time(&self, t: T) -> [T; 4] {
         let t8 = self.fixed[0] * t;
@@ -691,67 +691,67 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 4, 10> for AxisAligned<T> {
         [t9, t14, t36, t40]
     }
     #[inline]
-    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 10] {
+    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 4] {
         let t2 = X[0].sin_pi();
         let t13 = X[1].sin_pi();
         let t35 = X[0].cos_pi();
         let t39 = X[1].cos_pi();
-        let t138 = self.fixed[7] * t2;
-        let t143 = t35 * t35;
-        let t147 = t2 * t143;
-        let t148 = self.fixed[9] * t147;
-        let t149 = -t148;
-        let t155 = t2 * t35;
-        let t156 = self.fixed[10] * t155;
-        let t161 = self.fixed[11] * t2;
-        let t162 = -t161;
-        let t170 = self.fixed[7] * t13;
-        let t171 = t39 * t39;
-        let t172 = t13 * t171;
-        let t173 = self.fixed[9] * t172;
-        let t174 = -t173;
-        let t175 = t13 * t39;
-        let t176 = self.fixed[10] * t175;
-        let t179 = self.fixed[11] * t13;
-        let t180 = -t179;
-        [t35, t39, t138, t149, t156, t162, t170, t174, t176, t180]
+        [t2, t13, t35, t39]
     }
     #[inline(always)]
     fn body_force_staged(
         &self,
         time: &[T; 4],
-        point: &[T; 10],
+        point: &[T; 4],
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t37 = time[2] * point[0];
-        let t41 = time[3] * point[1];
+        let t37 = time[2] * point[2];
+        let t41 = time[3] * point[3];
         let t43 = t37 + T::one();
         let t44 = t41 + T::one();
         let t45 = t43 * t44;
-        let t51 = point[0] * t44;
+        let t51 = point[2] * t44;
         let t52 = time[0] * t51;
-        let t53 = time[1] * point[1];
+        let t53 = time[1] * point[3];
         let t54 = t52 + t53;
         let t55 = self.fixed[1] * t54;
         let t56 = t55.ln_of_both(t45);
         let t70 = T::one() / t43;
         let t77 = T::one() / t44;
-        let t157 = time[0] * point[3];
-        let t158 = t157 - point[4];
+        let t138 = self.fixed[7] * point[0];
+        let t143 = point[2] * point[2];
+        let t147 = point[0] * t143;
+        let t148 = self.fixed[9] * t147;
+        let t149 = -t148;
+        let t155 = point[0] * point[2];
+        let t156 = self.fixed[10] * t155;
+        let t157 = time[0] * t149;
+        let t158 = t157 - t156;
+        let t161 = self.fixed[11] * point[0];
+        let t162 = -t161;
         let t163 = time[0] * t158;
-        let t164 = point[5] * t56;
+        let t164 = t162 * t56;
         let t165 = t163 + t164;
         let t166 = t70 * t70;
         let t167 = t165 * t166;
-        let t168 = point[2] + t167;
+        let t168 = t138 + t167;
         let t169 = time[0] * t168;
-        let t177 = time[1] * point[7];
-        let t178 = t177 - point[8];
+        let t170 = self.fixed[7] * point[1];
+        let t171 = point[3] * point[3];
+        let t172 = point[1] * t171;
+        let t173 = self.fixed[9] * t172;
+        let t174 = -t173;
+        let t175 = point[1] * point[3];
+        let t176 = self.fixed[10] * t175;
+        let t177 = time[1] * t174;
+        let t178 = t177 - t176;
+        let t179 = self.fixed[11] * point[1];
+        let t180 = -t179;
         let t181 = time[1] * t178;
-        let t182 = point[9] * t56;
+        let t182 = t180 * t56;
         let t183 = t181 + t182;
         let t184 = t77 * t77;
         let t185 = t183 * t184;
-        let t186 = point[6] + t185;
+        let t186 = t170 + t185;
         let t187 = time[1] * t186;
         crate::nalgebra::SVector::<T, 2>::new(t169, t187)
     }

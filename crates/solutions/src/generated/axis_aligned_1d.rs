@@ -488,11 +488,11 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 1>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 1> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 2, 5>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 2, 2>::new(*self, X))
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 5> for AxisAligned1d<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 2> for AxisAligned1d<T> {
     #[inline]
     fn body_force_time(&self, t: T) -> [T; 2] {
         let t8 = self.fixed[0] * t;
@@ -501,38 +501,38 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 5> for AxisAligned1d<T> {
         [t9, t27]
     }
     #[inline]
-    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 1>) -> [T; 5] {
+    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 1>) -> [T; 2] {
         let t2 = X[0].sin_pi();
         let t26 = X[0].cos_pi();
-        let t85 = self.fixed[8] * t2;
-        let t90 = t26 * t26;
-        let t94 = t2 * t90;
-        let t95 = self.fixed[11] * t94;
-        let t96 = -t95;
-        let t102 = t2 * t26;
-        let t103 = self.fixed[12] * t102;
-        let t108 = self.fixed[13] * t2;
-        let t109 = -t108;
-        [t26, t85, t96, t103, t109]
+        [t2, t26]
     }
     #[inline(always)]
     fn body_force_staged(
         &self,
         time: &[T; 2],
-        point: &[T; 5],
+        point: &[T; 2],
     ) -> crate::nalgebra::SVector<T, 1> {
-        let t28 = time[1] * point[0];
+        let t28 = time[1] * point[1];
         let t30 = t28 + T::one();
         let t36 = t28.log_1p();
         let t50 = T::one() / t30;
-        let t104 = time[0] * point[2];
-        let t105 = t104 - point[3];
+        let t85 = self.fixed[8] * point[0];
+        let t90 = point[1] * point[1];
+        let t94 = point[0] * t90;
+        let t95 = self.fixed[11] * t94;
+        let t96 = -t95;
+        let t102 = point[0] * point[1];
+        let t103 = self.fixed[12] * t102;
+        let t104 = time[0] * t96;
+        let t105 = t104 - t103;
+        let t108 = self.fixed[13] * point[0];
+        let t109 = -t108;
         let t110 = time[0] * t105;
-        let t111 = point[4] * t36;
+        let t111 = t109 * t36;
         let t112 = t110 + t111;
         let t113 = t50 * t50;
         let t114 = t112 * t113;
-        let t115 = point[1] + t114;
+        let t115 = t85 + t114;
         let t116 = time[0] * t115;
         crate::nalgebra::SVector::<T, 1>::new(t116)
     }

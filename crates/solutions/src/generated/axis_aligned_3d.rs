@@ -1090,11 +1090,11 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 3>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 3> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 6, 15>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 6, 6>::new(*self, X))
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 15> for AxisAligned3d<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 6> for AxisAligned3d<T> {
     #[inline]
     fn body_force_time(&self, t: T) -> [T; 6] {
         let t8 = self.fixed[0] * t;
@@ -1109,64 +1109,25 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 15> for AxisAligned3d<T> {
         [t9, t18, t26, t61, t65, t69]
     }
     #[inline]
-    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 15] {
+    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 6] {
         let t2 = X[0].sin_pi();
         let t13 = X[1].sin_pi();
         let t25 = X[2].sin_pi();
         let t60 = X[0].cos_pi();
         let t64 = X[1].cos_pi();
         let t68 = X[2].cos_pi();
-        let t195 = self.fixed[13] * t2;
-        let t199 = t60 * t60;
-        let t203 = t2 * t199;
-        let t204 = self.fixed[18] * t203;
-        let t205 = -t204;
-        let t211 = t2 * t60;
-        let t212 = self.fixed[19] * t211;
-        let t217 = self.fixed[20] * t2;
-        let t218 = -t217;
-        let t226 = self.fixed[16] * t13;
-        let t228 = t64 * t64;
-        let t233 = t13 * t228;
-        let t234 = self.fixed[21] * t233;
-        let t239 = t13 * t64;
-        let t240 = self.fixed[22] * t239;
-        let t245 = self.fixed[23] * t13;
-        let t253 = self.fixed[16] * t25;
-        let t254 = t68 * t68;
-        let t255 = t25 * t254;
-        let t256 = self.fixed[21] * t255;
-        let t257 = t25 * t68;
-        let t258 = self.fixed[22] * t257;
-        let t261 = self.fixed[23] * t25;
-        [
-            t60,
-            t64,
-            t68,
-            t195,
-            t205,
-            t212,
-            t218,
-            t226,
-            t234,
-            t240,
-            t245,
-            t253,
-            t256,
-            t258,
-            t261,
-        ]
+        [t2, t13, t25, t60, t64, t68]
     }
     #[inline(always)]
     fn body_force_staged(
         &self,
         time: &[T; 6],
-        point: &[T; 15],
+        point: &[T; 6],
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t62 = time[3] * point[0];
-        let t66 = time[4] * point[1];
+        let t62 = time[3] * point[3];
+        let t66 = time[4] * point[4];
         let t67 = -t66;
-        let t70 = time[5] * point[2];
+        let t70 = time[5] * point[5];
         let t71 = -t70;
         let t73 = t62 + T::one();
         let t83 = t67 + T::one();
@@ -1176,7 +1137,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 15> for AxisAligned3d<T> {
         let t91 = t67 * t84;
         let t92 = t91 - t70;
         let t93 = t92 + T::one();
-        let t94 = time[0] * point[0];
+        let t94 = time[0] * point[3];
         let t95 = t94 * t93;
         let t96 = self.fixed[3] * t95;
         let t97 = t96 + t91;
@@ -1185,32 +1146,55 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 15> for AxisAligned3d<T> {
         let t112 = T::one() / t73;
         let t118 = T::one() / t83;
         let t124 = T::one() / t84;
-        let t213 = time[0] * point[4];
-        let t214 = t213 - point[5];
+        let t195 = self.fixed[13] * point[0];
+        let t199 = point[3] * point[3];
+        let t203 = point[0] * t199;
+        let t204 = self.fixed[18] * t203;
+        let t205 = -t204;
+        let t211 = point[0] * point[3];
+        let t212 = self.fixed[19] * t211;
+        let t213 = time[0] * t205;
+        let t214 = t213 - t212;
+        let t217 = self.fixed[20] * point[0];
+        let t218 = -t217;
         let t219 = time[0] * t214;
-        let t220 = point[6] * t99;
+        let t220 = t218 * t99;
         let t221 = t219 + t220;
         let t222 = t112 * t112;
         let t223 = t221 * t222;
-        let t224 = point[3] + t223;
+        let t224 = t195 + t223;
         let t225 = time[0] * t224;
-        let t241 = time[1] * point[8];
-        let t242 = t241 - point[9];
+        let t226 = self.fixed[16] * point[1];
+        let t228 = point[4] * point[4];
+        let t233 = point[1] * t228;
+        let t234 = self.fixed[21] * t233;
+        let t239 = point[1] * point[4];
+        let t240 = self.fixed[22] * t239;
+        let t241 = time[1] * t234;
+        let t242 = t241 - t240;
+        let t245 = self.fixed[23] * point[1];
         let t246 = time[1] * t242;
-        let t247 = point[10] * t99;
+        let t247 = t245 * t99;
         let t248 = t246 + t247;
         let t249 = t118 * t118;
         let t250 = t248 * t249;
-        let t251 = t250 - point[7];
+        let t251 = t250 - t226;
         let t252 = time[1] * t251;
-        let t259 = time[2] * point[12];
-        let t260 = t259 - point[13];
+        let t253 = self.fixed[16] * point[2];
+        let t254 = point[5] * point[5];
+        let t255 = point[2] * t254;
+        let t256 = self.fixed[21] * t255;
+        let t257 = point[2] * point[5];
+        let t258 = self.fixed[22] * t257;
+        let t259 = time[2] * t256;
+        let t260 = t259 - t258;
+        let t261 = self.fixed[23] * point[2];
         let t262 = time[2] * t260;
-        let t263 = point[14] * t99;
+        let t263 = t261 * t99;
         let t264 = t262 + t263;
         let t265 = t124 * t124;
         let t266 = t264 * t265;
-        let t267 = t266 - point[11];
+        let t267 = t266 - t253;
         let t268 = time[2] * t267;
         crate::nalgebra::SVector::<T, 3>::new(t225, t252, t268)
     }

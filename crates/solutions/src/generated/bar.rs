@@ -528,11 +528,11 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 1>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 1> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 2, 5>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 2, 2>::new(*self, X))
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 5> for Bar<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 2> for Bar<T> {
     #[inline]
     fn body_force_time(&self, t: T) -> [T; 2] {
         let t13 = self.fixed[2] * t;
@@ -541,39 +541,39 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 5> for Bar<T> {
         [t14, t38]
     }
     #[inline]
-    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 1>) -> [T; 5] {
+    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 1>) -> [T; 2] {
         let t5 = self.fixed[0] * X[0];
         let t6 = t5.sin_pi();
         let t34 = t5.cos_pi();
-        let t92 = self.fixed[9] * t6;
-        let t99 = t34 * t34;
-        let t105 = t6 * t99;
-        let t106 = self.fixed[12] * t105;
-        let t107 = -t106;
-        let t115 = t6 * t34;
-        let t116 = self.fixed[13] * t115;
-        let t125 = self.fixed[14] * t6;
-        let t126 = -t125;
-        [t34, t92, t107, t116, t126]
+        [t6, t34]
     }
     #[inline(always)]
     fn body_force_staged(
         &self,
         time: &[T; 2],
-        point: &[T; 5],
+        point: &[T; 2],
     ) -> crate::nalgebra::SVector<T, 1> {
-        let t39 = time[1] * point[0];
+        let t39 = time[1] * point[1];
         let t41 = t39 + T::one();
         let t46 = t39.log_1p();
         let t58 = T::one() / t41;
-        let t117 = time[0] * point[2];
-        let t118 = t117 - point[3];
+        let t92 = self.fixed[9] * point[0];
+        let t99 = point[1] * point[1];
+        let t105 = point[0] * t99;
+        let t106 = self.fixed[12] * t105;
+        let t107 = -t106;
+        let t115 = point[0] * point[1];
+        let t116 = self.fixed[13] * t115;
+        let t117 = time[0] * t107;
+        let t118 = t117 - t116;
+        let t125 = self.fixed[14] * point[0];
+        let t126 = -t125;
         let t127 = time[0] * t118;
-        let t128 = point[4] * t46;
+        let t128 = t126 * t46;
         let t129 = t127 + t128;
         let t130 = t58 * t58;
         let t131 = t129 * t130;
-        let t132 = t131 - point[1];
+        let t132 = t131 - t92;
         let t133 = time[0] * t132;
         crate::nalgebra::SVector::<T, 1>::new(t133)
     }

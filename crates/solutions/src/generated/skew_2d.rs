@@ -1459,11 +1459,11 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 15, 27>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 15, 18>::new(*self, X))
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 2, 15, 27> for Skew2d<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 2, 15, 18> for Skew2d<T> {
     #[inline]
     fn body_force_time(&self, t: T) -> [T; 15] {
         let t12 = self.fixed[0] * t;
@@ -1504,7 +1504,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 15, 27> for Skew2d<T> {
         ]
     }
     #[inline]
-    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 27] {
+    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 18] {
         let t4 = T::nearest(3.0) * X[0];
         let t5 = t4 + X[1];
         let t6 = t5.sin();
@@ -1528,28 +1528,16 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 15, 27> for Skew2d<T> {
         let t75 = X[0] * X[1];
         let t76 = T::nearest(2.0) * t75;
         let t77 = t74 + t76;
-        let t104 = t62 * t62;
         let t152 = t67 * t72;
         let t153 = T::pi() * t152;
         let t154 = X[1] - t153;
-        let t189 = T::nearest(3.0) * t6;
         let t227 = T::nearest(4.0) * X[0];
         let t228 = self.fixed[4] * t22;
         let t229 = t227 - t228;
-        let t282 = T::nearest(8.0) * t22;
-        let t283 = t282 - t229;
         let t351 = self.fixed[24] * t73;
         let t353 = T::nearest(6.0) * t75;
         let t354 = t70 - t351;
         let t355 = t354 - t353;
-        let t360 = t355 * t355;
-        let t364 = t6 * t104;
-        let t365 = t364 * t360;
-        let t366 = self.fixed[26] * t365;
-        let t367 = -t366;
-        let t372 = t104 * t154;
-        let t373 = t372 * t360;
-        let t374 = self.fixed[27] * t373;
         let t375 = T::nearest(4.0) * t22;
         let t376 = T::nearest(3.0) * t154;
         let t377 = t375 + t376;
@@ -1652,8 +1640,6 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 15, 27> for Skew2d<T> {
         let t510 = t509 + t503;
         let t511 = t510 + t507;
         let t513 = self.fixed[42] * t511;
-        let t524 = t364 * t355;
-        let t525 = self.fixed[43] * t524;
         let t526 = T::nearest(9.0) * t402;
         let t527 = t391 + t526;
         let t528 = t392 - t527;
@@ -1671,9 +1657,6 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 15, 27> for Skew2d<T> {
         let t551 = t547 - t548;
         let t552 = t551 - t550;
         let t555 = self.fixed[48] * t552;
-        let t562 = t77 * t77;
-        let t566 = t562 * t154;
-        let t567 = self.fixed[49] * t566;
         let t568 = t70 * t229;
         let t569 = t77 * t154;
         let t570 = T::nearest(4.0) * t569;
@@ -1685,13 +1668,6 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 15, 27> for Skew2d<T> {
         let t581 = self.fixed[25] * t568;
         let t582 = t580 + t581;
         let t584 = self.fixed[52] * t582;
-        let t592 = self.fixed[53] * t154;
-        let t602 = self.fixed[54] * t364;
-        let t603 = -t602;
-        let t608 = t6 * t62;
-        let t609 = self.fixed[55] * t608;
-        let t615 = self.fixed[56] * t6;
-        let t616 = -t615;
         [
             t6,
             t22,
@@ -1700,33 +1676,24 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 15, 27> for Skew2d<T> {
             t70,
             t77,
             t154,
-            t189,
             t229,
-            t283,
-            t367,
-            t374,
+            t355,
             t418,
             t431,
             t456,
             t513,
-            t525,
             t537,
             t544,
             t555,
-            t567,
             t577,
             t584,
-            t592,
-            t603,
-            t609,
-            t616,
         ]
     }
     #[inline(always)]
     fn body_force_staged(
         &self,
         time: &[T; 15],
-        point: &[T; 27],
+        point: &[T; 18],
     ) -> crate::nalgebra::SVector<T, 2> {
         let t65 = time[4] * point[3];
         let t66 = time[1] * point[3];
@@ -1741,6 +1708,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 15, 27> for Skew2d<T> {
         let t95 = t94 + t78;
         let t96 = t95 - t88;
         let t97 = t96.log_1p();
+        let t104 = point[3] * point[3];
         let t112 = self.fixed[10] * t97;
         let t126 = T::one() / t89;
         let t157 = time[5] * point[0];
@@ -1759,7 +1727,8 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 15, 27> for Skew2d<T> {
         let t183 = time[9] * point[1];
         let t184 = -t183;
         let t188 = time[10] * point[6];
-        let t190 = point[7] * t71;
+        let t189 = T::nearest(3.0) * point[0];
+        let t190 = t189 * t71;
         let t191 = point[3] * t184;
         let t192 = t190 - t191;
         let t193 = self.parameters.A * t192;
@@ -1775,7 +1744,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 15, 27> for Skew2d<T> {
         let t220 = t78 * t80;
         let t225 = time[4] * point[0];
         let t226 = -t225;
-        let t233 = time[11] * point[8];
+        let t233 = time[11] * point[7];
         let t234 = point[0] * t71;
         let t235 = point[3] * t188;
         let t236 = t234 - t235;
@@ -1790,9 +1759,11 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 15, 27> for Skew2d<T> {
         let t245 = t244 + t238;
         let t253 = t88 - t220;
         let t278 = time[12] * point[0];
-        let t279 = time[2] * point[8];
+        let t279 = time[2] * point[7];
         let t280 = t278 - t279;
-        let t284 = time[2] * point[9];
+        let t282 = T::nearest(8.0) * point[1];
+        let t283 = t282 - point[7];
+        let t284 = time[2] * t283;
         let t287 = time[13] * point[0];
         let t289 = self.fixed[21] * t280;
         let t290 = t284 + t287;
@@ -1831,7 +1802,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 15, 27> for Skew2d<T> {
         let t327 = t325 + t326;
         let t328 = t219 * t126;
         let t329 = point[3] * t328;
-        let t330 = point[7] + t329;
+        let t330 = t189 + t329;
         let t331 = t320 * t330;
         let t332 = point[3] * t327;
         let t333 = t331 - t332;
@@ -1851,37 +1822,57 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 15, 27> for Skew2d<T> {
         let t347 = self.fixed[20] * t346;
         let t348 = t299 + t347;
         let t349 = -t348;
-        let t419 = time[0] * point[10];
-        let t420 = time[2] * point[11];
+        let t360 = point[8] * point[8];
+        let t364 = point[0] * t104;
+        let t365 = t364 * t360;
+        let t366 = self.fixed[26] * t365;
+        let t367 = -t366;
+        let t372 = t104 * point[6];
+        let t373 = t372 * t360;
+        let t374 = self.fixed[27] * t373;
+        let t419 = time[0] * t367;
+        let t420 = time[2] * t374;
         let t421 = t419 + t420;
-        let t422 = t421 - point[12];
+        let t422 = t421 - point[9];
         let t514 = time[0] * t422;
-        let t515 = time[2] * point[13];
-        let t516 = point[14] * t97;
+        let t515 = time[2] * point[10];
+        let t516 = point[11] * t97;
         let t517 = t514 + t515;
         let t518 = t517 + t516;
-        let t519 = t518 - point[15];
-        let t538 = time[0] * point[16];
-        let t539 = point[17] + t538;
+        let t519 = t518 - point[12];
+        let t524 = t364 * point[8];
+        let t525 = self.fixed[43] * t524;
+        let t538 = time[0] * t525;
+        let t539 = point[13] + t538;
         let t556 = time[2] * t519;
         let t557 = time[0] * t539;
-        let t558 = point[18] * t97;
+        let t558 = point[14] * t97;
         let t559 = t556 + t557;
         let t560 = t559 + t558;
-        let t561 = point[19] + t560;
-        let t585 = time[2] * point[20];
-        let t586 = point[21] * t97;
+        let t561 = point[15] + t560;
+        let t562 = point[5] * point[5];
+        let t566 = t562 * point[6];
+        let t567 = self.fixed[49] * t566;
+        let t585 = time[2] * t567;
+        let t586 = point[16] * t97;
         let t587 = t585 + t586;
-        let t588 = point[22] + t587;
+        let t588 = point[17] + t587;
+        let t592 = self.fixed[53] * point[6];
         let t593 = time[0] * t561;
         let t594 = time[2] * t588;
-        let t595 = point[23] * t97;
+        let t595 = t592 * t97;
         let t596 = t593 + t594;
         let t597 = t596 + t595;
-        let t610 = time[0] * point[24];
-        let t611 = t610 - point[25];
+        let t602 = self.fixed[54] * t364;
+        let t603 = -t602;
+        let t608 = point[0] * point[3];
+        let t609 = self.fixed[55] * t608;
+        let t610 = time[0] * t603;
+        let t611 = t610 - t609;
+        let t615 = self.fixed[56] * point[0];
+        let t616 = -t615;
         let t617 = time[0] * t611;
-        let t618 = point[26] * t97;
+        let t618 = t616 * t97;
         let t619 = t617 + t618;
         let t620 = time[2] * t597;
         let t621 = time[0] * t619;

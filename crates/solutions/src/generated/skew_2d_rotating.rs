@@ -1818,11 +1818,11 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 24, 12>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 24, 9>::new(*self, X))
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 2, 24, 12> for Skew2dRotating<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 2, 24, 9> for Skew2dRotating<T> {
     #[inline]
     fn body_force_time(&self, t: T) -> [T; 24] {
         let t8 = self.parameters.Omega * t;
@@ -1887,7 +1887,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 24, 12> for Skew2dRotating<T> 
         ]
     }
     #[inline]
-    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 12] {
+    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 9] {
         let t12 = T::nearest(3.0) * X[0];
         let t13 = t12 + X[1];
         let t14 = t13.sin();
@@ -1915,19 +1915,13 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 24, 12> for Skew2dRotating<T> 
         let t263 = t131 * t144;
         let t264 = T::pi() * t263;
         let t265 = X[1] - t264;
-        let t313 = T::nearest(3.0) * t14;
-        let t346 = T::nearest(4.0) * X[0];
-        let t347 = self.fixed[4] * t27;
-        let t348 = t346 - t347;
-        let t402 = T::nearest(8.0) * t27;
-        let t403 = t402 - t348;
-        [X[0], t14, t27, t31, t71, t130, t134, t149, t265, t313, t348, t403]
+        [X[0], t14, t27, t31, t71, t130, t134, t149, t265]
     }
     #[inline(always)]
     fn body_force_staged(
         &self,
         time: &[T; 24],
-        point: &[T; 12],
+        point: &[T; 9],
     ) -> crate::nalgebra::SVector<T, 2> {
         let t69 = time[5] * point[1];
         let t70 = point[0] + t69;
@@ -1976,13 +1970,19 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 24, 12> for Skew2dRotating<T> 
         let t276 = t273 - t269;
         let t277 = t276 + t275;
         let t280 = self.fixed[13] * t277;
-        let t314 = point[9] * t184;
+        let t313 = T::nearest(3.0) * point[1];
+        let t314 = t313 * t184;
         let t338 = t182 * t179;
-        let t349 = time[3] * point[10];
+        let t346 = T::nearest(4.0) * point[0];
+        let t347 = self.fixed[4] * point[2];
+        let t348 = t346 - t347;
+        let t349 = time[3] * t348;
         let t353 = point[1] * t184;
         let t399 = time[16] * point[1];
         let t400 = t399 - t349;
-        let t404 = time[3] * point[11];
+        let t402 = T::nearest(8.0) * point[2];
+        let t403 = t402 - t348;
+        let t404 = time[3] * t403;
         let t406 = time[17] * point[1];
         let t408 = self.fixed[21] * t400;
         let t409 = t404 + t406;
@@ -2031,7 +2031,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 24, 12> for Skew2dRotating<T> 
         let t546 = t211 + t545;
         let t547 = time[12] * point[1];
         let t548 = -t547;
-        let t550 = time[23] * point[10];
+        let t550 = time[23] * t348;
         let t551 = point[5] * t513;
         let t552 = t353 - t551;
         let t553 = t183 * t548;
@@ -2105,7 +2105,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 24, 12> for Skew2dRotating<T> 
         let t621 = t619 + t620;
         let t622 = t542 * t239;
         let t623 = point[5] * t622;
-        let t624 = point[9] + t623;
+        let t624 = t313 + t623;
         let t625 = t614 * t624;
         let t626 = point[5] * t621;
         let t627 = t625 - t626;

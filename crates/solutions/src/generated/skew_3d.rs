@@ -3737,11 +3737,11 @@ impl<T: crate::Real> crate::Solution<T, 3> for Skew3d<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 3>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 3> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 36, 16>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 36, 11>::new(*self, X))
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 3, 36, 16> for Skew3d<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 3, 36, 11> for Skew3d<T> {
     #[inline]
     fn body_force_time(&self, t: T) -> [T; 36] {
         let t18 = self.fixed[0] * t;
@@ -3827,7 +3827,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 36, 16> for Skew3d<T> {
         ]
     }
     #[inline]
-    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 16] {
+    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 11] {
         let t5 = T::nearest(6.0) * X[0];
         let t7 = T::nearest(2.0) * X[1];
         let t8 = t5 + t7;
@@ -3839,9 +3839,6 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 36, 16> for Skew3d<T> {
         let t24 = T::nearest(0.5) * X[1];
         let t25 = t24.sin_pi();
         let t26 = t23 * t25;
-        let t27 = X[2] * X[2];
-        let t28 = X[0] * t27;
-        let t29 = t26 + t28;
         let t40 = T::nearest(0.5) * X[0];
         let t41 = t40.exp();
         let t42 = T::nearest(2.0) * X[2];
@@ -3852,59 +3849,42 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 36, 16> for Skew3d<T> {
         let t104 = t22.sin();
         let t105 = t25 * t104;
         let t106 = T::nearest(2.0) * t105;
-        let t107 = t27 - t106;
         let t109 = t24.cos_pi();
         let t114 = t23 * t109;
-        let t119 = X[0] * X[2];
         let t125 = t43.sin();
         let t126 = t41 * t125;
         let t331 = t104 * t109;
-        let t480 = T::nearest(3.0) * t12;
-        let t679 = T::nearest(2.0) * t95;
         let t1548 = self.fixed[44] * t25;
         let t1549 = t23 * t1548;
         let t1550 = T::nearest(4.0) * X[0];
         let t1551 = t1550 - t1549;
         let t1552 = T::nearest(13.0) * t1551;
-        let t1627 = self.parameters.A * t95;
-        [
-            X[0],
-            X[2],
-            t12,
-            t26,
-            t29,
-            t53,
-            t95,
-            t107,
-            t114,
-            t119,
-            t126,
-            t331,
-            t480,
-            t679,
-            t1552,
-            t1627,
-        ]
+        [X[0], X[2], t12, t26, t53, t95, t106, t114, t126, t331, t1552]
     }
     #[inline(always)]
     fn body_force_staged(
         &self,
         time: &[T; 36],
-        point: &[T; 16],
+        point: &[T; 11],
     ) -> crate::nalgebra::SVector<T, 3> {
         let t21 = time[1] * point[2];
-        let t54 = time[4] * point[5];
-        let t98 = time[5] * point[6];
-        let t99 = time[1] * point[6];
-        let t102 = time[6] * point[6];
+        let t27 = point[1] * point[1];
+        let t28 = point[0] * t27;
+        let t29 = point[3] + t28;
+        let t54 = time[4] * point[4];
+        let t98 = time[5] * point[5];
+        let t99 = time[1] * point[5];
+        let t102 = time[6] * point[5];
         let t103 = -t102;
-        let t108 = time[3] * point[7];
-        let t115 = time[7] * point[8];
-        let t120 = time[8] * point[9];
-        let t124 = time[9] * point[5];
-        let t127 = time[4] * point[10];
+        let t107 = t27 - point[6];
+        let t108 = time[3] * t107;
+        let t115 = time[7] * point[7];
+        let t119 = point[0] * point[1];
+        let t120 = time[8] * t119;
+        let t124 = time[9] * point[4];
+        let t127 = time[4] * point[8];
         let t128 = -t127;
-        let t132 = time[10] * point[10];
+        let t132 = time[10] * point[8];
         let t133 = -t132;
         let t135 = t98 + T::one();
         let t148 = t115 + T::one();
@@ -3928,7 +3908,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 36, 16> for Skew3d<T> {
         let t170 = t115 * t133;
         let t171 = t151 - t170;
         let t172 = T::one() - t171;
-        let t173 = time[0] * point[6];
+        let t173 = time[0] * point[5];
         let t174 = t173 * t155;
         let t175 = self.parameters.A * t174;
         let t176 = t98 - t132;
@@ -3963,14 +3943,14 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 36, 16> for Skew3d<T> {
         let t247 = t99 * t108;
         let t248 = t135 * t148;
         let t249 = t247 - t248;
-        let t325 = time[11] * point[10];
+        let t325 = time[11] * point[8];
         let t328 = time[12] * point[2];
-        let t332 = time[13] * point[11];
+        let t332 = time[13] * point[9];
         let t333 = t325 + t328;
         let t334 = t333 + t332;
-        let t337 = time[14] * point[10];
+        let t337 = time[14] * point[8];
         let t340 = time[15] * point[2];
-        let t344 = time[16] * point[11];
+        let t344 = time[16] * point[9];
         let t348 = self.fixed[22] * t334;
         let t349 = t337 + t340;
         let t350 = t349 + t344;
@@ -3978,21 +3958,23 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 36, 16> for Skew3d<T> {
         let t354 = self.fixed[23] * t351;
         let t413 = time[8] * point[1];
         let t473 = t413 - t148;
-        let t488 = point[6] * t413;
-        let t687 = point[13] * t413;
+        let t480 = T::nearest(3.0) * point[2];
+        let t488 = point[5] * t413;
+        let t679 = T::nearest(2.0) * point[5];
+        let t687 = t679 * t413;
         let t688 = point[2] * t108;
         let t689 = t687 + t688;
         let t690 = time[1] * t689;
-        let t850 = time[17] * point[5];
+        let t850 = time[17] * point[4];
         let t853 = time[18] * point[2];
         let t856 = t850 + t853;
-        let t862 = time[14] * point[5];
+        let t862 = time[14] * point[4];
         let t865 = time[19] * point[2];
-        let t874 = time[20] * point[4];
-        let t1011 = time[21] * point[5];
+        let t874 = time[20] * t29;
+        let t1011 = time[21] * point[4];
         let t1014 = time[22] * point[2];
         let t1015 = t1011 - t1014;
-        let t1018 = time[23] * point[5];
+        let t1018 = time[23] * point[4];
         let t1021 = time[24] * point[2];
         let t1024 = self.fixed[39] * t1015;
         let t1025 = t1018 - t1021;
@@ -4007,10 +3989,10 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 36, 16> for Skew3d<T> {
         let t1153 = time[27] * point[2];
         let t1155 = time[28] * point[3];
         let t1156 = -t1155;
-        let t1159 = time[29] * point[11];
+        let t1159 = time[29] * point[9];
         let t1160 = -t1159;
-        let t1162 = time[30] * point[5];
-        let t1163 = time[9] * point[10];
+        let t1162 = time[30] * point[4];
+        let t1163 = time[9] * point[8];
         let t1164 = -t1163;
         let t1165 = t152 * t1151;
         let t1166 = time[5] * point[2];
@@ -4040,15 +4022,15 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 36, 16> for Skew3d<T> {
         let t1190 = t120 * t1164;
         let t1191 = t1189 - t1188;
         let t1192 = t1191 - t1190;
-        let t1193 = point[6] * t128;
-        let t1194 = point[12] * t149;
+        let t1193 = point[5] * t128;
+        let t1194 = t480 * t149;
         let t1195 = t1193 - t1194;
         let t1196 = time[1] * t1195;
         let t1197 = t128 * t1153;
         let t1198 = t103 * t1164;
         let t1199 = t1196 - t1197;
         let t1200 = t1199 - t1198;
-        let t1201 = point[12] * t120;
+        let t1201 = t480 * t120;
         let t1202 = t1201 - t488;
         let t1203 = time[1] * t1202;
         let t1204 = t148 * t1153;
@@ -4092,8 +4074,8 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 36, 16> for Skew3d<T> {
         let t1242 = t156 + t1239;
         let t1243 = t1242 - t1240;
         let t1244 = t1243 - t1241;
-        let t1245 = point[12] * t155;
-        let t1246 = point[6] * t1244;
+        let t1245 = t480 * t155;
+        let t1246 = point[5] * t1244;
         let t1247 = t1245 - t1246;
         let t1248 = t128 * t1156;
         let t1249 = t108 * t1164;
@@ -4114,7 +4096,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 36, 16> for Skew3d<T> {
         let t1267 = time[31] * point[3];
         let t1268 = -t1267;
         let t1269 = -t54;
-        let t1270 = time[10] * point[5];
+        let t1270 = time[10] * point[4];
         let t1271 = -t1270;
         let t1272 = t21 * t155;
         let t1273 = t152 * t1262;
@@ -4186,7 +4168,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 36, 16> for Skew3d<T> {
         let t1339 = t1336 + t1337;
         let t1340 = t1339 - t1338;
         let t1341 = point[2] * t155;
-        let t1342 = point[6] * t1294;
+        let t1342 = point[5] * t1294;
         let t1343 = t1341 - t1342;
         let t1344 = t128 * t1160;
         let t1345 = t108 * t1269;
@@ -4205,7 +4187,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 36, 16> for Skew3d<T> {
         let t1359 = time[32] * point[2];
         let t1360 = -t1359;
         let t1361 = time[8] * point[0];
-        let t1363 = time[33] * point[5];
+        let t1363 = time[33] * point[4];
         let t1364 = -t1363;
         let t1365 = t152 * t1153;
         let t1366 = t158 * t1360;
@@ -4228,7 +4210,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 36, 16> for Skew3d<T> {
         let t1383 = t1382 - t1381;
         let t1384 = t1188 + t1292;
         let t1385 = -t1384;
-        let t1386 = point[13] * t128;
+        let t1386 = t679 * t128;
         let t1387 = point[2] * t124;
         let t1388 = t1386 + t1387;
         let t1389 = t1197 + t1297;
@@ -4278,7 +4260,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 36, 16> for Skew3d<T> {
         let t1433 = t151 - t1430;
         let t1434 = t1433 - t1431;
         let t1435 = t1434 + t1432;
-        let t1436 = point[13] * t1435;
+        let t1436 = t679 * t1435;
         let t1437 = t1341 - t1436;
         let t1438 = t135 * t1429;
         let t1439 = t103 * t1385;
@@ -4388,7 +4370,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 36, 16> for Skew3d<T> {
         let t1543 = T::nearest(0.5) * t1542;
         let t1545 = time[34] * point[3];
         let t1546 = t856 + t1545;
-        let t1553 = time[2] * point[14];
+        let t1553 = time[2] * point[10];
         let t1554 = self.fixed[36] * t1546;
         let t1555 = t862 - t1553;
         let t1556 = t1555 + t865;
@@ -4397,8 +4379,8 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 36, 16> for Skew3d<T> {
         let t1559 = t874 - t1558;
         let t1560 = self.fixed[38] * t1559;
         let t1561 = -t1560;
-        let t1562 = point[12] * t152;
-        let t1563 = point[6] * t1192;
+        let t1562 = t480 * t152;
+        let t1563 = point[5] * t1192;
         let t1564 = t1562 - t1563;
         let t1565 = t128 * t1207;
         let t1566 = time[1] * t1564;
@@ -4440,7 +4422,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 36, 16> for Skew3d<T> {
         let t1602 = self.fixed[17] * t1599;
         let t1603 = t1601 + t1602;
         let t1604 = point[2] * t158;
-        let t1605 = point[13] * t1385;
+        let t1605 = t679 * t1385;
         let t1606 = t1604 - t1605;
         let t1607 = T::nearest(2.0) * t1279;
         let t1608 = t128 * t1394;
@@ -4462,7 +4444,8 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 36, 16> for Skew3d<T> {
         let t1624 = self.fixed[17] * t1621;
         let t1625 = t1623 - t1624;
         let t1626 = T::nearest(2.0) * t232;
-        let t1628 = point[15] * t1448;
+        let t1627 = self.parameters.A * point[5];
+        let t1628 = t1627 * t1448;
         let t1629 = time[0] * t1628;
         let t1630 = T::nearest(6.0) * t103;
         let t1631 = t1630 + t135;
@@ -4470,7 +4453,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 36, 16> for Skew3d<T> {
         let t1633 = t1626 + t1629;
         let t1634 = t1633 - t1632;
         let t1635 = T::nearest(2.0) * t235;
-        let t1636 = point[15] * t1454;
+        let t1636 = t1627 * t1454;
         let t1637 = time[0] * t1636;
         let t1638 = t148 * t1631;
         let t1639 = t1637 - t1635;
@@ -4481,7 +4464,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 36, 16> for Skew3d<T> {
         let t1644 = t1641 - t1642;
         let t1645 = t1644 + t1643;
         let t1646 = point[2] * t1645;
-        let t1647 = point[6] * t1470;
+        let t1647 = point[5] * t1470;
         let t1648 = t1646 - t1647;
         let t1649 = t1160 * t1224;
         let t1650 = t1164 * t1229;
@@ -4528,7 +4511,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 36, 16> for Skew3d<T> {
         let t1691 = self.fixed[34] * t1690;
         let t1692 = t1689 + t1691;
         let t1693 = T::nearest(0.5) * t1692;
-        let t1695 = time[35] * point[5];
+        let t1695 = time[35] * point[4];
         let t1696 = t1695 - t1027;
         let t1697 = self.fixed[41] * t1696;
         let t1698 = -t1697;

@@ -677,11 +677,11 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 3>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 3> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 4, 4>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 4, 3>::new(*self, X))
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 4> for Torsion<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 3> for Torsion<T> {
     #[inline]
     fn body_force_time(&self, t: T) -> [T; 4] {
         let t7 = self.fixed[0] * t;
@@ -695,15 +695,14 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 4> for Torsion<T> {
         [t8, t11, t47, t102]
     }
     #[inline]
-    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 4] {
-        let t88 = self.fixed[6] * X[2];
-        [X[2], X[0], X[1], t88]
+    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 3] {
+        [X[2], X[0], X[1]]
     }
     #[inline(always)]
     fn body_force_staged(
         &self,
         time: &[T; 4],
-        point: &[T; 4],
+        point: &[T; 3],
     ) -> crate::nalgebra::SVector<T, 3> {
         let t12 = time[1] * point[0];
         let t13 = t12.sin();
@@ -727,8 +726,9 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 4> for Torsion<T> {
         let t56 = time[0] * t41;
         let t57 = t48 * t33;
         let t58 = t56 - t57;
-        let t89 = point[3] * t50;
-        let t97 = point[3] * t58;
+        let t88 = self.fixed[6] * point[0];
+        let t89 = t88 * t50;
+        let t97 = t88 * t58;
         let t103 = time[3] * t41;
         let t104 = t89 - t103;
         let t105 = self.fixed[8] * t104;

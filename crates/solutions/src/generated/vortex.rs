@@ -1124,11 +1124,11 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 9, 15>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 9, 4>::new(*self, X))
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 15> for Vortex<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 4> for Vortex<T> {
     #[inline]
     fn body_force_time(&self, t: T) -> [T; 9] {
         let t6 = self.fixed[1] * t;
@@ -1145,111 +1145,84 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 15> for Vortex<T> {
         [t7, t23, t62, t66, t72, t93, t195, t258, t303]
     }
     #[inline]
-    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 15] {
+    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 4] {
         let t10 = X[0] * X[0];
         let t11 = X[1] * X[1];
         let t12 = t10 + t11;
         let t13 = t12.sqrt();
-        let t15 = T::one() - t13;
-        let t17 = t15 * t15;
-        let t18 = T::nearest(16.0) * t17;
-        let t19 = T::one() - t18;
-        let t21 = t19 * t19;
-        let t94 = t13 * t15;
-        let t95 = t94 * t19;
         let t114 = T::one() / t12;
-        let t160 = t15 * t19;
         let t161 = t13 * t114;
-        let t176 = T::nearest(2.0) * t13;
-        let t178 = T::nearest(3.0) * t15;
-        let t179 = t176 - t178;
-        let t180 = t19 * t179;
-        let t181 = t13 * t17;
-        let t182 = T::nearest(64.0) * t181;
-        let t183 = t182 - t180;
-        let t185 = t181 * t21;
-        let t199 = T::nearest(2.0) * t15;
-        let t200 = t13 - t199;
-        let t201 = t19 * t200;
-        let t202 = T::nearest(32.0) * t181;
-        let t203 = t202 - t201;
-        let t221 = t13 * t21;
-        let t222 = self.fixed[14] * t221;
-        let t233 = t13 - t15;
-        let t234 = t19 * t233;
-        let t235 = t202 - t234;
-        let t293 = t13 - t178;
-        let t294 = t19 * t293;
-        let t295 = t202 - t294;
-        let t300 = self.fixed[5] * t221;
-        let t308 = self.fixed[19] * X[1];
-        let t313 = self.fixed[19] * X[0];
-        [
-            X[0],
-            X[1],
-            t21,
-            t95,
-            t160,
-            t161,
-            t183,
-            t185,
-            t203,
-            t222,
-            t235,
-            t295,
-            t300,
-            t308,
-            t313,
-        ]
+        [X[0], X[1], t13, t161]
     }
     #[inline(always)]
     fn body_force_staged(
         &self,
         time: &[T; 9],
-        point: &[T; 15],
+        point: &[T; 4],
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t24 = time[1] * point[2];
+        let t15 = T::one() - point[2];
+        let t17 = t15 * t15;
+        let t18 = T::nearest(16.0) * t17;
+        let t19 = T::one() - t18;
+        let t21 = t19 * t19;
+        let t24 = time[1] * t21;
         let t25 = t24.sin();
         let t26 = t24.cos();
         let t42 = t25 * t25;
         let t43 = t26 * t26;
         let t44 = t42 - t43;
         let t46 = t25 * t26;
-        let t63 = time[2] * point[2];
+        let t63 = time[2] * t21;
         let t64 = t63 * t44;
         let t65 = self.parameters.A * t64;
         let t67 = time[3] * t46;
         let t68 = t65 + t67;
         let t69 = -t68;
         let t70 = time[0] * t44;
-        let t73 = time[4] * point[2];
+        let t73 = time[4] * t21;
         let t74 = t73 * t46;
         let t75 = t70 - t74;
-        let t96 = time[5] * point[3];
+        let t94 = point[2] * t15;
+        let t95 = t94 * t19;
+        let t96 = time[5] * t95;
         let t97 = t96 * t26;
         let t98 = t25 + t97;
-        let t99 = time[0] * point[3];
+        let t99 = time[0] * t95;
         let t100 = t99 * t44;
         let t103 = self.fixed[8] * t100;
         let t104 = t46 - t103;
         let t149 = T::nearest(2.0) * t42;
-        let t184 = t26 * point[6];
-        let t186 = time[5] * point[7];
+        let t160 = t15 * t19;
+        let t176 = T::nearest(2.0) * point[2];
+        let t178 = T::nearest(3.0) * t15;
+        let t179 = t176 - t178;
+        let t180 = t19 * t179;
+        let t181 = point[2] * t17;
+        let t182 = T::nearest(64.0) * t181;
+        let t183 = t182 - t180;
+        let t184 = t26 * t183;
+        let t185 = t181 * t21;
+        let t186 = time[5] * t185;
         let t187 = t186 * t25;
         let t188 = t184 - t187;
         let t189 = t26 * t98;
-        let t190 = point[4] * t189;
+        let t190 = t160 * t189;
         let t191 = t25 * t188;
         let t192 = t190 + t191;
-        let t196 = time[6] * point[3];
+        let t196 = time[6] * t95;
         let t197 = t196 * t26;
         let t198 = t25 + t197;
-        let t204 = t26 * point[8];
-        let t205 = time[6] * point[7];
+        let t199 = T::nearest(2.0) * t15;
+        let t200 = point[2] - t199;
+        let t201 = t19 * t200;
+        let t202 = T::nearest(32.0) * t181;
+        let t203 = t202 - t201;
+        let t204 = t26 * t203;
+        let t205 = time[6] * t185;
         let t206 = t205 * t25;
         let t207 = t204 - t206;
         let t208 = t26 * t198;
-        let t209 = point[4] * t208;
+        let t209 = t160 * t208;
         let t210 = t25 * t207;
         let t211 = t209 + t210;
         let t213 = self.fixed[13] * t211;
@@ -1257,23 +1230,28 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 15> for Vortex<T> {
         let t215 = self.fixed[8] * t214;
         let t216 = time[0] * t215;
         let t217 = t96 * t46;
-        let t218 = point[5] * t217;
+        let t218 = point[3] * t217;
         let t219 = t216 + t218;
-        let t223 = point[9] * t69;
+        let t221 = point[2] * t21;
+        let t222 = self.fixed[14] * t221;
+        let t223 = t222 * t69;
         let t225 = self.fixed[15] * t219;
         let t226 = t223 - t225;
         let t227 = self.fixed[0] * t226;
         let t228 = T::nearest(2.0) * t104;
-        let t229 = time[5] * point[4];
+        let t229 = time[5] * t160;
         let t230 = t229 * t44;
         let t231 = T::nearest(2.0) * t46;
         let t232 = -t231;
-        let t236 = t26 * point[10];
+        let t233 = point[2] - t15;
+        let t234 = t19 * t233;
+        let t235 = t202 - t234;
+        let t236 = t26 * t235;
         let t237 = t236 - t187;
-        let t238 = t25 * point[10];
+        let t238 = t25 * t235;
         let t239 = t186 * t26;
         let t240 = t238 + t239;
-        let t241 = point[4] * t44;
+        let t241 = t160 * t44;
         let t242 = t26 * t237;
         let t243 = t25 * t240;
         let t244 = t241 - t242;
@@ -1290,7 +1268,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 15> for Vortex<T> {
         let t255 = t232 * t228;
         let t256 = t252 * t254;
         let t257 = t255 - t256;
-        let t259 = time[7] * point[4];
+        let t259 = time[7] * t160;
         let t260 = t259 * t46;
         let t261 = -t260;
         let t262 = t254 * t249;
@@ -1308,7 +1286,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 15> for Vortex<T> {
         let t274 = t272 - t273;
         let t275 = t249 * t257;
         let t276 = t252 * t268;
-        let t277 = point[5] * t274;
+        let t277 = point[3] * t274;
         let t278 = t263 + t264;
         let t279 = t278 - t275;
         let t280 = t279 + t276;
@@ -1320,21 +1298,27 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 15> for Vortex<T> {
         let t289 = t284 + t288;
         let t291 = self.fixed[17] * t289;
         let t292 = t291 - t227;
-        let t296 = t44 * point[11];
-        let t297 = time[7] * point[7];
+        let t293 = point[2] - t178;
+        let t294 = t19 * t293;
+        let t295 = t202 - t294;
+        let t296 = t44 * t295;
+        let t297 = time[7] * t185;
         let t298 = t297 * t46;
         let t299 = t296 + t298;
-        let t301 = point[12] * t75;
+        let t300 = self.fixed[5] * t221;
+        let t301 = t300 * t75;
         let t304 = time[8] * t299;
         let t305 = t301 + t304;
         let t306 = point[0] * t292;
-        let t309 = point[13] * t305;
+        let t308 = self.fixed[19] * point[1];
+        let t309 = t308 * t305;
         let t310 = t306 - t309;
-        let t311 = point[5] * t310;
+        let t311 = point[3] * t310;
         let t312 = point[1] * t292;
-        let t314 = point[14] * t305;
+        let t313 = self.fixed[19] * point[0];
+        let t314 = t313 * t305;
         let t315 = t312 + t314;
-        let t316 = point[5] * t315;
+        let t316 = point[3] * t315;
         crate::nalgebra::SVector::<T, 2>::new(t311, t316)
     }
 }
