@@ -249,56 +249,56 @@ MMSMITH_FN const char *axis_aligned_1d_prepare(axis_aligned_1d_solution *s, cons
     const double t21 = t20 * p->E;
     const double t22 = t21 / p->rho0;
     const double t32 = p->nu + 1.0;
-    const double t34 = 2.0 * p->nu;
-    const double t35 = 1.0 - t34;
-    const double t38 = 0.5 * p->E;
-    const double t39 = t38 / t32;
-    const double t41 = p->E * p->nu;
-    const double t42 = t32 * t35;
-    const double t43 = t41 / t42;
-    const double t45 = t14 * t39;
+    const double t34 = 0.5 * p->E;
+    const double t35 = t34 / t32;
+    const double t39 = 2.0 * p->nu;
+    const double t40 = 1.0 - t39;
+    const double t42 = t14 * t35;
+    const double t46 = p->E * p->nu;
+    const double t47 = t32 * t40;
+    const double t48 = t46 / t47;
     const double t52 = p->nu * p->nu;
     const double t53 = 2.0 * p->A;
     const double t54 = t53 * t19;
     const double t55 = t54 * p->E;
     const double t56 = t55 * t52;
     const double t57 = p->rho0 * t32;
-    const double t58 = t57 * t35;
+    const double t58 = t57 * t40;
     const double t59 = t56 / t58;
-    const double t67 = 2.0 * t39;
-    const double t68 = t43 + t67;
-    const double t80 = t14 / p->rho0;
-    const double t86 = t43 + t39;
-    const double t87 = p->A * p->A;
-    const double t88 = t87 * p->A;
-    const double t89 = t19 * t19;
-    const double t91 = t88 * t89;
-    const double t92 = t91 * t86;
-    const double t93 = t92 / p->rho0;
-    const double t97 = t19 * 3.141592653589793;
-    const double t98 = 2.0 * t87;
-    const double t99 = t98 * t97;
-    const double t100 = t99 * t86;
-    const double t101 = t100 / p->rho0;
-    const double t106 = t21 * p->nu;
-    const double t107 = t106 / t58;
-    const double t117 = 2.0 / t7;
+    const double t68 = 2.0 * t35;
+    const double t69 = t48 + t68;
+    const double t81 = t14 / p->rho0;
+    const double t87 = t48 + t35;
+    const double t88 = p->A * p->A;
+    const double t89 = t88 * p->A;
+    const double t90 = t19 * t19;
+    const double t92 = t89 * t90;
+    const double t93 = t92 * t87;
+    const double t94 = t93 / p->rho0;
+    const double t98 = t19 * 3.141592653589793;
+    const double t99 = 2.0 * t88;
+    const double t100 = t99 * t98;
+    const double t101 = t100 * t87;
+    const double t102 = t101 / p->rho0;
+    const double t107 = t21 * p->nu;
+    const double t108 = t107 / t58;
+    const double t118 = 2.0 / t7;
     s->par = *p;
     s->fixed[0] = t7;
     s->fixed[1] = t14;
     s->fixed[2] = t15;
     s->fixed[3] = t20;
     s->fixed[4] = t22;
-    s->fixed[5] = t39;
-    s->fixed[6] = t43;
-    s->fixed[7] = t45;
+    s->fixed[5] = t35;
+    s->fixed[6] = t42;
+    s->fixed[7] = t48;
     s->fixed[8] = t59;
-    s->fixed[9] = t68;
-    s->fixed[10] = t80;
-    s->fixed[11] = t93;
-    s->fixed[12] = t101;
-    s->fixed[13] = t107;
-    s->fixed[14] = t117;
+    s->fixed[9] = t69;
+    s->fixed[10] = t81;
+    s->fixed[11] = t94;
+    s->fixed[12] = t102;
+    s->fixed[13] = t108;
+    s->fixed[14] = t118;
     return 0;
 }
 
@@ -381,15 +381,15 @@ MMSMITH_FN void axis_aligned_1d_P(const axis_aligned_1d_solution *s, const doubl
     const double t27 = s->fixed[1] * t9;
     const double t28 = t27 * t26;
     const double t30 = t28 + 1.0;
-    const double t36 = mmsmith_log_1p(t28);
-    const double t40 = t28 + 2.0;
-    const double t44 = s->fixed[6] * t36;
-    const double t46 = s->fixed[7] * t9;
-    const double t47 = t46 * t26;
-    const double t48 = t47 * t40;
-    const double t49 = t44 + t48;
-    const double t50 = 1.0 / t30;
-    const double t51 = t49 * t50;
+    const double t36 = 1.0 / t30;
+    const double t37 = t36 + 1.0;
+    const double t41 = mmsmith_log_1p(t28);
+    const double t43 = s->fixed[6] * t9;
+    const double t44 = t43 * t26;
+    const double t45 = t44 * t37;
+    const double t49 = t41 * t36;
+    const double t50 = s->fixed[7] * t49;
+    const double t51 = t45 + t50;
     P[0] = t51;
 }
 
@@ -403,34 +403,34 @@ MMSMITH_FN void axis_aligned_1d_b(const axis_aligned_1d_solution *s, const doubl
     const double t27 = s->fixed[1] * t9;
     const double t28 = t27 * t26;
     const double t30 = t28 + 1.0;
-    const double t36 = mmsmith_log_1p(t28);
-    const double t44 = s->fixed[6] * t36;
-    const double t46 = s->fixed[7] * t9;
-    const double t47 = t46 * t26;
-    const double t50 = 1.0 / t30;
+    const double t36 = 1.0 / t30;
+    const double t41 = mmsmith_log_1p(t28);
+    const double t43 = s->fixed[6] * t9;
+    const double t44 = t43 * t26;
     const double t60 = s->fixed[8] * t9;
     const double t61 = t60 * t2;
-    const double t62 = t44 + t47;
-    const double t63 = s->fixed[3] * t9;
-    const double t64 = t63 * t2;
-    const double t65 = -t64;
-    const double t66 = s->fixed[6] * t50;
-    const double t69 = s->fixed[9] + t66;
-    const double t70 = s->fixed[1] * t26;
-    const double t71 = t70 * t69;
-    const double t72 = t9 * t71;
-    const double t73 = t72 + t44;
-    const double t74 = 3.141592653589793 * t73;
-    const double t75 = t2 * t74;
-    const double t76 = t62 * t65;
-    const double t77 = t76 * t50;
-    const double t78 = t26 * t77;
-    const double t79 = t75 + t78;
-    const double t81 = s->fixed[10] * t9;
-    const double t82 = t79 * t50;
-    const double t83 = t81 * t82;
-    const double t84 = t61 - t83;
-    b[0] = t84;
+    const double t62 = s->fixed[7] * t41;
+    const double t63 = t62 + t44;
+    const double t64 = s->fixed[3] * t9;
+    const double t65 = t64 * t2;
+    const double t66 = -t65;
+    const double t67 = s->fixed[7] * t36;
+    const double t70 = s->fixed[9] + t67;
+    const double t71 = s->fixed[1] * t26;
+    const double t72 = t71 * t70;
+    const double t73 = t9 * t72;
+    const double t74 = t73 + t62;
+    const double t75 = 3.141592653589793 * t74;
+    const double t76 = t2 * t75;
+    const double t77 = t63 * t66;
+    const double t78 = t77 * t36;
+    const double t79 = t26 * t78;
+    const double t80 = t76 + t79;
+    const double t82 = s->fixed[10] * t9;
+    const double t83 = t80 * t36;
+    const double t84 = t82 * t83;
+    const double t85 = t61 - t84;
+    b[0] = t85;
 }
 
 /* traction on the surface X-lower, force per reference area */
@@ -441,16 +441,17 @@ MMSMITH_FN void axis_aligned_1d_X_lower_traction(const axis_aligned_1d_solution 
     const double t8 = s->fixed[0] * t;
     const double t9 = mmsmith_cos_pi(t8);
     const double t27 = s->fixed[1] * t9;
-    const double t119 = t27 + 1.0;
-    const double t120 = mmsmith_log_1p(t27);
-    const double t121 = t27 + 2.0;
-    const double t122 = s->fixed[6] * t120;
-    const double t123 = t9 * t121;
-    const double t124 = s->fixed[7] * t123;
-    const double t125 = t122 + t124;
-    const double t126 = t125 / t119;
-    const double t127 = -t126;
-    traction[0] = t127;
+    const double t120 = t27 + 1.0;
+    const double t121 = 1.0 / t120;
+    const double t122 = t121 + 1.0;
+    const double t123 = mmsmith_log_1p(t27);
+    const double t124 = t9 * t122;
+    const double t125 = s->fixed[6] * t124;
+    const double t126 = t123 * t121;
+    const double t127 = s->fixed[7] * t126;
+    const double t128 = t125 + t127;
+    const double t129 = -t128;
+    traction[0] = t129;
 }
 
 /* traction on the surface X-upper, force per reference area */
@@ -461,16 +462,18 @@ MMSMITH_FN void axis_aligned_1d_X_upper_traction(const axis_aligned_1d_solution 
     const double t8 = s->fixed[0] * t;
     const double t9 = mmsmith_cos_pi(t8);
     const double t27 = s->fixed[1] * t9;
-    const double t128 = 1.0 - t27;
-    const double t129 = -t27;
-    const double t130 = mmsmith_log_1p(t129);
-    const double t131 = 2.0 - t27;
-    const double t132 = s->fixed[6] * t130;
-    const double t133 = t9 * t131;
-    const double t134 = s->fixed[7] * t133;
-    const double t135 = t132 - t134;
-    const double t136 = t135 / t128;
-    traction[0] = t136;
+    const double t130 = 1.0 - t27;
+    const double t131 = 1.0 / t130;
+    const double t132 = t131 + 1.0;
+    const double t133 = -t27;
+    const double t134 = mmsmith_log_1p(t133);
+    const double t135 = t9 * t132;
+    const double t136 = s->fixed[6] * t135;
+    const double t137 = t134 * t131;
+    const double t138 = s->fixed[7] * t137;
+    const double t139 = t136 - t138;
+    const double t140 = -t139;
+    traction[0] = t140;
 }
 
 /* all fields */
@@ -492,37 +495,38 @@ MMSMITH_FN void axis_aligned_1d_fields(const axis_aligned_1d_solution *s, const 
     const double t27 = s->fixed[1] * t9;
     const double t28 = t27 * t26;
     const double t30 = t28 + 1.0;
-    const double t36 = mmsmith_log_1p(t28);
-    const double t40 = t28 + 2.0;
-    const double t44 = s->fixed[6] * t36;
-    const double t46 = s->fixed[7] * t9;
-    const double t47 = t46 * t26;
-    const double t48 = t47 * t40;
-    const double t49 = t44 + t48;
-    const double t50 = 1.0 / t30;
-    const double t51 = t49 * t50;
+    const double t36 = 1.0 / t30;
+    const double t37 = t36 + 1.0;
+    const double t41 = mmsmith_log_1p(t28);
+    const double t43 = s->fixed[6] * t9;
+    const double t44 = t43 * t26;
+    const double t45 = t44 * t37;
+    const double t49 = t41 * t36;
+    const double t50 = s->fixed[7] * t49;
+    const double t51 = t45 + t50;
     const double t60 = s->fixed[8] * t9;
     const double t61 = t60 * t2;
-    const double t62 = t44 + t47;
-    const double t63 = s->fixed[3] * t9;
-    const double t64 = t63 * t2;
-    const double t65 = -t64;
-    const double t66 = s->fixed[6] * t50;
-    const double t69 = s->fixed[9] + t66;
-    const double t70 = s->fixed[1] * t26;
-    const double t71 = t70 * t69;
-    const double t72 = t9 * t71;
-    const double t73 = t72 + t44;
-    const double t74 = 3.141592653589793 * t73;
-    const double t75 = t2 * t74;
-    const double t76 = t62 * t65;
-    const double t77 = t76 * t50;
-    const double t78 = t26 * t77;
-    const double t79 = t75 + t78;
-    const double t81 = s->fixed[10] * t9;
-    const double t82 = t79 * t50;
-    const double t83 = t81 * t82;
-    const double t84 = t61 - t83;
+    const double t62 = s->fixed[7] * t41;
+    const double t63 = t62 + t44;
+    const double t64 = s->fixed[3] * t9;
+    const double t65 = t64 * t2;
+    const double t66 = -t65;
+    const double t67 = s->fixed[7] * t36;
+    const double t70 = s->fixed[9] + t67;
+    const double t71 = s->fixed[1] * t26;
+    const double t72 = t71 * t70;
+    const double t73 = t9 * t72;
+    const double t74 = t73 + t62;
+    const double t75 = 3.141592653589793 * t74;
+    const double t76 = t2 * t75;
+    const double t77 = t63 * t66;
+    const double t78 = t77 * t36;
+    const double t79 = t26 * t78;
+    const double t80 = t76 + t79;
+    const double t82 = s->fixed[10] * t9;
+    const double t83 = t80 * t36;
+    const double t84 = t82 * t83;
+    const double t85 = t61 - t84;
     out->u[0] = t11;
     out->v[0] = t18;
     out->a[0] = t25;
@@ -530,7 +534,7 @@ MMSMITH_FN void axis_aligned_1d_fields(const axis_aligned_1d_solution *s, const 
     out->F[0] = t30;
     out->J = t30;
     out->P[0] = t51;
-    out->b[0] = t84;
+    out->b[0] = t85;
 }
 
 /* What the body force needs of the time alone. */
@@ -550,20 +554,20 @@ MMSMITH_FN void axis_aligned_1d_at_point(const axis_aligned_1d_solution *s, cons
 {
     const double t2 = mmsmith_sin_pi(X[0]);
     const double t26 = mmsmith_cos_pi(X[0]);
-    const double t85 = s->fixed[8] * t2;
-    const double t90 = t26 * t26;
-    const double t94 = t2 * t90;
-    const double t95 = s->fixed[11] * t94;
-    const double t96 = -t95;
-    const double t102 = t2 * t26;
-    const double t103 = s->fixed[12] * t102;
-    const double t108 = s->fixed[13] * t2;
-    const double t109 = -t108;
+    const double t86 = s->fixed[8] * t2;
+    const double t91 = t26 * t26;
+    const double t95 = t2 * t91;
+    const double t96 = s->fixed[11] * t95;
+    const double t97 = -t96;
+    const double t103 = t2 * t26;
+    const double t104 = s->fixed[12] * t103;
+    const double t109 = s->fixed[13] * t2;
+    const double t110 = -t109;
     point[0] = t26;
-    point[1] = t85;
-    point[2] = t96;
-    point[3] = t103;
-    point[4] = t109;
+    point[1] = t86;
+    point[2] = t97;
+    point[3] = t104;
+    point[4] = t110;
 }
 
 /* The body force from the values of one time and of one point. Value m of the point is point[m*stride]:
@@ -575,18 +579,18 @@ MMSMITH_FN void axis_aligned_1d_b_staged(const axis_aligned_1d_solution *s, cons
     (void)s;
     const double t28 = time->values[1] * point[0];
     const double t30 = t28 + 1.0;
-    const double t36 = mmsmith_log_1p(t28);
-    const double t50 = 1.0 / t30;
-    const double t104 = time->values[0] * point[2 * stride];
-    const double t105 = t104 - point[3 * stride];
-    const double t110 = time->values[0] * t105;
-    const double t111 = point[4 * stride] * t36;
-    const double t112 = t110 + t111;
-    const double t113 = t50 * t50;
-    const double t114 = t112 * t113;
-    const double t115 = point[stride] + t114;
-    const double t116 = time->values[0] * t115;
-    b[0] = t116;
+    const double t36 = 1.0 / t30;
+    const double t41 = mmsmith_log_1p(t28);
+    const double t105 = time->values[0] * point[2 * stride];
+    const double t106 = t105 - point[3 * stride];
+    const double t111 = time->values[0] * t106;
+    const double t112 = point[4 * stride] * t41;
+    const double t113 = t111 + t112;
+    const double t114 = t36 * t36;
+    const double t115 = t113 * t114;
+    const double t116 = point[stride] + t115;
+    const double t117 = time->values[0] * t116;
+    b[0] = t117;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -622,18 +626,18 @@ MMSMITH_FN void axis_aligned_1d_b_array(const axis_aligned_1d_solution *s, doubl
     for (p = first; p < end; ++p) {
         const double t28 = time.values[1] * point0[p];
         const double t30 = t28 + 1.0;
-        const double t36 = mmsmith_log_1p(t28);
-        const double t50 = 1.0 / t30;
-        const double t104 = time.values[0] * point2[p];
-        const double t105 = t104 - point3[p];
-        const double t110 = time.values[0] * t105;
-        const double t111 = point4[p] * t36;
-        const double t112 = t110 + t111;
-        const double t113 = t50 * t50;
-        const double t114 = t112 * t113;
-        const double t115 = point1[p] + t114;
-        const double t116 = time.values[0] * t115;
-        b[p * 1 + 0] = t116;
+        const double t36 = 1.0 / t30;
+        const double t41 = mmsmith_log_1p(t28);
+        const double t105 = time.values[0] * point2[p];
+        const double t106 = t105 - point3[p];
+        const double t111 = time.values[0] * t106;
+        const double t112 = point4[p] * t41;
+        const double t113 = t111 + t112;
+        const double t114 = t36 * t36;
+        const double t115 = t113 * t114;
+        const double t116 = point1[p] + t115;
+        const double t117 = time.values[0] * t116;
+        b[p * 1 + 0] = t117;
     }
 }
 
@@ -665,7 +669,7 @@ MMSMITH_FN double axis_aligned_1d_period(const axis_aligned_1d_solution *s)
 /* first Lame constant */
 MMSMITH_FN double axis_aligned_1d_lambda(const axis_aligned_1d_solution *s)
 {
-    return s->fixed[6];
+    return s->fixed[7];
 }
 
 /* shear modulus */

@@ -38,7 +38,7 @@ impl<T: crate::Real> Default for VortexParameters<T> {
 pub struct Vortex<T: crate::Real> {
     parameters: VortexParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 21],
+    fixed: [T; 19],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Vortex<T> {
@@ -124,21 +124,19 @@ impl<T: crate::Real> Vortex<T> {
         let t146 = parameters.nu + T::one();
         let t147 = T::nearest(0.5) * parameters.E;
         let t148 = t147 / t146;
-        let t157 = T::nearest(128.0) * parameters.A;
-        let t158 = t157 * t148;
-        let t171 = t92 * t148;
-        let t193 = T::nearest(2.0) * parameters.nu;
-        let t194 = T::one() - t193;
-        let t212 = t193 / t194;
-        let t220 = parameters.A * t79;
-        let t224 = T::nearest(2.0) / t146;
-        let t285 = parameters.E * parameters.nu;
-        let t286 = t146 * t194;
-        let t287 = t285 / t286;
-        let t290 = T::one() / parameters.rho0;
-        let t302 = T::nearest(32.0) / t146;
-        let t307 = t80 / parameters.rho0;
-        let t317 = T::nearest(2.0) / t5;
+        let t203 = T::nearest(2.0) * parameters.nu;
+        let t204 = T::one() - t203;
+        let t222 = t203 / t204;
+        let t231 = parameters.A * t79;
+        let t235 = T::nearest(2.0) / t146;
+        let t262 = T::nearest(128.0) * parameters.A;
+        let t290 = parameters.E * parameters.nu;
+        let t291 = t146 * t204;
+        let t292 = t290 / t291;
+        let t295 = T::one() / parameters.rho0;
+        let t307 = T::nearest(32.0) / t146;
+        let t312 = t80 / parameters.rho0;
+        let t322 = T::nearest(2.0) / t5;
         Ok(Vortex {
             parameters,
             fixed: [
@@ -152,17 +150,15 @@ impl<T: crate::Real> Vortex<T> {
                 t92,
                 t102,
                 t148,
-                t157,
-                t158,
-                t171,
-                t212,
-                t220,
-                t224,
-                t287,
-                t290,
-                t302,
+                t222,
+                t231,
+                t235,
+                t262,
+                t292,
+                t295,
                 t307,
-                t317,
+                t312,
+                t322,
             ],
         })
     }
@@ -505,32 +501,58 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t25 = t24.sin();
         let t26 = t24.cos();
         let t42 = t25 * t25;
+        let t43 = t26 * t26;
+        let t44 = t42 - t43;
         let t46 = t25 * t26;
+        let t93 = self.fixed[7] * t7;
+        let t94 = t13 * t15;
+        let t95 = t94 * t19;
+        let t96 = t93 * t95;
+        let t97 = t96 * t26;
+        let t98 = t25 + t97;
+        let t99 = t7 * t95;
+        let t100 = t99 * t44;
+        let t103 = self.fixed[8] * t100;
+        let t104 = t46 - t103;
         let t109 = X[0] * X[1];
         let t114 = T::one() / t12;
-        let t149 = T::nearest(2.0) * t42;
-        let t150 = T::one() - t149;
-        let t151 = t10 - t11;
-        let t152 = t151 * t26;
-        let t153 = t25 * t152;
-        let t154 = t109 * t150;
-        let t155 = t153 + t154;
-        let t159 = self.fixed[11] * t7;
-        let t160 = t15 * t19;
-        let t161 = t13 * t114;
-        let t162 = t160 * t161;
-        let t163 = t159 * t162;
-        let t164 = t163 * t155;
-        let t165 = -t164;
-        let t166 = t150 * t151;
-        let t168 = T::nearest(4.0) * t109;
-        let t169 = t168 * t46;
-        let t170 = t169 - t166;
-        let t172 = self.fixed[12] * t7;
-        let t173 = t172 * t162;
-        let t174 = t173 * t170;
-        let t175 = -t174;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t165, t175, t175, t164)
+        let t149 = T::nearest(2.0) * t46;
+        let t150 = -t149;
+        let t151 = T::nearest(2.0) * t104;
+        let t152 = t25 * t98;
+        let t153 = T::nearest(2.0) * t152;
+        let t154 = -t153;
+        let t155 = T::nearest(2.0) * t42;
+        let t156 = -t155;
+        let t157 = t156 + T::nearest(2.0);
+        let t158 = t150 * t151;
+        let t159 = t154 * t157;
+        let t160 = t158 - t159;
+        let t161 = t151 - t149;
+        let t162 = t154 + T::nearest(2.0);
+        let t163 = t156 * t162;
+        let t164 = t158 - t163;
+        let t165 = t10 * t160;
+        let t166 = T::nearest(2.0) * t109;
+        let t167 = t166 * t161;
+        let t168 = t11 * t164;
+        let t169 = t165 + t167;
+        let t170 = t169 + t168;
+        let t171 = self.fixed[9] * t114;
+        let t172 = t171 * t170;
+        let t173 = -t172;
+        let t174 = t159 - t163;
+        let t175 = t10 - t11;
+        let t176 = t161 * t175;
+        let t177 = t109 * t174;
+        let t178 = t176 + t177;
+        let t179 = t171 * t178;
+        let t180 = t11 * t160;
+        let t181 = t10 * t164;
+        let t182 = t167 - t180;
+        let t183 = t182 - t181;
+        let t184 = t171 * t183;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t173, t179, t179, t184)
     }
     #[inline]
     fn body_force(
@@ -582,139 +604,139 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t103 = self.fixed[8] * t100;
         let t104 = t46 - t103;
         let t114 = T::one() / t12;
-        let t149 = T::nearest(2.0) * t42;
-        let t160 = t15 * t19;
-        let t161 = t13 * t114;
-        let t176 = T::nearest(2.0) * t13;
-        let t178 = T::nearest(3.0) * t15;
-        let t179 = t176 - t178;
-        let t180 = t19 * t179;
-        let t181 = t13 * t17;
-        let t182 = T::nearest(64.0) * t181;
-        let t183 = t182 - t180;
-        let t184 = t26 * t183;
-        let t185 = t181 * t21;
-        let t186 = t93 * t185;
-        let t187 = t186 * t25;
-        let t188 = t184 - t187;
-        let t189 = t26 * t98;
-        let t190 = t160 * t189;
-        let t191 = t25 * t188;
-        let t192 = t190 + t191;
-        let t195 = self.fixed[8] * t7;
-        let t196 = t195 * t95;
-        let t197 = t196 * t26;
-        let t198 = t25 + t197;
-        let t199 = T::nearest(2.0) * t15;
-        let t200 = t13 - t199;
-        let t201 = t19 * t200;
-        let t202 = T::nearest(32.0) * t181;
-        let t203 = t202 - t201;
-        let t204 = t26 * t203;
-        let t205 = t195 * t185;
-        let t206 = t205 * t25;
-        let t207 = t204 - t206;
-        let t208 = t26 * t198;
-        let t209 = t160 * t208;
-        let t210 = t25 * t207;
-        let t211 = t209 + t210;
-        let t213 = self.fixed[13] * t211;
-        let t214 = t192 + t213;
-        let t215 = self.fixed[8] * t214;
-        let t216 = t7 * t215;
-        let t217 = t96 * t46;
-        let t218 = t161 * t217;
-        let t219 = t216 + t218;
-        let t221 = t13 * t21;
-        let t222 = self.fixed[14] * t221;
-        let t223 = t222 * t69;
-        let t225 = self.fixed[15] * t219;
-        let t226 = t223 - t225;
-        let t227 = self.fixed[0] * t226;
-        let t228 = T::nearest(2.0) * t104;
-        let t229 = t93 * t160;
-        let t230 = t229 * t44;
-        let t231 = T::nearest(2.0) * t46;
-        let t232 = -t231;
-        let t233 = t13 - t15;
-        let t234 = t19 * t233;
-        let t235 = t202 - t234;
-        let t236 = t26 * t235;
-        let t237 = t236 - t187;
-        let t238 = t25 * t235;
-        let t239 = t186 * t26;
-        let t240 = t238 + t239;
-        let t241 = t160 * t44;
-        let t242 = t26 * t237;
-        let t243 = t25 * t240;
-        let t244 = t241 - t242;
-        let t245 = t244 + t243;
-        let t246 = t93 * t245;
-        let t247 = -t246;
-        let t248 = t93 * t192;
-        let t249 = -t248;
-        let t250 = t25 * t98;
-        let t251 = T::nearest(2.0) * t250;
-        let t252 = -t251;
-        let t253 = -t149;
-        let t254 = t253 + T::one();
-        let t255 = t232 * t228;
-        let t256 = t252 * t254;
-        let t257 = t255 - t256;
-        let t258 = self.fixed[10] * t7;
-        let t259 = t258 * t160;
-        let t260 = t259 * t46;
-        let t261 = -t260;
-        let t262 = t254 * t249;
-        let t263 = t228 * t230;
-        let t264 = t232 * t247;
-        let t265 = t252 * t261;
-        let t266 = t262 - t263;
-        let t267 = t266 - t264;
-        let t268 = t267 + t265;
-        let t269 = t252 + T::one();
-        let t270 = t253 * t269;
-        let t271 = t255 - t270;
-        let t272 = t252 * t257;
-        let t273 = t253 * t271;
-        let t274 = t272 - t273;
-        let t275 = t249 * t257;
-        let t276 = t252 * t268;
-        let t277 = t161 * t274;
-        let t278 = t263 + t264;
-        let t279 = t278 - t275;
-        let t280 = t279 + t276;
-        let t281 = t280 - t277;
-        let t282 = t261 * t271;
-        let t283 = t279 - t282;
-        let t284 = self.fixed[9] * t281;
-        let t288 = self.fixed[16] * t283;
-        let t289 = t284 + t288;
-        let t291 = self.fixed[17] * t289;
-        let t292 = t291 - t227;
-        let t293 = t13 - t178;
-        let t294 = t19 * t293;
-        let t295 = t202 - t294;
-        let t296 = t44 * t295;
-        let t297 = t258 * t185;
-        let t298 = t297 * t46;
-        let t299 = t296 + t298;
-        let t300 = self.fixed[5] * t221;
-        let t301 = t300 * t75;
-        let t303 = self.fixed[18] * t7;
-        let t304 = t303 * t299;
-        let t305 = t301 + t304;
-        let t306 = X[0] * t292;
-        let t308 = self.fixed[19] * X[1];
-        let t309 = t308 * t305;
-        let t310 = t306 - t309;
-        let t311 = t161 * t310;
-        let t312 = X[1] * t292;
-        let t313 = self.fixed[19] * X[0];
-        let t314 = t313 * t305;
-        let t315 = t312 + t314;
-        let t316 = t161 * t315;
-        crate::nalgebra::SVector::<T, 2>::new(t311, t316)
+        let t149 = T::nearest(2.0) * t46;
+        let t150 = -t149;
+        let t151 = T::nearest(2.0) * t104;
+        let t152 = t25 * t98;
+        let t153 = T::nearest(2.0) * t152;
+        let t154 = -t153;
+        let t155 = T::nearest(2.0) * t42;
+        let t156 = -t155;
+        let t158 = t150 * t151;
+        let t185 = T::nearest(2.0) * t13;
+        let t187 = T::nearest(3.0) * t15;
+        let t188 = t185 - t187;
+        let t189 = t19 * t188;
+        let t190 = t13 * t17;
+        let t191 = T::nearest(64.0) * t190;
+        let t192 = t191 - t189;
+        let t193 = t26 * t192;
+        let t194 = t190 * t21;
+        let t195 = t93 * t194;
+        let t196 = t195 * t25;
+        let t197 = t193 - t196;
+        let t198 = t15 * t19;
+        let t199 = t26 * t98;
+        let t200 = t198 * t199;
+        let t201 = t25 * t197;
+        let t202 = t200 + t201;
+        let t205 = self.fixed[8] * t7;
+        let t206 = t205 * t95;
+        let t207 = t206 * t26;
+        let t208 = t25 + t207;
+        let t209 = T::nearest(2.0) * t15;
+        let t210 = t13 - t209;
+        let t211 = t19 * t210;
+        let t212 = T::nearest(32.0) * t190;
+        let t213 = t212 - t211;
+        let t214 = t26 * t213;
+        let t215 = t205 * t194;
+        let t216 = t215 * t25;
+        let t217 = t214 - t216;
+        let t218 = t26 * t208;
+        let t219 = t198 * t218;
+        let t220 = t25 * t217;
+        let t221 = t219 + t220;
+        let t223 = self.fixed[10] * t221;
+        let t224 = t202 + t223;
+        let t225 = self.fixed[8] * t224;
+        let t226 = t7 * t225;
+        let t227 = t96 * t46;
+        let t228 = t13 * t114;
+        let t229 = t228 * t227;
+        let t230 = t226 + t229;
+        let t232 = t13 * t21;
+        let t233 = self.fixed[11] * t232;
+        let t234 = t233 * t69;
+        let t236 = self.fixed[12] * t230;
+        let t237 = t234 - t236;
+        let t238 = self.fixed[0] * t237;
+        let t239 = t93 * t198;
+        let t240 = t239 * t44;
+        let t241 = t13 - t15;
+        let t242 = t19 * t241;
+        let t243 = t212 - t242;
+        let t244 = t26 * t243;
+        let t245 = t244 - t196;
+        let t246 = t25 * t243;
+        let t247 = t195 * t26;
+        let t248 = t246 + t247;
+        let t249 = t198 * t44;
+        let t250 = t26 * t245;
+        let t251 = t25 * t248;
+        let t252 = t249 - t250;
+        let t253 = t252 + t251;
+        let t254 = t93 * t253;
+        let t255 = -t254;
+        let t256 = t93 * t202;
+        let t257 = -t256;
+        let t258 = t156 + T::one();
+        let t259 = t154 * t258;
+        let t260 = t158 - t259;
+        let t263 = self.fixed[13] * t7;
+        let t264 = t263 * t198;
+        let t265 = t264 * t46;
+        let t266 = -t265;
+        let t267 = t258 * t257;
+        let t268 = t151 * t240;
+        let t269 = t150 * t255;
+        let t270 = t154 * t266;
+        let t271 = t267 - t268;
+        let t272 = t271 - t269;
+        let t273 = t272 + t270;
+        let t274 = t154 + T::one();
+        let t275 = t156 * t274;
+        let t276 = t158 - t275;
+        let t277 = t154 * t260;
+        let t278 = t156 * t276;
+        let t279 = t277 - t278;
+        let t280 = t257 * t260;
+        let t281 = t154 * t273;
+        let t282 = t228 * t279;
+        let t283 = t268 + t269;
+        let t284 = t283 - t280;
+        let t285 = t284 + t281;
+        let t286 = t285 - t282;
+        let t287 = t266 * t276;
+        let t288 = t284 - t287;
+        let t289 = self.fixed[9] * t286;
+        let t293 = self.fixed[14] * t288;
+        let t294 = t289 + t293;
+        let t296 = self.fixed[15] * t294;
+        let t297 = t296 - t238;
+        let t298 = t13 - t187;
+        let t299 = t19 * t298;
+        let t300 = t212 - t299;
+        let t301 = t44 * t300;
+        let t302 = t263 * t194;
+        let t303 = t302 * t46;
+        let t304 = t301 + t303;
+        let t305 = self.fixed[5] * t232;
+        let t306 = t305 * t75;
+        let t308 = self.fixed[16] * t7;
+        let t309 = t308 * t304;
+        let t310 = t306 + t309;
+        let t311 = X[0] * t297;
+        let t313 = self.fixed[17] * X[1];
+        let t314 = t313 * t310;
+        let t315 = t311 - t314;
+        let t316 = t228 * t315;
+        let t317 = X[1] * t297;
+        let t318 = self.fixed[17] * X[0];
+        let t319 = t318 * t310;
+        let t320 = t317 + t319;
+        let t321 = t228 * t320;
+        crate::nalgebra::SVector::<T, 2>::new(t316, t321)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t6 = self.fixed[1] * t;
@@ -837,157 +859,165 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t142 = -t141;
         let t143 = T::one() - t116;
         let t144 = T::one() - t141;
-        let t149 = T::nearest(2.0) * t42;
-        let t150 = T::one() - t149;
-        let t151 = t10 - t11;
-        let t152 = t151 * t26;
-        let t153 = t25 * t152;
-        let t154 = t109 * t150;
-        let t155 = t153 + t154;
-        let t159 = self.fixed[11] * t7;
-        let t160 = t15 * t19;
-        let t161 = t13 * t114;
-        let t162 = t160 * t161;
-        let t163 = t159 * t162;
-        let t164 = t163 * t155;
-        let t165 = -t164;
-        let t166 = t150 * t151;
-        let t168 = T::nearest(4.0) * t109;
-        let t169 = t168 * t46;
-        let t170 = t169 - t166;
-        let t172 = self.fixed[12] * t7;
-        let t173 = t172 * t162;
-        let t174 = t173 * t170;
-        let t175 = -t174;
-        let t176 = T::nearest(2.0) * t13;
-        let t178 = T::nearest(3.0) * t15;
-        let t179 = t176 - t178;
-        let t180 = t19 * t179;
-        let t181 = t13 * t17;
-        let t182 = T::nearest(64.0) * t181;
-        let t183 = t182 - t180;
-        let t184 = t26 * t183;
-        let t185 = t181 * t21;
-        let t186 = t93 * t185;
-        let t187 = t186 * t25;
-        let t188 = t184 - t187;
-        let t189 = t26 * t98;
-        let t190 = t160 * t189;
-        let t191 = t25 * t188;
-        let t192 = t190 + t191;
-        let t195 = self.fixed[8] * t7;
-        let t196 = t195 * t95;
-        let t197 = t196 * t26;
-        let t198 = t25 + t197;
-        let t199 = T::nearest(2.0) * t15;
-        let t200 = t13 - t199;
-        let t201 = t19 * t200;
-        let t202 = T::nearest(32.0) * t181;
-        let t203 = t202 - t201;
-        let t204 = t26 * t203;
-        let t205 = t195 * t185;
-        let t206 = t205 * t25;
-        let t207 = t204 - t206;
-        let t208 = t26 * t198;
-        let t209 = t160 * t208;
-        let t210 = t25 * t207;
-        let t211 = t209 + t210;
-        let t213 = self.fixed[13] * t211;
-        let t214 = t192 + t213;
-        let t215 = self.fixed[8] * t214;
-        let t216 = t7 * t215;
-        let t217 = t96 * t46;
-        let t218 = t161 * t217;
-        let t219 = t216 + t218;
-        let t221 = t13 * t21;
-        let t222 = self.fixed[14] * t221;
-        let t223 = t222 * t69;
-        let t225 = self.fixed[15] * t219;
-        let t226 = t223 - t225;
-        let t227 = self.fixed[0] * t226;
-        let t228 = T::nearest(2.0) * t104;
-        let t229 = t93 * t160;
-        let t230 = t229 * t44;
-        let t231 = T::nearest(2.0) * t46;
-        let t232 = -t231;
-        let t233 = t13 - t15;
-        let t234 = t19 * t233;
-        let t235 = t202 - t234;
-        let t236 = t26 * t235;
-        let t237 = t236 - t187;
-        let t238 = t25 * t235;
-        let t239 = t186 * t26;
-        let t240 = t238 + t239;
-        let t241 = t160 * t44;
-        let t242 = t26 * t237;
-        let t243 = t25 * t240;
-        let t244 = t241 - t242;
-        let t245 = t244 + t243;
-        let t246 = t93 * t245;
-        let t247 = -t246;
-        let t248 = t93 * t192;
-        let t249 = -t248;
-        let t250 = t25 * t98;
-        let t251 = T::nearest(2.0) * t250;
-        let t252 = -t251;
-        let t253 = -t149;
-        let t254 = t253 + T::one();
-        let t255 = t232 * t228;
-        let t256 = t252 * t254;
-        let t257 = t255 - t256;
-        let t258 = self.fixed[10] * t7;
-        let t259 = t258 * t160;
-        let t260 = t259 * t46;
-        let t261 = -t260;
-        let t262 = t254 * t249;
-        let t263 = t228 * t230;
-        let t264 = t232 * t247;
-        let t265 = t252 * t261;
-        let t266 = t262 - t263;
-        let t267 = t266 - t264;
-        let t268 = t267 + t265;
-        let t269 = t252 + T::one();
-        let t270 = t253 * t269;
-        let t271 = t255 - t270;
-        let t272 = t252 * t257;
-        let t273 = t253 * t271;
-        let t274 = t272 - t273;
-        let t275 = t249 * t257;
-        let t276 = t252 * t268;
-        let t277 = t161 * t274;
-        let t278 = t263 + t264;
-        let t279 = t278 - t275;
-        let t280 = t279 + t276;
-        let t281 = t280 - t277;
-        let t282 = t261 * t271;
-        let t283 = t279 - t282;
-        let t284 = self.fixed[9] * t281;
-        let t288 = self.fixed[16] * t283;
-        let t289 = t284 + t288;
-        let t291 = self.fixed[17] * t289;
-        let t292 = t291 - t227;
-        let t293 = t13 - t178;
-        let t294 = t19 * t293;
-        let t295 = t202 - t294;
-        let t296 = t44 * t295;
-        let t297 = t258 * t185;
-        let t298 = t297 * t46;
-        let t299 = t296 + t298;
-        let t300 = self.fixed[5] * t221;
-        let t301 = t300 * t75;
-        let t303 = self.fixed[18] * t7;
-        let t304 = t303 * t299;
-        let t305 = t301 + t304;
-        let t306 = X[0] * t292;
-        let t308 = self.fixed[19] * X[1];
-        let t309 = t308 * t305;
-        let t310 = t306 - t309;
-        let t311 = t161 * t310;
-        let t312 = X[1] * t292;
-        let t313 = self.fixed[19] * X[0];
-        let t314 = t313 * t305;
-        let t315 = t312 + t314;
-        let t316 = t161 * t315;
+        let t149 = T::nearest(2.0) * t46;
+        let t150 = -t149;
+        let t151 = T::nearest(2.0) * t104;
+        let t152 = t25 * t98;
+        let t153 = T::nearest(2.0) * t152;
+        let t154 = -t153;
+        let t155 = T::nearest(2.0) * t42;
+        let t156 = -t155;
+        let t157 = t156 + T::nearest(2.0);
+        let t158 = t150 * t151;
+        let t159 = t154 * t157;
+        let t160 = t158 - t159;
+        let t161 = t151 - t149;
+        let t162 = t154 + T::nearest(2.0);
+        let t163 = t156 * t162;
+        let t164 = t158 - t163;
+        let t165 = t10 * t160;
+        let t166 = T::nearest(2.0) * t109;
+        let t167 = t166 * t161;
+        let t168 = t11 * t164;
+        let t169 = t165 + t167;
+        let t170 = t169 + t168;
+        let t171 = self.fixed[9] * t114;
+        let t172 = t171 * t170;
+        let t173 = -t172;
+        let t174 = t159 - t163;
+        let t175 = t10 - t11;
+        let t176 = t161 * t175;
+        let t177 = t109 * t174;
+        let t178 = t176 + t177;
+        let t179 = t171 * t178;
+        let t180 = t11 * t160;
+        let t181 = t10 * t164;
+        let t182 = t167 - t180;
+        let t183 = t182 - t181;
+        let t184 = t171 * t183;
+        let t185 = T::nearest(2.0) * t13;
+        let t187 = T::nearest(3.0) * t15;
+        let t188 = t185 - t187;
+        let t189 = t19 * t188;
+        let t190 = t13 * t17;
+        let t191 = T::nearest(64.0) * t190;
+        let t192 = t191 - t189;
+        let t193 = t26 * t192;
+        let t194 = t190 * t21;
+        let t195 = t93 * t194;
+        let t196 = t195 * t25;
+        let t197 = t193 - t196;
+        let t198 = t15 * t19;
+        let t199 = t26 * t98;
+        let t200 = t198 * t199;
+        let t201 = t25 * t197;
+        let t202 = t200 + t201;
+        let t205 = self.fixed[8] * t7;
+        let t206 = t205 * t95;
+        let t207 = t206 * t26;
+        let t208 = t25 + t207;
+        let t209 = T::nearest(2.0) * t15;
+        let t210 = t13 - t209;
+        let t211 = t19 * t210;
+        let t212 = T::nearest(32.0) * t190;
+        let t213 = t212 - t211;
+        let t214 = t26 * t213;
+        let t215 = t205 * t194;
+        let t216 = t215 * t25;
+        let t217 = t214 - t216;
+        let t218 = t26 * t208;
+        let t219 = t198 * t218;
+        let t220 = t25 * t217;
+        let t221 = t219 + t220;
+        let t223 = self.fixed[10] * t221;
+        let t224 = t202 + t223;
+        let t225 = self.fixed[8] * t224;
+        let t226 = t7 * t225;
+        let t227 = t96 * t46;
+        let t228 = t13 * t114;
+        let t229 = t228 * t227;
+        let t230 = t226 + t229;
+        let t232 = t13 * t21;
+        let t233 = self.fixed[11] * t232;
+        let t234 = t233 * t69;
+        let t236 = self.fixed[12] * t230;
+        let t237 = t234 - t236;
+        let t238 = self.fixed[0] * t237;
+        let t239 = t93 * t198;
+        let t240 = t239 * t44;
+        let t241 = t13 - t15;
+        let t242 = t19 * t241;
+        let t243 = t212 - t242;
+        let t244 = t26 * t243;
+        let t245 = t244 - t196;
+        let t246 = t25 * t243;
+        let t247 = t195 * t26;
+        let t248 = t246 + t247;
+        let t249 = t198 * t44;
+        let t250 = t26 * t245;
+        let t251 = t25 * t248;
+        let t252 = t249 - t250;
+        let t253 = t252 + t251;
+        let t254 = t93 * t253;
+        let t255 = -t254;
+        let t256 = t93 * t202;
+        let t257 = -t256;
+        let t258 = t156 + T::one();
+        let t259 = t154 * t258;
+        let t260 = t158 - t259;
+        let t263 = self.fixed[13] * t7;
+        let t264 = t263 * t198;
+        let t265 = t264 * t46;
+        let t266 = -t265;
+        let t267 = t258 * t257;
+        let t268 = t151 * t240;
+        let t269 = t150 * t255;
+        let t270 = t154 * t266;
+        let t271 = t267 - t268;
+        let t272 = t271 - t269;
+        let t273 = t272 + t270;
+        let t274 = t154 + T::one();
+        let t275 = t156 * t274;
+        let t276 = t158 - t275;
+        let t277 = t154 * t260;
+        let t278 = t156 * t276;
+        let t279 = t277 - t278;
+        let t280 = t257 * t260;
+        let t281 = t154 * t273;
+        let t282 = t228 * t279;
+        let t283 = t268 + t269;
+        let t284 = t283 - t280;
+        let t285 = t284 + t281;
+        let t286 = t285 - t282;
+        let t287 = t266 * t276;
+        let t288 = t284 - t287;
+        let t289 = self.fixed[9] * t286;
+        let t293 = self.fixed[14] * t288;
+        let t294 = t289 + t293;
+        let t296 = self.fixed[15] * t294;
+        let t297 = t296 - t238;
+        let t298 = t13 - t187;
+        let t299 = t19 * t298;
+        let t300 = t212 - t299;
+        let t301 = t44 * t300;
+        let t302 = t263 * t194;
+        let t303 = t302 * t46;
+        let t304 = t301 + t303;
+        let t305 = self.fixed[5] * t232;
+        let t306 = t305 * t75;
+        let t308 = self.fixed[16] * t7;
+        let t309 = t308 * t304;
+        let t310 = t306 + t309;
+        let t311 = X[0] * t297;
+        let t313 = self.fixed[17] * X[1];
+        let t314 = t313 * t310;
+        let t315 = t311 - t314;
+        let t316 = t228 * t315;
+        let t317 = X[1] * t297;
+        let t318 = self.fixed[17] * X[0];
+        let t319 = t318 * t310;
+        let t320 = t317 + t319;
+        let t321 = t228 * t320;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t33, t39),
             v: crate::nalgebra::SVector::<T, 2>::new(t55, t61),
@@ -995,8 +1025,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
             H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t117, t127, t135, t142),
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t143, t127, t135, t144),
             J: T::one(),
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t165, t175, t175, t164),
-            b: crate::nalgebra::SVector::<T, 2>::new(t311, t316),
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t173, t179, t179, t184),
+            b: crate::nalgebra::SVector::<T, 2>::new(t316, t321),
         }
     }
     fn traction(
@@ -1029,22 +1059,38 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
                 let t25 = t24.sin();
                 let t26 = t24.cos();
                 let t42 = t25 * t25;
+                let t43 = t26 * t26;
+                let t44 = t42 - t43;
                 let t46 = t25 * t26;
+                let t93 = self.fixed[7] * t7;
+                let t94 = t13 * t15;
+                let t95 = t94 * t19;
+                let t96 = t93 * t95;
+                let t97 = t96 * t26;
+                let t98 = t25 + t97;
+                let t99 = t7 * t95;
+                let t100 = t99 * t44;
+                let t103 = self.fixed[8] * t100;
+                let t104 = t46 - t103;
                 let t114 = T::one() / t12;
-                let t149 = T::nearest(2.0) * t42;
-                let t150 = T::one() - t149;
-                let t159 = self.fixed[11] * t7;
-                let t160 = t15 * t19;
-                let t161 = t13 * t114;
-                let t172 = self.fixed[12] * t7;
-                let t321 = t160 * t11;
-                let t322 = t321 * t161;
-                let t323 = t159 * t322;
-                let t324 = t323 * t46;
-                let t325 = -t324;
-                let t326 = t172 * t322;
-                let t327 = t326 * t150;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t325, t327))
+                let t149 = T::nearest(2.0) * t46;
+                let t150 = -t149;
+                let t151 = T::nearest(2.0) * t104;
+                let t152 = t25 * t98;
+                let t153 = T::nearest(2.0) * t152;
+                let t154 = -t153;
+                let t155 = T::nearest(2.0) * t42;
+                let t156 = -t155;
+                let t158 = t150 * t151;
+                let t161 = t151 - t149;
+                let t162 = t154 + T::nearest(2.0);
+                let t163 = t156 * t162;
+                let t164 = t158 - t163;
+                let t326 = t11 * t114;
+                let t327 = self.fixed[9] * t326;
+                let t328 = t327 * t164;
+                let t329 = t327 * t161;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t328, t329))
             }
             crate::Surface::Lower(1) => {
                 let t6 = self.fixed[1] * t;
@@ -1063,23 +1109,39 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
                 let t25 = t24.sin();
                 let t26 = t24.cos();
                 let t42 = t25 * t25;
+                let t43 = t26 * t26;
+                let t44 = t42 - t43;
                 let t46 = t25 * t26;
+                let t93 = self.fixed[7] * t7;
+                let t94 = t13 * t15;
+                let t95 = t94 * t19;
+                let t96 = t93 * t95;
+                let t97 = t96 * t26;
+                let t98 = t25 + t97;
+                let t99 = t7 * t95;
+                let t100 = t99 * t44;
+                let t103 = self.fixed[8] * t100;
+                let t104 = t46 - t103;
                 let t114 = T::one() / t12;
-                let t149 = T::nearest(2.0) * t42;
-                let t150 = T::one() - t149;
-                let t159 = self.fixed[11] * t7;
-                let t160 = t15 * t19;
-                let t161 = t13 * t114;
-                let t172 = self.fixed[12] * t7;
-                let t328 = t160 * t10;
-                let t329 = t328 * t161;
-                let t330 = t172 * t329;
-                let t331 = t330 * t150;
-                let t332 = -t331;
-                let t333 = t159 * t329;
-                let t334 = t333 * t46;
-                let t335 = -t334;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t332, t335))
+                let t149 = T::nearest(2.0) * t46;
+                let t150 = -t149;
+                let t151 = T::nearest(2.0) * t104;
+                let t152 = t25 * t98;
+                let t153 = T::nearest(2.0) * t152;
+                let t154 = -t153;
+                let t155 = T::nearest(2.0) * t42;
+                let t156 = -t155;
+                let t158 = t150 * t151;
+                let t161 = t151 - t149;
+                let t162 = t154 + T::nearest(2.0);
+                let t163 = t156 * t162;
+                let t164 = t158 - t163;
+                let t330 = t10 * t114;
+                let t331 = self.fixed[9] * t330;
+                let t332 = t331 * t161;
+                let t333 = -t332;
+                let t334 = t331 * t164;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t333, t334))
             }
             _ => None,
         }
@@ -1107,7 +1169,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
     }
     fn material(&self) -> crate::Material<T> {
         crate::Material::NeoHookean {
-            lambda: self.fixed[16],
+            lambda: self.fixed[14],
             mu: self.fixed[9],
         }
     }
@@ -1118,7 +1180,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         self.fixed[1]
     }
     fn period(&self) -> T {
-        self.fixed[20]
+        self.fixed[18]
     }
     fn body_force_at(
         &self,
@@ -1139,10 +1201,10 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 15> for Vortex<T> {
         let t66 = T::nearest(2.0) * t7;
         let t72 = self.fixed[4] * t62;
         let t93 = self.fixed[7] * t7;
-        let t195 = self.fixed[8] * t7;
-        let t258 = self.fixed[10] * t7;
-        let t303 = self.fixed[18] * t7;
-        [t7, t23, t62, t66, t72, t93, t195, t258, t303]
+        let t205 = self.fixed[8] * t7;
+        let t263 = self.fixed[13] * t7;
+        let t308 = self.fixed[16] * t7;
+        [t7, t23, t62, t66, t72, t93, t205, t263, t308]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 15] {
@@ -1158,48 +1220,48 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 15> for Vortex<T> {
         let t94 = t13 * t15;
         let t95 = t94 * t19;
         let t114 = T::one() / t12;
-        let t160 = t15 * t19;
-        let t161 = t13 * t114;
-        let t176 = T::nearest(2.0) * t13;
-        let t178 = T::nearest(3.0) * t15;
-        let t179 = t176 - t178;
-        let t180 = t19 * t179;
-        let t181 = t13 * t17;
-        let t182 = T::nearest(64.0) * t181;
-        let t183 = t182 - t180;
-        let t185 = t181 * t21;
-        let t199 = T::nearest(2.0) * t15;
-        let t200 = t13 - t199;
-        let t201 = t19 * t200;
-        let t202 = T::nearest(32.0) * t181;
-        let t203 = t202 - t201;
-        let t221 = t13 * t21;
-        let t222 = self.fixed[14] * t221;
-        let t233 = t13 - t15;
-        let t234 = t19 * t233;
-        let t235 = t202 - t234;
-        let t293 = t13 - t178;
-        let t294 = t19 * t293;
-        let t295 = t202 - t294;
-        let t300 = self.fixed[5] * t221;
-        let t308 = self.fixed[19] * X[1];
-        let t313 = self.fixed[19] * X[0];
+        let t185 = T::nearest(2.0) * t13;
+        let t187 = T::nearest(3.0) * t15;
+        let t188 = t185 - t187;
+        let t189 = t19 * t188;
+        let t190 = t13 * t17;
+        let t191 = T::nearest(64.0) * t190;
+        let t192 = t191 - t189;
+        let t194 = t190 * t21;
+        let t198 = t15 * t19;
+        let t209 = T::nearest(2.0) * t15;
+        let t210 = t13 - t209;
+        let t211 = t19 * t210;
+        let t212 = T::nearest(32.0) * t190;
+        let t213 = t212 - t211;
+        let t228 = t13 * t114;
+        let t232 = t13 * t21;
+        let t233 = self.fixed[11] * t232;
+        let t241 = t13 - t15;
+        let t242 = t19 * t241;
+        let t243 = t212 - t242;
+        let t298 = t13 - t187;
+        let t299 = t19 * t298;
+        let t300 = t212 - t299;
+        let t305 = self.fixed[5] * t232;
+        let t313 = self.fixed[17] * X[1];
+        let t318 = self.fixed[17] * X[0];
         [
             X[0],
             X[1],
             t21,
             t95,
-            t160,
-            t161,
-            t183,
-            t185,
-            t203,
-            t222,
-            t235,
-            t295,
+            t192,
+            t194,
+            t198,
+            t213,
+            t228,
+            t233,
+            t243,
             t300,
-            t308,
+            t305,
             t313,
+            t318,
         ]
     }
     #[inline(always)]
@@ -1232,110 +1294,110 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 15> for Vortex<T> {
         let t100 = t99 * t44;
         let t103 = self.fixed[8] * t100;
         let t104 = t46 - t103;
-        let t149 = T::nearest(2.0) * t42;
-        let t184 = t26 * point[6];
-        let t186 = time[5] * point[7];
-        let t187 = t186 * t25;
-        let t188 = t184 - t187;
-        let t189 = t26 * t98;
-        let t190 = point[4] * t189;
-        let t191 = t25 * t188;
-        let t192 = t190 + t191;
-        let t196 = time[6] * point[3];
-        let t197 = t196 * t26;
-        let t198 = t25 + t197;
-        let t204 = t26 * point[8];
-        let t205 = time[6] * point[7];
-        let t206 = t205 * t25;
-        let t207 = t204 - t206;
-        let t208 = t26 * t198;
-        let t209 = point[4] * t208;
-        let t210 = t25 * t207;
-        let t211 = t209 + t210;
-        let t213 = self.fixed[13] * t211;
-        let t214 = t192 + t213;
-        let t215 = self.fixed[8] * t214;
-        let t216 = time[0] * t215;
-        let t217 = t96 * t46;
-        let t218 = point[5] * t217;
-        let t219 = t216 + t218;
-        let t223 = point[9] * t69;
-        let t225 = self.fixed[15] * t219;
-        let t226 = t223 - t225;
-        let t227 = self.fixed[0] * t226;
-        let t228 = T::nearest(2.0) * t104;
-        let t229 = time[5] * point[4];
-        let t230 = t229 * t44;
-        let t231 = T::nearest(2.0) * t46;
-        let t232 = -t231;
-        let t236 = t26 * point[10];
-        let t237 = t236 - t187;
-        let t238 = t25 * point[10];
-        let t239 = t186 * t26;
-        let t240 = t238 + t239;
-        let t241 = point[4] * t44;
-        let t242 = t26 * t237;
-        let t243 = t25 * t240;
-        let t244 = t241 - t242;
-        let t245 = t244 + t243;
-        let t246 = time[5] * t245;
-        let t247 = -t246;
-        let t248 = time[5] * t192;
-        let t249 = -t248;
-        let t250 = t25 * t98;
-        let t251 = T::nearest(2.0) * t250;
-        let t252 = -t251;
-        let t253 = -t149;
-        let t254 = t253 + T::one();
-        let t255 = t232 * t228;
-        let t256 = t252 * t254;
-        let t257 = t255 - t256;
-        let t259 = time[7] * point[4];
-        let t260 = t259 * t46;
-        let t261 = -t260;
-        let t262 = t254 * t249;
-        let t263 = t228 * t230;
-        let t264 = t232 * t247;
-        let t265 = t252 * t261;
-        let t266 = t262 - t263;
-        let t267 = t266 - t264;
-        let t268 = t267 + t265;
-        let t269 = t252 + T::one();
-        let t270 = t253 * t269;
-        let t271 = t255 - t270;
-        let t272 = t252 * t257;
-        let t273 = t253 * t271;
-        let t274 = t272 - t273;
-        let t275 = t249 * t257;
-        let t276 = t252 * t268;
-        let t277 = point[5] * t274;
-        let t278 = t263 + t264;
-        let t279 = t278 - t275;
-        let t280 = t279 + t276;
-        let t281 = t280 - t277;
-        let t282 = t261 * t271;
-        let t283 = t279 - t282;
-        let t284 = self.fixed[9] * t281;
-        let t288 = self.fixed[16] * t283;
-        let t289 = t284 + t288;
-        let t291 = self.fixed[17] * t289;
-        let t292 = t291 - t227;
-        let t296 = t44 * point[11];
-        let t297 = time[7] * point[7];
-        let t298 = t297 * t46;
-        let t299 = t296 + t298;
-        let t301 = point[12] * t75;
-        let t304 = time[8] * t299;
-        let t305 = t301 + t304;
-        let t306 = point[0] * t292;
-        let t309 = point[13] * t305;
-        let t310 = t306 - t309;
-        let t311 = point[5] * t310;
-        let t312 = point[1] * t292;
-        let t314 = point[14] * t305;
-        let t315 = t312 + t314;
-        let t316 = point[5] * t315;
-        crate::nalgebra::SVector::<T, 2>::new(t311, t316)
+        let t149 = T::nearest(2.0) * t46;
+        let t150 = -t149;
+        let t151 = T::nearest(2.0) * t104;
+        let t152 = t25 * t98;
+        let t153 = T::nearest(2.0) * t152;
+        let t154 = -t153;
+        let t155 = T::nearest(2.0) * t42;
+        let t156 = -t155;
+        let t158 = t150 * t151;
+        let t193 = t26 * point[4];
+        let t195 = time[5] * point[5];
+        let t196 = t195 * t25;
+        let t197 = t193 - t196;
+        let t199 = t26 * t98;
+        let t200 = point[6] * t199;
+        let t201 = t25 * t197;
+        let t202 = t200 + t201;
+        let t206 = time[6] * point[3];
+        let t207 = t206 * t26;
+        let t208 = t25 + t207;
+        let t214 = t26 * point[7];
+        let t215 = time[6] * point[5];
+        let t216 = t215 * t25;
+        let t217 = t214 - t216;
+        let t218 = t26 * t208;
+        let t219 = point[6] * t218;
+        let t220 = t25 * t217;
+        let t221 = t219 + t220;
+        let t223 = self.fixed[10] * t221;
+        let t224 = t202 + t223;
+        let t225 = self.fixed[8] * t224;
+        let t226 = time[0] * t225;
+        let t227 = t96 * t46;
+        let t229 = point[8] * t227;
+        let t230 = t226 + t229;
+        let t234 = point[9] * t69;
+        let t236 = self.fixed[12] * t230;
+        let t237 = t234 - t236;
+        let t238 = self.fixed[0] * t237;
+        let t239 = time[5] * point[6];
+        let t240 = t239 * t44;
+        let t244 = t26 * point[10];
+        let t245 = t244 - t196;
+        let t246 = t25 * point[10];
+        let t247 = t195 * t26;
+        let t248 = t246 + t247;
+        let t249 = point[6] * t44;
+        let t250 = t26 * t245;
+        let t251 = t25 * t248;
+        let t252 = t249 - t250;
+        let t253 = t252 + t251;
+        let t254 = time[5] * t253;
+        let t255 = -t254;
+        let t256 = time[5] * t202;
+        let t257 = -t256;
+        let t258 = t156 + T::one();
+        let t259 = t154 * t258;
+        let t260 = t158 - t259;
+        let t264 = time[7] * point[6];
+        let t265 = t264 * t46;
+        let t266 = -t265;
+        let t267 = t258 * t257;
+        let t268 = t151 * t240;
+        let t269 = t150 * t255;
+        let t270 = t154 * t266;
+        let t271 = t267 - t268;
+        let t272 = t271 - t269;
+        let t273 = t272 + t270;
+        let t274 = t154 + T::one();
+        let t275 = t156 * t274;
+        let t276 = t158 - t275;
+        let t277 = t154 * t260;
+        let t278 = t156 * t276;
+        let t279 = t277 - t278;
+        let t280 = t257 * t260;
+        let t281 = t154 * t273;
+        let t282 = point[8] * t279;
+        let t283 = t268 + t269;
+        let t284 = t283 - t280;
+        let t285 = t284 + t281;
+        let t286 = t285 - t282;
+        let t287 = t266 * t276;
+        let t288 = t284 - t287;
+        let t289 = self.fixed[9] * t286;
+        let t293 = self.fixed[14] * t288;
+        let t294 = t289 + t293;
+        let t296 = self.fixed[15] * t294;
+        let t297 = t296 - t238;
+        let t301 = t44 * point[11];
+        let t302 = time[7] * point[5];
+        let t303 = t302 * t46;
+        let t304 = t301 + t303;
+        let t306 = point[12] * t75;
+        let t309 = time[8] * t304;
+        let t310 = t306 + t309;
+        let t311 = point[0] * t297;
+        let t314 = point[13] * t310;
+        let t315 = t311 - t314;
+        let t316 = point[8] * t315;
+        let t317 = point[1] * t297;
+        let t319 = point[14] * t310;
+        let t320 = t317 + t319;
+        let t321 = point[8] * t320;
+        crate::nalgebra::SVector::<T, 2>::new(t316, t321)
     }
 }
 impl<T: crate::Real> From<Vortex<T>> for crate::AnySolution<T> {
