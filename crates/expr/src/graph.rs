@@ -148,6 +148,10 @@ pub struct Graph {
     pub(crate) work: usize,
     /// The values of the first nodes at one place, each with the magnitude of what it was summed up from.
     samples: Vec<(f64, f64)>,
+    /// What [`Graph::open`] has found.
+    pub(crate) open: HashMap<Expr, Expr>,
+    /// What [`Graph::residue`] has found.
+    pub(crate) residues: HashMap<Expr, Option<u64>>,
 }
 
 impl Default for Graph {
@@ -174,6 +178,8 @@ impl Graph {
             bits: 0,
             work: 0,
             samples: Vec::new(),
+            open: HashMap::new(),
+            residues: HashMap::new(),
         };
         graph.intern(Node::Number(Rational::zero()));
         graph.intern(Node::Number(Rational::one()));
@@ -413,7 +419,8 @@ pub(crate) fn numbers(node: &Node) -> impl Iterator<Item = &Rational> {
 
 /// The bits of numerator and denominator together.
 pub(crate) fn bits(number: &Rational) -> u64 {
-    number.numer().bits() + number.denom().bits()
+    let (numerator, denominator) = number.bits();
+    numerator + denominator
 }
 
 fn children(node: &Node) -> impl Iterator<Item = Expr> + '_ {

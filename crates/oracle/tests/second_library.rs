@@ -20,8 +20,8 @@ fn float(value: &Rational) -> Float {
             .with_base_and_precision::<2>(BITS)
             .value()
     };
-    let numerator: FBig<_, 2> = integer(value.numer());
-    let denominator: FBig<_, 2> = integer(value.denom());
+    let numerator: FBig<_, 2> = integer(&value.numer());
+    let denominator: FBig<_, 2> = integer(&value.denom());
     numerator.with_rounding::<HalfEven>().with_precision(BITS).value()
         / denominator.with_rounding::<HalfEven>().with_precision(BITS).value()
 }
