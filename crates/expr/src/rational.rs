@@ -130,8 +130,12 @@ impl Rational {
     /// `n / d` for `d` not zero and `|n|` and `|d|` below `2^127`.
     fn reduced(n: i128, d: i128) -> Self {
         let (n, d) = if d < 0 { (-n, -d) } else { (n, d) };
-        let divisor = if d == 1 { 1 } else { gcd(n.unsigned_abs(), d.unsigned_abs()) as i128 };
-        let (n, d) = (n / divisor, d / divisor);
+        let divisor = if d == 1 { 1 } else { gcd(n.unsigned_abs(), d.unsigned_abs()) };
+        // Division of this width is slow, and seldom needed.
+        let (n, d) = match i128::try_from(divisor) {
+            Ok(divisor) if divisor != 1 => (n / divisor, d / divisor),
+            _ => (n, d),
+        };
         match (i64::try_from(n), i64::try_from(d)) {
             (Ok(small), Ok(d)) if small != i64::MIN => Rational(Small(small, d)),
             _ => Rational(Big(Box::new(BigRational::new_raw(n.into(), d.into())))),
