@@ -35,7 +35,9 @@ impl<'a> Translator<'a> {
     pub(crate) fn statements(&self, block: &Block<'_>) -> (TokenStream, Vec<TokenStream>) {
         let lines: Vec<String> = block
             .steps()
-            .map(|(index, operation)| format!("let t{index} = {};", self.operation(block, operation)))
+            .map(|(index, operation)| {
+                format!("let t{index} = {};", self.operation(block, operation))
+            })
             .collect();
         let statements = match self.blocks {
             _ if lines.is_empty() => TokenStream::new(),
