@@ -3,107 +3,116 @@
 use crate::plan::{Block, Operand, Stage};
 use mmsmith_expr::{Function, Operation, Rational, Slot, nearest_f64};
 use num_traits::{One, Zero};
-use proc_macro2::{Ident, Literal, Span, TokenStream};
+use proc_macro2::{Ident, Literal, TokenStream};
 use quote::quote;
+use std::cell::RefCell;
+
+/// Stands for the statements of a block, by its number, until the rest is formatted.
+const PLACEHOLDER: &str = "let statements_of_block = ";
 
 /// Writes blocks in Rust, given how the parameters are called.
-pub(crate) struct Translator {
+///
+/// Blocks are by far the largest part of a solution, and simple; formatting them as tokens would take longer than
+/// to derive them. So they are written as lines, of checked names and numbers alone.
+pub(crate) struct Translator<'a> {
     /// Where the parameters are: `parameters` itself, or `self.parameters`.
-    parameters: TokenStream,
+    parameters: &'static str,
     names: Vec<Ident>,
+    /// The blocks that placeholders stand for; `None` where tokens are wanted.
+    blocks: Option<&'a RefCell<Vec<Vec<String>>>>,
 }
 
-impl Translator {
-    pub(crate) fn new(parameters: TokenStream, names: Vec<Ident>) -> Self {
-        Translator { parameters, names }
+impl<'a> Translator<'a> {
+    pub(crate) fn new(
+        parameters: &'static str,
+        names: Vec<Ident>,
+        blocks: Option<&'a RefCell<Vec<Vec<String>>>>,
+    ) -> Self {
+        Translator { parameters, names, blocks }
     }
 
     /// The statements of a block, and its outputs as expressions.
     pub(crate) fn statements(&self, block: &Block<'_>) -> (TokenStream, Vec<TokenStream>) {
-        let statements = block
+        let lines: Vec<String> = block
             .steps()
             .map(|(index, operation)| {
-                let (name, value) = (temporary(index), self.operation(block, operation));
-                quote!(let #name = #value;)
+                format!("let t{index} = {};", self.operation(block, operation))
             })
             .collect();
-        (statements, block.outputs().map(|operand| self.operand(operand)).collect())
+        let statements = match self.blocks {
+            _ if lines.is_empty() => TokenStream::new(),
+            Some(blocks) => {
+                let mut blocks = blocks.borrow_mut();
+                blocks.push(lines);
+                tokens(&format!("{PLACEHOLDER}{};", blocks.len() - 1))
+            }
+            None => tokens(&lines.concat()),
+        };
+        (statements, block.outputs().map(|operand| tokens(&self.operand(operand))).collect())
     }
 
-    fn operand(&self, operand: Operand<'_>) -> TokenStream {
+    fn operand(&self, operand: Operand<'_>) -> String {
         match operand {
-            Operand::Temporary(index) => {
-                let name = temporary(index);
-                quote!(#name)
-            }
+            Operand::Temporary(index) => format!("t{index}"),
             Operand::Number(value) => number(value),
-            Operand::Pi => quote!(T::pi()),
-            Operand::Coordinate(index) => {
-                let index = Literal::usize_unsuffixed(index);
-                quote!(X[#index])
-            }
-            Operand::Time => quote!(t),
-            Operand::Parameter(index) => {
-                let (parameters, name) = (&self.parameters, &self.names[index]);
-                quote!(#parameters.#name)
-            }
-            Operand::Kept(stage, index) => {
-                let index = Literal::usize_unsuffixed(index);
-                match stage {
-                    Stage::Fixed => quote!(self.fixed[#index]),
-                    Stage::Time => quote!(time[#index]),
-                    Stage::Point => quote!(point[#index]),
-                }
-            }
+            Operand::Pi => "T::pi()".into(),
+            Operand::Coordinate(index) => format!("X[{index}]"),
+            Operand::Time => "t".into(),
+            Operand::Parameter(index) => format!("{}.{}", self.parameters, self.names[index]),
+            Operand::Kept(Stage::Fixed, index) => format!("self.fixed[{index}]"),
+            Operand::Kept(Stage::Time, index) => format!("time[{index}]"),
+            Operand::Kept(Stage::Point, index) => format!("point[{index}]"),
         }
     }
 
-    fn operation(&self, block: &Block<'_>, operation: &Operation) -> TokenStream {
+    fn operation(&self, block: &Block<'_>, operation: &Operation) -> String {
         let at = |slot: &Slot| self.operand(block.operand(*slot));
         match operation {
             // These are operands and no statements.
             Operation::Number(value) => number(value),
-            Operation::Pi => quote!(T::pi()),
-            Operation::Input(_) => TokenStream::new(),
-            Operation::Add(a, b) => binary(&at(a), &quote!(+), &at(b)),
-            Operation::Sub(a, b) => binary(&at(a), &quote!(-), &at(b)),
-            Operation::Mul(a, b) => binary(&at(a), &quote!(*), &at(b)),
-            Operation::Div(a, b) => binary(&at(a), &quote!(/), &at(b)),
-            Operation::Neg(a) => {
-                let a = at(a);
-                quote!(-#a)
-            }
-            Operation::Sqrt(a) => method(&at(a), "sqrt"),
-            Operation::SinPi(a) => method(&at(a), "sin_pi"),
-            Operation::CosPi(a) => method(&at(a), "cos_pi"),
-            Operation::Call(function, a) => method(&at(a), rust_name(*function)),
-            Operation::Power(a, exponent) => {
-                let (a, exponent) = (at(a), number(exponent));
-                quote!(#a.powf(#exponent))
-            }
-            Operation::Atan2(y, x) => {
-                let (y, x) = (at(y), at(x));
-                quote!(#y.atan2(#x))
-            }
-            Operation::LnOfBoth(x, y) => {
-                let (x, y) = (at(x), at(y));
-                quote!(#x.ln_of_both(#y))
-            }
+            Operation::Pi => "T::pi()".into(),
+            Operation::Input(_) => String::new(),
+            Operation::Add(a, b) => format!("{} + {}", at(a), at(b)),
+            Operation::Sub(a, b) => format!("{} - {}", at(a), at(b)),
+            Operation::Mul(a, b) => format!("{} * {}", at(a), at(b)),
+            Operation::Div(a, b) => format!("{} / {}", at(a), at(b)),
+            Operation::Neg(a) => format!("-{}", at(a)),
+            Operation::Sqrt(a) => format!("{}.sqrt()", at(a)),
+            Operation::SinPi(a) => format!("{}.sin_pi()", at(a)),
+            Operation::CosPi(a) => format!("{}.cos_pi()", at(a)),
+            Operation::Call(function, a) => format!("{}.{}()", at(a), rust_name(*function)),
+            Operation::Power(a, exponent) => format!("{}.powf({})", at(a), number(exponent)),
+            Operation::Atan2(y, x) => format!("{}.atan2({})", at(y), at(x)),
+            Operation::LnOfBoth(x, y) => format!("{}.ln_of_both({})", at(x), at(y)),
         }
     }
 }
 
-fn temporary(index: usize) -> Ident {
-    Ident::new(&format!("t{index}"), Span::call_site())
+/// `text` with the lines of `blocks` in the places of their placeholders, as far to the right as these.
+///
+/// Text from a specification is always within a comment or a literal, so that no line of it starts as a placeholder.
+pub(crate) fn fill(text: &str, blocks: &[Vec<String>]) -> String {
+    let mut filled = String::new();
+    for line in text.lines() {
+        let statement = line.trim_start();
+        let number = statement.strip_prefix(PLACEHOLDER).and_then(|n| n.strip_suffix(';'));
+        let block = number.and_then(|n| blocks.get(n.parse::<usize>().ok()?));
+        let margin = &line[..line.len() - statement.len()];
+        match block {
+            Some(lines) => {
+                for line in lines {
+                    filled.extend([margin, line, "\n"]);
+                }
+            }
+            None => filled.extend([line, "\n"]),
+        }
+    }
+    filled
 }
 
-fn binary(a: &TokenStream, sign: &TokenStream, b: &TokenStream) -> TokenStream {
-    quote!(#a #sign #b)
-}
-
-fn method(receiver: &TokenStream, name: &str) -> TokenStream {
-    let name = Ident::new(name, Span::call_site());
-    quote!(#receiver.#name())
+/// Names and numbers with what joins them always are tokens.
+fn tokens(text: &str) -> TokenStream {
+    text.parse().unwrap_or_default()
 }
 
 fn rust_name(function: Function) -> &'static str {
@@ -130,15 +139,18 @@ fn rust_name(function: Function) -> &'static str {
 }
 
 /// A non-negative number as a value of the scalar type `T`.
-fn number(value: &Rational) -> TokenStream {
+fn number(value: &Rational) -> String {
     if value.is_one() {
-        return quote!(T::one());
+        return "T::one()".into();
     }
     if value.is_zero() {
-        return quote!(T::zero());
+        return "T::zero()".into();
     }
-    let literal = float(nearest_f64(value));
-    quote!(T::nearest(#literal))
+    let value = nearest_f64(value);
+    if value.is_infinite() {
+        return "T::nearest(f64::INFINITY)".into();
+    }
+    format!("T::nearest({})", digits(value))
 }
 
 /// A literal for any double; negative ones with a minus sign before it.

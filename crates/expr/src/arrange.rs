@@ -48,6 +48,7 @@ pub fn arrange(
         dependence: HashMap::new(),
         arranged: HashMap::new(),
         products: 0,
+        fractions: HashMap::new(),
     };
     outputs.iter().map(|&output| arranging.arrange(output)).collect()
 }
@@ -86,6 +87,9 @@ struct Arranging<'a> {
     arranged: HashMap<Expr, Expr>,
     /// The products of two terms made so far.
     products: usize,
+    /// Fractions found before, each with the products that it took. They count again where it is used again, so that
+    /// the limit does not depend on what was asked for first.
+    fractions: HashMap<Expr, (Fraction, usize)>,
 }
 
 impl Arranging<'_> {
@@ -234,6 +238,17 @@ impl Arranging<'_> {
 
     /// `expr` as a polynomial over a product; `None` where that grows too large.
     fn fraction(&mut self, expr: Expr) -> Option<Fraction> {
+        if let Some((known, products)) = self.fractions.get(&expr) {
+            self.products += products;
+            return (*products == 0 || self.products <= MOST_PRODUCTS).then(|| known.clone());
+        }
+        let before = self.products;
+        let fraction = self.find_fraction(expr)?;
+        self.fractions.insert(expr, (fraction.clone(), self.products - before));
+        Some(fraction)
+    }
+
+    fn find_fraction(&mut self, expr: Expr) -> Option<Fraction> {
         let dependence = self.dependence(expr);
         if !dependence.time {
             return Some(Fraction::polynomial(Monomial::new(), expr));

@@ -108,8 +108,8 @@ impl Graph {
         let mut common = BigInt::one();
         let mut numbers = parts.iter().flat_map(|(_, part)| numbers(self.node(*part)));
         numbers.any(|number| {
-            if !common.is_multiple_of(number.denom()) {
-                common = common.lcm(number.denom());
+            if !common.is_multiple_of(&number.denom()) {
+                common = common.lcm(&number.denom());
             }
             common.bits() > MOST_BITS
         })
@@ -122,7 +122,7 @@ impl Graph {
             return Ok(self.call(Function::Exp, &[product]));
         };
         let limit = LARGEST_EXPONENT.into();
-        if number.numer().abs() > limit || *number.denom() > limit {
+        if number.numer().abs() > limit || number.denom() > limit {
             return Err(format!("an exponent beyond {LARGEST_EXPONENT} is not supported"));
         }
         if base == Graph::ZERO && !number.is_positive() {

@@ -7,7 +7,7 @@
 
 use crate::{Expr, Function, Graph, Node, Rational};
 use num_traits::{One, Signed, ToPrimitive, Zero};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// Numerators with more terms than this are not worth the search.
 const MOST_TERMS: usize = 512;
@@ -99,7 +99,11 @@ impl Graph {
         if self.differs_from_zero(expr) {
             return false;
         }
-        let open = self.opened(expr, &mut BTreeMap::new());
+        let open = self.open(expr);
+        // What is not zero modulo a prime is not zero; what is zero there is still to be proved so.
+        if self.residue(open).is_some_and(|residue| residue != 0) {
+            return false;
+        }
         self.fraction(open).is_some_and(|fraction| {
             self.without_cosine_squares(fraction.numerator).is_some_and(|n| n.is_empty())
         })
@@ -107,7 +111,10 @@ impl Graph {
 
     /// `expr` with nothing kept in one piece.
     pub fn open(&mut self, expr: Expr) -> Expr {
-        self.opened(expr, &mut BTreeMap::new())
+        let mut done = std::mem::take(&mut self.open);
+        let open = self.opened(expr, &mut done);
+        self.open = done;
+        open
     }
 
     /// The numerator of `expr` over a common denominator, multiplied out: monomials, which are powers of atoms, with
@@ -118,7 +125,7 @@ impl Graph {
         Some(numerator.into_iter().map(|(m, c)| (m.into_iter().collect(), c)).collect())
     }
 
-    fn opened(&mut self, expr: Expr, done: &mut BTreeMap<Expr, Expr>) -> Expr {
+    fn opened(&mut self, expr: Expr, done: &mut HashMap<Expr, Expr>) -> Expr {
         if let Some(&known) = done.get(&expr) {
             return known;
         }

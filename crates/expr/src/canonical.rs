@@ -469,7 +469,10 @@ fn rational_power(value: &Rational, exponent: &Rational) -> Option<Rational> {
     }
     let root = exact_root_or_self(value, exponent)?;
     let power = exponent.numer().to_i32()?;
-    let bits = root.numer().bits().max(root.denom().bits());
+    let bits = {
+        let (numerator, denominator) = root.bits();
+        numerator.max(denominator)
+    };
     if bits.saturating_sub(1) * u64::from(power.unsigned_abs()) > LARGEST_NUMBER_BITS {
         return None;
     }
@@ -491,7 +494,10 @@ fn content_of(constant: &Rational, terms: &[(Expr, Rational)]) -> Rational {
         std::iter::once(constant).chain(terms.iter().map(|(_, c)| c)).filter(|c| !c.is_zero());
     let content = all
         .map(Signed::abs)
-        .reduce(|a, b| Rational::new(a.numer().gcd(b.numer()), a.denom().lcm(b.denom())))
+        .reduce(|a, b| match (a.small(), b.small()) {
+            (Some((a, 1)), Some((b, 1))) => Rational::from_integer(a.gcd(&b).into()),
+            _ => Rational::new(a.numer().gcd(&b.numer()), a.denom().lcm(&b.denom())),
+        })
         .unwrap_or_else(Rational::one);
     if leading_negative { -content } else { content }
 }

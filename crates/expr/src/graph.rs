@@ -3,6 +3,7 @@
 use crate::{Rational, nearest_f64};
 use num_traits::{One, Zero};
 use std::collections::{BTreeSet, HashMap};
+use std::hash::{BuildHasherDefault, Hasher};
 
 /// The most nodes and references that text may make.
 pub(crate) const LARGEST_SIZE: usize = 1 << 21;
@@ -138,7 +139,7 @@ pub enum Node {
 pub struct Graph {
     nodes: Vec<Node>,
     depth: Vec<u32>,
-    index: HashMap<Node, Expr>,
+    index: HashMap<Node, Expr, BuildHasherDefault<NodeHasher>>,
     symbols: Vec<String>,
     /// Nodes and references between them.
     size: usize,
@@ -148,6 +149,50 @@ pub struct Graph {
     pub(crate) work: usize,
     /// The values of the first nodes at one place, each with the magnitude of what it was summed up from.
     samples: Vec<(f64, f64)>,
+    /// What [`Graph::open`] has found.
+    pub(crate) open: HashMap<Expr, Expr>,
+    /// What [`Graph::residue`] has found.
+    pub(crate) residues: HashMap<Expr, Option<u64>>,
+}
+
+/// Hashes nodes, which are small numbers, by a multiplication each.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct NodeHasher(u64);
+
+impl Hasher for NodeHasher {
+    fn finish(&self) -> u64 {
+        // The table takes the lowest bits, which a product leaves the poorest.
+        self.0 ^ self.0 >> 32
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        for part in bytes.chunks(8) {
+            let mut word = [0; 8];
+            word[..part.len()].copy_from_slice(part);
+            self.write_u64(u64::from_le_bytes(word));
+        }
+    }
+
+    fn write_u32(&mut self, word: u32) {
+        self.write_u64(word.into());
+    }
+
+    fn write_u64(&mut self, word: u64) {
+        // An odd constant without a pattern: 2^64 by the golden ratio.
+        self.0 = (self.0.rotate_left(29) ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    }
+
+    fn write_usize(&mut self, word: usize) {
+        self.write_u64(word as u64);
+    }
+
+    fn write_i64(&mut self, word: i64) {
+        self.write_u64(word as u64);
+    }
+
+    fn write_isize(&mut self, word: isize) {
+        self.write_u64(word as u64);
+    }
 }
 
 impl Default for Graph {
@@ -168,12 +213,14 @@ impl Graph {
         let mut graph = Graph {
             nodes: Vec::new(),
             depth: Vec::new(),
-            index: HashMap::new(),
+            index: HashMap::default(),
             symbols: Vec::new(),
             size: 0,
             bits: 0,
             work: 0,
             samples: Vec::new(),
+            open: HashMap::new(),
+            residues: HashMap::new(),
         };
         graph.intern(Node::Number(Rational::zero()));
         graph.intern(Node::Number(Rational::one()));
@@ -413,7 +460,8 @@ pub(crate) fn numbers(node: &Node) -> impl Iterator<Item = &Rational> {
 
 /// The bits of numerator and denominator together.
 pub(crate) fn bits(number: &Rational) -> u64 {
-    number.numer().bits() + number.denom().bits()
+    let (numerator, denominator) = number.bits();
+    numerator + denominator
 }
 
 fn children(node: &Node) -> impl Iterator<Item = Expr> + '_ {

@@ -44,6 +44,7 @@ mod program;
 mod pythagoras;
 mod rational;
 mod reciprocal;
+mod residue;
 mod reuse;
 
 pub use arrange::arrange;

@@ -71,11 +71,11 @@ impl Graph {
         factors: &[(Expr, Rational)],
         coefficient: &Rational,
     ) -> (String, Binding) {
-        let integer = |n: &num_bigint::BigInt| Rational::from_integer(n.clone());
+        let integer = |n: num_bigint::BigInt| Rational::from_integer(n);
         let mut above = Vec::new();
         let mut below = Vec::new();
         if !coefficient.numer().abs().is_one() {
-            above.push(number_text(&integer(coefficient.numer()).abs()).0);
+            above.push(number_text(&integer(coefficient.numer().abs())).0);
         }
         if !coefficient.denom().is_one() {
             below.push(number_text(&integer(coefficient.denom())).0);

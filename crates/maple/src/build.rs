@@ -63,7 +63,7 @@ impl Listing {
 
 /// The bits of the longest number in the root of `expr` and right below it, where new numbers come up.
 fn largest_number(graph: &Graph, expr: Expr) -> u64 {
-    let bits = |number: &Rational| number.numer().bits().max(number.denom().bits());
+    let bits = |number: &Rational| number.bits().0.max(number.bits().1);
     let in_node = |expr: Expr| match graph.node(expr) {
         Node::Number(value) => bits(value),
         Node::Sum { constant, terms } => {

@@ -16,8 +16,8 @@ pub fn exact(value: f64) -> Option<Rational> {
 
 /// `value`, rounded to `bits`.
 pub(crate) fn to_float(value: &Rational, bits: usize) -> BigFloat {
-    let numerator = integer(value.numer());
-    let denominator = integer(value.denom());
+    let numerator = integer(&value.numer());
+    let denominator = integer(&value.denom());
     numerator.div(&denominator, bits, RoundingMode::ToEven)
 }
 

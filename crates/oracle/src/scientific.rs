@@ -11,7 +11,7 @@ pub fn scientific(value: &Rational, digits: usize) -> String {
         return "0".into();
     }
     let digits = digits.max(1);
-    let bits = value.numer().bits() as f64 - value.denom().bits() as f64;
+    let bits = value.bits().0 as f64 - value.bits().1 as f64;
     // One too small at worst by this estimate; the loop mends it.
     let mut exponent = (bits * std::f64::consts::LOG10_2).floor() as i64 - 1;
     let ten = Rational::from_integer(10.into());

@@ -5,7 +5,7 @@ use dashu_float::FBig;
 use dashu_float::round::mode::HalfEven;
 use mmsmith_expr::{Expr, Function, Graph, Node, Rational};
 use mmsmith_oracle::{Oracle, OracleError, Point};
-use num_traits::{Signed, ToPrimitive, Zero};
+use num_traits::{One, Signed, ToPrimitive, Zero};
 use proptest::prelude::*;
 use std::str::FromStr;
 
@@ -20,8 +20,8 @@ fn float(value: &Rational) -> Float {
             .with_base_and_precision::<2>(BITS)
             .value()
     };
-    let numerator: FBig<_, 2> = integer(value.numer());
-    let denominator: FBig<_, 2> = integer(value.denom());
+    let numerator: FBig<_, 2> = integer(&value.numer());
+    let denominator: FBig<_, 2> = integer(&value.denom());
     numerator.with_rounding::<HalfEven>().with_precision(BITS).value()
         / denominator.with_rounding::<HalfEven>().with_precision(BITS).value()
 }
@@ -177,7 +177,9 @@ fn tame(graph: &Graph, root: Expr, values: &[(Expr, Rational)], oracle: &mut Ora
     let point = Point { graph, definitions: &[], values };
     oracle.evaluate(&point, &parts).is_ok_and(|values| {
         let bound = Rational::from_integer(1_000_000.into());
-        values.iter().all(|v| v.abs() < bound && (v.is_zero() || v.abs() > bound.recip()))
+        values
+            .iter()
+            .all(|v| v.abs() < bound && (v.is_zero() || v.abs() > Rational::one() / &bound))
     })
 }
 

@@ -273,14 +273,14 @@ MMSMITH_FN const char *bar_prepare(bar_solution *s, const bar_parameters *p)
     const double t36 = t35 * 3.141592653589793;
     const double t37 = t36 / p->L;
     const double t43 = p->nu + 1.0;
-    const double t44 = 2.0 * p->nu;
-    const double t45 = 1.0 - t44;
-    const double t48 = 0.5 * p->E;
-    const double t49 = t48 / t43;
-    const double t51 = p->E * p->nu;
-    const double t52 = t43 * t45;
-    const double t53 = t51 / t52;
-    const double t60 = p->nu / t45;
+    const double t45 = 0.5 * p->E;
+    const double t46 = t45 / t43;
+    const double t49 = 2.0 * p->nu;
+    const double t50 = 1.0 - t49;
+    const double t54 = p->E * p->nu;
+    const double t55 = t43 * t50;
+    const double t56 = t54 / t55;
+    const double t60 = p->nu / t50;
     const double t61 = t60 + 1.0;
     const double t63 = 4.0 * t61;
     const double t64 = t63 / t43;
@@ -290,37 +290,37 @@ MMSMITH_FN const char *bar_prepare(bar_solution *s, const bar_parameters *p)
     const double t70 = 4.0 * p->A;
     const double t71 = t70 * t26;
     const double t72 = t71 / t25;
-    const double t87 = 1.0 / p->rho0;
-    const double t93 = t53 + t49;
-    const double t95 = p->A * p->A;
-    const double t96 = t95 * p->A;
-    const double t97 = t25 * t25;
-    const double t98 = t26 * t26;
-    const double t100 = 16.0 * t96;
-    const double t101 = t100 * t98;
-    const double t102 = t101 * t93;
-    const double t103 = p->rho0 * t97;
-    const double t104 = t102 / t103;
-    const double t108 = t25 * p->L;
-    const double t109 = t26 * 3.141592653589793;
-    const double t110 = 16.0 * t95;
-    const double t111 = t110 * t109;
-    const double t112 = t111 * t93;
-    const double t113 = p->rho0 * t108;
-    const double t114 = t112 / t113;
-    const double t119 = t70 * p->E;
-    const double t120 = t119 * p->nu;
-    const double t121 = t120 * t26;
-    const double t122 = t29 * t43;
-    const double t123 = t122 * t45;
-    const double t124 = t121 / t123;
-    const double t134 = 2.0 * p->L;
-    const double t135 = t134 / t11;
-    const double t137 = -t36;
+    const double t88 = 1.0 / p->rho0;
+    const double t94 = t56 + t46;
+    const double t96 = p->A * p->A;
+    const double t97 = t96 * p->A;
+    const double t98 = t25 * t25;
+    const double t99 = t26 * t26;
+    const double t101 = 16.0 * t97;
+    const double t102 = t101 * t99;
+    const double t103 = t102 * t94;
+    const double t104 = p->rho0 * t98;
+    const double t105 = t103 / t104;
+    const double t109 = t25 * p->L;
+    const double t110 = t26 * 3.141592653589793;
+    const double t111 = 16.0 * t96;
+    const double t112 = t111 * t110;
+    const double t113 = t112 * t94;
+    const double t114 = p->rho0 * t109;
+    const double t115 = t113 / t114;
+    const double t120 = t70 * p->E;
+    const double t121 = t120 * p->nu;
+    const double t122 = t121 * t26;
+    const double t123 = t29 * t43;
+    const double t124 = t123 * t50;
+    const double t125 = t122 / t124;
+    const double t135 = 2.0 * p->L;
+    const double t136 = t135 / t11;
+    const double t138 = -t36;
     if (!(t36 < p->L)) {
         return "the parameters of bar must satisfy 2*Pi*A < L";
     }
-    if (!(t137 < p->L)) {
+    if (!(t138 < p->L)) {
         return "the parameters of bar must satisfy -2*Pi*A < L";
     }
     s->par = *p;
@@ -331,16 +331,16 @@ MMSMITH_FN const char *bar_prepare(bar_solution *s, const bar_parameters *p)
     s->fixed[4] = t30;
     s->fixed[5] = t36;
     s->fixed[6] = t37;
-    s->fixed[7] = t49;
-    s->fixed[8] = t53;
+    s->fixed[7] = t46;
+    s->fixed[8] = t56;
     s->fixed[9] = t67;
     s->fixed[10] = t72;
-    s->fixed[11] = t87;
-    s->fixed[12] = t104;
-    s->fixed[13] = t114;
-    s->fixed[14] = t124;
-    s->fixed[15] = t135;
-    s->fixed[16] = t137;
+    s->fixed[11] = t88;
+    s->fixed[12] = t105;
+    s->fixed[13] = t115;
+    s->fixed[14] = t125;
+    s->fixed[15] = t136;
+    s->fixed[16] = t138;
     return 0;
 }
 
@@ -430,14 +430,14 @@ MMSMITH_FN void bar_P(const bar_solution *s, const double X[1], double t, double
     const double t38 = s->fixed[6] * t14;
     const double t39 = t38 * t34;
     const double t41 = t39 + 1.0;
-    const double t46 = mmsmith_log_1p(t39);
-    const double t50 = t39 + 2.0;
-    const double t54 = s->fixed[8] * t46;
-    const double t55 = t39 * t50;
-    const double t56 = s->fixed[7] * t55;
-    const double t57 = t54 + t56;
-    const double t58 = 1.0 / t41;
-    const double t59 = t57 * t58;
+    const double t47 = 1.0 / t41;
+    const double t48 = t47 + 1.0;
+    const double t51 = mmsmith_log_1p(t39);
+    const double t52 = t39 * t48;
+    const double t53 = s->fixed[7] * t52;
+    const double t57 = t51 * t47;
+    const double t58 = s->fixed[8] * t57;
+    const double t59 = t53 + t58;
     P[0] = t59;
 }
 
@@ -452,30 +452,30 @@ MMSMITH_FN void bar_b(const bar_solution *s, const double X[1], double t, double
     const double t38 = s->fixed[6] * t14;
     const double t39 = t38 * t34;
     const double t41 = t39 + 1.0;
-    const double t46 = mmsmith_log_1p(t39);
-    const double t54 = s->fixed[8] * t46;
-    const double t58 = 1.0 / t41;
+    const double t47 = 1.0 / t41;
+    const double t51 = mmsmith_log_1p(t39);
     const double t68 = s->fixed[9] * t14;
     const double t69 = t68 * t6;
     const double t73 = s->fixed[10] * t14;
     const double t74 = t73 * t6;
     const double t75 = -t74;
-    const double t76 = s->fixed[7] * t39;
-    const double t77 = t54 + t76;
-    const double t78 = s->fixed[8] * t58;
-    const double t79 = s->fixed[7] + t78;
-    const double t80 = t39 + t46;
-    const double t81 = s->fixed[8] * t80;
-    const double t82 = t77 * t58;
-    const double t83 = t79 - t82;
-    const double t84 = s->fixed[7] + t83;
-    const double t85 = t39 * t84;
-    const double t86 = t81 + t85;
-    const double t88 = t75 * t86;
-    const double t89 = t88 * t58;
-    const double t90 = s->fixed[11] * t89;
-    const double t91 = t90 - t69;
-    b[0] = t91;
+    const double t76 = s->fixed[8] * t51;
+    const double t77 = s->fixed[7] * t39;
+    const double t78 = t76 + t77;
+    const double t79 = s->fixed[8] * t47;
+    const double t80 = s->fixed[7] + t79;
+    const double t81 = t39 + t51;
+    const double t82 = s->fixed[8] * t81;
+    const double t83 = t78 * t47;
+    const double t84 = t80 - t83;
+    const double t85 = s->fixed[7] + t84;
+    const double t86 = t39 * t85;
+    const double t87 = t82 + t86;
+    const double t89 = t75 * t87;
+    const double t90 = t89 * t47;
+    const double t91 = s->fixed[11] * t90;
+    const double t92 = t91 - t69;
+    b[0] = t92;
 }
 
 /* traction on the surface X-lower, force per reference area */
@@ -486,16 +486,17 @@ MMSMITH_FN void bar_X_lower_traction(const bar_solution *s, const double X[1], d
     const double t13 = s->fixed[2] * t;
     const double t14 = mmsmith_cos_pi(t13);
     const double t38 = s->fixed[6] * t14;
-    const double t138 = t38 + 1.0;
-    const double t139 = mmsmith_log_1p(t38);
-    const double t140 = t38 + 2.0;
-    const double t141 = s->fixed[8] * t139;
-    const double t142 = t38 * t140;
-    const double t143 = s->fixed[7] * t142;
-    const double t144 = t141 + t143;
-    const double t145 = t144 / t138;
-    const double t146 = -t145;
-    traction[0] = t146;
+    const double t139 = t38 + 1.0;
+    const double t140 = 1.0 / t139;
+    const double t141 = t140 + 1.0;
+    const double t142 = mmsmith_log_1p(t38);
+    const double t143 = t38 * t141;
+    const double t144 = s->fixed[7] * t143;
+    const double t145 = t142 * t140;
+    const double t146 = s->fixed[8] * t145;
+    const double t147 = t144 + t146;
+    const double t148 = -t147;
+    traction[0] = t148;
 }
 
 /* traction on the surface X-upper, force per reference area */
@@ -506,15 +507,16 @@ MMSMITH_FN void bar_X_upper_traction(const bar_solution *s, const double X[1], d
     const double t13 = s->fixed[2] * t;
     const double t14 = mmsmith_cos_pi(t13);
     const double t38 = s->fixed[6] * t14;
-    const double t138 = t38 + 1.0;
-    const double t139 = mmsmith_log_1p(t38);
-    const double t140 = t38 + 2.0;
-    const double t141 = s->fixed[8] * t139;
-    const double t142 = t38 * t140;
-    const double t143 = s->fixed[7] * t142;
-    const double t144 = t141 + t143;
-    const double t145 = t144 / t138;
-    traction[0] = t145;
+    const double t139 = t38 + 1.0;
+    const double t140 = 1.0 / t139;
+    const double t141 = t140 + 1.0;
+    const double t142 = mmsmith_log_1p(t38);
+    const double t143 = t38 * t141;
+    const double t144 = s->fixed[7] * t143;
+    const double t145 = t142 * t140;
+    const double t146 = s->fixed[8] * t145;
+    const double t147 = t144 + t146;
+    traction[0] = t147;
 }
 
 /* all fields */
@@ -537,34 +539,35 @@ MMSMITH_FN void bar_fields(const bar_solution *s, const double X[1], double t, b
     const double t38 = s->fixed[6] * t14;
     const double t39 = t38 * t34;
     const double t41 = t39 + 1.0;
-    const double t46 = mmsmith_log_1p(t39);
-    const double t50 = t39 + 2.0;
-    const double t54 = s->fixed[8] * t46;
-    const double t55 = t39 * t50;
-    const double t56 = s->fixed[7] * t55;
-    const double t57 = t54 + t56;
-    const double t58 = 1.0 / t41;
-    const double t59 = t57 * t58;
+    const double t47 = 1.0 / t41;
+    const double t48 = t47 + 1.0;
+    const double t51 = mmsmith_log_1p(t39);
+    const double t52 = t39 * t48;
+    const double t53 = s->fixed[7] * t52;
+    const double t57 = t51 * t47;
+    const double t58 = s->fixed[8] * t57;
+    const double t59 = t53 + t58;
     const double t68 = s->fixed[9] * t14;
     const double t69 = t68 * t6;
     const double t73 = s->fixed[10] * t14;
     const double t74 = t73 * t6;
     const double t75 = -t74;
-    const double t76 = s->fixed[7] * t39;
-    const double t77 = t54 + t76;
-    const double t78 = s->fixed[8] * t58;
-    const double t79 = s->fixed[7] + t78;
-    const double t80 = t39 + t46;
-    const double t81 = s->fixed[8] * t80;
-    const double t82 = t77 * t58;
-    const double t83 = t79 - t82;
-    const double t84 = s->fixed[7] + t83;
-    const double t85 = t39 * t84;
-    const double t86 = t81 + t85;
-    const double t88 = t75 * t86;
-    const double t89 = t88 * t58;
-    const double t90 = s->fixed[11] * t89;
-    const double t91 = t90 - t69;
+    const double t76 = s->fixed[8] * t51;
+    const double t77 = s->fixed[7] * t39;
+    const double t78 = t76 + t77;
+    const double t79 = s->fixed[8] * t47;
+    const double t80 = s->fixed[7] + t79;
+    const double t81 = t39 + t51;
+    const double t82 = s->fixed[8] * t81;
+    const double t83 = t78 * t47;
+    const double t84 = t80 - t83;
+    const double t85 = s->fixed[7] + t84;
+    const double t86 = t39 * t85;
+    const double t87 = t82 + t86;
+    const double t89 = t75 * t87;
+    const double t90 = t89 * t47;
+    const double t91 = s->fixed[11] * t90;
+    const double t92 = t91 - t69;
     out->u[0] = t16;
     out->v[0] = t24;
     out->a[0] = t33;
@@ -572,7 +575,7 @@ MMSMITH_FN void bar_fields(const bar_solution *s, const double X[1], double t, b
     out->F[0] = t41;
     out->J = t41;
     out->P[0] = t59;
-    out->b[0] = t91;
+    out->b[0] = t92;
 }
 
 /* What the body force needs of the time alone. */
@@ -605,27 +608,27 @@ MMSMITH_FN void bar_b_staged(const bar_solution *s, const bar_time_values *time,
 {
     const double t39 = time->values[1] * point[stride];
     const double t41 = t39 + 1.0;
-    const double t46 = mmsmith_log_1p(t39);
-    const double t58 = 1.0 / t41;
-    const double t92 = s->fixed[9] * point[0];
-    const double t99 = point[stride] * point[stride];
-    const double t105 = point[0] * t99;
-    const double t106 = s->fixed[12] * t105;
-    const double t107 = -t106;
-    const double t115 = point[0] * point[stride];
-    const double t116 = s->fixed[13] * t115;
-    const double t117 = time->values[0] * t107;
-    const double t118 = t117 - t116;
-    const double t125 = s->fixed[14] * point[0];
-    const double t126 = -t125;
-    const double t127 = time->values[0] * t118;
-    const double t128 = t126 * t46;
-    const double t129 = t127 + t128;
-    const double t130 = t58 * t58;
-    const double t131 = t129 * t130;
-    const double t132 = t131 - t92;
-    const double t133 = time->values[0] * t132;
-    b[0] = t133;
+    const double t47 = 1.0 / t41;
+    const double t51 = mmsmith_log_1p(t39);
+    const double t93 = s->fixed[9] * point[0];
+    const double t100 = point[stride] * point[stride];
+    const double t106 = point[0] * t100;
+    const double t107 = s->fixed[12] * t106;
+    const double t108 = -t107;
+    const double t116 = point[0] * point[stride];
+    const double t117 = s->fixed[13] * t116;
+    const double t118 = time->values[0] * t108;
+    const double t119 = t118 - t117;
+    const double t126 = s->fixed[14] * point[0];
+    const double t127 = -t126;
+    const double t128 = time->values[0] * t119;
+    const double t129 = t127 * t51;
+    const double t130 = t128 + t129;
+    const double t131 = t47 * t47;
+    const double t132 = t130 * t131;
+    const double t133 = t132 - t93;
+    const double t134 = time->values[0] * t133;
+    b[0] = t134;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -658,27 +661,27 @@ MMSMITH_FN void bar_b_array(const bar_solution *s, double t, size_t n,
     for (p = first; p < end; ++p) {
         const double t39 = time.values[1] * point1[p];
         const double t41 = t39 + 1.0;
-        const double t46 = mmsmith_log_1p(t39);
-        const double t58 = 1.0 / t41;
-        const double t92 = s->fixed[9] * point0[p];
-        const double t99 = point1[p] * point1[p];
-        const double t105 = point0[p] * t99;
-        const double t106 = s->fixed[12] * t105;
-        const double t107 = -t106;
-        const double t115 = point0[p] * point1[p];
-        const double t116 = s->fixed[13] * t115;
-        const double t117 = time.values[0] * t107;
-        const double t118 = t117 - t116;
-        const double t125 = s->fixed[14] * point0[p];
-        const double t126 = -t125;
-        const double t127 = time.values[0] * t118;
-        const double t128 = t126 * t46;
-        const double t129 = t127 + t128;
-        const double t130 = t58 * t58;
-        const double t131 = t129 * t130;
-        const double t132 = t131 - t92;
-        const double t133 = time.values[0] * t132;
-        b[p * 1 + 0] = t133;
+        const double t47 = 1.0 / t41;
+        const double t51 = mmsmith_log_1p(t39);
+        const double t93 = s->fixed[9] * point0[p];
+        const double t100 = point1[p] * point1[p];
+        const double t106 = point0[p] * t100;
+        const double t107 = s->fixed[12] * t106;
+        const double t108 = -t107;
+        const double t116 = point0[p] * point1[p];
+        const double t117 = s->fixed[13] * t116;
+        const double t118 = time.values[0] * t108;
+        const double t119 = t118 - t117;
+        const double t126 = s->fixed[14] * point0[p];
+        const double t127 = -t126;
+        const double t128 = time.values[0] * t119;
+        const double t129 = t127 * t51;
+        const double t130 = t128 + t129;
+        const double t131 = t47 * t47;
+        const double t132 = t130 * t131;
+        const double t133 = t132 - t93;
+        const double t134 = time.values[0] * t133;
+        b[p * 1 + 0] = t134;
     }
 }
 

@@ -122,41 +122,41 @@ impl<T: crate::Real> AxisAligned<T> {
         let t27 = t26 * parameters.E;
         let t28 = t27 / parameters.rho0;
         let t47 = parameters.nu + T::one();
-        let t49 = T::nearest(2.0) * parameters.nu;
-        let t50 = T::one() - t49;
-        let t58 = T::nearest(0.5) * parameters.E;
-        let t59 = t58 / t47;
-        let t61 = parameters.E * parameters.nu;
-        let t62 = t47 * t50;
-        let t63 = t61 / t62;
-        let t65 = t18 * t59;
-        let t79 = parameters.nu * parameters.nu;
-        let t80 = T::nearest(2.0) * parameters.A;
-        let t81 = t80 * t25;
-        let t82 = t81 * parameters.E;
-        let t83 = t82 * t79;
-        let t84 = parameters.rho0 * t47;
-        let t85 = t84 * t50;
-        let t86 = t83 / t85;
-        let t113 = t26 / parameters.rho0;
-        let t139 = t63 + t59;
-        let t140 = parameters.A * parameters.A;
-        let t141 = t140 * parameters.A;
-        let t142 = t25 * t25;
-        let t144 = t141 * t142;
-        let t145 = t144 * t139;
-        let t146 = t145 / parameters.rho0;
-        let t150 = t25 * T::pi();
-        let t151 = T::nearest(2.0) * t140;
-        let t152 = t151 * t150;
-        let t153 = t152 * t139;
-        let t154 = t153 / parameters.rho0;
-        let t159 = t27 * parameters.nu;
-        let t160 = t159 / t85;
-        let t188 = T::nearest(2.0) / t7;
+        let t49 = T::nearest(0.5) * parameters.E;
+        let t50 = t49 / t47;
+        let t54 = T::nearest(2.0) * parameters.nu;
+        let t55 = T::one() - t54;
+        let t62 = t18 * t50;
+        let t66 = parameters.E * parameters.nu;
+        let t67 = t47 * t55;
+        let t68 = t66 / t67;
+        let t80 = parameters.nu * parameters.nu;
+        let t81 = T::nearest(2.0) * parameters.A;
+        let t82 = t81 * t25;
+        let t83 = t82 * parameters.E;
+        let t84 = t83 * t80;
+        let t85 = parameters.rho0 * t47;
+        let t86 = t85 * t55;
+        let t87 = t84 / t86;
+        let t114 = t26 / parameters.rho0;
+        let t140 = t68 + t50;
+        let t141 = parameters.A * parameters.A;
+        let t142 = t141 * parameters.A;
+        let t143 = t25 * t25;
+        let t145 = t142 * t143;
+        let t146 = t145 * t140;
+        let t147 = t146 / parameters.rho0;
+        let t151 = t25 * T::pi();
+        let t152 = T::nearest(2.0) * t141;
+        let t153 = t152 * t151;
+        let t154 = t153 * t140;
+        let t155 = t154 / parameters.rho0;
+        let t160 = t27 * parameters.nu;
+        let t161 = t160 / t86;
+        let t189 = T::nearest(2.0) / t7;
         Ok(AxisAligned {
             parameters,
-            fixed: [t7, t18, t19, t28, t59, t63, t65, t86, t113, t146, t154, t160, t188],
+            fixed: [t7, t18, t19, t28, t50, t62, t68, t87, t114, t147, t155, t161, t189],
         })
     }
     /// The solution with parameter values in the order of the description; missing ones take their
@@ -313,28 +313,29 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t43 = t37 + T::one();
         let t44 = t41 + T::one();
         let t45 = t43 * t44;
-        let t51 = t35 * t44;
-        let t52 = t9 * t51;
-        let t53 = t14 * t39;
-        let t54 = t52 + t53;
-        let t55 = self.fixed[1] * t54;
-        let t56 = t55.ln_of_both(t45);
-        let t60 = t37 + T::nearest(2.0);
-        let t64 = self.fixed[5] * t56;
-        let t66 = self.fixed[6] * t9;
-        let t67 = t66 * t35;
-        let t68 = t67 * t60;
-        let t69 = t64 + t68;
-        let t70 = T::one() / t43;
-        let t71 = t69 * t70;
-        let t72 = t41 + T::nearest(2.0);
-        let t73 = self.fixed[6] * t14;
-        let t74 = t73 * t39;
-        let t75 = t74 * t72;
-        let t76 = t64 + t75;
-        let t77 = T::one() / t44;
-        let t78 = t76 * t77;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t71, T::zero(), T::zero(), t78)
+        let t51 = T::one() / t43;
+        let t52 = t51 + T::one();
+        let t56 = t35 * t44;
+        let t57 = t9 * t56;
+        let t58 = t14 * t39;
+        let t59 = t57 + t58;
+        let t60 = self.fixed[1] * t59;
+        let t61 = t60.ln_of_both(t45);
+        let t63 = self.fixed[5] * t9;
+        let t64 = t63 * t35;
+        let t65 = t64 * t52;
+        let t69 = t61 * t51;
+        let t70 = self.fixed[6] * t69;
+        let t71 = t65 + t70;
+        let t72 = T::one() / t44;
+        let t73 = t72 + T::one();
+        let t74 = self.fixed[5] * t14;
+        let t75 = t74 * t39;
+        let t76 = t75 * t73;
+        let t77 = t61 * t72;
+        let t78 = self.fixed[6] * t77;
+        let t79 = t76 + t78;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t71, T::zero(), T::zero(), t79)
     }
     #[inline]
     fn body_force(
@@ -349,58 +350,58 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t14 = t8.sin_pi();
         let t35 = X[0].cos_pi();
         let t39 = X[1].cos_pi();
-        let t53 = t14 * t39;
-        let t87 = self.fixed[7] * t9;
-        let t88 = t87 * t2;
-        let t89 = t9 * t35;
-        let t90 = self.fixed[1] * t89;
-        let t91 = t90 + T::one();
-        let t92 = t39 * t91;
-        let t93 = t14 * t92;
-        let t94 = t93 + t89;
-        let t95 = self.fixed[1] * t94;
-        let t96 = self.fixed[1] * t53;
-        let t97 = t96 + T::one();
-        let t98 = t91 * t97;
-        let t99 = t95.ln_of_both(t98);
-        let t100 = self.fixed[5] * t99;
-        let t101 = self.fixed[4] * t90;
-        let t102 = t100 + t101;
-        let t103 = T::one() / t91;
-        let t104 = self.fixed[5] * t103;
-        let t105 = self.fixed[4] + t104;
-        let t106 = t90 + t99;
-        let t107 = self.fixed[5] * t106;
-        let t108 = t102 * t103;
-        let t109 = t105 - t108;
-        let t110 = self.fixed[4] + t109;
-        let t111 = t90 * t110;
-        let t112 = t107 + t111;
-        let t114 = self.fixed[8] * t9;
-        let t115 = t114 * t2;
-        let t116 = t112 * t103;
-        let t117 = t115 * t116;
-        let t118 = t88 - t117;
-        let t119 = self.fixed[7] * t14;
-        let t120 = t119 * t13;
-        let t121 = self.fixed[4] * t96;
-        let t122 = t100 + t121;
-        let t123 = T::one() / t97;
-        let t124 = self.fixed[5] * t123;
-        let t125 = self.fixed[4] + t124;
-        let t126 = t99 + t96;
-        let t127 = self.fixed[5] * t126;
-        let t128 = t122 * t123;
-        let t129 = t125 - t128;
-        let t130 = self.fixed[4] + t129;
-        let t131 = t96 * t130;
-        let t132 = t127 + t131;
-        let t133 = self.fixed[8] * t14;
-        let t134 = t133 * t13;
-        let t135 = t132 * t123;
-        let t136 = t134 * t135;
-        let t137 = t120 - t136;
-        crate::nalgebra::SVector::<T, 2>::new(t118, t137)
+        let t58 = t14 * t39;
+        let t88 = self.fixed[7] * t9;
+        let t89 = t88 * t2;
+        let t90 = t9 * t35;
+        let t91 = self.fixed[1] * t90;
+        let t92 = t91 + T::one();
+        let t93 = t39 * t92;
+        let t94 = t14 * t93;
+        let t95 = t94 + t90;
+        let t96 = self.fixed[1] * t95;
+        let t97 = self.fixed[1] * t58;
+        let t98 = t97 + T::one();
+        let t99 = t92 * t98;
+        let t100 = t96.ln_of_both(t99);
+        let t101 = self.fixed[6] * t100;
+        let t102 = self.fixed[4] * t91;
+        let t103 = t101 + t102;
+        let t104 = T::one() / t92;
+        let t105 = self.fixed[6] * t104;
+        let t106 = self.fixed[4] + t105;
+        let t107 = t91 + t100;
+        let t108 = self.fixed[6] * t107;
+        let t109 = t103 * t104;
+        let t110 = t106 - t109;
+        let t111 = self.fixed[4] + t110;
+        let t112 = t91 * t111;
+        let t113 = t108 + t112;
+        let t115 = self.fixed[8] * t9;
+        let t116 = t115 * t2;
+        let t117 = t113 * t104;
+        let t118 = t116 * t117;
+        let t119 = t89 - t118;
+        let t120 = self.fixed[7] * t14;
+        let t121 = t120 * t13;
+        let t122 = self.fixed[4] * t97;
+        let t123 = t101 + t122;
+        let t124 = T::one() / t98;
+        let t125 = self.fixed[6] * t124;
+        let t126 = self.fixed[4] + t125;
+        let t127 = t100 + t97;
+        let t128 = self.fixed[6] * t127;
+        let t129 = t123 * t124;
+        let t130 = t126 - t129;
+        let t131 = self.fixed[4] + t130;
+        let t132 = t97 * t131;
+        let t133 = t128 + t132;
+        let t134 = self.fixed[8] * t14;
+        let t135 = t134 * t13;
+        let t136 = t133 * t124;
+        let t137 = t135 * t136;
+        let t138 = t121 - t137;
+        crate::nalgebra::SVector::<T, 2>::new(t119, t138)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t2 = X[0].sin_pi();
@@ -432,77 +433,78 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t43 = t37 + T::one();
         let t44 = t41 + T::one();
         let t45 = t43 * t44;
-        let t51 = t35 * t44;
-        let t52 = t9 * t51;
-        let t53 = t14 * t39;
-        let t54 = t52 + t53;
-        let t55 = self.fixed[1] * t54;
-        let t56 = t55.ln_of_both(t45);
-        let t60 = t37 + T::nearest(2.0);
-        let t64 = self.fixed[5] * t56;
-        let t66 = self.fixed[6] * t9;
-        let t67 = t66 * t35;
-        let t68 = t67 * t60;
-        let t69 = t64 + t68;
-        let t70 = T::one() / t43;
-        let t71 = t69 * t70;
-        let t72 = t41 + T::nearest(2.0);
-        let t73 = self.fixed[6] * t14;
-        let t74 = t73 * t39;
-        let t75 = t74 * t72;
-        let t76 = t64 + t75;
-        let t77 = T::one() / t44;
-        let t78 = t76 * t77;
-        let t87 = self.fixed[7] * t9;
-        let t88 = t87 * t2;
-        let t89 = t9 * t35;
-        let t90 = self.fixed[1] * t89;
-        let t91 = t90 + T::one();
-        let t92 = t39 * t91;
-        let t93 = t14 * t92;
-        let t94 = t93 + t89;
-        let t95 = self.fixed[1] * t94;
-        let t96 = self.fixed[1] * t53;
-        let t97 = t96 + T::one();
-        let t98 = t91 * t97;
-        let t99 = t95.ln_of_both(t98);
-        let t100 = self.fixed[5] * t99;
-        let t101 = self.fixed[4] * t90;
-        let t102 = t100 + t101;
-        let t103 = T::one() / t91;
-        let t104 = self.fixed[5] * t103;
-        let t105 = self.fixed[4] + t104;
-        let t106 = t90 + t99;
-        let t107 = self.fixed[5] * t106;
-        let t108 = t102 * t103;
-        let t109 = t105 - t108;
-        let t110 = self.fixed[4] + t109;
-        let t111 = t90 * t110;
-        let t112 = t107 + t111;
-        let t114 = self.fixed[8] * t9;
-        let t115 = t114 * t2;
-        let t116 = t112 * t103;
-        let t117 = t115 * t116;
-        let t118 = t88 - t117;
-        let t119 = self.fixed[7] * t14;
-        let t120 = t119 * t13;
-        let t121 = self.fixed[4] * t96;
-        let t122 = t100 + t121;
-        let t123 = T::one() / t97;
-        let t124 = self.fixed[5] * t123;
-        let t125 = self.fixed[4] + t124;
-        let t126 = t99 + t96;
-        let t127 = self.fixed[5] * t126;
-        let t128 = t122 * t123;
-        let t129 = t125 - t128;
-        let t130 = self.fixed[4] + t129;
-        let t131 = t96 * t130;
-        let t132 = t127 + t131;
-        let t133 = self.fixed[8] * t14;
-        let t134 = t133 * t13;
-        let t135 = t132 * t123;
-        let t136 = t134 * t135;
-        let t137 = t120 - t136;
+        let t51 = T::one() / t43;
+        let t52 = t51 + T::one();
+        let t56 = t35 * t44;
+        let t57 = t9 * t56;
+        let t58 = t14 * t39;
+        let t59 = t57 + t58;
+        let t60 = self.fixed[1] * t59;
+        let t61 = t60.ln_of_both(t45);
+        let t63 = self.fixed[5] * t9;
+        let t64 = t63 * t35;
+        let t65 = t64 * t52;
+        let t69 = t61 * t51;
+        let t70 = self.fixed[6] * t69;
+        let t71 = t65 + t70;
+        let t72 = T::one() / t44;
+        let t73 = t72 + T::one();
+        let t74 = self.fixed[5] * t14;
+        let t75 = t74 * t39;
+        let t76 = t75 * t73;
+        let t77 = t61 * t72;
+        let t78 = self.fixed[6] * t77;
+        let t79 = t76 + t78;
+        let t88 = self.fixed[7] * t9;
+        let t89 = t88 * t2;
+        let t90 = t9 * t35;
+        let t91 = self.fixed[1] * t90;
+        let t92 = t91 + T::one();
+        let t93 = t39 * t92;
+        let t94 = t14 * t93;
+        let t95 = t94 + t90;
+        let t96 = self.fixed[1] * t95;
+        let t97 = self.fixed[1] * t58;
+        let t98 = t97 + T::one();
+        let t99 = t92 * t98;
+        let t100 = t96.ln_of_both(t99);
+        let t101 = self.fixed[6] * t100;
+        let t102 = self.fixed[4] * t91;
+        let t103 = t101 + t102;
+        let t104 = T::one() / t92;
+        let t105 = self.fixed[6] * t104;
+        let t106 = self.fixed[4] + t105;
+        let t107 = t91 + t100;
+        let t108 = self.fixed[6] * t107;
+        let t109 = t103 * t104;
+        let t110 = t106 - t109;
+        let t111 = self.fixed[4] + t110;
+        let t112 = t91 * t111;
+        let t113 = t108 + t112;
+        let t115 = self.fixed[8] * t9;
+        let t116 = t115 * t2;
+        let t117 = t113 * t104;
+        let t118 = t116 * t117;
+        let t119 = t89 - t118;
+        let t120 = self.fixed[7] * t14;
+        let t121 = t120 * t13;
+        let t122 = self.fixed[4] * t97;
+        let t123 = t101 + t122;
+        let t124 = T::one() / t98;
+        let t125 = self.fixed[6] * t124;
+        let t126 = self.fixed[4] + t125;
+        let t127 = t100 + t97;
+        let t128 = self.fixed[6] * t127;
+        let t129 = t123 * t124;
+        let t130 = t126 - t129;
+        let t131 = self.fixed[4] + t130;
+        let t132 = t97 * t131;
+        let t133 = t128 + t132;
+        let t134 = self.fixed[8] * t14;
+        let t135 = t134 * t13;
+        let t136 = t133 * t124;
+        let t137 = t135 * t136;
+        let t138 = t121 - t137;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t11, t16),
             v: crate::nalgebra::SVector::<T, 2>::new(t22, t24),
@@ -510,8 +512,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
             H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t37, T::zero(), T::zero(), t41),
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t43, T::zero(), T::zero(), t44),
             J: t45,
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t71, T::zero(), T::zero(), t78),
-            b: crate::nalgebra::SVector::<T, 2>::new(t118, t137),
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t71, T::zero(), T::zero(), t79),
+            b: crate::nalgebra::SVector::<T, 2>::new(t119, t138),
         }
     }
     fn traction(
@@ -530,22 +532,22 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t40 = self.fixed[1] * t14;
                 let t41 = t40 * t39;
                 let t44 = t41 + T::one();
-                let t53 = t14 * t39;
-                let t189 = t36 + T::one();
-                let t190 = t9 * t44;
-                let t191 = t190 + t53;
-                let t192 = self.fixed[1] * t191;
-                let t193 = t189 * t44;
-                let t194 = t192.ln_of_both(t193);
-                let t195 = t36 + T::nearest(2.0);
-                let t196 = self.fixed[5] * t194;
-                let t197 = t9 * t195;
-                let t198 = self.fixed[6] * t197;
-                let t199 = t198 + t196;
-                let t200 = T::one() / t189;
-                let t201 = t200 * t199;
-                let t202 = -t201;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t202, T::zero()))
+                let t58 = t14 * t39;
+                let t190 = t36 + T::one();
+                let t191 = T::one() / t190;
+                let t192 = t191 + T::one();
+                let t193 = t9 * t44;
+                let t194 = t193 + t58;
+                let t195 = self.fixed[1] * t194;
+                let t196 = t190 * t44;
+                let t197 = t195.ln_of_both(t196);
+                let t198 = t9 * t192;
+                let t199 = self.fixed[5] * t198;
+                let t200 = self.fixed[6] * t191;
+                let t201 = t200 * t197;
+                let t202 = t199 + t201;
+                let t203 = -t202;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t203, T::zero()))
             }
             crate::Surface::Upper(0) => {
                 let t8 = self.fixed[0] * t;
@@ -556,22 +558,23 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t40 = self.fixed[1] * t14;
                 let t41 = t40 * t39;
                 let t44 = t41 + T::one();
-                let t53 = t14 * t39;
-                let t190 = t9 * t44;
-                let t203 = T::one() - t36;
-                let t204 = t190 - t53;
-                let t205 = self.fixed[1] * t204;
-                let t206 = -t205;
-                let t207 = t203 * t44;
-                let t208 = t206.ln_of_both(t207);
-                let t209 = T::nearest(2.0) - t36;
-                let t210 = self.fixed[5] * t208;
-                let t211 = t9 * t209;
-                let t212 = self.fixed[6] * t211;
-                let t213 = t210 - t212;
-                let t214 = T::one() / t203;
-                let t215 = t214 * t213;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t215, T::zero()))
+                let t58 = t14 * t39;
+                let t193 = t9 * t44;
+                let t204 = T::one() - t36;
+                let t205 = T::one() / t204;
+                let t206 = t205 + T::one();
+                let t207 = t193 - t58;
+                let t208 = self.fixed[1] * t207;
+                let t209 = -t208;
+                let t210 = t204 * t44;
+                let t211 = t209.ln_of_both(t210);
+                let t212 = t9 * t206;
+                let t213 = self.fixed[5] * t212;
+                let t214 = self.fixed[6] * t205;
+                let t215 = t214 * t211;
+                let t216 = t213 - t215;
+                let t217 = -t216;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t217, T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t8 = self.fixed[0] * t;
@@ -582,22 +585,22 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t37 = t36 * t35;
                 let t40 = self.fixed[1] * t14;
                 let t43 = t37 + T::one();
-                let t89 = t9 * t35;
-                let t216 = t40 + T::one();
-                let t217 = t14 * t43;
-                let t218 = t217 + t89;
-                let t219 = self.fixed[1] * t218;
-                let t220 = t216 * t43;
-                let t221 = t219.ln_of_both(t220);
-                let t222 = t40 + T::nearest(2.0);
-                let t223 = self.fixed[5] * t221;
-                let t224 = t14 * t222;
-                let t225 = self.fixed[6] * t224;
-                let t226 = t225 + t223;
-                let t227 = T::one() / t216;
-                let t228 = t227 * t226;
-                let t229 = -t228;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t229))
+                let t90 = t9 * t35;
+                let t218 = t40 + T::one();
+                let t219 = T::one() / t218;
+                let t220 = t219 + T::one();
+                let t221 = t14 * t43;
+                let t222 = t221 + t90;
+                let t223 = self.fixed[1] * t222;
+                let t224 = t218 * t43;
+                let t225 = t223.ln_of_both(t224);
+                let t226 = t14 * t220;
+                let t227 = self.fixed[5] * t226;
+                let t228 = self.fixed[6] * t219;
+                let t229 = t228 * t225;
+                let t230 = t227 + t229;
+                let t231 = -t230;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t231))
             }
             crate::Surface::Upper(1) => {
                 let t8 = self.fixed[0] * t;
@@ -608,22 +611,23 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t37 = t36 * t35;
                 let t40 = self.fixed[1] * t14;
                 let t43 = t37 + T::one();
-                let t89 = t9 * t35;
-                let t217 = t14 * t43;
-                let t230 = T::one() - t40;
-                let t231 = t217 - t89;
-                let t232 = self.fixed[1] * t231;
-                let t233 = -t232;
-                let t234 = t230 * t43;
-                let t235 = t233.ln_of_both(t234);
-                let t236 = T::nearest(2.0) - t40;
-                let t237 = self.fixed[5] * t235;
-                let t238 = t14 * t236;
-                let t239 = self.fixed[6] * t238;
-                let t240 = t237 - t239;
-                let t241 = T::one() / t230;
-                let t242 = t241 * t240;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t242))
+                let t90 = t9 * t35;
+                let t221 = t14 * t43;
+                let t232 = T::one() - t40;
+                let t233 = T::one() / t232;
+                let t234 = t233 + T::one();
+                let t235 = t221 - t90;
+                let t236 = self.fixed[1] * t235;
+                let t237 = -t236;
+                let t238 = t232 * t43;
+                let t239 = t237.ln_of_both(t238);
+                let t240 = t14 * t234;
+                let t241 = self.fixed[5] * t240;
+                let t242 = self.fixed[6] * t233;
+                let t243 = t242 * t239;
+                let t244 = t241 - t243;
+                let t245 = -t244;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t245))
             }
             _ => None,
         }
@@ -659,7 +663,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
     }
     fn material(&self) -> crate::Material<T> {
         crate::Material::NeoHookean {
-            lambda: self.fixed[5],
+            lambda: self.fixed[6],
             mu: self.fixed[4],
         }
     }
@@ -709,51 +713,51 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 4, 4> for AxisAligned<T> {
         let t43 = t37 + T::one();
         let t44 = t41 + T::one();
         let t45 = t43 * t44;
-        let t51 = point[2] * t44;
-        let t52 = time[0] * t51;
-        let t53 = time[1] * point[3];
-        let t54 = t52 + t53;
-        let t55 = self.fixed[1] * t54;
-        let t56 = t55.ln_of_both(t45);
-        let t70 = T::one() / t43;
-        let t77 = T::one() / t44;
-        let t138 = self.fixed[7] * point[0];
-        let t143 = point[2] * point[2];
-        let t147 = point[0] * t143;
-        let t148 = self.fixed[9] * t147;
-        let t149 = -t148;
-        let t155 = point[0] * point[2];
-        let t156 = self.fixed[10] * t155;
-        let t157 = time[0] * t149;
-        let t158 = t157 - t156;
-        let t161 = self.fixed[11] * point[0];
-        let t162 = -t161;
-        let t163 = time[0] * t158;
-        let t164 = t162 * t56;
-        let t165 = t163 + t164;
-        let t166 = t70 * t70;
-        let t167 = t165 * t166;
-        let t168 = t138 + t167;
-        let t169 = time[0] * t168;
-        let t170 = self.fixed[7] * point[1];
-        let t171 = point[3] * point[3];
-        let t172 = point[1] * t171;
-        let t173 = self.fixed[9] * t172;
-        let t174 = -t173;
-        let t175 = point[1] * point[3];
-        let t176 = self.fixed[10] * t175;
-        let t177 = time[1] * t174;
-        let t178 = t177 - t176;
-        let t179 = self.fixed[11] * point[1];
-        let t180 = -t179;
-        let t181 = time[1] * t178;
-        let t182 = t180 * t56;
-        let t183 = t181 + t182;
-        let t184 = t77 * t77;
-        let t185 = t183 * t184;
-        let t186 = t170 + t185;
-        let t187 = time[1] * t186;
-        crate::nalgebra::SVector::<T, 2>::new(t169, t187)
+        let t51 = T::one() / t43;
+        let t56 = point[2] * t44;
+        let t57 = time[0] * t56;
+        let t58 = time[1] * point[3];
+        let t59 = t57 + t58;
+        let t60 = self.fixed[1] * t59;
+        let t61 = t60.ln_of_both(t45);
+        let t72 = T::one() / t44;
+        let t139 = self.fixed[7] * point[0];
+        let t144 = point[2] * point[2];
+        let t148 = point[0] * t144;
+        let t149 = self.fixed[9] * t148;
+        let t150 = -t149;
+        let t156 = point[0] * point[2];
+        let t157 = self.fixed[10] * t156;
+        let t158 = time[0] * t150;
+        let t159 = t158 - t157;
+        let t162 = self.fixed[11] * point[0];
+        let t163 = -t162;
+        let t164 = time[0] * t159;
+        let t165 = t163 * t61;
+        let t166 = t164 + t165;
+        let t167 = t51 * t51;
+        let t168 = t166 * t167;
+        let t169 = t139 + t168;
+        let t170 = time[0] * t169;
+        let t171 = self.fixed[7] * point[1];
+        let t172 = point[3] * point[3];
+        let t173 = point[1] * t172;
+        let t174 = self.fixed[9] * t173;
+        let t175 = -t174;
+        let t176 = point[1] * point[3];
+        let t177 = self.fixed[10] * t176;
+        let t178 = time[1] * t175;
+        let t179 = t178 - t177;
+        let t180 = self.fixed[11] * point[1];
+        let t181 = -t180;
+        let t182 = time[1] * t179;
+        let t183 = t181 * t61;
+        let t184 = t182 + t183;
+        let t185 = t72 * t72;
+        let t186 = t184 * t185;
+        let t187 = t171 + t186;
+        let t188 = time[1] * t187;
+        crate::nalgebra::SVector::<T, 2>::new(t170, t188)
     }
 }
 impl<T: crate::Real> From<AxisAligned<T>> for crate::AnySolution<T> {

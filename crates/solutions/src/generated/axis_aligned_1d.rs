@@ -121,40 +121,40 @@ impl<T: crate::Real> AxisAligned1d<T> {
         let t21 = t20 * parameters.E;
         let t22 = t21 / parameters.rho0;
         let t32 = parameters.nu + T::one();
-        let t34 = T::nearest(2.0) * parameters.nu;
-        let t35 = T::one() - t34;
-        let t38 = T::nearest(0.5) * parameters.E;
-        let t39 = t38 / t32;
-        let t41 = parameters.E * parameters.nu;
-        let t42 = t32 * t35;
-        let t43 = t41 / t42;
-        let t45 = t14 * t39;
+        let t34 = T::nearest(0.5) * parameters.E;
+        let t35 = t34 / t32;
+        let t39 = T::nearest(2.0) * parameters.nu;
+        let t40 = T::one() - t39;
+        let t42 = t14 * t35;
+        let t46 = parameters.E * parameters.nu;
+        let t47 = t32 * t40;
+        let t48 = t46 / t47;
         let t52 = parameters.nu * parameters.nu;
         let t53 = T::nearest(2.0) * parameters.A;
         let t54 = t53 * t19;
         let t55 = t54 * parameters.E;
         let t56 = t55 * t52;
         let t57 = parameters.rho0 * t32;
-        let t58 = t57 * t35;
+        let t58 = t57 * t40;
         let t59 = t56 / t58;
-        let t67 = T::nearest(2.0) * t39;
-        let t68 = t43 + t67;
-        let t80 = t14 / parameters.rho0;
-        let t86 = t43 + t39;
-        let t87 = parameters.A * parameters.A;
-        let t88 = t87 * parameters.A;
-        let t89 = t19 * t19;
-        let t91 = t88 * t89;
-        let t92 = t91 * t86;
-        let t93 = t92 / parameters.rho0;
-        let t97 = t19 * T::pi();
-        let t98 = T::nearest(2.0) * t87;
-        let t99 = t98 * t97;
-        let t100 = t99 * t86;
-        let t101 = t100 / parameters.rho0;
-        let t106 = t21 * parameters.nu;
-        let t107 = t106 / t58;
-        let t117 = T::nearest(2.0) / t7;
+        let t68 = T::nearest(2.0) * t35;
+        let t69 = t48 + t68;
+        let t81 = t14 / parameters.rho0;
+        let t87 = t48 + t35;
+        let t88 = parameters.A * parameters.A;
+        let t89 = t88 * parameters.A;
+        let t90 = t19 * t19;
+        let t92 = t89 * t90;
+        let t93 = t92 * t87;
+        let t94 = t93 / parameters.rho0;
+        let t98 = t19 * T::pi();
+        let t99 = T::nearest(2.0) * t88;
+        let t100 = t99 * t98;
+        let t101 = t100 * t87;
+        let t102 = t101 / parameters.rho0;
+        let t107 = t21 * parameters.nu;
+        let t108 = t107 / t58;
+        let t118 = T::nearest(2.0) / t7;
         Ok(AxisAligned1d {
             parameters,
             fixed: [
@@ -163,16 +163,16 @@ impl<T: crate::Real> AxisAligned1d<T> {
                 t15,
                 t20,
                 t22,
-                t39,
-                t43,
-                t45,
+                t35,
+                t42,
+                t48,
                 t59,
-                t68,
-                t80,
-                t93,
-                t101,
-                t107,
-                t117,
+                t69,
+                t81,
+                t94,
+                t102,
+                t108,
+                t118,
             ],
         })
     }
@@ -296,15 +296,15 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         let t27 = self.fixed[1] * t9;
         let t28 = t27 * t26;
         let t30 = t28 + T::one();
-        let t36 = t28.log_1p();
-        let t40 = t28 + T::nearest(2.0);
-        let t44 = self.fixed[6] * t36;
-        let t46 = self.fixed[7] * t9;
-        let t47 = t46 * t26;
-        let t48 = t47 * t40;
-        let t49 = t44 + t48;
-        let t50 = T::one() / t30;
-        let t51 = t49 * t50;
+        let t36 = T::one() / t30;
+        let t37 = t36 + T::one();
+        let t41 = t28.log_1p();
+        let t43 = self.fixed[6] * t9;
+        let t44 = t43 * t26;
+        let t45 = t44 * t37;
+        let t49 = t41 * t36;
+        let t50 = self.fixed[7] * t49;
+        let t51 = t45 + t50;
         crate::nalgebra::SMatrix::<T, 1, 1>::new(t51)
     }
     #[inline]
@@ -320,34 +320,34 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         let t27 = self.fixed[1] * t9;
         let t28 = t27 * t26;
         let t30 = t28 + T::one();
-        let t36 = t28.log_1p();
-        let t44 = self.fixed[6] * t36;
-        let t46 = self.fixed[7] * t9;
-        let t47 = t46 * t26;
-        let t50 = T::one() / t30;
+        let t36 = T::one() / t30;
+        let t41 = t28.log_1p();
+        let t43 = self.fixed[6] * t9;
+        let t44 = t43 * t26;
         let t60 = self.fixed[8] * t9;
         let t61 = t60 * t2;
-        let t62 = t44 + t47;
-        let t63 = self.fixed[3] * t9;
-        let t64 = t63 * t2;
-        let t65 = -t64;
-        let t66 = self.fixed[6] * t50;
-        let t69 = self.fixed[9] + t66;
-        let t70 = self.fixed[1] * t26;
-        let t71 = t70 * t69;
-        let t72 = t9 * t71;
-        let t73 = t72 + t44;
-        let t74 = T::pi() * t73;
-        let t75 = t2 * t74;
-        let t76 = t62 * t65;
-        let t77 = t76 * t50;
-        let t78 = t26 * t77;
-        let t79 = t75 + t78;
-        let t81 = self.fixed[10] * t9;
-        let t82 = t79 * t50;
-        let t83 = t81 * t82;
-        let t84 = t61 - t83;
-        crate::nalgebra::SVector::<T, 1>::new(t84)
+        let t62 = self.fixed[7] * t41;
+        let t63 = t62 + t44;
+        let t64 = self.fixed[3] * t9;
+        let t65 = t64 * t2;
+        let t66 = -t65;
+        let t67 = self.fixed[7] * t36;
+        let t70 = self.fixed[9] + t67;
+        let t71 = self.fixed[1] * t26;
+        let t72 = t71 * t70;
+        let t73 = t9 * t72;
+        let t74 = t73 + t62;
+        let t75 = T::pi() * t74;
+        let t76 = t2 * t75;
+        let t77 = t63 * t66;
+        let t78 = t77 * t36;
+        let t79 = t26 * t78;
+        let t80 = t76 + t79;
+        let t82 = self.fixed[10] * t9;
+        let t83 = t80 * t36;
+        let t84 = t82 * t83;
+        let t85 = t61 - t84;
+        crate::nalgebra::SVector::<T, 1>::new(t85)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 1>, t: T) -> crate::Fields<T, 1> {
         let t2 = X[0].sin_pi();
@@ -366,37 +366,38 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         let t27 = self.fixed[1] * t9;
         let t28 = t27 * t26;
         let t30 = t28 + T::one();
-        let t36 = t28.log_1p();
-        let t40 = t28 + T::nearest(2.0);
-        let t44 = self.fixed[6] * t36;
-        let t46 = self.fixed[7] * t9;
-        let t47 = t46 * t26;
-        let t48 = t47 * t40;
-        let t49 = t44 + t48;
-        let t50 = T::one() / t30;
-        let t51 = t49 * t50;
+        let t36 = T::one() / t30;
+        let t37 = t36 + T::one();
+        let t41 = t28.log_1p();
+        let t43 = self.fixed[6] * t9;
+        let t44 = t43 * t26;
+        let t45 = t44 * t37;
+        let t49 = t41 * t36;
+        let t50 = self.fixed[7] * t49;
+        let t51 = t45 + t50;
         let t60 = self.fixed[8] * t9;
         let t61 = t60 * t2;
-        let t62 = t44 + t47;
-        let t63 = self.fixed[3] * t9;
-        let t64 = t63 * t2;
-        let t65 = -t64;
-        let t66 = self.fixed[6] * t50;
-        let t69 = self.fixed[9] + t66;
-        let t70 = self.fixed[1] * t26;
-        let t71 = t70 * t69;
-        let t72 = t9 * t71;
-        let t73 = t72 + t44;
-        let t74 = T::pi() * t73;
-        let t75 = t2 * t74;
-        let t76 = t62 * t65;
-        let t77 = t76 * t50;
-        let t78 = t26 * t77;
-        let t79 = t75 + t78;
-        let t81 = self.fixed[10] * t9;
-        let t82 = t79 * t50;
-        let t83 = t81 * t82;
-        let t84 = t61 - t83;
+        let t62 = self.fixed[7] * t41;
+        let t63 = t62 + t44;
+        let t64 = self.fixed[3] * t9;
+        let t65 = t64 * t2;
+        let t66 = -t65;
+        let t67 = self.fixed[7] * t36;
+        let t70 = self.fixed[9] + t67;
+        let t71 = self.fixed[1] * t26;
+        let t72 = t71 * t70;
+        let t73 = t9 * t72;
+        let t74 = t73 + t62;
+        let t75 = T::pi() * t74;
+        let t76 = t2 * t75;
+        let t77 = t63 * t66;
+        let t78 = t77 * t36;
+        let t79 = t26 * t78;
+        let t80 = t76 + t79;
+        let t82 = self.fixed[10] * t9;
+        let t83 = t80 * t36;
+        let t84 = t82 * t83;
+        let t85 = t61 - t84;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 1>::new(t11),
             v: crate::nalgebra::SVector::<T, 1>::new(t18),
@@ -405,7 +406,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
             F: crate::nalgebra::SMatrix::<T, 1, 1>::new(t30),
             J: t30,
             P: crate::nalgebra::SMatrix::<T, 1, 1>::new(t51),
-            b: crate::nalgebra::SVector::<T, 1>::new(t84),
+            b: crate::nalgebra::SVector::<T, 1>::new(t85),
         }
     }
     fn traction(
@@ -419,31 +420,34 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
                 let t8 = self.fixed[0] * t;
                 let t9 = t8.cos_pi();
                 let t27 = self.fixed[1] * t9;
-                let t119 = t27 + T::one();
-                let t120 = t27.log_1p();
-                let t121 = t27 + T::nearest(2.0);
-                let t122 = self.fixed[6] * t120;
-                let t123 = t9 * t121;
-                let t124 = self.fixed[7] * t123;
-                let t125 = t122 + t124;
-                let t126 = t125 / t119;
-                let t127 = -t126;
-                Some(crate::nalgebra::SVector::<T, 1>::new(t127))
+                let t120 = t27 + T::one();
+                let t121 = T::one() / t120;
+                let t122 = t121 + T::one();
+                let t123 = t27.log_1p();
+                let t124 = t9 * t122;
+                let t125 = self.fixed[6] * t124;
+                let t126 = t123 * t121;
+                let t127 = self.fixed[7] * t126;
+                let t128 = t125 + t127;
+                let t129 = -t128;
+                Some(crate::nalgebra::SVector::<T, 1>::new(t129))
             }
             crate::Surface::Upper(0) => {
                 let t8 = self.fixed[0] * t;
                 let t9 = t8.cos_pi();
                 let t27 = self.fixed[1] * t9;
-                let t128 = T::one() - t27;
-                let t129 = -t27;
-                let t130 = t129.log_1p();
-                let t131 = T::nearest(2.0) - t27;
-                let t132 = self.fixed[6] * t130;
-                let t133 = t9 * t131;
-                let t134 = self.fixed[7] * t133;
-                let t135 = t132 - t134;
-                let t136 = t135 / t128;
-                Some(crate::nalgebra::SVector::<T, 1>::new(t136))
+                let t130 = T::one() - t27;
+                let t131 = T::one() / t130;
+                let t132 = t131 + T::one();
+                let t133 = -t27;
+                let t134 = t133.log_1p();
+                let t135 = t9 * t132;
+                let t136 = self.fixed[6] * t135;
+                let t137 = t134 * t131;
+                let t138 = self.fixed[7] * t137;
+                let t139 = t136 - t138;
+                let t140 = -t139;
+                Some(crate::nalgebra::SVector::<T, 1>::new(t140))
             }
             _ => None,
         }
@@ -471,7 +475,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
     }
     fn material(&self) -> crate::Material<T> {
         crate::Material::NeoHookean {
-            lambda: self.fixed[6],
+            lambda: self.fixed[7],
             mu: self.fixed[5],
         }
     }
@@ -514,27 +518,27 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 2> for AxisAligned1d<T> {
     ) -> crate::nalgebra::SVector<T, 1> {
         let t28 = time[1] * point[1];
         let t30 = t28 + T::one();
-        let t36 = t28.log_1p();
-        let t50 = T::one() / t30;
-        let t85 = self.fixed[8] * point[0];
-        let t90 = point[1] * point[1];
-        let t94 = point[0] * t90;
-        let t95 = self.fixed[11] * t94;
-        let t96 = -t95;
-        let t102 = point[0] * point[1];
-        let t103 = self.fixed[12] * t102;
-        let t104 = time[0] * t96;
-        let t105 = t104 - t103;
-        let t108 = self.fixed[13] * point[0];
-        let t109 = -t108;
-        let t110 = time[0] * t105;
-        let t111 = t109 * t36;
-        let t112 = t110 + t111;
-        let t113 = t50 * t50;
-        let t114 = t112 * t113;
-        let t115 = t85 + t114;
-        let t116 = time[0] * t115;
-        crate::nalgebra::SVector::<T, 1>::new(t116)
+        let t36 = T::one() / t30;
+        let t41 = t28.log_1p();
+        let t86 = self.fixed[8] * point[0];
+        let t91 = point[1] * point[1];
+        let t95 = point[0] * t91;
+        let t96 = self.fixed[11] * t95;
+        let t97 = -t96;
+        let t103 = point[0] * point[1];
+        let t104 = self.fixed[12] * t103;
+        let t105 = time[0] * t97;
+        let t106 = t105 - t104;
+        let t109 = self.fixed[13] * point[0];
+        let t110 = -t109;
+        let t111 = time[0] * t106;
+        let t112 = t110 * t41;
+        let t113 = t111 + t112;
+        let t114 = t36 * t36;
+        let t115 = t113 * t114;
+        let t116 = t86 + t115;
+        let t117 = time[0] * t116;
+        crate::nalgebra::SVector::<T, 1>::new(t117)
     }
 }
 impl<T: crate::Real> From<AxisAligned1d<T>> for crate::AnySolution<T> {

@@ -130,52 +130,52 @@ impl<T: crate::Real> AxisAligned3d<T> {
         let t54 = t53 * parameters.E;
         let t55 = t54 / parameters.rho0;
         let t88 = parameters.nu + T::one();
-        let t89 = T::nearest(2.0) * parameters.nu;
-        let t90 = T::one() - t89;
-        let t100 = T::nearest(0.5) * parameters.E;
-        let t101 = t100 / t88;
-        let t103 = parameters.E * parameters.nu;
-        let t104 = t88 * t90;
-        let t105 = t103 / t104;
-        let t107 = t31 * t101;
-        let t126 = parameters.nu * parameters.nu;
-        let t127 = T::nearest(2.0) * parameters.A;
-        let t128 = t127 * t46;
-        let t129 = t128 * parameters.E;
-        let t130 = t129 * t126;
-        let t131 = parameters.rho0 * t88;
-        let t132 = t131 * t90;
-        let t133 = t130 / t132;
-        let t142 = t105 + t101;
-        let t143 = t31 * t142;
-        let t148 = t47 / parameters.rho0;
-        let t154 = t48 * t126;
-        let t155 = t154 / t132;
-        let t171 = T::one() / parameters.rho0;
-        let t196 = parameters.A * parameters.A;
-        let t197 = t196 * parameters.A;
-        let t198 = t46 * t46;
-        let t200 = t197 * t198;
-        let t201 = t200 * t142;
-        let t202 = t201 / parameters.rho0;
-        let t206 = t46 * T::pi();
-        let t207 = T::nearest(2.0) * t196;
-        let t208 = t207 * t206;
-        let t209 = t208 * t142;
-        let t210 = t209 / parameters.rho0;
-        let t215 = t48 * parameters.nu;
-        let t216 = t215 / t132;
-        let t229 = T::nearest(0.125) * t197;
-        let t230 = t229 * t198;
-        let t231 = t230 * t142;
-        let t232 = t231 / parameters.rho0;
-        let t235 = T::nearest(0.5) * t196;
-        let t236 = t235 * t206;
-        let t237 = t236 * t142;
-        let t238 = t237 / parameters.rho0;
-        let t243 = t54 * parameters.nu;
-        let t244 = t243 / t132;
-        let t269 = T::nearest(2.0) / t7;
+        let t89 = T::nearest(0.5) * parameters.E;
+        let t90 = t89 / t88;
+        let t93 = T::nearest(2.0) * parameters.nu;
+        let t94 = T::one() - t93;
+        let t104 = t31 * t90;
+        let t108 = parameters.E * parameters.nu;
+        let t109 = t88 * t94;
+        let t110 = t108 / t109;
+        let t128 = parameters.nu * parameters.nu;
+        let t129 = T::nearest(2.0) * parameters.A;
+        let t130 = t129 * t46;
+        let t131 = t130 * parameters.E;
+        let t132 = t131 * t128;
+        let t133 = parameters.rho0 * t88;
+        let t134 = t133 * t94;
+        let t135 = t132 / t134;
+        let t145 = t110 + t90;
+        let t146 = t31 * t145;
+        let t151 = t47 / parameters.rho0;
+        let t157 = t48 * t128;
+        let t158 = t157 / t134;
+        let t174 = T::one() / parameters.rho0;
+        let t199 = parameters.A * parameters.A;
+        let t200 = t199 * parameters.A;
+        let t201 = t46 * t46;
+        let t203 = t200 * t201;
+        let t204 = t203 * t145;
+        let t205 = t204 / parameters.rho0;
+        let t209 = t46 * T::pi();
+        let t210 = T::nearest(2.0) * t199;
+        let t211 = t210 * t209;
+        let t212 = t211 * t145;
+        let t213 = t212 / parameters.rho0;
+        let t218 = t48 * parameters.nu;
+        let t219 = t218 / t134;
+        let t232 = T::nearest(0.125) * t200;
+        let t233 = t232 * t201;
+        let t234 = t233 * t145;
+        let t235 = t234 / parameters.rho0;
+        let t238 = T::nearest(0.5) * t199;
+        let t239 = t238 * t209;
+        let t240 = t239 * t145;
+        let t241 = t240 / parameters.rho0;
+        let t246 = t54 * parameters.nu;
+        let t247 = t246 / t134;
+        let t272 = T::nearest(2.0) / t7;
         Ok(AxisAligned3d {
             parameters,
             fixed: [
@@ -189,21 +189,21 @@ impl<T: crate::Real> AxisAligned3d<T> {
                 t49,
                 t53,
                 t55,
-                t101,
-                t105,
-                t107,
-                t133,
-                t143,
-                t148,
-                t155,
-                t171,
-                t202,
-                t210,
-                t216,
-                t232,
-                t238,
-                t244,
-                t269,
+                t90,
+                t104,
+                t110,
+                t135,
+                t146,
+                t151,
+                t158,
+                t174,
+                t205,
+                t213,
+                t219,
+                t235,
+                t241,
+                t247,
+                t272,
             ],
         })
     }
@@ -446,35 +446,37 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t84 = t71 + T::one();
         let t85 = t73 * t83;
         let t86 = t85 * t84;
-        let t91 = t67 * t84;
-        let t92 = t91 - t70;
-        let t93 = t92 + T::one();
-        let t94 = t9 * t60;
-        let t95 = t94 * t93;
-        let t96 = self.fixed[3] * t95;
-        let t97 = t96 + t91;
-        let t98 = t97 - t70;
-        let t99 = t98.ln_of_both(t86);
-        let t102 = t62 + T::nearest(2.0);
-        let t106 = self.fixed[11] * t99;
-        let t108 = self.fixed[12] * t9;
-        let t109 = t108 * t60;
-        let t110 = t109 * t102;
-        let t111 = t106 + t110;
-        let t112 = T::one() / t73;
-        let t113 = t111 * t112;
-        let t114 = t67 + T::nearest(2.0);
-        let t115 = t67 * t114;
-        let t116 = self.fixed[10] * t115;
-        let t117 = t106 + t116;
-        let t118 = T::one() / t83;
-        let t119 = t117 * t118;
-        let t120 = t71 + T::nearest(2.0);
-        let t121 = t71 * t120;
-        let t122 = self.fixed[10] * t121;
-        let t123 = t106 + t122;
-        let t124 = T::one() / t84;
-        let t125 = t123 * t124;
+        let t91 = T::one() / t73;
+        let t92 = t91 + T::one();
+        let t95 = t67 * t84;
+        let t96 = t95 - t70;
+        let t97 = t96 + T::one();
+        let t98 = t9 * t60;
+        let t99 = t98 * t97;
+        let t100 = self.fixed[3] * t99;
+        let t101 = t100 + t95;
+        let t102 = t101 - t70;
+        let t103 = t102.ln_of_both(t86);
+        let t105 = self.fixed[11] * t9;
+        let t106 = t105 * t60;
+        let t107 = t106 * t92;
+        let t111 = t103 * t91;
+        let t112 = self.fixed[12] * t111;
+        let t113 = t107 + t112;
+        let t114 = T::one() / t83;
+        let t115 = t114 + T::one();
+        let t116 = t67 * t115;
+        let t117 = self.fixed[10] * t116;
+        let t118 = t103 * t114;
+        let t119 = self.fixed[12] * t118;
+        let t120 = t117 + t119;
+        let t121 = T::one() / t84;
+        let t122 = t121 + T::one();
+        let t123 = t71 * t122;
+        let t124 = self.fixed[10] * t123;
+        let t125 = t103 * t121;
+        let t126 = self.fixed[12] * t125;
+        let t127 = t124 + t126;
         crate::nalgebra::SMatrix::<
             T,
             3,
@@ -484,11 +486,11 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
             T::zero(),
             T::zero(),
             T::zero(),
-            t119,
+            t120,
             T::zero(),
             T::zero(),
             T::zero(),
-            t125,
+            t127,
         )
     }
     #[inline]
@@ -522,77 +524,77 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t84 = t71 + T::one();
         let t85 = t73 * t83;
         let t86 = t85 * t84;
-        let t91 = t67 * t84;
-        let t92 = t91 - t70;
-        let t93 = t92 + T::one();
-        let t94 = t9 * t60;
-        let t95 = t94 * t93;
-        let t96 = self.fixed[3] * t95;
-        let t97 = t96 + t91;
-        let t98 = t97 - t70;
-        let t99 = t98.ln_of_both(t86);
-        let t106 = self.fixed[11] * t99;
-        let t108 = self.fixed[12] * t9;
-        let t109 = t108 * t60;
-        let t112 = T::one() / t73;
-        let t118 = T::one() / t83;
-        let t124 = T::one() / t84;
-        let t134 = self.fixed[13] * t9;
-        let t135 = t134 * t2;
-        let t136 = t106 + t109;
-        let t137 = self.fixed[11] - t136;
-        let t138 = t112 * t137;
-        let t139 = self.fixed[10] + t138;
-        let t140 = t94 * t139;
-        let t141 = self.fixed[3] * t140;
-        let t144 = self.fixed[14] * t60;
-        let t145 = t9 * t144;
-        let t146 = t141 + t145;
-        let t147 = t146 + t106;
-        let t149 = self.fixed[15] * t9;
-        let t150 = t149 * t2;
-        let t151 = t147 * t112;
-        let t152 = t150 * t151;
-        let t153 = t135 - t152;
-        let t156 = self.fixed[16] * t18;
-        let t157 = t156 * t13;
-        let t158 = self.fixed[8] * t18;
-        let t159 = t158 * t13;
-        let t160 = self.fixed[10] * t67;
-        let t161 = t106 + t160;
-        let t162 = self.fixed[11] * t118;
-        let t163 = self.fixed[10] + t162;
-        let t164 = t99 - t66;
-        let t165 = self.fixed[11] * t164;
-        let t166 = t161 * t118;
-        let t167 = t163 - t166;
-        let t168 = self.fixed[10] + t167;
-        let t169 = t67 * t168;
-        let t170 = t165 + t169;
-        let t172 = t159 * t170;
-        let t173 = t172 * t118;
-        let t174 = self.fixed[17] * t173;
-        let t175 = t174 - t157;
-        let t176 = self.fixed[16] * t26;
-        let t177 = t176 * t25;
-        let t178 = self.fixed[8] * t26;
-        let t179 = t178 * t25;
-        let t180 = self.fixed[10] * t71;
-        let t181 = t106 + t180;
-        let t182 = self.fixed[11] * t124;
-        let t183 = self.fixed[10] + t182;
-        let t184 = t99 - t70;
-        let t185 = self.fixed[11] * t184;
-        let t186 = t181 * t124;
-        let t187 = t183 - t186;
-        let t188 = self.fixed[10] + t187;
-        let t189 = t71 * t188;
-        let t190 = t185 + t189;
-        let t191 = t179 * t190;
-        let t192 = t191 * t124;
-        let t193 = self.fixed[17] * t192;
-        let t194 = t193 - t177;
-        crate::nalgebra::SVector::<T, 3>::new(t153, t175, t194)
+        let t91 = T::one() / t73;
+        let t95 = t67 * t84;
+        let t96 = t95 - t70;
+        let t97 = t96 + T::one();
+        let t98 = t9 * t60;
+        let t99 = t98 * t97;
+        let t100 = self.fixed[3] * t99;
+        let t101 = t100 + t95;
+        let t102 = t101 - t70;
+        let t103 = t102.ln_of_both(t86);
+        let t105 = self.fixed[11] * t9;
+        let t106 = t105 * t60;
+        let t114 = T::one() / t83;
+        let t121 = T::one() / t84;
+        let t136 = self.fixed[13] * t9;
+        let t137 = t136 * t2;
+        let t138 = self.fixed[12] * t103;
+        let t139 = t138 + t106;
+        let t140 = self.fixed[12] - t139;
+        let t141 = t91 * t140;
+        let t142 = self.fixed[10] + t141;
+        let t143 = t98 * t142;
+        let t144 = self.fixed[3] * t143;
+        let t147 = self.fixed[14] * t60;
+        let t148 = t9 * t147;
+        let t149 = t144 + t148;
+        let t150 = t149 + t138;
+        let t152 = self.fixed[15] * t9;
+        let t153 = t152 * t2;
+        let t154 = t150 * t91;
+        let t155 = t153 * t154;
+        let t156 = t137 - t155;
+        let t159 = self.fixed[16] * t18;
+        let t160 = t159 * t13;
+        let t161 = self.fixed[8] * t18;
+        let t162 = t161 * t13;
+        let t163 = self.fixed[10] * t67;
+        let t164 = t138 + t163;
+        let t165 = self.fixed[12] * t114;
+        let t166 = self.fixed[10] + t165;
+        let t167 = t103 - t66;
+        let t168 = self.fixed[12] * t167;
+        let t169 = t164 * t114;
+        let t170 = t166 - t169;
+        let t171 = self.fixed[10] + t170;
+        let t172 = t67 * t171;
+        let t173 = t168 + t172;
+        let t175 = t162 * t173;
+        let t176 = t175 * t114;
+        let t177 = self.fixed[17] * t176;
+        let t178 = t177 - t160;
+        let t179 = self.fixed[16] * t26;
+        let t180 = t179 * t25;
+        let t181 = self.fixed[8] * t26;
+        let t182 = t181 * t25;
+        let t183 = self.fixed[10] * t71;
+        let t184 = t138 + t183;
+        let t185 = self.fixed[12] * t121;
+        let t186 = self.fixed[10] + t185;
+        let t187 = t103 - t70;
+        let t188 = self.fixed[12] * t187;
+        let t189 = t184 * t121;
+        let t190 = t186 - t189;
+        let t191 = self.fixed[10] + t190;
+        let t192 = t71 * t191;
+        let t193 = t188 + t192;
+        let t194 = t182 * t193;
+        let t195 = t194 * t121;
+        let t196 = self.fixed[17] * t195;
+        let t197 = t196 - t180;
+        crate::nalgebra::SVector::<T, 3>::new(t156, t178, t197)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> crate::Fields<T, 3> {
         let t2 = X[0].sin_pi();
@@ -654,90 +656,93 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t84 = t71 + T::one();
         let t85 = t73 * t83;
         let t86 = t85 * t84;
-        let t91 = t67 * t84;
-        let t92 = t91 - t70;
-        let t93 = t92 + T::one();
-        let t94 = t9 * t60;
-        let t95 = t94 * t93;
-        let t96 = self.fixed[3] * t95;
-        let t97 = t96 + t91;
-        let t98 = t97 - t70;
-        let t99 = t98.ln_of_both(t86);
-        let t102 = t62 + T::nearest(2.0);
-        let t106 = self.fixed[11] * t99;
-        let t108 = self.fixed[12] * t9;
-        let t109 = t108 * t60;
-        let t110 = t109 * t102;
-        let t111 = t106 + t110;
-        let t112 = T::one() / t73;
-        let t113 = t111 * t112;
-        let t114 = t67 + T::nearest(2.0);
-        let t115 = t67 * t114;
-        let t116 = self.fixed[10] * t115;
-        let t117 = t106 + t116;
-        let t118 = T::one() / t83;
-        let t119 = t117 * t118;
-        let t120 = t71 + T::nearest(2.0);
-        let t121 = t71 * t120;
-        let t122 = self.fixed[10] * t121;
-        let t123 = t106 + t122;
-        let t124 = T::one() / t84;
-        let t125 = t123 * t124;
-        let t134 = self.fixed[13] * t9;
-        let t135 = t134 * t2;
-        let t136 = t106 + t109;
-        let t137 = self.fixed[11] - t136;
-        let t138 = t112 * t137;
-        let t139 = self.fixed[10] + t138;
-        let t140 = t94 * t139;
-        let t141 = self.fixed[3] * t140;
-        let t144 = self.fixed[14] * t60;
-        let t145 = t9 * t144;
-        let t146 = t141 + t145;
-        let t147 = t146 + t106;
-        let t149 = self.fixed[15] * t9;
-        let t150 = t149 * t2;
-        let t151 = t147 * t112;
-        let t152 = t150 * t151;
-        let t153 = t135 - t152;
-        let t156 = self.fixed[16] * t18;
-        let t157 = t156 * t13;
-        let t158 = self.fixed[8] * t18;
-        let t159 = t158 * t13;
-        let t160 = self.fixed[10] * t67;
-        let t161 = t106 + t160;
-        let t162 = self.fixed[11] * t118;
-        let t163 = self.fixed[10] + t162;
-        let t164 = t99 - t66;
-        let t165 = self.fixed[11] * t164;
-        let t166 = t161 * t118;
-        let t167 = t163 - t166;
-        let t168 = self.fixed[10] + t167;
-        let t169 = t67 * t168;
-        let t170 = t165 + t169;
-        let t172 = t159 * t170;
-        let t173 = t172 * t118;
-        let t174 = self.fixed[17] * t173;
-        let t175 = t174 - t157;
-        let t176 = self.fixed[16] * t26;
-        let t177 = t176 * t25;
-        let t178 = self.fixed[8] * t26;
-        let t179 = t178 * t25;
-        let t180 = self.fixed[10] * t71;
-        let t181 = t106 + t180;
-        let t182 = self.fixed[11] * t124;
-        let t183 = self.fixed[10] + t182;
-        let t184 = t99 - t70;
-        let t185 = self.fixed[11] * t184;
-        let t186 = t181 * t124;
-        let t187 = t183 - t186;
-        let t188 = self.fixed[10] + t187;
-        let t189 = t71 * t188;
-        let t190 = t185 + t189;
-        let t191 = t179 * t190;
-        let t192 = t191 * t124;
-        let t193 = self.fixed[17] * t192;
-        let t194 = t193 - t177;
+        let t91 = T::one() / t73;
+        let t92 = t91 + T::one();
+        let t95 = t67 * t84;
+        let t96 = t95 - t70;
+        let t97 = t96 + T::one();
+        let t98 = t9 * t60;
+        let t99 = t98 * t97;
+        let t100 = self.fixed[3] * t99;
+        let t101 = t100 + t95;
+        let t102 = t101 - t70;
+        let t103 = t102.ln_of_both(t86);
+        let t105 = self.fixed[11] * t9;
+        let t106 = t105 * t60;
+        let t107 = t106 * t92;
+        let t111 = t103 * t91;
+        let t112 = self.fixed[12] * t111;
+        let t113 = t107 + t112;
+        let t114 = T::one() / t83;
+        let t115 = t114 + T::one();
+        let t116 = t67 * t115;
+        let t117 = self.fixed[10] * t116;
+        let t118 = t103 * t114;
+        let t119 = self.fixed[12] * t118;
+        let t120 = t117 + t119;
+        let t121 = T::one() / t84;
+        let t122 = t121 + T::one();
+        let t123 = t71 * t122;
+        let t124 = self.fixed[10] * t123;
+        let t125 = t103 * t121;
+        let t126 = self.fixed[12] * t125;
+        let t127 = t124 + t126;
+        let t136 = self.fixed[13] * t9;
+        let t137 = t136 * t2;
+        let t138 = self.fixed[12] * t103;
+        let t139 = t138 + t106;
+        let t140 = self.fixed[12] - t139;
+        let t141 = t91 * t140;
+        let t142 = self.fixed[10] + t141;
+        let t143 = t98 * t142;
+        let t144 = self.fixed[3] * t143;
+        let t147 = self.fixed[14] * t60;
+        let t148 = t9 * t147;
+        let t149 = t144 + t148;
+        let t150 = t149 + t138;
+        let t152 = self.fixed[15] * t9;
+        let t153 = t152 * t2;
+        let t154 = t150 * t91;
+        let t155 = t153 * t154;
+        let t156 = t137 - t155;
+        let t159 = self.fixed[16] * t18;
+        let t160 = t159 * t13;
+        let t161 = self.fixed[8] * t18;
+        let t162 = t161 * t13;
+        let t163 = self.fixed[10] * t67;
+        let t164 = t138 + t163;
+        let t165 = self.fixed[12] * t114;
+        let t166 = self.fixed[10] + t165;
+        let t167 = t103 - t66;
+        let t168 = self.fixed[12] * t167;
+        let t169 = t164 * t114;
+        let t170 = t166 - t169;
+        let t171 = self.fixed[10] + t170;
+        let t172 = t67 * t171;
+        let t173 = t168 + t172;
+        let t175 = t162 * t173;
+        let t176 = t175 * t114;
+        let t177 = self.fixed[17] * t176;
+        let t178 = t177 - t160;
+        let t179 = self.fixed[16] * t26;
+        let t180 = t179 * t25;
+        let t181 = self.fixed[8] * t26;
+        let t182 = t181 * t25;
+        let t183 = self.fixed[10] * t71;
+        let t184 = t138 + t183;
+        let t185 = self.fixed[12] * t121;
+        let t186 = self.fixed[10] + t185;
+        let t187 = t103 - t70;
+        let t188 = self.fixed[12] * t187;
+        let t189 = t184 * t121;
+        let t190 = t186 - t189;
+        let t191 = self.fixed[10] + t190;
+        let t192 = t71 * t191;
+        let t193 = t188 + t192;
+        let t194 = t182 * t193;
+        let t195 = t194 * t121;
+        let t196 = self.fixed[17] * t195;
+        let t197 = t196 - t180;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 3>::new(t11, t23, t29),
             v: crate::nalgebra::SVector::<T, 3>::new(t34, t41, t45),
@@ -782,13 +787,13 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 T::zero(),
                 T::zero(),
                 T::zero(),
-                t119,
+                t120,
                 T::zero(),
                 T::zero(),
                 T::zero(),
-                t125,
+                t127,
             ),
-            b: crate::nalgebra::SVector::<T, 3>::new(t153, t175, t194),
+            b: crate::nalgebra::SVector::<T, 3>::new(t156, t178, t197),
         }
     }
     fn traction(
@@ -816,26 +821,26 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t71 = -t70;
                 let t83 = t67 + T::one();
                 let t84 = t71 + T::one();
-                let t91 = t67 * t84;
-                let t92 = t91 - t70;
-                let t270 = t61 + T::one();
-                let t271 = t9 * t92;
-                let t272 = self.fixed[3] * t271;
-                let t273 = t272 + t91;
-                let t274 = t273 - t70;
-                let t275 = t61 + t274;
-                let t276 = t83 * t84;
-                let t277 = t270 * t276;
-                let t278 = t275.ln_of_both(t277);
-                let t279 = t61 + T::nearest(2.0);
-                let t280 = self.fixed[11] * t278;
-                let t281 = t9 * t279;
-                let t282 = self.fixed[12] * t281;
-                let t283 = t282 + t280;
-                let t284 = T::one() / t270;
-                let t285 = t284 * t283;
-                let t286 = -t285;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t286, T::zero(), T::zero()))
+                let t95 = t67 * t84;
+                let t96 = t95 - t70;
+                let t273 = t61 + T::one();
+                let t274 = T::one() / t273;
+                let t275 = t274 + T::one();
+                let t276 = t9 * t96;
+                let t277 = self.fixed[3] * t276;
+                let t278 = t277 + t95;
+                let t279 = t278 - t70;
+                let t280 = t61 + t279;
+                let t281 = t83 * t84;
+                let t282 = t273 * t281;
+                let t283 = t280.ln_of_both(t282);
+                let t284 = t9 * t275;
+                let t285 = self.fixed[11] * t284;
+                let t286 = self.fixed[12] * t274;
+                let t287 = t286 * t283;
+                let t288 = t285 + t287;
+                let t289 = -t288;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t289, T::zero(), T::zero()))
             }
             crate::Surface::Upper(0) => {
                 let t8 = self.fixed[0] * t;
@@ -855,25 +860,26 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t71 = -t70;
                 let t83 = t67 + T::one();
                 let t84 = t71 + T::one();
-                let t91 = t67 * t84;
-                let t92 = t91 - t70;
-                let t271 = t9 * t92;
-                let t272 = self.fixed[3] * t271;
-                let t276 = t83 * t84;
-                let t287 = T::one() - t61;
-                let t288 = t91 - t272;
-                let t289 = t288 - t70;
-                let t290 = t289 - t61;
-                let t291 = t287 * t276;
-                let t292 = t290.ln_of_both(t291);
-                let t293 = T::nearest(2.0) - t61;
-                let t294 = self.fixed[11] * t292;
-                let t295 = t9 * t293;
-                let t296 = self.fixed[12] * t295;
-                let t297 = t294 - t296;
-                let t298 = T::one() / t287;
-                let t299 = t298 * t297;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t299, T::zero(), T::zero()))
+                let t95 = t67 * t84;
+                let t96 = t95 - t70;
+                let t276 = t9 * t96;
+                let t277 = self.fixed[3] * t276;
+                let t281 = t83 * t84;
+                let t290 = T::one() - t61;
+                let t291 = T::one() / t290;
+                let t292 = t291 + T::one();
+                let t293 = t95 - t277;
+                let t294 = t293 - t70;
+                let t295 = t294 - t61;
+                let t296 = t290 * t281;
+                let t297 = t295.ln_of_both(t296);
+                let t298 = t9 * t292;
+                let t299 = self.fixed[11] * t298;
+                let t300 = self.fixed[12] * t291;
+                let t301 = t300 * t297;
+                let t302 = t299 - t301;
+                let t303 = -t302;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t303, T::zero(), T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t8 = self.fixed[0] * t;
@@ -892,28 +898,28 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t71 = -t70;
                 let t73 = t62 + T::one();
                 let t84 = t71 + T::one();
-                let t94 = t9 * t60;
-                let t300 = -t65;
-                let t301 = t300 + T::one();
-                let t302 = t71 * t301;
-                let t303 = t302 - t65;
-                let t304 = t303 + T::one();
-                let t305 = t94 * t304;
-                let t306 = self.fixed[3] * t305;
-                let t307 = t306 + t302;
-                let t308 = t307 - t65;
-                let t309 = t73 * t84;
-                let t310 = t301 * t309;
-                let t311 = t308.ln_of_both(t310);
-                let t312 = t300 + T::nearest(2.0);
-                let t313 = self.fixed[11] * t311;
-                let t314 = t300 * t312;
-                let t315 = self.fixed[10] * t314;
-                let t316 = t315 + t313;
-                let t317 = T::one() / t301;
-                let t318 = t317 * t316;
-                let t319 = -t318;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t319, T::zero()))
+                let t98 = t9 * t60;
+                let t304 = -t65;
+                let t305 = t304 + T::one();
+                let t306 = T::one() / t305;
+                let t307 = t306 + T::one();
+                let t308 = t71 * t305;
+                let t309 = t308 - t65;
+                let t310 = t309 + T::one();
+                let t311 = t98 * t310;
+                let t312 = self.fixed[3] * t311;
+                let t313 = t312 + t308;
+                let t314 = t313 - t65;
+                let t315 = t73 * t84;
+                let t316 = t305 * t315;
+                let t317 = t314.ln_of_both(t316);
+                let t318 = t304 * t307;
+                let t319 = self.fixed[10] * t318;
+                let t320 = self.fixed[12] * t306;
+                let t321 = t320 * t317;
+                let t322 = t319 + t321;
+                let t323 = -t322;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t323, T::zero()))
             }
             crate::Surface::Upper(1) => {
                 let t8 = self.fixed[0] * t;
@@ -932,26 +938,26 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t71 = -t70;
                 let t73 = t62 + T::one();
                 let t84 = t71 + T::one();
-                let t94 = t9 * t60;
-                let t309 = t73 * t84;
-                let t320 = t65 + T::one();
-                let t321 = t71 * t320;
-                let t322 = t65 + t321;
-                let t323 = t322 + T::one();
-                let t324 = t94 * t323;
-                let t325 = self.fixed[3] * t324;
-                let t326 = t325 + t321;
-                let t327 = t65 + t326;
-                let t328 = t320 * t309;
-                let t329 = t327.ln_of_both(t328);
-                let t330 = t65 + T::nearest(2.0);
-                let t331 = self.fixed[11] * t329;
-                let t332 = t65 * t330;
-                let t333 = self.fixed[10] * t332;
-                let t334 = t333 + t331;
-                let t335 = T::one() / t320;
-                let t336 = t335 * t334;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t336, T::zero()))
+                let t98 = t9 * t60;
+                let t315 = t73 * t84;
+                let t324 = t65 + T::one();
+                let t325 = T::one() / t324;
+                let t326 = t325 + T::one();
+                let t327 = t71 * t324;
+                let t328 = t65 + t327;
+                let t329 = t328 + T::one();
+                let t330 = t98 * t329;
+                let t331 = self.fixed[3] * t330;
+                let t332 = t331 + t327;
+                let t333 = t65 + t332;
+                let t334 = t324 * t315;
+                let t335 = t333.ln_of_both(t334);
+                let t336 = t65 * t326;
+                let t337 = self.fixed[10] * t336;
+                let t338 = self.fixed[12] * t325;
+                let t339 = t338 * t335;
+                let t340 = t337 + t339;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t340, T::zero()))
             }
             crate::Surface::Lower(2) => {
                 let t8 = self.fixed[0] * t;
@@ -971,27 +977,27 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t73 = t62 + T::one();
                 let t83 = t67 + T::one();
                 let t85 = t73 * t83;
-                let t94 = t9 * t60;
-                let t337 = -t69;
-                let t338 = t337 + T::one();
-                let t339 = t67 * t338;
-                let t340 = t339 - t69;
-                let t341 = t340 + T::one();
-                let t342 = t94 * t341;
-                let t343 = self.fixed[3] * t342;
-                let t344 = t343 + t339;
-                let t345 = t344 - t69;
-                let t346 = t338 * t85;
-                let t347 = t345.ln_of_both(t346);
-                let t348 = t337 + T::nearest(2.0);
-                let t349 = self.fixed[11] * t347;
-                let t350 = t337 * t348;
-                let t351 = self.fixed[10] * t350;
-                let t352 = t351 + t349;
-                let t353 = T::one() / t338;
-                let t354 = t353 * t352;
-                let t355 = -t354;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t355))
+                let t98 = t9 * t60;
+                let t341 = -t69;
+                let t342 = t341 + T::one();
+                let t343 = T::one() / t342;
+                let t344 = t343 + T::one();
+                let t345 = t67 * t342;
+                let t346 = t345 - t69;
+                let t347 = t346 + T::one();
+                let t348 = t98 * t347;
+                let t349 = self.fixed[3] * t348;
+                let t350 = t349 + t345;
+                let t351 = t350 - t69;
+                let t352 = t342 * t85;
+                let t353 = t351.ln_of_both(t352);
+                let t354 = t341 * t344;
+                let t355 = self.fixed[10] * t354;
+                let t356 = self.fixed[12] * t343;
+                let t357 = t356 * t353;
+                let t358 = t355 + t357;
+                let t359 = -t358;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t359))
             }
             crate::Surface::Upper(2) => {
                 let t8 = self.fixed[0] * t;
@@ -1011,25 +1017,25 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t73 = t62 + T::one();
                 let t83 = t67 + T::one();
                 let t85 = t73 * t83;
-                let t94 = t9 * t60;
-                let t356 = t69 + T::one();
-                let t357 = t67 * t356;
-                let t358 = t69 + t357;
-                let t359 = t358 + T::one();
-                let t360 = t94 * t359;
-                let t361 = self.fixed[3] * t360;
-                let t362 = t361 + t357;
-                let t363 = t69 + t362;
-                let t364 = t356 * t85;
-                let t365 = t363.ln_of_both(t364);
-                let t366 = t69 + T::nearest(2.0);
-                let t367 = self.fixed[11] * t365;
-                let t368 = t69 * t366;
-                let t369 = self.fixed[10] * t368;
-                let t370 = t369 + t367;
-                let t371 = T::one() / t356;
-                let t372 = t371 * t370;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t372))
+                let t98 = t9 * t60;
+                let t360 = t69 + T::one();
+                let t361 = T::one() / t360;
+                let t362 = t361 + T::one();
+                let t363 = t67 * t360;
+                let t364 = t69 + t363;
+                let t365 = t364 + T::one();
+                let t366 = t98 * t365;
+                let t367 = self.fixed[3] * t366;
+                let t368 = t367 + t363;
+                let t369 = t69 + t368;
+                let t370 = t360 * t85;
+                let t371 = t369.ln_of_both(t370);
+                let t372 = t69 * t362;
+                let t373 = self.fixed[10] * t372;
+                let t374 = self.fixed[12] * t361;
+                let t375 = t374 * t371;
+                let t376 = t373 + t375;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t376))
             }
             _ => None,
         }
@@ -1073,7 +1079,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
     }
     fn material(&self) -> crate::Material<T> {
         crate::Material::NeoHookean {
-            lambda: self.fixed[11],
+            lambda: self.fixed[12],
             mu: self.fixed[10],
         }
     }
@@ -1134,69 +1140,69 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 6> for AxisAligned3d<T> {
         let t84 = t71 + T::one();
         let t85 = t73 * t83;
         let t86 = t85 * t84;
-        let t91 = t67 * t84;
-        let t92 = t91 - t70;
-        let t93 = t92 + T::one();
-        let t94 = time[0] * point[3];
-        let t95 = t94 * t93;
-        let t96 = self.fixed[3] * t95;
-        let t97 = t96 + t91;
-        let t98 = t97 - t70;
-        let t99 = t98.ln_of_both(t86);
-        let t112 = T::one() / t73;
-        let t118 = T::one() / t83;
-        let t124 = T::one() / t84;
-        let t195 = self.fixed[13] * point[0];
-        let t199 = point[3] * point[3];
-        let t203 = point[0] * t199;
-        let t204 = self.fixed[18] * t203;
-        let t205 = -t204;
-        let t211 = point[0] * point[3];
-        let t212 = self.fixed[19] * t211;
-        let t213 = time[0] * t205;
-        let t214 = t213 - t212;
-        let t217 = self.fixed[20] * point[0];
-        let t218 = -t217;
-        let t219 = time[0] * t214;
-        let t220 = t218 * t99;
-        let t221 = t219 + t220;
-        let t222 = t112 * t112;
-        let t223 = t221 * t222;
-        let t224 = t195 + t223;
-        let t225 = time[0] * t224;
-        let t226 = self.fixed[16] * point[1];
-        let t228 = point[4] * point[4];
-        let t233 = point[1] * t228;
-        let t234 = self.fixed[21] * t233;
-        let t239 = point[1] * point[4];
-        let t240 = self.fixed[22] * t239;
-        let t241 = time[1] * t234;
-        let t242 = t241 - t240;
-        let t245 = self.fixed[23] * point[1];
-        let t246 = time[1] * t242;
-        let t247 = t245 * t99;
-        let t248 = t246 + t247;
-        let t249 = t118 * t118;
-        let t250 = t248 * t249;
-        let t251 = t250 - t226;
-        let t252 = time[1] * t251;
-        let t253 = self.fixed[16] * point[2];
-        let t254 = point[5] * point[5];
-        let t255 = point[2] * t254;
-        let t256 = self.fixed[21] * t255;
-        let t257 = point[2] * point[5];
-        let t258 = self.fixed[22] * t257;
-        let t259 = time[2] * t256;
-        let t260 = t259 - t258;
-        let t261 = self.fixed[23] * point[2];
-        let t262 = time[2] * t260;
-        let t263 = t261 * t99;
-        let t264 = t262 + t263;
-        let t265 = t124 * t124;
-        let t266 = t264 * t265;
-        let t267 = t266 - t253;
-        let t268 = time[2] * t267;
-        crate::nalgebra::SVector::<T, 3>::new(t225, t252, t268)
+        let t91 = T::one() / t73;
+        let t95 = t67 * t84;
+        let t96 = t95 - t70;
+        let t97 = t96 + T::one();
+        let t98 = time[0] * point[3];
+        let t99 = t98 * t97;
+        let t100 = self.fixed[3] * t99;
+        let t101 = t100 + t95;
+        let t102 = t101 - t70;
+        let t103 = t102.ln_of_both(t86);
+        let t114 = T::one() / t83;
+        let t121 = T::one() / t84;
+        let t198 = self.fixed[13] * point[0];
+        let t202 = point[3] * point[3];
+        let t206 = point[0] * t202;
+        let t207 = self.fixed[18] * t206;
+        let t208 = -t207;
+        let t214 = point[0] * point[3];
+        let t215 = self.fixed[19] * t214;
+        let t216 = time[0] * t208;
+        let t217 = t216 - t215;
+        let t220 = self.fixed[20] * point[0];
+        let t221 = -t220;
+        let t222 = time[0] * t217;
+        let t223 = t221 * t103;
+        let t224 = t222 + t223;
+        let t225 = t91 * t91;
+        let t226 = t224 * t225;
+        let t227 = t198 + t226;
+        let t228 = time[0] * t227;
+        let t229 = self.fixed[16] * point[1];
+        let t231 = point[4] * point[4];
+        let t236 = point[1] * t231;
+        let t237 = self.fixed[21] * t236;
+        let t242 = point[1] * point[4];
+        let t243 = self.fixed[22] * t242;
+        let t244 = time[1] * t237;
+        let t245 = t244 - t243;
+        let t248 = self.fixed[23] * point[1];
+        let t249 = time[1] * t245;
+        let t250 = t248 * t103;
+        let t251 = t249 + t250;
+        let t252 = t114 * t114;
+        let t253 = t251 * t252;
+        let t254 = t253 - t229;
+        let t255 = time[1] * t254;
+        let t256 = self.fixed[16] * point[2];
+        let t257 = point[5] * point[5];
+        let t258 = point[2] * t257;
+        let t259 = self.fixed[21] * t258;
+        let t260 = point[2] * point[5];
+        let t261 = self.fixed[22] * t260;
+        let t262 = time[2] * t259;
+        let t263 = t262 - t261;
+        let t264 = self.fixed[23] * point[2];
+        let t265 = time[2] * t263;
+        let t266 = t264 * t103;
+        let t267 = t265 + t266;
+        let t268 = t121 * t121;
+        let t269 = t267 * t268;
+        let t270 = t269 - t256;
+        let t271 = time[2] * t270;
+        crate::nalgebra::SVector::<T, 3>::new(t228, t255, t271)
     }
 }
 impl<T: crate::Real> From<AxisAligned3d<T>> for crate::AnySolution<T> {

@@ -140,14 +140,14 @@ impl<T: crate::Real> Bar<T> {
         let t36 = t35 * T::pi();
         let t37 = t36 / parameters.L;
         let t43 = parameters.nu + T::one();
-        let t44 = T::nearest(2.0) * parameters.nu;
-        let t45 = T::one() - t44;
-        let t48 = T::nearest(0.5) * parameters.E;
-        let t49 = t48 / t43;
-        let t51 = parameters.E * parameters.nu;
-        let t52 = t43 * t45;
-        let t53 = t51 / t52;
-        let t60 = parameters.nu / t45;
+        let t45 = T::nearest(0.5) * parameters.E;
+        let t46 = t45 / t43;
+        let t49 = T::nearest(2.0) * parameters.nu;
+        let t50 = T::one() - t49;
+        let t54 = parameters.E * parameters.nu;
+        let t55 = t43 * t50;
+        let t56 = t54 / t55;
+        let t60 = parameters.nu / t50;
         let t61 = t60 + T::one();
         let t63 = T::nearest(4.0) * t61;
         let t64 = t63 / t43;
@@ -157,37 +157,37 @@ impl<T: crate::Real> Bar<T> {
         let t70 = T::nearest(4.0) * parameters.A;
         let t71 = t70 * t26;
         let t72 = t71 / t25;
-        let t87 = T::one() / parameters.rho0;
-        let t93 = t53 + t49;
-        let t95 = parameters.A * parameters.A;
-        let t96 = t95 * parameters.A;
-        let t97 = t25 * t25;
-        let t98 = t26 * t26;
-        let t100 = T::nearest(16.0) * t96;
-        let t101 = t100 * t98;
-        let t102 = t101 * t93;
-        let t103 = parameters.rho0 * t97;
-        let t104 = t102 / t103;
-        let t108 = t25 * parameters.L;
-        let t109 = t26 * T::pi();
-        let t110 = T::nearest(16.0) * t95;
-        let t111 = t110 * t109;
-        let t112 = t111 * t93;
-        let t113 = parameters.rho0 * t108;
-        let t114 = t112 / t113;
-        let t119 = t70 * parameters.E;
-        let t120 = t119 * parameters.nu;
-        let t121 = t120 * t26;
-        let t122 = t29 * t43;
-        let t123 = t122 * t45;
-        let t124 = t121 / t123;
-        let t134 = T::nearest(2.0) * parameters.L;
-        let t135 = t134 / t11;
-        let t137 = -t36;
+        let t88 = T::one() / parameters.rho0;
+        let t94 = t56 + t46;
+        let t96 = parameters.A * parameters.A;
+        let t97 = t96 * parameters.A;
+        let t98 = t25 * t25;
+        let t99 = t26 * t26;
+        let t101 = T::nearest(16.0) * t97;
+        let t102 = t101 * t99;
+        let t103 = t102 * t94;
+        let t104 = parameters.rho0 * t98;
+        let t105 = t103 / t104;
+        let t109 = t25 * parameters.L;
+        let t110 = t26 * T::pi();
+        let t111 = T::nearest(16.0) * t96;
+        let t112 = t111 * t110;
+        let t113 = t112 * t94;
+        let t114 = parameters.rho0 * t109;
+        let t115 = t113 / t114;
+        let t120 = t70 * parameters.E;
+        let t121 = t120 * parameters.nu;
+        let t122 = t121 * t26;
+        let t123 = t29 * t43;
+        let t124 = t123 * t50;
+        let t125 = t122 / t124;
+        let t135 = T::nearest(2.0) * parameters.L;
+        let t136 = t135 / t11;
+        let t138 = -t36;
         if !(t36 < parameters.L) {
             return Err(Self::DESCRIPTION.requirement_broken("2*Pi*A < L", &values));
         }
-        if !(t137 < parameters.L) {
+        if !(t138 < parameters.L) {
             return Err(Self::DESCRIPTION.requirement_broken("-2*Pi*A < L", &values));
         }
         Ok(Bar {
@@ -200,16 +200,16 @@ impl<T: crate::Real> Bar<T> {
                 t30,
                 t36,
                 t37,
-                t49,
-                t53,
+                t46,
+                t56,
                 t67,
                 t72,
-                t87,
-                t104,
-                t114,
-                t124,
-                t135,
-                t137,
+                t88,
+                t105,
+                t115,
+                t125,
+                t136,
+                t138,
             ],
         })
     }
@@ -343,14 +343,14 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
         let t38 = self.fixed[6] * t14;
         let t39 = t38 * t34;
         let t41 = t39 + T::one();
-        let t46 = t39.log_1p();
-        let t50 = t39 + T::nearest(2.0);
-        let t54 = self.fixed[8] * t46;
-        let t55 = t39 * t50;
-        let t56 = self.fixed[7] * t55;
-        let t57 = t54 + t56;
-        let t58 = T::one() / t41;
-        let t59 = t57 * t58;
+        let t47 = T::one() / t41;
+        let t48 = t47 + T::one();
+        let t51 = t39.log_1p();
+        let t52 = t39 * t48;
+        let t53 = self.fixed[7] * t52;
+        let t57 = t51 * t47;
+        let t58 = self.fixed[8] * t57;
+        let t59 = t53 + t58;
         crate::nalgebra::SMatrix::<T, 1, 1>::new(t59)
     }
     #[inline]
@@ -367,30 +367,30 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
         let t38 = self.fixed[6] * t14;
         let t39 = t38 * t34;
         let t41 = t39 + T::one();
-        let t46 = t39.log_1p();
-        let t54 = self.fixed[8] * t46;
-        let t58 = T::one() / t41;
+        let t47 = T::one() / t41;
+        let t51 = t39.log_1p();
         let t68 = self.fixed[9] * t14;
         let t69 = t68 * t6;
         let t73 = self.fixed[10] * t14;
         let t74 = t73 * t6;
         let t75 = -t74;
-        let t76 = self.fixed[7] * t39;
-        let t77 = t54 + t76;
-        let t78 = self.fixed[8] * t58;
-        let t79 = self.fixed[7] + t78;
-        let t80 = t39 + t46;
-        let t81 = self.fixed[8] * t80;
-        let t82 = t77 * t58;
-        let t83 = t79 - t82;
-        let t84 = self.fixed[7] + t83;
-        let t85 = t39 * t84;
-        let t86 = t81 + t85;
-        let t88 = t75 * t86;
-        let t89 = t88 * t58;
-        let t90 = self.fixed[11] * t89;
-        let t91 = t90 - t69;
-        crate::nalgebra::SVector::<T, 1>::new(t91)
+        let t76 = self.fixed[8] * t51;
+        let t77 = self.fixed[7] * t39;
+        let t78 = t76 + t77;
+        let t79 = self.fixed[8] * t47;
+        let t80 = self.fixed[7] + t79;
+        let t81 = t39 + t51;
+        let t82 = self.fixed[8] * t81;
+        let t83 = t78 * t47;
+        let t84 = t80 - t83;
+        let t85 = self.fixed[7] + t84;
+        let t86 = t39 * t85;
+        let t87 = t82 + t86;
+        let t89 = t75 * t87;
+        let t90 = t89 * t47;
+        let t91 = self.fixed[11] * t90;
+        let t92 = t91 - t69;
+        crate::nalgebra::SVector::<T, 1>::new(t92)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 1>, t: T) -> crate::Fields<T, 1> {
         let t5 = self.fixed[0] * X[0];
@@ -410,34 +410,35 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
         let t38 = self.fixed[6] * t14;
         let t39 = t38 * t34;
         let t41 = t39 + T::one();
-        let t46 = t39.log_1p();
-        let t50 = t39 + T::nearest(2.0);
-        let t54 = self.fixed[8] * t46;
-        let t55 = t39 * t50;
-        let t56 = self.fixed[7] * t55;
-        let t57 = t54 + t56;
-        let t58 = T::one() / t41;
-        let t59 = t57 * t58;
+        let t47 = T::one() / t41;
+        let t48 = t47 + T::one();
+        let t51 = t39.log_1p();
+        let t52 = t39 * t48;
+        let t53 = self.fixed[7] * t52;
+        let t57 = t51 * t47;
+        let t58 = self.fixed[8] * t57;
+        let t59 = t53 + t58;
         let t68 = self.fixed[9] * t14;
         let t69 = t68 * t6;
         let t73 = self.fixed[10] * t14;
         let t74 = t73 * t6;
         let t75 = -t74;
-        let t76 = self.fixed[7] * t39;
-        let t77 = t54 + t76;
-        let t78 = self.fixed[8] * t58;
-        let t79 = self.fixed[7] + t78;
-        let t80 = t39 + t46;
-        let t81 = self.fixed[8] * t80;
-        let t82 = t77 * t58;
-        let t83 = t79 - t82;
-        let t84 = self.fixed[7] + t83;
-        let t85 = t39 * t84;
-        let t86 = t81 + t85;
-        let t88 = t75 * t86;
-        let t89 = t88 * t58;
-        let t90 = self.fixed[11] * t89;
-        let t91 = t90 - t69;
+        let t76 = self.fixed[8] * t51;
+        let t77 = self.fixed[7] * t39;
+        let t78 = t76 + t77;
+        let t79 = self.fixed[8] * t47;
+        let t80 = self.fixed[7] + t79;
+        let t81 = t39 + t51;
+        let t82 = self.fixed[8] * t81;
+        let t83 = t78 * t47;
+        let t84 = t80 - t83;
+        let t85 = self.fixed[7] + t84;
+        let t86 = t39 * t85;
+        let t87 = t82 + t86;
+        let t89 = t75 * t87;
+        let t90 = t89 * t47;
+        let t91 = self.fixed[11] * t90;
+        let t92 = t91 - t69;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 1>::new(t16),
             v: crate::nalgebra::SVector::<T, 1>::new(t24),
@@ -446,7 +447,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
             F: crate::nalgebra::SMatrix::<T, 1, 1>::new(t41),
             J: t41,
             P: crate::nalgebra::SMatrix::<T, 1, 1>::new(t59),
-            b: crate::nalgebra::SVector::<T, 1>::new(t91),
+            b: crate::nalgebra::SVector::<T, 1>::new(t92),
         }
     }
     fn traction(
@@ -460,30 +461,32 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
                 let t13 = self.fixed[2] * t;
                 let t14 = t13.cos_pi();
                 let t38 = self.fixed[6] * t14;
-                let t138 = t38 + T::one();
-                let t139 = t38.log_1p();
-                let t140 = t38 + T::nearest(2.0);
-                let t141 = self.fixed[8] * t139;
-                let t142 = t38 * t140;
-                let t143 = self.fixed[7] * t142;
-                let t144 = t141 + t143;
-                let t145 = t144 / t138;
-                let t146 = -t145;
-                Some(crate::nalgebra::SVector::<T, 1>::new(t146))
+                let t139 = t38 + T::one();
+                let t140 = T::one() / t139;
+                let t141 = t140 + T::one();
+                let t142 = t38.log_1p();
+                let t143 = t38 * t141;
+                let t144 = self.fixed[7] * t143;
+                let t145 = t142 * t140;
+                let t146 = self.fixed[8] * t145;
+                let t147 = t144 + t146;
+                let t148 = -t147;
+                Some(crate::nalgebra::SVector::<T, 1>::new(t148))
             }
             crate::Surface::Upper(0) => {
                 let t13 = self.fixed[2] * t;
                 let t14 = t13.cos_pi();
                 let t38 = self.fixed[6] * t14;
-                let t138 = t38 + T::one();
-                let t139 = t38.log_1p();
-                let t140 = t38 + T::nearest(2.0);
-                let t141 = self.fixed[8] * t139;
-                let t142 = t38 * t140;
-                let t143 = self.fixed[7] * t142;
-                let t144 = t141 + t143;
-                let t145 = t144 / t138;
-                Some(crate::nalgebra::SVector::<T, 1>::new(t145))
+                let t139 = t38 + T::one();
+                let t140 = T::one() / t139;
+                let t141 = t140 + T::one();
+                let t142 = t38.log_1p();
+                let t143 = t38 * t141;
+                let t144 = self.fixed[7] * t143;
+                let t145 = t142 * t140;
+                let t146 = self.fixed[8] * t145;
+                let t147 = t144 + t146;
+                Some(crate::nalgebra::SVector::<T, 1>::new(t147))
             }
             _ => None,
         }
@@ -555,27 +558,27 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 2> for Bar<T> {
     ) -> crate::nalgebra::SVector<T, 1> {
         let t39 = time[1] * point[1];
         let t41 = t39 + T::one();
-        let t46 = t39.log_1p();
-        let t58 = T::one() / t41;
-        let t92 = self.fixed[9] * point[0];
-        let t99 = point[1] * point[1];
-        let t105 = point[0] * t99;
-        let t106 = self.fixed[12] * t105;
-        let t107 = -t106;
-        let t115 = point[0] * point[1];
-        let t116 = self.fixed[13] * t115;
-        let t117 = time[0] * t107;
-        let t118 = t117 - t116;
-        let t125 = self.fixed[14] * point[0];
-        let t126 = -t125;
-        let t127 = time[0] * t118;
-        let t128 = t126 * t46;
-        let t129 = t127 + t128;
-        let t130 = t58 * t58;
-        let t131 = t129 * t130;
-        let t132 = t131 - t92;
-        let t133 = time[0] * t132;
-        crate::nalgebra::SVector::<T, 1>::new(t133)
+        let t47 = T::one() / t41;
+        let t51 = t39.log_1p();
+        let t93 = self.fixed[9] * point[0];
+        let t100 = point[1] * point[1];
+        let t106 = point[0] * t100;
+        let t107 = self.fixed[12] * t106;
+        let t108 = -t107;
+        let t116 = point[0] * point[1];
+        let t117 = self.fixed[13] * t116;
+        let t118 = time[0] * t108;
+        let t119 = t118 - t117;
+        let t126 = self.fixed[14] * point[0];
+        let t127 = -t126;
+        let t128 = time[0] * t119;
+        let t129 = t127 * t51;
+        let t130 = t128 + t129;
+        let t131 = t47 * t47;
+        let t132 = t130 * t131;
+        let t133 = t132 - t93;
+        let t134 = time[0] * t133;
+        crate::nalgebra::SVector::<T, 1>::new(t134)
     }
 }
 impl<T: crate::Real> From<Bar<T>> for crate::AnySolution<T> {

@@ -142,33 +142,33 @@ impl<T: crate::Real> Ring<T> {
         let t88 = T::nearest(6.0) * parameters.A;
         let t89 = t88 / t26;
         let t97 = T::nearest(0.5) * parameters.E;
-        let t121 = parameters.Ri + parameters.Ro;
-        let t129 = t51 / parameters.rho0;
-        let t143 = t97 / parameters.rho0;
-        let t155 = parameters.A * parameters.A;
-        let t156 = t155 * t155;
-        let t157 = t15 * t15;
-        let t158 = t19 * t19;
-        let t160 = T::nearest(36.0) * t156;
-        let t161 = t160 * t97;
-        let t162 = parameters.rho0 * t157;
-        let t163 = t162 * t158;
-        let t164 = t161 / t163;
-        let t170 = t157 * t158;
-        let t171 = T::nearest(36.0) / t170;
-        let t180 = T::nearest(3.0) / t26;
-        let t185 = T::nearest(12.0) / t26;
-        let t189 = t155 * parameters.A;
-        let t190 = T::nearest(6.0) * t189;
-        let t191 = t190 * t97;
-        let t192 = parameters.rho0 * t15;
-        let t193 = t192 * t19;
-        let t194 = t191 / t193;
-        let t200 = T::nearest(72.0) / t170;
-        let t205 = t155 * t97;
-        let t206 = t205 / parameters.rho0;
-        let t219 = T::nearest(2.0) / t11;
-        let t221 = parameters.A * t97;
+        let t119 = parameters.Ri + parameters.Ro;
+        let t127 = t51 / parameters.rho0;
+        let t141 = t97 / parameters.rho0;
+        let t153 = parameters.A * parameters.A;
+        let t154 = t153 * t153;
+        let t155 = t15 * t15;
+        let t156 = t19 * t19;
+        let t158 = T::nearest(36.0) * t154;
+        let t159 = t158 * t97;
+        let t160 = parameters.rho0 * t155;
+        let t161 = t160 * t156;
+        let t162 = t159 / t161;
+        let t168 = t155 * t156;
+        let t169 = T::nearest(36.0) / t168;
+        let t178 = T::nearest(3.0) / t26;
+        let t183 = T::nearest(12.0) / t26;
+        let t187 = t153 * parameters.A;
+        let t188 = T::nearest(6.0) * t187;
+        let t189 = t188 * t97;
+        let t190 = parameters.rho0 * t15;
+        let t191 = t190 * t19;
+        let t192 = t189 / t191;
+        let t198 = T::nearest(72.0) / t168;
+        let t203 = t153 * t97;
+        let t204 = t203 / parameters.rho0;
+        let t217 = T::nearest(2.0) / t11;
+        let t219 = parameters.A * t97;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -188,18 +188,18 @@ impl<T: crate::Real> Ring<T> {
                 t61,
                 t89,
                 t97,
-                t121,
-                t129,
-                t143,
-                t164,
-                t171,
-                t180,
-                t185,
-                t194,
-                t200,
-                t206,
+                t119,
+                t127,
+                t141,
+                t162,
+                t169,
+                t178,
+                t183,
+                t192,
+                t198,
+                t204,
+                t217,
                 t219,
-                t221,
             ],
         })
     }
@@ -494,30 +494,28 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t92 = t91 + T::one();
         let t93 = t32 * t72;
         let t94 = t93 + T::one();
-        let t98 = t91 + T::nearest(2.0);
-        let t99 = t93 + T::nearest(2.0);
-        let t100 = t91 * t98;
-        let t101 = T::one() / t92;
-        let t102 = t100 * t101;
+        let t98 = T::one() / t92;
+        let t99 = t98 + T::one();
+        let t100 = T::one() / t94;
+        let t101 = t100 + T::one();
+        let t102 = t91 * t99;
         let t103 = t2 * t102;
         let t104 = t32 * t66;
-        let t105 = T::one() / t94;
-        let t106 = t99 * t105;
-        let t107 = t104 * t106;
-        let t108 = t103 + t107;
-        let t109 = self.fixed[9] * t34;
-        let t110 = t109 * t108;
-        let t111 = t93 * t106;
-        let t112 = t102 - t111;
-        let t113 = t74 * t34;
-        let t114 = self.fixed[9] * t113;
-        let t115 = t114 * t112;
-        let t116 = t3 * t102;
-        let t117 = t32 * t82;
-        let t118 = t117 * t106;
-        let t119 = t116 + t118;
-        let t120 = t109 * t119;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t110, t115, t115, t120)
+        let t105 = t104 * t101;
+        let t106 = t103 + t105;
+        let t107 = self.fixed[9] * t34;
+        let t108 = t107 * t106;
+        let t109 = t93 * t101;
+        let t110 = t102 - t109;
+        let t111 = t74 * t34;
+        let t112 = self.fixed[9] * t111;
+        let t113 = t112 * t110;
+        let t114 = t3 * t102;
+        let t115 = t32 * t82;
+        let t116 = t115 * t101;
+        let t117 = t114 + t116;
+        let t118 = t107 * t117;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t108, t113, t113, t118)
     }
     #[inline]
     fn body_force(
@@ -549,34 +547,34 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t92 = t91 + T::one();
         let t93 = t32 * t72;
         let t94 = t93 + T::one();
-        let t101 = T::one() / t92;
-        let t105 = T::one() / t94;
-        let t122 = t23 - self.fixed[10];
-        let t123 = t70 * t35;
-        let t124 = t123 + t122;
-        let t125 = self.fixed[7] * t124;
-        let t126 = t34 - self.fixed[5];
-        let t127 = t31 * t126;
-        let t128 = t125 - t127;
-        let t130 = self.fixed[11] * t13;
-        let t131 = t130 * t128;
-        let t132 = t91 * t101;
-        let t133 = t90 * t122;
-        let t134 = T::nearest(2.0) - t132;
-        let t135 = t91 * t132;
-        let t136 = t93 * t93;
-        let t137 = t136 * t105;
-        let t138 = t135 - t137;
-        let t139 = t35 * t138;
-        let t140 = t133 * t134;
-        let t141 = t140 * t132;
-        let t142 = t139 + t141;
-        let t144 = self.fixed[12] * t142;
-        let t145 = t144 - t131;
-        let t146 = t35 * t145;
-        let t147 = X[0] * t146;
-        let t148 = X[1] * t146;
-        crate::nalgebra::SVector::<T, 2>::new(t147, t148)
+        let t98 = T::one() / t92;
+        let t100 = T::one() / t94;
+        let t120 = t23 - self.fixed[10];
+        let t121 = t70 * t35;
+        let t122 = t121 + t120;
+        let t123 = self.fixed[7] * t122;
+        let t124 = t34 - self.fixed[5];
+        let t125 = t31 * t124;
+        let t126 = t123 - t125;
+        let t128 = self.fixed[11] * t13;
+        let t129 = t128 * t126;
+        let t130 = t91 * t98;
+        let t131 = t90 * t120;
+        let t132 = T::nearest(2.0) - t130;
+        let t133 = t91 * t130;
+        let t134 = t93 * t93;
+        let t135 = t134 * t100;
+        let t136 = t133 - t135;
+        let t137 = t35 * t136;
+        let t138 = t131 * t132;
+        let t139 = t138 * t130;
+        let t140 = t137 + t139;
+        let t142 = self.fixed[12] * t140;
+        let t143 = t142 - t129;
+        let t144 = t35 * t143;
+        let t145 = X[0] * t144;
+        let t146 = X[1] * t144;
+        crate::nalgebra::SVector::<T, 2>::new(t145, t146)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t2 = X[0] * X[0];
@@ -645,54 +643,52 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t93 = t32 * t72;
         let t94 = t93 + T::one();
         let t95 = t92 * t94;
-        let t98 = t91 + T::nearest(2.0);
-        let t99 = t93 + T::nearest(2.0);
-        let t100 = t91 * t98;
-        let t101 = T::one() / t92;
-        let t102 = t100 * t101;
+        let t98 = T::one() / t92;
+        let t99 = t98 + T::one();
+        let t100 = T::one() / t94;
+        let t101 = t100 + T::one();
+        let t102 = t91 * t99;
         let t103 = t2 * t102;
         let t104 = t32 * t66;
-        let t105 = T::one() / t94;
-        let t106 = t99 * t105;
-        let t107 = t104 * t106;
-        let t108 = t103 + t107;
-        let t109 = self.fixed[9] * t34;
-        let t110 = t109 * t108;
-        let t111 = t93 * t106;
-        let t112 = t102 - t111;
-        let t113 = t74 * t34;
-        let t114 = self.fixed[9] * t113;
-        let t115 = t114 * t112;
-        let t116 = t3 * t102;
-        let t117 = t32 * t82;
-        let t118 = t117 * t106;
-        let t119 = t116 + t118;
-        let t120 = t109 * t119;
-        let t122 = t23 - self.fixed[10];
-        let t123 = t70 * t35;
-        let t124 = t123 + t122;
-        let t125 = self.fixed[7] * t124;
-        let t126 = t34 - self.fixed[5];
-        let t127 = t31 * t126;
-        let t128 = t125 - t127;
-        let t130 = self.fixed[11] * t13;
-        let t131 = t130 * t128;
-        let t132 = t91 * t101;
-        let t133 = t90 * t122;
-        let t134 = T::nearest(2.0) - t132;
-        let t135 = t91 * t132;
-        let t136 = t93 * t93;
-        let t137 = t136 * t105;
-        let t138 = t135 - t137;
-        let t139 = t35 * t138;
-        let t140 = t133 * t134;
-        let t141 = t140 * t132;
-        let t142 = t139 + t141;
-        let t144 = self.fixed[12] * t142;
-        let t145 = t144 - t131;
-        let t146 = t35 * t145;
-        let t147 = X[0] * t146;
-        let t148 = X[1] * t146;
+        let t105 = t104 * t101;
+        let t106 = t103 + t105;
+        let t107 = self.fixed[9] * t34;
+        let t108 = t107 * t106;
+        let t109 = t93 * t101;
+        let t110 = t102 - t109;
+        let t111 = t74 * t34;
+        let t112 = self.fixed[9] * t111;
+        let t113 = t112 * t110;
+        let t114 = t3 * t102;
+        let t115 = t32 * t82;
+        let t116 = t115 * t101;
+        let t117 = t114 + t116;
+        let t118 = t107 * t117;
+        let t120 = t23 - self.fixed[10];
+        let t121 = t70 * t35;
+        let t122 = t121 + t120;
+        let t123 = self.fixed[7] * t122;
+        let t124 = t34 - self.fixed[5];
+        let t125 = t31 * t124;
+        let t126 = t123 - t125;
+        let t128 = self.fixed[11] * t13;
+        let t129 = t128 * t126;
+        let t130 = t91 * t98;
+        let t131 = t90 * t120;
+        let t132 = T::nearest(2.0) - t130;
+        let t133 = t91 * t130;
+        let t134 = t93 * t93;
+        let t135 = t134 * t100;
+        let t136 = t133 - t135;
+        let t137 = t35 * t136;
+        let t138 = t131 * t132;
+        let t139 = t138 * t130;
+        let t140 = t137 + t139;
+        let t142 = self.fixed[12] * t140;
+        let t143 = t142 - t129;
+        let t144 = t35 * t143;
+        let t145 = X[0] * t144;
+        let t146 = X[1] * t144;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t37, t40),
             v: crate::nalgebra::SVector::<T, 2>::new(t47, t49),
@@ -700,8 +696,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
             H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t69, t77, t77, t85),
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t86, t77, t77, t87),
             J: t95,
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t110, t115, t115, t120),
-            b: crate::nalgebra::SVector::<T, 2>::new(t147, t148),
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t108, t113, t113, t118),
+            b: crate::nalgebra::SVector::<T, 2>::new(t145, t146),
         }
     }
     fn traction(
@@ -738,16 +734,15 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
                 let t72 = t31 * t35;
                 let t93 = t32 * t72;
                 let t94 = t93 + T::one();
-                let t99 = t93 + T::nearest(2.0);
-                let t105 = T::one() / t94;
-                let t106 = t99 * t105;
-                let t222 = self.fixed[21] * t13;
-                let t223 = t34 * t35;
-                let t224 = t65 * t223;
-                let t225 = t222 * t224;
-                let t226 = t225 * t106;
-                let t227 = -t226;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t227, T::zero()))
+                let t100 = T::one() / t94;
+                let t101 = t100 + T::one();
+                let t220 = self.fixed[21] * t13;
+                let t221 = t34 * t35;
+                let t222 = t65 * t221;
+                let t223 = t220 * t222;
+                let t224 = t223 * t101;
+                let t225 = -t224;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t225, T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t2 = X[0] * X[0];
@@ -770,16 +765,15 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
                 let t81 = t31 * t2;
                 let t93 = t32 * t72;
                 let t94 = t93 + T::one();
-                let t99 = t93 + T::nearest(2.0);
-                let t105 = T::one() / t94;
-                let t106 = t99 * t105;
-                let t222 = self.fixed[21] * t13;
-                let t223 = t34 * t35;
-                let t228 = t81 * t223;
-                let t229 = t222 * t228;
-                let t230 = t229 * t106;
-                let t231 = -t230;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t231))
+                let t100 = T::one() / t94;
+                let t101 = t100 + T::one();
+                let t220 = self.fixed[21] * t13;
+                let t221 = t34 * t35;
+                let t226 = t81 * t221;
+                let t227 = t220 * t226;
+                let t228 = t227 * t101;
+                let t229 = -t228;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t229))
             }
             _ => None,
         }
@@ -865,47 +859,47 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 8> for Ring<T> {
         let t71 = self.fixed[7] * t70;
         let t72 = t31 * t35;
         let t73 = t71 - t72;
-        let t122 = t23 - self.fixed[10];
-        let t123 = t70 * t35;
-        let t124 = t123 + t122;
-        let t125 = self.fixed[7] * t124;
-        let t126 = t34 - self.fixed[5];
-        let t127 = t31 * t126;
-        let t128 = t125 - t127;
-        let t149 = X[0] * t35;
-        let t150 = self.fixed[11] * t128;
-        let t151 = self.fixed[7] * t122;
-        let t152 = t73 * t35;
-        let t153 = t151 + t152;
-        let t159 = t59 * t59;
-        let t165 = t21 * t31;
-        let t166 = t165 * t159;
-        let t167 = t166 * t153;
-        let t168 = t167 * t35;
-        let t169 = self.fixed[13] * t168;
-        let t172 = t21 * t159;
-        let t173 = self.fixed[14] * t172;
-        let t174 = t31 * t31;
-        let t175 = t174 * t34;
-        let t176 = t31 * t73;
-        let t177 = t176 * t35;
-        let t178 = t173 - t175;
-        let t179 = t178 + t177;
-        let t181 = self.fixed[15] * t70;
-        let t182 = t181 + t72;
-        let t183 = t179 * t35;
-        let t186 = t122 * t182;
-        let t187 = self.fixed[16] * t186;
-        let t188 = t183 + t187;
-        let t195 = t70 * t188;
-        let t196 = self.fixed[17] * t195;
-        let t201 = t70 * t122;
-        let t202 = self.fixed[18] * t201;
-        let t203 = t178 * t35;
-        let t204 = t202 + t203;
-        let t207 = self.fixed[19] * t204;
-        let t217 = X[1] * t35;
-        [t70, t72, t149, t150, t169, t196, t207, t217]
+        let t120 = t23 - self.fixed[10];
+        let t121 = t70 * t35;
+        let t122 = t121 + t120;
+        let t123 = self.fixed[7] * t122;
+        let t124 = t34 - self.fixed[5];
+        let t125 = t31 * t124;
+        let t126 = t123 - t125;
+        let t147 = X[0] * t35;
+        let t148 = self.fixed[11] * t126;
+        let t149 = self.fixed[7] * t120;
+        let t150 = t73 * t35;
+        let t151 = t149 + t150;
+        let t157 = t59 * t59;
+        let t163 = t21 * t31;
+        let t164 = t163 * t157;
+        let t165 = t164 * t151;
+        let t166 = t165 * t35;
+        let t167 = self.fixed[13] * t166;
+        let t170 = t21 * t157;
+        let t171 = self.fixed[14] * t170;
+        let t172 = t31 * t31;
+        let t173 = t172 * t34;
+        let t174 = t31 * t73;
+        let t175 = t174 * t35;
+        let t176 = t171 - t173;
+        let t177 = t176 + t175;
+        let t179 = self.fixed[15] * t70;
+        let t180 = t179 + t72;
+        let t181 = t177 * t35;
+        let t184 = t120 * t180;
+        let t185 = self.fixed[16] * t184;
+        let t186 = t181 + t185;
+        let t193 = t70 * t186;
+        let t194 = self.fixed[17] * t193;
+        let t199 = t70 * t120;
+        let t200 = self.fixed[18] * t199;
+        let t201 = t176 * t35;
+        let t202 = t200 + t201;
+        let t205 = self.fixed[19] * t202;
+        let t215 = X[1] * t35;
+        [t70, t72, t147, t148, t167, t194, t205, t215]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -917,19 +911,19 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 8> for Ring<T> {
         let t92 = t91 + T::one();
         let t93 = time[1] * point[1];
         let t94 = t93 + T::one();
-        let t197 = time[0] * point[4];
-        let t198 = point[5] + t197;
-        let t208 = time[0] * t198;
-        let t209 = point[6] + t208;
-        let t210 = t92 * t92;
-        let t211 = t210 * t94;
-        let t212 = t209 / t211;
+        let t195 = time[0] * point[4];
+        let t196 = point[5] + t195;
+        let t206 = time[0] * t196;
+        let t207 = point[6] + t206;
+        let t208 = t92 * t92;
+        let t209 = t208 * t94;
+        let t210 = t207 / t209;
+        let t211 = time[0] * t210;
+        let t212 = t211 - point[3];
         let t213 = time[0] * t212;
-        let t214 = t213 - point[3];
-        let t215 = time[0] * t214;
-        let t216 = point[2] * t215;
-        let t218 = point[7] * t215;
-        crate::nalgebra::SVector::<T, 2>::new(t216, t218)
+        let t214 = point[2] * t213;
+        let t216 = point[7] * t213;
+        crate::nalgebra::SVector::<T, 2>::new(t214, t216)
     }
 }
 impl<T: crate::Real> From<Ring<T>> for crate::AnySolution<T> {

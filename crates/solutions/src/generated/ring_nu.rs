@@ -161,60 +161,60 @@ impl<T: crate::Real> RingNu<T> {
         let t99 = T::one() - t98;
         let t106 = T::nearest(0.5) * parameters.E;
         let t107 = t106 / t97;
-        let t109 = parameters.E * parameters.nu;
-        let t110 = t97 * t99;
-        let t111 = t109 / t110;
-        let t138 = parameters.Ri + parameters.Ro;
-        let t147 = parameters.nu / t99;
-        let t152 = T::one() / t97;
-        let t155 = t51 / parameters.rho0;
-        let t196 = T::one() / parameters.rho0;
-        let t212 = t111 + t107;
-        let t214 = parameters.A * parameters.A;
-        let t215 = t214 * t214;
-        let t216 = t15 * t15;
-        let t217 = t19 * t19;
-        let t219 = T::nearest(36.0) * t215;
-        let t220 = t219 * t212;
-        let t221 = parameters.rho0 * t216;
-        let t222 = t221 * t217;
-        let t223 = t220 / t222;
-        let t232 = T::nearest(3.0) / t26;
-        let t241 = t216 * t217;
-        let t242 = T::nearest(36.0) / t241;
-        let t265 = t214 * parameters.A;
-        let t266 = T::nearest(6.0) * t265;
-        let t267 = parameters.rho0 * t15;
-        let t268 = t267 * t19;
-        let t269 = t266 / t268;
-        let t274 = T::nearest(6.0) * t214;
-        let t275 = t274 * parameters.E;
-        let t276 = t275 * parameters.nu;
-        let t277 = t268 * t97;
-        let t278 = t277 * t99;
-        let t279 = t276 / t278;
-        let t283 = T::nearest(12.0) * t107;
-        let t284 = t283 / t26;
-        let t296 = t214 / parameters.rho0;
-        let t302 = t51 * parameters.nu;
-        let t303 = parameters.rho0 * t97;
-        let t304 = t303 * t99;
-        let t305 = t302 / t304;
-        let t318 = T::nearest(2.0) / t11;
-        let t319 = parameters.Ri - parameters.Ro;
-        let t320 = t319 * t319;
-        let t321 = t320 * t319;
-        let t322 = t321 / t26;
-        let t323 = T::one() - t322;
-        let t324 = parameters.A * t323;
-        let t325 = t324 / parameters.Ri;
-        let t329 = parameters.Ri * t97;
-        let t330 = t329 * t99;
-        let t331 = t109 / t330;
-        let t337 = parameters.A / parameters.Ro;
-        let t341 = parameters.Ro * t97;
-        let t342 = t341 * t99;
-        let t343 = t109 / t342;
+        let t110 = parameters.E * parameters.nu;
+        let t111 = t97 * t99;
+        let t112 = t110 / t111;
+        let t142 = parameters.Ri + parameters.Ro;
+        let t151 = parameters.nu / t99;
+        let t156 = T::one() / t97;
+        let t159 = t51 / parameters.rho0;
+        let t200 = T::one() / parameters.rho0;
+        let t216 = t112 + t107;
+        let t218 = parameters.A * parameters.A;
+        let t219 = t218 * t218;
+        let t220 = t15 * t15;
+        let t221 = t19 * t19;
+        let t223 = T::nearest(36.0) * t219;
+        let t224 = t223 * t216;
+        let t225 = parameters.rho0 * t220;
+        let t226 = t225 * t221;
+        let t227 = t224 / t226;
+        let t236 = T::nearest(3.0) / t26;
+        let t245 = t220 * t221;
+        let t246 = T::nearest(36.0) / t245;
+        let t269 = t218 * parameters.A;
+        let t270 = T::nearest(6.0) * t269;
+        let t271 = parameters.rho0 * t15;
+        let t272 = t271 * t19;
+        let t273 = t270 / t272;
+        let t278 = T::nearest(6.0) * t218;
+        let t279 = t278 * parameters.E;
+        let t280 = t279 * parameters.nu;
+        let t281 = t272 * t97;
+        let t282 = t281 * t99;
+        let t283 = t280 / t282;
+        let t287 = T::nearest(12.0) * t107;
+        let t288 = t287 / t26;
+        let t300 = t218 / parameters.rho0;
+        let t306 = t51 * parameters.nu;
+        let t307 = parameters.rho0 * t97;
+        let t308 = t307 * t99;
+        let t309 = t306 / t308;
+        let t322 = T::nearest(2.0) / t11;
+        let t323 = parameters.Ri - parameters.Ro;
+        let t324 = t323 * t323;
+        let t325 = t324 * t323;
+        let t326 = t325 / t26;
+        let t327 = T::one() - t326;
+        let t328 = parameters.A * t327;
+        let t329 = t328 / parameters.Ri;
+        let t333 = parameters.Ri * t97;
+        let t334 = t333 * t99;
+        let t335 = t110 / t334;
+        let t341 = parameters.A / parameters.Ro;
+        let t345 = parameters.Ro * t97;
+        let t346 = t345 * t99;
+        let t347 = t110 / t346;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -235,25 +235,25 @@ impl<T: crate::Real> RingNu<T> {
                 t88,
                 t89,
                 t107,
-                t111,
-                t138,
-                t147,
-                t152,
-                t155,
-                t196,
-                t223,
-                t232,
-                t242,
-                t269,
-                t279,
-                t284,
-                t296,
-                t305,
-                t318,
-                t325,
-                t331,
-                t337,
-                t343,
+                t112,
+                t142,
+                t151,
+                t156,
+                t159,
+                t200,
+                t227,
+                t236,
+                t246,
+                t273,
+                t283,
+                t288,
+                t300,
+                t309,
+                t322,
+                t329,
+                t335,
+                t341,
+                t347,
             ],
         })
     }
@@ -539,9 +539,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t34 = T::one() / t4;
         let t35 = t5 * t34;
         let t59 = t5 - self.parameters.Ri;
+        let t65 = t31 * t3;
+        let t66 = t65 * t35;
         let t70 = t20 * t59;
         let t72 = t31 * t35;
         let t74 = X[0] * X[1];
+        let t81 = t31 * t2;
+        let t82 = t81 * t35;
         let t90 = self.fixed[9] * t13;
         let t91 = t90 * t70;
         let t92 = t91 + T::one();
@@ -553,34 +557,38 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t102 = self.parameters.A * t101;
         let t103 = t102 + t91;
         let t104 = t103.ln_of_both(t95);
-        let t108 = t91 + T::nearest(2.0);
-        let t112 = self.fixed[11] * t104;
-        let t113 = self.fixed[10] * t108;
-        let t114 = t112 - t113;
-        let t115 = t91 * t114;
-        let t116 = -t115;
-        let t117 = t93 + T::nearest(2.0);
-        let t118 = self.fixed[10] * t117;
-        let t119 = t112 - t118;
-        let t120 = t93 * t119;
-        let t121 = -t120;
-        let t122 = t116 / t92;
-        let t123 = t2 * t122;
-        let t124 = T::one() / t94;
-        let t125 = t121 * t124;
-        let t126 = t3 * t125;
-        let t127 = t123 + t126;
-        let t128 = t34 * t127;
-        let t129 = t112 + t128;
-        let t130 = t122 - t125;
-        let t131 = t74 * t34;
-        let t132 = t131 * t130;
-        let t133 = t3 * t122;
-        let t134 = t2 * t125;
-        let t135 = t133 + t134;
-        let t136 = t34 * t135;
-        let t137 = t112 + t136;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t129, t132, t132, t137)
+        let t108 = T::one() / t92;
+        let t109 = t108 + T::one();
+        let t113 = t104 * t108;
+        let t114 = self.fixed[11] * t113;
+        let t115 = self.fixed[10] * t109;
+        let t116 = t114 - t115;
+        let t117 = T::one() / t94;
+        let t118 = t117 + T::one();
+        let t119 = t104 * t117;
+        let t120 = self.fixed[11] * t119;
+        let t121 = self.fixed[10] * t118;
+        let t122 = t120 - t121;
+        let t123 = t91 * t116;
+        let t124 = t2 * t123;
+        let t125 = t32 * t66;
+        let t126 = t125 * t122;
+        let t127 = t124 + t126;
+        let t128 = self.fixed[11] * t104;
+        let t129 = t34 * t127;
+        let t130 = t128 - t129;
+        let t131 = t93 * t122;
+        let t132 = t123 - t131;
+        let t133 = t74 * t34;
+        let t134 = t133 * t132;
+        let t135 = -t134;
+        let t136 = t3 * t123;
+        let t137 = t32 * t82;
+        let t138 = t137 * t122;
+        let t139 = t136 + t138;
+        let t140 = t34 * t139;
+        let t141 = t128 - t140;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t130, t135, t135, t141)
     }
     #[inline]
     fn body_force(
@@ -612,67 +620,67 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t90 = self.fixed[9] * t13;
         let t93 = t32 * t72;
         let t94 = t93 + T::one();
-        let t124 = T::one() / t94;
-        let t139 = t23 - self.fixed[12];
-        let t140 = self.fixed[7] * t139;
-        let t141 = t73 * t35;
-        let t142 = t140 + t141;
-        let t143 = self.fixed[3] * t70;
-        let t144 = T::nearest(6.0) * t143;
-        let t145 = t72 - t144;
-        let t146 = t35 * t145;
-        let t148 = self.fixed[13] * t142;
-        let t149 = t140 - t146;
-        let t150 = t149 + t148;
-        let t151 = self.fixed[5] * t31;
-        let t153 = self.fixed[14] * t150;
-        let t154 = t151 + t153;
-        let t156 = self.fixed[15] * t13;
-        let t157 = t156 * t154;
-        let t158 = self.fixed[8] * t13;
-        let t159 = t158 * t143;
-        let t160 = t159 + T::one();
-        let t161 = t159 * t94;
-        let t162 = t161 + t93;
-        let t163 = t160 * t94;
-        let t164 = t162.ln_of_both(t163);
-        let t165 = self.fixed[11] * t164;
-        let t166 = self.fixed[10] * t159;
-        let t167 = t165 + t166;
-        let t168 = self.fixed[10] * t93;
-        let t169 = t165 + t168;
-        let t170 = t90 * t139;
-        let t171 = T::one() / t160;
-        let t172 = t170 * t171;
-        let t173 = t159 * t172;
-        let t174 = t32 * t141;
-        let t175 = t174 * t124;
-        let t176 = t172 + t175;
-        let t177 = self.fixed[10] * t170;
-        let t178 = self.fixed[11] * t176;
-        let t179 = t177 + t178;
-        let t180 = t170 - t173;
-        let t181 = t167 * t180;
-        let t182 = t159 * t179;
+        let t117 = T::one() / t94;
+        let t143 = t23 - self.fixed[12];
+        let t144 = self.fixed[7] * t143;
+        let t145 = t73 * t35;
+        let t146 = t144 + t145;
+        let t147 = self.fixed[3] * t70;
+        let t148 = T::nearest(6.0) * t147;
+        let t149 = t72 - t148;
+        let t150 = t35 * t149;
+        let t152 = self.fixed[13] * t146;
+        let t153 = t144 - t150;
+        let t154 = t153 + t152;
+        let t155 = self.fixed[5] * t31;
+        let t157 = self.fixed[14] * t154;
+        let t158 = t155 + t157;
+        let t160 = self.fixed[15] * t13;
+        let t161 = t160 * t158;
+        let t162 = self.fixed[8] * t13;
+        let t163 = t162 * t147;
+        let t164 = t163 + T::one();
+        let t165 = t163 * t94;
+        let t166 = t165 + t93;
+        let t167 = t164 * t94;
+        let t168 = t166.ln_of_both(t167);
+        let t169 = self.fixed[11] * t168;
+        let t170 = self.fixed[10] * t163;
+        let t171 = t169 + t170;
+        let t172 = self.fixed[10] * t93;
+        let t173 = t169 + t172;
+        let t174 = t90 * t143;
+        let t175 = T::one() / t164;
+        let t176 = t174 * t175;
+        let t177 = t163 * t176;
+        let t178 = t32 * t145;
+        let t179 = t178 * t117;
+        let t180 = t176 + t179;
+        let t181 = self.fixed[10] * t174;
+        let t182 = self.fixed[11] * t180;
         let t183 = t181 + t182;
-        let t184 = t93 * t175;
-        let t185 = t173 + t184;
-        let t186 = t159 * t167;
-        let t187 = t186 * t171;
-        let t188 = t93 * t169;
-        let t189 = t188 * t124;
-        let t190 = t187 - t189;
-        let t191 = t35 * t190;
-        let t192 = t183 * t171;
-        let t193 = self.fixed[11] * t185;
-        let t194 = t191 + t192;
-        let t195 = t194 + t193;
-        let t197 = self.fixed[16] * t195;
-        let t198 = t197 - t157;
-        let t199 = t35 * t198;
-        let t200 = X[0] * t199;
-        let t201 = X[1] * t199;
-        crate::nalgebra::SVector::<T, 2>::new(t200, t201)
+        let t184 = t174 - t177;
+        let t185 = t171 * t184;
+        let t186 = t163 * t183;
+        let t187 = t185 + t186;
+        let t188 = t93 * t179;
+        let t189 = t177 + t188;
+        let t190 = t163 * t171;
+        let t191 = t190 * t175;
+        let t192 = t93 * t173;
+        let t193 = t192 * t117;
+        let t194 = t191 - t193;
+        let t195 = t35 * t194;
+        let t196 = t187 * t175;
+        let t197 = self.fixed[11] * t189;
+        let t198 = t195 + t196;
+        let t199 = t198 + t197;
+        let t201 = self.fixed[16] * t199;
+        let t202 = t201 - t161;
+        let t203 = t35 * t202;
+        let t204 = X[0] * t203;
+        let t205 = X[1] * t203;
+        crate::nalgebra::SVector::<T, 2>::new(t204, t205)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t2 = X[0] * X[0];
@@ -746,92 +754,96 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t102 = self.parameters.A * t101;
         let t103 = t102 + t91;
         let t104 = t103.ln_of_both(t95);
-        let t108 = t91 + T::nearest(2.0);
-        let t112 = self.fixed[11] * t104;
-        let t113 = self.fixed[10] * t108;
-        let t114 = t112 - t113;
-        let t115 = t91 * t114;
-        let t116 = -t115;
-        let t117 = t93 + T::nearest(2.0);
-        let t118 = self.fixed[10] * t117;
-        let t119 = t112 - t118;
-        let t120 = t93 * t119;
-        let t121 = -t120;
-        let t122 = t116 / t92;
-        let t123 = t2 * t122;
-        let t124 = T::one() / t94;
-        let t125 = t121 * t124;
-        let t126 = t3 * t125;
-        let t127 = t123 + t126;
-        let t128 = t34 * t127;
-        let t129 = t112 + t128;
-        let t130 = t122 - t125;
-        let t131 = t74 * t34;
-        let t132 = t131 * t130;
-        let t133 = t3 * t122;
-        let t134 = t2 * t125;
-        let t135 = t133 + t134;
-        let t136 = t34 * t135;
-        let t137 = t112 + t136;
-        let t139 = t23 - self.fixed[12];
-        let t140 = self.fixed[7] * t139;
-        let t141 = t73 * t35;
-        let t142 = t140 + t141;
-        let t143 = self.fixed[3] * t70;
-        let t144 = T::nearest(6.0) * t143;
-        let t145 = t72 - t144;
-        let t146 = t35 * t145;
-        let t148 = self.fixed[13] * t142;
-        let t149 = t140 - t146;
-        let t150 = t149 + t148;
-        let t151 = self.fixed[5] * t31;
-        let t153 = self.fixed[14] * t150;
-        let t154 = t151 + t153;
-        let t156 = self.fixed[15] * t13;
-        let t157 = t156 * t154;
-        let t158 = self.fixed[8] * t13;
-        let t159 = t158 * t143;
-        let t160 = t159 + T::one();
-        let t161 = t159 * t94;
-        let t162 = t161 + t93;
-        let t163 = t160 * t94;
-        let t164 = t162.ln_of_both(t163);
-        let t165 = self.fixed[11] * t164;
-        let t166 = self.fixed[10] * t159;
-        let t167 = t165 + t166;
-        let t168 = self.fixed[10] * t93;
-        let t169 = t165 + t168;
-        let t170 = t90 * t139;
-        let t171 = T::one() / t160;
-        let t172 = t170 * t171;
-        let t173 = t159 * t172;
-        let t174 = t32 * t141;
-        let t175 = t174 * t124;
-        let t176 = t172 + t175;
-        let t177 = self.fixed[10] * t170;
-        let t178 = self.fixed[11] * t176;
-        let t179 = t177 + t178;
-        let t180 = t170 - t173;
-        let t181 = t167 * t180;
-        let t182 = t159 * t179;
+        let t108 = T::one() / t92;
+        let t109 = t108 + T::one();
+        let t113 = t104 * t108;
+        let t114 = self.fixed[11] * t113;
+        let t115 = self.fixed[10] * t109;
+        let t116 = t114 - t115;
+        let t117 = T::one() / t94;
+        let t118 = t117 + T::one();
+        let t119 = t104 * t117;
+        let t120 = self.fixed[11] * t119;
+        let t121 = self.fixed[10] * t118;
+        let t122 = t120 - t121;
+        let t123 = t91 * t116;
+        let t124 = t2 * t123;
+        let t125 = t32 * t66;
+        let t126 = t125 * t122;
+        let t127 = t124 + t126;
+        let t128 = self.fixed[11] * t104;
+        let t129 = t34 * t127;
+        let t130 = t128 - t129;
+        let t131 = t93 * t122;
+        let t132 = t123 - t131;
+        let t133 = t74 * t34;
+        let t134 = t133 * t132;
+        let t135 = -t134;
+        let t136 = t3 * t123;
+        let t137 = t32 * t82;
+        let t138 = t137 * t122;
+        let t139 = t136 + t138;
+        let t140 = t34 * t139;
+        let t141 = t128 - t140;
+        let t143 = t23 - self.fixed[12];
+        let t144 = self.fixed[7] * t143;
+        let t145 = t73 * t35;
+        let t146 = t144 + t145;
+        let t147 = self.fixed[3] * t70;
+        let t148 = T::nearest(6.0) * t147;
+        let t149 = t72 - t148;
+        let t150 = t35 * t149;
+        let t152 = self.fixed[13] * t146;
+        let t153 = t144 - t150;
+        let t154 = t153 + t152;
+        let t155 = self.fixed[5] * t31;
+        let t157 = self.fixed[14] * t154;
+        let t158 = t155 + t157;
+        let t160 = self.fixed[15] * t13;
+        let t161 = t160 * t158;
+        let t162 = self.fixed[8] * t13;
+        let t163 = t162 * t147;
+        let t164 = t163 + T::one();
+        let t165 = t163 * t94;
+        let t166 = t165 + t93;
+        let t167 = t164 * t94;
+        let t168 = t166.ln_of_both(t167);
+        let t169 = self.fixed[11] * t168;
+        let t170 = self.fixed[10] * t163;
+        let t171 = t169 + t170;
+        let t172 = self.fixed[10] * t93;
+        let t173 = t169 + t172;
+        let t174 = t90 * t143;
+        let t175 = T::one() / t164;
+        let t176 = t174 * t175;
+        let t177 = t163 * t176;
+        let t178 = t32 * t145;
+        let t179 = t178 * t117;
+        let t180 = t176 + t179;
+        let t181 = self.fixed[10] * t174;
+        let t182 = self.fixed[11] * t180;
         let t183 = t181 + t182;
-        let t184 = t93 * t175;
-        let t185 = t173 + t184;
-        let t186 = t159 * t167;
-        let t187 = t186 * t171;
-        let t188 = t93 * t169;
-        let t189 = t188 * t124;
-        let t190 = t187 - t189;
-        let t191 = t35 * t190;
-        let t192 = t183 * t171;
-        let t193 = self.fixed[11] * t185;
-        let t194 = t191 + t192;
-        let t195 = t194 + t193;
-        let t197 = self.fixed[16] * t195;
-        let t198 = t197 - t157;
-        let t199 = t35 * t198;
-        let t200 = X[0] * t199;
-        let t201 = X[1] * t199;
+        let t184 = t174 - t177;
+        let t185 = t171 * t184;
+        let t186 = t163 * t183;
+        let t187 = t185 + t186;
+        let t188 = t93 * t179;
+        let t189 = t177 + t188;
+        let t190 = t163 * t171;
+        let t191 = t190 * t175;
+        let t192 = t93 * t173;
+        let t193 = t192 * t117;
+        let t194 = t191 - t193;
+        let t195 = t35 * t194;
+        let t196 = t187 * t175;
+        let t197 = self.fixed[11] * t189;
+        let t198 = t195 + t196;
+        let t199 = t198 + t197;
+        let t201 = self.fixed[16] * t199;
+        let t202 = t201 - t161;
+        let t203 = t35 * t202;
+        let t204 = X[0] * t203;
+        let t205 = X[1] * t203;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t37, t40),
             v: crate::nalgebra::SVector::<T, 2>::new(t47, t49),
@@ -839,8 +851,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
             H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t69, t77, t77, t85),
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t86, t77, t77, t87),
             J: t95,
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t129, t132, t132, t137),
-            b: crate::nalgebra::SVector::<T, 2>::new(t200, t201),
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t130, t135, t135, t141),
+            b: crate::nalgebra::SVector::<T, 2>::new(t204, t205),
         }
     }
     fn traction(
@@ -853,26 +865,26 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
             crate::Surface::Inner => {
                 let t12 = self.fixed[0] * t;
                 let t13 = t12.cos_pi();
-                let t326 = self.fixed[26] * t13;
-                let t327 = t326 + T::one();
-                let t328 = t326.ln_of_both(t327);
-                let t332 = self.fixed[27] * t328;
-                let t333 = t332 * X[0];
-                let t334 = -t333;
-                let t335 = t332 * X[1];
-                let t336 = -t335;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t334, t336))
+                let t330 = self.fixed[26] * t13;
+                let t331 = t330 + T::one();
+                let t332 = t330.ln_of_both(t331);
+                let t336 = self.fixed[27] * t332;
+                let t337 = t336 * X[0];
+                let t338 = -t337;
+                let t339 = t336 * X[1];
+                let t340 = -t339;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t338, t340))
             }
             crate::Surface::Outer => {
                 let t12 = self.fixed[0] * t;
                 let t13 = t12.cos_pi();
-                let t338 = self.fixed[28] * t13;
-                let t339 = t338 + T::one();
-                let t340 = t338.ln_of_both(t339);
-                let t344 = self.fixed[29] * t340;
-                let t345 = t344 * X[0];
-                let t346 = t344 * X[1];
-                Some(crate::nalgebra::SVector::<T, 2>::new(t345, t346))
+                let t342 = self.fixed[28] * t13;
+                let t343 = t342 + T::one();
+                let t344 = t342.ln_of_both(t343);
+                let t348 = self.fixed[29] * t344;
+                let t349 = t348 * X[0];
+                let t350 = t348 * X[1];
+                Some(crate::nalgebra::SVector::<T, 2>::new(t349, t350))
             }
             crate::Surface::Lower(0) => {
                 let t2 = X[0] * X[0];
@@ -892,6 +904,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
                 let t34 = T::one() / t4;
                 let t35 = t5 * t34;
                 let t59 = t5 - self.parameters.Ri;
+                let t65 = t31 * t3;
                 let t70 = t20 * t59;
                 let t72 = t31 * t35;
                 let t90 = self.fixed[9] * t13;
@@ -905,19 +918,20 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
                 let t102 = self.parameters.A * t101;
                 let t103 = t102 + t91;
                 let t104 = t103.ln_of_both(t95);
-                let t112 = self.fixed[11] * t104;
-                let t117 = t93 + T::nearest(2.0);
-                let t118 = self.fixed[10] * t117;
-                let t119 = t112 - t118;
-                let t120 = t93 * t119;
-                let t121 = -t120;
-                let t124 = T::one() / t94;
-                let t125 = t121 * t124;
-                let t347 = t3 * t34;
-                let t348 = t347 * t125;
-                let t349 = t112 + t348;
-                let t350 = -t349;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t350, T::zero()))
+                let t117 = T::one() / t94;
+                let t118 = t117 + T::one();
+                let t119 = t104 * t117;
+                let t120 = self.fixed[11] * t119;
+                let t121 = self.fixed[10] * t118;
+                let t122 = t120 - t121;
+                let t128 = self.fixed[11] * t104;
+                let t351 = t34 * t35;
+                let t352 = t65 * t351;
+                let t353 = t32 * t352;
+                let t354 = t353 * t122;
+                let t355 = t128 - t354;
+                let t356 = -t355;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t356, T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t2 = X[0] * X[0];
@@ -939,6 +953,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
                 let t59 = t5 - self.parameters.Ri;
                 let t70 = t20 * t59;
                 let t72 = t31 * t35;
+                let t81 = t31 * t2;
                 let t90 = self.fixed[9] * t13;
                 let t91 = t90 * t70;
                 let t92 = t91 + T::one();
@@ -950,19 +965,20 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
                 let t102 = self.parameters.A * t101;
                 let t103 = t102 + t91;
                 let t104 = t103.ln_of_both(t95);
-                let t112 = self.fixed[11] * t104;
-                let t117 = t93 + T::nearest(2.0);
-                let t118 = self.fixed[10] * t117;
-                let t119 = t112 - t118;
-                let t120 = t93 * t119;
-                let t121 = -t120;
-                let t124 = T::one() / t94;
-                let t125 = t121 * t124;
-                let t352 = t2 * t34;
-                let t353 = t352 * t125;
-                let t354 = t112 + t353;
-                let t355 = -t354;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t355))
+                let t117 = T::one() / t94;
+                let t118 = t117 + T::one();
+                let t119 = t104 * t117;
+                let t120 = self.fixed[11] * t119;
+                let t121 = self.fixed[10] * t118;
+                let t122 = t120 - t121;
+                let t128 = self.fixed[11] * t104;
+                let t351 = t34 * t35;
+                let t358 = t81 * t351;
+                let t359 = t32 * t358;
+                let t360 = t359 * t122;
+                let t361 = t128 - t360;
+                let t362 = -t361;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t362))
             }
             _ => None,
         }
@@ -1048,80 +1064,80 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         let t71 = self.fixed[7] * t70;
         let t72 = t31 * t35;
         let t73 = t71 - t72;
-        let t139 = t23 - self.fixed[12];
-        let t140 = self.fixed[7] * t139;
-        let t141 = t73 * t35;
-        let t142 = t140 + t141;
-        let t148 = self.fixed[13] * t142;
-        let t151 = self.fixed[5] * t31;
-        let t202 = X[0] * t35;
-        let t203 = t70 * t35;
-        let t204 = t203 + t139;
-        let t205 = self.fixed[7] * t204;
-        let t206 = t31 * t34;
-        let t207 = t205 - t206;
-        let t208 = t207 + t148;
-        let t209 = self.fixed[14] * t208;
-        let t210 = t151 + t209;
-        let t211 = self.fixed[15] * t210;
-        let t218 = t59 * t59;
-        let t224 = t21 * t31;
-        let t225 = t224 * t218;
-        let t226 = t225 * t142;
-        let t227 = t226 * t35;
-        let t228 = self.fixed[17] * t227;
-        let t229 = t31 * t139;
-        let t230 = t70 * t73;
-        let t231 = t229 + t230;
-        let t233 = self.fixed[18] * t70;
-        let t234 = t233 + t72;
-        let t235 = t139 * t234;
-        let t236 = T::nearest(2.0) * t235;
-        let t237 = self.fixed[10] * t236;
-        let t238 = t231 * t35;
-        let t239 = self.fixed[11] * t238;
-        let t240 = t237 + t239;
-        let t243 = t21 * t218;
-        let t244 = self.fixed[19] * t243;
-        let t245 = t31 * t31;
-        let t246 = t245 * t34;
-        let t247 = t31 * t73;
-        let t248 = t247 * t35;
-        let t249 = t244 - t246;
-        let t250 = t249 + t248;
-        let t251 = self.fixed[18] * t139;
-        let t252 = t251 + t141;
-        let t253 = t252 * t35;
-        let t254 = T::nearest(2.0) * t253;
-        let t255 = t31 * t254;
-        let t256 = t70 * t139;
-        let t257 = self.fixed[19] * t256;
-        let t258 = t255 + t257;
-        let t259 = self.fixed[7] * t240;
-        let t260 = t250 * t35;
-        let t261 = self.fixed[10] * t260;
-        let t262 = self.fixed[11] * t258;
-        let t263 = t259 + t261;
-        let t264 = t263 + t262;
-        let t270 = t70 * t264;
-        let t271 = self.fixed[20] * t270;
-        let t280 = self.fixed[21] * t238;
-        let t281 = self.fixed[11] * t142;
-        let t285 = self.fixed[22] * t139;
-        let t286 = t281 + t285;
-        let t287 = t247 * t34;
-        let t288 = t257 + t287;
-        let t289 = t70 * t286;
-        let t290 = self.fixed[7] * t289;
-        let t291 = t249 * t35;
-        let t292 = self.fixed[10] * t291;
-        let t293 = self.fixed[11] * t288;
-        let t294 = t290 + t292;
-        let t295 = t294 + t293;
-        let t297 = self.fixed[23] * t295;
-        let t306 = self.fixed[24] * t142;
-        let t316 = X[1] * t35;
-        [t70, t72, t202, t211, t228, t271, t280, t297, t306, t316]
+        let t143 = t23 - self.fixed[12];
+        let t144 = self.fixed[7] * t143;
+        let t145 = t73 * t35;
+        let t146 = t144 + t145;
+        let t152 = self.fixed[13] * t146;
+        let t155 = self.fixed[5] * t31;
+        let t206 = X[0] * t35;
+        let t207 = t70 * t35;
+        let t208 = t207 + t143;
+        let t209 = self.fixed[7] * t208;
+        let t210 = t31 * t34;
+        let t211 = t209 - t210;
+        let t212 = t211 + t152;
+        let t213 = self.fixed[14] * t212;
+        let t214 = t155 + t213;
+        let t215 = self.fixed[15] * t214;
+        let t222 = t59 * t59;
+        let t228 = t21 * t31;
+        let t229 = t228 * t222;
+        let t230 = t229 * t146;
+        let t231 = t230 * t35;
+        let t232 = self.fixed[17] * t231;
+        let t233 = t31 * t143;
+        let t234 = t70 * t73;
+        let t235 = t233 + t234;
+        let t237 = self.fixed[18] * t70;
+        let t238 = t237 + t72;
+        let t239 = t143 * t238;
+        let t240 = T::nearest(2.0) * t239;
+        let t241 = self.fixed[10] * t240;
+        let t242 = t235 * t35;
+        let t243 = self.fixed[11] * t242;
+        let t244 = t241 + t243;
+        let t247 = t21 * t222;
+        let t248 = self.fixed[19] * t247;
+        let t249 = t31 * t31;
+        let t250 = t249 * t34;
+        let t251 = t31 * t73;
+        let t252 = t251 * t35;
+        let t253 = t248 - t250;
+        let t254 = t253 + t252;
+        let t255 = self.fixed[18] * t143;
+        let t256 = t255 + t145;
+        let t257 = t256 * t35;
+        let t258 = T::nearest(2.0) * t257;
+        let t259 = t31 * t258;
+        let t260 = t70 * t143;
+        let t261 = self.fixed[19] * t260;
+        let t262 = t259 + t261;
+        let t263 = self.fixed[7] * t244;
+        let t264 = t254 * t35;
+        let t265 = self.fixed[10] * t264;
+        let t266 = self.fixed[11] * t262;
+        let t267 = t263 + t265;
+        let t268 = t267 + t266;
+        let t274 = t70 * t268;
+        let t275 = self.fixed[20] * t274;
+        let t284 = self.fixed[21] * t242;
+        let t285 = self.fixed[11] * t146;
+        let t289 = self.fixed[22] * t143;
+        let t290 = t285 + t289;
+        let t291 = t251 * t34;
+        let t292 = t261 + t291;
+        let t293 = t70 * t290;
+        let t294 = self.fixed[7] * t293;
+        let t295 = t253 * t35;
+        let t296 = self.fixed[10] * t295;
+        let t297 = self.fixed[11] * t292;
+        let t298 = t294 + t296;
+        let t299 = t298 + t297;
+        let t301 = self.fixed[23] * t299;
+        let t310 = self.fixed[24] * t146;
+        let t320 = X[1] * t35;
+        [t70, t72, t206, t215, t232, t275, t284, t301, t310, t320]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -1139,23 +1155,23 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         let t102 = self.parameters.A * t101;
         let t103 = t102 + t91;
         let t104 = t103.ln_of_both(t95);
-        let t272 = time[0] * point[4];
-        let t273 = point[5] + t272;
-        let t298 = time[0] * t273;
-        let t299 = point[6] * t104;
-        let t300 = t298 + t299;
-        let t301 = point[7] + t300;
-        let t307 = time[0] * t301;
-        let t308 = point[8] * t104;
-        let t309 = t307 + t308;
-        let t310 = t92 * t92;
-        let t311 = t310 * t94;
-        let t312 = t309 / t311;
-        let t313 = t312 - point[3];
-        let t314 = time[0] * t313;
-        let t315 = point[2] * t314;
-        let t317 = point[9] * t314;
-        crate::nalgebra::SVector::<T, 2>::new(t315, t317)
+        let t276 = time[0] * point[4];
+        let t277 = point[5] + t276;
+        let t302 = time[0] * t277;
+        let t303 = point[6] * t104;
+        let t304 = t302 + t303;
+        let t305 = point[7] + t304;
+        let t311 = time[0] * t305;
+        let t312 = point[8] * t104;
+        let t313 = t311 + t312;
+        let t314 = t92 * t92;
+        let t315 = t314 * t94;
+        let t316 = t313 / t315;
+        let t317 = t316 - point[3];
+        let t318 = time[0] * t317;
+        let t319 = point[2] * t318;
+        let t321 = point[9] * t318;
+        crate::nalgebra::SVector::<T, 2>::new(t319, t321)
     }
 }
 impl<T: crate::Real> From<RingNu<T>> for crate::AnySolution<T> {

@@ -125,106 +125,108 @@ impl<T: crate::Real> Skew2d<T> {
         let t58 = t57 / parameters.rho0;
         let t63 = T::nearest(3.0) * parameters.A;
         let t91 = parameters.nu + T::one();
-        let t92 = T::nearest(2.0) * parameters.nu;
-        let t93 = T::one() - t92;
-        let t98 = T::nearest(0.5) * parameters.E;
-        let t99 = t98 / t91;
-        let t102 = parameters.A * parameters.A;
-        let t109 = parameters.E * parameters.nu;
-        let t110 = t91 * t93;
-        let t111 = t109 / t110;
-        let t121 = parameters.A * t99;
-        let t163 = t92 / t93;
-        let t167 = T::nearest(10.0) * t49;
-        let t170 = T::one() / t91;
-        let t173 = t56 / parameters.rho0;
-        let t176 = T::nearest(9.0) * parameters.A;
-        let t181 = T::nearest(0.8) * parameters.A;
-        let t186 = T::nearest(0.2) * parameters.A;
-        let t231 = T::nearest(0.05) * parameters.A;
-        let t271 = T::one() / parameters.rho0;
-        let t288 = parameters.nu / t93;
-        let t292 = T::nearest(2.0) * t49;
-        let t297 = t231 * parameters.E;
-        let t298 = t297 / parameters.rho0;
-        let t350 = T::nearest(3.0) * T::pi();
-        let t356 = t111 + t99;
-        let t358 = t102 * t102;
-        let t359 = t358 * parameters.A;
-        let t361 = T::nearest(0.09) * t359;
-        let t362 = t361 * t356;
-        let t363 = t362 / parameters.rho0;
-        let t369 = T::nearest(0.002) * t359;
-        let t370 = t369 * t356;
-        let t371 = t370 / parameters.rho0;
-        let t410 = T::nearest(12.0) * t99;
-        let t415 = T::nearest(0.01) * t358;
-        let t416 = t415 / parameters.rho0;
-        let t424 = T::nearest(0.004) * t358;
-        let t425 = t424 * t356;
-        let t426 = t425 / parameters.rho0;
-        let t434 = T::nearest(4.0) * T::pi();
-        let t436 = T::nearest(3.0) * t49;
-        let t449 = t102 * parameters.A;
-        let t450 = T::nearest(0.005) * t449;
-        let t451 = t450 * parameters.E;
-        let t452 = t451 * parameters.nu;
-        let t453 = parameters.rho0 * t91;
-        let t454 = t453 * t93;
-        let t455 = t452 / t454;
-        let t457 = T::nearest(9.0) * T::pi();
-        let t464 = T::nearest(6.0) * T::pi();
-        let t470 = T::nearest(2.0) * T::pi();
-        let t479 = T::nearest(2.0) * t99;
-        let t493 = T::nearest(4.0) * t99;
-        let t495 = T::nearest(3.0) * t99;
-        let t499 = T::nearest(4.0) * parameters.E;
-        let t500 = t499 * parameters.nu;
-        let t501 = t500 / t110;
-        let t504 = T::nearest(2.0) * parameters.E;
-        let t505 = t504 * parameters.nu;
-        let t506 = t505 / t110;
-        let t512 = t450 / parameters.rho0;
-        let t521 = T::nearest(5.4) * t358;
-        let t522 = t521 * t356;
-        let t523 = t522 / parameters.rho0;
-        let t534 = T::nearest(0.6) * t449;
-        let t535 = t534 / parameters.rho0;
-        let t540 = T::nearest(0.2) * t102;
-        let t541 = t540 * parameters.E;
-        let t542 = t541 * parameters.nu;
-        let t543 = t542 / t454;
-        let t545 = T::nearest(6.0) * t356;
-        let t549 = T::nearest(3.0) * t356;
-        let t553 = T::nearest(0.1) * t102;
-        let t554 = t553 / parameters.rho0;
-        let t563 = T::nearest(0.002) * t449;
-        let t564 = t563 * t356;
-        let t565 = t564 / parameters.rho0;
-        let t572 = T::nearest(0.005) * t102;
-        let t573 = t572 * parameters.E;
-        let t574 = t573 * parameters.nu;
-        let t575 = t574 / t454;
-        let t578 = T::nearest(4.0) * t356;
-        let t583 = t572 / parameters.rho0;
-        let t589 = t186 * parameters.E;
-        let t590 = t589 * parameters.nu;
-        let t591 = t590 / t454;
-        let t599 = T::nearest(81.0) * t449;
-        let t600 = t599 * t356;
-        let t601 = t600 / parameters.rho0;
-        let t605 = T::nearest(54.0) * t102;
-        let t606 = t605 * t356;
-        let t607 = t606 / parameters.rho0;
-        let t612 = t176 * parameters.E;
-        let t613 = t612 * parameters.nu;
-        let t614 = t613 / t454;
-        let t626 = T::nearest(2.0) / t11;
-        let t631 = t33 * T::pi();
-        let t682 = T::nearest(2.0).cos();
-        let t683 = T::pi() * t682;
-        let t688 = T::nearest(2.0).sin();
-        let t689 = T::nearest(4.0) * t688;
+        let t92 = T::nearest(0.5) * parameters.E;
+        let t93 = t92 / t91;
+        let t99 = T::nearest(2.0) * parameters.nu;
+        let t100 = T::one() - t99;
+        let t105 = parameters.E * parameters.nu;
+        let t106 = t91 * t100;
+        let t107 = t105 / t106;
+        let t122 = t50 * parameters.nu;
+        let t123 = t122 / t106;
+        let t149 = t99 / t100;
+        let t153 = T::nearest(10.0) * t49;
+        let t156 = T::one() / t91;
+        let t159 = t56 / parameters.rho0;
+        let t162 = T::nearest(9.0) * parameters.A;
+        let t167 = T::nearest(0.8) * parameters.A;
+        let t172 = T::nearest(0.2) * parameters.A;
+        let t216 = T::nearest(0.05) * parameters.A;
+        let t255 = T::one() / parameters.rho0;
+        let t272 = parameters.nu / t100;
+        let t276 = T::nearest(2.0) * t49;
+        let t281 = t216 * parameters.E;
+        let t282 = t281 / parameters.rho0;
+        let t334 = T::nearest(3.0) * T::pi();
+        let t340 = t107 + t93;
+        let t342 = parameters.A * parameters.A;
+        let t343 = t342 * t342;
+        let t344 = t343 * parameters.A;
+        let t347 = T::nearest(0.09) * t344;
+        let t348 = t347 * t340;
+        let t349 = t348 / parameters.rho0;
+        let t355 = T::nearest(0.002) * t344;
+        let t356 = t355 * t340;
+        let t357 = t356 / parameters.rho0;
+        let t396 = T::nearest(12.0) * t93;
+        let t401 = T::nearest(0.01) * t343;
+        let t402 = t401 / parameters.rho0;
+        let t410 = T::nearest(0.004) * t343;
+        let t411 = t410 * t340;
+        let t412 = t411 / parameters.rho0;
+        let t420 = T::nearest(4.0) * T::pi();
+        let t422 = T::nearest(3.0) * t49;
+        let t435 = t342 * parameters.A;
+        let t436 = T::nearest(0.005) * t435;
+        let t437 = t436 * parameters.E;
+        let t438 = t437 * parameters.nu;
+        let t439 = parameters.rho0 * t91;
+        let t440 = t439 * t100;
+        let t441 = t438 / t440;
+        let t443 = T::nearest(9.0) * T::pi();
+        let t450 = T::nearest(6.0) * T::pi();
+        let t456 = T::nearest(2.0) * T::pi();
+        let t465 = T::nearest(2.0) * t93;
+        let t479 = T::nearest(4.0) * t93;
+        let t481 = T::nearest(3.0) * t93;
+        let t485 = T::nearest(4.0) * parameters.E;
+        let t486 = t485 * parameters.nu;
+        let t487 = t486 / t106;
+        let t490 = T::nearest(2.0) * parameters.E;
+        let t491 = t490 * parameters.nu;
+        let t492 = t491 / t106;
+        let t498 = t436 / parameters.rho0;
+        let t507 = T::nearest(5.4) * t343;
+        let t508 = t507 * t340;
+        let t509 = t508 / parameters.rho0;
+        let t520 = T::nearest(0.6) * t435;
+        let t521 = t520 / parameters.rho0;
+        let t526 = T::nearest(0.2) * t342;
+        let t527 = t526 * parameters.E;
+        let t528 = t527 * parameters.nu;
+        let t529 = t528 / t440;
+        let t531 = T::nearest(6.0) * t340;
+        let t535 = T::nearest(3.0) * t340;
+        let t539 = T::nearest(0.1) * t342;
+        let t540 = t539 / parameters.rho0;
+        let t549 = T::nearest(0.002) * t435;
+        let t550 = t549 * t340;
+        let t551 = t550 / parameters.rho0;
+        let t558 = T::nearest(0.005) * t342;
+        let t559 = t558 * parameters.E;
+        let t560 = t559 * parameters.nu;
+        let t561 = t560 / t440;
+        let t564 = T::nearest(4.0) * t340;
+        let t569 = t558 / parameters.rho0;
+        let t575 = t172 * parameters.E;
+        let t576 = t575 * parameters.nu;
+        let t577 = t576 / t440;
+        let t585 = T::nearest(81.0) * t435;
+        let t586 = t585 * t340;
+        let t587 = t586 / parameters.rho0;
+        let t591 = T::nearest(54.0) * t342;
+        let t592 = t591 * t340;
+        let t593 = t592 / parameters.rho0;
+        let t598 = t162 * parameters.E;
+        let t599 = t598 * parameters.nu;
+        let t600 = t599 / t440;
+        let t612 = T::nearest(2.0) / t11;
+        let t617 = t33 * T::pi();
+        let t652 = T::nearest(2.0).cos();
+        let t653 = T::pi() * t652;
+        let t658 = T::nearest(2.0).sin();
+        let t659 = T::nearest(4.0) * t658;
+        let t688 = parameters.A * t93;
         Ok(Skew2d {
             parameters,
             fixed: [
@@ -236,59 +238,59 @@ impl<T: crate::Real> Skew2d<T> {
                 t52,
                 t58,
                 t63,
-                t99,
-                t102,
-                t111,
-                t121,
-                t163,
+                t93,
+                t107,
+                t123,
+                t149,
+                t153,
+                t156,
+                t159,
+                t162,
                 t167,
-                t170,
-                t173,
-                t176,
-                t181,
-                t186,
-                t231,
-                t271,
-                t288,
-                t292,
-                t298,
-                t350,
-                t356,
-                t363,
-                t371,
-                t410,
-                t416,
-                t426,
-                t434,
-                t436,
-                t455,
-                t457,
-                t464,
-                t470,
+                t172,
+                t216,
+                t255,
+                t272,
+                t276,
+                t282,
+                t334,
+                t340,
+                t349,
+                t357,
+                t396,
+                t402,
+                t412,
+                t420,
+                t422,
+                t441,
+                t443,
+                t450,
+                t456,
+                t465,
                 t479,
-                t493,
-                t495,
-                t501,
-                t506,
-                t512,
-                t523,
+                t481,
+                t487,
+                t492,
+                t498,
+                t509,
+                t521,
+                t529,
+                t531,
                 t535,
-                t543,
-                t545,
-                t549,
-                t554,
-                t565,
-                t575,
-                t578,
-                t583,
-                t591,
-                t601,
-                t607,
-                t614,
-                t626,
-                t631,
-                t683,
-                t689,
+                t540,
+                t551,
+                t561,
+                t564,
+                t569,
+                t577,
+                t587,
+                t593,
+                t600,
+                t612,
+                t617,
+                t653,
+                t659,
+                t688,
             ],
         })
     }
@@ -580,57 +582,43 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t88 = t66 * t71;
         let t89 = t87 - t88;
         let t94 = t65 * t86;
-        let t95 = t94 + t78;
-        let t96 = t95 - t88;
-        let t97 = t96.log_1p();
-        let t100 = T::nearest(2.0) * t65;
-        let t101 = t65 * t65;
-        let t103 = t13 * t13;
-        let t104 = t62 * t62;
-        let t105 = self.fixed[9] * t103;
-        let t106 = t105 * t104;
-        let t107 = t100 + t101;
-        let t108 = t107 + t106;
-        let t112 = self.fixed[10] * t97;
-        let t113 = self.fixed[8] * t108;
-        let t114 = t112 + t113;
-        let t115 = t13 * t62;
-        let t116 = t115 * t86;
-        let t117 = self.parameters.A * t116;
-        let t118 = t71 * t80;
-        let t119 = t117 + t118;
-        let t120 = t86 * t114;
-        let t122 = self.fixed[11] * t13;
-        let t123 = t122 * t62;
-        let t124 = t123 * t119;
-        let t125 = t120 - t124;
-        let t126 = T::one() / t89;
+        let t95 = t88 - t94;
+        let t96 = T::one() / t89;
+        let t97 = t95 * t96;
+        let t98 = t65 - t97;
+        let t101 = t94 + t78;
+        let t102 = t101 - t88;
+        let t103 = t102.log_1p();
+        let t104 = self.fixed[8] * t98;
+        let t108 = t86 * t103;
+        let t109 = t108 * t96;
+        let t110 = self.fixed[9] * t109;
+        let t111 = t104 + t110;
+        let t112 = t71 * t96;
+        let t113 = t66 + t112;
+        let t114 = self.fixed[8] * t113;
+        let t115 = t71 * t103;
+        let t116 = t115 * t96;
+        let t117 = self.fixed[9] * t116;
+        let t118 = t114 - t117;
+        let t119 = t66 * t96;
+        let t120 = t71 + t119;
+        let t121 = self.fixed[8] * t120;
+        let t124 = self.fixed[10] * t13;
+        let t125 = t124 * t62;
+        let t126 = t103 * t96;
         let t127 = t125 * t126;
-        let t128 = t71 * t114;
-        let t129 = t80 * t119;
-        let t130 = self.fixed[8] * t129;
-        let t131 = t128 - t130;
-        let t132 = t131 * t126;
-        let t133 = -t132;
-        let t134 = T::nearest(2.0) * t78;
-        let t135 = t71 * t71;
-        let t136 = t78 * t78;
-        let t137 = t134 + t135;
-        let t138 = t137 + t136;
-        let t139 = self.fixed[8] * t138;
-        let t140 = t112 + t139;
-        let t141 = t86 * t119;
-        let t142 = self.fixed[8] * t141;
-        let t143 = t66 * t140;
-        let t144 = t142 - t143;
-        let t145 = t144 * t126;
-        let t146 = t71 * t119;
-        let t147 = self.fixed[8] * t146;
-        let t148 = t80 * t140;
-        let t149 = t147 - t148;
-        let t150 = t149 * t126;
-        let t151 = -t150;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t127, t133, t145, t151)
+        let t128 = t121 - t127;
+        let t129 = t78 * t80;
+        let t130 = t88 - t129;
+        let t131 = t130 * t96;
+        let t132 = t78 - t131;
+        let t133 = self.fixed[8] * t132;
+        let t134 = t80 * t103;
+        let t135 = t134 * t96;
+        let t136 = self.fixed[9] * t135;
+        let t137 = t133 + t136;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t111, t118, t128, t137)
     }
     #[inline]
     fn body_force(
@@ -680,188 +668,188 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t88 = t66 * t71;
         let t89 = t87 - t88;
         let t94 = t65 * t86;
-        let t95 = t94 + t78;
-        let t96 = t95 - t88;
-        let t97 = t96.log_1p();
-        let t112 = self.fixed[10] * t97;
-        let t126 = T::one() / t89;
-        let t152 = t67 * t72;
-        let t153 = T::pi() * t152;
-        let t154 = X[1] - t153;
-        let t156 = T::nearest(45.0) * t13;
-        let t157 = t156 * t6;
-        let t158 = t31 * t154;
-        let t159 = t157 - t158;
-        let t161 = T::nearest(95.0) * t13;
-        let t162 = t161 * t6;
-        let t164 = self.fixed[12] * t159;
-        let t165 = t162 - t158;
-        let t166 = t165 + t164;
-        let t168 = self.fixed[13] * t13;
-        let t169 = t168 * t6;
-        let t171 = self.fixed[14] * t166;
-        let t172 = t169 - t171;
-        let t174 = self.fixed[15] * t172;
-        let t177 = self.fixed[16] * t13;
-        let t178 = t177 * t6;
-        let t179 = -t178;
-        let t182 = self.fixed[17] * t31;
-        let t183 = t182 * t22;
-        let t184 = -t183;
-        let t187 = self.fixed[18] * t31;
-        let t188 = t187 * t154;
-        let t189 = T::nearest(3.0) * t6;
-        let t190 = t189 * t71;
-        let t191 = t62 * t184;
+        let t95 = t88 - t94;
+        let t96 = T::one() / t89;
+        let t101 = t94 + t78;
+        let t102 = t101 - t88;
+        let t103 = t102.log_1p();
+        let t129 = t78 * t80;
+        let t130 = t88 - t129;
+        let t138 = t67 * t72;
+        let t139 = T::pi() * t138;
+        let t140 = X[1] - t139;
+        let t142 = T::nearest(45.0) * t13;
+        let t143 = t142 * t6;
+        let t144 = t31 * t140;
+        let t145 = t143 - t144;
+        let t147 = T::nearest(95.0) * t13;
+        let t148 = t147 * t6;
+        let t150 = self.fixed[11] * t145;
+        let t151 = t148 - t144;
+        let t152 = t151 + t150;
+        let t154 = self.fixed[12] * t13;
+        let t155 = t154 * t6;
+        let t157 = self.fixed[13] * t152;
+        let t158 = t155 - t157;
+        let t160 = self.fixed[14] * t158;
+        let t163 = self.fixed[15] * t13;
+        let t164 = t163 * t6;
+        let t165 = -t164;
+        let t168 = self.fixed[16] * t31;
+        let t169 = t168 * t22;
+        let t170 = -t169;
+        let t173 = self.fixed[17] * t31;
+        let t174 = t173 * t140;
+        let t175 = T::nearest(3.0) * t6;
+        let t176 = t175 * t71;
+        let t177 = t62 * t170;
+        let t178 = t176 - t177;
+        let t179 = self.parameters.A * t178;
+        let t180 = t13 * t179;
+        let t181 = t86 * t165;
+        let t182 = t80 * t174;
+        let t183 = t180 + t181;
+        let t184 = t183 + t182;
+        let t185 = t14 * t178;
+        let t186 = t65 * t174;
+        let t187 = t181 + t185;
+        let t188 = t187 + t186;
+        let t189 = t184 * t95;
+        let t190 = t189 * t96;
+        let t191 = t103 * t188;
         let t192 = t190 - t191;
-        let t193 = self.parameters.A * t192;
-        let t194 = t13 * t193;
-        let t195 = t86 * t179;
-        let t196 = t80 * t188;
-        let t197 = t194 + t195;
-        let t198 = t197 + t196;
-        let t199 = t88 - t94;
-        let t200 = t14 * t192;
-        let t201 = t65 * t188;
-        let t202 = t195 + t200;
-        let t203 = t202 + t201;
-        let t204 = t198 * t199;
-        let t205 = t204 * t126;
-        let t206 = t97 * t203;
-        let t207 = t205 - t206;
-        let t208 = t179 * t199;
-        let t209 = t65 * t203;
-        let t210 = t200 + t208;
-        let t211 = t210 - t209;
-        let t212 = t65 * t199;
-        let t213 = t88 - t212;
-        let t214 = t97 * t199;
-        let t215 = self.fixed[10] * t214;
-        let t216 = self.fixed[8] * t213;
-        let t217 = t215 - t216;
-        let t218 = t195 + t196;
-        let t219 = t218 + t200;
-        let t220 = t78 * t80;
-        let t221 = t65 - t88;
-        let t222 = t221 + t220;
-        let t223 = self.fixed[8] * t222;
-        let t224 = t112 + t223;
-        let t225 = t64 * t6;
-        let t226 = -t225;
-        let t227 = T::nearest(4.0) * X[0];
-        let t228 = self.fixed[4] * t22;
-        let t229 = t227 - t228;
-        let t232 = self.fixed[19] * t31;
-        let t233 = t232 * t229;
-        let t234 = t6 * t71;
-        let t235 = t62 * t188;
-        let t236 = t234 - t235;
-        let t237 = t86 * t226;
-        let t238 = t80 * t233;
-        let t239 = t14 * t236;
-        let t240 = t237 + t238;
-        let t241 = t240 + t239;
-        let t242 = t13 * t236;
-        let t243 = self.parameters.A * t242;
-        let t244 = t243 + t237;
-        let t245 = t244 + t238;
-        let t246 = t226 * t86;
-        let t247 = t246 + t238;
-        let t248 = t247 + t239;
-        let t249 = t245 * t126;
-        let t250 = self.fixed[10] * t249;
-        let t251 = self.fixed[8] * t248;
-        let t252 = t250 + t251;
-        let t253 = t88 - t220;
-        let t254 = t188 * t253;
-        let t255 = t194 + t208;
-        let t256 = t255 + t254;
-        let t257 = t207 + t256;
-        let t258 = self.fixed[10] * t257;
-        let t259 = t217 * t219;
-        let t260 = t71 * t224;
-        let t261 = t260 * t241;
-        let t262 = t259 - t261;
-        let t263 = t126 * t262;
-        let t264 = self.fixed[8] * t211;
-        let t265 = t188 * t224;
-        let t266 = t71 * t252;
-        let t267 = t258 - t263;
-        let t268 = t267 + t264;
-        let t269 = t268 - t265;
-        let t270 = t269 - t266;
-        let t272 = t270 * t126;
-        let t273 = self.fixed[20] * t272;
-        let t274 = t174 + t273;
-        let t275 = -t274;
-        let t277 = T::nearest(60.0) * t13;
-        let t278 = t277 * t6;
-        let t279 = t31 * t229;
+        let t193 = t165 * t95;
+        let t194 = t65 * t188;
+        let t195 = t185 + t193;
+        let t196 = t195 - t194;
+        let t197 = t65 * t95;
+        let t198 = t88 - t197;
+        let t199 = t103 * t95;
+        let t200 = self.fixed[9] * t199;
+        let t201 = self.fixed[8] * t198;
+        let t202 = t200 - t201;
+        let t203 = t181 + t182;
+        let t204 = t203 + t185;
+        let t205 = t65 - t88;
+        let t206 = t205 + t129;
+        let t207 = self.fixed[9] * t103;
+        let t208 = self.fixed[8] * t206;
+        let t209 = t207 + t208;
+        let t210 = t64 * t6;
+        let t211 = -t210;
+        let t212 = T::nearest(4.0) * X[0];
+        let t213 = self.fixed[4] * t22;
+        let t214 = t212 - t213;
+        let t217 = self.fixed[18] * t31;
+        let t218 = t217 * t214;
+        let t219 = t6 * t71;
+        let t220 = t62 * t174;
+        let t221 = t219 - t220;
+        let t222 = t86 * t211;
+        let t223 = t80 * t218;
+        let t224 = t14 * t221;
+        let t225 = t222 + t223;
+        let t226 = t225 + t224;
+        let t227 = t13 * t221;
+        let t228 = self.parameters.A * t227;
+        let t229 = t228 + t222;
+        let t230 = t229 + t223;
+        let t231 = t211 * t86;
+        let t232 = t231 + t223;
+        let t233 = t232 + t224;
+        let t234 = t230 * t96;
+        let t235 = self.fixed[9] * t234;
+        let t236 = self.fixed[8] * t233;
+        let t237 = t235 + t236;
+        let t238 = t174 * t130;
+        let t239 = t180 + t193;
+        let t240 = t239 + t238;
+        let t241 = t192 + t240;
+        let t242 = self.fixed[9] * t241;
+        let t243 = t202 * t204;
+        let t244 = t71 * t209;
+        let t245 = t244 * t226;
+        let t246 = t243 - t245;
+        let t247 = t96 * t246;
+        let t248 = self.fixed[8] * t196;
+        let t249 = t174 * t209;
+        let t250 = t71 * t237;
+        let t251 = t242 - t247;
+        let t252 = t251 + t248;
+        let t253 = t252 - t249;
+        let t254 = t253 - t250;
+        let t256 = t254 * t96;
+        let t257 = self.fixed[19] * t256;
+        let t258 = t160 + t257;
+        let t259 = -t258;
+        let t261 = T::nearest(60.0) * t13;
+        let t262 = t261 * t6;
+        let t263 = t31 * t214;
+        let t264 = t262 - t263;
+        let t266 = T::nearest(8.0) * t22;
+        let t267 = t266 - t214;
+        let t268 = t31 * t267;
+        let t270 = T::nearest(30.0) * t13;
+        let t271 = t270 * t6;
+        let t273 = self.fixed[20] * t264;
+        let t274 = t268 + t271;
+        let t275 = t274 + t273;
+        let t277 = self.fixed[21] * t31;
+        let t278 = t277 * t26;
+        let t279 = self.fixed[13] * t275;
         let t280 = t278 - t279;
-        let t282 = T::nearest(8.0) * t22;
-        let t283 = t282 - t229;
-        let t284 = t31 * t283;
-        let t286 = T::nearest(30.0) * t13;
-        let t287 = t286 * t6;
-        let t289 = self.fixed[21] * t280;
-        let t290 = t284 + t287;
-        let t291 = t290 + t289;
-        let t293 = self.fixed[22] * t31;
-        let t294 = t293 * t26;
-        let t295 = self.fixed[14] * t291;
-        let t296 = t294 - t295;
-        let t299 = self.fixed[23] * t296;
-        let t300 = t78 * t226;
-        let t301 = t238 + t239;
-        let t302 = t301 + t300;
-        let t303 = t245 * t253;
-        let t304 = t303 * t126;
-        let t305 = t97 * t302;
-        let t306 = t304 - t305;
-        let t307 = t233 * t253;
-        let t308 = t78 * t302;
-        let t309 = t239 + t307;
-        let t310 = t309 - t308;
-        let t311 = t78 * t253;
-        let t312 = t88 - t311;
-        let t313 = t97 * t253;
-        let t314 = self.fixed[10] * t313;
-        let t315 = self.fixed[8] * t312;
-        let t316 = t314 - t315;
-        let t317 = t78 - t88;
-        let t318 = t317 + t94;
-        let t319 = self.fixed[8] * t318;
-        let t320 = t112 + t319;
-        let t321 = t188 * t80;
-        let t322 = t321 + t195;
-        let t323 = t322 + t200;
-        let t324 = t198 * t126;
-        let t325 = self.fixed[10] * t324;
-        let t326 = self.fixed[8] * t323;
-        let t327 = t325 + t326;
-        let t328 = t219 * t126;
-        let t329 = t62 * t328;
-        let t330 = t189 + t329;
-        let t331 = t320 * t330;
-        let t332 = t62 * t327;
-        let t333 = t331 - t332;
-        let t334 = t226 * t199;
-        let t335 = t243 + t307;
-        let t336 = t335 + t334;
-        let t337 = t306 + t336;
-        let t338 = self.fixed[10] * t337;
-        let t339 = self.fixed[8] * t310;
-        let t340 = t316 * t241;
-        let t341 = t340 * t126;
-        let t342 = t14 * t333;
-        let t343 = t338 + t339;
-        let t344 = t343 - t341;
-        let t345 = t344 + t342;
-        let t346 = t345 * t126;
-        let t347 = self.fixed[20] * t346;
-        let t348 = t299 + t347;
-        let t349 = -t348;
-        crate::nalgebra::SVector::<T, 2>::new(t275, t349)
+        let t283 = self.fixed[22] * t280;
+        let t284 = t78 * t211;
+        let t285 = t223 + t224;
+        let t286 = t285 + t284;
+        let t287 = t230 * t130;
+        let t288 = t287 * t96;
+        let t289 = t103 * t286;
+        let t290 = t288 - t289;
+        let t291 = t218 * t130;
+        let t292 = t78 * t286;
+        let t293 = t224 + t291;
+        let t294 = t293 - t292;
+        let t295 = t78 * t130;
+        let t296 = t88 - t295;
+        let t297 = t103 * t130;
+        let t298 = self.fixed[9] * t297;
+        let t299 = self.fixed[8] * t296;
+        let t300 = t298 - t299;
+        let t301 = t78 - t88;
+        let t302 = t301 + t94;
+        let t303 = self.fixed[8] * t302;
+        let t304 = t207 + t303;
+        let t305 = t174 * t80;
+        let t306 = t305 + t181;
+        let t307 = t306 + t185;
+        let t308 = t184 * t96;
+        let t309 = self.fixed[9] * t308;
+        let t310 = self.fixed[8] * t307;
+        let t311 = t309 + t310;
+        let t312 = t204 * t96;
+        let t313 = t62 * t312;
+        let t314 = t175 + t313;
+        let t315 = t304 * t314;
+        let t316 = t62 * t311;
+        let t317 = t315 - t316;
+        let t318 = t211 * t95;
+        let t319 = t228 + t291;
+        let t320 = t319 + t318;
+        let t321 = t290 + t320;
+        let t322 = self.fixed[9] * t321;
+        let t323 = self.fixed[8] * t294;
+        let t324 = t300 * t226;
+        let t325 = t324 * t96;
+        let t326 = t14 * t317;
+        let t327 = t322 + t323;
+        let t328 = t327 - t325;
+        let t329 = t328 + t326;
+        let t330 = t329 * t96;
+        let t331 = self.fixed[19] * t330;
+        let t332 = t283 + t331;
+        let t333 = -t332;
+        crate::nalgebra::SVector::<T, 2>::new(t259, t333)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t4 = T::nearest(3.0) * X[0];
@@ -926,232 +914,216 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t88 = t66 * t71;
         let t89 = t87 - t88;
         let t94 = t65 * t86;
-        let t95 = t94 + t78;
-        let t96 = t95 - t88;
-        let t97 = t96.log_1p();
-        let t100 = T::nearest(2.0) * t65;
-        let t101 = t65 * t65;
-        let t103 = t13 * t13;
-        let t104 = t62 * t62;
-        let t105 = self.fixed[9] * t103;
-        let t106 = t105 * t104;
-        let t107 = t100 + t101;
-        let t108 = t107 + t106;
-        let t112 = self.fixed[10] * t97;
-        let t113 = self.fixed[8] * t108;
-        let t114 = t112 + t113;
-        let t115 = t13 * t62;
-        let t116 = t115 * t86;
-        let t117 = self.parameters.A * t116;
-        let t118 = t71 * t80;
-        let t119 = t117 + t118;
-        let t120 = t86 * t114;
-        let t122 = self.fixed[11] * t13;
-        let t123 = t122 * t62;
-        let t124 = t123 * t119;
-        let t125 = t120 - t124;
-        let t126 = T::one() / t89;
+        let t95 = t88 - t94;
+        let t96 = T::one() / t89;
+        let t97 = t95 * t96;
+        let t98 = t65 - t97;
+        let t101 = t94 + t78;
+        let t102 = t101 - t88;
+        let t103 = t102.log_1p();
+        let t104 = self.fixed[8] * t98;
+        let t108 = t86 * t103;
+        let t109 = t108 * t96;
+        let t110 = self.fixed[9] * t109;
+        let t111 = t104 + t110;
+        let t112 = t71 * t96;
+        let t113 = t66 + t112;
+        let t114 = self.fixed[8] * t113;
+        let t115 = t71 * t103;
+        let t116 = t115 * t96;
+        let t117 = self.fixed[9] * t116;
+        let t118 = t114 - t117;
+        let t119 = t66 * t96;
+        let t120 = t71 + t119;
+        let t121 = self.fixed[8] * t120;
+        let t124 = self.fixed[10] * t13;
+        let t125 = t124 * t62;
+        let t126 = t103 * t96;
         let t127 = t125 * t126;
-        let t128 = t71 * t114;
-        let t129 = t80 * t119;
-        let t130 = self.fixed[8] * t129;
-        let t131 = t128 - t130;
-        let t132 = t131 * t126;
-        let t133 = -t132;
-        let t134 = T::nearest(2.0) * t78;
-        let t135 = t71 * t71;
-        let t136 = t78 * t78;
-        let t137 = t134 + t135;
-        let t138 = t137 + t136;
-        let t139 = self.fixed[8] * t138;
-        let t140 = t112 + t139;
-        let t141 = t86 * t119;
-        let t142 = self.fixed[8] * t141;
-        let t143 = t66 * t140;
-        let t144 = t142 - t143;
-        let t145 = t144 * t126;
-        let t146 = t71 * t119;
-        let t147 = self.fixed[8] * t146;
-        let t148 = t80 * t140;
-        let t149 = t147 - t148;
-        let t150 = t149 * t126;
-        let t151 = -t150;
-        let t152 = t67 * t72;
-        let t153 = T::pi() * t152;
-        let t154 = X[1] - t153;
-        let t156 = T::nearest(45.0) * t13;
-        let t157 = t156 * t6;
-        let t158 = t31 * t154;
-        let t159 = t157 - t158;
-        let t161 = T::nearest(95.0) * t13;
-        let t162 = t161 * t6;
-        let t164 = self.fixed[12] * t159;
-        let t165 = t162 - t158;
-        let t166 = t165 + t164;
-        let t168 = self.fixed[13] * t13;
-        let t169 = t168 * t6;
-        let t171 = self.fixed[14] * t166;
-        let t172 = t169 - t171;
-        let t174 = self.fixed[15] * t172;
-        let t177 = self.fixed[16] * t13;
-        let t178 = t177 * t6;
-        let t179 = -t178;
-        let t182 = self.fixed[17] * t31;
-        let t183 = t182 * t22;
-        let t184 = -t183;
-        let t187 = self.fixed[18] * t31;
-        let t188 = t187 * t154;
-        let t189 = T::nearest(3.0) * t6;
-        let t190 = t189 * t71;
-        let t191 = t62 * t184;
+        let t128 = t121 - t127;
+        let t129 = t78 * t80;
+        let t130 = t88 - t129;
+        let t131 = t130 * t96;
+        let t132 = t78 - t131;
+        let t133 = self.fixed[8] * t132;
+        let t134 = t80 * t103;
+        let t135 = t134 * t96;
+        let t136 = self.fixed[9] * t135;
+        let t137 = t133 + t136;
+        let t138 = t67 * t72;
+        let t139 = T::pi() * t138;
+        let t140 = X[1] - t139;
+        let t142 = T::nearest(45.0) * t13;
+        let t143 = t142 * t6;
+        let t144 = t31 * t140;
+        let t145 = t143 - t144;
+        let t147 = T::nearest(95.0) * t13;
+        let t148 = t147 * t6;
+        let t150 = self.fixed[11] * t145;
+        let t151 = t148 - t144;
+        let t152 = t151 + t150;
+        let t154 = self.fixed[12] * t13;
+        let t155 = t154 * t6;
+        let t157 = self.fixed[13] * t152;
+        let t158 = t155 - t157;
+        let t160 = self.fixed[14] * t158;
+        let t163 = self.fixed[15] * t13;
+        let t164 = t163 * t6;
+        let t165 = -t164;
+        let t168 = self.fixed[16] * t31;
+        let t169 = t168 * t22;
+        let t170 = -t169;
+        let t173 = self.fixed[17] * t31;
+        let t174 = t173 * t140;
+        let t175 = T::nearest(3.0) * t6;
+        let t176 = t175 * t71;
+        let t177 = t62 * t170;
+        let t178 = t176 - t177;
+        let t179 = self.parameters.A * t178;
+        let t180 = t13 * t179;
+        let t181 = t86 * t165;
+        let t182 = t80 * t174;
+        let t183 = t180 + t181;
+        let t184 = t183 + t182;
+        let t185 = t14 * t178;
+        let t186 = t65 * t174;
+        let t187 = t181 + t185;
+        let t188 = t187 + t186;
+        let t189 = t184 * t95;
+        let t190 = t189 * t96;
+        let t191 = t103 * t188;
         let t192 = t190 - t191;
-        let t193 = self.parameters.A * t192;
-        let t194 = t13 * t193;
-        let t195 = t86 * t179;
-        let t196 = t80 * t188;
-        let t197 = t194 + t195;
-        let t198 = t197 + t196;
-        let t199 = t88 - t94;
-        let t200 = t14 * t192;
-        let t201 = t65 * t188;
-        let t202 = t195 + t200;
-        let t203 = t202 + t201;
-        let t204 = t198 * t199;
-        let t205 = t204 * t126;
-        let t206 = t97 * t203;
-        let t207 = t205 - t206;
-        let t208 = t179 * t199;
-        let t209 = t65 * t203;
-        let t210 = t200 + t208;
-        let t211 = t210 - t209;
-        let t212 = t65 * t199;
-        let t213 = t88 - t212;
-        let t214 = t97 * t199;
-        let t215 = self.fixed[10] * t214;
-        let t216 = self.fixed[8] * t213;
-        let t217 = t215 - t216;
-        let t218 = t195 + t196;
-        let t219 = t218 + t200;
-        let t220 = t78 * t80;
-        let t221 = t65 - t88;
-        let t222 = t221 + t220;
-        let t223 = self.fixed[8] * t222;
-        let t224 = t112 + t223;
-        let t225 = t64 * t6;
-        let t226 = -t225;
-        let t227 = T::nearest(4.0) * X[0];
-        let t228 = self.fixed[4] * t22;
-        let t229 = t227 - t228;
-        let t232 = self.fixed[19] * t31;
-        let t233 = t232 * t229;
-        let t234 = t6 * t71;
-        let t235 = t62 * t188;
-        let t236 = t234 - t235;
-        let t237 = t86 * t226;
-        let t238 = t80 * t233;
-        let t239 = t14 * t236;
-        let t240 = t237 + t238;
-        let t241 = t240 + t239;
-        let t242 = t13 * t236;
-        let t243 = self.parameters.A * t242;
-        let t244 = t243 + t237;
-        let t245 = t244 + t238;
-        let t246 = t226 * t86;
-        let t247 = t246 + t238;
-        let t248 = t247 + t239;
-        let t249 = t245 * t126;
-        let t250 = self.fixed[10] * t249;
-        let t251 = self.fixed[8] * t248;
-        let t252 = t250 + t251;
-        let t253 = t88 - t220;
-        let t254 = t188 * t253;
-        let t255 = t194 + t208;
-        let t256 = t255 + t254;
-        let t257 = t207 + t256;
-        let t258 = self.fixed[10] * t257;
-        let t259 = t217 * t219;
-        let t260 = t71 * t224;
-        let t261 = t260 * t241;
-        let t262 = t259 - t261;
-        let t263 = t126 * t262;
-        let t264 = self.fixed[8] * t211;
-        let t265 = t188 * t224;
-        let t266 = t71 * t252;
-        let t267 = t258 - t263;
-        let t268 = t267 + t264;
-        let t269 = t268 - t265;
-        let t270 = t269 - t266;
-        let t272 = t270 * t126;
-        let t273 = self.fixed[20] * t272;
-        let t274 = t174 + t273;
-        let t275 = -t274;
-        let t277 = T::nearest(60.0) * t13;
-        let t278 = t277 * t6;
-        let t279 = t31 * t229;
+        let t193 = t165 * t95;
+        let t194 = t65 * t188;
+        let t195 = t185 + t193;
+        let t196 = t195 - t194;
+        let t197 = t65 * t95;
+        let t198 = t88 - t197;
+        let t199 = t103 * t95;
+        let t200 = self.fixed[9] * t199;
+        let t201 = self.fixed[8] * t198;
+        let t202 = t200 - t201;
+        let t203 = t181 + t182;
+        let t204 = t203 + t185;
+        let t205 = t65 - t88;
+        let t206 = t205 + t129;
+        let t207 = self.fixed[9] * t103;
+        let t208 = self.fixed[8] * t206;
+        let t209 = t207 + t208;
+        let t210 = t64 * t6;
+        let t211 = -t210;
+        let t212 = T::nearest(4.0) * X[0];
+        let t213 = self.fixed[4] * t22;
+        let t214 = t212 - t213;
+        let t217 = self.fixed[18] * t31;
+        let t218 = t217 * t214;
+        let t219 = t6 * t71;
+        let t220 = t62 * t174;
+        let t221 = t219 - t220;
+        let t222 = t86 * t211;
+        let t223 = t80 * t218;
+        let t224 = t14 * t221;
+        let t225 = t222 + t223;
+        let t226 = t225 + t224;
+        let t227 = t13 * t221;
+        let t228 = self.parameters.A * t227;
+        let t229 = t228 + t222;
+        let t230 = t229 + t223;
+        let t231 = t211 * t86;
+        let t232 = t231 + t223;
+        let t233 = t232 + t224;
+        let t234 = t230 * t96;
+        let t235 = self.fixed[9] * t234;
+        let t236 = self.fixed[8] * t233;
+        let t237 = t235 + t236;
+        let t238 = t174 * t130;
+        let t239 = t180 + t193;
+        let t240 = t239 + t238;
+        let t241 = t192 + t240;
+        let t242 = self.fixed[9] * t241;
+        let t243 = t202 * t204;
+        let t244 = t71 * t209;
+        let t245 = t244 * t226;
+        let t246 = t243 - t245;
+        let t247 = t96 * t246;
+        let t248 = self.fixed[8] * t196;
+        let t249 = t174 * t209;
+        let t250 = t71 * t237;
+        let t251 = t242 - t247;
+        let t252 = t251 + t248;
+        let t253 = t252 - t249;
+        let t254 = t253 - t250;
+        let t256 = t254 * t96;
+        let t257 = self.fixed[19] * t256;
+        let t258 = t160 + t257;
+        let t259 = -t258;
+        let t261 = T::nearest(60.0) * t13;
+        let t262 = t261 * t6;
+        let t263 = t31 * t214;
+        let t264 = t262 - t263;
+        let t266 = T::nearest(8.0) * t22;
+        let t267 = t266 - t214;
+        let t268 = t31 * t267;
+        let t270 = T::nearest(30.0) * t13;
+        let t271 = t270 * t6;
+        let t273 = self.fixed[20] * t264;
+        let t274 = t268 + t271;
+        let t275 = t274 + t273;
+        let t277 = self.fixed[21] * t31;
+        let t278 = t277 * t26;
+        let t279 = self.fixed[13] * t275;
         let t280 = t278 - t279;
-        let t282 = T::nearest(8.0) * t22;
-        let t283 = t282 - t229;
-        let t284 = t31 * t283;
-        let t286 = T::nearest(30.0) * t13;
-        let t287 = t286 * t6;
-        let t289 = self.fixed[21] * t280;
-        let t290 = t284 + t287;
-        let t291 = t290 + t289;
-        let t293 = self.fixed[22] * t31;
-        let t294 = t293 * t26;
-        let t295 = self.fixed[14] * t291;
-        let t296 = t294 - t295;
-        let t299 = self.fixed[23] * t296;
-        let t300 = t78 * t226;
-        let t301 = t238 + t239;
-        let t302 = t301 + t300;
-        let t303 = t245 * t253;
-        let t304 = t303 * t126;
-        let t305 = t97 * t302;
-        let t306 = t304 - t305;
-        let t307 = t233 * t253;
-        let t308 = t78 * t302;
-        let t309 = t239 + t307;
-        let t310 = t309 - t308;
-        let t311 = t78 * t253;
-        let t312 = t88 - t311;
-        let t313 = t97 * t253;
-        let t314 = self.fixed[10] * t313;
-        let t315 = self.fixed[8] * t312;
-        let t316 = t314 - t315;
-        let t317 = t78 - t88;
-        let t318 = t317 + t94;
-        let t319 = self.fixed[8] * t318;
-        let t320 = t112 + t319;
-        let t321 = t188 * t80;
-        let t322 = t321 + t195;
-        let t323 = t322 + t200;
-        let t324 = t198 * t126;
-        let t325 = self.fixed[10] * t324;
-        let t326 = self.fixed[8] * t323;
-        let t327 = t325 + t326;
-        let t328 = t219 * t126;
-        let t329 = t62 * t328;
-        let t330 = t189 + t329;
-        let t331 = t320 * t330;
-        let t332 = t62 * t327;
-        let t333 = t331 - t332;
-        let t334 = t226 * t199;
-        let t335 = t243 + t307;
-        let t336 = t335 + t334;
-        let t337 = t306 + t336;
-        let t338 = self.fixed[10] * t337;
-        let t339 = self.fixed[8] * t310;
-        let t340 = t316 * t241;
-        let t341 = t340 * t126;
-        let t342 = t14 * t333;
-        let t343 = t338 + t339;
-        let t344 = t343 - t341;
-        let t345 = t344 + t342;
-        let t346 = t345 * t126;
-        let t347 = self.fixed[20] * t346;
-        let t348 = t299 + t347;
-        let t349 = -t348;
+        let t283 = self.fixed[22] * t280;
+        let t284 = t78 * t211;
+        let t285 = t223 + t224;
+        let t286 = t285 + t284;
+        let t287 = t230 * t130;
+        let t288 = t287 * t96;
+        let t289 = t103 * t286;
+        let t290 = t288 - t289;
+        let t291 = t218 * t130;
+        let t292 = t78 * t286;
+        let t293 = t224 + t291;
+        let t294 = t293 - t292;
+        let t295 = t78 * t130;
+        let t296 = t88 - t295;
+        let t297 = t103 * t130;
+        let t298 = self.fixed[9] * t297;
+        let t299 = self.fixed[8] * t296;
+        let t300 = t298 - t299;
+        let t301 = t78 - t88;
+        let t302 = t301 + t94;
+        let t303 = self.fixed[8] * t302;
+        let t304 = t207 + t303;
+        let t305 = t174 * t80;
+        let t306 = t305 + t181;
+        let t307 = t306 + t185;
+        let t308 = t184 * t96;
+        let t309 = self.fixed[9] * t308;
+        let t310 = self.fixed[8] * t307;
+        let t311 = t309 + t310;
+        let t312 = t204 * t96;
+        let t313 = t62 * t312;
+        let t314 = t175 + t313;
+        let t315 = t304 * t314;
+        let t316 = t62 * t311;
+        let t317 = t315 - t316;
+        let t318 = t211 * t95;
+        let t319 = t228 + t291;
+        let t320 = t319 + t318;
+        let t321 = t290 + t320;
+        let t322 = self.fixed[9] * t321;
+        let t323 = self.fixed[8] * t294;
+        let t324 = t300 * t226;
+        let t325 = t324 * t96;
+        let t326 = t14 * t317;
+        let t327 = t322 + t323;
+        let t328 = t327 - t325;
+        let t329 = t328 + t326;
+        let t330 = t329 * t96;
+        let t331 = self.fixed[19] * t330;
+        let t332 = t283 + t331;
+        let t333 = -t332;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t15, t35),
             v: crate::nalgebra::SVector::<T, 2>::new(t41, t48),
@@ -1159,8 +1131,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
             H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t65, t66, t71, t78),
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t80, t66, t71, t85),
             J: t89,
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t127, t133, t145, t151),
-            b: crate::nalgebra::SVector::<T, 2>::new(t275, t349),
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t111, t118, t128, t137),
+            b: crate::nalgebra::SVector::<T, 2>::new(t259, t333),
         }
     }
     fn traction(
@@ -1183,59 +1155,41 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t34 = self.fixed[1] * t31;
                 let t64 = self.fixed[7] * t13;
                 let t72 = t20.cos_pi();
-                let t103 = t13 * t13;
-                let t105 = self.fixed[9] * t103;
-                let t122 = self.fixed[11] * t13;
-                let t628 = X[1].cos();
-                let t629 = t64 * t628;
-                let t630 = t629 + T::one();
-                let t632 = self.fixed[58] * t31;
-                let t633 = t632 * t72;
-                let t634 = t633 + T::one();
-                let t635 = t34 * t24;
-                let t636 = t630 * t634;
-                let t637 = t14 * t628;
-                let t638 = t637 * t635;
-                let t639 = t636 - t638;
-                let t640 = t629 * t634;
-                let t641 = t640 + t633;
-                let t642 = t641 - t638;
-                let t643 = t642.log_1p();
-                let t644 = T::nearest(2.0) * t629;
-                let t645 = t629 * t629;
-                let t646 = t628 * t628;
-                let t647 = t105 * t646;
-                let t648 = t644 + t645;
-                let t649 = t648 + t647;
-                let t650 = self.fixed[10] * t643;
-                let t651 = self.fixed[8] * t649;
-                let t652 = t650 + t651;
-                let t653 = t13 * t628;
-                let t654 = t653 * t634;
-                let t655 = self.parameters.A * t654;
-                let t656 = t635 * t630;
-                let t657 = t655 + t656;
-                let t658 = t634 * t652;
-                let t659 = t122 * t628;
-                let t660 = t659 * t657;
-                let t661 = t658 - t660;
-                let t662 = T::one() / t639;
-                let t663 = t661 * t662;
-                let t664 = -t663;
-                let t665 = T::nearest(2.0) * t633;
-                let t666 = t635 * t635;
-                let t667 = t633 * t633;
-                let t668 = t665 + t666;
-                let t669 = t668 + t667;
-                let t670 = self.fixed[8] * t669;
-                let t671 = t650 + t670;
-                let t672 = t634 * t657;
-                let t673 = self.fixed[8] * t672;
-                let t674 = t637 * t671;
-                let t675 = t673 - t674;
-                let t676 = t675 * t662;
-                let t677 = -t676;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t664, t677))
+                let t124 = self.fixed[10] * t13;
+                let t614 = X[1].cos();
+                let t615 = t64 * t614;
+                let t616 = t615 + T::one();
+                let t618 = self.fixed[57] * t31;
+                let t619 = t618 * t72;
+                let t620 = t619 + T::one();
+                let t621 = t34 * t24;
+                let t622 = t616 * t620;
+                let t623 = t14 * t614;
+                let t624 = t623 * t621;
+                let t625 = t622 - t624;
+                let t626 = t615 * t620;
+                let t627 = t624 - t626;
+                let t628 = T::one() / t625;
+                let t629 = t627 * t628;
+                let t630 = t615 - t629;
+                let t631 = t626 + t619;
+                let t632 = t631 - t624;
+                let t633 = t632.log_1p();
+                let t634 = self.fixed[8] * t630;
+                let t635 = t620 * t633;
+                let t636 = t635 * t628;
+                let t637 = self.fixed[9] * t636;
+                let t638 = t634 + t637;
+                let t639 = -t638;
+                let t640 = t623 * t628;
+                let t641 = t621 + t640;
+                let t642 = self.fixed[8] * t641;
+                let t643 = t124 * t614;
+                let t644 = t633 * t628;
+                let t645 = t643 * t644;
+                let t646 = t642 - t645;
+                let t647 = -t646;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t639, t647))
             }
             crate::Surface::Upper(0) => {
                 let t12 = self.fixed[0] * t;
@@ -1251,62 +1205,44 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t34 = self.fixed[1] * t31;
                 let t64 = self.fixed[7] * t13;
                 let t72 = t20.cos_pi();
-                let t103 = t13 * t13;
-                let t105 = self.fixed[9] * t103;
-                let t122 = self.fixed[11] * t13;
-                let t469 = T::nearest(2.0) * X[1];
-                let t678 = X[1] + T::nearest(3.0);
-                let t679 = t678.cos();
-                let t680 = t64 * t679;
-                let t681 = t680 + T::one();
-                let t684 = self.fixed[59] * t72;
-                let t685 = t469 + t684;
-                let t686 = t34 * t685;
-                let t687 = t686 + T::one();
-                let t690 = self.fixed[60] * t21;
-                let t691 = t24 - t690;
-                let t692 = t34 * t691;
-                let t693 = t681 * t687;
-                let t694 = t14 * t679;
-                let t695 = t694 * t692;
-                let t696 = t693 - t695;
-                let t697 = t680 * t687;
-                let t698 = t697 + t686;
-                let t699 = t698 - t695;
-                let t700 = t699.log_1p();
-                let t701 = T::nearest(2.0) * t680;
-                let t702 = t680 * t680;
-                let t703 = t679 * t679;
-                let t704 = t105 * t703;
-                let t705 = t701 + t702;
-                let t706 = t705 + t704;
-                let t707 = self.fixed[10] * t700;
-                let t708 = self.fixed[8] * t706;
-                let t709 = t707 + t708;
-                let t710 = t13 * t679;
-                let t711 = t710 * t687;
-                let t712 = self.parameters.A * t711;
-                let t713 = t692 * t681;
-                let t714 = t712 + t713;
-                let t715 = t687 * t709;
-                let t716 = t122 * t679;
-                let t717 = t716 * t714;
-                let t718 = t715 - t717;
-                let t719 = T::one() / t696;
-                let t720 = t718 * t719;
-                let t721 = T::nearest(2.0) * t686;
-                let t722 = t692 * t692;
-                let t723 = t686 * t686;
-                let t724 = t721 + t722;
-                let t725 = t724 + t723;
-                let t726 = self.fixed[8] * t725;
-                let t727 = t707 + t726;
-                let t728 = t687 * t714;
-                let t729 = self.fixed[8] * t728;
-                let t730 = t694 * t727;
-                let t731 = t729 - t730;
-                let t732 = t731 * t719;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t720, t732))
+                let t124 = self.fixed[10] * t13;
+                let t455 = T::nearest(2.0) * X[1];
+                let t648 = X[1] + T::nearest(3.0);
+                let t649 = t648.cos();
+                let t650 = t64 * t649;
+                let t651 = t650 + T::one();
+                let t654 = self.fixed[58] * t72;
+                let t655 = t455 + t654;
+                let t656 = t34 * t655;
+                let t657 = t656 + T::one();
+                let t660 = self.fixed[59] * t21;
+                let t661 = t24 - t660;
+                let t662 = t34 * t661;
+                let t663 = t651 * t657;
+                let t664 = t14 * t649;
+                let t665 = t664 * t662;
+                let t666 = t663 - t665;
+                let t667 = t650 * t657;
+                let t668 = t665 - t667;
+                let t669 = T::one() / t666;
+                let t670 = t668 * t669;
+                let t671 = t650 - t670;
+                let t672 = t667 + t656;
+                let t673 = t672 - t665;
+                let t674 = t673.log_1p();
+                let t675 = self.fixed[8] * t671;
+                let t676 = t657 * t674;
+                let t677 = t676 * t669;
+                let t678 = self.fixed[9] * t677;
+                let t679 = t675 + t678;
+                let t680 = t664 * t669;
+                let t681 = t662 + t680;
+                let t682 = self.fixed[8] * t681;
+                let t683 = t124 * t649;
+                let t684 = t674 * t669;
+                let t685 = t683 * t684;
+                let t686 = t682 - t685;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t679, t686))
             }
             crate::Surface::Lower(1) => {
                 let t4 = T::nearest(3.0) * X[0];
@@ -1319,25 +1255,26 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t30 = T::nearest(4.0) * t27;
                 let t31 = t28 + t30;
                 let t64 = self.fixed[7] * t13;
-                let t122 = self.fixed[11] * t13;
-                let t632 = self.fixed[58] * t31;
-                let t733 = t4.cos();
-                let t734 = t122 * t733;
-                let t735 = -t734;
-                let t736 = t632 * t18;
-                let t737 = t736 + T::one();
-                let t738 = t64 * t733;
-                let t739 = t738 * t737;
-                let t740 = t739 + t736;
-                let t741 = t740.log_1p();
-                let t742 = t736 + T::nearest(2.0);
-                let t743 = self.fixed[10] * t741;
-                let t744 = t736 * t742;
-                let t745 = self.fixed[8] * t744;
-                let t746 = t743 + t745;
-                let t747 = t746 / t737;
-                let t748 = -t747;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t735, t748))
+                let t618 = self.fixed[57] * t31;
+                let t687 = t4.cos();
+                let t689 = self.fixed[60] * t13;
+                let t690 = t689 * t687;
+                let t691 = -t690;
+                let t692 = t618 * t18;
+                let t693 = t692 + T::one();
+                let t694 = T::one() / t693;
+                let t695 = t694 + T::one();
+                let t696 = t64 * t687;
+                let t697 = t696 * t693;
+                let t698 = t697 + t692;
+                let t699 = t698.log_1p();
+                let t700 = t692 * t695;
+                let t701 = self.fixed[8] * t700;
+                let t702 = t699 * t694;
+                let t703 = self.fixed[9] * t702;
+                let t704 = t701 + t703;
+                let t705 = -t704;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t691, t705))
             }
             crate::Surface::Upper(1) => {
                 let t4 = T::nearest(3.0) * X[0];
@@ -1352,61 +1289,42 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t34 = self.fixed[1] * t31;
                 let t64 = self.fixed[7] * t13;
                 let t67 = t17.sin();
-                let t103 = t13 * t13;
-                let t105 = self.fixed[9] * t103;
-                let t187 = self.fixed[18] * t31;
-                let t749 = t4 + T::one();
-                let t750 = t749.cos();
-                let t751 = t64 * t750;
-                let t752 = t751 + T::one();
-                let t753 = t187 * X[0];
-                let t754 = t753 + T::one();
-                let t755 = T::nearest(4.0) * t67;
-                let t756 = T::one() - t755;
-                let t757 = t34 * t756;
-                let t758 = t752 * t754;
-                let t759 = t14 * t750;
-                let t760 = t759 * t757;
-                let t761 = t758 - t760;
-                let t762 = t751 * t754;
-                let t763 = t762 + t753;
-                let t764 = t763 - t760;
-                let t765 = t764.log_1p();
-                let t766 = T::nearest(2.0) * t751;
-                let t767 = t751 * t751;
-                let t768 = t750 * t750;
-                let t769 = t105 * t768;
-                let t770 = t766 + t767;
-                let t771 = t770 + t769;
-                let t772 = self.fixed[10] * t765;
-                let t773 = self.fixed[8] * t771;
-                let t774 = t772 + t773;
-                let t775 = t13 * t750;
-                let t776 = t775 * t754;
-                let t777 = self.parameters.A * t776;
-                let t778 = t757 * t752;
-                let t779 = t777 + t778;
-                let t780 = t757 * t774;
-                let t781 = t752 * t779;
-                let t782 = self.fixed[8] * t781;
-                let t783 = t780 - t782;
-                let t784 = T::one() / t761;
-                let t785 = t783 * t784;
-                let t786 = -t785;
-                let t787 = T::nearest(2.0) * t753;
-                let t788 = t757 * t757;
-                let t789 = t753 * t753;
-                let t790 = t787 + t788;
-                let t791 = t790 + t789;
-                let t792 = self.fixed[8] * t791;
-                let t793 = t772 + t792;
-                let t794 = t757 * t779;
-                let t795 = self.fixed[8] * t794;
-                let t796 = t752 * t793;
-                let t797 = t795 - t796;
-                let t798 = t797 * t784;
-                let t799 = -t798;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t786, t799))
+                let t173 = self.fixed[17] * t31;
+                let t706 = t4 + T::one();
+                let t707 = t706.cos();
+                let t708 = T::nearest(4.0) * t67;
+                let t709 = T::one() - t708;
+                let t710 = t34 * t709;
+                let t711 = t64 * t707;
+                let t712 = t711 + T::one();
+                let t713 = t173 * X[0];
+                let t714 = t713 + T::one();
+                let t715 = t712 * t714;
+                let t716 = t14 * t707;
+                let t717 = t716 * t710;
+                let t718 = t715 - t717;
+                let t719 = T::one() / t718;
+                let t720 = t710 * t719;
+                let t721 = t716 + t720;
+                let t722 = t711 * t714;
+                let t723 = t722 + t713;
+                let t724 = t723 - t717;
+                let t725 = t724.log_1p();
+                let t726 = self.fixed[8] * t721;
+                let t727 = t710 * t725;
+                let t728 = t727 * t719;
+                let t729 = self.fixed[9] * t728;
+                let t730 = t726 - t729;
+                let t731 = t712 * t713;
+                let t732 = t717 - t731;
+                let t733 = t732 * t719;
+                let t734 = t713 - t733;
+                let t735 = self.fixed[8] * t734;
+                let t736 = t712 * t725;
+                let t737 = t736 * t719;
+                let t738 = self.fixed[9] * t737;
+                let t739 = t735 + t738;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t730, t739))
             }
             _ => None,
         }
@@ -1442,7 +1360,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
     }
     fn material(&self) -> crate::Material<T> {
         crate::Material::NeoHookean {
-            lambda: self.fixed[10],
+            lambda: self.fixed[9],
             mu: self.fixed[8],
         }
     }
@@ -1453,7 +1371,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[57]
+        self.fixed[56]
     }
     fn body_force_at(
         &self,
@@ -1475,32 +1393,32 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 15, 18> for Skew2d<T> {
         let t31 = t28 + t30;
         let t34 = self.fixed[1] * t31;
         let t64 = self.fixed[7] * t13;
-        let t156 = T::nearest(45.0) * t13;
-        let t161 = T::nearest(95.0) * t13;
-        let t168 = self.fixed[13] * t13;
-        let t177 = self.fixed[16] * t13;
-        let t182 = self.fixed[17] * t31;
-        let t187 = self.fixed[18] * t31;
-        let t232 = self.fixed[19] * t31;
-        let t277 = T::nearest(60.0) * t13;
-        let t286 = T::nearest(30.0) * t13;
-        let t293 = self.fixed[22] * t31;
+        let t142 = T::nearest(45.0) * t13;
+        let t147 = T::nearest(95.0) * t13;
+        let t154 = self.fixed[12] * t13;
+        let t163 = self.fixed[15] * t13;
+        let t168 = self.fixed[16] * t31;
+        let t173 = self.fixed[17] * t31;
+        let t217 = self.fixed[18] * t31;
+        let t261 = T::nearest(60.0) * t13;
+        let t270 = T::nearest(30.0) * t13;
+        let t277 = self.fixed[21] * t31;
         [
             t13,
             t14,
             t31,
             t34,
             t64,
-            t156,
-            t161,
+            t142,
+            t147,
+            t154,
+            t163,
             t168,
-            t177,
-            t182,
-            t187,
-            t232,
+            t173,
+            t217,
+            t261,
+            t270,
             t277,
-            t286,
-            t293,
         ]
     }
     #[inline]
@@ -1528,146 +1446,146 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 15, 18> for Skew2d<T> {
         let t75 = X[0] * X[1];
         let t76 = T::nearest(2.0) * t75;
         let t77 = t74 + t76;
-        let t152 = t67 * t72;
-        let t153 = T::pi() * t152;
-        let t154 = X[1] - t153;
-        let t227 = T::nearest(4.0) * X[0];
-        let t228 = self.fixed[4] * t22;
-        let t229 = t227 - t228;
-        let t351 = self.fixed[24] * t73;
-        let t353 = T::nearest(6.0) * t75;
-        let t354 = t70 - t351;
-        let t355 = t354 - t353;
-        let t375 = T::nearest(4.0) * t22;
-        let t376 = T::nearest(3.0) * t154;
-        let t377 = t375 + t376;
-        let t378 = T::nearest(2.0) * t377;
-        let t379 = t62 * t378;
-        let t380 = t6 * t355;
-        let t381 = T::nearest(3.0) * t380;
-        let t382 = t379 + t381;
-        let t383 = t6 * t70;
-        let t384 = T::nearest(3.0) * t383;
-        let t385 = t22 * t62;
-        let t386 = T::nearest(8.0) * t385;
-        let t387 = t384 + t386;
-        let t388 = t62 * t154;
-        let t389 = t388 + t380;
-        let t390 = T::nearest(3.0) * t389;
-        let t391 = T::nearest(4.0) * t385;
-        let t392 = t390 + t391;
-        let t393 = t388 * t355;
-        let t394 = t77 * t392;
-        let t395 = t393 + t394;
-        let t396 = T::nearest(6.0) * t395;
-        let t397 = t70 * t382;
-        let t398 = t387 * t355;
-        let t399 = t397 - t396;
-        let t400 = t399 - t398;
-        let t401 = T::nearest(2.0) * t388;
-        let t402 = t6 * t77;
-        let t403 = T::nearest(3.0) * t402;
-        let t404 = t401 - t403;
-        let t405 = t355 * t404;
-        let t406 = T::nearest(6.0) * t405;
-        let t407 = self.fixed[10] * t406;
-        let t408 = self.fixed[8] * t400;
-        let t411 = self.fixed[28] * t393;
-        let t412 = t407 + t408;
-        let t413 = t412 + t411;
-        let t417 = t62 * t413;
-        let t418 = self.fixed[29] * t417;
-        let t427 = t62 * t77;
-        let t428 = t427 * t154;
-        let t429 = t428 * t355;
-        let t430 = self.fixed[30] * t429;
-        let t431 = -t430;
-        let t432 = T::nearest(12.0) * X[0];
-        let t433 = T::nearest(4.0) * X[1];
-        let t435 = self.fixed[31] * t152;
-        let t437 = self.fixed[32] * t22;
-        let t438 = t432 - t433;
-        let t439 = t438 + t435;
-        let t440 = t439 - t437;
-        let t441 = T::nearest(2.0) * t380;
-        let t442 = t62 * t440;
-        let t443 = t441 + t442;
-        let t444 = t77 * t382;
-        let t445 = T::nearest(2.0) * t444;
-        let t446 = t70 * t443;
-        let t447 = t445 - t446;
-        let t456 = self.fixed[33] * t447;
-        let t458 = self.fixed[34] * t73;
-        let t460 = T::nearest(18.0) * t75;
-        let t461 = T::nearest(2.0) * t402;
-        let t462 = t62 * t229;
-        let t463 = t461 - t462;
-        let t465 = self.fixed[35] * t73;
-        let t466 = T::nearest(12.0) * t75;
-        let t467 = t70 - t465;
-        let t468 = t467 - t466;
-        let t469 = T::nearest(2.0) * X[1];
-        let t471 = self.fixed[36] * t152;
-        let t472 = t432 - t469;
-        let t473 = t472 + t471;
-        let t474 = t473 - t437;
-        let t475 = t6 * t468;
-        let t476 = t62 * t474;
-        let t477 = t475 + t476;
-        let t478 = self.fixed[10] * t443;
-        let t480 = self.fixed[37] * t477;
-        let t481 = t478 + t480;
-        let t482 = t154 * t468;
-        let t483 = T::nearest(2.0) * t482;
-        let t484 = t62 * t483;
-        let t485 = t77 * t387;
-        let t486 = t484 + t485;
-        let t487 = T::nearest(2.0) * t24;
-        let t488 = T::nearest(8.0) * t68;
-        let t489 = t487 - t488;
-        let t490 = t489 - t458;
-        let t491 = t490 - t460;
-        let t492 = t388 * t491;
-        let t494 = self.fixed[38] * t492;
-        let t496 = self.fixed[39] * t463;
-        let t497 = t496 + t481;
-        let t498 = t70 * t497;
-        let t502 = self.fixed[40] * t393;
-        let t503 = self.fixed[37] * t485;
-        let t507 = self.fixed[41] * t486;
-        let t508 = t494 - t498;
-        let t509 = t508 + t502;
-        let t510 = t509 + t503;
-        let t511 = t510 + t507;
-        let t513 = self.fixed[42] * t511;
-        let t526 = T::nearest(9.0) * t402;
-        let t527 = t391 + t526;
-        let t528 = t392 - t527;
-        let t529 = self.fixed[10] * t528;
-        let t530 = t388 + t475;
-        let t531 = self.fixed[39] * t530;
-        let t532 = t529 + t531;
-        let t536 = t62 * t532;
-        let t537 = self.fixed[44] * t536;
-        let t544 = self.fixed[45] * t392;
-        let t546 = self.fixed[46] * t154;
-        let t547 = t62 * t546;
-        let t548 = t387 * self.fixed[25];
-        let t550 = self.fixed[47] * t383;
-        let t551 = t547 - t548;
-        let t552 = t551 - t550;
-        let t555 = self.fixed[48] * t552;
-        let t568 = t70 * t229;
-        let t569 = t77 * t154;
-        let t570 = T::nearest(4.0) * t569;
-        let t571 = t568 - t570;
-        let t576 = self.fixed[50] * t571;
-        let t577 = -t576;
-        let t579 = self.fixed[51] * t154;
-        let t580 = t77 * t579;
-        let t581 = self.fixed[25] * t568;
-        let t582 = t580 + t581;
-        let t584 = self.fixed[52] * t582;
+        let t138 = t67 * t72;
+        let t139 = T::pi() * t138;
+        let t140 = X[1] - t139;
+        let t212 = T::nearest(4.0) * X[0];
+        let t213 = self.fixed[4] * t22;
+        let t214 = t212 - t213;
+        let t335 = self.fixed[23] * t73;
+        let t337 = T::nearest(6.0) * t75;
+        let t338 = t70 - t335;
+        let t339 = t338 - t337;
+        let t361 = T::nearest(4.0) * t22;
+        let t362 = T::nearest(3.0) * t140;
+        let t363 = t361 + t362;
+        let t364 = T::nearest(2.0) * t363;
+        let t365 = t62 * t364;
+        let t366 = t6 * t339;
+        let t367 = T::nearest(3.0) * t366;
+        let t368 = t365 + t367;
+        let t369 = t6 * t70;
+        let t370 = T::nearest(3.0) * t369;
+        let t371 = t22 * t62;
+        let t372 = T::nearest(8.0) * t371;
+        let t373 = t370 + t372;
+        let t374 = t62 * t140;
+        let t375 = t374 + t366;
+        let t376 = T::nearest(3.0) * t375;
+        let t377 = T::nearest(4.0) * t371;
+        let t378 = t376 + t377;
+        let t379 = t374 * t339;
+        let t380 = t77 * t378;
+        let t381 = t379 + t380;
+        let t382 = T::nearest(6.0) * t381;
+        let t383 = t70 * t368;
+        let t384 = t373 * t339;
+        let t385 = t383 - t382;
+        let t386 = t385 - t384;
+        let t387 = T::nearest(2.0) * t374;
+        let t388 = t6 * t77;
+        let t389 = T::nearest(3.0) * t388;
+        let t390 = t387 - t389;
+        let t391 = t339 * t390;
+        let t392 = T::nearest(6.0) * t391;
+        let t393 = self.fixed[9] * t392;
+        let t394 = self.fixed[8] * t386;
+        let t397 = self.fixed[27] * t379;
+        let t398 = t393 + t394;
+        let t399 = t398 + t397;
+        let t403 = t62 * t399;
+        let t404 = self.fixed[28] * t403;
+        let t413 = t62 * t77;
+        let t414 = t413 * t140;
+        let t415 = t414 * t339;
+        let t416 = self.fixed[29] * t415;
+        let t417 = -t416;
+        let t418 = T::nearest(12.0) * X[0];
+        let t419 = T::nearest(4.0) * X[1];
+        let t421 = self.fixed[30] * t138;
+        let t423 = self.fixed[31] * t22;
+        let t424 = t418 - t419;
+        let t425 = t424 + t421;
+        let t426 = t425 - t423;
+        let t427 = T::nearest(2.0) * t366;
+        let t428 = t62 * t426;
+        let t429 = t427 + t428;
+        let t430 = t77 * t368;
+        let t431 = T::nearest(2.0) * t430;
+        let t432 = t70 * t429;
+        let t433 = t431 - t432;
+        let t442 = self.fixed[32] * t433;
+        let t444 = self.fixed[33] * t73;
+        let t446 = T::nearest(18.0) * t75;
+        let t447 = T::nearest(2.0) * t388;
+        let t448 = t62 * t214;
+        let t449 = t447 - t448;
+        let t451 = self.fixed[34] * t73;
+        let t452 = T::nearest(12.0) * t75;
+        let t453 = t70 - t451;
+        let t454 = t453 - t452;
+        let t455 = T::nearest(2.0) * X[1];
+        let t457 = self.fixed[35] * t138;
+        let t458 = t418 - t455;
+        let t459 = t458 + t457;
+        let t460 = t459 - t423;
+        let t461 = t6 * t454;
+        let t462 = t62 * t460;
+        let t463 = t461 + t462;
+        let t464 = self.fixed[9] * t429;
+        let t466 = self.fixed[36] * t463;
+        let t467 = t464 + t466;
+        let t468 = t140 * t454;
+        let t469 = T::nearest(2.0) * t468;
+        let t470 = t62 * t469;
+        let t471 = t77 * t373;
+        let t472 = t470 + t471;
+        let t473 = T::nearest(2.0) * t24;
+        let t474 = T::nearest(8.0) * t68;
+        let t475 = t473 - t474;
+        let t476 = t475 - t444;
+        let t477 = t476 - t446;
+        let t478 = t374 * t477;
+        let t480 = self.fixed[37] * t478;
+        let t482 = self.fixed[38] * t449;
+        let t483 = t482 + t467;
+        let t484 = t70 * t483;
+        let t488 = self.fixed[39] * t379;
+        let t489 = self.fixed[36] * t471;
+        let t493 = self.fixed[40] * t472;
+        let t494 = t480 - t484;
+        let t495 = t494 + t488;
+        let t496 = t495 + t489;
+        let t497 = t496 + t493;
+        let t499 = self.fixed[41] * t497;
+        let t512 = T::nearest(9.0) * t388;
+        let t513 = t377 + t512;
+        let t514 = t378 - t513;
+        let t515 = self.fixed[9] * t514;
+        let t516 = t374 + t461;
+        let t517 = self.fixed[38] * t516;
+        let t518 = t515 + t517;
+        let t522 = t62 * t518;
+        let t523 = self.fixed[43] * t522;
+        let t530 = self.fixed[44] * t378;
+        let t532 = self.fixed[45] * t140;
+        let t533 = t62 * t532;
+        let t534 = t373 * self.fixed[24];
+        let t536 = self.fixed[46] * t369;
+        let t537 = t533 - t534;
+        let t538 = t537 - t536;
+        let t541 = self.fixed[47] * t538;
+        let t554 = t70 * t214;
+        let t555 = t77 * t140;
+        let t556 = T::nearest(4.0) * t555;
+        let t557 = t554 - t556;
+        let t562 = self.fixed[49] * t557;
+        let t563 = -t562;
+        let t565 = self.fixed[50] * t140;
+        let t566 = t77 * t565;
+        let t567 = self.fixed[24] * t554;
+        let t568 = t566 + t567;
+        let t570 = self.fixed[51] * t568;
         [
             t6,
             t22,
@@ -1675,18 +1593,18 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 15, 18> for Skew2d<T> {
             t62,
             t70,
             t77,
-            t154,
-            t229,
-            t355,
-            t418,
-            t431,
-            t456,
-            t513,
-            t537,
-            t544,
-            t555,
-            t577,
-            t584,
+            t140,
+            t214,
+            t339,
+            t404,
+            t417,
+            t442,
+            t499,
+            t523,
+            t530,
+            t541,
+            t563,
+            t570,
         ]
     }
     #[inline(always)]
@@ -1705,182 +1623,182 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 15, 18> for Skew2d<T> {
         let t88 = t66 * t71;
         let t89 = t87 - t88;
         let t94 = t65 * t86;
-        let t95 = t94 + t78;
-        let t96 = t95 - t88;
-        let t97 = t96.log_1p();
-        let t104 = point[3] * point[3];
-        let t112 = self.fixed[10] * t97;
-        let t126 = T::one() / t89;
-        let t157 = time[5] * point[0];
-        let t158 = time[2] * point[6];
-        let t159 = t157 - t158;
-        let t162 = time[6] * point[0];
-        let t164 = self.fixed[12] * t159;
-        let t165 = t162 - t158;
-        let t166 = t165 + t164;
-        let t169 = time[7] * point[0];
-        let t171 = self.fixed[14] * t166;
-        let t172 = t169 - t171;
-        let t174 = self.fixed[15] * t172;
-        let t178 = time[8] * point[0];
-        let t179 = -t178;
-        let t183 = time[9] * point[1];
-        let t184 = -t183;
-        let t188 = time[10] * point[6];
-        let t189 = T::nearest(3.0) * point[0];
-        let t190 = t189 * t71;
-        let t191 = point[3] * t184;
-        let t192 = t190 - t191;
-        let t193 = self.parameters.A * t192;
-        let t194 = time[0] * t193;
-        let t195 = t86 * t179;
-        let t196 = t80 * t188;
-        let t197 = t194 + t195;
-        let t198 = t197 + t196;
-        let t199 = t88 - t94;
-        let t200 = time[1] * t192;
-        let t218 = t195 + t196;
-        let t219 = t218 + t200;
-        let t220 = t78 * t80;
-        let t225 = time[4] * point[0];
-        let t226 = -t225;
-        let t233 = time[11] * point[7];
-        let t234 = point[0] * t71;
-        let t235 = point[3] * t188;
-        let t236 = t234 - t235;
-        let t237 = t86 * t226;
-        let t238 = t80 * t233;
-        let t239 = time[1] * t236;
-        let t240 = t237 + t238;
-        let t241 = t240 + t239;
-        let t242 = time[0] * t236;
-        let t243 = self.parameters.A * t242;
-        let t244 = t243 + t237;
-        let t245 = t244 + t238;
-        let t253 = t88 - t220;
-        let t278 = time[12] * point[0];
-        let t279 = time[2] * point[7];
+        let t95 = t88 - t94;
+        let t96 = T::one() / t89;
+        let t101 = t94 + t78;
+        let t102 = t101 - t88;
+        let t103 = t102.log_1p();
+        let t129 = t78 * t80;
+        let t130 = t88 - t129;
+        let t143 = time[5] * point[0];
+        let t144 = time[2] * point[6];
+        let t145 = t143 - t144;
+        let t148 = time[6] * point[0];
+        let t150 = self.fixed[11] * t145;
+        let t151 = t148 - t144;
+        let t152 = t151 + t150;
+        let t155 = time[7] * point[0];
+        let t157 = self.fixed[13] * t152;
+        let t158 = t155 - t157;
+        let t160 = self.fixed[14] * t158;
+        let t164 = time[8] * point[0];
+        let t165 = -t164;
+        let t169 = time[9] * point[1];
+        let t170 = -t169;
+        let t174 = time[10] * point[6];
+        let t175 = T::nearest(3.0) * point[0];
+        let t176 = t175 * t71;
+        let t177 = point[3] * t170;
+        let t178 = t176 - t177;
+        let t179 = self.parameters.A * t178;
+        let t180 = time[0] * t179;
+        let t181 = t86 * t165;
+        let t182 = t80 * t174;
+        let t183 = t180 + t181;
+        let t184 = t183 + t182;
+        let t185 = time[1] * t178;
+        let t203 = t181 + t182;
+        let t204 = t203 + t185;
+        let t207 = self.fixed[9] * t103;
+        let t210 = time[4] * point[0];
+        let t211 = -t210;
+        let t218 = time[11] * point[7];
+        let t219 = point[0] * t71;
+        let t220 = point[3] * t174;
+        let t221 = t219 - t220;
+        let t222 = t86 * t211;
+        let t223 = t80 * t218;
+        let t224 = time[1] * t221;
+        let t225 = t222 + t223;
+        let t226 = t225 + t224;
+        let t227 = time[0] * t221;
+        let t228 = self.parameters.A * t227;
+        let t229 = t228 + t222;
+        let t230 = t229 + t223;
+        let t262 = time[12] * point[0];
+        let t263 = time[2] * point[7];
+        let t264 = t262 - t263;
+        let t266 = T::nearest(8.0) * point[1];
+        let t267 = t266 - point[7];
+        let t268 = time[2] * t267;
+        let t271 = time[13] * point[0];
+        let t273 = self.fixed[20] * t264;
+        let t274 = t268 + t271;
+        let t275 = t274 + t273;
+        let t278 = time[14] * point[2];
+        let t279 = self.fixed[13] * t275;
         let t280 = t278 - t279;
-        let t282 = T::nearest(8.0) * point[1];
-        let t283 = t282 - point[7];
-        let t284 = time[2] * t283;
-        let t287 = time[13] * point[0];
-        let t289 = self.fixed[21] * t280;
-        let t290 = t284 + t287;
-        let t291 = t290 + t289;
-        let t294 = time[14] * point[2];
-        let t295 = self.fixed[14] * t291;
-        let t296 = t294 - t295;
-        let t299 = self.fixed[23] * t296;
-        let t300 = t78 * t226;
-        let t301 = t238 + t239;
-        let t302 = t301 + t300;
-        let t303 = t245 * t253;
-        let t304 = t303 * t126;
-        let t305 = t97 * t302;
-        let t306 = t304 - t305;
-        let t307 = t233 * t253;
-        let t308 = t78 * t302;
-        let t309 = t239 + t307;
-        let t310 = t309 - t308;
-        let t311 = t78 * t253;
-        let t312 = t88 - t311;
-        let t313 = t97 * t253;
-        let t314 = self.fixed[10] * t313;
-        let t315 = self.fixed[8] * t312;
-        let t316 = t314 - t315;
-        let t317 = t78 - t88;
-        let t318 = t317 + t94;
-        let t319 = self.fixed[8] * t318;
-        let t320 = t112 + t319;
-        let t321 = t188 * t80;
-        let t322 = t321 + t195;
-        let t323 = t322 + t200;
-        let t324 = t198 * t126;
-        let t325 = self.fixed[10] * t324;
-        let t326 = self.fixed[8] * t323;
-        let t327 = t325 + t326;
-        let t328 = t219 * t126;
-        let t329 = point[3] * t328;
-        let t330 = t189 + t329;
-        let t331 = t320 * t330;
-        let t332 = point[3] * t327;
-        let t333 = t331 - t332;
-        let t334 = t226 * t199;
-        let t335 = t243 + t307;
-        let t336 = t335 + t334;
-        let t337 = t306 + t336;
-        let t338 = self.fixed[10] * t337;
-        let t339 = self.fixed[8] * t310;
-        let t340 = t316 * t241;
-        let t341 = t340 * t126;
-        let t342 = time[1] * t333;
-        let t343 = t338 + t339;
-        let t344 = t343 - t341;
-        let t345 = t344 + t342;
-        let t346 = t345 * t126;
-        let t347 = self.fixed[20] * t346;
-        let t348 = t299 + t347;
-        let t349 = -t348;
-        let t360 = point[8] * point[8];
-        let t364 = point[0] * t104;
-        let t365 = t364 * t360;
-        let t366 = self.fixed[26] * t365;
-        let t367 = -t366;
-        let t372 = t104 * point[6];
-        let t373 = t372 * t360;
-        let t374 = self.fixed[27] * t373;
-        let t419 = time[0] * t367;
-        let t420 = time[2] * t374;
-        let t421 = t419 + t420;
-        let t422 = t421 - point[9];
-        let t514 = time[0] * t422;
-        let t515 = time[2] * point[10];
-        let t516 = point[11] * t97;
-        let t517 = t514 + t515;
-        let t518 = t517 + t516;
-        let t519 = t518 - point[12];
-        let t524 = t364 * point[8];
-        let t525 = self.fixed[43] * t524;
-        let t538 = time[0] * t525;
-        let t539 = point[13] + t538;
-        let t556 = time[2] * t519;
-        let t557 = time[0] * t539;
-        let t558 = point[14] * t97;
-        let t559 = t556 + t557;
-        let t560 = t559 + t558;
-        let t561 = point[15] + t560;
-        let t562 = point[5] * point[5];
-        let t566 = t562 * point[6];
-        let t567 = self.fixed[49] * t566;
-        let t585 = time[2] * t567;
-        let t586 = point[16] * t97;
-        let t587 = t585 + t586;
-        let t588 = point[17] + t587;
-        let t592 = self.fixed[53] * point[6];
-        let t593 = time[0] * t561;
-        let t594 = time[2] * t588;
-        let t595 = t592 * t97;
-        let t596 = t593 + t594;
-        let t597 = t596 + t595;
-        let t602 = self.fixed[54] * t364;
-        let t603 = -t602;
-        let t608 = point[0] * point[3];
-        let t609 = self.fixed[55] * t608;
-        let t610 = time[0] * t603;
-        let t611 = t610 - t609;
-        let t615 = self.fixed[56] * point[0];
-        let t616 = -t615;
-        let t617 = time[0] * t611;
-        let t618 = t616 * t97;
-        let t619 = t617 + t618;
-        let t620 = time[2] * t597;
-        let t621 = time[0] * t619;
-        let t622 = t620 + t621;
-        let t623 = t126 * t126;
-        let t624 = t622 * t623;
-        let t625 = t624 - t174;
-        crate::nalgebra::SVector::<T, 2>::new(t625, t349)
+        let t283 = self.fixed[22] * t280;
+        let t284 = t78 * t211;
+        let t285 = t223 + t224;
+        let t286 = t285 + t284;
+        let t287 = t230 * t130;
+        let t288 = t287 * t96;
+        let t289 = t103 * t286;
+        let t290 = t288 - t289;
+        let t291 = t218 * t130;
+        let t292 = t78 * t286;
+        let t293 = t224 + t291;
+        let t294 = t293 - t292;
+        let t295 = t78 * t130;
+        let t296 = t88 - t295;
+        let t297 = t103 * t130;
+        let t298 = self.fixed[9] * t297;
+        let t299 = self.fixed[8] * t296;
+        let t300 = t298 - t299;
+        let t301 = t78 - t88;
+        let t302 = t301 + t94;
+        let t303 = self.fixed[8] * t302;
+        let t304 = t207 + t303;
+        let t305 = t174 * t80;
+        let t306 = t305 + t181;
+        let t307 = t306 + t185;
+        let t308 = t184 * t96;
+        let t309 = self.fixed[9] * t308;
+        let t310 = self.fixed[8] * t307;
+        let t311 = t309 + t310;
+        let t312 = t204 * t96;
+        let t313 = point[3] * t312;
+        let t314 = t175 + t313;
+        let t315 = t304 * t314;
+        let t316 = point[3] * t311;
+        let t317 = t315 - t316;
+        let t318 = t211 * t95;
+        let t319 = t228 + t291;
+        let t320 = t319 + t318;
+        let t321 = t290 + t320;
+        let t322 = self.fixed[9] * t321;
+        let t323 = self.fixed[8] * t294;
+        let t324 = t300 * t226;
+        let t325 = t324 * t96;
+        let t326 = time[1] * t317;
+        let t327 = t322 + t323;
+        let t328 = t327 - t325;
+        let t329 = t328 + t326;
+        let t330 = t329 * t96;
+        let t331 = self.fixed[19] * t330;
+        let t332 = t283 + t331;
+        let t333 = -t332;
+        let t345 = point[3] * point[3];
+        let t346 = point[8] * point[8];
+        let t350 = point[0] * t345;
+        let t351 = t350 * t346;
+        let t352 = self.fixed[25] * t351;
+        let t353 = -t352;
+        let t358 = t345 * point[6];
+        let t359 = t358 * t346;
+        let t360 = self.fixed[26] * t359;
+        let t405 = time[0] * t353;
+        let t406 = time[2] * t360;
+        let t407 = t405 + t406;
+        let t408 = t407 - point[9];
+        let t500 = time[0] * t408;
+        let t501 = time[2] * point[10];
+        let t502 = point[11] * t103;
+        let t503 = t500 + t501;
+        let t504 = t503 + t502;
+        let t505 = t504 - point[12];
+        let t510 = t350 * point[8];
+        let t511 = self.fixed[42] * t510;
+        let t524 = time[0] * t511;
+        let t525 = point[13] + t524;
+        let t542 = time[2] * t505;
+        let t543 = time[0] * t525;
+        let t544 = point[14] * t103;
+        let t545 = t542 + t543;
+        let t546 = t545 + t544;
+        let t547 = point[15] + t546;
+        let t548 = point[5] * point[5];
+        let t552 = t548 * point[6];
+        let t553 = self.fixed[48] * t552;
+        let t571 = time[2] * t553;
+        let t572 = point[16] * t103;
+        let t573 = t571 + t572;
+        let t574 = point[17] + t573;
+        let t578 = self.fixed[52] * point[6];
+        let t579 = time[0] * t547;
+        let t580 = time[2] * t574;
+        let t581 = t578 * t103;
+        let t582 = t579 + t580;
+        let t583 = t582 + t581;
+        let t588 = self.fixed[53] * t350;
+        let t589 = -t588;
+        let t594 = point[0] * point[3];
+        let t595 = self.fixed[54] * t594;
+        let t596 = time[0] * t589;
+        let t597 = t596 - t595;
+        let t601 = self.fixed[55] * point[0];
+        let t602 = -t601;
+        let t603 = time[0] * t597;
+        let t604 = t602 * t103;
+        let t605 = t603 + t604;
+        let t606 = time[2] * t583;
+        let t607 = time[0] * t605;
+        let t608 = t606 + t607;
+        let t609 = t96 * t96;
+        let t610 = t608 * t609;
+        let t611 = t610 - t160;
+        crate::nalgebra::SVector::<T, 2>::new(t611, t333)
     }
 }
 impl<T: crate::Real> From<Skew2d<T>> for crate::AnySolution<T> {

@@ -169,73 +169,73 @@ impl<T: crate::Real> SphereShell<T> {
         let t129 = t127 / t128;
         let t135 = T::nearest(0.5) * parameters.E;
         let t136 = t135 / t114;
-        let t138 = parameters.E * parameters.nu;
-        let t139 = t114 * t116;
-        let t140 = t138 / t139;
-        let t178 = T::nearest(5.0) / parameters.Ro;
-        let t181 = parameters.nu / t116;
-        let t182 = t181 + T::one();
-        let t185 = T::nearest(4.0) * t182;
-        let t186 = t185 / t114;
-        let t189 = t46 / t48;
-        let t238 = T::one() / parameters.rho0;
-        let t247 = t140 + t136;
-        let t250 = t127 * t127;
-        let t251 = t128 * t128;
-        let t253 = T::nearest(144.0) * t250;
-        let t254 = t253 * t247;
-        let t255 = parameters.rho0 * t251;
-        let t256 = t254 / t255;
-        let t280 = T::nearest(3.0) * t136;
-        let t282 = T::nearest(3.0) * parameters.E;
-        let t283 = t282 * parameters.nu;
-        let t284 = t283 / t139;
-        let t292 = t127 * parameters.A;
-        let t293 = t11 * parameters.Ro;
-        let t294 = t293 * t293;
-        let t295 = T::nearest(12.0) * t292;
-        let t296 = parameters.rho0 * t294;
-        let t297 = t295 / t296;
-        let t303 = T::nearest(6.0) * t127;
-        let t304 = t303 * parameters.E;
-        let t305 = t304 * parameters.nu;
-        let t306 = parameters.rho0 * t128;
-        let t307 = t306 * t114;
-        let t308 = t307 * t116;
-        let t309 = t305 / t308;
-        let t323 = T::nearest(2.0) * t127;
-        let t324 = t323 / t306;
-        let t331 = T::nearest(4.0) * parameters.A;
-        let t332 = t331 * parameters.E;
-        let t333 = t332 * parameters.nu;
-        let t334 = t48 * t114;
-        let t335 = t334 * t116;
-        let t336 = t333 / t335;
-        let t351 = T::nearest(2.0) / t16;
-        let t353 = parameters.Ri / parameters.Ro;
-        let t354 = T::one() - t353;
-        let t355 = t103 * parameters.Ri;
-        let t356 = t355 * t354;
-        let t357 = t356 / t11;
-        let t360 = T::nearest(2.0) * parameters.Ri;
-        let t361 = t360 / parameters.Ro;
-        let t362 = T::nearest(3.0) - t361;
-        let t364 = t119 * parameters.Ri;
-        let t365 = t364 * t362;
-        let t366 = t365 / t11;
-        let t369 = parameters.Ri * parameters.Ri;
-        let t370 = t362 * t362;
-        let t371 = t127 * t369;
-        let t372 = t371 * t370;
-        let t373 = t372 / t128;
-        let t377 = parameters.A * parameters.Ri;
-        let t378 = t377 * t362;
-        let t379 = t378 / t11;
-        let t390 = T::one() / parameters.Ri;
-        let t399 = parameters.A / parameters.Ro;
-        let t407 = parameters.Ro * t114;
-        let t408 = t407 * t116;
-        let t409 = t138 / t408;
+        let t139 = parameters.E * parameters.nu;
+        let t140 = t114 * t116;
+        let t141 = t139 / t140;
+        let t189 = T::nearest(5.0) / parameters.Ro;
+        let t192 = parameters.nu / t116;
+        let t193 = t192 + T::one();
+        let t196 = T::nearest(4.0) * t193;
+        let t197 = t196 / t114;
+        let t200 = t46 / t48;
+        let t248 = T::one() / parameters.rho0;
+        let t257 = t141 + t136;
+        let t260 = t127 * t127;
+        let t261 = t128 * t128;
+        let t263 = T::nearest(144.0) * t260;
+        let t264 = t263 * t257;
+        let t265 = parameters.rho0 * t261;
+        let t266 = t264 / t265;
+        let t290 = T::nearest(3.0) * t136;
+        let t292 = T::nearest(3.0) * parameters.E;
+        let t293 = t292 * parameters.nu;
+        let t294 = t293 / t140;
+        let t302 = t127 * parameters.A;
+        let t303 = t11 * parameters.Ro;
+        let t304 = t303 * t303;
+        let t305 = T::nearest(12.0) * t302;
+        let t306 = parameters.rho0 * t304;
+        let t307 = t305 / t306;
+        let t313 = T::nearest(6.0) * t127;
+        let t314 = t313 * parameters.E;
+        let t315 = t314 * parameters.nu;
+        let t316 = parameters.rho0 * t128;
+        let t317 = t316 * t114;
+        let t318 = t317 * t116;
+        let t319 = t315 / t318;
+        let t333 = T::nearest(2.0) * t127;
+        let t334 = t333 / t316;
+        let t341 = T::nearest(4.0) * parameters.A;
+        let t342 = t341 * parameters.E;
+        let t343 = t342 * parameters.nu;
+        let t344 = t48 * t114;
+        let t345 = t344 * t116;
+        let t346 = t343 / t345;
+        let t361 = T::nearest(2.0) / t16;
+        let t363 = parameters.Ri / parameters.Ro;
+        let t364 = T::one() - t363;
+        let t365 = t103 * parameters.Ri;
+        let t366 = t365 * t364;
+        let t367 = t366 / t11;
+        let t372 = T::nearest(2.0) * parameters.Ri;
+        let t373 = t372 / parameters.Ro;
+        let t374 = T::nearest(3.0) - t373;
+        let t376 = t119 * parameters.Ri;
+        let t377 = t376 * t374;
+        let t378 = t377 / t11;
+        let t381 = parameters.Ri * parameters.Ri;
+        let t382 = t374 * t374;
+        let t383 = t127 * t381;
+        let t384 = t383 * t382;
+        let t385 = t384 / t128;
+        let t389 = parameters.A * parameters.Ri;
+        let t390 = t389 * t374;
+        let t391 = t390 / t11;
+        let t402 = T::one() / parameters.Ri;
+        let t410 = parameters.A / parameters.Ro;
+        let t418 = parameters.Ro * t114;
+        let t419 = t418 * t116;
+        let t420 = t139 / t419;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -254,26 +254,26 @@ impl<T: crate::Real> SphereShell<T> {
                 t120,
                 t129,
                 t136,
-                t140,
-                t178,
-                t186,
+                t141,
                 t189,
-                t238,
-                t256,
-                t280,
-                t284,
-                t297,
-                t309,
-                t324,
-                t336,
-                t351,
-                t357,
-                t366,
-                t373,
-                t379,
-                t390,
-                t399,
-                t409,
+                t197,
+                t200,
+                t248,
+                t266,
+                t290,
+                t294,
+                t307,
+                t319,
+                t334,
+                t346,
+                t361,
+                t367,
+                t378,
+                t385,
+                t391,
+                t402,
+                t410,
+                t420,
             ],
         })
     }
@@ -568,12 +568,16 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t26 = t8 * t23;
         let t59 = self.fixed[6] * t8;
         let t60 = T::one() - t59;
+        let t64 = t23 * t6;
         let t66 = T::one() / t7;
+        let t67 = t8 * t66;
         let t74 = X[0] * X[1];
         let t78 = X[0] * X[2];
         let t82 = t4 + t5;
+        let t85 = t23 * t82;
         let t89 = X[1] * X[2];
         let t93 = t3 + t5;
+        let t96 = t23 * t93;
         let t105 = self.fixed[8] * t18;
         let t106 = t8 * t60;
         let t107 = t105 * t106;
@@ -594,48 +598,59 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t131 = t121 + t130;
         let t132 = t131 + t107;
         let t133 = t132.ln_of_both(t112);
-        let t137 = t107 + T::nearest(2.0);
-        let t141 = self.fixed[12] * t133;
-        let t142 = self.fixed[11] * t137;
-        let t143 = t141 - t142;
-        let t144 = t107 * t143;
-        let t145 = -t144;
-        let t146 = t109 + T::nearest(2.0);
-        let t147 = self.fixed[11] * t146;
-        let t148 = t141 - t147;
-        let t149 = t109 * t148;
-        let t150 = -t149;
-        let t151 = T::one() / t108;
-        let t152 = t145 * t151;
-        let t153 = t5 * t152;
-        let t154 = T::one() / t110;
-        let t155 = t150 * t154;
-        let t156 = t6 * t155;
-        let t157 = t153 + t156;
-        let t158 = t66 * t157;
-        let t159 = t141 + t158;
-        let t160 = t152 - t155;
-        let t161 = t74 * t66;
-        let t162 = t161 * t160;
-        let t163 = t78 * t66;
-        let t164 = t163 * t160;
-        let t165 = t3 * t152;
-        let t166 = t82 * t155;
-        let t167 = t165 + t166;
-        let t168 = t66 * t167;
-        let t169 = t141 + t168;
-        let t170 = t89 * t66;
-        let t171 = t170 * t160;
-        let t172 = t4 * t152;
-        let t173 = t93 * t155;
-        let t174 = t172 + t173;
-        let t175 = t66 * t174;
-        let t176 = t141 + t175;
+        let t137 = T::one() / t108;
+        let t138 = t137 + T::one();
+        let t142 = t133 * t137;
+        let t143 = self.fixed[12] * t142;
+        let t144 = self.fixed[11] * t138;
+        let t145 = t143 - t144;
+        let t146 = T::one() / t110;
+        let t147 = t146 + T::one();
+        let t148 = t133 * t146;
+        let t149 = self.fixed[12] * t148;
+        let t150 = self.fixed[11] * t147;
+        let t151 = t149 - t150;
+        let t152 = t5 * t67;
+        let t153 = t107 * t145;
+        let t154 = t152 * t153;
+        let t155 = t25 * t64;
+        let t156 = t155 * t151;
+        let t157 = t154 + t156;
+        let t158 = self.fixed[12] * t133;
+        let t159 = t67 * t157;
+        let t160 = t158 - t159;
+        let t161 = t67 * t153;
+        let t162 = t25 * t23;
+        let t163 = t162 * t151;
+        let t164 = t161 - t163;
+        let t165 = t74 * t67;
+        let t166 = t165 * t164;
+        let t167 = -t166;
+        let t168 = t78 * t67;
+        let t169 = t168 * t164;
+        let t170 = -t169;
+        let t171 = t3 * t67;
+        let t172 = t171 * t153;
+        let t173 = t25 * t85;
+        let t174 = t173 * t151;
+        let t175 = t172 + t174;
+        let t176 = t67 * t175;
+        let t177 = t158 - t176;
+        let t178 = t89 * t67;
+        let t179 = t178 * t164;
+        let t180 = -t179;
+        let t181 = t4 * t67;
+        let t182 = t181 * t153;
+        let t183 = t25 * t96;
+        let t184 = t183 * t151;
+        let t185 = t182 + t184;
+        let t186 = t67 * t185;
+        let t187 = t158 - t186;
         crate::nalgebra::SMatrix::<
             T,
             3,
             3,
-        >::new(t159, t162, t164, t162, t169, t171, t164, t171, t176)
+        >::new(t160, t167, t170, t167, t177, t180, t170, t180, t187)
     }
     #[inline]
     fn body_force(
@@ -669,69 +684,69 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t110 = t109 + T::one();
         let t111 = t110 * t110;
         let t112 = t108 * t111;
-        let t151 = T::one() / t108;
-        let t154 = T::one() / t110;
-        let t179 = self.fixed[13] * t8;
-        let t180 = T::nearest(3.0) - t179;
-        let t183 = t7 * t23;
-        let t184 = self.fixed[4] * t183;
-        let t187 = self.fixed[14] * t180;
-        let t188 = t184 + t187;
-        let t190 = self.fixed[15] * t18;
-        let t191 = t190 * t188;
-        let t192 = t107 * t109;
-        let t193 = t192 + T::nearest(2.0);
-        let t194 = t25 * t23;
-        let t195 = t194 * t193;
-        let t196 = t8 * t195;
-        let t197 = T::nearest(2.0) * t109;
-        let t198 = t197 + T::one();
-        let t199 = t107 * t198;
-        let t200 = t109 * t109;
-        let t201 = t196 + t199;
-        let t202 = t201 + t200;
-        let t203 = t202.ln_of_both(t112);
-        let t204 = self.fixed[11] * t107;
-        let t205 = self.fixed[12] * t203;
-        let t206 = t204 + t205;
-        let t207 = self.fixed[11] * t109;
-        let t208 = t205 + t207;
-        let t209 = T::one() - t21;
-        let t210 = t105 * t209;
-        let t211 = t210 * t151;
-        let t212 = self.fixed[9] * t18;
-        let t213 = t212 * t73;
-        let t214 = t213 * t154;
-        let t215 = t211 + t214;
-        let t216 = self.fixed[12] * t215;
-        let t217 = self.fixed[11] * t210;
-        let t218 = t216 + t217;
-        let t219 = t107 * t211;
-        let t220 = t210 - t219;
-        let t221 = t206 * t220;
-        let t222 = t107 * t218;
-        let t223 = t221 + t222;
-        let t224 = t109 * t154;
-        let t225 = t213 * t224;
-        let t226 = t219 + t225;
-        let t227 = T::nearest(2.0) * t67;
-        let t228 = t107 * t206;
-        let t229 = t227 * t228;
-        let t230 = t229 + t223;
-        let t231 = t151 * t230;
-        let t232 = t212 * t23;
-        let t233 = t208 * t154;
-        let t234 = t232 * t233;
-        let t235 = self.fixed[12] * t226;
-        let t236 = t231 - t234;
-        let t237 = t236 + t235;
-        let t239 = self.fixed[16] * t237;
-        let t240 = t239 - t191;
-        let t241 = t67 * t240;
-        let t242 = X[0] * t241;
-        let t243 = X[1] * t241;
-        let t244 = X[2] * t241;
-        crate::nalgebra::SVector::<T, 3>::new(t242, t243, t244)
+        let t137 = T::one() / t108;
+        let t146 = T::one() / t110;
+        let t162 = t25 * t23;
+        let t190 = self.fixed[13] * t8;
+        let t191 = T::nearest(3.0) - t190;
+        let t194 = t7 * t23;
+        let t195 = self.fixed[4] * t194;
+        let t198 = self.fixed[14] * t191;
+        let t199 = t195 + t198;
+        let t201 = self.fixed[15] * t18;
+        let t202 = t201 * t199;
+        let t203 = t107 * t109;
+        let t204 = t203 + T::nearest(2.0);
+        let t205 = t162 * t204;
+        let t206 = t8 * t205;
+        let t207 = T::nearest(2.0) * t109;
+        let t208 = t207 + T::one();
+        let t209 = t107 * t208;
+        let t210 = t109 * t109;
+        let t211 = t206 + t209;
+        let t212 = t211 + t210;
+        let t213 = t212.ln_of_both(t112);
+        let t214 = self.fixed[11] * t107;
+        let t215 = self.fixed[12] * t213;
+        let t216 = t214 + t215;
+        let t217 = self.fixed[11] * t109;
+        let t218 = t215 + t217;
+        let t219 = T::one() - t21;
+        let t220 = t105 * t219;
+        let t221 = t220 * t137;
+        let t222 = self.fixed[9] * t18;
+        let t223 = t222 * t73;
+        let t224 = t223 * t146;
+        let t225 = t221 + t224;
+        let t226 = self.fixed[12] * t225;
+        let t227 = self.fixed[11] * t220;
+        let t228 = t226 + t227;
+        let t229 = t107 * t221;
+        let t230 = t220 - t229;
+        let t231 = t216 * t230;
+        let t232 = t107 * t228;
+        let t233 = t231 + t232;
+        let t234 = t109 * t146;
+        let t235 = t223 * t234;
+        let t236 = t229 + t235;
+        let t237 = T::nearest(2.0) * t67;
+        let t238 = t107 * t216;
+        let t239 = t237 * t238;
+        let t240 = t239 + t233;
+        let t241 = t137 * t240;
+        let t242 = t222 * t23;
+        let t243 = t218 * t146;
+        let t244 = t242 * t243;
+        let t245 = self.fixed[12] * t236;
+        let t246 = t241 - t244;
+        let t247 = t246 + t245;
+        let t249 = self.fixed[16] * t247;
+        let t250 = t249 - t202;
+        let t251 = t67 * t250;
+        let t252 = X[0] * t251;
+        let t253 = X[1] * t251;
+        let t254 = X[2] * t251;
+        crate::nalgebra::SVector::<T, 3>::new(t252, t253, t254)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> crate::Fields<T, 3> {
         let t3 = X[1] * X[1];
@@ -828,103 +843,113 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t131 = t121 + t130;
         let t132 = t131 + t107;
         let t133 = t132.ln_of_both(t112);
-        let t137 = t107 + T::nearest(2.0);
-        let t141 = self.fixed[12] * t133;
-        let t142 = self.fixed[11] * t137;
-        let t143 = t141 - t142;
-        let t144 = t107 * t143;
-        let t145 = -t144;
-        let t146 = t109 + T::nearest(2.0);
-        let t147 = self.fixed[11] * t146;
-        let t148 = t141 - t147;
-        let t149 = t109 * t148;
-        let t150 = -t149;
-        let t151 = T::one() / t108;
-        let t152 = t145 * t151;
-        let t153 = t5 * t152;
-        let t154 = T::one() / t110;
-        let t155 = t150 * t154;
-        let t156 = t6 * t155;
-        let t157 = t153 + t156;
-        let t158 = t66 * t157;
-        let t159 = t141 + t158;
-        let t160 = t152 - t155;
-        let t161 = t74 * t66;
-        let t162 = t161 * t160;
-        let t163 = t78 * t66;
-        let t164 = t163 * t160;
-        let t165 = t3 * t152;
-        let t166 = t82 * t155;
-        let t167 = t165 + t166;
-        let t168 = t66 * t167;
-        let t169 = t141 + t168;
-        let t170 = t89 * t66;
-        let t171 = t170 * t160;
-        let t172 = t4 * t152;
-        let t173 = t93 * t155;
-        let t174 = t172 + t173;
-        let t175 = t66 * t174;
-        let t176 = t141 + t175;
-        let t179 = self.fixed[13] * t8;
-        let t180 = T::nearest(3.0) - t179;
-        let t183 = t7 * t23;
-        let t184 = self.fixed[4] * t183;
-        let t187 = self.fixed[14] * t180;
-        let t188 = t184 + t187;
-        let t190 = self.fixed[15] * t18;
-        let t191 = t190 * t188;
-        let t192 = t107 * t109;
-        let t193 = t192 + T::nearest(2.0);
-        let t194 = t25 * t23;
-        let t195 = t194 * t193;
-        let t196 = t8 * t195;
-        let t197 = T::nearest(2.0) * t109;
-        let t198 = t197 + T::one();
-        let t199 = t107 * t198;
-        let t200 = t109 * t109;
-        let t201 = t196 + t199;
-        let t202 = t201 + t200;
-        let t203 = t202.ln_of_both(t112);
-        let t204 = self.fixed[11] * t107;
-        let t205 = self.fixed[12] * t203;
-        let t206 = t204 + t205;
-        let t207 = self.fixed[11] * t109;
-        let t208 = t205 + t207;
-        let t209 = T::one() - t21;
-        let t210 = t105 * t209;
-        let t211 = t210 * t151;
-        let t212 = self.fixed[9] * t18;
-        let t213 = t212 * t73;
-        let t214 = t213 * t154;
-        let t215 = t211 + t214;
-        let t216 = self.fixed[12] * t215;
-        let t217 = self.fixed[11] * t210;
-        let t218 = t216 + t217;
-        let t219 = t107 * t211;
-        let t220 = t210 - t219;
-        let t221 = t206 * t220;
-        let t222 = t107 * t218;
-        let t223 = t221 + t222;
-        let t224 = t109 * t154;
-        let t225 = t213 * t224;
-        let t226 = t219 + t225;
-        let t227 = T::nearest(2.0) * t67;
-        let t228 = t107 * t206;
-        let t229 = t227 * t228;
-        let t230 = t229 + t223;
-        let t231 = t151 * t230;
-        let t232 = t212 * t23;
-        let t233 = t208 * t154;
-        let t234 = t232 * t233;
-        let t235 = self.fixed[12] * t226;
-        let t236 = t231 - t234;
-        let t237 = t236 + t235;
-        let t239 = self.fixed[16] * t237;
-        let t240 = t239 - t191;
-        let t241 = t67 * t240;
-        let t242 = X[0] * t241;
-        let t243 = X[1] * t241;
-        let t244 = X[2] * t241;
+        let t137 = T::one() / t108;
+        let t138 = t137 + T::one();
+        let t142 = t133 * t137;
+        let t143 = self.fixed[12] * t142;
+        let t144 = self.fixed[11] * t138;
+        let t145 = t143 - t144;
+        let t146 = T::one() / t110;
+        let t147 = t146 + T::one();
+        let t148 = t133 * t146;
+        let t149 = self.fixed[12] * t148;
+        let t150 = self.fixed[11] * t147;
+        let t151 = t149 - t150;
+        let t152 = t5 * t67;
+        let t153 = t107 * t145;
+        let t154 = t152 * t153;
+        let t155 = t25 * t64;
+        let t156 = t155 * t151;
+        let t157 = t154 + t156;
+        let t158 = self.fixed[12] * t133;
+        let t159 = t67 * t157;
+        let t160 = t158 - t159;
+        let t161 = t67 * t153;
+        let t162 = t25 * t23;
+        let t163 = t162 * t151;
+        let t164 = t161 - t163;
+        let t165 = t74 * t67;
+        let t166 = t165 * t164;
+        let t167 = -t166;
+        let t168 = t78 * t67;
+        let t169 = t168 * t164;
+        let t170 = -t169;
+        let t171 = t3 * t67;
+        let t172 = t171 * t153;
+        let t173 = t25 * t85;
+        let t174 = t173 * t151;
+        let t175 = t172 + t174;
+        let t176 = t67 * t175;
+        let t177 = t158 - t176;
+        let t178 = t89 * t67;
+        let t179 = t178 * t164;
+        let t180 = -t179;
+        let t181 = t4 * t67;
+        let t182 = t181 * t153;
+        let t183 = t25 * t96;
+        let t184 = t183 * t151;
+        let t185 = t182 + t184;
+        let t186 = t67 * t185;
+        let t187 = t158 - t186;
+        let t190 = self.fixed[13] * t8;
+        let t191 = T::nearest(3.0) - t190;
+        let t194 = t7 * t23;
+        let t195 = self.fixed[4] * t194;
+        let t198 = self.fixed[14] * t191;
+        let t199 = t195 + t198;
+        let t201 = self.fixed[15] * t18;
+        let t202 = t201 * t199;
+        let t203 = t107 * t109;
+        let t204 = t203 + T::nearest(2.0);
+        let t205 = t162 * t204;
+        let t206 = t8 * t205;
+        let t207 = T::nearest(2.0) * t109;
+        let t208 = t207 + T::one();
+        let t209 = t107 * t208;
+        let t210 = t109 * t109;
+        let t211 = t206 + t209;
+        let t212 = t211 + t210;
+        let t213 = t212.ln_of_both(t112);
+        let t214 = self.fixed[11] * t107;
+        let t215 = self.fixed[12] * t213;
+        let t216 = t214 + t215;
+        let t217 = self.fixed[11] * t109;
+        let t218 = t215 + t217;
+        let t219 = T::one() - t21;
+        let t220 = t105 * t219;
+        let t221 = t220 * t137;
+        let t222 = self.fixed[9] * t18;
+        let t223 = t222 * t73;
+        let t224 = t223 * t146;
+        let t225 = t221 + t224;
+        let t226 = self.fixed[12] * t225;
+        let t227 = self.fixed[11] * t220;
+        let t228 = t226 + t227;
+        let t229 = t107 * t221;
+        let t230 = t220 - t229;
+        let t231 = t216 * t230;
+        let t232 = t107 * t228;
+        let t233 = t231 + t232;
+        let t234 = t109 * t146;
+        let t235 = t223 * t234;
+        let t236 = t229 + t235;
+        let t237 = T::nearest(2.0) * t67;
+        let t238 = t107 * t216;
+        let t239 = t237 * t238;
+        let t240 = t239 + t233;
+        let t241 = t137 * t240;
+        let t242 = t222 * t23;
+        let t243 = t218 * t146;
+        let t244 = t242 * t243;
+        let t245 = self.fixed[12] * t236;
+        let t246 = t241 - t244;
+        let t247 = t246 + t245;
+        let t249 = self.fixed[16] * t247;
+        let t250 = t249 - t202;
+        let t251 = t67 * t250;
+        let t252 = X[0] * t251;
+        let t253 = X[1] * t251;
+        let t254 = X[2] * t251;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 3>::new(t28, t30, t32),
             v: crate::nalgebra::SVector::<T, 3>::new(t40, t42, t44),
@@ -944,8 +969,8 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 T,
                 3,
                 3,
-            >::new(t159, t162, t164, t162, t169, t171, t164, t171, t176),
-            b: crate::nalgebra::SVector::<T, 3>::new(t242, t243, t244),
+            >::new(t160, t167, t170, t167, t177, t180, t170, t180, t187),
+            b: crate::nalgebra::SVector::<T, 3>::new(t252, t253, t254),
         }
     }
     fn traction(
@@ -959,49 +984,50 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t17 = self.fixed[0] * t;
                 let t18 = t17.cos_pi();
                 let t122 = t18 * t18;
-                let t358 = self.fixed[25] * t18;
-                let t359 = t358 + T::one();
-                let t363 = t18 * t359;
-                let t367 = self.fixed[26] * t363;
-                let t368 = t122 * t359;
-                let t374 = self.fixed[27] * t368;
-                let t375 = t367 + t374;
-                let t376 = t375 + t358;
-                let t380 = self.fixed[28] * t18;
-                let t381 = t380 + T::one();
-                let t382 = t381 * t381;
-                let t383 = t359 * t382;
-                let t384 = t376.ln_of_both(t383);
-                let t385 = t358 + T::nearest(2.0);
-                let t386 = self.fixed[12] * t384;
-                let t387 = t358 * t385;
-                let t388 = self.fixed[11] * t387;
-                let t389 = t386 + t388;
-                let t391 = t389 / t359;
-                let t392 = self.fixed[29] * t391;
-                let t393 = t392 * X[0];
-                let t394 = -t393;
-                let t395 = t392 * X[1];
-                let t396 = -t395;
-                let t397 = t392 * X[2];
-                let t398 = -t397;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t394, t396, t398))
+                let t368 = self.fixed[25] * t18;
+                let t369 = t368 + T::one();
+                let t370 = T::one() / t369;
+                let t371 = t370 + T::one();
+                let t375 = t18 * t369;
+                let t379 = self.fixed[26] * t375;
+                let t380 = t122 * t369;
+                let t386 = self.fixed[27] * t380;
+                let t387 = t379 + t386;
+                let t388 = t387 + t368;
+                let t392 = self.fixed[28] * t18;
+                let t393 = t392 + T::one();
+                let t394 = t393 * t393;
+                let t395 = t369 * t394;
+                let t396 = t388.ln_of_both(t395);
+                let t397 = t368 * t371;
+                let t398 = self.fixed[11] * t397;
+                let t399 = t396 * t370;
+                let t400 = self.fixed[12] * t399;
+                let t401 = t398 + t400;
+                let t403 = self.fixed[29] * t401;
+                let t404 = t403 * X[0];
+                let t405 = -t404;
+                let t406 = t403 * X[1];
+                let t407 = -t406;
+                let t408 = t403 * X[2];
+                let t409 = -t408;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t405, t407, t409))
             }
             crate::Surface::Outer => {
                 let t17 = self.fixed[0] * t;
                 let t18 = t17.cos_pi();
-                let t400 = self.fixed[30] * t18;
-                let t401 = t400 + T::nearest(2.0);
-                let t402 = t18 * t401;
-                let t403 = self.fixed[30] * t402;
-                let t404 = t400 + T::one();
-                let t405 = t404 * t404;
-                let t406 = t403.ln_of_both(t405);
-                let t410 = self.fixed[31] * t406;
-                let t411 = t410 * X[0];
-                let t412 = t410 * X[1];
-                let t413 = t410 * X[2];
-                Some(crate::nalgebra::SVector::<T, 3>::new(t411, t412, t413))
+                let t411 = self.fixed[30] * t18;
+                let t412 = t411 + T::nearest(2.0);
+                let t413 = t18 * t412;
+                let t414 = self.fixed[30] * t413;
+                let t415 = t411 + T::one();
+                let t416 = t415 * t415;
+                let t417 = t414.ln_of_both(t416);
+                let t421 = self.fixed[31] * t417;
+                let t422 = t421 * X[0];
+                let t423 = t421 * X[1];
+                let t424 = t421 * X[2];
+                Some(crate::nalgebra::SVector::<T, 3>::new(t422, t423, t424))
             }
             crate::Surface::Lower(0) => {
                 let t3 = X[1] * X[1];
@@ -1018,7 +1044,9 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t26 = t8 * t23;
                 let t59 = self.fixed[6] * t8;
                 let t60 = T::one() - t59;
+                let t64 = t23 * t6;
                 let t66 = T::one() / t7;
+                let t67 = t8 * t66;
                 let t105 = self.fixed[8] * t18;
                 let t106 = t8 * t60;
                 let t107 = t105 * t106;
@@ -1039,19 +1067,19 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t131 = t121 + t130;
                 let t132 = t131 + t107;
                 let t133 = t132.ln_of_both(t112);
-                let t141 = self.fixed[12] * t133;
-                let t146 = t109 + T::nearest(2.0);
-                let t147 = self.fixed[11] * t146;
-                let t148 = t141 - t147;
-                let t149 = t109 * t148;
-                let t150 = -t149;
-                let t154 = T::one() / t110;
-                let t155 = t150 * t154;
-                let t414 = t6 * t66;
-                let t415 = t414 * t155;
-                let t416 = t141 + t415;
-                let t417 = -t416;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t417, T::zero(), T::zero()))
+                let t146 = T::one() / t110;
+                let t147 = t146 + T::one();
+                let t148 = t133 * t146;
+                let t149 = self.fixed[12] * t148;
+                let t150 = self.fixed[11] * t147;
+                let t151 = t149 - t150;
+                let t158 = self.fixed[12] * t133;
+                let t425 = t64 * t67;
+                let t426 = t25 * t425;
+                let t427 = t426 * t151;
+                let t428 = t158 - t427;
+                let t429 = -t428;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t429, T::zero(), T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t3 = X[1] * X[1];
@@ -1069,7 +1097,9 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t59 = self.fixed[6] * t8;
                 let t60 = T::one() - t59;
                 let t66 = T::one() / t7;
+                let t67 = t8 * t66;
                 let t82 = t4 + t5;
+                let t85 = t23 * t82;
                 let t105 = self.fixed[8] * t18;
                 let t106 = t8 * t60;
                 let t107 = t105 * t106;
@@ -1090,19 +1120,19 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t131 = t121 + t130;
                 let t132 = t131 + t107;
                 let t133 = t132.ln_of_both(t112);
-                let t141 = self.fixed[12] * t133;
-                let t146 = t109 + T::nearest(2.0);
-                let t147 = self.fixed[11] * t146;
-                let t148 = t141 - t147;
-                let t149 = t109 * t148;
-                let t150 = -t149;
-                let t154 = T::one() / t110;
-                let t155 = t150 * t154;
-                let t419 = t82 * t66;
-                let t420 = t419 * t155;
-                let t421 = t141 + t420;
-                let t422 = -t421;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t422, T::zero()))
+                let t146 = T::one() / t110;
+                let t147 = t146 + T::one();
+                let t148 = t133 * t146;
+                let t149 = self.fixed[12] * t148;
+                let t150 = self.fixed[11] * t147;
+                let t151 = t149 - t150;
+                let t158 = self.fixed[12] * t133;
+                let t431 = t85 * t67;
+                let t432 = t25 * t431;
+                let t433 = t432 * t151;
+                let t434 = t158 - t433;
+                let t435 = -t434;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t435, T::zero()))
             }
             crate::Surface::Lower(2) => {
                 let t3 = X[1] * X[1];
@@ -1120,7 +1150,9 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t59 = self.fixed[6] * t8;
                 let t60 = T::one() - t59;
                 let t66 = T::one() / t7;
+                let t67 = t8 * t66;
                 let t93 = t3 + t5;
+                let t96 = t23 * t93;
                 let t105 = self.fixed[8] * t18;
                 let t106 = t8 * t60;
                 let t107 = t105 * t106;
@@ -1141,19 +1173,19 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t131 = t121 + t130;
                 let t132 = t131 + t107;
                 let t133 = t132.ln_of_both(t112);
-                let t141 = self.fixed[12] * t133;
-                let t146 = t109 + T::nearest(2.0);
-                let t147 = self.fixed[11] * t146;
-                let t148 = t141 - t147;
-                let t149 = t109 * t148;
-                let t150 = -t149;
-                let t154 = T::one() / t110;
-                let t155 = t150 * t154;
-                let t423 = t93 * t66;
-                let t424 = t423 * t155;
-                let t425 = t141 + t424;
-                let t426 = -t425;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t426))
+                let t146 = T::one() / t110;
+                let t147 = t146 + T::one();
+                let t148 = t133 * t146;
+                let t149 = self.fixed[12] * t148;
+                let t150 = self.fixed[11] * t147;
+                let t151 = t149 - t150;
+                let t158 = self.fixed[12] * t133;
+                let t436 = t96 * t67;
+                let t437 = t25 * t436;
+                let t438 = t437 * t151;
+                let t439 = t158 - t438;
+                let t440 = -t439;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t440))
             }
             _ => None,
         }
@@ -1244,67 +1276,67 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 12> for SphereShell<T> {
         let t106 = t8 * t60;
         let t123 = t23 * t23;
         let t124 = t7 * t123;
-        let t179 = self.fixed[13] * t8;
-        let t180 = T::nearest(3.0) - t179;
-        let t183 = t7 * t23;
-        let t184 = self.fixed[4] * t183;
-        let t187 = self.fixed[14] * t180;
-        let t188 = t184 + t187;
-        let t209 = T::one() - t21;
-        let t245 = X[0] * t67;
-        let t246 = self.fixed[15] * t188;
-        let t249 = t7 * t8;
-        let t252 = t60 * t60;
-        let t257 = t249 * t23;
-        let t258 = t257 * t252;
-        let t259 = t258 * t180;
-        let t260 = self.fixed[17] * t259;
-        let t261 = t23 * t209;
-        let t262 = t60 * t73;
-        let t263 = T::nearest(2.0) * t262;
-        let t264 = t261 + t263;
-        let t265 = t23 * t73;
-        let t267 = T::nearest(36.0) * t252;
-        let t268 = t265 + t267;
-        let t269 = t268 - t123;
-        let t270 = T::nearest(2.0) * t180;
-        let t271 = t73 + t270;
-        let t272 = t23 * t271;
-        let t274 = t60 * t209;
-        let t275 = T::nearest(18.0) * t274;
-        let t276 = t272 + t275;
-        let t277 = T::nearest(6.0) - t179;
-        let t278 = t277 * t209;
-        let t279 = T::nearest(2.0) * t278;
-        let t281 = self.fixed[18] * t279;
-        let t285 = self.fixed[19] * t264;
-        let t286 = self.fixed[11] * t269;
-        let t287 = self.fixed[12] * t276;
-        let t288 = t281 + t285;
-        let t289 = t288 + t286;
-        let t290 = t289 + t287;
-        let t298 = t7 * t60;
-        let t299 = t298 * t290;
-        let t300 = self.fixed[20] * t299;
-        let t310 = t8 * t264;
-        let t311 = self.fixed[21] * t310;
-        let t312 = self.fixed[12] * t180;
-        let t313 = self.fixed[18] * t209;
-        let t314 = t312 + t313;
-        let t315 = t267 - t123;
-        let t316 = t275 + t265;
-        let t317 = t60 * t314;
-        let t318 = T::nearest(12.0) * t317;
-        let t319 = self.fixed[11] * t315;
-        let t320 = self.fixed[12] * t316;
-        let t321 = t318 + t319;
-        let t322 = t321 + t320;
-        let t325 = t8 * t322;
-        let t326 = self.fixed[22] * t325;
-        let t337 = self.fixed[23] * t180;
-        let t347 = X[1] * t67;
-        let t349 = X[2] * t67;
-        [t26, t106, t124, t245, t246, t260, t300, t311, t326, t337, t347, t349]
+        let t190 = self.fixed[13] * t8;
+        let t191 = T::nearest(3.0) - t190;
+        let t194 = t7 * t23;
+        let t195 = self.fixed[4] * t194;
+        let t198 = self.fixed[14] * t191;
+        let t199 = t195 + t198;
+        let t219 = T::one() - t21;
+        let t255 = X[0] * t67;
+        let t256 = self.fixed[15] * t199;
+        let t259 = t7 * t8;
+        let t262 = t60 * t60;
+        let t267 = t259 * t23;
+        let t268 = t267 * t262;
+        let t269 = t268 * t191;
+        let t270 = self.fixed[17] * t269;
+        let t271 = t23 * t219;
+        let t272 = t60 * t73;
+        let t273 = T::nearest(2.0) * t272;
+        let t274 = t271 + t273;
+        let t275 = t23 * t73;
+        let t277 = T::nearest(36.0) * t262;
+        let t278 = t275 + t277;
+        let t279 = t278 - t123;
+        let t280 = T::nearest(2.0) * t191;
+        let t281 = t73 + t280;
+        let t282 = t23 * t281;
+        let t284 = t60 * t219;
+        let t285 = T::nearest(18.0) * t284;
+        let t286 = t282 + t285;
+        let t287 = T::nearest(6.0) - t190;
+        let t288 = t287 * t219;
+        let t289 = T::nearest(2.0) * t288;
+        let t291 = self.fixed[18] * t289;
+        let t295 = self.fixed[19] * t274;
+        let t296 = self.fixed[11] * t279;
+        let t297 = self.fixed[12] * t286;
+        let t298 = t291 + t295;
+        let t299 = t298 + t296;
+        let t300 = t299 + t297;
+        let t308 = t7 * t60;
+        let t309 = t308 * t300;
+        let t310 = self.fixed[20] * t309;
+        let t320 = t8 * t274;
+        let t321 = self.fixed[21] * t320;
+        let t322 = self.fixed[12] * t191;
+        let t323 = self.fixed[18] * t219;
+        let t324 = t322 + t323;
+        let t325 = t277 - t123;
+        let t326 = t285 + t275;
+        let t327 = t60 * t324;
+        let t328 = T::nearest(12.0) * t327;
+        let t329 = self.fixed[11] * t325;
+        let t330 = self.fixed[12] * t326;
+        let t331 = t328 + t329;
+        let t332 = t331 + t330;
+        let t335 = t8 * t332;
+        let t336 = self.fixed[22] * t335;
+        let t347 = self.fixed[23] * t191;
+        let t357 = X[1] * t67;
+        let t359 = X[2] * t67;
+        [t26, t106, t124, t255, t256, t270, t310, t321, t336, t347, t357, t359]
     }
     #[inline(always)]
     fn body_force_staged(
@@ -1327,24 +1359,24 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 12> for SphereShell<T> {
         let t131 = t121 + t130;
         let t132 = t131 + t107;
         let t133 = t132.ln_of_both(t112);
-        let t301 = time[0] * point[5];
-        let t302 = point[6] + t301;
-        let t327 = time[0] * t302;
-        let t328 = point[7] * t133;
-        let t329 = t327 + t328;
-        let t330 = point[8] + t329;
-        let t338 = time[0] * t330;
-        let t339 = point[9] * t133;
-        let t340 = t338 + t339;
-        let t341 = t108 * t108;
-        let t342 = t341 * t110;
-        let t343 = t340 / t342;
-        let t344 = t343 - point[4];
-        let t345 = time[0] * t344;
-        let t346 = point[3] * t345;
-        let t348 = point[10] * t345;
-        let t350 = point[11] * t345;
-        crate::nalgebra::SVector::<T, 3>::new(t346, t348, t350)
+        let t311 = time[0] * point[5];
+        let t312 = point[6] + t311;
+        let t337 = time[0] * t312;
+        let t338 = point[7] * t133;
+        let t339 = t337 + t338;
+        let t340 = point[8] + t339;
+        let t348 = time[0] * t340;
+        let t349 = point[9] * t133;
+        let t350 = t348 + t349;
+        let t351 = t108 * t108;
+        let t352 = t351 * t110;
+        let t353 = t350 / t352;
+        let t354 = t353 - point[4];
+        let t355 = time[0] * t354;
+        let t356 = point[3] * t355;
+        let t358 = point[10] * t355;
+        let t360 = point[11] * t355;
+        crate::nalgebra::SVector::<T, 3>::new(t356, t358, t360)
     }
 }
 impl<T: crate::Real> From<SphereShell<T>> for crate::AnySolution<T> {

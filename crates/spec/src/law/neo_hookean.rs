@@ -1,7 +1,12 @@
 //! The compressible neo-Hookean law, `tau = lambda ln(J) I + mu (F F^T - I)`, in forms that keep digits.
 //!
-//! - Stress is formed from the displacement gradient `H`, never from `F - I`:
-//!   `tau = lambda log1p(J - 1) I + mu (H + H^T + H H^T)`, and `P = tau F^-T`.
+//! - Stress is formed from the displacement gradient `H`, never from `F - I`. Since
+//!   `(F F^T - I) F^-T = F - F^-T = H + H^T F^-T`, it is `P = mu (H + H^T F^-T) + lambda log1p(J - 1) F^-T`. The product
+//!   `tau F^-T` instead would form squares of `H` that the division by `F` takes away again: at large gradients
+//!   that loses digits.
+//! - Where the motion turns as it goes, `H` is large next to the strain, and the turn drops out of the sum
+//!   `F F^T - I = H + H^T + H H^T` alone, in symbols: there `P = tau F^-T` with
+//!   `tau = lambda log1p(J - 1) I + mu (F F^T - I)`.
 //! - `P` is the part linear in `H` and a remainder of second order,
 //!   `P = lambda tr(H) I + mu (H + H^T) + [lambda (ln J - tr H) I + lambda ln J (F^-T - I) - mu (H^T)^2 F^-T]`.
 //! - `d ln J = F^-T : dH` (Jacobi's formula), so that the gradient of `ln J - tr H` is `-(H^T F^-T) : dH`, exactly of
@@ -22,12 +27,15 @@ pub(super) fn stress(
     let graph = &mut derivation.graph;
     let (lambda, mu) = (graph.whole(lambda), graph.whole(mu));
     let law = NeoHookean { deformation, lambda, mu };
-    let strain = law.strain(graph);
-    let P = law.first_piola_kirchhoff(graph, &strain);
+    let strain = law.strain_without_turn(graph);
+    let P = match &strain {
+        Some(strain) => law.from_strain(graph, strain),
+        None => law.from_gradient(graph),
+    };
     let (isotropic, anisotropic) = if derivation.geometry.is_cartesian() {
         (Graph::ZERO, P.clone())
     } else {
-        law.isotropic_and_rest(graph, &strain, &P)
+        law.isotropic_and_rest(graph, strain.as_ref(), &P)
     };
     let remainder = law.remainder_divergence(derivation);
     Stress { P, isotropic, anisotropic, linear, remainder, energy: None }
@@ -41,25 +49,47 @@ struct NeoHookean<'a> {
 }
 
 impl NeoHookean<'_> {
-    /// `H + H^T + H H^T = F F^T - I`.
-    fn strain(&self, graph: &mut Graph) -> Matrix {
+    /// `H + H^T + H H^T = F F^T - I` where a turn drops out of it in symbols.
+    fn strain_without_turn(&self, graph: &mut Graph) -> Option<Matrix> {
         let H = &self.deformation.H;
         let n = H.len();
         let mut strain = vec![vec![Graph::ZERO; n]; n];
+        let mut turns = false;
         for i in 0..n {
             for j in 0..n {
                 let mut terms = vec![H[i][j], H[j][i]];
                 terms.extend((0..n).map(|m| graph.mul(H[i][m], H[j][m])));
-                // What a rotation leaves behind cancels identically.
-                let terms = graph.without_vanishing_part(&terms);
-                let sum = graph.sum_of(terms);
+                let left = graph.without_vanishing_part(&terms);
+                let sum = graph.sum_of(left.iter().copied());
                 strain[i][j] = graph.shortened(sum);
+                // A turn takes the parts of first order away with those of second order.
+                let first = [H[i][j], H[j][i]];
+                let lost = |h: &Expr| *h != Graph::ZERO && !left.contains(h);
+                turns |= first.iter().any(lost) || strain[i][j] != sum;
             }
         }
-        strain
+        turns.then_some(strain)
     }
 
-    fn first_piola_kirchhoff(&self, graph: &mut Graph, strain: &Matrix) -> Matrix {
+    /// `mu (H + H^T F^-T) + lambda ln J F^-T`.
+    fn from_gradient(&self, graph: &mut Graph) -> Matrix {
+        let pressure = graph.mul(self.lambda, self.deformation.log_J);
+        let once = self.transposed_gradient_times_inverse(graph);
+        let mut P = once.clone();
+        for (i, row) in P.iter_mut().enumerate() {
+            for (j, entry) in row.iter_mut().enumerate() {
+                let shear = graph.add(self.deformation.H[i][j], once[i][j]);
+                let shear = graph.mul(self.mu, shear);
+                let normal = graph.mul(pressure, self.deformation.inverse_transpose[i][j]);
+                *entry = graph.add(shear, normal);
+                *entry = zero_if_vanishing(graph, *entry);
+            }
+        }
+        P
+    }
+
+    /// `tau F^-T` with `tau = lambda ln J I + mu (F F^T - I)`.
+    fn from_strain(&self, graph: &mut Graph, strain: &Matrix) -> Matrix {
         let n = strain.len();
         let pressure = graph.mul(self.lambda, self.deformation.log_J);
         let mut tau = vec![vec![Graph::ZERO; n]; n];
@@ -81,23 +111,41 @@ impl NeoHookean<'_> {
         P
     }
 
-    /// `p = lambda ln J`, and `P - p I = [mu (F F^T - I) - p H^T] F^-T`.
-    fn isotropic_and_rest(&self, graph: &mut Graph, strain: &Matrix, P: &Matrix) -> (Expr, Matrix) {
+    /// `p = lambda ln J`, and `P - p I = [mu (F F^T - I) - p H^T] F^-T = mu H + (mu - p) H^T F^-T`.
+    fn isotropic_and_rest(
+        &self,
+        graph: &mut Graph,
+        strain: Option<&Matrix>,
+        P: &Matrix,
+    ) -> (Expr, Matrix) {
         let H = &self.deformation.H;
+        let n = H.len();
         let pressure = graph.mul(self.lambda, self.deformation.log_J);
         if pressure == Graph::ZERO {
             return (pressure, P.clone());
         }
-        let mut rest = strain.clone();
-        for (i, row) in rest.iter_mut().enumerate() {
-            for (j, entry) in row.iter_mut().enumerate() {
-                let shear = graph.mul(self.mu, *entry);
-                let turned = graph.mul(pressure, H[j][i]);
-                *entry = graph.sub(shear, turned);
-                *entry = graph.whole(*entry);
+        let mut rest = vec![vec![Graph::ZERO; n]; n];
+        if let Some(strain) = strain {
+            for i in 0..n {
+                for j in 0..n {
+                    let shear = graph.mul(self.mu, strain[i][j]);
+                    let turned = graph.mul(pressure, H[j][i]);
+                    let entry = graph.sub(shear, turned);
+                    rest[i][j] = graph.whole(entry);
+                }
+            }
+            rest = matrix_product(graph, &rest, &self.deformation.inverse_transpose);
+        } else {
+            let once = self.transposed_gradient_times_inverse(graph);
+            for i in 0..n {
+                for j in 0..n {
+                    let shear = graph.add(H[i][j], once[i][j]);
+                    let shear = graph.mul(self.mu, shear);
+                    let turned = graph.mul(pressure, once[i][j]);
+                    rest[i][j] = graph.sub(shear, turned);
+                }
             }
         }
-        let mut rest = matrix_product(graph, &rest, &self.deformation.inverse_transpose);
         for entry in rest.iter_mut().flatten() {
             *entry = zero_if_vanishing(graph, *entry);
         }

@@ -64,7 +64,7 @@ impl Polynomial {
     }
 
     fn of_reasonable_size(self) -> Option<Self> {
-        let bits = |c: &Rational| c.numer().bits().max(c.denom().bits());
+        let bits = |c: &Rational| c.bits().0.max(c.bits().1);
         (self.0.len() <= MOST_TERMS && self.0.values().all(|c| bits(c) <= MOST_BITS))
             .then_some(self)
     }

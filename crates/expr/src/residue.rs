@@ -1,0 +1,157 @@
+//! Values modulo a prime, which tell at once that most expressions do not vanish.
+//!
+//! To [vanish](Graph::vanishes) is to be zero whatever the values of symbols, function values and broken powers, but
+//! that `sin^2 + cos^2 = 1`. With values in the integers modulo a prime, chosen without a pattern, an expression that
+//! vanishes is zero; one that is not zero there is refuted without rounding. Where it is zero, polynomials decide.
+
+use crate::{Expr, Function, Graph, Node, Rational};
+use num_bigint::BigInt;
+use num_integer::Integer;
+use num_traits::{Signed, ToPrimitive};
+use std::hash::{Hash, Hasher};
+
+/// The Mersenne prime `2^61 - 1`.
+const PRIME: u64 = (1 << 61) - 1;
+
+impl Graph {
+    /// The value of `expr` modulo the prime; `None` where something is divided by zero.
+    ///
+    /// Quantities in one piece are looked into, but not for function values: [`Graph::open`] comes first.
+    pub(crate) fn residue(&mut self, expr: Expr) -> Option<u64> {
+        if let Some(&known) = self.residues.get(&expr) {
+            return known;
+        }
+        let residue = self.find_residue(expr);
+        self.residues.insert(expr, residue);
+        residue
+    }
+
+    fn find_residue(&mut self, expr: Expr) -> Option<u64> {
+        match self.node(expr).clone() {
+            Node::Number(value) => of_number(&value),
+            Node::Sum { constant, terms } => {
+                let mut sum = of_number(&constant)?;
+                for (term, coefficient) in &terms {
+                    sum = add(sum, times(of_number(coefficient)?, self.residue(*term)?));
+                }
+                Some(sum)
+            }
+            Node::Product(factors) => {
+                let mut product = 1;
+                for (base, exponent) in &factors {
+                    let factor = if exponent.is_integer() {
+                        of_power(self.residue(*base)?, exponent)?
+                    } else {
+                        at_random((base, exponent))
+                    };
+                    product = times(product, factor);
+                }
+                Some(product)
+            }
+            Node::Call(function @ (Function::Sin | Function::Cos), arguments) => {
+                // A point of the unit circle.
+                let t = at_random(arguments[0]);
+                let square = times(t, t);
+                let above = match function {
+                    Function::Sin => add(t, t),
+                    _ => add(1, PRIME - square),
+                };
+                Some(times(above, inverse(add(1, square))?))
+            }
+            Node::Pi | Node::Symbol(_) | Node::Call(..) => Some(at_random(expr)),
+            Node::Whole(inner) => self.residue(inner),
+        }
+    }
+}
+
+fn add(a: u64, b: u64) -> u64 {
+    let sum = a + b;
+    if sum >= PRIME { sum - PRIME } else { sum }
+}
+
+fn times(a: u64, b: u64) -> u64 {
+    let product = u128::from(a) * u128::from(b);
+    // 2^61 = 1 modulo the prime; both parts are below 2^61.
+    add(reduced(product as u64 & PRIME), reduced((product >> 61) as u64))
+}
+
+/// A number of up to 61 bits modulo the prime.
+fn reduced(a: u64) -> u64 {
+    if a >= PRIME { a - PRIME } else { a }
+}
+
+fn raised(base: u64, mut exponent: u64) -> u64 {
+    let (mut power, mut square) = (1, base);
+    while exponent > 0 {
+        if exponent & 1 == 1 {
+            power = times(power, square);
+        }
+        square = times(square, square);
+        exponent >>= 1;
+    }
+    power
+}
+
+/// By Fermat's little theorem.
+fn inverse(a: u64) -> Option<u64> {
+    (a != 0).then(|| raised(a, PRIME - 2))
+}
+
+fn of_power(base: u64, exponent: &Rational) -> Option<u64> {
+    let power = raised(base, exponent.abs().to_integer().to_u64()?);
+    if exponent.is_negative() { inverse(power) } else { Some(power) }
+}
+
+fn of_number(value: &Rational) -> Option<u64> {
+    let of_integer = |n: BigInt| n.mod_floor(&PRIME.into()).to_u64();
+    match value.small() {
+        Some((n, 1)) => Some(n.rem_euclid(PRIME as i64) as u64),
+        _ => Some(times(of_integer(value.numer())?, inverse(of_integer(value.denom())?)?)),
+    }
+}
+
+/// A definite value for `what`, without a pattern.
+fn at_random(what: impl Hash) -> u64 {
+    let mut hasher = std::hash::DefaultHasher::new();
+    what.hash(&mut hasher);
+    reduced(hasher.finish() & PRIME)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Ast;
+
+    fn residue(text: &str) -> Option<u64> {
+        let mut graph = Graph::new();
+        let ast = Ast::parse(text).unwrap();
+        let expr = graph.build(&ast, &mut |g, name| Ok(g.symbol(name))).unwrap();
+        graph.residue(expr)
+    }
+
+    #[test]
+    fn arithmetic_modulo_the_prime() {
+        assert_eq!(times(PRIME - 1, PRIME - 1), 1);
+        assert_eq!(raised(3, PRIME - 1), 1);
+        assert_eq!(times(12_345, inverse(12_345).unwrap()), 1);
+        assert_eq!(inverse(0), None);
+        assert_eq!(residue("2305843009213693951"), Some(0));
+        assert_eq!(residue("-1"), Some(PRIME - 1));
+        assert_eq!(residue("1/2 + 2305843009213693952/4611686018427387904"), residue("1"));
+    }
+
+    #[test]
+    fn what_vanishes_is_zero() {
+        for text in [
+            "1/(1 + a/(b + c)) - (b + c)/(b + c + a)",
+            "cos(a)^4 - sin(a)^4 - cos(a)^2 + sin(a)^2",
+            "(ln(a) + ln(b))^2 - ln(a)^2 - 2*ln(a)*ln(b) - ln(b)^2",
+        ] {
+            assert_eq!(residue(text), Some(0), "{text}");
+        }
+        assert_eq!(residue("a/((b + c)^2 - b^2 - 2*b*c - c^2)"), None);
+        for text in ["cos(a)^2 + sin(b)^2 - 1", "(a + b)^2 - a^2 - b^2", "sin(a) - sin(b)"] {
+            assert_ne!(residue(text), Some(0), "{text}");
+        }
+    }
+}
