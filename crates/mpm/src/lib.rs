@@ -53,6 +53,7 @@ mod bands;
 mod block;
 mod body_force;
 mod error;
+pub mod general;
 mod grid;
 mod material;
 mod particles;

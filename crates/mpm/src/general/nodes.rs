@@ -1,0 +1,92 @@
+//! Values at the nodes, and their exchange with the particles.
+
+use nalgebra::{SMatrix, SVector};
+
+use super::stencil::{Entry, Stencils};
+use crate::grid::Layout;
+
+/// The nodes of a grid.
+#[derive(Clone, Debug)]
+pub(crate) struct Nodes<const D: usize> {
+    layout: Layout<D>,
+    /// The reciprocal of the mass, or zero for a node that no particle reaches.
+    inverse_mass: Vec<f64>,
+    /// Nodes with less mass than this are taken to be empty.
+    least_mass: f64,
+}
+
+/// A vector at every node.
+pub(crate) type Field<const D: usize> = Vec<SVector<f64, D>>;
+
+impl<const D: usize> Nodes<D> {
+    pub(crate) fn new(layout: Layout<D>, least_mass: f64) -> Self {
+        Self { inverse_mass: vec![0.0; layout.nodes], layout, least_mass }
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.layout.nodes
+    }
+
+    /// Sums the masses of particles at the nodes.
+    pub(crate) fn weigh(&mut self, stencils: &Stencils<D>, mass: &[f64]) {
+        let sums = &mut self.inverse_mass;
+        sums.fill(0.0);
+        for (p, m) in mass.iter().enumerate() {
+            for entry in stencils.of(p) {
+                sums[entry.node] += m * entry.S;
+            }
+        }
+        self.layout.fold(sums, |image, ghost, _| *image += ghost);
+        for mass in sums {
+            *mass = if *mass > self.least_mass { mass.recip() } else { 0.0 };
+        }
+    }
+
+    /// Sums vectors that particles give to their nodes, over the nodes' masses; what is normal to walls vanishes there, and
+    /// nodes beyond have the mirrored values.
+    pub(crate) fn collect(
+        &self,
+        stencils: &Stencils<D>,
+        particles: usize,
+        field: &mut Field<D>,
+        mut give: impl FnMut(usize, &[Entry<D>], &mut Field<D>),
+    ) {
+        field.fill(SVector::zeros());
+        for p in 0..particles {
+            give(p, stencils.of(p), field);
+        }
+        let flipped = |mut value: SVector<f64, D>, flip: Option<usize>| {
+            if let Some(axis) = flip {
+                value[axis] = -value[axis];
+            }
+            value
+        };
+        self.layout.fold(field, |image, ghost, flip| *image += flipped(ghost, flip));
+        for (value, inverse_mass) in field.iter_mut().zip(&self.inverse_mass) {
+            *value *= *inverse_mass;
+        }
+        self.layout.on_walls(field, |value, axis| value[axis] = 0.0);
+        self.layout.unfold(field, flipped);
+    }
+}
+
+/// A field at a particle.
+pub(crate) fn value<const D: usize>(entries: &[Entry<D>], field: &Field<D>) -> SVector<f64, D> {
+    let mut sum = SVector::zeros();
+    for entry in entries {
+        sum += field[entry.node] * entry.S;
+    }
+    sum
+}
+
+/// The gradient `dv_i/dx_j` of a field at a particle.
+pub(crate) fn gradient<const D: usize>(
+    entries: &[Entry<D>],
+    field: &Field<D>,
+) -> SMatrix<f64, D, D> {
+    let mut sum = SMatrix::zeros();
+    for entry in entries {
+        sum += field[entry.node] * entry.G.transpose();
+    }
+    sum
+}
