@@ -61,8 +61,7 @@ pub(crate) fn of_polygon<const D: usize>(x: &[SVector<f64, D>; 4]) -> ([Corner<D
         // The normals of the two sides at the corner, each with half of its length.
         let across = next - last;
         let normal = SVector::from_fn(|a, _| if a == 0 { across[1] } else { -across[0] });
-        corners[k] =
-            Corner { x: x[k], w: (1.0 + triangle / area) / 6.0, g: normal * (0.5 / area) };
+        corners[k] = Corner { x: x[k], w: (1.0 + triangle / area) / 6.0, g: normal * (0.5 / area) };
     }
     (corners, area)
 }

@@ -49,6 +49,8 @@ mod settings;
 mod simulation;
 mod spline;
 mod stencil;
+#[cfg(test)]
+mod tests;
 
 pub use body::{Annulus, Body, Mesh};
 pub use settings::{Integrator, Settings, Shape, Transfer};

@@ -2,7 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::stencil::{Entry, Stencils};
+use super::stencil::{Entry, Raster, Stencils};
 use crate::grid::Layout;
 
 /// The nodes of a grid.
@@ -55,19 +55,60 @@ impl<const D: usize> Nodes<D> {
         for p in 0..particles {
             give(p, stencils.of(p), field);
         }
-        let flipped = |mut value: SVector<f64, D>, flip: Option<usize>| {
-            if let Some(axis) = flip {
-                value[axis] = -value[axis];
-            }
-            value
-        };
         self.layout.fold(field, |image, ghost, flip| *image += flipped(ghost, flip));
         for (value, inverse_mass) in field.iter_mut().zip(&self.inverse_mass) {
             *value *= *inverse_mass;
         }
+        self.mirror(field);
+    }
+
+    /// Clears what is normal to walls there, and gives nodes beyond them the mirrored values.
+    pub(crate) fn mirror(&self, field: &mut Field<D>) {
         self.layout.on_walls(field, |value, axis| value[axis] = 0.0);
         self.layout.unfold(field, flipped);
     }
+
+    /// The velocity field of particles with velocities `v` and, if they have them, affine parts `C` about their centres.
+    pub(crate) fn project(
+        &self,
+        raster: &Raster<D>,
+        stencils: &Stencils<D>,
+        mass: &[f64],
+        v: &[SVector<f64, D>],
+        C: &[SMatrix<f64, D, D>],
+        field: &mut Field<D>,
+    ) {
+        self.collect(stencils, v.len(), field, |p, entries, sums| {
+            let momentum = v[p] * mass[p];
+            let Some(C) = C.get(p) else {
+                entries.iter().for_each(|entry| sums[entry.node] += momentum * entry.S);
+                return;
+            };
+            let centre = centre(raster, entries);
+            for entry in entries {
+                let arm = raster.node(entry.node) - centre;
+                sums[entry.node] += (momentum + C * arm * mass[p]) * entry.S;
+            }
+        });
+    }
+
+    /// The mass of a node that particles reach.
+    #[cfg(test)]
+    pub(crate) fn mass(&self, index: usize) -> Option<f64> {
+        (self.inverse_mass[index] > 0.0).then(|| self.inverse_mass[index].recip())
+    }
+}
+
+fn flipped<const D: usize>(mut value: SVector<f64, D>, axis: Option<usize>) -> SVector<f64, D> {
+    if let Some(axis) = axis {
+        value[axis] = -value[axis];
+    }
+    value
+}
+
+/// The mean position of a particle's nodes: its own, or its domain's centroid.
+pub(crate) fn centre<const D: usize>(raster: &Raster<D>, entries: &[Entry<D>]) -> SVector<f64, D> {
+    entries.iter().map(|entry| raster.node(entry.node) * entry.S).sum()
 }
 
 /// A field at a particle.

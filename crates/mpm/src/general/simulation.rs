@@ -4,7 +4,7 @@ use nalgebra::{SMatrix, SVector};
 
 use super::body::Body;
 use super::domain;
-use super::nodes::{Field, Nodes, gradient, value};
+use super::nodes::{Field, Nodes, centre, gradient, value};
 use super::settings::{Integrator, Settings, Shape, Transfer};
 use super::stencil::{Entry, Raster, Stencils};
 use crate::body_force::BodyForce;
@@ -77,21 +77,23 @@ impl<const D: usize> General<D> {
     /// Where the scene makes no sense (see [`SetupError`]) or does not fit into memory.
     pub fn new(
         grid: Grid<f64, D>,
-        body: Body<D>,
+        mut body: Body<D>,
         material: Material<f64>,
         settings: Settings,
     ) -> Result<Self, SetupError> {
         const { assert!(1 <= D && D <= 3, "one, two or three dimensions") };
         check(&grid, &body, &settings)?;
+        if settings.shape != Shape::Cpdi2 {
+            // Nothing would move it.
+            body.mesh = None;
+        }
         let least = body.particles.mass.iter().copied().fold(f64::INFINITY, f64::min);
         let bytes_per_node = size_of::<f64>() + 4 * size_of::<SVector<f64, D>>();
         let layout = Layout::new(&grid, bytes_per_node)?;
         // Asking first turns a grid that is too large into an error instead of an abort.
         let bytes = layout.nodes * bytes_per_node;
-        let refused = |_| SetupError::GridTooLarge {
-            cells: grid.cells.to_vec(),
-            bytes: bytes as u128,
-        };
+        let refused =
+            |_| SetupError::GridTooLarge { cells: grid.cells.to_vec(), bytes: bytes as u128 };
         Vec::<u8>::new().try_reserve_exact(bytes).map_err(refused)?;
         let raster = Raster::new(&grid, &layout);
         // Weights below the square of the rounding error only come about by rounding.
@@ -153,7 +155,6 @@ impl<const D: usize> General<D> {
         };
         let t = self.time();
         self.list();
-        self.nodes.weigh(&self.work.stencils, &self.body.particles.mass);
         self.project();
         if early > 0.0 {
             self.stretch(early * dt);
@@ -185,7 +186,7 @@ impl<const D: usize> General<D> {
         &self.body.particles
     }
 
-    /// The body: its particles, and the corners of their domains.
+    /// The body: its particles and, for CPDI2, the corners of their domains.
     pub fn body(&self) -> &Body<D> {
         &self.body
     }
@@ -225,65 +226,19 @@ impl<const D: usize> General<D> {
         }
     }
 
-    /// Lists the nodes of every particle, and of every corner that moves with the grid.
+    /// Lists the nodes of every particle, with their masses.
     fn list(&mut self) {
-        let Self { settings, body, raster, work, .. } = self;
+        let Self { settings, body, raster, nodes, work, .. } = self;
         let Work { stencils, corner_stencils, .. } = work;
-        let Particles { x, F, .. } = &body.particles;
-        stencils.clear();
-        match (settings.shape, &body.mesh) {
-            (Shape::Cpdi2, Some(mesh)) => {
-                corner_stencils.clear();
-                for x in &mesh.x {
-                    raster.hats(x, |entry| corner_stencils.push(entry));
-                    corner_stencils.finish();
-                }
-                for indices in &mesh.corners {
-                    let (corners, _) = domain::of_polygon(&indices.map(|k| mesh.x[k]));
-                    for (corner, &index) in corners.iter().zip(&indices[..1 << D]) {
-                        for hat in corner_stencils.of(index) {
-                            stencils.push(corner.share(hat));
-                        }
-                    }
-                    stencils.finish();
-                }
-            }
-            (Shape::Cpdi, _) => {
-                for ((x, F), E) in x.iter().zip(F).zip(&body.half_edges) {
-                    let E = product(F, E);
-                    for index in 0..1 << D {
-                        let corner = domain::of_parallelogram(x, &E, index);
-                        raster.hats(&corner.x, |hat| stencils.push(corner.share(&hat)));
-                    }
-                    stencils.finish();
-                }
-            }
-            (shape, _) => {
-                for ((x, F), E) in x.iter().zip(F).zip(&body.half_edges) {
-                    let (half_size, stretch) = (E.diagonal(), F.diagonal());
-                    raster.list(shape, x, &half_size, &stretch, |entry| stencils.push(entry));
-                    stencils.finish();
-                }
-            }
-        }
+        list(settings.shape, raster, body, stencils, corner_stencils);
+        nodes.weigh(stencils, &body.particles.mass);
     }
 
     /// The particles' velocities on the grid.
     fn project(&mut self) {
         let Self { body, affine, raster, nodes, work, .. } = self;
         let Particles { v, mass, .. } = &body.particles;
-        nodes.collect(&work.stencils, v.len(), &mut work.v, |p, entries, sums| {
-            let momentum = v[p] * mass[p];
-            let Some(C) = affine.get(p) else {
-                entries.iter().for_each(|entry| sums[entry.node] += momentum * entry.S);
-                return;
-            };
-            let centre = centre(raster, entries);
-            for entry in entries {
-                let arm = raster.node(entry.node) - centre;
-                sums[entry.node] += (momentum + C * arm * mass[p]) * entry.S;
-            }
-        });
+        nodes.project(raster, &work.stencils, mass, v, affine, &mut work.v);
     }
 
     /// Accelerations on the grid, from the stresses of F as it is.
@@ -310,7 +265,7 @@ impl<const D: usize> General<D> {
     /// `sum_k (-1)^(k+1) binomial(m, k) (S^+ S)^(k-1) v`, with `S^+` from particles to the grid.
     fn filter(&mut self) {
         let Transfer::Xpic(order) = self.settings.transfer else { return };
-        let Self { body, nodes, work, .. } = self;
+        let Self { body, raster, nodes, work, .. } = self;
         let Work { stencils, v, filtered, term, at_particles, .. } = work;
         let mass = &body.particles.mass;
         let m = f64::from(order);
@@ -320,10 +275,7 @@ impl<const D: usize> General<D> {
         for k in 2..=order {
             at_particles.clear();
             at_particles.extend((0..mass.len()).map(|p| value(stencils.of(p), term)));
-            nodes.collect(stencils, mass.len(), term, |p, entries, sums| {
-                let momentum = at_particles[p] * mass[p];
-                entries.iter().for_each(|entry| sums[entry.node] += momentum * entry.S);
-            });
+            nodes.project(raster, stencils, mass, at_particles, &[], term);
             let k = f64::from(k);
             factor *= -(m - k + 1.0) / k;
             filtered.iter_mut().zip(&*term).for_each(|(sum, term)| *sum += term * factor);
@@ -380,7 +332,6 @@ impl<const D: usize> General<D> {
             return;
         }
         self.list();
-        self.nodes.weigh(&self.work.stencils, &self.body.particles.mass);
         self.project();
         let Self { settings, raster, work, .. } = self;
         let part = |p| affine_part(settings.shape, raster, work.stencils.of(p), &work.v);
@@ -455,8 +406,55 @@ impl<const D: usize> General<D> {
         };
         let limit = HALF_SIZE_LIMIT * self.raster.spacing;
         (0..D)
-            .find(|&a| !(half_size[a] <= limit))
+            .find(|&a| half_size[a] > limit)
             .map(|axis| Trouble::TooLarge { axis, half_size: half_size[axis] })
+    }
+}
+
+/// Lists the nodes of every particle and, for CPDI2, of every corner.
+pub(super) fn list<const D: usize>(
+    shape: Shape,
+    raster: &Raster<D>,
+    body: &Body<D>,
+    stencils: &mut Stencils<D>,
+    corner_stencils: &mut Stencils<D>,
+) {
+    let Particles { x, F, .. } = &body.particles;
+    stencils.clear();
+    match (shape, &body.mesh) {
+        (Shape::Cpdi2, Some(mesh)) => {
+            corner_stencils.clear();
+            for x in &mesh.x {
+                raster.hats(x, |entry| corner_stencils.push(entry));
+                corner_stencils.finish();
+            }
+            for indices in &mesh.corners {
+                let (corners, _) = domain::of_polygon(&indices.map(|k| mesh.x[k]));
+                for (corner, &index) in corners.iter().zip(&indices[..1 << D]) {
+                    for hat in corner_stencils.of(index) {
+                        stencils.push(corner.share(hat));
+                    }
+                }
+                stencils.finish();
+            }
+        }
+        (Shape::Cpdi, _) => {
+            for ((x, F), E) in x.iter().zip(F).zip(&body.half_edges) {
+                let E = product(F, E);
+                for index in 0..1 << D {
+                    let corner = domain::of_parallelogram(x, &E, index);
+                    raster.hats(&corner.x, |hat| stencils.push(corner.share(&hat)));
+                }
+                stencils.finish();
+            }
+        }
+        (shape, _) => {
+            for ((x, F), E) in x.iter().zip(F).zip(&body.half_edges) {
+                let (half_size, stretch) = (E.diagonal(), F.diagonal());
+                raster.list(shape, x, &half_size, &stretch, |entry| stencils.push(entry));
+                stencils.finish();
+            }
+        }
     }
 }
 
@@ -467,14 +465,9 @@ impl<const D: usize> domain::Corner<D> {
     }
 }
 
-/// The mean position of a particle's nodes: its own, or its domain's centroid.
-fn centre<const D: usize>(raster: &Raster<D>, entries: &[Entry<D>]) -> SVector<f64, D> {
-    entries.iter().map(|entry| raster.node(entry.node) * entry.S).sum()
-}
-
 /// The affine part of a field around a particle, `B D^-1` with `B = sum S v r^T`, `D = sum S r r^T`, r from the particle to
 /// its nodes.
-fn affine_part<const D: usize>(
+pub(super) fn affine_part<const D: usize>(
     shape: Shape,
     raster: &Raster<D>,
     entries: &[Entry<D>],
