@@ -195,6 +195,12 @@ pub enum SetupError {
         /// The number of corners.
         corners: usize,
     },
+    /// A corner that no domain has: nothing would tell when it leaves the grid.
+    #[error("the corner {corner} belongs to no particle's domain; leave it out")]
+    IdleCorner {
+        /// Its index.
+        corner: usize,
+    },
     /// Only centred differences start with half an acceleration.
     #[error("a halved first acceleration belongs to centred differences only, not to {integrator}")]
     HalvedStart {

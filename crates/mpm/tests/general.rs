@@ -373,6 +373,13 @@ fn set_ups_that_make_no_sense_are_refused() {
     let mut wrong = body.clone();
     wrong.mesh.as_mut().unwrap().corners[3][2] = 1000;
     assert!(matches!(refused(&wrong, flat), SetupError::NoSuchCorner { corner: 1000, .. }));
+    let mut idle = body.clone();
+    let mesh = idle.mesh.as_mut().unwrap();
+    mesh.X.push(vector![7.0, 7.0]);
+    let corner = mesh.x.len();
+    assert!(matches!(refused(&idle, flat), SetupError::LengthMismatch { .. }));
+    idle.mesh.as_mut().unwrap().x.push(vector![7.0, 7.0]);
+    assert_eq!(refused(&idle, flat), SetupError::IdleCorner { corner });
     let ring = Body::annulus(&Annulus { inner: 0.4, outer: 0.6, quarter: true }, 0.25, 2, 1.0);
     let gimp = Settings { shape: Shape::Gimp, ..flat };
     assert_eq!(refused(&ring.unwrap(), gimp), SetupError::NotABox { particle: 0 });

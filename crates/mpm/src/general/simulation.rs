@@ -2,7 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::body::Body;
+use super::body::{Body, Mesh};
 use super::domain;
 use super::nodes::{Field, Nodes, centre, gradient, value};
 use super::settings::{Integrator, Settings, Shape, Transfer};
@@ -552,13 +552,23 @@ fn check<const D: usize>(
     }
     match &body.mesh {
         _ if settings.shape != Shape::Cpdi2 => Ok(()),
-        Some(mesh) if D <= 2 => {
-            let indices = || mesh.corners.iter().flat_map(|corners| &corners[..1 << D]);
-            match indices().find(|&&k| k >= mesh.X.len().min(mesh.x.len())) {
-                Some(&corner) => Err(SetupError::NoSuchCorner { corner, corners: mesh.X.len() }),
-                None => Ok(()),
-            }
-        }
+        Some(mesh) if D <= 2 => check_corners(mesh),
         _ => Err(SetupError::NoCorners { dimension: D }),
+    }
+}
+
+fn check_corners<const D: usize>(mesh: &Mesh<D>) -> Result<(), SetupError> {
+    let (expected, found) = (mesh.X.len(), mesh.x.len());
+    if found != expected {
+        return Err(SetupError::LengthMismatch { array: "x of the corners", found, expected });
+    }
+    let mut idle = vec![true; expected];
+    for &corner in mesh.corners.iter().flat_map(|corners| &corners[..1 << D]) {
+        *idle.get_mut(corner).ok_or(SetupError::NoSuchCorner { corner, corners: expected })? =
+            false;
+    }
+    match idle.iter().position(|&idle| idle) {
+        Some(corner) => Err(SetupError::IdleCorner { corner }),
+        None => Ok(()),
     }
 }
