@@ -230,7 +230,7 @@ pub(crate) struct SchemeOptions {
     /// Order of the symmetric composition of leapfrog in the total frame; where nothing is said 4, and 6 for splines of degree 4 and 5
     #[arg(long, value_enum)]
     pub(crate) composition: Option<Composition>,
-    /// Where the particles lie in a cell; Gauss points in the total frame only
+    /// Where the particles lie; Gauss points in the total frame only, body-fitted ones in the updated frame only
     #[arg(long, value_enum, default_value_t = Layout::Lattice)]
     pub(crate) layout: Layout,
     /// Coordinates of the background grid; polar for rings in the total frame
@@ -242,6 +242,9 @@ pub(crate) struct SchemeOptions {
     /// Time integrator
     #[arg(long, value_enum, default_value_t = Integrator::Cd)]
     pub(crate) integrator: Integrator,
+    /// Velocities from the grid to the particles: flip, pic, apic, or xpic2, xpic3, ... with a filter of that order
+    #[arg(long, value_name = "NAME", default_value = "flip", value_parser = transfer)]
+    pub(crate) transfer: verify::Transfer,
     /// First velocity of the cd integrator; others ignore it
     #[arg(long, value_enum, default_value_t = Start::Halved)]
     pub(crate) start: Start,
@@ -310,14 +313,18 @@ pub(crate) enum Shape {
     Ugimp,
     /// GIMP weights that follow the particle's stretch
     Gimp,
-    /// Quadratic splines (total frame)
+    /// Quadratic splines
     Bspline2,
-    /// Cubic splines (total frame)
+    /// Cubic splines
     Bspline3,
     /// Quartic splines (total frame)
     Bspline4,
     /// Quintic splines (total frame)
     Bspline5,
+    /// Parallelograms that deform with the particle
+    Cpdi,
+    /// Quadrilaterals whose corners neighbours share (one and two dimensions)
+    Cpdi2,
 }
 
 /// Configurations.
@@ -328,6 +335,18 @@ pub(crate) enum Frame {
     Updated,
     /// The reference configuration, weights once
     Total,
+}
+
+/// Layouts of particles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Layout {
+    /// Centres of equal parts of a cell
+    Lattice,
+    /// Polar cells of equal angle that end at the rims (rings, updated frame)
+    BodyFitted,
+    /// Gauss-Legendre points (total frame)
+    Gauss,
 }
 
 /// Orders in time.
@@ -353,6 +372,8 @@ choices!(
         Usl,
         /// Update stress last, with the velocity projected again
         Musl,
+        /// Stress updated by halves, before the forces and after
+        Usavg,
         /// Centred differences
         Cd,
     }
@@ -375,15 +396,6 @@ choices!(
         Lumped,
         /// Integrated over the particles
         Consistent,
-    }
-);
-choices!(
-    /// Layouts of particles.
-    Layout => verify::Layout {
-        /// Centres of equal parts of a cell
-        Lattice,
-        /// Gauss-Legendre points
-        Gauss,
     }
 );
 choices!(
@@ -471,6 +483,23 @@ fn finite_number(text: &str) -> Result<f64, String> {
     }
 }
 
+fn transfer(text: &str) -> Result<verify::Transfer, String> {
+    /// Each order costs a pass over the particles, and beyond some tens nothing is left to filter.
+    const MOST: u32 = 100;
+    match text {
+        "flip" => Ok(verify::Transfer::Flip),
+        "pic" => Ok(verify::Transfer::Pic),
+        "apic" => Ok(verify::Transfer::Apic),
+        _ => text
+            .strip_prefix("xpic")
+            .filter(|order| order.bytes().all(|digit| digit.is_ascii_digit()))
+            .and_then(|order| order.parse().ok())
+            .filter(|order| (1..=MOST).contains(order))
+            .map(verify::Transfer::Xpic)
+            .ok_or_else(|| format!("it must be flip, pic, apic, or xpic1 to xpic{MOST}")),
+    }
+}
+
 fn role(text: &str) -> Result<(verify::Role, String), String> {
     let roles = || verify::Role::ALL.map(verify::Role::name).join(", ");
     let form = || format!("expected ROLE=NAME, such as displacement=disp; roles: {}", roles());
@@ -516,6 +545,10 @@ mod tests {
         for text in ["A", "=1", "A=", "A=x", "A=nan", "A=inf"] {
             assert!(assignment(text).is_err(), "{text}");
         }
+        for text in ["xpic", "xpic0", "xpic101", "xpic+2", "xpic2.5", "PIC", ""] {
+            assert!(transfer(text).is_err(), "{text}");
+        }
+        assert_eq!(transfer("xpic3"), Ok(verify::Transfer::Xpic(3)));
         assert_eq!(assignment("A = 5e-2"), Ok(("A".into(), 0.05)));
     }
 }

@@ -73,6 +73,8 @@ fn case(options: &SchemeOptions, cells: usize) -> Result<Case> {
         shape,
         integrator: options.integrator.into(),
         start: options.start.into(),
+        transfer: options.transfer,
+        placement: scheme::placement(options)?,
         cells,
         per_cell: options.ppc,
         cfl: options.cfl,
@@ -104,6 +106,7 @@ fn settings(
         "layout": options.layout,
         "grid": options.grid,
         "cfl_speed": options.cfl_speed,
+        "transfer": options.transfer.to_string(),
         "integrator": options.integrator,
         "start": options.start,
         "cells": cells,
@@ -124,6 +127,7 @@ fn caption(selection: &Selection, options: &SchemeOptions, extent: Option<Extent
         (_, crate::arguments::Integrator::Cd) => format!(" ({} start)", word(&options.start)),
         _ => String::new(),
     };
+    let start = start + &scheme::additions(options);
     let extent = extent.map(|extent| format!(", {}", word(&extent))).unwrap_or_default();
     let parameters: Vec<_> =
         selection.parameters().iter().map(|(name, value)| format!("{name} = {value}")).collect();

@@ -204,6 +204,28 @@ fn results_do_not_depend_on_the_number_of_threads() {
 }
 
 #[test]
+fn the_general_step_is_chosen_by_its_options_and_echoes_them() {
+    let place = tempfile::tempdir().unwrap();
+    let call = "converge ring --shape cpdi2 --layout body-fitted --cells 8,16 --set Ri=0.4 --set Ro=0.6 --json s.json";
+    let called = mms(place.path(), call);
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    assert!(called.stdout.contains("cpdi2 + cd (halved start), body-fitted layout"));
+    let study = read_json(&place.path().join("s.json"));
+    let settings = &study["settings"];
+    assert_eq!(settings["shape"], "cpdi2");
+    assert_eq!(settings["layout"], "body-fitted");
+    assert_eq!(settings["transfer"], "flip");
+    assert_eq!(study["verdicts"]["u"]["linf"]["expected"], 2.0);
+
+    let call = "run axis-aligned --shape bspline2 --transfer xpic3 --integrator usavg --cells 8 --json row.json";
+    let called = mms(place.path(), call);
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    assert!(called.stdout.contains("bspline2 + usavg, transfer xpic3"), "{}", called.stdout);
+    let settings = &read_json(&place.path().join("row.json"))["settings"];
+    assert_eq!([&settings["transfer"], &settings["integrator"]], ["xpic3", "usavg"]);
+}
+
+#[test]
 fn single_precision_is_an_option() {
     let place = tempfile::tempdir().unwrap();
     let call = "run ring --cells 8 --precision f32 --extent full --json row.json";
@@ -262,11 +284,29 @@ fn bad_input_is_met_with_what_would_be_right() {
     refuses(place, "run ring --frames 5", &["--vtk"]);
     let total = "run axis-aligned --frame total --shape bspline3";
     refuses(place, "run ring --frame total", &["--shape gimp", "bspline3"]);
-    refuses(place, "run ring --shape bspline3", &["--frame total"]);
+    refuses(place, "run ring --shape bspline4", &["--frame total", "bspline3"]);
     refuses(place, "run ring --mass consistent", &["--mass", "--frame total"]);
     refuses(place, "run ring --composition 4", &["--composition", "--frame total"]);
     refuses(place, "run ring --layout gauss", &["--layout", "--frame total"]);
     refuses(place, "run ring --grid polar", &["--grid", "--frame total"]);
+    let fitted = "--layout body-fitted";
+    refuses(place, &format!("run ring --shape gimp {fitted}"), &["layout", "lattice", "cpdi2"]);
+    refuses(place, &format!("run axis-aligned --shape cpdi2 {fitted}"), &["lattice for a box"]);
+    refuses(place, &format!("{total} {fitted}"), &["--layout", "gauss or lattice"]);
+    refuses(place, &format!("{total} --transfer apic"), &["--transfer apic", "--frame updated"]);
+    refuses(place, &format!("{total} --integrator usavg"), &["usavg", "cd"]);
+    refuses(
+        place,
+        "run axis-aligned-3d --cells 4 --shape cpdi2",
+        &["shape = cpdi2", "cpdi in three"],
+    );
+    refuses(
+        place,
+        "run ring --cells 8 --shape cpdi --precision f32",
+        &["precision", "f64", "gimp"],
+    );
+    refuses(place, "run ring --transfer xpic0", &["--transfer", "xpic1 to"]);
+    refuses(place, "run ring --frame total --shape cpdi", &["--shape cpdi", "bspline3"]);
     refuses(place, &format!("{total} --grid polar"), &["polar", "cartesian for a box"]);
     refuses(place, &format!("{total} --integrator usl"), &["usl", "cd"]);
     refuses(place, &format!("{total} --precision f32"), &["f32", "f64"]);

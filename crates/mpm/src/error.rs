@@ -170,6 +170,37 @@ pub enum SetupError {
         /// The grid's dimension.
         dimension: usize,
     },
+    /// GIMP boxes of particles whose domains are none.
+    #[error(
+        "the domain of particle {particle} is not a box along the axes, which GIMP weights need; use those of CPDI"
+    )]
+    NotABox {
+        /// The first such particle.
+        particle: usize,
+    },
+    /// Weights between corners that the body does not have.
+    #[error(
+        "a body of dimension {dimension} without shared corners cannot have the weights of CPDI2, which are for one and \
+         two dimensions; use those of CPDI"
+    )]
+    NoCorners {
+        /// The body's dimension.
+        dimension: usize,
+    },
+    /// A domain with a corner that is none.
+    #[error("a domain has the corner {corner}, but there are only {corners}")]
+    NoSuchCorner {
+        /// The index.
+        corner: usize,
+        /// The number of corners.
+        corners: usize,
+    },
+    /// A corner that no domain has: nothing would tell when it leaves the grid.
+    #[error("the corner {corner} belongs to no particle's domain; leave it out")]
+    IdleCorner {
+        /// Its index.
+        corner: usize,
+    },
     /// Only centred differences start with half an acceleration.
     #[error("a halved first acceleration belongs to centred differences only, not to {integrator}")]
     HalvedStart {

@@ -2,7 +2,8 @@
 //!
 //! Particles carry mass, velocity and deformation gradient; each step moves mass, momentum and internal forces to a
 //! background grid of cubic cells, solves there, and carries the change back ([`Simulation::step`]). Weights are hat
-//! functions or GIMP weights ([`Shape`]); time integration is USF, USL, MUSL or centred differences ([`Integrator`]).
+//! functions or GIMP weights ([`Shape`]); time integration is USF, USL, MUSL or centred differences ([`Integrator`]). Other
+//! weights, transfers and integrators are in [`general`], slower; high order is in [`total_lagrangian`].
 //!
 //! The scheme, for particle p and node i with weight `S_ip` and gradient `G_ip` taken at `x^n`:
 //!
@@ -53,6 +54,7 @@ mod bands;
 mod block;
 mod body_force;
 mod error;
+pub mod general;
 mod grid;
 mod material;
 mod particles;

@@ -75,7 +75,7 @@ impl<T: RealField + Copy, const D: usize> Particles<T, D> {
 }
 
 /// Counts through all multi-indices below `limits`, axis 0 fastest.
-fn count<const D: usize>(limits: [usize; D], mut visit: impl FnMut(&[usize; D])) {
+pub(crate) fn count<const D: usize>(limits: [usize; D], mut visit: impl FnMut(&[usize; D])) {
     if limits.contains(&0) {
         return;
     }

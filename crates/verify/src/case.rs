@@ -3,15 +3,15 @@
 use std::fmt;
 use std::time::Instant;
 
-use mmsmith_mpm::{
-    BodyForce, Integrator, Particles, Settings, SetupError, Shape, Simulation, StepError,
-};
+use mmsmith_mpm::general::{Integrator, Shape, Transfer};
+use mmsmith_mpm::{BodyForce, Particles, Settings, SetupError, Simulation, StepError};
 use mmsmith_solutions::{AnySolution, BodyForceAtPoints, Material, Real, Solution};
 use nalgebra::SVector;
 use serde::{Serialize, Serializer};
 use thiserror::Error;
 
 use crate::frames::{FrameOutput, FrameWriter};
+use crate::general::{self, Placement, Precision};
 use crate::measure::measure;
 use crate::norms::{PerField, PerNorm};
 use crate::plan::{MOST_STEPS, Steps, prepare};
@@ -39,6 +39,10 @@ pub struct Case {
     pub integrator: Integrator,
     /// The start of centred differences; the other integrators ignore it.
     pub start: Start,
+    /// How particles get their velocity back from the grid; without meaning in the total frame.
+    pub transfer: Transfer,
+    /// Where the particles of the updated frame lie.
+    pub placement: Placement,
     /// Number of cells along the solution's cell length.
     pub cells: usize,
     /// Particles in a cell along each direction.
@@ -62,6 +66,8 @@ impl Default for Case {
             shape: Shape::Gimp,
             integrator: Integrator::Cd,
             start: Start::Halved,
+            transfer: Transfer::Flip,
+            placement: Placement::Lattice,
             cells: 32,
             per_cell: 2,
             cfl: 0.4,
@@ -231,7 +237,7 @@ impl Case {
             }
         }
         match &self.frame {
-            Frame::Updated => Ok(()),
+            Frame::Updated => general::validate(self),
             Frame::Total(total) => total.validate(self),
         }
     }
@@ -271,7 +277,7 @@ pub fn run(
     }
 }
 
-fn run_in<T: Real, const D: usize>(
+fn run_in<T: Precision, const D: usize>(
     exact: &dyn Solution<f64, D>,
     model: &dyn Solution<T, D>,
     case: &Case,
@@ -282,13 +288,13 @@ fn run_in<T: Real, const D: usize>(
     // In single precision the solver's step is a rounded one, and its time is a multiple of that.
     let dt = time_step.to_f64();
 
-    let (simulation, body_force) = set_up(exact, model, case, &scene, time_step)?;
-    follow(simulation, &body_force, exact, case, &scene, Steps { dt, ..steps }, outputs)
+    let (mut solver, body_force) = set_up(exact, model, case, &scene, time_step)?;
+    follow(solver.as_mut(), &body_force, exact, case, &scene, Steps { dt, ..steps }, outputs)
 }
 
 /// Steps to the end and measures the errors on the way.
 pub(crate) fn follow<T: Real, const D: usize>(
-    mut solver: impl Solver<T, D>,
+    solver: &mut dyn Solver<T, D>,
     body_force: &dyn BodyForce<T, D>,
     exact: &dyn Solution<f64, D>,
     case: &Case,
@@ -352,28 +358,38 @@ pub(crate) fn follow<T: Real, const D: usize>(
     })
 }
 
-/// The solver at time zero with steps of `time_step`, and the body force that drives it.
-pub(crate) fn set_up<'a, T: Real, const D: usize>(
+/// A solver at time zero, and the body force that drives it.
+type Driven<'a, T, const D: usize> = (Box<dyn Solver<T, D>>, ExactBodyForce<'a, T, D>);
+
+/// The solver of the updated frame with steps of `time_step`: the fast step where it has the case.
+pub(crate) fn set_up<'a, T: Precision, const D: usize>(
     exact: &dyn Solution<f64, D>,
     model: &'a dyn Solution<T, D>,
     case: &Case,
     scene: &Scene<D>,
     time_step: T,
-) -> Result<(Simulation<T, D>, ExactBodyForce<'a, T, D>), CaseError> {
+) -> Result<Driven<'a, T, D>, CaseError> {
+    let Some((shape, integrator)) = general::fast_step(case) else {
+        let mut solver = T::general(exact, case, scene, time_step)?;
+        let body_force = model.body_force_at(&solver.observe().0.X);
+        return Ok((solver, ExactBodyForce(body_force)));
+    };
     let grid = scene.grid::<T>();
     let mut particles = scene.particles(&grid, case.per_cell, exact.density());
     if particles.is_empty() {
         return Err(SceneError::Empty { cells: case.cells }.into());
     }
     set_in_motion(&mut particles, exact, case, time_step.to_f64());
-    let settings = Settings {
-        shape: case.shape,
-        integrator: case.integrator,
-        time_step,
-        halve_first_acceleration: case.integrator == Integrator::Cd && case.start == Start::Halved,
-    };
+    let settings =
+        Settings { shape, integrator, time_step, halve_first_acceleration: starts_halved(case) };
     let body_force = ExactBodyForce(model.body_force_at(&particles.X));
-    Ok((Simulation::new(grid, particles, law(model.material())?, settings)?, body_force))
+    let simulation = Simulation::new(grid, particles, law(model.material())?, settings)?;
+    Ok((Box::new(simulation), body_force))
+}
+
+/// Whether the first step's acceleration is halved.
+pub(crate) fn starts_halved(case: &Case) -> bool {
+    case.integrator == Integrator::Cd && case.start == Start::Halved
 }
 
 /// The exact body force at the particles; what depends on their reference positions alone is kept.
@@ -404,7 +420,7 @@ pub(crate) fn law<T: Real>(material: Material<T>) -> Result<mmsmith_mpm::Materia
 }
 
 /// Gives particles at rest the exact state at time zero, with the velocity that the integrator starts from.
-fn set_in_motion<T: Real, const D: usize>(
+pub(crate) fn set_in_motion<T: Real, const D: usize>(
     particles: &mut Particles<T, D>,
     exact: &dyn Solution<f64, D>,
     case: &Case,

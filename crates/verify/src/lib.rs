@@ -18,6 +18,7 @@ mod coverage;
 mod difference;
 mod evaluate;
 mod frames;
+mod general;
 mod measure;
 mod norms;
 mod order;
@@ -38,8 +39,9 @@ pub use check::{
 pub use coverage::{Part, Share, coverage, smallest_set};
 pub use evaluate::{FieldRow, WrongLength, evaluate};
 pub use frames::FrameOutput;
+pub use general::Placement;
+pub use mmsmith_mpm::general::{Integrator, Shape, Transfer};
 pub use mmsmith_mpm::total_lagrangian::{Composition, Coordinates, Layout, MassMatrix, Scheme};
-pub use mmsmith_mpm::{Integrator, Shape};
 pub use norms::{PerField, PerNorm};
 pub use order::Order;
 pub use plan::{Plan, plan};

@@ -3,6 +3,7 @@
 use mmsmith_solutions::{AnySolution, Solution};
 
 use crate::case::{Arithmetic, Case, CaseError};
+use crate::general;
 use crate::scene::{Extent, Scene};
 use crate::total::Frame;
 
@@ -57,10 +58,17 @@ fn plan_in<const D: usize>(
     if let Frame::Total(total) = &case.frame {
         total.grid(&scene, case.per_cell)?;
     }
+    let is_general = case.frame == Frame::Updated && general::fast_step(case).is_none();
+    if is_general {
+        general::admit(&scene, case)?;
+    }
     Ok(Plan {
         steps: steps.count,
         particles: scene.particles_expected(case.per_cell),
-        bytes: scene.bytes_expected(case.per_cell, scalar),
+        bytes: match is_general {
+            true => general::bytes_expected(&scene, case),
+            false => scene.bytes_expected(case.per_cell, scalar),
+        },
         extent: scene.extent(),
         round_off: unit * scene.size * (steps.count as f64).sqrt(),
     })

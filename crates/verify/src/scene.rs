@@ -238,8 +238,13 @@ impl<const D: usize> Scene<D> {
         per_cell: usize,
         density: f64,
     ) -> Particles<T, D> {
+        Particles::lattice(grid, per_cell, Real::nearest(density), self.inside(per_cell))
+    }
+
+    /// Whether a place of the lattice with `per_cell` particles in a cell and direction lies in the body.
+    pub(crate) fn inside<T: Real>(&self, per_cell: usize) -> impl Fn(&SVector<T, D>) -> bool {
         let distance = self.spacing / per_cell as f64;
-        Particles::lattice(grid, per_cell, Real::nearest(density), |X| {
+        move |X| {
             // Decided on the exact centre, so that both precisions have the same particles.
             let centre = SVector::<f64, D>::from_fn(|axis, _| {
                 let index = ((X[axis].to_f64() - self.lower[axis]) / distance - 0.5).round();
@@ -252,7 +257,7 @@ impl<const D: usize> Scene<D> {
                 }
                 _ => true,
             }
-        })
+        }
     }
 }
 

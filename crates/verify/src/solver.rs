@@ -1,5 +1,6 @@
 //! What measuring and writing need of a solver, whatever its frame.
 
+use mmsmith_mpm::general::General;
 use mmsmith_mpm::total_lagrangian::TotalLagrangian;
 use mmsmith_mpm::{BodyForce, Material, Particles, Simulation, StepError};
 use mmsmith_solutions::Real;
@@ -25,6 +26,20 @@ impl<T: Real, const D: usize> Solver<T, D> for Simulation<T, D> {
 
     fn velocity_lag(&self) -> f64 {
         Simulation::velocity_lag(self).to_f64()
+    }
+}
+
+impl<const D: usize> Solver<f64, D> for General<D> {
+    fn step(&mut self, body_force: &dyn BodyForce<f64, D>) -> Result<(), StepError> {
+        General::step(self, body_force)
+    }
+
+    fn observe(&mut self) -> (&Particles<f64, D>, &Material<f64>) {
+        (self.particles(), self.material())
+    }
+
+    fn velocity_lag(&self) -> f64 {
+        General::velocity_lag(self)
     }
 }
 

@@ -14,6 +14,7 @@ use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 
 use crate::case::{Arithmetic, Case, CaseError, Progress, Status, set_up};
+use crate::general::Precision;
 use crate::norms::{PerField, PerNorm, Tally};
 use crate::order::Order;
 use crate::plan::{MOST_STEPS, prepare};
@@ -86,7 +87,7 @@ pub fn temporal(
     }
 }
 
-fn over<T: Real, const D: usize>(
+fn over<T: Precision, const D: usize>(
     exact: &dyn Solution<f64, D>,
     model: &dyn Solution<T, D>,
     base: &Case,
@@ -158,7 +159,7 @@ struct State<const D: usize> {
 }
 
 /// The states at the common times of a run with `count` steps, or how it failed.
-fn observe<T: Real, const D: usize>(
+fn observe<T: Precision, const D: usize>(
     exact: &dyn Solution<f64, D>,
     model: &dyn Solution<T, D>,
     case: &Case,
@@ -168,14 +169,14 @@ fn observe<T: Real, const D: usize>(
     let (scene, _) = prepare(exact, case)?;
     let time_step: T = Real::nearest(case.periods * exact.period() / count as f64);
     let (mut simulation, body_force) = set_up(exact, model, case, &scene, time_step)?;
-    let lags = simulation.velocity_lag().to_f64() > 0.0;
+    let lags = simulation.velocity_lag() > 0.0;
     let mut states: Vec<State<D>> = Vec::new();
     // One step more than the run has: the last velocity at a full step needs it.
     for step in 1..=count + u64::from(lags) {
         if let Err(error) = simulation.step(&body_force) {
             return Ok(Err(Status::Stopped(error)));
         }
-        let particles = simulation.particles();
+        let (particles, law) = simulation.observe();
         let v = || particles.v.iter().map(|v| v.map(Real::to_f64));
         if lags
             && (step - 1) % (count / INSTANTS) == 0
@@ -198,7 +199,6 @@ fn observe<T: Real, const D: usize>(
                     return Ok(Err(Status::Unstable { step, time, particle, error, size }));
                 }
             }
-            let law = simulation.material();
             // A particle that is inside out has no stress; the solver stops at its next step.
             let none = SMatrix::repeat(f64::NAN);
             let stress = |F: &SMatrix<T, D, D>| {

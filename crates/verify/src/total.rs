@@ -1,6 +1,6 @@
 //! Runs in the reference configuration: from a solution to splines, a layout of particles, and their motion.
 
-use mmsmith_mpm::Integrator;
+use mmsmith_mpm::general::{Integrator, Transfer};
 use mmsmith_mpm::total_lagrangian::{
     Axis, Composition, Coordinates, End, Grid, Layout, MassMatrix, Scheme, TotalLagrangian,
 };
@@ -8,6 +8,7 @@ use mmsmith_solutions::{AnySolution, Domain, Solution};
 use std::f64::consts::FRAC_PI_2;
 
 use crate::case::{Arithmetic, Case, CaseError, ExactBodyForce, Outputs, Row, follow, law};
+use crate::general::Placement;
 use crate::plan::prepare;
 use crate::scene::{Extent, Scene};
 
@@ -74,6 +75,12 @@ impl TotalScheme {
         if case.integrator != Integrator::Cd {
             let value = format!("{:?}", case.integrator).to_lowercase();
             return refuse("integrator", value, "cd in the total frame");
+        }
+        if case.transfer != Transfer::Flip {
+            return refuse("transfer", case.transfer.to_string(), "flip in the total frame");
+        }
+        if case.placement != Placement::Lattice {
+            return refuse("layout", "body-fitted".into(), "lattice or gauss in the total frame");
         }
         if case.extent == Some(Extent::Full) {
             return refuse("extent", "full".into(), "quarter in the total frame");
@@ -168,5 +175,5 @@ fn run_in<const D: usize>(
     let u: Vec<_> = X.iter().map(|X| exact.displacement(X, 0.0)).collect();
     let v: Vec<_> = X.iter().map(|X| exact.velocity(X, 0.0)).collect();
     body.start(&u, &v)?;
-    follow(body, &body_force, exact, case, &scene, steps, outputs)
+    follow(&mut body, &body_force, exact, case, &scene, steps, outputs)
 }
