@@ -8,6 +8,7 @@
 //! A piece is higher than a band and its stencils need, so that particles may drift for some steps before all are
 //! sorted anew. The order is therefore state of the run: whoever continues a run to the same bits has to carry it over.
 
+use bytemuck::cast_slice_mut;
 use rayon::prelude::*;
 
 use crate::grid::{BAND_ROWS, Layout, PAD_BELOW};
@@ -68,6 +69,12 @@ impl Bands {
     /// Band of every particle.
     pub(crate) fn home(&self) -> &[u32] {
         &self.home
+    }
+
+    /// What the next steps need of the last sort.
+    pub(crate) fn state(&mut self) -> [&mut [u8]; 3] {
+        let Self { home, order, starts, .. } = self;
+        [cast_slice_mut(home), cast_slice_mut(order), cast_slice_mut(starts)]
     }
 
     /// Sorts all particles by the first node of their stencils, which `first_node(particle)` computes.

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use bytemuck::{Pod, bytes_of_mut, cast_slice_mut};
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::bands::Bands;
@@ -155,6 +156,22 @@ impl<T: RealField + Copy, const D: usize> Simulation<T, D> {
             Integrator::Cd => self.settings.time_step * real(0.5),
             Integrator::Usf | Integrator::Usl | Integrator::Musl => T::zero(),
         }
+    }
+}
+
+impl<T: RealField + Pod, const D: usize> Simulation<T, D> {
+    /// The numbers that make up the state between two steps, as bytes in this machine's order; their number and their lengths
+    /// follow from the set-up.
+    ///
+    /// Whoever writes them down, and later over those of a simulation that is set up in the same way, continues to the same
+    /// bits: nothing else of one step is used by the next.
+    pub fn state(&mut self) -> Vec<&mut [u8]> {
+        let Particles { x, v, F, .. } = &mut self.state.particles;
+        let mut state = vec![cast_slice_mut(x), cast_slice_mut(v), cast_slice_mut(F)];
+        // Sums over particles follow the order of the last sort.
+        state.extend(self.state.bands.state());
+        state.push(bytes_of_mut(&mut self.steps_done));
+        state
     }
 }
 

@@ -10,6 +10,7 @@ use nalgebra::SVector;
 use serde::{Serialize, Serializer};
 use thiserror::Error;
 
+use crate::checkpoint::{CheckpointError, Checkpoints, Reached};
 use crate::frames::{FrameOutput, FrameWriter};
 use crate::general::{self, Placement, Precision};
 use crate::measure::measure;
@@ -107,6 +108,8 @@ pub struct Outputs<'a> {
     pub progress: &'a mut dyn FnMut(Progress),
     /// Particle files, if any are wanted.
     pub frames: Option<&'a FrameOutput>,
+    /// What a run that is killed goes on from, if that is wanted.
+    pub checkpoints: Option<&'a Checkpoints>,
 }
 
 /// How a run ended.
@@ -215,6 +218,9 @@ pub enum CaseError {
     /// A particle file could not be written.
     #[error(transparent)]
     Frames(#[from] mmsmith_vtk::Error),
+    /// A checkpoint could not be written or read.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
 }
 
 impl Case {
@@ -308,15 +314,25 @@ pub(crate) fn follow<T: Real, const D: usize>(
         Some(output) => Some(FrameWriter::new(output, steps.count, lag)?),
         None => None,
     };
-    if let Some(frames) = &mut frames {
-        frames.write(solver.observe(), exact, 0, 0.0)?;
-    }
-    let at_start = measure(solver.observe(), exact, 0.0, lag).norms;
-    // Before the first step no velocity is stored yet that belongs to a time of the scheme.
-    let mut errors = PerField { v: PerNorm::default(), ..at_start };
+    let resumed = match outputs.checkpoints.filter(|checkpoints| checkpoints.resume) {
+        Some(checkpoints) => checkpoints.read(&mut solver.state())?,
+        None => None,
+    };
+    let Reached { step: mut done, mut wall_s, mut errors } = if let Some(reached) = resumed {
+        if let Some(frames) = &mut frames {
+            frames.take_up(reached.step, dt);
+        }
+        reached
+    } else {
+        if let Some(frames) = &mut frames {
+            frames.write(solver.observe(), exact, 0, 0.0)?;
+        }
+        let at_start = measure(solver.observe(), exact, 0.0, lag).norms;
+        // Before the first step no velocity is stored yet that belongs to a time of the scheme.
+        Reached { step: 0, wall_s: 0.0, errors: PerField { v: PerNorm::default(), ..at_start } }
+    };
     let mut status = Status::Ok;
-    let (mut wall_s, mut done) = (0.0, 0_u64);
-    for step in 1..=steps.count {
+    for step in done + 1..=steps.count {
         let started = Instant::now();
         let outcome = solver.step(body_force);
         wall_s += started.elapsed().as_secs_f64();
@@ -340,6 +356,11 @@ pub(crate) fn follow<T: Real, const D: usize>(
         (outputs.progress)(Progress { case: 0, step, steps: steps.count, share });
         if status != Status::Ok {
             break;
+        }
+        if let Some(checkpoints) = outputs.checkpoints
+            && step % checkpoints.every == 0
+        {
+            checkpoints.write(&Reached { step, wall_s, errors }, &solver.state())?;
         }
     }
     let count = solver.observe().0.len();

@@ -38,6 +38,14 @@ impl FrameWriter {
         Ok(Self { series, count, steps, velocity_lag, next: 0 })
     }
 
+    /// Goes on after `step` of a run with steps of `dt`, whose earlier frames are on the disk.
+    pub(crate) fn take_up(&mut self, step: u64, dt: f64) {
+        let steps = (0..self.count).map(|frame| step_of_frame(frame, self.count, self.steps));
+        let times: Vec<f64> = steps.take_while(|&s| s <= step).map(|s| s as f64 * dt).collect();
+        self.next = times.len() as u64;
+        self.series.take_up(&times);
+    }
+
     /// Writes the state after `step` if it is one of those wanted.
     pub(crate) fn write<T: Real, const D: usize>(
         &mut self,

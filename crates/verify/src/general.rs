@@ -1,5 +1,6 @@
 //! Runs that the fast step has no kernel for: other weights, transfers, integrators and layouts in the updated frame.
 
+use bytemuck::Pod;
 use mmsmith_mpm::general::{Annulus, Body, General, Settings, Shape, Transfer};
 use mmsmith_mpm::{Integrator as FastIntegrator, Shape as FastShape};
 use mmsmith_solutions::{Domain, Real, Solution};
@@ -87,7 +88,7 @@ pub(crate) fn bytes_expected<const D: usize>(scene: &Scene<D>, case: &Case) -> f
 }
 
 /// The precisions of the solver.
-pub(crate) trait Precision: Real {
+pub(crate) trait Precision: Real + Pod {
     /// The general simulation at time zero.
     fn general<const D: usize>(
         exact: &dyn Solution<f64, D>,

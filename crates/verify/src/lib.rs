@@ -14,6 +14,7 @@
 
 mod case;
 mod check;
+mod checkpoint;
 mod coverage;
 mod difference;
 mod evaluate;
@@ -36,6 +37,7 @@ pub use case::{Arithmetic, Case, CaseError, Outputs, Progress, Row, Start, Statu
 pub use check::{
     BLUNT, CheckError, CheckReport, Finding, OWN_ERROR_FACTOR, TOLERANCE, Verdict, check,
 };
+pub use checkpoint::{CheckpointError, Checkpoints};
 pub use coverage::{Part, Share, coverage, smallest_set};
 pub use evaluate::{FieldRow, WrongLength, evaluate};
 pub use frames::FrameOutput;

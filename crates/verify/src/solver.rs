@@ -1,5 +1,6 @@
 //! What measuring and writing need of a solver, whatever its frame.
 
+use bytemuck::Pod;
 use mmsmith_mpm::general::General;
 use mmsmith_mpm::total_lagrangian::TotalLagrangian;
 use mmsmith_mpm::{BodyForce, Material, Particles, Simulation, StepError};
@@ -13,9 +14,11 @@ pub(crate) trait Solver<T: Real, const D: usize> {
     fn observe(&mut self) -> (&Particles<T, D>, &Material<T>);
     /// How far velocities lag behind positions.
     fn velocity_lag(&self) -> f64;
+    /// The numbers that the next step needs, of lengths that follow from the set-up.
+    fn state(&mut self) -> Vec<&mut [u8]>;
 }
 
-impl<T: Real, const D: usize> Solver<T, D> for Simulation<T, D> {
+impl<T: Real + Pod, const D: usize> Solver<T, D> for Simulation<T, D> {
     fn step(&mut self, body_force: &dyn BodyForce<T, D>) -> Result<(), StepError> {
         Simulation::step(self, body_force)
     }
@@ -26,6 +29,10 @@ impl<T: Real, const D: usize> Solver<T, D> for Simulation<T, D> {
 
     fn velocity_lag(&self) -> f64 {
         Simulation::velocity_lag(self).to_f64()
+    }
+
+    fn state(&mut self) -> Vec<&mut [u8]> {
+        Simulation::state(self)
     }
 }
 
@@ -41,6 +48,10 @@ impl<const D: usize> Solver<f64, D> for General<D> {
     fn velocity_lag(&self) -> f64 {
         General::velocity_lag(self)
     }
+
+    fn state(&mut self) -> Vec<&mut [u8]> {
+        General::state(self)
+    }
 }
 
 impl<const D: usize> Solver<f64, D> for TotalLagrangian<D> {
@@ -55,5 +66,9 @@ impl<const D: usize> Solver<f64, D> for TotalLagrangian<D> {
 
     fn velocity_lag(&self) -> f64 {
         0.0
+    }
+
+    fn state(&mut self) -> Vec<&mut [u8]> {
+        TotalLagrangian::state(self)
     }
 }

@@ -78,7 +78,7 @@ pub fn converge(
             let share = (before + done.share * work[index]) / total;
             progress(Progress { case: index, share, ..done });
         };
-        let mut outputs = Outputs { progress: &mut report, frames: None };
+        let mut outputs = Outputs { progress: &mut report, frames: None, checkpoints: None };
         rows.push(run(exact, arithmetic, case, &mut outputs).map_err(fail(index))?);
     }
     let orders = orders(&rows, sweep);

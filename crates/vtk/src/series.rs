@@ -46,6 +46,16 @@ impl Series {
         Ok(Self { folder: folder.to_owned(), name: name.to_owned(), pvd, listed: vec![] })
     }
 
+    /// Takes the frames that an earlier run wrote to this folder into the list, one for each time; the next frame comes after
+    /// them. They were written whole before the state that a run goes on from.
+    pub fn take_up(&mut self, times: &[f64]) {
+        self.listed = times.iter().enumerate().map(|(n, &time)| (time, self.file(n))).collect();
+    }
+
+    fn file(&self, number: usize) -> String {
+        format!("{}-{number:06}.vtu", self.name)
+    }
+
     /// Writes the next frame and adds it to the list; returns the path of the frame's file.
     ///
     /// Times should increase from frame to frame, since readers tell frames apart by them; this is not checked.
@@ -55,7 +65,7 @@ impl Series {
     /// Where [`Frame::check`] finds fault with the frame, or the file system refuses. The frames so far and their list
     /// then remain whole, and the next call writes to the same number.
     pub fn write(&mut self, frame: &Frame) -> Result<PathBuf, Error> {
-        let file = format!("{}-{:06}.vtu", self.name, self.listed.len());
+        let file = self.file(self.listed.len());
         let path = self.folder.join(&file);
         whole_file::replace(&path, &to_bytes(frame)?)?;
 

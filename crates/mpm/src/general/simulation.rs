@@ -1,5 +1,6 @@
 //! The simulation: set up once, then stepped.
 
+use bytemuck::{bytes_of_mut, cast_slice_mut};
 use nalgebra::{SMatrix, SVector};
 
 use super::body::{Body, Mesh};
@@ -224,6 +225,20 @@ impl<const D: usize> General<D> {
             Integrator::Cd => self.settings.time_step * 0.5,
             _ => 0.0,
         }
+    }
+
+    /// The numbers that make up the state between two steps, as bytes in this machine's order; their number and their lengths
+    /// follow from the set-up.
+    ///
+    /// Whoever writes them down, and later over those of a simulation that is set up in the same way, continues to the same
+    /// bits: nothing else of one step is used by the next.
+    pub fn state(&mut self) -> Vec<&mut [u8]> {
+        let Particles { x, v, F, .. } = &mut self.body.particles;
+        let mut state = vec![cast_slice_mut(x), cast_slice_mut(v), cast_slice_mut(F)];
+        state.push(cast_slice_mut(&mut self.affine));
+        state.extend(self.body.mesh.as_mut().map(|mesh| cast_slice_mut(&mut mesh.x)));
+        state.push(bytes_of_mut(&mut self.steps_done));
+        state
     }
 
     /// Lists the nodes of every particle, with their masses.

@@ -2,6 +2,7 @@
 
 use std::array;
 
+use bytemuck::{bytes_of_mut, cast_slice_mut};
 use nalgebra::{SMatrix, SVector};
 
 use super::axis::{Axis, End, Layout};
@@ -73,9 +74,8 @@ pub struct TotalLagrangian<const D: usize> {
     /// Coefficients by component, axis 0 fastest.
     u: [Vec<f64>; D],
     v: [Vec<f64>; D],
-    /// Accelerations at the current state; forces before the solution.
+    /// Accelerations at the current state, from the first step on; forces before the solution.
     a: [Vec<f64>; D],
-    a_is_current: bool,
     particles: Particles<f64, D>,
     density: f64,
     /// Polar coordinates: reciprocal radius by place along axis 0, and cosine and sine by place along axis 1.
@@ -168,7 +168,6 @@ impl<const D: usize> TotalLagrangian<D> {
             u: zeros.clone(),
             v: zeros.clone(),
             a: zeros,
-            a_is_current: false,
             grid,
             scheme,
             material,
@@ -220,7 +219,6 @@ impl<const D: usize> TotalLagrangian<D> {
         let consistent: [[Mass; 2]; D] = array::from_fn(|k| consistent[k].clone());
         self.u = self.fit(&consistent, u);
         self.v = self.fit(&consistent, v);
-        self.a_is_current = false;
         self.steps_done = 0;
         self.failed = None;
         Ok(())
@@ -262,9 +260,8 @@ impl<const D: usize> TotalLagrangian<D> {
 
     fn advance(&mut self, body_force: &dyn BodyForce<f64, D>) -> Result<(), StepError> {
         let start = self.time();
-        if !self.a_is_current {
+        if self.steps_done == 0 {
             self.accelerate(body_force, start)?;
-            self.a_is_current = true;
         }
         // The step's part that is done: time is a variable of the drift, or the composition would lose its order.
         let mut done = 0.0;
@@ -316,6 +313,19 @@ impl<const D: usize> TotalLagrangian<D> {
     /// The particles as they were at the last call of [`observe`](Self::observe), or at rest.
     pub fn particles(&self) -> &Particles<f64, D> {
         &self.particles
+    }
+
+    /// The numbers that make up the state between two steps, as bytes in this machine's order; their number and their lengths
+    /// follow from the set-up.
+    ///
+    /// Whoever writes them down, and later over those of a simulation that is set up in the same way, continues to the same
+    /// bits: nothing else of one step is used by the next.
+    pub fn state(&mut self) -> Vec<&mut [u8]> {
+        let Self { u, v, a, steps_done, .. } = self;
+        let coefficients = u.iter_mut().chain(v).chain(a);
+        let mut state: Vec<&mut [u8]> = coefficients.map(|c| cast_slice_mut(c)).collect();
+        state.push(bytes_of_mut(steps_done));
+        state
     }
 
     /// Number of completed steps.
