@@ -136,6 +136,8 @@ pub(crate) struct ConvergeOptions {
     /// exit status 1
     #[arg(long, value_name = "X", value_parser = positive_number)]
     pub(crate) tolerance: Option<f64>,
+    #[command(flatten)]
+    pub(crate) kept: KeepOptions,
     /// Draw the displacement error to this SVG file
     #[arg(long, value_name = "FILE")]
     pub(crate) plot: Option<PathBuf>,
@@ -205,6 +207,15 @@ pub(crate) struct ReproduceOptions {
     /// Number of threads; all cores when left out
     #[arg(long, value_name = "N", value_parser = thread_count)]
     pub(crate) threads: Option<usize>,
+}
+
+/// Where finished cases are kept.
+#[derive(Args)]
+pub(crate) struct KeepOptions {
+    /// Keep every finished case in this folder, and take from it what is there: a study that was killed goes on where it
+    /// stopped, and several processes may share one
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
 }
 
 /// Values for parameters of a solution.

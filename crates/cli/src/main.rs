@@ -9,6 +9,7 @@ mod commands;
 mod csv;
 mod expect;
 mod json;
+mod keep;
 mod library;
 mod machine;
 mod memory;

@@ -1,4 +1,6 @@
 //! Ledgers as studies use them: killed, damaged, shared, and on a full disk.
+// Helpers may unwrap as tests do.
+#![allow(clippy::unwrap_used)]
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{BufRead, BufReader, Read, Write};

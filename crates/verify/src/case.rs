@@ -170,10 +170,18 @@ pub struct Row {
     pub wall_s: f64,
     /// Particles times steps done over `wall_s`.
     pub particle_steps_per_s: f64,
+    /// Whether no other case of the same study ran beside it: where one did, its times are those of a shared machine.
+    /// Written where it is false.
+    #[serde(skip_serializing_if = "is_true")]
+    pub timed_alone: bool,
     /// How it ended.
     pub status: Status,
     /// The errors until then.
     pub errors: PerField<PerNorm<f64>>,
+}
+
+fn is_true(value: &bool) -> bool {
+    *value
 }
 
 /// Why a case could not be run.
@@ -353,6 +361,7 @@ pub(crate) fn follow<T: Real, const D: usize>(
         particles: count,
         wall_s,
         particle_steps_per_s: if wall_s > 0.0 { particle_steps / wall_s } else { 0.0 },
+        timed_alone: true,
         status,
         errors,
     })

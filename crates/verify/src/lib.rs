@@ -24,6 +24,7 @@ mod norms;
 mod order;
 mod plan;
 mod points;
+mod record;
 mod scene;
 mod score;
 mod solver;
@@ -45,6 +46,7 @@ pub use mmsmith_mpm::total_lagrangian::{Composition, Coordinates, Layout, MassMa
 pub use norms::{PerField, PerNorm};
 pub use order::Order;
 pub use plan::{Plan, plan};
+pub use record::{Record, TemporalRecord};
 pub use scene::{Extent, SceneError};
 pub use score::{
     Input, Points, Remark, Resolution, Role, Score, ScoreError, ScoreOptions, ScoreRow, Source,
