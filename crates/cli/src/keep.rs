@@ -1,11 +1,11 @@
 //! Studies that survive: finished cases in a folder, from which a study goes on.
 
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
 use anyhow::{Context, Result};
 use mmsmith_ledger::{Claim, Ledger};
-use rayon::prelude::*;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
@@ -68,29 +68,24 @@ impl Keep {
     ) -> Result<Vec<T>> {
         let mut results: Vec<Option<T>> = settings.iter().map(|_| None).collect();
         loop {
-            let work = |(index, result): (usize, &mut Option<T>)| -> Result<bool> {
-                if result.is_none() {
-                    *result = self.one(&settings[index], &shared, || compute(index))?;
-                }
-                Ok(result.is_some())
-            };
-            let done = |done: Vec<bool>| done.into_iter().all(|done| done);
-            let all_done = match order {
-                Order::OneByOne => {
-                    results.iter_mut().enumerate().map(work).collect::<Result<_>>().map(done)?
-                }
-                Order::AtOnce => results
-                    .par_iter_mut()
-                    .enumerate()
-                    .with_max_len(1)
-                    .map(work)
-                    .collect::<Result<_>>()
-                    .map(done)?,
-            };
-            if all_done {
+            let open: Vec<usize> =
+                (0..settings.len()).filter(|index| results[*index].is_none()).collect();
+            if open.is_empty() {
                 break;
             }
-            std::thread::sleep(WAIT);
+            let work = |index: usize| self.one(&settings[index], &shared, || compute(index));
+            let found = match order {
+                Order::OneByOne => open.iter().map(|&index| work(index)).collect(),
+                Order::AtOnce => at_once(&open, work),
+            };
+            let found: Vec<Option<T>> = found?;
+            let idle = found.iter().all(Option::is_none);
+            for (index, found) in open.into_iter().zip(found) {
+                results[index] = found;
+            }
+            if idle {
+                std::thread::sleep(WAIT);
+            }
         }
         self.tell_damage();
         Ok(results.into_iter().flatten().collect())
@@ -139,6 +134,41 @@ impl Keep {
             ));
         }
     }
+}
+
+/// What `work` makes of each of `cases`, in their order: on as many threads as there are here, each case on one.
+fn at_once<R: Send>(cases: &[usize], work: impl Fn(usize) -> Result<R> + Sync) -> Result<Vec<R>> {
+    let next = AtomicUsize::new(0);
+    let failed = AtomicBool::new(false);
+    let threads = rayon::current_num_threads().min(cases.len());
+    let worker = || -> Result<Vec<(usize, Result<R>)>> {
+        // A pool of its own: a thread that waits for its own case must not begin another.
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+        let pool = pool.context("--threads: cannot start the threads")?;
+        Ok(pool.install(|| {
+            let mut found = Vec::new();
+            loop {
+                let place = next.fetch_add(1, Ordering::Relaxed);
+                if place >= cases.len() || failed.load(Ordering::Relaxed) {
+                    return found;
+                }
+                let outcome = work(cases[place]);
+                failed.fetch_or(outcome.is_err(), Ordering::Relaxed);
+                found.push((place, outcome));
+            }
+        }))
+    };
+    let found = std::thread::scope(|scope| {
+        let handles: Vec<_> = (0..threads).map(|_| scope.spawn(worker)).collect();
+        let join = |handle: std::thread::ScopedJoinHandle<'_, _>| match handle.join() {
+            Ok(found) => found,
+            Err(panic) => std::panic::resume_unwind(panic),
+        };
+        handles.into_iter().map(join).collect::<Result<Vec<_>>>()
+    })?;
+    let mut found: Vec<_> = found.into_iter().flatten().collect();
+    found.sort_by_key(|(place, _)| *place);
+    found.into_iter().map(|(_, outcome)| outcome).collect()
 }
 
 /// A short checksum in hexadecimal digits.

@@ -34,6 +34,7 @@ fn main() -> ExitCode {
         Command::Eval(options) => commands::eval(options),
         Command::Run(options) => commands::run(options),
         Command::Converge(options) => commands::converge(options),
+        Command::Stability(options) => commands::stability(options),
         Command::Score(options) => commands::score(options),
         Command::Reproduce(options) => commands::reproduce(options),
     };

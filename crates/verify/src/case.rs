@@ -57,6 +57,10 @@ pub struct Case {
     pub frame: Frame,
     /// The speed `c` that `cfl` refers to.
     pub cfl_speed: CflSpeed,
+    /// By how much the lattice of particles is shifted along every axis, in units of the particles' distance, at most
+    /// half of it either way: with 0 they are at the centres of equal parts of a cell, with 0.5 some are on cell edges,
+    /// and on the upper walls.
+    pub offset: f64,
 }
 
 impl Default for Case {
@@ -75,6 +79,7 @@ impl Default for Case {
             extent: None,
             frame: Frame::Updated,
             cfl_speed: CflSpeed::Bar,
+            offset: 0.0,
         }
     }
 }
@@ -244,6 +249,10 @@ impl Case {
                 return Err(CaseError::Setting { setting, value, admissible });
             }
         }
+        if !(self.offset.abs() <= 0.5) {
+            let (setting, value) = ("offset", format!("{:?}", self.offset));
+            return Err(CaseError::Setting { setting, value, admissible: "from -0.5 to 0.5" });
+        }
         match &self.frame {
             Frame::Updated => general::validate(self),
             Frame::Total(total) => total.validate(self),
@@ -384,7 +393,7 @@ pub(crate) fn set_up<'a, T: Precision, const D: usize>(
         return Ok((solver, ExactBodyForce(body_force)));
     };
     let grid = scene.grid::<T>();
-    let mut particles = scene.particles(&grid, case.per_cell, exact.density());
+    let mut particles = scene.particles(&grid, case, exact.density());
     if particles.is_empty() {
         return Err(SceneError::Empty { cells: case.cells }.into());
     }
@@ -461,6 +470,8 @@ mod tests {
             (Case { per_cell: 0, ..Case::default() }, "ppc = 0"),
             (Case { cfl: -0.4, ..Case::default() }, "cfl = -0.4"),
             (Case { cfl: f64::NAN, ..Case::default() }, "cfl = NaN"),
+            (Case { offset: 0.6, ..Case::default() }, "offset = 0.6"),
+            (Case { offset: f64::NAN, ..Case::default() }, "offset = NaN"),
             (Case { periods: f64::INFINITY, ..Case::default() }, "periods = inf"),
         ] {
             let message = case.validate().unwrap_err().to_string();

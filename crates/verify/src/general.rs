@@ -129,7 +129,7 @@ impl Precision for f64 {
                 let ring = Annulus { inner, outer, quarter };
                 Body::annulus(&ring, scene.spacing, per_cell, density)?
             }
-            _ => Body::lattice(&grid, per_cell, density, scene.inside(per_cell)),
+            _ => Body::lattice(&grid, per_cell, density, scene.inside(per_cell, case.offset)),
         };
         if body.particles.is_empty() {
             return Err(SceneError::Empty { cells: case.cells }.into());

@@ -7,6 +7,7 @@
 //!   stress; [`converge`] does so for a series of grids or time steps and adds the orders of accuracy.
 //! - [`score()`] measures what another solver wrote to files, in the same norms.
 //! - [`temporal()`] measures the error of time stepping alone, and [`verdicts`] judges orders.
+//! - [`stability()`] finds the largest stable time step of a scheme.
 //! - [`evaluate()`] gives the exact fields at a point.
 //!
 //! Everything here takes a solution as a value, never by its name, and knows nothing of terminals or arguments.
@@ -28,6 +29,7 @@ mod record;
 mod scene;
 mod score;
 mod solver;
+mod stability;
 mod study;
 mod temporal;
 mod total;
@@ -51,6 +53,10 @@ pub use scene::{Extent, SceneError};
 pub use score::{
     Input, Points, Remark, Resolution, Role, Score, ScoreError, ScoreOptions, ScoreRow, Source,
     score,
+};
+pub use stability::{
+    Criteria, Failure, FailureKind, Observed, Search, StabilityRow, is_stable, p_wave_limit,
+    stability,
 };
 pub use study::{Study, StudyError, Sweep, converge};
 pub use temporal::{Temporal, TemporalRow, temporal};
