@@ -112,6 +112,10 @@ fn units_that_differ_by_powers_of_two_give_the_same_bits() {
             }
             assert_scaled(&case, &row(&plain, &case), &row(&scaled, &case), factors);
         }
+        if (mass - length - 2 * time).abs() > 64 {
+            // Forces of a solid this soft are among the smallest numbers of single precision, which have fewer digits.
+            continue;
+        }
         let case = Case { cells: 6, ..Case::default() };
         let (small_plain, small_scaled) = (solution(name, &[]), solution(name, &values));
         let a = row_in_single(&plain, &small_plain, &case);

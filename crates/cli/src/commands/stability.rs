@@ -179,7 +179,8 @@ fn without_threads(mut key: Value) -> Value {
 fn definition(criteria: &Criteria) -> String {
     format!(
         "unstable: J <= 0, not finite, off the grid, or too large for the weights; an error of u above {} times that of a \
-         run at CFL 0.125 on P-waves; or more energy than the exact motion has by {} of its largest, for each period\n",
+         run at CFL 0.125 on P-waves; or more energy than the exact motion has, by what that run showed and {} of its largest for \
+         each period\n",
         criteria.error_multiple, criteria.energy_rate
     )
 }

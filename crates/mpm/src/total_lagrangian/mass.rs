@@ -11,14 +11,14 @@ pub(crate) enum Mass {
     /// Lumped: the reciprocal of each entry.
     Diagonal(Vec<f64>),
     /// Consistent: its factors.
-    Banded(Factors),
+    Banded(Ldl),
 }
 
 /// The factors of a symmetric positive definite banded matrix `L D L^T`, the diagonal of L being one.
 ///
 /// Without square roots, so that masses in other units, a power of two apart, give the same bits.
 #[derive(Clone, Debug)]
-pub(crate) struct Factors {
+pub(crate) struct Ldl {
     size: usize,
     /// Entries beside the diagonal in each row.
     band: usize,
@@ -41,7 +41,7 @@ impl Mass {
                 }
             }
         }
-        Factors::new(size, band, &lower).map(Self::Banded)
+        Ldl::new(size, band, &lower).map(Self::Banded)
     }
 
     /// The row sums `sum_q w_q N_i`. `even` are the functions continued with equal sign at walls, whose sum is one;
@@ -75,7 +75,7 @@ impl Mass {
     }
 }
 
-impl Factors {
+impl Ldl {
     /// Factors the matrix with the lower rows `lower[i][band - d] = A[i][i - d]`; `None` where it is not positive
     /// definite to within rounding.
     fn new(size: usize, band: usize, lower: &[f64]) -> Option<Self> {
