@@ -164,7 +164,7 @@ pub(crate) struct StabilityOptions {
     /// Number of cells along the solution's cell length
     #[arg(long, value_name = "N", default_value_t = 32, value_parser = positive_count)]
     pub(crate) cells: usize,
-    /// What to vary, one or two of them: NAME=VALUE,VALUE,... with the name amplitude, units (mass, length where it can be,
+    /// What to vary, one or two of them: NAME=VALUE,VALUE,... with the name amplitude, units (mass, length where L is one,
     /// and time change by powers of two), a parameter of the solution, or cells, ppc, offset, periods, precision, shape,
     /// integrator, start
     #[arg(long, value_name = "NAME=VALUE,...", value_parser = variation, conflicts_with_all = ["at", "search"])]

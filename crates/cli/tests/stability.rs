@@ -75,7 +75,7 @@ fn settings_words_and_units_can_be_varied() {
     assert_eq!((&rows[1]["shape"], &rows[1]["integrator"]), (&"ugimp".into(), &"usl".into()));
     // Units that differ by powers of two change no bit of a limit.
     let call =
-        "stability ring --cells 6 --width 0.05 --over units=-7,0,20 --plot l.svg --json m.json";
+        "stability bar --cells 6 --width 0.05 --over units=-7,0,20 --plot l.svg --json m.json";
     let called = mms(place, call);
     assert_eq!(called.status, 0, "{}", called.stderr);
     let rows = read_json(&place.join("m.json"))["rows"].clone();
@@ -122,7 +122,7 @@ fn bad_settings_are_named() {
     refuses(place, &call("--over ppc=0"), &["ppc=0", "at least 1"]);
     refuses(place, &call("--over offset=0.7"), &["offset", "-0.5 to 0.5"]);
     refuses(place, &call("--over nu=0 --over nu=0.1"), &["given twice"]);
-    refuses(place, &call("--over nu=0 --over ppc=2 --over cells=4"), &["one or two", "3"]);
+    refuses(place, &call("--over nu=0 --over ppc=2 --over cells=4"), &["two make a map", "3"]);
     refuses(place, &call("--lower 0.9 --upper 0.5"), &["--lower", "--upper"]);
     refuses(place, &call("--width 0"), &["--width", "positive"]);
     refuses(place, &call("--plot p.svg"), &["--over"]);

@@ -96,18 +96,16 @@ fn word<V: ValueEnum>(text: &str) -> Result<V> {
 }
 
 /// The same problem in other units: times are `2^power` as large, masses `2^(5 power)`, and lengths `2^power` where the
-/// body's size is among the parameters.
+/// length that a cell count divides is among the parameters, as L.
 fn in_units(selection: &Selection, power: i32) -> Result<Selection> {
     let units = selection.units();
-    let has = |name: &str| units.contains_key(name);
-    let length = if has("L") || (has("Ri") && has("Ro")) { power } else { 0 };
+    let length = if units.contains_key("L") { power } else { 0 };
     let (mass, time) = (5 * power, power);
     let mut values = Vec::new();
     for (name, value) in selection.parameters() {
         let unit = units.get(name).map_or("", String::as_str);
         let exponent = match unit {
             "" => 0,
-            // An amplitude is a length, and stays one of the fixed unit square's where that is the body.
             "m" => length,
             "1/m" => -length,
             "s" => time,
