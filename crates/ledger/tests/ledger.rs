@@ -1,6 +1,6 @@
 //! Ledgers as studies use them: killed, damaged, shared, and on a full disk.
-// Helpers may unwrap as tests do.
-#![allow(clippy::unwrap_used)]
+// Helpers may unwrap and print as tests do.
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{BufRead, BufReader, Read, Write};

@@ -249,7 +249,7 @@ impl Case {
                 return Err(CaseError::Setting { setting, value, admissible });
             }
         }
-        if !(self.offset.abs() <= 0.5) {
+        if !(-0.5..=0.5).contains(&self.offset) {
             let (setting, value) = ("offset", format!("{:?}", self.offset));
             return Err(CaseError::Setting { setting, value, admissible: "from -0.5 to 0.5" });
         }

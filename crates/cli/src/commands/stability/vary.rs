@@ -29,7 +29,7 @@ pub(super) fn points(options: &StabilityOptions, selection: &Selection) -> Resul
         combinations = combinations
             .iter()
             .flat_map(|so_far| {
-                values.iter().map(|value| [so_far.as_slice(), &[value.clone()]].concat())
+                values.iter().map(|value| [so_far.as_slice(), std::slice::from_ref(value)].concat())
             })
             .collect();
     }
