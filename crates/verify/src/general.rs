@@ -37,6 +37,15 @@ pub(crate) fn fast_step(case: &Case) -> Option<(FastShape, FastIntegrator)> {
 
 /// Refuses what makes no sense whatever the solution.
 pub(crate) fn validate(case: &Case) -> Result<(), CaseError> {
+    if case.offset != 0.0 && fast_step(case).is_none() {
+        let value = format!("{:?}", case.offset);
+        return refuse(
+            "offset",
+            &value,
+            "0, but for the shapes linear, ugimp and gimp on a lattice with the transfer flip and the integrators cd, usl, usf \
+             and musl",
+        );
+    }
     let boxed = matches!(case.shape, Shape::Ugimp | Shape::Gimp);
     if boxed && case.placement == Placement::BodyFitted {
         return refuse(

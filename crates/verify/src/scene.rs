@@ -239,8 +239,7 @@ impl<const D: usize> Scene<D> {
         density: f64,
     ) -> Particles<T, D> {
         let inside = self.inside(case.per_cell, case.offset);
-        let mut particles =
-            Particles::lattice(grid, case.per_cell, Real::nearest(density), inside);
+        let mut particles = Particles::lattice(grid, case.per_cell, Real::nearest(density), inside);
         if case.offset != 0.0 {
             let distance = self.spacing / case.per_cell as f64;
             let shift: SVector<T, D> = SVector::repeat(Real::nearest(case.offset * distance));
