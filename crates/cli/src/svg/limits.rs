@@ -47,7 +47,7 @@ impl Map<'_> {
         let _ = writeln!(
             text,
             r##"<text x="16" y="22" font-size="15" font-weight="bold">{}</text>
-<text x="16" y="44" font-size="13">{range}; the second number is the share of the P-wave limit</text>"##,
+<text x="16" y="44" font-size="13">{range}; below: share of P-waves' limit; heavy line: 0.8 of it</text>"##,
             escape(self.title)
         );
         let at = |column: usize, line: usize| {

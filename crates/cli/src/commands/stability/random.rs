@@ -3,11 +3,12 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use anyhow::{Result, bail};
+use clap::ValueEnum;
 use mmsmith_verify::{Criteria, Observed, is_stable};
 use serde_json::{Value, json};
 
 use super::{Point, definition, told, without_threads};
-use crate::arguments::{SchemeOptions, StabilityOptions};
+use crate::arguments::{CflSpeed, Frame, SchemeOptions, StabilityOptions};
 use crate::commands::{caption, settings, with_threads};
 use crate::json::Output;
 use crate::keep::{Keep, Order};
@@ -139,43 +140,48 @@ fn draw(options: &StabilityOptions, selection: &Selection, sample: usize) -> Res
 
 /// The command line that repeats a setting.
 fn command(options: &StabilityOptions, point: &Point) -> String {
-    let word = |value: &dyn std::fmt::Debug| format!("{value:?}").to_lowercase();
     let Point { scheme, case, .. } = point;
     let mut text = format!(
-        "mms stability {} --at {:?} --cells {} --ppc {} --offset {:?} --shape {} --integrator {} --start {} \
-         --periods {:?} --precision {} --error-multiple {:?} --energy-rate {:?}",
+        "mms stability {} --at {:?} --cells {} --ppc {} --offset {:?} --shape {} --integrator {} --start {} --transfer {} \
+         --layout {} --periods {:?} --precision {} --error-multiple {:?} --energy-rate {:?}",
         options.name,
         case.cfl,
         case.cells,
         scheme.ppc,
         scheme.offset,
-        word(&scheme.shape),
-        word(&scheme.integrator),
-        word(&scheme.start),
+        word(scheme.shape),
+        word(scheme.integrator),
+        word(scheme.start),
+        scheme.transfer,
+        word(scheme.layout),
         scheme.periods,
-        word(&scheme.precision),
+        word(scheme.precision),
         options.error_multiple,
         options.energy_rate,
     );
-    if scheme.frame == crate::arguments::Frame::Total {
+    if scheme.frame == Frame::Total {
         let (mass, composition) = crate::commands::scheme::echo(scheme);
         text += &format!(
-            " --frame total --mass {} --composition {composition} --layout {} --grid {}",
-            word(&mass),
-            word(&scheme.layout),
-            word(&scheme.grid)
+            " --frame total --mass {} --composition {composition} --grid {}",
+            word(mass),
+            word(scheme.grid)
         );
     }
-    if scheme.cfl_speed == crate::arguments::CflSpeed::PWave {
+    if scheme.cfl_speed == CflSpeed::PWave {
         text += " --cfl-speed p-wave";
     }
     if let Some(extent) = scheme.extent {
-        text += &format!(" --extent {}", word(&extent));
+        text += &format!(" --extent {}", word(extent));
     }
     for (name, value) in point.selection.parameters() {
         text += &format!(" --set {name}={value:?}");
     }
     text
+}
+
+/// An argument's value as it is typed.
+fn word(value: impl ValueEnum) -> String {
+    value.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
 }
 
 /// SplitMix64 (Steele, Lea and Flood, 2014): the same numbers on every machine.
