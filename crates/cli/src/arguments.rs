@@ -28,8 +28,12 @@ pub(crate) enum Command {
     Eval(EvalOptions),
     /// Run one simulation and measure its errors
     Run(RunOptions),
+    /// Go on with a run that wrote checkpoints and was stopped or killed, to the same bits
+    Resume(ResumeOptions),
     /// Measure orders of accuracy over grids (--cells 16,32,64) or time steps (--cells 32 --cfls 0.1,0.2,0.4)
     Converge(ConvergeOptions),
+    /// Find the largest stable CFL number by bisection, over one or two settings or parameters
+    Stability(StabilityOptions),
     /// Measure errors and orders of what another solver wrote (.vtu, .vtp, .vtk, .pvd, .csv)
     Score(ScoreOptions),
     /// Repeat the original study on both of its problems, with a report, tables, data and particle files
@@ -115,6 +119,22 @@ pub(crate) struct RunOptions {
     /// Number of particle files, spread evenly from the first state to the last
     #[arg(long, value_name = "N", default_value_t = 20, requires = "vtk", value_parser = clap::value_parser!(u64).range(2..))]
     pub(crate) frames: u64,
+    /// Write all that the next step needs to this folder every so often; after a kill, `mms resume DIR` goes on from there
+    #[arg(long, value_name = "DIR")]
+    pub(crate) checkpoint: Option<PathBuf>,
+    /// Steps between checkpoints
+    #[arg(long, value_name = "N", default_value_t = 1000, requires = "checkpoint", value_parser = clap::value_parser!(u64).range(1..))]
+    pub(crate) every: u64,
+}
+
+#[derive(Args)]
+pub(crate) struct ResumeOptions {
+    /// The folder that the run was given with --checkpoint
+    #[arg(value_name = "DIR")]
+    pub(crate) folder: PathBuf,
+    /// Number of threads; as the run was started with when left out
+    #[arg(long, value_name = "N", value_parser = thread_count)]
+    pub(crate) threads: Option<usize>,
 }
 
 #[derive(Args)]
@@ -136,6 +156,8 @@ pub(crate) struct ConvergeOptions {
     /// exit status 1
     #[arg(long, value_name = "X", value_parser = positive_number)]
     pub(crate) tolerance: Option<f64>,
+    #[command(flatten)]
+    pub(crate) kept: KeepOptions,
     /// Draw the displacement error to this SVG file
     #[arg(long, value_name = "FILE")]
     pub(crate) plot: Option<PathBuf>,
@@ -150,6 +172,66 @@ pub(crate) struct ConvergeOptions {
     pub(crate) latex: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) scheme: SchemeOptions,
+}
+
+#[derive(Args)]
+pub(crate) struct StabilityOptions {
+    /// The solution, by name, or a specification file (SPEC.toml)
+    #[arg(value_name = "NAME|SPEC.toml")]
+    pub(crate) name: String,
+    /// Number of cells along the solution's cell length
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser = positive_count)]
+    pub(crate) cells: usize,
+    /// What to vary, one or two of them: NAME=VALUE,VALUE,... with the name amplitude, units (mass, length where L is one,
+    /// and time change by powers of two), a parameter of the solution, or cells, ppc, offset, periods, precision, shape,
+    /// integrator, start
+    #[arg(long, value_name = "NAME=VALUE,...", value_parser = variation, conflicts_with_all = ["at", "search"])]
+    pub(crate) over: Vec<(String, Vec<String>)>,
+    /// How close the stable and the unstable CFL number come, on P-waves, whose number is the larger one
+    #[arg(long, value_name = "X", default_value_t = 0.01, value_parser = positive_number)]
+    pub(crate) width: f64,
+    /// CFL number to start from; an eighth of P-waves' when left out. It is halved until it is stable
+    #[arg(long, value_name = "X", value_parser = positive_number)]
+    pub(crate) lower: Option<f64>,
+    /// CFL number that is thought unstable; P-waves' own when left out. It is raised until it is unstable
+    #[arg(long, value_name = "X", value_parser = positive_number)]
+    pub(crate) upper: Option<f64>,
+    /// A run is unstable with an error of u above this multiple of a reference run's, at an eighth of P-waves' time step
+    #[arg(long, value_name = "X", default_value_t = verify::Criteria::default().error_multiple, value_parser = positive_number)]
+    pub(crate) error_multiple: f64,
+    /// A run is unstable if it gains, in a period, more than this multiple of the exact motion's largest energy
+    #[arg(long, value_name = "X", default_value_t = verify::Criteria::default().energy_rate, value_parser = positive_number)]
+    pub(crate) energy_rate: f64,
+    /// Judge the run at this CFL number alone; exit status 1 if it is unstable
+    #[arg(long, value_name = "CFL", value_parser = positive_number, conflicts_with = "search")]
+    pub(crate) at: Option<f64>,
+    /// Look for failures among random settings with CFL numbers up to --cfl on P-waves, which are believed stable; exit
+    /// status 1 if there are any
+    #[arg(long, value_enum)]
+    pub(crate) search: Option<SearchKind>,
+    /// Number of random settings
+    #[arg(long, value_name = "N", default_value_t = 100, requires = "search", value_parser = sample_count)]
+    pub(crate) samples: usize,
+    /// Seed of the random settings
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "search")]
+    pub(crate) seed: u64,
+    /// Draw the limits to this SVG file: a line over one setting, a map over two
+    #[arg(long, value_name = "FILE", requires = "over")]
+    pub(crate) plot: Option<PathBuf>,
+    /// Write the table to this file as comma-separated values
+    #[arg(long, value_name = "FILE")]
+    pub(crate) csv: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) kept: KeepOptions,
+    #[command(flatten)]
+    pub(crate) scheme: SchemeOptions,
+}
+
+/// Ways to look for failures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum SearchKind {
+    /// Settings drawn from a seed
+    Random,
 }
 
 /// Where another solver's output is, and how it is to be read.
@@ -207,8 +289,17 @@ pub(crate) struct ReproduceOptions {
     pub(crate) threads: Option<usize>,
 }
 
-/// Values for parameters of a solution.
+/// Where finished cases are kept.
 #[derive(Args)]
+pub(crate) struct KeepOptions {
+    /// Keep every finished case in this folder, and take from it what is there: a study that was killed goes on where it
+    /// stopped, and several processes may share one
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+/// Values for parameters of a solution.
+#[derive(Args, Clone)]
 pub(crate) struct ParameterOptions {
     /// Give a parameter another value than its default; repeatable
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment)]
@@ -216,7 +307,7 @@ pub(crate) struct ParameterOptions {
 }
 
 /// How to simulate; what every measuring command shares.
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub(crate) struct SchemeOptions {
     /// Weights between particles and grid
     #[arg(long, value_enum, default_value_t = Shape::Gimp)]
@@ -260,6 +351,9 @@ pub(crate) struct SchemeOptions {
     /// How much of a ring is modelled; a quarter where symmetry allows it
     #[arg(long, value_enum)]
     pub(crate) extent: Option<Extent>,
+    /// Shift of the particles' lattice along every axis, in units of their distance, from -0.5 to 0.5
+    #[arg(long, value_name = "X", default_value_t = 0.0, allow_negative_numbers = true, value_parser = finite_number)]
+    pub(crate) offset: f64,
     /// Precision of the solver; errors are always measured in f64
     #[arg(long, value_enum, default_value_t = Precision::F64)]
     pub(crate) precision: Precision,
@@ -509,6 +603,16 @@ fn role(text: &str) -> Result<(verify::Role, String), String> {
         Some(known) if !name.is_empty() => Ok((known, name.to_owned())),
         _ => Err(form()),
     }
+}
+
+fn variation(text: &str) -> Result<(String, Vec<String>), String> {
+    let form = || "expected NAME=VALUE,VALUE,..., such as nu=0,0.3,0.49".to_owned();
+    let (name, values) = text.split_once('=').ok_or_else(form)?;
+    let values: Vec<_> = values.split(',').map(|value| value.trim().to_owned()).collect();
+    if name.trim().is_empty() || values.iter().any(String::is_empty) {
+        return Err(form());
+    }
+    Ok((name.trim().to_owned(), values))
 }
 
 fn assignment(text: &str) -> Result<(String, f64), String> {

@@ -7,9 +7,11 @@ mod eval;
 mod explain;
 mod list;
 mod reproduce;
+mod resume;
 mod run;
 mod scheme;
 mod score;
+mod stability;
 mod thorough;
 
 pub(crate) use check::check;
@@ -19,8 +21,10 @@ pub(crate) use eval::eval;
 pub(crate) use explain::explain;
 pub(crate) use list::list;
 pub(crate) use reproduce::reproduce;
+pub(crate) use resume::resume;
 pub(crate) use run::run;
 pub(crate) use score::score;
+pub(crate) use stability::stability;
 
 use anyhow::{Context, Result};
 use mmsmith_solutions::AnySolution;
@@ -82,6 +86,7 @@ fn case(options: &SchemeOptions, cells: usize) -> Result<Case> {
         extent: options.extent.map(Into::into),
         frame,
         cfl_speed: options.cfl_speed.into(),
+        offset: options.offset,
     })
 }
 
@@ -113,6 +118,7 @@ fn settings(
         "ppc": options.ppc,
         "cfl": cfl,
         "periods": options.periods,
+        "offset": options.offset,
         "extent": extent,
         "precision": options.precision,
         "threads": rayon::current_num_threads(),

@@ -51,7 +51,7 @@ pub(crate) fn temporal(temporal: &Temporal) -> String {
     text
 }
 
-fn quoted(text: &str) -> String {
+pub(crate) fn quoted(text: &str) -> String {
     format!("\"{}\"", text.replace('"', "\"\""))
 }
 

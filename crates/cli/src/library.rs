@@ -104,6 +104,18 @@ impl Selection {
         }
     }
 
+    /// The unit of each parameter, empty for a pure number.
+    pub(crate) fn units(&self) -> BTreeMap<String, String> {
+        match &self.source {
+            Source::Library(description) => {
+                description.parameters.iter().map(|p| (p.name.into(), p.unit.into())).collect()
+            }
+            Source::File(source) => {
+                source.0.parameters.iter().map(|p| (p.name.clone(), p.unit.clone())).collect()
+            }
+        }
+    }
+
     /// Parameter values by name.
     pub(crate) fn parameters(&self) -> &BTreeMap<String, f64> {
         &self.parameters

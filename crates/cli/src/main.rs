@@ -9,6 +9,7 @@ mod commands;
 mod csv;
 mod expect;
 mod json;
+mod keep;
 mod library;
 mod machine;
 mod memory;
@@ -32,7 +33,9 @@ fn main() -> ExitCode {
         Command::Coverage(options) => commands::coverage(options),
         Command::Eval(options) => commands::eval(options),
         Command::Run(options) => commands::run(options),
+        Command::Resume(options) => commands::resume(options),
         Command::Converge(options) => commands::converge(options),
+        Command::Stability(options) => commands::stability(options),
         Command::Score(options) => commands::score(options),
         Command::Reproduce(options) => commands::reproduce(options),
     };

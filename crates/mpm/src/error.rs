@@ -3,8 +3,9 @@
 use thiserror::Error;
 
 /// Why a step could not be completed. Particle ids are indices into [`Particles`](crate::Particles).
+///
+/// Exhaustive: who keeps results on disk must know every one of them.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
 pub enum StepError {
     /// A deformation gradient lost its orientation.
     #[error(

@@ -58,6 +58,10 @@ pub struct Case {
     pub frame: Frame,
     /// The speed `c` that `cfl` refers to.
     pub cfl_speed: CflSpeed,
+    /// By how much the lattice of particles is shifted along every axis, in units of the particles' distance, at most
+    /// half of it either way: with 0 they are at the centres of equal parts of a cell, with 0.5 some are on cell edges,
+    /// and on the upper walls.
+    pub offset: f64,
 }
 
 impl Default for Case {
@@ -76,6 +80,7 @@ impl Default for Case {
             extent: None,
             frame: Frame::Updated,
             cfl_speed: CflSpeed::Bar,
+            offset: 0.0,
         }
     }
 }
@@ -173,10 +178,18 @@ pub struct Row {
     pub wall_s: f64,
     /// Particles times steps done over `wall_s`.
     pub particle_steps_per_s: f64,
+    /// Whether no other case of the same study ran beside it: where one did, its times are those of a shared machine.
+    /// Written where it is false.
+    #[serde(skip_serializing_if = "is_true")]
+    pub timed_alone: bool,
     /// How it ended.
     pub status: Status,
     /// The errors until then.
     pub errors: PerField<PerNorm<f64>>,
+}
+
+fn is_true(value: &bool) -> bool {
+    *value
 }
 
 /// Why a case could not be run.
@@ -241,6 +254,10 @@ impl Case {
                 let (value, admissible) = (format!("{value:?}"), "a positive number");
                 return Err(CaseError::Setting { setting, value, admissible });
             }
+        }
+        if !(-0.5..=0.5).contains(&self.offset) {
+            let (setting, value) = ("offset", format!("{:?}", self.offset));
+            return Err(CaseError::Setting { setting, value, admissible: "from -0.5 to 0.5" });
         }
         match &self.frame {
             Frame::Updated => general::validate(self),
@@ -374,6 +391,7 @@ pub(crate) fn follow<T: Real, const D: usize>(
         particles: count,
         wall_s,
         particle_steps_per_s: if wall_s > 0.0 { particle_steps / wall_s } else { 0.0 },
+        timed_alone: true,
         status,
         errors,
     })
@@ -396,7 +414,7 @@ pub(crate) fn set_up<'a, T: Precision, const D: usize>(
         return Ok((solver, ExactBodyForce(body_force)));
     };
     let grid = scene.grid::<T>();
-    let mut particles = scene.particles(&grid, case.per_cell, exact.density());
+    let mut particles = scene.particles(&grid, case, exact.density());
     if particles.is_empty() {
         return Err(SceneError::Empty { cells: case.cells }.into());
     }
@@ -473,6 +491,8 @@ mod tests {
             (Case { per_cell: 0, ..Case::default() }, "ppc = 0"),
             (Case { cfl: -0.4, ..Case::default() }, "cfl = -0.4"),
             (Case { cfl: f64::NAN, ..Case::default() }, "cfl = NaN"),
+            (Case { offset: 0.6, ..Case::default() }, "offset = 0.6"),
+            (Case { offset: f64::NAN, ..Case::default() }, "offset = NaN"),
             (Case { periods: f64::INFINITY, ..Case::default() }, "periods = inf"),
         ] {
             let message = case.validate().unwrap_err().to_string();

@@ -38,6 +38,15 @@ pub(crate) fn fast_step(case: &Case) -> Option<(FastShape, FastIntegrator)> {
 
 /// Refuses what makes no sense whatever the solution.
 pub(crate) fn validate(case: &Case) -> Result<(), CaseError> {
+    if case.offset != 0.0 && fast_step(case).is_none() {
+        let value = format!("{:?}", case.offset);
+        return refuse(
+            "offset",
+            &value,
+            "0, but for the shapes linear, ugimp and gimp on a lattice with the transfer flip and the integrators cd, usl, usf \
+             and musl",
+        );
+    }
     let boxed = matches!(case.shape, Shape::Ugimp | Shape::Gimp);
     if boxed && case.placement == Placement::BodyFitted {
         return refuse(
@@ -130,7 +139,7 @@ impl Precision for f64 {
                 let ring = Annulus { inner, outer, quarter };
                 Body::annulus(&ring, scene.spacing, per_cell, density)?
             }
-            _ => Body::lattice(&grid, per_cell, density, scene.inside(per_cell)),
+            _ => Body::lattice(&grid, per_cell, density, scene.inside(per_cell, case.offset)),
         };
         if body.particles.is_empty() {
             return Err(SceneError::Empty { cells: case.cells }.into());

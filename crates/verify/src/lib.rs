@@ -7,6 +7,7 @@
 //!   stress; [`converge`] does so for a series of grids or time steps and adds the orders of accuracy.
 //! - [`score()`] measures what another solver wrote to files, in the same norms.
 //! - [`temporal()`] measures the error of time stepping alone, and [`verdicts`] judges orders.
+//! - [`stability()`] finds the largest stable time step of a scheme.
 //! - [`evaluate()`] gives the exact fields at a point.
 //!
 //! Everything here takes a solution as a value, never by its name, and knows nothing of terminals or arguments.
@@ -25,9 +26,11 @@ mod norms;
 mod order;
 mod plan;
 mod points;
+mod record;
 mod scene;
 mod score;
 mod solver;
+mod stability;
 mod study;
 mod temporal;
 mod total;
@@ -47,10 +50,15 @@ pub use mmsmith_mpm::total_lagrangian::{Composition, Coordinates, Layout, MassMa
 pub use norms::{PerField, PerNorm};
 pub use order::Order;
 pub use plan::{Plan, plan};
+pub use record::{Record, TemporalRecord};
 pub use scene::{Extent, SceneError};
 pub use score::{
     Input, Points, Remark, Resolution, Role, Score, ScoreError, ScoreOptions, ScoreRow, Source,
     score,
+};
+pub use stability::{
+    Criteria, Failure, FailureKind, Observed, Search, StabilityRow, is_stable, p_wave_limit,
+    stability,
 };
 pub use study::{Study, StudyError, Sweep, converge};
 pub use temporal::{Temporal, TemporalRow, temporal};

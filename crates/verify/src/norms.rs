@@ -4,10 +4,10 @@
 //! are Euclidean norms of vectors and Frobenius norms of tensors. Partial sums belong to fixed groups of
 //! particles and are added in order, so the result does not depend on the number of threads.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// One value for each field whose error is measured.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PerField<N> {
     /// Displacement, a length.
     pub u: N,
@@ -20,7 +20,7 @@ pub struct PerField<N> {
 }
 
 /// One value for each norm.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PerNorm<V> {
     /// Largest magnitude over all particles and steps.
     pub linf: V,
@@ -36,6 +36,11 @@ impl<N> PerField<N> {
         [("u", &self.u), ("v", &self.v), ("F", &self.F), ("P", &self.P)]
     }
 
+    /// Field by field, what `f` makes of the value.
+    pub(crate) fn map<M>(&self, f: impl Fn(&N) -> M) -> PerField<M> {
+        PerField { u: f(&self.u), v: f(&self.v), F: f(&self.F), P: f(&self.P) }
+    }
+
     /// Field by field, what `f` makes of two values.
     pub(crate) fn combine<A, B>(a: &PerField<A>, b: &PerField<B>, f: impl Fn(&A, &B) -> N) -> Self {
         Self { u: f(&a.u, &b.u), v: f(&a.v, &b.v), F: f(&a.F, &b.F), P: f(&a.P, &b.P) }
@@ -46,6 +51,11 @@ impl<V> PerNorm<V> {
     /// The norms' names with their values, in the order of the struct.
     pub fn named(&self) -> [(&'static str, &V); 3] {
         [("linf", &self.linf), ("l2", &self.l2), ("l1", &self.l1)]
+    }
+
+    /// Norm by norm, what `f` makes of the value.
+    pub(crate) fn map<M>(&self, f: impl Fn(&V) -> M) -> PerNorm<M> {
+        PerNorm { linf: f(&self.linf), l2: f(&self.l2), l1: f(&self.l1) }
     }
 }
 

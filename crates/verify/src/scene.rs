@@ -235,20 +235,35 @@ impl<const D: usize> Scene<D> {
     pub(crate) fn particles<T: Real>(
         &self,
         grid: &Grid<T, D>,
-        per_cell: usize,
+        case: &Case,
         density: f64,
     ) -> Particles<T, D> {
-        Particles::lattice(grid, per_cell, Real::nearest(density), self.inside(per_cell))
+        let inside = self.inside(case.per_cell, case.offset);
+        let mut particles = Particles::lattice(grid, case.per_cell, Real::nearest(density), inside);
+        if case.offset != 0.0 {
+            let distance = self.spacing / case.per_cell as f64;
+            let shift: SVector<T, D> = SVector::repeat(Real::nearest(case.offset * distance));
+            for (X, x) in particles.X.iter_mut().zip(&mut particles.x) {
+                *X += shift;
+                *x = *X;
+            }
+        }
+        particles
     }
 
-    /// Whether a place of the lattice with `per_cell` particles in a cell and direction lies in the body.
-    pub(crate) fn inside<T: Real>(&self, per_cell: usize) -> impl Fn(&SVector<T, D>) -> bool {
+    /// Whether a place of the lattice with `per_cell` particles in a cell and direction lies in the body once it is shifted
+    /// by `offset` of the particles' distance.
+    pub(crate) fn inside<T: Real>(
+        &self,
+        per_cell: usize,
+        offset: f64,
+    ) -> impl Fn(&SVector<T, D>) -> bool {
         let distance = self.spacing / per_cell as f64;
         move |X| {
             // Decided on the exact centre, so that both precisions have the same particles.
             let centre = SVector::<f64, D>::from_fn(|axis, _| {
                 let index = ((X[axis].to_f64() - self.lower[axis]) / distance - 0.5).round();
-                self.lower[axis] + (index + 0.5) * distance
+                self.lower[axis] + (index + 0.5 + offset) * distance
             });
             match self.domain {
                 Domain::Annulus { inner, outer } => {

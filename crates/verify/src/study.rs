@@ -38,6 +38,15 @@ pub struct Study {
     pub orders: PerField<PerNorm<Order>>,
 }
 
+impl Study {
+    /// The rows of `sweep`'s cases, in its order, with their orders.
+    #[must_use]
+    pub fn new(rows: Vec<Row>, sweep: &Sweep) -> Self {
+        let orders = orders(&rows, sweep);
+        Self { rows, orders }
+    }
+}
+
 /// A case of a study could not be run.
 #[derive(Debug, Error)]
 #[error("case {}: {cause}", index + 1)]
@@ -81,8 +90,7 @@ pub fn converge(
         let mut outputs = Outputs { progress: &mut report, frames: None, checkpoints: None };
         rows.push(run(exact, arithmetic, case, &mut outputs).map_err(fail(index))?);
     }
-    let orders = orders(&rows, sweep);
-    Ok(Study { rows, orders })
+    Ok(Study::new(rows, sweep))
 }
 
 /// The orders over the rows of a sweep.

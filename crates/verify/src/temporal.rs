@@ -36,6 +36,16 @@ pub struct Temporal {
     pub orders: PerField<PerNorm<Order>>,
 }
 
+impl Temporal {
+    /// Rows with their orders.
+    pub(crate) fn new(times: Vec<f64>, rows: Vec<TemporalRow>) -> Self {
+        let values =
+            rows.iter().map(|row| (row.dt, (row.status == Status::Ok).then_some(&row.differences)));
+        let orders = orders_of(&values.collect::<Vec<_>>());
+        Self { times, rows, orders }
+    }
+}
+
 /// A run compared with the one of half its time step.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TemporalRow {
@@ -142,12 +152,8 @@ fn over<T: Precision, const D: usize>(
             differences,
         }
     });
-    let rows: Vec<_> = rows.collect();
-    let values =
-        rows.iter().map(|row| (row.dt, (row.status == Status::Ok).then_some(&row.differences)));
-    let orders = orders_of(&values.collect::<Vec<_>>());
     let times = (1..=INSTANTS).map(|part| end * part as f64 / INSTANTS as f64).collect();
-    Ok(Temporal { times, rows, orders })
+    Ok(Temporal::new(times, rows.collect()))
 }
 
 /// All particles at one of the common times.

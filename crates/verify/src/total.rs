@@ -82,6 +82,9 @@ impl TotalScheme {
         if case.placement != Placement::Lattice {
             return refuse("layout", "body-fitted".into(), "lattice or gauss in the total frame");
         }
+        if case.offset != 0.0 {
+            return refuse("offset", format!("{:?}", case.offset), "0 in the total frame");
+        }
         if case.extent == Some(Extent::Full) {
             return refuse("extent", "full".into(), "quarter in the total frame");
         }
@@ -167,13 +170,25 @@ fn run_in<const D: usize>(
     outputs: &mut Outputs<'_>,
 ) -> Result<Row, CaseError> {
     let (scene, steps) = prepare(exact, case)?;
-    let grid = total.grid(&scene, case.per_cell)?;
+    let (mut body, body_force) = set_up(exact, total, case, &scene, steps.dt)?;
+    follow(&mut body, &body_force, exact, case, &scene, steps, outputs)
+}
+
+/// The solver at time zero with steps of `dt`, and the body force that drives it.
+pub(crate) fn set_up<'a, const D: usize>(
+    exact: &'a dyn Solution<f64, D>,
+    total: &TotalScheme,
+    case: &Case,
+    scene: &Scene<D>,
+    dt: f64,
+) -> Result<(TotalLagrangian<D>, ExactBodyForce<'a, f64, D>), CaseError> {
+    let grid = total.grid(scene, case.per_cell)?;
     let material = law(exact.material())?;
-    let mut body = TotalLagrangian::new(grid, total.scheme, material, exact.density(), steps.dt)?;
+    let mut body = TotalLagrangian::new(grid, total.scheme, material, exact.density(), dt)?;
     let X = body.positions();
     let body_force = ExactBodyForce(exact.body_force_at(X));
     let u: Vec<_> = X.iter().map(|X| exact.displacement(X, 0.0)).collect();
     let v: Vec<_> = X.iter().map(|X| exact.velocity(X, 0.0)).collect();
     body.start(&u, &v)?;
-    follow(&mut body, &body_force, exact, case, &scene, steps, outputs)
+    Ok((body, body_force))
 }

@@ -2,8 +2,9 @@
 
 use anyhow::{Context, Result, bail};
 use mmsmith_verify::{
-    Behaviour, Case, Expected, ORDER_TOLERANCE, Order, OrderVerdict, PerField, PerNorm, Status,
-    Study, Sweep, Temporal, converge as measure, expected_in_space, expected_in_time, plan,
+    Behaviour, Case, Expected, ORDER_TOLERANCE, Order as ObservedOrder, OrderVerdict, Outputs,
+    PerField, PerNorm, Progress, Record, Row, Status, Study, StudyError, Sweep, Temporal,
+    TemporalRecord, expected_in_space, expected_in_time, plan, run,
     temporal as measure_differences, verdicts,
 };
 use serde_json::{Value, json};
@@ -11,6 +12,7 @@ use serde_json::{Value, json};
 use super::{Model, caption, case, settings, with_threads};
 use crate::arguments::{ConvergeOptions, Extent, SchemeOptions};
 use crate::json::Output;
+use crate::keep::{Keep, Order};
 use crate::library::Selection;
 use crate::progress::Bar;
 use crate::svg::{Curve, Plot};
@@ -29,23 +31,16 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
     let model = Model::new(&selection, scheme.precision)?;
     let base = case(scheme, options.cells[0])?;
     let extent = model.admit(&sweep.cases(&base))?;
+    let keep = Keep::open(options.kept.out.as_ref(), &options.name)?;
     let output = Output::prepare_if(scheme.json.as_ref())?;
     let [plot, values, markdown, latex] =
         [&options.plot, &options.csv, &options.markdown, &options.latex]
             .map(|path| Output::prepare_if(path.as_ref()));
     let (plot, values, markdown, latex) = (plot?, values?, markdown?, latex?);
     with_threads(scheme.threads, || {
-        let study = {
-            let bar = Bar::new();
-            let mut show = |progress: mmsmith_verify::Progress| {
-                let what = match &sweep {
-                    Sweep::Cells(cells) => format!("{} cells", cells[progress.case]),
-                    Sweep::Cfls(cfls) => format!("CFL {}", cfls[progress.case]),
-                };
-                bar.show(&what, progress);
-            };
-            measure(&model.exact, model.arithmetic(), &base, &sweep, &mut show)?
-        };
+        let study = study(&model, &base, &sweep, &keep, |case| {
+            settings(&selection, scheme, extent, case.cells, case.cfl)
+        })?;
         // In time the expectation is about the differences; the total error is mostly a spatial one.
         let in_space = match (&sweep, asked) {
             (Sweep::Cells(_), Some(asked)) => asked,
@@ -56,7 +51,20 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
         let differences = match &sweep {
             // In the total frame the order in time is that of the composition, far below the error in space.
             Sweep::Cfls(cfls) if base.frame == mmsmith_verify::Frame::Updated => {
-                let found = differences(&model, &base, cfls, "difference")?;
+                let mut what = settings(&selection, scheme, extent, base.cells, cfls);
+                what["differences"] = true.into();
+                let found = keep.all(
+                    &[what],
+                    Order::OneByOne,
+                    |_| {},
+                    |_| {
+                        differences(&model, &base, cfls, "difference")
+                            .map(|found| TemporalRecord::from(&found))
+                    },
+                )?;
+                let Some(found) = found.into_iter().next().map(Temporal::from) else {
+                    bail!("no differences were measured");
+                };
                 let expected = asked.unwrap_or_else(|| expected_in_time(&base));
                 let judged = judge_differences(&found, &expected, tolerance);
                 Some((found, judged))
@@ -132,6 +140,41 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
             .any(|(_, norms)| norms.named().iter().any(|(_, one)| one.passed == Some(false)));
         Ok(!(strict && failed))
     })
+}
+
+/// The cases of a study, those that are kept and the others, and their orders.
+fn study(
+    model: &Model,
+    base: &Case,
+    sweep: &Sweep,
+    keep: &Keep,
+    settings: impl Fn(&Case) -> Value,
+) -> Result<Study> {
+    let cases = sweep.cases(base);
+    let mut work = Vec::with_capacity(cases.len());
+    for case in &cases {
+        let plan = plan(&model.exact, model.arithmetic(), case)?;
+        work.push(plan.steps as f64 * plan.particles);
+    }
+    let total: f64 = work.iter().sum();
+    let bar = Bar::new();
+    let keys: Vec<_> = cases.iter().map(settings).collect();
+    let mark = |record: &mut Record| record.timed_alone = false;
+    let records = keep.all(&keys, Order::OneByOne, mark, |index| {
+        let what = match &sweep {
+            Sweep::Cells(cells) => format!("{} cells", cells[index]),
+            Sweep::Cfls(cfls) => format!("CFL {}", cfls[index]),
+        };
+        let before: f64 = work[..index].iter().sum();
+        let mut show = |progress: Progress| {
+            let share = (before + progress.share * work[index]) / total;
+            bar.show(&what, Progress { share, ..progress });
+        };
+        let mut outputs = Outputs { progress: &mut show, frames: None, checkpoints: None };
+        let row = run(&model.exact, model.arithmetic(), &cases[index], &mut outputs);
+        Ok(Record::from(&row.map_err(|cause| StudyError { index, cause })?))
+    })?;
+    Ok(Study::new(records.into_iter().map(Row::from).collect(), sweep))
 }
 
 /// The differences over `cfls` on the grid of `base`, with a progress bar that says `what`.
@@ -277,7 +320,7 @@ fn norms(
     row: usize,
     field: usize,
     errors: &PerField<PerNorm<f64>>,
-    orders: &PerField<PerNorm<Order>>,
+    orders: &PerField<PerNorm<ObservedOrder>>,
     judged: &Verdicts,
 ) -> Vec<String> {
     let errors = errors.named()[field].1.named();
@@ -297,7 +340,7 @@ fn norms(
 fn fits<const N: usize>(
     first: [String; N],
     field: usize,
-    orders: &PerField<PerNorm<Order>>,
+    orders: &PerField<PerNorm<ObservedOrder>>,
 ) -> Vec<String> {
     let mut cells = first.to_vec();
     for (_, order) in orders.named()[field].1.named() {

@@ -4,7 +4,7 @@ use anyhow::Result;
 use mmsmith_verify::{FrameOutput, Outputs, Row, Status, run as simulate};
 use serde_json::json;
 
-use super::{Model, caption, case, settings, with_threads};
+use super::{Model, caption, case, resume, settings, with_threads};
 use crate::arguments::RunOptions;
 use crate::json::Output;
 use crate::library::Selection;
@@ -13,6 +13,14 @@ use crate::table::{self, Table};
 use crate::terminal;
 
 pub(crate) fn run(options: &RunOptions) -> Result<bool> {
+    if let Some(folder) = &options.checkpoint {
+        resume::remember(folder)?;
+    }
+    follow(options, false)
+}
+
+/// The run, from its beginning or from its last checkpoint.
+pub(super) fn follow(options: &RunOptions, resume: bool) -> Result<bool> {
     let scheme = &options.scheme;
     let selection = Selection::new(&options.name, &scheme.parameters.set)?;
     let model = Model::new(&selection, scheme.precision)?;
@@ -24,6 +32,11 @@ pub(crate) fn run(options: &RunOptions) -> Result<bool> {
         name: selection.name().to_owned(),
         count: options.frames,
     });
+    let settings = || settings(&selection, scheme, extent, options.cells, scheme.cfl);
+    let checkpoints = match &options.checkpoint {
+        Some(folder) => Some(resume::checkpoints(folder, options, &settings(), resume)?),
+        None => None,
+    };
     with_threads(scheme.threads, || {
         let row = {
             let bar = Bar::new();
@@ -31,6 +44,7 @@ pub(crate) fn run(options: &RunOptions) -> Result<bool> {
             let mut outputs = Outputs {
                 progress: &mut |progress| bar.show(&what, progress),
                 frames: frames.as_ref(),
+                checkpoints: checkpoints.as_ref(),
             };
             simulate(&model.exact, model.arithmetic(), &case, &mut outputs)?
         };
@@ -42,7 +56,7 @@ pub(crate) fn run(options: &RunOptions) -> Result<bool> {
         if let Some(output) = output {
             output.write(&json!({
                 "schema": "mmsmith.run/1",
-                "settings": settings(&selection, scheme, extent, options.cells, scheme.cfl),
+                "settings": settings(),
                 "result": row,
             }))?;
         }

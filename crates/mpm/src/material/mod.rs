@@ -3,6 +3,7 @@
 //! All are hyperelastic but for [`Material::LinearElastic`], whose stress ignores how the body turns. Stresses are formed
 //! from H = F - I, so that small strains keep their digits.
 
+mod energy;
 mod hencky;
 mod linear_elastic;
 mod logarithm;

@@ -50,6 +50,8 @@ fn energy<const D: usize>(law: &Material<f64>, F: &SMatrix<f64, D, D>) -> f64 {
 
 fn check_against_energy<const D: usize>(law: &Material<f64>, F: &SMatrix<f64, D, D>) {
     let P = law.first_piola_kirchhoff(F).unwrap();
+    let (stored, printed) = (law.strain_energy(F).unwrap(), energy(law, F));
+    assert!((stored - printed).abs() < 1e-12 * (1.0 + printed), "{law:?} {stored} {printed}");
     let step = 1e-5;
     for i in 0..D {
         for j in 0..D {

@@ -10,19 +10,21 @@ use super::basis::{Basis, Part};
 pub(crate) enum Mass {
     /// Lumped: the reciprocal of each entry.
     Diagonal(Vec<f64>),
-    /// Consistent: its Cholesky factor.
-    Banded(Cholesky),
+    /// Consistent: its factors.
+    Banded(Ldl),
 }
 
-/// The factor L of a symmetric positive definite banded matrix `L L^T`.
+/// The factors of a symmetric positive definite banded matrix `L D L^T`, the diagonal of L being one.
+///
+/// Without square roots, so that masses in other units, a power of two apart, give the same bits.
 #[derive(Clone, Debug)]
-pub(crate) struct Cholesky {
+pub(crate) struct Ldl {
     size: usize,
     /// Entries beside the diagonal in each row.
     band: usize,
     /// `band` entries a row, `L[i][i - band + k]` at k; those before the first column are zero, as are `band` more rows.
     below: Vec<f64>,
-    /// Reciprocals of the diagonal entries.
+    /// Reciprocals of the entries of D.
     reciprocal: Vec<f64>,
 }
 
@@ -39,7 +41,7 @@ impl Mass {
                 }
             }
         }
-        Cholesky::new(size, band, &lower).map(Self::Banded)
+        Ldl::new(size, band, &lower).map(Self::Banded)
     }
 
     /// The row sums `sum_q w_q N_i`. `even` are the functions continued with equal sign at walls, whose sum is one;
@@ -73,29 +75,35 @@ impl Mass {
     }
 }
 
-impl Cholesky {
+impl Ldl {
     /// Factors the matrix with the lower rows `lower[i][band - d] = A[i][i - d]`; `None` where it is not positive
     /// definite to within rounding.
     fn new(size: usize, band: usize, lower: &[f64]) -> Option<Self> {
         let width = band + 1;
+        // L beside the diagonal, D on it.
         let mut factor = lower.to_vec();
         for i in 0..size {
             let lowest = i.saturating_sub(band);
-            for j in lowest..=i {
+            // The row of L D first: entry k of it meets entry k of the rows above.
+            for j in lowest..i {
                 let mut sum = factor[i * width + band + j - i];
                 for k in lowest.max(j.saturating_sub(band))..j {
                     sum -= factor[i * width + band + k - i] * factor[j * width + band + k - j];
                 }
-                if j < i {
-                    factor[i * width + band + j - i] = sum / factor[j * width + band];
-                } else {
-                    let diagonal = lower[i * width + band];
-                    if sum.is_nan() || sum <= 1e-13 * diagonal {
-                        return None;
-                    }
-                    factor[i * width + band] = sum.sqrt();
-                }
+                factor[i * width + band + j - i] = sum;
             }
+            let diagonal = lower[i * width + band];
+            let mut sum = diagonal;
+            for k in lowest..i {
+                let with_D = factor[i * width + band + k - i];
+                let below = with_D / factor[k * width + band];
+                factor[i * width + band + k - i] = below;
+                sum -= with_D * below;
+            }
+            if sum.is_nan() || sum <= 1e-13 * diagonal {
+                return None;
+            }
+            factor[i * width + band] = sum;
         }
         let rows = factor.chunks_exact(width);
         Some(Self {
@@ -126,17 +134,16 @@ impl Cholesky {
                     let other = &before[(i - d) * inner..][..inner];
                     line.iter_mut().zip(other).for_each(|(x, y)| *x -= factor * y);
                 }
-                line.iter_mut().for_each(|x| *x *= self.reciprocal[i]);
             }
             for i in (0..self.size).rev() {
                 let (upto, after) = block.split_at_mut((i + 1) * inner);
                 let line = &mut upto[i * inner..];
+                line.iter_mut().for_each(|x| *x *= self.reciprocal[i]);
                 for d in (1..=B.min(self.size - 1 - i)).rev() {
                     let factor = self.below[(i + d) * B + B - d];
                     let other = &after[(d - 1) * inner..][..inner];
                     line.iter_mut().zip(other).for_each(|(x, y)| *x -= factor * y);
                 }
-                line.iter_mut().for_each(|x| *x *= self.reciprocal[i]);
             }
         }
     }
@@ -144,19 +151,19 @@ impl Cholesky {
     /// Solves for `L` contiguous lines at once.
     fn solve_lines<const B: usize, const L: usize>(&self, lines: &mut [f64]) {
         let size = self.size;
-        let mut pass = |order: &mut dyn Iterator<Item = usize>, row_step: usize| {
+        let mut pass = |order: &mut dyn Iterator<Item = usize>, backwards: bool| {
             // The last B values of each line, the latest first. Those that do not exist are zero, as are their factors.
             let mut latest = [[0.0; L]; B];
             for i in order {
-                let mut now: [f64; L] = std::array::from_fn(|l| lines[l * size + i]);
+                let scale = if backwards { self.reciprocal[i] } else { 1.0 };
+                let mut now: [f64; L] = std::array::from_fn(|l| lines[l * size + i] * scale);
                 for d in (1..=B).rev() {
-                    let factor = self.below[(i + row_step * d) * B + B - d];
+                    let factor = self.below[(i + usize::from(backwards) * d) * B + B - d];
                     for l in 0..L {
                         now[l] -= factor * latest[d - 1][l];
                     }
                 }
                 for l in 0..L {
-                    now[l] *= self.reciprocal[i];
                     lines[l * size + i] = now[l];
                 }
                 latest.rotate_right(usize::from(B > 0));
@@ -165,8 +172,8 @@ impl Cholesky {
                 }
             }
         };
-        pass(&mut (0..size), 0);
-        pass(&mut (0..size).rev(), 1);
+        pass(&mut (0..size), false);
+        pass(&mut (0..size).rev(), true);
     }
 }
 

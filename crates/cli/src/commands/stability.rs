@@ -1,0 +1,343 @@
+//! `mms stability`: the largest stable time step, and what becomes of it at the extremes.
+
+mod random;
+mod vary;
+
+use anyhow::{Result, bail};
+use mmsmith_verify::{
+    Case, Criteria, Failure, FailureKind, Observed, Search, StabilityRow, is_stable,
+    stability as find,
+};
+use serde_json::{Value, json};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::{Model, caption, case, settings, with_threads};
+use crate::arguments::{Extent, SchemeOptions, StabilityOptions};
+use crate::csv;
+use crate::json::Output;
+use crate::keep::{Keep, Order};
+use crate::library::Selection;
+use crate::progress::Bar;
+use crate::svg::{Limits, Map};
+use crate::table::Table;
+use crate::terminal;
+
+/// One point of a line or map: what is set, and the case that follows from it.
+struct Point {
+    /// What the varied settings are here, in their order.
+    values: Vec<String>,
+    selection: Selection,
+    scheme: SchemeOptions,
+    model: Model,
+    case: Case,
+    extent: Option<Extent>,
+}
+
+impl Point {
+    fn new(
+        values: Vec<String>,
+        selection: Selection,
+        scheme: SchemeOptions,
+        cells: usize,
+    ) -> Result<Self> {
+        let model = Model::new(&selection, scheme.precision)?;
+        let case = case(&scheme, cells)?;
+        // The finest step that a search may come to is not known; memory does not depend on it.
+        let extent = model.admit(&[Case { cfl: 0.5, ..case }])?;
+        Ok(Self { values, selection, scheme, model, case, extent })
+    }
+
+    /// Everything but the CFL number.
+    fn settings(&self) -> Value {
+        settings(&self.selection, &self.scheme, self.extent, self.case.cells, Value::Null)
+    }
+}
+
+pub(crate) fn stability(options: &StabilityOptions) -> Result<bool> {
+    let criteria =
+        Criteria { error_multiple: options.error_multiple, energy_rate: options.energy_rate };
+    if let Some(cfl) = options.at {
+        return judge(options, cfl, &criteria);
+    }
+    if options.search.is_some() {
+        return random::search(options, &criteria);
+    }
+    let selection = Selection::new(&options.name, &options.scheme.parameters.set)?;
+    let points = vary::points(options, &selection)?;
+    let (lower, upper) = (options.lower, options.upper);
+    if let (Some(lower), Some(upper)) = (lower, upper)
+        && lower >= upper
+    {
+        bail!("--lower {lower} --upper {upper}: the lower CFL number must be below the upper one");
+    }
+    let search = Search { lower, upper, width: options.width, criteria };
+    let output = Output::prepare_if(options.scheme.json.as_ref())?;
+    let [plot, values] =
+        [&options.plot, &options.csv].map(|path| Output::prepare_if(path.as_ref()));
+    let (plot, values) = (plot?, values?);
+    let keep = Keep::open(options.kept.out.as_ref(), &options.name)?;
+    with_threads(options.scheme.threads, || {
+        let rows = limits(&points, &search, &keep)?;
+        let names: Vec<&str> = options.over.iter().map(|(name, _)| name.as_str()).collect();
+        let scheme = &options.scheme;
+        let mut text = caption(&selection, scheme, points[0].extent);
+        if !options.over.iter().any(|(name, _)| name == "cells") {
+            text += &format!("{} cells\n", options.cells);
+        }
+        text += &definition(&criteria);
+        text += &format!("\nlargest stable CFL number, to {} on P-waves\n", search.width);
+        text += &table(&names, &points, &rows).text();
+        text += &notes(&names, &points, &rows);
+        terminal::say(&text)?;
+        if let Some(output) = output {
+            let documents =
+                points.iter().zip(&rows).map(|(point, row)| document(options, point, row));
+            output.write(&json!({
+                "schema": "mmsmith.stability/1",
+                "settings": settings(&selection, scheme, points[0].extent, options.cells, Value::Null),
+                "over": names,
+                "search": search,
+                "rows": documents.collect::<Result<Vec<_>>>()?,
+            }))?;
+        }
+        if let Some(file) = values {
+            file.write_text(&sheet(&names, &points, &rows))?;
+        }
+        if let Some(file) = plot {
+            file.write_text(&picture(&selection, options, &rows))?;
+        }
+        Ok(true)
+    })
+}
+
+/// Judges one run.
+fn judge(options: &StabilityOptions, cfl: f64, criteria: &Criteria) -> Result<bool> {
+    let selection = Selection::new(&options.name, &options.scheme.parameters.set)?;
+    let scheme = SchemeOptions { cfl, ..options.scheme.clone() };
+    let output = Output::prepare_if(scheme.json.as_ref())?;
+    let point = Point::new(Vec::new(), selection, scheme, options.cells)?;
+    let scheme = &point.scheme;
+    with_threads(scheme.threads, || {
+        let found = is_stable(&point.model.exact, point.model.arithmetic(), &point.case, criteria)?;
+        let mut text = caption(&point.selection, scheme, point.extent);
+        text += &definition(criteria);
+        text += &match &found.failure {
+            None => format!("CFL {cfl}: stable over {} steps\n", found.steps),
+            Some(failure) => format!("CFL {cfl}: UNSTABLE: {}\n", told(failure)),
+        };
+        terminal::say(&text)?;
+        if let Some(output) = output {
+            let settings = settings(&point.selection, scheme, point.extent, options.cells, cfl);
+            output.write(&json!({
+                "schema": "mmsmith.stability/1",
+                "settings": settings,
+                "criteria": criteria,
+                "result": found,
+            }))?;
+        }
+        Ok(found.failure.is_none())
+    })
+}
+
+/// The limits of all points; the cases are independent, and go side by side where there are several.
+fn limits(points: &[Point], search: &Search, keep: &Keep) -> Result<Vec<StabilityRow>> {
+    let keys: Vec<_> = points
+        .iter()
+        .map(|point| json!({ "case": point.settings(), "search": search }))
+        .map(without_threads)
+        .collect();
+    let order = if points.len() > 1 { Order::AtOnce } else { Order::OneByOne };
+    let bar = Bar::new();
+    let done = AtomicUsize::new(0);
+    keep.all(
+        &keys,
+        order,
+        |_| {},
+        |index| {
+            let point = &points[index];
+            let name = point.values.join(", ");
+            let share = || done.load(Ordering::Relaxed) as f64 / points.len() as f64;
+            let mut show = |run: usize| bar.show_share(|| format!("{name}, run {run}"), share());
+            let row =
+                find(&point.model.exact, point.model.arithmetic(), &point.case, search, &mut show)?;
+            done.fetch_add(1, Ordering::Relaxed);
+            bar.show_share(|| name.clone(), share());
+            Ok(row)
+        },
+    )
+}
+
+/// Results do not depend on the number of threads.
+fn without_threads(mut key: Value) -> Value {
+    if let Some(case) = key["case"].as_object_mut() {
+        case.remove("threads");
+    }
+    key
+}
+
+/// What 'unstable' means, in words.
+fn definition(criteria: &Criteria) -> String {
+    format!(
+        "unstable: J <= 0, not finite, off the grid, or too large for the weights; an error of u above {} times that of a \
+         run at CFL 0.125 on P-waves; or more energy than the exact motion has, by what that run showed and {} of its largest for \
+         each period\n",
+        criteria.error_multiple, criteria.energy_rate
+    )
+}
+
+/// A number with three decimals, or a dash.
+fn three(value: Option<f64>) -> String {
+    value.map_or_else(|| "-".into(), |value| format!("{value:.3}"))
+}
+
+fn kind(kind: FailureKind) -> &'static str {
+    match kind {
+        FailureKind::Inverted => "J <= 0",
+        FailureKind::NotFinite => "not finite",
+        FailureKind::LeftGrid => "left the grid",
+        FailureKind::TooLarge => "too large",
+        FailureKind::Error => "error",
+        FailureKind::Energy => "energy",
+    }
+}
+
+/// A failure in one line.
+fn told(failure: &Failure) -> String {
+    let particle = failure.particle.map(|p| format!(", particle {p}")).unwrap_or_default();
+    let value = failure.value.map(|value| format!(", {value:.3e}")).unwrap_or_default();
+    let limit = failure.limit.map(|limit| format!(" (limit {limit:.3e})")).unwrap_or_default();
+    let Failure { step, time, .. } = failure;
+    format!("{} at step {step}, t = {time:.4e}{particle}{value}{limit}", kind(failure.kind))
+}
+
+fn table(names: &[&str], points: &[Point], rows: &[StabilityRow]) -> Table {
+    let header = names.iter().copied().chain([
+        "CFL",
+        "unstable at",
+        "P-wave CFL",
+        "CFL of P-waves",
+        "error",
+        "energy drift",
+        "momentum drift",
+        "runs",
+        "failure",
+    ]);
+    let mut table = Table::new(0, header);
+    for (point, row) in points.iter().zip(rows) {
+        let scientific = |value: Option<f64>| {
+            value.map_or_else(|| "-".to_owned(), |value| format!("{value:.1e}"))
+        };
+        let limit = row.at_limit.as_ref();
+        let mut cells = point.values.clone();
+        cells.extend([
+            three(row.cfl_max),
+            three(row.bracket[1]),
+            three(row.p_wave_cfl),
+            format!("{:.3}", row.p_wave_limit),
+            scientific(limit.and_then(|run| run.error)),
+            scientific(limit.and_then(|run| run.energy_drift)),
+            scientific(limit.and_then(|run| run.momentum_drift)),
+            row.runs.to_string(),
+            row.failure.as_ref().map_or("-", |failure| kind(failure.kind)).to_owned(),
+        ]);
+        table.row(cells);
+    }
+    table
+}
+
+/// What the table cannot say.
+fn notes(names: &[&str], points: &[Point], rows: &[StabilityRow]) -> String {
+    let mut text = String::new();
+    for (point, row) in points.iter().zip(rows) {
+        let place: Vec<_> = names
+            .iter()
+            .zip(&point.values)
+            .map(|(name, value)| format!("{name} = {value}"))
+            .collect();
+        let place =
+            if place.is_empty() { String::new() } else { format!("{}: ", place.join(", ")) };
+        match (row.bracket, &row.failure) {
+            ([Some(stable), None], _) => {
+                text += &format!("{place}stable at every CFL number tried, up to {stable:.3}\n");
+            }
+            ([None, Some(unstable)], Some(failure)) => {
+                text += &format!(
+                    "{place}unstable at every CFL number tried, down to {unstable:.4}: {}\n",
+                    told(failure)
+                );
+            }
+            _ => {}
+        }
+        for Observed { cfl, failure, .. } in &row.unstable_below {
+            let failure = failure.as_ref().map(told).unwrap_or_default();
+            text += &format!("{place}a hole below the limit, at CFL {cfl:.4}: {failure}\n");
+        }
+    }
+    text
+}
+
+/// A row as it is written to JSON: what was varied, then what was found.
+fn document(options: &StabilityOptions, point: &Point, row: &StabilityRow) -> Result<Value> {
+    let mut document = serde_json::Map::new();
+    for ((name, _), value) in options.over.iter().zip(&point.values) {
+        let number = value.parse::<f64>().ok().map(Value::from);
+        document.insert(name.clone(), number.unwrap_or_else(|| value.as_str().into()));
+    }
+    if let Value::Object(found) = serde_json::to_value(row)? {
+        document.extend(found);
+    }
+    Ok(document.into())
+}
+
+/// The rows as comma-separated values.
+fn sheet(names: &[&str], points: &[Point], rows: &[StabilityRow]) -> String {
+    let mut text = names.iter().map(|name| format!("{name},")).collect::<String>()
+        + "cfl_max,stable,unstable,p_wave_cfl,p_wave_limit,failure,step,time,particle,value,limit,\
+           reference_error,error,energy_drift,momentum_drift,runs,unstable_below\n";
+    let number = |value: Option<f64>| value.map(|value| format!("{value:?}")).unwrap_or_default();
+    for (point, row) in points.iter().zip(rows) {
+        let failure = row.failure.as_ref();
+        let limit = row.at_limit.as_ref();
+        let below: Vec<_> = row.unstable_below.iter().map(|run| format!("{:?}", run.cfl)).collect();
+        let mut cells: Vec<String> = point.values.iter().map(|value| csv::quoted(value)).collect();
+        cells.extend([
+            number(row.cfl_max),
+            number(row.bracket[0]),
+            number(row.bracket[1]),
+            number(row.p_wave_cfl),
+            number(Some(row.p_wave_limit)),
+            failure.map(|failure| csv::quoted(kind(failure.kind))).unwrap_or_default(),
+            failure.map(|failure| failure.step.to_string()).unwrap_or_default(),
+            number(failure.map(|failure| failure.time)),
+            failure.and_then(|failure| failure.particle).map(|p| p.to_string()).unwrap_or_default(),
+            number(failure.and_then(|failure| failure.value)),
+            number(failure.and_then(|failure| failure.limit)),
+            number(row.reference.error),
+            number(limit.and_then(|run| run.error)),
+            number(limit.and_then(|run| run.energy_drift)),
+            number(limit.and_then(|run| run.momentum_drift)),
+            row.runs.to_string(),
+            below.join(" "),
+        ]);
+        text += &format!("{}\n", cells.join(","));
+    }
+    text
+}
+
+/// A line over one setting, a map over two.
+fn picture(selection: &Selection, options: &StabilityOptions, rows: &[StabilityRow]) -> String {
+    let title = format!("{}: largest stable CFL number", selection.name());
+    let measured: Vec<Option<f64>> = rows.iter().map(|row| row.cfl_max).collect();
+    let analytic: Vec<f64> = rows.iter().map(|row| row.p_wave_limit).collect();
+    match options.over.as_slice() {
+        [(x, columns), (y, lines)] => {
+            let (x, y) = ((x.as_str(), columns.as_slice()), (y.as_str(), lines.as_slice()));
+            // Rows come with the second setting changing fastest.
+            Map { title: &title, x, y, values: &measured, analytic: &analytic }.svg()
+        }
+        [(x, values), ..] => {
+            Limits { title: &title, x, values, measured: &measured, analytic: &analytic }.svg()
+        }
+        [] => String::new(),
+    }
+}

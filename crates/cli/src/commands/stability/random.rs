@@ -1,0 +1,206 @@
+//! Failures inside the region believed stable, looked for by random settings.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use anyhow::{Result, bail};
+use clap::ValueEnum;
+use mmsmith_verify::{Criteria, Observed, is_stable};
+use serde_json::{Value, json};
+
+use super::{Point, definition, told, without_threads};
+use crate::arguments::{CflSpeed, Frame, SchemeOptions, StabilityOptions};
+use crate::commands::{caption, settings, with_threads};
+use crate::json::Output;
+use crate::keep::{Keep, Order};
+use crate::library::Selection;
+use crate::progress::Bar;
+use crate::terminal;
+
+/// Draws for one setting; the specification may refuse some.
+const MOST_DRAWS: usize = 100;
+
+pub(super) fn search(options: &StabilityOptions, criteria: &Criteria) -> Result<bool> {
+    let scheme = &options.scheme;
+    let selection = Selection::new(&options.name, &scheme.parameters.set)?;
+    if options.plot.is_some() || options.csv.is_some() {
+        bail!("--search random draws no picture and no table; use --json");
+    }
+    let output = Output::prepare_if(scheme.json.as_ref())?;
+    let points: Vec<Point> = (0..options.samples)
+        .map(|sample| draw(options, &selection, sample))
+        .collect::<Result<_>>()?;
+    let keep = Keep::open(options.kept.out.as_ref(), &options.name)?;
+    let keys: Vec<_> = points
+        .iter()
+        .map(|point| {
+            let case = settings(
+                &point.selection,
+                &point.scheme,
+                point.extent,
+                point.case.cells,
+                point.case.cfl,
+            );
+            without_threads(json!({ "case": case, "criteria": criteria }))
+        })
+        .collect();
+    with_threads(scheme.threads, || {
+        let found: Vec<Observed> = {
+            let bar = Bar::new();
+            let done = AtomicUsize::new(0);
+            keep.all(
+                &keys,
+                Order::AtOnce,
+                |_| {},
+                |index| {
+                    let point = &points[index];
+                    let model = &point.model;
+                    let found = is_stable(&model.exact, model.arithmetic(), &point.case, criteria)?;
+                    let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+                    let share = done as f64 / points.len() as f64;
+                    bar.show_share(|| format!("setting {done}/{}", points.len()), share);
+                    Ok(found)
+                },
+            )?
+        };
+        let extent = points.first().and_then(|point| point.extent);
+        let mut text = caption(&selection, scheme, extent);
+        text += &definition(criteria);
+        text += &format!(
+            "{} random settings (seed {}) with CFL numbers up to {} on P-waves:\n",
+            points.len(),
+            options.seed,
+            scheme.cfl
+        );
+        let mut failures = Vec::new();
+        for (point, found) in points.iter().zip(&found) {
+            let Some(failure) = &found.failure else { continue };
+            let command = command(options, point);
+            text += &format!("UNSTABLE: {}\n  {command}\n", told(failure));
+            failures.push(json!({ "command": command, "cfl": point.case.cfl, "failure": failure }));
+        }
+        text += &format!("{} of {} unstable\n", failures.len(), points.len());
+        terminal::say(&text)?;
+        let passed = failures.is_empty();
+        if let Some(output) = output {
+            output.write(&json!({
+                "schema": "mmsmith.stability/1",
+                "settings": settings(&selection, scheme, extent, Value::Null, scheme.cfl),
+                "criteria": criteria,
+                "samples": points.len(),
+                "seed": options.seed,
+                "failures": failures,
+            }))?;
+        }
+        Ok(passed)
+    })
+}
+
+/// Setting number `sample`.
+fn draw(options: &StabilityOptions, selection: &Selection, sample: usize) -> Result<Point> {
+    let mut random = Random(options.seed.wrapping_add((sample as u64) << 32));
+    let mut last = None;
+    for _ in 0..MOST_DRAWS {
+        let parameters = selection.parameters().iter().map(|(name, value)| {
+            let value = match name.as_str() {
+                // From rounding to beyond the default.
+                "A" => value * 10.0_f64.powf(random.between(-12.0, 0.4)),
+                "nu" => random.between(-0.2, 0.49),
+                "E" | "rho0" => value * 10.0_f64.powf(random.between(-12.0, 12.0)),
+                _ => *value,
+            };
+            (name.clone(), value)
+        });
+        let parameters: Vec<_> = parameters.collect();
+        let ppc = 2 + random.below(3);
+        let cells = 2 + random.below(31);
+        let offset = if random.below(2) == 0 { 0.0 } else { random.between(-0.5, 0.5) };
+        // Up to the limit believed stable, on P-waves; the speeds' ratio is known once the solution is.
+        let share = random.between(0.05, 1.0);
+        let attempt = selection.with(&parameters).and_then(|selection| {
+            let scheme = SchemeOptions {
+                ppc: ppc.max(options.scheme.ppc),
+                offset,
+                ..options.scheme.clone()
+            };
+            let mut point = Point::new(Vec::new(), selection, scheme, cells)?;
+            let unit = mmsmith_verify::p_wave_limit(&point.model.exact, &point.case)?;
+            point.case.cfl = options.scheme.cfl * unit * share;
+            Ok(point)
+        });
+        match attempt {
+            Ok(point) => return Ok(point),
+            Err(error) => last = Some(error),
+        }
+    }
+    match last {
+        Some(error) => Err(error.context("--search: no random setting is admissible")),
+        None => bail!("--search: no settings were drawn"),
+    }
+}
+
+/// The command line that repeats a setting.
+fn command(options: &StabilityOptions, point: &Point) -> String {
+    let Point { scheme, case, .. } = point;
+    let mut text = format!(
+        "mms stability {} --at {:?} --cells {} --ppc {} --offset {:?} --shape {} --integrator {} --start {} --transfer {} \
+         --layout {} --periods {:?} --precision {} --error-multiple {:?} --energy-rate {:?}",
+        options.name,
+        case.cfl,
+        case.cells,
+        scheme.ppc,
+        scheme.offset,
+        word(scheme.shape),
+        word(scheme.integrator),
+        word(scheme.start),
+        scheme.transfer,
+        word(scheme.layout),
+        scheme.periods,
+        word(scheme.precision),
+        options.error_multiple,
+        options.energy_rate,
+    );
+    if scheme.frame == Frame::Total {
+        let (mass, composition) = crate::commands::scheme::echo(scheme);
+        text += &format!(
+            " --frame total --mass {} --composition {composition} --grid {}",
+            word(mass),
+            word(scheme.grid)
+        );
+    }
+    if scheme.cfl_speed == CflSpeed::PWave {
+        text += " --cfl-speed p-wave";
+    }
+    if let Some(extent) = scheme.extent {
+        text += &format!(" --extent {}", word(extent));
+    }
+    for (name, value) in point.selection.parameters() {
+        text += &format!(" --set {name}={value:?}");
+    }
+    text
+}
+
+/// An argument's value as it is typed.
+fn word(value: impl ValueEnum) -> String {
+    value.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+}
+
+/// SplitMix64 (Steele, Lea and Flood, 2014): the same numbers on every machine.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * (self.next() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn below(&mut self, count: usize) -> usize {
+        (self.next() % count as u64) as usize
+    }
+}

@@ -1,0 +1,119 @@
+//! The points of a line or map.
+
+use anyhow::{Context, Result, bail};
+use clap::ValueEnum;
+
+use super::Point;
+use crate::arguments::{Integrator, Precision, SchemeOptions, Shape, StabilityOptions, Start};
+use crate::library::Selection;
+
+/// What a point is made from, while settings are put into it.
+struct Draft {
+    selection: Selection,
+    scheme: SchemeOptions,
+    cells: usize,
+}
+
+/// Every combination of the varied settings' values, the last setting changing fastest.
+pub(super) fn points(options: &StabilityOptions, selection: &Selection) -> Result<Vec<Point>> {
+    if options.over.len() > 2 {
+        bail!("--over: one makes a line and two make a map; {} were given", options.over.len());
+    }
+    for (index, (name, _)) in options.over.iter().enumerate() {
+        if options.over[..index].iter().any(|(earlier, _)| earlier == name) {
+            bail!("--over {name}=... is given twice");
+        }
+    }
+    let mut combinations: Vec<Vec<String>> = vec![Vec::new()];
+    for (_, values) in &options.over {
+        combinations = combinations
+            .iter()
+            .flat_map(|so_far| {
+                values.iter().map(|value| [so_far.as_slice(), std::slice::from_ref(value)].concat())
+            })
+            .collect();
+    }
+    combinations
+        .into_iter()
+        .map(|values| {
+            let (scheme, cells) = (options.scheme.clone(), options.cells);
+            let mut draft = Draft { selection: selection.clone(), scheme, cells };
+            let mut place = String::new();
+            for ((name, _), value) in options.over.iter().zip(&values) {
+                put(&mut draft, name, value).with_context(|| format!("--over {name}={value}"))?;
+                place += &format!("{}{name}={value}", if place.is_empty() { "" } else { ", " });
+            }
+            let Draft { selection, scheme, cells } = draft;
+            let point = Point::new(values, selection, scheme, cells);
+            if place.is_empty() { point } else { point.with_context(|| format!("--over {place}")) }
+        })
+        .collect()
+}
+
+/// Puts one setting in its place.
+fn put(draft: &mut Draft, name: &str, text: &str) -> Result<()> {
+    let number = || match text.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => bail!("'{text}' is not a finite number"),
+    };
+    let count = || match text.parse::<usize>() {
+        Ok(value) if value > 0 => Ok(value),
+        _ => bail!("'{text}' is not a whole number, at least 1"),
+    };
+    let scheme = &mut draft.scheme;
+    match name {
+        "cells" => draft.cells = count()?,
+        "ppc" => scheme.ppc = count()?,
+        "offset" => scheme.offset = number()?,
+        "periods" => scheme.periods = number()?,
+        "precision" => scheme.precision = word::<Precision>(text)?,
+        "shape" => scheme.shape = word::<Shape>(text)?,
+        "integrator" => scheme.integrator = word::<Integrator>(text)?,
+        "start" => scheme.start = word::<Start>(text)?,
+        "units" => {
+            let power = text.parse::<i32>().ok().filter(|power| power.abs() <= 100);
+            let power =
+                power.context("it must be a whole number from -100 to 100: powers of two")?;
+            draft.selection = in_units(&draft.selection, power)?;
+        }
+        _ => {
+            let parameter = if name == "amplitude" { "A" } else { name };
+            draft.selection = draft.selection.with(&[(parameter.to_owned(), number()?)])?;
+        }
+    }
+    Ok(())
+}
+
+fn word<V: ValueEnum>(text: &str) -> Result<V> {
+    let known = || {
+        let values = V::value_variants().iter().filter_map(ValueEnum::to_possible_value);
+        values.map(|value| value.get_name().to_owned()).collect::<Vec<_>>().join(", ")
+    };
+    match V::from_str(text, false) {
+        Ok(value) => Ok(value),
+        Err(_) => bail!("'{text}' is none of {}", known()),
+    }
+}
+
+/// The same problem in other units: times are `2^power` as large, masses `2^(5 power)`, and lengths `2^power` where the
+/// length that a cell count divides is among the parameters, as L.
+fn in_units(selection: &Selection, power: i32) -> Result<Selection> {
+    let units = selection.units();
+    let length = if units.contains_key("L") { power } else { 0 };
+    let (mass, time) = (5 * power, power);
+    let mut values = Vec::new();
+    for (name, value) in selection.parameters() {
+        let unit = units.get(name).map_or("", String::as_str);
+        let exponent = match unit {
+            "" => 0,
+            "m" => length,
+            "1/m" => -length,
+            "s" => time,
+            "Pa" => mass - length - 2 * time,
+            "kg/m^3" => mass - 3 * length,
+            _ => bail!("the unit '{unit}' of {name} is not known here"),
+        };
+        values.push((name.clone(), value * 2.0_f64.powi(exponent)));
+    }
+    selection.with(&values)
+}

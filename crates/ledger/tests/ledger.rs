@@ -1,0 +1,298 @@
+//! Ledgers as studies use them: killed, damaged, shared, and on a full disk.
+// Helpers may unwrap and print as tests do.
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use mmsmith_ledger::{Claim, Ledger};
+use serde_json::{Value, json};
+
+const FOLDER: &str = "MMSMITH_LEDGER_FOLDER";
+/// While this file is there, children wait.
+const GATE: &str = "gate";
+/// Cases of the children's study.
+const CASES: u64 = 400;
+
+fn key(case: u64) -> Value {
+    json!({ "case": case, "cfl": 0.1 * case as f64 })
+}
+
+fn value(case: u64) -> Value {
+    json!({ "error": 1.0 / (case as f64 + 3.0), "text": "x".repeat((case % 7) as usize * 300) })
+}
+
+/// Finishes what it can of the study, naming each case that it finished itself.
+fn work(folder: &Path) {
+    let ledger = Ledger::open(folder).unwrap();
+    for case in 0..CASES {
+        if let Claim::Mine(mine) = ledger.claim(&key(case)).unwrap() {
+            mine.finish(&value(case)).unwrap();
+            println!("finished {case}");
+        }
+    }
+}
+
+/// Runs in children only.
+#[test]
+#[ignore = "is started by other tests, in processes of its own"]
+fn child() {
+    let Some(folder) = std::env::var_os(FOLDER) else { return };
+    let folder = Path::new(&folder);
+    while folder.join(GATE).exists() {
+        std::thread::yield_now();
+    }
+    work(folder);
+}
+
+fn start(folder: &Path) -> Child {
+    Command::new(std::env::current_exe().unwrap())
+        .args(["--exact", "child", "--ignored", "--nocapture"])
+        .env(FOLDER, folder)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap()
+}
+
+/// The cases that a child named before its end.
+fn named(child: &mut Child) -> Vec<u64> {
+    let said = BufReader::new(child.stdout.take().unwrap());
+    // The test harness writes its own words in front of the first line.
+    let case = |line: String| line.split("finished ").nth(1).and_then(|case| case.parse().ok());
+    said.lines().map_while(Result::ok).filter_map(case).collect()
+}
+
+/// The keys of all lines, which must be whole.
+fn lines(folder: &Path) -> Vec<Value> {
+    let text = fs::read_to_string(folder.join("cases.jsonl")).unwrap();
+    let whole = text.lines().filter(|line| !line.trim().is_empty());
+    whole.map(|line| serde_json::from_str::<Value>(line).unwrap()["key"].take()).collect()
+}
+
+fn assert_complete(folder: &Path) {
+    let ledger = Ledger::open(folder).unwrap();
+    assert_eq!(ledger.take_damaged(), []);
+    for case in 0..CASES {
+        assert!(matches!(ledger.claim(&key(case)).unwrap(), Claim::Done(v) if v == value(case)));
+    }
+    let mut found: Vec<_> = lines(folder).iter().map(|key| key["case"].as_u64().unwrap()).collect();
+    found.sort_unstable();
+    assert_eq!(found, (0..CASES).collect::<Vec<_>>(), "each case once");
+}
+
+#[test]
+fn killed_at_thirty_moments_it_loses_no_finished_case_and_doubles_none() {
+    let place = tempfile::tempdir().unwrap();
+    let mut finished = Vec::new();
+    for round in 0..30_u64 {
+        // With some cases finished, starting again takes a child longer than the wait.
+        if finished.len() as u64 == CASES {
+            fs::remove_dir_all(place.path()).unwrap();
+            finished.clear();
+        }
+        let mut child = start(place.path());
+        let mut said = child.stdout.take().unwrap();
+        // The moment counts from the child's first word, or it would often be before its first case.
+        let mut first = [0; 1];
+        let _ = said.read(&mut first);
+        std::thread::sleep(Duration::from_micros(round * 7919 % 12_000));
+        child.kill().unwrap();
+        child.wait().unwrap();
+        child.stdout = Some(said);
+        finished.extend(named(&mut child));
+        let ledger = Ledger::open(place.path()).unwrap();
+        for &case in &finished {
+            let claim = ledger.claim(&key(case)).unwrap();
+            assert!(matches!(claim, Claim::Done(v) if v == value(case)), "case {case} is lost");
+        }
+        // A case may be finished and not named yet; no other one is.
+        assert!(ledger.finished().unwrap() >= finished.len());
+        let mut keys: Vec<_> = lines(place.path()).iter().map(Value::to_string).collect();
+        let count = keys.len();
+        keys.sort();
+        keys.dedup();
+        assert_eq!(keys.len(), count, "a case is there twice");
+        finished = keys
+            .iter()
+            .map(|key| serde_json::from_str::<Value>(key).unwrap()["case"].as_u64().unwrap())
+            .collect();
+    }
+    work(place.path());
+    assert_complete(place.path());
+}
+
+#[test]
+fn processes_side_by_side_share_the_cases() {
+    let place = tempfile::tempdir().unwrap();
+    let gate = place.path().join(GATE);
+    fs::write(&gate, "").unwrap();
+    let mut children = [start(place.path()), start(place.path()), start(place.path())];
+    for child in &mut children {
+        // Its first word: it has started.
+        child.stdout.as_mut().unwrap().read_exact(&mut [0; 1]).unwrap();
+    }
+    fs::remove_file(gate).unwrap();
+    let mut shares: Vec<_> = children.iter_mut().map(named).collect();
+    for child in &mut children {
+        assert!(child.wait().unwrap().success());
+    }
+    let mut all = shares.concat();
+    all.sort_unstable();
+    assert_eq!(all, (0..CASES).collect::<Vec<_>>(), "each case by one of them");
+    assert_complete(place.path());
+    shares.retain(|share| !share.is_empty());
+    assert!(shares.len() > 1, "they did not run side by side");
+}
+
+#[test]
+fn a_case_is_taken_while_another_is_at_it_and_free_when_that_one_is_gone() {
+    let place = tempfile::tempdir().unwrap();
+    let [one, other] = [(); 2].map(|()| Ledger::open(place.path()).unwrap());
+    let Claim::Mine(mine) = one.claim(&key(1)).unwrap() else { panic!("it is free") };
+    assert!(matches!(other.claim(&key(1)).unwrap(), Claim::Taken));
+    assert!(matches!(one.claim(&key(1)).unwrap(), Claim::Taken), "nor twice in one process");
+    drop(mine);
+    let Claim::Mine(mine) = other.claim(&key(1)).unwrap() else { panic!("it is free again") };
+    mine.finish(&value(1)).unwrap();
+    assert!(matches!(one.claim(&key(1)).unwrap(), Claim::Done(v) if v == value(1)));
+    // The order of a key's members says nothing.
+    let turned: Value = serde_json::from_str(r#"{ "cfl": 0.1, "case": 1 }"#).unwrap();
+    assert!(matches!(one.claim(&turned).unwrap(), Claim::Done(_)));
+}
+
+#[test]
+fn a_case_is_alone_unless_another_was_under_way() {
+    let place = tempfile::tempdir().unwrap();
+    let [one, other] = [(); 2].map(|()| Ledger::open(place.path()).unwrap());
+    let mine = |ledger: &'static str, claim| match claim {
+        Claim::Mine(case) => case,
+        _ => panic!("{ledger}: not free"),
+    };
+    let first = mine("one", one.claim(&key(1)).unwrap());
+    assert!(first.alone().unwrap());
+    let second = mine("other", other.claim(&key(2)).unwrap());
+    assert!(!first.alone().unwrap() && !second.alone().unwrap());
+    second.finish(&value(2)).unwrap();
+    assert!(!first.alone().unwrap(), "another was finished in the meantime");
+    first.finish(&value(1)).unwrap();
+    let third = mine("one", one.claim(&key(3)).unwrap());
+    assert!(third.alone().unwrap());
+}
+
+#[test]
+fn damaged_lines_are_named_set_aside_and_free_again() {
+    let place = tempfile::tempdir().unwrap();
+    work(place.path());
+    let file = place.path().join("cases.jsonl");
+    let whole = fs::read_to_string(&file).unwrap();
+    let mut lines: Vec<Vec<u8>> = whole.lines().map(|line| line.as_bytes().to_vec()).collect();
+    let digit = lines[10].len() - 4;
+    lines[10][digit] ^= 1;
+    lines[20] = b"{\"key\":{\"case\":20},\"value\":1}".to_vec();
+    lines[30].truncate(40);
+    lines[40] = vec![0, 159, 146, 150, 0];
+    let mut both = lines[51].clone();
+    both.extend_from_slice(&lines[50]);
+    lines[50] = both;
+    lines.push(lines[60].clone());
+    let mut bytes = lines.join(&b'\n');
+    bytes.extend_from_slice(b"\n{\"sha256\":\"0011");
+    fs::write(&file, bytes).unwrap();
+
+    let ledger = Ledger::open(place.path()).unwrap();
+    let damaged = ledger.take_damaged();
+    let numbers: Vec<_> = damaged.iter().map(|damage| damage.line).collect();
+    assert_eq!(numbers, [11, 21, 31, 41, 51, 402]);
+    assert!(damaged.iter().all(|damage| damage.file == file));
+    assert!(damaged[0].problem.contains("checksum does not fit"), "{damaged:?}");
+    assert!(damaged[1].problem.contains("does not start with a checksum"), "{damaged:?}");
+    assert!(damaged[5].problem.contains("cut short"), "{damaged:?}");
+    let aside = fs::read_to_string(ledger.damaged_file()).unwrap();
+    assert_eq!(aside.lines().count(), 6);
+    let kept: Value = serde_json::from_str(aside.lines().nth(1).unwrap()).unwrap();
+    assert_eq!(kept["line"], 21);
+    assert_eq!(kept["text"], "{\"key\":{\"case\":20},\"value\":1}");
+
+    for case in 0..CASES {
+        let free = matches!(ledger.claim(&key(case)).unwrap(), Claim::Mine(_));
+        // The line of 51 stands behind the one that swallowed its copy.
+        assert_eq!(free, [10, 20, 30, 40, 50].contains(&case), "case {case}");
+    }
+    // Each is set aside once, and what is computed anew is kept.
+    assert_eq!(Ledger::open(place.path()).unwrap().take_damaged(), []);
+    work(place.path());
+    fs::write(&file, fs::read_to_string(&file).unwrap().replacen(&"x".repeat(300), "y", 1))
+        .unwrap();
+    assert_eq!(Ledger::open(place.path()).unwrap().take_damaged().len(), 1);
+}
+
+#[test]
+fn a_line_cut_short_by_another_process_is_met_before_the_next_is_written() {
+    let place = tempfile::tempdir().unwrap();
+    let ledger = Ledger::open(place.path()).unwrap();
+    let Claim::Mine(mine) = ledger.claim(&key(0)).unwrap() else { panic!("it is free") };
+    let file = place.path().join("cases.jsonl");
+    let append = |text: &[u8]| {
+        let mut file: File = OpenOptions::new().append(true).open(&file).unwrap();
+        file.write_all(text).unwrap();
+    };
+    append(b"{\"sha256\":\"00");
+    mine.finish(&value(0)).unwrap();
+    let damaged = ledger.take_damaged();
+    assert_eq!(damaged.len(), 1);
+    assert_eq!(damaged[0].line, 1);
+    assert_eq!(lines(place.path()), [key(0)]);
+    let again = Ledger::open(place.path()).unwrap();
+    assert!(again.take_damaged().is_empty() && again.finished().unwrap() == 1);
+}
+
+/// Runs in a child whose files may not grow beyond some kilobytes.
+#[test]
+#[ignore = "is started by the other test, in a process of its own"]
+fn child_on_a_full_disk() {
+    let Some(folder) = std::env::var_os(FOLDER) else { return };
+    let ledger = Ledger::open(Path::new(&folder)).unwrap();
+    let finish = |case: u64, value: &Value| {
+        let Claim::Mine(mine) = ledger.claim(&key(case)).unwrap() else { panic!("it is free") };
+        mine.finish(value)
+    };
+    finish(0, &value(0)).unwrap();
+    let message = finish(1, &json!("x".repeat(100_000))).unwrap_err().to_string();
+    assert!(message.contains("cannot write") && message.contains("cases.jsonl"), "{message}");
+    // Less fits still, and the case is free.
+    finish(1, &value(1)).unwrap();
+}
+
+#[cfg(unix)]
+#[test]
+fn a_full_disk_costs_the_case_that_met_it_and_no_other() {
+    let place = tempfile::tempdir().unwrap();
+    // The signal would end the process; ignored, the limit becomes an error of the write, as a full disk is.
+    let output = Command::new("sh")
+        .args([
+            "-c",
+            r#"trap '' XFSZ; ulimit -f 8; exec "$0" --exact child_on_a_full_disk --ignored"#,
+        ])
+        .arg(std::env::current_exe().unwrap())
+        .env(FOLDER, place.path())
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success() && said.contains("1 passed"), "{said}");
+    let ledger = Ledger::open(place.path()).unwrap();
+    assert_eq!(ledger.take_damaged(), []);
+    assert_eq!(lines(place.path()), [key(0), key(1)]);
+}
+
+#[test]
+fn a_folder_that_cannot_be_is_named() {
+    let place = tempfile::tempdir().unwrap();
+    let file = place.path().join("file");
+    fs::write(&file, "mine").unwrap();
+    let message = Ledger::open(&file).unwrap_err().to_string();
+    assert!(message.contains("cannot make the folder") && message.contains("file"), "{message}");
+}

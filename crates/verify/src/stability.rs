@@ -1,0 +1,607 @@
+//! The largest stable time step of a scheme.
+//!
+//! A run is unstable from the first step at which one of these holds:
+//!
+//! - the solver gives up: a particle is turned inside out (`J <= 0`), is not finite, has left the grid, or has grown
+//!   beyond what its weights support;
+//! - the largest error of `u` is more than `error_multiple` times that of a reference run, which has the same grid and an
+//!   eighth of the time step that P-waves in the undeformed solid would allow, or not a number. Errors below the floor of
+//!   rounding do not count;
+//! - the energy, kinetic and strain, is larger than that of the exact motion at the same time by more than `energy_rate`
+//!   times the exact motion's largest energy, for each period, and by more than the reference run's energy ever differs
+//!   beyond that. (The body force does work, so the energy of the exact motion is not constant, and a coarse grid whose
+//!   waves have another speed gains and loses energy at any time step.) Energy lost is inaccuracy and not instability.
+//!
+//! Steps are not shortened to end at the end time, as those of other studies are, or on coarse grids few CFL numbers would
+//! be left. A run has the length of its periods, and at least that of 64 cells at the speed that the CFL number refers to,
+//! so that an instability has steps to grow in.
+
+use mmsmith_mpm::{BodyForce, Material, Particles, StepError};
+use mmsmith_solutions::{AnySolution, Real, Solution};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::case::{Arithmetic, Case, CaseError, law, set_up};
+use crate::general::Precision;
+use crate::plan::{MOST_STEPS, plan, prepare};
+use crate::scene::Scene;
+use crate::solver::Solver;
+use crate::total::{self, CflSpeed, Frame};
+
+/// When a run counts as unstable.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Criteria {
+    /// Errors of `u` beyond this multiple of the reference run's.
+    pub error_multiple: f64,
+    /// Energy gained per period, in units of the exact motion's largest energy.
+    pub energy_rate: f64,
+}
+
+impl Default for Criteria {
+    /// Ten: below the limit of centred differences the error changes by less than a factor of 2 with the time step, and
+    /// errors of first order in time grow by up to 8 between the reference and the limit; beyond it errors grow by
+    /// factors from step to step. One: as much energy again as there is.
+    fn default() -> Self {
+        Self { error_multiple: 10.0, energy_rate: 1.0 }
+    }
+}
+
+/// How to look for the limit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Search {
+    /// A CFL number to start from, hopefully stable; an eighth of P-waves' where nothing is said.
+    pub lower: Option<f64>,
+    /// One that is hopefully unstable; P-waves' own where nothing is said.
+    pub upper: Option<f64>,
+    /// How close the stable and the unstable end come, as a CFL number of P-waves, which is never smaller than that of
+    /// bar waves.
+    pub width: f64,
+    /// When a run counts as unstable.
+    pub criteria: Criteria,
+}
+
+/// What was unstable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FailureKind {
+    /// `J <= 0`; the value is J.
+    Inverted,
+    /// A position or deformation gradient is not finite.
+    NotFinite,
+    /// A particle left the grid; the value is its coordinate.
+    LeftGrid,
+    /// A particle's box is larger than its weights support; the value is its half-size.
+    TooLarge,
+    /// The error of `u` is above the limit.
+    Error,
+    /// The energy gained, in units of the exact motion's largest, is above the limit.
+    Energy,
+}
+
+/// When and where a run became unstable.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Failure {
+    /// What.
+    pub kind: FailureKind,
+    /// The step, from 1.
+    pub step: u64,
+    /// Its time.
+    pub time: f64,
+    /// The particle; none for the energy of all.
+    pub particle: Option<usize>,
+    /// The value that gave it away; none where it is not a finite number.
+    pub value: Option<f64>,
+    /// What that value was held against.
+    pub limit: Option<f64>,
+}
+
+/// What one run showed until its end, or until it became unstable.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Observed {
+    /// The CFL number.
+    pub cfl: f64,
+    /// Steps done.
+    pub steps: u64,
+    /// The largest error of `u`, a length.
+    pub error: Option<f64>,
+    /// The largest difference between the energy and that of the exact motion, gain or loss, in units of the exact
+    /// motion's largest.
+    pub energy_drift: Option<f64>,
+    /// The largest difference between the momentum and that of the exact motion, in units of the largest sum of all
+    /// particles' exact momenta's magnitudes.
+    pub momentum_drift: Option<f64>,
+    /// How it became unstable, if it did.
+    pub failure: Option<Failure>,
+}
+
+/// The limit of one case.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StabilityRow {
+    /// The largest CFL number that was found stable; none where every one tried was unstable, or every one stable.
+    pub cfl_max: Option<f64>,
+    /// The ends that the search came to: stable, unstable.
+    pub bracket: [Option<f64>; 2],
+    /// `cfl_max` as a CFL number of P-waves in the undeformed solid.
+    pub p_wave_cfl: Option<f64>,
+    /// The CFL number at which that of P-waves is one: what linear analysis of a grid would allow.
+    pub p_wave_limit: f64,
+    /// How the run at the unstable end failed.
+    pub failure: Option<Failure>,
+    /// The reference run.
+    pub reference: Observed,
+    /// The run at the stable end.
+    pub at_limit: Option<Observed>,
+    /// Runs below the limit that were unstable all the same.
+    pub unstable_below: Vec<Observed>,
+    /// Number of runs.
+    pub runs: usize,
+}
+
+/// The reference run's CFL number for P-waves.
+const REFERENCE: f64 = 0.125;
+/// How often the bracket is widened at either end, and by what factor.
+const MOST_WIDENINGS: usize = 6;
+const WIDENING: f64 = 1.5;
+/// Where below the limit runs are tried again: bisection takes for granted that they are stable.
+const PROBES: [f64; 4] = [0.95, 0.85, 0.7, 0.5];
+/// The least length of a run, in times that waves take to cross a cell.
+const LEAST_CELLS: f64 = 64.0;
+/// Rounding errors of `u` are a random walk; what is far above its length is not rounding.
+const FLOOR: f64 = 100.0;
+/// Times within a period at which the exact motion's energy is looked at for its largest.
+const MOMENTS: usize = 16;
+
+/// Looks for the largest stable CFL number of `case` by bisection; its own CFL number does not matter.
+///
+/// `progress` is told the number of runs done.
+///
+/// # Errors
+///
+/// [`CaseError`] for settings that cannot be run.
+pub fn stability(
+    exact: &AnySolution<f64>,
+    arithmetic: Arithmetic<'_>,
+    case: &Case,
+    search: &Search,
+    progress: &mut dyn FnMut(usize),
+) -> Result<StabilityRow, CaseError> {
+    let bench = Bench::new(exact, arithmetic, case)?;
+    let mut runs = 0;
+    let reference = bench.reference()?;
+    let limits = bench.limits(&search.criteria, &reference);
+    let mut attempt = |cfl: f64| -> Result<Observed, CaseError> {
+        runs += 1;
+        progress(runs);
+        bench.run(cfl, Some(&limits))
+    };
+    let unit = bench.p_wave_limit;
+    let mut stable: Option<Observed> = None;
+    let mut unstable: Option<Observed> = None;
+    let start = search.lower.unwrap_or(REFERENCE * unit);
+    let mut cfl = start;
+    for _ in 0..=MOST_WIDENINGS {
+        let found = attempt(cfl)?;
+        if found.failure.is_none() {
+            stable = Some(found);
+            break;
+        }
+        unstable = Some(found);
+        cfl /= 2.0;
+    }
+    if stable.is_some() && unstable.is_none() {
+        let mut cfl = search.upper.unwrap_or(unit).max(start * WIDENING);
+        for _ in 0..=MOST_WIDENINGS {
+            let found = attempt(cfl)?;
+            if found.failure.is_some() {
+                unstable = Some(found);
+                break;
+            }
+            stable = Some(found);
+            cfl *= WIDENING;
+        }
+    }
+    while let (Some(low), Some(high)) = (&stable, &unstable)
+        && high.cfl - low.cfl > search.width * unit
+    {
+        let found = attempt(0.5 * (low.cfl + high.cfl))?;
+        let end = if found.failure.is_none() { &mut stable } else { &mut unstable };
+        *end = Some(found);
+    }
+    let mut unstable_below = Vec::new();
+    if let (Some(limit), Some(_)) = (&stable, &unstable) {
+        let limit = limit.cfl;
+        for share in PROBES {
+            let found = attempt(share * limit)?;
+            if found.failure.is_some() {
+                unstable_below.push(found);
+            }
+        }
+    }
+    let cfl_max = stable.as_ref().filter(|_| unstable.is_some()).map(|stable| stable.cfl);
+    Ok(StabilityRow {
+        cfl_max,
+        bracket: [&stable, &unstable].map(|end| end.as_ref().map(|end| end.cfl)),
+        p_wave_cfl: cfl_max.map(|cfl| cfl / unit),
+        p_wave_limit: unit,
+        failure: unstable.and_then(|unstable| unstable.failure),
+        reference,
+        at_limit: stable,
+        unstable_below,
+        runs: runs + 1,
+    })
+}
+
+/// One run of `case` at its own CFL number, held against the reference run.
+///
+/// # Errors
+///
+/// [`CaseError`] for settings that cannot be run.
+pub fn is_stable(
+    exact: &AnySolution<f64>,
+    arithmetic: Arithmetic<'_>,
+    case: &Case,
+    criteria: &Criteria,
+) -> Result<Observed, CaseError> {
+    let bench = Bench::new(exact, arithmetic, case)?;
+    let limits = bench.limits(criteria, &bench.reference()?);
+    bench.run(case.cfl, Some(&limits))
+}
+
+/// The CFL number at which P-waves in the undeformed solid cross one cell in one step.
+///
+/// # Errors
+///
+/// [`CaseError`] for settings that cannot be run.
+pub fn p_wave_limit(exact: &AnySolution<f64>, case: &Case) -> Result<f64, CaseError> {
+    Ok(Bench::new(exact, Arithmetic::Double, case)?.p_wave_limit)
+}
+
+/// A case without its CFL number.
+struct Bench<'a> {
+    exact: &'a AnySolution<f64>,
+    arithmetic: Arithmetic<'a>,
+    case: Case,
+    /// The CFL number at which that of P-waves is one.
+    p_wave_limit: f64,
+    /// The length of a run.
+    end: f64,
+    /// What rounding may do to `u`.
+    floor: f64,
+}
+
+/// What a run is held against.
+struct Limits {
+    error: f64,
+    energy_rate: f64,
+    /// The reference run's largest difference of energy.
+    energy_drift: f64,
+    /// The case's period.
+    period: f64,
+    /// Energies are not looked at where rounding could change them by this share of their largest.
+    strain_floor: f64,
+}
+
+impl<'a> Bench<'a> {
+    fn new(
+        exact: &'a AnySolution<f64>,
+        arithmetic: Arithmetic<'a>,
+        case: &Case,
+    ) -> Result<Self, CaseError> {
+        let usual = Case { cfl: 0.5, ..*case };
+        let plan = plan(exact, arithmetic, &usual)?;
+        let (p_wave_limit, end) = match exact {
+            AnySolution::One(s) => scales(s.as_ref(), &usual),
+            AnySolution::Two(s) => scales(s.as_ref(), &usual),
+            AnySolution::Three(s) => scales(s.as_ref(), &usual),
+            _ => Err(CaseError::Dimension),
+        }?;
+        Ok(Self {
+            exact,
+            arithmetic,
+            case: *case,
+            p_wave_limit,
+            end,
+            floor: FLOOR * plan.round_off,
+        })
+    }
+
+    /// The run that errors are compared with; its time step is halved until it is through.
+    fn reference(&self) -> Result<Observed, CaseError> {
+        let mut cfl = REFERENCE * self.p_wave_limit;
+        loop {
+            let found = self.run(cfl, None)?;
+            if found.failure.is_none() || cfl < REFERENCE / 8.0 * self.p_wave_limit {
+                return Ok(found);
+            }
+            cfl /= 2.0;
+        }
+    }
+
+    fn limits(&self, criteria: &Criteria, reference: &Observed) -> Limits {
+        let error = criteria.error_multiple * reference.error.unwrap_or(f64::NAN);
+        let period = match self.exact {
+            AnySolution::One(s) => s.period(),
+            AnySolution::Two(s) => s.period(),
+            AnySolution::Three(s) => s.period(),
+            _ => self.end,
+        };
+        Limits {
+            // Without a reference no error is too large.
+            error: if error.is_nan() || reference.failure.is_some() {
+                f64::INFINITY
+            } else {
+                error.max(self.floor)
+            },
+            energy_rate: criteria.energy_rate,
+            energy_drift: reference.energy_drift.unwrap_or(0.0),
+            period,
+            strain_floor: self.floor,
+        }
+    }
+
+    fn run(&self, cfl: f64, limits: Option<&Limits>) -> Result<Observed, CaseError> {
+        use AnySolution::{One, Three, Two};
+        let case = Case { cfl, ..self.case };
+        let end = self.end;
+        match (self.exact, self.arithmetic) {
+            (One(s), Arithmetic::Double) => run_in(s.as_ref(), s.as_ref(), &case, end, limits),
+            (Two(s), Arithmetic::Double) => run_in(s.as_ref(), s.as_ref(), &case, end, limits),
+            (Three(s), Arithmetic::Double) => run_in(s.as_ref(), s.as_ref(), &case, end, limits),
+            (One(s), Arithmetic::Single(One(m))) => {
+                run_in(s.as_ref(), m.as_ref(), &case, end, limits)
+            }
+            (Two(s), Arithmetic::Single(Two(m))) => {
+                run_in(s.as_ref(), m.as_ref(), &case, end, limits)
+            }
+            (Three(s), Arithmetic::Single(Three(m))) => {
+                run_in(s.as_ref(), m.as_ref(), &case, end, limits)
+            }
+            _ => Err(CaseError::Dimension),
+        }
+    }
+}
+
+/// The CFL number at which that of P-waves is one, and the length of a run.
+fn scales<const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    case: &Case,
+) -> Result<(f64, f64), CaseError> {
+    let (scene, _) = prepare(exact, case)?;
+    let speed = case.cfl_speed.of(exact)?;
+    let unit = speed / CflSpeed::PWave.of(exact)?;
+    let periods = case.periods * exact.period();
+    Ok((unit, periods.max(LEAST_CELLS * scene.spacing / speed)))
+}
+
+fn run_in<T: Precision, const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    model: &dyn Solution<T, D>,
+    case: &Case,
+    end: f64,
+    limits: Option<&Limits>,
+) -> Result<Observed, CaseError> {
+    let (scene, _) = prepare(exact, case)?;
+    let longest = case.cfl * scene.spacing / case.cfl_speed.of(exact)?;
+    let time_step: T = Real::nearest(longest);
+    let dt = time_step.to_f64();
+    let count = (end / dt - 1e-9).ceil().max(1.0);
+    if count.is_nan() || count > MOST_STEPS {
+        return Err(CaseError::TooManySteps { end, dt, steps: count });
+    }
+    let run = Run { exact, scene: &scene, cfl: case.cfl, dt, count: count as u64, limits };
+    match &case.frame {
+        Frame::Updated => {
+            let (mut solver, body_force) = set_up(exact, model, case, &scene, time_step)?;
+            run.follow(solver.as_mut(), &body_force)
+        }
+        Frame::Total(scheme) => {
+            if size_of::<T>() != size_of::<f64>() {
+                let (setting, value) = ("precision", "f32".into());
+                let admissible = "f64 in the total frame";
+                return Err(CaseError::Setting { setting, value, admissible });
+            }
+            let (mut solver, body_force) = total::set_up(exact, scheme, case, &scene, dt)?;
+            run.follow(&mut solver, &body_force)
+        }
+    }
+}
+
+/// One run.
+struct Run<'a, const D: usize> {
+    exact: &'a dyn Solution<f64, D>,
+    scene: &'a Scene<D>,
+    cfl: f64,
+    dt: f64,
+    count: u64,
+    limits: Option<&'a Limits>,
+}
+
+/// Sums over all particles at one instant, of the computed state and of the exact one.
+struct Totals<const D: usize> {
+    error: f64,
+    worst: usize,
+    energy: f64,
+    exact_energy: f64,
+    momentum: [f64; D],
+    /// The sum of the magnitudes of the exact momenta.
+    exact_momentum: f64,
+}
+
+impl<const D: usize> Totals<D> {
+    /// Those of no particles, the first of which is to be `worst`.
+    fn of_none(worst: usize) -> Self {
+        let (error, energy, exact_energy, exact_momentum) = (0.0, 0.0, 0.0, 0.0);
+        Self { error, worst, energy, exact_energy, momentum: [0.0; D], exact_momentum }
+    }
+}
+
+impl<const D: usize> Run<'_, D> {
+    fn follow<T: Real>(
+        &self,
+        solver: &mut dyn Solver<T, D>,
+        body_force: &dyn BodyForce<T, D>,
+    ) -> Result<Observed, CaseError> {
+        let lag = solver.velocity_lag();
+        let material = law::<f64>(self.exact.material())?;
+        let scales = self.largest(solver.observe().0, &material);
+        let (mut error, mut energy, mut momentum) = (0.0_f64, 0.0_f64, 0.0_f64);
+        let mut failure = None;
+        let mut steps = 0;
+        for step in 1..=self.count {
+            if let Err(error) = solver.step(body_force) {
+                failure = Some(Failure::from(&error));
+                break;
+            }
+            steps = step;
+            let time = step as f64 * self.dt;
+            let totals = self.totals(solver.observe().0, &material, time, lag);
+            error = error.max(totals.error);
+            let gain = (totals.energy - totals.exact_energy) / scales.0;
+            energy = energy.max(gain.abs());
+            let length = totals.momentum.iter().map(|p| p * p).sum::<f64>().sqrt();
+            momentum = momentum.max(length / scales.1);
+            failure = self.judge(step, time, &totals, gain, scales.0);
+            if failure.is_some() {
+                break;
+            }
+        }
+        let finite = |value: f64| value.is_finite().then_some(value);
+        Ok(Observed {
+            cfl: self.cfl,
+            steps,
+            error: finite(error),
+            energy_drift: finite(energy),
+            momentum_drift: finite(momentum),
+            failure,
+        })
+    }
+
+    fn judge(
+        &self,
+        step: u64,
+        time: f64,
+        totals: &Totals<D>,
+        gain: f64,
+        largest_energy: f64,
+    ) -> Option<Failure> {
+        let finite = |value: f64| value.is_finite().then_some(value);
+        let failure = |kind, particle, value: f64, limit: f64| {
+            let (value, limit) = (finite(value), finite(limit));
+            Some(Failure { kind, step, time, particle, value, limit })
+        };
+        // The reference run, too, ends where it says nothing more.
+        let error = self.limits.map_or(f64::INFINITY, |limits| limits.error).min(self.scene.size);
+        if totals.error > error || totals.error.is_nan() {
+            return failure(FailureKind::Error, Some(totals.worst), totals.error, error);
+        }
+        let limits = self.limits?;
+        let strain = limits.strain_floor / self.scene.spacing;
+        let (lambda, mu) = law::<f64>(self.exact.material()).ok()?.small_strain_moduli();
+        let volume = self.scene.size.powi(D as i32);
+        let counts = largest_energy > (lambda + 2.0 * mu) * volume * strain * strain;
+        let most = limits.energy_drift + limits.energy_rate * (time / limits.period).max(1.0);
+        if counts && gain > most {
+            return failure(FailureKind::Energy, None, gain, most);
+        }
+        None
+    }
+
+    /// The largest energy of the exact motion, and the largest sum of its momenta's magnitudes.
+    fn largest<T: Real>(
+        &self,
+        particles: &Particles<T, D>,
+        material: &Material<f64>,
+    ) -> (f64, f64) {
+        let period = self.exact.period();
+        let mut largest = (0.0_f64, 0.0_f64);
+        for moment in 0..MOMENTS {
+            let time = period * moment as f64 / MOMENTS as f64;
+            let totals = self.totals(particles, material, time, 0.0);
+            largest.0 = largest.0.max(totals.exact_energy);
+            largest.1 = largest.1.max(totals.exact_momentum);
+        }
+        largest
+    }
+
+    /// Sums over fixed groups of particles in order, so that they do not depend on the number of threads.
+    fn totals<T: Real>(
+        &self,
+        particles: &Particles<T, D>,
+        material: &Material<f64>,
+        time: f64,
+        lag: f64,
+    ) -> Totals<D> {
+        const GROUP: usize = 512;
+        let group = |g: usize| {
+            let mut totals = Totals::<D>::of_none(g * GROUP);
+            for p in g * GROUP..particles.len().min((g + 1) * GROUP) {
+                let X = particles.X[p].map(Real::to_f64);
+                let (mass, volume) = (particles.mass[p].to_f64(), particles.volume[p].to_f64());
+                let u = particles.x[p].map(Real::to_f64) - X;
+                let error = (u - self.exact.displacement(&X, time)).norm();
+                if error > totals.error || error.is_nan() {
+                    (totals.error, totals.worst) = (error, p);
+                }
+                let v = particles.v[p].map(Real::to_f64);
+                let exact_v = self.exact.velocity(&X, time - lag);
+                let F = particles.F[p].map(Real::to_f64);
+                let exact_F = self.exact.deformation_gradient(&X, time);
+                // A particle that is inside out has no energy; the solver stops at its next step.
+                let strain = |F| material.strain_energy(F).unwrap_or(f64::NAN);
+                totals.energy += 0.5 * mass * v.norm_squared() + volume * strain(&F);
+                totals.exact_energy +=
+                    0.5 * mass * exact_v.norm_squared() + volume * strain(&exact_F);
+                for axis in 0..D {
+                    totals.momentum[axis] += mass * (v[axis] - exact_v[axis]);
+                }
+                totals.exact_momentum += mass * exact_v.norm();
+            }
+            totals
+        };
+        let groups: Vec<_> =
+            (0..particles.len().div_ceil(GROUP)).into_par_iter().map(group).collect();
+        let mut total = Totals::<D>::of_none(0);
+        for next in groups {
+            if next.error > total.error || next.error.is_nan() {
+                (total.error, total.worst) = (next.error, next.worst);
+            }
+            total.energy += next.energy;
+            total.exact_energy += next.exact_energy;
+            total.exact_momentum += next.exact_momentum;
+            for axis in 0..D {
+                total.momentum[axis] += next.momentum[axis];
+            }
+        }
+        total
+    }
+}
+
+impl From<&StepError> for Failure {
+    fn from(error: &StepError) -> Self {
+        let (kind, step, time, particle, value, limit) = match *error {
+            StepError::Inverted { step, time, particle, J } => {
+                (FailureKind::Inverted, step, time, particle, J, 0.0)
+            }
+            StepError::NotFinite { step, time, particle, J, .. } => {
+                (FailureKind::NotFinite, step, time, particle, J, f64::NAN)
+            }
+            StepError::LeftGrid { step, time, particle, ref position, axis, lower, upper } => {
+                let at = position.get(axis).copied().unwrap_or(f64::NAN);
+                let limit = if at < lower { lower } else { upper };
+                (FailureKind::LeftGrid, step, time, particle, at, limit)
+            }
+            StepError::TooLarge { step, time, particle, half_size, limit, .. } => {
+                (FailureKind::TooLarge, step, time, particle, half_size, limit)
+            }
+        };
+        let finite = |value: f64| value.is_finite().then_some(value);
+        Self {
+            kind,
+            step: step as u64,
+            time,
+            particle: Some(particle),
+            value: finite(value),
+            limit: finite(limit),
+        }
+    }
+}
