@@ -4,9 +4,11 @@ use std::array;
 
 use nalgebra::{RealField, SMatrix, SVector};
 
+use crate::fault::{Fault, Planted};
 use crate::material::Law;
 use crate::simd::{Loop, dispatch};
 use crate::step::Constants;
+use crate::tensor::real;
 use crate::transfer::{Deposit, Gathered, Node, Weights, gather, scatter};
 use crate::weights::{Rule, WideWeights, is_wide};
 
@@ -29,13 +31,14 @@ pub(crate) struct Block<T, const D: usize, const W: usize> {
     l: [Row<T>; D],
     /// Whether any particle's box takes more nodes than the rule's usual ones.
     any_wide: bool,
+    planted: Planted,
     base: [Row<i32>; D],
     S: [[Row<T>; W]; D],
     G: [[Row<T>; W]; D],
 }
 
 impl<T: RealField + Copy, const D: usize, const W: usize> Block<T, D, W> {
-    pub(crate) fn new() -> Self {
+    pub(crate) fn new(planted: Planted) -> Self {
         let zero = [T::zero(); BLOCK];
         Self {
             xi: [zero; D],
@@ -45,6 +48,7 @@ impl<T: RealField + Copy, const D: usize, const W: usize> Block<T, D, W> {
             }),
             l: [zero; D],
             any_wide: false,
+            planted,
             base: [[0; BLOCK]; D],
             S: [[zero; W]; D],
             G: [[zero; W]; D],
@@ -84,14 +88,33 @@ impl<T: RealField + Copy, const D: usize, const W: usize> Block<T, D, W> {
     }
 
     /// Turns deformation gradients into Kirchhoff stresses.
-    pub(crate) fn stress<L: Law<T>>(&mut self, law: L) {
-        dispatch(Stress { tensors: &mut self.tensors, law });
+    pub(crate) fn stress<L: Law<T>>(&mut self, c: &Constants<T, D>, law: L) {
+        dispatch(Stress { tensors: &mut self.tensors, law, planted: c.planted });
+    }
+
+    /// A planted fault: particles in the last cell of an axis forget the last node they reach along it.
+    pub(crate) fn skip_last_node(&mut self, upper: &[T; D]) {
+        for a in 0..D {
+            for k in (0..BLOCK).filter(|&k| self.xi[a][k] >= upper[a] - T::one()) {
+                (self.S[a][W - 1][k], self.G[a][W - 1][k]) = (T::zero(), T::zero());
+            }
+        }
     }
 
     /// The stress of particle `k`, or F until it has been asked for.
     #[inline(always)]
     pub(crate) fn tensor(&self, k: usize) -> SMatrix<T, D, D> {
         SMatrix::from_fn(|i, j| self.tensors[i][j][k])
+    }
+
+    /// `F_aa` of particle `k`, which tells the size of its box.
+    #[inline(always)]
+    fn stretch(&self, a: usize, k: usize) -> T {
+        if self.planted.is(Fault::SizeFromJacobian) {
+            let J = (0..D).fold(T::one(), |product, i| product * self.tensors[i][i][k]);
+            return J.powf(real(1.0 / D as f64));
+        }
+        self.tensors[a][a][k]
     }
 
     /// Position and half-sizes of a particle whose box takes more than the usual nodes.
@@ -208,7 +231,7 @@ where
         let mut any_wide = false;
         for a in 0..D {
             for k in 0..BLOCK {
-                let l = rule.half_size(a, block.tensors[a][a][k]);
+                let l = rule.half_size(a, block.stretch(a, k));
                 any_wide |= is_wide(l);
                 block.l[a][k] = l;
                 let weights = R::along_axis(block.xi[a][k], l);
@@ -292,15 +315,16 @@ fn gather_wide<T: RealField + Copy, const D: usize>(
 struct Stress<'a, T, L, const D: usize> {
     tensors: &'a mut [[Row<T>; D]; D],
     law: L,
+    planted: Planted,
 }
 
 impl<T: RealField + Copy, L: Law<T>, const D: usize> Loop for Stress<'_, T, L, D> {
     #[inline(always)]
     fn run(self) {
-        let Self { tensors, law } = self;
+        let Self { tensors, law, planted } = self;
         for k in 0..BLOCK {
             let F = SMatrix::<T, D, D>::from_fn(|i, j| tensors[i][j][k]);
-            let tau = law.kirchhoff(&F);
+            let tau = planted.stress_in_forces(law.kirchhoff(&F), &F);
             for i in 0..D {
                 for j in 0..D {
                     tensors[i][j][k] = tau[(i, j)];

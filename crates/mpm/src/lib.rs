@@ -54,6 +54,8 @@ mod bands;
 mod block;
 mod body_force;
 mod error;
+#[doc(hidden)]
+pub mod fault;
 pub mod general;
 mod grid;
 mod material;

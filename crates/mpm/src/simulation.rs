@@ -8,6 +8,7 @@ use nalgebra::{RealField, SMatrix, SVector};
 use crate::bands::Bands;
 use crate::body_force::BodyForce;
 use crate::error::{SetupError, StepError};
+use crate::fault::Fault;
 use crate::grid::{Grid, Layout};
 use crate::material::{AnyLaw, Law, Material, NeoHookean, NeoHookeanNoLog};
 use crate::particles::Particles;
@@ -103,7 +104,10 @@ impl<T: RealField + Copy, const D: usize> Simulation<T, D> {
         if let Some(error) = &self.failed {
             return Err(error.clone());
         }
-        let halved = self.settings.halve_first_acceleration && self.steps_done == 0;
+        let planted = self.state.constants.planted;
+        let halved = self.settings.halve_first_acceleration
+            && self.steps_done == 0
+            && !planted.is(Fault::NoHalfStep);
         let scale = if halved { real(0.5) } else { T::one() };
         let t = self.time();
         let outcome = (self.kernel)(&mut self.state, body_force, t, scale);
@@ -309,7 +313,8 @@ where
             with_law(rule, NeoHookeanNoLog { mu }, settings.integrator)
         }
         Material::NeoHookean { lambda, mu } => {
-            with_law(rule, NeoHookean { lambda, mu }, settings.integrator)
+            let planted = state.constants.planted;
+            with_law(rule, NeoHookean { lambda, mu, planted }, settings.integrator)
         }
         other => with_law(rule, AnyLaw(other), settings.integrator),
     };

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use crate::bands::Bands;
 use crate::block::{BLOCK, Block};
 use crate::body_force::BodyForce;
+use crate::fault::{Fault, Planted};
 use crate::grid::{Grid, Layout};
 use crate::material::Law;
 use crate::particles::Particles;
@@ -30,6 +31,7 @@ pub(crate) struct Constants<T, const D: usize> {
     time_step: T,
     /// Nodes with less mass than this are taken to be empty.
     least_mass: T,
+    pub(crate) planted: Planted,
 }
 
 impl<T: RealField + Copy, const D: usize> Constants<T, D> {
@@ -49,6 +51,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
             time_step,
             // Weights below the square of the rounding error only come about by rounding.
             least_mass: least_particle_mass * T::default_epsilon() * T::default_epsilon(),
+            planted: Planted::here(),
         }
     }
 
@@ -61,7 +64,14 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
     /// `(I + dt L) F`, for `L` per cell.
     #[inline(always)]
     fn stretch(&self, L: &SMatrix<T, D, D>, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
-        F + product(&(L * (self.time_step * self.inverse_spacing)), F)
+        let change = L * (self.time_step * self.inverse_spacing);
+        if self.planted.is(Fault::AdditiveStretch) {
+            return F + change;
+        }
+        if self.planted.is(Fault::GradientTransposed) {
+            return F + product(&change.transpose(), F);
+        }
+        F + product(&change, F)
     }
 
     /// The reciprocal of a node's mass, or zero for a node that no particle reaches.
@@ -113,15 +123,45 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
     ) where
         R: Rule<T, D, W>,
     {
-        let mut block = Block::new();
+        let mut block = Block::new(self.planted);
         let mut deposits = [Deposit::zero(); BLOCK];
         for ids in ids.chunks(BLOCK) {
             block.pick(self, ids, x, F);
             level(ids, &mut deposits);
             block.weigh(rule);
+            if self.planted.is(Fault::LastNodeSkipped) {
+                block.skip_last_node(&self.upper_in_cells());
+            }
             slope(&mut block, ids, &mut deposits);
             block.scatter(&self.strides, piece, first, &deposits[..ids.len()]);
         }
+    }
+
+    /// What a node beyond a wall gives to its mirror image.
+    #[inline(always)]
+    fn ghost(&self, mut ghost: Node<T, D>) -> Node<T, D> {
+        if self.planted.is(Fault::GhostMassLost) {
+            ghost.values[2 * D] = T::zero();
+        }
+        ghost
+    }
+
+    /// What a wall across `axis` does to a node on it.
+    #[inline(always)]
+    fn clear(&self, node: &mut Node<T, D>, axis: usize) {
+        let kept = *node;
+        node.clear(axis);
+        if self.planted.is(Fault::WallsKeepVelocity) {
+            node.values[axis] = kept.values[axis];
+        }
+        if self.planted.is(Fault::WallsKeepAcceleration) {
+            node.values[D + axis] = kept.values[D + axis];
+        }
+    }
+
+    /// Number of cells along each axis.
+    fn upper_in_cells(&self) -> [T; D] {
+        self.in_cells(&self.upper)
     }
 
     /// Edge of a cell.
@@ -254,7 +294,7 @@ where
     let Particles { x, v, F, mass, .. } = particles;
     v.par_chunks_mut(CHUNK).zip(x.par_chunks(CHUNK)).zip(F.par_chunks(CHUNK)).for_each(
         |((v, x), F)| {
-            let mut block = Block::new();
+            let mut block = Block::new(c.planted);
             let blocks = v.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK));
             for ((v, x), F) in blocks {
                 block.weigh_run(rule, &c, x, F);
@@ -289,7 +329,7 @@ where
     });
     layout.on_walls(reprojected, Node::clear);
     layout.unfold(reprojected, Node::flipped);
-    let reprojected = &reprojected[..];
+    let reprojected = if c.planted.is(Fault::NoReprojection) { nodes } else { &reprojected[..] };
     let outcome = advance(particles, bands, c, rule, |block, gathered, _, x, _, F| {
         block.gather(&c.strides, nodes, gathered);
         for (x, gathered) in x.iter_mut().zip(&*gathered) {
@@ -378,7 +418,7 @@ where
         .enumerate()
         .map(|(chunk, (((x, v), F), home))| {
             let mut outcome = Outcome::default();
-            let mut block = Block::new();
+            let mut block = Block::new(c.planted);
             let mut gathered = [Gathered::zero(); BLOCK];
             let blocks = x
                 .chunks_mut(BLOCK)
@@ -388,6 +428,11 @@ where
             for (index, (((x, v), F), home)) in blocks.enumerate() {
                 let first = chunk * CHUNK + index * BLOCK;
                 block.weigh_run(rule, &c, x, F);
+                if c.planted.is(Fault::WeightsOfNewPosition) {
+                    let ahead: Vec<_> =
+                        x.iter().zip(&*v).map(|(x, v)| x + v * c.time_step).collect();
+                    block.weigh_run(rule, &c, &ahead, F);
+                }
                 update(&block, &mut gathered[..x.len()], first, x, v, F);
                 let mut all_well = true;
                 dispatch(Check { c: &c, rule, home, x, F, all_well: &mut all_well });
@@ -473,7 +518,10 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         if body_force.is_absent() {
             return;
         }
-        let X = &self.particles.X;
+        let at_current = self.constants.planted.is(Fault::BodyForceAtCurrentPosition);
+        let X = if at_current { &self.particles.x } else { &self.particles.X };
+        let late = self.constants.planted.is(Fault::LateBodyForce);
+        let t = if late { t + self.constants.time_step } else { t };
         self.b.resize(X.len(), SVector::zeros());
         self.b
             .par_chunks_mut(CHUNK)
@@ -492,22 +540,23 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let Self { particles, constants, layout, bands, nodes, b, .. } = self;
         let Particles { x, v, F, mass, volume, .. } = &*particles;
         let c = *constants;
-        let b = (!no_body_force).then_some(&b[..]);
+        let forced = !no_body_force && !c.planted.is(Fault::NoBodyForce);
+        let b = forced.then_some(&b[..]);
         bands.scatter(
             layout,
             nodes,
             |node| *node = Node::zero(),
             |piece, first, ids| {
                 let level = |ids: &[u32], deposits: &mut [Deposit<T, D>; BLOCK]| {
-                    dispatch(GiveLevel { ids, v: Some(v), b, mass, deposits });
+                    dispatch(GiveLevel { c: &c, ids, v: Some(v), b, mass, volume, deposits });
                 };
                 c.scatter(rule, x, F, piece, first, ids, level, |block, ids, deposits| {
-                    block.stress(law);
+                    block.stress(&c, law);
                     dispatch(GiveSlope { c: &c, block, ids, volume, deposits });
                 });
             },
         );
-        layout.fold(nodes, |image, ghost, flip| image.add(&ghost.flipped(flip)));
+        layout.fold(nodes, |image, ghost, flip| image.add(&c.ghost(ghost).flipped(flip)));
     }
 
     /// On the grid: momentum and force to velocity at the end of the step and acceleration.
@@ -528,8 +577,8 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
 
     /// Clears what is normal to walls, and gives nodes beyond them the mirrored values.
     fn apply_walls(&mut self) {
-        let Self { layout, nodes, .. } = self;
-        layout.on_walls(nodes, Node::clear);
+        let Self { layout, nodes, constants: c, .. } = self;
+        layout.on_walls(nodes, |node, axis| c.clear(node, axis));
         layout.unfold(nodes, Node::flipped);
     }
 
@@ -556,7 +605,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
                 c.scatter(rule, x, F, piece, first, ids, give, |_, _, _| {});
             },
         );
-        layout.fold(nodes, |image, ghost, flip| image.add(&ghost.flipped(flip)));
+        layout.fold(nodes, |image, ghost, flip| image.add(&c.ghost(ghost).flipped(flip)));
         nodes.par_chunks_mut(CHUNK).for_each(|nodes| {
             for node in nodes {
                 let inverse = c.inverse_mass(node);
@@ -580,7 +629,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
             .enumerate()
             .map(|(chunk, ((F_next, x), F))| {
                 let mut outcome = Outcome::default();
-                let mut block = Block::new();
+                let mut block = Block::new(c.planted);
                 let blocks = F_next.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK));
                 for (index, ((F_next, x), F)) in blocks.enumerate() {
                     block.weigh_run(rule, &c, x, F);
@@ -612,14 +661,17 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let Self { particles, constants, layout, bands, nodes, b, F_next, .. } = self;
         let Particles { x, F, mass, volume, .. } = &*particles;
         let (c, F_next) = (*constants, &F_next[..]);
-        let b = (!no_body_force).then_some(&b[..]);
+        let forced = !no_body_force && !c.planted.is(Fault::NoBodyForce);
+        let b = forced.then_some(&b[..]);
         bands.scatter(layout, nodes, Node::clear_acceleration, |piece, first, ids| {
             let level = |ids: &[u32], deposits: &mut [Deposit<T, D>; BLOCK]| {
-                dispatch(GiveLevel { ids, v: None, b, mass, deposits });
+                dispatch(GiveLevel { c: &c, ids, v: None, b, mass, volume, deposits });
             };
             c.scatter(rule, x, F, piece, first, ids, level, |block, ids, deposits| {
-                block.pick_F(&c, ids, F_next);
-                block.stress(law);
+                if !c.planted.is(Fault::StressOfOldStretch) {
+                    block.pick_F(&c, ids, F_next);
+                }
+                block.stress(&c, law);
                 dispatch(GiveSlope { c: &c, block, ids, volume, deposits });
             });
         });
@@ -644,21 +696,25 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
 
 /// States what the body force and, if `v` is there, mass and momentum of particles give to the grid.
 struct GiveLevel<'a, T, const D: usize> {
+    c: &'a Constants<T, D>,
     ids: &'a [u32],
     v: Option<&'a [SVector<T, D>]>,
     b: Option<&'a [SVector<T, D>]>,
     mass: &'a [T],
+    volume: &'a [T],
     deposits: &'a mut [Deposit<T, D>; BLOCK],
 }
 
 impl<T: RealField + Copy, const D: usize> Loop for GiveLevel<'_, T, D> {
     #[inline(always)]
     fn run(self) {
-        let Self { ids, v, b, mass, deposits } = self;
+        let Self { c, ids, v, b, mass, volume, deposits } = self;
+        let per_volume = c.planted.is(Fault::BodyForcePerVolume);
         for (deposit, &p) in deposits.iter_mut().zip(ids) {
             let p = p as usize;
             let m = mass[p];
-            let weight = b.map_or(SVector::zeros(), |b| b[p] * m);
+            let weight =
+                b.map_or(SVector::zeros(), |b| b[p] * if per_volume { volume[p] } else { m });
             deposit.level = v.map_or(Node::new(&SVector::zeros(), &weight, T::zero()), |v| {
                 Node::new(&(v[p] * m), &weight, m)
             });
@@ -703,7 +759,14 @@ impl<T: RealField + Copy, const D: usize> Loop for Follow<'_, T, D> {
         let Self { c, gathered, x, v, F } = self;
         for (((x, v), F), gathered) in x.iter_mut().zip(v).zip(F).zip(gathered) {
             *v += gathered.acceleration() * c.time_step;
-            *x += gathered.velocity() * c.time_step;
+            let mut velocity = gathered.velocity();
+            if c.planted.is(Fault::PicForFlip) {
+                *v = velocity;
+            }
+            if c.planted.is(Fault::OwnVelocity) {
+                velocity = *v;
+            }
+            *x += c.planted.change(velocity * c.time_step);
             *F = c.stretch(&gathered.velocity_gradient(), F);
         }
     }

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::time::Instant;
 
+use mmsmith_mpm::fault::{Fault, Planted};
 use mmsmith_mpm::general::{Integrator, Shape, Transfer};
 use mmsmith_mpm::{BodyForce, Particles, Settings, SetupError, Simulation, StepError};
 use mmsmith_solutions::{AnySolution, BodyForceAtPoints, Material, Real, Solution};
@@ -410,8 +411,8 @@ pub(crate) fn set_up<'a, T: Precision, const D: usize>(
 ) -> Result<Driven<'a, T, D>, CaseError> {
     let Some((shape, integrator)) = general::fast_step(case) else {
         let mut solver = T::general(exact, case, scene, time_step)?;
-        let body_force = model.body_force_at(&solver.observe().0.X);
-        return Ok((solver, ExactBodyForce(body_force)));
+        let body_force = ExactBodyForce::new(model, &solver.observe().0.X);
+        return Ok((solver, body_force));
     };
     let grid = scene.grid::<T>();
     let mut particles = scene.particles(&grid, case, exact.density());
@@ -421,7 +422,7 @@ pub(crate) fn set_up<'a, T: Precision, const D: usize>(
     set_in_motion(&mut particles, exact, case, time_step.to_f64());
     let settings =
         Settings { shape, integrator, time_step, halve_first_acceleration: starts_halved(case) };
-    let body_force = ExactBodyForce(model.body_force_at(&particles.X));
+    let body_force = ExactBodyForce::new(model, &particles.X);
     let simulation = Simulation::new(grid, particles, law(model.material())?, settings)?;
     Ok((Box::new(simulation), body_force))
 }
@@ -432,20 +433,40 @@ pub(crate) fn starts_halved(case: &Case) -> bool {
 }
 
 /// The exact body force at the particles; what depends on their reference positions alone is kept.
-pub(crate) struct ExactBodyForce<'a, T: Real, const D: usize>(
-    pub(crate) Box<dyn BodyForceAtPoints<T, D> + 'a>,
-);
+pub(crate) struct ExactBodyForce<'a, T: Real, const D: usize> {
+    kept: Box<dyn BodyForceAtPoints<T, D> + 'a>,
+    model: &'a dyn Solution<T, D>,
+    planted: Planted,
+}
+
+impl<'a, T: Real, const D: usize> ExactBodyForce<'a, T, D> {
+    pub(crate) fn new(model: &'a dyn Solution<T, D>, X: &[SVector<T, D>]) -> Self {
+        Self { kept: model.body_force_at(X), model, planted: Planted::here() }
+    }
+}
 
 impl<T: Real, const D: usize> BodyForce<T, D> for ExactBodyForce<'_, T, D> {
-    fn evaluate(&self, first: usize, _X: &[SVector<T, D>], t: T, b: &mut [SVector<T, D>]) {
-        self.0.evaluate(t, first, b);
+    fn evaluate(&self, first: usize, X: &[SVector<T, D>], t: T, b: &mut [SVector<T, D>]) {
+        if self.planted.is(Fault::BodyForceAtCurrentPosition) {
+            b.iter_mut().zip(X).for_each(|(b, x)| *b = self.model.body_force(x, t));
+            return;
+        }
+        self.kept.evaluate(t, first, b);
     }
 }
 
 /// The solver's hand-written law with the constants of the solution's material.
 pub(crate) fn law<T: Real>(material: Material<T>) -> Result<mmsmith_mpm::Material<T>, SceneError> {
     use mmsmith_mpm::Material as Law;
+    let planted = Planted::here();
     Ok(match material {
+        Material::NeoHookean { lambda, mu } if planted.is(Fault::LambdaForMu) => {
+            Law::NeoHookean { lambda: mu, mu: lambda }
+        }
+        Material::NeoHookean { lambda, mu } if planted.is(Fault::StiffnessOff) => {
+            let factor = T::nearest(1.0 + 1e-6);
+            Law::NeoHookean { lambda: lambda * factor, mu: mu * factor }
+        }
         Material::NeoHookean { lambda, mu } => Law::NeoHookean { lambda, mu },
         Material::StVenantKirchhoff { lambda, mu } => Law::StVenantKirchhoff { lambda, mu },
         Material::Hencky { lambda, mu } => Law::Hencky { lambda, mu },

@@ -186,7 +186,7 @@ pub(crate) fn set_up<'a, const D: usize>(
     let material = law(exact.material())?;
     let mut body = TotalLagrangian::new(grid, total.scheme, material, exact.density(), dt)?;
     let X = body.positions();
-    let body_force = ExactBodyForce(exact.body_force_at(X));
+    let body_force = ExactBodyForce::new(exact, X);
     let u: Vec<_> = X.iter().map(|X| exact.displacement(X, 0.0)).collect();
     let v: Vec<_> = X.iter().map(|X| exact.velocity(X, 0.0)).collect();
     body.start(&u, &v)?;

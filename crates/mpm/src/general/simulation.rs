@@ -10,6 +10,7 @@ use super::settings::{Integrator, Settings, Shape, Transfer};
 use super::stencil::{Entry, Raster, Stencils};
 use crate::body_force::BodyForce;
 use crate::error::{SetupError, StepError};
+use crate::fault::{Fault, Planted};
 use crate::grid::{Grid, Layout};
 use crate::material::Material;
 use crate::particles::Particles;
@@ -32,6 +33,7 @@ pub struct General<const D: usize> {
     work: Work<D>,
     steps_done: usize,
     failed: Option<StepError>,
+    planted: Planted,
 }
 
 /// Arrays that a step works in.
@@ -121,6 +123,7 @@ impl<const D: usize> General<D> {
             work,
             steps_done: 0,
             failed: None,
+            planted: Planted::here(),
         };
         if let Some(error) = simulation.trouble(0) {
             return Err(SetupError::InitialState(error));
@@ -280,6 +283,7 @@ impl<const D: usize> General<D> {
     /// `sum_k (-1)^(k+1) binomial(m, k) (S^+ S)^(k-1) v`, with `S^+` from particles to the grid.
     fn filter(&mut self) {
         let Transfer::Xpic(order) = self.settings.transfer else { return };
+        let planted = self.planted;
         let Self { body, raster, nodes, work, .. } = self;
         let Work { stencils, v, filtered, term, at_particles, .. } = work;
         let mass = &body.particles.mass;
@@ -292,14 +296,15 @@ impl<const D: usize> General<D> {
             at_particles.extend((0..mass.len()).map(|p| value(stencils.of(p), term)));
             nodes.project(raster, stencils, mass, at_particles, &[], term);
             let k = f64::from(k);
-            factor *= -(m - k + 1.0) / k;
+            let sign = if planted.is(Fault::XpicSign) { 1.0 } else { -1.0 };
+            factor *= sign * (m - k + 1.0) / k;
             filtered.iter_mut().zip(&*term).for_each(|(sum, term)| *sum += term * factor);
         }
     }
 
     /// Velocities of the particles, by the transfer.
     fn accept(&mut self) {
-        let dt = self.settings.time_step;
+        let (dt, planted) = (self.settings.time_step, self.planted);
         let Self { settings, body, affine, raster, work, .. } = self;
         let Work { stencils, v, a, filtered, .. } = work;
         for (p, particle_v) in body.particles.v.iter_mut().enumerate() {
@@ -309,7 +314,9 @@ impl<const D: usize> General<D> {
                 Transfer::Pic => *particle_v = value(entries, v),
                 Transfer::Apic => {
                     *particle_v = value(entries, v);
-                    affine[p] = affine_part(settings.shape, raster, entries, v);
+                    if !planted.is(Fault::AffinePartDropped) {
+                        affine[p] = affine_part(settings.shape, raster, entries, v);
+                    }
                 }
                 Transfer::Xpic(_) => {
                     *particle_v = value(entries, filtered) + value(entries, a) * dt;
@@ -320,13 +327,16 @@ impl<const D: usize> General<D> {
 
     /// Moves particles and corners with the grid.
     fn travel(&mut self) {
-        let dt = self.settings.time_step;
+        let (dt, planted) = (self.settings.time_step, self.planted);
         let Self { settings, body, work, .. } = self;
         for (p, x) in body.particles.x.iter_mut().enumerate() {
             *x += value(work.stencils.of(p), &work.v) * dt;
         }
         if let (Shape::Cpdi2, Some(mesh)) = (settings.shape, &mut body.mesh) {
             for (k, x) in mesh.x.iter_mut().enumerate() {
+                if planted.is(Fault::CornersStay) {
+                    break;
+                }
                 *x += value(work.corner_stencils.of(k), &work.v) * dt;
             }
         }

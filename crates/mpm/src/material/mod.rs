@@ -22,6 +22,7 @@ pub(crate) use mooney_rivlin::MooneyRivlin;
 pub(crate) use neo_hookean::{NeoHookean, NeoHookeanNoLog};
 pub(crate) use st_venant_kirchhoff::StVenantKirchhoff;
 
+use crate::fault::Planted;
 use crate::tensor::{det_minus_one, determinant, product, real};
 
 /// An elastic material.
@@ -85,7 +86,7 @@ macro_rules! with_law {
     ($material:expr, |$law:ident| $body:expr) => {
         match *$material {
             Material::NeoHookean { lambda, mu } => {
-                let $law = NeoHookean { lambda, mu };
+                let $law = NeoHookean { lambda, mu, planted: Planted::here() };
                 $body
             }
             Material::StVenantKirchhoff { lambda, mu } => {

@@ -3,30 +3,44 @@
 use nalgebra::{RealField, SMatrix};
 
 use super::{Law, displacement_gradient, finger_minus_identity, log_jacobian, plus_diagonal};
-use crate::tensor::inverse_transpose_minus_identity;
+use crate::fault::{Fault, Planted};
+use crate::tensor::{det_minus_one, inverse_transpose_minus_identity};
 
 /// The neo-Hookean law, `W = mu/2 (I1 - 3 - 2 ln J) + lambda/2 (ln J)^2`.
 #[derive(Clone, Copy)]
 pub(crate) struct NeoHookean<T> {
     pub(crate) lambda: T,
     pub(crate) mu: T,
+    pub(crate) planted: Planted,
+}
+
+impl<T: RealField + Copy> NeoHookean<T> {
+    /// `lambda ln J`.
+    #[inline(always)]
+    fn pressure<const D: usize>(&self, F: &SMatrix<T, D, D>) -> T {
+        if self.planted.is(Fault::LinearLogarithm) {
+            return self.lambda * det_minus_one(&displacement_gradient(F));
+        }
+        self.lambda * log_jacobian(F)
+    }
 }
 
 impl<T: RealField + Copy> Law<T> for NeoHookean<T> {
     #[inline(always)]
     fn kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
-        plus_diagonal(finger_minus_identity(F) * self.mu, self.lambda * log_jacobian(F))
+        plus_diagonal(finger_minus_identity(F) * self.mu, self.pressure(F))
     }
 
     fn kirchhoff_across<const D: usize>(&self, F: &SMatrix<T, D, D>) -> T {
-        self.lambda * log_jacobian(F)
+        self.pressure(F)
     }
 
     fn first_piola_kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         let H = displacement_gradient(F);
         let K = inverse_transpose_minus_identity(F);
-        let pressure = self.lambda * log_jacobian(F);
-        plus_diagonal((H - K) * self.mu + K * pressure, pressure)
+        let pressure = self.pressure(F);
+        let P = plus_diagonal((H - K) * self.mu + K * pressure, pressure);
+        if self.planted.is(Fault::TransposedLaw) { P.transpose() } else { P }
     }
 }
 

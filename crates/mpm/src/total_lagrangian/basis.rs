@@ -3,6 +3,7 @@
 //! Piegl & Tiller, "The NURBS Book", 2nd ed. (1997), chapter 2: recurrence and derivative.
 
 use super::axis::{Axis, End};
+use crate::fault::{Fault, Planted};
 
 /// The largest degree.
 pub(crate) const MOST_DEGREE: usize = 5;
@@ -66,7 +67,8 @@ impl Basis {
                 } else {
                     break;
                 };
-                sign = if normal { -sign } else { sign };
+                let odd = normal && !Planted::here().is(Fault::MirrorSign);
+                sign = if odd { -sign } else { sign };
             }
             kept(j).then(|| (j - lowest, sign))
         };

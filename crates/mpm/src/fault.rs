@@ -1,0 +1,216 @@
+//! Mistakes of the kind that solvers carry, to find out whether the tests would catch them.
+//!
+//! With the feature `planted-faults` a fault is [planted](with) in every simulation that is set up meanwhile on the same
+//! thread, and in no other: simulations beside it and tests on other threads stay sound. Without the feature nothing can
+//! be planted, [`Planted`] has no size, and every question whether a fault is there is a constant.
+
+use nalgebra::{RealField, SMatrix, SVector};
+
+use crate::tensor::{determinant, inverse_transpose};
+
+/// What is done wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// Forces from sigma V0 instead of tau V0.
+    CauchyStress,
+    /// The first normal component of the stress enters the forces with the opposite sign.
+    NormalStressSign,
+    /// One shear component of the stress enters the forces with the opposite sign.
+    ShearStressSign,
+    /// The nominal stress taken for the first Piola-Kirchhoff stress in the forces.
+    NominalStress,
+    /// `J - 1` for `ln J`.
+    LinearLogarithm,
+    /// `P` transposed in the law.
+    TransposedLaw,
+    /// The moduli handed to the solver exchanged.
+    LambdaForMu,
+    /// Young's modulus handed to the solver a millionth too large.
+    StiffnessOff,
+    /// The body force computed, and never applied.
+    NoBodyForce,
+    /// The body force at the end of the step.
+    LateBodyForce,
+    /// The body force at the current instead of the reference position.
+    BodyForceAtCurrentPosition,
+    /// The body force times reference volume instead of mass.
+    BodyForcePerVolume,
+    /// The position moved by the particle's own velocity.
+    OwnVelocity,
+    /// The position moved by a millionth too little.
+    PositionOff,
+    /// Walls leave the acceleration.
+    WallsKeepAcceleration,
+    /// Walls leave the velocity.
+    WallsKeepVelocity,
+    /// Nodes beyond walls keep their mass.
+    GhostMassLost,
+    /// Centred differences that start with the velocity at time 0 and a whole acceleration.
+    NoHalfStep,
+    /// `F + dt L` for `(I + dt L) F`.
+    AdditiveStretch,
+    /// The velocity gradient transposed.
+    GradientTransposed,
+    /// GIMP boxes of the size that J gives, alike along all axes.
+    SizeFromJacobian,
+    /// Particles read the grid from where their velocity takes them.
+    WeightsOfNewPosition,
+    /// Particles in the last cell give nothing to the last node they reach.
+    LastNodeSkipped,
+    /// One sum of a step in single precision.
+    SinglePrecision,
+    /// The velocity taken from the grid instead of its change.
+    PicForFlip,
+    /// MUSL that updates F with the velocity before it is projected anew.
+    NoReprojection,
+    /// USF with the stress of F at the start of the step.
+    StressOfOldStretch,
+    /// Total frame: the mass matrix without its outermost band.
+    MassBandDropped,
+    /// Total frame: the first integration weight a thousandth too large.
+    WeightOff,
+    /// Total frame: the first part of the composed step cut after three digits.
+    StageOff,
+    /// Total frame: time stands still during the stages of a step.
+    StagesAtOneTime,
+    /// Total frame: mirror images beyond walls keep the sign of the component across.
+    MirrorSign,
+    /// Total frame: the hoop stress left out of the radial balance.
+    HoopStressDropped,
+    /// Total frame: the shear stress left out of the balance around.
+    HoopShearDropped,
+    /// General step: corners of CPDI2 that are never moved.
+    CornersStay,
+    /// General step: APIC without its affine part.
+    AffinePartDropped,
+    /// General step: the terms of XPIC all with the same sign.
+    XpicSign,
+}
+
+/// The fault of one simulation, if it has one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Planted(#[cfg(feature = "planted-faults")] Option<Fault>);
+
+#[cfg(feature = "planted-faults")]
+thread_local! {
+    static HERE: std::cell::Cell<Option<Fault>> = const { std::cell::Cell::new(None) };
+}
+
+/// Plants a fault in all simulations that `build` sets up on this thread.
+#[cfg(feature = "planted-faults")]
+pub fn with<R>(fault: Fault, build: impl FnOnce() -> R) -> R {
+    /// Takes the fault away again, even if `build` panics.
+    struct Weed(Option<Fault>);
+    impl Drop for Weed {
+        fn drop(&mut self) {
+            HERE.set(self.0);
+        }
+    }
+    let _weed = Weed(HERE.replace(Some(fault)));
+    build()
+}
+
+#[cfg(feature = "planted-faults")]
+impl Planted {
+    /// What is planted on this thread at present.
+    #[must_use]
+    pub fn here() -> Self {
+        Self(HERE.get())
+    }
+
+    /// Whether it is this fault.
+    #[inline(always)]
+    #[must_use]
+    pub fn is(self, fault: Fault) -> bool {
+        self.0 == Some(fault)
+    }
+}
+
+#[cfg(not(feature = "planted-faults"))]
+impl Planted {
+    /// Nothing.
+    #[inline(always)]
+    #[must_use]
+    pub const fn here() -> Self {
+        Self()
+    }
+
+    /// No.
+    #[inline(always)]
+    #[must_use]
+    pub const fn is(self, _: Fault) -> bool {
+        false
+    }
+}
+
+#[cfg(not(feature = "planted-faults"))]
+const _: () = assert!(size_of::<Planted>() == 0, "a normal build carries nothing");
+
+impl Planted {
+    /// The Kirchhoff stress as it enters the forces.
+    #[inline(always)]
+    pub(crate) fn stress_in_forces<T: RealField + Copy, const D: usize>(
+        self,
+        mut tau: SMatrix<T, D, D>,
+        F: &SMatrix<T, D, D>,
+    ) -> SMatrix<T, D, D> {
+        if self.is(Fault::CauchyStress) {
+            tau /= determinant(F);
+        }
+        if self.is(Fault::NormalStressSign) {
+            tau[(0, 0)] = -tau[(0, 0)];
+        }
+        if self.is(Fault::ShearStressSign) && D > 1 {
+            tau[(0, D - 1)] = -tau[(0, D - 1)];
+        }
+        if self.is(Fault::NominalStress) {
+            tau = inverse_transpose(F, determinant(F)).transpose() * tau * F.transpose();
+        }
+        tau
+    }
+
+    /// The first Piola-Kirchhoff stress as it enters the forces of the total frame.
+    #[inline(always)]
+    pub(crate) fn piola_in_forces<const D: usize>(
+        self,
+        mut P: SMatrix<f64, D, D>,
+        F: &SMatrix<f64, D, D>,
+    ) -> SMatrix<f64, D, D> {
+        if self.is(Fault::CauchyStress) {
+            P /= determinant(F);
+        }
+        if self.is(Fault::NormalStressSign) {
+            P[(0, 0)] = -P[(0, 0)];
+        }
+        if self.is(Fault::ShearStressSign) && D > 1 {
+            P[(0, D - 1)] = -P[(0, D - 1)];
+        }
+        if self.is(Fault::NominalStress) { P.transpose() } else { P }
+    }
+
+    /// A change of position in a step.
+    #[inline(always)]
+    pub(crate) fn change<T: RealField + Copy, const D: usize>(
+        self,
+        change: SVector<T, D>,
+    ) -> SVector<T, D> {
+        if self.is(Fault::PositionOff) {
+            return change * nalgebra::convert::<f64, T>(1.0 - 1e-6);
+        }
+        if self.is(Fault::SinglePrecision) {
+            let single = |value| nalgebra::convert_unchecked::<T, f64>(value) as f32;
+            return change.map(|value| nalgebra::convert(f64::from(single(value))));
+        }
+        change
+    }
+
+    /// The part of a time step that a stage takes.
+    #[inline(always)]
+    pub(crate) fn stage(self, gamma: f64) -> f64 {
+        if !self.is(Fault::StageOff) || gamma == 1.0 {
+            return gamma;
+        }
+        // Suzuki's coefficients still add up to one.
+        if gamma > 0.0 { 0.414 } else { 1.0 - 4.0 * 0.414 }
+    }
+}
