@@ -717,6 +717,10 @@ before. Results equal those of the Rust functions bit for bit where the compiler
             Operation::LnOfBoth(x, y) => {
                 format!("mmsmith_ln_of_both({}, {})", at(x), at(y))
             }
+            Operation::SumError(a, b) => format!("mmsmith_sum_error({}, {})", at(a), at(b)),
+            Operation::ProductError(a, b) => {
+                format!("mmsmith_product_error({}, {})", at(a), at(b))
+            }
         }
     }
 }
