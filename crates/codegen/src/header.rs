@@ -10,6 +10,9 @@ use mmsmith_spec::{Boundary, Condition, Material, Parameter, Surface};
 /// What every header needs: macros, and `sin(pi x)` as the crate of the solutions computes it.
 const SUPPORT: &str = include_str!("support.h");
 
+/// What rounding takes from sums and products.
+const ROUNDING: &str = include_str!("rounding.h");
+
 /// The logarithm of one plus a small number, as the crate of the solutions computes it.
 const LOGARITHM: &str = include_str!("logarithm.h");
 
@@ -217,6 +220,9 @@ impl Header<'_> {
         self.line("#include <math.h>");
         self.line("#include <stddef.h>\n");
         self.text += SUPPORT;
+        if self.plan.forms_rounding_errors() {
+            self.text += ROUNDING;
+        }
         if self.plan.calls(|f| matches!(f, Function::Ln1p | Function::LnOfBoth)) {
             self.text += LOGARITHM;
         }
