@@ -14,6 +14,18 @@ use num_traits::{One, Signed, Zero};
 /// A term: whether it is taken away, and its value.
 type Term = (bool, Slot);
 
+/// A sum of more parts, sums within it counted anew wherever they occur, is left as it is.
+const MOST_VISITED: usize = 100;
+
+/// A constant and inputs, with what they depend on, their index and their coefficient.
+#[derive(Default)]
+struct Collected {
+    constant: Rational,
+    inputs: Vec<(Dependence, usize, Rational)>,
+    /// The nodes that have been looked at.
+    visited: usize,
+}
+
 impl Lowering<'_> {
     /// `function` of `argument`, of `Pi argument` where that is `in_turns`.
     pub(super) fn applied(&mut self, function: Function, argument: Expr, in_turns: bool) -> Slot {
@@ -67,17 +79,14 @@ impl Lowering<'_> {
     /// `None` where `argument` is no such sum, where nothing is rounded, and where it depends on both place and time: there
     /// the correction would be done in the innermost loop.
     fn with_lost_part(&mut self, argument: Expr) -> Option<(Slot, Slot)> {
-        let mut constant = Rational::zero();
-        let mut inputs: Vec<(Dependence, usize, Rational)> = Vec::new();
-        self.collect(argument, &Rational::one(), &mut constant, &mut inputs)?;
+        let mut collected = Collected::default();
+        self.collect(argument, &Rational::one(), &mut collected)?;
+        let Collected { constant, mut inputs, .. } = collected;
         inputs.retain(|(.., coefficient)| !coefficient.is_zero());
         let rate = inputs.iter().fold(Dependence::default(), |rate, (d, ..)| rate.join(*d));
-        let numbers = || inputs.iter().map(|(.., c)| c).chain([&constant]);
-        let terms = numbers().filter(|number| !number.is_zero()).count();
-        let exact =
-            terms == 1 && numbers().all(|number| number.is_zero() || is_power_of_two(number));
-        let in_range = numbers().all(|number| nearest_f64(number).is_finite());
-        if exact || !in_range || (rate.position && rate.time) {
+        let mut numbers = inputs.iter().map(|(.., c)| c).chain([&constant]);
+        let in_range = numbers.all(|number| nearest_f64(number).is_finite());
+        if inputs.is_empty() || !in_range || (rate.position && rate.time) {
             return None;
         }
         // What changes rarely first.
@@ -122,41 +131,40 @@ impl Lowering<'_> {
                 Operation::Add(total, part)
             });
         }
+        if lost.is_empty() {
+            return None;
+        }
         let (negative, lost) = self.add(lost);
         Some((total, self.with_sign(negative, lost)))
     }
 
-    /// Adds `factor * expr` to a constant and inputs with coefficients; `None` where it is no such sum. The canonical form
-    /// takes out common factors, so that sums stand within sums.
-    fn collect(
-        &self,
-        expr: Expr,
-        factor: &Rational,
-        constant: &mut Rational,
-        inputs: &mut Vec<(Dependence, usize, Rational)>,
-    ) -> Option<()> {
+    /// Adds `factor * expr`; `None` where it is no such sum. The canonical form takes out common factors, so that sums
+    /// stand within sums.
+    fn collect(&self, expr: Expr, factor: &Rational, sum: &mut Collected) -> Option<()> {
+        sum.visited += 1;
+        if sum.visited > MOST_VISITED {
+            return None;
+        }
         match self.graph.node(expr) {
-            Node::Number(value) => *constant += factor * value,
+            Node::Number(value) => sum.constant += factor * value,
             Node::Symbol(_) => {
                 let defined = self.definitions.iter().any(|(symbol, _)| *symbol == expr);
                 let known = self.inputs.iter().position(|(symbol, _)| *symbol == expr);
                 let index = known.filter(|_| !defined)?;
-                match inputs.iter_mut().find(|(_, place, _)| *place == index) {
+                match sum.inputs.iter_mut().find(|(_, place, _)| *place == index) {
                     Some((.., coefficient)) => *coefficient += factor,
-                    None => inputs.push((self.inputs[index].1, index, factor.clone())),
+                    None => sum.inputs.push((self.inputs[index].1, index, factor.clone())),
                 }
             }
-            Node::Sum { constant: own, terms } => {
-                *constant += factor * own;
+            Node::Sum { constant, terms } => {
+                sum.constant += factor * constant;
                 for (term, coefficient) in terms {
-                    self.collect(*term, &(factor * coefficient), constant, inputs)?;
+                    self.collect(*term, &(factor * coefficient), sum)?;
                 }
             }
-            Node::Whole(inner) => self.collect(*inner, factor, constant, inputs)?,
+            Node::Whole(inner) => self.collect(*inner, factor, sum)?,
             Node::Product(factors) => match &**factors {
-                [(base, exponent)] if exponent.is_one() => {
-                    self.collect(*base, factor, constant, inputs)?;
-                }
+                [(base, exponent)] if exponent.is_one() => self.collect(*base, factor, sum)?,
                 _ => return None,
             },
             Node::Pi | Node::Call(..) => return None,
@@ -229,7 +237,16 @@ mod tests {
         for text in ["sin(X + Y)", "cos(3*X)", "exp(X/10)", "sin(Pi*(X + 1/3))", "sinh(k + X)"] {
             assert!(is_corrected(text), "{text}");
         }
-        for text in ["sin(X)", "cos(X/2)", "exp(-4*X)", "sin(2*Pi*X)", "sin(k*X)", "sin(X - t)"] {
+        for text in [
+            "sin(X)",
+            "cos(3)",
+            "sin(1/3)",
+            "cos(X/2)",
+            "exp(-4*X)",
+            "sin(2*Pi*X)",
+            "sin(k*X)",
+            "sin(X - t)",
+        ] {
             assert!(!is_corrected(text), "{text}");
         }
     }
