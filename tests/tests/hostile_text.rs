@@ -42,6 +42,7 @@ fn hostile() -> Vec<String> {
         "\n#define double int\n#include \"/etc/passwd\"\n",
         "//\\",
         "%s%n%hn",
+        "\nlet statements_of_block = 0;\n",
         "caf\u{e9} \u{1d54f} \u{1f9ea} e\u{301}",
     ]
     .map(str::to_owned)

@@ -84,6 +84,8 @@ impl<'a> Translator<'a> {
             Operation::Power(a, exponent) => format!("{}.powf({})", at(a), number(exponent)),
             Operation::Atan2(y, x) => format!("{}.atan2({})", at(y), at(x)),
             Operation::LnOfBoth(x, y) => format!("{}.ln_of_both({})", at(x), at(y)),
+            Operation::SumError(a, b) => format!("{}.sum_error({})", at(a), at(b)),
+            Operation::ProductError(a, b) => format!("{}.product_error({})", at(a), at(b)),
         }
     }
 }

@@ -10,6 +10,9 @@ use mmsmith_spec::{Boundary, Condition, Material, Parameter, Surface};
 /// What every header needs: macros, and `sin(pi x)` as the crate of the solutions computes it.
 const SUPPORT: &str = include_str!("support.h");
 
+/// What rounding takes from sums and products.
+const ROUNDING: &str = include_str!("rounding.h");
+
 /// The logarithm of one plus a small number, as the crate of the solutions computes it.
 const LOGARITHM: &str = include_str!("logarithm.h");
 
@@ -217,6 +220,9 @@ impl Header<'_> {
         self.line("#include <math.h>");
         self.line("#include <stddef.h>\n");
         self.text += SUPPORT;
+        if self.plan.forms_rounding_errors() {
+            self.text += ROUNDING;
+        }
         if self.plan.calls(|f| matches!(f, Function::Ln1p | Function::LnOfBoth)) {
             self.text += LOGARITHM;
         }
@@ -716,6 +722,10 @@ before. Results equal those of the Rust functions bit for bit where the compiler
             Operation::Atan2(y, x) => format!("atan2({}, {})", at(y), at(x)),
             Operation::LnOfBoth(x, y) => {
                 format!("mmsmith_ln_of_both({}, {})", at(x), at(y))
+            }
+            Operation::SumError(a, b) => format!("mmsmith_sum_error({}, {})", at(a), at(b)),
+            Operation::ProductError(a, b) => {
+                format!("mmsmith_product_error({}, {})", at(a), at(b))
             }
         }
     }

@@ -198,6 +198,12 @@ impl<'a> Plan<'a> {
         })
     }
 
+    /// Whether any operation asks for what rounding takes from a sum or a product.
+    pub(crate) fn forms_rounding_errors(&self) -> bool {
+        let mut operations = self.program.operations().iter();
+        operations.any(|o| matches!(o, Operation::SumError(..) | Operation::ProductError(..)))
+    }
+
     /// How many values a stage keeps.
     pub(crate) fn count(&self, stage: Stage) -> usize {
         self.slots(stage).len()

@@ -5,6 +5,8 @@
 //! It also keeps apart what changes at different rates. Factors and terms that depend on parameters only are
 //! combined before those that depend on time or on position, so that the slow parts are computed rarely.
 
+mod argument;
+
 use crate::log_ratio;
 use crate::{Expr, Function, Graph, Node, Rational, nearest_f64};
 use num_traits::{One, Signed, ToPrimitive, Zero};
@@ -59,6 +61,10 @@ pub enum Operation {
     Atan2(Slot, Slot),
     /// `ln(y)` of `y = 1 + x`, given as `(x, y)`: by `y` where `x < -1/2`, else by `x`.
     LnOfBoth(Slot, Slot),
+    /// What rounding takes from a sum: `a + b` less its rounded value, exactly.
+    SumError(Slot, Slot),
+    /// What rounding takes from a product: `a b` less its rounded value, exactly.
+    ProductError(Slot, Slot),
 }
 
 impl Operation {
@@ -72,7 +78,9 @@ impl Operation {
             | Operation::Mul(a, b)
             | Operation::Div(a, b)
             | Operation::Atan2(a, b)
-            | Operation::LnOfBoth(a, b) => vec![a, b],
+            | Operation::LnOfBoth(a, b)
+            | Operation::SumError(a, b)
+            | Operation::ProductError(a, b) => vec![a, b],
             Operation::Neg(a)
             | Operation::Sqrt(a)
             | Operation::Power(a, _)
@@ -98,6 +106,8 @@ impl Operation {
             Operation::Call(function, a) => Operation::Call(function, place(a)),
             Operation::Atan2(a, b) => Operation::Atan2(place(a), place(b)),
             Operation::LnOfBoth(a, b) => Operation::LnOfBoth(place(a), place(b)),
+            Operation::SumError(a, b) => Operation::SumError(place(a), place(b)),
+            Operation::ProductError(a, b) => Operation::ProductError(place(a), place(b)),
         }
     }
 
@@ -125,6 +135,8 @@ impl Operation {
                     at(x).ln_1p()
                 }
             }
+            Operation::SumError(a, b) => argument::sum_error(at(a), at(b)),
+            Operation::ProductError(a, b) => argument::product_error(at(a), at(b)),
         }
     }
 }
@@ -193,6 +205,12 @@ impl OperationCount {
             Operation::Mul(..) => self.multiplications += 1,
             Operation::Div(..) => self.divisions += 1,
             Operation::Sqrt(_) => self.square_roots += 1,
+            // Beside the sum or the product itself, with one operand of the product a number that is split beforehand.
+            Operation::SumError(..) => self.additions += 5,
+            Operation::ProductError(..) => {
+                self.additions += 7;
+                self.multiplications += 5;
+            }
             Operation::Power(..)
             | Operation::SinPi(_)
             | Operation::CosPi(_)
@@ -359,6 +377,8 @@ impl Program {
             };
             let carried = match *operation {
                 Operation::Number(_) | Operation::Pi | Operation::Input(_) => 0.0,
+                // What they correct stays in the bound, so they add nothing.
+                Operation::SumError(..) | Operation::ProductError(..) => 0.0,
                 Operation::Add(a, b) | Operation::Sub(a, b) => error(a) + error(b),
                 Operation::Mul(a, b) => error(a) * at(b).abs() + error(b) * at(a).abs(),
                 Operation::Div(a, b) => (error(a) + error(b) * value.abs()) / at(b).abs(),
@@ -538,15 +558,10 @@ impl Lowering<'_> {
             let pi = self.graph.pi();
             let turns = self.graph.div(argument, pi);
             if !self.contains_pi_as_factor(turns) {
-                let turns = self.lower(turns);
-                return self.push(match function {
-                    Function::Sin => Operation::SinPi(turns),
-                    _ => Operation::CosPi(turns),
-                });
+                return self.applied(function, turns, true);
             }
         }
-        let argument = self.lower(argument);
-        self.push(Operation::Call(function, argument))
+        self.applied(function, argument, false)
     }
 
     /// Whether a power of pi stands in the product `expr`: then dividing by pi did not take it away.

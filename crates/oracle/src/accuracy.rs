@@ -18,8 +18,10 @@ const QUICK_BITS: usize = 192;
 /// From this factor on the first look is not believed.
 const DOUBTFUL_FACTOR: f64 = 3.0;
 
-/// Far from the body, what is smaller than this is not judged.
-const SMALLEST_FAR: f64 = 1e-280;
+/// Where amplitudes are tiny, so that squares of them are next to the smallest doubles, and far from the body, where
+/// exponentials are, what is smaller than this is not judged: its parts have lost their digits to the range of the format,
+/// whatever the formula.
+const SMALLEST_JUDGED: f64 = 1e-280;
 
 /// Where so many draws in a row find nothing that suits, a class is given up.
 const FIRST_DRAWS: u64 = 8;
@@ -238,6 +240,7 @@ impl<'a> Accuracy<'a> {
         let mut terms = terms.iter();
         let mut truth = truth.iter();
         let mut products = self.products.iter();
+        let may_underflow = matches!(class, Class::TinyAmplitude | Class::Far);
         let mut findings = Vec::new();
         for (field, results) in results.iter().enumerate() {
             let mut worst = Finding { field, entry: 0, factor: -1.0 };
@@ -246,8 +249,7 @@ impl<'a> Accuracy<'a> {
                 let sens: f64 = terms.by_ref().take(count).map(|term| term.abs()).sum();
                 let quick = exact(sens).map(|sens| worst_factor(result, truth, &sens));
                 let factor = match quick {
-                    // Far outside an exponential leaves the range of normal numbers, and its digits with it.
-                    _ if class == Class::Far && sens < SMALLEST_FAR => 0.0,
+                    _ if may_underflow && sens < SMALLEST_JUDGED => 0.0,
                     Some(factor) if factor < DOUBTFUL_FACTOR => factor,
                     _ => self.settled(inputs, field, entry, result)?.0,
                 };

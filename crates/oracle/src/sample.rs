@@ -8,8 +8,7 @@ use mmsmith_spec::{Domain, Fields, Spec};
 pub enum Class {
     /// Parameters within 40 % of their defaults, a place in the body, a time within the period.
     Ordinary,
-    /// Amplitude smaller by a factor of 1e-4 to 1e-200, but for those whose square is next to the smallest doubles: there
-    /// a quantity of second order has lost its digits to the range of the format, whatever the formula.
+    /// Amplitude smaller by a factor of 1e-4 to 1e-200.
     TinyAmplitude,
     /// Times of 1e2 to 1e6 periods.
     Late,
@@ -52,8 +51,6 @@ impl Class {
 
 /// How often inputs that do not suit are drawn anew.
 const MOST_DRAWS: usize = 100;
-/// Amplitudes whose squares are below 1e-285 but not zero yet, with room for factors of 1e20 either way.
-const UNDERFLOWING_SQUARES: std::ops::Range<f64> = 1e-182..1e-142;
 /// Beyond this deformation gradient a place is of no use: far from the body some displacements grow without bound.
 const LARGEST_GRADIENT: f64 = 10.0;
 /// Below this ratio of volumes ordinary points count as inverted.
@@ -163,9 +160,6 @@ impl<'a> Sampler<'a> {
                 }
                 if class == Class::TinyAmplitude {
                     value *= 10_f64.powf(-random.between(4.0, 200.0));
-                    if UNDERFLOWING_SQUARES.contains(&value.abs()) {
-                        return None;
-                    }
                 }
             }
             if parameter.name == "nu" && random.one_in(3) {

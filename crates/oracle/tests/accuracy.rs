@@ -77,6 +77,23 @@ fn every_specification_in_every_class() {
     assert!(failures.is_empty(), "beyond K = {LARGEST_FACTOR}:\n{}", failures.join("\n"));
 }
 
+/// Far from the body functions of `3 X + Y - Z/2` and of other sums of the same coordinates nearly cancel in their answers
+/// to each, and the rounding of the sums must not remain: without its correction `K` is 24 at these points.
+#[test]
+fn sums_of_coordinates_keep_their_digits_far_from_the_body() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../mms-specs/skew-3d.toml");
+    let spec = Spec::parse(&std::fs::read_to_string(file).unwrap(), "skew-3d.toml").unwrap();
+    let accuracy = Accuracy::new(&spec, spec.derive().unwrap());
+    let generated = |inputs: &[f64]| -> Result<Judged, String> {
+        let solution = build(&spec.name, &inputs[4..]).ok_or("not in the library")?;
+        let solution = solution.map_err(|error| error.to_string())?;
+        solution.each_field(&inputs[..3], inputs[3]).ok_or("wrong dimension".into())
+    };
+    let mut failures = Vec::new();
+    judge(&spec, "generated", &accuracy, (&[Class::Far], 150), &generated, &mut failures);
+    assert!(failures.is_empty(), "beyond K = {LARGEST_FACTOR}:\n{}", failures.join("\n"));
+}
+
 /// Laws that no solution of the library has, by the programs alone.
 #[test]
 fn further_specifications() {

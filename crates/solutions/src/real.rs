@@ -29,6 +29,21 @@ pub trait Real: RealField + Copy {
     #[must_use]
     fn ln_of_both(self, y: Self) -> Self;
 
+    /// What rounding takes from a sum: `self + other` less its rounded value, exactly (D. E. Knuth, The Art of Computer
+    /// Programming, vol. 2, 4.2.2).
+    #[inline]
+    #[must_use]
+    fn sum_error(self, other: Self) -> Self {
+        let sum = self + other;
+        let other_in_sum = sum - self;
+        (self - (sum - other_in_sum)) + (other - other_in_sum)
+    }
+
+    /// What rounding takes from a product: `self * other` less its rounded value, exactly while both and the product are
+    /// below 1e300 and what is lost is not below the normal numbers (T. J. Dekker, Numer. Math. 18, 1971).
+    #[must_use]
+    fn product_error(self, other: Self) -> Self;
+
     /// `arcosh(1 + z)^2`: the squared logarithm of the ratio of two stretches `a`, `b` for `z = (a - b)^2/(2 a b)`.
     #[must_use]
     fn log_ratio_squared(self) -> Self {
@@ -108,6 +123,19 @@ impl Real for f64 {
     fn ln_of_both(self, y: Self) -> Self {
         logarithm(self, y, self < -0.5)
     }
+
+    #[inline]
+    fn product_error(self, other: Self) -> Self {
+        // Halves of 26 bits, whose products are exact.
+        let split = |x: f64| {
+            let scaled = x * 134_217_729.0;
+            let high = scaled - (scaled - x);
+            (high, x - high)
+        };
+        let ((a_high, a_low), (b_high, b_low)) = (split(self), split(other));
+        let product = self * other;
+        (((a_high * b_high - product) + a_high * b_low) + a_low * b_high) + a_low * b_low
+    }
 }
 
 impl Real for f32 {
@@ -139,6 +167,12 @@ impl Real for f32 {
     #[inline(always)]
     fn ln_of_both(self, y: Self) -> Self {
         f64::from(self).ln_of_both(f64::from(y)) as f32
+    }
+
+    #[inline]
+    fn product_error(self, other: Self) -> Self {
+        // The product of two of them is exact in double precision.
+        (f64::from(self) * f64::from(other) - f64::from(self * other)) as f32
     }
 }
 
@@ -307,6 +341,21 @@ mod tests {
         assert!((-1.0_f64).ln_of_both(f64::NAN).is_nan() && (-1.0_f64).ln_of_both(-1e-9).is_nan());
         assert!(f64::NAN.ln_of_both(1.0).is_nan());
         assert_eq!((-0.75_f32).ln_of_both(0.25), 0.25_f32.ln());
+    }
+
+    #[test]
+    fn what_rounding_takes_is_exact_in_both_precisions() {
+        // (1 + 2^-30)(1 - 2^-30) = 1 - 2^-60, and 1 + 2^-60 is one.
+        let (a, b) = (1.0 + 2_f64.powi(-30), 1.0 - 2_f64.powi(-30));
+        assert_eq!((a * b, a.product_error(b)), (1.0, -(2_f64.powi(-60))));
+        assert_eq!(1.0_f64.sum_error(2_f64.powi(-60)), 2_f64.powi(-60));
+        assert_eq!((-(2_f64.powi(-60))).sum_error(1.0), -(2_f64.powi(-60)));
+        let (a, b) = (1.0 + 2_f32.powi(-15), 1.0 - 2_f32.powi(-15));
+        assert_eq!((a * b, a.product_error(b)), (1.0, -(2_f32.powi(-30))));
+        assert_eq!(1.0_f32.sum_error(2_f32.powi(-30)), 2_f32.powi(-30));
+        // 3 x for x near 1e8: what is lost is a whole number of units of the last place of x.
+        let x = 123_456_789.123_456_78_f64;
+        assert_eq!(3.0.product_error(x), (x.sum_error(2.0 * x)));
     }
 
     #[test]

@@ -29,8 +29,8 @@ pub(super) fn stress(
     let law = NeoHookean { deformation, lambda, mu };
     let strain = law.strain_without_turn(graph);
     let P = match &strain {
-        Some(strain) => law.from_strain(graph, strain),
-        None => law.from_gradient(graph),
+        Some(strain) => law.by_strain(graph, strain),
+        None => law.by_gradient(graph),
     };
     let (isotropic, anisotropic) = if derivation.geometry.is_cartesian() {
         (Graph::ZERO, P.clone())
@@ -72,7 +72,7 @@ impl NeoHookean<'_> {
     }
 
     /// `mu (H + H^T F^-T) + lambda ln J F^-T`.
-    fn from_gradient(&self, graph: &mut Graph) -> Matrix {
+    fn by_gradient(&self, graph: &mut Graph) -> Matrix {
         let pressure = graph.mul(self.lambda, self.deformation.log_J);
         let once = self.transposed_gradient_times_inverse(graph);
         let mut P = once.clone();
@@ -89,7 +89,7 @@ impl NeoHookean<'_> {
     }
 
     /// `tau F^-T` with `tau = lambda ln J I + mu (F F^T - I)`.
-    fn from_strain(&self, graph: &mut Graph, strain: &Matrix) -> Matrix {
+    fn by_strain(&self, graph: &mut Graph, strain: &Matrix) -> Matrix {
         let n = strain.len();
         let pressure = graph.mul(self.lambda, self.deformation.log_J);
         let mut tau = vec![vec![Graph::ZERO; n]; n];
