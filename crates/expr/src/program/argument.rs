@@ -84,8 +84,8 @@ impl Lowering<'_> {
         let Collected { constant, mut inputs, .. } = collected;
         inputs.retain(|(.., coefficient)| !coefficient.is_zero());
         let rate = inputs.iter().fold(Dependence::default(), |rate, (d, ..)| rate.join(*d));
-        let mut numbers = inputs.iter().map(|(.., c)| c).chain([&constant]);
-        let in_range = numbers.all(|number| nearest_f64(number).is_finite());
+        let finite = |number: &Rational| nearest_f64(number).is_finite();
+        let in_range = finite(&constant) && inputs.iter().all(|(.., number)| finite(number));
         if inputs.is_empty() || !in_range || (rate.position && rate.time) {
             return None;
         }
