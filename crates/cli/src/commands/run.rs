@@ -45,6 +45,7 @@ pub(super) fn follow(options: &RunOptions, resume: bool) -> Result<bool> {
                 progress: &mut |progress| bar.show(&what, progress),
                 frames: frames.as_ref(),
                 checkpoints: checkpoints.as_ref(),
+                until: None,
             };
             simulate(&model.exact, model.arithmetic(), &case, &mut outputs)?
         };
