@@ -13,6 +13,7 @@ mod scheme;
 mod score;
 mod stability;
 mod thorough;
+mod tradeoff;
 
 pub(crate) use check::check;
 pub(crate) use converge::converge;
@@ -25,6 +26,7 @@ pub(crate) use resume::resume;
 pub(crate) use run::run;
 pub(crate) use score::score;
 pub(crate) use stability::stability;
+pub(crate) use tradeoff::tradeoff;
 
 use anyhow::{Context, Result};
 use mmsmith_solutions::AnySolution;

@@ -68,8 +68,9 @@ pub use study::{Study, StudyError, Sweep, converge};
 pub use temporal::{Temporal, TemporalRow, temporal};
 pub use total::{CflSpeed, Frame, TotalScheme};
 pub use tradeoff::{
-    Against, Cheapest, Chosen, Effect, Entry, Goal, Knob, LADDER, MARGIN, Machine, Repeat, Setting,
-    Skip, TOLERANCES, Tradeoff, differences, extrapolate, families, median, pareto, tradeoff,
+    Against, Cheapest, Chosen, Effect, Entry, Goal, Knob, LADDER, MARGIN, Machine, Repeat,
+    RepeatOutcome, Setting, Skip, TOLERANCES, Tradeoff, differences, extrapolate, families, median,
+    pareto, tradeoff,
 };
 pub use verdict::{
     Behaviour, Expected, ORDER_TOLERANCE, Verdict as OrderVerdict, expected_in_space,

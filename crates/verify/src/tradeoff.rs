@@ -122,6 +122,9 @@ pub struct Repeat {
     pub cpu_s: f64,
 }
 
+/// A repeat, none where it did not end in time, or why it could not be run.
+pub type RepeatOutcome<E> = Result<Option<Repeat>, E>;
+
 /// What runs the settings.
 pub struct Machine<'a, E> {
     /// What a setting comes to; none where it does not fit the solution.
@@ -129,7 +132,7 @@ pub struct Machine<'a, E> {
     /// Runs a setting and measures its errors, for at most so many seconds.
     pub run: &'a dyn Fn(&Setting, f64) -> Result<Row, E>,
     /// Runs the steps alone, for at most so many seconds; none if it did not end.
-    pub repeat: &'a dyn Fn(&Setting, f64) -> Result<Option<Repeat>, E>,
+    pub repeat: &'a (dyn Fn(&Setting, f64) -> RepeatOutcome<E> + 'a),
     /// Seconds since the start.
     pub clock: &'a dyn Fn() -> f64,
 }
