@@ -27,7 +27,7 @@ use crate::{machine, memory, terminal};
 
 /// The CFL number that ladders begin with.
 const CFL: f64 = 0.4;
-/// Time that is left for output, as a share of the budget.
+/// More threads than this are not compared with one.
 const MOST_THREADS: usize = 64;
 
 /// How errors are compared.
@@ -101,7 +101,8 @@ impl Runner<'_> {
         let until = until(most_s);
         let compute = |_: usize| -> Result<Record> {
             let row = self.pool(setting)?.install(|| {
-                let mut outputs = Outputs { progress: &mut |_| (), frames: None, until };
+                let mut outputs =
+                    Outputs { progress: &mut |_| (), frames: None, checkpoints: None, until };
                 simulate(&self.exact.exact, self.arithmetic(setting), &setting.case, &mut outputs)
             })?;
             if matches!(row.status, Status::Cut { .. }) {
