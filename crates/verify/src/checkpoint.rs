@@ -14,7 +14,7 @@ use thiserror::Error;
 use crate::norms::{PerField, PerNorm};
 
 /// How every checkpoint begins.
-const MAGIC: &[u8; 24] = b"mmsmith checkpoint 1\n\0\0\0";
+const MAGIC: &[u8; 24] = b"mmsmith checkpoint 2\n\0\0\0";
 const FILE: &str = "checkpoint";
 
 /// Where and how often a run writes down its state, and whether it goes on from there.
@@ -77,6 +77,9 @@ pub(crate) struct Reached {
 }
 
 impl Reached {
+    /// How many numbers it is: the step, two times, and three norms of four fields.
+    const NUMBERS: u64 = 15;
+
     fn numbers(&self) -> Vec<u64> {
         let errors = self.errors.named();
         let errors = errors.iter().flat_map(|(_, norms)| norms.named().map(|(_, e)| e.to_bits()));
@@ -157,7 +160,7 @@ impl Checkpoints {
             take(&mut bytes).map(|()| u64::from_le_bytes(bytes))
         };
         let (numbers, arrays) = (number()?, number()?);
-        if numbers != 14 || arrays != state.len() as u64 {
+        if numbers != Reached::NUMBERS || arrays != state.len() as u64 {
             return Err(damaged("it holds another number of arrays than this run has"));
         }
         let numbers = (0..numbers).map(|_| number()).collect::<Result<Vec<_>, _>>()?;

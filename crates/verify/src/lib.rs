@@ -69,8 +69,8 @@ pub use temporal::{Temporal, TemporalRow, temporal};
 pub use total::{CflSpeed, Frame, TotalScheme};
 pub use tradeoff::{
     Against, Cheapest, Chosen, Effect, Entry, Goal, Knob, LADDER, MARGIN, Machine, Repeat,
-    RepeatOutcome, Setting, Skip, TOLERANCES, Tradeoff, differences, extrapolate, families, median,
-    pareto, tradeoff,
+    RepeatOutcome, RunOutcome, Setting, Skip, TOLERANCES, Tradeoff, differences, extrapolate,
+    families, median, pareto, tradeoff,
 };
 pub use verdict::{
     Behaviour, Expected, ORDER_TOLERANCE, Verdict as OrderVerdict, expected_in_space,

@@ -3,8 +3,9 @@
 //! A *family* is a scheme with everything but its grid and its time step; a *ladder* is a family at one CFL number, on
 //! grids from coarse to fine. The next run is always the cheapest one, by the time that the family's earlier runs let
 //! expect, so that settings from the whole field are compared before any of them becomes dear. A grid is passed over where
-//! the error that the observed order lets expect is larger by [`MARGIN`] than that of a setting already known to cost no
-//! more; a ladder ends where that holds for all its grids that the budget can pay for, where its error no longer falls, or
+//! the error that the observed order lets expect is larger by [`MARGIN`] than that of a setting of the same weights already
+//! known to cost no more; one that any other setting so betters may still be run, to tell what its weights cost, but only
+//! while that is cheap. A ladder ends where that holds for all its grids that the budget can pay for, where its error no longer falls, or
 //! where a run stops. From a ladder's third grid on, half and twice its CFL number are tried as well, as long as that gains.
 //!
 //! Nothing here knows a clock or a solver: both are given, so that tests can state them.
@@ -29,8 +30,10 @@ pub const TOLERANCES: [f64; 7] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8];
 /// Shares of the budget at which the sweep, the comparisons of knobs, the proofs on neighbouring grids and the repeats
 /// for timing end.
 const PHASES: [f64; 4] = [0.58, 0.68, 0.92, 0.98];
-/// The largest share of the budget that one run may take, so that its neighbours can be run as well.
+/// The largest share of the budget that one run may take, so that its neighbours can be run as well; and one that settings
+/// with other weights dominate.
 const LARGEST_RUN: f64 = 0.1;
+const LARGEST_DOMINATED: f64 = 0.03;
 /// Predictions are held within 30 %.
 const UNCERTAINTY: f64 = 1.3;
 /// Runs shorter than this are timed three times at once.
@@ -82,7 +85,8 @@ pub enum Against {
 /// Why something was not run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Skip {
-    /// Its expected error is larger by [`MARGIN`] than one already measured at no higher cost.
+    /// Its expected error is larger by [`MARGIN`] than one already measured with the same weights at no higher cost, or with
+    /// any, and it would be dear.
     Dominated,
     /// The error of its ladder no longer falls.
     NoGain,
@@ -94,6 +98,8 @@ pub enum Skip {
     Budget,
     /// It needs more memory than there is.
     Memory,
+    /// The solver refuses it.
+    Refused,
 }
 
 /// What is wanted.
@@ -125,12 +131,15 @@ pub struct Repeat {
 /// A repeat, none where it did not end in time, or why it could not be run.
 pub type RepeatOutcome<E> = Result<Option<Repeat>, E>;
 
+/// A row, none where the solver refuses the setting, or why the study cannot go on.
+pub type RunOutcome<E> = Result<Option<Row>, E>;
+
 /// What runs the settings.
 pub struct Machine<'a, E> {
     /// What a setting comes to; none where it does not fit the solution.
     pub plan: &'a dyn Fn(&Setting) -> Option<Plan>,
-    /// Runs a setting and measures its errors, for at most so many seconds.
-    pub run: &'a dyn Fn(&Setting, f64) -> Result<Row, E>,
+    /// Runs a setting and measures its errors, for at most so many seconds; none where the solver refuses it.
+    pub run: &'a (dyn Fn(&Setting, f64) -> RunOutcome<E> + 'a),
     /// Runs the steps alone, for at most so many seconds; none if it did not end.
     pub repeat: &'a (dyn Fn(&Setting, f64) -> RepeatOutcome<E> + 'a),
     /// Seconds since the start.
@@ -352,6 +361,20 @@ fn hint(setting: &Setting) -> f64 {
     }
 }
 
+/// What the weights are: the shape and where its particles lie, or the degree of the total frame's splines.
+#[derive(Clone, Copy, PartialEq)]
+enum Weights {
+    Updated(Shape, Placement),
+    Total(usize),
+}
+
+fn weights(setting: &Setting) -> Weights {
+    match &setting.case.frame {
+        Frame::Updated => Weights::Updated(setting.case.shape, setting.case.placement),
+        Frame::Total(total) => Weights::Total(total.scheme.degree),
+    }
+}
+
 /// Which knobs differ.
 #[must_use]
 pub fn differences(a: &Setting, b: &Setting) -> Vec<Knob> {
@@ -499,9 +522,19 @@ impl<E> Sweep<'_, E> {
     }
 
     fn front(&self) -> Vec<usize> {
-        let points =
-            (0..self.found.entries.len()).map(|index| (self.cost(index), self.error(index)));
-        pareto(&points.collect::<Vec<_>>())
+        pareto(&self.points(0..self.found.entries.len()))
+    }
+
+    /// The front among settings of the same weights.
+    fn front_of(&self, of: Weights) -> Vec<usize> {
+        let entries = &self.found.entries;
+        let own: Vec<usize> =
+            (0..entries.len()).filter(|&index| weights(&entries[index].setting) == of).collect();
+        pareto(&self.points(own.iter().copied())).into_iter().map(|place| own[place]).collect()
+    }
+
+    fn points(&self, entries: impl IntoIterator<Item = usize>) -> Vec<(f64, f64)> {
+        entries.into_iter().map(|index| (self.cost(index), self.error(index))).collect()
     }
 
     fn expected_cost(&self, plan: &Plan, cost: &Cost, threads: usize) -> f64 {
@@ -522,15 +555,24 @@ impl<E> Sweep<'_, E> {
     /// Runs the ladders from cheap to dear.
     fn climb(&mut self, progress: &mut dyn FnMut(&Setting)) -> Result<(), E> {
         loop {
-            let front: Vec<(f64, f64)> =
-                self.front().into_iter().map(|i| (self.cost(i), self.error(i))).collect();
-            let left = self.left(0).min(LARGEST_RUN * self.goal.budget_s);
+            let front = self.points(self.front());
+            let left = self.left(0);
+            let mut own: Vec<(Weights, Vec<(f64, f64)>)> = Vec::new();
+            for family in &self.families {
+                let weights = weights(&family.setting);
+                if own.iter().all(|(known, _)| *known != weights) {
+                    own.push((weights, self.points(self.front_of(weights))));
+                }
+            }
             let mut cheapest: Option<(f64, usize, Next)> = None;
             for index in 0..self.ladders.len() {
                 if !self.ladders[index].open {
                     continue;
                 }
-                match self.next(&self.ladders[index], &front, left) {
+                let weights = weights(&self.families[self.ladders[index].family].setting);
+                let own = own.iter().find(|(known, _)| *known == weights);
+                let own = own.map_or(&[][..], |(_, points)| points.as_slice());
+                match self.next(&self.ladders[index], own, &front, left) {
                     Ok(next) => {
                         let time = next.expected.map_or(0.0, |cost| cost.total_s);
                         if cheapest.as_ref().is_none_or(|(least, ..)| time < *least) {
@@ -553,7 +595,8 @@ impl<E> Sweep<'_, E> {
     fn next(
         &self,
         ladder: &Ladder,
-        front: &[(f64, f64)],
+        own: &[(f64, f64)],
+        all: &[(f64, f64)],
         left: f64,
     ) -> Result<Next, (Skip, usize)> {
         let family = &self.families[ladder.family];
@@ -575,7 +618,8 @@ impl<E> Sweep<'_, E> {
                     false => Err((Skip::Budget, 1)),
                 };
             };
-            if UNCERTAINTY * cost.total_s > left {
+            let most = left.min(LARGEST_RUN * self.goal.budget_s);
+            if UNCERTAINTY * cost.total_s > most {
                 // If all that can be paid for is dominated, that is why the ladder ends.
                 let reason = if passed_over > 0 { Skip::Dominated } else { Skip::Budget };
                 return Err((reason, 1.max(passed_over)));
@@ -585,9 +629,13 @@ impl<E> Sweep<'_, E> {
                 _ => extrapolate(&ladder.known, LADDER[rung], hint(&family.setting)),
             };
             let price = self.expected_cost(&plan, &cost, family.setting.threads);
-            let is_dominated = error.is_some_and(|error| {
-                front.iter().any(|&(known, least)| known <= price && MARGIN * least <= error)
-            });
+            let is_below = |points: &[(f64, f64)]| {
+                error.is_some_and(|error| {
+                    points.iter().any(|&(known, least)| known <= price && MARGIN * least <= error)
+                })
+            };
+            let is_dear = cost.total_s > LARGEST_DOMINATED * self.goal.budget_s;
+            let is_dominated = is_below(own) || is_dear && is_below(all);
             if !is_dominated {
                 return Ok(Next { rung, passed_over, expected: Some(cost) });
             }
@@ -607,9 +655,12 @@ impl<E> Sweep<'_, E> {
         let cells = LADDER[rung];
         let setting = self.families[family].setting;
         let setting = Setting { case: Case { cells, cfl, ..setting.case }, ..setting };
-        let entry = self.run(family, &setting, progress)?;
-        let error = self.error(entry);
         self.ladders[index].next = rung + 1;
+        let Some(entry) = self.run(family, &setting, progress)? else {
+            self.skip(Skip::Refused, 1);
+            return Ok(());
+        };
+        let error = self.error(entry);
         let branch = |sweep: &mut Self, factor: f64, parent: Option<Parent>, halvings| {
             sweep.ladders.push(Ladder {
                 family,
@@ -651,19 +702,19 @@ impl<E> Sweep<'_, E> {
         Ok(())
     }
 
-    /// The entry of a setting, run now if it was not yet.
+    /// The entry of a setting, run now if it was not yet; none where the solver refuses it.
     fn run(
         &mut self,
         family: usize,
         setting: &Setting,
         progress: &mut dyn FnMut(&Setting),
-    ) -> Result<usize, E> {
+    ) -> Result<Option<usize>, E> {
         if let Some(known) = self.found.entries.iter().position(|e| e.setting == *setting) {
-            return Ok(known);
+            return Ok(Some(known));
         }
         progress(setting);
         let started = (self.machine.clock)();
-        let row = (self.machine.run)(setting, self.left(3))?;
+        let Some(row) = (self.machine.run)(setting, self.left(3))? else { return Ok(None) };
         let total_s = (self.machine.clock)() - started;
         if row.status == Status::Ok {
             let cost = Cost { steps_s: row.wall_s, total_s };
@@ -681,7 +732,7 @@ impl<E> Sweep<'_, E> {
                 break;
             }
         }
-        Ok(entry)
+        Ok(Some(entry))
     }
 
     /// Times a setting once more; whether it ended in time.
@@ -796,7 +847,7 @@ impl<E> Sweep<'_, E> {
                 }
             }
             let entry = self.run(family, &neighbour, progress)?;
-            let error = self.error(entry);
+            let error = entry.map_or(f64::NAN, |entry| self.error(entry));
             // A comparison that is not a number holds nothing.
             if error.is_nan() || error > tolerance {
                 return Ok(Some(false));
@@ -830,7 +881,8 @@ impl<E> Sweep<'_, E> {
         let Some(entry) = entry else { return Ok(None) };
         let setting = self.found.entries[entry].setting;
         progress(&setting);
-        Ok(Some(Chosen { entry, proof: (self.machine.run)(&setting, f64::INFINITY)? }))
+        let proof = (self.machine.run)(&setting, f64::INFINITY)?;
+        Ok(proof.map(|proof| Chosen { entry, proof }))
     }
 
     /// What the proofs will take.
@@ -903,26 +955,29 @@ fn turn(knob: Knob, a: &Setting, b: &Setting) -> Option<String> {
         Frame::Total(t) => (String::new(), t.scheme.degree, format!("{:?}", t.scheme.composition)),
     };
     let ((shape, degree, integrator), (shape_b, degree_b, integrator_b)) = (of(a), of(b));
-    let usual = matches!(x.shape, Shape::Gimp) || x.placement == Placement::BodyFitted;
+    let is_usual = x.shape == Shape::Gimp || x.placement == Placement::BodyFitted;
     let key = match knob {
         Knob::Cells => {
             (y.cells == 2 * x.cells).then(|| format!("{shape} {degree} {:?}", x.placement))
         }
-        Knob::Cfl => (y.cfl == x.cfl / 2.0).then(|| format!("{shape} {degree} {integrator}")),
-        Knob::Ppc => (y.per_cell > x.per_cell)
-            .then(|| format!("{shape} {degree} {} {}", x.per_cell, y.per_cell)),
-        Knob::Shape if frame == "total" => {
-            (degree_b == degree + 2).then(|| format!("{degree} {degree_b}"))
+        Knob::Cfl => (y.cfl == x.cfl / 2.0 && (is_usual || frame == "total"))
+            .then(|| format!("{shape} {degree} {integrator}")),
+        Knob::Ppc => {
+            (y.per_cell == x.per_cell + 1).then(|| format!("{shape} {degree} {}", x.per_cell))
         }
-        Knob::Shape => usual.then(|| format!("{shape} {shape_b}")),
-        // From centred differences to another one; between compositions one way round.
-        Knob::Integrator => (x.integrator == Integrator::Cd
-            && (y.integrator != Integrator::Cd || integrator < integrator_b))
-            .then(|| format!("{shape} {degree} {integrator} {integrator_b}")),
+        Knob::Shape if frame == "total" => (degree_b == degree + 1).then(|| format!("{degree}")),
+        Knob::Shape => is_usual.then(|| format!("{shape} {shape_b}")),
+        // From centred differences to another one; between compositions to the next order.
+        Knob::Integrator if frame == "updated" => {
+            (x.integrator == Integrator::Cd).then(|| format!("{shape} {integrator_b}"))
+        }
+        Knob::Integrator => (integrator < integrator_b
+            && (integrator.as_str(), integrator_b.as_str()) != ("Order2", "Order6"))
+            .then(|| format!("{degree} {integrator}")),
         Knob::Transfer => (x.transfer == Transfer::Flip).then(|| format!("{shape} {}", y.transfer)),
-        Knob::Layout => match (x.frame, y.frame) {
-            (Frame::Updated, _) => (x.placement == Placement::Lattice).then(|| shape.clone()),
-            (Frame::Total(s), _) => (s.layout == Layout::Lattice).then(|| format!("{degree}")),
+        Knob::Layout => match x.frame {
+            Frame::Updated => (x.placement == Placement::Lattice).then(|| shape.clone()),
+            Frame::Total(total) => (total.layout == Layout::Lattice).then(|| format!("{degree}")),
         },
         Knob::Mass => match x.frame {
             Frame::Total(total) if total.scheme.mass == MassMatrix::Lumped => {

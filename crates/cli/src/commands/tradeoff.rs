@@ -7,10 +7,11 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Context, Result, bail};
 use mmsmith_verify::{
-    Arithmetic, Case, Chosen, Entry, Goal, MARGIN, Machine, Outputs, Record, Repeat, Row, Setting,
-    Skip, Status, Tradeoff, families, plan, run as simulate, time_steps, tradeoff as measure,
+    Arithmetic, Case, CaseError, Chosen, Entry, Goal, MARGIN, Machine, Outputs, Record, Repeat,
+    Row, Setting, Skip, Status, Tradeoff, families, plan, run as simulate, time_steps,
+    tradeoff as measure,
 };
 use serde_json::{Value, json};
 
@@ -97,7 +98,7 @@ impl Runner<'_> {
         self.pools.get(&setting.threads).context("no threads were started for this setting")
     }
 
-    fn run(&self, setting: &Setting, most_s: f64) -> Result<Row> {
+    fn run(&self, setting: &Setting, most_s: f64) -> Result<Option<Row>> {
         let until = until(most_s);
         let compute = |_: usize| -> Result<Record> {
             let row = self.pool(setting)?.install(|| {
@@ -122,11 +123,16 @@ impl Runner<'_> {
         });
         let mark = |record: &mut Record| record.timed_alone = false;
         match self.keep.all(&[key], Order::OneByOne, mark, compute) {
-            Ok(records) => {
-                let record = records.into_iter().next();
-                record.map(Row::from).ok_or_else(|| anyhow!("a run gave no row"))
-            }
-            Err(error) => error.downcast::<CutShort>().map(|CutShort(row)| row),
+            Ok(records) => Ok(records.into_iter().next().map(Row::from)),
+            Err(error) => match error.downcast::<CutShort>() {
+                Ok(CutShort(row)) => Ok(Some(row)),
+                // Such as a mass matrix that too few particles make singular.
+                Err(error) => match error.downcast::<CaseError>() {
+                    Ok(CaseError::Setup(_)) => Ok(None),
+                    Ok(other) => Err(other.into()),
+                    Err(other) => Err(other),
+                },
+            },
         }
     }
 
@@ -237,12 +243,14 @@ struct Report<'a> {
 fn reason(skip: Skip) -> String {
     match skip {
         Skip::Dominated => format!(
-            "expected to be {MARGIN} times less accurate than a setting measured at no higher cost"
+            "expected to be {MARGIN} times less accurate than one measured at no higher cost with the same weights, or, where \
+             dear, with any"
         ),
         Skip::NoGain => "error no longer falls on finer grids".into(),
         Skip::Cfl => "another CFL number gains nothing".into(),
         Skip::Stopped => "the run stopped, finer ones were not tried".into(),
         Skip::Budget => "would take longer than the budget leaves to one run".into(),
+        Skip::Refused => "refused by the solver, such as for too few particles".into(),
         Skip::Memory => "would need more memory than there is".into(),
     }
 }
