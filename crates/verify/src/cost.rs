@@ -16,6 +16,10 @@ use crate::measure::measure;
 use crate::plan::{Plan, plan, prepare};
 use crate::solver::Solver;
 use crate::total::{self, Frame};
+use crate::tradeoff::median;
+
+/// How many steps' times a median is taken of.
+const FIRST_STEPS: usize = 63;
 
 /// What some steps of a case took, in seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +34,8 @@ pub struct Timing {
     pub setup_s: f64,
     /// Wall-clock time of the steps.
     pub wall_s: f64,
+    /// The median of the first steps' times: one that the machine's other work held up does not count.
+    pub step_s: f64,
     /// Processor time of the steps on all threads.
     pub cpu_s: f64,
     /// Measuring the errors at one instant.
@@ -107,19 +113,30 @@ fn advance<T: Real, const D: usize>(
 ) -> Timing {
     let (computing, started) = (ProcessTime::now(), Instant::now());
     let mut done = 0;
+    let mut each = Vec::new();
+    let mut before = started;
     while done < steps.min(limits.most) && solver.step(body_force).is_ok() {
         done += 1;
-        if limits.until.is_some_and(|until| Instant::now() >= until) {
+        let now = Instant::now();
+        if each.len() < FIRST_STEPS {
+            each.push((now - before).as_secs_f64());
+        }
+        before = now;
+        if limits.until.is_some_and(|until| now >= until) {
             break;
         }
     }
     let (wall_s, cpu_s) = (started.elapsed().as_secs_f64(), computing.elapsed().as_secs_f64());
-    let started = Instant::now();
     let lag = solver.velocity_lag();
-    std::hint::black_box(measure(solver.observe(), exact, 0.0, lag).norms);
-    let measure_s = started.elapsed().as_secs_f64();
+    let measured: [f64; 3] = std::array::from_fn(|_| {
+        let started = Instant::now();
+        std::hint::black_box(measure(solver.observe(), exact, 0.0, lag).norms);
+        started.elapsed().as_secs_f64()
+    });
+    let (step_s, measure_s) = (median(&each), median(&measured));
     let particles = solver.observe().0.len();
-    Timing { particles, steps: done, complete: done == steps, setup_s, wall_s, cpu_s, measure_s }
+    let complete = done == steps;
+    Timing { particles, steps: done, complete, setup_s, wall_s, step_s, cpu_s, measure_s }
 }
 
 /// What one number of particles costs, in seconds.
@@ -206,7 +223,7 @@ impl CostModel {
                 model.put(Sample {
                     particles: timing.particles as f64,
                     setup_s: timing.setup_s,
-                    step_s: timing.wall_s / timing.steps as f64,
+                    step_s: timing.step_s,
                     beside_s: timing.measure_s,
                 });
             }

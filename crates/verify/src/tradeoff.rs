@@ -914,12 +914,23 @@ impl<E> Sweep<'_, E> {
     /// What each knob did: of the pairs that differ in it alone, the finest one for each pair of values.
     fn effects(&self) -> Vec<Effect> {
         let entries = &self.found.entries;
+        let Some(plain) = self.families.first().map(|family| family.setting) else {
+            return Vec::new();
+        };
         let mut best: BTreeMap<(Knob, String), Effect> = BTreeMap::new();
         for from in 0..entries.len() {
             for to in 0..entries.len() {
                 let (a, b) = (&entries[from].setting, &entries[to].setting);
                 let &[knob] = differences(a, b).as_slice() else { continue };
-                let Some(turned) = turn(knob, a, b) else { continue };
+                // Told of plain settings: with f32 or PIC, say, another knob's effect is another one.
+                let is_plain = a.case.transfer == Transfer::Flip
+                    && !a.single
+                    && a.threads == plain.threads
+                    && a.case.cfl <= plain.case.cfl
+                    && (a.case.per_cell == 2
+                        || knob == Knob::Ppc
+                        || a.case.frame != Frame::Updated);
+                let Some(turned) = turn(knob, a, b).filter(|_| is_plain) else { continue };
                 let error = self.error(to) / self.error(from);
                 let time = entries[to].row.wall_s / entries[from].row.wall_s;
                 if !(error.is_finite() && time.is_finite()) {
