@@ -99,7 +99,7 @@ fn what_cannot_be_swept_is_refused() {
     let place = place.path();
     refuses(place, "tradeoff vortex --budget 1s --json a.json", &["does not model"]);
     refuses(place, "tradeoff ring --budget 2x", &["--budget", "90s, 2m or 1h"]);
-    refuses(place, "tradeoff ring --budget -1s", &["--budget"]);
+    refuses(place, "tradeoff ring --budget=-1s", &["--budget", "90s, 2m or 1h"]);
     refuses(place, "tradeoff rings --budget 1s", &["did you mean 'ring'"]);
 }
 
