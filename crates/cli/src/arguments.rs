@@ -34,10 +34,28 @@ pub(crate) enum Command {
     Converge(ConvergeOptions),
     /// Find the largest stable CFL number by bisection, over one or two settings or parameters
     Stability(StabilityOptions),
+    /// Measure error against cost over all schemes that fit, name the cheapest setting for an error, and say what each knob buys
+    Tradeoff(TradeoffOptions),
     /// Measure errors and orders of what another solver wrote (.vtu, .vtp, .vtk, .pvd, .csv)
     Score(ScoreOptions),
     /// Repeat the original study on both of its problems, with a report, tables, data and particle files
     Reproduce(ReproduceOptions),
+}
+
+/// Declares an argument's values with what they mean to the library.
+macro_rules! choices {
+    ($(#[$doc:meta])* $name:ident => $target:ty { $($(#[$value_doc:meta])* $value:ident,)+ }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+        #[serde(rename_all = "kebab-case")]
+        pub(crate) enum $name { $($(#[$value_doc])* $value,)+ }
+
+        impl From<$name> for $target {
+            fn from(value: $name) -> Self {
+                match value { $($name::$value => Self::$value,)+ }
+            }
+        }
+    };
 }
 
 #[derive(Args)]
@@ -227,6 +245,95 @@ pub(crate) struct StabilityOptions {
     pub(crate) scheme: SchemeOptions,
 }
 
+#[derive(Args)]
+pub(crate) struct TradeoffOptions {
+    /// The solution, by name, or a specification file (SPEC.toml)
+    #[arg(value_name = "NAME|SPEC.toml")]
+    pub(crate) name: String,
+    /// Time for everything, such as 90s, 2m or 1h; it is used up, for timings repeated if for nothing better
+    #[arg(long, value_name = "TIME", default_value = "2m", value_parser = seconds)]
+    pub(crate) budget: f64,
+    /// Name the cheapest setting with at most this error, and run it once more to prove it; exit status 1 if there is none
+    #[arg(long, value_name = "X", value_parser = positive_number)]
+    pub(crate) tolerance: Option<f64>,
+    /// Name the most accurate setting whose steps take at most this time, and run it once more to prove it; exit status 1
+    /// if there is none
+    #[arg(long, value_name = "TIME", value_parser = seconds)]
+    pub(crate) time: Option<f64>,
+    /// Field whose error counts. Errors of u are divided by the amplitude A where the solution has one
+    #[arg(long, value_enum, default_value_t = Field::U, ignore_case = true)]
+    pub(crate) field: Field,
+    /// Norm of the error
+    #[arg(long, value_enum, default_value_t = Norm::Linf)]
+    pub(crate) norm: Norm,
+    /// Cost that the error is held against
+    #[arg(long, value_enum, default_value_t = Against::Wall)]
+    pub(crate) against: Against,
+    /// End time in periods of the solution
+    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = positive_number)]
+    pub(crate) periods: f64,
+    /// Number of threads; 1 when left out, and all cores for comparison
+    #[arg(long, value_name = "N", value_parser = thread_count)]
+    pub(crate) threads: Option<usize>,
+    #[command(flatten)]
+    pub(crate) parameters: ParameterOptions,
+    /// Write the result to this JSON file
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
+    /// Write all settings to this file as comma-separated values
+    #[arg(long, value_name = "FILE")]
+    pub(crate) csv: Option<PathBuf>,
+    /// Draw error against cost, with the front, to this SVG file
+    #[arg(long, value_name = "FILE")]
+    pub(crate) plot: Option<PathBuf>,
+    /// Write a page of advice to this Markdown file, with the figure behind each sentence
+    #[arg(long, value_name = "FILE")]
+    pub(crate) advice: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) kept: KeepOptions,
+}
+
+/// Fields whose error is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+pub(crate) enum Field {
+    /// Displacement
+    #[serde(rename = "u")]
+    U,
+    /// Velocity
+    #[serde(rename = "v")]
+    V,
+    /// Deformation gradient
+    F,
+    /// First Piola-Kirchhoff stress
+    P,
+}
+
+/// Norms.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Norm {
+    /// Largest over particles
+    Linf,
+    /// Root of the mean square
+    L2,
+    /// Mean
+    L1,
+}
+
+choices!(
+    /// Costs.
+    Against => verify::Against {
+        /// Wall-clock time of the steps
+        Wall,
+        /// Processor time of the steps
+        Cpu,
+        /// Number of steps
+        Steps,
+        /// Memory, estimated
+        Memory,
+    }
+);
+
 /// Ways to look for failures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum SearchKind {
@@ -379,22 +486,6 @@ impl SchemeOptions {
         let Usual { scheme } = Usual::parse_from(["mms"]);
         Self { shape, integrator, ..scheme }
     }
-}
-
-/// Declares an argument's values with what they mean to the library.
-macro_rules! choices {
-    ($(#[$doc:meta])* $name:ident => $target:ty { $($(#[$value_doc:meta])* $value:ident,)+ }) => {
-        $(#[$doc])*
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
-        #[serde(rename_all = "kebab-case")]
-        pub(crate) enum $name { $($(#[$value_doc])* $value,)+ }
-
-        impl From<$name> for $target {
-            fn from(value: $name) -> Self {
-                match value { $($name::$value => Self::$value,)+ }
-            }
-        }
-    };
 }
 
 /// Weights.
@@ -568,6 +659,19 @@ fn positive_number(text: &str) -> Result<f64, String> {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
         _ => Err("it must be a positive number, such as 0.4".into()),
     }
+}
+
+/// A time: seconds, or with a unit.
+fn seconds(text: &str) -> Result<f64, String> {
+    let text = text.trim();
+    let units = [("ms", 1e-3), ("s", 1.0), ("m", 60.0), ("h", 3600.0)];
+    let (number, unit) = units
+        .into_iter()
+        .find_map(|(unit, factor)| Some((text.strip_suffix(unit)?, factor)))
+        .unwrap_or((text, 1.0));
+    positive_number(number)
+        .map(|number| number * unit)
+        .map_err(|_| "it must be a positive time, such as 90s, 2m or 1h".into())
 }
 
 fn finite_number(text: &str) -> Result<f64, String> {

@@ -6,6 +6,7 @@ mod coverage;
 mod eval;
 mod explain;
 mod list;
+mod predict;
 mod reproduce;
 mod resume;
 mod run;
@@ -13,6 +14,7 @@ mod scheme;
 mod score;
 mod stability;
 mod thorough;
+mod tradeoff;
 
 pub(crate) use check::check;
 pub(crate) use converge::converge;
@@ -25,6 +27,7 @@ pub(crate) use resume::resume;
 pub(crate) use run::run;
 pub(crate) use score::score;
 pub(crate) use stability::stability;
+pub(crate) use tradeoff::tradeoff;
 
 use anyhow::{Context, Result};
 use mmsmith_solutions::AnySolution;
@@ -34,7 +37,7 @@ use serde_json::{Value, json};
 
 use crate::arguments::{Extent, Frame, Precision, SchemeOptions};
 use crate::library::Selection;
-use crate::memory;
+use crate::{memory, terminal};
 
 /// A solution in the precisions that a simulation of it needs.
 struct Model {
@@ -53,6 +56,21 @@ impl Model {
 
     fn arithmetic(&self) -> Arithmetic<'_> {
         self.single.as_ref().map_or(Arithmetic::Double, Arithmetic::Single)
+    }
+
+    /// Says on standard error what cases of more than a minute will take, and gives the seconds of each.
+    fn announce(&self, cases: &[Case]) -> Option<Vec<f64>> {
+        const LONG_S: f64 = 60.0;
+        let seconds = predict::seconds(self, cases)?;
+        let total: f64 = seconds.iter().sum();
+        if total < LONG_S {
+            return None;
+        }
+        let plans = cases.iter().filter_map(|case| plan(&self.exact, self.arithmetic(), case).ok());
+        let bytes = plans.map(|plan| plan.bytes).fold(0.0, f64::max);
+        let (time, memory) = (predict::duration(total), predict::amount(bytes));
+        terminal::complain(&format!("predicted: about {time}, with {memory} of memory\n"));
+        Some(seconds)
     }
 
     /// Refuses cases that cannot be run or do not fit; gives the extent that they will have.

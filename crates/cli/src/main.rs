@@ -37,6 +37,7 @@ fn main() -> ExitCode {
         Command::Converge(options) => commands::converge(options),
         Command::Stability(options) => commands::stability(options),
         Command::Score(options) => commands::score(options),
+        Command::Tradeoff(options) => commands::tradeoff(options),
         Command::Reproduce(options) => commands::reproduce(options),
     };
     match outcome {

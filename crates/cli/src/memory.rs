@@ -8,7 +8,7 @@ const GIB: f64 = 1024.0 * 1024.0 * 1024.0;
 
 /// Refuses what cannot fit, before it is tried.
 pub(crate) fn require(bytes: f64, cells: usize) -> Result<()> {
-    let available = available().unwrap_or(UNKNOWN);
+    let available = available();
     if bytes > available {
         bail!(
             "--cells {cells}: this needs about {:.3e} GiB of memory, and {:.1} GiB are available; \
@@ -20,8 +20,12 @@ pub(crate) fn require(bytes: f64, cells: usize) -> Result<()> {
     Ok(())
 }
 
-/// Bytes that can be had without swapping, where the system tells.
-fn available() -> Option<f64> {
+/// Bytes that can be had without swapping; where the system does not tell, what is believed.
+pub(crate) fn available() -> f64 {
+    told().unwrap_or(UNKNOWN)
+}
+
+fn told() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
     let kibibytes: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;

@@ -26,7 +26,7 @@ fn killed(place: &Path, arguments: &str, after: Duration) {
 /// The result without its times.
 fn result(path: &Path) -> Value {
     let mut result = read_json(path)["result"].take();
-    for key in ["wall_s", "particle_steps_per_s"] {
+    for key in ["wall_s", "cpu_s", "particle_steps_per_s"] {
         result.as_object_mut().expect("a row").remove(key).expect("a time");
     }
     result

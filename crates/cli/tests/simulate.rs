@@ -5,7 +5,7 @@ mod command;
 use command::{keys, mms, names, read_json, refuses};
 use serde_json::Value;
 
-const ROW: &str = "cells cfl dt errors h particle_steps_per_s particles status steps wall_s";
+const ROW: &str = "cells cfl cpu_s dt errors h particle_steps_per_s particles status steps wall_s";
 
 fn assert_row(row: &Value) {
     assert_eq!(keys(row), ROW);

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::time::Instant;
 
+use cpu_time::ProcessTime;
 use mmsmith_mpm::fault::{Fault, Planted};
 use mmsmith_mpm::general::{Integrator, Shape, Transfer};
 use mmsmith_mpm::{BodyForce, Particles, Settings, SetupError, Simulation, StepError};
@@ -116,6 +117,8 @@ pub struct Outputs<'a> {
     pub frames: Option<&'a FrameOutput>,
     /// What a run that is killed goes on from, if that is wanted.
     pub checkpoints: Option<&'a Checkpoints>,
+    /// When to give up: a run that is still under way then ends after its step with [`Status::Cut`].
+    pub until: Option<Instant>,
 }
 
 /// How a run ended.
@@ -138,6 +141,13 @@ pub enum Status {
         /// The body's largest extent.
         size: f64,
     },
+    /// The time that it was given was over.
+    Cut {
+        /// The last step done.
+        step: u64,
+        /// Its time.
+        time: f64,
+    },
 }
 
 impl fmt::Display for Status {
@@ -150,6 +160,9 @@ impl fmt::Display for Status {
                 "unstable: position error {error:.3e} exceeds the body's size {size:.3e} at step {step}, \
                  t = {time:.6e}, particle {particle}"
             ),
+            Self::Cut { step, time } => {
+                write!(f, "cut after step {step}, t = {time:.6e}: its time was over")
+            }
         }
     }
 }
@@ -177,6 +190,8 @@ pub struct Row {
     pub particles: usize,
     /// Wall-clock time of the steps alone, without set-up, measuring and writing, in seconds.
     pub wall_s: f64,
+    /// Processor time of the steps on all threads, in seconds.
+    pub cpu_s: f64,
     /// Particles times steps done over `wall_s`.
     pub particle_steps_per_s: f64,
     /// Whether no other case of the same study ran beside it: where one did, its times are those of a shared machine.
@@ -336,24 +351,31 @@ pub(crate) fn follow<T: Real, const D: usize>(
         Some(checkpoints) => checkpoints.read(&mut solver.state())?,
         None => None,
     };
-    let Reached { step: mut done, mut wall_s, mut errors } = if let Some(reached) = resumed {
-        if let Some(frames) = &mut frames {
-            frames.take_up(reached.step, dt);
-        }
-        reached
-    } else {
-        if let Some(frames) = &mut frames {
-            frames.write(solver.observe(), exact, 0, 0.0)?;
-        }
-        let at_start = measure(solver.observe(), exact, 0.0, lag).norms;
-        // Before the first step no velocity is stored yet that belongs to a time of the scheme.
-        Reached { step: 0, wall_s: 0.0, errors: PerField { v: PerNorm::default(), ..at_start } }
-    };
+    let Reached { step: mut done, mut wall_s, mut cpu_s, mut errors } =
+        if let Some(reached) = resumed {
+            if let Some(frames) = &mut frames {
+                frames.take_up(reached.step, dt);
+            }
+            reached
+        } else {
+            if let Some(frames) = &mut frames {
+                frames.write(solver.observe(), exact, 0, 0.0)?;
+            }
+            let at_start = measure(solver.observe(), exact, 0.0, lag).norms;
+            // Before the first step no velocity is stored yet that belongs to a time of the scheme.
+            Reached {
+                step: 0,
+                wall_s: 0.0,
+                cpu_s: 0.0,
+                errors: PerField { v: PerNorm::default(), ..at_start },
+            }
+        };
     let mut status = Status::Ok;
     for step in done + 1..=steps.count {
-        let started = Instant::now();
+        let (computing, started) = (ProcessTime::now(), Instant::now());
         let outcome = solver.step(body_force);
         wall_s += started.elapsed().as_secs_f64();
+        cpu_s += computing.elapsed().as_secs_f64();
         if let Err(error) = outcome {
             status = Status::Stopped(error);
             break;
@@ -372,13 +394,17 @@ pub(crate) fn follow<T: Real, const D: usize>(
         }
         let share = step as f64 / steps.count as f64;
         (outputs.progress)(Progress { case: 0, step, steps: steps.count, share });
+        let late = step < steps.count && outputs.until.is_some_and(|until| Instant::now() >= until);
+        if late && status == Status::Ok {
+            status = Status::Cut { step, time };
+        }
         if status != Status::Ok {
             break;
         }
         if let Some(checkpoints) = outputs.checkpoints
             && step % checkpoints.every == 0
         {
-            checkpoints.write(&Reached { step, wall_s, errors }, &solver.state())?;
+            checkpoints.write(&Reached { step, wall_s, cpu_s, errors }, &solver.state())?;
         }
     }
     let count = solver.observe().0.len();
@@ -391,6 +417,7 @@ pub(crate) fn follow<T: Real, const D: usize>(
         steps: steps.count,
         particles: count,
         wall_s,
+        cpu_s,
         particle_steps_per_s: if wall_s > 0.0 { particle_steps / wall_s } else { 0.0 },
         timed_alone: true,
         status,

@@ -14,7 +14,7 @@ use thiserror::Error;
 use crate::norms::{PerField, PerNorm};
 
 /// How every checkpoint begins.
-const MAGIC: &[u8; 24] = b"mmsmith checkpoint 1\n\0\0\0";
+const MAGIC: &[u8; 24] = b"mmsmith checkpoint 2\n\0\0\0";
 const FILE: &str = "checkpoint";
 
 /// Where and how often a run writes down its state, and whether it goes on from there.
@@ -72,18 +72,22 @@ pub enum CheckpointError {
 pub(crate) struct Reached {
     pub(crate) step: u64,
     pub(crate) wall_s: f64,
+    pub(crate) cpu_s: f64,
     pub(crate) errors: PerField<PerNorm<f64>>,
 }
 
 impl Reached {
+    /// How many numbers it is: the step, two times, and three norms of four fields.
+    const NUMBERS: u64 = 15;
+
     fn numbers(&self) -> Vec<u64> {
         let errors = self.errors.named();
         let errors = errors.iter().flat_map(|(_, norms)| norms.named().map(|(_, e)| e.to_bits()));
-        [self.step, self.wall_s.to_bits()].into_iter().chain(errors).collect()
+        [self.step, self.wall_s.to_bits(), self.cpu_s.to_bits()].into_iter().chain(errors).collect()
     }
 
     fn from_numbers(numbers: &[u64]) -> Option<Self> {
-        let (&[step, wall_s], errors) = numbers.split_first_chunk()?;
+        let (&[step, wall_s, cpu_s], errors) = numbers.split_first_chunk()?;
         let (norms, rest) = errors.as_chunks::<3>();
         let norm = |[linf, l2, l1]: [u64; 3]| {
             let [linf, l2, l1] = [linf, l2, l1].map(f64::from_bits);
@@ -91,7 +95,8 @@ impl Reached {
         };
         let (&[u, v, F, P], []) = (norms, rest) else { return None };
         let errors = PerField { u: norm(u), v: norm(v), F: norm(F), P: norm(P) };
-        Some(Self { step, wall_s: f64::from_bits(wall_s), errors })
+        let [wall_s, cpu_s] = [wall_s, cpu_s].map(f64::from_bits);
+        Some(Self { step, wall_s, cpu_s, errors })
     }
 }
 
@@ -155,7 +160,7 @@ impl Checkpoints {
             take(&mut bytes).map(|()| u64::from_le_bytes(bytes))
         };
         let (numbers, arrays) = (number()?, number()?);
-        if numbers != 14 || arrays != state.len() as u64 {
+        if numbers != Reached::NUMBERS || arrays != state.len() as u64 {
             return Err(damaged("it holds another number of arrays than this run has"));
         }
         let numbers = (0..numbers).map(|_| number()).collect::<Result<Vec<_>, _>>()?;
@@ -211,7 +216,7 @@ mod tests {
     fn reached() -> Reached {
         let norm = |x: f64| PerNorm { linf: x, l2: 0.1 * x, l1: -0.0 };
         let errors = PerField { u: norm(1.0), v: norm(2.0), F: norm(f64::NAN), P: norm(1e-300) };
-        Reached { step: 12, wall_s: 0.3, errors }
+        Reached { step: 12, wall_s: 0.3, cpu_s: 0.4, errors }
     }
 
     #[test]

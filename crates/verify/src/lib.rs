@@ -7,6 +7,7 @@
 //!   stress; [`converge`] does so for a series of grids or time steps and adds the orders of accuracy.
 //! - [`score()`] measures what another solver wrote to files, in the same norms.
 //! - [`temporal()`] measures the error of time stepping alone, and [`verdicts`] judges orders.
+//! - [`tradeoff()`] measures error against cost over all schemes that fit a solution, and [`CostModel`] predicts what a run takes.
 //! - [`stability()`] finds the largest stable time step of a scheme.
 //! - [`evaluate()`] gives the exact fields at a point.
 //!
@@ -16,6 +17,7 @@
 mod case;
 mod check;
 mod checkpoint;
+mod cost;
 mod coverage;
 mod difference;
 mod evaluate;
@@ -34,6 +36,7 @@ mod stability;
 mod study;
 mod temporal;
 mod total;
+mod tradeoff;
 mod verdict;
 
 pub use case::{Arithmetic, Case, CaseError, Outputs, Progress, Row, Start, Status, run};
@@ -41,6 +44,7 @@ pub use check::{
     BLUNT, CheckError, CheckReport, Finding, OWN_ERROR_FACTOR, TOLERANCE, Verdict, check,
 };
 pub use checkpoint::{CheckpointError, Checkpoints};
+pub use cost::{Cost, CostModel, Timing, time_steps};
 pub use coverage::{Part, Share, coverage, smallest_set};
 pub use evaluate::{FieldRow, WrongLength, evaluate};
 pub use frames::FrameOutput;
@@ -63,6 +67,11 @@ pub use stability::{
 pub use study::{Study, StudyError, Sweep, converge};
 pub use temporal::{Temporal, TemporalRow, temporal};
 pub use total::{CflSpeed, Frame, TotalScheme};
+pub use tradeoff::{
+    Against, Cheapest, Chosen, Effect, Entry, Goal, Knob, LADDER, MARGIN, Machine, Repeat,
+    RepeatOutcome, RunOutcome, Setting, Skip, TOLERANCES, Tradeoff, differences, extrapolate,
+    families, median, pareto, tradeoff,
+};
 pub use verdict::{
     Behaviour, Expected, ORDER_TOLERANCE, Verdict as OrderVerdict, expected_in_space,
     expected_in_time, verdicts,

@@ -21,6 +21,7 @@ pub struct Record {
     steps: u64,
     particles: usize,
     wall_s: Exact,
+    cpu_s: Exact,
     particle_steps_per_s: Exact,
     /// As in the row; who keeps it may know better.
     pub timed_alone: bool,
@@ -58,6 +59,7 @@ impl From<&Row> for Record {
             steps: row.steps,
             particles: row.particles,
             wall_s: Exact(row.wall_s),
+            cpu_s: Exact(row.cpu_s),
             particle_steps_per_s: Exact(row.particle_steps_per_s),
             timed_alone: row.timed_alone,
             status: (&row.status).into(),
@@ -76,6 +78,7 @@ impl From<Record> for Row {
             steps: record.steps,
             particles: record.particles,
             wall_s: record.wall_s.0,
+            cpu_s: record.cpu_s.0,
             particle_steps_per_s: record.particle_steps_per_s.0,
             timed_alone: record.timed_alone,
             status: record.status.into(),
@@ -129,6 +132,10 @@ enum End {
         error: Exact,
         size: Exact,
     },
+    Cut {
+        step: u64,
+        time: Exact,
+    },
     Inverted {
         step: usize,
         time: Exact,
@@ -170,6 +177,7 @@ impl From<&Status> for End {
                 let (time, error, size) = (Exact(time), Exact(error), Exact(size));
                 Self::Unstable { step, time, particle, error, size }
             }
+            &Status::Cut { step, time } => Self::Cut { step, time: Exact(time) },
             Status::Stopped(error) => match *error {
                 StepError::Inverted { step, time, particle, J } => {
                     Self::Inverted { step, time: Exact(time), particle, J: Exact(J) }
@@ -201,6 +209,7 @@ impl From<End> for Status {
                 let (time, error, size) = (time.0, error.0, size.0);
                 return Self::Unstable { step, time, particle, error, size };
             }
+            End::Cut { step, time } => return Self::Cut { step, time: time.0 },
             End::Inverted { step, time, particle, J } => {
                 StepError::Inverted { step, time: time.0, particle, J: J.0 }
             }
@@ -279,6 +288,7 @@ mod tests {
             steps: u64::MAX,
             particles: 7,
             wall_s: 5e-324,
+            cpu_s: 0.25,
             particle_steps_per_s: f64::MAX,
             timed_alone: false,
             status,
@@ -306,7 +316,8 @@ mod tests {
         ];
         let unstable =
             Status::Unstable { step: 1, time, particle, error: f64::INFINITY, size: 1.0 };
-        let statuses = stops.into_iter().map(Status::Stopped).chain([Status::Ok, unstable]);
+        let cut = Status::Cut { step: 7, time };
+        let statuses = stops.into_iter().map(Status::Stopped).chain([Status::Ok, unstable, cut]);
         let odd_nan = f64::from_bits(0xfff8_0000_0000_0123);
         for status in statuses {
             for error in [1.6e-2, f64::NAN, f64::INFINITY, odd_nan] {

@@ -151,13 +151,20 @@ fn study(
     settings: impl Fn(&Case) -> Value,
 ) -> Result<Study> {
     let cases = sweep.cases(base);
-    let mut work = Vec::with_capacity(cases.len());
-    for case in &cases {
-        let plan = plan(&model.exact, model.arithmetic(), case)?;
-        work.push(plan.steps as f64 * plan.particles);
-    }
+    let expected = model.announce(&cases);
+    let bar = Bar::expecting(expected.as_ref().map(|seconds| seconds.iter().sum()));
+    // Without a prediction a particle's step is the unit of work.
+    let work = match expected {
+        Some(seconds) => seconds,
+        None => {
+            let work = |case| -> Result<f64> {
+                let plan = plan(&model.exact, model.arithmetic(), case)?;
+                Ok(plan.steps as f64 * plan.particles)
+            };
+            cases.iter().map(work).collect::<Result<_>>()?
+        }
+    };
     let total: f64 = work.iter().sum();
-    let bar = Bar::new();
     let keys: Vec<_> = cases.iter().map(settings).collect();
     let mark = |record: &mut Record| record.timed_alone = false;
     let records = keep.all(&keys, Order::OneByOne, mark, |index| {
@@ -170,7 +177,8 @@ fn study(
             let share = (before + progress.share * work[index]) / total;
             bar.show(&what, Progress { share, ..progress });
         };
-        let mut outputs = Outputs { progress: &mut show, frames: None, checkpoints: None };
+        let mut outputs =
+            Outputs { progress: &mut show, frames: None, checkpoints: None, until: None };
         let row = run(&model.exact, model.arithmetic(), &cases[index], &mut outputs);
         Ok(Record::from(&row.map_err(|cause| StudyError { index, cause })?))
     })?;

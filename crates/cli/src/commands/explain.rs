@@ -4,13 +4,14 @@ use anyhow::{Result, bail};
 use mmsmith_expr::{Expr, OperationCount, Program, arrange};
 use mmsmith_solutions::CATALOGUE;
 use mmsmith_spec::{Domain, Fields, SolvedCondition, Spec};
-use mmsmith_verify::{Part, Share, coverage};
+use mmsmith_verify::{Cost, Part, Plan, Share, coverage};
 use serde_json::{Value, json};
 
 use super::coverage::{POINTS, THRESHOLD};
-use crate::arguments::ExplainOptions;
+use super::{Model, predict};
+use crate::arguments::{ExplainOptions, Precision};
 use crate::json::Output;
-use crate::library::{Subject, specification};
+use crate::library::{Selection, Subject, specification};
 use crate::table::Table;
 use crate::terminal;
 
@@ -20,9 +21,12 @@ pub(crate) fn explain(options: &ExplainOptions) -> Result<bool> {
     let mut fields = spec.derive()?;
     let exercises = exercises(&options.name)?;
     let cost = BodyForceCost::of(&mut fields);
-    terminal::say(&text(&spec, &exercises, &cost))?;
+    let selection = Selection::new(&options.name, &[])?;
+    let model = Model::new(&selection, Precision::F64)?;
+    let predicted = predict::usual(&model).map_err(|error| error.to_string());
+    terminal::say(&(text(&spec, &exercises, &cost) + &runs(&predicted)))?;
     if let Some(output) = output {
-        output.write(&document(&spec, &exercises, &cost))?;
+        output.write(&document(&spec, &exercises, &cost, &predicted))?;
     }
     Ok(true)
 }
@@ -160,6 +164,33 @@ fn text(spec: &Spec, exercises: &[Exercise], cost: &BodyForceCost) -> String {
     text
 }
 
+/// What runs of the usual scheme are predicted to take, or why there are none.
+type Predicted = Result<Vec<(usize, Plan, Cost)>, String>;
+
+fn runs(predicted: &Predicted) -> String {
+    let rows = match predicted {
+        Ok(rows) => rows,
+        Err(reason) => return format!("\nnot simulated: {reason}\n"),
+    };
+    let header = ["cells", "particles", "steps", "stepping", "in all", "memory"];
+    let mut table = Table::new(0, header);
+    for (cells, plan, cost) in rows {
+        table.row([
+            cells.to_string(),
+            format!("{:.0}", plan.particles),
+            plan.steps.to_string(),
+            predict::duration(cost.steps_s),
+            predict::duration(cost.total_s),
+            predict::amount(plan.bytes),
+        ]);
+    }
+    format!(
+        "\na run with the usual scheme on {} thread(s), predicted from a few steps made just now\n{}",
+        rayon::current_num_threads(),
+        table.text()
+    )
+}
+
 fn domain(spec: &Spec) -> String {
     let list = |corner: &[Expr]| {
         let parts: Vec<String> = corner.iter().map(|&x| spec.graph.print(x)).collect();
@@ -173,7 +204,25 @@ fn domain(spec: &Spec) -> String {
     }
 }
 
-fn document(spec: &Spec, exercises: &[Exercise], cost: &BodyForceCost) -> Value {
+fn document(
+    spec: &Spec,
+    exercises: &[Exercise],
+    cost: &BodyForceCost,
+    predicted: &Predicted,
+) -> Value {
+    let runs = predicted.as_ref().map(|rows| {
+        let row = |(cells, plan, cost): &(usize, Plan, Cost)| {
+            json!({
+                "cells": cells,
+                "particles": plan.particles,
+                "steps": plan.steps,
+                "steps_s": cost.steps_s,
+                "total_s": cost.total_s,
+                "bytes": plan.bytes,
+            })
+        };
+        rows.iter().map(row).collect::<Vec<_>>()
+    });
     let exercised: serde_json::Map<String, Value> =
         exercises.iter().map(|e| (e.part.to_string(), e.is_exercised().into())).collect();
     let shares: serde_json::Map<String, Value> =
@@ -216,6 +265,8 @@ fn document(spec: &Spec, exercises: &[Exercise], cost: &BodyForceCost) -> Value 
         "domain": domain(spec),
         "exercises": exercised,
         "shares": shares,
+        "runs": runs.as_ref().ok(),
+        "not_simulated": runs.as_ref().err(),
         "body_force": { "operations": stages, "kept_numbers_per_particle": cost.kept },
     })
 }

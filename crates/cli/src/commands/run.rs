@@ -39,12 +39,14 @@ pub(super) fn follow(options: &RunOptions, resume: bool) -> Result<bool> {
     };
     with_threads(scheme.threads, || {
         let row = {
-            let bar = Bar::new();
+            let expected = model.announce(&[case]);
+            let bar = Bar::expecting(expected.map(|seconds| seconds.iter().sum()));
             let what = format!("{} cells", options.cells);
             let mut outputs = Outputs {
                 progress: &mut |progress| bar.show(&what, progress),
                 frames: frames.as_ref(),
                 checkpoints: checkpoints.as_ref(),
+                until: None,
             };
             simulate(&model.exact, model.arithmetic(), &case, &mut outputs)?
         };

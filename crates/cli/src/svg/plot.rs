@@ -4,16 +4,16 @@ use std::fmt::Write;
 
 use super::{escape, number, open};
 
-const WIDTH: f64 = 480.0;
-const LEFT: f64 = 72.0;
-const RIGHT: f64 = 466.0;
-const TOP: f64 = 38.0;
-const BOTTOM: f64 = 370.0;
+pub(super) const WIDTH: f64 = 480.0;
+pub(super) const LEFT: f64 = 72.0;
+pub(super) const RIGHT: f64 = 466.0;
+pub(super) const TOP: f64 = 38.0;
+pub(super) const BOTTOM: f64 = 370.0;
 /// Where the legend starts, and how far apart its lines are.
-const LEGEND: f64 = 432.0;
-const LINE: f64 = 22.0;
+pub(super) const LEGEND: f64 = 432.0;
+pub(super) const LINE: f64 = 22.0;
 /// Colours that the colour-blind can tell apart (Okabe and Ito), and the dashes that go with them.
-const STYLES: [(&str, &str); 6] = [
+pub(super) const STYLES: [(&str, &str); 6] = [
     ("#0072b2", ""),
     ("#d55e00", "7 3"),
     ("#009e73", "2 3"),
@@ -81,7 +81,7 @@ impl Curve {
 }
 
 /// A logarithmic axis: values from `low` to `high`, drawn from `start` to `end`.
-struct Axis {
+pub(super) struct Axis {
     low: f64,
     high: f64,
     start: f64,
@@ -90,13 +90,13 @@ struct Axis {
 
 impl Axis {
     /// An axis that holds all values, with some room around them.
-    fn around(values: impl Iterator<Item = f64> + Clone, start: f64, end: f64) -> Self {
+    pub(super) fn around(values: impl Iterator<Item = f64> + Clone, start: f64, end: f64) -> Self {
         let low = values.clone().fold(f64::INFINITY, f64::min);
         let high = values.fold(0.0, f64::max);
         Self { low: low / 1.5, high: high * 1.5, start, end }
     }
 
-    fn at(&self, value: f64) -> f64 {
+    pub(super) fn at(&self, value: f64) -> f64 {
         let share = (value / self.low).ln() / (self.high / self.low).ln();
         self.start + share * (self.end - self.start)
     }
@@ -135,7 +135,7 @@ impl Plot<'_> {
             if let Some(floor) = floor {
                 y.low = y.low.min(floor / 3.0);
             }
-            self.grid(&mut text, &x, &y);
+            grid(&mut text, &x, &y);
             if let Some(floor) = floor {
                 let at = y.at(floor).max(TOP);
                 let _ = writeln!(
@@ -152,7 +152,7 @@ impl Plot<'_> {
                 draw(&mut text, index, curve, &x, &y);
             }
         }
-        self.frame(&mut text);
+        frame(&mut text, self.x, self.y);
         for (index, label) in labels.iter().enumerate() {
             let (colour, dash) = STYLES[index % STYLES.len()];
             let line = LEGEND + LINE * index as f64;
@@ -182,43 +182,6 @@ impl Plot<'_> {
         text
     }
 
-    fn frame(&self, text: &mut String) {
-        let (width, height) = (RIGHT - LEFT, BOTTOM - TOP);
-        let _ = writeln!(
-            text,
-            r##"<rect x="{LEFT}" y="{TOP}" width="{width}" height="{height}" fill="none" stroke="#333"/>
-<text x="{}" y="{}" text-anchor="middle">{}</text>
-<text transform="translate(18 {}) rotate(-90)" text-anchor="middle">{}</text>"##,
-            (LEFT + RIGHT) / 2.0,
-            BOTTOM + 40.0,
-            escape(self.x),
-            (TOP + BOTTOM) / 2.0,
-            escape(self.y)
-        );
-    }
-
-    fn grid(&self, text: &mut String, x: &Axis, y: &Axis) {
-        for tick in x.ticks() {
-            let at = x.at(tick);
-            let _ = writeln!(
-                text,
-                r##"<path d="M{at:.1} {TOP}V{BOTTOM}" stroke="#ddd"/><text x="{at:.1}" y="{:.1}" text-anchor="middle" font-size="13">{}</text>"##,
-                BOTTOM + 18.0,
-                number(tick)
-            );
-        }
-        for tick in y.ticks() {
-            let at = y.at(tick);
-            let _ = writeln!(
-                text,
-                r##"<path d="M{LEFT} {at:.1}H{RIGHT}" stroke="#ddd"/><text x="{:.1}" y="{:.1}" text-anchor="end" font-size="13">{}</text>"##,
-                LEFT - 6.0,
-                at + 5.0,
-                number(tick)
-            );
-        }
-    }
-
     /// Dashed lines through the finest point of the first curve that has one, moved below it.
     fn slopes(&self, text: &mut String, x: &Axis, y: &Axis) {
         let first = self.curves.iter().find(|curve| !curve.points.is_empty());
@@ -237,6 +200,45 @@ impl Plot<'_> {
                 r##"<path d="M{x1:.1} {y1:.1}L{x2:.1} {y2:.1}" stroke="#777" stroke-dasharray="6 4"/><text x="{xt:.1}" y="{yt:.1}" fill="#444" text-anchor="middle">{order}</text>"##
             );
         }
+    }
+}
+
+/// The frame of a plot, with what its axes are.
+pub(super) fn frame(text: &mut String, x: &str, y: &str) {
+    let (width, height) = (RIGHT - LEFT, BOTTOM - TOP);
+    let _ = writeln!(
+        text,
+        r##"<rect x="{LEFT}" y="{TOP}" width="{width}" height="{height}" fill="none" stroke="#333"/>
+<text x="{}" y="{}" text-anchor="middle">{}</text>
+<text transform="translate(18 {}) rotate(-90)" text-anchor="middle">{}</text>"##,
+        (LEFT + RIGHT) / 2.0,
+        BOTTOM + 40.0,
+        escape(x),
+        (TOP + BOTTOM) / 2.0,
+        escape(y)
+    );
+}
+
+/// The lines of a plot's grid, with their values.
+pub(super) fn grid(text: &mut String, x: &Axis, y: &Axis) {
+    for tick in x.ticks() {
+        let at = x.at(tick);
+        let _ = writeln!(
+            text,
+            r##"<path d="M{at:.1} {TOP}V{BOTTOM}" stroke="#ddd"/><text x="{at:.1}" y="{:.1}" text-anchor="middle" font-size="13">{}</text>"##,
+            BOTTOM + 18.0,
+            number(tick)
+        );
+    }
+    for tick in y.ticks() {
+        let at = y.at(tick);
+        let _ = writeln!(
+            text,
+            r##"<path d="M{LEFT} {at:.1}H{RIGHT}" stroke="#ddd"/><text x="{:.1}" y="{:.1}" text-anchor="end" font-size="13">{}</text>"##,
+            LEFT - 6.0,
+            at + 5.0,
+            number(tick)
+        );
     }
 }
 
@@ -260,7 +262,7 @@ fn draw(text: &mut String, index: usize, curve: &Curve, x: &Axis, y: &Axis) {
 }
 
 /// A marker of its own shape and fill for each curve, so that the picture can be printed in black.
-fn marker(text: &mut String, index: usize, x: f64, y: f64) {
+pub(super) fn marker(text: &mut String, index: usize, x: f64, y: f64) {
     let (colour, _) = STYLES[index % STYLES.len()];
     let (path, filled) = match index % STYLES.len() {
         0 => (format!("M{:.1} {y:.1}a5 5 0 1 0 10 0a5 5 0 1 0 -10 0z", x - 5.0), true),

@@ -1,0 +1,86 @@
+//! What runs will take, before they are run.
+
+use std::time::Duration;
+
+use mmsmith_verify::{Case, Cost, CostModel, Plan, plan};
+
+use super::Model;
+
+/// Cell counts that `mms explain` tells of.
+pub(super) const GRIDS: [usize; 4] = [32, 64, 128, 256];
+/// Particles times steps below which no run takes a minute, whatever its scheme.
+const LITTLE_WORK: f64 = 1e7;
+/// Calibration in seconds for each particle and step of the work, a small part of it; and its limits.
+const EFFORT: f64 = 5e-9;
+const EFFORTS: (f64, f64) = (0.05, 0.5);
+/// What `mms explain` spends on it.
+const BRIEF: Duration = Duration::from_millis(200);
+
+/// The seconds that each of `cases`, of one scheme, will take; none for work so little that it is not worth calibrating for,
+/// and where nothing could be measured.
+pub(super) fn seconds(model: &Model, cases: &[Case]) -> Option<Vec<f64>> {
+    let plans: Option<Vec<Plan>> =
+        cases.iter().map(|case| plan(&model.exact, model.arithmetic(), case).ok()).collect();
+    let plans = plans?;
+    let work = |plan: &Plan| plan.steps as f64 * plan.particles;
+    let all: f64 = plans.iter().map(work).sum();
+    if all < LITTLE_WORK {
+        return None;
+    }
+    let largest = plans.iter().zip(cases).max_by(|a, b| a.0.particles.total_cmp(&b.0.particles))?.1;
+    let effort = Duration::from_secs_f64((EFFORT * all).clamp(EFFORTS.0, EFFORTS.1));
+    let learnt = CostModel::calibrate(&model.exact, model.arithmetic(), largest, effort).ok()?;
+    plans.iter().map(|plan| Some(learnt.predict(plan)?.total_s)).collect()
+}
+
+/// What the usual scheme takes on some grids; grids that do not fit the solution are left out.
+pub(super) fn usual(model: &Model) -> Result<Vec<(usize, Plan, Cost)>, mmsmith_verify::CaseError> {
+    let at = |cells| Case { cells, ..Case::default() };
+    let mut fitting: Vec<(usize, Plan)> = Vec::new();
+    let mut refused = None;
+    for cells in GRIDS {
+        match plan(&model.exact, model.arithmetic(), &at(cells)) {
+            Ok(plan) => fitting.push((cells, plan)),
+            Err(error) => refused = Some(error),
+        }
+    }
+    if let (true, Some(error)) = (fitting.is_empty(), refused) {
+        return Err(error);
+    }
+    let Some(&(finest, _)) = fitting.last() else { return Ok(Vec::new()) };
+    let learnt = CostModel::calibrate(&model.exact, model.arithmetic(), &at(finest), BRIEF)?;
+    let row = |(cells, plan): (usize, Plan)| Some((cells, plan, learnt.predict(&plan)?));
+    Ok(fitting.into_iter().filter_map(row).collect())
+}
+
+/// A time for people.
+pub(super) fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 0.0995 => format!("{:.1} ms", 1e3 * s),
+        s if s < 99.5 => format!("{s:.1} s"),
+        s if s < 5970.0 => format!("{:.0} min", s / 60.0),
+        s if s < 3.6e5 => format!("{:.1} h", s / 3600.0),
+        s => format!("{:.3e} days", s / 86400.0),
+    }
+}
+
+/// An amount of memory for people.
+pub(super) fn amount(bytes: f64) -> String {
+    const MIB: f64 = 1024.0 * 1024.0;
+    match bytes / MIB {
+        mib if mib < 1000.0 => format!("{mib:.1} MiB"),
+        mib => format!("{:.1} GiB", mib / 1024.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_and_amounts_are_told_in_fitting_units() {
+        let told = [0.0123, 3.25, 120.0, 7200.0, 8.64e7].map(duration);
+        assert_eq!(told, ["12.3 ms", "3.2 s", "2 min", "2.0 h", "1.000e3 days"]);
+        assert_eq!([2.5e6, 3e9].map(amount), ["2.4 MiB", "2.8 GiB"]);
+    }
+}

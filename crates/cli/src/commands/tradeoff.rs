@@ -1,0 +1,621 @@
+//! `mms tradeoff`: error against cost, and the cheapest setting for a need.
+
+mod advice;
+mod words;
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+use mmsmith_verify::{
+    Arithmetic, Case, CaseError, Chosen, Entry, Goal, MARGIN, Machine, Outputs, Record, Repeat,
+    Row, Setting, Skip, Status, Tradeoff, families, plan, run as simulate, time_steps,
+    tradeoff as measure,
+};
+use serde_json::{Value, json};
+
+use super::Model;
+use crate::arguments::{Against, Precision, TradeoffOptions};
+use crate::csv;
+use crate::json::Output;
+use crate::keep::{Keep, Order};
+use crate::library::Selection;
+use crate::progress::Bar;
+use crate::svg::{Front, Point};
+use crate::table::{self, Table};
+use crate::{machine, memory, terminal};
+
+/// The CFL number that ladders begin with.
+const CFL: f64 = 0.4;
+/// More threads than this are not compared with one.
+const MOST_THREADS: usize = 64;
+
+/// How errors are compared.
+struct Measure {
+    field: usize,
+    norm: usize,
+    /// What errors are divided by, and its name.
+    scale: Option<(String, f64)>,
+}
+
+impl Measure {
+    fn new(options: &TradeoffOptions, selection: &Selection) -> Self {
+        let amplitude = selection.parameters().get("A").filter(|A| **A != 0.0);
+        // Displacements go with the amplitude; other fields have other units.
+        let scale =
+            amplitude.filter(|_| options.field as usize == 0).map(|A| ("A".into(), A.abs()));
+        Self { field: options.field as usize, norm: options.norm as usize, scale }
+    }
+
+    fn of(&self, row: &Row) -> f64 {
+        let error = *row.errors.named()[self.field].1.named()[self.norm].1;
+        error / self.scale.as_ref().map_or(1.0, |(_, scale)| *scale)
+    }
+
+    /// What the errors are, in words.
+    fn words(&self) -> String {
+        let field = ["u", "v", "F", "P"][self.field];
+        let norm = ["L_inf", "L2", "L1"][self.norm];
+        match &self.scale {
+            Some((name, value)) => format!("{norm} of {field} over {name} = {value}"),
+            None => format!("{norm} of {field}, not divided by anything"),
+        }
+    }
+}
+
+/// What runs settings for the sweep.
+struct Runner<'a> {
+    exact: &'a Model,
+    single: Option<&'a Model>,
+    pools: BTreeMap<usize, rayon::ThreadPool>,
+    started: Instant,
+    keep: Keep,
+    selection: &'a Selection,
+}
+
+/// A run that was cut: it is no result that could be kept.
+#[derive(Debug)]
+struct CutShort(Row);
+
+impl fmt::Display for CutShort {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.status.fmt(f)
+    }
+}
+
+impl std::error::Error for CutShort {}
+
+impl Runner<'_> {
+    fn arithmetic(&self, setting: &Setting) -> Arithmetic<'_> {
+        match self.single.filter(|_| setting.single) {
+            Some(single) => single.arithmetic(),
+            None => Arithmetic::Double,
+        }
+    }
+
+    fn pool(&self, setting: &Setting) -> Result<&rayon::ThreadPool> {
+        self.pools.get(&setting.threads).context("no threads were started for this setting")
+    }
+
+    fn run(&self, setting: &Setting, most_s: f64) -> Result<Option<Row>> {
+        let until = until(most_s);
+        let compute = |_: usize| -> Result<Record> {
+            let row = self.pool(setting)?.install(|| {
+                let mut outputs =
+                    Outputs { progress: &mut |_| (), frames: None, checkpoints: None, until };
+                simulate(&self.exact.exact, self.arithmetic(setting), &setting.case, &mut outputs)
+            })?;
+            if matches!(row.status, Status::Cut { .. }) {
+                return Err(CutShort(row).into());
+            }
+            Ok(Record::from(&row))
+        };
+        let mut key = words::document(setting);
+        // Times are part of this result, and so are the threads.
+        key["timed_with_threads"] = setting.threads.into();
+        key["tradeoff"] = json!({
+            "solution": self.selection.name(),
+            "parameters": self.selection.parameters(),
+            "cells": setting.case.cells,
+            "cfl": setting.case.cfl,
+            "periods": setting.case.periods,
+        });
+        let mark = |record: &mut Record| record.timed_alone = false;
+        match self.keep.all(&[key], Order::OneByOne, mark, compute) {
+            Ok(records) => Ok(records.into_iter().next().map(Row::from)),
+            Err(error) => match error.downcast::<CutShort>() {
+                Ok(CutShort(row)) => Ok(Some(row)),
+                // Such as a mass matrix that too few particles make singular.
+                Err(error) => match error.downcast::<CaseError>() {
+                    Ok(CaseError::Setup(_)) => Ok(None),
+                    Ok(other) => Err(other.into()),
+                    Err(other) => Err(other),
+                },
+            },
+        }
+    }
+
+    fn repeat(&self, setting: &Setting, most_s: f64) -> Result<Option<Repeat>> {
+        let until = until(most_s);
+        let timing = self.pool(setting)?.install(|| {
+            let arithmetic = self.arithmetic(setting);
+            time_steps(&self.exact.exact, arithmetic, &setting.case, u64::MAX, until)
+        })?;
+        let repeat = Repeat { wall_s: timing.wall_s, cpu_s: timing.cpu_s };
+        Ok(timing.complete.then_some(repeat))
+    }
+}
+
+fn until(most_s: f64) -> Option<Instant> {
+    // Longer than any study: no limit.
+    Duration::try_from_secs_f64(most_s.max(0.0)).ok().and_then(|d| Instant::now().checked_add(d))
+}
+
+pub(crate) fn tradeoff(options: &TradeoffOptions) -> Result<bool> {
+    let started = Instant::now();
+    let selection = Selection::new(&options.name, &options.parameters.set)?;
+    let exact = Model::new(&selection, Precision::F64)?;
+    // What is interpreted has double precision only.
+    let single = Model::new(&selection, Precision::F32).ok();
+    let outputs = [&options.json, &options.csv, &options.plot, &options.advice]
+        .map(|path| Output::prepare_if(path.as_ref()));
+    let [json, csv, plot, advice] = outputs;
+    let (json, csv, plot, advice) = (json?, csv?, plot?, advice?);
+    let threads = options.threads.unwrap_or(1);
+    let more = machine::cores().min(MOST_THREADS);
+    let more = (more > threads && options.threads.is_none()).then_some(more);
+    let pool = |threads: usize| -> Result<(usize, rayon::ThreadPool)> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        Ok((threads, pool.context("--threads: cannot start the threads")?))
+    };
+    let pools = std::iter::once(threads).chain(more).map(pool).collect::<Result<_>>()?;
+    let keep = Keep::open(options.kept.out.as_ref(), &options.name)?;
+    let runner = Runner {
+        exact: &exact,
+        single: single.as_ref(),
+        pools,
+        started,
+        keep,
+        selection: &selection,
+    };
+    let what =
+        |setting: &Setting| plan(&exact.exact, runner.arithmetic(setting), &setting.case).ok();
+    let case = Case { cfl: CFL, periods: options.periods, ..Case::default() };
+    let base = Setting { case, single: false, threads };
+    let tried = families(&base, more, single.is_some(), &what);
+    if tried.is_empty() {
+        // The reason why even the usual scheme cannot be run.
+        plan(&exact.exact, Arithmetic::Double, &case)?;
+        bail!("no scheme of the solver fits {}", selection.name());
+    }
+    let compared = Measure::new(options, &selection);
+    let goal = Goal {
+        budget_s: options.budget,
+        error: &|row| compared.of(row),
+        against: options.against.into(),
+        tolerance: options.tolerance,
+        time_s: options.time,
+        most_bytes: memory::available(),
+    };
+    let calls = Machine {
+        plan: &what,
+        run: &|setting: &Setting, most_s| runner.run(setting, most_s),
+        repeat: &|setting: &Setting, most_s| runner.repeat(setting, most_s),
+        clock: &|| runner.started.elapsed().as_secs_f64(),
+    };
+    let bar = Bar::new();
+    let mut show = |setting: &Setting| {
+        let share = runner.started.elapsed().as_secs_f64() / options.budget;
+        bar.show_share(|| words::line(setting), share.min(1.0));
+    };
+    let found = measure(&tried, &goal, &calls, &mut show)?;
+    drop(bar);
+    let report =
+        Report { options, selection: &selection, found: &found, compared: &compared, threads };
+    let used_s = started.elapsed().as_secs_f64();
+    terminal::say(&report.text(used_s))?;
+    if let Some(file) = json {
+        file.write(&report.document(used_s)?)?;
+    }
+    if let Some(file) = csv {
+        file.write_text(&report.sheet())?;
+    }
+    if let Some(file) = plot {
+        file.write_text(&report.picture())?;
+    }
+    if let Some(file) = advice {
+        file.write_text(&report.advice())?;
+    }
+    Ok(report.holds())
+}
+
+/// What was found, to be told.
+struct Report<'a> {
+    options: &'a TradeoffOptions,
+    selection: &'a Selection,
+    found: &'a Tradeoff,
+    compared: &'a Measure,
+    threads: usize,
+}
+
+/// Why grids were left out, for people and for machines.
+fn reason(skip: Skip) -> String {
+    match skip {
+        Skip::Dominated => format!(
+            "expected to be {MARGIN} times less accurate than one measured at no higher cost with the same weights, or, where \
+             dear, with any"
+        ),
+        Skip::NoGain => "error no longer falls on finer grids".into(),
+        Skip::Cfl => "another CFL number gains nothing".into(),
+        Skip::Stopped => "the run stopped, finer ones were not tried".into(),
+        Skip::Budget => "would take longer than the budget leaves to one run".into(),
+        Skip::Refused => "refused by the solver, such as for too few particles".into(),
+        Skip::Memory => "would need more memory than there is".into(),
+    }
+}
+
+impl Report<'_> {
+    fn error(&self, entry: &Entry) -> f64 {
+        if entry.row.status == Status::Ok { self.compared.of(&entry.row) } else { f64::NAN }
+    }
+
+    fn cost(&self, entry: &Entry) -> f64 {
+        match self.options.against {
+            Against::Wall => entry.row.wall_s,
+            Against::Cpu => entry.row.cpu_s,
+            Against::Steps => entry.row.steps as f64,
+            Against::Memory => entry.bytes,
+        }
+    }
+
+    fn cost_words(&self) -> &'static str {
+        match self.options.against {
+            Against::Wall => "wall-clock time of the steps, s",
+            Against::Cpu => "processor time of the steps, s",
+            Against::Steps => "number of steps",
+            Against::Memory => "memory (estimated), bytes",
+        }
+    }
+
+    fn definition(&self) -> String {
+        format!(
+            "error: {}, the largest over all steps; cost: {}; both as mms run measures them",
+            self.compared.words(),
+            self.cost_words()
+        )
+    }
+
+    /// Whether what was asked for was found and proved.
+    fn holds(&self) -> bool {
+        let asked = [
+            (self.options.tolerance, &self.found.for_tolerance),
+            (self.options.time, &self.found.for_time),
+        ];
+        asked.iter().all(|(limit, chosen)| {
+            limit.is_none_or(|limit| {
+                chosen.as_ref().is_some_and(|chosen| {
+                    self.proved(chosen, limit, self.options.tolerance == Some(limit))
+                })
+            })
+        })
+    }
+
+    fn proved(&self, chosen: &Chosen, limit: f64, is_tolerance: bool) -> bool {
+        let row = &chosen.proof;
+        let value = if is_tolerance { self.compared.of(row) } else { row.wall_s };
+        row.status == Status::Ok && value <= limit
+    }
+
+    fn table(&self, indices: &[usize]) -> Table {
+        let header = [
+            "error",
+            "wall s",
+            "spread",
+            "cpu s",
+            "timings",
+            "cells",
+            "CFL",
+            "particles",
+            "steps",
+            "scheme",
+        ];
+        let mut table = Table::new(0, header);
+        for &index in indices {
+            let entry = &self.found.entries[index];
+            table.row([
+                table::error(self.error(entry)),
+                format!("{:.2e}", entry.row.wall_s),
+                format!("{:.0} %", 100.0 * spread(&entry.walls)),
+                format!("{:.2e}", entry.row.cpu_s),
+                entry.walls.len().to_string(),
+                entry.row.cells.to_string(),
+                format!("{:.3}", entry.row.cfl),
+                entry.row.particles.to_string(),
+                entry.row.steps.to_string(),
+                words::scheme(&entry.setting),
+            ]);
+        }
+        table
+    }
+
+    fn text(&self, used_s: f64) -> String {
+        let parameters: Vec<_> = self
+            .selection
+            .parameters()
+            .iter()
+            .map(|(name, value)| format!("{name} = {value}"))
+            .collect();
+        let runs = self.found.entries.len();
+        let mut text = format!(
+            "{} ({}), {} period(s), {} thread(s) where nothing else is said\n{}\n{runs} settings of {} schemes in {used_s:.1} s of {} s\n",
+            self.selection.name(),
+            parameters.join(", "),
+            self.options.periods,
+            self.threads,
+            self.definition(),
+            self.found.families,
+            self.options.budget,
+        );
+        for (skip, count) in &self.found.skipped {
+            text += &format!("  {count} left out: {}\n", reason(*skip));
+        }
+        text += &format!(
+            "\nthe front: no other setting is both cheaper and more accurate\n{}",
+            self.table(&self.found.front).text()
+        );
+        text += "\nwhat each knob buys, the other settings being equal\n";
+        for line in self.knobs() {
+            text += &format!("  {line}\n");
+        }
+        text +=
+            "\nthe cheapest setting whose neighbouring cell counts meet the tolerance as well\n";
+        for named in &self.found.tolerances {
+            text += &match named.entry {
+                None => format!("  {:e}: none within the budget\n", named.tolerance),
+                Some(index) => {
+                    let entry = &self.found.entries[index];
+                    let doubt = match named.neighbours_hold {
+                        true => "",
+                        false => " (no time to try its neighbours)",
+                    };
+                    format!(
+                        "  {:e}: {:.2e} s, error {:.2e}: {}{doubt}\n",
+                        named.tolerance,
+                        entry.row.wall_s,
+                        self.error(entry),
+                        words::line(&entry.setting)
+                    )
+                }
+            };
+        }
+        if let Some(limit) = self.options.tolerance {
+            text +=
+                &self.choice(&format!("--tolerance {limit:e}"), limit, &self.found.for_tolerance);
+        }
+        if let Some(limit) = self.options.time {
+            text += &self.choice(&format!("--time {limit} s"), limit, &self.found.for_time);
+        }
+        text
+    }
+
+    fn choice(&self, asked: &str, limit: f64, chosen: &Option<Chosen>) -> String {
+        let Some(chosen) = chosen else {
+            return format!("\n{asked}: NO setting within the budget does\n");
+        };
+        let row = &chosen.proof;
+        let is_tolerance = self.options.tolerance == Some(limit);
+        let verdict =
+            if self.proved(chosen, limit, is_tolerance) { "holds" } else { "DOES NOT HOLD" };
+        format!(
+            "\n{asked}: {}\n  run once more: error {:.3e}, {:.3e} s: it {verdict}\n",
+            self.command(&self.found.entries[chosen.entry].setting),
+            self.compared.of(row),
+            row.wall_s
+        )
+    }
+
+    /// The command that runs a setting.
+    fn command(&self, setting: &Setting) -> String {
+        let set: String = self
+            .options
+            .parameters
+            .set
+            .iter()
+            .map(|(name, value)| format!(" --set {name}={value}"))
+            .collect();
+        let periods = match self.options.periods {
+            1.0 => String::new(),
+            periods => format!(" --periods {periods}"),
+        };
+        format!("mms run {} {}{periods}{set}", self.options.name, words::options(setting))
+    }
+
+    /// What each knob did, a line each.
+    fn knobs(&self) -> Vec<String> {
+        let entries = &self.found.entries;
+        let mut lines: Vec<String> = self
+            .found
+            .effects
+            .iter()
+            .map(|effect| words::effect(effect, &entries[effect.from], &entries[effect.to]))
+            .collect();
+        lines.extend(self.single_precision());
+        lines
+    }
+
+    /// From where on single precision stops improving: for each scheme that was run in both, its errors grid by grid.
+    fn single_precision(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        let ok = |entry: &&Entry| self.error(entry).is_finite();
+        let entries = || self.found.entries.iter().filter(ok);
+        let mut schemes: Vec<String> = Vec::new();
+        for scheme in entries().filter(|entry| entry.setting.single) {
+            let name = words::scheme(&Setting { single: false, ..scheme.setting });
+            let name = format!("{name}, CFL {}", scheme.setting.case.cfl);
+            if schemes.contains(&name) {
+                continue;
+            }
+            schemes.push(name.clone());
+            let same = |a: &Setting, b: &Setting| {
+                let cells = b.case.cells;
+                Setting { case: Case { cells, ..a.case }, single: b.single, ..*a } == *b
+            };
+            let mut pairs: Vec<(usize, f64, f64)> = entries()
+                .filter(|single| single.setting.single && same(&scheme.setting, &single.setting))
+                .filter_map(|single| {
+                    let twin = Setting { single: false, ..single.setting };
+                    let double = entries().find(|entry| entry.setting == twin)?;
+                    Some((single.row.cells, self.error(single), self.error(double)))
+                })
+                .collect();
+            pairs.sort_by_key(|pair| pair.0);
+            let Some(&(finest, ..)) = pairs.last() else { continue };
+            let worse = pairs.iter().find(|(_, single, double)| *single > 1.1 * double);
+            lines.push(match worse {
+                Some((cells, single, double)) => format!(
+                    "f32 ({name}): from {cells} cells on its error is more than 10 % above that of f64 ({single:.2e} against \
+                     {double:.2e})"
+                ),
+                None => format!(
+                    "f32 ({name}): within 10 % of the error of f64 on all grids that both were run on, up to {finest} cells"
+                ),
+            });
+        }
+        lines
+    }
+
+    fn document(&self, used_s: f64) -> Result<Value> {
+        let mut rows = Vec::new();
+        for entry in &self.found.entries {
+            let mut row = words::document(&entry.setting);
+            if let (Value::Object(row), Value::Object(measured)) =
+                (&mut row, serde_json::to_value(&entry.row)?)
+            {
+                row.extend(measured);
+                row.insert("error".into(), json!(self.error(entry)));
+                row.insert("bytes".into(), json!(entry.bytes));
+                row.insert("wall_repeats_s".into(), json!(entry.walls));
+                row.insert("cpu_repeats_s".into(), json!(entry.cpus));
+                row.insert("wall_spread".into(), json!(spread(&entry.walls)));
+                row.insert("total_s".into(), json!(entry.total_s));
+            }
+            rows.push(row);
+        }
+        let tolerances: Vec<Value> = self
+            .found
+            .tolerances
+            .iter()
+            .map(|named| {
+                json!({
+                    "tolerance": named.tolerance,
+                    "index": named.entry,
+                    "wall_s": named.entry.map(|entry| self.found.entries[entry].row.wall_s),
+                    "neighbours_hold": named.entry.map(|_| named.neighbours_hold),
+                    "command": named.entry.map(|entry| self.command(&self.found.entries[entry].setting)),
+                })
+            })
+            .collect();
+        let chosen = |name: &str, limit: Option<f64>, chosen: &Option<Chosen>| {
+            limit.map(|limit| {
+                json!({
+                    "for": name,
+                    "limit": limit,
+                    "index": chosen.as_ref().map(|chosen| chosen.entry),
+                    "holds": chosen.as_ref().is_some_and(|chosen| self.proved(chosen, limit, name == "tolerance")),
+                    "row": chosen.as_ref().map(|chosen| &chosen.proof),
+                    "command": chosen.as_ref().map(|chosen| self.command(&self.found.entries[chosen.entry].setting)),
+                })
+            })
+        };
+        let chosen: Vec<Value> = [
+            chosen("tolerance", self.options.tolerance, &self.found.for_tolerance),
+            chosen("time", self.options.time, &self.found.for_time),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
+        let skipped: Vec<Value> = self
+            .found
+            .skipped
+            .iter()
+            .map(|(skip, count)| json!({ "reason": reason(*skip), "count": count }))
+            .collect();
+        Ok(json!({
+            "schema": "mmsmith.tradeoff/1",
+            "settings": {
+                "version": env!("CARGO_PKG_VERSION"),
+                "solution": self.selection.name(),
+                "parameters": self.selection.parameters(),
+                "periods": self.options.periods,
+                "budget_s": self.options.budget,
+                "field": self.options.field,
+                "norm": self.options.norm,
+                "against": self.options.against,
+                "threads": self.threads,
+                "processor": machine::processor(),
+            },
+            "definition": self.definition(),
+            "used_s": used_s,
+            "families": self.found.families,
+            "rows": rows,
+            "front": self.found.front,
+            "tolerances": tolerances,
+            "chosen": chosen,
+            "knobs": self.knobs(),
+            "skipped": skipped,
+        }))
+    }
+
+    fn sheet(&self) -> String {
+        let mut text = "front,scheme,cells,cfl,ppc,threads,precision,steps,particles,wall_s,cpu_s,wall_spread,timings,bytes,error,status\n"
+            .to_owned();
+        for (index, entry) in self.found.entries.iter().enumerate() {
+            let Entry { setting, row, walls, bytes, .. } = entry;
+            let error = self.error(entry);
+            let error = if error.is_finite() { format!("{error:?}") } else { String::new() };
+            text += &format!(
+                "{},{},{},{:?},{},{},{},{},{},{:?},{:?},{:?},{},{:?},{error},{}\n",
+                u8::from(self.found.front.contains(&index)),
+                csv::quoted(&words::scheme(setting)),
+                row.cells,
+                row.cfl,
+                setting.case.per_cell,
+                setting.threads,
+                if setting.single { "f32" } else { "f64" },
+                row.steps,
+                row.particles,
+                row.wall_s,
+                row.cpu_s,
+                spread(walls),
+                walls.len(),
+                bytes,
+                csv::quoted(&row.status.to_string())
+            );
+        }
+        text
+    }
+
+    fn picture(&self) -> String {
+        let title = format!("{}: error against cost", self.selection.name());
+        let point = |(index, entry): (usize, &Entry)| Point {
+            kind: words::kind(&entry.setting),
+            cost: self.cost(entry),
+            error: self.error(entry),
+            on_front: self.found.front.contains(&index),
+        };
+        let points = self.found.entries.iter().enumerate().map(point).collect();
+        Front { title: &title, x: self.cost_words(), y: &self.compared.words(), points }.svg()
+    }
+}
+
+/// How far repeats lie apart: the largest less the smallest, over the median.
+fn spread(values: &[f64]) -> f64 {
+    let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
+    for value in values {
+        least = least.min(*value);
+        most = most.max(*value);
+    }
+    let median = mmsmith_verify::median(values);
+    if median > 0.0 { (most - least) / median } else { 0.0 }
+}

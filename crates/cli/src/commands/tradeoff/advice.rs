@@ -1,0 +1,126 @@
+//! A page of advice, each sentence with the figure behind it.
+
+use mmsmith_verify::{Entry, TOLERANCES};
+
+use super::{Report, words};
+use crate::machine;
+use crate::table::Table;
+
+impl Report<'_> {
+    /// The page, in Markdown.
+    pub(super) fn advice(&self) -> String {
+        let mut text = format!(
+            "# {}: which scheme for which need\n\nMade by `mms tradeoff {} --budget {}s --advice FILE.md` on {} ({} core(s)). \
+             {}.\n\n## What accuracy costs\n\nSeconds of stepping on {} thread(s) to each error, by the cheapest setting of \
+             each kind; `-` where none within the budget gets there.\n\n{}\n",
+            self.selection.name(),
+            self.options.name,
+            self.options.budget,
+            machine::processor(),
+            machine::cores(),
+            self.definition(),
+            self.threads,
+            self.costs().markdown()
+        );
+        text += "## Advice\n\n";
+        for line in self.sentences() {
+            text += &format!("- {line}\n");
+        }
+        text += "\n## What each knob buys\n\n";
+        for line in self.knobs() {
+            text += &format!("- {line}\n");
+        }
+        text
+    }
+
+    /// The time to each tolerance for each kind of scheme.
+    fn costs(&self) -> Table {
+        let header = TOLERANCES.iter().map(|tolerance| format!("{tolerance:e}"));
+        let mut table = Table::new(1, std::iter::once("scheme".to_owned()).chain(header));
+        for kind in self.kinds() {
+            let least = |tolerance: f64| {
+                let meets = |entry: &&Entry| {
+                    words::kind(&entry.setting) == kind
+                        && self.error(entry) <= tolerance
+                        && entry.setting.threads == self.threads
+                };
+                let costs = self.found.entries.iter().filter(meets).map(|entry| entry.row.wall_s);
+                let least = costs.fold(f64::INFINITY, f64::min);
+                if least.is_finite() { format!("{least:.1e}") } else { "-".into() }
+            };
+            let costs: Vec<String> = TOLERANCES.into_iter().map(least).collect();
+            if costs.iter().any(|cost| cost != "-") {
+                table.row(std::iter::once(kind.clone()).chain(costs));
+            }
+        }
+        table
+    }
+
+    fn kinds(&self) -> Vec<String> {
+        let mut kinds: Vec<String> = Vec::new();
+        for entry in &self.found.entries {
+            let kind = words::kind(&entry.setting);
+            if !kinds.contains(&kind) {
+                kinds.push(kind);
+            }
+        }
+        kinds.sort_unstable();
+        kinds
+    }
+
+    fn sentences(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        let entries = &self.found.entries;
+        for named in &self.found.tolerances {
+            let Some(index) = named.entry else { continue };
+            let entry = &entries[index];
+            let proof = match named.neighbours_hold {
+                true => "its neighbouring cell counts meet it too",
+                false => "there was no time to try its neighbours",
+            };
+            lines.push(format!(
+                "For an error of {:e} take {}: {:.2e} in {:.1e} s, and {proof}. `{}`",
+                named.tolerance,
+                words::line(&entry.setting),
+                self.error(entry),
+                entry.row.wall_s,
+                self.command(&entry.setting)
+            ));
+        }
+        // How far each kind gets, and what gets as far for less.
+        for kind in self.kinds() {
+            let own = entries.iter().filter(|entry| {
+                words::kind(&entry.setting) == kind
+                    && self.error(entry).is_finite()
+                    && entry.setting.threads == self.threads
+            });
+            let best = own.min_by(|a, b| self.error(a).total_cmp(&self.error(b)));
+            let Some(best) = best else {
+                lines.push(format!("Not {kind}: every run of it stopped."));
+                continue;
+            };
+            let cheaper = entries
+                .iter()
+                .filter(|entry| {
+                    self.error(entry) <= self.error(best) && entry.setting.threads == self.threads
+                })
+                .min_by(|a, b| a.row.wall_s.total_cmp(&b.row.wall_s));
+            let Some(cheaper) = cheaper.filter(|cheaper| words::kind(&cheaper.setting) != kind)
+            else {
+                continue;
+            };
+            lines.push(format!(
+                "Not {kind} for accuracy: its best within the budget is {:.2e} in {:.1e} s ({}); {} has {:.2e} in {:.1e} s, a \
+                 factor of {:.0}.",
+                self.error(best),
+                best.row.wall_s,
+                words::line(&best.setting),
+                words::line(&cheaper.setting),
+                self.error(cheaper),
+                cheaper.row.wall_s,
+                best.row.wall_s / cheaper.row.wall_s
+            ));
+        }
+        lines
+    }
+}

@@ -1,0 +1,147 @@
+//! `mms tradeoff`, and what runs are predicted to take, as a user meets them.
+
+mod command;
+
+use command::{keys, mms, names, read_json, refuses};
+use serde_json::Value;
+use std::time::Instant;
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().expect("a number")
+}
+
+/// All that a short sweep promises, in one call: it is the slow test here.
+#[test]
+fn a_short_sweep_keeps_its_budget_and_its_promises() {
+    let place = tempfile::tempdir().expect("a folder");
+    let place = place.path();
+    let started = Instant::now();
+    let called = mms(
+        place,
+        "tradeoff axis-aligned --budget 3s --tolerance 1e-2 --json found.json --csv found.csv --plot found.svg --advice \
+         found.md",
+    );
+    let took = started.elapsed().as_secs_f64();
+    assert_eq!(called.status, 0, "{}{}", called.stdout, called.stderr);
+    assert_eq!(names(place), ["found.csv", "found.json", "found.md", "found.svg"]);
+    // One run may be under way when other work holds the machine up; far beyond is a fault.
+    assert!((2.7..6.0).contains(&took), "{took} s");
+    let found = read_json(&place.join("found.json"));
+    assert_eq!(
+        keys(&found),
+        "chosen definition families front knobs rows schema settings skipped tolerances used_s"
+    );
+    assert_eq!(found["schema"], "mmsmith.tradeoff/1");
+    assert!(found["definition"].as_str().expect("text").contains("L_inf of u over A = 0.1"));
+
+    let rows = found["rows"].as_array().expect("rows");
+    for row in rows {
+        for key in ["cells", "h", "dt", "cfl", "steps", "particles", "wall_s", "cpu_s", "bytes"] {
+            assert!(number(&row[key]) > 0.0, "{key}: {row}");
+        }
+        for key in
+            ["shape", "integrator", "frame", "mass", "layout", "grid", "transfer", "precision"]
+        {
+            assert!(row[key].is_string(), "{key}: {row}");
+        }
+        if row["status"] == "ok" {
+            let error = number(&row["errors"]["u"]["linf"]) / 0.1;
+            assert_eq!(number(&row["error"]), error);
+        }
+    }
+    // The front is what no other row betters.
+    let front: Vec<usize> = found["front"]
+        .as_array()
+        .expect("a front")
+        .iter()
+        .map(|index| index.as_u64().expect("an index") as usize)
+        .collect();
+    assert!(front.len() >= 4, "{front:?}");
+    let (cost, error) = (|row: &Value| number(&row["wall_s"]), |row: &Value| number(&row["error"]));
+    let ok = || rows.iter().filter(|row| row["status"] == "ok");
+    for &index in &front {
+        let one = &rows[index];
+        assert!(!ok().any(|row| cost(row) < cost(one) && error(row) < error(one)), "{one}");
+    }
+    assert!(ok().all(|row| front.iter().any(|&i| error(&rows[i]) <= error(row))));
+
+    let named = &found["tolerances"][0];
+    assert_eq!(number(&named["tolerance"]), 1e-2);
+    let row = &rows[named["index"].as_u64().expect("an index") as usize];
+    assert!(error(row) <= 1e-2);
+    let chosen = &found["chosen"][0];
+    assert_eq!((&chosen["for"], &chosen["holds"]), (&"tolerance".into(), &true.into()));
+    // The proof has the errors of the row to the bit.
+    assert_eq!(chosen["row"]["errors"], row["errors"]);
+    // The command that is given runs the same setting.
+    let command =
+        chosen["command"].as_str().and_then(|text| text.strip_prefix("mms ")).expect("a command");
+    let again = mms(place, &format!("{command} --json again.json"));
+    assert_eq!(again.status, 0, "{}", again.stderr);
+    assert_eq!(read_json(&place.join("again.json"))["result"]["errors"], row["errors"]);
+
+    assert!(!found["knobs"].as_array().expect("lines").is_empty());
+    assert!(!found["skipped"].as_array().expect("reasons").is_empty());
+    assert!(called.stdout.contains("run once more") && called.stdout.contains("it holds"));
+    let sheet = std::fs::read_to_string(place.join("found.csv")).expect("a table");
+    assert_eq!(sheet.lines().count(), rows.len() + 1);
+    let picture = std::fs::read_to_string(place.join("found.svg")).expect("a picture");
+    assert!(picture.contains("class=\"pareto\""));
+    let advice = std::fs::read_to_string(place.join("found.md")).expect("a page");
+    assert!(
+        advice.contains("## What accuracy costs") && advice.contains("For an error of 1e-2 take")
+    );
+}
+
+#[test]
+fn what_cannot_be_swept_is_refused() {
+    let place = tempfile::tempdir().expect("a folder");
+    let place = place.path();
+    refuses(place, "tradeoff vortex --budget 1s --json a.json", &["does not model"]);
+    refuses(place, "tradeoff ring --budget 2x", &["--budget", "90s, 2m or 1h"]);
+    refuses(place, "tradeoff ring --budget=-1s", &["--budget", "90s, 2m or 1h"]);
+    refuses(place, "tradeoff rings --budget 1s", &["did you mean 'ring'"]);
+}
+
+#[test]
+fn explain_predicts_what_runs_take() {
+    let place = tempfile::tempdir().expect("a folder");
+    let place = place.path();
+    let called = mms(place, "explain ring --json told.json");
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    let runs = read_json(&place.join("told.json"))["runs"].clone();
+    let runs = runs.as_array().expect("rows");
+    assert_eq!(
+        runs.iter().map(|run| number(&run["cells"])).collect::<Vec<_>>(),
+        [32.0, 64.0, 128.0, 256.0]
+    );
+    for pair in runs.windows(2) {
+        // Twice the cells are four times the particles and twice the steps.
+        let ratio = number(&pair[1]["steps_s"]) / number(&pair[0]["steps_s"]);
+        assert!((3.0..20.0).contains(&ratio), "{pair:?}");
+        assert!(number(&pair[0]["total_s"]) >= number(&pair[0]["steps_s"]));
+    }
+    let called = mms(place, "explain vortex");
+    assert!(called.stdout.contains("not simulated: "), "{}", called.stdout);
+}
+
+#[test]
+fn long_runs_are_announced_and_those_that_do_not_fit_are_refused() {
+    let place = tempfile::tempdir().expect("a folder");
+    let place = place.path();
+    refuses(place, "run axis-aligned --cells 1000000", &["GiB of memory", "are available"]);
+    // Not a quiet minute: it is announced before the first step, and stopped here.
+    use std::io::Read;
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_mms"))
+        .args(["run", "axis-aligned", "--cells", "512", "--periods", "100", "--threads", "1"])
+        .stderr(std::process::Stdio::piped())
+        .stdout(std::process::Stdio::null())
+        .spawn()
+        .expect("it starts");
+    let mut said = [0; 10];
+    let told = child.stderr.take().expect("a pipe").read_exact(&mut said);
+    child.kill().expect("it runs");
+    child.wait().expect("it ends");
+    told.expect("a prediction");
+    assert_eq!(&said, b"predicted:");
+}

@@ -1,0 +1,313 @@
+//! What a run will take, before it is run: calibrated on the spot by a few steps of the same scheme.
+//!
+//! Stored constants of a machine would be wrong on the next one, beside other work, and after every change of a kernel, and
+//! each scheme, solution and number of threads would need its own. A few steps on some grids take a tenth of a second
+//! and have all of that in them. Between grids the time of a step goes by a power of the number of particles.
+
+use std::time::{Duration, Instant};
+
+use cpu_time::ProcessTime;
+use mmsmith_mpm::BodyForce;
+use mmsmith_solutions::{AnySolution, Real, Solution};
+
+use crate::case::{Arithmetic, Case, CaseError, set_up};
+use crate::general::Precision;
+use crate::measure::measure;
+use crate::plan::{Plan, plan, prepare};
+use crate::solver::Solver;
+use crate::total::{self, Frame};
+use crate::tradeoff::median;
+
+/// How many steps' times a median is taken of.
+const FIRST_STEPS: usize = 63;
+
+/// What some steps of a case took, in seconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Timing {
+    /// Particles.
+    pub particles: usize,
+    /// Steps done.
+    pub steps: u64,
+    /// Whether these are all steps to the end time.
+    pub complete: bool,
+    /// Setting up, before the first step.
+    pub setup_s: f64,
+    /// Wall-clock time of the steps.
+    pub wall_s: f64,
+    /// The median of the first steps' times: one that the machine's other work held up does not count.
+    pub step_s: f64,
+    /// Processor time of the steps on all threads.
+    pub cpu_s: f64,
+    /// Measuring the errors at one instant.
+    pub measure_s: f64,
+}
+
+/// Does at most `most` steps of a case, without measuring errors on the way, and at most until the given moment.
+///
+/// # Errors
+///
+/// [`CaseError`] for settings that cannot be run. A run that the solver gives up is not complete, and no error.
+pub fn time_steps(
+    exact: &AnySolution<f64>,
+    arithmetic: Arithmetic<'_>,
+    case: &Case,
+    most: u64,
+    until: Option<Instant>,
+) -> Result<Timing, CaseError> {
+    use AnySolution::{One, Three, Two};
+    let limits = Limits { most, until };
+    match (exact, arithmetic) {
+        (One(s), Arithmetic::Double) => double(s.as_ref(), case, limits),
+        (Two(s), Arithmetic::Double) => double(s.as_ref(), case, limits),
+        (Three(s), Arithmetic::Double) => double(s.as_ref(), case, limits),
+        (One(s), Arithmetic::Single(One(m))) => updated(s.as_ref(), m.as_ref(), case, limits),
+        (Two(s), Arithmetic::Single(Two(m))) => updated(s.as_ref(), m.as_ref(), case, limits),
+        (Three(s), Arithmetic::Single(Three(m))) => updated(s.as_ref(), m.as_ref(), case, limits),
+        _ => Err(CaseError::Dimension),
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Limits {
+    most: u64,
+    until: Option<Instant>,
+}
+
+fn double<const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    case: &Case,
+    limits: Limits,
+) -> Result<Timing, CaseError> {
+    let Frame::Total(total) = &case.frame else { return updated(exact, exact, case, limits) };
+    let started = Instant::now();
+    let (scene, steps) = prepare(exact, case)?;
+    let (mut body, body_force) = total::set_up(exact, total, case, &scene, steps.dt)?;
+    let setup_s = started.elapsed().as_secs_f64();
+    Ok(advance(&mut body, &body_force, exact, steps.count, limits, setup_s))
+}
+
+fn updated<T: Precision, const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    model: &dyn Solution<T, D>,
+    case: &Case,
+    limits: Limits,
+) -> Result<Timing, CaseError> {
+    if case.frame != Frame::Updated {
+        let (setting, value) = ("precision", "f32".into());
+        return Err(CaseError::Setting { setting, value, admissible: "f64 in the total frame" });
+    }
+    let started = Instant::now();
+    let (scene, steps) = prepare(exact, case)?;
+    let (mut solver, body_force) = set_up(exact, model, case, &scene, Real::nearest(steps.dt))?;
+    let setup_s = started.elapsed().as_secs_f64();
+    Ok(advance(solver.as_mut(), &body_force, exact, steps.count, limits, setup_s))
+}
+
+fn advance<T: Real, const D: usize>(
+    solver: &mut dyn Solver<T, D>,
+    body_force: &dyn BodyForce<T, D>,
+    exact: &dyn Solution<f64, D>,
+    steps: u64,
+    limits: Limits,
+    setup_s: f64,
+) -> Timing {
+    let (computing, started) = (ProcessTime::now(), Instant::now());
+    let mut done = 0;
+    let mut each = Vec::new();
+    let mut before = started;
+    while done < steps.min(limits.most) && solver.step(body_force).is_ok() {
+        done += 1;
+        let now = Instant::now();
+        if each.len() < FIRST_STEPS {
+            each.push((now - before).as_secs_f64());
+        }
+        before = now;
+        if limits.until.is_some_and(|until| now >= until) {
+            break;
+        }
+    }
+    let (wall_s, cpu_s) = (started.elapsed().as_secs_f64(), computing.elapsed().as_secs_f64());
+    let lag = solver.velocity_lag();
+    let measured: [f64; 3] = std::array::from_fn(|_| {
+        let started = Instant::now();
+        std::hint::black_box(measure(solver.observe(), exact, 0.0, lag).norms);
+        started.elapsed().as_secs_f64()
+    });
+    let (step_s, measure_s) = (median(&each), median(&measured));
+    let particles = solver.observe().0.len();
+    let complete = done == steps;
+    Timing { particles, steps: done, complete, setup_s, wall_s, step_s, cpu_s, measure_s }
+}
+
+/// What one number of particles costs, in seconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Sample {
+    particles: f64,
+    setup_s: f64,
+    /// One step.
+    step_s: f64,
+    /// All of a run but its steps, for each of them.
+    beside_s: f64,
+}
+
+/// What a run takes, in seconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cost {
+    /// The steps alone, as a row states them.
+    pub steps_s: f64,
+    /// Everything, from setting up to the last error.
+    pub total_s: f64,
+}
+
+/// The time of a scheme's steps as it depends on the number of particles.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CostModel {
+    /// By number of particles.
+    samples: Vec<Sample>,
+}
+
+/// By how much the time of a step may grow with the particles, as a power: what is less is rounding of clocks and steady
+/// parts of a step that larger grids do not have, what is more are caches that are left but once.
+const POWERS: (f64, f64) = (0.5, 1.3);
+
+impl CostModel {
+    /// Learns what a run of `steps` steps took: its steps, and all of it.
+    pub fn learn(&mut self, particles: f64, steps: u64, cost: Cost) {
+        let is_known = steps > 0 && cost.steps_s > 0.0 && particles > 0.0;
+        if !is_known {
+            return;
+        }
+        let steps = steps as f64;
+        let beside_s = ((cost.total_s - cost.steps_s) / steps).max(0.0);
+        // Setting up is in what is beside the steps.
+        self.put(Sample { particles, setup_s: 0.0, step_s: cost.steps_s / steps, beside_s });
+    }
+
+    fn put(&mut self, sample: Sample) {
+        let place = self.samples.partition_point(|known| known.particles < sample.particles);
+        match self.samples.get_mut(place) {
+            // The latest of several on one grid: what else runs on the machine changes.
+            Some(known) if known.particles == sample.particles => *known = sample,
+            _ => self.samples.insert(place, sample),
+        }
+    }
+
+    /// Times a few steps of `case`'s scheme on grids of its own kind up to its size, for at most about `effort`.
+    ///
+    /// # Errors
+    ///
+    /// [`CaseError`] for settings that cannot be run.
+    pub fn calibrate(
+        exact: &AnySolution<f64>,
+        arithmetic: Arithmetic<'_>,
+        case: &Case,
+        effort: Duration,
+    ) -> Result<Self, CaseError> {
+        let started = Instant::now();
+        let mut model = Self::default();
+        let own = plan(exact, arithmetic, case)?;
+        for cells in PROBES {
+            let probe = Case { cells, ..*case };
+            // Not every number of cells fits every box.
+            let Ok(size) = plan(exact, arithmetic, &probe) else { continue };
+            let expected = model.of(&size, 2).map_or(0.0, |cost| cost.total_s);
+            let is_over = started.elapsed().as_secs_f64() + expected > effort.as_secs_f64();
+            if is_over || (size.particles > own.particles && !model.samples.is_empty()) {
+                break;
+            }
+            // The first steps touch memory for the first time; many on small grids, where clocks count.
+            let most = (20_000.0 / size.particles.max(1.0)).ceil().clamp(3.0, 50.0) as u64;
+            let share = effort / 4;
+            let timing = time_steps(exact, arithmetic, &probe, most, Some(Instant::now() + share))?;
+            if timing.steps > 0 {
+                model.put(Sample {
+                    particles: timing.particles as f64,
+                    setup_s: timing.setup_s,
+                    step_s: timing.step_s,
+                    beside_s: timing.measure_s,
+                });
+            }
+        }
+        Ok(model)
+    }
+
+    /// What a run that comes to `plan` takes; `None` where nothing was learnt.
+    #[must_use]
+    pub fn predict(&self, plan: &Plan) -> Option<Cost> {
+        self.of(plan, plan.steps)
+    }
+
+    fn of(&self, plan: &Plan, steps: u64) -> Option<Cost> {
+        let steps = steps as f64;
+        let at = |value: fn(&Sample) -> f64| self.interpolate(plan.particles, value);
+        let steps_s = steps * at(|sample| sample.step_s)?;
+        let beside_s = steps * at(|sample| sample.beside_s)? + at(|sample| sample.setup_s)?;
+        Some(Cost { steps_s, total_s: steps_s + beside_s })
+    }
+
+    fn interpolate(&self, particles: f64, value: impl Fn(&Sample) -> f64) -> Option<f64> {
+        let last = self.samples.len().checked_sub(1)?;
+        let upper =
+            self.samples.partition_point(|known| known.particles < particles).clamp(1, last.max(1));
+        let a = &self.samples[upper - 1];
+        let (x, y) = (particles / a.particles, value(a));
+        let Some(b) = self.samples.get(upper) else { return Some(y * x) };
+        if !(y > 0.0 && value(b) > 0.0) {
+            return Some(y.max(value(b)) * particles / b.particles);
+        }
+        let power = (value(b) / y).ln() / (b.particles / a.particles).ln();
+        // Beyond the samples from the nearest one on.
+        let (base, from) = if particles > b.particles { (value(b), b) } else { (y, a) };
+        let outside = particles > b.particles || particles < a.particles;
+        let power = if outside { power.clamp(POWERS.0, POWERS.1) } else { power };
+        Some(base * (particles / from.particles).powf(power))
+    }
+}
+
+/// Grids that a scheme is tried on.
+const PROBES: [usize; 7] = [4, 8, 16, 32, 64, 128, 256];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plan(particles: f64, steps: u64) -> Plan {
+        Plan { steps, particles, bytes: 0.0, extent: None, round_off: 0.0 }
+    }
+
+    #[test]
+    fn a_power_law_is_found_again_between_its_samples_and_beyond() {
+        let law = |n: f64| 1e-7 * n.powf(1.1);
+        let mut model = CostModel::default();
+        assert_eq!(model.predict(&plan(100.0, 1)), None);
+        for n in [1e4, 1e2, 1e3] {
+            let steps_s = 10.0 * law(n);
+            model.learn(n, 10, Cost { steps_s, total_s: 3.0 * steps_s });
+        }
+        for n in [10.0, 300.0, 1e3, 5e3, 1e6] {
+            let cost = model.predict(&plan(n, 7)).unwrap();
+            assert!((cost.steps_s / (7.0 * law(n)) - 1.0).abs() < 1e-9, "{n}: {cost:?}");
+            assert!((cost.total_s / cost.steps_s - 3.0).abs() < 1e-9, "{n}: {cost:?}");
+        }
+    }
+
+    #[test]
+    fn one_sample_goes_by_the_number_of_particles_and_the_latest_counts() {
+        let mut model = CostModel::default();
+        model.learn(100.0, 1, Cost { steps_s: 9.0, total_s: 9.0 });
+        model.learn(100.0, 1, Cost { steps_s: 1.0, total_s: 1.5 });
+        assert_eq!(model.predict(&plan(200.0, 3)), Some(Cost { steps_s: 6.0, total_s: 9.0 }));
+    }
+
+    #[test]
+    fn what_cannot_be_extrapolated_sensibly_is_bounded() {
+        let mut model = CostModel::default();
+        // A clock that stood still, then one that leapt.
+        model.learn(100.0, 1, Cost { steps_s: 1.0, total_s: 1.0 });
+        model.learn(200.0, 1, Cost { steps_s: 1000.0, total_s: 1000.0 });
+        let cost = model.predict(&plan(2000.0, 1)).unwrap();
+        assert!((cost.steps_s / (1000.0 * 10.0_f64.powf(POWERS.1)) - 1.0).abs() < 1e-12);
+        model.learn(50.0, 0, Cost { steps_s: 1.0, total_s: 1.0 });
+        assert_eq!(model.samples.len(), 2);
+    }
+}

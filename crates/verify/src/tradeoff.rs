@@ -1,0 +1,1029 @@
+//! Error against cost: which setting is worth its time.
+//!
+//! A *family* is a scheme with everything but its grid and its time step; a *ladder* is a family at one CFL number, on
+//! grids from coarse to fine. The next run is always the cheapest one, by the time that the family's earlier runs let
+//! expect, so that settings from the whole field are compared before any of them becomes dear. A grid is passed over where
+//! the error that the observed order lets expect is larger by [`MARGIN`] than that of a setting of the same weights already
+//! known to cost no more; one that any other setting so betters may still be run, to tell what its weights cost, but only
+//! while that is cheap. A ladder ends where that holds for all its grids that the budget can pay for, where its error no longer falls, or
+//! where a run stops. From a ladder's third grid on, half and twice its CFL number are tried as well, as long as that gains.
+//!
+//! Nothing here knows a clock or a solver: both are given, so that tests can state them.
+
+use mmsmith_mpm::general::{Integrator, Shape, Transfer};
+use mmsmith_mpm::total_lagrangian::{Composition, Coordinates, Layout, MassMatrix};
+use std::collections::BTreeMap;
+
+use crate::case::{Case, Row, Status};
+use crate::cost::{Cost, CostModel};
+use crate::general::Placement;
+use crate::plan::Plan;
+use crate::total::{Frame, TotalScheme};
+
+/// Cell counts of a ladder.
+pub const LADDER: [usize; 15] = [4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512];
+/// An expected error this much larger than a measured one of no higher cost is not worth a run.
+pub const MARGIN: f64 = 1.25;
+/// Errors that the cheapest settings are named for.
+pub const TOLERANCES: [f64; 7] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8];
+
+/// Shares of the budget at which the sweep, the comparisons of knobs, the proofs on neighbouring grids and the repeats
+/// for timing end.
+const PHASES: [f64; 4] = [0.58, 0.68, 0.92, 0.98];
+/// The largest share of the budget that one run may take, so that its neighbours can be run as well; and one that settings
+/// with other weights dominate.
+const LARGEST_RUN: f64 = 0.1;
+const LARGEST_DOMINATED: f64 = 0.03;
+/// Predictions are held within 30 %.
+const UNCERTAINTY: f64 = 1.3;
+/// Runs shorter than this are timed three times at once.
+const SHORT_S: f64 = 0.2;
+/// The fewest timings of a short run.
+const TIMINGS: usize = 3;
+
+/// What is run: a case, its precision, and its threads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setting {
+    /// Scheme, grid and time step.
+    pub case: Case,
+    /// Whether the solver computes in single precision.
+    pub single: bool,
+    /// Number of threads.
+    pub threads: usize,
+}
+
+/// One measured setting.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Entry {
+    /// What was run.
+    pub setting: Setting,
+    /// Its errors; the times are medians of the repeats.
+    pub row: Row,
+    /// Wall-clock time of the steps in each repeat, in seconds.
+    pub walls: Vec<f64>,
+    /// Processor time of the steps in each repeat, in seconds.
+    pub cpus: Vec<f64>,
+    /// Everything in its first run, from setting up to the last error, in seconds.
+    pub total_s: f64,
+    /// Memory in bytes, estimated.
+    pub bytes: f64,
+}
+
+/// What a setting costs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Against {
+    /// Wall-clock time of the steps.
+    Wall,
+    /// Processor time of the steps.
+    Cpu,
+    /// Number of steps.
+    Steps,
+    /// Memory.
+    Memory,
+}
+
+/// Why something was not run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Skip {
+    /// Its expected error is larger by [`MARGIN`] than one already measured with the same weights at no higher cost, or with
+    /// any, and it would be dear.
+    Dominated,
+    /// The error of its ladder no longer falls.
+    NoGain,
+    /// Another CFL number on the same grid was no better, or was much worse.
+    Cfl,
+    /// A coarser grid of its ladder stopped.
+    Stopped,
+    /// It would take longer than there is time, or than one run may.
+    Budget,
+    /// It needs more memory than there is.
+    Memory,
+    /// The solver refuses it.
+    Refused,
+}
+
+/// What is wanted.
+#[derive(Clone, Copy)]
+pub struct Goal<'a> {
+    /// Seconds for everything.
+    pub budget_s: f64,
+    /// The error of a row that settings are compared by.
+    pub error: &'a dyn Fn(&Row) -> f64,
+    /// The cost that settings are compared by.
+    pub against: Against,
+    /// An error that must be met, beside [`TOLERANCES`].
+    pub tolerance: Option<f64>,
+    /// Seconds of stepping within which the most accurate setting is wanted.
+    pub time_s: Option<f64>,
+    /// Bytes that a run may need.
+    pub most_bytes: f64,
+}
+
+/// What the steps of a run took, in seconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Repeat {
+    /// Wall-clock time.
+    pub wall_s: f64,
+    /// Processor time.
+    pub cpu_s: f64,
+}
+
+/// A repeat, none where it did not end in time, or why it could not be run.
+pub type RepeatOutcome<E> = Result<Option<Repeat>, E>;
+
+/// A row, none where the solver refuses the setting, or why the study cannot go on.
+pub type RunOutcome<E> = Result<Option<Row>, E>;
+
+/// What runs the settings.
+pub struct Machine<'a, E> {
+    /// What a setting comes to; none where it does not fit the solution.
+    pub plan: &'a dyn Fn(&Setting) -> Option<Plan>,
+    /// Runs a setting and measures its errors, for at most so many seconds; none where the solver refuses it.
+    pub run: &'a (dyn Fn(&Setting, f64) -> RunOutcome<E> + 'a),
+    /// Runs the steps alone, for at most so many seconds; none if it did not end.
+    pub repeat: &'a (dyn Fn(&Setting, f64) -> RepeatOutcome<E> + 'a),
+    /// Seconds since the start.
+    pub clock: &'a dyn Fn() -> f64,
+}
+
+/// The cheapest setting for an error.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cheapest {
+    /// The error.
+    pub tolerance: f64,
+    /// The entry, if any meets it.
+    pub entry: Option<usize>,
+    /// Whether the neighbouring cell counts were run and meet it too; otherwise there was no time for that.
+    pub neighbours_hold: bool,
+}
+
+/// The setting that was asked for, and the run that proves it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Chosen {
+    /// The entry.
+    pub entry: usize,
+    /// What its setting gave when it was run once more.
+    pub proof: Row,
+}
+
+/// What one knob does, the other settings being equal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Effect {
+    /// Which.
+    pub knob: Knob,
+    /// The entry before it was turned.
+    pub from: usize,
+    /// The entry after.
+    pub to: usize,
+    /// Factor of the wall-clock time.
+    pub time: f64,
+    /// Factor of the error.
+    pub error: f64,
+}
+
+/// What can be set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Knob {
+    /// Number of cells.
+    Cells,
+    /// Time step.
+    Cfl,
+    /// Particles per cell and direction.
+    Ppc,
+    /// Weights; in the total frame the splines' degree.
+    Shape,
+    /// Time integrator, or composition in the total frame.
+    Integrator,
+    /// Velocities from the grid.
+    Transfer,
+    /// Where the particles lie.
+    Layout,
+    /// The mass matrix of the total frame.
+    Mass,
+    /// Precision.
+    Precision,
+    /// Number of threads.
+    Threads,
+}
+
+/// Everything that was measured.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Tradeoff {
+    /// All rows, in the order in which they were run.
+    pub entries: Vec<Entry>,
+    /// Indices of the Pareto-optimal ones, from cheap to dear.
+    pub front: Vec<usize>,
+    /// The cheapest setting for each tolerance.
+    pub tolerances: Vec<Cheapest>,
+    /// The cheapest setting for the tolerance asked for, if one meets it.
+    pub for_tolerance: Option<Chosen>,
+    /// The most accurate setting within the time asked for, if one is within it.
+    pub for_time: Option<Chosen>,
+    /// What each knob does.
+    pub effects: Vec<Effect>,
+    /// What was not run, with its reason and how many grids that were.
+    pub skipped: BTreeMap<Skip, usize>,
+    /// Families that were tried.
+    pub families: usize,
+}
+
+/// The indices of pairs `(cost, error)` that no other one betters in one and equals in the other, from cheap to dear.
+/// Pairs with a part that is not finite are never among them; of equal ones the first is.
+#[must_use]
+pub fn pareto(points: &[(f64, f64)]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..points.len())
+        .filter(|&index| points[index].0.is_finite() && points[index].1.is_finite())
+        .collect();
+    // Stable, so that equal ones stay in their order.
+    order.sort_by(|&a, &b| {
+        points[a].0.total_cmp(&points[b].0).then(points[a].1.total_cmp(&points[b].1))
+    });
+    let mut best = f64::INFINITY;
+    order.retain(|&index| {
+        let is_better = points[index].1 < best;
+        best = best.min(points[index].1);
+        is_better
+    });
+    order
+}
+
+/// The error on `cells`, from errors on coarser grids by their observed order; `hint` is the order believed while there
+/// are fewer than four of them, if the observed one is lower.
+///
+/// `None` without an error to start from.
+#[must_use]
+pub fn extrapolate(known: &[(usize, f64)], cells: usize, hint: f64) -> Option<f64> {
+    let &(last, error) = known.last()?;
+    let observed = match known {
+        [.., (a, e), (b, f)] if a != b && *e > 0.0 && *f > 0.0 => {
+            Some((e / f).ln() / (*b as f64 / *a as f64).ln())
+        }
+        _ => None,
+    };
+    let order = match observed {
+        Some(order) if known.len() >= 4 => order,
+        Some(order) => order.max(hint),
+        None => hint,
+    };
+    Some(error * (last as f64 / cells as f64).powf(order.clamp(0.0, 12.0)))
+}
+
+/// The families that may fit a solution, in the order in which they are tried; those that do not fit it are left out.
+/// `base` says the periods, the extent and the speed of CFL numbers, and the CFL number to begin with.
+#[must_use]
+pub fn families(
+    base: &Setting,
+    more_threads: Option<usize>,
+    has_single: bool,
+    plan: &dyn Fn(&Setting) -> Option<Plan>,
+) -> Vec<Setting> {
+    let mut all = Vec::new();
+    let updated =
+        Case { frame: Frame::Updated, integrator: Integrator::Cd, per_cell: 2, ..base.case };
+    let mut add = |case: Case| all.push(Setting { case, ..*base });
+    for placement in [Placement::Lattice, Placement::BodyFitted] {
+        let updated = Case { placement, ..updated };
+        let usual = if placement == Placement::Lattice { Shape::Gimp } else { Shape::Cpdi2 };
+        let usual = Case { shape: usual, ..updated };
+        add(usual);
+        let shapes = [
+            Shape::Linear,
+            Shape::Ugimp,
+            Shape::Gimp,
+            Shape::Cpdi,
+            Shape::Cpdi2,
+            Shape::Bspline2,
+            Shape::Bspline3,
+        ];
+        for shape in shapes.into_iter().filter(|shape| *shape != usual.shape) {
+            add(Case { shape, ..updated });
+        }
+        for integrator in [Integrator::Usl, Integrator::Usf, Integrator::Musl, Integrator::Usavg] {
+            add(Case { integrator, ..usual });
+        }
+        for per_cell in [1, 3, 4] {
+            add(Case { per_cell, ..usual });
+        }
+        add(Case { shape: Shape::Bspline3, per_cell: 4, ..updated });
+        for transfer in [Transfer::Pic, Transfer::Apic, Transfer::Xpic(2)] {
+            add(Case { transfer, ..usual });
+        }
+    }
+    let usual = Case { shape: Shape::Gimp, placement: Placement::Lattice, ..updated };
+    if let Some(threads) = more_threads {
+        all.push(Setting { case: usual, threads, ..*base });
+    }
+    if has_single {
+        for shape in [Shape::Gimp, Shape::Ugimp] {
+            all.push(Setting { case: Case { shape, ..usual }, single: true, ..*base });
+        }
+    }
+    for coordinates in [Coordinates::Cartesian, Coordinates::Polar] {
+        for degree in 2..=5 {
+            let total = TotalScheme { coordinates, ..TotalScheme::of_degree(degree) };
+            let mut add = |total: TotalScheme, layout: Layout, per_cell: usize| {
+                let frame = Frame::Total(TotalScheme { layout, ..total });
+                let case = Case { frame, per_cell, shape: Shape::Gimp, ..updated };
+                all.push(Setting { case, ..*base });
+            };
+            for per_cell in [2, 3, 4] {
+                add(total, Layout::Lattice, per_cell);
+            }
+            for per_cell in [degree - 1, degree, degree + 1] {
+                add(total, Layout::Gauss, per_cell);
+            }
+            for composition in [Composition::Order2, Composition::Order4, Composition::Order6] {
+                if composition != total.scheme.composition {
+                    let mut other = total;
+                    other.scheme.composition = composition;
+                    add(other, Layout::Gauss, degree);
+                }
+            }
+            let mut lumped = total;
+            lumped.scheme.mass = MassMatrix::Lumped;
+            lumped.scheme.composition = Composition::Order2;
+            add(lumped, Layout::Lattice, 2);
+        }
+    }
+    let fits = |setting: &Setting| {
+        let at = |cells| Setting { case: Case { cells, ..setting.case }, ..*setting };
+        LADDER.iter().any(|&cells| plan(&at(cells)).is_some())
+    };
+    all.retain(fits);
+    all
+}
+
+/// The order that a scheme may have.
+fn hint(setting: &Setting) -> f64 {
+    match &setting.case.frame {
+        Frame::Updated => 2.0,
+        Frame::Total(total) => total.scheme.degree as f64 + 1.0,
+    }
+}
+
+/// What the weights are: the shape and where its particles lie, or the degree of the total frame's splines.
+#[derive(Clone, Copy, PartialEq)]
+enum Weights {
+    Updated(Shape, Placement),
+    Total(usize),
+}
+
+fn weights(setting: &Setting) -> Weights {
+    match &setting.case.frame {
+        Frame::Updated => Weights::Updated(setting.case.shape, setting.case.placement),
+        Frame::Total(total) => Weights::Total(total.scheme.degree),
+    }
+}
+
+/// Which knobs differ.
+#[must_use]
+pub fn differences(a: &Setting, b: &Setting) -> Vec<Knob> {
+    let scheme = |setting: &Setting| match setting.case.frame {
+        Frame::Updated => None,
+        Frame::Total(total) => Some(total),
+    };
+    let (x, y) = (&a.case, &b.case);
+    let (s, t) = (scheme(a), scheme(b));
+    let degree = |total: Option<TotalScheme>| total.map(|total| total.scheme.degree);
+    let mass = |total: Option<TotalScheme>| total.map(|total| total.scheme.mass);
+    let order = |total: Option<TotalScheme>| total.map(|total| total.scheme.composition);
+    let layout = |total: Option<TotalScheme>| total.map(|total| (total.layout, total.coordinates));
+    [
+        (Knob::Cells, x.cells != y.cells),
+        (Knob::Cfl, x.cfl != y.cfl),
+        (Knob::Ppc, x.per_cell != y.per_cell),
+        (Knob::Shape, x.shape != y.shape || degree(s) != degree(t)),
+        (Knob::Integrator, x.integrator != y.integrator || order(s) != order(t)),
+        (Knob::Transfer, x.transfer != y.transfer),
+        (Knob::Layout, x.placement != y.placement || layout(s) != layout(t)),
+        (Knob::Mass, mass(s) != mass(t)),
+        (Knob::Precision, a.single != b.single),
+        (Knob::Threads, a.threads != b.threads),
+    ]
+    .into_iter()
+    .filter_map(|(knob, differs)| differs.then_some(knob))
+    .collect()
+}
+
+struct Family {
+    setting: Setting,
+    /// What each rung of the ladder comes to at the setting's own CFL number.
+    plans: Vec<Option<Plan>>,
+    cost: CostModel,
+}
+
+impl Family {
+    fn plan(&self, rung: usize, cfl: f64) -> Option<Plan> {
+        let plan = self.plans.get(rung).copied()??;
+        let steps = (plan.steps as f64 * self.setting.case.cfl / cfl).ceil() as u64;
+        Some(Plan { steps, ..plan })
+    }
+}
+
+/// A run at another CFL number that this one is held against.
+#[derive(Clone, Copy)]
+struct Parent {
+    error: f64,
+    /// The ladder's CFL number over the parent's.
+    factor: f64,
+}
+
+struct Ladder {
+    family: usize,
+    cfl: f64,
+    next: usize,
+    /// Cells and errors of the runs that ended well.
+    known: Vec<(usize, f64)>,
+    parent: Option<Parent>,
+    /// How often the CFL number was halved since a run stopped.
+    halvings: usize,
+    open: bool,
+}
+
+/// The next run of a ladder.
+struct Next {
+    rung: usize,
+    passed_over: usize,
+    expected: Option<Cost>,
+}
+
+struct Sweep<'a, E> {
+    machine: &'a Machine<'a, E>,
+    goal: Goal<'a>,
+    families: Vec<Family>,
+    ladders: Vec<Ladder>,
+    found: Tradeoff,
+}
+
+/// Measures the families within the budget, and says what is worth its cost. `progress` is told what is run next.
+///
+/// # Errors
+///
+/// That of the machine: where a setting that was planned cannot be run after all.
+pub fn tradeoff<E>(
+    families: &[Setting],
+    goal: &Goal<'_>,
+    machine: &Machine<'_, E>,
+    progress: &mut dyn FnMut(&Setting),
+) -> Result<Tradeoff, E> {
+    let at =
+        |setting: &Setting, cells| Setting { case: Case { cells, ..setting.case }, ..*setting };
+    let known = |setting: &Setting| Family {
+        setting: *setting,
+        plans: LADDER.iter().map(|&cells| (machine.plan)(&at(setting, cells))).collect(),
+        cost: CostModel::default(),
+    };
+    let ladder = |(family, setting): (usize, &Setting)| Ladder {
+        family,
+        cfl: setting.case.cfl,
+        next: 0,
+        known: Vec::new(),
+        parent: None,
+        halvings: 0,
+        open: true,
+    };
+    let mut sweep = Sweep {
+        machine,
+        goal: *goal,
+        families: families.iter().map(known).collect(),
+        ladders: families.iter().enumerate().map(ladder).collect(),
+        found: Tradeoff { families: families.len(), ..Tradeoff::default() },
+    };
+    sweep.climb(progress)?;
+    sweep.compare_knobs(progress)?;
+    sweep.name_cheapest(progress)?;
+    sweep.fill(progress)?;
+    sweep.found.for_tolerance = sweep.prove(sweep.cheapest_for_tolerance(), progress)?;
+    sweep.found.for_time = sweep.prove(sweep.best_in_time(), progress)?;
+    sweep.found.front = sweep.front();
+    sweep.found.effects = sweep.effects();
+    Ok(sweep.found)
+}
+
+impl<E> Sweep<'_, E> {
+    /// Seconds until a phase ends.
+    fn left(&self, phase: usize) -> f64 {
+        PHASES[phase] * self.goal.budget_s - (self.machine.clock)()
+    }
+
+    fn error(&self, entry: usize) -> f64 {
+        let row = &self.found.entries[entry].row;
+        if row.status == Status::Ok { (self.goal.error)(row) } else { f64::NAN }
+    }
+
+    fn cost(&self, entry: usize) -> f64 {
+        let entry = &self.found.entries[entry];
+        match self.goal.against {
+            Against::Wall => entry.row.wall_s,
+            Against::Cpu => entry.row.cpu_s,
+            Against::Steps => entry.row.steps as f64,
+            Against::Memory => entry.bytes,
+        }
+    }
+
+    fn front(&self) -> Vec<usize> {
+        pareto(&self.points(0..self.found.entries.len()))
+    }
+
+    /// The front among settings of the same weights.
+    fn front_of(&self, of: Weights) -> Vec<usize> {
+        let entries = &self.found.entries;
+        let own: Vec<usize> =
+            (0..entries.len()).filter(|&index| weights(&entries[index].setting) == of).collect();
+        pareto(&self.points(own.iter().copied())).into_iter().map(|place| own[place]).collect()
+    }
+
+    fn points(&self, entries: impl IntoIterator<Item = usize>) -> Vec<(f64, f64)> {
+        entries.into_iter().map(|index| (self.cost(index), self.error(index))).collect()
+    }
+
+    fn expected_cost(&self, plan: &Plan, cost: &Cost, threads: usize) -> f64 {
+        match self.goal.against {
+            Against::Wall => cost.steps_s,
+            Against::Cpu => cost.steps_s * threads as f64,
+            Against::Steps => plan.steps as f64,
+            Against::Memory => plan.bytes,
+        }
+    }
+
+    fn skip(&mut self, reason: Skip, count: usize) {
+        if count > 0 {
+            *self.found.skipped.entry(reason).or_default() += count;
+        }
+    }
+
+    /// Runs the ladders from cheap to dear.
+    fn climb(&mut self, progress: &mut dyn FnMut(&Setting)) -> Result<(), E> {
+        loop {
+            let front = self.points(self.front());
+            let left = self.left(0);
+            let mut own: Vec<(Weights, Vec<(f64, f64)>)> = Vec::new();
+            for family in &self.families {
+                let weights = weights(&family.setting);
+                if own.iter().all(|(known, _)| *known != weights) {
+                    own.push((weights, self.points(self.front_of(weights))));
+                }
+            }
+            let mut cheapest: Option<(f64, usize, Next)> = None;
+            for index in 0..self.ladders.len() {
+                if !self.ladders[index].open {
+                    continue;
+                }
+                let weights = weights(&self.families[self.ladders[index].family].setting);
+                let own = own.iter().find(|(known, _)| *known == weights);
+                let own = own.map_or(&[][..], |(_, points)| points.as_slice());
+                match self.next(&self.ladders[index], own, &front, left) {
+                    Ok(next) => {
+                        let time = next.expected.map_or(0.0, |cost| cost.total_s);
+                        if cheapest.as_ref().is_none_or(|(least, ..)| time < *least) {
+                            cheapest = Some((time, index, next));
+                        }
+                    }
+                    Err((reason, count)) => {
+                        self.ladders[index].open = false;
+                        self.skip(reason, count);
+                    }
+                }
+            }
+            let Some((_, index, next)) = cheapest else { return Ok(()) };
+            self.skip(Skip::Dominated, next.passed_over);
+            self.ascend(index, next.rung, progress)?;
+        }
+    }
+
+    /// The next run of a ladder that may be worth it, or why there is none, with the number of grids that this is said of.
+    fn next(
+        &self,
+        ladder: &Ladder,
+        own: &[(f64, f64)],
+        all: &[(f64, f64)],
+        left: f64,
+    ) -> Result<Next, (Skip, usize)> {
+        let family = &self.families[ladder.family];
+        if let [.., (_, a), (_, b)] = ladder.known.as_slice()
+            && ladder.known.len() >= 4
+            && b / a > 0.95
+        {
+            return Err((Skip::NoGain, 1));
+        }
+        let mut passed_over = 0;
+        for rung in ladder.next..LADDER.len() {
+            let Some(plan) = family.plan(rung, ladder.cfl) else { continue };
+            if plan.bytes > self.goal.most_bytes {
+                return Err((Skip::Memory, 1 + passed_over));
+            }
+            let Some(cost) = family.cost.predict(&plan) else {
+                return match left > 0.0 {
+                    true => Ok(Next { rung, passed_over, expected: None }),
+                    false => Err((Skip::Budget, 1)),
+                };
+            };
+            let most = left.min(LARGEST_RUN * self.goal.budget_s);
+            if UNCERTAINTY * cost.total_s > most {
+                // If all that can be paid for is dominated, that is why the ladder ends.
+                let reason = if passed_over > 0 { Skip::Dominated } else { Skip::Budget };
+                return Err((reason, 1.max(passed_over)));
+            }
+            let error = match (ladder.known.is_empty(), ladder.parent) {
+                (true, Some(parent)) => Some(parent.error * parent.factor.powi(2).min(1.0)),
+                _ => extrapolate(&ladder.known, LADDER[rung], hint(&family.setting)),
+            };
+            let price = self.expected_cost(&plan, &cost, family.setting.threads);
+            let is_below = |points: &[(f64, f64)]| {
+                error.is_some_and(|error| {
+                    points.iter().any(|&(known, least)| known <= price && MARGIN * least <= error)
+                })
+            };
+            let is_dear = cost.total_s > LARGEST_DOMINATED * self.goal.budget_s;
+            let is_dominated = is_below(own) || is_dear && is_below(all);
+            if !is_dominated {
+                return Ok(Next { rung, passed_over, expected: Some(cost) });
+            }
+            passed_over += 1;
+        }
+        Err((Skip::Dominated, passed_over))
+    }
+
+    /// Runs one rung of a ladder, and decides how the ladder goes on.
+    fn ascend(
+        &mut self,
+        index: usize,
+        rung: usize,
+        progress: &mut dyn FnMut(&Setting),
+    ) -> Result<(), E> {
+        let Ladder { family, cfl, parent, halvings, .. } = self.ladders[index];
+        let cells = LADDER[rung];
+        let setting = self.families[family].setting;
+        let setting = Setting { case: Case { cells, cfl, ..setting.case }, ..setting };
+        self.ladders[index].next = rung + 1;
+        let Some(entry) = self.run(family, &setting, progress)? else {
+            self.skip(Skip::Refused, 1);
+            return Ok(());
+        };
+        let error = self.error(entry);
+        let branch = |sweep: &mut Self, factor: f64, parent: Option<Parent>, halvings| {
+            sweep.ladders.push(Ladder {
+                family,
+                cfl: factor * cfl,
+                next: rung,
+                known: Vec::new(),
+                parent,
+                halvings,
+                open: true,
+            });
+        };
+        if self.found.entries[entry].row.status != Status::Ok || !error.is_finite() {
+            self.ladders[index].open = false;
+            self.skip(Skip::Stopped, 1);
+            if parent.is_none() && halvings < 2 {
+                branch(self, 0.5, None, halvings + 1);
+            }
+            return Ok(());
+        }
+        self.ladders[index].known.push((cells, error));
+        match (parent, self.ladders[index].known.len()) {
+            (Some(Parent { error: before, factor }), 1) => {
+                let worth = if factor < 1.0 { error < 0.8 * before } else { error < 1.5 * before };
+                if worth {
+                    branch(self, factor, Some(Parent { error, factor }), halvings);
+                } else {
+                    self.ladders[index].open = false;
+                    self.skip(Skip::Cfl, 1);
+                }
+            }
+            (None, 3) => {
+                branch(self, 0.5, Some(Parent { error, factor: 0.5 }), halvings);
+                if halvings == 0 {
+                    branch(self, 2.0, Some(Parent { error, factor: 2.0 }), halvings);
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// The entry of a setting, run now if it was not yet; none where the solver refuses it.
+    fn run(
+        &mut self,
+        family: usize,
+        setting: &Setting,
+        progress: &mut dyn FnMut(&Setting),
+    ) -> Result<Option<usize>, E> {
+        if let Some(known) = self.found.entries.iter().position(|e| e.setting == *setting) {
+            return Ok(Some(known));
+        }
+        progress(setting);
+        let started = (self.machine.clock)();
+        let Some(row) = (self.machine.run)(setting, self.left(3))? else { return Ok(None) };
+        let total_s = (self.machine.clock)() - started;
+        if row.status == Status::Ok {
+            let cost = Cost { steps_s: row.wall_s, total_s };
+            // The plan's number of particles is an estimate; predictions start from such estimates as well.
+            let particles = (self.machine.plan)(setting).map_or(0.0, |plan| plan.particles);
+            self.families[family].cost.learn(particles, row.steps, cost);
+        }
+        let bytes = (self.machine.plan)(setting).map_or(0.0, |plan| plan.bytes);
+        let (walls, cpus) = (vec![row.wall_s], vec![row.cpu_s]);
+        let is_short = row.status == Status::Ok && row.wall_s < SHORT_S;
+        self.found.entries.push(Entry { setting: *setting, row, walls, cpus, total_s, bytes });
+        let entry = self.found.entries.len() - 1;
+        while is_short && self.found.entries[entry].walls.len() < TIMINGS && self.left(3) > 0.0 {
+            if !self.time_again(entry)? {
+                break;
+            }
+        }
+        Ok(Some(entry))
+    }
+
+    /// Times a setting once more; whether it ended in time.
+    fn time_again(&mut self, entry: usize) -> Result<bool, E> {
+        let setting = self.found.entries[entry].setting;
+        let Some(Repeat { wall_s, cpu_s }) = (self.machine.repeat)(&setting, self.left(3))? else {
+            return Ok(false);
+        };
+        let Entry { row, walls, cpus, .. } = &mut self.found.entries[entry];
+        walls.push(wall_s);
+        cpus.push(cpu_s);
+        let particle_steps = row.particles as f64 * row.steps as f64;
+        row.wall_s = median(walls);
+        row.cpu_s = median(cpus);
+        row.particle_steps_per_s = if row.wall_s > 0.0 { particle_steps / row.wall_s } else { 0.0 };
+        Ok(true)
+    }
+
+    /// Runs what is missing for comparisons in which one knob differs, on the finest grid that is cheap.
+    fn compare_knobs(&mut self, progress: &mut dyn FnMut(&Setting)) -> Result<(), E> {
+        let cheap = 0.004 * self.goal.budget_s;
+        let references = [
+            self.families.iter().position(|f| f.setting.case.frame == Frame::Updated),
+            self.families.iter().position(|f| f.setting.case.placement == Placement::BodyFitted),
+            self.families.iter().position(|f| f.setting.case.frame != Frame::Updated),
+        ];
+        for reference in references.into_iter().flatten() {
+            let of = self.families[reference].setting;
+            let affordable = |rung: &usize| {
+                let family = &self.families[reference];
+                let plan = family.plan(*rung, of.case.cfl);
+                plan.and_then(|plan| family.cost.predict(&plan)).is_some_and(|c| c.total_s < cheap)
+            };
+            let Some(rung) = (0..LADDER.len()).rev().find(affordable) else { continue };
+            let at = |family: &Setting, cfl: f64| {
+                let case = Case { cells: LADDER[rung], cfl, ..family.case };
+                Setting { case, ..*family }
+            };
+            let partners: Vec<(usize, Setting)> = (0..self.families.len())
+                .filter(|&other| differences(&of, &self.families[other].setting).len() <= 1)
+                .flat_map(|other| {
+                    let setting = self.families[other].setting;
+                    [at(&setting, setting.case.cfl), at(&setting, setting.case.cfl / 2.0)]
+                        .map(|setting| (other, setting))
+                })
+                .collect();
+            for (family, setting) in partners {
+                let Some(plan) = (self.machine.plan)(&setting) else { continue };
+                let expected = self.families[family].cost.predict(&plan);
+                let is_cheap = expected.is_some_and(|cost| {
+                    cost.total_s < 8.0 * cheap && UNCERTAINTY * cost.total_s < self.left(1)
+                });
+                if is_cheap && plan.bytes <= self.goal.most_bytes {
+                    self.run(family, &setting, progress)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// For each tolerance the cheapest setting that meets it, and whose neighbours do.
+    fn name_cheapest(&mut self, progress: &mut dyn FnMut(&Setting)) -> Result<(), E> {
+        let mut wanted: Vec<f64> = TOLERANCES.into_iter().chain(self.goal.tolerance).collect();
+        wanted.sort_by(|a, b| b.total_cmp(a));
+        wanted.dedup();
+        // Neighbours that are run here are not candidates themselves, or their neighbours would have to be run in turn.
+        let candidates = self.found.entries.len();
+        for tolerance in wanted {
+            let mut order: Vec<usize> =
+                (0..candidates).filter(|&i| self.error(i) <= tolerance).collect();
+            order.sort_by(|&a, &b| self.cost(a).total_cmp(&self.cost(b)));
+            let mut named = Cheapest { tolerance, entry: None, neighbours_hold: false };
+            for entry in order {
+                match self.neighbours_hold(entry, tolerance, progress)? {
+                    Some(true) => {
+                        named = Cheapest { tolerance, entry: Some(entry), neighbours_hold: true };
+                        break;
+                    }
+                    Some(false) => {}
+                    // No time: the first that is left is named, unproved.
+                    None if named.entry.is_none() => named.entry = Some(entry),
+                    None => {}
+                }
+            }
+            self.found.tolerances.push(named);
+        }
+        Ok(())
+    }
+
+    /// Whether the next coarser and the next finer grid meet the tolerance as well; `None` if there was no time.
+    fn neighbours_hold(
+        &mut self,
+        entry: usize,
+        tolerance: f64,
+        progress: &mut dyn FnMut(&Setting),
+    ) -> Result<Option<bool>, E> {
+        let setting = self.found.entries[entry].setting;
+        let Some(family) = self.families.iter().position(|family| {
+            let at =
+                Case { cells: setting.case.cells, cfl: setting.case.cfl, ..family.setting.case };
+            Setting { case: at, ..family.setting } == setting
+        }) else {
+            return Ok(None);
+        };
+        for neighbour in neighbours(&setting, self.machine.plan) {
+            let known = self.found.entries.iter().any(|e| e.setting == neighbour);
+            if !known {
+                let plan = (self.machine.plan)(&neighbour);
+                let cost = plan.and_then(|plan| self.families[family].cost.predict(&plan));
+                if cost.is_none_or(|cost| UNCERTAINTY * cost.total_s > self.left(2)) {
+                    return Ok(None);
+                }
+            }
+            let entry = self.run(family, &neighbour, progress)?;
+            let error = entry.map_or(f64::NAN, |entry| self.error(entry));
+            // A comparison that is not a number holds nothing.
+            if error.is_nan() || error > tolerance {
+                return Ok(Some(false));
+            }
+        }
+        Ok(Some(true))
+    }
+
+    fn cheapest_for_tolerance(&self) -> Option<usize> {
+        let wanted = self.goal.tolerance?;
+        self.found.tolerances.iter().find(|named| named.tolerance == wanted)?.entry
+    }
+
+    /// The most accurate setting whose steps took no more than the time asked for, each time that they were timed.
+    fn best_in_time(&self) -> Option<usize> {
+        let most = self.goal.time_s?;
+        let is_within = |entry: &usize| {
+            self.found.entries[*entry].walls.iter().all(|wall| *wall <= most)
+                && self.error(*entry).is_finite()
+        };
+        let entries = (0..self.found.entries.len()).filter(is_within);
+        entries.min_by(|&a, &b| self.error(a).total_cmp(&self.error(b)))
+    }
+
+    /// Runs a setting once more, with as long as that takes.
+    fn prove(
+        &self,
+        entry: Option<usize>,
+        progress: &mut dyn FnMut(&Setting),
+    ) -> Result<Option<Chosen>, E> {
+        let Some(entry) = entry else { return Ok(None) };
+        let setting = self.found.entries[entry].setting;
+        progress(&setting);
+        let proof = (self.machine.run)(&setting, f64::INFINITY)?;
+        Ok(proof.map(|proof| Chosen { entry, proof }))
+    }
+
+    /// What the proofs will take.
+    fn proofs_s(&self) -> f64 {
+        let chosen = [self.cheapest_for_tolerance(), self.best_in_time()];
+        chosen.into_iter().flatten().map(|entry| self.found.entries[entry].total_s).sum()
+    }
+
+    /// Spends what is left on timings of the front, those with the fewest first.
+    fn fill(&mut self, progress: &mut dyn FnMut(&Setting)) -> Result<(), E> {
+        let named: Vec<usize> = self.found.tolerances.iter().filter_map(|t| t.entry).collect();
+        loop {
+            let left = self.left(3) - self.proofs_s();
+            let mut worth = self.front();
+            worth.extend(&named);
+            let fits = |&index: &usize| UNCERTAINTY * self.found.entries[index].row.wall_s < left;
+            let fewest = worth
+                .into_iter()
+                .filter(fits)
+                .min_by_key(|&index| self.found.entries[index].walls.len());
+            let Some(entry) = fewest.filter(|_| left > 0.0) else { return Ok(()) };
+            progress(&self.found.entries[entry].setting);
+            if !self.time_again(entry)? {
+                return Ok(());
+            }
+        }
+    }
+
+    /// What each knob did: of the pairs that differ in it alone, the finest one for each pair of values.
+    fn effects(&self) -> Vec<Effect> {
+        let entries = &self.found.entries;
+        let Some(plain) = self.families.first().map(|family| family.setting) else {
+            return Vec::new();
+        };
+        let mut best: BTreeMap<(Knob, String), Effect> = BTreeMap::new();
+        for from in 0..entries.len() {
+            for to in 0..entries.len() {
+                let (a, b) = (&entries[from].setting, &entries[to].setting);
+                let &[knob] = differences(a, b).as_slice() else { continue };
+                // Told of plain settings: with f32 or PIC, say, another knob's effect is another one.
+                let is_plain = a.case.transfer == Transfer::Flip
+                    && !a.single
+                    && a.threads == plain.threads
+                    && a.case.cfl <= plain.case.cfl
+                    && (a.case.per_cell == 2
+                        || knob == Knob::Ppc
+                        || a.case.frame != Frame::Updated);
+                let Some(turned) = turn(knob, a, b).filter(|_| is_plain) else { continue };
+                let error = self.error(to) / self.error(from);
+                let time = entries[to].row.wall_s / entries[from].row.wall_s;
+                if !(error.is_finite() && time.is_finite()) {
+                    continue;
+                }
+                let effect = Effect { knob, from, to, time, error };
+                let finer = |known: &Effect| entries[known.from].setting.case.cells < a.case.cells;
+                match best.entry((knob, turned)) {
+                    std::collections::btree_map::Entry::Vacant(place) => {
+                        place.insert(effect);
+                    }
+                    std::collections::btree_map::Entry::Occupied(mut place) => {
+                        if finer(place.get()) {
+                            place.insert(effect);
+                        }
+                    }
+                }
+            }
+        }
+        best.into_values().collect()
+    }
+}
+
+/// By what a knob is turned, as a key that sorts alike turns together; `None` for the other way round of a turn, and for
+/// turns that nobody asks for.
+fn turn(knob: Knob, a: &Setting, b: &Setting) -> Option<String> {
+    let frame = if a.case.frame == Frame::Updated { "updated" } else { "total" };
+    let (x, y) = (&a.case, &b.case);
+    let of = |setting: &Setting| match setting.case.frame {
+        Frame::Updated => {
+            (format!("{:?}", setting.case.shape), 0, format!("{:?}", setting.case.integrator))
+        }
+        Frame::Total(t) => (String::new(), t.scheme.degree, format!("{:?}", t.scheme.composition)),
+    };
+    let ((shape, degree, integrator), (shape_b, degree_b, integrator_b)) = (of(a), of(b));
+    let is_usual = x.shape == Shape::Gimp || x.placement == Placement::BodyFitted;
+    let key = match knob {
+        Knob::Cells => {
+            (y.cells == 2 * x.cells).then(|| format!("{shape} {degree} {:?}", x.placement))
+        }
+        Knob::Cfl => (y.cfl == x.cfl / 2.0 && (is_usual || frame == "total"))
+            .then(|| format!("{shape} {degree} {integrator}")),
+        Knob::Ppc => {
+            (y.per_cell == x.per_cell + 1).then(|| format!("{shape} {degree} {}", x.per_cell))
+        }
+        Knob::Shape if frame == "total" => (degree_b == degree + 1).then(|| format!("{degree}")),
+        Knob::Shape => is_usual.then(|| format!("{shape} {shape_b}")),
+        // From centred differences to another one; between compositions to the next order.
+        Knob::Integrator if frame == "updated" => {
+            (x.integrator == Integrator::Cd).then(|| format!("{shape} {integrator_b}"))
+        }
+        Knob::Integrator => (integrator < integrator_b
+            && (integrator.as_str(), integrator_b.as_str()) != ("Order2", "Order6"))
+            .then(|| format!("{degree} {integrator}")),
+        Knob::Transfer => (x.transfer == Transfer::Flip).then(|| format!("{shape} {}", y.transfer)),
+        Knob::Layout => match x.frame {
+            Frame::Updated => (x.placement == Placement::Lattice).then(|| shape.clone()),
+            Frame::Total(total) => (total.layout == Layout::Lattice).then(|| format!("{degree}")),
+        },
+        Knob::Mass => match x.frame {
+            Frame::Total(total) if total.scheme.mass == MassMatrix::Lumped => {
+                Some(format!("{degree}"))
+            }
+            _ => None,
+        },
+        Knob::Precision => (!a.single).then(|| shape.clone()),
+        Knob::Threads => (b.threads > a.threads).then(|| shape.clone()),
+    };
+    key.map(|key| format!("{frame} {key}"))
+}
+
+/// The setting on the next coarser and the next finer grid that fit.
+fn neighbours(setting: &Setting, plan: &dyn Fn(&Setting) -> Option<Plan>) -> Vec<Setting> {
+    let cells = setting.case.cells;
+    let at = |cells| Setting { case: Case { cells, ..setting.case }, ..*setting };
+    let fits = |&cells: &usize| plan(&at(cells)).is_some();
+    let coarser = (1..cells).rev().take(32).find(fits);
+    let finer = (cells + 1..cells + 33).find(fits);
+    coarser.into_iter().chain(finer).map(at).collect()
+}
+
+/// The median; of an even number the mean of the middle two.
+#[must_use]
+pub fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let middle = sorted.len() / 2;
+    match sorted.len() {
+        0 => f64::NAN,
+        n if n % 2 == 1 => sorted[middle],
+        _ => f64::midpoint(sorted[middle - 1], sorted[middle]),
+    }
+}
+
+#[cfg(test)]
+mod tests;
