@@ -15,7 +15,7 @@ use nalgebra::{Vector2, vector};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 const CELLS: usize = 256;
-const STEPS: usize = 4;
+const STEPS: usize = 10;
 const LAMBDA: f64 = 5769.0;
 const MU: f64 = 3846.0;
 const ITEMS: usize = 4 * CELLS * CELLS * STEPS;

@@ -12,6 +12,7 @@ use bytemuck::cast_slice_mut;
 use rayon::prelude::*;
 
 use crate::grid::{BAND_ROWS, Layout, PAD_BELOW};
+use crate::partition::{Partition, Share};
 
 /// Rows that a particle may be lower than the band it was sorted into before everything is sorted anew.
 const SLACK: usize = 2;
@@ -24,9 +25,7 @@ pub(crate) struct Bands {
     /// Band of every particle.
     home: Vec<u32>,
     /// Particle ids, band after band.
-    order: Vec<u32>,
-    /// Where each band starts in `order`, and where the last one ends.
-    starts: Vec<usize>,
+    order: Partition,
     /// Scratch of the sort: particles at each node, then where the next of them goes.
     counts: Vec<u32>,
     /// Scratch of the sort: first node of every particle.
@@ -45,8 +44,7 @@ impl Bands {
         Self {
             height,
             home: vec![0; particles],
-            order: vec![0; particles],
-            starts: vec![0; bands + 1],
+            order: Partition::new(particles, bands),
             counts: vec![0; layout.nodes + 1],
             keys: vec![0; particles],
         }
@@ -71,9 +69,16 @@ impl Bands {
         &self.home
     }
 
+    /// Whether every particle is in one band: false before the first sort, and where [`state`](Self::state) was
+    /// overwritten by what no sort can give.
+    pub(crate) fn is_sorted(&mut self) -> bool {
+        self.order.is_whole()
+    }
+
     /// What the next steps need of the last sort.
     pub(crate) fn state(&mut self) -> [&mut [u8]; 3] {
-        let Self { home, order, starts, .. } = self;
+        let Self { home, order, .. } = self;
+        let (order, starts) = order.arrange();
         [cast_slice_mut(home), cast_slice_mut(order), cast_slice_mut(starts)]
     }
 
@@ -96,16 +101,16 @@ impl Bands {
         for node in 1..self.counts.len() {
             self.counts[node] += self.counts[node - 1];
         }
-        let bands = self.starts.len() - 1;
-        self.starts[bands] = self.order.len();
+        let (order, starts) = self.order.arrange();
+        let bands = starts.len() - 1;
+        (starts[0], starts[bands]) = (0, order.len());
         for band in 1..bands {
             let first_node = (band * height + SLACK) * row;
-            self.starts[band] =
-                self.counts.get(first_node).map_or(self.order.len(), |&start| start as usize);
+            starts[band] = self.counts.get(first_node).map_or(order.len(), |&start| start as usize);
         }
         for (p, &key) in self.keys.iter().enumerate() {
             let place = &mut self.counts[key as usize];
-            self.order[*place as usize] = p as u32;
+            order[*place as usize] = p as u32;
             *place += 1;
         }
     }
@@ -121,22 +126,59 @@ impl Bands {
     ) where
         N: Send,
     {
-        let band_nodes = self.height * layout.row();
-        let run = |piece: &mut [N], band: usize| {
-            let Some(&[start, end]) = self.starts.get(band..band + 2).and_then(|s| s.first_chunk())
-            else {
-                return;
-            };
-            add(piece, band * band_nodes, &self.order[start..end]);
+        let add = |piece: &mut [N], first: usize, band: usize| {
+            if let Some(particles) = self.order.part(band) {
+                add(piece, first, particles);
+            }
         };
-        nodes.par_chunks_mut(2 * band_nodes).enumerate().for_each(|(pair, piece)| {
-            piece.iter_mut().for_each(&clear);
-            run(piece, 2 * pair);
+        each(self.height, layout, nodes, clear, add);
+    }
+
+    /// As [`scatter`](Self::scatter) for bands that may change their own elements of three arrays on the way:
+    /// `add(piece, first, band, elements)`. Nothing is called where the bands are not [sorted](Self::is_sorted).
+    pub(crate) fn sweep<N, A, B, C, const D: usize>(
+        &mut self,
+        layout: &Layout<D>,
+        nodes: &mut [N],
+        clear: impl Fn(&mut N) + Sync,
+        arrays: (&mut [A], &mut [B], &mut [C]),
+        add: impl Fn(&mut [N], usize, u32, Share<'_, A, B, C>) + Sync,
+    ) where
+        N: Send,
+        A: Send,
+        B: Send,
+        C: Send,
+    {
+        let Self { order, height, .. } = self;
+        let Some(shares) = order.shares(arrays) else {
+            debug_assert!(false, "bands that are not sorted");
+            return;
+        };
+        each(*height, layout, nodes, clear, |piece, first, band| {
+            if let Some(share) = shares.take(band) {
+                add(piece, first, band as u32, share);
+            }
         });
-        if let Some(rest) = nodes.get_mut(band_nodes..) {
-            rest.par_chunks_mut(2 * band_nodes).enumerate().for_each(|(pair, piece)| {
-                run(piece, 2 * pair + 1);
-            });
-        }
+    }
+}
+
+/// Calls `clear` on all nodes and then `add(piece, first, band)` for each band: even bands side by side, then odd ones.
+fn each<N: Send, const D: usize>(
+    height: usize,
+    layout: &Layout<D>,
+    nodes: &mut [N],
+    clear: impl Fn(&mut N) + Sync,
+    add: impl Fn(&mut [N], usize, usize) + Sync,
+) {
+    let band_nodes = height * layout.row();
+    nodes.par_chunks_mut(2 * band_nodes).enumerate().for_each(|(pair, piece)| {
+        piece.iter_mut().for_each(&clear);
+        add(piece, 2 * pair * band_nodes, 2 * pair);
+    });
+    if let Some(rest) = nodes.get_mut(band_nodes..) {
+        rest.par_chunks_mut(2 * band_nodes).enumerate().for_each(|(pair, piece)| {
+            let band = 2 * pair + 1;
+            add(piece, band * band_nodes, band);
+        });
     }
 }

@@ -9,7 +9,7 @@ use crate::material::Law;
 use crate::simd::{Loop, dispatch};
 use crate::step::Constants;
 use crate::tensor::real;
-use crate::transfer::{Deposit, Gathered, Node, Weights, gather, scatter};
+use crate::transfer::{Deposit, Gathered, Node, Weights, gather, scatter, scatter_runs};
 use crate::weights::{Rule, WideWeights, is_wide};
 
 /// Particles in a block: as many as keep all of it in the first-level cache.
@@ -23,7 +23,9 @@ type Row<T> = [T; BLOCK];
 /// What comes out of one loop is used by another only after all of the block went through the first: vector loads wait
 /// for the narrower stores that they overlap.
 pub(crate) struct Block<T, const D: usize, const W: usize> {
-    /// Positions in cells, from the lower corner.
+    /// Positions.
+    x: [Row<T>; D],
+    /// Positions in cells, from the lower corner, once the weights have been asked for.
     xi: [Row<T>; D],
     /// F, and once it has been asked for the stress.
     tensors: [[Row<T>; D]; D],
@@ -41,6 +43,7 @@ impl<T: RealField + Copy, const D: usize, const W: usize> Block<T, D, W> {
     pub(crate) fn new(planted: Planted) -> Self {
         let zero = [T::zero(); BLOCK];
         Self {
+            x: [zero; D],
             xi: [zero; D],
             // Identities, which have a stress.
             tensors: array::from_fn(|i| {
@@ -58,17 +61,16 @@ impl<T: RealField + Copy, const D: usize, const W: usize> Block<T, D, W> {
     /// Takes the particles `ids` of the arrays.
     pub(crate) fn pick(
         &mut self,
-        c: &Constants<T, D>,
         ids: &[u32],
         x: &[SVector<T, D>],
         F: &[SMatrix<T, D, D>],
     ) {
-        dispatch(Pick { block: self, c, ids, x: Some(x), F });
+        dispatch(Pick { block: self, ids, x: Some(x), F });
     }
 
     /// Replaces the deformation gradients by those of the particles `ids`.
-    pub(crate) fn pick_F(&mut self, c: &Constants<T, D>, ids: &[u32], F: &[SMatrix<T, D, D>]) {
-        dispatch(Pick { block: self, c, ids, x: None, F });
+    pub(crate) fn pick_F(&mut self, ids: &[u32], F: &[SMatrix<T, D, D>]) {
+        dispatch(Pick { block: self, ids, x: None, F });
     }
 
     /// Takes a run of particles, and computes their weights.
@@ -79,12 +81,29 @@ impl<T: RealField + Copy, const D: usize, const W: usize> Block<T, D, W> {
         x: &[SVector<T, D>],
         F: &[SMatrix<T, D, D>],
     ) {
-        dispatch(Weigh { block: self, rule, run: Some((c, x, F)) });
+        dispatch(Weigh { block: self, c, rule, run: Some((x, F)) });
     }
 
     /// Computes the weights of the particles taken last.
-    pub(crate) fn weigh<R: Rule<T, D, W>>(&mut self, rule: R) {
-        dispatch(Weigh { block: self, rule, run: None });
+    pub(crate) fn weigh<R: Rule<T, D, W>>(&mut self, c: &Constants<T, D>, rule: R) {
+        dispatch(Weigh { block: self, c, rule, run: None });
+    }
+
+    /// Takes one particle, as number `k` of the block.
+    #[inline(always)]
+    pub(crate) fn put(&mut self, k: usize, x: &SVector<T, D>, F: &SMatrix<T, D, D>) {
+        for i in 0..D {
+            self.x[i][k] = x[i];
+            for j in 0..D {
+                self.tensors[i][j][k] = F[(i, j)];
+            }
+        }
+    }
+
+    /// The position of particle `k`.
+    #[inline(always)]
+    pub(crate) fn position(&self, k: usize) -> SVector<T, D> {
+        SVector::from_fn(|a, _| self.x[a][k])
     }
 
     /// Turns deformation gradients into Kirchhoff stresses.
@@ -172,7 +191,6 @@ impl<T: RealField + Copy, const D: usize, const W: usize> Weights<T, D, W> for L
 
 struct Pick<'a, T, const D: usize, const W: usize> {
     block: &'a mut Block<T, D, W>,
-    c: &'a Constants<T, D>,
     ids: &'a [u32],
     x: Option<&'a [SVector<T, D>]>,
     F: &'a [SMatrix<T, D, D>],
@@ -181,30 +199,20 @@ struct Pick<'a, T, const D: usize, const W: usize> {
 impl<T: RealField + Copy, const D: usize, const W: usize> Loop for Pick<'_, T, D, W> {
     #[inline(always)]
     fn run(self) {
-        let Self { block, c, ids, x, F } = self;
+        let Self { block, ids, x, F } = self;
         for (k, &p) in ids.iter().take(BLOCK).enumerate() {
-            let F = &F[p as usize];
-            for i in 0..D {
-                for j in 0..D {
-                    block.tensors[i][j][k] = F[(i, j)];
-                }
-            }
-            if let Some(x) = x {
-                let xi = c.in_cells(&x[p as usize]);
-                for a in 0..D {
-                    block.xi[a][k] = xi[a];
-                }
-            }
+            let x = x.map_or_else(|| block.position(k), |x| x[p as usize]);
+            block.put(k, &x, &F[p as usize]);
         }
     }
 }
 
-/// The grid and a run of particles.
-type Run<'a, T, const D: usize> =
-    (&'a Constants<T, D>, &'a [SVector<T, D>], &'a [SMatrix<T, D, D>]);
+/// A run of particles.
+type Run<'a, T, const D: usize> = (&'a [SVector<T, D>], &'a [SMatrix<T, D, D>]);
 
 struct Weigh<'a, T, R, const D: usize, const W: usize> {
     block: &'a mut Block<T, D, W>,
+    c: &'a Constants<T, D>,
     rule: R,
     /// The particles to take first, if any.
     run: Option<Run<'a, T, D>>,
@@ -217,11 +225,11 @@ where
 {
     #[inline(always)]
     fn run(self) {
-        let Self { block, rule, run } = self;
-        if let Some((c, x, F)) = run {
+        let Self { block, c, rule, run } = self;
+        if let Some((x, F)) = run {
             for a in 0..D {
-                for (xi, x) in block.xi[a].iter_mut().zip(x) {
-                    *xi = c.in_cells(x)[a];
+                for (row, x) in block.x[a].iter_mut().zip(x) {
+                    *row = x[a];
                 }
                 for (stretch, F) in block.tensors[a][a].iter_mut().zip(F) {
                     *stretch = F[(a, a)];
@@ -230,6 +238,9 @@ where
         }
         let mut any_wide = false;
         for a in 0..D {
+            for k in 0..BLOCK {
+                block.xi[a][k] = c.in_cells(&block.position(k))[a];
+            }
             for k in 0..BLOCK {
                 let l = rule.half_size(a, block.stretch(a, k));
                 any_wide |= is_wide(l);
@@ -258,6 +269,10 @@ impl<T: RealField + Copy, const D: usize, const W: usize> Loop for Scatter<'_, T
     #[inline(always)]
     fn run(self) {
         let Self { block, strides, piece, first, deposits } = self;
+        if D <= 2 && W <= 3 && !block.any_wide {
+            scatter_runs(|k| Lane { block, k }, strides, piece, first, deposits);
+            return;
+        }
         for (k, deposit) in deposits.iter().enumerate().take(BLOCK) {
             if let Some((xi, l)) = block.wide(k) {
                 scatter_wide(&xi, &l, strides, piece, first, deposit);

@@ -13,8 +13,9 @@ use crate::grid::{Grid, Layout};
 use crate::material::{AnyLaw, Law, Material, NeoHookean, NeoHookeanNoLog};
 use crate::particles::Particles;
 use crate::step::{
-    Constants, Kernel, State, Trouble, axis_too_large, step_musl, step_usf, step_usl, trouble,
+    Constants, Kernel, State, Trouble, axis_too_large, step_musl, step_usf, trouble,
 };
+use crate::sweep::step_usl;
 use crate::tensor::{determinant, real};
 use crate::transfer::Node;
 use crate::weights::{FixedBox, HALF_SIZE_LIMIT, Hat, Rule, StretchingBox};
@@ -96,6 +97,8 @@ impl<T: RealField + Copy, const D: usize> Simulation<T, D> {
 
     /// Advances by one time step.
     ///
+    /// All steps of a simulation are to be given the same body force: a step may evaluate it for the next one as well.
+    ///
     /// # Errors
     ///
     /// Where a particle turns inside out, leaves the grid, grows too large or takes on values that are not finite. The
@@ -109,8 +112,8 @@ impl<T: RealField + Copy, const D: usize> Simulation<T, D> {
             && self.steps_done == 0
             && !planted.is(Fault::NoHalfStep);
         let scale = if halved { real(0.5) } else { T::one() };
-        let t = self.time();
-        let outcome = (self.kernel)(&mut self.state, body_force, t, scale);
+        let times = (self.time(), self.settings.time_step * real((self.steps_done + 1) as f64));
+        let outcome = (self.kernel)(&mut self.state, body_force, times, scale);
         if let Some((trouble, particle)) = outcome.failure {
             let step = self.steps_done + 1;
             let time = self.settings.time_step * real(step as f64);
@@ -170,6 +173,8 @@ impl<T: RealField + Pod, const D: usize> Simulation<T, D> {
     /// Whoever writes them down, and later over those of a simulation that is set up in the same way, continues to the same
     /// bits: nothing else of one step is used by the next.
     pub fn state(&mut self) -> Vec<&mut [u8]> {
+        // Whatever is overwritten, the grid is not what follows from it.
+        self.state.is_ahead = false;
         let Particles { x, v, F, .. } = &mut self.state.particles;
         let mut state = vec![cast_slice_mut(x), cast_slice_mut(v), cast_slice_mut(F)];
         // Sums over particles follow the order of the last sort.
@@ -281,6 +286,8 @@ fn allocate<T: RealField + Copy, const D: usize>(
         b: Vec::new(),
         F_next: if usf { vec![SMatrix::identity(); particles.len()] } else { Vec::new() },
         reprojected: vec![Node::zero(); if musl { layout.nodes } else { 0 }],
+        next: Vec::new(),
+        is_ahead: false,
         particles,
         layout,
         bands,
@@ -334,10 +341,10 @@ where
 {
     match integrator {
         Integrator::Usl | Integrator::Cd => {
-            Box::new(move |s, b, t, scale| step_usl(s, (rule, law), b, t, scale))
+            Box::new(move |s, b, times, scale| step_usl(s, (rule, law), b, times, scale))
         }
-        Integrator::Musl => Box::new(move |s, b, t, scale| step_musl(s, (rule, law), b, t, scale)),
-        Integrator::Usf => Box::new(move |s, b, t, scale| step_usf(s, (rule, law), b, t, scale)),
+        Integrator::Musl => Box::new(move |s, b, times, scale| step_musl(s, (rule, law), b, times, scale)),
+        Integrator::Usf => Box::new(move |s, b, times, scale| step_usf(s, (rule, law), b, times, scale)),
     }
 }
 

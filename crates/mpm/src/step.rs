@@ -26,9 +26,9 @@ pub(crate) struct Constants<T, const D: usize> {
     lower: SVector<T, D>,
     upper: SVector<T, D>,
     inverse_spacing: T,
-    strides: [usize; D],
+    pub(crate) strides: [usize; D],
     band_height: usize,
-    time_step: T,
+    pub(crate) time_step: T,
     /// Nodes with less mass than this are taken to be empty.
     least_mass: T,
     pub(crate) planted: Planted,
@@ -63,7 +63,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
 
     /// `(I + dt L) F`, for `L` per cell.
     #[inline(always)]
-    fn stretch(&self, L: &SMatrix<T, D, D>, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
+    pub(crate) fn stretch(&self, L: &SMatrix<T, D, D>, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         let change = L * (self.time_step * self.inverse_spacing);
         if self.planted.is(Fault::AdditiveStretch) {
             return F + change;
@@ -83,7 +83,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
     /// Whether a particle is a deformed body within the grid that may stay in its band; nearly all are, and it takes one
     /// branch to know.
     #[inline(always)]
-    fn is_well<R, const W: usize>(
+    pub(crate) fn is_well<R, const W: usize>(
         &self,
         rule: R,
         home: u32,
@@ -126,9 +126,9 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
         let mut block = Block::new(self.planted);
         let mut deposits = [Deposit::zero(); BLOCK];
         for ids in ids.chunks(BLOCK) {
-            block.pick(self, ids, x, F);
+            block.pick(ids, x, F);
             level(ids, &mut deposits);
-            block.weigh(rule);
+            block.weigh(self, rule);
             if self.planted.is(Fault::LastNodeSkipped) {
                 block.skip_last_node(&self.upper_in_cells());
             }
@@ -139,7 +139,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
 
     /// What a node beyond a wall gives to its mirror image.
     #[inline(always)]
-    fn ghost(&self, mut ghost: Node<T, D>) -> Node<T, D> {
+    pub(crate) fn ghost(&self, mut ghost: Node<T, D>) -> Node<T, D> {
         if self.planted.is(Fault::GhostMassLost) {
             ghost.values[2 * D] = T::zero();
         }
@@ -160,7 +160,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
     }
 
     /// Number of cells along each axis.
-    fn upper_in_cells(&self) -> [T; D] {
+    pub(crate) fn upper_in_cells(&self) -> [T; D] {
         self.in_cells(&self.upper)
     }
 
@@ -195,11 +195,16 @@ pub(crate) struct Outcome {
     /// The worst trouble, and the first particle that is in it.
     pub(crate) failure: Option<(Trouble, usize)>,
     /// Whether a particle no longer fits its band.
-    resort: bool,
+    pub(crate) resort: bool,
 }
 
 impl Outcome {
-    fn merge(self, other: Self) -> Self {
+    /// Whether nothing came to light.
+    pub(crate) fn is_nothing(self) -> bool {
+        self.failure.is_none() && !self.resort
+    }
+
+    pub(crate) fn merge(self, other: Self) -> Self {
         let failure = match (self.failure, other.failure) {
             (Some(a), Some(b)) => Some(a.min(b)),
             (a, b) => a.or(b),
@@ -222,53 +227,23 @@ pub(crate) struct State<T, const D: usize> {
     pub(crate) F_next: Vec<SMatrix<T, D, D>>,
     /// MUSL: velocities projected from the updated particles, one per node.
     pub(crate) reprojected: Vec<Node<T, D>>,
+    /// USL: the grid of the step to come while particles add to it; empty before the first step.
+    pub(crate) next: Vec<Node<T, D>>,
+    /// USL: whether the particles have given to `nodes` what the step to come needs.
+    pub(crate) is_ahead: bool,
 }
 
-/// A kernel: takes the state, the body force, the time at the start of the step and a factor on all accelerations.
+/// A kernel: takes the state, the body force, the times at the start of the step and at its end, and a factor on all
+/// accelerations.
 pub(crate) type Kernel<T, const D: usize> =
-    Box<dyn Fn(&mut State<T, D>, &dyn BodyForce<T, D>, T, T) -> Outcome + Send + Sync>;
-
-/// USL, and with it centred differences: stress from `F^n`, F updated with the end-of-step grid velocity.
-pub(crate) fn step_usl<T, R, L, const D: usize, const W: usize>(
-    s: &mut State<T, D>,
-    (rule, law): (R, L),
-    body_force: &dyn BodyForce<T, D>,
-    t: T,
-    scale: T,
-) -> Outcome
-where
-    T: RealField + Copy,
-    R: Rule<T, D, W>,
-    L: Law<T>,
-{
-    s.evaluate(body_force, t);
-    s.deposit(rule, law, body_force.is_absent());
-    s.solve(scale);
-    finish_usl(s, rule)
-}
-
-/// USL after the solution on the grid. A function of its own, since it is the same for every law.
-#[inline(never)]
-fn finish_usl<T, R, const D: usize, const W: usize>(s: &mut State<T, D>, rule: R) -> Outcome
-where
-    T: RealField + Copy,
-    R: Rule<T, D, W>,
-{
-    let State { particles, constants, nodes, bands, .. } = s;
-    let (nodes, c) = (&nodes[..], *constants);
-    let outcome = advance(particles, bands, c, rule, |block, gathered, _, x, v, F| {
-        block.gather(&c.strides, nodes, gathered);
-        dispatch(Follow { c: &c, gathered, x, v, F });
-    });
-    s.resort_if(outcome, rule)
-}
+    Box<dyn Fn(&mut State<T, D>, &dyn BodyForce<T, D>, (T, T), T) -> Outcome + Send + Sync>;
 
 /// MUSL: as USL, but F updated with velocities projected anew from the updated particles.
 pub(crate) fn step_musl<T, R, L, const D: usize, const W: usize>(
     s: &mut State<T, D>,
     (rule, law): (R, L),
     body_force: &dyn BodyForce<T, D>,
-    t: T,
+    (t, _): (T, T),
     scale: T,
 ) -> Outcome
 where
@@ -348,7 +323,7 @@ pub(crate) fn step_usf<T, R, L, const D: usize, const W: usize>(
     s: &mut State<T, D>,
     (rule, law): (R, L),
     body_force: &dyn BodyForce<T, D>,
-    t: T,
+    (t, _): (T, T),
     scale: T,
 ) -> Outcome
 where
@@ -489,7 +464,7 @@ pub(crate) fn axis_too_large<T: RealField + Copy, const D: usize>(
 
 impl<T: RealField + Copy, const D: usize> State<T, D> {
     /// Sorts the particles into bands, if the last pass found that to be due.
-    fn resort_if<R, const W: usize>(&mut self, outcome: Outcome, rule: R) -> Outcome
+    pub(crate) fn resort_if<R, const W: usize>(&mut self, outcome: Outcome, rule: R) -> Outcome
     where
         R: Rule<T, D, W>,
     {
@@ -514,7 +489,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
     }
 
     /// Evaluates the body force at the reference positions.
-    fn evaluate(&mut self, body_force: &dyn BodyForce<T, D>, t: T) {
+    pub(crate) fn evaluate(&mut self, body_force: &dyn BodyForce<T, D>, t: T) {
         if body_force.is_absent() {
             return;
         }
@@ -532,7 +507,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
 
     /// Particles to grid: mass, momentum and force, folded at walls.
     #[inline(never)]
-    fn deposit<R, L, const W: usize>(&mut self, rule: R, law: L, no_body_force: bool)
+    pub(crate) fn deposit<R, L, const W: usize>(&mut self, rule: R, law: L, no_body_force: bool)
     where
         R: Rule<T, D, W>,
         L: Law<T>,
@@ -560,7 +535,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
     }
 
     /// On the grid: momentum and force to velocity at the end of the step and acceleration.
-    fn solve(&mut self, scale: T) {
+    pub(crate) fn solve(&mut self, scale: T) {
         let Self { constants: c, nodes, .. } = self;
         nodes.par_chunks_mut(CHUNK).for_each(|nodes| {
             for node in nodes {
@@ -669,7 +644,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
             };
             c.scatter(rule, x, F, piece, first, ids, level, |block, ids, deposits| {
                 if !c.planted.is(Fault::StressOfOldStretch) {
-                    block.pick_F(&c, ids, F_next);
+                    block.pick_F(ids, F_next);
                 }
                 block.stress(&c, law);
                 dispatch(GiveSlope { c: &c, block, ids, volume, deposits });
@@ -723,12 +698,12 @@ impl<T: RealField + Copy, const D: usize> Loop for GiveLevel<'_, T, D> {
 }
 
 /// States what the stress of particles gives to the grid.
-struct GiveSlope<'a, T, const D: usize, const W: usize> {
-    c: &'a Constants<T, D>,
-    block: &'a Block<T, D, W>,
-    ids: &'a [u32],
-    volume: &'a [T],
-    deposits: &'a mut [Deposit<T, D>; BLOCK],
+pub(crate) struct GiveSlope<'a, T, const D: usize, const W: usize> {
+    pub(crate) c: &'a Constants<T, D>,
+    pub(crate) block: &'a Block<T, D, W>,
+    pub(crate) ids: &'a [u32],
+    pub(crate) volume: &'a [T],
+    pub(crate) deposits: &'a mut [Deposit<T, D>; BLOCK],
 }
 
 impl<T: RealField + Copy, const D: usize, const W: usize> Loop for GiveSlope<'_, T, D, W> {
@@ -740,34 +715,6 @@ impl<T: RealField + Copy, const D: usize, const W: usize> Loop for GiveSlope<'_,
             for a in 0..D {
                 deposit.slope[a].set_acceleration(&traction.column(a).into_owned());
             }
-        }
-    }
-}
-
-/// Moves and stretches particles as the grid tells.
-struct Follow<'a, T, const D: usize> {
-    c: &'a Constants<T, D>,
-    gathered: &'a [Gathered<T, D>],
-    x: &'a mut [SVector<T, D>],
-    v: &'a mut [SVector<T, D>],
-    F: &'a mut [SMatrix<T, D, D>],
-}
-
-impl<T: RealField + Copy, const D: usize> Loop for Follow<'_, T, D> {
-    #[inline(always)]
-    fn run(self) {
-        let Self { c, gathered, x, v, F } = self;
-        for (((x, v), F), gathered) in x.iter_mut().zip(v).zip(F).zip(gathered) {
-            *v += gathered.acceleration() * c.time_step;
-            let mut velocity = gathered.velocity();
-            if c.planted.is(Fault::PicForFlip) {
-                *v = velocity;
-            }
-            if c.planted.is(Fault::OwnVelocity) {
-                velocity = *v;
-            }
-            *x += c.planted.change(velocity * c.time_step);
-            *F = c.stretch(&gathered.velocity_gradient(), F);
         }
     }
 }

@@ -189,6 +189,32 @@ fn first_node<T, const D: usize, const W: usize>(
     first
 }
 
+/// What a particle gives to a row of nodes along axis 0: `level S + slope G` with the weights along that axis.
+#[inline(always)]
+fn given_to_row<T: RealField + Copy, const D: usize>(
+    given: &Deposit<T, D>,
+    row: &Row<T, D>,
+) -> [[T; LANES]; 2] {
+    let mut level = given.level.values;
+    let mut slope = given.slope[0].values;
+    for q in 0..LANES {
+        level[q] *= row.S;
+        slope[q] *= row.S;
+        for a in 1..D {
+            level[q] = given.slope[a].values[q].mul_add(row.G[a], level[q]);
+        }
+    }
+    [level, slope]
+}
+
+/// Adds what a particle gives to a node.
+#[inline(always)]
+fn add<T: RealField + Copy>(sum: &mut [T; LANES], [level, slope]: &[[T; LANES]; 2], S: T, G: T) {
+    for q in 0..LANES {
+        sum[q] = level[q].mul_add(S, slope[q].mul_add(G, sum[q]));
+    }
+}
+
 /// Adds what a particle gives to the piece of the grid that starts at node `first`.
 #[inline(always)]
 pub(crate) fn scatter<T: RealField + Copy, const D: usize, const W: usize>(
@@ -201,23 +227,66 @@ pub(crate) fn scatter<T: RealField + Copy, const D: usize, const W: usize>(
     let start = first_node(weights, strides) - first;
     for index in 0..rows::<D, W>() {
         let row = row(weights, start, strides, index);
-        let mut level = given.level.values;
-        let mut slope = given.slope[0].values;
-        for q in 0..LANES {
-            level[q] *= row.S;
-            slope[q] *= row.S;
-            for a in 1..D {
-                level[q] += given.slope[a].values[q] * row.G[a];
-            }
-        }
+        let to_row = given_to_row(given, &row);
         let Some(nodes) = piece.get_mut(row.start..).and_then(|n| n.first_chunk_mut::<W>()) else {
             debug_assert!(false, "a stencil beyond its band");
             return;
         };
         for (i, node) in nodes.iter_mut().enumerate() {
-            let (S, G) = (weights.S(0, i), weights.G(0, i));
-            for q in 0..LANES {
-                node.values[q] += level[q] * S + slope[q] * G;
+            add(&mut node.values, &to_row, weights.S(0, i), weights.G(0, i));
+        }
+    }
+}
+
+/// As [`scatter`] for several particles in one or two dimensions, particle `k` with the weights `weights(k)`: the nodes stay
+/// in registers for as long as particle after particle reaches the same ones. The sums are the same.
+#[inline(always)]
+pub(crate) fn scatter_runs<T, V, const D: usize, const W: usize>(
+    weights: impl Fn(usize) -> V,
+    strides: &[usize; D],
+    piece: &mut [Node<T, D>],
+    first: usize,
+    given: &[Deposit<T, D>],
+) where
+    T: RealField + Copy,
+    V: Weights<T, D, W>,
+{
+    const { assert!(W <= 3, "more nodes than registers") };
+    let rows = if D == 1 { 1 } else { W };
+    let mut k = 0;
+    while k < given.len() {
+        let start = first_node(&weights(k), strides);
+        let mut sums = [[[T::zero(); LANES]; W]; W];
+        for index in 0..rows {
+            let place = start - first + if D == 1 { 0 } else { index * strides[1] };
+            let Some(nodes) = piece.get(place..).and_then(|n| n.first_chunk::<W>()) else {
+                debug_assert!(false, "a stencil beyond its band");
+                return;
+            };
+            for i in 0..W {
+                sums[index][i] = nodes[i].values;
+            }
+        }
+        loop {
+            let weights_k = weights(k);
+            for index in 0..rows {
+                let to_row = given_to_row(&given[k], &row(&weights_k, start, strides, index));
+                for i in 0..W {
+                    add(&mut sums[index][i], &to_row, weights_k.S(0, i), weights_k.G(0, i));
+                }
+            }
+            k += 1;
+            if k >= given.len() || first_node(&weights(k), strides) != start {
+                break;
+            }
+        }
+        for index in 0..rows {
+            let place = start - first + if D == 1 { 0 } else { index * strides[1] };
+            let Some(nodes) = piece.get_mut(place..).and_then(|n| n.first_chunk_mut::<W>()) else {
+                return;
+            };
+            for i in 0..W {
+                nodes[i].values = sums[index][i];
             }
         }
     }
@@ -247,16 +316,16 @@ pub(crate) fn gather<T: RealField + Copy, const D: usize, const W: usize>(
         for (i, node) in nodes.iter().enumerate() {
             let (S, G) = (weights.S(0, i), weights.G(0, i));
             for q in 0..used {
-                let (level, slope) = (node.values[q] * S, node.values[q] * G);
-                row_level[q] = if i == 0 { level } else { row_level[q] + level };
-                row_slope[q] = if i == 0 { slope } else { row_slope[q] + slope };
+                let value = node.values[q];
+                row_level[q] = if i == 0 { value * S } else { value.mul_add(S, row_level[q]) };
+                row_slope[q] = if i == 0 { value * G } else { value.mul_add(G, row_slope[q]) };
             }
         }
         for q in 0..used {
-            level[q] += row_level[q] * row.S;
-            slope[0][q] += row_slope[q] * row.S;
+            level[q] = row_level[q].mul_add(row.S, level[q]);
+            slope[0][q] = row_slope[q].mul_add(row.S, slope[0][q]);
             for a in 1..D {
-                slope[a][q] += row_level[q] * row.G[a];
+                slope[a][q] = row_level[q].mul_add(row.G[a], slope[a][q]);
             }
         }
     }
