@@ -9,7 +9,7 @@ use crate::material::Law;
 use crate::simd::{Loop, dispatch};
 use crate::step::Constants;
 use crate::tensor::real;
-use crate::transfer::{Deposit, Gathered, Node, Weights, gather, scatter, scatter_runs};
+use crate::transfer::{Deposit, Gathered, Node, Weights, gather, gather_runs, scatter, scatter_runs};
 use crate::weights::{Rule, WideWeights, is_wide};
 
 /// Particles in a block: as many as keep all of it in the first-level cache.
@@ -306,6 +306,10 @@ impl<T: RealField + Copy, const D: usize, const W: usize> Loop for Gather<'_, T,
     #[inline(always)]
     fn run(self) {
         let Self { block, strides, nodes, gathered } = self;
+        if D <= 2 && W <= 3 && !block.any_wide {
+            gather_runs(|k| Lane { block, k }, strides, nodes, gathered);
+            return;
+        }
         for (k, gathered) in gathered.iter_mut().enumerate().take(BLOCK) {
             if let Some((xi, l)) = block.wide(k) {
                 gather_wide(&xi, &l, strides, nodes, gathered);

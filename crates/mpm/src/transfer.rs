@@ -334,3 +334,70 @@ pub(crate) fn gather<T: RealField + Copy, const D: usize, const W: usize>(
         gathered.slope[a].values[..used].copy_from_slice(&slope[a][..used]);
     }
 }
+
+/// As [`gather`] for several particles in one or two dimensions, particle `k` with the weights `weights(k)`: the nodes stay
+/// in registers for as long as particle after particle reaches the same ones.
+#[inline(always)]
+pub(crate) fn gather_runs<T, V, const D: usize, const W: usize>(
+    weights: impl Fn(usize) -> V,
+    strides: &[usize; D],
+    nodes: &[Node<T, D>],
+    gathered: &mut [Gathered<T, D>],
+) where
+    T: RealField + Copy,
+    V: Weights<T, D, W>,
+{
+    const { assert!(W <= 3, "more nodes than registers") };
+    // Velocity and acceleration are half of a node's values.
+    const USED: usize = LANES / 2;
+    let rows = if D == 1 { 1 } else { W };
+    let mut k = 0;
+    while k < gathered.len() {
+        let start = first_node(&weights(k), strides);
+        let mut values = [[[T::zero(); USED]; W]; W];
+        for index in 0..rows {
+            let place = start + if D == 1 { 0 } else { index * strides[1] };
+            let Some(nodes) = nodes.get(place..).and_then(|n| n.first_chunk::<W>()) else {
+                debug_assert!(false, "a stencil beyond the grid");
+                return;
+            };
+            for i in 0..W {
+                values[index][i].copy_from_slice(&nodes[i].values[..USED]);
+            }
+        }
+        loop {
+            let weights_k = weights(k);
+            let mut level = [T::zero(); USED];
+            let mut slope = [[T::zero(); USED]; D];
+            for index in 0..rows {
+                let mut row_level = [T::zero(); USED];
+                let mut row_slope = [T::zero(); USED];
+                for i in 0..W {
+                    let (S, G) = (weights_k.S(0, i), weights_k.G(0, i));
+                    for q in 0..USED {
+                        let value = values[index][i][q];
+                        row_level[q] = if i == 0 { value * S } else { value.mul_add(S, row_level[q]) };
+                        row_slope[q] = if i == 0 { value * G } else { value.mul_add(G, row_slope[q]) };
+                    }
+                }
+                let row = row(&weights_k, start, strides, index);
+                for q in 0..USED {
+                    level[q] = row_level[q].mul_add(row.S, level[q]);
+                    slope[0][q] = row_slope[q].mul_add(row.S, slope[0][q]);
+                    for a in 1..D {
+                        slope[a][q] = row_level[q].mul_add(row.G[a], slope[a][q]);
+                    }
+                }
+            }
+            let of_k = &mut gathered[k];
+            of_k.level.values[..USED].copy_from_slice(&level);
+            for a in 0..D {
+                of_k.slope[a].values[..USED].copy_from_slice(&slope[a]);
+            }
+            k += 1;
+            if k >= gathered.len() || first_node(&weights(k), strides) != start {
+                break;
+            }
+        }
+    }
+}
