@@ -9,7 +9,9 @@ use crate::material::Law;
 use crate::simd::{Loop, dispatch};
 use crate::step::Constants;
 use crate::tensor::real;
-use crate::transfer::{Deposit, Gathered, Node, Weights, gather, gather_runs, scatter, scatter_runs};
+use crate::transfer::{
+    Deposit, Gathered, Node, Weights, gather, gather_runs, scatter, scatter_runs,
+};
 use crate::weights::{Rule, WideWeights, is_wide};
 
 /// Particles in a block: as many as keep all of it in the first-level cache.
@@ -59,12 +61,7 @@ impl<T: RealField + Copy, const D: usize, const W: usize> Block<T, D, W> {
     }
 
     /// Takes the particles `ids` of the arrays.
-    pub(crate) fn pick(
-        &mut self,
-        ids: &[u32],
-        x: &[SVector<T, D>],
-        F: &[SMatrix<T, D, D>],
-    ) {
+    pub(crate) fn pick(&mut self, ids: &[u32], x: &[SVector<T, D>], F: &[SMatrix<T, D, D>]) {
         dispatch(Pick { block: self, ids, x: Some(x), F });
     }
 

@@ -343,8 +343,12 @@ where
         Integrator::Usl | Integrator::Cd => {
             Box::new(move |s, b, times, scale| step_usl(s, (rule, law), b, times, scale))
         }
-        Integrator::Musl => Box::new(move |s, b, times, scale| step_musl(s, (rule, law), b, times, scale)),
-        Integrator::Usf => Box::new(move |s, b, times, scale| step_usf(s, (rule, law), b, times, scale)),
+        Integrator::Musl => {
+            Box::new(move |s, b, times, scale| step_musl(s, (rule, law), b, times, scale))
+        }
+        Integrator::Usf => {
+            Box::new(move |s, b, times, scale| step_usf(s, (rule, law), b, times, scale))
+        }
     }
 }
 

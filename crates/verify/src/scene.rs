@@ -224,7 +224,7 @@ impl<const D: usize> Scene<D> {
     pub(crate) fn bytes_expected(&self, per_cell: usize, scalar: usize) -> f64 {
         // X, x, v, b and the solver's copies of them; F twice, a stress; mass, volume and sorting.
         let per_particle = 8 * D + 4 * D * D + 8;
-        // A cache line, another for MUSL, and what sorting counts; with the padding beyond the walls.
+        // A cache line, another for the step to come or for MUSL, and what sorting counts; with the padding beyond the walls.
         const PER_NODE: f64 = 64.0 + 64.0 + 4.0;
         let nodes: f64 = self.cells.iter().map(|&cells| cells as f64 + 9.0).product();
         let particles = self.particles_expected(per_cell);
