@@ -78,7 +78,7 @@ impl BodyForceCost {
     fn of(fields: &mut Fields) -> Self {
         let b = arrange(&mut fields.graph, &fields.inputs, &fields.definitions, &fields.b);
         let program: Program = fields.program(&b);
-        let kept = program.kept_at_points(program.outputs());
+        let kept = program.kept_at_points(program.outputs(), usize::MAX);
         let count = program.operations_with_kept(program.outputs(), &kept);
         BodyForceCost {
             stages: [

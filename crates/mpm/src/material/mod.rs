@@ -23,6 +23,7 @@ pub(crate) use neo_hookean::{NeoHookean, NeoHookeanNoLog};
 pub(crate) use st_venant_kirchhoff::StVenantKirchhoff;
 
 use crate::fault::Planted;
+use crate::simd::{Loop, dispatch};
 use crate::tensor::{det_minus_one, determinant, product, real};
 
 /// An elastic material.
@@ -125,6 +126,19 @@ impl<T: RealField + Copy> Material<T> {
         Some(with_law!(self, |law| law.first_piola_kirchhoff(F)))
     }
 
+    /// First Piola-Kirchhoff stresses of `N` particles side by side: `F[i][J][n]` is `F_iJ` of particle `n`, and so it is with
+    /// the stresses. They are those of [`Material::first_piola_kirchhoff`] to the last bit, and not a number where F is no
+    /// deformation.
+    #[must_use]
+    pub fn first_piola_kirchhoff_side_by_side<const D: usize, const N: usize>(
+        &self,
+        F: &[[[T; N]; D]; D],
+    ) -> [[[T; N]; D]; D] {
+        let mut P = [[[T::zero(); N]; D]; D];
+        with_law!(self, |law| dispatch(SideBySide { law, F, P: &mut P }));
+        P
+    }
+
     /// Cauchy (true) stress `sigma = tau / J`.
     pub fn cauchy<const D: usize>(&self, F: &SMatrix<T, D, D>) -> Option<SMatrix<T, D, D>> {
         let J = jacobian(F)?;
@@ -165,7 +179,41 @@ impl<T: RealField + Copy> Material<T> {
     }
 }
 
+struct SideBySide<'a, T, L, const D: usize, const N: usize> {
+    law: L,
+    F: &'a [[[T; N]; D]; D],
+    P: &'a mut [[[T; N]; D]; D],
+}
+
+impl<T: RealField + Copy, L: Law<T>, const D: usize, const N: usize> Loop
+    for SideBySide<'_, T, L, D, N>
+{
+    #[inline(always)]
+    fn run(self) {
+        let Self { law, F, P } = self;
+        // Their own, which nothing else can be in the same place as.
+        let mut stresses = [[[T::zero(); N]; D]; D];
+        for n in 0..N {
+            let F = SMatrix::<T, D, D>::from_fn(|i, j| F[i][j][n]);
+            let is_deformation = jacobian(&F).is_some();
+            // A law may be asked for a stress only where there is one.
+            let identity = |i, j| if i == j { T::one() } else { T::zero() };
+            let F = SMatrix::<T, D, D>::from_fn(|i, j| {
+                if is_deformation { F[(i, j)] } else { identity(i, j) }
+            });
+            let P = law.first_piola_kirchhoff(&F);
+            for i in 0..D {
+                for j in 0..D {
+                    stresses[i][j][n] = if is_deformation { P[(i, j)] } else { real(f64::NAN) };
+                }
+            }
+        }
+        *P = stresses;
+    }
+}
+
 /// J, if F is a deformation.
+#[inline(always)]
 fn jacobian<T: RealField + Copy, const D: usize>(F: &SMatrix<T, D, D>) -> Option<T> {
     let J = determinant(F);
     (J > T::zero() && J.is_finite() && F.iter().all(|entry| entry.is_finite())).then_some(J)
