@@ -342,12 +342,7 @@ where
     fn with_simd<I: Simd>(self, _: I) {
         let Self { solution, time, velocity_time, blocks, runs } = self;
         for (block, run) in blocks.iter().zip(runs) {
-            // Its own, which nothing else can be in the same place as.
-            let mut states = StateRun::zero();
-            for n in 0..BLOCK {
-                states.put(n, &solution.state_staged(time, velocity_time, &point(block, n)));
-            }
-            *run = states;
+            fill(block, run, |point| solution.state_staged(time, velocity_time, point));
         }
     }
 }
@@ -368,6 +363,18 @@ where
 
     fn bytes_per_point(&self) -> usize {
         POINT * size_of::<T>()
+    }
+}
+
+/// As a function of its own, which tells the compiler that `block` and `run` are in different places.
+#[inline(always)]
+fn fill<T: Real, const D: usize, const POINT: usize>(
+    block: &[[T; BLOCK]; POINT],
+    run: &mut StateRun<T, D>,
+    state: impl Fn(&[T; POINT]) -> State<T, D>,
+) {
+    for n in 0..BLOCK {
+        run.put(n, &state(&point(block, n)));
     }
 }
 

@@ -1,5 +1,7 @@
 //! The errors of all particles at one instant.
 
+use std::ops::Range;
+
 use mmsmith_mpm::{Material, Particles};
 use mmsmith_solutions::{BLOCK, Real, Solution, StateAtPoints, StateRun};
 use nalgebra::SVector;
@@ -13,7 +15,7 @@ const GROUP: usize = 512;
 /// Runs of particles for which what depends on the time alone is computed once.
 pub(crate) const RUNS: usize = 8;
 /// Particles in as many runs; what is compared of them fits into the first-level cache.
-pub(crate) const CHUNK: usize = RUNS * BLOCK;
+const CHUNK: usize = RUNS * BLOCK;
 
 /// The errors at one instant.
 pub(crate) struct Measured {
@@ -41,18 +43,17 @@ impl<'a, const D: usize> Comparison<'a, D> {
         time: f64,
         lag: f64,
     ) -> Measured {
-        let magnitudes = |first: usize, magnitudes: &mut [[f64; 4]]| {
+        let magnitudes = |first: usize, count: usize, magnitudes: &mut [[Row<f64>; 4]]| {
             let mut exact = [StateRun::zero(); RUNS];
-            let exact = &mut exact[..magnitudes.len().div_ceil(BLOCK)];
+            let exact = &mut exact[..magnitudes.len()];
             self.exact.evaluate(time, time - lag, first / BLOCK, exact);
-            for (n, run) in magnitudes.chunks_mut(BLOCK).enumerate() {
-                let own = Run::pick(particles, first + n * BLOCK, run.len());
+            let mut run = Run::zero();
+            for (n, (exact, magnitudes)) in exact.iter().zip(magnitudes).enumerate() {
+                let places = first + n * BLOCK..first + count.min((n + 1) * BLOCK);
+                run.pick(particles, places);
                 // A particle that is inside out has no stress; the solver stops at its next step.
-                let P = material.first_piola_kirchhoff_side_by_side(&own.F);
-                let errors = own.errors(&P, &exact[n]);
-                for (n, magnitudes) in run.iter_mut().enumerate() {
-                    *magnitudes = errors.map(|row| row[n]);
-                }
+                material.first_piola_kirchhoff_side_by_side(&run.F, &mut run.P);
+                Arch::new().dispatch(Errors { run: &run, exact, magnitudes });
             }
         };
         let ([u, v, F, P], worst_particle) = over_particles(particles.len(), magnitudes);
@@ -61,7 +62,7 @@ impl<'a, const D: usize> Comparison<'a, D> {
 }
 
 /// One number for each particle of a run.
-type Row<T> = [T; BLOCK];
+pub(crate) type Row<T> = [T; BLOCK];
 
 /// What is compared of `BLOCK` particles, side by side.
 struct Run<T, const D: usize> {
@@ -69,45 +70,50 @@ struct Run<T, const D: usize> {
     x: [Row<T>; D],
     v: [Row<T>; D],
     F: [[Row<T>; D]; D],
+    /// The stress that their law gives for `F`.
+    P: [[Row<T>; D]; D],
 }
 
 impl<T: Real, const D: usize> Run<T, D> {
-    /// Takes `count` particles from number `first` on; what is left to spare repeats the last one.
-    fn pick(particles: &Particles<T, D>, first: usize, count: usize) -> Self {
-        let zero = [T::zero(); BLOCK];
-        let mut run = Self { X: [zero; D], x: [zero; D], v: [zero; D], F: [[zero; D]; D] };
-        let range = first..first + count;
-        let (X, x) = (&particles.X[range.clone()], &particles.x[range.clone()]);
-        let (v, F) = (&particles.v[range.clone()], &particles.F[range]);
-        for n in 0..BLOCK {
-            let p = n.min(count - 1);
-            for i in 0..D {
-                run.X[i][n] = X[p][i];
-                run.x[i][n] = x[p][i];
-                run.v[i][n] = v[p][i];
-                for j in 0..D {
-                    run.F[i][j][n] = F[p][(i, j)];
-                }
-            }
-        }
-        run
+    fn zero() -> Self {
+        let (vector, matrix) = ([[T::zero(); BLOCK]; D], [[[T::zero(); BLOCK]; D]; D]);
+        Self { X: vector, x: vector, v: vector, F: matrix, P: matrix }
     }
 
-    /// The magnitudes of the errors of u, v, F and P, where `P` is the stress of the particles.
-    fn errors(&self, P: &[[Row<T>; D]; D], exact: &StateRun<f64, D>) -> [Row<f64>; 4] {
-        let mut errors = [[0.0; BLOCK]; 4];
-        Arch::new().dispatch(Errors { run: self, P, exact, errors: &mut errors });
-        errors
+    /// Takes the particles of the numbers `places`; what is left to spare repeats the last one.
+    fn pick(&mut self, particles: &Particles<T, D>, places: Range<usize>) {
+        let Particles { X, x, v, F, .. } = particles;
+        rows(&X[places.clone()], |n, X| (0..D).for_each(|i| self.X[i][n] = X[i]));
+        rows(&x[places.clone()], |n, x| (0..D).for_each(|i| self.x[i][n] = x[i]));
+        rows(&v[places.clone()], |n, v| (0..D).for_each(|i| self.v[i][n] = v[i]));
+        rows(&F[places], |n, F| {
+            for i in 0..D {
+                (0..D).for_each(|j| self.F[i][j][n] = F[(i, j)]);
+            }
+        });
     }
 }
 
-/// The errors of a run as loops over rows. Only the width of the registers differs between processors: the bits are the
-/// same.
+/// Shows `take` the items of a run with their places in it, the last one again and again to its end.
+#[inline(always)]
+fn rows<V>(items: &[V], mut take: impl FnMut(usize, &V)) {
+    if let Some(items) = items.first_chunk::<BLOCK>() {
+        for n in 0..BLOCK {
+            take(n, &items[n]);
+        }
+    } else {
+        for n in 0..BLOCK {
+            take(n, &items[n.min(items.len() - 1)]);
+        }
+    }
+}
+
+/// The errors of a run as a loop over its rows. Only the width of the registers differs between processors: the bits are
+/// the same.
 struct Errors<'a, T, const D: usize> {
     run: &'a Run<T, D>,
-    P: &'a [[Row<T>; D]; D],
     exact: &'a StateRun<f64, D>,
-    errors: &'a mut [Row<f64>; 4],
+    magnitudes: &'a mut [Row<f64>; 4],
 }
 
 impl<T: Real, const D: usize> WithSimd for Errors<'_, T, D> {
@@ -115,50 +121,61 @@ impl<T: Real, const D: usize> WithSimd for Errors<'_, T, D> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let Self { run, P, exact, errors } = self;
-        let mut all = [[0.0; BLOCK]; 4];
-        for n in 0..BLOCK {
-            let vector = |a: &dyn Fn(usize) -> f64| {
-                (0..D).fold(0.0, |sum, i| {
-                    let difference = a(i);
-                    sum + difference * difference
-                })
-            };
-            let matrix = |rows: &[[Row<T>; D]; D], exact: &[[Row<f64>; D]; D]| {
-                // Column by column, as norms of matrices are summed elsewhere.
-                (0..D)
-                    .fold(0.0, |sum, j| sum + vector(&|i| rows[i][j][n].to_f64() - exact[i][j][n]))
-            };
-            all[0][n] = vector(&|i| (run.x[i][n].to_f64() - run.X[i][n].to_f64()) - exact.u[i][n]);
-            all[1][n] = vector(&|i| run.v[i][n].to_f64() - exact.v[i][n]);
-            all[2][n] = matrix(&run.F, &exact.F);
-            all[3][n] = matrix(P, &exact.P);
-        }
-        *errors = all.map(|row| row.map(f64::sqrt));
+        errors(self.run, self.exact, self.magnitudes);
+    }
+}
+
+/// The magnitudes of the errors of u, v, F and P. As a function of its own, which tells the compiler that what is read and
+/// what is written are in different places.
+#[inline(always)]
+fn errors<T: Real, const D: usize>(
+    run: &Run<T, D>,
+    exact: &StateRun<f64, D>,
+    magnitudes: &mut [Row<f64>; 4],
+) {
+    /// The sum of the squares of a vector's components.
+    #[inline(always)]
+    fn square<const D: usize>(component: impl Fn(usize) -> f64) -> f64 {
+        (0..D).fold(0.0, |sum, i| sum + component(i) * component(i))
+    }
+    let distance = |rows: &[[Row<T>; D]; D], exact: &[[Row<f64>; D]; D], n: usize| {
+        // Column by column, as norms of matrices are summed elsewhere.
+        let column = |j: usize| square::<D>(|i| rows[i][j][n].to_f64() - exact[i][j][n]);
+        (0..D).fold(0.0, |sum, j| sum + column(j)).sqrt()
+    };
+    for n in 0..BLOCK {
+        let u = |i: usize| run.x[i][n].to_f64() - run.X[i][n].to_f64();
+        magnitudes[0][n] = square::<D>(|i| u(i) - exact.u[i][n]).sqrt();
+        magnitudes[1][n] = square::<D>(|i| run.v[i][n].to_f64() - exact.v[i][n]).sqrt();
+        magnitudes[2][n] = distance(&run.F, &exact.F, n);
+        magnitudes[3][n] = distance(&run.P, &exact.P, n);
     }
 }
 
 /// The norms of `N` magnitudes over `count` particles, and the particle whose first magnitude is the largest.
 ///
-/// `magnitudes` writes those of at most [`CHUNK`] particles from a number on that is a multiple of it. The result does not
-/// depend on the number of threads.
+/// `magnitudes` is given the number of a first particle, a count, and the rows to write their magnitudes to, at most `RUNS`
+/// times `BLOCK` of them. The result does not depend on the number of threads.
 pub(crate) fn over_particles<const N: usize>(
     count: usize,
-    magnitudes: impl Fn(usize, &mut [[f64; N]]) + Sync,
+    magnitudes: impl Fn(usize, usize, &mut [[Row<f64>; N]]) + Sync,
 ) -> ([PerNorm<f64>; N], usize) {
     let group = |g: usize| {
         let mut tallies = [Tally::default(); N];
         let mut worst = (0.0, g * GROUP);
         for first in (g * GROUP..count.min((g + 1) * GROUP)).step_by(CHUNK) {
-            let mut chunk = [[0.0; N]; CHUNK];
-            let chunk = &mut chunk[..CHUNK.min(count - first)];
-            magnitudes(first, chunk);
-            for (p, magnitudes) in (first..).zip(chunk) {
-                for (tally, magnitude) in tallies.iter_mut().zip(&*magnitudes) {
-                    tally.add(*magnitude);
+            let count = CHUNK.min(count - first);
+            let mut chunk = [[[0.0; BLOCK]; N]; RUNS];
+            let chunk = &mut chunk[..count.div_ceil(BLOCK)];
+            magnitudes(first, count, chunk);
+            for p in 0..count {
+                let rows = &chunk[p / BLOCK];
+                for (tally, row) in tallies.iter_mut().zip(rows) {
+                    tally.add(row[p % BLOCK]);
                 }
-                if magnitudes[0] > worst.0 || magnitudes[0].is_nan() {
-                    worst = (magnitudes[0], p);
+                let first_of_it = rows[0][p % BLOCK];
+                if first_of_it > worst.0 || first_of_it.is_nan() {
+                    worst = (first_of_it, first + p);
                 }
             }
         }

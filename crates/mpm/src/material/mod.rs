@@ -127,16 +127,14 @@ impl<T: RealField + Copy> Material<T> {
     }
 
     /// First Piola-Kirchhoff stresses of `N` particles side by side: `F[i][J][n]` is `F_iJ` of particle `n`, and so it is with
-    /// the stresses. They are those of [`Material::first_piola_kirchhoff`] to the last bit, and not a number where F is no
+    /// the stresses `P`. They are those of [`Material::first_piola_kirchhoff`] to the last bit, and not a number where F is no
     /// deformation.
-    #[must_use]
     pub fn first_piola_kirchhoff_side_by_side<const D: usize, const N: usize>(
         &self,
         F: &[[[T; N]; D]; D],
-    ) -> [[[T; N]; D]; D] {
-        let mut P = [[[T::zero(); N]; D]; D];
-        with_law!(self, |law| dispatch(SideBySide { law, F, P: &mut P }));
-        P
+        P: &mut [[[T; N]; D]; D],
+    ) {
+        with_law!(self, |law| dispatch(SideBySide { law, F, P }));
     }
 
     /// Cauchy (true) stress `sigma = tau / J`.
@@ -190,30 +188,39 @@ impl<T: RealField + Copy, L: Law<T>, const D: usize, const N: usize> Loop
 {
     #[inline(always)]
     fn run(self) {
-        let Self { law, F, P } = self;
-        // Their own, which nothing else can be in the same place as.
-        let mut stresses = [[[T::zero(); N]; D]; D];
-        for n in 0..N {
-            let F = SMatrix::<T, D, D>::from_fn(|i, j| F[i][j][n]);
-            let is_deformation = jacobian(&F).is_some();
-            // A law may be asked for a stress only where there is one.
-            let identity = |i, j| if i == j { T::one() } else { T::zero() };
-            let F = SMatrix::<T, D, D>::from_fn(|i, j| {
-                if is_deformation { F[(i, j)] } else { identity(i, j) }
-            });
-            let P = law.first_piola_kirchhoff(&F);
-            for i in 0..D {
-                for j in 0..D {
-                    stresses[i][j][n] = if is_deformation { P[(i, j)] } else { real(f64::NAN) };
-                }
+        stresses(self.law, self.F, self.P);
+    }
+}
+
+/// As a function of its own, which tells the compiler that `F` and `P` are in different places.
+#[inline(always)]
+fn stresses<T: RealField + Copy, L: Law<T>, const D: usize, const N: usize>(
+    law: L,
+    F: &[[[T; N]; D]; D],
+    P: &mut [[[T; N]; D]; D],
+) {
+    for n in 0..N {
+        let own = SMatrix::<T, D, D>::from_fn(|i, j| F[i][j][n]);
+        let J = determinant(&own);
+        // Without branches: zero times anything that is not finite is not a number.
+        let zero = own.fold(J * T::zero(), |sum, entry| sum + entry * T::zero());
+        let is_deformation = (J > T::zero()) & (zero == T::zero());
+        // A law may be asked for a stress only where there is one.
+        let own = SMatrix::<T, D, D>::from_fn(|i, j| match is_deformation {
+            true => own[(i, j)],
+            false if i == j => T::one(),
+            false => T::zero(),
+        });
+        let stress = law.first_piola_kirchhoff(&own);
+        for i in 0..D {
+            for j in 0..D {
+                P[i][j][n] = if is_deformation { stress[(i, j)] } else { real(f64::NAN) };
             }
         }
-        *P = stresses;
     }
 }
 
 /// J, if F is a deformation.
-#[inline(always)]
 fn jacobian<T: RealField + Copy, const D: usize>(F: &SMatrix<T, D, D>) -> Option<T> {
     let J = determinant(F);
     (J > T::zero() && J.is_finite() && F.iter().all(|entry| entry.is_finite())).then_some(J)

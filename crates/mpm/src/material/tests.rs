@@ -97,7 +97,8 @@ fn check_side_by_side<T: RealField + Copy, const D: usize>(all: &[Matrix3<f64>])
         };
         for five in some.chunks_exact(5) {
             let rows = array::from_fn(|i| array::from_fn(|j| array::from_fn(|n| five[n][(i, j)])));
-            let P: [[[T; 5]; D]; D] = law.first_piola_kirchhoff_side_by_side(&rows);
+            let mut P = [[[T::zero(); 5]; D]; D];
+            law.first_piola_kirchhoff_side_by_side(&rows, &mut P);
             for (n, F) in five.iter().enumerate() {
                 let found = SMatrix::<T, D, D>::from_fn(|i, j| P[i][j][n]);
                 match law.first_piola_kirchhoff(F) {

@@ -10,7 +10,7 @@ use super::arrays::{Chosen, Role, matrices, not_finite, vectors};
 use super::findings::Remarks;
 use super::reference::{Scheme, Traced};
 use super::{ScoreError, ScoreOptions};
-use crate::measure::{RUNS, over_particles};
+use crate::measure::{RUNS, Row, over_particles};
 use crate::norms::{PerField, PerNorm};
 
 /// Share of the body's size by which a reference position may lie outside before it is told.
@@ -107,14 +107,17 @@ impl<const D: usize> FrameData<D> {
             [(self.u[p] - exact.u).norm(), v, F, P, F_turned, P_turned]
         };
         let velocity_time = self.v.as_ref().map_or(time, |(_, time)| *time);
-        let magnitudes = |first: usize, magnitudes: &mut [[f64; 6]]| {
+        let magnitudes = |first: usize, count: usize, magnitudes: &mut [[Row<f64>; 6]]| {
             let mut runs = [StateRun::zero(); RUNS];
-            let runs = &mut runs[..magnitudes.len().div_ceil(BLOCK)];
+            let runs = &mut runs[..magnitudes.len()];
             // Other frames may have their particles in another order, or others: nothing is worth keeping.
-            let X = &self.X[first..first + magnitudes.len()];
+            let X = &self.X[first..first + count];
             exact.state_at(X).evaluate(time, velocity_time, 0, runs);
-            for (n, magnitudes) in magnitudes.iter_mut().enumerate() {
-                *magnitudes = of_particle(first + n, &runs[n / BLOCK].get(n % BLOCK));
+            for n in 0..count {
+                let own = of_particle(first + n, &runs[n / BLOCK].get(n % BLOCK));
+                for (row, magnitude) in magnitudes[n / BLOCK].iter_mut().zip(own) {
+                    row[n % BLOCK] = magnitude;
+                }
             }
         };
         let ([u, v, F, P, F_turned, P_turned], _) = over_particles(self.X.len(), magnitudes);
