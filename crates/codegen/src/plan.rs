@@ -5,7 +5,7 @@
 //! order; the Rust module and the C header are two renderings of the same plan, so that their results agree.
 
 use mmsmith_expr::{
-    Dependence, Expr, Function, Operation, Program, Rational, Slot, arrange, reuse,
+    Dependence, Drafts, Expr, Function, Operation, Program, Rational, Slot, arrange, reuse,
 };
 use mmsmith_spec::{DeriveError, Domain, Fields, Spec, Surface};
 use std::collections::BTreeMap;
@@ -127,8 +127,10 @@ impl<'a> Plan<'a> {
         let mut fields = spec.derive()?;
         let formulas = formulas(spec, &fields);
         // Solvers sample the body force at the same points in every step; a single call does all the work each time.
-        let single = reuse(&mut fields.graph, &fields.inputs, &fields.definitions, &fields.b);
-        let staged = arrange(&mut fields.graph, &fields.inputs, &fields.definitions, &fields.b);
+        let (inputs, definitions, b) = (&fields.inputs, &fields.definitions, &fields.b);
+        let drafts = &mut Drafts::default();
+        let single = reuse(&mut fields.graph, inputs, definitions, drafts, b);
+        let staged = arrange(&mut fields.graph, inputs, definitions, drafts, b);
         let matrix = |A: &Vec<Vec<Expr>>| A.concat();
         let parts = [
             ("displacement", "u", "displacement", Shape::Vector, fields.u.clone()),

@@ -15,7 +15,7 @@
 //! and where the bound of its rounding errors, by running error analysis at sample points, is not clearly larger.
 
 use crate::graph::NumberMap;
-use crate::{Dependence, Expr, Graph, Node, Program, Rational};
+use crate::{Dependence, Drafts, Expr, Graph, Node, Program, Rational};
 use num_traits::{One, Signed, ToPrimitive, Zero};
 use std::collections::BTreeMap;
 
@@ -34,12 +34,14 @@ const PLASTIC_RATIO: f64 = 0.324_717_957_244_746;
 
 /// `outputs` in forms of the same value that cost less where position and time meet.
 ///
-/// `inputs` and `definitions` are those of [`Program::lower`], which the result is meant for.
+/// `inputs` and `definitions` are those of [`Program::lower`], which the result is meant for; `drafts` may have served
+/// with the same ones before.
 #[must_use]
 pub fn arrange(
     graph: &mut Graph,
     inputs: &[(Expr, Dependence)],
     definitions: &[(Expr, Expr)],
+    drafts: &mut Drafts,
     outputs: &[Expr],
 ) -> Vec<Expr> {
     let mut arranging = Arranging {
@@ -49,6 +51,7 @@ pub fn arrange(
         dependence: NumberMap::default(),
         arranged: NumberMap::default(),
         products: 0,
+        drafts,
         last: None,
         fractions: NumberMap::default(),
     };
@@ -85,6 +88,7 @@ struct Arranging<'a> {
     graph: &'a mut Graph,
     inputs: &'a [(Expr, Dependence)],
     definitions: &'a [(Expr, Expr)],
+    drafts: &'a mut Drafts,
     dependence: NumberMap<Expr, Dependence>,
     arranged: NumberMap<Expr, Expr>,
     /// The products of two terms made so far.
@@ -442,7 +446,7 @@ impl Arranging<'_> {
     fn lowered(&mut self, expr: Expr) -> Program {
         match self.last.take() {
             Some((known, program)) if known == expr => program,
-            _ => Program::lower(self.graph, self.inputs, self.definitions, &[expr]),
+            _ => self.drafts.lower(self.graph, self.inputs, self.definitions, &[expr]),
         }
     }
 }

@@ -279,7 +279,12 @@ impl Program {
 
     /// The program without operations that no output needs.
     pub(crate) fn compacted(&self) -> Self {
-        let needed = self.needed(&self.outputs);
+        self.part(&self.outputs)
+    }
+
+    /// The operations that `outputs` need.
+    fn part(&self, outputs: &[Slot]) -> Self {
+        let needed = self.needed(outputs);
         let mut places: Vec<Slot> = Vec::with_capacity(self.operations.len());
         let mut program = Program::default();
         for (index, operation) in self.operations.iter().enumerate() {
@@ -289,7 +294,7 @@ impl Program {
                 program.dependence.push(self.dependence[index]);
             }
         }
-        program.outputs = self.outputs.iter().map(|slot| places[slot.index()]).collect();
+        program.outputs = outputs.iter().map(|slot| places[slot.index()]).collect();
         let number = |operation: &Operation| match operation {
             Operation::Number(value) => nearest_f64(value),
             _ => 0.0,
@@ -499,6 +504,33 @@ fn call(function: Function, x: f64) -> f64 {
         Function::LogRatioCurvature => log_ratio::curvature(x),
         // These have operations of their own.
         Function::Atan2 | Function::LnOfBoth => f64::NAN,
+    }
+}
+
+/// Programs of expressions that are tried and compared, of one graph with one set of inputs and definitions: what they have in
+/// common is lowered once.
+#[derive(Debug, Default)]
+pub struct Drafts {
+    program: Program,
+    interned: NumberMap<Operation, Slot>,
+    lowered: NumberMap<Expr, Slot>,
+}
+
+impl Drafts {
+    /// As [`Program::lower`], but for the order of the operations.
+    pub(crate) fn lower(
+        &mut self,
+        graph: &mut Graph,
+        inputs: &[(Expr, Dependence)],
+        definitions: &[(Expr, Expr)],
+        outputs: &[Expr],
+    ) -> Program {
+        let Drafts { program, interned, lowered } = std::mem::take(self);
+        let mut lowering = Lowering { graph, program, interned, lowered, inputs, definitions };
+        let slots: Vec<Slot> = outputs.iter().map(|&output| lowering.lower(output)).collect();
+        let Lowering { program, interned, lowered, .. } = lowering;
+        *self = Drafts { program, interned, lowered };
+        self.program.part(&slots).with_shared_reciprocals()
     }
 }
 
