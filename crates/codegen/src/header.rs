@@ -312,9 +312,9 @@ before. Results equal those of the Rust functions bit for bit where the compiler
         let (prefix, d) = (self.prefix.clone(), self.dimension);
         let (parameters, fixed, time, point) = (
             self.members.len(),
-            self.plan.count(Stage::Fixed),
-            self.plan.count(Stage::Time),
-            self.plan.count(Stage::Point),
+            self.plan.fixed_count(),
+            self.plan.body_force.time_count(),
+            self.plan.body_force.point_count(),
         );
         self.comment(&["Space dimensions, and the numbers of parameters and of values that the stages of b keep.".into()]);
         self.line(&format!(
@@ -385,7 +385,7 @@ before. Results equal those of the Rust functions bit for bit where the compiler
             self.line(&format!("        return {};\n    }}", c_string(&message)));
         }
         let plan = self.plan;
-        let block = plan.stage(Stage::Fixed);
+        let block = plan.fixed_stage();
         let outputs = self.statements(&block, "    ", Places::PREPARE);
         let (sides, fixed) = outputs.split_at(2 * spec.requirements.len());
         for (requirement, side) in spec.requirements.iter().zip(sides.chunks(2)) {
@@ -486,7 +486,7 @@ before. Results equal those of the Rust functions bit for bit where the compiler
 
     fn stages(&mut self) {
         let (prefix, d, plan) = (self.prefix.clone(), self.dimension, self.plan);
-        let (times, points) = (plan.count(Stage::Time), plan.count(Stage::Point));
+        let (times, points) = (plan.body_force.time_count(), plan.body_force.point_count());
         let shown = points.max(1);
 
         self.comment(&["What the body force needs of the time alone.".into()]);
@@ -494,7 +494,7 @@ before. Results equal those of the Rust functions bit for bit where the compiler
             "MMSMITH_FN {prefix}_time_values {prefix}_at_time(const {prefix}_solution *s, double t)\n{{"
         ));
         self.line(&format!("    {prefix}_time_values time;"));
-        let block = plan.stage(Stage::Time);
+        let block = plan.time_stage(&plan.body_force);
         self.unread(&block, &[Given::Solution, Given::Time]);
         let outputs = self.statements(&block, "    ", Places::SINGLE);
         for (index, value) in outputs.iter().enumerate() {
@@ -511,7 +511,7 @@ before. Results equal those of the Rust functions bit for bit where the compiler
         self.line(&format!(
             "MMSMITH_FN void {prefix}_at_point(const {prefix}_solution *s, const double X[{d}], double point[{shown}])\n{{"
         ));
-        let block = plan.stage(Stage::Point);
+        let block = plan.point_stage(&plan.body_force);
         self.unread(&block, &[Given::Solution, Given::Position]);
         let outputs = self.statements(&block, "    ", Places::SINGLE);
         for (index, value) in outputs.iter().enumerate() {
@@ -530,7 +530,7 @@ before. Results equal those of the Rust functions bit for bit where the compiler
             "MMSMITH_FN void {prefix}_b_staged(const {prefix}_solution *s, const {prefix}_time_values *time,\n    \
              const double *point, size_t stride, double b[{d}])\n{{"
         ));
-        let block = plan.body_force_staged();
+        let block = plan.staged(&plan.body_force);
         self.unread(&block, &[Given::Solution, Given::TimeValues, Given::PointValues]);
         if !block.reads(|operand| matches!(operand, Operand::Kept(Stage::Point, 1..))) {
             self.line("    (void)stride;");

@@ -1,7 +1,7 @@
 //! The items of one solution, and the files that hold them.
 
 use crate::function::{Translator, fill, float};
-use crate::plan::{Measures, Plan, Shape, Stage};
+use crate::plan::{Measures, Plan, Shape, Stages};
 use crate::text::{meaning, one_line};
 use mmsmith_expr::Slot;
 use mmsmith_spec::{Boundary, Condition, DeriveError, Material, Spec, Surface};
@@ -188,7 +188,8 @@ impl Generator<'_> {
         let parameter_items = self.parameter_items(&parameters, &names.solution);
         let inherent = self.inherent_items(&solution, &parameters);
         let mut solution_items = self.solution_items();
-        let (stages, time, point) = self.stages();
+        let (body_force, time, point) = self.body_force_stages();
+        let (state, state_time, velocity_time, state_point) = self.state_stages();
         let dimension = Literal::usize_unsuffixed(self.spec.dimension);
         solution_items.extend(quote! {
             fn body_force_at(
@@ -197,8 +198,16 @@ impl Generator<'_> {
             ) -> ::std::boxed::Box<dyn #runtime::BodyForceAtPoints<T, #dimension> + '_> {
                 ::std::boxed::Box::new(#runtime::StagedPoints::<Self, T, #time, #point>::new(*self, X))
             }
+            fn state_at(
+                &self,
+                X: &[#runtime::nalgebra::SVector<T, #dimension>],
+            ) -> ::std::boxed::Box<dyn #runtime::StateAtPoints<T, #dimension> + '_> {
+                ::std::boxed::Box::new(
+                    #runtime::StagedStates::<Self, T, #state_time, #velocity_time, #state_point>::new(*self, X),
+                )
+            }
         });
-        let count = Literal::usize_unsuffixed(self.plan.count(Stage::Fixed));
+        let count = Literal::usize_unsuffixed(self.plan.fixed_count());
         let variant =
             format_ident!("{}", ["One", "Two", "Three"][self.spec.dimension.clamp(1, 3) - 1]);
         let title = doc_line(&self.spec.title);
@@ -236,7 +245,14 @@ impl Generator<'_> {
 
             #[allow(unused_variables, clippy::all, clippy::pedantic)]
             impl<T: #runtime::Real> #runtime::BodyForceStages<T, #dimension, #time, #point> for #solution<T> {
-                #stages
+                #body_force
+            }
+
+            #[allow(unused_variables, clippy::all, clippy::pedantic)]
+            impl<T: #runtime::Real>
+                #runtime::StateStages<T, #dimension, #state_time, #velocity_time, #state_point> for #solution<T>
+            {
+                #state
             }
 
             impl<T: #runtime::Real> From<#solution<T>> for #runtime::AnySolution<T> {
@@ -316,7 +332,7 @@ impl Generator<'_> {
         });
 
         let translator = Translator::new("parameters", names.clone(), self.blocks);
-        let (statements, values) = translator.statements(&self.plan.stage(Stage::Fixed));
+        let (statements, values) = translator.statements(&self.plan.fixed_stage());
         let (sides, fixed_values) = values.split_at(2 * spec.requirements.len());
         let requirements =
             spec.requirements.iter().zip(sides.chunks(2)).map(|(requirement, side)| {
@@ -387,53 +403,125 @@ impl Generator<'_> {
     }
 
     /// The functions of the trait `BodyForceStages`, and how many values there are of the time and of the point.
-    fn stages(&self) -> (TokenStream, Literal, Literal) {
-        let runtime = self.runtime;
-        let n = Literal::usize_unsuffixed(self.spec.dimension);
-        let vector = quote!(#runtime::nalgebra::SVector<T, #n>);
-        let translator = &self.translator;
-        let (time_statements, time_values) = translator.statements(&self.plan.stage(Stage::Time));
-        let (point_statements, point_values) =
-            translator.statements(&self.plan.stage(Stage::Point));
-        let (statements, values) = translator.statements(&self.plan.body_force_staged());
-        let time = Literal::usize_unsuffixed(self.plan.count(Stage::Time));
-        let point = Literal::usize_unsuffixed(self.plan.count(Stage::Point));
+    fn body_force_stages(&self) -> (TokenStream, Literal, Literal) {
+        let vector = self.vector();
+        let stages = &self.plan.body_force;
+        let (of_time, time) = self.time_stage("body_force_time", stages);
+        let (of_point, point) = self.point_stage("body_force_point", stages);
+        let (statements, values) = self.translator.statements(&self.plan.staged(stages));
+        let result = self.shaped(Shape::Vector, &values);
         let items = quote! {
-            #[inline]
-            fn body_force_time(&self, t: T) -> [T; #time] {
-                #time_statements
-                [#(#time_values),*]
-            }
-            #[inline]
-            fn body_force_point(&self, X: &#vector) -> [T; #point] {
-                #point_statements
-                [#(#point_values),*]
-            }
+            #of_time
+            #of_point
             #[inline(always)]
             fn body_force_staged(&self, time: &[T; #time], point: &[T; #point]) -> #vector {
                 #statements
-                #runtime::nalgebra::SVector::<T, #n>::new(#(#values),*)
+                #result
             }
         };
         (items, time, point)
     }
 
-    fn solution_items(&self) -> TokenStream {
+    /// The functions of the trait `StateStages`, and how many values there are of the time, of the time of the velocity,
+    /// and of the point.
+    fn state_stages(&self) -> (TokenStream, Literal, Literal, Literal) {
         let runtime = self.runtime;
         let n = Literal::usize_unsuffixed(self.spec.dimension);
-        let vector = quote!(#runtime::nalgebra::SVector<T, #n>);
-        let matrix = quote!(#runtime::nalgebra::SMatrix<T, #n, #n>);
-        let shaped = |shape: Shape, values: &[TokenStream]| match shape {
+        let Plan { state, velocity, .. } = self.plan;
+        let (of_time, time) = self.time_stage("state_time", state);
+        let (of_velocity_time, velocity_time) = self.time_stage("velocity_time", velocity);
+        let (of_point, point) = self.point_stage("state_point", state);
+        let (statements, values) = self.translator.statements(&self.plan.staged(state));
+        let (u, tensors) = values.split_at(self.spec.dimension);
+        let (F, P) = tensors.split_at(tensors.len() / 2);
+        let u = self.shaped(Shape::Vector, u);
+        let [F, P] = [F, P].map(|values| self.shaped(Shape::Matrix, values));
+        let (v_statements, values) = self.translator.statements(&self.plan.staged(velocity));
+        let v = self.shaped(Shape::Vector, &values);
+        let items = quote! {
+            #of_time
+            #of_velocity_time
+            #of_point
+            #[inline(always)]
+            fn state_staged(
+                &self,
+                time: &[T; #time],
+                velocity_time: &[T; #velocity_time],
+                point: &[T; #point],
+            ) -> #runtime::State<T, #n> {
+                // In a block of its own: its values belong to another time.
+                let v = {
+                    let time = velocity_time;
+                    #v_statements
+                    #v
+                };
+                #statements
+                #runtime::State { u: #u, v, F: #F, P: #P }
+            }
+        };
+        (items, time, velocity_time, point)
+    }
+
+    /// A function for what `stages` keep of the time, and how many values these are.
+    fn time_stage(&self, name: &str, stages: &Stages) -> (TokenStream, Literal) {
+        let (name, count) =
+            (format_ident!("{name}"), Literal::usize_unsuffixed(stages.time_count()));
+        let (statements, values) = self.translator.statements(&self.plan.time_stage(stages));
+        let function = quote! {
+            #[inline]
+            fn #name(&self, t: T) -> [T; #count] {
+                #statements
+                [#(#values),*]
+            }
+        };
+        (function, count)
+    }
+
+    /// A function for what `stages` keep of a point, and how many values these are.
+    fn point_stage(&self, name: &str, stages: &Stages) -> (TokenStream, Literal) {
+        let (name, count) =
+            (format_ident!("{name}"), Literal::usize_unsuffixed(stages.point_count()));
+        let vector = self.vector();
+        let (statements, values) = self.translator.statements(&self.plan.point_stage(stages));
+        let function = quote! {
+            #[inline]
+            fn #name(&self, X: &#vector) -> [T; #count] {
+                #statements
+                [#(#values),*]
+            }
+        };
+        (function, count)
+    }
+
+    /// The type of vectors.
+    fn vector(&self) -> TokenStream {
+        let runtime = self.runtime;
+        let n = Literal::usize_unsuffixed(self.spec.dimension);
+        quote!(#runtime::nalgebra::SVector<T, #n>)
+    }
+
+    /// Values as a scalar, a vector or a matrix.
+    fn shaped(&self, shape: Shape, values: &[TokenStream]) -> TokenStream {
+        let runtime = self.runtime;
+        let n = Literal::usize_unsuffixed(self.spec.dimension);
+        match shape {
             Shape::Scalar => quote!(#(#values)*),
             Shape::Vector => quote!(#runtime::nalgebra::SVector::<T, #n>::new(#(#values),*)),
             Shape::Matrix => quote!(#runtime::nalgebra::SMatrix::<T, #n, #n>::new(#(#values),*)),
-        };
+        }
+    }
+
+    fn solution_items(&self) -> TokenStream {
+        let runtime = self.runtime;
+        let n = Literal::usize_unsuffixed(self.spec.dimension);
+        let vector = self.vector();
+        let matrix = quote!(#runtime::nalgebra::SMatrix<T, #n, #n>);
         let mut items = TokenStream::new();
         for field in &self.plan.fields {
             let method = format_ident!("{}", field.name);
             let block = self.plan.after_parameters(&field.outputs);
             let (statements, values) = self.translator.statements(&block);
-            let result = shaped(field.shape, &values);
+            let result = self.shaped(field.shape, &values);
             let result_type = match field.shape {
                 Shape::Scalar => quote!(T),
                 Shape::Vector => vector.clone(),
@@ -456,7 +544,8 @@ impl Generator<'_> {
             .map(|field| {
                 let (own, rest) = values.split_at(field.outputs.len());
                 values = rest;
-                let (letter, value) = (format_ident!("{}", field.letter), shaped(field.shape, own));
+                let (letter, value) =
+                    (format_ident!("{}", field.letter), self.shaped(field.shape, own));
                 quote!(#letter: #value)
             })
             .collect();

@@ -5,10 +5,14 @@
 //! order; the Rust module and the C header are two renderings of the same plan, so that their results agree.
 
 use mmsmith_expr::{
-    Dependence, Expr, Function, Operation, Program, Rational, Slot, arrange, reuse,
+    Dependence, Drafts, Expr, Function, Operation, Program, Rational, Slot, arrange, reuse,
 };
 use mmsmith_spec::{DeriveError, Domain, Fields, Spec, Surface};
 use std::collections::BTreeMap;
+
+/// What is kept of each point for its state, at most: 128 bytes in double precision, four times what a step needs of
+/// a particle's position in the plane. Where the cheapest choice is more, some of it is computed anew.
+const MOST_KEPT_OF_STATES: usize = 16;
 
 /// A solution whose fields are derived and staged, ready to be written down in Rust or in C.
 pub struct Plan<'a> {
@@ -16,7 +20,11 @@ pub struct Plan<'a> {
     program: Program,
     pub(crate) fields: Vec<Field>,
     /// The body force, arranged for evaluation in stages.
-    staged: Vec<Slot>,
+    pub(crate) body_force: Stages,
+    /// Displacement, deformation gradient and stress, and the velocity, which may belong to another time: both from what
+    /// one stage keeps of a point.
+    pub(crate) state: Stages,
+    pub(crate) velocity: Stages,
     pub(crate) constants: Constants,
     /// The strain energy, where the material is given by one.
     pub(crate) energy: Option<Slot>,
@@ -27,6 +35,11 @@ pub struct Plan<'a> {
     /// The displacement and the law, a line each, for people.
     pub(crate) formulas: Vec<String>,
     fixed: Vec<Slot>,
+}
+
+/// Values that are computed in stages, and what is kept for them.
+pub(crate) struct Stages {
+    outputs: Vec<Slot>,
     time: Vec<Slot>,
     point: Vec<Slot>,
 }
@@ -114,8 +127,10 @@ impl<'a> Plan<'a> {
         let mut fields = spec.derive()?;
         let formulas = formulas(spec, &fields);
         // Solvers sample the body force at the same points in every step; a single call does all the work each time.
-        let single = reuse(&mut fields.graph, &fields.inputs, &fields.definitions, &fields.b);
-        let staged = arrange(&mut fields.graph, &fields.inputs, &fields.definitions, &fields.b);
+        let (inputs, definitions, b) = (&fields.inputs, &fields.definitions, &fields.b);
+        let drafts = &mut Drafts::default();
+        let single = reuse(&mut fields.graph, inputs, definitions, drafts, b);
+        let staged = arrange(&mut fields.graph, inputs, definitions, drafts, b);
         let matrix = |A: &Vec<Vec<Expr>>| A.concat();
         let parts = [
             ("displacement", "u", "displacement", Shape::Vector, fields.u.clone()),
@@ -171,20 +186,32 @@ impl<'a> Plan<'a> {
 
         let fixed = fixed_slots(&program);
         let kept = numbered(Stage::Fixed, &fixed).collect();
-        let (time, point) = staged_slots(&program, &kept, &staged);
+        let stages = |outputs: Vec<Slot>, point| {
+            let time = time_slots(&program, &kept, &outputs);
+            Stages { outputs, time, point }
+        };
+        let at_points = program.kept_at_points(&staged, usize::MAX);
+        let body_force = stages(staged, at_points);
+        let of = |letters: &[&str]| -> Vec<Slot> {
+            let fields = fields.iter().filter(|field| letters.contains(&field.letter));
+            fields.flat_map(|field| field.outputs.clone()).collect()
+        };
+        let at_points = program.kept_at_points(&of(&["u", "v", "F", "P"]), MOST_KEPT_OF_STATES);
+        let state = stages(of(&["u", "F", "P"]), at_points.clone());
+        let velocity = stages(of(&["v"]), at_points);
         Ok(Plan {
             spec,
             program,
             fields,
-            staged,
+            body_force,
+            state,
+            velocity,
             constants,
             energy,
             tractions,
             requirements,
             formulas,
             fixed,
-            time,
-            point,
         })
     }
 
@@ -204,39 +231,40 @@ impl<'a> Plan<'a> {
         operations.any(|o| matches!(o, Operation::SumError(..) | Operation::ProductError(..)))
     }
 
-    /// How many values a stage keeps.
-    pub(crate) fn count(&self, stage: Stage) -> usize {
-        self.slots(stage).len()
+    /// How many values the stage of the parameters keeps.
+    pub(crate) fn fixed_count(&self) -> usize {
+        self.fixed.len()
     }
 
-    fn slots(&self, stage: Stage) -> &[Slot] {
-        match stage {
-            Stage::Fixed => &self.fixed,
-            Stage::Time => &self.time,
-            Stage::Point => &self.point,
-        }
+    /// The values that the stage of the parameters keeps, after the two sides of each requirement.
+    pub(crate) fn fixed_stage(&self) -> Block<'_> {
+        let sides = self.requirements.iter().flat_map(|&(left, right)| [left, right]);
+        self.block(&[], sides.chain(self.fixed.iter().copied()).collect())
     }
 
-    /// The values that `stage` keeps. Those of the parameters come after the two sides of each requirement.
-    pub(crate) fn stage(&self, stage: Stage) -> Block<'_> {
-        match stage {
-            Stage::Fixed => {
-                let sides = self.requirements.iter().flat_map(|&(left, right)| [left, right]);
-                self.block(&[], sides.chain(self.fixed.iter().copied()).collect())
-            }
-            Stage::Time | Stage::Point => self.after_parameters(self.slots(stage)),
-        }
+    /// What `stages` keep of the time.
+    pub(crate) fn time_stage(&self, stages: &Stages) -> Block<'_> {
+        self.after_parameters(&stages.time)
     }
 
-    /// The body force from what all stages keep.
-    pub(crate) fn body_force_staged(&self) -> Block<'_> {
-        let stages = [Stage::Fixed, Stage::Time, Stage::Point];
-        self.block(&stages, self.staged.clone())
+    /// What `stages` keep of a point.
+    pub(crate) fn point_stage(&self, stages: &Stages) -> Block<'_> {
+        self.after_parameters(&stages.point)
+    }
+
+    /// The values of `stages` from what all of them keep.
+    pub(crate) fn staged(&self, stages: &Stages) -> Block<'_> {
+        let kept = [
+            (Stage::Fixed, self.fixed.as_slice()),
+            (Stage::Time, &stages.time),
+            (Stage::Point, &stages.point),
+        ];
+        self.block(&kept, stages.outputs.clone())
     }
 
     /// `outputs` from the coordinates, the time, and what the stage of the parameters keeps.
     pub(crate) fn after_parameters(&self, outputs: &[Slot]) -> Block<'_> {
-        self.block(&[Stage::Fixed], outputs.to_vec())
+        self.block(&[(Stage::Fixed, &self.fixed)], outputs.to_vec())
     }
 
     /// All fields, in their order.
@@ -245,9 +273,9 @@ impl<'a> Plan<'a> {
         self.after_parameters(&outputs)
     }
 
-    fn block(&self, stages: &[Stage], outputs: Vec<Slot>) -> Block<'_> {
+    fn block(&self, stages: &[(Stage, &[Slot])], outputs: Vec<Slot>) -> Block<'_> {
         let kept: BTreeMap<_, _> =
-            stages.iter().flat_map(|&stage| numbered(stage, self.slots(stage))).collect();
+            stages.iter().flat_map(|&(stage, slots)| numbered(stage, slots)).collect();
         let needed = needed(&self.program, &kept, &outputs);
         let steps = self
             .program
@@ -256,6 +284,18 @@ impl<'a> Plan<'a> {
             .filter(|slot| is_computed(&self.program, *slot))
             .collect();
         Block { program: &self.program, dimension: self.spec.dimension, kept, steps, outputs }
+    }
+}
+
+impl Stages {
+    /// How many values are kept of the time.
+    pub(crate) fn time_count(&self) -> usize {
+        self.time.len()
+    }
+
+    /// How many values are kept of a point.
+    pub(crate) fn point_count(&self) -> usize {
+        self.point.len()
     }
 }
 
@@ -341,13 +381,12 @@ fn fixed_slots(program: &Program) -> Vec<Slot> {
     slots
 }
 
-/// What `outputs` need of the time alone and of the position alone: the values of the time that are read where both come
-/// together, or are results, and [those of the position](Program::kept_at_points) that are worth keeping.
-fn staged_slots(
+/// What `outputs` need of the time alone: the values that are read where time and position come together, or are results.
+fn time_slots(
     program: &Program,
     kept: &BTreeMap<Slot, (Stage, usize)>,
     outputs: &[Slot],
-) -> (Vec<Slot>, Vec<Slot>) {
+) -> Vec<Slot> {
     let needed = needed(program, kept, outputs);
     let of_time = |slot: &Slot| {
         let Dependence { position, time } = program.dependence(*slot);
@@ -362,7 +401,7 @@ fn staged_slots(
         .collect();
     time.sort_unstable();
     time.dedup();
-    (time, program.kept_at_points(outputs))
+    time
 }
 
 /// Which operations `outputs` need, where kept values need none.

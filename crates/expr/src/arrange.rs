@@ -14,9 +14,10 @@
 //! a small remainder is never mixed with the large part that it corrects. A form is taken only where it costs less
 //! and where the bound of its rounding errors, by running error analysis at sample points, is not clearly larger.
 
-use crate::{Dependence, Expr, Graph, Node, Program, Rational};
+use crate::graph::NumberMap;
+use crate::{Dependence, Drafts, Expr, Graph, Node, Program, Rational};
 use num_traits::{One, Signed, ToPrimitive, Zero};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 /// Numerators with more terms than this are not worth the search.
 const MOST_TERMS: usize = 48;
@@ -33,22 +34,26 @@ const PLASTIC_RATIO: f64 = 0.324_717_957_244_746;
 
 /// `outputs` in forms of the same value that cost less where position and time meet.
 ///
-/// `inputs` and `definitions` are those of [`Program::lower`], which the result is meant for.
+/// `inputs` and `definitions` are those of [`Program::lower`], which the result is meant for; `drafts` may have served
+/// with the same ones before.
 #[must_use]
 pub fn arrange(
     graph: &mut Graph,
     inputs: &[(Expr, Dependence)],
     definitions: &[(Expr, Expr)],
+    drafts: &mut Drafts,
     outputs: &[Expr],
 ) -> Vec<Expr> {
     let mut arranging = Arranging {
         graph,
         inputs,
         definitions,
-        dependence: HashMap::new(),
-        arranged: HashMap::new(),
+        dependence: NumberMap::default(),
+        arranged: NumberMap::default(),
         products: 0,
-        fractions: HashMap::new(),
+        drafts,
+        last: None,
+        fractions: NumberMap::default(),
     };
     outputs.iter().map(|&output| arranging.arrange(output)).collect()
 }
@@ -83,13 +88,16 @@ struct Arranging<'a> {
     graph: &'a mut Graph,
     inputs: &'a [(Expr, Dependence)],
     definitions: &'a [(Expr, Expr)],
-    dependence: HashMap<Expr, Dependence>,
-    arranged: HashMap<Expr, Expr>,
+    drafts: &'a mut Drafts,
+    dependence: NumberMap<Expr, Dependence>,
+    arranged: NumberMap<Expr, Expr>,
     /// The products of two terms made so far.
     products: usize,
+    /// The expression that was found to be the better one last.
+    last: Option<(Expr, Program)>,
     /// Fractions found before, each with the products that it took. They count again where it is used again, so that
     /// the limit does not depend on what was asked for first.
-    fractions: HashMap<Expr, (Fraction, usize)>,
+    fractions: NumberMap<Expr, (Fraction, usize)>,
 }
 
 impl Arranging<'_> {
@@ -425,13 +433,20 @@ impl Arranging<'_> {
         let Some(candidate) = candidate.filter(|&candidate| candidate != present) else {
             return present;
         };
-        let before = Program::lower(self.graph, self.inputs, self.definitions, &[present]);
-        let after = Program::lower(self.graph, self.inputs, self.definitions, &[candidate]);
+        let (before, after) = (self.lowered(present), self.lowered(candidate));
         let cost = |program: &Program| program.operations_by_stage(program.outputs()).both.cost();
-        if cost(&after) <= cost(&before) && as_accurate(&before, &after, self.inputs.len()) {
-            candidate
-        } else {
-            present
+        let is_better =
+            cost(&after) <= cost(&before) && as_accurate(&before, &after, self.inputs.len());
+        let (taken, program) = if is_better { (candidate, after) } else { (present, before) };
+        self.last = Some((taken, program));
+        taken
+    }
+
+    /// The program of an expression, which is often the one that came out best before.
+    fn lowered(&mut self, expr: Expr) -> Program {
+        match self.last.take() {
+            Some((known, program)) if known == expr => program,
+            _ => self.drafts.lower(self.graph, self.inputs, self.definitions, &[expr]),
         }
     }
 }
@@ -445,10 +460,15 @@ pub(crate) fn as_accurate(before: &Program, after: &Program, inputs: usize) -> b
         let scale = if point == 2 * input + 1 { 1e-8 } else { 1.0 };
         scale * (0.05 + 0.9 * turns.fract())
     };
+    let places: Vec<Vec<f64>> = (0..64.max(2 * inputs))
+        .map(|point| (0..inputs).map(|input| sample(point, input)).collect())
+        .collect();
     let mut growth = Vec::new();
-    for point in 0..64.max(2 * inputs) {
-        let values: Vec<f64> = (0..inputs).map(|input| sample(point, input)).collect();
-        let (old, new) = (before.error_bounds(&values), after.error_bounds(&values));
+    // As many side by side as keep a program's values in the cache.
+    let bounds = |program: &Program| -> Vec<Vec<f64>> {
+        places.chunks(8).flat_map(|places| program.error_bounds(places)).collect()
+    };
+    for (old, new) in bounds(before).iter().zip(bounds(after)) {
         // Where the point is outside the domain of definition there is nothing to compare.
         growth.extend(old.iter().zip(&new).filter(|(old, _)| old.is_finite()).map(|(old, new)| {
             // Nothing is as large as nothing; what is not finite any more is infinitely worse.

@@ -5,9 +5,10 @@
 //! parameter-only coefficients of a sum are brought over their common denominator; where the numerator turns out
 //! to be zero or one single product, that form replaces the sum.
 
+use crate::graph::NumberMap;
 use crate::{Expr, Function, Graph, Node, Rational};
 use num_traits::{One, Signed, ToPrimitive, Zero};
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Numerators with more terms than this are not worth the search.
 const MOST_TERMS: usize = 512;
@@ -125,7 +126,7 @@ impl Graph {
         Some(numerator.into_iter().map(|(m, c)| (m.into_iter().collect(), c)).collect())
     }
 
-    fn opened(&mut self, expr: Expr, done: &mut HashMap<Expr, Expr>) -> Expr {
+    fn opened(&mut self, expr: Expr, done: &mut NumberMap<Expr, Expr>) -> Expr {
         if let Some(&known) = done.get(&expr) {
             return known;
         }

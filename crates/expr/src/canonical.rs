@@ -17,7 +17,7 @@ impl Graph {
     /// `sum of coefficient * term`.
     pub fn sum(&mut self, terms: impl IntoIterator<Item = (Rational, Expr)>) -> Expr {
         let mut constant = Rational::zero();
-        let mut collected = BTreeMap::new();
+        let mut collected = Collected::default();
         let terms: Vec<_> = terms.into_iter().collect();
         for (coefficient, term) in terms {
             self.add_term(&mut constant, &mut collected, &coefficient, term);
@@ -74,29 +74,21 @@ impl Graph {
     fn add_term(
         &mut self,
         constant: &mut Rational,
-        collected: &mut BTreeMap<Expr, Rational>,
+        collected: &mut Collected,
         coefficient: &Rational,
         term: Expr,
     ) {
-        self.work += 1 + (crate::graph::bits(coefficient) / 64) as usize;
-        match self.node(term).clone() {
-            Node::Number(value) => *constant += coefficient * value,
-            Node::Sum { constant: inner, terms } => {
-                *constant += coefficient * inner;
-                for (inner_term, inner_coefficient) in terms {
-                    self.add_term(
-                        constant,
-                        collected,
-                        &(coefficient * inner_coefficient),
-                        inner_term,
-                    );
+        let mut pending = vec![(coefficient.clone(), term)];
+        while let Some((coefficient, term)) = pending.pop() {
+            self.work += 1 + (crate::graph::bits(&coefficient) / 64) as usize;
+            match self.node(term) {
+                Node::Number(value) => *constant += &coefficient * value,
+                Node::Sum { constant: inner, terms } => {
+                    *constant += &coefficient * inner;
+                    pending.extend(terms.iter().rev().map(|(term, c)| (&coefficient * c, *term)));
                 }
-            }
-            _ => {
-                let entry = collected.entry(term).or_insert_with(Rational::zero);
-                *entry += coefficient;
-                if entry.is_zero() {
-                    collected.remove(&term);
+                _ => {
+                    collected.add(term, &coefficient);
                 }
             }
         }
@@ -106,21 +98,26 @@ impl Graph {
     fn merge_terms_of_equal_key(
         &mut self,
         constant: &mut Rational,
-        collected: &mut BTreeMap<Expr, Rational>,
+        collected: &mut Collected,
     ) -> bool {
-        let mut groups: BTreeMap<Expr, Vec<(Expr, Expr)>> = BTreeMap::new();
-        let terms: Vec<Expr> = collected.keys().copied().collect();
+        let terms: Vec<Expr> = collected.keys().collect();
         if terms.len() < 2 {
             return false;
         }
         self.work += terms.len();
+        // Key, term and sum.
+        let mut splits: Vec<(Expr, Expr, Expr)> = Vec::new();
         for &term in &terms {
             if let Some((key, inner)) = self.split_off_sum(term) {
-                groups.entry(key).or_default().push((term, inner));
+                splits.push((key, term, inner));
             }
         }
-        for (key, mut members) in groups {
-            if collected.contains_key(&key) {
+        // Stable, so that the terms of a key keep their order.
+        splits.sort_by_key(|(key, ..)| *key);
+        for group in splits.chunk_by(|a, b| a.0 == b.0) {
+            let key = group[0].0;
+            let mut members: Vec<(Expr, Expr)> = group.iter().map(|m| (m.1, m.2)).collect();
+            if collected.contains(key) {
                 members.push((key, Graph::ONE));
             }
             if members.len() < 2 {
@@ -128,7 +125,7 @@ impl Graph {
             }
             let inner_terms: Vec<(Rational, Expr)> = members
                 .iter()
-                .filter_map(|&(term, inner)| Some((collected.remove(&term)?, inner)))
+                .filter_map(|&(term, inner)| Some((collected.remove(term)?, inner)))
                 .collect();
             let inner = self.sum(inner_terms);
             let merged = self.mul(key, inner);
@@ -152,12 +149,8 @@ impl Graph {
         Some((self.product(rest), sum))
     }
 
-    fn sum_of_collected(
-        &mut self,
-        constant: Rational,
-        collected: BTreeMap<Expr, Rational>,
-    ) -> Expr {
-        let mut terms: Vec<(Expr, Rational)> = collected.into_iter().collect();
+    fn sum_of_collected(&mut self, constant: Rational, collected: Collected) -> Expr {
+        let mut terms: Vec<(Expr, Rational)> = collected.into_sorted();
         match (terms.len(), constant.is_zero()) {
             (0, _) => return self.number(constant),
             (1, true) => {
@@ -202,15 +195,21 @@ impl Graph {
 
     /// The factors that every term has, to the smallest power that occurs.
     fn common_factors(&self, terms: &[(Expr, Rational)]) -> Vec<(Expr, Rational)> {
-        let factors_of = |term: Expr| -> Vec<(Expr, Rational)> {
-            match self.node(term) {
-                Node::Product(factors) => factors.to_vec(),
-                _ => vec![(term, Rational::one())],
-            }
+        // The factors of a term that is no product are itself.
+        let single = |term: Expr| [(term, Rational::one())];
+        let mut common = match self.node(terms[0].0) {
+            Node::Product(factors) => factors.to_vec(),
+            _ => single(terms[0].0).to_vec(),
         };
-        let mut common = factors_of(terms[0].0);
         for &(term, _) in &terms[1..] {
-            let factors = factors_of(term);
+            if common.is_empty() {
+                break;
+            }
+            let single = single(term);
+            let factors: &[(Expr, Rational)] = match self.node(term) {
+                Node::Product(factors) => factors,
+                _ => &single,
+            };
             common.retain_mut(|(base, exponent)| {
                 // Factors are sorted by their bases.
                 let Ok(found) = factors.binary_search_by_key(base, |(base, _)| *base) else {
@@ -234,7 +233,7 @@ impl Graph {
     /// Zero to a negative power stays in the product, where [`Graph::divides_by_zero`] finds it.
     pub fn product(&mut self, factors: impl IntoIterator<Item = (Expr, Rational)>) -> Expr {
         let mut coefficient = Rational::one();
-        let mut collected: BTreeMap<Expr, Rational> = BTreeMap::new();
+        let mut collected = Collected::default();
         let mut pending: Vec<(Expr, Rational)> = factors.into_iter().collect();
         while let Some((base, exponent)) = pending.pop() {
             self.work += 1;
@@ -245,28 +244,23 @@ impl Graph {
                 pending.extend(factors);
                 continue;
             }
-            let entry = collected.entry(base).or_insert_with(Rational::zero);
-            *entry += &exponent;
-            let total = entry.clone();
+            let total = collected.add(base, &exponent);
             // Powers that were out of reach one by one may have become whole together, as in sqrt(a b)^2.
-            if total.is_zero() {
-                collected.remove(&base);
-            } else if total != exponent && total.is_integer() && self.opens(base) {
-                collected.remove(&base);
+            if !total.is_zero() && total != exponent && total.is_integer() && self.opens(base) {
+                collected.remove(base);
                 pending.push((base, total));
             }
         }
-        if collected.contains_key(&Graph::ZERO) {
+        if collected.contains(Graph::ZERO) {
             coefficient = Rational::one();
         } else if coefficient.is_zero() {
             return Graph::ZERO;
         }
-        let term = match collected.len() {
-            0 => return self.number(coefficient),
-            1 if collected.values().all(One::is_one) => {
-                collected.into_keys().next().unwrap_or(Graph::ONE)
-            }
-            _ => self.intern(Node::Product(collected.into_iter().collect())),
+        let collected = collected.into_sorted();
+        let term = match &collected[..] {
+            [] => return self.number(coefficient),
+            [(base, exponent)] if exponent.is_one() => *base,
+            _ => self.intern(Node::Product(collected.into_boxed_slice())),
         };
         self.scaled_flat(term, coefficient)
     }
@@ -292,14 +286,14 @@ impl Graph {
 
     /// Takes `base ^ exponent` apart where that is exact; numbers go into `coefficient`.
     fn open_factor(
-        &mut self,
+        &self,
         base: Expr,
         exponent: &Rational,
         coefficient: &mut Rational,
     ) -> Option<Vec<(Expr, Rational)>> {
-        match self.node(base).clone() {
+        match self.node(base) {
             Node::Number(value) => {
-                let power = rational_power(&value, exponent)?;
+                let power = rational_power(value, exponent)?;
                 *coefficient *= power;
                 Some(Vec::new())
             }
@@ -309,10 +303,10 @@ impl Graph {
                     .then(|| factors.iter().map(|(b, e)| (*b, e * exponent)).collect())
             }
             Node::Sum { constant, terms } if constant.is_zero() && terms.len() == 1 => {
-                let (term, scale) = terms[0].clone();
-                let power = rational_power(&scale, exponent)?;
+                let (term, scale) = &terms[0];
+                let power = rational_power(scale, exponent)?;
                 *coefficient *= power;
-                Some(vec![(term, exponent.clone())])
+                Some(vec![(*term, exponent.clone())])
             }
             _ => None,
         }
@@ -321,10 +315,12 @@ impl Graph {
     /// Whether any part of `expr` is zero to a negative power.
     #[must_use]
     pub fn divides_by_zero(&self, expr: Expr) -> bool {
-        self.reachable(&[expr]).into_iter().any(|e| match self.node(e) {
-            Node::Product(factors) => factors.iter().any(|(base, _)| *base == Graph::ZERO),
-            _ => false,
-        })
+        // Hardly any graph has such a part at all.
+        self.has_powers_of_zero
+            && self.reachable(&[expr]).into_iter().any(|e| match self.node(e) {
+                Node::Product(factors) => factors.iter().any(|(base, _)| *base == Graph::ZERO),
+                _ => false,
+            })
     }
 
     /// `function(arguments)`, simplified at arguments where the value is known.
@@ -459,6 +455,73 @@ impl Graph {
                 self.whole(mapped)
             }
         }
+    }
+}
+
+/// What a sum or product is collected in: numbers by expression, none of them zero.
+#[derive(Default)]
+struct Collected {
+    /// In order of the expressions, as long as there are few: nearly always.
+    few: Vec<(Expr, Rational)>,
+    many: BTreeMap<Expr, Rational>,
+}
+
+/// As many can be moved to make room for one more at little cost.
+const FEW: usize = 64;
+
+impl Collected {
+    /// Adds to the number of `expr`; what it is now.
+    fn add(&mut self, expr: Expr, number: &Rational) -> Rational {
+        if self.many.is_empty() {
+            match self.few.binary_search_by_key(&expr, |(e, _)| *e) {
+                Ok(place) => {
+                    let total = &self.few[place].1 + number;
+                    if total.is_zero() {
+                        self.few.remove(place);
+                    } else {
+                        self.few[place].1 = total.clone();
+                    }
+                    return total;
+                }
+                Err(_) if number.is_zero() => return number.clone(),
+                Err(place) if self.few.len() < FEW => {
+                    self.few.insert(place, (expr, number.clone()));
+                    return number.clone();
+                }
+                Err(_) => self.many.extend(self.few.drain(..)),
+            }
+        }
+        let entry = self.many.entry(expr).or_insert_with(Rational::zero);
+        *entry += number;
+        let total = entry.clone();
+        if total.is_zero() {
+            self.many.remove(&expr);
+        }
+        total
+    }
+
+    fn remove(&mut self, expr: Expr) -> Option<Rational> {
+        match self.few.binary_search_by_key(&expr, |(e, _)| *e) {
+            Ok(place) => Some(self.few.remove(place).1),
+            Err(_) => self.many.remove(&expr),
+        }
+    }
+
+    fn contains(&self, expr: Expr) -> bool {
+        self.few.binary_search_by_key(&expr, |(e, _)| *e).is_ok() || self.many.contains_key(&expr)
+    }
+
+    fn keys(&self) -> impl Iterator<Item = Expr> {
+        self.few.iter().map(|(e, _)| *e).chain(self.many.keys().copied())
+    }
+
+    /// In order of the expressions.
+    fn into_sorted(mut self) -> Vec<(Expr, Rational)> {
+        if !self.many.is_empty() {
+            // One of the two is empty.
+            self.few.extend(self.many);
+        }
+        self.few
     }
 }
 

@@ -1,8 +1,8 @@
 //! Differentiation.
 
+use crate::graph::NumberMap;
 use crate::{Expr, Function, Graph, Node, Rational};
 use num_traits::One;
-use std::collections::HashMap;
 
 /// Partial derivatives of the expressions of one graph, each found once.
 ///
@@ -10,7 +10,7 @@ use std::collections::HashMap;
 /// determinant, can be stated with [`Derivatives::define`].
 #[derive(Clone, Debug, Default)]
 pub struct Derivatives {
-    known: HashMap<(Expr, Expr), Expr>,
+    known: NumberMap<(Expr, Expr), Expr>,
     limited: bool,
 }
 

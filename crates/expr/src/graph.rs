@@ -3,7 +3,7 @@
 use crate::{Rational, nearest_f64};
 use num_traits::{One, Zero};
 use std::collections::{BTreeSet, HashMap};
-use std::hash::{BuildHasherDefault, Hasher};
+use std::hash::{BuildHasher, BuildHasherDefault, Hasher};
 
 /// The most nodes and references that text may make.
 pub(crate) const LARGEST_SIZE: usize = 1 << 21;
@@ -139,21 +139,29 @@ pub enum Node {
 pub struct Graph {
     nodes: Vec<Node>,
     depth: Vec<u32>,
-    index: HashMap<Node, Expr, BuildHasherDefault<NodeHasher>>,
+    /// By the hash of a node the last one made of this hash; equal hashes of different nodes are rare.
+    index: NumberMap<u64, Expr>,
+    /// For each node the one made before it of the same hash.
+    earlier: Vec<Option<Expr>>,
     symbols: Vec<String>,
     /// Nodes and references between them.
     size: usize,
     /// The bits of the largest number.
     bits: u64,
+    /// Whether any product has a power of zero.
+    pub(crate) has_powers_of_zero: bool,
     /// Operands that sums and products have been made of, time and again.
     pub(crate) work: usize,
     /// The values of the first nodes at one place, each with the magnitude of what it was summed up from.
     samples: Vec<(f64, f64)>,
     /// What [`Graph::open`] has found.
-    pub(crate) open: HashMap<Expr, Expr>,
+    pub(crate) open: NumberMap<Expr, Expr>,
     /// What [`Graph::residue`] has found.
-    pub(crate) residues: HashMap<Expr, Option<u64>>,
+    pub(crate) residues: NumberMap<Expr, Option<u64>>,
 }
+
+/// A map whose keys are small numbers. Nothing may depend on the order of its entries.
+pub(crate) type NumberMap<K, V> = HashMap<K, V, BuildHasherDefault<NodeHasher>>;
 
 /// Hashes nodes, which are small numbers, by a multiplication each.
 #[derive(Clone, Copy, Debug, Default)]
@@ -214,13 +222,15 @@ impl Graph {
             nodes: Vec::new(),
             depth: Vec::new(),
             index: HashMap::default(),
+            earlier: Vec::new(),
             symbols: Vec::new(),
             size: 0,
             bits: 0,
+            has_powers_of_zero: false,
             work: 0,
             samples: Vec::new(),
-            open: HashMap::new(),
-            residues: HashMap::new(),
+            open: HashMap::default(),
+            residues: HashMap::default(),
         };
         graph.intern(Node::Number(Rational::zero()));
         graph.intern(Node::Number(Rational::one()));
@@ -229,14 +239,22 @@ impl Graph {
 
     /// The handle of `node`; canonical form is the caller's duty.
     pub(crate) fn intern(&mut self, node: Node) -> Expr {
-        if let Some(&expr) = self.index.get(&node) {
-            return expr;
+        let hash = BuildHasherDefault::<NodeHasher>::default().hash_one(&node);
+        let mut known = self.index.get(&hash).copied();
+        while let Some(expr) = known {
+            if *self.node(expr) == node {
+                return expr;
+            }
+            known = self.earlier[expr.0 as usize];
         }
         let expr = Expr(u32::try_from(self.nodes.len()).unwrap_or(u32::MAX));
         let depth = 1 + children(&node).map(|c| self.depth(c)).max().unwrap_or(0);
         self.size += 1 + children(&node).count();
         self.bits = numbers(&node).map(bits).fold(self.bits, u64::max);
-        self.index.insert(node.clone(), expr);
+        // Factors are sorted by their bases, and zero is the first node.
+        self.has_powers_of_zero |=
+            matches!(&node, Node::Product(factors) if factors[0].0 == Graph::ZERO);
+        self.earlier.push(self.index.insert(hash, expr));
         self.nodes.push(node);
         self.depth.push(depth);
         expr

@@ -12,6 +12,9 @@ use std::collections::{BTreeMap, VecDeque};
 /// that one core gets while it also computes, and an addition in a vector register of eight about 0.15 ns.
 const KEPT_NUMBER: usize = 5;
 
+/// A call costs forty additions, so that no program of a field comes to as much.
+const LARGEST_PRICE: usize = 1 << 20;
+
 /// No sum of costs reaches it.
 const FORBIDDEN: usize = usize::MAX / 4;
 
@@ -19,8 +22,24 @@ impl Program {
     /// The values that depend on the position alone and should be kept for each point, for `outputs` that are evaluated
     /// at the same points at many times. All other operations that `outputs` need follow from these, from
     /// time and from parameters.
+    ///
+    /// They are at most `most`, or the coordinates where those are more: where the cheapest choice keeps more, memory
+    /// counts as twice as dear, again and again.
     #[must_use]
-    pub fn kept_at_points(&self, outputs: &[Slot]) -> Vec<Slot> {
+    pub fn kept_at_points(&self, outputs: &[Slot], most: usize) -> Vec<Slot> {
+        let mut price = KEPT_NUMBER;
+        loop {
+            let kept = self.kept_at_price(outputs, price);
+            // Beyond this price all that can be computed anew is.
+            if kept.len() <= most || price > LARGEST_PRICE {
+                return kept;
+            }
+            price *= 2;
+        }
+    }
+
+    /// The cheapest choice where reading one kept number costs `price`.
+    fn kept_at_price(&self, outputs: &[Slot], price: usize) -> Vec<Slot> {
         let needed = self.needed(outputs);
         let of_point = |slot: &Slot| {
             let dependence = self.dependence(*slot);
@@ -41,7 +60,7 @@ impl Program {
                 _ => OperationCount::of(operation).cost(),
             };
             network.edge(source, n, anew);
-            network.edge(n, memory + n, KEPT_NUMBER);
+            network.edge(n, memory + n, price);
             for operand in operation.operands() {
                 if let Some(&operand) = vertex.get(&operand) {
                     network.edge(memory + operand, n, FORBIDDEN);
@@ -195,7 +214,7 @@ mod tests {
     #[test]
     fn a_few_products_are_cheaper_than_numbers_from_memory() {
         let p = program(&["t*sin(x) + t^2*sin(x)*cos(x) + sin(x)*cos(x)^2*cos(t)"]);
-        let kept = p.kept_at_points(p.outputs());
+        let kept = p.kept_at_points(p.outputs(), usize::MAX);
         assert_eq!(kept.len(), 2, "{kept:?}");
         assert!(
             kept.iter().all(|slot| matches!(p.operations()[slot.index()], Operation::Call(..)))
@@ -205,13 +224,28 @@ mod tests {
     #[test]
     fn long_computations_are_kept() {
         let p = program(&["t*(x^2 + 3*x*y + y^2 + 7)^2 + t^2"]);
-        assert_eq!(p.kept_at_points(p.outputs()).len(), 1);
+        assert_eq!(p.kept_at_points(p.outputs(), usize::MAX).len(), 1);
+    }
+
+    #[test]
+    fn no_more_are_kept_than_there_is_room_for() {
+        let texts =
+            ["t*sin(x) + t^2*cos(x) + t^3*exp(x) + t^4*sin(y) + t^5*cos(2*x) + t^6*exp(x*y)"];
+        let p = program(&texts);
+        assert_eq!(p.kept_at_points(p.outputs(), 6).len(), 6);
+        for most in 2..6 {
+            let kept = p.kept_at_points(p.outputs(), most);
+            assert!(kept.len() <= most && !reads_coordinates(&p, &kept), "{most}: {kept:?}");
+        }
+        // Nothing else gives the coordinates.
+        let kept = p.kept_at_points(p.outputs(), 0);
+        assert_eq!(kept.len(), 2);
     }
 
     #[test]
     fn results_that_know_no_time_are_kept() {
         let p = program(&["sin(x)*y", "x*t"]);
-        let kept = p.kept_at_points(p.outputs());
+        let kept = p.kept_at_points(p.outputs(), usize::MAX);
         assert!(kept.contains(&p.outputs()[0]), "{kept:?}");
     }
 
@@ -225,7 +259,7 @@ mod tests {
             &["x*y", "t*x*y + t^2*(x*y + 1)^2"],
         ] {
             let p = program(texts);
-            let found = p.kept_at_points(p.outputs());
+            let found = p.kept_at_points(p.outputs(), usize::MAX);
             let needed = p.needed(p.outputs());
             let here: Vec<Slot> = p
                 .slots()

@@ -53,6 +53,8 @@ pub use cancel::Term;
 pub use derivative::Derivatives;
 pub use graph::{Expr, Function, Graph, Node};
 pub use parse::{Ast, AstKind, ParseError};
-pub use program::{Dependence, Operation, OperationCount, OperationsByStage, Program, Slot};
+pub use program::{
+    Dependence, Drafts, Operation, OperationCount, OperationsByStage, Program, Slot,
+};
 pub use rational::{Rational, nearest_f64};
 pub use reuse::reuse;

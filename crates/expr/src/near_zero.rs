@@ -5,23 +5,24 @@
 //! remainder that is formed from the small quantities themselves, so that `mu/F - mu` becomes `-mu H/(1 + H)`. The
 //! values at zero then cancel in symbols, and what is computed has no large terms.
 
+use crate::graph::NumberMap;
 use crate::{Expr, Function, Graph, Node, Rational};
 use num_traits::{Signed, ToPrimitive};
-use std::collections::{BTreeSet, HashMap};
+use std::collections::BTreeSet;
 
 impl Graph {
     /// `expr` as its value where all of `small` are zero, and a rest that is small with them.
     ///
     /// The two add up to `expr`. Where `expr` has no value at zero, as `ln(x)` at `x = 0`, all of it is the rest.
     pub fn split_at_zero(&mut self, expr: Expr, small: &BTreeSet<Expr>) -> (Expr, Expr) {
-        Splitting { graph: self, small, known: HashMap::new() }.split(expr)
+        Splitting { graph: self, small, known: NumberMap::default() }.split(expr)
     }
 }
 
 struct Splitting<'a> {
     graph: &'a mut Graph,
     small: &'a BTreeSet<Expr>,
-    known: HashMap<Expr, (Expr, Expr)>,
+    known: NumberMap<Expr, (Expr, Expr)>,
 }
 
 impl Splitting<'_> {

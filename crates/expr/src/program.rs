@@ -7,10 +7,10 @@
 
 mod argument;
 
+use crate::graph::NumberMap;
 use crate::log_ratio;
 use crate::{Expr, Function, Graph, Node, Rational, nearest_f64};
 use num_traits::{One, Signed, ToPrimitive, Zero};
-use std::collections::HashMap;
 
 /// The place of a value in a program: the index of the operation that computes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -69,10 +69,9 @@ pub enum Operation {
 
 impl Operation {
     /// The slots that it reads.
-    #[must_use]
-    pub fn operands(&self) -> Vec<Slot> {
-        match *self {
-            Operation::Number(_) | Operation::Pi | Operation::Input(_) => Vec::new(),
+    pub fn operands(&self) -> impl Iterator<Item = Slot> + use<> {
+        let (count, slots) = match *self {
+            Operation::Number(_) | Operation::Pi | Operation::Input(_) => (0, [Slot(0); 2]),
             Operation::Add(a, b)
             | Operation::Sub(a, b)
             | Operation::Mul(a, b)
@@ -80,14 +79,15 @@ impl Operation {
             | Operation::Atan2(a, b)
             | Operation::LnOfBoth(a, b)
             | Operation::SumError(a, b)
-            | Operation::ProductError(a, b) => vec![a, b],
+            | Operation::ProductError(a, b) => (2, [a, b]),
             Operation::Neg(a)
             | Operation::Sqrt(a)
             | Operation::Power(a, _)
             | Operation::SinPi(a)
             | Operation::CosPi(a)
-            | Operation::Call(_, a) => vec![a],
-        }
+            | Operation::Call(_, a) => (1, [a; 2]),
+        };
+        slots.into_iter().take(count)
     }
 
     /// The same operation on the slots that `place` says.
@@ -259,8 +259,8 @@ impl Program {
         let mut lowering = Lowering {
             graph,
             program: Program::default(),
-            interned: HashMap::new(),
-            lowered: HashMap::new(),
+            interned: NumberMap::default(),
+            lowered: NumberMap::default(),
             inputs,
             definitions,
         };
@@ -279,7 +279,12 @@ impl Program {
 
     /// The program without operations that no output needs.
     pub(crate) fn compacted(&self) -> Self {
-        let needed = self.needed(&self.outputs);
+        self.part(&self.outputs)
+    }
+
+    /// The operations that `outputs` need.
+    fn part(&self, outputs: &[Slot]) -> Self {
+        let needed = self.needed(outputs);
         let mut places: Vec<Slot> = Vec::with_capacity(self.operations.len());
         let mut program = Program::default();
         for (index, operation) in self.operations.iter().enumerate() {
@@ -289,7 +294,7 @@ impl Program {
                 program.dependence.push(self.dependence[index]);
             }
         }
-        program.outputs = self.outputs.iter().map(|slot| places[slot.index()]).collect();
+        program.outputs = outputs.iter().map(|slot| places[slot.index()]).collect();
         let number = |operation: &Operation| match operation {
             Operation::Number(value) => nearest_f64(value),
             _ => 0.0,
@@ -358,47 +363,87 @@ impl Program {
         stages.time.cost() + stages.point.cost() + stages.both.cost()
     }
 
-    /// Bounds, to first order, of the rounding errors of the outputs, in units of the rounding error of one operation.
+    /// Bounds, to first order, of the rounding errors of the outputs, in units of the rounding error of one operation: at
+    /// each of `places`, which give the values of the inputs, the bounds of all outputs.
     ///
     /// Inputs count as exact. Running error analysis: every operation adds its own rounding to what its operands
-    /// carry, and nothing cancels.
-    pub(crate) fn error_bounds(&self, inputs: &[f64]) -> Vec<f64> {
-        let values = self.values(inputs);
-        let mut errors: Vec<f64> = Vec::with_capacity(self.operations.len());
-        for (operation, &value) in self.operations.iter().zip(&values) {
-            let (at, error) =
-                (|slot: Slot| values[slot.index()], |slot: Slot| errors[slot.index()]);
-            // The derivative of a function by a difference: its accuracy does not matter.
-            let slope = |a: Slot| {
-                let step = 1e-6 * (1e-3 + at(a).abs());
-                let moved = operation
-                    .value(inputs, |slot| if slot == a { at(slot) + step } else { at(slot) });
-                ((moved - value) / step).abs()
+    /// carry, and nothing cancels. All places go through one operation after another, side by side.
+    pub(crate) fn error_bounds(&self, places: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let count = places.len();
+        let mut values: Vec<f64> = Vec::with_capacity(count * self.operations.len());
+        let mut errors: Vec<f64> = Vec::with_capacity(count * self.operations.len());
+        // Those of the operation in hand.
+        let (mut own, mut bound) = (vec![0.0; count], vec![0.0; count]);
+        for (operation, &number) in self.operations.iter().zip(&self.numbers) {
+            // Values and errors of an operand at all places.
+            let known = |slot: Slot| {
+                let row = slot.index() * count..(slot.index() + 1) * count;
+                values[row.clone()].iter().zip(&errors[row])
             };
-            let carried = match *operation {
-                Operation::Number(_) | Operation::Pi | Operation::Input(_) => 0.0,
-                // What they correct stays in the bound, so they add nothing.
-                Operation::SumError(..) | Operation::ProductError(..) => 0.0,
-                Operation::Add(a, b) | Operation::Sub(a, b) => error(a) + error(b),
-                Operation::Mul(a, b) => error(a) * at(b).abs() + error(b) * at(a).abs(),
-                Operation::Div(a, b) => (error(a) + error(b) * value.abs()) / at(b).abs(),
-                Operation::Neg(a) => error(a),
-                Operation::Atan2(a, b) | Operation::LnOfBoth(a, b) => {
-                    error(a) * slope(a) + error(b) * slope(b)
+            let results = own.iter_mut().zip(&mut bound);
+            match *operation {
+                Operation::Number(_) => results.for_each(|(y, e)| (*y, *e) = (number, 0.0)),
+                Operation::Input(index) => results.zip(places).for_each(|((y, e), place)| {
+                    (*y, *e) = (place.get(index).copied().unwrap_or(f64::NAN), 0.0);
+                }),
+                Operation::Neg(a) => {
+                    results.zip(known(a)).for_each(|((y, e), (a, ea))| (*y, *e) = (-a, *ea));
                 }
-                Operation::Sqrt(a)
-                | Operation::Power(a, _)
-                | Operation::SinPi(a)
-                | Operation::CosPi(a)
-                | Operation::Call(_, a) => error(a) * slope(a),
-            };
-            let own = match operation {
-                Operation::Number(_) | Operation::Input(_) | Operation::Neg(_) => 0.0,
-                _ => value.abs(),
-            };
-            errors.push(carried + own);
+                Operation::Add(a, b) => {
+                    for ((y, e), ((a, ea), (b, eb))) in results.zip(known(a).zip(known(b))) {
+                        *y = a + b;
+                        *e = ea + eb + y.abs();
+                    }
+                }
+                Operation::Sub(a, b) => {
+                    for ((y, e), ((a, ea), (b, eb))) in results.zip(known(a).zip(known(b))) {
+                        *y = a - b;
+                        *e = ea + eb + y.abs();
+                    }
+                }
+                Operation::Mul(a, b) => {
+                    for ((y, e), ((a, ea), (b, eb))) in results.zip(known(a).zip(known(b))) {
+                        *y = a * b;
+                        *e = ea * b.abs() + eb * a.abs() + y.abs();
+                    }
+                }
+                Operation::Div(a, b) => {
+                    for ((y, e), ((a, ea), (b, eb))) in results.zip(known(a).zip(known(b))) {
+                        *y = a / b;
+                        *e = (ea + eb * y.abs()) / b.abs() + y.abs();
+                    }
+                }
+                _ => {
+                    for (place, (y, e)) in results.enumerate() {
+                        let at = |slot: Slot| values[slot.index() * count + place];
+                        let value = operation.value(&[], at);
+                        // The derivative of a function by a difference: its accuracy does not matter.
+                        let slope = |a: Slot| {
+                            let step = 1e-6 * (1e-3 + at(a).abs());
+                            let moved = operation.value(&[], |slot| {
+                                if slot == a { at(slot) + step } else { at(slot) }
+                            });
+                            ((moved - value) / step).abs()
+                        };
+                        let carried = match operation {
+                            // What they correct stays in the bound, so they add nothing.
+                            Operation::SumError(..) | Operation::ProductError(..) => 0.0,
+                            _ => operation
+                                .operands()
+                                .map(|a| errors[a.index() * count + place] * slope(a))
+                                .sum(),
+                        };
+                        (*y, *e) = (value, carried + value.abs());
+                    }
+                }
+            }
+            values.extend_from_slice(&own);
+            errors.extend_from_slice(&bound);
         }
-        self.outputs.iter().map(|slot| errors[slot.index()]).collect()
+        let of_place = |place: usize| {
+            self.outputs.iter().map(|slot| errors[slot.index() * count + place]).collect()
+        };
+        (0..count).map(of_place).collect()
     }
 
     /// The outputs at the given input values, in double precision.
@@ -462,11 +507,38 @@ fn call(function: Function, x: f64) -> f64 {
     }
 }
 
+/// Programs of expressions that are tried and compared, of one graph with one set of inputs and definitions: what they have in
+/// common is lowered once.
+#[derive(Debug, Default)]
+pub struct Drafts {
+    program: Program,
+    interned: NumberMap<Operation, Slot>,
+    lowered: NumberMap<Expr, Slot>,
+}
+
+impl Drafts {
+    /// As [`Program::lower`], but for the order of the operations.
+    pub(crate) fn lower(
+        &mut self,
+        graph: &mut Graph,
+        inputs: &[(Expr, Dependence)],
+        definitions: &[(Expr, Expr)],
+        outputs: &[Expr],
+    ) -> Program {
+        let Drafts { program, interned, lowered } = std::mem::take(self);
+        let mut lowering = Lowering { graph, program, interned, lowered, inputs, definitions };
+        let slots: Vec<Slot> = outputs.iter().map(|&output| lowering.lower(output)).collect();
+        let Lowering { program, interned, lowered, .. } = lowering;
+        *self = Drafts { program, interned, lowered };
+        self.program.part(&slots).with_shared_reciprocals()
+    }
+}
+
 struct Lowering<'a> {
     graph: &'a mut Graph,
     program: Program,
-    interned: HashMap<Operation, Slot>,
-    lowered: HashMap<Expr, Slot>,
+    interned: NumberMap<Operation, Slot>,
+    lowered: NumberMap<Expr, Slot>,
     inputs: &'a [(Expr, Dependence)],
     definitions: &'a [(Expr, Expr)],
 }
@@ -501,8 +573,7 @@ impl Lowering<'_> {
             }
             _ => operation
                 .operands()
-                .iter()
-                .map(|&slot| self.program.dependence(slot))
+                .map(|slot| self.program.dependence(slot))
                 .fold(Dependence::default(), Dependence::join),
         };
         let slot = Slot::at(self.program.operations.len());
@@ -663,7 +734,7 @@ impl Lowering<'_> {
             let mut rests = Vec::new();
             let mut others = Vec::new();
             for (term, coefficient) in single {
-                if self.factors(term).contains(&factor) {
+                if self.has_factor(term, &factor) {
                     let inverse = (factor.0, -factor.1.clone());
                     let rest = self.graph.product([(term, Rational::one()), inverse]);
                     rests.push((coefficient, rest));
@@ -706,6 +777,13 @@ impl Lowering<'_> {
         }
         let most = counts.iter().map(|(_, count)| *count).max().filter(|&count| count > 1)?;
         counts.into_iter().find(|(_, count)| *count == most).map(|(factor, _)| factor)
+    }
+
+    fn has_factor(&self, term: Expr, factor: &(Expr, Rational)) -> bool {
+        match self.graph.node(term) {
+            Node::Product(factors) => factors.contains(factor),
+            _ => term == factor.0 && factor.1.is_one(),
+        }
     }
 
     fn factors(&self, term: Expr) -> Vec<(Expr, Rational)> {

@@ -5,6 +5,7 @@ use num_rational::BigRational;
 use num_traits::{Num, One, Pow, Signed, ToPrimitive, Zero};
 use std::cmp::Ordering;
 use std::fmt;
+use std::hash::{Hash, Hasher};
 use std::iter::Sum;
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Rem, Sub, SubAssign};
 
@@ -16,12 +17,22 @@ use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Rem, Sub, Su
 pub struct Rational(Value);
 
 /// Numerator and positive denominator, without a common factor. What fits is small, so that equal numbers look alike.
-#[derive(Clone, PartialEq, Eq, Hash)]
+#[derive(Clone, PartialEq, Eq)]
 enum Value {
     Small(i64, i64),
     Big(Box<BigRational>),
 }
 use Value::{Big, Small};
+
+impl Hash for Value {
+    /// One word for what is small: all nodes of a graph are found by their hashes.
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        match self {
+            Small(n, d) => state.write_i64(n ^ d.rotate_left(32)),
+            Big(value) => value.hash(state),
+        }
+    }
+}
 
 impl Rational {
     /// `numerator / denominator`, reduced.

@@ -5,10 +5,11 @@
 //! formed, and the quotients become products with its powers. Each such product carries one rounding more than the
 //! quotient had, the same for small and for large values.
 
+use crate::graph::NumberMap;
 use crate::{Dependence, Operation, Program, Rational, Slot};
 use num_integer::Integer;
 use num_traits::One;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 /// A quantity and the power of it that some slot holds.
 type Power = (Slot, u32);
@@ -141,7 +142,7 @@ impl Program {
 struct Builder {
     operations: Vec<Operation>,
     dependence: Vec<Dependence>,
-    known: HashMap<Operation, Slot>,
+    known: NumberMap<Operation, Slot>,
 }
 
 impl Builder {

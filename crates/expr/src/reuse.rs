@@ -6,7 +6,7 @@
 //! number of operations of a single evaluation. (It mixes rates of change, so it is not for evaluation in stages.)
 
 use crate::arrange::as_accurate;
-use crate::{Dependence, Expr, Graph, Node, Program, Rational};
+use crate::{Dependence, Drafts, Expr, Graph, Node, Rational};
 use num_traits::{One, Signed, ToPrimitive};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,12 +15,14 @@ const MOST_PRODUCTS: usize = 400;
 
 /// `outputs` in forms of the same value that cost less in all, where there are such.
 ///
-/// `inputs` and `definitions` are those of [`Program::lower`], which the result is meant for.
+/// `inputs` and `definitions` are those of [`Program::lower`], which the result is meant for; `drafts` may have served
+/// with the same ones before.
 #[must_use]
 pub fn reuse(
     graph: &mut Graph,
     inputs: &[(Expr, Dependence)],
     definitions: &[(Expr, Expr)],
+    drafts: &mut Drafts,
     outputs: &[Expr],
 ) -> Vec<Expr> {
     let mut variables: BTreeSet<Expr> =
@@ -33,8 +35,8 @@ pub fn reuse(
     if candidate == outputs {
         return candidate;
     }
-    let before = Program::lower(graph, inputs, definitions, outputs);
-    let after = Program::lower(graph, inputs, definitions, &candidate);
+    let before = drafts.lower(graph, inputs, definitions, outputs);
+    let after = drafts.lower(graph, inputs, definitions, &candidate);
     if after.cost() < before.cost() && as_accurate(&before, &after, inputs.len()) {
         candidate
     } else {

@@ -1,7 +1,7 @@
 //! Properties of the algebra: whatever the expression, printing reads back, canonical form keeps the value, and
 //! derivatives agree with differences.
 
-use mmsmith_expr::{Ast, Dependence, Derivatives, Expr, Graph, Program};
+use mmsmith_expr::{Ast, Dependence, Derivatives, Expr, Graph, Program, Rational};
 use proptest::prelude::*;
 
 /// Expressions in `x` and `y` that are defined for `x` and `y` in [0.6, 1.4].
@@ -146,5 +146,34 @@ proptest! {
             let mut graph = Graph::new();
             let _ = graph.build(&ast, &mut |g, name| Ok(g.symbol(name)));
         }
+    }
+}
+
+/// Sums and products collect few operands in another way than many: the order in which they come must not matter to either,
+/// nor to what goes over from one way to the other and back.
+#[test]
+fn many_operands_in_any_order() {
+    let mut graph = Graph::new();
+    let symbols: Vec<Expr> = (0..300).map(|n| graph.symbol(&format!("x{n}"))).collect();
+    let one = || Rational::from_integer(1.into());
+    for count in [3, 63, 64, 65, 66, 300] {
+        let forth: Vec<Expr> = symbols[..count].to_vec();
+        let back: Vec<Expr> = forth.iter().rev().copied().collect();
+        let mixed: Vec<Expr> = (0..count).map(|n| symbols[n * 7 % count]).collect();
+        let sum = graph.sum_of(forth.clone());
+        assert_eq!(graph.sum_of(back.clone()), sum, "{count}");
+        let product = graph.product_of(forth.clone());
+        assert_eq!(graph.product_of(back), product, "{count}");
+        if count % 7 != 0 {
+            assert_eq!(graph.sum_of(mixed.clone()), sum, "{count}");
+            assert_eq!(graph.product_of(mixed.clone()), product, "{count}");
+        }
+        // All but the first are taken away again, one by one.
+        let terms =
+            forth.iter().map(|x| (one(), *x)).chain(forth[1..].iter().map(|x| (-one(), *x)));
+        assert_eq!(graph.sum(terms.collect::<Vec<_>>()), forth[0]);
+        let factors =
+            forth.iter().map(|x| (*x, one())).chain(forth[1..].iter().map(|x| (*x, -one())));
+        assert_eq!(graph.product(factors.collect::<Vec<_>>()), forth[0]);
     }
 }

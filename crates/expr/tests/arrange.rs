@@ -1,6 +1,6 @@
 //! Arranging expressions in stages keeps their values and saves divisions.
 
-use mmsmith_expr::{Ast, Dependence, Expr, Graph, Program, arrange};
+use mmsmith_expr::{Ast, Dependence, Drafts, Expr, Graph, Program, arrange};
 use proptest::prelude::*;
 
 const POSITION: Dependence = Dependence { position: true, time: false };
@@ -27,7 +27,8 @@ fn case(text: &str) -> Case {
 
 impl Case {
     fn programs(&mut self) -> (Program, Program) {
-        let arranged = arrange(&mut self.graph, &self.inputs, &[], &[self.expr]);
+        let arranged =
+            arrange(&mut self.graph, &self.inputs, &[], &mut Drafts::default(), &[self.expr]);
         (
             Program::lower(&mut self.graph, &self.inputs, &[], &[self.expr]),
             Program::lower(&mut self.graph, &self.inputs, &[], &arranged),
@@ -158,7 +159,8 @@ fn products_within_products_are_used() {
     let over = case.graph.mul(one_more, x);
     let quotient = case.graph.div(square, over);
     let outputs = [quotient, one_more];
-    let reused = mmsmith_expr::reuse(&mut case.graph, &case.inputs, &[], &outputs);
+    let reused =
+        mmsmith_expr::reuse(&mut case.graph, &case.inputs, &[], &mut Drafts::default(), &outputs);
     assert_ne!(reused, outputs);
     let total = |graph: &mut Graph, outputs: &[Expr]| {
         let program = Program::lower(graph, &case.inputs, &[], outputs);

@@ -41,7 +41,7 @@ pub(crate) fn determinant<T: RealField + Copy, const D: usize>(F: &SMatrix<T, D,
 }
 
 /// `F^-T`, the cofactors over the determinant `J`, which must not be zero.
-#[inline]
+#[inline(always)]
 pub(crate) fn inverse_transpose<T: RealField + Copy, const D: usize>(
     F: &SMatrix<T, D, D>,
     J: T,
@@ -59,7 +59,7 @@ pub(crate) fn inverse_transpose<T: RealField + Copy, const D: usize>(
 }
 
 /// `F^-T - I`, without cancellation at small strain; `det F` must not be zero.
-#[inline]
+#[inline(always)]
 pub(crate) fn inverse_transpose_minus_identity<T: RealField + Copy, const D: usize>(
     F: &SMatrix<T, D, D>,
 ) -> SMatrix<T, D, D> {

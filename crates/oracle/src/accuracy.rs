@@ -3,7 +3,7 @@
 use crate::{
     Class, Oracle, OracleError, Point, Sampler, Sensitivity, exact, scientific, worst_factor,
 };
-use mmsmith_expr::{Expr, Program, Rational, arrange};
+use mmsmith_expr::{Drafts, Expr, Program, Rational, arrange};
 use mmsmith_spec::{Fields, Spec};
 use rayon::prelude::*;
 use thiserror::Error;
@@ -53,7 +53,7 @@ pub enum AccuracyError {
 /// The worst factor of one field in one class.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Worst {
-    /// The letter of the field, `b staged` for the staged body force.
+    /// The letter of the field; `b staged` and the like for those by way of stages.
     pub field: &'static str,
     /// The entry, row by row from 0.
     pub entry: usize,
@@ -142,7 +142,8 @@ impl<'a> Accuracy<'a> {
             .iter()
             .map(|(letter, expressions)| (*letter, fields.program(expressions)))
             .collect();
-        let staged = arrange(&mut fields.graph, &fields.inputs, &fields.definitions, &fields.b);
+        let (inputs, definitions, b) = (&fields.inputs, &fields.definitions, &fields.b);
+        let staged = arrange(&mut fields.graph, inputs, definitions, &mut Drafts::default(), b);
         programs.retain(|(letter, _)| *letter != "b staged");
         programs.push(("b staged", fields.program(&staged)));
         programs
@@ -377,5 +378,9 @@ fn by_letter(fields: &Fields) -> Vec<(&'static str, Vec<Expr>)> {
         ("P", fields.P.concat()),
         ("b", fields.b.clone()),
         ("b staged", fields.b.clone()),
+        ("u staged", fields.u.clone()),
+        ("v staged", fields.v.clone()),
+        ("F staged", fields.F.concat()),
+        ("P staged", fields.P.concat()),
     ]
 }

@@ -50,7 +50,9 @@ fn every_specification_in_every_class() {
     let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().path()).collect();
     files.sort();
     let mut failures = Vec::new();
-    println!("specification, way, class: K of u, v, a, H, F, J, P, b, b staged");
+    println!(
+        "specification, way, class: K of u, v, a, H, F, J, P, b, and of b, u, v, F, P in stages"
+    );
     for file in files.iter().filter(|f| f.extension().is_some_and(|e| e == "toml")) {
         let text = std::fs::read_to_string(file).unwrap();
         let spec = match Spec::parse(&text, &file.display().to_string()) {

@@ -29,4 +29,7 @@ pub use nalgebra;
 pub use parameters::{Description, Parameter, ParameterError};
 pub use real::Real;
 pub use solution::{AnySolution, Fields, Material, Solution};
-pub use staged::{BLOCK, BodyForceAtPoints, BodyForceStages, StagedPoints};
+pub use staged::{
+    BLOCK, BodyForceAtPoints, BodyForceStages, StagedPoints, StagedStates, State, StateAtPoints,
+    StateRun, StateStages,
+};

@@ -1,7 +1,7 @@
 //! What every manufactured solution can do.
 
 use crate::staged::PlainPoints;
-use crate::{BodyForceAtPoints, Boundary, Domain, Real, Surface};
+use crate::{BLOCK, BodyForceAtPoints, Boundary, Domain, Real, StateAtPoints, StateRun, Surface};
 use nalgebra::{SMatrix, SVector};
 
 /// The constitutive law of a solution, with its constants; what a solver needs to model the same material.
@@ -97,6 +97,11 @@ pub trait Solution<T: Real, const D: usize>: Send + Sync {
     fn body_force_at(&self, X: &[SVector<T, D>]) -> Box<dyn BodyForceAtPoints<T, D> + '_> {
         Box::new(PlainPoints { solution: self, X: X.to_vec() })
     }
+    /// What a simulation is compared with at many fixed points, prepared as [`Solution::body_force_at`] prepares the body
+    /// force: displacement, deformation gradient and stress at one time, and the velocity at another.
+    fn state_at(&self, X: &[SVector<T, D>]) -> Box<dyn StateAtPoints<T, D> + '_> {
+        Box::new(PlainPoints { solution: self, X: X.to_vec() })
+    }
     /// Strain energy per reference volume; `None` unless the specification gives the material by its energy.
     fn strain_energy(&self, _X: &SVector<T, D>, _t: T) -> Option<T> {
         None
@@ -142,7 +147,8 @@ pub enum AnySolution<T: Real> {
 
 impl AnySolution<f64> {
     /// Every field at position `X` and time `t`, each by its own function, with its letter and its entries row by row;
-    /// last, as `b staged`, the body force by way of [`Solution::body_force_at`].
+    /// last, as `b staged`, the body force by way of [`Solution::body_force_at`], and as `u staged`, `v staged`, `F staged` and
+    /// `P staged` the fields of [`Solution::state_at`].
     ///
     /// `None` where `X` has not as many coordinates as the solution has dimensions.
     #[must_use]
@@ -165,6 +171,11 @@ fn each_field<const D: usize>(
     let matrix = |A: SMatrix<f64, D, D>| A.transpose().iter().copied().collect();
     let mut staged = [SVector::zeros()];
     solution.body_force_at(&[*X]).evaluate(t, 0, &mut staged);
+    let mut run = [StateRun::zero()];
+    solution.state_at(&[*X]).evaluate(t, t, 0, &mut run);
+    let [run] = run;
+    let first = |rows: [[f64; BLOCK]; D]| rows.map(|row| row[0]).to_vec();
+    let firsts = |rows: [[[f64; BLOCK]; D]; D]| rows.map(first).concat();
     Some(vec![
         ("u", vector(solution.displacement(X, t))),
         ("v", vector(solution.velocity(X, t))),
@@ -175,5 +186,9 @@ fn each_field<const D: usize>(
         ("P", matrix(solution.first_piola_kirchhoff(X, t))),
         ("b", vector(solution.body_force(X, t))),
         ("b staged", vector(staged[0])),
+        ("u staged", first(run.u)),
+        ("v staged", first(run.v)),
+        ("F staged", firsts(run.F)),
+        ("P staged", firsts(run.P)),
     ])
 }

@@ -1,11 +1,12 @@
-//! The body force at points that stay while time goes on.
+//! Fields at points that stay while time goes on.
 //!
-//! A solver samples `b` at the same reference positions in every step. What depends on the position alone, such as the
-//! sines of `pi X` or the profile of a displacement over the radius, is computed once and kept; what depends on the time
-//! alone is computed once a call; what is left for each point and time is short, and many points go through it at once.
+//! A solver samples `b` at the same reference positions in every step, and is compared with `u`, `v`, `F` and `P` there.
+//! What depends on the position alone, such as the sines of `pi X` or the profile of a displacement over the radius, is
+//! computed once and kept; what depends on the time alone is computed once a call; what is left for each point and time
+//! is short, and many points go through it at once.
 
 use crate::{Real, Solution};
-use nalgebra::SVector;
+use nalgebra::{SMatrix, SVector};
 use pulp::{Arch, Simd, WithSimd};
 use std::array;
 
@@ -34,6 +35,81 @@ pub trait BodyForceAtPoints<T: Real, const D: usize>: Send + Sync {
     fn bytes_per_point(&self) -> usize;
 }
 
+/// What a simulation is compared with at many fixed points, as [`Solution::state_at`] prepares it.
+pub trait StateAtPoints<T: Real, const D: usize>: Send + Sync {
+    /// Writes `u`, `F` and `P` at time `t`, and `v` at `velocity_time`, of the points from `BLOCK first` on. What a last run
+    /// has to spare repeats the last point.
+    ///
+    /// The values are those of the functions of [`Solution`], to the last bit.
+    ///
+    /// # Panics
+    ///
+    /// Panics where there are fewer than `first + runs.len()` runs of [`BLOCK`] points, the last one begun.
+    fn evaluate(&self, t: T, velocity_time: T, first: usize, runs: &mut [StateRun<T, D>]);
+
+    /// The memory that each point takes, in bytes.
+    fn bytes_per_point(&self) -> usize;
+}
+
+/// What a simulation is compared with, at one point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct State<T: Real, const D: usize> {
+    /// Displacement, a length.
+    pub u: SVector<T, D>,
+    /// Velocity, which schemes may store at a time of its own.
+    pub v: SVector<T, D>,
+    /// Deformation gradient.
+    pub F: SMatrix<T, D, D>,
+    /// First Piola-Kirchhoff stress.
+    pub P: SMatrix<T, D, D>,
+}
+
+/// The [`State`]s of [`BLOCK`] points, each component in one run: `F[i][J][n]` is `F_iJ` of point `n`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StateRun<T, const D: usize> {
+    /// Displacements.
+    pub u: [[T; BLOCK]; D],
+    /// Velocities.
+    pub v: [[T; BLOCK]; D],
+    /// Deformation gradients.
+    pub F: [[[T; BLOCK]; D]; D],
+    /// First Piola-Kirchhoff stresses.
+    pub P: [[[T; BLOCK]; D]; D],
+}
+
+impl<T: Real, const D: usize> StateRun<T, D> {
+    /// All components zero.
+    #[must_use]
+    #[inline(always)]
+    pub fn zero() -> Self {
+        let (vector, matrix) = ([[T::zero(); BLOCK]; D], [[[T::zero(); BLOCK]; D]; D]);
+        Self { u: vector, v: vector, F: matrix, P: matrix }
+    }
+
+    /// The state of point `n` of the run.
+    #[must_use]
+    pub fn get(&self, n: usize) -> State<T, D> {
+        State {
+            u: SVector::from_fn(|i, _| self.u[i][n]),
+            v: SVector::from_fn(|i, _| self.v[i][n]),
+            F: SMatrix::from_fn(|i, j| self.F[i][j][n]),
+            P: SMatrix::from_fn(|i, j| self.P[i][j][n]),
+        }
+    }
+
+    #[inline(always)]
+    fn put(&mut self, n: usize, state: &State<T, D>) {
+        for i in 0..D {
+            self.u[i][n] = state.u[i];
+            self.v[i][n] = state.v[i];
+            for j in 0..D {
+                self.F[i][j][n] = state.F[(i, j)];
+                self.P[i][j][n] = state.P[(i, j)];
+            }
+        }
+    }
+}
+
 /// The body force in three stages: what `TIME` values it needs of the time alone, what `POINT` values of the point
 /// alone, and how it follows from both. Every generated solution has them.
 ///
@@ -59,16 +135,64 @@ pub trait BodyForceStages<T: Real, const D: usize, const TIME: usize, const POIN
     fn body_force_staged(&self, time: &[T; TIME], point: &[T; POINT]) -> SVector<T, D>;
 }
 
+/// What a simulation is compared with, in stages: what `TIME` values it needs of the time alone, what `VELOCITY_TIME` values
+/// the velocity needs of its own time, what `POINT` values they need of the point alone, and how they follow from these.
+/// Every generated solution has them.
+pub trait StateStages<
+    T: Real,
+    const D: usize,
+    const TIME: usize,
+    const VELOCITY_TIME: usize,
+    const POINT: usize,
+>: Solution<T, D>
+{
+    /// What displacement, deformation gradient and stress need of the time alone.
+    fn state_time(&self, t: T) -> [T; TIME];
+    /// What the velocity needs of the time alone.
+    fn velocity_time(&self, t: T) -> [T; VELOCITY_TIME];
+    /// What depends on the reference position alone.
+    fn state_point(&self, X: &SVector<T, D>) -> [T; POINT];
+    /// The fields from the values of their times and of one point; those of [`Solution`]'s functions, to the last bit.
+    fn state_staged(
+        &self,
+        time: &[T; TIME],
+        velocity_time: &[T; VELOCITY_TIME],
+        point: &[T; POINT],
+    ) -> State<T, D>;
+}
+
 /// Points that are evaluated together. Each of the values kept for them is one run of this length, so that a run of
 /// points fills the vector registers of any processor, and is no longer than the two cache lines that are read at once:
 /// blocks come from memory in the order in which they lie there.
 pub const BLOCK: usize = 16;
 
-/// The values kept for the points of a generated solution, in blocks.
+/// The values kept for points, in blocks: `blocks[n][m][i]` is value `m` of point `n BLOCK + i`. What a last block has to
+/// spare repeats its last point.
+type Blocks<T, const POINT: usize> = Vec<[[T; BLOCK]; POINT]>;
+
+/// What `values` gives for each of the points `X`.
+fn blocks<T: Real, const D: usize, const POINT: usize>(
+    X: &[SVector<T, D>],
+    values: impl Fn(&SVector<T, D>) -> [T; POINT],
+) -> Blocks<T, POINT> {
+    let block = |points: &[SVector<T, D>]| {
+        let mut block = [[T::zero(); BLOCK]; POINT];
+        for (i, X) in points.iter().enumerate() {
+            block.iter_mut().zip(values(X)).for_each(|(run, value)| run[i] = value);
+        }
+        for run in &mut block {
+            let last = run[points.len() - 1];
+            run[points.len()..].fill(last);
+        }
+        block
+    };
+    X.chunks(BLOCK).map(block).collect()
+}
+
+/// What the body force of a generated solution keeps of points.
 pub struct StagedPoints<S, T, const TIME: usize, const POINT: usize> {
     solution: S,
-    /// `blocks[n][m][i]`: value `m` of point `n BLOCK + i`. What a last block has to spare repeats its last point.
-    blocks: Vec<[[T; BLOCK]; POINT]>,
+    blocks: Blocks<T, POINT>,
     len: usize,
 }
 
@@ -79,22 +203,28 @@ impl<S, T: Real, const TIME: usize, const POINT: usize> StagedPoints<S, T, TIME,
     where
         S: BodyForceStages<T, D, TIME, POINT>,
     {
-        let blocks = X
-            .chunks(BLOCK)
-            .map(|points| {
-                let mut block = [[T::zero(); BLOCK]; POINT];
-                for (i, X) in points.iter().enumerate() {
-                    let values = solution.body_force_point(X);
-                    block.iter_mut().zip(values).for_each(|(run, value)| run[i] = value);
-                }
-                for run in &mut block {
-                    let last = run[points.len() - 1];
-                    run[points.len()..].fill(last);
-                }
-                block
-            })
-            .collect();
+        let blocks = blocks(X, |X| solution.body_force_point(X));
         StagedPoints { solution, blocks, len: X.len() }
+    }
+}
+
+/// What the states of a generated solution keep of points.
+pub struct StagedStates<S, T, const TIME: usize, const VELOCITY_TIME: usize, const POINT: usize> {
+    solution: S,
+    blocks: Blocks<T, POINT>,
+}
+
+impl<S, T: Real, const TIME: usize, const VELOCITY_TIME: usize, const POINT: usize>
+    StagedStates<S, T, TIME, VELOCITY_TIME, POINT>
+{
+    /// Computes what depends on the points `X` alone.
+    #[must_use]
+    pub fn new<const D: usize>(solution: S, X: &[SVector<T, D>]) -> Self
+    where
+        S: StateStages<T, D, TIME, VELOCITY_TIME, POINT>,
+    {
+        let blocks = blocks(X, |X| solution.state_point(X));
+        StagedStates { solution, blocks }
     }
 }
 
@@ -184,6 +314,70 @@ where
     }
 }
 
+/// As [`WholeBlocks`].
+struct BlocksOfStates<
+    'a,
+    S,
+    T: Real,
+    const D: usize,
+    const TIME: usize,
+    const VELOCITY_TIME: usize,
+    const POINT: usize,
+> {
+    solution: &'a S,
+    time: &'a [T; TIME],
+    velocity_time: &'a [T; VELOCITY_TIME],
+    blocks: &'a [[[T; BLOCK]; POINT]],
+    runs: &'a mut [StateRun<T, D>],
+}
+
+impl<S, T: Real, const D: usize, const TIME: usize, const VELOCITY_TIME: usize, const POINT: usize>
+    WithSimd for BlocksOfStates<'_, S, T, D, TIME, VELOCITY_TIME, POINT>
+where
+    S: StateStages<T, D, TIME, VELOCITY_TIME, POINT>,
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<I: Simd>(self, _: I) {
+        let Self { solution, time, velocity_time, blocks, runs } = self;
+        for (block, run) in blocks.iter().zip(runs) {
+            fill(block, run, |point| solution.state_staged(time, velocity_time, point));
+        }
+    }
+}
+
+impl<S, T: Real, const D: usize, const TIME: usize, const VELOCITY_TIME: usize, const POINT: usize>
+    StateAtPoints<T, D> for StagedStates<S, T, TIME, VELOCITY_TIME, POINT>
+where
+    S: StateStages<T, D, TIME, VELOCITY_TIME, POINT>,
+{
+    fn evaluate(&self, t: T, velocity_time: T, first: usize, runs: &mut [StateRun<T, D>]) {
+        let blocks = &self.blocks[first..first + runs.len()];
+        let time = self.solution.state_time(t);
+        let velocity_time = self.solution.velocity_time(velocity_time);
+        let (time, velocity_time) = (&time, &velocity_time);
+        let solution = &self.solution;
+        Arch::new().dispatch(BlocksOfStates { solution, time, velocity_time, blocks, runs });
+    }
+
+    fn bytes_per_point(&self) -> usize {
+        POINT * size_of::<T>()
+    }
+}
+
+/// As a function of its own, which tells the compiler that `block` and `run` are in different places.
+#[inline(always)]
+fn fill<T: Real, const D: usize, const POINT: usize>(
+    block: &[[T; BLOCK]; POINT],
+    run: &mut StateRun<T, D>,
+    state: impl Fn(&[T; POINT]) -> State<T, D>,
+) {
+    for n in 0..BLOCK {
+        run.put(n, &state(&point(block, n)));
+    }
+}
+
 /// The positions of points, for solutions that keep nothing else.
 pub(crate) struct PlainPoints<'a, S: ?Sized, T, const D: usize> {
     pub(crate) solution: &'a S,
@@ -201,6 +395,32 @@ where
 
     fn len(&self) -> usize {
         self.X.len()
+    }
+
+    fn bytes_per_point(&self) -> usize {
+        size_of::<SVector<T, D>>()
+    }
+}
+
+impl<S, T: Real, const D: usize> StateAtPoints<T, D> for PlainPoints<'_, S, T, D>
+where
+    S: Solution<T, D> + ?Sized,
+{
+    fn evaluate(&self, t: T, velocity_time: T, first: usize, runs: &mut [StateRun<T, D>]) {
+        let blocks = self.X.chunks(BLOCK).skip(first);
+        assert!(blocks.len() >= runs.len(), "there are {} points", self.X.len());
+        for (X, run) in blocks.zip(runs) {
+            for n in 0..BLOCK {
+                let X = &X[n.min(X.len() - 1)];
+                let state = State {
+                    u: self.solution.displacement(X, t),
+                    v: self.solution.velocity(X, velocity_time),
+                    F: self.solution.deformation_gradient(X, t),
+                    P: self.solution.first_piola_kirchhoff(X, t),
+                };
+                run.put(n, &state);
+            }
+        }
     }
 
     fn bytes_per_point(&self) -> usize {

@@ -1,10 +1,10 @@
-//! The body force at kept points: the same to the last bit in whatever runs it is evaluated, and that of single calls but
-//! for rounding.
+//! Fields at kept points. The body force is the same to the last bit in whatever runs it is evaluated, and that of single
+//! calls but for rounding; states are those of single calls to the last bit.
 
 #![allow(clippy::unwrap_used)]
 
 use mmsmith_solutions::nalgebra::SVector;
-use mmsmith_solutions::{AnySolution, BLOCK, CATALOGUE, Real, Solution, build};
+use mmsmith_solutions::{AnySolution, BLOCK, CATALOGUE, Real, Solution, State, StateRun, build};
 
 /// Points in the unit cube, off its faces; a body force is defined there for every solution.
 fn points<T: Real, const D: usize>(count: usize) -> Vec<SVector<T, D>> {
@@ -56,13 +56,51 @@ fn compare<T: Real, const D: usize>(name: &str, solution: &dyn Solution<T, D>) {
     }
 }
 
+fn compare_states<T: Real, const D: usize>(name: &str, solution: &dyn Solution<T, D>) {
+    let bits = |values: &[T]| values.iter().map(|x| x.to_f64().to_bits()).collect::<Vec<_>>();
+    for count in [1, BLOCK, 3 * BLOCK + 5] {
+        let X = points::<T, D>(count);
+        let (kept, blocks) = (solution.state_at(&X), count.div_ceil(BLOCK));
+        let times = [0.0, 0.3217, 1.0, 1e6].map(|turns| turns * solution.period().to_f64());
+        for (t, lag) in times.into_iter().flat_map(|t| [(t, 0.0), (t, 1e-3 * t)]) {
+            let (t, velocity_time) = (T::nearest(t), T::nearest(t - lag));
+            let mut runs = vec![StateRun::zero(); blocks];
+            kept.evaluate(t, velocity_time, 0, &mut runs);
+            for n in 0..blocks * BLOCK {
+                let X = &X[n.min(count - 1)];
+                let State { u, v, F, P } = runs[n / BLOCK].get(n % BLOCK);
+                for (letter, found, expected) in [
+                    ("u", u.as_slice(), solution.displacement(X, t).as_slice()),
+                    ("v", v.as_slice(), solution.velocity(X, velocity_time).as_slice()),
+                    ("F", F.as_slice(), solution.deformation_gradient(X, t).as_slice()),
+                    ("P", P.as_slice(), solution.first_piola_kirchhoff(X, t).as_slice()),
+                ] {
+                    assert_eq!(bits(found), bits(expected), "{letter} of {name} at {X}, t = {t}");
+                }
+            }
+            let mut last = [StateRun::zero()];
+            kept.evaluate(t, velocity_time, blocks - 1, &mut last);
+            assert_eq!(bits(last[0].u.as_flattened()), bits(runs[blocks - 1].u.as_flattened()));
+        }
+    }
+}
+
 fn compare_all<T: Real>() {
     for description in CATALOGUE {
         let name = description.name;
         match build::<T>(name, &[]).unwrap().unwrap() {
-            AnySolution::One(solution) => compare(name, &*solution),
-            AnySolution::Two(solution) => compare(name, &*solution),
-            AnySolution::Three(solution) => compare(name, &*solution),
+            AnySolution::One(solution) => {
+                compare(name, &*solution);
+                compare_states(name, &*solution);
+            }
+            AnySolution::Two(solution) => {
+                compare(name, &*solution);
+                compare_states(name, &*solution);
+            }
+            AnySolution::Three(solution) => {
+                compare(name, &*solution);
+                compare_states(name, &*solution);
+            }
             _ => panic!("{name} has an unknown dimension"),
         }
     }

@@ -15,7 +15,7 @@ use thiserror::Error;
 use crate::checkpoint::{CheckpointError, Checkpoints, Reached};
 use crate::frames::{FrameOutput, FrameWriter};
 use crate::general::{self, Placement, Precision};
-use crate::measure::measure;
+use crate::measure::Comparison;
 use crate::norms::{PerField, PerNorm};
 use crate::plan::{MOST_STEPS, Steps, prepare};
 use crate::scene::{Extent, Scene, SceneError};
@@ -343,6 +343,7 @@ pub(crate) fn follow<T: Real, const D: usize>(
 ) -> Result<Row, CaseError> {
     let dt = steps.dt;
     let lag = solver.velocity_lag();
+    let comparison = Comparison::new(exact, &solver.observe().0.X);
     let mut frames = match outputs.frames {
         Some(output) => Some(FrameWriter::new(output, steps.count, lag)?),
         None => None,
@@ -361,7 +362,7 @@ pub(crate) fn follow<T: Real, const D: usize>(
             if let Some(frames) = &mut frames {
                 frames.write(solver.observe(), exact, 0, 0.0)?;
             }
-            let at_start = measure(solver.observe(), exact, 0.0, lag).norms;
+            let at_start = comparison.measure(solver.observe(), 0.0, lag).norms;
             // Before the first step no velocity is stored yet that belongs to a time of the scheme.
             Reached {
                 step: 0,
@@ -382,7 +383,7 @@ pub(crate) fn follow<T: Real, const D: usize>(
         }
         done = step;
         let time = step as f64 * dt;
-        let measured = measure(solver.observe(), exact, time, lag);
+        let measured = comparison.measure(solver.observe(), time, lag);
         errors = PerField::combine(&errors, &measured.norms, PerNorm::larger);
         let error = measured.norms.u.linf;
         if error > scene.size || error.is_nan() {

@@ -79,8 +79,8 @@ fn refuse<T>(setting: &'static str, value: &str, admissible: &'static str) -> Re
     Err(CaseError::Setting { setting, value: value.into(), admissible })
 }
 
-/// About how many bytes a run keeps.
-pub(crate) fn bytes_expected<const D: usize>(scene: &Scene<D>, case: &Case) -> f64 {
+/// About how many bytes a run keeps, where the exact fields keep `exact` bytes of each particle.
+pub(crate) fn bytes_expected<const D: usize>(scene: &Scene<D>, case: &Case, exact: usize) -> f64 {
     let entries = match case.shape {
         Shape::Linear => 2_u32.pow(D as u32),
         Shape::Bspline3 | Shape::Cpdi | Shape::Cpdi2 => 4_u32.pow(D as u32),
@@ -92,7 +92,7 @@ pub(crate) fn bytes_expected<const D: usize>(scene: &Scene<D>, case: &Case) -> f
     let domains = (2 * D * D + 5 * D) as f64;
     let nodes: f64 = scene.cells.iter().map(|&cells| cells as f64 + 9.0).product();
     let particles = scene.particles_expected(case.per_cell);
-    scene.bytes_expected(case.per_cell, size_of::<f64>())
+    scene.bytes_expected(case.per_cell, size_of::<f64>(), exact)
         + 8.0 * (particles * (lists + domains) + nodes * (1 + 4 * D) as f64)
 }
 

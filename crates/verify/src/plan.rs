@@ -62,12 +62,13 @@ fn plan_in<const D: usize>(
     if is_general {
         general::admit(&scene, case)?;
     }
+    let kept = Scene::bytes_of_exact(exact, scalar);
     Ok(Plan {
         steps: steps.count,
         particles: scene.particles_expected(case.per_cell),
         bytes: match is_general {
-            true => general::bytes_expected(&scene, case),
-            false => scene.bytes_expected(case.per_cell, scalar),
+            true => general::bytes_expected(&scene, case, kept),
+            false => scene.bytes_expected(case.per_cell, scalar, kept),
         },
         extent: scene.extent(),
         round_off: unit * scene.size * (steps.count as f64).sqrt(),
@@ -113,6 +114,18 @@ impl Steps {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What is kept of each particle counts: four numbers for the body force and as many for the state.
+    #[test]
+    fn ten_million_particles_fit_into_four_gibibytes() {
+        let exact = mmsmith_solutions::build::<f64>("axis-aligned", &[]).unwrap().unwrap();
+        let case = Case { cells: 1581, ..Case::default() };
+        let bytes = plan(&exact, Arithmetic::Double, &case).unwrap().bytes;
+        assert!((2.0..4.0).contains(&(bytes / 2f64.powi(30))), "{bytes:e}");
+        let AnySolution::Two(exact) = exact else { panic!("it is plane") };
+        assert_eq!(Scene::bytes_of_exact(exact.as_ref(), size_of::<f64>()), 64);
+        assert_eq!(Scene::bytes_of_exact(exact.as_ref(), size_of::<f32>()), 48);
+    }
 
     #[test]
     fn whole_steps_keep_the_cfl_number_and_others_shorten_the_step() {

@@ -220,15 +220,23 @@ impl<const D: usize> Scene<D> {
         body * (per_cell as f64).powi(D as i32)
     }
 
-    /// About how many bytes the solver and the measurement keep, for values of `scalar` bytes.
-    pub(crate) fn bytes_expected(&self, per_cell: usize, scalar: usize) -> f64 {
-        // X, x, v, b and the solver's copies of them; F twice, a stress; mass, volume and sorting.
-        let per_particle = 8 * D + 4 * D * D + 8;
+    /// About how many bytes the solver and the measurement keep, for values of `scalar` bytes, where the exact fields keep
+    /// `exact` bytes of each particle.
+    pub(crate) fn bytes_expected(&self, per_cell: usize, scalar: usize, exact: usize) -> f64 {
+        // X, x, v, b and two copies at set-up; F twice; mass and volume; and three whole numbers for sorting.
+        let per_particle = scalar * (6 * D + 2 * D * D + 2) + 12 + exact;
         // A cache line, another for the step to come or for MUSL, and what sorting counts; with the padding beyond the walls.
         const PER_NODE: f64 = 64.0 + 64.0 + 4.0;
         let nodes: f64 = self.cells.iter().map(|&cells| cells as f64 + 9.0).product();
         let particles = self.particles_expected(per_cell);
-        scalar as f64 * particles * per_particle as f64 + nodes * PER_NODE
+        particles * per_particle as f64 + nodes * PER_NODE
+    }
+
+    /// How many bytes the exact fields keep of each particle: what the body force needs, in values of the solver's size, and
+    /// what the state that errors are measured by needs, in double precision.
+    pub(crate) fn bytes_of_exact(solution: &dyn Solution<f64, D>, scalar: usize) -> usize {
+        let body_force = solution.body_force_at(&[]).bytes_per_point();
+        body_force * scalar / size_of::<f64>() + solution.state_at(&[]).bytes_per_point()
     }
 
     /// The particles at rest in the reference configuration: those whose centre lies in the body.

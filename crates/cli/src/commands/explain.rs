@@ -1,7 +1,7 @@
 //! `mms explain`: what a solution models, which parts of a solver it exercises, and what its body force costs.
 
 use anyhow::{Result, bail};
-use mmsmith_expr::{Expr, OperationCount, Program, arrange};
+use mmsmith_expr::{Drafts, Expr, OperationCount, Program, arrange};
 use mmsmith_solutions::CATALOGUE;
 use mmsmith_spec::{Domain, Fields, SolvedCondition, Spec};
 use mmsmith_verify::{Cost, Part, Plan, Share, coverage};
@@ -76,9 +76,10 @@ struct BodyForceCost {
 
 impl BodyForceCost {
     fn of(fields: &mut Fields) -> Self {
-        let b = arrange(&mut fields.graph, &fields.inputs, &fields.definitions, &fields.b);
+        let (inputs, definitions, b) = (&fields.inputs, &fields.definitions, &fields.b);
+        let b = arrange(&mut fields.graph, inputs, definitions, &mut Drafts::default(), b);
         let program: Program = fields.program(&b);
-        let kept = program.kept_at_points(program.outputs());
+        let kept = program.kept_at_points(program.outputs(), usize::MAX);
         let count = program.operations_with_kept(program.outputs(), &kept);
         BodyForceCost {
             stages: [

@@ -23,6 +23,7 @@ pub(crate) use neo_hookean::{NeoHookean, NeoHookeanNoLog};
 pub(crate) use st_venant_kirchhoff::StVenantKirchhoff;
 
 use crate::fault::Planted;
+use crate::simd::{Loop, dispatch};
 use crate::tensor::{det_minus_one, determinant, product, real};
 
 /// An elastic material.
@@ -125,6 +126,17 @@ impl<T: RealField + Copy> Material<T> {
         Some(with_law!(self, |law| law.first_piola_kirchhoff(F)))
     }
 
+    /// First Piola-Kirchhoff stresses of `N` particles side by side: `F[i][J][n]` is `F_iJ` of particle `n`, and so it is with
+    /// the stresses `P`. They are those of [`Material::first_piola_kirchhoff`] to the last bit, and not a number where F is no
+    /// deformation.
+    pub fn first_piola_kirchhoff_side_by_side<const D: usize, const N: usize>(
+        &self,
+        F: &[[[T; N]; D]; D],
+        P: &mut [[[T; N]; D]; D],
+    ) {
+        with_law!(self, |law| dispatch(SideBySide { law, F, P }));
+    }
+
     /// Cauchy (true) stress `sigma = tau / J`.
     pub fn cauchy<const D: usize>(&self, F: &SMatrix<T, D, D>) -> Option<SMatrix<T, D, D>> {
         let J = jacobian(F)?;
@@ -160,6 +172,49 @@ impl<T: RealField + Copy> Material<T> {
             | Self::LinearElastic { lambda, mu } => (lambda, mu),
             Self::MooneyRivlin { c1, c2, lambda } => {
                 (lambda + c2 * real(4.0), (c1 + c2) * real(2.0))
+            }
+        }
+    }
+}
+
+struct SideBySide<'a, T, L, const D: usize, const N: usize> {
+    law: L,
+    F: &'a [[[T; N]; D]; D],
+    P: &'a mut [[[T; N]; D]; D],
+}
+
+impl<T: RealField + Copy, L: Law<T>, const D: usize, const N: usize> Loop
+    for SideBySide<'_, T, L, D, N>
+{
+    #[inline(always)]
+    fn run(self) {
+        stresses(self.law, self.F, self.P);
+    }
+}
+
+/// As a function of its own, which tells the compiler that `F` and `P` are in different places.
+#[inline(always)]
+fn stresses<T: RealField + Copy, L: Law<T>, const D: usize, const N: usize>(
+    law: L,
+    F: &[[[T; N]; D]; D],
+    P: &mut [[[T; N]; D]; D],
+) {
+    for n in 0..N {
+        let own = SMatrix::<T, D, D>::from_fn(|i, j| F[i][j][n]);
+        let J = determinant(&own);
+        // Without branches: zero times anything that is not finite is not a number.
+        let zero = own.fold(J * T::zero(), |sum, entry| sum + entry * T::zero());
+        let is_deformation = (J > T::zero()) & (zero == T::zero());
+        // A law may be asked for a stress only where there is one.
+        let own = SMatrix::<T, D, D>::from_fn(|i, j| match is_deformation {
+            true => own[(i, j)],
+            false if i == j => T::one(),
+            false => T::zero(),
+        });
+        let stress = law.first_piola_kirchhoff(&own);
+        for i in 0..D {
+            for j in 0..D {
+                P[i][j][n] = if is_deformation { stress[(i, j)] } else { real(f64::NAN) };
             }
         }
     }

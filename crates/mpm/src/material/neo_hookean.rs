@@ -35,6 +35,7 @@ impl<T: RealField + Copy> Law<T> for NeoHookean<T> {
         self.pressure(F)
     }
 
+    #[inline(always)]
     fn first_piola_kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         let H = displacement_gradient(F);
         let K = inverse_transpose_minus_identity(F);
@@ -60,6 +61,7 @@ impl<T: RealField + Copy> Law<T> for NeoHookeanNoLog<T> {
         T::zero()
     }
 
+    #[inline(always)]
     fn first_piola_kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         let H = displacement_gradient(F);
         (H - inverse_transpose_minus_identity(F)) * self.mu

@@ -1,6 +1,7 @@
 use super::*;
 use nalgebra::{Matrix1, Matrix2, Matrix3, Rotation3};
 use proptest::prelude::*;
+use std::array;
 
 const LAWS: [Material<f64>; 6] = [
     Material::NeoHookean { lambda: 5.77, mu: 3.85 },
@@ -71,6 +72,69 @@ fn check_against_energy<const D: usize>(law: &Material<f64>, F: &SMatrix<f64, D,
 fn deformation() -> impl Strategy<Value = Matrix3<f64>> {
     proptest::array::uniform9(-0.25..0.25_f64)
         .prop_map(|H| Matrix3::identity() + Matrix3::from_row_slice(&H))
+}
+
+fn check_side_by_side<T: RealField + Copy, const D: usize>(all: &[Matrix3<f64>]) {
+    let some: Vec<SMatrix<T, D, D>> =
+        all.iter().map(|F| SMatrix::from_fn(|i, j| real(F[(i, j)]))).collect();
+    for law in LAWS {
+        let law = match law {
+            Material::NeoHookean { lambda, mu } => {
+                Material::NeoHookean { lambda: real(lambda), mu: real(mu) }
+            }
+            Material::StVenantKirchhoff { lambda, mu } => {
+                Material::StVenantKirchhoff { lambda: real(lambda), mu: real(mu) }
+            }
+            Material::Hencky { lambda, mu } => {
+                Material::Hencky { lambda: real(lambda), mu: real(mu) }
+            }
+            Material::MooneyRivlin { c1, c2, lambda } => {
+                Material::MooneyRivlin { c1: real(c1), c2: real(c2), lambda: real(lambda) }
+            }
+            Material::LinearElastic { lambda, mu } => {
+                Material::LinearElastic { lambda: real(lambda), mu: real(mu) }
+            }
+        };
+        for five in some.chunks_exact(5) {
+            let rows = array::from_fn(|i| array::from_fn(|j| array::from_fn(|n| five[n][(i, j)])));
+            let mut P = [[[T::zero(); 5]; D]; D];
+            law.first_piola_kirchhoff_side_by_side(&rows, &mut P);
+            for (n, F) in five.iter().enumerate() {
+                let found = SMatrix::<T, D, D>::from_fn(|i, j| P[i][j][n]);
+                match law.first_piola_kirchhoff(F) {
+                    Some(P) => assert_eq!(found, P, "{law:?}, {F}"),
+                    None => assert!(found.iter().all(|p| *p != *p), "{law:?}, {F}, {found}"),
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn stresses_side_by_side_are_those_of_single_particles() {
+    // Near inversion, next to the identity, inside out, and no numbers at all among ordinary ones.
+    let all: Vec<Matrix3<f64>> = (0..60)
+        .map(|n| {
+            let H = |i: usize, j: usize| {
+                (0.618 * f64::from(n) + 0.325 * (3 * i + j) as f64).fract() - 0.5
+            };
+            let scale = [0.4, 1e-9, 0.7, 1.5][n as usize % 4];
+            let mut F = Matrix3::from_fn(|i, j| f64::from(u8::from(i == j)) + scale * H(i, j));
+            match n % 10 {
+                7 => F[(0, 0)] = f64::NAN,
+                8 => F.column_mut(0).scale_mut(1e-7),
+                9 => F.column_mut(0).neg_mut(),
+                _ => {}
+            }
+            F
+        })
+        .collect();
+    let inverted = all.iter().filter(|F| jacobian(F).is_none()).count();
+    assert!((10..40).contains(&inverted), "{inverted}");
+    check_side_by_side::<f64, 1>(&all);
+    check_side_by_side::<f64, 2>(&all);
+    check_side_by_side::<f64, 3>(&all);
+    check_side_by_side::<f32, 2>(&all);
 }
 
 proptest! {

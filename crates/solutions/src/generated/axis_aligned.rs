@@ -682,6 +682,12 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
         ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 4, 4>::new(*self, X))
     }
+    fn state_at(
+        &self,
+        X: &[crate::nalgebra::SVector<T, 2>],
+    ) -> ::std::boxed::Box<dyn crate::StateAtPoints<T, 2> + '_> {
+        ::std::boxed::Box::new(crate::StagedStates::<Self, T, 8, 2, 4>::new(*self, X))
+    }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> crate::BodyForceStages<T, 2, 4, 4> for AxisAligned<T> {
@@ -758,6 +764,87 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 4, 4> for AxisAligned<T> {
         let t187 = t171 + t186;
         let t188 = time[1] * t187;
         crate::nalgebra::SVector::<T, 2>::new(t170, t188)
+    }
+}
+#[allow(unused_variables, clippy::all, clippy::pedantic)]
+impl<T: crate::Real> crate::StateStages<T, 2, 8, 2, 4> for AxisAligned<T> {
+    #[inline]
+    fn state_time(&self, t: T) -> [T; 8] {
+        let t8 = self.fixed[0] * t;
+        let t9 = t8.cos_pi();
+        let t10 = self.parameters.A * t9;
+        let t14 = t8.sin_pi();
+        let t15 = self.parameters.A * t14;
+        let t36 = self.fixed[1] * t9;
+        let t40 = self.fixed[1] * t14;
+        let t63 = self.fixed[5] * t9;
+        let t74 = self.fixed[5] * t14;
+        [t9, t10, t14, t15, t36, t40, t63, t74]
+    }
+    #[inline]
+    fn velocity_time(&self, t: T) -> [T; 2] {
+        let t8 = self.fixed[0] * t;
+        let t9 = t8.cos_pi();
+        let t14 = t8.sin_pi();
+        let t20 = self.fixed[2] * t14;
+        let t23 = self.fixed[2] * t9;
+        [t20, t23]
+    }
+    #[inline]
+    fn state_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 4] {
+        let t2 = X[0].sin_pi();
+        let t13 = X[1].sin_pi();
+        let t35 = X[0].cos_pi();
+        let t39 = X[1].cos_pi();
+        [t2, t13, t35, t39]
+    }
+    #[inline(always)]
+    fn state_staged(
+        &self,
+        time: &[T; 8],
+        velocity_time: &[T; 2],
+        point: &[T; 4],
+    ) -> crate::State<T, 2> {
+        let v = {
+            let time = velocity_time;
+            let t21 = time[0] * point[0];
+            let t22 = -t21;
+            let t24 = time[1] * point[1];
+            crate::nalgebra::SVector::<T, 2>::new(t22, t24)
+        };
+        let t11 = time[1] * point[0];
+        let t16 = time[3] * point[1];
+        let t37 = time[4] * point[2];
+        let t41 = time[5] * point[3];
+        let t43 = t37 + T::one();
+        let t44 = t41 + T::one();
+        let t45 = t43 * t44;
+        let t51 = T::one() / t43;
+        let t52 = t51 + T::one();
+        let t56 = point[2] * t44;
+        let t57 = time[0] * t56;
+        let t58 = time[2] * point[3];
+        let t59 = t57 + t58;
+        let t60 = self.fixed[1] * t59;
+        let t61 = t60.ln_of_both(t45);
+        let t64 = time[6] * point[2];
+        let t65 = t64 * t52;
+        let t69 = t61 * t51;
+        let t70 = self.fixed[6] * t69;
+        let t71 = t65 + t70;
+        let t72 = T::one() / t44;
+        let t73 = t72 + T::one();
+        let t75 = time[7] * point[3];
+        let t76 = t75 * t73;
+        let t77 = t61 * t72;
+        let t78 = self.fixed[6] * t77;
+        let t79 = t76 + t78;
+        crate::State {
+            u: crate::nalgebra::SVector::<T, 2>::new(t11, t16),
+            v,
+            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t43, T::zero(), T::zero(), t44),
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t71, T::zero(), T::zero(), t79),
+        }
     }
 }
 impl<T: crate::Real> From<AxisAligned<T>> for crate::AnySolution<T> {

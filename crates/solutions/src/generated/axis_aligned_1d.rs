@@ -494,6 +494,12 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 1> + '_> {
         ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 2, 2>::new(*self, X))
     }
+    fn state_at(
+        &self,
+        X: &[crate::nalgebra::SVector<T, 1>],
+    ) -> ::std::boxed::Box<dyn crate::StateAtPoints<T, 1> + '_> {
+        ::std::boxed::Box::new(crate::StagedStates::<Self, T, 3, 1, 2>::new(*self, X))
+    }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 2> for AxisAligned1d<T> {
@@ -539,6 +545,62 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 2> for AxisAligned1d<T> {
         let t116 = t86 + t115;
         let t117 = time[0] * t116;
         crate::nalgebra::SVector::<T, 1>::new(t117)
+    }
+}
+#[allow(unused_variables, clippy::all, clippy::pedantic)]
+impl<T: crate::Real> crate::StateStages<T, 1, 3, 1, 2> for AxisAligned1d<T> {
+    #[inline]
+    fn state_time(&self, t: T) -> [T; 3] {
+        let t8 = self.fixed[0] * t;
+        let t9 = t8.cos_pi();
+        let t10 = self.parameters.A * t9;
+        let t27 = self.fixed[1] * t9;
+        let t43 = self.fixed[6] * t9;
+        [t10, t27, t43]
+    }
+    #[inline]
+    fn velocity_time(&self, t: T) -> [T; 1] {
+        let t8 = self.fixed[0] * t;
+        let t13 = t8.sin_pi();
+        let t16 = self.fixed[2] * t13;
+        [t16]
+    }
+    #[inline]
+    fn state_point(&self, X: &crate::nalgebra::SVector<T, 1>) -> [T; 2] {
+        let t2 = X[0].sin_pi();
+        let t26 = X[0].cos_pi();
+        [t2, t26]
+    }
+    #[inline(always)]
+    fn state_staged(
+        &self,
+        time: &[T; 3],
+        velocity_time: &[T; 1],
+        point: &[T; 2],
+    ) -> crate::State<T, 1> {
+        let v = {
+            let time = velocity_time;
+            let t17 = time[0] * point[0];
+            let t18 = -t17;
+            crate::nalgebra::SVector::<T, 1>::new(t18)
+        };
+        let t11 = time[0] * point[0];
+        let t28 = time[1] * point[1];
+        let t30 = t28 + T::one();
+        let t36 = T::one() / t30;
+        let t37 = t36 + T::one();
+        let t41 = t28.log_1p();
+        let t44 = time[2] * point[1];
+        let t45 = t44 * t37;
+        let t49 = t41 * t36;
+        let t50 = self.fixed[7] * t49;
+        let t51 = t45 + t50;
+        crate::State {
+            u: crate::nalgebra::SVector::<T, 1>::new(t11),
+            v,
+            F: crate::nalgebra::SMatrix::<T, 1, 1>::new(t30),
+            P: crate::nalgebra::SMatrix::<T, 1, 1>::new(t51),
+        }
     }
 }
 impl<T: crate::Real> From<AxisAligned1d<T>> for crate::AnySolution<T> {

@@ -1098,6 +1098,12 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 3> + '_> {
         ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 6, 6>::new(*self, X))
     }
+    fn state_at(
+        &self,
+        X: &[crate::nalgebra::SVector<T, 3>],
+    ) -> ::std::boxed::Box<dyn crate::StateAtPoints<T, 3> + '_> {
+        ::std::boxed::Box::new(crate::StagedStates::<Self, T, 10, 3, 6>::new(*self, X))
+    }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 6> for AxisAligned3d<T> {
@@ -1203,6 +1209,153 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 6> for AxisAligned3d<T> {
         let t270 = t269 - t256;
         let t271 = time[2] * t270;
         crate::nalgebra::SVector::<T, 3>::new(t228, t255, t271)
+    }
+}
+#[allow(unused_variables, clippy::all, clippy::pedantic)]
+impl<T: crate::Real> crate::StateStages<T, 3, 10, 3, 6> for AxisAligned3d<T> {
+    #[inline]
+    fn state_time(&self, t: T) -> [T; 10] {
+        let t8 = self.fixed[0] * t;
+        let t9 = t8.sin_pi();
+        let t10 = self.parameters.A * t9;
+        let t15 = t8.cos_pi();
+        let t17 = self.fixed[1] * t15;
+        let t18 = t9 - t17;
+        let t21 = self.fixed[2] * t18;
+        let t26 = t9 + t17;
+        let t27 = self.fixed[2] * t26;
+        let t61 = self.fixed[3] * t9;
+        let t65 = self.fixed[5] * t18;
+        let t69 = self.fixed[5] * t26;
+        let t74 = self.fixed[3] * t18;
+        let t79 = self.fixed[3] * t26;
+        let t105 = self.fixed[11] * t9;
+        [t9, t10, t21, t27, t61, t65, t69, t74, t79, t105]
+    }
+    #[inline]
+    fn velocity_time(&self, t: T) -> [T; 3] {
+        let t8 = self.fixed[0] * t;
+        let t9 = t8.sin_pi();
+        let t15 = t8.cos_pi();
+        let t33 = self.fixed[4] * t15;
+        let t35 = self.fixed[1] * t9;
+        let t36 = t15 + t35;
+        let t39 = self.fixed[6] * t36;
+        let t42 = t15 - t35;
+        let t43 = self.fixed[6] * t42;
+        [t33, t39, t43]
+    }
+    #[inline]
+    fn state_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 6] {
+        let t2 = X[0].sin_pi();
+        let t13 = X[1].sin_pi();
+        let t25 = X[2].sin_pi();
+        let t60 = X[0].cos_pi();
+        let t64 = X[1].cos_pi();
+        let t68 = X[2].cos_pi();
+        [t2, t13, t25, t60, t64, t68]
+    }
+    #[inline(always)]
+    fn state_staged(
+        &self,
+        time: &[T; 10],
+        velocity_time: &[T; 3],
+        point: &[T; 6],
+    ) -> crate::State<T, 3> {
+        let v = {
+            let time = velocity_time;
+            let t34 = time[0] * point[0];
+            let t40 = time[1] * point[1];
+            let t41 = -t40;
+            let t44 = time[2] * point[2];
+            let t45 = -t44;
+            crate::nalgebra::SVector::<T, 3>::new(t34, t41, t45)
+        };
+        let t11 = time[1] * point[0];
+        let t22 = time[2] * point[1];
+        let t23 = -t22;
+        let t28 = time[3] * point[2];
+        let t29 = -t28;
+        let t62 = time[4] * point[3];
+        let t66 = time[5] * point[4];
+        let t67 = -t66;
+        let t70 = time[6] * point[5];
+        let t71 = -t70;
+        let t73 = t62 + T::one();
+        let t75 = time[7] * point[4];
+        let t77 = T::nearest(2.0) - t75;
+        let t78 = T::nearest(0.5) * t77;
+        let t80 = time[8] * point[5];
+        let t81 = T::nearest(2.0) - t80;
+        let t82 = T::nearest(0.5) * t81;
+        let t83 = t67 + T::one();
+        let t84 = t71 + T::one();
+        let t85 = t73 * t83;
+        let t86 = t85 * t84;
+        let t91 = T::one() / t73;
+        let t92 = t91 + T::one();
+        let t95 = t67 * t84;
+        let t96 = t95 - t70;
+        let t97 = t96 + T::one();
+        let t98 = time[0] * point[3];
+        let t99 = t98 * t97;
+        let t100 = self.fixed[3] * t99;
+        let t101 = t100 + t95;
+        let t102 = t101 - t70;
+        let t103 = t102.ln_of_both(t86);
+        let t106 = time[9] * point[3];
+        let t107 = t106 * t92;
+        let t111 = t103 * t91;
+        let t112 = self.fixed[12] * t111;
+        let t113 = t107 + t112;
+        let t114 = T::one() / t83;
+        let t115 = t114 + T::one();
+        let t116 = t67 * t115;
+        let t117 = self.fixed[10] * t116;
+        let t118 = t103 * t114;
+        let t119 = self.fixed[12] * t118;
+        let t120 = t117 + t119;
+        let t121 = T::one() / t84;
+        let t122 = t121 + T::one();
+        let t123 = t71 * t122;
+        let t124 = self.fixed[10] * t123;
+        let t125 = t103 * t121;
+        let t126 = self.fixed[12] * t125;
+        let t127 = t124 + t126;
+        crate::State {
+            u: crate::nalgebra::SVector::<T, 3>::new(t11, t23, t29),
+            v,
+            F: crate::nalgebra::SMatrix::<
+                T,
+                3,
+                3,
+            >::new(
+                t73,
+                T::zero(),
+                T::zero(),
+                T::zero(),
+                t78,
+                T::zero(),
+                T::zero(),
+                T::zero(),
+                t82,
+            ),
+            P: crate::nalgebra::SMatrix::<
+                T,
+                3,
+                3,
+            >::new(
+                t113,
+                T::zero(),
+                T::zero(),
+                T::zero(),
+                t120,
+                T::zero(),
+                T::zero(),
+                T::zero(),
+                t127,
+            ),
+        }
     }
 }
 impl<T: crate::Real> From<AxisAligned3d<T>> for crate::AnySolution<T> {

@@ -533,6 +533,12 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 1> + '_> {
         ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 2, 2>::new(*self, X))
     }
+    fn state_at(
+        &self,
+        X: &[crate::nalgebra::SVector<T, 1>],
+    ) -> ::std::boxed::Box<dyn crate::StateAtPoints<T, 1> + '_> {
+        ::std::boxed::Box::new(crate::StagedStates::<Self, T, 2, 1, 2>::new(*self, X))
+    }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 2> for Bar<T> {
@@ -579,6 +585,62 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 2> for Bar<T> {
         let t133 = t132 - t93;
         let t134 = time[0] * t133;
         crate::nalgebra::SVector::<T, 1>::new(t134)
+    }
+}
+#[allow(unused_variables, clippy::all, clippy::pedantic)]
+impl<T: crate::Real> crate::StateStages<T, 1, 2, 1, 2> for Bar<T> {
+    #[inline]
+    fn state_time(&self, t: T) -> [T; 2] {
+        let t13 = self.fixed[2] * t;
+        let t14 = t13.cos_pi();
+        let t15 = self.parameters.A * t14;
+        let t38 = self.fixed[6] * t14;
+        [t15, t38]
+    }
+    #[inline]
+    fn velocity_time(&self, t: T) -> [T; 1] {
+        let t13 = self.fixed[2] * t;
+        let t18 = t13.sin_pi();
+        let t22 = self.fixed[3] * t18;
+        [t22]
+    }
+    #[inline]
+    fn state_point(&self, X: &crate::nalgebra::SVector<T, 1>) -> [T; 2] {
+        let t5 = self.fixed[0] * X[0];
+        let t6 = t5.sin_pi();
+        let t34 = t5.cos_pi();
+        [t6, t34]
+    }
+    #[inline(always)]
+    fn state_staged(
+        &self,
+        time: &[T; 2],
+        velocity_time: &[T; 1],
+        point: &[T; 2],
+    ) -> crate::State<T, 1> {
+        let v = {
+            let time = velocity_time;
+            let t23 = time[0] * point[0];
+            let t24 = -t23;
+            crate::nalgebra::SVector::<T, 1>::new(t24)
+        };
+        let t16 = time[0] * point[0];
+        let t39 = time[1] * point[1];
+        let t41 = t39 + T::one();
+        let t47 = T::one() / t41;
+        let t48 = t47 + T::one();
+        let t51 = t39.log_1p();
+        let t52 = t39 * t48;
+        let t53 = self.fixed[7] * t52;
+        let t57 = t51 * t47;
+        let t58 = self.fixed[8] * t57;
+        let t59 = t53 + t58;
+        crate::State {
+            u: crate::nalgebra::SVector::<T, 1>::new(t16),
+            v,
+            F: crate::nalgebra::SMatrix::<T, 1, 1>::new(t41),
+            P: crate::nalgebra::SMatrix::<T, 1, 1>::new(t59),
+        }
     }
 }
 impl<T: crate::Real> From<Bar<T>> for crate::AnySolution<T> {

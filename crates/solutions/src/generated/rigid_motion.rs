@@ -517,6 +517,12 @@ impl<T: crate::Real> crate::Solution<T, 2> for RigidMotion<T> {
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
         ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 5, 2>::new(*self, X))
     }
+    fn state_at(
+        &self,
+        X: &[crate::nalgebra::SVector<T, 2>],
+    ) -> ::std::boxed::Box<dyn crate::StateAtPoints<T, 2> + '_> {
+        ::std::boxed::Box::new(crate::StagedStates::<Self, T, 7, 4, 2>::new(*self, X))
+    }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> crate::BodyForceStages<T, 2, 5, 2> for RigidMotion<T> {
@@ -566,6 +572,95 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 5, 2> for RigidMotion<T> {
         let t65 = self.fixed[6] * t61;
         let t76 = self.fixed[7] * t52;
         crate::nalgebra::SVector::<T, 2>::new(t76, t65)
+    }
+}
+#[allow(unused_variables, clippy::all, clippy::pedantic)]
+impl<T: crate::Real> crate::StateStages<T, 2, 7, 4, 2> for RigidMotion<T> {
+    #[inline]
+    fn state_time(&self, t: T) -> [T; 7] {
+        let t6 = self.fixed[0] * t;
+        let t7 = t6.sin_pi();
+        let t10 = self.fixed[1] * t7;
+        let t11 = t10.sin();
+        let t14 = t10.cos();
+        let t20 = T::nearest(2.0) * t11;
+        let t22 = self.parameters.U * t7;
+        let t66 = t11 * t11;
+        let t67 = T::nearest(2.0) * t66;
+        let t69 = t14 * t11;
+        let t70 = T::nearest(2.0) * t69;
+        let t71 = -t70;
+        let t73 = T::one() - t67;
+        [t11, t14, t20, t22, t70, t71, t73]
+    }
+    #[inline]
+    fn velocity_time(&self, t: T) -> [T; 4] {
+        let t6 = self.fixed[0] * t;
+        let t7 = t6.sin_pi();
+        let t10 = self.fixed[1] * t7;
+        let t11 = t10.sin();
+        let t14 = t10.cos();
+        let t30 = t6.cos_pi();
+        let t37 = self.fixed[2] * t30;
+        let t44 = self.fixed[3] * t30;
+        [t11, t14, t37, t44]
+    }
+    #[inline]
+    fn state_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 2] {
+        [X[0], X[1]]
+    }
+    #[inline(always)]
+    fn state_staged(
+        &self,
+        time: &[T; 7],
+        velocity_time: &[T; 4],
+        point: &[T; 2],
+    ) -> crate::State<T, 2> {
+        let v = {
+            let time = velocity_time;
+            let t15 = time[0] * point[0];
+            let t16 = time[1] * point[1];
+            let t17 = t15 + t16;
+            let t25 = time[1] * point[0];
+            let t26 = time[0] * point[1];
+            let t27 = t25 - t26;
+            let t31 = time[0] * t27;
+            let t32 = time[1] * t17;
+            let t33 = t31 + t32;
+            let t34 = self.parameters.A * t33;
+            let t35 = self.parameters.U - t34;
+            let t38 = time[2] * t35;
+            let t39 = time[0] * t17;
+            let t40 = time[1] * t27;
+            let t41 = t39 - t40;
+            let t45 = time[3] * t41;
+            let t46 = -t45;
+            crate::nalgebra::SVector::<T, 2>::new(t38, t46)
+        };
+        let t15 = time[0] * point[0];
+        let t16 = time[1] * point[1];
+        let t17 = t15 + t16;
+        let t21 = time[2] * t17;
+        let t23 = t21 - time[3];
+        let t24 = -t23;
+        let t25 = time[1] * point[0];
+        let t26 = time[0] * point[1];
+        let t27 = t25 - t26;
+        let t28 = time[2] * t27;
+        crate::State {
+            u: crate::nalgebra::SVector::<T, 2>::new(t24, t28),
+            v,
+            F: crate::nalgebra::SMatrix::<
+                T,
+                2,
+                2,
+            >::new(time[6], time[5], time[4], time[6]),
+            P: crate::nalgebra::SMatrix::<
+                T,
+                2,
+                2,
+            >::new(T::zero(), T::zero(), T::zero(), T::zero()),
+        }
     }
 }
 impl<T: crate::Real> From<RigidMotion<T>> for crate::AnySolution<T> {

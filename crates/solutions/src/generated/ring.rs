@@ -828,6 +828,12 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
         ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 3, 8>::new(*self, X))
     }
+    fn state_at(
+        &self,
+        X: &[crate::nalgebra::SVector<T, 2>],
+    ) -> ::std::boxed::Box<dyn crate::StateAtPoints<T, 2> + '_> {
+        ::std::boxed::Box::new(crate::StagedStates::<Self, T, 2, 1, 13>::new(*self, X))
+    }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 8> for Ring<T> {
@@ -924,6 +930,121 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 8> for Ring<T> {
         let t214 = point[2] * t213;
         let t216 = point[7] * t213;
         crate::nalgebra::SVector::<T, 2>::new(t214, t216)
+    }
+}
+#[allow(unused_variables, clippy::all, clippy::pedantic)]
+impl<T: crate::Real> crate::StateStages<T, 2, 2, 1, 13> for Ring<T> {
+    #[inline]
+    fn state_time(&self, t: T) -> [T; 2] {
+        let t12 = self.fixed[0] * t;
+        let t13 = t12.cos_pi();
+        let t32 = self.parameters.A * t13;
+        let t90 = self.fixed[8] * t13;
+        [t32, t90]
+    }
+    #[inline]
+    fn velocity_time(&self, t: T) -> [T; 1] {
+        let t12 = self.fixed[0] * t;
+        let t42 = t12.sin_pi();
+        let t45 = self.fixed[4] * t42;
+        [t45]
+    }
+    #[inline]
+    fn state_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 13] {
+        let t2 = X[0] * X[0];
+        let t3 = X[1] * X[1];
+        let t4 = t2 + t3;
+        let t5 = t4.sqrt();
+        let t20 = t5 - self.parameters.Ro;
+        let t21 = t20 * t20;
+        let t23 = T::nearest(2.0) * t5;
+        let t25 = self.fixed[2] + t23;
+        let t29 = t21 * t25;
+        let t30 = self.fixed[3] * t29;
+        let t31 = t30 + T::one();
+        let t33 = t31 * X[0];
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t36 = t33 * t35;
+        let t38 = t31 * X[1];
+        let t39 = t38 * t35;
+        let t59 = t5 - self.parameters.Ri;
+        let t62 = t20 * t2;
+        let t63 = t62 * t59;
+        let t64 = self.fixed[7] * t63;
+        let t65 = t31 * t3;
+        let t66 = t65 * t35;
+        let t67 = t64 + t66;
+        let t68 = t67 * t34;
+        let t70 = t20 * t59;
+        let t71 = self.fixed[7] * t70;
+        let t72 = t31 * t35;
+        let t73 = t71 - t72;
+        let t74 = X[0] * X[1];
+        let t75 = t74 * t73;
+        let t76 = t75 * t34;
+        let t78 = t20 * t3;
+        let t79 = t78 * t59;
+        let t80 = self.fixed[7] * t79;
+        let t81 = t31 * t2;
+        let t82 = t81 * t35;
+        let t83 = t80 + t82;
+        let t84 = t83 * t34;
+        let t107 = self.fixed[9] * t34;
+        let t111 = t74 * t34;
+        let t112 = self.fixed[9] * t111;
+        [t2, t3, t36, t39, t66, t68, t70, t72, t76, t82, t84, t107, t112]
+    }
+    #[inline(always)]
+    fn state_staged(
+        &self,
+        time: &[T; 2],
+        velocity_time: &[T; 1],
+        point: &[T; 13],
+    ) -> crate::State<T, 2> {
+        let v = {
+            let time = velocity_time;
+            let t46 = time[0] * point[2];
+            let t47 = -t46;
+            let t48 = time[0] * point[3];
+            let t49 = -t48;
+            crate::nalgebra::SVector::<T, 2>::new(t47, t49)
+        };
+        let t37 = time[0] * point[2];
+        let t40 = time[0] * point[3];
+        let t69 = time[0] * point[5];
+        let t77 = time[0] * point[8];
+        let t85 = time[0] * point[10];
+        let t86 = t69 + T::one();
+        let t87 = t85 + T::one();
+        let t91 = time[1] * point[6];
+        let t92 = t91 + T::one();
+        let t93 = time[0] * point[7];
+        let t94 = t93 + T::one();
+        let t98 = T::one() / t92;
+        let t99 = t98 + T::one();
+        let t100 = T::one() / t94;
+        let t101 = t100 + T::one();
+        let t102 = t91 * t99;
+        let t103 = point[0] * t102;
+        let t104 = time[0] * point[4];
+        let t105 = t104 * t101;
+        let t106 = t103 + t105;
+        let t108 = point[11] * t106;
+        let t109 = t93 * t101;
+        let t110 = t102 - t109;
+        let t113 = point[12] * t110;
+        let t114 = point[1] * t102;
+        let t115 = time[0] * point[9];
+        let t116 = t115 * t101;
+        let t117 = t114 + t116;
+        let t118 = point[11] * t117;
+        crate::State {
+            u: crate::nalgebra::SVector::<T, 2>::new(t37, t40),
+            v,
+            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t86, t77, t77, t87),
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t108, t113, t113, t118),
+        }
     }
 }
 impl<T: crate::Real> From<Ring<T>> for crate::AnySolution<T> {

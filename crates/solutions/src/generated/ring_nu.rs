@@ -1033,6 +1033,12 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
         ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 3, 10>::new(*self, X))
     }
+    fn state_at(
+        &self,
+        X: &[crate::nalgebra::SVector<T, 2>],
+    ) -> ::std::boxed::Box<dyn crate::StateAtPoints<T, 2> + '_> {
+        ::std::boxed::Box::new(crate::StagedStates::<Self, T, 3, 1, 2>::new(*self, X))
+    }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
@@ -1172,6 +1178,154 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         let t319 = point[2] * t318;
         let t321 = point[9] * t318;
         crate::nalgebra::SVector::<T, 2>::new(t319, t321)
+    }
+}
+#[allow(unused_variables, clippy::all, clippy::pedantic)]
+impl<T: crate::Real> crate::StateStages<T, 2, 3, 1, 2> for RingNu<T> {
+    #[inline]
+    fn state_time(&self, t: T) -> [T; 3] {
+        let t12 = self.fixed[0] * t;
+        let t13 = t12.cos_pi();
+        let t32 = self.parameters.A * t13;
+        let t90 = self.fixed[9] * t13;
+        [t13, t32, t90]
+    }
+    #[inline]
+    fn velocity_time(&self, t: T) -> [T; 1] {
+        let t12 = self.fixed[0] * t;
+        let t42 = t12.sin_pi();
+        let t45 = self.fixed[4] * t42;
+        [t45]
+    }
+    #[inline]
+    fn state_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 2] {
+        [X[0], X[1]]
+    }
+    #[inline(always)]
+    fn state_staged(
+        &self,
+        time: &[T; 3],
+        velocity_time: &[T; 1],
+        point: &[T; 2],
+    ) -> crate::State<T, 2> {
+        let v = {
+            let time = velocity_time;
+            let t2 = point[0] * point[0];
+            let t3 = point[1] * point[1];
+            let t4 = t2 + t3;
+            let t5 = t4.sqrt();
+            let t20 = t5 - self.parameters.Ro;
+            let t21 = t20 * t20;
+            let t23 = T::nearest(2.0) * t5;
+            let t25 = self.fixed[2] + t23;
+            let t29 = t21 * t25;
+            let t30 = self.fixed[3] * t29;
+            let t31 = t30 + T::one();
+            let t33 = t31 * point[0];
+            let t34 = T::one() / t4;
+            let t35 = t5 * t34;
+            let t36 = t33 * t35;
+            let t38 = t31 * point[1];
+            let t39 = t38 * t35;
+            let t46 = time[0] * t36;
+            let t47 = -t46;
+            let t48 = time[0] * t39;
+            let t49 = -t48;
+            crate::nalgebra::SVector::<T, 2>::new(t47, t49)
+        };
+        let t2 = point[0] * point[0];
+        let t3 = point[1] * point[1];
+        let t4 = t2 + t3;
+        let t5 = t4.sqrt();
+        let t20 = t5 - self.parameters.Ro;
+        let t21 = t20 * t20;
+        let t23 = T::nearest(2.0) * t5;
+        let t25 = self.fixed[2] + t23;
+        let t29 = t21 * t25;
+        let t30 = self.fixed[3] * t29;
+        let t31 = t30 + T::one();
+        let t33 = t31 * point[0];
+        let t34 = T::one() / t4;
+        let t35 = t5 * t34;
+        let t36 = t33 * t35;
+        let t37 = time[1] * t36;
+        let t38 = t31 * point[1];
+        let t39 = t38 * t35;
+        let t40 = time[1] * t39;
+        let t59 = t5 - self.parameters.Ri;
+        let t62 = t20 * t2;
+        let t63 = t62 * t59;
+        let t64 = self.fixed[7] * t63;
+        let t65 = t31 * t3;
+        let t66 = t65 * t35;
+        let t67 = t64 + t66;
+        let t68 = t67 * t34;
+        let t69 = time[1] * t68;
+        let t70 = t20 * t59;
+        let t71 = self.fixed[7] * t70;
+        let t72 = t31 * t35;
+        let t73 = t71 - t72;
+        let t74 = point[0] * point[1];
+        let t75 = t74 * t73;
+        let t76 = t75 * t34;
+        let t77 = time[1] * t76;
+        let t78 = t20 * t3;
+        let t79 = t78 * t59;
+        let t80 = self.fixed[7] * t79;
+        let t81 = t31 * t2;
+        let t82 = t81 * t35;
+        let t83 = t80 + t82;
+        let t84 = t83 * t34;
+        let t85 = time[1] * t84;
+        let t86 = t69 + T::one();
+        let t87 = t85 + T::one();
+        let t91 = time[2] * t70;
+        let t92 = t91 + T::one();
+        let t93 = time[1] * t72;
+        let t94 = t93 + T::one();
+        let t95 = t92 * t94;
+        let t100 = time[0] * t72;
+        let t101 = t100 * t92;
+        let t102 = self.parameters.A * t101;
+        let t103 = t102 + t91;
+        let t104 = t103.ln_of_both(t95);
+        let t108 = T::one() / t92;
+        let t109 = t108 + T::one();
+        let t113 = t104 * t108;
+        let t114 = self.fixed[11] * t113;
+        let t115 = self.fixed[10] * t109;
+        let t116 = t114 - t115;
+        let t117 = T::one() / t94;
+        let t118 = t117 + T::one();
+        let t119 = t104 * t117;
+        let t120 = self.fixed[11] * t119;
+        let t121 = self.fixed[10] * t118;
+        let t122 = t120 - t121;
+        let t123 = t91 * t116;
+        let t124 = t2 * t123;
+        let t125 = time[1] * t66;
+        let t126 = t125 * t122;
+        let t127 = t124 + t126;
+        let t128 = self.fixed[11] * t104;
+        let t129 = t34 * t127;
+        let t130 = t128 - t129;
+        let t131 = t93 * t122;
+        let t132 = t123 - t131;
+        let t133 = t74 * t34;
+        let t134 = t133 * t132;
+        let t135 = -t134;
+        let t136 = t3 * t123;
+        let t137 = time[1] * t82;
+        let t138 = t137 * t122;
+        let t139 = t136 + t138;
+        let t140 = t34 * t139;
+        let t141 = t128 - t140;
+        crate::State {
+            u: crate::nalgebra::SVector::<T, 2>::new(t37, t40),
+            v,
+            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t86, t77, t77, t87),
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t130, t135, t135, t141),
+        }
     }
 }
 impl<T: crate::Real> From<RingNu<T>> for crate::AnySolution<T> {

@@ -422,6 +422,12 @@ impl<T: crate::Real> crate::Solution<T, 2> for ShearWave<T> {
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
         ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 0, 0>::new(*self, X))
     }
+    fn state_at(
+        &self,
+        X: &[crate::nalgebra::SVector<T, 2>],
+    ) -> ::std::boxed::Box<dyn crate::StateAtPoints<T, 2> + '_> {
+        ::std::boxed::Box::new(crate::StagedStates::<Self, T, 2, 1, 2>::new(*self, X))
+    }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> crate::BodyForceStages<T, 2, 0, 0> for ShearWave<T> {
@@ -440,6 +446,57 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 0, 0> for ShearWave<T> {
         point: &[T; 0],
     ) -> crate::nalgebra::SVector<T, 2> {
         crate::nalgebra::SVector::<T, 2>::new(T::zero(), T::zero())
+    }
+}
+#[allow(unused_variables, clippy::all, clippy::pedantic)]
+impl<T: crate::Real> crate::StateStages<T, 2, 2, 1, 2> for ShearWave<T> {
+    #[inline]
+    fn state_time(&self, t: T) -> [T; 2] {
+        let t22 = self.fixed[1] * t;
+        let t23 = t22.sin();
+        let t24 = self.parameters.A * t23;
+        let t41 = self.fixed[4] * t23;
+        [t24, t41]
+    }
+    #[inline]
+    fn velocity_time(&self, t: T) -> [T; 1] {
+        let t22 = self.fixed[1] * t;
+        let t27 = t22.cos();
+        let t29 = self.fixed[2] * t27;
+        [t29]
+    }
+    #[inline]
+    fn state_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 2] {
+        let t5 = self.fixed[0] * X[1];
+        let t6 = t5.sin_pi();
+        let t38 = t5.cos_pi();
+        [t6, t38]
+    }
+    #[inline(always)]
+    fn state_staged(
+        &self,
+        time: &[T; 2],
+        velocity_time: &[T; 1],
+        point: &[T; 2],
+    ) -> crate::State<T, 2> {
+        let v = {
+            let time = velocity_time;
+            let t30 = time[0] * point[0];
+            crate::nalgebra::SVector::<T, 2>::new(t30, T::zero())
+        };
+        let t25 = time[0] * point[0];
+        let t42 = time[1] * point[1];
+        let t46 = self.fixed[5] * t42;
+        crate::State {
+            u: crate::nalgebra::SVector::<T, 2>::new(t25, T::zero()),
+            v,
+            F: crate::nalgebra::SMatrix::<
+                T,
+                2,
+                2,
+            >::new(T::one(), t42, T::zero(), T::one()),
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(T::zero(), t46, t46, T::zero()),
+        }
     }
 }
 impl<T: crate::Real> From<ShearWave<T>> for crate::AnySolution<T> {

@@ -1489,6 +1489,12 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
         ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 15, 18>::new(*self, X))
     }
+    fn state_at(
+        &self,
+        X: &[crate::nalgebra::SVector<T, 2>],
+    ) -> ::std::boxed::Box<dyn crate::StateAtPoints<T, 2> + '_> {
+        ::std::boxed::Box::new(crate::StagedStates::<Self, T, 5, 2, 5>::new(*self, X))
+    }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> crate::BodyForceStages<T, 2, 15, 18> for Skew2d<T> {
@@ -1921,6 +1927,146 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 15, 18> for Skew2d<T> {
         let t622 = t620 * t621;
         let t623 = t622 - t172;
         crate::nalgebra::SVector::<T, 2>::new(t623, t345)
+    }
+}
+#[allow(unused_variables, clippy::all, clippy::pedantic)]
+impl<T: crate::Real> crate::StateStages<T, 2, 5, 2, 5> for Skew2d<T> {
+    #[inline]
+    fn state_time(&self, t: T) -> [T; 5] {
+        let t22 = self.fixed[0] * t;
+        let t23 = t22.cos_pi();
+        let t24 = self.parameters.A * t23;
+        let t36 = t22.sin_pi();
+        let t37 = T::nearest(3.0) * t23;
+        let t39 = T::nearest(4.0) * t36;
+        let t40 = t37 + t39;
+        let t43 = self.fixed[1] * t40;
+        let t76 = self.fixed[7] * t23;
+        let t93 = self.parameters.A * t40;
+        let t136 = self.fixed[10] * t23;
+        [t24, t43, t76, t93, t136]
+    }
+    #[inline]
+    fn velocity_time(&self, t: T) -> [T; 2] {
+        let t22 = self.fixed[0] * t;
+        let t23 = t22.cos_pi();
+        let t36 = t22.sin_pi();
+        let t48 = self.fixed[2] * t36;
+        let t51 = T::nearest(4.0) * t23;
+        let t52 = T::nearest(3.0) * t36;
+        let t53 = t51 - t52;
+        let t56 = self.fixed[3] * t53;
+        [t48, t56]
+    }
+    #[inline]
+    fn state_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 5] {
+        let t3 = T::nearest(3.0).product_error(X[0]);
+        let t4 = T::nearest(3.0) * X[0];
+        let t6 = t4.sum_error(X[1]);
+        let t7 = t4 + X[1];
+        let t8 = t3 + t6;
+        let t9 = t7.sin();
+        let t10 = t7.cos();
+        let t12 = T::nearest(0.5) * t8;
+        let t13 = t12 * t9;
+        let t14 = t10 - t13;
+        let t15 = t8 * t14;
+        let t16 = t9 + t15;
+        let t27 = T::nearest(2.0) * X[0];
+        let t28 = t27.cos();
+        let t29 = T::nearest(0.5) * X[1];
+        let t30 = t29.sin_pi();
+        let t31 = t28 * t30;
+        let t32 = T::nearest(2.0) * t31;
+        let t33 = X[1] * X[1];
+        let t34 = X[0] * t33;
+        let t35 = t32 + t34;
+        let t71 = t12 * t10;
+        let t72 = t9 + t71;
+        let t73 = t8 * t72;
+        let t74 = t10 - t73;
+        let t79 = t27.sin();
+        let t80 = t30 * t79;
+        let t81 = T::nearest(4.0) * t80;
+        let t82 = t33 - t81;
+        let t84 = t29.cos_pi();
+        let t85 = t28 * t84;
+        let t86 = T::pi() * t85;
+        let t87 = X[0] * X[1];
+        let t88 = T::nearest(2.0) * t87;
+        let t89 = t86 + t88;
+        [t16, t35, t74, t82, t89]
+    }
+    #[inline(always)]
+    fn state_staged(
+        &self,
+        time: &[T; 5],
+        velocity_time: &[T; 2],
+        point: &[T; 5],
+    ) -> crate::State<T, 2> {
+        let v = {
+            let time = velocity_time;
+            let t49 = time[0] * point[0];
+            let t50 = -t49;
+            let t57 = time[1] * point[1];
+            crate::nalgebra::SVector::<T, 2>::new(t50, t57)
+        };
+        let t25 = time[0] * point[0];
+        let t44 = time[1] * point[1];
+        let t77 = time[2] * point[2];
+        let t78 = time[0] * point[2];
+        let t83 = time[1] * point[3];
+        let t90 = time[1] * point[4];
+        let t92 = t77 + T::one();
+        let t94 = time[3] * point[4];
+        let t96 = t94 + T::nearest(10.0);
+        let t97 = T::nearest(0.1) * t96;
+        let t98 = t90 + T::one();
+        let t99 = t92 * t98;
+        let t100 = t78 * t83;
+        let t101 = t99 - t100;
+        let t106 = t77 * t98;
+        let t107 = t100 - t106;
+        let t108 = T::one() / t101;
+        let t109 = t107 * t108;
+        let t110 = t77 - t109;
+        let t113 = t106 + t90;
+        let t114 = t113 - t100;
+        let t115 = t114.log_1p();
+        let t116 = self.fixed[8] * t110;
+        let t120 = t98 * t115;
+        let t121 = t120 * t108;
+        let t122 = self.fixed[9] * t121;
+        let t123 = t116 + t122;
+        let t124 = t83 * t108;
+        let t125 = t78 + t124;
+        let t126 = self.fixed[8] * t125;
+        let t127 = t83 * t115;
+        let t128 = t127 * t108;
+        let t129 = self.fixed[9] * t128;
+        let t130 = t126 - t129;
+        let t131 = t78 * t108;
+        let t132 = t83 + t131;
+        let t133 = self.fixed[8] * t132;
+        let t137 = time[4] * point[2];
+        let t138 = t115 * t108;
+        let t139 = t137 * t138;
+        let t140 = t133 - t139;
+        let t141 = t90 * t92;
+        let t142 = t100 - t141;
+        let t143 = t142 * t108;
+        let t144 = t90 - t143;
+        let t145 = self.fixed[8] * t144;
+        let t146 = t92 * t115;
+        let t147 = t146 * t108;
+        let t148 = self.fixed[9] * t147;
+        let t149 = t145 + t148;
+        crate::State {
+            u: crate::nalgebra::SVector::<T, 2>::new(t25, t44),
+            v,
+            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t92, t78, t83, t97),
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t123, t130, t140, t149),
+        }
     }
 }
 impl<T: crate::Real> From<Skew2d<T>> for crate::AnySolution<T> {

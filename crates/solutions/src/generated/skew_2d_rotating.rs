@@ -1848,6 +1848,12 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
         ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 24, 9>::new(*self, X))
     }
+    fn state_at(
+        &self,
+        X: &[crate::nalgebra::SVector<T, 2>],
+    ) -> ::std::boxed::Box<dyn crate::StateAtPoints<T, 2> + '_> {
+        ::std::boxed::Box::new(crate::StagedStates::<Self, T, 14, 10, 7>::new(*self, X))
+    }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> crate::BodyForceStages<T, 2, 24, 9> for Skew2dRotating<T> {
@@ -2178,6 +2184,251 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 24, 9> for Skew2dRotating<T> {
         let t650 = t649 - t135;
         let t651 = T::nearest(0.1) * t650;
         crate::nalgebra::SVector::<T, 2>::new(t645, t651)
+    }
+}
+#[allow(unused_variables, clippy::all, clippy::pedantic)]
+impl<T: crate::Real> crate::StateStages<T, 2, 14, 10, 7> for Skew2dRotating<T> {
+    #[inline]
+    fn state_time(&self, t: T) -> [T; 14] {
+        let t5 = self.fixed[0] * t;
+        let t6 = t5.sin();
+        let t8 = self.parameters.Omega * t;
+        let t9 = t8.sin();
+        let t28 = self.fixed[1] * t;
+        let t29 = t28.cos_pi();
+        let t30 = t8.cos();
+        let t41 = t28.sin_pi();
+        let t42 = T::nearest(3.0) * t29;
+        let t44 = T::nearest(4.0) * t41;
+        let t45 = t42 + t44;
+        let t47 = t29 * t30;
+        let t48 = T::nearest(10.0) * t47;
+        let t50 = t45 * t9;
+        let t54 = t6 * t6;
+        let t55 = T::nearest(20.0) * t54;
+        let t57 = T::nearest(10.0) * t9;
+        let t65 = t29 * t9;
+        let t66 = T::nearest(10.0) * t65;
+        let t68 = t45 * t30;
+        let t77 = self.parameters.A * t29;
+        let t148 = T::nearest(30.0) * t47;
+        let t169 = T::nearest(30.0) * t65;
+        let t188 = self.fixed[6] * t29;
+        let t193 = self.fixed[7] * t45;
+        let t228 = self.fixed[10] * t29;
+        [t9, t30, t48, t50, t55, t57, t66, t68, t77, t148, t169, t188, t193, t228]
+    }
+    #[inline]
+    fn velocity_time(&self, t: T) -> [T; 10] {
+        let t8 = self.parameters.Omega * t;
+        let t9 = t8.sin();
+        let t28 = self.fixed[1] * t;
+        let t29 = t28.cos_pi();
+        let t30 = t8.cos();
+        let t41 = t28.sin_pi();
+        let t42 = T::nearest(3.0) * t29;
+        let t44 = T::nearest(4.0) * t41;
+        let t45 = t42 + t44;
+        let t57 = T::nearest(10.0) * t9;
+        let t77 = self.parameters.A * t29;
+        let t81 = self.parameters.A * t45;
+        let t88 = T::nearest(4.0) * t29;
+        let t89 = T::nearest(3.0) * t41;
+        let t90 = t88 - t89;
+        let t91 = t41 * t30;
+        let t92 = T::nearest(10.0) * t91;
+        let t94 = t90 * t9;
+        let t104 = T::nearest(10.0) * t30;
+        let t108 = t41 * t9;
+        let t109 = T::nearest(10.0) * t108;
+        let t111 = t90 * t30;
+        [t9, t30, t57, t77, t81, t92, t94, t104, t109, t111]
+    }
+    #[inline]
+    fn state_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 7] {
+        let t12 = T::nearest(3.0).product_error(X[0]);
+        let t13 = T::nearest(3.0) * X[0];
+        let t14 = t13.sum_error(X[1]);
+        let t15 = t13 + X[1];
+        let t16 = t12 + t14;
+        let t17 = t15.sin();
+        let t18 = t15.cos();
+        let t19 = T::nearest(0.5) * t16;
+        let t20 = t19 * t17;
+        let t21 = t18 - t20;
+        let t22 = t16 * t21;
+        let t23 = t17 + t22;
+        let t32 = T::nearest(2.0) * X[0];
+        let t33 = t32.cos();
+        let t34 = T::nearest(0.5) * X[1];
+        let t35 = t34.sin_pi();
+        let t36 = t33 * t35;
+        let t37 = T::nearest(2.0) * t36;
+        let t38 = X[1] * X[1];
+        let t39 = X[0] * t38;
+        let t40 = t37 + t39;
+        let t139 = t19 * t18;
+        let t140 = t17 + t139;
+        let t141 = t16 * t140;
+        let t142 = t18 - t141;
+        let t143 = t32.sin();
+        let t144 = t35 * t143;
+        let t145 = T::nearest(4.0) * t144;
+        let t146 = t38 - t145;
+        let t156 = t34.cos_pi();
+        let t157 = t33 * t156;
+        let t158 = T::pi() * t157;
+        let t159 = X[0] * X[1];
+        let t160 = T::nearest(2.0) * t159;
+        let t161 = t158 + t160;
+        [X[0], X[1], t23, t40, t142, t146, t161]
+    }
+    #[inline(always)]
+    fn state_staged(
+        &self,
+        time: &[T; 14],
+        velocity_time: &[T; 10],
+        point: &[T; 7],
+    ) -> crate::State<T, 2> {
+        let v = {
+            let time = velocity_time;
+            let t78 = time[3] * point[2];
+            let t79 = point[0] + t78;
+            let t80 = T::nearest(10.0) * point[1];
+            let t82 = time[4] * point[3];
+            let t83 = t80 + t82;
+            let t84 = time[2] * t79;
+            let t85 = time[1] * t83;
+            let t86 = t84 + t85;
+            let t93 = time[5] * point[2];
+            let t95 = time[6] * point[3];
+            let t96 = t93 + t95;
+            let t97 = self.parameters.Omega * t86;
+            let t100 = self.fixed[2] * t96;
+            let t101 = t97 + t100;
+            let t102 = T::nearest(0.1) * t101;
+            let t103 = -t102;
+            let t105 = time[7] * t79;
+            let t106 = time[0] * t83;
+            let t107 = t105 - t106;
+            let t110 = time[8] * point[2];
+            let t112 = time[9] * point[3];
+            let t113 = t110 - t112;
+            let t114 = self.parameters.Omega * t107;
+            let t115 = self.fixed[2] * t113;
+            let t116 = t114 - t115;
+            let t117 = T::nearest(0.1) * t116;
+            crate::nalgebra::SVector::<T, 2>::new(t103, t117)
+        };
+        let t49 = time[2] * point[2];
+        let t51 = time[3] * point[3];
+        let t52 = t49 - t51;
+        let t56 = time[4] * point[0];
+        let t58 = time[5] * point[1];
+        let t59 = self.parameters.A * t52;
+        let t60 = t56 + t58;
+        let t61 = t60 - t59;
+        let t63 = T::nearest(0.1) * t61;
+        let t64 = -t63;
+        let t67 = time[6] * point[2];
+        let t69 = time[7] * point[3];
+        let t70 = t67 + t69;
+        let t71 = time[5] * point[0];
+        let t72 = time[4] * point[1];
+        let t73 = self.parameters.A * t70;
+        let t74 = t71 - t72;
+        let t75 = t74 + t73;
+        let t76 = T::nearest(0.1) * t75;
+        let t149 = time[9] * point[4];
+        let t150 = time[3] * point[5];
+        let t151 = t149 - t150;
+        let t152 = self.parameters.A * t151;
+        let t153 = time[4] - t152;
+        let t162 = time[2] * point[4];
+        let t163 = time[3] * point[6];
+        let t164 = t162 - t163;
+        let t165 = self.parameters.A * t164;
+        let t166 = time[5] - t165;
+        let t167 = T::nearest(0.1) * t166;
+        let t168 = -t167;
+        let t170 = time[10] * point[4];
+        let t171 = time[7] * point[5];
+        let t172 = t170 + t171;
+        let t173 = self.parameters.A * t172;
+        let t174 = time[5] + t173;
+        let t175 = T::nearest(0.1) * t174;
+        let t176 = time[6] * point[4];
+        let t177 = time[7] * point[6];
+        let t178 = t176 + t177;
+        let t179 = self.parameters.A * t178;
+        let t180 = time[4] - t179;
+        let t183 = T::nearest(10.0) - t153;
+        let t184 = T::nearest(0.1) * t183;
+        let t185 = T::nearest(10.0) - t180;
+        let t186 = T::nearest(0.1) * t185;
+        let t189 = time[11] * point[4];
+        let t191 = t189 + T::one();
+        let t194 = time[12] * point[6];
+        let t195 = t194 + T::one();
+        let t196 = time[12] * point[5];
+        let t197 = t191 * t195;
+        let t198 = time[8] * point[4];
+        let t199 = t198 * t196;
+        let t200 = t197 - t199;
+        let t205 = t189 * t195;
+        let t206 = t199 - t205;
+        let t207 = T::one() / t200;
+        let t208 = t206 * t207;
+        let t209 = t189 - t208;
+        let t212 = t205 + t194;
+        let t213 = t212 - t199;
+        let t214 = t213.log_1p();
+        let t215 = self.fixed[8] * t209;
+        let t219 = t195 * t214;
+        let t220 = t219 * t207;
+        let t221 = self.fixed[9] * t220;
+        let t222 = t215 + t221;
+        let t223 = t198 * t207;
+        let t224 = t196 + t223;
+        let t225 = self.fixed[8] * t224;
+        let t229 = time[13] * point[4];
+        let t230 = t214 * t207;
+        let t231 = t229 * t230;
+        let t232 = t225 - t231;
+        let t233 = time[1] * t222;
+        let t234 = time[0] * t232;
+        let t235 = t233 - t234;
+        let t236 = t196 * t207;
+        let t237 = t198 + t236;
+        let t238 = self.fixed[8] * t237;
+        let t239 = t196 * t214;
+        let t240 = t239 * t207;
+        let t241 = self.fixed[9] * t240;
+        let t242 = t238 - t241;
+        let t243 = t194 * t191;
+        let t244 = t199 - t243;
+        let t245 = t244 * t207;
+        let t246 = t194 - t245;
+        let t247 = self.fixed[8] * t246;
+        let t248 = t191 * t214;
+        let t249 = t248 * t207;
+        let t250 = self.fixed[9] * t249;
+        let t251 = t247 + t250;
+        let t252 = time[1] * t242;
+        let t253 = time[0] * t251;
+        let t254 = t252 - t253;
+        let t255 = time[0] * t222;
+        let t256 = time[1] * t232;
+        let t257 = t255 + t256;
+        let t258 = time[0] * t242;
+        let t259 = time[1] * t251;
+        let t260 = t258 + t259;
+        crate::State {
+            u: crate::nalgebra::SVector::<T, 2>::new(t64, t76),
+            v,
+            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t184, t168, t175, t186),
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t235, t254, t257, t260),
+        }
     }
 }
 impl<T: crate::Real> From<Skew2dRotating<T>> for crate::AnySolution<T> {

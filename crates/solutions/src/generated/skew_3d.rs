@@ -3844,6 +3844,12 @@ impl<T: crate::Real> crate::Solution<T, 3> for Skew3d<T> {
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 3> + '_> {
         ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 36, 11>::new(*self, X))
     }
+    fn state_at(
+        &self,
+        X: &[crate::nalgebra::SVector<T, 3>],
+    ) -> ::std::boxed::Box<dyn crate::StateAtPoints<T, 3> + '_> {
+        ::std::boxed::Box::new(crate::StagedStates::<Self, T, 12, 3, 8>::new(*self, X))
+    }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> crate::BodyForceStages<T, 3, 36, 11> for Skew3d<T> {
@@ -4754,6 +4760,323 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 36, 11> for Skew3d<T> {
         let t1783 = t1780 + t1782;
         let t1784 = T::nearest(0.5) * t1783;
         crate::nalgebra::SVector::<T, 3>::new(t1520, t1670, t1784)
+    }
+}
+#[allow(unused_variables, clippy::all, clippy::pedantic)]
+impl<T: crate::Real> crate::StateStages<T, 3, 12, 3, 8> for Skew3d<T> {
+    #[inline]
+    fn state_time(&self, t: T) -> [T; 12] {
+        let t28 = self.fixed[0] * t;
+        let t29 = t28.cos_pi();
+        let t30 = self.parameters.A * t29;
+        let t41 = t28.sin_pi();
+        let t42 = T::nearest(3.0) * t29;
+        let t44 = T::nearest(4.0) * t41;
+        let t45 = t42 + t44;
+        let t48 = self.fixed[1] * t45;
+        let t63 = T::nearest(5.0) * t29;
+        let t65 = T::nearest(12.0) * t41;
+        let t66 = t63 - t65;
+        let t69 = self.fixed[2] * t66;
+        let t117 = self.fixed[9] * t29;
+        let t121 = self.fixed[10] * t29;
+        let t133 = self.fixed[11] * t45;
+        let t138 = self.fixed[12] * t45;
+        let t143 = self.fixed[13] * t66;
+        let t154 = self.fixed[14] * t66;
+        let t160 = self.fixed[15] * t45;
+        let t166 = self.fixed[16] * t66;
+        [t29, t30, t48, t69, t117, t121, t133, t138, t143, t154, t160, t166]
+    }
+    #[inline]
+    fn velocity_time(&self, t: T) -> [T; 3] {
+        let t28 = self.fixed[0] * t;
+        let t29 = t28.cos_pi();
+        let t41 = t28.sin_pi();
+        let t75 = self.fixed[3] * t41;
+        let t78 = T::nearest(4.0) * t29;
+        let t79 = T::nearest(3.0) * t41;
+        let t80 = t78 - t79;
+        let t83 = self.fixed[4] * t80;
+        let t85 = T::nearest(12.0) * t29;
+        let t86 = T::nearest(5.0) * t41;
+        let t87 = t85 + t86;
+        let t90 = self.fixed[5] * t87;
+        [t75, t83, t90]
+    }
+    #[inline]
+    fn state_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 8] {
+        let t3 = T::nearest(3.0).product_error(X[0]);
+        let t4 = T::nearest(3.0) * X[0];
+        let t8 = T::nearest(0.5) * X[2];
+        let t9 = t4.sum_error(X[1]);
+        let t10 = t4 + X[1];
+        let t11 = -t8;
+        let t12 = t10.sum_error(t11);
+        let t13 = t10 - t8;
+        let t14 = t3 + t9;
+        let t15 = t14 + t12;
+        let t16 = t13.sin();
+        let t17 = t13.cos();
+        let t18 = T::nearest(0.5) * t15;
+        let t19 = t18 * t16;
+        let t20 = t17 - t19;
+        let t21 = t15 * t20;
+        let t22 = t16 + t21;
+        let t33 = T::nearest(2.0) * X[0];
+        let t34 = t33.cos();
+        let t35 = T::nearest(0.5) * X[1];
+        let t36 = t35.sin_pi();
+        let t37 = t34 * t36;
+        let t38 = X[2] * X[2];
+        let t39 = X[0] * t38;
+        let t40 = t37 + t39;
+        let t50 = T::nearest(0.5) * X[0];
+        let t51 = t50.exp();
+        let t52 = T::nearest(2.0) * X[2];
+        let t53 = X[1].sum_error(t52);
+        let t54 = X[1] + t52;
+        let t55 = t54.cos();
+        let t56 = t54.sin();
+        let t57 = T::nearest(0.5) * t53;
+        let t58 = t57 * t55;
+        let t59 = t56 + t58;
+        let t60 = t53 * t59;
+        let t61 = t55 - t60;
+        let t70 = t51 * t61;
+        let t112 = t18 * t17;
+        let t113 = t16 + t112;
+        let t114 = t15 * t113;
+        let t115 = t17 - t114;
+        let t124 = t33.sin();
+        let t125 = t36 * t124;
+        let t126 = T::nearest(2.0) * t125;
+        let t127 = t38 - t126;
+        let t129 = t35.cos_pi();
+        let t134 = t34 * t129;
+        let t139 = X[0] * X[2];
+        let t145 = t57 * t56;
+        let t146 = t55 - t145;
+        let t147 = t53 * t146;
+        let t148 = t56 + t147;
+        let t149 = t51 * t148;
+        [t22, t40, t70, t115, t127, t134, t139, t149]
+    }
+    #[inline(always)]
+    fn state_staged(
+        &self,
+        time: &[T; 12],
+        velocity_time: &[T; 3],
+        point: &[T; 8],
+    ) -> crate::State<T, 3> {
+        let v = {
+            let time = velocity_time;
+            let t76 = time[0] * point[0];
+            let t77 = -t76;
+            let t84 = time[1] * point[1];
+            let t91 = time[2] * point[2];
+            let t92 = -t91;
+            crate::nalgebra::SVector::<T, 3>::new(t77, t84, t92)
+        };
+        let t31 = time[1] * point[0];
+        let t49 = time[2] * point[1];
+        let t71 = time[3] * point[2];
+        let t118 = time[4] * point[3];
+        let t119 = time[1] * point[3];
+        let t122 = time[5] * point[3];
+        let t123 = -t122;
+        let t128 = time[2] * point[4];
+        let t135 = time[6] * point[5];
+        let t140 = time[7] * point[6];
+        let t144 = time[8] * point[2];
+        let t150 = time[3] * point[7];
+        let t151 = -t150;
+        let t155 = time[9] * point[7];
+        let t156 = -t155;
+        let t158 = t118 + T::one();
+        let t161 = time[10] * point[5];
+        let t163 = t161 + T::nearest(10.0);
+        let t164 = T::nearest(0.1) * t163;
+        let t167 = time[11] * point[7];
+        let t169 = T::nearest(13.0) - t167;
+        let t170 = T::nearest(0.07692307692307693) * t169;
+        let t171 = t135 + T::one();
+        let t172 = t156 + T::one();
+        let t173 = t171 * t172;
+        let t174 = t140 * t151;
+        let t175 = t173 - t174;
+        let t176 = t128 * t172;
+        let t177 = t140 * t144;
+        let t178 = t176 - t177;
+        let t179 = t128 * t151;
+        let t180 = t144 * t171;
+        let t181 = t179 - t180;
+        let t182 = t158 * t175;
+        let t183 = t119 * t178;
+        let t184 = t123 * t181;
+        let t185 = t182 - t183;
+        let t186 = t185 + t184;
+        let t191 = t119 * t172;
+        let t192 = t123 * t151;
+        let t193 = t191 - t192;
+        let t194 = t119 * t140;
+        let t195 = t123 * t171;
+        let t196 = t194 - t195;
+        let t197 = t118 * t175;
+        let t198 = t128 * t193;
+        let t199 = t144 * t196;
+        let t200 = t197 - t198;
+        let t201 = t200 + t199;
+        let t202 = T::one() / t186;
+        let t203 = t201 * t202;
+        let t204 = t118 + t203;
+        let t207 = t135 * t144;
+        let t208 = t179 - t207;
+        let t209 = t135 * t156;
+        let t210 = t174 - t209;
+        let t211 = T::one() - t210;
+        let t212 = time[0] * point[3];
+        let t213 = t212 * t178;
+        let t214 = self.parameters.A * t213;
+        let t215 = t118 - t155;
+        let t216 = t215 + T::one();
+        let t217 = t135 * t216;
+        let t218 = t156 * t158;
+        let t219 = t144 - t208;
+        let t220 = t123 * t219;
+        let t221 = t118 * t211;
+        let t222 = t217 - t214;
+        let t223 = t222 + t218;
+        let t224 = t223 - t220;
+        let t225 = t224 - t174;
+        let t226 = t225 + t221;
+        let t227 = t226.log_1p();
+        let t228 = self.fixed[17] * t204;
+        let t232 = t175 * t227;
+        let t233 = t232 * t202;
+        let t234 = self.fixed[18] * t233;
+        let t235 = t228 + t234;
+        let t236 = t123 * t144;
+        let t237 = t158 * t172;
+        let t238 = t236 - t237;
+        let t239 = t140 * t158;
+        let t240 = t123 * t128;
+        let t241 = t239 - t240;
+        let t242 = t118 * t178;
+        let t243 = t128 * t238;
+        let t244 = t144 * t241;
+        let t245 = t242 + t243;
+        let t246 = t245 + t244;
+        let t247 = t246 * t202;
+        let t248 = t119 - t247;
+        let t249 = self.fixed[17] * t248;
+        let t250 = t178 * t227;
+        let t251 = t250 * t202;
+        let t252 = self.fixed[18] * t251;
+        let t253 = t249 - t252;
+        let t254 = t151 * t158;
+        let t255 = t119 * t144;
+        let t256 = t254 - t255;
+        let t257 = t119 * t128;
+        let t258 = t158 * t171;
+        let t259 = t257 - t258;
+        let t260 = t118 * t181;
+        let t261 = t128 * t256;
+        let t262 = t144 * t259;
+        let t263 = t260 - t261;
+        let t264 = t263 - t262;
+        let t265 = t264 * t202;
+        let t266 = t265 - t122;
+        let t267 = self.fixed[17] * t266;
+        let t268 = t181 * t227;
+        let t269 = t268 * t202;
+        let t270 = self.fixed[18] * t269;
+        let t271 = t267 + t270;
+        let t272 = t151 * t196;
+        let t273 = t119 * t175;
+        let t274 = t135 * t193;
+        let t275 = t272 + t273;
+        let t276 = t275 - t274;
+        let t277 = t276 * t202;
+        let t278 = t128 + t277;
+        let t279 = self.fixed[17] * t278;
+        let t280 = t193 * t227;
+        let t281 = t280 * t202;
+        let t282 = self.fixed[18] * t281;
+        let t283 = t279 - t282;
+        let t284 = t135 * t238;
+        let t285 = t151 * t241;
+        let t286 = t183 + t284;
+        let t287 = t286 + t285;
+        let t288 = t287 * t202;
+        let t289 = t135 - t288;
+        let t290 = self.fixed[17] * t289;
+        let t291 = t238 * t227;
+        let t292 = t291 * t202;
+        let t293 = self.fixed[18] * t292;
+        let t294 = t290 - t293;
+        let t295 = t151 * t259;
+        let t296 = t119 * t181;
+        let t297 = t135 * t256;
+        let t298 = t295 - t296;
+        let t299 = t298 + t297;
+        let t300 = t299 * t202;
+        let t301 = t140 - t300;
+        let t302 = self.fixed[17] * t301;
+        let t303 = t256 * t227;
+        let t304 = t303 * t202;
+        let t305 = self.fixed[18] * t304;
+        let t306 = t302 - t305;
+        let t307 = t123 * t175;
+        let t308 = t140 * t193;
+        let t309 = t156 * t196;
+        let t310 = t307 - t308;
+        let t311 = t310 + t309;
+        let t312 = t311 * t202;
+        let t313 = t144 + t312;
+        let t314 = self.fixed[17] * t313;
+        let t315 = t196 * t227;
+        let t316 = t315 * t202;
+        let t317 = self.fixed[18] * t316;
+        let t318 = t314 + t317;
+        let t319 = t123 * t178;
+        let t320 = t140 * t238;
+        let t321 = t156 * t241;
+        let t322 = t319 + t320;
+        let t323 = t322 + t321;
+        let t324 = t323 * t202;
+        let t325 = t150 + t324;
+        let t326 = -t325;
+        let t327 = self.fixed[17] * t326;
+        let t328 = t241 * t227;
+        let t329 = t328 * t202;
+        let t330 = self.fixed[18] * t329;
+        let t331 = t327 - t330;
+        let t332 = t140 * t256;
+        let t333 = t156 * t259;
+        let t334 = t184 - t332;
+        let t335 = t334 - t333;
+        let t336 = t335 * t202;
+        let t337 = t336 - t155;
+        let t338 = self.fixed[17] * t337;
+        let t339 = t259 * t227;
+        let t340 = t339 * t202;
+        let t341 = self.fixed[18] * t340;
+        let t342 = t338 - t341;
+        crate::State {
+            u: crate::nalgebra::SVector::<T, 3>::new(t31, t49, t71),
+            v,
+            F: crate::nalgebra::SMatrix::<
+                T,
+                3,
+                3,
+            >::new(t158, t119, t123, t128, t164, t140, t144, t151, t170),
+            P: crate::nalgebra::SMatrix::<
+                T,
+                3,
+                3,
+            >::new(t235, t253, t271, t283, t294, t306, t318, t331, t342),
+        }
     }
 }
 impl<T: crate::Real> From<Skew3d<T>> for crate::AnySolution<T> {

@@ -1244,6 +1244,12 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 3> + '_> {
         ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 4, 12>::new(*self, X))
     }
+    fn state_at(
+        &self,
+        X: &[crate::nalgebra::SVector<T, 3>],
+    ) -> ::std::boxed::Box<dyn crate::StateAtPoints<T, 3> + '_> {
+        ::std::boxed::Box::new(crate::StagedStates::<Self, T, 4, 1, 3>::new(*self, X))
+    }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 12> for SphereShell<T> {
@@ -1377,6 +1383,195 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 12> for SphereShell<T> {
         let t358 = point[10] * t355;
         let t360 = point[11] * t355;
         crate::nalgebra::SVector::<T, 3>::new(t356, t358, t360)
+    }
+}
+#[allow(unused_variables, clippy::all, clippy::pedantic)]
+impl<T: crate::Real> crate::StateStages<T, 3, 4, 1, 3> for SphereShell<T> {
+    #[inline]
+    fn state_time(&self, t: T) -> [T; 4] {
+        let t17 = self.fixed[0] * t;
+        let t18 = t17.cos_pi();
+        let t25 = self.fixed[2] * t18;
+        let t105 = self.fixed[8] * t18;
+        let t122 = t18 * t18;
+        [t18, t25, t105, t122]
+    }
+    #[inline]
+    fn velocity_time(&self, t: T) -> [T; 1] {
+        let t17 = self.fixed[0] * t;
+        let t34 = t17.sin_pi();
+        let t38 = self.fixed[3] * t34;
+        [t38]
+    }
+    #[inline]
+    fn state_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 3] {
+        [X[1], X[2], X[0]]
+    }
+    #[inline(always)]
+    fn state_staged(
+        &self,
+        time: &[T; 4],
+        velocity_time: &[T; 1],
+        point: &[T; 3],
+    ) -> crate::State<T, 3> {
+        let v = {
+            let time = velocity_time;
+            let t3 = point[0] * point[0];
+            let t4 = point[1] * point[1];
+            let t5 = point[2] * point[2];
+            let t6 = t3 + t4;
+            let t7 = t6 + t5;
+            let t8 = t7.sqrt();
+            let t21 = self.fixed[1] * t8;
+            let t23 = T::nearest(3.0) - t21;
+            let t26 = t8 * t23;
+            let t27 = t26 * point[2];
+            let t29 = t26 * point[0];
+            let t31 = t26 * point[1];
+            let t39 = time[0] * t27;
+            let t40 = -t39;
+            let t41 = time[0] * t29;
+            let t42 = -t41;
+            let t43 = time[0] * t31;
+            let t44 = -t43;
+            crate::nalgebra::SVector::<T, 3>::new(t40, t42, t44)
+        };
+        let t3 = point[0] * point[0];
+        let t4 = point[1] * point[1];
+        let t5 = point[2] * point[2];
+        let t6 = t3 + t4;
+        let t7 = t6 + t5;
+        let t8 = t7.sqrt();
+        let t21 = self.fixed[1] * t8;
+        let t23 = T::nearest(3.0) - t21;
+        let t26 = t8 * t23;
+        let t27 = t26 * point[2];
+        let t28 = time[1] * t27;
+        let t29 = t26 * point[0];
+        let t30 = time[1] * t29;
+        let t31 = t26 * point[1];
+        let t32 = time[1] * t31;
+        let t59 = self.fixed[6] * t8;
+        let t60 = T::one() - t59;
+        let t62 = t5 * t60;
+        let t63 = T::nearest(6.0) * t62;
+        let t64 = t23 * t6;
+        let t65 = t63 + t64;
+        let t66 = T::one() / t7;
+        let t67 = t8 * t66;
+        let t68 = t65 * t67;
+        let t69 = time[1] * t68;
+        let t72 = self.fixed[7] * t8;
+        let t73 = T::nearest(3.0) - t72;
+        let t74 = point[2] * point[0];
+        let t75 = t74 * t73;
+        let t76 = t75 * t67;
+        let t77 = time[1] * t76;
+        let t78 = point[2] * point[1];
+        let t79 = t78 * t73;
+        let t80 = t79 * t67;
+        let t81 = time[1] * t80;
+        let t82 = t4 + t5;
+        let t83 = t3 * t60;
+        let t84 = T::nearest(6.0) * t83;
+        let t85 = t23 * t82;
+        let t86 = t84 + t85;
+        let t87 = t86 * t67;
+        let t88 = time[1] * t87;
+        let t89 = point[0] * point[1];
+        let t90 = t89 * t73;
+        let t91 = t90 * t67;
+        let t92 = time[1] * t91;
+        let t93 = t3 + t5;
+        let t94 = t4 * t60;
+        let t95 = T::nearest(6.0) * t94;
+        let t96 = t23 * t93;
+        let t97 = t95 + t96;
+        let t98 = t97 * t67;
+        let t99 = time[1] * t98;
+        let t100 = t69 + T::one();
+        let t101 = t88 + T::one();
+        let t102 = t99 + T::one();
+        let t106 = t8 * t60;
+        let t107 = time[2] * t106;
+        let t108 = t107 + T::one();
+        let t109 = time[1] * t26;
+        let t110 = t109 + T::one();
+        let t111 = t110 * t110;
+        let t112 = t108 * t111;
+        let t117 = time[0] * t26;
+        let t118 = t117 * t108;
+        let t121 = self.fixed[9] * t118;
+        let t123 = t23 * t23;
+        let t124 = t7 * t123;
+        let t125 = time[3] * t124;
+        let t126 = t125 * t108;
+        let t130 = self.fixed[10] * t126;
+        let t131 = t121 + t130;
+        let t132 = t131 + t107;
+        let t133 = t132.ln_of_both(t112);
+        let t137 = T::one() / t108;
+        let t138 = t137 + T::one();
+        let t142 = t133 * t137;
+        let t143 = self.fixed[12] * t142;
+        let t144 = self.fixed[11] * t138;
+        let t145 = t143 - t144;
+        let t146 = T::one() / t110;
+        let t147 = t146 + T::one();
+        let t148 = t133 * t146;
+        let t149 = self.fixed[12] * t148;
+        let t150 = self.fixed[11] * t147;
+        let t151 = t149 - t150;
+        let t152 = t5 * t67;
+        let t153 = t107 * t145;
+        let t154 = t152 * t153;
+        let t155 = time[1] * t64;
+        let t156 = t155 * t151;
+        let t157 = t154 + t156;
+        let t158 = self.fixed[12] * t133;
+        let t159 = t67 * t157;
+        let t160 = t158 - t159;
+        let t161 = t67 * t153;
+        let t162 = time[1] * t23;
+        let t163 = t162 * t151;
+        let t164 = t161 - t163;
+        let t165 = t74 * t67;
+        let t166 = t165 * t164;
+        let t167 = -t166;
+        let t168 = t78 * t67;
+        let t169 = t168 * t164;
+        let t170 = -t169;
+        let t171 = t3 * t67;
+        let t172 = t171 * t153;
+        let t173 = time[1] * t85;
+        let t174 = t173 * t151;
+        let t175 = t172 + t174;
+        let t176 = t67 * t175;
+        let t177 = t158 - t176;
+        let t178 = t89 * t67;
+        let t179 = t178 * t164;
+        let t180 = -t179;
+        let t181 = t4 * t67;
+        let t182 = t181 * t153;
+        let t183 = time[1] * t96;
+        let t184 = t183 * t151;
+        let t185 = t182 + t184;
+        let t186 = t67 * t185;
+        let t187 = t158 - t186;
+        crate::State {
+            u: crate::nalgebra::SVector::<T, 3>::new(t28, t30, t32),
+            v,
+            F: crate::nalgebra::SMatrix::<
+                T,
+                3,
+                3,
+            >::new(t100, t77, t81, t77, t101, t92, t81, t92, t102),
+            P: crate::nalgebra::SMatrix::<
+                T,
+                3,
+                3,
+            >::new(t160, t167, t170, t167, t177, t180, t170, t180, t187),
+        }
     }
 }
 impl<T: crate::Real> From<SphereShell<T>> for crate::AnySolution<T> {

@@ -679,6 +679,12 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 3> + '_> {
         ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 4, 3>::new(*self, X))
     }
+    fn state_at(
+        &self,
+        X: &[crate::nalgebra::SVector<T, 3>],
+    ) -> ::std::boxed::Box<dyn crate::StateAtPoints<T, 3> + '_> {
+        ::std::boxed::Box::new(crate::StagedStates::<Self, T, 3, 2, 3>::new(*self, X))
+    }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 3> for Torsion<T> {
@@ -736,6 +742,123 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 3> for Torsion<T> {
         let t107 = t97 + t106;
         let t108 = self.fixed[8] * t107;
         crate::nalgebra::SVector::<T, 3>::new(t105, t108, T::zero())
+    }
+}
+#[allow(unused_variables, clippy::all, clippy::pedantic)]
+impl<T: crate::Real> crate::StateStages<T, 3, 3, 2, 3> for Torsion<T> {
+    #[inline]
+    fn state_time(&self, t: T) -> [T; 3] {
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = self.fixed[1] * t8;
+        let t66 = self.parameters.A * t8;
+        let t79 = self.fixed[5] * t8;
+        [t11, t66, t79]
+    }
+    #[inline]
+    fn velocity_time(&self, t: T) -> [T; 2] {
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = self.fixed[1] * t8;
+        let t31 = t7.cos_pi();
+        let t36 = self.fixed[2] * t31;
+        [t11, t36]
+    }
+    #[inline]
+    fn state_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 3] {
+        [X[2], X[0], X[1]]
+    }
+    #[inline(always)]
+    fn state_staged(
+        &self,
+        time: &[T; 3],
+        velocity_time: &[T; 2],
+        point: &[T; 3],
+    ) -> crate::State<T, 3> {
+        let v = {
+            let time = velocity_time;
+            let t12 = time[0] * point[0];
+            let t13 = t12.sin();
+            let t16 = t12.cos();
+            let t17 = point[1] * t13;
+            let t18 = point[2] * t16;
+            let t19 = t17 + t18;
+            let t21 = t13 * t19;
+            let t24 = point[1] * t16;
+            let t25 = point[2] * t13;
+            let t26 = t24 - t25;
+            let t27 = t13 * t26;
+            let t32 = t16 * t19;
+            let t33 = t27 + t32;
+            let t37 = time[1] * point[0];
+            let t38 = t37 * t33;
+            let t39 = -t38;
+            let t40 = t16 * t26;
+            let t41 = t21 - t40;
+            let t42 = t37 * t41;
+            let t43 = -t42;
+            crate::nalgebra::SVector::<T, 3>::new(t39, t43, T::zero())
+        };
+        let t12 = time[0] * point[0];
+        let t13 = t12.sin();
+        let t16 = t12.cos();
+        let t17 = point[1] * t13;
+        let t18 = point[2] * t16;
+        let t19 = t17 + t18;
+        let t21 = t13 * t19;
+        let t22 = T::nearest(2.0) * t21;
+        let t23 = -t22;
+        let t24 = point[1] * t16;
+        let t25 = point[2] * t13;
+        let t26 = t24 - t25;
+        let t27 = t13 * t26;
+        let t28 = T::nearest(2.0) * t27;
+        let t32 = t16 * t19;
+        let t33 = t27 + t32;
+        let t40 = t16 * t26;
+        let t41 = t21 - t40;
+        let t60 = t13 * t13;
+        let t61 = T::nearest(2.0) * t60;
+        let t63 = t16 * t13;
+        let t64 = T::nearest(2.0) * t63;
+        let t65 = -t64;
+        let t67 = time[1] * t33;
+        let t68 = -t67;
+        let t69 = time[1] * t41;
+        let t70 = -t69;
+        let t72 = T::one() - t61;
+        let t77 = point[2] + t28;
+        let t80 = time[2] * t77;
+        let t81 = -t80;
+        let t82 = point[1] - t22;
+        let t83 = time[2] * t82;
+        let t84 = time[2] * point[2];
+        let t85 = -t84;
+        let t86 = time[2] * point[1];
+        crate::State {
+            u: crate::nalgebra::SVector::<T, 3>::new(t23, t28, T::zero()),
+            v,
+            F: crate::nalgebra::SMatrix::<
+                T,
+                3,
+                3,
+            >::new(t72, t65, t68, t64, t72, t70, T::zero(), T::zero(), T::one()),
+            P: crate::nalgebra::SMatrix::<
+                T,
+                3,
+                3,
+            >::new(
+                T::zero(),
+                T::zero(),
+                t81,
+                T::zero(),
+                T::zero(),
+                t83,
+                t85,
+                t86,
+                T::zero(),
+            ),
+        }
     }
 }
 impl<T: crate::Real> From<Torsion<T>> for crate::AnySolution<T> {

@@ -1188,6 +1188,12 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
         ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 9, 4>::new(*self, X))
     }
+    fn state_at(
+        &self,
+        X: &[crate::nalgebra::SVector<T, 2>],
+    ) -> ::std::boxed::Box<dyn crate::StateAtPoints<T, 2> + '_> {
+        ::std::boxed::Box::new(crate::StagedStates::<Self, T, 3, 2, 7>::new(*self, X))
+    }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 4> for Vortex<T> {
@@ -1382,6 +1388,179 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 4> for Vortex<T> {
         let t320 = t317 + t319;
         let t321 = point[3] * t320;
         crate::nalgebra::SVector::<T, 2>::new(t316, t321)
+    }
+}
+#[allow(unused_variables, clippy::all, clippy::pedantic)]
+impl<T: crate::Real> crate::StateStages<T, 2, 3, 2, 7> for Vortex<T> {
+    #[inline]
+    fn state_time(&self, t: T) -> [T; 3] {
+        let t6 = self.fixed[1] * t;
+        let t7 = t6.sin_pi();
+        let t23 = self.fixed[2] * t7;
+        let t93 = self.fixed[7] * t7;
+        [t7, t23, t93]
+    }
+    #[inline]
+    fn velocity_time(&self, t: T) -> [T; 2] {
+        let t6 = self.fixed[1] * t;
+        let t7 = t6.sin_pi();
+        let t23 = self.fixed[2] * t7;
+        let t41 = t6.cos_pi();
+        let t52 = self.fixed[3] * t41;
+        [t23, t52]
+    }
+    #[inline]
+    fn state_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 7] {
+        let t10 = X[0] * X[0];
+        let t11 = X[1] * X[1];
+        let t12 = t10 + t11;
+        let t13 = t12.sqrt();
+        let t15 = T::one() - t13;
+        let t17 = t15 * t15;
+        let t18 = T::nearest(16.0) * t17;
+        let t19 = T::one() - t18;
+        let t21 = t19 * t19;
+        let t94 = t13 * t15;
+        let t95 = t94 * t19;
+        let t114 = T::one() / t12;
+        [X[0], X[1], t10, t11, t21, t95, t114]
+    }
+    #[inline(always)]
+    fn state_staged(
+        &self,
+        time: &[T; 3],
+        velocity_time: &[T; 2],
+        point: &[T; 7],
+    ) -> crate::State<T, 2> {
+        let v = {
+            let time = velocity_time;
+            let t24 = time[0] * point[4];
+            let t25 = t24.sin();
+            let t26 = t24.cos();
+            let t42 = t25 * t25;
+            let t43 = t26 * t26;
+            let t44 = t42 - t43;
+            let t45 = T::nearest(2.0) * point[0];
+            let t46 = t25 * t26;
+            let t47 = t45 * t46;
+            let t48 = point[1] * t44;
+            let t49 = t47 - t48;
+            let t53 = time[1] * point[4];
+            let t54 = t53 * t49;
+            let t55 = -t54;
+            let t56 = T::nearest(2.0) * point[1];
+            let t57 = t56 * t46;
+            let t58 = point[0] * t44;
+            let t59 = t57 + t58;
+            let t60 = t53 * t59;
+            let t61 = -t60;
+            crate::nalgebra::SVector::<T, 2>::new(t55, t61)
+        };
+        let t24 = time[1] * point[4];
+        let t25 = t24.sin();
+        let t26 = t24.cos();
+        let t27 = point[0] * t25;
+        let t28 = point[1] * t26;
+        let t29 = t27 + t28;
+        let t31 = t25 * t29;
+        let t32 = T::nearest(2.0) * t31;
+        let t33 = -t32;
+        let t34 = point[1] * t25;
+        let t35 = point[0] * t26;
+        let t36 = t34 - t35;
+        let t37 = t25 * t36;
+        let t38 = T::nearest(2.0) * t37;
+        let t39 = -t38;
+        let t42 = t25 * t25;
+        let t43 = t26 * t26;
+        let t44 = t42 - t43;
+        let t46 = t25 * t26;
+        let t96 = time[2] * point[5];
+        let t97 = t96 * t26;
+        let t98 = t25 + t97;
+        let t99 = time[0] * point[5];
+        let t100 = t99 * t44;
+        let t103 = self.fixed[8] * t100;
+        let t104 = t46 - t103;
+        let t105 = point[0] * t98;
+        let t106 = t28 - t105;
+        let t107 = point[0] * t106;
+        let t108 = t25 * t107;
+        let t109 = point[0] * point[1];
+        let t110 = t109 * t104;
+        let t111 = point[3] * t42;
+        let t112 = t110 - t108;
+        let t113 = t112 + t111;
+        let t115 = T::nearest(2.0) * point[6];
+        let t116 = t115 * t113;
+        let t118 = point[1] * t98;
+        let t119 = t35 + t118;
+        let t120 = point[0] * t119;
+        let t121 = t25 * t120;
+        let t122 = point[3] * t104;
+        let t123 = t109 * t42;
+        let t124 = t121 + t122;
+        let t125 = t124 - t123;
+        let t126 = t115 * t125;
+        let t127 = -t126;
+        let t128 = point[1] * t106;
+        let t129 = t25 * t128;
+        let t130 = point[2] * t104;
+        let t131 = t129 + t123;
+        let t132 = t131 + t130;
+        let t133 = -t132;
+        let t134 = t115 * t133;
+        let t135 = -t134;
+        let t136 = point[1] * t119;
+        let t137 = t25 * t136;
+        let t138 = point[2] * t42;
+        let t139 = t137 - t110;
+        let t140 = t139 + t138;
+        let t141 = t115 * t140;
+        let t143 = T::one() - t116;
+        let t144 = T::one() - t141;
+        let t149 = T::nearest(2.0) * t46;
+        let t150 = -t149;
+        let t151 = T::nearest(2.0) * t104;
+        let t152 = t25 * t98;
+        let t153 = T::nearest(2.0) * t152;
+        let t154 = -t153;
+        let t155 = T::nearest(2.0) * t42;
+        let t156 = -t155;
+        let t157 = t156 + T::nearest(2.0);
+        let t158 = t150 * t151;
+        let t159 = t154 * t157;
+        let t160 = t158 - t159;
+        let t161 = t151 - t149;
+        let t162 = t154 + T::nearest(2.0);
+        let t163 = t156 * t162;
+        let t164 = t158 - t163;
+        let t165 = point[2] * t160;
+        let t166 = T::nearest(2.0) * t109;
+        let t167 = t166 * t161;
+        let t168 = point[3] * t164;
+        let t169 = t165 + t167;
+        let t170 = t169 + t168;
+        let t171 = self.fixed[9] * point[6];
+        let t172 = t171 * t170;
+        let t173 = -t172;
+        let t174 = t159 - t163;
+        let t175 = point[2] - point[3];
+        let t176 = t161 * t175;
+        let t177 = t109 * t174;
+        let t178 = t176 + t177;
+        let t179 = t171 * t178;
+        let t180 = point[3] * t160;
+        let t181 = point[2] * t164;
+        let t182 = t167 - t180;
+        let t183 = t182 - t181;
+        let t184 = t171 * t183;
+        crate::State {
+            u: crate::nalgebra::SVector::<T, 2>::new(t33, t39),
+            v,
+            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t143, t127, t135, t144),
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t173, t179, t179, t184),
+        }
     }
 }
 impl<T: crate::Real> From<Vortex<T>> for crate::AnySolution<T> {

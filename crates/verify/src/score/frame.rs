@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use mmsmith_solutions::{Domain, Solution};
+use mmsmith_solutions::{BLOCK, Domain, Solution, State, StateRun};
 use mmsmith_vtk::foreign::{ArrayHead, Snapshot};
 use nalgebra::{SMatrix, SVector};
 
@@ -10,7 +10,7 @@ use super::arrays::{Chosen, Role, matrices, not_finite, vectors};
 use super::findings::Remarks;
 use super::reference::{Scheme, Traced};
 use super::{ScoreError, ScoreOptions};
-use crate::measure::over_particles;
+use crate::measure::{RUNS, Row, over_particles};
 use crate::norms::{PerField, PerNorm};
 
 /// Share of the body's size by which a reference position may lie outside before it is told.
@@ -95,21 +95,30 @@ impl<const D: usize> FrameData<D> {
         exact: &dyn Solution<f64, D>,
         time: f64,
     ) -> (PerField<PerNorm<f64>>, [PerNorm<f64>; 2]) {
-        let magnitudes = |p: usize| {
-            let at_time = exact.fields(&self.X[p], time);
-            let v = self.v.as_ref().map_or(0.0, |(v, v_time)| {
-                let exact_v =
-                    if *v_time == time { at_time.v } else { exact.velocity(&self.X[p], *v_time) };
-                (v[p] - exact_v).norm()
-            });
+        let of_particle = |p: usize, exact: &State<f64, D>| {
+            let v = self.v.as_ref().map_or(0.0, |(v, _)| (v[p] - exact.v).norm());
             let tensor = |given: &Option<Vec<SMatrix<f64, D, D>>>, exact: SMatrix<f64, D, D>| {
                 given.as_ref().map_or((0.0, 0.0), |given| {
                     ((given[p] - exact).norm(), (given[p].transpose() - exact).norm())
                 })
             };
-            let (F, F_turned) = tensor(&self.F, at_time.F);
-            let (P, P_turned) = tensor(&self.P, at_time.P);
-            [(self.u[p] - at_time.u).norm(), v, F, P, F_turned, P_turned]
+            let (F, F_turned) = tensor(&self.F, exact.F);
+            let (P, P_turned) = tensor(&self.P, exact.P);
+            [(self.u[p] - exact.u).norm(), v, F, P, F_turned, P_turned]
+        };
+        let velocity_time = self.v.as_ref().map_or(time, |(_, time)| *time);
+        let magnitudes = |first: usize, count: usize, magnitudes: &mut [[Row<f64>; 6]]| {
+            let mut runs = [StateRun::zero(); RUNS];
+            let runs = &mut runs[..magnitudes.len()];
+            // Other frames may have their particles in another order, or others: nothing is worth keeping.
+            let X = &self.X[first..first + count];
+            exact.state_at(X).evaluate(time, velocity_time, 0, runs);
+            for n in 0..count {
+                let own = of_particle(first + n, &runs[n / BLOCK].get(n % BLOCK));
+                for (row, magnitude) in magnitudes[n / BLOCK].iter_mut().zip(own) {
+                    row[n % BLOCK] = magnitude;
+                }
+            }
         };
         let ([u, v, F, P, F_turned, P_turned], _) = over_particles(self.X.len(), magnitudes);
         (PerField { u, v, F, P }, [F_turned, P_turned])
