@@ -3,13 +3,23 @@
 use nalgebra::{RealField, SVector};
 
 /// Force per unit mass on many particles at once.
-pub trait BodyForce<T, const D: usize>: Sync {
+pub trait BodyForce<T: Copy, const D: usize>: Sync {
     /// Writes into `b` the body force at the reference positions `X` and time `t`; both slices have the same length.
     /// They belong to the particles from number `first` on, which never change places: whatever depends on the position
     /// alone may have been kept from an earlier step.
     ///
-    /// Called once a step from several threads, each with its own run of particles; what is in `b` before is unspecified.
+    /// Called from several threads, each with its own run of particles; what is in `b` before is unspecified.
     fn evaluate(&self, first: usize, X: &[SVector<T, D>], t: T, b: &mut [SVector<T, D>]);
+
+    /// Writes into `b` the body force on the particles `ids` at time `t`; `X` holds the reference positions of all.
+    ///
+    /// As [`evaluate`](Self::evaluate) particle by particle, unless there is a faster way; `b` is as long as `ids`.
+    fn evaluate_of(&self, ids: &[u32], X: &[SVector<T, D>], t: T, b: &mut [SVector<T, D>]) {
+        for (&p, b) in ids.iter().zip(b.chunks_mut(1)) {
+            let p = p as usize;
+            self.evaluate(p, &X[p..=p], t, b);
+        }
+    }
 
     /// Whether the force is zero everywhere and always, so that a step may leave it out.
     fn is_absent(&self) -> bool {
@@ -17,7 +27,7 @@ pub trait BodyForce<T, const D: usize>: Sync {
     }
 }
 
-impl<T, const D: usize, B> BodyForce<T, D> for B
+impl<T: Copy, const D: usize, B> BodyForce<T, D> for B
 where
     B: Fn(&[SVector<T, D>], T, &mut [SVector<T, D>]) + Sync,
 {
@@ -30,7 +40,7 @@ where
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NoBodyForce;
 
-impl<T: RealField, const D: usize> BodyForce<T, D> for NoBodyForce {
+impl<T: RealField + Copy, const D: usize> BodyForce<T, D> for NoBodyForce {
     fn evaluate(&self, _first: usize, _X: &[SVector<T, D>], _t: T, b: &mut [SVector<T, D>]) {
         b.fill(SVector::zeros());
     }

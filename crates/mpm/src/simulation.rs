@@ -283,7 +283,6 @@ fn allocate<T: RealField + Copy, const D: usize>(
     Ok(State {
         constants: Constants::new(grid, &layout, &bands, settings.time_step, least),
         nodes,
-        b: Vec::new(),
         F_next: if usf { vec![SMatrix::identity(); particles.len()] } else { Vec::new() },
         reprojected: vec![Node::zero(); if musl { layout.nodes } else { 0 }],
         next: Vec::new(),

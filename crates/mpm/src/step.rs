@@ -107,7 +107,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
         well & (edge >= real(first)) & (edge < real(end))
     }
 
-    /// Adds to the piece of the grid that starts at node `first` what `level(ids, deposits)` and then
+    /// Adds to the piece of the grid that starts at node `first` what `level(block, ids, deposits)` and then
     /// `slope(block, ids, deposits)` state for each block of particles.
     #[expect(clippy::too_many_arguments, reason = "the arrays of a band's particles")]
     fn scatter<R, const W: usize>(
@@ -118,7 +118,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
         piece: &mut [Node<T, D>],
         first: usize,
         ids: &[u32],
-        level: impl Fn(&[u32], &mut [Deposit<T, D>; BLOCK]),
+        level: impl Fn(&Block<T, D, W>, &[u32], &mut [Deposit<T, D>; BLOCK]),
         slope: impl Fn(&mut Block<T, D, W>, &[u32], &mut [Deposit<T, D>; BLOCK]),
     ) where
         R: Rule<T, D, W>,
@@ -127,7 +127,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
         let mut deposits = [Deposit::zero(); BLOCK];
         for ids in ids.chunks(BLOCK) {
             block.pick(ids, x, F);
-            level(ids, &mut deposits);
+            level(&block, ids, &mut deposits);
             block.weigh(self, rule);
             if self.planted.is(Fault::LastNodeSkipped) {
                 block.skip_last_node(&self.upper_in_cells());
@@ -221,8 +221,6 @@ pub(crate) struct State<T, const D: usize> {
     pub(crate) layout: Layout<D>,
     pub(crate) bands: Bands,
     pub(crate) nodes: Vec<Node<T, D>>,
-    /// Body force of every particle in this step; empty until a scene has one.
-    pub(crate) b: Vec<SVector<T, D>>,
     /// USF: F at the end of the step, while the weights still need F at its start.
     pub(crate) F_next: Vec<SMatrix<T, D, D>>,
     /// MUSL: velocities projected from the updated particles, one per node.
@@ -251,8 +249,7 @@ where
     R: Rule<T, D, W>,
     L: Law<T>,
 {
-    s.evaluate(body_force, t);
-    s.deposit(rule, law, body_force.is_absent());
+    s.deposit(rule, law, body_force, t);
     s.solve(scale);
     finish_musl(s, rule)
 }
@@ -281,7 +278,7 @@ where
             }
         },
     );
-    let give = |ids: &[u32], deposits: &mut [Deposit<T, D>; BLOCK]| {
+    let give = |_: &Block<T, D, W>, ids: &[u32], deposits: &mut [Deposit<T, D>; BLOCK]| {
         for (deposit, &p) in deposits.iter_mut().zip(ids) {
             let p = p as usize;
             deposit.level = Node::new(&(v[p] * mass[p]), &SVector::zeros(), T::zero());
@@ -331,14 +328,13 @@ where
     R: Rule<T, D, W>,
     L: Law<T>,
 {
-    s.evaluate(body_force, t);
     s.deposit_momentum(rule);
     let outcome = s.stretch_first(rule);
     if outcome.failure.is_some() {
         std::mem::swap(&mut s.particles.F, &mut s.F_next);
         return outcome;
     }
-    s.deposit_force(rule, law, body_force.is_absent());
+    s.deposit_force(rule, law, body_force, t);
     s.solve_acceleration(scale);
     finish_usf(s, rule)
 }
@@ -488,41 +484,30 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         });
     }
 
-    /// Evaluates the body force at the reference positions.
-    pub(crate) fn evaluate(&mut self, body_force: &dyn BodyForce<T, D>, t: T) {
-        if body_force.is_absent() {
-            return;
-        }
-        let at_current = self.constants.planted.is(Fault::BodyForceAtCurrentPosition);
-        let X = if at_current { &self.particles.x } else { &self.particles.X };
-        let late = self.constants.planted.is(Fault::LateBodyForce);
-        let t = if late { t + self.constants.time_step } else { t };
-        self.b.resize(X.len(), SVector::zeros());
-        self.b
-            .par_chunks_mut(CHUNK)
-            .zip(X.par_chunks(CHUNK))
-            .enumerate()
-            .for_each(|(chunk, (b, X))| body_force.evaluate(chunk * CHUNK, X, t, b));
-    }
-
     /// Particles to grid: mass, momentum and force, folded at walls.
     #[inline(never)]
-    pub(crate) fn deposit<R, L, const W: usize>(&mut self, rule: R, law: L, no_body_force: bool)
-    where
+    pub(crate) fn deposit<R, L, const W: usize>(
+        &mut self,
+        rule: R,
+        law: L,
+        body_force: &dyn BodyForce<T, D>,
+        t: T,
+    ) where
         R: Rule<T, D, W>,
         L: Law<T>,
     {
-        let Self { particles, constants, layout, bands, nodes, b, .. } = self;
-        let Particles { x, v, F, mass, volume, .. } = &*particles;
+        let Self { particles, constants, layout, bands, nodes, .. } = self;
+        let Particles { X, x, v, F, mass, volume, .. } = &*particles;
         let c = *constants;
-        let forced = !no_body_force && !c.planted.is(Fault::NoBodyForce);
-        let b = forced.then_some(&b[..]);
+        let forcing = Forcing::new(body_force, X, t, &c);
         bands.scatter(
             layout,
             nodes,
             |node| *node = Node::zero(),
             |piece, first, ids| {
-                let level = |ids: &[u32], deposits: &mut [Deposit<T, D>; BLOCK]| {
+                let level = |block: &Block<T, D, W>, ids: &[u32], deposits: &mut [_; BLOCK]| {
+                    let b = &mut [SVector::zeros(); BLOCK];
+                    forcing.evaluate(ids, block, b);
                     dispatch(GiveLevel { c: &c, ids, v: Some(v), b, mass, volume, deposits });
                 };
                 c.scatter(rule, x, F, piece, first, ids, level, |block, ids, deposits| {
@@ -566,7 +551,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let Self { particles, constants, layout, bands, nodes, .. } = self;
         let Particles { x, v, F, mass, .. } = &*particles;
         let c = *constants;
-        let give = |ids: &[u32], deposits: &mut [Deposit<T, D>; BLOCK]| {
+        let give = |_: &Block<T, D, W>, ids: &[u32], deposits: &mut [Deposit<T, D>; BLOCK]| {
             for (deposit, &p) in deposits.iter_mut().zip(ids) {
                 let (p, m) = (p as usize, mass[p as usize]);
                 deposit.level = Node::new(&(v[p] * m), &SVector::zeros(), m);
@@ -628,18 +613,24 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
 
     /// USF, third pass: force on the grid, from the updated F with the weights of the old one.
     #[inline(never)]
-    fn deposit_force<R, L, const W: usize>(&mut self, rule: R, law: L, no_body_force: bool)
-    where
+    fn deposit_force<R, L, const W: usize>(
+        &mut self,
+        rule: R,
+        law: L,
+        body_force: &dyn BodyForce<T, D>,
+        t: T,
+    ) where
         R: Rule<T, D, W>,
         L: Law<T>,
     {
-        let Self { particles, constants, layout, bands, nodes, b, F_next, .. } = self;
-        let Particles { x, F, mass, volume, .. } = &*particles;
+        let Self { particles, constants, layout, bands, nodes, F_next, .. } = self;
+        let Particles { X, x, F, mass, volume, .. } = &*particles;
         let (c, F_next) = (*constants, &F_next[..]);
-        let forced = !no_body_force && !c.planted.is(Fault::NoBodyForce);
-        let b = forced.then_some(&b[..]);
+        let forcing = Forcing::new(body_force, X, t, &c);
         bands.scatter(layout, nodes, Node::clear_acceleration, |piece, first, ids| {
-            let level = |ids: &[u32], deposits: &mut [Deposit<T, D>; BLOCK]| {
+            let level = |block: &Block<T, D, W>, ids: &[u32], deposits: &mut [_; BLOCK]| {
+                let b = &mut [SVector::zeros(); BLOCK];
+                forcing.evaluate(ids, block, b);
                 dispatch(GiveLevel { c: &c, ids, v: None, b, mass, volume, deposits });
             };
             c.scatter(rule, x, F, piece, first, ids, level, |block, ids, deposits| {
@@ -669,12 +660,60 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
     }
 }
 
+/// The body force on all particles at one time.
+pub(crate) struct Forcing<'a, T, const D: usize> {
+    /// `None` where there is nothing to evaluate.
+    body_force: Option<&'a dyn BodyForce<T, D>>,
+    X: &'a [SVector<T, D>],
+    t: T,
+    at_current: bool,
+}
+
+impl<'a, T: RealField + Copy, const D: usize> Forcing<'a, T, D> {
+    /// At the reference positions `X`.
+    pub(crate) fn new(
+        body_force: &'a dyn BodyForce<T, D>,
+        X: &'a [SVector<T, D>],
+        t: T,
+        c: &Constants<T, D>,
+    ) -> Self {
+        let absent = body_force.is_absent() || c.planted.is(Fault::NoBodyForce);
+        Self {
+            body_force: (!absent).then_some(body_force),
+            X,
+            t: if c.planted.is(Fault::LateBodyForce) { t + c.time_step } else { t },
+            at_current: c.planted.is(Fault::BodyForceAtCurrentPosition),
+        }
+    }
+
+    /// Writes into `b` the force per unit mass on the particles `ids`, and nothing where there is none. The particles of the
+    /// block are the same.
+    pub(crate) fn evaluate<const W: usize>(
+        &self,
+        ids: &[u32],
+        block: &Block<T, D, W>,
+        b: &mut [SVector<T, D>; BLOCK],
+    ) {
+        let Some(body_force) = self.body_force else {
+            return;
+        };
+        let b = &mut b[..ids.len()];
+        if self.at_current {
+            let x: Vec<_> = (0..ids.len()).map(|k| block.position(k)).collect();
+            body_force.evaluate(0, &x, self.t, b);
+        } else {
+            body_force.evaluate_of(ids, self.X, self.t, b);
+        }
+    }
+}
+
 /// States what the body force and, if `v` is there, mass and momentum of particles give to the grid.
 struct GiveLevel<'a, T, const D: usize> {
     c: &'a Constants<T, D>,
     ids: &'a [u32],
     v: Option<&'a [SVector<T, D>]>,
-    b: Option<&'a [SVector<T, D>]>,
+    /// Of these particles.
+    b: &'a [SVector<T, D>; BLOCK],
     mass: &'a [T],
     volume: &'a [T],
     deposits: &'a mut [Deposit<T, D>; BLOCK],
@@ -685,11 +724,10 @@ impl<T: RealField + Copy, const D: usize> Loop for GiveLevel<'_, T, D> {
     fn run(self) {
         let Self { c, ids, v, b, mass, volume, deposits } = self;
         let per_volume = c.planted.is(Fault::BodyForcePerVolume);
-        for (deposit, &p) in deposits.iter_mut().zip(ids) {
+        for ((deposit, &p), b) in deposits.iter_mut().zip(ids).zip(b) {
             let p = p as usize;
             let m = mass[p];
-            let weight =
-                b.map_or(SVector::zeros(), |b| b[p] * if per_volume { volume[p] } else { m });
+            let weight = b * if per_volume { volume[p] } else { m };
             deposit.level = v.map_or(Node::new(&SVector::zeros(), &weight, T::zero()), |v| {
                 Node::new(&(v[p] * m), &weight, m)
             });

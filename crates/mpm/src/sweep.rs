@@ -16,7 +16,7 @@ use crate::material::Law;
 use crate::particles::Particles;
 use crate::partition::Share;
 use crate::simd::{Loop, dispatch};
-use crate::step::{Constants, GiveSlope, Outcome, State, trouble};
+use crate::step::{Constants, Forcing, GiveSlope, Outcome, State, trouble};
 use crate::transfer::{Deposit, Gathered, Node};
 use crate::weights::Rule;
 
@@ -36,17 +36,14 @@ where
     R: Rule<T, D, W>,
     L: Law<T>,
 {
-    let absent = body_force.is_absent();
     if !s.is_ahead {
         if !s.bands.is_sorted() {
             s.sort(rule);
         }
-        s.evaluate(body_force, t);
-        s.deposit(rule, law, absent);
+        s.deposit(rule, law, body_force, t);
     }
     s.solve(scale);
-    s.evaluate(body_force, t_next);
-    let outcome = s.sweep(rule, law, absent);
+    let outcome = s.sweep(rule, law, body_force, t_next);
     // Where particles change their bands or stop, what they gave in part is of no use.
     s.is_ahead = outcome.is_nothing();
     s.resort_if(outcome, rule)
@@ -55,16 +52,22 @@ where
 impl<T: RealField + Copy, const D: usize> State<T, D> {
     /// Grid to particles, and particles to the grid of the next step, which is `nodes` from then on.
     #[inline(never)]
-    fn sweep<R, L, const W: usize>(&mut self, rule: R, law: L, no_body_force: bool) -> Outcome
+    fn sweep<R, L, const W: usize>(
+        &mut self,
+        rule: R,
+        law: L,
+        body_force: &dyn BodyForce<T, D>,
+        t_next: T,
+    ) -> Outcome
     where
         R: Rule<T, D, W>,
         L: Law<T>,
     {
-        let Self { particles, constants: c, layout, bands, nodes, next, b, .. } = self;
+        let Self { particles, constants: c, layout, bands, nodes, next, .. } = self;
         next.resize(nodes.len(), Node::zero());
-        let Particles { x, v, F, mass, volume, .. } = particles;
-        let forced = !no_body_force && !c.planted.is(Fault::NoBodyForce);
-        let step = Sweep { c, rule, law, nodes, mass, volume, b: forced.then_some(&b[..]) };
+        let Particles { X, x, v, F, mass, volume, .. } = particles;
+        let forcing = Forcing::new(body_force, X, t_next, c);
+        let step = Sweep { c, rule, law, nodes, mass, volume, forcing };
         let found = Mutex::new(Outcome::default());
         let clear = |node: &mut Node<T, D>| *node = Node::zero();
         bands.sweep(layout, next, clear, (x, v, F), |piece, first, band, elements| {
@@ -90,7 +93,7 @@ struct Sweep<'a, T, R, L, const D: usize> {
     mass: &'a [T],
     volume: &'a [T],
     /// The body force at the start of the next step.
-    b: Option<&'a [SVector<T, D>]>,
+    forcing: Forcing<'a, T, D>,
 }
 
 impl<T: RealField + Copy, R, L: Law<T>, const D: usize> Sweep<'_, T, R, L, D> {
@@ -106,16 +109,18 @@ impl<T: RealField + Copy, R, L: Law<T>, const D: usize> Sweep<'_, T, R, L, D> {
     where
         R: Rule<T, D, W>,
     {
-        let &Self { c, rule, law, nodes, mass, volume, b } = self;
+        let &Self { c, rule, law, nodes, mass, volume, ref forcing } = self;
         let mut outcome = Outcome::default();
         let mut block = Block::<T, D, W>::new(c.planted);
         let mut gathered = [Gathered::zero(); BLOCK];
         let mut deposits = [Deposit::zero(); BLOCK];
+        let mut b = [SVector::zeros(); BLOCK];
         for (index, ids) in elements.numbers().chunks(BLOCK).enumerate() {
             let place = index * BLOCK;
             dispatch(Take { c, block: &mut block, elements: &mut elements, place, ids });
             block.weigh(c, rule);
             block.gather(&c.strides, nodes, &mut gathered[..ids.len()]);
+            forcing.evaluate(ids, &block, &mut b);
             dispatch(Follow {
                 c,
                 block: &mut block,
@@ -125,7 +130,7 @@ impl<T: RealField + Copy, R, L: Law<T>, const D: usize> Sweep<'_, T, R, L, D> {
                 gathered: &gathered,
                 mass,
                 volume,
-                b,
+                b: &b,
                 deposits: &mut deposits,
             });
             block.weigh(c, rule);
@@ -187,7 +192,7 @@ struct Follow<'a, 'b, T, const D: usize, const W: usize> {
     gathered: &'a [Gathered<T, D>; BLOCK],
     mass: &'a [T],
     volume: &'a [T],
-    b: Option<&'a [SVector<T, D>]>,
+    b: &'a [SVector<T, D>; BLOCK],
     deposits: &'a mut [Deposit<T, D>; BLOCK],
 }
 
@@ -212,8 +217,7 @@ impl<T: RealField + Copy, const D: usize, const W: usize> Loop for Follow<'_, '_
             block.put(k, x, F);
             let m = mass[p as usize];
             let factor = if per_volume { volume[p as usize] } else { m };
-            let force = b.map_or(SVector::zeros(), |b| b[p as usize] * factor);
-            deposits[k].level = Node::new(&(*v * m), &force, m);
+            deposits[k].level = Node::new(&(*v * m), &(b[k] * factor), m);
         }
     }
 }

@@ -23,6 +23,13 @@ pub trait BodyForceAtPoints<T: Real, const D: usize>: Send + Sync {
     /// Panics where there are fewer than `first + b.len()` points.
     fn evaluate(&self, t: T, first: usize, b: &mut [SVector<T, D>]);
 
+    /// As [`evaluate`](Self::evaluate) for the points of the given numbers, in any order; `b` is as long as `points`.
+    ///
+    /// # Panics
+    ///
+    /// Panics where a number is that of no point.
+    fn evaluate_of(&self, t: T, points: &[u32], b: &mut [SVector<T, D>]);
+
     /// The number of points.
     fn len(&self) -> usize;
 
@@ -305,6 +312,29 @@ where
         one_by_one(end, after);
     }
 
+    fn evaluate_of(&self, t: T, points: &[u32], b: &mut [SVector<T, D>]) {
+        let time = self.solution.body_force_time(t);
+        let mut block = [[T::zero(); BLOCK]; POINT];
+        for (points, b) in points.chunks(BLOCK).zip(b.chunks_mut(BLOCK)) {
+            for (i, &n) in points.iter().enumerate() {
+                let n = n as usize;
+                assert!(n < self.len, "point {n} was asked for; there are {}", self.len);
+                let values = point(&self.blocks[n / BLOCK], n % BLOCK);
+                block.iter_mut().zip(values).for_each(|(run, value)| run[i] = value);
+            }
+            let blocks = std::slice::from_ref(&block);
+            let of = |b| WholeBlocks { solution: &self.solution, time: &time, blocks, b };
+            if points.len() == BLOCK {
+                Arch::new().dispatch(of(b));
+            } else {
+                // What a last block has to spare holds points of blocks before it, or zeros that nobody reads.
+                let mut whole = [SVector::zeros(); BLOCK];
+                Arch::new().dispatch(of(&mut whole));
+                b.copy_from_slice(&whole[..b.len()]);
+            }
+        }
+    }
+
     fn len(&self) -> usize {
         self.len
     }
@@ -391,6 +421,12 @@ where
     fn evaluate(&self, t: T, first: usize, b: &mut [SVector<T, D>]) {
         let X = &self.X[first..first + b.len()];
         b.iter_mut().zip(X).for_each(|(b, X)| *b = self.solution.body_force(X, t));
+    }
+
+    fn evaluate_of(&self, t: T, points: &[u32], b: &mut [SVector<T, D>]) {
+        for (&n, b) in points.iter().zip(b) {
+            *b = self.solution.body_force(&self.X[n as usize], t);
+        }
     }
 
     fn len(&self) -> usize {

@@ -481,6 +481,10 @@ impl<T: Real, const D: usize> BodyForce<T, D> for ExactBodyForce<'_, T, D> {
         }
         self.kept.evaluate(t, first, b);
     }
+
+    fn evaluate_of(&self, ids: &[u32], _X: &[SVector<T, D>], t: T, b: &mut [SVector<T, D>]) {
+        self.kept.evaluate_of(t, ids, b);
+    }
 }
 
 /// The solver's hand-written law with the constants of the solution's material.
