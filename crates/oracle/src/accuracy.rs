@@ -216,10 +216,11 @@ impl<'a> Accuracy<'a> {
             }
         }
         let remark = (count < points).then_some("draws that do not suit were left out");
-        let mut confirmed = Vec::new();
+        let mut confirmed: Vec<Worst> = Vec::new();
         for (index, finding) in worst.into_iter().flatten() {
             let inputs = self.sampler.draw(class, index).unwrap_or_default();
-            confirmed.push(self.confirm(&inputs, &finding, judged)?);
+            let worst = self.confirm(&inputs, &finding, &confirmed, judged)?;
+            confirmed.push(worst);
         }
         Ok(ClassAccuracy { class, points: count, remark, worst: confirmed })
     }
@@ -243,17 +244,27 @@ impl<'a> Accuracy<'a> {
         let mut products = self.products.iter();
         let may_underflow = matches!(class, Class::TinyAmplitude | Class::Far);
         let mut findings = Vec::new();
+        // What was judged before at this point: stages often give a single call's bits.
+        let mut seen: Vec<(Expr, u64, f64)> = Vec::new();
+        let mut expressions = self.flat.iter();
         for (field, results) in results.iter().enumerate() {
             let mut worst = Finding { field, entry: 0, factor: -1.0 };
             for (entry, &result) in results.iter().enumerate() {
-                let (Some(truth), Some(&count)) = (truth.next(), products.next()) else { break };
+                let (Some(truth), Some(&count), Some(&expression)) =
+                    (truth.next(), products.next(), expressions.next())
+                else {
+                    break;
+                };
                 let sens: f64 = terms.by_ref().take(count).map(|term| term.abs()).sum();
                 let quick = exact(sens).map(|sens| worst_factor(result, truth, &sens));
+                let known = seen.iter().find(|s| (s.0, s.1) == (expression, result.to_bits()));
                 let factor = match quick {
+                    _ if known.is_some() => known.map_or(f64::NAN, |known| known.2),
                     _ if may_underflow && sens < SMALLEST_JUDGED => 0.0,
                     Some(factor) if factor < DOUBTFUL_FACTOR => factor,
                     _ => self.settled(inputs, field, entry, result)?.0,
                 };
+                seen.push((expression, result.to_bits(), factor));
                 if factor > worst.factor {
                     worst = Finding { field, entry, factor };
                 }
@@ -287,16 +298,32 @@ impl<'a> Accuracy<'a> {
         Ok((worst_factor(result, &truth, &sens), truth, sens))
     }
 
+    /// The finding in arbitrary precision, unless one of those `known` is the same number at the same place.
     fn confirm(
         &self,
         inputs: &[f64],
         finding: &Finding,
+        known: &[Worst],
         judged: &(dyn Fn(&[f64]) -> Result<Judged, String> + Sync),
     ) -> Result<Worst, AccuracyError> {
         let result = self.results(inputs, judged)?[finding.field][finding.entry];
+        let (field, entries) = &self.expressions[finding.field];
+        let expression_of = |worst: &Worst| {
+            let (_, entries) =
+                self.expressions.iter().find(|(letter, _)| *letter == worst.field)?;
+            entries.get(worst.entry)
+        };
+        let same = known.iter().find(|worst| {
+            worst.inputs == inputs
+                && worst.result.to_bits() == result.to_bits()
+                && expression_of(worst) == entries.get(finding.entry)
+        });
+        if let Some(same) = same {
+            return Ok(Worst { field, entry: finding.entry, ..same.clone() });
+        }
         let (factor, truth, sens) = self.settled(inputs, finding.field, finding.entry, result)?;
         Ok(Worst {
-            field: self.expressions[finding.field].0,
+            field,
             entry: finding.entry,
             factor,
             inputs: inputs.to_vec(),
