@@ -90,11 +90,7 @@ impl Keep {
         compute: impl FnOnce() -> Result<T>,
     ) -> Result<Option<T>> {
         let Some(Place { ledger, common }) = &self.0 else { return compute().map(Some) };
-        let mut settings = settings.clone();
-        if let Some(settings) = settings.as_object_mut() {
-            settings.remove("threads");
-        }
-        let key = json!({ "settings": settings, "from": common });
+        let key = json!({ "settings": decisive(settings), "from": common });
         match ledger.claim(&key).context("--out")? {
             Claim::Taken => Ok(None),
             Claim::Done(value) => {
@@ -125,6 +121,13 @@ impl Keep {
             ));
         }
     }
+}
+
+/// The settings that results depend on: all but the number of threads.
+pub(crate) fn decisive(settings: &Value) -> Value {
+    let mut settings = settings.clone();
+    settings.as_object_mut().and_then(|settings| settings.remove("threads"));
+    settings
 }
 
 /// What results depend on beside their settings: the program, and a specification file's text.

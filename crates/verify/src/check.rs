@@ -13,6 +13,7 @@ use thiserror::Error;
 
 use crate::case::law;
 use crate::difference::derivative;
+use crate::dimension::in_dimension;
 use crate::points;
 use crate::scene::SceneError;
 
@@ -149,12 +150,7 @@ pub enum CheckError {
 ///
 /// [`CheckError`] where there is nothing to check or no way to; a field found wrong is a [`Finding`], no error.
 pub fn check(solution: &AnySolution<f64>, count: usize) -> Result<CheckReport, CheckError> {
-    match solution {
-        AnySolution::One(s) => check_in(s.as_ref(), count),
-        AnySolution::Two(s) => check_in(s.as_ref(), count),
-        AnySolution::Three(s) => check_in(s.as_ref(), count),
-        _ => Err(CheckError::Dimension),
-    }
+    in_dimension!(solution, |s| check_in(s, count), else Err(CheckError::Dimension))
 }
 
 fn check_in<const D: usize>(

@@ -13,6 +13,7 @@ use crate::CheckError;
 use crate::case::law;
 use crate::check::with;
 use crate::difference::derivative;
+use crate::dimension::in_dimension;
 use crate::points;
 use crate::scene::SceneError;
 
@@ -106,12 +107,7 @@ pub struct Share {
 ///
 /// [`CheckError`] for a shape or a dimension that is not known here, or no points.
 pub fn coverage(solution: &AnySolution<f64>, count: usize) -> Result<Vec<Share>, CheckError> {
-    match solution {
-        AnySolution::One(s) => coverage_in(s.as_ref(), count),
-        AnySolution::Two(s) => coverage_in(s.as_ref(), count),
-        AnySolution::Three(s) => coverage_in(s.as_ref(), count),
-        _ => Err(CheckError::Dimension),
-    }
+    in_dimension!(solution, |s| coverage_in(s, count), else Err(CheckError::Dimension))
 }
 
 /// Sums of squares over the samples.

@@ -1,5 +1,6 @@
 //! The exact fields at one point, in a form that can be written.
 
+use crate::dimension::in_dimension;
 use mmsmith_solutions::{AnySolution, Fields, Solution};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
@@ -42,12 +43,8 @@ pub struct WrongLength {
 ///
 /// [`WrongLength`] when `X` does not have one coordinate for each dimension.
 pub fn evaluate(solution: &AnySolution<f64>, X: &[f64], t: f64) -> Result<FieldRow, WrongLength> {
-    match solution {
-        AnySolution::One(s) => evaluate_in(s.as_ref(), X, t),
-        AnySolution::Two(s) => evaluate_in(s.as_ref(), X, t),
-        AnySolution::Three(s) => evaluate_in(s.as_ref(), X, t),
-        _ => Err(WrongLength { given: X.len(), dimension: 0 }),
-    }
+    let unknown = || Err(WrongLength { given: X.len(), dimension: 0 });
+    in_dimension!(solution, |s| evaluate_in(s, X, t), else unknown())
 }
 
 fn evaluate_in<const D: usize>(

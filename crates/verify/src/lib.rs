@@ -20,6 +20,7 @@ mod checkpoint;
 mod cost;
 mod coverage;
 mod difference;
+mod dimension;
 mod evaluate;
 mod frames;
 mod general;

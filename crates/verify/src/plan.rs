@@ -3,6 +3,7 @@
 use mmsmith_solutions::{AnySolution, Solution};
 
 use crate::case::{Arithmetic, Case, CaseError};
+use crate::dimension::in_dimension;
 use crate::general;
 use crate::scene::{Extent, Scene};
 use crate::total::Frame;
@@ -40,12 +41,7 @@ pub fn plan(
         Arithmetic::Double => (size_of::<f64>(), f64::EPSILON / 2.0),
         Arithmetic::Single(_) => (size_of::<f32>(), f64::from(f32::EPSILON) / 2.0),
     };
-    match exact {
-        AnySolution::One(s) => plan_in(s.as_ref(), scalar, unit, case),
-        AnySolution::Two(s) => plan_in(s.as_ref(), scalar, unit, case),
-        AnySolution::Three(s) => plan_in(s.as_ref(), scalar, unit, case),
-        _ => Err(CaseError::Dimension),
-    }
+    in_dimension!(exact, |s| plan_in(s, scalar, unit, case), else Err(CaseError::Dimension))
 }
 
 fn plan_in<const D: usize>(

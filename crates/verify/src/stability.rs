@@ -22,6 +22,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::case::{Arithmetic, Case, CaseError, law, set_up};
+use crate::dimension::{in_arithmetic, in_dimension};
 use crate::general::Precision;
 use crate::plan::{MOST_STEPS, plan, prepare};
 use crate::scene::Scene;
@@ -289,12 +290,8 @@ impl<'a> Bench<'a> {
     ) -> Result<Self, CaseError> {
         let usual = Case { cfl: 0.5, ..*case };
         let plan = plan(exact, arithmetic, &usual)?;
-        let (p_wave_limit, end) = match exact {
-            AnySolution::One(s) => scales(s.as_ref(), &usual),
-            AnySolution::Two(s) => scales(s.as_ref(), &usual),
-            AnySolution::Three(s) => scales(s.as_ref(), &usual),
-            _ => Err(CaseError::Dimension),
-        }?;
+        let scales = in_dimension!(exact, |s| scales(s, &usual), else Err(CaseError::Dimension));
+        let (p_wave_limit, end) = scales?;
         Ok(Self {
             exact,
             arithmetic,
@@ -319,12 +316,7 @@ impl<'a> Bench<'a> {
 
     fn limits(&self, criteria: &Criteria, reference: &Observed) -> Limits {
         let error = criteria.error_multiple * reference.error.unwrap_or(f64::NAN);
-        let period = match self.exact {
-            AnySolution::One(s) => s.period(),
-            AnySolution::Two(s) => s.period(),
-            AnySolution::Three(s) => s.period(),
-            _ => self.end,
-        };
+        let period = in_dimension!(self.exact, |s| s.period(), else self.end);
         Limits {
             // Without a reference no error is too large.
             error: if error.is_nan() || reference.failure.is_some() {
@@ -340,24 +332,13 @@ impl<'a> Bench<'a> {
     }
 
     fn run(&self, cfl: f64, limits: Option<&Limits>) -> Result<Observed, CaseError> {
-        use AnySolution::{One, Three, Two};
         let case = Case { cfl, ..self.case };
-        let end = self.end;
-        match (self.exact, self.arithmetic) {
-            (One(s), Arithmetic::Double) => run_in(s.as_ref(), s.as_ref(), &case, end, limits),
-            (Two(s), Arithmetic::Double) => run_in(s.as_ref(), s.as_ref(), &case, end, limits),
-            (Three(s), Arithmetic::Double) => run_in(s.as_ref(), s.as_ref(), &case, end, limits),
-            (One(s), Arithmetic::Single(One(m))) => {
-                run_in(s.as_ref(), m.as_ref(), &case, end, limits)
-            }
-            (Two(s), Arithmetic::Single(Two(m))) => {
-                run_in(s.as_ref(), m.as_ref(), &case, end, limits)
-            }
-            (Three(s), Arithmetic::Single(Three(m))) => {
-                run_in(s.as_ref(), m.as_ref(), &case, end, limits)
-            }
-            _ => Err(CaseError::Dimension),
-        }
+        in_arithmetic!(
+            self.exact,
+            self.arithmetic,
+            |exact, model| run_in(exact, model, &case, self.end, limits),
+            else Err(CaseError::Dimension)
+        )
     }
 }
 

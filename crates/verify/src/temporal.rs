@@ -14,6 +14,7 @@ use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 
 use crate::case::{Arithmetic, Case, CaseError, Progress, Status, set_up};
+use crate::dimension::in_arithmetic;
 use crate::general::Precision;
 use crate::norms::{PerField, PerNorm, Tally};
 use crate::order::Order;
@@ -83,18 +84,12 @@ pub fn temporal(
     cfls: &[f64],
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Temporal, StudyError> {
-    use AnySolution::{One, Three, Two};
-    match (exact, arithmetic) {
-        (One(s), Arithmetic::Double) => over(s.as_ref(), s.as_ref(), base, cfls, progress),
-        (Two(s), Arithmetic::Double) => over(s.as_ref(), s.as_ref(), base, cfls, progress),
-        (Three(s), Arithmetic::Double) => over(s.as_ref(), s.as_ref(), base, cfls, progress),
-        (One(s), Arithmetic::Single(One(m))) => over(s.as_ref(), m.as_ref(), base, cfls, progress),
-        (Two(s), Arithmetic::Single(Two(m))) => over(s.as_ref(), m.as_ref(), base, cfls, progress),
-        (Three(s), Arithmetic::Single(Three(m))) => {
-            over(s.as_ref(), m.as_ref(), base, cfls, progress)
-        }
-        _ => Err(StudyError { index: 0, cause: CaseError::Dimension }),
-    }
+    in_arithmetic!(
+        exact,
+        arithmetic,
+        |exact, model| over(exact, model, base, cfls, progress),
+        else Err(StudyError { index: 0, cause: CaseError::Dimension })
+    )
 }
 
 fn over<T: Precision, const D: usize>(

@@ -5,6 +5,7 @@ use mmsmith_solutions::{AnySolution, Domain, Solution};
 use serde::Serialize;
 
 use crate::case::Case;
+use crate::dimension::in_dimension;
 use crate::norms::{PerField, PerNorm};
 use crate::{Frame, Integrator, Placement, Shape, Transfer, points};
 
@@ -138,12 +139,7 @@ pub fn verdicts(
 /// Method; Sadeghirad, Brannon and Guilkey, Second-order convected particle domain interpolation.
 #[must_use]
 pub fn expected_in_space(exact: &AnySolution<f64>, case: &Case) -> Expected {
-    let aligned = match exact {
-        AnySolution::One(s) => stays_aligned(s.as_ref()),
-        AnySolution::Two(s) => stays_aligned(s.as_ref()),
-        AnySolution::Three(s) => stays_aligned(s.as_ref()),
-        _ => false,
-    };
+    let aligned = in_dimension!(exact, |s| stays_aligned(s), else false);
     let contiguous = match (case.placement, case.shape) {
         (Placement::Lattice, Shape::Gimp | Shape::Cpdi | Shape::Cpdi2) => aligned,
         (Placement::BodyFitted, Shape::Cpdi2) => true,

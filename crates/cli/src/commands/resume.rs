@@ -96,10 +96,7 @@ pub(super) fn checkpoints(
     settings: &Value,
     resume: bool,
 ) -> Result<Checkpoints> {
-    // Results do not depend on the number of threads.
-    let mut settings = settings.clone();
-    settings.as_object_mut().and_then(|settings| settings.remove("threads"));
-    let origin = keep::origin(&options.name)?;
+    let (settings, origin) = (keep::decisive(settings), keep::origin(&options.name)?);
     let identity = Sha256::digest(format!("{settings}{origin}")).into();
     Ok(Checkpoints { folder: folder.to_owned(), every: options.every, identity, resume })
 }
