@@ -21,12 +21,18 @@
 //! squares fit in the whole body given its sides, by which a simulation starts.
 //!
 //! `Q` does not depend on time, so that the coefficients of the acceleration are the second derivatives of those of the
-//! displacement. For the coefficients that are integrated both are a force that depends on time, and compositions of
-//! leapfrog keep their order.
+//! displacement, and for the coefficients that are integrated both are a force that depends on time. Within a step the
+//! coefficients on the sides are integrated from their accelerations as all others are, and are set to the given motion at its
+//! end. Set at each stage, they would lack the errors of the stages, of third order in the step, that the motion beside them
+//! has: such a step in the displacement, over a cell, is a force that leaves a layer with velocities of second order.
+//! Integrated, they differ from the given motion by what the whole composition does.
 //!
 //! # Sides with a given traction
 //!
-//! The forces gain `sum T N_i dA` over the products of the other axes' points.
+//! The forces gain `sum T N_i dA` over the products of the other axes' points. The traction belongs to the exact motion,
+//! the stress inside to that of the stage, which is what limits the order of the velocities beside such a side: with a
+//! composition of fourth order and steps in proportion to the cells they have an error of third order in a layer that is
+//! one cell wide.
 
 use std::ops::Range;
 

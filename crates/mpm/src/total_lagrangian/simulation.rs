@@ -1,6 +1,6 @@
 //! The simulation: coefficients of displacement and velocity, and the forces on them.
 
-use std::array;
+use std::{array, mem};
 
 use bytemuck::{bytes_of_mut, cast_slice_mut};
 use nalgebra::{SMatrix, SVector};
@@ -316,35 +316,40 @@ impl<const D: usize> TotalLagrangian<D> {
         boundary: &dyn BoundaryData<D>,
     ) -> Result<(), StepError> {
         let start = self.time();
-        let mut now = start;
         if self.steps_done == 0 {
-            self.accelerate(body_force, boundary, now)?;
+            self.accelerate(body_force, boundary, start)?;
         }
         // The step's part that is done: time is a variable of the drift, or the composition would lose its order.
         let mut done = 0.0;
-        for &gamma in self.scheme.composition.stages() {
+        let stages = self.scheme.composition.stages();
+        for (stage, &gamma) in stages.iter().enumerate() {
             let part = self.planted.stage(gamma) * self.time_step;
             add(&mut self.v, 0.5 * part, &self.a);
             add(&mut self.u, part, &self.v);
+            let before = start + done * self.time_step;
             done += if self.planted.is(Fault::StagesAtOneTime) { 0.0 } else { gamma };
-            let before = std::mem::replace(&mut now, start + done * self.time_step);
+            let now = start + done * self.time_step;
             let moved = if self.planted.is(Fault::LateBoundary) { before } else { now };
-            // What the drift made of the coefficients on the sides is written over.
-            self.prescribe_displacement(boundary, moved);
+            // On the way the sides are integrated like all the rest: beside a motion without the errors of the stages they
+            // would leave a layer of order two in the velocities.
+            if stage + 1 == stages.len() {
+                self.prescribe_motion(boundary, Quantity::Displacement, moved);
+            }
             self.accelerate(body_force, boundary, now)?;
             add(&mut self.v, 0.5 * part, &self.a);
         }
-        let mut v = std::mem::replace(&mut self.v, array::from_fn(|_| Vec::new()));
-        self.prescribe(boundary, Quantity::Velocity, now, &mut v);
-        self.v = v;
+        self.prescribe_motion(boundary, Quantity::Velocity, start + done * self.time_step);
         self.steps_done += 1;
         Ok(())
     }
 
-    fn prescribe_displacement(&mut self, boundary: &dyn BoundaryData<D>, time: f64) {
-        let mut u = std::mem::replace(&mut self.u, array::from_fn(|_| Vec::new()));
-        self.prescribe(boundary, Quantity::Displacement, time, &mut u);
-        self.u = u;
+    /// Writes the displacement or the velocity of moved sides over what was integrated there.
+    fn prescribe_motion(&mut self, boundary: &dyn BoundaryData<D>, of: Quantity, time: f64) {
+        let field = if of == Quantity::Velocity { &mut self.v } else { &mut self.u };
+        let mut coefficients = mem::replace(field, array::from_fn(|_| Vec::new()));
+        self.prescribe(boundary, of, time, &mut coefficients);
+        let field = if of == Quantity::Velocity { &mut self.v } else { &mut self.u };
+        *field = coefficients;
     }
 
     /// Writes what is given on moved sides over their coefficients.
@@ -499,13 +504,13 @@ impl<const D: usize> TotalLagrangian<D> {
             return Err(self.describe());
         }
         let factors = if polar || forced { Factors::Both } else { Factors::Slopes };
-        let mut given = std::mem::replace(&mut self.work.given, array::from_fn(|_| Vec::new()));
-        self.prescribe(boundary, Quantity::Acceleration, time, &mut given);
         for face in self.faces.iter_mut().filter(|face| !face.moved) {
             face.ask(boundary, Quantity::Traction, time);
         }
+        let mut given = mem::replace(&mut self.work.given, array::from_fn(|_| Vec::new()));
+        self.prescribe(boundary, Quantity::Acceleration, time, &mut given);
         for component in 0..D {
-            let mut a = std::mem::take(&mut self.a[component]);
+            let mut a = mem::take(&mut self.a[component]);
             self.integrate(component, factors, &mut a);
             self.finish(component, &given[component], &mut a);
             self.a[component] = a;
@@ -755,7 +760,7 @@ impl<const D: usize> Work<D> {
         let mut inner = 1;
         for (k, count) in functions.iter().enumerate() {
             matrix(k).multiply(inner, product, next);
-            std::mem::swap(product, next);
+            mem::swap(product, next);
             inner *= count;
         }
         sums.iter_mut().zip(product).for_each(|(sum, part)| *sum -= factor * *part);
