@@ -38,6 +38,7 @@ const CHECKS: &[(&str, Check)] = &[
     ("high order in time", high_order_in_time),
     ("high order, moved sides", high_order_with_moved_sides),
     ("high order, loaded rims", high_order_with_loaded_rims),
+    ("high order, vortex", high_order_in_the_vortex),
     ("fitted ring", order_on_the_fitted_ring),
 ];
 
@@ -75,6 +76,7 @@ const FAULTS: &[(Fault, &[&str])] = &[
             "high order in time",
             "high order, moved sides",
             "high order, loaded rims",
+            "high order, vortex",
         ],
     ),
     (
@@ -89,6 +91,7 @@ const FAULTS: &[(Fault, &[&str])] = &[
             "high order, ring",
             "high order, moved sides",
             "high order, loaded rims",
+            "high order, vortex",
         ],
     ),
     (
@@ -124,6 +127,7 @@ const FAULTS: &[(Fault, &[&str])] = &[
             "high order in time",
             "high order, moved sides",
             "high order, loaded rims",
+            "high order, vortex",
             "fitted ring",
         ],
     ),
@@ -151,6 +155,7 @@ const FAULTS: &[(Fault, &[&str])] = &[
             "high order in time",
             "high order, moved sides",
             "high order, loaded rims",
+            "high order, vortex",
         ],
     ),
     (
@@ -238,6 +243,7 @@ const FAULTS: &[(Fault, &[&str])] = &[
             "high order in time",
             "high order, moved sides",
             "high order, loaded rims",
+            "high order, vortex",
         ],
     ),
     (
@@ -268,14 +274,18 @@ const FAULTS: &[(Fault, &[&str])] = &[
             "high order in time",
             "high order, moved sides",
             "high order, loaded rims",
+            "high order, vortex",
         ],
     ),
     (
         Fault::MirrorSign,
         &["high order, box", "high order, ring", "high order in time", "high order, loaded rims"],
     ),
-    (Fault::HoopStressDropped, &["energy", "high order, ring", "high order, loaded rims"]),
-    (Fault::HoopShearDropped, &["energy"]),
+    (
+        Fault::HoopStressDropped,
+        &["energy", "high order, ring", "high order, loaded rims", "high order, vortex"],
+    ),
+    (Fault::HoopShearDropped, &["energy", "high order, vortex"]),
     (Fault::TractionSign, &["high order, loaded rims"]),
     (Fault::BoundaryInertiaDropped, &["high order, moved sides"]),
     (Fault::LateBoundary, &["high order, moved sides"]),
@@ -659,6 +669,16 @@ fn high_order_with_loaded_rims(fault: Option<Fault>) -> Vec<String> {
     let polar = TotalScheme { layout: Layout::Gauss, coordinates: Coordinates::Polar, ..scheme };
     let case = Case { frame: Frame::Total(polar), per_cell: 4, cfl: 0.2, ..case };
     reached(&study(fault, &ring, &case, &[8, 16]), 0.1, &[1.3e-7, 7.8e-9], 3.8)
+}
+
+/// A whole ring whose circles turn: shear in polar coordinates, and an axis without ends.
+fn high_order_in_the_vortex(fault: Option<Fault>) -> Vec<String> {
+    let vortex = solution("vortex", &[("A", 0.2)]);
+    let case = total(3, Composition::Order4);
+    let Frame::Total(scheme) = case.frame else { unreachable!() };
+    let polar = TotalScheme { layout: Layout::Gauss, coordinates: Coordinates::Polar, ..scheme };
+    let case = Case { frame: Frame::Total(polar), per_cell: 4, cfl: 0.2, periods: 0.1, ..case };
+    reached(&study(fault, &vortex, &case, &[8, 16]), 0.2, &[1.6e-3, 1.4e-4], 3.4)
 }
 
 /// On one grid whose error in space is far below that of time: the order of the composition.
