@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use mmsmith_solutions::AnySolution;
 use mmsmith_verify as verify;
 use serde::Serialize;
 
@@ -428,12 +429,13 @@ pub(crate) struct SchemeOptions {
     /// Order of the symmetric composition of leapfrog in the total frame; where nothing is said 4, and 6 for splines of degree 4 and 5
     #[arg(long, value_enum)]
     pub(crate) composition: Option<Composition>,
-    /// Where the particles lie; Gauss points in the total frame only, body-fitted ones in the updated frame only
-    #[arg(long, value_enum, default_value_t = Layout::Lattice)]
-    pub(crate) layout: Layout,
-    /// Coordinates of the background grid; polar for rings in the total frame
-    #[arg(long, value_enum, default_value_t = Grid::Cartesian)]
-    pub(crate) grid: Grid,
+    /// Where the particles lie; Gauss points in the total frame only, body-fitted ones in the updated frame only. Where nothing is
+    /// said a lattice, and Gauss points in the total frame for a body that is not held between sliding walls
+    #[arg(long, value_enum)]
+    pub(crate) layout: Option<Layout>,
+    /// Coordinates of the background grid; where nothing is said polar for rings in the total frame
+    #[arg(long, value_enum)]
+    pub(crate) grid: Option<Grid>,
     /// Speed that the CFL number refers to
     #[arg(long, value_enum, default_value_t = CflSpeed::Bar)]
     pub(crate) cfl_speed: CflSpeed,
@@ -446,9 +448,9 @@ pub(crate) struct SchemeOptions {
     /// First velocity of the cd integrator; others ignore it
     #[arg(long, value_enum, default_value_t = Start::Halved)]
     pub(crate) start: Start,
-    /// Particles in a cell along each direction
-    #[arg(long, value_name = "N", default_value_t = 2, value_parser = positive_count)]
-    pub(crate) ppc: usize,
+    /// Particles in a cell along each direction; where nothing is said 2, and one more than the degree with Gauss points
+    #[arg(long, value_name = "N", value_parser = positive_count)]
+    pub(crate) ppc: Option<usize>,
     /// Time step times wave speed over grid spacing
     #[arg(long, value_name = "X", default_value_t = 0.4, value_parser = positive_number)]
     pub(crate) cfl: f64,
@@ -485,6 +487,44 @@ impl SchemeOptions {
         }
         let Usual { scheme } = Usual::parse_from(["mms"]);
         Self { shape, integrator, ..scheme }
+    }
+
+    /// The same with what suits a solution where nothing is said.
+    pub(crate) fn for_solution(&self, exact: &AnySolution<f64>) -> Self {
+        let mut settled = self.clone();
+        if self.frame == Frame::Total {
+            settled.layout.get_or_insert(match verify::TotalScheme::layout_for(exact) {
+                verify::Layout::Lattice => Layout::Lattice,
+                verify::Layout::Gauss => Layout::Gauss,
+            });
+            settled.grid.get_or_insert(match verify::TotalScheme::coordinates_for(exact) {
+                verify::Coordinates::Cartesian => Grid::Cartesian,
+                verify::Coordinates::Polar => Grid::Polar,
+            });
+        }
+        settled
+    }
+
+    /// Where the particles lie.
+    pub(crate) fn layout(&self) -> Layout {
+        self.layout.unwrap_or(Layout::Lattice)
+    }
+
+    /// Coordinates of the background grid.
+    pub(crate) fn grid(&self) -> Grid {
+        self.grid.unwrap_or(Grid::Cartesian)
+    }
+
+    /// Particles in a cell along each direction.
+    pub(crate) fn ppc(&self) -> usize {
+        const USUAL: usize = 2;
+        self.ppc.unwrap_or_else(|| match (self.layout(), self.shape) {
+            (Layout::Gauss, Shape::Bspline3) => 4,
+            (Layout::Gauss, Shape::Bspline4) => 5,
+            (Layout::Gauss, Shape::Bspline5) => 6,
+            (Layout::Gauss, Shape::Bspline2) => 3,
+            _ => USUAL,
+        })
     }
 }
 

@@ -97,7 +97,7 @@ fn a_short_sweep_keeps_its_budget_and_its_promises() {
 fn what_cannot_be_swept_is_refused() {
     let place = tempfile::tempdir().expect("a folder");
     let place = place.path();
-    refuses(place, "tradeoff vortex --budget 1s --json a.json", &["does not model"]);
+    refuses(place, "tradeoff sphere-shell --budget 1s --json a.json", &["does not model"]);
     refuses(place, "tradeoff ring --budget 2x", &["--budget", "90s, 2m or 1h"]);
     refuses(place, "tradeoff ring --budget=-1s", &["--budget", "90s, 2m or 1h"]);
     refuses(place, "tradeoff rings --budget 1s", &["did you mean 'ring'"]);
@@ -122,7 +122,7 @@ fn explain_predicts_what_runs_take() {
         assert!(number(&pair[0]["total_s"]) >= number(&pair[0]["steps_s"]));
     }
     let called = mms(place, "explain vortex");
-    assert!(called.stdout.contains("not simulated: "), "{}", called.stdout);
+    assert!(called.stdout.contains("not simulated in the usual scheme: "), "{}", called.stdout);
 }
 
 #[test]

@@ -114,6 +114,14 @@ pub enum SetupError {
         /// The value given.
         value: f64,
     },
+    /// An axis that is periodic at one end.
+    #[error(
+        "axis {axis} is periodic at one end only; an axis that returns to its beginning has to be so at both"
+    )]
+    HalfPeriodic {
+        /// The axis.
+        axis: usize,
+    },
     /// A quantity that has to be finite is not.
     #[error("{quantity} has to be finite")]
     NotFinite {

@@ -79,6 +79,12 @@ pub enum Fault {
     HoopStressDropped,
     /// Total frame: the shear stress left out of the balance around.
     HoopShearDropped,
+    /// Total frame: given tractions with the wrong sign.
+    TractionSign,
+    /// Total frame: the inertia of sides with a given motion left out of the balance inside.
+    BoundaryInertiaDropped,
+    /// Total frame: sides with a given motion late by a stage.
+    LateBoundary,
     /// General step: corners of CPDI2 that are never moved.
     CornersStay,
     /// General step: APIC without its affine part.

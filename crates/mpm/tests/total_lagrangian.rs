@@ -41,6 +41,14 @@ fn sector() -> Grid<2> {
     }
 }
 
+/// A whole ring, in polar coordinates.
+fn ring() -> Grid<2> {
+    let mut ring = sector();
+    ring.axes[1] =
+        Axis { lower: 0.0, upper: std::f64::consts::TAU, cells: 16, ends: [End::Periodic; 2] };
+    ring
+}
+
 /// A body set in motion without regularity.
 fn moving<const D: usize>(grid: Grid<D>, scheme: Scheme, dt: f64) -> TotalLagrangian<D> {
     let mut body = TotalLagrangian::new(grid, scheme, SOFT, DENSITY, dt).unwrap();
@@ -114,6 +122,7 @@ fn energy_is_kept_to_the_order_of_the_composition() {
     check(&open_box::<2>(3), 3, Composition::Order6, 5e-3);
     // Tangential motion and its connection terms are in the energy, too.
     check(&sector(), 3, Composition::Order4, 1.5e-3);
+    check(&ring(), 3, Composition::Order4, 1.5e-3);
 }
 
 #[test]
@@ -230,6 +239,15 @@ fn set_ups_that_make_no_sense_are_refused() {
     };
     has(message(&|(grid, _, _)| mixed(grid)), "at least 3");
     has(message(&|(grid, _, _)| grid.axes[0].cells = 1 << 40), "memory");
+    has(
+        message(&|(grid, _, _)| grid.axes[1].ends[0] = End::Periodic),
+        "axis 1 is periodic at one end",
+    );
+    let short = |grid: &mut Grid<2>| {
+        grid.axes[0].ends = [End::Periodic; 2];
+        grid.axes[0].cells = 3;
+    };
+    has(message(&|(grid, _, _)| short(grid)), "at least 4");
     let polar = Grid { coordinates: Coordinates::Polar, ..open_box::<1>(4) };
     let error = TotalLagrangian::new(polar, fine.1, SOFT, DENSITY, 1e-3).unwrap_err();
     assert_eq!(error, SetupError::PolarDimension { dimension: 1 });

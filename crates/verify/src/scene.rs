@@ -1,10 +1,11 @@
 //! From a solution to a grid with walls and particles.
 
 use mmsmith_mpm::{Grid, Particles};
-use mmsmith_solutions::{Condition, Domain, Real, Solution, Surface};
+use mmsmith_solutions::{Boundary, Condition, Domain, Real, Solution, Surface};
 use nalgebra::SVector;
 use thiserror::Error;
 
+use crate::total::Frame;
 use crate::{Case, points};
 
 /// Free cells beyond the furthest place that a free surface reaches.
@@ -40,12 +41,14 @@ pub enum SceneError {
         fitting: Vec<usize>,
     },
     /// The solver has no model for a boundary condition.
-    #[error("the solver does not model the condition {condition:?} on {surface:?}")]
+    #[error("the solver does not model the condition {condition:?} on {surface:?}{instead}")]
     Unmodelled {
         /// Where.
         surface: Surface,
         /// What.
         condition: Condition,
+        /// What would model it, from a separator on; empty where nothing does.
+        instead: &'static str,
     },
     /// A surface of the body without a boundary condition.
     #[error(
@@ -94,6 +97,8 @@ pub(crate) struct Scene<const D: usize> {
     pub(crate) spacing: f64,
     pub(crate) cells: [usize; D],
     pub(crate) walls: [[bool; 2]; D],
+    /// What holds on the two sides along each axis of a box, or on the inner and the outer rim of an annulus, first.
+    pub(crate) sides: [[Condition; 2]; D],
     pub(crate) domain: Domain<f64, D>,
     /// The largest extent of the body.
     pub(crate) size: f64,
@@ -120,22 +125,36 @@ impl<const D: usize> Scene<D> {
             return Err(SceneError::Undeclared { surface });
         }
         let mut walls = [[false; 2]; D];
-        for boundary in solution.boundaries() {
-            let is_wall = match boundary.condition {
-                Condition::Sliding | Condition::Symmetry => true,
-                Condition::TractionFree => false,
-                condition => {
-                    return Err(SceneError::Unmodelled { surface: boundary.surface, condition });
+        let mut sides = [[Condition::TractionFree; 2]; D];
+        for &Boundary { surface, condition } in solution.boundaries() {
+            let is_wall = matches!(condition, Condition::Sliding | Condition::Symmetry);
+            let is_given =
+                matches!(condition, Condition::PrescribedMotion | Condition::PrescribedTraction);
+            let has_total_frame = D < 3 || matches!(domain, Domain::Box { .. });
+            if is_given && (case.frame == Frame::Updated || !has_total_frame) {
+                let instead = instead(&domain);
+                return Err(SceneError::Unmodelled { surface, condition, instead });
+            }
+            match surface {
+                Surface::Lower(axis) if axis < D => {
+                    walls[axis][0] |= is_wall && quarter;
+                    sides[axis][0] = condition;
                 }
-            };
-            match boundary.surface {
-                Surface::Lower(axis) if axis < D => walls[axis][0] |= is_wall && quarter,
-                Surface::Upper(axis) if axis < D => walls[axis][1] |= is_wall,
+                Surface::Upper(axis) if axis < D => {
+                    walls[axis][1] |= is_wall;
+                    sides[axis][1] = condition;
+                }
                 surface if is_wall => {
-                    return Err(SceneError::Unmodelled { surface, condition: boundary.condition });
+                    return Err(SceneError::Unmodelled { surface, condition, instead: "" });
                 }
                 _ => {}
             }
+        }
+        if matches!(domain, Domain::Annulus { .. }) {
+            // The first axis is the radius.
+            let on = |rim: Surface| solution.boundaries().iter().find(|b| b.surface == rim);
+            let rim = |rim| on(rim).map_or(Condition::TractionFree, |b| b.condition);
+            sides[0] = [rim(Surface::Inner), rim(Surface::Outer)];
         }
         let (lower, cells) = match &domain {
             Domain::Box { lower, upper } => {
@@ -180,7 +199,7 @@ impl<const D: usize> Scene<D> {
             }
             _ => return Err(unknown()),
         };
-        Ok(Self { lower, spacing, cells, walls, domain, size })
+        Ok(Self { lower, spacing, cells, walls, sides, domain, size })
     }
 
     /// The grid in the solver's precision.
@@ -280,6 +299,22 @@ impl<const D: usize> Scene<D> {
                 }
                 _ => true,
             }
+        }
+    }
+}
+
+/// What models given motions and tractions on the sides of a body.
+fn instead<const D: usize>(domain: &Domain<f64, D>) -> &'static str {
+    match domain {
+        Domain::Box { .. } => {
+            " in the updated frame; the total frame does: --frame total --shape bspline3"
+        }
+        Domain::Annulus { .. } if D == 2 => {
+            " in the updated frame; the total frame does: --frame total --shape bspline3 --grid polar"
+        }
+        _ => {
+            ": there is no spline grid for spherical shells, in which the total frame could; mms check, eval and score serve \
+             this solution all the same"
         }
     }
 }

@@ -2,7 +2,6 @@
 
 use bytemuck::Pod;
 use mmsmith_mpm::general::General;
-use mmsmith_mpm::total_lagrangian::TotalLagrangian;
 use mmsmith_mpm::{BodyForce, Material, Particles, Simulation, StepError};
 use mmsmith_solutions::Real;
 
@@ -51,24 +50,5 @@ impl<const D: usize> Solver<f64, D> for General<D> {
 
     fn state(&mut self) -> Vec<&mut [u8]> {
         General::state(self)
-    }
-}
-
-impl<const D: usize> Solver<f64, D> for TotalLagrangian<D> {
-    fn step(&mut self, body_force: &dyn BodyForce<f64, D>) -> Result<(), StepError> {
-        TotalLagrangian::step(self, body_force)
-    }
-
-    fn observe(&mut self) -> (&Particles<f64, D>, &Material<f64>) {
-        TotalLagrangian::observe(self);
-        (self.particles(), self.material())
-    }
-
-    fn velocity_lag(&self) -> f64 {
-        0.0
-    }
-
-    fn state(&mut self) -> Vec<&mut [u8]> {
-        TotalLagrangian::state(self)
     }
 }

@@ -2,15 +2,19 @@
 
 use mmsmith_mpm::general::{Integrator, Transfer};
 use mmsmith_mpm::total_lagrangian::{
-    Axis, Composition, Coordinates, End, Grid, Layout, MassMatrix, Scheme, TotalLagrangian,
+    Axis, BoundaryData, Composition, Coordinates, End, Grid, Layout, MassMatrix, Quantity, Scheme,
+    Side, TotalLagrangian,
 };
-use mmsmith_solutions::{AnySolution, Domain, Solution};
-use std::f64::consts::FRAC_PI_2;
+use mmsmith_mpm::{BodyForce, Material, Particles, StepError};
+use mmsmith_solutions::{AnySolution, Condition, Domain, Solution, Surface};
+use nalgebra::SVector;
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 use crate::case::{Arithmetic, Case, CaseError, ExactBodyForce, Outputs, Row, follow, law};
 use crate::general::Placement;
 use crate::plan::prepare;
 use crate::scene::{Extent, Scene};
+use crate::solver::Solver;
 
 /// The configuration that the weights belong to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -67,6 +71,30 @@ impl TotalScheme {
         }
     }
 
+    /// The layout that keeps the order of the splines for a solution: a lattice between walls, where the mirror images make
+    /// all integrands periodic, and Gauss points elsewhere.
+    #[must_use]
+    pub fn layout_for(exact: &AnySolution<f64>) -> Layout {
+        let between_walls = match exact {
+            AnySolution::One(s) => is_between_walls(s.as_ref()),
+            AnySolution::Two(s) => is_between_walls(s.as_ref()),
+            AnySolution::Three(s) => is_between_walls(s.as_ref()),
+            _ => false,
+        };
+        if between_walls { Layout::Lattice } else { Layout::Gauss }
+    }
+
+    /// The coordinates that fit a solution's body: polar for rings.
+    #[must_use]
+    pub fn coordinates_for(exact: &AnySolution<f64>) -> Coordinates {
+        match exact {
+            AnySolution::Two(s) if matches!(s.domain(), Domain::Annulus { .. }) => {
+                Coordinates::Polar
+            }
+            _ => Coordinates::Cartesian,
+        }
+    }
+
     /// Refuses what this scheme has no meaning for.
     pub(crate) fn validate(&self, case: &Case) -> Result<(), CaseError> {
         let refuse = |setting, value: String, admissible| {
@@ -84,9 +112,6 @@ impl TotalScheme {
         }
         if case.offset != 0.0 {
             return refuse("offset", format!("{:?}", case.offset), "0 in the total frame");
-        }
-        if case.extent == Some(Extent::Full) {
-            return refuse("extent", "full".into(), "quarter in the total frame");
         }
         Ok(())
     }
@@ -106,7 +131,7 @@ impl TotalScheme {
                     lower: lower[k],
                     upper: upper[k],
                     cells: scene.cells[k],
-                    ends: scene.walls[k].map(|wall| if wall { End::Wall } else { End::Free }),
+                    ends: scene.sides[k].map(end),
                 })
             }
             (Domain::Annulus { inner, outer }, Coordinates::Polar) if D == 2 => {
@@ -117,13 +142,19 @@ impl TotalScheme {
                     lower: *inner,
                     upper: *outer,
                     cells: count(outer - inner),
-                    ends: [End::Free; 2],
+                    ends: scene.sides[0].map(end),
                 };
+                let (angle, end) = match scene.extent() {
+                    Some(Extent::Full) => (TAU, End::Periodic),
+                    _ => (FRAC_PI_2, End::Wall),
+                };
+                // Along a periodic axis no spline may meet itself.
+                let least = if end == End::Periodic { self.scheme.degree + 1 } else { 2 };
                 let around = Axis {
                     lower: 0.0,
-                    upper: FRAC_PI_2,
-                    cells: count(FRAC_PI_2 * radius),
-                    ends: [End::Wall; 2],
+                    upper: angle,
+                    cells: count(angle * radius).max(least),
+                    ends: [end; 2],
                 };
                 std::array::from_fn(|k| if k == 0 { radial } else { around })
             }
@@ -141,6 +172,12 @@ impl TotalScheme {
         };
         Ok(Grid { axes, coordinates: self.coordinates, per_cell, layout: self.layout })
     }
+}
+
+fn is_between_walls<const D: usize>(exact: &dyn Solution<f64, D>) -> bool {
+    let is_wall = |condition| matches!(condition, Condition::Sliding | Condition::Symmetry);
+    matches!(exact.domain(), Domain::Box { .. })
+        && exact.boundaries().iter().all(|boundary| is_wall(boundary.condition))
 }
 
 /// Runs one case in the total frame.
@@ -174,6 +211,74 @@ fn run_in<const D: usize>(
     follow(&mut body, &body_force, exact, case, &scene, steps, outputs)
 }
 
+/// What holds at the end of an axis.
+fn end(condition: Condition) -> End {
+    match condition {
+        Condition::Sliding | Condition::Symmetry => End::Wall,
+        Condition::TractionFree => End::Free,
+        Condition::PrescribedTraction => End::Loaded,
+        Condition::PrescribedMotion => End::Moved,
+    }
+}
+
+/// A body in the total frame, with the exact motion and traction on the sides where the solution prescribes them.
+pub(crate) struct DrivenBody<'a, const D: usize> {
+    body: TotalLagrangian<D>,
+    boundary: ExactBoundary<'a, D>,
+}
+
+/// The exact solution on the sides of the body.
+struct ExactBoundary<'a, const D: usize>(&'a dyn Solution<f64, D>);
+
+impl<const D: usize> BoundaryData<D> for ExactBoundary<'_, D> {
+    fn evaluate(
+        &self,
+        quantity: Quantity,
+        side: Side,
+        X: &[SVector<f64, D>],
+        t: f64,
+        values: &mut [SVector<f64, D>],
+    ) {
+        let exact = self.0;
+        let surface = match (exact.domain(), side) {
+            (Domain::Annulus { .. }, Side { axis: 0, upper: false }) => Surface::Inner,
+            (Domain::Annulus { .. }, Side { axis: 0, upper: true }) => Surface::Outer,
+            (_, Side { axis, upper: false }) => Surface::Lower(axis),
+            (_, Side { axis, upper: true }) => Surface::Upper(axis),
+        };
+        for (X, value) in X.iter().zip(values) {
+            *value = match quantity {
+                Quantity::Displacement => exact.displacement(X, t),
+                Quantity::Velocity => exact.velocity(X, t),
+                Quantity::Acceleration => exact.acceleration(X, t),
+                // A surface that the body does not have stops the run.
+                Quantity::Traction => {
+                    exact.traction(surface, X, t).unwrap_or(SVector::repeat(f64::NAN))
+                }
+            };
+        }
+    }
+}
+
+impl<const D: usize> Solver<f64, D> for DrivenBody<'_, D> {
+    fn step(&mut self, body_force: &dyn BodyForce<f64, D>) -> Result<(), StepError> {
+        self.body.step_with_boundary(body_force, &self.boundary)
+    }
+
+    fn observe(&mut self) -> (&Particles<f64, D>, &Material<f64>) {
+        self.body.observe();
+        (self.body.particles(), self.body.material())
+    }
+
+    fn velocity_lag(&self) -> f64 {
+        0.0
+    }
+
+    fn state(&mut self) -> Vec<&mut [u8]> {
+        self.body.state()
+    }
+}
+
 /// The solver at time zero with steps of `dt`, and the body force that drives it.
 pub(crate) fn set_up<'a, const D: usize>(
     exact: &'a dyn Solution<f64, D>,
@@ -181,7 +286,7 @@ pub(crate) fn set_up<'a, const D: usize>(
     case: &Case,
     scene: &Scene<D>,
     dt: f64,
-) -> Result<(TotalLagrangian<D>, ExactBodyForce<'a, f64, D>), CaseError> {
+) -> Result<(DrivenBody<'a, D>, ExactBodyForce<'a, f64, D>), CaseError> {
     let grid = total.grid(scene, case.per_cell)?;
     let material = law(exact.material())?;
     let mut body = TotalLagrangian::new(grid, total.scheme, material, exact.density(), dt)?;
@@ -189,6 +294,7 @@ pub(crate) fn set_up<'a, const D: usize>(
     let body_force = ExactBodyForce::new(exact, X);
     let u: Vec<_> = X.iter().map(|X| exact.displacement(X, 0.0)).collect();
     let v: Vec<_> = X.iter().map(|X| exact.velocity(X, 0.0)).collect();
-    body.start(&u, &v)?;
-    Ok((body, body_force))
+    let boundary = ExactBoundary(exact);
+    body.start_with_boundary(&u, &v, &boundary)?;
+    Ok((DrivenBody { body, boundary }, body_force))
 }

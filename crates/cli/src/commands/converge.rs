@@ -29,6 +29,7 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
     let asked = options.expect.as_deref().map(expect::parse).transpose()?;
     let tolerance = options.tolerance.unwrap_or(ORDER_TOLERANCE);
     let model = Model::new(&selection, scheme.precision)?;
+    let scheme = &scheme.for_solution(&model.exact);
     let base = case(scheme, options.cells[0])?;
     let extent = model.admit(&sweep.cases(&base))?;
     let keep = Keep::open(options.kept.out.as_ref(), &options.name)?;

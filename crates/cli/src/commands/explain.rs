@@ -171,7 +171,7 @@ type Predicted = Result<Vec<(usize, Plan, Cost)>, String>;
 fn runs(predicted: &Predicted) -> String {
     let rows = match predicted {
         Ok(rows) => rows,
-        Err(reason) => return format!("\nnot simulated: {reason}\n"),
+        Err(reason) => return format!("\nnot simulated in the usual scheme: {reason}\n"),
     };
     let header = ["cells", "particles", "steps", "stepping", "in all", "memory"];
     let mut table = Table::new(0, header);

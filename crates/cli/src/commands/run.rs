@@ -24,6 +24,7 @@ pub(super) fn follow(options: &RunOptions, resume: bool) -> Result<bool> {
     let scheme = &options.scheme;
     let selection = Selection::new(&options.name, &scheme.parameters.set)?;
     let model = Model::new(&selection, scheme.precision)?;
+    let scheme = &scheme.for_solution(&model.exact);
     let case = case(scheme, options.cells)?;
     let extent = model.admit(&[case])?;
     let output = Output::prepare_if(scheme.json.as_ref())?;

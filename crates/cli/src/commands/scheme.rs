@@ -16,7 +16,7 @@ pub(super) fn of(options: &SchemeOptions) -> Result<(verify::Shape, verify::Fram
 
 /// Where the particles of the updated frame lie.
 pub(super) fn placement(options: &SchemeOptions) -> Result<verify::Placement> {
-    match (options.frame, options.layout) {
+    match (options.frame, options.layout()) {
         (Frame::Total, Layout::BodyFitted) => {
             bail!(
                 "--layout body-fitted: the total frame fits a ring by --grid polar; use --layout gauss or lattice with it"
@@ -31,8 +31,8 @@ fn updated(options: &SchemeOptions) -> Result<verify::Shape> {
     let total_only = [
         ("--mass consistent", options.mass == Some(Mass::Consistent)),
         ("--composition", options.composition.is_some_and(|order| order != Composition::Order2)),
-        ("--layout gauss", options.layout == Layout::Gauss),
-        ("--grid polar", options.grid == Grid::Polar),
+        ("--layout gauss", options.layout() == Layout::Gauss),
+        ("--grid polar", options.grid() == Grid::Polar),
     ];
     if let Some((option, _)) = total_only.iter().find(|(_, given)| *given) {
         bail!("{option}: the updated frame has none; use it with --frame total");
@@ -84,11 +84,11 @@ fn total(options: &SchemeOptions) -> Result<verify::TotalScheme> {
             Composition::Order6 => verify::Composition::Order6,
         };
     }
-    total.layout = match options.layout {
+    total.layout = match options.layout() {
         Layout::Gauss => verify::Layout::Gauss,
         Layout::Lattice | Layout::BodyFitted => verify::Layout::Lattice,
     };
-    total.coordinates = options.grid.into();
+    total.coordinates = options.grid().into();
     Ok(total)
 }
 
@@ -98,7 +98,7 @@ pub(super) fn additions(options: &SchemeOptions) -> String {
     if options.transfer != verify::Transfer::Flip {
         text += &format!(", transfer {}", options.transfer);
     }
-    if options.layout == Layout::BodyFitted {
+    if options.layout() == Layout::BodyFitted {
         text += ", body-fitted layout";
     }
     text
@@ -128,7 +128,7 @@ pub(super) fn words(options: &SchemeOptions) -> String {
     format!(
         " of order {order}, total frame, {} mass, {} layout, {} grid",
         word(&mass),
-        word(&options.layout),
-        word(&options.grid)
+        word(&options.layout()),
+        word(&options.grid())
     )
 }

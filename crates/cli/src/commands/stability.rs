@@ -41,6 +41,7 @@ impl Point {
         cells: usize,
     ) -> Result<Self> {
         let model = Model::new(&selection, scheme.precision)?;
+        let scheme = scheme.for_solution(&model.exact);
         let case = case(&scheme, cells)?;
         // The finest step that a search may come to is not known; memory does not depend on it.
         let extent = model.admit(&[Case { cfl: 0.5, ..case }])?;
@@ -79,7 +80,7 @@ pub(crate) fn stability(options: &StabilityOptions) -> Result<bool> {
     with_threads(options.scheme.threads, || {
         let rows = limits(&points, &search, &keep)?;
         let names: Vec<&str> = options.over.iter().map(|(name, _)| name.as_str()).collect();
-        let scheme = &options.scheme;
+        let scheme = &options.scheme.for_solution(&points[0].model.exact);
         let mut text = caption(&selection, scheme, points[0].extent);
         if !options.over.iter().any(|(name, _)| name == "cells") {
             text += &format!("{} cells\n", options.cells);

@@ -11,13 +11,27 @@ pub enum End {
     /// along this axis with the opposite sign. It so vanishes on the wall exactly, and the other components have no
     /// slope there, as the absence of shear traction asks of an isotropic solid.
     Wall,
+    /// A surface whose traction is [given](super::BoundaryData): free but for that.
+    Loaded,
+    /// A surface whose motion is [given](super::BoundaryData), all components of it.
+    Moved,
+    /// No end: the other end of the axis follows, where this is `Periodic` too.
+    Periodic,
+}
+
+impl End {
+    /// Whether knots are repeated here, so that the last function alone has a value at the end.
+    pub(crate) fn is_clamped(self) -> bool {
+        matches!(self, Self::Free | Self::Loaded | Self::Moved)
+    }
 }
 
 /// Where the particles lie in each cell, and the weights with which they integrate over it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layout {
     /// At the centres of equal parts of the cell (the midpoint rule). Between walls that is as accurate as the splines
-    /// themselves, since the mirror images make all integrands periodic; next to a free surface it is of order two.
+    /// themselves, since the mirror images make all integrands periodic, as it is along a periodic axis; next to any other
+    /// end it is of order two.
     Lattice,
     /// At the Gauss-Legendre points of the cell.
     Gauss,
@@ -40,6 +54,11 @@ impl Axis {
     /// The cell's size.
     pub fn spacing(&self) -> f64 {
         (self.upper - self.lower) / self.cells as f64
+    }
+
+    /// Which ends have a given motion.
+    pub(crate) fn moved(&self) -> [bool; 2] {
+        self.ends.map(|end| end == End::Moved)
     }
 
     /// Coordinates and weights of the particles along this axis, `per_cell` in each cell, cell after cell.

@@ -11,7 +11,9 @@ pub(crate) const MOST_DEGREE: usize = 5;
 /// The functions of one component along one axis, at the particles along it.
 ///
 /// Spline j (0 to cells + degree - 1) lies around cells `j - degree` to `j`. At a wall those beyond it are folded on their
-/// mirror images; at a free end the knots are repeated.
+/// mirror images; at a clamped end the knots are repeated. Along a periodic axis the last `degree` splines are copies of
+/// the first ones: coefficients have to agree, and what is integrated against both belongs together (see
+/// [`Mass::solve`](super::mass::Mass::solve)).
 #[derive(Clone, Debug)]
 pub(crate) struct Basis {
     /// Number of coefficients.
@@ -232,14 +234,14 @@ impl Basis {
     }
 }
 
-/// The knots: repeated at free ends, equally spaced beyond walls.
+/// The knots: repeated at ends that are clamped, equally spaced beyond the others.
 fn knots(axis: &Axis, p: usize) -> Vec<f64> {
     let h = axis.spacing();
     let n = axis.cells as i64;
     let p = p as i64;
     let knot = |index: i64| {
-        let index = if axis.ends[0] == End::Free { index.max(0) } else { index };
-        let index = if axis.ends[1] == End::Free { index.min(n) } else { index };
+        let index = if axis.ends[0].is_clamped() { index.max(0) } else { index };
+        let index = if axis.ends[1].is_clamped() { index.min(n) } else { index };
         axis.lower + index as f64 * h
     };
     (-p..=n + p).map(knot).collect()
@@ -277,11 +279,13 @@ mod tests {
     use super::*;
     use crate::total_lagrangian::Layout;
 
-    const ENDS: [[End; 2]; 4] = [
+    const ENDS: [[End; 2]; 6] = [
         [End::Free, End::Free],
         [End::Wall, End::Wall],
         [End::Free, End::Wall],
         [End::Wall, End::Free],
+        [End::Moved, End::Loaded],
+        [End::Periodic, End::Periodic],
     ];
 
     fn axis(ends: [End; 2]) -> Axis {

@@ -43,10 +43,13 @@
 
 mod axis;
 mod basis;
+mod boundary;
 mod composition;
+mod fit;
 mod mass;
 mod simulation;
 
 pub use axis::{Axis, End, Layout};
+pub use boundary::{BoundaryData, HeldBoundary, Quantity, Side};
 pub use composition::Composition;
 pub use simulation::{Coordinates, Grid, MassMatrix, Scheme, TotalLagrangian};

@@ -1,14 +1,16 @@
 //! The simulation: coefficients of displacement and velocity, and the forces on them.
 
-use std::array;
+use std::{array, mem};
 
 use bytemuck::{bytes_of_mut, cast_slice_mut};
 use nalgebra::{SMatrix, SVector};
 
 use super::axis::{Axis, End, Layout};
 use super::basis::{Basis, MOST_DEGREE, Part};
+use super::boundary::{BoundaryData, Face, HeldBoundary, Quantity, Side};
 use super::composition::Composition;
-use super::mass::Mass;
+use super::fit::{Fit, Line};
+use super::mass::{Band, Mass};
 use crate::body_force::BodyForce;
 use crate::error::{SetupError, StepError};
 use crate::fault::{Fault, Planted};
@@ -72,6 +74,10 @@ pub struct TotalLagrangian<const D: usize> {
     bases: [[Basis; 2]; D],
     /// Solves for accelerations, by axis as `bases`.
     mass: [[Mass; 2]; D],
+    /// Fits coefficients to values, by axis as `bases`; or why the particles do not determine them.
+    fits: Result<[[Fit; 2]; D], SetupError>,
+    /// Sides whose motion or traction is given.
+    faces: Vec<Face<D>>,
     /// Coefficients by component, axis 0 fastest.
     u: [Vec<f64>; D],
     v: [Vec<f64>; D],
@@ -99,6 +105,10 @@ struct Work<const D: usize> {
     /// coefficients after it.
     partial: Vec<Vec<Vec<f64>>>,
     b: Vec<SVector<f64, D>>,
+    /// Coefficients of the acceleration on moved sides, and zero elsewhere.
+    given: [Vec<f64>; D],
+    /// Products of the mass matrix.
+    product: [Vec<f64>; 2],
 }
 
 impl<const D: usize> TotalLagrangian<D> {
@@ -117,44 +127,45 @@ impl<const D: usize> TotalLagrangian<D> {
         const { assert!(1 <= D && D <= 3, "one, two or three dimensions") };
         check(&grid, &scheme, density, time_step)?;
         reserve(&grid, scheme.degree)?;
-        let mut lines = Vec::with_capacity(D);
-        for (k, axis) in grid.axes.iter().enumerate() {
-            let (points, mut weights) = axis.points(grid.per_cell, grid.layout);
-            if grid.coordinates == Coordinates::Polar && k == 0 {
-                weights.iter_mut().zip(&points).for_each(|(w, R)| *w *= R);
-            }
-            if Planted::here().is(Fault::WeightOff) {
-                weights[0] *= 1.001;
-            }
-            lines.push((points, weights));
-        }
-        let basis =
-            |k: usize, normal: bool| {
-                let axis = &grid.axes[k];
-                Basis::new(axis, scheme.degree, normal, &lines[k].0)
-                    .ok_or(SetupError::TooFewCells { axis: k, cells: axis.cells, least: 2 })
-            };
+        let mut lines: [Line; D] = array::from_fn(|k| line(&grid, k));
+        let faces = faces(&grid, &lines);
+        let basis = |k: usize, normal: bool| {
+            let axis = &grid.axes[k];
+            Basis::new(axis, scheme.degree, normal, &lines[k].points)
+                .ok_or(SetupError::TooFewCells { axis: k, cells: axis.cells, least: 2 })
+        };
         let mut bases = Vec::with_capacity(D);
-        let mut masses = Vec::with_capacity(D);
         for k in 0..D {
-            let pair = [basis(k, false)?, basis(k, true)?];
-            // The density belongs to the product over the axes, so to one of them.
-            let factor = if k == 0 { density } else { 1.0 };
-            let weights: Vec<f64> = lines[k].1.iter().map(|w| w * factor).collect();
-            let mass = |normal: usize| match scheme.mass {
-                MassMatrix::Consistent => Mass::consistent(&pair[normal], &weights),
-                MassMatrix::Lumped => {
-                    let on_wall = scheme.degree % 2 == 1 && grid.axes[k].ends[0] == End::Wall;
-                    let skipped = usize::from(on_wall && normal == 1);
-                    Some(Mass::lumped(&pair[0], &weights, skipped, pair[normal].functions))
-                }
-            };
-            let singular = SetupError::SingularMass { axis: k, per_cell: grid.per_cell };
-            let pair_of_masses = mass(0).zip(mass(1)).ok_or(singular)?;
-            masses.push(<[Mass; 2]>::from(pair_of_masses));
-            bases.push(pair);
+            bases.push([basis(k, false)?, basis(k, true)?]);
         }
         let bases: [[Basis; 2]; D] = array::from_fn(|k| bases[k].clone());
+        let singular = |axis: usize| SetupError::SingularMass { axis, per_cell: grid.per_cell };
+        let fits = fits(&grid, &bases, &lines).map_err(singular);
+        if let (Err(error), true) = (&fits, faces.iter().any(|face| face.moved)) {
+            return Err(error.clone());
+        }
+        if Planted::here().is(Fault::WeightOff) {
+            lines.iter_mut().for_each(|line| line.weights[0] *= 1.001);
+        }
+        let mut masses = Vec::with_capacity(D);
+        for (k, (axis, pair)) in grid.axes.iter().zip(&bases).enumerate() {
+            // The density belongs to the product over the axes, so to one of them.
+            let factor = if k == 0 { density } else { 1.0 };
+            let weights: Vec<f64> = lines[k].weights.iter().map(|w| w * factor).collect();
+            let mass = |normal: usize| match scheme.mass {
+                MassMatrix::Consistent => {
+                    Mass::consistent(axis, &Band::consistent(&pair[normal], &weights))
+                }
+                MassMatrix::Lumped => {
+                    let on_wall = scheme.degree % 2 == 1 && axis.ends[0] == End::Wall;
+                    let skipped = usize::from(on_wall && normal == 1);
+                    let count = pair[normal].functions;
+                    Some(Mass::lumped(axis, &pair[0], &weights, skipped, count))
+                }
+            };
+            let pair_of_masses = mass(0).zip(mass(1)).ok_or_else(|| singular(k))?;
+            masses.push(<[Mass; 2]>::from(pair_of_masses));
+        }
         let mass: [[Mass; 2]; D] = array::from_fn(|k| masses[k].clone());
         let particles = particles(&grid, &lines, density);
         let zeros: [Vec<f64>; D] = array::from_fn(|component| {
@@ -165,11 +176,15 @@ impl<const D: usize> TotalLagrangian<D> {
         let direction = |theta: &f64| [theta.cos(), theta.sin()];
         Ok(Self {
             reciprocal_radius: match polar {
-                true => lines[0].0.iter().map(|R| R.recip()).collect(),
+                true => lines[0].points.iter().map(|R| R.recip()).collect(),
                 false => Vec::new(),
             },
-            direction: if polar { lines[1].0.iter().map(direction).collect() } else { Vec::new() },
-            work: Work::new(&bases, particles.len()),
+            direction: match polar {
+                true => lines[1].points.iter().map(direction).collect(),
+                false => Vec::new(),
+            },
+            faces,
+            work: Work::new(&bases, particles.len(), &zeros),
             u: zeros.clone(),
             v: zeros.clone(),
             a: zeros,
@@ -179,6 +194,7 @@ impl<const D: usize> TotalLagrangian<D> {
             time_step,
             bases,
             mass,
+            fits,
             particles,
             density,
             steps_done: 0,
@@ -192,17 +208,31 @@ impl<const D: usize> TotalLagrangian<D> {
         &self.particles.X
     }
 
+    /// Starts anew at time 0 as [`start_with_boundary`](Self::start_with_boundary) does, with sides that are held.
+    ///
+    /// # Errors
+    ///
+    /// As [`start_with_boundary`](Self::start_with_boundary).
+    pub fn start(
+        &mut self,
+        u: &[SVector<f64, D>],
+        v: &[SVector<f64, D>],
+    ) -> Result<(), SetupError> {
+        self.start_with_boundary(u, v, &HeldBoundary)
+    }
+
     /// Starts anew at time 0 from the displacements and velocities nearest to those given at the particles, in the
-    /// mean of squares weighted with the particles' masses.
+    /// mean of squares weighted with the particles' masses, among those that have the motion given on the sides.
     ///
     /// # Errors
     ///
     /// [`SetupError::SingularMass`] where lumped masses hide that the particles do not determine the coefficients, and
     /// [`SetupError::LengthMismatch`] for slices of another length than [`positions`](Self::positions).
-    pub fn start(
+    pub fn start_with_boundary(
         &mut self,
         u: &[SVector<f64, D>],
         v: &[SVector<f64, D>],
+        boundary: &dyn BoundaryData<D>,
     ) -> Result<(), SetupError> {
         let expected = self.particles.len();
         for (array, found) in [("u", u.len()), ("v", v.len())] {
@@ -210,28 +240,22 @@ impl<const D: usize> TotalLagrangian<D> {
                 return Err(SetupError::LengthMismatch { array, found, expected });
             }
         }
-        let mut consistent = Vec::with_capacity(D);
-        for k in 0..D {
-            let (points, mut weights) =
-                self.grid.axes[k].points(self.grid.per_cell, self.grid.layout);
-            if !self.reciprocal_radius.is_empty() && k == 0 {
-                weights.iter_mut().zip(&points).for_each(|(w, R)| *w *= R);
-            }
-            let mass = |basis: &Basis| Mass::consistent(basis, &weights);
-            let singular = SetupError::SingularMass { axis: k, per_cell: self.grid.per_cell };
-            let [even, odd] = &self.bases[k];
-            consistent.push(<[Mass; 2]>::from(mass(even).zip(mass(odd)).ok_or(singular)?));
-        }
-        let consistent: [[Mass; 2]; D] = array::from_fn(|k| consistent[k].clone());
-        self.u = self.fit(&consistent, u);
-        self.v = self.fit(&consistent, v);
+        self.u = self.fit(u, boundary, Quantity::Displacement)?;
+        self.v = self.fit(v, boundary, Quantity::Velocity)?;
         self.steps_done = 0;
         self.failed = None;
         Ok(())
     }
 
-    /// The coefficients of the field nearest to given values.
-    fn fit(&mut self, mass: &[[Mass; 2]; D], values: &[SVector<f64, D>]) -> [Vec<f64>; D] {
+    /// The coefficients of the field nearest to given values, which is `quantity` on the sides at time 0.
+    fn fit(
+        &mut self,
+        values: &[SVector<f64, D>],
+        boundary: &dyn BoundaryData<D>,
+        quantity: Quantity,
+    ) -> Result<[Vec<f64>; D], SetupError> {
+        let mut fitted: [Vec<f64>; D] = array::from_fn(|c| vec![0.0; self.u[c].len()]);
+        self.prescribe(boundary, quantity, 0.0, &mut fitted);
         let row = self.row();
         for (p, value) in values.iter().enumerate() {
             let value = self.components(p / row, value);
@@ -239,12 +263,30 @@ impl<const D: usize> TotalLagrangian<D> {
                 self.work.values[component][p] = value[component] * self.particles.volume[p];
             }
         }
-        array::from_fn(|component| {
-            let mut fitted = vec![0.0; self.u[component].len()];
-            self.integrate(component, Factors::Values, &mut fitted);
-            self.solve(mass, component, &mut fitted);
-            fitted
-        })
+        for (component, given) in fitted.iter_mut().enumerate() {
+            let mut sums = vec![0.0; given.len()];
+            self.integrate(component, Factors::Values, &mut sums);
+            let functions = self.functions(component);
+            let fits = self.fits.as_ref().map_err(Clone::clone)?;
+            let of = |k: usize| &fits[k][usize::from(k == component)];
+            self.work.subtract_product(&functions, |k| &of(k).matrix, 1.0, given, &mut sums);
+            solve(&functions, |k| &of(k).mass, &mut sums);
+            self.faces.iter().filter(|face| face.moved).for_each(|face| {
+                face.copy(&functions, given, &mut sums);
+            });
+            *given = sums;
+        }
+        Ok(fitted)
+    }
+
+    /// Advances by one time step as [`step_with_boundary`](Self::step_with_boundary) does, with sides that are held, and
+    /// without traction.
+    ///
+    /// # Errors
+    ///
+    /// As [`step_with_boundary`](Self::step_with_boundary).
+    pub fn step(&mut self, body_force: &dyn BodyForce<f64, D>) -> Result<(), StepError> {
+        self.step_with_boundary(body_force, &HeldBoundary)
     }
 
     /// Advances by one time step.
@@ -253,34 +295,87 @@ impl<const D: usize> TotalLagrangian<D> {
     ///
     /// Where a particle turns inside out or takes on values that are not finite, at any stage of the step. Every
     /// further call returns the same error.
-    pub fn step(&mut self, body_force: &dyn BodyForce<f64, D>) -> Result<(), StepError> {
+    pub fn step_with_boundary(
+        &mut self,
+        body_force: &dyn BodyForce<f64, D>,
+        boundary: &dyn BoundaryData<D>,
+    ) -> Result<(), StepError> {
         if let Some(error) = &self.failed {
             return Err(error.clone());
         }
-        let outcome = self.advance(body_force);
+        let outcome = self.advance(body_force, boundary);
         if let Err(error) = &outcome {
             self.failed = Some(error.clone());
         }
         outcome
     }
 
-    fn advance(&mut self, body_force: &dyn BodyForce<f64, D>) -> Result<(), StepError> {
+    fn advance(
+        &mut self,
+        body_force: &dyn BodyForce<f64, D>,
+        boundary: &dyn BoundaryData<D>,
+    ) -> Result<(), StepError> {
         let start = self.time();
         if self.steps_done == 0 {
-            self.accelerate(body_force, start)?;
+            self.accelerate(body_force, boundary, start)?;
         }
         // The step's part that is done: time is a variable of the drift, or the composition would lose its order.
         let mut done = 0.0;
-        for &gamma in self.scheme.composition.stages() {
+        let stages = self.scheme.composition.stages();
+        for (stage, &gamma) in stages.iter().enumerate() {
             let part = self.planted.stage(gamma) * self.time_step;
             add(&mut self.v, 0.5 * part, &self.a);
             add(&mut self.u, part, &self.v);
+            let before = start + done * self.time_step;
             done += if self.planted.is(Fault::StagesAtOneTime) { 0.0 } else { gamma };
-            self.accelerate(body_force, start + done * self.time_step)?;
+            let now = start + done * self.time_step;
+            let moved = if self.planted.is(Fault::LateBoundary) { before } else { now };
+            // On the way the sides are integrated like all the rest: beside a motion without the errors of the stages they
+            // would leave a layer of order two in the velocities.
+            if stage + 1 == stages.len() {
+                self.prescribe_motion(boundary, Quantity::Displacement, moved);
+            }
+            self.accelerate(body_force, boundary, now)?;
             add(&mut self.v, 0.5 * part, &self.a);
         }
+        self.prescribe_motion(boundary, Quantity::Velocity, start + done * self.time_step);
         self.steps_done += 1;
         Ok(())
+    }
+
+    /// Writes the displacement or the velocity of moved sides over what was integrated there.
+    fn prescribe_motion(&mut self, boundary: &dyn BoundaryData<D>, of: Quantity, time: f64) {
+        let field = if of == Quantity::Velocity { &mut self.v } else { &mut self.u };
+        let mut coefficients = mem::replace(field, array::from_fn(|_| Vec::new()));
+        self.prescribe(boundary, of, time, &mut coefficients);
+        let field = if of == Quantity::Velocity { &mut self.v } else { &mut self.u };
+        *field = coefficients;
+    }
+
+    /// Writes what is given on moved sides over their coefficients.
+    fn prescribe(
+        &mut self,
+        boundary: &dyn BoundaryData<D>,
+        quantity: Quantity,
+        time: f64,
+        coefficients: &mut [Vec<f64>; D],
+    ) {
+        // Without fits there are no sides of that kind.
+        let Self { faces, fits: Ok(fits), bases, .. } = self else { return };
+        for face in faces.iter_mut().filter(|face| face.moved) {
+            face.ask(boundary, quantity, time);
+            for (component, coefficients) in coefficients.iter_mut().enumerate() {
+                let normal = |k: usize| usize::from(k == component);
+                let of_side = face.fit(component, |k| (&fits[k][normal(k)], &bases[k][normal(k)]));
+                let functions = array::from_fn(|k| bases[k][normal(k)].functions);
+                face.set(&functions, &of_side, coefficients);
+            }
+        }
+    }
+
+    /// The number of coefficients of a component along each axis.
+    fn functions(&self, component: usize) -> [usize; D] {
+        array::from_fn(|k| self.bases[k][usize::from(k == component)].functions)
     }
 
     /// The particles as they are now, with velocities of the same time; computed at each call.
@@ -384,6 +479,7 @@ impl<const D: usize> TotalLagrangian<D> {
     fn accelerate(
         &mut self,
         body_force: &dyn BodyForce<f64, D>,
+        boundary: &dyn BoundaryData<D>,
         time: f64,
     ) -> Result<(), StepError> {
         let polar = self.grid.coordinates == Coordinates::Polar;
@@ -408,13 +504,44 @@ impl<const D: usize> TotalLagrangian<D> {
             return Err(self.describe());
         }
         let factors = if polar || forced { Factors::Both } else { Factors::Slopes };
+        for face in self.faces.iter_mut().filter(|face| !face.moved) {
+            face.ask(boundary, Quantity::Traction, time);
+        }
+        let mut given = mem::replace(&mut self.work.given, array::from_fn(|_| Vec::new()));
+        self.prescribe(boundary, Quantity::Acceleration, time, &mut given);
         for component in 0..D {
-            let mut a = std::mem::take(&mut self.a[component]);
+            let mut a = mem::take(&mut self.a[component]);
             self.integrate(component, factors, &mut a);
-            self.solve(&self.mass, component, &mut a);
+            self.finish(component, &given[component], &mut a);
             self.a[component] = a;
         }
+        self.work.given = given;
         Ok(())
+    }
+
+    /// From a component's forces inside the body to accelerations, of which those on moved sides are given.
+    fn finish(&mut self, component: usize, given: &[f64], a: &mut [f64]) {
+        let functions = self.functions(component);
+        let normal = |k: usize| usize::from(k == component);
+        for face in self.faces.iter().filter(|face| !face.moved) {
+            let mut forces = face.load(component, |k| &self.bases[k][normal(k)]);
+            if self.planted.is(Fault::TractionSign) {
+                forces.iter_mut().for_each(|force| *force = -*force);
+            }
+            face.add(&functions, &forces, a);
+        }
+        let moves = self.faces.iter().any(|face| face.moved);
+        if let (true, MassMatrix::Consistent, Ok(fits)) = (moves, self.scheme.mass, &self.fits)
+            && !self.planted.is(Fault::BoundaryInertiaDropped)
+        {
+            let matrix = |k: usize| &fits[k][normal(k)].matrix;
+            self.work.subtract_product(&functions, matrix, self.density, given, a);
+        }
+        solve(&functions, |k| &self.mass[k][normal(k)], a);
+        self.faces
+            .iter()
+            .filter(|face| face.moved)
+            .for_each(|face| face.copy(&functions, given, a));
     }
 
     /// Turns displacements and their slopes at the particles into the factors of the functions' values and slopes in the
@@ -572,15 +699,18 @@ impl<const D: usize> TotalLagrangian<D> {
             size = next;
         }
     }
+}
 
-    /// Solves for a component's coefficients in place.
-    fn solve(&self, mass: &[[Mass; 2]; D], component: usize, coefficients: &mut [f64]) {
-        let mut inner = 1;
-        for k in 0..D {
-            let normal = usize::from(k == component);
-            mass[k][normal].solve(inner, coefficients);
-            inner *= self.bases[k][normal].functions;
-        }
+/// Solves in place for coefficients, `functions` by axis, with one mass matrix for each axis.
+fn solve<'a, const D: usize>(
+    functions: &[usize; D],
+    mass: impl Fn(usize) -> &'a Mass,
+    coefficients: &mut [f64],
+) {
+    let mut inner = 1;
+    for (k, count) in functions.iter().enumerate() {
+        mass(k).solve(inner, coefficients);
+        inner *= count;
     }
 }
 
@@ -600,7 +730,7 @@ enum Factors {
 }
 
 impl<const D: usize> Work<D> {
-    fn new(bases: &[[Basis; 2]; D], particles: usize) -> Self {
+    fn new(bases: &[[Basis; 2]; D], particles: usize, zeros: &[Vec<f64>; D]) -> Self {
         let size = |axis: usize| (0..D).map(|k| layer(&bases[k], k <= axis)).product::<usize>();
         let stage = |axis: usize| vec![vec![0.0; size(axis)]; axis + 2];
         let points = || vec![0.0; particles];
@@ -609,7 +739,31 @@ impl<const D: usize> Work<D> {
             slopes: array::from_fn(|_| array::from_fn(|_| points())),
             partial: (0..D - 1).map(stage).collect(),
             b: vec![SVector::zeros(); particles],
+            given: zeros.clone(),
+            product: [Vec::new(), Vec::new()],
         }
+    }
+
+    /// `sums -= factor * M * given`, `M` being the product of one matrix for each axis.
+    fn subtract_product<'a>(
+        &mut self,
+        functions: &[usize; D],
+        matrix: impl Fn(usize) -> &'a Band,
+        factor: f64,
+        given: &[f64],
+        sums: &mut [f64],
+    ) {
+        let [product, next] = &mut self.product;
+        product.clear();
+        product.extend_from_slice(given);
+        next.resize(given.len(), 0.0);
+        let mut inner = 1;
+        for (k, count) in functions.iter().enumerate() {
+            matrix(k).multiply(inner, product, next);
+            mem::swap(product, next);
+            inner *= count;
+        }
+        sums.iter_mut().zip(product).for_each(|(sum, part)| *sum -= factor * *part);
     }
 }
 
@@ -654,35 +808,143 @@ fn polar_gradient<const D: usize>(
     H
 }
 
-/// The body at rest.
-fn particles<const D: usize>(
-    grid: &Grid<D>,
-    lines: &[(Vec<f64>, Vec<f64>)],
-    density: f64,
-) -> Particles<f64, D> {
-    let count = lines.iter().map(|(points, _)| points.len()).product();
-    let mut X = Vec::with_capacity(count);
-    let mut volume = Vec::with_capacity(count);
-    for p in 0..count {
-        let mut rest = p;
-        let mut weight = 1.0;
-        let place = SVector::<f64, D>::from_fn(|k, _| {
-            let (points, weights) = &lines[k];
-            let index = rest % points.len();
-            rest /= points.len();
-            weight *= weights[index];
-            points[index]
-        });
-        X.push(match grid.coordinates {
-            Coordinates::Cartesian => place,
-            Coordinates::Polar => {
-                let (R, theta) = (place[0], place[1]);
+impl Coordinates {
+    /// The Cartesian position.
+    fn place<const D: usize>(self, coordinates: &SVector<f64, D>) -> SVector<f64, D> {
+        match self {
+            Self::Cartesian => *coordinates,
+            Self::Polar => {
+                let (R, theta) = (coordinates[0], coordinates[1]);
                 let mut along = SVector::zeros();
                 along[0] = R;
                 turn(&along, theta.cos(), theta.sin())
             }
-        });
-        volume.push(weight);
+        }
+    }
+
+    /// The unit vectors that components belong to, as columns; `None` where they are Cartesian.
+    fn frame<const D: usize>(self, coordinates: &SVector<f64, D>) -> Option<SMatrix<f64, D, D>> {
+        match self {
+            Self::Cartesian => None,
+            Self::Polar => {
+                let (sin, cos) = coordinates[1].sin_cos();
+                Some(SMatrix::from_fn(|i, k| match (i, k) {
+                    (0, 1) => -sin,
+                    (1, 0) => sin,
+                    (0, 0) | (1, 1) => cos,
+                    _ => f64::from(u8::from(i == k)),
+                }))
+            }
+        }
+    }
+
+    /// Lengths per unit of each coordinate.
+    fn scales<const D: usize>(self, coordinates: &SVector<f64, D>) -> SVector<f64, D> {
+        let mut scales = SVector::repeat(1.0);
+        if self == Self::Polar {
+            scales[1] = coordinates[0];
+        }
+        scales
+    }
+
+    /// The factor of the volume that belongs to axis `k`; the product over the axes is that of the scales.
+    fn density(self, k: usize, coordinate: f64) -> f64 {
+        match (self, k) {
+            (Self::Polar, 0) => coordinate,
+            _ => 1.0,
+        }
+    }
+}
+
+/// The particles along an axis.
+fn line<const D: usize>(grid: &Grid<D>, k: usize) -> Line {
+    let density = |x| grid.coordinates.density(k, x);
+    Line::new(&grid.axes[k], grid.per_cell, grid.layout, density)
+}
+
+/// What takes values to coefficients, by axis and kind of component; or the axis whose particles do not determine them.
+fn fits<const D: usize>(
+    grid: &Grid<D>,
+    bases: &[[Basis; 2]; D],
+    lines: &[Line; D],
+) -> Result<[[Fit; 2]; D], usize> {
+    let mut fits = Vec::with_capacity(D);
+    for k in 0..D {
+        let fit = |normal: usize| Fit::new(&grid.axes[k], &bases[k][normal], &lines[k].weights);
+        fits.push(<[Fit; 2]>::from(fit(0).zip(fit(1)).ok_or(k)?));
+    }
+    Ok(array::from_fn(|k| fits[k].clone()))
+}
+
+/// The sides where something is given.
+fn faces<const D: usize>(grid: &Grid<D>, lines: &[Line; D]) -> Vec<Face<D>> {
+    let mut faces = Vec::new();
+    for axis in 0..D {
+        for upper in [false, true] {
+            let end = grid.axes[axis].ends[usize::from(upper)];
+            if !matches!(end, End::Moved | End::Loaded) {
+                continue;
+            }
+            let moved = end == End::Moved;
+            let own = if upper { grid.axes[axis].upper } else { grid.axes[axis].lower };
+            // Coordinates and lengths; the lengths matter for tractions only.
+            let places: [Vec<[f64; 2]>; D] = array::from_fn(|k| {
+                if k == axis {
+                    return vec![[own, 1.0]];
+                }
+                let (axis, line) = (&grid.axes[k], &lines[k]);
+                let ends = axis.moved().map(|other| moved && other);
+                let particles = line.points.iter().zip(&line.lengths).map(|(x, w)| [*x, *w]);
+                let lower = ends[0].then_some([axis.lower, 0.0]);
+                lower
+                    .into_iter()
+                    .chain(particles)
+                    .chain(ends[1].then_some([axis.upper, 0.0]))
+                    .collect()
+            });
+            let count = places.iter().map(Vec::len).product();
+            let mut face = Face {
+                side: Side { axis, upper },
+                moved,
+                X: Vec::with_capacity(count),
+                frames: Vec::new(),
+                areas: Vec::new(),
+                values: vec![SVector::zeros(); count],
+            };
+            for index in products(places.each_ref().map(Vec::len)) {
+                let place = SVector::<f64, D>::from_fn(|k, _| places[k][index[k]][0]);
+                let scales = grid.coordinates.scales(&place);
+                let others = (0..D).filter(|k| *k != axis);
+                face.X.push(grid.coordinates.place(&place));
+                face.frames.extend(grid.coordinates.frame(&place));
+                face.areas.push(others.map(|k| scales[k] * places[k][index[k]][1]).product());
+            }
+            faces.push(face);
+        }
+    }
+    faces
+}
+
+/// All index tuples below `counts`, the first index fastest.
+fn products<const D: usize>(counts: [usize; D]) -> impl Iterator<Item = [usize; D]> {
+    (0..counts.iter().product()).map(move |mut rest| {
+        counts.map(|count| {
+            let index = rest % count;
+            rest /= count;
+            index
+        })
+    })
+}
+
+/// The body at rest.
+fn particles<const D: usize>(grid: &Grid<D>, lines: &[Line; D], density: f64) -> Particles<f64, D> {
+    let count = lines.iter().map(|line| line.points.len()).product();
+    let mut X = Vec::with_capacity(count);
+    let mut volume = Vec::with_capacity(count);
+    for index in products(lines.each_ref().map(|line| line.points.len())) {
+        let place = SVector::<f64, D>::from_fn(|k, _| lines[k].points[index[k]]);
+        X.push(grid.coordinates.place(&place));
+        volume.push((0..D).map(|k| lines[k].weights[index[k]]).product());
     }
     Particles {
         x: X.clone(),
@@ -719,10 +981,18 @@ fn check<const D: usize>(
             return Err(SetupError::NoCells { axis: k });
         }
         positive(&format!("the length of axis {k}"), axis.upper - axis.lower)?;
-        // The mirror images of splines at a wall have to be splines: those at a free end are not.
-        let mixed = axis.ends[0] != axis.ends[1];
-        if mixed && axis.cells < degree {
+        let of = |kind: End| axis.ends.map(|end| end == kind);
+        // The mirror images of splines at a wall have to be splines: those at a clamped end are not.
+        let [lower, upper] = of(End::Wall);
+        if lower != upper && axis.cells < degree {
             return Err(SetupError::TooFewCells { axis: k, cells: axis.cells, least: degree });
+        }
+        let [lower, upper] = of(End::Periodic);
+        if lower != upper {
+            return Err(SetupError::HalfPeriodic { axis: k });
+        }
+        if lower && axis.cells <= degree {
+            return Err(SetupError::TooFewCells { axis: k, cells: axis.cells, least: degree + 1 });
         }
     }
     if grid.coordinates == Coordinates::Polar {
@@ -737,8 +1007,13 @@ fn check<const D: usize>(
 /// Asks for all the memory of a run first, which turns a grid that is too large into an error instead of an abort.
 fn reserve<const D: usize>(grid: &Grid<D>, degree: usize) -> Result<(), SetupError> {
     let (mut particles, mut functions, mut along) = (1_u128, 1_u128, 0_u128);
+    let mut on_sides = 0_u128;
     for axis in &grid.axes {
         let points = axis.cells as u128 * grid.per_cell as u128;
+        let others = grid.axes.iter().map(|other| other.cells as u128 * grid.per_cell as u128 + 2);
+        let others = others.fold(1_u128, u128::saturating_mul) / (points + 2);
+        let given = axis.ends.iter().filter(|end| matches!(end, End::Moved | End::Loaded));
+        on_sides = on_sides.saturating_add(others.saturating_mul(given.count() as u128));
         particles = particles.saturating_mul(points);
         functions = functions.saturating_mul(axis.cells as u128 + degree as u128);
         // Values and slopes of both kinds of components, places, weights, and factors of the mass.
@@ -748,7 +1023,8 @@ fn reserve<const D: usize>(grid: &Grid<D>, degree: usize) -> Result<(), SetupErr
     let at_particles = (5 * D + 4 * D * D + 2) as u128;
     let doubles = particles
         .saturating_mul(at_particles)
-        .saturating_add(functions.saturating_mul(3 * D as u128))
+        .saturating_add(functions.saturating_mul(4 * D as u128 + 2))
+        .saturating_add(on_sides.saturating_mul((2 * D + D * D + 1) as u128))
         .saturating_add(along);
     let bytes = doubles.saturating_mul(size_of::<f64>() as u128);
     let too_large = || SetupError::GridTooLarge {

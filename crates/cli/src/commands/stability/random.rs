@@ -29,6 +29,8 @@ pub(super) fn search(options: &StabilityOptions, criteria: &Criteria) -> Result<
     let points: Vec<Point> = (0..options.samples)
         .map(|sample| draw(options, &selection, sample))
         .collect::<Result<_>>()?;
+    let settled = points.first().map(|point| scheme.for_solution(&point.model.exact));
+    let scheme = settled.as_ref().unwrap_or(scheme);
     let keep = Keep::open(options.kept.out.as_ref(), &options.name)?;
     let keys: Vec<_> = points
         .iter()
@@ -118,7 +120,7 @@ fn draw(options: &StabilityOptions, selection: &Selection, sample: usize) -> Res
         let share = random.between(0.05, 1.0);
         let attempt = selection.with(&parameters).and_then(|selection| {
             let scheme = SchemeOptions {
-                ppc: ppc.max(options.scheme.ppc),
+                ppc: Some(ppc.max(options.scheme.ppc())),
                 offset,
                 ..options.scheme.clone()
             };
@@ -147,13 +149,13 @@ fn command(options: &StabilityOptions, point: &Point) -> String {
         options.name,
         case.cfl,
         case.cells,
-        scheme.ppc,
+        scheme.ppc(),
         scheme.offset,
         word(scheme.shape),
         word(scheme.integrator),
         word(scheme.start),
         scheme.transfer,
-        word(scheme.layout),
+        word(scheme.layout()),
         scheme.periods,
         word(scheme.precision),
         options.error_multiple,
@@ -164,7 +166,7 @@ fn command(options: &StabilityOptions, point: &Point) -> String {
         text += &format!(
             " --frame total --mass {} --composition {composition} --grid {}",
             word(mass),
-            word(scheme.grid)
+            word(scheme.grid())
         );
     }
     if scheme.cfl_speed == CflSpeed::PWave {

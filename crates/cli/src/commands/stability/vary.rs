@@ -63,7 +63,7 @@ fn put(draft: &mut Draft, name: &str, text: &str) -> Result<()> {
     let scheme = &mut draft.scheme;
     match name {
         "cells" => draft.cells = count()?,
-        "ppc" => scheme.ppc = count()?,
+        "ppc" => scheme.ppc = Some(count()?),
         "offset" => scheme.offset = number()?,
         "periods" => scheme.periods = number()?,
         "precision" => scheme.precision = word::<Precision>(text)?,
