@@ -13,6 +13,7 @@ use serde::{Serialize, Serializer};
 use thiserror::Error;
 
 use crate::checkpoint::{CheckpointError, Checkpoints, Reached};
+use crate::dimension::in_arithmetic;
 use crate::frames::{FrameOutput, FrameWriter};
 use crate::general::{self, Placement, Precision};
 use crate::measure::Comparison;
@@ -20,7 +21,7 @@ use crate::norms::{PerField, PerNorm};
 use crate::plan::{MOST_STEPS, Steps, prepare};
 use crate::scene::{Extent, Scene, SceneError};
 use crate::solver::Solver;
-use crate::total::{self, CflSpeed, Frame};
+use crate::total::{CflSpeed, Frame};
 
 /// How the centred-difference integrator gets its first velocity, half a step before the start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -301,19 +302,12 @@ pub fn run(
     case: &Case,
     outputs: &mut Outputs<'_>,
 ) -> Result<Row, CaseError> {
-    use AnySolution::{One, Three, Two};
-    if let Frame::Total(total) = &case.frame {
-        return total::run(exact, arithmetic, total, case, outputs);
-    }
-    match (exact, arithmetic) {
-        (One(s), Arithmetic::Double) => run_in(s.as_ref(), s.as_ref(), case, outputs),
-        (Two(s), Arithmetic::Double) => run_in(s.as_ref(), s.as_ref(), case, outputs),
-        (Three(s), Arithmetic::Double) => run_in(s.as_ref(), s.as_ref(), case, outputs),
-        (One(s), Arithmetic::Single(One(m))) => run_in(s.as_ref(), m.as_ref(), case, outputs),
-        (Two(s), Arithmetic::Single(Two(m))) => run_in(s.as_ref(), m.as_ref(), case, outputs),
-        (Three(s), Arithmetic::Single(Three(m))) => run_in(s.as_ref(), m.as_ref(), case, outputs),
-        _ => Err(CaseError::Dimension),
-    }
+    in_arithmetic!(
+        exact,
+        arithmetic,
+        |exact, model| run_in(exact, model, case, outputs),
+        else Err(CaseError::Dimension)
+    )
 }
 
 fn run_in<T: Precision, const D: usize>(
@@ -332,7 +326,7 @@ fn run_in<T: Precision, const D: usize>(
 }
 
 /// Steps to the end and measures the errors on the way.
-pub(crate) fn follow<T: Real, const D: usize>(
+fn follow<T: Real, const D: usize>(
     solver: &mut dyn Solver<T, D>,
     body_force: &dyn BodyForce<T, D>,
     exact: &dyn Solution<f64, D>,
@@ -427,18 +421,18 @@ pub(crate) fn follow<T: Real, const D: usize>(
 }
 
 /// A solver at time zero, and the body force that drives it.
-type Driven<'a, T, const D: usize> = (Box<dyn Solver<T, D>>, ExactBodyForce<'a, T, D>);
+type Driven<'a, T, const D: usize> = (Box<dyn Solver<T, D> + 'a>, ExactBodyForce<'a, T, D>);
 
-/// The solver of the updated frame with steps of `time_step`: the fast step where it has the case.
+/// The solver of a case with steps of `time_step`: the fast step where it has the case.
 pub(crate) fn set_up<'a, T: Precision, const D: usize>(
-    exact: &dyn Solution<f64, D>,
+    exact: &'a dyn Solution<f64, D>,
     model: &'a dyn Solution<T, D>,
     case: &Case,
     scene: &Scene<D>,
     time_step: T,
 ) -> Result<Driven<'a, T, D>, CaseError> {
     let Some((shape, integrator)) = general::fast_step(case) else {
-        let mut solver = T::general(exact, case, scene, time_step)?;
+        let mut solver = T::other(exact, case, scene, time_step)?;
         let body_force = ExactBodyForce::new(model, &solver.observe().0.X);
         return Ok((solver, body_force));
     };

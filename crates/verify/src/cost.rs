@@ -11,11 +11,11 @@ use mmsmith_mpm::BodyForce;
 use mmsmith_solutions::{AnySolution, Real, Solution};
 
 use crate::case::{Arithmetic, Case, CaseError, set_up};
+use crate::dimension::in_arithmetic;
 use crate::general::Precision;
 use crate::measure::Comparison;
 use crate::plan::{Plan, plan, prepare};
 use crate::solver::Solver;
-use crate::total::{self, Frame};
 use crate::tradeoff::median;
 
 /// How many steps' times a median is taken of.
@@ -54,17 +54,13 @@ pub fn time_steps(
     most: u64,
     until: Option<Instant>,
 ) -> Result<Timing, CaseError> {
-    use AnySolution::{One, Three, Two};
     let limits = Limits { most, until };
-    match (exact, arithmetic) {
-        (One(s), Arithmetic::Double) => double(s.as_ref(), case, limits),
-        (Two(s), Arithmetic::Double) => double(s.as_ref(), case, limits),
-        (Three(s), Arithmetic::Double) => double(s.as_ref(), case, limits),
-        (One(s), Arithmetic::Single(One(m))) => updated(s.as_ref(), m.as_ref(), case, limits),
-        (Two(s), Arithmetic::Single(Two(m))) => updated(s.as_ref(), m.as_ref(), case, limits),
-        (Three(s), Arithmetic::Single(Three(m))) => updated(s.as_ref(), m.as_ref(), case, limits),
-        _ => Err(CaseError::Dimension),
-    }
+    in_arithmetic!(
+        exact,
+        arithmetic,
+        |exact, model| time_in(exact, model, case, limits),
+        else Err(CaseError::Dimension)
+    )
 }
 
 #[derive(Clone, Copy)]
@@ -73,29 +69,12 @@ struct Limits {
     until: Option<Instant>,
 }
 
-fn double<const D: usize>(
-    exact: &dyn Solution<f64, D>,
-    case: &Case,
-    limits: Limits,
-) -> Result<Timing, CaseError> {
-    let Frame::Total(total) = &case.frame else { return updated(exact, exact, case, limits) };
-    let started = Instant::now();
-    let (scene, steps) = prepare(exact, case)?;
-    let (mut body, body_force) = total::set_up(exact, total, case, &scene, steps.dt)?;
-    let setup_s = started.elapsed().as_secs_f64();
-    Ok(advance(&mut body, &body_force, exact, steps.count, limits, setup_s))
-}
-
-fn updated<T: Precision, const D: usize>(
+fn time_in<T: Precision, const D: usize>(
     exact: &dyn Solution<f64, D>,
     model: &dyn Solution<T, D>,
     case: &Case,
     limits: Limits,
 ) -> Result<Timing, CaseError> {
-    if case.frame != Frame::Updated {
-        let (setting, value) = ("precision", "f32".into());
-        return Err(CaseError::Setting { setting, value, admissible: "f64 in the total frame" });
-    }
     let started = Instant::now();
     let (scene, steps) = prepare(exact, case)?;
     let (mut solver, body_force) = set_up(exact, model, case, &scene, Real::nearest(steps.dt))?;

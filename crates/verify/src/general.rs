@@ -9,6 +9,7 @@ use nalgebra::SVector;
 use crate::case::{Case, CaseError, law, set_in_motion, starts_halved};
 use crate::scene::{Extent, Scene, SceneError};
 use crate::solver::Solver;
+use crate::total::{self, Frame};
 
 /// Where the particles of the updated frame lie.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -31,7 +32,9 @@ impl Placement {
 
 /// The weights and the integrator of the fast step that make up a case, if it has them.
 pub(crate) fn fast_step(case: &Case) -> Option<(FastShape, FastIntegrator)> {
-    let plain = case.transfer == Transfer::Flip && case.placement == Placement::Lattice;
+    let plain = case.frame == Frame::Updated
+        && case.transfer == Transfer::Flip
+        && case.placement == Placement::Lattice;
     plain.then_some(())?;
     case.shape.of_fast_step().zip(case.integrator.of_fast_step())
 }
@@ -98,73 +101,88 @@ pub(crate) fn bytes_expected<const D: usize>(scene: &Scene<D>, case: &Case, exac
 
 /// The precisions of the solver.
 pub(crate) trait Precision: Real + Pod {
-    /// The general simulation at time zero.
-    fn general<const D: usize>(
-        exact: &dyn Solution<f64, D>,
+    /// What the fast step has no kernel for, at time zero: the general simulation, or that in the total frame.
+    fn other<'a, const D: usize>(
+        exact: &'a dyn Solution<f64, D>,
         case: &Case,
         scene: &Scene<D>,
         time_step: Self,
-    ) -> Result<Box<dyn Solver<Self, D>>, CaseError>;
+    ) -> Result<Box<dyn Solver<Self, D> + 'a>, CaseError>;
 }
 
 impl Precision for f32 {
-    fn general<const D: usize>(
-        _exact: &dyn Solution<f64, D>,
-        _case: &Case,
+    fn other<'a, const D: usize>(
+        _exact: &'a dyn Solution<f64, D>,
+        case: &Case,
         _scene: &Scene<D>,
         _time_step: f32,
-    ) -> Result<Box<dyn Solver<f32, D>>, CaseError> {
-        refuse(
-            "precision",
-            "f32",
-            "f64, but for the shapes linear, ugimp and gimp on a lattice with the transfer flip and the integrators cd, \
-             usl, usf and musl",
-        )
+    ) -> Result<Box<dyn Solver<f32, D> + 'a>, CaseError> {
+        let admissible = match case.frame {
+            Frame::Total(_) => "f64 in the total frame",
+            Frame::Updated => {
+                "f64, but for the shapes linear, ugimp and gimp on a lattice with the transfer flip and the integrators \
+                 cd, usl, usf and musl"
+            }
+        };
+        refuse("precision", "f32", admissible)
     }
 }
 
 impl Precision for f64 {
-    fn general<const D: usize>(
-        exact: &dyn Solution<f64, D>,
+    fn other<'a, const D: usize>(
+        exact: &'a dyn Solution<f64, D>,
         case: &Case,
         scene: &Scene<D>,
         time_step: f64,
-    ) -> Result<Box<dyn Solver<f64, D>>, CaseError> {
-        admit(scene, case)?;
-        let grid = scene.grid();
-        let (density, per_cell) = (exact.density(), case.per_cell);
-        let mut body = match (case.placement, &scene.domain) {
-            (Placement::BodyFitted, &Domain::Annulus { inner, outer }) => {
-                let quarter = scene.extent() == Some(Extent::Quarter);
-                let ring = Annulus { inner, outer, quarter };
-                Body::annulus(&ring, scene.spacing, per_cell, density)?
-            }
-            _ => Body::lattice(&grid, per_cell, density, scene.inside(per_cell, case.offset)),
-        };
-        if body.particles.is_empty() {
-            return Err(SceneError::Empty { cells: case.cells }.into());
+    ) -> Result<Box<dyn Solver<f64, D> + 'a>, CaseError> {
+        match &case.frame {
+            Frame::Total(scheme) => total::set_up(exact, scheme, case, scene, time_step),
+            Frame::Updated => set_up(exact, case, scene, time_step),
         }
-        set_in_motion(&mut body.particles, exact, case, time_step);
-        if let Some(mesh) = &mut body.mesh {
-            let moved = |X: &SVector<f64, D>| X + exact.displacement(X, 0.0);
-            mesh.x = mesh.X.iter().map(moved).collect();
-            // On a plane of symmetry there is no motion across it, not even by rounding.
-            for (x, X) in mesh.x.iter_mut().zip(&mesh.X) {
-                for (a, [lower, _]) in scene.walls.iter().enumerate() {
-                    if *lower && X[a] == scene.lower[a] {
-                        x[a] = X[a];
-                    }
+    }
+}
+
+/// The general simulation at time zero.
+fn set_up<const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    case: &Case,
+    scene: &Scene<D>,
+    time_step: f64,
+) -> Result<Box<dyn Solver<f64, D>>, CaseError> {
+    admit(scene, case)?;
+    let grid = scene.grid();
+    let (density, per_cell) = (exact.density(), case.per_cell);
+    let mut body = match (case.placement, &scene.domain) {
+        (Placement::BodyFitted, &Domain::Annulus { inner, outer }) => {
+            let quarter = scene.extent() == Some(Extent::Quarter);
+            let ring = Annulus { inner, outer, quarter };
+            Body::annulus(&ring, scene.spacing, per_cell, density)?
+        }
+        _ => Body::lattice(&grid, per_cell, density, scene.inside(per_cell, case.offset)),
+    };
+    if body.particles.is_empty() {
+        return Err(SceneError::Empty { cells: case.cells }.into());
+    }
+    set_in_motion(&mut body.particles, exact, case, time_step);
+    if let Some(mesh) = &mut body.mesh {
+        let moved = |X: &SVector<f64, D>| X + exact.displacement(X, 0.0);
+        mesh.x = mesh.X.iter().map(moved).collect();
+        // On a plane of symmetry there is no motion across it, not even by rounding.
+        for (x, X) in mesh.x.iter_mut().zip(&mesh.X) {
+            for (a, [lower, _]) in scene.walls.iter().enumerate() {
+                if *lower && X[a] == scene.lower[a] {
+                    x[a] = X[a];
                 }
             }
         }
-        let settings = Settings {
-            shape: case.shape,
-            integrator: case.integrator,
-            transfer: case.transfer,
-            time_step,
-            halve_first_acceleration: starts_halved(case),
-        };
-        let law = law(exact.material())?;
-        Ok(Box::new(General::new(grid, body, law, settings)?))
     }
+    let settings = Settings {
+        shape: case.shape,
+        integrator: case.integrator,
+        transfer: case.transfer,
+        time_step,
+        halve_first_acceleration: starts_halved(case),
+    };
+    let law = law(exact.material())?;
+    Ok(Box::new(General::new(grid, body, law, settings)?))
 }

@@ -27,7 +27,7 @@ use crate::general::Precision;
 use crate::plan::{MOST_STEPS, plan, prepare};
 use crate::scene::Scene;
 use crate::solver::Solver;
-use crate::total::{self, CflSpeed, Frame};
+use crate::total::CflSpeed;
 
 /// When a run counts as unstable.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -370,21 +370,8 @@ fn run_in<T: Precision, const D: usize>(
         return Err(CaseError::TooManySteps { end, dt, steps: count });
     }
     let run = Run { exact, scene: &scene, cfl: case.cfl, dt, count: count as u64, limits };
-    match &case.frame {
-        Frame::Updated => {
-            let (mut solver, body_force) = set_up(exact, model, case, &scene, time_step)?;
-            run.follow(solver.as_mut(), &body_force)
-        }
-        Frame::Total(scheme) => {
-            if size_of::<T>() != size_of::<f64>() {
-                let (setting, value) = ("precision", "f32".into());
-                let admissible = "f64 in the total frame";
-                return Err(CaseError::Setting { setting, value, admissible });
-            }
-            let (mut solver, body_force) = total::set_up(exact, scheme, case, &scene, dt)?;
-            run.follow(&mut solver, &body_force)
-        }
-    }
+    let (mut solver, body_force) = set_up(exact, model, case, &scene, time_step)?;
+    run.follow(solver.as_mut(), &body_force)
 }
 
 /// One run.

@@ -10,9 +10,9 @@ use mmsmith_solutions::{AnySolution, Condition, Domain, Solution, Surface};
 use nalgebra::SVector;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use crate::case::{Arithmetic, Case, CaseError, ExactBodyForce, Outputs, Row, follow, law};
+use crate::case::{Case, CaseError, law};
+use crate::dimension::in_dimension;
 use crate::general::Placement;
-use crate::plan::prepare;
 use crate::scene::{Extent, Scene};
 use crate::solver::Solver;
 
@@ -75,12 +75,7 @@ impl TotalScheme {
     /// all integrands periodic, and Gauss points elsewhere.
     #[must_use]
     pub fn layout_for(exact: &AnySolution<f64>) -> Layout {
-        let between_walls = match exact {
-            AnySolution::One(s) => is_between_walls(s.as_ref()),
-            AnySolution::Two(s) => is_between_walls(s.as_ref()),
-            AnySolution::Three(s) => is_between_walls(s.as_ref()),
-            _ => false,
-        };
+        let between_walls = in_dimension!(exact, |s| is_between_walls(s), else false);
         if between_walls { Layout::Lattice } else { Layout::Gauss }
     }
 
@@ -180,37 +175,6 @@ fn is_between_walls<const D: usize>(exact: &dyn Solution<f64, D>) -> bool {
         && exact.boundaries().iter().all(|boundary| is_wall(boundary.condition))
 }
 
-/// Runs one case in the total frame.
-pub(crate) fn run(
-    exact: &AnySolution<f64>,
-    arithmetic: Arithmetic<'_>,
-    total: &TotalScheme,
-    case: &Case,
-    outputs: &mut Outputs<'_>,
-) -> Result<Row, CaseError> {
-    if matches!(arithmetic, Arithmetic::Single(_)) {
-        let (setting, value) = ("precision", "f32".into());
-        return Err(CaseError::Setting { setting, value, admissible: "f64 in the total frame" });
-    }
-    match exact {
-        AnySolution::One(solution) => run_in(solution.as_ref(), total, case, outputs),
-        AnySolution::Two(solution) => run_in(solution.as_ref(), total, case, outputs),
-        AnySolution::Three(solution) => run_in(solution.as_ref(), total, case, outputs),
-        _ => Err(CaseError::Dimension),
-    }
-}
-
-fn run_in<const D: usize>(
-    exact: &dyn Solution<f64, D>,
-    total: &TotalScheme,
-    case: &Case,
-    outputs: &mut Outputs<'_>,
-) -> Result<Row, CaseError> {
-    let (scene, steps) = prepare(exact, case)?;
-    let (mut body, body_force) = set_up(exact, total, case, &scene, steps.dt)?;
-    follow(&mut body, &body_force, exact, case, &scene, steps, outputs)
-}
-
 /// What holds at the end of an axis.
 fn end(condition: Condition) -> End {
     match condition {
@@ -222,7 +186,7 @@ fn end(condition: Condition) -> End {
 }
 
 /// A body in the total frame, with the exact motion and traction on the sides where the solution prescribes them.
-pub(crate) struct DrivenBody<'a, const D: usize> {
+struct DrivenBody<'a, const D: usize> {
     body: TotalLagrangian<D>,
     boundary: ExactBoundary<'a, D>,
 }
@@ -279,22 +243,21 @@ impl<const D: usize> Solver<f64, D> for DrivenBody<'_, D> {
     }
 }
 
-/// The solver at time zero with steps of `dt`, and the body force that drives it.
+/// The solver at time zero with steps of `dt`.
 pub(crate) fn set_up<'a, const D: usize>(
     exact: &'a dyn Solution<f64, D>,
     total: &TotalScheme,
     case: &Case,
     scene: &Scene<D>,
     dt: f64,
-) -> Result<(DrivenBody<'a, D>, ExactBodyForce<'a, f64, D>), CaseError> {
+) -> Result<Box<dyn Solver<f64, D> + 'a>, CaseError> {
     let grid = total.grid(scene, case.per_cell)?;
     let material = law(exact.material())?;
     let mut body = TotalLagrangian::new(grid, total.scheme, material, exact.density(), dt)?;
     let X = body.positions();
-    let body_force = ExactBodyForce::new(exact, X);
     let u: Vec<_> = X.iter().map(|X| exact.displacement(X, 0.0)).collect();
     let v: Vec<_> = X.iter().map(|X| exact.velocity(X, 0.0)).collect();
     let boundary = ExactBoundary(exact);
     body.start_with_boundary(&u, &v, &boundary)?;
-    Ok((DrivenBody { body, boundary }, body_force))
+    Ok(Box::new(DrivenBody { body, boundary }))
 }
