@@ -165,6 +165,10 @@ pub fn expected_in_time(case: &Case) -> Expected {
     // The other transfers lose a part of the velocities in every step, however short.
     let keeps_velocities = case.transfer == Transfer::Flip;
     let order = match case.integrator {
+        // Weights that stay let the composition of leapfrog show its order.
+        Integrator::Cd if let Frame::Total(total) = &case.frame => {
+            Some(total.scheme.composition.order() as f64)
+        }
         Integrator::Usf | Integrator::Usl | Integrator::Musl | Integrator::Usavg
             if keeps_velocities =>
         {

@@ -50,8 +50,7 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
         };
         let judged = judge(&study, &sweep, &in_space, tolerance);
         let differences = match &sweep {
-            // In the total frame the order in time is that of the composition, far below the error in space.
-            Sweep::Cfls(cfls) if base.frame == mmsmith_verify::Frame::Updated => {
+            Sweep::Cfls(cfls) => {
                 let mut what = settings(&selection, scheme, extent, base.cells, cfls);
                 what["differences"] = true.into();
                 let found = keep.all(
@@ -70,7 +69,7 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
                 let judged = judge_differences(&found, &expected, tolerance);
                 Some((found, judged))
             }
-            Sweep::Cells(_) | Sweep::Cfls(_) => None,
+            Sweep::Cells(_) => None,
         };
 
         let caption = caption(&selection, scheme, extent);
