@@ -293,6 +293,9 @@ pub(crate) fn scatter_runs<T, V, const D: usize, const W: usize>(
 }
 
 /// Interpolates velocity and acceleration, and the velocity's gradient.
+///
+/// Products that make up a level are rounded before they are added, not fused: those of a node and of its mirror image then
+/// cancel, and a particle on a wall stays there.
 #[inline(always)]
 pub(crate) fn gather<T: RealField + Copy, const D: usize, const W: usize>(
     weights: &impl Weights<T, D, W>,
@@ -317,12 +320,12 @@ pub(crate) fn gather<T: RealField + Copy, const D: usize, const W: usize>(
             let (S, G) = (weights.S(0, i), weights.G(0, i));
             for q in 0..used {
                 let value = node.values[q];
-                row_level[q] = if i == 0 { value * S } else { value.mul_add(S, row_level[q]) };
+                row_level[q] = if i == 0 { value * S } else { row_level[q] + value * S };
                 row_slope[q] = if i == 0 { value * G } else { value.mul_add(G, row_slope[q]) };
             }
         }
         for q in 0..used {
-            level[q] = row_level[q].mul_add(row.S, level[q]);
+            level[q] += row_level[q] * row.S;
             slope[0][q] = row_slope[q].mul_add(row.S, slope[0][q]);
             for a in 1..D {
                 slope[a][q] = row_level[q].mul_add(row.G[a], slope[a][q]);
@@ -384,7 +387,7 @@ pub(crate) fn gather_runs<T, V, const D: usize, const W: usize>(
                 }
                 let row = row(&weights_k, start, strides, index);
                 for q in 0..USED {
-                    level[q] = row_level[q].mul_add(row.S, level[q]);
+                    level[q] += row_level[q] * row.S;
                     slope[0][q] = row_slope[q].mul_add(row.S, slope[0][q]);
                     for a in 1..D {
                         slope[a][q] = row_level[q].mul_add(row.G[a], slope[a][q]);
