@@ -1,14 +1,16 @@
-//! Pictures as SVG: error against step size, particles coloured by a value, limits of stability, and error against
-//! cost.
+//! Pictures as SVG: error against step size, particles coloured by a value, limits of stability, error against cost, and
+//! drift over time.
 //!
 //! Written here and not with a plotting library: these pictures tell screen readers what they show, scale with the
 //! page, mark every curve by shape and fill, draw reference slopes and are the same to the byte on every machine.
 
+mod drift;
 mod front;
 mod limits;
 mod particles;
 mod plot;
 
+pub(crate) use drift::{Course, Drift};
 pub(crate) use front::{Front, Point};
 pub(crate) use limits::{Limits, Map};
 pub(crate) use particles::Particles;

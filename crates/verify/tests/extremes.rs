@@ -17,14 +17,24 @@ fn solution<T: Real>(name: &str, set: &[(&str, f64)]) -> AnySolution<T> {
 }
 
 fn row(exact: &AnySolution<f64>, case: &Case) -> Row {
-    let mut outputs =
-        Outputs { progress: &mut |_| (), frames: None, checkpoints: None, until: None };
+    let mut outputs = Outputs {
+        progress: &mut |_| (),
+        frames: None,
+        checkpoints: None,
+        history: None,
+        until: None,
+    };
     run(exact, Arithmetic::Double, case, &mut outputs).expect("a case that can be run")
 }
 
 fn row_in_single(exact: &AnySolution<f64>, single: &AnySolution<f32>, case: &Case) -> Row {
-    let mut outputs =
-        Outputs { progress: &mut |_| (), frames: None, checkpoints: None, until: None };
+    let mut outputs = Outputs {
+        progress: &mut |_| (),
+        frames: None,
+        checkpoints: None,
+        history: None,
+        until: None,
+    };
     run(exact, Arithmetic::Single(single), case, &mut outputs).expect("a case that can be run")
 }
 
