@@ -88,7 +88,7 @@ impl Course {
     fn label(&self) -> String {
         let finite = || self.points.iter().map(|point| point.1).filter(|value| value.is_finite());
         let (least, most) = finite().fold((0.0_f64, 0.0_f64), |(l, m), v| (l.min(v), m.max(v)));
-        match finite().last() {
+        match finite().next_back() {
             None => format!("{}: none", self.name),
             Some(last) => {
                 let [least, most, last] = [least, most, last].map(told);

@@ -102,7 +102,7 @@ fn cells(name: String, row: &Row, history: &[Moment]) -> [String; 6] {
         name,
         told(values().fold(0.0, f64::min)),
         told(values().fold(0.0, f64::max)),
-        values().last().map_or_else(|| "-".into(), told),
+        values().next_back().map_or_else(|| "-".into(), told),
         if momentum.is_finite() { told(momentum) } else { "-".into() },
         if row.status == Status::Ok { "ok".into() } else { row.status.to_string() },
     ]

@@ -79,7 +79,7 @@ impl Section {
         if lines.is_empty() {
             return;
         }
-        let _ = write!(self.html, "<pre tabindex=\"0\">{}</pre>\n", escape(lines));
+        let _ = writeln!(self.html, "<pre tabindex=\"0\">{}</pre>", escape(lines));
         let _ = write!(self.markdown, "\n```text\n{lines}```\n");
     }
 
