@@ -8,7 +8,7 @@ use super::{escape, number, open};
 /// Markers on a curve.
 const MARKERS: usize = 8;
 /// Where one curve goes this many times as far as another, small values are given more room.
-const APART: f64 = 8.0;
+const APART: f64 = 20.0;
 
 /// Curves over time. The axes are linear; with curves of very different sizes that of the values is logarithmic away from zero.
 pub(crate) struct Drift<'a> {
@@ -130,6 +130,12 @@ impl Drift<'_> {
             };
             let bend = self.bend();
             let y = Axis { low: low - room, high: high + room, start: BOTTOM, end: TOP, bend };
+            if bend.is_some() {
+                let _ = writeln!(
+                    text,
+                    r##"<text x="{RIGHT}" y="22" text-anchor="end" font-size="13" fill="#444">log away from zero</text>"##
+                );
+            }
             lines(&mut text, &x, &y);
             for (index, curve) in self.curves.iter().enumerate() {
                 let (colour, dash) = style(index);
@@ -249,6 +255,7 @@ mod tests {
         // On a linear axis the second would end at a fiftieth of the first's height.
         let share = (ends[2] - ends[1]) / (ends[2] - ends[0]);
         assert!((0.2..0.6).contains(&share), "{ends:?}");
+        assert!(text.contains("log away from zero"), "{text}");
         assert!(text.contains(">0<") && text.contains(">0.1<") && text.contains(">1<"), "{text}");
     }
 

@@ -6,7 +6,7 @@ use crate::svg::escape;
 use crate::table::Table;
 
 /// Lists of more sentences are closed at first.
-const LONG: usize = 20;
+const LONG: usize = 30;
 
 /// A part of the report.
 pub(super) struct Section {
