@@ -29,8 +29,8 @@ from PIL import Image
 WIDTHS = (1280, 400)
 HEIGHT = 900
 PATIENCE = 60.0
-# A curve is at least a marker; the dots of a band of colours may be fewer.
-PIXELS = {"curve": 40, "dots": 4}
+# A curve is at least a marker, and a map's cell is much more; the dots of a band of colours may be fewer.
+PIXELS = {"curve": 40, "cell": 200, "dots": 4}
 # How far a channel may be from the colour asked for.
 NEAR = 12
 
@@ -44,13 +44,27 @@ JSON.stringify([...document.querySelectorAll('svg')].map(svg => {
     box: [box.left + scrollX, box.top + scrollY, box.width, box.height],
     font: Math.min(...[...svg.querySelectorAll('text')].map(t =>
       parseFloat(getComputedStyle(t).fontSize) * box.width / svg.viewBox.baseVal.width)),
-    marks: [...svg.querySelectorAll('.curve, .dots')].map(mark => ({
-      kind: mark.classList.contains('curve') ? 'curve' : 'dots',
+    marks: [...svg.querySelectorAll('.curve, .cell, .dots')].map(mark => ({
+      kind: ['curve', 'cell', 'dots'].find(kind => mark.classList.contains(kind)),
       name: mark.dataset.name ?? mark.dataset.colour,
       colour: mark.dataset.colour,
     })),
   };
 }))
+"""
+
+# What the sections that are not from the study hold.
+SECTIONS = """
+(() => {
+  const names = id => [...document.querySelectorAll(`#${id} .curve`)].map(curve => curve.dataset.name);
+  return JSON.stringify({
+    drift: names('drift'),
+    stability: document.querySelectorAll('#stability .cell').length,
+    division: document.querySelectorAll('#stability .division').length === 1,
+    cost: names('cost'),
+    points: [...document.querySelectorAll('#cost .pareto')].map(line => line.points.length),
+  });
+})()
 """
 
 FAULTS = """<!DOCTYPE html><html><head><title>faults</title></head><body>
@@ -177,6 +191,20 @@ def count(image, colour):
     return Image.composite(both, Image.new("L", image.size), masks[2]).histogram()[255]
 
 
+def missing(browser):
+    """What of the sections on energy, stability and cost the open page lacks."""
+    wrong = []
+    seen = json.loads(browser.evaluate(SECTIONS))
+    schemes = [f"gimp+{integrator}" for integrator in ("cd", "usl", "usf", "musl")]
+    if seen["drift"] != 2 * schemes:
+        wrong.append(f"the curves of energy are {seen['drift']}, not {2 * schemes}")
+    if seen["stability"] != 16 or not seen["division"]:
+        wrong.append(f"the map of limits has {seen['stability']} cells, not 16, and the line {seen['division']}")
+    if seen["cost"] != ["front", "front"] or min(seen["points"]) < 8:
+        wrong.append(f"the plots of cost show {seen['cost']}, with {seen['points']} settings on the fronts")
+    return wrong
+
+
 def inspect(browser, address, width, picture):
     """All that is wrong with a page at this width, and how many plots and curves it has."""
     wrong = []
@@ -242,9 +270,10 @@ def main(arguments):
             for width in WIDTHS:
                 picture = pictures / f"report-{width}.png"
                 wrong, plots, marks = inspect(browser, report.as_uri(), width, picture)
-                # Space, time and two pictures for each problem, and three of differences.
-                if plots != 11:
-                    wrong.append(f"{plots} plots, not 11")
+                # Space, time, two pictures, energy and cost for each problem, three of differences, and a map of limits.
+                if plots != 16:
+                    wrong.append(f"{plots} plots, not 16")
+                wrong += missing(browser)
                 failed += len(wrong)
                 print(f"{width} pixels: {plots} plots, {marks} curves and colours; {picture}")
                 for line in wrong:

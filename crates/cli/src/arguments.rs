@@ -144,6 +144,13 @@ pub(crate) struct RunOptions {
     /// Steps between checkpoints
     #[arg(long, value_name = "N", default_value_t = 1000, requires = "checkpoint", value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) every: u64,
+    /// Write errors of u, energies and momentum of the particles and of the exact motion over time to this file as
+    /// comma-separated values, at up to 1000 evenly spread steps; --json then has them too
+    #[arg(long, value_name = "FILE", conflicts_with = "checkpoint")]
+    pub(crate) history: Option<PathBuf>,
+    /// Draw the energy gained and lost against the exact motion over time to this SVG file
+    #[arg(long, value_name = "FILE", conflicts_with = "checkpoint")]
+    pub(crate) plot: Option<PathBuf>,
 }
 
 #[derive(Args)]
@@ -392,6 +399,9 @@ pub(crate) struct ReproduceOptions {
     /// Write everything to this folder
     #[arg(long, value_name = "DIR", default_value = "target/reproduce")]
     pub(crate) out: PathBuf,
+    /// Time for the comparison of schemes by error and cost, for each problem, such as 8s or 2m
+    #[arg(long, value_name = "TIME", default_value = "8s", value_parser = seconds)]
+    pub(crate) budget: f64,
     /// Number of threads; all cores when left out
     #[arg(long, value_name = "N", value_parser = thread_count)]
     pub(crate) threads: Option<usize>,
@@ -476,17 +486,34 @@ pub(crate) struct SchemeOptions {
     pub(crate) json: Option<PathBuf>,
 }
 
+/// Lets the parser fill in its own defaults, so that they stand in one place.
+fn parsed<O: Args>(arguments: &[&str]) -> O {
+    #[derive(Parser)]
+    struct Usual<O: Args> {
+        #[command(flatten)]
+        options: O,
+    }
+    Usual::<O>::parse_from(["mms"].iter().chain(arguments)).options
+}
+
+impl TradeoffOptions {
+    /// What holds where nothing is said.
+    pub(crate) fn usual(name: &str, budget: f64) -> Self {
+        Self { budget, ..parsed(&[name]) }
+    }
+}
+
+impl StabilityOptions {
+    /// A map over two settings, told as `NAME=VALUE,...`, with what holds where nothing is said.
+    pub(crate) fn map(name: &str, cells: usize, over: [&str; 2]) -> Self {
+        Self { cells, ..parsed(&[name, "--over", over[0], "--over", over[1]]) }
+    }
+}
+
 impl SchemeOptions {
     /// What holds where nothing is said, with the given scheme.
     pub(crate) fn usual(shape: Shape, integrator: Integrator) -> Self {
-        /// Lets the parser fill in its own defaults, so that they stand in one place.
-        #[derive(Parser)]
-        struct Usual {
-            #[command(flatten)]
-            scheme: SchemeOptions,
-        }
-        let Usual { scheme } = Usual::parse_from(["mms"]);
-        Self { shape, integrator, ..scheme }
+        Self { shape, integrator, ..parsed(&[]) }
     }
 
     /// The same with what suits a solution where nothing is said.

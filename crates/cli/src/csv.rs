@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use mmsmith_verify::{Order, PerField, PerNorm, Study, Temporal};
+use mmsmith_verify::{Moment, Order, PerField, PerNorm, Study, Sums, Temporal};
 
 use crate::table;
 
@@ -47,6 +47,39 @@ pub(crate) fn temporal(temporal: &Temporal) -> String {
             quoted(&row.status.to_string())
         );
         values(&mut text, index, &row.differences, &temporal.orders);
+    }
+    text
+}
+
+/// A run's history: a line that says what is what, the header, and a line for each moment; empty where there is no number.
+pub(crate) fn history(history: &[Moment]) -> String {
+    let axes = history.first().map_or(0, |moment| moment.exact.momentum.len());
+    let names = |of: &str| {
+        let momenta = ["x", "y", "z"].iter().take(axes).map(|axis| format!(",{of}momentum_{axis}"));
+        format!(",{of}kinetic_energy,{of}strain_energy") + &momenta.collect::<String>()
+    };
+    let mut text = format!(
+        "# u and strain energy at time; kinetic energy and momentum at velocity_time, where the scheme stores velocities; \
+         exact_: the exact motion at the same particles and times; drift = solver - exact\n\
+         step,time,velocity_time,u_linf,u_l2,u_l1{}{}\n",
+        names(""),
+        names("exact_")
+    );
+    for Moment { step, time, velocity_time, u, computed, exact } in history {
+        let _ = write!(text, "{step}");
+        let sums = |sums: &Sums| {
+            let energies = [sums.kinetic_energy, sums.strain_energy];
+            energies.into_iter().chain(sums.momentum.iter().copied()).collect::<Vec<_>>()
+        };
+        let errors = u.named().map(|(_, value)| *value);
+        let values = [*time, *velocity_time].into_iter().chain(errors);
+        for value in values.chain(sums(computed)).chain(sums(exact)) {
+            let _ = match value.is_finite() {
+                true => write!(text, ",{value:?}"),
+                false => write!(text, ","),
+            };
+        }
+        text.push('\n');
     }
     text
 }

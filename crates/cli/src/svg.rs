@@ -1,14 +1,16 @@
-//! Pictures as SVG: error against step size, particles coloured by a value, limits of stability, and error against
-//! cost.
+//! Pictures as SVG: error against step size, particles coloured by a value, limits of stability, error against cost, and
+//! drift over time.
 //!
 //! Written here and not with a plotting library: these pictures tell screen readers what they show, scale with the
 //! page, mark every curve by shape and fill, draw reference slopes and are the same to the byte on every machine.
 
+mod drift;
 mod front;
 mod limits;
 mod particles;
 mod plot;
 
+pub(crate) use drift::{Course, Drift};
 pub(crate) use front::{Front, Point};
 pub(crate) use limits::{Limits, Map};
 pub(crate) use particles::Particles;
@@ -39,6 +41,7 @@ pub(crate) fn number(value: f64) -> String {
         .collect();
     match mantissa {
         "1" => format!("10{raised}"),
+        "-1" => format!("-10{raised}"),
         _ => format!("{mantissa}·10{raised}"),
     }
 }
@@ -61,8 +64,10 @@ mod tests {
 
     #[test]
     fn numbers_read_well_and_text_cannot_leave_its_place() {
-        let told = [0.0, 0.25, 40.0, 1e-3, 2e-3, 5e-12, 1e7, -3.5e-4].map(number);
-        assert_eq!(told, ["0", "0.25", "40", "10⁻³", "2·10⁻³", "5·10⁻¹²", "10⁷", "-3.5·10⁻⁴"]);
+        let told = [0.0, 0.25, 40.0, 1e-3, 2e-3, 5e-12, 1e7, -3.5e-4, -1e-3].map(number);
+        let expected =
+            ["0", "0.25", "40", "10⁻³", "2·10⁻³", "5·10⁻¹²", "10⁷", "-3.5·10⁻⁴", "-10⁻³"];
+        assert_eq!(told, expected);
         assert_eq!(escape("a<b & \"c\">"), "a&lt;b &amp; &quot;c&quot;&gt;");
     }
 }

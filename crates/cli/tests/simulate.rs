@@ -34,6 +34,45 @@ fn run_writes_exactly_the_promised_keys() {
 }
 
 #[test]
+fn a_history_is_written_on_request_as_csv_json_and_svg() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let run = "run axis-aligned --cells 8 --json row.json --history h.csv --plot h.svg";
+    assert_eq!(mms(place, run).status, 0);
+    assert_eq!(names(place), ["h.csv", "h.svg", "row.json"]);
+    let row = read_json(&place.join("row.json"));
+    assert_eq!(keys(&row), "history result schema settings");
+    let history = &row["history"];
+    let expected = "exact_kinetic_energy exact_momentum exact_strain_energy kinetic_energy momentum step strain_energy \
+                    time u_l1 u_l2 u_linf velocity_time";
+    assert_eq!(keys(history), expected);
+    let steps = row["result"]["steps"].as_u64().unwrap();
+    let count = |value: &Value| value.as_array().map(Vec::len);
+    for (key, values) in history.as_object().unwrap() {
+        assert_eq!(count(values), Some(steps as usize + 1), "{key}");
+    }
+    let (last, dt) = (steps as usize, row["result"]["dt"].as_f64().unwrap());
+    let lag =
+        history["time"][last].as_f64().unwrap() - history["velocity_time"][last].as_f64().unwrap();
+    assert!((lag - 0.5 * dt).abs() < 1e-15, "{lag}");
+    let text = std::fs::read_to_string(place.join("h.csv")).unwrap();
+    let lines: Vec<_> = text.lines().collect();
+    assert!(lines[0].starts_with("# ") && lines[0].contains("velocity_time"), "{}", lines[0]);
+    let header = "step,time,velocity_time,u_linf,u_l2,u_l1,kinetic_energy,strain_energy,momentum_x,momentum_y,\
+                  exact_kinetic_energy,exact_strain_energy,exact_momentum_x,exact_momentum_y";
+    assert_eq!((lines[1], lines.len()), (header, 2 + steps as usize + 1));
+    let value = |line: usize, column: usize| -> f64 {
+        lines[2 + line].split(',').nth(column).unwrap().parse().unwrap()
+    };
+    assert_eq!(value(last, 6), history["kinetic_energy"][last].as_f64().unwrap());
+    assert_eq!(value(5, 13), history["exact_momentum"][5][1].as_f64().unwrap());
+    let svg = std::fs::read_to_string(place.join("h.svg")).unwrap();
+    assert!(svg.contains("data-name=\"gimp + cd\"") && svg.ends_with("</svg>\n"), "{svg}");
+    refuses(&place.join("."), "run ring --history none/h.csv", &["none/h.csv"]);
+    refuses(place, "run ring --history h.csv --checkpoint c", &["--history", "--checkpoint"]);
+}
+
+#[test]
 fn run_writes_particle_files_on_request_only() {
     let place = tempfile::tempdir().unwrap();
     let called = mms(place.path(), "run ring --cells 8 --vtk frames --frames 3");
@@ -332,6 +371,7 @@ fn an_output_that_cannot_be_written_is_found_before_the_work() {
     }
     refuses(place, "run ring --cells 512 --vtk file/frames", &["file/frames"]);
     refuses(place, "reproduce --out file", &["--out"]);
+    refuses(place, "reproduce --budget 0s", &["--budget", "90s"]);
     assert_eq!(std::fs::read_to_string(place.join("file")).unwrap(), "mine");
 }
 

@@ -16,6 +16,7 @@ use crate::checkpoint::{CheckpointError, Checkpoints, Reached};
 use crate::dimension::in_arithmetic;
 use crate::frames::{FrameOutput, FrameWriter};
 use crate::general::{self, Placement, Precision};
+use crate::history::{Moment, Recorder};
 use crate::measure::Comparison;
 use crate::norms::{PerField, PerNorm};
 use crate::plan::{MOST_STEPS, Steps, prepare};
@@ -118,6 +119,9 @@ pub struct Outputs<'a> {
     pub frames: Option<&'a FrameOutput>,
     /// What a run that is killed goes on from, if that is wanted.
     pub checkpoints: Option<&'a Checkpoints>,
+    /// Where errors, energies and momentum go at up to [`MOST_MOMENTS`](crate::MOST_MOMENTS) evenly spread steps, first and
+    /// last state included; what is there before the run is removed. A run that goes on from a checkpoint lacks those before.
+    pub history: Option<&'a mut Vec<Moment>>,
     /// When to give up: a run that is still under way then ends after its step with [`Status::Cut`].
     pub until: Option<Instant>,
 }
@@ -342,6 +346,10 @@ fn follow<T: Real, const D: usize>(
         Some(output) => Some(FrameWriter::new(output, steps.count, lag)?),
         None => None,
     };
+    let mut recorder = match &mut outputs.history {
+        Some(moments) => Some(Recorder::new(moments, exact, law(exact.material())?, steps.count)),
+        None => None,
+    };
     let resumed = match outputs.checkpoints.filter(|checkpoints| checkpoints.resume) {
         Some(checkpoints) => checkpoints.read(&mut solver.state())?,
         None => None,
@@ -357,6 +365,11 @@ fn follow<T: Real, const D: usize>(
                 frames.write(solver.observe(), exact, 0, 0.0)?;
             }
             let at_start = comparison.measure(solver.observe(), 0.0, lag).norms;
+            if let Some(recorder) = &mut recorder {
+                let velocity_time = if starts_early(case) { -lag } else { 0.0 };
+                let particles = solver.observe().0;
+                recorder.take(particles, (0, false), (0.0, velocity_time), at_start.u);
+            }
             // Before the first step no velocity is stored yet that belongs to a time of the scheme.
             Reached {
                 step: 0,
@@ -392,6 +405,11 @@ fn follow<T: Real, const D: usize>(
         let late = step < steps.count && outputs.until.is_some_and(|until| Instant::now() >= until);
         if late && status == Status::Ok {
             status = Status::Cut { step, time };
+        }
+        if let Some(recorder) = &mut recorder {
+            let is_last = status != Status::Ok;
+            let particles = solver.observe().0;
+            recorder.take(particles, (step, is_last), (time, time - lag), measured.norms.u);
         }
         if status != Status::Ok {
             break;
@@ -452,6 +470,11 @@ pub(crate) fn set_up<'a, T: Precision, const D: usize>(
 /// Whether the first step's acceleration is halved.
 pub(crate) fn starts_halved(case: &Case) -> bool {
     case.integrator == Integrator::Cd && case.start == Start::Halved
+}
+
+/// Whether the first velocities are those of half a step before the start.
+fn starts_early(case: &Case) -> bool {
+    case.integrator == Integrator::Cd && case.start != Start::Halved
 }
 
 /// The exact body force at the particles; what depends on their reference positions alone is kept.

@@ -69,7 +69,7 @@ impl FrameWriter {
 }
 
 /// The step at which frame `index` of `count` is written.
-fn step_of_frame(index: u64, count: u64, steps: u64) -> u64 {
+pub(crate) fn step_of_frame(index: u64, count: u64, steps: u64) -> u64 {
     // In 128 bits, since a long run's steps times frames may not fit into 64.
     let (index, last, steps) = (u128::from(index), u128::from(count - 1), u128::from(steps));
     ((2 * index * steps + last) / (2 * last)) as u64

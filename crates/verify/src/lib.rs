@@ -5,6 +5,7 @@
 //! - [`coverage()`] measures which terms of the momentum balance a solution exercises.
 //! - [`run`] simulates one [`Case`] and measures the errors of displacement, velocity, deformation gradient and
 //!   stress; [`converge`] does so for a series of grids or time steps and adds the orders of accuracy.
+//!   A run's [history](Moment) has energies and momentum as well, of the run and of the exact motion.
 //! - [`score()`] measures what another solver wrote to files, in the same norms.
 //! - [`temporal()`] measures the error of time stepping alone, and [`verdicts`] judges orders.
 //! - [`tradeoff()`] measures error against cost over all schemes that fit a solution, and [`CostModel`] predicts what a run takes.
@@ -24,6 +25,7 @@ mod dimension;
 mod evaluate;
 mod frames;
 mod general;
+mod history;
 mod measure;
 mod norms;
 mod order;
@@ -50,6 +52,7 @@ pub use coverage::{Part, Share, coverage, smallest_set};
 pub use evaluate::{FieldRow, WrongLength, evaluate};
 pub use frames::FrameOutput;
 pub use general::Placement;
+pub use history::{MOST_MOMENTS, Moment, Sums, energy_drift};
 pub use mmsmith_mpm::general::{Integrator, Shape, Transfer};
 pub use mmsmith_mpm::total_lagrangian::{Composition, Coordinates, Layout, MassMatrix, Scheme};
 pub use norms::{PerField, PerNorm};

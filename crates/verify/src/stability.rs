@@ -18,12 +18,12 @@
 
 use mmsmith_mpm::{BodyForce, Material, Particles, StepError};
 use mmsmith_solutions::{AnySolution, Real, Solution};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::case::{Arithmetic, Case, CaseError, law, set_up};
 use crate::dimension::{in_arithmetic, in_dimension};
 use crate::general::Precision;
+use crate::history::Totals;
 use crate::plan::{MOST_STEPS, plan, prepare};
 use crate::scene::Scene;
 use crate::solver::Solver;
@@ -384,25 +384,6 @@ struct Run<'a, const D: usize> {
     limits: Option<&'a Limits>,
 }
 
-/// Sums over all particles at one instant, of the computed state and of the exact one.
-struct Totals<const D: usize> {
-    error: f64,
-    worst: usize,
-    energy: f64,
-    exact_energy: f64,
-    momentum: [f64; D],
-    /// The sum of the magnitudes of the exact momenta.
-    exact_momentum: f64,
-}
-
-impl<const D: usize> Totals<D> {
-    /// Those of no particles, the first of which is to be `worst`.
-    fn of_none(worst: usize) -> Self {
-        let (error, energy, exact_energy, exact_momentum) = (0.0, 0.0, 0.0, 0.0);
-        Self { error, worst, energy, exact_energy, momentum: [0.0; D], exact_momentum }
-    }
-}
-
 impl<const D: usize> Run<'_, D> {
     fn follow<T: Real>(
         &self,
@@ -422,11 +403,13 @@ impl<const D: usize> Run<'_, D> {
             }
             steps = step;
             let time = step as f64 * self.dt;
-            let totals = self.totals(solver.observe().0, &material, time, lag);
+            let particles = solver.observe().0;
+            let totals = Totals::of(particles, &material, self.exact, time, time - lag);
             error = error.max(totals.error);
-            let gain = (totals.energy - totals.exact_energy) / scales.0;
+            let gain = (totals.computed.energy() - totals.exact.energy()) / scales.0;
             energy = energy.max(gain.abs());
-            let length = totals.momentum.iter().map(|p| p * p).sum::<f64>().sqrt();
+            let momenta = totals.computed.momentum.iter().zip(&totals.exact.momentum);
+            let length = momenta.map(|(p, q)| (p - q) * (p - q)).sum::<f64>().sqrt();
             momentum = momentum.max(length / scales.1);
             failure = self.judge(step, time, &totals, gain, scales.0);
             if failure.is_some() {
@@ -484,63 +467,11 @@ impl<const D: usize> Run<'_, D> {
         let mut largest = (0.0_f64, 0.0_f64);
         for moment in 0..MOMENTS {
             let time = period * moment as f64 / MOMENTS as f64;
-            let totals = self.totals(particles, material, time, 0.0);
-            largest.0 = largest.0.max(totals.exact_energy);
-            largest.1 = largest.1.max(totals.exact_momentum);
+            let totals = Totals::of(particles, material, self.exact, time, time);
+            largest.0 = largest.0.max(totals.exact.energy());
+            largest.1 = largest.1.max(totals.exact_momenta);
         }
         largest
-    }
-
-    /// Sums over fixed groups of particles in order, so that they do not depend on the number of threads.
-    fn totals<T: Real>(
-        &self,
-        particles: &Particles<T, D>,
-        material: &Material<f64>,
-        time: f64,
-        lag: f64,
-    ) -> Totals<D> {
-        const GROUP: usize = 512;
-        let group = |g: usize| {
-            let mut totals = Totals::<D>::of_none(g * GROUP);
-            for p in g * GROUP..particles.len().min((g + 1) * GROUP) {
-                let X = particles.X[p].map(Real::to_f64);
-                let (mass, volume) = (particles.mass[p].to_f64(), particles.volume[p].to_f64());
-                let u = particles.x[p].map(Real::to_f64) - X;
-                let error = (u - self.exact.displacement(&X, time)).norm();
-                if error > totals.error || error.is_nan() {
-                    (totals.error, totals.worst) = (error, p);
-                }
-                let v = particles.v[p].map(Real::to_f64);
-                let exact_v = self.exact.velocity(&X, time - lag);
-                let F = particles.F[p].map(Real::to_f64);
-                let exact_F = self.exact.deformation_gradient(&X, time);
-                // A particle that is inside out has no energy; the solver stops at its next step.
-                let strain = |F| material.strain_energy(F).unwrap_or(f64::NAN);
-                totals.energy += 0.5 * mass * v.norm_squared() + volume * strain(&F);
-                totals.exact_energy +=
-                    0.5 * mass * exact_v.norm_squared() + volume * strain(&exact_F);
-                for axis in 0..D {
-                    totals.momentum[axis] += mass * (v[axis] - exact_v[axis]);
-                }
-                totals.exact_momentum += mass * exact_v.norm();
-            }
-            totals
-        };
-        let groups: Vec<_> =
-            (0..particles.len().div_ceil(GROUP)).into_par_iter().map(group).collect();
-        let mut total = Totals::<D>::of_none(0);
-        for next in groups {
-            if next.error > total.error || next.error.is_nan() {
-                (total.error, total.worst) = (next.error, next.worst);
-            }
-            total.energy += next.energy;
-            total.exact_energy += next.exact_energy;
-            total.exact_momentum += next.exact_momentum;
-            for axis in 0..D {
-                total.momentum[axis] += next.momentum[axis];
-            }
-        }
-        total
     }
 }
 

@@ -17,14 +17,24 @@ fn solution<T: Real>(name: &str, set: &[(&str, f64)]) -> AnySolution<T> {
 }
 
 fn row(exact: &AnySolution<f64>, case: &Case) -> Row {
-    let mut outputs =
-        Outputs { progress: &mut |_| (), frames: None, checkpoints: None, until: None };
+    let mut outputs = Outputs {
+        progress: &mut |_| (),
+        frames: None,
+        checkpoints: None,
+        history: None,
+        until: None,
+    };
     run(exact, Arithmetic::Double, case, &mut outputs).expect("a case that can be run")
 }
 
 fn row_in_single(exact: &AnySolution<f64>, single: &AnySolution<f32>, case: &Case) -> Row {
-    let mut outputs =
-        Outputs { progress: &mut |_| (), frames: None, checkpoints: None, until: None };
+    let mut outputs = Outputs {
+        progress: &mut |_| (),
+        frames: None,
+        checkpoints: None,
+        history: None,
+        until: None,
+    };
     run(exact, Arithmetic::Single(single), case, &mut outputs).expect("a case that can be run")
 }
 
@@ -246,4 +256,46 @@ fn limits_do_not_depend_on_the_start_of_the_search_or_on_threads() {
     let difference = first.cfl_max.unwrap() - second.cfl_max.unwrap();
     assert!(difference.abs() <= 0.01, "{first:?} {second:?}");
     assert!(first.bracket[1].unwrap() - first.bracket[0].unwrap() <= 0.01, "{first:?}");
+}
+
+#[test]
+fn stiffness_and_density_over_24_decades_change_nothing_but_rounding() {
+    // Powers of ten, which round; those of two are seen to scale to the bit above.
+    let decades = [1e-12, 1e-5, 1.0, 1e7, 1e12];
+    let reference = solution("axis-aligned", &[]);
+    for mut case in schemes() {
+        // In this time hat functions part runs that differ by rounding.
+        case.cells = 8;
+        case.periods = if case.shape == Shape::Linear { 0.25 } else { 1.0 };
+        let expected = row(&reference, &case);
+        for E in decades {
+            for rho0 in decades {
+                let found = row(&solution("axis-aligned", &[("E", E), ("rho0", rho0)]), &case);
+                let told = format!("E = {E:e}, rho0 = {rho0:e}: {case:?}");
+                assert_eq!(
+                    (found.steps, &found.status),
+                    (expected.steps, &expected.status),
+                    "{told}"
+                );
+                for (of, reference) in [
+                    (found.errors.u.linf, expected.errors.u.linf),
+                    (found.errors.F.linf, expected.errors.F.linf),
+                ] {
+                    assert!((of / reference - 1.0).abs() < 1e-9, "{of:e} {reference:e}: {told}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_million_steps_on_one_cell_end_with_the_error_of_the_first_ones() {
+    let exact = solution("axis-aligned-1d", &[]);
+    let few = Case { cells: 1, ..Case::default() };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+    let of = |periods: f64| pool.install(|| row(&exact, &Case { periods, ..few }));
+    let (long, short) = (of(200_000.0), of(20.0));
+    assert_eq!((long.steps, &long.status), (1_000_000, &Status::Ok));
+    let ratio = long.errors.u.linf / short.errors.u.linf;
+    assert!((1.0..1.01).contains(&ratio), "{ratio}: {long:?}");
 }

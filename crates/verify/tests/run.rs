@@ -18,8 +18,13 @@ fn ring() -> AnySolution<f64> {
 }
 
 fn run_quietly(solution: &AnySolution<f64>, case: &Case) -> Row {
-    let mut outputs =
-        Outputs { progress: &mut |_| (), frames: None, checkpoints: None, until: None };
+    let mut outputs = Outputs {
+        progress: &mut |_| (),
+        frames: None,
+        checkpoints: None,
+        history: None,
+        until: None,
+    };
     run(solution, Arithmetic::Double, case, &mut outputs).expect("a case that can be run")
 }
 
@@ -110,8 +115,13 @@ fn single_precision_has_the_same_particles_and_nearly_the_same_error() {
         (ring(), AnySolution::<f32>::Two(Box::new(Coded(Ring::default())))),
     ] {
         let case = Case { cells: 16, ..Case::default() };
-        let mut outputs =
-            Outputs { progress: &mut |_| (), frames: None, checkpoints: None, until: None };
+        let mut outputs = Outputs {
+            progress: &mut |_| (),
+            frames: None,
+            checkpoints: None,
+            history: None,
+            until: None,
+        };
         let coarse = run(&double, Arithmetic::Single(&single), &case, &mut outputs).unwrap();
         let fine = run_quietly(&double, &case);
         assert_eq!(coarse.particles, fine.particles);
@@ -132,8 +142,13 @@ fn an_unstable_run_ends_as_a_row_that_says_so() {
 #[test]
 fn conditions_that_the_solver_does_not_model_are_named() {
     let shear = AnySolution::Two(Box::new(Coded(CrossedShear::default())));
-    let mut outputs =
-        Outputs { progress: &mut |_| (), frames: None, checkpoints: None, until: None };
+    let mut outputs = Outputs {
+        progress: &mut |_| (),
+        frames: None,
+        checkpoints: None,
+        history: None,
+        until: None,
+    };
     let error =
         run(&shear, Arithmetic::Double, &Case::default(), &mut outputs).unwrap_err().to_string();
     assert!(error.contains("PrescribedMotion on Lower(0)"), "{error}");
@@ -142,8 +157,13 @@ fn conditions_that_the_solver_does_not_model_are_named() {
 #[test]
 fn an_extent_is_for_rings_only() {
     let case = Case { extent: Some(Extent::Full), ..Case::default() };
-    let mut outputs =
-        Outputs { progress: &mut |_| (), frames: None, checkpoints: None, until: None };
+    let mut outputs = Outputs {
+        progress: &mut |_| (),
+        frames: None,
+        checkpoints: None,
+        history: None,
+        until: None,
+    };
     let error = run(&axis_aligned(), Arithmetic::Double, &case, &mut outputs).unwrap_err();
     assert!(error.to_string().contains("annulus"), "{error}");
 }
@@ -153,8 +173,13 @@ fn frames_hold_what_the_row_measured() {
     let folder = tempfile::tempdir().unwrap();
     let output = FrameOutput { folder: folder.path().to_owned(), name: "box".into(), count: 5 };
     let case = Case { cells: 8, ..Case::default() };
-    let mut outputs =
-        Outputs { progress: &mut |_| (), frames: Some(&output), checkpoints: None, until: None };
+    let mut outputs = Outputs {
+        progress: &mut |_| (),
+        frames: Some(&output),
+        checkpoints: None,
+        history: None,
+        until: None,
+    };
     let row = run(&axis_aligned(), Arithmetic::Double, &case, &mut outputs).unwrap();
     let frame =
         |n: usize| mmsmith_vtk::read(&folder.path().join(format!("box-{n:06}.vtu"))).unwrap();

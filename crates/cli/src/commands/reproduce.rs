@@ -1,8 +1,12 @@
 //! `mms reproduce`: the original study of Wallstedt and Guilkey, again, on both of its problems.
 
 mod claims;
+mod cost;
+mod drift;
+mod limits;
 mod pictures;
 mod report;
+mod section;
 
 use std::fs;
 use std::path::Path;
@@ -125,8 +129,13 @@ pub(crate) fn reproduce(options: &ReproduceOptions) -> Result<bool> {
         let (said, written) = claims::texts(&claims);
         terminal::say(&said)?;
         text += &written;
+        let sections =
+            [drift::section(out)?, limits::section(out)?, cost::section(out, options.budget)?];
+        for section in &sections {
+            text += section.markdown();
+        }
         output.write_text(&text)?;
-        page.write_text(&report::html(out, &results, &gentle, &claims)?)?;
+        page.write_text(&report::html(out, &results, &gentle, &claims, &sections)?)?;
         terminal::say(&format!("report, data, plots and particle files: {}\n", report.display()))?;
         Ok(true)
     })
@@ -217,12 +226,22 @@ fn measure_problem(problem: &'static str, folder: &Path) -> Result<Results> {
     let base = case(&SchemeOptions::usual(Shape::Gimp, Integrator::Cd), GRID)?;
     let frames =
         FrameOutput { folder: folder.join("particles"), name: problem.to_owned(), count: FRAMES };
-    let mut outputs =
-        Outputs { progress: &mut |_| (), frames: Some(&frames), checkpoints: None, until: None };
+    let mut outputs = Outputs {
+        progress: &mut |_| (),
+        frames: Some(&frames),
+        checkpoints: None,
+        history: None,
+        until: None,
+    };
     simulate(&model.exact, model.arithmetic(), &base, &mut outputs)?;
     let base = Case { start: Start::Exact, ..base };
-    let mut outputs =
-        Outputs { progress: &mut |_| (), frames: None, checkpoints: None, until: None };
+    let mut outputs = Outputs {
+        progress: &mut |_| (),
+        frames: None,
+        checkpoints: None,
+        history: None,
+        until: None,
+    };
     let exact_start = simulate(&model.exact, model.arithmetic(), &base, &mut outputs)?;
     pictures::write_contrast(&model, problem, folder)?;
     let results = Results { problem, space, time, small_step, differences, exact_start };

@@ -1,16 +1,18 @@
 //! `mms run`: one simulation.
 
 use anyhow::Result;
-use mmsmith_verify::{FrameOutput, Outputs, Row, Status, run as simulate};
-use serde_json::json;
+use mmsmith_solutions::AnySolution;
+use mmsmith_verify::{FrameOutput, Moment, Outputs, Row, Status, energy_drift, run as simulate};
+use serde_json::{Value, json};
 
 use super::{Model, caption, case, resume, settings, with_threads};
-use crate::arguments::RunOptions;
+use crate::arguments::{Frame, RunOptions};
 use crate::json::Output;
 use crate::library::Selection;
 use crate::progress::Bar;
+use crate::svg::{Course, Drift};
 use crate::table::{self, Table};
-use crate::terminal;
+use crate::{csv, terminal};
 
 pub(crate) fn run(options: &RunOptions) -> Result<bool> {
     if let Some(folder) = &options.checkpoint {
@@ -28,6 +30,10 @@ pub(super) fn follow(options: &RunOptions, resume: bool) -> Result<bool> {
     let case = case(scheme, options.cells)?;
     let extent = model.admit(&[case])?;
     let output = Output::prepare_if(scheme.json.as_ref())?;
+    let [history, plot] =
+        [&options.history, &options.plot].map(|path| Output::prepare_if(path.as_ref()));
+    let (history, plot) = (history?, plot?);
+    let mut moments = (history.is_some() || plot.is_some()).then(Vec::new);
     let frames = options.vtk.as_ref().map(|folder| FrameOutput {
         folder: folder.clone(),
         name: selection.name().to_owned(),
@@ -47,6 +53,7 @@ pub(super) fn follow(options: &RunOptions, resume: bool) -> Result<bool> {
                 progress: &mut |progress| bar.show(&what, progress),
                 frames: frames.as_ref(),
                 checkpoints: checkpoints.as_ref(),
+                history: moments.as_mut(),
                 until: None,
             };
             simulate(&model.exact, model.arithmetic(), &case, &mut outputs)?
@@ -56,15 +63,71 @@ pub(super) fn follow(options: &RunOptions, resume: bool) -> Result<bool> {
             let list = frames.folder.join(format!("{}.pvd", frames.name));
             terminal::say(&format!("particle files: {}\n", list.display()))?;
         }
+        if let Some(file) = history {
+            file.write_text(&csv::history(moments.as_deref().unwrap_or_default()))?;
+        }
+        if let Some(file) = plot {
+            let name = format!("{} + {}", word(&scheme.shape), word(&scheme.integrator));
+            let name = if scheme.frame == Frame::Total { word(&scheme.shape) } else { name };
+            let course = course(name, &model, moments.as_deref().unwrap_or_default());
+            let title = format!("{}: drift of energy, {} cells", selection.name(), options.cells);
+            file.write_text(&drift_plot(&title, vec![course]))?;
+        }
         if let Some(output) = output {
-            output.write(&json!({
+            let mut document = json!({
                 "schema": "mmsmith.run/1",
                 "settings": settings(),
                 "result": row,
-            }))?;
+            });
+            if let Some(moments) = &moments {
+                document["history"] = history_document(moments);
+            }
+            output.write(&document)?;
         }
         Ok(true)
     })
+}
+
+/// A history as arrays of one length; each momentum is an array by axis.
+pub(super) fn history_document(history: &[Moment]) -> Value {
+    let each = |value: &dyn Fn(&Moment) -> Value| history.iter().map(value).collect::<Value>();
+    json!({
+        "step": each(&|moment| moment.step.into()),
+        "time": each(&|moment| moment.time.into()),
+        "velocity_time": each(&|moment| moment.velocity_time.into()),
+        "u_linf": each(&|moment| moment.u.linf.into()),
+        "u_l2": each(&|moment| moment.u.l2.into()),
+        "u_l1": each(&|moment| moment.u.l1.into()),
+        "kinetic_energy": each(&|moment| moment.computed.kinetic_energy.into()),
+        "strain_energy": each(&|moment| moment.computed.strain_energy.into()),
+        "momentum": each(&|moment| moment.computed.momentum.clone().into()),
+        "exact_kinetic_energy": each(&|moment| moment.exact.kinetic_energy.into()),
+        "exact_strain_energy": each(&|moment| moment.exact.strain_energy.into()),
+        "exact_momentum": each(&|moment| moment.exact.momentum.clone().into()),
+    })
+}
+
+/// The drift of energy over periods of the solution.
+pub(super) fn course(name: String, model: &Model, history: &[Moment]) -> Course {
+    let period = match &model.exact {
+        AnySolution::One(exact) => exact.period(),
+        AnySolution::Two(exact) => exact.period(),
+        AnySolution::Three(exact) => exact.period(),
+        // Then over time as it is.
+        _ => 1.0,
+    };
+    let points = energy_drift(history).into_iter().map(|(time, drift)| (time / period, drift));
+    Course { name, points: points.collect() }
+}
+
+/// Curves of the drift of energy.
+pub(super) fn drift_plot(title: &str, curves: Vec<Course>) -> String {
+    let y = "energy, solver - exact, over the largest exact";
+    Drift { title, x: "periods", y, curves }.svg()
+}
+
+fn word(value: &dyn std::fmt::Debug) -> String {
+    format!("{value:?}").to_lowercase()
 }
 
 fn text(row: &Row) -> String {

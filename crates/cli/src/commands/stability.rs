@@ -63,6 +63,39 @@ pub(crate) fn stability(options: &StabilityOptions) -> Result<bool> {
     if options.search.is_some() {
         return random::search(options, &criteria);
     }
+    let output = Output::prepare_if(options.scheme.json.as_ref())?;
+    let [plot, values] =
+        [&options.plot, &options.csv].map(|path| Output::prepare_if(path.as_ref()));
+    let (plot, values) = (plot?, values?);
+    with_threads(options.scheme.threads, || {
+        let found = survey(options)?;
+        terminal::say(&found.text())?;
+        if let Some(output) = output {
+            output.write(&found.document()?)?;
+        }
+        if let Some(file) = values {
+            file.write_text(&found.sheet())?;
+        }
+        if let Some(file) = plot {
+            file.write_text(&found.picture())?;
+        }
+        Ok(true)
+    })
+}
+
+/// The limits over what was varied, to be told.
+pub(super) struct Survey<'a> {
+    options: &'a StabilityOptions,
+    selection: Selection,
+    search: Search,
+    points: Vec<Point>,
+    rows: Vec<StabilityRow>,
+}
+
+/// Looks for the limits that were asked for.
+pub(super) fn survey(options: &StabilityOptions) -> Result<Survey<'_>> {
+    let criteria =
+        Criteria { error_multiple: options.error_multiple, energy_rate: options.energy_rate };
     let selection = Selection::new(&options.name, &options.scheme.parameters.set)?;
     let points = vary::points(options, &selection)?;
     let (lower, upper) = (options.lower, options.upper);
@@ -72,43 +105,68 @@ pub(crate) fn stability(options: &StabilityOptions) -> Result<bool> {
         bail!("--lower {lower} --upper {upper}: the lower CFL number must be below the upper one");
     }
     let search = Search { lower, upper, width: options.width, criteria };
-    let output = Output::prepare_if(options.scheme.json.as_ref())?;
-    let [plot, values] =
-        [&options.plot, &options.csv].map(|path| Output::prepare_if(path.as_ref()));
-    let (plot, values) = (plot?, values?);
     let keep = Keep::open(options.kept.out.as_ref(), &options.name)?;
-    with_threads(options.scheme.threads, || {
-        let rows = limits(&points, &search, &keep)?;
-        let names: Vec<&str> = options.over.iter().map(|(name, _)| name.as_str()).collect();
-        let scheme = &options.scheme.for_solution(&points[0].model.exact);
-        let mut text = caption(&selection, scheme, points[0].extent);
-        if !options.over.iter().any(|(name, _)| name == "cells") {
+    let rows = limits(&points, &search, &keep)?;
+    Ok(Survey { options, selection, search, points, rows })
+}
+
+impl Survey<'_> {
+    fn names(&self) -> Vec<&str> {
+        self.options.over.iter().map(|(name, _)| name.as_str()).collect()
+    }
+
+    fn scheme(&self) -> SchemeOptions {
+        self.options.scheme.for_solution(&self.points[0].model.exact)
+    }
+
+    fn text(&self) -> String {
+        let Self { options, selection, search, points, .. } = self;
+        let mut text = caption(selection, &self.scheme(), points[0].extent);
+        if !self.names().contains(&"cells") {
             text += &format!("{} cells\n", options.cells);
         }
-        text += &definition(&criteria);
+        text += &self.definition();
         text += &format!("\nlargest stable CFL number, to {} on P-waves\n", search.width);
-        text += &table(&names, &points, &rows).text();
-        text += &notes(&names, &points, &rows);
-        terminal::say(&text)?;
-        if let Some(output) = output {
-            let documents =
-                points.iter().zip(&rows).map(|(point, row)| document(options, point, row));
-            output.write(&json!({
-                "schema": "mmsmith.stability/1",
-                "settings": settings(&selection, scheme, points[0].extent, options.cells, Value::Null),
-                "over": names,
-                "search": search,
-                "rows": documents.collect::<Result<Vec<_>>>()?,
-            }))?;
-        }
-        if let Some(file) = values {
-            file.write_text(&sheet(&names, &points, &rows))?;
-        }
-        if let Some(file) = plot {
-            file.write_text(&picture(&selection, options, &rows))?;
-        }
-        Ok(true)
-    })
+        text += &self.table().text();
+        text += &self.notes();
+        text
+    }
+
+    /// What 'unstable' means, in words.
+    pub(super) fn definition(&self) -> String {
+        definition(&self.search.criteria)
+    }
+
+    pub(super) fn table(&self) -> Table {
+        table(&self.names(), &self.points, &self.rows)
+    }
+
+    /// What the table cannot say.
+    pub(super) fn notes(&self) -> String {
+        notes(&self.names(), &self.points, &self.rows)
+    }
+
+    pub(super) fn document(&self) -> Result<Value> {
+        let Self { options, selection, search, points, rows } = self;
+        let settings =
+            settings(selection, &self.scheme(), points[0].extent, options.cells, Value::Null);
+        let rows = points.iter().zip(rows).map(|(point, row)| document(options, point, row));
+        Ok(json!({
+            "schema": "mmsmith.stability/1",
+            "settings": settings,
+            "over": self.names(),
+            "search": search,
+            "rows": rows.collect::<Result<Vec<_>>>()?,
+        }))
+    }
+
+    pub(super) fn sheet(&self) -> String {
+        sheet(&self.names(), &self.points, &self.rows)
+    }
+
+    pub(super) fn picture(&self) -> String {
+        picture(&self.selection, self.options, &self.rows)
+    }
 }
 
 /// Judges one run.

@@ -102,8 +102,13 @@ impl Runner<'_> {
         let until = until(most_s);
         let compute = |_: usize| -> Result<Record> {
             let row = self.pool(setting)?.install(|| {
-                let mut outputs =
-                    Outputs { progress: &mut |_| (), frames: None, checkpoints: None, until };
+                let mut outputs = Outputs {
+                    progress: &mut |_| (),
+                    frames: None,
+                    checkpoints: None,
+                    history: None,
+                    until,
+                };
                 simulate(&self.exact.exact, self.arithmetic(setting), &setting.case, &mut outputs)
             })?;
             if matches!(row.status, Status::Cut { .. }) {
@@ -153,15 +158,34 @@ fn until(most_s: f64) -> Option<Instant> {
 }
 
 pub(crate) fn tradeoff(options: &TradeoffOptions) -> Result<bool> {
+    let outputs = [&options.json, &options.csv, &options.plot, &options.advice]
+        .map(|path| Output::prepare_if(path.as_ref()));
+    let [json, csv, plot, advice] = outputs;
+    let (json, csv, plot, advice) = (json?, csv?, plot?, advice?);
+    let report = sweep(options)?;
+    terminal::say(&report.text())?;
+    if let Some(file) = json {
+        file.write(&report.document()?)?;
+    }
+    if let Some(file) = csv {
+        file.write_text(&report.sheet())?;
+    }
+    if let Some(file) = plot {
+        file.write_text(&report.picture())?;
+    }
+    if let Some(file) = advice {
+        file.write_text(&report.advice())?;
+    }
+    Ok(report.holds())
+}
+
+/// Measures what was asked for.
+pub(super) fn sweep(options: &TradeoffOptions) -> Result<Report<'_>> {
     let started = Instant::now();
     let selection = Selection::new(&options.name, &options.parameters.set)?;
     let exact = Model::new(&selection, Precision::F64)?;
     // What is interpreted has double precision only.
     let single = Model::new(&selection, Precision::F32).ok();
-    let outputs = [&options.json, &options.csv, &options.plot, &options.advice]
-        .map(|path| Output::prepare_if(path.as_ref()));
-    let [json, csv, plot, advice] = outputs;
-    let (json, csv, plot, advice) = (json?, csv?, plot?, advice?);
     let threads = options.threads.unwrap_or(1);
     let more = machine::cores().min(MOST_THREADS);
     let more = (more > threads && options.threads.is_none()).then_some(more);
@@ -211,32 +235,18 @@ pub(crate) fn tradeoff(options: &TradeoffOptions) -> Result<bool> {
     };
     let found = measure(&tried, &goal, &calls, &mut show)?;
     drop(bar);
-    let report =
-        Report { options, selection: &selection, found: &found, compared: &compared, threads };
     let used_s = started.elapsed().as_secs_f64();
-    terminal::say(&report.text(used_s))?;
-    if let Some(file) = json {
-        file.write(&report.document(used_s)?)?;
-    }
-    if let Some(file) = csv {
-        file.write_text(&report.sheet())?;
-    }
-    if let Some(file) = plot {
-        file.write_text(&report.picture())?;
-    }
-    if let Some(file) = advice {
-        file.write_text(&report.advice())?;
-    }
-    Ok(report.holds())
+    Ok(Report { options, selection, found, compared, threads, used_s })
 }
 
 /// What was found, to be told.
-struct Report<'a> {
+pub(super) struct Report<'a> {
     options: &'a TradeoffOptions,
-    selection: &'a Selection,
-    found: &'a Tradeoff,
-    compared: &'a Measure,
+    selection: Selection,
+    found: Tradeoff,
+    compared: Measure,
     threads: usize,
+    used_s: f64,
 }
 
 /// Why grids were left out, for people and for machines.
@@ -278,7 +288,7 @@ impl Report<'_> {
         }
     }
 
-    fn definition(&self) -> String {
+    pub(super) fn definition(&self) -> String {
         format!(
             "error: {}, the largest over all steps; cost: {}; both as mms run measures them",
             self.compared.words(),
@@ -339,7 +349,17 @@ impl Report<'_> {
         table
     }
 
-    fn text(&self, used_s: f64) -> String {
+    /// The settings to which no other is both cheaper and more accurate.
+    pub(super) fn front(&self) -> Table {
+        self.table(&self.found.front)
+    }
+
+    /// The number of settings that were run.
+    pub(super) fn settings(&self) -> usize {
+        self.found.entries.len()
+    }
+
+    fn text(&self) -> String {
         let parameters: Vec<_> = self
             .selection
             .parameters()
@@ -348,13 +368,14 @@ impl Report<'_> {
             .collect();
         let runs = self.found.entries.len();
         let mut text = format!(
-            "{} ({}), {} period(s), {} thread(s) where nothing else is said\n{}\n{runs} settings of {} schemes in {used_s:.1} s of {} s\n",
+            "{} ({}), {} period(s), {} thread(s) where nothing else is said\n{}\n{runs} settings of {} schemes in {:.1} s of {} s\n",
             self.selection.name(),
             parameters.join(", "),
             self.options.periods,
             self.threads,
             self.definition(),
             self.found.families,
+            self.used_s,
             self.options.budget,
         );
         for (skip, count) in &self.found.skipped {
@@ -362,7 +383,7 @@ impl Report<'_> {
         }
         text += &format!(
             "\nthe front: no other setting is both cheaper and more accurate\n{}",
-            self.table(&self.found.front).text()
+            self.front().text()
         );
         text += "\nwhat each knob buys, the other settings being equal\n";
         for line in self.knobs() {
@@ -432,7 +453,7 @@ impl Report<'_> {
     }
 
     /// What each knob did, a line each.
-    fn knobs(&self) -> Vec<String> {
+    pub(super) fn knobs(&self) -> Vec<String> {
         let entries = &self.found.entries;
         let mut lines: Vec<String> = self
             .found
@@ -485,7 +506,7 @@ impl Report<'_> {
         lines
     }
 
-    fn document(&self, used_s: f64) -> Result<Value> {
+    pub(super) fn document(&self) -> Result<Value> {
         let mut rows = Vec::new();
         for entry in &self.found.entries {
             let mut row = words::document(&entry.setting);
@@ -556,7 +577,7 @@ impl Report<'_> {
                 "processor": machine::processor(),
             },
             "definition": self.definition(),
-            "used_s": used_s,
+            "used_s": self.used_s,
             "families": self.found.families,
             "rows": rows,
             "front": self.found.front,
@@ -567,7 +588,7 @@ impl Report<'_> {
         }))
     }
 
-    fn sheet(&self) -> String {
+    pub(super) fn sheet(&self) -> String {
         let mut text = "front,scheme,cells,cfl,ppc,threads,precision,steps,particles,wall_s,cpu_s,wall_spread,timings,bytes,error,status\n"
             .to_owned();
         for (index, entry) in self.found.entries.iter().enumerate() {
@@ -596,7 +617,7 @@ impl Report<'_> {
         text
     }
 
-    fn picture(&self) -> String {
+    pub(super) fn picture(&self) -> String {
         let title = format!("{}: error against cost", self.selection.name());
         let point = |(index, entry): (usize, &Entry)| Point {
             kind: words::kind(&entry.setting),

@@ -2,10 +2,11 @@
 
 use std::fmt::Write;
 
-use super::plot::{
-    Axis, BOTTOM, LEFT, LEGEND, LINE, RIGHT, STYLES, TOP, WIDTH, frame, grid, marker,
-};
+use super::plot::{Axis, BOTTOM, LEFT, LEGEND, LINE, RIGHT, TOP, WIDTH, frame, grid, marker};
 use super::{escape, open};
+
+/// The colour of the front, which no marker has.
+const RED: &str = "#cc0000";
 
 /// One measured setting.
 pub(crate) struct Point {
@@ -52,12 +53,7 @@ impl Front<'_> {
             let y = Axis::around(drawn.iter().map(|p| p.error), BOTTOM, TOP);
             grid(&mut text, &x, &y);
             for (index, kind) in kinds.iter().enumerate() {
-                let opacity = opacity(index);
-                let _ = writeln!(
-                    text,
-                    r##"<g class="kind" data-name="{}" opacity="{opacity}">"##,
-                    escape(kind)
-                );
+                let _ = writeln!(text, r##"<g class="kind" data-name="{}">"##, escape(kind));
                 for point in drawn.iter().filter(|point| point.kind == *kind) {
                     marker(&mut text, index, x.at(point.cost), y.at(point.error));
                 }
@@ -69,18 +65,17 @@ impl Front<'_> {
                 front.iter().map(|p| format!("{:.1},{:.1}", x.at(p.cost), y.at(p.error))).collect();
             let _ = writeln!(
                 text,
-                r##"<polyline class="pareto" points="{}" fill="none" stroke="#111" stroke-width="1.5"/>"##,
+                r##"<g class="curve" data-name="front" data-colour="{RED}"><polyline class="pareto" points="{}" fill="none" stroke="{RED}" stroke-width="2"/></g>"##,
                 places.join(" ")
             );
         }
         frame(&mut text, self.x, self.y);
         for (index, kind) in kinds.iter().enumerate() {
             let line = LEGEND + LINE * index as f64;
-            let _ = write!(text, r##"<g opacity="{}">"##, opacity(index));
             marker(&mut text, index, LEFT + 22.0, line);
             let _ = writeln!(
                 text,
-                r##"</g><text x="{}" y="{}">{}</text>"##,
+                r##"<text x="{}" y="{}">{}</text>"##,
                 LEFT + 54.0,
                 line + 5.0,
                 escape(kind)
@@ -89,18 +84,13 @@ impl Front<'_> {
         let line = LEGEND + LINE * kinds.len() as f64;
         let _ = writeln!(
             text,
-            r##"<path d="M{LEFT} {line}h44" stroke="#111" stroke-width="1.5"/><text x="{}" y="{}">front</text>"##,
+            r##"<path d="M{LEFT} {line}h44" stroke="{RED}" stroke-width="2"/><text x="{}" y="{}">front</text>"##,
             LEFT + 54.0,
             line + 5.0
         );
         text.push_str("</svg>\n");
         text
     }
-}
-
-/// Markers repeat after some kinds, and are paler then.
-fn opacity(index: usize) -> f64 {
-    if index < STYLES.len() { 1.0 } else { 0.5 }
 }
 
 #[cfg(test)]

@@ -6,8 +6,10 @@ use super::{escape, open};
 
 const LEFT: f64 = 72.0;
 const TOP: f64 = 56.0;
-/// Of a cell of a map.
-const CELL: (f64, f64) = (62.0, 34.0);
+/// The least width and the height of a map's cell.
+const CELL: (f64, f64) = (62.0, 38.0);
+/// The first line of a map, below its words.
+const MAP: f64 = 76.0;
 /// Of the line's frame.
 const HEIGHT: f64 = 300.0;
 /// Eight greys-with-a-hue from light to dark, which keep their order in black and white (from the map viridis, reversed).
@@ -29,8 +31,9 @@ pub(crate) struct Map<'a> {
 impl Map<'_> {
     pub(crate) fn svg(&self) -> String {
         let (columns, lines) = (self.x.1.len(), self.y.1.len());
-        let width = (LEFT + CELL.0 * columns as f64 + 16.0).max(480.0);
-        let bottom = TOP + CELL.1 * lines as f64;
+        let across = self.across();
+        let width = LEFT + across * columns as f64 + 16.0;
+        let bottom = MAP + CELL.1 * lines as f64;
         let known = || self.values.iter().copied().flatten();
         let (low, high) =
             (known().fold(f64::INFINITY, f64::min), known().fold(f64::NEG_INFINITY, f64::max));
@@ -47,18 +50,19 @@ impl Map<'_> {
         let _ = writeln!(
             text,
             r##"<text x="16" y="22" font-size="15" font-weight="bold">{}</text>
-<text x="16" y="44" font-size="13">{range}; below: share of P-waves' limit; heavy line: 0.8 of it</text>"##,
+<text x="16" y="44" font-size="13">{range}; below each: its share of P-waves' limit</text>
+<text x="16" y="62" font-size="13">Heavy line: between shares above and below 0.8. Darker: larger.</text>"##,
             escape(self.title)
         );
         let at = |column: usize, line: usize| {
-            (LEFT + CELL.0 * column as f64, bottom - CELL.1 * (line + 1) as f64)
+            (LEFT + across * column as f64, bottom - CELL.1 * (line + 1) as f64)
         };
         for column in 0..columns {
             for line in 0..lines {
                 let index = column * lines + line;
                 let (x, y) = at(column, line);
                 let (colour, ink, first, second) = match self.values[index] {
-                    None => ("#fff", "#111", "-".to_owned(), String::new()),
+                    None => ("#ffffff", "#111", "-".to_owned(), String::new()),
                     Some(value) => {
                         let share = if high > low { (value - low) / (high - low) } else { 1.0 };
                         let last = COLOURS.len() - 1;
@@ -68,14 +72,15 @@ impl Map<'_> {
                         (COLOURS[step], ink, format!("{value:.3}"), format!("{analytic:.2}"))
                     }
                 };
-                let middle = x + CELL.0 / 2.0;
+                let middle = x + across / 2.0;
                 let _ = writeln!(
                     text,
-                    r##"<g class="cell"><rect x="{x}" y="{y}" width="{}" height="{}" fill="{colour}" stroke="#fff"/><text x="{middle}" y="{}" text-anchor="middle" font-size="13" fill="{ink}">{first}</text><text x="{middle}" y="{}" text-anchor="middle" font-size="10" fill="{ink}">{second}</text></g>"##,
-                    CELL.0,
+                    r##"<g class="cell" data-name="{}" data-colour="{colour}"><rect x="{x}" y="{y}" width="{}" height="{}" fill="{colour}" stroke="#fff"/><text x="{middle}" y="{}" text-anchor="middle" font-size="13" fill="{ink}">{first}</text><text x="{middle}" y="{}" text-anchor="middle" font-size="13" fill="{ink}">{second}</text></g>"##,
+                    escape(&format!("{}, {}", self.x.1[column], self.y.1[line])),
+                    across,
                     CELL.1,
-                    y + 16.0,
-                    y + 29.0
+                    y + 17.0,
+                    y + 33.0
                 );
             }
         }
@@ -84,9 +89,9 @@ impl Map<'_> {
             let (x, _) = at(column, 0);
             let _ = writeln!(
                 text,
-                r##"<text x="{}" y="{}" text-anchor="middle" font-size="12">{}</text>"##,
-                x + CELL.0 / 2.0,
-                bottom + 17.0,
+                r##"<text x="{}" y="{}" text-anchor="middle" font-size="13">{}</text>"##,
+                x + across / 2.0,
+                bottom + 19.0,
                 escape(value)
             );
         }
@@ -94,7 +99,7 @@ impl Map<'_> {
             let (_, y) = at(0, line);
             let _ = writeln!(
                 text,
-                r##"<text x="{}" y="{}" text-anchor="end" font-size="12">{}</text>"##,
+                r##"<text x="{}" y="{}" text-anchor="end" font-size="13">{}</text>"##,
                 LEFT - 6.0,
                 y + CELL.1 / 2.0 + 4.0,
                 escape(value)
@@ -105,17 +110,23 @@ impl Map<'_> {
             r##"<text x="{}" y="{}" text-anchor="middle">{}</text>
 <text transform="translate(16 {}) rotate(-90)" text-anchor="middle">{}</text>
 </svg>"##,
-            LEFT + CELL.0 * columns as f64 / 2.0,
-            bottom + 42.0,
+            LEFT + across * columns as f64 / 2.0,
+            bottom + 44.0,
             escape(self.x.0),
-            (TOP + bottom) / 2.0,
+            (MAP + bottom) / 2.0,
             escape(self.y.0)
         );
         text
     }
 
+    /// The width of a cell: the picture has at least the width of the others.
+    fn across(&self) -> f64 {
+        ((480.0 - LEFT - 16.0) / self.x.1.len() as f64).max(CELL.0)
+    }
+
     /// The line between cells whose limit is above, and those whose limit is below, 0.8 of P-waves'.
     fn divide(&self, text: &mut String, at: impl Fn(usize, usize) -> (f64, f64)) {
+        let across = self.across();
         let (columns, lines) = (self.x.1.len(), self.y.1.len());
         let above = |column: usize, line: usize| {
             let index = column * lines + line;
@@ -127,10 +138,10 @@ impl Map<'_> {
             for line in 0..lines {
                 let (x, y) = at(column, line);
                 if column + 1 < columns && differ(above(column, line), above(column + 1, line)) {
-                    let _ = write!(path, "M{} {y}v{}", x + CELL.0, CELL.1);
+                    let _ = write!(path, "M{} {y}v{}", x + across, CELL.1);
                 }
                 if line + 1 < lines && differ(above(column, line), above(column, line + 1)) {
-                    let _ = write!(path, "M{x} {y}h{}", CELL.0);
+                    let _ = write!(path, "M{x} {y}h{}", across);
                 }
             }
         }
@@ -197,7 +208,7 @@ impl Limits<'_> {
         for (place, value) in self.values.iter().enumerate() {
             let _ = writeln!(
                 text,
-                r##"<text x="{:.1}" y="{}" text-anchor="middle" font-size="12">{}</text>"##,
+                r##"<text x="{:.1}" y="{}" text-anchor="middle" font-size="13">{}</text>"##,
                 x(place),
                 bottom + 18.0,
                 escape(value)

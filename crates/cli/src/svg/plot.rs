@@ -13,7 +13,7 @@ pub(super) const BOTTOM: f64 = 370.0;
 pub(super) const LEGEND: f64 = 432.0;
 pub(super) const LINE: f64 = 22.0;
 /// Colours that the colour-blind can tell apart (Okabe and Ito), and the dashes that go with them.
-pub(super) const STYLES: [(&str, &str); 6] = [
+const STYLES: [(&str, &str); 6] = [
     ("#0072b2", ""),
     ("#d55e00", "7 3"),
     ("#009e73", "2 3"),
@@ -21,6 +21,13 @@ pub(super) const STYLES: [(&str, &str); 6] = [
     ("#000000", "4 2"),
     ("#8a6d00", "1 2"),
 ];
+/// The colour and the dashes of curve `index`. Shapes of markers repeat after as many as there are colours, then with another
+/// colour.
+pub(super) fn style(index: usize) -> (&'static str, &'static str) {
+    let count = STYLES.len();
+    (STYLES[(index + index / count) % count].0, STYLES[index % count].1)
+}
+
 /// Errors within this factor of the round-off floor are near it.
 const NEAR: f64 = 100.0;
 
@@ -154,7 +161,7 @@ impl Plot<'_> {
         }
         frame(&mut text, self.x, self.y);
         for (index, label) in labels.iter().enumerate() {
-            let (colour, dash) = STYLES[index % STYLES.len()];
+            let (colour, dash) = style(index);
             let line = LEGEND + LINE * index as f64;
             let _ = writeln!(
                 text,
@@ -246,7 +253,7 @@ fn draw(text: &mut String, index: usize, curve: &Curve, x: &Axis, y: &Axis) {
     if curve.points.is_empty() {
         return;
     }
-    let (colour, dash) = STYLES[index % STYLES.len()];
+    let (colour, dash) = style(index);
     let places: Vec<_> =
         curve.points.iter().map(|p| format!("{:.1},{:.1}", x.at(p.0), y.at(p.1))).collect();
     let _ = writeln!(
@@ -263,7 +270,7 @@ fn draw(text: &mut String, index: usize, curve: &Curve, x: &Axis, y: &Axis) {
 
 /// A marker of its own shape and fill for each curve, so that the picture can be printed in black.
 pub(super) fn marker(text: &mut String, index: usize, x: f64, y: f64) {
-    let (colour, _) = STYLES[index % STYLES.len()];
+    let (colour, _) = style(index);
     let (path, filled) = match index % STYLES.len() {
         0 => (format!("M{:.1} {y:.1}a5 5 0 1 0 10 0a5 5 0 1 0 -10 0z", x - 5.0), true),
         1 => (format!("M{:.1} {:.1}h9v9h-9z", x - 4.5, y - 4.5), false),
@@ -322,11 +329,11 @@ mod tests {
 
     #[test]
     fn every_curve_has_a_marker_of_its_own() {
-        let markers: Vec<_> = (0..STYLES.len())
+        let markers: Vec<_> = (0..STYLES.len() * STYLES.len())
             .map(|index| {
                 let mut text = String::new();
                 marker(&mut text, index, 0.0, 0.0);
-                text.split("fill").next().map(str::to_owned)
+                text
             })
             .collect();
         for (index, one) in markers.iter().enumerate() {

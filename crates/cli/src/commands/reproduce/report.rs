@@ -9,6 +9,7 @@ use mmsmith_verify::{Row, Sweep};
 use sha2::{Digest, Sha256};
 
 use super::claims::{Claim, difference_orders, told_orders};
+use super::section::Section;
 use super::{
     CELLS, DIFFERENCES, Differences, GENTLE, GENTLE_GRID, GRID, PROBLEMS, Results, SMALL_STEP,
     SMALL_STEP_CELLS, SPACE, TIME, compare, difference_plot, difference_tables, name, pictures,
@@ -26,6 +27,7 @@ pub(super) fn html(
     results: &[Results],
     gentle: &[Differences],
     claims: &[Claim],
+    sections: &[Section],
 ) -> Result<String> {
     let confirmed = claims.iter().filter(|claim| claim.confirmed).count();
     let mut page = format!(
@@ -44,11 +46,17 @@ pub(super) fn html(
     for one in results {
         let _ = writeln!(page, "<li><a href=\"#{0}\">{0}</a></li>", one.problem);
     }
+    for section in sections {
+        let _ = writeln!(page, "<li><a href=\"#{}\">{}</a></li>", section.id, section.title);
+    }
     page += "<li><a href=\"#setting\">How it was measured</a></li>\n</ul>\n</nav>\n<main>\n";
     page += &claims_section(claims);
     page += &sum_section(results, gentle);
     for one in results {
         page += &problem_section(out, one)?;
+    }
+    for section in sections {
+        page += &section.html();
     }
     page += &setting_section()?;
     page += "</main>\n</body>\n</html>\n";
@@ -228,7 +236,7 @@ fn does_not_converge(results: &Results) -> bool {
     }
 }
 
-fn figure(svg: &str, caption: &str) -> String {
+pub(super) fn figure(svg: &str, caption: &str) -> String {
     format!("<figure>\n{svg}<figcaption>{}</figcaption>\n</figure>\n", escape(caption))
 }
 

@@ -8,7 +8,7 @@ use crate::table::Table;
 
 impl Report<'_> {
     /// The page, in Markdown.
-    pub(super) fn advice(&self) -> String {
+    pub(in crate::commands) fn advice(&self) -> String {
         let mut text = format!(
             "# {}: which scheme for which need\n\nMade by `mms tradeoff {} --budget {}s --advice FILE.md` on {} ({} core(s)). \
              {}.\n\n## What accuracy costs\n\nSeconds of stepping on {} thread(s) to each error, by the cheapest setting of \
@@ -34,7 +34,7 @@ impl Report<'_> {
     }
 
     /// The time to each tolerance for each kind of scheme.
-    fn costs(&self) -> Table {
+    pub(in crate::commands) fn costs(&self) -> Table {
         let header = TOLERANCES.iter().map(|tolerance| format!("{tolerance:e}"));
         let mut table = Table::new(1, std::iter::once("scheme".to_owned()).chain(header));
         for kind in self.kinds() {
@@ -68,7 +68,8 @@ impl Report<'_> {
         kinds
     }
 
-    fn sentences(&self) -> Vec<String> {
+    /// The advice, a sentence each; commands stand between backquotes.
+    pub(in crate::commands) fn sentences(&self) -> Vec<String> {
         let mut lines = Vec::new();
         let entries = &self.found.entries;
         for named in &self.found.tolerances {

@@ -1,0 +1,46 @@
+//! The largest stable time step over amplitude and Poisson's ratio, as `mms stability` finds it.
+
+use std::path::Path;
+
+use anyhow::Result;
+
+use super::PROBLEMS;
+use super::section::Section;
+use crate::arguments::StabilityOptions;
+use crate::commands::stability::survey;
+use crate::json::Output;
+
+/// A small grid: the limit depends little on it.
+const CELLS: usize = 16;
+const OVER: [&str; 2] = ["amplitude=1e-6,0.03,0.1,0.2", "nu=0,0.3,0.4,0.45"];
+
+/// Finds the limits of gimp+cd and writes them into the folder of the first problem.
+pub(super) fn section(out: &Path) -> Result<Section> {
+    let problem = PROBLEMS[0];
+    let folder = out.join(problem);
+    let file = |name: &str| Output::prepare(&folder.join(name));
+    let (json, csv, plot) =
+        (file("stability.json")?, file("stability.csv")?, file("stability.svg")?);
+    let options = StabilityOptions::map(problem, CELLS, OVER);
+    let found = survey(&options)?;
+    json.write(&found.document()?)?;
+    csv.write_text(&found.sheet())?;
+    let svg = found.picture();
+    plot.write_text(&svg)?;
+    let said = format!(
+        "The largest stable CFL number of gimp+cd on {problem} with {CELLS} cells, over the amplitude and Poisson's ratio. \
+         Linear analysis allows the step in which P-waves cross one cell. As long as particles stay where they are, the limit \
+         is about 0.8 of that; where they move through a share of a cell it is higher, and next to inversion stretched \
+         cells lower it. Numbers are CFL numbers on bar waves."
+    );
+    let mut section = Section::new("stability", "Stability", &said);
+    section.figures(&[(
+        svg,
+        format!("{problem}/stability.svg"),
+        format!("Each limit and its share of the CFL number of P-waves. {}", found.definition()),
+    )]);
+    section.table(&found.table(), &format!("{problem}: largest stable CFL numbers"));
+    section.lines(&found.notes());
+    section.files(problem, "stability", &["json", "csv", "svg"]);
+    Ok(section)
+}

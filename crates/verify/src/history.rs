@@ -1,0 +1,222 @@
+//! Sums over particles as they go with time: errors of `u`, energies and momentum, of a run and of the exact motion.
+//!
+//! The body force of a manufactured solution does work, so that the energy of the exact motion is not constant. What a scheme
+//! gains or loses is the difference between the two.
+
+use mmsmith_mpm::{Material, Particles};
+use mmsmith_solutions::{Real, Solution};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::norms::PerNorm;
+
+/// Particles in a group that one thread works on; fixed, so that sums do not depend on the number of threads.
+const GROUP: usize = 512;
+/// The most moments that a history has.
+pub const MOST_MOMENTS: u64 = 1000;
+
+/// One step of a run's history.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Moment {
+    /// The step; 0 is the start.
+    pub step: u64,
+    /// The time of positions and deformation gradients.
+    pub time: f64,
+    /// The time of velocities, which centred differences store half a step earlier.
+    pub velocity_time: f64,
+    /// The error of `u` at this step, a length.
+    pub u: PerNorm<f64>,
+    /// The solver's sums.
+    pub computed: Sums,
+    /// The same of the exact solution, at the same particles and times.
+    pub exact: Sums,
+}
+
+/// Sums over all particles, per unit of what the dimension leaves out: of length in a plane, of area on a line.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Sums {
+    /// `sum m_p |v_p|^2 / 2`.
+    pub kinetic_energy: f64,
+    /// `sum V0_p W(F_p)`; not a number where a particle is inside out.
+    pub strain_energy: f64,
+    /// `sum m_p v_p`, by axis.
+    pub momentum: Vec<f64>,
+}
+
+impl Sums {
+    /// Kinetic and strain energy.
+    pub fn energy(&self) -> f64 {
+        self.kinetic_energy + self.strain_energy
+    }
+}
+
+/// The energy that a run has gained against the exact motion at each moment, in units of the largest energy that the exact
+/// motion has at any of them: time and gain. Where nothing moves the gain is zero.
+pub fn energy_drift(history: &[Moment]) -> Vec<(f64, f64)> {
+    let largest = history.iter().fold(0.0_f64, |most, moment| most.max(moment.exact.energy()));
+    let drift = |moment: &Moment| match moment.computed.energy() - moment.exact.energy() {
+        0.0 => 0.0,
+        gain => gain / largest,
+    };
+    history.iter().map(|moment| (moment.time, drift(moment))).collect()
+}
+
+/// Sums over all particles at one instant, of the computed state and of the exact one.
+pub(crate) struct Totals<const D: usize> {
+    pub(crate) error: f64,
+    /// The particle of largest error.
+    pub(crate) worst: usize,
+    pub(crate) computed: Motion<D>,
+    pub(crate) exact: Motion<D>,
+    /// The sum of the magnitudes of the exact momenta.
+    pub(crate) exact_momenta: f64,
+}
+
+/// What a motion has.
+#[derive(Clone, Copy)]
+pub(crate) struct Motion<const D: usize> {
+    kinetic: f64,
+    strain: f64,
+    pub(crate) momentum: [f64; D],
+}
+
+impl<const D: usize> Motion<D> {
+    const NONE: Self = Self { kinetic: 0.0, strain: 0.0, momentum: [0.0; D] };
+
+    pub(crate) fn energy(&self) -> f64 {
+        self.kinetic + self.strain
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.kinetic += other.kinetic;
+        self.strain += other.strain;
+        for axis in 0..D {
+            self.momentum[axis] += other.momentum[axis];
+        }
+    }
+}
+
+impl<const D: usize> From<Motion<D>> for Sums {
+    fn from(motion: Motion<D>) -> Self {
+        let Motion { kinetic, strain, momentum } = motion;
+        let momentum = momentum.to_vec();
+        Self { kinetic_energy: kinetic, strain_energy: strain, momentum }
+    }
+}
+
+impl<const D: usize> Totals<D> {
+    /// Those of no particles, the first of which is to be `worst`.
+    fn of_none(worst: usize) -> Self {
+        let (computed, exact) = (Motion::NONE, Motion::NONE);
+        Self { error: 0.0, worst, computed, exact, exact_momenta: 0.0 }
+    }
+
+    /// Those of all particles at `time`, with velocities of `velocity_time`.
+    pub(crate) fn of<T: Real>(
+        particles: &Particles<T, D>,
+        material: &Material<f64>,
+        exact: &dyn Solution<f64, D>,
+        time: f64,
+        velocity_time: f64,
+    ) -> Self {
+        let group = |g: usize| {
+            let mut totals = Self::of_none(g * GROUP);
+            for p in g * GROUP..particles.len().min((g + 1) * GROUP) {
+                let X = particles.X[p].map(Real::to_f64);
+                let (mass, volume) = (particles.mass[p].to_f64(), particles.volume[p].to_f64());
+                let u = particles.x[p].map(Real::to_f64) - X;
+                let error = (u - exact.displacement(&X, time)).norm();
+                if error > totals.error || error.is_nan() {
+                    (totals.error, totals.worst) = (error, p);
+                }
+                let v = particles.v[p].map(Real::to_f64);
+                let exact_v = exact.velocity(&X, velocity_time);
+                let F = particles.F[p].map(Real::to_f64);
+                let exact_F = exact.deformation_gradient(&X, time);
+                for (motion, v, F) in
+                    [(&mut totals.computed, v, F), (&mut totals.exact, exact_v, exact_F)]
+                {
+                    // A particle that is inside out has no energy; the solver stops at its next step.
+                    let strain = volume * material.strain_energy(&F).unwrap_or(f64::NAN);
+                    let kinetic = 0.5 * mass * v.norm_squared();
+                    let momentum = std::array::from_fn(|axis| mass * v[axis]);
+                    motion.add(&Motion { kinetic, strain, momentum });
+                }
+                totals.exact_momenta += mass * exact_v.norm();
+            }
+            totals
+        };
+        let groups: Vec<_> =
+            (0..particles.len().div_ceil(GROUP)).into_par_iter().map(group).collect();
+        let mut total = Self::of_none(0);
+        for next in groups {
+            if next.error > total.error || next.error.is_nan() {
+                (total.error, total.worst) = (next.error, next.worst);
+            }
+            total.computed.add(&next.computed);
+            total.exact.add(&next.exact);
+            total.exact_momenta += next.exact_momenta;
+        }
+        total
+    }
+}
+
+/// Takes down the history of one run.
+pub(crate) struct Recorder<'a, const D: usize> {
+    moments: &'a mut Vec<Moment>,
+    exact: &'a dyn Solution<f64, D>,
+    material: Material<f64>,
+    count: u64,
+    steps: u64,
+}
+
+impl<'a, const D: usize> Recorder<'a, D> {
+    pub(crate) fn new(
+        moments: &'a mut Vec<Moment>,
+        exact: &'a dyn Solution<f64, D>,
+        material: Material<f64>,
+        steps: u64,
+    ) -> Self {
+        moments.clear();
+        let count = MOST_MOMENTS.min(steps + 1);
+        Self { moments, exact, material, count, steps }
+    }
+
+    /// Takes the state after `step` down if its turn has come, or if it is the `last` one. `times` are those of positions and
+    /// of velocities.
+    pub(crate) fn take<T: Real>(
+        &mut self,
+        particles: &Particles<T, D>,
+        (step, is_last): (u64, bool),
+        (time, velocity_time): (f64, f64),
+        u: PerNorm<f64>,
+    ) {
+        let next = crate::frames::step_of_frame(self.moments.len() as u64, self.count, self.steps);
+        if step < next && !is_last {
+            return;
+        }
+        let totals = Totals::of(particles, &self.material, self.exact, time, velocity_time);
+        let (computed, exact) = (totals.computed.into(), totals.exact.into());
+        self.moments.push(Moment { step, time, velocity_time, u, computed, exact });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn moment(time: f64, computed: f64, exact: f64) -> Moment {
+        let sums =
+            |kinetic_energy: f64| Sums { kinetic_energy, strain_energy: 0.0, momentum: vec![0.0] };
+        let (computed, exact) = (sums(computed), sums(exact));
+        Moment { step: 0, time, velocity_time: time, u: PerNorm::default(), computed, exact }
+    }
+
+    #[test]
+    fn drift_is_in_units_of_the_largest_exact_energy() {
+        let history = [moment(0.0, 2.0, 2.0), moment(1.0, 5.0, 4.0), moment(2.0, 0.0, 1.0)];
+        assert_eq!(energy_drift(&history), [(0.0, 0.0), (1.0, 0.25), (2.0, -0.25)]);
+        assert_eq!(energy_drift(&[moment(0.0, 0.0, 0.0)]), [(0.0, 0.0)]);
+        assert!(energy_drift(&[moment(0.0, f64::NAN, 1.0)])[0].1.is_nan());
+    }
+}
