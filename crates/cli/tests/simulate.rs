@@ -351,9 +351,10 @@ fn bad_input_is_met_with_what_would_be_right() {
     refuses(place, &format!("{total} --precision f32"), &["f32", "f64"]);
     refuses(place, &format!("{total} --ppc 1"), &["singular", "use more"]);
     refuses(place, &format!("{total} --cells 1"), &["at least 2"]);
-    refuses(place, "run ring --frame total --shape bspline3", &["cartesian", "polar"]);
-    let full = "run ring --frame total --shape bspline3 --grid polar --extent full";
-    refuses(place, full, &["full", "quarter"]);
+    let square = "run ring --frame total --shape bspline3 --grid cartesian";
+    refuses(place, square, &["cartesian", "polar"]);
+    let shell = "run sphere-shell --frame total --shape bspline3";
+    refuses(place, shell, &["spherical shells", "mms check"]);
     refuses(place, "converge ring --cells 8,16 --cfls 0.1,0.2", &["--cfls", "one grid"]);
     refuses(place, "converge ring --cells 8,x", &["--cells"]);
 }

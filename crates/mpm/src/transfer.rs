@@ -379,8 +379,7 @@ pub(crate) fn gather_runs<T, V, const D: usize, const W: usize>(
                     let (S, G) = (weights_k.S(0, i), weights_k.G(0, i));
                     for q in 0..USED {
                         let value = values[index][i][q];
-                        row_level[q] =
-                            if i == 0 { value * S } else { value.mul_add(S, row_level[q]) };
+                        row_level[q] = if i == 0 { value * S } else { row_level[q] + value * S };
                         row_slope[q] =
                             if i == 0 { value * G } else { value.mul_add(G, row_slope[q]) };
                     }
