@@ -268,24 +268,30 @@ fn allocate<T: RealField + Copy, const D: usize>(
 ) -> Result<State<T, D>, SetupError> {
     let usf = settings.integrator == Integrator::Usf;
     let musl = settings.integrator == Integrator::Musl;
-    let reprojected_bytes = if musl { size_of::<Node<T, D>>() } else { 0 };
-    let bytes_per_node = size_of::<Node<T, D>>() + Bands::BYTES_PER_NODE + reprojected_bytes;
+    let ahead = !usf && !musl;
+    let grids = if musl || ahead { 2 } else { 1 };
+    let bytes_per_node = grids * size_of::<Node<T, D>>() + Bands::BYTES_PER_NODE;
     let layout = Layout::new(grid, bytes_per_node)?;
     // Asking first turns a grid that is too large into an error instead of an abort.
-    let mut nodes = Vec::new();
-    nodes.try_reserve_exact(layout.nodes).map_err(|_| SetupError::GridTooLarge {
-        cells: grid.cells.to_vec(),
-        bytes: layout.nodes as u128 * bytes_per_node as u128,
-    })?;
-    nodes.resize(layout.nodes, Node::zero());
+    let nodes = |is_needed: bool| {
+        let mut nodes = Vec::new();
+        let count = if is_needed { layout.nodes } else { 0 };
+        nodes.try_reserve_exact(count).map_err(|_| SetupError::GridTooLarge {
+            cells: grid.cells.to_vec(),
+            bytes: layout.nodes as u128 * bytes_per_node as u128,
+        })?;
+        nodes.resize(count, Node::zero());
+        Ok::<_, SetupError>(nodes)
+    };
+    let (now, reprojected, next) = (nodes(true)?, nodes(musl)?, nodes(ahead)?);
     let bands = Bands::new(&layout, particles.len());
     let least = particles.mass.iter().fold(particles.mass[0], |least, &m| least.min(m));
     Ok(State {
         constants: Constants::new(grid, &layout, &bands, settings.time_step, least),
-        nodes,
+        nodes: now,
         F_next: if usf { vec![SMatrix::identity(); particles.len()] } else { Vec::new() },
-        reprojected: vec![Node::zero(); if musl { layout.nodes } else { 0 }],
-        next: Vec::new(),
+        reprojected,
+        next,
         is_ahead: false,
         particles,
         layout,

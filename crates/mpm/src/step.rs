@@ -225,7 +225,7 @@ pub(crate) struct State<T, const D: usize> {
     pub(crate) F_next: Vec<SMatrix<T, D, D>>,
     /// MUSL: velocities projected from the updated particles, one per node.
     pub(crate) reprojected: Vec<Node<T, D>>,
-    /// USL: the grid of the step to come while particles add to it; empty before the first step.
+    /// USL: the grid of the step to come while particles add to it.
     pub(crate) next: Vec<Node<T, D>>,
     /// USL: whether the particles have given to `nodes` what the step to come needs.
     pub(crate) is_ahead: bool,

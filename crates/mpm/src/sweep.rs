@@ -64,7 +64,6 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         L: Law<T>,
     {
         let Self { particles, constants: c, layout, bands, nodes, next, .. } = self;
-        next.resize(nodes.len(), Node::zero());
         let Particles { X, x, v, F, mass, volume, .. } = particles;
         let forcing = Forcing::new(body_force, X, t_next, c);
         let step = Sweep { c, rule, law, nodes, mass, volume, forcing };
