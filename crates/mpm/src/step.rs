@@ -107,6 +107,25 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
         well & (edge >= real(first)) & (edge < real(end))
     }
 
+    /// What comes to light at a particle that may not be [well](Self::is_well).
+    pub(crate) fn judge<R, const W: usize>(
+        &self,
+        rule: R,
+        home: u32,
+        x: &SVector<T, D>,
+        F: &SMatrix<T, D, D>,
+        particle: usize,
+    ) -> Outcome
+    where
+        R: Rule<T, D, W>,
+    {
+        if self.is_well(rule, home, x, F) {
+            return Outcome::default();
+        }
+        let failure = trouble(&rule, self, x, F).map(|trouble| (trouble, particle));
+        Outcome { failure, resort: failure.is_none() }
+    }
+
     /// Adds to the piece of the grid that starts at node `first` what `level(block, ids, deposits)` and then
     /// `slope(block, ids, deposits)` state for each block of particles.
     #[expect(clippy::too_many_arguments, reason = "the arrays of a band's particles")]
@@ -195,7 +214,7 @@ pub(crate) struct Outcome {
     /// The worst trouble, and the first particle that is in it.
     pub(crate) failure: Option<(Trouble, usize)>,
     /// Whether a particle no longer fits its band.
-    pub(crate) resort: bool,
+    resort: bool,
 }
 
 impl Outcome {
@@ -411,10 +430,7 @@ where
                     continue;
                 }
                 for (k, ((x, F), &home)) in x.iter().zip(F).zip(home).enumerate() {
-                    if !c.is_well(rule, home, x, F) {
-                        let failure = trouble(&rule, &c, x, F).map(|trouble| (trouble, first + k));
-                        outcome = outcome.merge(Outcome { failure, resort: failure.is_none() });
-                    }
+                    outcome = outcome.merge(c.judge(rule, home, x, F, first + k));
                 }
             }
             outcome

@@ -16,7 +16,7 @@ use crate::material::Law;
 use crate::particles::Particles;
 use crate::partition::Share;
 use crate::simd::{Loop, dispatch};
-use crate::step::{Constants, Forcing, GiveSlope, Outcome, State, trouble};
+use crate::step::{Constants, Forcing, GiveSlope, Outcome, State};
 use crate::transfer::{Deposit, Gathered, Node};
 use crate::weights::Rule;
 
@@ -138,10 +138,7 @@ impl<T: RealField + Copy, R, L: Law<T>, const D: usize> Sweep<'_, T, R, L, D> {
             if !all_well {
                 for (k, &p) in ids.iter().enumerate() {
                     let (x, _, F) = elements.get(place + k);
-                    if !c.is_well(rule, band, x, F) {
-                        let failure = trouble(&rule, c, x, F).map(|trouble| (trouble, p as usize));
-                        outcome = outcome.merge(Outcome { failure, resort: failure.is_none() });
-                    }
+                    outcome = outcome.merge(c.judge(rule, band, x, F, p as usize));
                 }
             }
             // A particle that has left its band would give to nodes that are another's.

@@ -258,7 +258,7 @@ pub(crate) fn scatter_runs<T, V, const D: usize, const W: usize>(
         let start = first_node(&weights(k), strides);
         let mut sums = [[[T::zero(); LANES]; W]; W];
         for index in 0..rows {
-            let place = start - first + if D == 1 { 0 } else { index * strides[1] };
+            let place = row_start(start - first, strides, index);
             let Some(nodes) = piece.get(place..).and_then(|n| n.first_chunk::<W>()) else {
                 debug_assert!(false, "a stencil beyond its band");
                 return;
@@ -281,7 +281,7 @@ pub(crate) fn scatter_runs<T, V, const D: usize, const W: usize>(
             }
         }
         for index in 0..rows {
-            let place = start - first + if D == 1 { 0 } else { index * strides[1] };
+            let place = row_start(start - first, strides, index);
             let Some(nodes) = piece.get_mut(place..).and_then(|n| n.first_chunk_mut::<W>()) else {
                 return;
             };
@@ -292,39 +292,47 @@ pub(crate) fn scatter_runs<T, V, const D: usize, const W: usize>(
     }
 }
 
-/// Interpolates velocity and acceleration, and the velocity's gradient.
-///
-/// Products that make up a level are rounded before they are added, not fused: those of a node and of its mirror image then
-/// cancel, and a particle on a wall stays there.
+/// Where a row of nodes starts, in one and two dimensions.
 #[inline(always)]
-pub(crate) fn gather<T: RealField + Copy, const D: usize, const W: usize>(
-    weights: &impl Weights<T, D, W>,
-    strides: &[usize; D],
-    nodes: &[Node<T, D>],
-    gathered: &mut Gathered<T, D>,
-) {
-    // In one and two dimensions velocity and acceleration are half of a node's values.
-    let used = if D <= 2 { LANES / 2 } else { LANES };
-    let mut level = [T::zero(); LANES];
-    let mut slope = [[T::zero(); LANES]; D];
-    let start = first_node(weights, strides);
-    for index in 0..rows::<D, W>() {
-        let row = row(weights, start, strides, index);
-        let Some(nodes) = nodes.get(row.start..).and_then(|n| n.first_chunk::<W>()) else {
-            debug_assert!(false, "a stencil beyond the grid");
-            break;
-        };
-        let mut row_level = [T::zero(); LANES];
-        let mut row_slope = [T::zero(); LANES];
-        for (i, node) in nodes.iter().enumerate() {
+fn row_start<const D: usize>(start: usize, strides: &[usize; D], index: usize) -> usize {
+    if D == 1 { start } else { start + index * strides[1] }
+}
+
+/// The first `N` values of nodes interpolated, and their gradients.
+struct Interpolated<T, const D: usize, const N: usize> {
+    level: [T; N],
+    slope: [[T; N]; D],
+}
+
+impl<T: RealField + Copy, const D: usize, const N: usize> Interpolated<T, D, N> {
+    #[inline(always)]
+    fn zero() -> Self {
+        Self { level: [T::zero(); N], slope: [[T::zero(); N]; D] }
+    }
+
+    /// Adds what a row of nodes contributes.
+    ///
+    /// Products that make up a level are rounded before they are added, not fused: those of a node and of its mirror image
+    /// then cancel, and a particle on a wall stays there.
+    #[inline(always)]
+    fn add_row<const W: usize>(
+        &mut self,
+        weights: &impl Weights<T, D, W>,
+        row: &Row<T, D>,
+        value: impl Fn(usize, usize) -> T,
+    ) {
+        let mut row_level = [T::zero(); N];
+        let mut row_slope = [T::zero(); N];
+        for i in 0..W {
             let (S, G) = (weights.S(0, i), weights.G(0, i));
-            for q in 0..used {
-                let value = node.values[q];
+            for q in 0..N {
+                let value = value(i, q);
                 row_level[q] = if i == 0 { value * S } else { row_level[q] + value * S };
                 row_slope[q] = if i == 0 { value * G } else { value.mul_add(G, row_slope[q]) };
             }
         }
-        for q in 0..used {
+        let Self { level, slope } = self;
+        for q in 0..N {
             level[q] += row_level[q] * row.S;
             slope[0][q] = row_slope[q].mul_add(row.S, slope[0][q]);
             for a in 1..D {
@@ -332,10 +340,35 @@ pub(crate) fn gather<T: RealField + Copy, const D: usize, const W: usize>(
             }
         }
     }
-    gathered.level.values[..used].copy_from_slice(&level[..used]);
-    for a in 0..D {
-        gathered.slope[a].values[..used].copy_from_slice(&slope[a][..used]);
+
+    #[inline(always)]
+    fn write_to(&self, gathered: &mut Gathered<T, D>) {
+        gathered.level.values[..N].copy_from_slice(&self.level);
+        for a in 0..D {
+            gathered.slope[a].values[..N].copy_from_slice(&self.slope[a]);
+        }
     }
+}
+
+/// Interpolates velocity and acceleration, and the velocity's gradient.
+#[inline(always)]
+pub(crate) fn gather<T: RealField + Copy, const D: usize, const W: usize>(
+    weights: &impl Weights<T, D, W>,
+    strides: &[usize; D],
+    nodes: &[Node<T, D>],
+    gathered: &mut Gathered<T, D>,
+) {
+    let mut sums = Interpolated::<T, D, LANES>::zero();
+    let start = first_node(weights, strides);
+    for index in 0..rows::<D, W>() {
+        let row = row(weights, start, strides, index);
+        let Some(nodes) = nodes.get(row.start..).and_then(|n| n.first_chunk::<W>()) else {
+            debug_assert!(false, "a stencil beyond the grid");
+            break;
+        };
+        sums.add_row(weights, &row, |i, q| nodes[i].values[q]);
+    }
+    sums.write_to(gathered);
 }
 
 /// As [`gather`] for several particles in one or two dimensions, particle `k` with the weights `weights(k)`: the nodes stay
@@ -359,7 +392,7 @@ pub(crate) fn gather_runs<T, V, const D: usize, const W: usize>(
         let start = first_node(&weights(k), strides);
         let mut values = [[[T::zero(); USED]; W]; W];
         for index in 0..rows {
-            let place = start + if D == 1 { 0 } else { index * strides[1] };
+            let place = row_start(start, strides, index);
             let Some(nodes) = nodes.get(place..).and_then(|n| n.first_chunk::<W>()) else {
                 debug_assert!(false, "a stencil beyond the grid");
                 return;
@@ -370,34 +403,12 @@ pub(crate) fn gather_runs<T, V, const D: usize, const W: usize>(
         }
         loop {
             let weights_k = weights(k);
-            let mut level = [T::zero(); USED];
-            let mut slope = [[T::zero(); USED]; D];
+            let mut sums = Interpolated::<T, D, USED>::zero();
             for index in 0..rows {
-                let mut row_level = [T::zero(); USED];
-                let mut row_slope = [T::zero(); USED];
-                for i in 0..W {
-                    let (S, G) = (weights_k.S(0, i), weights_k.G(0, i));
-                    for q in 0..USED {
-                        let value = values[index][i][q];
-                        row_level[q] = if i == 0 { value * S } else { row_level[q] + value * S };
-                        row_slope[q] =
-                            if i == 0 { value * G } else { value.mul_add(G, row_slope[q]) };
-                    }
-                }
                 let row = row(&weights_k, start, strides, index);
-                for q in 0..USED {
-                    level[q] += row_level[q] * row.S;
-                    slope[0][q] = row_slope[q].mul_add(row.S, slope[0][q]);
-                    for a in 1..D {
-                        slope[a][q] = row_level[q].mul_add(row.G[a], slope[a][q]);
-                    }
-                }
+                sums.add_row(&weights_k, &row, |i, q| values[index][i][q]);
             }
-            let of_k = &mut gathered[k];
-            of_k.level.values[..USED].copy_from_slice(&level);
-            for a in 0..D {
-                of_k.slope[a].values[..USED].copy_from_slice(&slope[a]);
-            }
+            sums.write_to(&mut gathered[k]);
             k += 1;
             if k >= gathered.len() || first_node(&weights(k), strides) != start {
                 break;

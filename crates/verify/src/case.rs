@@ -126,6 +126,13 @@ pub struct Outputs<'a> {
     pub until: Option<Instant>,
 }
 
+impl<'a> Outputs<'a> {
+    /// Nothing but what is called after every step.
+    pub fn new(progress: &'a mut dyn FnMut(Progress)) -> Self {
+        Self { progress, frames: None, checkpoints: None, history: None, until: None }
+    }
+}
+
 /// How a run ended.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Status {

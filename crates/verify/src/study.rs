@@ -87,13 +87,7 @@ pub fn converge(
             let share = (before + done.share * work[index]) / total;
             progress(Progress { case: index, share, ..done });
         };
-        let mut outputs = Outputs {
-            progress: &mut report,
-            frames: None,
-            checkpoints: None,
-            history: None,
-            until: None,
-        };
+        let mut outputs = Outputs::new(&mut report);
         rows.push(run(exact, arithmetic, case, &mut outputs).map_err(fail(index))?);
     }
     Ok(Study::new(rows, sweep))

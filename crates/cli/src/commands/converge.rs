@@ -177,13 +177,7 @@ fn study(
             let share = (before + progress.share * work[index]) / total;
             bar.show(&what, Progress { share, ..progress });
         };
-        let mut outputs = Outputs {
-            progress: &mut show,
-            frames: None,
-            checkpoints: None,
-            history: None,
-            until: None,
-        };
+        let mut outputs = Outputs::new(&mut show);
         let row = run(&model.exact, model.arithmetic(), &cases[index], &mut outputs);
         Ok(Record::from(&row.map_err(|cause| StudyError { index, cause })?))
     })?;

@@ -226,22 +226,12 @@ fn measure_problem(problem: &'static str, folder: &Path) -> Result<Results> {
     let base = case(&SchemeOptions::usual(Shape::Gimp, Integrator::Cd), GRID)?;
     let frames =
         FrameOutput { folder: folder.join("particles"), name: problem.to_owned(), count: FRAMES };
-    let mut outputs = Outputs {
-        progress: &mut |_| (),
-        frames: Some(&frames),
-        checkpoints: None,
-        history: None,
-        until: None,
-    };
+    let silent = &mut |_| ();
+    let mut outputs = Outputs { frames: Some(&frames), ..Outputs::new(silent) };
     simulate(&model.exact, model.arithmetic(), &base, &mut outputs)?;
     let base = Case { start: Start::Exact, ..base };
-    let mut outputs = Outputs {
-        progress: &mut |_| (),
-        frames: None,
-        checkpoints: None,
-        history: None,
-        until: None,
-    };
+    let silent = &mut |_| ();
+    let mut outputs = Outputs::new(silent);
     let exact_start = simulate(&model.exact, model.arithmetic(), &base, &mut outputs)?;
     pictures::write_contrast(&model, problem, folder)?;
     let results = Results { problem, space, time, small_step, differences, exact_start };

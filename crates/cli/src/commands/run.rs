@@ -49,12 +49,12 @@ pub(super) fn follow(options: &RunOptions, resume: bool) -> Result<bool> {
             let expected = model.announce(&[case]);
             let bar = Bar::expecting(expected.map(|seconds| seconds.iter().sum()));
             let what = format!("{} cells", options.cells);
+            let show = &mut |progress| bar.show(&what, progress);
             let mut outputs = Outputs {
-                progress: &mut |progress| bar.show(&what, progress),
                 frames: frames.as_ref(),
                 checkpoints: checkpoints.as_ref(),
                 history: moments.as_mut(),
-                until: None,
+                ..Outputs::new(show)
             };
             simulate(&model.exact, model.arithmetic(), &case, &mut outputs)?
         };

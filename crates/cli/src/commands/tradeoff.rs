@@ -102,13 +102,8 @@ impl Runner<'_> {
         let until = until(most_s);
         let compute = |_: usize| -> Result<Record> {
             let row = self.pool(setting)?.install(|| {
-                let mut outputs = Outputs {
-                    progress: &mut |_| (),
-                    frames: None,
-                    checkpoints: None,
-                    history: None,
-                    until,
-                };
+                let silent = &mut |_| ();
+                let mut outputs = Outputs { until, ..Outputs::new(silent) };
                 simulate(&self.exact.exact, self.arithmetic(setting), &setting.case, &mut outputs)
             })?;
             if matches!(row.status, Status::Cut { .. }) {

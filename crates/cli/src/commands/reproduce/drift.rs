@@ -76,13 +76,8 @@ pub(super) fn section(out: &Path) -> Result<Section> {
 
 fn run(model: &Model, case: &Case) -> Result<(Row, Vec<Moment>)> {
     let mut history = Vec::new();
-    let mut outputs = Outputs {
-        progress: &mut |_| (),
-        frames: None,
-        checkpoints: None,
-        history: Some(&mut history),
-        until: None,
-    };
+    let silent = &mut |_| ();
+    let mut outputs = Outputs { history: Some(&mut history), ..Outputs::new(silent) };
     let row = simulate(&model.exact, model.arithmetic(), case, &mut outputs)?;
     Ok((row, history))
 }

@@ -24,13 +24,8 @@ pub(super) fn write_contrast(model: &Model, problem: &str, folder: &Path) -> Res
     let base = case(&SchemeOptions::usual(Shape::Ugimp, Integrator::Cd), GRID)?;
     let case = Case { periods: MOMENT as f64 / (FRAMES - 1) as f64, ..base };
     let frames = FrameOutput { folder: folder.join(CONTRAST), name: problem.to_owned(), count: 2 };
-    let mut outputs = Outputs {
-        progress: &mut |_| (),
-        frames: Some(&frames),
-        checkpoints: None,
-        history: None,
-        until: None,
-    };
+    let silent = &mut |_| ();
+    let mut outputs = Outputs { frames: Some(&frames), ..Outputs::new(silent) };
     simulate(&model.exact, model.arithmetic(), &case, &mut outputs)?;
     Ok(())
 }
