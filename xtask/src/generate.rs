@@ -148,7 +148,6 @@ fn locate(library: &Path, given: &Path) -> anyhow::Result<PathBuf> {
     bail!("there is no specification {}, nor {}", given.display(), named.display())
 }
 
-/// The name of a specification's solution, and its text for each target.
 /// The code of one specification.
 struct Generated {
     name: String,

@@ -1,10 +1,12 @@
 //! Blocks of operations as Rust statements.
 
 use crate::plan::{Block, Operand, Stage};
-use mmsmith_expr::{Function, Operation, Rational, Slot, nearest_f64};
+use crate::text::{push_index, spell};
+use mmsmith_expr::{Function, Operation, Rational, nearest_f64};
 use num_traits::{One, Zero};
 use proc_macro2::{Ident, Literal, TokenStream};
 use quote::quote;
+use std::borrow::Cow;
 use std::cell::RefCell;
 
 /// Stands for the statements of a block, by its number, until the rest is formatted.
@@ -19,26 +21,28 @@ pub(crate) struct Translator<'a> {
     parameters: &'static str,
     names: Vec<Ident>,
     /// The blocks that placeholders stand for; `None` where tokens are wanted.
-    blocks: Option<&'a RefCell<Vec<Vec<String>>>>,
+    blocks: Option<&'a RefCell<Vec<String>>>,
 }
 
 impl<'a> Translator<'a> {
     pub(crate) fn new(
         parameters: &'static str,
         names: Vec<Ident>,
-        blocks: Option<&'a RefCell<Vec<Vec<String>>>>,
+        blocks: Option<&'a RefCell<Vec<String>>>,
     ) -> Self {
         Translator { parameters, names, blocks }
     }
 
     /// The statements of a block, and its outputs as expressions.
     pub(crate) fn statements(&self, block: &Block<'_>) -> (TokenStream, Vec<TokenStream>) {
-        let lines: Vec<String> = block
-            .steps()
-            .map(|(index, operation)| {
-                format!("let t{index} = {};", self.operation(block, operation))
-            })
-            .collect();
+        let mut lines = String::new();
+        for (index, operation) in block.steps() {
+            lines.push_str("let t");
+            push_index(&mut lines, index);
+            lines.push_str(" = ");
+            self.operation(&mut lines, block, operation);
+            lines.push_str(";\n");
+        }
         let statements = match self.blocks {
             _ if lines.is_empty() => TokenStream::new(),
             Some(blocks) => {
@@ -46,54 +50,73 @@ impl<'a> Translator<'a> {
                 blocks.push(lines);
                 tokens(&format!("{PLACEHOLDER}{};", blocks.len() - 1))
             }
-            None => tokens(&lines.concat()),
+            None => tokens(&lines),
         };
-        (statements, block.outputs().map(|operand| tokens(&self.operand(operand))).collect())
+        let output = |operand| {
+            let mut text = String::new();
+            self.operand(&mut text, operand);
+            tokens(&text)
+        };
+        (statements, block.outputs().map(output).collect())
     }
 
-    fn operand(&self, operand: Operand<'_>) -> String {
-        match operand {
-            Operand::Temporary(index) => format!("t{index}"),
-            Operand::Number(value) => number(value),
-            Operand::Pi => "T::pi()".into(),
-            Operand::Coordinate(index) => format!("X[{index}]"),
-            Operand::Time => "t".into(),
-            Operand::Parameter(index) => format!("{}.{}", self.parameters, self.names[index]),
-            Operand::Kept(Stage::Fixed, index) => format!("self.fixed[{index}]"),
-            Operand::Kept(Stage::Time, index) => format!("time[{index}]"),
-            Operand::Kept(Stage::Point, index) => format!("point[{index}]"),
-        }
+    fn operand(&self, text: &mut String, operand: Operand<'_>) {
+        let (name, index) = match operand {
+            Operand::Temporary(index) => {
+                text.push('t');
+                return push_index(text, index);
+            }
+            Operand::Number(value) => return text.push_str(&number(value)),
+            Operand::Pi => return text.push_str("T::pi()"),
+            Operand::Time => return text.push('t'),
+            Operand::Parameter(index) => {
+                return text.extend([self.parameters, ".", &self.names[index].to_string()]);
+            }
+            Operand::Coordinate(index) => ("X", index),
+            Operand::Kept(Stage::Fixed, index) => ("self.fixed", index),
+            Operand::Kept(Stage::Time, index) => ("time", index),
+            Operand::Kept(Stage::Point, index) => ("point", index),
+        };
+        text.extend([name, "["]);
+        push_index(text, index);
+        text.push(']');
     }
 
-    fn operation(&self, block: &Block<'_>, operation: &Operation) -> String {
-        let at = |slot: &Slot| self.operand(block.operand(*slot));
-        match operation {
-            // These are operands and no statements.
-            Operation::Number(value) => number(value),
-            Operation::Pi => "T::pi()".into(),
-            Operation::Input(_) => String::new(),
-            Operation::Add(a, b) => format!("{} + {}", at(a), at(b)),
-            Operation::Sub(a, b) => format!("{} - {}", at(a), at(b)),
-            Operation::Mul(a, b) => format!("{} * {}", at(a), at(b)),
-            Operation::Div(a, b) => format!("{} / {}", at(a), at(b)),
-            Operation::Neg(a) => format!("-{}", at(a)),
-            Operation::Sqrt(a) => format!("{}.sqrt()", at(a)),
-            Operation::SinPi(a) => format!("{}.sin_pi()", at(a)),
-            Operation::CosPi(a) => format!("{}.cos_pi()", at(a)),
-            Operation::Call(function, a) => format!("{}.{}()", at(a), rust_name(*function)),
-            Operation::Power(a, exponent) => format!("{}.powf({})", at(a), number(exponent)),
-            Operation::Atan2(y, x) => format!("{}.atan2({})", at(y), at(x)),
-            Operation::LnOfBoth(x, y) => format!("{}.ln_of_both({})", at(x), at(y)),
-            Operation::SumError(a, b) => format!("{}.sum_error({})", at(a), at(b)),
-            Operation::ProductError(a, b) => format!("{}.product_error({})", at(a), at(b)),
-        }
+    fn operation(&self, text: &mut String, block: &Block<'_>, operation: &Operation) {
+        spell(text, &template(operation), operation, |text, slot| {
+            self.operand(text, block.operand(slot));
+        });
     }
+}
+
+/// An operation in Rust, with `#` for each operand. Numbers and inputs are operands and no statements.
+fn template(operation: &Operation) -> Cow<'static, str> {
+    let fixed = match operation {
+        Operation::Number(value) => return number(value).into(),
+        Operation::Call(function, _) => return format!("#.{}()", rust_name(*function)).into(),
+        Operation::Power(_, exponent) => return format!("#.powf({})", number(exponent)).into(),
+        Operation::Pi => "T::pi()",
+        Operation::Input(_) => "",
+        Operation::Add(..) => "# + #",
+        Operation::Sub(..) => "# - #",
+        Operation::Mul(..) => "# * #",
+        Operation::Div(..) => "# / #",
+        Operation::Neg(_) => "-#",
+        Operation::Sqrt(_) => "#.sqrt()",
+        Operation::SinPi(_) => "#.sin_pi()",
+        Operation::CosPi(_) => "#.cos_pi()",
+        Operation::Atan2(..) => "#.atan2(#)",
+        Operation::LnOfBoth(..) => "#.ln_of_both(#)",
+        Operation::SumError(..) => "#.sum_error(#)",
+        Operation::ProductError(..) => "#.product_error(#)",
+    };
+    fixed.into()
 }
 
 /// `text` with the lines of `blocks` in the places of their placeholders, as far to the right as these.
 ///
 /// Text from a specification is always within a comment or a literal, so that no line of it starts as a placeholder.
-pub(crate) fn fill(text: &str, blocks: &[Vec<String>]) -> String {
+pub(crate) fn fill(text: &str, blocks: &[String]) -> String {
     let mut filled = String::new();
     for line in text.lines() {
         let statement = line.trim_start();
@@ -102,7 +125,7 @@ pub(crate) fn fill(text: &str, blocks: &[Vec<String>]) -> String {
         let margin = &line[..line.len() - statement.len()];
         match block {
             Some(lines) => {
-                for line in lines {
+                for line in lines.lines() {
                     filled.extend([margin, line, "\n"]);
                 }
             }

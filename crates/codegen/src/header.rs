@@ -3,9 +3,10 @@
 use crate::function::digits;
 use crate::module::Names;
 use crate::plan::{Block, Measures, Operand, Plan, Shape, Stage};
-use crate::text::{c_string, comment, meaning};
+use crate::text::{c_string, comment, meaning, push_index, spell};
 use mmsmith_expr::{Function, Operation, Slot, nearest_f64};
 use mmsmith_spec::{Boundary, Condition, Material, Parameter, Surface};
+use std::borrow::Cow;
 
 /// What every header needs: macros, and `sin(pi x)` as the crate of the solutions computes it.
 const SUPPORT: &str = include_str!("support.h");
@@ -674,61 +675,77 @@ before. Results equal those of the Rust functions bit for bit where the compiler
 
     /// Writes the statements of a block; returns its outputs as expressions.
     fn statements(&mut self, block: &Block<'_>, indent: &str, places: Places) -> Vec<String> {
+        let mut text = std::mem::take(&mut self.text);
         for (index, operation) in block.steps() {
-            let value = self.operation(block, operation, places);
-            self.line(&format!("{indent}const double t{index} = {value};"));
+            text.extend([indent, "const double t"]);
+            push_index(&mut text, index);
+            text.push_str(" = ");
+            spell(&mut text, &template(operation), operation, |text, slot| {
+                self.operand(text, block.operand(slot), places);
+            });
+            text.push_str(";\n");
         }
-        block.outputs().map(|operand| self.operand(operand, places)).collect()
+        self.text = text;
+        let output = |operand| {
+            let mut text = String::new();
+            self.operand(&mut text, operand, places);
+            text
+        };
+        block.outputs().map(output).collect()
     }
 
-    fn operand(&self, operand: Operand<'_>, places: Places) -> String {
-        match operand {
-            Operand::Temporary(index) => format!("t{index}"),
-            Operand::Number(value) => literal(nearest_f64(value)),
-            Operand::Pi => literal(std::f64::consts::PI),
-            Operand::Coordinate(index) => format!("X[{index}]"),
-            Operand::Time => "t".into(),
-            Operand::Parameter(index) => format!("{}{}", places.parameters, self.members[index]),
-            Operand::Kept(Stage::Fixed, index) => format!("s->fixed[{index}]"),
-            Operand::Kept(Stage::Time, index) => format!("{}values[{index}]", places.time),
+    fn operand(&self, text: &mut String, operand: Operand<'_>, places: Places) {
+        let (before, index, after) = match operand {
+            Operand::Number(value) => return text.push_str(&literal(nearest_f64(value))),
+            Operand::Pi => return text.push_str(&literal(std::f64::consts::PI)),
+            Operand::Time => return text.push('t'),
+            Operand::Parameter(index) => {
+                return text.extend([places.parameters, &self.members[index]]);
+            }
+            Operand::Temporary(index) => ("t", index, ""),
+            Operand::Coordinate(index) => ("X[", index, "]"),
+            Operand::Kept(Stage::Fixed, index) => ("s->fixed[", index, "]"),
+            Operand::Kept(Stage::Time, index) => {
+                text.push_str(places.time);
+                ("values[", index, "]")
+            }
             Operand::Kept(Stage::Point, index) => match (places.in_array, index) {
-                (true, _) => format!("point{index}[p]"),
-                (false, 0) => "point[0]".into(),
-                (false, 1) => "point[stride]".into(),
-                (false, _) => format!("point[{index} * stride]"),
+                (true, _) => ("point", index, "[p]"),
+                (false, 0) => return text.push_str("point[0]"),
+                (false, 1) => return text.push_str("point[stride]"),
+                (false, _) => ("point[", index, " * stride]"),
             },
-        }
+        };
+        text.push_str(before);
+        push_index(text, index);
+        text.push_str(after);
     }
+}
 
-    fn operation(&self, block: &Block<'_>, operation: &Operation, places: Places) -> String {
-        let at = |slot: &Slot| self.operand(block.operand(*slot), places);
-        match operation {
-            // These are operands and no statements.
-            Operation::Number(value) => literal(nearest_f64(value)),
-            Operation::Pi => literal(std::f64::consts::PI),
-            Operation::Input(_) => String::new(),
-            Operation::Add(a, b) => format!("{} + {}", at(a), at(b)),
-            Operation::Sub(a, b) => format!("{} - {}", at(a), at(b)),
-            Operation::Mul(a, b) => format!("{} * {}", at(a), at(b)),
-            Operation::Div(a, b) => format!("{} / {}", at(a), at(b)),
-            Operation::Neg(a) => format!("-{}", at(a)),
-            Operation::Sqrt(a) => format!("sqrt({})", at(a)),
-            Operation::SinPi(a) => format!("mmsmith_sin_pi({})", at(a)),
-            Operation::CosPi(a) => format!("mmsmith_cos_pi({})", at(a)),
-            Operation::Call(function, a) => format!("{}({})", c_name(*function), at(a)),
-            Operation::Power(a, exponent) => {
-                format!("pow({}, {})", at(a), literal(nearest_f64(exponent)))
-            }
-            Operation::Atan2(y, x) => format!("atan2({}, {})", at(y), at(x)),
-            Operation::LnOfBoth(x, y) => {
-                format!("mmsmith_ln_of_both({}, {})", at(x), at(y))
-            }
-            Operation::SumError(a, b) => format!("mmsmith_sum_error({}, {})", at(a), at(b)),
-            Operation::ProductError(a, b) => {
-                format!("mmsmith_product_error({}, {})", at(a), at(b))
-            }
+/// An operation in C, with `#` for each operand. Numbers and inputs are operands and no statements.
+fn template(operation: &Operation) -> Cow<'static, str> {
+    let fixed = match operation {
+        Operation::Number(value) => return literal(nearest_f64(value)).into(),
+        Operation::Pi => return literal(std::f64::consts::PI).into(),
+        Operation::Call(function, _) => return format!("{}(#)", c_name(*function)).into(),
+        Operation::Power(_, exponent) => {
+            return format!("pow(#, {})", literal(nearest_f64(exponent))).into();
         }
-    }
+        Operation::Input(_) => "",
+        Operation::Add(..) => "# + #",
+        Operation::Sub(..) => "# - #",
+        Operation::Mul(..) => "# * #",
+        Operation::Div(..) => "# / #",
+        Operation::Neg(_) => "-#",
+        Operation::Sqrt(_) => "sqrt(#)",
+        Operation::SinPi(_) => "mmsmith_sin_pi(#)",
+        Operation::CosPi(_) => "mmsmith_cos_pi(#)",
+        Operation::Atan2(..) => "atan2(#, #)",
+        Operation::LnOfBoth(..) => "mmsmith_ln_of_both(#, #)",
+        Operation::SumError(..) => "mmsmith_sum_error(#, #)",
+        Operation::ProductError(..) => "mmsmith_product_error(#, #)",
+    };
+    fixed.into()
 }
 
 /// How a function refers to what is not computed in it.

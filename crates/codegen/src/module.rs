@@ -67,7 +67,7 @@ impl Plan<'_> {
     fn items_with(
         &self,
         runtime: &TokenStream,
-        blocks: Option<&RefCell<Vec<Vec<String>>>>,
+        blocks: Option<&RefCell<Vec<String>>>,
     ) -> TokenStream {
         let names = self.spec.parameters.iter().map(|p| identifier(&p.name)).collect();
         let translator = Translator::new("self.parameters", names, blocks);
@@ -175,7 +175,7 @@ struct Generator<'a> {
     /// For functions of the solution itself.
     translator: Translator<'a>,
     /// As in [`Translator`].
-    blocks: Option<&'a RefCell<Vec<Vec<String>>>>,
+    blocks: Option<&'a RefCell<Vec<String>>>,
 }
 
 impl Generator<'_> {

@@ -1,4 +1,7 @@
-//! Text from specifications, made harmless.
+//! Text from specifications, made harmless, and pieces of code joined.
+
+use mmsmith_expr::{Operation, Slot};
+use std::fmt::Write;
 
 /// One line without control characters, for string literals.
 pub(crate) fn one_line(text: &str) -> String {
@@ -16,6 +19,30 @@ pub(crate) fn meaning(name: &str, description: &str, unit: &str, range: &str) ->
         text += &format!("; must be {}", one_line(range));
     }
     text
+}
+
+/// Writes `template` with an operand of the operation in the place of each `#`, in their order.
+pub(crate) fn spell(
+    text: &mut String,
+    template: &str,
+    operation: &Operation,
+    mut operand: impl FnMut(&mut String, Slot),
+) {
+    let mut operands = operation.operands();
+    for (index, piece) in template.split('#').enumerate() {
+        if index > 0
+            && let Some(slot) = operands.next()
+        {
+            operand(text, slot);
+        }
+        text.push_str(piece);
+    }
+}
+
+/// Writes an index in decimal digits.
+pub(crate) fn push_index(text: &mut String, index: usize) {
+    // Writing to a string does not fail.
+    let _ = write!(text, "{index}");
 }
 
 /// Of longer text, C's comments and messages show the beginning.

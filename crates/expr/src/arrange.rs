@@ -15,8 +15,10 @@
 //! and where the bound of its rounding errors, by running error analysis at sample points, is not clearly larger.
 
 use crate::graph::NumberMap;
+use crate::program::SIDE;
 use crate::{Dependence, Drafts, Expr, Graph, Node, Program, Rational};
 use num_traits::{One, Signed, ToPrimitive, Zero};
+use std::array;
 use std::collections::BTreeMap;
 
 /// Numerators with more terms than this are not worth the search.
@@ -379,10 +381,7 @@ impl Arranging<'_> {
         let numerator = self.nested(&fraction.numerator);
         let mut factors = vec![(numerator, Rational::one())];
         factors.extend(
-            fraction
-                .denominator
-                .iter()
-                .map(|(&base, &n)| (base, Rational::from_integer((-i64::from(n)).into()))),
+            fraction.denominator.iter().map(|(&base, &n)| (base, Rational::from(-i64::from(n)))),
         );
         self.graph.product(factors)
     }
@@ -460,20 +459,19 @@ pub(crate) fn as_accurate(before: &Program, after: &Program, inputs: usize) -> b
         let scale = if point == 2 * input + 1 { 1e-8 } else { 1.0 };
         scale * (0.05 + 0.9 * turns.fract())
     };
-    let places: Vec<Vec<f64>> = (0..64.max(2 * inputs))
-        .map(|point| (0..inputs).map(|input| sample(point, input)).collect())
-        .collect();
+    let points = 64.max(2 * inputs);
     let mut growth = Vec::new();
-    // As many side by side as keep a program's values in the cache.
-    let bounds = |program: &Program| -> Vec<Vec<f64>> {
-        places.chunks(8).flat_map(|places| program.error_bounds(places)).collect()
-    };
-    for (old, new) in bounds(before).iter().zip(bounds(after)) {
-        // Where the point is outside the domain of definition there is nothing to compare.
-        growth.extend(old.iter().zip(&new).filter(|(old, _)| old.is_finite()).map(|(old, new)| {
-            // Nothing is as large as nothing; what is not finite any more is infinitely worse.
-            if new <= old { 1.0 } else { (new / old).max(1.0) }
-        }));
+    for first in (0..points).step_by(SIDE) {
+        let places: Vec<[f64; SIDE]> =
+            (0..inputs).map(|input| array::from_fn(|k| sample(first + k, input))).collect();
+        for (old, new) in before.error_bounds(&places).iter().zip(after.error_bounds(&places)) {
+            // Where the point is outside the domain of definition there is nothing to compare.
+            let known = old.iter().zip(new).take(points - first).filter(|(old, _)| old.is_finite());
+            growth.extend(known.map(|(&old, new)| {
+                // Nothing is as large as nothing; what is not finite any more is infinitely worse.
+                if new <= old { 1.0 } else { (new / old).max(1.0) }
+            }));
+        }
     }
     growth.sort_by(f64::total_cmp);
     let usual = growth.get(growth.len() / 2).copied().unwrap_or(1.0);

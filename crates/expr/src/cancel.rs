@@ -180,9 +180,7 @@ impl Graph {
         let Some((monomial, coefficient)) = numerator.into_iter().next() else {
             return Some(Graph::ZERO);
         };
-        let power = |(atom, n): (Expr, u32), sign: i64| {
-            (atom, Rational::from_integer((sign * i64::from(n)).into()))
-        };
+        let power = |(atom, n): (Expr, u32), sign: i64| (atom, Rational::from(sign * i64::from(n)));
         let mut factors: Vec<_> = monomial.into_iter().map(|f| power(f, 1)).collect();
         factors.extend(denominator.into_iter().map(|f| power(f, -1)));
         factors.push((self.number(coefficient), Rational::one()));
@@ -246,9 +244,8 @@ impl Graph {
         let terms: Vec<(Rational, Expr)> = numerator
             .into_iter()
             .map(|(monomial, coefficient)| {
-                let factors = monomial
-                    .into_iter()
-                    .map(|(atom, n)| (atom, Rational::from_integer(i64::from(n).into())));
+                let factors =
+                    monomial.into_iter().map(|(atom, n)| (atom, Rational::from(i64::from(n))));
                 (coefficient, self.product(factors.collect::<Vec<_>>()))
             })
             .collect();

@@ -8,17 +8,20 @@ use crate::rational::exact_root;
 use crate::{Expr, Function, Graph, Node, Rational};
 use num_integer::Integer;
 use num_traits::{One, Signed, ToPrimitive, Zero};
+use smallvec::{SmallVec, smallvec};
 use std::collections::BTreeMap;
 
 /// Exact numbers beyond this size stay unevaluated powers.
 const LARGEST_NUMBER_BITS: u64 = 8192;
+
+/// Terms with their coefficients, or bases with their exponents. Most sums and products have few, for which nothing is allocated.
+type Numbered = SmallVec<[(Expr, Rational); 6]>;
 
 impl Graph {
     /// `sum of coefficient * term`.
     pub fn sum(&mut self, terms: impl IntoIterator<Item = (Rational, Expr)>) -> Expr {
         let mut constant = Rational::zero();
         let mut collected = Collected::default();
-        let terms: Vec<_> = terms.into_iter().collect();
         for (coefficient, term) in terms {
             self.add_term(&mut constant, &mut collected, &coefficient, term);
         }
@@ -63,7 +66,7 @@ impl Graph {
 
     /// `base ^ exponent` for an integer exponent.
     pub fn powi(&mut self, base: Expr, exponent: i64) -> Expr {
-        self.product([(base, Rational::from_integer(exponent.into()))])
+        self.product([(base, Rational::from(exponent))])
     }
 
     /// The square root.
@@ -78,14 +81,14 @@ impl Graph {
         coefficient: &Rational,
         term: Expr,
     ) {
-        let mut pending = vec![(coefficient.clone(), term)];
-        while let Some((coefficient, term)) = pending.pop() {
+        let mut pending: Numbered = smallvec![(term, coefficient.clone())];
+        while let Some((term, coefficient)) = pending.pop() {
             self.work += 1 + (crate::graph::bits(&coefficient) / 64) as usize;
             match self.node(term) {
                 Node::Number(value) => *constant += &coefficient * value,
                 Node::Sum { constant: inner, terms } => {
                     *constant += &coefficient * inner;
-                    pending.extend(terms.iter().rev().map(|(term, c)| (&coefficient * c, *term)));
+                    pending.extend(terms.iter().rev().map(|(term, c)| (*term, &coefficient * c)));
                 }
                 _ => {
                     collected.add(term, &coefficient);
@@ -150,7 +153,7 @@ impl Graph {
     }
 
     fn sum_of_collected(&mut self, constant: Rational, collected: Collected) -> Expr {
-        let mut terms: Vec<(Expr, Rational)> = collected.into_sorted();
+        let mut terms = collected.into_sorted();
         match (terms.len(), constant.is_zero()) {
             (0, _) => return self.number(constant),
             (1, true) => {
@@ -234,14 +237,13 @@ impl Graph {
     pub fn product(&mut self, factors: impl IntoIterator<Item = (Expr, Rational)>) -> Expr {
         let mut coefficient = Rational::one();
         let mut collected = Collected::default();
-        let mut pending: Vec<(Expr, Rational)> = factors.into_iter().collect();
+        let mut pending: Numbered = factors.into_iter().collect();
         while let Some((base, exponent)) = pending.pop() {
             self.work += 1;
             if exponent.is_zero() {
                 continue;
             }
-            if let Some(factors) = self.open_factor(base, &exponent, &mut coefficient) {
-                pending.extend(factors);
+            if self.open_factor(base, &exponent, &mut coefficient, &mut pending) {
                 continue;
             }
             let total = collected.add(base, &exponent);
@@ -284,32 +286,33 @@ impl Graph {
         }
     }
 
-    /// Takes `base ^ exponent` apart where that is exact; numbers go into `coefficient`.
+    /// Takes `base ^ exponent` apart where that is exact: its factors go to `pending`, numbers into `coefficient`.
     fn open_factor(
         &self,
         base: Expr,
         exponent: &Rational,
         coefficient: &mut Rational,
-    ) -> Option<Vec<(Expr, Rational)>> {
-        match self.node(base) {
-            Node::Number(value) => {
-                let power = rational_power(value, exponent)?;
-                *coefficient *= power;
-                Some(Vec::new())
-            }
+        pending: &mut Numbered,
+    ) -> bool {
+        let number = match self.node(base) {
+            Node::Number(value) => value,
             Node::Product(factors) => {
                 let simple = factors.len() == 1 && !factors[0].1.is_integer();
-                (exponent.is_integer() || simple)
-                    .then(|| factors.iter().map(|(b, e)| (*b, e * exponent)).collect())
+                let opens = exponent.is_integer() || simple;
+                if opens {
+                    pending.extend(factors.iter().map(|(b, e)| (*b, e * exponent)));
+                }
+                return opens;
             }
-            Node::Sum { constant, terms } if constant.is_zero() && terms.len() == 1 => {
-                let (term, scale) = &terms[0];
-                let power = rational_power(scale, exponent)?;
-                *coefficient *= power;
-                Some(vec![(*term, exponent.clone())])
-            }
-            _ => None,
+            Node::Sum { constant, terms } if constant.is_zero() && terms.len() == 1 => &terms[0].1,
+            _ => return false,
+        };
+        let Some(power) = rational_power(number, exponent) else { return false };
+        *coefficient *= power;
+        if let Node::Sum { terms, .. } = self.node(base) {
+            pending.push((terms[0].0, exponent.clone()));
         }
+        true
     }
 
     /// Whether any part of `expr` is zero to a negative power.
@@ -395,33 +398,13 @@ impl Graph {
     fn trigonometric_value(&mut self, function: Function, x: Expr) -> Option<Expr> {
         let pi = self.pi();
         let turns = self.div(x, pi);
-        let halves = self.as_number(turns)? * Rational::from_integer(2.into());
+        let halves = self.as_number(turns)? * Rational::from(2);
         if !halves.is_integer() {
             return None;
         }
         let quarter = halves.to_integer().mod_floor(&4.into()).to_u8()?;
         let quarter = if function == Function::Cos { (quarter + 1) % 4 } else { quarter };
         Some(self.integer([0, 1, 0, -1][usize::from(quarter)]))
-    }
-
-    /// `expr` with each expression that `replacement` knows replaced, from the root downwards.
-    pub fn replace(&mut self, expr: Expr, replacement: &BTreeMap<Expr, Expr>) -> Expr {
-        self.replace_with(expr, replacement, &mut BTreeMap::new())
-    }
-
-    fn replace_with(
-        &mut self,
-        expr: Expr,
-        replacement: &BTreeMap<Expr, Expr>,
-        done: &mut BTreeMap<Expr, Expr>,
-    ) -> Expr {
-        if let Some(&known) = replacement.get(&expr).or_else(|| done.get(&expr)) {
-            return known;
-        }
-        let result = self
-            .map_children(expr, &mut |graph, child| graph.replace_with(child, replacement, done));
-        done.insert(expr, result);
-        result
     }
 
     /// The node of `expr` built anew from what `map` makes of its children.
@@ -462,7 +445,7 @@ impl Graph {
 #[derive(Default)]
 struct Collected {
     /// In order of the expressions, as long as there are few: nearly always.
-    few: Vec<(Expr, Rational)>,
+    few: Numbered,
     many: BTreeMap<Expr, Rational>,
 }
 
@@ -516,7 +499,7 @@ impl Collected {
     }
 
     /// In order of the expressions.
-    fn into_sorted(mut self) -> Vec<(Expr, Rational)> {
+    fn into_sorted(mut self) -> Numbered {
         if !self.many.is_empty() {
             // One of the two is empty.
             self.few.extend(self.many);
@@ -529,6 +512,9 @@ impl Collected {
 fn rational_power(value: &Rational, exponent: &Rational) -> Option<Rational> {
     if value.is_zero() && !exponent.is_positive() {
         return None;
+    }
+    if value.is_one() || exponent.is_one() {
+        return Some(value.clone());
     }
     let root = exact_root_or_self(value, exponent)?;
     let power = exponent.numer().to_i32()?;
@@ -558,7 +544,7 @@ fn content_of(constant: &Rational, terms: &[(Expr, Rational)]) -> Rational {
     let content = all
         .map(Signed::abs)
         .reduce(|a, b| match (a.small(), b.small()) {
-            (Some((a, 1)), Some((b, 1))) => Rational::from_integer(a.gcd(&b).into()),
+            (Some((a, 1)), Some((b, 1))) => Rational::from(a.gcd(&b)),
             _ => Rational::new(a.numer().gcd(&b.numer()), a.denom().lcm(&b.denom())),
         })
         .unwrap_or_else(Rational::one);

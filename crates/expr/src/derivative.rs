@@ -139,7 +139,7 @@ fn outer_derivative(graph: &mut Graph, function: Function, x: Expr) -> Expr {
         Function::LogRatioSquared => {
             let slope = graph.call(Function::LogRatioSlope, &[x]);
             let shifted = graph.add(one, slope);
-            graph.sum([(Rational::from_integer(2.into()), shifted)])
+            graph.sum([(Rational::from(2), shifted)])
         }
         Function::LogRatioSlope => graph.call(Function::LogRatioCurvature, &[x]),
         Function::LogRatioCurvature => {
@@ -148,7 +148,7 @@ fn outer_derivative(graph: &mut Graph, function: Function, x: Expr) -> Expr {
             let curvature = graph.call(Function::LogRatioCurvature, &[x]);
             let (shifted, two) = (graph.add(one, x), graph.integer(2));
             let product = graph.mul(shifted, curvature);
-            let three = Rational::from_integer(3.into());
+            let three = Rational::from(3);
             let plain = Rational::one();
             let numerator = graph.sum([(plain.clone(), one), (plain, slope), (three, product)]);
             let denominator = graph.add(x, two);

@@ -320,7 +320,7 @@ impl Graph {
 
     /// The integer `value`.
     pub fn integer(&mut self, value: i64) -> Expr {
-        self.number(Rational::from_integer(value.into()))
+        self.number(value.into())
     }
 
     /// The circle number.

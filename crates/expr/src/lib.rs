@@ -44,6 +44,7 @@ mod program;
 mod pythagoras;
 mod rational;
 mod reciprocal;
+mod replacement;
 mod residue;
 mod reuse;
 
@@ -57,4 +58,5 @@ pub use program::{
     Dependence, Drafts, Operation, OperationCount, OperationsByStage, Program, Slot,
 };
 pub use rational::{Rational, nearest_f64};
+pub use replacement::Replacement;
 pub use reuse::reuse;

@@ -6,6 +6,9 @@
 //! combined before those that depend on time or on position, so that the slow parts are computed rarely.
 
 mod argument;
+mod error_bounds;
+
+pub(crate) use error_bounds::SIDE;
 
 use crate::graph::NumberMap;
 use crate::log_ratio;
@@ -363,89 +366,6 @@ impl Program {
         stages.time.cost() + stages.point.cost() + stages.both.cost()
     }
 
-    /// Bounds, to first order, of the rounding errors of the outputs, in units of the rounding error of one operation: at
-    /// each of `places`, which give the values of the inputs, the bounds of all outputs.
-    ///
-    /// Inputs count as exact. Running error analysis: every operation adds its own rounding to what its operands
-    /// carry, and nothing cancels. All places go through one operation after another, side by side.
-    pub(crate) fn error_bounds(&self, places: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        let count = places.len();
-        let mut values: Vec<f64> = Vec::with_capacity(count * self.operations.len());
-        let mut errors: Vec<f64> = Vec::with_capacity(count * self.operations.len());
-        // Those of the operation in hand.
-        let (mut own, mut bound) = (vec![0.0; count], vec![0.0; count]);
-        for (operation, &number) in self.operations.iter().zip(&self.numbers) {
-            // Values and errors of an operand at all places.
-            let known = |slot: Slot| {
-                let row = slot.index() * count..(slot.index() + 1) * count;
-                values[row.clone()].iter().zip(&errors[row])
-            };
-            let results = own.iter_mut().zip(&mut bound);
-            match *operation {
-                Operation::Number(_) => results.for_each(|(y, e)| (*y, *e) = (number, 0.0)),
-                Operation::Input(index) => results.zip(places).for_each(|((y, e), place)| {
-                    (*y, *e) = (place.get(index).copied().unwrap_or(f64::NAN), 0.0);
-                }),
-                Operation::Neg(a) => {
-                    results.zip(known(a)).for_each(|((y, e), (a, ea))| (*y, *e) = (-a, *ea));
-                }
-                Operation::Add(a, b) => {
-                    for ((y, e), ((a, ea), (b, eb))) in results.zip(known(a).zip(known(b))) {
-                        *y = a + b;
-                        *e = ea + eb + y.abs();
-                    }
-                }
-                Operation::Sub(a, b) => {
-                    for ((y, e), ((a, ea), (b, eb))) in results.zip(known(a).zip(known(b))) {
-                        *y = a - b;
-                        *e = ea + eb + y.abs();
-                    }
-                }
-                Operation::Mul(a, b) => {
-                    for ((y, e), ((a, ea), (b, eb))) in results.zip(known(a).zip(known(b))) {
-                        *y = a * b;
-                        *e = ea * b.abs() + eb * a.abs() + y.abs();
-                    }
-                }
-                Operation::Div(a, b) => {
-                    for ((y, e), ((a, ea), (b, eb))) in results.zip(known(a).zip(known(b))) {
-                        *y = a / b;
-                        *e = (ea + eb * y.abs()) / b.abs() + y.abs();
-                    }
-                }
-                _ => {
-                    for (place, (y, e)) in results.enumerate() {
-                        let at = |slot: Slot| values[slot.index() * count + place];
-                        let value = operation.value(&[], at);
-                        // The derivative of a function by a difference: its accuracy does not matter.
-                        let slope = |a: Slot| {
-                            let step = 1e-6 * (1e-3 + at(a).abs());
-                            let moved = operation.value(&[], |slot| {
-                                if slot == a { at(slot) + step } else { at(slot) }
-                            });
-                            ((moved - value) / step).abs()
-                        };
-                        let carried = match operation {
-                            // What they correct stays in the bound, so they add nothing.
-                            Operation::SumError(..) | Operation::ProductError(..) => 0.0,
-                            _ => operation
-                                .operands()
-                                .map(|a| errors[a.index() * count + place] * slope(a))
-                                .sum(),
-                        };
-                        (*y, *e) = (value, carried + value.abs());
-                    }
-                }
-            }
-            values.extend_from_slice(&own);
-            errors.extend_from_slice(&bound);
-        }
-        let of_place = |place: usize| {
-            self.outputs.iter().map(|slot| errors[slot.index() * count + place]).collect()
-        };
-        (0..count).map(of_place).collect()
-    }
-
     /// The outputs at the given input values, in double precision.
     ///
     /// An input that is not given counts as not-a-number.
@@ -705,8 +625,7 @@ impl Lowering<'_> {
         for (term, coefficient) in terms {
             let (factor, rest, rate) = self.split_off_fixed(*term, &coefficient.abs());
             let open = factor != Graph::ONE && rest != Graph::ONE;
-            let sign =
-                Rational::from_integer(if coefficient.is_negative() { -1 } else { 1 }.into());
+            let sign = Rational::from(if coefficient.is_negative() { -1 } else { 1 });
             let known = groups
                 .iter_mut()
                 .find(|group| open && group.open && group.factor == factor && group.rate == rate);
@@ -804,14 +723,22 @@ impl Lowering<'_> {
     /// `coefficient * term` as a factor that depends on parameters only and a rest, with what the rest depends on.
     fn split_off_fixed(&mut self, term: Expr, coefficient: &Rational) -> (Expr, Expr, Dependence) {
         let factors = self.factors(term);
-        let mut fixed = vec![(self.graph.number(coefficient.clone()), Rational::one())];
+        let dependence: Vec<Dependence> = factors
+            .iter()
+            .map(|(base, _)| {
+                let slot = self.lower(*base);
+                self.program.dependence(slot)
+            })
+            .collect();
+        let rate = dependence.iter().fold(Dependence::default(), |all, one| all.join(*one));
+        let number = self.graph.number(coefficient.clone());
+        if !dependence.iter().any(|d| d.is_fixed()) {
+            return (number, term, rate);
+        }
+        let mut fixed = vec![(number, Rational::one())];
         let mut rest = Vec::new();
-        let mut rate = Dependence::default();
-        for (base, exponent) in factors {
-            let slot = self.lower(base);
-            let dependence = self.program.dependence(slot);
-            rate = rate.join(dependence);
-            if dependence.is_fixed() { &mut fixed } else { &mut rest }.push((base, exponent));
+        for (factor, dependence) in factors.into_iter().zip(dependence) {
+            if dependence.is_fixed() { &mut fixed } else { &mut rest }.push(factor);
         }
         (self.graph.product(fixed), self.graph.product(rest), rate)
     }
@@ -902,11 +829,11 @@ impl Lowering<'_> {
 
     /// `base ^ exponent` for a positive exponent.
     fn power(&mut self, base: Slot, exponent: &Rational) -> Slot {
-        let whole = exponent.to_integer().to_u32().unwrap_or(0);
-        let rest = exponent - Rational::from_integer(whole.into());
-        if rest.is_zero() {
+        if let Some(whole) = exponent.to_i64().and_then(|n| u32::try_from(n).ok()) {
             return self.whole_power(base, whole);
         }
+        let whole = exponent.to_integer().to_u32().unwrap_or(0);
+        let rest = exponent - Rational::from(i64::from(whole));
         if rest != Rational::new(1.into(), 2.into()) {
             return self.push(Operation::Power(base, exponent.clone()));
         }

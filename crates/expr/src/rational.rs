@@ -109,6 +109,11 @@ impl Rational {
         }
     }
 
+    /// The number where it is an integer of this size.
+    pub(crate) fn to_i64(&self) -> Option<i64> {
+        self.small().and_then(|(n, d)| (d == 1).then_some(n))
+    }
+
     /// The nearest integer, halves away from zero.
     #[must_use]
     pub fn round(&self) -> Self {
@@ -138,6 +143,11 @@ impl Rational {
         }
     }
 
+    /// A small integer, but for the least number, which has no negative.
+    fn small_integer(value: Option<i64>) -> Option<Self> {
+        value.filter(|&n| n != i64::MIN).map(|n| Rational(Small(n, 1)))
+    }
+
     /// `n / d` for `d` not zero and `|n|` and `|d|` below `2^127`.
     fn reduced(n: i128, d: i128) -> Self {
         let (n, d) = if d < 0 { (-n, -d) } else { (n, d) };
@@ -154,6 +164,11 @@ impl Rational {
     }
 
     fn sum(&self, other: &Self) -> Self {
+        if let (&Small(a, 1), &Small(c, 1)) = (&self.0, &other.0)
+            && let Some(sum) = Self::small_integer(a.checked_add(c))
+        {
+            return sum;
+        }
         match (&self.0, &other.0) {
             (&Small(a, b), &Small(c, d)) => {
                 let [a, b, c, d] = [a, b, c, d].map(i128::from);
@@ -164,6 +179,11 @@ impl Rational {
     }
 
     fn product(&self, other: &Self) -> Self {
+        if let (&Small(a, 1), &Small(c, 1)) = (&self.0, &other.0)
+            && let Some(product) = Self::small_integer(a.checked_mul(c))
+        {
+            return product;
+        }
         match (&self.0, &other.0) {
             (&Small(a, b), &Small(c, d)) => {
                 let [a, b, c, d] = [a, b, c, d].map(i128::from);
@@ -175,6 +195,7 @@ impl Rational {
 
     fn quotient(&self, other: &Self) -> Self {
         match (&self.0, &other.0) {
+            (_, Small(1, 1)) => self.clone(),
             (&Small(a, b), &Small(c, d)) if c != 0 => {
                 let [a, b, c, d] = [a, b, c, d].map(i128::from);
                 Self::reduced(a * d, b * c)
@@ -193,6 +214,12 @@ fn gcd(mut a: u128, mut b: u128) -> u128 {
         (a, b) = (b % a, a);
     }
     b
+}
+
+impl From<i64> for Rational {
+    fn from(value: i64) -> Self {
+        Self::small_integer(Some(value)).unwrap_or_else(|| Self::reduced(value.into(), 1))
+    }
 }
 
 impl Default for Rational {
@@ -216,6 +243,7 @@ impl fmt::Display for Rational {
 impl Ord for Rational {
     fn cmp(&self, other: &Self) -> Ordering {
         match (&self.0, &other.0) {
+            (Small(a, 1), Small(c, 1)) => a.cmp(c),
             (&Small(a, b), &Small(c, d)) => {
                 (i128::from(a) * i128::from(d)).cmp(&(i128::from(c) * i128::from(b)))
             }

@@ -6,8 +6,7 @@
 
 use crate::coordinates::Geometry;
 use crate::{Boundary, Condition, Coordinates, Domain, Spec, Surface};
-use mmsmith_expr::{Expr, Graph};
-use std::collections::BTreeMap;
+use mmsmith_expr::{Expr, Graph, Replacement};
 
 /// Fields on one surface of the body.
 #[derive(Clone, Debug)]
@@ -83,7 +82,9 @@ pub(crate) fn surface_fields(
     let surfaces = spec.domain.surfaces(spec.dimension).into_iter();
     surfaces
         .map(|surface| {
-            let mut on_surface = OnSurface { graph, geometry, spec, fields, surface };
+            let mut on_surface =
+                OnSurface { graph, geometry, spec, fields, surface, placing: None };
+            on_surface.placing = on_surface.place().map(|pair| Replacement::new([pair]));
             on_surface.derive()
         })
         .collect()
@@ -95,6 +96,8 @@ struct OnSurface<'a, 'b> {
     spec: &'a Spec,
     fields: &'a Components<'b>,
     surface: Surface,
+    /// The coordinate that is fixed on the surface, replaced by its value.
+    placing: Option<Replacement>,
 }
 
 impl OnSurface<'_, '_> {
@@ -188,14 +191,19 @@ impl OnSurface<'_, '_> {
             .collect()
     }
 
+    /// The coordinate that is fixed on the surface, and its value.
+    fn place(&self) -> Option<(Expr, Expr)> {
+        match self.plane() {
+            Some((axis, value)) => Some((self.geometry.cartesian[axis], value)),
+            None if self.spec.coordinates == Coordinates::Cartesian => None,
+            None => Some((self.geometry.coordinates[0], self.radius())),
+        }
+    }
+
     /// The expression with the coordinate that is fixed on the surface put in, where that does not divide by zero.
     fn placed(&mut self, expr: Expr) -> Expr {
-        let (symbol, value) = match self.plane() {
-            Some((axis, value)) => (self.geometry.cartesian[axis], value),
-            None if self.spec.coordinates == Coordinates::Cartesian => return expr,
-            None => (self.geometry.coordinates[0], self.radius()),
-        };
-        let placed = self.graph.replace(expr, &BTreeMap::from([(symbol, value)]));
+        let Some(placing) = &mut self.placing else { return expr };
+        let placed = placing.of(self.graph, expr);
         if self.graph.divides_by_zero(placed) { expr } else { placed }
     }
 
