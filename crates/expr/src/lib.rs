@@ -55,7 +55,7 @@ pub use derivative::Derivatives;
 pub use graph::{Expr, Function, Graph, Node};
 pub use parse::{Ast, AstKind, ParseError};
 pub use program::{
-    Dependence, Drafts, Operation, OperationCount, OperationsByStage, Program, Slot,
+    Dependence, Drafts, Operation, OperationCount, OperationsByStage, Program, Section, Slot,
 };
 pub use rational::{Rational, nearest_f64};
 pub use replacement::Replacement;

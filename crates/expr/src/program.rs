@@ -7,8 +7,10 @@
 
 mod argument;
 mod error_bounds;
+mod section;
 
 pub(crate) use error_bounds::SIDE;
+pub use section::Section;
 
 use crate::graph::NumberMap;
 use crate::log_ratio;
@@ -286,7 +288,8 @@ impl Program {
     }
 
     /// The operations that `outputs` need.
-    fn part(&self, outputs: &[Slot]) -> Self {
+    #[must_use]
+    pub fn part(&self, outputs: &[Slot]) -> Self {
         let needed = self.needed(outputs);
         let mut places: Vec<Slot> = Vec::with_capacity(self.operations.len());
         let mut program = Program::default();

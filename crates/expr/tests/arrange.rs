@@ -1,6 +1,6 @@
 //! Arranging expressions in stages keeps their values and saves divisions.
 
-use mmsmith_expr::{Ast, Dependence, Drafts, Expr, Graph, Program, arrange};
+use mmsmith_expr::{Ast, Dependence, Drafts, Expr, Graph, Operation, Program, Slot, arrange};
 use proptest::prelude::*;
 
 const POSITION: Dependence = Dependence { position: true, time: false };
@@ -71,6 +71,30 @@ proptest! {
         let inner = |program: &Program| program.operations_by_stage(program.outputs()).both;
         prop_assert!(inner(&after).divisions <= inner(&before).divisions, "{}", text);
         prop_assert!(inner(&after).calls <= inner(&before).calls, "{}", text);
+    }
+}
+
+proptest! {
+    #[test]
+    fn points_side_by_side_give_the_bits_of_each_alone(
+        text in expression(), x in prop::array::uniform4(0.6..1.4), t in 0.6..1.4, a in 0.6..1.4,
+    ) {
+        let (program, _) = case(&text).programs();
+        let position = |slot: &Slot| program.operations()[slot.index()] == Operation::Input(0);
+        let x_alone: Vec<Slot> = program.slots().find(position).into_iter().collect();
+        let kept = program.kept_at_points(program.outputs(), usize::MAX);
+        let (at_points, of_parameters) = program.section(&kept, &x_alone);
+        let (at_times, of_times) = program.section(program.outputs(), &kept);
+        let mut rows = Vec::new();
+        let uniform = of_parameters.evaluate(&[f64::NAN, f64::NAN, a]);
+        let given = vec![x; x_alone.len()];
+        let known: Vec<[f64; 4]> = at_points.run(&uniform, &given, &mut rows).copied().collect();
+        let uniform = of_times.evaluate(&[f64::NAN, t, a]);
+        let found: Vec<[f64; 4]> = at_times.run(&uniform, &known, &mut rows).copied().collect();
+        for (n, &x) in x.iter().enumerate() {
+            let alone = program.evaluate(&[x, t, a])[0];
+            prop_assert_eq!(found[0][n].to_bits(), alone.to_bits(), "{} at {}", text, x);
+        }
     }
 }
 

@@ -2,15 +2,22 @@
 //!
 //! [`interpret`] turns a specification into the same interface that generated solutions have, so that a file can
 //! be checked before anything is generated from it. It evaluates the straight-line programs that the generator
-//! translates, in double precision; for work on many points the generated code is far faster.
+//! translates, in double precision, and in the same stages; for work on many points the generated code is still faster.
 
-use mmsmith_expr::{Expr, Program};
+mod staged;
+
+use mmsmith_expr::{Drafts, Expr, Program, Slot, arrange};
 use mmsmith_solutions::nalgebra::{SMatrix, SVector};
 use mmsmith_solutions::{
-    AnySolution, Boundary, Condition, Domain, Fields, Material, ParameterError, Solution, Surface,
+    AnySolution, BodyForceAtPoints, Boundary, Condition, Domain, Fields, Material, ParameterError,
+    Solution, StateAtPoints, Surface,
 };
 use mmsmith_spec::{self as spec, DeriveError, Spec};
+use staged::Stages;
 use thiserror::Error;
+
+/// What is kept of each point for its state, at most.
+const MOST_KEPT_OF_STATES: usize = 16;
 
 /// Why a specification could not be interpreted.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -96,6 +103,9 @@ struct Interpreted<const D: usize> {
     body_force: Program,
     strain_energy: Option<Program>,
     tractions: Vec<(Surface, Program)>,
+    body_force_stages: Stages<1>,
+    /// Of `u`, `F` and `P`, and of `v`.
+    state_stages: Stages<2>,
     domain: Domain<f64, D>,
     boundaries: Vec<Boundary>,
     cell_length: f64,
@@ -111,18 +121,13 @@ impl<const D: usize> Interpreted<D> {
         mut fields: spec::Fields,
         parameters: Vec<f64>,
     ) -> Result<Self, InterpretError> {
-        let (u, v, a, b) = (fields.u.clone(), fields.v.clone(), fields.a.clone(), fields.b.clone());
-        let (H, F, P) = (fields.H.concat(), fields.F.concat(), fields.P.concat());
-        let (J, W) = ([fields.J], fields.W);
         let surfaces = std::mem::take(&mut fields.surfaces);
-
         let mut constants = spec.constants();
         for requirement in &spec.requirements {
             constants.extend([requirement.left, requirement.right]);
         }
-        let mut program = |outputs: &[Expr]| fields.program(outputs);
         let constants =
-            program(&constants).evaluate(&inputs::<D>(&SVector::zeros(), 0.0, &parameters));
+            fields.program(&constants).evaluate(&inputs::<D>(&SVector::zeros(), 0.0, &parameters));
         let sides = &constants[constants.len() - 2 * spec.requirements.len()..];
         for (requirement, side) in spec.requirements.iter().zip(sides.chunks(2)) {
             if !requirement.relation.holds(side[0], side[1]) {
@@ -147,20 +152,45 @@ impl<const D: usize> Interpreted<D> {
                 Domain::Annulus { inner: measures[0], outer: measures[1] }
             }
         };
+        // As generated code has it: one program, and the body force of points that stay in a form of its own.
+        let (inputs, definitions, b) = (&fields.inputs, &fields.definitions, &fields.b);
+        let staged = arrange(&mut fields.graph, inputs, definitions, &mut Drafts::default(), b);
+        let parts: [Vec<Expr>; 9] = [
+            fields.u.clone(),
+            fields.v.clone(),
+            fields.a.clone(),
+            fields.H.concat(),
+            fields.F.concat(),
+            vec![fields.J],
+            fields.P.concat(),
+            fields.b.clone(),
+            staged,
+        ];
+        let tractions = surfaces.iter().flat_map(|s| &s.traction).copied();
+        let outputs: Vec<Expr> =
+            parts.iter().flatten().copied().chain(fields.W).chain(tractions).collect();
+        let program = fields.program(&outputs);
+        let mut slots = program.outputs().iter().copied();
+        let mut take = |n: usize| slots.by_ref().take(n).collect::<Vec<Slot>>();
+        let [u, v, a, H, F, J, P, b, staged] = parts.map(|part| take(part.len()));
+        let part = |slots: &[Slot]| program.part(slots);
+        let state = [u.as_slice(), &F, &P].concat();
         Ok(Interpreted {
-            displacement: program(&u),
-            velocity: program(&v),
-            acceleration: program(&a),
-            displacement_gradient: program(&H),
-            deformation_gradient: program(&F),
-            jacobian: program(&J),
-            first_piola_kirchhoff: program(&P),
-            body_force: program(&b),
-            strain_energy: W.map(|W| program(&[W])),
+            displacement: part(&u),
+            velocity: part(&v),
+            acceleration: part(&a),
+            displacement_gradient: part(&H),
+            deformation_gradient: part(&F),
+            jacobian: part(&J),
+            first_piola_kirchhoff: part(&P),
+            body_force: part(&b),
+            strain_energy: fields.W.map(|_| part(&take(1))),
             tractions: surfaces
                 .iter()
-                .map(|s| (surface(s.surface), program(&s.traction)))
+                .map(|s| (surface(s.surface), part(&take(s.traction.len()))))
                 .collect(),
+            body_force_stages: Stages::new::<D>(&program, [&staged], usize::MAX),
+            state_stages: Stages::new::<D>(&program, [&state, &v], MOST_KEPT_OF_STATES),
             domain,
             boundaries: spec.boundaries.iter().map(boundary).collect(),
             cell_length: constants[0],
@@ -237,6 +267,14 @@ impl<const D: usize> Solution<f64, D> for Interpreted<D> {
 
     fn body_force(&self, X: &SVector<f64, D>, t: f64) -> SVector<f64, D> {
         self.vector(&self.body_force, X, t)
+    }
+
+    fn body_force_at(&self, X: &[SVector<f64, D>]) -> Box<dyn BodyForceAtPoints<f64, D> + '_> {
+        Box::new(self.body_force_stages.at(X, &self.parameters))
+    }
+
+    fn state_at(&self, X: &[SVector<f64, D>]) -> Box<dyn StateAtPoints<f64, D> + '_> {
+        Box::new(self.state_stages.at(X, &self.parameters))
     }
 
     fn traction(&self, surface: Surface, X: &SVector<f64, D>, t: f64) -> Option<SVector<f64, D>> {

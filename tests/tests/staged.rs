@@ -1,10 +1,14 @@
-//! Fields at kept points. The body force is the same to the last bit in whatever runs it is evaluated, and that of single
+//! Fields at kept points, generated and interpreted. The body force is the same to the last bit in whatever runs it is evaluated, and that of single
 //! calls but for rounding; states are those of single calls to the last bit.
 
 #![allow(clippy::unwrap_used)]
 
+use mmsmith_interpret::interpret;
 use mmsmith_solutions::nalgebra::SVector;
-use mmsmith_solutions::{AnySolution, BLOCK, CATALOGUE, Real, Solution, State, StateRun, build};
+use mmsmith_solutions::{
+    AnySolution, BLOCK, CATALOGUE, Description, Real, Solution, State, StateRun, build,
+};
+use mmsmith_spec::Spec;
 
 /// Points in the unit cube, off its faces; a body force is defined there for every solution.
 fn points<T: Real, const D: usize>(count: usize) -> Vec<SVector<T, D>> {
@@ -43,6 +47,12 @@ fn compare<T: Real, const D: usize>(name: &str, solution: &dyn Solution<T, D>) {
                         || (a - b).abs() <= 64.0 * T::default_epsilon().to_f64() * largest
                 });
                 assert!(close, "{name}, t = {t}: {found}, not {expected}");
+            }
+            let numbers: Vec<u32> = (0..count as u32).rev().collect();
+            let mut backwards = vec![SVector::zeros(); count];
+            kept.evaluate_of(t, &numbers, &mut backwards);
+            for (found, expected) in backwards.iter().rev().zip(&whole) {
+                assert!(same(found, expected), "{name}, t = {t}: {found}, not {expected}");
             }
             let middle = count / 2;
             for (first, end) in [(middle, count), (0, middle), (middle / 2, count - middle / 2)] {
@@ -85,24 +95,27 @@ fn compare_states<T: Real, const D: usize>(name: &str, solution: &dyn Solution<T
     }
 }
 
-fn compare_all<T: Real>() {
-    for description in CATALOGUE {
-        let name = description.name;
-        match build::<T>(name, &[]).unwrap().unwrap() {
-            AnySolution::One(solution) => {
-                compare(name, &*solution);
-                compare_states(name, &*solution);
-            }
-            AnySolution::Two(solution) => {
-                compare(name, &*solution);
-                compare_states(name, &*solution);
-            }
-            AnySolution::Three(solution) => {
-                compare(name, &*solution);
-                compare_states(name, &*solution);
-            }
-            _ => panic!("{name} has an unknown dimension"),
+fn compare_both<T: Real>(name: &str, solution: AnySolution<T>) {
+    match solution {
+        AnySolution::One(solution) => {
+            compare(name, &*solution);
+            compare_states(name, &*solution);
         }
+        AnySolution::Two(solution) => {
+            compare(name, &*solution);
+            compare_states(name, &*solution);
+        }
+        AnySolution::Three(solution) => {
+            compare(name, &*solution);
+            compare_states(name, &*solution);
+        }
+        _ => panic!("{name} has an unknown dimension"),
+    }
+}
+
+fn compare_all<T: Real>() {
+    for Description { name, .. } in CATALOGUE {
+        compare_both(name, build::<T>(name, &[]).unwrap().unwrap());
     }
 }
 
@@ -114,6 +127,14 @@ fn double_precision() {
 #[test]
 fn single_precision() {
     compare_all::<f32>();
+}
+
+#[test]
+fn interpreted() {
+    for Description { name, specification, .. } in CATALOGUE {
+        let spec = Spec::parse(specification, name).unwrap();
+        compare_both(name, interpret(&spec, []).unwrap());
+    }
 }
 
 #[test]

@@ -1,0 +1,98 @@
+//! Parts of a program over many points side by side.
+//!
+//! Reading an operation takes longer than doing it for one point; so each is done for a row of points before the next one
+//! is read.
+
+use super::{Operation, Program, Slot};
+use std::array;
+
+/// The operations that some outputs need, given values that are the same at all points and values of each point.
+///
+/// Results are those of [`Program::evaluate`], to the last bit.
+#[derive(Clone, Debug)]
+pub struct Section {
+    /// How many values are the same at all points, and how many are given of each.
+    uniform: usize,
+    given: usize,
+    /// The operations, each on the places of earlier ones, after the values of both kinds.
+    operations: Vec<Operation>,
+    outputs: Vec<usize>,
+}
+
+impl Program {
+    /// What `outputs` need beside `given`, which are values of a point, and beside values that do not depend on the
+    /// position; and the program of these, whose outputs are what [`Section::run`] takes as uniform.
+    #[must_use]
+    pub fn section(&self, outputs: &[Slot], given: &[Slot]) -> (Section, Program) {
+        let mut reached = vec![false; self.operations.len()];
+        let mut stack = outputs.to_vec();
+        while let Some(slot) = stack.pop() {
+            if std::mem::replace(&mut reached[slot.index()], true) {
+                continue;
+            }
+            if self.dependence(slot).position && !given.contains(&slot) {
+                stack.extend(self.operations[slot.index()].operands());
+            }
+        }
+        let reached = self.slots().filter(|slot| reached[slot.index()]);
+        let (of_points, uniform): (Vec<Slot>, Vec<Slot>) =
+            reached.partition(|&slot| self.dependence(slot).position);
+        let mut places = vec![0; self.operations.len()];
+        for (place, slot) in uniform.iter().chain(given).enumerate() {
+            places[slot.index()] = place;
+        }
+        let mut operations = Vec::new();
+        for slot in of_points.into_iter().filter(|slot| !given.contains(slot)) {
+            let operation = &self.operations[slot.index()];
+            operations.push(operation.with_operands(|operand| Slot::at(places[operand.index()])));
+            places[slot.index()] = uniform.len() + given.len() + operations.len() - 1;
+        }
+        let outputs = outputs.iter().map(|slot| places[slot.index()]).collect();
+        let section = Section { uniform: uniform.len(), given: given.len(), operations, outputs };
+        (section, self.part(&uniform))
+    }
+}
+
+impl Section {
+    /// The outputs of `N` points, from the uniform values and those given of each point. `rows` is room to work in.
+    ///
+    /// # Panics
+    ///
+    /// Panics where there are not as many values as the section takes.
+    pub fn run<'a, const N: usize>(
+        &self,
+        uniform: &[f64],
+        given: &[[f64; N]],
+        rows: &'a mut Vec<[f64; N]>,
+    ) -> impl Iterator<Item = &'a [f64; N]> {
+        assert_eq!((uniform.len(), given.len()), (self.uniform, self.given), "values of a section");
+        rows.clear();
+        rows.extend(uniform.iter().map(|&value| [value; N]));
+        rows.extend(given);
+        for operation in &self.operations {
+            rows.push(operation.row(rows));
+        }
+        let rows: &'a [[f64; N]] = rows;
+        self.outputs.clone().into_iter().map(move |place| &rows[place])
+    }
+}
+
+impl Operation {
+    /// The values at `N` places, where `rows` has those of the operands.
+    fn row<const N: usize>(&self, rows: &[[f64; N]]) -> [f64; N] {
+        let of = |slot: Slot| &rows[slot.index()];
+        let each = |a: Slot, b: Slot, value: fn(f64, f64) -> f64| -> [f64; N] {
+            let (a, b) = (of(a), of(b));
+            array::from_fn(|n| value(a[n], b[n]))
+        };
+        match *self {
+            Operation::Add(a, b) => each(a, b, |a, b| a + b),
+            Operation::Sub(a, b) => each(a, b, |a, b| a - b),
+            Operation::Mul(a, b) => each(a, b, |a, b| a * b),
+            Operation::Div(a, b) => each(a, b, |a, b| a / b),
+            Operation::Neg(a) => of(a).map(|a| -a),
+            Operation::Sqrt(a) => of(a).map(f64::sqrt),
+            _ => array::from_fn(|n| self.value(&[], |slot| of(slot)[n])),
+        }
+    }
+}

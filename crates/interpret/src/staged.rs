@@ -1,0 +1,177 @@
+//! The body force, and what a simulation is compared with, at points that stay.
+
+use crate::inputs;
+use mmsmith_expr::{Operation, Program, Section, Slot};
+use mmsmith_solutions::nalgebra::SVector;
+use mmsmith_solutions::{BLOCK, BodyForceAtPoints, StateAtPoints, StateRun};
+
+/// One number for each point of a block.
+type Row = [f64; BLOCK];
+
+/// A section with the program of what is the same at all points.
+struct Stage {
+    section: Section,
+    uniform: Program,
+}
+
+impl Stage {
+    fn new(program: &Program, outputs: &[Slot], given: &[Slot]) -> Self {
+        let (section, uniform) = program.section(outputs, given);
+        Stage { section, uniform }
+    }
+
+    fn uniform<const D: usize>(&self, t: f64, parameters: &[f64]) -> Vec<f64> {
+        // These values read no position.
+        self.uniform.evaluate(&inputs::<D>(&SVector::zeros(), t, parameters))
+    }
+}
+
+/// How outputs are computed at points that stay: what is kept of a point once, and `N` groups of outputs from it, each
+/// group at a time of its own.
+pub(crate) struct Stages<const N: usize> {
+    /// The coordinates that anything reads.
+    axes: Vec<usize>,
+    at_points: Stage,
+    kept: usize,
+    at_times: [Stage; N],
+}
+
+impl<const N: usize> Stages<N> {
+    /// Of a point at most `most` values are kept.
+    pub(crate) fn new<const D: usize>(
+        program: &Program,
+        outputs: [&[Slot]; N],
+        most: usize,
+    ) -> Self {
+        let kept = program.kept_at_points(&outputs.concat(), most);
+        let coordinate = |axis: usize| {
+            let operations = program.operations();
+            program.slots().find(|slot| operations[slot.index()] == Operation::Input(axis))
+        };
+        let (axes, coordinates): (Vec<usize>, Vec<Slot>) =
+            (0..D).filter_map(|axis| Some((axis, coordinate(axis)?))).unzip();
+        Stages {
+            axes,
+            at_points: Stage::new(program, &kept, &coordinates),
+            kept: kept.len(),
+            at_times: outputs.map(|outputs| Stage::new(program, outputs, &kept)),
+        }
+    }
+
+    /// With what is kept of the points `X`.
+    pub(crate) fn at<'a, const D: usize>(
+        &'a self,
+        X: &[SVector<f64, D>],
+        parameters: &'a [f64],
+    ) -> Points<'a, N> {
+        let uniform = self.at_points.uniform::<D>(f64::NAN, parameters);
+        let mut rows = Vec::new();
+        let mut blocks = Vec::with_capacity(X.len().div_ceil(BLOCK) * self.kept);
+        for X in X.chunks(BLOCK) {
+            // What a last block has to spare repeats its last point.
+            let coordinate =
+                |axis: usize| -> Row { std::array::from_fn(|n| X[n.min(X.len() - 1)][axis]) };
+            let given: Vec<Row> = self.axes.iter().map(|&axis| coordinate(axis)).collect();
+            blocks.extend(self.at_points.section.run(&uniform, &given, &mut rows));
+        }
+        Points { stages: self, parameters, blocks, len: X.len() }
+    }
+}
+
+/// What is kept of points.
+pub(crate) struct Points<'a, const N: usize> {
+    stages: &'a Stages<N>,
+    parameters: &'a [f64],
+    /// Value `m` of point `n BLOCK + i` is number `i` of row `n kept + m`.
+    blocks: Vec<Row>,
+    len: usize,
+}
+
+impl<const N: usize> Points<'_, N> {
+    /// The rows of a block.
+    fn block(&self, number: usize) -> &[Row] {
+        let kept = self.stages.kept;
+        &self.blocks[number * kept..(number + 1) * kept]
+    }
+
+    fn bytes(&self) -> usize {
+        self.stages.kept * size_of::<f64>()
+    }
+}
+
+impl<const D: usize> BodyForceAtPoints<f64, D> for Points<'_, 1> {
+    fn evaluate(&self, t: f64, first: usize, b: &mut [SVector<f64, D>]) {
+        assert!(
+            first.checked_add(b.len()).is_some_and(|end| end <= self.len),
+            "{} points from number {first} on were asked for; there are {}",
+            b.len(),
+            self.len
+        );
+        self.of_numbers(t, b, |n| first + n);
+    }
+
+    fn evaluate_of(&self, t: f64, points: &[u32], b: &mut [SVector<f64, D>]) {
+        assert_eq!(points.len(), b.len(), "one body force a point");
+        if let Some(&n) = points.iter().find(|&&n| n as usize >= self.len) {
+            panic!("point {n} was asked for; there are {}", self.len);
+        }
+        self.of_numbers(t, b, |n| points[n] as usize);
+    }
+
+    fn len(&self) -> usize {
+        self.len
+    }
+
+    fn bytes_per_point(&self) -> usize {
+        self.bytes()
+    }
+}
+
+impl Points<'_, 1> {
+    /// The body force of the points that `number` tells for each place in `b`.
+    fn of_numbers<const D: usize>(
+        &self,
+        t: f64,
+        b: &mut [SVector<f64, D>],
+        number: impl Fn(usize) -> usize,
+    ) {
+        let [stage] = &self.stages.at_times;
+        let uniform = stage.uniform::<D>(t, self.parameters);
+        let mut rows = Vec::new();
+        let mut given = vec![[0.0; BLOCK]; self.stages.kept];
+        for (chunk, b) in b.chunks_mut(BLOCK).enumerate() {
+            for i in 0..b.len() {
+                let n = number(chunk * BLOCK + i);
+                let kept = self.block(n / BLOCK);
+                given.iter_mut().zip(kept).for_each(|(row, kept)| row[i] = kept[n % BLOCK]);
+            }
+            for (d, row) in stage.section.run(&uniform, &given, &mut rows).enumerate() {
+                b.iter_mut().zip(row).for_each(|(b, value)| b[d] = *value);
+            }
+        }
+    }
+}
+
+/// The first group is `u`, `F` and `P`, the second `v`.
+impl<const D: usize> StateAtPoints<f64, D> for Points<'_, 2> {
+    fn evaluate(&self, t: f64, velocity_time: f64, first: usize, runs: &mut [StateRun<f64, D>]) {
+        let [state, velocity] = &self.stages.at_times;
+        let uniform = state.uniform::<D>(t, self.parameters);
+        let of_velocity = velocity.uniform::<D>(velocity_time, self.parameters);
+        let mut rows = Vec::new();
+        for (number, run) in (first..).zip(runs) {
+            assert!(number * BLOCK < self.len, "there are {} points", self.len);
+            let kept = self.block(number);
+            let StateRun { u, v, F, P } = run;
+            let places = u.iter_mut().chain(F.as_flattened_mut()).chain(P.as_flattened_mut());
+            let values = state.section.run(&uniform, kept, &mut rows);
+            places.zip(values).for_each(|(place, value)| *place = *value);
+            let values = velocity.section.run(&of_velocity, kept, &mut rows);
+            v.iter_mut().zip(values).for_each(|(place, value)| *place = *value);
+        }
+    }
+
+    fn bytes_per_point(&self) -> usize {
+        self.bytes()
+    }
+}
