@@ -12,6 +12,7 @@ use bytemuck::cast_slice_mut;
 use rayon::prelude::*;
 
 use crate::grid::{BAND_ROWS, Layout, PAD_BELOW};
+use crate::parallel::each_chunk;
 use crate::partition::{Partition, Share};
 
 /// Rows that a particle may be lower than the band it was sorted into before everything is sorted anew.
@@ -86,7 +87,7 @@ impl Bands {
     pub(crate) fn sort<const D: usize>(
         &mut self,
         layout: &Layout<D>,
-        first_node: impl Fn(usize) -> usize + Sync,
+        first_node: &(dyn Fn(usize) -> usize + Sync),
     ) {
         let (height, row) = (self.height, layout.row());
         self.keys.par_iter_mut().zip(&mut self.home).enumerate().for_each(|(p, (key, home))| {
@@ -121,8 +122,8 @@ impl Bands {
         &self,
         layout: &Layout<D>,
         nodes: &mut [N],
-        clear: impl Fn(&mut N) + Sync,
-        add: impl Fn(&mut [N], usize, &[u32]) + Sync,
+        clear: &(dyn Fn(&mut [N]) + Sync),
+        add: &(dyn Fn(&mut [N], usize, &[u32]) + Sync),
     ) where
         N: Send,
     {
@@ -131,7 +132,7 @@ impl Bands {
                 add(piece, first, particles);
             }
         };
-        each(self.height, layout, nodes, clear, add);
+        each(self.height, layout, nodes, clear, &add);
     }
 
     /// As [`scatter`](Self::scatter) for bands that may change their own elements of three arrays on the way:
@@ -140,9 +141,9 @@ impl Bands {
         &mut self,
         layout: &Layout<D>,
         nodes: &mut [N],
-        clear: impl Fn(&mut N) + Sync,
+        clear: &(dyn Fn(&mut [N]) + Sync),
         arrays: (&mut [A], &mut [B], &mut [C]),
-        add: impl Fn(&mut [N], usize, u32, Share<'_, A, B, C>) + Sync,
+        add: &(dyn Fn(&mut [N], usize, u32, Share<'_, A, B, C>) + Sync),
     ) where
         N: Send,
         A: Send,
@@ -154,7 +155,7 @@ impl Bands {
             debug_assert!(false, "bands that are not sorted");
             return;
         };
-        each(*height, layout, nodes, clear, |piece, first, band| {
+        each(*height, layout, nodes, clear, &|piece, first, band| {
             if let Some(share) = shares.take(band) {
                 add(piece, first, band as u32, share);
             }
@@ -167,16 +168,16 @@ fn each<N: Send, const D: usize>(
     height: usize,
     layout: &Layout<D>,
     nodes: &mut [N],
-    clear: impl Fn(&mut N) + Sync,
-    add: impl Fn(&mut [N], usize, usize) + Sync,
+    clear: &(dyn Fn(&mut [N]) + Sync),
+    add: &(dyn Fn(&mut [N], usize, usize) + Sync),
 ) {
     let band_nodes = height * layout.row();
-    nodes.par_chunks_mut(2 * band_nodes).enumerate().for_each(|(pair, piece)| {
-        piece.iter_mut().for_each(&clear);
+    each_chunk(nodes, 2 * band_nodes, &|pair, piece| {
+        clear(piece);
         add(piece, 2 * pair * band_nodes, 2 * pair);
     });
     if let Some(rest) = nodes.get_mut(band_nodes..) {
-        rest.par_chunks_mut(2 * band_nodes).enumerate().for_each(|(pair, piece)| {
+        each_chunk(rest, 2 * band_nodes, &|pair, piece| {
             let band = 2 * pair + 1;
             add(piece, band * band_nodes, band);
         });

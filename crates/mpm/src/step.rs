@@ -1,9 +1,7 @@
 //! One time step: the kernels, one instance for every combination of dimension, weights, integrator and law.
 
 use std::array;
-
-use nalgebra::{RealField, SMatrix, SVector};
-use rayon::prelude::*;
+use std::sync::{Mutex, PoisonError};
 
 use crate::bands::Bands;
 use crate::block::{BLOCK, Block};
@@ -11,11 +9,13 @@ use crate::body_force::BodyForce;
 use crate::fault::{Fault, Planted};
 use crate::grid::{Grid, Layout};
 use crate::material::Law;
+use crate::parallel::{each_chunk, each_chunk_of_three};
 use crate::particles::Particles;
 use crate::simd::{Loop, dispatch};
 use crate::tensor::{determinant, product, real};
 use crate::transfer::{Deposit, Gathered, Node};
 use crate::weights::{HALF_SIZE_LIMIT, Rule, WIDE, first_layer, is_wide};
+use nalgebra::{RealField, SMatrix, SVector};
 
 /// Particles handed to a thread at a time; fixed, so that nothing depends on the number of threads.
 const CHUNK: usize = 1024;
@@ -208,6 +208,23 @@ pub(crate) enum Trouble {
     TooLarge,
 }
 
+/// Adds what particles gave to nodes beyond walls to the mirror images.
+pub(crate) fn fold_ghosts<T: RealField + Copy, const D: usize>(
+    layout: &Layout<D>,
+    c: &Constants<T, D>,
+    nodes: &mut [Node<T, D>],
+) {
+    layout.fold(nodes, |image, ghost, flip| image.add(&c.ghost(ghost).flipped(flip)));
+}
+
+/// As [`fold_ghosts`] for forces alone.
+fn fold_ghost_forces<T: RealField + Copy, const D: usize>(
+    layout: &Layout<D>,
+    nodes: &mut [Node<T, D>],
+) {
+    layout.fold(nodes, |image, ghost, flip| image.add_acceleration(&ghost.flipped(flip)));
+}
+
 /// What came to light in a pass over the particles.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Outcome {
@@ -229,6 +246,23 @@ impl Outcome {
             (a, b) => a.or(b),
         };
         Self { failure, resort: self.resort || other.resort }
+    }
+}
+
+/// What came to light on several threads; in which order does not matter.
+#[derive(Debug, Default)]
+pub(crate) struct Found(Mutex<Outcome>);
+
+impl Found {
+    pub(crate) fn add(&self, outcome: Outcome) {
+        if !outcome.is_nothing() {
+            let mut found = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            *found = found.merge(outcome);
+        }
+    }
+
+    pub(crate) fn all(self) -> Outcome {
+        self.0.into_inner().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -273,6 +307,24 @@ where
     finish_musl(s, rule)
 }
 
+/// From the momenta given to `reprojected` to velocities, with the masses of `nodes`.
+fn finish_reprojection<T: RealField + Copy, const D: usize>(
+    layout: &Layout<D>,
+    c: &Constants<T, D>,
+    nodes: &[Node<T, D>],
+    reprojected: &mut [Node<T, D>],
+) {
+    layout.fold(reprojected, |image, ghost, flip| image.add(&ghost.flipped(flip)));
+    each_chunk(reprojected, CHUNK, &|chunk, new| {
+        for (new, node) in new.iter_mut().zip(&nodes[chunk * CHUNK..]) {
+            let inverse = c.inverse_mass(node);
+            new.values.iter_mut().for_each(|value| *value *= inverse);
+        }
+    });
+    layout.on_walls(reprojected, Node::clear);
+    layout.unfold(reprojected, Node::flipped);
+}
+
 /// MUSL after the solution on the grid.
 #[inline(never)]
 fn finish_musl<T, R, const D: usize, const W: usize>(s: &mut State<T, D>, rule: R) -> Outcome
@@ -283,43 +335,28 @@ where
     let State { particles, constants, nodes, bands, layout, reprojected, .. } = s;
     let (nodes, c) = (&nodes[..], *constants);
     let Particles { x, v, F, mass, .. } = particles;
-    v.par_chunks_mut(CHUNK).zip(x.par_chunks(CHUNK)).zip(F.par_chunks(CHUNK)).for_each(
-        |((v, x), F)| {
-            let mut block = Block::new(c.planted);
-            let blocks = v.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK));
-            for ((v, x), F) in blocks {
-                block.weigh_run(rule, &c, x, F);
-                let gathered = &mut [Gathered::zero(); BLOCK][..x.len()];
-                block.gather(&c.strides, nodes, gathered);
-                for (v, gathered) in v.iter_mut().zip(gathered) {
-                    *v += gathered.acceleration() * c.time_step;
-                }
+    each_chunk(v, CHUNK, &|chunk, v| {
+        let mut block = Block::new(c.planted);
+        let (x, F) = (&x[chunk * CHUNK..], &F[chunk * CHUNK..]);
+        for ((v, x), F) in v.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK)) {
+            block.weigh_run(rule, &c, x, F);
+            let gathered = &mut [Gathered::zero(); BLOCK][..x.len()];
+            block.gather(&c.strides, nodes, gathered);
+            for (v, gathered) in v.iter_mut().zip(gathered) {
+                *v += gathered.acceleration() * c.time_step;
             }
-        },
-    );
+        }
+    });
     let give = |_: &Block<T, D, W>, ids: &[u32], deposits: &mut [Deposit<T, D>; BLOCK]| {
         for (deposit, &p) in deposits.iter_mut().zip(ids) {
             let p = p as usize;
             deposit.level = Node::new(&(v[p] * mass[p]), &SVector::zeros(), T::zero());
         }
     };
-    bands.scatter(
-        layout,
-        reprojected,
-        |node| *node = Node::zero(),
-        |piece, first, ids| {
-            c.scatter(rule, x, F, piece, first, ids, give, |_, _, _| {});
-        },
-    );
-    layout.fold(reprojected, |image, ghost, flip| image.add(&ghost.flipped(flip)));
-    reprojected.par_chunks_mut(CHUNK).zip(nodes.par_chunks(CHUNK)).for_each(|(new, nodes)| {
-        for (new, node) in new.iter_mut().zip(nodes) {
-            let inverse = c.inverse_mass(node);
-            new.values.iter_mut().for_each(|value| *value *= inverse);
-        }
+    bands.scatter(layout, reprojected, &|nodes| nodes.fill(Node::zero()), &|piece, first, ids| {
+        c.scatter(rule, x, F, piece, first, ids, give, |_, _, _| {});
     });
-    layout.on_walls(reprojected, Node::clear);
-    layout.unfold(reprojected, Node::flipped);
+    finish_reprojection(layout, &c, nodes, reprojected);
     let reprojected = if c.planted.is(Fault::NoReprojection) { nodes } else { &reprojected[..] };
     let outcome = advance(particles, bands, c, rule, |block, gathered, _, x, _, F| {
         block.gather(&c.strides, nodes, gathered);
@@ -399,43 +436,36 @@ where
     R: Rule<T, D, W>,
 {
     let Particles { x, v, F, .. } = particles;
-    let chunks = x
-        .par_chunks_mut(CHUNK)
-        .zip(v.par_chunks_mut(CHUNK))
-        .zip(F.par_chunks_mut(CHUNK))
-        .zip(bands.home().par_chunks(CHUNK));
-    chunks
-        .enumerate()
-        .map(|(chunk, (((x, v), F), home))| {
-            let mut outcome = Outcome::default();
-            let mut block = Block::new(c.planted);
-            let mut gathered = [Gathered::zero(); BLOCK];
-            let blocks = x
-                .chunks_mut(BLOCK)
-                .zip(v.chunks_mut(BLOCK))
-                .zip(F.chunks_mut(BLOCK))
-                .zip(home.chunks(BLOCK));
-            for (index, (((x, v), F), home)) in blocks.enumerate() {
-                let first = chunk * CHUNK + index * BLOCK;
-                block.weigh_run(rule, &c, x, F);
-                if c.planted.is(Fault::WeightsOfNewPosition) {
-                    let ahead: Vec<_> =
-                        x.iter().zip(&*v).map(|(x, v)| x + v * c.time_step).collect();
-                    block.weigh_run(rule, &c, &ahead, F);
-                }
-                update(&block, &mut gathered[..x.len()], first, x, v, F);
-                let mut all_well = true;
-                dispatch(Check { c: &c, rule, home, x, F, all_well: &mut all_well });
-                if all_well {
-                    continue;
-                }
-                for (k, ((x, F), &home)) in x.iter().zip(F).zip(home).enumerate() {
-                    outcome = outcome.merge(c.judge(rule, home, x, F, first + k));
-                }
+    let (home, found) = (bands.home(), Found::default());
+    each_chunk_of_three((x, v, F), CHUNK, &|chunk, x, v, F| {
+        let mut outcome = Outcome::default();
+        let mut block = Block::new(c.planted);
+        let mut gathered = [Gathered::zero(); BLOCK];
+        let blocks = x
+            .chunks_mut(BLOCK)
+            .zip(v.chunks_mut(BLOCK))
+            .zip(F.chunks_mut(BLOCK))
+            .zip(home[chunk * CHUNK..].chunks(BLOCK));
+        for (index, (((x, v), F), home)) in blocks.enumerate() {
+            let first = chunk * CHUNK + index * BLOCK;
+            block.weigh_run(rule, &c, x, F);
+            if c.planted.is(Fault::WeightsOfNewPosition) {
+                let ahead: Vec<_> = x.iter().zip(&*v).map(|(x, v)| x + v * c.time_step).collect();
+                block.weigh_run(rule, &c, &ahead, F);
             }
-            outcome
-        })
-        .reduce(Outcome::default, Outcome::merge)
+            update(&block, &mut gathered[..x.len()], first, x, v, F);
+            let mut all_well = true;
+            dispatch(Check { c: &c, rule, home, x, F, all_well: &mut all_well });
+            if all_well {
+                continue;
+            }
+            for (k, ((x, F), &home)) in x.iter().zip(F).zip(home).enumerate() {
+                outcome = outcome.merge(c.judge(rule, home, x, F, first + k));
+            }
+        }
+        found.add(outcome);
+    });
+    found.all()
 }
 
 /// What is wrong with a particle, if anything.
@@ -493,7 +523,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         R: Rule<T, D, W>,
     {
         let (c, Particles { x, F, .. }) = (self.constants, &self.particles);
-        self.bands.sort(&self.layout, |p| {
+        self.bands.sort(&self.layout, &|p| {
             let xi = c.in_cells(&x[p]);
             let layer = |a| first_layer(xi[a], rule.half_size(a, F[p][(a, a)]));
             (0..D).map(|a| layer(a) as usize * c.strides[a]).sum()
@@ -516,29 +546,24 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let Particles { X, x, v, F, mass, volume, .. } = &*particles;
         let c = *constants;
         let forcing = Forcing::new(body_force, X, t, &c);
-        bands.scatter(
-            layout,
-            nodes,
-            |node| *node = Node::zero(),
-            |piece, first, ids| {
-                let level = |block: &Block<T, D, W>, ids: &[u32], deposits: &mut [_; BLOCK]| {
-                    let b = &mut [SVector::zeros(); BLOCK];
-                    forcing.evaluate(ids, block, b);
-                    dispatch(GiveLevel { c: &c, ids, v: Some(v), b, mass, volume, deposits });
-                };
-                c.scatter(rule, x, F, piece, first, ids, level, |block, ids, deposits| {
-                    block.stress(&c, law);
-                    dispatch(GiveSlope { c: &c, block, ids, volume, deposits });
-                });
-            },
-        );
-        layout.fold(nodes, |image, ghost, flip| image.add(&c.ghost(ghost).flipped(flip)));
+        bands.scatter(layout, nodes, &|nodes| nodes.fill(Node::zero()), &|piece, first, ids| {
+            let level = |block: &Block<T, D, W>, ids: &[u32], deposits: &mut [_; BLOCK]| {
+                let b = &mut [SVector::zeros(); BLOCK];
+                forcing.evaluate(ids, block, b);
+                dispatch(GiveLevel { c: &c, ids, v: Some(v), b, mass, volume, deposits });
+            };
+            c.scatter(rule, x, F, piece, first, ids, level, |block, ids, deposits| {
+                block.stress(&c, law);
+                dispatch(GiveSlope { c: &c, block, ids, volume, deposits });
+            });
+        });
+        fold_ghosts(layout, &c, nodes);
     }
 
     /// On the grid: momentum and force to velocity at the end of the step and acceleration.
     pub(crate) fn solve(&mut self, scale: T) {
         let Self { constants: c, nodes, .. } = self;
-        nodes.par_chunks_mut(CHUNK).for_each(|nodes| {
+        each_chunk(nodes, CHUNK, &|_, nodes| {
             for node in nodes {
                 let inverse = c.inverse_mass(node);
                 for a in 0..D {
@@ -573,16 +598,17 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
                 deposit.level = Node::new(&(v[p] * m), &SVector::zeros(), m);
             }
         };
-        bands.scatter(
-            layout,
-            nodes,
-            |node| *node = Node::zero(),
-            |piece, first, ids| {
-                c.scatter(rule, x, F, piece, first, ids, give, |_, _, _| {});
-            },
-        );
-        layout.fold(nodes, |image, ghost, flip| image.add(&c.ghost(ghost).flipped(flip)));
-        nodes.par_chunks_mut(CHUNK).for_each(|nodes| {
+        bands.scatter(layout, nodes, &|nodes| nodes.fill(Node::zero()), &|piece, first, ids| {
+            c.scatter(rule, x, F, piece, first, ids, give, |_, _, _| {});
+        });
+        fold_ghosts(layout, &c, nodes);
+        self.solve_velocity();
+    }
+
+    /// USF, on the grid: momentum to velocity at the start of the step.
+    fn solve_velocity(&mut self) {
+        let Self { constants: c, nodes, .. } = self;
+        each_chunk(nodes, CHUNK, &|_, nodes| {
             for node in nodes {
                 let inverse = c.inverse_mass(node);
                 (0..D).for_each(|a| node.values[a] *= inverse);
@@ -600,31 +626,30 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let Self { particles, constants, nodes, F_next, .. } = self;
         let (nodes, c) = (&nodes[..], *constants);
         let Particles { x, F, .. } = &*particles;
-        let chunks = F_next.par_chunks_mut(CHUNK).zip(x.par_chunks(CHUNK)).zip(F.par_chunks(CHUNK));
-        chunks
-            .enumerate()
-            .map(|(chunk, ((F_next, x), F))| {
-                let mut outcome = Outcome::default();
-                let mut block = Block::new(c.planted);
-                let blocks = F_next.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK));
-                for (index, ((F_next, x), F)) in blocks.enumerate() {
-                    block.weigh_run(rule, &c, x, F);
-                    let gathered = &mut [Gathered::zero(); BLOCK][..x.len()];
-                    block.gather(&c.strides, nodes, gathered);
-                    let first = chunk * CHUNK + index * BLOCK;
-                    for (k, (((F_next, gathered), x), F)) in
-                        F_next.iter_mut().zip(gathered).zip(x).zip(F).enumerate()
-                    {
-                        *F_next = c.stretch(&gathered.velocity_gradient(), F);
-                        if let Some(trouble) = trouble(&rule, &c, x, F_next) {
-                            let failure = Some((trouble, first + k));
-                            outcome = outcome.merge(Outcome { failure, ..Outcome::default() });
-                        }
+        let found = Found::default();
+        each_chunk(F_next, CHUNK, &|chunk, F_next| {
+            let mut outcome = Outcome::default();
+            let mut block = Block::new(c.planted);
+            let (x, F) = (&x[chunk * CHUNK..], &F[chunk * CHUNK..]);
+            let blocks = F_next.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK));
+            for (index, ((F_next, x), F)) in blocks.enumerate() {
+                block.weigh_run(rule, &c, x, F);
+                let gathered = &mut [Gathered::zero(); BLOCK][..x.len()];
+                block.gather(&c.strides, nodes, gathered);
+                let first = chunk * CHUNK + index * BLOCK;
+                for (k, (((F_next, gathered), x), F)) in
+                    F_next.iter_mut().zip(gathered).zip(x).zip(F).enumerate()
+                {
+                    *F_next = c.stretch(&gathered.velocity_gradient(), F);
+                    if let Some(trouble) = trouble(&rule, &c, x, F_next) {
+                        let failure = Some((trouble, first + k));
+                        outcome = outcome.merge(Outcome { failure, ..Outcome::default() });
                     }
                 }
-                outcome
-            })
-            .reduce(Outcome::default, Outcome::merge)
+            }
+            found.add(outcome);
+        });
+        found.all()
     }
 
     /// USF, third pass: force on the grid, from the updated F with the weights of the old one.
@@ -643,7 +668,8 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let Particles { X, x, F, mass, volume, .. } = &*particles;
         let (c, F_next) = (*constants, &F_next[..]);
         let forcing = Forcing::new(body_force, X, t, &c);
-        bands.scatter(layout, nodes, Node::clear_acceleration, |piece, first, ids| {
+        let clear = |nodes: &mut [Node<T, D>]| nodes.iter_mut().for_each(Node::clear_acceleration);
+        bands.scatter(layout, nodes, &clear, &|piece, first, ids| {
             let level = |block: &Block<T, D, W>, ids: &[u32], deposits: &mut [_; BLOCK]| {
                 let b = &mut [SVector::zeros(); BLOCK];
                 forcing.evaluate(ids, block, b);
@@ -657,13 +683,13 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
                 dispatch(GiveSlope { c: &c, block, ids, volume, deposits });
             });
         });
-        layout.fold(nodes, |image, ghost, flip| image.add_acceleration(&ghost.flipped(flip)));
+        fold_ghost_forces(layout, nodes);
     }
 
     /// USF, on the grid: force to acceleration, velocity to that at the end of the step.
     fn solve_acceleration(&mut self, scale: T) {
         let Self { constants: c, nodes, .. } = self;
-        nodes.par_chunks_mut(CHUNK).for_each(|nodes| {
+        each_chunk(nodes, CHUNK, &|_, nodes| {
             for node in nodes {
                 let inverse = c.inverse_mass(node) * scale;
                 for a in 0..D {

@@ -5,8 +5,6 @@
 //! twice. The sums are those of two passes, in the same order, so that a run may be taken up between any two steps: what
 //! the grid holds by then is formed anew from the particles.
 
-use std::sync::{Mutex, PoisonError};
-
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::block::{BLOCK, Block};
@@ -16,7 +14,7 @@ use crate::material::Law;
 use crate::particles::Particles;
 use crate::partition::Share;
 use crate::simd::{Loop, dispatch};
-use crate::step::{Constants, Forcing, GiveSlope, Outcome, State};
+use crate::step::{Constants, Forcing, Found, GiveSlope, Outcome, State, fold_ghosts};
 use crate::transfer::{Deposit, Gathered, Node};
 use crate::weights::Rule;
 
@@ -67,18 +65,14 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let Particles { X, x, v, F, mass, volume, .. } = particles;
         let forcing = Forcing::new(body_force, X, t_next, c);
         let step = Sweep { c, rule, law, nodes, mass, volume, forcing };
-        let found = Mutex::new(Outcome::default());
-        let clear = |node: &mut Node<T, D>| *node = Node::zero();
-        bands.sweep(layout, next, clear, (x, v, F), |piece, first, band, elements| {
-            let outcome = step.band(piece, first, band, elements);
-            if !outcome.is_nothing() {
-                let mut found = found.lock().unwrap_or_else(PoisonError::into_inner);
-                *found = found.merge(outcome);
-            }
+        let found = Found::default();
+        let clear = |nodes: &mut [Node<T, D>]| nodes.fill(Node::zero());
+        bands.sweep(layout, next, &clear, (x, v, F), &|piece, first, band, elements| {
+            found.add(step.band(piece, first, band, elements));
         });
         std::mem::swap(nodes, next);
-        layout.fold(nodes, |image, ghost, flip| image.add(&c.ghost(ghost).flipped(flip)));
-        found.into_inner().unwrap_or_else(PoisonError::into_inner)
+        fold_ghosts(layout, c, nodes);
+        found.all()
     }
 }
 

@@ -5,9 +5,9 @@
 
 use mmsmith_mpm::{Material, Particles};
 use mmsmith_solutions::{Real, Solution};
-use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::measure::each_group;
 use crate::norms::PerNorm;
 
 /// Particles in a group that one thread works on; fixed, so that sums do not depend on the number of threads.
@@ -146,8 +146,7 @@ impl<const D: usize> Totals<D> {
             }
             totals
         };
-        let groups: Vec<_> =
-            (0..particles.len().div_ceil(GROUP)).into_par_iter().map(group).collect();
+        let groups = each_group(particles.len().div_ceil(GROUP), &group);
         let mut total = Self::of_none(0);
         for next in groups {
             if next.error > total.error || next.error.is_nan() {

@@ -152,6 +152,12 @@ fn errors<T: Real, const D: usize>(
     }
 }
 
+/// What `group` makes of each number below `count`, on the threads of the pool; through a reference, so that their
+/// machinery is compiled once for each kind of result.
+pub(crate) fn each_group<R: Send>(count: usize, group: &(dyn Fn(usize) -> R + Sync)) -> Vec<R> {
+    (0..count).into_par_iter().map(group).collect()
+}
+
 /// The norms of `N` magnitudes over `count` particles, and the particle whose first magnitude is the largest.
 ///
 /// `magnitudes` is given the number of a first particle, a count, and the rows to write their magnitudes to, at most `RUNS`
@@ -181,7 +187,7 @@ pub(crate) fn over_particles<const N: usize>(
         }
         (tallies, worst)
     };
-    let groups: Vec<_> = (0..count.div_ceil(GROUP)).into_par_iter().map(group).collect();
+    let groups = each_group(count.div_ceil(GROUP), &group);
     let mut total = [Tally::default(); N];
     let mut worst = (0.0, 0);
     for (tallies, candidate) in &groups {

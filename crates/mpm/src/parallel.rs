@@ -1,0 +1,25 @@
+//! Loops over chunks of arrays, side by side on the threads of the pool.
+//!
+//! What is done with a chunk is called through a reference: the machinery of the pool is then compiled once for each kind
+//! of element, not once for each scheme.
+
+use rayon::prelude::*;
+
+/// Calls `work` with the number of each chunk of `size` elements, and the chunk.
+pub(crate) fn each_chunk<A: Send>(
+    array: &mut [A],
+    size: usize,
+    work: &(dyn Fn(usize, &mut [A]) + Sync),
+) {
+    array.par_chunks_mut(size).enumerate().for_each(|(number, chunk)| work(number, chunk));
+}
+
+/// As [`each_chunk`] for three arrays of one length, chunk by chunk together.
+pub(crate) fn each_chunk_of_three<A: Send, B: Send, C: Send>(
+    (a, b, c): (&mut [A], &mut [B], &mut [C]),
+    size: usize,
+    work: &(dyn Fn(usize, &mut [A], &mut [B], &mut [C]) + Sync),
+) {
+    let chunks = a.par_chunks_mut(size).zip(b.par_chunks_mut(size)).zip(c.par_chunks_mut(size));
+    chunks.enumerate().for_each(|(number, ((a, b), c))| work(number, a, b, c));
+}
