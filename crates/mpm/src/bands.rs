@@ -33,6 +33,12 @@ pub(crate) struct Bands {
     keys: Vec<u32>,
 }
 
+/// What particles give to a piece of the grid: the piece, its first node, and the numbers of the particles.
+type Scatter<'a, N> = dyn Fn(&mut [N], usize, &[u32]) + Sync + 'a;
+
+/// As [`Scatter`] with the band's number, where its particles' elements of three arrays may change.
+type Sweep<'a, N, A, B, C> = dyn Fn(&mut [N], usize, u32, Share<'_, A, B, C>) + Sync + 'a;
+
 impl Bands {
     /// Bytes that sorting needs for each node.
     pub(crate) const BYTES_PER_NODE: usize = size_of::<u32>();
@@ -123,7 +129,7 @@ impl Bands {
         layout: &Layout<D>,
         nodes: &mut [N],
         clear: &(dyn Fn(&mut [N]) + Sync),
-        add: &(dyn Fn(&mut [N], usize, &[u32]) + Sync),
+        add: &Scatter<'_, N>,
     ) where
         N: Send,
     {
@@ -143,7 +149,7 @@ impl Bands {
         nodes: &mut [N],
         clear: &(dyn Fn(&mut [N]) + Sync),
         arrays: (&mut [A], &mut [B], &mut [C]),
-        add: &(dyn Fn(&mut [N], usize, u32, Share<'_, A, B, C>) + Sync),
+        add: &Sweep<'_, N, A, B, C>,
     ) where
         N: Send,
         A: Send,

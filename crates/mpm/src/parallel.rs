@@ -14,11 +14,14 @@ pub(crate) fn each_chunk<A: Send>(
     array.par_chunks_mut(size).enumerate().for_each(|(number, chunk)| work(number, chunk));
 }
 
+/// What is done with a chunk of three arrays, by its number.
+type OfThree<'a, A, B, C> = dyn Fn(usize, &mut [A], &mut [B], &mut [C]) + Sync + 'a;
+
 /// As [`each_chunk`] for three arrays of one length, chunk by chunk together.
 pub(crate) fn each_chunk_of_three<A: Send, B: Send, C: Send>(
     (a, b, c): (&mut [A], &mut [B], &mut [C]),
     size: usize,
-    work: &(dyn Fn(usize, &mut [A], &mut [B], &mut [C]) + Sync),
+    work: &OfThree<'_, A, B, C>,
 ) {
     let chunks = a.par_chunks_mut(size).zip(b.par_chunks_mut(size)).zip(c.par_chunks_mut(size));
     chunks.enumerate().for_each(|(number, ((a, b), c))| work(number, a, b, c));
