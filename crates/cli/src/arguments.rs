@@ -172,7 +172,7 @@ pub(crate) struct ConvergeOptions {
     #[arg(long, value_name = "N,...", required = true, value_delimiter = ',', value_parser = positive_count)]
     pub(crate) cells: Vec<usize>,
     /// CFL numbers, separated by commas, for orders in time on one grid
-    #[arg(long, value_name = "X,...", value_delimiter = ',', value_parser = positive_number, conflicts_with = "cfl")]
+    #[arg(long, value_name = "X,...", value_delimiter = ',', allow_negative_numbers = true, value_parser = positive_number, conflicts_with = "cfl")]
     pub(crate) cfls: Vec<f64>,
     /// Orders to be met, or else exit status 1: a number for u, or by field and norm, such as u=2,F=1,P.l1=1. With --cfls
     /// they are orders in time, of the differences on one grid
@@ -180,7 +180,7 @@ pub(crate) struct ConvergeOptions {
     pub(crate) expect: Option<String>,
     /// How far the order on the finest pair may be from the expected one; 0.1 when left out. With it a missed order gives
     /// exit status 1
-    #[arg(long, value_name = "X", value_parser = positive_number)]
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) tolerance: Option<f64>,
     #[command(flatten)]
     pub(crate) kept: KeepOptions,
@@ -214,22 +214,22 @@ pub(crate) struct StabilityOptions {
     #[arg(long, value_name = "NAME=VALUE,...", value_parser = variation, conflicts_with_all = ["at", "search"])]
     pub(crate) over: Vec<(String, Vec<String>)>,
     /// How close the stable and the unstable CFL number come, on P-waves, whose number is the larger one
-    #[arg(long, value_name = "X", default_value_t = 0.01, value_parser = positive_number)]
+    #[arg(long, value_name = "X", default_value_t = 0.01, allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) width: f64,
     /// CFL number to start from; an eighth of P-waves' when left out. It is halved until it is stable
-    #[arg(long, value_name = "X", value_parser = positive_number)]
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) lower: Option<f64>,
     /// CFL number that is thought unstable; P-waves' own when left out. It is raised until it is unstable
-    #[arg(long, value_name = "X", value_parser = positive_number)]
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) upper: Option<f64>,
     /// A run is unstable with an error of u above this multiple of a reference run's, at an eighth of P-waves' time step
-    #[arg(long, value_name = "X", default_value_t = verify::Criteria::default().error_multiple, value_parser = positive_number)]
+    #[arg(long, value_name = "X", default_value_t = verify::Criteria::default().error_multiple, allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) error_multiple: f64,
     /// A run is unstable if it gains, in a period, more than this multiple of the exact motion's largest energy
-    #[arg(long, value_name = "X", default_value_t = verify::Criteria::default().energy_rate, value_parser = positive_number)]
+    #[arg(long, value_name = "X", default_value_t = verify::Criteria::default().energy_rate, allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) energy_rate: f64,
     /// Judge the run at this CFL number alone; exit status 1 if it is unstable
-    #[arg(long, value_name = "CFL", value_parser = positive_number, conflicts_with = "search")]
+    #[arg(long, value_name = "CFL", allow_negative_numbers = true, value_parser = positive_number, conflicts_with = "search")]
     pub(crate) at: Option<f64>,
     /// Look for failures among random settings with CFL numbers up to --cfl on P-waves, which are believed stable; exit
     /// status 1 if there are any
@@ -262,7 +262,7 @@ pub(crate) struct TradeoffOptions {
     #[arg(long, value_name = "TIME", default_value = "2m", value_parser = seconds)]
     pub(crate) budget: f64,
     /// Name the cheapest setting with at most this error, and run it once more to prove it; exit status 1 if there is none
-    #[arg(long, value_name = "X", value_parser = positive_number)]
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) tolerance: Option<f64>,
     /// Name the most accurate setting whose steps take at most this time, and run it once more to prove it; exit status 1
     /// if there is none
@@ -278,7 +278,7 @@ pub(crate) struct TradeoffOptions {
     #[arg(long, value_enum, default_value_t = Against::Wall)]
     pub(crate) against: Against,
     /// End time in periods of the solution
-    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = positive_number)]
+    #[arg(long, value_name = "X", default_value_t = 1.0, allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) periods: f64,
     /// Number of threads; 1 when left out, and all cores for comparison
     #[arg(long, value_name = "N", value_parser = thread_count)]
@@ -376,13 +376,13 @@ pub(crate) struct ScoreOptions {
     #[arg(long, value_name = "DT", default_value_t = 0.0, allow_negative_numbers = true, value_parser = finite_number)]
     pub(crate) velocity_lag: f64,
     /// The time in which frames are expected, in periods of the solution
-    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = positive_number)]
+    #[arg(long, value_name = "X", default_value_t = 1.0, allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) periods: f64,
     /// Cell counts along the solution's cell length, one for each recording
     #[arg(long, value_name = "N,...", value_delimiter = ',', value_parser = positive_count, conflicts_with = "h")]
     pub(crate) cells: Vec<usize>,
     /// Mesh sizes, one for each recording; estimated from the particles when neither is given
-    #[arg(long, value_name = "H,...", value_delimiter = ',', value_parser = positive_number)]
+    #[arg(long, value_name = "H,...", value_delimiter = ',', allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) h: Vec<f64>,
     #[command(flatten)]
     pub(crate) parameters: ParameterOptions,
@@ -462,10 +462,10 @@ pub(crate) struct SchemeOptions {
     #[arg(long, value_name = "N", value_parser = positive_count)]
     pub(crate) ppc: Option<usize>,
     /// Time step times wave speed over grid spacing
-    #[arg(long, value_name = "X", default_value_t = 0.4, value_parser = positive_number)]
+    #[arg(long, value_name = "X", default_value_t = 0.4, allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) cfl: f64,
     /// End time in periods of the solution
-    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = positive_number)]
+    #[arg(long, value_name = "X", default_value_t = 1.0, allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) periods: f64,
     /// How much of a ring is modelled; a quarter where symmetry allows it
     #[arg(long, value_enum)]

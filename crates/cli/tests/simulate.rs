@@ -315,6 +315,7 @@ fn bad_input_is_met_with_what_would_be_right() {
     refuses(place, "run ring --threads 0", &["--threads", "from 1"]);
     refuses(place, "run ring --cfl=-0.4", &["--cfl", "positive"]);
     refuses(place, "run ring --cfl nan", &["--cfl", "positive"]);
+    refuses(place, "run ring --cfl -0.4", &["--cfl", "positive"]);
     refuses(place, "run ring --cfl 1e-300", &["steps"]);
     refuses(place, "run ring --cells 99999999", &["--cells 99999999", "GiB"]);
     refuses(place, "run ring --extent full --cells 18446744073709551615", &["steps"]);
