@@ -262,19 +262,21 @@ mod tests {
 
     #[test]
     fn forces_do_the_work_that_gradients_do() {
-        let force = Matrix3::new(0.4, -1.2, 0.9, 2.1, 0.6, -0.3, 1.7, -0.8, 0.2);
-        for q in PLACES.map(Vector3::from) {
-            let (u, slopes) = in_components(&q);
-            for coordinates in [Coordinates::Cartesian, Coordinates::Polar, Coordinates::Spherical]
-            {
-                let row = coordinates.row(&q);
-                // Cartesian rows have nothing in common that is used.
-                let row = row.or_else(|| Coordinates::Polar.row(&q)).unwrap();
-                let H = coordinates.gradient(&u, &slopes, q[0].recip(), &row);
-                let (values, factors) = coordinates.transposed_gradient(&force, q[0].recip(), &row);
-                let work = values.dot(&u) + factors.dot(&slopes);
-                assert!((work - force.dot(&H)).abs() < 1e-13 * work.abs(), "{coordinates:?}");
-            }
+        fn check<const D: usize>(coordinates: Coordinates, q: [f64; 3]) {
+            let number = |k: usize| (1.7 * k as f64 + q[0]).sin();
+            let u = SVector::<f64, D>::from_fn(|c, _| number(c));
+            let slopes = SMatrix::<f64, D, D>::from_fn(|c, k| number(3 + 3 * c + k));
+            let force = SMatrix::<f64, D, D>::from_fn(|c, k| number(12 + 3 * c + k));
+            let row = coordinates.row(&SVector::from_fn(|k, _| q[k])).unwrap();
+            let H = coordinates.gradient(&u, &slopes, q[0].recip(), &row);
+            let (values, factors) = coordinates.transposed_gradient(&force, q[0].recip(), &row);
+            let work = values.dot(&u) + factors.dot(&slopes);
+            let off = (work - force.dot(&H)).abs();
+            assert!(off < 1e-14 * force.norm() * H.norm(), "{coordinates:?} {q:?}: {off:e}");
+        }
+        for q in PLACES {
+            check::<2>(Coordinates::Polar, q);
+            check::<3>(Coordinates::Spherical, q);
         }
     }
 
