@@ -44,7 +44,7 @@ pub(crate) struct Row<const D: usize> {
     pub(crate) frame: SMatrix<f64, D, D>,
     /// `1/sin(theta)` and `cot(theta)` of the polar angle; one and zero in polar coordinates.
     cosecant: f64,
-    cotangent: f64,
+    pub(crate) cotangent: f64,
 }
 
 impl Coordinates {

@@ -554,6 +554,9 @@ impl<const D: usize> TotalLagrangian<D> {
                     if planted.is(Fault::HoopShearDropped) {
                         values[1][i] = 0.0;
                     }
+                    if planted.is(Fault::CotangentDropped) && D == 3 {
+                        values[1][i] -= force[(2, 2)] * at.cotangent * self.reciprocal_radius[i];
+                    }
                 }
                 for c in 0..D {
                     for k in 0..D {
