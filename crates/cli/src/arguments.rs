@@ -443,7 +443,7 @@ pub(crate) struct SchemeOptions {
     /// said a lattice, and Gauss points in the total frame for a body that is not held between sliding walls
     #[arg(long, value_enum)]
     pub(crate) layout: Option<Layout>,
-    /// Coordinates of the background grid; where nothing is said polar for rings in the total frame
+    /// Coordinates of the background grid; where nothing is said polar for rings and spherical for shells in the total frame
     #[arg(long, value_enum)]
     pub(crate) grid: Option<Grid>,
     /// Speed that the CFL number refers to
@@ -467,7 +467,7 @@ pub(crate) struct SchemeOptions {
     /// End time in periods of the solution
     #[arg(long, value_name = "X", default_value_t = 1.0, allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) periods: f64,
-    /// How much of a ring is modelled; a quarter where symmetry allows it
+    /// How much of a ring or a shell is modelled; the part between planes of symmetry where there are such
     #[arg(long, value_enum)]
     pub(crate) extent: Option<Extent>,
     /// Shift of the particles' lattice along every axis, in units of their distance, from -0.5 to 0.5
@@ -527,6 +527,7 @@ impl SchemeOptions {
             settled.grid.get_or_insert(match verify::TotalScheme::coordinates_for(exact) {
                 verify::Coordinates::Cartesian => Grid::Cartesian,
                 verify::Coordinates::Polar => Grid::Polar,
+                verify::Coordinates::Spherical => Grid::Spherical,
             });
         }
         settled
@@ -657,6 +658,8 @@ choices!(
         Cartesian,
         /// Radius and angle
         Polar,
+        /// Radius, polar angle and azimuth, without a cone of 45 degrees about the third axis
+        Spherical,
     }
 );
 choices!(
@@ -669,7 +672,7 @@ choices!(
     }
 );
 choices!(
-    /// How much of a ring.
+    /// How much of a ring or a shell.
     Extent => verify::Extent {
         /// The part between the planes of symmetry
         Quarter,

@@ -31,11 +31,11 @@ pub(crate) use tradeoff::tradeoff;
 
 use anyhow::{Context, Result};
 use mmsmith_solutions::AnySolution;
-use mmsmith_verify::{Arithmetic, Case, plan};
+use mmsmith_verify::{Arithmetic, Case, POLAR_ANGLES, plan};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::arguments::{Extent, Frame, Precision, SchemeOptions};
+use crate::arguments::{Extent, Frame, Grid, Precision, SchemeOptions};
 use crate::library::Selection;
 use crate::{memory, terminal};
 
@@ -118,7 +118,7 @@ fn settings(
     cfl: impl Serialize,
 ) -> Value {
     let (mass, composition) = scheme::echo(options);
-    json!({
+    let mut settings = json!({
         "version": env!("CARGO_PKG_VERSION"),
         "solution": selection.name(),
         "parameters": selection.parameters(),
@@ -140,7 +140,11 @@ fn settings(
         "extent": extent,
         "precision": options.precision,
         "threads": rayon::current_num_threads(),
-    })
+    });
+    if options.grid() == Grid::Spherical {
+        settings["polar_angles"] = json!(POLAR_ANGLES);
+    }
+    settings
 }
 
 /// One line that says what was simulated.

@@ -4,6 +4,7 @@ mod command;
 
 use command::{keys, mms, names, read_json, refuses};
 use serde_json::Value;
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
 const ROW: &str = "cells cfl cpu_s dt errors h particle_steps_per_s particles status steps wall_s";
 
@@ -301,6 +302,25 @@ fn the_total_frame_echoes_its_scheme() {
 }
 
 #[test]
+fn a_shell_says_which_part_of_it_is_simulated() {
+    let place = tempfile::tempdir().unwrap();
+    let call = "run sphere-shell --cells 4 --cfl 0.2 --periods 0.1 --frame total --shape bspline3 \
+                --json row.json --vtk frames --frames 2";
+    let called = mms(place.path(), call);
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    let part = "spherical grid from 45 to 90 degrees off the third axis";
+    assert!(called.stdout.contains(part), "{}", called.stdout);
+    let result = read_json(&place.path().join("row.json"));
+    assert_row(&result["result"]);
+    assert_eq!(result["result"]["status"], "ok");
+    assert_eq!(result["result"]["particles"], 2 * 3 * 5 * 64);
+    assert_eq!(result["settings"]["grid"], "spherical");
+    let angles = &result["settings"]["polar_angles"];
+    assert_eq!(*angles, serde_json::json!([FRAC_PI_4, FRAC_PI_2]));
+    assert_eq!(names(&place.path().join("frames")).len(), 3);
+}
+
+#[test]
 fn bad_input_is_met_with_what_would_be_right() {
     let place = tempfile::tempdir().unwrap();
     let place = place.path();
@@ -354,8 +374,21 @@ fn bad_input_is_met_with_what_would_be_right() {
     refuses(place, &format!("{total} --cells 1"), &["at least 2"]);
     let square = "run ring --frame total --shape bspline3 --grid cartesian";
     refuses(place, square, &["cartesian", "polar"]);
+    refuses(place, "run sphere-shell", &["--frame total", "--grid spherical"]);
+    refuses(place, "run ring --grid spherical", &["--grid spherical", "--frame total"]);
     let shell = "run sphere-shell --frame total --shape bspline3";
-    refuses(place, shell, &["spherical shells", "mms check"]);
+    for (call, parts) in [
+        (format!("{shell} --grid polar"), ["polar", "spherical for a shell"]),
+        (format!("{shell} --grid cartesian"), ["cartesian", "spherical for a shell"]),
+        (format!("{shell} --extent full"), ["extent = full", "quarter on a spherical grid"]),
+        (format!("{total} --grid spherical"), ["spherical", "cartesian for a box"]),
+        (
+            "run ring --frame total --shape bspline3 --grid spherical".into(),
+            ["spherical", "polar for a ring"],
+        ),
+    ] {
+        refuses(place, &call, &parts);
+    }
     refuses(place, "converge ring --cells 8,16 --cfls 0.1,0.2", &["--cfls", "one grid"]);
     refuses(place, "converge ring --cells 8,x", &["--cells"]);
 }

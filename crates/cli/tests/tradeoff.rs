@@ -97,7 +97,10 @@ fn a_short_sweep_keeps_its_budget_and_its_promises() {
 fn what_cannot_be_swept_is_refused() {
     let place = tempfile::tempdir().expect("a folder");
     let place = place.path();
-    refuses(place, "tradeoff sphere-shell --budget 1s --json a.json", &["does not model"]);
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+    let lawless = format!("{root}/tests/data/specs/materials/skew-2d-energy.toml");
+    let call = format!("tradeoff {lawless} --budget 1s --json a.json");
+    refuses(place, &call, &["solver's laws are written by hand, and it has none"]);
     refuses(place, "tradeoff ring --budget 2x", &["--budget", "90s, 2m or 1h"]);
     refuses(place, "tradeoff ring --budget=-1s", &["--budget", "90s, 2m or 1h"]);
     refuses(place, "tradeoff rings --budget 1s", &["did you mean 'ring'"]);

@@ -179,6 +179,12 @@ pub enum SetupError {
         /// The grid's dimension.
         dimension: usize,
     },
+    /// Spherical coordinates in a dimension other than three.
+    #[error("spherical grids are three-dimensional; this one has dimension {dimension}")]
+    SphericalDimension {
+        /// The grid's dimension.
+        dimension: usize,
+    },
     /// GIMP boxes of particles whose domains are none.
     #[error(
         "the domain of particle {particle} is not a box along the axes, which GIMP weights need; use those of CPDI"

@@ -79,6 +79,8 @@ pub enum Fault {
     HoopStressDropped,
     /// Total frame: the shear stress left out of the balance around.
     HoopShearDropped,
+    /// Total frame: the hoop stress around the third axis left out of the balance along meridians.
+    CotangentDropped,
     /// Total frame: given tractions with the wrong sign.
     TractionSign,
     /// Total frame: the inertia of sides with a given motion left out of the balance inside.

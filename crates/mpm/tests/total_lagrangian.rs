@@ -4,7 +4,8 @@
 #![allow(clippy::unwrap_used)]
 
 use mmsmith_mpm::total_lagrangian::{
-    Axis, Composition, Coordinates, End, Grid, Layout, MassMatrix, Scheme, TotalLagrangian,
+    Axis, Composition, Coordinates, End, Grid, Layout, MassMatrix, Quantity, Scheme, Side,
+    TotalLagrangian,
 };
 use mmsmith_mpm::{Material, NoBodyForce, SetupError, StepError};
 use nalgebra::{SMatrix, SVector, Vector1, Vector2, vector};
@@ -47,6 +48,38 @@ fn ring() -> Grid<2> {
     ring.axes[1] =
         Axis { lower: 0.0, upper: std::f64::consts::TAU, cells: 16, ends: [End::Periodic; 2] };
     ring
+}
+
+/// A part of a spherical shell between two cones and two half planes, free on all sides.
+fn shell() -> Grid<3> {
+    let ends = [End::Free; 2];
+    Grid {
+        axes: [
+            Axis { lower: 0.5, upper: 1.0, cells: 2, ends },
+            Axis { lower: 0.7, upper: 1.9, cells: 4, ends },
+            Axis { lower: 0.2, upper: 1.1, cells: 3, ends },
+        ],
+        coordinates: Coordinates::Spherical,
+        per_cell: 4,
+        layout: Layout::Gauss,
+    }
+}
+
+/// The outward normal of a side.
+fn normal<const D: usize>(
+    coordinates: Coordinates,
+    side: Side,
+    X: &SVector<f64, D>,
+) -> SVector<f64, D> {
+    let unit = |axis: usize| SVector::<f64, D>::from_fn(|i, _| f64::from(u8::from(i == axis)));
+    let along = X.normalize();
+    let axis = match (coordinates, side.axis) {
+        (Coordinates::Cartesian, axis) => unit(axis),
+        (_, 0) => along,
+        (Coordinates::Polar, _) | (_, 2) => (unit(1) * X[0] - unit(0) * X[1]).normalize(),
+        (Coordinates::Spherical, _) => (along * along[2] - unit(2)).normalize(),
+    };
+    if side.upper { axis } else { -axis }
 }
 
 /// A body set in motion without regularity.
@@ -123,6 +156,7 @@ fn energy_is_kept_to_the_order_of_the_composition() {
     // Tangential motion and its connection terms are in the energy, too.
     check(&sector(), 3, Composition::Order4, 1.5e-3);
     check(&ring(), 3, Composition::Order4, 1.5e-3);
+    check(&shell(), 3, Composition::Order4, 1.5e-3);
 }
 
 #[test]
@@ -151,24 +185,83 @@ fn a_body_whose_velocities_are_reversed_returns() {
 }
 
 #[test]
-fn polar_coordinates_give_the_cartesian_fields() {
-    let mut grid = sector();
-    grid.axes[1].cells = 12;
-    let mut body =
-        TotalLagrangian::new(grid, scheme(5, Composition::Order2), SOFT, DENSITY, 1e-3).unwrap();
-    let shear = SMatrix::<f64, 2, 2>::new(0.1, 0.3, -0.2, 0.05);
-    let u: Vec<_> = body.positions().iter().map(|X| shear * X).collect();
-    let v: Vec<_> = body.positions().iter().map(|X| vector![1.0, X[0] - 2.0 * X[1]]).collect();
-    body.start(&u, &v).unwrap();
-    let particles = body.observe();
-    let area: f64 = particles.volume.iter().sum();
-    assert!((area - 0.5 * 1.2 * (1.0 - 0.25)).abs() < 1e-14);
-    for p in 0..particles.len() {
-        // Cosine and sine are no splines, but quintic ones are close.
-        assert!((particles.F[p] - SMatrix::identity() - shear).norm() < 1e-5);
-        assert!((particles.x[p] - particles.X[p] - u[p]).norm() < 1e-6);
-        assert!((particles.v[p] - v[p]).norm() < 1e-6);
+fn curvilinear_coordinates_give_the_cartesian_fields() {
+    fn check<const D: usize>(grid: Grid<D>, content: f64) {
+        let scheme = scheme(5, Composition::Order2);
+        let mut body = TotalLagrangian::new(grid, scheme, SOFT, DENSITY, 1e-3).unwrap();
+        let shear = affine::<D>();
+        let spin = SMatrix::<f64, D, D>::from_fn(|i, k| (i as f64 - k as f64) * 2.0);
+        let u: Vec<_> = body.positions().iter().map(|X| shear * X).collect();
+        let v: Vec<_> = body.positions().iter().map(|X| spin * X + SVector::repeat(1.0)).collect();
+        body.start(&u, &v).unwrap();
+        let particles = body.observe();
+        let volume: f64 = particles.volume.iter().sum();
+        assert!((volume - content).abs() < 1e-13, "{volume} instead of {content}");
+        let mass: f64 = particles.mass.iter().sum();
+        assert!((mass - DENSITY * content).abs() < 1e-13);
+        for p in 0..particles.len() {
+            // Cosine and sine are no splines, but quintic ones are close.
+            assert!((particles.F[p] - SMatrix::identity() - shear).norm() < 1e-5);
+            assert!((particles.x[p] - particles.X[p] - u[p]).norm() < 1e-6);
+            assert!((particles.v[p] - v[p]).norm() < 2e-6);
+        }
     }
+    let (mut sector, mut shell) = (sector(), shell());
+    sector.axes[1].cells = 12;
+    (shell.axes[1].cells, shell.axes[2].cells) = (12, 9);
+    check(sector, 0.5 * 1.2 * (1.0 - 0.25));
+    check(shell, 0.9 * (0.7_f64.cos() - 1.9_f64.cos()) * (1.0 - 0.125) / 3.0);
+}
+
+/// A displacement gradient without any symmetry.
+fn affine<const D: usize>() -> SMatrix<f64, D, D> {
+    SMatrix::from_fn(|i, k| [[0.1, 0.3, -0.15], [-0.2, 0.05, 0.1], [0.07, -0.12, -0.08]][i][k])
+}
+
+/// What is far from radial has all terms of gradients and forces; where one is wrong the body moves by an amount that does not
+/// depend on the grid.
+#[test]
+fn a_homogeneous_deformation_is_in_equilibrium_with_its_tractions() {
+    fn check<const D: usize>(grid: &Grid<D>, dt: f64) {
+        let H = affine::<D>();
+        let F = SMatrix::identity() + H;
+        let E = (F.transpose() * F - SMatrix::identity()) * 0.5;
+        let P = F * (SMatrix::identity() * (LAMBDA * E.trace()) + E * (2.0 * MU));
+        let moved = |factor: usize| {
+            let mut grid = grid.clone();
+            for axis in &mut grid.axes {
+                (axis.cells, axis.ends) = (axis.cells * factor, [End::Loaded; 2]);
+            }
+            let coordinates = grid.coordinates;
+            let scheme = scheme(3, Composition::Order4);
+            let mut body = TotalLagrangian::new(grid, scheme, SOFT, DENSITY, dt).unwrap();
+            let u: Vec<_> = body.positions().iter().map(|X| H * X).collect();
+            let traction = |of: Quantity,
+                            side: Side,
+                            X: &[SVector<f64, D>],
+                            _: f64,
+                            values: &mut [SVector<f64, D>]| {
+                assert_eq!(of, Quantity::Traction);
+                let on = |X| P * normal(coordinates, side, X);
+                values.iter_mut().zip(X).for_each(|(value, X)| *value = on(X));
+            };
+            body.start(&u, &vec![SVector::zeros(); u.len()]).unwrap();
+            (0..20).for_each(|_| body.step_with_boundary(&NoBodyForce, &traction).unwrap());
+            let particles = body.observe();
+            let off = (0..u.len()).map(|p| (particles.x[p] - particles.X[p] - u[p]).norm());
+            off.fold(0.0, f64::max)
+        };
+        let (coarse, fine) = (moved(1), moved(2));
+        if grid.coordinates == Coordinates::Cartesian {
+            assert!(coarse < 1e-13 && fine < 1e-13, "{coarse:e} {fine:e}");
+        } else {
+            let order = (coarse / fine).log2();
+            assert!(fine < 1e-4 && order > 3.8, "{coarse:e} {fine:e}, {order}");
+        }
+    }
+    check(&open_box::<3>(2), 1e-3);
+    check(&sector(), 1e-3);
+    check(&shell(), 1e-3);
 }
 
 #[test]
@@ -251,6 +344,19 @@ fn set_ups_that_make_no_sense_are_refused() {
     let polar = Grid { coordinates: Coordinates::Polar, ..open_box::<1>(4) };
     let error = TotalLagrangian::new(polar, fine.1, SOFT, DENSITY, 1e-3).unwrap_err();
     assert_eq!(error, SetupError::PolarDimension { dimension: 1 });
+    has(
+        message(&|(grid, _, _)| grid.coordinates = Coordinates::Spherical),
+        "spherical grids are three-dimensional; this one has dimension 2",
+    );
+    for (axis, [lower, upper], part) in [
+        (0, [0.0, 1.0], "the inner radius"),
+        (1, [0.0, 1.5], "the least polar angle"),
+        (1, [1.0, 3.2], "pi minus the largest polar angle"),
+    ] {
+        let mut grid = shell();
+        (grid.axes[axis].lower, grid.axes[axis].upper) = (lower, upper);
+        has(TotalLagrangian::new(grid, fine.1, SOFT, DENSITY, 1e-3).unwrap_err(), part);
+    }
     let mut body = TotalLagrangian::new(fine.0, fine.1, SOFT, DENSITY, 1e-3).unwrap();
     assert!(matches!(body.start(&[], &[]), Err(SetupError::LengthMismatch { found: 0, .. })));
 }

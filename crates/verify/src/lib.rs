@@ -70,7 +70,7 @@ pub use stability::{
 };
 pub use study::{Study, StudyError, Sweep, converge};
 pub use temporal::{Temporal, TemporalRow, temporal};
-pub use total::{CflSpeed, Frame, TotalScheme};
+pub use total::{CflSpeed, Frame, POLAR_ANGLES, TotalScheme};
 pub use tradeoff::{
     Against, Cheapest, Chosen, Effect, Entry, Goal, Knob, LADDER, MARGIN, Machine, Repeat,
     RepeatOutcome, RunOutcome, Setting, Skip, TOLERANCES, Tradeoff, differences, extrapolate,

@@ -16,7 +16,7 @@ pub(crate) const MOST_STEPS: f64 = 1e12;
 pub struct Plan {
     /// Number of steps.
     pub steps: u64,
-    /// Particles, estimated.
+    /// Particles; in the updated frame estimated.
     pub particles: f64,
     /// Memory in bytes, estimated.
     pub bytes: f64,
@@ -51,9 +51,13 @@ fn plan_in<const D: usize>(
     case: &Case,
 ) -> Result<Plan, CaseError> {
     let (scene, steps) = prepare(exact, case)?;
-    if let Frame::Total(total) = &case.frame {
-        total.grid(&scene, case.per_cell)?;
-    }
+    let particles = match &case.frame {
+        Frame::Updated => scene.particles_expected(case.per_cell),
+        Frame::Total(total) => {
+            let grid = total.grid(&scene, case.per_cell)?;
+            grid.axes.iter().map(|axis| axis.cells as f64 * case.per_cell as f64).product()
+        }
+    };
     let is_general = case.frame == Frame::Updated && general::fast_step(case).is_none();
     if is_general {
         general::admit(&scene, case)?;
@@ -61,7 +65,7 @@ fn plan_in<const D: usize>(
     let kept = Scene::bytes_of_exact(exact, scalar);
     Ok(Plan {
         steps: steps.count,
-        particles: scene.particles_expected(case.per_cell),
+        particles,
         bytes: match is_general {
             true => general::bytes_expected(&scene, case, kept),
             false => scene.bytes_expected(case.per_cell, scalar, kept),

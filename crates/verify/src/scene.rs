@@ -130,8 +130,7 @@ impl<const D: usize> Scene<D> {
             let is_wall = matches!(condition, Condition::Sliding | Condition::Symmetry);
             let is_given =
                 matches!(condition, Condition::PrescribedMotion | Condition::PrescribedTraction);
-            let has_total_frame = D < 3 || matches!(domain, Domain::Box { .. });
-            if is_given && (case.frame == Frame::Updated || !has_total_frame) {
+            if is_given && case.frame == Frame::Updated {
                 let instead = instead(&domain);
                 return Err(SceneError::Unmodelled { surface, condition, instead });
             }
@@ -312,10 +311,10 @@ fn instead<const D: usize>(domain: &Domain<f64, D>) -> &'static str {
         Domain::Annulus { .. } if D == 2 => {
             " in the updated frame; the total frame does: --frame total --shape bspline3 --grid polar"
         }
-        _ => {
-            ": there is no spline grid for spherical shells, in which the total frame could; mms check, eval and score serve \
-             this solution all the same"
+        Domain::Annulus { .. } => {
+            " in the updated frame; the total frame does: --frame total --shape bspline3 --grid spherical"
         }
+        _ => "",
     }
 }
 

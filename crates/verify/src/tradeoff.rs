@@ -318,7 +318,7 @@ pub fn families(
             all.push(Setting { case: Case { shape, ..usual }, single: true, ..*base });
         }
     }
-    for coordinates in [Coordinates::Cartesian, Coordinates::Polar] {
+    for coordinates in [Coordinates::Cartesian, Coordinates::Polar, Coordinates::Spherical] {
         for degree in 2..=5 {
             let total = TotalScheme { coordinates, ..TotalScheme::of_degree(degree) };
             let mut add = |total: TotalScheme, layout: Layout, per_cell: usize| {

@@ -33,6 +33,7 @@ fn updated(options: &SchemeOptions) -> Result<verify::Shape> {
         ("--composition", options.composition.is_some_and(|order| order != Composition::Order2)),
         ("--layout gauss", options.layout() == Layout::Gauss),
         ("--grid polar", options.grid() == Grid::Polar),
+        ("--grid spherical", options.grid() == Grid::Spherical),
     ];
     if let Some((option, _)) = total_only.iter().find(|(_, given)| *given) {
         bail!("{option}: the updated frame has none; use it with --frame total");
@@ -125,8 +126,15 @@ pub(super) fn echo(options: &SchemeOptions) -> (Mass, usize) {
 /// The scheme of the total frame in words.
 pub(super) fn words(options: &SchemeOptions) -> String {
     let (mass, order) = echo(options);
+    let part = match options.grid() {
+        Grid::Cartesian | Grid::Polar => String::new(),
+        Grid::Spherical => {
+            let [from, to] = verify::POLAR_ANGLES.map(f64::to_degrees);
+            format!(" from {from} to {to} degrees off the third axis")
+        }
+    };
     format!(
-        " of order {order}, total frame, {} mass, {} layout, {} grid",
+        " of order {order}, total frame, {} mass, {} layout, {} grid{part}",
         word(&mass),
         word(&options.layout()),
         word(&options.grid())

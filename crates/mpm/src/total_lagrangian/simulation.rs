@@ -9,6 +9,7 @@ use super::axis::{Axis, End, Layout};
 use super::basis::{Basis, MOST_DEGREE, Part};
 use super::boundary::{BoundaryData, Face, HeldBoundary, Quantity, Side};
 use super::composition::Composition;
+use super::coordinates::{Coordinates, Row};
 use super::fit::{Fit, Line};
 use super::mass::{Band, Mass};
 use crate::body_force::BodyForce;
@@ -17,16 +18,6 @@ use crate::fault::{Fault, Planted};
 use crate::material::{AnyLaw, Law, Material, NeoHookean, NeoHookeanNoLog};
 use crate::particles::Particles;
 use crate::tensor::determinant;
-
-/// What the coordinates of a grid mean.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Coordinates {
-    /// Reference positions.
-    Cartesian,
-    /// Radius and angle of the reference position, in two dimensions. Unknowns are the components along `e_R` and
-    /// `e_theta` at the reference position, so that planes of symmetry through the origin are ends of the angle's axis.
-    Polar,
-}
 
 /// A tensor-product grid that covers the body, with the particles in it.
 #[derive(Clone, Debug, PartialEq)]
@@ -85,9 +76,9 @@ pub struct TotalLagrangian<const D: usize> {
     a: [Vec<f64>; D],
     particles: Particles<f64, D>,
     density: f64,
-    /// Polar coordinates: reciprocal radius by place along axis 0, and cosine and sine by place along axis 1.
+    /// Curvilinear coordinates: reciprocal radius by place along axis 0, and what a row of places along it has in common.
     reciprocal_radius: Vec<f64>,
-    direction: Vec<[f64; 2]>,
+    rows: Vec<Row<D>>,
     work: Work<D>,
     steps_done: usize,
     failed: Option<StepError>,
@@ -172,17 +163,12 @@ impl<const D: usize> TotalLagrangian<D> {
             let sizes = (0..D).map(|k| bases[k][usize::from(k == component)].functions);
             vec![0.0; sizes.product()]
         });
-        let polar = grid.coordinates == Coordinates::Polar;
-        let direction = |theta: &f64| [theta.cos(), theta.sin()];
         Ok(Self {
-            reciprocal_radius: match polar {
+            reciprocal_radius: match grid.coordinates.are_curvilinear() {
                 true => lines[0].points.iter().map(|R| R.recip()).collect(),
                 false => Vec::new(),
             },
-            direction: match polar {
-                true => lines[1].points.iter().map(direction).collect(),
-                false => Vec::new(),
-            },
+            rows: rows(&grid, &lines),
             faces,
             work: Work::new(&bases, particles.len(), &zeros),
             u: zeros.clone(),
@@ -395,15 +381,10 @@ impl<const D: usize> TotalLagrangian<D> {
             let Work { values, slopes, .. } = &self.work;
             let local = SVector::from_fn(|i, _| values[i][p]);
             let mut H = SMatrix::from_fn(|i, k| slopes[i][k][p]);
-            if let Some(reciprocal_radius) = self.reciprocal_radius.get(p % row) {
-                H = polar_gradient(&local, &H, *reciprocal_radius);
-                let [cos, sin] = self.direction[p / row];
-                let Q = SMatrix::<f64, D, D>::from_fn(|i, k| match (i, k) {
-                    (0, 1) => -sin,
-                    (1, 0) => sin,
-                    _ => cos,
-                });
-                H = Q * H * Q.transpose();
+            if let Some(at) = self.rows.get(p / row) {
+                let reciprocal_radius = self.reciprocal_radius[p % row];
+                H = self.grid.coordinates.gradient(&local, &H, reciprocal_radius, at);
+                H = at.frame * H * at.frame.transpose();
             }
             self.particles.F[p] = SMatrix::identity() + H;
             self.particles.x[p] = self.particles.X[p] + self.cartesian(p / row, &local);
@@ -461,18 +442,12 @@ impl<const D: usize> TotalLagrangian<D> {
 
     /// A vector's components that the unknowns stand for, in row `row` of particles.
     fn components(&self, row: usize, vector: &SVector<f64, D>) -> SVector<f64, D> {
-        match self.direction.get(row) {
-            Some(&[cos, sin]) => turn(vector, cos, -sin),
-            None => *vector,
-        }
+        self.rows.get(row).map_or(*vector, |row| row.frame.tr_mul(vector))
     }
 
     /// The inverse of [`components`](Self::components).
     fn cartesian(&self, row: usize, components: &SVector<f64, D>) -> SVector<f64, D> {
-        match self.direction.get(row) {
-            Some(&[cos, sin]) => turn(components, cos, sin),
-            None => *components,
-        }
+        self.rows.get(row).map_or(*components, |row| row.frame * components)
     }
 
     /// The accelerations at the current displacement and at `time`.
@@ -482,28 +457,26 @@ impl<const D: usize> TotalLagrangian<D> {
         boundary: &dyn BoundaryData<D>,
         time: f64,
     ) -> Result<(), StepError> {
-        let polar = self.grid.coordinates == Coordinates::Polar;
+        let curvilinear = self.grid.coordinates.are_curvilinear();
         for component in 0..D {
-            self.evaluate(component, Field::Displacement, polar);
+            self.evaluate(component, Field::Displacement, curvilinear);
         }
         let forced = !body_force.is_absent() && !self.planted.is(Fault::NoBodyForce);
         if forced {
             body_force.evaluate(0, &self.particles.X, time, &mut self.work.b);
         }
         let bad = match self.material {
-            Material::NeoHookean { lambda: 0.0, mu } => {
-                self.stress(NeoHookeanNoLog { mu }, polar, forced)
-            }
+            Material::NeoHookean { lambda: 0.0, mu } => self.stress(NeoHookeanNoLog { mu }, forced),
             Material::NeoHookean { lambda, mu } => {
                 let planted = self.planted;
-                self.stress(NeoHookean { lambda, mu, planted }, polar, forced)
+                self.stress(NeoHookean { lambda, mu, planted }, forced)
             }
-            other => self.stress(AnyLaw(other), polar, forced),
+            other => self.stress(AnyLaw(other), forced),
         };
         if bad {
             return Err(self.describe());
         }
-        let factors = if polar || forced { Factors::Both } else { Factors::Slopes };
+        let factors = if curvilinear || forced { Factors::Both } else { Factors::Slopes };
         for face in self.faces.iter_mut().filter(|face| !face.moved) {
             face.ask(boundary, Quantity::Traction, time);
         }
@@ -546,55 +519,59 @@ impl<const D: usize> TotalLagrangian<D> {
 
     /// Turns displacements and their slopes at the particles into the factors of the functions' values and slopes in the
     /// forces. True where a particle has no stress.
-    fn stress<L: Law<f64>>(&mut self, law: L, polar: bool, forced: bool) -> bool {
-        let (row, planted) = (self.row(), self.planted);
+    fn stress<L: Law<f64>>(&mut self, law: L, forced: bool) -> bool {
+        let (row, planted, coordinates) = (self.row(), self.planted, self.grid.coordinates);
         let Work { values, slopes, b, .. } = &mut self.work;
         let mut bad = false;
         for (index, volume) in self.particles.volume.chunks_exact(row).enumerate() {
             let range = index * row..(index + 1) * row;
+            let at = self.rows.get(index);
             let values = values.each_mut().map(|array| &mut array[range.clone()]);
             let slopes = slopes
                 .each_mut()
                 .map(|arrays| arrays.each_mut().map(|array| &mut array[range.clone()]));
             for i in 0..row {
                 let mut H = SMatrix::<f64, D, D>::from_fn(|c, k| slopes[c][k][i]);
-                if polar {
+                if let Some(at) = at {
                     let u = SVector::from_fn(|c, _| values[c][i]);
-                    H = polar_gradient(&u, &H, self.reciprocal_radius[i]);
+                    H = coordinates.gradient(&u, &H, self.reciprocal_radius[i], at);
                 }
                 let F = SMatrix::identity() + H;
                 bad |= !is_deformation(&F);
                 let P = planted.piola_in_forces(law.first_piola_kirchhoff(&F), &F);
-                let force = P * -volume[i];
-                for c in 0..D {
-                    for k in 0..D {
-                        slopes[c][k][i] = force[(c, k)];
-                    }
-                }
-                if polar {
-                    let reciprocal = self.reciprocal_radius[i];
+                let mut force = P * -volume[i];
+                if let Some(at) = at {
+                    let reciprocal_radius = self.reciprocal_radius[i];
+                    let of_values;
+                    (of_values, force) =
+                        coordinates.transposed_gradient(&force, reciprocal_radius, at);
                     for c in 0..D {
-                        slopes[c][1][i] *= reciprocal;
+                        values[c][i] = of_values[c];
                     }
-                    values[0][i] = force[(1, 1)] * reciprocal;
-                    values[1][i] = -force[(0, 1)] * reciprocal;
                     if planted.is(Fault::HoopStressDropped) {
                         values[0][i] = 0.0;
                     }
                     if planted.is(Fault::HoopShearDropped) {
                         values[1][i] = 0.0;
                     }
+                    if planted.is(Fault::CotangentDropped) && D == 3 {
+                        values[1][i] -= force[(2, 2)] * at.cotangent * self.reciprocal_radius[i];
+                    }
+                }
+                for c in 0..D {
+                    for k in 0..D {
+                        slopes[c][k][i] = force[(c, k)];
+                    }
                 }
             }
             if forced {
                 for (i, b) in b[range].iter().enumerate() {
                     let mut b = b * (volume[i] * self.density);
-                    if polar {
-                        let [cos, sin] = self.direction[index];
-                        b = turn(&b, cos, -sin);
+                    if let Some(at) = at {
+                        b = at.frame.tr_mul(&b);
                     }
                     for c in 0..D {
-                        values[c][i] = if polar { values[c][i] + b[c] } else { b[c] };
+                        values[c][i] = if at.is_some() { values[c][i] + b[c] } else { b[c] };
                     }
                 }
             }
@@ -787,79 +764,18 @@ fn add<const D: usize>(target: &mut [Vec<f64>; D], factor: f64, source: &[Vec<f6
     }
 }
 
-/// A vector of the plane, turned.
-fn turn<const D: usize>(vector: &SVector<f64, D>, cos: f64, sin: f64) -> SVector<f64, D> {
-    let mut turned = *vector;
-    turned[0] = cos * vector[0] - sin * vector[1];
-    turned[1] = sin * vector[0] + cos * vector[1];
-    turned
-}
-
-/// The displacement gradient in the basis `e_R, e_theta` from the components and their derivatives by R and theta.
-#[inline(always)]
-fn polar_gradient<const D: usize>(
-    u: &SVector<f64, D>,
-    slopes: &SMatrix<f64, D, D>,
-    reciprocal_radius: f64,
-) -> SMatrix<f64, D, D> {
-    let mut H = *slopes;
-    H[(0, 1)] = (slopes[(0, 1)] - u[1]) * reciprocal_radius;
-    H[(1, 1)] = (slopes[(1, 1)] + u[0]) * reciprocal_radius;
-    H
-}
-
-impl Coordinates {
-    /// The Cartesian position.
-    fn place<const D: usize>(self, coordinates: &SVector<f64, D>) -> SVector<f64, D> {
-        match self {
-            Self::Cartesian => *coordinates,
-            Self::Polar => {
-                let (R, theta) = (coordinates[0], coordinates[1]);
-                let mut along = SVector::zeros();
-                along[0] = R;
-                turn(&along, theta.cos(), theta.sin())
-            }
-        }
-    }
-
-    /// The unit vectors that components belong to, as columns; `None` where they are Cartesian.
-    fn frame<const D: usize>(self, coordinates: &SVector<f64, D>) -> Option<SMatrix<f64, D, D>> {
-        match self {
-            Self::Cartesian => None,
-            Self::Polar => {
-                let (sin, cos) = coordinates[1].sin_cos();
-                Some(SMatrix::from_fn(|i, k| match (i, k) {
-                    (0, 1) => -sin,
-                    (1, 0) => sin,
-                    (0, 0) | (1, 1) => cos,
-                    _ => f64::from(u8::from(i == k)),
-                }))
-            }
-        }
-    }
-
-    /// Lengths per unit of each coordinate.
-    fn scales<const D: usize>(self, coordinates: &SVector<f64, D>) -> SVector<f64, D> {
-        let mut scales = SVector::repeat(1.0);
-        if self == Self::Polar {
-            scales[1] = coordinates[0];
-        }
-        scales
-    }
-
-    /// The factor of the volume that belongs to axis `k`; the product over the axes is that of the scales.
-    fn density(self, k: usize, coordinate: f64) -> f64 {
-        match (self, k) {
-            (Self::Polar, 0) => coordinate,
-            _ => 1.0,
-        }
-    }
-}
-
 /// The particles along an axis.
 fn line<const D: usize>(grid: &Grid<D>, k: usize) -> Line {
     let density = |x| grid.coordinates.density(k, x);
     Line::new(&grid.axes[k], grid.per_cell, grid.layout, density)
+}
+
+/// What rows of particles along axis 0 have in common; none where components are Cartesian.
+fn rows<const D: usize>(grid: &Grid<D>, lines: &[Line; D]) -> Vec<Row<D>> {
+    let mut counts = lines.each_ref().map(|line| line.points.len());
+    counts[0] = 1;
+    let place = |index: [usize; D]| SVector::from_fn(|k, _| lines[k].points[index[k]]);
+    products(counts).filter_map(|index| grid.coordinates.row(&place(index))).collect()
 }
 
 /// What takes values to coefficients, by axis and kind of component; or the axis whose particles do not determine them.
@@ -995,13 +911,7 @@ fn check<const D: usize>(
             return Err(SetupError::TooFewCells { axis: k, cells: axis.cells, least: degree + 1 });
         }
     }
-    if grid.coordinates == Coordinates::Polar {
-        if D != 2 {
-            return Err(SetupError::PolarDimension { dimension: D });
-        }
-        positive("the inner radius", grid.axes[0].lower)?;
-    }
-    Ok(())
+    grid.coordinates.check(&grid.axes.map(|axis| [axis.lower, axis.upper]))
 }
 
 /// Asks for all the memory of a run first, which turns a grid that is too large into an error instead of an abort.
@@ -1021,9 +931,14 @@ fn reserve<const D: usize>(grid: &Grid<D>, degree: usize) -> Result<(), SetupErr
     }
     // Positions, velocities, gradients, masses, values, slopes, partial sums and the body force.
     let at_particles = (5 * D + 4 * D * D + 2) as u128;
+    let rows = match grid.coordinates.are_curvilinear() {
+        true => particles / (grid.axes[0].cells as u128 * grid.per_cell as u128),
+        false => 0,
+    };
     let doubles = particles
         .saturating_mul(at_particles)
         .saturating_add(functions.saturating_mul(4 * D as u128 + 2))
+        .saturating_add(rows.saturating_mul((D * D + 2) as u128))
         .saturating_add(on_sides.saturating_mul((2 * D + D * D + 1) as u128))
         .saturating_add(along);
     let bytes = doubles.saturating_mul(size_of::<f64>() as u128);

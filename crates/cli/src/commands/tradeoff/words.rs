@@ -42,8 +42,12 @@ fn mass(setting: &Setting) -> &'static str {
 
 fn grid(setting: &Setting) -> &'static str {
     match setting.case.frame {
-        Frame::Total(total) if total.coordinates == Coordinates::Polar => "polar",
-        _ => "cartesian",
+        Frame::Updated => "cartesian",
+        Frame::Total(total) => match total.coordinates {
+            Coordinates::Cartesian => "cartesian",
+            Coordinates::Polar => "polar",
+            Coordinates::Spherical => "spherical",
+        },
     }
 }
 
