@@ -123,6 +123,27 @@ fn a_shell_converges_under_a_motion_that_is_not_radial() {
 }
 
 #[test]
+#[cfg_attr(debug_assertions, ignore = "simulates for long; runs in release mode")]
+fn splines_in_the_total_frame_are_expected_to_have_their_order_without_asking() {
+    let call = "converge axis-aligned-1d --frame total --cells 16,32,64 --shape";
+    for (options, expected) in [
+        ("bspline2 --layout gauss", 3.0),
+        ("bspline3", 4.0),
+        ("bspline4 --layout gauss --composition 6", 5.0),
+        ("bspline5 --composition 6 --cfl 0.2", 6.0),
+    ] {
+        let call: Vec<_> = call.split(' ').chain(options.split(' ')).collect();
+        let verdict = &json(&call)["verdicts"]["u"]["l2"];
+        assert_eq!((&verdict["expected"], &verdict["passed"]), (&expected.into(), &true.into()));
+    }
+    // Neither a lattice with an even degree nor lumped masses let the splines have theirs.
+    for options in ["bspline2", "bspline3 --mass lumped"] {
+        let call: Vec<_> = call.split(' ').chain(options.split(' ')).collect();
+        assert!(json(&call)["verdicts"]["u"]["l2"]["expected"].is_null(), "{options}");
+    }
+}
+
+#[test]
 fn the_updated_frame_names_the_frame_that_runs_a_solution() {
     for (name, part) in [
         (
