@@ -2,6 +2,8 @@
 
 use mmsmith_expr::{Expr, Graph, Program};
 use mmsmith_spec::{Domain, Fields, Spec};
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
 /// How inputs are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -56,16 +58,16 @@ const LARGEST_GRADIENT: f64 = 10.0;
 /// Below this ratio of volumes ordinary points count as inverted.
 const LEAST_JACOBIAN: f64 = 0.1;
 
-/// A small generator of reproducible numbers (splitmix64; Steele, Lea and Flood 2014).
-struct Random(u64);
+/// The same numbers on every machine.
+struct Random(SplitMix64);
 
 impl Random {
+    fn new(seed: u64) -> Self {
+        Random(SplitMix64::seed_from_u64(seed))
+    }
+
     fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        self.0.next_u64()
     }
 
     fn between(&mut self, low: f64, high: f64) -> f64 {
@@ -134,9 +136,9 @@ impl<'a> Sampler<'a> {
         if self.not_applicable(class).is_some() {
             return None;
         }
-        let mut random = Random((class as u64) << 48 | index);
+        let mut random = Random::new((class as u64) << 48 | index);
         // Neighbouring seeds begin alike.
-        random.0 = random.bits();
+        random = Random::new(random.bits());
         (0..MOST_DRAWS).find_map(|_| {
             let inputs = self.attempt(class, &mut random)?;
             if class == Class::NearInversion {

@@ -5,6 +5,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use anyhow::{Result, bail};
 use clap::ValueEnum;
 use mmsmith_verify::{Criteria, Observed, is_stable};
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use serde_json::{Value, json};
 
 use super::{Point, definition, told, without_threads};
@@ -99,7 +101,7 @@ pub(super) fn search(options: &StabilityOptions, criteria: &Criteria) -> Result<
 
 /// Setting number `sample`.
 fn draw(options: &StabilityOptions, selection: &Selection, sample: usize) -> Result<Point> {
-    let mut random = Random(options.seed.wrapping_add((sample as u64) << 32));
+    let mut random = Random::new(options.seed.wrapping_add((sample as u64) << 32));
     let mut last = None;
     for _ in 0..MOST_DRAWS {
         let parameters = selection.parameters().iter().map(|(name, value)| {
@@ -186,23 +188,19 @@ fn word(value: impl ValueEnum) -> String {
     value.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
 }
 
-/// SplitMix64 (Steele, Lea and Flood, 2014): the same numbers on every machine.
-struct Random(u64);
+/// The same numbers on every machine.
+struct Random(SplitMix64);
 
 impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+    fn new(seed: u64) -> Self {
+        Random(SplitMix64::seed_from_u64(seed))
     }
 
     fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * (self.next() >> 11) as f64 / (1_u64 << 53) as f64
+        low + (high - low) * (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
     fn below(&mut self, count: usize) -> usize {
-        (self.next() % count as u64) as usize
+        (self.0.next_u64() % count as u64) as usize
     }
 }
