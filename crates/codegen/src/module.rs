@@ -48,15 +48,6 @@ pub fn items(spec: &Spec, runtime: &TokenStream) -> Result<TokenStream, DeriveEr
     Ok(Plan::new(spec)?.items(runtime))
 }
 
-/// The text of the module of a solution within the crate of the solutions.
-///
-/// # Errors
-///
-/// [`DeriveError`] where a field is nowhere defined.
-pub fn module_source(spec: &Spec) -> Result<String, DeriveError> {
-    Ok(Plan::new(spec)?.module_source())
-}
-
 impl Plan<'_> {
     /// The items of the solution in Rust; `runtime` is the path to the crate `mmsmith_solutions`.
     #[must_use]
