@@ -6,6 +6,8 @@
 //! combined before those that depend on time or on position, so that the slow parts are computed rarely.
 
 mod argument;
+#[cfg(test)]
+mod tests;
 
 use crate::graph::NumberMap;
 use crate::log_ratio;

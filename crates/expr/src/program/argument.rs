@@ -274,6 +274,28 @@ mod tests {
         ("cosh(X/10^6 - k)", 1.4423823122947754e41),
     ];
 
+    /// A quantity that stays in one piece may hold an input that stands beside it as well.
+    #[test]
+    fn coefficients_of_one_input_are_added() {
+        let place = Dependence { position: true, time: false };
+        let mut graph = Graph::new();
+        let inputs = ["X", "Y"].map(|name| (graph.symbol(name), place));
+        let build = |graph: &mut Graph, text: &str| {
+            graph.build(&Ast::parse(text).unwrap(), &mut |g, name| Ok(g.symbol(name))).unwrap()
+        };
+        let part = build(&mut graph, "X/10 + Y/3 - 1/7");
+        let part = graph.whole(part);
+        let beside = build(&mut graph, "X/10 - 2*Y/3");
+        let argument = graph.add(beside, part);
+        let sine = graph.call(Function::Sin, &[argument]);
+        let plain = build(&mut graph, "sin(X/5 - Y/3 - 1/7)");
+        let [found, expected] = [sine, plain].map(|expr| {
+            let program = Program::lower(&mut graph, &inputs, &[], &[expr]);
+            program.evaluate(&[98_765_432.123_456_79, 0.123_456_789])[0]
+        });
+        assert_eq!(found, expected);
+    }
+
     #[test]
     fn errors_of_sums_and_products_are_exact() {
         let exact = |x: f64| Rational::from_float(x).unwrap();
