@@ -523,6 +523,21 @@ mod tests {
         let product = program("4*(x + 1)*(y + 1)");
         assert!(as_accurate(&product, &program("(x + 1)*(y + 1)^7/12"), 2));
         assert!(!as_accurate(&product, &program("(x + 1)*(y + 1)^9/27"), 2));
+        // However many inputs there are, each is tiny once.
+        let names: Vec<String> = (0..40).map(|n| format!("x{n}")).collect();
+        let mut graph = Graph::new();
+        let inputs: Vec<_> =
+            names.iter().map(|name| (graph.symbol(name), Dependence::default())).collect();
+        let mut program_of_many = |text: &str| {
+            let ast = Ast::parse(text).unwrap();
+            let expr = graph.build(&ast, &mut |g, name| Ok(g.symbol(name))).unwrap();
+            Program::lower(&mut graph, &inputs, &[], &[expr])
+        };
+        let sum = program_of_many(&names.join(" + "));
+        for name in &names {
+            let candidate = format!("{} + 1/(10^3*{name})", names.join(" + "));
+            assert!(!as_accurate(&sum, &program_of_many(&candidate), 40), "{name}");
+        }
         // What is defined nowhere has nothing to lose, nor what is exact as long as it stays so.
         let (nowhere, exact) = (program("sqrt(x - 2)"), program("x"));
         assert!(as_accurate(&nowhere, &four, 2));
