@@ -146,7 +146,6 @@ impl Lowering<'_> {
             return None;
         }
         match self.graph.node(expr) {
-            Node::Number(value) => sum.constant += factor * value,
             Node::Symbol(_) => {
                 let defined = self.definitions.iter().any(|(symbol, _)| *symbol == expr);
                 let known = self.inputs.iter().position(|(symbol, _)| *symbol == expr);
@@ -167,7 +166,8 @@ impl Lowering<'_> {
                 [(base, exponent)] if exponent.is_one() => self.collect(*base, factor, sum)?,
                 _ => return None,
             },
-            Node::Pi | Node::Call(..) => return None,
+            // Of a sum no term is a number, and a number alone is no sum of inputs.
+            Node::Number(_) | Node::Pi | Node::Call(..) => return None,
         }
         Some(())
     }
