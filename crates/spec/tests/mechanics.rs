@@ -194,7 +194,13 @@ fn places(spec: &Spec, fields: &mut Fields) -> Vec<Vec<f64>> {
 
 fn specifications() -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let mut found: Vec<PathBuf> = ["mms-specs", "tests/data/specs", "tests/data/specs/materials"]
+    let folders = [
+        "mms-specs",
+        "tests/data/specs",
+        "tests/data/specs/materials",
+        "crates/spec/tests/data/ok",
+    ];
+    let mut found: Vec<PathBuf> = folders
         .iter()
         .flat_map(|folder| std::fs::read_dir(root.join(folder)).unwrap())
         .map(|entry| entry.unwrap().path())
