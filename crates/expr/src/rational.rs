@@ -545,7 +545,7 @@ mod tests {
             for other in [nearest.next_up(), nearest.next_down()] {
                 match distance(nearest).cmp(&distance(other)) {
                     Ordering::Less => {}
-                    Ordering::Equal => prop_assert!(nearest.to_bits() % 2 == 0, "{value} is a tie"),
+                    Ordering::Equal => prop_assert!(nearest.to_bits().is_multiple_of(2), "{value} is a tie"),
                     Ordering::Greater => prop_assert!(false, "{value} is nearer to {other} than to {nearest}"),
                 }
             }
