@@ -491,6 +491,14 @@ mod tests {
         (any.clone(), any.prop_filter("a denominator", |d| !d.is_zero()))
     }
 
+    /// A double over an integer that may be none, or the other way round.
+    fn quotient() -> impl Strategy<Value = (BigInt, BigInt)> {
+        (1..1_i64 << 53, 1..i64::MAX, any::<bool>()).prop_map(|(double, integer, turned)| {
+            let (a, b) = if turned { (integer, double) } else { (double, integer) };
+            (a.into(), b.into())
+        })
+    }
+
     proptest! {
         #[test]
         fn arithmetic_is_that_of_big_numbers(a in parts(), b in parts()) {
@@ -537,7 +545,7 @@ mod tests {
         /// Integers that are no doubles among them, of which the machine's quotient is rounded twice, and scales from
         /// below the smallest double on.
         #[test]
-        fn no_double_is_nearer(parts in parts(), scale in prop_oneof![Just(0), -1150..850, -1100..-1000]) {
+        fn no_double_is_nearer(parts in prop_oneof![parts(), quotient()], scale in prop_oneof![Just(0), -1150..850, -1100..-1000]) {
             let power: BigRational = Pow::pow(BigRational::from_integer(2.into()), scale);
             let value = BigRational::new(parts.0, parts.1) * power;
             let nearest = nearest_f64(&Rational::from_big(value.clone()));
