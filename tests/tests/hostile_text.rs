@@ -4,7 +4,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use mmsmith_codegen::{Plan, items, module_source};
+use mmsmith_codegen::{Plan, items};
 use mmsmith_spec::Spec;
 use mmsmith_tests::{c_compiler, cpp_compiler, outcome};
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
@@ -329,7 +329,7 @@ fn names_that_are_words_of_c_give_code() {
 
 /// The generated tokens and those of the module's text, after checking that the text parses.
 fn module(spec: &Spec) -> Vec<String> {
-    let source = module_source(spec).unwrap();
+    let source = Plan::new(spec).unwrap().module_source();
     let shown: String = source.chars().take(2_000).collect();
     syn::parse_file(&source).unwrap_or_else(|e| panic!("{e}: {shown}"));
     let runtime: TokenStream = "crate".parse().unwrap();

@@ -180,14 +180,13 @@ fn number(value: &Rational) -> String {
 
 /// A literal for any double; negative ones with a minus sign before it.
 pub(crate) fn float(value: f64) -> TokenStream {
+    let sign = value.is_sign_negative().then(|| quote!(-));
     if value.is_infinite() {
-        let sign = (value < 0.0).then(|| quote!(-));
         return quote!(#sign f64::INFINITY);
     }
     let magnitude = value.abs();
     let text = digits(magnitude);
     let literal = text.parse::<Literal>().unwrap_or_else(|_| Literal::f64_unsuffixed(magnitude));
-    let sign = value.is_sign_negative().then(|| quote!(-));
     quote!(#sign #literal)
 }
 
@@ -206,6 +205,15 @@ pub(crate) fn digits(magnitude: f64) -> String {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn infinite_literals_keep_their_sign() {
+        for (value, expected) in
+            [(f64::INFINITY, "f64::INFINITY"), (-f64::INFINITY, "-f64::INFINITY")]
+        {
+            assert_eq!(float(value).to_string().replace(' ', ""), expected);
+        }
+    }
 
     proptest! {
         #[test]

@@ -177,18 +177,18 @@ fn members(parameters: &[Parameter]) -> Vec<String> {
         C_WORDS.contains(&name) || C_FAMILIES.iter().any(|family| name.starts_with(family))
     };
     let plain = |name: &str| parameters.iter().any(|p| p.name == name && !is_taken(name));
-    let mut members: Vec<String> = Vec::new();
-    for parameter in parameters {
+    // No two become one: what the one passes over is plain, so that the other is not it.
+    let member = |parameter: &Parameter| {
         let mut member = parameter.name.clone();
         if is_taken(&member) {
             member.push('_');
-            while plain(&member) || members.contains(&member) {
+            while plain(&member) {
                 member.push('_');
             }
         }
-        members.push(member);
-    }
-    members
+        member
+    };
+    parameters.iter().map(member).collect()
 }
 
 impl Plan<'_> {

@@ -14,5 +14,5 @@ mod module;
 mod plan;
 mod text;
 
-pub use module::{NameClash, Names, items, module_source, registry_source};
+pub use module::{NameClash, Names, items, registry_source};
 pub use plan::Plan;

@@ -48,15 +48,6 @@ pub fn items(spec: &Spec, runtime: &TokenStream) -> Result<TokenStream, DeriveEr
     Ok(Plan::new(spec)?.items(runtime))
 }
 
-/// The text of the module of a solution within the crate of the solutions.
-///
-/// # Errors
-///
-/// [`DeriveError`] where a field is nowhere defined.
-pub fn module_source(spec: &Spec) -> Result<String, DeriveError> {
-    Ok(Plan::new(spec)?.module_source())
-}
-
 impl Plan<'_> {
     /// The items of the solution in Rust; `runtime` is the path to the crate `mmsmith_solutions`.
     #[must_use]
@@ -714,13 +705,14 @@ fn surface_value(runtime: &TokenStream, surface: Surface) -> TokenStream {
     }
 }
 
-/// A parameter name as an identifier; names that are Rust keywords become raw identifiers.
+/// A parameter name as an identifier; names that are Rust keywords become raw identifiers. (Specifications refuse the
+/// words that cannot be raw, as `self`.)
 fn identifier(name: &str) -> Ident {
-    match name {
-        // These cannot be raw.
-        "self" | "Self" | "super" | "crate" | "_" => format_ident!("{name}_"),
-        _ if syn::parse_str::<Ident>(name).is_err() => Ident::new_raw(name, Span::call_site()),
-        _ => Ident::new(name, Span::call_site()),
+    // Reserved since edition 2024, which the parser does not know.
+    if name == "gen" || syn::parse_str::<Ident>(name).is_err() {
+        Ident::new_raw(name, Span::call_site())
+    } else {
+        Ident::new(name, Span::call_site())
     }
 }
 

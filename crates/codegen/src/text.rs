@@ -106,6 +106,11 @@ mod tests {
         assert_eq!(comment("*??/\n/"), "*? ?/ /");
         assert_eq!(comment("*\\\n/ x\\"), "*_ / x_");
         assert_eq!(comment("https://example.org"), "https://example.org");
+        // Letters stay; what nobody sees, and signs, do not.
+        assert_eq!(
+            comment("caf\u{e9} \u{3bb}0 e\u{301} \u{200b} \u{2264}"),
+            "caf\u{e9} \u{3bb}0 e_ _ _"
+        );
     }
 
     #[test]

@@ -469,7 +469,11 @@ pub(crate) fn as_accurate(before: &Program, after: &Program, inputs: usize) -> b
             let known = old.iter().zip(new).take(points - first).filter(|(old, _)| old.is_finite());
             growth.extend(known.map(|(&old, new)| {
                 // Nothing is as large as nothing; what is not finite any more is infinitely worse.
-                if new <= old { 1.0 } else { (new / old).max(1.0) }
+                match new.is_finite() {
+                    true if new <= old => 1.0,
+                    true => new / old,
+                    false => f64::INFINITY,
+                }
             }));
         }
     }
@@ -477,4 +481,65 @@ pub(crate) fn as_accurate(before: &Program, after: &Program, inputs: usize) -> b
     let usual = growth.get(growth.len() / 2).copied().unwrap_or(1.0);
     let largest = growth.last().copied().unwrap_or(1.0);
     usual <= USUAL_GROWTH && largest <= LARGEST_GROWTH
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Ast;
+
+    /// Only the bounds of the errors are compared, whatever the programs compute: `n x y` has two roundings of `n x y`.
+    #[test]
+    fn bounds_may_hardly_grow() {
+        let mut graph = Graph::new();
+        let inputs = ["x", "y"].map(|name| (graph.symbol(name), Dependence::default()));
+        let mut program = |text: &str| {
+            let ast = Ast::parse(text).unwrap();
+            let expr = graph.build(&ast, &mut |g, name| Ok(g.symbol(name))).unwrap();
+            Program::lower(&mut graph, &inputs, &[], &[expr])
+        };
+        let four = program("4*x*y");
+        for (text, expected) in [
+            ("4*x*y", true),
+            ("x*y", true),
+            ("x", true),
+            // By little, and by more than little at most points.
+            ("5*x*y", true),
+            ("5.9*x*y", true),
+            ("6.1*x*y", false),
+            ("40*x*y", false),
+            // By little where nothing is tiny, and by much where x or y is.
+            ("4*x*y + 1/(10^12*x)", false),
+            ("4*x*y + 1/(10^12*y)", false),
+            // At some points not defined any more, at more than half of them not defined.
+            ("4*x*y + 10^(-20)*sqrt(0.9 - x)", false),
+            ("sqrt(x - 2)", false),
+        ] {
+            assert_eq!(as_accurate(&four, &program(text), 2), expected, "{text}");
+        }
+        // The same but for a factor: it is about one at most points, and up to five, or up to nine, where y is largest.
+        let product = program("4*(x + 1)*(y + 1)");
+        assert!(as_accurate(&product, &program("(x + 1)*(y + 1)^7/12"), 2));
+        assert!(!as_accurate(&product, &program("(x + 1)*(y + 1)^9/27"), 2));
+        // However many inputs there are, each is tiny once.
+        let names: Vec<String> = (0..40).map(|n| format!("x{n}")).collect();
+        let mut graph = Graph::new();
+        let inputs: Vec<_> =
+            names.iter().map(|name| (graph.symbol(name), Dependence::default())).collect();
+        let mut program_of_many = |text: &str| {
+            let ast = Ast::parse(text).unwrap();
+            let expr = graph.build(&ast, &mut |g, name| Ok(g.symbol(name))).unwrap();
+            Program::lower(&mut graph, &inputs, &[], &[expr])
+        };
+        let sum = program_of_many(&names.join(" + "));
+        for name in &names {
+            let candidate = format!("{} + 1/(10^3*{name})", names.join(" + "));
+            assert!(!as_accurate(&sum, &program_of_many(&candidate), 40), "{name}");
+        }
+        // What is defined nowhere has nothing to lose, nor what is exact as long as it stays so.
+        let (nowhere, exact) = (program("sqrt(x - 2)"), program("x"));
+        assert!(as_accurate(&nowhere, &four, 2));
+        assert!(as_accurate(&exact, &program("y"), 2));
+        assert!(!as_accurate(&exact, &four, 2));
+    }
 }

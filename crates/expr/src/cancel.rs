@@ -325,7 +325,7 @@ fn multiply(a: &Polynomial, b: &Polynomial) -> Option<Polynomial> {
 
 #[cfg(test)]
 mod tests {
-    use crate::{Ast, Graph};
+    use crate::{Ast, Function, Graph};
     use std::collections::BTreeSet;
 
     fn cancelled(text: &str) -> String {
@@ -373,6 +373,33 @@ mod tests {
         // Nothing is said about a quotient by zero.
         assert!(!vanishes("a/(b/(1 + c) + b*c/(1 + c) - b)"));
         assert!(!vanishes("a/((b + c)^2 - b^2 - 2*b*c - c^2)"));
+    }
+
+    /// A look at one place, in floating point, must not take rounding for a difference, however small or large the
+    /// values are.
+    #[test]
+    fn rounding_is_no_difference() {
+        for function in [Function::Exp, Function::Sin, Function::Cos, Function::Ln] {
+            for shift in ["0", "-60/7", "-60", "10^8/7", "-400"] {
+                for scale in ["1", "1/10^9", "10^9"] {
+                    let mut graph = Graph::new();
+                    let build = |graph: &mut Graph, text: &str| {
+                        let ast = Ast::parse(text).unwrap();
+                        graph.build(&ast, &mut |g, name| Ok(g.symbol(name))).unwrap()
+                    };
+                    let part = build(&mut graph, &format!("{scale}*(a/3 + b/7 + c)"));
+                    let part = graph.whole(part);
+                    let rest = build(&mut graph, &format!("{scale}*(-b/7 - c) + d^2 + ({shift})"));
+                    let first = graph.add(part, rest);
+                    let second = build(&mut graph, &format!("{scale}*a/3 + d^2 + ({shift})"));
+                    let [first, second] = [first, second].map(|x| graph.call(function, &[x]));
+                    let difference = graph.sub(first, second);
+                    assert!(graph.vanishes(difference), "{function:?} {shift} {scale}");
+                    let twice = graph.add(first, difference);
+                    assert!(!graph.vanishes(twice), "{function:?} {shift} {scale}");
+                }
+            }
+        }
     }
 
     #[test]

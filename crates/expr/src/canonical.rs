@@ -248,7 +248,7 @@ impl Graph {
             }
             let total = collected.add(base, &exponent);
             // Powers that were out of reach one by one may have become whole together, as in sqrt(a b)^2.
-            if !total.is_zero() && total != exponent && total.is_integer() && self.opens(base) {
+            if !total.is_zero() && total != exponent && total.is_integer() {
                 collected.remove(base);
                 pending.push((base, total));
             }
@@ -275,14 +275,6 @@ impl Graph {
                 self.scaled(inner, c * coefficient)
             }
             _ => self.scaled(term, coefficient),
-        }
-    }
-
-    fn opens(&self, base: Expr) -> bool {
-        match self.node(base) {
-            Node::Number(_) | Node::Product(_) => true,
-            Node::Sum { constant, terms } => constant.is_zero() && terms.len() == 1,
-            _ => false,
         }
     }
 

@@ -430,6 +430,7 @@ mod tests {
         );
         assert_eq!(message("a b").1, 2..3);
         assert_eq!(message("a ^ b ^ c").1, 6..7);
+        assert_eq!(message("a ** b ** c").1, 7..9);
         assert_eq!(message("a +").1, 3..3);
         assert_eq!(message("a $ b").1, 2..3);
         assert_eq!(message("1e999").1, 0..5);

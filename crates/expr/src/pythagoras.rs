@@ -265,6 +265,21 @@ mod tests {
         assert!(graph.without_vanishing_part(&terms[..4]).is_empty());
     }
 
+    /// A look at one place sorts out what cannot vanish; where a function has no value there, only all terms together
+    /// are worth the search.
+    #[test]
+    fn terms_without_a_value_vanish_together_only() {
+        let mut graph = Graph::new();
+        let mut terms = |texts: &[&str]| -> Vec<Expr> {
+            texts.iter().map(|text| build(&mut graph, text)).collect()
+        };
+        let part = terms(&["arctan(a)", "sin(b)^2", "cos(b)^2", "-1"]);
+        let all = terms(&["arctan(a)*sin(b)^2", "arctan(a)*cos(b)^2", "-arctan(a)"]);
+        assert_eq!(graph.without_vanishing_part(&part), part);
+        assert!(graph.without_vanishing_part(&part[1..]).is_empty());
+        assert!(graph.without_vanishing_part(&all).is_empty());
+    }
+
     #[test]
     fn shorter_where_terms_cancel() {
         let cases = [

@@ -494,6 +494,17 @@ mod tests {
         assert_eq!(exact_root(&q(2, 9), 2), None);
     }
 
+    #[test]
+    fn division_by_zero_panics() {
+        let divided = |n: i64| std::panic::catch_unwind(|| Rational::new(n.into(), 0.into()));
+        let quotient = |n: i64| {
+            std::panic::catch_unwind(|| Rational::from_integer(n.into()) / Rational::zero())
+        };
+        for n in [0, 1, -7, i64::MIN] {
+            assert!(divided(n).is_err() && quotient(n).is_err(), "{n}/0");
+        }
+    }
+
     /// Numerators and denominators on both sides of what is small.
     fn parts() -> impl Strategy<Value = (BigInt, BigInt)> {
         let any = prop_oneof![
@@ -506,6 +517,14 @@ mod tests {
         .prop_map(BigInt::from)
         .boxed();
         (any.clone(), any.prop_filter("a denominator", |d| !d.is_zero()))
+    }
+
+    /// A double over an integer that may be none, or the other way round.
+    fn quotient() -> impl Strategy<Value = (BigInt, BigInt)> {
+        (1..1_i64 << 53, 1..i64::MAX, any::<bool>()).prop_map(|(double, integer, turned)| {
+            let (a, b) = if turned { (integer, double) } else { (double, integer) };
+            (a.into(), b.into())
+        })
     }
 
     proptest! {
@@ -527,8 +546,16 @@ mod tests {
             prop_assert_eq!(p.bits(), (r.numer().bits(), r.denom().bits()));
             prop_assert_eq!((p.numer(), p.denom()), (r.numer().clone(), r.denom().clone()));
             prop_assert_eq!(Pow::pow(&p, 3_u32), Rational::from_big(Pow::pow(&r, 3_u32)));
+            prop_assert_eq!(p.signum(), Rational::from_big(r.signum()));
+            prop_assert_eq!(p.abs_sub(&q), Rational::from_big(r.abs_sub(&s)));
+            prop_assert_eq!(p.round(), Rational::from_big(r.round()));
+            prop_assert_eq!([p.clone(), q.clone()].into_iter().sum::<Rational>(), &p + &q);
+            prop_assert_eq!(p.to_string(), r.to_string());
+            let text = format!("{}/{}", r.numer(), r.denom());
+            prop_assert_eq!(Rational::from_str_radix(&text, 10).unwrap(), p.clone());
             if !q.is_zero() {
                 prop_assert_eq!(&p / &q, Rational::from_big(&r / &s));
+                prop_assert_eq!(p % q, Rational::from_big(r % s));
             }
         }
 
@@ -541,6 +568,23 @@ mod tests {
         #[test]
         fn quotients_of_integers_round_as_division_does(a in -(1_i64 << 53)..(1_i64 << 53), b in 1_i64..(1_i64 << 53)) {
             prop_assert_eq!(nearest_f64(&Rational::new(a.into(), b.into())), a as f64 / b as f64);
+        }
+
+        /// Integers that are no doubles among them, of which the machine's quotient is rounded twice, and scales from
+        /// below the smallest double on.
+        #[test]
+        fn no_double_is_nearer(parts in prop_oneof![parts(), quotient()], scale in prop_oneof![Just(0), -1150..850, -1100..-1000]) {
+            let power: BigRational = Pow::pow(BigRational::from_integer(2.into()), scale);
+            let value = BigRational::new(parts.0, parts.1) * power;
+            let nearest = nearest_f64(&Rational::from_big(value.clone()));
+            let distance = |x: f64| (BigRational::from_float(x).unwrap() - &value).abs();
+            for other in [nearest.next_up(), nearest.next_down()] {
+                match distance(nearest).cmp(&distance(other)) {
+                    Ordering::Less => {}
+                    Ordering::Equal => prop_assert!(nearest.to_bits().is_multiple_of(2), "{value} is a tie"),
+                    Ordering::Greater => prop_assert!(false, "{value} is nearer to {other} than to {nearest}"),
+                }
+            }
         }
     }
 }

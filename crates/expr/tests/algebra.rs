@@ -149,6 +149,79 @@ proptest! {
     }
 }
 
+/// What is one expression in exact arithmetic as well as to the canonical form, which never multiplies out.
+#[test]
+fn texts_that_are_the_same_expression() {
+    let mut differ = Vec::new();
+    for (a, b) in [
+        // Like terms, content, common factors and terms that differ in one factor.
+        ("2*x + 3*y - x - 3*y", "x"),
+        ("6*x + 4*y", "2*(3*x + 2*y)"),
+        ("x/6 - y/4", "-(3*y - 2*x)/12"),
+        ("x*y + x*sin(y)", "x*(y + sin(y))"),
+        ("x^2*y + x^3", "x^2*(y + x)"),
+        ("sqrt(x)*y + x", "sqrt(x)*(y + sqrt(x))"),
+        ("y/x + y^2/x^3", "y/x*(1 + y/x^2)"),
+        ("sin(y)*(1 + x) + sin(y)*(2 - y)", "sin(y)*(3 + x - y)"),
+        ("x*(1 + y) - x", "x*y"),
+        // Powers that are whole together, and roots that are exact.
+        ("sqrt(x*y)*sqrt(x*y)", "x*y"),
+        ("(x*y)^(1/3)*(x*y)^(2/3)", "x*y"),
+        ("sqrt(2)*sqrt(2)*x", "2*x"),
+        ("sqrt(3*x)^2", "3*x"),
+        ("(8/27)^(1/3)", "2/3"),
+        ("(4*x)^(-1/2)", "1/(2*sqrt(x))"),
+        ("(x^2*y)^3/x^6", "y^3"),
+        ("sqrt(sqrt(x))", "x^(1/4)"),
+        ("(x^(1/3))^(1/2)", "x^(1/6)"),
+        ("x^3/x^3*y", "y"),
+        ("sqrt(x)^2", "x"),
+        // Values that are known, and functions of what has a sign.
+        ("sin(0) + tan(0) + arcsin(0) + arctan(0) + sinh(0) + tanh(0)", "0"),
+        ("cos(0) + cosh(0) + exp(0)", "3"),
+        ("ln(1) + log1p(0) + expm1(0)", "0"),
+        ("exp(ln(x*y))", "x*y"),
+        ("ln(exp(x - y))", "x - y"),
+        ("sin(-2*x) + tan(-x)", "-sin(2*x) - tan(x)"),
+        (
+            "arcsin(-x) + arctan(-3) + sinh(-x/2) + tanh(-x)",
+            "-arcsin(x) - arctan(3) - sinh(x/2) - tanh(x)",
+        ),
+        ("cos(-2*x)*cosh(-y)", "cos(2*x)*cosh(y)"),
+        ("sin(Pi/2) + sin(Pi) + sin(3*Pi/2) + sin(5*Pi/2)", "1"),
+        ("cos(Pi/2) + cos(Pi) + cos(2*Pi) + cos(-7*Pi)", "-1"),
+        ("lnratio2(0) + lnratio2_slope(0) - 3*lnratio2_curvature(0)", "1"),
+        ("x^0", "1"),
+        ("0^2*x", "0"),
+    ] {
+        let mut graph = Graph::new();
+        let (first, second) = (build(&mut graph, a), build(&mut graph, b));
+        if first != second {
+            differ.push(format!("{a} = {}, {b} = {}", graph.print(first), graph.print(second)));
+        }
+    }
+    assert!(differ.is_empty(), "{}", differ.join("\n"));
+}
+
+/// What is the same for positive values only, or one of the two has no value at zero.
+#[test]
+fn texts_that_are_not_the_same_expression() {
+    for (a, b) in [
+        ("sqrt(x^2)", "x"),
+        ("sqrt(x*y)", "sqrt(x)*sqrt(y)"),
+        ("sqrt(sqrt(x)*y)", "x^(1/4)*sqrt(y)"),
+        ("sqrt(x^2*y)", "x*sqrt(y)"),
+        ("(x^2)^(3/2)", "x^3"),
+        ("arcsin(sin(x))", "x"),
+        ("ln(x*y)", "ln(x) + ln(y)"),
+        ("ln(x^2)", "2*ln(x)"),
+    ] {
+        let mut graph = Graph::new();
+        let (first, second) = (build(&mut graph, a), build(&mut graph, b));
+        assert_ne!(first, second, "{a} and {b}");
+    }
+}
+
 /// Sums and products collect few operands in another way than many: the order in which they come must not matter to either,
 /// nor to what goes over from one way to the other and back.
 #[test]
@@ -162,6 +235,12 @@ fn many_operands_in_any_order() {
         let mixed: Vec<Expr> = (0..count).map(|n| symbols[n * 7 % count]).collect();
         let sum = graph.sum_of(forth.clone());
         assert_eq!(graph.sum_of(back.clone()), sum, "{count}");
+        // No time anything is nothing, before the others and after.
+        let zero = (one() - one(), symbols[299]);
+        let terms = || forth[..count - 1].iter().map(|x| (one(), *x));
+        let without = graph.sum(terms());
+        assert_eq!(graph.sum([zero.clone()].into_iter().chain(terms())), without, "{count}");
+        assert_eq!(graph.sum(terms().chain([zero])), without, "{count}");
         let product = graph.product_of(forth.clone());
         assert_eq!(graph.product_of(back), product, "{count}");
         if count % 7 != 0 {

@@ -230,6 +230,13 @@ mod tests {
             check(&wide_axis(xi, wide), xi)?;
         }
 
+        /// Particles are sorted by the node at which their weights begin.
+        #[test]
+        fn the_first_layer_is_that_of_the_weights(xi in 0.0..20.0_f64, l in 1e-3..0.5_f64) {
+            prop_assert_eq!(first_layer(xi, l), gimp_axis(xi, l).base);
+            prop_assert_eq!(first_layer(xi, 0.0), hat(xi).base);
+        }
+
         #[test]
         fn the_formula_is_the_exact_integral(xi in 0.0..20.0_f64, l in 1e-2..0.5_f64) {
             let (formula, exact) = (spread(&gimp_axis(xi, l)), spread(&wide_axis(xi, l)));

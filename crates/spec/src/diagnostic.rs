@@ -77,3 +77,47 @@ fn distance(a: &str, b: &str) -> usize {
     }
     row[b.len()]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distances_count_edits() {
+        for (a, b, edits) in [
+            ("", "", 0),
+            ("lambda", "lambda", 0),
+            ("Lambda", "lAMBDA", 0),
+            ("", "abc", 3),
+            ("abc", "", 3),
+            ("a", "b", 1),
+            ("lamda", "lambda", 1),
+            ("lambda", "lamda", 1),
+            ("abc", "xabc", 1),
+            ("xyzabc", "abc", 3),
+            ("ab", "ba", 2),
+            ("kitten", "sitting", 3),
+            ("saturday", "sunday", 3),
+            ("\u{3bb}", "l", 1),
+        ] {
+            assert_eq!(distance(a, b), edits, "{a} {b}");
+            assert_eq!(distance(b, a), edits, "{b} {a}");
+        }
+    }
+
+    #[test]
+    fn only_what_is_near_is_suggested() {
+        let known = ["mu", "lambda", "rho0", "sigma_max"];
+        for (name, expected) in [
+            ("lamda", Some("lambda")),
+            ("MU", Some("mu")),
+            ("m", Some("mu")),
+            ("rho", Some("rho0")),
+            ("sigmax", Some("sigma_max")),
+            ("temperature", None),
+            ("xy", None),
+        ] {
+            assert_eq!(nearest(name, known), expected, "{name}");
+        }
+    }
+}

@@ -91,6 +91,11 @@ fn fields_are_derived_as_expected() {
             let traction: Vec<String> =
                 fields_on.traction.iter().map(|&t| fields.graph.print(t)).collect();
             text += &format!("traction on {:?} = ({})\n", fields_on.surface, traction.join(", "));
+            for claim in &fields_on.claims {
+                let quantities: Vec<String> =
+                    claim.quantities.iter().map(|&q| fields.graph.print(q)).collect();
+                text += &format!("    {:?} ({}) is to vanish\n", claim.what, quantities.join(", "));
+            }
         }
         expect(&path, &text, &mut failures);
     }

@@ -146,7 +146,6 @@ impl Lowering<'_> {
             return None;
         }
         match self.graph.node(expr) {
-            Node::Number(value) => sum.constant += factor * value,
             Node::Symbol(_) => {
                 let defined = self.definitions.iter().any(|(symbol, _)| *symbol == expr);
                 let known = self.inputs.iter().position(|(symbol, _)| *symbol == expr);
@@ -167,7 +166,8 @@ impl Lowering<'_> {
                 [(base, exponent)] if exponent.is_one() => self.collect(*base, factor, sum)?,
                 _ => return None,
             },
-            Node::Pi | Node::Call(..) => return None,
+            // Of a sum no term is a number, and a number alone is no sum of inputs.
+            Node::Number(_) | Node::Pi | Node::Call(..) => return None,
         }
         Some(())
     }
@@ -273,6 +273,28 @@ mod tests {
         ("sinh(Y + X/10^6)", 4.424546671737787e42),
         ("cosh(X/10^6 - k)", 1.4423823122947754e41),
     ];
+
+    /// A quantity that stays in one piece may hold an input that stands beside it as well.
+    #[test]
+    fn coefficients_of_one_input_are_added() {
+        let place = Dependence { position: true, time: false };
+        let mut graph = Graph::new();
+        let inputs = ["X", "Y"].map(|name| (graph.symbol(name), place));
+        let build = |graph: &mut Graph, text: &str| {
+            graph.build(&Ast::parse(text).unwrap(), &mut |g, name| Ok(g.symbol(name))).unwrap()
+        };
+        let part = build(&mut graph, "X/10 + Y/3 - 1/7");
+        let part = graph.whole(part);
+        let beside = build(&mut graph, "X/10 - 2*Y/3");
+        let argument = graph.add(beside, part);
+        let sine = graph.call(Function::Sin, &[argument]);
+        let plain = build(&mut graph, "sin(X/5 - Y/3 - 1/7)");
+        let [found, expected] = [sine, plain].map(|expr| {
+            let program = Program::lower(&mut graph, &inputs, &[], &[expr]);
+            program.evaluate(&[98_765_432.123_456_79, 0.123_456_789])[0]
+        });
+        assert_eq!(found, expected);
+    }
 
     #[test]
     fn errors_of_sums_and_products_are_exact() {

@@ -1,5 +1,8 @@
 //! How much rounding errors may make of the outputs of a program.
 
+#[cfg(test)]
+mod tests;
+
 use super::{Operation, Program, Slot};
 use std::array;
 

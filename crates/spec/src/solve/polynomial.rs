@@ -147,9 +147,7 @@ impl Polynomial {
         let content = self_content.gcd(&other_content)?;
         let mut p = self.divided_by(&self_content)?;
         let mut q = other.divided_by(&other_content)?;
-        if p.degree(v) < q.degree(v) {
-            std::mem::swap(&mut p, &mut q);
-        }
+        // Where q has the larger degree, the first remainder is p itself, and the two change places.
         while !q.is_zero() {
             if q.degree(v) == 0 {
                 return Some(content);

@@ -1,0 +1,35 @@
+//! What every generated Rust module has to be by itself.
+
+#![allow(clippy::unwrap_used)]
+
+use mmsmith_codegen::Plan;
+use mmsmith_spec::Spec;
+
+/// Words of the language are raw identifiers, and all else is called as the specification says.
+#[test]
+fn parameters_have_names_that_rust_takes() {
+    for (name, identifier) in [
+        ("A", "A"),
+        ("nu_0", "nu_0"),
+        ("type", "r#type"),
+        ("async", "r#async"),
+        ("gen", "r#gen"),
+        ("union", "union"),
+        ("static", "r#static"),
+    ] {
+        let text = format!(
+            "name = 'test'\ntitle = 'Test'\ncoordinates = 'cartesian'\ndimension = 1\n\
+             [parameters]\n{name} = {{ default = 0.1, range = '> -1e400, < 1e400' }}\n\
+             [displacement]\nX = '{name}*X*t'\n\
+             [material]\nlaw = 'neo-hookean'\nlambda = 1\nmu = 1\ndensity = 1\n\
+             [domain]\nshape = 'box'\nlower = [0]\nupper = [1]\n\
+             [time]\nperiod = 1\n"
+        );
+        let spec = Spec::parse(&text, "test.toml").unwrap_or_else(|d| panic!("{d}"));
+        let source = Plan::new(&spec).unwrap().module_source();
+        syn::parse_file(&source).unwrap_or_else(|e| panic!("{name}: {e}\n{source}"));
+        assert!(source.contains(&format!("pub {identifier}: T,")), "{name}\n{source}");
+        let bounds = "value > -f64::INFINITY && value < f64::INFINITY";
+        assert!(source.contains(bounds), "{source}");
+    }
+}

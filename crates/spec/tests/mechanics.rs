@@ -1,0 +1,283 @@
+//! The derived fields against mechanics written down a second time: kinematics and the balance of momentum by differences of
+//! their values, stresses by each law's formula in three dimensions, for every specification of the library and of
+//! the tests.
+
+#![allow(clippy::unwrap_used)]
+
+use mmsmith_expr::{Expr, Program};
+use mmsmith_spec::{Domain, Fields, Material, Spec};
+use std::path::{Path, PathBuf};
+
+type Tensor = [[f64; 3]; 3];
+
+fn tensor(entry: impl Fn(usize, usize) -> f64) -> Tensor {
+    std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)))
+}
+
+fn times(a: &Tensor, b: &Tensor) -> Tensor {
+    tensor(|i, j| (0..3).map(|k| a[i][k] * b[k][j]).sum())
+}
+
+fn transposed(a: &Tensor) -> Tensor {
+    tensor(|i, j| a[j][i])
+}
+
+fn trace(a: &Tensor) -> f64 {
+    a[0][0] + a[1][1] + a[2][2]
+}
+
+fn identity(i: usize, j: usize) -> f64 {
+    f64::from(u8::from(i == j))
+}
+
+fn determinant(a: &Tensor) -> f64 {
+    (0..3).map(|i| a[0][i] * cofactor(a, 0, i)).sum()
+}
+
+fn cofactor(a: &Tensor, i: usize, j: usize) -> f64 {
+    let at = |m: usize, n: usize| a[(i + m) % 3][(j + n) % 3];
+    at(1, 1) * at(2, 2) - at(1, 2) * at(2, 1)
+}
+
+/// The logarithm of a symmetric tensor of positive eigenvalues, by Jacobi's rotations.
+fn logarithm(a: &Tensor) -> Tensor {
+    let (mut a, mut axes) = (*a, tensor(identity));
+    for _ in 0..20 {
+        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
+            let angle = 0.5 * (2.0 * a[p][q]).atan2(a[q][q] - a[p][p]);
+            let (s, c) = angle.sin_cos();
+            let mut turn = tensor(identity);
+            (turn[p][p], turn[p][q], turn[q][p], turn[q][q]) = (c, s, -s, c);
+            a = times(&transposed(&turn), &times(&a, &turn));
+            axes = times(&axes, &turn);
+        }
+    }
+    tensor(|i, j| (0..3).map(|k| axes[i][k] * a[k][k].ln() * axes[j][k]).sum())
+}
+
+/// The first Piola-Kirchhoff stress of a law with these constants; `None` for a law that only the specification states.
+fn stress(material: &Material, constants: &[f64], F: &Tensor) -> Option<Tensor> {
+    let J = determinant(F);
+    let inverse_transposed = tensor(|i, j| cofactor(F, i, j) / J);
+    let C = times(&transposed(F), F);
+    let of_kirchhoff = |tau: Tensor| Some(times(&tau, &inverse_transposed));
+    match (material, constants) {
+        (Material::NeoHookean { .. }, &[lambda, mu]) => {
+            let b = times(F, &transposed(F));
+            of_kirchhoff(tensor(|i, j| {
+                lambda * J.ln() * identity(i, j) + mu * (b[i][j] - identity(i, j))
+            }))
+        }
+        (Material::Hencky { .. }, &[lambda, mu]) => {
+            let doubled = logarithm(&times(F, &transposed(F)));
+            of_kirchhoff(tensor(|i, j| lambda * J.ln() * identity(i, j) + mu * doubled[i][j]))
+        }
+        (Material::StVenantKirchhoff { .. }, &[lambda, mu]) => {
+            let strain = tensor(|i, j| 0.5 * (C[i][j] - identity(i, j)));
+            let second =
+                tensor(|i, j| lambda * trace(&strain) * identity(i, j) + 2.0 * mu * strain[i][j]);
+            Some(times(F, &second))
+        }
+        (Material::LinearElastic { .. }, &[lambda, mu]) => {
+            let H = tensor(|i, j| F[i][j] - identity(i, j));
+            Some(tensor(|i, j| lambda * trace(&H) * identity(i, j) + mu * (H[i][j] + H[j][i])))
+        }
+        (Material::MooneyRivlin { .. }, &[c1, c2, lambda]) => {
+            let FC = times(F, &C);
+            Some(tensor(|i, j| {
+                2.0 * c1 * (F[i][j] - inverse_transposed[i][j])
+                    + 2.0 * c2 * (trace(&C) * F[i][j] - FC[i][j] - 2.0 * inverse_transposed[i][j])
+                    + lambda * J.ln() * inverse_transposed[i][j]
+            }))
+        }
+        (Material::Energy { .. } | Material::Stress { .. }, &[]) => None,
+        _ => panic!("{material:?} with {} constants", constants.len()),
+    }
+}
+
+/// The values of all fields at a place and time.
+struct Values {
+    u: Vec<f64>,
+    v: Vec<f64>,
+    a: Vec<f64>,
+    b: Vec<f64>,
+    /// By rows.
+    H: Vec<f64>,
+    F: Vec<f64>,
+    P: Vec<f64>,
+    J: f64,
+    density: f64,
+    constants: Vec<f64>,
+}
+
+struct Solution {
+    n: usize,
+    program: Program,
+    parameters: Vec<f64>,
+    constants: usize,
+}
+
+impl Solution {
+    fn new(spec: &Spec, fields: &mut Fields) -> Self {
+        let mut outputs: Vec<Expr> =
+            [&fields.u, &fields.v, &fields.a, &fields.b].map(|x| &x[..]).concat();
+        outputs.extend([&fields.H, &fields.F, &fields.P].iter().flat_map(|A| A.concat()));
+        outputs.extend([fields.J, spec.density]);
+        let constants = spec.material.constants();
+        outputs.extend(constants.iter().map(|(_, value)| *value));
+        Solution {
+            n: spec.dimension,
+            program: fields.program(&outputs),
+            parameters: spec.parameters.iter().map(|p| p.default).collect(),
+            constants: constants.len(),
+        }
+    }
+
+    fn at(&self, X: &[f64], t: f64) -> Values {
+        let values = self.program.evaluate(&[X, &[t], &self.parameters].concat());
+        let mut values = values.into_iter();
+        let mut take = |count: usize| values.by_ref().take(count).collect::<Vec<f64>>();
+        let (n, square) = (self.n, self.n * self.n);
+        Values {
+            u: take(n),
+            v: take(n),
+            a: take(n),
+            b: take(n),
+            H: take(square),
+            F: take(square),
+            P: take(square),
+            J: take(1)[0],
+            density: take(1)[0],
+            constants: take(self.constants),
+        }
+    }
+}
+
+/// The derivative of values that are a function of one number, at zero; the error is of the fourth order in `h`.
+fn derivative(values: impl Fn(f64) -> Vec<f64>, h: f64) -> Vec<f64> {
+    let slope = |h: f64| -> Vec<f64> {
+        values(h).iter().zip(values(-h)).map(|(above, below)| (above - below) / (2.0 * h)).collect()
+    };
+    slope(h).iter().zip(slope(2.0 * h)).map(|(fine, coarse)| (4.0 * fine - coarse) / 3.0).collect()
+}
+
+/// Places within the body, none of them on an axis or a plane of symmetry.
+fn places(spec: &Spec, fields: &mut Fields) -> Vec<Vec<f64>> {
+    let parameters: Vec<f64> = spec.parameters.iter().map(|p| p.default).collect();
+    let inputs = [vec![0.0; spec.dimension + 1], parameters].concat();
+    let mut values = |measures: &[Expr]| fields.program(measures).evaluate(&inputs);
+    let fractions = [[0.31, 0.62, 0.17], [0.83, 0.24, 0.55], [0.47, 0.91, 0.72]];
+    match &spec.domain {
+        Domain::Box { lower, upper } => {
+            let (lower, upper) = (values(lower), values(upper));
+            fractions
+                .iter()
+                .map(|f| {
+                    (0..lower.len()).map(|i| lower[i] + f[i] * (upper[i] - lower[i])).collect()
+                })
+                .collect()
+        }
+        Domain::Annulus { inner, outer } => {
+            let radii = values(&[*inner, *outer]);
+            fractions
+                .iter()
+                .map(|f| {
+                    let radius = radii[0] + f[0] * (radii[1] - radii[0]);
+                    let direction: Vec<f64> = (0..spec.dimension).map(|i| 0.2 + f[2 - i]).collect();
+                    let length = direction.iter().map(|x| x * x).sum::<f64>().sqrt();
+                    direction.iter().map(|x| radius * x / length).collect()
+                })
+                .collect()
+        }
+    }
+}
+
+fn specifications() -> Vec<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let folders = [
+        "mms-specs",
+        "tests/data/specs",
+        "tests/data/specs/materials",
+        "crates/spec/tests/data/ok",
+    ];
+    let mut found: Vec<PathBuf> = folders
+        .iter()
+        .flat_map(|folder| std::fs::read_dir(root.join(folder)).unwrap())
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|e| e == "toml"))
+        .collect();
+    found.sort();
+    found
+}
+
+#[test]
+fn fields_obey_mechanics() {
+    for path in specifications() {
+        let file = path.file_name().unwrap().to_str().unwrap();
+        let spec = Spec::parse(&std::fs::read_to_string(&path).unwrap(), file)
+            .unwrap_or_else(|diagnostic| panic!("{diagnostic}"));
+        let mut fields = spec.derive().unwrap();
+        let solution = Solution::new(&spec, &mut fields);
+        let n = spec.dimension;
+        let period = {
+            let inputs: Vec<f64> = [vec![0.0; n + 1], solution.parameters.clone()].concat();
+            fields.program(&[spec.period]).evaluate(&inputs)[0]
+        };
+        for X in places(&spec, &mut fields) {
+            let t = 0.23 * period;
+            let here = solution.at(&X, t);
+            let close = |found: &[f64], expected: &[f64], scale: f64, what: &str| {
+                assert_eq!(found.len(), expected.len());
+                for (found, expected) in found.iter().zip(expected) {
+                    assert!(
+                        (found - expected).abs() <= 1e-7 * scale,
+                        "{file}: {what} is {found:e}, not {expected:e}, at {X:?}"
+                    );
+                }
+            };
+            let largest = |values: &[f64]| values.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+            let moved = |axis: usize, by: f64| {
+                let mut X = X.clone();
+                X[axis] += by;
+                solution.at(&X, t)
+            };
+
+            // Kinematics.
+            let h = 1e-3 * period;
+            let of_time =
+                |part: fn(Values) -> Vec<f64>| derivative(|by| part(solution.at(&X, t + by)), h);
+            let speed = largest(&here.v).max(largest(&here.u) / period);
+            close(&here.v, &of_time(|values| values.u), speed, "v");
+            close(&here.a, &of_time(|values| values.v), largest(&here.a).max(speed / period), "a");
+            let by_axis = |part: fn(Values) -> Vec<f64>| -> Vec<Vec<f64>> {
+                (0..n).map(|axis| derivative(|by| part(moved(axis, by)), 1e-3)).collect()
+            };
+            let columns = by_axis(|values| values.u);
+            let H: Vec<f64> = (0..n * n).map(|k| columns[k % n][k / n]).collect();
+            close(&here.H, &H, 1.0, "H");
+            let plane = |values: &[f64], i: usize, j: usize| {
+                if i < n && j < n { values[i * n + j] } else { identity(i, j) }
+            };
+            let F: Vec<f64> = (0..n * n).map(|k| here.H[k] + identity(k / n, k % n)).collect();
+            close(&here.F, &F, 1e-6, "F");
+            // Out of the plane nothing is stretched.
+            let F = tensor(|i, j| plane(&F, i, j));
+            close(&[here.J], &[determinant(&F)], 1e-6, "J");
+
+            // The law, and the balance of momentum: rho0 a = Div P + rho0 b.
+            let modulus = largest(&here.constants).max(largest(&here.P));
+            if let Some(P) = stress(&spec.material, &here.constants, &F) {
+                let P: Vec<f64> = (0..n * n).map(|k| P[k / n][k % n]).collect();
+                close(&here.P, &P, 1e-4 * modulus, "P");
+            }
+            let columns = by_axis(|values| values.P);
+            let b: Vec<f64> = (0..n)
+                .map(|i| {
+                    let divergence: f64 = (0..n).map(|axis| columns[axis][i * n + axis]).sum();
+                    here.a[i] - divergence / here.density
+                })
+                .collect();
+            close(&here.b, &b, modulus / here.density, "b");
+        }
+    }
+}
