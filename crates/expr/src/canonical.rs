@@ -196,7 +196,8 @@ impl Graph {
         })
     }
 
-    /// The factors that every term has, to the smallest power that occurs.
+    /// The factors that every term has, to the smallest power that occurs. Powers of zero are none: nothing can be divided by
+    /// them.
     fn common_factors(&self, terms: &[(Expr, Rational)]) -> Vec<(Expr, Rational)> {
         // The factors of a term that is no product are itself.
         let single = |term: Expr| [(term, Rational::one())];
@@ -204,6 +205,7 @@ impl Graph {
             Node::Product(factors) => factors.to_vec(),
             _ => single(terms[0].0).to_vec(),
         };
+        common.retain(|(base, _)| *base != Graph::ZERO);
         for &(term, _) in &terms[1..] {
             if common.is_empty() {
                 break;

@@ -487,7 +487,11 @@ mod tests {
         assert_eq!(nearest_f64(&q(-1, 3)), -1.0 / 3.0);
         let tiny = Rational::new(1.into(), num_traits::pow(BigInt::from(2), 1074));
         assert_eq!(nearest_f64(&tiny), f64::from_bits(1));
-        assert_eq!(nearest_f64(&(tiny / Rational::from_integer(2.into()))), 0.0);
+        assert_eq!(nearest_f64(&(&tiny / Rational::from_integer(2.into()))), 0.0);
+        // More than half of the smallest double.
+        assert_eq!(nearest_f64(&(&tiny * q(3, 4))), f64::from_bits(1));
+        assert_eq!(nearest_f64(&(tiny * q(1, 4))), 0.0);
+        assert_eq!(format!("{:?} {:?}", q(-1, 3), q(4, 2)), "-1/3 2");
         let huge = Rational::from_integer(num_traits::pow(BigInt::from(10), 400));
         assert_eq!(nearest_f64(&huge), f64::INFINITY);
         assert_eq!(exact_root(&q(4, 9), 2), Some(q(2, 3)));

@@ -256,3 +256,21 @@ fn many_operands_in_any_order() {
         assert_eq!(graph.product(factors.collect::<Vec<_>>()), forth[0]);
     }
 }
+
+#[test]
+fn only_what_divides_by_zero_says_so_and_every_node_counts() {
+    let mut graph = Graph::new();
+    let (x, zero) = (graph.symbol("x"), graph.integer(0));
+    let before = graph.len();
+    let undefined = graph.div(x, zero);
+    assert_eq!(graph.len(), before + 1);
+    let sum = graph.add(undefined, x);
+    assert!(graph.divides_by_zero(undefined) && graph.divides_by_zero(sum));
+    let square = graph.powi(x, 2);
+    assert!(!graph.divides_by_zero(x) && !graph.divides_by_zero(square));
+    // A factor of both terms that cannot be set apart.
+    let (y, minus_two) = (graph.symbol("y"), Rational::from(-2));
+    let other = graph.product([(y, Rational::from(1)), (zero, minus_two)]);
+    let both = graph.add(undefined, other);
+    assert!(graph.divides_by_zero(both));
+}

@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 use mmsmith_expr::{Ast, Graph};
-use mmsmith_spec::{Diagnostic, Spec, Surface};
+use mmsmith_spec::{DeriveError, Diagnostic, Spec, Surface};
 use std::path::{Path, PathBuf};
 
 fn cases(folder: &str) -> Vec<PathBuf> {
@@ -151,4 +151,28 @@ fn conditions_return_the_coefficients_of_the_study() {
     let same = graph.build(&Ast::parse(&text).unwrap(), &mut |graph, name| Ok(graph.symbol(name)));
     let difference = graph.sub(solved.displacement[0], same.unwrap());
     assert!(graph.vanishes(difference));
+}
+
+/// The one-dimensional sample with another displacement and the name of its amplitude.
+fn sample(amplitude: &str, displacement: &str) -> Result<Spec, Diagnostic> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/ok/axis-aligned-1d.toml");
+    let text = std::fs::read_to_string(path).unwrap();
+    let line = text.lines().find(|line| line.starts_with("X = ")).unwrap();
+    let text = text.replace(line, &format!("X = '{displacement}'"));
+    Spec::parse(&text.replace("\nA = ", &format!("\n{amplitude} = ")), "sample.toml")
+}
+
+#[test]
+fn names_of_64_letters_are_the_longest() {
+    let [longest, longer] = [64, 65].map(|length| "a".repeat(length));
+    assert!(sample(&longest, &format!("{longest}*sin(Pi*X)*cos(c*Pi*t)")).is_ok());
+    let message = sample(&longer, &format!("{longer}*X*t")).unwrap_err().to_string();
+    assert!(message.contains("a name of 65 characters; 64 are the limit"), "{message}");
+}
+
+/// All of the body in one point: F and J are zero everywhere, and the stress is nowhere defined.
+#[test]
+fn fields_that_are_nowhere_defined_are_refused() {
+    let error = sample("A", "-X").unwrap().derive().unwrap_err();
+    assert!(matches!(error, DeriveError::DivisionByZero { .. }), "{error}");
 }
