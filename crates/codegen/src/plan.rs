@@ -5,14 +5,11 @@
 //! order; the Rust module and the C header are two renderings of the same plan, so that their results agree.
 
 use mmsmith_expr::{
-    Dependence, Drafts, Expr, Function, Operation, Program, Rational, Slot, arrange, reuse,
+    Dependence, Drafts, Expr, Function, MOST_KEPT_OF_STATES, Operation, Program, Rational, Slot,
+    arrange, reuse,
 };
 use mmsmith_spec::{DeriveError, Domain, Fields, Spec, Surface};
 use std::collections::BTreeMap;
-
-/// What is kept of each point for its state, at most: 128 bytes in double precision, four times what a step needs of
-/// a particle's position in the plane. Where the cheapest choice is more, some of it is computed anew.
-const MOST_KEPT_OF_STATES: usize = 16;
 
 /// A solution whose fields are derived and staged, ready to be written down in Rust or in C.
 pub struct Plan<'a> {

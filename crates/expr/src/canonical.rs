@@ -288,8 +288,8 @@ impl Graph {
         coefficient: &mut Rational,
         pending: &mut Numbered,
     ) -> bool {
-        let number = match self.node(base) {
-            Node::Number(value) => value,
+        let (number, term) = match self.node(base) {
+            Node::Number(value) => (value, None),
             Node::Product(factors) => {
                 let simple = factors.len() == 1 && !factors[0].1.is_integer();
                 let opens = exponent.is_integer() || simple;
@@ -298,14 +298,14 @@ impl Graph {
                 }
                 return opens;
             }
-            Node::Sum { constant, terms } if constant.is_zero() && terms.len() == 1 => &terms[0].1,
+            Node::Sum { constant, terms } if constant.is_zero() && terms.len() == 1 => {
+                (&terms[0].1, Some(terms[0].0))
+            }
             _ => return false,
         };
         let Some(power) = rational_power(number, exponent) else { return false };
         *coefficient *= power;
-        if let Node::Sum { terms, .. } = self.node(base) {
-            pending.push((terms[0].0, exponent.clone()));
-        }
+        pending.extend(term.map(|term| (term, exponent.clone())));
         true
     }
 

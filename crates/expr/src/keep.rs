@@ -12,6 +12,10 @@ use std::collections::{BTreeMap, VecDeque};
 /// that one core gets while it also computes, and an addition in a vector register of eight about 0.15 ns.
 const KEPT_NUMBER: usize = 5;
 
+/// What is kept of each point for its state, at most: 128 bytes in double precision, four times what a step needs of
+/// a particle's position in the plane. Where the cheapest choice is more, some of it is computed anew.
+pub const MOST_KEPT_OF_STATES: usize = 16;
+
 /// A call costs forty additions, so that no program of a field comes to as much.
 const LARGEST_PRICE: usize = 1 << 20;
 

@@ -53,6 +53,7 @@ pub use build::BuildError;
 pub use cancel::Term;
 pub use derivative::Derivatives;
 pub use graph::{Expr, Function, Graph, Node};
+pub use keep::MOST_KEPT_OF_STATES;
 pub use parse::{Ast, AstKind, ParseError};
 pub use program::{
     Dependence, Drafts, Operation, OperationCount, OperationsByStage, Program, Section, Slot,

@@ -19,6 +19,9 @@ impl Replacement {
 
     /// `expr` with what is known replaced, from the root downwards.
     pub fn of(&mut self, graph: &mut Graph, expr: Expr) -> Expr {
+        if self.known.is_empty() {
+            return expr;
+        }
         if let Some(&known) = self.known.get(&expr) {
             return known;
         }
@@ -31,9 +34,6 @@ impl Replacement {
 impl Graph {
     /// `expr` with each expression that `replacement` knows replaced, from the root downwards.
     pub fn replace(&mut self, expr: Expr, replacement: &BTreeMap<Expr, Expr>) -> Expr {
-        if replacement.is_empty() {
-            return expr;
-        }
         Replacement::new(replacement.iter().map(|(&of, &by)| (of, by))).of(self, expr)
     }
 }

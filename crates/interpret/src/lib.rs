@@ -6,7 +6,7 @@
 
 mod staged;
 
-use mmsmith_expr::{Drafts, Expr, Program, Slot, arrange};
+use mmsmith_expr::{Drafts, Expr, MOST_KEPT_OF_STATES, Program, Slot, arrange};
 use mmsmith_solutions::nalgebra::{SMatrix, SVector};
 use mmsmith_solutions::{
     AnySolution, BodyForceAtPoints, Boundary, Condition, Domain, Fields, Material, ParameterError,
@@ -15,9 +15,6 @@ use mmsmith_solutions::{
 use mmsmith_spec::{self as spec, DeriveError, Spec};
 use staged::Stages;
 use thiserror::Error;
-
-/// What is kept of each point for its state, at most.
-const MOST_KEPT_OF_STATES: usize = 16;
 
 /// Why a specification could not be interpreted.
 #[derive(Clone, Debug, Error, PartialEq)]

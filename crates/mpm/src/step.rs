@@ -3,6 +3,8 @@
 use std::array;
 use std::sync::{Mutex, PoisonError};
 
+use nalgebra::{RealField, SMatrix, SVector};
+
 use crate::bands::Bands;
 use crate::block::{BLOCK, Block};
 use crate::body_force::BodyForce;
@@ -15,7 +17,6 @@ use crate::simd::{Loop, dispatch};
 use crate::tensor::{determinant, product, real};
 use crate::transfer::{Deposit, Gathered, Node};
 use crate::weights::{HALF_SIZE_LIMIT, Rule, WIDE, first_layer, is_wide};
-use nalgebra::{RealField, SMatrix, SVector};
 
 /// Particles handed to a thread at a time; fixed, so that nothing depends on the number of threads.
 const CHUNK: usize = 1024;

@@ -82,10 +82,8 @@ pub(crate) fn surface_fields(
     let surfaces = spec.domain.surfaces(spec.dimension).into_iter();
     surfaces
         .map(|surface| {
-            let mut on_surface =
-                OnSurface { graph, geometry, spec, fields, surface, placing: None };
-            on_surface.placing = on_surface.place().map(|pair| Replacement::new([pair]));
-            on_surface.derive()
+            let placing = Replacement::new(fixed_coordinate(geometry, spec, surface));
+            OnSurface { graph, geometry, spec, fields, surface, placing }.derive()
         })
         .collect()
 }
@@ -97,18 +95,50 @@ struct OnSurface<'a, 'b> {
     fields: &'a Components<'b>,
     surface: Surface,
     /// The coordinate that is fixed on the surface, replaced by its value.
-    placing: Option<Replacement>,
+    placing: Replacement,
+}
+
+/// The coordinate that is fixed on a surface, and its value.
+fn fixed_coordinate(geometry: &Geometry, spec: &Spec, surface: Surface) -> Option<(Expr, Expr)> {
+    match plane(spec, surface) {
+        Some((axis, value)) => Some((geometry.cartesian[axis], value)),
+        None if spec.coordinates == Coordinates::Cartesian => None,
+        None => Some((geometry.coordinates[0], radius(spec, surface))),
+    }
+}
+
+/// The axis and the place of a plane surface.
+fn plane(spec: &Spec, surface: Surface) -> Option<(usize, Expr)> {
+    match (surface, &spec.domain) {
+        (Surface::Lower(axis), Domain::Box { lower, .. }) => Some((axis, lower[axis])),
+        (Surface::Upper(axis), Domain::Box { upper, .. }) => Some((axis, upper[axis])),
+        (Surface::Lower(axis) | Surface::Upper(axis), _) => Some((axis, Graph::ZERO)),
+        _ => None,
+    }
+}
+
+fn radius(spec: &Spec, surface: Surface) -> Expr {
+    match (surface, &spec.domain) {
+        (Surface::Inner, Domain::Annulus { inner, .. }) => *inner,
+        (_, Domain::Annulus { outer, .. }) => *outer,
+        _ => Graph::ONE,
+    }
 }
 
 impl OnSurface<'_, '_> {
     fn derive(&mut self) -> SurfaceFields {
         // The traction and the displacement in components of which one is along the normal, where there are such.
         let radial = matches!(self.spec.coordinates, Coordinates::Polar | Coordinates::Spherical);
-        let (traction, displacement, normal) = match (self.plane(), self.radius()) {
-            (Some((axis, _)), _) => (self.column(self.fields.P, axis), self.fields.u, Some(axis)),
-            (None, _) if radial => (self.column(self.fields.own_P, 0), self.fields.own_u, Some(0)),
-            (None, radius) => (self.across(radius), self.fields.u, None),
-        };
+        let (traction, displacement, normal) =
+            match (plane(self.spec, self.surface), radius(self.spec, self.surface)) {
+                (Some((axis, _)), _) => {
+                    (self.column(self.fields.P, axis), self.fields.u, Some(axis))
+                }
+                (None, _) if radial => {
+                    (self.column(self.fields.own_P, 0), self.fields.own_u, Some(0))
+                }
+                (None, radius) => (self.across(radius), self.fields.u, None),
+            };
         let mut traction: Vec<Expr> = traction.into_iter().map(|t| self.placed(t)).collect();
         let mut claims = Vec::new();
         let declared: Vec<Condition> = self.conditions();
@@ -135,7 +165,7 @@ impl OnSurface<'_, '_> {
                 Condition::PrescribedTraction | Condition::PrescribedMotion => {}
             }
         }
-        if self.plane().is_none() && radial {
+        if plane(self.spec, self.surface).is_none() && radial {
             traction = crate::derive::turn_vector(self.graph, self.geometry, &traction);
             traction = traction.into_iter().map(|t| self.placed(t)).collect();
         }
@@ -145,24 +175,6 @@ impl OnSurface<'_, '_> {
     fn conditions(&self) -> Vec<Condition> {
         let here = |boundary: &&Boundary| boundary.surface == self.surface;
         self.spec.boundaries.iter().filter(here).map(|boundary| boundary.condition).collect()
-    }
-
-    /// The axis and the place of a plane surface.
-    fn plane(&self) -> Option<(usize, Expr)> {
-        match (self.surface, &self.spec.domain) {
-            (Surface::Lower(axis), Domain::Box { lower, .. }) => Some((axis, lower[axis])),
-            (Surface::Upper(axis), Domain::Box { upper, .. }) => Some((axis, upper[axis])),
-            (Surface::Lower(axis) | Surface::Upper(axis), _) => Some((axis, Graph::ZERO)),
-            _ => None,
-        }
-    }
-
-    fn radius(&self) -> Expr {
-        match (self.surface, &self.spec.domain) {
-            (Surface::Inner, Domain::Annulus { inner, .. }) => *inner,
-            (_, Domain::Annulus { outer, .. }) => *outer,
-            _ => Graph::ONE,
-        }
     }
 
     /// Whether the outward normal points the way of the coordinate.
@@ -191,19 +203,9 @@ impl OnSurface<'_, '_> {
             .collect()
     }
 
-    /// The coordinate that is fixed on the surface, and its value.
-    fn place(&self) -> Option<(Expr, Expr)> {
-        match self.plane() {
-            Some((axis, value)) => Some((self.geometry.cartesian[axis], value)),
-            None if self.spec.coordinates == Coordinates::Cartesian => None,
-            None => Some((self.geometry.coordinates[0], self.radius())),
-        }
-    }
-
     /// The expression with the coordinate that is fixed on the surface put in, where that does not divide by zero.
     fn placed(&mut self, expr: Expr) -> Expr {
-        let Some(placing) = &mut self.placing else { return expr };
-        let placed = placing.of(self.graph, expr);
+        let placed = self.placing.of(self.graph, expr);
         if self.graph.divides_by_zero(placed) { expr } else { placed }
     }
 

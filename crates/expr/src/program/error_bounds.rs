@@ -22,73 +22,50 @@ impl Program {
         let mut values: Vec<Row> = Vec::with_capacity(self.operations.len());
         let mut errors: Vec<Row> = Vec::with_capacity(self.operations.len());
         for (operation, &number) in self.operations.iter().zip(&self.numbers) {
-            let known = |slot: Slot| (&values[slot.index()], &errors[slot.index()]);
-            let (value, error) = match *operation {
-                Operation::Number(_) => ([number; SIDE], [0.0; SIDE]),
-                Operation::Input(index) => {
-                    (inputs.get(index).copied().unwrap_or([f64::NAN; SIDE]), [0.0; SIDE])
+            let value = match *operation {
+                Operation::Number(_) => [number; SIDE],
+                Operation::Input(index) => inputs.get(index).copied().unwrap_or([f64::NAN; SIDE]),
+                _ => operation.row(&values),
+            };
+            let carried = |slot: Slot| &errors[slot.index()];
+            let error = match *operation {
+                Operation::Number(_) | Operation::Input(_) => [0.0; SIDE],
+                Operation::Neg(a) => *carried(a),
+                Operation::Add(a, b) | Operation::Sub(a, b) => {
+                    let (ea, eb) = (carried(a), carried(b));
+                    array::from_fn(|k| ea[k] + eb[k] + value[k].abs())
                 }
-                Operation::Neg(a) => (known(a).0.map(|a| -a), *known(a).1),
-                Operation::Add(a, b) => {
-                    rounded(known(a), known(b), |a, b| a + b, |_, _, _, ea, eb| ea + eb)
+                Operation::Mul(a, b) => {
+                    let (ea, eb) = (carried(a), carried(b));
+                    let (a, b) = (&values[a.index()], &values[b.index()]);
+                    array::from_fn(|k| ea[k] * b[k].abs() + eb[k] * a[k].abs() + value[k].abs())
                 }
-                Operation::Sub(a, b) => {
-                    rounded(known(a), known(b), |a, b| a - b, |_, _, _, ea, eb| ea + eb)
+                Operation::Div(a, b) => {
+                    let (ea, eb, b) = (carried(a), carried(b), &values[b.index()]);
+                    array::from_fn(|k| {
+                        (ea[k] + eb[k] * value[k].abs()) / b[k].abs() + value[k].abs()
+                    })
                 }
-                Operation::Mul(a, b) => rounded(
-                    known(a),
-                    known(b),
-                    |a, b| a * b,
-                    |_, a, b, ea, eb| ea * b.abs() + eb * a.abs(),
-                ),
-                Operation::Div(a, b) => rounded(
-                    known(a),
-                    known(b),
-                    |a, b| a / b,
-                    |y, _, b, ea, eb| (ea + eb * y.abs()) / b.abs(),
-                ),
-                _ => {
-                    let value =
-                        array::from_fn(|k| operation.value(&[], |slot| values[slot.index()][k]));
-                    let error = array::from_fn(|k| {
-                        let at = |slot: Slot| values[slot.index()][k];
-                        // The derivative of a function by a difference: its accuracy does not matter.
-                        let slope = |a: Slot| {
-                            let step = 1e-6 * (1e-3 + at(a).abs());
-                            let moved = operation.value(&[], |slot| {
-                                if slot == a { at(slot) + step } else { at(slot) }
-                            });
-                            ((moved - value[k]) / step).abs()
-                        };
-                        let carried: f64 = match operation {
-                            // What they correct stays in the bound, so they add nothing.
-                            Operation::SumError(..) | Operation::ProductError(..) => 0.0,
-                            _ => {
-                                operation.operands().map(|a| errors[a.index()][k] * slope(a)).sum()
-                            }
-                        };
-                        carried + value[k].abs()
-                    });
-                    (value, error)
-                }
+                _ => array::from_fn(|k| {
+                    let at = |slot: Slot| values[slot.index()][k];
+                    // The derivative of a function by a difference: its accuracy does not matter.
+                    let slope = |a: Slot| {
+                        let step = 1e-6 * (1e-3 + at(a).abs());
+                        let moved = operation
+                            .value(&[], |slot| if slot == a { at(slot) + step } else { at(slot) });
+                        ((moved - value[k]) / step).abs()
+                    };
+                    let carried: f64 = match operation {
+                        // What they correct stays in the bound, so they add nothing.
+                        Operation::SumError(..) | Operation::ProductError(..) => 0.0,
+                        _ => operation.operands().map(|a| carried(a)[k] * slope(a)).sum(),
+                    };
+                    carried + value[k].abs()
+                }),
             };
             values.push(value);
             errors.push(error);
         }
         self.outputs.iter().map(|slot| errors[slot.index()]).collect()
     }
-}
-
-/// The results of an operation, and their bounds: its own rounding, and what `carried` of the result, the operands and
-/// their bounds says.
-#[inline(always)]
-fn rounded(
-    (a, ea): (&Row, &Row),
-    (b, eb): (&Row, &Row),
-    operation: impl Fn(f64, f64) -> f64,
-    carried: impl Fn(f64, f64, f64, f64, f64) -> f64,
-) -> (Row, Row) {
-    let value: Row = array::from_fn(|k| operation(a[k], b[k]));
-    let error = array::from_fn(|k| carried(value[k], a[k], b[k], ea[k], eb[k]) + value[k].abs());
-    (value, error)
 }

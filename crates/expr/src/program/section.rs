@@ -79,7 +79,7 @@ impl Section {
 
 impl Operation {
     /// The values at `N` places, where `rows` has those of the operands.
-    fn row<const N: usize>(&self, rows: &[[f64; N]]) -> [f64; N] {
+    pub(super) fn row<const N: usize>(&self, rows: &[[f64; N]]) -> [f64; N] {
         let of = |slot: Slot| &rows[slot.index()];
         let each = |a: Slot, b: Slot, value: fn(f64, f64) -> f64| -> [f64; N] {
             let (a, b) = (of(a), of(b));
