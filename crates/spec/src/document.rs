@@ -139,14 +139,14 @@ impl Text {
     /// The place in the file of a place in the text.
     pub(crate) fn locate(&self, source: &str, inner: &Range<usize>) -> Range<usize> {
         let raw = source.get(self.span.clone()).unwrap_or_default();
-        let quote = raw.len().saturating_sub(raw.trim_start_matches(['"', '\'']).len());
-        let newline = if quote == 3 && raw[quote..].starts_with('\n') { 1 } else { 0 };
-        let start = quote + newline;
+        let content = raw.trim_start_matches(['"', '\'']);
+        // The end of a line right after the quotes is no part of the text.
+        let content = content.strip_prefix('\n').unwrap_or(content);
         // Escapes move what follows them; then only the whole string is certain.
-        if raw.get(start..start + self.value.len()) != Some(self.value.as_str()) {
+        if !content.starts_with(&self.value) {
             return self.span.clone();
         }
-        let offset = self.span.start + start;
+        let offset = self.span.end - content.len();
         offset + inner.start..offset + inner.end
     }
 }

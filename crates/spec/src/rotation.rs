@@ -7,6 +7,7 @@
 use crate::coordinates::CARTESIAN;
 use crate::derive::Fields;
 use crate::document::{BoundaryTable, RotationTable};
+use crate::law::energy::component_names;
 use crate::scope::Scope;
 use crate::tensor::Matrix;
 use crate::{Boundary, Condition, Diagnostic, Material};
@@ -84,8 +85,9 @@ impl Rotation {
             Material::LinearElastic { .. } | Material::Stress { .. } => false,
             Material::Energy { W, .. } => {
                 let symbols = scope.graph.symbols_in(&[*W]);
-                let names = symbols.iter().filter_map(|s| scope.graph.symbol_name(*s));
-                !names.into_iter().any(is_component_of_f)
+                let components = component_names("F", scope.coordinates.len()).concat();
+                let mut names = symbols.iter().filter_map(|s| scope.graph.symbol_name(*s));
+                !names.any(|name| components.iter().any(|component| component == name))
             }
             _ => true,
         };
@@ -138,11 +140,6 @@ impl Rotation {
         let angle = graph.print(self.angle);
         format!("then turned about {} by the angle {angle}", CARTESIAN[self.axis.min(2)])
     }
-}
-
-/// Whether the name is `F11` or another component of the deformation gradient.
-fn is_component_of_f(name: &str) -> bool {
-    name.len() == 3 && name.starts_with('F') && name[1..].chars().all(|c| ('1'..='3').contains(&c))
 }
 
 /// A rotation matrix with its rates.

@@ -16,7 +16,7 @@ use crate::law::{self, Deformation};
 use crate::scope::Scope;
 use crate::{Diagnostic, Material, Spec};
 use mmsmith_expr::{Ast, AstKind, Expr, Function, Graph, Node, Program, Rational, Term};
-use num_traits::{One, Signed, Zero};
+use num_traits::{Signed, Zero};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use toml::Spanned;
@@ -215,7 +215,8 @@ impl<'a> Solver<'a> {
         };
         let symbols = self.unknown_symbols();
         let mut factors = Vec::new();
-        self.collect_factors(zero, &Rational::one(), &mut factors);
+        let open = self.graph.open(zero);
+        self.collect_factors(open, true, &mut factors);
         factors.retain(|factor| self.graph.depends_on(*factor, &symbols));
         if factors.is_empty() {
             let held = self.graph.vanishes(zero);
@@ -397,26 +398,18 @@ impl<'a> Solver<'a> {
         self.unknowns.iter().map(|(_, symbol)| *symbol).collect()
     }
 
-    /// The factors of `expr` that are not divided by, each opened.
-    fn collect_factors(&mut self, expr: Expr, exponent: &Rational, factors: &mut Vec<Expr>) {
-        match self.graph.node(expr).clone() {
-            Node::Whole(inner) => self.collect_factors(inner, exponent, factors),
+    /// The factors of `expr` that are not divided by, or, with `above` false, those that are.
+    fn collect_factors(&self, expr: Expr, above: bool, factors: &mut Vec<Expr>) {
+        match self.graph.node(expr) {
             Node::Product(parts) => {
                 for (base, power) in parts {
-                    self.collect_factors(base, &(power * exponent), factors);
+                    self.collect_factors(*base, above == power.is_positive(), factors);
                 }
             }
             Node::Sum { constant, terms } if constant.is_zero() && terms.len() == 1 => {
-                self.collect_factors(terms[0].0, exponent, factors);
+                self.collect_factors(terms[0].0, above, factors);
             }
-            _ if exponent.is_positive() => {
-                let open = self.graph.open(expr);
-                if open != expr {
-                    self.collect_factors(open, exponent, factors);
-                } else if !factors.contains(&expr) {
-                    factors.push(expr);
-                }
-            }
+            _ if above && !factors.contains(&expr) => factors.push(expr),
             _ => {}
         }
     }

@@ -1,11 +1,11 @@
 //! The derived fields against mechanics written down a second time: kinematics and the balance of momentum by differences of
 //! their values, stresses by each law's formula in three dimensions, for every specification of the library and of
-//! the tests.
+//! the tests. The traction on a surface is the stress there on its normal.
 
 #![allow(clippy::unwrap_used)]
 
 use mmsmith_expr::{Expr, Program};
-use mmsmith_spec::{Domain, Fields, Material, Spec};
+use mmsmith_spec::{Domain, Fields, Material, Spec, Surface};
 use std::path::{Path, PathBuf};
 
 type Tensor = [[f64; 3]; 3];
@@ -161,6 +161,30 @@ fn derivative(values: impl Fn(f64) -> Vec<f64>, h: f64) -> Vec<f64> {
     slope(h).iter().zip(slope(2.0 * h)).map(|(fine, coarse)| (4.0 * fine - coarse) / 3.0).collect()
 }
 
+/// Where a surface is: the place on it that is nearest to `X`, and the outward normal there.
+fn on_surface(spec: &Spec, fields: &mut Fields, surface: Surface, X: &[f64]) -> [Vec<f64>; 2] {
+    let parameters: Vec<f64> = spec.parameters.iter().map(|p| p.default).collect();
+    let inputs = [vec![0.0; spec.dimension + 1], parameters].concat();
+    let mut value = |measure: Expr| fields.program(&[measure]).evaluate(&inputs)[0];
+    let plane = |axis: usize, at: f64, sign: f64| {
+        let (mut place, mut normal) = (X.to_vec(), vec![0.0; X.len()]);
+        (place[axis], normal[axis]) = (at, sign);
+        [place, normal]
+    };
+    let rim = |radius: f64, sign: f64| {
+        let length = X.iter().map(|x| x * x).sum::<f64>().sqrt();
+        [radius, sign].map(|factor| X.iter().map(|x| factor * x / length).collect())
+    };
+    match (surface, &spec.domain) {
+        (Surface::Lower(axis), Domain::Box { lower, .. }) => plane(axis, value(lower[axis]), -1.0),
+        (Surface::Upper(axis), Domain::Box { upper, .. }) => plane(axis, value(upper[axis]), 1.0),
+        (Surface::Lower(axis), Domain::Annulus { .. }) => plane(axis, 0.0, -1.0),
+        (Surface::Inner, Domain::Annulus { inner, .. }) => rim(value(*inner), -1.0),
+        (Surface::Outer, Domain::Annulus { outer, .. }) => rim(value(*outer), 1.0),
+        _ => panic!("{surface:?} of {:?}", spec.domain),
+    }
+}
+
 /// Places within the body, none of them on an axis or a plane of symmetry.
 fn places(spec: &Spec, fields: &mut Fields) -> Vec<Vec<f64>> {
     let parameters: Vec<f64> = spec.parameters.iter().map(|p| p.default).collect();
@@ -216,6 +240,8 @@ fn fields_obey_mechanics() {
         let file = path.file_name().unwrap().to_str().unwrap();
         let spec = Spec::parse(&std::fs::read_to_string(&path).unwrap(), file)
             .unwrap_or_else(|diagnostic| panic!("{diagnostic}"));
+        let law = format!("law = '{}'", spec.material.name());
+        assert!(spec.source.contains(&law), "{file}: {law}");
         let mut fields = spec.derive().unwrap();
         let solution = Solution::new(&spec, &mut fields);
         let n = spec.dimension;
@@ -223,6 +249,9 @@ fn fields_obey_mechanics() {
             let inputs: Vec<f64> = [vec![0.0; n + 1], solution.parameters.clone()].concat();
             fields.program(&[spec.period]).evaluate(&inputs)[0]
         };
+        let surfaces = fields.surfaces.clone();
+        let tractions: Vec<(Surface, Program)> =
+            surfaces.iter().map(|on| (on.surface, fields.program(&on.traction))).collect();
         for X in places(&spec, &mut fields) {
             let t = 0.23 * period;
             let here = solution.at(&X, t);
@@ -278,6 +307,14 @@ fn fields_obey_mechanics() {
                 })
                 .collect();
             close(&here.b, &b, modulus / here.density, "b");
+            for (surface, traction) in &tractions {
+                let [place, normal] = on_surface(&spec, &mut fields, *surface, &X);
+                let P = solution.at(&place, t).P;
+                let expected: Vec<f64> =
+                    (0..n).map(|i| (0..n).map(|j| P[i * n + j] * normal[j]).sum()).collect();
+                let found = traction.evaluate(&[&place[..], &[t], &solution.parameters].concat());
+                close(&found, &expected, 1e-6 * modulus, &format!("traction on {surface:?}"));
+            }
         }
     }
 }

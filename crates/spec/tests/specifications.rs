@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 use mmsmith_expr::{Ast, Graph};
-use mmsmith_spec::{DeriveError, Diagnostic, Spec, Surface};
+use mmsmith_spec::{DeriveError, Diagnostic, ListingText, Spec, Surface};
 use std::path::{Path, PathBuf};
 
 fn cases(folder: &str) -> Vec<PathBuf> {
@@ -97,6 +97,20 @@ fn fields_are_derived_as_expected() {
                 text += &format!("    {:?} ({}) is to vanish\n", claim.what, quantities.join(", "));
             }
         }
+        for rotation in spec.rotation.iter() {
+            text += &format!("{}\n", rotation.formula(&spec.graph));
+        }
+        for check in &spec.cross_checks {
+            let listing = match &check.listing {
+                ListingText::Inline(listing) => listing.text().trim(),
+                ListingText::File { path, .. } => path,
+            };
+            let line = listing.lines().next().unwrap();
+            text += &format!("{}: {line}\n", check.source);
+            for (name, _) in &check.renamed {
+                text += &format!("    {name} = {}\n", spec.graph.print(check.names[name]));
+            }
+        }
         expect(&path, &text, &mut failures);
     }
     assert!(failures.is_empty(), "{}", failures.join("\n\n"));
@@ -160,6 +174,53 @@ fn sample(amplitude: &str, displacement: &str) -> Result<Spec, Diagnostic> {
     let line = text.lines().find(|line| line.starts_with("X = ")).unwrap();
     let text = text.replace(line, &format!("X = '{displacement}'"));
     Spec::parse(&text.replace("\nA = ", &format!("\n{amplitude} = ")), "sample.toml")
+}
+
+#[test]
+fn a_range_admits_what_its_signs_say() {
+    for (range, admitted) in [
+        ("< 1", [true, false, false]),
+        ("<= 1", [true, true, false]),
+        ("> 1", [false, false, true]),
+        (">= 1", [false, true, true]),
+    ] {
+        for (default, admitted) in ["0.5", "1", "1.5"].into_iter().zip(admitted) {
+            let parameter = format!("more = {{ default = {default}, range = '{range}' }}\nA");
+            let found = sample(&parameter, "A*X*t");
+            assert_eq!(found.is_ok(), admitted, "{default} {range}");
+        }
+    }
+}
+
+#[test]
+fn built_in_names_cannot_be_declared() {
+    for name in ["Pi", "sqrt", "diff", "sin", "atan2"] {
+        let message = sample(name, "X*t").unwrap_err().to_string();
+        assert!(message.contains(&format!("'{name}' is built in")), "{message}");
+    }
+}
+
+/// The invariants are recognized, so that fields are derived in the same way as for a law that is built in.
+#[test]
+fn an_energy_in_invariants_has_the_fields_of_the_law_that_it_is() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let path = root.join("tests/data/specs/materials/ring-mooney-rivlin.toml");
+    let text = std::fs::read_to_string(path).unwrap();
+    let text = text.replace(
+        "[parameters]",
+        "[parameters]\nc1 = { default = 2 }\nc2 = { default = 1 }\nlambda = { default = 3 }",
+    );
+    let (start, end) = (text.find("law = ").unwrap(), text.find("[domain]").unwrap());
+    let [named, stated] = [
+        "law = 'mooney-rivlin'\nc1 = 'c1'\nc2 = 'c2'\nlambda = 'lambda'\n",
+        "law = 'energy'\nW = 'c1*(I1 - 3 - 2*ln(J)) + c2*(I2 - 3 - 4*ln(J)) + lambda/2*ln(J)^2'\n",
+    ]
+    .map(|material| {
+        let text = [&text[..start], material, &text[end..]].concat();
+        let fields = Spec::parse(&text, "sample.toml").unwrap().derive().unwrap();
+        fields.b.iter().map(|&b| fields.graph.print(b)).collect::<Vec<_>>()
+    });
+    assert!(stated == named, "{stated:?}\nis not\n{named:?}");
 }
 
 #[test]

@@ -90,7 +90,7 @@ impl ComponentLaw {
         for i in 0..n {
             let (mut first, mut second) = (Vec::new(), Vec::new());
             for (J, k, L) in indices(n) {
-                if open[k][L][J] == Graph::ZERO && whole[k][L][J] == Graph::ZERO {
+                if open[k][L][J] == Graph::ZERO {
                     continue;
                 }
                 let graph = &mut derivation.graph;

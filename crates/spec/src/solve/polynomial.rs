@@ -9,21 +9,17 @@ const MOST_TERMS: usize = 1 << 10;
 /// Coefficients of more bits than this are given up.
 const MOST_BITS: u64 = 1 << 11;
 
-/// A sum of `coefficient * product of x_i ^ exponent_i`; all monomials have the same number of exponents.
+/// A sum of `coefficient * product of x_i ^ exponent_i`, by default zero; all monomials have the same number of exponents.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
 pub(super) struct Polynomial(BTreeMap<Vec<u32>, Rational>);
 
 impl Polynomial {
-    pub(super) fn zero() -> Self {
-        Self::default()
-    }
-
     pub(super) fn constant(value: Rational, variables: usize) -> Self {
         Self::of([(vec![0; variables], value)])
     }
 
     pub(super) fn of(terms: impl IntoIterator<Item = (Vec<u32>, Rational)>) -> Self {
-        let mut sum = Self::zero();
+        let mut sum = Self::default();
         terms.into_iter().for_each(|(monomial, coefficient)| sum.add_term(monomial, &coefficient));
         sum
     }
@@ -53,7 +49,7 @@ impl Polynomial {
 
     /// The product; `None` where it grows too large.
     pub(super) fn times(&self, other: &Self) -> Option<Self> {
-        let mut product = Self::zero();
+        let mut product = Self::default();
         for (m, c) in &self.0 {
             for (n, d) in &other.0 {
                 let monomial = m.iter().zip(n).map(|(a, b)| a + b).collect();
@@ -86,7 +82,7 @@ impl Polynomial {
     fn monic(&self) -> Self {
         match self.0.last_key_value() {
             Some((_, leading)) => self.scaled(&(Rational::one() / leading)),
-            None => Self::zero(),
+            None => Self::default(),
         }
     }
 
@@ -108,7 +104,7 @@ impl Polynomial {
     pub(super) fn divided_by(&self, divisor: &Self) -> Option<Self> {
         let (leading, coefficient) = divisor.0.last_key_value()?;
         let mut rest = self.clone();
-        let mut quotient = Self::zero();
+        let mut quotient = Self::default();
         while let Some((monomial, c)) = rest.0.last_key_value() {
             let difference: Option<Vec<u32>> =
                 monomial.iter().zip(leading).map(|(a, b)| a.checked_sub(*b)).collect();
@@ -122,7 +118,7 @@ impl Polynomial {
 
     /// The greatest common divisor of the coefficients with respect to variable `v`.
     fn content(&self, v: usize) -> Option<Self> {
-        let mut content = Self::zero();
+        let mut content = Self::default();
         for n in 0..=self.degree(v) {
             content = content.gcd(&self.coefficient(v, n))?;
         }
@@ -227,6 +223,25 @@ mod tests {
         prop::collection::vec(term, 1..4).prop_map(Polynomial::of)
     }
 
+    #[test]
+    fn products_of_too_many_terms_or_bits_are_given_up() {
+        let powers = |v: usize, count: u32| {
+            Polynomial::of((0..count).map(|n| {
+                let mut exponents = vec![0; 2];
+                exponents[v] = n;
+                (exponents, Rational::one())
+            }))
+        };
+        assert!(powers(0, 32).times(&powers(1, 32)).is_some());
+        assert!(powers(0, 32).times(&powers(1, 33)).is_none());
+        let of_bits = |bits: u32| {
+            let power = num_traits::pow(Rational::from_integer(2.into()), bits as usize - 1);
+            Polynomial::constant(power, 2)
+        };
+        assert!(of_bits(1024).times(&of_bits(1025)).is_some());
+        assert!(of_bits(1025).times(&of_bits(1025)).is_none());
+    }
+
     proptest! {
         #[test]
         fn a_common_factor_is_found(a in polynomial(), b in polynomial(), common in polynomial()) {
@@ -247,7 +262,7 @@ mod tests {
             let quotient = fraction(&a).divided_by(&fraction(&b)).unwrap();
             let back = quotient.times(&fraction(&b)).unwrap();
             prop_assert_eq!(back.numerator.times(&fraction(&a).denominator).unwrap().minus(
-                &a.times(&back.denominator).unwrap()), Polynomial::zero());
+                &a.times(&back.denominator).unwrap()), Polynomial::default());
             prop_assert!(quotient.minus(&quotient).unwrap().is_zero());
         }
     }
