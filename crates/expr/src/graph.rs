@@ -492,3 +492,88 @@ fn children(node: &Node) -> impl Iterator<Item = Expr> + '_ {
     };
     pairs.iter().map(|&(e, _)| e).chain(arguments.iter().copied())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Ast, Expr};
+
+    fn build(graph: &mut Graph, text: &str) -> Expr {
+        graph.build(&Ast::parse(text).unwrap(), &mut |g, name| Ok(g.symbol(name))).unwrap()
+    }
+
+    /// Values at the one place are those of the mathematics, and magnitudes are what they would be if nothing cancelled,
+    /// by as much as an error of the operands is magnified.
+    #[test]
+    fn samples_and_magnitudes() {
+        type Of = fn(f64, f64) -> f64;
+        let cases: [(&str, Of, Of); 20] = [
+            ("-7/2", |_, _| -3.5, |_, _| 3.5),
+            ("Pi", |_, _| std::f64::consts::PI, |_, _| std::f64::consts::PI),
+            ("y", |_, y| y, |_, y| y),
+            ("x - y", |x, y| x - y, |x, y| x + y),
+            ("3 - 2*x + y/4", |x, y| 3.0 - 2.0 * x + y / 4.0, |x, y| 3.0 + 2.0 * x + y / 4.0),
+            ("x*y", |x, y| x * y, |x, y| 2.0 * x * 2.0 * y),
+            ("x^3*y", |x, y| x.powi(3) * y, |x, y| 4.0 * x.powi(3) * 2.0 * y),
+            ("x/y^2", |x, y| x / (y * y), |x, y| 2.0 * x * 3.0 / (y * y)),
+            ("sqrt(x)", |x, _| x.sqrt(), |x, _| 1.5 * x.sqrt()),
+            ("(x - y)^3", |x, y| (x - y).powi(3), |x, y| 4.0 * (x - y).powi(2).abs() * (x + y)),
+            ("1/(y - x)", |x, y| 1.0 / (y - x), |x, y| 2.0 * (x + y) / (y - x).powi(2)),
+            ("sin(x - y)", |x, y| (x - y).sin(), |x, y| (x - y).sin().abs() + x + y),
+            ("cos(x - y)", |x, y| (x - y).cos(), |x, y| (x - y).cos().abs() + x + y),
+            ("exp(x - y)", |x, y| (x - y).exp(), |x, y| (x - y).exp() * (1.0 + x + y)),
+            ("exp(-x)", |x, _| (-x).exp(), |x, _| (-x).exp() * (1.0 + x)),
+            ("ln(x)", |x, _| x.ln(), |x, _| x.ln().abs() + 1.0),
+            ("ln(3*x - y)", |x, y| (3.0 * x - y).ln(), |x, y| {
+                (3.0 * x - y).ln().abs() + (3.0 * x + y) / (3.0 * x - y)
+            }),
+            ("log1p(x - y)", |x, y| (x - y).ln_1p(), |x, y| {
+                (x - y).ln_1p().abs() + (x + y) / (1.0 + x - y)
+            }),
+            ("lnboth(x, 1 + x)", |x, _| x.ln_1p(), |x, _| x.ln_1p() + x / (1.0 + x)),
+            ("lnboth(-y, 1 - y)", |_, y| (-y).ln_1p(), |_, y| {
+                (-y).ln_1p().abs() + y / (1.0 - y)
+            }),
+        ];
+        for (text, value, magnitude) in cases {
+            let mut graph = Graph::new();
+            let symbols = ["x", "y"].map(|name| graph.symbol(name));
+            let [x, y] = symbols.map(|symbol| graph.sampled(symbol).0);
+            assert!(0.3 < y && y < x && x < 1.3, "{x} {y}");
+            let expr = build(&mut graph, text);
+            let near = |found: f64, expected: f64| (found / expected - 1.0).abs() < 1e-14;
+            let found = graph.sampled(expr);
+            assert!(near(found.0, value(x, y)), "{text}: {found:?}, not {}", value(x, y));
+            assert!(near(found.1, magnitude(x, y)), "{text}: {found:?}, not {}", magnitude(x, y));
+            assert!(graph.differs_from_zero(expr), "{text}");
+            // What has a value is the same in one piece.
+            let whole = graph.opaque(expr);
+            assert_eq!(graph.sampled(whole), found, "{text}");
+            assert!(graph.sum_is_sampled(&[expr, whole]));
+            assert!(graph.sum_differs_from_zero([expr, whole].into_iter()), "{text}");
+            let negative = graph.neg(whole);
+            assert!(!graph.sum_differs_from_zero([expr, negative].into_iter()), "{text}");
+        }
+    }
+
+    #[test]
+    fn zero_and_what_has_no_value_do_not_differ_from_zero() {
+        let mut graph = Graph::new();
+        assert!(!graph.differs_from_zero(Graph::ZERO) && graph.vanishes(Graph::ZERO));
+        for text in ["arctan(x)", "ln(-x)", "sqrt(-x) + 1"] {
+            let expr = build(&mut graph, text);
+            assert!(!graph.differs_from_zero(expr) && !graph.vanishes(expr), "{text}");
+            assert!(!graph.sum_is_sampled(&[Graph::ONE, expr]), "{text}");
+        }
+    }
+
+    #[test]
+    fn depth_is_that_of_the_longest_path() {
+        let mut graph = Graph::new();
+        let x = graph.symbol("x");
+        let long = (0..50).fold(x, |inner, _| graph.call(Function::Sin, &[inner]));
+        assert_eq!((graph.depth(x), graph.depth(Graph::ONE), graph.depth(long)), (1, 1, 51));
+        let sum = build(&mut graph, "y + sin(sin(x))*z");
+        assert_eq!(graph.depth(sum), 5);
+    }
+}

@@ -239,6 +239,7 @@ impl Shortening<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::MOST_PARTS;
     use crate::{Ast, Expr, Graph};
 
     fn build(graph: &mut Graph, text: &str) -> Expr {
@@ -278,6 +279,23 @@ mod tests {
         assert_eq!(graph.without_vanishing_part(&part), part);
         assert!(graph.without_vanishing_part(&part[1..]).is_empty());
         assert!(graph.without_vanishing_part(&all).is_empty());
+    }
+
+    /// The search takes twice as long with each term more.
+    #[test]
+    fn of_many_terms_no_part_is_searched_for() {
+        let mut graph = Graph::new();
+        let mut texts = vec!["sin(a)^2".to_owned(), "cos(a)^2".into(), "-1".into()];
+        texts.extend((1..=5).map(|n| format!("a^{n}")));
+        let mut terms: Vec<Expr> = texts.iter().map(|text| build(&mut graph, text)).collect();
+        assert_eq!(terms.len(), MOST_PARTS);
+        assert_eq!(graph.without_vanishing_part(&terms), terms[3..]);
+        terms.push(build(&mut graph, "a^6"));
+        assert_eq!(graph.without_vanishing_part(&terms), terms);
+        // Zeros do not count.
+        terms.pop();
+        terms.push(Graph::ZERO);
+        assert_eq!(graph.without_vanishing_part(&terms), terms[3..8]);
     }
 
     #[test]

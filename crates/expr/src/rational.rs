@@ -574,6 +574,23 @@ mod tests {
             prop_assert_eq!(nearest_f64(&Rational::new(a.into(), b.into())), a as f64 / b as f64);
         }
 
+        /// Between two doubles the even one is the nearest, and a little to either side of the middle the one there.
+        #[test]
+        fn the_middle_of_two_doubles_divides_what_rounds_to_them(
+            n in (1_i64 << 52)..(1 << 53) - 1, scale in -1000..900_i32, little in 1..400_u32,
+        ) {
+            let double = |n: i64| n as f64 * 2_f64.powi(scale / 2) * 2_f64.powi(scale - scale / 2);
+            let exact = |x: f64| BigRational::from_float(x).unwrap();
+            let two = BigRational::from_integer(2.into());
+            let middle = (exact(double(n)) + exact(double(n + 1))) / &two;
+            let apart = &middle / Pow::pow(two, 53 + little);
+            let nearest = |x: BigRational| nearest_f64(&Rational::from_big(x));
+            prop_assert_eq!(nearest(&middle - &apart), double(n));
+            prop_assert_eq!(nearest(middle.clone()), double(n + n % 2));
+            prop_assert_eq!(nearest(&middle + &apart), double(n + 1));
+            prop_assert_eq!(nearest(-middle - apart), -double(n + 1));
+        }
+
         /// Integers that are no doubles among them, of which the machine's quotient is rounded twice, and scales from
         /// below the smallest double on.
         #[test]

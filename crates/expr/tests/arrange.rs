@@ -161,6 +161,25 @@ fn several_quotients_share_a_reciprocal() {
     }
 }
 
+/// Whatever the powers, one reciprocal serves all of them, and the values are those of the quotients.
+#[test]
+fn any_powers_share_a_reciprocal() {
+    let (x, t) = (1.3_f64, 0.7_f64);
+    for (base, value) in [("x", x), ("(x + t)", x + t), ("sqrt(x^2 + 1)", (x * x + 1.0).sqrt())] {
+        for (m, n) in (1..8).flat_map(|n| (1..n).map(move |m| (m, n))) {
+            let text = format!("sin(t)/{base}^{m} + cos(t)*exp(x)/{base}^{n}");
+            let mut case = case(&text);
+            let program = Program::lower(&mut case.graph, &case.inputs, &[], &[case.expr]);
+            let count = program.operations_by_stage(program.outputs());
+            let found = count.time.divisions + count.point.divisions + count.both.divisions;
+            assert_eq!(found, 1, "{text}: {:?}", program.operations());
+            let expected = t.sin() / value.powi(m) + t.cos() * x.exp() / value.powi(n);
+            let result = program.evaluate(&[x, t, 0.0])[0];
+            assert!((result / expected - 1.0).abs() < 1e-14, "{text}: {result}, not {expected}");
+        }
+    }
+}
+
 /// A factor of some terms of a sum is multiplied once.
 #[test]
 fn terms_with_a_common_factor_are_gathered() {
