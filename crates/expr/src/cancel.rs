@@ -433,9 +433,7 @@ mod tests {
     fn exact(ast: &Ast, at: &[i64; 3]) -> Option<Rational> {
         match &ast.kind {
             AstKind::Number(value) => Some(value.clone()),
-            AstKind::Name(name) => {
-                Some(at[usize::from(name.as_bytes()[0] - b'a')].into())
-            }
+            AstKind::Name(name) => Some(at[usize::from(name.as_bytes()[0] - b'a')].into()),
             AstKind::Sum(terms) => terms.iter().try_fold(Rational::zero(), |sum, (minus, term)| {
                 let value = exact(term, at)?;
                 Some(if *minus { sum - value } else { sum + value })

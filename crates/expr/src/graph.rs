@@ -524,16 +524,18 @@ mod tests {
             ("exp(x - y)", |x, y| (x - y).exp(), |x, y| (x - y).exp() * (1.0 + x + y)),
             ("exp(-x)", |x, _| (-x).exp(), |x, _| (-x).exp() * (1.0 + x)),
             ("ln(x)", |x, _| x.ln(), |x, _| x.ln().abs() + 1.0),
-            ("ln(3*x - y)", |x, y| (3.0 * x - y).ln(), |x, y| {
-                (3.0 * x - y).ln().abs() + (3.0 * x + y) / (3.0 * x - y)
-            }),
-            ("log1p(x - y)", |x, y| (x - y).ln_1p(), |x, y| {
-                (x - y).ln_1p().abs() + (x + y) / (1.0 + x - y)
-            }),
+            (
+                "ln(3*x - y)",
+                |x, y| (3.0 * x - y).ln(),
+                |x, y| (3.0 * x - y).ln().abs() + (3.0 * x + y) / (3.0 * x - y),
+            ),
+            (
+                "log1p(x - y)",
+                |x, y| (x - y).ln_1p(),
+                |x, y| (x - y).ln_1p().abs() + (x + y) / (1.0 + x - y),
+            ),
             ("lnboth(x, 1 + x)", |x, _| x.ln_1p(), |x, _| x.ln_1p() + x / (1.0 + x)),
-            ("lnboth(-y, 1 - y)", |_, y| (-y).ln_1p(), |_, y| {
-                (-y).ln_1p().abs() + y / (1.0 - y)
-            }),
+            ("lnboth(-y, 1 - y)", |_, y| (-y).ln_1p(), |_, y| (-y).ln_1p().abs() + y / (1.0 - y)),
         ];
         for (text, value, magnitude) in cases {
             let mut graph = Graph::new();
@@ -565,6 +567,49 @@ mod tests {
             assert!(!graph.differs_from_zero(expr) && !graph.vanishes(expr), "{text}");
             assert!(!graph.sum_is_sampled(&[Graph::ONE, expr]), "{text}");
         }
+    }
+
+    /// Each limit may be reached and not be passed, and a message says which one is.
+    #[test]
+    fn limits_on_what_text_makes() {
+        let x = Ast::parse("x").unwrap();
+        let is_at_limit = |graph: &mut Graph| {
+            let built = graph.build(&x, &mut |g, name| Ok(g.symbol(name)));
+            built.is_ok() && !graph.is_overgrown()
+        };
+        let message = |graph: &mut Graph| {
+            assert!(graph.is_overgrown());
+            graph.build(&x, &mut |g, name| Ok(g.symbol(name))).unwrap_err().message
+        };
+        // Two references and a node each.
+        let mut graph = Graph::new();
+        let symbols: Vec<Expr> = (0..1000).map(|n| graph.symbol(&format!("x{n}"))).collect();
+        graph.symbol("x");
+        for n in 0..(LARGEST_SIZE - 1003) / 3 {
+            graph.call(Function::Atan2, &[symbols[n / 1000], symbols[n % 1000]]);
+        }
+        for n in 0..(LARGEST_SIZE - 1003) % 3 {
+            graph.symbol(&format!("y{n}"));
+        }
+        assert!(graph.size == LARGEST_SIZE && is_at_limit(&mut graph));
+        graph.symbol("z");
+        assert!(message(&mut graph).contains("subexpressions"));
+
+        let mut graph = Graph::new();
+        graph.symbol("x");
+        graph.work = MOST_WORK;
+        assert!(is_at_limit(&mut graph));
+        graph.work += 1;
+        assert!(message(&mut graph).contains("too long"));
+
+        // Numerator and denominator together.
+        let mut graph = Graph::new();
+        let power = |n: u64| num_bigint::BigInt::from(1) << n;
+        graph.symbol("x");
+        graph.number(Rational::new(power(MOST_BITS - 102), power(100) - 1));
+        assert!(is_at_limit(&mut graph));
+        graph.number(Rational::new(power(MOST_BITS - 100), power(100) - 1));
+        assert!(message(&mut graph).contains("bits"));
     }
 
     #[test]

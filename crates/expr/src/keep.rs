@@ -257,7 +257,8 @@ mod tests {
     #[test]
     fn operations_are_counted_where_they_are_done() {
         let calls = |n: usize| OperationCount { calls: n, ..OperationCount::default() };
-        let products = |n: usize| OperationCount { multiplications: n, ..OperationCount::default() };
+        let products =
+            |n: usize| OperationCount { multiplications: n, ..OperationCount::default() };
         let p = program(&["cos(t)*sin(x*y)", "sin(x*y)^2"]);
         let find = |wanted: fn(&Operation) -> bool| -> Vec<Slot> {
             p.slots().filter(|slot| wanted(&p.operations()[slot.index()])).collect()
@@ -266,10 +267,14 @@ mod tests {
         let stages = p.operations_with_kept(p.outputs(), &coordinates);
         assert_eq!((stages.time, stages.point), (calls(1), calls(0)));
         assert_eq!(stages.both, OperationCount { calls: 1, ..products(3) });
-        let mut kept: Vec<Slot> = p.slots().filter(|&slot| {
-            let position = Dependence { position: true, time: false };
-            matches!(p.operations()[slot.index()], Operation::Call(..)) && p.dependence(slot) == position
-        }).collect();
+        let mut kept: Vec<Slot> = p
+            .slots()
+            .filter(|&slot| {
+                let position = Dependence { position: true, time: false };
+                matches!(p.operations()[slot.index()], Operation::Call(..))
+                    && p.dependence(slot) == position
+            })
+            .collect();
         let stages = p.operations_with_kept(p.outputs(), &kept);
         assert_eq!(stages.point, OperationCount { calls: 1, ..products(1) });
         assert_eq!((stages.time, stages.both), (calls(1), products(2)));

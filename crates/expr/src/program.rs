@@ -740,7 +740,6 @@ impl Lowering<'_> {
 
     fn scaled(&mut self, term: Expr, coefficient: &Rational) -> Slot {
         match self.graph.node(term).clone() {
-            _ if coefficient.is_one() => self.lower(term),
             Node::Product(factors) => self.product(&factors, coefficient),
             _ => self.product(&[(term, Rational::one())], coefficient),
         }

@@ -134,7 +134,8 @@ mod tests {
         assert_eq!(times(PRIME - 1, PRIME - 1), 1);
         assert_eq!(raised(3, PRIME - 1), 1);
         // Among them products that end in the prime itself, as 2^62 - 1 does.
-        let numbers = [0, 1, 2, 3, 77_777, (1 << 31) - 1, (1 << 31) + 1, 1 << 60, PRIME - 2, PRIME - 1];
+        let numbers =
+            [0, 1, 2, 3, 77_777, (1 << 31) - 1, (1 << 31) + 1, 1 << 60, PRIME - 2, PRIME - 1];
         for a in numbers {
             for b in numbers {
                 let wide = |n: u128| u64::try_from(n % u128::from(PRIME)).unwrap();

@@ -246,6 +246,8 @@ mod tests {
             "sin(2*Pi*X)",
             "sin(k*X)",
             "sin(X - t)",
+            "sin(10^400*X + Y/3)",
+            "sin(X/3 + 10^400)",
         ] {
             assert!(!is_corrected(text), "{text}");
         }

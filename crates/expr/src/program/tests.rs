@@ -60,8 +60,7 @@ fn every_operation_is_what_it_says() {
     for (operation, expected, count) in cases() {
         let all: Vec<Operation> = inputs.iter().chain([&operation]).cloned().collect();
         let place = Dependence { position: true, time: false };
-        let program =
-            Program::from_parts(all, vec![place; 3], vec![Slot::at(2)]).compacted();
+        let program = Program::from_parts(all, vec![place; 3], vec![Slot::at(2)]).compacted();
         let found = operation.row(&PLACES, &PLACES);
         for n in 0..4 {
             let at = [PLACES[0][n], PLACES[1][n]];
@@ -142,9 +141,8 @@ fn where_pi_is_a_factor_it_is_left_out() {
     ] {
         let mut graph = Graph::new();
         let inputs = ["x", "y"].map(|name| (graph.symbol(name), Dependence::default()));
-        let expr = graph
-            .build(&Ast::parse(text).unwrap(), &mut |g, name| Ok(g.symbol(name)))
-            .unwrap();
+        let expr =
+            graph.build(&Ast::parse(text).unwrap(), &mut |g, name| Ok(g.symbol(name))).unwrap();
         let program = Program::lower(&mut graph, &inputs, &[], &[expr]);
         let found = program
             .operations()
