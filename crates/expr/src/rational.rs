@@ -143,11 +143,6 @@ impl Rational {
         }
     }
 
-    /// A small integer, but for the least number, which has no negative.
-    fn small_integer(value: Option<i64>) -> Option<Self> {
-        value.filter(|&n| n != i64::MIN).map(|n| Rational(Small(n, 1)))
-    }
-
     /// `n / d` for `d` not zero and `|n|` and `|d|` below `2^127`.
     fn reduced(n: i128, d: i128) -> Self {
         let (n, d) = if d < 0 { (-n, -d) } else { (n, d) };
@@ -164,11 +159,6 @@ impl Rational {
     }
 
     fn sum(&self, other: &Self) -> Self {
-        if let (&Small(a, 1), &Small(c, 1)) = (&self.0, &other.0)
-            && let Some(sum) = Self::small_integer(a.checked_add(c))
-        {
-            return sum;
-        }
         match (&self.0, &other.0) {
             (&Small(a, b), &Small(c, d)) => {
                 let [a, b, c, d] = [a, b, c, d].map(i128::from);
@@ -179,11 +169,6 @@ impl Rational {
     }
 
     fn product(&self, other: &Self) -> Self {
-        if let (&Small(a, 1), &Small(c, 1)) = (&self.0, &other.0)
-            && let Some(product) = Self::small_integer(a.checked_mul(c))
-        {
-            return product;
-        }
         match (&self.0, &other.0) {
             (&Small(a, b), &Small(c, d)) => {
                 let [a, b, c, d] = [a, b, c, d].map(i128::from);
@@ -218,7 +203,7 @@ fn gcd(mut a: u128, mut b: u128) -> u128 {
 
 impl From<i64> for Rational {
     fn from(value: i64) -> Self {
-        Self::small_integer(Some(value)).unwrap_or_else(|| Self::reduced(value.into(), 1))
+        Self::reduced(value.into(), 1)
     }
 }
 
@@ -243,7 +228,6 @@ impl fmt::Display for Rational {
 impl Ord for Rational {
     fn cmp(&self, other: &Self) -> Ordering {
         match (&self.0, &other.0) {
-            (Small(a, 1), Small(c, 1)) => a.cmp(c),
             (&Small(a, b), &Small(c, d)) => {
                 (i128::from(a) * i128::from(d)).cmp(&(i128::from(c) * i128::from(b)))
             }
