@@ -569,6 +569,29 @@ mod tests {
         }
     }
 
+    /// Hashes of handles and of other numbers, consecutive or with zeros at their ends, take about as many values in
+    /// the lowest bits as random numbers would, which is 63 of a hundred.
+    #[test]
+    fn hashes_spread_over_the_lowest_bits() {
+        let build = BuildHasherDefault::<NodeHasher>::default();
+        for shift in [0, 3, 12, 20] {
+            let hashes = |of: &dyn Fn(u64) -> u64| {
+                let lowest: BTreeSet<u64> = (0..4096).map(|n| of(n << shift) & 4095).collect();
+                lowest.len()
+            };
+            for different in [
+                hashes(&|n| build.hash_one(n)),
+                hashes(&|n| build.hash_one(n as i64)),
+                hashes(&|n| build.hash_one((n as usize, 7_u8))),
+                hashes(&|n| build.hash_one((n as isize, 7_u8))),
+                hashes(&|n| build.hash_one((Expr((n >> shift) as u32), "name"))),
+                hashes(&|n| build.hash_one(n.to_string())),
+            ] {
+                assert!(different > 2000, "{different} of 4096, shifted by {shift}");
+            }
+        }
+    }
+
     /// Each limit may be reached and not be passed, and a message says which one is.
     #[test]
     fn limits_on_what_text_makes() {

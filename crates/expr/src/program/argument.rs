@@ -162,12 +162,8 @@ impl Lowering<'_> {
                 }
             }
             Node::Whole(inner) => self.collect(*inner, factor, sum)?,
-            Node::Product(factors) => match &**factors {
-                [(base, exponent)] if exponent.is_one() => self.collect(*base, factor, sum)?,
-                _ => return None,
-            },
             // Of a sum no term is a number, and a number alone is no sum of inputs.
-            Node::Number(_) | Node::Pi | Node::Call(..) => return None,
+            Node::Number(_) | Node::Pi | Node::Product(_) | Node::Call(..) => return None,
         }
         Some(())
     }
