@@ -304,6 +304,7 @@ mod tests {
             ("(x*sin(a)+y*cos(a))*cos(a) + (x*cos(a)-y*sin(a))*(-sin(a))", "y"),
             ("((r-1)^2*cos(a) - x)*cos(a) + (r-1)^2*sin(a)^2 + cos(a)*x", "(-1 + r)^2"),
             ("sin(a)*(cos(a)^2 + sin(a)^2)*f", "f*sin(a)"),
+            ("cos(a)^2*(sin(a)^2 + cos(a)^2)^3", "1 - sin(a)^2"),
         ];
         for (text, shorter) in cases {
             let mut graph = Graph::new();
@@ -321,6 +322,8 @@ mod tests {
             "cos(a)^2 + sin(b)^2",
             "(sin(a)^2 + cos(a)^2*x)/(1 + sin(a))",
             "1 - sin(a)^2*cos(a)",
+            // Shorter as 1 - sin^2, which has lost its digits near a right angle, where this one is looked at.
+            "cos(171*a/100)^2*(sin(171*a/100)^2 + cos(171*a/100)^2)^3",
         ];
         for text in cases {
             let mut graph = Graph::new();

@@ -180,6 +180,17 @@ fn any_powers_share_a_reciprocal() {
     }
 }
 
+/// Where all denominators are powers of a square that is at hand, the reciprocal is that of the square: two products for its
+/// powers and two for the numerators, beside the square itself.
+#[test]
+fn the_reciprocal_is_of_the_greatest_common_power() {
+    let mut case = case("1 + sin(t)/x^4 + cos(t)/x^6");
+    let program = Program::lower(&mut case.graph, &case.inputs, &[], &[case.expr]);
+    let count = program.operations_by_stage(program.outputs());
+    assert_eq!((count.point.divisions, count.both.divisions), (1, 0));
+    assert_eq!((count.point.multiplications, count.both.multiplications), (3, 2));
+}
+
 /// A factor of some terms of a sum is multiplied once.
 #[test]
 fn terms_with_a_common_factor_are_gathered() {
