@@ -147,7 +147,9 @@ mod tests {
             "sin(x)^2 - atan2(y, (1 + 2*x)/2)",
         ] {
             let mut graph = Graph::new();
-            ["x", "y", "z"].map(|name| graph.symbol(name));
+            for name in ["x", "y", "z"] {
+                graph.symbol(name);
+            }
             let ast = Ast::parse(text).unwrap();
             let expr = graph.build(&ast, &mut |g, name| Ok(g.symbol(name))).unwrap();
             assert_eq!(graph.print(expr), text);

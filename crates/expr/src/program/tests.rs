@@ -4,7 +4,8 @@ use super::{Dependence, Operation, OperationCount, Program, Slot};
 use crate::{Ast, Function, Graph, Rational};
 
 /// Each operation on the two inputs, what it is, and what it counts as: sums, products, quotients, roots and calls.
-type Case = (Operation, fn(f64, f64) -> f64, [usize; 5]);
+type Case = (Operation, Value, [usize; 5]);
+type Value = fn(f64, f64) -> f64;
 
 fn cases() -> Vec<Case> {
     let (x, y) = (Slot::at(0), Slot::at(1));
@@ -26,7 +27,7 @@ fn cases() -> Vec<Case> {
         (Operation::SumError(x, y), |x, y| two_sum(x, y), [5, 0, 0, 0, 0]),
         (Operation::ProductError(x, y), |x, y| x.mul_add(y, -(x * y)), [7, 5, 0, 0, 0]),
     ];
-    let functions: [(Function, fn(f64, f64) -> f64); 13] = [
+    let functions: [(Function, Value); 13] = [
         (Function::Sin, |x, _| x.sin()),
         (Function::Cos, |x, _| x.cos()),
         (Function::Tan, |x, _| x.tan()),
