@@ -466,7 +466,7 @@ pub(crate) fn as_accurate(before: &Program, after: &Program, inputs: usize) -> b
             (0..inputs).map(|input| array::from_fn(|k| sample(first + k, input))).collect();
         for (old, new) in before.error_bounds(&places).iter().zip(after.error_bounds(&places)) {
             // Where the point is outside the domain of definition there is nothing to compare.
-            let known = old.iter().zip(new).take(points - first).filter(|(old, _)| old.is_finite());
+            let known = old.iter().zip(new).filter(|(old, _)| old.is_finite());
             growth.extend(known.map(|(&old, new)| {
                 // Nothing is as large as nothing; what is not finite any more is infinitely worse.
                 match new.is_finite() {

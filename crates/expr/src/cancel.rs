@@ -325,7 +325,9 @@ fn multiply(a: &Polynomial, b: &Polynomial) -> Option<Polynomial> {
 
 #[cfg(test)]
 mod tests {
-    use crate::{Ast, Function, Graph};
+    use crate::{Ast, AstKind, Expr, Function, Graph, Rational};
+    use num_traits::{One, Pow, ToPrimitive, Zero};
+    use proptest::prelude::*;
     use std::collections::BTreeSet;
 
     fn cancelled(text: &str) -> String {
@@ -399,6 +401,115 @@ mod tests {
                     assert!(!graph.vanishes(twice), "{function:?} {shift} {scale}");
                 }
             }
+        }
+    }
+
+    fn build(graph: &mut Graph, text: &str) -> Expr {
+        graph.build(&Ast::parse(text).unwrap(), &mut |g, name| Ok(g.symbol(name))).unwrap()
+    }
+
+    /// Polynomials in a, b and c, or quotients of such.
+    fn text(with_quotients: bool) -> impl Strategy<Value = String> {
+        let leaf = prop_oneof![
+            prop::sample::select(&["a", "b", "c"][..]).prop_map(str::to_owned),
+            (-5..6_i32).prop_map(|n| format!("({n})")),
+        ];
+        leaf.prop_recursive(4, 12, 2, move |inner| {
+            let pair = (inner.clone(), inner.clone());
+            let over = move |(a, b)| {
+                if with_quotients { format!("({a})/({b})") } else { format!("({a})*({b})") }
+            };
+            prop_oneof![
+                pair.clone().prop_map(|(a, b)| format!("({a}) + ({b})")),
+                pair.clone().prop_map(|(a, b)| format!("({a}) - 3*({b})/2")),
+                pair.clone().prop_map(|(a, b)| format!("({a})*({b})")),
+                pair.prop_map(over),
+                (inner, 1..4_i32).prop_map(|(a, n)| format!("({a})^{n}")),
+            ]
+        })
+    }
+
+    /// The value as the text is written; `None` where it divides by zero.
+    fn exact(ast: &Ast, at: &[i64; 3]) -> Option<Rational> {
+        match &ast.kind {
+            AstKind::Number(value) => Some(value.clone()),
+            AstKind::Name(name) => Some(at[usize::from(name.as_bytes()[0] - b'a')].into()),
+            AstKind::Sum(terms) => terms.iter().try_fold(Rational::zero(), |sum, (minus, term)| {
+                let value = exact(term, at)?;
+                Some(if *minus { sum - value } else { sum + value })
+            }),
+            AstKind::Product(factors) => {
+                factors.iter().try_fold(Rational::one(), |product, (divides, factor)| {
+                    let value = exact(factor, at)?;
+                    match divides {
+                        true if value.is_zero() => None,
+                        true => Some(product / value),
+                        false => Some(product * value),
+                    }
+                })
+            }
+            AstKind::Power(base, exponent) => {
+                let exponent = exact(exponent, at)?.to_integer().to_u32()?;
+                Some(Pow::pow(exact(base, at)?, exponent))
+            }
+            AstKind::Call(..) => None,
+        }
+    }
+
+    /// The numerator of `expr` at a place; `None` where it is too large.
+    fn numerator_at(graph: &mut Graph, expr: Expr, at: &[i64; 3]) -> Option<Rational> {
+        let symbols = ["a", "b", "c"].map(|name| graph.symbol(name));
+        let of = |atom: Expr| symbols.iter().position(|symbol| *symbol == atom).map(|n| at[n]);
+        let terms = graph.numerator(expr)?;
+        Some(terms.iter().fold(Rational::zero(), |sum, (powers, coefficient)| {
+            sum + powers.iter().fold(coefficient.clone(), |term, &(atom, power)| {
+                term * Pow::pow(Rational::from(of(atom).unwrap()), power)
+            })
+        }))
+    }
+
+    proptest! {
+        #[test]
+        fn numerators_of_polynomials_have_their_values(text in text(false), at in prop::array::uniform3(-4..5_i64)) {
+            let mut graph = Graph::new();
+            let expr = build(&mut graph, &text);
+            let numerator = numerator_at(&mut graph, expr, &at).unwrap();
+            prop_assert_eq!(numerator, exact(&Ast::parse(&text).unwrap(), &at).unwrap(), "{}", text);
+        }
+
+        #[test]
+        fn numerators_are_zero_where_the_expression_is(text in text(true), at in prop::array::uniform3(-4..5_i64)) {
+            let value = exact(&Ast::parse(&text).unwrap(), &at);
+            prop_assume!(value.is_some());
+            let mut graph = Graph::new();
+            let Ok(expr) = graph.build(&Ast::parse(&text).unwrap(), &mut |g, name| Ok(g.symbol(name))) else {
+                return Err(TestCaseError::reject("divides by what is zero everywhere"));
+            };
+            for other in [0, 1] {
+                let number = graph.number(value.clone().unwrap() + Rational::from(other));
+                let less = graph.sub(expr, number);
+                let numerator = numerator_at(&mut graph, less, &at);
+                prop_assert_eq!(numerator.map(|n| n.is_zero()), Some(other == 0), "{}", text);
+            }
+        }
+
+        /// Whatever the parts, to multiply out a product of sums changes nothing.
+        #[test]
+        fn what_differs_by_multiplying_out_is_the_same(
+            a in text(false), b in text(true), c in text(true), at in prop::array::uniform3(-4..5_i64),
+        ) {
+            let [a, b, c] = [a, b, c].map(|text| format!("({text})"));
+            let mut graph = Graph::new();
+            let text = format!("({a} - {b})*({a} + {c}) - {a}^2 - {a}*{c} + {b}*{a} + {b}*{c}");
+            let parsed = Ast::parse(&text).unwrap();
+            let Ok(expr) = graph.build(&parsed, &mut |g, name| Ok(g.symbol(name))) else {
+                return Err(TestCaseError::reject("divides by what is zero everywhere"));
+            };
+            prop_assume!(exact(&parsed, &at).is_some());
+            let open = graph.open(expr);
+            prop_assert!(graph.vanishes(expr), "{}", graph.print(open));
+            let more = graph.add(expr, Graph::ONE);
+            prop_assert!(!graph.vanishes(more), "{} + 1", text);
         }
     }
 

@@ -263,21 +263,11 @@ impl Graph {
         let collected = collected.into_sorted();
         let term = match &collected[..] {
             [] => return self.number(coefficient),
+            // To the first power nothing is left closed that has a coefficient of its own.
             [(base, exponent)] if exponent.is_one() => *base,
             _ => self.intern(Node::Product(collected.into_boxed_slice())),
         };
-        self.scaled_flat(term, coefficient)
-    }
-
-    /// As [`Graph::scaled`], for a term that may itself be a scaled expression.
-    fn scaled_flat(&mut self, term: Expr, coefficient: Rational) -> Expr {
-        match self.node(term) {
-            Node::Sum { constant, terms } if constant.is_zero() && terms.len() == 1 => {
-                let (inner, c) = terms[0].clone();
-                self.scaled(inner, c * coefficient)
-            }
-            _ => self.scaled(term, coefficient),
-        }
+        self.scaled(term, coefficient)
     }
 
     /// Takes `base ^ exponent` apart where that is exact: its factors go to `pending`, numbers into `coefficient`.

@@ -492,3 +492,156 @@ fn children(node: &Node) -> impl Iterator<Item = Expr> + '_ {
     };
     pairs.iter().map(|&(e, _)| e).chain(arguments.iter().copied())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Ast, Expr};
+
+    fn build(graph: &mut Graph, text: &str) -> Expr {
+        graph.build(&Ast::parse(text).unwrap(), &mut |g, name| Ok(g.symbol(name))).unwrap()
+    }
+
+    /// Values at the one place are those of the mathematics, and magnitudes are what they would be if nothing cancelled,
+    /// by as much as an error of the operands is magnified.
+    #[test]
+    fn samples_and_magnitudes() {
+        type Of = fn(f64, f64) -> f64;
+        let cases: [(&str, Of, Of); 20] = [
+            ("-7/2", |_, _| -3.5, |_, _| 3.5),
+            ("Pi", |_, _| std::f64::consts::PI, |_, _| std::f64::consts::PI),
+            ("y", |_, y| y, |_, y| y),
+            ("x - y", |x, y| x - y, |x, y| x + y),
+            ("3 - 2*x + y/4", |x, y| 3.0 - 2.0 * x + y / 4.0, |x, y| 3.0 + 2.0 * x + y / 4.0),
+            ("x*y", |x, y| x * y, |x, y| 2.0 * x * 2.0 * y),
+            ("x^3*y", |x, y| x.powi(3) * y, |x, y| 4.0 * x.powi(3) * 2.0 * y),
+            ("x/y^2", |x, y| x / (y * y), |x, y| 2.0 * x * 3.0 / (y * y)),
+            ("sqrt(x)", |x, _| x.sqrt(), |x, _| 1.5 * x.sqrt()),
+            ("(x - y)^3", |x, y| (x - y).powi(3), |x, y| 4.0 * (x - y).powi(2).abs() * (x + y)),
+            ("1/(y - x)", |x, y| 1.0 / (y - x), |x, y| 2.0 * (x + y) / (y - x).powi(2)),
+            ("sin(x - y)", |x, y| (x - y).sin(), |x, y| (x - y).sin().abs() + x + y),
+            ("cos(x - y)", |x, y| (x - y).cos(), |x, y| (x - y).cos().abs() + x + y),
+            ("exp(x - y)", |x, y| (x - y).exp(), |x, y| (x - y).exp() * (1.0 + x + y)),
+            ("exp(-x)", |x, _| (-x).exp(), |x, _| (-x).exp() * (1.0 + x)),
+            ("ln(x)", |x, _| x.ln(), |x, _| x.ln().abs() + 1.0),
+            (
+                "ln(3*x - y)",
+                |x, y| (3.0 * x - y).ln(),
+                |x, y| (3.0 * x - y).ln().abs() + (3.0 * x + y) / (3.0 * x - y),
+            ),
+            (
+                "log1p(x - y)",
+                |x, y| (x - y).ln_1p(),
+                |x, y| (x - y).ln_1p().abs() + (x + y) / (1.0 + x - y),
+            ),
+            ("lnboth(x, 1 + x)", |x, _| x.ln_1p(), |x, _| x.ln_1p() + x / (1.0 + x)),
+            ("lnboth(-y, 1 - y)", |_, y| (-y).ln_1p(), |_, y| (-y).ln_1p().abs() + y / (1.0 - y)),
+        ];
+        for (text, value, magnitude) in cases {
+            let mut graph = Graph::new();
+            let symbols = ["x", "y"].map(|name| graph.symbol(name));
+            let [x, y] = symbols.map(|symbol| graph.sampled(symbol).0);
+            assert!(0.3 < y && y < x && x < 1.3, "{x} {y}");
+            let expr = build(&mut graph, text);
+            let near = |found: f64, expected: f64| (found / expected - 1.0).abs() < 1e-14;
+            let found = graph.sampled(expr);
+            assert!(near(found.0, value(x, y)), "{text}: {found:?}, not {}", value(x, y));
+            assert!(near(found.1, magnitude(x, y)), "{text}: {found:?}, not {}", magnitude(x, y));
+            assert!(graph.differs_from_zero(expr), "{text}");
+            // What has a value is the same in one piece.
+            let whole = graph.opaque(expr);
+            assert_eq!(graph.sampled(whole), found, "{text}");
+            assert!(graph.sum_is_sampled(&[expr, whole]));
+            assert!(graph.sum_differs_from_zero([expr, whole].into_iter()), "{text}");
+            let negative = graph.neg(whole);
+            assert!(!graph.sum_differs_from_zero([expr, negative].into_iter()), "{text}");
+        }
+    }
+
+    #[test]
+    fn zero_and_what_has_no_value_do_not_differ_from_zero() {
+        let mut graph = Graph::new();
+        assert!(!graph.differs_from_zero(Graph::ZERO) && graph.vanishes(Graph::ZERO));
+        for text in ["arctan(x)", "ln(-x)", "sqrt(-x) + 1"] {
+            let expr = build(&mut graph, text);
+            assert!(!graph.differs_from_zero(expr) && !graph.vanishes(expr), "{text}");
+            assert!(!graph.sum_is_sampled(&[Graph::ONE, expr]), "{text}");
+        }
+    }
+
+    /// Hashes of handles and of other numbers, consecutive or with zeros at their ends, take about as many values in
+    /// the lowest bits as random numbers would, which is 63 of a hundred.
+    #[test]
+    fn hashes_spread_over_the_lowest_bits() {
+        let build = BuildHasherDefault::<NodeHasher>::default();
+        for shift in [0, 3, 12, 20] {
+            let hashes = |of: &dyn Fn(u64) -> u64| {
+                let lowest: BTreeSet<u64> = (0..4096).map(|n| of(n << shift) & 4095).collect();
+                lowest.len()
+            };
+            for different in [
+                hashes(&|n| build.hash_one(n)),
+                hashes(&|n| build.hash_one(n as i64)),
+                hashes(&|n| build.hash_one((n as usize, 7_u8))),
+                hashes(&|n| build.hash_one((n as isize, 7_u8))),
+                hashes(&|n| build.hash_one((Expr((n >> shift) as u32), "name"))),
+                hashes(&|n| build.hash_one(n.to_string())),
+            ] {
+                assert!(different > 2000, "{different} of 4096, shifted by {shift}");
+            }
+        }
+    }
+
+    /// Each limit may be reached and not be passed, and a message says which one is.
+    #[test]
+    fn limits_on_what_text_makes() {
+        let x = Ast::parse("x").unwrap();
+        let is_at_limit = |graph: &mut Graph| {
+            let built = graph.build(&x, &mut |g, name| Ok(g.symbol(name)));
+            built.is_ok() && !graph.is_overgrown()
+        };
+        let message = |graph: &mut Graph| {
+            assert!(graph.is_overgrown());
+            graph.build(&x, &mut |g, name| Ok(g.symbol(name))).unwrap_err().message
+        };
+        // Two references and a node each.
+        let mut graph = Graph::new();
+        let symbols: Vec<Expr> = (0..1000).map(|n| graph.symbol(&format!("x{n}"))).collect();
+        graph.symbol("x");
+        for n in 0..(LARGEST_SIZE - 1003) / 3 {
+            graph.call(Function::Atan2, &[symbols[n / 1000], symbols[n % 1000]]);
+        }
+        for n in 0..(LARGEST_SIZE - 1003) % 3 {
+            graph.symbol(&format!("y{n}"));
+        }
+        assert!(graph.size == LARGEST_SIZE && is_at_limit(&mut graph));
+        graph.symbol("z");
+        assert!(message(&mut graph).contains("subexpressions"));
+
+        let mut graph = Graph::new();
+        graph.symbol("x");
+        graph.work = MOST_WORK;
+        assert!(is_at_limit(&mut graph));
+        graph.work += 1;
+        assert!(message(&mut graph).contains("too long"));
+
+        // Numerator and denominator together.
+        let mut graph = Graph::new();
+        let power = |n: u64| num_bigint::BigInt::from(1) << n;
+        graph.symbol("x");
+        graph.number(Rational::new(power(MOST_BITS - 102), power(100) - 1));
+        assert!(is_at_limit(&mut graph));
+        graph.number(Rational::new(power(MOST_BITS - 100), power(100) - 1));
+        assert!(message(&mut graph).contains("bits"));
+    }
+
+    #[test]
+    fn depth_is_that_of_the_longest_path() {
+        let mut graph = Graph::new();
+        let x = graph.symbol("x");
+        let long = (0..50).fold(x, |inner, _| graph.call(Function::Sin, &[inner]));
+        assert_eq!((graph.depth(x), graph.depth(Graph::ONE), graph.depth(long)), (1, 1, 51));
+        let sum = build(&mut graph, "y + sin(sin(x))*z");
+        assert_eq!(graph.depth(sum), 5);
+    }
+}

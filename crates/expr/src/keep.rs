@@ -253,6 +253,37 @@ mod tests {
         assert!(kept.contains(&p.outputs()[0]), "{kept:?}");
     }
 
+    /// By what is left to do at each time, where some values are kept.
+    #[test]
+    fn operations_are_counted_where_they_are_done() {
+        let calls = |n: usize| OperationCount { calls: n, ..OperationCount::default() };
+        let products =
+            |n: usize| OperationCount { multiplications: n, ..OperationCount::default() };
+        let p = program(&["cos(t)*sin(x*y)", "sin(x*y)^2"]);
+        let find = |wanted: fn(&Operation) -> bool| -> Vec<Slot> {
+            p.slots().filter(|slot| wanted(&p.operations()[slot.index()])).collect()
+        };
+        let coordinates = find(|o| matches!(o, Operation::Input(0 | 1)));
+        let stages = p.operations_with_kept(p.outputs(), &coordinates);
+        assert_eq!((stages.time, stages.point), (calls(1), calls(0)));
+        assert_eq!(stages.both, OperationCount { calls: 1, ..products(3) });
+        let mut kept: Vec<Slot> = p
+            .slots()
+            .filter(|&slot| {
+                let position = Dependence { position: true, time: false };
+                matches!(p.operations()[slot.index()], Operation::Call(..))
+                    && p.dependence(slot) == position
+            })
+            .collect();
+        let stages = p.operations_with_kept(p.outputs(), &kept);
+        assert_eq!(stages.point, OperationCount { calls: 1, ..products(1) });
+        assert_eq!((stages.time, stages.both), (calls(1), products(2)));
+        kept.push(p.outputs()[1]);
+        let stages = p.operations_with_kept(p.outputs(), &kept);
+        assert_eq!(stages.point, OperationCount { calls: 1, ..products(2) });
+        assert_eq!((stages.time, stages.both), (calls(1), products(1)));
+    }
+
     /// No other set of values that all else follows from is cheaper.
     #[test]
     fn no_choice_is_cheaper() {

@@ -217,11 +217,37 @@ mod tests {
             ("sin(mu+h) - sin(mu)", "0", 1.7_f64.cos() * 1e-30),
             ("cosh(h) - 1", "0", 0.5e-60),
             ("h/(mu+h)", "0", 1e-30 / 1.7),
+            ("tan(mu*(1+h) - mu/(1+h))", "0", 3.4e-30),
+            ("arctan(mu*(1+h) - mu/(1+h))", "0", 3.4e-30),
+            ("arcsin((mu+h)/mu - 1)", "0", 1e-30 / 1.7),
+            ("sinh(mu*(1+h) - mu)", "0", 1.7e-30),
+            ("sin(mu*(1+h) - mu)", "0", 1.7e-30),
+            ("tanh(h)*exp(mu)/exp(mu+h)", "0", 1e-30),
+            ("sinh(mu+h) - sinh(mu)", "0", 1.7_f64.cosh() * 1e-30),
+            ("cosh(mu+h) - cosh(mu)", "0", 1.7_f64.sinh() * 1e-30),
+            ("cos(mu+h) - cos(mu)", "0", -(1.7_f64.sin()) * 1e-30),
+            ("expm1(mu+h) - expm1(mu)", "0", 1.7_f64.exp() * 1e-30),
+            ("log1p(mu+h) - log1p(mu)", "0", 1e-30 / 2.7),
+            ("1/sqrt(mu+h) - 1/sqrt(mu)", "0", -0.5e-30 / 1.7_f64.powf(1.5)),
+            ("(mu+h)^16/mu^16 - 1", "0", 16.0 / 1.7 * 1e-30),
+            ("(mu+h)^17/mu^17 - 1", "0", 17.0 / 1.7 * 1e-30),
         ];
         for (text, value, small) in cases {
             let (found, rest, at_small) = split(text);
             assert_eq!(found, value, "{text}");
             assert!((at_small / small - 1.0).abs() < 1e-14, "{text}: {rest} gives {at_small:e}");
+        }
+    }
+
+    /// With a factor that vanishes with the small quantity the whole product does, and nothing is to be split.
+    #[test]
+    fn products_that_are_small_stay_as_they_are() {
+        for text in ["h*exp(mu+h)", "h/(mu+h)", "sin(h)/(1+h)^2", "mu*h^2*ln(2+h)*cos(h+mu)"] {
+            let mut graph = Graph::new();
+            let ast = Ast::parse(text).unwrap();
+            let expr = graph.build(&ast, &mut |g, name| Ok(g.symbol(name))).unwrap();
+            let small = BTreeSet::from([graph.symbol("h")]);
+            assert_eq!(graph.split_at_zero(expr, &small), (Graph::ZERO, expr), "{text}");
         }
     }
 

@@ -428,6 +428,9 @@ mod tests {
             message("2x"),
             ("'2' runs into what follows; multiplication is written with '*'".into(), 0..2)
         );
+        assert_eq!(message("2_x").1, 0..2);
+        assert_eq!(message("1.2.3").1, 0..4);
+        assert_eq!(message("1.5e3.").1, 0..6);
         assert_eq!(message("a b").1, 2..3);
         assert_eq!(message("a ^ b ^ c").1, 6..7);
         assert_eq!(message("a ** b ** c").1, 7..9);

@@ -120,3 +120,55 @@ fn number_text(value: &Rational) -> (String, Binding) {
     };
     (value.to_string(), binding)
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::{Ast, Graph, Rational};
+
+    /// No parentheses and no factors of one but where they are needed.
+    #[test]
+    fn printed_as_one_would_write_it() {
+        for text in [
+            "x",
+            "-x",
+            "x + y",
+            "-(x + y)",
+            "2*x/3",
+            "-2*x/(3*y)",
+            "1/x",
+            "1/(x*y^2)",
+            "x^2*sqrt(y)/z^(1/3)",
+            "(x + y)^2",
+            "2*(x + y)",
+            "x - y*(2/3)^(1/3)",
+            "1 + x*Pi",
+            "-(5 + 2*x*y)/2",
+            "(7 + 42*x - 4*y)/14",
+            "sin(x)^2 - atan2(y, (1 + 2*x)/2)",
+        ] {
+            let mut graph = Graph::new();
+            for name in ["x", "y", "z"] {
+                graph.symbol(name);
+            }
+            let ast = Ast::parse(text).unwrap();
+            let expr = graph.build(&ast, &mut |g, name| Ok(g.symbol(name))).unwrap();
+            assert_eq!(graph.print(expr), text);
+        }
+    }
+
+    /// What is in one piece shows as a sum within a sum does, and else does not show.
+    #[test]
+    fn what_is_in_one_piece() {
+        let mut graph = Graph::new();
+        let [x, y, z] = ["x", "y", "z"].map(|name| graph.symbol(name));
+        let (product, sum) = (graph.mul(x, y), graph.add(x, y));
+        let double = graph.sum([(Rational::from(2), x)]);
+        for (part, text) in [(product, "x*y"), (sum, "(x + y)"), (double, "2*x")] {
+            let part = graph.opaque(part);
+            let sum = graph.add(z, part);
+            assert_eq!(graph.print(sum), format!("z + {text}"));
+            let difference = graph.sub(z, part);
+            assert_eq!(graph.print(difference), format!("z - {text}"));
+        }
+    }
+}

@@ -8,6 +8,8 @@
 mod argument;
 mod error_bounds;
 mod section;
+#[cfg(test)]
+mod tests;
 
 pub(crate) use error_bounds::SIDE;
 pub use section::Section;
@@ -113,35 +115,6 @@ impl Operation {
             Operation::LnOfBoth(a, b) => Operation::LnOfBoth(place(a), place(b)),
             Operation::SumError(a, b) => Operation::SumError(place(a), place(b)),
             Operation::ProductError(a, b) => Operation::ProductError(place(a), place(b)),
-        }
-    }
-
-    /// The value, where `at` gives those of the operands.
-    fn value(&self, inputs: &[f64], at: impl Fn(Slot) -> f64) -> f64 {
-        match *self {
-            Operation::Number(ref value) => nearest_f64(value),
-            Operation::Pi => std::f64::consts::PI,
-            Operation::Input(index) => inputs.get(index).copied().unwrap_or(f64::NAN),
-            Operation::Add(a, b) => at(a) + at(b),
-            Operation::Sub(a, b) => at(a) - at(b),
-            Operation::Mul(a, b) => at(a) * at(b),
-            Operation::Div(a, b) => at(a) / at(b),
-            Operation::Neg(a) => -at(a),
-            Operation::Sqrt(a) => at(a).sqrt(),
-            Operation::Power(a, ref exponent) => at(a).powf(nearest_f64(exponent)),
-            Operation::SinPi(a) => sin_pi(at(a)),
-            Operation::CosPi(a) => sin_pi_shifted(at(a), 1),
-            Operation::Call(function, a) => call(function, at(a)),
-            Operation::Atan2(y, x) => at(y).atan2(at(x)),
-            Operation::LnOfBoth(x, y) => {
-                if at(x) < -0.5 {
-                    at(y).ln()
-                } else {
-                    at(x).ln_1p()
-                }
-            }
-            Operation::SumError(a, b) => argument::sum_error(at(a), at(b)),
-            Operation::ProductError(a, b) => argument::product_error(at(a), at(b)),
         }
     }
 }
@@ -374,17 +347,17 @@ impl Program {
     /// An input that is not given counts as not-a-number.
     #[must_use]
     pub fn evaluate(&self, inputs: &[f64]) -> Vec<f64> {
-        let values = self.values(inputs);
-        self.outputs.iter().map(|slot| values[slot.index()]).collect()
+        let values = self.values(inputs.as_chunks::<1>().0);
+        self.outputs.iter().map(|slot| values[slot.index()][0]).collect()
     }
 
-    /// The value of every operation.
-    fn values(&self, inputs: &[f64]) -> Vec<f64> {
-        let mut values: Vec<f64> = Vec::with_capacity(self.operations.len());
+    /// The value of every operation at `N` places, which are given by the values of each input there.
+    fn values<const N: usize>(&self, inputs: &[[f64; N]]) -> Vec<[f64; N]> {
+        let mut values = Vec::with_capacity(self.operations.len());
         for (operation, &number) in self.operations.iter().zip(&self.numbers) {
             values.push(match operation {
-                Operation::Number(_) => number,
-                _ => operation.value(inputs, |slot| values[slot.index()]),
+                Operation::Number(_) => [number; N],
+                _ => operation.row(inputs, &values),
             });
         }
         values
@@ -767,7 +740,6 @@ impl Lowering<'_> {
 
     fn scaled(&mut self, term: Expr, coefficient: &Rational) -> Slot {
         match self.graph.node(term).clone() {
-            _ if coefficient.is_one() => self.lower(term),
             Node::Product(factors) => self.product(&factors, coefficient),
             _ => self.product(&[(term, Rational::one())], coefficient),
         }

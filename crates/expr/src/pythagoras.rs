@@ -239,6 +239,7 @@ impl Shortening<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::MOST_PARTS;
     use crate::{Ast, Expr, Graph};
 
     fn build(graph: &mut Graph, text: &str) -> Expr {
@@ -280,12 +281,30 @@ mod tests {
         assert!(graph.without_vanishing_part(&all).is_empty());
     }
 
+    /// The search takes twice as long with each term more.
+    #[test]
+    fn of_many_terms_no_part_is_searched_for() {
+        let mut graph = Graph::new();
+        let mut texts = vec!["sin(a)^2".to_owned(), "cos(a)^2".into(), "-1".into()];
+        texts.extend((1..=5).map(|n| format!("a^{n}")));
+        let mut terms: Vec<Expr> = texts.iter().map(|text| build(&mut graph, text)).collect();
+        assert_eq!(terms.len(), MOST_PARTS);
+        assert_eq!(graph.without_vanishing_part(&terms), terms[3..]);
+        terms.push(build(&mut graph, "a^6"));
+        assert_eq!(graph.without_vanishing_part(&terms), terms);
+        // Zeros do not count.
+        terms.pop();
+        terms.push(Graph::ZERO);
+        assert_eq!(graph.without_vanishing_part(&terms), terms[3..8]);
+    }
+
     #[test]
     fn shorter_where_terms_cancel() {
         let cases = [
             ("(x*sin(a)+y*cos(a))*cos(a) + (x*cos(a)-y*sin(a))*(-sin(a))", "y"),
             ("((r-1)^2*cos(a) - x)*cos(a) + (r-1)^2*sin(a)^2 + cos(a)*x", "(-1 + r)^2"),
             ("sin(a)*(cos(a)^2 + sin(a)^2)*f", "f*sin(a)"),
+            ("cos(a)^2*(sin(a)^2 + cos(a)^2)^3", "1 - sin(a)^2"),
         ];
         for (text, shorter) in cases {
             let mut graph = Graph::new();
@@ -303,6 +322,8 @@ mod tests {
             "cos(a)^2 + sin(b)^2",
             "(sin(a)^2 + cos(a)^2*x)/(1 + sin(a))",
             "1 - sin(a)^2*cos(a)",
+            // Shorter as 1 - sin^2, which has lost its digits near a right angle, where this one is looked at.
+            "cos(171*a/100)^2*(sin(171*a/100)^2 + cos(171*a/100)^2)^3",
         ];
         for text in cases {
             let mut graph = Graph::new();

@@ -143,11 +143,6 @@ impl Rational {
         }
     }
 
-    /// A small integer, but for the least number, which has no negative.
-    fn small_integer(value: Option<i64>) -> Option<Self> {
-        value.filter(|&n| n != i64::MIN).map(|n| Rational(Small(n, 1)))
-    }
-
     /// `n / d` for `d` not zero and `|n|` and `|d|` below `2^127`.
     fn reduced(n: i128, d: i128) -> Self {
         let (n, d) = if d < 0 { (-n, -d) } else { (n, d) };
@@ -164,11 +159,6 @@ impl Rational {
     }
 
     fn sum(&self, other: &Self) -> Self {
-        if let (&Small(a, 1), &Small(c, 1)) = (&self.0, &other.0)
-            && let Some(sum) = Self::small_integer(a.checked_add(c))
-        {
-            return sum;
-        }
         match (&self.0, &other.0) {
             (&Small(a, b), &Small(c, d)) => {
                 let [a, b, c, d] = [a, b, c, d].map(i128::from);
@@ -179,11 +169,6 @@ impl Rational {
     }
 
     fn product(&self, other: &Self) -> Self {
-        if let (&Small(a, 1), &Small(c, 1)) = (&self.0, &other.0)
-            && let Some(product) = Self::small_integer(a.checked_mul(c))
-        {
-            return product;
-        }
         match (&self.0, &other.0) {
             (&Small(a, b), &Small(c, d)) => {
                 let [a, b, c, d] = [a, b, c, d].map(i128::from);
@@ -218,7 +203,7 @@ fn gcd(mut a: u128, mut b: u128) -> u128 {
 
 impl From<i64> for Rational {
     fn from(value: i64) -> Self {
-        Self::small_integer(Some(value)).unwrap_or_else(|| Self::reduced(value.into(), 1))
+        Self::reduced(value.into(), 1)
     }
 }
 
@@ -243,7 +228,6 @@ impl fmt::Display for Rational {
 impl Ord for Rational {
     fn cmp(&self, other: &Self) -> Ordering {
         match (&self.0, &other.0) {
-            (Small(a, 1), Small(c, 1)) => a.cmp(c),
             (&Small(a, b), &Small(c, d)) => {
                 (i128::from(a) * i128::from(d)).cmp(&(i128::from(c) * i128::from(b)))
             }
@@ -572,6 +556,23 @@ mod tests {
         #[test]
         fn quotients_of_integers_round_as_division_does(a in -(1_i64 << 53)..(1_i64 << 53), b in 1_i64..(1_i64 << 53)) {
             prop_assert_eq!(nearest_f64(&Rational::new(a.into(), b.into())), a as f64 / b as f64);
+        }
+
+        /// Between two doubles the even one is the nearest, and a little to either side of the middle the one there.
+        #[test]
+        fn the_middle_of_two_doubles_divides_what_rounds_to_them(
+            n in (1_i64 << 52)..(1 << 53) - 1, scale in -1000..900_i32, little in 1..400_u32,
+        ) {
+            let double = |n: i64| n as f64 * 2_f64.powi(scale / 2) * 2_f64.powi(scale - scale / 2);
+            let exact = |x: f64| BigRational::from_float(x).unwrap();
+            let two = BigRational::from_integer(2.into());
+            let middle = (exact(double(n)) + exact(double(n + 1))) / &two;
+            let apart = &middle / Pow::pow(two, 53 + little);
+            let nearest = |x: BigRational| nearest_f64(&Rational::from_big(x));
+            prop_assert_eq!(nearest(&middle - &apart), double(n));
+            prop_assert_eq!(nearest(middle.clone()), double(n + n % 2));
+            prop_assert_eq!(nearest(&middle + &apart), double(n + 1));
+            prop_assert_eq!(nearest(-middle - apart), -double(n + 1));
         }
 
         /// Integers that are no doubles among them, of which the machine's quotient is rounded twice, and scales from

@@ -133,6 +133,16 @@ mod tests {
     fn arithmetic_modulo_the_prime() {
         assert_eq!(times(PRIME - 1, PRIME - 1), 1);
         assert_eq!(raised(3, PRIME - 1), 1);
+        // Among them products that end in the prime itself, as 2^62 - 1 does.
+        let numbers =
+            [0, 1, 2, 3, 77_777, (1 << 31) - 1, (1 << 31) + 1, 1 << 60, PRIME - 2, PRIME - 1];
+        for a in numbers {
+            for b in numbers {
+                let wide = |n: u128| u64::try_from(n % u128::from(PRIME)).unwrap();
+                assert_eq!(times(a, b), wide(u128::from(a) * u128::from(b)), "{a} {b}");
+                assert_eq!(add(a, b), wide(u128::from(a) + u128::from(b)), "{a} {b}");
+            }
+        }
         assert_eq!(times(12_345, inverse(12_345).unwrap()), 1);
         assert_eq!(inverse(0), None);
         assert_eq!(residue("2305843009213693951"), Some(0));

@@ -164,6 +164,9 @@ fn texts_that_are_the_same_expression() {
         ("y/x + y^2/x^3", "y/x*(1 + y/x^2)"),
         ("sin(y)*(1 + x) + sin(y)*(2 - y)", "sin(y)*(3 + x - y)"),
         ("x*(1 + y) - x", "x*y"),
+        ("5 + sin(y)*(1 + x) + sin(y)*(2 - y)", "5 + sin(y)*(3 + x - y)"),
+        ("5 + x*(1 + y) - x", "5 + x*y"),
+        ("5 - sqrt(x)*(1 + y) + 2*sqrt(x)", "5 + sqrt(x)*(1 - y)"),
         // Powers that are whole together, and roots that are exact.
         ("sqrt(x*y)*sqrt(x*y)", "x*y"),
         ("(x*y)^(1/3)*(x*y)^(2/3)", "x*y"),

@@ -161,6 +161,36 @@ fn several_quotients_share_a_reciprocal() {
     }
 }
 
+/// Whatever the powers, one reciprocal serves all of them, and the values are those of the quotients.
+#[test]
+fn any_powers_share_a_reciprocal() {
+    let (x, t) = (1.3_f64, 0.7_f64);
+    for (base, value) in [("x", x), ("(x + t)", x + t), ("sqrt(x^2 + 1)", (x * x + 1.0).sqrt())] {
+        for (m, n) in (1..8).flat_map(|n| (1..n).map(move |m| (m, n))) {
+            let text = format!("sin(t)/{base}^{m} + cos(t)*exp(x)/{base}^{n}");
+            let mut case = case(&text);
+            let program = Program::lower(&mut case.graph, &case.inputs, &[], &[case.expr]);
+            let count = program.operations_by_stage(program.outputs());
+            let found = count.time.divisions + count.point.divisions + count.both.divisions;
+            assert_eq!(found, 1, "{text}: {:?}", program.operations());
+            let expected = t.sin() / value.powi(m) + t.cos() * x.exp() / value.powi(n);
+            let result = program.evaluate(&[x, t, 0.0])[0];
+            assert!((result / expected - 1.0).abs() < 1e-14, "{text}: {result}, not {expected}");
+        }
+    }
+}
+
+/// Where all denominators are powers of a square that is at hand, the reciprocal is that of the square: two products for its
+/// powers and two for the numerators, beside the square itself.
+#[test]
+fn the_reciprocal_is_of_the_greatest_common_power() {
+    let mut case = case("t + sin(t)/x^4 + cos(t)/x^6");
+    let program = Program::lower(&mut case.graph, &case.inputs, &[], &[case.expr]);
+    let count = program.operations_by_stage(program.outputs());
+    assert_eq!((count.point.divisions, count.both.divisions), (1, 0));
+    assert_eq!((count.point.multiplications, count.both.multiplications), (3, 2));
+}
+
 /// A factor of some terms of a sum is multiplied once.
 #[test]
 fn terms_with_a_common_factor_are_gathered() {

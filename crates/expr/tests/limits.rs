@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use mmsmith_expr::{Ast, Dependence, Derivatives, Graph, Program};
+use mmsmith_expr::{Ast, Dependence, Derivatives, Function, Graph, Program};
 use proptest::prelude::*;
 use std::time::{Duration, Instant};
 
@@ -93,6 +93,8 @@ fn long_flat_text() {
     accepted("x*x-".repeat(100_000) + "x", 0.09 * (1.0 - 99_999.0) - 0.3);
     accepted("x*".repeat(100_000) + "x", 0.0);
     accepted("x/".repeat(100_000) + "x", f64::INFINITY);
+    // Ones have no size.
+    accepted("1*".repeat(100_000) + "x", 0.3);
     let different: Vec<String> = (1..=100_000).map(|i| format!("{i}")).collect();
     accepted(different.join("+"), 5_000_050_000.0);
     accepted(different.join("-"), 2.0 - 5_000_050_000.0);
@@ -110,6 +112,42 @@ fn many_different_terms() {
     assert!(evaluate_within(SOON, terms.join("+")).is_ok());
     let terms: Vec<String> = (1..=5_000).map(|i| format!("(x+{i})*(y+{i})*x")).collect();
     assert!(evaluate_within(SOON, terms.join("+")).is_ok());
+}
+
+/// What is made of large parts again and again takes too long, though text and result are short; what is made of deep
+/// parts is too deep.
+#[test]
+fn short_text_of_large_parts() {
+    let mut graph = Graph::new();
+    let symbols: Vec<_> = (0..1_000).map(|n| graph.symbol(&format!("x{n}"))).collect();
+    let sum = graph.sum_of(symbols.iter().copied());
+    let product = graph.product_of(symbols.iter().copied());
+    let deep = |levels: usize| {
+        move |graph: &mut Graph| {
+            let x = graph.symbol("x");
+            (0..levels).fold(x, |inner, _| graph.call(Function::Sin, &[inner]))
+        }
+    };
+    let (below, above) = (deep(398)(&mut graph), deep(399)(&mut graph));
+    let found = |text: String| {
+        let mut graph = graph.clone();
+        let ast = Ast::parse(&text).unwrap();
+        let built = graph.build(&ast, &mut |_, name| match name {
+            "sum" => Ok(sum),
+            "product" => Ok(product),
+            "below" => Ok(below),
+            "above" => Ok(above),
+            _ => Err("unknown".into()),
+        });
+        built.map(|_| ()).map_err(|error| error.message)
+    };
+    for (part, sign) in [("sum", "+"), ("sum", "-"), ("product", "*"), ("product", "/")] {
+        let many = |count: usize| vec![part; count].join(sign);
+        assert_eq!(found(many(200)), Ok(()), "{part} {sign}");
+        assert!(found(many(2_000)).unwrap_err().contains("too long"), "{part} {sign}");
+    }
+    assert_eq!(found("sin(below)".into()), Ok(()));
+    assert!(found("sin(above)".into()).unwrap_err().contains("nested deeper than 400"));
 }
 
 #[test]

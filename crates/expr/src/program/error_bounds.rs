@@ -19,14 +19,10 @@ impl Program {
     /// Inputs count as exact. Running error analysis: every operation adds its own rounding to what its operands
     /// carry, and nothing cancels. All places go through one operation after another, side by side.
     pub(crate) fn error_bounds(&self, inputs: &[Row]) -> Vec<Row> {
-        let mut values: Vec<Row> = Vec::with_capacity(self.operations.len());
+        let mut values = self.values(inputs);
         let mut errors: Vec<Row> = Vec::with_capacity(self.operations.len());
-        for (operation, &number) in self.operations.iter().zip(&self.numbers) {
-            let value = match *operation {
-                Operation::Number(_) => [number; SIDE],
-                Operation::Input(index) => inputs.get(index).copied().unwrap_or([f64::NAN; SIDE]),
-                _ => operation.row(&values),
-            };
+        for (index, operation) in self.operations.iter().enumerate() {
+            let value = values[index];
             let carried = |slot: Slot| &errors[slot.index()];
             let error = match *operation {
                 Operation::Number(_) | Operation::Input(_) => [0.0; SIDE],
@@ -46,24 +42,25 @@ impl Program {
                         (ea[k] + eb[k] * value[k].abs()) / b[k].abs() + value[k].abs()
                     })
                 }
-                _ => array::from_fn(|k| {
-                    let at = |slot: Slot| values[slot.index()][k];
-                    // The derivative of a function by a difference: its accuracy does not matter.
-                    let slope = |a: Slot| {
-                        let step = 1e-6 * (1e-3 + at(a).abs());
-                        let moved = operation
-                            .value(&[], |slot| if slot == a { at(slot) + step } else { at(slot) });
-                        ((moved - value[k]) / step).abs()
-                    };
-                    let carried: f64 = match operation {
-                        // What they correct stays in the bound, so they add nothing.
-                        Operation::SumError(..) | Operation::ProductError(..) => 0.0,
-                        _ => operation.operands().map(|a| carried(a)[k] * slope(a)).sum(),
-                    };
-                    carried + value[k].abs()
-                }),
+                // What they correct stays in the bound, so they add nothing.
+                Operation::SumError(..) | Operation::ProductError(..) => value.map(f64::abs),
+                _ => {
+                    let mut error = [0.0; SIDE];
+                    for slot in operation.operands() {
+                        // The derivative of a function by a difference: its accuracy does not matter.
+                        let at = values[slot.index()];
+                        let step = at.map(|at| 1e-6 * (1e-3 + at.abs()));
+                        values[slot.index()] = array::from_fn(|k| at[k] + step[k]);
+                        let moved = operation.row(inputs, &values);
+                        values[slot.index()] = at;
+                        for (k, error) in error.iter_mut().enumerate() {
+                            let slope = ((moved[k] - value[k]) / step[k]).abs();
+                            *error += errors[slot.index()][k] * slope;
+                        }
+                    }
+                    array::from_fn(|k| error[k] + value[k].abs())
+                }
             };
-            values.push(value);
             errors.push(error);
         }
         self.outputs.iter().map(|slot| errors[slot.index()]).collect()

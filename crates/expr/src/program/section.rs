@@ -3,7 +3,8 @@
 //! Reading an operation takes longer than doing it for one point; so each is done for a row of points before the next one
 //! is read.
 
-use super::{Operation, Program, Slot};
+use super::{Operation, Program, Slot, argument, call, sin_pi, sin_pi_shifted};
+use crate::nearest_f64;
 use std::array;
 
 /// The operations that some outputs need, given values that are the same at all points and values of each point.
@@ -70,7 +71,7 @@ impl Section {
         rows.extend(uniform.iter().map(|&value| [value; N]));
         rows.extend(given);
         for operation in &self.operations {
-            rows.push(operation.row(rows));
+            rows.push(operation.row(&[], rows));
         }
         let rows: &'a [[f64; N]] = rows;
         self.outputs.clone().into_iter().map(move |place| &rows[place])
@@ -78,21 +79,36 @@ impl Section {
 }
 
 impl Operation {
-    /// The values at `N` places, where `rows` has those of the operands.
-    pub(super) fn row<const N: usize>(&self, rows: &[[f64; N]]) -> [f64; N] {
-        let of = |slot: Slot| &rows[slot.index()];
+    /// The values at `N` places, where `inputs` has those of the inputs and `rows` those of the operands.
+    pub(super) fn row<const N: usize>(&self, inputs: &[[f64; N]], rows: &[[f64; N]]) -> [f64; N] {
+        let of = |slot: Slot| rows[slot.index()];
         let each = |a: Slot, b: Slot, value: fn(f64, f64) -> f64| -> [f64; N] {
             let (a, b) = (of(a), of(b));
             array::from_fn(|n| value(a[n], b[n]))
         };
         match *self {
+            Operation::Number(ref value) => [nearest_f64(value); N],
+            Operation::Pi => [std::f64::consts::PI; N],
+            Operation::Input(index) => inputs.get(index).copied().unwrap_or([f64::NAN; N]),
             Operation::Add(a, b) => each(a, b, |a, b| a + b),
             Operation::Sub(a, b) => each(a, b, |a, b| a - b),
             Operation::Mul(a, b) => each(a, b, |a, b| a * b),
             Operation::Div(a, b) => each(a, b, |a, b| a / b),
             Operation::Neg(a) => of(a).map(|a| -a),
             Operation::Sqrt(a) => of(a).map(f64::sqrt),
-            _ => array::from_fn(|n| self.value(&[], |slot| of(slot)[n])),
+            Operation::Power(a, ref exponent) => {
+                let exponent = nearest_f64(exponent);
+                of(a).map(|a| a.powf(exponent))
+            }
+            Operation::SinPi(a) => of(a).map(sin_pi),
+            Operation::CosPi(a) => of(a).map(|a| sin_pi_shifted(a, 1)),
+            Operation::Call(function, a) => of(a).map(|a| call(function, a)),
+            Operation::Atan2(y, x) => each(y, x, f64::atan2),
+            Operation::LnOfBoth(x, y) => {
+                each(x, y, |x, y| if x < -0.5 { y.ln() } else { x.ln_1p() })
+            }
+            Operation::SumError(a, b) => each(a, b, argument::sum_error),
+            Operation::ProductError(a, b) => each(a, b, argument::product_error),
         }
     }
 }
