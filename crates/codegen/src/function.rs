@@ -35,12 +35,30 @@ impl<'a> Translator<'a> {
 
     /// The statements of a block, and its outputs as expressions.
     pub(crate) fn statements(&self, block: &Block<'_>) -> (TokenStream, Vec<TokenStream>) {
+        self.statements_with(block, template)
+    }
+
+    /// The same where a constant `NEAR` tells whether logarithms of ratios may be the short ones.
+    pub(crate) fn statements_if_near(&self, block: &Block<'_>) -> (TokenStream, Vec<TokenStream>) {
+        self.statements_with(block, |operation| match operation {
+            Operation::LnOfBoth(..) => "#.ln_of_both_if::<NEAR>(#)".into(),
+            other => template(other),
+        })
+    }
+
+    fn statements_with(
+        &self,
+        block: &Block<'_>,
+        template: impl Fn(&Operation) -> Cow<'static, str>,
+    ) -> (TokenStream, Vec<TokenStream>) {
         let mut lines = String::new();
         for (index, operation) in block.steps() {
             lines.push_str("let t");
             push_index(&mut lines, index);
             lines.push_str(" = ");
-            self.operation(&mut lines, block, operation);
+            spell(&mut lines, &template(operation), operation, |text, slot| {
+                self.operand(text, block.operand(slot));
+            });
             lines.push_str(";\n");
         }
         let statements = match self.blocks {
@@ -80,12 +98,6 @@ impl<'a> Translator<'a> {
         text.extend([name, "["]);
         push_index(text, index);
         text.push(']');
-    }
-
-    fn operation(&self, text: &mut String, block: &Block<'_>, operation: &Operation) {
-        spell(text, &template(operation), operation, |text, slot| {
-            self.operand(text, block.operand(slot));
-        });
     }
 }
 

@@ -399,13 +399,17 @@ impl Generator<'_> {
         let stages = &self.plan.body_force;
         let (of_time, time) = self.time_stage("body_force_time", stages);
         let (of_point, point) = self.point_stage("body_force_point", stages);
-        let (statements, values) = self.translator.statements(&self.plan.staged(stages));
+        let (statements, values) = self.translator.statements_if_near(&self.plan.staged(stages));
         let result = self.shaped(Shape::Vector, &values);
         let items = quote! {
             #of_time
             #of_point
             #[inline(always)]
-            fn body_force_staged(&self, time: &[T; #time], point: &[T; #point]) -> #vector {
+            fn body_force_staged<const NEAR: bool>(
+                &self,
+                time: &[T; #time],
+                point: &[T; #point],
+            ) -> #vector {
                 #statements
                 #result
             }
@@ -422,19 +426,20 @@ impl Generator<'_> {
         let (of_time, time) = self.time_stage("state_time", state);
         let (of_velocity_time, velocity_time) = self.time_stage("velocity_time", velocity);
         let (of_point, point) = self.point_stage("state_point", state);
-        let (statements, values) = self.translator.statements(&self.plan.staged(state));
+        let (statements, values) = self.translator.statements_if_near(&self.plan.staged(state));
         let (u, tensors) = values.split_at(self.spec.dimension);
         let (F, P) = tensors.split_at(tensors.len() / 2);
         let u = self.shaped(Shape::Vector, u);
         let [F, P] = [F, P].map(|values| self.shaped(Shape::Matrix, values));
-        let (v_statements, values) = self.translator.statements(&self.plan.staged(velocity));
+        let (v_statements, values) =
+            self.translator.statements_if_near(&self.plan.staged(velocity));
         let v = self.shaped(Shape::Vector, &values);
         let items = quote! {
             #of_time
             #of_velocity_time
             #of_point
             #[inline(always)]
-            fn state_staged(
+            fn state_staged<const NEAR: bool>(
                 &self,
                 time: &[T; #time],
                 velocity_time: &[T; #velocity_time],

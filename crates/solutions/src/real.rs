@@ -29,6 +29,18 @@ pub trait Real: RealField + Copy {
     #[must_use]
     fn ln_of_both(self, y: Self) -> Self;
 
+    /// [`ln_of_both`](Self::ln_of_both) to the last bit, in half as many operations, where `1 + x` lies between `sqrt(1/2)`
+    /// and `sqrt(2)`; not a number elsewhere.
+    #[must_use]
+    fn ln_near_one(self) -> Self;
+
+    /// [`ln_near_one`](Self::ln_near_one) if `NEAR`, else [`ln_of_both`](Self::ln_of_both).
+    #[inline(always)]
+    #[must_use]
+    fn ln_of_both_if<const NEAR: bool>(self, y: Self) -> Self {
+        if NEAR { self.ln_near_one() } else { self.ln_of_both(y) }
+    }
+
     /// What rounding takes from a sum: `self + other` less its rounded value, exactly (D. E. Knuth, The Art of Computer
     /// Programming, vol. 2, 4.2.2).
     #[inline]
@@ -124,6 +136,15 @@ impl Real for f64 {
         logarithm(self, y, self < -0.5)
     }
 
+    #[inline(always)]
+    fn ln_near_one(self) -> Self {
+        let sum = 1.0 + self;
+        let near =
+            (sum >= f64::from_bits(ROOT_HALF)) & (sum < f64::from_bits(ROOT_HALF + (1 << 52)));
+        let (half_square, tail) = parts_of_logarithm(self);
+        if near { 0.0 - ((half_square - tail) - self) } else { f64::NAN }
+    }
+
     #[inline]
     fn product_error(self, other: Self) -> Self {
         // Halves of 26 bits, whose products are exact.
@@ -167,6 +188,11 @@ impl Real for f32 {
     #[inline(always)]
     fn ln_of_both(self, y: Self) -> Self {
         f64::from(self).ln_of_both(f64::from(y)) as f32
+    }
+
+    #[inline(always)]
+    fn ln_near_one(self) -> Self {
+        f64::from(self).ln_near_one() as f32
     }
 
     #[inline]
@@ -221,12 +247,13 @@ fn cosine(x: f64) -> f64 {
     (1.0 - 4.934_802_200_544_679 * z) + square * (low + square * (middle + square * high))
 }
 
+/// The bits of sqrt(1/2), to 32 bits.
+const ROOT_HALF: u64 = 0x3fe6_a09e_0000_0000;
+
 /// `ln(y)` where `by_y`, else `ln(1 + x)`, by the reduction and the polynomial of Sun's fdlibm, `s_log1p.c`, without
 /// branches.
 #[inline(always)]
 fn logarithm(x: f64, y: f64, by_y: bool) -> f64 {
-    /// The bits of sqrt(1/2), to 32 bits.
-    const ROOT_HALF: u64 = 0x3fe6_a09e_0000_0000;
     const ONE: u64 = 0x3ff0_0000_0000_0000;
     const MANTISSA: u64 = 0x000f_ffff_ffff_ffff;
     /// 2^52 as a double; with a whole number in its last bits it is 2^52 plus that number.
@@ -254,6 +281,17 @@ fn logarithm(x: f64, y: f64, by_y: bool) -> f64 {
     // lost / u, which two digits of 1/m are enough for.
     let corrected = !exact && !by_y && k <= 1022.0;
     let correction = if corrected { lost * scale * (1.0 - f + f * f) } else { 0.0 };
+    let (half_square, tail) = parts_of_logarithm(f);
+    let tail = tail + (k * LN2_LOW + correction);
+    let value = k * LN2_HIGH - ((half_square - tail) - f);
+    let pole = if u == 0.0 { f64::NEG_INFINITY } else { f64::NAN };
+    let outside = if u > 0.0 { u } else { pole };
+    if u > 0.0 && u < f64::INFINITY { value } else { outside }
+}
+
+/// `h = f^2/2` and `t` with `ln(1 + f) = f - (h - t)`, for 1 + f between sqrt(1/2) and sqrt(2).
+#[inline(always)]
+fn parts_of_logarithm(f: f64) -> (f64, f64) {
     let s = f / (2.0 + f);
     let z = s * s;
     let w = z * z;
@@ -265,11 +303,7 @@ fn logarithm(x: f64, y: f64, by_y: bool) -> f64 {
             + w * (2.857_142_874_366_239e-1
                 + w * (1.818_357_216_161_805e-1 + w * 1.479_819_860_511_658_6e-1)));
     let half_square = 0.5 * f * f;
-    let tail = s * (half_square + (even + odd)) + (k * LN2_LOW + correction);
-    let value = k * LN2_HIGH - ((half_square - tail) - f);
-    let pole = if u == 0.0 { f64::NEG_INFINITY } else { f64::NAN };
-    let outside = if u > 0.0 { u } else { pole };
-    if u > 0.0 && u < f64::INFINITY { value } else { outside }
+    (half_square, s * (half_square + (even + odd)))
 }
 
 #[cfg(test)]
@@ -341,6 +375,27 @@ mod tests {
         assert!((-1.0_f64).ln_of_both(f64::NAN).is_nan() && (-1.0_f64).ln_of_both(-1e-9).is_nan());
         assert!(f64::NAN.ln_of_both(1.0).is_nan());
         assert_eq!((-0.75_f32).ln_of_both(0.25), 0.25_f32.ln());
+    }
+
+    #[test]
+    fn near_one_the_short_logarithm_has_the_same_bits() {
+        let mut near = 0;
+        for n in 0..300_000 {
+            let x = f64::from(n) * 5e-6 - 0.9;
+            for x in [x, x * 1e-9] {
+                let ratio = (1.0 + x) / f64::from_bits(ROOT_HALF);
+                if (1.0..2.0).contains(&ratio) {
+                    near += 1;
+                    assert_eq!(x.ln_near_one().to_bits(), x.ln_of_both(f64::NAN).to_bits(), "{x}");
+                } else {
+                    assert!(x.ln_near_one().is_nan(), "{x}");
+                }
+            }
+        }
+        assert!((400_000..500_000).contains(&near), "{near}");
+        assert_eq!(0.0_f64.ln_near_one().to_bits(), 0.0_f64.to_bits());
+        assert!(f64::NAN.ln_near_one().is_nan() && f64::INFINITY.ln_near_one().is_nan());
+        assert_eq!(0.25_f32.ln_near_one(), 0.25_f32.ln_of_both(1.25));
     }
 
     #[test]

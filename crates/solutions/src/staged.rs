@@ -126,7 +126,7 @@ impl<T: Real, const D: usize> StateRun<T, D> {
 /// let ring = Ring::<f64>::new(RingParameters::default())?;
 /// let X = [0.6, 0.3].into();
 /// let (time, point) = (ring.body_force_time(1e-3), ring.body_force_point(&X));
-/// let (staged, single) = (ring.body_force_staged(&time, &point), ring.body_force(&X, 1e-3));
+/// let (staged, single) = (ring.body_force_staged::<false>(&time, &point), ring.body_force(&X, 1e-3));
 /// assert!((staged - single).norm() < 1e-14 * single.norm());
 /// # Ok::<(), mmsmith_solutions::ParameterError>(())
 /// ```
@@ -139,7 +139,14 @@ pub trait BodyForceStages<T: Real, const D: usize, const TIME: usize, const POIN
     fn body_force_point(&self, X: &SVector<T, D>) -> [T; POINT];
     /// The body force per unit mass, from the values of one time and of one point; equal to
     /// [`Solution::body_force`] but for rounding.
-    fn body_force_staged(&self, time: &[T; TIME], point: &[T; POINT]) -> SVector<T, D>;
+    ///
+    /// If `NEAR`, logarithms of ratios are [those near one](Real::ln_near_one): the result is the same to the last bit, or
+    /// not a number.
+    fn body_force_staged<const NEAR: bool>(
+        &self,
+        time: &[T; TIME],
+        point: &[T; POINT],
+    ) -> SVector<T, D>;
 }
 
 /// What a simulation is compared with, in stages: what `TIME` values it needs of the time alone, what `VELOCITY_TIME` values
@@ -160,7 +167,8 @@ pub trait StateStages<
     /// What depends on the reference position alone.
     fn state_point(&self, X: &SVector<T, D>) -> [T; POINT];
     /// The fields from the values of their times and of one point; those of [`Solution`]'s functions, to the last bit.
-    fn state_staged(
+    /// `NEAR` is as in [`BodyForceStages::body_force_staged`].
+    fn state_staged<const NEAR: bool>(
         &self,
         time: &[T; TIME],
         velocity_time: &[T; VELOCITY_TIME],
@@ -199,7 +207,9 @@ fn blocks<T: Real, const D: usize, const POINT: usize>(
 /// What the body force of a generated solution keeps of points.
 pub struct StagedPoints<S, T, const TIME: usize, const POINT: usize> {
     solution: S,
-    blocks: Blocks<T, POINT>,
+    /// For each value an array over all points, so that a run of points may begin anywhere. The last point is repeated for
+    /// the runs that end beyond it.
+    values: [Vec<T>; POINT],
     len: usize,
 }
 
@@ -210,8 +220,16 @@ impl<S, T: Real, const TIME: usize, const POINT: usize> StagedPoints<S, T, TIME,
     where
         S: BodyForceStages<T, D, TIME, POINT>,
     {
-        let blocks = blocks(X, |X| solution.body_force_point(X));
-        StagedPoints { solution, blocks, len: X.len() }
+        let mut values = array::from_fn(|_| Vec::with_capacity(X.len() + BLOCK));
+        for X in X {
+            let of_point = solution.body_force_point(X);
+            values.iter_mut().zip(of_point).for_each(|(run, value)| run.push(value));
+        }
+        for run in &mut values {
+            let last = run.last().copied().unwrap_or(T::zero());
+            run.resize(X.len() + BLOCK, last);
+        }
+        StagedPoints { solution, values, len: X.len() }
     }
 }
 
@@ -241,18 +259,26 @@ fn point<T: Real, const POINT: usize>(block: &[[T; BLOCK]; POINT], i: usize) -> 
     array::from_fn(|m| block[m][i])
 }
 
-/// Blocks of points as loops of fixed length over separate runs. There is an instance of it for each kind of vector
-/// registers, and the processor's own is chosen when the program runs; all give the same bits, since nothing is
-/// contracted or reordered.
-struct WholeBlocks<'a, S, T: Real, const D: usize, const TIME: usize, const POINT: usize> {
+/// Some points by their numbers.
+#[derive(Clone, Copy)]
+enum Numbers<'a> {
+    /// Successive ones from this one on.
+    From(usize),
+    Of(&'a [u32]),
+}
+
+/// Points as loops of fixed length over separate runs. There is an instance of it for each kind of vector registers, and the
+/// processor's own is chosen when the program runs; all give the same bits, since nothing is contracted or reordered.
+struct Runs<'a, S, T: Real, const D: usize, const TIME: usize, const POINT: usize> {
     solution: &'a S,
     time: &'a [T; TIME],
-    blocks: &'a [[[T; BLOCK]; POINT]],
+    values: &'a [Vec<T>; POINT],
+    numbers: Numbers<'a>,
     b: &'a mut [SVector<T, D>],
 }
 
 impl<S, T: Real, const D: usize, const TIME: usize, const POINT: usize> WithSimd
-    for WholeBlocks<'_, S, T, D, TIME, POINT>
+    for Runs<'_, S, T, D, TIME, POINT>
 where
     S: BodyForceStages<T, D, TIME, POINT>,
 {
@@ -260,18 +286,90 @@ where
 
     #[inline(always)]
     fn with_simd<I: Simd>(self, _: I) {
-        let Self { solution, time, blocks, b } = self;
-        for (block, b) in blocks.iter().zip(b.chunks_exact_mut(BLOCK)) {
-            let mut components = [[T::zero(); BLOCK]; D];
-            for i in 0..BLOCK {
-                let value = solution.body_force_staged(time, &point(block, i));
-                for d in 0..D {
-                    components[d][i] = value[d];
+        let Self { solution, time, values, numbers, b } = self;
+        let nothing = [T::zero(); BLOCK];
+        let mut components = [nothing; D];
+        let mut picked = [nothing; POINT];
+        for (index, b) in b.chunks_mut(BLOCK).enumerate() {
+            let place = index * BLOCK;
+            let first = match numbers {
+                Numbers::From(first) => Some(first + place),
+                Numbers::Of(points) => successive(&points[place..place + b.len()]),
+            };
+            let run = first.and_then(|first| run(values, first, &nothing));
+            if let Some(run) = run {
+                body_forces(solution, time, &run, &mut components);
+            } else if let Numbers::Of(points) = numbers {
+                for (i, &n) in points[place..place + b.len()].iter().enumerate() {
+                    for (picked, values) in picked.iter_mut().zip(values) {
+                        picked[i] = values[n as usize];
+                    }
                 }
+                let run = array::from_fn(|m| &picked[m]);
+                body_forces(solution, time, &run, &mut components);
             }
             for (i, b) in b.iter_mut().enumerate() {
                 *b = SVector::from_fn(|d, _| components[d][i]);
             }
+        }
+    }
+}
+
+/// The first of points with successive numbers; `None` for others.
+#[inline(always)]
+fn successive(points: &[u32]) -> Option<usize> {
+    let &first = points.first()?;
+    let mut apart = 0;
+    for (i, &n) in points.iter().enumerate() {
+        apart |= n ^ first.wrapping_add(i as u32);
+    }
+    (apart == 0).then_some(first as usize)
+}
+
+/// The values of a run of points from number `first` on.
+#[inline(always)]
+fn run<'a, T, const POINT: usize>(
+    values: &'a [Vec<T>; POINT],
+    first: usize,
+    nothing: &'a [T; BLOCK],
+) -> Option<[&'a [T; BLOCK]; POINT]> {
+    let run = |m: usize| values[m].get(first..).and_then(|values| values.first_chunk());
+    let whole = (0..POINT).all(|m| run(m).is_some());
+    whole.then(|| array::from_fn(|m| run(m).unwrap_or(nothing)))
+}
+
+/// The body force on a run of points; as a function of its own, which tells the compiler that they are in different places.
+#[inline(always)]
+fn body_forces<S, T: Real, const D: usize, const TIME: usize, const POINT: usize>(
+    solution: &S,
+    time: &[T; TIME],
+    run: &[&[T; BLOCK]; POINT],
+    components: &mut [[T; BLOCK]; D],
+) where
+    S: BodyForceStages<T, D, TIME, POINT>,
+{
+    for i in 0..BLOCK {
+        let point = array::from_fn(|m| run[m][i]);
+        let value = solution.body_force_staged::<true>(time, &point);
+        for d in 0..D {
+            components[d][i] = value[d];
+        }
+    }
+    let mut finite = true;
+    for component in &*components {
+        for value in component {
+            finite &= value.is_finite();
+        }
+    }
+    if finite {
+        return;
+    }
+    // A ratio that is not near one, or a force that is none.
+    for i in 0..BLOCK {
+        let point = array::from_fn(|m| run[m][i]);
+        let value = solution.body_force_staged::<false>(time, &point);
+        for d in 0..D {
+            components[d][i] = value[d];
         }
     }
 }
@@ -288,51 +386,15 @@ where
             b.len(),
             self.len
         );
-        let time = self.solution.body_force_time(t);
-        let one_by_one = |first: usize, b: &mut [SVector<T, D>]| {
-            for (n, b) in (first..).zip(b) {
-                let point = point(&self.blocks[n / BLOCK], n % BLOCK);
-                *b = self.solution.body_force_staged(&time, &point);
-            }
-        };
-        let (before, rest) = b.split_at_mut(b.len().min(first.next_multiple_of(BLOCK) - first));
-        let start = first + before.len();
-        let (whole, after) = rest.split_at_mut(rest.len() / BLOCK * BLOCK);
-        let end = start + whole.len();
-        one_by_one(first, before);
-        if !whole.is_empty() {
-            let blocks = &self.blocks[start / BLOCK..end / BLOCK];
-            Arch::new().dispatch(WholeBlocks {
-                solution: &self.solution,
-                time: &time,
-                blocks,
-                b: whole,
-            });
-        }
-        one_by_one(end, after);
+        self.runs(t, Numbers::From(first), b);
     }
 
     fn evaluate_of(&self, t: T, points: &[u32], b: &mut [SVector<T, D>]) {
-        let time = self.solution.body_force_time(t);
-        let mut block = [[T::zero(); BLOCK]; POINT];
-        for (points, b) in points.chunks(BLOCK).zip(b.chunks_mut(BLOCK)) {
-            for (i, &n) in points.iter().enumerate() {
-                let n = n as usize;
-                assert!(n < self.len, "point {n} was asked for; there are {}", self.len);
-                let values = point(&self.blocks[n / BLOCK], n % BLOCK);
-                block.iter_mut().zip(values).for_each(|(run, value)| run[i] = value);
-            }
-            let blocks = std::slice::from_ref(&block);
-            let of = |b| WholeBlocks { solution: &self.solution, time: &time, blocks, b };
-            if points.len() == BLOCK {
-                Arch::new().dispatch(of(b));
-            } else {
-                // What a last block has to spare holds points of blocks before it, or zeros that nobody reads.
-                let mut whole = [SVector::zeros(); BLOCK];
-                Arch::new().dispatch(of(&mut whole));
-                b.copy_from_slice(&whole[..b.len()]);
-            }
+        assert_eq!(points.len(), b.len(), "one body force a point");
+        if let Some(&n) = points.iter().find(|&&n| n as usize >= self.len) {
+            panic!("point {n} was asked for; there are {}", self.len);
         }
+        self.runs(t, Numbers::Of(points), b);
     }
 
     fn len(&self) -> usize {
@@ -344,7 +406,18 @@ where
     }
 }
 
-/// As [`WholeBlocks`].
+impl<S, T: Real, const TIME: usize, const POINT: usize> StagedPoints<S, T, TIME, POINT> {
+    fn runs<const D: usize>(&self, t: T, numbers: Numbers<'_>, b: &mut [SVector<T, D>])
+    where
+        S: BodyForceStages<T, D, TIME, POINT>,
+    {
+        let Self { solution, values, .. } = self;
+        let time = &solution.body_force_time(t);
+        Arch::new().dispatch(Runs { solution, time, values, numbers, b });
+    }
+}
+
+/// As [`Runs`].
 struct BlocksOfStates<
     'a,
     S,
@@ -372,7 +445,10 @@ where
     fn with_simd<I: Simd>(self, _: I) {
         let Self { solution, time, velocity_time, blocks, runs } = self;
         for (block, run) in blocks.iter().zip(runs) {
-            fill(block, run, |point| solution.state_staged(time, velocity_time, point));
+            if fill(block, run, |p| solution.state_staged::<true>(time, velocity_time, p)).is_none()
+            {
+                fill(block, run, |p| solution.state_staged::<false>(time, velocity_time, p));
+            }
         }
     }
 }
@@ -396,16 +472,24 @@ where
     }
 }
 
-/// As a function of its own, which tells the compiler that `block` and `run` are in different places.
+/// `None` where a stress is none. As a function of its own, which tells the compiler that `block` and `run` are in different
+/// places.
 #[inline(always)]
 fn fill<T: Real, const D: usize, const POINT: usize>(
     block: &[[T; BLOCK]; POINT],
     run: &mut StateRun<T, D>,
     state: impl Fn(&[T; POINT]) -> State<T, D>,
-) {
+) -> Option<()> {
     for n in 0..BLOCK {
         run.put(n, &state(&point(block, n)));
     }
+    let mut finite = true;
+    for P in run.P.as_flattened() {
+        for value in P {
+            finite &= value.is_finite();
+        }
+    }
+    finite.then_some(())
 }
 
 /// The positions of points, for solutions that keep nothing else.

@@ -709,7 +709,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 4, 4> for AxisAligned<T> {
         [t2, t13, t35, t39]
     }
     #[inline(always)]
-    fn body_force_staged(
+    fn body_force_staged<const NEAR: bool>(
         &self,
         time: &[T; 4],
         point: &[T; 4],
@@ -725,7 +725,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 4, 4> for AxisAligned<T> {
         let t58 = time[1] * point[3];
         let t59 = t57 + t58;
         let t60 = self.fixed[1] * t59;
-        let t61 = t60.ln_of_both(t45);
+        let t61 = t60.ln_of_both_if::<NEAR>(t45);
         let t72 = T::one() / t44;
         let t139 = self.fixed[7] * point[0];
         let t144 = point[2] * point[2];
@@ -799,7 +799,7 @@ impl<T: crate::Real> crate::StateStages<T, 2, 8, 2, 4> for AxisAligned<T> {
         [t2, t13, t35, t39]
     }
     #[inline(always)]
-    fn state_staged(
+    fn state_staged<const NEAR: bool>(
         &self,
         time: &[T; 8],
         velocity_time: &[T; 2],
@@ -826,7 +826,7 @@ impl<T: crate::Real> crate::StateStages<T, 2, 8, 2, 4> for AxisAligned<T> {
         let t58 = time[2] * point[3];
         let t59 = t57 + t58;
         let t60 = self.fixed[1] * t59;
-        let t61 = t60.ln_of_both(t45);
+        let t61 = t60.ln_of_both_if::<NEAR>(t45);
         let t64 = time[6] * point[2];
         let t65 = t64 * t52;
         let t69 = t61 * t51;

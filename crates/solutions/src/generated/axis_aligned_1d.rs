@@ -517,7 +517,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 2> for AxisAligned1d<T> {
         [t2, t26]
     }
     #[inline(always)]
-    fn body_force_staged(
+    fn body_force_staged<const NEAR: bool>(
         &self,
         time: &[T; 2],
         point: &[T; 2],
@@ -572,7 +572,7 @@ impl<T: crate::Real> crate::StateStages<T, 1, 3, 1, 2> for AxisAligned1d<T> {
         [t2, t26]
     }
     #[inline(always)]
-    fn state_staged(
+    fn state_staged<const NEAR: bool>(
         &self,
         time: &[T; 3],
         velocity_time: &[T; 1],

@@ -1131,7 +1131,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 6> for AxisAligned3d<T> {
         [t2, t13, t25, t60, t64, t68]
     }
     #[inline(always)]
-    fn body_force_staged(
+    fn body_force_staged<const NEAR: bool>(
         &self,
         time: &[T; 6],
         point: &[T; 6],
@@ -1155,7 +1155,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 6> for AxisAligned3d<T> {
         let t100 = self.fixed[3] * t99;
         let t101 = t100 + t95;
         let t102 = t101 - t70;
-        let t103 = t102.ln_of_both(t86);
+        let t103 = t102.ln_of_both_if::<NEAR>(t86);
         let t114 = T::one() / t83;
         let t121 = T::one() / t84;
         let t198 = self.fixed[13] * point[0];
@@ -1256,7 +1256,7 @@ impl<T: crate::Real> crate::StateStages<T, 3, 10, 3, 6> for AxisAligned3d<T> {
         [t2, t13, t25, t60, t64, t68]
     }
     #[inline(always)]
-    fn state_staged(
+    fn state_staged<const NEAR: bool>(
         &self,
         time: &[T; 10],
         velocity_time: &[T; 3],
@@ -1302,7 +1302,7 @@ impl<T: crate::Real> crate::StateStages<T, 3, 10, 3, 6> for AxisAligned3d<T> {
         let t100 = self.fixed[3] * t99;
         let t101 = t100 + t95;
         let t102 = t101 - t70;
-        let t103 = t102.ln_of_both(t86);
+        let t103 = t102.ln_of_both_if::<NEAR>(t86);
         let t106 = time[9] * point[3];
         let t107 = t106 * t92;
         let t111 = t103 * t91;

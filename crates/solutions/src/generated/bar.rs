@@ -557,7 +557,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 2> for Bar<T> {
         [t6, t34]
     }
     #[inline(always)]
-    fn body_force_staged(
+    fn body_force_staged<const NEAR: bool>(
         &self,
         time: &[T; 2],
         point: &[T; 2],
@@ -612,7 +612,7 @@ impl<T: crate::Real> crate::StateStages<T, 1, 2, 1, 2> for Bar<T> {
         [t6, t34]
     }
     #[inline(always)]
-    fn state_staged(
+    fn state_staged<const NEAR: bool>(
         &self,
         time: &[T; 2],
         velocity_time: &[T; 1],

@@ -544,7 +544,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 5, 2> for RigidMotion<T> {
         [X[0], X[1]]
     }
     #[inline(always)]
-    fn body_force_staged(
+    fn body_force_staged<const NEAR: bool>(
         &self,
         time: &[T; 5],
         point: &[T; 2],
@@ -610,7 +610,7 @@ impl<T: crate::Real> crate::StateStages<T, 2, 7, 4, 2> for RigidMotion<T> {
         [X[0], X[1]]
     }
     #[inline(always)]
-    fn state_staged(
+    fn state_staged<const NEAR: bool>(
         &self,
         time: &[T; 7],
         velocity_time: &[T; 4],

@@ -908,7 +908,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 8> for Ring<T> {
         [t70, t72, t147, t148, t167, t194, t205, t215]
     }
     #[inline(always)]
-    fn body_force_staged(
+    fn body_force_staged<const NEAR: bool>(
         &self,
         time: &[T; 3],
         point: &[T; 8],
@@ -996,7 +996,7 @@ impl<T: crate::Real> crate::StateStages<T, 2, 2, 1, 13> for Ring<T> {
         [t2, t3, t36, t39, t66, t68, t70, t72, t76, t82, t84, t107, t112]
     }
     #[inline(always)]
-    fn state_staged(
+    fn state_staged<const NEAR: bool>(
         &self,
         time: &[T; 2],
         velocity_time: &[T; 1],

@@ -1146,7 +1146,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         [t70, t72, t206, t215, t232, t275, t284, t301, t310, t320]
     }
     #[inline(always)]
-    fn body_force_staged(
+    fn body_force_staged<const NEAR: bool>(
         &self,
         time: &[T; 3],
         point: &[T; 10],
@@ -1160,7 +1160,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         let t101 = t100 * t92;
         let t102 = self.parameters.A * t101;
         let t103 = t102 + t91;
-        let t104 = t103.ln_of_both(t95);
+        let t104 = t103.ln_of_both_if::<NEAR>(t95);
         let t276 = time[0] * point[4];
         let t277 = point[5] + t276;
         let t302 = time[0] * t277;
@@ -1202,7 +1202,7 @@ impl<T: crate::Real> crate::StateStages<T, 2, 3, 1, 2> for RingNu<T> {
         [X[0], X[1]]
     }
     #[inline(always)]
-    fn state_staged(
+    fn state_staged<const NEAR: bool>(
         &self,
         time: &[T; 3],
         velocity_time: &[T; 1],
@@ -1288,7 +1288,7 @@ impl<T: crate::Real> crate::StateStages<T, 2, 3, 1, 2> for RingNu<T> {
         let t101 = t100 * t92;
         let t102 = self.parameters.A * t101;
         let t103 = t102 + t91;
-        let t104 = t103.ln_of_both(t95);
+        let t104 = t103.ln_of_both_if::<NEAR>(t95);
         let t108 = T::one() / t92;
         let t109 = t108 + T::one();
         let t113 = t104 * t108;

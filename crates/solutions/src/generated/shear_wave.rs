@@ -440,7 +440,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 0, 0> for ShearWave<T> {
         []
     }
     #[inline(always)]
-    fn body_force_staged(
+    fn body_force_staged<const NEAR: bool>(
         &self,
         time: &[T; 0],
         point: &[T; 0],
@@ -473,7 +473,7 @@ impl<T: crate::Real> crate::StateStages<T, 2, 2, 1, 2> for ShearWave<T> {
         [t6, t38]
     }
     #[inline(always)]
-    fn state_staged(
+    fn state_staged<const NEAR: bool>(
         &self,
         time: &[T; 2],
         velocity_time: &[T; 1],

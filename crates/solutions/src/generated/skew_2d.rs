@@ -1736,7 +1736,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 15, 18> for Skew2d<T> {
         ]
     }
     #[inline(always)]
-    fn body_force_staged(
+    fn body_force_staged<const NEAR: bool>(
         &self,
         time: &[T; 15],
         point: &[T; 18],
@@ -1998,7 +1998,7 @@ impl<T: crate::Real> crate::StateStages<T, 2, 5, 2, 5> for Skew2d<T> {
         [t16, t35, t74, t82, t89]
     }
     #[inline(always)]
-    fn state_staged(
+    fn state_staged<const NEAR: bool>(
         &self,
         time: &[T; 5],
         velocity_time: &[T; 2],

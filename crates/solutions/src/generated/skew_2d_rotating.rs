@@ -1964,7 +1964,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 24, 9> for Skew2dRotating<T> {
         [X[0], t23, t36, t40, t80, t142, t146, t161, t263]
     }
     #[inline(always)]
-    fn body_force_staged(
+    fn body_force_staged<const NEAR: bool>(
         &self,
         time: &[T; 24],
         point: &[T; 9],
@@ -2284,7 +2284,7 @@ impl<T: crate::Real> crate::StateStages<T, 2, 14, 10, 7> for Skew2dRotating<T> {
         [X[0], X[1], t23, t40, t142, t146, t161]
     }
     #[inline(always)]
-    fn state_staged(
+    fn state_staged<const NEAR: bool>(
         &self,
         time: &[T; 14],
         velocity_time: &[T; 10],

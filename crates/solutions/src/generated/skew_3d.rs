@@ -3997,7 +3997,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 36, 11> for Skew3d<T> {
         [X[0], X[2], t22, t37, t70, t115, t126, t134, t149, t350, t1529]
     }
     #[inline(always)]
-    fn body_force_staged(
+    fn body_force_staged<const NEAR: bool>(
         &self,
         time: &[T; 36],
         point: &[T; 11],
@@ -4863,7 +4863,7 @@ impl<T: crate::Real> crate::StateStages<T, 3, 12, 3, 8> for Skew3d<T> {
         [t22, t40, t70, t115, t127, t134, t139, t149]
     }
     #[inline(always)]
-    fn state_staged(
+    fn state_staged<const NEAR: bool>(
         &self,
         time: &[T; 12],
         velocity_time: &[T; 3],

@@ -1345,7 +1345,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 12> for SphereShell<T> {
         [t26, t106, t124, t255, t256, t270, t310, t321, t336, t347, t357, t359]
     }
     #[inline(always)]
-    fn body_force_staged(
+    fn body_force_staged<const NEAR: bool>(
         &self,
         time: &[T; 4],
         point: &[T; 12],
@@ -1364,7 +1364,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 12> for SphereShell<T> {
         let t130 = self.fixed[10] * t126;
         let t131 = t121 + t130;
         let t132 = t131 + t107;
-        let t133 = t132.ln_of_both(t112);
+        let t133 = t132.ln_of_both_if::<NEAR>(t112);
         let t311 = time[0] * point[5];
         let t312 = point[6] + t311;
         let t337 = time[0] * t312;
@@ -1408,7 +1408,7 @@ impl<T: crate::Real> crate::StateStages<T, 3, 4, 1, 3> for SphereShell<T> {
         [X[1], X[2], X[0]]
     }
     #[inline(always)]
-    fn state_staged(
+    fn state_staged<const NEAR: bool>(
         &self,
         time: &[T; 4],
         velocity_time: &[T; 1],
@@ -1509,7 +1509,7 @@ impl<T: crate::Real> crate::StateStages<T, 3, 4, 1, 3> for SphereShell<T> {
         let t130 = self.fixed[10] * t126;
         let t131 = t121 + t130;
         let t132 = t131 + t107;
-        let t133 = t132.ln_of_both(t112);
+        let t133 = t132.ln_of_both_if::<NEAR>(t112);
         let t137 = T::one() / t108;
         let t138 = t137 + T::one();
         let t142 = t133 * t137;

@@ -705,7 +705,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 3> for Torsion<T> {
         [X[2], X[0], X[1]]
     }
     #[inline(always)]
-    fn body_force_staged(
+    fn body_force_staged<const NEAR: bool>(
         &self,
         time: &[T; 4],
         point: &[T; 3],
@@ -769,7 +769,7 @@ impl<T: crate::Real> crate::StateStages<T, 3, 3, 2, 3> for Torsion<T> {
         [X[2], X[0], X[1]]
     }
     #[inline(always)]
-    fn state_staged(
+    fn state_staged<const NEAR: bool>(
         &self,
         time: &[T; 3],
         velocity_time: &[T; 2],

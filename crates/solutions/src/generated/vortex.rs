@@ -1223,7 +1223,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 4> for Vortex<T> {
         [X[0], X[1], t13, t228]
     }
     #[inline(always)]
-    fn body_force_staged(
+    fn body_force_staged<const NEAR: bool>(
         &self,
         time: &[T; 9],
         point: &[T; 4],
@@ -1426,7 +1426,7 @@ impl<T: crate::Real> crate::StateStages<T, 2, 3, 2, 7> for Vortex<T> {
         [X[0], X[1], t10, t11, t21, t95, t114]
     }
     #[inline(always)]
-    fn state_staged(
+    fn state_staged<const NEAR: bool>(
         &self,
         time: &[T; 3],
         velocity_time: &[T; 2],
