@@ -18,7 +18,16 @@ use crate::partition::{Partition, Share};
 /// Rows that a particle may be lower than the band it was sorted into before everything is sorted anew.
 const SLACK: usize = 2;
 
-/// Particles sorted by band, and within each band by cell at the time of sorting.
+/// Nodes along axis 0 in a tile: with as many rows as a band's stencils reach, the nodes of a tile stay in the first-level
+/// cache.
+const TILE: usize = 32;
+/// The same along axis 1 in three dimensions.
+const TILE_ACROSS: usize = 8;
+
+/// Particles sorted by band, within each band by tile, and within each tile by number.
+///
+/// Neighbours mostly have successive numbers, and where they have, what belongs to them lies side by side in memory. So they
+/// are not sorted further.
 #[derive(Debug)]
 pub(crate) struct Bands {
     /// Rows in a band.
@@ -27,9 +36,11 @@ pub(crate) struct Bands {
     home: Vec<u32>,
     /// Particle ids, band after band.
     order: Partition,
-    /// Scratch of the sort: particles at each node, then where the next of them goes.
+    /// Tiles in a band.
+    tiles: usize,
+    /// Scratch of the sort: particles in each tile, then where the next of them goes.
     counts: Vec<u32>,
-    /// Scratch of the sort: first node of every particle.
+    /// Scratch of the sort: tile of every particle.
     keys: Vec<u32>,
 }
 
@@ -40,19 +51,22 @@ type Scatter<'a, N> = dyn Fn(&mut [N], usize, &[u32]) + Sync + 'a;
 type Sweep<'a, N, A, B, C> = dyn Fn(&mut [N], usize, u32, Share<'_, A, B, C>) + Sync + 'a;
 
 impl Bands {
-    /// Bytes that sorting needs for each node.
-    pub(crate) const BYTES_PER_NODE: usize = size_of::<u32>();
-
     /// Prepares for `particles` particles on the grid; `sort` has to follow.
     pub(crate) fn new<const D: usize>(layout: &Layout<D>, particles: usize) -> Self {
         // A row is one node in 1D; bands below some hundred particles would cost more to hand out than to compute.
         let height = if D == 1 { BAND_ROWS } else { 8 };
         let bands = layout.dims[D - 1] / height + 1;
+        let tiles = match D {
+            1 => 1,
+            2 => layout.dims[0].div_ceil(TILE),
+            _ => layout.dims[0].div_ceil(TILE) * layout.dims[1].div_ceil(TILE_ACROSS),
+        };
         Self {
             height,
             home: vec![0; particles],
             order: Partition::new(particles, bands),
-            counts: vec![0; layout.nodes + 1],
+            tiles,
+            counts: vec![0; bands * tiles + 1],
             keys: vec![0; particles],
         }
     }
@@ -89,31 +103,36 @@ impl Bands {
         [cast_slice_mut(home), cast_slice_mut(order), cast_slice_mut(starts)]
     }
 
-    /// Sorts all particles by the first node of their stencils, which `first_node(particle)` computes.
+    /// Sorts all particles by the tile of the first node of their stencils, which `first_node(particle)` computes.
     pub(crate) fn sort<const D: usize>(
         &mut self,
         layout: &Layout<D>,
         first_node: &(dyn Fn(usize) -> usize + Sync),
     ) {
-        let (height, row) = (self.height, layout.row());
+        let Self { height, tiles, .. } = *self;
+        let (row, line) = (layout.row(), layout.dims[0]);
         self.keys.par_iter_mut().zip(&mut self.home).enumerate().for_each(|(p, (key, home))| {
             let node = first_node(p);
-            *key = node as u32;
-            *home = ((node / row).saturating_sub(SLACK) / height) as u32;
+            let band = (node / row).saturating_sub(SLACK) / height;
+            let in_row = node % row;
+            let tile = match D {
+                1 => 0,
+                2 => in_row / TILE,
+                _ => in_row / line / TILE_ACROSS * line.div_ceil(TILE) + in_row % line / TILE,
+            };
+            *home = band as u32;
+            *key = (band * tiles + tile) as u32;
         });
         self.counts.fill(0);
         for &key in &self.keys {
             self.counts[key as usize + 1] += 1;
         }
-        for node in 1..self.counts.len() {
-            self.counts[node] += self.counts[node - 1];
+        for tile in 1..self.counts.len() {
+            self.counts[tile] += self.counts[tile - 1];
         }
         let (order, starts) = self.order.arrange();
-        let bands = starts.len() - 1;
-        (starts[0], starts[bands]) = (0, order.len());
-        for band in 1..bands {
-            let first_node = (band * height + SLACK) * row;
-            starts[band] = self.counts.get(first_node).map_or(order.len(), |&start| start as usize);
+        for (start, first) in starts.iter_mut().zip(self.counts.iter().step_by(tiles)) {
+            *start = *first as usize;
         }
         for (p, &key) in self.keys.iter().enumerate() {
             let place = &mut self.counts[key as usize];

@@ -132,6 +132,13 @@ impl Planted {
     pub fn is(self, fault: Fault) -> bool {
         self.0 == Some(fault)
     }
+
+    /// Whether it is any fault.
+    #[inline(always)]
+    #[must_use]
+    pub fn is_any(self) -> bool {
+        self.0.is_some()
+    }
 }
 
 #[cfg(not(feature = "planted-faults"))]
@@ -147,6 +154,13 @@ impl Planted {
     #[inline(always)]
     #[must_use]
     pub const fn is(self, _: Fault) -> bool {
+        false
+    }
+
+    /// No.
+    #[inline(always)]
+    #[must_use]
+    pub const fn is_any(self) -> bool {
         false
     }
 }

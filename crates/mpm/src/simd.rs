@@ -4,21 +4,216 @@
 //! fused are those that are written as such, which a processor without the instruction works out in many. So all give the
 //! same bits.
 
-use pulp::{Arch, Simd, WithSimd};
+use std::any::Any;
+
+use nalgebra::RealField;
+use pulp::{Arch, Scalar, Simd, WithSimd};
 
 /// A loop that is worth vector instructions. `run` and whatever it calls has to be `#[inline(always)]`.
 pub(crate) trait Loop {
-    fn run(self);
+    fn run<V: Vectors>(self, vectors: V);
 }
 
-struct Instance<L>(L);
+/// Four numbers that go through the processor together.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(32))]
+pub(crate) struct Quad<T>(pub(crate) [T; 4]);
 
-impl<L: Loop> WithSimd for Instance<L> {
+/// Sums and products of [`Quad`]s. The compiler finds vector instructions for loops over many particles by itself, but not
+/// always for the few numbers of one.
+pub(crate) trait Vectors: Copy {
+    /// Four times the same.
+    #[inline(always)]
+    fn splat<T: RealField + Copy>(self, value: T) -> Quad<T> {
+        Quad([value; 4])
+    }
+
+    #[inline(always)]
+    fn add<T: RealField + Copy>(self, Quad(a): Quad<T>, Quad(b): Quad<T>) -> Quad<T> {
+        Quad([a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]])
+    }
+
+    #[inline(always)]
+    fn mul<T: RealField + Copy>(self, Quad(a): Quad<T>, Quad(b): Quad<T>) -> Quad<T> {
+        Quad([a[0] * b[0], a[1] * b[1], a[2] * b[2], a[3] * b[3]])
+    }
+
+    #[inline(always)]
+    fn sub<T: RealField + Copy>(self, Quad(a): Quad<T>, Quad(b): Quad<T>) -> Quad<T> {
+        Quad([a[0] - b[0], a[1] - b[1], a[2] - b[2], a[3] - b[3]])
+    }
+
+    /// `a b - c`, rounded once.
+    #[inline(always)]
+    fn mul_sub<T: RealField + Copy>(
+        self,
+        Quad(a): Quad<T>,
+        Quad(b): Quad<T>,
+        Quad(c): Quad<T>,
+    ) -> Quad<T> {
+        Quad(std::array::from_fn(|q| a[q].mul_add(b[q], -c[q])))
+    }
+
+    /// `a b + c`, rounded once.
+    #[inline(always)]
+    fn mul_add<T: RealField + Copy>(
+        self,
+        Quad(a): Quad<T>,
+        Quad(b): Quad<T>,
+        Quad(c): Quad<T>,
+    ) -> Quad<T> {
+        Quad(std::array::from_fn(|q| a[q].mul_add(b[q], c[q])))
+    }
+
+    /// `[a0, a0, a2, a2]`.
+    #[inline(always)]
+    fn even<T: RealField + Copy>(self, Quad(a): Quad<T>) -> Quad<T> {
+        Quad([a[0], a[0], a[2], a[2]])
+    }
+
+    /// `[a1, a1, a3, a3]`.
+    #[inline(always)]
+    fn odd<T: RealField + Copy>(self, Quad(a): Quad<T>) -> Quad<T> {
+        Quad([a[1], a[1], a[3], a[3]])
+    }
+
+    /// `[a0, a1, a0, a1]`.
+    #[inline(always)]
+    fn low_twice<T: RealField + Copy>(self, Quad(a): Quad<T>) -> Quad<T> {
+        Quad([a[0], a[1], a[0], a[1]])
+    }
+
+    /// `[0, 0, a0, a1]`.
+    #[inline(always)]
+    fn low_to_high<T: RealField + Copy>(self, Quad(a): Quad<T>) -> Quad<T> {
+        Quad([T::zero(), T::zero(), a[0], a[1]])
+    }
+
+    /// `[0, 0, a2, a3]`.
+    #[inline(always)]
+    fn high_alone<T: RealField + Copy>(self, Quad(a): Quad<T>) -> Quad<T> {
+        Quad([T::zero(), T::zero(), a[2], a[3]])
+    }
+
+    /// `[a2, a3, b0, b1]`.
+    #[inline(always)]
+    fn high_and_low<T: RealField + Copy>(self, Quad(a): Quad<T>, Quad(b): Quad<T>) -> Quad<T> {
+        Quad([a[2], a[3], b[0], b[1]])
+    }
+}
+
+impl Vectors for Scalar {}
+
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    use super::{Quad, RealField, Scalar, Vectors, same};
+    use pulp::cast;
+    use pulp::x86::{V3, V4};
+    use std::arch::x86_64::{__m128, __m256d};
+
+    /// The instructions for an operation in double and in single precision, if `T` is one of them.
+    macro_rules! instructions {
+        ($(fn $name:ident($self:ident, $($a:ident),*) { $double:expr, $single:expr })*) => {
+            impl Vectors for V3 {
+                $(#[inline(always)]
+                fn $name<T: RealField + Copy>($self, $($a: Quad<T>),*) -> Quad<T> {
+                    if let ($(Some($a),)*) = ($(double($a),)*) {
+                        return from_double($double).unwrap_or_else(zero);
+                    }
+                    if let ($(Some($a),)*) = ($(single($a),)*) {
+                        return from_single($single).unwrap_or_else(zero);
+                    }
+                    Scalar::new().$name($($a),*)
+                })*
+
+                #[inline(always)]
+                fn splat<T: RealField + Copy>(self, value: T) -> Quad<T> {
+                    let double = same(value).and_then(|x: f64| from_double(self.avx._mm256_set1_pd(x)));
+                    let single = same(value).and_then(|x: f32| from_single(self.sse._mm_set1_ps(x)));
+                    double.or(single).unwrap_or(Quad([value; 4]))
+                }
+            }
+
+            impl Vectors for V4 {
+                $(#[inline(always)]
+                fn $name<T: RealField + Copy>(self, $($a: Quad<T>),*) -> Quad<T> {
+                    V3::$name(*self, $($a),*)
+                })*
+
+                #[inline(always)]
+                fn splat<T: RealField + Copy>(self, value: T) -> Quad<T> {
+                    V3::splat(*self, value)
+                }
+            }
+        };
+    }
+
+    instructions! {
+        fn add(self, a, b) { self.avx._mm256_add_pd(a, b), self.sse._mm_add_ps(a, b) }
+        fn sub(self, a, b) { self.avx._mm256_sub_pd(a, b), self.sse._mm_sub_ps(a, b) }
+        fn mul(self, a, b) { self.avx._mm256_mul_pd(a, b), self.sse._mm_mul_ps(a, b) }
+        fn mul_add(self, a, b, c) { self.fma._mm256_fmadd_pd(a, b, c), self.fma._mm_fmadd_ps(a, b, c) }
+        fn mul_sub(self, a, b, c) { self.fma._mm256_fmsub_pd(a, b, c), self.fma._mm_fmsub_ps(a, b, c) }
+        fn even(self, a) { self.avx._mm256_movedup_pd(a), self.sse3._mm_moveldup_ps(a) }
+        fn odd(self, a) { self.avx._mm256_permute_pd::<0b1111>(a), self.sse3._mm_movehdup_ps(a) }
+        fn low_twice(self, a) {
+            self.avx._mm256_permute2f128_pd::<0x00>(a, a), self.sse._mm_movelh_ps(a, a)
+        }
+        fn low_to_high(self, a) {
+            self.avx._mm256_permute2f128_pd::<0x08>(a, a),
+            self.sse._mm_movelh_ps(self.sse._mm_setzero_ps(), a)
+        }
+        fn high_alone(self, a) {
+            self.avx._mm256_permute2f128_pd::<0x18>(a, a),
+            self.sse._mm_shuffle_ps::<0b11_10_01_00>(self.sse._mm_setzero_ps(), a)
+        }
+        fn high_and_low(self, a, b) {
+            self.avx._mm256_permute2f128_pd::<0x21>(a, b),
+            self.sse._mm_shuffle_ps::<0b01_00_11_10>(a, b)
+        }
+    }
+
+    #[inline(always)]
+    fn double<T: RealField + Copy>(a: Quad<T>) -> Option<__m256d> {
+        same::<_, Quad<f64>>(a).map(|Quad(a)| cast(a))
+    }
+
+    #[inline(always)]
+    fn single<T: RealField + Copy>(a: Quad<T>) -> Option<__m128> {
+        same::<_, Quad<f32>>(a).map(|Quad(a)| cast(a))
+    }
+
+    #[inline(always)]
+    fn from_double<T: RealField + Copy>(a: __m256d) -> Option<Quad<T>> {
+        same(Quad::<f64>(cast(a)))
+    }
+
+    #[inline(always)]
+    fn from_single<T: RealField + Copy>(a: __m128) -> Option<Quad<T>> {
+        same(Quad::<f32>(cast(a)))
+    }
+
+    /// For what cannot be.
+    #[inline(always)]
+    fn zero<T: RealField + Copy>() -> Quad<T> {
+        Quad([T::zero(); 4])
+    }
+}
+
+/// The value, if it is of this type; known when the program is compiled.
+#[inline(always)]
+fn same<A: Copy + 'static, B: Copy + 'static>(a: A) -> Option<B> {
+    (&a as &dyn Any).downcast_ref().copied()
+}
+
+struct Instance<L, V>(L, V);
+
+impl<L: Loop, V: Vectors> WithSimd for Instance<L, V> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        self.0.run();
+        self.0.run(self.1);
     }
 }
 
@@ -29,7 +224,13 @@ pub(crate) fn dispatch(work: impl Loop) {
     if let Some(level) = tests::LEVEL.get() {
         return level.run(work);
     }
-    Arch::new().dispatch(Instance(work));
+    match Arch::new() {
+        #[cfg(target_arch = "x86_64")]
+        Arch::V4(simd) => Simd::vectorize(simd, Instance(work, simd)),
+        #[cfg(target_arch = "x86_64")]
+        Arch::V3(simd) => Simd::vectorize(simd, Instance(work, simd)),
+        arch => arch.dispatch(Instance(work, Scalar::new())),
+    }
 }
 
 #[cfg(test)]
@@ -59,11 +260,11 @@ mod tests {
     impl Level {
         pub(super) fn run(self, work: impl Loop) {
             match self {
-                Self::Scalar => Scalar::new().vectorize(Instance(work)),
+                Self::Scalar => Scalar::new().vectorize(Instance(work, Scalar::new())),
                 #[cfg(target_arch = "x86_64")]
-                Self::V3(simd) => Simd::vectorize(simd, Instance(work)),
+                Self::V3(simd) => Simd::vectorize(simd, Instance(work, simd)),
                 #[cfg(target_arch = "x86_64")]
-                Self::V4(simd) => Simd::vectorize(simd, Instance(work)),
+                Self::V4(simd) => Simd::vectorize(simd, Instance(work, simd)),
             }
         }
 
@@ -102,6 +303,45 @@ mod tests {
         };
         // All of it on the one thread whose level is set.
         rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap().install(run)
+    }
+
+    /// All operations on some numbers, one after the other.
+    fn operations<T: RealField + Copy>(vectors: impl Vectors) -> Vec<[T; 4]> {
+        let quad = |from: f64| {
+            Quad(std::array::from_fn(|q| nalgebra::convert::<f64, T>((from + q as f64).sqrt())))
+        };
+        let (a, b, c) = (quad(2.0), quad(11.0), quad(20.0));
+        [
+            vectors.splat(a.0[1]),
+            vectors.add(a, b),
+            vectors.sub(a, b),
+            vectors.mul(a, b),
+            vectors.mul_add(a, b, c),
+            vectors.mul_sub(a, b, c),
+            vectors.even(a),
+            vectors.odd(a),
+            vectors.low_twice(a),
+            vectors.low_to_high(a),
+            vectors.high_alone(a),
+            vectors.high_and_low(a, b),
+        ]
+        .map(|Quad(values)| values)
+        .into()
+    }
+
+    #[test]
+    fn instructions_do_what_is_written_out_for_processors_without_them() {
+        for level in Level::all() {
+            let (double, single): (Vec<[f64; 4]>, Vec<[f32; 4]>) = match level {
+                Level::Scalar => continue,
+                #[cfg(target_arch = "x86_64")]
+                Level::V3(simd) => (operations(simd), operations(simd)),
+                #[cfg(target_arch = "x86_64")]
+                Level::V4(simd) => (operations(simd), operations(simd)),
+            };
+            assert_eq!(double, operations(Scalar::new()), "{level:?}");
+            assert_eq!(single, operations(Scalar::new()), "{level:?}");
+        }
     }
 
     #[test]

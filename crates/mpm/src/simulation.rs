@@ -270,7 +270,7 @@ fn allocate<T: RealField + Copy, const D: usize>(
     let musl = settings.integrator == Integrator::Musl;
     let ahead = !usf && !musl;
     let grids = if musl || ahead { 2 } else { 1 };
-    let bytes_per_node = grids * size_of::<Node<T, D>>() + Bands::BYTES_PER_NODE;
+    let bytes_per_node = grids * size_of::<Node<T, D>>();
     let layout = Layout::new(grid, bytes_per_node)?;
     // Asking first turns a grid that is too large into an error instead of an abort.
     let nodes = |is_needed: bool| {

@@ -6,16 +6,16 @@ use std::sync::{Mutex, PoisonError};
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::bands::Bands;
-use crate::block::{BLOCK, Block};
+use crate::block::{BLOCK, Block, Run};
 use crate::body_force::BodyForce;
 use crate::fault::{Fault, Planted};
 use crate::grid::{Grid, Layout};
 use crate::material::Law;
 use crate::parallel::{each_chunk, each_chunk_of_three};
 use crate::particles::Particles;
-use crate::simd::{Loop, dispatch};
+use crate::simd::{Loop, Vectors, dispatch};
 use crate::tensor::{determinant, product, real};
-use crate::transfer::{Deposit, Gathered, Node};
+use crate::transfer::{Deposits, Gathered, Node};
 use crate::weights::{HALF_SIZE_LIMIT, Rule, WIDE, first_layer, is_wide};
 
 /// Particles handed to a thread at a time; fixed, so that nothing depends on the number of threads.
@@ -26,7 +26,7 @@ const CHUNK: usize = 1024;
 pub(crate) struct Constants<T, const D: usize> {
     lower: SVector<T, D>,
     upper: SVector<T, D>,
-    inverse_spacing: T,
+    pub(crate) inverse_spacing: T,
     pub(crate) strides: [usize; D],
     band_height: usize,
     pub(crate) time_step: T,
@@ -127,8 +127,8 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
         Outcome { failure, resort: failure.is_none() }
     }
 
-    /// Adds to the piece of the grid that starts at node `first` what `level(block, ids, deposits)` and then
-    /// `slope(block, ids, deposits)` state for each block of particles.
+    /// Adds to the piece of the grid that starts at node `first` what `state(run, ids, deposits)` states for each block of
+    /// particles.
     #[expect(clippy::too_many_arguments, reason = "the arrays of a band's particles")]
     fn scatter<R, const W: usize>(
         &self,
@@ -138,22 +138,21 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
         piece: &mut [Node<T, D>],
         first: usize,
         ids: &[u32],
-        level: impl Fn(&Block<T, D, W>, &[u32], &mut [Deposit<T, D>; BLOCK]),
-        slope: impl Fn(&mut Block<T, D, W>, &[u32], &mut [Deposit<T, D>; BLOCK]),
+        state: impl Fn(&mut Run<T, D>, &[u32], &mut Deposits<T, D, BLOCK>),
     ) where
         R: Rule<T, D, W>,
     {
-        let mut block = Block::new(self.planted);
-        let mut deposits = [Deposit::zero(); BLOCK];
+        let mut run = Run::new();
+        let mut block = Block::new();
+        let mut deposits = Deposits::zero();
         for ids in ids.chunks(BLOCK) {
-            block.pick(ids, x, F);
-            level(&block, ids, &mut deposits);
-            block.weigh(self, rule);
+            run.pick(ids, x, F);
+            block.weigh(self, rule, &run);
             if self.planted.is(Fault::LastNodeSkipped) {
                 block.skip_last_node(&self.upper_in_cells());
             }
-            slope(&mut block, ids, &mut deposits);
-            block.scatter(&self.strides, piece, first, &deposits[..ids.len()]);
+            state(&mut run, ids, &mut deposits);
+            block.scatter(&self.strides, piece, first, &deposits, ids.len());
         }
     }
 
@@ -337,36 +336,37 @@ where
     let (nodes, c) = (&nodes[..], *constants);
     let Particles { x, v, F, mass, .. } = particles;
     each_chunk(v, CHUNK, &|chunk, v| {
-        let mut block = Block::new(c.planted);
+        let (mut run, mut block) = (Run::new(), Block::new());
         let (x, F) = (&x[chunk * CHUNK..], &F[chunk * CHUNK..]);
         for ((v, x), F) in v.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK)) {
-            block.weigh_run(rule, &c, x, F);
+            run.copy(x, F);
+            block.weigh(&c, rule, &run);
             let gathered = &mut [Gathered::zero(); BLOCK][..x.len()];
-            block.gather(&c.strides, nodes, gathered);
+            block.gather(&c.strides, nodes, x.len(), &mut *gathered);
             for (v, gathered) in v.iter_mut().zip(gathered) {
-                *v += gathered.acceleration() * c.time_step;
+                *v += gathered.acceleration * c.time_step;
             }
         }
     });
-    let give = |_: &Block<T, D, W>, ids: &[u32], deposits: &mut [Deposit<T, D>; BLOCK]| {
-        for (deposit, &p) in deposits.iter_mut().zip(ids) {
-            let p = p as usize;
-            deposit.level = Node::new(&(v[p] * mass[p]), &SVector::zeros(), T::zero());
+    let give = |_: &mut Run<T, D>, ids: &[u32], deposits: &mut Deposits<T, D, BLOCK>| {
+        for (k, &p) in ids.iter().enumerate() {
+            deposits.mass[k] = mass[p as usize];
+            deposits.set_momentum(k, &v[p as usize]);
         }
     };
     bands.scatter(layout, reprojected, &|nodes| nodes.fill(Node::zero()), &|piece, first, ids| {
-        c.scatter(rule, x, F, piece, first, ids, give, |_, _, _| {});
+        c.scatter(rule, x, F, piece, first, ids, give);
     });
     finish_reprojection(layout, &c, nodes, reprojected);
     let reprojected = if c.planted.is(Fault::NoReprojection) { nodes } else { &reprojected[..] };
     let outcome = advance(particles, bands, c, rule, |block, gathered, _, x, _, F| {
-        block.gather(&c.strides, nodes, gathered);
+        block.gather(&c.strides, nodes, x.len(), &mut *gathered);
         for (x, gathered) in x.iter_mut().zip(&*gathered) {
-            *x += gathered.velocity() * c.time_step;
+            *x += gathered.velocity * c.time_step;
         }
-        block.gather(&c.strides, reprojected, gathered);
+        block.gather(&c.strides, reprojected, x.len(), &mut *gathered);
         for (F, gathered) in F.iter_mut().zip(gathered) {
-            *F = c.stretch(&gathered.velocity_gradient(), F);
+            *F = c.stretch(&gathered.velocity_gradient, F);
         }
     });
     s.resort_if(outcome, rule)
@@ -406,10 +406,10 @@ where
     let State { particles, constants, nodes, bands, F_next, .. } = s;
     let (nodes, c) = (&nodes[..], *constants);
     let outcome = advance(particles, bands, c, rule, |block, gathered, first, x, v, F| {
-        block.gather(&c.strides, nodes, gathered);
+        block.gather(&c.strides, nodes, x.len(), &mut *gathered);
         for ((x, v), gathered) in x.iter_mut().zip(v).zip(gathered) {
-            *v += gathered.acceleration() * c.time_step;
-            *x += gathered.velocity() * c.time_step;
+            *v += gathered.acceleration * c.time_step;
+            *x += gathered.velocity * c.time_step;
         }
         F.copy_from_slice(&F_next[first..first + F.len()]);
     });
@@ -440,7 +440,7 @@ where
     let (home, found) = (bands.home(), Found::default());
     each_chunk_of_three((x, v, F), CHUNK, &|chunk, x, v, F| {
         let mut outcome = Outcome::default();
-        let mut block = Block::new(c.planted);
+        let (mut run, mut block) = (Run::new(), Block::new());
         let mut gathered = [Gathered::zero(); BLOCK];
         let blocks = x
             .chunks_mut(BLOCK)
@@ -449,11 +449,13 @@ where
             .zip(home[chunk * CHUNK..].chunks(BLOCK));
         for (index, (((x, v), F), home)) in blocks.enumerate() {
             let first = chunk * CHUNK + index * BLOCK;
-            block.weigh_run(rule, &c, x, F);
+            run.copy(x, F);
             if c.planted.is(Fault::WeightsOfNewPosition) {
-                let ahead: Vec<_> = x.iter().zip(&*v).map(|(x, v)| x + v * c.time_step).collect();
-                block.weigh_run(rule, &c, &ahead, F);
+                for (x, v) in run.x.iter_mut().zip(&*v) {
+                    *x += v * c.time_step;
+                }
             }
+            block.weigh(&c, rule, &run);
             update(&block, &mut gathered[..x.len()], first, x, v, F);
             let mut all_well = true;
             dispatch(Check { c: &c, rule, home, x, F, all_well: &mut all_well });
@@ -548,14 +550,13 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let c = *constants;
         let forcing = Forcing::new(body_force, X, t, &c);
         bands.scatter(layout, nodes, &|nodes| nodes.fill(Node::zero()), &|piece, first, ids| {
-            let level = |block: &Block<T, D, W>, ids: &[u32], deposits: &mut [_; BLOCK]| {
-                let b = &mut [SVector::zeros(); BLOCK];
-                forcing.evaluate(ids, block, b);
-                dispatch(GiveLevel { c: &c, ids, v: Some(v), b, mass, volume, deposits });
-            };
-            c.scatter(rule, x, F, piece, first, ids, level, |block, ids, deposits| {
-                block.stress(&c, law);
-                dispatch(GiveSlope { c: &c, block, ids, volume, deposits });
+            c.scatter(rule, x, F, piece, first, ids, |run, ids, deposits| {
+                forcing.evaluate(ids, run, &mut deposits.b);
+                deposits.take(ids, mass, volume);
+                for (k, &p) in ids.iter().enumerate() {
+                    deposits.set_level(&c, k, &v[p as usize]);
+                }
+                run.stress(&c, law, deposits);
             });
         });
         fold_ghosts(layout, &c, nodes);
@@ -593,14 +594,14 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let Self { particles, constants, layout, bands, nodes, .. } = self;
         let Particles { x, v, F, mass, .. } = &*particles;
         let c = *constants;
-        let give = |_: &Block<T, D, W>, ids: &[u32], deposits: &mut [Deposit<T, D>; BLOCK]| {
-            for (deposit, &p) in deposits.iter_mut().zip(ids) {
-                let (p, m) = (p as usize, mass[p as usize]);
-                deposit.level = Node::new(&(v[p] * m), &SVector::zeros(), m);
+        let give = |_: &mut Run<T, D>, ids: &[u32], deposits: &mut Deposits<T, D, BLOCK>| {
+            for (k, &p) in ids.iter().enumerate() {
+                deposits.mass[k] = mass[p as usize];
+                deposits.set_momentum(k, &v[p as usize]);
             }
         };
         bands.scatter(layout, nodes, &|nodes| nodes.fill(Node::zero()), &|piece, first, ids| {
-            c.scatter(rule, x, F, piece, first, ids, give, |_, _, _| {});
+            c.scatter(rule, x, F, piece, first, ids, give);
         });
         fold_ghosts(layout, &c, nodes);
         self.solve_velocity();
@@ -630,18 +631,19 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let found = Found::default();
         each_chunk(F_next, CHUNK, &|chunk, F_next| {
             let mut outcome = Outcome::default();
-            let mut block = Block::new(c.planted);
+            let (mut run, mut block) = (Run::new(), Block::new());
             let (x, F) = (&x[chunk * CHUNK..], &F[chunk * CHUNK..]);
             let blocks = F_next.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK));
             for (index, ((F_next, x), F)) in blocks.enumerate() {
-                block.weigh_run(rule, &c, x, F);
+                run.copy(x, F);
+                block.weigh(&c, rule, &run);
                 let gathered = &mut [Gathered::zero(); BLOCK][..x.len()];
-                block.gather(&c.strides, nodes, gathered);
+                block.gather(&c.strides, nodes, x.len(), &mut *gathered);
                 let first = chunk * CHUNK + index * BLOCK;
                 for (k, (((F_next, gathered), x), F)) in
                     F_next.iter_mut().zip(gathered).zip(x).zip(F).enumerate()
                 {
-                    *F_next = c.stretch(&gathered.velocity_gradient(), F);
+                    *F_next = c.stretch(&gathered.velocity_gradient, F);
                     if let Some(trouble) = trouble(&rule, &c, x, F_next) {
                         let failure = Some((trouble, first + k));
                         outcome = outcome.merge(Outcome { failure, ..Outcome::default() });
@@ -671,17 +673,14 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let forcing = Forcing::new(body_force, X, t, &c);
         let clear = |nodes: &mut [Node<T, D>]| nodes.iter_mut().for_each(Node::clear_acceleration);
         bands.scatter(layout, nodes, &clear, &|piece, first, ids| {
-            let level = |block: &Block<T, D, W>, ids: &[u32], deposits: &mut [_; BLOCK]| {
-                let b = &mut [SVector::zeros(); BLOCK];
-                forcing.evaluate(ids, block, b);
-                dispatch(GiveLevel { c: &c, ids, v: None, b, mass, volume, deposits });
-            };
-            c.scatter(rule, x, F, piece, first, ids, level, |block, ids, deposits| {
+            c.scatter(rule, x, F, piece, first, ids, |run, ids, deposits| {
+                forcing.evaluate(ids, run, &mut deposits.b);
+                deposits.take(ids, mass, volume);
+                (0..ids.len()).for_each(|k| deposits.set_force(&c, k));
                 if !c.planted.is(Fault::StressOfOldStretch) {
-                    block.pick_F(ids, F_next);
+                    run.pick_F(ids, F_next);
                 }
-                block.stress(&c, law);
-                dispatch(GiveSlope { c: &c, block, ids, volume, deposits });
+                run.stress(&c, law, deposits);
             });
         });
         fold_ghost_forces(layout, nodes);
@@ -731,71 +730,15 @@ impl<'a, T: RealField + Copy, const D: usize> Forcing<'a, T, D> {
 
     /// Writes into `b` the force per unit mass on the particles `ids`, and nothing where there is none. The particles of the
     /// block are the same.
-    pub(crate) fn evaluate<const W: usize>(
-        &self,
-        ids: &[u32],
-        block: &Block<T, D, W>,
-        b: &mut [SVector<T, D>; BLOCK],
-    ) {
+    pub(crate) fn evaluate(&self, ids: &[u32], run: &Run<T, D>, b: &mut [SVector<T, D>; BLOCK]) {
         let Some(body_force) = self.body_force else {
             return;
         };
         let b = &mut b[..ids.len()];
         if self.at_current {
-            let x: Vec<_> = (0..ids.len()).map(|k| block.position(k)).collect();
-            body_force.evaluate(0, &x, self.t, b);
+            body_force.evaluate(0, &run.x[..ids.len()], self.t, b);
         } else {
             body_force.evaluate_of(ids, self.X, self.t, b);
-        }
-    }
-}
-
-/// States what the body force and, if `v` is there, mass and momentum of particles give to the grid.
-struct GiveLevel<'a, T, const D: usize> {
-    c: &'a Constants<T, D>,
-    ids: &'a [u32],
-    v: Option<&'a [SVector<T, D>]>,
-    /// Of these particles.
-    b: &'a [SVector<T, D>; BLOCK],
-    mass: &'a [T],
-    volume: &'a [T],
-    deposits: &'a mut [Deposit<T, D>; BLOCK],
-}
-
-impl<T: RealField + Copy, const D: usize> Loop for GiveLevel<'_, T, D> {
-    #[inline(always)]
-    fn run(self) {
-        let Self { c, ids, v, b, mass, volume, deposits } = self;
-        let per_volume = c.planted.is(Fault::BodyForcePerVolume);
-        for ((deposit, &p), b) in deposits.iter_mut().zip(ids).zip(b) {
-            let p = p as usize;
-            let m = mass[p];
-            let weight = b * if per_volume { volume[p] } else { m };
-            deposit.level = v.map_or(Node::new(&SVector::zeros(), &weight, T::zero()), |v| {
-                Node::new(&(v[p] * m), &weight, m)
-            });
-        }
-    }
-}
-
-/// States what the stress of particles gives to the grid.
-pub(crate) struct GiveSlope<'a, T, const D: usize, const W: usize> {
-    pub(crate) c: &'a Constants<T, D>,
-    pub(crate) block: &'a Block<T, D, W>,
-    pub(crate) ids: &'a [u32],
-    pub(crate) volume: &'a [T],
-    pub(crate) deposits: &'a mut [Deposit<T, D>; BLOCK],
-}
-
-impl<T: RealField + Copy, const D: usize, const W: usize> Loop for GiveSlope<'_, T, D, W> {
-    #[inline(always)]
-    fn run(self) {
-        let Self { c, block, ids, volume, deposits } = self;
-        for (k, (deposit, &p)) in deposits.iter_mut().zip(ids).enumerate() {
-            let traction = block.tensor(k) * -(volume[p as usize] * c.inverse_spacing);
-            for a in 0..D {
-                deposit.slope[a].set_acceleration(&traction.column(a).into_owned());
-            }
         }
     }
 }
@@ -816,7 +759,7 @@ where
     R: Rule<T, D, W>,
 {
     #[inline(always)]
-    fn run(self) {
+    fn run<V: Vectors>(self, _: V) {
         let Self { c, rule, home, x, F, all_well } = self;
         let mut well = true;
         for ((x, F), &home) in x.iter().zip(F).zip(home) {

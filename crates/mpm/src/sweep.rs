@@ -5,17 +5,19 @@
 //! twice. The sums are those of two passes, in the same order, so that a run may be taken up between any two steps: what
 //! the grid holds by then is formed anew from the particles.
 
+use std::marker::PhantomData;
+
 use nalgebra::{RealField, SMatrix, SVector};
 
-use crate::block::{BLOCK, Block};
+use crate::block::{BLOCK, Block, Run};
 use crate::body_force::BodyForce;
 use crate::fault::Fault;
 use crate::material::Law;
 use crate::particles::Particles;
 use crate::partition::Share;
-use crate::simd::{Loop, dispatch};
-use crate::step::{Constants, Forcing, Found, GiveSlope, Outcome, State, fold_ghosts};
-use crate::transfer::{Deposit, Gathered, Node};
+use crate::simd::{Loop, Quad, Vectors, dispatch};
+use crate::step::{Constants, Forcing, Found, Outcome, State, fold_ghosts};
+use crate::transfer::{Deposits, Gathered, Node, Receive};
 use crate::weights::Rule;
 
 /// What a particle's share of the arrays gives: position, velocity and deformation gradient.
@@ -104,31 +106,41 @@ impl<T: RealField + Copy, R, L: Law<T>, const D: usize> Sweep<'_, T, R, L, D> {
     {
         let &Self { c, rule, law, nodes, mass, volume, ref forcing } = self;
         let mut outcome = Outcome::default();
-        let mut block = Block::<T, D, W>::new(c.planted);
-        let mut gathered = [Gathered::zero(); BLOCK];
-        let mut deposits = [Deposit::zero(); BLOCK];
-        let mut b = [SVector::zeros(); BLOCK];
+        let mut run = Run::new();
+        let mut block = Block::<T, D, W>::new();
+        let mut deposits = Deposits::zero();
         for (index, ids) in elements.numbers().chunks(BLOCK).enumerate() {
             let place = index * BLOCK;
-            dispatch(Take { c, block: &mut block, elements: &mut elements, place, ids });
-            block.weigh(c, rule);
-            block.gather(&c.strides, nodes, &mut gathered[..ids.len()]);
-            forcing.evaluate(ids, &block, &mut b);
-            dispatch(Follow {
+            for (k, &p) in ids.iter().enumerate() {
+                let (x, v, F) = elements.get(place + k);
+                let ahead = c.planted.is(Fault::WeightsOfNewPosition);
+                run.x[k] = if ahead { *x + *v * c.time_step } else { *x };
+                run.F[k] = *F;
+                deposits.mass[k] = mass[p as usize];
+                deposits.volume[k] = volume[p as usize];
+            }
+            block.weigh(c, rule, &run);
+            forcing.evaluate(ids, &run, &mut deposits.b);
+            let follow = Follow {
                 c,
-                block: &mut block,
+                time_step: c.time_step,
+                per_cell: c.time_step * c.inverse_spacing,
+                run: &mut run,
                 elements: &mut elements,
                 place,
-                ids,
-                gathered: &gathered,
-                mass,
-                volume,
-                b: &b,
                 deposits: &mut deposits,
-            });
-            block.weigh(c, rule);
+            };
+            block.gather(&c.strides, nodes, ids.len(), follow);
+            block.weigh(c, rule, &run);
             let mut all_well = true;
-            dispatch(Check { c, rule, band, block: &block, all_well: &mut all_well });
+            dispatch(Check {
+                c,
+                rule,
+                band,
+                run: &run,
+                all_well: &mut all_well,
+                width: PhantomData,
+            });
             if !all_well {
                 for (k, &p) in ids.iter().enumerate() {
                     let (x, _, F) = elements.get(place + k);
@@ -142,73 +154,83 @@ impl<T: RealField + Copy, R, L: Law<T>, const D: usize> Sweep<'_, T, R, L, D> {
             if c.planted.is(Fault::LastNodeSkipped) {
                 block.skip_last_node(&c.upper_in_cells());
             }
-            block.stress(c, law);
-            dispatch(GiveSlope { c, block: &block, ids, volume, deposits: &mut deposits });
-            block.scatter(&c.strides, piece, first, &deposits[..ids.len()]);
+            run.stress(c, law, &mut deposits);
+            block.scatter(&c.strides, piece, first, &deposits, ids.len());
         }
         outcome
     }
 }
 
-/// Takes a run of a band's particles.
-struct Take<'a, 'b, T, const D: usize, const W: usize> {
+/// Moves and stretches particles as the grid tells, and states what mass, momentum and body force they give to it next.
+struct Follow<'a, 'b, T, const D: usize> {
     c: &'a Constants<T, D>,
-    block: &'a mut Block<T, D, W>,
+    time_step: T,
+    /// Time step over the edge of a cell.
+    per_cell: T,
+    run: &'a mut Run<T, D>,
     elements: &'a mut Elements<'b, T, D>,
     /// Of the first particle within the band.
     place: usize,
-    ids: &'a [u32],
+    /// With the forces per mass, which are turned into forces.
+    deposits: &'a mut Deposits<T, D, BLOCK>,
 }
 
-impl<T: RealField + Copy, const D: usize, const W: usize> Loop for Take<'_, '_, T, D, W> {
+impl<T: RealField + Copy, const D: usize> Receive<T, D> for Follow<'_, '_, T, D> {
     #[inline(always)]
-    fn run(self) {
-        let Self { c, block, elements, place, ids } = self;
-        for k in 0..ids.len().min(BLOCK) {
-            let (x, v, F) = elements.get(place + k);
-            let ahead = c.planted.is(Fault::WeightsOfNewPosition);
-            block.put(k, &if ahead { *x + *v * c.time_step } else { *x }, F);
+    fn receive(&mut self, k: usize, gathered: &Gathered<T, D>) {
+        let Self { c, run, elements, place, deposits, .. } = self;
+        let (x, v, F) = elements.get(*place + k);
+        *v += gathered.acceleration * c.time_step;
+        let mut velocity = gathered.velocity;
+        if c.planted.is(Fault::PicForFlip) {
+            *v = velocity;
         }
+        if c.planted.is(Fault::OwnVelocity) {
+            velocity = *v;
+        }
+        *x += c.planted.change(velocity * c.time_step);
+        *F = c.stretch(&gathered.velocity_gradient, F);
+        (run.x[k], run.F[k]) = (*x, *F);
+        deposits.set_level(c, k, v);
     }
-}
 
-/// Moves and stretches particles as the grid tells, and states what mass, momentum and body force they give to it next.
-struct Follow<'a, 'b, T, const D: usize, const W: usize> {
-    c: &'a Constants<T, D>,
-    block: &'a mut Block<T, D, W>,
-    elements: &'a mut Elements<'b, T, D>,
-    place: usize,
-    ids: &'a [u32],
-    gathered: &'a [Gathered<T, D>; BLOCK],
-    mass: &'a [T],
-    volume: &'a [T],
-    b: &'a [SVector<T, D>; BLOCK],
-    deposits: &'a mut [Deposit<T, D>; BLOCK],
-}
-
-impl<T: RealField + Copy, const D: usize, const W: usize> Loop for Follow<'_, '_, T, D, W> {
     #[inline(always)]
-    fn run(self) {
-        let Self { c, block, elements, place, ids, gathered, mass, volume, b, deposits } = self;
-        let per_volume = c.planted.is(Fault::BodyForcePerVolume);
-        for (k, &p) in ids.iter().take(BLOCK).enumerate() {
-            let (x, v, F) = elements.get(place + k);
-            let gathered = &gathered[k];
-            *v += gathered.acceleration() * c.time_step;
-            let mut velocity = gathered.velocity();
-            if c.planted.is(Fault::PicForFlip) {
-                *v = velocity;
-            }
-            if c.planted.is(Fault::OwnVelocity) {
-                velocity = *v;
-            }
-            *x += c.planted.change(velocity * c.time_step);
-            *F = c.stretch(&gathered.velocity_gradient(), F);
-            block.put(k, x, F);
-            let m = mass[p as usize];
-            let factor = if per_volume { volume[p as usize] } else { m };
-            deposits[k].level = Node::new(&(*v * m), &(b[k] * factor), m);
+    fn receive_quads(
+        &mut self,
+        vectors: impl Vectors,
+        k: usize,
+        level: Quad<T>,
+        slope: [Quad<T>; D],
+    ) {
+        // Faults are planted in what is written for all dimensions.
+        if D != 2 || self.c.planted.is_any() {
+            self.receive(k, &Gathered::new(&level.0, &slope.map(|slope| slope.0)));
+            return;
         }
+        let Self { time_step, per_cell, run, elements, place, deposits, .. } = self;
+        let (x, v, F) = elements.get(*place + k);
+        let (Some(x), Some(v), Some(F)) = (
+            x.as_mut_slice().first_chunk_mut::<2>(),
+            v.as_mut_slice().first_chunk_mut::<2>(),
+            F.as_mut_slice().first_chunk_mut::<4>(),
+        ) else {
+            return;
+        };
+        let xv = vectors
+            .add(Quad([x[0], x[1], v[0], v[1]]), vectors.mul(level, vectors.splat(*time_step)));
+        *x = [xv.0[0], xv.0[1]];
+        *v = [xv.0[2], xv.0[3]];
+        let factor = vectors.splat(*per_cell);
+        let old = Quad(*F);
+        let along = vectors.mul(vectors.low_twice(slope[0]), factor);
+        let across = vectors.mul(vectors.low_twice(slope[D - 1]), factor);
+        let stretch = vectors
+            .add(vectors.mul(along, vectors.even(old)), vectors.mul(across, vectors.odd(old)));
+        let new = vectors.add(old, stretch);
+        *F = new.0;
+        run.x[k].as_mut_slice().copy_from_slice(&[xv.0[0], xv.0[1]]);
+        run.F[k].as_mut_slice().copy_from_slice(&new.0);
+        deposits.set_level_in_plane(vectors, k, xv);
     }
 }
 
@@ -217,8 +239,9 @@ struct Check<'a, T, R, const D: usize, const W: usize> {
     c: &'a Constants<T, D>,
     rule: R,
     band: u32,
-    block: &'a Block<T, D, W>,
+    run: &'a Run<T, D>,
     all_well: &'a mut bool,
+    width: PhantomData<[(); W]>,
 }
 
 impl<T, R, const D: usize, const W: usize> Loop for Check<'_, T, R, D, W>
@@ -227,11 +250,11 @@ where
     R: Rule<T, D, W>,
 {
     #[inline(always)]
-    fn run(self) {
-        let Self { c, rule, band, block, all_well } = self;
+    fn run<V: Vectors>(self, _: V) {
+        let Self { c, rule, band, run, all_well, .. } = self;
         let mut well = true;
-        for k in 0..BLOCK {
-            well &= c.is_well(rule, band, &block.position(k), &block.tensor(k));
+        for (x, F) in run.x.iter().zip(&run.F) {
+            well &= c.is_well(rule, band, x, F);
         }
         *all_well = well;
     }

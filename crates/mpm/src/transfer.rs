@@ -2,6 +2,9 @@
 
 use nalgebra::{RealField, SMatrix, SVector};
 
+use crate::fault::Fault;
+use crate::simd::{Quad, Vectors};
+use crate::step::Constants;
 use crate::weights::WIDE;
 
 /// Numbers kept for a node: enough for three dimensions, and a whole vector register whatever their type.
@@ -79,47 +82,138 @@ impl<T: RealField + Copy, const D: usize> Node<T, D> {
     }
 }
 
-/// What the nodes around a particle say about its place: their values weighted, and the gradients of these per cell.
-///
-/// All values of the nodes are interpolated, the useful ones and the others, so that whole vectors are moved and stored.
+/// What the nodes around a particle say about its place.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Gathered<T, const D: usize> {
-    level: Node<T, D>,
-    slope: [Node<T, D>; D],
+    pub(crate) velocity: SVector<T, D>,
+    pub(crate) acceleration: SVector<T, D>,
+    /// Per cell.
+    pub(crate) velocity_gradient: SMatrix<T, D, D>,
 }
 
 impl<T: RealField + Copy, const D: usize> Gathered<T, D> {
+    /// From interpolated values of nodes and their gradients, in the order in which nodes have them.
+    #[inline(always)]
+    pub(crate) fn new<const Q: usize>(level: &[T; Q], slope: &[[T; Q]; D]) -> Self {
+        Self {
+            velocity: SVector::from_fn(|i, _| level[i]),
+            acceleration: SVector::from_fn(|i, _| level[D + i]),
+            velocity_gradient: SMatrix::from_fn(|i, j| slope[j][i]),
+        }
+    }
+
     pub(crate) fn zero() -> Self {
-        Self { level: Node::zero(), slope: [Node::zero(); D] }
-    }
-
-    #[inline(always)]
-    pub(crate) fn velocity(&self) -> SVector<T, D> {
-        SVector::from_fn(|i, _| self.level.values[i])
-    }
-
-    #[inline(always)]
-    pub(crate) fn acceleration(&self) -> SVector<T, D> {
-        SVector::from_fn(|i, _| self.level.values[D + i])
-    }
-
-    /// Gradient of the velocity, per cell.
-    #[inline(always)]
-    pub(crate) fn velocity_gradient(&self) -> SMatrix<T, D, D> {
-        SMatrix::from_fn(|i, j| self.slope[j].values[i])
+        Self {
+            velocity: SVector::zeros(),
+            acceleration: SVector::zeros(),
+            velocity_gradient: SMatrix::zeros(),
+        }
     }
 }
 
-/// What a particle gives to the nodes around it: `level S + sum_a slope[a] G_a`.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Deposit<T, const D: usize> {
-    pub(crate) level: Node<T, D>,
-    pub(crate) slope: [Node<T, D>; D],
+/// Whoever wants to know what the nodes around particles say.
+pub(crate) trait Receive<T, const D: usize> {
+    /// Of particle `k` of a block.
+    fn receive(&mut self, k: usize, gathered: &Gathered<T, D>);
+
+    /// The same in one or two dimensions: velocity and acceleration one after the other, and their gradients.
+    #[inline(always)]
+    fn receive_quads(&mut self, _: impl Vectors, k: usize, level: Quad<T>, slope: [Quad<T>; D])
+    where
+        T: RealField + Copy,
+    {
+        self.receive(k, &Gathered::new(&level.0, &slope.map(|slope| slope.0)));
+    }
 }
 
-impl<T: RealField + Copy, const D: usize> Deposit<T, D> {
+/// Writes it down.
+impl<T: RealField + Copy, const D: usize> Receive<T, D> for &mut [Gathered<T, D>] {
+    #[inline(always)]
+    fn receive(&mut self, k: usize, gathered: &Gathered<T, D>) {
+        if let Some(own) = self.get_mut(k) {
+            *own = *gathered;
+        }
+    }
+}
+
+/// What particles give to the nodes around them: `level S + sum_a traction[a] G_a`, the second part to the force alone.
+pub(crate) struct Deposits<T, const D: usize, const N: usize> {
+    pub(crate) mass: [T; N],
+    /// Reference volumes.
+    pub(crate) volume: [T; N],
+    /// Body forces, per mass.
+    pub(crate) b: [SVector<T, D>; N],
+    /// Momenta, body forces and masses.
+    pub(crate) level: [Node<T, D>; N],
+    /// Per cell: column `a` goes with the gradient along axis `a`.
+    pub(crate) traction: [SMatrix<T, D, D>; N],
+}
+
+impl<T: RealField + Copy, const D: usize, const N: usize> Deposits<T, D, N> {
     pub(crate) fn zero() -> Self {
-        Self { level: Node::zero(), slope: [Node::zero(); D] }
+        Self {
+            mass: [T::zero(); N],
+            volume: [T::zero(); N],
+            b: [SVector::zeros(); N],
+            level: [Node::zero(); N],
+            traction: [SMatrix::zeros(); N],
+        }
+    }
+
+    /// Takes masses and volumes of the particles `ids`.
+    pub(crate) fn take(&mut self, ids: &[u32], mass: &[T], volume: &[T]) {
+        for (k, &p) in ids.iter().enumerate() {
+            (self.mass[k], self.volume[k]) = (mass[p as usize], volume[p as usize]);
+        }
+    }
+
+    /// States momentum, body force and mass of a particle.
+    #[inline(always)]
+    pub(crate) fn set_level(&mut self, c: &Constants<T, D>, k: usize, v: &SVector<T, D>) {
+        let m = self.mass[k];
+        self.level[k] = Node::new(&(v * m), &self.force(c, k), m);
+    }
+
+    /// The same in two dimensions, for the numbers of position and velocity one after the other.
+    #[inline(always)]
+    pub(crate) fn set_level_in_plane(&mut self, vectors: impl Vectors, k: usize, xv: Quad<T>) {
+        let (m, b) = (self.mass[k], self.b[k]);
+        let b = Quad([b[0], b[D - 1], T::zero(), T::zero()]);
+        let level = vectors.mul(vectors.high_and_low(xv, b), vectors.splat(m));
+        let values = &mut self.level[k].values;
+        values[..4].copy_from_slice(&level.0);
+        values[4] = m;
+    }
+
+    /// States the body force of a particle, and nothing else.
+    #[inline(always)]
+    pub(crate) fn set_force(&mut self, c: &Constants<T, D>, k: usize) {
+        self.level[k].set_acceleration(&self.force(c, k));
+    }
+
+    /// States momentum and mass of a particle, and nothing else.
+    #[inline(always)]
+    pub(crate) fn set_momentum(&mut self, k: usize, v: &SVector<T, D>) {
+        let m = self.mass[k];
+        self.level[k] = Node::new(&(v * m), &SVector::zeros(), m);
+    }
+
+    #[inline(always)]
+    fn force(&self, c: &Constants<T, D>, k: usize) -> SVector<T, D> {
+        let per_volume = c.planted.is(Fault::BodyForcePerVolume);
+        self.b[k] * if per_volume { self.volume[k] } else { self.mass[k] }
+    }
+
+    /// What goes with the gradients along all axes, in the order of a node's values.
+    #[inline(always)]
+    fn slopes(&self, k: usize) -> [[T; LANES]; D] {
+        let mut slopes = [[T::zero(); LANES]; D];
+        for (a, slope) in slopes.iter_mut().enumerate() {
+            for i in 0..D {
+                slope[D + i] = self.traction[k][(i, a)];
+            }
+        }
+        slopes
     }
 }
 
@@ -134,12 +228,12 @@ pub(crate) trait Weights<T, const D: usize, const W: usize> {
 }
 
 /// One row of nodes along axis 0: the weights of all other axes multiplied.
-struct Row<T, const D: usize> {
+pub(crate) struct Row<T, const D: usize> {
     start: usize,
     /// Product of the weights along axes 1 and up.
-    S: T,
+    pub(crate) S: T,
     /// Its gradient; entry 0 is unused.
-    G: [T; D],
+    pub(crate) G: [T; D],
 }
 
 /// Number of rows of nodes.
@@ -151,7 +245,7 @@ fn rows<const D: usize, const W: usize>() -> usize {
 }
 
 #[inline(always)]
-fn row<T: RealField + Copy, const D: usize, const W: usize>(
+pub(crate) fn row<T: RealField + Copy, const D: usize, const W: usize>(
     weights: &impl Weights<T, D, W>,
     first: usize,
     strides: &[usize; D],
@@ -178,7 +272,7 @@ fn row<T: RealField + Copy, const D: usize, const W: usize>(
 
 /// Index of a particle's first node.
 #[inline(always)]
-fn first_node<T, const D: usize, const W: usize>(
+pub(crate) fn first_node<T, const D: usize, const W: usize>(
     weights: &impl Weights<T, D, W>,
     strides: &[usize; D],
 ) -> usize {
@@ -192,19 +286,19 @@ fn first_node<T, const D: usize, const W: usize>(
 /// What a particle gives to a row of nodes along axis 0: `level S + slope G` with the weights along that axis.
 #[inline(always)]
 fn given_to_row<T: RealField + Copy, const D: usize>(
-    given: &Deposit<T, D>,
+    level: &[T; LANES],
+    slope: &[[T; LANES]; D],
     row: &Row<T, D>,
 ) -> [[T; LANES]; 2] {
-    let mut level = given.level.values;
-    let mut slope = given.slope[0].values;
+    let (mut to_level, mut to_slope) = (*level, slope[0]);
     for q in 0..LANES {
-        level[q] *= row.S;
-        slope[q] *= row.S;
+        to_level[q] *= row.S;
+        to_slope[q] *= row.S;
         for a in 1..D {
-            level[q] = given.slope[a].values[q].mul_add(row.G[a], level[q]);
+            to_level[q] = slope[a][q].mul_add(row.G[a], to_level[q]);
         }
     }
-    [level, slope]
+    [to_level, to_slope]
 }
 
 /// Adds what a particle gives to a node.
@@ -215,19 +309,21 @@ fn add<T: RealField + Copy>(sum: &mut [T; LANES], [level, slope]: &[[T; LANES]; 
     }
 }
 
-/// Adds what a particle gives to the piece of the grid that starts at node `first`.
+/// Adds what particle `k` gives to the piece of the grid that starts at node `first`.
 #[inline(always)]
-pub(crate) fn scatter<T: RealField + Copy, const D: usize, const W: usize>(
+pub(crate) fn scatter<T: RealField + Copy, const D: usize, const W: usize, const N: usize>(
     weights: &impl Weights<T, D, W>,
     strides: &[usize; D],
     piece: &mut [Node<T, D>],
     first: usize,
-    given: &Deposit<T, D>,
+    (given, k): (&Deposits<T, D, N>, usize),
 ) {
     let start = first_node(weights, strides) - first;
+    let level = &given.level[k].values;
+    let slope = given.slopes(k);
     for index in 0..rows::<D, W>() {
         let row = row(weights, start, strides, index);
-        let to_row = given_to_row(given, &row);
+        let to_row = given_to_row(level, &slope, &row);
         let Some(nodes) = piece.get_mut(row.start..).and_then(|n| n.first_chunk_mut::<W>()) else {
             debug_assert!(false, "a stencil beyond its band");
             return;
@@ -238,76 +334,16 @@ pub(crate) fn scatter<T: RealField + Copy, const D: usize, const W: usize>(
     }
 }
 
-/// As [`scatter`] for several particles in one or two dimensions, particle `k` with the weights `weights(k)`: the nodes stay
-/// in registers for as long as particle after particle reaches the same ones. The sums are the same.
-#[inline(always)]
-pub(crate) fn scatter_runs<T, V, const D: usize, const W: usize>(
-    weights: impl Fn(usize) -> V,
-    strides: &[usize; D],
-    piece: &mut [Node<T, D>],
-    first: usize,
-    given: &[Deposit<T, D>],
-) where
-    T: RealField + Copy,
-    V: Weights<T, D, W>,
-{
-    const { assert!(W <= 3, "more nodes than registers") };
-    let rows = if D == 1 { 1 } else { W };
-    let mut k = 0;
-    while k < given.len() {
-        let start = first_node(&weights(k), strides);
-        let mut sums = [[[T::zero(); LANES]; W]; W];
-        for index in 0..rows {
-            let place = row_start(start - first, strides, index);
-            let Some(nodes) = piece.get(place..).and_then(|n| n.first_chunk::<W>()) else {
-                debug_assert!(false, "a stencil beyond its band");
-                return;
-            };
-            for i in 0..W {
-                sums[index][i] = nodes[i].values;
-            }
-        }
-        loop {
-            let weights_k = weights(k);
-            for index in 0..rows {
-                let to_row = given_to_row(&given[k], &row(&weights_k, start, strides, index));
-                for i in 0..W {
-                    add(&mut sums[index][i], &to_row, weights_k.S(0, i), weights_k.G(0, i));
-                }
-            }
-            k += 1;
-            if k >= given.len() || first_node(&weights(k), strides) != start {
-                break;
-            }
-        }
-        for index in 0..rows {
-            let place = row_start(start - first, strides, index);
-            let Some(nodes) = piece.get_mut(place..).and_then(|n| n.first_chunk_mut::<W>()) else {
-                return;
-            };
-            for i in 0..W {
-                nodes[i].values = sums[index][i];
-            }
-        }
-    }
+/// The values of nodes interpolated, the useful ones and the others, and their gradients per cell.
+struct Interpolated<T, const D: usize> {
+    level: [T; LANES],
+    slope: [[T; LANES]; D],
 }
 
-/// Where a row of nodes starts, in one and two dimensions.
-#[inline(always)]
-fn row_start<const D: usize>(start: usize, strides: &[usize; D], index: usize) -> usize {
-    if D == 1 { start } else { start + index * strides[1] }
-}
-
-/// The first `N` values of nodes interpolated, and their gradients.
-struct Interpolated<T, const D: usize, const N: usize> {
-    level: [T; N],
-    slope: [[T; N]; D],
-}
-
-impl<T: RealField + Copy, const D: usize, const N: usize> Interpolated<T, D, N> {
+impl<T: RealField + Copy, const D: usize> Interpolated<T, D> {
     #[inline(always)]
     fn zero() -> Self {
-        Self { level: [T::zero(); N], slope: [[T::zero(); N]; D] }
+        Self { level: [T::zero(); LANES], slope: [[T::zero(); LANES]; D] }
     }
 
     /// Adds what a row of nodes contributes.
@@ -319,33 +355,25 @@ impl<T: RealField + Copy, const D: usize, const N: usize> Interpolated<T, D, N> 
         &mut self,
         weights: &impl Weights<T, D, W>,
         row: &Row<T, D>,
-        value: impl Fn(usize, usize) -> T,
+        nodes: &[Node<T, D>; W],
     ) {
-        let mut row_level = [T::zero(); N];
-        let mut row_slope = [T::zero(); N];
+        let mut row_level = [T::zero(); LANES];
+        let mut row_slope = [T::zero(); LANES];
         for i in 0..W {
             let (S, G) = (weights.S(0, i), weights.G(0, i));
-            for q in 0..N {
-                let value = value(i, q);
+            for q in 0..LANES {
+                let value = nodes[i].values[q];
                 row_level[q] = if i == 0 { value * S } else { row_level[q] + value * S };
                 row_slope[q] = if i == 0 { value * G } else { value.mul_add(G, row_slope[q]) };
             }
         }
         let Self { level, slope } = self;
-        for q in 0..N {
+        for q in 0..LANES {
             level[q] += row_level[q] * row.S;
             slope[0][q] = row_slope[q].mul_add(row.S, slope[0][q]);
             for a in 1..D {
                 slope[a][q] = row_level[q].mul_add(row.G[a], slope[a][q]);
             }
-        }
-    }
-
-    #[inline(always)]
-    fn write_to(&self, gathered: &mut Gathered<T, D>) {
-        gathered.level.values[..N].copy_from_slice(&self.level);
-        for a in 0..D {
-            gathered.slope[a].values[..N].copy_from_slice(&self.slope[a]);
         }
     }
 }
@@ -356,9 +384,8 @@ pub(crate) fn gather<T: RealField + Copy, const D: usize, const W: usize>(
     weights: &impl Weights<T, D, W>,
     strides: &[usize; D],
     nodes: &[Node<T, D>],
-    gathered: &mut Gathered<T, D>,
-) {
-    let mut sums = Interpolated::<T, D, LANES>::zero();
+) -> Gathered<T, D> {
+    let mut sums = Interpolated::zero();
     let start = first_node(weights, strides);
     for index in 0..rows::<D, W>() {
         let row = row(weights, start, strides, index);
@@ -366,53 +393,7 @@ pub(crate) fn gather<T: RealField + Copy, const D: usize, const W: usize>(
             debug_assert!(false, "a stencil beyond the grid");
             break;
         };
-        sums.add_row(weights, &row, |i, q| nodes[i].values[q]);
+        sums.add_row(weights, &row, nodes);
     }
-    sums.write_to(gathered);
-}
-
-/// As [`gather`] for several particles in one or two dimensions, particle `k` with the weights `weights(k)`: the nodes stay
-/// in registers for as long as particle after particle reaches the same ones.
-#[inline(always)]
-pub(crate) fn gather_runs<T, V, const D: usize, const W: usize>(
-    weights: impl Fn(usize) -> V,
-    strides: &[usize; D],
-    nodes: &[Node<T, D>],
-    gathered: &mut [Gathered<T, D>],
-) where
-    T: RealField + Copy,
-    V: Weights<T, D, W>,
-{
-    const { assert!(W <= 3, "more nodes than registers") };
-    // Velocity and acceleration are half of a node's values.
-    const USED: usize = LANES / 2;
-    let rows = if D == 1 { 1 } else { W };
-    let mut k = 0;
-    while k < gathered.len() {
-        let start = first_node(&weights(k), strides);
-        let mut values = [[[T::zero(); USED]; W]; W];
-        for index in 0..rows {
-            let place = row_start(start, strides, index);
-            let Some(nodes) = nodes.get(place..).and_then(|n| n.first_chunk::<W>()) else {
-                debug_assert!(false, "a stencil beyond the grid");
-                return;
-            };
-            for i in 0..W {
-                values[index][i].copy_from_slice(&nodes[i].values[..USED]);
-            }
-        }
-        loop {
-            let weights_k = weights(k);
-            let mut sums = Interpolated::<T, D, USED>::zero();
-            for index in 0..rows {
-                let row = row(&weights_k, start, strides, index);
-                sums.add_row(&weights_k, &row, |i, q| values[index][i][q]);
-            }
-            sums.write_to(&mut gathered[k]);
-            k += 1;
-            if k >= gathered.len() || first_node(&weights(k), strides) != start {
-                break;
-            }
-        }
-    }
+    Gathered::new(&sums.level, &sums.slope)
 }

@@ -1,5 +1,8 @@
 //! The logarithm of J, without calls or branches, so that loops over many particles use vector instructions.
 
+/// The bits of sqrt(1/2), to 32 bits.
+const ROOT_HALF: u64 = 0x3fe6_a09e_0000_0000;
+
 /// `ln(ratio)` for `growth = ratio - 1`, either of which may carry a rounding error; finite `ratio > 0`, else whatever.
 ///
 /// Within one unit in the last place of the logarithm of the one that states it better: `growth` down to -1/2, below that
@@ -7,8 +10,6 @@
 /// Sun's fdlibm, `s_log1p.c`.
 #[inline(always)]
 pub(super) fn log_of_ratio(growth: f64, ratio: f64) -> f64 {
-    /// The bits of sqrt(1/2), to 32 bits.
-    const ROOT_HALF: u64 = 0x3fe6_a09e_0000_0000;
     const ONE: u64 = 0x3ff0_0000_0000_0000;
     const MANTISSA: u64 = 0x000f_ffff_ffff_ffff;
     /// 2^52 as a double; with a whole number in its last bits it is 2^52 plus that number.
@@ -35,6 +36,30 @@ pub(super) fn log_of_ratio(growth: f64, ratio: f64) -> f64 {
     let corrected = !exact && k <= 1022.0;
     // What is not a number stays so.
     let correction = lost * if corrected { scale * (1.0 - f + f * f) } else { 0.0 };
+    let (half_square, tail) = parts_of_log(f);
+    let tail = tail + (k * LN2_LOW + correction);
+    k * LN2_HIGH - ((half_square - tail) - f)
+}
+
+/// Whether [`log_near_one`] takes this growth: 1 + growth between sqrt(1/2) and sqrt(2), where no power of two has to be
+/// split off.
+#[inline(always)]
+pub(super) fn is_near_one(growth: f64) -> bool {
+    let sum = 1.0 + growth;
+    (sum >= f64::from_bits(ROOT_HALF)) & (sum < f64::from_bits(ROOT_HALF + (1 << 52)))
+}
+
+/// `log_of_ratio(growth, 1 + growth)` to the last bit for a growth that [is near one](is_near_one), in half as many
+/// operations.
+#[inline(always)]
+pub(super) fn log_near_one(growth: f64) -> f64 {
+    let (half_square, tail) = parts_of_log(growth);
+    0.0 - ((half_square - tail) - growth)
+}
+
+/// `h = f^2/2` and `t` with `ln(1 + f) = f - (h - t)`, for 1 + f between sqrt(1/2) and sqrt(2).
+#[inline(always)]
+fn parts_of_log(f: f64) -> (f64, f64) {
     let s = f / (2.0 + f);
     let z = s * s;
     let w = z * z;
@@ -46,13 +71,12 @@ pub(super) fn log_of_ratio(growth: f64, ratio: f64) -> f64 {
             + w * (2.857_142_874_366_239e-1
                 + w * (1.818_357_216_161_805e-1 + w * 1.479_819_860_511_658_6e-1)));
     let half_square = 0.5 * f * f;
-    let tail = s * (half_square + (even + odd)) + (k * LN2_LOW + correction);
-    k * LN2_HIGH - ((half_square - tail) - f)
+    (half_square, s * (half_square + (even + odd)))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::log_of_ratio;
+    use super::{is_near_one, log_near_one, log_of_ratio};
 
     /// Distance in units in the last place of the value expected.
     fn ulps(found: f64, expected: f64) -> f64 {
@@ -72,6 +96,25 @@ mod tests {
             worst = worst.max(ulps(log_of_ratio(ratio - 1.0, ratio), ratio.ln()));
         }
         assert!(worst <= 1.5, "{worst} units in the last place");
+    }
+
+    #[test]
+    fn near_one_the_short_form_has_the_same_bits() {
+        let mut near = 0;
+        for n in 0..400_000 {
+            let growth = f64::from(n) * 5e-6 - 1.0;
+            for growth in [growth, growth * 1e-9] {
+                let k = (1.0 + growth) / f64::from_bits(super::ROOT_HALF);
+                assert_eq!(is_near_one(growth), (1.0..2.0).contains(&k), "{growth}");
+                if is_near_one(growth) {
+                    near += 1;
+                    let long = log_of_ratio(growth, f64::NAN);
+                    assert_eq!(log_near_one(growth).to_bits(), long.to_bits(), "{growth}");
+                }
+            }
+        }
+        assert!(near > 400_000);
+        assert!(!is_near_one(f64::NAN));
     }
 
     #[test]

@@ -17,13 +17,13 @@ use nalgebra::{RealField, SMatrix};
 
 pub(crate) use hencky::Hencky;
 pub(crate) use linear_elastic::LinearElastic;
-use logarithm::log_of_ratio;
+use logarithm::{is_near_one, log_near_one, log_of_ratio};
 pub(crate) use mooney_rivlin::MooneyRivlin;
 pub(crate) use neo_hookean::{NeoHookean, NeoHookeanNoLog};
 pub(crate) use st_venant_kirchhoff::StVenantKirchhoff;
 
 use crate::fault::Planted;
-use crate::simd::{Loop, dispatch};
+use crate::simd::{Loop, Vectors, dispatch};
 use crate::tensor::{det_minus_one, determinant, product, real};
 
 /// An elastic material.
@@ -187,7 +187,7 @@ impl<T: RealField + Copy, L: Law<T>, const D: usize, const N: usize> Loop
     for SideBySide<'_, T, L, D, N>
 {
     #[inline(always)]
-    fn run(self) {
+    fn run<V: Vectors>(self, _: V) {
         stresses(self.law, self.F, self.P);
     }
 }
@@ -230,6 +230,18 @@ fn jacobian<T: RealField + Copy, const D: usize>(F: &SMatrix<T, D, D>) -> Option
 pub(crate) trait Law<T: RealField + Copy>: Copy + Send + Sync + 'static {
     /// Kirchhoff stress.
     fn kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D>;
+
+    /// Whether [`kirchhoff_short`](Self::kirchhoff_short) may be asked for this F.
+    #[inline(always)]
+    fn is_short<const D: usize>(&self, _F: &SMatrix<T, D, D>) -> bool {
+        false
+    }
+
+    /// The same Kirchhoff stress, to the last bit, in fewer operations.
+    #[inline(always)]
+    fn kirchhoff_short<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
+        self.kirchhoff(F)
+    }
 
     /// The normal Kirchhoff stress along the axes that F leaves out, where the stretch is one.
     fn kirchhoff_across<const D: usize>(&self, F: &SMatrix<T, D, D>) -> T;
@@ -274,6 +286,19 @@ fn log_jacobian<T: RealField + Copy, const D: usize>(F: &SMatrix<T, D, D>) -> T 
         nalgebra::convert_unchecked(determinant(F)),
     );
     real(logarithm)
+}
+
+/// Whether [`log_jacobian_short`] may be asked for.
+#[inline(always)]
+fn log_jacobian_is_short<T: RealField + Copy, const D: usize>(F: &SMatrix<T, D, D>) -> bool {
+    is_near_one(nalgebra::convert_unchecked(det_minus_one(&displacement_gradient(F))))
+}
+
+/// As [`log_jacobian`], to the last bit, for J near one.
+#[inline(always)]
+fn log_jacobian_short<T: RealField + Copy, const D: usize>(F: &SMatrix<T, D, D>) -> T {
+    let growth = det_minus_one(&displacement_gradient(F));
+    real(log_near_one(nalgebra::convert_unchecked(growth)))
 }
 
 /// `F F^T - I`, to full relative accuracy at small strain.

@@ -2,7 +2,10 @@
 
 use nalgebra::{RealField, SMatrix};
 
-use super::{Law, displacement_gradient, finger_minus_identity, log_jacobian, plus_diagonal};
+use super::{
+    Law, displacement_gradient, finger_minus_identity, log_jacobian, log_jacobian_is_short,
+    log_jacobian_short, plus_diagonal,
+};
 use crate::fault::{Fault, Planted};
 use crate::tensor::{det_minus_one, inverse_transpose_minus_identity};
 
@@ -29,6 +32,16 @@ impl<T: RealField + Copy> Law<T> for NeoHookean<T> {
     #[inline(always)]
     fn kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         plus_diagonal(finger_minus_identity(F) * self.mu, self.pressure(F))
+    }
+
+    #[inline(always)]
+    fn is_short<const D: usize>(&self, F: &SMatrix<T, D, D>) -> bool {
+        !self.planted.is(Fault::LinearLogarithm) && log_jacobian_is_short(F)
+    }
+
+    #[inline(always)]
+    fn kirchhoff_short<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
+        plus_diagonal(finger_minus_identity(F) * self.mu, self.lambda * log_jacobian_short(F))
     }
 
     fn kirchhoff_across<const D: usize>(&self, F: &SMatrix<T, D, D>) -> T {
