@@ -8,9 +8,10 @@ use crate::transfer::{Deposits, LANES, Node, Weights, first_node, row};
 
 /// The first half of a node's values: in one or two dimensions momentum and force, and for one dimension the mass.
 #[inline(always)]
-fn half<T: Copy>(values: &[T; LANES]) -> Quad<T> {
-    let [a, b, c, d, ..] = *values;
-    Quad([a, b, c, d])
+fn half<T: RealField + Copy>(values: &[T; LANES]) -> Quad<T> {
+    const { assert!(LANES >= 4) };
+    // Four numbers at once, even in a build that is hardly optimised.
+    values.first_chunk().map_or(Quad([T::zero(); 4]), |half| Quad(*half))
 }
 
 /// As [`scatter`](crate::transfer::scatter) for the first `count` particles, particle `k` with the weights `weights(k)`: the
