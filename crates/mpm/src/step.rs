@@ -348,14 +348,10 @@ where
             }
         }
     });
-    let give = |_: &mut Run<T, D>, ids: &[u32], deposits: &mut Deposits<T, D, BLOCK>| {
-        for (k, &p) in ids.iter().enumerate() {
-            deposits.mass[k] = mass[p as usize];
-            deposits.set_momentum(k, &v[p as usize]);
-        }
-    };
     bands.scatter(layout, reprojected, &|nodes| nodes.fill(Node::zero()), &|piece, first, ids| {
-        c.scatter(rule, x, F, piece, first, ids, give);
+        c.scatter(rule, x, F, piece, first, ids, |_, ids, deposits| {
+            deposits.take_momenta(ids, mass, v);
+        });
     });
     finish_reprojection(layout, &c, nodes, reprojected);
     let reprojected = if c.planted.is(Fault::NoReprojection) { nodes } else { &reprojected[..] };
@@ -458,7 +454,8 @@ where
             block.weigh(&c, rule, &run);
             update(&block, &mut gathered[..x.len()], first, x, v, F);
             let mut all_well = true;
-            dispatch(Check { c: &c, rule, home, x, F, all_well: &mut all_well });
+            let home_of = home.iter().copied();
+            dispatch(Check { c: &c, rule, home: home_of, x, F, all_well: &mut all_well });
             if all_well {
                 continue;
             }
@@ -594,14 +591,10 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let Self { particles, constants, layout, bands, nodes, .. } = self;
         let Particles { x, v, F, mass, .. } = &*particles;
         let c = *constants;
-        let give = |_: &mut Run<T, D>, ids: &[u32], deposits: &mut Deposits<T, D, BLOCK>| {
-            for (k, &p) in ids.iter().enumerate() {
-                deposits.mass[k] = mass[p as usize];
-                deposits.set_momentum(k, &v[p as usize]);
-            }
-        };
         bands.scatter(layout, nodes, &|nodes| nodes.fill(Node::zero()), &|piece, first, ids| {
-            c.scatter(rule, x, F, piece, first, ids, give);
+            c.scatter(rule, x, F, piece, first, ids, |_, ids, deposits| {
+                deposits.take_momenta(ids, mass, v);
+            });
         });
         fold_ghosts(layout, &c, nodes);
         self.solve_velocity();
@@ -743,26 +736,27 @@ impl<'a, T: RealField + Copy, const D: usize> Forcing<'a, T, D> {
     }
 }
 
-/// Looks whether all of a run of particles are [well](Constants::is_well).
-struct Check<'a, T, R, const D: usize, const W: usize> {
-    c: &'a Constants<T, D>,
-    rule: R,
-    home: &'a [u32],
-    x: &'a [SVector<T, D>],
-    F: &'a [SMatrix<T, D, D>],
-    all_well: &'a mut bool,
+/// Looks whether all of a run of particles are [well](Constants::is_well), each in the band that `home` tells.
+pub(crate) struct Check<'a, T, R, H, const D: usize, const W: usize> {
+    pub(crate) c: &'a Constants<T, D>,
+    pub(crate) rule: R,
+    pub(crate) home: H,
+    pub(crate) x: &'a [SVector<T, D>],
+    pub(crate) F: &'a [SMatrix<T, D, D>],
+    pub(crate) all_well: &'a mut bool,
 }
 
-impl<T, R, const D: usize, const W: usize> Loop for Check<'_, T, R, D, W>
+impl<T, R, H, const D: usize, const W: usize> Loop for Check<'_, T, R, H, D, W>
 where
     T: RealField + Copy,
     R: Rule<T, D, W>,
+    H: Iterator<Item = u32>,
 {
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self { c, rule, home, x, F, all_well } = self;
         let mut well = true;
-        for ((x, F), &home) in x.iter().zip(F).zip(home) {
+        for ((x, F), home) in x.iter().zip(F).zip(home) {
             well &= c.is_well(rule, home, x, F);
         }
         *all_well = well;

@@ -5,8 +5,6 @@
 //! twice. The sums are those of two passes, in the same order, so that a run may be taken up between any two steps: what
 //! the grid holds by then is formed anew from the particles.
 
-use std::marker::PhantomData;
-
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::block::{BLOCK, Block, Run};
@@ -15,8 +13,8 @@ use crate::fault::Fault;
 use crate::material::Law;
 use crate::particles::Particles;
 use crate::partition::Share;
-use crate::simd::{Loop, Quad, Vectors, dispatch};
-use crate::step::{Constants, Forcing, Found, Outcome, State, fold_ghosts};
+use crate::simd::{Quad, Vectors, dispatch};
+use crate::step::{Check, Constants, Forcing, Found, Outcome, State, fold_ghosts};
 use crate::transfer::{Deposits, Gathered, Node, Receive};
 use crate::weights::Rule;
 
@@ -111,13 +109,12 @@ impl<T: RealField + Copy, R, L: Law<T>, const D: usize> Sweep<'_, T, R, L, D> {
         let mut deposits = Deposits::zero();
         for (index, ids) in elements.numbers().chunks(BLOCK).enumerate() {
             let place = index * BLOCK;
-            for (k, &p) in ids.iter().enumerate() {
+            deposits.take(ids, mass, volume);
+            for k in 0..ids.len() {
                 let (x, v, F) = elements.get(place + k);
                 let ahead = c.planted.is(Fault::WeightsOfNewPosition);
                 run.x[k] = if ahead { *x + *v * c.time_step } else { *x };
                 run.F[k] = *F;
-                deposits.mass[k] = mass[p as usize];
-                deposits.volume[k] = volume[p as usize];
             }
             block.weigh(c, rule, &run);
             forcing.evaluate(ids, &run, &mut deposits.b);
@@ -133,14 +130,9 @@ impl<T: RealField + Copy, R, L: Law<T>, const D: usize> Sweep<'_, T, R, L, D> {
             block.gather(&c.strides, nodes, ids.len(), follow);
             block.weigh(c, rule, &run);
             let mut all_well = true;
-            dispatch(Check {
-                c,
-                rule,
-                band,
-                run: &run,
-                all_well: &mut all_well,
-                width: PhantomData,
-            });
+            let home = std::iter::repeat(band);
+            let Run { x, F } = &run;
+            dispatch(Check { c, rule, home, x, F, all_well: &mut all_well });
             if !all_well {
                 for (k, &p) in ids.iter().enumerate() {
                     let (x, _, F) = elements.get(place + k);
@@ -231,31 +223,5 @@ impl<T: RealField + Copy, const D: usize> Receive<T, D> for Follow<'_, '_, T, D>
         run.x[k].as_mut_slice().copy_from_slice(&[xv.0[0], xv.0[1]]);
         run.F[k].as_mut_slice().copy_from_slice(&new.0);
         deposits.set_level_in_plane(vectors, k, xv);
-    }
-}
-
-/// Looks whether all particles of a block are [well](Constants::is_well).
-struct Check<'a, T, R, const D: usize, const W: usize> {
-    c: &'a Constants<T, D>,
-    rule: R,
-    band: u32,
-    run: &'a Run<T, D>,
-    all_well: &'a mut bool,
-    width: PhantomData<[(); W]>,
-}
-
-impl<T, R, const D: usize, const W: usize> Loop for Check<'_, T, R, D, W>
-where
-    T: RealField + Copy,
-    R: Rule<T, D, W>,
-{
-    #[inline(always)]
-    fn run<V: Vectors>(self, _: V) {
-        let Self { c, rule, band, run, all_well, .. } = self;
-        let mut well = true;
-        for (x, F) in run.x.iter().zip(&run.F) {
-            well &= c.is_well(rule, band, x, F);
-        }
-        *all_well = well;
     }
 }

@@ -167,6 +167,14 @@ impl<T: RealField + Copy, const D: usize, const N: usize> Deposits<T, D, N> {
         }
     }
 
+    /// States momenta and masses of the particles `ids`, and nothing else.
+    pub(crate) fn take_momenta(&mut self, ids: &[u32], mass: &[T], v: &[SVector<T, D>]) {
+        for (level, &p) in self.level.iter_mut().zip(ids) {
+            let m = mass[p as usize];
+            *level = Node::new(&(v[p as usize] * m), &SVector::zeros(), m);
+        }
+    }
+
     /// States momentum, body force and mass of a particle.
     #[inline(always)]
     pub(crate) fn set_level(&mut self, c: &Constants<T, D>, k: usize, v: &SVector<T, D>) {
@@ -189,13 +197,6 @@ impl<T: RealField + Copy, const D: usize, const N: usize> Deposits<T, D, N> {
     #[inline(always)]
     pub(crate) fn set_force(&mut self, c: &Constants<T, D>, k: usize) {
         self.level[k].set_acceleration(&self.force(c, k));
-    }
-
-    /// States momentum and mass of a particle, and nothing else.
-    #[inline(always)]
-    pub(crate) fn set_momentum(&mut self, k: usize, v: &SVector<T, D>) {
-        let m = self.mass[k];
-        self.level[k] = Node::new(&(v * m), &SVector::zeros(), m);
     }
 
     #[inline(always)]

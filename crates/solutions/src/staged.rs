@@ -338,7 +338,7 @@ fn run<'a, T, const POINT: usize>(
     whole.then(|| array::from_fn(|m| run(m).unwrap_or(nothing)))
 }
 
-/// The body force on a run of points; as a function of its own, which tells the compiler that they are in different places.
+/// The body force on a run of points.
 #[inline(always)]
 fn body_forces<S, T: Real, const D: usize, const TIME: usize, const POINT: usize>(
     solution: &S,
@@ -348,30 +348,38 @@ fn body_forces<S, T: Real, const D: usize, const TIME: usize, const POINT: usize
 ) where
     S: BodyForceStages<T, D, TIME, POINT>,
 {
+    let near = spread(run, components, |point| solution.body_force_staged::<true>(time, point));
+    if !near {
+        spread(run, components, |point| solution.body_force_staged::<false>(time, point));
+    }
+}
+
+/// Whether all values are finite: if not, a ratio was not near one, or there is no force. As a function of its own, which
+/// tells the compiler that the arrays are in different places.
+#[inline(always)]
+fn spread<T: Real, const D: usize, const POINT: usize>(
+    run: &[&[T; BLOCK]; POINT],
+    components: &mut [[T; BLOCK]; D],
+    body_force: impl Fn(&[T; POINT]) -> SVector<T, D>,
+) -> bool {
     for i in 0..BLOCK {
-        let point = array::from_fn(|m| run[m][i]);
-        let value = solution.body_force_staged::<true>(time, &point);
+        let value = body_force(&array::from_fn(|m| run[m][i]));
         for d in 0..D {
             components[d][i] = value[d];
         }
     }
+    all_finite(components)
+}
+
+#[inline(always)]
+fn all_finite<T: Real>(rows: &[[T; BLOCK]]) -> bool {
     let mut finite = true;
-    for component in &*components {
-        for value in component {
+    for row in rows {
+        for value in row {
             finite &= value.is_finite();
         }
     }
-    if finite {
-        return;
-    }
-    // A ratio that is not near one, or a force that is none.
-    for i in 0..BLOCK {
-        let point = array::from_fn(|m| run[m][i]);
-        let value = solution.body_force_staged::<false>(time, &point);
-        for d in 0..D {
-            components[d][i] = value[d];
-        }
-    }
+    finite
 }
 
 impl<S, T: Real, const D: usize, const TIME: usize, const POINT: usize> BodyForceAtPoints<T, D>
@@ -445,8 +453,7 @@ where
     fn with_simd<I: Simd>(self, _: I) {
         let Self { solution, time, velocity_time, blocks, runs } = self;
         for (block, run) in blocks.iter().zip(runs) {
-            if fill(block, run, |p| solution.state_staged::<true>(time, velocity_time, p)).is_none()
-            {
+            if !fill(block, run, |p| solution.state_staged::<true>(time, velocity_time, p)) {
                 fill(block, run, |p| solution.state_staged::<false>(time, velocity_time, p));
             }
         }
@@ -472,24 +479,18 @@ where
     }
 }
 
-/// `None` where a stress is none. As a function of its own, which tells the compiler that `block` and `run` are in different
+/// Whether all stresses are finite. As a function of its own, which tells the compiler that `block` and `run` are in different
 /// places.
 #[inline(always)]
 fn fill<T: Real, const D: usize, const POINT: usize>(
     block: &[[T; BLOCK]; POINT],
     run: &mut StateRun<T, D>,
     state: impl Fn(&[T; POINT]) -> State<T, D>,
-) -> Option<()> {
+) -> bool {
     for n in 0..BLOCK {
         run.put(n, &state(&point(block, n)));
     }
-    let mut finite = true;
-    for P in run.P.as_flattened() {
-        for value in P {
-            finite &= value.is_finite();
-        }
-    }
-    finite.then_some(())
+    all_finite(run.P.as_flattened())
 }
 
 /// The positions of points, for solutions that keep nothing else.
