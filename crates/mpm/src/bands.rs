@@ -16,18 +16,16 @@ use crate::parallel::each_chunk;
 use crate::partition::{Partition, Share};
 
 /// Rows that a particle may be lower than the band it was sorted into before everything is sorted anew.
-const SLACK: usize = 2;
+const SLACK: usize = 3;
 
-/// Nodes along axis 0 in a tile: with as many rows as a band's stencils reach, the nodes of a tile stay in the first-level
-/// cache.
-const TILE: usize = 32;
-/// The same along axis 1 in three dimensions.
-const TILE_ACROSS: usize = 8;
+/// In three dimensions, rows of nodes along axis 0 in a strip: with as many layers as a band's stencils reach, the nodes of
+/// a strip stay in the cache. In fewer dimensions a band is one strip.
+const STRIP: usize = 8;
 
-/// Particles sorted by band, within each band by tile, and within each tile by number.
+/// Particles sorted by band, within each band by strip, and within each strip by number.
 ///
-/// Neighbours mostly have successive numbers, and where they have, what belongs to them lies side by side in memory. So they
-/// are not sorted further.
+/// Neighbours mostly have successive numbers, and where they have, what belongs to them lies side by side in memory and is
+/// used where it lies. So they are not sorted further.
 #[derive(Debug)]
 pub(crate) struct Bands {
     /// Rows in a band.
@@ -36,11 +34,11 @@ pub(crate) struct Bands {
     home: Vec<u32>,
     /// Particle ids, band after band.
     order: Partition,
-    /// Tiles in a band.
-    tiles: usize,
-    /// Scratch of the sort: particles in each tile, then where the next of them goes.
+    /// Strips in a band.
+    strips: usize,
+    /// Scratch of the sort: particles in each strip, then where the next of them goes.
     counts: Vec<u32>,
-    /// Scratch of the sort: tile of every particle.
+    /// Scratch of the sort: strip of every particle.
     keys: Vec<u32>,
 }
 
@@ -56,17 +54,13 @@ impl Bands {
         // A row is one node in 1D; bands below some hundred particles would cost more to hand out than to compute.
         let height = if D == 1 { BAND_ROWS } else { 8 };
         let bands = layout.dims[D - 1] / height + 1;
-        let tiles = match D {
-            1 => 1,
-            2 => layout.dims[0].div_ceil(TILE),
-            _ => layout.dims[0].div_ceil(TILE) * layout.dims[1].div_ceil(TILE_ACROSS),
-        };
+        let strips = if D == 3 { layout.dims[1].div_ceil(STRIP) } else { 1 };
         Self {
             height,
             home: vec![0; particles],
             order: Partition::new(particles, bands),
-            tiles,
-            counts: vec![0; bands * tiles + 1],
+            strips,
+            counts: vec![0; bands * strips + 1],
             keys: vec![0; particles],
         }
     }
@@ -103,35 +97,30 @@ impl Bands {
         [cast_slice_mut(home), cast_slice_mut(order), cast_slice_mut(starts)]
     }
 
-    /// Sorts all particles by the tile of the first node of their stencils, which `first_node(particle)` computes.
+    /// Sorts all particles by the strip of the first node of their stencils, which `first_node(particle)` computes.
     pub(crate) fn sort<const D: usize>(
         &mut self,
         layout: &Layout<D>,
         first_node: &(dyn Fn(usize) -> usize + Sync),
     ) {
-        let Self { height, tiles, .. } = *self;
+        let Self { height, strips, .. } = *self;
         let (row, line) = (layout.row(), layout.dims[0]);
         self.keys.par_iter_mut().zip(&mut self.home).enumerate().for_each(|(p, (key, home))| {
             let node = first_node(p);
             let band = (node / row).saturating_sub(SLACK) / height;
-            let in_row = node % row;
-            let tile = match D {
-                1 => 0,
-                2 => in_row / TILE,
-                _ => in_row / line / TILE_ACROSS * line.div_ceil(TILE) + in_row % line / TILE,
-            };
+            let strip = if D == 3 { node % row / line / STRIP } else { 0 };
             *home = band as u32;
-            *key = (band * tiles + tile) as u32;
+            *key = (band * strips + strip) as u32;
         });
         self.counts.fill(0);
         for &key in &self.keys {
             self.counts[key as usize + 1] += 1;
         }
-        for tile in 1..self.counts.len() {
-            self.counts[tile] += self.counts[tile - 1];
+        for strip in 1..self.counts.len() {
+            self.counts[strip] += self.counts[strip - 1];
         }
         let (order, starts) = self.order.arrange();
-        for (start, first) in starts.iter_mut().zip(self.counts.iter().step_by(tiles)) {
+        for (start, first) in starts.iter_mut().zip(self.counts.iter().step_by(strips)) {
             *start = *first as usize;
         }
         for (p, &key) in self.keys.iter().enumerate() {

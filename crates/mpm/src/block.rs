@@ -19,21 +19,49 @@ pub(crate) const BLOCK: usize = 64;
 /// One number for every particle of a block.
 type Row<T> = [T; BLOCK];
 
-/// Up to `BLOCK` particles, as they are at a time.
-pub(crate) struct Run<T, const D: usize> {
+/// The particles of a block, as they are at a time.
+#[derive(Clone, Copy)]
+pub(crate) struct Run<'a, T, const D: usize> {
+    /// Positions.
+    pub(crate) x: &'a [SVector<T, D>; BLOCK],
+    /// Deformation gradients.
+    pub(crate) F: &'a [SMatrix<T, D, D>; BLOCK],
+}
+
+impl<T: RealField + Copy, const D: usize> Run<'_, T, D> {
+    /// States the forces of the particles' stresses, for the reference volumes in `deposits.volume`.
+    pub(crate) fn stress<L: Law<T>>(
+        self,
+        c: &Constants<T, D>,
+        law: L,
+        deposits: &mut Deposits<T, D, BLOCK>,
+    ) {
+        dispatch(Stress { run: self, c, law, deposits });
+    }
+}
+
+/// Copies of up to `BLOCK` particles that do not lie side by side.
+pub(crate) struct Copies<T, const D: usize> {
     /// Positions.
     pub(crate) x: [SVector<T, D>; BLOCK],
+    /// Velocities.
+    pub(crate) v: [SVector<T, D>; BLOCK],
     /// Deformation gradients.
     pub(crate) F: [SMatrix<T, D, D>; BLOCK],
 }
 
-impl<T: RealField + Copy, const D: usize> Run<T, D> {
+impl<T: RealField + Copy, const D: usize> Copies<T, D> {
     pub(crate) fn new() -> Self {
         // Identities, which have a stress.
-        Self { x: [SVector::zeros(); BLOCK], F: [SMatrix::identity(); BLOCK] }
+        let zero = [SVector::zeros(); BLOCK];
+        Self { x: zero, v: zero, F: [SMatrix::identity(); BLOCK] }
     }
 
-    /// Takes the particles `ids` of the arrays.
+    pub(crate) fn run(&self) -> Run<'_, T, D> {
+        Run { x: &self.x, F: &self.F }
+    }
+
+    /// Takes positions and deformation gradients of the particles `ids`.
     pub(crate) fn pick(&mut self, ids: &[u32], x: &[SVector<T, D>], F: &[SMatrix<T, D, D>]) {
         for (own, &p) in self.x.iter_mut().zip(ids) {
             *own = x[p as usize];
@@ -52,16 +80,6 @@ impl<T: RealField + Copy, const D: usize> Run<T, D> {
     pub(crate) fn copy(&mut self, x: &[SVector<T, D>], F: &[SMatrix<T, D, D>]) {
         self.x[..x.len()].copy_from_slice(x);
         self.F[..F.len()].copy_from_slice(F);
-    }
-
-    /// States the forces of the particles' stresses, for the reference volumes in `deposits.volume`.
-    pub(crate) fn stress<L: Law<T>>(
-        &self,
-        c: &Constants<T, D>,
-        law: L,
-        deposits: &mut Deposits<T, D, BLOCK>,
-    ) {
-        dispatch(Stress { run: self, c, law, deposits });
     }
 }
 
@@ -99,7 +117,7 @@ impl<T: RealField + Copy, const D: usize, const W: usize> Block<T, D, W> {
         &mut self,
         c: &Constants<T, D>,
         rule: R,
-        run: &Run<T, D>,
+        run: Run<'_, T, D>,
     ) {
         dispatch(Weigh { block: self, c, rule, run });
     }
@@ -186,7 +204,7 @@ struct Weigh<'a, T, R, const D: usize, const W: usize> {
     block: &'a mut Block<T, D, W>,
     c: &'a Constants<T, D>,
     rule: R,
-    run: &'a Run<T, D>,
+    run: Run<'a, T, D>,
 }
 
 impl<T, R, const D: usize, const W: usize> Loop for Weigh<'_, T, R, D, W>
@@ -285,7 +303,10 @@ impl<T: RealField + Copy, A: Receive<T, D>, const D: usize, const W: usize> Loop
         if D <= 2 && W <= 3 && !block.any_wide {
             for k in 0..count {
                 let lane = Lane { block, k };
-                let (level, slope) = gather_quads(vectors, &lane, strides, nodes);
+                let Some((level, slope)) = gather_quads(vectors, &lane, strides, nodes) else {
+                    debug_assert!(false, "a stencil beyond the grid");
+                    return;
+                };
                 receiver.receive_quads(vectors, k, level, slope);
             }
             return;
@@ -311,7 +332,7 @@ fn gather_wide<T: RealField + Copy, const D: usize>(
 }
 
 struct Stress<'a, T, L, const D: usize> {
-    run: &'a Run<T, D>,
+    run: Run<'a, T, D>,
     c: &'a Constants<T, D>,
     law: L,
     deposits: &'a mut Deposits<T, D, BLOCK>,

@@ -125,6 +125,34 @@ impl<'a, A, B, C> Share<'a, A, B, C> {
         self.numbers
     }
 
+    /// The elements from `place` on in all three arrays, where as many as `N` have successive numbers.
+    #[inline(always)]
+    pub(crate) fn successive<const N: usize>(
+        &mut self,
+        place: usize,
+    ) -> Option<(&mut [A; N], &mut [B; N], &mut [C; N])> {
+        let numbers = self.numbers.get(place..)?.first_chunk::<N>()?;
+        let first = *numbers.first()?;
+        let mut apart = 0;
+        for (i, number) in numbers.iter().enumerate() {
+            apart |= number ^ first.wrapping_add(i as u32);
+        }
+        if apart != 0 {
+            return None;
+        }
+        let (a, b, c) = self.firsts;
+        let first = first as usize;
+        // SAFETY: the elements are those of `N` numbers of this part, for each of which what is said in `get` holds, and
+        // lie one after the other.
+        unsafe {
+            Some((
+                &mut *a.add(first).cast::<[A; N]>(),
+                &mut *b.add(first).cast::<[B; N]>(),
+                &mut *c.add(first).cast::<[C; N]>(),
+            ))
+        }
+    }
+
     /// Element `place` of the part in all three arrays.
     ///
     /// # Panics
@@ -181,6 +209,25 @@ mod tests {
             assert_eq!(a, [0, 21, 22, 23, 4, 25].map(|value| value * round));
         }
         assert_eq!(c[3], "33");
+    }
+
+    /// Run under Miri too.
+    #[test]
+    fn successive_numbers_lie_side_by_side() {
+        let mut partition = partition(&[3, 4, 5, 0, 1, 2, 6], &[0, 4, 7]);
+        let (mut a, mut b, mut c) = ([0; 7], [0.0; 7], [false; 7]);
+        let shares = partition.shares((&mut a, &mut b, &mut c)).unwrap();
+        let (mut first, mut second) = (shares.take(0).unwrap(), shares.take(1).unwrap());
+        let (x, y, z) = first.successive::<3>(0).unwrap();
+        (*x, *y, *z) = ([1, 2, 3], [0.5, 1.5, 2.5], [true; 3]);
+        let (x, ..) = second.successive::<2>(0).unwrap();
+        *x = [4, 5];
+        // 5 and 0, 2 and 6 are apart; the last run would leave the part.
+        assert!(first.successive::<2>(2).is_none() && second.successive::<2>(1).is_none());
+        assert!(first.successive::<2>(3).is_none() && first.successive::<1>(4).is_none());
+        assert_eq!(a, [0, 4, 5, 1, 2, 3, 0]);
+        assert_eq!(b[3..6], [0.5, 1.5, 2.5]);
+        assert_eq!(c, [false, false, false, true, true, true, false]);
     }
 
     #[test]

@@ -114,38 +114,37 @@ fn slopes<T: RealField + Copy, V: Vectors, const D: usize, const N: usize>(
     std::array::from_fn(|a| if a == 0 { along } else { across })
 }
 
-/// As [`gather`](crate::transfer::gather): velocity and acceleration one after the other, and their gradients.
+/// As [`gather`](crate::transfer::gather): velocity and acceleration one after the other, and their gradients. `None` where a
+/// stencil reaches beyond the grid.
 #[inline(always)]
 pub(crate) fn gather_quads<T, V, const D: usize, const W: usize>(
     vectors: V,
     weights: &impl Weights<T, D, W>,
     strides: &[usize; D],
     nodes: &[Node<T, D>],
-) -> (Quad<T>, [Quad<T>; D])
+) -> Option<(Quad<T>, [Quad<T>; D])>
 where
     T: RealField + Copy,
     V: Vectors,
 {
     let zero = Quad([T::zero(); 4]);
     let rows = if D == 1 { 1 } else { W };
-    let start = first_node(weights, strides);
-    let reach = row_start(0, strides, rows - 1);
-    let Some(nodes) = nodes.get(start..).and_then(|nodes| nodes.get(..reach + W)) else {
-        debug_assert!(false, "a stencil beyond the grid");
-        return (zero, [zero; D]);
-    };
     let (mut levels, mut slopes) = ([zero; W], [zero; W]);
+    let mut rest = nodes.get(first_node(weights, strides)..)?;
     for index in 0..rows {
-        let first = row_start(0, strides, index);
-        let values: [_; W] = std::array::from_fn(|i| half(&nodes[first + i].values));
+        let row = rest.first_chunk::<W>()?;
+        let values = row.each_ref().map(|node| half(&node.values));
         (levels[index], slopes[index]) = interpolate(vectors, &values, weights, 0);
+        if index + 1 < rows {
+            rest = rest.get(strides[D - 1]..)?;
+        }
     }
     if D == 1 {
-        return (levels[0], [slopes[0]; D]);
+        return Some((levels[0], [slopes[0]; D]));
     }
     let (level, across) = interpolate(vectors, &levels, weights, 1);
     let (along, _) = interpolate(vectors, &slopes, weights, 1);
-    (level, std::array::from_fn(|a| if a == 0 { along } else { across }))
+    Some((level, std::array::from_fn(|a| if a == 0 { along } else { across })))
 }
 
 /// What values at successive nodes of an axis come to, and their gradient.

@@ -286,7 +286,11 @@ fn allocate<T: RealField + Copy, const D: usize>(
     let (now, reprojected, next) = (nodes(true)?, nodes(musl)?, nodes(ahead)?);
     let bands = Bands::new(&layout, particles.len());
     let least = particles.mass.iter().fold(particles.mass[0], |least, &m| least.min(m));
+    let Particles { mass, volume, .. } = &particles;
+    let (m, V) = (mass[0], volume[0]);
+    let alike = mass.iter().all(|&mass| mass == m) && volume.iter().all(|&volume| volume == V);
     Ok(State {
+        alike: alike.then_some((m, V)),
         constants: Constants::new(grid, &layout, &bands, settings.time_step, least),
         nodes: now,
         F_next: if usf { vec![SMatrix::identity(); particles.len()] } else { Vec::new() },

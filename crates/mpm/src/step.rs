@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::bands::Bands;
-use crate::block::{BLOCK, Block, Run};
+use crate::block::{BLOCK, Block, Copies};
 use crate::body_force::BodyForce;
 use crate::fault::{Fault, Planted};
 use crate::grid::{Grid, Layout};
@@ -138,20 +138,20 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
         piece: &mut [Node<T, D>],
         first: usize,
         ids: &[u32],
-        state: impl Fn(&mut Run<T, D>, &[u32], &mut Deposits<T, D, BLOCK>),
+        state: impl Fn(&mut Copies<T, D>, &[u32], &mut Deposits<T, D, BLOCK>),
     ) where
         R: Rule<T, D, W>,
     {
-        let mut run = Run::new();
+        let mut copies = Copies::new();
         let mut block = Block::new();
         let mut deposits = Deposits::zero();
         for ids in ids.chunks(BLOCK) {
-            run.pick(ids, x, F);
-            block.weigh(self, rule, &run);
+            copies.pick(ids, x, F);
+            block.weigh(self, rule, copies.run());
             if self.planted.is(Fault::LastNodeSkipped) {
                 block.skip_last_node(&self.upper_in_cells());
             }
-            state(&mut run, ids, &mut deposits);
+            state(&mut copies, ids, &mut deposits);
             block.scatter(&self.strides, piece, first, &deposits, ids.len());
         }
     }
@@ -270,6 +270,8 @@ impl Found {
 #[derive(Debug)]
 pub(crate) struct State<T, const D: usize> {
     pub(crate) particles: Particles<T, D>,
+    /// Mass and volume of every particle, where all have the same.
+    pub(crate) alike: Option<(T, T)>,
     pub(crate) constants: Constants<T, D>,
     pub(crate) layout: Layout<D>,
     pub(crate) bands: Bands,
@@ -336,11 +338,11 @@ where
     let (nodes, c) = (&nodes[..], *constants);
     let Particles { x, v, F, mass, .. } = particles;
     each_chunk(v, CHUNK, &|chunk, v| {
-        let (mut run, mut block) = (Run::new(), Block::new());
+        let (mut copies, mut block) = (Copies::new(), Block::new());
         let (x, F) = (&x[chunk * CHUNK..], &F[chunk * CHUNK..]);
         for ((v, x), F) in v.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK)) {
-            run.copy(x, F);
-            block.weigh(&c, rule, &run);
+            copies.copy(x, F);
+            block.weigh(&c, rule, copies.run());
             let gathered = &mut [Gathered::zero(); BLOCK][..x.len()];
             block.gather(&c.strides, nodes, x.len(), &mut *gathered);
             for (v, gathered) in v.iter_mut().zip(gathered) {
@@ -436,7 +438,7 @@ where
     let (home, found) = (bands.home(), Found::default());
     each_chunk_of_three((x, v, F), CHUNK, &|chunk, x, v, F| {
         let mut outcome = Outcome::default();
-        let (mut run, mut block) = (Run::new(), Block::new());
+        let (mut copies, mut block) = (Copies::new(), Block::new());
         let mut gathered = [Gathered::zero(); BLOCK];
         let blocks = x
             .chunks_mut(BLOCK)
@@ -445,13 +447,13 @@ where
             .zip(home[chunk * CHUNK..].chunks(BLOCK));
         for (index, (((x, v), F), home)) in blocks.enumerate() {
             let first = chunk * CHUNK + index * BLOCK;
-            run.copy(x, F);
+            copies.copy(x, F);
             if c.planted.is(Fault::WeightsOfNewPosition) {
-                for (x, v) in run.x.iter_mut().zip(&*v) {
+                for (x, v) in copies.x.iter_mut().zip(&*v) {
                     *x += v * c.time_step;
                 }
             }
-            block.weigh(&c, rule, &run);
+            block.weigh(&c, rule, copies.run());
             update(&block, &mut gathered[..x.len()], first, x, v, F);
             let mut all_well = true;
             let home_of = home.iter().copied();
@@ -547,13 +549,13 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let c = *constants;
         let forcing = Forcing::new(body_force, X, t, &c);
         bands.scatter(layout, nodes, &|nodes| nodes.fill(Node::zero()), &|piece, first, ids| {
-            c.scatter(rule, x, F, piece, first, ids, |run, ids, deposits| {
-                forcing.evaluate(ids, run, &mut deposits.b);
+            c.scatter(rule, x, F, piece, first, ids, |copies, ids, deposits| {
+                forcing.evaluate(ids, &copies.x, &mut deposits.b);
                 deposits.take(ids, mass, volume);
                 for (k, &p) in ids.iter().enumerate() {
                     deposits.set_level(&c, k, &v[p as usize]);
                 }
-                run.stress(&c, law, deposits);
+                copies.run().stress(&c, law, deposits);
             });
         });
         fold_ghosts(layout, &c, nodes);
@@ -624,12 +626,12 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let found = Found::default();
         each_chunk(F_next, CHUNK, &|chunk, F_next| {
             let mut outcome = Outcome::default();
-            let (mut run, mut block) = (Run::new(), Block::new());
+            let (mut copies, mut block) = (Copies::new(), Block::new());
             let (x, F) = (&x[chunk * CHUNK..], &F[chunk * CHUNK..]);
             let blocks = F_next.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK));
             for (index, ((F_next, x), F)) in blocks.enumerate() {
-                run.copy(x, F);
-                block.weigh(&c, rule, &run);
+                copies.copy(x, F);
+                block.weigh(&c, rule, copies.run());
                 let gathered = &mut [Gathered::zero(); BLOCK][..x.len()];
                 block.gather(&c.strides, nodes, x.len(), &mut *gathered);
                 let first = chunk * CHUNK + index * BLOCK;
@@ -666,14 +668,14 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let forcing = Forcing::new(body_force, X, t, &c);
         let clear = |nodes: &mut [Node<T, D>]| nodes.iter_mut().for_each(Node::clear_acceleration);
         bands.scatter(layout, nodes, &clear, &|piece, first, ids| {
-            c.scatter(rule, x, F, piece, first, ids, |run, ids, deposits| {
-                forcing.evaluate(ids, run, &mut deposits.b);
+            c.scatter(rule, x, F, piece, first, ids, |copies, ids, deposits| {
+                forcing.evaluate(ids, &copies.x, &mut deposits.b);
                 deposits.take(ids, mass, volume);
                 (0..ids.len()).for_each(|k| deposits.set_force(&c, k));
                 if !c.planted.is(Fault::StressOfOldStretch) {
-                    run.pick_F(ids, F_next);
+                    copies.pick_F(ids, F_next);
                 }
-                run.stress(&c, law, deposits);
+                copies.run().stress(&c, law, deposits);
             });
         });
         fold_ghost_forces(layout, nodes);
@@ -723,13 +725,18 @@ impl<'a, T: RealField + Copy, const D: usize> Forcing<'a, T, D> {
 
     /// Writes into `b` the force per unit mass on the particles `ids`, and nothing where there is none. The particles of the
     /// block are the same.
-    pub(crate) fn evaluate(&self, ids: &[u32], run: &Run<T, D>, b: &mut [SVector<T, D>; BLOCK]) {
+    pub(crate) fn evaluate(
+        &self,
+        ids: &[u32],
+        x: &[SVector<T, D>; BLOCK],
+        b: &mut [SVector<T, D>; BLOCK],
+    ) {
         let Some(body_force) = self.body_force else {
             return;
         };
         let b = &mut b[..ids.len()];
         if self.at_current {
-            body_force.evaluate(0, &run.x[..ids.len()], self.t, b);
+            body_force.evaluate(0, &x[..ids.len()], self.t, b);
         } else {
             body_force.evaluate_of(ids, self.X, self.t, b);
         }

@@ -7,7 +7,7 @@
 
 use nalgebra::{RealField, SMatrix, SVector};
 
-use crate::block::{BLOCK, Block, Run};
+use crate::block::{BLOCK, Block, Copies, Run};
 use crate::body_force::BodyForce;
 use crate::fault::Fault;
 use crate::material::Law;
@@ -61,10 +61,10 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         R: Rule<T, D, W>,
         L: Law<T>,
     {
-        let Self { particles, constants: c, layout, bands, nodes, next, .. } = self;
+        let Self { particles, constants: c, layout, bands, nodes, next, alike, .. } = self;
         let Particles { X, x, v, F, mass, volume, .. } = particles;
         let forcing = Forcing::new(body_force, X, t_next, c);
-        let step = Sweep { c, rule, law, nodes, mass, volume, forcing };
+        let step = Sweep { c, rule, law, nodes, mass, volume, alike: *alike, forcing };
         let found = Found::default();
         let clear = |nodes: &mut [Node<T, D>]| nodes.fill(Node::zero());
         bands.sweep(layout, next, &clear, (x, v, F), &|piece, first, band, elements| {
@@ -85,6 +85,7 @@ struct Sweep<'a, T, R, L, const D: usize> {
     nodes: &'a [Node<T, D>],
     mass: &'a [T],
     volume: &'a [T],
+    alike: Option<(T, T)>,
     /// The body force at the start of the next step.
     forcing: Forcing<'a, T, D>,
 }
@@ -102,76 +103,116 @@ impl<T: RealField + Copy, R, L: Law<T>, const D: usize> Sweep<'_, T, R, L, D> {
     where
         R: Rule<T, D, W>,
     {
-        let &Self { c, rule, law, nodes, mass, volume, ref forcing } = self;
         let mut outcome = Outcome::default();
-        let mut run = Run::new();
-        let mut block = Block::<T, D, W>::new();
-        let mut deposits = Deposits::zero();
+        let mut copies = Copies::new();
+        let deposits = match self.alike {
+            Some((mass, volume)) => Deposits::alike(mass, volume),
+            None => Deposits::zero(),
+        };
+        let mut scratch = (Block::new(), deposits);
         for (index, ids) in elements.numbers().chunks(BLOCK).enumerate() {
             let place = index * BLOCK;
-            deposits.take(ids, mass, volume);
-            for k in 0..ids.len() {
-                let (x, v, F) = elements.get(place + k);
-                let ahead = c.planted.is(Fault::WeightsOfNewPosition);
-                run.x[k] = if ahead { *x + *v * c.time_step } else { *x };
-                run.F[k] = *F;
+            if self.alike.is_none() {
+                scratch.1.take(ids, self.mass, self.volume);
             }
-            block.weigh(c, rule, &run);
-            forcing.evaluate(ids, &run, &mut deposits.b);
-            let follow = Follow {
-                c,
-                time_step: c.time_step,
-                per_cell: c.time_step * c.inverse_spacing,
-                run: &mut run,
-                elements: &mut elements,
-                place,
-                deposits: &mut deposits,
-            };
-            block.gather(&c.strides, nodes, ids.len(), follow);
-            block.weigh(c, rule, &run);
-            let mut all_well = true;
-            let home = std::iter::repeat(band);
-            let Run { x, F } = &run;
-            dispatch(Check { c, rule, home, x, F, all_well: &mut all_well });
-            if !all_well {
-                for (k, &p) in ids.iter().enumerate() {
-                    let (x, _, F) = elements.get(place + k);
-                    outcome = outcome.merge(c.judge(rule, band, x, F, p as usize));
-                }
-            }
-            // A particle that has left its band would give to nodes that are another's.
-            if !outcome.is_nothing() {
+            if let Some((x, v, F)) = elements.successive::<BLOCK>(place) {
+                let found = self.block(&mut scratch, piece, (first, band), ids, (x, v, F));
+                outcome = outcome.merge(found);
                 continue;
             }
-            if c.planted.is(Fault::LastNodeSkipped) {
-                block.skip_last_node(&c.upper_in_cells());
+            for k in 0..ids.len() {
+                let (x, v, F) = elements.get(place + k);
+                (copies.x[k], copies.v[k], copies.F[k]) = (*x, *v, *F);
             }
-            run.stress(c, law, &mut deposits);
-            block.scatter(&c.strides, piece, first, &deposits, ids.len());
+            let Copies { x, v, F } = &mut copies;
+            let found = self.block(&mut scratch, piece, (first, band), ids, (x, v, F));
+            outcome = outcome.merge(found);
+            for k in 0..ids.len() {
+                let (x, v, F) = elements.get(place + k);
+                (*x, *v, *F) = (copies.x[k], copies.v[k], copies.F[k]);
+            }
         }
         outcome
     }
+
+    /// The same for a block of particles.
+    fn block<const W: usize>(
+        &self,
+        (block, deposits): &mut (Block<T, D, W>, Deposits<T, D, BLOCK>),
+        piece: &mut [Node<T, D>],
+        (first, band): (usize, u32),
+        ids: &[u32],
+        (x, v, F): Lying<'_, T, D>,
+    ) -> Outcome
+    where
+        R: Rule<T, D, W>,
+    {
+        let &Self { c, rule, law, nodes, ref forcing, .. } = self;
+        if c.planted.is(Fault::WeightsOfNewPosition) {
+            let ahead = std::array::from_fn(|k| x[k] + v[k] * c.time_step);
+            block.weigh(c, rule, Run { x: &ahead, F });
+        } else {
+            block.weigh(c, rule, Run { x, F });
+        }
+        forcing.evaluate(ids, x, &mut deposits.b);
+        let follow = Follow {
+            c,
+            time_step: c.time_step,
+            per_cell: c.time_step * c.inverse_spacing,
+            x,
+            v,
+            F,
+            deposits,
+        };
+        block.gather(&c.strides, nodes, ids.len(), follow);
+        block.weigh(c, rule, Run { x, F });
+        let mut all_well = true;
+        let home = std::iter::repeat(band);
+        dispatch(Check { c, rule, home, x: &x[..ids.len()], F, all_well: &mut all_well });
+        if !all_well {
+            let mut outcome = Outcome::default();
+            for (k, &p) in ids.iter().enumerate() {
+                outcome = outcome.merge(c.judge(rule, band, &x[k], &F[k], p as usize));
+            }
+            // A particle that has left its band would give to nodes that are another's.
+            if !outcome.is_nothing() {
+                return outcome;
+            }
+        }
+        if c.planted.is(Fault::LastNodeSkipped) {
+            block.skip_last_node(&c.upper_in_cells());
+        }
+        Run { x, F }.stress(c, law, deposits);
+        block.scatter(&c.strides, piece, first, deposits, ids.len());
+        Outcome::default()
+    }
 }
 
+/// Positions, velocities and deformation gradients of the particles of a block, one after the other.
+type Lying<'a, T, const D: usize> = (
+    &'a mut [SVector<T, D>; BLOCK],
+    &'a mut [SVector<T, D>; BLOCK],
+    &'a mut [SMatrix<T, D, D>; BLOCK],
+);
+
 /// Moves and stretches particles as the grid tells, and states what mass, momentum and body force they give to it next.
-struct Follow<'a, 'b, T, const D: usize> {
+struct Follow<'a, T, const D: usize> {
     c: &'a Constants<T, D>,
     time_step: T,
     /// Time step over the edge of a cell.
     per_cell: T,
-    run: &'a mut Run<T, D>,
-    elements: &'a mut Elements<'b, T, D>,
-    /// Of the first particle within the band.
-    place: usize,
+    x: &'a mut [SVector<T, D>; BLOCK],
+    v: &'a mut [SVector<T, D>; BLOCK],
+    F: &'a mut [SMatrix<T, D, D>; BLOCK],
     /// With the forces per mass, which are turned into forces.
     deposits: &'a mut Deposits<T, D, BLOCK>,
 }
 
-impl<T: RealField + Copy, const D: usize> Receive<T, D> for Follow<'_, '_, T, D> {
+impl<T: RealField + Copy, const D: usize> Receive<T, D> for Follow<'_, T, D> {
     #[inline(always)]
     fn receive(&mut self, k: usize, gathered: &Gathered<T, D>) {
-        let Self { c, run, elements, place, deposits, .. } = self;
-        let (x, v, F) = elements.get(*place + k);
+        let Self { c, deposits, .. } = self;
+        let (x, v, F) = (&mut self.x[k], &mut self.v[k], &mut self.F[k]);
         *v += gathered.acceleration * c.time_step;
         let mut velocity = gathered.velocity;
         if c.planted.is(Fault::PicForFlip) {
@@ -182,7 +223,6 @@ impl<T: RealField + Copy, const D: usize> Receive<T, D> for Follow<'_, '_, T, D>
         }
         *x += c.planted.change(velocity * c.time_step);
         *F = c.stretch(&gathered.velocity_gradient, F);
-        (run.x[k], run.F[k]) = (*x, *F);
         deposits.set_level(c, k, v);
     }
 
@@ -199,12 +239,11 @@ impl<T: RealField + Copy, const D: usize> Receive<T, D> for Follow<'_, '_, T, D>
             self.receive(k, &Gathered::new(&level.0, &slope.map(|slope| slope.0)));
             return;
         }
-        let Self { time_step, per_cell, run, elements, place, deposits, .. } = self;
-        let (x, v, F) = elements.get(*place + k);
+        let Self { time_step, per_cell, deposits, .. } = self;
         let (Some(x), Some(v), Some(F)) = (
-            x.as_mut_slice().first_chunk_mut::<2>(),
-            v.as_mut_slice().first_chunk_mut::<2>(),
-            F.as_mut_slice().first_chunk_mut::<4>(),
+            self.x[k].as_mut_slice().first_chunk_mut::<2>(),
+            self.v[k].as_mut_slice().first_chunk_mut::<2>(),
+            self.F[k].as_mut_slice().first_chunk_mut::<4>(),
         ) else {
             return;
         };
@@ -218,10 +257,7 @@ impl<T: RealField + Copy, const D: usize> Receive<T, D> for Follow<'_, '_, T, D>
         let across = vectors.mul(vectors.low_twice(slope[D - 1]), factor);
         let stretch = vectors
             .add(vectors.mul(along, vectors.even(old)), vectors.mul(across, vectors.odd(old)));
-        let new = vectors.add(old, stretch);
-        *F = new.0;
-        run.x[k].as_mut_slice().copy_from_slice(&[xv.0[0], xv.0[1]]);
-        run.F[k].as_mut_slice().copy_from_slice(&new.0);
+        *F = vectors.add(old, stretch).0;
         deposits.set_level_in_plane(vectors, k, xv);
     }
 }

@@ -160,6 +160,11 @@ impl<T: RealField + Copy, const D: usize, const N: usize> Deposits<T, D, N> {
         }
     }
 
+    /// Nothing yet, of particles that all have this mass and this volume.
+    pub(crate) fn alike(mass: T, volume: T) -> Self {
+        Self { mass: [mass; N], volume: [volume; N], ..Self::zero() }
+    }
+
     /// Takes masses and volumes of the particles `ids`.
     pub(crate) fn take(&mut self, ids: &[u32], mass: &[T], volume: &[T]) {
         for (k, &p) in ids.iter().enumerate() {

@@ -230,7 +230,7 @@ mod tests {
             check(&wide_axis(xi, wide), xi)?;
         }
 
-        /// Particles are sorted by the tile of the node at which their weights begin.
+        /// Particles are sorted by the band of the node at which their weights begin.
         #[test]
         fn the_first_layer_is_that_of_the_weights(xi in 0.0..20.0_f64, l in 1e-3..0.5_f64) {
             prop_assert_eq!(first_layer(xi, l), gimp_axis(xi, l).base);

@@ -348,22 +348,25 @@ fn body_forces<S, T: Real, const D: usize, const TIME: usize, const POINT: usize
 ) where
     S: BodyForceStages<T, D, TIME, POINT>,
 {
-    let near = spread(run, components, |point| solution.body_force_staged::<true>(time, point));
-    if !near {
-        spread(run, components, |point| solution.body_force_staged::<false>(time, point));
+    if !spread::<true, _, _, D, TIME, POINT>(solution, time, run, components) {
+        spread::<false, _, _, D, TIME, POINT>(solution, time, run, components);
     }
 }
 
 /// Whether all values are finite: if not, a ratio was not near one, or there is no force. As a function of its own, which
 /// tells the compiler that the arrays are in different places.
 #[inline(always)]
-fn spread<T: Real, const D: usize, const POINT: usize>(
+fn spread<const NEAR: bool, S, T: Real, const D: usize, const TIME: usize, const POINT: usize>(
+    solution: &S,
+    time: &[T; TIME],
     run: &[&[T; BLOCK]; POINT],
     components: &mut [[T; BLOCK]; D],
-    body_force: impl Fn(&[T; POINT]) -> SVector<T, D>,
-) -> bool {
+) -> bool
+where
+    S: BodyForceStages<T, D, TIME, POINT>,
+{
     for i in 0..BLOCK {
-        let value = body_force(&array::from_fn(|m| run[m][i]));
+        let value = solution.body_force_staged::<NEAR>(time, &array::from_fn(|m| run[m][i]));
         for d in 0..D {
             components[d][i] = value[d];
         }
@@ -399,6 +402,12 @@ where
 
     fn evaluate_of(&self, t: T, points: &[u32], b: &mut [SVector<T, D>]) {
         assert_eq!(points.len(), b.len(), "one body force a point");
+        if let Some(first) = successive(points)
+            && first + points.len() <= self.len
+        {
+            self.runs(t, Numbers::From(first), b);
+            return;
+        }
         if let Some(&n) = points.iter().find(|&&n| n as usize >= self.len) {
             panic!("point {n} was asked for; there are {}", self.len);
         }
@@ -452,9 +461,10 @@ where
     #[inline(always)]
     fn with_simd<I: Simd>(self, _: I) {
         let Self { solution, time, velocity_time, blocks, runs } = self;
+        let times = (time, velocity_time);
         for (block, run) in blocks.iter().zip(runs) {
-            if !fill(block, run, |p| solution.state_staged::<true>(time, velocity_time, p)) {
-                fill(block, run, |p| solution.state_staged::<false>(time, velocity_time, p));
+            if !fill::<true, _, _, D, TIME, VELOCITY_TIME, POINT>(solution, times, block, run) {
+                fill::<false, _, _, D, TIME, VELOCITY_TIME, POINT>(solution, times, block, run);
             }
         }
     }
@@ -482,13 +492,25 @@ where
 /// Whether all stresses are finite. As a function of its own, which tells the compiler that `block` and `run` are in different
 /// places.
 #[inline(always)]
-fn fill<T: Real, const D: usize, const POINT: usize>(
+fn fill<
+    const NEAR: bool,
+    S,
+    T: Real,
+    const D: usize,
+    const TIME: usize,
+    const VELOCITY_TIME: usize,
+    const POINT: usize,
+>(
+    solution: &S,
+    (time, velocity_time): (&[T; TIME], &[T; VELOCITY_TIME]),
     block: &[[T; BLOCK]; POINT],
     run: &mut StateRun<T, D>,
-    state: impl Fn(&[T; POINT]) -> State<T, D>,
-) -> bool {
+) -> bool
+where
+    S: StateStages<T, D, TIME, VELOCITY_TIME, POINT>,
+{
     for n in 0..BLOCK {
-        run.put(n, &state(&point(block, n)));
+        run.put(n, &solution.state_staged::<NEAR>(time, velocity_time, &point(block, n)));
     }
     all_finite(run.P.as_flattened())
 }
