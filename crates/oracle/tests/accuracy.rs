@@ -44,38 +44,43 @@ fn judge(
     }
 }
 
+/// What goes beyond the bound in one specification of the library.
+fn in_every_class(file: &Path) -> Vec<String> {
+    let text = std::fs::read_to_string(file).unwrap();
+    let spec = match Spec::parse(&text, &file.display().to_string()) {
+        Ok(spec) => spec,
+        Err(error) => return vec![error.to_string()],
+    };
+    let mut failures = Vec::new();
+    let accuracy = Accuracy::new(&spec, spec.derive().unwrap());
+    let n = accuracy.dimension();
+    let generated = |inputs: &[f64]| -> Result<Judged, String> {
+        let solution = build(&spec.name, &inputs[n + 1..]).ok_or("not in the library")?;
+        let solution = solution.map_err(|error| error.to_string())?;
+        solution.each_field(&inputs[..n], inputs[n]).ok_or("wrong dimension".into())
+    };
+    judge(&spec, "generated", &accuracy, (&Class::ALL, POINTS), &generated, &mut failures);
+    let programs = accuracy.programs();
+    let interpreted = |inputs: &[f64]| -> Result<Judged, String> {
+        Ok(programs.iter().map(|(letter, p)| (*letter, p.evaluate(inputs))).collect())
+    };
+    judge(&spec, "program", &accuracy, (&Class::ALL, POINTS / 4), &interpreted, &mut failures);
+    failures
+}
+
 #[test]
 fn every_specification_in_every_class() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../mms-specs");
     let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().path()).collect();
+    files.retain(|file| file.extension().is_some_and(|extension| extension == "toml"));
     files.sort();
-    let mut failures = Vec::new();
     println!(
         "specification, way, class: K of u, v, a, H, F, J, P, b, and of b, u, v, F, P in stages"
     );
-    for file in files.iter().filter(|f| f.extension().is_some_and(|e| e == "toml")) {
-        let text = std::fs::read_to_string(file).unwrap();
-        let spec = match Spec::parse(&text, &file.display().to_string()) {
-            Ok(spec) => spec,
-            Err(error) => {
-                failures.push(error.to_string());
-                continue;
-            }
-        };
-        let accuracy = Accuracy::new(&spec, spec.derive().unwrap());
-        let n = accuracy.dimension();
-        let generated = |inputs: &[f64]| -> Result<Judged, String> {
-            let solution = build(&spec.name, &inputs[n + 1..]).ok_or("not in the library")?;
-            let solution = solution.map_err(|error| error.to_string())?;
-            solution.each_field(&inputs[..n], inputs[n]).ok_or("wrong dimension".into())
-        };
-        judge(&spec, "generated", &accuracy, (&Class::ALL, POINTS), &generated, &mut failures);
-        let programs = accuracy.programs();
-        let interpreted = |inputs: &[f64]| -> Result<Judged, String> {
-            Ok(programs.iter().map(|(letter, p)| (*letter, p.evaluate(inputs))).collect())
-        };
-        judge(&spec, "program", &accuracy, (&Class::ALL, POINTS / 4), &interpreted, &mut failures);
-    }
+    let failures = std::thread::scope(|scope| {
+        let files: Vec<_> = files.iter().map(|file| scope.spawn(|| in_every_class(file))).collect();
+        files.into_iter().flat_map(|file| file.join().unwrap()).collect::<Vec<_>>()
+    });
     assert!(failures.is_empty(), "beyond K = {LARGEST_FACTOR}:\n{}", failures.join("\n"));
 }
 

@@ -17,17 +17,19 @@ use std::process::{Command, Stdio};
 
 /// Solutions with what those of the library lack: the other laws, energies, stresses, curved coordinates in space.
 mod others {
-    mmsmith_macros::manufactured_solution!("../data/specs/materials/ring-hencky.toml");
-    mmsmith_macros::manufactured_solution!("../data/specs/materials/shell-hencky.toml");
-    mmsmith_macros::manufactured_solution!("../data/specs/materials/skew-2d-energy.toml");
-    mmsmith_macros::manufactured_solution!("../data/specs/materials/skew-2d-hencky.toml");
-    mmsmith_macros::manufactured_solution!("../data/specs/materials/skew-2d-linear-elastic.toml");
-    mmsmith_macros::manufactured_solution!("../data/specs/materials/skew-2d-mooney-rivlin.toml");
+    mmsmith_macros::manufactured_solution!("../../data/specs/materials/ring-hencky.toml");
+    mmsmith_macros::manufactured_solution!("../../data/specs/materials/shell-hencky.toml");
+    mmsmith_macros::manufactured_solution!("../../data/specs/materials/skew-2d-energy.toml");
+    mmsmith_macros::manufactured_solution!("../../data/specs/materials/skew-2d-hencky.toml");
     mmsmith_macros::manufactured_solution!(
-        "../data/specs/materials/skew-2d-st-venant-kirchhoff.toml"
+        "../../data/specs/materials/skew-2d-linear-elastic.toml"
     );
-    mmsmith_macros::manufactured_solution!("../data/specs/materials/skew-2d-stress.toml");
-    mmsmith_macros::manufactured_solution!("../data/specs/materials/tube-hencky.toml");
+    mmsmith_macros::manufactured_solution!("../../data/specs/materials/skew-2d-mooney-rivlin.toml");
+    mmsmith_macros::manufactured_solution!(
+        "../../data/specs/materials/skew-2d-st-venant-kirchhoff.toml"
+    );
+    mmsmith_macros::manufactured_solution!("../../data/specs/materials/skew-2d-stress.toml");
+    mmsmith_macros::manufactured_solution!("../../data/specs/materials/tube-hencky.toml");
 }
 
 type Build = Box<dyn Fn(&[f64]) -> Result<AnySolution<f64>, ParameterError>>;

@@ -1,6 +1,6 @@
 //! The field check passes right solutions and catches planted faults.
 
-mod hand_coded;
+use crate::hand_coded;
 
 use hand_coded::{AxisAligned, Coded, CrossedShear, Plane, Ring};
 use mmsmith_solutions::{AnySolution, Boundary, Condition, Domain, Surface};

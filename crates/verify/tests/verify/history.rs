@@ -1,6 +1,6 @@
 //! Energies and momentum of runs over time, against those of the exact motion.
 
-mod hand_coded;
+use crate::hand_coded;
 
 use hand_coded::{AxisAligned, Coded, Plane};
 use mmsmith_solutions::{AnySolution, Boundary, Condition, Domain, Surface};

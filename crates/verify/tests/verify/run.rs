@@ -1,6 +1,6 @@
 //! Simulations of hand-coded solutions: known errors, orders, reproducibility, and runs that go wrong.
 
-mod hand_coded;
+use crate::hand_coded;
 
 use hand_coded::{AxisAligned, Coded, CrossedShear, Ring};
 use mmsmith_solutions::AnySolution;

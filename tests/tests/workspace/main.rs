@@ -1,0 +1,16 @@
+//! Tests that cross the borders of the crates, a file for each subject. One program, so that what they share is compiled once.
+
+mod automatic_differentiation;
+mod c_headers;
+mod check;
+mod claims;
+mod golden;
+mod high_order;
+mod hostile_text;
+mod library;
+mod new_solution;
+mod orders;
+mod planted_faults;
+mod planted_solver_faults;
+mod staged;
+mod updated_frame;
