@@ -122,11 +122,10 @@ impl Parser {
         }
     }
 
+    /// Goes on to the next token, which there is: nothing goes on from the end.
     fn advance(&mut self) -> Range<usize> {
         let span = self.tokens[self.position].1.clone();
-        if self.position + 1 < self.tokens.len() {
-            self.position += 1;
-        }
+        self.position += 1;
         span
     }
 

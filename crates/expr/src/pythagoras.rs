@@ -305,6 +305,9 @@ mod tests {
             ("((r-1)^2*cos(a) - x)*cos(a) + (r-1)^2*sin(a)^2 + cos(a)*x", "(-1 + r)^2"),
             ("sin(a)*(cos(a)^2 + sin(a)^2)*f", "f*sin(a)"),
             ("cos(a)^2*(sin(a)^2 + cos(a)^2)^3", "1 - sin(a)^2"),
+            // A function of a sine is a factor like any other, also below a quotient.
+            ("(sin(a)^2 + cos(a)^2)/exp(sin(a))", "1/exp(sin(a))"),
+            ("(sin(a)^2 + cos(a)^2)*sqrt(exp(cos(a)))", "sqrt(exp(cos(a)))"),
         ];
         for (text, shorter) in cases {
             let mut graph = Graph::new();
@@ -322,6 +325,11 @@ mod tests {
             "cos(a)^2 + sin(b)^2",
             "(sin(a)^2 + cos(a)^2*x)/(1 + sin(a))",
             "1 - sin(a)^2*cos(a)",
+            // A root and a quotient of a sine.
+            "(sin(a)^2 + cos(a)^2)*sqrt(2 + sin(a))",
+            "(sin(a)^2 + cos(a)^2)/(2 + sin(a))",
+            // Too high a power.
+            "(sin(a)^2 + cos(a)^2)*sin(a)^9",
             // Shorter as 1 - sin^2, which has lost its digits near a right angle, where this one is looked at.
             "cos(171*a/100)^2*(sin(171*a/100)^2 + cos(171*a/100)^2)^3",
         ];

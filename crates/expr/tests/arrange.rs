@@ -48,12 +48,14 @@ fn expression() -> impl Strategy<Value = String> {
     ];
     leaf.prop_recursive(4, 24, 3, |inner| {
         let pair = (inner.clone(), inner.clone());
+        let roots = prop::sample::select(&["1/2", "-1/2", "3/2", "-7/3", "-2", "3"][..]);
         prop_oneof![
             pair.clone().prop_map(|(a, b)| format!("({a}) + ({b})")),
             pair.clone().prop_map(|(a, b)| format!("({a}) - ({b})")),
             pair.clone().prop_map(|(a, b)| format!("({a})*({b})")),
             pair.clone().prop_map(|(a, b)| format!("({a})/(2 + ({b})^2)")),
             pair.prop_map(|(a, b)| format!("({a})/(1 + ({b})^2) + ({b})/(1 + ({a})^2)")),
+            (inner.clone(), roots).prop_map(|(a, n)| format!("(1 + ({a})^2)^({n})")),
             inner.prop_map(|a| format!("ln(1 + ({a})^2)")),
         ]
     })
@@ -94,6 +96,25 @@ proptest! {
         for (n, &x) in x.iter().enumerate() {
             let alone = program.evaluate(&[x, t, a])[0];
             prop_assert_eq!(found[0][n].to_bits(), alone.to_bits(), "{} at {}", text, x);
+        }
+    }
+}
+
+/// As above, with roots and quotients of each rate of change beside fractions, and powers up to what is multiplied out and beyond.
+#[test]
+fn values_stay_with_powers_of_every_rate() {
+    let at = [0.7, 1.2, 0.4];
+    for base in ["(1 + x)", "(1 + t)", "(1 + a)", "(1 + x*t)", "(1 + a*x*t)"] {
+        for exponent in ["1/2", "-1/2", "3/2", "-2", "2", "6", "7", "-7"] {
+            for text in [
+                format!("x*t/(1 + x*t) + {base}^({exponent})"),
+                format!("x*t/(1 + x*t)*{base}^({exponent}) - t/(1 + x*t)^2 + a*x*t"),
+                format!("(t + x/(1 + x*t))*(2*x + {base}^({exponent}))/(1 + x*t) + t"),
+            ] {
+                let (before, after) = case(&text).programs();
+                let (old, new) = (before.evaluate(&at)[0], after.evaluate(&at)[0]);
+                assert!((old - new).abs() <= 1e-12 * old.abs(), "{text} gives {old} and {new}");
+            }
         }
     }
 }
