@@ -206,6 +206,29 @@ mod tests {
         }
     }
 
+    /// The limit on products may be reached and not be passed.
+    #[test]
+    fn many_products_are_not_compared() {
+        // None of them is within another, since all are of one degree.
+        let of_degree = |n: usize| {
+            let pairs = (1..n).flat_map(move |i| (1..n - i).map(move |j| (i, j)));
+            pairs.map(move |(i, j)| format!("u^{i}*v^{j}*x^{}", n - i - j))
+        };
+        let mut texts = vec!["sin(z*w)*z^2*w^2 + y".to_owned()];
+        texts.extend(of_degree(31).take(MOST_PRODUCTS - 2));
+        let is_found = |texts: &[String]| {
+            let texts: Vec<&str> = texts.iter().map(String::as_str).collect();
+            let mut graph = Graph::new();
+            let (_, _, outputs) = reused(&mut graph, &texts);
+            graph.reachable(&outputs).iter().any(|&e| matches!(graph.node(e), Node::Whole(_)))
+        };
+        assert!(texts.len() == MOST_PRODUCTS - 1 && is_found(&texts));
+        texts.push("u*v".into());
+        assert!(!is_found(&texts));
+        texts.push("u*y".into());
+        assert!(!is_found(&texts));
+    }
+
     /// One product alone has its factors in common with nothing, so it is not made one piece.
     #[test]
     fn one_output_stays_a_product() {
