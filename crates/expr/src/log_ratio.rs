@@ -75,6 +75,38 @@ mod tests {
         assert_eq!(curvature(0.0), -1.0 / 3.0);
     }
 
+    /// `z`, the squared logarithm, the slope and the curvature there, from 60 digits (mpmath).
+    const EXACT: [[f64; 4]; 11] = [
+        [1e-30, 2.000000000000000167e-30, -3.333333333333333611e-31, -0.3333333333333333333],
+        [1e-9, 1.999999999666666791e-9, -3.333333332000000208e-10, -0.3333333330666666668],
+        [0.001, 0.001999666755526994323, -0.0003332000571174718631, -0.3330668379937084818],
+        [0.1, 0.196752796298258271, -0.03205471352418187585, -0.3082848339209520865],
+        [0.5, 0.92625928230877757, -0.1391821180719919222, -0.2329814583136096933],
+        [0.66, 1.195953493724381863, -0.174638209183653909, -0.2108114449505209131],
+        [0.67, 1.212439690914552239, -0.1767399510294059075, -0.2095389802565219629],
+        [1.0, 1.73437810227263615, -0.2396540036990536525, -0.1735639975339642317],
+        [3.0, 4.257772537292302282, -0.4672228397480298466, -0.07540724273385870756],
+        [30.0, 17.03109014916920913, -0.8668057099370074617, -0.003259398949950800717],
+        [1e6, 210.5011783909334308, -0.9999854913557701135, -1.350863172126728119e-11],
+    ];
+
+    #[test]
+    fn few_roundings_are_lost() {
+        for [z, expected_square, expected_slope, expected_curvature] in EXACT {
+            let roundings =
+                |found: f64, expected: f64| (found / expected - 1.0).abs() / f64::EPSILON;
+            assert!(roundings(squared(z), expected_square) <= 2.0, "{z}");
+            assert!(
+                roundings(slope(z), expected_slope) <= 4.0,
+                "{z}: {}",
+                roundings(slope(z), expected_slope)
+            );
+            // Of the curvature the absolute error counts where it is small, but it keeps most digits.
+            let lost = roundings(curvature(z), expected_curvature);
+            assert!(lost <= if z < 100.0 { 10.0 } else { 1e6 }, "{z}: {lost}");
+        }
+    }
+
     #[test]
     fn both_forms_agree_where_they_meet() {
         let z = 2.0 / 3.0;

@@ -240,7 +240,8 @@ impl Shortening<'_> {
 #[cfg(test)]
 mod tests {
     use super::MOST_PARTS;
-    use crate::{Ast, Expr, Graph};
+    use crate::{Ast, Expr, Graph, Program};
+    use proptest::prelude::*;
 
     fn build(graph: &mut Graph, text: &str) -> Expr {
         let ast = Ast::parse(text).unwrap();
@@ -337,6 +338,52 @@ mod tests {
             let mut graph = Graph::new();
             let expr = build(&mut graph, text);
             assert_eq!(graph.shortened(expr), expr, "{text}");
+        }
+    }
+
+    /// Polynomials in sines and cosines of two angles and in other quantities, some of which are functions of a sine or roots.
+    fn text() -> impl Strategy<Value = String> {
+        let leaf = prop::sample::select(
+            &[
+                "sin(a)",
+                "cos(a)",
+                "sin(b)",
+                "cos(b)",
+                "x",
+                "2",
+                "exp(sin(a))",
+                "(sin(a)^2 + cos(a)^2)",
+            ][..],
+        );
+        leaf.prop_map(str::to_owned).prop_recursive(4, 16, 2, |inner| {
+            let pair = (inner.clone(), inner.clone());
+            prop_oneof![
+                pair.clone().prop_map(|(a, b)| format!("({a}) + ({b})")),
+                pair.clone().prop_map(|(a, b)| format!("({a}) - ({b})/3")),
+                pair.clone().prop_map(|(a, b)| format!("({a})*({b})")),
+                pair.prop_map(|(a, b)| format!("({a})*cos(a)*cos(b) + ({b})*sin(a)*sin(b)")),
+                (inner.clone(), 2..4_i32).prop_map(|(a, n)| format!("({a})^{n}")),
+                inner.clone().prop_map(|a| format!("({a})*cos(a)^2 + ({a})*sin(a)^2")),
+                inner.prop_map(|a| format!("sqrt(1 + ({a})^2)")),
+            ]
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn shorter_forms_have_the_same_value(
+            text in text(), x in 0.1..2.0, a in 0.1..1.4, b in -1.4..1.4,
+        ) {
+            let mut graph = Graph::new();
+            let inputs = ["x", "a", "b"].map(|name| (graph.symbol(name), Default::default()));
+            let expr = build(&mut graph, &text);
+            let short = graph.shortened(expr);
+            let program = Program::lower(&mut graph, &inputs, &[], &[expr, short]);
+            let found = program.evaluate(&[x, a, b]);
+            let allowed = 1e-11 * (1.0 + found[0].abs().powi(2));
+            prop_assert!((found[0] - found[1]).abs() <= allowed, "{} as {}", text, graph.print(short));
+            let size = |expr| graph.reachable(&[expr]).len();
+            prop_assert!(short == expr || size(short) < size(expr), "{} as {}", text, graph.print(short));
         }
     }
 }
