@@ -558,6 +558,17 @@ mod tests {
         }
     }
 
+    /// However many symbols there are, none has nearly the value of another, and none is near zero.
+    #[test]
+    fn samples_of_symbols_are_apart() {
+        let mut graph = Graph::new();
+        let symbols: Vec<Expr> = (0..40).map(|n| graph.symbol(&format!("x{n}"))).collect();
+        let mut at: Vec<f64> = symbols.iter().map(|&symbol| graph.sampled(symbol).0).collect();
+        at.sort_by(f64::total_cmp);
+        assert!(at[0] > 0.3 && at[39] < 1.3, "{at:?}");
+        assert!(at.windows(2).all(|pair| pair[1] - pair[0] > 0.01), "{at:?}");
+    }
+
     #[test]
     fn zero_and_what_has_no_value_do_not_differ_from_zero() {
         let mut graph = Graph::new();

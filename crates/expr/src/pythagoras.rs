@@ -329,6 +329,8 @@ mod tests {
             // A root and a quotient of a sine.
             "(sin(a)^2 + cos(a)^2)*sqrt(2 + sin(a))",
             "(sin(a)^2 + cos(a)^2)/(2 + sin(a))",
+            // No shorter multiplied out, as 1 and the squares and products of sin(a) and sin(b).
+            "(sin(a)^2 + cos(a)^2 - sin(b)/3 + sin(a))^2",
             // Too high a power.
             "(sin(a)^2 + cos(a)^2)*sin(a)^9",
             // Shorter as 1 - sin^2, which has lost its digits near a right angle, where this one is looked at.
