@@ -551,6 +551,8 @@ mod tests {
             // What has a value is the same in one piece.
             let whole = graph.opaque(expr);
             assert_eq!(graph.sampled(whole), found, "{text}");
+            assert_eq!(graph.opaque(whole), whole);
+            assert_eq!(graph.as_number(expr).is_some(), whole == expr, "{text}");
             assert!(graph.sum_is_sampled(&[expr, whole]));
             assert!(graph.sum_differs_from_zero([expr, whole].into_iter()), "{text}");
             let negative = graph.neg(whole);
