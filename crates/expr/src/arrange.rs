@@ -489,6 +489,42 @@ mod tests {
     use super::*;
     use crate::Ast;
 
+    /// Limits on terms, products and powers may be reached and not be passed.
+    #[test]
+    fn limits_of_multiplying_out() {
+        let mut graph = Graph::new();
+        let (t, s) = (graph.symbol("t"), graph.symbol("s"));
+        let mut arranging = Arranging {
+            graph: &mut graph,
+            inputs: &[],
+            definitions: &[],
+            drafts: &mut Drafts::default(),
+            dependence: NumberMap::default(),
+            arranged: NumberMap::default(),
+            products: 0,
+            last: None,
+            fractions: NumberMap::default(),
+        };
+        let sum = |of: Expr, count: usize| -> Fraction {
+            let terms = (1..).map(|n| (Monomial::from([(of, n)]), Graph::ONE));
+            Fraction { numerator: terms.take(count).collect(), denominator: Monomial::new() }
+        };
+        let power = arranging.repeated(&Fraction::atom(t), LARGEST_POWER);
+        assert_eq!(
+            power.map(|f| f.numerator),
+            Some([([(t, LARGEST_POWER)].into(), Graph::ONE)].into())
+        );
+        assert!(arranging.repeated(&Fraction::atom(t), LARGEST_POWER + 1).is_none());
+        arranging.products = 0;
+        let terms = |f: Option<Fraction>| f.map(|f| f.numerator.len());
+        assert_eq!(terms(arranging.times(&sum(t, 6), &sum(s, 8))), Some(MOST_TERMS));
+        assert_eq!(terms(arranging.times(&sum(t, 7), &sum(s, 7))), None);
+        assert_eq!(arranging.products, 6 * 8 + 7 * 7);
+        arranging.products = MOST_PRODUCTS - 4;
+        assert_eq!(terms(arranging.times(&sum(t, 2), &sum(s, 2))), Some(4));
+        assert_eq!(terms(arranging.times(&sum(t, 1), &sum(s, 1))), None);
+    }
+
     /// The points of each input are all over its range, none of two inputs are the same, and each is tiny at one odd point.
     #[test]
     fn sample_points_fill_their_range() {

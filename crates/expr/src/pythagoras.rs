@@ -239,9 +239,10 @@ impl Shortening<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::MOST_PARTS;
-    use crate::{Ast, Expr, Graph, Program};
+    use super::{MOST_PARTS, MOST_TERMS, Monomial, Polynomial, Shortening};
+    use crate::{Ast, Expr, Function, Graph, Program};
     use proptest::prelude::*;
+    use std::collections::{BTreeMap, BTreeSet};
 
     fn build(graph: &mut Graph, text: &str) -> Expr {
         let ast = Ast::parse(text).unwrap();
@@ -297,6 +298,52 @@ mod tests {
         terms.pop();
         terms.push(Graph::ZERO);
         assert_eq!(graph.without_vanishing_part(&terms), terms[3..8]);
+    }
+
+    /// Limits on terms and powers may be reached and not be passed.
+    #[test]
+    fn limits_of_multiplying_out() {
+        let mut graph = Graph::new();
+        let (a, b) = (graph.symbol("a"), graph.symbol("b"));
+        let sine = graph.call(Function::Sin, &[a]);
+        let cosine = graph.call(Function::Cos, &[a]);
+        let other = graph.call(Function::Sin, &[b]);
+        let sum = |of: Expr, count: usize| -> Polynomial {
+            (1..).map(|n| (Monomial::from([(of, n)]), Graph::ONE)).take(count).collect()
+        };
+        let angles = BTreeSet::from([a, b]);
+        let mut shortening = Shortening { graph: &mut graph, angles, turning: BTreeMap::new() };
+        let mut times = |first: Polynomial, second: Polynomial| {
+            shortening.times(&first, &second).map(|product| product.len())
+        };
+        // Pairs of terms, of which many become one, and terms of the product.
+        assert_eq!(times(sum(sine, 16), sum(sine, 16)), Some(31));
+        assert_eq!(times(sum(sine, 16), sum(sine, 17)), None);
+        assert_eq!(times(sum(sine, 8), sum(other, 8)), Some(64));
+        assert_eq!(times(sum(sine, 8), sum(other, 9)), None);
+        // A square makes one term more while it is looked at, a fourth power three.
+        for (power, others, expected) in [
+            (2, 2 * MOST_TERMS - 1, Some(2 * MOST_TERMS + 1)),
+            (2, 2 * MOST_TERMS, None),
+            (4, 2 * MOST_TERMS - 3, Some(2 * MOST_TERMS)),
+            (4, 2 * MOST_TERMS - 2, None),
+        ] {
+            let mut polynomial = sum(other, others);
+            polynomial.insert(Monomial::from([(cosine, power)]), Graph::ONE);
+            let found = shortening.without_cosine_squares(polynomial);
+            assert_eq!(found.map(|p| p.len()), expected, "{power} {others}");
+        }
+        let mut terms = |text: &str| {
+            let expr = build(shortening.graph, text);
+            shortening.polynomial(expr).map(|p| p.len())
+        };
+        assert_eq!(terms("sin(a)^8"), Some(1));
+        assert_eq!(terms("sin(a)^9"), None);
+        let powers =
+            "(sin(a) + sin(a)^2 + sin(a)^3 + sin(a)^4 + sin(a)^5 + sin(a)^6 + sin(a)^7 + sin(a)^8)";
+        let others = powers.replace("sin(a)", "cos(b)");
+        assert_eq!(terms(&format!("{powers}*{others}")), Some(64));
+        assert_eq!(terms(&format!("1 + {powers}*{others}")), None);
     }
 
     #[test]
