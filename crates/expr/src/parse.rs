@@ -552,7 +552,7 @@ mod tests {
             assert!(Ast::parse(&next).is_err());
         }
         // Parts beside each other are not nested.
-        let beside = vec![nested(DEEPEST), called(DEEPEST - 1), nested(DEEPEST)].join("*");
+        let beside = [nested(DEEPEST), called(DEEPEST - 1), nested(DEEPEST)].join("*");
         assert!(Ast::parse(&beside).is_ok());
     }
 
