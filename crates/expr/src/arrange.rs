@@ -523,6 +523,21 @@ mod tests {
         arranging.products = MOST_PRODUCTS - 4;
         assert_eq!(terms(arranging.times(&sum(t, 2), &sum(s, 2))), Some(4));
         assert_eq!(terms(arranging.times(&sum(t, 1), &sum(s, 1))), None);
+        // What is found again counts again, though nothing is multiplied.
+        let product = arranging.graph.mul(t, s);
+        let time = Dependence { position: false, time: true };
+        arranging.dependence.extend([(t, time), (s, time)]);
+        arranging.products = 10;
+        for times in 1..4 {
+            assert_eq!(terms(arranging.fraction(product)), Some(1));
+            assert_eq!(arranging.products, 10 + 4 * times);
+        }
+        arranging.products = MOST_PRODUCTS - 4;
+        assert_eq!(terms(arranging.fraction(product)), Some(1));
+        assert_eq!(terms(arranging.fraction(product)), None);
+        // What takes no product is never too much.
+        assert_eq!(terms(arranging.fraction(t)), Some(1));
+        assert_eq!(terms(arranging.fraction(t)), Some(1));
     }
 
     /// The points of each input are all over its range, none of two inputs are the same, and each is tiny at one odd point.

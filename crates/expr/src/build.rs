@@ -203,3 +203,57 @@ impl Graph {
 fn large_numbers() -> String {
     format!("numbers of more than {MOST_BITS} bits are not supported")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn built(text: &str) -> Result<(), String> {
+        let mut graph = Graph::new();
+        let ast = Ast::parse(text).unwrap();
+        let built = graph.build(&ast, &mut |graph, name| match name {
+            // Numbers of `2^n` and of one over it, as large as they have to be.
+            "least" => Ok(graph.number(power_of_two(1))),
+            "half" => Ok(graph.number(power_of_two(MOST_BITS / 2 - 1))),
+            "rest" => Ok(graph.number(power_of_two(MOST_BITS / 2 - 2))),
+            "small" => Ok(graph.number(Rational::one() / power_of_two(MOST_BITS - 2))),
+            "smallest" => Ok(graph.number(Rational::one() / power_of_two(MOST_BITS - 1))),
+            _ => Ok(graph.symbol(name)),
+        });
+        built.map(|_| ()).map_err(|error| error.message)
+    }
+
+    fn power_of_two(exponent: u64) -> Rational {
+        Rational::from_integer(BigInt::one() << exponent)
+    }
+
+    /// Limits on numbers may be reached and not be passed.
+    #[test]
+    fn limits_on_numbers() {
+        let large = |text: &str| assert!(built(text).unwrap_err().contains("bits"), "{text}");
+        let fine = |text: &str| assert_eq!(built(text), Ok(()), "{text}");
+        // Numerators and denominators of factors, less the bits that they have in any case.
+        fine("half*rest");
+        large("half*half*least");
+        fine("half*x*rest");
+        large("half*x*half*least*least*x");
+        fine("1/small");
+        fine("x + y/3*half");
+        // Numbers that a sum brings over one denominator.
+        fine("small + x");
+        large("smallest + x");
+        large("smallest + x/3");
+        // Exponents.
+        for text in ["x^1000", "x^-1000", "x^(1/1000)", "x^(-999/1000)", "x^0", "0^2"] {
+            fine(text);
+        }
+        for text in ["x^1001", "x^-1001", "x^(1/1001)", "x^(1001/2)"] {
+            assert!(built(text).unwrap_err().contains("beyond 1000"), "{text}");
+        }
+        fine("(-8)^3");
+        fine("8^(1/3)");
+        assert!(built("(-8)^(1/3)").unwrap_err().contains("negative"));
+        assert!(built("0^(-1)").unwrap_err().contains("not positive"));
+        assert!(built("0^0").unwrap_err().contains("not positive"));
+    }
+}

@@ -153,18 +153,16 @@ fn where_pi_is_a_factor_it_is_left_out() {
     }
 }
 
+const NAMES: [&str; 8] = ["a", "b", "k", "t", "s", "x", "y", "z"];
+
 /// What the program for `text` does, as nested operations; parameters are a, b, k, times t, s, places x, y, z, and r means
 /// `sqrt(x^2 + y^2)`.
 fn lowered(text: &str) -> String {
     let mut graph = Graph::new();
-    let names = ["a", "b", "k", "t", "s", "x", "y", "z"];
-    let inputs: Vec<_> = names
-        .iter()
-        .map(|&name| {
-            let (time, position) = ("ts".contains(name), "xyz".contains(name));
-            (graph.symbol(name), Dependence { position, time })
-        })
-        .collect();
+    let inputs = NAMES.map(|name| {
+        let (time, position) = ("ts".contains(name), "xyz".contains(name));
+        (graph.symbol(name), Dependence { position, time })
+    });
     let mut build = |text: &str| {
         graph.build(&Ast::parse(text).unwrap(), &mut |g, name| Ok(g.symbol(name))).unwrap()
     };
@@ -177,7 +175,7 @@ fn lowered(text: &str) -> String {
         shown.push(match operation {
             Operation::Number(number) => number.to_string(),
             Operation::Pi => "Pi".into(),
-            Operation::Input(index) => names[*index].into(),
+            Operation::Input(index) => NAMES[*index].into(),
             Operation::Add(a, b) => format!("({} + {})", of(a), of(b)),
             Operation::Sub(a, b) => format!("({} - {})", of(a), of(b)),
             Operation::Mul(a, b) => format!("({}*{})", of(a), of(b)),
@@ -326,5 +324,36 @@ fn operations_and_their_order() {
         ("k*x*t - k*y*t + k*z*t + x", "(x + (k*(t*((x - y) + z))))"),
     ] {
         assert_eq!(lowered(text), expected, "{text}");
+    }
+}
+
+/// Additions and products count once, quotients and roots eight times, calls forty times; what is done once for given
+/// parameters does not count.
+#[test]
+fn costs_of_programs() {
+    for (text, cost) in [
+        ("x + y", 1),
+        ("x - y*t", 2),
+        ("x*y*z*t", 3),
+        ("x/t", 9),
+        ("sqrt(x)", 8),
+        ("t + sqrt(s)*sqrt(t)", 18),
+        ("tan(x)", 40),
+        ("tan(t) + exp(s)", 81),
+        ("x^(1/3)", 40),
+        ("a + b", 0),
+        ("sin(a)*b + x", 1),
+        ("x*y + t*s + sin(a) + y*t", 5),
+        ("exp(t*x)*y*t/(s + t) + s/y", 61),
+    ] {
+        let mut graph = Graph::new();
+        let inputs = NAMES.map(|name| {
+            let (time, position) = ("ts".contains(name), "xyz".contains(name));
+            (graph.symbol(name), Dependence { position, time })
+        });
+        let ast = Ast::parse(text).unwrap();
+        let expr = graph.build(&ast, &mut |g, name| Ok(g.symbol(name))).unwrap();
+        let program = Program::lower(&mut graph, &inputs, &[], &[expr]);
+        assert_eq!(program.cost(), cost, "{text}: {:?}", program.operations());
     }
 }
