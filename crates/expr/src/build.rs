@@ -212,12 +212,8 @@ mod tests {
         let mut graph = Graph::new();
         let ast = Ast::parse(text).unwrap();
         let built = graph.build(&ast, &mut |graph, name| match name {
-            // Numbers of `2^n` and of one over it, as large as they have to be.
-            "least" => Ok(graph.number(power_of_two(1))),
-            "half" => Ok(graph.number(power_of_two(MOST_BITS / 2 - 1))),
-            "rest" => Ok(graph.number(power_of_two(MOST_BITS / 2 - 2))),
-            "small" => Ok(graph.number(Rational::one() / power_of_two(MOST_BITS - 2))),
-            "smallest" => Ok(graph.number(Rational::one() / power_of_two(MOST_BITS - 1))),
+            "half" => Ok(graph.number(power_of_two(MOST_BITS / 2))),
+            "odd" => Ok(graph.number(power_of_two(MOST_BITS / 2) - Rational::one())),
             _ => Ok(graph.symbol(name)),
         });
         built.map(|_| ()).map_err(|error| error.message)
@@ -233,16 +229,14 @@ mod tests {
         let large = |text: &str| assert!(built(text).unwrap_err().contains("bits"), "{text}");
         let fine = |text: &str| assert_eq!(built(text), Ok(()), "{text}");
         // Numerators and denominators of factors, less the bits that they have in any case.
-        fine("half*rest");
-        large("half*half*least");
-        fine("half*x*rest");
-        large("half*x*half*least*least*x");
-        fine("1/small");
-        fine("x + y/3*half");
-        // Numbers that a sum brings over one denominator.
-        fine("small + x");
-        large("smallest + x");
-        large("smallest + x/3");
+        fine("half/half");
+        large("2*half/half");
+        fine("x*half/half*1/1*y");
+        large("x*half/(3*half)");
+        large("half*half");
+        // Denominators of terms, though they cancel.
+        fine("x/half + y/odd - y/odd");
+        large("x/half/2 + y/odd - y/odd");
         // Exponents.
         for text in ["x^1000", "x^-1000", "x^(1/1000)", "x^(-999/1000)", "x^0", "0^2"] {
             fine(text);
