@@ -119,6 +119,24 @@ fn values_stay_with_powers_of_every_rate() {
     }
 }
 
+/// What does not depend on position and time is not computed where they meet.
+#[test]
+fn what_is_of_one_stage_stays_as_it_is() {
+    for text in [
+        "a*sin(t)/(1 + t) - t/(2 + a*t)",
+        "2*t*(1 + a)",
+        "a*x^2/(1 + x) + a*x/(1 + a*x)^2",
+        "3*a*x",
+        "a/(1 + a) - a^2",
+    ] {
+        let mut case = case(text);
+        let outputs = [case.expr];
+        let arranged =
+            arrange(&mut case.graph, &case.inputs, &[], &mut Drafts::default(), &outputs);
+        assert_eq!(arranged, outputs, "{text}");
+    }
+}
+
 #[test]
 fn fractions_share_one_denominator() {
     let mut case = case("x*cos(t) + a*cos(t)*x^3/(1 + x*cos(t)) - cos(t)*x^2/(1 + a*x*cos(t))^2");
