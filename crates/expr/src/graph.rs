@@ -648,6 +648,30 @@ mod tests {
         assert!(message(&mut graph).contains("bits"));
     }
 
+    /// Each operand counts whenever it is looked at: where terms are collected, where they are merged, and where common
+    /// factors are looked for.
+    #[test]
+    fn work_is_that_of_the_operands() {
+        for count in [2, 10, 100, 1000] {
+            let mut graph = Graph::new();
+            let symbols: Vec<Expr> = (0..count).map(|n| graph.symbol(&format!("x{n}"))).collect();
+            assert_eq!(graph.work, 0);
+            let sum = graph.sum_of(symbols.iter().copied());
+            assert_eq!(graph.work, 3 * count);
+            graph.product_of(symbols.iter().copied());
+            assert_eq!(graph.work, 4 * count);
+            // With a constant there are no common factors.
+            graph.add(sum, Graph::ONE);
+            assert_eq!(graph.work, 4 * count + (count + 2) + count);
+        }
+        // Large coefficients take longer.
+        let mut graph = Graph::new();
+        let x = graph.symbol("x");
+        let large = Rational::from_integer(num_bigint::BigInt::from(1) << 64_000);
+        graph.sum([(large, x)]);
+        assert_eq!(graph.work, 1 + 1000);
+    }
+
     #[test]
     fn depth_is_that_of_the_longest_path() {
         let mut graph = Graph::new();
