@@ -148,6 +148,17 @@ fn fractions_share_one_denominator() {
     assert_eq!(after.both.calls, 0);
 }
 
+/// Below a quotient the factors are multiplied out where that saves operations.
+#[test]
+fn factors_over_a_quotient_are_one_polynomial() {
+    let mut case = case("(1 + x*t)*(1 - x*t)/(2 + x*t)");
+    let (before, after) = case.programs();
+    let count = |program: &Program| program.operations_by_stage(program.outputs()).both;
+    assert_eq!((count(&before).additions, count(&before).multiplications), (3, 2));
+    assert_eq!((count(&after).additions, count(&after).multiplications), (2, 2));
+    assert_eq!((count(&before).divisions, count(&after).divisions), (1, 1));
+}
+
 #[test]
 fn what_cancels_identically_is_gone() {
     // 1 - h/(1 + h) = 1/(1 + h)
