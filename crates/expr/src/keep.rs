@@ -247,6 +247,20 @@ mod tests {
         assert_eq!(kept.len(), 2);
     }
 
+    /// Products of two, three and so on up to eight sums cost 3, 5, ..., 15 additions; the coordinate is kept for those that are
+    /// computed anew. At the price of 5 six products are kept, at that of 10 three, at that of 20 none.
+    #[test]
+    fn each_price_is_twice_the_one_before() {
+        let product =
+            |n: usize| (0..n).map(|m| format!("(x + {})", 10 * n + m)).collect::<Vec<_>>();
+        let texts: Vec<String> =
+            (2..9).map(|n| format!("cos(t + {})", product(n).join("*"))).collect();
+        let p = program(&[&texts.join(" + ")]);
+        for (most, number) in [(8, 7), (7, 7), (6, 4), (5, 4), (4, 4), (3, 1), (1, 1)] {
+            assert_eq!(p.kept_at_points(p.outputs(), most).len(), number, "{most}");
+        }
+    }
+
     #[test]
     fn results_that_know_no_time_are_kept() {
         let p = program(&["sin(x)*y", "x*t"]);
