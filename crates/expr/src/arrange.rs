@@ -450,15 +450,16 @@ impl Arranging<'_> {
     }
 }
 
+/// An input at a point of a fixed sequence: multiples of the golden ratio, with a different start for each input.
+fn sample(point: usize, input: usize) -> f64 {
+    let turns = GOLDEN_RATIO * point as f64 + PLASTIC_RATIO * input as f64;
+    let scale = if point == 2 * input + 1 { 1e-8 } else { 1.0 };
+    scale * (0.05 + 0.9 * turns.fract())
+}
+
 /// Whether the error bound of `after` is hardly larger than that of `before`: at more than half of some sample points
 /// by little, and nowhere by much. At every other point one input is tiny, as an amplitude may be.
 pub(crate) fn as_accurate(before: &Program, after: &Program, inputs: usize) -> bool {
-    // A fixed sequence: multiples of the golden ratio, a different start for each input.
-    let sample = |point: usize, input: usize| {
-        let turns = GOLDEN_RATIO * point as f64 + PLASTIC_RATIO * input as f64;
-        let scale = if point == 2 * input + 1 { 1e-8 } else { 1.0 };
-        scale * (0.05 + 0.9 * turns.fract())
-    };
     let points = 64.max(2 * inputs);
     let mut growth = Vec::new();
     for first in (0..points).step_by(SIDE) {
@@ -487,6 +488,75 @@ pub(crate) fn as_accurate(before: &Program, after: &Program, inputs: usize) -> b
 mod tests {
     use super::*;
     use crate::Ast;
+
+    /// Limits on terms, products and powers may be reached and not be passed.
+    #[test]
+    fn limits_of_multiplying_out() {
+        let mut graph = Graph::new();
+        let (t, s) = (graph.symbol("t"), graph.symbol("s"));
+        let mut arranging = Arranging {
+            graph: &mut graph,
+            inputs: &[],
+            definitions: &[],
+            drafts: &mut Drafts::default(),
+            dependence: NumberMap::default(),
+            arranged: NumberMap::default(),
+            products: 0,
+            last: None,
+            fractions: NumberMap::default(),
+        };
+        let sum = |of: Expr, count: usize| -> Fraction {
+            let terms = (1..).map(|n| (Monomial::from([(of, n)]), Graph::ONE));
+            Fraction { numerator: terms.take(count).collect(), denominator: Monomial::new() }
+        };
+        let power = arranging.repeated(&Fraction::atom(t), LARGEST_POWER);
+        assert_eq!(
+            power.map(|f| f.numerator),
+            Some([([(t, LARGEST_POWER)].into(), Graph::ONE)].into())
+        );
+        assert!(arranging.repeated(&Fraction::atom(t), LARGEST_POWER + 1).is_none());
+        arranging.products = 0;
+        let terms = |f: Option<Fraction>| f.map(|f| f.numerator.len());
+        assert_eq!(terms(arranging.times(&sum(t, 6), &sum(s, 8))), Some(MOST_TERMS));
+        assert_eq!(terms(arranging.times(&sum(t, 7), &sum(s, 7))), None);
+        assert_eq!(arranging.products, 6 * 8 + 7 * 7);
+        arranging.products = MOST_PRODUCTS - 4;
+        assert_eq!(terms(arranging.times(&sum(t, 2), &sum(s, 2))), Some(4));
+        assert_eq!(terms(arranging.times(&sum(t, 1), &sum(s, 1))), None);
+        // What is found again counts again, though nothing is multiplied.
+        let product = arranging.graph.mul(t, s);
+        let time = Dependence { position: false, time: true };
+        arranging.dependence.extend([(t, time), (s, time)]);
+        arranging.products = 10;
+        for times in 1..4 {
+            assert_eq!(terms(arranging.fraction(product)), Some(1));
+            assert_eq!(arranging.products, 10 + 4 * times);
+        }
+        arranging.products = MOST_PRODUCTS - 4;
+        assert_eq!(terms(arranging.fraction(product)), Some(1));
+        assert_eq!(terms(arranging.fraction(product)), None);
+        // What takes no product is never too much.
+        assert_eq!(terms(arranging.fraction(t)), Some(1));
+        assert_eq!(terms(arranging.fraction(t)), Some(1));
+    }
+
+    /// The points of each input are all over its range, none of two inputs are the same, and each is tiny at one odd point.
+    #[test]
+    fn sample_points_fill_their_range() {
+        for input in 0..20 {
+            let is_tiny = |point: usize| sample(point, input) < 1e-7;
+            let tiny: Vec<usize> = (0..64).filter(|&point| is_tiny(point)).collect();
+            assert_eq!(tiny, [2 * input + 1]);
+            let points = (0..64).filter(|&point| !is_tiny(point));
+            let mut at: Vec<f64> = points.map(|point| sample(point, input)).collect();
+            at.sort_by(f64::total_cmp);
+            assert!(at[0] >= 0.05 && at[0] < 0.1 && at[62] > 0.9 && at[62] <= 0.95, "{at:?}");
+            assert!(at.windows(2).all(|pair| pair[1] - pair[0] < 0.06), "{at:?}");
+        }
+        let mut first: Vec<f64> = (0..20).map(|input| sample(0, input)).collect();
+        first.sort_by(f64::total_cmp);
+        assert!(first.windows(2).all(|pair| pair[1] - pair[0] > 0.01), "{first:?}");
+    }
 
     /// Only the bounds of the errors are compared, whatever the programs compute: `n x y` has two roundings of `n x y`.
     #[test]

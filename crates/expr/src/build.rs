@@ -203,3 +203,51 @@ impl Graph {
 fn large_numbers() -> String {
     format!("numbers of more than {MOST_BITS} bits are not supported")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn built(text: &str) -> Result<(), String> {
+        let mut graph = Graph::new();
+        let ast = Ast::parse(text).unwrap();
+        let built = graph.build(&ast, &mut |graph, name| match name {
+            "half" => Ok(graph.number(power_of_two(MOST_BITS / 2))),
+            "odd" => Ok(graph.number(power_of_two(MOST_BITS / 2) - Rational::one())),
+            _ => Ok(graph.symbol(name)),
+        });
+        built.map(|_| ()).map_err(|error| error.message)
+    }
+
+    fn power_of_two(exponent: u64) -> Rational {
+        Rational::from_integer(BigInt::one() << exponent)
+    }
+
+    /// Limits on numbers may be reached and not be passed.
+    #[test]
+    fn limits_on_numbers() {
+        let large = |text: &str| assert!(built(text).unwrap_err().contains("bits"), "{text}");
+        let fine = |text: &str| assert_eq!(built(text), Ok(()), "{text}");
+        // Numerators and denominators of factors, less the bits that they have in any case.
+        fine("half/half");
+        large("2*half/half");
+        fine("x*half/half*1/1*y");
+        large("x*half/(3*half)");
+        large("half*half");
+        // Denominators of terms, though they cancel.
+        fine("x/half + y/odd - y/odd");
+        large("x/half/2 + y/odd - y/odd");
+        // Exponents.
+        for text in ["x^1000", "x^-1000", "x^(1/1000)", "x^(-999/1000)", "x^0", "0^2"] {
+            fine(text);
+        }
+        for text in ["x^1001", "x^-1001", "x^(1/1001)", "x^(1001/2)"] {
+            assert!(built(text).unwrap_err().contains("beyond 1000"), "{text}");
+        }
+        fine("(-8)^3");
+        fine("8^(1/3)");
+        assert!(built("(-8)^(1/3)").unwrap_err().contains("negative"));
+        assert!(built("0^(-1)").unwrap_err().contains("not positive"));
+        assert!(built("0^0").unwrap_err().contains("not positive"));
+    }
+}

@@ -325,6 +325,7 @@ fn multiply(a: &Polynomial, b: &Polynomial) -> Option<Polynomial> {
 
 #[cfg(test)]
 mod tests {
+    use super::{MOST_TERMS, Monomial, Polynomial, multiply};
     use crate::{Ast, AstKind, Expr, Function, Graph, Rational};
     use num_traits::{One, Pow, ToPrimitive, Zero};
     use proptest::prelude::*;
@@ -359,6 +360,58 @@ mod tests {
         assert!(vanishes("-4*sin(a)^2 + 4*sin(a)^4 + 4*sin(a)^2*cos(a)^2"));
         assert!(vanishes("cos(a)^4 - sin(a)^4 - cos(a)^2 + sin(a)^2"));
         assert!(!vanishes("-4*sin(a)^2 + 4*sin(a)^4 + 4*sin(a)^2*cos(b)^2"));
+    }
+
+    /// What is zero modulo a prime, where it has no value in floating point, is decided by polynomials.
+    #[test]
+    fn multiples_of_the_prime_do_not_vanish() {
+        let mut graph = Graph::new();
+        let mut vanishes = |text: &str| {
+            let expr = build(&mut graph, text);
+            assert_eq!(graph.residue(expr), Some(0), "{text}");
+            graph.vanishes(expr)
+        };
+        assert!(!vanishes("2305843009213693951*arctan(a)"));
+        assert!(!vanishes(
+            "2305843009213693951*arctan(a)*cos(b)^3 + arctan(a)*(cos(b)^2 + sin(b)^2 - 1)"
+        ));
+        assert!(vanishes("arctan(a)*(cos(b)^3 - cos(b)*(1 - sin(b)^2))"));
+    }
+
+    /// Limits on terms may be reached and not be passed.
+    #[test]
+    fn limits_on_terms() {
+        let mut graph = Graph::new();
+        let symbols: Vec<Expr> = (0..40).map(|n| graph.symbol(&format!("x{n}"))).collect();
+        let a = graph.symbol("a");
+        let (cosine, sine) = (graph.call(Function::Cos, &[a]), graph.call(Function::Sin, &[a]));
+        let sum = |symbols: &[Expr]| -> Polynomial {
+            symbols.iter().map(|&symbol| (Monomial::from([(symbol, 1)]), Rational::one())).collect()
+        };
+        assert_eq!(
+            multiply(&sum(&symbols[..16]), &sum(&symbols[16..])).map(|p| p.len()),
+            Some(384)
+        );
+        let powers = |count: usize| -> Polynomial {
+            (1..).map(|n| (Monomial::from([(a, n)]), Rational::one())).take(count).collect()
+        };
+        assert_eq!(multiply(&powers(MOST_TERMS), &powers(1)).map(|p| p.len()), Some(MOST_TERMS));
+        assert_eq!(multiply(&powers(MOST_TERMS), &powers(2)).map(|p| p.len()), None);
+        // A square makes one term more while it is looked at, a fourth power three.
+        for (power, others, expected) in [
+            (2, MOST_TERMS - 1, Some(MOST_TERMS + 1)),
+            (2, MOST_TERMS, None),
+            (4, MOST_TERMS - 3, Some(MOST_TERMS)),
+            (4, MOST_TERMS - 2, None),
+        ] {
+            let mut polynomial = powers(others);
+            polynomial.insert(Monomial::from([(cosine, power)]), Rational::one());
+            let found = graph.without_cosine_squares(polynomial);
+            if let Some(found) = &found {
+                assert!(found.contains_key(&Monomial::from([(sine, power)])));
+            }
+            assert_eq!(found.map(|p| p.len()), expected, "{power} {others}");
+        }
     }
 
     #[test]

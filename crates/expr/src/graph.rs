@@ -551,11 +551,24 @@ mod tests {
             // What has a value is the same in one piece.
             let whole = graph.opaque(expr);
             assert_eq!(graph.sampled(whole), found, "{text}");
+            assert_eq!(graph.opaque(whole), whole);
+            assert_eq!(graph.as_number(expr).is_some(), whole == expr, "{text}");
             assert!(graph.sum_is_sampled(&[expr, whole]));
             assert!(graph.sum_differs_from_zero([expr, whole].into_iter()), "{text}");
             let negative = graph.neg(whole);
             assert!(!graph.sum_differs_from_zero([expr, negative].into_iter()), "{text}");
         }
+    }
+
+    /// However many symbols there are, none has nearly the value of another, and none is near zero.
+    #[test]
+    fn samples_of_symbols_are_apart() {
+        let mut graph = Graph::new();
+        let symbols: Vec<Expr> = (0..40).map(|n| graph.symbol(&format!("x{n}"))).collect();
+        let mut at: Vec<f64> = symbols.iter().map(|&symbol| graph.sampled(symbol).0).collect();
+        at.sort_by(f64::total_cmp);
+        assert!(at[0] > 0.3 && at[39] < 1.3, "{at:?}");
+        assert!(at.windows(2).all(|pair| pair[1] - pair[0] > 0.01), "{at:?}");
     }
 
     #[test]
@@ -633,6 +646,30 @@ mod tests {
         assert!(is_at_limit(&mut graph));
         graph.number(Rational::new(power(MOST_BITS - 100), power(100) - 1));
         assert!(message(&mut graph).contains("bits"));
+    }
+
+    /// Each operand counts whenever it is looked at: where terms are collected, where they are merged, and where common
+    /// factors are looked for.
+    #[test]
+    fn work_is_that_of_the_operands() {
+        for count in [2, 10, 100, 1000] {
+            let mut graph = Graph::new();
+            let symbols: Vec<Expr> = (0..count).map(|n| graph.symbol(&format!("x{n}"))).collect();
+            assert_eq!(graph.work, 0);
+            let sum = graph.sum_of(symbols.iter().copied());
+            assert_eq!(graph.work, 3 * count);
+            graph.product_of(symbols.iter().copied());
+            assert_eq!(graph.work, 4 * count);
+            // With a constant there are no common factors.
+            graph.add(sum, Graph::ONE);
+            assert_eq!(graph.work, 4 * count + (count + 2) + count);
+        }
+        // Large coefficients take longer.
+        let mut graph = Graph::new();
+        let x = graph.symbol("x");
+        let large = Rational::from_integer(num_bigint::BigInt::from(1) << 64_000);
+        graph.sum([(large, x)]);
+        assert_eq!(graph.work, 1 + 1000);
     }
 
     #[test]

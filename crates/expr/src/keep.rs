@@ -191,6 +191,7 @@ impl Network {
 mod tests {
     use super::*;
     use crate::{Ast, Dependence, Graph};
+    use proptest::prelude::*;
 
     fn program(texts: &[&str]) -> Program {
         let mut graph = Graph::new();
@@ -246,6 +247,20 @@ mod tests {
         assert_eq!(kept.len(), 2);
     }
 
+    /// Products of two, three and so on up to eight sums cost 3, 5, ..., 15 additions; the coordinate is kept for those that are
+    /// computed anew. At the price of 5 six products are kept, at that of 10 three, at that of 20 none.
+    #[test]
+    fn each_price_is_twice_the_one_before() {
+        let product =
+            |n: usize| (0..n).map(|m| format!("(x + {})", 10 * n + m)).collect::<Vec<_>>();
+        let texts: Vec<String> =
+            (2..9).map(|n| format!("cos(t + {})", product(n).join("*"))).collect();
+        let p = program(&[&texts.join(" + ")]);
+        for (most, number) in [(8, 7), (7, 7), (6, 4), (5, 4), (4, 4), (3, 1), (1, 1)] {
+            assert_eq!(p.kept_at_points(p.outputs(), most).len(), number, "{most}");
+        }
+    }
+
     #[test]
     fn results_that_know_no_time_are_kept() {
         let p = program(&["sin(x)*y", "x*t"]);
@@ -284,7 +299,40 @@ mod tests {
         assert_eq!((stages.time, stages.both), (calls(1), products(1)));
     }
 
-    /// No other set of values that all else follows from is cheaper.
+    /// The values that `outputs` need and that depend on the position alone.
+    fn of_points(p: &Program) -> Vec<Slot> {
+        let needed = p.needed(p.outputs());
+        p.slots()
+            .filter(|slot| needed[slot.index()])
+            .filter(|&slot| p.dependence(slot) == Dependence { position: true, time: false })
+            .collect()
+    }
+
+    /// The least that any set of values costs that all else follows from, where nothing is computed once a point and
+    /// again each time.
+    fn least_cost(p: &Program) -> Option<usize> {
+        let here = of_points(p);
+        let computed_twice = |kept: &[Slot]| {
+            let below = p.needed(kept);
+            let mut stack = p.outputs().to_vec();
+            let mut anew = Vec::new();
+            while let Some(slot) = stack.pop() {
+                if !kept.contains(&slot) && !anew.contains(&slot) {
+                    anew.push(slot);
+                    stack.extend(p.operations()[slot.index()].operands());
+                }
+            }
+            here.iter().any(|slot| below[slot.index()] && anew.contains(slot))
+        };
+        (0..1_usize << here.len())
+            .map(|set| -> Vec<Slot> {
+                (0..here.len()).filter(|n| set >> n & 1 == 1).map(|n| here[n]).collect()
+            })
+            .filter(|kept| !reads_coordinates(p, kept) && !computed_twice(kept))
+            .map(|kept| cost(p, &kept))
+            .min()
+    }
+
     #[test]
     fn no_choice_is_cheaper() {
         for texts in [
@@ -295,22 +343,39 @@ mod tests {
         ] {
             let p = program(texts);
             let found = p.kept_at_points(p.outputs(), usize::MAX);
-            let needed = p.needed(p.outputs());
-            let here: Vec<Slot> = p
-                .slots()
-                .filter(|slot| needed[slot.index()])
-                .filter(|&slot| p.dependence(slot) == Dependence { position: true, time: false })
-                .collect();
-            assert!(here.len() < 16, "too many to try all");
-            // All sets of values that have every coordinate computed or kept somewhere below what needs it.
-            let cheapest = (0..1_usize << here.len())
-                .map(|set| -> Vec<Slot> {
-                    (0..here.len()).filter(|n| set >> n & 1 == 1).map(|n| here[n]).collect()
-                })
-                .filter(|kept| !reads_coordinates(&p, kept))
-                .map(|kept| cost(&p, &kept))
-                .min();
-            assert_eq!(Some(cost(&p, &found)), cheapest, "{texts:?}: {found:?}");
+            assert!(of_points(&p).len() < 16, "too many to try all");
+            assert_eq!(Some(cost(&p, &found)), least_cost(&p), "{texts:?}: {found:?}");
+        }
+    }
+
+    fn text() -> impl Strategy<Value = String> {
+        let leaf = prop::sample::select(&["x", "y", "t", "2"][..]).prop_map(str::to_owned);
+        leaf.prop_recursive(4, 12, 2, |inner| {
+            let pair = (inner.clone(), inner.clone());
+            prop_oneof![
+                pair.clone().prop_map(|(a, b)| format!("({a}) + ({b})")),
+                pair.clone().prop_map(|(a, b)| format!("({a})*({b})")),
+                pair.clone().prop_map(|(a, b)| format!("({a})*({b}) + t*({a})")),
+                pair.prop_map(|(a, b)| format!("({a})/(1 + ({b})^2)")),
+                inner.clone().prop_map(|a| format!("({a})^2 + t*({a})")),
+                inner.prop_map(|a| format!("sin({a})")),
+            ]
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn whatever_is_computed_no_choice_is_cheaper(first in text(), second in text()) {
+            let p = program(&[&first, &second]);
+            prop_assume!(of_points(&p).len() < 10);
+            let found = p.kept_at_points(p.outputs(), usize::MAX);
+            prop_assert!(!reads_coordinates(&p, &found));
+            prop_assert_eq!(Some(cost(&p, &found)), least_cost(&p), "{}, {}: {:?}", first, second, found);
+            // No more than there is room for, but the coordinates.
+            for most in 2..found.len() {
+                let kept = p.kept_at_points(p.outputs(), most);
+                prop_assert!(kept.len() <= most && !reads_coordinates(&p, &kept), "{}, {}: {:?}", first, second, kept);
+            }
         }
     }
 

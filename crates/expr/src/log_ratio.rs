@@ -75,6 +75,38 @@ mod tests {
         assert_eq!(curvature(0.0), -1.0 / 3.0);
     }
 
+    /// `z`, the squared logarithm, the slope and the curvature there, from 60 digits (mpmath).
+    const EXACT: [[f64; 4]; 11] = [
+        [1e-30, 2e-30, -3.3333333333333338e-31, -0.3333333333333333],
+        [1e-09, 1.9999999996666666e-09, -3.333333332e-10, -0.3333333330666667],
+        [0.001, 0.0019996667555269945, -0.00033320005711747185, -0.3330668379937085],
+        [0.1, 0.19675279629825826, -0.03205471352418188, -0.3082848339209521],
+        [0.5, 0.9262592823087775, -0.13918211807199193, -0.2329814583136097],
+        [0.66, 1.1959534937243819, -0.17463820918365391, -0.21081144495052093],
+        [0.67, 1.2124396909145523, -0.1767399510294059, -0.20953898025652196],
+        [1.0, 1.7343781022726361, -0.23965400369905365, -0.17356399753396423],
+        [3.0, 4.257772537292302, -0.46722283974802986, -0.07540724273385871],
+        [30.0, 17.03109014916921, -0.8668057099370075, -0.003259398949950801],
+        [1e6, 210.50117839093343, -0.9999854913557701, -1.3508631721267281e-11],
+    ];
+
+    #[test]
+    fn few_roundings_are_lost() {
+        for [z, expected_square, expected_slope, expected_curvature] in EXACT {
+            let roundings =
+                |found: f64, expected: f64| (found / expected - 1.0).abs() / f64::EPSILON;
+            assert!(roundings(squared(z), expected_square) <= 2.0, "{z}");
+            assert!(
+                roundings(slope(z), expected_slope) <= 4.0,
+                "{z}: {}",
+                roundings(slope(z), expected_slope)
+            );
+            // Of the curvature the absolute error counts where it is small, but it keeps most digits.
+            let lost = roundings(curvature(z), expected_curvature);
+            assert!(lost <= if z < 100.0 { 10.0 } else { 1e6 }, "{z}: {lost}");
+        }
+    }
+
     #[test]
     fn both_forms_agree_where_they_meet() {
         let z = 2.0 / 3.0;

@@ -186,6 +186,7 @@ impl Splitting<'_> {
 #[cfg(test)]
 mod tests {
     use crate::{Ast, Graph, Program};
+    use proptest::prelude::*;
     use std::collections::BTreeSet;
 
     fn split(text: &str) -> (String, String, f64) {
@@ -248,6 +249,49 @@ mod tests {
             let expr = graph.build(&ast, &mut |g, name| Ok(g.symbol(name))).unwrap();
             let small = BTreeSet::from([graph.symbol("h")]);
             assert_eq!(graph.split_at_zero(expr, &small), (Graph::ZERO, expr), "{text}");
+        }
+    }
+
+    fn text() -> impl Strategy<Value = String> {
+        let leaf = prop::sample::select(&["h", "mu", "(1 + h)", "(mu + h)", "2"][..])
+            .prop_map(str::to_owned);
+        leaf.prop_recursive(3, 10, 2, |inner| {
+            let pair = (inner.clone(), inner.clone());
+            let function = prop::sample::select(
+                &["sin", "cos", "sinh", "cosh", "tan", "tanh", "exp", "expm1", "arctan", "arccos"]
+                    [..],
+            );
+            let exponent = prop::sample::select(&["2", "-1", "-3", "1/2", "-5/2", "17"][..]);
+            prop_oneof![
+                pair.clone().prop_map(|(a, b)| format!("({a}) + ({b})")),
+                pair.clone().prop_map(|(a, b)| format!("({a}) - ({b})")),
+                pair.clone().prop_map(|(a, b)| format!("({a})*({b})")),
+                pair.prop_map(|(a, b)| format!("atan2({a}, 2 + ({b})^2)")),
+                (inner.clone(), function).prop_map(|(a, f)| format!("{f}(({a})/(1 + ({a})^2))")),
+                (inner.clone(), exponent).prop_map(|(a, n)| format!("(1/2 + ({a})^2)^({n})")),
+                inner.clone().prop_map(|a| format!("ln(1 + ({a})^2)")),
+                inner.prop_map(|a| format!("log1p(({a})^2)")),
+            ]
+        })
+    }
+
+    proptest! {
+        /// The value does not depend on what is small, the rest is as small, and the two add up to the whole.
+        #[test]
+        fn values_and_rests(text in text(), at in 0.1..0.5) {
+            let mut graph = Graph::new();
+            let expr = graph.build(&Ast::parse(&text).unwrap(), &mut |g, name| Ok(g.symbol(name))).unwrap();
+            let (h, mu) = (graph.symbol("h"), graph.symbol("mu"));
+            let (value, rest) = graph.split_at_zero(expr, &BTreeSet::from([h]));
+            prop_assert!(!graph.symbols_in(&[value]).contains(&h), "{}: {}", text, graph.print(value));
+            let inputs = [(h, Default::default()), (mu, Default::default())];
+            let program = Program::lower(&mut graph, &inputs, &[], &[expr, value, rest]);
+            let found = program.evaluate(&[at, 1.7]);
+            prop_assume!(found[0].abs() < 1e4);
+            let allowed = 1e-11 * (1.0 + found[0].abs());
+            prop_assert!((found[1] + found[2] - found[0]).abs() <= allowed, "{}: {:?}", text, found);
+            let small = program.evaluate(&[1e-7, 1.7]);
+            prop_assert!(small[2].abs() < 1e-3 * (1.0 + small[1].abs()), "{}: {:?}", text, small);
         }
     }
 

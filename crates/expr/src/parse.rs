@@ -122,11 +122,10 @@ impl Parser {
         }
     }
 
+    /// Goes on to the next token, which there is: nothing goes on from the end.
     fn advance(&mut self) -> Range<usize> {
         let span = self.tokens[self.position].1.clone();
-        if self.position + 1 < self.tokens.len() {
-            self.position += 1;
-        }
+        self.position += 1;
         span
     }
 
@@ -449,6 +448,161 @@ mod tests {
         assert!(message(&deep).0.contains("nested deeper"));
         assert!(Ast::parse(&("-".repeat(100_000) + "a")).is_ok());
         assert!(Ast::parse(&("a+".repeat(100_000) + "a")).is_ok());
+    }
+
+    /// The tree in words: terms and factors with their signs.
+    fn shape(ast: &Ast) -> String {
+        let list = |parts: &[(bool, Ast)], sign: char| {
+            let shown = parts.iter().map(|(inverse, part)| {
+                let sign = if *inverse { sign.to_string() } else { String::new() };
+                sign + &shape(part)
+            });
+            shown.collect::<Vec<_>>().join(" ")
+        };
+        match &ast.kind {
+            AstKind::Number(value) => value.to_string(),
+            AstKind::Name(name) => name.clone(),
+            AstKind::Sum(terms) => format!("sum({})", list(terms, '-')),
+            AstKind::Product(factors) => format!("product({})", list(factors, '/')),
+            AstKind::Power(base, exponent) => format!("power({} {})", shape(base), shape(exponent)),
+            AstKind::Call(name, arguments) => {
+                let shown: Vec<String> = arguments.iter().map(shape).collect();
+                format!("{name}({})", shown.join(" "))
+            }
+        }
+    }
+
+    const TREES: [(&str, &str); 27] = [
+        ("x", "x"),
+        ("(x)", "x"),
+        ("-x", "sum(-x)"),
+        ("--x", "x"),
+        ("- + -- x + y", "sum(-x y)"),
+        ("a - b + c - 2", "sum(a -b c -2)"),
+        ("a*b/c/d*e", "product(a b /c /d e)"),
+        ("a + b*c - d/e", "sum(a product(b c) -product(d /e))"),
+        ("-a*b", "sum(-product(a b))"),
+        ("(a + b)*(c - d)", "product(sum(a b) sum(c -d))"),
+        ("a - (b - c)", "sum(a -sum(b -c))"),
+        ("a^2*b", "product(power(a 2) b)"),
+        ("a*b^2", "product(a power(b 2))"),
+        ("a^-2", "power(a sum(-2))"),
+        ("a ** - b * c", "product(power(a sum(-b)) c)"),
+        ("-a^2", "sum(-power(a 2))"),
+        ("(a^b)^c", "power(power(a b) c)"),
+        ("a^(b^c)", "power(a power(b c))"),
+        ("f(x)", "f(x)"),
+        ("f (x + 1, -y, g(z)^2)/2", "product(f(sum(x 1) sum(-y) power(g(z) 2)) /2)"),
+        ("a\u{b7}b \u{2212} c", "sum(product(a b) -c)"),
+        ("  \u{3bb}1 +\u{3a9}_\u{b5}\t", "sum(lambda1 Omega_mu)"),
+        ("1.5", "3/2"),
+        (".5 + 5. - 0.125e2", "sum(1/2 5 -25/2)"),
+        ("12e-1 + 12E+1 - 3e2", "sum(6/5 120 -300)"),
+        ("1.25e-2*007", "product(1/80 7)"),
+        ("_a1 + b_2c", "sum(_a1 b_2c)"),
+    ];
+
+    #[test]
+    fn trees() {
+        for (text, expected) in TREES {
+            assert_eq!(shape(&Ast::parse(text).unwrap()), expected, "{text}");
+        }
+    }
+
+    /// The place of every part holds that part and no more.
+    #[test]
+    fn every_part_knows_its_place() {
+        fn check(ast: &Ast, text: &str) {
+            let part = &text[ast.span.clone()];
+            assert_eq!(part, part.trim(), "{text}");
+            assert_eq!(shape(&Ast::parse(part).unwrap()), shape(ast), "{part} in {text}");
+            match &ast.kind {
+                AstKind::Number(_) | AstKind::Name(_) => {}
+                AstKind::Sum(parts) | AstKind::Product(parts) => {
+                    parts.iter().for_each(|(_, part)| check(part, text));
+                }
+                AstKind::Power(base, exponent) => {
+                    [base, exponent].into_iter().for_each(|part| check(part, text));
+                }
+                AstKind::Call(_, arguments) => arguments.iter().for_each(|ast| check(ast, text)),
+            }
+        }
+        for (text, _) in TREES {
+            let ast = Ast::parse(text).unwrap();
+            // Signs that cancel are no part of anything.
+            assert_eq!(&text[ast.span.clone()], text.trim().trim_start_matches("--"));
+            check(&ast, text);
+        }
+    }
+
+    /// Each limit may be reached and not be passed.
+    #[test]
+    fn limits_on_text() {
+        let nested = |n: usize| "(".repeat(n) + "x" + &")".repeat(n);
+        let called = |n: usize| "f(".repeat(n) + "x" + &")".repeat(n);
+        for (text, next) in [
+            (nested(DEEPEST), nested(DEEPEST + 1)),
+            (called(DEEPEST), called(DEEPEST + 1)),
+            ("1".repeat(MOST_DIGITS), "1".repeat(MOST_DIGITS + 1)),
+            (format!("1e{MOST_DIGITS}"), format!("1e{}", MOST_DIGITS + 1)),
+            (format!("1e-{MOST_DIGITS}"), format!("1e-{}", MOST_DIGITS + 1)),
+            (" ".repeat(LONGEST - 1) + "x", " ".repeat(LONGEST) + "x"),
+        ] {
+            assert!(Ast::parse(&text).is_ok(), "{}", message(&text).0);
+            assert!(Ast::parse(&next).is_err());
+        }
+        // Parts beside each other are not nested.
+        let beside = [nested(DEEPEST), called(DEEPEST - 1), nested(DEEPEST)].join("*");
+        assert!(Ast::parse(&beside).is_ok());
+    }
+
+    #[test]
+    fn messages() {
+        let missing = "an operator is missing";
+        for (text, start, place) in [
+            ("", "the expression ends", ""),
+            ("x +", "the expression ends", ""),
+            ("x + * y", "a value is expected, not '*'", "*"),
+            ("x*)", "a value is expected, not ')'", ")"),
+            ("x*-y", "a value is expected, not '-'", "-"),
+            ("x + - y", "'-' after a sign", "-"),
+            ("x - + y", "'+' after a sign", "+"),
+            ("x y", missing, "y"),
+            ("x 2", missing, "2"),
+            ("2 (x)", missing, "("),
+            ("f(x) (y)", missing, "(y"),
+            ("f(x y)", missing, "y"),
+            ("f(x 3)", missing, "3"),
+            ("(x(y) (z))", missing, "(z"),
+            ("x)", "this ')' closes nothing", ")"),
+            ("x, y", "',' is out of place", ","),
+            ("(x, y)", "')' is expected, not ','", ","),
+            ("2*(x + f(y)", "this '(' is never closed", "(x"),
+            ("2*f(y, z", "this '(' is never closed", "(y"),
+            ("f(,)", "a value is expected, not ','", ","),
+            ("x^y^z", "'a^b^c' is ambiguous", "^z"),
+            ("x $ y", "the character '$' has no meaning", "$"),
+            ("x + \u{fc}y", "'\u{fc}' is not allowed in a name", "\u{fc}"),
+            ("x*3y", "'3' runs into", "3y"),
+            ("x*3\u{3bb}", "'3' runs into", "3\u{3bb}"),
+            ("1.5_", "'1.5' runs into", "1.5_"),
+            ("1.5.", "'1.5' runs into", "1.5."),
+            ("x*.", "a number needs at least one digit", "."),
+            ("x - 1e401", "the decimal exponent of '1e401' is beyond", "1e401"),
+            ("x - 1e99999999999", "the decimal exponent of", "1e9"),
+            ("2e + x", "'2' runs into", "2e"),
+            ("2e+x", "'2' runs into", "2e"),
+        ] {
+            let (found, span) = message(text);
+            assert!(found.starts_with(start), "{text}: {found}");
+            let from = if place.is_empty() { text.len() } else { text.rfind(place).unwrap() };
+            assert_eq!(span.start, from, "{text}: {found} at {span:?}");
+            if !found.starts_with("'a^b") && !found.contains("exponent") {
+                let length = if found.contains("runs into") { place.len() } else { 1 };
+                let length = text[from..].chars().next().map_or(0, char::len_utf8).max(length);
+                assert_eq!(span.end, text.len().min(from + length), "{text}: {found}");
+            }
+        }
     }
 
     #[test]

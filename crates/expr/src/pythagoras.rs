@@ -239,8 +239,10 @@ impl Shortening<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::MOST_PARTS;
-    use crate::{Ast, Expr, Graph};
+    use super::{MOST_PARTS, MOST_TERMS, Monomial, Polynomial, Shortening};
+    use crate::{Ast, Expr, Function, Graph, Program};
+    use proptest::prelude::*;
+    use std::collections::{BTreeMap, BTreeSet};
 
     fn build(graph: &mut Graph, text: &str) -> Expr {
         let ast = Ast::parse(text).unwrap();
@@ -298,6 +300,52 @@ mod tests {
         assert_eq!(graph.without_vanishing_part(&terms), terms[3..8]);
     }
 
+    /// Limits on terms and powers may be reached and not be passed.
+    #[test]
+    fn limits_of_multiplying_out() {
+        let mut graph = Graph::new();
+        let (a, b) = (graph.symbol("a"), graph.symbol("b"));
+        let sine = graph.call(Function::Sin, &[a]);
+        let cosine = graph.call(Function::Cos, &[a]);
+        let other = graph.call(Function::Sin, &[b]);
+        let sum = |of: Expr, count: usize| -> Polynomial {
+            (1..).map(|n| (Monomial::from([(of, n)]), Graph::ONE)).take(count).collect()
+        };
+        let angles = BTreeSet::from([a, b]);
+        let mut shortening = Shortening { graph: &mut graph, angles, turning: BTreeMap::new() };
+        let mut times = |first: Polynomial, second: Polynomial| {
+            shortening.times(&first, &second).map(|product| product.len())
+        };
+        // Pairs of terms, of which many become one, and terms of the product.
+        assert_eq!(times(sum(sine, 16), sum(sine, 16)), Some(31));
+        assert_eq!(times(sum(sine, 16), sum(sine, 17)), None);
+        assert_eq!(times(sum(sine, 8), sum(other, 8)), Some(64));
+        assert_eq!(times(sum(sine, 8), sum(other, 9)), None);
+        // A square makes one term more while it is looked at, a fourth power three.
+        for (power, others, expected) in [
+            (2, 2 * MOST_TERMS - 1, Some(2 * MOST_TERMS + 1)),
+            (2, 2 * MOST_TERMS, None),
+            (4, 2 * MOST_TERMS - 3, Some(2 * MOST_TERMS)),
+            (4, 2 * MOST_TERMS - 2, None),
+        ] {
+            let mut polynomial = sum(other, others);
+            polynomial.insert(Monomial::from([(cosine, power)]), Graph::ONE);
+            let found = shortening.without_cosine_squares(polynomial);
+            assert_eq!(found.map(|p| p.len()), expected, "{power} {others}");
+        }
+        let mut terms = |text: &str| {
+            let expr = build(shortening.graph, text);
+            shortening.polynomial(expr).map(|p| p.len())
+        };
+        assert_eq!(terms("sin(a)^8"), Some(1));
+        assert_eq!(terms("sin(a)^9"), None);
+        let powers =
+            "(sin(a) + sin(a)^2 + sin(a)^3 + sin(a)^4 + sin(a)^5 + sin(a)^6 + sin(a)^7 + sin(a)^8)";
+        let others = powers.replace("sin(a)", "cos(b)");
+        assert_eq!(terms(&format!("{powers}*{others}")), Some(64));
+        assert_eq!(terms(&format!("1 + {powers}*{others}")), None);
+    }
+
     #[test]
     fn shorter_where_terms_cancel() {
         let cases = [
@@ -305,6 +353,9 @@ mod tests {
             ("((r-1)^2*cos(a) - x)*cos(a) + (r-1)^2*sin(a)^2 + cos(a)*x", "(-1 + r)^2"),
             ("sin(a)*(cos(a)^2 + sin(a)^2)*f", "f*sin(a)"),
             ("cos(a)^2*(sin(a)^2 + cos(a)^2)^3", "1 - sin(a)^2"),
+            // A function of a sine is a factor like any other, also below a quotient.
+            ("(sin(a)^2 + cos(a)^2)/exp(sin(a))", "1/exp(sin(a))"),
+            ("(sin(a)^2 + cos(a)^2)*sqrt(exp(cos(a)))", "sqrt(exp(cos(a)))"),
         ];
         for (text, shorter) in cases {
             let mut graph = Graph::new();
@@ -322,6 +373,13 @@ mod tests {
             "cos(a)^2 + sin(b)^2",
             "(sin(a)^2 + cos(a)^2*x)/(1 + sin(a))",
             "1 - sin(a)^2*cos(a)",
+            // A root and a quotient of a sine.
+            "(sin(a)^2 + cos(a)^2)*sqrt(2 + sin(a))",
+            "(sin(a)^2 + cos(a)^2)/(2 + sin(a))",
+            // No shorter multiplied out, as 1 and the squares and products of sin(a) and sin(b).
+            "(sin(a)^2 + cos(a)^2 - sin(b)/3 + sin(a))^2",
+            // Too high a power.
+            "(sin(a)^2 + cos(a)^2)*sin(a)^9",
             // Shorter as 1 - sin^2, which has lost its digits near a right angle, where this one is looked at.
             "cos(171*a/100)^2*(sin(171*a/100)^2 + cos(171*a/100)^2)^3",
         ];
@@ -329,6 +387,52 @@ mod tests {
             let mut graph = Graph::new();
             let expr = build(&mut graph, text);
             assert_eq!(graph.shortened(expr), expr, "{text}");
+        }
+    }
+
+    /// Polynomials in sines and cosines of two angles and in other quantities, some of which are functions of a sine or roots.
+    fn text() -> impl Strategy<Value = String> {
+        let leaf = prop::sample::select(
+            &[
+                "sin(a)",
+                "cos(a)",
+                "sin(b)",
+                "cos(b)",
+                "x",
+                "2",
+                "exp(sin(a))",
+                "(sin(a)^2 + cos(a)^2)",
+            ][..],
+        );
+        leaf.prop_map(str::to_owned).prop_recursive(4, 16, 2, |inner| {
+            let pair = (inner.clone(), inner.clone());
+            prop_oneof![
+                pair.clone().prop_map(|(a, b)| format!("({a}) + ({b})")),
+                pair.clone().prop_map(|(a, b)| format!("({a}) - ({b})/3")),
+                pair.clone().prop_map(|(a, b)| format!("({a})*({b})")),
+                pair.prop_map(|(a, b)| format!("({a})*cos(a)*cos(b) + ({b})*sin(a)*sin(b)")),
+                (inner.clone(), 2..4_i32).prop_map(|(a, n)| format!("({a})^{n}")),
+                inner.clone().prop_map(|a| format!("({a})*cos(a)^2 + ({a})*sin(a)^2")),
+                inner.prop_map(|a| format!("sqrt(1 + ({a})^2)")),
+            ]
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn shorter_forms_have_the_same_value(
+            text in text(), x in 0.1..2.0, a in 0.1..1.4, b in -1.4..1.4,
+        ) {
+            let mut graph = Graph::new();
+            let inputs = ["x", "a", "b"].map(|name| (graph.symbol(name), Default::default()));
+            let expr = build(&mut graph, &text);
+            let short = graph.shortened(expr);
+            let program = Program::lower(&mut graph, &inputs, &[], &[expr, short]);
+            let found = program.evaluate(&[x, a, b]);
+            let allowed = 1e-11 * (1.0 + found[0].abs().powi(2));
+            prop_assert!((found[0] - found[1]).abs() <= allowed, "{} as {}", text, graph.print(short));
+            let size = |expr| graph.reachable(&[expr]).len();
+            prop_assert!(short == expr || size(short) < size(expr), "{} as {}", text, graph.print(short));
         }
     }
 }

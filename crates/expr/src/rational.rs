@@ -440,9 +440,6 @@ fn round_scaled(quotient: &BigUint, sticky: bool, exponent: i64) -> f64 {
         let step = e.clamp(-1000, 1000);
         result *= 2_f64.powi(step as i32);
         e -= step;
-        if result == 0.0 || result.is_infinite() {
-            break;
-        }
     }
     result
 }

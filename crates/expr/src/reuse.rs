@@ -158,3 +158,84 @@ fn times_within(inner: &[(Expr, Rational)], factors: &[(Expr, Rational)]) -> Opt
     }
     times
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Ast, Operation, Program};
+
+    const NAMES: [&str; 6] = ["u", "v", "x", "y", "z", "w"];
+
+    const AT: [f64; 6] = [0.5, -1.5, 2.0, 3.0, -0.25, 8.0];
+
+    /// The program, the values without reuse, and the outputs in their new forms.
+    fn reused(graph: &mut Graph, texts: &[&str]) -> (Program, Vec<f64>, Vec<Expr>) {
+        let place = Dependence { position: true, time: false };
+        let inputs = NAMES.map(|name| (graph.symbol(name), place));
+        let outputs: Vec<Expr> = texts
+            .iter()
+            .map(|text| {
+                let ast = Ast::parse(text).unwrap();
+                graph.build(&ast, &mut |g, name| Ok(g.symbol(name))).unwrap()
+            })
+            .collect();
+        let plain = Program::lower(graph, &inputs, &[], &outputs).evaluate(&AT);
+        let outputs = reuse(graph, &inputs, &[], &mut Drafts::default(), &outputs);
+        (Program::lower(graph, &inputs, &[], &outputs), plain, outputs)
+    }
+
+    /// Products multiply their factors in the order of the names, so that what two have in common is not at hand by itself where
+    /// they begin with what they have not.
+    #[test]
+    fn common_factors_are_multiplied_once() {
+        for (texts, products) in [
+            (&["u*x", "v*x"][..], 2),
+            (&["u*x*y", "v*x*y"], 3),
+            (&["u*x*y*z", "v*x*y*z"], 4),
+            (&["u*x*y*z*w", "v*x*y*z*w"], 5),
+            // Not all have them.
+            (&["u*x*y", "v*x*z"], 4),
+            (&["u*x*y", "v*x*y", "u + v"], 4),
+        ] {
+            let (program, plain, _) = reused(&mut Graph::new(), texts);
+            let found =
+                program.operations().iter().filter(|o| matches!(o, Operation::Mul(..))).count();
+            assert_eq!(found, products, "{texts:?}: {:?}", program.operations());
+            let found = program.evaluate(&AT);
+            assert!(found.iter().zip(plain).all(|(a, b)| (a / b - 1.0).abs() < 1e-15), "{texts:?}");
+        }
+    }
+
+    /// The limit on products may be reached and not be passed.
+    #[test]
+    fn many_products_are_not_compared() {
+        // None of them is within another, since all are of one degree.
+        let of_degree = |n: usize| {
+            let pairs = (1..n).flat_map(move |i| (1..n - i).map(move |j| (i, j)));
+            pairs.map(move |(i, j)| format!("u^{i}*v^{j}*x^{}", n - i - j))
+        };
+        let mut texts = vec!["sin(z*w)*z^2*w^2 + y".to_owned()];
+        texts.extend(of_degree(31).take(MOST_PRODUCTS - 2));
+        let is_found = |texts: &[String]| {
+            let texts: Vec<&str> = texts.iter().map(String::as_str).collect();
+            let mut graph = Graph::new();
+            let (_, _, outputs) = reused(&mut graph, &texts);
+            graph.reachable(&outputs).iter().any(|&e| matches!(graph.node(e), Node::Whole(_)))
+        };
+        assert!(texts.len() == MOST_PRODUCTS - 1 && is_found(&texts));
+        texts.push("u*v".into());
+        assert!(!is_found(&texts));
+        texts.push("u*y".into());
+        assert!(!is_found(&texts));
+    }
+
+    /// One product alone has its factors in common with nothing, so it is not made one piece.
+    #[test]
+    fn one_output_stays_a_product() {
+        let mut graph = Graph::new();
+        let (program, _, outputs) = reused(&mut graph, &["sin(u*v)*u^2*v^2*x"]);
+        assert!(matches!(graph.node(outputs[0]), Node::Product(_)));
+        let found = program.operations().iter().filter(|o| matches!(o, Operation::Mul(..))).count();
+        assert_eq!(found, 4, "{:?}", program.operations());
+    }
+}

@@ -260,6 +260,42 @@ fn many_operands_in_any_order() {
     }
 }
 
+/// Powers of numbers are numbers up to a size that may be reached and not be passed; what is no power has no such limit.
+#[test]
+fn sizes_of_powers() {
+    let mut graph = Graph::new();
+    let (x, two, half) = (graph.symbol("x"), graph.integer(2), graph.number(rational(1, 2)));
+    for base in [two, half] {
+        for (exponent, is_number) in [(8192, true), (-8192, true), (8193, false), (-8193, false)] {
+            let power = graph.powi(base, exponent);
+            assert_eq!(graph.as_number(power).is_some(), is_number, "{exponent}");
+        }
+    }
+    let three_halves = graph.number(rational(3, 2));
+    let power = graph.powi(three_halves, 8192);
+    assert!(graph.as_number(power).is_some());
+    // 4 has one bit more, and a root of 4 one less.
+    let four = graph.integer(4);
+    for (exponent, is_number) in [(rational(4096, 1), true), (rational(4097, 1), false)] {
+        let power = graph.product([(four, exponent)]);
+        assert_eq!(graph.as_number(power).is_some(), is_number);
+    }
+    let root = graph.product([(four, rational(8191, 2))]);
+    assert!(graph.as_number(root).is_some());
+    // One is one, and a factor is a coefficient.
+    assert_eq!(graph.powi(Graph::ONE, i64::MAX), Graph::ONE);
+    let large = Rational::from_integer(num_traits::pow(3.into(), 10_000));
+    let number = graph.number(large.clone());
+    let product = graph.mul(number, x);
+    assert_eq!(product, graph.sum([(large, x)]));
+    let quotient = graph.div(product, x);
+    assert_eq!(quotient, number);
+}
+
+fn rational(numerator: i64, denominator: i64) -> Rational {
+    Rational::new(numerator.into(), denominator.into())
+}
+
 #[test]
 fn only_what_divides_by_zero_says_so_and_every_node_counts() {
     let mut graph = Graph::new();

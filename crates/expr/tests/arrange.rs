@@ -48,12 +48,14 @@ fn expression() -> impl Strategy<Value = String> {
     ];
     leaf.prop_recursive(4, 24, 3, |inner| {
         let pair = (inner.clone(), inner.clone());
+        let roots = prop::sample::select(&["1/2", "-1/2", "3/2", "-7/3", "-2", "3"][..]);
         prop_oneof![
             pair.clone().prop_map(|(a, b)| format!("({a}) + ({b})")),
             pair.clone().prop_map(|(a, b)| format!("({a}) - ({b})")),
             pair.clone().prop_map(|(a, b)| format!("({a})*({b})")),
             pair.clone().prop_map(|(a, b)| format!("({a})/(2 + ({b})^2)")),
             pair.prop_map(|(a, b)| format!("({a})/(1 + ({b})^2) + ({b})/(1 + ({a})^2)")),
+            (inner.clone(), roots).prop_map(|(a, n)| format!("(1 + ({a})^2)^({n})")),
             inner.prop_map(|a| format!("ln(1 + ({a})^2)")),
         ]
     })
@@ -98,6 +100,43 @@ proptest! {
     }
 }
 
+/// As above, with roots and quotients of each rate of change beside fractions, and powers up to what is multiplied out and beyond.
+#[test]
+fn values_stay_with_powers_of_every_rate() {
+    let at = [0.7, 1.2, 0.4];
+    for base in ["(1 + x)", "(1 + t)", "(1 + a)", "(1 + x*t)", "(1 + a*x*t)"] {
+        for exponent in ["1/2", "-1/2", "3/2", "-2", "2", "6", "7", "-7"] {
+            for text in [
+                format!("x*t/(1 + x*t) + {base}^({exponent})"),
+                format!("x*t/(1 + x*t)*{base}^({exponent}) - t/(1 + x*t)^2 + a*x*t"),
+                format!("(t + x/(1 + x*t))*(2*x + {base}^({exponent}))/(1 + x*t) + t"),
+            ] {
+                let (before, after) = case(&text).programs();
+                let (old, new) = (before.evaluate(&at)[0], after.evaluate(&at)[0]);
+                assert!((old - new).abs() <= 1e-12 * old.abs(), "{text} gives {old} and {new}");
+            }
+        }
+    }
+}
+
+/// What does not depend on position and time is not computed where they meet.
+#[test]
+fn what_is_of_one_stage_stays_as_it_is() {
+    for text in [
+        "a*sin(t)/(1 + t) - t/(2 + a*t)",
+        "2*t*(1 + a)",
+        "a*x^2/(1 + x) + a*x/(1 + a*x)^2",
+        "3*a*x",
+        "a/(1 + a) - a^2",
+    ] {
+        let mut case = case(text);
+        let outputs = [case.expr];
+        let arranged =
+            arrange(&mut case.graph, &case.inputs, &[], &mut Drafts::default(), &outputs);
+        assert_eq!(arranged, outputs, "{text}");
+    }
+}
+
 #[test]
 fn fractions_share_one_denominator() {
     let mut case = case("x*cos(t) + a*cos(t)*x^3/(1 + x*cos(t)) - cos(t)*x^2/(1 + a*x*cos(t))^2");
@@ -107,6 +146,17 @@ fn fractions_share_one_denominator() {
     assert_eq!((before.both.divisions, after.both.divisions), (2, 1));
     assert_eq!(after.time.calls, 1);
     assert_eq!(after.both.calls, 0);
+}
+
+/// Below a quotient the factors are multiplied out where that saves operations.
+#[test]
+fn factors_over_a_quotient_are_one_polynomial() {
+    let mut case = case("(1 + x*t)*(1 - x*t)/(2 + x*t)");
+    let (before, after) = case.programs();
+    let count = |program: &Program| program.operations_by_stage(program.outputs()).both;
+    assert_eq!((count(&before).additions, count(&before).multiplications), (3, 2));
+    assert_eq!((count(&after).additions, count(&after).multiplications), (2, 2));
+    assert_eq!((count(&before).divisions, count(&after).divisions), (1, 1));
 }
 
 #[test]

@@ -294,6 +294,46 @@ mod tests {
         assert_eq!(found, expected);
     }
 
+    /// The limit on parts may be reached and not be passed: a sum is looked at, and each of its terms.
+    #[test]
+    fn sums_of_many_inputs() {
+        for (count, expected) in [(MOST_VISITED - 1, true), (MOST_VISITED, false)] {
+            let mut graph = Graph::new();
+            let place = Dependence { position: true, time: false };
+            let inputs: Vec<(Expr, Dependence)> =
+                (0..count).map(|n| (graph.symbol(&format!("X{n}")), place)).collect();
+            let argument = graph.sum_of(inputs.iter().map(|(symbol, _)| *symbol));
+            let sine = graph.call(Function::Sin, &[argument]);
+            let program = Program::lower(&mut graph, &inputs, &[], &[sine]);
+            let is_error = |o: &Operation| matches!(o, Operation::SumError(..));
+            assert_eq!(program.operations().iter().any(is_error), expected, "{count}");
+        }
+    }
+
+    /// Where all inputs cancel, what is left is a number, which is no sum of inputs.
+    #[test]
+    fn without_inputs_nothing_is_corrected() {
+        for beside in ["X/10 - 3/7", "X/10 - 10^400", "X/10"] {
+            let mut graph = Graph::new();
+            let place = Dependence { position: true, time: false };
+            let inputs = ["X", "Y"].map(|name| (graph.symbol(name), place));
+            let mut build = |text: &str| {
+                graph.build(&Ast::parse(text).unwrap(), &mut |g, name| Ok(g.symbol(name))).unwrap()
+            };
+            let (part, beside) = (build("X/10 + 1/3"), build(beside));
+            let part = graph.whole(part);
+            let argument = graph.sub(beside, part);
+            let sine = graph.call(Function::Sinh, &[argument]);
+            let program = Program::lower(&mut graph, &inputs, &[], &[sine]);
+            let is_error =
+                |o: &&Operation| matches!(o, Operation::SumError(..) | Operation::ProductError(..));
+            assert_eq!(program.operations().iter().find(is_error), None);
+            let calls =
+                program.operations().iter().filter(|o| matches!(o, Operation::Call(..))).count();
+            assert_eq!(calls, 1, "{:?}", program.operations());
+        }
+    }
+
     #[test]
     fn errors_of_sums_and_products_are_exact() {
         let exact = |x: f64| Rational::from_float(x).unwrap();

@@ -116,6 +116,9 @@ fn logarithms_of_both_lose_no_digits() {
     ] {
         assert!((at(x, y) / expected - 1.0).abs() < 1e-15, "{x}, {y}: {}", at(x, y));
     }
+    // Down to -1/2 only the first is looked at, below only the second.
+    assert_eq!(at(-0.5, f64::NAN), (-0.5_f64).ln_1p());
+    assert_eq!(at((-0.5_f64).next_down(), 3.0), 3.0_f64.ln());
 }
 
 /// Sines and cosines of what contains `Pi` as a factor are taken of the rest, of which the argument is reduced exactly.
@@ -150,5 +153,210 @@ fn where_pi_is_a_factor_it_is_left_out() {
             .iter()
             .any(|o| matches!(o, Operation::SinPi(_) | Operation::CosPi(_)));
         assert_eq!(found, without, "{text}: {:?}", program.operations());
+    }
+}
+
+const NAMES: [&str; 8] = ["a", "b", "k", "t", "s", "x", "y", "z"];
+
+/// What the program for `text` does, as nested operations; parameters are a, b, k, times t, s, places x, y, z, and r means
+/// `sqrt(x^2 + y^2)`.
+fn lowered(text: &str) -> String {
+    let mut graph = Graph::new();
+    let inputs = NAMES.map(|name| {
+        let (time, position) = ("ts".contains(name), "xyz".contains(name));
+        (graph.symbol(name), Dependence { position, time })
+    });
+    let mut build = |text: &str| {
+        graph.build(&Ast::parse(text).unwrap(), &mut |g, name| Ok(g.symbol(name))).unwrap()
+    };
+    let (radius, expr) = (build("sqrt(x^2 + y^2)"), build(text));
+    let definitions = [(build("r"), radius)];
+    let program = Program::lower(&mut graph, &inputs, &definitions, &[expr]);
+    let mut shown: Vec<String> = Vec::new();
+    for operation in program.operations() {
+        let of = |slot: &Slot| shown[slot.index()].as_str();
+        shown.push(match operation {
+            Operation::Number(number) => number.to_string(),
+            Operation::Pi => "Pi".into(),
+            Operation::Input(index) => NAMES[*index].into(),
+            Operation::Add(a, b) => format!("({} + {})", of(a), of(b)),
+            Operation::Sub(a, b) => format!("({} - {})", of(a), of(b)),
+            Operation::Mul(a, b) => format!("({}*{})", of(a), of(b)),
+            Operation::Div(a, b) => format!("({}/{})", of(a), of(b)),
+            Operation::Neg(a) => format!("-{}", of(a)),
+            Operation::Sqrt(a) => format!("sqrt({})", of(a)),
+            Operation::Power(a, exponent) => format!("{}^{exponent}", of(a)),
+            Operation::SinPi(a) => format!("sin(Pi {})", of(a)),
+            Operation::CosPi(a) => format!("cos(Pi {})", of(a)),
+            Operation::Call(function, a) => format!("{}({})", function.name(), of(a)),
+            Operation::Atan2(a, b) => format!("atan2({}, {})", of(a), of(b)),
+            Operation::LnOfBoth(a, b) => format!("lnboth({}, {})", of(a), of(b)),
+            Operation::SumError(a, b) => format!("sumerror({}, {})", of(a), of(b)),
+            Operation::ProductError(a, b) => format!("producterror({}, {})", of(a), of(b)),
+        });
+    }
+    shown[program.outputs()[0].index()].clone()
+}
+
+/// Slow factors and terms first, the constant of a sum last, a factor of several terms once, a quotient for all that is below,
+/// powers by squares, a sign where it costs nothing.
+#[test]
+fn operations_and_their_order() {
+    for (text, expected) in [
+        ("-3", "-3"),
+        ("-x", "-x"),
+        ("2*x", "(2*x)"),
+        ("-2*x", "-(2*x)"),
+        ("x/3", "(1/3*x)"),
+        ("-x/3", "-(1/3*x)"),
+        ("2*x/3", "(2/3*x)"),
+        ("x - y", "(x - y)"),
+        ("-x - y", "-(x + y)"),
+        ("-x + y", "-(x - y)"),
+        ("y - x", "-(x - y)"),
+        ("-x - y - z", "-((x + y) + z)"),
+        ("1 + x", "(x + 1)"),
+        ("1 - x", "(1 - x)"),
+        ("-1 - x", "-(x + 1)"),
+        ("-1 + x", "-(1 - x)"),
+        ("1 + x - y", "((x - y) + 1)"),
+        ("2 - x - y", "(2 - (x + y))"),
+        ("x^2", "(x*x)"),
+        ("x^3", "((x*x)*x)"),
+        ("x^7", "((((x*x)*x)*((x*x)*x))*x)"),
+        ("x^6", "(((x*x)*x)*((x*x)*x))"),
+        ("1/x", "(1/x)"),
+        ("1/x^2", "(1/(x*x))"),
+        ("x/y^2", "(x/(y*y))"),
+        ("a/x", "(a/x)"),
+        ("x/a", "((1/a)*x)"),
+        ("sqrt(x)", "sqrt(x)"),
+        ("x^(3/2)", "(x*sqrt(x))"),
+        ("x^(5/2)", "((x*x)*sqrt(x))"),
+        ("x^(1/3)", "x^1/3"),
+        ("x^(-1/2)", "(1/sqrt(x))"),
+        ("x^(-2/3)", "(1/x^2/3)"),
+        ("x^(4/3)", "x^4/3"),
+        ("1/(a*x)", "((1/a)/x)"),
+        ("a*b*t*x*y", "(((a*b)*t)*(x*y))"),
+        ("x*t*a*y*s*b", "(((a*b)*(t*s))*(x*y))"),
+        ("a/b*t/s*x/y", "(((a/b)*(t/s))*(x/y))"),
+        ("t/x", "(t/x)"),
+        ("1/(a*t*x)", "(((1/a)/t)/x)"),
+        ("x*y/(t*z)", "((1/t)*((x*y)/z))"),
+        ("a*x + a*y", "(a*(x + y))"),
+        ("a*x + b*y + a*z", "((a*(x + z)) + (b*y))"),
+        ("a*x - a*y", "(a*(x - y))"),
+        ("-a*x - a*y", "-(a*(x + y))"),
+        ("a*x + a*t", "(a*(t + x))"),
+        ("2*a*x + 2*a*y + 3*b*x*y", "(((2*a)*(x + y)) + ((3*b)*(x*y)))"),
+        ("2*x + 2*y + 3*z", "((2*(x + y)) + (3*z))"),
+        ("x*t + y*t + z", "(z + (t*(x + y)))"),
+        ("x*t - y*t + z", "(z + (t*(x - y)))"),
+        ("x*y + x*z + y*z", "((x*(y + z)) + (y*z))"),
+        ("x^2*y + x^2*z + x*y", "(x*((y*(x + 1)) + (x*z)))"),
+        ("x*sin(t) + y*sin(t) - z*cos(t)", "((sin(t)*(x + y)) - (cos(t)*z))"),
+        ("x + t + a", "((a + t) + x)"),
+        ("x*t + x + t + a + b", "(((a + b) + x) + (t*(x + 1)))"),
+        ("a - t - x", "((a - t) - x)"),
+        ("-a - t + x*t", "-(a + (t*(1 - x)))"),
+        ("r", "sqrt(((x*x) + (y*y)))"),
+        ("r^2", "((x*x) + (y*y))"),
+        ("r^3", "(((x*x) + (y*y))*sqrt(((x*x) + (y*y))))"),
+        ("r^4*x", "(x*(((x*x) + (y*y))*((x*x) + (y*y))))"),
+        ("1/r", "(1/sqrt(((x*x) + (y*y))))"),
+        ("1/r^2", "(1/((x*x) + (y*y)))"),
+        ("x/r^3", "(x/(((x*x) + (y*y))*sqrt(((x*x) + (y*y)))))"),
+        ("lnboth(x, 1 + x)", "lnboth(x, (x + 1))"),
+        ("atan2(y, x)", "atan2(y, x)"),
+        ("sin(Pi*x)", "sin(Pi x)"),
+        ("sin(x)", "sin(x)"),
+        ("cos(2*Pi*x)", "cos(Pi (2*x))"),
+        ("sin(a*x)", "sin((a*x))"),
+        (
+            "sin(x + y)",
+            "(sin((x + y)) + (sumerror(x, y)*(cos((x + y)) - ((1/2*sumerror(x, y))*sin((x + y))))))",
+        ),
+        (
+            "cos(x - 3*y)",
+            "(cos((x - (3*y))) - ((sumerror(x, -(3*y)) - producterror(3, y))*(sin((x - (3*y))) + ((1/2*(sumerror(x, -(3*y)) - producterror(3, y)))*cos((x - (3*y)))))))",
+        ),
+        (
+            "sin(1/3*x)",
+            "(sin((1/3*x)) + (((1/54043195528445952*x) + producterror(1/3, x))*(cos((1/3*x)) - ((1/2*((1/54043195528445952*x) + producterror(1/3, x)))*sin((1/3*x))))))",
+        ),
+        (
+            "exp(x + 1)",
+            "(exp((1 + x)) + (sumerror(1, x)*(exp((1 + x)) + ((1/2*sumerror(1, x))*exp((1 + x))))))",
+        ),
+        (
+            "sinh(-x + y)",
+            "-(sinh((x - y)) + (sumerror(x, -y)*(cosh((x - y)) + ((1/2*sumerror(x, -y))*sinh((x - y))))))",
+        ),
+        (
+            "cosh(2 - x)",
+            "(cosh((2 - x)) + (sumerror(2, -x)*(sinh((2 - x)) + ((1/2*sumerror(2, -x))*cosh((2 - x))))))",
+        ),
+        ("tan(x + y)", "tan((x + y))"),
+        ("sin(x + t)", "sin((t + x))"),
+        (
+            "sin(Pi*(x + y))",
+            "(sin(Pi (x + y)) + ((Pi*sumerror(x, y))*(cos(Pi (x + y)) - ((1/2*(Pi*sumerror(x, y)))*sin(Pi (x + y))))))",
+        ),
+        (
+            "cos(Pi*(1 - x/3))",
+            "(cos(Pi (1 - (1/3*x))) - ((Pi*((sumerror(1, -(1/3*x)) - (1/54043195528445952*x)) - producterror(1/3, x)))*(sin(Pi (1 - (1/3*x))) + ((1/2*(Pi*((sumerror(1, -(1/3*x)) - (1/54043195528445952*x)) - producterror(1/3, x))))*cos(Pi (1 - (1/3*x)))))))",
+        ),
+        (
+            "exp(-x - y)",
+            "(exp((-x - y)) + (sumerror(-x, -y)*(exp((-x - y)) + ((1/2*sumerror(-x, -y))*exp((-x - y))))))",
+        ),
+        ("x*(1 + y)", "(x*(y + 1))"),
+        ("2*(1 + y)", "(2*(y + 1))"),
+        ("(1 + y)/2", "(1/2*(y + 1))"),
+        ("(x + y)*(x - y)", "((x + y)*(x - y))"),
+        ("a*(x + y) + b*(x - y)", "((a*(x + y)) + (b*(x - y)))"),
+        ("(a + b)*x", "((a + b)*x)"),
+        ("(a + b)*x + (a + b)*y", "((a + b)*(x + y))"),
+        ("a*x*(1 + y) + a*t", "(a*(t + (x*(y + 1))))"),
+        ("1 + a*x + a*y", "((a*(x + y)) + 1)"),
+        ("Pi*x", "(Pi*x)"),
+        ("Pi*x + Pi*y", "(Pi*(x + y))"),
+        ("x + 0.1", "(1/10*((10*x) + 1))"),
+        ("x/10 + y/5 - 1/3", "-(1/30*(10 - (3*(x + (2*y)))))"),
+        ("k*x*t - k*y*t + k*z*t + x", "(x + (k*(t*((x - y) + z))))"),
+    ] {
+        assert_eq!(lowered(text), expected, "{text}");
+    }
+}
+
+/// Additions and products count once, quotients and roots eight times, calls forty times; what is done once for given
+/// parameters does not count.
+#[test]
+fn costs_of_programs() {
+    for (text, cost) in [
+        ("x + y", 1),
+        ("x - y*t", 2),
+        ("x*y*z*t", 3),
+        ("x/t", 9),
+        ("sqrt(x)", 8),
+        ("t + sqrt(s)*sqrt(t)", 18),
+        ("tan(x)", 40),
+        ("tan(t) + exp(s)", 81),
+        ("x^(1/3)", 40),
+        ("a + b", 0),
+        ("sin(a)*b + x", 1),
+        ("x*y + t*s + sin(a) + y*t", 5),
+        ("exp(t*x)*y*t/(s + t) + s/y", 61),
+    ] {
+        let mut graph = Graph::new();
+        let inputs = NAMES.map(|name| {
+            let (time, position) = ("ts".contains(name), "xyz".contains(name));
+            (graph.symbol(name), Dependence { position, time })
+        });
+        let ast = Ast::parse(text).unwrap();
+        let expr = graph.build(&ast, &mut |g, name| Ok(g.symbol(name))).unwrap();
+        let program = Program::lower(&mut graph, &inputs, &[], &[expr]);
+        assert_eq!(program.cost(), cost, "{text}: {:?}", program.operations());
     }
 }
