@@ -4,12 +4,15 @@
 //! than once by one quantity or by powers of it, as polar fields divide by `R`, `R^2` and `R^3`, one reciprocal is
 //! formed, and the quotients become products with its powers. Each such product carries one rounding more than the
 //! quotient had, the same for small and for large values.
+//!
+//! In the same way a product whose logarithm is taken, as J is, serves for the reciprocals of its factors, as the stretches along
+//! axes are: `1/a = b/(a b)`. That it neither overflows nor vanishes its logarithm asks for already.
 
 use crate::graph::NumberMap;
 use crate::{Dependence, Operation, Program, Rational, Slot};
 use num_integer::Integer;
 use num_traits::One;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A quantity and the power of it that some slot holds.
 type Power = (Slot, u32);
@@ -27,6 +30,11 @@ enum Unit {
 impl Program {
     /// The program with shared reciprocals, and without operations that no output needs.
     pub(crate) fn with_shared_reciprocals(&self) -> Program {
+        self.with_reciprocals_of_powers().with_reciprocals_of_factors()
+    }
+
+    /// One reciprocal of each quantity that several quotients divide by powers of.
+    fn with_reciprocals_of_powers(&self) -> Program {
         let shared = self.shared_divisors();
         if shared.is_empty() {
             return self.compacted();
@@ -79,6 +87,88 @@ impl Program {
         }
         let outputs = self.outputs().iter().filter_map(|slot| places[slot.index()]).collect();
         Program::from_parts(builder.operations, builder.dependence, outputs).compacted()
+    }
+
+    /// One reciprocal of each product whose logarithm is taken, for the quotients by its factors.
+    fn with_reciprocals_of_factors(self) -> Program {
+        let needed = self.needed(self.outputs());
+        let logarithms = self.slots().filter(|slot| needed[slot.index()]);
+        let products: BTreeSet<Slot> = logarithms
+            .filter_map(|slot| match self.operations()[slot.index()] {
+                Operation::LnOfBoth(_, product) => Some(product),
+                _ => None,
+            })
+            .collect();
+        // One is enough: there is one J.
+        let cheaper = products.into_iter().find_map(|p| self.with_reciprocals_of_factors_of(p));
+        cheaper.unwrap_or(self)
+    }
+
+    /// `None` where fewer than two quotients could be spared.
+    fn with_reciprocals_of_factors_of(&self, whole: Slot) -> Option<Program> {
+        let rate = self.dependence(whole);
+        // Each factor after the product that it is a factor of, with that and with the other factor.
+        let mut factors: Vec<(Slot, Slot, Slot)> = Vec::new();
+        let mut products = vec![whole];
+        while let Some(product) = products.pop() {
+            let Operation::Mul(a, b) = self.operations()[product.index()] else { continue };
+            if a == b || [a, b].iter().any(|&factor| self.dependence(factor) != rate) {
+                continue;
+            }
+            factors.extend([(a, product, b), (b, product, a)]);
+            products.extend([a, b]);
+        }
+        let before = self.needed(&[whole]);
+        let needed = self.needed(self.outputs());
+        let quotients: BTreeMap<Slot, (Slot, Slot)> = self
+            .slots()
+            .filter(|slot| needed[slot.index()] && !before[slot.index()])
+            .filter_map(|slot| match self.operations()[slot.index()] {
+                Operation::Div(numerator, factor)
+                    if factor == whole || factors.iter().any(|(known, ..)| *known == factor) =>
+                {
+                    Some((slot, (numerator, factor)))
+                }
+                _ => None,
+            })
+            .collect();
+        let divisors: BTreeSet<Slot> = quotients.values().map(|(_, factor)| *factor).collect();
+        if divisors.len() < 2 {
+            return None;
+        }
+        let mut builder = Builder::default();
+        let mut places: Vec<Option<Slot>> = vec![None; self.operations().len()];
+        let one = Operation::Number(Rational::one());
+        let mut reciprocals: BTreeMap<Slot, Slot> = BTreeMap::new();
+        // What the product needs comes first, since the quotients need it now.
+        let first = self.slots().filter(|slot| before[slot.index()]);
+        for slot in first.chain(self.slots().filter(|slot| !before[slot.index()])) {
+            let operation = &self.operations()[slot.index()];
+            let place = |slot: Slot| places[slot.index()].unwrap_or(slot);
+            let own = self.dependence(slot);
+            let moved = if let Some(&(numerator, factor)) = quotients.get(&slot) {
+                if reciprocals.is_empty() {
+                    reciprocals.insert(whole, builder.reciprocal(place(whole), rate));
+                    for &(factor, product, other) in &factors {
+                        if let Some(&of_product) = reciprocals.get(&product) {
+                            let of_factor = Operation::Mul(place(other), of_product);
+                            reciprocals.insert(factor, builder.push(of_factor, rate));
+                        }
+                    }
+                }
+                let reciprocal = *reciprocals.get(&factor)?;
+                if self.operations()[numerator.index()] == one {
+                    reciprocal
+                } else {
+                    builder.push(Operation::Mul(place(numerator), reciprocal), own)
+                }
+            } else {
+                builder.push(operation.with_operands(place), own)
+            };
+            places[slot.index()] = Some(moved);
+        }
+        let outputs = self.outputs().iter().filter_map(|slot| places[slot.index()]).collect();
+        Some(Program::from_parts(builder.operations, builder.dependence, outputs).compacted())
     }
 
     /// The quantities that several needed quotients divide by powers of, with the reciprocal to form.

@@ -280,3 +280,32 @@ fn products_within_products_are_used() {
         assert!((a - b).abs() <= 1e-15 * a.abs(), "{same:?}, not {values:?}");
     }
 }
+
+/// The reciprocals of the factors of a product whose logarithm is taken come from that of the product, unless one of
+/// them has another rate, or a factor depends on a quotient by another.
+#[test]
+fn factors_of_a_product_whose_logarithm_is_taken_share_its_reciprocal() {
+    let (x, t) = (0.5_f64, 0.25_f64);
+    let (f, g, h) = (1.0 + x * t, 2.0 + x * t, 3.0 + x * t);
+    let (F, G, H) = ("(1 + x*t)", "(2 + x*t)", "(3 + x*t)");
+    for (text, divisions, value) in [
+        (format!("lnboth(x, {F}*{G}) + x/{F} + t/{G}"), 1, x / f + t / g),
+        (format!("lnboth(x, {F}*{G}*{H}) + x/{F} + t/{G} + 1/{H}"), 1, x / f + t / g + 1.0 / h),
+        (format!("lnboth(x, {F}*{G}*{H}) + x/{F} + 1/{H}"), 1, x / f + 1.0 / h),
+        // A product without a logarithm may be as small as it likes.
+        (format!("{F}*{G} + x/{F} + t/{G}"), 2, f * g + x / f + t / g),
+        (format!("lnboth(x, {F}*{G}) + x/{F} + t/{H}"), 2, x / f + t / h),
+        (format!("lnboth(x, {F}*{G}) + x/{F}"), 1, x / f),
+        (format!("lnboth(x, {F}*(1 + t)) + x/{F} + t/(1 + t)"), 2, x / f + t / (1.0 + t)),
+        (format!("lnboth(x, {F}*({G} + x/{F})) + t/({G} + x/{F})"), 2, t / (g + x / f)),
+    ] {
+        let mut case = case(&text);
+        let program = Program::lower(&mut case.graph, &case.inputs, &[], &[case.expr]);
+        let count = program.operations_by_stage(program.outputs());
+        let found = count.time.divisions + count.point.divisions + count.both.divisions;
+        assert_eq!(found, divisions, "{text}: {:?}", program.operations());
+        let logarithm = if text.starts_with("lnboth") { x.ln_1p() } else { 0.0 };
+        let (result, expected) = (program.evaluate(&[x, t, 0.0])[0], value + logarithm);
+        assert!((result / expected - 1.0).abs() < 1e-14, "{text}: {result}, not {expected}");
+    }
+}

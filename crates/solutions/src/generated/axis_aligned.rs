@@ -113,50 +113,50 @@ impl<T: crate::Real> AxisAligned<T> {
         if !(value.is_finite() && value > 0.0) {
             return Err(Self::DESCRIPTION.out_of_range(3, value));
         }
-        let t6 = parameters.E / parameters.rho0;
-        let t7 = t6.sqrt();
-        let t18 = parameters.A * T::pi();
-        let t19 = t18 * t7;
-        let t25 = T::pi() * T::pi();
-        let t26 = parameters.A * t25;
-        let t27 = t26 * parameters.E;
-        let t28 = t27 / parameters.rho0;
+        let t5 = parameters.E / parameters.rho0;
+        let t6 = t5.sqrt();
+        let t12 = parameters.A * T::pi();
+        let t29 = t12 * t6;
+        let t35 = T::pi() * T::pi();
+        let t36 = parameters.A * t35;
+        let t37 = t36 * parameters.E;
+        let t38 = t37 / parameters.rho0;
         let t47 = parameters.nu + T::one();
         let t49 = T::nearest(0.5) * parameters.E;
         let t50 = t49 / t47;
-        let t54 = T::nearest(2.0) * parameters.nu;
-        let t55 = T::one() - t54;
-        let t62 = t18 * t50;
-        let t66 = parameters.E * parameters.nu;
-        let t67 = t47 * t55;
-        let t68 = t66 / t67;
-        let t80 = parameters.nu * parameters.nu;
-        let t81 = T::nearest(2.0) * parameters.A;
-        let t82 = t81 * t25;
-        let t83 = t82 * parameters.E;
-        let t84 = t83 * t80;
-        let t85 = parameters.rho0 * t47;
-        let t86 = t85 * t55;
-        let t87 = t84 / t86;
-        let t114 = t26 / parameters.rho0;
-        let t140 = t68 + t50;
-        let t141 = parameters.A * parameters.A;
-        let t142 = t141 * parameters.A;
-        let t143 = t25 * t25;
-        let t145 = t142 * t143;
-        let t146 = t145 * t140;
-        let t147 = t146 / parameters.rho0;
-        let t151 = t25 * T::pi();
-        let t152 = T::nearest(2.0) * t141;
-        let t153 = t152 * t151;
-        let t154 = t153 * t140;
-        let t155 = t154 / parameters.rho0;
-        let t160 = t27 * parameters.nu;
-        let t161 = t160 / t86;
-        let t189 = T::nearest(2.0) / t7;
+        let t56 = T::nearest(2.0) * parameters.nu;
+        let t57 = T::one() - t56;
+        let t64 = t12 * t50;
+        let t68 = parameters.E * parameters.nu;
+        let t69 = t47 * t57;
+        let t70 = t68 / t69;
+        let t81 = parameters.nu * parameters.nu;
+        let t82 = T::nearest(2.0) * parameters.A;
+        let t83 = t82 * t35;
+        let t84 = t83 * parameters.E;
+        let t85 = t84 * t81;
+        let t86 = parameters.rho0 * t47;
+        let t87 = t86 * t57;
+        let t88 = t85 / t87;
+        let t115 = t36 / parameters.rho0;
+        let t141 = t70 + t50;
+        let t142 = parameters.A * parameters.A;
+        let t143 = t142 * parameters.A;
+        let t144 = t35 * t35;
+        let t146 = t143 * t144;
+        let t147 = t146 * t141;
+        let t148 = t147 / parameters.rho0;
+        let t152 = t35 * T::pi();
+        let t153 = T::nearest(2.0) * t142;
+        let t154 = t153 * t152;
+        let t155 = t154 * t141;
+        let t156 = t155 / parameters.rho0;
+        let t161 = t37 * parameters.nu;
+        let t162 = t161 / t87;
+        let t190 = T::nearest(2.0) / t6;
         Ok(AxisAligned {
             parameters,
-            fixed: [t7, t18, t19, t28, t50, t62, t68, t87, t114, t147, t155, t161, t189],
+            fixed: [t6, t12, t29, t38, t50, t64, t70, t88, t115, t148, t156, t162, t190],
         })
     }
     /// The solution with parameter values in the order of the description; missing ones take their
@@ -195,16 +195,16 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t2 = X[0].sin_pi();
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.cos_pi();
-        let t10 = self.parameters.A * t9;
-        let t11 = t10 * t2;
-        let t13 = X[1].sin_pi();
-        let t14 = t8.sin_pi();
-        let t15 = self.parameters.A * t14;
-        let t16 = t15 * t13;
-        crate::nalgebra::SVector::<T, 2>::new(t11, t16)
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.cos_pi();
+        let t10 = t7.sin_pi();
+        let t23 = X[0].sin_pi();
+        let t24 = self.parameters.A * t8;
+        let t25 = t24 * t23;
+        let t26 = X[1].sin_pi();
+        let t27 = self.parameters.A * t10;
+        let t28 = t27 * t26;
+        crate::nalgebra::SVector::<T, 2>::new(t25, t28)
     }
     #[inline]
     fn velocity(
@@ -212,17 +212,17 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t2 = X[0].sin_pi();
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.cos_pi();
-        let t13 = X[1].sin_pi();
-        let t14 = t8.sin_pi();
-        let t20 = self.fixed[2] * t14;
-        let t21 = t20 * t2;
-        let t22 = -t21;
-        let t23 = self.fixed[2] * t9;
-        let t24 = t23 * t13;
-        crate::nalgebra::SVector::<T, 2>::new(t22, t24)
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.cos_pi();
+        let t10 = t7.sin_pi();
+        let t23 = X[0].sin_pi();
+        let t26 = X[1].sin_pi();
+        let t30 = self.fixed[2] * t10;
+        let t31 = t30 * t23;
+        let t32 = -t31;
+        let t33 = self.fixed[2] * t8;
+        let t34 = t33 * t26;
+        crate::nalgebra::SVector::<T, 2>::new(t32, t34)
     }
     #[inline]
     fn acceleration(
@@ -230,18 +230,18 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t2 = X[0].sin_pi();
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.cos_pi();
-        let t13 = X[1].sin_pi();
-        let t14 = t8.sin_pi();
-        let t29 = self.fixed[3] * t9;
-        let t30 = t29 * t2;
-        let t31 = -t30;
-        let t32 = self.fixed[3] * t14;
-        let t33 = t32 * t13;
-        let t34 = -t33;
-        crate::nalgebra::SVector::<T, 2>::new(t31, t34)
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.cos_pi();
+        let t10 = t7.sin_pi();
+        let t23 = X[0].sin_pi();
+        let t26 = X[1].sin_pi();
+        let t39 = self.fixed[3] * t8;
+        let t40 = t39 * t23;
+        let t41 = -t40;
+        let t42 = self.fixed[3] * t10;
+        let t43 = t42 * t26;
+        let t44 = -t43;
+        crate::nalgebra::SVector::<T, 2>::new(t41, t44)
     }
     #[inline]
     fn displacement_gradient(
@@ -249,16 +249,16 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.cos_pi();
-        let t14 = t8.sin_pi();
-        let t35 = X[0].cos_pi();
-        let t36 = self.fixed[1] * t9;
-        let t37 = t36 * t35;
-        let t39 = X[1].cos_pi();
-        let t40 = self.fixed[1] * t14;
-        let t41 = t40 * t39;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t37, T::zero(), T::zero(), t41)
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.cos_pi();
+        let t10 = t7.sin_pi();
+        let t13 = X[0].cos_pi();
+        let t14 = self.fixed[1] * t8;
+        let t15 = t14 * t13;
+        let t16 = X[1].cos_pi();
+        let t17 = self.fixed[1] * t10;
+        let t18 = t17 * t16;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t15, T::zero(), T::zero(), t18)
     }
     #[inline]
     fn deformation_gradient(
@@ -266,34 +266,34 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.cos_pi();
-        let t14 = t8.sin_pi();
-        let t35 = X[0].cos_pi();
-        let t36 = self.fixed[1] * t9;
-        let t37 = t36 * t35;
-        let t39 = X[1].cos_pi();
-        let t40 = self.fixed[1] * t14;
-        let t41 = t40 * t39;
-        let t43 = t37 + T::one();
-        let t44 = t41 + T::one();
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t43, T::zero(), T::zero(), t44)
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.cos_pi();
+        let t10 = t7.sin_pi();
+        let t13 = X[0].cos_pi();
+        let t14 = self.fixed[1] * t8;
+        let t15 = t14 * t13;
+        let t16 = X[1].cos_pi();
+        let t17 = self.fixed[1] * t10;
+        let t18 = t17 * t16;
+        let t20 = t15 + T::one();
+        let t21 = t18 + T::one();
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t20, T::zero(), T::zero(), t21)
     }
     #[inline]
     fn jacobian(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> T {
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.cos_pi();
-        let t14 = t8.sin_pi();
-        let t35 = X[0].cos_pi();
-        let t36 = self.fixed[1] * t9;
-        let t37 = t36 * t35;
-        let t39 = X[1].cos_pi();
-        let t40 = self.fixed[1] * t14;
-        let t41 = t40 * t39;
-        let t43 = t37 + T::one();
-        let t44 = t41 + T::one();
-        let t45 = t43 * t44;
-        t45
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.cos_pi();
+        let t10 = t7.sin_pi();
+        let t13 = X[0].cos_pi();
+        let t14 = self.fixed[1] * t8;
+        let t15 = t14 * t13;
+        let t16 = X[1].cos_pi();
+        let t17 = self.fixed[1] * t10;
+        let t18 = t17 * t16;
+        let t20 = t15 + T::one();
+        let t21 = t18 + T::one();
+        let t22 = t20 * t21;
+        t22
     }
     #[inline]
     fn first_piola_kirchhoff(
@@ -301,41 +301,42 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.cos_pi();
-        let t14 = t8.sin_pi();
-        let t35 = X[0].cos_pi();
-        let t36 = self.fixed[1] * t9;
-        let t37 = t36 * t35;
-        let t39 = X[1].cos_pi();
-        let t40 = self.fixed[1] * t14;
-        let t41 = t40 * t39;
-        let t43 = t37 + T::one();
-        let t44 = t41 + T::one();
-        let t45 = t43 * t44;
-        let t51 = T::one() / t43;
-        let t52 = t51 + T::one();
-        let t56 = t35 * t44;
-        let t57 = t9 * t56;
-        let t58 = t14 * t39;
-        let t59 = t57 + t58;
-        let t60 = self.fixed[1] * t59;
-        let t61 = t60.ln_of_both(t45);
-        let t63 = self.fixed[5] * t9;
-        let t64 = t63 * t35;
-        let t65 = t64 * t52;
-        let t69 = t61 * t51;
-        let t70 = self.fixed[6] * t69;
-        let t71 = t65 + t70;
-        let t72 = T::one() / t44;
-        let t73 = t72 + T::one();
-        let t74 = self.fixed[5] * t14;
-        let t75 = t74 * t39;
-        let t76 = t75 * t73;
-        let t77 = t61 * t72;
-        let t78 = self.fixed[6] * t77;
-        let t79 = t76 + t78;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t71, T::zero(), T::zero(), t79)
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.cos_pi();
+        let t10 = t7.sin_pi();
+        let t13 = X[0].cos_pi();
+        let t14 = self.fixed[1] * t8;
+        let t15 = t14 * t13;
+        let t16 = X[1].cos_pi();
+        let t17 = self.fixed[1] * t10;
+        let t18 = t17 * t16;
+        let t20 = t15 + T::one();
+        let t21 = t18 + T::one();
+        let t22 = t20 * t21;
+        let t51 = T::one() / t22;
+        let t52 = t21 * t51;
+        let t53 = t20 * t51;
+        let t54 = t52 + T::one();
+        let t58 = t13 * t21;
+        let t59 = t8 * t58;
+        let t60 = t10 * t16;
+        let t61 = t59 + t60;
+        let t62 = self.fixed[1] * t61;
+        let t63 = t62.ln_of_both(t22);
+        let t65 = self.fixed[5] * t8;
+        let t66 = t65 * t13;
+        let t67 = t66 * t54;
+        let t71 = t63 * t52;
+        let t72 = self.fixed[6] * t71;
+        let t73 = t67 + t72;
+        let t74 = t53 + T::one();
+        let t75 = self.fixed[5] * t10;
+        let t76 = t75 * t16;
+        let t77 = t76 * t74;
+        let t78 = t63 * t53;
+        let t79 = self.fixed[6] * t78;
+        let t80 = t77 + t79;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t73, T::zero(), T::zero(), t80)
     }
     #[inline]
     fn body_force(
@@ -343,177 +344,178 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t2 = X[0].sin_pi();
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.cos_pi();
-        let t13 = X[1].sin_pi();
-        let t14 = t8.sin_pi();
-        let t35 = X[0].cos_pi();
-        let t39 = X[1].cos_pi();
-        let t58 = t14 * t39;
-        let t88 = self.fixed[7] * t9;
-        let t89 = t88 * t2;
-        let t90 = t9 * t35;
-        let t91 = self.fixed[1] * t90;
-        let t92 = t91 + T::one();
-        let t93 = t39 * t92;
-        let t94 = t14 * t93;
-        let t95 = t94 + t90;
-        let t96 = self.fixed[1] * t95;
-        let t97 = self.fixed[1] * t58;
-        let t98 = t97 + T::one();
-        let t99 = t92 * t98;
-        let t100 = t96.ln_of_both(t99);
-        let t101 = self.fixed[6] * t100;
-        let t102 = self.fixed[4] * t91;
-        let t103 = t101 + t102;
-        let t104 = T::one() / t92;
-        let t105 = self.fixed[6] * t104;
-        let t106 = self.fixed[4] + t105;
-        let t107 = t91 + t100;
-        let t108 = self.fixed[6] * t107;
-        let t109 = t103 * t104;
-        let t110 = t106 - t109;
-        let t111 = self.fixed[4] + t110;
-        let t112 = t91 * t111;
-        let t113 = t108 + t112;
-        let t115 = self.fixed[8] * t9;
-        let t116 = t115 * t2;
-        let t117 = t113 * t104;
-        let t118 = t116 * t117;
-        let t119 = t89 - t118;
-        let t120 = self.fixed[7] * t14;
-        let t121 = t120 * t13;
-        let t122 = self.fixed[4] * t97;
-        let t123 = t101 + t122;
-        let t124 = T::one() / t98;
-        let t125 = self.fixed[6] * t124;
-        let t126 = self.fixed[4] + t125;
-        let t127 = t100 + t97;
-        let t128 = self.fixed[6] * t127;
-        let t129 = t123 * t124;
-        let t130 = t126 - t129;
-        let t131 = self.fixed[4] + t130;
-        let t132 = t97 * t131;
-        let t133 = t128 + t132;
-        let t134 = self.fixed[8] * t14;
-        let t135 = t134 * t13;
-        let t136 = t133 * t124;
-        let t137 = t135 * t136;
-        let t138 = t121 - t137;
-        crate::nalgebra::SVector::<T, 2>::new(t119, t138)
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.cos_pi();
+        let t10 = t7.sin_pi();
+        let t13 = X[0].cos_pi();
+        let t16 = X[1].cos_pi();
+        let t23 = X[0].sin_pi();
+        let t26 = X[1].sin_pi();
+        let t60 = t10 * t16;
+        let t89 = self.fixed[7] * t8;
+        let t90 = t89 * t23;
+        let t91 = t8 * t13;
+        let t92 = self.fixed[1] * t91;
+        let t93 = t92 + T::one();
+        let t94 = t16 * t93;
+        let t95 = t10 * t94;
+        let t96 = t95 + t91;
+        let t97 = self.fixed[1] * t96;
+        let t98 = self.fixed[1] * t60;
+        let t99 = t98 + T::one();
+        let t100 = t93 * t99;
+        let t101 = t97.ln_of_both(t100);
+        let t102 = self.fixed[6] * t101;
+        let t103 = self.fixed[4] * t92;
+        let t104 = t102 + t103;
+        let t105 = T::one() / t93;
+        let t106 = self.fixed[6] * t105;
+        let t107 = self.fixed[4] + t106;
+        let t108 = t92 + t101;
+        let t109 = self.fixed[6] * t108;
+        let t110 = t104 * t105;
+        let t111 = t107 - t110;
+        let t112 = self.fixed[4] + t111;
+        let t113 = t92 * t112;
+        let t114 = t109 + t113;
+        let t116 = self.fixed[8] * t8;
+        let t117 = t116 * t23;
+        let t118 = t114 * t105;
+        let t119 = t117 * t118;
+        let t120 = t90 - t119;
+        let t121 = self.fixed[7] * t10;
+        let t122 = t121 * t26;
+        let t123 = self.fixed[4] * t98;
+        let t124 = t102 + t123;
+        let t125 = T::one() / t99;
+        let t126 = self.fixed[6] * t125;
+        let t127 = self.fixed[4] + t126;
+        let t128 = t101 + t98;
+        let t129 = self.fixed[6] * t128;
+        let t130 = t124 * t125;
+        let t131 = t127 - t130;
+        let t132 = self.fixed[4] + t131;
+        let t133 = t98 * t132;
+        let t134 = t129 + t133;
+        let t135 = self.fixed[8] * t10;
+        let t136 = t135 * t26;
+        let t137 = t134 * t125;
+        let t138 = t136 * t137;
+        let t139 = t122 - t138;
+        crate::nalgebra::SVector::<T, 2>::new(t120, t139)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
-        let t2 = X[0].sin_pi();
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.cos_pi();
-        let t10 = self.parameters.A * t9;
-        let t11 = t10 * t2;
-        let t13 = X[1].sin_pi();
-        let t14 = t8.sin_pi();
-        let t15 = self.parameters.A * t14;
-        let t16 = t15 * t13;
-        let t20 = self.fixed[2] * t14;
-        let t21 = t20 * t2;
-        let t22 = -t21;
-        let t23 = self.fixed[2] * t9;
-        let t24 = t23 * t13;
-        let t29 = self.fixed[3] * t9;
-        let t30 = t29 * t2;
-        let t31 = -t30;
-        let t32 = self.fixed[3] * t14;
-        let t33 = t32 * t13;
-        let t34 = -t33;
-        let t35 = X[0].cos_pi();
-        let t36 = self.fixed[1] * t9;
-        let t37 = t36 * t35;
-        let t39 = X[1].cos_pi();
-        let t40 = self.fixed[1] * t14;
-        let t41 = t40 * t39;
-        let t43 = t37 + T::one();
-        let t44 = t41 + T::one();
-        let t45 = t43 * t44;
-        let t51 = T::one() / t43;
-        let t52 = t51 + T::one();
-        let t56 = t35 * t44;
-        let t57 = t9 * t56;
-        let t58 = t14 * t39;
-        let t59 = t57 + t58;
-        let t60 = self.fixed[1] * t59;
-        let t61 = t60.ln_of_both(t45);
-        let t63 = self.fixed[5] * t9;
-        let t64 = t63 * t35;
-        let t65 = t64 * t52;
-        let t69 = t61 * t51;
-        let t70 = self.fixed[6] * t69;
-        let t71 = t65 + t70;
-        let t72 = T::one() / t44;
-        let t73 = t72 + T::one();
-        let t74 = self.fixed[5] * t14;
-        let t75 = t74 * t39;
-        let t76 = t75 * t73;
-        let t77 = t61 * t72;
-        let t78 = self.fixed[6] * t77;
-        let t79 = t76 + t78;
-        let t88 = self.fixed[7] * t9;
-        let t89 = t88 * t2;
-        let t90 = t9 * t35;
-        let t91 = self.fixed[1] * t90;
-        let t92 = t91 + T::one();
-        let t93 = t39 * t92;
-        let t94 = t14 * t93;
-        let t95 = t94 + t90;
-        let t96 = self.fixed[1] * t95;
-        let t97 = self.fixed[1] * t58;
-        let t98 = t97 + T::one();
-        let t99 = t92 * t98;
-        let t100 = t96.ln_of_both(t99);
-        let t101 = self.fixed[6] * t100;
-        let t102 = self.fixed[4] * t91;
-        let t103 = t101 + t102;
-        let t104 = T::one() / t92;
-        let t105 = self.fixed[6] * t104;
-        let t106 = self.fixed[4] + t105;
-        let t107 = t91 + t100;
-        let t108 = self.fixed[6] * t107;
-        let t109 = t103 * t104;
-        let t110 = t106 - t109;
-        let t111 = self.fixed[4] + t110;
-        let t112 = t91 * t111;
-        let t113 = t108 + t112;
-        let t115 = self.fixed[8] * t9;
-        let t116 = t115 * t2;
-        let t117 = t113 * t104;
-        let t118 = t116 * t117;
-        let t119 = t89 - t118;
-        let t120 = self.fixed[7] * t14;
-        let t121 = t120 * t13;
-        let t122 = self.fixed[4] * t97;
-        let t123 = t101 + t122;
-        let t124 = T::one() / t98;
-        let t125 = self.fixed[6] * t124;
-        let t126 = self.fixed[4] + t125;
-        let t127 = t100 + t97;
-        let t128 = self.fixed[6] * t127;
-        let t129 = t123 * t124;
-        let t130 = t126 - t129;
-        let t131 = self.fixed[4] + t130;
-        let t132 = t97 * t131;
-        let t133 = t128 + t132;
-        let t134 = self.fixed[8] * t14;
-        let t135 = t134 * t13;
-        let t136 = t133 * t124;
-        let t137 = t135 * t136;
-        let t138 = t121 - t137;
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.cos_pi();
+        let t10 = t7.sin_pi();
+        let t13 = X[0].cos_pi();
+        let t14 = self.fixed[1] * t8;
+        let t15 = t14 * t13;
+        let t16 = X[1].cos_pi();
+        let t17 = self.fixed[1] * t10;
+        let t18 = t17 * t16;
+        let t20 = t15 + T::one();
+        let t21 = t18 + T::one();
+        let t22 = t20 * t21;
+        let t23 = X[0].sin_pi();
+        let t24 = self.parameters.A * t8;
+        let t25 = t24 * t23;
+        let t26 = X[1].sin_pi();
+        let t27 = self.parameters.A * t10;
+        let t28 = t27 * t26;
+        let t30 = self.fixed[2] * t10;
+        let t31 = t30 * t23;
+        let t32 = -t31;
+        let t33 = self.fixed[2] * t8;
+        let t34 = t33 * t26;
+        let t39 = self.fixed[3] * t8;
+        let t40 = t39 * t23;
+        let t41 = -t40;
+        let t42 = self.fixed[3] * t10;
+        let t43 = t42 * t26;
+        let t44 = -t43;
+        let t51 = T::one() / t22;
+        let t52 = t21 * t51;
+        let t53 = t20 * t51;
+        let t54 = t52 + T::one();
+        let t58 = t13 * t21;
+        let t59 = t8 * t58;
+        let t60 = t10 * t16;
+        let t61 = t59 + t60;
+        let t62 = self.fixed[1] * t61;
+        let t63 = t62.ln_of_both(t22);
+        let t65 = self.fixed[5] * t8;
+        let t66 = t65 * t13;
+        let t67 = t66 * t54;
+        let t71 = t63 * t52;
+        let t72 = self.fixed[6] * t71;
+        let t73 = t67 + t72;
+        let t74 = t53 + T::one();
+        let t75 = self.fixed[5] * t10;
+        let t76 = t75 * t16;
+        let t77 = t76 * t74;
+        let t78 = t63 * t53;
+        let t79 = self.fixed[6] * t78;
+        let t80 = t77 + t79;
+        let t89 = self.fixed[7] * t8;
+        let t90 = t89 * t23;
+        let t91 = t8 * t13;
+        let t92 = self.fixed[1] * t91;
+        let t93 = t92 + T::one();
+        let t94 = t16 * t93;
+        let t95 = t10 * t94;
+        let t96 = t95 + t91;
+        let t97 = self.fixed[1] * t96;
+        let t98 = self.fixed[1] * t60;
+        let t99 = t98 + T::one();
+        let t100 = t93 * t99;
+        let t101 = t97.ln_of_both(t100);
+        let t102 = self.fixed[6] * t101;
+        let t103 = self.fixed[4] * t92;
+        let t104 = t102 + t103;
+        let t105 = T::one() / t93;
+        let t106 = self.fixed[6] * t105;
+        let t107 = self.fixed[4] + t106;
+        let t108 = t92 + t101;
+        let t109 = self.fixed[6] * t108;
+        let t110 = t104 * t105;
+        let t111 = t107 - t110;
+        let t112 = self.fixed[4] + t111;
+        let t113 = t92 * t112;
+        let t114 = t109 + t113;
+        let t116 = self.fixed[8] * t8;
+        let t117 = t116 * t23;
+        let t118 = t114 * t105;
+        let t119 = t117 * t118;
+        let t120 = t90 - t119;
+        let t121 = self.fixed[7] * t10;
+        let t122 = t121 * t26;
+        let t123 = self.fixed[4] * t98;
+        let t124 = t102 + t123;
+        let t125 = T::one() / t99;
+        let t126 = self.fixed[6] * t125;
+        let t127 = self.fixed[4] + t126;
+        let t128 = t101 + t98;
+        let t129 = self.fixed[6] * t128;
+        let t130 = t124 * t125;
+        let t131 = t127 - t130;
+        let t132 = self.fixed[4] + t131;
+        let t133 = t98 * t132;
+        let t134 = t129 + t133;
+        let t135 = self.fixed[8] * t10;
+        let t136 = t135 * t26;
+        let t137 = t134 * t125;
+        let t138 = t136 * t137;
+        let t139 = t122 - t138;
         crate::Fields {
-            u: crate::nalgebra::SVector::<T, 2>::new(t11, t16),
-            v: crate::nalgebra::SVector::<T, 2>::new(t22, t24),
-            a: crate::nalgebra::SVector::<T, 2>::new(t31, t34),
-            H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t37, T::zero(), T::zero(), t41),
-            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t43, T::zero(), T::zero(), t44),
-            J: t45,
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t71, T::zero(), T::zero(), t79),
-            b: crate::nalgebra::SVector::<T, 2>::new(t119, t138),
+            u: crate::nalgebra::SVector::<T, 2>::new(t25, t28),
+            v: crate::nalgebra::SVector::<T, 2>::new(t32, t34),
+            a: crate::nalgebra::SVector::<T, 2>::new(t41, t44),
+            H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t15, T::zero(), T::zero(), t18),
+            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t20, T::zero(), T::zero(), t21),
+            J: t22,
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t73, T::zero(), T::zero(), t80),
+            b: crate::nalgebra::SVector::<T, 2>::new(t120, t139),
         }
     }
     fn traction(
@@ -524,110 +526,110 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
     ) -> Option<crate::nalgebra::SVector<T, 2>> {
         match surface {
             crate::Surface::Lower(0) => {
-                let t8 = self.fixed[0] * t;
-                let t9 = t8.cos_pi();
-                let t14 = t8.sin_pi();
-                let t36 = self.fixed[1] * t9;
-                let t39 = X[1].cos_pi();
-                let t40 = self.fixed[1] * t14;
-                let t41 = t40 * t39;
-                let t44 = t41 + T::one();
-                let t58 = t14 * t39;
-                let t190 = t36 + T::one();
-                let t191 = T::one() / t190;
-                let t192 = t191 + T::one();
-                let t193 = t9 * t44;
-                let t194 = t193 + t58;
-                let t195 = self.fixed[1] * t194;
-                let t196 = t190 * t44;
-                let t197 = t195.ln_of_both(t196);
-                let t198 = t9 * t192;
-                let t199 = self.fixed[5] * t198;
-                let t200 = self.fixed[6] * t191;
-                let t201 = t200 * t197;
-                let t202 = t199 + t201;
-                let t203 = -t202;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t203, T::zero()))
+                let t7 = self.fixed[0] * t;
+                let t8 = t7.cos_pi();
+                let t10 = t7.sin_pi();
+                let t14 = self.fixed[1] * t8;
+                let t16 = X[1].cos_pi();
+                let t17 = self.fixed[1] * t10;
+                let t18 = t17 * t16;
+                let t21 = t18 + T::one();
+                let t60 = t10 * t16;
+                let t191 = t14 + T::one();
+                let t192 = T::one() / t191;
+                let t193 = t192 + T::one();
+                let t194 = t8 * t21;
+                let t195 = t194 + t60;
+                let t196 = self.fixed[1] * t195;
+                let t197 = t191 * t21;
+                let t198 = t196.ln_of_both(t197);
+                let t199 = t8 * t193;
+                let t200 = self.fixed[5] * t199;
+                let t201 = self.fixed[6] * t192;
+                let t202 = t201 * t198;
+                let t203 = t200 + t202;
+                let t204 = -t203;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t204, T::zero()))
             }
             crate::Surface::Upper(0) => {
-                let t8 = self.fixed[0] * t;
-                let t9 = t8.cos_pi();
-                let t14 = t8.sin_pi();
-                let t36 = self.fixed[1] * t9;
-                let t39 = X[1].cos_pi();
-                let t40 = self.fixed[1] * t14;
-                let t41 = t40 * t39;
-                let t44 = t41 + T::one();
-                let t58 = t14 * t39;
-                let t193 = t9 * t44;
-                let t204 = T::one() - t36;
-                let t205 = T::one() / t204;
-                let t206 = t205 + T::one();
-                let t207 = t193 - t58;
-                let t208 = self.fixed[1] * t207;
-                let t209 = -t208;
-                let t210 = t204 * t44;
-                let t211 = t209.ln_of_both(t210);
-                let t212 = t9 * t206;
-                let t213 = self.fixed[5] * t212;
-                let t214 = self.fixed[6] * t205;
-                let t215 = t214 * t211;
-                let t216 = t213 - t215;
-                let t217 = -t216;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t217, T::zero()))
+                let t7 = self.fixed[0] * t;
+                let t8 = t7.cos_pi();
+                let t10 = t7.sin_pi();
+                let t14 = self.fixed[1] * t8;
+                let t16 = X[1].cos_pi();
+                let t17 = self.fixed[1] * t10;
+                let t18 = t17 * t16;
+                let t21 = t18 + T::one();
+                let t60 = t10 * t16;
+                let t194 = t8 * t21;
+                let t205 = T::one() - t14;
+                let t206 = T::one() / t205;
+                let t207 = t206 + T::one();
+                let t208 = t194 - t60;
+                let t209 = self.fixed[1] * t208;
+                let t210 = -t209;
+                let t211 = t205 * t21;
+                let t212 = t210.ln_of_both(t211);
+                let t213 = t8 * t207;
+                let t214 = self.fixed[5] * t213;
+                let t215 = self.fixed[6] * t206;
+                let t216 = t215 * t212;
+                let t217 = t214 - t216;
+                let t218 = -t217;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t218, T::zero()))
             }
             crate::Surface::Lower(1) => {
-                let t8 = self.fixed[0] * t;
-                let t9 = t8.cos_pi();
-                let t14 = t8.sin_pi();
-                let t35 = X[0].cos_pi();
-                let t36 = self.fixed[1] * t9;
-                let t37 = t36 * t35;
-                let t40 = self.fixed[1] * t14;
-                let t43 = t37 + T::one();
-                let t90 = t9 * t35;
-                let t218 = t40 + T::one();
-                let t219 = T::one() / t218;
-                let t220 = t219 + T::one();
-                let t221 = t14 * t43;
-                let t222 = t221 + t90;
-                let t223 = self.fixed[1] * t222;
-                let t224 = t218 * t43;
-                let t225 = t223.ln_of_both(t224);
-                let t226 = t14 * t220;
-                let t227 = self.fixed[5] * t226;
-                let t228 = self.fixed[6] * t219;
-                let t229 = t228 * t225;
-                let t230 = t227 + t229;
-                let t231 = -t230;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t231))
+                let t7 = self.fixed[0] * t;
+                let t8 = t7.cos_pi();
+                let t10 = t7.sin_pi();
+                let t13 = X[0].cos_pi();
+                let t14 = self.fixed[1] * t8;
+                let t15 = t14 * t13;
+                let t17 = self.fixed[1] * t10;
+                let t20 = t15 + T::one();
+                let t91 = t8 * t13;
+                let t219 = t17 + T::one();
+                let t220 = T::one() / t219;
+                let t221 = t220 + T::one();
+                let t222 = t10 * t20;
+                let t223 = t222 + t91;
+                let t224 = self.fixed[1] * t223;
+                let t225 = t219 * t20;
+                let t226 = t224.ln_of_both(t225);
+                let t227 = t10 * t221;
+                let t228 = self.fixed[5] * t227;
+                let t229 = self.fixed[6] * t220;
+                let t230 = t229 * t226;
+                let t231 = t228 + t230;
+                let t232 = -t231;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t232))
             }
             crate::Surface::Upper(1) => {
-                let t8 = self.fixed[0] * t;
-                let t9 = t8.cos_pi();
-                let t14 = t8.sin_pi();
-                let t35 = X[0].cos_pi();
-                let t36 = self.fixed[1] * t9;
-                let t37 = t36 * t35;
-                let t40 = self.fixed[1] * t14;
-                let t43 = t37 + T::one();
-                let t90 = t9 * t35;
-                let t221 = t14 * t43;
-                let t232 = T::one() - t40;
-                let t233 = T::one() / t232;
-                let t234 = t233 + T::one();
-                let t235 = t221 - t90;
-                let t236 = self.fixed[1] * t235;
-                let t237 = -t236;
-                let t238 = t232 * t43;
-                let t239 = t237.ln_of_both(t238);
-                let t240 = t14 * t234;
-                let t241 = self.fixed[5] * t240;
-                let t242 = self.fixed[6] * t233;
-                let t243 = t242 * t239;
-                let t244 = t241 - t243;
-                let t245 = -t244;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t245))
+                let t7 = self.fixed[0] * t;
+                let t8 = t7.cos_pi();
+                let t10 = t7.sin_pi();
+                let t13 = X[0].cos_pi();
+                let t14 = self.fixed[1] * t8;
+                let t15 = t14 * t13;
+                let t17 = self.fixed[1] * t10;
+                let t20 = t15 + T::one();
+                let t91 = t8 * t13;
+                let t222 = t10 * t20;
+                let t233 = T::one() - t17;
+                let t234 = T::one() / t233;
+                let t235 = t234 + T::one();
+                let t236 = t222 - t91;
+                let t237 = self.fixed[1] * t236;
+                let t238 = -t237;
+                let t239 = t233 * t20;
+                let t240 = t238.ln_of_both(t239);
+                let t241 = t10 * t235;
+                let t242 = self.fixed[5] * t241;
+                let t243 = self.fixed[6] * t234;
+                let t244 = t243 * t240;
+                let t245 = t242 - t244;
+                let t246 = -t245;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t246))
             }
             _ => None,
         }
@@ -693,20 +695,20 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
 impl<T: crate::Real> crate::BodyForceStages<T, 2, 4, 4> for AxisAligned<T> {
     #[inline]
     fn body_force_time(&self, t: T) -> [T; 4] {
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.cos_pi();
-        let t14 = t8.sin_pi();
-        let t36 = self.fixed[1] * t9;
-        let t40 = self.fixed[1] * t14;
-        [t9, t14, t36, t40]
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.cos_pi();
+        let t10 = t7.sin_pi();
+        let t14 = self.fixed[1] * t8;
+        let t17 = self.fixed[1] * t10;
+        [t8, t10, t14, t17]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 4] {
-        let t2 = X[0].sin_pi();
-        let t13 = X[1].sin_pi();
-        let t35 = X[0].cos_pi();
-        let t39 = X[1].cos_pi();
-        [t2, t13, t35, t39]
+        let t13 = X[0].cos_pi();
+        let t16 = X[1].cos_pi();
+        let t23 = X[0].sin_pi();
+        let t26 = X[1].sin_pi();
+        [t13, t16, t23, t26]
     }
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
@@ -714,89 +716,90 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 4, 4> for AxisAligned<T> {
         time: &[T; 4],
         point: &[T; 4],
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t37 = time[2] * point[2];
-        let t41 = time[3] * point[3];
-        let t43 = t37 + T::one();
-        let t44 = t41 + T::one();
-        let t45 = t43 * t44;
-        let t51 = T::one() / t43;
-        let t56 = point[2] * t44;
-        let t57 = time[0] * t56;
-        let t58 = time[1] * point[3];
-        let t59 = t57 + t58;
-        let t60 = self.fixed[1] * t59;
-        let t61 = t60.ln_of_both_if::<NEAR>(t45);
-        let t72 = T::one() / t44;
-        let t139 = self.fixed[7] * point[0];
-        let t144 = point[2] * point[2];
-        let t148 = point[0] * t144;
-        let t149 = self.fixed[9] * t148;
-        let t150 = -t149;
-        let t156 = point[0] * point[2];
-        let t157 = self.fixed[10] * t156;
-        let t158 = time[0] * t150;
-        let t159 = t158 - t157;
-        let t162 = self.fixed[11] * point[0];
-        let t163 = -t162;
-        let t164 = time[0] * t159;
-        let t165 = t163 * t61;
-        let t166 = t164 + t165;
-        let t167 = t51 * t51;
-        let t168 = t166 * t167;
-        let t169 = t139 + t168;
-        let t170 = time[0] * t169;
-        let t171 = self.fixed[7] * point[1];
-        let t172 = point[3] * point[3];
-        let t173 = point[1] * t172;
-        let t174 = self.fixed[9] * t173;
-        let t175 = -t174;
-        let t176 = point[1] * point[3];
-        let t177 = self.fixed[10] * t176;
-        let t178 = time[1] * t175;
-        let t179 = t178 - t177;
-        let t180 = self.fixed[11] * point[1];
-        let t181 = -t180;
-        let t182 = time[1] * t179;
-        let t183 = t181 * t61;
-        let t184 = t182 + t183;
-        let t185 = t72 * t72;
-        let t186 = t184 * t185;
-        let t187 = t171 + t186;
-        let t188 = time[1] * t187;
-        crate::nalgebra::SVector::<T, 2>::new(t170, t188)
+        let t15 = time[2] * point[0];
+        let t18 = time[3] * point[1];
+        let t20 = t15 + T::one();
+        let t21 = t18 + T::one();
+        let t22 = t20 * t21;
+        let t51 = T::one() / t22;
+        let t52 = t21 * t51;
+        let t53 = t20 * t51;
+        let t58 = point[0] * t21;
+        let t59 = time[0] * t58;
+        let t60 = time[1] * point[1];
+        let t61 = t59 + t60;
+        let t62 = self.fixed[1] * t61;
+        let t63 = t62.ln_of_both_if::<NEAR>(t22);
+        let t140 = self.fixed[7] * point[2];
+        let t145 = point[0] * point[0];
+        let t149 = point[2] * t145;
+        let t150 = self.fixed[9] * t149;
+        let t151 = -t150;
+        let t157 = point[2] * point[0];
+        let t158 = self.fixed[10] * t157;
+        let t159 = time[0] * t151;
+        let t160 = t159 - t158;
+        let t163 = self.fixed[11] * point[2];
+        let t164 = -t163;
+        let t165 = time[0] * t160;
+        let t166 = t164 * t63;
+        let t167 = t165 + t166;
+        let t168 = t52 * t52;
+        let t169 = t167 * t168;
+        let t170 = t140 + t169;
+        let t171 = time[0] * t170;
+        let t172 = self.fixed[7] * point[3];
+        let t173 = point[1] * point[1];
+        let t174 = point[3] * t173;
+        let t175 = self.fixed[9] * t174;
+        let t176 = -t175;
+        let t177 = point[3] * point[1];
+        let t178 = self.fixed[10] * t177;
+        let t179 = time[1] * t176;
+        let t180 = t179 - t178;
+        let t181 = self.fixed[11] * point[3];
+        let t182 = -t181;
+        let t183 = time[1] * t180;
+        let t184 = t182 * t63;
+        let t185 = t183 + t184;
+        let t186 = t53 * t53;
+        let t187 = t185 * t186;
+        let t188 = t172 + t187;
+        let t189 = time[1] * t188;
+        crate::nalgebra::SVector::<T, 2>::new(t171, t189)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> crate::StateStages<T, 2, 8, 2, 4> for AxisAligned<T> {
     #[inline]
     fn state_time(&self, t: T) -> [T; 8] {
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.cos_pi();
-        let t10 = self.parameters.A * t9;
-        let t14 = t8.sin_pi();
-        let t15 = self.parameters.A * t14;
-        let t36 = self.fixed[1] * t9;
-        let t40 = self.fixed[1] * t14;
-        let t63 = self.fixed[5] * t9;
-        let t74 = self.fixed[5] * t14;
-        [t9, t10, t14, t15, t36, t40, t63, t74]
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.cos_pi();
+        let t10 = t7.sin_pi();
+        let t14 = self.fixed[1] * t8;
+        let t17 = self.fixed[1] * t10;
+        let t24 = self.parameters.A * t8;
+        let t27 = self.parameters.A * t10;
+        let t65 = self.fixed[5] * t8;
+        let t75 = self.fixed[5] * t10;
+        [t8, t10, t14, t17, t24, t27, t65, t75]
     }
     #[inline]
     fn velocity_time(&self, t: T) -> [T; 2] {
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.cos_pi();
-        let t14 = t8.sin_pi();
-        let t20 = self.fixed[2] * t14;
-        let t23 = self.fixed[2] * t9;
-        [t20, t23]
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.cos_pi();
+        let t10 = t7.sin_pi();
+        let t30 = self.fixed[2] * t10;
+        let t33 = self.fixed[2] * t8;
+        [t30, t33]
     }
     #[inline]
     fn state_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 4] {
-        let t2 = X[0].sin_pi();
-        let t13 = X[1].sin_pi();
-        let t35 = X[0].cos_pi();
-        let t39 = X[1].cos_pi();
-        [t2, t13, t35, t39]
+        let t13 = X[0].cos_pi();
+        let t16 = X[1].cos_pi();
+        let t23 = X[0].sin_pi();
+        let t26 = X[1].sin_pi();
+        [t13, t16, t23, t26]
     }
     #[inline(always)]
     fn state_staged<const NEAR: bool>(
@@ -807,43 +810,44 @@ impl<T: crate::Real> crate::StateStages<T, 2, 8, 2, 4> for AxisAligned<T> {
     ) -> crate::State<T, 2> {
         let v = {
             let time = velocity_time;
-            let t21 = time[0] * point[0];
-            let t22 = -t21;
-            let t24 = time[1] * point[1];
-            crate::nalgebra::SVector::<T, 2>::new(t22, t24)
+            let t31 = time[0] * point[2];
+            let t32 = -t31;
+            let t34 = time[1] * point[3];
+            crate::nalgebra::SVector::<T, 2>::new(t32, t34)
         };
-        let t11 = time[1] * point[0];
-        let t16 = time[3] * point[1];
-        let t37 = time[4] * point[2];
-        let t41 = time[5] * point[3];
-        let t43 = t37 + T::one();
-        let t44 = t41 + T::one();
-        let t45 = t43 * t44;
-        let t51 = T::one() / t43;
-        let t52 = t51 + T::one();
-        let t56 = point[2] * t44;
-        let t57 = time[0] * t56;
-        let t58 = time[2] * point[3];
-        let t59 = t57 + t58;
-        let t60 = self.fixed[1] * t59;
-        let t61 = t60.ln_of_both_if::<NEAR>(t45);
-        let t64 = time[6] * point[2];
-        let t65 = t64 * t52;
-        let t69 = t61 * t51;
-        let t70 = self.fixed[6] * t69;
-        let t71 = t65 + t70;
-        let t72 = T::one() / t44;
-        let t73 = t72 + T::one();
-        let t75 = time[7] * point[3];
-        let t76 = t75 * t73;
-        let t77 = t61 * t72;
-        let t78 = self.fixed[6] * t77;
-        let t79 = t76 + t78;
+        let t15 = time[2] * point[0];
+        let t18 = time[3] * point[1];
+        let t20 = t15 + T::one();
+        let t21 = t18 + T::one();
+        let t22 = t20 * t21;
+        let t25 = time[4] * point[2];
+        let t28 = time[5] * point[3];
+        let t51 = T::one() / t22;
+        let t52 = t21 * t51;
+        let t53 = t20 * t51;
+        let t54 = t52 + T::one();
+        let t58 = point[0] * t21;
+        let t59 = time[0] * t58;
+        let t60 = time[1] * point[1];
+        let t61 = t59 + t60;
+        let t62 = self.fixed[1] * t61;
+        let t63 = t62.ln_of_both_if::<NEAR>(t22);
+        let t66 = time[6] * point[0];
+        let t67 = t66 * t54;
+        let t71 = t63 * t52;
+        let t72 = self.fixed[6] * t71;
+        let t73 = t67 + t72;
+        let t74 = t53 + T::one();
+        let t76 = time[7] * point[1];
+        let t77 = t76 * t74;
+        let t78 = t63 * t53;
+        let t79 = self.fixed[6] * t78;
+        let t80 = t77 + t79;
         crate::State {
-            u: crate::nalgebra::SVector::<T, 2>::new(t11, t16),
+            u: crate::nalgebra::SVector::<T, 2>::new(t25, t28),
             v,
-            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t43, T::zero(), T::zero(), t44),
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t71, T::zero(), T::zero(), t79),
+            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t20, T::zero(), T::zero(), t21),
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t73, T::zero(), T::zero(), t80),
         }
     }
 }

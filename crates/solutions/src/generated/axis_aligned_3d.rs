@@ -114,96 +114,96 @@ impl<T: crate::Real> AxisAligned3d<T> {
         if !(value.is_finite() && value > 0.0) {
             return Err(Self::DESCRIPTION.out_of_range(3, value));
         }
-        let t6 = parameters.E / parameters.rho0;
-        let t7 = t6.sqrt();
-        let t16 = T::nearest(3.0).sqrt();
-        let t20 = T::nearest(0.5) * parameters.A;
-        let t31 = parameters.A * T::pi();
-        let t32 = t31 * t7;
-        let t37 = t20 * T::pi();
-        let t38 = t37 * t7;
-        let t46 = T::pi() * T::pi();
-        let t47 = parameters.A * t46;
-        let t48 = t47 * parameters.E;
-        let t49 = t48 / parameters.rho0;
-        let t53 = t20 * t46;
-        let t54 = t53 * parameters.E;
-        let t55 = t54 / parameters.rho0;
+        let t5 = parameters.E / parameters.rho0;
+        let t6 = t5.sqrt();
+        let t12 = T::nearest(3.0).sqrt();
+        let t16 = T::nearest(0.5) * parameters.A;
+        let t20 = parameters.A * T::pi();
+        let t21 = t16 * T::pi();
+        let t50 = t20 * t6;
+        let t55 = t21 * t6;
+        let t63 = T::pi() * T::pi();
+        let t64 = parameters.A * t63;
+        let t65 = t64 * parameters.E;
+        let t66 = t65 / parameters.rho0;
+        let t70 = t16 * t63;
+        let t71 = t70 * parameters.E;
+        let t72 = t71 / parameters.rho0;
         let t88 = parameters.nu + T::one();
         let t89 = T::nearest(0.5) * parameters.E;
         let t90 = t89 / t88;
-        let t93 = T::nearest(2.0) * parameters.nu;
-        let t94 = T::one() - t93;
-        let t104 = t31 * t90;
-        let t108 = parameters.E * parameters.nu;
-        let t109 = t88 * t94;
-        let t110 = t108 / t109;
-        let t128 = parameters.nu * parameters.nu;
-        let t129 = T::nearest(2.0) * parameters.A;
-        let t130 = t129 * t46;
-        let t131 = t130 * parameters.E;
-        let t132 = t131 * t128;
-        let t133 = parameters.rho0 * t88;
-        let t134 = t133 * t94;
-        let t135 = t132 / t134;
-        let t145 = t110 + t90;
-        let t146 = t31 * t145;
-        let t151 = t47 / parameters.rho0;
-        let t157 = t48 * t128;
-        let t158 = t157 / t134;
-        let t174 = T::one() / parameters.rho0;
-        let t199 = parameters.A * parameters.A;
-        let t200 = t199 * parameters.A;
-        let t201 = t46 * t46;
-        let t203 = t200 * t201;
-        let t204 = t203 * t145;
-        let t205 = t204 / parameters.rho0;
-        let t209 = t46 * T::pi();
-        let t210 = T::nearest(2.0) * t199;
-        let t211 = t210 * t209;
-        let t212 = t211 * t145;
-        let t213 = t212 / parameters.rho0;
-        let t218 = t48 * parameters.nu;
-        let t219 = t218 / t134;
-        let t232 = T::nearest(0.125) * t200;
-        let t233 = t232 * t201;
-        let t234 = t233 * t145;
-        let t235 = t234 / parameters.rho0;
-        let t238 = T::nearest(0.5) * t199;
-        let t239 = t238 * t209;
-        let t240 = t239 * t145;
-        let t241 = t240 / parameters.rho0;
-        let t246 = t54 * parameters.nu;
-        let t247 = t246 / t134;
-        let t272 = T::nearest(2.0) / t7;
+        let t97 = T::nearest(2.0) * parameters.nu;
+        let t98 = T::one() - t97;
+        let t108 = t20 * t90;
+        let t112 = parameters.E * parameters.nu;
+        let t113 = t88 * t98;
+        let t114 = t112 / t113;
+        let t130 = parameters.nu * parameters.nu;
+        let t131 = T::nearest(2.0) * parameters.A;
+        let t132 = t131 * t63;
+        let t133 = t132 * parameters.E;
+        let t134 = t133 * t130;
+        let t135 = parameters.rho0 * t88;
+        let t136 = t135 * t98;
+        let t137 = t134 / t136;
+        let t147 = t114 + t90;
+        let t148 = t20 * t147;
+        let t153 = t64 / parameters.rho0;
+        let t159 = t65 * t130;
+        let t160 = t159 / t136;
+        let t176 = T::one() / parameters.rho0;
+        let t201 = parameters.A * parameters.A;
+        let t202 = t201 * parameters.A;
+        let t203 = t63 * t63;
+        let t205 = t202 * t203;
+        let t206 = t205 * t147;
+        let t207 = t206 / parameters.rho0;
+        let t211 = t63 * T::pi();
+        let t212 = T::nearest(2.0) * t201;
+        let t213 = t212 * t211;
+        let t214 = t213 * t147;
+        let t215 = t214 / parameters.rho0;
+        let t220 = t65 * parameters.nu;
+        let t221 = t220 / t136;
+        let t234 = T::nearest(0.125) * t202;
+        let t235 = t234 * t203;
+        let t236 = t235 * t147;
+        let t237 = t236 / parameters.rho0;
+        let t240 = T::nearest(0.5) * t201;
+        let t241 = t240 * t211;
+        let t242 = t241 * t147;
+        let t243 = t242 / parameters.rho0;
+        let t248 = t71 * parameters.nu;
+        let t249 = t248 / t136;
+        let t274 = T::nearest(2.0) / t6;
         Ok(AxisAligned3d {
             parameters,
             fixed: [
-                t7,
+                t6,
+                t12,
                 t16,
                 t20,
-                t31,
-                t32,
-                t37,
-                t38,
-                t49,
-                t53,
+                t21,
+                t50,
                 t55,
+                t66,
+                t70,
+                t72,
                 t90,
-                t104,
-                t110,
-                t135,
-                t146,
-                t151,
-                t158,
-                t174,
-                t205,
-                t213,
-                t219,
-                t235,
-                t241,
-                t247,
-                t272,
+                t108,
+                t114,
+                t137,
+                t148,
+                t153,
+                t160,
+                t176,
+                t207,
+                t215,
+                t221,
+                t237,
+                t243,
+                t249,
+                t274,
             ],
         })
     }
@@ -243,24 +243,24 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t2 = X[0].sin_pi();
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.sin_pi();
-        let t10 = self.parameters.A * t9;
-        let t11 = t10 * t2;
-        let t13 = X[1].sin_pi();
-        let t15 = t8.cos_pi();
-        let t17 = self.fixed[1] * t15;
-        let t18 = t9 - t17;
-        let t21 = self.fixed[2] * t18;
-        let t22 = t21 * t13;
-        let t23 = -t22;
-        let t25 = X[2].sin_pi();
-        let t26 = t9 + t17;
-        let t27 = self.fixed[2] * t26;
-        let t28 = t27 * t25;
-        let t29 = -t28;
-        crate::nalgebra::SVector::<T, 3>::new(t11, t23, t29)
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = t7.cos_pi();
+        let t13 = self.fixed[1] * t11;
+        let t14 = t8 - t13;
+        let t18 = t8 + t13;
+        let t39 = X[0].sin_pi();
+        let t40 = self.parameters.A * t8;
+        let t41 = t40 * t39;
+        let t42 = X[1].sin_pi();
+        let t43 = self.fixed[2] * t14;
+        let t44 = t43 * t42;
+        let t45 = -t44;
+        let t46 = X[2].sin_pi();
+        let t47 = self.fixed[2] * t18;
+        let t48 = t47 * t46;
+        let t49 = -t48;
+        crate::nalgebra::SVector::<T, 3>::new(t41, t45, t49)
     }
     #[inline]
     fn velocity(
@@ -268,24 +268,24 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t2 = X[0].sin_pi();
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.sin_pi();
-        let t13 = X[1].sin_pi();
-        let t15 = t8.cos_pi();
-        let t25 = X[2].sin_pi();
-        let t33 = self.fixed[4] * t15;
-        let t34 = t33 * t2;
-        let t35 = self.fixed[1] * t9;
-        let t36 = t15 + t35;
-        let t39 = self.fixed[6] * t36;
-        let t40 = t39 * t13;
-        let t41 = -t40;
-        let t42 = t15 - t35;
-        let t43 = self.fixed[6] * t42;
-        let t44 = t43 * t25;
-        let t45 = -t44;
-        crate::nalgebra::SVector::<T, 3>::new(t34, t41, t45)
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = t7.cos_pi();
+        let t39 = X[0].sin_pi();
+        let t42 = X[1].sin_pi();
+        let t46 = X[2].sin_pi();
+        let t51 = self.fixed[5] * t11;
+        let t52 = t51 * t39;
+        let t53 = self.fixed[1] * t8;
+        let t54 = t11 + t53;
+        let t56 = self.fixed[6] * t54;
+        let t57 = t56 * t42;
+        let t58 = -t57;
+        let t59 = t11 - t53;
+        let t60 = self.fixed[6] * t59;
+        let t61 = t60 * t46;
+        let t62 = -t61;
+        crate::nalgebra::SVector::<T, 3>::new(t52, t58, t62)
     }
     #[inline]
     fn acceleration(
@@ -293,23 +293,23 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t2 = X[0].sin_pi();
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.sin_pi();
-        let t13 = X[1].sin_pi();
-        let t15 = t8.cos_pi();
-        let t17 = self.fixed[1] * t15;
-        let t18 = t9 - t17;
-        let t25 = X[2].sin_pi();
-        let t26 = t9 + t17;
-        let t50 = self.fixed[7] * t9;
-        let t51 = t50 * t2;
-        let t52 = -t51;
-        let t56 = self.fixed[9] * t18;
-        let t57 = t56 * t13;
-        let t58 = self.fixed[9] * t26;
-        let t59 = t58 * t25;
-        crate::nalgebra::SVector::<T, 3>::new(t52, t57, t59)
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = t7.cos_pi();
+        let t13 = self.fixed[1] * t11;
+        let t14 = t8 - t13;
+        let t18 = t8 + t13;
+        let t39 = X[0].sin_pi();
+        let t42 = X[1].sin_pi();
+        let t46 = X[2].sin_pi();
+        let t67 = self.fixed[7] * t8;
+        let t68 = t67 * t39;
+        let t69 = -t68;
+        let t73 = self.fixed[9] * t14;
+        let t74 = t73 * t42;
+        let t75 = self.fixed[9] * t18;
+        let t76 = t75 * t46;
+        crate::nalgebra::SVector::<T, 3>::new(t69, t74, t76)
     }
     #[inline]
     fn displacement_gradient(
@@ -317,37 +317,37 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 3, 3> {
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.sin_pi();
-        let t15 = t8.cos_pi();
-        let t17 = self.fixed[1] * t15;
-        let t18 = t9 - t17;
-        let t26 = t9 + t17;
-        let t60 = X[0].cos_pi();
-        let t61 = self.fixed[3] * t9;
-        let t62 = t61 * t60;
-        let t64 = X[1].cos_pi();
-        let t65 = self.fixed[5] * t18;
-        let t66 = t65 * t64;
-        let t67 = -t66;
-        let t68 = X[2].cos_pi();
-        let t69 = self.fixed[5] * t26;
-        let t70 = t69 * t68;
-        let t71 = -t70;
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = t7.cos_pi();
+        let t13 = self.fixed[1] * t11;
+        let t14 = t8 - t13;
+        let t18 = t8 + t13;
+        let t22 = X[0].cos_pi();
+        let t23 = self.fixed[3] * t8;
+        let t24 = t23 * t22;
+        let t25 = X[1].cos_pi();
+        let t26 = self.fixed[4] * t14;
+        let t27 = t26 * t25;
+        let t28 = -t27;
+        let t29 = X[2].cos_pi();
+        let t30 = self.fixed[4] * t18;
+        let t31 = t30 * t29;
+        let t32 = -t31;
         crate::nalgebra::SMatrix::<
             T,
             3,
             3,
         >::new(
-            t62,
+            t24,
             T::zero(),
             T::zero(),
             T::zero(),
-            t67,
+            t28,
             T::zero(),
             T::zero(),
             T::zero(),
-            t71,
+            t32,
         )
     }
     #[inline]
@@ -356,67 +356,67 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 3, 3> {
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.sin_pi();
-        let t15 = t8.cos_pi();
-        let t17 = self.fixed[1] * t15;
-        let t18 = t9 - t17;
-        let t26 = t9 + t17;
-        let t60 = X[0].cos_pi();
-        let t61 = self.fixed[3] * t9;
-        let t62 = t61 * t60;
-        let t64 = X[1].cos_pi();
-        let t68 = X[2].cos_pi();
-        let t73 = t62 + T::one();
-        let t74 = self.fixed[3] * t18;
-        let t75 = t74 * t64;
-        let t77 = T::nearest(2.0) - t75;
-        let t78 = T::nearest(0.5) * t77;
-        let t79 = self.fixed[3] * t26;
-        let t80 = t79 * t68;
-        let t81 = T::nearest(2.0) - t80;
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = t7.cos_pi();
+        let t13 = self.fixed[1] * t11;
+        let t14 = t8 - t13;
+        let t18 = t8 + t13;
+        let t22 = X[0].cos_pi();
+        let t23 = self.fixed[3] * t8;
+        let t24 = t23 * t22;
+        let t25 = X[1].cos_pi();
+        let t29 = X[2].cos_pi();
+        let t34 = t24 + T::one();
+        let t78 = self.fixed[3] * t14;
+        let t79 = t78 * t25;
+        let t81 = T::nearest(2.0) - t79;
         let t82 = T::nearest(0.5) * t81;
+        let t83 = self.fixed[3] * t18;
+        let t84 = t83 * t29;
+        let t85 = T::nearest(2.0) - t84;
+        let t86 = T::nearest(0.5) * t85;
         crate::nalgebra::SMatrix::<
             T,
             3,
             3,
         >::new(
-            t73,
-            T::zero(),
-            T::zero(),
-            T::zero(),
-            t78,
+            t34,
             T::zero(),
             T::zero(),
             T::zero(),
             t82,
+            T::zero(),
+            T::zero(),
+            T::zero(),
+            t86,
         )
     }
     #[inline]
     fn jacobian(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> T {
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.sin_pi();
-        let t15 = t8.cos_pi();
-        let t17 = self.fixed[1] * t15;
-        let t18 = t9 - t17;
-        let t26 = t9 + t17;
-        let t60 = X[0].cos_pi();
-        let t61 = self.fixed[3] * t9;
-        let t62 = t61 * t60;
-        let t64 = X[1].cos_pi();
-        let t65 = self.fixed[5] * t18;
-        let t66 = t65 * t64;
-        let t67 = -t66;
-        let t68 = X[2].cos_pi();
-        let t69 = self.fixed[5] * t26;
-        let t70 = t69 * t68;
-        let t71 = -t70;
-        let t73 = t62 + T::one();
-        let t83 = t67 + T::one();
-        let t84 = t71 + T::one();
-        let t85 = t73 * t83;
-        let t86 = t85 * t84;
-        t86
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = t7.cos_pi();
+        let t13 = self.fixed[1] * t11;
+        let t14 = t8 - t13;
+        let t18 = t8 + t13;
+        let t22 = X[0].cos_pi();
+        let t23 = self.fixed[3] * t8;
+        let t24 = t23 * t22;
+        let t25 = X[1].cos_pi();
+        let t26 = self.fixed[4] * t14;
+        let t27 = t26 * t25;
+        let t28 = -t27;
+        let t29 = X[2].cos_pi();
+        let t30 = self.fixed[4] * t18;
+        let t31 = t30 * t29;
+        let t32 = -t31;
+        let t34 = t24 + T::one();
+        let t35 = t28 + T::one();
+        let t36 = t32 + T::one();
+        let t37 = t34 * t35;
+        let t38 = t37 * t36;
+        t38
     }
     #[inline]
     fn first_piola_kirchhoff(
@@ -424,73 +424,75 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 3, 3> {
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.sin_pi();
-        let t15 = t8.cos_pi();
-        let t17 = self.fixed[1] * t15;
-        let t18 = t9 - t17;
-        let t26 = t9 + t17;
-        let t60 = X[0].cos_pi();
-        let t61 = self.fixed[3] * t9;
-        let t62 = t61 * t60;
-        let t64 = X[1].cos_pi();
-        let t65 = self.fixed[5] * t18;
-        let t66 = t65 * t64;
-        let t67 = -t66;
-        let t68 = X[2].cos_pi();
-        let t69 = self.fixed[5] * t26;
-        let t70 = t69 * t68;
-        let t71 = -t70;
-        let t73 = t62 + T::one();
-        let t83 = t67 + T::one();
-        let t84 = t71 + T::one();
-        let t85 = t73 * t83;
-        let t86 = t85 * t84;
-        let t91 = T::one() / t73;
-        let t92 = t91 + T::one();
-        let t95 = t67 * t84;
-        let t96 = t95 - t70;
-        let t97 = t96 + T::one();
-        let t98 = t9 * t60;
-        let t99 = t98 * t97;
-        let t100 = self.fixed[3] * t99;
-        let t101 = t100 + t95;
-        let t102 = t101 - t70;
-        let t103 = t102.ln_of_both(t86);
-        let t105 = self.fixed[11] * t9;
-        let t106 = t105 * t60;
-        let t107 = t106 * t92;
-        let t111 = t103 * t91;
-        let t112 = self.fixed[12] * t111;
-        let t113 = t107 + t112;
-        let t114 = T::one() / t83;
-        let t115 = t114 + T::one();
-        let t116 = t67 * t115;
-        let t117 = self.fixed[10] * t116;
-        let t118 = t103 * t114;
-        let t119 = self.fixed[12] * t118;
-        let t120 = t117 + t119;
-        let t121 = T::one() / t84;
-        let t122 = t121 + T::one();
-        let t123 = t71 * t122;
-        let t124 = self.fixed[10] * t123;
-        let t125 = t103 * t121;
-        let t126 = self.fixed[12] * t125;
-        let t127 = t124 + t126;
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = t7.cos_pi();
+        let t13 = self.fixed[1] * t11;
+        let t14 = t8 - t13;
+        let t18 = t8 + t13;
+        let t22 = X[0].cos_pi();
+        let t23 = self.fixed[3] * t8;
+        let t24 = t23 * t22;
+        let t25 = X[1].cos_pi();
+        let t26 = self.fixed[4] * t14;
+        let t27 = t26 * t25;
+        let t28 = -t27;
+        let t29 = X[2].cos_pi();
+        let t30 = self.fixed[4] * t18;
+        let t31 = t30 * t29;
+        let t32 = -t31;
+        let t34 = t24 + T::one();
+        let t35 = t28 + T::one();
+        let t36 = t32 + T::one();
+        let t37 = t34 * t35;
+        let t38 = t37 * t36;
+        let t91 = T::one() / t38;
+        let t92 = t36 * t91;
+        let t93 = t37 * t91;
+        let t94 = t35 * t92;
+        let t95 = t34 * t92;
+        let t96 = t94 + T::one();
+        let t99 = t28 * t36;
+        let t100 = t99 - t31;
+        let t101 = t100 + T::one();
+        let t102 = t8 * t22;
+        let t103 = t102 * t101;
+        let t104 = self.fixed[3] * t103;
+        let t105 = t104 + t99;
+        let t106 = t105 - t31;
+        let t107 = t106.ln_of_both(t38);
+        let t109 = self.fixed[11] * t8;
+        let t110 = t109 * t22;
+        let t111 = t110 * t96;
+        let t115 = t107 * t94;
+        let t116 = self.fixed[12] * t115;
+        let t117 = t111 + t116;
+        let t118 = t95 + T::one();
+        let t119 = t28 * t118;
+        let t120 = self.fixed[10] * t119;
+        let t121 = t107 * t95;
+        let t122 = self.fixed[12] * t121;
+        let t123 = t120 + t122;
+        let t124 = t93 + T::one();
+        let t125 = t32 * t124;
+        let t126 = self.fixed[10] * t125;
+        let t127 = t107 * t93;
+        let t128 = self.fixed[12] * t127;
+        let t129 = t126 + t128;
         crate::nalgebra::SMatrix::<
             T,
             3,
             3,
         >::new(
-            t113,
+            t117,
             T::zero(),
             T::zero(),
             T::zero(),
-            t120,
+            t123,
             T::zero(),
             T::zero(),
             T::zero(),
-            t127,
+            t129,
         )
     }
     #[inline]
@@ -499,301 +501,305 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         X: &crate::nalgebra::SVector<T, 3>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t2 = X[0].sin_pi();
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.sin_pi();
-        let t13 = X[1].sin_pi();
-        let t15 = t8.cos_pi();
-        let t17 = self.fixed[1] * t15;
-        let t18 = t9 - t17;
-        let t25 = X[2].sin_pi();
-        let t26 = t9 + t17;
-        let t60 = X[0].cos_pi();
-        let t61 = self.fixed[3] * t9;
-        let t62 = t61 * t60;
-        let t64 = X[1].cos_pi();
-        let t65 = self.fixed[5] * t18;
-        let t66 = t65 * t64;
-        let t67 = -t66;
-        let t68 = X[2].cos_pi();
-        let t69 = self.fixed[5] * t26;
-        let t70 = t69 * t68;
-        let t71 = -t70;
-        let t73 = t62 + T::one();
-        let t83 = t67 + T::one();
-        let t84 = t71 + T::one();
-        let t85 = t73 * t83;
-        let t86 = t85 * t84;
-        let t91 = T::one() / t73;
-        let t95 = t67 * t84;
-        let t96 = t95 - t70;
-        let t97 = t96 + T::one();
-        let t98 = t9 * t60;
-        let t99 = t98 * t97;
-        let t100 = self.fixed[3] * t99;
-        let t101 = t100 + t95;
-        let t102 = t101 - t70;
-        let t103 = t102.ln_of_both(t86);
-        let t105 = self.fixed[11] * t9;
-        let t106 = t105 * t60;
-        let t114 = T::one() / t83;
-        let t121 = T::one() / t84;
-        let t136 = self.fixed[13] * t9;
-        let t137 = t136 * t2;
-        let t138 = self.fixed[12] * t103;
-        let t139 = t138 + t106;
-        let t140 = self.fixed[12] - t139;
-        let t141 = t91 * t140;
-        let t142 = self.fixed[10] + t141;
-        let t143 = t98 * t142;
-        let t144 = self.fixed[3] * t143;
-        let t147 = self.fixed[14] * t60;
-        let t148 = t9 * t147;
-        let t149 = t144 + t148;
-        let t150 = t149 + t138;
-        let t152 = self.fixed[15] * t9;
-        let t153 = t152 * t2;
-        let t154 = t150 * t91;
-        let t155 = t153 * t154;
-        let t156 = t137 - t155;
-        let t159 = self.fixed[16] * t18;
-        let t160 = t159 * t13;
-        let t161 = self.fixed[8] * t18;
-        let t162 = t161 * t13;
-        let t163 = self.fixed[10] * t67;
-        let t164 = t138 + t163;
-        let t165 = self.fixed[12] * t114;
-        let t166 = self.fixed[10] + t165;
-        let t167 = t103 - t66;
-        let t168 = self.fixed[12] * t167;
-        let t169 = t164 * t114;
-        let t170 = t166 - t169;
-        let t171 = self.fixed[10] + t170;
-        let t172 = t67 * t171;
-        let t173 = t168 + t172;
-        let t175 = t162 * t173;
-        let t176 = t175 * t114;
-        let t177 = self.fixed[17] * t176;
-        let t178 = t177 - t160;
-        let t179 = self.fixed[16] * t26;
-        let t180 = t179 * t25;
-        let t181 = self.fixed[8] * t26;
-        let t182 = t181 * t25;
-        let t183 = self.fixed[10] * t71;
-        let t184 = t138 + t183;
-        let t185 = self.fixed[12] * t121;
-        let t186 = self.fixed[10] + t185;
-        let t187 = t103 - t70;
-        let t188 = self.fixed[12] * t187;
-        let t189 = t184 * t121;
-        let t190 = t186 - t189;
-        let t191 = self.fixed[10] + t190;
-        let t192 = t71 * t191;
-        let t193 = t188 + t192;
-        let t194 = t182 * t193;
-        let t195 = t194 * t121;
-        let t196 = self.fixed[17] * t195;
-        let t197 = t196 - t180;
-        crate::nalgebra::SVector::<T, 3>::new(t156, t178, t197)
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = t7.cos_pi();
+        let t13 = self.fixed[1] * t11;
+        let t14 = t8 - t13;
+        let t18 = t8 + t13;
+        let t22 = X[0].cos_pi();
+        let t23 = self.fixed[3] * t8;
+        let t24 = t23 * t22;
+        let t25 = X[1].cos_pi();
+        let t26 = self.fixed[4] * t14;
+        let t27 = t26 * t25;
+        let t28 = -t27;
+        let t29 = X[2].cos_pi();
+        let t30 = self.fixed[4] * t18;
+        let t31 = t30 * t29;
+        let t32 = -t31;
+        let t34 = t24 + T::one();
+        let t35 = t28 + T::one();
+        let t36 = t32 + T::one();
+        let t37 = t34 * t35;
+        let t38 = t37 * t36;
+        let t39 = X[0].sin_pi();
+        let t42 = X[1].sin_pi();
+        let t46 = X[2].sin_pi();
+        let t91 = T::one() / t38;
+        let t92 = t36 * t91;
+        let t93 = t37 * t91;
+        let t94 = t35 * t92;
+        let t95 = t34 * t92;
+        let t99 = t28 * t36;
+        let t100 = t99 - t31;
+        let t101 = t100 + T::one();
+        let t102 = t8 * t22;
+        let t103 = t102 * t101;
+        let t104 = self.fixed[3] * t103;
+        let t105 = t104 + t99;
+        let t106 = t105 - t31;
+        let t107 = t106.ln_of_both(t38);
+        let t109 = self.fixed[11] * t8;
+        let t110 = t109 * t22;
+        let t138 = self.fixed[13] * t8;
+        let t139 = t138 * t39;
+        let t140 = self.fixed[12] * t107;
+        let t141 = t140 + t110;
+        let t142 = self.fixed[12] - t141;
+        let t143 = t94 * t142;
+        let t144 = self.fixed[10] + t143;
+        let t145 = t102 * t144;
+        let t146 = self.fixed[3] * t145;
+        let t149 = self.fixed[14] * t22;
+        let t150 = t8 * t149;
+        let t151 = t146 + t150;
+        let t152 = t151 + t140;
+        let t154 = self.fixed[15] * t8;
+        let t155 = t154 * t39;
+        let t156 = t152 * t94;
+        let t157 = t155 * t156;
+        let t158 = t139 - t157;
+        let t161 = self.fixed[16] * t14;
+        let t162 = t161 * t42;
+        let t163 = self.fixed[8] * t14;
+        let t164 = t163 * t42;
+        let t165 = self.fixed[10] * t28;
+        let t166 = t140 + t165;
+        let t167 = self.fixed[12] * t95;
+        let t168 = self.fixed[10] + t167;
+        let t169 = t107 - t27;
+        let t170 = self.fixed[12] * t169;
+        let t171 = t166 * t95;
+        let t172 = t168 - t171;
+        let t173 = self.fixed[10] + t172;
+        let t174 = t28 * t173;
+        let t175 = t170 + t174;
+        let t177 = t164 * t175;
+        let t178 = t177 * t95;
+        let t179 = self.fixed[17] * t178;
+        let t180 = t179 - t162;
+        let t181 = self.fixed[16] * t18;
+        let t182 = t181 * t46;
+        let t183 = self.fixed[8] * t18;
+        let t184 = t183 * t46;
+        let t185 = self.fixed[10] * t32;
+        let t186 = t140 + t185;
+        let t187 = self.fixed[12] * t93;
+        let t188 = self.fixed[10] + t187;
+        let t189 = t107 - t31;
+        let t190 = self.fixed[12] * t189;
+        let t191 = t186 * t93;
+        let t192 = t188 - t191;
+        let t193 = self.fixed[10] + t192;
+        let t194 = t32 * t193;
+        let t195 = t190 + t194;
+        let t196 = t184 * t195;
+        let t197 = t196 * t93;
+        let t198 = self.fixed[17] * t197;
+        let t199 = t198 - t182;
+        crate::nalgebra::SVector::<T, 3>::new(t158, t180, t199)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> crate::Fields<T, 3> {
-        let t2 = X[0].sin_pi();
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.sin_pi();
-        let t10 = self.parameters.A * t9;
-        let t11 = t10 * t2;
-        let t13 = X[1].sin_pi();
-        let t15 = t8.cos_pi();
-        let t17 = self.fixed[1] * t15;
-        let t18 = t9 - t17;
-        let t21 = self.fixed[2] * t18;
-        let t22 = t21 * t13;
-        let t23 = -t22;
-        let t25 = X[2].sin_pi();
-        let t26 = t9 + t17;
-        let t27 = self.fixed[2] * t26;
-        let t28 = t27 * t25;
-        let t29 = -t28;
-        let t33 = self.fixed[4] * t15;
-        let t34 = t33 * t2;
-        let t35 = self.fixed[1] * t9;
-        let t36 = t15 + t35;
-        let t39 = self.fixed[6] * t36;
-        let t40 = t39 * t13;
-        let t41 = -t40;
-        let t42 = t15 - t35;
-        let t43 = self.fixed[6] * t42;
-        let t44 = t43 * t25;
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = t7.cos_pi();
+        let t13 = self.fixed[1] * t11;
+        let t14 = t8 - t13;
+        let t18 = t8 + t13;
+        let t22 = X[0].cos_pi();
+        let t23 = self.fixed[3] * t8;
+        let t24 = t23 * t22;
+        let t25 = X[1].cos_pi();
+        let t26 = self.fixed[4] * t14;
+        let t27 = t26 * t25;
+        let t28 = -t27;
+        let t29 = X[2].cos_pi();
+        let t30 = self.fixed[4] * t18;
+        let t31 = t30 * t29;
+        let t32 = -t31;
+        let t34 = t24 + T::one();
+        let t35 = t28 + T::one();
+        let t36 = t32 + T::one();
+        let t37 = t34 * t35;
+        let t38 = t37 * t36;
+        let t39 = X[0].sin_pi();
+        let t40 = self.parameters.A * t8;
+        let t41 = t40 * t39;
+        let t42 = X[1].sin_pi();
+        let t43 = self.fixed[2] * t14;
+        let t44 = t43 * t42;
         let t45 = -t44;
-        let t50 = self.fixed[7] * t9;
-        let t51 = t50 * t2;
-        let t52 = -t51;
-        let t56 = self.fixed[9] * t18;
-        let t57 = t56 * t13;
-        let t58 = self.fixed[9] * t26;
-        let t59 = t58 * t25;
-        let t60 = X[0].cos_pi();
-        let t61 = self.fixed[3] * t9;
-        let t62 = t61 * t60;
-        let t64 = X[1].cos_pi();
-        let t65 = self.fixed[5] * t18;
-        let t66 = t65 * t64;
-        let t67 = -t66;
-        let t68 = X[2].cos_pi();
-        let t69 = self.fixed[5] * t26;
-        let t70 = t69 * t68;
-        let t71 = -t70;
-        let t73 = t62 + T::one();
-        let t74 = self.fixed[3] * t18;
-        let t75 = t74 * t64;
-        let t77 = T::nearest(2.0) - t75;
-        let t78 = T::nearest(0.5) * t77;
-        let t79 = self.fixed[3] * t26;
-        let t80 = t79 * t68;
-        let t81 = T::nearest(2.0) - t80;
+        let t46 = X[2].sin_pi();
+        let t47 = self.fixed[2] * t18;
+        let t48 = t47 * t46;
+        let t49 = -t48;
+        let t51 = self.fixed[5] * t11;
+        let t52 = t51 * t39;
+        let t53 = self.fixed[1] * t8;
+        let t54 = t11 + t53;
+        let t56 = self.fixed[6] * t54;
+        let t57 = t56 * t42;
+        let t58 = -t57;
+        let t59 = t11 - t53;
+        let t60 = self.fixed[6] * t59;
+        let t61 = t60 * t46;
+        let t62 = -t61;
+        let t67 = self.fixed[7] * t8;
+        let t68 = t67 * t39;
+        let t69 = -t68;
+        let t73 = self.fixed[9] * t14;
+        let t74 = t73 * t42;
+        let t75 = self.fixed[9] * t18;
+        let t76 = t75 * t46;
+        let t78 = self.fixed[3] * t14;
+        let t79 = t78 * t25;
+        let t81 = T::nearest(2.0) - t79;
         let t82 = T::nearest(0.5) * t81;
-        let t83 = t67 + T::one();
-        let t84 = t71 + T::one();
-        let t85 = t73 * t83;
-        let t86 = t85 * t84;
-        let t91 = T::one() / t73;
-        let t92 = t91 + T::one();
-        let t95 = t67 * t84;
-        let t96 = t95 - t70;
-        let t97 = t96 + T::one();
-        let t98 = t9 * t60;
-        let t99 = t98 * t97;
-        let t100 = self.fixed[3] * t99;
-        let t101 = t100 + t95;
-        let t102 = t101 - t70;
-        let t103 = t102.ln_of_both(t86);
-        let t105 = self.fixed[11] * t9;
-        let t106 = t105 * t60;
-        let t107 = t106 * t92;
-        let t111 = t103 * t91;
-        let t112 = self.fixed[12] * t111;
-        let t113 = t107 + t112;
-        let t114 = T::one() / t83;
-        let t115 = t114 + T::one();
-        let t116 = t67 * t115;
-        let t117 = self.fixed[10] * t116;
-        let t118 = t103 * t114;
-        let t119 = self.fixed[12] * t118;
-        let t120 = t117 + t119;
-        let t121 = T::one() / t84;
-        let t122 = t121 + T::one();
-        let t123 = t71 * t122;
-        let t124 = self.fixed[10] * t123;
-        let t125 = t103 * t121;
-        let t126 = self.fixed[12] * t125;
-        let t127 = t124 + t126;
-        let t136 = self.fixed[13] * t9;
-        let t137 = t136 * t2;
-        let t138 = self.fixed[12] * t103;
-        let t139 = t138 + t106;
-        let t140 = self.fixed[12] - t139;
-        let t141 = t91 * t140;
-        let t142 = self.fixed[10] + t141;
-        let t143 = t98 * t142;
-        let t144 = self.fixed[3] * t143;
-        let t147 = self.fixed[14] * t60;
-        let t148 = t9 * t147;
-        let t149 = t144 + t148;
-        let t150 = t149 + t138;
-        let t152 = self.fixed[15] * t9;
-        let t153 = t152 * t2;
-        let t154 = t150 * t91;
-        let t155 = t153 * t154;
-        let t156 = t137 - t155;
-        let t159 = self.fixed[16] * t18;
-        let t160 = t159 * t13;
-        let t161 = self.fixed[8] * t18;
-        let t162 = t161 * t13;
-        let t163 = self.fixed[10] * t67;
-        let t164 = t138 + t163;
-        let t165 = self.fixed[12] * t114;
-        let t166 = self.fixed[10] + t165;
-        let t167 = t103 - t66;
-        let t168 = self.fixed[12] * t167;
-        let t169 = t164 * t114;
-        let t170 = t166 - t169;
-        let t171 = self.fixed[10] + t170;
-        let t172 = t67 * t171;
-        let t173 = t168 + t172;
-        let t175 = t162 * t173;
-        let t176 = t175 * t114;
-        let t177 = self.fixed[17] * t176;
-        let t178 = t177 - t160;
-        let t179 = self.fixed[16] * t26;
-        let t180 = t179 * t25;
-        let t181 = self.fixed[8] * t26;
-        let t182 = t181 * t25;
-        let t183 = self.fixed[10] * t71;
-        let t184 = t138 + t183;
-        let t185 = self.fixed[12] * t121;
-        let t186 = self.fixed[10] + t185;
-        let t187 = t103 - t70;
-        let t188 = self.fixed[12] * t187;
-        let t189 = t184 * t121;
-        let t190 = t186 - t189;
-        let t191 = self.fixed[10] + t190;
-        let t192 = t71 * t191;
-        let t193 = t188 + t192;
-        let t194 = t182 * t193;
-        let t195 = t194 * t121;
-        let t196 = self.fixed[17] * t195;
-        let t197 = t196 - t180;
+        let t83 = self.fixed[3] * t18;
+        let t84 = t83 * t29;
+        let t85 = T::nearest(2.0) - t84;
+        let t86 = T::nearest(0.5) * t85;
+        let t91 = T::one() / t38;
+        let t92 = t36 * t91;
+        let t93 = t37 * t91;
+        let t94 = t35 * t92;
+        let t95 = t34 * t92;
+        let t96 = t94 + T::one();
+        let t99 = t28 * t36;
+        let t100 = t99 - t31;
+        let t101 = t100 + T::one();
+        let t102 = t8 * t22;
+        let t103 = t102 * t101;
+        let t104 = self.fixed[3] * t103;
+        let t105 = t104 + t99;
+        let t106 = t105 - t31;
+        let t107 = t106.ln_of_both(t38);
+        let t109 = self.fixed[11] * t8;
+        let t110 = t109 * t22;
+        let t111 = t110 * t96;
+        let t115 = t107 * t94;
+        let t116 = self.fixed[12] * t115;
+        let t117 = t111 + t116;
+        let t118 = t95 + T::one();
+        let t119 = t28 * t118;
+        let t120 = self.fixed[10] * t119;
+        let t121 = t107 * t95;
+        let t122 = self.fixed[12] * t121;
+        let t123 = t120 + t122;
+        let t124 = t93 + T::one();
+        let t125 = t32 * t124;
+        let t126 = self.fixed[10] * t125;
+        let t127 = t107 * t93;
+        let t128 = self.fixed[12] * t127;
+        let t129 = t126 + t128;
+        let t138 = self.fixed[13] * t8;
+        let t139 = t138 * t39;
+        let t140 = self.fixed[12] * t107;
+        let t141 = t140 + t110;
+        let t142 = self.fixed[12] - t141;
+        let t143 = t94 * t142;
+        let t144 = self.fixed[10] + t143;
+        let t145 = t102 * t144;
+        let t146 = self.fixed[3] * t145;
+        let t149 = self.fixed[14] * t22;
+        let t150 = t8 * t149;
+        let t151 = t146 + t150;
+        let t152 = t151 + t140;
+        let t154 = self.fixed[15] * t8;
+        let t155 = t154 * t39;
+        let t156 = t152 * t94;
+        let t157 = t155 * t156;
+        let t158 = t139 - t157;
+        let t161 = self.fixed[16] * t14;
+        let t162 = t161 * t42;
+        let t163 = self.fixed[8] * t14;
+        let t164 = t163 * t42;
+        let t165 = self.fixed[10] * t28;
+        let t166 = t140 + t165;
+        let t167 = self.fixed[12] * t95;
+        let t168 = self.fixed[10] + t167;
+        let t169 = t107 - t27;
+        let t170 = self.fixed[12] * t169;
+        let t171 = t166 * t95;
+        let t172 = t168 - t171;
+        let t173 = self.fixed[10] + t172;
+        let t174 = t28 * t173;
+        let t175 = t170 + t174;
+        let t177 = t164 * t175;
+        let t178 = t177 * t95;
+        let t179 = self.fixed[17] * t178;
+        let t180 = t179 - t162;
+        let t181 = self.fixed[16] * t18;
+        let t182 = t181 * t46;
+        let t183 = self.fixed[8] * t18;
+        let t184 = t183 * t46;
+        let t185 = self.fixed[10] * t32;
+        let t186 = t140 + t185;
+        let t187 = self.fixed[12] * t93;
+        let t188 = self.fixed[10] + t187;
+        let t189 = t107 - t31;
+        let t190 = self.fixed[12] * t189;
+        let t191 = t186 * t93;
+        let t192 = t188 - t191;
+        let t193 = self.fixed[10] + t192;
+        let t194 = t32 * t193;
+        let t195 = t190 + t194;
+        let t196 = t184 * t195;
+        let t197 = t196 * t93;
+        let t198 = self.fixed[17] * t197;
+        let t199 = t198 - t182;
         crate::Fields {
-            u: crate::nalgebra::SVector::<T, 3>::new(t11, t23, t29),
-            v: crate::nalgebra::SVector::<T, 3>::new(t34, t41, t45),
-            a: crate::nalgebra::SVector::<T, 3>::new(t52, t57, t59),
+            u: crate::nalgebra::SVector::<T, 3>::new(t41, t45, t49),
+            v: crate::nalgebra::SVector::<T, 3>::new(t52, t58, t62),
+            a: crate::nalgebra::SVector::<T, 3>::new(t69, t74, t76),
             H: crate::nalgebra::SMatrix::<
                 T,
                 3,
                 3,
             >::new(
-                t62,
+                t24,
                 T::zero(),
                 T::zero(),
                 T::zero(),
-                t67,
+                t28,
                 T::zero(),
                 T::zero(),
                 T::zero(),
-                t71,
+                t32,
             ),
             F: crate::nalgebra::SMatrix::<
                 T,
                 3,
                 3,
             >::new(
-                t73,
-                T::zero(),
-                T::zero(),
-                T::zero(),
-                t78,
+                t34,
                 T::zero(),
                 T::zero(),
                 T::zero(),
                 t82,
+                T::zero(),
+                T::zero(),
+                T::zero(),
+                t86,
             ),
-            J: t86,
+            J: t38,
             P: crate::nalgebra::SMatrix::<
                 T,
                 3,
                 3,
             >::new(
-                t113,
+                t117,
                 T::zero(),
                 T::zero(),
                 T::zero(),
-                t120,
+                t123,
                 T::zero(),
                 T::zero(),
                 T::zero(),
-                t127,
+                t129,
             ),
-            b: crate::nalgebra::SVector::<T, 3>::new(t156, t178, t197),
+            b: crate::nalgebra::SVector::<T, 3>::new(t158, t180, t199),
         }
     }
     fn traction(
@@ -804,238 +810,238 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
     ) -> Option<crate::nalgebra::SVector<T, 3>> {
         match surface {
             crate::Surface::Lower(0) => {
-                let t8 = self.fixed[0] * t;
-                let t9 = t8.sin_pi();
-                let t15 = t8.cos_pi();
-                let t17 = self.fixed[1] * t15;
-                let t18 = t9 - t17;
-                let t26 = t9 + t17;
-                let t61 = self.fixed[3] * t9;
-                let t64 = X[1].cos_pi();
-                let t65 = self.fixed[5] * t18;
-                let t66 = t65 * t64;
-                let t67 = -t66;
-                let t68 = X[2].cos_pi();
-                let t69 = self.fixed[5] * t26;
-                let t70 = t69 * t68;
-                let t71 = -t70;
-                let t83 = t67 + T::one();
-                let t84 = t71 + T::one();
-                let t95 = t67 * t84;
-                let t96 = t95 - t70;
-                let t273 = t61 + T::one();
-                let t274 = T::one() / t273;
-                let t275 = t274 + T::one();
-                let t276 = t9 * t96;
-                let t277 = self.fixed[3] * t276;
-                let t278 = t277 + t95;
-                let t279 = t278 - t70;
-                let t280 = t61 + t279;
-                let t281 = t83 * t84;
-                let t282 = t273 * t281;
-                let t283 = t280.ln_of_both(t282);
-                let t284 = t9 * t275;
-                let t285 = self.fixed[11] * t284;
-                let t286 = self.fixed[12] * t274;
-                let t287 = t286 * t283;
-                let t288 = t285 + t287;
-                let t289 = -t288;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t289, T::zero(), T::zero()))
+                let t7 = self.fixed[0] * t;
+                let t8 = t7.sin_pi();
+                let t11 = t7.cos_pi();
+                let t13 = self.fixed[1] * t11;
+                let t14 = t8 - t13;
+                let t18 = t8 + t13;
+                let t23 = self.fixed[3] * t8;
+                let t25 = X[1].cos_pi();
+                let t26 = self.fixed[4] * t14;
+                let t27 = t26 * t25;
+                let t28 = -t27;
+                let t29 = X[2].cos_pi();
+                let t30 = self.fixed[4] * t18;
+                let t31 = t30 * t29;
+                let t32 = -t31;
+                let t35 = t28 + T::one();
+                let t36 = t32 + T::one();
+                let t99 = t28 * t36;
+                let t100 = t99 - t31;
+                let t275 = t23 + T::one();
+                let t276 = T::one() / t275;
+                let t277 = t276 + T::one();
+                let t278 = t8 * t100;
+                let t279 = self.fixed[3] * t278;
+                let t280 = t279 + t99;
+                let t281 = t280 - t31;
+                let t282 = t23 + t281;
+                let t283 = t35 * t36;
+                let t284 = t275 * t283;
+                let t285 = t282.ln_of_both(t284);
+                let t286 = t8 * t277;
+                let t287 = self.fixed[11] * t286;
+                let t288 = self.fixed[12] * t276;
+                let t289 = t288 * t285;
+                let t290 = t287 + t289;
+                let t291 = -t290;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t291, T::zero(), T::zero()))
             }
             crate::Surface::Upper(0) => {
-                let t8 = self.fixed[0] * t;
-                let t9 = t8.sin_pi();
-                let t15 = t8.cos_pi();
-                let t17 = self.fixed[1] * t15;
-                let t18 = t9 - t17;
-                let t26 = t9 + t17;
-                let t61 = self.fixed[3] * t9;
-                let t64 = X[1].cos_pi();
-                let t65 = self.fixed[5] * t18;
-                let t66 = t65 * t64;
-                let t67 = -t66;
-                let t68 = X[2].cos_pi();
-                let t69 = self.fixed[5] * t26;
-                let t70 = t69 * t68;
-                let t71 = -t70;
-                let t83 = t67 + T::one();
-                let t84 = t71 + T::one();
-                let t95 = t67 * t84;
-                let t96 = t95 - t70;
-                let t276 = t9 * t96;
-                let t277 = self.fixed[3] * t276;
-                let t281 = t83 * t84;
-                let t290 = T::one() - t61;
-                let t291 = T::one() / t290;
-                let t292 = t291 + T::one();
-                let t293 = t95 - t277;
-                let t294 = t293 - t70;
-                let t295 = t294 - t61;
-                let t296 = t290 * t281;
-                let t297 = t295.ln_of_both(t296);
-                let t298 = t9 * t292;
-                let t299 = self.fixed[11] * t298;
-                let t300 = self.fixed[12] * t291;
-                let t301 = t300 * t297;
-                let t302 = t299 - t301;
-                let t303 = -t302;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t303, T::zero(), T::zero()))
+                let t7 = self.fixed[0] * t;
+                let t8 = t7.sin_pi();
+                let t11 = t7.cos_pi();
+                let t13 = self.fixed[1] * t11;
+                let t14 = t8 - t13;
+                let t18 = t8 + t13;
+                let t23 = self.fixed[3] * t8;
+                let t25 = X[1].cos_pi();
+                let t26 = self.fixed[4] * t14;
+                let t27 = t26 * t25;
+                let t28 = -t27;
+                let t29 = X[2].cos_pi();
+                let t30 = self.fixed[4] * t18;
+                let t31 = t30 * t29;
+                let t32 = -t31;
+                let t35 = t28 + T::one();
+                let t36 = t32 + T::one();
+                let t99 = t28 * t36;
+                let t100 = t99 - t31;
+                let t278 = t8 * t100;
+                let t279 = self.fixed[3] * t278;
+                let t283 = t35 * t36;
+                let t292 = T::one() - t23;
+                let t293 = T::one() / t292;
+                let t294 = t293 + T::one();
+                let t295 = t99 - t279;
+                let t296 = t295 - t31;
+                let t297 = t296 - t23;
+                let t298 = t292 * t283;
+                let t299 = t297.ln_of_both(t298);
+                let t300 = t8 * t294;
+                let t301 = self.fixed[11] * t300;
+                let t302 = self.fixed[12] * t293;
+                let t303 = t302 * t299;
+                let t304 = t301 - t303;
+                let t305 = -t304;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t305, T::zero(), T::zero()))
             }
             crate::Surface::Lower(1) => {
-                let t8 = self.fixed[0] * t;
-                let t9 = t8.sin_pi();
-                let t15 = t8.cos_pi();
-                let t17 = self.fixed[1] * t15;
-                let t18 = t9 - t17;
-                let t26 = t9 + t17;
-                let t60 = X[0].cos_pi();
-                let t61 = self.fixed[3] * t9;
-                let t62 = t61 * t60;
-                let t65 = self.fixed[5] * t18;
-                let t68 = X[2].cos_pi();
-                let t69 = self.fixed[5] * t26;
-                let t70 = t69 * t68;
-                let t71 = -t70;
-                let t73 = t62 + T::one();
-                let t84 = t71 + T::one();
-                let t98 = t9 * t60;
-                let t304 = -t65;
-                let t305 = t304 + T::one();
-                let t306 = T::one() / t305;
+                let t7 = self.fixed[0] * t;
+                let t8 = t7.sin_pi();
+                let t11 = t7.cos_pi();
+                let t13 = self.fixed[1] * t11;
+                let t14 = t8 - t13;
+                let t18 = t8 + t13;
+                let t22 = X[0].cos_pi();
+                let t23 = self.fixed[3] * t8;
+                let t24 = t23 * t22;
+                let t26 = self.fixed[4] * t14;
+                let t29 = X[2].cos_pi();
+                let t30 = self.fixed[4] * t18;
+                let t31 = t30 * t29;
+                let t32 = -t31;
+                let t34 = t24 + T::one();
+                let t36 = t32 + T::one();
+                let t102 = t8 * t22;
+                let t306 = -t26;
                 let t307 = t306 + T::one();
-                let t308 = t71 * t305;
-                let t309 = t308 - t65;
-                let t310 = t309 + T::one();
-                let t311 = t98 * t310;
-                let t312 = self.fixed[3] * t311;
-                let t313 = t312 + t308;
-                let t314 = t313 - t65;
-                let t315 = t73 * t84;
-                let t316 = t305 * t315;
-                let t317 = t314.ln_of_both(t316);
-                let t318 = t304 * t307;
-                let t319 = self.fixed[10] * t318;
-                let t320 = self.fixed[12] * t306;
-                let t321 = t320 * t317;
-                let t322 = t319 + t321;
-                let t323 = -t322;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t323, T::zero()))
+                let t308 = T::one() / t307;
+                let t309 = t308 + T::one();
+                let t310 = t32 * t307;
+                let t311 = t310 - t26;
+                let t312 = t311 + T::one();
+                let t313 = t102 * t312;
+                let t314 = self.fixed[3] * t313;
+                let t315 = t314 + t310;
+                let t316 = t315 - t26;
+                let t317 = t34 * t36;
+                let t318 = t307 * t317;
+                let t319 = t316.ln_of_both(t318);
+                let t320 = t306 * t309;
+                let t321 = self.fixed[10] * t320;
+                let t322 = self.fixed[12] * t308;
+                let t323 = t322 * t319;
+                let t324 = t321 + t323;
+                let t325 = -t324;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t325, T::zero()))
             }
             crate::Surface::Upper(1) => {
-                let t8 = self.fixed[0] * t;
-                let t9 = t8.sin_pi();
-                let t15 = t8.cos_pi();
-                let t17 = self.fixed[1] * t15;
-                let t18 = t9 - t17;
-                let t26 = t9 + t17;
-                let t60 = X[0].cos_pi();
-                let t61 = self.fixed[3] * t9;
-                let t62 = t61 * t60;
-                let t65 = self.fixed[5] * t18;
-                let t68 = X[2].cos_pi();
-                let t69 = self.fixed[5] * t26;
-                let t70 = t69 * t68;
-                let t71 = -t70;
-                let t73 = t62 + T::one();
-                let t84 = t71 + T::one();
-                let t98 = t9 * t60;
-                let t315 = t73 * t84;
-                let t324 = t65 + T::one();
-                let t325 = T::one() / t324;
-                let t326 = t325 + T::one();
-                let t327 = t71 * t324;
-                let t328 = t65 + t327;
-                let t329 = t328 + T::one();
-                let t330 = t98 * t329;
-                let t331 = self.fixed[3] * t330;
-                let t332 = t331 + t327;
-                let t333 = t65 + t332;
-                let t334 = t324 * t315;
-                let t335 = t333.ln_of_both(t334);
-                let t336 = t65 * t326;
-                let t337 = self.fixed[10] * t336;
-                let t338 = self.fixed[12] * t325;
-                let t339 = t338 * t335;
-                let t340 = t337 + t339;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t340, T::zero()))
+                let t7 = self.fixed[0] * t;
+                let t8 = t7.sin_pi();
+                let t11 = t7.cos_pi();
+                let t13 = self.fixed[1] * t11;
+                let t14 = t8 - t13;
+                let t18 = t8 + t13;
+                let t22 = X[0].cos_pi();
+                let t23 = self.fixed[3] * t8;
+                let t24 = t23 * t22;
+                let t26 = self.fixed[4] * t14;
+                let t29 = X[2].cos_pi();
+                let t30 = self.fixed[4] * t18;
+                let t31 = t30 * t29;
+                let t32 = -t31;
+                let t34 = t24 + T::one();
+                let t36 = t32 + T::one();
+                let t102 = t8 * t22;
+                let t317 = t34 * t36;
+                let t326 = t26 + T::one();
+                let t327 = T::one() / t326;
+                let t328 = t327 + T::one();
+                let t329 = t32 * t326;
+                let t330 = t26 + t329;
+                let t331 = t330 + T::one();
+                let t332 = t102 * t331;
+                let t333 = self.fixed[3] * t332;
+                let t334 = t333 + t329;
+                let t335 = t26 + t334;
+                let t336 = t326 * t317;
+                let t337 = t335.ln_of_both(t336);
+                let t338 = t26 * t328;
+                let t339 = self.fixed[10] * t338;
+                let t340 = self.fixed[12] * t327;
+                let t341 = t340 * t337;
+                let t342 = t339 + t341;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t342, T::zero()))
             }
             crate::Surface::Lower(2) => {
-                let t8 = self.fixed[0] * t;
-                let t9 = t8.sin_pi();
-                let t15 = t8.cos_pi();
-                let t17 = self.fixed[1] * t15;
-                let t18 = t9 - t17;
-                let t26 = t9 + t17;
-                let t60 = X[0].cos_pi();
-                let t61 = self.fixed[3] * t9;
-                let t62 = t61 * t60;
-                let t64 = X[1].cos_pi();
-                let t65 = self.fixed[5] * t18;
-                let t66 = t65 * t64;
-                let t67 = -t66;
-                let t69 = self.fixed[5] * t26;
-                let t73 = t62 + T::one();
-                let t83 = t67 + T::one();
-                let t85 = t73 * t83;
-                let t98 = t9 * t60;
-                let t341 = -t69;
-                let t342 = t341 + T::one();
-                let t343 = T::one() / t342;
+                let t7 = self.fixed[0] * t;
+                let t8 = t7.sin_pi();
+                let t11 = t7.cos_pi();
+                let t13 = self.fixed[1] * t11;
+                let t14 = t8 - t13;
+                let t18 = t8 + t13;
+                let t22 = X[0].cos_pi();
+                let t23 = self.fixed[3] * t8;
+                let t24 = t23 * t22;
+                let t25 = X[1].cos_pi();
+                let t26 = self.fixed[4] * t14;
+                let t27 = t26 * t25;
+                let t28 = -t27;
+                let t30 = self.fixed[4] * t18;
+                let t34 = t24 + T::one();
+                let t35 = t28 + T::one();
+                let t37 = t34 * t35;
+                let t102 = t8 * t22;
+                let t343 = -t30;
                 let t344 = t343 + T::one();
-                let t345 = t67 * t342;
-                let t346 = t345 - t69;
-                let t347 = t346 + T::one();
-                let t348 = t98 * t347;
-                let t349 = self.fixed[3] * t348;
-                let t350 = t349 + t345;
-                let t351 = t350 - t69;
-                let t352 = t342 * t85;
-                let t353 = t351.ln_of_both(t352);
-                let t354 = t341 * t344;
-                let t355 = self.fixed[10] * t354;
-                let t356 = self.fixed[12] * t343;
-                let t357 = t356 * t353;
-                let t358 = t355 + t357;
-                let t359 = -t358;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t359))
+                let t345 = T::one() / t344;
+                let t346 = t345 + T::one();
+                let t347 = t28 * t344;
+                let t348 = t347 - t30;
+                let t349 = t348 + T::one();
+                let t350 = t102 * t349;
+                let t351 = self.fixed[3] * t350;
+                let t352 = t351 + t347;
+                let t353 = t352 - t30;
+                let t354 = t344 * t37;
+                let t355 = t353.ln_of_both(t354);
+                let t356 = t343 * t346;
+                let t357 = self.fixed[10] * t356;
+                let t358 = self.fixed[12] * t345;
+                let t359 = t358 * t355;
+                let t360 = t357 + t359;
+                let t361 = -t360;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t361))
             }
             crate::Surface::Upper(2) => {
-                let t8 = self.fixed[0] * t;
-                let t9 = t8.sin_pi();
-                let t15 = t8.cos_pi();
-                let t17 = self.fixed[1] * t15;
-                let t18 = t9 - t17;
-                let t26 = t9 + t17;
-                let t60 = X[0].cos_pi();
-                let t61 = self.fixed[3] * t9;
-                let t62 = t61 * t60;
-                let t64 = X[1].cos_pi();
-                let t65 = self.fixed[5] * t18;
-                let t66 = t65 * t64;
-                let t67 = -t66;
-                let t69 = self.fixed[5] * t26;
-                let t73 = t62 + T::one();
-                let t83 = t67 + T::one();
-                let t85 = t73 * t83;
-                let t98 = t9 * t60;
-                let t360 = t69 + T::one();
-                let t361 = T::one() / t360;
-                let t362 = t361 + T::one();
-                let t363 = t67 * t360;
-                let t364 = t69 + t363;
-                let t365 = t364 + T::one();
-                let t366 = t98 * t365;
-                let t367 = self.fixed[3] * t366;
-                let t368 = t367 + t363;
-                let t369 = t69 + t368;
-                let t370 = t360 * t85;
-                let t371 = t369.ln_of_both(t370);
-                let t372 = t69 * t362;
-                let t373 = self.fixed[10] * t372;
-                let t374 = self.fixed[12] * t361;
-                let t375 = t374 * t371;
-                let t376 = t373 + t375;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t376))
+                let t7 = self.fixed[0] * t;
+                let t8 = t7.sin_pi();
+                let t11 = t7.cos_pi();
+                let t13 = self.fixed[1] * t11;
+                let t14 = t8 - t13;
+                let t18 = t8 + t13;
+                let t22 = X[0].cos_pi();
+                let t23 = self.fixed[3] * t8;
+                let t24 = t23 * t22;
+                let t25 = X[1].cos_pi();
+                let t26 = self.fixed[4] * t14;
+                let t27 = t26 * t25;
+                let t28 = -t27;
+                let t30 = self.fixed[4] * t18;
+                let t34 = t24 + T::one();
+                let t35 = t28 + T::one();
+                let t37 = t34 * t35;
+                let t102 = t8 * t22;
+                let t362 = t30 + T::one();
+                let t363 = T::one() / t362;
+                let t364 = t363 + T::one();
+                let t365 = t28 * t362;
+                let t366 = t30 + t365;
+                let t367 = t366 + T::one();
+                let t368 = t102 * t367;
+                let t369 = self.fixed[3] * t368;
+                let t370 = t369 + t365;
+                let t371 = t30 + t370;
+                let t372 = t362 * t37;
+                let t373 = t371.ln_of_both(t372);
+                let t374 = t30 * t364;
+                let t375 = self.fixed[10] * t374;
+                let t376 = self.fixed[12] * t363;
+                let t377 = t376 * t373;
+                let t378 = t375 + t377;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t378))
             }
             _ => None,
         }
@@ -1109,26 +1115,26 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
 impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 6> for AxisAligned3d<T> {
     #[inline]
     fn body_force_time(&self, t: T) -> [T; 6] {
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.sin_pi();
-        let t15 = t8.cos_pi();
-        let t17 = self.fixed[1] * t15;
-        let t18 = t9 - t17;
-        let t26 = t9 + t17;
-        let t61 = self.fixed[3] * t9;
-        let t65 = self.fixed[5] * t18;
-        let t69 = self.fixed[5] * t26;
-        [t9, t18, t26, t61, t65, t69]
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = t7.cos_pi();
+        let t13 = self.fixed[1] * t11;
+        let t14 = t8 - t13;
+        let t18 = t8 + t13;
+        let t23 = self.fixed[3] * t8;
+        let t26 = self.fixed[4] * t14;
+        let t30 = self.fixed[4] * t18;
+        [t8, t14, t18, t23, t26, t30]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 6] {
-        let t2 = X[0].sin_pi();
-        let t13 = X[1].sin_pi();
-        let t25 = X[2].sin_pi();
-        let t60 = X[0].cos_pi();
-        let t64 = X[1].cos_pi();
-        let t68 = X[2].cos_pi();
-        [t2, t13, t25, t60, t64, t68]
+        let t22 = X[0].cos_pi();
+        let t25 = X[1].cos_pi();
+        let t29 = X[2].cos_pi();
+        let t39 = X[0].sin_pi();
+        let t42 = X[1].sin_pi();
+        let t46 = X[2].sin_pi();
+        [t22, t25, t29, t39, t42, t46]
     }
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
@@ -1136,124 +1142,126 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 6> for AxisAligned3d<T> {
         time: &[T; 6],
         point: &[T; 6],
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t62 = time[3] * point[3];
-        let t66 = time[4] * point[4];
-        let t67 = -t66;
-        let t70 = time[5] * point[5];
-        let t71 = -t70;
-        let t73 = t62 + T::one();
-        let t83 = t67 + T::one();
-        let t84 = t71 + T::one();
-        let t85 = t73 * t83;
-        let t86 = t85 * t84;
-        let t91 = T::one() / t73;
-        let t95 = t67 * t84;
-        let t96 = t95 - t70;
-        let t97 = t96 + T::one();
-        let t98 = time[0] * point[3];
-        let t99 = t98 * t97;
-        let t100 = self.fixed[3] * t99;
-        let t101 = t100 + t95;
-        let t102 = t101 - t70;
-        let t103 = t102.ln_of_both_if::<NEAR>(t86);
-        let t114 = T::one() / t83;
-        let t121 = T::one() / t84;
-        let t198 = self.fixed[13] * point[0];
-        let t202 = point[3] * point[3];
-        let t206 = point[0] * t202;
-        let t207 = self.fixed[18] * t206;
-        let t208 = -t207;
-        let t214 = point[0] * point[3];
-        let t215 = self.fixed[19] * t214;
-        let t216 = time[0] * t208;
-        let t217 = t216 - t215;
-        let t220 = self.fixed[20] * point[0];
-        let t221 = -t220;
-        let t222 = time[0] * t217;
-        let t223 = t221 * t103;
-        let t224 = t222 + t223;
-        let t225 = t91 * t91;
-        let t226 = t224 * t225;
-        let t227 = t198 + t226;
-        let t228 = time[0] * t227;
-        let t229 = self.fixed[16] * point[1];
-        let t231 = point[4] * point[4];
-        let t236 = point[1] * t231;
-        let t237 = self.fixed[21] * t236;
-        let t242 = point[1] * point[4];
-        let t243 = self.fixed[22] * t242;
-        let t244 = time[1] * t237;
-        let t245 = t244 - t243;
-        let t248 = self.fixed[23] * point[1];
-        let t249 = time[1] * t245;
-        let t250 = t248 * t103;
-        let t251 = t249 + t250;
-        let t252 = t114 * t114;
-        let t253 = t251 * t252;
-        let t254 = t253 - t229;
-        let t255 = time[1] * t254;
-        let t256 = self.fixed[16] * point[2];
-        let t257 = point[5] * point[5];
-        let t258 = point[2] * t257;
-        let t259 = self.fixed[21] * t258;
-        let t260 = point[2] * point[5];
-        let t261 = self.fixed[22] * t260;
-        let t262 = time[2] * t259;
-        let t263 = t262 - t261;
-        let t264 = self.fixed[23] * point[2];
-        let t265 = time[2] * t263;
-        let t266 = t264 * t103;
-        let t267 = t265 + t266;
-        let t268 = t121 * t121;
-        let t269 = t267 * t268;
-        let t270 = t269 - t256;
-        let t271 = time[2] * t270;
-        crate::nalgebra::SVector::<T, 3>::new(t228, t255, t271)
+        let t24 = time[3] * point[0];
+        let t27 = time[4] * point[1];
+        let t28 = -t27;
+        let t31 = time[5] * point[2];
+        let t32 = -t31;
+        let t34 = t24 + T::one();
+        let t35 = t28 + T::one();
+        let t36 = t32 + T::one();
+        let t37 = t34 * t35;
+        let t38 = t37 * t36;
+        let t91 = T::one() / t38;
+        let t92 = t36 * t91;
+        let t93 = t37 * t91;
+        let t94 = t35 * t92;
+        let t95 = t34 * t92;
+        let t99 = t28 * t36;
+        let t100 = t99 - t31;
+        let t101 = t100 + T::one();
+        let t102 = time[0] * point[0];
+        let t103 = t102 * t101;
+        let t104 = self.fixed[3] * t103;
+        let t105 = t104 + t99;
+        let t106 = t105 - t31;
+        let t107 = t106.ln_of_both_if::<NEAR>(t38);
+        let t200 = self.fixed[13] * point[3];
+        let t204 = point[0] * point[0];
+        let t208 = point[3] * t204;
+        let t209 = self.fixed[18] * t208;
+        let t210 = -t209;
+        let t216 = point[3] * point[0];
+        let t217 = self.fixed[19] * t216;
+        let t218 = time[0] * t210;
+        let t219 = t218 - t217;
+        let t222 = self.fixed[20] * point[3];
+        let t223 = -t222;
+        let t224 = time[0] * t219;
+        let t225 = t223 * t107;
+        let t226 = t224 + t225;
+        let t227 = t94 * t94;
+        let t228 = t226 * t227;
+        let t229 = t200 + t228;
+        let t230 = time[0] * t229;
+        let t231 = self.fixed[16] * point[4];
+        let t233 = point[1] * point[1];
+        let t238 = point[4] * t233;
+        let t239 = self.fixed[21] * t238;
+        let t244 = point[4] * point[1];
+        let t245 = self.fixed[22] * t244;
+        let t246 = time[1] * t239;
+        let t247 = t246 - t245;
+        let t250 = self.fixed[23] * point[4];
+        let t251 = time[1] * t247;
+        let t252 = t250 * t107;
+        let t253 = t251 + t252;
+        let t254 = t95 * t95;
+        let t255 = t253 * t254;
+        let t256 = t255 - t231;
+        let t257 = time[1] * t256;
+        let t258 = self.fixed[16] * point[5];
+        let t259 = point[2] * point[2];
+        let t260 = point[5] * t259;
+        let t261 = self.fixed[21] * t260;
+        let t262 = point[5] * point[2];
+        let t263 = self.fixed[22] * t262;
+        let t264 = time[2] * t261;
+        let t265 = t264 - t263;
+        let t266 = self.fixed[23] * point[5];
+        let t267 = time[2] * t265;
+        let t268 = t266 * t107;
+        let t269 = t267 + t268;
+        let t270 = t93 * t93;
+        let t271 = t269 * t270;
+        let t272 = t271 - t258;
+        let t273 = time[2] * t272;
+        crate::nalgebra::SVector::<T, 3>::new(t230, t257, t273)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> crate::StateStages<T, 3, 10, 3, 6> for AxisAligned3d<T> {
     #[inline]
     fn state_time(&self, t: T) -> [T; 10] {
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.sin_pi();
-        let t10 = self.parameters.A * t9;
-        let t15 = t8.cos_pi();
-        let t17 = self.fixed[1] * t15;
-        let t18 = t9 - t17;
-        let t21 = self.fixed[2] * t18;
-        let t26 = t9 + t17;
-        let t27 = self.fixed[2] * t26;
-        let t61 = self.fixed[3] * t9;
-        let t65 = self.fixed[5] * t18;
-        let t69 = self.fixed[5] * t26;
-        let t74 = self.fixed[3] * t18;
-        let t79 = self.fixed[3] * t26;
-        let t105 = self.fixed[11] * t9;
-        [t9, t10, t21, t27, t61, t65, t69, t74, t79, t105]
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = t7.cos_pi();
+        let t13 = self.fixed[1] * t11;
+        let t14 = t8 - t13;
+        let t18 = t8 + t13;
+        let t23 = self.fixed[3] * t8;
+        let t26 = self.fixed[4] * t14;
+        let t30 = self.fixed[4] * t18;
+        let t40 = self.parameters.A * t8;
+        let t43 = self.fixed[2] * t14;
+        let t47 = self.fixed[2] * t18;
+        let t78 = self.fixed[3] * t14;
+        let t83 = self.fixed[3] * t18;
+        let t109 = self.fixed[11] * t8;
+        [t8, t23, t26, t30, t40, t43, t47, t78, t83, t109]
     }
     #[inline]
     fn velocity_time(&self, t: T) -> [T; 3] {
-        let t8 = self.fixed[0] * t;
-        let t9 = t8.sin_pi();
-        let t15 = t8.cos_pi();
-        let t33 = self.fixed[4] * t15;
-        let t35 = self.fixed[1] * t9;
-        let t36 = t15 + t35;
-        let t39 = self.fixed[6] * t36;
-        let t42 = t15 - t35;
-        let t43 = self.fixed[6] * t42;
-        [t33, t39, t43]
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = t7.cos_pi();
+        let t51 = self.fixed[5] * t11;
+        let t53 = self.fixed[1] * t8;
+        let t54 = t11 + t53;
+        let t56 = self.fixed[6] * t54;
+        let t59 = t11 - t53;
+        let t60 = self.fixed[6] * t59;
+        [t51, t56, t60]
     }
     #[inline]
     fn state_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 6] {
-        let t2 = X[0].sin_pi();
-        let t13 = X[1].sin_pi();
-        let t25 = X[2].sin_pi();
-        let t60 = X[0].cos_pi();
-        let t64 = X[1].cos_pi();
-        let t68 = X[2].cos_pi();
-        [t2, t13, t25, t60, t64, t68]
+        let t22 = X[0].cos_pi();
+        let t25 = X[1].cos_pi();
+        let t29 = X[2].cos_pi();
+        let t39 = X[0].sin_pi();
+        let t42 = X[1].sin_pi();
+        let t46 = X[2].sin_pi();
+        [t22, t25, t29, t39, t42, t46]
     }
     #[inline(always)]
     fn state_staged<const NEAR: bool>(
@@ -1264,96 +1272,98 @@ impl<T: crate::Real> crate::StateStages<T, 3, 10, 3, 6> for AxisAligned3d<T> {
     ) -> crate::State<T, 3> {
         let v = {
             let time = velocity_time;
-            let t34 = time[0] * point[0];
-            let t40 = time[1] * point[1];
-            let t41 = -t40;
-            let t44 = time[2] * point[2];
-            let t45 = -t44;
-            crate::nalgebra::SVector::<T, 3>::new(t34, t41, t45)
+            let t52 = time[0] * point[3];
+            let t57 = time[1] * point[4];
+            let t58 = -t57;
+            let t61 = time[2] * point[5];
+            let t62 = -t61;
+            crate::nalgebra::SVector::<T, 3>::new(t52, t58, t62)
         };
-        let t11 = time[1] * point[0];
-        let t22 = time[2] * point[1];
-        let t23 = -t22;
-        let t28 = time[3] * point[2];
-        let t29 = -t28;
-        let t62 = time[4] * point[3];
-        let t66 = time[5] * point[4];
-        let t67 = -t66;
-        let t70 = time[6] * point[5];
-        let t71 = -t70;
-        let t73 = t62 + T::one();
-        let t75 = time[7] * point[4];
-        let t77 = T::nearest(2.0) - t75;
-        let t78 = T::nearest(0.5) * t77;
-        let t80 = time[8] * point[5];
-        let t81 = T::nearest(2.0) - t80;
+        let t24 = time[1] * point[0];
+        let t27 = time[2] * point[1];
+        let t28 = -t27;
+        let t31 = time[3] * point[2];
+        let t32 = -t31;
+        let t34 = t24 + T::one();
+        let t35 = t28 + T::one();
+        let t36 = t32 + T::one();
+        let t37 = t34 * t35;
+        let t38 = t37 * t36;
+        let t41 = time[4] * point[3];
+        let t44 = time[5] * point[4];
+        let t45 = -t44;
+        let t48 = time[6] * point[5];
+        let t49 = -t48;
+        let t79 = time[7] * point[1];
+        let t81 = T::nearest(2.0) - t79;
         let t82 = T::nearest(0.5) * t81;
-        let t83 = t67 + T::one();
-        let t84 = t71 + T::one();
-        let t85 = t73 * t83;
-        let t86 = t85 * t84;
-        let t91 = T::one() / t73;
-        let t92 = t91 + T::one();
-        let t95 = t67 * t84;
-        let t96 = t95 - t70;
-        let t97 = t96 + T::one();
-        let t98 = time[0] * point[3];
-        let t99 = t98 * t97;
-        let t100 = self.fixed[3] * t99;
-        let t101 = t100 + t95;
-        let t102 = t101 - t70;
-        let t103 = t102.ln_of_both_if::<NEAR>(t86);
-        let t106 = time[9] * point[3];
-        let t107 = t106 * t92;
-        let t111 = t103 * t91;
-        let t112 = self.fixed[12] * t111;
-        let t113 = t107 + t112;
-        let t114 = T::one() / t83;
-        let t115 = t114 + T::one();
-        let t116 = t67 * t115;
-        let t117 = self.fixed[10] * t116;
-        let t118 = t103 * t114;
-        let t119 = self.fixed[12] * t118;
-        let t120 = t117 + t119;
-        let t121 = T::one() / t84;
-        let t122 = t121 + T::one();
-        let t123 = t71 * t122;
-        let t124 = self.fixed[10] * t123;
-        let t125 = t103 * t121;
-        let t126 = self.fixed[12] * t125;
-        let t127 = t124 + t126;
+        let t84 = time[8] * point[2];
+        let t85 = T::nearest(2.0) - t84;
+        let t86 = T::nearest(0.5) * t85;
+        let t91 = T::one() / t38;
+        let t92 = t36 * t91;
+        let t93 = t37 * t91;
+        let t94 = t35 * t92;
+        let t95 = t34 * t92;
+        let t96 = t94 + T::one();
+        let t99 = t28 * t36;
+        let t100 = t99 - t31;
+        let t101 = t100 + T::one();
+        let t102 = time[0] * point[0];
+        let t103 = t102 * t101;
+        let t104 = self.fixed[3] * t103;
+        let t105 = t104 + t99;
+        let t106 = t105 - t31;
+        let t107 = t106.ln_of_both_if::<NEAR>(t38);
+        let t110 = time[9] * point[0];
+        let t111 = t110 * t96;
+        let t115 = t107 * t94;
+        let t116 = self.fixed[12] * t115;
+        let t117 = t111 + t116;
+        let t118 = t95 + T::one();
+        let t119 = t28 * t118;
+        let t120 = self.fixed[10] * t119;
+        let t121 = t107 * t95;
+        let t122 = self.fixed[12] * t121;
+        let t123 = t120 + t122;
+        let t124 = t93 + T::one();
+        let t125 = t32 * t124;
+        let t126 = self.fixed[10] * t125;
+        let t127 = t107 * t93;
+        let t128 = self.fixed[12] * t127;
+        let t129 = t126 + t128;
         crate::State {
-            u: crate::nalgebra::SVector::<T, 3>::new(t11, t23, t29),
+            u: crate::nalgebra::SVector::<T, 3>::new(t41, t45, t49),
             v,
             F: crate::nalgebra::SMatrix::<
                 T,
                 3,
                 3,
             >::new(
-                t73,
-                T::zero(),
-                T::zero(),
-                T::zero(),
-                t78,
+                t34,
                 T::zero(),
                 T::zero(),
                 T::zero(),
                 t82,
+                T::zero(),
+                T::zero(),
+                T::zero(),
+                t86,
             ),
             P: crate::nalgebra::SMatrix::<
                 T,
                 3,
                 3,
             >::new(
-                t113,
+                t117,
                 T::zero(),
                 T::zero(),
                 T::zero(),
-                t120,
+                t123,
                 T::zero(),
                 T::zero(),
                 T::zero(),
-                t127,
+                t129,
             ),
         }
     }

@@ -147,74 +147,74 @@ impl<T: crate::Real> RingNu<T> {
         let t24 = parameters.Ro - t18;
         let t26 = t15 * t19;
         let t28 = T::one() / t26;
-        let t43 = parameters.A * t11;
-        let t44 = t43 * T::pi();
-        let t50 = T::pi() * T::pi();
-        let t51 = parameters.A * parameters.E;
-        let t52 = t51 * t50;
-        let t53 = t52 / parameters.rho0;
-        let t61 = T::nearest(6.0) / t26;
-        let t88 = T::nearest(6.0) * parameters.A;
-        let t89 = t88 / t26;
+        let t39 = T::nearest(6.0) * parameters.A;
+        let t40 = t39 / t26;
+        let t55 = parameters.A * t11;
+        let t56 = t55 * T::pi();
+        let t62 = T::pi() * T::pi();
+        let t63 = parameters.A * parameters.E;
+        let t64 = t63 * t62;
+        let t65 = t64 / parameters.rho0;
+        let t71 = T::nearest(6.0) / t26;
         let t97 = parameters.nu + T::one();
         let t98 = T::nearest(2.0) * parameters.nu;
         let t99 = T::one() - t98;
         let t106 = T::nearest(0.5) * parameters.E;
         let t107 = t106 / t97;
-        let t110 = parameters.E * parameters.nu;
-        let t111 = t97 * t99;
-        let t112 = t110 / t111;
-        let t142 = parameters.Ri + parameters.Ro;
-        let t151 = parameters.nu / t99;
-        let t156 = T::one() / t97;
-        let t159 = t51 / parameters.rho0;
-        let t200 = T::one() / parameters.rho0;
-        let t216 = t112 + t107;
-        let t218 = parameters.A * parameters.A;
-        let t219 = t218 * t218;
-        let t220 = t15 * t15;
-        let t221 = t19 * t19;
-        let t223 = T::nearest(36.0) * t219;
-        let t224 = t223 * t216;
-        let t225 = parameters.rho0 * t220;
-        let t226 = t225 * t221;
-        let t227 = t224 / t226;
-        let t236 = T::nearest(3.0) / t26;
-        let t245 = t220 * t221;
-        let t246 = T::nearest(36.0) / t245;
-        let t269 = t218 * parameters.A;
-        let t270 = T::nearest(6.0) * t269;
-        let t271 = parameters.rho0 * t15;
-        let t272 = t271 * t19;
-        let t273 = t270 / t272;
-        let t278 = T::nearest(6.0) * t218;
-        let t279 = t278 * parameters.E;
-        let t280 = t279 * parameters.nu;
-        let t281 = t272 * t97;
-        let t282 = t281 * t99;
-        let t283 = t280 / t282;
-        let t287 = T::nearest(12.0) * t107;
-        let t288 = t287 / t26;
-        let t300 = t218 / parameters.rho0;
-        let t306 = t51 * parameters.nu;
-        let t307 = parameters.rho0 * t97;
-        let t308 = t307 * t99;
-        let t309 = t306 / t308;
-        let t322 = T::nearest(2.0) / t11;
-        let t323 = parameters.Ri - parameters.Ro;
-        let t324 = t323 * t323;
-        let t325 = t324 * t323;
-        let t326 = t325 / t26;
-        let t327 = T::one() - t326;
-        let t328 = parameters.A * t327;
-        let t329 = t328 / parameters.Ri;
-        let t333 = parameters.Ri * t97;
-        let t334 = t333 * t99;
-        let t335 = t110 / t334;
-        let t341 = parameters.A / parameters.Ro;
-        let t345 = parameters.Ro * t97;
-        let t346 = t345 * t99;
-        let t347 = t110 / t346;
+        let t112 = parameters.E * parameters.nu;
+        let t113 = t97 * t99;
+        let t114 = t112 / t113;
+        let t143 = parameters.Ri + parameters.Ro;
+        let t152 = parameters.nu / t99;
+        let t157 = T::one() / t97;
+        let t160 = t63 / parameters.rho0;
+        let t201 = T::one() / parameters.rho0;
+        let t217 = t114 + t107;
+        let t219 = parameters.A * parameters.A;
+        let t220 = t219 * t219;
+        let t221 = t15 * t15;
+        let t222 = t19 * t19;
+        let t224 = T::nearest(36.0) * t220;
+        let t225 = t224 * t217;
+        let t226 = parameters.rho0 * t221;
+        let t227 = t226 * t222;
+        let t228 = t225 / t227;
+        let t237 = T::nearest(3.0) / t26;
+        let t246 = t221 * t222;
+        let t247 = T::nearest(36.0) / t246;
+        let t270 = t219 * parameters.A;
+        let t271 = T::nearest(6.0) * t270;
+        let t272 = parameters.rho0 * t15;
+        let t273 = t272 * t19;
+        let t274 = t271 / t273;
+        let t279 = T::nearest(6.0) * t219;
+        let t280 = t279 * parameters.E;
+        let t281 = t280 * parameters.nu;
+        let t282 = t273 * t97;
+        let t283 = t282 * t99;
+        let t284 = t281 / t283;
+        let t288 = T::nearest(12.0) * t107;
+        let t289 = t288 / t26;
+        let t301 = t219 / parameters.rho0;
+        let t307 = t63 * parameters.nu;
+        let t308 = parameters.rho0 * t97;
+        let t309 = t308 * t99;
+        let t310 = t307 / t309;
+        let t323 = T::nearest(2.0) / t11;
+        let t324 = parameters.Ri - parameters.Ro;
+        let t325 = t324 * t324;
+        let t326 = t325 * t324;
+        let t327 = t326 / t26;
+        let t328 = T::one() - t327;
+        let t329 = parameters.A * t328;
+        let t330 = t329 / parameters.Ri;
+        let t334 = parameters.Ri * t97;
+        let t335 = t334 * t99;
+        let t336 = t112 / t335;
+        let t342 = parameters.A / parameters.Ro;
+        let t346 = parameters.Ro * t97;
+        let t347 = t346 * t99;
+        let t348 = t112 / t347;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -228,32 +228,32 @@ impl<T: crate::Real> RingNu<T> {
                 t18,
                 t24,
                 t28,
-                t44,
-                t50,
-                t53,
-                t61,
-                t88,
-                t89,
+                t39,
+                t40,
+                t56,
+                t62,
+                t65,
+                t71,
                 t107,
-                t112,
-                t142,
-                t151,
-                t156,
-                t159,
-                t200,
-                t227,
-                t236,
-                t246,
-                t273,
-                t283,
-                t288,
-                t300,
-                t309,
-                t322,
-                t329,
-                t335,
-                t341,
-                t347,
+                t114,
+                t143,
+                t152,
+                t157,
+                t160,
+                t201,
+                t228,
+                t237,
+                t247,
+                t274,
+                t284,
+                t289,
+                t301,
+                t310,
+                t323,
+                t330,
+                t336,
+                t342,
+                t348,
             ],
         })
     }
@@ -313,15 +313,15 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t33 = t31 * X[0];
-        let t34 = T::one() / t4;
-        let t35 = t5 * t34;
-        let t36 = t33 * t35;
-        let t37 = t32 * t36;
-        let t38 = t31 * X[1];
-        let t39 = t38 * t35;
-        let t40 = t32 * t39;
-        crate::nalgebra::SVector::<T, 2>::new(t37, t40)
+        let t33 = T::one() / t4;
+        let t34 = t5 * t33;
+        let t47 = t31 * X[0];
+        let t48 = t47 * t34;
+        let t49 = t32 * t48;
+        let t50 = t31 * X[1];
+        let t51 = t50 * t34;
+        let t52 = t32 * t51;
+        crate::nalgebra::SVector::<T, 2>::new(t49, t52)
     }
     #[inline]
     fn velocity(
@@ -341,19 +341,19 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t29 = t21 * t25;
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
-        let t33 = t31 * X[0];
-        let t34 = T::one() / t4;
-        let t35 = t5 * t34;
-        let t36 = t33 * t35;
-        let t38 = t31 * X[1];
-        let t39 = t38 * t35;
-        let t42 = t12.sin_pi();
-        let t45 = self.fixed[4] * t42;
-        let t46 = t45 * t36;
-        let t47 = -t46;
-        let t48 = t45 * t39;
-        let t49 = -t48;
-        crate::nalgebra::SVector::<T, 2>::new(t47, t49)
+        let t33 = T::one() / t4;
+        let t34 = t5 * t33;
+        let t47 = t31 * X[0];
+        let t48 = t47 * t34;
+        let t50 = t31 * X[1];
+        let t51 = t50 * t34;
+        let t54 = t12.sin_pi();
+        let t57 = self.fixed[6] * t54;
+        let t58 = t57 * t48;
+        let t59 = -t58;
+        let t60 = t57 * t51;
+        let t61 = -t60;
+        crate::nalgebra::SVector::<T, 2>::new(t59, t61)
     }
     #[inline]
     fn acceleration(
@@ -374,18 +374,18 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t29 = t21 * t25;
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
-        let t33 = t31 * X[0];
-        let t34 = T::one() / t4;
-        let t35 = t5 * t34;
-        let t36 = t33 * t35;
-        let t38 = t31 * X[1];
-        let t39 = t38 * t35;
-        let t54 = self.fixed[6] * t13;
-        let t55 = t54 * t36;
-        let t56 = -t55;
-        let t57 = t54 * t39;
-        let t58 = -t57;
-        crate::nalgebra::SVector::<T, 2>::new(t56, t58)
+        let t33 = T::one() / t4;
+        let t34 = t5 * t33;
+        let t47 = t31 * X[0];
+        let t48 = t47 * t34;
+        let t50 = t31 * X[1];
+        let t51 = t50 * t34;
+        let t66 = self.fixed[8] * t13;
+        let t67 = t66 * t48;
+        let t68 = -t67;
+        let t69 = t66 * t51;
+        let t70 = -t69;
+        crate::nalgebra::SVector::<T, 2>::new(t68, t70)
     }
     #[inline]
     fn displacement_gradient(
@@ -407,34 +407,34 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t34 = T::one() / t4;
-        let t35 = t5 * t34;
-        let t59 = t5 - self.parameters.Ri;
-        let t62 = t20 * t2;
-        let t63 = t62 * t59;
-        let t64 = self.fixed[7] * t63;
-        let t65 = t31 * t3;
-        let t66 = t65 * t35;
-        let t67 = t64 + t66;
-        let t68 = t67 * t34;
-        let t69 = t32 * t68;
-        let t70 = t20 * t59;
-        let t71 = self.fixed[7] * t70;
-        let t72 = t31 * t35;
-        let t73 = t71 - t72;
-        let t74 = X[0] * X[1];
-        let t75 = t74 * t73;
+        let t33 = T::one() / t4;
+        let t34 = t5 * t33;
+        let t35 = t5 - self.parameters.Ri;
+        let t37 = t20 * t35;
+        let t38 = t31 * t34;
+        let t72 = t20 * t2;
+        let t73 = t72 * t35;
+        let t74 = self.fixed[9] * t73;
+        let t75 = t31 * t3;
         let t76 = t75 * t34;
-        let t77 = t32 * t76;
-        let t78 = t20 * t3;
-        let t79 = t78 * t59;
-        let t80 = self.fixed[7] * t79;
-        let t81 = t31 * t2;
-        let t82 = t81 * t35;
-        let t83 = t80 + t82;
-        let t84 = t83 * t34;
+        let t77 = t74 + t76;
+        let t78 = t77 * t33;
+        let t79 = t32 * t78;
+        let t80 = self.fixed[9] * t37;
+        let t81 = t80 - t38;
+        let t82 = X[0] * X[1];
+        let t83 = t82 * t81;
+        let t84 = t83 * t33;
         let t85 = t32 * t84;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t69, t77, t77, t85)
+        let t86 = t20 * t3;
+        let t87 = t86 * t35;
+        let t88 = self.fixed[9] * t87;
+        let t89 = t31 * t2;
+        let t90 = t89 * t34;
+        let t91 = t88 + t90;
+        let t92 = t91 * t33;
+        let t93 = t32 * t92;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t79, t85, t85, t93)
     }
     #[inline]
     fn deformation_gradient(
@@ -456,36 +456,36 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t34 = T::one() / t4;
-        let t35 = t5 * t34;
-        let t59 = t5 - self.parameters.Ri;
-        let t62 = t20 * t2;
-        let t63 = t62 * t59;
-        let t64 = self.fixed[7] * t63;
-        let t65 = t31 * t3;
-        let t66 = t65 * t35;
-        let t67 = t64 + t66;
-        let t68 = t67 * t34;
-        let t69 = t32 * t68;
-        let t70 = t20 * t59;
-        let t71 = self.fixed[7] * t70;
-        let t72 = t31 * t35;
-        let t73 = t71 - t72;
-        let t74 = X[0] * X[1];
-        let t75 = t74 * t73;
+        let t33 = T::one() / t4;
+        let t34 = t5 * t33;
+        let t35 = t5 - self.parameters.Ri;
+        let t37 = t20 * t35;
+        let t38 = t31 * t34;
+        let t72 = t20 * t2;
+        let t73 = t72 * t35;
+        let t74 = self.fixed[9] * t73;
+        let t75 = t31 * t3;
         let t76 = t75 * t34;
-        let t77 = t32 * t76;
-        let t78 = t20 * t3;
-        let t79 = t78 * t59;
-        let t80 = self.fixed[7] * t79;
-        let t81 = t31 * t2;
-        let t82 = t81 * t35;
-        let t83 = t80 + t82;
-        let t84 = t83 * t34;
+        let t77 = t74 + t76;
+        let t78 = t77 * t33;
+        let t79 = t32 * t78;
+        let t80 = self.fixed[9] * t37;
+        let t81 = t80 - t38;
+        let t82 = X[0] * X[1];
+        let t83 = t82 * t81;
+        let t84 = t83 * t33;
         let t85 = t32 * t84;
-        let t86 = t69 + T::one();
-        let t87 = t85 + T::one();
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t86, t77, t77, t87)
+        let t86 = t20 * t3;
+        let t87 = t86 * t35;
+        let t88 = self.fixed[9] * t87;
+        let t89 = t31 * t2;
+        let t90 = t89 * t34;
+        let t91 = t88 + t90;
+        let t92 = t91 * t33;
+        let t93 = t32 * t92;
+        let t94 = t79 + T::one();
+        let t95 = t93 + T::one();
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t94, t85, t85, t95)
     }
     #[inline]
     fn jacobian(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> T {
@@ -503,18 +503,18 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t34 = T::one() / t4;
-        let t35 = t5 * t34;
-        let t59 = t5 - self.parameters.Ri;
-        let t70 = t20 * t59;
-        let t72 = t31 * t35;
-        let t90 = self.fixed[9] * t13;
-        let t91 = t90 * t70;
-        let t92 = t91 + T::one();
-        let t93 = t32 * t72;
-        let t94 = t93 + T::one();
-        let t95 = t92 * t94;
-        t95
+        let t33 = T::one() / t4;
+        let t34 = t5 * t33;
+        let t35 = t5 - self.parameters.Ri;
+        let t37 = t20 * t35;
+        let t38 = t31 * t34;
+        let t41 = self.fixed[5] * t13;
+        let t42 = t41 * t37;
+        let t43 = t42 + T::one();
+        let t44 = t32 * t38;
+        let t45 = t44 + T::one();
+        let t46 = t43 * t45;
+        t46
     }
     #[inline]
     fn first_piola_kirchhoff(
@@ -536,59 +536,60 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t34 = T::one() / t4;
-        let t35 = t5 * t34;
-        let t59 = t5 - self.parameters.Ri;
-        let t65 = t31 * t3;
-        let t66 = t65 * t35;
-        let t70 = t20 * t59;
-        let t72 = t31 * t35;
-        let t74 = X[0] * X[1];
-        let t81 = t31 * t2;
-        let t82 = t81 * t35;
-        let t90 = self.fixed[9] * t13;
-        let t91 = t90 * t70;
-        let t92 = t91 + T::one();
-        let t93 = t32 * t72;
-        let t94 = t93 + T::one();
-        let t95 = t92 * t94;
-        let t100 = t13 * t72;
-        let t101 = t100 * t92;
+        let t33 = T::one() / t4;
+        let t34 = t5 * t33;
+        let t35 = t5 - self.parameters.Ri;
+        let t37 = t20 * t35;
+        let t38 = t31 * t34;
+        let t41 = self.fixed[5] * t13;
+        let t42 = t41 * t37;
+        let t43 = t42 + T::one();
+        let t44 = t32 * t38;
+        let t45 = t44 + T::one();
+        let t46 = t43 * t45;
+        let t75 = t31 * t3;
+        let t76 = t75 * t34;
+        let t82 = X[0] * X[1];
+        let t89 = t31 * t2;
+        let t90 = t89 * t34;
+        let t100 = t13 * t38;
+        let t101 = t100 * t43;
         let t102 = self.parameters.A * t101;
-        let t103 = t102 + t91;
-        let t104 = t103.ln_of_both(t95);
-        let t108 = T::one() / t92;
-        let t109 = t108 + T::one();
-        let t113 = t104 * t108;
-        let t114 = self.fixed[11] * t113;
-        let t115 = self.fixed[10] * t109;
-        let t116 = t114 - t115;
-        let t117 = T::one() / t94;
-        let t118 = t117 + T::one();
-        let t119 = t104 * t117;
-        let t120 = self.fixed[11] * t119;
-        let t121 = self.fixed[10] * t118;
-        let t122 = t120 - t121;
-        let t123 = t91 * t116;
-        let t124 = t2 * t123;
-        let t125 = t32 * t66;
-        let t126 = t125 * t122;
-        let t127 = t124 + t126;
-        let t128 = self.fixed[11] * t104;
-        let t129 = t34 * t127;
-        let t130 = t128 - t129;
-        let t131 = t93 * t122;
-        let t132 = t123 - t131;
-        let t133 = t74 * t34;
-        let t134 = t133 * t132;
-        let t135 = -t134;
-        let t136 = t3 * t123;
-        let t137 = t32 * t82;
-        let t138 = t137 * t122;
-        let t139 = t136 + t138;
-        let t140 = t34 * t139;
-        let t141 = t128 - t140;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t130, t135, t135, t141)
+        let t103 = t102 + t42;
+        let t104 = t103.ln_of_both(t46);
+        let t108 = T::one() / t46;
+        let t109 = t45 * t108;
+        let t110 = t43 * t108;
+        let t111 = t109 + T::one();
+        let t115 = t104 * t109;
+        let t116 = self.fixed[11] * t115;
+        let t117 = self.fixed[10] * t111;
+        let t118 = t116 - t117;
+        let t119 = t110 + T::one();
+        let t120 = t104 * t110;
+        let t121 = self.fixed[11] * t120;
+        let t122 = self.fixed[10] * t119;
+        let t123 = t121 - t122;
+        let t124 = t42 * t118;
+        let t125 = t2 * t124;
+        let t126 = t32 * t76;
+        let t127 = t126 * t123;
+        let t128 = t125 + t127;
+        let t129 = self.fixed[11] * t104;
+        let t130 = t33 * t128;
+        let t131 = t129 - t130;
+        let t132 = t44 * t123;
+        let t133 = t124 - t132;
+        let t134 = t82 * t33;
+        let t135 = t134 * t133;
+        let t136 = -t135;
+        let t137 = t3 * t124;
+        let t138 = t32 * t90;
+        let t139 = t138 * t123;
+        let t140 = t137 + t139;
+        let t141 = t33 * t140;
+        let t142 = t129 - t141;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t131, t136, t136, t142)
     }
     #[inline]
     fn body_force(
@@ -610,77 +611,81 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t34 = T::one() / t4;
-        let t35 = t5 * t34;
-        let t59 = t5 - self.parameters.Ri;
-        let t70 = t20 * t59;
-        let t71 = self.fixed[7] * t70;
-        let t72 = t31 * t35;
-        let t73 = t71 - t72;
-        let t90 = self.fixed[9] * t13;
-        let t93 = t32 * t72;
-        let t94 = t93 + T::one();
-        let t117 = T::one() / t94;
-        let t143 = t23 - self.fixed[12];
-        let t144 = self.fixed[7] * t143;
-        let t145 = t73 * t35;
-        let t146 = t144 + t145;
-        let t147 = self.fixed[3] * t70;
-        let t148 = T::nearest(6.0) * t147;
-        let t149 = t72 - t148;
-        let t150 = t35 * t149;
-        let t152 = self.fixed[13] * t146;
-        let t153 = t144 - t150;
-        let t154 = t153 + t152;
-        let t155 = self.fixed[5] * t31;
-        let t157 = self.fixed[14] * t154;
-        let t158 = t155 + t157;
-        let t160 = self.fixed[15] * t13;
-        let t161 = t160 * t158;
-        let t162 = self.fixed[8] * t13;
-        let t163 = t162 * t147;
-        let t164 = t163 + T::one();
-        let t165 = t163 * t94;
-        let t166 = t165 + t93;
-        let t167 = t164 * t94;
-        let t168 = t166.ln_of_both(t167);
-        let t169 = self.fixed[11] * t168;
-        let t170 = self.fixed[10] * t163;
-        let t171 = t169 + t170;
-        let t172 = self.fixed[10] * t93;
-        let t173 = t169 + t172;
-        let t174 = t90 * t143;
-        let t175 = T::one() / t164;
-        let t176 = t174 * t175;
-        let t177 = t163 * t176;
-        let t178 = t32 * t145;
-        let t179 = t178 * t117;
-        let t180 = t176 + t179;
-        let t181 = self.fixed[10] * t174;
-        let t182 = self.fixed[11] * t180;
-        let t183 = t181 + t182;
-        let t184 = t174 - t177;
-        let t185 = t171 * t184;
-        let t186 = t163 * t183;
-        let t187 = t185 + t186;
-        let t188 = t93 * t179;
-        let t189 = t177 + t188;
-        let t190 = t163 * t171;
-        let t191 = t190 * t175;
-        let t192 = t93 * t173;
-        let t193 = t192 * t117;
-        let t194 = t191 - t193;
-        let t195 = t35 * t194;
-        let t196 = t187 * t175;
-        let t197 = self.fixed[11] * t189;
-        let t198 = t195 + t196;
-        let t199 = t198 + t197;
-        let t201 = self.fixed[16] * t199;
-        let t202 = t201 - t161;
-        let t203 = t35 * t202;
-        let t204 = X[0] * t203;
-        let t205 = X[1] * t203;
-        crate::nalgebra::SVector::<T, 2>::new(t204, t205)
+        let t33 = T::one() / t4;
+        let t34 = t5 * t33;
+        let t35 = t5 - self.parameters.Ri;
+        let t37 = t20 * t35;
+        let t38 = t31 * t34;
+        let t41 = self.fixed[5] * t13;
+        let t42 = t41 * t37;
+        let t43 = t42 + T::one();
+        let t44 = t32 * t38;
+        let t45 = t44 + T::one();
+        let t46 = t43 * t45;
+        let t80 = self.fixed[9] * t37;
+        let t81 = t80 - t38;
+        let t108 = T::one() / t46;
+        let t110 = t43 * t108;
+        let t144 = t23 - self.fixed[12];
+        let t145 = self.fixed[9] * t144;
+        let t146 = t81 * t34;
+        let t147 = t145 + t146;
+        let t148 = self.fixed[3] * t37;
+        let t149 = T::nearest(6.0) * t148;
+        let t150 = t38 - t149;
+        let t151 = t34 * t150;
+        let t153 = self.fixed[13] * t147;
+        let t154 = t145 - t151;
+        let t155 = t154 + t153;
+        let t156 = self.fixed[7] * t31;
+        let t158 = self.fixed[14] * t155;
+        let t159 = t156 + t158;
+        let t161 = self.fixed[15] * t13;
+        let t162 = t161 * t159;
+        let t163 = self.fixed[4] * t13;
+        let t164 = t163 * t148;
+        let t165 = t164 + T::one();
+        let t166 = t164 * t45;
+        let t167 = t166 + t44;
+        let t168 = t165 * t45;
+        let t169 = t167.ln_of_both(t168);
+        let t170 = self.fixed[11] * t169;
+        let t171 = self.fixed[10] * t164;
+        let t172 = t170 + t171;
+        let t173 = self.fixed[10] * t44;
+        let t174 = t170 + t173;
+        let t175 = t41 * t144;
+        let t176 = T::one() / t165;
+        let t177 = t175 * t176;
+        let t178 = t164 * t177;
+        let t179 = t32 * t146;
+        let t180 = t179 * t110;
+        let t181 = t177 + t180;
+        let t182 = self.fixed[10] * t175;
+        let t183 = self.fixed[11] * t181;
+        let t184 = t182 + t183;
+        let t185 = t175 - t178;
+        let t186 = t172 * t185;
+        let t187 = t164 * t184;
+        let t188 = t186 + t187;
+        let t189 = t44 * t180;
+        let t190 = t178 + t189;
+        let t191 = t164 * t172;
+        let t192 = t191 * t176;
+        let t193 = t44 * t174;
+        let t194 = t193 * t110;
+        let t195 = t192 - t194;
+        let t196 = t34 * t195;
+        let t197 = t188 * t176;
+        let t198 = self.fixed[11] * t190;
+        let t199 = t196 + t197;
+        let t200 = t199 + t198;
+        let t202 = self.fixed[16] * t200;
+        let t203 = t202 - t162;
+        let t204 = t34 * t203;
+        let t205 = X[0] * t204;
+        let t206 = X[1] * t204;
+        crate::nalgebra::SVector::<T, 2>::new(t205, t206)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t2 = X[0] * X[0];
@@ -697,162 +702,163 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
         let t32 = self.parameters.A * t13;
-        let t33 = t31 * X[0];
-        let t34 = T::one() / t4;
-        let t35 = t5 * t34;
-        let t36 = t33 * t35;
-        let t37 = t32 * t36;
-        let t38 = t31 * X[1];
-        let t39 = t38 * t35;
-        let t40 = t32 * t39;
-        let t42 = t12.sin_pi();
-        let t45 = self.fixed[4] * t42;
-        let t46 = t45 * t36;
-        let t47 = -t46;
-        let t48 = t45 * t39;
-        let t49 = -t48;
-        let t54 = self.fixed[6] * t13;
-        let t55 = t54 * t36;
-        let t56 = -t55;
-        let t57 = t54 * t39;
-        let t58 = -t57;
-        let t59 = t5 - self.parameters.Ri;
-        let t62 = t20 * t2;
-        let t63 = t62 * t59;
-        let t64 = self.fixed[7] * t63;
-        let t65 = t31 * t3;
-        let t66 = t65 * t35;
-        let t67 = t64 + t66;
-        let t68 = t67 * t34;
-        let t69 = t32 * t68;
-        let t70 = t20 * t59;
-        let t71 = self.fixed[7] * t70;
-        let t72 = t31 * t35;
-        let t73 = t71 - t72;
-        let t74 = X[0] * X[1];
-        let t75 = t74 * t73;
+        let t33 = T::one() / t4;
+        let t34 = t5 * t33;
+        let t35 = t5 - self.parameters.Ri;
+        let t37 = t20 * t35;
+        let t38 = t31 * t34;
+        let t41 = self.fixed[5] * t13;
+        let t42 = t41 * t37;
+        let t43 = t42 + T::one();
+        let t44 = t32 * t38;
+        let t45 = t44 + T::one();
+        let t46 = t43 * t45;
+        let t47 = t31 * X[0];
+        let t48 = t47 * t34;
+        let t49 = t32 * t48;
+        let t50 = t31 * X[1];
+        let t51 = t50 * t34;
+        let t52 = t32 * t51;
+        let t54 = t12.sin_pi();
+        let t57 = self.fixed[6] * t54;
+        let t58 = t57 * t48;
+        let t59 = -t58;
+        let t60 = t57 * t51;
+        let t61 = -t60;
+        let t66 = self.fixed[8] * t13;
+        let t67 = t66 * t48;
+        let t68 = -t67;
+        let t69 = t66 * t51;
+        let t70 = -t69;
+        let t72 = t20 * t2;
+        let t73 = t72 * t35;
+        let t74 = self.fixed[9] * t73;
+        let t75 = t31 * t3;
         let t76 = t75 * t34;
-        let t77 = t32 * t76;
-        let t78 = t20 * t3;
-        let t79 = t78 * t59;
-        let t80 = self.fixed[7] * t79;
-        let t81 = t31 * t2;
-        let t82 = t81 * t35;
-        let t83 = t80 + t82;
-        let t84 = t83 * t34;
+        let t77 = t74 + t76;
+        let t78 = t77 * t33;
+        let t79 = t32 * t78;
+        let t80 = self.fixed[9] * t37;
+        let t81 = t80 - t38;
+        let t82 = X[0] * X[1];
+        let t83 = t82 * t81;
+        let t84 = t83 * t33;
         let t85 = t32 * t84;
-        let t86 = t69 + T::one();
-        let t87 = t85 + T::one();
-        let t90 = self.fixed[9] * t13;
-        let t91 = t90 * t70;
-        let t92 = t91 + T::one();
-        let t93 = t32 * t72;
-        let t94 = t93 + T::one();
-        let t95 = t92 * t94;
-        let t100 = t13 * t72;
-        let t101 = t100 * t92;
+        let t86 = t20 * t3;
+        let t87 = t86 * t35;
+        let t88 = self.fixed[9] * t87;
+        let t89 = t31 * t2;
+        let t90 = t89 * t34;
+        let t91 = t88 + t90;
+        let t92 = t91 * t33;
+        let t93 = t32 * t92;
+        let t94 = t79 + T::one();
+        let t95 = t93 + T::one();
+        let t100 = t13 * t38;
+        let t101 = t100 * t43;
         let t102 = self.parameters.A * t101;
-        let t103 = t102 + t91;
-        let t104 = t103.ln_of_both(t95);
-        let t108 = T::one() / t92;
-        let t109 = t108 + T::one();
-        let t113 = t104 * t108;
-        let t114 = self.fixed[11] * t113;
-        let t115 = self.fixed[10] * t109;
-        let t116 = t114 - t115;
-        let t117 = T::one() / t94;
-        let t118 = t117 + T::one();
-        let t119 = t104 * t117;
-        let t120 = self.fixed[11] * t119;
-        let t121 = self.fixed[10] * t118;
-        let t122 = t120 - t121;
-        let t123 = t91 * t116;
-        let t124 = t2 * t123;
-        let t125 = t32 * t66;
-        let t126 = t125 * t122;
-        let t127 = t124 + t126;
-        let t128 = self.fixed[11] * t104;
-        let t129 = t34 * t127;
-        let t130 = t128 - t129;
-        let t131 = t93 * t122;
-        let t132 = t123 - t131;
-        let t133 = t74 * t34;
-        let t134 = t133 * t132;
-        let t135 = -t134;
-        let t136 = t3 * t123;
-        let t137 = t32 * t82;
-        let t138 = t137 * t122;
-        let t139 = t136 + t138;
-        let t140 = t34 * t139;
-        let t141 = t128 - t140;
-        let t143 = t23 - self.fixed[12];
-        let t144 = self.fixed[7] * t143;
-        let t145 = t73 * t35;
-        let t146 = t144 + t145;
-        let t147 = self.fixed[3] * t70;
-        let t148 = T::nearest(6.0) * t147;
-        let t149 = t72 - t148;
-        let t150 = t35 * t149;
-        let t152 = self.fixed[13] * t146;
-        let t153 = t144 - t150;
-        let t154 = t153 + t152;
-        let t155 = self.fixed[5] * t31;
-        let t157 = self.fixed[14] * t154;
-        let t158 = t155 + t157;
-        let t160 = self.fixed[15] * t13;
-        let t161 = t160 * t158;
-        let t162 = self.fixed[8] * t13;
-        let t163 = t162 * t147;
-        let t164 = t163 + T::one();
-        let t165 = t163 * t94;
-        let t166 = t165 + t93;
-        let t167 = t164 * t94;
-        let t168 = t166.ln_of_both(t167);
-        let t169 = self.fixed[11] * t168;
-        let t170 = self.fixed[10] * t163;
-        let t171 = t169 + t170;
-        let t172 = self.fixed[10] * t93;
-        let t173 = t169 + t172;
-        let t174 = t90 * t143;
-        let t175 = T::one() / t164;
-        let t176 = t174 * t175;
-        let t177 = t163 * t176;
-        let t178 = t32 * t145;
-        let t179 = t178 * t117;
-        let t180 = t176 + t179;
-        let t181 = self.fixed[10] * t174;
-        let t182 = self.fixed[11] * t180;
-        let t183 = t181 + t182;
-        let t184 = t174 - t177;
-        let t185 = t171 * t184;
-        let t186 = t163 * t183;
-        let t187 = t185 + t186;
-        let t188 = t93 * t179;
-        let t189 = t177 + t188;
-        let t190 = t163 * t171;
-        let t191 = t190 * t175;
-        let t192 = t93 * t173;
-        let t193 = t192 * t117;
-        let t194 = t191 - t193;
-        let t195 = t35 * t194;
-        let t196 = t187 * t175;
-        let t197 = self.fixed[11] * t189;
-        let t198 = t195 + t196;
-        let t199 = t198 + t197;
-        let t201 = self.fixed[16] * t199;
-        let t202 = t201 - t161;
-        let t203 = t35 * t202;
-        let t204 = X[0] * t203;
-        let t205 = X[1] * t203;
+        let t103 = t102 + t42;
+        let t104 = t103.ln_of_both(t46);
+        let t108 = T::one() / t46;
+        let t109 = t45 * t108;
+        let t110 = t43 * t108;
+        let t111 = t109 + T::one();
+        let t115 = t104 * t109;
+        let t116 = self.fixed[11] * t115;
+        let t117 = self.fixed[10] * t111;
+        let t118 = t116 - t117;
+        let t119 = t110 + T::one();
+        let t120 = t104 * t110;
+        let t121 = self.fixed[11] * t120;
+        let t122 = self.fixed[10] * t119;
+        let t123 = t121 - t122;
+        let t124 = t42 * t118;
+        let t125 = t2 * t124;
+        let t126 = t32 * t76;
+        let t127 = t126 * t123;
+        let t128 = t125 + t127;
+        let t129 = self.fixed[11] * t104;
+        let t130 = t33 * t128;
+        let t131 = t129 - t130;
+        let t132 = t44 * t123;
+        let t133 = t124 - t132;
+        let t134 = t82 * t33;
+        let t135 = t134 * t133;
+        let t136 = -t135;
+        let t137 = t3 * t124;
+        let t138 = t32 * t90;
+        let t139 = t138 * t123;
+        let t140 = t137 + t139;
+        let t141 = t33 * t140;
+        let t142 = t129 - t141;
+        let t144 = t23 - self.fixed[12];
+        let t145 = self.fixed[9] * t144;
+        let t146 = t81 * t34;
+        let t147 = t145 + t146;
+        let t148 = self.fixed[3] * t37;
+        let t149 = T::nearest(6.0) * t148;
+        let t150 = t38 - t149;
+        let t151 = t34 * t150;
+        let t153 = self.fixed[13] * t147;
+        let t154 = t145 - t151;
+        let t155 = t154 + t153;
+        let t156 = self.fixed[7] * t31;
+        let t158 = self.fixed[14] * t155;
+        let t159 = t156 + t158;
+        let t161 = self.fixed[15] * t13;
+        let t162 = t161 * t159;
+        let t163 = self.fixed[4] * t13;
+        let t164 = t163 * t148;
+        let t165 = t164 + T::one();
+        let t166 = t164 * t45;
+        let t167 = t166 + t44;
+        let t168 = t165 * t45;
+        let t169 = t167.ln_of_both(t168);
+        let t170 = self.fixed[11] * t169;
+        let t171 = self.fixed[10] * t164;
+        let t172 = t170 + t171;
+        let t173 = self.fixed[10] * t44;
+        let t174 = t170 + t173;
+        let t175 = t41 * t144;
+        let t176 = T::one() / t165;
+        let t177 = t175 * t176;
+        let t178 = t164 * t177;
+        let t179 = t32 * t146;
+        let t180 = t179 * t110;
+        let t181 = t177 + t180;
+        let t182 = self.fixed[10] * t175;
+        let t183 = self.fixed[11] * t181;
+        let t184 = t182 + t183;
+        let t185 = t175 - t178;
+        let t186 = t172 * t185;
+        let t187 = t164 * t184;
+        let t188 = t186 + t187;
+        let t189 = t44 * t180;
+        let t190 = t178 + t189;
+        let t191 = t164 * t172;
+        let t192 = t191 * t176;
+        let t193 = t44 * t174;
+        let t194 = t193 * t110;
+        let t195 = t192 - t194;
+        let t196 = t34 * t195;
+        let t197 = t188 * t176;
+        let t198 = self.fixed[11] * t190;
+        let t199 = t196 + t197;
+        let t200 = t199 + t198;
+        let t202 = self.fixed[16] * t200;
+        let t203 = t202 - t162;
+        let t204 = t34 * t203;
+        let t205 = X[0] * t204;
+        let t206 = X[1] * t204;
         crate::Fields {
-            u: crate::nalgebra::SVector::<T, 2>::new(t37, t40),
-            v: crate::nalgebra::SVector::<T, 2>::new(t47, t49),
-            a: crate::nalgebra::SVector::<T, 2>::new(t56, t58),
-            H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t69, t77, t77, t85),
-            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t86, t77, t77, t87),
-            J: t95,
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t130, t135, t135, t141),
-            b: crate::nalgebra::SVector::<T, 2>::new(t204, t205),
+            u: crate::nalgebra::SVector::<T, 2>::new(t49, t52),
+            v: crate::nalgebra::SVector::<T, 2>::new(t59, t61),
+            a: crate::nalgebra::SVector::<T, 2>::new(t68, t70),
+            H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t79, t85, t85, t93),
+            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t94, t85, t85, t95),
+            J: t46,
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t131, t136, t136, t142),
+            b: crate::nalgebra::SVector::<T, 2>::new(t205, t206),
         }
     }
     fn traction(
@@ -865,26 +871,26 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
             crate::Surface::Inner => {
                 let t12 = self.fixed[0] * t;
                 let t13 = t12.cos_pi();
-                let t330 = self.fixed[26] * t13;
-                let t331 = t330 + T::one();
-                let t332 = t330.ln_of_both(t331);
-                let t336 = self.fixed[27] * t332;
-                let t337 = t336 * X[0];
-                let t338 = -t337;
-                let t339 = t336 * X[1];
-                let t340 = -t339;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t338, t340))
+                let t331 = self.fixed[26] * t13;
+                let t332 = t331 + T::one();
+                let t333 = t331.ln_of_both(t332);
+                let t337 = self.fixed[27] * t333;
+                let t338 = t337 * X[0];
+                let t339 = -t338;
+                let t340 = t337 * X[1];
+                let t341 = -t340;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t339, t341))
             }
             crate::Surface::Outer => {
                 let t12 = self.fixed[0] * t;
                 let t13 = t12.cos_pi();
-                let t342 = self.fixed[28] * t13;
-                let t343 = t342 + T::one();
-                let t344 = t342.ln_of_both(t343);
-                let t348 = self.fixed[29] * t344;
-                let t349 = t348 * X[0];
-                let t350 = t348 * X[1];
-                Some(crate::nalgebra::SVector::<T, 2>::new(t349, t350))
+                let t343 = self.fixed[28] * t13;
+                let t344 = t343 + T::one();
+                let t345 = t343.ln_of_both(t344);
+                let t349 = self.fixed[29] * t345;
+                let t350 = t349 * X[0];
+                let t351 = t349 * X[1];
+                Some(crate::nalgebra::SVector::<T, 2>::new(t350, t351))
             }
             crate::Surface::Lower(0) => {
                 let t2 = X[0] * X[0];
@@ -901,37 +907,38 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
                 let t30 = self.fixed[3] * t29;
                 let t31 = t30 + T::one();
                 let t32 = self.parameters.A * t13;
-                let t34 = T::one() / t4;
-                let t35 = t5 * t34;
-                let t59 = t5 - self.parameters.Ri;
-                let t65 = t31 * t3;
-                let t70 = t20 * t59;
-                let t72 = t31 * t35;
-                let t90 = self.fixed[9] * t13;
-                let t91 = t90 * t70;
-                let t92 = t91 + T::one();
-                let t93 = t32 * t72;
-                let t94 = t93 + T::one();
-                let t95 = t92 * t94;
-                let t100 = t13 * t72;
-                let t101 = t100 * t92;
+                let t33 = T::one() / t4;
+                let t34 = t5 * t33;
+                let t35 = t5 - self.parameters.Ri;
+                let t37 = t20 * t35;
+                let t38 = t31 * t34;
+                let t41 = self.fixed[5] * t13;
+                let t42 = t41 * t37;
+                let t43 = t42 + T::one();
+                let t44 = t32 * t38;
+                let t45 = t44 + T::one();
+                let t46 = t43 * t45;
+                let t75 = t31 * t3;
+                let t100 = t13 * t38;
+                let t101 = t100 * t43;
                 let t102 = self.parameters.A * t101;
-                let t103 = t102 + t91;
-                let t104 = t103.ln_of_both(t95);
-                let t117 = T::one() / t94;
-                let t118 = t117 + T::one();
-                let t119 = t104 * t117;
-                let t120 = self.fixed[11] * t119;
-                let t121 = self.fixed[10] * t118;
-                let t122 = t120 - t121;
-                let t128 = self.fixed[11] * t104;
-                let t351 = t34 * t35;
-                let t352 = t65 * t351;
-                let t353 = t32 * t352;
-                let t354 = t353 * t122;
-                let t355 = t128 - t354;
-                let t356 = -t355;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t356, T::zero()))
+                let t103 = t102 + t42;
+                let t104 = t103.ln_of_both(t46);
+                let t108 = T::one() / t46;
+                let t110 = t43 * t108;
+                let t119 = t110 + T::one();
+                let t120 = t104 * t110;
+                let t121 = self.fixed[11] * t120;
+                let t122 = self.fixed[10] * t119;
+                let t123 = t121 - t122;
+                let t129 = self.fixed[11] * t104;
+                let t352 = t33 * t34;
+                let t353 = t75 * t352;
+                let t354 = t32 * t353;
+                let t355 = t354 * t123;
+                let t356 = t129 - t355;
+                let t357 = -t356;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t357, T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t2 = X[0] * X[0];
@@ -948,37 +955,38 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
                 let t30 = self.fixed[3] * t29;
                 let t31 = t30 + T::one();
                 let t32 = self.parameters.A * t13;
-                let t34 = T::one() / t4;
-                let t35 = t5 * t34;
-                let t59 = t5 - self.parameters.Ri;
-                let t70 = t20 * t59;
-                let t72 = t31 * t35;
-                let t81 = t31 * t2;
-                let t90 = self.fixed[9] * t13;
-                let t91 = t90 * t70;
-                let t92 = t91 + T::one();
-                let t93 = t32 * t72;
-                let t94 = t93 + T::one();
-                let t95 = t92 * t94;
-                let t100 = t13 * t72;
-                let t101 = t100 * t92;
+                let t33 = T::one() / t4;
+                let t34 = t5 * t33;
+                let t35 = t5 - self.parameters.Ri;
+                let t37 = t20 * t35;
+                let t38 = t31 * t34;
+                let t41 = self.fixed[5] * t13;
+                let t42 = t41 * t37;
+                let t43 = t42 + T::one();
+                let t44 = t32 * t38;
+                let t45 = t44 + T::one();
+                let t46 = t43 * t45;
+                let t89 = t31 * t2;
+                let t100 = t13 * t38;
+                let t101 = t100 * t43;
                 let t102 = self.parameters.A * t101;
-                let t103 = t102 + t91;
-                let t104 = t103.ln_of_both(t95);
-                let t117 = T::one() / t94;
-                let t118 = t117 + T::one();
-                let t119 = t104 * t117;
-                let t120 = self.fixed[11] * t119;
-                let t121 = self.fixed[10] * t118;
-                let t122 = t120 - t121;
-                let t128 = self.fixed[11] * t104;
-                let t351 = t34 * t35;
-                let t358 = t81 * t351;
-                let t359 = t32 * t358;
-                let t360 = t359 * t122;
-                let t361 = t128 - t360;
-                let t362 = -t361;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t362))
+                let t103 = t102 + t42;
+                let t104 = t103.ln_of_both(t46);
+                let t108 = T::one() / t46;
+                let t110 = t43 * t108;
+                let t119 = t110 + T::one();
+                let t120 = t104 * t110;
+                let t121 = self.fixed[11] * t120;
+                let t122 = self.fixed[10] * t119;
+                let t123 = t121 - t122;
+                let t129 = self.fixed[11] * t104;
+                let t352 = t33 * t34;
+                let t359 = t89 * t352;
+                let t360 = t32 * t359;
+                let t361 = t360 * t123;
+                let t362 = t129 - t361;
+                let t363 = -t362;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t363))
             }
             _ => None,
         }
@@ -1047,8 +1055,8 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
         let t32 = self.parameters.A * t13;
-        let t90 = self.fixed[9] * t13;
-        [t13, t32, t90]
+        let t41 = self.fixed[5] * t13;
+        [t13, t32, t41]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 10] {
@@ -1063,87 +1071,87 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         let t29 = t21 * t25;
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
-        let t34 = T::one() / t4;
-        let t35 = t5 * t34;
-        let t59 = t5 - self.parameters.Ri;
-        let t70 = t20 * t59;
-        let t71 = self.fixed[7] * t70;
-        let t72 = t31 * t35;
-        let t73 = t71 - t72;
-        let t143 = t23 - self.fixed[12];
-        let t144 = self.fixed[7] * t143;
-        let t145 = t73 * t35;
-        let t146 = t144 + t145;
-        let t152 = self.fixed[13] * t146;
-        let t155 = self.fixed[5] * t31;
-        let t206 = X[0] * t35;
-        let t207 = t70 * t35;
-        let t208 = t207 + t143;
-        let t209 = self.fixed[7] * t208;
-        let t210 = t31 * t34;
-        let t211 = t209 - t210;
-        let t212 = t211 + t152;
-        let t213 = self.fixed[14] * t212;
-        let t214 = t155 + t213;
-        let t215 = self.fixed[15] * t214;
-        let t222 = t59 * t59;
-        let t228 = t21 * t31;
-        let t229 = t228 * t222;
-        let t230 = t229 * t146;
-        let t231 = t230 * t35;
-        let t232 = self.fixed[17] * t231;
-        let t233 = t31 * t143;
-        let t234 = t70 * t73;
-        let t235 = t233 + t234;
-        let t237 = self.fixed[18] * t70;
-        let t238 = t237 + t72;
-        let t239 = t143 * t238;
-        let t240 = T::nearest(2.0) * t239;
-        let t241 = self.fixed[10] * t240;
-        let t242 = t235 * t35;
-        let t243 = self.fixed[11] * t242;
-        let t244 = t241 + t243;
-        let t247 = t21 * t222;
-        let t248 = self.fixed[19] * t247;
-        let t249 = t31 * t31;
-        let t250 = t249 * t34;
-        let t251 = t31 * t73;
-        let t252 = t251 * t35;
-        let t253 = t248 - t250;
-        let t254 = t253 + t252;
-        let t255 = self.fixed[18] * t143;
-        let t256 = t255 + t145;
-        let t257 = t256 * t35;
-        let t258 = T::nearest(2.0) * t257;
-        let t259 = t31 * t258;
-        let t260 = t70 * t143;
-        let t261 = self.fixed[19] * t260;
-        let t262 = t259 + t261;
-        let t263 = self.fixed[7] * t244;
-        let t264 = t254 * t35;
-        let t265 = self.fixed[10] * t264;
-        let t266 = self.fixed[11] * t262;
-        let t267 = t263 + t265;
-        let t268 = t267 + t266;
-        let t274 = t70 * t268;
-        let t275 = self.fixed[20] * t274;
-        let t284 = self.fixed[21] * t242;
-        let t285 = self.fixed[11] * t146;
-        let t289 = self.fixed[22] * t143;
-        let t290 = t285 + t289;
-        let t291 = t251 * t34;
-        let t292 = t261 + t291;
-        let t293 = t70 * t290;
-        let t294 = self.fixed[7] * t293;
-        let t295 = t253 * t35;
-        let t296 = self.fixed[10] * t295;
-        let t297 = self.fixed[11] * t292;
-        let t298 = t294 + t296;
-        let t299 = t298 + t297;
-        let t301 = self.fixed[23] * t299;
-        let t310 = self.fixed[24] * t146;
-        let t320 = X[1] * t35;
-        [t70, t72, t206, t215, t232, t275, t284, t301, t310, t320]
+        let t33 = T::one() / t4;
+        let t34 = t5 * t33;
+        let t35 = t5 - self.parameters.Ri;
+        let t37 = t20 * t35;
+        let t38 = t31 * t34;
+        let t80 = self.fixed[9] * t37;
+        let t81 = t80 - t38;
+        let t144 = t23 - self.fixed[12];
+        let t145 = self.fixed[9] * t144;
+        let t146 = t81 * t34;
+        let t147 = t145 + t146;
+        let t153 = self.fixed[13] * t147;
+        let t156 = self.fixed[7] * t31;
+        let t207 = X[0] * t34;
+        let t208 = t37 * t34;
+        let t209 = t208 + t144;
+        let t210 = self.fixed[9] * t209;
+        let t211 = t31 * t33;
+        let t212 = t210 - t211;
+        let t213 = t212 + t153;
+        let t214 = self.fixed[14] * t213;
+        let t215 = t156 + t214;
+        let t216 = self.fixed[15] * t215;
+        let t223 = t35 * t35;
+        let t229 = t21 * t31;
+        let t230 = t229 * t223;
+        let t231 = t230 * t147;
+        let t232 = t231 * t34;
+        let t233 = self.fixed[17] * t232;
+        let t234 = t31 * t144;
+        let t235 = t37 * t81;
+        let t236 = t234 + t235;
+        let t238 = self.fixed[18] * t37;
+        let t239 = t238 + t38;
+        let t240 = t144 * t239;
+        let t241 = T::nearest(2.0) * t240;
+        let t242 = self.fixed[10] * t241;
+        let t243 = t236 * t34;
+        let t244 = self.fixed[11] * t243;
+        let t245 = t242 + t244;
+        let t248 = t21 * t223;
+        let t249 = self.fixed[19] * t248;
+        let t250 = t31 * t31;
+        let t251 = t250 * t33;
+        let t252 = t31 * t81;
+        let t253 = t252 * t34;
+        let t254 = t249 - t251;
+        let t255 = t254 + t253;
+        let t256 = self.fixed[18] * t144;
+        let t257 = t256 + t146;
+        let t258 = t257 * t34;
+        let t259 = T::nearest(2.0) * t258;
+        let t260 = t31 * t259;
+        let t261 = t37 * t144;
+        let t262 = self.fixed[19] * t261;
+        let t263 = t260 + t262;
+        let t264 = self.fixed[9] * t245;
+        let t265 = t255 * t34;
+        let t266 = self.fixed[10] * t265;
+        let t267 = self.fixed[11] * t263;
+        let t268 = t264 + t266;
+        let t269 = t268 + t267;
+        let t275 = t37 * t269;
+        let t276 = self.fixed[20] * t275;
+        let t285 = self.fixed[21] * t243;
+        let t286 = self.fixed[11] * t147;
+        let t290 = self.fixed[22] * t144;
+        let t291 = t286 + t290;
+        let t292 = t252 * t33;
+        let t293 = t262 + t292;
+        let t294 = t37 * t291;
+        let t295 = self.fixed[9] * t294;
+        let t296 = t254 * t34;
+        let t297 = self.fixed[10] * t296;
+        let t298 = self.fixed[11] * t293;
+        let t299 = t295 + t297;
+        let t300 = t299 + t298;
+        let t302 = self.fixed[23] * t300;
+        let t311 = self.fixed[24] * t147;
+        let t321 = X[1] * t34;
+        [t37, t38, t207, t216, t233, t276, t285, t302, t311, t321]
     }
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
@@ -1151,33 +1159,33 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         time: &[T; 3],
         point: &[T; 10],
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t91 = time[2] * point[0];
-        let t92 = t91 + T::one();
-        let t93 = time[1] * point[1];
-        let t94 = t93 + T::one();
-        let t95 = t92 * t94;
+        let t42 = time[2] * point[0];
+        let t43 = t42 + T::one();
+        let t44 = time[1] * point[1];
+        let t45 = t44 + T::one();
+        let t46 = t43 * t45;
         let t100 = time[0] * point[1];
-        let t101 = t100 * t92;
+        let t101 = t100 * t43;
         let t102 = self.parameters.A * t101;
-        let t103 = t102 + t91;
-        let t104 = t103.ln_of_both_if::<NEAR>(t95);
-        let t276 = time[0] * point[4];
-        let t277 = point[5] + t276;
-        let t302 = time[0] * t277;
-        let t303 = point[6] * t104;
-        let t304 = t302 + t303;
-        let t305 = point[7] + t304;
-        let t311 = time[0] * t305;
-        let t312 = point[8] * t104;
-        let t313 = t311 + t312;
-        let t314 = t92 * t92;
-        let t315 = t314 * t94;
-        let t316 = t313 / t315;
-        let t317 = t316 - point[3];
-        let t318 = time[0] * t317;
-        let t319 = point[2] * t318;
-        let t321 = point[9] * t318;
-        crate::nalgebra::SVector::<T, 2>::new(t319, t321)
+        let t103 = t102 + t42;
+        let t104 = t103.ln_of_both_if::<NEAR>(t46);
+        let t277 = time[0] * point[4];
+        let t278 = point[5] + t277;
+        let t303 = time[0] * t278;
+        let t304 = point[6] * t104;
+        let t305 = t303 + t304;
+        let t306 = point[7] + t305;
+        let t312 = time[0] * t306;
+        let t313 = point[8] * t104;
+        let t314 = t312 + t313;
+        let t315 = t43 * t43;
+        let t316 = t315 * t45;
+        let t317 = t314 / t316;
+        let t318 = t317 - point[3];
+        let t319 = time[0] * t318;
+        let t320 = point[2] * t319;
+        let t322 = point[9] * t319;
+        crate::nalgebra::SVector::<T, 2>::new(t320, t322)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
@@ -1187,15 +1195,15 @@ impl<T: crate::Real> crate::StateStages<T, 2, 3, 1, 2> for RingNu<T> {
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
         let t32 = self.parameters.A * t13;
-        let t90 = self.fixed[9] * t13;
-        [t13, t32, t90]
+        let t41 = self.fixed[5] * t13;
+        [t13, t32, t41]
     }
     #[inline]
     fn velocity_time(&self, t: T) -> [T; 1] {
         let t12 = self.fixed[0] * t;
-        let t42 = t12.sin_pi();
-        let t45 = self.fixed[4] * t42;
-        [t45]
+        let t54 = t12.sin_pi();
+        let t57 = self.fixed[6] * t54;
+        [t57]
     }
     #[inline]
     fn state_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 2] {
@@ -1221,17 +1229,17 @@ impl<T: crate::Real> crate::StateStages<T, 2, 3, 1, 2> for RingNu<T> {
             let t29 = t21 * t25;
             let t30 = self.fixed[3] * t29;
             let t31 = t30 + T::one();
-            let t33 = t31 * point[0];
-            let t34 = T::one() / t4;
-            let t35 = t5 * t34;
-            let t36 = t33 * t35;
-            let t38 = t31 * point[1];
-            let t39 = t38 * t35;
-            let t46 = time[0] * t36;
-            let t47 = -t46;
-            let t48 = time[0] * t39;
-            let t49 = -t48;
-            crate::nalgebra::SVector::<T, 2>::new(t47, t49)
+            let t33 = T::one() / t4;
+            let t34 = t5 * t33;
+            let t47 = t31 * point[0];
+            let t48 = t47 * t34;
+            let t50 = t31 * point[1];
+            let t51 = t50 * t34;
+            let t58 = time[0] * t48;
+            let t59 = -t58;
+            let t60 = time[0] * t51;
+            let t61 = -t60;
+            crate::nalgebra::SVector::<T, 2>::new(t59, t61)
         };
         let t2 = point[0] * point[0];
         let t3 = point[1] * point[1];
@@ -1244,87 +1252,88 @@ impl<T: crate::Real> crate::StateStages<T, 2, 3, 1, 2> for RingNu<T> {
         let t29 = t21 * t25;
         let t30 = self.fixed[3] * t29;
         let t31 = t30 + T::one();
-        let t33 = t31 * point[0];
-        let t34 = T::one() / t4;
-        let t35 = t5 * t34;
-        let t36 = t33 * t35;
-        let t37 = time[1] * t36;
-        let t38 = t31 * point[1];
-        let t39 = t38 * t35;
-        let t40 = time[1] * t39;
-        let t59 = t5 - self.parameters.Ri;
-        let t62 = t20 * t2;
-        let t63 = t62 * t59;
-        let t64 = self.fixed[7] * t63;
-        let t65 = t31 * t3;
-        let t66 = t65 * t35;
-        let t67 = t64 + t66;
-        let t68 = t67 * t34;
-        let t69 = time[1] * t68;
-        let t70 = t20 * t59;
-        let t71 = self.fixed[7] * t70;
-        let t72 = t31 * t35;
-        let t73 = t71 - t72;
-        let t74 = point[0] * point[1];
-        let t75 = t74 * t73;
+        let t33 = T::one() / t4;
+        let t34 = t5 * t33;
+        let t35 = t5 - self.parameters.Ri;
+        let t37 = t20 * t35;
+        let t38 = t31 * t34;
+        let t42 = time[2] * t37;
+        let t43 = t42 + T::one();
+        let t44 = time[1] * t38;
+        let t45 = t44 + T::one();
+        let t46 = t43 * t45;
+        let t47 = t31 * point[0];
+        let t48 = t47 * t34;
+        let t49 = time[1] * t48;
+        let t50 = t31 * point[1];
+        let t51 = t50 * t34;
+        let t52 = time[1] * t51;
+        let t72 = t20 * t2;
+        let t73 = t72 * t35;
+        let t74 = self.fixed[9] * t73;
+        let t75 = t31 * t3;
         let t76 = t75 * t34;
-        let t77 = time[1] * t76;
-        let t78 = t20 * t3;
-        let t79 = t78 * t59;
-        let t80 = self.fixed[7] * t79;
-        let t81 = t31 * t2;
-        let t82 = t81 * t35;
-        let t83 = t80 + t82;
-        let t84 = t83 * t34;
+        let t77 = t74 + t76;
+        let t78 = t77 * t33;
+        let t79 = time[1] * t78;
+        let t80 = self.fixed[9] * t37;
+        let t81 = t80 - t38;
+        let t82 = point[0] * point[1];
+        let t83 = t82 * t81;
+        let t84 = t83 * t33;
         let t85 = time[1] * t84;
-        let t86 = t69 + T::one();
-        let t87 = t85 + T::one();
-        let t91 = time[2] * t70;
-        let t92 = t91 + T::one();
-        let t93 = time[1] * t72;
-        let t94 = t93 + T::one();
-        let t95 = t92 * t94;
-        let t100 = time[0] * t72;
-        let t101 = t100 * t92;
+        let t86 = t20 * t3;
+        let t87 = t86 * t35;
+        let t88 = self.fixed[9] * t87;
+        let t89 = t31 * t2;
+        let t90 = t89 * t34;
+        let t91 = t88 + t90;
+        let t92 = t91 * t33;
+        let t93 = time[1] * t92;
+        let t94 = t79 + T::one();
+        let t95 = t93 + T::one();
+        let t100 = time[0] * t38;
+        let t101 = t100 * t43;
         let t102 = self.parameters.A * t101;
-        let t103 = t102 + t91;
-        let t104 = t103.ln_of_both_if::<NEAR>(t95);
-        let t108 = T::one() / t92;
-        let t109 = t108 + T::one();
-        let t113 = t104 * t108;
-        let t114 = self.fixed[11] * t113;
-        let t115 = self.fixed[10] * t109;
-        let t116 = t114 - t115;
-        let t117 = T::one() / t94;
-        let t118 = t117 + T::one();
-        let t119 = t104 * t117;
-        let t120 = self.fixed[11] * t119;
-        let t121 = self.fixed[10] * t118;
-        let t122 = t120 - t121;
-        let t123 = t91 * t116;
-        let t124 = t2 * t123;
-        let t125 = time[1] * t66;
-        let t126 = t125 * t122;
-        let t127 = t124 + t126;
-        let t128 = self.fixed[11] * t104;
-        let t129 = t34 * t127;
-        let t130 = t128 - t129;
-        let t131 = t93 * t122;
-        let t132 = t123 - t131;
-        let t133 = t74 * t34;
-        let t134 = t133 * t132;
-        let t135 = -t134;
-        let t136 = t3 * t123;
-        let t137 = time[1] * t82;
-        let t138 = t137 * t122;
-        let t139 = t136 + t138;
-        let t140 = t34 * t139;
-        let t141 = t128 - t140;
+        let t103 = t102 + t42;
+        let t104 = t103.ln_of_both_if::<NEAR>(t46);
+        let t108 = T::one() / t46;
+        let t109 = t45 * t108;
+        let t110 = t43 * t108;
+        let t111 = t109 + T::one();
+        let t115 = t104 * t109;
+        let t116 = self.fixed[11] * t115;
+        let t117 = self.fixed[10] * t111;
+        let t118 = t116 - t117;
+        let t119 = t110 + T::one();
+        let t120 = t104 * t110;
+        let t121 = self.fixed[11] * t120;
+        let t122 = self.fixed[10] * t119;
+        let t123 = t121 - t122;
+        let t124 = t42 * t118;
+        let t125 = t2 * t124;
+        let t126 = time[1] * t76;
+        let t127 = t126 * t123;
+        let t128 = t125 + t127;
+        let t129 = self.fixed[11] * t104;
+        let t130 = t33 * t128;
+        let t131 = t129 - t130;
+        let t132 = t44 * t123;
+        let t133 = t124 - t132;
+        let t134 = t82 * t33;
+        let t135 = t134 * t133;
+        let t136 = -t135;
+        let t137 = t3 * t124;
+        let t138 = time[1] * t90;
+        let t139 = t138 * t123;
+        let t140 = t137 + t139;
+        let t141 = t33 * t140;
+        let t142 = t129 - t141;
         crate::State {
-            u: crate::nalgebra::SVector::<T, 2>::new(t37, t40),
+            u: crate::nalgebra::SVector::<T, 2>::new(t49, t52),
             v,
-            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t86, t77, t77, t87),
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t130, t135, t135, t141),
+            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t94, t85, t85, t95),
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t131, t136, t136, t142),
         }
     }
 }
