@@ -673,6 +673,18 @@ mod tests {
     }
 
     #[test]
+    fn symbols_are_found_wherever_they_are() {
+        let mut graph = Graph::new();
+        let texts = ["3/2 + Pi", "x*sin(y)^2 + z - z", "1/atan2(w, 2 - x)"];
+        let roots = texts.map(|text| build(&mut graph, text));
+        let whole = graph.whole(roots[1]);
+        let [w, x, y] = ["w", "x", "y"].map(|name| graph.symbol(name));
+        assert_eq!(graph.symbols_in(&roots[..1]), BTreeSet::new());
+        assert_eq!(graph.symbols_in(&[whole]), BTreeSet::from([x, y]));
+        assert_eq!(graph.symbols_in(&roots), BTreeSet::from([w, x, y]));
+    }
+
+    #[test]
     fn depth_is_that_of_the_longest_path() {
         let mut graph = Graph::new();
         let x = graph.symbol("x");
