@@ -214,6 +214,7 @@ mod tests {
         let built = graph.build(&ast, &mut |graph, name| match name {
             "half" => Ok(graph.number(power_of_two(MOST_BITS / 2))),
             "odd" => Ok(graph.number(power_of_two(MOST_BITS / 2) - Rational::one())),
+            "fifth" => Ok(graph.number(power_of_two(MOST_BITS / 5))),
             _ => Ok(graph.symbol(name)),
         });
         built.map(|_| ()).map_err(|error| error.message)
@@ -234,6 +235,10 @@ mod tests {
         fine("x*half/half*1/1*y");
         large("x*half/(3*half)");
         large("half*half");
+        // The coefficients of a sum of several terms stay where they are.
+        let factor = "(fifth*x + y)";
+        fine(&[factor; 6].join("*"));
+        large(&["(fifth*x)"; 6].join("*"));
         // Denominators of terms, though they cancel.
         fine("x/half + y/odd - y/odd");
         large("x/half/2 + y/odd - y/odd");

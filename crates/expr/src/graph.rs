@@ -599,6 +599,8 @@ mod tests {
                 hashes(&|n| build.hash_one((n as isize, 7_u8))),
                 hashes(&|n| build.hash_one((Expr((n >> shift) as u32), "name"))),
                 hashes(&|n| build.hash_one(n.to_string())),
+                hashes(&|n| build.hash_one(Rational::from(n as i64))),
+                hashes(&|n| build.hash_one(Rational::new(1.into(), ((n >> shift) + 1).into()))),
             ] {
                 assert!(different > 2000, "{different} of 4096, shifted by {shift}");
             }
@@ -670,6 +672,26 @@ mod tests {
         let large = Rational::from_integer(num_bigint::BigInt::from(1) << 64_000);
         graph.sum([(large, x)]);
         assert_eq!(graph.work, 1 + 1000);
+    }
+
+    #[test]
+    fn zero_and_one_are_always_there() {
+        let graph = Graph::new();
+        assert!(graph.len() == 2 && !graph.is_empty());
+        assert_eq!(graph.as_number(Graph::ZERO), Some(&0.into()));
+        assert_eq!(graph.as_number(Graph::ONE), Some(&1.into()));
+    }
+
+    #[test]
+    fn symbols_are_found_wherever_they_are() {
+        let mut graph = Graph::new();
+        let texts = ["3/2 + Pi", "x*sin(y)^2 + z - z", "1/atan2(w, 2 - x)"];
+        let roots = texts.map(|text| build(&mut graph, text));
+        let whole = graph.whole(roots[1]);
+        let [w, x, y] = ["w", "x", "y"].map(|name| graph.symbol(name));
+        assert_eq!(graph.symbols_in(&roots[..1]), BTreeSet::new());
+        assert_eq!(graph.symbols_in(&[whole]), BTreeSet::from([x, y]));
+        assert_eq!(graph.symbols_in(&roots), BTreeSet::from([w, x, y]));
     }
 
     #[test]

@@ -382,6 +382,9 @@ mod tests {
             "(sin(a)^2 + cos(a)^2)*sin(a)^9",
             // Shorter as 1 - sin^2, which has lost its digits near a right angle, where this one is looked at.
             "cos(171*a/100)^2*(sin(171*a/100)^2 + cos(171*a/100)^2)^3",
+            // Polynomials in the cosine alone: the sine is within another function.
+            "(cos(a)^2 - 1)*exp(sin(a))",
+            "(sin(a)^2 - 1)*exp(cos(a))",
         ];
         for text in cases {
             let mut graph = Graph::new();
