@@ -109,24 +109,28 @@ impl Program {
         let rate = self.dependence(whole);
         // Each factor after the product that it is a factor of, with that and with the other factor.
         let mut factors: Vec<(Slot, Slot, Slot)> = Vec::new();
+        let mut seen = BTreeSet::new();
         let mut products = vec![whole];
         while let Some(product) = products.pop() {
             let Operation::Mul(a, b) = self.operations()[product.index()] else { continue };
-            if a == b || [a, b].iter().any(|&factor| self.dependence(factor) != rate) {
+            // A product may be a factor of several.
+            if !seen.insert(product)
+                || a == b
+                || [a, b].iter().any(|&factor| self.dependence(factor) != rate)
+            {
                 continue;
             }
             factors.extend([(a, product, b), (b, product, a)]);
             products.extend([a, b]);
         }
+        let known: BTreeSet<Slot> = factors.iter().map(|(factor, ..)| *factor).collect();
         let before = self.needed(&[whole]);
         let needed = self.needed(self.outputs());
         let quotients: BTreeMap<Slot, (Slot, Slot)> = self
             .slots()
             .filter(|slot| needed[slot.index()] && !before[slot.index()])
             .filter_map(|slot| match self.operations()[slot.index()] {
-                Operation::Div(numerator, factor)
-                    if factor == whole || factors.iter().any(|(known, ..)| *known == factor) =>
-                {
+                Operation::Div(numerator, factor) if factor == whole || known.contains(&factor) => {
                     Some((slot, (numerator, factor)))
                 }
                 _ => None,
