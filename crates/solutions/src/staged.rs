@@ -354,7 +354,8 @@ fn body_forces<S, T: Real, const D: usize, const TIME: usize, const POINT: usize
 }
 
 /// Whether all values are finite: if not, a ratio was not near one, or there is no force. As a function of its own, which
-/// tells the compiler that the arrays are in different places.
+/// tells the compiler that the arrays are in different places. Generic instead of taking a closure, which is not always
+/// inlined: the loop then goes point by point.
 #[inline(always)]
 fn spread<const NEAR: bool, S, T: Real, const D: usize, const TIME: usize, const POINT: usize>(
     solution: &S,
