@@ -74,75 +74,56 @@ impl Program {
                         }
                         (Unit::Root, _) => builder.reciprocal(place(base), rate),
                     };
-                    if self.operations()[numerator.index()] == Operation::Number(Rational::one()) {
-                        factor
-                    } else {
-                        let rate = self.dependence(slot);
-                        builder.push(Operation::Mul(place(numerator), factor), rate)
-                    }
+                    let is_one = self.is_one(numerator);
+                    builder.times(place(numerator), is_one, factor, self.dependence(slot))
                 }
                 _ => builder.push(operation.with_operands(place), self.dependence(slot)),
             };
             places[slot.index()] = Some(moved);
         }
         let outputs = self.outputs().iter().filter_map(|slot| places[slot.index()]).collect();
-        Program::from_parts(builder.operations, builder.dependence, outputs).compacted()
+        builder.finish(outputs)
     }
 
-    /// One reciprocal of each product whose logarithm is taken, for the quotients by its factors.
+    fn is_one(&self, slot: Slot) -> bool {
+        self.operations()[slot.index()] == Operation::Number(Rational::one())
+    }
+
+    /// One reciprocal of a product whose logarithm is taken, for the quotients by its factors, in a program without
+    /// operations that no output needs.
     fn with_reciprocals_of_factors(self) -> Program {
-        let needed = self.needed(self.outputs());
-        let logarithms = self.slots().filter(|slot| needed[slot.index()]);
-        let products: BTreeSet<Slot> = logarithms
-            .filter_map(|slot| match self.operations()[slot.index()] {
-                Operation::LnOfBoth(_, product) => Some(product),
-                _ => None,
-            })
-            .collect();
+        let product = |slot: Slot| match self.operations()[slot.index()] {
+            Operation::LnOfBoth(_, product) => Some(product),
+            _ => None,
+        };
+        let products: BTreeSet<Slot> = self.slots().filter_map(product).collect();
         // One is enough: there is one J.
         let cheaper = products.into_iter().find_map(|p| self.with_reciprocals_of_factors_of(p));
         cheaper.unwrap_or(self)
     }
 
-    /// `None` where fewer than two quotients could be spared.
+    /// `None` where quotients divide by fewer than two of the product and its factors.
     fn with_reciprocals_of_factors_of(&self, whole: Slot) -> Option<Program> {
         let rate = self.dependence(whole);
-        // Each factor after the product that it is a factor of, with that and with the other factor.
-        let mut factors: Vec<(Slot, Slot, Slot)> = Vec::new();
-        let mut seen = BTreeSet::new();
-        let mut products = vec![whole];
-        while let Some(product) = products.pop() {
-            let Operation::Mul(a, b) = self.operations()[product.index()] else { continue };
-            // A product may be a factor of several.
-            if !seen.insert(product)
-                || a == b
-                || [a, b].iter().any(|&factor| self.dependence(factor) != rate)
-            {
-                continue;
-            }
-            factors.extend([(a, product, b), (b, product, a)]);
-            products.extend([a, b]);
-        }
-        let known: BTreeSet<Slot> = factors.iter().map(|(factor, ..)| *factor).collect();
+        let factors = self.factors(whole);
+        let divisors: BTreeSet<Slot> =
+            factors.iter().map(|(factor, ..)| *factor).chain([whole]).collect();
         let before = self.needed(&[whole]);
-        let needed = self.needed(self.outputs());
-        let quotients: BTreeMap<Slot, (Slot, Slot)> = self
-            .slots()
-            .filter(|slot| needed[slot.index()] && !before[slot.index()])
-            .filter_map(|slot| match self.operations()[slot.index()] {
-                Operation::Div(numerator, factor) if factor == whole || known.contains(&factor) => {
-                    Some((slot, (numerator, factor)))
-                }
-                _ => None,
-            })
-            .collect();
-        let divisors: BTreeSet<Slot> = quotients.values().map(|(_, factor)| *factor).collect();
-        if divisors.len() < 2 {
+        let quotient = |slot: Slot| match self.operations()[slot.index()] {
+            Operation::Div(numerator, factor)
+                if divisors.contains(&factor) && !before[slot.index()] =>
+            {
+                Some((numerator, factor))
+            }
+            _ => None,
+        };
+        let divided: BTreeSet<Slot> =
+            self.slots().filter_map(quotient).map(|(_, factor)| factor).collect();
+        if divided.len() < 2 {
             return None;
         }
         let mut builder = Builder::default();
         let mut places: Vec<Option<Slot>> = vec![None; self.operations().len()];
-        let one = Operation::Number(Rational::one());
         let mut reciprocals: BTreeMap<Slot, Slot> = BTreeMap::new();
         // What the product needs comes first, since the quotients need it now.
         let first = self.slots().filter(|slot| before[slot.index()]);
@@ -150,29 +131,40 @@ impl Program {
             let operation = &self.operations()[slot.index()];
             let place = |slot: Slot| places[slot.index()].unwrap_or(slot);
             let own = self.dependence(slot);
-            let moved = if let Some(&(numerator, factor)) = quotients.get(&slot) {
+            let moved = if let Some((numerator, factor)) = quotient(slot) {
                 if reciprocals.is_empty() {
                     reciprocals.insert(whole, builder.reciprocal(place(whole), rate));
                     for &(factor, product, other) in &factors {
-                        if let Some(&of_product) = reciprocals.get(&product) {
-                            let of_factor = Operation::Mul(place(other), of_product);
-                            reciprocals.insert(factor, builder.push(of_factor, rate));
-                        }
+                        let of_factor = Operation::Mul(place(other), *reciprocals.get(&product)?);
+                        reciprocals.insert(factor, builder.push(of_factor, rate));
                     }
                 }
                 let reciprocal = *reciprocals.get(&factor)?;
-                if self.operations()[numerator.index()] == one {
-                    reciprocal
-                } else {
-                    builder.push(Operation::Mul(place(numerator), reciprocal), own)
-                }
+                builder.times(place(numerator), self.is_one(numerator), reciprocal, own)
             } else {
                 builder.push(operation.with_operands(place), own)
             };
             places[slot.index()] = Some(moved);
         }
         let outputs = self.outputs().iter().filter_map(|slot| places[slot.index()]).collect();
-        Some(Program::from_parts(builder.operations, builder.dependence, outputs).compacted())
+        Some(builder.finish(outputs))
+    }
+
+    /// The factors of a product, and theirs, as far as they have its rate: each with the product that it is a factor of, which
+    /// comes earlier, and with the other factor.
+    fn factors(&self, whole: Slot) -> Vec<(Slot, Slot, Slot)> {
+        let rate = self.dependence(whole);
+        let (mut factors, mut seen, mut products) = (Vec::new(), BTreeSet::new(), vec![whole]);
+        while let Some(product) = products.pop() {
+            let Operation::Mul(a, b) = self.operations()[product.index()] else { continue };
+            let same_rate = [a, b].iter().all(|&factor| self.dependence(factor) == rate);
+            // A product may be a factor of several.
+            if a != b && same_rate && seen.insert(product) {
+                factors.extend([(a, product, b), (b, product, a)]);
+                products.extend([a, b]);
+            }
+        }
+        factors
     }
 
     /// The quantities that several needed quotients divide by powers of, with the reciprocal to form.
@@ -249,6 +241,16 @@ impl Builder {
         self.dependence.push(dependence);
         self.known.insert(operation, slot);
         slot
+    }
+
+    /// The program of what was pushed, without operations that no output needs.
+    fn finish(self, outputs: Vec<Slot>) -> Program {
+        Program::from_parts(self.operations, self.dependence, outputs).compacted()
+    }
+
+    /// A quotient as the product of its numerator with a reciprocal.
+    fn times(&mut self, numerator: Slot, is_one: bool, reciprocal: Slot, rate: Dependence) -> Slot {
+        if is_one { reciprocal } else { self.push(Operation::Mul(numerator, reciprocal), rate) }
     }
 
     fn reciprocal(&mut self, slot: Slot, rate: Dependence) -> Slot {
