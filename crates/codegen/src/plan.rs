@@ -153,6 +153,7 @@ impl<'a> Plan<'a> {
         ];
         let constants = spec.constants();
         let mut outputs: Vec<Expr> = parts.iter().flat_map(|(.., part)| part.clone()).collect();
+        let staged_places = outputs.len()..outputs.len() + staged.len();
         outputs.extend(&staged);
         outputs.extend(&constants);
         let energy = fields.W;
@@ -160,7 +161,7 @@ impl<'a> Plan<'a> {
         outputs.extend(spec.requirements.iter().flat_map(|r| [r.left, r.right]));
         let surfaces = std::mem::take(&mut fields.surfaces);
         outputs.extend(surfaces.iter().flat_map(|s| &s.traction));
-        let program = fields.program(&outputs);
+        let program = fields.program(&outputs).with_gathered_factors(staged_places);
 
         let mut slots = program.outputs().iter().copied();
         let mut take = |n: usize| slots.by_ref().take(n).collect::<Vec<Slot>>();

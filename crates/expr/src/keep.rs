@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 /// What reading one kept number costs, in additions. A number of eight bytes takes about 0.8 ns from memory at the 10 GB/s
 /// that one core gets while it also computes, and an addition in a vector register of eight about 0.15 ns.
-const KEPT_NUMBER: usize = 5;
+pub(crate) const KEPT_NUMBER: usize = 5;
 
 /// What is kept of each point for its state, at most: 128 bytes in double precision, four times what a step needs of
 /// a particle's position in the plane. Where the cheapest choice is more, some of it is computed anew.

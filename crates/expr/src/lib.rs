@@ -34,6 +34,7 @@ mod build;
 mod cancel;
 mod canonical;
 mod derivative;
+mod gather;
 mod graph;
 mod keep;
 mod log_ratio;

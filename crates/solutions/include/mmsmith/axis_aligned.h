@@ -198,7 +198,7 @@ MMSMITH_FN double mmsmith_ln_of_both(double x, double y)
 enum {
     axis_aligned_dimension = 2,
     axis_aligned_parameter_count = 4,
-    axis_aligned_time_count = 4,
+    axis_aligned_time_count = 10,
     axis_aligned_point_count = 4
 };
 
@@ -217,7 +217,7 @@ typedef struct axis_aligned_solution {
 
 /* What the body force needs of the time alone. */
 typedef struct axis_aligned_time_values {
-    double values[4];
+    double values[10];
 } axis_aligned_time_values;
 
 typedef struct axis_aligned_field_values {
@@ -284,21 +284,21 @@ MMSMITH_FN const char *axis_aligned_prepare(axis_aligned_solution *s, const axis
     const double t87 = t86 * t57;
     const double t88 = t85 / t87;
     const double t115 = t36 / p->rho0;
-    const double t141 = t70 + t50;
-    const double t142 = p->A * p->A;
-    const double t143 = t142 * p->A;
-    const double t144 = t35 * t35;
-    const double t146 = t143 * t144;
-    const double t147 = t146 * t141;
-    const double t148 = t147 / p->rho0;
-    const double t152 = t35 * 3.141592653589793;
-    const double t153 = 2.0 * t142;
-    const double t154 = t153 * t152;
-    const double t155 = t154 * t141;
-    const double t156 = t155 / p->rho0;
-    const double t161 = t37 * p->nu;
-    const double t162 = t161 / t87;
-    const double t190 = 2.0 / t6;
+    const double t140 = t70 + t50;
+    const double t141 = p->A * p->A;
+    const double t142 = t141 * p->A;
+    const double t143 = t35 * t35;
+    const double t144 = t142 * t143;
+    const double t145 = t144 * t140;
+    const double t146 = t145 / p->rho0;
+    const double t147 = t35 * 3.141592653589793;
+    const double t148 = 2.0 * t141;
+    const double t149 = t148 * t147;
+    const double t150 = t149 * t140;
+    const double t151 = t150 / p->rho0;
+    const double t152 = t37 * p->nu;
+    const double t153 = t152 / t87;
+    const double t156 = 2.0 / t6;
     s->par = *p;
     s->fixed[0] = t6;
     s->fixed[1] = t12;
@@ -309,10 +309,10 @@ MMSMITH_FN const char *axis_aligned_prepare(axis_aligned_solution *s, const axis
     s->fixed[6] = t70;
     s->fixed[7] = t88;
     s->fixed[8] = t115;
-    s->fixed[9] = t148;
-    s->fixed[10] = t156;
-    s->fixed[11] = t162;
-    s->fixed[12] = t190;
+    s->fixed[9] = t146;
+    s->fixed[10] = t151;
+    s->fixed[11] = t153;
+    s->fixed[12] = t156;
     return 0;
 }
 
@@ -545,21 +545,21 @@ MMSMITH_FN void axis_aligned_X_lower_traction(const axis_aligned_solution *s, co
     const double t18 = t17 * t16;
     const double t21 = t18 + 1.0;
     const double t60 = t10 * t16;
-    const double t191 = t14 + 1.0;
-    const double t192 = 1.0 / t191;
-    const double t193 = t192 + 1.0;
-    const double t194 = t8 * t21;
-    const double t195 = t194 + t60;
-    const double t196 = s->fixed[1] * t195;
-    const double t197 = t191 * t21;
-    const double t198 = mmsmith_ln_of_both(t196, t197);
-    const double t199 = t8 * t193;
-    const double t200 = s->fixed[5] * t199;
-    const double t201 = s->fixed[6] * t192;
-    const double t202 = t201 * t198;
-    const double t203 = t200 + t202;
-    const double t204 = -t203;
-    traction[0] = t204;
+    const double t157 = t14 + 1.0;
+    const double t158 = 1.0 / t157;
+    const double t159 = t158 + 1.0;
+    const double t160 = t8 * t21;
+    const double t161 = t160 + t60;
+    const double t162 = s->fixed[1] * t161;
+    const double t163 = t157 * t21;
+    const double t164 = mmsmith_ln_of_both(t162, t163);
+    const double t165 = t8 * t159;
+    const double t166 = s->fixed[5] * t165;
+    const double t167 = s->fixed[6] * t158;
+    const double t168 = t167 * t164;
+    const double t169 = t166 + t168;
+    const double t170 = -t169;
+    traction[0] = t170;
     traction[1] = 0.0;
 }
 
@@ -576,22 +576,22 @@ MMSMITH_FN void axis_aligned_X_upper_traction(const axis_aligned_solution *s, co
     const double t18 = t17 * t16;
     const double t21 = t18 + 1.0;
     const double t60 = t10 * t16;
-    const double t194 = t8 * t21;
-    const double t205 = 1.0 - t14;
-    const double t206 = 1.0 / t205;
-    const double t207 = t206 + 1.0;
-    const double t208 = t194 - t60;
-    const double t209 = s->fixed[1] * t208;
-    const double t210 = -t209;
-    const double t211 = t205 * t21;
-    const double t212 = mmsmith_ln_of_both(t210, t211);
-    const double t213 = t8 * t207;
-    const double t214 = s->fixed[5] * t213;
-    const double t215 = s->fixed[6] * t206;
-    const double t216 = t215 * t212;
-    const double t217 = t214 - t216;
-    const double t218 = -t217;
-    traction[0] = t218;
+    const double t160 = t8 * t21;
+    const double t171 = 1.0 - t14;
+    const double t172 = 1.0 / t171;
+    const double t173 = t172 + 1.0;
+    const double t174 = t160 - t60;
+    const double t175 = s->fixed[1] * t174;
+    const double t176 = -t175;
+    const double t177 = t171 * t21;
+    const double t178 = mmsmith_ln_of_both(t176, t177);
+    const double t179 = t8 * t173;
+    const double t180 = s->fixed[5] * t179;
+    const double t181 = s->fixed[6] * t172;
+    const double t182 = t181 * t178;
+    const double t183 = t180 - t182;
+    const double t184 = -t183;
+    traction[0] = t184;
     traction[1] = 0.0;
 }
 
@@ -608,22 +608,22 @@ MMSMITH_FN void axis_aligned_Y_lower_traction(const axis_aligned_solution *s, co
     const double t17 = s->fixed[1] * t10;
     const double t20 = t15 + 1.0;
     const double t91 = t8 * t13;
-    const double t219 = t17 + 1.0;
-    const double t220 = 1.0 / t219;
-    const double t221 = t220 + 1.0;
-    const double t222 = t10 * t20;
-    const double t223 = t222 + t91;
-    const double t224 = s->fixed[1] * t223;
-    const double t225 = t219 * t20;
-    const double t226 = mmsmith_ln_of_both(t224, t225);
-    const double t227 = t10 * t221;
-    const double t228 = s->fixed[5] * t227;
-    const double t229 = s->fixed[6] * t220;
-    const double t230 = t229 * t226;
-    const double t231 = t228 + t230;
-    const double t232 = -t231;
+    const double t185 = t17 + 1.0;
+    const double t186 = 1.0 / t185;
+    const double t187 = t186 + 1.0;
+    const double t188 = t10 * t20;
+    const double t189 = t188 + t91;
+    const double t190 = s->fixed[1] * t189;
+    const double t191 = t185 * t20;
+    const double t192 = mmsmith_ln_of_both(t190, t191);
+    const double t193 = t10 * t187;
+    const double t194 = s->fixed[5] * t193;
+    const double t195 = s->fixed[6] * t186;
+    const double t196 = t195 * t192;
+    const double t197 = t194 + t196;
+    const double t198 = -t197;
     traction[0] = 0.0;
-    traction[1] = t232;
+    traction[1] = t198;
 }
 
 /* traction on the surface Y-upper, force per reference area */
@@ -639,23 +639,23 @@ MMSMITH_FN void axis_aligned_Y_upper_traction(const axis_aligned_solution *s, co
     const double t17 = s->fixed[1] * t10;
     const double t20 = t15 + 1.0;
     const double t91 = t8 * t13;
-    const double t222 = t10 * t20;
-    const double t233 = 1.0 - t17;
-    const double t234 = 1.0 / t233;
-    const double t235 = t234 + 1.0;
-    const double t236 = t222 - t91;
-    const double t237 = s->fixed[1] * t236;
-    const double t238 = -t237;
-    const double t239 = t233 * t20;
-    const double t240 = mmsmith_ln_of_both(t238, t239);
-    const double t241 = t10 * t235;
-    const double t242 = s->fixed[5] * t241;
-    const double t243 = s->fixed[6] * t234;
-    const double t244 = t243 * t240;
-    const double t245 = t242 - t244;
-    const double t246 = -t245;
+    const double t188 = t10 * t20;
+    const double t199 = 1.0 - t17;
+    const double t200 = 1.0 / t199;
+    const double t201 = t200 + 1.0;
+    const double t202 = t188 - t91;
+    const double t203 = s->fixed[1] * t202;
+    const double t204 = -t203;
+    const double t205 = t199 * t20;
+    const double t206 = mmsmith_ln_of_both(t204, t205);
+    const double t207 = t10 * t201;
+    const double t208 = s->fixed[5] * t207;
+    const double t209 = s->fixed[6] * t200;
+    const double t210 = t209 * t206;
+    const double t211 = t208 - t210;
+    const double t212 = -t211;
     traction[0] = 0.0;
-    traction[1] = t246;
+    traction[1] = t212;
 }
 
 /* all fields */
@@ -795,10 +795,28 @@ MMSMITH_FN axis_aligned_time_values axis_aligned_at_time(const axis_aligned_solu
     const double t10 = mmsmith_sin_pi(t7);
     const double t14 = s->fixed[1] * t8;
     const double t17 = s->fixed[1] * t10;
-    time.values[0] = t8;
-    time.values[1] = t10;
-    time.values[2] = t14;
-    time.values[3] = t17;
+    const double t89 = s->fixed[7] * t8;
+    const double t121 = s->fixed[7] * t10;
+    const double t213 = t8 * t8;
+    const double t214 = t213 * t8;
+    const double t215 = s->fixed[9] * t214;
+    const double t217 = s->fixed[10] * t213;
+    const double t223 = s->fixed[11] * t8;
+    const double t229 = t10 * t10;
+    const double t230 = t229 * t10;
+    const double t231 = s->fixed[9] * t230;
+    const double t233 = s->fixed[10] * t229;
+    const double t236 = s->fixed[11] * t10;
+    time.values[0] = t14;
+    time.values[1] = t17;
+    time.values[2] = t89;
+    time.values[3] = t121;
+    time.values[4] = t215;
+    time.values[5] = t217;
+    time.values[6] = t223;
+    time.values[7] = t231;
+    time.values[8] = t233;
+    time.values[9] = t236;
     return time;
 }
 
@@ -822,58 +840,38 @@ MMSMITH_FN void axis_aligned_at_point(const axis_aligned_solution *s, const doub
 MMSMITH_FN void axis_aligned_b_staged(const axis_aligned_solution *s, const axis_aligned_time_values *time,
     const double *point, size_t stride, double b[2])
 {
-    const double t15 = time->values[2] * point[0];
-    const double t18 = time->values[3] * point[stride];
+    (void)s;
+    const double t15 = time->values[0] * point[0];
+    const double t18 = time->values[1] * point[stride];
     const double t20 = t15 + 1.0;
     const double t21 = t18 + 1.0;
     const double t22 = t20 * t21;
     const double t51 = 1.0 / t22;
     const double t52 = t21 * t51;
     const double t53 = t20 * t51;
-    const double t58 = point[0] * t21;
-    const double t59 = time->values[0] * t58;
-    const double t60 = time->values[1] * point[stride];
-    const double t61 = t59 + t60;
-    const double t62 = s->fixed[1] * t61;
-    const double t63 = mmsmith_ln_of_both(t62, t22);
-    const double t140 = s->fixed[7] * point[2 * stride];
-    const double t145 = point[0] * point[0];
-    const double t149 = point[2 * stride] * t145;
-    const double t150 = s->fixed[9] * t149;
-    const double t151 = -t150;
-    const double t157 = point[2 * stride] * point[0];
-    const double t158 = s->fixed[10] * t157;
-    const double t159 = time->values[0] * t151;
-    const double t160 = t159 - t158;
-    const double t163 = s->fixed[11] * point[2 * stride];
-    const double t164 = -t163;
-    const double t165 = time->values[0] * t160;
-    const double t166 = t164 * t63;
-    const double t167 = t165 + t166;
-    const double t168 = t52 * t52;
-    const double t169 = t167 * t168;
-    const double t170 = t140 + t169;
-    const double t171 = time->values[0] * t170;
-    const double t172 = s->fixed[7] * point[3 * stride];
-    const double t173 = point[stride] * point[stride];
-    const double t174 = point[3 * stride] * t173;
-    const double t175 = s->fixed[9] * t174;
-    const double t176 = -t175;
-    const double t177 = point[3 * stride] * point[stride];
-    const double t178 = s->fixed[10] * t177;
-    const double t179 = time->values[1] * t176;
-    const double t180 = t179 - t178;
-    const double t181 = s->fixed[11] * point[3 * stride];
-    const double t182 = -t181;
-    const double t183 = time->values[1] * t180;
-    const double t184 = t182 * t63;
-    const double t185 = t183 + t184;
-    const double t186 = t53 * t53;
-    const double t187 = t185 * t186;
-    const double t188 = t172 + t187;
-    const double t189 = time->values[1] * t188;
-    b[0] = t171;
-    b[1] = t189;
+    const double t154 = t52 * t52;
+    const double t155 = t53 * t53;
+    const double t216 = time->values[4] * point[0];
+    const double t218 = t216 + time->values[5];
+    const double t219 = point[0] * t218;
+    const double t220 = t15 * t21;
+    const double t221 = t220 + t18;
+    const double t222 = mmsmith_ln_of_both(t221, t22);
+    const double t224 = time->values[6] * t222;
+    const double t225 = t219 + t224;
+    const double t226 = t154 * t225;
+    const double t227 = time->values[2] - t226;
+    const double t228 = point[2 * stride] * t227;
+    const double t232 = time->values[7] * point[stride];
+    const double t234 = t232 + time->values[8];
+    const double t235 = point[stride] * t234;
+    const double t237 = time->values[9] * t222;
+    const double t238 = t235 + t237;
+    const double t239 = t155 * t238;
+    const double t240 = time->values[3] - t239;
+    const double t241 = point[3 * stride] * t240;
+    b[0] = t228;
+    b[1] = t241;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -906,58 +904,37 @@ MMSMITH_FN void axis_aligned_b_array(const axis_aligned_solution *s, double t, s
     const size_t end = first + count;
     size_t p;
     for (p = first; p < end; ++p) {
-        const double t15 = time.values[2] * point0[p];
-        const double t18 = time.values[3] * point1[p];
+        const double t15 = time.values[0] * point0[p];
+        const double t18 = time.values[1] * point1[p];
         const double t20 = t15 + 1.0;
         const double t21 = t18 + 1.0;
         const double t22 = t20 * t21;
         const double t51 = 1.0 / t22;
         const double t52 = t21 * t51;
         const double t53 = t20 * t51;
-        const double t58 = point0[p] * t21;
-        const double t59 = time.values[0] * t58;
-        const double t60 = time.values[1] * point1[p];
-        const double t61 = t59 + t60;
-        const double t62 = s->fixed[1] * t61;
-        const double t63 = mmsmith_ln_of_both(t62, t22);
-        const double t140 = s->fixed[7] * point2[p];
-        const double t145 = point0[p] * point0[p];
-        const double t149 = point2[p] * t145;
-        const double t150 = s->fixed[9] * t149;
-        const double t151 = -t150;
-        const double t157 = point2[p] * point0[p];
-        const double t158 = s->fixed[10] * t157;
-        const double t159 = time.values[0] * t151;
-        const double t160 = t159 - t158;
-        const double t163 = s->fixed[11] * point2[p];
-        const double t164 = -t163;
-        const double t165 = time.values[0] * t160;
-        const double t166 = t164 * t63;
-        const double t167 = t165 + t166;
-        const double t168 = t52 * t52;
-        const double t169 = t167 * t168;
-        const double t170 = t140 + t169;
-        const double t171 = time.values[0] * t170;
-        const double t172 = s->fixed[7] * point3[p];
-        const double t173 = point1[p] * point1[p];
-        const double t174 = point3[p] * t173;
-        const double t175 = s->fixed[9] * t174;
-        const double t176 = -t175;
-        const double t177 = point3[p] * point1[p];
-        const double t178 = s->fixed[10] * t177;
-        const double t179 = time.values[1] * t176;
-        const double t180 = t179 - t178;
-        const double t181 = s->fixed[11] * point3[p];
-        const double t182 = -t181;
-        const double t183 = time.values[1] * t180;
-        const double t184 = t182 * t63;
-        const double t185 = t183 + t184;
-        const double t186 = t53 * t53;
-        const double t187 = t185 * t186;
-        const double t188 = t172 + t187;
-        const double t189 = time.values[1] * t188;
-        b[p * 2 + 0] = t171;
-        b[p * 2 + 1] = t189;
+        const double t154 = t52 * t52;
+        const double t155 = t53 * t53;
+        const double t216 = time.values[4] * point0[p];
+        const double t218 = t216 + time.values[5];
+        const double t219 = point0[p] * t218;
+        const double t220 = t15 * t21;
+        const double t221 = t220 + t18;
+        const double t222 = mmsmith_ln_of_both(t221, t22);
+        const double t224 = time.values[6] * t222;
+        const double t225 = t219 + t224;
+        const double t226 = t154 * t225;
+        const double t227 = time.values[2] - t226;
+        const double t228 = point2[p] * t227;
+        const double t232 = time.values[7] * point1[p];
+        const double t234 = t232 + time.values[8];
+        const double t235 = point1[p] * t234;
+        const double t237 = time.values[9] * t222;
+        const double t238 = t235 + t237;
+        const double t239 = t155 * t238;
+        const double t240 = time.values[3] - t239;
+        const double t241 = point3[p] * t240;
+        b[p * 2 + 0] = t228;
+        b[p * 2 + 1] = t241;
     }
 }
 

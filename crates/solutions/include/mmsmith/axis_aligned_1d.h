@@ -195,7 +195,7 @@ MMSMITH_FN double mmsmith_ln_of_both(double x, double y)
 enum {
     axis_aligned_1d_dimension = 1,
     axis_aligned_1d_parameter_count = 4,
-    axis_aligned_1d_time_count = 2,
+    axis_aligned_1d_time_count = 5,
     axis_aligned_1d_point_count = 2
 };
 
@@ -214,7 +214,7 @@ typedef struct axis_aligned_1d_solution {
 
 /* What the body force needs of the time alone. */
 typedef struct axis_aligned_1d_time_values {
-    double values[2];
+    double values[5];
 } axis_aligned_1d_time_values;
 
 typedef struct axis_aligned_1d_field_values {
@@ -283,21 +283,21 @@ MMSMITH_FN const char *axis_aligned_1d_prepare(axis_aligned_1d_solution *s, cons
     const double t68 = 2.0 * t35;
     const double t69 = t48 + t68;
     const double t81 = t14 / p->rho0;
-    const double t87 = t48 + t35;
-    const double t88 = p->A * p->A;
-    const double t89 = t88 * p->A;
-    const double t90 = t19 * t19;
-    const double t92 = t89 * t90;
-    const double t93 = t92 * t87;
-    const double t94 = t93 / p->rho0;
-    const double t98 = t19 * 3.141592653589793;
-    const double t99 = 2.0 * t88;
-    const double t100 = t99 * t98;
-    const double t101 = t100 * t87;
-    const double t102 = t101 / p->rho0;
-    const double t107 = t21 * p->nu;
-    const double t108 = t107 / t58;
-    const double t118 = 2.0 / t7;
+    const double t86 = t48 + t35;
+    const double t87 = p->A * p->A;
+    const double t88 = t87 * p->A;
+    const double t89 = t19 * t19;
+    const double t90 = t88 * t89;
+    const double t91 = t90 * t86;
+    const double t92 = t91 / p->rho0;
+    const double t93 = t19 * 3.141592653589793;
+    const double t94 = 2.0 * t87;
+    const double t95 = t94 * t93;
+    const double t96 = t95 * t86;
+    const double t97 = t96 / p->rho0;
+    const double t98 = t21 * p->nu;
+    const double t99 = t98 / t58;
+    const double t101 = 2.0 / t7;
     s->par = *p;
     s->fixed[0] = t7;
     s->fixed[1] = t14;
@@ -310,10 +310,10 @@ MMSMITH_FN const char *axis_aligned_1d_prepare(axis_aligned_1d_solution *s, cons
     s->fixed[8] = t59;
     s->fixed[9] = t69;
     s->fixed[10] = t81;
-    s->fixed[11] = t94;
-    s->fixed[12] = t102;
-    s->fixed[13] = t108;
-    s->fixed[14] = t118;
+    s->fixed[11] = t92;
+    s->fixed[12] = t97;
+    s->fixed[13] = t99;
+    s->fixed[14] = t101;
     return 0;
 }
 
@@ -456,17 +456,17 @@ MMSMITH_FN void axis_aligned_1d_X_lower_traction(const axis_aligned_1d_solution 
     const double t8 = s->fixed[0] * t;
     const double t9 = mmsmith_cos_pi(t8);
     const double t27 = s->fixed[1] * t9;
-    const double t120 = t27 + 1.0;
-    const double t121 = 1.0 / t120;
-    const double t122 = t121 + 1.0;
-    const double t123 = mmsmith_log_1p(t27);
-    const double t124 = t9 * t122;
-    const double t125 = s->fixed[6] * t124;
-    const double t126 = t123 * t121;
-    const double t127 = s->fixed[7] * t126;
-    const double t128 = t125 + t127;
-    const double t129 = -t128;
-    traction[0] = t129;
+    const double t103 = t27 + 1.0;
+    const double t104 = 1.0 / t103;
+    const double t105 = t104 + 1.0;
+    const double t106 = mmsmith_log_1p(t27);
+    const double t107 = t9 * t105;
+    const double t108 = s->fixed[6] * t107;
+    const double t109 = t106 * t104;
+    const double t110 = s->fixed[7] * t109;
+    const double t111 = t108 + t110;
+    const double t112 = -t111;
+    traction[0] = t112;
 }
 
 /* traction on the surface X-upper, force per reference area */
@@ -477,18 +477,18 @@ MMSMITH_FN void axis_aligned_1d_X_upper_traction(const axis_aligned_1d_solution 
     const double t8 = s->fixed[0] * t;
     const double t9 = mmsmith_cos_pi(t8);
     const double t27 = s->fixed[1] * t9;
-    const double t130 = 1.0 - t27;
-    const double t131 = 1.0 / t130;
-    const double t132 = t131 + 1.0;
-    const double t133 = -t27;
-    const double t134 = mmsmith_log_1p(t133);
-    const double t135 = t9 * t132;
-    const double t136 = s->fixed[6] * t135;
-    const double t137 = t134 * t131;
-    const double t138 = s->fixed[7] * t137;
-    const double t139 = t136 - t138;
-    const double t140 = -t139;
-    traction[0] = t140;
+    const double t113 = 1.0 - t27;
+    const double t114 = 1.0 / t113;
+    const double t115 = t114 + 1.0;
+    const double t116 = -t27;
+    const double t117 = mmsmith_log_1p(t116);
+    const double t118 = t9 * t115;
+    const double t119 = s->fixed[6] * t118;
+    const double t120 = t117 * t114;
+    const double t121 = s->fixed[7] * t120;
+    const double t122 = t119 - t121;
+    const double t123 = -t122;
+    traction[0] = t123;
 }
 
 /* all fields */
@@ -559,8 +559,17 @@ MMSMITH_FN axis_aligned_1d_time_values axis_aligned_1d_at_time(const axis_aligne
     const double t8 = s->fixed[0] * t;
     const double t9 = mmsmith_cos_pi(t8);
     const double t27 = s->fixed[1] * t9;
-    time.values[0] = t9;
-    time.values[1] = t27;
+    const double t60 = s->fixed[8] * t9;
+    const double t124 = t9 * t9;
+    const double t125 = t124 * t9;
+    const double t126 = s->fixed[11] * t125;
+    const double t128 = s->fixed[12] * t124;
+    const double t131 = s->fixed[13] * t9;
+    time.values[0] = t27;
+    time.values[1] = t60;
+    time.values[2] = t126;
+    time.values[3] = t128;
+    time.values[4] = t131;
     return time;
 }
 
@@ -580,29 +589,21 @@ MMSMITH_FN void axis_aligned_1d_at_point(const axis_aligned_1d_solution *s, cons
 MMSMITH_FN void axis_aligned_1d_b_staged(const axis_aligned_1d_solution *s, const axis_aligned_1d_time_values *time,
     const double *point, size_t stride, double b[1])
 {
-    const double t28 = time->values[1] * point[stride];
+    (void)s;
+    const double t28 = time->values[0] * point[stride];
     const double t30 = t28 + 1.0;
     const double t36 = 1.0 / t30;
     const double t41 = mmsmith_log_1p(t28);
-    const double t86 = s->fixed[8] * point[0];
-    const double t91 = point[stride] * point[stride];
-    const double t95 = point[0] * t91;
-    const double t96 = s->fixed[11] * t95;
-    const double t97 = -t96;
-    const double t103 = point[0] * point[stride];
-    const double t104 = s->fixed[12] * t103;
-    const double t105 = time->values[0] * t97;
-    const double t106 = t105 - t104;
-    const double t109 = s->fixed[13] * point[0];
-    const double t110 = -t109;
-    const double t111 = time->values[0] * t106;
-    const double t112 = t110 * t41;
-    const double t113 = t111 + t112;
-    const double t114 = t36 * t36;
-    const double t115 = t113 * t114;
-    const double t116 = t86 + t115;
-    const double t117 = time->values[0] * t116;
-    b[0] = t117;
+    const double t100 = t36 * t36;
+    const double t127 = time->values[2] * point[stride];
+    const double t129 = t127 + time->values[3];
+    const double t130 = point[stride] * t129;
+    const double t132 = time->values[4] * t41;
+    const double t133 = t130 + t132;
+    const double t134 = t100 * t133;
+    const double t135 = time->values[1] - t134;
+    const double t136 = point[0] * t135;
+    b[0] = t136;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -633,29 +634,20 @@ MMSMITH_FN void axis_aligned_1d_b_array(const axis_aligned_1d_solution *s, doubl
     const size_t end = first + count;
     size_t p;
     for (p = first; p < end; ++p) {
-        const double t28 = time.values[1] * point1[p];
+        const double t28 = time.values[0] * point1[p];
         const double t30 = t28 + 1.0;
         const double t36 = 1.0 / t30;
         const double t41 = mmsmith_log_1p(t28);
-        const double t86 = s->fixed[8] * point0[p];
-        const double t91 = point1[p] * point1[p];
-        const double t95 = point0[p] * t91;
-        const double t96 = s->fixed[11] * t95;
-        const double t97 = -t96;
-        const double t103 = point0[p] * point1[p];
-        const double t104 = s->fixed[12] * t103;
-        const double t105 = time.values[0] * t97;
-        const double t106 = t105 - t104;
-        const double t109 = s->fixed[13] * point0[p];
-        const double t110 = -t109;
-        const double t111 = time.values[0] * t106;
-        const double t112 = t110 * t41;
-        const double t113 = t111 + t112;
-        const double t114 = t36 * t36;
-        const double t115 = t113 * t114;
-        const double t116 = t86 + t115;
-        const double t117 = time.values[0] * t116;
-        b[p * 1 + 0] = t117;
+        const double t100 = t36 * t36;
+        const double t127 = time.values[2] * point1[p];
+        const double t129 = t127 + time.values[3];
+        const double t130 = point1[p] * t129;
+        const double t132 = time.values[4] * t41;
+        const double t133 = t130 + t132;
+        const double t134 = t100 * t133;
+        const double t135 = time.values[1] - t134;
+        const double t136 = point0[p] * t135;
+        b[p * 1 + 0] = t136;
     }
 }
 

@@ -191,7 +191,7 @@ MMSMITH_FN double mmsmith_ln_of_both(double x, double y)
 enum {
     bar_dimension = 1,
     bar_parameter_count = 5,
-    bar_time_count = 2,
+    bar_time_count = 5,
     bar_point_count = 2
 };
 
@@ -211,7 +211,7 @@ typedef struct bar_solution {
 
 /* What the body force needs of the time alone. */
 typedef struct bar_time_values {
-    double values[2];
+    double values[5];
 } bar_time_values;
 
 typedef struct bar_field_values {
@@ -291,36 +291,36 @@ MMSMITH_FN const char *bar_prepare(bar_solution *s, const bar_parameters *p)
     const double t71 = t70 * t26;
     const double t72 = t71 / t25;
     const double t88 = 1.0 / p->rho0;
-    const double t94 = t56 + t46;
-    const double t96 = p->A * p->A;
-    const double t97 = t96 * p->A;
-    const double t98 = t25 * t25;
-    const double t99 = t26 * t26;
-    const double t101 = 16.0 * t97;
-    const double t102 = t101 * t99;
-    const double t103 = t102 * t94;
-    const double t104 = p->rho0 * t98;
-    const double t105 = t103 / t104;
-    const double t109 = t25 * p->L;
-    const double t110 = t26 * 3.141592653589793;
-    const double t111 = 16.0 * t96;
-    const double t112 = t111 * t110;
-    const double t113 = t112 * t94;
-    const double t114 = p->rho0 * t109;
-    const double t115 = t113 / t114;
-    const double t120 = t70 * p->E;
-    const double t121 = t120 * p->nu;
-    const double t122 = t121 * t26;
-    const double t123 = t29 * t43;
-    const double t124 = t123 * t50;
-    const double t125 = t122 / t124;
-    const double t135 = 2.0 * p->L;
-    const double t136 = t135 / t11;
-    const double t138 = -t36;
+    const double t93 = t56 + t46;
+    const double t95 = p->A * p->A;
+    const double t96 = t95 * p->A;
+    const double t97 = t25 * t25;
+    const double t98 = t26 * t26;
+    const double t99 = 16.0 * t96;
+    const double t100 = t99 * t98;
+    const double t101 = t100 * t93;
+    const double t102 = p->rho0 * t97;
+    const double t103 = t101 / t102;
+    const double t104 = t25 * p->L;
+    const double t105 = t26 * 3.141592653589793;
+    const double t106 = 16.0 * t95;
+    const double t107 = t106 * t105;
+    const double t108 = t107 * t93;
+    const double t109 = p->rho0 * t104;
+    const double t110 = t108 / t109;
+    const double t111 = t70 * p->E;
+    const double t112 = t111 * p->nu;
+    const double t113 = t112 * t26;
+    const double t114 = t29 * t43;
+    const double t115 = t114 * t50;
+    const double t116 = t113 / t115;
+    const double t118 = 2.0 * p->L;
+    const double t119 = t118 / t11;
+    const double t121 = -t36;
     if (!(t36 < p->L)) {
         return "the parameters of bar must satisfy 2*Pi*A < L";
     }
-    if (!(t138 < p->L)) {
+    if (!(t121 < p->L)) {
         return "the parameters of bar must satisfy -2*Pi*A < L";
     }
     s->par = *p;
@@ -336,11 +336,11 @@ MMSMITH_FN const char *bar_prepare(bar_solution *s, const bar_parameters *p)
     s->fixed[9] = t67;
     s->fixed[10] = t72;
     s->fixed[11] = t88;
-    s->fixed[12] = t105;
-    s->fixed[13] = t115;
-    s->fixed[14] = t125;
-    s->fixed[15] = t136;
-    s->fixed[16] = t138;
+    s->fixed[12] = t103;
+    s->fixed[13] = t110;
+    s->fixed[14] = t116;
+    s->fixed[15] = t119;
+    s->fixed[16] = t121;
     return 0;
 }
 
@@ -486,17 +486,17 @@ MMSMITH_FN void bar_X_lower_traction(const bar_solution *s, const double X[1], d
     const double t13 = s->fixed[2] * t;
     const double t14 = mmsmith_cos_pi(t13);
     const double t38 = s->fixed[6] * t14;
-    const double t139 = t38 + 1.0;
-    const double t140 = 1.0 / t139;
-    const double t141 = t140 + 1.0;
-    const double t142 = mmsmith_log_1p(t38);
-    const double t143 = t38 * t141;
-    const double t144 = s->fixed[7] * t143;
-    const double t145 = t142 * t140;
-    const double t146 = s->fixed[8] * t145;
-    const double t147 = t144 + t146;
-    const double t148 = -t147;
-    traction[0] = t148;
+    const double t122 = t38 + 1.0;
+    const double t123 = 1.0 / t122;
+    const double t124 = t123 + 1.0;
+    const double t125 = mmsmith_log_1p(t38);
+    const double t126 = t38 * t124;
+    const double t127 = s->fixed[7] * t126;
+    const double t128 = t125 * t123;
+    const double t129 = s->fixed[8] * t128;
+    const double t130 = t127 + t129;
+    const double t131 = -t130;
+    traction[0] = t131;
 }
 
 /* traction on the surface X-upper, force per reference area */
@@ -507,16 +507,16 @@ MMSMITH_FN void bar_X_upper_traction(const bar_solution *s, const double X[1], d
     const double t13 = s->fixed[2] * t;
     const double t14 = mmsmith_cos_pi(t13);
     const double t38 = s->fixed[6] * t14;
-    const double t139 = t38 + 1.0;
-    const double t140 = 1.0 / t139;
-    const double t141 = t140 + 1.0;
-    const double t142 = mmsmith_log_1p(t38);
-    const double t143 = t38 * t141;
-    const double t144 = s->fixed[7] * t143;
-    const double t145 = t142 * t140;
-    const double t146 = s->fixed[8] * t145;
-    const double t147 = t144 + t146;
-    traction[0] = t147;
+    const double t122 = t38 + 1.0;
+    const double t123 = 1.0 / t122;
+    const double t124 = t123 + 1.0;
+    const double t125 = mmsmith_log_1p(t38);
+    const double t126 = t38 * t124;
+    const double t127 = s->fixed[7] * t126;
+    const double t128 = t125 * t123;
+    const double t129 = s->fixed[8] * t128;
+    const double t130 = t127 + t129;
+    traction[0] = t130;
 }
 
 /* all fields */
@@ -585,8 +585,17 @@ MMSMITH_FN bar_time_values bar_at_time(const bar_solution *s, double t)
     const double t13 = s->fixed[2] * t;
     const double t14 = mmsmith_cos_pi(t13);
     const double t38 = s->fixed[6] * t14;
-    time.values[0] = t14;
-    time.values[1] = t38;
+    const double t68 = s->fixed[9] * t14;
+    const double t132 = t14 * t14;
+    const double t133 = t132 * t14;
+    const double t134 = s->fixed[12] * t133;
+    const double t136 = s->fixed[13] * t132;
+    const double t139 = s->fixed[14] * t14;
+    time.values[0] = t38;
+    time.values[1] = t68;
+    time.values[2] = t134;
+    time.values[3] = t136;
+    time.values[4] = t139;
     return time;
 }
 
@@ -606,29 +615,22 @@ MMSMITH_FN void bar_at_point(const bar_solution *s, const double X[1], double po
 MMSMITH_FN void bar_b_staged(const bar_solution *s, const bar_time_values *time,
     const double *point, size_t stride, double b[1])
 {
-    const double t39 = time->values[1] * point[stride];
+    (void)s;
+    const double t39 = time->values[0] * point[stride];
     const double t41 = t39 + 1.0;
     const double t47 = 1.0 / t41;
     const double t51 = mmsmith_log_1p(t39);
-    const double t93 = s->fixed[9] * point[0];
-    const double t100 = point[stride] * point[stride];
-    const double t106 = point[0] * t100;
-    const double t107 = s->fixed[12] * t106;
-    const double t108 = -t107;
-    const double t116 = point[0] * point[stride];
-    const double t117 = s->fixed[13] * t116;
-    const double t118 = time->values[0] * t108;
-    const double t119 = t118 - t117;
-    const double t126 = s->fixed[14] * point[0];
-    const double t127 = -t126;
-    const double t128 = time->values[0] * t119;
-    const double t129 = t127 * t51;
-    const double t130 = t128 + t129;
-    const double t131 = t47 * t47;
-    const double t132 = t130 * t131;
-    const double t133 = t132 - t93;
-    const double t134 = time->values[0] * t133;
-    b[0] = t134;
+    const double t117 = t47 * t47;
+    const double t135 = time->values[2] * point[stride];
+    const double t137 = t135 + time->values[3];
+    const double t138 = point[stride] * t137;
+    const double t140 = time->values[4] * t51;
+    const double t141 = t138 + t140;
+    const double t142 = t117 * t141;
+    const double t143 = t142 + time->values[1];
+    const double t144 = point[0] * t143;
+    const double t145 = -t144;
+    b[0] = t145;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -659,29 +661,21 @@ MMSMITH_FN void bar_b_array(const bar_solution *s, double t, size_t n,
     const size_t end = first + count;
     size_t p;
     for (p = first; p < end; ++p) {
-        const double t39 = time.values[1] * point1[p];
+        const double t39 = time.values[0] * point1[p];
         const double t41 = t39 + 1.0;
         const double t47 = 1.0 / t41;
         const double t51 = mmsmith_log_1p(t39);
-        const double t93 = s->fixed[9] * point0[p];
-        const double t100 = point1[p] * point1[p];
-        const double t106 = point0[p] * t100;
-        const double t107 = s->fixed[12] * t106;
-        const double t108 = -t107;
-        const double t116 = point0[p] * point1[p];
-        const double t117 = s->fixed[13] * t116;
-        const double t118 = time.values[0] * t108;
-        const double t119 = t118 - t117;
-        const double t126 = s->fixed[14] * point0[p];
-        const double t127 = -t126;
-        const double t128 = time.values[0] * t119;
-        const double t129 = t127 * t51;
-        const double t130 = t128 + t129;
-        const double t131 = t47 * t47;
-        const double t132 = t130 * t131;
-        const double t133 = t132 - t93;
-        const double t134 = time.values[0] * t133;
-        b[p * 1 + 0] = t134;
+        const double t117 = t47 * t47;
+        const double t135 = time.values[2] * point1[p];
+        const double t137 = t135 + time.values[3];
+        const double t138 = point1[p] * t137;
+        const double t140 = time.values[4] * t51;
+        const double t141 = t138 + t140;
+        const double t142 = t117 * t141;
+        const double t143 = t142 + time.values[1];
+        const double t144 = point0[p] * t143;
+        const double t145 = -t144;
+        b[p * 1 + 0] = t145;
     }
 }
 

@@ -145,7 +145,7 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
 enum {
     rigid_motion_dimension = 2,
     rigid_motion_parameter_count = 5,
-    rigid_motion_time_count = 5,
+    rigid_motion_time_count = 7,
     rigid_motion_point_count = 2
 };
 
@@ -160,12 +160,12 @@ typedef struct rigid_motion_parameters {
 /* The parameters, and the values that depend on them only. */
 typedef struct rigid_motion_solution {
     rigid_motion_parameters par;
-    double fixed[11];
+    double fixed[14];
 } rigid_motion_solution;
 
 /* What the body force needs of the time alone. */
 typedef struct rigid_motion_time_values {
-    double values[5];
+    double values[7];
 } rigid_motion_time_values;
 
 typedef struct rigid_motion_field_values {
@@ -223,16 +223,19 @@ MMSMITH_FN const char *rigid_motion_prepare(rigid_motion_solution *s, const rigi
     const double t62 = p->A * p->E;
     const double t63 = t62 * t53;
     const double t64 = t63 / p->rho0;
-    const double t75 = -t55;
-    const double t77 = 2.0 / t5;
-    const double t79 = p->nu + 1.0;
-    const double t80 = 2.0 * p->nu;
-    const double t81 = 1.0 - t80;
-    const double t82 = p->E * p->nu;
-    const double t83 = t79 * t81;
-    const double t84 = t82 / t83;
-    const double t85 = 0.5 * p->E;
-    const double t86 = t85 / t79;
+    const double t75 = 2.0 / t5;
+    const double t77 = p->nu + 1.0;
+    const double t78 = 2.0 * p->nu;
+    const double t79 = 1.0 - t78;
+    const double t80 = p->E * p->nu;
+    const double t81 = t77 * t79;
+    const double t82 = t80 / t81;
+    const double t83 = 0.5 * p->E;
+    const double t84 = t83 / t77;
+    const double t85 = p->U * t55;
+    const double t88 = p->A * t55;
+    const double t93 = t48 * t55;
+    const double t100 = p->A * t64;
     s->par = *p;
     s->fixed[0] = t5;
     s->fixed[1] = t9;
@@ -242,9 +245,12 @@ MMSMITH_FN const char *rigid_motion_prepare(rigid_motion_solution *s, const rigi
     s->fixed[5] = t55;
     s->fixed[6] = t64;
     s->fixed[7] = t75;
-    s->fixed[8] = t77;
+    s->fixed[8] = t82;
     s->fixed[9] = t84;
-    s->fixed[10] = t86;
+    s->fixed[10] = t85;
+    s->fixed[11] = t88;
+    s->fixed[12] = t93;
+    s->fixed[13] = t100;
     return 0;
 }
 
@@ -576,13 +582,21 @@ MMSMITH_FN rigid_motion_time_values rigid_motion_at_time(const rigid_motion_solu
     const double t14 = cos(t10);
     const double t30 = mmsmith_cos_pi(t6);
     const double t49 = t30 * t30;
-    const double t50 = s->fixed[4] * t49;
-    const double t59 = s->par.A * t49;
-    time.values[0] = t7;
-    time.values[1] = t11;
-    time.values[2] = t14;
-    time.values[3] = t50;
-    time.values[4] = t59;
+    const double t86 = s->fixed[10] * t7;
+    const double t87 = -t86;
+    const double t89 = s->fixed[11] * t7;
+    const double t90 = -t89;
+    const double t94 = s->fixed[12] * t49;
+    const double t95 = -t94;
+    const double t98 = s->fixed[6] * t7;
+    const double t101 = s->fixed[13] * t49;
+    time.values[0] = t11;
+    time.values[1] = t14;
+    time.values[2] = t87;
+    time.values[3] = t90;
+    time.values[4] = t95;
+    time.values[5] = t98;
+    time.values[6] = t101;
     return time;
 }
 
@@ -600,30 +614,28 @@ MMSMITH_FN void rigid_motion_at_point(const rigid_motion_solution *s, const doub
 MMSMITH_FN void rigid_motion_b_staged(const rigid_motion_solution *s, const rigid_motion_time_values *time,
     const double *point, size_t stride, double b[2])
 {
-    const double t15 = time->values[1] * point[0];
-    const double t16 = time->values[2] * point[stride];
+    (void)s;
+    const double t15 = time->values[0] * point[0];
+    const double t16 = time->values[1] * point[stride];
     const double t17 = t15 + t16;
-    const double t25 = time->values[2] * point[0];
-    const double t26 = time->values[1] * point[stride];
+    const double t25 = time->values[1] * point[0];
+    const double t26 = time->values[0] * point[stride];
     const double t27 = t25 - t26;
-    const double t31 = time->values[1] * t27;
-    const double t32 = time->values[2] * t17;
+    const double t31 = time->values[0] * t27;
+    const double t32 = time->values[1] * t17;
     const double t33 = t31 + t32;
-    const double t34 = s->par.A * t33;
-    const double t35 = s->par.U - t34;
-    const double t39 = time->values[1] * t17;
-    const double t40 = time->values[2] * t27;
+    const double t39 = time->values[0] * t17;
+    const double t40 = time->values[1] * t27;
     const double t41 = t39 - t40;
-    const double t47 = time->values[0] * t35;
-    const double t51 = time->values[3] * t41;
-    const double t52 = t47 - t51;
-    const double t58 = time->values[0] * t41;
-    const double t60 = time->values[4] * t33;
-    const double t61 = t58 - t60;
-    const double t65 = s->fixed[6] * t61;
-    const double t76 = s->fixed[7] * t52;
-    b[0] = t76;
-    b[1] = t65;
+    const double t91 = time->values[3] * t33;
+    const double t92 = time->values[2] - t91;
+    const double t96 = time->values[4] * t41;
+    const double t97 = t92 - t96;
+    const double t99 = time->values[5] * t41;
+    const double t102 = time->values[6] * t33;
+    const double t103 = t99 - t102;
+    b[0] = t97;
+    b[1] = t103;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -654,30 +666,27 @@ MMSMITH_FN void rigid_motion_b_array(const rigid_motion_solution *s, double t, s
     const size_t end = first + count;
     size_t p;
     for (p = first; p < end; ++p) {
-        const double t15 = time.values[1] * point0[p];
-        const double t16 = time.values[2] * point1[p];
+        const double t15 = time.values[0] * point0[p];
+        const double t16 = time.values[1] * point1[p];
         const double t17 = t15 + t16;
-        const double t25 = time.values[2] * point0[p];
-        const double t26 = time.values[1] * point1[p];
+        const double t25 = time.values[1] * point0[p];
+        const double t26 = time.values[0] * point1[p];
         const double t27 = t25 - t26;
-        const double t31 = time.values[1] * t27;
-        const double t32 = time.values[2] * t17;
+        const double t31 = time.values[0] * t27;
+        const double t32 = time.values[1] * t17;
         const double t33 = t31 + t32;
-        const double t34 = s->par.A * t33;
-        const double t35 = s->par.U - t34;
-        const double t39 = time.values[1] * t17;
-        const double t40 = time.values[2] * t27;
+        const double t39 = time.values[0] * t17;
+        const double t40 = time.values[1] * t27;
         const double t41 = t39 - t40;
-        const double t47 = time.values[0] * t35;
-        const double t51 = time.values[3] * t41;
-        const double t52 = t47 - t51;
-        const double t58 = time.values[0] * t41;
-        const double t60 = time.values[4] * t33;
-        const double t61 = t58 - t60;
-        const double t65 = s->fixed[6] * t61;
-        const double t76 = s->fixed[7] * t52;
-        b[p * 2 + 0] = t76;
-        b[p * 2 + 1] = t65;
+        const double t91 = time.values[3] * t33;
+        const double t92 = time.values[2] - t91;
+        const double t96 = time.values[4] * t41;
+        const double t97 = t92 - t96;
+        const double t99 = time.values[5] * t41;
+        const double t102 = time.values[6] * t33;
+        const double t103 = t99 - t102;
+        b[p * 2 + 0] = t97;
+        b[p * 2 + 1] = t103;
     }
 }
 
@@ -703,19 +712,19 @@ MMSMITH_FN double rigid_motion_wave_speed(const rigid_motion_solution *s)
 /* the time in which the motion repeats */
 MMSMITH_FN double rigid_motion_period(const rigid_motion_solution *s)
 {
-    return s->fixed[8];
+    return s->fixed[7];
 }
 
 /* first Lame constant */
 MMSMITH_FN double rigid_motion_lambda(const rigid_motion_solution *s)
 {
-    return s->fixed[9];
+    return s->fixed[8];
 }
 
 /* shear modulus */
 MMSMITH_FN double rigid_motion_mu(const rigid_motion_solution *s)
 {
-    return s->fixed[10];
+    return s->fixed[9];
 }
 
 /* the body's corner of smallest coordinates */

@@ -323,25 +323,25 @@ MMSMITH_FN const char *ring_nu_prepare(ring_nu_solution *s, const ring_nu_parame
     const double t288 = 12.0 * t107;
     const double t289 = t288 / t26;
     const double t301 = t219 / p->rho0;
-    const double t307 = t63 * p->nu;
-    const double t308 = p->rho0 * t97;
-    const double t309 = t308 * t99;
-    const double t310 = t307 / t309;
-    const double t323 = 2.0 / t11;
-    const double t324 = p->Ri - p->Ro;
-    const double t325 = t324 * t324;
-    const double t326 = t325 * t324;
-    const double t327 = t326 / t26;
-    const double t328 = 1.0 - t327;
-    const double t329 = p->A * t328;
-    const double t330 = t329 / p->Ri;
-    const double t334 = p->Ri * t97;
-    const double t335 = t334 * t99;
-    const double t336 = t112 / t335;
-    const double t342 = p->A / p->Ro;
-    const double t346 = p->Ro * t97;
-    const double t347 = t346 * t99;
-    const double t348 = t112 / t347;
+    const double t304 = t63 * p->nu;
+    const double t305 = p->rho0 * t97;
+    const double t306 = t305 * t99;
+    const double t307 = t304 / t306;
+    const double t312 = 2.0 / t11;
+    const double t313 = p->Ri - p->Ro;
+    const double t314 = t313 * t313;
+    const double t315 = t314 * t313;
+    const double t316 = t315 / t26;
+    const double t317 = 1.0 - t316;
+    const double t318 = p->A * t317;
+    const double t319 = t318 / p->Ri;
+    const double t323 = p->Ri * t97;
+    const double t324 = t323 * t99;
+    const double t325 = t112 / t324;
+    const double t331 = p->A / p->Ro;
+    const double t335 = p->Ro * t97;
+    const double t336 = t335 * t99;
+    const double t337 = t112 / t336;
     if (!(p->Ri < p->Ro)) {
         return "the parameters of ring-nu must satisfy Ri < Ro";
     }
@@ -373,12 +373,12 @@ MMSMITH_FN const char *ring_nu_prepare(ring_nu_solution *s, const ring_nu_parame
     s->fixed[21] = t284;
     s->fixed[22] = t289;
     s->fixed[23] = t301;
-    s->fixed[24] = t310;
-    s->fixed[25] = t323;
-    s->fixed[26] = t330;
-    s->fixed[27] = t336;
-    s->fixed[28] = t342;
-    s->fixed[29] = t348;
+    s->fixed[24] = t307;
+    s->fixed[25] = t312;
+    s->fixed[26] = t319;
+    s->fixed[27] = t325;
+    s->fixed[28] = t331;
+    s->fixed[29] = t337;
     return 0;
 }
 
@@ -783,16 +783,16 @@ MMSMITH_FN void ring_nu_inner_traction(const ring_nu_solution *s, const double X
 {
     const double t12 = s->fixed[0] * t;
     const double t13 = mmsmith_cos_pi(t12);
-    const double t331 = s->fixed[26] * t13;
-    const double t332 = t331 + 1.0;
-    const double t333 = mmsmith_ln_of_both(t331, t332);
-    const double t337 = s->fixed[27] * t333;
-    const double t338 = t337 * X[0];
-    const double t339 = -t338;
-    const double t340 = t337 * X[1];
-    const double t341 = -t340;
-    traction[0] = t339;
-    traction[1] = t341;
+    const double t320 = s->fixed[26] * t13;
+    const double t321 = t320 + 1.0;
+    const double t322 = mmsmith_ln_of_both(t320, t321);
+    const double t326 = s->fixed[27] * t322;
+    const double t327 = t326 * X[0];
+    const double t328 = -t327;
+    const double t329 = t326 * X[1];
+    const double t330 = -t329;
+    traction[0] = t328;
+    traction[1] = t330;
 }
 
 /* traction on the surface outer, force per reference area */
@@ -801,14 +801,14 @@ MMSMITH_FN void ring_nu_outer_traction(const ring_nu_solution *s, const double X
 {
     const double t12 = s->fixed[0] * t;
     const double t13 = mmsmith_cos_pi(t12);
-    const double t343 = s->fixed[28] * t13;
-    const double t344 = t343 + 1.0;
-    const double t345 = mmsmith_ln_of_both(t343, t344);
-    const double t349 = s->fixed[29] * t345;
-    const double t350 = t349 * X[0];
-    const double t351 = t349 * X[1];
-    traction[0] = t350;
-    traction[1] = t351;
+    const double t332 = s->fixed[28] * t13;
+    const double t333 = t332 + 1.0;
+    const double t334 = mmsmith_ln_of_both(t332, t333);
+    const double t338 = s->fixed[29] * t334;
+    const double t339 = t338 * X[0];
+    const double t340 = t338 * X[1];
+    traction[0] = t339;
+    traction[1] = t340;
 }
 
 /* traction on the surface X-lower, force per reference area */
@@ -854,13 +854,13 @@ MMSMITH_FN void ring_nu_X_lower_traction(const ring_nu_solution *s, const double
     const double t122 = s->fixed[10] * t119;
     const double t123 = t121 - t122;
     const double t129 = s->fixed[11] * t104;
-    const double t352 = t33 * t34;
-    const double t353 = t75 * t352;
-    const double t354 = t32 * t353;
-    const double t355 = t354 * t123;
-    const double t356 = t129 - t355;
-    const double t357 = -t356;
-    traction[0] = t357;
+    const double t341 = t33 * t34;
+    const double t342 = t75 * t341;
+    const double t343 = t32 * t342;
+    const double t344 = t343 * t123;
+    const double t345 = t129 - t344;
+    const double t346 = -t345;
+    traction[0] = t346;
     traction[1] = 0.0;
 }
 
@@ -907,14 +907,14 @@ MMSMITH_FN void ring_nu_Y_lower_traction(const ring_nu_solution *s, const double
     const double t122 = s->fixed[10] * t119;
     const double t123 = t121 - t122;
     const double t129 = s->fixed[11] * t104;
-    const double t352 = t33 * t34;
-    const double t359 = t89 * t352;
-    const double t360 = t32 * t359;
-    const double t361 = t360 * t123;
-    const double t362 = t129 - t361;
-    const double t363 = -t362;
+    const double t341 = t33 * t34;
+    const double t348 = t89 * t341;
+    const double t349 = t32 * t348;
+    const double t350 = t349 * t123;
+    const double t351 = t129 - t350;
+    const double t352 = -t351;
     traction[0] = 0.0;
-    traction[1] = t363;
+    traction[1] = t352;
 }
 
 /* all fields */
@@ -1211,8 +1211,8 @@ MMSMITH_FN void ring_nu_at_point(const ring_nu_solution *s, const double X[2], d
     const double t299 = t295 + t297;
     const double t300 = t299 + t298;
     const double t302 = s->fixed[23] * t300;
-    const double t311 = s->fixed[24] * t147;
-    const double t321 = X[1] * t34;
+    const double t308 = s->fixed[24] * t147;
+    const double t311 = X[1] * t34;
     point[0] = t37;
     point[1] = t38;
     point[2] = t207;
@@ -1221,8 +1221,8 @@ MMSMITH_FN void ring_nu_at_point(const ring_nu_solution *s, const double X[2], d
     point[5] = t276;
     point[6] = t285;
     point[7] = t302;
-    point[8] = t311;
-    point[9] = t321;
+    point[8] = t308;
+    point[9] = t311;
 }
 
 /* The body force from the values of one time and of one point. Value m of the point is point[m*stride]:
@@ -1231,34 +1231,34 @@ MMSMITH_FN void ring_nu_at_point(const ring_nu_solution *s, const double X[2], d
 MMSMITH_FN void ring_nu_b_staged(const ring_nu_solution *s, const ring_nu_time_values *time,
     const double *point, size_t stride, double b[2])
 {
+    (void)s;
     const double t42 = time->values[2] * point[0];
     const double t43 = t42 + 1.0;
     const double t44 = time->values[1] * point[stride];
     const double t45 = t44 + 1.0;
     const double t46 = t43 * t45;
-    const double t100 = time->values[0] * point[stride];
-    const double t101 = t100 * t43;
-    const double t102 = s->par.A * t101;
-    const double t103 = t102 + t42;
-    const double t104 = mmsmith_ln_of_both(t103, t46);
     const double t277 = time->values[0] * point[4 * stride];
     const double t278 = point[5 * stride] + t277;
     const double t303 = time->values[0] * t278;
-    const double t304 = point[6 * stride] * t104;
-    const double t305 = t303 + t304;
-    const double t306 = point[7 * stride] + t305;
-    const double t312 = time->values[0] * t306;
-    const double t313 = point[8 * stride] * t104;
-    const double t314 = t312 + t313;
-    const double t315 = t43 * t43;
-    const double t316 = t315 * t45;
-    const double t317 = t314 / t316;
-    const double t318 = t317 - point[3 * stride];
-    const double t319 = time->values[0] * t318;
-    const double t320 = point[2 * stride] * t319;
-    const double t322 = point[9 * stride] * t319;
-    b[0] = t320;
-    b[1] = t322;
+    const double t309 = t43 * t43;
+    const double t310 = t309 * t45;
+    const double t353 = t44 * t43;
+    const double t354 = t353 + t42;
+    const double t355 = mmsmith_ln_of_both(t354, t46);
+    const double t356 = point[6 * stride] * t355;
+    const double t357 = t303 + t356;
+    const double t358 = point[7 * stride] + t357;
+    const double t359 = time->values[0] * t358;
+    const double t360 = point[8 * stride] * t355;
+    const double t361 = t359 + t360;
+    const double t362 = t361 / t310;
+    const double t363 = t362 - point[3 * stride];
+    const double t364 = time->values[0] * point[2 * stride];
+    const double t365 = t364 * t363;
+    const double t366 = time->values[0] * point[9 * stride];
+    const double t367 = t366 * t363;
+    b[0] = t365;
+    b[1] = t367;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -1302,29 +1302,28 @@ MMSMITH_FN void ring_nu_b_array(const ring_nu_solution *s, double t, size_t n,
         const double t44 = time.values[1] * point1[p];
         const double t45 = t44 + 1.0;
         const double t46 = t43 * t45;
-        const double t100 = time.values[0] * point1[p];
-        const double t101 = t100 * t43;
-        const double t102 = s->par.A * t101;
-        const double t103 = t102 + t42;
-        const double t104 = mmsmith_ln_of_both(t103, t46);
         const double t277 = time.values[0] * point4[p];
         const double t278 = point5[p] + t277;
         const double t303 = time.values[0] * t278;
-        const double t304 = point6[p] * t104;
-        const double t305 = t303 + t304;
-        const double t306 = point7[p] + t305;
-        const double t312 = time.values[0] * t306;
-        const double t313 = point8[p] * t104;
-        const double t314 = t312 + t313;
-        const double t315 = t43 * t43;
-        const double t316 = t315 * t45;
-        const double t317 = t314 / t316;
-        const double t318 = t317 - point3[p];
-        const double t319 = time.values[0] * t318;
-        const double t320 = point2[p] * t319;
-        const double t322 = point9[p] * t319;
-        b[p * 2 + 0] = t320;
-        b[p * 2 + 1] = t322;
+        const double t309 = t43 * t43;
+        const double t310 = t309 * t45;
+        const double t353 = t44 * t43;
+        const double t354 = t353 + t42;
+        const double t355 = mmsmith_ln_of_both(t354, t46);
+        const double t356 = point6[p] * t355;
+        const double t357 = t303 + t356;
+        const double t358 = point7[p] + t357;
+        const double t359 = time.values[0] * t358;
+        const double t360 = point8[p] * t355;
+        const double t361 = t359 + t360;
+        const double t362 = t361 / t310;
+        const double t363 = t362 - point3[p];
+        const double t364 = time.values[0] * point2[p];
+        const double t365 = t364 * t363;
+        const double t366 = time.values[0] * point9[p];
+        const double t367 = t366 * t363;
+        b[p * 2 + 0] = t365;
+        b[p * 2 + 1] = t367;
     }
 }
 

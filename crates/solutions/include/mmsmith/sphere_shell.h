@@ -199,7 +199,7 @@ MMSMITH_FN double mmsmith_ln_of_both(double x, double y)
 enum {
     sphere_shell_dimension = 3,
     sphere_shell_parameter_count = 6,
-    sphere_shell_time_count = 4,
+    sphere_shell_time_count = 5,
     sphere_shell_point_count = 12
 };
 
@@ -220,7 +220,7 @@ typedef struct sphere_shell_solution {
 
 /* What the body force needs of the time alone. */
 typedef struct sphere_shell_time_values {
-    double values[4];
+    double values[5];
 } sphere_shell_time_values;
 
 typedef struct sphere_shell_field_values {
@@ -332,37 +332,37 @@ MMSMITH_FN const char *sphere_shell_prepare(sphere_shell_solution *s, const sphe
     const double t319 = t315 / t318;
     const double t333 = 2.0 * t127;
     const double t334 = t333 / t316;
-    const double t341 = 4.0 * p->A;
-    const double t342 = t341 * p->E;
-    const double t343 = t342 * p->nu;
-    const double t344 = t48 * t114;
-    const double t345 = t344 * t116;
-    const double t346 = t343 / t345;
-    const double t361 = 2.0 / t16;
-    const double t363 = p->Ri / p->Ro;
-    const double t364 = 1.0 - t363;
-    const double t365 = t103 * p->Ri;
-    const double t366 = t365 * t364;
-    const double t367 = t366 / t11;
-    const double t372 = 2.0 * p->Ri;
-    const double t373 = t372 / p->Ro;
-    const double t374 = 3.0 - t373;
-    const double t376 = t119 * p->Ri;
-    const double t377 = t376 * t374;
-    const double t378 = t377 / t11;
-    const double t381 = p->Ri * p->Ri;
-    const double t382 = t374 * t374;
-    const double t383 = t127 * t381;
-    const double t384 = t383 * t382;
-    const double t385 = t384 / t128;
-    const double t389 = p->A * p->Ri;
-    const double t390 = t389 * t374;
-    const double t391 = t390 / t11;
-    const double t402 = 1.0 / p->Ri;
-    const double t410 = p->A / p->Ro;
-    const double t418 = p->Ro * t114;
-    const double t419 = t418 * t116;
-    const double t420 = t139 / t419;
+    const double t338 = 4.0 * p->A;
+    const double t339 = t338 * p->E;
+    const double t340 = t339 * p->nu;
+    const double t341 = t48 * t114;
+    const double t342 = t341 * t116;
+    const double t343 = t340 / t342;
+    const double t349 = 2.0 / t16;
+    const double t351 = p->Ri / p->Ro;
+    const double t352 = 1.0 - t351;
+    const double t353 = t103 * p->Ri;
+    const double t354 = t353 * t352;
+    const double t355 = t354 / t11;
+    const double t360 = 2.0 * p->Ri;
+    const double t361 = t360 / p->Ro;
+    const double t362 = 3.0 - t361;
+    const double t364 = t119 * p->Ri;
+    const double t365 = t364 * t362;
+    const double t366 = t365 / t11;
+    const double t369 = p->Ri * p->Ri;
+    const double t370 = t362 * t362;
+    const double t371 = t127 * t369;
+    const double t372 = t371 * t370;
+    const double t373 = t372 / t128;
+    const double t377 = p->A * p->Ri;
+    const double t378 = t377 * t362;
+    const double t379 = t378 / t11;
+    const double t390 = 1.0 / p->Ri;
+    const double t398 = p->A / p->Ro;
+    const double t406 = p->Ro * t114;
+    const double t407 = t406 * t116;
+    const double t408 = t139 / t407;
     if (!(p->Ri < p->Ro)) {
         return "the parameters of sphere-shell must satisfy Ri < Ro";
     }
@@ -390,15 +390,15 @@ MMSMITH_FN const char *sphere_shell_prepare(sphere_shell_solution *s, const sphe
     s->fixed[20] = t307;
     s->fixed[21] = t319;
     s->fixed[22] = t334;
-    s->fixed[23] = t346;
-    s->fixed[24] = t361;
-    s->fixed[25] = t367;
-    s->fixed[26] = t378;
-    s->fixed[27] = t385;
-    s->fixed[28] = t391;
-    s->fixed[29] = t402;
-    s->fixed[30] = t410;
-    s->fixed[31] = t420;
+    s->fixed[23] = t343;
+    s->fixed[24] = t349;
+    s->fixed[25] = t355;
+    s->fixed[26] = t366;
+    s->fixed[27] = t373;
+    s->fixed[28] = t379;
+    s->fixed[29] = t390;
+    s->fixed[30] = t398;
+    s->fixed[31] = t408;
     return 0;
 }
 
@@ -852,36 +852,36 @@ MMSMITH_FN void sphere_shell_inner_traction(const sphere_shell_solution *s, cons
     const double t17 = s->fixed[0] * t;
     const double t18 = mmsmith_cos_pi(t17);
     const double t122 = t18 * t18;
-    const double t368 = s->fixed[25] * t18;
-    const double t369 = t368 + 1.0;
-    const double t370 = 1.0 / t369;
-    const double t371 = t370 + 1.0;
-    const double t375 = t18 * t369;
-    const double t379 = s->fixed[26] * t375;
-    const double t380 = t122 * t369;
-    const double t386 = s->fixed[27] * t380;
-    const double t387 = t379 + t386;
-    const double t388 = t387 + t368;
-    const double t392 = s->fixed[28] * t18;
-    const double t393 = t392 + 1.0;
-    const double t394 = t393 * t393;
-    const double t395 = t369 * t394;
-    const double t396 = mmsmith_ln_of_both(t388, t395);
-    const double t397 = t368 * t371;
-    const double t398 = s->fixed[11] * t397;
-    const double t399 = t396 * t370;
-    const double t400 = s->fixed[12] * t399;
-    const double t401 = t398 + t400;
-    const double t403 = s->fixed[29] * t401;
-    const double t404 = t403 * X[0];
-    const double t405 = -t404;
-    const double t406 = t403 * X[1];
-    const double t407 = -t406;
-    const double t408 = t403 * X[2];
-    const double t409 = -t408;
-    traction[0] = t405;
-    traction[1] = t407;
-    traction[2] = t409;
+    const double t356 = s->fixed[25] * t18;
+    const double t357 = t356 + 1.0;
+    const double t358 = 1.0 / t357;
+    const double t359 = t358 + 1.0;
+    const double t363 = t18 * t357;
+    const double t367 = s->fixed[26] * t363;
+    const double t368 = t122 * t357;
+    const double t374 = s->fixed[27] * t368;
+    const double t375 = t367 + t374;
+    const double t376 = t375 + t356;
+    const double t380 = s->fixed[28] * t18;
+    const double t381 = t380 + 1.0;
+    const double t382 = t381 * t381;
+    const double t383 = t357 * t382;
+    const double t384 = mmsmith_ln_of_both(t376, t383);
+    const double t385 = t356 * t359;
+    const double t386 = s->fixed[11] * t385;
+    const double t387 = t384 * t358;
+    const double t388 = s->fixed[12] * t387;
+    const double t389 = t386 + t388;
+    const double t391 = s->fixed[29] * t389;
+    const double t392 = t391 * X[0];
+    const double t393 = -t392;
+    const double t394 = t391 * X[1];
+    const double t395 = -t394;
+    const double t396 = t391 * X[2];
+    const double t397 = -t396;
+    traction[0] = t393;
+    traction[1] = t395;
+    traction[2] = t397;
 }
 
 /* traction on the surface outer, force per reference area */
@@ -890,20 +890,20 @@ MMSMITH_FN void sphere_shell_outer_traction(const sphere_shell_solution *s, cons
 {
     const double t17 = s->fixed[0] * t;
     const double t18 = mmsmith_cos_pi(t17);
-    const double t411 = s->fixed[30] * t18;
-    const double t412 = t411 + 2.0;
-    const double t413 = t18 * t412;
-    const double t414 = s->fixed[30] * t413;
-    const double t415 = t411 + 1.0;
-    const double t416 = t415 * t415;
-    const double t417 = mmsmith_ln_of_both(t414, t416);
-    const double t421 = s->fixed[31] * t417;
-    const double t422 = t421 * X[0];
-    const double t423 = t421 * X[1];
-    const double t424 = t421 * X[2];
-    traction[0] = t422;
-    traction[1] = t423;
-    traction[2] = t424;
+    const double t399 = s->fixed[30] * t18;
+    const double t400 = t399 + 2.0;
+    const double t401 = t18 * t400;
+    const double t402 = s->fixed[30] * t401;
+    const double t403 = t399 + 1.0;
+    const double t404 = t403 * t403;
+    const double t405 = mmsmith_ln_of_both(t402, t404);
+    const double t409 = s->fixed[31] * t405;
+    const double t410 = t409 * X[0];
+    const double t411 = t409 * X[1];
+    const double t412 = t409 * X[2];
+    traction[0] = t410;
+    traction[1] = t411;
+    traction[2] = t412;
 }
 
 /* traction on the surface X-lower, force per reference area */
@@ -954,12 +954,12 @@ MMSMITH_FN void sphere_shell_X_lower_traction(const sphere_shell_solution *s, co
     const double t150 = s->fixed[11] * t147;
     const double t151 = t149 - t150;
     const double t158 = s->fixed[12] * t133;
-    const double t425 = t64 * t67;
-    const double t426 = t25 * t425;
-    const double t427 = t426 * t151;
-    const double t428 = t158 - t427;
-    const double t429 = -t428;
-    traction[0] = t429;
+    const double t413 = t64 * t67;
+    const double t414 = t25 * t413;
+    const double t415 = t414 * t151;
+    const double t416 = t158 - t415;
+    const double t417 = -t416;
+    traction[0] = t417;
     traction[1] = 0.0;
     traction[2] = 0.0;
 }
@@ -1013,13 +1013,13 @@ MMSMITH_FN void sphere_shell_Y_lower_traction(const sphere_shell_solution *s, co
     const double t150 = s->fixed[11] * t147;
     const double t151 = t149 - t150;
     const double t158 = s->fixed[12] * t133;
-    const double t431 = t85 * t67;
-    const double t432 = t25 * t431;
-    const double t433 = t432 * t151;
-    const double t434 = t158 - t433;
-    const double t435 = -t434;
+    const double t419 = t85 * t67;
+    const double t420 = t25 * t419;
+    const double t421 = t420 * t151;
+    const double t422 = t158 - t421;
+    const double t423 = -t422;
     traction[0] = 0.0;
-    traction[1] = t435;
+    traction[1] = t423;
     traction[2] = 0.0;
 }
 
@@ -1072,14 +1072,14 @@ MMSMITH_FN void sphere_shell_Z_lower_traction(const sphere_shell_solution *s, co
     const double t150 = s->fixed[11] * t147;
     const double t151 = t149 - t150;
     const double t158 = s->fixed[12] * t133;
-    const double t436 = t96 * t67;
-    const double t437 = t25 * t436;
-    const double t438 = t437 * t151;
-    const double t439 = t158 - t438;
-    const double t440 = -t439;
+    const double t424 = t96 * t67;
+    const double t425 = t25 * t424;
+    const double t426 = t425 * t151;
+    const double t427 = t158 - t426;
+    const double t428 = -t427;
     traction[0] = 0.0;
     traction[1] = 0.0;
-    traction[2] = t440;
+    traction[2] = t428;
 }
 
 /* all fields */
@@ -1337,10 +1337,13 @@ MMSMITH_FN sphere_shell_time_values sphere_shell_at_time(const sphere_shell_solu
     const double t25 = s->fixed[2] * t18;
     const double t105 = s->fixed[8] * t18;
     const double t122 = t18 * t18;
+    const double t222 = s->fixed[9] * t18;
+    const double t430 = s->fixed[10] * t122;
     time.values[0] = t18;
     time.values[1] = t25;
     time.values[2] = t105;
-    time.values[3] = t122;
+    time.values[3] = t222;
+    time.values[4] = t430;
     return time;
 }
 
@@ -1422,9 +1425,9 @@ MMSMITH_FN void sphere_shell_at_point(const sphere_shell_solution *s, const doub
     const double t332 = t331 + t330;
     const double t335 = t8 * t332;
     const double t336 = s->fixed[22] * t335;
-    const double t347 = s->fixed[23] * t191;
-    const double t357 = X[1] * t67;
-    const double t359 = X[2] * t67;
+    const double t344 = s->fixed[23] * t191;
+    const double t347 = X[1] * t67;
+    const double t348 = X[2] * t67;
     point[0] = t26;
     point[1] = t106;
     point[2] = t124;
@@ -1434,9 +1437,9 @@ MMSMITH_FN void sphere_shell_at_point(const sphere_shell_solution *s, const doub
     point[6] = t310;
     point[7] = t321;
     point[8] = t336;
-    point[9] = t347;
-    point[10] = t357;
-    point[11] = t359;
+    point[9] = t344;
+    point[10] = t347;
+    point[11] = t348;
 }
 
 /* The body force from the values of one time and of one point. Value m of the point is point[m*stride]:
@@ -1445,41 +1448,41 @@ MMSMITH_FN void sphere_shell_at_point(const sphere_shell_solution *s, const doub
 MMSMITH_FN void sphere_shell_b_staged(const sphere_shell_solution *s, const sphere_shell_time_values *time,
     const double *point, size_t stride, double b[3])
 {
+    (void)s;
     const double t107 = time->values[2] * point[stride];
     const double t108 = t107 + 1.0;
     const double t109 = time->values[1] * point[0];
     const double t110 = t109 + 1.0;
     const double t111 = t110 * t110;
     const double t112 = t108 * t111;
-    const double t117 = time->values[0] * point[0];
-    const double t118 = t117 * t108;
-    const double t121 = s->fixed[9] * t118;
-    const double t125 = time->values[3] * point[2 * stride];
-    const double t126 = t125 * t108;
-    const double t130 = s->fixed[10] * t126;
-    const double t131 = t121 + t130;
-    const double t132 = t131 + t107;
-    const double t133 = mmsmith_ln_of_both(t132, t112);
     const double t311 = time->values[0] * point[5 * stride];
     const double t312 = point[6 * stride] + t311;
     const double t337 = time->values[0] * t312;
-    const double t338 = point[7 * stride] * t133;
-    const double t339 = t337 + t338;
-    const double t340 = point[8 * stride] + t339;
-    const double t348 = time->values[0] * t340;
-    const double t349 = point[9 * stride] * t133;
-    const double t350 = t348 + t349;
-    const double t351 = t108 * t108;
-    const double t352 = t351 * t110;
-    const double t353 = t350 / t352;
-    const double t354 = t353 - point[4 * stride];
-    const double t355 = time->values[0] * t354;
-    const double t356 = point[3 * stride] * t355;
-    const double t358 = point[10 * stride] * t355;
-    const double t360 = point[11 * stride] * t355;
-    b[0] = t356;
-    b[1] = t358;
-    b[2] = t360;
+    const double t345 = t108 * t108;
+    const double t346 = t345 * t110;
+    const double t429 = time->values[3] * point[0];
+    const double t431 = time->values[4] * point[2 * stride];
+    const double t432 = t429 + t431;
+    const double t433 = t108 * t432;
+    const double t434 = t433 + t107;
+    const double t435 = mmsmith_ln_of_both(t434, t112);
+    const double t436 = point[7 * stride] * t435;
+    const double t437 = t337 + t436;
+    const double t438 = point[8 * stride] + t437;
+    const double t439 = time->values[0] * t438;
+    const double t440 = point[9 * stride] * t435;
+    const double t441 = t439 + t440;
+    const double t442 = t441 / t346;
+    const double t443 = t442 - point[4 * stride];
+    const double t444 = time->values[0] * point[3 * stride];
+    const double t445 = t444 * t443;
+    const double t446 = time->values[0] * point[10 * stride];
+    const double t447 = t446 * t443;
+    const double t448 = time->values[0] * point[11 * stride];
+    const double t449 = t448 * t443;
+    b[0] = t445;
+    b[1] = t447;
+    b[2] = t449;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -1526,35 +1529,34 @@ MMSMITH_FN void sphere_shell_b_array(const sphere_shell_solution *s, double t, s
         const double t110 = t109 + 1.0;
         const double t111 = t110 * t110;
         const double t112 = t108 * t111;
-        const double t117 = time.values[0] * point0[p];
-        const double t118 = t117 * t108;
-        const double t121 = s->fixed[9] * t118;
-        const double t125 = time.values[3] * point2[p];
-        const double t126 = t125 * t108;
-        const double t130 = s->fixed[10] * t126;
-        const double t131 = t121 + t130;
-        const double t132 = t131 + t107;
-        const double t133 = mmsmith_ln_of_both(t132, t112);
         const double t311 = time.values[0] * point5[p];
         const double t312 = point6[p] + t311;
         const double t337 = time.values[0] * t312;
-        const double t338 = point7[p] * t133;
-        const double t339 = t337 + t338;
-        const double t340 = point8[p] + t339;
-        const double t348 = time.values[0] * t340;
-        const double t349 = point9[p] * t133;
-        const double t350 = t348 + t349;
-        const double t351 = t108 * t108;
-        const double t352 = t351 * t110;
-        const double t353 = t350 / t352;
-        const double t354 = t353 - point4[p];
-        const double t355 = time.values[0] * t354;
-        const double t356 = point3[p] * t355;
-        const double t358 = point10[p] * t355;
-        const double t360 = point11[p] * t355;
-        b[p * 3 + 0] = t356;
-        b[p * 3 + 1] = t358;
-        b[p * 3 + 2] = t360;
+        const double t345 = t108 * t108;
+        const double t346 = t345 * t110;
+        const double t429 = time.values[3] * point0[p];
+        const double t431 = time.values[4] * point2[p];
+        const double t432 = t429 + t431;
+        const double t433 = t108 * t432;
+        const double t434 = t433 + t107;
+        const double t435 = mmsmith_ln_of_both(t434, t112);
+        const double t436 = point7[p] * t435;
+        const double t437 = t337 + t436;
+        const double t438 = point8[p] + t437;
+        const double t439 = time.values[0] * t438;
+        const double t440 = point9[p] * t435;
+        const double t441 = t439 + t440;
+        const double t442 = t441 / t346;
+        const double t443 = t442 - point4[p];
+        const double t444 = time.values[0] * point3[p];
+        const double t445 = t444 * t443;
+        const double t446 = time.values[0] * point10[p];
+        const double t447 = t446 * t443;
+        const double t448 = time.values[0] * point11[p];
+        const double t449 = t448 * t443;
+        b[p * 3 + 0] = t445;
+        b[p * 3 + 1] = t447;
+        b[p * 3 + 2] = t449;
     }
 }
 

@@ -139,24 +139,24 @@ impl<T: crate::Real> AxisAligned<T> {
         let t87 = t86 * t57;
         let t88 = t85 / t87;
         let t115 = t36 / parameters.rho0;
-        let t141 = t70 + t50;
-        let t142 = parameters.A * parameters.A;
-        let t143 = t142 * parameters.A;
-        let t144 = t35 * t35;
-        let t146 = t143 * t144;
-        let t147 = t146 * t141;
-        let t148 = t147 / parameters.rho0;
-        let t152 = t35 * T::pi();
-        let t153 = T::nearest(2.0) * t142;
-        let t154 = t153 * t152;
-        let t155 = t154 * t141;
-        let t156 = t155 / parameters.rho0;
-        let t161 = t37 * parameters.nu;
-        let t162 = t161 / t87;
-        let t190 = T::nearest(2.0) / t6;
+        let t140 = t70 + t50;
+        let t141 = parameters.A * parameters.A;
+        let t142 = t141 * parameters.A;
+        let t143 = t35 * t35;
+        let t144 = t142 * t143;
+        let t145 = t144 * t140;
+        let t146 = t145 / parameters.rho0;
+        let t147 = t35 * T::pi();
+        let t148 = T::nearest(2.0) * t141;
+        let t149 = t148 * t147;
+        let t150 = t149 * t140;
+        let t151 = t150 / parameters.rho0;
+        let t152 = t37 * parameters.nu;
+        let t153 = t152 / t87;
+        let t156 = T::nearest(2.0) / t6;
         Ok(AxisAligned {
             parameters,
-            fixed: [t6, t12, t29, t38, t50, t64, t70, t88, t115, t148, t156, t162, t190],
+            fixed: [t6, t12, t29, t38, t50, t64, t70, t88, t115, t146, t151, t153, t156],
         })
     }
     /// The solution with parameter values in the order of the description; missing ones take their
@@ -535,21 +535,21 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t18 = t17 * t16;
                 let t21 = t18 + T::one();
                 let t60 = t10 * t16;
-                let t191 = t14 + T::one();
-                let t192 = T::one() / t191;
-                let t193 = t192 + T::one();
-                let t194 = t8 * t21;
-                let t195 = t194 + t60;
-                let t196 = self.fixed[1] * t195;
-                let t197 = t191 * t21;
-                let t198 = t196.ln_of_both(t197);
-                let t199 = t8 * t193;
-                let t200 = self.fixed[5] * t199;
-                let t201 = self.fixed[6] * t192;
-                let t202 = t201 * t198;
-                let t203 = t200 + t202;
-                let t204 = -t203;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t204, T::zero()))
+                let t157 = t14 + T::one();
+                let t158 = T::one() / t157;
+                let t159 = t158 + T::one();
+                let t160 = t8 * t21;
+                let t161 = t160 + t60;
+                let t162 = self.fixed[1] * t161;
+                let t163 = t157 * t21;
+                let t164 = t162.ln_of_both(t163);
+                let t165 = t8 * t159;
+                let t166 = self.fixed[5] * t165;
+                let t167 = self.fixed[6] * t158;
+                let t168 = t167 * t164;
+                let t169 = t166 + t168;
+                let t170 = -t169;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t170, T::zero()))
             }
             crate::Surface::Upper(0) => {
                 let t7 = self.fixed[0] * t;
@@ -561,22 +561,22 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t18 = t17 * t16;
                 let t21 = t18 + T::one();
                 let t60 = t10 * t16;
-                let t194 = t8 * t21;
-                let t205 = T::one() - t14;
-                let t206 = T::one() / t205;
-                let t207 = t206 + T::one();
-                let t208 = t194 - t60;
-                let t209 = self.fixed[1] * t208;
-                let t210 = -t209;
-                let t211 = t205 * t21;
-                let t212 = t210.ln_of_both(t211);
-                let t213 = t8 * t207;
-                let t214 = self.fixed[5] * t213;
-                let t215 = self.fixed[6] * t206;
-                let t216 = t215 * t212;
-                let t217 = t214 - t216;
-                let t218 = -t217;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t218, T::zero()))
+                let t160 = t8 * t21;
+                let t171 = T::one() - t14;
+                let t172 = T::one() / t171;
+                let t173 = t172 + T::one();
+                let t174 = t160 - t60;
+                let t175 = self.fixed[1] * t174;
+                let t176 = -t175;
+                let t177 = t171 * t21;
+                let t178 = t176.ln_of_both(t177);
+                let t179 = t8 * t173;
+                let t180 = self.fixed[5] * t179;
+                let t181 = self.fixed[6] * t172;
+                let t182 = t181 * t178;
+                let t183 = t180 - t182;
+                let t184 = -t183;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t184, T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t7 = self.fixed[0] * t;
@@ -588,21 +588,21 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t17 = self.fixed[1] * t10;
                 let t20 = t15 + T::one();
                 let t91 = t8 * t13;
-                let t219 = t17 + T::one();
-                let t220 = T::one() / t219;
-                let t221 = t220 + T::one();
-                let t222 = t10 * t20;
-                let t223 = t222 + t91;
-                let t224 = self.fixed[1] * t223;
-                let t225 = t219 * t20;
-                let t226 = t224.ln_of_both(t225);
-                let t227 = t10 * t221;
-                let t228 = self.fixed[5] * t227;
-                let t229 = self.fixed[6] * t220;
-                let t230 = t229 * t226;
-                let t231 = t228 + t230;
-                let t232 = -t231;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t232))
+                let t185 = t17 + T::one();
+                let t186 = T::one() / t185;
+                let t187 = t186 + T::one();
+                let t188 = t10 * t20;
+                let t189 = t188 + t91;
+                let t190 = self.fixed[1] * t189;
+                let t191 = t185 * t20;
+                let t192 = t190.ln_of_both(t191);
+                let t193 = t10 * t187;
+                let t194 = self.fixed[5] * t193;
+                let t195 = self.fixed[6] * t186;
+                let t196 = t195 * t192;
+                let t197 = t194 + t196;
+                let t198 = -t197;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t198))
             }
             crate::Surface::Upper(1) => {
                 let t7 = self.fixed[0] * t;
@@ -614,22 +614,22 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t17 = self.fixed[1] * t10;
                 let t20 = t15 + T::one();
                 let t91 = t8 * t13;
-                let t222 = t10 * t20;
-                let t233 = T::one() - t17;
-                let t234 = T::one() / t233;
-                let t235 = t234 + T::one();
-                let t236 = t222 - t91;
-                let t237 = self.fixed[1] * t236;
-                let t238 = -t237;
-                let t239 = t233 * t20;
-                let t240 = t238.ln_of_both(t239);
-                let t241 = t10 * t235;
-                let t242 = self.fixed[5] * t241;
-                let t243 = self.fixed[6] * t234;
-                let t244 = t243 * t240;
-                let t245 = t242 - t244;
-                let t246 = -t245;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t246))
+                let t188 = t10 * t20;
+                let t199 = T::one() - t17;
+                let t200 = T::one() / t199;
+                let t201 = t200 + T::one();
+                let t202 = t188 - t91;
+                let t203 = self.fixed[1] * t202;
+                let t204 = -t203;
+                let t205 = t199 * t20;
+                let t206 = t204.ln_of_both(t205);
+                let t207 = t10 * t201;
+                let t208 = self.fixed[5] * t207;
+                let t209 = self.fixed[6] * t200;
+                let t210 = t209 * t206;
+                let t211 = t208 - t210;
+                let t212 = -t211;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t212))
             }
             _ => None,
         }
@@ -682,7 +682,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 4, 4>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 10, 4>::new(*self, X))
     }
     fn state_at(
         &self,
@@ -692,15 +692,27 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 2, 4, 4> for AxisAligned<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 2, 10, 4> for AxisAligned<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 4] {
+    fn body_force_time(&self, t: T) -> [T; 10] {
         let t7 = self.fixed[0] * t;
         let t8 = t7.cos_pi();
         let t10 = t7.sin_pi();
         let t14 = self.fixed[1] * t8;
         let t17 = self.fixed[1] * t10;
-        [t8, t10, t14, t17]
+        let t89 = self.fixed[7] * t8;
+        let t121 = self.fixed[7] * t10;
+        let t213 = t8 * t8;
+        let t214 = t213 * t8;
+        let t215 = self.fixed[9] * t214;
+        let t217 = self.fixed[10] * t213;
+        let t223 = self.fixed[11] * t8;
+        let t229 = t10 * t10;
+        let t230 = t229 * t10;
+        let t231 = self.fixed[9] * t230;
+        let t233 = self.fixed[10] * t229;
+        let t236 = self.fixed[11] * t10;
+        [t14, t17, t89, t121, t215, t217, t223, t231, t233, t236]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 4] {
@@ -713,60 +725,39 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 4, 4> for AxisAligned<T> {
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
-        time: &[T; 4],
+        time: &[T; 10],
         point: &[T; 4],
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t15 = time[2] * point[0];
-        let t18 = time[3] * point[1];
+        let t15 = time[0] * point[0];
+        let t18 = time[1] * point[1];
         let t20 = t15 + T::one();
         let t21 = t18 + T::one();
         let t22 = t20 * t21;
         let t51 = T::one() / t22;
         let t52 = t21 * t51;
         let t53 = t20 * t51;
-        let t58 = point[0] * t21;
-        let t59 = time[0] * t58;
-        let t60 = time[1] * point[1];
-        let t61 = t59 + t60;
-        let t62 = self.fixed[1] * t61;
-        let t63 = t62.ln_of_both_if::<NEAR>(t22);
-        let t140 = self.fixed[7] * point[2];
-        let t145 = point[0] * point[0];
-        let t149 = point[2] * t145;
-        let t150 = self.fixed[9] * t149;
-        let t151 = -t150;
-        let t157 = point[2] * point[0];
-        let t158 = self.fixed[10] * t157;
-        let t159 = time[0] * t151;
-        let t160 = t159 - t158;
-        let t163 = self.fixed[11] * point[2];
-        let t164 = -t163;
-        let t165 = time[0] * t160;
-        let t166 = t164 * t63;
-        let t167 = t165 + t166;
-        let t168 = t52 * t52;
-        let t169 = t167 * t168;
-        let t170 = t140 + t169;
-        let t171 = time[0] * t170;
-        let t172 = self.fixed[7] * point[3];
-        let t173 = point[1] * point[1];
-        let t174 = point[3] * t173;
-        let t175 = self.fixed[9] * t174;
-        let t176 = -t175;
-        let t177 = point[3] * point[1];
-        let t178 = self.fixed[10] * t177;
-        let t179 = time[1] * t176;
-        let t180 = t179 - t178;
-        let t181 = self.fixed[11] * point[3];
-        let t182 = -t181;
-        let t183 = time[1] * t180;
-        let t184 = t182 * t63;
-        let t185 = t183 + t184;
-        let t186 = t53 * t53;
-        let t187 = t185 * t186;
-        let t188 = t172 + t187;
-        let t189 = time[1] * t188;
-        crate::nalgebra::SVector::<T, 2>::new(t171, t189)
+        let t154 = t52 * t52;
+        let t155 = t53 * t53;
+        let t216 = time[4] * point[0];
+        let t218 = t216 + time[5];
+        let t219 = point[0] * t218;
+        let t220 = t15 * t21;
+        let t221 = t220 + t18;
+        let t222 = t221.ln_of_both_if::<NEAR>(t22);
+        let t224 = time[6] * t222;
+        let t225 = t219 + t224;
+        let t226 = t154 * t225;
+        let t227 = time[2] - t226;
+        let t228 = point[2] * t227;
+        let t232 = time[7] * point[1];
+        let t234 = t232 + time[8];
+        let t235 = point[1] * t234;
+        let t237 = time[9] * t222;
+        let t238 = t235 + t237;
+        let t239 = t155 * t238;
+        let t240 = time[3] - t239;
+        let t241 = point[3] * t240;
+        crate::nalgebra::SVector::<T, 2>::new(t228, t241)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

@@ -140,21 +140,21 @@ impl<T: crate::Real> AxisAligned1d<T> {
         let t68 = T::nearest(2.0) * t35;
         let t69 = t48 + t68;
         let t81 = t14 / parameters.rho0;
-        let t87 = t48 + t35;
-        let t88 = parameters.A * parameters.A;
-        let t89 = t88 * parameters.A;
-        let t90 = t19 * t19;
-        let t92 = t89 * t90;
-        let t93 = t92 * t87;
-        let t94 = t93 / parameters.rho0;
-        let t98 = t19 * T::pi();
-        let t99 = T::nearest(2.0) * t88;
-        let t100 = t99 * t98;
-        let t101 = t100 * t87;
-        let t102 = t101 / parameters.rho0;
-        let t107 = t21 * parameters.nu;
-        let t108 = t107 / t58;
-        let t118 = T::nearest(2.0) / t7;
+        let t86 = t48 + t35;
+        let t87 = parameters.A * parameters.A;
+        let t88 = t87 * parameters.A;
+        let t89 = t19 * t19;
+        let t90 = t88 * t89;
+        let t91 = t90 * t86;
+        let t92 = t91 / parameters.rho0;
+        let t93 = t19 * T::pi();
+        let t94 = T::nearest(2.0) * t87;
+        let t95 = t94 * t93;
+        let t96 = t95 * t86;
+        let t97 = t96 / parameters.rho0;
+        let t98 = t21 * parameters.nu;
+        let t99 = t98 / t58;
+        let t101 = T::nearest(2.0) / t7;
         Ok(AxisAligned1d {
             parameters,
             fixed: [
@@ -169,10 +169,10 @@ impl<T: crate::Real> AxisAligned1d<T> {
                 t59,
                 t69,
                 t81,
-                t94,
-                t102,
-                t108,
-                t118,
+                t92,
+                t97,
+                t99,
+                t101,
             ],
         })
     }
@@ -420,34 +420,34 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
                 let t8 = self.fixed[0] * t;
                 let t9 = t8.cos_pi();
                 let t27 = self.fixed[1] * t9;
-                let t120 = t27 + T::one();
-                let t121 = T::one() / t120;
-                let t122 = t121 + T::one();
-                let t123 = t27.log_1p();
-                let t124 = t9 * t122;
-                let t125 = self.fixed[6] * t124;
-                let t126 = t123 * t121;
-                let t127 = self.fixed[7] * t126;
-                let t128 = t125 + t127;
-                let t129 = -t128;
-                Some(crate::nalgebra::SVector::<T, 1>::new(t129))
+                let t103 = t27 + T::one();
+                let t104 = T::one() / t103;
+                let t105 = t104 + T::one();
+                let t106 = t27.log_1p();
+                let t107 = t9 * t105;
+                let t108 = self.fixed[6] * t107;
+                let t109 = t106 * t104;
+                let t110 = self.fixed[7] * t109;
+                let t111 = t108 + t110;
+                let t112 = -t111;
+                Some(crate::nalgebra::SVector::<T, 1>::new(t112))
             }
             crate::Surface::Upper(0) => {
                 let t8 = self.fixed[0] * t;
                 let t9 = t8.cos_pi();
                 let t27 = self.fixed[1] * t9;
-                let t130 = T::one() - t27;
-                let t131 = T::one() / t130;
-                let t132 = t131 + T::one();
-                let t133 = -t27;
-                let t134 = t133.log_1p();
-                let t135 = t9 * t132;
-                let t136 = self.fixed[6] * t135;
-                let t137 = t134 * t131;
-                let t138 = self.fixed[7] * t137;
-                let t139 = t136 - t138;
-                let t140 = -t139;
-                Some(crate::nalgebra::SVector::<T, 1>::new(t140))
+                let t113 = T::one() - t27;
+                let t114 = T::one() / t113;
+                let t115 = t114 + T::one();
+                let t116 = -t27;
+                let t117 = t116.log_1p();
+                let t118 = t9 * t115;
+                let t119 = self.fixed[6] * t118;
+                let t120 = t117 * t114;
+                let t121 = self.fixed[7] * t120;
+                let t122 = t119 - t121;
+                let t123 = -t122;
+                Some(crate::nalgebra::SVector::<T, 1>::new(t123))
             }
             _ => None,
         }
@@ -492,7 +492,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 1>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 1> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 2, 2>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 5, 2>::new(*self, X))
     }
     fn state_at(
         &self,
@@ -502,13 +502,19 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 2> for AxisAligned1d<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 1, 5, 2> for AxisAligned1d<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 2] {
+    fn body_force_time(&self, t: T) -> [T; 5] {
         let t8 = self.fixed[0] * t;
         let t9 = t8.cos_pi();
         let t27 = self.fixed[1] * t9;
-        [t9, t27]
+        let t60 = self.fixed[8] * t9;
+        let t124 = t9 * t9;
+        let t125 = t124 * t9;
+        let t126 = self.fixed[11] * t125;
+        let t128 = self.fixed[12] * t124;
+        let t131 = self.fixed[13] * t9;
+        [t27, t60, t126, t128, t131]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 1>) -> [T; 2] {
@@ -519,32 +525,23 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 2> for AxisAligned1d<T> {
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
-        time: &[T; 2],
+        time: &[T; 5],
         point: &[T; 2],
     ) -> crate::nalgebra::SVector<T, 1> {
-        let t28 = time[1] * point[1];
+        let t28 = time[0] * point[1];
         let t30 = t28 + T::one();
         let t36 = T::one() / t30;
         let t41 = t28.log_1p();
-        let t86 = self.fixed[8] * point[0];
-        let t91 = point[1] * point[1];
-        let t95 = point[0] * t91;
-        let t96 = self.fixed[11] * t95;
-        let t97 = -t96;
-        let t103 = point[0] * point[1];
-        let t104 = self.fixed[12] * t103;
-        let t105 = time[0] * t97;
-        let t106 = t105 - t104;
-        let t109 = self.fixed[13] * point[0];
-        let t110 = -t109;
-        let t111 = time[0] * t106;
-        let t112 = t110 * t41;
-        let t113 = t111 + t112;
-        let t114 = t36 * t36;
-        let t115 = t113 * t114;
-        let t116 = t86 + t115;
-        let t117 = time[0] * t116;
-        crate::nalgebra::SVector::<T, 1>::new(t117)
+        let t100 = t36 * t36;
+        let t127 = time[2] * point[1];
+        let t129 = t127 + time[3];
+        let t130 = point[1] * t129;
+        let t132 = time[4] * t41;
+        let t133 = t130 + t132;
+        let t134 = t100 * t133;
+        let t135 = time[1] - t134;
+        let t136 = point[0] * t135;
+        crate::nalgebra::SVector::<T, 1>::new(t136)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

@@ -39,7 +39,7 @@ impl<T: crate::Real> Default for AxisAligned3dParameters<T> {
 pub struct AxisAligned3d<T: crate::Real> {
     parameters: AxisAligned3dParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 25],
+    fixed: [T; 26],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> AxisAligned3d<T> {
@@ -152,30 +152,31 @@ impl<T: crate::Real> AxisAligned3d<T> {
         let t159 = t65 * t130;
         let t160 = t159 / t136;
         let t176 = T::one() / parameters.rho0;
-        let t201 = parameters.A * parameters.A;
-        let t202 = t201 * parameters.A;
-        let t203 = t63 * t63;
-        let t205 = t202 * t203;
-        let t206 = t205 * t147;
-        let t207 = t206 / parameters.rho0;
-        let t211 = t63 * T::pi();
-        let t212 = T::nearest(2.0) * t201;
-        let t213 = t212 * t211;
-        let t214 = t213 * t147;
-        let t215 = t214 / parameters.rho0;
-        let t220 = t65 * parameters.nu;
-        let t221 = t220 / t136;
-        let t234 = T::nearest(0.125) * t202;
-        let t235 = t234 * t203;
-        let t236 = t235 * t147;
-        let t237 = t236 / parameters.rho0;
-        let t240 = T::nearest(0.5) * t201;
-        let t241 = t240 * t211;
-        let t242 = t241 * t147;
-        let t243 = t242 / parameters.rho0;
-        let t248 = t71 * parameters.nu;
-        let t249 = t248 / t136;
-        let t274 = T::nearest(2.0) / t6;
+        let t200 = parameters.A * parameters.A;
+        let t201 = t200 * parameters.A;
+        let t202 = t63 * t63;
+        let t203 = t201 * t202;
+        let t204 = t203 * t147;
+        let t205 = t204 / parameters.rho0;
+        let t206 = t63 * T::pi();
+        let t207 = T::nearest(2.0) * t200;
+        let t208 = t207 * t206;
+        let t209 = t208 * t147;
+        let t210 = t209 / parameters.rho0;
+        let t211 = t65 * parameters.nu;
+        let t212 = t211 / t136;
+        let t214 = T::nearest(0.125) * t201;
+        let t215 = t214 * t202;
+        let t216 = t215 * t147;
+        let t217 = t216 / parameters.rho0;
+        let t218 = T::nearest(0.5) * t200;
+        let t219 = t218 * t206;
+        let t220 = t219 * t147;
+        let t221 = t220 / parameters.rho0;
+        let t222 = t71 * parameters.nu;
+        let t223 = t222 / t136;
+        let t224 = T::nearest(2.0) / t6;
+        let t345 = t20 * t21;
         Ok(AxisAligned3d {
             parameters,
             fixed: [
@@ -197,13 +198,14 @@ impl<T: crate::Real> AxisAligned3d<T> {
                 t153,
                 t160,
                 t176,
-                t207,
-                t215,
+                t205,
+                t210,
+                t212,
+                t217,
                 t221,
-                t237,
-                t243,
-                t249,
-                t274,
+                t223,
+                t224,
+                t345,
             ],
         })
     }
@@ -829,24 +831,24 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t36 = t32 + T::one();
                 let t99 = t28 * t36;
                 let t100 = t99 - t31;
-                let t275 = t23 + T::one();
-                let t276 = T::one() / t275;
-                let t277 = t276 + T::one();
-                let t278 = t8 * t100;
-                let t279 = self.fixed[3] * t278;
-                let t280 = t279 + t99;
-                let t281 = t280 - t31;
-                let t282 = t23 + t281;
-                let t283 = t35 * t36;
-                let t284 = t275 * t283;
-                let t285 = t282.ln_of_both(t284);
-                let t286 = t8 * t277;
-                let t287 = self.fixed[11] * t286;
-                let t288 = self.fixed[12] * t276;
-                let t289 = t288 * t285;
-                let t290 = t287 + t289;
-                let t291 = -t290;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t291, T::zero(), T::zero()))
+                let t225 = t23 + T::one();
+                let t226 = T::one() / t225;
+                let t227 = t226 + T::one();
+                let t228 = t8 * t100;
+                let t229 = self.fixed[3] * t228;
+                let t230 = t229 + t99;
+                let t231 = t230 - t31;
+                let t232 = t23 + t231;
+                let t233 = t35 * t36;
+                let t234 = t225 * t233;
+                let t235 = t232.ln_of_both(t234);
+                let t236 = t8 * t227;
+                let t237 = self.fixed[11] * t236;
+                let t238 = self.fixed[12] * t226;
+                let t239 = t238 * t235;
+                let t240 = t237 + t239;
+                let t241 = -t240;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t241, T::zero(), T::zero()))
             }
             crate::Surface::Upper(0) => {
                 let t7 = self.fixed[0] * t;
@@ -868,24 +870,24 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t36 = t32 + T::one();
                 let t99 = t28 * t36;
                 let t100 = t99 - t31;
-                let t278 = t8 * t100;
-                let t279 = self.fixed[3] * t278;
-                let t283 = t35 * t36;
-                let t292 = T::one() - t23;
-                let t293 = T::one() / t292;
-                let t294 = t293 + T::one();
-                let t295 = t99 - t279;
-                let t296 = t295 - t31;
-                let t297 = t296 - t23;
-                let t298 = t292 * t283;
-                let t299 = t297.ln_of_both(t298);
-                let t300 = t8 * t294;
-                let t301 = self.fixed[11] * t300;
-                let t302 = self.fixed[12] * t293;
-                let t303 = t302 * t299;
-                let t304 = t301 - t303;
-                let t305 = -t304;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t305, T::zero(), T::zero()))
+                let t228 = t8 * t100;
+                let t229 = self.fixed[3] * t228;
+                let t233 = t35 * t36;
+                let t242 = T::one() - t23;
+                let t243 = T::one() / t242;
+                let t244 = t243 + T::one();
+                let t245 = t99 - t229;
+                let t246 = t245 - t31;
+                let t247 = t246 - t23;
+                let t248 = t242 * t233;
+                let t249 = t247.ln_of_both(t248);
+                let t250 = t8 * t244;
+                let t251 = self.fixed[11] * t250;
+                let t252 = self.fixed[12] * t243;
+                let t253 = t252 * t249;
+                let t254 = t251 - t253;
+                let t255 = -t254;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t255, T::zero(), T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t7 = self.fixed[0] * t;
@@ -905,27 +907,27 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t34 = t24 + T::one();
                 let t36 = t32 + T::one();
                 let t102 = t8 * t22;
-                let t306 = -t26;
-                let t307 = t306 + T::one();
-                let t308 = T::one() / t307;
-                let t309 = t308 + T::one();
-                let t310 = t32 * t307;
-                let t311 = t310 - t26;
-                let t312 = t311 + T::one();
-                let t313 = t102 * t312;
-                let t314 = self.fixed[3] * t313;
-                let t315 = t314 + t310;
-                let t316 = t315 - t26;
-                let t317 = t34 * t36;
-                let t318 = t307 * t317;
-                let t319 = t316.ln_of_both(t318);
-                let t320 = t306 * t309;
-                let t321 = self.fixed[10] * t320;
-                let t322 = self.fixed[12] * t308;
-                let t323 = t322 * t319;
-                let t324 = t321 + t323;
-                let t325 = -t324;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t325, T::zero()))
+                let t256 = -t26;
+                let t257 = t256 + T::one();
+                let t258 = T::one() / t257;
+                let t259 = t258 + T::one();
+                let t260 = t32 * t257;
+                let t261 = t260 - t26;
+                let t262 = t261 + T::one();
+                let t263 = t102 * t262;
+                let t264 = self.fixed[3] * t263;
+                let t265 = t264 + t260;
+                let t266 = t265 - t26;
+                let t267 = t34 * t36;
+                let t268 = t257 * t267;
+                let t269 = t266.ln_of_both(t268);
+                let t270 = t256 * t259;
+                let t271 = self.fixed[10] * t270;
+                let t272 = self.fixed[12] * t258;
+                let t273 = t272 * t269;
+                let t274 = t271 + t273;
+                let t275 = -t274;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t275, T::zero()))
             }
             crate::Surface::Upper(1) => {
                 let t7 = self.fixed[0] * t;
@@ -945,25 +947,25 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t34 = t24 + T::one();
                 let t36 = t32 + T::one();
                 let t102 = t8 * t22;
-                let t317 = t34 * t36;
-                let t326 = t26 + T::one();
-                let t327 = T::one() / t326;
-                let t328 = t327 + T::one();
-                let t329 = t32 * t326;
-                let t330 = t26 + t329;
-                let t331 = t330 + T::one();
-                let t332 = t102 * t331;
-                let t333 = self.fixed[3] * t332;
-                let t334 = t333 + t329;
-                let t335 = t26 + t334;
-                let t336 = t326 * t317;
-                let t337 = t335.ln_of_both(t336);
-                let t338 = t26 * t328;
-                let t339 = self.fixed[10] * t338;
-                let t340 = self.fixed[12] * t327;
-                let t341 = t340 * t337;
-                let t342 = t339 + t341;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t342, T::zero()))
+                let t267 = t34 * t36;
+                let t276 = t26 + T::one();
+                let t277 = T::one() / t276;
+                let t278 = t277 + T::one();
+                let t279 = t32 * t276;
+                let t280 = t26 + t279;
+                let t281 = t280 + T::one();
+                let t282 = t102 * t281;
+                let t283 = self.fixed[3] * t282;
+                let t284 = t283 + t279;
+                let t285 = t26 + t284;
+                let t286 = t276 * t267;
+                let t287 = t285.ln_of_both(t286);
+                let t288 = t26 * t278;
+                let t289 = self.fixed[10] * t288;
+                let t290 = self.fixed[12] * t277;
+                let t291 = t290 * t287;
+                let t292 = t289 + t291;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t292, T::zero()))
             }
             crate::Surface::Lower(2) => {
                 let t7 = self.fixed[0] * t;
@@ -984,26 +986,26 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t35 = t28 + T::one();
                 let t37 = t34 * t35;
                 let t102 = t8 * t22;
-                let t343 = -t30;
-                let t344 = t343 + T::one();
-                let t345 = T::one() / t344;
-                let t346 = t345 + T::one();
-                let t347 = t28 * t344;
-                let t348 = t347 - t30;
-                let t349 = t348 + T::one();
-                let t350 = t102 * t349;
-                let t351 = self.fixed[3] * t350;
-                let t352 = t351 + t347;
-                let t353 = t352 - t30;
-                let t354 = t344 * t37;
-                let t355 = t353.ln_of_both(t354);
-                let t356 = t343 * t346;
-                let t357 = self.fixed[10] * t356;
-                let t358 = self.fixed[12] * t345;
-                let t359 = t358 * t355;
-                let t360 = t357 + t359;
-                let t361 = -t360;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t361))
+                let t293 = -t30;
+                let t294 = t293 + T::one();
+                let t295 = T::one() / t294;
+                let t296 = t295 + T::one();
+                let t297 = t28 * t294;
+                let t298 = t297 - t30;
+                let t299 = t298 + T::one();
+                let t300 = t102 * t299;
+                let t301 = self.fixed[3] * t300;
+                let t302 = t301 + t297;
+                let t303 = t302 - t30;
+                let t304 = t294 * t37;
+                let t305 = t303.ln_of_both(t304);
+                let t306 = t293 * t296;
+                let t307 = self.fixed[10] * t306;
+                let t308 = self.fixed[12] * t295;
+                let t309 = t308 * t305;
+                let t310 = t307 + t309;
+                let t311 = -t310;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t311))
             }
             crate::Surface::Upper(2) => {
                 let t7 = self.fixed[0] * t;
@@ -1024,24 +1026,24 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t35 = t28 + T::one();
                 let t37 = t34 * t35;
                 let t102 = t8 * t22;
-                let t362 = t30 + T::one();
-                let t363 = T::one() / t362;
-                let t364 = t363 + T::one();
-                let t365 = t28 * t362;
-                let t366 = t30 + t365;
-                let t367 = t366 + T::one();
-                let t368 = t102 * t367;
-                let t369 = self.fixed[3] * t368;
-                let t370 = t369 + t365;
-                let t371 = t30 + t370;
-                let t372 = t362 * t37;
-                let t373 = t371.ln_of_both(t372);
-                let t374 = t30 * t364;
-                let t375 = self.fixed[10] * t374;
-                let t376 = self.fixed[12] * t363;
-                let t377 = t376 * t373;
-                let t378 = t375 + t377;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t378))
+                let t312 = t30 + T::one();
+                let t313 = T::one() / t312;
+                let t314 = t313 + T::one();
+                let t315 = t28 * t312;
+                let t316 = t30 + t315;
+                let t317 = t316 + T::one();
+                let t318 = t102 * t317;
+                let t319 = self.fixed[3] * t318;
+                let t320 = t319 + t315;
+                let t321 = t30 + t320;
+                let t322 = t312 * t37;
+                let t323 = t321.ln_of_both(t322);
+                let t324 = t30 * t314;
+                let t325 = self.fixed[10] * t324;
+                let t326 = self.fixed[12] * t313;
+                let t327 = t326 * t323;
+                let t328 = t325 + t327;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t328))
             }
             _ => None,
         }
@@ -1102,7 +1104,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 3>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 3> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 6, 6>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 17, 6>::new(*self, X))
     }
     fn state_at(
         &self,
@@ -1112,9 +1114,9 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 6> for AxisAligned3d<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 3, 17, 6> for AxisAligned3d<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 6] {
+    fn body_force_time(&self, t: T) -> [T; 17] {
         let t7 = self.fixed[0] * t;
         let t8 = t7.sin_pi();
         let t11 = t7.cos_pi();
@@ -1124,7 +1126,47 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 6> for AxisAligned3d<T> {
         let t23 = self.fixed[3] * t8;
         let t26 = self.fixed[4] * t14;
         let t30 = self.fixed[4] * t18;
-        [t8, t14, t18, t23, t26, t30]
+        let t138 = self.fixed[13] * t8;
+        let t161 = self.fixed[16] * t14;
+        let t181 = self.fixed[16] * t18;
+        let t337 = t8 * t8;
+        let t338 = t337 * t8;
+        let t339 = self.fixed[18] * t338;
+        let t341 = self.fixed[19] * t337;
+        let t346 = t8 * t14;
+        let t347 = self.fixed[25] * t346;
+        let t349 = t8 * t18;
+        let t350 = self.fixed[25] * t349;
+        let t359 = self.fixed[20] * t8;
+        let t367 = t14 * t14;
+        let t368 = t367 * t14;
+        let t369 = self.fixed[21] * t368;
+        let t371 = self.fixed[22] * t367;
+        let t374 = self.fixed[23] * t14;
+        let t382 = t18 * t18;
+        let t383 = t382 * t18;
+        let t384 = self.fixed[21] * t383;
+        let t386 = self.fixed[22] * t382;
+        let t389 = self.fixed[23] * t18;
+        [
+            t23,
+            t26,
+            t30,
+            t138,
+            t161,
+            t181,
+            t339,
+            t341,
+            t347,
+            t350,
+            t359,
+            t369,
+            t371,
+            t374,
+            t384,
+            t386,
+            t389,
+        ]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 6] {
@@ -1139,84 +1181,60 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 6> for AxisAligned3d<T> {
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
-        time: &[T; 6],
+        time: &[T; 17],
         point: &[T; 6],
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t24 = time[3] * point[0];
-        let t27 = time[4] * point[1];
-        let t28 = -t27;
-        let t31 = time[5] * point[2];
-        let t32 = -t31;
+        let t24 = time[0] * point[0];
+        let t27 = time[1] * point[1];
+        let t31 = time[2] * point[2];
         let t34 = t24 + T::one();
-        let t35 = t28 + T::one();
-        let t36 = t32 + T::one();
-        let t37 = t34 * t35;
-        let t38 = t37 * t36;
-        let t91 = T::one() / t38;
-        let t92 = t36 * t91;
-        let t93 = t37 * t91;
-        let t94 = t35 * t92;
-        let t95 = t34 * t92;
-        let t99 = t28 * t36;
-        let t100 = t99 - t31;
-        let t101 = t100 + T::one();
-        let t102 = time[0] * point[0];
-        let t103 = t102 * t101;
-        let t104 = self.fixed[3] * t103;
-        let t105 = t104 + t99;
-        let t106 = t105 - t31;
-        let t107 = t106.ln_of_both_if::<NEAR>(t38);
-        let t200 = self.fixed[13] * point[3];
-        let t204 = point[0] * point[0];
-        let t208 = point[3] * t204;
-        let t209 = self.fixed[18] * t208;
-        let t210 = -t209;
-        let t216 = point[3] * point[0];
-        let t217 = self.fixed[19] * t216;
-        let t218 = time[0] * t210;
-        let t219 = t218 - t217;
-        let t222 = self.fixed[20] * point[3];
-        let t223 = -t222;
-        let t224 = time[0] * t219;
-        let t225 = t223 * t107;
-        let t226 = t224 + t225;
-        let t227 = t94 * t94;
-        let t228 = t226 * t227;
-        let t229 = t200 + t228;
-        let t230 = time[0] * t229;
-        let t231 = self.fixed[16] * point[4];
-        let t233 = point[1] * point[1];
-        let t238 = point[4] * t233;
-        let t239 = self.fixed[21] * t238;
-        let t244 = point[4] * point[1];
-        let t245 = self.fixed[22] * t244;
-        let t246 = time[1] * t239;
-        let t247 = t246 - t245;
-        let t250 = self.fixed[23] * point[4];
-        let t251 = time[1] * t247;
-        let t252 = t250 * t107;
-        let t253 = t251 + t252;
-        let t254 = t95 * t95;
-        let t255 = t253 * t254;
-        let t256 = t255 - t231;
-        let t257 = time[1] * t256;
-        let t258 = self.fixed[16] * point[5];
-        let t259 = point[2] * point[2];
-        let t260 = point[5] * t259;
-        let t261 = self.fixed[21] * t260;
-        let t262 = point[5] * point[2];
-        let t263 = self.fixed[22] * t262;
-        let t264 = time[2] * t261;
-        let t265 = t264 - t263;
-        let t266 = self.fixed[23] * point[5];
-        let t267 = time[2] * t265;
-        let t268 = t266 * t107;
-        let t269 = t267 + t268;
-        let t270 = t93 * t93;
-        let t271 = t269 * t270;
-        let t272 = t271 - t258;
-        let t273 = time[2] * t272;
-        crate::nalgebra::SVector::<T, 3>::new(t230, t257, t273)
+        let t329 = T::one() - t27;
+        let t330 = T::one() - t31;
+        let t331 = t34 * t329;
+        let t332 = t330 * t331;
+        let t333 = T::one() / t332;
+        let t334 = t330 * t333;
+        let t335 = t329 * t334;
+        let t336 = t335 * t335;
+        let t340 = time[6] * point[0];
+        let t342 = t340 + time[7];
+        let t343 = point[0] * t342;
+        let t344 = point[1] * t330;
+        let t348 = time[8] * t344;
+        let t351 = time[9] * point[2];
+        let t352 = t348 + t351;
+        let t353 = time[0] - t352;
+        let t354 = point[0] * t353;
+        let t355 = time[1] * t344;
+        let t356 = t354 - t355;
+        let t357 = t356 - t31;
+        let t358 = t357.ln_of_both_if::<NEAR>(t332);
+        let t360 = time[10] * t358;
+        let t361 = t343 + t360;
+        let t362 = t336 * t361;
+        let t363 = time[3] - t362;
+        let t364 = point[3] * t363;
+        let t365 = t34 * t334;
+        let t366 = t365 * t365;
+        let t370 = time[11] * point[1];
+        let t372 = t370 - time[12];
+        let t373 = point[1] * t372;
+        let t375 = time[13] * t358;
+        let t376 = t373 + t375;
+        let t377 = t366 * t376;
+        let t378 = t377 - time[4];
+        let t379 = point[4] * t378;
+        let t380 = t331 * t333;
+        let t381 = t380 * t380;
+        let t385 = time[14] * point[2];
+        let t387 = t385 - time[15];
+        let t388 = point[2] * t387;
+        let t390 = time[16] * t358;
+        let t391 = t388 + t390;
+        let t392 = t381 * t391;
+        let t393 = t392 - time[5];
+        let t394 = point[5] * t393;
+        crate::nalgebra::SVector::<T, 3>::new(t364, t379, t394)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

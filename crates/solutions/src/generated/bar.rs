@@ -158,36 +158,36 @@ impl<T: crate::Real> Bar<T> {
         let t71 = t70 * t26;
         let t72 = t71 / t25;
         let t88 = T::one() / parameters.rho0;
-        let t94 = t56 + t46;
-        let t96 = parameters.A * parameters.A;
-        let t97 = t96 * parameters.A;
-        let t98 = t25 * t25;
-        let t99 = t26 * t26;
-        let t101 = T::nearest(16.0) * t97;
-        let t102 = t101 * t99;
-        let t103 = t102 * t94;
-        let t104 = parameters.rho0 * t98;
-        let t105 = t103 / t104;
-        let t109 = t25 * parameters.L;
-        let t110 = t26 * T::pi();
-        let t111 = T::nearest(16.0) * t96;
-        let t112 = t111 * t110;
-        let t113 = t112 * t94;
-        let t114 = parameters.rho0 * t109;
-        let t115 = t113 / t114;
-        let t120 = t70 * parameters.E;
-        let t121 = t120 * parameters.nu;
-        let t122 = t121 * t26;
-        let t123 = t29 * t43;
-        let t124 = t123 * t50;
-        let t125 = t122 / t124;
-        let t135 = T::nearest(2.0) * parameters.L;
-        let t136 = t135 / t11;
-        let t138 = -t36;
+        let t93 = t56 + t46;
+        let t95 = parameters.A * parameters.A;
+        let t96 = t95 * parameters.A;
+        let t97 = t25 * t25;
+        let t98 = t26 * t26;
+        let t99 = T::nearest(16.0) * t96;
+        let t100 = t99 * t98;
+        let t101 = t100 * t93;
+        let t102 = parameters.rho0 * t97;
+        let t103 = t101 / t102;
+        let t104 = t25 * parameters.L;
+        let t105 = t26 * T::pi();
+        let t106 = T::nearest(16.0) * t95;
+        let t107 = t106 * t105;
+        let t108 = t107 * t93;
+        let t109 = parameters.rho0 * t104;
+        let t110 = t108 / t109;
+        let t111 = t70 * parameters.E;
+        let t112 = t111 * parameters.nu;
+        let t113 = t112 * t26;
+        let t114 = t29 * t43;
+        let t115 = t114 * t50;
+        let t116 = t113 / t115;
+        let t118 = T::nearest(2.0) * parameters.L;
+        let t119 = t118 / t11;
+        let t121 = -t36;
         if !(t36 < parameters.L) {
             return Err(Self::DESCRIPTION.requirement_broken("2*Pi*A < L", &values));
         }
-        if !(t138 < parameters.L) {
+        if !(t121 < parameters.L) {
             return Err(Self::DESCRIPTION.requirement_broken("-2*Pi*A < L", &values));
         }
         Ok(Bar {
@@ -205,11 +205,11 @@ impl<T: crate::Real> Bar<T> {
                 t67,
                 t72,
                 t88,
-                t105,
-                t115,
-                t125,
-                t136,
-                t138,
+                t103,
+                t110,
+                t116,
+                t119,
+                t121,
             ],
         })
     }
@@ -461,32 +461,32 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
                 let t13 = self.fixed[2] * t;
                 let t14 = t13.cos_pi();
                 let t38 = self.fixed[6] * t14;
-                let t139 = t38 + T::one();
-                let t140 = T::one() / t139;
-                let t141 = t140 + T::one();
-                let t142 = t38.log_1p();
-                let t143 = t38 * t141;
-                let t144 = self.fixed[7] * t143;
-                let t145 = t142 * t140;
-                let t146 = self.fixed[8] * t145;
-                let t147 = t144 + t146;
-                let t148 = -t147;
-                Some(crate::nalgebra::SVector::<T, 1>::new(t148))
+                let t122 = t38 + T::one();
+                let t123 = T::one() / t122;
+                let t124 = t123 + T::one();
+                let t125 = t38.log_1p();
+                let t126 = t38 * t124;
+                let t127 = self.fixed[7] * t126;
+                let t128 = t125 * t123;
+                let t129 = self.fixed[8] * t128;
+                let t130 = t127 + t129;
+                let t131 = -t130;
+                Some(crate::nalgebra::SVector::<T, 1>::new(t131))
             }
             crate::Surface::Upper(0) => {
                 let t13 = self.fixed[2] * t;
                 let t14 = t13.cos_pi();
                 let t38 = self.fixed[6] * t14;
-                let t139 = t38 + T::one();
-                let t140 = T::one() / t139;
-                let t141 = t140 + T::one();
-                let t142 = t38.log_1p();
-                let t143 = t38 * t141;
-                let t144 = self.fixed[7] * t143;
-                let t145 = t142 * t140;
-                let t146 = self.fixed[8] * t145;
-                let t147 = t144 + t146;
-                Some(crate::nalgebra::SVector::<T, 1>::new(t147))
+                let t122 = t38 + T::one();
+                let t123 = T::one() / t122;
+                let t124 = t123 + T::one();
+                let t125 = t38.log_1p();
+                let t126 = t38 * t124;
+                let t127 = self.fixed[7] * t126;
+                let t128 = t125 * t123;
+                let t129 = self.fixed[8] * t128;
+                let t130 = t127 + t129;
+                Some(crate::nalgebra::SVector::<T, 1>::new(t130))
             }
             _ => None,
         }
@@ -531,7 +531,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 1>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 1> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 2, 2>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 5, 2>::new(*self, X))
     }
     fn state_at(
         &self,
@@ -541,13 +541,19 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 2> for Bar<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 1, 5, 2> for Bar<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 2] {
+    fn body_force_time(&self, t: T) -> [T; 5] {
         let t13 = self.fixed[2] * t;
         let t14 = t13.cos_pi();
         let t38 = self.fixed[6] * t14;
-        [t14, t38]
+        let t68 = self.fixed[9] * t14;
+        let t132 = t14 * t14;
+        let t133 = t132 * t14;
+        let t134 = self.fixed[12] * t133;
+        let t136 = self.fixed[13] * t132;
+        let t139 = self.fixed[14] * t14;
+        [t38, t68, t134, t136, t139]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 1>) -> [T; 2] {
@@ -559,32 +565,24 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 2, 2> for Bar<T> {
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
-        time: &[T; 2],
+        time: &[T; 5],
         point: &[T; 2],
     ) -> crate::nalgebra::SVector<T, 1> {
-        let t39 = time[1] * point[1];
+        let t39 = time[0] * point[1];
         let t41 = t39 + T::one();
         let t47 = T::one() / t41;
         let t51 = t39.log_1p();
-        let t93 = self.fixed[9] * point[0];
-        let t100 = point[1] * point[1];
-        let t106 = point[0] * t100;
-        let t107 = self.fixed[12] * t106;
-        let t108 = -t107;
-        let t116 = point[0] * point[1];
-        let t117 = self.fixed[13] * t116;
-        let t118 = time[0] * t108;
-        let t119 = t118 - t117;
-        let t126 = self.fixed[14] * point[0];
-        let t127 = -t126;
-        let t128 = time[0] * t119;
-        let t129 = t127 * t51;
-        let t130 = t128 + t129;
-        let t131 = t47 * t47;
-        let t132 = t130 * t131;
-        let t133 = t132 - t93;
-        let t134 = time[0] * t133;
-        crate::nalgebra::SVector::<T, 1>::new(t134)
+        let t117 = t47 * t47;
+        let t135 = time[2] * point[1];
+        let t137 = t135 + time[3];
+        let t138 = point[1] * t137;
+        let t140 = time[4] * t51;
+        let t141 = t138 + t140;
+        let t142 = t117 * t141;
+        let t143 = t142 + time[1];
+        let t144 = point[0] * t143;
+        let t145 = -t144;
+        crate::nalgebra::SVector::<T, 1>::new(t145)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

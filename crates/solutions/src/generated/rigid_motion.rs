@@ -41,7 +41,7 @@ impl<T: crate::Real> Default for RigidMotionParameters<T> {
 pub struct RigidMotion<T: crate::Real> {
     parameters: RigidMotionParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 11],
+    fixed: [T; 14],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> RigidMotion<T> {
@@ -139,19 +139,22 @@ impl<T: crate::Real> RigidMotion<T> {
         let t62 = parameters.A * parameters.E;
         let t63 = t62 * t53;
         let t64 = t63 / parameters.rho0;
-        let t75 = -t55;
-        let t77 = T::nearest(2.0) / t5;
-        let t79 = parameters.nu + T::one();
-        let t80 = T::nearest(2.0) * parameters.nu;
-        let t81 = T::one() - t80;
-        let t82 = parameters.E * parameters.nu;
-        let t83 = t79 * t81;
-        let t84 = t82 / t83;
-        let t85 = T::nearest(0.5) * parameters.E;
-        let t86 = t85 / t79;
+        let t75 = T::nearest(2.0) / t5;
+        let t77 = parameters.nu + T::one();
+        let t78 = T::nearest(2.0) * parameters.nu;
+        let t79 = T::one() - t78;
+        let t80 = parameters.E * parameters.nu;
+        let t81 = t77 * t79;
+        let t82 = t80 / t81;
+        let t83 = T::nearest(0.5) * parameters.E;
+        let t84 = t83 / t77;
+        let t85 = parameters.U * t55;
+        let t88 = parameters.A * t55;
+        let t93 = t48 * t55;
+        let t100 = parameters.A * t64;
         Ok(RigidMotion {
             parameters,
-            fixed: [t5, t9, t36, t43, t48, t55, t64, t75, t77, t84, t86],
+            fixed: [t5, t9, t36, t43, t48, t55, t64, t75, t82, t84, t85, t88, t93, t100],
         })
     }
     /// The solution with parameter values in the order of the description; missing ones take their
@@ -498,8 +501,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for RigidMotion<T> {
     }
     fn material(&self) -> crate::Material<T> {
         crate::Material::NeoHookean {
-            lambda: self.fixed[9],
-            mu: self.fixed[10],
+            lambda: self.fixed[8],
+            mu: self.fixed[9],
         }
     }
     fn density(&self) -> T {
@@ -509,13 +512,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for RigidMotion<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[8]
+        self.fixed[7]
     }
     fn body_force_at(
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 5, 2>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 7, 2>::new(*self, X))
     }
     fn state_at(
         &self,
@@ -525,9 +528,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for RigidMotion<T> {
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 2, 5, 2> for RigidMotion<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 2, 7, 2> for RigidMotion<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 5] {
+    fn body_force_time(&self, t: T) -> [T; 7] {
         let t6 = self.fixed[0] * t;
         let t7 = t6.sin_pi();
         let t10 = self.fixed[1] * t7;
@@ -535,9 +538,15 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 5, 2> for RigidMotion<T> {
         let t14 = t10.cos();
         let t30 = t6.cos_pi();
         let t49 = t30 * t30;
-        let t50 = self.fixed[4] * t49;
-        let t59 = self.parameters.A * t49;
-        [t7, t11, t14, t50, t59]
+        let t86 = self.fixed[10] * t7;
+        let t87 = -t86;
+        let t89 = self.fixed[11] * t7;
+        let t90 = -t89;
+        let t94 = self.fixed[12] * t49;
+        let t95 = -t94;
+        let t98 = self.fixed[6] * t7;
+        let t101 = self.fixed[13] * t49;
+        [t11, t14, t87, t90, t95, t98, t101]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 2] {
@@ -546,32 +555,29 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 5, 2> for RigidMotion<T> {
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
-        time: &[T; 5],
+        time: &[T; 7],
         point: &[T; 2],
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t15 = time[1] * point[0];
-        let t16 = time[2] * point[1];
+        let t15 = time[0] * point[0];
+        let t16 = time[1] * point[1];
         let t17 = t15 + t16;
-        let t25 = time[2] * point[0];
-        let t26 = time[1] * point[1];
+        let t25 = time[1] * point[0];
+        let t26 = time[0] * point[1];
         let t27 = t25 - t26;
-        let t31 = time[1] * t27;
-        let t32 = time[2] * t17;
+        let t31 = time[0] * t27;
+        let t32 = time[1] * t17;
         let t33 = t31 + t32;
-        let t34 = self.parameters.A * t33;
-        let t35 = self.parameters.U - t34;
-        let t39 = time[1] * t17;
-        let t40 = time[2] * t27;
+        let t39 = time[0] * t17;
+        let t40 = time[1] * t27;
         let t41 = t39 - t40;
-        let t47 = time[0] * t35;
-        let t51 = time[3] * t41;
-        let t52 = t47 - t51;
-        let t58 = time[0] * t41;
-        let t60 = time[4] * t33;
-        let t61 = t58 - t60;
-        let t65 = self.fixed[6] * t61;
-        let t76 = self.fixed[7] * t52;
-        crate::nalgebra::SVector::<T, 2>::new(t76, t65)
+        let t91 = time[3] * t33;
+        let t92 = time[2] - t91;
+        let t96 = time[4] * t41;
+        let t97 = t92 - t96;
+        let t99 = time[5] * t41;
+        let t102 = time[6] * t33;
+        let t103 = t99 - t102;
+        crate::nalgebra::SVector::<T, 2>::new(t97, t103)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

@@ -196,25 +196,25 @@ impl<T: crate::Real> RingNu<T> {
         let t288 = T::nearest(12.0) * t107;
         let t289 = t288 / t26;
         let t301 = t219 / parameters.rho0;
-        let t307 = t63 * parameters.nu;
-        let t308 = parameters.rho0 * t97;
-        let t309 = t308 * t99;
-        let t310 = t307 / t309;
-        let t323 = T::nearest(2.0) / t11;
-        let t324 = parameters.Ri - parameters.Ro;
-        let t325 = t324 * t324;
-        let t326 = t325 * t324;
-        let t327 = t326 / t26;
-        let t328 = T::one() - t327;
-        let t329 = parameters.A * t328;
-        let t330 = t329 / parameters.Ri;
-        let t334 = parameters.Ri * t97;
-        let t335 = t334 * t99;
-        let t336 = t112 / t335;
-        let t342 = parameters.A / parameters.Ro;
-        let t346 = parameters.Ro * t97;
-        let t347 = t346 * t99;
-        let t348 = t112 / t347;
+        let t304 = t63 * parameters.nu;
+        let t305 = parameters.rho0 * t97;
+        let t306 = t305 * t99;
+        let t307 = t304 / t306;
+        let t312 = T::nearest(2.0) / t11;
+        let t313 = parameters.Ri - parameters.Ro;
+        let t314 = t313 * t313;
+        let t315 = t314 * t313;
+        let t316 = t315 / t26;
+        let t317 = T::one() - t316;
+        let t318 = parameters.A * t317;
+        let t319 = t318 / parameters.Ri;
+        let t323 = parameters.Ri * t97;
+        let t324 = t323 * t99;
+        let t325 = t112 / t324;
+        let t331 = parameters.A / parameters.Ro;
+        let t335 = parameters.Ro * t97;
+        let t336 = t335 * t99;
+        let t337 = t112 / t336;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -248,12 +248,12 @@ impl<T: crate::Real> RingNu<T> {
                 t284,
                 t289,
                 t301,
-                t310,
-                t323,
-                t330,
-                t336,
-                t342,
-                t348,
+                t307,
+                t312,
+                t319,
+                t325,
+                t331,
+                t337,
             ],
         })
     }
@@ -871,26 +871,26 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
             crate::Surface::Inner => {
                 let t12 = self.fixed[0] * t;
                 let t13 = t12.cos_pi();
-                let t331 = self.fixed[26] * t13;
-                let t332 = t331 + T::one();
-                let t333 = t331.ln_of_both(t332);
-                let t337 = self.fixed[27] * t333;
-                let t338 = t337 * X[0];
-                let t339 = -t338;
-                let t340 = t337 * X[1];
-                let t341 = -t340;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t339, t341))
+                let t320 = self.fixed[26] * t13;
+                let t321 = t320 + T::one();
+                let t322 = t320.ln_of_both(t321);
+                let t326 = self.fixed[27] * t322;
+                let t327 = t326 * X[0];
+                let t328 = -t327;
+                let t329 = t326 * X[1];
+                let t330 = -t329;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t328, t330))
             }
             crate::Surface::Outer => {
                 let t12 = self.fixed[0] * t;
                 let t13 = t12.cos_pi();
-                let t343 = self.fixed[28] * t13;
-                let t344 = t343 + T::one();
-                let t345 = t343.ln_of_both(t344);
-                let t349 = self.fixed[29] * t345;
-                let t350 = t349 * X[0];
-                let t351 = t349 * X[1];
-                Some(crate::nalgebra::SVector::<T, 2>::new(t350, t351))
+                let t332 = self.fixed[28] * t13;
+                let t333 = t332 + T::one();
+                let t334 = t332.ln_of_both(t333);
+                let t338 = self.fixed[29] * t334;
+                let t339 = t338 * X[0];
+                let t340 = t338 * X[1];
+                Some(crate::nalgebra::SVector::<T, 2>::new(t339, t340))
             }
             crate::Surface::Lower(0) => {
                 let t2 = X[0] * X[0];
@@ -932,13 +932,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
                 let t122 = self.fixed[10] * t119;
                 let t123 = t121 - t122;
                 let t129 = self.fixed[11] * t104;
-                let t352 = t33 * t34;
-                let t353 = t75 * t352;
-                let t354 = t32 * t353;
-                let t355 = t354 * t123;
-                let t356 = t129 - t355;
-                let t357 = -t356;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t357, T::zero()))
+                let t341 = t33 * t34;
+                let t342 = t75 * t341;
+                let t343 = t32 * t342;
+                let t344 = t343 * t123;
+                let t345 = t129 - t344;
+                let t346 = -t345;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t346, T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t2 = X[0] * X[0];
@@ -980,13 +980,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
                 let t122 = self.fixed[10] * t119;
                 let t123 = t121 - t122;
                 let t129 = self.fixed[11] * t104;
-                let t352 = t33 * t34;
-                let t359 = t89 * t352;
-                let t360 = t32 * t359;
-                let t361 = t360 * t123;
-                let t362 = t129 - t361;
-                let t363 = -t362;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t363))
+                let t341 = t33 * t34;
+                let t348 = t89 * t341;
+                let t349 = t32 * t348;
+                let t350 = t349 * t123;
+                let t351 = t129 - t350;
+                let t352 = -t351;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t352))
             }
             _ => None,
         }
@@ -1149,9 +1149,9 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         let t299 = t295 + t297;
         let t300 = t299 + t298;
         let t302 = self.fixed[23] * t300;
-        let t311 = self.fixed[24] * t147;
-        let t321 = X[1] * t34;
-        [t37, t38, t207, t216, t233, t276, t285, t302, t311, t321]
+        let t308 = self.fixed[24] * t147;
+        let t311 = X[1] * t34;
+        [t37, t38, t207, t216, t233, t276, t285, t302, t308, t311]
     }
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
@@ -1164,28 +1164,27 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         let t44 = time[1] * point[1];
         let t45 = t44 + T::one();
         let t46 = t43 * t45;
-        let t100 = time[0] * point[1];
-        let t101 = t100 * t43;
-        let t102 = self.parameters.A * t101;
-        let t103 = t102 + t42;
-        let t104 = t103.ln_of_both_if::<NEAR>(t46);
         let t277 = time[0] * point[4];
         let t278 = point[5] + t277;
         let t303 = time[0] * t278;
-        let t304 = point[6] * t104;
-        let t305 = t303 + t304;
-        let t306 = point[7] + t305;
-        let t312 = time[0] * t306;
-        let t313 = point[8] * t104;
-        let t314 = t312 + t313;
-        let t315 = t43 * t43;
-        let t316 = t315 * t45;
-        let t317 = t314 / t316;
-        let t318 = t317 - point[3];
-        let t319 = time[0] * t318;
-        let t320 = point[2] * t319;
-        let t322 = point[9] * t319;
-        crate::nalgebra::SVector::<T, 2>::new(t320, t322)
+        let t309 = t43 * t43;
+        let t310 = t309 * t45;
+        let t353 = t44 * t43;
+        let t354 = t353 + t42;
+        let t355 = t354.ln_of_both_if::<NEAR>(t46);
+        let t356 = point[6] * t355;
+        let t357 = t303 + t356;
+        let t358 = point[7] + t357;
+        let t359 = time[0] * t358;
+        let t360 = point[8] * t355;
+        let t361 = t359 + t360;
+        let t362 = t361 / t310;
+        let t363 = t362 - point[3];
+        let t364 = time[0] * point[2];
+        let t365 = t364 * t363;
+        let t366 = time[0] * point[9];
+        let t367 = t366 * t363;
+        crate::nalgebra::SVector::<T, 2>::new(t365, t367)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

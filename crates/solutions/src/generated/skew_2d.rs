@@ -38,7 +38,7 @@ impl<T: crate::Real> Default for Skew2dParameters<T> {
 pub struct Skew2d<T: crate::Real> {
     parameters: Skew2dParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 61],
+    fixed: [T; 93],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Skew2d<T> {
@@ -155,78 +155,129 @@ impl<T: crate::Real> Skew2d<T> {
         let t359 = T::nearest(0.09) * t356;
         let t360 = t359 * t352;
         let t361 = t360 / parameters.rho0;
-        let t367 = T::nearest(0.002) * t356;
-        let t368 = t367 * t352;
-        let t369 = t368 / parameters.rho0;
-        let t408 = T::nearest(12.0) * t105;
-        let t413 = T::nearest(0.01) * t355;
+        let t364 = T::nearest(0.002) * t356;
+        let t365 = t364 * t352;
+        let t366 = t365 / parameters.rho0;
+        let t402 = T::nearest(12.0) * t105;
+        let t407 = T::nearest(0.01) * t355;
+        let t408 = t407 / parameters.rho0;
+        let t412 = T::nearest(0.004) * t355;
+        let t413 = t412 * t352;
         let t414 = t413 / parameters.rho0;
-        let t422 = T::nearest(0.004) * t355;
-        let t423 = t422 * t352;
-        let t424 = t423 / parameters.rho0;
-        let t432 = T::nearest(4.0) * T::pi();
-        let t434 = T::nearest(3.0) * t58;
-        let t447 = t354 * parameters.A;
-        let t448 = T::nearest(0.005) * t447;
-        let t449 = t448 * parameters.E;
-        let t450 = t449 * parameters.nu;
-        let t451 = parameters.rho0 * t103;
-        let t452 = t451 * t112;
-        let t453 = t450 / t452;
-        let t455 = T::nearest(9.0) * T::pi();
-        let t462 = T::nearest(6.0) * T::pi();
-        let t468 = T::nearest(2.0) * T::pi();
-        let t477 = T::nearest(2.0) * t105;
-        let t491 = T::nearest(4.0) * t105;
-        let t493 = T::nearest(3.0) * t105;
-        let t497 = T::nearest(4.0) * parameters.E;
-        let t498 = t497 * parameters.nu;
-        let t499 = t498 / t118;
-        let t502 = T::nearest(2.0) * parameters.E;
-        let t503 = t502 * parameters.nu;
-        let t504 = t503 / t118;
-        let t510 = t448 / parameters.rho0;
-        let t519 = T::nearest(5.4) * t355;
-        let t520 = t519 * t352;
-        let t521 = t520 / parameters.rho0;
-        let t532 = T::nearest(0.6) * t447;
+        let t422 = T::nearest(4.0) * T::pi();
+        let t424 = T::nearest(3.0) * t58;
+        let t437 = t354 * parameters.A;
+        let t438 = T::nearest(0.005) * t437;
+        let t439 = t438 * parameters.E;
+        let t440 = t439 * parameters.nu;
+        let t441 = parameters.rho0 * t103;
+        let t442 = t441 * t112;
+        let t443 = t440 / t442;
+        let t445 = T::nearest(9.0) * T::pi();
+        let t452 = T::nearest(6.0) * T::pi();
+        let t458 = T::nearest(2.0) * T::pi();
+        let t467 = T::nearest(2.0) * t105;
+        let t481 = T::nearest(4.0) * t105;
+        let t483 = T::nearest(3.0) * t105;
+        let t487 = T::nearest(4.0) * parameters.E;
+        let t488 = t487 * parameters.nu;
+        let t489 = t488 / t118;
+        let t492 = T::nearest(2.0) * parameters.E;
+        let t493 = t492 * parameters.nu;
+        let t494 = t493 / t118;
+        let t500 = t438 / parameters.rho0;
+        let t504 = T::nearest(5.4) * t355;
+        let t505 = t504 * t352;
+        let t506 = t505 / parameters.rho0;
+        let t515 = T::nearest(0.6) * t437;
+        let t516 = t515 / parameters.rho0;
+        let t519 = T::nearest(0.2) * t354;
+        let t520 = t519 * parameters.E;
+        let t521 = t520 * parameters.nu;
+        let t522 = t521 / t442;
+        let t524 = T::nearest(6.0) * t352;
+        let t528 = T::nearest(3.0) * t352;
+        let t532 = T::nearest(0.1) * t354;
         let t533 = t532 / parameters.rho0;
-        let t538 = T::nearest(0.2) * t354;
-        let t539 = t538 * parameters.E;
-        let t540 = t539 * parameters.nu;
-        let t541 = t540 / t452;
-        let t543 = T::nearest(6.0) * t352;
-        let t547 = T::nearest(3.0) * t352;
-        let t551 = T::nearest(0.1) * t354;
-        let t552 = t551 / parameters.rho0;
-        let t561 = T::nearest(0.002) * t447;
-        let t562 = t561 * t352;
-        let t563 = t562 / parameters.rho0;
-        let t570 = T::nearest(0.005) * t354;
-        let t571 = t570 * parameters.E;
-        let t572 = t571 * parameters.nu;
-        let t573 = t572 / t452;
-        let t576 = T::nearest(4.0) * t352;
-        let t581 = t570 / parameters.rho0;
-        let t587 = t184 * parameters.E;
-        let t588 = t587 * parameters.nu;
-        let t589 = t588 / t452;
-        let t597 = T::nearest(81.0) * t447;
-        let t598 = t597 * t352;
-        let t599 = t598 / parameters.rho0;
-        let t603 = T::nearest(54.0) * t354;
-        let t604 = t603 * t352;
-        let t605 = t604 / parameters.rho0;
-        let t610 = t174 * parameters.E;
-        let t611 = t610 * parameters.nu;
-        let t612 = t611 / t452;
-        let t624 = T::nearest(2.0) / t21;
-        let t629 = t42 * T::pi();
-        let t671 = T::nearest(2.0).cos();
-        let t672 = T::pi() * t671;
-        let t677 = T::nearest(2.0).sin();
-        let t678 = T::nearest(4.0) * t677;
-        let t713 = parameters.A * t105;
+        let t536 = T::nearest(0.002) * t437;
+        let t537 = t536 * t352;
+        let t538 = t537 / parameters.rho0;
+        let t543 = T::nearest(0.005) * t354;
+        let t544 = t543 * parameters.E;
+        let t545 = t544 * parameters.nu;
+        let t546 = t545 / t442;
+        let t549 = T::nearest(4.0) * t352;
+        let t554 = t543 / parameters.rho0;
+        let t556 = t184 * parameters.E;
+        let t557 = t556 * parameters.nu;
+        let t558 = t557 / t442;
+        let t560 = T::nearest(81.0) * t437;
+        let t561 = t560 * t352;
+        let t562 = t561 / parameters.rho0;
+        let t564 = T::nearest(54.0) * t354;
+        let t565 = t564 * t352;
+        let t566 = t565 / parameters.rho0;
+        let t567 = t174 * parameters.E;
+        let t568 = t567 * parameters.nu;
+        let t569 = t568 / t442;
+        let t570 = T::nearest(2.0) / t21;
+        let t575 = t42 * T::pi();
+        let t617 = T::nearest(2.0).cos();
+        let t618 = T::pi() * t617;
+        let t623 = T::nearest(2.0).sin();
+        let t624 = T::nearest(4.0) * t623;
+        let t659 = parameters.A * t105;
+        let t720 = parameters.A * t42;
+        let t783 = t165 * t171;
+        let t786 = T::nearest(95.0) * t168;
+        let t787 = t786 * t171;
+        let t790 = t168 * t171;
+        let t794 = T::nearest(45.0) * t161;
+        let t795 = t794 * t168;
+        let t796 = t795 * t171;
+        let t799 = t161 * t168;
+        let t800 = t799 * t171;
+        let t807 = t288 * t294;
+        let t810 = t168 * t294;
+        let t813 = t168 * T::nearest(30.0);
+        let t814 = t813 * t294;
+        let t818 = t168 * T::nearest(60.0);
+        let t819 = t818 * t284;
+        let t820 = t819 * t294;
+        let t823 = t168 * t284;
+        let t824 = t823 * t294;
+        let t840 = t42 * t75;
+        let t850 = t720 * t75;
+        let t854 = t75 * t75;
+        let t861 = t119 * t267;
+        let t865 = t105 * t267;
+        let t868 = t75 * t267;
+        let t871 = t228 * t267;
+        let t875 = parameters.A * t267;
+        let t881 = t720 * t105;
+        let t884 = t42 * t105;
+        let t893 = parameters.A * t119;
+        let t894 = t893 * t267;
+        let t897 = t881 * t267;
+        let t900 = t354 * t42;
+        let t901 = t900 * t105;
+        let t902 = t901 * t267;
+        let t906 = parameters.A * t75;
+        let t907 = t906 * t105;
+        let t908 = t907 * t267;
+        let t917 = T::nearest(3.0) * t42;
+        let t929 = t354 * t119;
+        let t930 = t929 * t267;
+        let t933 = t893 * t174;
+        let t934 = t933 * t267;
+        let t938 = t893 * t184;
+        let t939 = t938 * t267;
+        let t944 = t659 * t184;
+        let t945 = t944 * t267;
+        let t949 = t659 * t174;
+        let t950 = t949 * t267;
+        let t954 = t354 * t105;
+        let t955 = t954 * t267;
         Ok(Skew2d {
             parameters,
             fixed: [
@@ -256,41 +307,73 @@ impl<T: crate::Real> Skew2d<T> {
                 t346,
                 t352,
                 t361,
-                t369,
+                t366,
+                t402,
                 t408,
                 t414,
+                t422,
                 t424,
-                t432,
-                t434,
-                t453,
-                t455,
-                t462,
-                t468,
-                t477,
-                t491,
-                t493,
-                t499,
-                t504,
-                t510,
-                t521,
+                t443,
+                t445,
+                t452,
+                t458,
+                t467,
+                t481,
+                t483,
+                t489,
+                t494,
+                t500,
+                t506,
+                t516,
+                t522,
+                t524,
+                t528,
                 t533,
-                t541,
-                t543,
-                t547,
-                t552,
-                t563,
-                t573,
-                t576,
-                t581,
-                t589,
-                t599,
-                t605,
-                t612,
+                t538,
+                t546,
+                t549,
+                t554,
+                t558,
+                t562,
+                t566,
+                t569,
+                t570,
+                t575,
+                t618,
                 t624,
-                t629,
-                t672,
-                t678,
-                t713,
+                t659,
+                t720,
+                t783,
+                t787,
+                t790,
+                t796,
+                t800,
+                t807,
+                t810,
+                t814,
+                t820,
+                t824,
+                t840,
+                t850,
+                t854,
+                t861,
+                t865,
+                t868,
+                t871,
+                t875,
+                t881,
+                t884,
+                t894,
+                t897,
+                t902,
+                t908,
+                t917,
+                t930,
+                t934,
+                t939,
+                t945,
+                t950,
+                t955,
             ],
         })
     }
@@ -1243,40 +1326,40 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t76 = self.fixed[7] * t23;
                 let t84 = t29.cos_pi();
                 let t136 = self.fixed[10] * t23;
-                let t626 = X[1].cos();
-                let t627 = t76 * t626;
-                let t628 = t627 + T::one();
-                let t630 = self.fixed[57] * t40;
-                let t631 = t630 * t84;
-                let t632 = t631 + T::one();
-                let t633 = t43 * t33;
-                let t634 = t628 * t632;
-                let t635 = t24 * t626;
-                let t636 = t635 * t633;
-                let t637 = t634 - t636;
-                let t638 = t627 * t632;
-                let t639 = t636 - t638;
-                let t640 = T::one() / t637;
-                let t641 = t639 * t640;
-                let t642 = t627 - t641;
-                let t643 = t638 + t631;
-                let t644 = t643 - t636;
-                let t645 = t644.log_1p();
-                let t646 = self.fixed[8] * t642;
-                let t647 = t632 * t645;
-                let t648 = t647 * t640;
-                let t649 = self.fixed[9] * t648;
-                let t650 = t646 + t649;
-                let t651 = -t650;
-                let t652 = t635 * t640;
-                let t653 = t633 + t652;
-                let t654 = self.fixed[8] * t653;
-                let t655 = t136 * t626;
-                let t656 = t645 * t640;
-                let t657 = t655 * t656;
-                let t658 = t654 - t657;
-                let t659 = -t658;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t651, t659))
+                let t572 = X[1].cos();
+                let t573 = t76 * t572;
+                let t574 = t573 + T::one();
+                let t576 = self.fixed[57] * t40;
+                let t577 = t576 * t84;
+                let t578 = t577 + T::one();
+                let t579 = t43 * t33;
+                let t580 = t574 * t578;
+                let t581 = t24 * t572;
+                let t582 = t581 * t579;
+                let t583 = t580 - t582;
+                let t584 = t573 * t578;
+                let t585 = t582 - t584;
+                let t586 = T::one() / t583;
+                let t587 = t585 * t586;
+                let t588 = t573 - t587;
+                let t589 = t584 + t577;
+                let t590 = t589 - t582;
+                let t591 = t590.log_1p();
+                let t592 = self.fixed[8] * t588;
+                let t593 = t578 * t591;
+                let t594 = t593 * t586;
+                let t595 = self.fixed[9] * t594;
+                let t596 = t592 + t595;
+                let t597 = -t596;
+                let t598 = t581 * t586;
+                let t599 = t579 + t598;
+                let t600 = self.fixed[8] * t599;
+                let t601 = t136 * t572;
+                let t602 = t591 * t586;
+                let t603 = t601 * t602;
+                let t604 = t600 - t603;
+                let t605 = -t604;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t597, t605))
             }
             crate::Surface::Upper(0) => {
                 let t22 = self.fixed[0] * t;
@@ -1293,50 +1376,50 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t76 = self.fixed[7] * t23;
                 let t84 = t29.cos_pi();
                 let t136 = self.fixed[10] * t23;
-                let t467 = T::nearest(2.0) * X[1];
-                let t660 = T::nearest(3.0).sum_error(X[1]);
-                let t661 = T::nearest(3.0) + X[1];
-                let t662 = t661.cos();
-                let t663 = t661.sin();
-                let t664 = T::nearest(0.5) * t660;
-                let t665 = t664 * t662;
-                let t666 = t663 + t665;
-                let t667 = t660 * t666;
-                let t668 = t662 - t667;
-                let t669 = t76 * t668;
-                let t670 = t669 + T::one();
-                let t673 = self.fixed[58] * t84;
-                let t674 = t467 + t673;
-                let t675 = t43 * t674;
-                let t676 = t675 + T::one();
-                let t679 = self.fixed[59] * t30;
-                let t680 = t33 - t679;
-                let t681 = t43 * t680;
-                let t682 = t670 * t676;
-                let t683 = t24 * t668;
-                let t684 = t683 * t681;
-                let t685 = t682 - t684;
-                let t686 = t669 * t676;
-                let t687 = t684 - t686;
-                let t688 = T::one() / t685;
-                let t689 = t687 * t688;
-                let t690 = t669 - t689;
-                let t691 = t686 + t675;
-                let t692 = t691 - t684;
-                let t693 = t692.log_1p();
-                let t694 = self.fixed[8] * t690;
-                let t695 = t676 * t693;
-                let t696 = t695 * t688;
-                let t697 = self.fixed[9] * t696;
-                let t698 = t694 + t697;
-                let t699 = t683 * t688;
-                let t700 = t681 + t699;
-                let t701 = self.fixed[8] * t700;
-                let t702 = t136 * t668;
-                let t703 = t693 * t688;
-                let t704 = t702 * t703;
-                let t705 = t701 - t704;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t698, t705))
+                let t457 = T::nearest(2.0) * X[1];
+                let t606 = T::nearest(3.0).sum_error(X[1]);
+                let t607 = T::nearest(3.0) + X[1];
+                let t608 = t607.cos();
+                let t609 = t607.sin();
+                let t610 = T::nearest(0.5) * t606;
+                let t611 = t610 * t608;
+                let t612 = t609 + t611;
+                let t613 = t606 * t612;
+                let t614 = t608 - t613;
+                let t615 = t76 * t614;
+                let t616 = t615 + T::one();
+                let t619 = self.fixed[58] * t84;
+                let t620 = t457 + t619;
+                let t621 = t43 * t620;
+                let t622 = t621 + T::one();
+                let t625 = self.fixed[59] * t30;
+                let t626 = t33 - t625;
+                let t627 = t43 * t626;
+                let t628 = t616 * t622;
+                let t629 = t24 * t614;
+                let t630 = t629 * t627;
+                let t631 = t628 - t630;
+                let t632 = t615 * t622;
+                let t633 = t630 - t632;
+                let t634 = T::one() / t631;
+                let t635 = t633 * t634;
+                let t636 = t615 - t635;
+                let t637 = t632 + t621;
+                let t638 = t637 - t630;
+                let t639 = t638.log_1p();
+                let t640 = self.fixed[8] * t636;
+                let t641 = t622 * t639;
+                let t642 = t641 * t634;
+                let t643 = self.fixed[9] * t642;
+                let t644 = t640 + t643;
+                let t645 = t629 * t634;
+                let t646 = t627 + t645;
+                let t647 = self.fixed[8] * t646;
+                let t648 = t136 * t614;
+                let t649 = t639 * t634;
+                let t650 = t648 * t649;
+                let t651 = t647 - t650;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t644, t651))
             }
             crate::Surface::Lower(1) => {
                 let t3 = T::nearest(3.0).product_error(X[0]);
@@ -1350,32 +1433,32 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t39 = T::nearest(4.0) * t36;
                 let t40 = t37 + t39;
                 let t76 = self.fixed[7] * t23;
-                let t630 = self.fixed[57] * t40;
-                let t706 = t4.cos();
-                let t707 = t4.sin();
-                let t708 = T::nearest(0.5) * t3;
-                let t709 = t708 * t706;
-                let t710 = t707 + t709;
-                let t711 = t3 * t710;
-                let t712 = t706 - t711;
-                let t714 = self.fixed[60] * t23;
-                let t715 = t714 * t712;
-                let t716 = -t715;
-                let t717 = t630 * t28;
-                let t718 = t717 + T::one();
-                let t719 = T::one() / t718;
-                let t720 = t719 + T::one();
-                let t721 = t76 * t712;
-                let t722 = t721 * t718;
-                let t723 = t722 + t717;
-                let t724 = t723.log_1p();
-                let t725 = t717 * t720;
-                let t726 = self.fixed[8] * t725;
-                let t727 = t724 * t719;
-                let t728 = self.fixed[9] * t727;
-                let t729 = t726 + t728;
-                let t730 = -t729;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t716, t730))
+                let t576 = self.fixed[57] * t40;
+                let t652 = t4.cos();
+                let t653 = t4.sin();
+                let t654 = T::nearest(0.5) * t3;
+                let t655 = t654 * t652;
+                let t656 = t653 + t655;
+                let t657 = t3 * t656;
+                let t658 = t652 - t657;
+                let t660 = self.fixed[60] * t23;
+                let t661 = t660 * t658;
+                let t662 = -t661;
+                let t663 = t576 * t28;
+                let t664 = t663 + T::one();
+                let t665 = T::one() / t664;
+                let t666 = t665 + T::one();
+                let t667 = t76 * t658;
+                let t668 = t667 * t664;
+                let t669 = t668 + t663;
+                let t670 = t669.log_1p();
+                let t671 = t663 * t666;
+                let t672 = self.fixed[8] * t671;
+                let t673 = t670 * t665;
+                let t674 = self.fixed[9] * t673;
+                let t675 = t672 + t674;
+                let t676 = -t675;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t662, t676))
             }
             crate::Surface::Upper(1) => {
                 let t3 = T::nearest(3.0).product_error(X[0]);
@@ -1392,49 +1475,49 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t76 = self.fixed[7] * t23;
                 let t79 = t27.sin();
                 let t185 = self.fixed[17] * t40;
-                let t731 = T::one().sum_error(t4);
-                let t732 = T::one() + t4;
-                let t733 = t3 + t731;
-                let t734 = t732.cos();
-                let t735 = t732.sin();
-                let t736 = T::nearest(0.5) * t733;
-                let t737 = t736 * t734;
-                let t738 = t735 + t737;
-                let t739 = t733 * t738;
-                let t740 = t734 - t739;
-                let t741 = T::nearest(4.0) * t79;
-                let t742 = T::one() - t741;
-                let t743 = t43 * t742;
-                let t744 = t76 * t740;
-                let t745 = t744 + T::one();
-                let t746 = t185 * X[0];
-                let t747 = t746 + T::one();
-                let t748 = t745 * t747;
-                let t749 = t24 * t740;
-                let t750 = t749 * t743;
-                let t751 = t748 - t750;
-                let t752 = T::one() / t751;
-                let t753 = t743 * t752;
-                let t754 = t749 + t753;
-                let t755 = t744 * t747;
-                let t756 = t755 + t746;
-                let t757 = t756 - t750;
-                let t758 = t757.log_1p();
-                let t759 = self.fixed[8] * t754;
-                let t760 = t743 * t758;
-                let t761 = t760 * t752;
-                let t762 = self.fixed[9] * t761;
-                let t763 = t759 - t762;
-                let t764 = t745 * t746;
-                let t765 = t750 - t764;
-                let t766 = t765 * t752;
-                let t767 = t746 - t766;
-                let t768 = self.fixed[8] * t767;
-                let t769 = t745 * t758;
-                let t770 = t769 * t752;
-                let t771 = self.fixed[9] * t770;
-                let t772 = t768 + t771;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t763, t772))
+                let t677 = T::one().sum_error(t4);
+                let t678 = T::one() + t4;
+                let t679 = t3 + t677;
+                let t680 = t678.cos();
+                let t681 = t678.sin();
+                let t682 = T::nearest(0.5) * t679;
+                let t683 = t682 * t680;
+                let t684 = t681 + t683;
+                let t685 = t679 * t684;
+                let t686 = t680 - t685;
+                let t687 = T::nearest(4.0) * t79;
+                let t688 = T::one() - t687;
+                let t689 = t43 * t688;
+                let t690 = t76 * t686;
+                let t691 = t690 + T::one();
+                let t692 = t185 * X[0];
+                let t693 = t692 + T::one();
+                let t694 = t691 * t693;
+                let t695 = t24 * t686;
+                let t696 = t695 * t689;
+                let t697 = t694 - t696;
+                let t698 = T::one() / t697;
+                let t699 = t689 * t698;
+                let t700 = t695 + t699;
+                let t701 = t690 * t693;
+                let t702 = t701 + t692;
+                let t703 = t702 - t696;
+                let t704 = t703.log_1p();
+                let t705 = self.fixed[8] * t700;
+                let t706 = t689 * t704;
+                let t707 = t706 * t698;
+                let t708 = self.fixed[9] * t707;
+                let t709 = t705 - t708;
+                let t710 = t691 * t692;
+                let t711 = t696 - t710;
+                let t712 = t711 * t698;
+                let t713 = t692 - t712;
+                let t714 = self.fixed[8] * t713;
+                let t715 = t691 * t704;
+                let t716 = t715 * t698;
+                let t717 = self.fixed[9] * t716;
+                let t718 = t714 + t717;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t709, t718))
             }
             _ => None,
         }
@@ -1487,7 +1570,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 15, 18>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 49, 18>::new(*self, X))
     }
     fn state_at(
         &self,
@@ -1497,9 +1580,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 2, 15, 18> for Skew2d<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 2, 49, 18> for Skew2d<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 15] {
+    fn body_force_time(&self, t: T) -> [T; 49] {
         let t22 = self.fixed[0] * t;
         let t23 = t22.cos_pi();
         let t24 = self.parameters.A * t23;
@@ -1509,32 +1592,103 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 15, 18> for Skew2d<T> {
         let t40 = t37 + t39;
         let t43 = self.fixed[1] * t40;
         let t76 = self.fixed[7] * t23;
-        let t154 = T::nearest(45.0) * t23;
-        let t159 = T::nearest(95.0) * t23;
-        let t166 = self.fixed[12] * t23;
         let t175 = self.fixed[15] * t23;
         let t180 = self.fixed[16] * t40;
         let t185 = self.fixed[17] * t40;
         let t229 = self.fixed[18] * t40;
-        let t273 = T::nearest(60.0) * t23;
-        let t282 = T::nearest(30.0) * t23;
-        let t289 = self.fixed[21] * t40;
+        let t721 = t23 * t40;
+        let t722 = self.fixed[61] * t721;
+        let t727 = self.fixed[25] * t23;
+        let t729 = self.fixed[26] * t40;
+        let t746 = self.fixed[42] * t23;
+        let t756 = self.fixed[48] * t40;
+        let t762 = t40 * t40;
+        let t765 = self.fixed[52] * t40;
+        let t769 = t23 * t23;
+        let t770 = t769 * t23;
+        let t771 = self.fixed[53] * t770;
+        let t773 = self.fixed[54] * t769;
+        let t777 = self.fixed[55] * t23;
+        let t784 = self.fixed[62] * t23;
+        let t788 = self.fixed[63] * t23;
+        let t791 = self.fixed[64] * t40;
+        let t797 = self.fixed[65] * t23;
+        let t801 = self.fixed[66] * t40;
+        let t808 = self.fixed[67] * t40;
+        let t811 = self.fixed[68] * t40;
+        let t815 = self.fixed[69] * t23;
+        let t821 = self.fixed[70] * t23;
+        let t825 = self.fixed[71] * t40;
+        let t841 = self.fixed[72] * t721;
+        let t851 = t769 * t40;
+        let t852 = self.fixed[73] * t851;
+        let t855 = self.fixed[74] * t769;
+        let t869 = self.fixed[77] * t23;
+        let t872 = self.fixed[78] * t40;
+        let t876 = self.fixed[79] * t23;
+        let t882 = self.fixed[80] * t721;
+        let t885 = self.fixed[81] * t40;
+        let t895 = self.fixed[82] * t23;
+        let t898 = self.fixed[83] * t721;
+        let t903 = self.fixed[84] * t851;
+        let t909 = self.fixed[85] * t769;
+        let t918 = self.fixed[86] * t40;
+        let t931 = self.fixed[87] * t769;
+        let t935 = self.fixed[88] * t769;
+        let t940 = self.fixed[89] * t721;
+        let t946 = self.fixed[90] * t721;
+        let t951 = self.fixed[91] * t769;
+        let t956 = self.fixed[92] * t769;
         [
             t23,
             t24,
             t40,
             t43,
             t76,
-            t154,
-            t159,
-            t166,
             t175,
             t180,
             t185,
             t229,
-            t273,
-            t282,
-            t289,
+            t721,
+            t722,
+            t727,
+            t729,
+            t746,
+            t756,
+            t762,
+            t765,
+            t771,
+            t773,
+            t777,
+            t784,
+            t788,
+            t791,
+            t797,
+            t801,
+            t808,
+            t811,
+            t815,
+            t821,
+            t825,
+            t841,
+            t852,
+            t855,
+            t869,
+            t872,
+            t876,
+            t882,
+            t885,
+            t895,
+            t898,
+            t903,
+            t909,
+            t918,
+            t931,
+            t935,
+            t940,
+            t946,
+            t951,
+            t956,
         ]
     }
     #[inline]
@@ -1584,136 +1738,136 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 15, 18> for Skew2d<T> {
         let t349 = T::nearest(6.0) * t87;
         let t350 = t82 - t347;
         let t351 = t350 - t349;
-        let t373 = T::nearest(4.0) * t31;
-        let t374 = T::nearest(3.0) * t152;
-        let t375 = t373 + t374;
-        let t376 = T::nearest(2.0) * t375;
-        let t377 = t74 * t376;
-        let t378 = t16 * t351;
-        let t379 = T::nearest(3.0) * t378;
-        let t380 = t377 + t379;
-        let t381 = t16 * t82;
+        let t367 = T::nearest(4.0) * t31;
+        let t368 = T::nearest(3.0) * t152;
+        let t369 = t367 + t368;
+        let t370 = T::nearest(2.0) * t369;
+        let t371 = t74 * t370;
+        let t372 = t16 * t351;
+        let t373 = T::nearest(3.0) * t372;
+        let t374 = t371 + t373;
+        let t375 = t16 * t82;
+        let t376 = T::nearest(3.0) * t375;
+        let t377 = t31 * t74;
+        let t378 = T::nearest(8.0) * t377;
+        let t379 = t376 + t378;
+        let t380 = t74 * t152;
+        let t381 = t380 + t372;
         let t382 = T::nearest(3.0) * t381;
-        let t383 = t31 * t74;
-        let t384 = T::nearest(8.0) * t383;
-        let t385 = t382 + t384;
-        let t386 = t74 * t152;
-        let t387 = t386 + t378;
-        let t388 = T::nearest(3.0) * t387;
-        let t389 = T::nearest(4.0) * t383;
-        let t390 = t388 + t389;
-        let t391 = t386 * t351;
-        let t392 = t89 * t390;
-        let t393 = t391 + t392;
-        let t394 = T::nearest(6.0) * t393;
-        let t395 = t82 * t380;
-        let t396 = t385 * t351;
-        let t397 = t395 - t394;
-        let t398 = t397 - t396;
-        let t399 = T::nearest(2.0) * t386;
-        let t400 = t16 * t89;
-        let t401 = T::nearest(3.0) * t400;
-        let t402 = t399 - t401;
-        let t403 = t351 * t402;
-        let t404 = T::nearest(6.0) * t403;
-        let t405 = self.fixed[9] * t404;
-        let t406 = self.fixed[8] * t398;
-        let t409 = self.fixed[27] * t391;
-        let t410 = t405 + t406;
-        let t411 = t410 + t409;
-        let t415 = t74 * t411;
-        let t416 = self.fixed[28] * t415;
-        let t425 = t74 * t89;
-        let t426 = t425 * t152;
-        let t427 = t426 * t351;
-        let t428 = self.fixed[29] * t427;
-        let t429 = -t428;
-        let t430 = T::nearest(12.0) * X[0];
-        let t431 = T::nearest(4.0) * X[1];
-        let t433 = self.fixed[30] * t150;
-        let t435 = self.fixed[31] * t31;
-        let t436 = t430 - t431;
-        let t437 = t436 + t433;
-        let t438 = t437 - t435;
-        let t439 = T::nearest(2.0) * t378;
-        let t440 = t74 * t438;
-        let t441 = t439 + t440;
-        let t442 = t89 * t380;
-        let t443 = T::nearest(2.0) * t442;
-        let t444 = t82 * t441;
-        let t445 = t443 - t444;
-        let t454 = self.fixed[32] * t445;
-        let t456 = self.fixed[33] * t85;
-        let t458 = T::nearest(18.0) * t87;
-        let t459 = T::nearest(2.0) * t400;
-        let t460 = t74 * t226;
-        let t461 = t459 - t460;
-        let t463 = self.fixed[34] * t85;
-        let t464 = T::nearest(12.0) * t87;
-        let t465 = t82 - t463;
-        let t466 = t465 - t464;
-        let t467 = T::nearest(2.0) * X[1];
-        let t469 = self.fixed[35] * t150;
-        let t470 = t430 - t467;
-        let t471 = t470 + t469;
-        let t472 = t471 - t435;
-        let t473 = t16 * t466;
-        let t474 = t74 * t472;
-        let t475 = t473 + t474;
-        let t476 = self.fixed[9] * t441;
-        let t478 = self.fixed[36] * t475;
-        let t479 = t476 + t478;
-        let t480 = t152 * t466;
-        let t481 = T::nearest(2.0) * t480;
-        let t482 = t74 * t481;
-        let t483 = t89 * t385;
-        let t484 = t482 + t483;
-        let t485 = T::nearest(2.0) * t33;
-        let t486 = T::nearest(8.0) * t80;
-        let t487 = t485 - t486;
-        let t488 = t487 - t456;
-        let t489 = t488 - t458;
-        let t490 = t386 * t489;
-        let t492 = self.fixed[37] * t490;
-        let t494 = self.fixed[38] * t461;
-        let t495 = t494 + t479;
-        let t496 = t82 * t495;
-        let t500 = self.fixed[39] * t391;
-        let t501 = self.fixed[36] * t483;
-        let t505 = self.fixed[40] * t484;
-        let t506 = t492 - t496;
-        let t507 = t506 + t500;
-        let t508 = t507 + t501;
-        let t509 = t508 + t505;
-        let t511 = self.fixed[41] * t509;
-        let t524 = T::nearest(9.0) * t400;
-        let t525 = t389 + t524;
-        let t526 = t390 - t525;
-        let t527 = self.fixed[9] * t526;
-        let t528 = t386 + t473;
-        let t529 = self.fixed[38] * t528;
-        let t530 = t527 + t529;
-        let t534 = t74 * t530;
-        let t535 = self.fixed[43] * t534;
-        let t542 = self.fixed[44] * t390;
-        let t544 = self.fixed[45] * t152;
-        let t545 = t74 * t544;
-        let t546 = t385 * self.fixed[24];
-        let t548 = self.fixed[46] * t381;
-        let t549 = t545 - t546;
-        let t550 = t549 - t548;
-        let t553 = self.fixed[47] * t550;
-        let t566 = t82 * t226;
-        let t567 = t89 * t152;
-        let t568 = T::nearest(4.0) * t567;
-        let t569 = t566 - t568;
-        let t574 = self.fixed[49] * t569;
-        let t575 = -t574;
-        let t577 = self.fixed[50] * t152;
-        let t578 = t89 * t577;
-        let t579 = self.fixed[24] * t566;
-        let t580 = t578 + t579;
-        let t582 = self.fixed[51] * t580;
+        let t383 = T::nearest(4.0) * t377;
+        let t384 = t382 + t383;
+        let t385 = t380 * t351;
+        let t386 = t89 * t384;
+        let t387 = t385 + t386;
+        let t388 = T::nearest(6.0) * t387;
+        let t389 = t82 * t374;
+        let t390 = t379 * t351;
+        let t391 = t389 - t388;
+        let t392 = t391 - t390;
+        let t393 = T::nearest(2.0) * t380;
+        let t394 = t16 * t89;
+        let t395 = T::nearest(3.0) * t394;
+        let t396 = t393 - t395;
+        let t397 = t351 * t396;
+        let t398 = T::nearest(6.0) * t397;
+        let t399 = self.fixed[9] * t398;
+        let t400 = self.fixed[8] * t392;
+        let t403 = self.fixed[27] * t385;
+        let t404 = t399 + t400;
+        let t405 = t404 + t403;
+        let t409 = t74 * t405;
+        let t410 = self.fixed[28] * t409;
+        let t415 = t74 * t89;
+        let t416 = t415 * t152;
+        let t417 = t416 * t351;
+        let t418 = self.fixed[29] * t417;
+        let t419 = -t418;
+        let t420 = T::nearest(12.0) * X[0];
+        let t421 = T::nearest(4.0) * X[1];
+        let t423 = self.fixed[30] * t150;
+        let t425 = self.fixed[31] * t31;
+        let t426 = t420 - t421;
+        let t427 = t426 + t423;
+        let t428 = t427 - t425;
+        let t429 = T::nearest(2.0) * t372;
+        let t430 = t74 * t428;
+        let t431 = t429 + t430;
+        let t432 = t89 * t374;
+        let t433 = T::nearest(2.0) * t432;
+        let t434 = t82 * t431;
+        let t435 = t433 - t434;
+        let t444 = self.fixed[32] * t435;
+        let t446 = self.fixed[33] * t85;
+        let t448 = T::nearest(18.0) * t87;
+        let t449 = T::nearest(2.0) * t394;
+        let t450 = t74 * t226;
+        let t451 = t449 - t450;
+        let t453 = self.fixed[34] * t85;
+        let t454 = T::nearest(12.0) * t87;
+        let t455 = t82 - t453;
+        let t456 = t455 - t454;
+        let t457 = T::nearest(2.0) * X[1];
+        let t459 = self.fixed[35] * t150;
+        let t460 = t420 - t457;
+        let t461 = t460 + t459;
+        let t462 = t461 - t425;
+        let t463 = t16 * t456;
+        let t464 = t74 * t462;
+        let t465 = t463 + t464;
+        let t466 = self.fixed[9] * t431;
+        let t468 = self.fixed[36] * t465;
+        let t469 = t466 + t468;
+        let t470 = t152 * t456;
+        let t471 = T::nearest(2.0) * t470;
+        let t472 = t74 * t471;
+        let t473 = t89 * t379;
+        let t474 = t472 + t473;
+        let t475 = T::nearest(2.0) * t33;
+        let t476 = T::nearest(8.0) * t80;
+        let t477 = t475 - t476;
+        let t478 = t477 - t446;
+        let t479 = t478 - t448;
+        let t480 = t380 * t479;
+        let t482 = self.fixed[37] * t480;
+        let t484 = self.fixed[38] * t451;
+        let t485 = t484 + t469;
+        let t486 = t82 * t485;
+        let t490 = self.fixed[39] * t385;
+        let t491 = self.fixed[36] * t473;
+        let t495 = self.fixed[40] * t474;
+        let t496 = t482 - t486;
+        let t497 = t496 + t490;
+        let t498 = t497 + t491;
+        let t499 = t498 + t495;
+        let t501 = self.fixed[41] * t499;
+        let t507 = T::nearest(9.0) * t394;
+        let t508 = t383 + t507;
+        let t509 = t384 - t508;
+        let t510 = self.fixed[9] * t509;
+        let t511 = t380 + t463;
+        let t512 = self.fixed[38] * t511;
+        let t513 = t510 + t512;
+        let t517 = t74 * t513;
+        let t518 = self.fixed[43] * t517;
+        let t523 = self.fixed[44] * t384;
+        let t525 = self.fixed[45] * t152;
+        let t526 = t74 * t525;
+        let t527 = t379 * self.fixed[24];
+        let t529 = self.fixed[46] * t375;
+        let t530 = t526 - t527;
+        let t531 = t530 - t529;
+        let t534 = self.fixed[47] * t531;
+        let t539 = t82 * t226;
+        let t540 = t89 * t152;
+        let t541 = T::nearest(4.0) * t540;
+        let t542 = t539 - t541;
+        let t547 = self.fixed[49] * t542;
+        let t548 = -t547;
+        let t550 = self.fixed[50] * t152;
+        let t551 = t89 * t550;
+        let t552 = self.fixed[24] * t539;
+        let t553 = t551 + t552;
+        let t555 = self.fixed[51] * t553;
         [
             t16,
             t31,
@@ -1724,209 +1878,198 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 15, 18> for Skew2d<T> {
             t152,
             t226,
             t351,
-            t416,
-            t429,
-            t454,
-            t511,
-            t535,
-            t542,
-            t553,
-            t575,
-            t582,
+            t410,
+            t419,
+            t444,
+            t501,
+            t518,
+            t523,
+            t534,
+            t548,
+            t555,
         ]
     }
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
-        time: &[T; 15],
+        time: &[T; 49],
         point: &[T; 18],
     ) -> crate::nalgebra::SVector<T, 2> {
         let t77 = time[4] * point[3];
-        let t78 = time[1] * point[3];
         let t83 = time[3] * point[4];
         let t90 = time[3] * point[5];
         let t92 = t77 + T::one();
         let t98 = t90 + T::one();
         let t99 = t92 * t98;
-        let t100 = t78 * t83;
-        let t101 = t99 - t100;
-        let t106 = t77 * t98;
-        let t107 = t100 - t106;
-        let t108 = T::one() / t101;
-        let t113 = t106 + t90;
-        let t114 = t113 - t100;
-        let t115 = t114.log_1p();
         let t141 = t90 * t92;
-        let t142 = t100 - t141;
-        let t155 = time[5] * point[0];
-        let t156 = time[2] * point[6];
-        let t157 = t155 - t156;
-        let t160 = time[6] * point[0];
-        let t162 = self.fixed[11] * t157;
-        let t163 = t160 - t156;
-        let t164 = t163 + t162;
-        let t167 = time[7] * point[0];
-        let t169 = self.fixed[13] * t164;
-        let t170 = t167 - t169;
-        let t172 = self.fixed[14] * t170;
-        let t176 = time[8] * point[0];
-        let t177 = -t176;
-        let t181 = time[9] * point[1];
-        let t182 = -t181;
-        let t186 = time[10] * point[6];
+        let t181 = time[6] * point[1];
+        let t186 = time[7] * point[6];
         let t187 = T::nearest(3.0) * point[0];
-        let t188 = t187 * t83;
-        let t189 = point[3] * t182;
-        let t190 = t188 - t189;
-        let t191 = self.parameters.A * t190;
-        let t192 = time[0] * t191;
-        let t193 = t98 * t177;
-        let t194 = t92 * t186;
-        let t195 = t192 + t193;
-        let t196 = t195 + t194;
-        let t197 = time[1] * t190;
-        let t215 = t193 + t194;
-        let t216 = t215 + t197;
-        let t219 = self.fixed[9] * t115;
-        let t222 = time[4] * point[0];
-        let t223 = -t222;
-        let t230 = time[11] * point[7];
         let t231 = point[0] * t83;
         let t232 = point[3] * t186;
         let t233 = t231 - t232;
-        let t234 = t98 * t223;
-        let t235 = t92 * t230;
         let t236 = time[1] * t233;
-        let t237 = t234 + t235;
-        let t238 = t237 + t236;
-        let t239 = time[0] * t233;
-        let t240 = self.parameters.A * t239;
-        let t241 = t240 + t234;
-        let t242 = t241 + t235;
-        let t274 = time[12] * point[0];
-        let t275 = time[2] * point[7];
-        let t276 = t274 - t275;
         let t278 = T::nearest(8.0) * point[1];
         let t279 = t278 - point[7];
-        let t280 = time[2] * t279;
-        let t283 = time[13] * point[0];
-        let t285 = self.fixed[20] * t276;
-        let t286 = t280 + t283;
-        let t287 = t286 + t285;
-        let t290 = time[14] * point[2];
-        let t291 = self.fixed[13] * t287;
-        let t292 = t290 - t291;
-        let t295 = self.fixed[22] * t292;
-        let t296 = t90 * t223;
-        let t297 = t235 + t236;
-        let t298 = t297 + t296;
-        let t299 = t242 * t142;
-        let t300 = t299 * t108;
-        let t301 = t115 * t298;
-        let t302 = t300 - t301;
-        let t303 = t230 * t142;
-        let t304 = t90 * t298;
-        let t305 = t236 + t303;
-        let t306 = t305 - t304;
-        let t307 = t90 * t142;
-        let t308 = t100 - t307;
-        let t309 = t115 * t142;
-        let t310 = self.fixed[9] * t309;
-        let t311 = self.fixed[8] * t308;
-        let t312 = t310 - t311;
-        let t313 = t90 - t100;
-        let t314 = t313 + t106;
-        let t315 = self.fixed[8] * t314;
-        let t316 = t219 + t315;
-        let t317 = t186 * t92;
-        let t318 = t317 + t193;
-        let t319 = t318 + t197;
-        let t320 = t196 * t108;
-        let t321 = self.fixed[9] * t320;
-        let t322 = self.fixed[8] * t319;
-        let t323 = t321 + t322;
-        let t324 = t216 * t108;
-        let t325 = point[3] * t324;
-        let t326 = t187 + t325;
-        let t327 = t316 * t326;
-        let t328 = point[3] * t323;
-        let t329 = t327 - t328;
-        let t330 = t223 * t107;
-        let t331 = t240 + t303;
-        let t332 = t331 + t330;
-        let t333 = t302 + t332;
-        let t334 = self.fixed[9] * t333;
-        let t335 = self.fixed[8] * t306;
-        let t336 = t312 * t238;
-        let t337 = t336 * t108;
-        let t338 = time[1] * t329;
-        let t339 = t334 + t335;
-        let t340 = t339 - t337;
-        let t341 = t340 + t338;
-        let t342 = t341 * t108;
-        let t343 = self.fixed[19] * t342;
-        let t344 = t295 + t343;
-        let t345 = -t344;
         let t357 = point[3] * point[3];
         let t358 = point[8] * point[8];
         let t362 = point[0] * t357;
-        let t363 = t362 * t358;
-        let t364 = self.fixed[25] * t363;
-        let t365 = -t364;
-        let t370 = t357 * point[6];
-        let t371 = t370 * t358;
-        let t372 = self.fixed[26] * t371;
-        let t417 = time[0] * t365;
-        let t418 = time[2] * t372;
-        let t419 = t417 + t418;
-        let t420 = t419 - point[9];
-        let t512 = time[0] * t420;
-        let t513 = time[2] * point[10];
-        let t514 = point[11] * t115;
-        let t515 = t512 + t513;
-        let t516 = t515 + t514;
-        let t517 = t516 - point[12];
-        let t522 = t362 * point[8];
-        let t523 = self.fixed[42] * t522;
-        let t536 = time[0] * t523;
-        let t537 = point[13] + t536;
-        let t554 = time[2] * t517;
-        let t555 = time[0] * t537;
-        let t556 = point[14] * t115;
-        let t557 = t554 + t555;
-        let t558 = t557 + t556;
-        let t559 = point[15] + t558;
-        let t560 = point[5] * point[5];
-        let t564 = t560 * point[6];
-        let t565 = self.fixed[48] * t564;
-        let t583 = time[2] * t565;
-        let t584 = point[16] * t115;
-        let t585 = t583 + t584;
-        let t586 = point[17] + t585;
-        let t590 = self.fixed[52] * point[6];
-        let t591 = time[0] * t559;
-        let t592 = time[2] * t586;
-        let t593 = t590 * t115;
-        let t594 = t591 + t592;
-        let t595 = t594 + t593;
-        let t600 = self.fixed[53] * t362;
-        let t601 = -t600;
-        let t606 = point[0] * point[3];
-        let t607 = self.fixed[54] * t606;
-        let t608 = time[0] * t601;
-        let t609 = t608 - t607;
-        let t613 = self.fixed[55] * point[0];
-        let t614 = -t613;
-        let t615 = time[0] * t609;
-        let t616 = t614 * t115;
-        let t617 = t615 + t616;
-        let t618 = time[2] * t595;
-        let t619 = time[0] * t617;
-        let t620 = t618 + t619;
-        let t621 = t108 * t108;
-        let t622 = t620 * t621;
-        let t623 = t622 - t172;
-        crate::nalgebra::SVector::<T, 2>::new(t623, t345)
+        let t502 = time[2] * point[10];
+        let t535 = point[5] * point[5];
+        let t719 = point[3] * point[4];
+        let t723 = time[10] * t719;
+        let t724 = t99 - t723;
+        let t725 = T::one() / t724;
+        let t726 = t725 * t725;
+        let t728 = time[11] * t362;
+        let t730 = time[12] * point[6];
+        let t731 = t730 * t357;
+        let t732 = t731 - t728;
+        let t733 = t358 * t732;
+        let t734 = t733 - point[9];
+        let t735 = time[0] * t734;
+        let t736 = t735 + t502;
+        let t737 = point[3] * t98;
+        let t738 = time[4] * t737;
+        let t739 = t738 + t90;
+        let t740 = t739 - t723;
+        let t741 = t740.log_1p();
+        let t742 = point[11] * t741;
+        let t743 = t736 + t742;
+        let t744 = t743 - point[12];
+        let t745 = time[2] * t744;
+        let t747 = time[13] * point[8];
+        let t748 = t747 * t362;
+        let t749 = point[13] + t748;
+        let t750 = time[0] * t749;
+        let t751 = t745 + t750;
+        let t752 = point[14] * t741;
+        let t753 = t751 + t752;
+        let t754 = point[15] + t753;
+        let t755 = time[9] * t754;
+        let t757 = time[14] * t535;
+        let t758 = t757 * point[6];
+        let t759 = point[16] * t741;
+        let t760 = t758 + t759;
+        let t761 = point[17] + t760;
+        let t763 = time[15] * t761;
+        let t764 = t755 + t763;
+        let t766 = time[16] * point[6];
+        let t767 = t766 * t741;
+        let t768 = t764 + t767;
+        let t772 = time[17] * t362;
+        let t774 = time[18] * point[0];
+        let t775 = t774 * point[3];
+        let t776 = t772 + t775;
+        let t778 = time[19] * point[0];
+        let t779 = t778 * t741;
+        let t780 = t776 + t779;
+        let t781 = t768 - t780;
+        let t782 = t726 * t781;
+        let t785 = time[20] * point[0];
+        let t789 = time[21] * point[0];
+        let t792 = time[22] * point[6];
+        let t793 = t789 - t792;
+        let t798 = time[23] * point[0];
+        let t802 = time[24] * point[6];
+        let t803 = t798 - t802;
+        let t804 = t793 + t803;
+        let t805 = t785 - t804;
+        let t806 = t782 - t805;
+        let t809 = time[25] * point[2];
+        let t812 = time[26] * t279;
+        let t816 = time[27] * point[0];
+        let t817 = t812 + t816;
+        let t822 = time[28] * point[0];
+        let t826 = time[29] * point[7];
+        let t827 = t822 - t826;
+        let t828 = t817 + t827;
+        let t829 = t809 - t828;
+        let t830 = t723 - t141;
+        let t831 = point[0] * t98;
+        let t832 = time[4] * t831;
+        let t833 = t236 - t832;
+        let t834 = point[7] * t92;
+        let t835 = time[8] * t834;
+        let t836 = t833 + t835;
+        let t837 = t725 * t830;
+        let t838 = t837 * t836;
+        let t839 = t835 + t236;
+        let t842 = time[30] * point[0];
+        let t843 = t842 * point[5];
+        let t844 = t839 - t843;
+        let t845 = t741 * t844;
+        let t846 = t838 - t845;
+        let t847 = point[7] * t830;
+        let t848 = time[8] * t847;
+        let t849 = t236 + t848;
+        let t853 = time[31] * t719;
+        let t856 = time[32] * t737;
+        let t857 = t853 - t856;
+        let t858 = point[0] * t857;
+        let t859 = t849 - t858;
+        let t860 = t846 + t859;
+        let t862 = self.fixed[75] * t860;
+        let t863 = t90 * t844;
+        let t864 = t849 - t863;
+        let t866 = self.fixed[76] * t864;
+        let t867 = t862 + t866;
+        let t870 = time[33] * t831;
+        let t873 = time[34] * t834;
+        let t874 = t873 - t870;
+        let t877 = time[35] * t233;
+        let t878 = t874 + t877;
+        let t879 = self.fixed[9] * t741;
+        let t880 = t879 * t830;
+        let t883 = time[36] * t719;
+        let t886 = time[37] * point[5];
+        let t887 = t886 * t830;
+        let t888 = t883 - t887;
+        let t889 = t880 - t888;
+        let t890 = t725 * t878;
+        let t891 = t890 * t889;
+        let t892 = t867 - t891;
+        let t896 = time[38] * t741;
+        let t899 = time[39] * point[5];
+        let t904 = time[40] * t719;
+        let t905 = t899 - t904;
+        let t910 = time[41] * t737;
+        let t911 = t905 + t910;
+        let t912 = t896 + t911;
+        let t913 = time[5] * t831;
+        let t914 = point[6] * t92;
+        let t915 = time[7] * t914;
+        let t916 = t915 - t913;
+        let t919 = time[42] * point[0];
+        let t920 = t919 * point[4];
+        let t921 = t181 * point[3];
+        let t922 = t920 + t921;
+        let t923 = time[1] * t922;
+        let t924 = t916 + t923;
+        let t925 = point[3] * t725;
+        let t926 = t925 * t924;
+        let t927 = t187 + t926;
+        let t928 = t912 * t927;
+        let t932 = time[43] * t922;
+        let t936 = time[44] * t831;
+        let t937 = t932 - t936;
+        let t941 = time[45] * t914;
+        let t942 = t937 + t941;
+        let t943 = t725 * t942;
+        let t947 = time[46] * point[6];
+        let t948 = t947 * t92;
+        let t952 = time[47] * t831;
+        let t953 = t948 - t952;
+        let t957 = time[48] * t922;
+        let t958 = t953 + t957;
+        let t959 = t943 + t958;
+        let t960 = point[3] * t959;
+        let t961 = t928 - t960;
+        let t962 = t892 + t961;
+        let t963 = t725 * t962;
+        let t964 = t829 + t963;
+        let t965 = -t964;
+        crate::nalgebra::SVector::<T, 2>::new(t806, t965)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

@@ -42,7 +42,7 @@ impl<T: crate::Real> Default for Skew2dRotatingParameters<T> {
 pub struct Skew2dRotating<T: crate::Real> {
     parameters: Skew2dRotatingParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 28],
+    fixed: [T; 66],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Skew2dRotating<T> {
@@ -165,13 +165,76 @@ impl<T: crate::Real> Skew2dRotating<T> {
         let t408 = T::nearest(2.0) * t123;
         let t413 = t348 * parameters.E;
         let t414 = t413 / parameters.rho0;
-        let t652 = T::nearest(2.0) / t27;
-        let t657 = t192 * T::pi();
-        let t705 = T::nearest(2.0).cos();
-        let t707 = T::pi() * t705;
-        let t712 = T::nearest(2.0).sin();
-        let t713 = T::nearest(4.0) * t712;
-        let t767 = parameters.A * t204;
+        let t509 = T::nearest(2.0) / t27;
+        let t514 = t192 * T::pi();
+        let t562 = T::nearest(2.0).cos();
+        let t564 = T::pi() * t562;
+        let t569 = T::nearest(2.0).sin();
+        let t570 = T::nearest(4.0) * t569;
+        let t624 = parameters.A * t204;
+        let t683 = t279 * t283;
+        let t686 = T::nearest(95.0) * t277;
+        let t687 = t686 * t283;
+        let t690 = t277 * t283;
+        let t694 = T::nearest(45.0) * t272;
+        let t695 = t694 * t277;
+        let t696 = t695 * t283;
+        let t699 = t272 * t277;
+        let t700 = t699 * t283;
+        let t707 = parameters.A * t192;
+        let t716 = T::nearest(3.0) * t192;
+        let t734 = t187 * t298;
+        let t750 = t218 * t388;
+        let t754 = t707 * t204;
+        let t755 = t754 * t388;
+        let t758 = t187 * t204;
+        let t759 = t758 * t388;
+        let t774 = t192 * t204;
+        let t784 = t192 * t388;
+        let t794 = t204 * t388;
+        let t797 = t298 * t388;
+        let t804 = t192 * t218;
+        let t805 = t804 * t388;
+        let t809 = t187 * t192;
+        let t810 = t809 * t204;
+        let t811 = t810 * t388;
+        let t815 = t774 * t348;
+        let t816 = t815 * t388;
+        let t828 = T::nearest(10.0) * T::nearest(0.1);
+        let t831 = t408 * t414;
+        let t834 = t277 * t414;
+        let t837 = T::nearest(30.0) * t277;
+        let t838 = t837 * t414;
+        let t842 = t277 * T::nearest(60.0);
+        let t843 = t842 * t404;
+        let t844 = t843 * t414;
+        let t847 = t277 * t404;
+        let t848 = t847 * t414;
+        let t876 = t774 * t388;
+        let t885 = parameters.A * t218;
+        let t886 = t885 * t388;
+        let t890 = parameters.A * parameters.A;
+        let t891 = t890 * t192;
+        let t892 = t891 * t204;
+        let t893 = t892 * t388;
+        let t899 = parameters.A * t187;
+        let t900 = t899 * t204;
+        let t901 = t900 * t388;
+        let t912 = t624 * t298;
+        let t913 = t912 * t388;
+        let t917 = t624 * t288;
+        let t918 = t917 * t388;
+        let t922 = t890 * t204;
+        let t923 = t922 * t388;
+        let t936 = parameters.Omega * parameters.Omega;
+        let t937 = t936 * T::nearest(10.0);
+        let t938 = t937 * T::nearest(0.1);
+        let t941 = t936 * T::nearest(0.1);
+        let t945 = parameters.Omega * T::nearest(10.0);
+        let t946 = t945 * T::nearest(0.1);
+        let t947 = t946 * t120;
+        let t950 = parameters.Omega * T::nearest(0.1);
+        let t951 = t950 * t120;
         Ok(Skew2dRotating {
             parameters,
             fixed: [
@@ -198,11 +261,49 @@ impl<T: crate::Real> Skew2dRotating<T> {
                 t404,
                 t408,
                 t414,
-                t652,
-                t657,
+                t509,
+                t514,
+                t564,
+                t570,
+                t624,
+                t683,
+                t687,
+                t690,
+                t696,
+                t700,
                 t707,
-                t713,
-                t767,
+                t716,
+                t734,
+                t750,
+                t754,
+                t755,
+                t758,
+                t759,
+                t774,
+                t784,
+                t794,
+                t797,
+                t805,
+                t809,
+                t811,
+                t816,
+                t828,
+                t831,
+                t834,
+                t838,
+                t844,
+                t848,
+                t876,
+                t886,
+                t893,
+                t901,
+                t913,
+                t918,
+                t923,
+                t938,
+                t941,
+                t947,
+                t951,
             ],
         })
     }
@@ -1567,46 +1668,46 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
                 let t188 = self.fixed[6] * t29;
                 let t193 = self.fixed[7] * t45;
                 let t228 = self.fixed[10] * t29;
-                let t654 = X[1].cos();
-                let t655 = t188 * t654;
-                let t656 = t655 + T::one();
-                let t658 = self.fixed[24] * t45;
-                let t659 = t658 * t156;
-                let t660 = t659 + T::one();
-                let t661 = t193 * t38;
-                let t662 = t656 * t660;
-                let t663 = t77 * t654;
-                let t664 = t663 * t661;
-                let t665 = t662 - t664;
-                let t666 = t655 * t660;
-                let t667 = t664 - t666;
-                let t668 = T::one() / t665;
-                let t669 = t667 * t668;
-                let t670 = t655 - t669;
-                let t671 = t666 + t659;
-                let t672 = t671 - t664;
-                let t673 = t672.log_1p();
-                let t674 = self.fixed[8] * t670;
-                let t675 = t660 * t673;
-                let t676 = t675 * t668;
-                let t677 = self.fixed[9] * t676;
-                let t678 = t674 + t677;
-                let t679 = t663 * t668;
-                let t680 = t661 + t679;
-                let t681 = self.fixed[8] * t680;
-                let t682 = t228 * t654;
-                let t683 = t673 * t668;
-                let t684 = t682 * t683;
-                let t685 = t681 - t684;
-                let t686 = t30 * t678;
-                let t687 = t9 * t685;
-                let t688 = t686 - t687;
-                let t689 = -t688;
-                let t690 = t9 * t678;
-                let t691 = t30 * t685;
-                let t692 = t690 + t691;
-                let t693 = -t692;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t689, t693))
+                let t511 = X[1].cos();
+                let t512 = t188 * t511;
+                let t513 = t512 + T::one();
+                let t515 = self.fixed[24] * t45;
+                let t516 = t515 * t156;
+                let t517 = t516 + T::one();
+                let t518 = t193 * t38;
+                let t519 = t513 * t517;
+                let t520 = t77 * t511;
+                let t521 = t520 * t518;
+                let t522 = t519 - t521;
+                let t523 = t512 * t517;
+                let t524 = t521 - t523;
+                let t525 = T::one() / t522;
+                let t526 = t524 * t525;
+                let t527 = t512 - t526;
+                let t528 = t523 + t516;
+                let t529 = t528 - t521;
+                let t530 = t529.log_1p();
+                let t531 = self.fixed[8] * t527;
+                let t532 = t517 * t530;
+                let t533 = t532 * t525;
+                let t534 = self.fixed[9] * t533;
+                let t535 = t531 + t534;
+                let t536 = t520 * t525;
+                let t537 = t518 + t536;
+                let t538 = self.fixed[8] * t537;
+                let t539 = t228 * t511;
+                let t540 = t530 * t525;
+                let t541 = t539 * t540;
+                let t542 = t538 - t541;
+                let t543 = t30 * t535;
+                let t544 = t9 * t542;
+                let t545 = t543 - t544;
+                let t546 = -t545;
+                let t547 = t9 * t535;
+                let t548 = t30 * t542;
+                let t549 = t547 + t548;
+                let t550 = -t549;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t546, t550))
             }
             crate::Surface::Upper(0) => {
                 let t8 = self.parameters.Omega * t;
@@ -1626,56 +1727,56 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
                 let t188 = self.fixed[6] * t29;
                 let t193 = self.fixed[7] * t45;
                 let t228 = self.fixed[10] * t29;
-                let t694 = T::nearest(3.0).sum_error(X[1]);
-                let t695 = T::nearest(3.0) + X[1];
-                let t696 = t695.cos();
-                let t697 = t695.sin();
-                let t698 = T::nearest(0.5) * t694;
-                let t699 = t698 * t696;
-                let t700 = t697 + t699;
-                let t701 = t694 * t700;
-                let t702 = t696 - t701;
-                let t703 = t188 * t702;
-                let t704 = t703 + T::one();
-                let t706 = T::nearest(2.0) * X[1];
-                let t708 = self.fixed[25] * t156;
-                let t709 = t706 + t708;
-                let t710 = t193 * t709;
-                let t711 = t710 + T::one();
-                let t714 = self.fixed[26] * t35;
-                let t715 = t38 - t714;
-                let t716 = t193 * t715;
-                let t717 = t704 * t711;
-                let t718 = t77 * t702;
-                let t719 = t718 * t716;
-                let t720 = t717 - t719;
-                let t721 = t703 * t711;
-                let t722 = t719 - t721;
-                let t723 = T::one() / t720;
-                let t724 = t722 * t723;
-                let t725 = t703 - t724;
-                let t726 = t721 + t710;
-                let t727 = t726 - t719;
-                let t728 = t727.log_1p();
-                let t729 = self.fixed[8] * t725;
-                let t730 = t711 * t728;
-                let t731 = t730 * t723;
-                let t732 = self.fixed[9] * t731;
-                let t733 = t729 + t732;
-                let t734 = t718 * t723;
-                let t735 = t716 + t734;
-                let t736 = self.fixed[8] * t735;
-                let t737 = t228 * t702;
-                let t738 = t728 * t723;
-                let t739 = t737 * t738;
-                let t740 = t736 - t739;
-                let t741 = t30 * t733;
-                let t742 = t9 * t740;
-                let t743 = t741 - t742;
-                let t744 = t9 * t733;
-                let t745 = t30 * t740;
-                let t746 = t744 + t745;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t743, t746))
+                let t551 = T::nearest(3.0).sum_error(X[1]);
+                let t552 = T::nearest(3.0) + X[1];
+                let t553 = t552.cos();
+                let t554 = t552.sin();
+                let t555 = T::nearest(0.5) * t551;
+                let t556 = t555 * t553;
+                let t557 = t554 + t556;
+                let t558 = t551 * t557;
+                let t559 = t553 - t558;
+                let t560 = t188 * t559;
+                let t561 = t560 + T::one();
+                let t563 = T::nearest(2.0) * X[1];
+                let t565 = self.fixed[25] * t156;
+                let t566 = t563 + t565;
+                let t567 = t193 * t566;
+                let t568 = t567 + T::one();
+                let t571 = self.fixed[26] * t35;
+                let t572 = t38 - t571;
+                let t573 = t193 * t572;
+                let t574 = t561 * t568;
+                let t575 = t77 * t559;
+                let t576 = t575 * t573;
+                let t577 = t574 - t576;
+                let t578 = t560 * t568;
+                let t579 = t576 - t578;
+                let t580 = T::one() / t577;
+                let t581 = t579 * t580;
+                let t582 = t560 - t581;
+                let t583 = t578 + t567;
+                let t584 = t583 - t576;
+                let t585 = t584.log_1p();
+                let t586 = self.fixed[8] * t582;
+                let t587 = t568 * t585;
+                let t588 = t587 * t580;
+                let t589 = self.fixed[9] * t588;
+                let t590 = t586 + t589;
+                let t591 = t575 * t580;
+                let t592 = t573 + t591;
+                let t593 = self.fixed[8] * t592;
+                let t594 = t228 * t559;
+                let t595 = t585 * t580;
+                let t596 = t594 * t595;
+                let t597 = t593 - t596;
+                let t598 = t30 * t590;
+                let t599 = t9 * t597;
+                let t600 = t598 - t599;
+                let t601 = t9 * t590;
+                let t602 = t30 * t597;
+                let t603 = t601 + t602;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t600, t603))
             }
             crate::Surface::Lower(1) => {
                 let t8 = self.parameters.Omega * t;
@@ -1694,38 +1795,38 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
                 let t47 = t29 * t30;
                 let t65 = t29 * t9;
                 let t188 = self.fixed[6] * t29;
-                let t658 = self.fixed[24] * t45;
-                let t747 = t13.cos();
-                let t748 = t13.sin();
-                let t749 = T::nearest(0.5) * t12;
-                let t750 = t749 * t747;
-                let t751 = t748 + t750;
-                let t752 = t12 * t751;
-                let t753 = t747 - t752;
-                let t754 = t658 * t33;
-                let t755 = t754 + T::one();
-                let t756 = T::one() / t755;
-                let t757 = t756 + T::one();
-                let t758 = t188 * t753;
-                let t759 = t758 * t755;
-                let t760 = t759 + t754;
-                let t761 = t760.log_1p();
-                let t762 = t754 * t757;
-                let t763 = self.fixed[8] * t762;
-                let t764 = t761 * t756;
-                let t765 = self.fixed[9] * t764;
-                let t766 = t763 + t765;
-                let t768 = self.fixed[27] * t47;
-                let t769 = t768 * t753;
-                let t770 = t9 * t766;
-                let t771 = t769 - t770;
-                let t772 = -t771;
-                let t773 = self.fixed[27] * t65;
-                let t774 = t773 * t753;
-                let t775 = t30 * t766;
-                let t776 = t774 + t775;
-                let t777 = -t776;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t772, t777))
+                let t515 = self.fixed[24] * t45;
+                let t604 = t13.cos();
+                let t605 = t13.sin();
+                let t606 = T::nearest(0.5) * t12;
+                let t607 = t606 * t604;
+                let t608 = t605 + t607;
+                let t609 = t12 * t608;
+                let t610 = t604 - t609;
+                let t611 = t515 * t33;
+                let t612 = t611 + T::one();
+                let t613 = T::one() / t612;
+                let t614 = t613 + T::one();
+                let t615 = t188 * t610;
+                let t616 = t615 * t612;
+                let t617 = t616 + t611;
+                let t618 = t617.log_1p();
+                let t619 = t611 * t614;
+                let t620 = self.fixed[8] * t619;
+                let t621 = t618 * t613;
+                let t622 = self.fixed[9] * t621;
+                let t623 = t620 + t622;
+                let t625 = self.fixed[27] * t47;
+                let t626 = t625 * t610;
+                let t627 = t9 * t623;
+                let t628 = t626 - t627;
+                let t629 = -t628;
+                let t630 = self.fixed[27] * t65;
+                let t631 = t630 * t610;
+                let t632 = t30 * t623;
+                let t633 = t631 + t632;
+                let t634 = -t633;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t629, t634))
             }
             crate::Surface::Upper(1) => {
                 let t8 = self.parameters.Omega * t;
@@ -1744,56 +1845,56 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
                 let t143 = t32.sin();
                 let t188 = self.fixed[6] * t29;
                 let t193 = self.fixed[7] * t45;
-                let t509 = self.fixed[17] * t45;
-                let t778 = T::one().sum_error(t13);
-                let t779 = T::one() + t13;
-                let t780 = t12 + t778;
-                let t781 = t779.cos();
-                let t782 = t779.sin();
-                let t783 = T::nearest(0.5) * t780;
-                let t784 = t783 * t781;
-                let t785 = t782 + t784;
-                let t786 = t780 * t785;
-                let t787 = t781 - t786;
-                let t788 = T::nearest(4.0) * t143;
-                let t789 = T::one() - t788;
-                let t790 = t193 * t789;
-                let t791 = t188 * t787;
-                let t792 = t791 + T::one();
-                let t793 = t509 * X[0];
-                let t794 = t793 + T::one();
-                let t795 = t792 * t794;
-                let t796 = t77 * t787;
-                let t797 = t796 * t790;
-                let t798 = t795 - t797;
-                let t799 = T::one() / t798;
-                let t800 = t790 * t799;
-                let t801 = t796 + t800;
-                let t802 = t791 * t794;
-                let t803 = t802 + t793;
-                let t804 = t803 - t797;
-                let t805 = t804.log_1p();
-                let t806 = self.fixed[8] * t801;
-                let t807 = t790 * t805;
-                let t808 = t807 * t799;
-                let t809 = self.fixed[9] * t808;
-                let t810 = t806 - t809;
-                let t811 = t792 * t793;
-                let t812 = t797 - t811;
-                let t813 = t812 * t799;
-                let t814 = t793 - t813;
-                let t815 = self.fixed[8] * t814;
-                let t816 = t792 * t805;
-                let t817 = t816 * t799;
-                let t818 = self.fixed[9] * t817;
-                let t819 = t815 + t818;
-                let t820 = t30 * t810;
-                let t821 = t9 * t819;
-                let t822 = t820 - t821;
-                let t823 = t9 * t810;
-                let t824 = t30 * t819;
-                let t825 = t823 + t824;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t822, t825))
+                let t502 = self.fixed[17] * t45;
+                let t635 = T::one().sum_error(t13);
+                let t636 = T::one() + t13;
+                let t637 = t12 + t635;
+                let t638 = t636.cos();
+                let t639 = t636.sin();
+                let t640 = T::nearest(0.5) * t637;
+                let t641 = t640 * t638;
+                let t642 = t639 + t641;
+                let t643 = t637 * t642;
+                let t644 = t638 - t643;
+                let t645 = T::nearest(4.0) * t143;
+                let t646 = T::one() - t645;
+                let t647 = t193 * t646;
+                let t648 = t188 * t644;
+                let t649 = t648 + T::one();
+                let t650 = t502 * X[0];
+                let t651 = t650 + T::one();
+                let t652 = t649 * t651;
+                let t653 = t77 * t644;
+                let t654 = t653 * t647;
+                let t655 = t652 - t654;
+                let t656 = T::one() / t655;
+                let t657 = t647 * t656;
+                let t658 = t653 + t657;
+                let t659 = t648 * t651;
+                let t660 = t659 + t650;
+                let t661 = t660 - t654;
+                let t662 = t661.log_1p();
+                let t663 = self.fixed[8] * t658;
+                let t664 = t647 * t662;
+                let t665 = t664 * t656;
+                let t666 = self.fixed[9] * t665;
+                let t667 = t663 - t666;
+                let t668 = t649 * t650;
+                let t669 = t654 - t668;
+                let t670 = t669 * t656;
+                let t671 = t650 - t670;
+                let t672 = self.fixed[8] * t671;
+                let t673 = t649 * t662;
+                let t674 = t673 * t656;
+                let t675 = self.fixed[9] * t674;
+                let t676 = t672 + t675;
+                let t677 = t30 * t667;
+                let t678 = t9 * t676;
+                let t679 = t677 - t678;
+                let t680 = t9 * t667;
+                let t681 = t30 * t676;
+                let t682 = t680 + t681;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t679, t682))
             }
             _ => None,
         }
@@ -1846,7 +1947,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 24, 9>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 49, 9>::new(*self, X))
     }
     fn state_at(
         &self,
@@ -1856,9 +1957,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 2, 24, 9> for Skew2dRotating<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 2, 49, 9> for Skew2dRotating<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 24] {
+    fn body_force_time(&self, t: T) -> [T; 49] {
         let t8 = self.parameters.Omega * t;
         let t9 = t8.sin();
         let t28 = self.fixed[1] * t;
@@ -1868,56 +1969,116 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 24, 9> for Skew2dRotating<T> {
         let t42 = T::nearest(3.0) * t29;
         let t44 = T::nearest(4.0) * t41;
         let t45 = t42 + t44;
-        let t57 = T::nearest(10.0) * t9;
         let t77 = self.parameters.A * t29;
         let t81 = self.parameters.A * t45;
         let t88 = T::nearest(4.0) * t29;
         let t89 = T::nearest(3.0) * t41;
         let t90 = t88 - t89;
         let t91 = t41 * t30;
-        let t92 = T::nearest(10.0) * t91;
         let t94 = t90 * t9;
-        let t104 = T::nearest(10.0) * t30;
         let t108 = t41 * t9;
-        let t109 = T::nearest(10.0) * t108;
         let t111 = t90 * t30;
         let t188 = self.fixed[6] * t29;
         let t193 = self.fixed[7] * t45;
-        let t265 = T::nearest(45.0) * t29;
-        let t270 = T::nearest(95.0) * t29;
-        let t395 = T::nearest(60.0) * t29;
-        let t402 = T::nearest(30.0) * t29;
-        let t409 = self.fixed[21] * t45;
-        let t499 = self.fixed[13] * t29;
-        let t503 = self.fixed[15] * t29;
-        let t506 = self.fixed[16] * t45;
-        let t509 = self.fixed[17] * t45;
-        let t546 = self.fixed[18] * t45;
+        let t499 = self.fixed[15] * t29;
+        let t500 = self.fixed[16] * t45;
+        let t502 = self.fixed[17] * t45;
+        let t505 = self.fixed[18] * t45;
+        let t684 = self.fixed[28] * t29;
+        let t688 = self.fixed[29] * t29;
+        let t691 = self.fixed[30] * t45;
+        let t697 = self.fixed[31] * t29;
+        let t701 = self.fixed[32] * t45;
+        let t708 = t29 * t45;
+        let t709 = self.fixed[33] * t708;
+        let t717 = self.fixed[34] * t45;
+        let t735 = self.fixed[35] * t708;
+        let t756 = self.fixed[38] * t708;
+        let t760 = self.fixed[40] * t29;
+        let t769 = self.fixed[39] * t29;
+        let t771 = self.fixed[37] * t708;
+        let t775 = self.fixed[41] * t45;
+        let t785 = self.fixed[42] * t45;
+        let t798 = self.fixed[44] * t45;
+        let t806 = self.fixed[45] * t45;
+        let t812 = self.fixed[47] * t708;
+        let t817 = t45 * t45;
+        let t818 = self.fixed[48] * t817;
+        let t829 = self.fixed[49] * t30;
+        let t832 = self.fixed[50] * t45;
+        let t835 = self.fixed[51] * t45;
+        let t839 = self.fixed[52] * t29;
+        let t845 = self.fixed[53] * t29;
+        let t849 = self.fixed[54] * t45;
+        let t857 = self.fixed[46] * t708;
+        let t877 = self.fixed[55] * t45;
+        let t887 = self.fixed[56] * t29;
+        let t894 = t29 * t29;
+        let t895 = t894 * t45;
+        let t896 = self.fixed[57] * t895;
+        let t902 = self.fixed[58] * t894;
+        let t914 = self.fixed[59] * t708;
+        let t919 = self.fixed[60] * t894;
+        let t924 = self.fixed[61] * t894;
+        let t933 = self.fixed[49] * t9;
+        let t939 = self.fixed[62] * t30;
+        let t942 = self.fixed[63] * t9;
+        let t948 = self.fixed[64] * t108;
+        let t952 = self.fixed[65] * t111;
+        let t960 = self.fixed[62] * t9;
+        let t962 = self.fixed[63] * t30;
+        let t965 = self.fixed[64] * t91;
+        let t967 = self.fixed[65] * t94;
         [
-            t9,
-            t29,
-            t30,
-            t45,
-            t57,
             t77,
             t81,
-            t92,
-            t94,
-            t104,
-            t109,
-            t111,
             t188,
             t193,
-            t265,
-            t270,
-            t395,
-            t402,
-            t409,
             t499,
-            t503,
-            t506,
-            t509,
-            t546,
+            t500,
+            t502,
+            t505,
+            t684,
+            t688,
+            t691,
+            t697,
+            t701,
+            t709,
+            t717,
+            t735,
+            t756,
+            t760,
+            t769,
+            t771,
+            t775,
+            t785,
+            t798,
+            t806,
+            t812,
+            t818,
+            t829,
+            t832,
+            t835,
+            t839,
+            t845,
+            t849,
+            t857,
+            t877,
+            t887,
+            t896,
+            t902,
+            t914,
+            t919,
+            t924,
+            t933,
+            t939,
+            t942,
+            t948,
+            t952,
+            t960,
+            t962,
+            t965,
+            t967,
         ]
     }
     #[inline]
@@ -1966,224 +2127,215 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 24, 9> for Skew2dRotating<T> {
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
-        time: &[T; 24],
+        time: &[T; 49],
         point: &[T; 9],
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t78 = time[5] * point[1];
+        let t78 = time[0] * point[1];
         let t79 = point[0] + t78;
-        let t82 = time[6] * point[3];
+        let t82 = time[1] * point[3];
         let t83 = point[4] + t82;
-        let t84 = time[4] * t79;
-        let t85 = time[2] * t83;
-        let t86 = t84 + t85;
-        let t93 = time[7] * point[1];
-        let t95 = time[8] * point[3];
-        let t96 = t93 + t95;
-        let t97 = self.parameters.Omega * t86;
-        let t105 = time[9] * t79;
-        let t106 = time[0] * t83;
-        let t107 = t105 - t106;
-        let t110 = time[10] * point[1];
-        let t112 = time[11] * point[3];
-        let t113 = t110 - t112;
-        let t114 = self.parameters.Omega * t107;
-        let t121 = self.fixed[3] * t113;
-        let t122 = t114 - t121;
-        let t128 = self.parameters.Omega * t122;
-        let t132 = self.fixed[3] * t96;
-        let t133 = t97 + t132;
-        let t135 = self.parameters.Omega * t133;
-        let t189 = time[12] * point[5];
+        let t189 = time[2] * point[5];
         let t191 = t189 + T::one();
-        let t194 = time[13] * point[7];
+        let t194 = time[3] * point[7];
         let t195 = t194 + T::one();
-        let t196 = time[13] * point[6];
+        let t196 = time[3] * point[6];
         let t197 = t191 * t195;
-        let t198 = time[5] * point[5];
-        let t199 = t198 * t196;
-        let t200 = t197 - t199;
-        let t205 = t189 * t195;
-        let t206 = t199 - t205;
-        let t207 = T::one() / t200;
-        let t212 = t205 + t194;
-        let t213 = t212 - t199;
-        let t214 = t213.log_1p();
-        let t243 = t194 * t191;
-        let t244 = t199 - t243;
-        let t266 = time[14] * point[1];
-        let t267 = time[3] * point[8];
-        let t268 = t266 - t267;
-        let t271 = time[15] * point[1];
-        let t273 = self.fixed[11] * t268;
-        let t274 = t271 - t267;
-        let t275 = t274 + t273;
-        let t278 = self.fixed[12] * t275;
         let t311 = T::nearest(3.0) * point[1];
-        let t312 = t311 * t196;
         let t343 = T::nearest(4.0) * point[0];
         let t344 = self.fixed[4] * point[2];
         let t345 = t343 - t344;
-        let t346 = time[3] * t345;
         let t350 = point[1] * t196;
-        let t396 = time[16] * point[1];
-        let t397 = t396 - t346;
         let t399 = T::nearest(8.0) * point[2];
         let t400 = t399 - t345;
-        let t401 = time[3] * t400;
-        let t403 = time[17] * point[1];
-        let t405 = self.fixed[20] * t397;
-        let t406 = t401 + t403;
-        let t407 = t406 + t405;
-        let t411 = self.fixed[12] * t407;
-        let t500 = time[19] * point[1];
-        let t501 = t500 - t278;
-        let t502 = self.fixed[14] * t501;
-        let t504 = time[20] * point[1];
-        let t505 = -t504;
-        let t507 = time[21] * point[2];
-        let t508 = -t507;
-        let t510 = time[22] * point[8];
-        let t511 = point[5] * t508;
-        let t512 = t312 - t511;
-        let t513 = self.parameters.A * t512;
-        let t514 = time[1] * t513;
-        let t515 = t195 * t505;
-        let t516 = t191 * t510;
-        let t517 = t514 + t515;
-        let t518 = t517 + t516;
-        let t519 = time[5] * t512;
-        let t520 = t189 * t510;
-        let t521 = t515 + t519;
-        let t522 = t521 + t520;
-        let t523 = t518 * t206;
-        let t524 = t523 * t207;
-        let t525 = t214 * t522;
-        let t526 = t524 - t525;
-        let t527 = t505 * t206;
-        let t528 = t189 * t522;
-        let t529 = t519 + t527;
-        let t530 = t529 - t528;
-        let t531 = t189 * t206;
-        let t532 = t199 - t531;
-        let t533 = t214 * t206;
-        let t534 = self.fixed[9] * t533;
-        let t535 = self.fixed[8] * t532;
-        let t536 = t534 - t535;
-        let t537 = t515 + t516;
-        let t538 = t537 + t519;
-        let t539 = t189 - t199;
-        let t540 = t539 + t243;
-        let t541 = self.fixed[9] * t214;
-        let t542 = self.fixed[8] * t540;
-        let t543 = t541 + t542;
-        let t544 = time[12] * point[1];
-        let t545 = -t544;
-        let t547 = time[23] * t345;
-        let t548 = point[5] * t510;
-        let t549 = t350 - t548;
-        let t550 = t195 * t545;
-        let t551 = t191 * t547;
-        let t552 = time[5] * t549;
-        let t553 = t550 + t551;
-        let t554 = t553 + t552;
-        let t555 = time[1] * t549;
-        let t556 = self.parameters.A * t555;
-        let t557 = t556 + t550;
-        let t558 = t557 + t551;
-        let t559 = t545 * t195;
-        let t560 = t559 + t551;
-        let t561 = t560 + t552;
-        let t562 = t558 * t207;
-        let t563 = self.fixed[9] * t562;
-        let t564 = self.fixed[8] * t561;
-        let t565 = t563 + t564;
-        let t566 = t510 * t244;
-        let t567 = t514 + t527;
-        let t568 = t567 + t566;
-        let t569 = t526 + t568;
-        let t570 = self.fixed[9] * t569;
-        let t571 = t536 * t538;
-        let t572 = t196 * t543;
-        let t573 = t572 * t554;
-        let t574 = t571 - t573;
-        let t575 = t207 * t574;
-        let t576 = self.fixed[8] * t530;
-        let t577 = t510 * t543;
-        let t578 = t196 * t565;
-        let t579 = t570 - t575;
-        let t580 = t579 + t576;
-        let t581 = t580 - t577;
-        let t582 = t581 - t578;
-        let t583 = t582 * t207;
-        let t584 = self.fixed[19] * t583;
-        let t585 = t502 + t584;
-        let t586 = -t585;
-        let t587 = time[18] * point[3];
-        let t588 = t587 - t411;
-        let t589 = self.fixed[22] * t588;
-        let t590 = t194 * t545;
-        let t591 = t551 + t552;
-        let t592 = t591 + t590;
-        let t593 = t558 * t244;
-        let t594 = t593 * t207;
-        let t595 = t214 * t592;
-        let t596 = t594 - t595;
-        let t597 = t547 * t244;
-        let t598 = t194 * t592;
-        let t599 = t552 + t597;
-        let t600 = t599 - t598;
-        let t601 = t194 * t244;
-        let t602 = t199 - t601;
-        let t603 = t214 * t244;
-        let t604 = self.fixed[9] * t603;
-        let t605 = self.fixed[8] * t602;
-        let t606 = t604 - t605;
-        let t607 = t194 - t199;
-        let t608 = t607 + t205;
-        let t609 = self.fixed[8] * t608;
-        let t610 = t541 + t609;
-        let t611 = t510 * t191;
-        let t612 = t611 + t515;
-        let t613 = t612 + t519;
-        let t614 = t518 * t207;
-        let t615 = self.fixed[9] * t614;
-        let t616 = self.fixed[8] * t613;
-        let t617 = t615 + t616;
-        let t618 = t538 * t207;
-        let t619 = point[5] * t618;
-        let t620 = t311 + t619;
-        let t621 = t610 * t620;
-        let t622 = point[5] * t617;
-        let t623 = t621 - t622;
-        let t624 = t545 * t206;
-        let t625 = t556 + t597;
-        let t626 = t625 + t624;
-        let t627 = t596 + t626;
-        let t628 = self.fixed[9] * t627;
-        let t629 = self.fixed[8] * t600;
-        let t630 = t606 * t554;
-        let t631 = t630 * t207;
-        let t632 = time[5] * t623;
-        let t633 = t628 + t629;
-        let t634 = t633 - t631;
-        let t635 = t634 + t632;
-        let t636 = t635 * t207;
-        let t637 = self.fixed[19] * t636;
-        let t638 = t589 + t637;
-        let t639 = -t638;
-        let t640 = time[2] * t586;
-        let t641 = time[0] * t639;
-        let t642 = t640 - t641;
-        let t643 = T::nearest(10.0) * t642;
-        let t644 = t643 - t128;
-        let t645 = T::nearest(0.1) * t644;
-        let t646 = time[0] * t586;
-        let t647 = time[2] * t639;
-        let t648 = t646 + t647;
-        let t649 = T::nearest(10.0) * t648;
-        let t650 = t649 - t135;
-        let t651 = T::nearest(0.1) * t650;
-        crate::nalgebra::SVector::<T, 2>::new(t645, t651)
+        let t501 = time[5] * point[2];
+        let t503 = time[6] * point[8];
+        let t504 = time[2] * point[1];
+        let t506 = point[5] * t503;
+        let t507 = t350 - t506;
+        let t508 = time[0] * t507;
+        let t685 = time[8] * point[1];
+        let t689 = time[9] * point[1];
+        let t692 = time[10] * point[8];
+        let t693 = t689 - t692;
+        let t698 = time[11] * point[1];
+        let t702 = time[12] * point[8];
+        let t703 = t698 - t702;
+        let t704 = t693 + t703;
+        let t705 = t685 - t704;
+        let t706 = point[5] * point[6];
+        let t710 = time[13] * t706;
+        let t711 = t197 - t710;
+        let t712 = T::one() / t711;
+        let t713 = point[5] * t195;
+        let t714 = time[2] * t713;
+        let t715 = t710 - t714;
+        let t718 = time[14] * point[1];
+        let t719 = t718 * point[6];
+        let t720 = t501 * point[5];
+        let t721 = t719 + t720;
+        let t722 = time[0] * t721;
+        let t723 = point[1] * t195;
+        let t724 = time[4] * t723;
+        let t725 = t722 - t724;
+        let t726 = point[8] * t191;
+        let t727 = time[6] * t726;
+        let t728 = t725 + t727;
+        let t729 = t715 * t712;
+        let t730 = t729 * t728;
+        let t731 = t714 + t194;
+        let t732 = t731 - t710;
+        let t733 = t732.log_1p();
+        let t736 = time[15] * point[5];
+        let t737 = t736 * point[8];
+        let t738 = t725 + t737;
+        let t739 = t733 * t738;
+        let t740 = t730 - t739;
+        let t741 = point[1] * t715;
+        let t742 = time[4] * t741;
+        let t743 = t722 - t742;
+        let t744 = point[7] * t191;
+        let t745 = time[3] * t744;
+        let t746 = t710 - t745;
+        let t747 = t503 * t746;
+        let t748 = t743 + t747;
+        let t749 = t740 + t748;
+        let t751 = self.fixed[36] * t749;
+        let t752 = self.fixed[36] * t715;
+        let t753 = t752 * t733;
+        let t757 = time[16] * t706;
+        let t761 = time[17] * point[5];
+        let t762 = t761 * t715;
+        let t763 = t757 - t762;
+        let t764 = t753 - t763;
+        let t765 = t727 - t724;
+        let t766 = t765 + t722;
+        let t767 = t764 * t766;
+        let t768 = self.fixed[9] * t733;
+        let t770 = time[18] * point[5];
+        let t772 = time[19] * t706;
+        let t773 = t770 - t772;
+        let t776 = time[20] * t744;
+        let t777 = t773 + t776;
+        let t778 = t768 + t777;
+        let t779 = time[2] * t723;
+        let t780 = t345 * t191;
+        let t781 = time[7] * t780;
+        let t782 = t781 - t779;
+        let t783 = t782 + t508;
+        let t786 = time[21] * point[6];
+        let t787 = t786 * t778;
+        let t788 = t787 * t783;
+        let t789 = t767 - t788;
+        let t790 = t712 * t789;
+        let t791 = t751 - t790;
+        let t792 = t189 * t738;
+        let t793 = t743 - t792;
+        let t795 = self.fixed[43] * t793;
+        let t796 = t791 + t795;
+        let t799 = time[22] * point[8];
+        let t800 = t799 * t778;
+        let t801 = t796 - t800;
+        let t802 = t508 - t779;
+        let t803 = t802 + t781;
+        let t807 = time[23] * t712;
+        let t808 = t807 * t803;
+        let t813 = time[24] * point[1];
+        let t814 = t813 * t195;
+        let t819 = time[25] * t780;
+        let t820 = t819 - t814;
+        let t821 = time[16] * t507;
+        let t822 = t820 + t821;
+        let t823 = t808 + t822;
+        let t824 = point[6] * t823;
+        let t825 = t801 - t824;
+        let t826 = t712 * t825;
+        let t827 = t705 + t826;
+        let t830 = time[26] * t827;
+        let t833 = time[27] * point[3];
+        let t836 = time[28] * t400;
+        let t840 = time[29] * point[1];
+        let t841 = t836 + t840;
+        let t846 = time[30] * point[1];
+        let t850 = time[31] * t345;
+        let t851 = t846 - t850;
+        let t852 = t841 + t851;
+        let t853 = t833 - t852;
+        let t854 = t712 * t746;
+        let t855 = t854 * t803;
+        let t856 = t781 + t508;
+        let t858 = time[32] * point[1];
+        let t859 = t858 * point[7];
+        let t860 = t856 - t859;
+        let t861 = t733 * t860;
+        let t862 = t855 - t861;
+        let t863 = t345 * t746;
+        let t864 = time[7] * t863;
+        let t865 = t508 + t864;
+        let t866 = t504 * t715;
+        let t867 = t865 - t866;
+        let t868 = t862 + t867;
+        let t869 = self.fixed[36] * t868;
+        let t870 = t194 * t860;
+        let t871 = t865 - t870;
+        let t872 = self.fixed[43] * t871;
+        let t873 = t869 + t872;
+        let t874 = self.fixed[36] * t733;
+        let t875 = t874 * t746;
+        let t878 = time[33] * point[7];
+        let t879 = t878 * t746;
+        let t880 = t757 - t879;
+        let t881 = t875 - t880;
+        let t882 = t712 * t783;
+        let t883 = t882 * t881;
+        let t884 = t873 - t883;
+        let t888 = time[34] * t733;
+        let t889 = time[16] * point[7];
+        let t897 = time[35] * t706;
+        let t898 = t889 - t897;
+        let t903 = time[36] * t713;
+        let t904 = t898 + t903;
+        let t905 = t888 + t904;
+        let t906 = point[5] * t712;
+        let t907 = t906 * t766;
+        let t908 = t311 + t907;
+        let t909 = t905 * t908;
+        let t910 = time[34] * t712;
+        let t911 = t910 * t728;
+        let t915 = time[37] * point[8];
+        let t916 = t915 * t191;
+        let t920 = time[38] * t723;
+        let t921 = t916 - t920;
+        let t925 = time[39] * t721;
+        let t926 = t921 + t925;
+        let t927 = t911 + t926;
+        let t928 = point[5] * t927;
+        let t929 = t909 - t928;
+        let t930 = t884 + t929;
+        let t931 = t712 * t930;
+        let t932 = t853 + t931;
+        let t934 = time[40] * t932;
+        let t935 = t934 - t830;
+        let t940 = time[41] * t79;
+        let t943 = time[42] * t83;
+        let t944 = t940 - t943;
+        let t949 = time[43] * point[1];
+        let t953 = time[44] * point[3];
+        let t954 = t949 - t953;
+        let t955 = t944 - t954;
+        let t956 = t935 - t955;
+        let t957 = time[40] * t827;
+        let t958 = time[26] * t932;
+        let t959 = t957 + t958;
+        let t961 = time[45] * t79;
+        let t963 = time[46] * t83;
+        let t964 = t961 + t963;
+        let t966 = time[47] * point[1];
+        let t968 = time[48] * point[3];
+        let t969 = t966 + t968;
+        let t970 = t964 + t969;
+        let t971 = t959 + t970;
+        let t972 = -t971;
+        crate::nalgebra::SVector::<T, 2>::new(t956, t972)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

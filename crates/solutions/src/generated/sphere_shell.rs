@@ -205,37 +205,37 @@ impl<T: crate::Real> SphereShell<T> {
         let t319 = t315 / t318;
         let t333 = T::nearest(2.0) * t127;
         let t334 = t333 / t316;
-        let t341 = T::nearest(4.0) * parameters.A;
-        let t342 = t341 * parameters.E;
-        let t343 = t342 * parameters.nu;
-        let t344 = t48 * t114;
-        let t345 = t344 * t116;
-        let t346 = t343 / t345;
-        let t361 = T::nearest(2.0) / t16;
-        let t363 = parameters.Ri / parameters.Ro;
-        let t364 = T::one() - t363;
-        let t365 = t103 * parameters.Ri;
-        let t366 = t365 * t364;
-        let t367 = t366 / t11;
-        let t372 = T::nearest(2.0) * parameters.Ri;
-        let t373 = t372 / parameters.Ro;
-        let t374 = T::nearest(3.0) - t373;
-        let t376 = t119 * parameters.Ri;
-        let t377 = t376 * t374;
-        let t378 = t377 / t11;
-        let t381 = parameters.Ri * parameters.Ri;
-        let t382 = t374 * t374;
-        let t383 = t127 * t381;
-        let t384 = t383 * t382;
-        let t385 = t384 / t128;
-        let t389 = parameters.A * parameters.Ri;
-        let t390 = t389 * t374;
-        let t391 = t390 / t11;
-        let t402 = T::one() / parameters.Ri;
-        let t410 = parameters.A / parameters.Ro;
-        let t418 = parameters.Ro * t114;
-        let t419 = t418 * t116;
-        let t420 = t139 / t419;
+        let t338 = T::nearest(4.0) * parameters.A;
+        let t339 = t338 * parameters.E;
+        let t340 = t339 * parameters.nu;
+        let t341 = t48 * t114;
+        let t342 = t341 * t116;
+        let t343 = t340 / t342;
+        let t349 = T::nearest(2.0) / t16;
+        let t351 = parameters.Ri / parameters.Ro;
+        let t352 = T::one() - t351;
+        let t353 = t103 * parameters.Ri;
+        let t354 = t353 * t352;
+        let t355 = t354 / t11;
+        let t360 = T::nearest(2.0) * parameters.Ri;
+        let t361 = t360 / parameters.Ro;
+        let t362 = T::nearest(3.0) - t361;
+        let t364 = t119 * parameters.Ri;
+        let t365 = t364 * t362;
+        let t366 = t365 / t11;
+        let t369 = parameters.Ri * parameters.Ri;
+        let t370 = t362 * t362;
+        let t371 = t127 * t369;
+        let t372 = t371 * t370;
+        let t373 = t372 / t128;
+        let t377 = parameters.A * parameters.Ri;
+        let t378 = t377 * t362;
+        let t379 = t378 / t11;
+        let t390 = T::one() / parameters.Ri;
+        let t398 = parameters.A / parameters.Ro;
+        let t406 = parameters.Ro * t114;
+        let t407 = t406 * t116;
+        let t408 = t139 / t407;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -265,15 +265,15 @@ impl<T: crate::Real> SphereShell<T> {
                 t307,
                 t319,
                 t334,
-                t346,
-                t361,
-                t367,
-                t378,
-                t385,
-                t391,
-                t402,
-                t410,
-                t420,
+                t343,
+                t349,
+                t355,
+                t366,
+                t373,
+                t379,
+                t390,
+                t398,
+                t408,
             ],
         })
     }
@@ -984,50 +984,50 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t17 = self.fixed[0] * t;
                 let t18 = t17.cos_pi();
                 let t122 = t18 * t18;
-                let t368 = self.fixed[25] * t18;
-                let t369 = t368 + T::one();
-                let t370 = T::one() / t369;
-                let t371 = t370 + T::one();
-                let t375 = t18 * t369;
-                let t379 = self.fixed[26] * t375;
-                let t380 = t122 * t369;
-                let t386 = self.fixed[27] * t380;
-                let t387 = t379 + t386;
-                let t388 = t387 + t368;
-                let t392 = self.fixed[28] * t18;
-                let t393 = t392 + T::one();
-                let t394 = t393 * t393;
-                let t395 = t369 * t394;
-                let t396 = t388.ln_of_both(t395);
-                let t397 = t368 * t371;
-                let t398 = self.fixed[11] * t397;
-                let t399 = t396 * t370;
-                let t400 = self.fixed[12] * t399;
-                let t401 = t398 + t400;
-                let t403 = self.fixed[29] * t401;
-                let t404 = t403 * X[0];
-                let t405 = -t404;
-                let t406 = t403 * X[1];
-                let t407 = -t406;
-                let t408 = t403 * X[2];
-                let t409 = -t408;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t405, t407, t409))
+                let t356 = self.fixed[25] * t18;
+                let t357 = t356 + T::one();
+                let t358 = T::one() / t357;
+                let t359 = t358 + T::one();
+                let t363 = t18 * t357;
+                let t367 = self.fixed[26] * t363;
+                let t368 = t122 * t357;
+                let t374 = self.fixed[27] * t368;
+                let t375 = t367 + t374;
+                let t376 = t375 + t356;
+                let t380 = self.fixed[28] * t18;
+                let t381 = t380 + T::one();
+                let t382 = t381 * t381;
+                let t383 = t357 * t382;
+                let t384 = t376.ln_of_both(t383);
+                let t385 = t356 * t359;
+                let t386 = self.fixed[11] * t385;
+                let t387 = t384 * t358;
+                let t388 = self.fixed[12] * t387;
+                let t389 = t386 + t388;
+                let t391 = self.fixed[29] * t389;
+                let t392 = t391 * X[0];
+                let t393 = -t392;
+                let t394 = t391 * X[1];
+                let t395 = -t394;
+                let t396 = t391 * X[2];
+                let t397 = -t396;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t393, t395, t397))
             }
             crate::Surface::Outer => {
                 let t17 = self.fixed[0] * t;
                 let t18 = t17.cos_pi();
-                let t411 = self.fixed[30] * t18;
-                let t412 = t411 + T::nearest(2.0);
-                let t413 = t18 * t412;
-                let t414 = self.fixed[30] * t413;
-                let t415 = t411 + T::one();
-                let t416 = t415 * t415;
-                let t417 = t414.ln_of_both(t416);
-                let t421 = self.fixed[31] * t417;
-                let t422 = t421 * X[0];
-                let t423 = t421 * X[1];
-                let t424 = t421 * X[2];
-                Some(crate::nalgebra::SVector::<T, 3>::new(t422, t423, t424))
+                let t399 = self.fixed[30] * t18;
+                let t400 = t399 + T::nearest(2.0);
+                let t401 = t18 * t400;
+                let t402 = self.fixed[30] * t401;
+                let t403 = t399 + T::one();
+                let t404 = t403 * t403;
+                let t405 = t402.ln_of_both(t404);
+                let t409 = self.fixed[31] * t405;
+                let t410 = t409 * X[0];
+                let t411 = t409 * X[1];
+                let t412 = t409 * X[2];
+                Some(crate::nalgebra::SVector::<T, 3>::new(t410, t411, t412))
             }
             crate::Surface::Lower(0) => {
                 let t3 = X[1] * X[1];
@@ -1074,12 +1074,12 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t150 = self.fixed[11] * t147;
                 let t151 = t149 - t150;
                 let t158 = self.fixed[12] * t133;
-                let t425 = t64 * t67;
-                let t426 = t25 * t425;
-                let t427 = t426 * t151;
-                let t428 = t158 - t427;
-                let t429 = -t428;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t429, T::zero(), T::zero()))
+                let t413 = t64 * t67;
+                let t414 = t25 * t413;
+                let t415 = t414 * t151;
+                let t416 = t158 - t415;
+                let t417 = -t416;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t417, T::zero(), T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t3 = X[1] * X[1];
@@ -1127,12 +1127,12 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t150 = self.fixed[11] * t147;
                 let t151 = t149 - t150;
                 let t158 = self.fixed[12] * t133;
-                let t431 = t85 * t67;
-                let t432 = t25 * t431;
-                let t433 = t432 * t151;
-                let t434 = t158 - t433;
-                let t435 = -t434;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t435, T::zero()))
+                let t419 = t85 * t67;
+                let t420 = t25 * t419;
+                let t421 = t420 * t151;
+                let t422 = t158 - t421;
+                let t423 = -t422;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t423, T::zero()))
             }
             crate::Surface::Lower(2) => {
                 let t3 = X[1] * X[1];
@@ -1180,12 +1180,12 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t150 = self.fixed[11] * t147;
                 let t151 = t149 - t150;
                 let t158 = self.fixed[12] * t133;
-                let t436 = t96 * t67;
-                let t437 = t25 * t436;
-                let t438 = t437 * t151;
-                let t439 = t158 - t438;
-                let t440 = -t439;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t440))
+                let t424 = t96 * t67;
+                let t425 = t25 * t424;
+                let t426 = t425 * t151;
+                let t427 = t158 - t426;
+                let t428 = -t427;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t428))
             }
             _ => None,
         }
@@ -1242,7 +1242,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 3>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 3> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 4, 12>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 5, 12>::new(*self, X))
     }
     fn state_at(
         &self,
@@ -1252,15 +1252,17 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 12> for SphereShell<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 3, 5, 12> for SphereShell<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 4] {
+    fn body_force_time(&self, t: T) -> [T; 5] {
         let t17 = self.fixed[0] * t;
         let t18 = t17.cos_pi();
         let t25 = self.fixed[2] * t18;
         let t105 = self.fixed[8] * t18;
         let t122 = t18 * t18;
-        [t18, t25, t105, t122]
+        let t222 = self.fixed[9] * t18;
+        let t430 = self.fixed[10] * t122;
+        [t18, t25, t105, t222, t430]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 12] {
@@ -1339,15 +1341,15 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 12> for SphereShell<T> {
         let t332 = t331 + t330;
         let t335 = t8 * t332;
         let t336 = self.fixed[22] * t335;
-        let t347 = self.fixed[23] * t191;
-        let t357 = X[1] * t67;
-        let t359 = X[2] * t67;
-        [t26, t106, t124, t255, t256, t270, t310, t321, t336, t347, t357, t359]
+        let t344 = self.fixed[23] * t191;
+        let t347 = X[1] * t67;
+        let t348 = X[2] * t67;
+        [t26, t106, t124, t255, t256, t270, t310, t321, t336, t344, t347, t348]
     }
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
-        time: &[T; 4],
+        time: &[T; 5],
         point: &[T; 12],
     ) -> crate::nalgebra::SVector<T, 3> {
         let t107 = time[2] * point[1];
@@ -1356,33 +1358,32 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 12> for SphereShell<T> {
         let t110 = t109 + T::one();
         let t111 = t110 * t110;
         let t112 = t108 * t111;
-        let t117 = time[0] * point[0];
-        let t118 = t117 * t108;
-        let t121 = self.fixed[9] * t118;
-        let t125 = time[3] * point[2];
-        let t126 = t125 * t108;
-        let t130 = self.fixed[10] * t126;
-        let t131 = t121 + t130;
-        let t132 = t131 + t107;
-        let t133 = t132.ln_of_both_if::<NEAR>(t112);
         let t311 = time[0] * point[5];
         let t312 = point[6] + t311;
         let t337 = time[0] * t312;
-        let t338 = point[7] * t133;
-        let t339 = t337 + t338;
-        let t340 = point[8] + t339;
-        let t348 = time[0] * t340;
-        let t349 = point[9] * t133;
-        let t350 = t348 + t349;
-        let t351 = t108 * t108;
-        let t352 = t351 * t110;
-        let t353 = t350 / t352;
-        let t354 = t353 - point[4];
-        let t355 = time[0] * t354;
-        let t356 = point[3] * t355;
-        let t358 = point[10] * t355;
-        let t360 = point[11] * t355;
-        crate::nalgebra::SVector::<T, 3>::new(t356, t358, t360)
+        let t345 = t108 * t108;
+        let t346 = t345 * t110;
+        let t429 = time[3] * point[0];
+        let t431 = time[4] * point[2];
+        let t432 = t429 + t431;
+        let t433 = t108 * t432;
+        let t434 = t433 + t107;
+        let t435 = t434.ln_of_both_if::<NEAR>(t112);
+        let t436 = point[7] * t435;
+        let t437 = t337 + t436;
+        let t438 = point[8] + t437;
+        let t439 = time[0] * t438;
+        let t440 = point[9] * t435;
+        let t441 = t439 + t440;
+        let t442 = t441 / t346;
+        let t443 = t442 - point[4];
+        let t444 = time[0] * point[3];
+        let t445 = t444 * t443;
+        let t446 = time[0] * point[10];
+        let t447 = t446 * t443;
+        let t448 = time[0] * point[11];
+        let t449 = t448 * t443;
+        crate::nalgebra::SVector::<T, 3>::new(t445, t447, t449)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

@@ -38,7 +38,7 @@ impl<T: crate::Real> Default for VortexParameters<T> {
 pub struct Vortex<T: crate::Real> {
     parameters: VortexParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 19],
+    fixed: [T; 30],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Vortex<T> {
@@ -137,6 +137,21 @@ impl<T: crate::Real> Vortex<T> {
         let t307 = T::nearest(32.0) / t146;
         let t312 = t80 / parameters.rho0;
         let t322 = T::nearest(2.0) / t5;
+        let t338 = T::nearest(2.0) * t92;
+        let t356 = T::nearest(2.0) * T::nearest(2.0);
+        let t366 = t356 * t92;
+        let t373 = t356 * t262;
+        let t389 = t148 * t295;
+        let t394 = t292 * t295;
+        let t397 = parameters.A * t4;
+        let t398 = t397 * t231;
+        let t402 = t4 * T::nearest(2.0);
+        let t403 = t402 * t231;
+        let t412 = t4 * t102;
+        let t413 = t412 * t235;
+        let t416 = t4 * t92;
+        let t417 = t416 * t235;
+        let t428 = t71 * t79;
         Ok(Vortex {
             parameters,
             fixed: [
@@ -159,6 +174,17 @@ impl<T: crate::Real> Vortex<T> {
                 t307,
                 t312,
                 t322,
+                t338,
+                t356,
+                t366,
+                t373,
+                t389,
+                t394,
+                t398,
+                t403,
+                t413,
+                t417,
+                t428,
             ],
         })
     }
@@ -1186,7 +1212,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 9, 4>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 14, 4>::new(*self, X))
     }
     fn state_at(
         &self,
@@ -1196,21 +1222,43 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 4> for Vortex<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 2, 14, 4> for Vortex<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 9] {
+    fn body_force_time(&self, t: T) -> [T; 14] {
         let t6 = self.fixed[1] * t;
         let t7 = t6.sin_pi();
         let t23 = self.fixed[2] * t7;
         let t41 = t6.cos_pi();
         let t62 = t41 * t41;
-        let t66 = T::nearest(2.0) * t7;
-        let t72 = self.fixed[4] * t62;
         let t93 = self.fixed[7] * t7;
         let t205 = self.fixed[8] * t7;
         let t263 = self.fixed[13] * t7;
         let t308 = self.fixed[16] * t7;
-        [t7, t23, t62, t66, t72, t93, t205, t263, t308]
+        let t339 = self.fixed[19] * t7;
+        let t367 = self.fixed[21] * t7;
+        let t374 = self.fixed[22] * t7;
+        let t399 = self.fixed[25] * t62;
+        let t404 = self.fixed[26] * t7;
+        let t414 = self.fixed[27] * t7;
+        let t418 = self.fixed[28] * t7;
+        let t426 = self.fixed[5] * t7;
+        let t429 = self.fixed[29] * t62;
+        [
+            t23,
+            t93,
+            t205,
+            t263,
+            t308,
+            t339,
+            t367,
+            t374,
+            t399,
+            t404,
+            t414,
+            t418,
+            t426,
+            t429,
+        ]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 4] {
@@ -1225,7 +1273,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 4> for Vortex<T> {
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
-        time: &[T; 9],
+        time: &[T; 14],
         point: &[T; 4],
     ) -> crate::nalgebra::SVector<T, 2> {
         let t15 = T::one() - point[2];
@@ -1233,41 +1281,21 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 4> for Vortex<T> {
         let t18 = T::nearest(16.0) * t17;
         let t19 = T::one() - t18;
         let t21 = t19 * t19;
-        let t24 = time[1] * t21;
+        let t24 = time[0] * t21;
         let t25 = t24.sin();
         let t26 = t24.cos();
         let t42 = t25 * t25;
         let t43 = t26 * t26;
         let t44 = t42 - t43;
         let t46 = t25 * t26;
-        let t63 = time[2] * t21;
-        let t64 = t63 * t44;
-        let t65 = self.parameters.A * t64;
-        let t67 = time[3] * t46;
-        let t68 = t65 + t67;
-        let t69 = -t68;
-        let t70 = time[0] * t44;
-        let t73 = time[4] * t21;
-        let t74 = t73 * t46;
-        let t75 = t70 - t74;
         let t94 = point[2] * t15;
         let t95 = t94 * t19;
-        let t96 = time[5] * t95;
+        let t96 = time[1] * t95;
         let t97 = t96 * t26;
         let t98 = t25 + t97;
-        let t99 = time[0] * t95;
-        let t100 = t99 * t44;
-        let t103 = self.fixed[8] * t100;
-        let t104 = t46 - t103;
-        let t149 = T::nearest(2.0) * t46;
-        let t150 = -t149;
-        let t151 = T::nearest(2.0) * t104;
         let t152 = t25 * t98;
         let t153 = T::nearest(2.0) * t152;
-        let t154 = -t153;
         let t155 = T::nearest(2.0) * t42;
-        let t156 = -t155;
-        let t158 = t150 * t151;
         let t185 = T::nearest(2.0) * point[2];
         let t187 = T::nearest(3.0) * t15;
         let t188 = t185 - t187;
@@ -1277,15 +1305,9 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 4> for Vortex<T> {
         let t192 = t191 - t189;
         let t193 = t26 * t192;
         let t194 = t190 * t21;
-        let t195 = time[5] * t194;
-        let t196 = t195 * t25;
-        let t197 = t193 - t196;
+        let t195 = time[1] * t194;
         let t198 = t15 * t19;
-        let t199 = t26 * t98;
-        let t200 = t198 * t199;
-        let t201 = t25 * t197;
-        let t202 = t200 + t201;
-        let t206 = time[6] * t95;
+        let t206 = time[2] * t95;
         let t207 = t206 * t26;
         let t208 = t25 + t207;
         let t209 = T::nearest(2.0) * t15;
@@ -1294,100 +1316,114 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 4> for Vortex<T> {
         let t212 = T::nearest(32.0) * t190;
         let t213 = t212 - t211;
         let t214 = t26 * t213;
-        let t215 = time[6] * t194;
+        let t215 = time[2] * t194;
         let t216 = t215 * t25;
         let t217 = t214 - t216;
-        let t218 = t26 * t208;
-        let t219 = t198 * t218;
         let t220 = t25 * t217;
-        let t221 = t219 + t220;
-        let t223 = self.fixed[10] * t221;
-        let t224 = t202 + t223;
-        let t225 = self.fixed[8] * t224;
-        let t226 = time[0] * t225;
-        let t227 = t96 * t46;
-        let t229 = point[3] * t227;
-        let t230 = t226 + t229;
         let t232 = point[2] * t21;
-        let t233 = self.fixed[11] * t232;
-        let t234 = t233 * t69;
-        let t236 = self.fixed[12] * t230;
-        let t237 = t234 - t236;
-        let t238 = self.fixed[0] * t237;
-        let t239 = time[5] * t198;
-        let t240 = t239 * t44;
         let t241 = point[2] - t15;
         let t242 = t19 * t241;
         let t243 = t212 - t242;
         let t244 = t26 * t243;
-        let t245 = t244 - t196;
         let t246 = t25 * t243;
         let t247 = t195 * t26;
         let t248 = t246 + t247;
         let t249 = t198 * t44;
-        let t250 = t26 * t245;
         let t251 = t25 * t248;
-        let t252 = t249 - t250;
-        let t253 = t252 + t251;
-        let t254 = time[5] * t253;
-        let t255 = -t254;
-        let t256 = time[5] * t202;
-        let t257 = -t256;
-        let t258 = t156 + T::one();
-        let t259 = t154 * t258;
-        let t260 = t158 - t259;
-        let t264 = time[7] * t198;
-        let t265 = t264 * t46;
-        let t266 = -t265;
-        let t267 = t258 * t257;
-        let t268 = t151 * t240;
-        let t269 = t150 * t255;
-        let t270 = t154 * t266;
-        let t271 = t267 - t268;
-        let t272 = t271 - t269;
-        let t273 = t272 + t270;
-        let t274 = t154 + T::one();
-        let t275 = t156 * t274;
-        let t276 = t158 - t275;
-        let t277 = t154 * t260;
-        let t278 = t156 * t276;
-        let t279 = t277 - t278;
-        let t280 = t257 * t260;
-        let t281 = t154 * t273;
-        let t282 = point[3] * t279;
-        let t283 = t268 + t269;
-        let t284 = t283 - t280;
-        let t285 = t284 + t281;
-        let t286 = t285 - t282;
-        let t287 = t266 * t276;
-        let t288 = t284 - t287;
-        let t289 = self.fixed[9] * t286;
-        let t293 = self.fixed[14] * t288;
-        let t294 = t289 + t293;
-        let t296 = self.fixed[15] * t294;
-        let t297 = t296 - t238;
         let t298 = point[2] - t187;
         let t299 = t19 * t298;
         let t300 = t212 - t299;
         let t301 = t44 * t300;
-        let t302 = time[7] * t194;
+        let t302 = time[3] * t194;
         let t303 = t302 * t46;
         let t304 = t301 + t303;
-        let t305 = self.fixed[5] * t232;
-        let t306 = t305 * t75;
-        let t309 = time[8] * t304;
-        let t310 = t306 + t309;
-        let t311 = point[0] * t297;
+        let t309 = time[4] * t304;
         let t313 = self.fixed[17] * point[1];
-        let t314 = t313 * t310;
-        let t315 = t311 - t314;
-        let t316 = point[3] * t315;
-        let t317 = point[1] * t297;
         let t318 = self.fixed[17] * point[0];
-        let t319 = t318 * t310;
-        let t320 = t317 + t319;
-        let t321 = point[3] * t320;
-        crate::nalgebra::SVector::<T, 2>::new(t316, t321)
+        let t335 = t206 * t44;
+        let t336 = t46 - t335;
+        let t337 = t249 * t336;
+        let t340 = time[5] * t337;
+        let t341 = t194 * t25;
+        let t342 = time[1] * t341;
+        let t343 = t244 - t342;
+        let t344 = t26 * t343;
+        let t345 = t249 - t344;
+        let t346 = t345 + t251;
+        let t347 = t46 * t346;
+        let t348 = time[5] * t347;
+        let t349 = t340 + t348;
+        let t350 = t198 * t26;
+        let t351 = t350 * t98;
+        let t352 = t193 - t342;
+        let t353 = t25 * t352;
+        let t354 = t351 + t353;
+        let t355 = t46 * t336;
+        let t357 = self.fixed[20] * t355;
+        let t358 = T::one() - t155;
+        let t359 = t153 * t358;
+        let t360 = t359 - t357;
+        let t361 = time[1] * t354;
+        let t362 = t361 * t360;
+        let t363 = t349 + t362;
+        let t364 = time[5] * t354;
+        let t365 = t364 * t358;
+        let t368 = time[6] * t337;
+        let t369 = t365 + t368;
+        let t370 = time[6] * t347;
+        let t371 = t369 + t370;
+        let t372 = t198 * t46;
+        let t375 = time[7] * t152;
+        let t376 = t375 * t372;
+        let t377 = t376 - t371;
+        let t378 = t152 * t377;
+        let t379 = t363 - t378;
+        let t380 = t153 * t360;
+        let t381 = self.fixed[20] * t152;
+        let t382 = T::nearest(2.0) - t381;
+        let t383 = t42 * t382;
+        let t384 = t383 - t357;
+        let t385 = t155 * t384;
+        let t386 = t385 - t380;
+        let t387 = point[3] * t386;
+        let t388 = t379 - t387;
+        let t390 = self.fixed[23] * t388;
+        let t391 = time[3] * t372;
+        let t392 = t391 * t384;
+        let t393 = t363 + t392;
+        let t395 = self.fixed[24] * t393;
+        let t396 = t390 + t395;
+        let t400 = time[8] * t21;
+        let t401 = t400 * t44;
+        let t405 = time[9] * t46;
+        let t406 = t401 + t405;
+        let t407 = t232 * t406;
+        let t408 = t350 * t208;
+        let t409 = t408 + t220;
+        let t410 = self.fixed[10] * t409;
+        let t411 = t354 + t410;
+        let t415 = time[10] * t411;
+        let t419 = time[11] * t95;
+        let t420 = t419 * point[3];
+        let t421 = t420 * t46;
+        let t422 = t415 + t421;
+        let t423 = t407 + t422;
+        let t424 = t396 + t423;
+        let t425 = point[0] * t424;
+        let t427 = time[12] * t44;
+        let t430 = time[13] * t21;
+        let t431 = t430 * t46;
+        let t432 = t427 - t431;
+        let t433 = t232 * t432;
+        let t434 = t433 + t309;
+        let t435 = t313 * t434;
+        let t436 = t425 - t435;
+        let t437 = point[3] * t436;
+        let t438 = point[1] * t424;
+        let t439 = t318 * t434;
+        let t440 = t438 + t439;
+        let t441 = point[3] * t440;
+        crate::nalgebra::SVector::<T, 2>::new(t437, t441)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
