@@ -201,7 +201,7 @@ MMSMITH_FN double mmsmith_ln_of_both(double x, double y)
 enum {
     axis_aligned_3d_dimension = 3,
     axis_aligned_3d_parameter_count = 4,
-    axis_aligned_3d_time_count = 17,
+    axis_aligned_3d_time_count = 15,
     axis_aligned_3d_point_count = 6
 };
 
@@ -215,12 +215,12 @@ typedef struct axis_aligned_3d_parameters {
 /* The parameters, and the values that depend on them only. */
 typedef struct axis_aligned_3d_solution {
     axis_aligned_3d_parameters par;
-    double fixed[26];
+    double fixed[25];
 } axis_aligned_3d_solution;
 
 /* What the body force needs of the time alone. */
 typedef struct axis_aligned_3d_time_values {
-    double values[17];
+    double values[15];
 } axis_aligned_3d_time_values;
 
 typedef struct axis_aligned_3d_field_values {
@@ -323,7 +323,6 @@ MMSMITH_FN const char *axis_aligned_3d_prepare(axis_aligned_3d_solution *s, cons
     const double t222 = t71 * p->nu;
     const double t223 = t222 / t136;
     const double t224 = 2.0 / t6;
-    const double t345 = t20 * t21;
     s->par = *p;
     s->fixed[0] = t6;
     s->fixed[1] = t12;
@@ -350,7 +349,6 @@ MMSMITH_FN const char *axis_aligned_3d_prepare(axis_aligned_3d_solution *s, cons
     s->fixed[22] = t221;
     s->fixed[23] = t223;
     s->fixed[24] = t224;
-    s->fixed[25] = t345;
     return 0;
 }
 
@@ -1178,21 +1176,17 @@ MMSMITH_FN axis_aligned_3d_time_values axis_aligned_3d_at_time(const axis_aligne
     const double t338 = t337 * t8;
     const double t339 = s->fixed[18] * t338;
     const double t341 = s->fixed[19] * t337;
-    const double t346 = t8 * t14;
-    const double t347 = s->fixed[25] * t346;
-    const double t349 = t8 * t18;
-    const double t350 = s->fixed[25] * t349;
-    const double t359 = s->fixed[20] * t8;
-    const double t367 = t14 * t14;
-    const double t368 = t367 * t14;
-    const double t369 = s->fixed[21] * t368;
-    const double t371 = s->fixed[22] * t367;
-    const double t374 = s->fixed[23] * t14;
-    const double t382 = t18 * t18;
-    const double t383 = t382 * t18;
-    const double t384 = s->fixed[21] * t383;
-    const double t386 = s->fixed[22] * t382;
-    const double t389 = s->fixed[23] * t18;
+    const double t351 = s->fixed[20] * t8;
+    const double t359 = t14 * t14;
+    const double t360 = t359 * t14;
+    const double t361 = s->fixed[21] * t360;
+    const double t363 = s->fixed[22] * t359;
+    const double t366 = s->fixed[23] * t14;
+    const double t374 = t18 * t18;
+    const double t375 = t374 * t18;
+    const double t376 = s->fixed[21] * t375;
+    const double t378 = s->fixed[22] * t374;
+    const double t381 = s->fixed[23] * t18;
     time.values[0] = t23;
     time.values[1] = t26;
     time.values[2] = t30;
@@ -1201,15 +1195,13 @@ MMSMITH_FN axis_aligned_3d_time_values axis_aligned_3d_at_time(const axis_aligne
     time.values[5] = t181;
     time.values[6] = t339;
     time.values[7] = t341;
-    time.values[8] = t347;
-    time.values[9] = t350;
-    time.values[10] = t359;
-    time.values[11] = t369;
-    time.values[12] = t371;
-    time.values[13] = t374;
-    time.values[14] = t384;
-    time.values[15] = t386;
-    time.values[16] = t389;
+    time.values[8] = t351;
+    time.values[9] = t361;
+    time.values[10] = t363;
+    time.values[11] = t366;
+    time.values[12] = t376;
+    time.values[13] = t378;
+    time.values[14] = t381;
     return time;
 }
 
@@ -1253,44 +1245,41 @@ MMSMITH_FN void axis_aligned_3d_b_staged(const axis_aligned_3d_solution *s, cons
     const double t340 = time->values[6] * point[0];
     const double t342 = t340 + time->values[7];
     const double t343 = point[0] * t342;
-    const double t344 = point[stride] * t330;
-    const double t348 = time->values[8] * t344;
-    const double t351 = time->values[9] * point[2 * stride];
-    const double t352 = t348 + t351;
-    const double t353 = time->values[0] - t352;
-    const double t354 = point[0] * t353;
-    const double t355 = time->values[1] * t344;
-    const double t356 = t354 - t355;
-    const double t357 = t356 - t31;
-    const double t358 = mmsmith_ln_of_both(t357, t332);
-    const double t360 = time->values[10] * t358;
-    const double t361 = t343 + t360;
-    const double t362 = t336 * t361;
-    const double t363 = time->values[3] - t362;
-    const double t364 = point[3 * stride] * t363;
-    const double t365 = t34 * t334;
-    const double t366 = t365 * t365;
-    const double t370 = time->values[11] * point[stride];
-    const double t372 = t370 - time->values[12];
-    const double t373 = point[stride] * t372;
-    const double t375 = time->values[13] * t358;
-    const double t376 = t373 + t375;
-    const double t377 = t366 * t376;
-    const double t378 = t377 - time->values[4];
-    const double t379 = point[4 * stride] * t378;
-    const double t380 = t331 * t333;
-    const double t381 = t380 * t380;
-    const double t385 = time->values[14] * point[2 * stride];
-    const double t387 = t385 - time->values[15];
-    const double t388 = point[2 * stride] * t387;
-    const double t390 = time->values[16] * t358;
-    const double t391 = t388 + t390;
-    const double t392 = t381 * t391;
-    const double t393 = t392 - time->values[5];
-    const double t394 = point[5 * stride] * t393;
-    b[0] = t364;
-    b[1] = t379;
-    b[2] = t394;
+    const double t344 = t27 * t330;
+    const double t345 = t344 + t31;
+    const double t346 = 1.0 - t345;
+    const double t347 = t24 * t346;
+    const double t348 = t347 - t344;
+    const double t349 = t348 - t31;
+    const double t350 = mmsmith_ln_of_both(t349, t332);
+    const double t352 = time->values[8] * t350;
+    const double t353 = t343 + t352;
+    const double t354 = t336 * t353;
+    const double t355 = time->values[3] - t354;
+    const double t356 = point[3 * stride] * t355;
+    const double t357 = t34 * t334;
+    const double t358 = t357 * t357;
+    const double t362 = time->values[9] * point[stride];
+    const double t364 = t362 - time->values[10];
+    const double t365 = point[stride] * t364;
+    const double t367 = time->values[11] * t350;
+    const double t368 = t365 + t367;
+    const double t369 = t358 * t368;
+    const double t370 = t369 - time->values[4];
+    const double t371 = point[4 * stride] * t370;
+    const double t372 = t331 * t333;
+    const double t373 = t372 * t372;
+    const double t377 = time->values[12] * point[2 * stride];
+    const double t379 = t377 - time->values[13];
+    const double t380 = point[2 * stride] * t379;
+    const double t382 = time->values[14] * t350;
+    const double t383 = t380 + t382;
+    const double t384 = t373 * t383;
+    const double t385 = t384 - time->values[5];
+    const double t386 = point[5 * stride] * t385;
+    b[0] = t356;
+    b[1] = t371;
+    b[2] = t386;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -1340,44 +1329,41 @@ MMSMITH_FN void axis_aligned_3d_b_array(const axis_aligned_3d_solution *s, doubl
         const double t340 = time.values[6] * point0[p];
         const double t342 = t340 + time.values[7];
         const double t343 = point0[p] * t342;
-        const double t344 = point1[p] * t330;
-        const double t348 = time.values[8] * t344;
-        const double t351 = time.values[9] * point2[p];
-        const double t352 = t348 + t351;
-        const double t353 = time.values[0] - t352;
-        const double t354 = point0[p] * t353;
-        const double t355 = time.values[1] * t344;
-        const double t356 = t354 - t355;
-        const double t357 = t356 - t31;
-        const double t358 = mmsmith_ln_of_both(t357, t332);
-        const double t360 = time.values[10] * t358;
-        const double t361 = t343 + t360;
-        const double t362 = t336 * t361;
-        const double t363 = time.values[3] - t362;
-        const double t364 = point3[p] * t363;
-        const double t365 = t34 * t334;
-        const double t366 = t365 * t365;
-        const double t370 = time.values[11] * point1[p];
-        const double t372 = t370 - time.values[12];
-        const double t373 = point1[p] * t372;
-        const double t375 = time.values[13] * t358;
-        const double t376 = t373 + t375;
-        const double t377 = t366 * t376;
-        const double t378 = t377 - time.values[4];
-        const double t379 = point4[p] * t378;
-        const double t380 = t331 * t333;
-        const double t381 = t380 * t380;
-        const double t385 = time.values[14] * point2[p];
-        const double t387 = t385 - time.values[15];
-        const double t388 = point2[p] * t387;
-        const double t390 = time.values[16] * t358;
-        const double t391 = t388 + t390;
-        const double t392 = t381 * t391;
-        const double t393 = t392 - time.values[5];
-        const double t394 = point5[p] * t393;
-        b[p * 3 + 0] = t364;
-        b[p * 3 + 1] = t379;
-        b[p * 3 + 2] = t394;
+        const double t344 = t27 * t330;
+        const double t345 = t344 + t31;
+        const double t346 = 1.0 - t345;
+        const double t347 = t24 * t346;
+        const double t348 = t347 - t344;
+        const double t349 = t348 - t31;
+        const double t350 = mmsmith_ln_of_both(t349, t332);
+        const double t352 = time.values[8] * t350;
+        const double t353 = t343 + t352;
+        const double t354 = t336 * t353;
+        const double t355 = time.values[3] - t354;
+        const double t356 = point3[p] * t355;
+        const double t357 = t34 * t334;
+        const double t358 = t357 * t357;
+        const double t362 = time.values[9] * point1[p];
+        const double t364 = t362 - time.values[10];
+        const double t365 = point1[p] * t364;
+        const double t367 = time.values[11] * t350;
+        const double t368 = t365 + t367;
+        const double t369 = t358 * t368;
+        const double t370 = t369 - time.values[4];
+        const double t371 = point4[p] * t370;
+        const double t372 = t331 * t333;
+        const double t373 = t372 * t372;
+        const double t377 = time.values[12] * point2[p];
+        const double t379 = t377 - time.values[13];
+        const double t380 = point2[p] * t379;
+        const double t382 = time.values[14] * t350;
+        const double t383 = t380 + t382;
+        const double t384 = t373 * t383;
+        const double t385 = t384 - time.values[5];
+        const double t386 = point5[p] * t385;
+        b[p * 3 + 0] = t356;
+        b[p * 3 + 1] = t371;
+        b[p * 3 + 2] = t386;
     }
 }
 

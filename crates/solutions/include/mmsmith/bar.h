@@ -589,13 +589,17 @@ MMSMITH_FN bar_time_values bar_at_time(const bar_solution *s, double t)
     const double t132 = t14 * t14;
     const double t133 = t132 * t14;
     const double t134 = s->fixed[12] * t133;
-    const double t136 = s->fixed[13] * t132;
-    const double t139 = s->fixed[14] * t14;
+    const double t135 = -t134;
+    const double t137 = s->fixed[13] * t132;
+    const double t138 = -t137;
+    const double t141 = s->fixed[14] * t14;
+    const double t142 = -t141;
+    const double t146 = -t68;
     time.values[0] = t38;
-    time.values[1] = t68;
-    time.values[2] = t134;
-    time.values[3] = t136;
-    time.values[4] = t139;
+    time.values[1] = t135;
+    time.values[2] = t138;
+    time.values[3] = t142;
+    time.values[4] = t146;
     return time;
 }
 
@@ -621,16 +625,15 @@ MMSMITH_FN void bar_b_staged(const bar_solution *s, const bar_time_values *time,
     const double t47 = 1.0 / t41;
     const double t51 = mmsmith_log_1p(t39);
     const double t117 = t47 * t47;
-    const double t135 = time->values[2] * point[stride];
-    const double t137 = t135 + time->values[3];
-    const double t138 = point[stride] * t137;
-    const double t140 = time->values[4] * t51;
-    const double t141 = t138 + t140;
-    const double t142 = t117 * t141;
-    const double t143 = t142 + time->values[1];
-    const double t144 = point[0] * t143;
-    const double t145 = -t144;
-    b[0] = t145;
+    const double t136 = time->values[1] * point[stride];
+    const double t139 = t136 + time->values[2];
+    const double t140 = point[stride] * t139;
+    const double t143 = time->values[3] * t51;
+    const double t144 = t140 + t143;
+    const double t145 = t117 * t144;
+    const double t147 = t145 + time->values[4];
+    const double t148 = point[0] * t147;
+    b[0] = t148;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -666,16 +669,15 @@ MMSMITH_FN void bar_b_array(const bar_solution *s, double t, size_t n,
         const double t47 = 1.0 / t41;
         const double t51 = mmsmith_log_1p(t39);
         const double t117 = t47 * t47;
-        const double t135 = time.values[2] * point1[p];
-        const double t137 = t135 + time.values[3];
-        const double t138 = point1[p] * t137;
-        const double t140 = time.values[4] * t51;
-        const double t141 = t138 + t140;
-        const double t142 = t117 * t141;
-        const double t143 = t142 + time.values[1];
-        const double t144 = point0[p] * t143;
-        const double t145 = -t144;
-        b[p * 1 + 0] = t145;
+        const double t136 = time.values[1] * point1[p];
+        const double t139 = t136 + time.values[2];
+        const double t140 = point1[p] * t139;
+        const double t143 = time.values[3] * t51;
+        const double t144 = t140 + t143;
+        const double t145 = t117 * t144;
+        const double t147 = t145 + time.values[4];
+        const double t148 = point0[p] * t147;
+        b[p * 1 + 0] = t148;
     }
 }
 

@@ -145,7 +145,7 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
 enum {
     rigid_motion_dimension = 2,
     rigid_motion_parameter_count = 5,
-    rigid_motion_time_count = 7,
+    rigid_motion_time_count = 5,
     rigid_motion_point_count = 2
 };
 
@@ -160,12 +160,12 @@ typedef struct rigid_motion_parameters {
 /* The parameters, and the values that depend on them only. */
 typedef struct rigid_motion_solution {
     rigid_motion_parameters par;
-    double fixed[14];
+    double fixed[11];
 } rigid_motion_solution;
 
 /* What the body force needs of the time alone. */
 typedef struct rigid_motion_time_values {
-    double values[7];
+    double values[5];
 } rigid_motion_time_values;
 
 typedef struct rigid_motion_field_values {
@@ -232,10 +232,7 @@ MMSMITH_FN const char *rigid_motion_prepare(rigid_motion_solution *s, const rigi
     const double t82 = t80 / t81;
     const double t83 = 0.5 * p->E;
     const double t84 = t83 / t77;
-    const double t85 = p->U * t55;
-    const double t88 = p->A * t55;
-    const double t93 = t48 * t55;
-    const double t100 = p->A * t64;
+    const double t105 = p->U * t55;
     s->par = *p;
     s->fixed[0] = t5;
     s->fixed[1] = t9;
@@ -247,10 +244,7 @@ MMSMITH_FN const char *rigid_motion_prepare(rigid_motion_solution *s, const rigi
     s->fixed[7] = t75;
     s->fixed[8] = t82;
     s->fixed[9] = t84;
-    s->fixed[10] = t85;
-    s->fixed[11] = t88;
-    s->fixed[12] = t93;
-    s->fixed[13] = t100;
+    s->fixed[10] = t105;
     return 0;
 }
 
@@ -582,21 +576,41 @@ MMSMITH_FN rigid_motion_time_values rigid_motion_at_time(const rigid_motion_solu
     const double t14 = cos(t10);
     const double t30 = mmsmith_cos_pi(t6);
     const double t49 = t30 * t30;
-    const double t86 = s->fixed[10] * t7;
-    const double t87 = -t86;
-    const double t89 = s->fixed[11] * t7;
-    const double t90 = -t89;
-    const double t94 = s->fixed[12] * t49;
-    const double t95 = -t94;
-    const double t98 = s->fixed[6] * t7;
-    const double t101 = s->fixed[13] * t49;
-    time.values[0] = t11;
-    time.values[1] = t14;
-    time.values[2] = t87;
-    time.values[3] = t90;
-    time.values[4] = t95;
-    time.values[5] = t98;
-    time.values[6] = t101;
+    const double t66 = t11 * t11;
+    const double t69 = t14 * t11;
+    const double t85 = t69 + t69;
+    const double t86 = t14 * t14;
+    const double t87 = t86 - t66;
+    const double t88 = t66 - t86;
+    const double t89 = t7 * t85;
+    const double t90 = s->par.A * t89;
+    const double t91 = t49 * t88;
+    const double t92 = s->fixed[4] * t91;
+    const double t93 = t90 + t92;
+    const double t94 = t7 * t87;
+    const double t95 = s->par.A * t94;
+    const double t96 = t49 * t85;
+    const double t97 = s->fixed[4] * t96;
+    const double t98 = t95 + t97;
+    const double t99 = t7 * t88;
+    const double t100 = s->par.A * t96;
+    const double t101 = t99 - t100;
+    const double t102 = t49 * t87;
+    const double t103 = s->par.A * t102;
+    const double t104 = t89 - t103;
+    const double t106 = s->fixed[10] * t7;
+    const double t107 = -t106;
+    const double t108 = s->fixed[5] * t93;
+    const double t109 = -t108;
+    const double t112 = s->fixed[5] * t98;
+    const double t113 = -t112;
+    const double t116 = s->fixed[6] * t101;
+    const double t118 = s->fixed[6] * t104;
+    time.values[0] = t107;
+    time.values[1] = t109;
+    time.values[2] = t113;
+    time.values[3] = t116;
+    time.values[4] = t118;
     return time;
 }
 
@@ -615,27 +629,15 @@ MMSMITH_FN void rigid_motion_b_staged(const rigid_motion_solution *s, const rigi
     const double *point, size_t stride, double b[2])
 {
     (void)s;
-    const double t15 = time->values[0] * point[0];
-    const double t16 = time->values[1] * point[stride];
-    const double t17 = t15 + t16;
-    const double t25 = time->values[1] * point[0];
-    const double t26 = time->values[0] * point[stride];
-    const double t27 = t25 - t26;
-    const double t31 = time->values[0] * t27;
-    const double t32 = time->values[1] * t17;
-    const double t33 = t31 + t32;
-    const double t39 = time->values[0] * t17;
-    const double t40 = time->values[1] * t27;
-    const double t41 = t39 - t40;
-    const double t91 = time->values[3] * t33;
-    const double t92 = time->values[2] - t91;
-    const double t96 = time->values[4] * t41;
-    const double t97 = t92 - t96;
-    const double t99 = time->values[5] * t41;
-    const double t102 = time->values[6] * t33;
-    const double t103 = t99 - t102;
-    b[0] = t97;
-    b[1] = t103;
+    const double t110 = time->values[1] * point[0];
+    const double t111 = time->values[0] - t110;
+    const double t114 = time->values[2] * point[stride];
+    const double t115 = t111 - t114;
+    const double t117 = time->values[3] * point[0];
+    const double t119 = time->values[4] * point[stride];
+    const double t120 = t117 + t119;
+    b[0] = t115;
+    b[1] = t120;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -666,27 +668,15 @@ MMSMITH_FN void rigid_motion_b_array(const rigid_motion_solution *s, double t, s
     const size_t end = first + count;
     size_t p;
     for (p = first; p < end; ++p) {
-        const double t15 = time.values[0] * point0[p];
-        const double t16 = time.values[1] * point1[p];
-        const double t17 = t15 + t16;
-        const double t25 = time.values[1] * point0[p];
-        const double t26 = time.values[0] * point1[p];
-        const double t27 = t25 - t26;
-        const double t31 = time.values[0] * t27;
-        const double t32 = time.values[1] * t17;
-        const double t33 = t31 + t32;
-        const double t39 = time.values[0] * t17;
-        const double t40 = time.values[1] * t27;
-        const double t41 = t39 - t40;
-        const double t91 = time.values[3] * t33;
-        const double t92 = time.values[2] - t91;
-        const double t96 = time.values[4] * t41;
-        const double t97 = t92 - t96;
-        const double t99 = time.values[5] * t41;
-        const double t102 = time.values[6] * t33;
-        const double t103 = t99 - t102;
-        b[p * 2 + 0] = t97;
-        b[p * 2 + 1] = t103;
+        const double t110 = time.values[1] * point0[p];
+        const double t111 = time.values[0] - t110;
+        const double t114 = time.values[2] * point1[p];
+        const double t115 = t111 - t114;
+        const double t117 = time.values[3] * point0[p];
+        const double t119 = time.values[4] * point1[p];
+        const double t120 = t117 + t119;
+        b[p * 2 + 0] = t115;
+        b[p * 2 + 1] = t120;
     }
 }
 

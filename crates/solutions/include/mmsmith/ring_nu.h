@@ -327,21 +327,21 @@ MMSMITH_FN const char *ring_nu_prepare(ring_nu_solution *s, const ring_nu_parame
     const double t305 = p->rho0 * t97;
     const double t306 = t305 * t99;
     const double t307 = t304 / t306;
-    const double t312 = 2.0 / t11;
-    const double t313 = p->Ri - p->Ro;
-    const double t314 = t313 * t313;
-    const double t315 = t314 * t313;
-    const double t316 = t315 / t26;
-    const double t317 = 1.0 - t316;
-    const double t318 = p->A * t317;
-    const double t319 = t318 / p->Ri;
-    const double t323 = p->Ri * t97;
-    const double t324 = t323 * t99;
-    const double t325 = t112 / t324;
-    const double t331 = p->A / p->Ro;
-    const double t335 = p->Ro * t97;
-    const double t336 = t335 * t99;
-    const double t337 = t112 / t336;
+    const double t310 = 2.0 / t11;
+    const double t311 = p->Ri - p->Ro;
+    const double t312 = t311 * t311;
+    const double t313 = t312 * t311;
+    const double t314 = t313 / t26;
+    const double t315 = 1.0 - t314;
+    const double t316 = p->A * t315;
+    const double t317 = t316 / p->Ri;
+    const double t321 = p->Ri * t97;
+    const double t322 = t321 * t99;
+    const double t323 = t112 / t322;
+    const double t329 = p->A / p->Ro;
+    const double t333 = p->Ro * t97;
+    const double t334 = t333 * t99;
+    const double t335 = t112 / t334;
     if (!(p->Ri < p->Ro)) {
         return "the parameters of ring-nu must satisfy Ri < Ro";
     }
@@ -374,11 +374,11 @@ MMSMITH_FN const char *ring_nu_prepare(ring_nu_solution *s, const ring_nu_parame
     s->fixed[22] = t289;
     s->fixed[23] = t301;
     s->fixed[24] = t307;
-    s->fixed[25] = t312;
-    s->fixed[26] = t319;
-    s->fixed[27] = t325;
-    s->fixed[28] = t331;
-    s->fixed[29] = t337;
+    s->fixed[25] = t310;
+    s->fixed[26] = t317;
+    s->fixed[27] = t323;
+    s->fixed[28] = t329;
+    s->fixed[29] = t335;
     return 0;
 }
 
@@ -783,16 +783,16 @@ MMSMITH_FN void ring_nu_inner_traction(const ring_nu_solution *s, const double X
 {
     const double t12 = s->fixed[0] * t;
     const double t13 = mmsmith_cos_pi(t12);
-    const double t320 = s->fixed[26] * t13;
-    const double t321 = t320 + 1.0;
-    const double t322 = mmsmith_ln_of_both(t320, t321);
-    const double t326 = s->fixed[27] * t322;
-    const double t327 = t326 * X[0];
+    const double t318 = s->fixed[26] * t13;
+    const double t319 = t318 + 1.0;
+    const double t320 = mmsmith_ln_of_both(t318, t319);
+    const double t324 = s->fixed[27] * t320;
+    const double t325 = t324 * X[0];
+    const double t326 = -t325;
+    const double t327 = t324 * X[1];
     const double t328 = -t327;
-    const double t329 = t326 * X[1];
-    const double t330 = -t329;
-    traction[0] = t328;
-    traction[1] = t330;
+    traction[0] = t326;
+    traction[1] = t328;
 }
 
 /* traction on the surface outer, force per reference area */
@@ -801,14 +801,14 @@ MMSMITH_FN void ring_nu_outer_traction(const ring_nu_solution *s, const double X
 {
     const double t12 = s->fixed[0] * t;
     const double t13 = mmsmith_cos_pi(t12);
-    const double t332 = s->fixed[28] * t13;
-    const double t333 = t332 + 1.0;
-    const double t334 = mmsmith_ln_of_both(t332, t333);
-    const double t338 = s->fixed[29] * t334;
-    const double t339 = t338 * X[0];
-    const double t340 = t338 * X[1];
-    traction[0] = t339;
-    traction[1] = t340;
+    const double t330 = s->fixed[28] * t13;
+    const double t331 = t330 + 1.0;
+    const double t332 = mmsmith_ln_of_both(t330, t331);
+    const double t336 = s->fixed[29] * t332;
+    const double t337 = t336 * X[0];
+    const double t338 = t336 * X[1];
+    traction[0] = t337;
+    traction[1] = t338;
 }
 
 /* traction on the surface X-lower, force per reference area */
@@ -854,13 +854,13 @@ MMSMITH_FN void ring_nu_X_lower_traction(const ring_nu_solution *s, const double
     const double t122 = s->fixed[10] * t119;
     const double t123 = t121 - t122;
     const double t129 = s->fixed[11] * t104;
-    const double t341 = t33 * t34;
-    const double t342 = t75 * t341;
-    const double t343 = t32 * t342;
-    const double t344 = t343 * t123;
-    const double t345 = t129 - t344;
-    const double t346 = -t345;
-    traction[0] = t346;
+    const double t339 = t33 * t34;
+    const double t340 = t75 * t339;
+    const double t341 = t32 * t340;
+    const double t342 = t341 * t123;
+    const double t343 = t129 - t342;
+    const double t344 = -t343;
+    traction[0] = t344;
     traction[1] = 0.0;
 }
 
@@ -907,14 +907,14 @@ MMSMITH_FN void ring_nu_Y_lower_traction(const ring_nu_solution *s, const double
     const double t122 = s->fixed[10] * t119;
     const double t123 = t121 - t122;
     const double t129 = s->fixed[11] * t104;
-    const double t341 = t33 * t34;
-    const double t348 = t89 * t341;
-    const double t349 = t32 * t348;
-    const double t350 = t349 * t123;
-    const double t351 = t129 - t350;
-    const double t352 = -t351;
+    const double t339 = t33 * t34;
+    const double t346 = t89 * t339;
+    const double t347 = t32 * t346;
+    const double t348 = t347 * t123;
+    const double t349 = t129 - t348;
+    const double t350 = -t349;
     traction[0] = 0.0;
-    traction[1] = t352;
+    traction[1] = t350;
 }
 
 /* all fields */
@@ -1212,7 +1212,7 @@ MMSMITH_FN void ring_nu_at_point(const ring_nu_solution *s, const double X[2], d
     const double t300 = t299 + t298;
     const double t302 = s->fixed[23] * t300;
     const double t308 = s->fixed[24] * t147;
-    const double t311 = X[1] * t34;
+    const double t309 = X[1] * t34;
     point[0] = t37;
     point[1] = t38;
     point[2] = t207;
@@ -1222,7 +1222,7 @@ MMSMITH_FN void ring_nu_at_point(const ring_nu_solution *s, const double X[2], d
     point[6] = t285;
     point[7] = t302;
     point[8] = t308;
-    point[9] = t311;
+    point[9] = t309;
 }
 
 /* The body force from the values of one time and of one point. Value m of the point is point[m*stride]:
@@ -1240,25 +1240,23 @@ MMSMITH_FN void ring_nu_b_staged(const ring_nu_solution *s, const ring_nu_time_v
     const double t277 = time->values[0] * point[4 * stride];
     const double t278 = point[5 * stride] + t277;
     const double t303 = time->values[0] * t278;
-    const double t309 = t43 * t43;
-    const double t310 = t309 * t45;
-    const double t353 = t44 * t43;
-    const double t354 = t353 + t42;
-    const double t355 = mmsmith_ln_of_both(t354, t46);
-    const double t356 = point[6 * stride] * t355;
-    const double t357 = t303 + t356;
-    const double t358 = point[7 * stride] + t357;
-    const double t359 = time->values[0] * t358;
-    const double t360 = point[8 * stride] * t355;
-    const double t361 = t359 + t360;
-    const double t362 = t361 / t310;
-    const double t363 = t362 - point[3 * stride];
-    const double t364 = time->values[0] * point[2 * stride];
-    const double t365 = t364 * t363;
-    const double t366 = time->values[0] * point[9 * stride];
-    const double t367 = t366 * t363;
-    b[0] = t365;
-    b[1] = t367;
+    const double t351 = t44 * t43;
+    const double t352 = t351 + t42;
+    const double t353 = mmsmith_ln_of_both(t352, t46);
+    const double t354 = point[6 * stride] * t353;
+    const double t355 = t303 + t354;
+    const double t356 = point[7 * stride] + t355;
+    const double t357 = time->values[0] * t356;
+    const double t358 = point[8 * stride] * t353;
+    const double t359 = t357 + t358;
+    const double t360 = t43 * t46;
+    const double t361 = t359 / t360;
+    const double t362 = t361 - point[3 * stride];
+    const double t363 = time->values[0] * t362;
+    const double t364 = point[2 * stride] * t363;
+    const double t365 = point[9 * stride] * t363;
+    b[0] = t364;
+    b[1] = t365;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -1305,25 +1303,23 @@ MMSMITH_FN void ring_nu_b_array(const ring_nu_solution *s, double t, size_t n,
         const double t277 = time.values[0] * point4[p];
         const double t278 = point5[p] + t277;
         const double t303 = time.values[0] * t278;
-        const double t309 = t43 * t43;
-        const double t310 = t309 * t45;
-        const double t353 = t44 * t43;
-        const double t354 = t353 + t42;
-        const double t355 = mmsmith_ln_of_both(t354, t46);
-        const double t356 = point6[p] * t355;
-        const double t357 = t303 + t356;
-        const double t358 = point7[p] + t357;
-        const double t359 = time.values[0] * t358;
-        const double t360 = point8[p] * t355;
-        const double t361 = t359 + t360;
-        const double t362 = t361 / t310;
-        const double t363 = t362 - point3[p];
-        const double t364 = time.values[0] * point2[p];
-        const double t365 = t364 * t363;
-        const double t366 = time.values[0] * point9[p];
-        const double t367 = t366 * t363;
-        b[p * 2 + 0] = t365;
-        b[p * 2 + 1] = t367;
+        const double t351 = t44 * t43;
+        const double t352 = t351 + t42;
+        const double t353 = mmsmith_ln_of_both(t352, t46);
+        const double t354 = point6[p] * t353;
+        const double t355 = t303 + t354;
+        const double t356 = point7[p] + t355;
+        const double t357 = time.values[0] * t356;
+        const double t358 = point8[p] * t353;
+        const double t359 = t357 + t358;
+        const double t360 = t43 * t46;
+        const double t361 = t359 / t360;
+        const double t362 = t361 - point3[p];
+        const double t363 = time.values[0] * t362;
+        const double t364 = point2[p] * t363;
+        const double t365 = point9[p] * t363;
+        b[p * 2 + 0] = t364;
+        b[p * 2 + 1] = t365;
     }
 }
 

@@ -338,31 +338,31 @@ MMSMITH_FN const char *sphere_shell_prepare(sphere_shell_solution *s, const sphe
     const double t341 = t48 * t114;
     const double t342 = t341 * t116;
     const double t343 = t340 / t342;
-    const double t349 = 2.0 / t16;
-    const double t351 = p->Ri / p->Ro;
-    const double t352 = 1.0 - t351;
-    const double t353 = t103 * p->Ri;
-    const double t354 = t353 * t352;
-    const double t355 = t354 / t11;
-    const double t360 = 2.0 * p->Ri;
-    const double t361 = t360 / p->Ro;
-    const double t362 = 3.0 - t361;
-    const double t364 = t119 * p->Ri;
-    const double t365 = t364 * t362;
-    const double t366 = t365 / t11;
-    const double t369 = p->Ri * p->Ri;
-    const double t370 = t362 * t362;
-    const double t371 = t127 * t369;
-    const double t372 = t371 * t370;
-    const double t373 = t372 / t128;
-    const double t377 = p->A * p->Ri;
-    const double t378 = t377 * t362;
-    const double t379 = t378 / t11;
-    const double t390 = 1.0 / p->Ri;
-    const double t398 = p->A / p->Ro;
-    const double t406 = p->Ro * t114;
-    const double t407 = t406 * t116;
-    const double t408 = t139 / t407;
+    const double t347 = 2.0 / t16;
+    const double t349 = p->Ri / p->Ro;
+    const double t350 = 1.0 - t349;
+    const double t351 = t103 * p->Ri;
+    const double t352 = t351 * t350;
+    const double t353 = t352 / t11;
+    const double t358 = 2.0 * p->Ri;
+    const double t359 = t358 / p->Ro;
+    const double t360 = 3.0 - t359;
+    const double t362 = t119 * p->Ri;
+    const double t363 = t362 * t360;
+    const double t364 = t363 / t11;
+    const double t367 = p->Ri * p->Ri;
+    const double t368 = t360 * t360;
+    const double t369 = t127 * t367;
+    const double t370 = t369 * t368;
+    const double t371 = t370 / t128;
+    const double t375 = p->A * p->Ri;
+    const double t376 = t375 * t360;
+    const double t377 = t376 / t11;
+    const double t388 = 1.0 / p->Ri;
+    const double t396 = p->A / p->Ro;
+    const double t404 = p->Ro * t114;
+    const double t405 = t404 * t116;
+    const double t406 = t139 / t405;
     if (!(p->Ri < p->Ro)) {
         return "the parameters of sphere-shell must satisfy Ri < Ro";
     }
@@ -391,14 +391,14 @@ MMSMITH_FN const char *sphere_shell_prepare(sphere_shell_solution *s, const sphe
     s->fixed[21] = t319;
     s->fixed[22] = t334;
     s->fixed[23] = t343;
-    s->fixed[24] = t349;
-    s->fixed[25] = t355;
-    s->fixed[26] = t366;
-    s->fixed[27] = t373;
-    s->fixed[28] = t379;
-    s->fixed[29] = t390;
-    s->fixed[30] = t398;
-    s->fixed[31] = t408;
+    s->fixed[24] = t347;
+    s->fixed[25] = t353;
+    s->fixed[26] = t364;
+    s->fixed[27] = t371;
+    s->fixed[28] = t377;
+    s->fixed[29] = t388;
+    s->fixed[30] = t396;
+    s->fixed[31] = t406;
     return 0;
 }
 
@@ -852,36 +852,36 @@ MMSMITH_FN void sphere_shell_inner_traction(const sphere_shell_solution *s, cons
     const double t17 = s->fixed[0] * t;
     const double t18 = mmsmith_cos_pi(t17);
     const double t122 = t18 * t18;
-    const double t356 = s->fixed[25] * t18;
+    const double t354 = s->fixed[25] * t18;
+    const double t355 = t354 + 1.0;
+    const double t356 = 1.0 / t355;
     const double t357 = t356 + 1.0;
-    const double t358 = 1.0 / t357;
-    const double t359 = t358 + 1.0;
-    const double t363 = t18 * t357;
-    const double t367 = s->fixed[26] * t363;
-    const double t368 = t122 * t357;
-    const double t374 = s->fixed[27] * t368;
-    const double t375 = t367 + t374;
-    const double t376 = t375 + t356;
-    const double t380 = s->fixed[28] * t18;
-    const double t381 = t380 + 1.0;
-    const double t382 = t381 * t381;
-    const double t383 = t357 * t382;
-    const double t384 = mmsmith_ln_of_both(t376, t383);
-    const double t385 = t356 * t359;
-    const double t386 = s->fixed[11] * t385;
-    const double t387 = t384 * t358;
-    const double t388 = s->fixed[12] * t387;
-    const double t389 = t386 + t388;
-    const double t391 = s->fixed[29] * t389;
-    const double t392 = t391 * X[0];
+    const double t361 = t18 * t355;
+    const double t365 = s->fixed[26] * t361;
+    const double t366 = t122 * t355;
+    const double t372 = s->fixed[27] * t366;
+    const double t373 = t365 + t372;
+    const double t374 = t373 + t354;
+    const double t378 = s->fixed[28] * t18;
+    const double t379 = t378 + 1.0;
+    const double t380 = t379 * t379;
+    const double t381 = t355 * t380;
+    const double t382 = mmsmith_ln_of_both(t374, t381);
+    const double t383 = t354 * t357;
+    const double t384 = s->fixed[11] * t383;
+    const double t385 = t382 * t356;
+    const double t386 = s->fixed[12] * t385;
+    const double t387 = t384 + t386;
+    const double t389 = s->fixed[29] * t387;
+    const double t390 = t389 * X[0];
+    const double t391 = -t390;
+    const double t392 = t389 * X[1];
     const double t393 = -t392;
-    const double t394 = t391 * X[1];
+    const double t394 = t389 * X[2];
     const double t395 = -t394;
-    const double t396 = t391 * X[2];
-    const double t397 = -t396;
-    traction[0] = t393;
-    traction[1] = t395;
-    traction[2] = t397;
+    traction[0] = t391;
+    traction[1] = t393;
+    traction[2] = t395;
 }
 
 /* traction on the surface outer, force per reference area */
@@ -890,20 +890,20 @@ MMSMITH_FN void sphere_shell_outer_traction(const sphere_shell_solution *s, cons
 {
     const double t17 = s->fixed[0] * t;
     const double t18 = mmsmith_cos_pi(t17);
-    const double t399 = s->fixed[30] * t18;
-    const double t400 = t399 + 2.0;
-    const double t401 = t18 * t400;
-    const double t402 = s->fixed[30] * t401;
-    const double t403 = t399 + 1.0;
-    const double t404 = t403 * t403;
-    const double t405 = mmsmith_ln_of_both(t402, t404);
-    const double t409 = s->fixed[31] * t405;
-    const double t410 = t409 * X[0];
-    const double t411 = t409 * X[1];
-    const double t412 = t409 * X[2];
-    traction[0] = t410;
-    traction[1] = t411;
-    traction[2] = t412;
+    const double t397 = s->fixed[30] * t18;
+    const double t398 = t397 + 2.0;
+    const double t399 = t18 * t398;
+    const double t400 = s->fixed[30] * t399;
+    const double t401 = t397 + 1.0;
+    const double t402 = t401 * t401;
+    const double t403 = mmsmith_ln_of_both(t400, t402);
+    const double t407 = s->fixed[31] * t403;
+    const double t408 = t407 * X[0];
+    const double t409 = t407 * X[1];
+    const double t410 = t407 * X[2];
+    traction[0] = t408;
+    traction[1] = t409;
+    traction[2] = t410;
 }
 
 /* traction on the surface X-lower, force per reference area */
@@ -954,12 +954,12 @@ MMSMITH_FN void sphere_shell_X_lower_traction(const sphere_shell_solution *s, co
     const double t150 = s->fixed[11] * t147;
     const double t151 = t149 - t150;
     const double t158 = s->fixed[12] * t133;
-    const double t413 = t64 * t67;
-    const double t414 = t25 * t413;
-    const double t415 = t414 * t151;
-    const double t416 = t158 - t415;
-    const double t417 = -t416;
-    traction[0] = t417;
+    const double t411 = t64 * t67;
+    const double t412 = t25 * t411;
+    const double t413 = t412 * t151;
+    const double t414 = t158 - t413;
+    const double t415 = -t414;
+    traction[0] = t415;
     traction[1] = 0.0;
     traction[2] = 0.0;
 }
@@ -1013,13 +1013,13 @@ MMSMITH_FN void sphere_shell_Y_lower_traction(const sphere_shell_solution *s, co
     const double t150 = s->fixed[11] * t147;
     const double t151 = t149 - t150;
     const double t158 = s->fixed[12] * t133;
-    const double t419 = t85 * t67;
-    const double t420 = t25 * t419;
-    const double t421 = t420 * t151;
-    const double t422 = t158 - t421;
-    const double t423 = -t422;
+    const double t417 = t85 * t67;
+    const double t418 = t25 * t417;
+    const double t419 = t418 * t151;
+    const double t420 = t158 - t419;
+    const double t421 = -t420;
     traction[0] = 0.0;
-    traction[1] = t423;
+    traction[1] = t421;
     traction[2] = 0.0;
 }
 
@@ -1072,14 +1072,14 @@ MMSMITH_FN void sphere_shell_Z_lower_traction(const sphere_shell_solution *s, co
     const double t150 = s->fixed[11] * t147;
     const double t151 = t149 - t150;
     const double t158 = s->fixed[12] * t133;
-    const double t424 = t96 * t67;
-    const double t425 = t25 * t424;
-    const double t426 = t425 * t151;
-    const double t427 = t158 - t426;
-    const double t428 = -t427;
+    const double t422 = t96 * t67;
+    const double t423 = t25 * t422;
+    const double t424 = t423 * t151;
+    const double t425 = t158 - t424;
+    const double t426 = -t425;
     traction[0] = 0.0;
     traction[1] = 0.0;
-    traction[2] = t428;
+    traction[2] = t426;
 }
 
 /* all fields */
@@ -1338,12 +1338,12 @@ MMSMITH_FN sphere_shell_time_values sphere_shell_at_time(const sphere_shell_solu
     const double t105 = s->fixed[8] * t18;
     const double t122 = t18 * t18;
     const double t222 = s->fixed[9] * t18;
-    const double t430 = s->fixed[10] * t122;
+    const double t428 = s->fixed[10] * t122;
     time.values[0] = t18;
     time.values[1] = t25;
     time.values[2] = t105;
     time.values[3] = t222;
-    time.values[4] = t430;
+    time.values[4] = t428;
     return time;
 }
 
@@ -1426,8 +1426,8 @@ MMSMITH_FN void sphere_shell_at_point(const sphere_shell_solution *s, const doub
     const double t335 = t8 * t332;
     const double t336 = s->fixed[22] * t335;
     const double t344 = s->fixed[23] * t191;
-    const double t347 = X[1] * t67;
-    const double t348 = X[2] * t67;
+    const double t345 = X[1] * t67;
+    const double t346 = X[2] * t67;
     point[0] = t26;
     point[1] = t106;
     point[2] = t124;
@@ -1438,8 +1438,8 @@ MMSMITH_FN void sphere_shell_at_point(const sphere_shell_solution *s, const doub
     point[7] = t321;
     point[8] = t336;
     point[9] = t344;
-    point[10] = t347;
-    point[11] = t348;
+    point[10] = t345;
+    point[11] = t346;
 }
 
 /* The body force from the values of one time and of one point. Value m of the point is point[m*stride]:
@@ -1453,36 +1453,33 @@ MMSMITH_FN void sphere_shell_b_staged(const sphere_shell_solution *s, const sphe
     const double t108 = t107 + 1.0;
     const double t109 = time->values[1] * point[0];
     const double t110 = t109 + 1.0;
-    const double t111 = t110 * t110;
-    const double t112 = t108 * t111;
     const double t311 = time->values[0] * point[5 * stride];
     const double t312 = point[6 * stride] + t311;
     const double t337 = time->values[0] * t312;
-    const double t345 = t108 * t108;
-    const double t346 = t345 * t110;
-    const double t429 = time->values[3] * point[0];
-    const double t431 = time->values[4] * point[2 * stride];
-    const double t432 = t429 + t431;
-    const double t433 = t108 * t432;
-    const double t434 = t433 + t107;
-    const double t435 = mmsmith_ln_of_both(t434, t112);
+    const double t427 = time->values[3] * point[0];
+    const double t429 = time->values[4] * point[2 * stride];
+    const double t430 = t427 + t429;
+    const double t431 = t108 * t430;
+    const double t432 = t431 + t107;
+    const double t433 = t108 * t110;
+    const double t434 = t110 * t433;
+    const double t435 = mmsmith_ln_of_both(t432, t434);
     const double t436 = point[7 * stride] * t435;
     const double t437 = t337 + t436;
     const double t438 = point[8 * stride] + t437;
     const double t439 = time->values[0] * t438;
     const double t440 = point[9 * stride] * t435;
     const double t441 = t439 + t440;
-    const double t442 = t441 / t346;
-    const double t443 = t442 - point[4 * stride];
-    const double t444 = time->values[0] * point[3 * stride];
-    const double t445 = t444 * t443;
-    const double t446 = time->values[0] * point[10 * stride];
-    const double t447 = t446 * t443;
-    const double t448 = time->values[0] * point[11 * stride];
-    const double t449 = t448 * t443;
-    b[0] = t445;
+    const double t442 = t108 * t433;
+    const double t443 = t441 / t442;
+    const double t444 = t443 - point[4 * stride];
+    const double t445 = time->values[0] * t444;
+    const double t446 = point[3 * stride] * t445;
+    const double t447 = point[10 * stride] * t445;
+    const double t448 = point[11 * stride] * t445;
+    b[0] = t446;
     b[1] = t447;
-    b[2] = t449;
+    b[2] = t448;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -1527,36 +1524,33 @@ MMSMITH_FN void sphere_shell_b_array(const sphere_shell_solution *s, double t, s
         const double t108 = t107 + 1.0;
         const double t109 = time.values[1] * point0[p];
         const double t110 = t109 + 1.0;
-        const double t111 = t110 * t110;
-        const double t112 = t108 * t111;
         const double t311 = time.values[0] * point5[p];
         const double t312 = point6[p] + t311;
         const double t337 = time.values[0] * t312;
-        const double t345 = t108 * t108;
-        const double t346 = t345 * t110;
-        const double t429 = time.values[3] * point0[p];
-        const double t431 = time.values[4] * point2[p];
-        const double t432 = t429 + t431;
-        const double t433 = t108 * t432;
-        const double t434 = t433 + t107;
-        const double t435 = mmsmith_ln_of_both(t434, t112);
+        const double t427 = time.values[3] * point0[p];
+        const double t429 = time.values[4] * point2[p];
+        const double t430 = t427 + t429;
+        const double t431 = t108 * t430;
+        const double t432 = t431 + t107;
+        const double t433 = t108 * t110;
+        const double t434 = t110 * t433;
+        const double t435 = mmsmith_ln_of_both(t432, t434);
         const double t436 = point7[p] * t435;
         const double t437 = t337 + t436;
         const double t438 = point8[p] + t437;
         const double t439 = time.values[0] * t438;
         const double t440 = point9[p] * t435;
         const double t441 = t439 + t440;
-        const double t442 = t441 / t346;
-        const double t443 = t442 - point4[p];
-        const double t444 = time.values[0] * point3[p];
-        const double t445 = t444 * t443;
-        const double t446 = time.values[0] * point10[p];
-        const double t447 = t446 * t443;
-        const double t448 = time.values[0] * point11[p];
-        const double t449 = t448 * t443;
-        b[p * 3 + 0] = t445;
+        const double t442 = t108 * t433;
+        const double t443 = t441 / t442;
+        const double t444 = t443 - point4[p];
+        const double t445 = time.values[0] * t444;
+        const double t446 = point3[p] * t445;
+        const double t447 = point10[p] * t445;
+        const double t448 = point11[p] * t445;
+        b[p * 3 + 0] = t446;
         b[p * 3 + 1] = t447;
-        b[p * 3 + 2] = t449;
+        b[p * 3 + 2] = t448;
     }
 }
 

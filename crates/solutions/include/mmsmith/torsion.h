@@ -161,7 +161,7 @@ typedef struct torsion_parameters {
 /* The parameters, and the values that depend on them only. */
 typedef struct torsion_solution {
     torsion_parameters par;
-    double fixed[15];
+    double fixed[12];
 } torsion_solution;
 
 /* What the body force needs of the time alone. */
@@ -224,17 +224,13 @@ MMSMITH_FN const char *torsion_prepare(torsion_solution *s, const torsion_parame
     const double t90 = p->A / t74;
     const double t94 = t10 * p->E;
     const double t95 = t94 / p->rho0;
-    const double t102 = 2.0 / t6;
-    const double t103 = 2.0 * p->nu;
-    const double t104 = 1.0 - t103;
-    const double t105 = p->E * p->nu;
-    const double t106 = t74 * t104;
-    const double t107 = t105 / t106;
-    const double t108 = -0.5;
-    const double t127 = t87 * t95;
-    const double t130 = p->A * t87;
-    const double t131 = t130 * t95;
-    const double t137 = t90 * t95;
+    const double t109 = 2.0 / t6;
+    const double t110 = 2.0 * p->nu;
+    const double t111 = 1.0 - t110;
+    const double t112 = p->E * p->nu;
+    const double t113 = t74 * t111;
+    const double t114 = t112 / t113;
+    const double t115 = -0.5;
     s->par = *p;
     s->fixed[0] = t6;
     s->fixed[1] = t10;
@@ -245,12 +241,9 @@ MMSMITH_FN const char *torsion_prepare(torsion_solution *s, const torsion_parame
     s->fixed[6] = t87;
     s->fixed[7] = t90;
     s->fixed[8] = t95;
-    s->fixed[9] = t102;
-    s->fixed[10] = t107;
-    s->fixed[11] = t108;
-    s->fixed[12] = t127;
-    s->fixed[13] = t131;
-    s->fixed[14] = t137;
+    s->fixed[9] = t109;
+    s->fixed[10] = t114;
+    s->fixed[11] = t115;
     return 0;
 }
 
@@ -566,10 +559,10 @@ MMSMITH_FN void torsion_Y_lower_traction(const torsion_solution *s, const double
     const double t8 = mmsmith_sin_pi(t7);
     const double t79 = s->fixed[5] * t8;
     const double t86 = t79 * X[0];
-    const double t109 = -t86;
+    const double t116 = -t86;
     traction[0] = 0.0;
     traction[1] = 0.0;
-    traction[2] = t109;
+    traction[2] = t116;
 }
 
 /* traction on the surface Y-upper, force per reference area */
@@ -594,9 +587,9 @@ MMSMITH_FN void torsion_Z_lower_traction(const torsion_solution *s, const double
     const double t79 = s->fixed[5] * t8;
     const double t84 = t79 * X[1];
     const double t86 = t79 * X[0];
-    const double t109 = -t86;
+    const double t116 = -t86;
     traction[0] = t84;
-    traction[1] = t109;
+    traction[1] = t116;
     traction[2] = 0.0;
 }
 
@@ -608,25 +601,25 @@ MMSMITH_FN void torsion_Z_upper_traction(const torsion_solution *s, const double
     const double t8 = mmsmith_sin_pi(t7);
     const double t11 = s->fixed[1] * t8;
     const double t79 = s->fixed[5] * t8;
-    const double t110 = cos(t11);
-    const double t111 = sin(t11);
-    const double t112 = t110 * X[0];
-    const double t113 = t111 * X[1];
-    const double t114 = t112 - t113;
-    const double t115 = t111 * t114;
-    const double t116 = 2.0 * t115;
-    const double t117 = X[1] + t116;
-    const double t118 = t79 * t117;
-    const double t119 = -t118;
-    const double t120 = t110 * X[1];
-    const double t121 = t111 * X[0];
-    const double t122 = t120 + t121;
-    const double t123 = t111 * t122;
-    const double t124 = 2.0 * t123;
-    const double t125 = X[0] - t124;
-    const double t126 = t79 * t125;
-    traction[0] = t119;
-    traction[1] = t126;
+    const double t117 = cos(t11);
+    const double t118 = sin(t11);
+    const double t119 = t117 * X[0];
+    const double t120 = t118 * X[1];
+    const double t121 = t119 - t120;
+    const double t122 = t118 * t121;
+    const double t123 = 2.0 * t122;
+    const double t124 = X[1] + t123;
+    const double t125 = t79 * t124;
+    const double t126 = -t125;
+    const double t127 = t117 * X[1];
+    const double t128 = t118 * X[0];
+    const double t129 = t127 + t128;
+    const double t130 = t118 * t129;
+    const double t131 = 2.0 * t130;
+    const double t132 = X[0] - t131;
+    const double t133 = t79 * t132;
+    traction[0] = t126;
+    traction[1] = t133;
     traction[2] = 0.0;
 }
 
@@ -755,14 +748,13 @@ MMSMITH_FN torsion_time_values torsion_at_time(const torsion_solution *s, double
     const double t11 = s->fixed[1] * t8;
     const double t31 = mmsmith_cos_pi(t7);
     const double t46 = t31 * t31;
+    const double t47 = s->par.A * t46;
     const double t101 = t8 * t8;
-    const double t128 = s->fixed[12] * t8;
-    const double t132 = s->fixed[13] * t46;
-    const double t138 = s->fixed[14] * t101;
-    time.values[0] = t11;
-    time.values[1] = t128;
-    time.values[2] = t132;
-    time.values[3] = t138;
+    const double t102 = s->fixed[7] * t101;
+    time.values[0] = t8;
+    time.values[1] = t11;
+    time.values[2] = t47;
+    time.values[3] = t102;
     return time;
 }
 
@@ -781,8 +773,7 @@ MMSMITH_FN void torsion_at_point(const torsion_solution *s, const double X[3], d
 MMSMITH_FN void torsion_b_staged(const torsion_solution *s, const torsion_time_values *time,
     const double *point, size_t stride, double b[3])
 {
-    (void)s;
-    const double t12 = time->values[0] * point[0];
+    const double t12 = time->values[1] * point[0];
     const double t13 = sin(t12);
     const double t16 = cos(t12);
     const double t17 = point[stride] * t13;
@@ -797,21 +788,24 @@ MMSMITH_FN void torsion_b_staged(const torsion_solution *s, const torsion_time_v
     const double t33 = t27 + t32;
     const double t40 = t16 * t26;
     const double t41 = t21 - t40;
-    const double t129 = time->values[1] * t33;
-    const double t133 = time->values[2] * point[0];
-    const double t134 = t133 * t41;
-    const double t135 = t129 + t134;
-    const double t136 = point[0] * t135;
-    const double t139 = time->values[3] * t41;
-    const double t140 = t136 - t139;
-    const double t141 = time->values[1] * t41;
-    const double t142 = t133 * t33;
-    const double t143 = t141 - t142;
-    const double t144 = point[0] * t143;
-    const double t145 = time->values[3] * t33;
-    const double t146 = t144 + t145;
-    b[0] = t140;
-    b[1] = t146;
+    const double t45 = time->values[0] * t33;
+    const double t48 = time->values[2] * point[0];
+    const double t49 = t48 * t41;
+    const double t50 = t45 + t49;
+    const double t56 = time->values[0] * t41;
+    const double t57 = t48 * t33;
+    const double t58 = t56 - t57;
+    const double t88 = s->fixed[6] * point[0];
+    const double t89 = t88 * t50;
+    const double t97 = t88 * t58;
+    const double t103 = time->values[3] * t41;
+    const double t104 = t89 - t103;
+    const double t105 = s->fixed[8] * t104;
+    const double t106 = time->values[3] * t33;
+    const double t107 = t97 + t106;
+    const double t108 = s->fixed[8] * t107;
+    b[0] = t105;
+    b[1] = t108;
     b[2] = 0.0;
 }
 
@@ -844,7 +838,7 @@ MMSMITH_FN void torsion_b_array(const torsion_solution *s, double t, size_t n,
     const size_t end = first + count;
     size_t p;
     for (p = first; p < end; ++p) {
-        const double t12 = time.values[0] * point0[p];
+        const double t12 = time.values[1] * point0[p];
         const double t13 = sin(t12);
         const double t16 = cos(t12);
         const double t17 = point1[p] * t13;
@@ -859,21 +853,24 @@ MMSMITH_FN void torsion_b_array(const torsion_solution *s, double t, size_t n,
         const double t33 = t27 + t32;
         const double t40 = t16 * t26;
         const double t41 = t21 - t40;
-        const double t129 = time.values[1] * t33;
-        const double t133 = time.values[2] * point0[p];
-        const double t134 = t133 * t41;
-        const double t135 = t129 + t134;
-        const double t136 = point0[p] * t135;
-        const double t139 = time.values[3] * t41;
-        const double t140 = t136 - t139;
-        const double t141 = time.values[1] * t41;
-        const double t142 = t133 * t33;
-        const double t143 = t141 - t142;
-        const double t144 = point0[p] * t143;
-        const double t145 = time.values[3] * t33;
-        const double t146 = t144 + t145;
-        b[p * 3 + 0] = t140;
-        b[p * 3 + 1] = t146;
+        const double t45 = time.values[0] * t33;
+        const double t48 = time.values[2] * point0[p];
+        const double t49 = t48 * t41;
+        const double t50 = t45 + t49;
+        const double t56 = time.values[0] * t41;
+        const double t57 = t48 * t33;
+        const double t58 = t56 - t57;
+        const double t88 = s->fixed[6] * point0[p];
+        const double t89 = t88 * t50;
+        const double t97 = t88 * t58;
+        const double t103 = time.values[3] * t41;
+        const double t104 = t89 - t103;
+        const double t105 = s->fixed[8] * t104;
+        const double t106 = time.values[3] * t33;
+        const double t107 = t97 + t106;
+        const double t108 = s->fixed[8] * t107;
+        b[p * 3 + 0] = t105;
+        b[p * 3 + 1] = t108;
         b[p * 3 + 2] = 0.0;
     }
 }

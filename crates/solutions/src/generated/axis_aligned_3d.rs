@@ -39,7 +39,7 @@ impl<T: crate::Real> Default for AxisAligned3dParameters<T> {
 pub struct AxisAligned3d<T: crate::Real> {
     parameters: AxisAligned3dParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 26],
+    fixed: [T; 25],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> AxisAligned3d<T> {
@@ -176,7 +176,6 @@ impl<T: crate::Real> AxisAligned3d<T> {
         let t222 = t71 * parameters.nu;
         let t223 = t222 / t136;
         let t224 = T::nearest(2.0) / t6;
-        let t345 = t20 * t21;
         Ok(AxisAligned3d {
             parameters,
             fixed: [
@@ -205,7 +204,6 @@ impl<T: crate::Real> AxisAligned3d<T> {
                 t221,
                 t223,
                 t224,
-                t345,
             ],
         })
     }
@@ -1104,7 +1102,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 3>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 3> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 17, 6>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 15, 6>::new(*self, X))
     }
     fn state_at(
         &self,
@@ -1114,9 +1112,9 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 3, 17, 6> for AxisAligned3d<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 3, 15, 6> for AxisAligned3d<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 17] {
+    fn body_force_time(&self, t: T) -> [T; 15] {
         let t7 = self.fixed[0] * t;
         let t8 = t7.sin_pi();
         let t11 = t7.cos_pi();
@@ -1133,21 +1131,17 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 17, 6> for AxisAligned3d<T> {
         let t338 = t337 * t8;
         let t339 = self.fixed[18] * t338;
         let t341 = self.fixed[19] * t337;
-        let t346 = t8 * t14;
-        let t347 = self.fixed[25] * t346;
-        let t349 = t8 * t18;
-        let t350 = self.fixed[25] * t349;
-        let t359 = self.fixed[20] * t8;
-        let t367 = t14 * t14;
-        let t368 = t367 * t14;
-        let t369 = self.fixed[21] * t368;
-        let t371 = self.fixed[22] * t367;
-        let t374 = self.fixed[23] * t14;
-        let t382 = t18 * t18;
-        let t383 = t382 * t18;
-        let t384 = self.fixed[21] * t383;
-        let t386 = self.fixed[22] * t382;
-        let t389 = self.fixed[23] * t18;
+        let t351 = self.fixed[20] * t8;
+        let t359 = t14 * t14;
+        let t360 = t359 * t14;
+        let t361 = self.fixed[21] * t360;
+        let t363 = self.fixed[22] * t359;
+        let t366 = self.fixed[23] * t14;
+        let t374 = t18 * t18;
+        let t375 = t374 * t18;
+        let t376 = self.fixed[21] * t375;
+        let t378 = self.fixed[22] * t374;
+        let t381 = self.fixed[23] * t18;
         [
             t23,
             t26,
@@ -1157,15 +1151,13 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 17, 6> for AxisAligned3d<T> {
             t181,
             t339,
             t341,
-            t347,
-            t350,
-            t359,
-            t369,
-            t371,
-            t374,
-            t384,
-            t386,
-            t389,
+            t351,
+            t361,
+            t363,
+            t366,
+            t376,
+            t378,
+            t381,
         ]
     }
     #[inline]
@@ -1181,7 +1173,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 17, 6> for AxisAligned3d<T> {
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
-        time: &[T; 17],
+        time: &[T; 15],
         point: &[T; 6],
     ) -> crate::nalgebra::SVector<T, 3> {
         let t24 = time[0] * point[0];
@@ -1199,42 +1191,39 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 17, 6> for AxisAligned3d<T> {
         let t340 = time[6] * point[0];
         let t342 = t340 + time[7];
         let t343 = point[0] * t342;
-        let t344 = point[1] * t330;
-        let t348 = time[8] * t344;
-        let t351 = time[9] * point[2];
-        let t352 = t348 + t351;
-        let t353 = time[0] - t352;
-        let t354 = point[0] * t353;
-        let t355 = time[1] * t344;
-        let t356 = t354 - t355;
-        let t357 = t356 - t31;
-        let t358 = t357.ln_of_both_if::<NEAR>(t332);
-        let t360 = time[10] * t358;
-        let t361 = t343 + t360;
-        let t362 = t336 * t361;
-        let t363 = time[3] - t362;
-        let t364 = point[3] * t363;
-        let t365 = t34 * t334;
-        let t366 = t365 * t365;
-        let t370 = time[11] * point[1];
-        let t372 = t370 - time[12];
-        let t373 = point[1] * t372;
-        let t375 = time[13] * t358;
-        let t376 = t373 + t375;
-        let t377 = t366 * t376;
-        let t378 = t377 - time[4];
-        let t379 = point[4] * t378;
-        let t380 = t331 * t333;
-        let t381 = t380 * t380;
-        let t385 = time[14] * point[2];
-        let t387 = t385 - time[15];
-        let t388 = point[2] * t387;
-        let t390 = time[16] * t358;
-        let t391 = t388 + t390;
-        let t392 = t381 * t391;
-        let t393 = t392 - time[5];
-        let t394 = point[5] * t393;
-        crate::nalgebra::SVector::<T, 3>::new(t364, t379, t394)
+        let t344 = t27 * t330;
+        let t345 = t344 + t31;
+        let t346 = T::one() - t345;
+        let t347 = t24 * t346;
+        let t348 = t347 - t344;
+        let t349 = t348 - t31;
+        let t350 = t349.ln_of_both_if::<NEAR>(t332);
+        let t352 = time[8] * t350;
+        let t353 = t343 + t352;
+        let t354 = t336 * t353;
+        let t355 = time[3] - t354;
+        let t356 = point[3] * t355;
+        let t357 = t34 * t334;
+        let t358 = t357 * t357;
+        let t362 = time[9] * point[1];
+        let t364 = t362 - time[10];
+        let t365 = point[1] * t364;
+        let t367 = time[11] * t350;
+        let t368 = t365 + t367;
+        let t369 = t358 * t368;
+        let t370 = t369 - time[4];
+        let t371 = point[4] * t370;
+        let t372 = t331 * t333;
+        let t373 = t372 * t372;
+        let t377 = time[12] * point[2];
+        let t379 = t377 - time[13];
+        let t380 = point[2] * t379;
+        let t382 = time[14] * t350;
+        let t383 = t380 + t382;
+        let t384 = t373 * t383;
+        let t385 = t384 - time[5];
+        let t386 = point[5] * t385;
+        crate::nalgebra::SVector::<T, 3>::new(t356, t371, t386)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

@@ -551,9 +551,13 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 5, 2> for Bar<T> {
         let t132 = t14 * t14;
         let t133 = t132 * t14;
         let t134 = self.fixed[12] * t133;
-        let t136 = self.fixed[13] * t132;
-        let t139 = self.fixed[14] * t14;
-        [t38, t68, t134, t136, t139]
+        let t135 = -t134;
+        let t137 = self.fixed[13] * t132;
+        let t138 = -t137;
+        let t141 = self.fixed[14] * t14;
+        let t142 = -t141;
+        let t146 = -t68;
+        [t38, t135, t138, t142, t146]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 1>) -> [T; 2] {
@@ -573,16 +577,15 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 5, 2> for Bar<T> {
         let t47 = T::one() / t41;
         let t51 = t39.log_1p();
         let t117 = t47 * t47;
-        let t135 = time[2] * point[1];
-        let t137 = t135 + time[3];
-        let t138 = point[1] * t137;
-        let t140 = time[4] * t51;
-        let t141 = t138 + t140;
-        let t142 = t117 * t141;
-        let t143 = t142 + time[1];
-        let t144 = point[0] * t143;
-        let t145 = -t144;
-        crate::nalgebra::SVector::<T, 1>::new(t145)
+        let t136 = time[1] * point[1];
+        let t139 = t136 + time[2];
+        let t140 = point[1] * t139;
+        let t143 = time[3] * t51;
+        let t144 = t140 + t143;
+        let t145 = t117 * t144;
+        let t147 = t145 + time[4];
+        let t148 = point[0] * t147;
+        crate::nalgebra::SVector::<T, 1>::new(t148)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

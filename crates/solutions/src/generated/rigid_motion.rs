@@ -41,7 +41,7 @@ impl<T: crate::Real> Default for RigidMotionParameters<T> {
 pub struct RigidMotion<T: crate::Real> {
     parameters: RigidMotionParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 14],
+    fixed: [T; 11],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> RigidMotion<T> {
@@ -148,13 +148,10 @@ impl<T: crate::Real> RigidMotion<T> {
         let t82 = t80 / t81;
         let t83 = T::nearest(0.5) * parameters.E;
         let t84 = t83 / t77;
-        let t85 = parameters.U * t55;
-        let t88 = parameters.A * t55;
-        let t93 = t48 * t55;
-        let t100 = parameters.A * t64;
+        let t105 = parameters.U * t55;
         Ok(RigidMotion {
             parameters,
-            fixed: [t5, t9, t36, t43, t48, t55, t64, t75, t82, t84, t85, t88, t93, t100],
+            fixed: [t5, t9, t36, t43, t48, t55, t64, t75, t82, t84, t105],
         })
     }
     /// The solution with parameter values in the order of the description; missing ones take their
@@ -518,7 +515,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RigidMotion<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 7, 2>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 5, 2>::new(*self, X))
     }
     fn state_at(
         &self,
@@ -528,9 +525,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for RigidMotion<T> {
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 2, 7, 2> for RigidMotion<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 2, 5, 2> for RigidMotion<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 7] {
+    fn body_force_time(&self, t: T) -> [T; 5] {
         let t6 = self.fixed[0] * t;
         let t7 = t6.sin_pi();
         let t10 = self.fixed[1] * t7;
@@ -538,15 +535,37 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 7, 2> for RigidMotion<T> {
         let t14 = t10.cos();
         let t30 = t6.cos_pi();
         let t49 = t30 * t30;
-        let t86 = self.fixed[10] * t7;
-        let t87 = -t86;
-        let t89 = self.fixed[11] * t7;
-        let t90 = -t89;
-        let t94 = self.fixed[12] * t49;
-        let t95 = -t94;
-        let t98 = self.fixed[6] * t7;
-        let t101 = self.fixed[13] * t49;
-        [t11, t14, t87, t90, t95, t98, t101]
+        let t66 = t11 * t11;
+        let t69 = t14 * t11;
+        let t85 = t69 + t69;
+        let t86 = t14 * t14;
+        let t87 = t86 - t66;
+        let t88 = t66 - t86;
+        let t89 = t7 * t85;
+        let t90 = self.parameters.A * t89;
+        let t91 = t49 * t88;
+        let t92 = self.fixed[4] * t91;
+        let t93 = t90 + t92;
+        let t94 = t7 * t87;
+        let t95 = self.parameters.A * t94;
+        let t96 = t49 * t85;
+        let t97 = self.fixed[4] * t96;
+        let t98 = t95 + t97;
+        let t99 = t7 * t88;
+        let t100 = self.parameters.A * t96;
+        let t101 = t99 - t100;
+        let t102 = t49 * t87;
+        let t103 = self.parameters.A * t102;
+        let t104 = t89 - t103;
+        let t106 = self.fixed[10] * t7;
+        let t107 = -t106;
+        let t108 = self.fixed[5] * t93;
+        let t109 = -t108;
+        let t112 = self.fixed[5] * t98;
+        let t113 = -t112;
+        let t116 = self.fixed[6] * t101;
+        let t118 = self.fixed[6] * t104;
+        [t107, t109, t113, t116, t118]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 2] {
@@ -555,29 +574,17 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 7, 2> for RigidMotion<T> {
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
-        time: &[T; 7],
+        time: &[T; 5],
         point: &[T; 2],
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t15 = time[0] * point[0];
-        let t16 = time[1] * point[1];
-        let t17 = t15 + t16;
-        let t25 = time[1] * point[0];
-        let t26 = time[0] * point[1];
-        let t27 = t25 - t26;
-        let t31 = time[0] * t27;
-        let t32 = time[1] * t17;
-        let t33 = t31 + t32;
-        let t39 = time[0] * t17;
-        let t40 = time[1] * t27;
-        let t41 = t39 - t40;
-        let t91 = time[3] * t33;
-        let t92 = time[2] - t91;
-        let t96 = time[4] * t41;
-        let t97 = t92 - t96;
-        let t99 = time[5] * t41;
-        let t102 = time[6] * t33;
-        let t103 = t99 - t102;
-        crate::nalgebra::SVector::<T, 2>::new(t97, t103)
+        let t110 = time[1] * point[0];
+        let t111 = time[0] - t110;
+        let t114 = time[2] * point[1];
+        let t115 = t111 - t114;
+        let t117 = time[3] * point[0];
+        let t119 = time[4] * point[1];
+        let t120 = t117 + t119;
+        crate::nalgebra::SVector::<T, 2>::new(t115, t120)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

@@ -200,21 +200,21 @@ impl<T: crate::Real> RingNu<T> {
         let t305 = parameters.rho0 * t97;
         let t306 = t305 * t99;
         let t307 = t304 / t306;
-        let t312 = T::nearest(2.0) / t11;
-        let t313 = parameters.Ri - parameters.Ro;
-        let t314 = t313 * t313;
-        let t315 = t314 * t313;
-        let t316 = t315 / t26;
-        let t317 = T::one() - t316;
-        let t318 = parameters.A * t317;
-        let t319 = t318 / parameters.Ri;
-        let t323 = parameters.Ri * t97;
-        let t324 = t323 * t99;
-        let t325 = t112 / t324;
-        let t331 = parameters.A / parameters.Ro;
-        let t335 = parameters.Ro * t97;
-        let t336 = t335 * t99;
-        let t337 = t112 / t336;
+        let t310 = T::nearest(2.0) / t11;
+        let t311 = parameters.Ri - parameters.Ro;
+        let t312 = t311 * t311;
+        let t313 = t312 * t311;
+        let t314 = t313 / t26;
+        let t315 = T::one() - t314;
+        let t316 = parameters.A * t315;
+        let t317 = t316 / parameters.Ri;
+        let t321 = parameters.Ri * t97;
+        let t322 = t321 * t99;
+        let t323 = t112 / t322;
+        let t329 = parameters.A / parameters.Ro;
+        let t333 = parameters.Ro * t97;
+        let t334 = t333 * t99;
+        let t335 = t112 / t334;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -249,11 +249,11 @@ impl<T: crate::Real> RingNu<T> {
                 t289,
                 t301,
                 t307,
-                t312,
-                t319,
-                t325,
-                t331,
-                t337,
+                t310,
+                t317,
+                t323,
+                t329,
+                t335,
             ],
         })
     }
@@ -871,26 +871,26 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
             crate::Surface::Inner => {
                 let t12 = self.fixed[0] * t;
                 let t13 = t12.cos_pi();
-                let t320 = self.fixed[26] * t13;
-                let t321 = t320 + T::one();
-                let t322 = t320.ln_of_both(t321);
-                let t326 = self.fixed[27] * t322;
-                let t327 = t326 * X[0];
+                let t318 = self.fixed[26] * t13;
+                let t319 = t318 + T::one();
+                let t320 = t318.ln_of_both(t319);
+                let t324 = self.fixed[27] * t320;
+                let t325 = t324 * X[0];
+                let t326 = -t325;
+                let t327 = t324 * X[1];
                 let t328 = -t327;
-                let t329 = t326 * X[1];
-                let t330 = -t329;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t328, t330))
+                Some(crate::nalgebra::SVector::<T, 2>::new(t326, t328))
             }
             crate::Surface::Outer => {
                 let t12 = self.fixed[0] * t;
                 let t13 = t12.cos_pi();
-                let t332 = self.fixed[28] * t13;
-                let t333 = t332 + T::one();
-                let t334 = t332.ln_of_both(t333);
-                let t338 = self.fixed[29] * t334;
-                let t339 = t338 * X[0];
-                let t340 = t338 * X[1];
-                Some(crate::nalgebra::SVector::<T, 2>::new(t339, t340))
+                let t330 = self.fixed[28] * t13;
+                let t331 = t330 + T::one();
+                let t332 = t330.ln_of_both(t331);
+                let t336 = self.fixed[29] * t332;
+                let t337 = t336 * X[0];
+                let t338 = t336 * X[1];
+                Some(crate::nalgebra::SVector::<T, 2>::new(t337, t338))
             }
             crate::Surface::Lower(0) => {
                 let t2 = X[0] * X[0];
@@ -932,13 +932,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
                 let t122 = self.fixed[10] * t119;
                 let t123 = t121 - t122;
                 let t129 = self.fixed[11] * t104;
-                let t341 = t33 * t34;
-                let t342 = t75 * t341;
-                let t343 = t32 * t342;
-                let t344 = t343 * t123;
-                let t345 = t129 - t344;
-                let t346 = -t345;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t346, T::zero()))
+                let t339 = t33 * t34;
+                let t340 = t75 * t339;
+                let t341 = t32 * t340;
+                let t342 = t341 * t123;
+                let t343 = t129 - t342;
+                let t344 = -t343;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t344, T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t2 = X[0] * X[0];
@@ -980,13 +980,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
                 let t122 = self.fixed[10] * t119;
                 let t123 = t121 - t122;
                 let t129 = self.fixed[11] * t104;
-                let t341 = t33 * t34;
-                let t348 = t89 * t341;
-                let t349 = t32 * t348;
-                let t350 = t349 * t123;
-                let t351 = t129 - t350;
-                let t352 = -t351;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t352))
+                let t339 = t33 * t34;
+                let t346 = t89 * t339;
+                let t347 = t32 * t346;
+                let t348 = t347 * t123;
+                let t349 = t129 - t348;
+                let t350 = -t349;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t350))
             }
             _ => None,
         }
@@ -1150,8 +1150,8 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         let t300 = t299 + t298;
         let t302 = self.fixed[23] * t300;
         let t308 = self.fixed[24] * t147;
-        let t311 = X[1] * t34;
-        [t37, t38, t207, t216, t233, t276, t285, t302, t308, t311]
+        let t309 = X[1] * t34;
+        [t37, t38, t207, t216, t233, t276, t285, t302, t308, t309]
     }
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
@@ -1167,24 +1167,22 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
         let t277 = time[0] * point[4];
         let t278 = point[5] + t277;
         let t303 = time[0] * t278;
-        let t309 = t43 * t43;
-        let t310 = t309 * t45;
-        let t353 = t44 * t43;
-        let t354 = t353 + t42;
-        let t355 = t354.ln_of_both_if::<NEAR>(t46);
-        let t356 = point[6] * t355;
-        let t357 = t303 + t356;
-        let t358 = point[7] + t357;
-        let t359 = time[0] * t358;
-        let t360 = point[8] * t355;
-        let t361 = t359 + t360;
-        let t362 = t361 / t310;
-        let t363 = t362 - point[3];
-        let t364 = time[0] * point[2];
-        let t365 = t364 * t363;
-        let t366 = time[0] * point[9];
-        let t367 = t366 * t363;
-        crate::nalgebra::SVector::<T, 2>::new(t365, t367)
+        let t351 = t44 * t43;
+        let t352 = t351 + t42;
+        let t353 = t352.ln_of_both_if::<NEAR>(t46);
+        let t354 = point[6] * t353;
+        let t355 = t303 + t354;
+        let t356 = point[7] + t355;
+        let t357 = time[0] * t356;
+        let t358 = point[8] * t353;
+        let t359 = t357 + t358;
+        let t360 = t43 * t46;
+        let t361 = t359 / t360;
+        let t362 = t361 - point[3];
+        let t363 = time[0] * t362;
+        let t364 = point[2] * t363;
+        let t365 = point[9] * t363;
+        crate::nalgebra::SVector::<T, 2>::new(t364, t365)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

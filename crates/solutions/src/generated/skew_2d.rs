@@ -38,7 +38,7 @@ impl<T: crate::Real> Default for Skew2dParameters<T> {
 pub struct Skew2d<T: crate::Real> {
     parameters: Skew2dParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 93],
+    fixed: [T; 72],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Skew2d<T> {
@@ -186,98 +186,65 @@ impl<T: crate::Real> Skew2d<T> {
         let t493 = t492 * parameters.nu;
         let t494 = t493 / t118;
         let t500 = t438 / parameters.rho0;
-        let t504 = T::nearest(5.4) * t355;
-        let t505 = t504 * t352;
-        let t506 = t505 / parameters.rho0;
-        let t515 = T::nearest(0.6) * t437;
-        let t516 = t515 / parameters.rho0;
-        let t519 = T::nearest(0.2) * t354;
-        let t520 = t519 * parameters.E;
-        let t521 = t520 * parameters.nu;
-        let t522 = t521 / t442;
-        let t524 = T::nearest(6.0) * t352;
-        let t528 = T::nearest(3.0) * t352;
-        let t532 = T::nearest(0.1) * t354;
-        let t533 = t532 / parameters.rho0;
-        let t536 = T::nearest(0.002) * t437;
-        let t537 = t536 * t352;
-        let t538 = t537 / parameters.rho0;
-        let t543 = T::nearest(0.005) * t354;
-        let t544 = t543 * parameters.E;
-        let t545 = t544 * parameters.nu;
-        let t546 = t545 / t442;
-        let t549 = T::nearest(4.0) * t352;
-        let t554 = t543 / parameters.rho0;
-        let t556 = t184 * parameters.E;
-        let t557 = t556 * parameters.nu;
-        let t558 = t557 / t442;
-        let t560 = T::nearest(81.0) * t437;
-        let t561 = t560 * t352;
-        let t562 = t561 / parameters.rho0;
-        let t564 = T::nearest(54.0) * t354;
-        let t565 = t564 * t352;
-        let t566 = t565 / parameters.rho0;
-        let t567 = t174 * parameters.E;
-        let t568 = t567 * parameters.nu;
-        let t569 = t568 / t442;
-        let t570 = T::nearest(2.0) / t21;
-        let t575 = t42 * T::pi();
-        let t617 = T::nearest(2.0).cos();
-        let t618 = T::pi() * t617;
-        let t623 = T::nearest(2.0).sin();
-        let t624 = T::nearest(4.0) * t623;
-        let t659 = parameters.A * t105;
-        let t720 = parameters.A * t42;
-        let t783 = t165 * t171;
-        let t786 = T::nearest(95.0) * t168;
-        let t787 = t786 * t171;
-        let t790 = t168 * t171;
-        let t794 = T::nearest(45.0) * t161;
-        let t795 = t794 * t168;
-        let t796 = t795 * t171;
-        let t799 = t161 * t168;
-        let t800 = t799 * t171;
-        let t807 = t288 * t294;
-        let t810 = t168 * t294;
-        let t813 = t168 * T::nearest(30.0);
-        let t814 = t813 * t294;
-        let t818 = t168 * T::nearest(60.0);
-        let t819 = t818 * t284;
-        let t820 = t819 * t294;
-        let t823 = t168 * t284;
-        let t824 = t823 * t294;
-        let t840 = t42 * t75;
-        let t850 = t720 * t75;
-        let t854 = t75 * t75;
-        let t861 = t119 * t267;
-        let t865 = t105 * t267;
-        let t868 = t75 * t267;
-        let t871 = t228 * t267;
-        let t875 = parameters.A * t267;
-        let t881 = t720 * t105;
-        let t884 = t42 * t105;
-        let t893 = parameters.A * t119;
-        let t894 = t893 * t267;
-        let t897 = t881 * t267;
-        let t900 = t354 * t42;
-        let t901 = t900 * t105;
-        let t902 = t901 * t267;
-        let t906 = parameters.A * t75;
-        let t907 = t906 * t105;
-        let t908 = t907 * t267;
-        let t917 = T::nearest(3.0) * t42;
-        let t929 = t354 * t119;
-        let t930 = t929 * t267;
-        let t933 = t893 * t174;
-        let t934 = t933 * t267;
-        let t938 = t893 * t184;
-        let t939 = t938 * t267;
-        let t944 = t659 * t184;
-        let t945 = t944 * t267;
-        let t949 = t659 * t174;
-        let t950 = t949 * t267;
-        let t954 = t354 * t105;
-        let t955 = t954 * t267;
+        let t505 = T::nearest(5.4) * t355;
+        let t506 = t505 * t352;
+        let t507 = t506 / parameters.rho0;
+        let t516 = T::nearest(0.6) * t437;
+        let t517 = t516 / parameters.rho0;
+        let t520 = T::nearest(0.2) * t354;
+        let t521 = t520 * parameters.E;
+        let t522 = t521 * parameters.nu;
+        let t523 = t522 / t442;
+        let t525 = T::nearest(6.0) * t352;
+        let t529 = T::nearest(3.0) * t352;
+        let t533 = T::nearest(0.1) * t354;
+        let t534 = t533 / parameters.rho0;
+        let t538 = T::nearest(0.002) * t437;
+        let t539 = t538 * t352;
+        let t540 = t539 / parameters.rho0;
+        let t545 = T::nearest(0.005) * t354;
+        let t546 = t545 * parameters.E;
+        let t547 = t546 * parameters.nu;
+        let t548 = t547 / t442;
+        let t551 = T::nearest(4.0) * t352;
+        let t556 = t545 / parameters.rho0;
+        let t559 = t184 * parameters.E;
+        let t560 = t559 * parameters.nu;
+        let t561 = t560 / t442;
+        let t563 = T::nearest(81.0) * t437;
+        let t564 = t563 * t352;
+        let t565 = t564 / parameters.rho0;
+        let t567 = T::nearest(54.0) * t354;
+        let t568 = t567 * t352;
+        let t569 = t568 / parameters.rho0;
+        let t570 = t174 * parameters.E;
+        let t571 = t570 * parameters.nu;
+        let t572 = t571 / t442;
+        let t574 = T::nearest(2.0) / t21;
+        let t579 = t42 * T::pi();
+        let t621 = T::nearest(2.0).cos();
+        let t622 = T::pi() * t621;
+        let t627 = T::nearest(2.0).sin();
+        let t628 = T::nearest(4.0) * t627;
+        let t663 = parameters.A * t105;
+        let t723 = T::nearest(45.0) * t161;
+        let t726 = T::one() + t161;
+        let t731 = T::nearest(60.0) * t284;
+        let t785 = t168 * t171;
+        let t786 = t785 * t726;
+        let t791 = t288 * t294;
+        let t795 = t168 * T::nearest(8.0);
+        let t796 = t795 * t294;
+        let t800 = t168 * t294;
+        let t813 = t119 * t267;
+        let t814 = -t813;
+        let t823 = t267 * t352;
+        let t824 = -t823;
+        let t832 = t105 * t267;
+        let t833 = -t832;
+        let t845 = parameters.A * t119;
+        let t846 = t845 * t267;
+        let t850 = t663 * t267;
         Ok(Skew2d {
             parameters,
             fixed: [
@@ -323,57 +290,36 @@ impl<T: crate::Real> Skew2d<T> {
                 t489,
                 t494,
                 t500,
-                t506,
-                t516,
-                t522,
-                t524,
-                t528,
-                t533,
-                t538,
-                t546,
-                t549,
-                t554,
-                t558,
-                t562,
-                t566,
+                t507,
+                t517,
+                t523,
+                t525,
+                t529,
+                t534,
+                t540,
+                t548,
+                t551,
+                t556,
+                t561,
+                t565,
                 t569,
-                t570,
-                t575,
-                t618,
-                t624,
-                t659,
-                t720,
-                t783,
-                t787,
-                t790,
+                t572,
+                t574,
+                t579,
+                t622,
+                t628,
+                t663,
+                t723,
+                t731,
+                t786,
+                t791,
                 t796,
                 t800,
-                t807,
-                t810,
                 t814,
-                t820,
                 t824,
-                t840,
+                t833,
+                t846,
                 t850,
-                t854,
-                t861,
-                t865,
-                t868,
-                t871,
-                t875,
-                t881,
-                t884,
-                t894,
-                t897,
-                t902,
-                t908,
-                t917,
-                t930,
-                t934,
-                t939,
-                t945,
-                t950,
-                t955,
             ],
         })
     }
@@ -1326,40 +1272,40 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t76 = self.fixed[7] * t23;
                 let t84 = t29.cos_pi();
                 let t136 = self.fixed[10] * t23;
-                let t572 = X[1].cos();
-                let t573 = t76 * t572;
-                let t574 = t573 + T::one();
-                let t576 = self.fixed[57] * t40;
-                let t577 = t576 * t84;
+                let t576 = X[1].cos();
+                let t577 = t76 * t576;
                 let t578 = t577 + T::one();
-                let t579 = t43 * t33;
-                let t580 = t574 * t578;
-                let t581 = t24 * t572;
-                let t582 = t581 * t579;
-                let t583 = t580 - t582;
-                let t584 = t573 * t578;
-                let t585 = t582 - t584;
-                let t586 = T::one() / t583;
-                let t587 = t585 * t586;
-                let t588 = t573 - t587;
-                let t589 = t584 + t577;
-                let t590 = t589 - t582;
-                let t591 = t590.log_1p();
-                let t592 = self.fixed[8] * t588;
-                let t593 = t578 * t591;
-                let t594 = t593 * t586;
-                let t595 = self.fixed[9] * t594;
-                let t596 = t592 + t595;
-                let t597 = -t596;
-                let t598 = t581 * t586;
-                let t599 = t579 + t598;
-                let t600 = self.fixed[8] * t599;
-                let t601 = t136 * t572;
-                let t602 = t591 * t586;
-                let t603 = t601 * t602;
-                let t604 = t600 - t603;
-                let t605 = -t604;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t597, t605))
+                let t580 = self.fixed[57] * t40;
+                let t581 = t580 * t84;
+                let t582 = t581 + T::one();
+                let t583 = t43 * t33;
+                let t584 = t578 * t582;
+                let t585 = t24 * t576;
+                let t586 = t585 * t583;
+                let t587 = t584 - t586;
+                let t588 = t577 * t582;
+                let t589 = t586 - t588;
+                let t590 = T::one() / t587;
+                let t591 = t589 * t590;
+                let t592 = t577 - t591;
+                let t593 = t588 + t581;
+                let t594 = t593 - t586;
+                let t595 = t594.log_1p();
+                let t596 = self.fixed[8] * t592;
+                let t597 = t582 * t595;
+                let t598 = t597 * t590;
+                let t599 = self.fixed[9] * t598;
+                let t600 = t596 + t599;
+                let t601 = -t600;
+                let t602 = t585 * t590;
+                let t603 = t583 + t602;
+                let t604 = self.fixed[8] * t603;
+                let t605 = t136 * t576;
+                let t606 = t595 * t590;
+                let t607 = t605 * t606;
+                let t608 = t604 - t607;
+                let t609 = -t608;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t601, t609))
             }
             crate::Surface::Upper(0) => {
                 let t22 = self.fixed[0] * t;
@@ -1377,49 +1323,49 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t84 = t29.cos_pi();
                 let t136 = self.fixed[10] * t23;
                 let t457 = T::nearest(2.0) * X[1];
-                let t606 = T::nearest(3.0).sum_error(X[1]);
-                let t607 = T::nearest(3.0) + X[1];
-                let t608 = t607.cos();
-                let t609 = t607.sin();
-                let t610 = T::nearest(0.5) * t606;
-                let t611 = t610 * t608;
-                let t612 = t609 + t611;
-                let t613 = t606 * t612;
-                let t614 = t608 - t613;
-                let t615 = t76 * t614;
-                let t616 = t615 + T::one();
-                let t619 = self.fixed[58] * t84;
-                let t620 = t457 + t619;
-                let t621 = t43 * t620;
-                let t622 = t621 + T::one();
-                let t625 = self.fixed[59] * t30;
-                let t626 = t33 - t625;
-                let t627 = t43 * t626;
-                let t628 = t616 * t622;
-                let t629 = t24 * t614;
-                let t630 = t629 * t627;
-                let t631 = t628 - t630;
-                let t632 = t615 * t622;
-                let t633 = t630 - t632;
-                let t634 = T::one() / t631;
-                let t635 = t633 * t634;
-                let t636 = t615 - t635;
-                let t637 = t632 + t621;
-                let t638 = t637 - t630;
-                let t639 = t638.log_1p();
-                let t640 = self.fixed[8] * t636;
-                let t641 = t622 * t639;
-                let t642 = t641 * t634;
-                let t643 = self.fixed[9] * t642;
-                let t644 = t640 + t643;
-                let t645 = t629 * t634;
-                let t646 = t627 + t645;
-                let t647 = self.fixed[8] * t646;
-                let t648 = t136 * t614;
-                let t649 = t639 * t634;
-                let t650 = t648 * t649;
-                let t651 = t647 - t650;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t644, t651))
+                let t610 = T::nearest(3.0).sum_error(X[1]);
+                let t611 = T::nearest(3.0) + X[1];
+                let t612 = t611.cos();
+                let t613 = t611.sin();
+                let t614 = T::nearest(0.5) * t610;
+                let t615 = t614 * t612;
+                let t616 = t613 + t615;
+                let t617 = t610 * t616;
+                let t618 = t612 - t617;
+                let t619 = t76 * t618;
+                let t620 = t619 + T::one();
+                let t623 = self.fixed[58] * t84;
+                let t624 = t457 + t623;
+                let t625 = t43 * t624;
+                let t626 = t625 + T::one();
+                let t629 = self.fixed[59] * t30;
+                let t630 = t33 - t629;
+                let t631 = t43 * t630;
+                let t632 = t620 * t626;
+                let t633 = t24 * t618;
+                let t634 = t633 * t631;
+                let t635 = t632 - t634;
+                let t636 = t619 * t626;
+                let t637 = t634 - t636;
+                let t638 = T::one() / t635;
+                let t639 = t637 * t638;
+                let t640 = t619 - t639;
+                let t641 = t636 + t625;
+                let t642 = t641 - t634;
+                let t643 = t642.log_1p();
+                let t644 = self.fixed[8] * t640;
+                let t645 = t626 * t643;
+                let t646 = t645 * t638;
+                let t647 = self.fixed[9] * t646;
+                let t648 = t644 + t647;
+                let t649 = t633 * t638;
+                let t650 = t631 + t649;
+                let t651 = self.fixed[8] * t650;
+                let t652 = t136 * t618;
+                let t653 = t643 * t638;
+                let t654 = t652 * t653;
+                let t655 = t651 - t654;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t648, t655))
             }
             crate::Surface::Lower(1) => {
                 let t3 = T::nearest(3.0).product_error(X[0]);
@@ -1433,32 +1379,32 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t39 = T::nearest(4.0) * t36;
                 let t40 = t37 + t39;
                 let t76 = self.fixed[7] * t23;
-                let t576 = self.fixed[57] * t40;
-                let t652 = t4.cos();
-                let t653 = t4.sin();
-                let t654 = T::nearest(0.5) * t3;
-                let t655 = t654 * t652;
-                let t656 = t653 + t655;
-                let t657 = t3 * t656;
-                let t658 = t652 - t657;
-                let t660 = self.fixed[60] * t23;
-                let t661 = t660 * t658;
-                let t662 = -t661;
-                let t663 = t576 * t28;
-                let t664 = t663 + T::one();
-                let t665 = T::one() / t664;
-                let t666 = t665 + T::one();
-                let t667 = t76 * t658;
-                let t668 = t667 * t664;
-                let t669 = t668 + t663;
-                let t670 = t669.log_1p();
-                let t671 = t663 * t666;
-                let t672 = self.fixed[8] * t671;
-                let t673 = t670 * t665;
-                let t674 = self.fixed[9] * t673;
-                let t675 = t672 + t674;
-                let t676 = -t675;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t662, t676))
+                let t580 = self.fixed[57] * t40;
+                let t656 = t4.cos();
+                let t657 = t4.sin();
+                let t658 = T::nearest(0.5) * t3;
+                let t659 = t658 * t656;
+                let t660 = t657 + t659;
+                let t661 = t3 * t660;
+                let t662 = t656 - t661;
+                let t664 = self.fixed[60] * t23;
+                let t665 = t664 * t662;
+                let t666 = -t665;
+                let t667 = t580 * t28;
+                let t668 = t667 + T::one();
+                let t669 = T::one() / t668;
+                let t670 = t669 + T::one();
+                let t671 = t76 * t662;
+                let t672 = t671 * t668;
+                let t673 = t672 + t667;
+                let t674 = t673.log_1p();
+                let t675 = t667 * t670;
+                let t676 = self.fixed[8] * t675;
+                let t677 = t674 * t669;
+                let t678 = self.fixed[9] * t677;
+                let t679 = t676 + t678;
+                let t680 = -t679;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t666, t680))
             }
             crate::Surface::Upper(1) => {
                 let t3 = T::nearest(3.0).product_error(X[0]);
@@ -1475,49 +1421,49 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t76 = self.fixed[7] * t23;
                 let t79 = t27.sin();
                 let t185 = self.fixed[17] * t40;
-                let t677 = T::one().sum_error(t4);
-                let t678 = T::one() + t4;
-                let t679 = t3 + t677;
-                let t680 = t678.cos();
-                let t681 = t678.sin();
-                let t682 = T::nearest(0.5) * t679;
-                let t683 = t682 * t680;
-                let t684 = t681 + t683;
-                let t685 = t679 * t684;
-                let t686 = t680 - t685;
-                let t687 = T::nearest(4.0) * t79;
-                let t688 = T::one() - t687;
-                let t689 = t43 * t688;
-                let t690 = t76 * t686;
-                let t691 = t690 + T::one();
-                let t692 = t185 * X[0];
-                let t693 = t692 + T::one();
-                let t694 = t691 * t693;
-                let t695 = t24 * t686;
-                let t696 = t695 * t689;
-                let t697 = t694 - t696;
-                let t698 = T::one() / t697;
-                let t699 = t689 * t698;
-                let t700 = t695 + t699;
-                let t701 = t690 * t693;
-                let t702 = t701 + t692;
-                let t703 = t702 - t696;
-                let t704 = t703.log_1p();
-                let t705 = self.fixed[8] * t700;
-                let t706 = t689 * t704;
-                let t707 = t706 * t698;
-                let t708 = self.fixed[9] * t707;
-                let t709 = t705 - t708;
-                let t710 = t691 * t692;
-                let t711 = t696 - t710;
-                let t712 = t711 * t698;
-                let t713 = t692 - t712;
-                let t714 = self.fixed[8] * t713;
-                let t715 = t691 * t704;
-                let t716 = t715 * t698;
-                let t717 = self.fixed[9] * t716;
-                let t718 = t714 + t717;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t709, t718))
+                let t681 = T::one().sum_error(t4);
+                let t682 = T::one() + t4;
+                let t683 = t3 + t681;
+                let t684 = t682.cos();
+                let t685 = t682.sin();
+                let t686 = T::nearest(0.5) * t683;
+                let t687 = t686 * t684;
+                let t688 = t685 + t687;
+                let t689 = t683 * t688;
+                let t690 = t684 - t689;
+                let t691 = T::nearest(4.0) * t79;
+                let t692 = T::one() - t691;
+                let t693 = t43 * t692;
+                let t694 = t76 * t690;
+                let t695 = t694 + T::one();
+                let t696 = t185 * X[0];
+                let t697 = t696 + T::one();
+                let t698 = t695 * t697;
+                let t699 = t24 * t690;
+                let t700 = t699 * t693;
+                let t701 = t698 - t700;
+                let t702 = T::one() / t701;
+                let t703 = t693 * t702;
+                let t704 = t699 + t703;
+                let t705 = t694 * t697;
+                let t706 = t705 + t696;
+                let t707 = t706 - t700;
+                let t708 = t707.log_1p();
+                let t709 = self.fixed[8] * t704;
+                let t710 = t693 * t708;
+                let t711 = t710 * t702;
+                let t712 = self.fixed[9] * t711;
+                let t713 = t709 - t712;
+                let t714 = t695 * t696;
+                let t715 = t700 - t714;
+                let t716 = t715 * t702;
+                let t717 = t696 - t716;
+                let t718 = self.fixed[8] * t717;
+                let t719 = t695 * t708;
+                let t720 = t719 * t702;
+                let t721 = self.fixed[9] * t720;
+                let t722 = t718 + t721;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t713, t722))
             }
             _ => None,
         }
@@ -1570,7 +1516,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 49, 18>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 27, 18>::new(*self, X))
     }
     fn state_at(
         &self,
@@ -1580,9 +1526,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 2, 49, 18> for Skew2d<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 2, 27, 18> for Skew2d<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 49] {
+    fn body_force_time(&self, t: T) -> [T; 27] {
         let t22 = self.fixed[0] * t;
         let t23 = t22.cos_pi();
         let t24 = self.parameters.A * t23;
@@ -1592,16 +1538,26 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 49, 18> for Skew2d<T> {
         let t40 = t37 + t39;
         let t43 = self.fixed[1] * t40;
         let t76 = self.fixed[7] * t23;
+        let t159 = T::nearest(95.0) * t23;
+        let t166 = self.fixed[12] * t23;
         let t175 = self.fixed[15] * t23;
         let t180 = self.fixed[16] * t40;
         let t185 = self.fixed[17] * t40;
         let t229 = self.fixed[18] * t40;
-        let t721 = t23 * t40;
-        let t722 = self.fixed[61] * t721;
-        let t727 = self.fixed[25] * t23;
-        let t729 = self.fixed[26] * t40;
-        let t746 = self.fixed[42] * t23;
-        let t756 = self.fixed[48] * t40;
+        let t282 = T::nearest(30.0) * t23;
+        let t724 = self.fixed[61] * t23;
+        let t725 = t159 + t724;
+        let t727 = self.fixed[13] * t725;
+        let t728 = t166 - t727;
+        let t729 = self.fixed[20] * t40;
+        let t730 = t40 + t729;
+        let t732 = self.fixed[62] * t23;
+        let t733 = t282 + t732;
+        let t734 = self.fixed[25] * t23;
+        let t736 = self.fixed[26] * t40;
+        let t747 = self.fixed[42] * t23;
+        let t755 = t23 * t40;
+        let t757 = self.fixed[48] * t40;
         let t762 = t40 * t40;
         let t765 = self.fixed[52] * t40;
         let t769 = t23 * t23;
@@ -1609,36 +1565,20 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 49, 18> for Skew2d<T> {
         let t771 = self.fixed[53] * t770;
         let t773 = self.fixed[54] * t769;
         let t777 = self.fixed[55] * t23;
-        let t784 = self.fixed[62] * t23;
-        let t788 = self.fixed[63] * t23;
-        let t791 = self.fixed[64] * t40;
-        let t797 = self.fixed[65] * t23;
-        let t801 = self.fixed[66] * t40;
-        let t808 = self.fixed[67] * t40;
-        let t811 = self.fixed[68] * t40;
-        let t815 = self.fixed[69] * t23;
-        let t821 = self.fixed[70] * t23;
-        let t825 = self.fixed[71] * t40;
-        let t841 = self.fixed[72] * t721;
-        let t851 = t769 * t40;
-        let t852 = self.fixed[73] * t851;
-        let t855 = self.fixed[74] * t769;
-        let t869 = self.fixed[77] * t23;
-        let t872 = self.fixed[78] * t40;
-        let t876 = self.fixed[79] * t23;
-        let t882 = self.fixed[80] * t721;
-        let t885 = self.fixed[81] * t40;
-        let t895 = self.fixed[82] * t23;
-        let t898 = self.fixed[83] * t721;
-        let t903 = self.fixed[84] * t851;
-        let t909 = self.fixed[85] * t769;
-        let t918 = self.fixed[86] * t40;
-        let t931 = self.fixed[87] * t769;
-        let t935 = self.fixed[88] * t769;
-        let t940 = self.fixed[89] * t721;
-        let t946 = self.fixed[90] * t721;
-        let t951 = self.fixed[91] * t769;
-        let t956 = self.fixed[92] * t769;
+        let t783 = self.fixed[14] * t728;
+        let t787 = self.fixed[63] * t40;
+        let t792 = self.fixed[64] * t40;
+        let t793 = -t792;
+        let t797 = self.fixed[65] * t40;
+        let t798 = -t797;
+        let t801 = self.fixed[66] * t730;
+        let t802 = -t801;
+        let t805 = self.fixed[66] * t733;
+        let t806 = -t805;
+        let t847 = self.fixed[70] * t23;
+        let t848 = -t847;
+        let t851 = self.fixed[71] * t23;
+        let t852 = -t851;
         [
             t23,
             t24,
@@ -1649,46 +1589,24 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 49, 18> for Skew2d<T> {
             t180,
             t185,
             t229,
-            t721,
-            t722,
-            t727,
-            t729,
-            t746,
-            t756,
+            t734,
+            t736,
+            t747,
+            t755,
+            t757,
             t762,
             t765,
             t771,
             t773,
             t777,
-            t784,
-            t788,
-            t791,
-            t797,
-            t801,
-            t808,
-            t811,
-            t815,
-            t821,
-            t825,
-            t841,
+            t783,
+            t787,
+            t793,
+            t798,
+            t802,
+            t806,
+            t848,
             t852,
-            t855,
-            t869,
-            t872,
-            t876,
-            t882,
-            t885,
-            t895,
-            t898,
-            t903,
-            t909,
-            t918,
-            t931,
-            t935,
-            t940,
-            t946,
-            t951,
-            t956,
         ]
     }
     #[inline]
@@ -1840,34 +1758,34 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 49, 18> for Skew2d<T> {
         let t498 = t497 + t491;
         let t499 = t498 + t495;
         let t501 = self.fixed[41] * t499;
-        let t507 = T::nearest(9.0) * t394;
-        let t508 = t383 + t507;
-        let t509 = t384 - t508;
-        let t510 = self.fixed[9] * t509;
-        let t511 = t380 + t463;
-        let t512 = self.fixed[38] * t511;
-        let t513 = t510 + t512;
-        let t517 = t74 * t513;
-        let t518 = self.fixed[43] * t517;
-        let t523 = self.fixed[44] * t384;
-        let t525 = self.fixed[45] * t152;
-        let t526 = t74 * t525;
-        let t527 = t379 * self.fixed[24];
-        let t529 = self.fixed[46] * t375;
-        let t530 = t526 - t527;
-        let t531 = t530 - t529;
-        let t534 = self.fixed[47] * t531;
-        let t539 = t82 * t226;
-        let t540 = t89 * t152;
-        let t541 = T::nearest(4.0) * t540;
-        let t542 = t539 - t541;
-        let t547 = self.fixed[49] * t542;
-        let t548 = -t547;
-        let t550 = self.fixed[50] * t152;
-        let t551 = t89 * t550;
-        let t552 = self.fixed[24] * t539;
-        let t553 = t551 + t552;
-        let t555 = self.fixed[51] * t553;
+        let t508 = T::nearest(9.0) * t394;
+        let t509 = t383 + t508;
+        let t510 = t384 - t509;
+        let t511 = self.fixed[9] * t510;
+        let t512 = t380 + t463;
+        let t513 = self.fixed[38] * t512;
+        let t514 = t511 + t513;
+        let t518 = t74 * t514;
+        let t519 = self.fixed[43] * t518;
+        let t524 = self.fixed[44] * t384;
+        let t526 = self.fixed[45] * t152;
+        let t527 = t74 * t526;
+        let t528 = t379 * self.fixed[24];
+        let t530 = self.fixed[46] * t375;
+        let t531 = t527 - t528;
+        let t532 = t531 - t530;
+        let t535 = self.fixed[47] * t532;
+        let t541 = t82 * t226;
+        let t542 = t89 * t152;
+        let t543 = T::nearest(4.0) * t542;
+        let t544 = t541 - t543;
+        let t549 = self.fixed[49] * t544;
+        let t550 = -t549;
+        let t552 = self.fixed[50] * t152;
+        let t553 = t89 * t552;
+        let t554 = self.fixed[24] * t541;
+        let t555 = t553 + t554;
+        let t557 = self.fixed[51] * t555;
         [
             t16,
             t31,
@@ -1882,194 +1800,166 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 49, 18> for Skew2d<T> {
             t419,
             t444,
             t501,
-            t518,
-            t523,
-            t534,
-            t548,
-            t555,
+            t519,
+            t524,
+            t535,
+            t550,
+            t557,
         ]
     }
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
-        time: &[T; 49],
+        time: &[T; 27],
         point: &[T; 18],
     ) -> crate::nalgebra::SVector<T, 2> {
         let t77 = time[4] * point[3];
+        let t78 = time[1] * point[3];
         let t83 = time[3] * point[4];
         let t90 = time[3] * point[5];
         let t92 = t77 + T::one();
         let t98 = t90 + T::one();
         let t99 = t92 * t98;
+        let t100 = t78 * t83;
+        let t101 = t99 - t100;
+        let t106 = t77 * t98;
+        let t107 = t100 - t106;
+        let t108 = T::one() / t101;
+        let t113 = t106 + t90;
+        let t114 = t113 - t100;
+        let t115 = t114.log_1p();
         let t141 = t90 * t92;
+        let t142 = t100 - t141;
+        let t176 = time[5] * point[0];
         let t181 = time[6] * point[1];
         let t186 = time[7] * point[6];
         let t187 = T::nearest(3.0) * point[0];
+        let t188 = t187 * t83;
+        let t194 = t92 * t186;
+        let t222 = time[4] * point[0];
+        let t230 = time[8] * point[7];
         let t231 = point[0] * t83;
         let t232 = point[3] * t186;
         let t233 = t231 - t232;
+        let t235 = t92 * t230;
         let t236 = time[1] * t233;
-        let t278 = T::nearest(8.0) * point[1];
-        let t279 = t278 - point[7];
+        let t297 = t235 + t236;
+        let t303 = t230 * t142;
+        let t307 = t90 * t142;
+        let t308 = t100 - t307;
+        let t313 = t90 - t100;
+        let t314 = t313 + t106;
         let t357 = point[3] * point[3];
         let t358 = point[8] * point[8];
         let t362 = point[0] * t357;
         let t502 = time[2] * point[10];
-        let t535 = point[5] * point[5];
-        let t719 = point[3] * point[4];
-        let t723 = time[10] * t719;
-        let t724 = t99 - t723;
-        let t725 = T::one() / t724;
-        let t726 = t725 * t725;
-        let t728 = time[11] * t362;
-        let t730 = time[12] * point[6];
-        let t731 = t730 * t357;
-        let t732 = t731 - t728;
-        let t733 = t358 * t732;
-        let t734 = t733 - point[9];
-        let t735 = time[0] * t734;
-        let t736 = t735 + t502;
-        let t737 = point[3] * t98;
-        let t738 = time[4] * t737;
-        let t739 = t738 + t90;
-        let t740 = t739 - t723;
-        let t741 = t740.log_1p();
-        let t742 = point[11] * t741;
-        let t743 = t736 + t742;
-        let t744 = t743 - point[12];
-        let t745 = time[2] * t744;
-        let t747 = time[13] * point[8];
-        let t748 = t747 * t362;
-        let t749 = point[13] + t748;
-        let t750 = time[0] * t749;
-        let t751 = t745 + t750;
-        let t752 = point[14] * t741;
-        let t753 = t751 + t752;
+        let t503 = point[11] * t115;
+        let t536 = point[14] * t115;
+        let t537 = point[5] * point[5];
+        let t558 = point[16] * t115;
+        let t573 = t108 * t108;
+        let t735 = time[9] * t362;
+        let t737 = time[10] * point[6];
+        let t738 = t737 * t357;
+        let t739 = t738 - t735;
+        let t740 = t358 * t739;
+        let t741 = t740 - point[9];
+        let t742 = time[0] * t741;
+        let t743 = t742 + t502;
+        let t744 = t743 + t503;
+        let t745 = t744 - point[12];
+        let t746 = time[2] * t745;
+        let t748 = time[11] * point[8];
+        let t749 = t748 * t362;
+        let t750 = point[13] + t749;
+        let t751 = time[0] * t750;
+        let t752 = t746 + t751;
+        let t753 = t752 + t536;
         let t754 = point[15] + t753;
-        let t755 = time[9] * t754;
-        let t757 = time[14] * t535;
-        let t758 = t757 * point[6];
-        let t759 = point[16] * t741;
-        let t760 = t758 + t759;
+        let t756 = time[12] * t754;
+        let t758 = time[13] * t537;
+        let t759 = t758 * point[6];
+        let t760 = t759 + t558;
         let t761 = point[17] + t760;
-        let t763 = time[15] * t761;
-        let t764 = t755 + t763;
-        let t766 = time[16] * point[6];
-        let t767 = t766 * t741;
+        let t763 = time[14] * t761;
+        let t764 = t756 + t763;
+        let t766 = time[15] * point[6];
+        let t767 = t766 * t115;
         let t768 = t764 + t767;
-        let t772 = time[17] * t362;
-        let t774 = time[18] * point[0];
+        let t772 = time[16] * t362;
+        let t774 = time[17] * point[0];
         let t775 = t774 * point[3];
         let t776 = t772 + t775;
-        let t778 = time[19] * point[0];
-        let t779 = t778 * t741;
+        let t778 = time[18] * point[0];
+        let t779 = t778 * t115;
         let t780 = t776 + t779;
         let t781 = t768 - t780;
-        let t782 = t726 * t781;
-        let t785 = time[20] * point[0];
-        let t789 = time[21] * point[0];
-        let t792 = time[22] * point[6];
-        let t793 = t789 - t792;
-        let t798 = time[23] * point[0];
-        let t802 = time[24] * point[6];
-        let t803 = t798 - t802;
-        let t804 = t793 + t803;
-        let t805 = t785 - t804;
-        let t806 = t782 - t805;
-        let t809 = time[25] * point[2];
-        let t812 = time[26] * t279;
-        let t816 = time[27] * point[0];
-        let t817 = t812 + t816;
-        let t822 = time[28] * point[0];
-        let t826 = time[29] * point[7];
-        let t827 = t822 - t826;
-        let t828 = t817 + t827;
-        let t829 = t809 - t828;
-        let t830 = t723 - t141;
-        let t831 = point[0] * t98;
-        let t832 = time[4] * t831;
-        let t833 = t236 - t832;
-        let t834 = point[7] * t92;
-        let t835 = time[8] * t834;
-        let t836 = t833 + t835;
-        let t837 = t725 * t830;
-        let t838 = t837 * t836;
-        let t839 = t835 + t236;
-        let t842 = time[30] * point[0];
-        let t843 = t842 * point[5];
-        let t844 = t839 - t843;
-        let t845 = t741 * t844;
-        let t846 = t838 - t845;
-        let t847 = point[7] * t830;
-        let t848 = time[8] * t847;
-        let t849 = t236 + t848;
-        let t853 = time[31] * t719;
-        let t856 = time[32] * t737;
-        let t857 = t853 - t856;
-        let t858 = point[0] * t857;
-        let t859 = t849 - t858;
-        let t860 = t846 + t859;
-        let t862 = self.fixed[75] * t860;
-        let t863 = t90 * t844;
-        let t864 = t849 - t863;
-        let t866 = self.fixed[76] * t864;
-        let t867 = t862 + t866;
-        let t870 = time[33] * t831;
-        let t873 = time[34] * t834;
-        let t874 = t873 - t870;
-        let t877 = time[35] * t233;
-        let t878 = t874 + t877;
-        let t879 = self.fixed[9] * t741;
-        let t880 = t879 * t830;
-        let t883 = time[36] * t719;
-        let t886 = time[37] * point[5];
-        let t887 = t886 * t830;
-        let t888 = t883 - t887;
-        let t889 = t880 - t888;
-        let t890 = t725 * t878;
-        let t891 = t890 * t889;
-        let t892 = t867 - t891;
-        let t896 = time[38] * t741;
-        let t899 = time[39] * point[5];
-        let t904 = time[40] * t719;
-        let t905 = t899 - t904;
-        let t910 = time[41] * t737;
-        let t911 = t905 + t910;
-        let t912 = t896 + t911;
-        let t913 = time[5] * t831;
-        let t914 = point[6] * t92;
-        let t915 = time[7] * t914;
-        let t916 = t915 - t913;
-        let t919 = time[42] * point[0];
-        let t920 = t919 * point[4];
-        let t921 = t181 * point[3];
-        let t922 = t920 + t921;
-        let t923 = time[1] * t922;
-        let t924 = t916 + t923;
-        let t925 = point[3] * t725;
-        let t926 = t925 * t924;
-        let t927 = t187 + t926;
-        let t928 = t912 * t927;
-        let t932 = time[43] * t922;
-        let t936 = time[44] * t831;
-        let t937 = t932 - t936;
-        let t941 = time[45] * t914;
-        let t942 = t937 + t941;
-        let t943 = t725 * t942;
-        let t947 = time[46] * point[6];
-        let t948 = t947 * t92;
-        let t952 = time[47] * t831;
-        let t953 = t948 - t952;
-        let t957 = time[48] * t922;
-        let t958 = t953 + t957;
-        let t959 = t943 + t958;
-        let t960 = point[3] * t959;
-        let t961 = t928 - t960;
-        let t962 = t892 + t961;
-        let t963 = t725 * t962;
-        let t964 = t829 + t963;
-        let t965 = -t964;
-        crate::nalgebra::SVector::<T, 2>::new(t806, t965)
+        let t782 = t573 * t781;
+        let t784 = time[19] * point[0];
+        let t788 = time[20] * point[6];
+        let t789 = t784 + t788;
+        let t790 = t782 - t789;
+        let t794 = time[21] * point[2];
+        let t799 = time[22] * point[1];
+        let t803 = time[23] * point[7];
+        let t804 = t799 - t803;
+        let t807 = time[24] * point[0];
+        let t808 = t804 + t807;
+        let t809 = t794 - t808;
+        let t810 = t98 * t222;
+        let t811 = t236 - t810;
+        let t812 = t811 + t235;
+        let t815 = self.fixed[67] * t108;
+        let t816 = t815 * t142;
+        let t817 = t816 * t812;
+        let t818 = t90 * t222;
+        let t819 = t297 - t818;
+        let t820 = self.fixed[67] * t115;
+        let t821 = t820 * t819;
+        let t822 = t817 - t821;
+        let t825 = self.fixed[68] * t236;
+        let t826 = t822 + t825;
+        let t827 = self.fixed[68] * t303;
+        let t828 = t826 + t827;
+        let t829 = self.fixed[67] * t107;
+        let t830 = t829 * t222;
+        let t831 = t828 - t830;
+        let t834 = self.fixed[69] * t90;
+        let t835 = t834 * t819;
+        let t836 = t831 - t835;
+        let t837 = t235 - t810;
+        let t838 = t837 + t236;
+        let t839 = t820 * t142;
+        let t840 = self.fixed[69] * t308;
+        let t841 = t839 - t840;
+        let t842 = t108 * t838;
+        let t843 = t842 * t841;
+        let t844 = t836 - t843;
+        let t849 = time[25] * t115;
+        let t853 = time[26] * t314;
+        let t854 = t849 + t853;
+        let t855 = t176 * t98;
+        let t856 = t194 - t855;
+        let t857 = t181 * point[3];
+        let t858 = t188 + t857;
+        let t859 = time[1] * t858;
+        let t860 = t856 + t859;
+        let t861 = point[3] * t108;
+        let t862 = t861 * t860;
+        let t863 = t187 + t862;
+        let t864 = t854 * t863;
+        let t865 = t859 - t855;
+        let t866 = t865 + t194;
+        let t867 = time[25] * t108;
+        let t868 = t867 * t866;
+        let t869 = time[26] * t860;
+        let t870 = t868 + t869;
+        let t871 = point[3] * t870;
+        let t872 = t864 - t871;
+        let t873 = t844 + t872;
+        let t874 = t108 * t873;
+        let t875 = t809 + t874;
+        crate::nalgebra::SVector::<T, 2>::new(t790, t875)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

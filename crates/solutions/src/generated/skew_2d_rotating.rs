@@ -42,7 +42,7 @@ impl<T: crate::Real> Default for Skew2dRotatingParameters<T> {
 pub struct Skew2dRotating<T: crate::Real> {
     parameters: Skew2dRotatingParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 66],
+    fixed: [T; 49],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Skew2dRotating<T> {
@@ -165,76 +165,38 @@ impl<T: crate::Real> Skew2dRotating<T> {
         let t408 = T::nearest(2.0) * t123;
         let t413 = t348 * parameters.E;
         let t414 = t413 / parameters.rho0;
-        let t509 = T::nearest(2.0) / t27;
-        let t514 = t192 * T::pi();
-        let t562 = T::nearest(2.0).cos();
-        let t564 = T::pi() * t562;
-        let t569 = T::nearest(2.0).sin();
-        let t570 = T::nearest(4.0) * t569;
-        let t624 = parameters.A * t204;
-        let t683 = t279 * t283;
-        let t686 = T::nearest(95.0) * t277;
-        let t687 = t686 * t283;
-        let t690 = t277 * t283;
-        let t694 = T::nearest(45.0) * t272;
-        let t695 = t694 * t277;
-        let t696 = t695 * t283;
-        let t699 = t272 * t277;
-        let t700 = t699 * t283;
-        let t707 = parameters.A * t192;
-        let t716 = T::nearest(3.0) * t192;
-        let t734 = t187 * t298;
-        let t750 = t218 * t388;
-        let t754 = t707 * t204;
-        let t755 = t754 * t388;
-        let t758 = t187 * t204;
-        let t759 = t758 * t388;
-        let t774 = t192 * t204;
-        let t784 = t192 * t388;
-        let t794 = t204 * t388;
-        let t797 = t298 * t388;
-        let t804 = t192 * t218;
-        let t805 = t804 * t388;
-        let t809 = t187 * t192;
-        let t810 = t809 * t204;
-        let t811 = t810 * t388;
-        let t815 = t774 * t348;
-        let t816 = t815 * t388;
-        let t828 = T::nearest(10.0) * T::nearest(0.1);
-        let t831 = t408 * t414;
-        let t834 = t277 * t414;
-        let t837 = T::nearest(30.0) * t277;
-        let t838 = t837 * t414;
-        let t842 = t277 * T::nearest(60.0);
-        let t843 = t842 * t404;
-        let t844 = t843 * t414;
-        let t847 = t277 * t404;
-        let t848 = t847 * t414;
-        let t876 = t774 * t388;
-        let t885 = parameters.A * t218;
-        let t886 = t885 * t388;
-        let t890 = parameters.A * parameters.A;
-        let t891 = t890 * t192;
-        let t892 = t891 * t204;
-        let t893 = t892 * t388;
-        let t899 = parameters.A * t187;
-        let t900 = t899 * t204;
-        let t901 = t900 * t388;
-        let t912 = t624 * t298;
-        let t913 = t912 * t388;
-        let t917 = t624 * t288;
-        let t918 = t917 * t388;
-        let t922 = t890 * t204;
-        let t923 = t922 * t388;
-        let t936 = parameters.Omega * parameters.Omega;
-        let t937 = t936 * T::nearest(10.0);
-        let t938 = t937 * T::nearest(0.1);
-        let t941 = t936 * T::nearest(0.1);
-        let t945 = parameters.Omega * T::nearest(10.0);
-        let t946 = t945 * T::nearest(0.1);
-        let t947 = t946 * t120;
-        let t950 = parameters.Omega * T::nearest(0.1);
-        let t951 = t950 * t120;
+        let t523 = T::nearest(2.0) / t27;
+        let t528 = t192 * T::pi();
+        let t576 = T::nearest(2.0).cos();
+        let t578 = T::pi() * t576;
+        let t583 = T::nearest(2.0).sin();
+        let t584 = T::nearest(4.0) * t583;
+        let t638 = parameters.A * t204;
+        let t697 = parameters.Omega * parameters.A;
+        let t698 = t697 * T::nearest(10.0);
+        let t700 = T::nearest(10.0) * t120;
+        let t712 = T::nearest(45.0) * t272;
+        let t715 = T::one() + t272;
+        let t719 = t123 * t404;
+        let t723 = T::nearest(4.0) * t404;
+        let t726 = T::nearest(60.0) * t404;
+        let t731 = t218 + t204;
+        let t734 = t277 * t283;
+        let t735 = t734 * t715;
+        let t769 = T::nearest(4.0) * t348;
+        let t772 = t123 * t348;
+        let t800 = T::nearest(10.0) * T::nearest(0.1);
+        let t803 = t408 * t414;
+        let t806 = t277 * t414;
+        let t816 = t218 * t388;
+        let t825 = t388 * t731;
+        let t834 = t204 * t388;
+        let t854 = parameters.A * t388;
+        let t863 = parameters.Omega * parameters.Omega;
+        let t864 = t863 * T::nearest(10.0);
+        let t865 = t864 * T::nearest(0.1);
+        let t868 = parameters.Omega * T::nearest(0.1);
+        let t872 = t863 * T::nearest(0.1);
         Ok(Skew2dRotating {
             parameters,
             fixed: [
@@ -261,49 +223,32 @@ impl<T: crate::Real> Skew2dRotating<T> {
                 t404,
                 t408,
                 t414,
-                t509,
-                t514,
-                t564,
-                t570,
-                t624,
-                t683,
-                t687,
-                t690,
-                t696,
+                t523,
+                t528,
+                t578,
+                t584,
+                t638,
+                t697,
+                t698,
                 t700,
-                t707,
-                t716,
-                t734,
-                t750,
-                t754,
-                t755,
-                t758,
-                t759,
-                t774,
-                t784,
-                t794,
-                t797,
-                t805,
-                t809,
-                t811,
+                t712,
+                t719,
+                t723,
+                t726,
+                t731,
+                t735,
+                t769,
+                t772,
+                t800,
+                t803,
+                t806,
                 t816,
-                t828,
-                t831,
+                t825,
                 t834,
-                t838,
-                t844,
-                t848,
-                t876,
-                t886,
-                t893,
-                t901,
-                t913,
-                t918,
-                t923,
-                t938,
-                t941,
-                t947,
-                t951,
+                t854,
+                t865,
+                t868,
+                t872,
             ],
         })
     }
@@ -1668,46 +1613,46 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
                 let t188 = self.fixed[6] * t29;
                 let t193 = self.fixed[7] * t45;
                 let t228 = self.fixed[10] * t29;
-                let t511 = X[1].cos();
-                let t512 = t188 * t511;
-                let t513 = t512 + T::one();
-                let t515 = self.fixed[24] * t45;
-                let t516 = t515 * t156;
-                let t517 = t516 + T::one();
-                let t518 = t193 * t38;
-                let t519 = t513 * t517;
-                let t520 = t77 * t511;
-                let t521 = t520 * t518;
-                let t522 = t519 - t521;
-                let t523 = t512 * t517;
-                let t524 = t521 - t523;
-                let t525 = T::one() / t522;
-                let t526 = t524 * t525;
-                let t527 = t512 - t526;
-                let t528 = t523 + t516;
-                let t529 = t528 - t521;
-                let t530 = t529.log_1p();
-                let t531 = self.fixed[8] * t527;
-                let t532 = t517 * t530;
-                let t533 = t532 * t525;
-                let t534 = self.fixed[9] * t533;
-                let t535 = t531 + t534;
-                let t536 = t520 * t525;
-                let t537 = t518 + t536;
-                let t538 = self.fixed[8] * t537;
-                let t539 = t228 * t511;
-                let t540 = t530 * t525;
-                let t541 = t539 * t540;
-                let t542 = t538 - t541;
-                let t543 = t30 * t535;
-                let t544 = t9 * t542;
-                let t545 = t543 - t544;
-                let t546 = -t545;
-                let t547 = t9 * t535;
-                let t548 = t30 * t542;
-                let t549 = t547 + t548;
-                let t550 = -t549;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t546, t550))
+                let t525 = X[1].cos();
+                let t526 = t188 * t525;
+                let t527 = t526 + T::one();
+                let t529 = self.fixed[24] * t45;
+                let t530 = t529 * t156;
+                let t531 = t530 + T::one();
+                let t532 = t193 * t38;
+                let t533 = t527 * t531;
+                let t534 = t77 * t525;
+                let t535 = t534 * t532;
+                let t536 = t533 - t535;
+                let t537 = t526 * t531;
+                let t538 = t535 - t537;
+                let t539 = T::one() / t536;
+                let t540 = t538 * t539;
+                let t541 = t526 - t540;
+                let t542 = t537 + t530;
+                let t543 = t542 - t535;
+                let t544 = t543.log_1p();
+                let t545 = self.fixed[8] * t541;
+                let t546 = t531 * t544;
+                let t547 = t546 * t539;
+                let t548 = self.fixed[9] * t547;
+                let t549 = t545 + t548;
+                let t550 = t534 * t539;
+                let t551 = t532 + t550;
+                let t552 = self.fixed[8] * t551;
+                let t553 = t228 * t525;
+                let t554 = t544 * t539;
+                let t555 = t553 * t554;
+                let t556 = t552 - t555;
+                let t557 = t30 * t549;
+                let t558 = t9 * t556;
+                let t559 = t557 - t558;
+                let t560 = -t559;
+                let t561 = t9 * t549;
+                let t562 = t30 * t556;
+                let t563 = t561 + t562;
+                let t564 = -t563;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t560, t564))
             }
             crate::Surface::Upper(0) => {
                 let t8 = self.parameters.Omega * t;
@@ -1727,56 +1672,56 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
                 let t188 = self.fixed[6] * t29;
                 let t193 = self.fixed[7] * t45;
                 let t228 = self.fixed[10] * t29;
-                let t551 = T::nearest(3.0).sum_error(X[1]);
-                let t552 = T::nearest(3.0) + X[1];
-                let t553 = t552.cos();
-                let t554 = t552.sin();
-                let t555 = T::nearest(0.5) * t551;
-                let t556 = t555 * t553;
-                let t557 = t554 + t556;
-                let t558 = t551 * t557;
-                let t559 = t553 - t558;
-                let t560 = t188 * t559;
-                let t561 = t560 + T::one();
-                let t563 = T::nearest(2.0) * X[1];
-                let t565 = self.fixed[25] * t156;
-                let t566 = t563 + t565;
-                let t567 = t193 * t566;
-                let t568 = t567 + T::one();
-                let t571 = self.fixed[26] * t35;
-                let t572 = t38 - t571;
-                let t573 = t193 * t572;
-                let t574 = t561 * t568;
-                let t575 = t77 * t559;
-                let t576 = t575 * t573;
-                let t577 = t574 - t576;
-                let t578 = t560 * t568;
-                let t579 = t576 - t578;
-                let t580 = T::one() / t577;
-                let t581 = t579 * t580;
-                let t582 = t560 - t581;
-                let t583 = t578 + t567;
-                let t584 = t583 - t576;
-                let t585 = t584.log_1p();
-                let t586 = self.fixed[8] * t582;
-                let t587 = t568 * t585;
-                let t588 = t587 * t580;
-                let t589 = self.fixed[9] * t588;
-                let t590 = t586 + t589;
-                let t591 = t575 * t580;
-                let t592 = t573 + t591;
-                let t593 = self.fixed[8] * t592;
-                let t594 = t228 * t559;
-                let t595 = t585 * t580;
-                let t596 = t594 * t595;
-                let t597 = t593 - t596;
-                let t598 = t30 * t590;
-                let t599 = t9 * t597;
-                let t600 = t598 - t599;
-                let t601 = t9 * t590;
-                let t602 = t30 * t597;
-                let t603 = t601 + t602;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t600, t603))
+                let t565 = T::nearest(3.0).sum_error(X[1]);
+                let t566 = T::nearest(3.0) + X[1];
+                let t567 = t566.cos();
+                let t568 = t566.sin();
+                let t569 = T::nearest(0.5) * t565;
+                let t570 = t569 * t567;
+                let t571 = t568 + t570;
+                let t572 = t565 * t571;
+                let t573 = t567 - t572;
+                let t574 = t188 * t573;
+                let t575 = t574 + T::one();
+                let t577 = T::nearest(2.0) * X[1];
+                let t579 = self.fixed[25] * t156;
+                let t580 = t577 + t579;
+                let t581 = t193 * t580;
+                let t582 = t581 + T::one();
+                let t585 = self.fixed[26] * t35;
+                let t586 = t38 - t585;
+                let t587 = t193 * t586;
+                let t588 = t575 * t582;
+                let t589 = t77 * t573;
+                let t590 = t589 * t587;
+                let t591 = t588 - t590;
+                let t592 = t574 * t582;
+                let t593 = t590 - t592;
+                let t594 = T::one() / t591;
+                let t595 = t593 * t594;
+                let t596 = t574 - t595;
+                let t597 = t592 + t581;
+                let t598 = t597 - t590;
+                let t599 = t598.log_1p();
+                let t600 = self.fixed[8] * t596;
+                let t601 = t582 * t599;
+                let t602 = t601 * t594;
+                let t603 = self.fixed[9] * t602;
+                let t604 = t600 + t603;
+                let t605 = t589 * t594;
+                let t606 = t587 + t605;
+                let t607 = self.fixed[8] * t606;
+                let t608 = t228 * t573;
+                let t609 = t599 * t594;
+                let t610 = t608 * t609;
+                let t611 = t607 - t610;
+                let t612 = t30 * t604;
+                let t613 = t9 * t611;
+                let t614 = t612 - t613;
+                let t615 = t9 * t604;
+                let t616 = t30 * t611;
+                let t617 = t615 + t616;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t614, t617))
             }
             crate::Surface::Lower(1) => {
                 let t8 = self.parameters.Omega * t;
@@ -1795,38 +1740,38 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
                 let t47 = t29 * t30;
                 let t65 = t29 * t9;
                 let t188 = self.fixed[6] * t29;
-                let t515 = self.fixed[24] * t45;
-                let t604 = t13.cos();
-                let t605 = t13.sin();
-                let t606 = T::nearest(0.5) * t12;
-                let t607 = t606 * t604;
-                let t608 = t605 + t607;
-                let t609 = t12 * t608;
-                let t610 = t604 - t609;
-                let t611 = t515 * t33;
-                let t612 = t611 + T::one();
-                let t613 = T::one() / t612;
-                let t614 = t613 + T::one();
-                let t615 = t188 * t610;
-                let t616 = t615 * t612;
-                let t617 = t616 + t611;
-                let t618 = t617.log_1p();
-                let t619 = t611 * t614;
-                let t620 = self.fixed[8] * t619;
-                let t621 = t618 * t613;
-                let t622 = self.fixed[9] * t621;
-                let t623 = t620 + t622;
-                let t625 = self.fixed[27] * t47;
-                let t626 = t625 * t610;
-                let t627 = t9 * t623;
-                let t628 = t626 - t627;
-                let t629 = -t628;
-                let t630 = self.fixed[27] * t65;
-                let t631 = t630 * t610;
-                let t632 = t30 * t623;
-                let t633 = t631 + t632;
-                let t634 = -t633;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t629, t634))
+                let t529 = self.fixed[24] * t45;
+                let t618 = t13.cos();
+                let t619 = t13.sin();
+                let t620 = T::nearest(0.5) * t12;
+                let t621 = t620 * t618;
+                let t622 = t619 + t621;
+                let t623 = t12 * t622;
+                let t624 = t618 - t623;
+                let t625 = t529 * t33;
+                let t626 = t625 + T::one();
+                let t627 = T::one() / t626;
+                let t628 = t627 + T::one();
+                let t629 = t188 * t624;
+                let t630 = t629 * t626;
+                let t631 = t630 + t625;
+                let t632 = t631.log_1p();
+                let t633 = t625 * t628;
+                let t634 = self.fixed[8] * t633;
+                let t635 = t632 * t627;
+                let t636 = self.fixed[9] * t635;
+                let t637 = t634 + t636;
+                let t639 = self.fixed[27] * t47;
+                let t640 = t639 * t624;
+                let t641 = t9 * t637;
+                let t642 = t640 - t641;
+                let t643 = -t642;
+                let t644 = self.fixed[27] * t65;
+                let t645 = t644 * t624;
+                let t646 = t30 * t637;
+                let t647 = t645 + t646;
+                let t648 = -t647;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t643, t648))
             }
             crate::Surface::Upper(1) => {
                 let t8 = self.parameters.Omega * t;
@@ -1845,56 +1790,56 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
                 let t143 = t32.sin();
                 let t188 = self.fixed[6] * t29;
                 let t193 = self.fixed[7] * t45;
-                let t502 = self.fixed[17] * t45;
-                let t635 = T::one().sum_error(t13);
-                let t636 = T::one() + t13;
-                let t637 = t12 + t635;
-                let t638 = t636.cos();
-                let t639 = t636.sin();
-                let t640 = T::nearest(0.5) * t637;
-                let t641 = t640 * t638;
-                let t642 = t639 + t641;
-                let t643 = t637 * t642;
-                let t644 = t638 - t643;
-                let t645 = T::nearest(4.0) * t143;
-                let t646 = T::one() - t645;
-                let t647 = t193 * t646;
-                let t648 = t188 * t644;
-                let t649 = t648 + T::one();
-                let t650 = t502 * X[0];
-                let t651 = t650 + T::one();
-                let t652 = t649 * t651;
-                let t653 = t77 * t644;
-                let t654 = t653 * t647;
-                let t655 = t652 - t654;
-                let t656 = T::one() / t655;
-                let t657 = t647 * t656;
-                let t658 = t653 + t657;
-                let t659 = t648 * t651;
-                let t660 = t659 + t650;
-                let t661 = t660 - t654;
-                let t662 = t661.log_1p();
-                let t663 = self.fixed[8] * t658;
-                let t664 = t647 * t662;
-                let t665 = t664 * t656;
-                let t666 = self.fixed[9] * t665;
-                let t667 = t663 - t666;
-                let t668 = t649 * t650;
-                let t669 = t654 - t668;
-                let t670 = t669 * t656;
-                let t671 = t650 - t670;
-                let t672 = self.fixed[8] * t671;
-                let t673 = t649 * t662;
-                let t674 = t673 * t656;
-                let t675 = self.fixed[9] * t674;
-                let t676 = t672 + t675;
-                let t677 = t30 * t667;
-                let t678 = t9 * t676;
-                let t679 = t677 - t678;
-                let t680 = t9 * t667;
-                let t681 = t30 * t676;
-                let t682 = t680 + t681;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t679, t682))
+                let t504 = self.fixed[17] * t45;
+                let t649 = T::one().sum_error(t13);
+                let t650 = T::one() + t13;
+                let t651 = t12 + t649;
+                let t652 = t650.cos();
+                let t653 = t650.sin();
+                let t654 = T::nearest(0.5) * t651;
+                let t655 = t654 * t652;
+                let t656 = t653 + t655;
+                let t657 = t651 * t656;
+                let t658 = t652 - t657;
+                let t659 = T::nearest(4.0) * t143;
+                let t660 = T::one() - t659;
+                let t661 = t193 * t660;
+                let t662 = t188 * t658;
+                let t663 = t662 + T::one();
+                let t664 = t504 * X[0];
+                let t665 = t664 + T::one();
+                let t666 = t663 * t665;
+                let t667 = t77 * t658;
+                let t668 = t667 * t661;
+                let t669 = t666 - t668;
+                let t670 = T::one() / t669;
+                let t671 = t661 * t670;
+                let t672 = t667 + t671;
+                let t673 = t662 * t665;
+                let t674 = t673 + t664;
+                let t675 = t674 - t668;
+                let t676 = t675.log_1p();
+                let t677 = self.fixed[8] * t672;
+                let t678 = t661 * t676;
+                let t679 = t678 * t670;
+                let t680 = self.fixed[9] * t679;
+                let t681 = t677 - t680;
+                let t682 = t663 * t664;
+                let t683 = t668 - t682;
+                let t684 = t683 * t670;
+                let t685 = t664 - t684;
+                let t686 = self.fixed[8] * t685;
+                let t687 = t663 * t676;
+                let t688 = t687 * t670;
+                let t689 = self.fixed[9] * t688;
+                let t690 = t686 + t689;
+                let t691 = t30 * t681;
+                let t692 = t9 * t690;
+                let t693 = t691 - t692;
+                let t694 = t9 * t681;
+                let t695 = t30 * t690;
+                let t696 = t694 + t695;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t693, t696))
             }
             _ => None,
         }
@@ -1947,7 +1892,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 49, 9>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 27, 9>::new(*self, X))
     }
     fn state_at(
         &self,
@@ -1957,9 +1902,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 2, 49, 9> for Skew2dRotating<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 2, 27, 9> for Skew2dRotating<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 49] {
+    fn body_force_time(&self, t: T) -> [T; 27] {
         let t8 = self.parameters.Omega * t;
         let t9 = t8.sin();
         let t28 = self.fixed[1] * t;
@@ -1969,8 +1914,11 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 49, 9> for Skew2dRotating<T> {
         let t42 = T::nearest(3.0) * t29;
         let t44 = T::nearest(4.0) * t41;
         let t45 = t42 + t44;
+        let t47 = t29 * t30;
+        let t50 = t45 * t9;
+        let t65 = t29 * t9;
+        let t68 = t45 * t30;
         let t77 = self.parameters.A * t29;
-        let t81 = self.parameters.A * t45;
         let t88 = T::nearest(4.0) * t29;
         let t89 = T::nearest(3.0) * t41;
         let t90 = t88 - t89;
@@ -1980,105 +1928,91 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 49, 9> for Skew2dRotating<T> {
         let t111 = t90 * t30;
         let t188 = self.fixed[6] * t29;
         let t193 = self.fixed[7] * t45;
-        let t499 = self.fixed[15] * t29;
-        let t500 = self.fixed[16] * t45;
-        let t502 = self.fixed[17] * t45;
-        let t505 = self.fixed[18] * t45;
-        let t684 = self.fixed[28] * t29;
-        let t688 = self.fixed[29] * t29;
-        let t691 = self.fixed[30] * t45;
-        let t697 = self.fixed[31] * t29;
-        let t701 = self.fixed[32] * t45;
-        let t708 = t29 * t45;
-        let t709 = self.fixed[33] * t708;
-        let t717 = self.fixed[34] * t45;
-        let t735 = self.fixed[35] * t708;
-        let t756 = self.fixed[38] * t708;
-        let t760 = self.fixed[40] * t29;
-        let t769 = self.fixed[39] * t29;
-        let t771 = self.fixed[37] * t708;
-        let t775 = self.fixed[41] * t45;
-        let t785 = self.fixed[42] * t45;
-        let t798 = self.fixed[44] * t45;
-        let t806 = self.fixed[45] * t45;
-        let t812 = self.fixed[47] * t708;
-        let t817 = t45 * t45;
-        let t818 = self.fixed[48] * t817;
-        let t829 = self.fixed[49] * t30;
-        let t832 = self.fixed[50] * t45;
-        let t835 = self.fixed[51] * t45;
-        let t839 = self.fixed[52] * t29;
-        let t845 = self.fixed[53] * t29;
-        let t849 = self.fixed[54] * t45;
-        let t857 = self.fixed[46] * t708;
-        let t877 = self.fixed[55] * t45;
-        let t887 = self.fixed[56] * t29;
-        let t894 = t29 * t29;
-        let t895 = t894 * t45;
-        let t896 = self.fixed[57] * t895;
-        let t902 = self.fixed[58] * t894;
-        let t914 = self.fixed[59] * t708;
-        let t919 = self.fixed[60] * t894;
-        let t924 = self.fixed[61] * t894;
-        let t933 = self.fixed[49] * t9;
-        let t939 = self.fixed[62] * t30;
-        let t942 = self.fixed[63] * t9;
-        let t948 = self.fixed[64] * t108;
-        let t952 = self.fixed[65] * t111;
-        let t960 = self.fixed[62] * t9;
-        let t962 = self.fixed[63] * t30;
-        let t965 = self.fixed[64] * t91;
-        let t967 = self.fixed[65] * t94;
+        let t270 = T::nearest(95.0) * t29;
+        let t402 = T::nearest(30.0) * t29;
+        let t499 = self.fixed[13] * t29;
+        let t500 = self.fixed[15] * t29;
+        let t502 = self.fixed[16] * t45;
+        let t504 = self.fixed[17] * t45;
+        let t699 = self.fixed[29] * t47;
+        let t701 = self.fixed[30] * t108;
+        let t702 = t699 - t701;
+        let t703 = self.fixed[28] * t50;
+        let t704 = self.fixed[3] * t111;
+        let t705 = t704 - t703;
+        let t706 = self.fixed[29] * t65;
+        let t707 = self.fixed[30] * t91;
+        let t708 = t706 + t707;
+        let t709 = self.fixed[28] * t68;
+        let t710 = self.fixed[3] * t94;
+        let t711 = t709 + t710;
+        let t713 = self.fixed[31] * t29;
+        let t714 = t270 + t713;
+        let t716 = T::nearest(8.0) * t45;
+        let t717 = self.fixed[4] * t45;
+        let t718 = t716 + t717;
+        let t720 = self.fixed[32] * t45;
+        let t721 = t718 + t720;
+        let t722 = T::nearest(4.0) * t45;
+        let t724 = self.fixed[33] * t45;
+        let t725 = t722 + t724;
+        let t727 = self.fixed[34] * t29;
+        let t728 = t402 + t727;
+        let t729 = self.fixed[12] * t714;
+        let t730 = t499 - t729;
+        let t732 = self.fixed[14] * t730;
+        let t736 = self.fixed[36] * t45;
+        let t770 = self.fixed[37] * t45;
+        let t773 = self.fixed[38] * t45;
+        let t801 = self.fixed[39] * t30;
+        let t804 = self.fixed[40] * t45;
+        let t807 = self.fixed[41] * t721;
+        let t809 = self.fixed[41] * t725;
+        let t812 = self.fixed[41] * t728;
+        let t855 = self.fixed[45] * t29;
+        let t860 = self.fixed[39] * t9;
+        let t866 = self.fixed[46] * t30;
+        let t869 = self.fixed[47] * t702;
+        let t873 = self.fixed[48] * t9;
+        let t876 = self.fixed[47] * t705;
+        let t880 = -t860;
+        let t882 = -t801;
+        let t885 = self.fixed[46] * t9;
+        let t886 = -t885;
+        let t888 = self.fixed[47] * t708;
+        let t889 = -t888;
+        let t892 = self.fixed[48] * t30;
+        let t893 = -t892;
+        let t896 = self.fixed[47] * t711;
+        let t897 = -t896;
         [
             t77,
-            t81,
             t188,
             t193,
-            t499,
             t500,
             t502,
-            t505,
-            t684,
-            t688,
-            t691,
-            t697,
-            t701,
-            t709,
-            t717,
-            t735,
-            t756,
-            t760,
-            t769,
-            t771,
-            t775,
-            t785,
-            t798,
-            t806,
+            t504,
+            t732,
+            t736,
+            t770,
+            t773,
+            t801,
+            t804,
+            t807,
+            t809,
             t812,
-            t818,
-            t829,
-            t832,
-            t835,
-            t839,
-            t845,
-            t849,
-            t857,
-            t877,
-            t887,
-            t896,
-            t902,
-            t914,
-            t919,
-            t924,
-            t933,
-            t939,
-            t942,
-            t948,
-            t952,
-            t960,
-            t962,
-            t965,
-            t967,
+            t855,
+            t860,
+            t866,
+            t869,
+            t873,
+            t876,
+            t880,
+            t882,
+            t886,
+            t889,
+            t893,
+            t897,
         ]
     }
     #[inline]
@@ -2127,215 +2061,176 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 49, 9> for Skew2dRotating<T> {
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
-        time: &[T; 49],
+        time: &[T; 27],
         point: &[T; 9],
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t78 = time[0] * point[1];
-        let t79 = point[0] + t78;
-        let t82 = time[1] * point[3];
-        let t83 = point[4] + t82;
-        let t189 = time[2] * point[5];
+        let t189 = time[1] * point[5];
         let t191 = t189 + T::one();
-        let t194 = time[3] * point[7];
+        let t194 = time[2] * point[7];
         let t195 = t194 + T::one();
-        let t196 = time[3] * point[6];
+        let t196 = time[2] * point[6];
         let t197 = t191 * t195;
+        let t198 = time[0] * point[5];
+        let t199 = t198 * t196;
+        let t200 = t197 - t199;
+        let t205 = t189 * t195;
+        let t206 = t199 - t205;
+        let t207 = T::one() / t200;
+        let t243 = t194 * t191;
+        let t244 = t199 - t243;
         let t311 = T::nearest(3.0) * point[1];
-        let t343 = T::nearest(4.0) * point[0];
-        let t344 = self.fixed[4] * point[2];
-        let t345 = t343 - t344;
+        let t312 = t311 * t196;
         let t350 = point[1] * t196;
-        let t399 = T::nearest(8.0) * point[2];
-        let t400 = t399 - t345;
-        let t501 = time[5] * point[2];
-        let t503 = time[6] * point[8];
-        let t504 = time[2] * point[1];
-        let t506 = point[5] * t503;
-        let t507 = t350 - t506;
-        let t508 = time[0] * t507;
-        let t685 = time[8] * point[1];
-        let t689 = time[9] * point[1];
-        let t692 = time[10] * point[8];
-        let t693 = t689 - t692;
-        let t698 = time[11] * point[1];
-        let t702 = time[12] * point[8];
-        let t703 = t698 - t702;
-        let t704 = t693 + t703;
-        let t705 = t685 - t704;
-        let t706 = point[5] * point[6];
-        let t710 = time[13] * t706;
-        let t711 = t197 - t710;
-        let t712 = T::one() / t711;
-        let t713 = point[5] * t195;
-        let t714 = time[2] * t713;
-        let t715 = t710 - t714;
-        let t718 = time[14] * point[1];
-        let t719 = t718 * point[6];
-        let t720 = t501 * point[5];
-        let t721 = t719 + t720;
-        let t722 = time[0] * t721;
-        let t723 = point[1] * t195;
-        let t724 = time[4] * t723;
-        let t725 = t722 - t724;
-        let t726 = point[8] * t191;
-        let t727 = time[6] * t726;
-        let t728 = t725 + t727;
-        let t729 = t715 * t712;
-        let t730 = t729 * t728;
-        let t731 = t714 + t194;
-        let t732 = t731 - t710;
-        let t733 = t732.log_1p();
-        let t736 = time[15] * point[5];
-        let t737 = t736 * point[8];
-        let t738 = t725 + t737;
-        let t739 = t733 * t738;
-        let t740 = t730 - t739;
-        let t741 = point[1] * t715;
-        let t742 = time[4] * t741;
-        let t743 = t722 - t742;
-        let t744 = point[7] * t191;
-        let t745 = time[3] * t744;
-        let t746 = t710 - t745;
-        let t747 = t503 * t746;
-        let t748 = t743 + t747;
-        let t749 = t740 + t748;
-        let t751 = self.fixed[36] * t749;
-        let t752 = self.fixed[36] * t715;
-        let t753 = t752 * t733;
-        let t757 = time[16] * t706;
-        let t761 = time[17] * point[5];
-        let t762 = t761 * t715;
-        let t763 = t757 - t762;
-        let t764 = t753 - t763;
-        let t765 = t727 - t724;
-        let t766 = t765 + t722;
-        let t767 = t764 * t766;
-        let t768 = self.fixed[9] * t733;
-        let t770 = time[18] * point[5];
-        let t772 = time[19] * t706;
-        let t773 = t770 - t772;
-        let t776 = time[20] * t744;
-        let t777 = t773 + t776;
-        let t778 = t768 + t777;
-        let t779 = time[2] * t723;
-        let t780 = t345 * t191;
-        let t781 = time[7] * t780;
-        let t782 = t781 - t779;
-        let t783 = t782 + t508;
-        let t786 = time[21] * point[6];
-        let t787 = t786 * t778;
-        let t788 = t787 * t783;
-        let t789 = t767 - t788;
-        let t790 = t712 * t789;
-        let t791 = t751 - t790;
-        let t792 = t189 * t738;
-        let t793 = t743 - t792;
-        let t795 = self.fixed[43] * t793;
-        let t796 = t791 + t795;
-        let t799 = time[22] * point[8];
-        let t800 = t799 * t778;
-        let t801 = t796 - t800;
-        let t802 = t508 - t779;
-        let t803 = t802 + t781;
-        let t807 = time[23] * t712;
-        let t808 = t807 * t803;
-        let t813 = time[24] * point[1];
-        let t814 = t813 * t195;
-        let t819 = time[25] * t780;
-        let t820 = t819 - t814;
-        let t821 = time[16] * t507;
-        let t822 = t820 + t821;
-        let t823 = t808 + t822;
-        let t824 = point[6] * t823;
-        let t825 = t801 - t824;
-        let t826 = t712 * t825;
-        let t827 = t705 + t826;
-        let t830 = time[26] * t827;
-        let t833 = time[27] * point[3];
-        let t836 = time[28] * t400;
-        let t840 = time[29] * point[1];
-        let t841 = t836 + t840;
-        let t846 = time[30] * point[1];
-        let t850 = time[31] * t345;
-        let t851 = t846 - t850;
-        let t852 = t841 + t851;
-        let t853 = t833 - t852;
-        let t854 = t712 * t746;
-        let t855 = t854 * t803;
-        let t856 = t781 + t508;
-        let t858 = time[32] * point[1];
-        let t859 = t858 * point[7];
-        let t860 = t856 - t859;
-        let t861 = t733 * t860;
-        let t862 = t855 - t861;
-        let t863 = t345 * t746;
-        let t864 = time[7] * t863;
-        let t865 = t508 + t864;
-        let t866 = t504 * t715;
-        let t867 = t865 - t866;
-        let t868 = t862 + t867;
-        let t869 = self.fixed[36] * t868;
-        let t870 = t194 * t860;
-        let t871 = t865 - t870;
-        let t872 = self.fixed[43] * t871;
-        let t873 = t869 + t872;
-        let t874 = self.fixed[36] * t733;
-        let t875 = t874 * t746;
-        let t878 = time[33] * point[7];
-        let t879 = t878 * t746;
-        let t880 = t757 - t879;
-        let t881 = t875 - t880;
-        let t882 = t712 * t783;
-        let t883 = t882 * t881;
-        let t884 = t873 - t883;
-        let t888 = time[34] * t733;
-        let t889 = time[16] * point[7];
-        let t897 = time[35] * t706;
-        let t898 = t889 - t897;
-        let t903 = time[36] * t713;
-        let t904 = t898 + t903;
-        let t905 = t888 + t904;
-        let t906 = point[5] * t712;
-        let t907 = t906 * t766;
-        let t908 = t311 + t907;
-        let t909 = t905 * t908;
-        let t910 = time[34] * t712;
-        let t911 = t910 * t728;
-        let t915 = time[37] * point[8];
-        let t916 = t915 * t191;
-        let t920 = time[38] * t723;
-        let t921 = t916 - t920;
-        let t925 = time[39] * t721;
-        let t926 = t921 + t925;
-        let t927 = t911 + t926;
-        let t928 = point[5] * t927;
-        let t929 = t909 - t928;
-        let t930 = t884 + t929;
-        let t931 = t712 * t930;
-        let t932 = t853 + t931;
-        let t934 = time[40] * t932;
-        let t935 = t934 - t830;
-        let t940 = time[41] * t79;
-        let t943 = time[42] * t83;
-        let t944 = t940 - t943;
-        let t949 = time[43] * point[1];
-        let t953 = time[44] * point[3];
-        let t954 = t949 - t953;
-        let t955 = t944 - t954;
-        let t956 = t935 - t955;
-        let t957 = time[40] * t827;
-        let t958 = time[26] * t932;
-        let t959 = t957 + t958;
-        let t961 = time[45] * t79;
-        let t963 = time[46] * t83;
-        let t964 = t961 + t963;
-        let t966 = time[47] * point[1];
-        let t968 = time[48] * point[3];
-        let t969 = t966 + t968;
-        let t970 = t964 + t969;
-        let t971 = t959 + t970;
-        let t972 = -t971;
-        crate::nalgebra::SVector::<T, 2>::new(t956, t972)
+        let t433 = t194 + t205;
+        let t501 = time[3] * point[1];
+        let t503 = time[4] * point[2];
+        let t505 = time[5] * point[8];
+        let t506 = t191 * t505;
+        let t507 = t189 * t505;
+        let t508 = t189 * t206;
+        let t509 = t199 - t508;
+        let t510 = self.fixed[8] * t509;
+        let t511 = t189 - t199;
+        let t512 = t511 + t243;
+        let t513 = self.fixed[8] * t512;
+        let t514 = time[1] * point[1];
+        let t515 = point[5] * t505;
+        let t516 = t350 - t515;
+        let t517 = time[0] * t516;
+        let t518 = t194 * t244;
+        let t519 = t199 - t518;
+        let t520 = t194 - t199;
+        let t521 = t520 + t205;
+        let t522 = self.fixed[8] * t521;
+        let t733 = time[6] * point[1];
+        let t737 = time[7] * point[8];
+        let t738 = t733 + t737;
+        let t739 = t503 * point[5];
+        let t740 = t312 + t739;
+        let t741 = time[0] * t740;
+        let t742 = t195 * t501;
+        let t743 = t741 - t742;
+        let t744 = t743 + t506;
+        let t745 = t207 * t744;
+        let t746 = self.fixed[9] * t206;
+        let t747 = t746 * t745;
+        let t748 = t433 - t199;
+        let t749 = t748.log_1p();
+        let t750 = t743 + t507;
+        let t751 = self.fixed[9] * t749;
+        let t752 = t751 * t750;
+        let t753 = t747 - t752;
+        let t754 = self.fixed[35] * t741;
+        let t755 = t753 + t754;
+        let t756 = t206 * t501;
+        let t757 = self.fixed[35] * t756;
+        let t758 = t755 - t757;
+        let t759 = self.fixed[9] * t244;
+        let t760 = t759 * t505;
+        let t761 = t758 + t760;
+        let t762 = t746 * t749;
+        let t763 = t762 - t510;
+        let t764 = t506 - t742;
+        let t765 = t764 + t741;
+        let t766 = t763 * t765;
+        let t767 = t751 + t513;
+        let t768 = t195 * t514;
+        let t771 = time[8] * point[0];
+        let t774 = time[9] * point[2];
+        let t775 = t771 - t774;
+        let t776 = t191 * t775;
+        let t777 = t776 - t768;
+        let t778 = t777 + t517;
+        let t779 = t196 * t767;
+        let t780 = t779 * t778;
+        let t781 = t766 - t780;
+        let t782 = t207 * t781;
+        let t783 = t761 - t782;
+        let t784 = self.fixed[8] * t189;
+        let t785 = t784 * t750;
+        let t786 = t783 - t785;
+        let t787 = t505 * t767;
+        let t788 = t786 - t787;
+        let t789 = t517 - t768;
+        let t790 = t789 + t776;
+        let t791 = t207 * t790;
+        let t792 = self.fixed[9] * t791;
+        let t793 = self.fixed[8] * t778;
+        let t794 = t792 + t793;
+        let t795 = t196 * t794;
+        let t796 = t788 - t795;
+        let t797 = self.fixed[19] * t207;
+        let t798 = t797 * t796;
+        let t799 = t738 + t798;
+        let t802 = time[10] * t799;
+        let t805 = time[11] * point[3];
+        let t808 = time[12] * point[2];
+        let t810 = time[13] * point[0];
+        let t811 = t808 - t810;
+        let t813 = time[14] * point[1];
+        let t814 = t811 + t813;
+        let t815 = t805 - t814;
+        let t817 = self.fixed[42] * t244;
+        let t818 = t817 * t791;
+        let t819 = t776 + t517;
+        let t820 = t194 * t514;
+        let t821 = t819 - t820;
+        let t822 = self.fixed[42] * t749;
+        let t823 = t822 * t821;
+        let t824 = t818 - t823;
+        let t826 = self.fixed[43] * t517;
+        let t827 = t824 + t826;
+        let t828 = t244 * t775;
+        let t829 = self.fixed[43] * t828;
+        let t830 = t827 + t829;
+        let t831 = self.fixed[42] * t206;
+        let t832 = t831 * t514;
+        let t833 = t830 - t832;
+        let t835 = self.fixed[44] * t194;
+        let t836 = t835 * t821;
+        let t837 = t833 - t836;
+        let t838 = t822 * t244;
+        let t839 = self.fixed[44] * t519;
+        let t840 = t838 - t839;
+        let t841 = t207 * t778;
+        let t842 = t841 * t840;
+        let t843 = t837 - t842;
+        let t844 = t751 + t522;
+        let t845 = point[5] * t207;
+        let t846 = t845 * t765;
+        let t847 = t311 + t846;
+        let t848 = t844 * t847;
+        let t849 = self.fixed[9] * t745;
+        let t850 = self.fixed[8] * t765;
+        let t851 = t849 + t850;
+        let t852 = point[5] * t851;
+        let t853 = t848 - t852;
+        let t856 = time[15] * t853;
+        let t857 = t843 + t856;
+        let t858 = t207 * t857;
+        let t859 = t815 + t858;
+        let t861 = time[16] * t859;
+        let t862 = t861 - t802;
+        let t867 = time[17] * point[0];
+        let t870 = time[18] * point[1];
+        let t871 = t867 + t870;
+        let t874 = time[19] * point[4];
+        let t875 = t871 - t874;
+        let t877 = time[20] * point[3];
+        let t878 = t875 + t877;
+        let t879 = t862 - t878;
+        let t881 = time[21] * t799;
+        let t883 = time[22] * t859;
+        let t884 = t881 + t883;
+        let t887 = time[23] * point[0];
+        let t890 = time[24] * point[1];
+        let t891 = t887 + t890;
+        let t894 = time[25] * point[4];
+        let t895 = t891 + t894;
+        let t898 = time[26] * point[3];
+        let t899 = t895 + t898;
+        let t900 = t884 + t899;
+        crate::nalgebra::SVector::<T, 2>::new(t879, t900)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

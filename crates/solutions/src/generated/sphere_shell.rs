@@ -211,31 +211,31 @@ impl<T: crate::Real> SphereShell<T> {
         let t341 = t48 * t114;
         let t342 = t341 * t116;
         let t343 = t340 / t342;
-        let t349 = T::nearest(2.0) / t16;
-        let t351 = parameters.Ri / parameters.Ro;
-        let t352 = T::one() - t351;
-        let t353 = t103 * parameters.Ri;
-        let t354 = t353 * t352;
-        let t355 = t354 / t11;
-        let t360 = T::nearest(2.0) * parameters.Ri;
-        let t361 = t360 / parameters.Ro;
-        let t362 = T::nearest(3.0) - t361;
-        let t364 = t119 * parameters.Ri;
-        let t365 = t364 * t362;
-        let t366 = t365 / t11;
-        let t369 = parameters.Ri * parameters.Ri;
-        let t370 = t362 * t362;
-        let t371 = t127 * t369;
-        let t372 = t371 * t370;
-        let t373 = t372 / t128;
-        let t377 = parameters.A * parameters.Ri;
-        let t378 = t377 * t362;
-        let t379 = t378 / t11;
-        let t390 = T::one() / parameters.Ri;
-        let t398 = parameters.A / parameters.Ro;
-        let t406 = parameters.Ro * t114;
-        let t407 = t406 * t116;
-        let t408 = t139 / t407;
+        let t347 = T::nearest(2.0) / t16;
+        let t349 = parameters.Ri / parameters.Ro;
+        let t350 = T::one() - t349;
+        let t351 = t103 * parameters.Ri;
+        let t352 = t351 * t350;
+        let t353 = t352 / t11;
+        let t358 = T::nearest(2.0) * parameters.Ri;
+        let t359 = t358 / parameters.Ro;
+        let t360 = T::nearest(3.0) - t359;
+        let t362 = t119 * parameters.Ri;
+        let t363 = t362 * t360;
+        let t364 = t363 / t11;
+        let t367 = parameters.Ri * parameters.Ri;
+        let t368 = t360 * t360;
+        let t369 = t127 * t367;
+        let t370 = t369 * t368;
+        let t371 = t370 / t128;
+        let t375 = parameters.A * parameters.Ri;
+        let t376 = t375 * t360;
+        let t377 = t376 / t11;
+        let t388 = T::one() / parameters.Ri;
+        let t396 = parameters.A / parameters.Ro;
+        let t404 = parameters.Ro * t114;
+        let t405 = t404 * t116;
+        let t406 = t139 / t405;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -266,14 +266,14 @@ impl<T: crate::Real> SphereShell<T> {
                 t319,
                 t334,
                 t343,
-                t349,
-                t355,
-                t366,
-                t373,
-                t379,
-                t390,
-                t398,
-                t408,
+                t347,
+                t353,
+                t364,
+                t371,
+                t377,
+                t388,
+                t396,
+                t406,
             ],
         })
     }
@@ -984,50 +984,50 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t17 = self.fixed[0] * t;
                 let t18 = t17.cos_pi();
                 let t122 = t18 * t18;
-                let t356 = self.fixed[25] * t18;
+                let t354 = self.fixed[25] * t18;
+                let t355 = t354 + T::one();
+                let t356 = T::one() / t355;
                 let t357 = t356 + T::one();
-                let t358 = T::one() / t357;
-                let t359 = t358 + T::one();
-                let t363 = t18 * t357;
-                let t367 = self.fixed[26] * t363;
-                let t368 = t122 * t357;
-                let t374 = self.fixed[27] * t368;
-                let t375 = t367 + t374;
-                let t376 = t375 + t356;
-                let t380 = self.fixed[28] * t18;
-                let t381 = t380 + T::one();
-                let t382 = t381 * t381;
-                let t383 = t357 * t382;
-                let t384 = t376.ln_of_both(t383);
-                let t385 = t356 * t359;
-                let t386 = self.fixed[11] * t385;
-                let t387 = t384 * t358;
-                let t388 = self.fixed[12] * t387;
-                let t389 = t386 + t388;
-                let t391 = self.fixed[29] * t389;
-                let t392 = t391 * X[0];
+                let t361 = t18 * t355;
+                let t365 = self.fixed[26] * t361;
+                let t366 = t122 * t355;
+                let t372 = self.fixed[27] * t366;
+                let t373 = t365 + t372;
+                let t374 = t373 + t354;
+                let t378 = self.fixed[28] * t18;
+                let t379 = t378 + T::one();
+                let t380 = t379 * t379;
+                let t381 = t355 * t380;
+                let t382 = t374.ln_of_both(t381);
+                let t383 = t354 * t357;
+                let t384 = self.fixed[11] * t383;
+                let t385 = t382 * t356;
+                let t386 = self.fixed[12] * t385;
+                let t387 = t384 + t386;
+                let t389 = self.fixed[29] * t387;
+                let t390 = t389 * X[0];
+                let t391 = -t390;
+                let t392 = t389 * X[1];
                 let t393 = -t392;
-                let t394 = t391 * X[1];
+                let t394 = t389 * X[2];
                 let t395 = -t394;
-                let t396 = t391 * X[2];
-                let t397 = -t396;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t393, t395, t397))
+                Some(crate::nalgebra::SVector::<T, 3>::new(t391, t393, t395))
             }
             crate::Surface::Outer => {
                 let t17 = self.fixed[0] * t;
                 let t18 = t17.cos_pi();
-                let t399 = self.fixed[30] * t18;
-                let t400 = t399 + T::nearest(2.0);
-                let t401 = t18 * t400;
-                let t402 = self.fixed[30] * t401;
-                let t403 = t399 + T::one();
-                let t404 = t403 * t403;
-                let t405 = t402.ln_of_both(t404);
-                let t409 = self.fixed[31] * t405;
-                let t410 = t409 * X[0];
-                let t411 = t409 * X[1];
-                let t412 = t409 * X[2];
-                Some(crate::nalgebra::SVector::<T, 3>::new(t410, t411, t412))
+                let t397 = self.fixed[30] * t18;
+                let t398 = t397 + T::nearest(2.0);
+                let t399 = t18 * t398;
+                let t400 = self.fixed[30] * t399;
+                let t401 = t397 + T::one();
+                let t402 = t401 * t401;
+                let t403 = t400.ln_of_both(t402);
+                let t407 = self.fixed[31] * t403;
+                let t408 = t407 * X[0];
+                let t409 = t407 * X[1];
+                let t410 = t407 * X[2];
+                Some(crate::nalgebra::SVector::<T, 3>::new(t408, t409, t410))
             }
             crate::Surface::Lower(0) => {
                 let t3 = X[1] * X[1];
@@ -1074,12 +1074,12 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t150 = self.fixed[11] * t147;
                 let t151 = t149 - t150;
                 let t158 = self.fixed[12] * t133;
-                let t413 = t64 * t67;
-                let t414 = t25 * t413;
-                let t415 = t414 * t151;
-                let t416 = t158 - t415;
-                let t417 = -t416;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t417, T::zero(), T::zero()))
+                let t411 = t64 * t67;
+                let t412 = t25 * t411;
+                let t413 = t412 * t151;
+                let t414 = t158 - t413;
+                let t415 = -t414;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t415, T::zero(), T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t3 = X[1] * X[1];
@@ -1127,12 +1127,12 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t150 = self.fixed[11] * t147;
                 let t151 = t149 - t150;
                 let t158 = self.fixed[12] * t133;
-                let t419 = t85 * t67;
-                let t420 = t25 * t419;
-                let t421 = t420 * t151;
-                let t422 = t158 - t421;
-                let t423 = -t422;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t423, T::zero()))
+                let t417 = t85 * t67;
+                let t418 = t25 * t417;
+                let t419 = t418 * t151;
+                let t420 = t158 - t419;
+                let t421 = -t420;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t421, T::zero()))
             }
             crate::Surface::Lower(2) => {
                 let t3 = X[1] * X[1];
@@ -1180,12 +1180,12 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t150 = self.fixed[11] * t147;
                 let t151 = t149 - t150;
                 let t158 = self.fixed[12] * t133;
-                let t424 = t96 * t67;
-                let t425 = t25 * t424;
-                let t426 = t425 * t151;
-                let t427 = t158 - t426;
-                let t428 = -t427;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t428))
+                let t422 = t96 * t67;
+                let t423 = t25 * t422;
+                let t424 = t423 * t151;
+                let t425 = t158 - t424;
+                let t426 = -t425;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t426))
             }
             _ => None,
         }
@@ -1261,8 +1261,8 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 5, 12> for SphereShell<T> {
         let t105 = self.fixed[8] * t18;
         let t122 = t18 * t18;
         let t222 = self.fixed[9] * t18;
-        let t430 = self.fixed[10] * t122;
-        [t18, t25, t105, t222, t430]
+        let t428 = self.fixed[10] * t122;
+        [t18, t25, t105, t222, t428]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 12] {
@@ -1342,9 +1342,9 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 5, 12> for SphereShell<T> {
         let t335 = t8 * t332;
         let t336 = self.fixed[22] * t335;
         let t344 = self.fixed[23] * t191;
-        let t347 = X[1] * t67;
-        let t348 = X[2] * t67;
-        [t26, t106, t124, t255, t256, t270, t310, t321, t336, t344, t347, t348]
+        let t345 = X[1] * t67;
+        let t346 = X[2] * t67;
+        [t26, t106, t124, t255, t256, t270, t310, t321, t336, t344, t345, t346]
     }
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
@@ -1356,34 +1356,31 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 5, 12> for SphereShell<T> {
         let t108 = t107 + T::one();
         let t109 = time[1] * point[0];
         let t110 = t109 + T::one();
-        let t111 = t110 * t110;
-        let t112 = t108 * t111;
         let t311 = time[0] * point[5];
         let t312 = point[6] + t311;
         let t337 = time[0] * t312;
-        let t345 = t108 * t108;
-        let t346 = t345 * t110;
-        let t429 = time[3] * point[0];
-        let t431 = time[4] * point[2];
-        let t432 = t429 + t431;
-        let t433 = t108 * t432;
-        let t434 = t433 + t107;
-        let t435 = t434.ln_of_both_if::<NEAR>(t112);
+        let t427 = time[3] * point[0];
+        let t429 = time[4] * point[2];
+        let t430 = t427 + t429;
+        let t431 = t108 * t430;
+        let t432 = t431 + t107;
+        let t433 = t108 * t110;
+        let t434 = t110 * t433;
+        let t435 = t432.ln_of_both_if::<NEAR>(t434);
         let t436 = point[7] * t435;
         let t437 = t337 + t436;
         let t438 = point[8] + t437;
         let t439 = time[0] * t438;
         let t440 = point[9] * t435;
         let t441 = t439 + t440;
-        let t442 = t441 / t346;
-        let t443 = t442 - point[4];
-        let t444 = time[0] * point[3];
-        let t445 = t444 * t443;
-        let t446 = time[0] * point[10];
-        let t447 = t446 * t443;
-        let t448 = time[0] * point[11];
-        let t449 = t448 * t443;
-        crate::nalgebra::SVector::<T, 3>::new(t445, t447, t449)
+        let t442 = t108 * t433;
+        let t443 = t441 / t442;
+        let t444 = t443 - point[4];
+        let t445 = time[0] * t444;
+        let t446 = point[3] * t445;
+        let t447 = point[10] * t445;
+        let t448 = point[11] * t445;
+        crate::nalgebra::SVector::<T, 3>::new(t446, t447, t448)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

@@ -39,7 +39,7 @@ impl<T: crate::Real> Default for TorsionParameters<T> {
 pub struct Torsion<T: crate::Real> {
     parameters: TorsionParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 15],
+    fixed: [T; 12],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Torsion<T> {
@@ -127,36 +127,16 @@ impl<T: crate::Real> Torsion<T> {
         let t90 = parameters.A / t74;
         let t94 = t10 * parameters.E;
         let t95 = t94 / parameters.rho0;
-        let t102 = T::nearest(2.0) / t6;
-        let t103 = T::nearest(2.0) * parameters.nu;
-        let t104 = T::one() - t103;
-        let t105 = parameters.E * parameters.nu;
-        let t106 = t74 * t104;
-        let t107 = t105 / t106;
-        let t108 = -T::nearest(0.5);
-        let t127 = t87 * t95;
-        let t130 = parameters.A * t87;
-        let t131 = t130 * t95;
-        let t137 = t90 * t95;
+        let t109 = T::nearest(2.0) / t6;
+        let t110 = T::nearest(2.0) * parameters.nu;
+        let t111 = T::one() - t110;
+        let t112 = parameters.E * parameters.nu;
+        let t113 = t74 * t111;
+        let t114 = t112 / t113;
+        let t115 = -T::nearest(0.5);
         Ok(Torsion {
             parameters,
-            fixed: [
-                t6,
-                t10,
-                t35,
-                t53,
-                t76,
-                t78,
-                t87,
-                t90,
-                t95,
-                t102,
-                t107,
-                t108,
-                t127,
-                t131,
-                t137,
-            ],
+            fixed: [t6, t10, t35, t53, t76, t78, t87, t90, t95, t109, t114, t115],
         })
     }
     /// The solution with parameter values in the order of the description; missing ones take their
@@ -587,8 +567,8 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
                 let t8 = t7.sin_pi();
                 let t79 = self.fixed[5] * t8;
                 let t86 = t79 * X[0];
-                let t109 = -t86;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t109))
+                let t116 = -t86;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t116))
             }
             crate::Surface::Upper(1) => {
                 let t7 = self.fixed[0] * t;
@@ -603,32 +583,32 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
                 let t79 = self.fixed[5] * t8;
                 let t84 = t79 * X[1];
                 let t86 = t79 * X[0];
-                let t109 = -t86;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t84, t109, T::zero()))
+                let t116 = -t86;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t84, t116, T::zero()))
             }
             crate::Surface::Upper(2) => {
                 let t7 = self.fixed[0] * t;
                 let t8 = t7.sin_pi();
                 let t11 = self.fixed[1] * t8;
                 let t79 = self.fixed[5] * t8;
-                let t110 = t11.cos();
-                let t111 = t11.sin();
-                let t112 = t110 * X[0];
-                let t113 = t111 * X[1];
-                let t114 = t112 - t113;
-                let t115 = t111 * t114;
-                let t116 = T::nearest(2.0) * t115;
-                let t117 = X[1] + t116;
-                let t118 = t79 * t117;
-                let t119 = -t118;
-                let t120 = t110 * X[1];
-                let t121 = t111 * X[0];
-                let t122 = t120 + t121;
-                let t123 = t111 * t122;
-                let t124 = T::nearest(2.0) * t123;
-                let t125 = X[0] - t124;
-                let t126 = t79 * t125;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t119, t126, T::zero()))
+                let t117 = t11.cos();
+                let t118 = t11.sin();
+                let t119 = t117 * X[0];
+                let t120 = t118 * X[1];
+                let t121 = t119 - t120;
+                let t122 = t118 * t121;
+                let t123 = T::nearest(2.0) * t122;
+                let t124 = X[1] + t123;
+                let t125 = t79 * t124;
+                let t126 = -t125;
+                let t127 = t117 * X[1];
+                let t128 = t118 * X[0];
+                let t129 = t127 + t128;
+                let t130 = t118 * t129;
+                let t131 = T::nearest(2.0) * t130;
+                let t132 = X[0] - t131;
+                let t133 = t79 * t132;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t126, t133, T::zero()))
             }
             _ => None,
         }
@@ -715,11 +695,10 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 3> for Torsion<T> {
         let t11 = self.fixed[1] * t8;
         let t31 = t7.cos_pi();
         let t46 = t31 * t31;
+        let t47 = self.parameters.A * t46;
         let t101 = t8 * t8;
-        let t128 = self.fixed[12] * t8;
-        let t132 = self.fixed[13] * t46;
-        let t138 = self.fixed[14] * t101;
-        [t11, t128, t132, t138]
+        let t102 = self.fixed[7] * t101;
+        [t8, t11, t47, t102]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 3] {
@@ -731,7 +710,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 3> for Torsion<T> {
         time: &[T; 4],
         point: &[T; 3],
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t12 = time[0] * point[0];
+        let t12 = time[1] * point[0];
         let t13 = t12.sin();
         let t16 = t12.cos();
         let t17 = point[1] * t13;
@@ -746,20 +725,23 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 3> for Torsion<T> {
         let t33 = t27 + t32;
         let t40 = t16 * t26;
         let t41 = t21 - t40;
-        let t129 = time[1] * t33;
-        let t133 = time[2] * point[0];
-        let t134 = t133 * t41;
-        let t135 = t129 + t134;
-        let t136 = point[0] * t135;
-        let t139 = time[3] * t41;
-        let t140 = t136 - t139;
-        let t141 = time[1] * t41;
-        let t142 = t133 * t33;
-        let t143 = t141 - t142;
-        let t144 = point[0] * t143;
-        let t145 = time[3] * t33;
-        let t146 = t144 + t145;
-        crate::nalgebra::SVector::<T, 3>::new(t140, t146, T::zero())
+        let t45 = time[0] * t33;
+        let t48 = time[2] * point[0];
+        let t49 = t48 * t41;
+        let t50 = t45 + t49;
+        let t56 = time[0] * t41;
+        let t57 = t48 * t33;
+        let t58 = t56 - t57;
+        let t88 = self.fixed[6] * point[0];
+        let t89 = t88 * t50;
+        let t97 = t88 * t58;
+        let t103 = time[3] * t41;
+        let t104 = t89 - t103;
+        let t105 = self.fixed[8] * t104;
+        let t106 = time[3] * t33;
+        let t107 = t97 + t106;
+        let t108 = self.fixed[8] * t107;
+        crate::nalgebra::SVector::<T, 3>::new(t105, t108, T::zero())
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

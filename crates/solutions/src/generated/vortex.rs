@@ -38,7 +38,7 @@ impl<T: crate::Real> Default for VortexParameters<T> {
 pub struct Vortex<T: crate::Real> {
     parameters: VortexParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 30],
+    fixed: [T; 27],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Vortex<T> {
@@ -137,21 +137,17 @@ impl<T: crate::Real> Vortex<T> {
         let t307 = T::nearest(32.0) / t146;
         let t312 = t80 / parameters.rho0;
         let t322 = T::nearest(2.0) / t5;
-        let t338 = T::nearest(2.0) * t92;
-        let t356 = T::nearest(2.0) * T::nearest(2.0);
-        let t366 = t356 * t92;
-        let t373 = t356 * t262;
-        let t389 = t148 * t295;
-        let t394 = t292 * t295;
-        let t397 = parameters.A * t4;
-        let t398 = t397 * t231;
-        let t402 = t4 * T::nearest(2.0);
-        let t403 = t402 * t231;
-        let t412 = t4 * t102;
-        let t413 = t412 * t235;
-        let t416 = t4 * t92;
-        let t417 = t416 * t235;
-        let t428 = t71 * t79;
+        let t335 = T::one() + T::nearest(2.0);
+        let t336 = t148 + t292;
+        let t361 = t295 * t336;
+        let t368 = t148 * t295;
+        let t381 = t292 * t295;
+        let t385 = parameters.A * t4;
+        let t386 = t385 * t231;
+        let t390 = t4 * T::nearest(2.0);
+        let t391 = t390 * t231;
+        let t413 = t4 * t235;
+        let t420 = t71 * t79;
         Ok(Vortex {
             parameters,
             fixed: [
@@ -174,17 +170,14 @@ impl<T: crate::Real> Vortex<T> {
                 t307,
                 t312,
                 t322,
-                t338,
-                t356,
-                t366,
-                t373,
-                t389,
-                t394,
-                t398,
-                t403,
+                t335,
+                t361,
+                t368,
+                t381,
+                t386,
+                t391,
                 t413,
-                t417,
-                t428,
+                t420,
             ],
         })
     }
@@ -1212,7 +1205,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 14, 4>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 9, 4>::new(*self, X))
     }
     fn state_at(
         &self,
@@ -1222,9 +1215,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 2, 14, 4> for Vortex<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 4> for Vortex<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 14] {
+    fn body_force_time(&self, t: T) -> [T; 9] {
         let t6 = self.fixed[1] * t;
         let t7 = t6.sin_pi();
         let t23 = self.fixed[2] * t7;
@@ -1234,31 +1227,11 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 14, 4> for Vortex<T> {
         let t205 = self.fixed[8] * t7;
         let t263 = self.fixed[13] * t7;
         let t308 = self.fixed[16] * t7;
-        let t339 = self.fixed[19] * t7;
-        let t367 = self.fixed[21] * t7;
-        let t374 = self.fixed[22] * t7;
-        let t399 = self.fixed[25] * t62;
-        let t404 = self.fixed[26] * t7;
-        let t414 = self.fixed[27] * t7;
-        let t418 = self.fixed[28] * t7;
-        let t426 = self.fixed[5] * t7;
-        let t429 = self.fixed[29] * t62;
-        [
-            t23,
-            t93,
-            t205,
-            t263,
-            t308,
-            t339,
-            t367,
-            t374,
-            t399,
-            t404,
-            t414,
-            t418,
-            t426,
-            t429,
-        ]
+        let t387 = self.fixed[23] * t62;
+        let t392 = self.fixed[24] * t7;
+        let t418 = self.fixed[5] * t7;
+        let t421 = self.fixed[26] * t62;
+        [t23, t93, t205, t263, t308, t387, t392, t418, t421]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 4] {
@@ -1273,7 +1246,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 14, 4> for Vortex<T> {
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
-        time: &[T; 14],
+        time: &[T; 9],
         point: &[T; 4],
     ) -> crate::nalgebra::SVector<T, 2> {
         let t15 = T::one() - point[2];
@@ -1288,13 +1261,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 14, 4> for Vortex<T> {
         let t43 = t26 * t26;
         let t44 = t42 - t43;
         let t46 = t25 * t26;
-        let t94 = point[2] * t15;
-        let t95 = t94 * t19;
-        let t96 = time[1] * t95;
-        let t97 = t96 * t26;
-        let t98 = t25 + t97;
-        let t152 = t25 * t98;
-        let t153 = T::nearest(2.0) * t152;
+        let t149 = T::nearest(2.0) * t46;
         let t155 = T::nearest(2.0) * t42;
         let t185 = T::nearest(2.0) * point[2];
         let t187 = T::nearest(3.0) * t15;
@@ -1306,30 +1273,30 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 14, 4> for Vortex<T> {
         let t193 = t26 * t192;
         let t194 = t190 * t21;
         let t195 = time[1] * t194;
+        let t196 = t195 * t25;
+        let t197 = t193 - t196;
         let t198 = t15 * t19;
-        let t206 = time[2] * t95;
-        let t207 = t206 * t26;
-        let t208 = t25 + t207;
-        let t209 = T::nearest(2.0) * t15;
-        let t210 = point[2] - t209;
-        let t211 = t19 * t210;
+        let t201 = t25 * t197;
         let t212 = T::nearest(32.0) * t190;
-        let t213 = t212 - t211;
-        let t214 = t26 * t213;
         let t215 = time[2] * t194;
         let t216 = t215 * t25;
-        let t217 = t214 - t216;
-        let t220 = t25 * t217;
         let t232 = point[2] * t21;
         let t241 = point[2] - t15;
         let t242 = t19 * t241;
         let t243 = t212 - t242;
         let t244 = t26 * t243;
+        let t245 = t244 - t196;
         let t246 = t25 * t243;
         let t247 = t195 * t26;
         let t248 = t246 + t247;
         let t249 = t198 * t44;
+        let t250 = t26 * t245;
         let t251 = t25 * t248;
+        let t252 = t249 - t250;
+        let t253 = t252 + t251;
+        let t254 = time[1] * t253;
+        let t264 = time[3] * t198;
+        let t265 = t264 * t46;
         let t298 = point[2] - t187;
         let t299 = t19 * t298;
         let t300 = t212 - t299;
@@ -1340,90 +1307,91 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 14, 4> for Vortex<T> {
         let t309 = time[4] * t304;
         let t313 = self.fixed[17] * point[1];
         let t318 = self.fixed[17] * point[0];
-        let t335 = t206 * t44;
-        let t336 = t46 - t335;
-        let t337 = t249 * t336;
-        let t340 = time[5] * t337;
-        let t341 = t194 * t25;
+        let t337 = point[2] * t198;
+        let t338 = time[2] * t337;
+        let t339 = t338 * t44;
+        let t340 = t46 - t339;
+        let t341 = T::nearest(2.0) * t340;
         let t342 = time[1] * t341;
-        let t343 = t244 - t342;
-        let t344 = t26 * t343;
-        let t345 = t249 - t344;
-        let t346 = t345 + t251;
-        let t347 = t46 * t346;
-        let t348 = time[5] * t347;
-        let t349 = t340 + t348;
-        let t350 = t198 * t26;
-        let t351 = t350 * t98;
-        let t352 = t193 - t342;
-        let t353 = t25 * t352;
-        let t354 = t351 + t353;
-        let t355 = t46 * t336;
-        let t357 = self.fixed[20] * t355;
-        let t358 = T::one() - t155;
-        let t359 = t153 * t358;
-        let t360 = t359 - t357;
-        let t361 = time[1] * t354;
-        let t362 = t361 * t360;
-        let t363 = t349 + t362;
-        let t364 = time[5] * t354;
-        let t365 = t364 * t358;
-        let t368 = time[6] * t337;
-        let t369 = t365 + t368;
-        let t370 = time[6] * t347;
-        let t371 = t369 + t370;
-        let t372 = t198 * t46;
-        let t375 = time[7] * t152;
-        let t376 = t375 * t372;
-        let t377 = t376 - t371;
-        let t378 = t152 * t377;
-        let t379 = t363 - t378;
-        let t380 = t153 * t360;
-        let t381 = self.fixed[20] * t152;
-        let t382 = T::nearest(2.0) - t381;
-        let t383 = t42 * t382;
-        let t384 = t383 - t357;
-        let t385 = t155 * t384;
-        let t386 = t385 - t380;
-        let t387 = point[3] * t386;
-        let t388 = t379 - t387;
-        let t390 = self.fixed[23] * t388;
-        let t391 = time[3] * t372;
-        let t392 = t391 * t384;
-        let t393 = t363 + t392;
-        let t395 = self.fixed[24] * t393;
-        let t396 = t390 + t395;
-        let t400 = time[8] * t21;
-        let t401 = t400 * t44;
-        let t405 = time[9] * t46;
-        let t406 = t401 + t405;
-        let t407 = t232 * t406;
-        let t408 = t350 * t208;
-        let t409 = t408 + t220;
-        let t410 = self.fixed[10] * t409;
-        let t411 = t354 + t410;
-        let t415 = time[10] * t411;
-        let t419 = time[11] * t95;
-        let t420 = t419 * point[3];
-        let t421 = t420 * t46;
-        let t422 = t415 + t421;
-        let t423 = t407 + t422;
-        let t424 = t396 + t423;
-        let t425 = point[0] * t424;
-        let t427 = time[12] * t44;
-        let t430 = time[13] * t21;
-        let t431 = t430 * t46;
-        let t432 = t427 - t431;
-        let t433 = t232 * t432;
-        let t434 = t433 + t309;
-        let t435 = t313 * t434;
-        let t436 = t425 - t435;
-        let t437 = point[3] * t436;
-        let t438 = point[1] * t424;
-        let t439 = t318 * t434;
-        let t440 = t438 + t439;
-        let t441 = point[3] * t440;
-        crate::nalgebra::SVector::<T, 2>::new(t437, t441)
+        let t343 = t342 * t249;
+        let t344 = t254 * t149;
+        let t345 = t343 + t344;
+        let t346 = time[1] * t337;
+        let t347 = t26 * t346;
+        let t348 = t25 + t347;
+        let t349 = t198 * t26;
+        let t350 = t348 * t349;
+        let t351 = t350 + t201;
+        let t352 = time[1] * t351;
+        let t353 = t149 * t341;
+        let t354 = T::nearest(2.0) * t25;
+        let t355 = t354 * t348;
+        let t356 = T::one() - t155;
+        let t357 = t355 * t356;
+        let t358 = t357 - t353;
+        let t359 = t352 * t358;
+        let t360 = t345 + t359;
+        let t362 = self.fixed[20] * t360;
+        let t363 = t352 * t356;
+        let t364 = t363 + t343;
+        let t365 = t364 + t344;
+        let t366 = t355 * t265;
+        let t367 = t366 - t365;
+        let t369 = self.fixed[21] * t355;
+        let t370 = t369 * t367;
+        let t371 = t362 - t370;
+        let t372 = t355 * t358;
+        let t373 = T::one() - t355;
+        let t374 = t155 * t373;
+        let t375 = t374 - t353;
+        let t376 = t155 * t375;
+        let t377 = t376 - t372;
+        let t378 = self.fixed[21] * point[3];
+        let t379 = t378 * t377;
+        let t380 = t371 - t379;
+        let t382 = self.fixed[22] * t265;
+        let t383 = t382 * t375;
+        let t384 = t380 + t383;
+        let t388 = time[5] * t21;
+        let t389 = t388 * t44;
+        let t393 = time[6] * t46;
+        let t394 = t389 + t393;
+        let t395 = t232 * t394;
+        let t396 = t338 * t26;
+        let t397 = t25 + t396;
+        let t398 = t397 * t349;
+        let t399 = self.fixed[19] * point[2];
+        let t400 = t399 - T::nearest(2.0);
+        let t401 = t19 * t400;
+        let t402 = t212 - t401;
+        let t403 = t402 * t26;
+        let t404 = t403 - t216;
+        let t405 = t25 * t404;
+        let t406 = t398 + t405;
+        let t407 = self.fixed[10] * t406;
+        let t408 = t351 + t407;
+        let t409 = time[2] * t408;
+        let t410 = point[3] * t46;
+        let t411 = t410 * t346;
+        let t412 = t409 + t411;
+        let t414 = self.fixed[25] * t412;
+        let t415 = t395 + t414;
+        let t416 = t384 + t415;
+        let t417 = point[0] * t416;
+        let t419 = time[7] * t44;
+        let t422 = time[8] * t21;
+        let t423 = t422 * t46;
+        let t424 = t419 - t423;
+        let t425 = t232 * t424;
+        let t426 = t425 + t309;
+        let t427 = t313 * t426;
+        let t428 = t417 - t427;
+        let t429 = point[3] * t428;
+        let t430 = point[1] * t416;
+        let t431 = t318 * t426;
+        let t432 = t430 + t431;
+        let t433 = point[3] * t432;
+        crate::nalgebra::SVector::<T, 2>::new(t429, t433)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
