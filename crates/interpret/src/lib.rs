@@ -166,7 +166,9 @@ impl<const D: usize> Interpreted<D> {
         let tractions = surfaces.iter().flat_map(|s| &s.traction).copied();
         let outputs: Vec<Expr> =
             parts.iter().flatten().copied().chain(fields.W).chain(tractions).collect();
-        let program = fields.program(&outputs);
+        let before_staged = parts[..8].iter().map(Vec::len).sum::<usize>();
+        let staged_places = before_staged..before_staged + parts[8].len();
+        let program = fields.program(&outputs).with_gathered_factors(staged_places);
         let mut slots = program.outputs().iter().copied();
         let mut take = |n: usize| slots.by_ref().take(n).collect::<Vec<Slot>>();
         let [u, v, a, H, F, J, P, b, staged] = parts.map(|part| take(part.len()));

@@ -145,7 +145,8 @@ impl<'a> Accuracy<'a> {
         let (inputs, definitions, b) = (&fields.inputs, &fields.definitions, &fields.b);
         let staged = arrange(&mut fields.graph, inputs, definitions, &mut Drafts::default(), b);
         programs.retain(|(letter, _)| *letter != "b staged");
-        programs.push(("b staged", fields.program(&staged)));
+        let staged = fields.program(&staged).with_gathered_factors(0..staged.len());
+        programs.push(("b staged", staged));
         programs
     }
 

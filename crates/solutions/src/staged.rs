@@ -308,10 +308,21 @@ where
                 let run = array::from_fn(|m| &picked[m]);
                 body_forces(solution, time, &run, &mut components);
             }
-            for (i, b) in b.iter_mut().enumerate() {
-                *b = SVector::from_fn(|d, _| components[d][i]);
+            // A whole run as a loop of fixed length, which needs no steps of single points.
+            if let Some(whole) = b.first_chunk_mut::<BLOCK>() {
+                put(&components, whole);
+            } else {
+                put(&components, b);
             }
         }
+    }
+}
+
+/// The vectors of the given components.
+#[inline(always)]
+fn put<T: Real, const D: usize>(components: &[[T; BLOCK]; D], b: &mut [SVector<T, D>]) {
+    for (i, b) in b.iter_mut().enumerate() {
+        *b = SVector::from_fn(|d, _| components[d][i]);
     }
 }
 

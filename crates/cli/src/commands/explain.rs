@@ -78,7 +78,7 @@ impl BodyForceCost {
     fn of(fields: &mut Fields) -> Self {
         let (inputs, definitions, b) = (&fields.inputs, &fields.definitions, &fields.b);
         let b = arrange(&mut fields.graph, inputs, definitions, &mut Drafts::default(), b);
-        let program: Program = fields.program(&b);
+        let program: Program = fields.program(&b).with_gathered_factors(0..b.len());
         let kept = program.kept_at_points(program.outputs(), usize::MAX);
         let count = program.operations_with_kept(program.outputs(), &kept);
         BodyForceCost {
