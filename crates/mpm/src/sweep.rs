@@ -256,7 +256,7 @@ impl<T: RealField + Copy, const D: usize> Receive<T, D> for Follow<'_, T, D> {
         *x = [xv.0[0], xv.0[1]];
         *v = [xv.0[2], xv.0[3]];
         let factor = vectors.splat(*per_cell);
-        let old = Quad(*F);
+        let old = vectors.load(F);
         let along = vectors.mul(vectors.low_twice(slope[0]), factor);
         let across = vectors.mul(vectors.low_twice(slope[D - 1]), factor);
         let stretch = vectors
