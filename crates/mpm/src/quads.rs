@@ -253,3 +253,120 @@ fn interpolate<T: RealField + Copy, V: Vectors, const D: usize, const W: usize>(
     let slope = vectors.mul_sub(last, G, vectors.mul(first, vectors.splat(weights.G(axis, 0))));
     (vectors.add(changes[1], vectors.sub(to_last, to_first)), slope)
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{SMatrix, SVector};
+    use proptest::prelude::*;
+    use pulp::Scalar;
+
+    use super::*;
+    use crate::transfer::{Gathered, gather, scatter};
+    use crate::weights::{AxisWeights, FixedBox, Hat, Rule, index};
+
+    const COUNT: usize = 24;
+    const SIDE: usize = 16;
+
+    /// The weights of one particle, as a rule states them.
+    struct Stated<const D: usize, const W: usize>([AxisWeights<f64, W>; D]);
+
+    impl<const D: usize, const W: usize> Weights<f64, D, W> for &Stated<D, W> {
+        fn first_node(&self) -> usize {
+            (0..D).map(|a| index(self.0[a].base) * SIDE.pow(a as u32)).sum()
+        }
+
+        fn S(&self, axis: usize, place: usize) -> f64 {
+            self.0[axis].S[place]
+        }
+
+        fn G(&self, axis: usize, place: usize) -> f64 {
+            self.0[axis].G[place]
+        }
+    }
+
+    /// Both ways to the grid and both ways back, for particles at places along a line of cells.
+    fn compare<R, const D: usize, const W: usize>(
+        rule: R,
+        places: &[f64],
+        numbers: &[f64],
+    ) -> Result<(), TestCaseError>
+    where
+        R: Rule<f64, D, W>,
+    {
+        let mut numbers = numbers.iter().copied().cycle();
+        let mut number = || numbers.next().unwrap_or(1.0);
+        let weights: Vec<Stated<D, W>> = places
+            .iter()
+            .map(|&place| {
+                let xi: [f64; D] = std::array::from_fn(|a| place / (a + 1) as f64);
+                Stated(std::array::from_fn(|a| R::along_axis(xi[a], rule.half_size(a, 1.0))))
+            })
+            .collect();
+        let strides: [usize; D] = std::array::from_fn(|a| SIDE.pow(a as u32));
+        let mut given = Deposits::<f64, D, COUNT>::zero();
+        for k in 0..COUNT {
+            let v = SVector::from_fn(|_, _| number());
+            given.level[k] =
+                Node::new(&v, &SVector::from_fn(|_, _| number()), 1.0 + number().abs());
+            given.traction[k] = SMatrix::from_fn(|_, _| number());
+        }
+        let mut nodes = vec![Node::zero(); SIDE.pow(D as u32)];
+        let mut one_by_one = nodes.clone();
+        let first = SIDE.pow(D as u32 - 1);
+        scatter_runs(
+            Scalar::new(),
+            |k| &weights[k],
+            &strides,
+            &mut nodes[first..],
+            first,
+            &given,
+            COUNT,
+        );
+        for k in 0..COUNT {
+            scatter(&&weights[k], &strides, &mut one_by_one[first..], first, (&given, k));
+        }
+        for (a, b) in nodes.iter().zip(&one_by_one) {
+            for (a, b) in a.values.iter().zip(&b.values) {
+                prop_assert!((a - b).abs() < 1e-13, "{a} {b}");
+            }
+        }
+        prop_assert!(nodes.iter().any(|node| node.mass() > 0.5));
+
+        let mut gathered = [Gathered::zero(); COUNT];
+        gather_runs(
+            Scalar::new(),
+            |k| &weights[k],
+            &strides,
+            &nodes,
+            COUNT,
+            &mut &mut gathered[..],
+        );
+        for (gathered, weights) in gathered.iter().zip(&weights) {
+            let alone = gather(&weights, &strides, &nodes);
+            prop_assert!((gathered.velocity - alone.velocity).amax() < 1e-13);
+            prop_assert!((gathered.acceleration - alone.acceleration).amax() < 1e-13);
+            prop_assert!((gathered.velocity_gradient - alone.velocity_gradient).amax() < 1e-13);
+        }
+        Ok(())
+    }
+
+    proptest! {
+        /// In runs that share their nodes, and particles that share them with nobody.
+        #[test]
+        fn runs_of_particles_exchange_what_each_would_alone(
+            places in prop::collection::vec(2.5..9.5, COUNT),
+            numbers in prop::collection::vec(-1.0..1.0, 31),
+            sort in any::<bool>(),
+            l in 0.05..0.5,
+        ) {
+            let mut places = places;
+            if sort {
+                places.sort_by(f64::total_cmp);
+            }
+            compare::<_, 1, 2>(Hat, &places, &numbers)?;
+            compare::<_, 2, 2>(Hat, &places, &numbers)?;
+            compare::<_, 1, 3>(FixedBox(SVector::repeat(l)), &places, &numbers)?;
+            compare::<_, 2, 3>(FixedBox(SVector::repeat(l)), &places, &numbers)?;
+        }
+    }
+}
