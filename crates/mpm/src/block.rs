@@ -368,28 +368,27 @@ impl<T: RealField + Copy, L: Law<T>, const D: usize> Loop for Stress<'_, T, L, D
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self { run: Run { F, .. }, c, law, deposits } = self;
-        let mut short = true;
-        for F in F {
-            short &= law.is_short(F);
-        }
-        if short {
-            tractions(c, F, deposits, |F| law.kirchhoff_short(F));
-        } else {
-            tractions(c, F, deposits, |F| law.kirchhoff(F));
+        if !tractions::<true, _, _, D>(c, law, F, deposits) {
+            tractions::<false, _, _, D>(c, law, F, deposits);
         }
     }
 }
 
-/// `-V0 tau / h` for all particles of a block.
+/// `-V0 tau / h` for all particles of a block, in the short way or not; whether that may be asked for all of them.
 #[inline(always)]
-fn tractions<T: RealField + Copy, const D: usize>(
+fn tractions<const SHORT: bool, T: RealField + Copy, L: Law<T>, const D: usize>(
     c: &Constants<T, D>,
+    law: L,
     F: &[SMatrix<T, D, D>; BLOCK],
     deposits: &mut Deposits<T, D, BLOCK>,
-    tau: impl Fn(&SMatrix<T, D, D>) -> SMatrix<T, D, D>,
-) {
+) -> bool {
+    let mut short = true;
     for k in 0..BLOCK {
-        let tau = c.planted.stress_in_forces(tau(&F[k]), &F[k]);
+        let F = &F[k];
+        short &= law.is_short(F);
+        let tau = if SHORT { law.kirchhoff_short(F) } else { law.kirchhoff(F) };
+        let tau = c.planted.stress_in_forces(tau, F);
         deposits.traction[k] = tau * -(deposits.volume[k] * c.inverse_spacing);
     }
+    short
 }
