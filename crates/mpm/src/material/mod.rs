@@ -231,13 +231,13 @@ pub(crate) trait Law<T: RealField + Copy>: Copy + Send + Sync + 'static {
     /// Kirchhoff stress.
     fn kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D>;
 
-    /// Whether [`kirchhoff_short`](Self::kirchhoff_short) may be asked for this F.
+    /// Whether [`kirchhoff_short`](Self::kirchhoff_short) is right for this F.
     #[inline(always)]
     fn is_short<const D: usize>(&self, _F: &SMatrix<T, D, D>) -> bool {
-        false
+        true
     }
 
-    /// The same Kirchhoff stress, to the last bit, in fewer operations.
+    /// The same Kirchhoff stress, to the last bit, in fewer operations, where those [do](Self::is_short).
     #[inline(always)]
     fn kirchhoff_short<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         self.kirchhoff(F)
