@@ -5,4 +5,5 @@ mod general;
 mod mechanics;
 mod order;
 mod ring;
+mod state;
 mod total_lagrangian;
