@@ -484,7 +484,8 @@ where
 {
     let J = determinant(F);
     let l = SVector::<T, D>::from_fn(|a, _| rule.half_size(a, F[(a, a)]));
-    if J > T::zero() && c.axis_outside(x).is_none() && axis_too_large(&l).is_none() {
+    let is_deformation = J > T::zero() && J.is_finite();
+    if is_deformation && c.axis_outside(x).is_none() && axis_too_large(&l).is_none() {
         return None;
     }
     Some(if J <= T::zero() {

@@ -1,0 +1,331 @@
+//! What a state has to be to be simulated, up to the limits, and which particle a failed step names, with which figures.
+
+#![allow(clippy::unwrap_used)]
+
+use mmsmith_mpm::general::{self, Body, General, Transfer};
+use mmsmith_mpm::{
+    Grid, Integrator, Material, NoBodyForce, Particles, Settings, SetupError, Shape, Simulation,
+    StepError,
+};
+use nalgebra::{SMatrix, SVector};
+
+const SOFT: Material<f64> = Material::NeoHookean { lambda: 60.0, mu: 40.0 };
+const INTEGRATORS: [Integrator; 4] =
+    [Integrator::Usf, Integrator::Usl, Integrator::Musl, Integrator::Cd];
+
+/// Of binary fractions, and with axes that differ.
+fn grid<const D: usize>() -> Grid<f64, D> {
+    Grid {
+        lower: SVector::from_fn(|a, _| [-0.5, 0.25, 1.0][a]),
+        spacing: 0.25,
+        cells: std::array::from_fn(|a| 4 + a),
+        walls: [[false; 2]; D],
+    }
+}
+
+fn fast(shape: Shape, integrator: Integrator, time_step: f64) -> Settings<f64> {
+    Settings { shape, integrator, time_step, halve_first_acceleration: false }
+}
+
+/// The errors of the fast and of the general simulation, if any, for the initial state of a body.
+fn refusals<const D: usize>(
+    body: &Body<D>,
+    shape: general::Shape,
+) -> impl Iterator<Item = Option<StepError>> {
+    let settings = general::Settings {
+        shape,
+        integrator: general::Integrator::Cd,
+        transfer: Transfer::Flip,
+        time_step: 1e-3,
+        halve_first_acceleration: false,
+    };
+    let general = General::new(grid(), body.clone(), SOFT, settings).err();
+    let fast = shape.of_fast_step().map(|shape| {
+        let mut particles = body.particles.clone();
+        particles.half_size = body.half_edges[0].diagonal();
+        Simulation::new(grid(), particles, SOFT, fast(shape, Integrator::Cd, 1e-3)).err()
+    });
+    [general].into_iter().chain(fast).map(|error| {
+        error.map(|error| match error {
+            SetupError::InitialState(error) => error,
+            other => panic!("{other}"),
+        })
+    })
+}
+
+#[test]
+fn initial_states_are_admitted_up_to_the_limits() {
+    fn check<const D: usize>() {
+        use general::Shape;
+        let grid = grid::<D>();
+        let fine = Body::lattice(&grid, 1, 2.0, |_| true);
+        let particle = fine.particles.len() / 2;
+        let (step, time) = (0, 0.0);
+        let of = |shape: Shape, change: &dyn Fn(&mut Body<D>), expected: Option<&StepError>| {
+            let mut body = fine.clone();
+            change(&mut body);
+            for found in refusals(&body, shape) {
+                assert_eq!(found.as_ref(), expected, "{D} {shape:?}");
+            }
+        };
+        for axis in 0..D {
+            let (lower, upper) = (grid.lower[axis], grid.upper()[axis]);
+            let shapes = [Shape::Linear, Shape::Ugimp, Shape::Gimp, Shape::Bspline3, Shape::Cpdi];
+            for shape in shapes {
+                for (on, beyond) in
+                    [(lower, lower.next_down()), (upper, upper.next_up()), (upper, upper + 9.0)]
+                {
+                    let put =
+                        |x: f64| move |body: &mut Body<D>| body.particles.x[particle][axis] = x;
+                    of(shape, &put(on), None);
+                    let mut position: Vec<f64> =
+                        fine.particles.x[particle].iter().copied().collect();
+                    position[axis] = beyond;
+                    let error =
+                        StepError::LeftGrid { step, time, particle, position, axis, lower, upper };
+                    of(shape, &put(beyond), Some(&error));
+                }
+                let stretch = |by: f64| {
+                    move |body: &mut Body<D>| body.particles.F[particle][(axis, axis)] = by
+                };
+                for J in [0.0, -0.5] {
+                    let error = StepError::Inverted { step, time, particle, J };
+                    of(shape, &stretch(J), Some(&error));
+                }
+                of(shape, &stretch(1e-9), None);
+                // Half of a box is half a cell; two cells are the limit.
+                let limit = 0.5;
+                let too_large = |half_size: f64| StepError::TooLarge {
+                    step,
+                    time,
+                    particle,
+                    axis,
+                    half_size,
+                    limit,
+                };
+                of(shape, &stretch(4.0), None);
+                let stretches = matches!(shape, Shape::Gimp | Shape::Cpdi);
+                let error = too_large(0.125 * 4.5);
+                of(shape, &stretch(4.5), stretches.then_some(&error));
+            }
+            let size = |half: f64| {
+                move |body: &mut Body<D>| {
+                    body.half_edges.iter_mut().for_each(|E| E[(axis, axis)] = half);
+                }
+            };
+            for shape in [Shape::Ugimp, Shape::Gimp, Shape::Cpdi] {
+                of(shape, &size(0.5), None);
+                let (half_size, limit, particle) = (0.5625, 0.5, 0);
+                let error = StepError::TooLarge { step, time, particle, axis, half_size, limit };
+                of(shape, &size(0.5625), Some(&error));
+            }
+        }
+    }
+    check::<1>();
+    check::<2>();
+    check::<3>();
+}
+
+#[test]
+fn what_is_not_finite_is_refused_with_its_position() {
+    let body = Body::lattice(&grid::<2>(), 1, 2.0, |_| true);
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let mut moved = body.clone();
+        moved.particles.x[3][1] = bad;
+        let mut stretched = body.clone();
+        stretched.particles.F[3][(0, 0)] = bad;
+        for shape in [general::Shape::Gimp, general::Shape::Linear, general::Shape::Cpdi] {
+            for error in refusals(&moved, shape) {
+                let Some(StepError::NotFinite { step: 0, particle: 3, position, J, .. }) = error
+                else {
+                    panic!("{shape:?} {error:?}")
+                };
+                assert_eq!((position[0].to_bits(), J), (body.particles.x[3][0].to_bits(), 1.0));
+                assert!(position[1].is_nan() == bad.is_nan() && !position[1].is_finite());
+            }
+            for error in refusals(&stretched, shape) {
+                match error {
+                    Some(StepError::NotFinite { particle: 3, J, .. }) if bad.is_nan() => {
+                        assert!(J.is_nan());
+                    }
+                    Some(StepError::NotFinite { particle: 3, J, .. }) => assert_eq!(J, bad),
+                    Some(StepError::Inverted { particle: 3, J, .. }) => {
+                        assert!(J == bad && bad < 0.0, "{J} {bad}");
+                    }
+                    error => panic!("{shape:?} {bad} {error:?}"),
+                }
+            }
+        }
+    }
+}
+
+/// Where one particle is inverted others may follow, so that it is the one to name; of those alike the first.
+#[test]
+fn of_several_particles_the_one_in_the_worst_trouble_is_named() {
+    let mut body = Body::lattice(&grid::<2>(), 1, 2.0, |_| true);
+    let settings = general::Settings {
+        shape: general::Shape::Gimp,
+        integrator: general::Integrator::Cd,
+        transfer: Transfer::Flip,
+        time_step: 1e-3,
+        halve_first_acceleration: false,
+    };
+    let mut expect = |change: &dyn Fn(&mut Particles<f64, 2>), is: &dyn Fn(&StepError) -> bool| {
+        change(&mut body.particles);
+        let error = General::new(grid(), body.clone(), SOFT, settings).unwrap_err();
+        let SetupError::InitialState(error) = error else { panic!("{error}") };
+        assert!(is(&error), "{error}");
+    };
+    expect(&|p| p.F[11][(1, 1)] = 7.0, &|error| {
+        matches!(error, StepError::TooLarge { particle: 11, axis: 1, .. })
+    });
+    expect(&|p| p.F[10][(0, 0)] = 7.0, &|error| {
+        matches!(error, StepError::TooLarge { particle: 10, axis: 0, .. })
+    });
+    expect(&|p| p.x[12][0] = 9.0, &|error| {
+        matches!(error, StepError::LeftGrid { particle: 12, axis: 0, .. })
+    });
+    expect(&|p| p.x[13][0] = f64::NAN, &|error| {
+        matches!(error, StepError::NotFinite { particle: 13, .. })
+    });
+    expect(&|p| p.F[14][(0, 0)] = -1.0, &|error| {
+        matches!(error, StepError::Inverted { particle: 14, J: -1.0, .. })
+    });
+    expect(&|p| p.F[9][(0, 0)] = -2.0, &|error| {
+        matches!(error, StepError::Inverted { particle: 9, J: -2.0, .. })
+    });
+}
+
+/// A body of so many particles that they are handed out in several portions, most of which no failure touches.
+fn long<const D: usize>(
+    shape: Shape,
+    integrator: Integrator,
+) -> (Grid<f64, D>, Particles<f64, D>, Settings<f64>) {
+    let mut cells = [3; D];
+    cells[D - 1] = [600, 150, 40][D - 1];
+    let grid = Grid { lower: SVector::zeros(), spacing: 1.0, cells, walls: [[false; 2]; D] };
+    let particles = Particles::lattice(&grid, 2, 2.0, |_| true);
+    (grid, particles, fast(shape, integrator, 0.125))
+}
+
+#[test]
+fn a_failed_step_names_the_first_particle_that_left_the_grid() {
+    fn check<const D: usize>() {
+        for shape in [Shape::Linear, Shape::Gimp] {
+            for integrator in INTEGRATORS {
+                for side in [1.0, -1.0] {
+                    let (grid, mut particles, settings) = long::<D>(shape, integrator);
+                    particles.v.iter_mut().for_each(|v| v[D - 1] = side);
+                    let mut run = Simulation::new(grid.clone(), particles, SOFT, settings).unwrap();
+                    let error = (0..10).find_map(|_| run.step(&NoBodyForce).err()).unwrap();
+                    let p = run.particles();
+                    let upper = grid.upper()[D - 1];
+                    let is_out = |x: &SVector<f64, D>| !(0.0..=upper).contains(&x[D - 1]);
+                    let particle = p.x.iter().position(is_out).unwrap();
+                    let position = p.x[particle].iter().copied().collect();
+                    let axis = D - 1;
+                    // A quarter of a cell to go, of which a step takes an eighth.
+                    let (step, time, lower) = (3, 0.375, 0.0);
+                    let expected =
+                        StepError::LeftGrid { step, time, particle, position, axis, lower, upper };
+                    assert_eq!(error, expected, "{shape:?} {integrator:?}");
+                    assert!(side < 0.0 || particle > 1100, "{particle}");
+                    assert_eq!(run.steps_done(), 2);
+                }
+            }
+        }
+    }
+    check::<1>();
+    check::<2>();
+    check::<3>();
+}
+
+#[test]
+fn a_failed_step_names_the_first_particle_that_is_turned_inside_out() {
+    fn check<const D: usize>() {
+        for shape in [Shape::Linear, Shape::Gimp] {
+            for integrator in INTEGRATORS {
+                let (grid, mut particles, settings) = long::<D>(shape, integrator);
+                let far = 0.95 * grid.upper()[D - 1];
+                for (v, X) in particles.v.iter_mut().zip(&particles.X) {
+                    v[D - 1] = (far - X[D - 1]).min(0.0) * 10.0;
+                }
+                let mut run = Simulation::new(grid, particles, SOFT, settings).unwrap();
+                let error = run.step(&NoBodyForce).unwrap_err();
+                let p = run.particles();
+                let particle = p.F.iter().position(|F| F[(D - 1, D - 1)] <= 0.0).unwrap();
+                // Nothing is stretched across.
+                let J = p.F[particle][(D - 1, D - 1)];
+                let StepError::Inverted { step: 1, time: 0.125, particle: named, J: found } = error
+                else {
+                    panic!("{shape:?} {integrator:?} {error}")
+                };
+                assert_eq!(named, particle, "{shape:?} {integrator:?}");
+                assert!((found - J).abs() < 1e-15 * J.abs().max(1.0));
+                assert!(p.X[particle][D - 1] > far - 2.0 && particle > 1100);
+                // Nothing follows from a stress that there is not.
+                assert!(p.x.iter().chain(&p.v).all(|x| x.iter().all(|x| x.is_finite())));
+                assert_eq!(run.step(&NoBodyForce), Err(error));
+            }
+        }
+    }
+    check::<1>();
+    check::<2>();
+    check::<3>();
+}
+
+#[test]
+fn what_is_not_finite_is_named_before_what_left_the_grid() {
+    for integrator in INTEGRATORS {
+        let (grid, mut particles, settings) = long::<2>(Shape::Gimp, integrator);
+        particles.v.iter_mut().for_each(|v| v[0] = 1.0);
+        let hit = particles.X.iter().position(|X| X[1] > 100.0).unwrap();
+        let place = particles.X[hit];
+        let force = |X: &[SVector<f64, 2>], t: f64, b: &mut [SVector<f64, 2>]| {
+            for (X, b) in X.iter().zip(b) {
+                *b = SVector::repeat(if *X == place && t >= 0.25 { f64::NAN } else { 0.0 });
+            }
+        };
+        let mut run = Simulation::new(grid, particles, SOFT, settings).unwrap();
+        let error = (0..10).find_map(|_| run.step(&force).err()).unwrap();
+        // Particles that leave the grid in the same step come before.
+        let p = run.particles();
+        assert!((0..hit / 2).any(|k| p.x[k][0] > 3.0));
+        let is_nan = |k: &usize| p.x[*k].sum().is_nan() || p.F[*k].sum().is_nan();
+        let first = (0..p.len()).find(is_nan).unwrap();
+        let StepError::NotFinite { step: 3, time: 0.375, particle, J, .. } = error else {
+            panic!("{integrator:?} {error}")
+        };
+        assert_eq!(particle, first);
+        assert!(J.is_nan() == p.F[first].determinant().is_nan(), "{integrator:?} {J}");
+    }
+}
+
+#[test]
+fn a_box_that_grows_too_wide_is_named_with_its_size() {
+    fn check<const D: usize>(axis: usize) {
+        for integrator in INTEGRATORS {
+            let grid = Grid { cells: [36; D], ..grid::<D>() };
+            let middle = (grid.lower + grid.upper()) * 0.5;
+            let mut particles = Particles::lattice(&grid, 2, 2.0, |X| (X - middle).amax() < 0.5);
+            for (v, X) in particles.v.iter_mut().zip(&particles.X) {
+                v[axis] = (X - middle)[axis] * 50.0;
+            }
+            let settings = fast(Shape::Gimp, integrator, 0.02);
+            let softest = Material::NeoHookean { lambda: 0.06, mu: 0.04 };
+            let mut run = Simulation::new(grid, particles, softest, settings).unwrap();
+            let error = (0..20).find_map(|_| run.step(&NoBodyForce).err()).unwrap();
+            let p = run.particles();
+            let of = |F: &SMatrix<f64, D, D>| F[(axis, axis)] * 0.0625;
+            let particle = p.F.iter().position(|F| of(F) > 0.5).unwrap();
+            let step = run.steps_done() + 1;
+            let (time, half_size, limit) = (0.02 * step as f64, of(&p.F[particle]), 0.5);
+            let expected = StepError::TooLarge { step, time, particle, axis, half_size, limit };
+            assert_eq!(error, expected, "{D} {integrator:?}");
+        }
+    }
+    check::<1>(0);
+    check::<2>(0);
+    check::<2>(1);
+    check::<3>(2);
+}
