@@ -329,3 +329,153 @@ fn a_box_that_grows_too_wide_is_named_with_its_size() {
     check::<2>(1);
     check::<3>(2);
 }
+
+type Change<'a> = &'a dyn Fn(&mut Grid<f64, 2>, &mut Body<2>, &mut f64);
+
+/// What both simulations answer to a change of a sound scene.
+fn answers(shape: general::Shape, change: Change) -> Vec<Option<SetupError>> {
+    let (mut grid, mut time_step) = (grid::<2>(), 1e-3);
+    let mut body = Body::lattice(&grid, 2, 2.0, |_| true);
+    change(&mut grid, &mut body, &mut time_step);
+    let settings = general::Settings {
+        shape,
+        integrator: general::Integrator::Usl,
+        transfer: Transfer::Apic,
+        time_step,
+        halve_first_acceleration: false,
+    };
+    let mut particles = body.particles.clone();
+    if let Some(E) = body.half_edges.first() {
+        particles.half_size = E.diagonal();
+    }
+    let mut answers = Vec::new();
+    if let Some(shape) = shape.of_fast_step() {
+        let settings = fast(shape, Integrator::Usl, time_step);
+        answers.push(Simulation::new(grid.clone(), particles, SOFT, settings).err());
+    }
+    answers.push(General::new(grid, body, SOFT, settings).err());
+    answers
+}
+
+#[test]
+fn what_has_to_be_positive_and_finite_is_named() {
+    use general::Shape;
+    let refused = |shape: Shape, change: Change, parts: &[&str], value: f64| {
+        for answer in answers(shape, change) {
+            let Some(SetupError::NotPositive { quantity, value: found }) = &answer else {
+                panic!("{parts:?} {value}: {answer:?}")
+            };
+            assert!(parts.iter().all(|part| quantity.contains(part)), "{quantity} {parts:?}");
+            assert!(*found == value || found.is_nan() && value.is_nan());
+        }
+    };
+    for bad in [0.0, -0.0, -1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        for shape in [Shape::Linear, Shape::Gimp, Shape::Cpdi, Shape::Cpdi2] {
+            refused(shape, &|_, _, time_step| *time_step = bad, &["the time step"], bad);
+            refused(shape, &|grid, _, _| grid.spacing = bad, &["spacing"], bad);
+            let mass: Change = &|_, body, _| body.particles.mass[5] = bad;
+            refused(shape, mass, &["mass", "particle 5"], bad);
+            let volume: Change = &|_, body, _| body.particles.volume[3] = bad;
+            refused(shape, volume, &["volume", "particle 3"], bad);
+        }
+        let flat: Change = &|_, body, _| body.half_edges[0][(1, 1)] = bad;
+        for shape in [Shape::Ugimp, Shape::Gimp] {
+            refused(shape, flat, &["half-size", "axis 1"], bad);
+        }
+        for shape in [Shape::Linear, Shape::Bspline2, Shape::Bspline3] {
+            assert!(answers(shape, flat).iter().all(Option::is_none), "a point has no size");
+        }
+        if bad.is_finite() {
+            refused(Shape::Cpdi, flat, &["domain", "particle 0"], bad * 0.0625);
+        }
+    }
+    for small in [f64::MIN_POSITIVE, 1e-9] {
+        let soft: Change = &|_, _, time_step| *time_step = small;
+        assert!(answers(Shape::Gimp, soft).iter().all(Option::is_none));
+    }
+}
+
+#[test]
+fn what_has_to_be_finite_is_named() {
+    use general::Shape;
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        for shape in [Shape::Linear, Shape::Gimp, Shape::Cpdi, Shape::Cpdi2] {
+            let cases: [(&str, Change); 2] = [
+                ("the velocity of particle 7", &|_, body, _| body.particles.v[7][1] = bad),
+                ("the reference position of particle 2", &|_, body, _| {
+                    body.particles.X[2][0] = bad;
+                }),
+            ];
+            for (expected, change) in cases {
+                for answer in answers(shape, change) {
+                    let quantity = expected.to_string();
+                    assert_eq!(answer, Some(SetupError::NotFinite { quantity }));
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn arrays_of_another_length_are_named() {
+    use general::Shape;
+    // Four by five cells.
+    let expected = 80;
+    let cases: [(&str, Change); 7] = [
+        ("x", &|_, body, _| body.particles.x.truncate(79)),
+        ("v", &|_, body, _| body.particles.v.truncate(79)),
+        ("F", &|_, body, _| body.particles.F.truncate(79)),
+        ("mass", &|_, body, _| body.particles.mass.truncate(79)),
+        ("volume", &|_, body, _| body.particles.volume.truncate(79)),
+        ("half_edges", &|_, body, _| body.half_edges.truncate(79)),
+        ("corners", &|_, body, _| body.mesh.as_mut().unwrap().corners.truncate(79)),
+    ];
+    for (array, change) in cases {
+        // Only the general simulation has the last two.
+        for answer in answers(Shape::Cpdi2, change) {
+            assert_eq!(answer, Some(SetupError::LengthMismatch { array, found: 79, expected }));
+        }
+        for answer in answers(Shape::Gimp, change).iter().flatten() {
+            assert!(matches!(answer, SetupError::LengthMismatch { found: 79, .. }), "{answer}");
+        }
+        let count = answers(Shape::Gimp, change).iter().flatten().count();
+        assert_eq!(count, if array.len() > 6 { 1 } else { 2 }, "{array}");
+    }
+}
+
+/// No machine has so much; the figures are those of the nodes, nine more than cells along each axis.
+#[test]
+fn a_grid_beyond_memory_is_refused_with_the_bytes_it_needs() {
+    fn check<const D: usize>(cells: [usize; D], of_node: u128) {
+        let body = Body::lattice(&grid::<D>(), 1, 2.0, |_| true);
+        let large = Grid { cells, ..grid::<D>() };
+        let nodes: u128 = cells.iter().map(|&n| n as u128 + 9).product();
+        let settings = general::Settings {
+            shape: general::Shape::Gimp,
+            integrator: general::Integrator::Usl,
+            transfer: Transfer::Flip,
+            time_step: 1e-3,
+            halve_first_acceleration: false,
+        };
+        let error = General::new(large.clone(), body.clone(), SOFT, settings).unwrap_err();
+        // A mass and four vectors.
+        let bytes = nodes * (8 + 4 * 8 * D as u128);
+        assert_eq!(error, SetupError::GridTooLarge { cells: cells.to_vec(), bytes });
+        for integrator in INTEGRATORS {
+            let mut particles = body.particles.clone();
+            particles.half_size = SVector::repeat(0.125);
+            let settings = fast(Shape::Gimp, integrator, 1e-3);
+            let error = Simulation::new(large.clone(), particles, SOFT, settings).unwrap_err();
+            let grids = if integrator == Integrator::Usf { 1 } else { 2 };
+            let bytes = nodes * of_node * grids;
+            assert_eq!(error, SetupError::GridTooLarge { cells: cells.to_vec(), bytes });
+        }
+    }
+    check([1 << 22, 1 << 22], 64);
+    check([1 << 17, 1 << 16, 1 << 17], 64);
+    // Beyond what can be addressed, in bytes and in nodes, and beyond what can be numbered.
+    check([1 << 20, 1 << 20, 1 << 20], 64);
+    check([1 << 20, 1 << 22, 1 << 22], 64);
+    check([4, 1 << 31], 64);
+    check([usize::MAX >> 20], 64);
+}
