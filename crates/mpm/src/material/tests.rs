@@ -115,7 +115,7 @@ fn check_side_by_side<T: RealField + Copy, const D: usize>(all: &[Matrix3<f64>])
 
 #[test]
 fn stresses_side_by_side_are_those_of_single_particles() {
-    // Near inversion, next to the identity, inside out, and no numbers at all among ordinary ones.
+    // Near inversion, next to the identity, flat, inside out, and no numbers at all among ordinary ones.
     let all: Vec<Matrix3<f64>> = (0..60)
         .map(|n| {
             let H = |i: usize, j: usize| {
@@ -124,6 +124,8 @@ fn stresses_side_by_side_are_those_of_single_particles() {
             let scale = [0.4, 1e-9, 0.7, 1.5][n as usize % 4];
             let mut F = Matrix3::from_fn(|i, j| f64::from(u8::from(i == j)) + scale * H(i, j));
             match n % 10 {
+                5 => F.column_mut(0).fill(0.0),
+                6 => F[(0, 0)] = f64::INFINITY,
                 7 => F[(0, 0)] = f64::NAN,
                 8 => F.column_mut(0).scale_mut(1e-7),
                 9 => F.column_mut(0).neg_mut(),
