@@ -292,3 +292,35 @@ fn what_is_no_deformation_has_no_stress() {
         }
     }
 }
+
+#[test]
+fn the_short_way_to_the_stress_is_taken_near_volumes_as_they_were_and_has_the_same_bits() {
+    fn check<const D: usize>() {
+        let law = NeoHookean { lambda: 5.77, mu: 3.85, planted: Planted::here() };
+        let (mut short, mut long) = (0, 0);
+        for n in 1..400 {
+            // J grows evenly from next to nothing to four.
+            let J = f64::from(n) * 0.01;
+            let mut F = SMatrix::<f64, D, D>::from_fn(|i, j| match (i, j) {
+                (0, 0) => J,
+                _ => f64::from(u8::from(i == j)),
+            });
+            if D > 1 {
+                F[(0, D - 1)] = 0.3;
+            }
+            let expected = (0.5_f64.sqrt()..2.0_f64.sqrt()).contains(&J);
+            assert_eq!(law.is_short(&F), expected, "{J}");
+            if expected {
+                assert_eq!(law.kirchhoff_short(&F), law.kirchhoff(&F), "{J}");
+                short += 1;
+            } else {
+                long += 1;
+            }
+            assert!(!AnyLaw(LAWS[0]).is_short(&F) && !NeoHookeanNoLog { mu: 1.0 }.is_short(&F));
+        }
+        assert!(short > 60 && long > 300);
+    }
+    check::<1>();
+    check::<2>();
+    check::<3>();
+}
