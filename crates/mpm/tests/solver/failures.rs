@@ -479,3 +479,112 @@ fn a_grid_beyond_memory_is_refused_with_the_bytes_it_needs() {
     check([4, 1 << 31], 64);
     check([usize::MAX >> 20], 64);
 }
+
+#[test]
+fn a_failed_step_of_the_general_simulation_names_the_first_particle_that_left_the_grid() {
+    use general::Shape;
+    fn check<const D: usize>(shape: Shape) {
+        for axis in 0..D {
+            for side in [1.0, -1.0] {
+                let grid = grid::<D>();
+                let mut body = Body::lattice(&grid, 2, 2.0, |_| true);
+                body.particles.v.iter_mut().for_each(|v| v[axis] = side);
+                let settings = general::Settings {
+                    shape,
+                    integrator: general::Integrator::Usl,
+                    transfer: Transfer::Flip,
+                    time_step: 1.0 / 32.0,
+                    halve_first_acceleration: false,
+                };
+                let mut run = General::new(grid.clone(), body, SOFT, settings).unwrap();
+                let error = (0..10).find_map(|_| run.step(&NoBodyForce).err()).unwrap();
+                let (lower, upper) = (grid.lower[axis], grid.upper()[axis]);
+                let is_out = |x: &SVector<f64, D>| !(lower..=upper).contains(&x[axis]);
+                let particle = run.particles().x.iter().position(is_out).unwrap();
+                let position = run.particles().x[particle].iter().copied().collect();
+                // A sixteenth to go, of which a step takes a half.
+                let (step, time) = (3, 3.0 / 32.0);
+                let expected =
+                    StepError::LeftGrid { step, time, particle, position, axis, lower, upper };
+                assert_eq!(error, expected, "{D} {shape:?}");
+                assert_eq!((run.steps_done(), run.time()), (2, 2.0 / 32.0));
+                assert_eq!(run.step(&NoBodyForce), Err(error));
+            }
+        }
+    }
+    for shape in [Shape::Linear, Shape::Gimp, Shape::Bspline2, Shape::Cpdi] {
+        check::<1>(shape);
+        check::<2>(shape);
+        check::<3>(shape);
+    }
+    check::<1>(Shape::Cpdi2);
+    check::<2>(Shape::Cpdi2);
+}
+
+/// Domains between corners have a volume of their own, whatever F is.
+#[test]
+fn domains_between_corners_are_admitted_up_to_the_limits() {
+    let grid = grid::<2>();
+    let settings = general::Settings {
+        shape: general::Shape::Cpdi2,
+        integrator: general::Integrator::Usl,
+        transfer: Transfer::Flip,
+        time_step: 1e-3,
+        halve_first_acceleration: false,
+    };
+    let particle = 2;
+    let of = |change: &dyn Fn(&mut [SVector<f64, 2>])| {
+        let mut body = Body::lattice(&grid, 1, 2.0, |_| true);
+        let mesh = body.mesh.as_mut().unwrap();
+        // A domain that shares no corner.
+        let own = mesh.corners[particle].map(|k| mesh.X[k]);
+        mesh.corners[particle] = std::array::from_fn(|k| mesh.X.len() + k);
+        mesh.X.extend(own);
+        mesh.x.extend(own);
+        let first = mesh.x.len() - 4;
+        change(&mut mesh.x[first..]);
+        General::new(grid.clone(), body, SOFT, settings).err()
+    };
+    assert_eq!(of(&|_| {}), None);
+    let (step, time, limit) = (0, 0.0, 0.5);
+    for axis in 0..2 {
+        // From the particle, in the middle of its cell, two cells are the limit.
+        for (away, admitted) in [(0.375, true), (0.375 + 1e-9, false)] {
+            for corners in [[0, 3], [1, 2]] {
+                let error = of(&|x| {
+                    let sign = if corners[0] == 0 { -1.0 } else { 1.0 };
+                    for k in if axis == 0 { corners } else { [corners[0] * 2, corners[0] * 2 + 1] }
+                    {
+                        x[k][axis] += sign * away;
+                    }
+                });
+                let is_wide = |error: &SetupError| {
+                    matches!(error, SetupError::InitialState(StepError::TooLarge {
+                        step: 0, particle: 2, axis: found, half_size, limit: 0.5, ..
+                    }) if *found == axis && *half_size > limit && *half_size < limit + 1e-8)
+                };
+                assert!(error.as_ref().map_or(admitted, |e| !admitted && is_wide(e)), "{error:?}");
+            }
+        }
+    }
+    // Its area in its reference area.
+    for (height, J) in [(0.0, 0.0), (-0.5, -0.5), (-3.0, -3.0)] {
+        let error = of(&|x| {
+            for (low, high) in [(0, 3), (1, 2)] {
+                x[high][1] = x[low][1] + 0.25 * height;
+            }
+        });
+        let inverted = StepError::Inverted { step, time, particle, J };
+        assert_eq!(error, Some(SetupError::InitialState(inverted)));
+    }
+    for bad in [f64::NAN, f64::INFINITY] {
+        let error = of(&|x| x[1][0] = bad);
+        assert!(
+            matches!(
+                error,
+                Some(SetupError::InitialState(StepError::NotFinite { particle: 2, .. }))
+            ),
+            "{error:?}"
+        );
+    }
+}
