@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use mmsmith_mpm::general::{self, Body, General, Transfer};
+use mmsmith_mpm::general::{self, Annulus, Body, General, Transfer};
 use mmsmith_mpm::{
     Grid, Integrator, Material, NoBodyForce, Particles, Settings, SetupError, Shape, Simulation,
     StepError,
@@ -587,4 +587,31 @@ fn domains_between_corners_are_admitted_up_to_the_limits() {
             "{error:?}"
         );
     }
+}
+
+#[test]
+fn rings_that_are_none_are_refused() {
+    let of = |inner: f64, outer: f64, spacing: f64, density: f64| {
+        let ring = Annulus { inner, outer, quarter: true };
+        Body::<2>::annulus(&ring, spacing, 2, density).err()
+    };
+    assert_eq!(of(0.4, 0.6, 0.1, 2.0), None);
+    for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let answers = [
+            ("the inner radius", bad, of(bad, bad + 1.0, 0.1, 2.0)),
+            ("the width of the ring", bad, of(0.5, 0.5 + bad, 0.1, 2.0)),
+            ("the spacing", bad, of(0.4, 0.6, bad, 2.0)),
+            ("the density", bad, of(0.4, 0.6, 0.1, bad)),
+        ];
+        for (expected, value, answer) in answers {
+            let Some(SetupError::NotPositive { quantity, value: found }) = answer else {
+                panic!("{expected} {value}: {answer:?}")
+            };
+            assert_eq!(quantity, expected);
+            assert!(found == value || found.is_nan() && value.is_nan());
+        }
+    }
+    let ring = Annulus { inner: 0.4, outer: 0.6, quarter: true };
+    let error = Body::<3>::annulus(&ring, 0.1, 2, 1.0).err();
+    assert_eq!(error, Some(SetupError::PolarDimension { dimension: 3 }));
 }
