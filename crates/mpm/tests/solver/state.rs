@@ -4,9 +4,12 @@
 
 use mmsmith_mpm::general::{self, Body, General, Transfer};
 use mmsmith_mpm::total_lagrangian::{
-    self as total, Axis, Composition, Coordinates, End, Layout, MassMatrix, Scheme, TotalLagrangian,
+    self as total, Axis, BoundaryData, Composition, Coordinates, End, HeldBoundary, Layout,
+    MassMatrix, Quantity, Scheme, Side, TotalLagrangian,
 };
-use mmsmith_mpm::{Grid, Integrator, Material, Particles, Settings, Shape, Simulation};
+use mmsmith_mpm::{
+    BodyForce, Grid, Integrator, Material, NoBodyForce, Particles, Settings, Shape, Simulation,
+};
 use nalgebra::{SMatrix, SVector};
 
 /// Sizes of the units in which lengths, times and masses are given: powers of two, so that nothing is rounded in another way.
@@ -313,4 +316,73 @@ fn results_in_other_units_are_the_same_to_the_bit() {
             are_same(units, &run(units), &there, &format!("{scene:?}"));
         }
     }
+}
+
+#[test]
+fn runs_tell_what_they_were_set_up_with_and_how_far_they_are() {
+    let force = ONE.body_force::<2>();
+    for settings in fast_schemes() {
+        let particles = body::<2>().particles;
+        let mut run =
+            Simulation::new(ONE.grid(), particles, ONE.material::<2>(), settings).unwrap();
+        (0..3).for_each(|_| run.step(&force).unwrap());
+        assert_eq!((run.grid(), run.settings()), (&ONE.grid(), &settings));
+        assert_eq!(run.material(), &ONE.material::<2>());
+        let lag = if settings.integrator == Integrator::Cd { 1.0 / 1024.0 } else { 0.0 };
+        assert_eq!((run.velocity_lag(), run.time(), run.steps_done()), (lag, 3.0 / 512.0, 3));
+        let printed = format!("{run:?}");
+        let shape = format!("{:?}", settings.shape);
+        for part in ["steps_done: 3", "failed: None", "NeoHookean", &shape] {
+            assert!(printed.contains(part), "{printed}");
+        }
+    }
+    for settings in general_schemes() {
+        let mut run = General::new(ONE.grid(), body(), ONE.material::<2>(), settings).unwrap();
+        (0..3).for_each(|_| run.step(&force).unwrap());
+        assert_eq!((run.grid(), run.settings()), (&ONE.grid(), &settings));
+        assert_eq!(run.material(), &ONE.material::<2>());
+        let centred = settings.integrator == general::Integrator::Cd;
+        let lag = if centred { 1.0 / 1024.0 } else { 0.0 };
+        assert_eq!((run.velocity_lag(), run.time(), run.steps_done()), (lag, 3.0 / 512.0, 3));
+        let has_corners = settings.shape == general::Shape::Cpdi2;
+        assert_eq!(run.body().mesh.is_some(), has_corners, "nothing would move them");
+    }
+    for scene in total_scenes() {
+        let mut run = total_scene(ONE, scene);
+        (0..3).for_each(|_| run.step(&force).unwrap());
+        assert_eq!((run.grid().coordinates, run.scheme()), (scene.0, scene.2));
+        assert_eq!(run.material(), &ONE.material::<2>());
+        assert_eq!((run.time(), run.steps_done()), (3.0 / 512.0, 3));
+    }
+    let names = [Transfer::Flip, Transfer::Pic, Transfer::Apic, Transfer::Xpic(5)];
+    assert_eq!(names.map(|transfer| transfer.to_string()), ["flip", "pic", "apic", "xpic5"]);
+}
+
+/// They are asked for numbers like any other force or motion.
+#[test]
+fn no_force_and_held_sides_are_zero_whatever_was_there_before() {
+    const NONE: [SVector<f64, 2>; 4] = [SVector::<f64, 2>::new(0.0, 0.0); 4];
+    let there = [SVector::<f64, 2>::repeat(3.0); 4];
+    let mut values = there;
+    NoBodyForce.evaluate(0, &there, 1.0, &mut values);
+    assert_eq!(values, NONE);
+    assert!(BodyForce::<f64, 2>::is_absent(&NoBodyForce));
+    values = there;
+    NoBodyForce.evaluate_of(&[2, 0, 3, 1], &there, 1.0, &mut values);
+    assert_eq!(values, NONE);
+    let one = ONE.body_force::<2>();
+    assert!(!BodyForce::<f64, 2>::is_absent(&one));
+    for of in
+        [Quantity::Displacement, Quantity::Velocity, Quantity::Acceleration, Quantity::Traction]
+    {
+        values = there;
+        HeldBoundary.evaluate(of, Side { axis: 1, upper: true }, &there, 1.0, &mut values);
+        assert_eq!(values, NONE);
+    }
+    // One by one at the particles that are named.
+    let X: Vec<_> = (0..5).map(|k| SVector::<f64, 2>::repeat(f64::from(k))).collect();
+    let (mut all, mut some) = ([SVector::zeros(); 5], [SVector::zeros(); 3]);
+    one.evaluate(0, &X, 0.5, &mut all);
+    one.evaluate_of(&[4, 0, 2], &X, 0.5, &mut some);
+    assert_eq!(some, [all[4], all[0], all[2]]);
 }
