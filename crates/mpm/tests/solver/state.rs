@@ -351,6 +351,8 @@ fn runs_tell_what_they_were_set_up_with_and_how_far_they_are() {
         let mut run = total_scene(ONE, scene);
         (0..3).for_each(|_| run.step(&force).unwrap());
         assert_eq!((run.grid().coordinates, run.scheme()), (scene.0, scene.2));
+        // Four particles in each of four cells, along half a unit and along one.
+        assert_eq!(run.particles().half_size.as_slice(), [1.0 / 64.0, 1.0 / 32.0]);
         assert_eq!(run.material(), &ONE.material::<2>());
         assert_eq!((run.time(), run.steps_done()), (3.0 / 512.0, 3));
     }
