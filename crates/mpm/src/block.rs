@@ -6,12 +6,12 @@ use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::fault::{Fault, Planted};
 use crate::material::Law;
-use crate::quads::{gather_quads, scatter_runs};
+use crate::quads::{gather_runs, scatter_runs};
 use crate::simd::{Loop, Vectors, dispatch};
 use crate::step::Constants;
 use crate::tensor::real;
-use crate::transfer::{Deposits, Gathered, Node, Receive, Weights, gather, scatter};
-use crate::weights::{Rule, WideWeights, is_wide};
+use crate::transfer::{Deposits, Gathered, Node, Receive, Weights, gather, is_middle, scatter};
+use crate::weights::{Rule, WideWeights, index, is_wide};
 
 /// Particles in a block: as many as keep all of it in the first-level cache.
 pub(crate) const BLOCK: usize = 64;
@@ -88,27 +88,29 @@ impl<T: RealField + Copy, const D: usize> Copies<T, D> {
 /// What comes out of one loop is used by another only after all of the block went through the first: vector loads wait
 /// for the narrower stores that they overlap.
 pub(crate) struct Block<T, const D: usize, const W: usize> {
-    /// Positions in cells, from the lower corner.
-    xi: [Row<T>; D],
-    /// Half-sizes in cells.
-    l: [Row<T>; D],
-    /// Whether any particle's box takes more nodes than the rule's usual ones.
-    any_wide: bool,
-    base: [Row<i32>; D],
+    /// Index of the first node of every particle.
+    first_node: [usize; BLOCK],
+    /// Weights, but for those of the [middle node](is_middle).
     S: [[Row<T>; W]; D],
     G: [[Row<T>; W]; D],
+    /// Whether any particle's box takes more nodes than the rule's usual ones.
+    any_wide: bool,
+    /// Positions in cells, from the lower corner; kept up where boxes are wide.
+    xi: [Row<T>; D],
+    /// Half-sizes in cells; kept up where boxes are wide.
+    l: [Row<T>; D],
 }
 
 impl<T: RealField + Copy, const D: usize, const W: usize> Block<T, D, W> {
     pub(crate) fn new() -> Self {
         let zero = [T::zero(); BLOCK];
         Self {
-            xi: [zero; D],
-            l: [zero; D],
-            any_wide: false,
-            base: [[0; BLOCK]; D],
+            first_node: [0; BLOCK],
             S: [[zero; W]; D],
             G: [[zero; W]; D],
+            any_wide: false,
+            xi: [zero; D],
+            l: [zero; D],
         }
     }
 
@@ -120,12 +122,23 @@ impl<T: RealField + Copy, const D: usize, const W: usize> Block<T, D, W> {
         run: Run<'_, T, D>,
     ) {
         dispatch(Weigh { block: self, c, rule, run });
+        if self.any_wide {
+            for k in 0..BLOCK {
+                let xi = c.in_cells(&run.x[k]);
+                for a in 0..D {
+                    self.xi[a][k] = xi[a];
+                    self.l[a][k] = rule.half_size(a, stretch(c.planted, &run.F[k], a));
+                }
+            }
+        }
     }
 
     /// A planted fault: particles in the last cell of an axis forget the last node they reach along it.
-    pub(crate) fn skip_last_node(&mut self, upper: &[T; D]) {
-        for a in 0..D {
-            for k in (0..BLOCK).filter(|&k| self.xi[a][k] >= upper[a] - T::one()) {
+    pub(crate) fn skip_last_node(&mut self, c: &Constants<T, D>, x: &[SVector<T, D>; BLOCK]) {
+        let upper = c.upper_in_cells();
+        for (k, x) in x.iter().enumerate() {
+            let xi = c.in_cells(x);
+            for a in (0..D).filter(|&a| xi[a] >= upper[a] - T::one()) {
                 (self.S[a][W - 1][k], self.G[a][W - 1][k]) = (T::zero(), T::zero());
             }
         }
@@ -171,18 +184,26 @@ struct Lane<'a, T, const D: usize, const W: usize> {
 
 impl<T: RealField + Copy, const D: usize, const W: usize> Weights<T, D, W> for Lane<'_, T, D, W> {
     #[inline(always)]
-    fn base(&self, axis: usize) -> usize {
-        self.block.base[axis][self.k] as usize
+    fn first_node(&self) -> usize {
+        self.block.first_node[self.k]
     }
 
     #[inline(always)]
     fn S(&self, axis: usize, place: usize) -> T {
-        self.block.S[axis][place][self.k]
+        let S = &self.block.S[axis];
+        if is_middle::<W>(place) {
+            return T::one() - S[place - 1][self.k] - S[place + 1][self.k];
+        }
+        S[place][self.k]
     }
 
     #[inline(always)]
     fn G(&self, axis: usize, place: usize) -> T {
-        self.block.G[axis][place][self.k]
+        let G = &self.block.G[axis];
+        if is_middle::<W>(place) {
+            return -G[place - 1][self.k] - G[place + 1][self.k];
+        }
+        G[place][self.k]
     }
 }
 
@@ -214,35 +235,47 @@ where
 {
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
-        let Self { block, c, rule, run } = self;
-        // All components at once: a loop over some of them would have to leave out its last particles, lest it read beyond
-        // the array.
-        for k in 0..BLOCK {
-            let xi = c.in_cells(&run.x[k]);
-            for a in 0..D {
-                block.xi[a][k] = xi[a];
-            }
-        }
-        let mut any_wide = false;
-        for k in 0..BLOCK {
-            for a in 0..D {
-                let l = rule.half_size(a, stretch(c.planted, &run.F[k], a));
-                any_wide |= is_wide(l);
-                block.l[a][k] = l;
-            }
-        }
-        block.any_wide = any_wide;
+        let Self { block, c, rule, run: Run { x, F } } = self;
+        let Block { first_node, S, G, .. } = block;
+        block.any_wide = weigh(c, rule, x, F, first_node, S, G);
+    }
+}
+
+/// Computes weights, and tells whether any box is wide. As a function of its own, which tells the compiler that the arrays
+/// are in different places.
+#[inline(always)]
+fn weigh<T, R, const D: usize, const W: usize>(
+    c: &Constants<T, D>,
+    rule: R,
+    x: &[SVector<T, D>; BLOCK],
+    F: &[SMatrix<T, D, D>; BLOCK],
+    first_node: &mut [usize; BLOCK],
+    S: &mut [[Row<T>; W]; D],
+    G: &mut [[Row<T>; W]; D],
+) -> bool
+where
+    T: RealField + Copy,
+    R: Rule<T, D, W>,
+{
+    let mut any_wide = false;
+    for k in 0..BLOCK {
+        let xi = c.in_cells(&x[k]);
+        let mut first = 0.0;
         for a in 0..D {
-            for k in 0..BLOCK {
-                let weights = R::along_axis(block.xi[a][k], block.l[a][k]);
-                block.base[a][k] = weights.base;
-                for i in 0..W {
-                    block.S[a][i][k] = weights.S[i];
-                    block.G[a][i][k] = weights.G[i];
+            let l = rule.half_size(a, stretch(c.planted, &F[k], a));
+            any_wide |= is_wide(l);
+            let weights = R::along_axis(xi[a], l);
+            first += weights.base * c.strides[a] as f64;
+            for i in 0..W {
+                if !is_middle::<W>(i) {
+                    S[a][i][k] = weights.S[i];
+                    G[a][i][k] = weights.G[i];
                 }
             }
         }
+        first_node[k] = index(first);
     }
+    any_wide
 }
 
 struct Scatter<'a, T, const D: usize, const W: usize> {
@@ -282,7 +315,7 @@ fn scatter_wide<T: RealField + Copy, const D: usize>(
     first: usize,
     deposit: (&Deposits<T, D, BLOCK>, usize),
 ) {
-    scatter(&WideWeights::new(xi, l), strides, piece, first, deposit);
+    scatter(&WideWeights::new(xi, l, strides), strides, piece, first, deposit);
 }
 
 struct Gather<'a, T, A, const D: usize, const W: usize> {
@@ -301,14 +334,7 @@ impl<T: RealField + Copy, A: Receive<T, D>, const D: usize, const W: usize> Loop
         let Self { block, strides, nodes, count, mut receiver } = self;
         let count = count.min(BLOCK);
         if D <= 2 && W <= 3 && !block.any_wide {
-            for k in 0..count {
-                let lane = Lane { block, k };
-                let Some((level, slope)) = gather_quads(vectors, &lane, strides, nodes) else {
-                    debug_assert!(false, "a stencil beyond the grid");
-                    return;
-                };
-                receiver.receive_quads(vectors, k, level, slope);
-            }
+            gather_runs(vectors, |k| Lane { block, k }, strides, nodes, count, &mut receiver);
             return;
         }
         for k in 0..count {
@@ -328,7 +354,7 @@ fn gather_wide<T: RealField + Copy, const D: usize>(
     strides: &[usize; D],
     nodes: &[Node<T, D>],
 ) -> Gathered<T, D> {
-    gather(&WideWeights::new(xi, l), strides, nodes)
+    gather(&WideWeights::new(xi, l, strides), strides, nodes)
 }
 
 struct Stress<'a, T, L, const D: usize> {

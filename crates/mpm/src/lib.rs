@@ -62,6 +62,7 @@ mod material;
 mod parallel;
 mod particles;
 mod partition;
+mod prefetch;
 mod quads;
 mod simd;
 mod simulation;

@@ -28,6 +28,12 @@ pub(crate) trait Vectors: Copy {
         Quad([value; 4])
     }
 
+    /// Four numbers as they lie in memory. The compiler reads what is only copied from there in whatever pieces its uses suggest.
+    #[inline(always)]
+    fn load<T: RealField + Copy>(self, values: &[T; 4]) -> Quad<T> {
+        Quad(*values)
+    }
+
     #[inline(always)]
     fn add<T: RealField + Copy>(self, Quad(a): Quad<T>, Quad(b): Quad<T>) -> Quad<T> {
         Quad([a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]])
@@ -106,7 +112,8 @@ impl Vectors for Scalar {}
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use super::{Quad, RealField, Scalar, Vectors, same};
+    use super::{Any, Quad, RealField, Scalar, Vectors, same};
+    use bytemuck::{AnyBitPattern, NoUninit, bytes_of, pod_read_unaligned};
     use pulp::x86::{V3, V4};
     use std::arch::x86_64::{__m128, __m256d};
     use zerocopy::transmute;
@@ -127,6 +134,13 @@ mod x86 {
                 })*
 
                 #[inline(always)]
+                fn load<T: RealField + Copy>(self, values: &[T; 4]) -> Quad<T> {
+                    let double = at::<_, [f64; 4], __m256d>(values).and_then(from_double);
+                    let single = at::<_, [f32; 4], __m128>(values).and_then(from_single);
+                    double.or(single).unwrap_or(Quad(*values))
+                }
+
+                #[inline(always)]
                 fn splat<T: RealField + Copy>(self, value: T) -> Quad<T> {
                     let double = same(value).and_then(|x: f64| from_double(self.avx._mm256_set1_pd(x)));
                     let single = same(value).and_then(|x: f32| from_single(self.sse._mm_set1_ps(x)));
@@ -139,6 +153,11 @@ mod x86 {
                 fn $name<T: RealField + Copy>(self, $($a: Quad<T>),*) -> Quad<T> {
                     V3::$name(*self, $($a),*)
                 })*
+
+                #[inline(always)]
+                fn load<T: RealField + Copy>(self, values: &[T; 4]) -> Quad<T> {
+                    V3::load(*self, values)
+                }
 
                 #[inline(always)]
                 fn splat<T: RealField + Copy>(self, value: T) -> Quad<T> {
@@ -171,6 +190,12 @@ mod x86 {
             self.avx._mm256_permute2f128_pd::<0x21>(a, b),
             self.sse._mm_shuffle_ps::<0b01_00_11_10>(a, b)
         }
+    }
+
+    /// A register with what lies there, if that is of type `B`.
+    #[inline(always)]
+    fn at<A: 'static, B: NoUninit + 'static, R: AnyBitPattern>(a: &A) -> Option<R> {
+        (a as &dyn Any).downcast_ref::<B>().map(|b| pod_read_unaligned(bytes_of(b)))
     }
 
     #[inline(always)]
@@ -313,6 +338,7 @@ mod tests {
         let (a, b, c) = (quad(2.0), quad(11.0), quad(20.0));
         [
             vectors.splat(a.0[1]),
+            vectors.load(&b.0),
             vectors.add(a, b),
             vectors.sub(a, b),
             vectors.mul(a, b),

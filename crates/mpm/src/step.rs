@@ -149,7 +149,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
             copies.pick(ids, x, F);
             block.weigh(self, rule, copies.run());
             if self.planted.is(Fault::LastNodeSkipped) {
-                block.skip_last_node(&self.upper_in_cells());
+                block.skip_last_node(self, &copies.x);
             }
             state(&mut copies, ids, &mut deposits);
             block.scatter(&self.strides, piece, first, &deposits, ids.len());
@@ -529,7 +529,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         self.bands.sort(&self.layout, &|p| {
             let xi = c.in_cells(&x[p]);
             let layer = |a| first_layer(xi[a], rule.half_size(a, F[p][(a, a)]));
-            (0..D).map(|a| layer(a) as usize * c.strides[a]).sum()
+            (0..D).map(|a| layer(a) * c.strides[a]).sum()
         });
     }
 

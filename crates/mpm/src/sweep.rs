@@ -13,6 +13,7 @@ use crate::fault::Fault;
 use crate::material::Law;
 use crate::particles::Particles;
 use crate::partition::Share;
+use crate::prefetch::prefetch;
 use crate::simd::{Quad, Vectors, dispatch};
 use crate::step::{Check, Constants, Forcing, Found, Outcome, State, fold_ghosts};
 use crate::transfer::{Deposits, Gathered, Node, Receive};
@@ -180,7 +181,7 @@ impl<T: RealField + Copy, R, L: Law<T>, const D: usize> Sweep<'_, T, R, L, D> {
             }
         }
         if c.planted.is(Fault::LastNodeSkipped) {
-            block.skip_last_node(&c.upper_in_cells());
+            block.skip_last_node(c, x);
         }
         Run { x, F }.stress(c, law, deposits);
         block.scatter(&c.strides, piece, first, deposits, ids.len());
@@ -239,6 +240,9 @@ impl<T: RealField + Copy, const D: usize> Receive<T, D> for Follow<'_, T, D> {
             self.receive(k, &Gathered::new(&level.0, &slope.map(|slope| slope.0)));
             return;
         }
+        prefetch(&self.x[k], BLOCK);
+        prefetch(&self.v[k], BLOCK);
+        prefetch(&self.F[k], BLOCK);
         let Self { time_step, per_cell, deposits, .. } = self;
         let (Some(x), Some(v), Some(F)) = (
             self.x[k].as_mut_slice().first_chunk_mut::<2>(),
@@ -252,7 +256,7 @@ impl<T: RealField + Copy, const D: usize> Receive<T, D> for Follow<'_, T, D> {
         *x = [xv.0[0], xv.0[1]];
         *v = [xv.0[2], xv.0[3]];
         let factor = vectors.splat(*per_cell);
-        let old = Quad(*F);
+        let old = vectors.load(F);
         let along = vectors.mul(vectors.low_twice(slope[0]), factor);
         let across = vectors.mul(vectors.low_twice(slope[D - 1]), factor);
         let stretch = vectors

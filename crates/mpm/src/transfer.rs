@@ -225,12 +225,19 @@ impl<T: RealField + Copy, const D: usize, const N: usize> Deposits<T, D, N> {
 
 /// The weights of one particle, wherever they are kept.
 pub(crate) trait Weights<T, const D: usize, const W: usize> {
-    /// Index of the first node along an axis.
-    fn base(&self, axis: usize) -> usize;
+    /// Index of the first node.
+    fn first_node(&self) -> usize;
     /// Weight of a node, by its place along an axis.
     fn S(&self, axis: usize, place: usize) -> T;
     /// Gradient of the weight.
     fn G(&self, axis: usize, place: usize) -> T;
+}
+
+/// Whether a node, by its place along an axis, is the middle one of three: it takes what the outer two leave, as all weights add
+/// up to one and their gradients to zero.
+#[inline(always)]
+pub(crate) const fn is_middle<const W: usize>(place: usize) -> bool {
+    W == 3 && place == 1
 }
 
 /// One row of nodes along axis 0: the weights of all other axes multiplied.
@@ -276,19 +283,6 @@ pub(crate) fn row<T: RealField + Copy, const D: usize, const W: usize>(
     row
 }
 
-/// Index of a particle's first node.
-#[inline(always)]
-pub(crate) fn first_node<T, const D: usize, const W: usize>(
-    weights: &impl Weights<T, D, W>,
-    strides: &[usize; D],
-) -> usize {
-    let mut first = 0;
-    for a in 0..D {
-        first += weights.base(a) * strides[a];
-    }
-    first
-}
-
 /// What a particle gives to a row of nodes along axis 0: `level S + slope G` with the weights along that axis.
 #[inline(always)]
 fn given_to_row<T: RealField + Copy, const D: usize>(
@@ -324,7 +318,7 @@ pub(crate) fn scatter<T: RealField + Copy, const D: usize, const W: usize, const
     first: usize,
     (given, k): (&Deposits<T, D, N>, usize),
 ) {
-    let start = first_node(weights, strides) - first;
+    let start = weights.first_node() - first;
     let level = &given.level[k].values;
     let slope = given.slopes(k);
     for index in 0..rows::<D, W>() {
@@ -392,7 +386,7 @@ pub(crate) fn gather<T: RealField + Copy, const D: usize, const W: usize>(
     nodes: &[Node<T, D>],
 ) -> Gathered<T, D> {
     let mut sums = Interpolated::zero();
-    let start = first_node(weights, strides);
+    let start = weights.first_node();
     for index in 0..rows::<D, W>() {
         let row = row(weights, start, strides, index);
         let Some(nodes) = nodes.get(row.start..).and_then(|n| n.first_chunk::<W>()) else {

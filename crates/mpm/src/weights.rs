@@ -17,35 +17,49 @@ pub(crate) const WIDE: usize = 6;
 /// Weights and gradients at `W` successive nodes of one axis.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AxisWeights<T, const W: usize> {
-    /// Index of the first node, counted in the padded grid.
-    pub(crate) base: i32,
+    /// Index of the first node, counted in the padded grid: a whole number, and as a double one of those that go through
+    /// vector instructions.
+    pub(crate) base: f64,
     pub(crate) S: [T; W],
     pub(crate) G: [T; W],
 }
 
 /// The weights of a particle whose box is wide along some axis.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct WideWeights<T, const D: usize>([AxisWeights<T, WIDE>; D]);
+pub(crate) struct WideWeights<T, const D: usize> {
+    axes: [AxisWeights<T, WIDE>; D],
+    first_node: usize,
+}
 
 impl<T: RealField + Copy, const D: usize> WideWeights<T, D> {
     #[inline(never)]
-    pub(crate) fn new(xi: &[T; D], l: &[T; D]) -> Self {
-        Self(std::array::from_fn(|a| wide_axis(xi[a], l[a])))
+    pub(crate) fn new(xi: &[T; D], l: &[T; D], strides: &[usize; D]) -> Self {
+        let axes = wide_axes(xi, l);
+        let first_node = (0..D).map(|a| axes[a].base as usize * strides[a]).sum();
+        Self { axes, first_node }
     }
 }
 
 impl<T: RealField + Copy, const D: usize> Weights<T, D, WIDE> for WideWeights<T, D> {
-    fn base(&self, axis: usize) -> usize {
-        self.0[axis].base as usize
+    fn first_node(&self) -> usize {
+        self.first_node
     }
 
     fn S(&self, axis: usize, place: usize) -> T {
-        self.0[axis].S[place]
+        self.axes[axis].S[place]
     }
 
     fn G(&self, axis: usize, place: usize) -> T {
-        self.0[axis].G[place]
+        self.axes[axis].G[place]
     }
+}
+
+/// The weights along all axes of a box that may be wide.
+pub(crate) fn wide_axes<T: RealField + Copy, const D: usize>(
+    xi: &[T; D],
+    l: &[T; D],
+) -> [AxisWeights<T, WIDE>; D] {
+    std::array::from_fn(|a| wide_axis(xi[a], l[a]))
 }
 
 /// A kind of weights; `W` is the number of nodes per axis that it usually needs.
@@ -118,24 +132,33 @@ pub(crate) fn is_wide<T: RealField + Copy>(l: T) -> bool {
     l > real(0.5)
 }
 
+/// From here on doubles are whole numbers, with those in their last 52 bits.
+const WHOLE: f64 = 4_503_599_627_370_496.0;
+
+/// The index that a double is, for one from zero up to [`WHOLE`].
+///
+/// Processors without instructions for whole numbers of 64 bits turn many into one side by side all the same.
+#[inline(always)]
+pub(crate) fn index(whole: f64) -> usize {
+    ((whole + WHOLE).to_bits() & (WHOLE as u64 - 1)) as usize
+}
+
 /// Index in the padded grid of the node below `s`, and that node's position. Callers have seen to it that
 /// `s >= -PAD_BELOW`.
 ///
-/// Sums alone, which processors of any age do side by side; rounding down and whole numbers of 64 bits are not.
+/// Sums alone, which processors of any age do side by side; rounding down is not.
 #[inline(always)]
-fn node_below<T: RealField + Copy>(s: T) -> (i32, T) {
-    /// From here on doubles are whole numbers, with those in their last bits.
-    const WHOLE: f64 = 4_503_599_627_370_496.0;
+fn node_below<T: RealField + Copy>(s: T) -> (f64, T) {
     let padded = nalgebra::convert_unchecked::<T, f64>(s + real(PAD_BELOW as f64));
     let nearest = (padded + WHOLE) - WHOLE;
     let below = if nearest > padded { nearest - 1.0 } else { nearest };
-    ((below + WHOLE).to_bits() as i32, real(below - PAD_BELOW as f64))
+    (below, real(below - PAD_BELOW as f64))
 }
 
 /// Index of the first node along an axis, as in the weights.
 #[inline(always)]
-pub(crate) fn first_layer<T: RealField + Copy>(xi: T, l: T) -> i32 {
-    node_below(xi - l).0
+pub(crate) fn first_layer<T: RealField + Copy>(xi: T, l: T) -> usize {
+    index(node_below(xi - l).0)
 }
 
 /// GIMP weights along one axis for `0 < l <= 1/2`.
@@ -187,7 +210,7 @@ mod tests {
 
     /// Weight and gradient of every node of one axis, by its position.
     fn spread<const W: usize>(w: &AxisWeights<f64, W>) -> Vec<(f64, f64, f64)> {
-        (0..W).map(|k| (w.base as f64 + k as f64 - PAD_BELOW as f64, w.S[k], w.G[k])).collect()
+        (0..W).map(|k| (w.base + k as f64 - PAD_BELOW as f64, w.S[k], w.G[k])).collect()
     }
 
     fn at(spread: &[(f64, f64, f64)], node: f64) -> (f64, f64) {
@@ -248,8 +271,8 @@ mod tests {
         /// Particles are sorted by the band of the node at which their weights begin.
         #[test]
         fn the_first_layer_is_that_of_the_weights(xi in 0.0..20.0_f64, l in 1e-3..0.5_f64) {
-            prop_assert_eq!(first_layer(xi, l), gimp_axis(xi, l).base);
-            prop_assert_eq!(first_layer(xi, 0.0), hat(xi).base);
+            prop_assert_eq!(first_layer(xi, l) as f64, gimp_axis(xi, l).base);
+            prop_assert_eq!(first_layer(xi, 0.0) as f64, hat(xi).base);
         }
 
         #[test]

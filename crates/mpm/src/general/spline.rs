@@ -32,6 +32,6 @@ pub(crate) fn cubic(xi: f64) -> AxisWeights<f64, 4> {
     }
 }
 
-fn first(node: f64) -> i32 {
-    node as i32 + PAD_BELOW as i32
+fn first(node: f64) -> f64 {
+    node + PAD_BELOW as f64
 }

@@ -9,8 +9,7 @@ use super::settings::Shape;
 use super::spline;
 use crate::grid::{Grid, Layout, PAD_BELOW};
 use crate::particles::count;
-use crate::transfer::Weights;
-use crate::weights::{AxisWeights, FixedBox, Hat, Rule, StretchingBox, WIDE, WideWeights, is_wide};
+use crate::weights::{AxisWeights, FixedBox, Hat, Rule, StretchingBox, is_wide, wide_axes};
 
 /// A node with the weight of a particle there, and the weight's gradient in space.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -122,13 +121,7 @@ impl<const D: usize> Raster<D> {
     ) {
         let l: [f64; D] = array::from_fn(|a| rule.half_size(a, stretch[a]));
         if l.iter().any(|&l| is_wide(l)) {
-            let wide = WideWeights::new(xi, &l);
-            let axis = |a: usize| AxisWeights::<f64, WIDE> {
-                base: wide.base(a) as i32,
-                S: array::from_fn(|k| wide.S(a, k)),
-                G: array::from_fn(|k| wide.G(a, k)),
-            };
-            self.product(&array::from_fn(axis), visit);
+            self.product(&wide_axes(xi, &l), visit);
         } else {
             self.product(&array::from_fn(|a| R::along_axis(xi[a], l[a])), visit);
         }
