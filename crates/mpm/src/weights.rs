@@ -252,10 +252,11 @@ mod tests {
             for away in [0.0, -1e-4, 1e-4, 0.499, 0.5, 0.501] {
                 let s: f64 = at + away;
                 let below = s.floor();
-                assert_eq!(node_below(s), (below as i32 + PAD_BELOW as i32, below), "{s:e}");
+                assert_eq!(node_below(s), (below + PAD_BELOW as f64, below), "{s:e}");
+                assert_eq!(first_layer(s, 0.0), (below as i32 + PAD_BELOW as i32) as usize);
                 let s = s as f32;
                 let below = s.floor();
-                assert_eq!(node_below(s), (below as i32 + PAD_BELOW as i32, below), "{s:e}");
+                assert_eq!(node_below(s), (f64::from(below) + PAD_BELOW as f64, below), "{s:e}");
             }
         }
     }
