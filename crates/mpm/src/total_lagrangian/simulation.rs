@@ -1002,7 +1002,7 @@ mod tests {
             grid.axes[1].cells = cells;
             let bytes = (8.0 * doubles(&grid, 2)) as u128;
             // A position alone takes sixteen.
-            assert!(bytes > 16 * 9 * (cells as u128) << 22);
+            assert!(bytes > (16 * 9 * (cells as u128)) << 22);
             let cells = vec![1 << 22, cells];
             assert_eq!(reserve(&grid, 2), Err(SetupError::GridTooLarge { cells, bytes }));
         }
