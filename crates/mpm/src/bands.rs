@@ -197,3 +197,121 @@ fn each<N: Send, const D: usize>(
         });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grid::Grid;
+    use nalgebra::SVector;
+
+    #[test]
+    fn a_band_keeps_particles_whose_stencils_lie_in_its_piece_and_no_others() {
+        for height in [8, BAND_ROWS] {
+            for width in [2, 3, 6] {
+                for home in [0, 1, 2, 7] {
+                    let (first, end) = Bands::range(home, height, width);
+                    // Rows of the stencil from the band's first row on; a piece has those of two bands.
+                    let rows = |edge: f64| {
+                        let row = edge.floor() + PAD_BELOW as f64 - (home as usize * height) as f64;
+                        (row, row + width as f64)
+                    };
+                    let fits =
+                        |edge: f64| rows(edge).0 >= 0.0 && rows(edge).1 <= 2.0 * height as f64;
+                    for (edge, is_kept) in [
+                        (first, true),
+                        (first.next_down(), false),
+                        (end, false),
+                        (end.next_down(), true),
+                        ((first + end) / 2.0, true),
+                    ] {
+                        assert_eq!(fits(edge), is_kept, "{height} {width} {home}");
+                    }
+                }
+            }
+        }
+    }
+
+    /// Nodes at which stencils may begin, by a lattice of particles and with some layers left out.
+    fn first_nodes<const D: usize>(layout: &Layout<D>) -> Vec<usize> {
+        let row = layout.row();
+        let last = layout.dims[D - 1] - 6;
+        // Numbered from the far end on, so that numbers and places differ in order.
+        (0..last * row).rev().filter(|node| node % 3 != 1).collect()
+    }
+
+    #[test]
+    fn particles_are_sorted_into_bands_with_room_to_drift_both_ways() {
+        fn check<const D: usize>(cells: [usize; D]) {
+            let grid =
+                Grid { lower: SVector::zeros(), spacing: 1.0, cells, walls: [[false; 2]; D] };
+            let layout = Layout::new(&grid, 8).unwrap();
+            let nodes = first_nodes(&layout);
+            let mut bands = Bands::new(&layout, nodes.len());
+            assert!(!bands.is_sorted());
+            bands.sort(&layout, &|p| nodes[p]);
+            assert!(bands.is_sorted());
+            let mut met = vec![0; nodes.len()];
+            let count = layout.dims[D - 1] / bands.height() + 1;
+            for band in 0..count {
+                let particles = bands.order.part(band).unwrap();
+                let (first, end) = Bands::range(band as u32, bands.height(), 3);
+                let strip = |p: u32| match D {
+                    3 => nodes[p as usize] / layout.dims[0] % layout.dims[1] / STRIP,
+                    _ => 0,
+                };
+                let place = |&p: &u32| (strip(p), p);
+                assert!(particles.is_sorted_by_key(place), "by strip, then by number");
+                for &p in particles {
+                    met[p as usize] += 1;
+                    assert_eq!(bands.home()[p as usize] as usize, band);
+                    let edge = (nodes[p as usize] / layout.row()) as f64 - PAD_BELOW as f64;
+                    // At the lower end of the grid there is nowhere to drift to.
+                    assert!(band == 0 || edge - SLACK as f64 >= first, "{edge} {first}");
+                    assert!(edge + SLACK as f64 + 1.0 <= end, "{edge} {end}");
+                }
+            }
+            assert!(bands.order.part(count).is_none());
+            assert!(met.iter().all(|&times| times == 1));
+        }
+        check([700]);
+        check([5, 40]);
+        check([4, 30, 25]);
+    }
+
+    /// Each band adds to every node of its piece, which is its own rows and as many above.
+    #[test]
+    fn pieces_are_the_rows_of_a_band_and_of_the_next() {
+        fn check<const D: usize>(cells: [usize; D]) {
+            let grid =
+                Grid { lower: SVector::zeros(), spacing: 1.0, cells, walls: [[false; 2]; D] };
+            let layout = Layout::new(&grid, 8).unwrap();
+            let mut bands = Bands::new(&layout, 0);
+            bands.sort(&layout, &|_| 0);
+            let (height, row) = (bands.height(), layout.row());
+            let count = layout.dims[D - 1] / height + 1;
+            let mut nodes = vec![9; layout.nodes];
+            let clear = |nodes: &mut [i32]| nodes.fill(0);
+            bands.scatter(&layout, &mut nodes, &clear, &|piece, first, _| {
+                assert_eq!(first % (height * row), 0);
+                assert!(piece.len() == 2 * height * row || first + piece.len() == layout.nodes);
+                piece.iter_mut().for_each(|node| *node += 1);
+            });
+            for (node, &sum) in nodes.iter().enumerate() {
+                // The lowest band's rows belong to no other one.
+                assert_eq!(sum, if node < height * row { 1 } else { 2 }, "{node}");
+            }
+            let mut seen = vec![0; layout.nodes];
+            let empty = (&mut [0_u8; 0][..], &mut [0_u8; 0][..], &mut [0_u8; 0][..]);
+            let add = |piece: &mut [i32], first: usize, band: u32, _: Share<'_, u8, u8, u8>| {
+                assert_eq!(first, band as usize * height * row);
+                assert!((band as usize) < count);
+                piece.iter_mut().for_each(|node| *node += 1);
+            };
+            bands.sweep(&layout, &mut seen, &clear, empty, &add);
+            assert_eq!(seen, nodes);
+        }
+        check([1100]);
+        check([5, 40]);
+        check([4, 3, 25]);
+    }
+}

@@ -484,7 +484,8 @@ where
 {
     let J = determinant(F);
     let l = SVector::<T, D>::from_fn(|a, _| rule.half_size(a, F[(a, a)]));
-    if J > T::zero() && c.axis_outside(x).is_none() && axis_too_large(&l).is_none() {
+    let is_deformation = J > T::zero() && J.is_finite();
+    if is_deformation && c.axis_outside(x).is_none() && axis_too_large(&l).is_none() {
         return None;
     }
     Some(if J <= T::zero() {
@@ -767,5 +768,112 @@ where
             well &= c.is_well(rule, home, x, F);
         }
         *all_well = well;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::weights::{FixedBox, Hat, StretchingBox};
+    use nalgebra::{Matrix2, Vector2, vector};
+
+    fn constants() -> Constants<f64, 2> {
+        let grid =
+            Grid { lower: Vector2::zeros(), spacing: 0.5, cells: [6, 60], walls: [[false; 2]; 2] };
+        let layout = Layout::new(&grid, 8).unwrap();
+        let bands = Bands::new(&layout, 1);
+        Constants::new(&grid, &layout, &bands, 0.1, 1.0)
+    }
+
+    /// `check(x, F, well)` has to find what is expected, with the band of rows from 13 cells above the lower corner on.
+    fn for_all_limits(
+        rule: &str,
+        F: Matrix2<f64>,
+        half_size: f64,
+        end: f64,
+        check: &dyn Fn(Vector2<f64>, Matrix2<f64>) -> bool,
+    ) {
+        let at = |edge: f64| 0.5 * (edge + half_size);
+        for (y, well) in [
+            (at(13.0), true),
+            (at(13.0).next_down(), false),
+            (at(end), false),
+            (at(end).next_down(), true),
+        ] {
+            assert_eq!(check(vector![1.2, y], F), well, "{rule} {F} {y}");
+        }
+        for (x, well) in [
+            (0.0, true),
+            (-5e-324, false),
+            (3.0, true),
+            (3.0_f64.next_up(), false),
+            (f64::NAN, false),
+        ] {
+            assert_eq!(check(vector![x, 9.0], F), well, "{rule} {F} {x}");
+        }
+        for bad in [Matrix2::zeros(), Matrix2::from_diagonal(&vector![1.0, -1.0])] {
+            assert!(!check(vector![1.2, 9.0], bad), "{rule}");
+        }
+    }
+
+    #[test]
+    fn particles_are_well_up_to_the_limits_of_grid_band_and_box() {
+        let c = constants();
+        let with = |a: f64, b: f64| Matrix2::from_diagonal(&vector![a, b]);
+        let one = with(1.0, 1.0);
+        for_all_limits("hat", one, 0.0, 28.0, &|x, F| c.is_well(Hat, 2, &x, &F));
+        let fixed = FixedBox(Vector2::repeat(0.25));
+        for_all_limits("fixed", one, 0.25, 27.0, &|x, F| c.is_well(fixed, 2, &x, &F));
+        let stretching = StretchingBox(Vector2::repeat(0.25));
+        let of_box = |x: Vector2<f64>, F: Matrix2<f64>| c.is_well(stretching, 2, &x, &F);
+        for (F, half_size, end) in [
+            (one, 0.25, 27.0),
+            (with(1.0, 2.0), 0.5, 27.0),
+            // Along whichever axis it is wide, the stencil has six rows.
+            (with(1.0, 3.0), 0.75, 24.0),
+            (with(3.0, 1.0), 0.25, 24.0),
+            (with(1.0, 8.0), 2.0, 24.0),
+            (with(8.0, 1.0), 0.25, 24.0),
+        ] {
+            for_all_limits("stretching", F, half_size, end, &of_box);
+        }
+        for F in [with(8.125, 1.0), with(1.0, 8.125)] {
+            assert!(!of_box(vector![1.2, 9.0], F));
+        }
+        // The lowest and the highest band reach over the ends of the grid.
+        for (home, y, well) in
+            [(0, 0.0, true), (0, -5e-324, false), (7, 30.0, true), (7, 30.0_f64.next_up(), false)]
+        {
+            assert_eq!(c.is_well(Hat, home, &vector![1.2, y], &one), well, "{home} {y}");
+        }
+    }
+
+    #[test]
+    fn a_particle_that_left_its_band_is_sorted_anew_and_one_in_trouble_stops_the_run() {
+        let c = constants();
+        let one = Matrix2::identity();
+        let judge = |y: f64, F: &Matrix2<f64>| c.judge(Hat, 2, &vector![1.2, y], F, 41);
+        assert!(judge(9.0, &one).is_nothing());
+        let moved = judge(15.0, &one);
+        assert!(moved.resort && moved.failure.is_none() && !moved.is_nothing());
+        let gone = judge(31.0, &one);
+        assert_eq!((gone.failure, gone.resort), (Some((Trouble::LeftGrid, 41)), false));
+        let inverted = judge(9.0, &-Matrix2::from_diagonal(&vector![1.0, -1.0]));
+        assert_eq!(inverted.failure, Some((Trouble::Inverted, 41)));
+        assert!(!gone.is_nothing());
+
+        // Whatever the order, the worst is kept, of those alike the first, and that something is to be sorted.
+        let other = Outcome { failure: Some((Trouble::LeftGrid, 7)), resort: false };
+        for outcomes in [[moved, gone, inverted, other], [other, inverted, gone, moved]] {
+            let merged = outcomes.into_iter().fold(Outcome::default(), Outcome::merge);
+            assert_eq!((merged.failure, merged.resort), (inverted.failure, true));
+            let found = Found::default();
+            outcomes.into_iter().for_each(|outcome| found.add(outcome));
+            let all = found.all();
+            assert_eq!((all.failure, all.resort), (inverted.failure, true));
+        }
+        assert_eq!(gone.merge(other).failure, other.failure);
+        assert!(!gone.merge(other).resort && moved.merge(Outcome::default()).resort);
+        assert!(Found::default().all().is_nothing());
     }
 }

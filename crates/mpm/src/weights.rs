@@ -245,6 +245,22 @@ mod tests {
         }
     }
 
+    #[test]
+    fn the_node_below_a_place_is_the_largest_not_beyond_it() {
+        for node in -2..40_i32 {
+            let at = f64::from(node);
+            for away in [0.0, -1e-4, 1e-4, 0.499, 0.5, 0.501] {
+                let s: f64 = at + away;
+                let below = s.floor();
+                assert_eq!(node_below(s), (below + PAD_BELOW as f64, below), "{s:e}");
+                assert_eq!(first_layer(s, 0.0), (below as i32 + PAD_BELOW as i32) as usize);
+                let s = s as f32;
+                let below = s.floor();
+                assert_eq!(node_below(s), (f64::from(below) + PAD_BELOW as f64, below), "{s:e}");
+            }
+        }
+    }
+
     proptest! {
         #[test]
         fn linear_fields_are_reproduced(xi in 0.0..20.0_f64, l in 1e-3..0.5_f64, wide in 1e-2..2.0_f64) {

@@ -191,6 +191,19 @@ mod tests {
     use std::f64::consts::PI;
 
     #[test]
+    fn polar_cells_are_square_at_the_mean_radius() {
+        for (inner, outer, spacing, across, around) in
+            [(0.3, 1.0, 0.25, 8, 12), (0.5, 0.51, 1.0, 1, 79), (2.0, 5.0, 0.5, 18, 33)]
+        {
+            let ring = Annulus { inner, outer, quarter: true };
+            let body = Body::<2>::annulus(&ring, spacing, 3, 1.0).unwrap();
+            assert_eq!(body.particles.len(), across * around, "{ring:?}");
+            let half_size = 0.5 * (outer - inner) / across as f64;
+            assert!((body.particles.half_size / half_size).iter().all(|r| (r - 1.0).abs() < 1e-13));
+        }
+    }
+
+    #[test]
     fn polar_cells_add_up_to_the_ring_with_its_moments() {
         for quarter in [true, false] {
             let ring = Annulus { inner: 0.4, outer: 0.6, quarter };

@@ -115,7 +115,7 @@ fn check_side_by_side<T: RealField + Copy, const D: usize>(all: &[Matrix3<f64>])
 
 #[test]
 fn stresses_side_by_side_are_those_of_single_particles() {
-    // Near inversion, next to the identity, inside out, and no numbers at all among ordinary ones.
+    // Near inversion, next to the identity, flat, inside out, and no numbers at all among ordinary ones.
     let all: Vec<Matrix3<f64>> = (0..60)
         .map(|n| {
             let H = |i: usize, j: usize| {
@@ -124,6 +124,8 @@ fn stresses_side_by_side_are_those_of_single_particles() {
             let scale = [0.4, 1e-9, 0.7, 1.5][n as usize % 4];
             let mut F = Matrix3::from_fn(|i, j| f64::from(u8::from(i == j)) + scale * H(i, j));
             match n % 10 {
+                5 => F.column_mut(0).fill(0.0),
+                6 => F[(0, 0)] = f64::INFINITY,
                 7 => F[(0, 0)] = f64::NAN,
                 8 => F.column_mut(0).scale_mut(1e-7),
                 9 => F.column_mut(0).neg_mut(),
@@ -289,4 +291,36 @@ fn what_is_no_deformation_has_no_stress() {
             assert_eq!(law.von_mises(&F), None);
         }
     }
+}
+
+#[test]
+fn the_short_way_to_the_stress_is_taken_near_volumes_as_they_were_and_has_the_same_bits() {
+    fn check<const D: usize>() {
+        let law = NeoHookean { lambda: 5.77, mu: 3.85, planted: Planted::here() };
+        let (mut short, mut long) = (0, 0);
+        for n in 1..400 {
+            // J grows evenly from next to nothing to four.
+            let J = f64::from(n) * 0.01;
+            let mut F = SMatrix::<f64, D, D>::from_fn(|i, j| match (i, j) {
+                (0, 0) => J,
+                _ => f64::from(u8::from(i == j)),
+            });
+            if D > 1 {
+                F[(0, D - 1)] = 0.3;
+            }
+            let expected = (0.5_f64.sqrt()..2.0_f64.sqrt()).contains(&J);
+            assert_eq!(law.is_short(&F), expected, "{J}");
+            if expected {
+                assert_eq!(law.kirchhoff_short(&F), law.kirchhoff(&F), "{J}");
+                short += 1;
+            } else {
+                long += 1;
+            }
+            assert!(!AnyLaw(LAWS[0]).is_short(&F) && !NeoHookeanNoLog { mu: 1.0 }.is_short(&F));
+        }
+        assert!(short > 60 && long > 300);
+    }
+    check::<1>();
+    check::<2>();
+    check::<3>();
 }

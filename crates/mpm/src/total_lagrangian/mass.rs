@@ -386,6 +386,30 @@ mod tests {
         [End::Periodic; 2],
     ];
 
+    /// A cell between walls has one function of second degree, which is coupled with no other.
+    #[test]
+    fn a_function_by_itself_is_divided_by_its_mass() {
+        let axis = Axis { lower: 0.0, upper: 1.0, cells: 1, ends: [End::Wall; 2] };
+        let (points, weights) = axis.points(3, Layout::Gauss);
+        for normal in [false, true] {
+            let basis = Basis::new(&axis, 2, normal, &points).unwrap();
+            assert_eq!((basis.functions, basis.width), (1, 1));
+            let of_point = |q: usize| weights[q] * basis.row(q, Part::Value).1[0].powi(2);
+            let expected: f64 = (0..3).map(of_point).sum();
+            let mass = Mass::consistent(&axis, &Band::consistent(&basis, &weights)).unwrap();
+            for inner in [1, 3] {
+                let mut values: Vec<f64> = (1..=21).map(f64::from).collect();
+                mass.solve(inner, &mut values);
+                for (k, value) in values.iter().enumerate() {
+                    assert!(
+                        (value * expected / (k as f64 + 1.0) - 1.0).abs() < 1e-14,
+                        "{inner} {k}"
+                    );
+                }
+            }
+        }
+    }
+
     /// The matrix between the coefficients that are not given and not copies, and where these lie.
     fn dense(axis: &Axis, basis: &Basis, weights: &[f64]) -> (DMatrix<f64>, Vec<usize>) {
         let [lower, upper] = axis.moved().map(usize::from);

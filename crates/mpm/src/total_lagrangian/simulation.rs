@@ -916,36 +916,140 @@ fn check<const D: usize>(
 
 /// Asks for all the memory of a run first, which turns a grid that is too large into an error instead of an abort.
 fn reserve<const D: usize>(grid: &Grid<D>, degree: usize) -> Result<(), SetupError> {
-    let (mut particles, mut functions, mut along) = (1_u128, 1_u128, 0_u128);
-    let mut on_sides = 0_u128;
-    for axis in &grid.axes {
-        let points = axis.cells as u128 * grid.per_cell as u128;
-        let others = grid.axes.iter().map(|other| other.cells as u128 * grid.per_cell as u128 + 2);
-        let others = others.fold(1_u128, u128::saturating_mul) / (points + 2);
-        let given = axis.ends.iter().filter(|end| matches!(end, End::Moved | End::Loaded));
-        on_sides = on_sides.saturating_add(others.saturating_mul(given.count() as u128));
-        particles = particles.saturating_mul(points);
-        functions = functions.saturating_mul(axis.cells as u128 + degree as u128);
-        // Values and slopes of both kinds of components, places, weights, and factors of the mass.
-        along = along.saturating_add(points.saturating_mul(4 * (degree as u128 + 2)));
-    }
-    // Positions, velocities, gradients, masses, values, slopes, partial sums and the body force.
-    let at_particles = (5 * D + 4 * D * D + 2) as u128;
-    let rows = match grid.coordinates.are_curvilinear() {
-        true => particles / (grid.axes[0].cells as u128 * grid.per_cell as u128),
-        false => 0,
-    };
-    let doubles = particles
-        .saturating_mul(at_particles)
-        .saturating_add(functions.saturating_mul(4 * D as u128 + 2))
-        .saturating_add(rows.saturating_mul((D * D + 2) as u128))
-        .saturating_add(on_sides.saturating_mul((2 * D + D * D + 1) as u128))
-        .saturating_add(along);
-    let bytes = doubles.saturating_mul(size_of::<f64>() as u128);
+    // Saturates where no integer is large enough.
+    let bytes = (doubles(grid, degree) * size_of::<f64>() as f64) as u128;
     let too_large = || SetupError::GridTooLarge {
         cells: grid.axes.iter().map(|axis| axis.cells).collect(),
         bytes,
     };
     let size = usize::try_from(bytes).map_err(|_| too_large())?;
     Vec::<u8>::new().try_reserve_exact(size).map_err(|_| too_large())
+}
+
+/// How many numbers of 64 bits a run keeps, walls taken for ends with as many functions as the others have.
+fn doubles<const D: usize>(grid: &Grid<D>, degree: usize) -> f64 {
+    let curvilinear = grid.coordinates.are_curvilinear();
+    let in_vector = D as f64;
+    let in_matrix = in_vector * in_vector;
+    let in_frame = if curvilinear { in_matrix } else { 0.0 };
+    let points = grid.axes.each_ref().map(|axis| axis.cells as f64 * grid.per_cell as f64);
+    let functions = grid.axes.each_ref().map(|axis| axis.cells as f64 + degree as f64);
+    let width = degree as f64 + 1.0;
+    let count = |along: &dyn Fn(usize) -> f64| (0..D).map(along).product::<f64>();
+    // Positions, velocities, values and the body force; gradients and slopes; masses and volumes.
+    let mut doubles = count(&|k| points[k]) * (5.0 * in_vector + 2.0 * in_matrix + 2.0);
+    // Displacements, velocities, accelerations and given ones; two products of the mass matrix.
+    doubles += count(&|k| functions[k]) * (4.0 * in_vector + 2.0);
+    for axis in 0..D {
+        if axis + 1 < D {
+            let partial = count(&|k| if k <= axis { points[k] } else { functions[k] });
+            doubles += partial * (axis as f64 + 2.0);
+        }
+        // Of both kinds of components: values, slopes, the first function and the weight; three matrices.
+        doubles += 2.0 * points[axis] * (2.0 * width + 2.0) + 2.0 * functions[axis] * 3.0 * width;
+        // On sides: positions, values, an area, and the frame.
+        let given =
+            grid.axes[axis].ends.iter().filter(|end| matches!(end, End::Moved | End::Loaded));
+        let places = count(&|k| if k == axis { 1.0 } else { points[k] });
+        doubles += given.count() as f64 * places * (2.0 * in_vector + 1.0 + in_frame);
+    }
+    if curvilinear {
+        doubles += points[0] + count(&|k| if k == 0 { 1.0 } else { points[k] }) * (in_frame + 2.0);
+    }
+    doubles
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The numbers that a simulation holds, counted.
+    fn held<const D: usize>(body: &TotalLagrangian<D>) -> usize {
+        let TotalLagrangian { particles, work, faces, .. } = body;
+        let Particles { X, x, v, F, mass, volume, .. } = particles;
+        let of_vectors = X.len() + x.len() + v.len() + work.b.len();
+        let of_particles = D * of_vectors + D * D * F.len() + mass.len() + volume.len();
+        let fields = [&body.u, &body.v, &body.a, &work.given];
+        let coefficients: usize = fields.into_iter().flatten().map(Vec::len).sum();
+        let values = work.values.iter().chain(work.slopes.iter().flatten());
+        let values: usize = values.chain(work.partial.iter().flatten()).map(Vec::len).sum();
+        let products: usize = work.product.iter().map(Vec::len).sum();
+        let of_sides = |face: &Face<D>| {
+            let vectors = face.X.len() + face.values.len() + D * face.frames.len();
+            D * vectors + face.areas.len()
+        };
+        let rows = body.rows.len() * (D * D + 2) + body.reciprocal_radius.len();
+        // A basis has values and slopes and the first function of each particle, a fit its weight and the matrix, and both the
+        // fit and the mass the matrix's factors.
+        let along = |basis: &Basis| {
+            basis.points * (2 * basis.width + 2) + 3 * basis.functions * basis.width
+        };
+        let along: usize = body.bases.iter().flatten().map(along).sum();
+        let of_sides: usize = faces.iter().map(of_sides).sum();
+        of_particles + coefficients + values + products + of_sides + rows + along
+    }
+
+    #[test]
+    fn a_grid_beyond_memory_is_refused_with_the_bytes_it_needs() {
+        let axis = Axis { lower: 0.0, upper: 1.0, cells: 1 << 22, ends: [End::Free; 2] };
+        let mut grid = Grid {
+            axes: [axis; 2],
+            coordinates: Coordinates::Cartesian,
+            per_cell: 3,
+            layout: Layout::Lattice,
+        };
+        for cells in [1 << 22, 1 << 40] {
+            grid.axes[1].cells = cells;
+            let bytes = (8.0 * doubles(&grid, 2)) as u128;
+            // A position alone takes sixteen.
+            assert!(bytes > (16 * 9 * (cells as u128)) << 22);
+            let cells = vec![1 << 22, cells];
+            assert_eq!(reserve(&grid, 2), Err(SetupError::GridTooLarge { cells, bytes }));
+        }
+        grid.axes = [Axis { cells: 4, ..axis }; 2];
+        assert_eq!(reserve(&grid, 2), Ok(()));
+    }
+
+    #[test]
+    fn the_memory_asked_for_is_what_a_run_holds() {
+        fn check<const D: usize>(
+            coordinates: Coordinates,
+            cells: [usize; D],
+            ends: [[End; 2]; D],
+            per_cell: usize,
+            degree: usize,
+        ) {
+            let axes: [Axis; D] = array::from_fn(|k| {
+                let (lower, upper) = (0.5, 1.0 + 0.5 * k as f64);
+                Axis { lower, upper, cells: cells[k], ends: ends[k] }
+            });
+            let grid: Grid<D> = Grid { axes, coordinates, per_cell, layout: Layout::Gauss };
+            let composition = Composition::Order2;
+            let scheme = Scheme { degree, mass: MassMatrix::Consistent, composition };
+            let expected = doubles(&grid, degree);
+            let law = Material::NeoHookean { lambda: 6.0, mu: 4.0 };
+            let mut body = TotalLagrangian::new(grid, scheme, law, 1.0, 1e-6).unwrap();
+            let still = vec![SVector::zeros(); body.positions().len()];
+            body.start(&still, &still).unwrap();
+            assert_eq!(expected, held(&body) as f64, "{coordinates:?} {cells:?}");
+        }
+        const FREE: [End; 2] = [End::Free; 2];
+        const MOVED: [End; 2] = [End::Moved; 2];
+        const LOADED: [End; 2] = [End::Loaded; 2];
+        let cartesian = Coordinates::Cartesian;
+        for degree in [2, 5] {
+            check(cartesian, [400], [FREE], degree + 1, degree);
+            check(cartesian, [50, 60], [FREE; 2], degree + 1, degree);
+            check(cartesian, [14, 12, 10], [FREE; 3], degree + 1, degree);
+            // Many coefficients between few particles, and long sides.
+            check(cartesian, [1, 300], [LOADED, FREE], degree + 1, degree);
+            check(cartesian, [300, 1], [FREE, MOVED], degree + 1, degree);
+            check(cartesian, [7], [[End::Moved, End::Loaded]], degree + 1, degree);
+            check(cartesian, [1, 1, 200], [FREE, LOADED, FREE], degree + 1, degree);
+            check(cartesian, [200, 1, 1], [FREE, FREE, LOADED], degree + 1, degree);
+            check(Coordinates::Polar, [1, 300], [LOADED, FREE], degree + 1, degree);
+            check(Coordinates::Polar, [300, 1], [FREE, LOADED], degree + 1, degree);
+            check(Coordinates::Spherical, [1, 20, 20], [LOADED, FREE, FREE], degree + 1, degree);
+        }
+    }
 }

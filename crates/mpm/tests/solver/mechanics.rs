@@ -249,6 +249,39 @@ fn bits_do_not_depend_on_the_number_of_threads() {
     check::<f64, 3>(12);
 }
 
+/// Two bodies of as many particles as are handed out at a time: one at rest, and one that flies past it. What is known of the
+/// bands of the one must not be taken for those of the other.
+#[test]
+fn a_body_flies_straight_past_another_through_the_bands() {
+    for (shape, integrator) in schemes() {
+        let h = 0.25;
+        let grid =
+            Grid { lower: Vector2::zeros(), spacing: h, cells: [134, 40], walls: [[false; 2]; 2] };
+        let part = |columns: std::ops::Range<f64>, rows: std::ops::Range<f64>| {
+            let within =
+                move |X: &Vector2<f64>| columns.contains(&(X[0] / h)) && rows.contains(&(X[1] / h));
+            Particles::lattice(&grid, 2, 2.0, within)
+        };
+        let (mut p, flying) = (part(0.0..64.0, 18.0..22.0), part(70.0..134.0, 6.0..10.0));
+        assert_eq!((p.len(), flying.len()), (1024, 1024));
+        let v = vector![0.0, 1.0];
+        p.v.resize(2048, v);
+        p.F.extend(flying.F);
+        p.x.extend(flying.x);
+        p.X.extend(flying.X);
+        p.mass.extend(flying.mass);
+        p.volume.extend(flying.volume);
+        let mut run = Simulation::new(grid, p, SOFT, settings(shape, integrator, 0.125)).unwrap();
+        (0..50).for_each(|_| run.step(&NoBodyForce).unwrap());
+        let p = run.particles();
+        for k in 0..p.len() {
+            let moved = if k < 1024 { Vector2::zeros() } else { v * 6.25 };
+            let off = (p.x[k] - p.X[k] - moved).norm();
+            assert!(off < 1e-10, "{shape:?} {integrator:?} {k}: {off:e}");
+        }
+    }
+}
+
 #[test]
 fn one_stretched_cell_layer_in_3d_is_the_1d_bar() {
     let bar = |X: f64| 0.3 * (X * std::f64::consts::PI).sin();

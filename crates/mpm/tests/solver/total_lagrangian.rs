@@ -213,6 +213,31 @@ fn curvilinear_coordinates_give_the_cartesian_fields() {
     check(shell, 0.9 * (0.7_f64.cos() - 1.9_f64.cos()) * (1.0 - 0.125) / 3.0);
 }
 
+#[test]
+fn a_uniform_body_force_moves_a_body_as_a_whole_in_any_coordinates() {
+    fn check<const D: usize>(grid: Grid<D>) {
+        let coordinates = grid.coordinates;
+        let scheme = scheme(5, Composition::Order2);
+        let mut body = TotalLagrangian::new(grid, scheme, SOFT, DENSITY, 1e-3).unwrap();
+        let force = SVector::<f64, D>::from_fn(|a, _| 1.0 - 1.7 * a as f64);
+        let b = |_: &[SVector<f64, D>], _: f64, b: &mut [SVector<f64, D>]| b.fill(force);
+        (0..5).for_each(|_| body.step(&b).unwrap());
+        let (t, particles) = (body.time(), body.observe());
+        for p in 0..particles.len() {
+            let u = particles.x[p] - particles.X[p];
+            let off = [(particles.v[p] / t - force).norm(), (u / (0.5 * t * t) - force).norm()];
+            assert!(off.iter().all(|&off| off < 1e-4), "{coordinates:?} {off:?}");
+        }
+    }
+    let (mut sector, mut shell) = (sector(), shell());
+    sector.axes[1].cells = 12;
+    (shell.axes[1].cells, shell.axes[2].cells) = (12, 9);
+    check(open_box::<1>(4));
+    check(open_box::<2>(3));
+    check(sector);
+    check(shell);
+}
+
 /// A displacement gradient without any symmetry.
 fn affine<const D: usize>() -> SMatrix<f64, D, D> {
     SMatrix::from_fn(|i, k| [[0.1, 0.3, -0.15], [-0.2, 0.05, 0.1], [0.07, -0.12, -0.08]][i][k])

@@ -1,0 +1,618 @@
+//! What a state has to be to be simulated, up to the limits, and which particle a failed step names, with which figures.
+
+#![allow(clippy::unwrap_used)]
+
+use mmsmith_mpm::general::{self, Annulus, Body, General, Transfer};
+use mmsmith_mpm::{
+    Grid, Integrator, Material, NoBodyForce, Particles, Settings, SetupError, Shape, Simulation,
+    StepError,
+};
+use nalgebra::{SMatrix, SVector};
+
+const SOFT: Material<f64> = Material::NeoHookean { lambda: 60.0, mu: 40.0 };
+const INTEGRATORS: [Integrator; 4] =
+    [Integrator::Usf, Integrator::Usl, Integrator::Musl, Integrator::Cd];
+
+/// Of binary fractions, and with axes that differ.
+fn grid<const D: usize>() -> Grid<f64, D> {
+    Grid {
+        lower: SVector::from_fn(|a, _| [-0.5, 0.25, 1.0][a]),
+        spacing: 0.25,
+        cells: std::array::from_fn(|a| 4 + a),
+        walls: [[false; 2]; D],
+    }
+}
+
+fn fast(shape: Shape, integrator: Integrator, time_step: f64) -> Settings<f64> {
+    Settings { shape, integrator, time_step, halve_first_acceleration: false }
+}
+
+/// The errors of the fast and of the general simulation, if any, for the initial state of a body.
+fn refusals<const D: usize>(
+    body: &Body<D>,
+    shape: general::Shape,
+) -> impl Iterator<Item = Option<StepError>> {
+    let settings = general::Settings {
+        shape,
+        integrator: general::Integrator::Cd,
+        transfer: Transfer::Flip,
+        time_step: 1e-3,
+        halve_first_acceleration: false,
+    };
+    let general = General::new(grid(), body.clone(), SOFT, settings).err();
+    let fast = shape.of_fast_step().map(|shape| {
+        let mut particles = body.particles.clone();
+        particles.half_size = body.half_edges[0].diagonal();
+        Simulation::new(grid(), particles, SOFT, fast(shape, Integrator::Cd, 1e-3)).err()
+    });
+    [general].into_iter().chain(fast).map(|error| {
+        error.map(|error| match error {
+            SetupError::InitialState(error) => error,
+            other => panic!("{other}"),
+        })
+    })
+}
+
+#[test]
+fn initial_states_are_admitted_up_to_the_limits() {
+    fn check<const D: usize>() {
+        use general::Shape;
+        let grid = grid::<D>();
+        let fine = Body::lattice(&grid, 1, 2.0, |_| true);
+        let particle = fine.particles.len() / 2;
+        let (step, time) = (0, 0.0);
+        let of = |shape: Shape, change: &dyn Fn(&mut Body<D>), expected: Option<&StepError>| {
+            let mut body = fine.clone();
+            change(&mut body);
+            for found in refusals(&body, shape) {
+                assert_eq!(found.as_ref(), expected, "{D} {shape:?}");
+            }
+        };
+        for axis in 0..D {
+            let (lower, upper) = (grid.lower[axis], grid.upper()[axis]);
+            let shapes = [Shape::Linear, Shape::Ugimp, Shape::Gimp, Shape::Bspline3, Shape::Cpdi];
+            for shape in shapes {
+                for (on, beyond) in
+                    [(lower, lower.next_down()), (upper, upper.next_up()), (upper, upper + 9.0)]
+                {
+                    let put =
+                        |x: f64| move |body: &mut Body<D>| body.particles.x[particle][axis] = x;
+                    of(shape, &put(on), None);
+                    let mut position: Vec<f64> =
+                        fine.particles.x[particle].iter().copied().collect();
+                    position[axis] = beyond;
+                    let error =
+                        StepError::LeftGrid { step, time, particle, position, axis, lower, upper };
+                    of(shape, &put(beyond), Some(&error));
+                }
+                let stretch = |by: f64| {
+                    move |body: &mut Body<D>| body.particles.F[particle][(axis, axis)] = by
+                };
+                for J in [0.0, -0.5] {
+                    let error = StepError::Inverted { step, time, particle, J };
+                    of(shape, &stretch(J), Some(&error));
+                }
+                of(shape, &stretch(1e-9), None);
+                // Half of a box is half a cell; two cells are the limit.
+                let limit = 0.5;
+                let too_large = |half_size: f64| StepError::TooLarge {
+                    step,
+                    time,
+                    particle,
+                    axis,
+                    half_size,
+                    limit,
+                };
+                of(shape, &stretch(4.0), None);
+                let stretches = matches!(shape, Shape::Gimp | Shape::Cpdi);
+                let error = too_large(0.125 * 4.5);
+                of(shape, &stretch(4.5), stretches.then_some(&error));
+            }
+            let size = |half: f64| {
+                move |body: &mut Body<D>| {
+                    body.half_edges.iter_mut().for_each(|E| E[(axis, axis)] = half);
+                }
+            };
+            for shape in [Shape::Ugimp, Shape::Gimp, Shape::Cpdi] {
+                of(shape, &size(0.5), None);
+                let (half_size, limit, particle) = (0.5625, 0.5, 0);
+                let error = StepError::TooLarge { step, time, particle, axis, half_size, limit };
+                of(shape, &size(0.5625), Some(&error));
+            }
+        }
+    }
+    check::<1>();
+    check::<2>();
+    check::<3>();
+}
+
+#[test]
+fn what_is_not_finite_is_refused_with_its_position() {
+    let body = Body::lattice(&grid::<2>(), 1, 2.0, |_| true);
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let mut moved = body.clone();
+        moved.particles.x[3][1] = bad;
+        let mut stretched = body.clone();
+        stretched.particles.F[3][(0, 0)] = bad;
+        for shape in [general::Shape::Gimp, general::Shape::Linear, general::Shape::Cpdi] {
+            for error in refusals(&moved, shape) {
+                let Some(StepError::NotFinite { step: 0, particle: 3, position, J, .. }) = error
+                else {
+                    panic!("{shape:?} {error:?}")
+                };
+                assert_eq!((position[0].to_bits(), J), (body.particles.x[3][0].to_bits(), 1.0));
+                assert!(position[1].is_nan() == bad.is_nan() && !position[1].is_finite());
+            }
+            for error in refusals(&stretched, shape) {
+                match error {
+                    Some(StepError::NotFinite { particle: 3, J, .. }) if bad.is_nan() => {
+                        assert!(J.is_nan());
+                    }
+                    Some(StepError::NotFinite { particle: 3, J, .. }) => assert_eq!(J, bad),
+                    Some(StepError::Inverted { particle: 3, J, .. }) => {
+                        assert!(J == bad && bad < 0.0, "{J} {bad}");
+                    }
+                    error => panic!("{shape:?} {bad} {error:?}"),
+                }
+            }
+        }
+    }
+}
+
+/// Where one particle is inverted others may follow, so that it is the one to name; of those alike the first.
+#[test]
+fn of_several_particles_the_one_in_the_worst_trouble_is_named() {
+    let mut body = Body::lattice(&grid::<2>(), 1, 2.0, |_| true);
+    let settings = general::Settings {
+        shape: general::Shape::Gimp,
+        integrator: general::Integrator::Cd,
+        transfer: Transfer::Flip,
+        time_step: 1e-3,
+        halve_first_acceleration: false,
+    };
+    let mut expect = |change: &dyn Fn(&mut Particles<f64, 2>), is: &dyn Fn(&StepError) -> bool| {
+        change(&mut body.particles);
+        let error = General::new(grid(), body.clone(), SOFT, settings).unwrap_err();
+        let SetupError::InitialState(error) = error else { panic!("{error}") };
+        assert!(is(&error), "{error}");
+    };
+    expect(&|p| p.F[11][(1, 1)] = 7.0, &|error| {
+        matches!(error, StepError::TooLarge { particle: 11, axis: 1, .. })
+    });
+    expect(&|p| p.F[10][(0, 0)] = 7.0, &|error| {
+        matches!(error, StepError::TooLarge { particle: 10, axis: 0, .. })
+    });
+    expect(&|p| p.x[12][0] = 9.0, &|error| {
+        matches!(error, StepError::LeftGrid { particle: 12, axis: 0, .. })
+    });
+    expect(&|p| p.x[13][0] = f64::NAN, &|error| {
+        matches!(error, StepError::NotFinite { particle: 13, .. })
+    });
+    expect(&|p| p.F[14][(0, 0)] = -1.0, &|error| {
+        matches!(error, StepError::Inverted { particle: 14, J: -1.0, .. })
+    });
+    expect(&|p| p.F[9][(0, 0)] = -2.0, &|error| {
+        matches!(error, StepError::Inverted { particle: 9, J: -2.0, .. })
+    });
+}
+
+/// A body of so many particles that they are handed out in several portions, most of which no failure touches.
+fn long<const D: usize>(
+    shape: Shape,
+    integrator: Integrator,
+) -> (Grid<f64, D>, Particles<f64, D>, Settings<f64>) {
+    let mut cells = [3; D];
+    cells[D - 1] = [600, 150, 40][D - 1];
+    let grid = Grid { lower: SVector::zeros(), spacing: 1.0, cells, walls: [[false; 2]; D] };
+    let particles = Particles::lattice(&grid, 2, 2.0, |_| true);
+    (grid, particles, fast(shape, integrator, 0.125))
+}
+
+#[test]
+fn a_failed_step_names_the_first_particle_that_left_the_grid() {
+    fn check<const D: usize>() {
+        for shape in [Shape::Linear, Shape::Gimp] {
+            for integrator in INTEGRATORS {
+                for side in [1.0, -1.0] {
+                    let (grid, mut particles, settings) = long::<D>(shape, integrator);
+                    particles.v.iter_mut().for_each(|v| v[D - 1] = side);
+                    let mut run = Simulation::new(grid.clone(), particles, SOFT, settings).unwrap();
+                    let error = (0..10).find_map(|_| run.step(&NoBodyForce).err()).unwrap();
+                    let p = run.particles();
+                    let upper = grid.upper()[D - 1];
+                    let is_out = |x: &SVector<f64, D>| !(0.0..=upper).contains(&x[D - 1]);
+                    let particle = p.x.iter().position(is_out).unwrap();
+                    let position = p.x[particle].iter().copied().collect();
+                    let axis = D - 1;
+                    // A quarter of a cell to go, of which a step takes an eighth.
+                    let (step, time, lower) = (3, 0.375, 0.0);
+                    let expected =
+                        StepError::LeftGrid { step, time, particle, position, axis, lower, upper };
+                    assert_eq!(error, expected, "{shape:?} {integrator:?}");
+                    assert!(side < 0.0 || particle > 1100, "{particle}");
+                    assert_eq!(run.steps_done(), 2);
+                }
+            }
+        }
+    }
+    check::<1>();
+    check::<2>();
+    check::<3>();
+}
+
+#[test]
+fn a_failed_step_names_the_first_particle_that_is_turned_inside_out() {
+    fn check<const D: usize>() {
+        for shape in [Shape::Linear, Shape::Gimp] {
+            for integrator in INTEGRATORS {
+                let (grid, mut particles, settings) = long::<D>(shape, integrator);
+                let far = 0.95 * grid.upper()[D - 1];
+                for (v, X) in particles.v.iter_mut().zip(&particles.X) {
+                    v[D - 1] = (far - X[D - 1]).min(0.0) * 10.0;
+                }
+                let mut run = Simulation::new(grid, particles, SOFT, settings).unwrap();
+                let error = run.step(&NoBodyForce).unwrap_err();
+                let p = run.particles();
+                let particle = p.F.iter().position(|F| F[(D - 1, D - 1)] <= 0.0).unwrap();
+                // Nothing is stretched across.
+                let J = p.F[particle][(D - 1, D - 1)];
+                let StepError::Inverted { step: 1, time: 0.125, particle: named, J: found } = error
+                else {
+                    panic!("{shape:?} {integrator:?} {error}")
+                };
+                assert_eq!(named, particle, "{shape:?} {integrator:?}");
+                assert!((found - J).abs() < 1e-15 * J.abs().max(1.0));
+                assert!(p.X[particle][D - 1] > far - 2.0 && particle > 1100);
+                // Where F comes first, a step that fails so has moved nothing.
+                assert!(integrator != Integrator::Usf || p.x == p.X);
+                assert!(p.x.iter().chain(&p.v).all(|x| x.iter().all(|x| x.is_finite())));
+                assert_eq!(run.step(&NoBodyForce), Err(error));
+            }
+        }
+    }
+    check::<1>();
+    check::<2>();
+    check::<3>();
+}
+
+#[test]
+fn what_is_not_finite_is_named_before_what_left_the_grid() {
+    for integrator in INTEGRATORS {
+        let (grid, mut particles, settings) = long::<2>(Shape::Gimp, integrator);
+        particles.v.iter_mut().for_each(|v| v[0] = 1.0);
+        let hit = particles.X.iter().position(|X| X[1] > 100.0).unwrap();
+        let place = particles.X[hit];
+        let force = |X: &[SVector<f64, 2>], t: f64, b: &mut [SVector<f64, 2>]| {
+            for (X, b) in X.iter().zip(b) {
+                *b = SVector::repeat(if *X == place && t >= 0.25 { f64::NAN } else { 0.0 });
+            }
+        };
+        let mut run = Simulation::new(grid, particles, SOFT, settings).unwrap();
+        let error = (0..10).find_map(|_| run.step(&force).err()).unwrap();
+        // Particles that leave the grid in the same step come before.
+        let p = run.particles();
+        assert!((0..hit / 2).any(|k| p.x[k][0] > 3.0));
+        let is_nan = |k: &usize| p.x[*k].sum().is_nan() || p.F[*k].sum().is_nan();
+        let first = (0..p.len()).find(is_nan).unwrap();
+        let StepError::NotFinite { step: 3, time: 0.375, particle, J, .. } = error else {
+            panic!("{integrator:?} {error}")
+        };
+        assert_eq!(particle, first);
+        assert!(J.is_nan() == p.F[first].determinant().is_nan(), "{integrator:?} {J}");
+    }
+}
+
+#[test]
+fn a_box_that_grows_too_wide_is_named_with_its_size() {
+    fn check<const D: usize>(axis: usize) {
+        for integrator in INTEGRATORS {
+            let grid = Grid { cells: [36; D], ..grid::<D>() };
+            let middle = (grid.lower + grid.upper()) * 0.5;
+            let mut particles = Particles::lattice(&grid, 2, 2.0, |X| (X - middle).amax() < 0.5);
+            for (v, X) in particles.v.iter_mut().zip(&particles.X) {
+                v[axis] = (X - middle)[axis] * 50.0;
+            }
+            let settings = fast(Shape::Gimp, integrator, 0.02);
+            let softest = Material::NeoHookean { lambda: 0.06, mu: 0.04 };
+            let mut run = Simulation::new(grid, particles, softest, settings).unwrap();
+            let error = (0..20).find_map(|_| run.step(&NoBodyForce).err()).unwrap();
+            let p = run.particles();
+            let of = |F: &SMatrix<f64, D, D>| F[(axis, axis)] * 0.0625;
+            let particle = p.F.iter().position(|F| of(F) > 0.5).unwrap();
+            let step = run.steps_done() + 1;
+            let (time, half_size, limit) = (0.02 * step as f64, of(&p.F[particle]), 0.5);
+            let expected = StepError::TooLarge { step, time, particle, axis, half_size, limit };
+            assert_eq!(error, expected, "{D} {integrator:?}");
+        }
+    }
+    check::<1>(0);
+    check::<2>(0);
+    check::<2>(1);
+    check::<3>(2);
+}
+
+type Change<'a> = &'a dyn Fn(&mut Grid<f64, 2>, &mut Body<2>, &mut f64);
+
+/// What both simulations answer to a change of a sound scene.
+fn answers(shape: general::Shape, change: Change) -> Vec<Option<SetupError>> {
+    let (mut grid, mut time_step) = (grid::<2>(), 1e-3);
+    let mut body = Body::lattice(&grid, 2, 2.0, |_| true);
+    change(&mut grid, &mut body, &mut time_step);
+    let settings = general::Settings {
+        shape,
+        integrator: general::Integrator::Usl,
+        transfer: Transfer::Apic,
+        time_step,
+        halve_first_acceleration: false,
+    };
+    let mut particles = body.particles.clone();
+    if let Some(E) = body.half_edges.first() {
+        particles.half_size = E.diagonal();
+    }
+    let mut answers = Vec::new();
+    if let Some(shape) = shape.of_fast_step() {
+        let settings = fast(shape, Integrator::Usl, time_step);
+        answers.push(Simulation::new(grid.clone(), particles, SOFT, settings).err());
+    }
+    answers.push(General::new(grid, body, SOFT, settings).err());
+    answers
+}
+
+#[test]
+fn what_has_to_be_positive_and_finite_is_named() {
+    use general::Shape;
+    let refused = |shape: Shape, change: Change, parts: &[&str], value: f64| {
+        for answer in answers(shape, change) {
+            let Some(SetupError::NotPositive { quantity, value: found }) = &answer else {
+                panic!("{parts:?} {value}: {answer:?}")
+            };
+            assert!(parts.iter().all(|part| quantity.contains(part)), "{quantity} {parts:?}");
+            assert!(*found == value || found.is_nan() && value.is_nan());
+        }
+    };
+    for bad in [0.0, -0.0, -1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        for shape in [Shape::Linear, Shape::Gimp, Shape::Cpdi, Shape::Cpdi2] {
+            refused(shape, &|_, _, time_step| *time_step = bad, &["the time step"], bad);
+            refused(shape, &|grid, _, _| grid.spacing = bad, &["spacing"], bad);
+            let mass: Change = &|_, body, _| body.particles.mass[5] = bad;
+            refused(shape, mass, &["mass", "particle 5"], bad);
+            let volume: Change = &|_, body, _| body.particles.volume[3] = bad;
+            refused(shape, volume, &["volume", "particle 3"], bad);
+        }
+        let flat: Change = &|_, body, _| body.half_edges[0][(1, 1)] = bad;
+        for shape in [Shape::Ugimp, Shape::Gimp] {
+            refused(shape, flat, &["half-size", "axis 1"], bad);
+        }
+        for shape in [Shape::Linear, Shape::Bspline2, Shape::Bspline3] {
+            assert!(answers(shape, flat).iter().all(Option::is_none), "a point has no size");
+        }
+        if bad.is_finite() {
+            refused(Shape::Cpdi, flat, &["domain", "particle 0"], bad * 0.0625);
+        }
+    }
+    for small in [f64::MIN_POSITIVE, 1e-9] {
+        let soft: Change = &|_, _, time_step| *time_step = small;
+        assert!(answers(Shape::Gimp, soft).iter().all(Option::is_none));
+    }
+}
+
+#[test]
+fn what_has_to_be_finite_is_named() {
+    use general::Shape;
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        for shape in [Shape::Linear, Shape::Gimp, Shape::Cpdi, Shape::Cpdi2] {
+            let cases: [(&str, Change); 2] = [
+                ("the velocity of particle 7", &|_, body, _| body.particles.v[7][1] = bad),
+                ("the reference position of particle 2", &|_, body, _| {
+                    body.particles.X[2][0] = bad;
+                }),
+            ];
+            for (expected, change) in cases {
+                for answer in answers(shape, change) {
+                    let quantity = expected.to_string();
+                    assert_eq!(answer, Some(SetupError::NotFinite { quantity }));
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn arrays_of_another_length_are_named() {
+    use general::Shape;
+    // Four by five cells.
+    let expected = 80;
+    let cases: [(&str, Change); 7] = [
+        ("x", &|_, body, _| body.particles.x.truncate(79)),
+        ("v", &|_, body, _| body.particles.v.truncate(79)),
+        ("F", &|_, body, _| body.particles.F.truncate(79)),
+        ("mass", &|_, body, _| body.particles.mass.truncate(79)),
+        ("volume", &|_, body, _| body.particles.volume.truncate(79)),
+        ("half_edges", &|_, body, _| body.half_edges.truncate(79)),
+        ("corners", &|_, body, _| body.mesh.as_mut().unwrap().corners.truncate(79)),
+    ];
+    for (array, change) in cases {
+        // Only the general simulation has the last two.
+        for answer in answers(Shape::Cpdi2, change) {
+            assert_eq!(answer, Some(SetupError::LengthMismatch { array, found: 79, expected }));
+        }
+        for answer in answers(Shape::Gimp, change).iter().flatten() {
+            assert!(matches!(answer, SetupError::LengthMismatch { found: 79, .. }), "{answer}");
+        }
+        let count = answers(Shape::Gimp, change).iter().flatten().count();
+        assert_eq!(count, if array.len() > 6 { 1 } else { 2 }, "{array}");
+    }
+}
+
+/// No machine has so much; the figures are those of the nodes, nine more than cells along each axis.
+#[test]
+fn a_grid_beyond_memory_is_refused_with_the_bytes_it_needs() {
+    fn check<const D: usize>(cells: [usize; D], of_node: u128) {
+        let body = Body::lattice(&grid::<D>(), 1, 2.0, |_| true);
+        let large = Grid { cells, ..grid::<D>() };
+        let nodes: u128 = cells.iter().map(|&n| n as u128 + 9).product();
+        let settings = general::Settings {
+            shape: general::Shape::Gimp,
+            integrator: general::Integrator::Usl,
+            transfer: Transfer::Flip,
+            time_step: 1e-3,
+            halve_first_acceleration: false,
+        };
+        let error = General::new(large.clone(), body.clone(), SOFT, settings).unwrap_err();
+        // A mass and four vectors.
+        let bytes = nodes * (8 + 4 * 8 * D as u128);
+        assert_eq!(error, SetupError::GridTooLarge { cells: cells.to_vec(), bytes });
+        for integrator in INTEGRATORS {
+            let mut particles = body.particles.clone();
+            particles.half_size = SVector::repeat(0.125);
+            let settings = fast(Shape::Gimp, integrator, 1e-3);
+            let error = Simulation::new(large.clone(), particles, SOFT, settings).unwrap_err();
+            let grids = if integrator == Integrator::Usf { 1 } else { 2 };
+            let bytes = nodes * of_node * grids;
+            assert_eq!(error, SetupError::GridTooLarge { cells: cells.to_vec(), bytes });
+        }
+    }
+    check([1 << 22, 1 << 22], 64);
+    check([1 << 17, 1 << 16, 1 << 17], 64);
+    // Beyond what can be addressed, in bytes and in nodes, and beyond what can be numbered.
+    check([1 << 20, 1 << 20, 1 << 20], 64);
+    check([1 << 20, 1 << 22, 1 << 22], 64);
+    check([4, 1 << 31], 64);
+    check([usize::MAX >> 20], 64);
+}
+
+#[test]
+fn a_failed_step_of_the_general_simulation_names_the_first_particle_that_left_the_grid() {
+    use general::Shape;
+    fn check<const D: usize>(shape: Shape) {
+        for axis in 0..D {
+            for side in [1.0, -1.0] {
+                let grid = grid::<D>();
+                let mut body = Body::lattice(&grid, 2, 2.0, |_| true);
+                body.particles.v.iter_mut().for_each(|v| v[axis] = side);
+                let settings = general::Settings {
+                    shape,
+                    integrator: general::Integrator::Usl,
+                    transfer: Transfer::Flip,
+                    time_step: 1.0 / 32.0,
+                    halve_first_acceleration: false,
+                };
+                let mut run = General::new(grid.clone(), body, SOFT, settings).unwrap();
+                let error = (0..10).find_map(|_| run.step(&NoBodyForce).err()).unwrap();
+                let (lower, upper) = (grid.lower[axis], grid.upper()[axis]);
+                let is_out = |x: &SVector<f64, D>| !(lower..=upper).contains(&x[axis]);
+                let particle = run.particles().x.iter().position(is_out).unwrap();
+                let position = run.particles().x[particle].iter().copied().collect();
+                // A sixteenth to go, of which a step takes a half.
+                let (step, time) = (3, 3.0 / 32.0);
+                let expected =
+                    StepError::LeftGrid { step, time, particle, position, axis, lower, upper };
+                assert_eq!(error, expected, "{D} {shape:?}");
+                assert_eq!((run.steps_done(), run.time()), (2, 2.0 / 32.0));
+                assert_eq!(run.step(&NoBodyForce), Err(error));
+            }
+        }
+    }
+    for shape in [Shape::Linear, Shape::Gimp, Shape::Bspline2, Shape::Cpdi] {
+        check::<1>(shape);
+        check::<2>(shape);
+        check::<3>(shape);
+    }
+    check::<1>(Shape::Cpdi2);
+    check::<2>(Shape::Cpdi2);
+}
+
+/// Domains between corners have a volume of their own, whatever F is.
+#[test]
+fn domains_between_corners_are_admitted_up_to_the_limits() {
+    let grid = grid::<2>();
+    let settings = general::Settings {
+        shape: general::Shape::Cpdi2,
+        integrator: general::Integrator::Usl,
+        transfer: Transfer::Flip,
+        time_step: 1e-3,
+        halve_first_acceleration: false,
+    };
+    let particle = 2;
+    let of = |change: &dyn Fn(&mut [SVector<f64, 2>])| {
+        let mut body = Body::lattice(&grid, 1, 2.0, |_| true);
+        let mesh = body.mesh.as_mut().unwrap();
+        // A domain that shares no corner.
+        let own = mesh.corners[particle].map(|k| mesh.X[k]);
+        mesh.corners[particle] = std::array::from_fn(|k| mesh.X.len() + k);
+        mesh.X.extend(own);
+        mesh.x.extend(own);
+        let first = mesh.x.len() - 4;
+        change(&mut mesh.x[first..]);
+        General::new(grid.clone(), body, SOFT, settings).err()
+    };
+    assert_eq!(of(&|_| {}), None);
+    let (step, time, limit) = (0, 0.0, 0.5);
+    for axis in 0..2 {
+        // From the particle, in the middle of its cell, two cells are the limit.
+        for (away, admitted) in [(0.375, true), (0.375 + 1e-9, false)] {
+            for corners in [[0, 3], [1, 2]] {
+                let error = of(&|x| {
+                    let sign = if corners[0] == 0 { -1.0 } else { 1.0 };
+                    for k in if axis == 0 { corners } else { [corners[0] * 2, corners[0] * 2 + 1] }
+                    {
+                        x[k][axis] += sign * away;
+                    }
+                });
+                let is_wide = |error: &SetupError| {
+                    matches!(error, SetupError::InitialState(StepError::TooLarge {
+                        step: 0, particle: 2, axis: found, half_size, limit: 0.5, ..
+                    }) if *found == axis && *half_size > limit && *half_size < limit + 1e-8)
+                };
+                assert!(error.as_ref().map_or(admitted, |e| !admitted && is_wide(e)), "{error:?}");
+            }
+        }
+    }
+    // Its area in its reference area.
+    for (height, J) in [(0.0, 0.0), (-0.5, -0.5), (-3.0, -3.0)] {
+        let error = of(&|x| {
+            for (low, high) in [(0, 3), (1, 2)] {
+                x[high][1] = x[low][1] + 0.25 * height;
+            }
+        });
+        let inverted = StepError::Inverted { step, time, particle, J };
+        assert_eq!(error, Some(SetupError::InitialState(inverted)));
+    }
+    for bad in [f64::NAN, f64::INFINITY] {
+        let error = of(&|x| x[1][0] = bad);
+        assert!(
+            matches!(
+                error,
+                Some(SetupError::InitialState(StepError::NotFinite { particle: 2, .. }))
+            ),
+            "{error:?}"
+        );
+    }
+}
+
+#[test]
+fn rings_that_are_none_are_refused() {
+    let of = |inner: f64, outer: f64, spacing: f64, density: f64| {
+        let ring = Annulus { inner, outer, quarter: true };
+        Body::<2>::annulus(&ring, spacing, 2, density).err()
+    };
+    assert_eq!(of(0.4, 0.6, 0.1, 2.0), None);
+    for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let answers = [
+            ("the inner radius", bad, of(bad, bad + 1.0, 0.1, 2.0)),
+            ("the width of the ring", bad, of(0.5, 0.5 + bad, 0.1, 2.0)),
+            ("the spacing", bad, of(0.4, 0.6, bad, 2.0)),
+            ("the density", bad, of(0.4, 0.6, 0.1, bad)),
+        ];
+        for (expected, value, answer) in answers {
+            let Some(SetupError::NotPositive { quantity, value: found }) = answer else {
+                panic!("{expected} {value}: {answer:?}")
+            };
+            assert_eq!(quantity, expected);
+            assert!(found == value || found.is_nan() && value.is_nan());
+        }
+    }
+    let ring = Annulus { inner: 0.4, outer: 0.6, quarter: true };
+    let error = Body::<3>::annulus(&ring, 0.1, 2, 1.0).err();
+    assert_eq!(error, Some(SetupError::PolarDimension { dimension: 3 }));
+}
