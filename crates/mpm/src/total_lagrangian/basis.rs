@@ -292,6 +292,41 @@ mod tests {
         Axis { lower: 0.3, upper: 1.7, cells: 7, ends }
     }
 
+    #[test]
+    fn what_integrates_is_the_transpose_of_what_evaluates_at_every_width() {
+        let mut met = [false; MOST_DEGREE + 2];
+        for degree in 2..=MOST_DEGREE {
+            for cells in 1..=6 {
+                let axis = Axis { cells, ..axis([End::Wall; 2]) };
+                let (points, _) = axis.points(2, Layout::Gauss);
+                let basis = Basis::new(&axis, degree, false, &points).unwrap();
+                met[basis.width] = true;
+                for part in [Part::Value, Part::Slope] {
+                    for inner in [1, 2] {
+                        let unit = |size: usize, at: usize| {
+                            let mut unit = vec![0.0; size * inner];
+                            unit[at * inner] = 1.0;
+                            unit
+                        };
+                        for j in 0..basis.functions {
+                            for q in 0..basis.points {
+                                let mut values = vec![0.0; basis.points * inner];
+                                basis.evaluate(part, inner, &unit(basis.functions, j), &mut values);
+                                let mut sums = vec![0.0; basis.functions * inner];
+                                basis.integrate(part, inner, &unit(basis.points, q), &mut sums);
+                                assert_eq!(values[q * inner], sums[j * inner], "{degree} {cells}");
+                                let (first, row) = basis.row(q, part);
+                                let entry = j.checked_sub(first).and_then(|k| row.get(k));
+                                assert_eq!(sums[j * inner], entry.copied().unwrap_or(0.0));
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        assert_eq!(met, [false, true, true, true, true, true, true]);
+    }
+
     fn sum(basis: &Basis, part: Part, coefficients: &[f64]) -> Vec<f64> {
         let mut values = vec![0.0; basis.points];
         basis.evaluate(part, 1, coefficients, &mut values);

@@ -120,3 +120,49 @@ fn affine_motion_of_sides_and_affine_tractions_are_followed_without_error() {
         affine_motion_is_exact([[End::Loaded; 2], moved, mixed], degree, MassMatrix::Consistent);
     }
 }
+
+/// Not a motion that the steps follow without error: what is left of it must not stay.
+#[test]
+fn moved_sides_are_where_they_are_given_after_each_step() {
+    const RATE: f64 = 40.0;
+    let given = |of: Quantity, X: f64, t: f64| {
+        let phase = RATE * t + 3.0 * X;
+        match of {
+            Quantity::Displacement => 0.02 * phase.sin(),
+            Quantity::Velocity => 0.02 * RATE * phase.cos(),
+            _ => -0.02 * RATE * RATE * phase.sin(),
+        }
+    };
+    let motion =
+        |of: Quantity, _: Side, X: &[SVector<f64, 1>], t: f64, u: &mut [SVector<f64, 1>]| {
+            u.iter_mut().zip(X).for_each(|(u, X)| u[0] = given(of, X[0], t));
+        };
+    for composition in [Composition::Order2, Composition::Order4] {
+        let grid = Grid {
+            axes: axes([[End::Moved; 2]]),
+            coordinates: Coordinates::Cartesian,
+            per_cell: 4,
+            layout: Layout::Gauss,
+        };
+        let scheme = Scheme { composition, ..scheme(3, MassMatrix::Consistent) };
+        let mut body = TotalLagrangian::new(grid, scheme, MATERIAL, DENSITY, 2e-3).unwrap();
+        let at = |of: Quantity| -> Vec<SVector<f64, 1>> {
+            body.positions().iter().map(|X| X.map(|x| given(of, x, 0.0))).collect()
+        };
+        let (u, v) = (at(Quantity::Displacement), at(Quantity::Velocity));
+        body.start_with_boundary(&u, &v, &motion).unwrap();
+        for _ in 0..10 {
+            body.step_with_boundary(&mmsmith_mpm::NoBodyForce, &motion).unwrap();
+            let t = body.time();
+            let state = body.state();
+            for (of, part) in [Quantity::Displacement, Quantity::Velocity].into_iter().zip(state) {
+                // The first and the last coefficient are the values at the ends.
+                let (ends, _) = part.as_chunks::<8>();
+                for (X, found) in [(0.2, ends[0]), (1.0, ends[ends.len() - 1])] {
+                    let off = (f64::from_ne_bytes(found) - given(of, X, t)).abs();
+                    assert!(off < 1e-13, "{composition:?} {of:?} {X} {t}: {off:e}");
+                }
+            }
+        }
+    }
+}
