@@ -55,7 +55,7 @@ pub enum Fault {
     SizeFromJacobian,
     /// Particles read the grid from where their velocity takes them.
     WeightsOfNewPosition,
-    /// Particles in the last cell give nothing to the last node they reach.
+    /// Particles in the last cell give nothing to the last node they reach; of three nodes the middle one gets that as well.
     LastNodeSkipped,
     /// One sum of a step in single precision.
     SinglePrecision,

@@ -227,7 +227,10 @@ const FAULTS: &[(Fault, &[&str])] = &[
         Fault::WeightsOfNewPosition,
         &["agreement", "momentum", "order, 1D", "order, 2D", "known errors", "known errors, ring"],
     ),
-    (Fault::LastNodeSkipped, &["agreement", "momentum", "known errors"]),
+    (
+        Fault::LastNodeSkipped,
+        &["agreement", "momentum", "order, 1D", "order, 2D", "known errors", "order in time"],
+    ),
     (Fault::SinglePrecision, &["agreement", "momentum"]),
     (
         Fault::PicForFlip,
