@@ -392,3 +392,119 @@ fn tractions<const SHORT: bool, T: RealField + Copy, L: Law<T>, const D: usize>(
     }
     short
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Grid;
+    use crate::bands::Bands;
+    use crate::grid::Layout;
+    use crate::material::NeoHookean;
+    use crate::weights::StretchingBox;
+
+    fn constants<const D: usize>() -> (Constants<f64, D>, usize) {
+        let grid =
+            Grid { lower: SVector::zeros(), spacing: 0.5, cells: [8; D], walls: [[false; 2]; D] };
+        let layout = Layout::new(&grid, 8).unwrap();
+        let bands = Bands::new(&layout, 1);
+        (Constants::new(&grid, &layout, &bands, 0.1, 1.0), layout.nodes)
+    }
+
+    fn noise(seed: usize) -> f64 {
+        (seed as f64 * 12.9898).sin()
+    }
+
+    /// Boxes may grow and shrink again from one time that a block is used to the next.
+    #[test]
+    fn particles_of_a_block_exchange_what_their_boxes_cover_however_many_of_those_are_wide() {
+        fn check<const D: usize>() {
+            let (c, nodes) = constants::<D>();
+            let reference = SVector::repeat(0.25);
+            let rule = StretchingBox(reference);
+            let x: [_; BLOCK] =
+                array::from_fn(|k| SVector::from_fn(|a, _| 2.0 + 1.2 * noise(5 * k + a)));
+            let grid: Vec<Node<f64, D>> = (0..nodes)
+                .map(|n| Node { values: array::from_fn(|q| noise(8 * n + q + 1000)) })
+                .collect();
+            let mut deposits = Deposits::<f64, D, BLOCK>::zero();
+            for k in 0..BLOCK {
+                let of = |from: usize| SVector::from_fn(|a, _| noise(3 * k + a + from));
+                deposits.level[k] = Node::new(&of(50), &of(700), 1.0 + 0.5 * noise(k));
+                deposits.traction[k] = SMatrix::from_fn(|i, j| noise(9 * k + 3 * i + j + 2000));
+            }
+            let mut block = Block::<f64, D, 3>::new();
+            for wide in [vec![], vec![0], vec![5, BLOCK - 1], (0..BLOCK).collect(), vec![]] {
+                let F: [SMatrix<f64, D, D>; BLOCK] = array::from_fn(|k| {
+                    let mut F = SMatrix::identity();
+                    if wide.contains(&k) {
+                        F[(k % D, k % D)] = 3.0 + noise(k);
+                    }
+                    F
+                });
+                block.weigh(&c, rule, Run { x: &x, F: &F });
+                let exact = |k: usize| {
+                    let l = array::from_fn(|a| reference[a] * F[k][(a, a)]);
+                    WideWeights::new(&c.in_cells(&x[k]), &l, &c.strides)
+                };
+                for count in [BLOCK, 41] {
+                    let mut gathered = [Gathered::zero(); BLOCK];
+                    block.gather(&c.strides, &grid, count, &mut gathered[..]);
+                    for k in 0..count {
+                        let alone = gather(&exact(k), &c.strides, &grid);
+                        let off = (gathered[k].velocity - alone.velocity).amax();
+                        assert!(off < 1e-13, "{wide:?} {k} {off:e}");
+                        let off = (gathered[k].acceleration - alone.acceleration).amax();
+                        assert!(off < 1e-13, "{wide:?} {k} {off:e}");
+                        let off = (gathered[k].velocity_gradient - alone.velocity_gradient).amax();
+                        assert!(off < 1e-13, "{wide:?} {k} {off:e}");
+                    }
+                    assert!(gathered[count..].iter().all(|own| own.velocity.amax() == 0.0));
+
+                    let mut sums = vec![Node::zero(); nodes];
+                    let mut one_by_one = sums.clone();
+                    block.scatter(&c.strides, &mut sums, 0, &deposits, count);
+                    for k in 0..count {
+                        scatter(&exact(k), &c.strides, &mut one_by_one, 0, (&deposits, k));
+                    }
+                    for (a, b) in sums.iter().zip(&one_by_one) {
+                        for (a, b) in a.values.iter().zip(&b.values) {
+                            assert!((a - b).abs() < 1e-12, "{wide:?} {a} {b}");
+                        }
+                    }
+                }
+            }
+        }
+        check::<1>();
+        check::<2>();
+        check::<3>();
+    }
+
+    /// The short way to the stress is right for some deformations alone.
+    #[test]
+    fn tractions_are_those_of_each_particle_whatever_else_is_in_its_block() {
+        fn check<const D: usize>() {
+            let (c, _) = constants::<D>();
+            let law = NeoHookean { lambda: 5.77, mu: 3.85, planted: c.planted };
+            for large in [vec![], vec![0], vec![31], vec![BLOCK - 1], (0..BLOCK).collect()] {
+                let F: [SMatrix<f64, D, D>; BLOCK] = array::from_fn(|k| {
+                    let stretch = if large.contains(&k) { 2.5 } else { 1.1 };
+                    SMatrix::from_fn(|i, j| match i == j {
+                        true => stretch + 0.05 * noise(k + i),
+                        false => 0.05 * noise(k + 2 * i + j),
+                    })
+                });
+                let mut deposits = Deposits::<f64, D, BLOCK>::zero();
+                deposits.volume = array::from_fn(|k| 1.0 + 0.5 * noise(k));
+                let x = [SVector::zeros(); BLOCK];
+                Run { x: &x, F: &F }.stress(&c, law, &mut deposits);
+                for k in 0..BLOCK {
+                    let expected = -law.kirchhoff(&F[k]) * (deposits.volume[k] * c.inverse_spacing);
+                    assert_eq!(deposits.traction[k], expected, "{large:?} {k}");
+                }
+            }
+        }
+        check::<1>();
+        check::<2>();
+        check::<3>();
+    }
+}
