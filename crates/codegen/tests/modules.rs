@@ -2,8 +2,10 @@
 
 #![allow(clippy::unwrap_used)]
 
-use mmsmith_codegen::Plan;
+use mmsmith_codegen::{Plan, items};
 use mmsmith_spec::Spec;
+use quote::quote;
+use std::path::Path;
 
 /// Words of the language are raw identifiers, and all else is called as the specification says.
 #[test]
@@ -31,5 +33,23 @@ fn parameters_have_names_that_rust_takes() {
         assert!(source.contains(&format!("pub {identifier}: T,")), "{name}\n{source}");
         let bounds = "value > -f64::INFINITY && value < f64::INFINITY";
         assert!(source.contains(bounds), "{source}");
+    }
+}
+
+/// Statements are formatted in one way for files and in another for macros; the items are the same.
+#[test]
+fn a_macro_puts_the_items_of_the_file() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../mms-specs");
+    for name in ["bar", "ring", "axis-aligned", "rigid-motion"] {
+        let text = std::fs::read_to_string(folder.join(name).with_extension("toml")).unwrap();
+        let spec = Spec::parse(&text, name).unwrap_or_else(|d| panic!("{d}"));
+        let plan = Plan::new(&spec).unwrap();
+        let mut file = syn::parse_file(&plan.module_source()).unwrap();
+        // What only the file says: where it comes from.
+        file.attrs.clear();
+        let expected = prettyplease::unparse(&file);
+        for found in [plan.items(&quote!(crate)), items(&spec, &quote!(crate)).unwrap()] {
+            assert_eq!(prettyplease::unparse(&syn::parse2(found).unwrap()), expected, "{name}");
+        }
     }
 }
