@@ -16,7 +16,7 @@
 use crate::arrange::as_accurate;
 use crate::graph::NumberMap;
 use crate::keep::KEPT_NUMBER;
-use crate::program::{Operation, OperationCount, Program, Slot};
+use crate::program::{Operation, OperationCount, Program, Slot, intern};
 use crate::{Dependence, Rational};
 use num_traits::One;
 use std::cmp::Reverse;
@@ -663,18 +663,8 @@ impl<'a> Gathering<'a> {
     }
 
     fn push(&mut self, operation: Operation) -> Slot {
-        if let Some(&slot) = self.interned.get(&operation) {
-            return slot;
-        }
-        let dependence = operation
-            .operands()
-            .map(|slot| self.dependence[slot.index()])
-            .fold(Dependence::default(), Dependence::join);
-        let slot = Slot::at(self.operations.len());
-        self.operations.push(operation.clone());
-        self.dependence.push(dependence);
-        self.interned.insert(operation, slot);
-        slot
+        let parts = (&mut self.operations, &mut self.dependence);
+        intern(operation, Dependence::default(), parts, &mut self.interned)
     }
 }
 

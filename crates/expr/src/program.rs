@@ -458,25 +458,35 @@ struct Group {
     term: (Expr, Rational),
 }
 
+/// Where an operation is, which is put after the others unless it is there already. It depends on what its operands do, and an
+/// input, which has none, on `of_input`.
+pub(crate) fn intern(
+    operation: Operation,
+    of_input: Dependence,
+    (operations, dependence): (&mut Vec<Operation>, &mut Vec<Dependence>),
+    interned: &mut NumberMap<Operation, Slot>,
+) -> Slot {
+    if let Some(&slot) = interned.get(&operation) {
+        return slot;
+    }
+    let own = operation.operands().map(|slot| dependence[slot.index()]);
+    let own = own.fold(of_input, Dependence::join);
+    let slot = Slot::at(operations.len());
+    operations.push(operation.clone());
+    dependence.push(own);
+    interned.insert(operation, slot);
+    slot
+}
+
 impl Lowering<'_> {
     fn push(&mut self, operation: Operation) -> Slot {
-        if let Some(&slot) = self.interned.get(&operation) {
-            return slot;
-        }
-        let dependence = match operation {
-            Operation::Input(index) => {
-                self.inputs.get(index).map_or_else(Dependence::default, |(_, d)| *d)
-            }
-            _ => operation
-                .operands()
-                .map(|slot| self.program.dependence(slot))
-                .fold(Dependence::default(), Dependence::join),
+        let of_input = match operation {
+            Operation::Input(index) => self.inputs.get(index).map(|(_, dependence)| *dependence),
+            _ => None,
         };
-        let slot = Slot::at(self.program.operations.len());
-        self.program.operations.push(operation.clone());
-        self.program.dependence.push(dependence);
-        self.interned.insert(operation, slot);
-        slot
+        let Program { operations, dependence, .. } = &mut self.program;
+        let parts = (operations, dependence);
+        intern(operation, of_input.unwrap_or_default(), parts, &mut self.interned)
     }
 
     fn lower(&mut self, expr: Expr) -> Slot {

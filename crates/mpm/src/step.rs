@@ -667,8 +667,8 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let Particles { X, x, F, mass, volume, .. } = &*particles;
         let (c, F_next) = (*constants, &F_next[..]);
         let forcing = Forcing::new(body_force, X, t, &c);
-        let clear = |nodes: &mut [Node<T, D>]| nodes.iter_mut().for_each(Node::clear_acceleration);
-        bands.scatter(layout, nodes, &clear, &|piece, first, ids| {
+        // What gave its momentum to the nodes gave no force.
+        bands.scatter(layout, nodes, &|_| {}, &|piece, first, ids| {
             c.scatter(rule, x, F, piece, first, ids, |copies, ids, deposits| {
                 forcing.evaluate(ids, &copies.x, &mut deposits.b);
                 deposits.take(ids, mass, volume);

@@ -64,10 +64,6 @@ impl<T: RealField + Copy, const D: usize> Node<T, D> {
         }
     }
 
-    pub(crate) fn clear_acceleration(&mut self) {
-        self.set_acceleration(&SVector::zeros());
-    }
-
     pub(crate) fn add_acceleration(&mut self, other: &Self) {
         for a in 0..D {
             self.values[D + a] += other.values[D + a];
@@ -241,12 +237,12 @@ pub(crate) const fn is_middle<const W: usize>(place: usize) -> bool {
 }
 
 /// One row of nodes along axis 0: the weights of all other axes multiplied.
-pub(crate) struct Row<T, const D: usize> {
+struct Row<T, const D: usize> {
     start: usize,
     /// Product of the weights along axes 1 and up.
-    pub(crate) S: T,
+    S: T,
     /// Its gradient; entry 0 is unused.
-    pub(crate) G: [T; D],
+    G: [T; D],
 }
 
 /// Number of rows of nodes.
@@ -258,7 +254,7 @@ fn rows<const D: usize, const W: usize>() -> usize {
 }
 
 #[inline(always)]
-pub(crate) fn row<T: RealField + Copy, const D: usize, const W: usize>(
+fn row<T: RealField + Copy, const D: usize, const W: usize>(
     weights: &impl Weights<T, D, W>,
     first: usize,
     strides: &[usize; D],

@@ -5,7 +5,7 @@ use mmsmith_mpm::general::{Annulus, Body, General, Integrator, Settings, Shape, 
 use mmsmith_mpm::{Grid, Material, NoBodyForce, SetupError, Simulation, StepError};
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2, vector};
 
-const SHAPES: [Shape; 7] = [
+pub(crate) const SHAPES: [Shape; 7] = [
     Shape::Linear,
     Shape::Ugimp,
     Shape::Gimp,
@@ -14,7 +14,7 @@ const SHAPES: [Shape; 7] = [
     Shape::Cpdi,
     Shape::Cpdi2,
 ];
-const INTEGRATORS: [Integrator; 5] =
+pub(crate) const INTEGRATORS: [Integrator; 5] =
     [Integrator::Usf, Integrator::Usl, Integrator::Musl, Integrator::Usavg, Integrator::Cd];
 const TRANSFERS: [Transfer; 5] =
     [Transfer::Flip, Transfer::Pic, Transfer::Apic, Transfer::Xpic(2), Transfer::Xpic(5)];

@@ -12,6 +12,8 @@ use mmsmith_mpm::{
 };
 use nalgebra::{SMatrix, SVector};
 
+use crate::general::{INTEGRATORS, SHAPES};
+
 /// Sizes of the units in which lengths, times and masses are given: powers of two, so that nothing is rounded in another way.
 #[derive(Clone, Copy)]
 struct Units {
@@ -146,28 +148,16 @@ fn fast_schemes() -> impl Iterator<Item = Settings<f64>> {
 }
 
 fn general_schemes() -> impl Iterator<Item = general::Settings> {
-    use general::{Integrator, Shape};
-    let integrators =
-        [Integrator::Usf, Integrator::Usl, Integrator::Musl, Integrator::Usavg, Integrator::Cd];
     let transfers = [Transfer::Flip, Transfer::Pic, Transfer::Apic, Transfer::Xpic(3)];
-    let shapes = [
-        Shape::Linear,
-        Shape::Ugimp,
-        Shape::Gimp,
-        Shape::Bspline2,
-        Shape::Bspline3,
-        Shape::Cpdi,
-        Shape::Cpdi2,
-    ];
-    shapes.into_iter().flat_map(move |shape| {
+    SHAPES.into_iter().flat_map(move |shape| {
         // Every integrator and every transfer with each of the weights.
-        integrators.into_iter().zip(transfers.into_iter().cycle()).map(
+        INTEGRATORS.into_iter().zip(transfers.into_iter().cycle()).map(
             move |(integrator, transfer)| general::Settings {
                 shape,
                 integrator,
                 transfer,
                 time_step: 1.0 / 512.0,
-                halve_first_acceleration: integrator == Integrator::Cd,
+                halve_first_acceleration: integrator == general::Integrator::Cd,
             },
         )
     })
