@@ -107,15 +107,20 @@ impl<const D: usize> BodyForceAtPoints<f64, D> for Points<'_, 1> {
             b.len(),
             self.len
         );
-        self.of_numbers(t, b, |n| first + n);
+        let time = self.stages.at_times[0].uniform::<D>(t, self.parameters);
+        self.of_numbers(&time, b, |n| first + n);
     }
 
-    fn evaluate_of(&self, t: f64, points: &[u32], b: &mut [SVector<f64, D>]) {
+    fn of_time(&self, t: f64, values: &mut Vec<f64>) {
+        values.extend(self.stages.at_times[0].uniform::<D>(t, self.parameters));
+    }
+
+    fn evaluate_of(&self, time: &[f64], points: &[u32], b: &mut [SVector<f64, D>]) {
         assert_eq!(points.len(), b.len(), "one body force a point");
         if let Some(&n) = points.iter().find(|&&n| n as usize >= self.len) {
             panic!("point {n} was asked for; there are {}", self.len);
         }
-        self.of_numbers(t, b, |n| points[n] as usize);
+        self.of_numbers(time, b, |n| points[n] as usize);
     }
 
     fn len(&self) -> usize {
@@ -131,12 +136,11 @@ impl Points<'_, 1> {
     /// The body force of the points that `number` tells for each place in `b`.
     fn of_numbers<const D: usize>(
         &self,
-        t: f64,
+        uniform: &[f64],
         b: &mut [SVector<f64, D>],
         number: impl Fn(usize) -> usize,
     ) {
         let [stage] = &self.stages.at_times;
-        let uniform = stage.uniform::<D>(t, self.parameters);
         let mut rows = Vec::new();
         let mut given = vec![[0.0; BLOCK]; self.stages.kept];
         for (chunk, b) in b.chunks_mut(BLOCK).enumerate() {
@@ -145,7 +149,7 @@ impl Points<'_, 1> {
                 let kept = self.block(n / BLOCK);
                 given.iter_mut().zip(kept).for_each(|(row, kept)| row[i] = kept[n % BLOCK]);
             }
-            for (d, row) in stage.section.run(&uniform, &given, &mut rows).enumerate() {
+            for (d, row) in stage.section.run(uniform, &given, &mut rows).enumerate() {
                 b.iter_mut().zip(row).for_each(|(b, value)| b[d] = *value);
             }
         }

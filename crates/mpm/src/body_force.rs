@@ -11,13 +11,23 @@ pub trait BodyForce<T: Copy, const D: usize>: Sync {
     /// Called from several threads, each with its own run of particles; what is in `b` before is unspecified.
     fn evaluate(&self, first: usize, X: &[SVector<T, D>], t: T, b: &mut [SVector<T, D>]);
 
-    /// Writes into `b` the body force on the particles `ids` at time `t`; `X` holds the reference positions of all.
+    /// Adds to `values`, which is empty, what [`evaluate_of`](Self::evaluate_of) needs of the time alone: it is called with it
+    /// for a few particles at a time. Nothing, unless there is such.
+    fn of_time(&self, _t: T, _values: &mut Vec<T>) {}
+
+    /// Writes into `b` the body force on the particles `ids` at a time; `X` holds the reference positions of all.
     ///
     /// As [`evaluate`](Self::evaluate) particle by particle, unless there is a faster way; `b` is as long as `ids`.
-    fn evaluate_of(&self, ids: &[u32], X: &[SVector<T, D>], t: T, b: &mut [SVector<T, D>]) {
+    fn evaluate_of(
+        &self,
+        ids: &[u32],
+        X: &[SVector<T, D>],
+        time: AtTime<'_, T>,
+        b: &mut [SVector<T, D>],
+    ) {
         for (&p, b) in ids.iter().zip(b.chunks_mut(1)) {
             let p = p as usize;
-            self.evaluate(p, &X[p..=p], t, b);
+            self.evaluate(p, &X[p..=p], time.t, b);
         }
     }
 
@@ -25,6 +35,15 @@ pub trait BodyForce<T: Copy, const D: usize>: Sync {
     fn is_absent(&self) -> bool {
         false
     }
+}
+
+/// A time, with what [`BodyForce::of_time`] says of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AtTime<'a, T> {
+    /// The time.
+    pub t: T,
+    /// What the body force needs of it.
+    pub values: &'a [T],
 }
 
 impl<T: Copy, const D: usize, B> BodyForce<T, D> for B

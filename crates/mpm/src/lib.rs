@@ -73,7 +73,7 @@ pub mod total_lagrangian;
 mod transfer;
 mod weights;
 
-pub use body_force::{BodyForce, NoBodyForce};
+pub use body_force::{AtTime, BodyForce, NoBodyForce};
 pub use error::{SetupError, StepError};
 pub use grid::Grid;
 pub use material::Material;

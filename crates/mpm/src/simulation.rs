@@ -297,6 +297,7 @@ fn allocate<T: RealField + Copy, const D: usize>(
         reprojected,
         next,
         is_ahead: false,
+        of_time: Vec::new(),
         particles,
         layout,
         bands,

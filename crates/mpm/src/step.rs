@@ -7,7 +7,7 @@ use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::bands::Bands;
 use crate::block::{BLOCK, Block, Copies};
-use crate::body_force::BodyForce;
+use crate::body_force::{AtTime, BodyForce};
 use crate::fault::{Fault, Planted};
 use crate::grid::{Grid, Layout};
 use crate::material::Law;
@@ -284,6 +284,8 @@ pub(crate) struct State<T, const D: usize> {
     pub(crate) next: Vec<Node<T, D>>,
     /// USL: whether the particles have given to `nodes` what the step to come needs.
     pub(crate) is_ahead: bool,
+    /// Room for what the body force needs of the time.
+    pub(crate) of_time: Vec<T>,
 }
 
 /// A kernel: takes the state, the body force, the times at the start of the step and at its end, and a factor on all
@@ -545,10 +547,10 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         R: Rule<T, D, W>,
         L: Law<T>,
     {
-        let Self { particles, constants, layout, bands, nodes, .. } = self;
+        let Self { particles, constants, layout, bands, nodes, of_time, .. } = self;
         let Particles { X, x, v, F, mass, volume, .. } = &*particles;
         let c = *constants;
-        let forcing = Forcing::new(body_force, X, t, &c);
+        let forcing = Forcing::new(body_force, X, t, &c, of_time);
         bands.scatter(layout, nodes, &|nodes| nodes.fill(Node::zero()), &|piece, first, ids| {
             c.scatter(rule, x, F, piece, first, ids, |copies, ids, deposits| {
                 forcing.evaluate(ids, &copies.x, &mut deposits.b);
@@ -663,10 +665,10 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         R: Rule<T, D, W>,
         L: Law<T>,
     {
-        let Self { particles, constants, layout, bands, nodes, F_next, .. } = self;
+        let Self { particles, constants, layout, bands, nodes, F_next, of_time, .. } = self;
         let Particles { X, x, F, mass, volume, .. } = &*particles;
         let (c, F_next) = (*constants, &F_next[..]);
-        let forcing = Forcing::new(body_force, X, t, &c);
+        let forcing = Forcing::new(body_force, X, t, &c, of_time);
         // What gave its momentum to the nodes gave no force.
         bands.scatter(layout, nodes, &|_| {}, &|piece, first, ids| {
             c.scatter(rule, x, F, piece, first, ids, |copies, ids, deposits| {
@@ -703,23 +705,29 @@ pub(crate) struct Forcing<'a, T, const D: usize> {
     /// `None` where there is nothing to evaluate.
     body_force: Option<&'a dyn BodyForce<T, D>>,
     X: &'a [SVector<T, D>],
-    t: T,
+    time: AtTime<'a, T>,
     at_current: bool,
 }
 
 impl<'a, T: RealField + Copy, const D: usize> Forcing<'a, T, D> {
-    /// At the reference positions `X`.
+    /// At the reference positions `X`; `values` is room for what is needed of the time.
     pub(crate) fn new(
         body_force: &'a dyn BodyForce<T, D>,
         X: &'a [SVector<T, D>],
         t: T,
         c: &Constants<T, D>,
+        values: &'a mut Vec<T>,
     ) -> Self {
         let absent = body_force.is_absent() || c.planted.is(Fault::NoBodyForce);
+        let t = if c.planted.is(Fault::LateBodyForce) { t + c.time_step } else { t };
+        values.clear();
+        if !absent {
+            body_force.of_time(t, values);
+        }
         Self {
             body_force: (!absent).then_some(body_force),
             X,
-            t: if c.planted.is(Fault::LateBodyForce) { t + c.time_step } else { t },
+            time: AtTime { t, values },
             at_current: c.planted.is(Fault::BodyForceAtCurrentPosition),
         }
     }
@@ -737,9 +745,9 @@ impl<'a, T: RealField + Copy, const D: usize> Forcing<'a, T, D> {
         };
         let b = &mut b[..ids.len()];
         if self.at_current {
-            body_force.evaluate(0, &x[..ids.len()], self.t, b);
+            body_force.evaluate(0, &x[..ids.len()], self.time.t, b);
         } else {
-            body_force.evaluate_of(ids, self.X, self.t, b);
+            body_force.evaluate_of(ids, self.X, self.time, b);
         }
     }
 }

@@ -62,9 +62,9 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         R: Rule<T, D, W>,
         L: Law<T>,
     {
-        let Self { particles, constants: c, layout, bands, nodes, next, alike, .. } = self;
+        let Self { particles, constants: c, layout, bands, nodes, next, alike, of_time, .. } = self;
         let Particles { X, x, v, F, mass, volume, .. } = particles;
-        let forcing = Forcing::new(body_force, X, t_next, c);
+        let forcing = Forcing::new(body_force, X, t_next, c, of_time);
         let step = Sweep { c, rule, law, nodes, mass, volume, alike: *alike, forcing };
         let found = Found::default();
         let clear = |nodes: &mut [Node<T, D>]| nodes.fill(Node::zero());

@@ -255,35 +255,31 @@ const ROOT_HALF: u64 = 0x3fe6_a09e_0000_0000;
 #[inline(always)]
 fn logarithm(x: f64, y: f64, by_y: bool) -> f64 {
     const ONE: u64 = 0x3ff0_0000_0000_0000;
-    const MANTISSA: u64 = 0x000f_ffff_ffff_ffff;
     /// 2^52 as a double; with a whole number in its last bits it is 2^52 plus that number.
     const WHOLE: u64 = 0x4330_0000_0000_0000;
     const LN2_HIGH: f64 = 6.931_471_803_691_238e-1;
     const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
+    /// Normal still after 2^54 were taken from it.
+    const TINY: f64 = 1e-290;
+    /// 2^52 + 1023.
+    const WHOLE_ONE: f64 = 4_503_599_627_370_496.0 + 1023.0;
     const TWO_TO_54: f64 = 18_014_398_509_481_984.0;
 
     let sum = 1.0 + x;
     // What rounding took from the sum.
-    let lost = if x < 1.0 { x - (sum - 1.0) } else { 1.0 - (sum - x) };
+    let lost = x - (sum - 1.0);
     let (u, lost) = if by_y { (y, 0.0) } else { (sum, lost) };
-    let subnormal = by_y && y < f64::MIN_POSITIVE;
-    let (normal, shift) = if subnormal { (u * TWO_TO_54, 54.0) } else { (u, 0.0) };
+    let tiny = u < TINY;
+    let (normal, bias) = if tiny { (u * TWO_TO_54, WHOLE_ONE + 54.0) } else { (u, WHOLE_ONE) };
     // u = 2^k m with m between sqrt(1/2) and sqrt(2).
-    let bits = normal.to_bits().wrapping_add(ONE - ROOT_HALF);
-    let exponent = bits >> 52;
-    let k = f64::from_bits(exponent | WHOLE) - (4_503_599_627_370_496.0 + 1023.0) - shift;
-    // 2^-k, for k up to 1022.
-    let scale = f64::from_bits(2046_u64.wrapping_sub(exponent) << 52);
-    let m = f64::from_bits((bits & MANTISSA).wrapping_add(ROOT_HALF));
-    // With k = 0 x itself has digits that the sum has lost.
-    let exact = k == 0.0 && !by_y;
-    let f = if exact { x } else { m - 1.0 };
-    // lost / u, which two digits of 1/m are enough for.
-    let corrected = !exact && !by_y && k <= 1022.0;
-    let correction = if corrected { lost * scale * (1.0 - f + f * f) } else { 0.0 };
+    let exponent = normal.to_bits().wrapping_add(ONE - ROOT_HALF) >> 52;
+    let k = f64::from_bits(exponent | WHOLE) - bias;
+    // 2^(2 - k), which is a normal number for the largest k as well.
+    let scale = f64::from_bits(2048_u64.wrapping_sub(exponent) << 52);
+    // m - 1 with the digits that the sum has lost; x itself if k = 0.
+    let f = 0.25 * ((normal * scale - 4.0) + lost * scale);
     let (half_square, tail) = parts_of_logarithm(f);
-    let tail = tail + (k * LN2_LOW + correction);
-    let value = k * LN2_HIGH - ((half_square - tail) - f);
+    let value = k * LN2_HIGH - ((half_square - (tail + k * LN2_LOW)) - f);
     let pole = if u == 0.0 { f64::NEG_INFINITY } else { f64::NAN };
     let outside = if u > 0.0 { u } else { pole };
     if u > 0.0 && u < f64::INFINITY { value } else { outside }

@@ -23,12 +23,16 @@ pub trait BodyForceAtPoints<T: Real, const D: usize>: Send + Sync {
     /// Panics where there are fewer than `first + b.len()` points.
     fn evaluate(&self, t: T, first: usize, b: &mut [SVector<T, D>]);
 
-    /// As [`evaluate`](Self::evaluate) for the points of the given numbers, in any order; `b` is as long as `points`.
+    /// Adds to `values` what [`evaluate_of`](Self::evaluate_of) needs of the time `t`.
+    fn of_time(&self, t: T, values: &mut Vec<T>);
+
+    /// As [`evaluate`](Self::evaluate) for the points of the given numbers, in any order, at the time that `time` was made [of
+    /// ](Self::of_time); `b` is as long as `points`.
     ///
     /// # Panics
     ///
-    /// Panics where a number is that of no point.
-    fn evaluate_of(&self, t: T, points: &[u32], b: &mut [SVector<T, D>]);
+    /// Panics where a number is that of no point, or `time` was not made by this solution.
+    fn evaluate_of(&self, time: &[T], points: &[u32], b: &mut [SVector<T, D>]);
 
     /// The number of points.
     fn len(&self) -> usize;
@@ -409,21 +413,28 @@ where
             b.len(),
             self.len
         );
-        self.runs(t, Numbers::From(first), b);
+        self.runs(&self.solution.body_force_time(t), Numbers::From(first), b);
     }
 
-    fn evaluate_of(&self, t: T, points: &[u32], b: &mut [SVector<T, D>]) {
+    fn of_time(&self, t: T, values: &mut Vec<T>) {
+        values.extend(self.solution.body_force_time(t));
+    }
+
+    fn evaluate_of(&self, time: &[T], points: &[u32], b: &mut [SVector<T, D>]) {
         assert_eq!(points.len(), b.len(), "one body force a point");
+        let Ok(time) = time.try_into() else {
+            panic!("{TIME} values of the time are needed, not {}", time.len());
+        };
         if let Some(first) = successive(points)
             && first + points.len() <= self.len
         {
-            self.runs(t, Numbers::From(first), b);
+            self.runs(time, Numbers::From(first), b);
             return;
         }
         if let Some(&n) = points.iter().find(|&&n| n as usize >= self.len) {
             panic!("point {n} was asked for; there are {}", self.len);
         }
-        self.runs(t, Numbers::Of(points), b);
+        self.runs(time, Numbers::Of(points), b);
     }
 
     fn len(&self) -> usize {
@@ -436,12 +447,11 @@ where
 }
 
 impl<S, T: Real, const TIME: usize, const POINT: usize> StagedPoints<S, T, TIME, POINT> {
-    fn runs<const D: usize>(&self, t: T, numbers: Numbers<'_>, b: &mut [SVector<T, D>])
+    fn runs<const D: usize>(&self, time: &[T; TIME], numbers: Numbers<'_>, b: &mut [SVector<T, D>])
     where
         S: BodyForceStages<T, D, TIME, POINT>,
     {
         let Self { solution, values, .. } = self;
-        let time = &solution.body_force_time(t);
         Arch::new().dispatch(Runs { solution, time, values, numbers, b });
     }
 }
@@ -542,7 +552,12 @@ where
         b.iter_mut().zip(X).for_each(|(b, X)| *b = self.solution.body_force(X, t));
     }
 
-    fn evaluate_of(&self, t: T, points: &[u32], b: &mut [SVector<T, D>]) {
+    fn of_time(&self, t: T, values: &mut Vec<T>) {
+        values.push(t);
+    }
+
+    fn evaluate_of(&self, time: &[T], points: &[u32], b: &mut [SVector<T, D>]) {
+        let &[t] = time else { panic!("one value of the time is needed, not {}", time.len()) };
         for (&n, b) in points.iter().zip(b) {
             *b = self.solution.body_force(&self.X[n as usize], t);
         }

@@ -8,7 +8,8 @@
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use mmsmith_mpm::{
-    BodyForce, Grid, Integrator, Material, NoBodyForce, Particles, Settings, Shape, Simulation,
+    AtTime, BodyForce, Grid, Integrator, Material, NoBodyForce, Particles, Settings, Shape,
+    Simulation,
 };
 use mmsmith_solutions::{
     AxisAligned, AxisAlignedParameters, BodyForceAtPoints, Material as Law, Solution,
@@ -29,6 +30,20 @@ struct Exact<'a>(Box<dyn BodyForceAtPoints<f64, 2> + 'a>);
 impl BodyForce<f64, 2> for Exact<'_> {
     fn evaluate(&self, first: usize, _X: &[Vector2<f64>], t: f64, b: &mut [Vector2<f64>]) {
         self.0.evaluate(t, first, b);
+    }
+
+    fn of_time(&self, t: f64, values: &mut Vec<f64>) {
+        self.0.of_time(t, values);
+    }
+
+    fn evaluate_of(
+        &self,
+        ids: &[u32],
+        _X: &[Vector2<f64>],
+        time: AtTime<'_, f64>,
+        b: &mut [Vector2<f64>],
+    ) {
+        self.0.evaluate_of(time.values, ids, b);
     }
 }
 

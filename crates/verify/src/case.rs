@@ -6,7 +6,7 @@ use std::time::Instant;
 use cpu_time::ProcessTime;
 use mmsmith_mpm::fault::{Fault, Planted};
 use mmsmith_mpm::general::{Integrator, Shape, Transfer};
-use mmsmith_mpm::{BodyForce, Particles, Settings, SetupError, Simulation, StepError};
+use mmsmith_mpm::{AtTime, BodyForce, Particles, Settings, SetupError, Simulation, StepError};
 use mmsmith_solutions::{AnySolution, BodyForceAtPoints, Material, Real, Solution};
 use nalgebra::SVector;
 use serde::{Serialize, Serializer};
@@ -506,8 +506,18 @@ impl<T: Real, const D: usize> BodyForce<T, D> for ExactBodyForce<'_, T, D> {
         self.kept.evaluate(t, first, b);
     }
 
-    fn evaluate_of(&self, ids: &[u32], _X: &[SVector<T, D>], t: T, b: &mut [SVector<T, D>]) {
-        self.kept.evaluate_of(t, ids, b);
+    fn of_time(&self, t: T, values: &mut Vec<T>) {
+        self.kept.of_time(t, values);
+    }
+
+    fn evaluate_of(
+        &self,
+        ids: &[u32],
+        _X: &[SVector<T, D>],
+        time: AtTime<'_, T>,
+        b: &mut [SVector<T, D>],
+    ) {
+        self.kept.evaluate_of(time.values, ids, b);
     }
 }
 

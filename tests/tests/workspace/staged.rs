@@ -75,7 +75,9 @@ fn compare<T: Real, const D: usize>(
             }
             let numbers: Vec<u32> = (0..count as u32).rev().collect();
             let mut backwards = vec![SVector::zeros(); count];
-            kept.evaluate_of(t, &numbers, &mut backwards);
+            let mut time = Vec::new();
+            kept.of_time(t, &mut time);
+            kept.evaluate_of(&time, &numbers, &mut backwards);
             for (found, expected) in backwards.iter().rev().zip(&whole) {
                 assert!(same(found, expected), "{name}, t = {t}: {found}, not {expected}");
             }

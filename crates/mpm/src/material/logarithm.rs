@@ -11,7 +11,6 @@ const ROOT_HALF: u64 = 0x3fe6_a09e_0000_0000;
 #[inline(always)]
 pub(super) fn log_of_ratio(growth: f64, ratio: f64) -> f64 {
     const ONE: u64 = 0x3ff0_0000_0000_0000;
-    const MANTISSA: u64 = 0x000f_ffff_ffff_ffff;
     /// 2^52 as a double; with a whole number in its last bits it is 2^52 plus that number.
     const WHOLE: u64 = 0x4330_0000_0000_0000;
     const LN2_HIGH: f64 = 6.931_471_803_691_238e-1;
@@ -20,25 +19,17 @@ pub(super) fn log_of_ratio(growth: f64, ratio: f64) -> f64 {
     let near_zero = growth < -0.5;
     let sum = 1.0 + growth;
     // What rounding took from the sum.
-    let lost = if growth < 1.0 { growth - (sum - 1.0) } else { 1.0 - (sum - growth) };
+    let lost = growth - (sum - 1.0);
     let (u, lost) = if near_zero { (ratio, 0.0) } else { (sum, lost) };
     // u = 2^k m with m between sqrt(1/2) and sqrt(2).
-    let bits = u.to_bits().wrapping_add(ONE - ROOT_HALF);
-    let exponent = bits >> 52;
+    let exponent = u.to_bits().wrapping_add(ONE - ROOT_HALF) >> 52;
     let k = f64::from_bits(exponent | WHOLE) - (4_503_599_627_370_496.0 + 1023.0);
-    // 2^-k, for k up to 1022.
-    let scale = f64::from_bits(2046_u64.wrapping_sub(exponent) << 52);
-    let m = f64::from_bits((bits & MANTISSA).wrapping_add(ROOT_HALF));
-    // With k = 0 growth itself has digits that the sum has lost.
-    let exact = k == 0.0 && !near_zero;
-    let f = if exact { growth } else { m - 1.0 };
-    // lost / u, which two digits of 1/m are enough for.
-    let corrected = !exact && k <= 1022.0;
-    // What is not a number stays so.
-    let correction = lost * if corrected { scale * (1.0 - f + f * f) } else { 0.0 };
+    // 2^(1 - k), a normal number for k up to 1022.
+    let scale = f64::from_bits(2047_u64.wrapping_sub(exponent) << 52);
+    // m - 1 with the digits that the sum has lost; growth itself if k = 0.
+    let f = 0.5 * ((u * scale - 2.0) + lost * scale);
     let (half_square, tail) = parts_of_log(f);
-    let tail = tail + (k * LN2_LOW + correction);
-    k * LN2_HIGH - ((half_square - tail) - f)
+    k * LN2_HIGH - ((half_square - (tail + k * LN2_LOW)) - f)
 }
 
 /// Whether [`log_near_one`] takes this growth: 1 + growth between sqrt(1/2) and sqrt(2), where no power of two has to be

@@ -8,7 +8,8 @@ use mmsmith_mpm::total_lagrangian::{
     MassMatrix, Quantity, Scheme, Side, TotalLagrangian,
 };
 use mmsmith_mpm::{
-    BodyForce, Grid, Integrator, Material, NoBodyForce, Particles, Settings, Shape, Simulation,
+    AtTime, BodyForce, Grid, Integrator, Material, NoBodyForce, Particles, Settings, Shape,
+    Simulation,
 };
 use nalgebra::{SMatrix, SVector};
 
@@ -389,7 +390,8 @@ fn no_force_and_held_sides_are_zero_whatever_was_there_before() {
     assert_eq!(values, NONE);
     assert!(BodyForce::<f64, 2>::is_absent(&NoBodyForce));
     values = there;
-    NoBodyForce.evaluate_of(&[2, 0, 3, 1], &there, 1.0, &mut values);
+    let time = |t| AtTime { t, values: &[] };
+    NoBodyForce.evaluate_of(&[2, 0, 3, 1], &there, time(1.0), &mut values);
     assert_eq!(values, NONE);
     let one = ONE.body_force::<2>();
     assert!(!BodyForce::<f64, 2>::is_absent(&one));
@@ -404,6 +406,9 @@ fn no_force_and_held_sides_are_zero_whatever_was_there_before() {
     let X: Vec<_> = (0..5).map(|k| SVector::<f64, 2>::repeat(f64::from(k))).collect();
     let (mut all, mut some) = ([SVector::zeros(); 5], [SVector::zeros(); 3]);
     one.evaluate(0, &X, 0.5, &mut all);
-    one.evaluate_of(&[4, 0, 2], &X, 0.5, &mut some);
+    one.evaluate_of(&[4, 0, 2], &X, time(0.5), &mut some);
     assert_eq!(some, [all[4], all[0], all[2]]);
+    let mut nothing = Vec::new();
+    one.of_time(0.5, &mut nothing);
+    assert!(nothing.is_empty());
 }

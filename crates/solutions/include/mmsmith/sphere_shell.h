@@ -151,9 +151,9 @@ MMSMITH_FN double mmsmith_logarithm(double x, double y, int by_y)
     const double sum = 1.0 + x;
     const double u = by_y ? y : sum;
     /* What rounding took from the sum. */
-    const double lost = by_y ? 0.0 : x < 1.0 ? x - (sum - 1.0) : 1.0 - (sum - x);
-    double m, f, correction, s, z, w, even, odd, half_square, tail;
-    int k, exact;
+    const double lost = by_y ? 0.0 : x - (sum - 1.0);
+    double m, f, s, z, w, even, odd, half_square, tail;
+    int k;
     if (!(u > 0.0 && u - u == 0.0)) {
         return u == 0.0 ? -HUGE_VAL : u > 0.0 ? u : NAN;
     }
@@ -163,12 +163,8 @@ MMSMITH_FN double mmsmith_logarithm(double x, double y, int by_y)
         m += m;
         --k;
     }
-    /* With k = 0 x itself has digits that the sum has lost. */
-    exact = k == 0 && !by_y;
-    f = exact ? x : m - 1.0;
-    /* lost / u, which two digits of 1/m are enough for. */
-    correction =
-        exact || by_y || k > 1022 ? 0.0 : lost * ldexp(1.0, -k) * (1.0 - f + f * f);
+    /* m - 1 with the digits that the sum has lost; x itself if k = 0. */
+    f = (m - 1.0) + ldexp(lost, -k);
     s = f / (2.0 + f);
     z = s * s;
     w = z * z;
@@ -177,7 +173,7 @@ MMSMITH_FN double mmsmith_logarithm(double x, double y, int by_y)
         * (6.6666666666667351e-1
             + w * (2.8571428743662391e-1 + w * (1.818357216161805e-1 + w * 1.4798198605116586e-1)));
     half_square = 0.5 * f * f;
-    tail = s * (half_square + (even + odd)) + (k * 1.9082149292705877e-10 + correction);
+    tail = s * (half_square + (even + odd)) + k * 1.9082149292705877e-10;
     return k * 6.931471803691238e-1 - ((half_square - tail) - f);
 }
 
