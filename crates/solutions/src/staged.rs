@@ -185,6 +185,9 @@ pub trait StateStages<
 /// blocks come from memory in the order in which they lie there.
 pub const BLOCK: usize = 16;
 
+/// Points whose body force is computed in one loop, which is long against what is done before and after it.
+const RUN: usize = 4 * BLOCK;
+
 /// The values kept for points, in blocks: `blocks[n][m][i]` is value `m` of point `n BLOCK + i`. What a last block has to
 /// spare repeats its last point.
 type Blocks<T, const POINT: usize> = Vec<[[T; BLOCK]; POINT]>;
@@ -224,14 +227,14 @@ impl<S, T: Real, const TIME: usize, const POINT: usize> StagedPoints<S, T, TIME,
     where
         S: BodyForceStages<T, D, TIME, POINT>,
     {
-        let mut values = array::from_fn(|_| Vec::with_capacity(X.len() + BLOCK));
+        let mut values = array::from_fn(|_| Vec::with_capacity(X.len() + RUN));
         for X in X {
             let of_point = solution.body_force_point(X);
             values.iter_mut().zip(of_point).for_each(|(run, value)| run.push(value));
         }
         for run in &mut values {
             let last = run.last().copied().unwrap_or(T::zero());
-            run.resize(X.len() + BLOCK, last);
+            run.resize(X.len() + RUN, last);
         }
         StagedPoints { solution, values, len: X.len() }
     }
@@ -277,6 +280,8 @@ struct Runs<'a, S, T: Real, const D: usize, const TIME: usize, const POINT: usiz
     solution: &'a S,
     time: &'a [T; TIME],
     values: &'a [Vec<T>; POINT],
+    /// How many points there are.
+    len: usize,
     numbers: Numbers<'a>,
     b: &'a mut [SVector<T, D>],
 }
@@ -290,43 +295,29 @@ where
 
     #[inline(always)]
     fn with_simd<I: Simd>(self, _: I) {
-        let Self { solution, time, values, numbers, b } = self;
-        let nothing = [T::zero(); BLOCK];
-        let mut components = [nothing; D];
-        let mut picked = [nothing; POINT];
-        for (index, b) in b.chunks_mut(BLOCK).enumerate() {
-            let place = index * BLOCK;
-            let first = match numbers {
-                Numbers::From(first) => Some(first + place),
-                Numbers::Of(points) => successive(&points[place..place + b.len()]),
-            };
-            let run = first.and_then(|first| run(values, first, &nothing));
-            if let Some(run) = run {
-                body_forces(solution, time, &run, &mut components);
-            } else if let Numbers::Of(points) = numbers {
-                for (i, &n) in points[place..place + b.len()].iter().enumerate() {
-                    for (picked, values) in picked.iter_mut().zip(values) {
-                        picked[i] = values[n as usize];
+        let Self { solution, time, values, len, numbers, b } = self;
+        for (index, b) in b.chunks_mut(RUN).enumerate() {
+            let place = index * RUN;
+            let picked;
+            let run = match numbers {
+                Numbers::From(first) => run(values, first + place),
+                Numbers::Of(points) => {
+                    let points = &points[place..place + b.len()];
+                    if let Some(first) = successive(points)
+                        && first + points.len() <= len
+                    {
+                        run(values, first)
+                    } else {
+                        if let Some(n) = points.iter().find(|&&n| n as usize >= len) {
+                            panic!("point {n} was asked for; there are {len}");
+                        }
+                        picked = pick(values, points);
+                        array::from_fn(|m| &picked[m])
                     }
                 }
-                let run = array::from_fn(|m| &picked[m]);
-                body_forces(solution, time, &run, &mut components);
-            }
-            // A whole run as a loop of fixed length, which needs no steps of single points.
-            if let Some(whole) = b.first_chunk_mut::<BLOCK>() {
-                put(&components, whole);
-            } else {
-                put(&components, b);
-            }
+            };
+            body_forces(solution, time, &run, b);
         }
-    }
-}
-
-/// The vectors of the given components.
-#[inline(always)]
-fn put<T: Real, const D: usize>(components: &[[T; BLOCK]; D], b: &mut [SVector<T, D>]) {
-    for (i, b) in b.iter_mut().enumerate() {
-        *b = SVector::from_fn(|d, _| components[d][i]);
     }
 }
 
@@ -341,64 +332,81 @@ fn successive(points: &[u32]) -> Option<usize> {
     (apart == 0).then_some(first as usize)
 }
 
-/// The values of a run of points from number `first` on.
+/// The values of a run of points from number `first` on, which is that of a point.
 #[inline(always)]
-fn run<'a, T, const POINT: usize>(
-    values: &'a [Vec<T>; POINT],
-    first: usize,
-    nothing: &'a [T; BLOCK],
-) -> Option<[&'a [T; BLOCK]; POINT]> {
-    let run = |m: usize| values[m].get(first..).and_then(|values| values.first_chunk());
-    let whole = (0..POINT).all(|m| run(m).is_some());
-    whole.then(|| array::from_fn(|m| run(m).unwrap_or(nothing)))
+fn run<T, const POINT: usize>(values: &[Vec<T>; POINT], first: usize) -> [&[T; RUN]; POINT] {
+    array::from_fn(|m| match values[m][first..].first_chunk() {
+        Some(run) => run,
+        // There is room for a run after each point.
+        None => panic!("{} values are kept from point {first} on", values[m].len() - first),
+    })
 }
 
-/// The body force on a run of points.
+/// The values of a run that begins with these points. Mostly some of them have successive numbers.
+#[inline(always)]
+fn pick<T: Real, const POINT: usize>(
+    values: &[Vec<T>; POINT],
+    points: &[u32],
+) -> [[T; RUN]; POINT] {
+    const TOGETHER: usize = BLOCK / 2;
+    let mut picked = [[T::zero(); RUN]; POINT];
+    for (index, points) in points.chunks(TOGETHER).enumerate() {
+        let place = index * TOGETHER;
+        let first = successive(points);
+        for (picked, values) in picked.iter_mut().zip(values) {
+            if let Some(first) = first
+                && let Some(from) = values[first..].first_chunk::<TOGETHER>()
+            {
+                picked[place..place + TOGETHER].copy_from_slice(from);
+            } else {
+                for (i, &n) in points.iter().enumerate() {
+                    picked[place + i] = values[n as usize];
+                }
+            }
+        }
+    }
+    picked
+}
+
+/// The body force on the first points of a run.
 #[inline(always)]
 fn body_forces<S, T: Real, const D: usize, const TIME: usize, const POINT: usize>(
     solution: &S,
     time: &[T; TIME],
-    run: &[&[T; BLOCK]; POINT],
-    components: &mut [[T; BLOCK]; D],
+    run: &[&[T; RUN]; POINT],
+    b: &mut [SVector<T, D>],
 ) where
     S: BodyForceStages<T, D, TIME, POINT>,
 {
-    if !spread::<true, _, _, D, TIME, POINT>(solution, time, run, components) {
-        spread::<false, _, _, D, TIME, POINT>(solution, time, run, components);
+    // A whole run as a loop of fixed length, which needs no steps of single points.
+    if let Some(whole) = b.first_chunk_mut::<RUN>() {
+        if !spread::<true, _, _, D, TIME, POINT>(solution, time, run, whole) {
+            spread::<false, _, _, D, TIME, POINT>(solution, time, run, whole);
+        }
+    } else if !spread::<true, _, _, D, TIME, POINT>(solution, time, run, b) {
+        spread::<false, _, _, D, TIME, POINT>(solution, time, run, b);
     }
 }
 
-/// Whether all values are finite: if not, a ratio was not near one, or there is no force. As a function of its own, which
+/// Whether all values are numbers: if not, a ratio was not near one, or there is no force. As a function of its own, which
 /// tells the compiler that the arrays are in different places. Generic instead of taking a closure, which is not always
 /// inlined: the loop then goes point by point.
 #[inline(always)]
 fn spread<const NEAR: bool, S, T: Real, const D: usize, const TIME: usize, const POINT: usize>(
     solution: &S,
     time: &[T; TIME],
-    run: &[&[T; BLOCK]; POINT],
-    components: &mut [[T; BLOCK]; D],
+    run: &[&[T; RUN]; POINT],
+    b: &mut [SVector<T, D>],
 ) -> bool
 where
     S: BodyForceStages<T, D, TIME, POINT>,
 {
-    for i in 0..BLOCK {
-        let value = solution.body_force_staged::<NEAR>(time, &array::from_fn(|m| run[m][i]));
-        for d in 0..D {
-            components[d][i] = value[d];
-        }
+    let mut numbers = true;
+    for (i, b) in b.iter_mut().enumerate() {
+        *b = solution.body_force_staged::<NEAR>(time, &array::from_fn(|m| run[m][i]));
+        numbers &= b.iter().fold(true, |all, value| all & value.is_number());
     }
-    all_finite(components)
-}
-
-#[inline(always)]
-fn all_finite<T: Real>(rows: &[[T; BLOCK]]) -> bool {
-    let mut finite = true;
-    for row in rows {
-        for value in row {
-            finite &= value.is_finite();
-        }
-    }
-    finite
+    numbers
 }
 
 impl<S, T: Real, const D: usize, const TIME: usize, const POINT: usize> BodyForceAtPoints<T, D>
@@ -425,15 +433,6 @@ where
         let Ok(time) = time.try_into() else {
             panic!("{TIME} values of the time are needed, not {}", time.len());
         };
-        if let Some(first) = successive(points)
-            && first + points.len() <= self.len
-        {
-            self.runs(time, Numbers::From(first), b);
-            return;
-        }
-        if let Some(&n) = points.iter().find(|&&n| n as usize >= self.len) {
-            panic!("point {n} was asked for; there are {}", self.len);
-        }
         self.runs(time, Numbers::Of(points), b);
     }
 
@@ -451,8 +450,8 @@ impl<S, T: Real, const TIME: usize, const POINT: usize> StagedPoints<S, T, TIME,
     where
         S: BodyForceStages<T, D, TIME, POINT>,
     {
-        let Self { solution, values, .. } = self;
-        Arch::new().dispatch(Runs { solution, time, values, numbers, b });
+        let Self { solution, values, len, .. } = self;
+        Arch::new().dispatch(Runs { solution, time, values, len: *len, numbers, b });
     }
 }
 
@@ -511,7 +510,7 @@ where
     }
 }
 
-/// Whether all stresses are finite. As a function of its own, which tells the compiler that `block` and `run` are in different
+/// Whether all stresses are numbers. As a function of its own, which tells the compiler that `block` and `run` are in different
 /// places.
 #[inline(always)]
 fn fill<
@@ -531,10 +530,13 @@ fn fill<
 where
     S: StateStages<T, D, TIME, VELOCITY_TIME, POINT>,
 {
+    let mut numbers = true;
     for n in 0..BLOCK {
-        run.put(n, &solution.state_staged::<NEAR>(time, velocity_time, &point(block, n)));
+        let state = solution.state_staged::<NEAR>(time, velocity_time, &point(block, n));
+        run.put(n, &state);
+        numbers &= state.P.iter().fold(true, |all, value| all & value.is_number());
     }
-    all_finite(run.P.as_flattened())
+    numbers
 }
 
 /// The positions of points, for solutions that keep nothing else.

@@ -308,7 +308,7 @@ fn the_short_way_to_the_stress_is_taken_near_volumes_as_they_were_and_has_the_sa
             if D > 1 {
                 F[(0, D - 1)] = 0.3;
             }
-            let expected = (0.5_f64.sqrt()..2.0_f64.sqrt()).contains(&J);
+            let expected = (0.5..2.0).contains(&J);
             assert_eq!(law.is_short(&F), expected, "{J}");
             if expected {
                 assert_eq!(law.kirchhoff_short(&F), law.kirchhoff(&F), "{J}");
@@ -322,7 +322,7 @@ fn the_short_way_to_the_stress_is_taken_near_volumes_as_they_were_and_has_the_sa
             assert_eq!(any.kirchhoff_short(&F), any.kirchhoff(&F));
             assert_eq!(plain.kirchhoff_short(&F), plain.kirchhoff(&F));
         }
-        assert!(short > 60 && long > 300);
+        assert!(short > 140 && long > 200);
     }
     check::<1>();
     check::<2>();

@@ -144,15 +144,38 @@ MMSMITH_FN double mmsmith_cos_pi(double x)
 #ifndef MMSMITH_LOGARITHM
 #define MMSMITH_LOGARITHM 1
 
-/* ln(y) where by_y, else ln(1 + x), by the reduction and the polynomial of Sun's fdlibm. */
+/*
+ * h - t of ln(1 + f) = f - (h - t), for f from -1/2 to 1: h = f^2/2, t = s (h + R) with s = f/(2 + f), and R the polynomial of
+ * degree ten in s^2 next to 2 artanh(s)/s - 2.
+ */
+MMSMITH_FN double mmsmith_rest_of_logarithm(double f)
+{
+    const double s = f / (2.0 + f);
+    const double z = s * s;
+    const double square = z * z;
+    const double fourth = square * square;
+    const double a = 6.666666666666631e-1 + z * 4.0000000000157265e-1;
+    const double b = 2.857142854785134e-1 + z * 2.222222396988407e-1;
+    const double c = 1.818174391978506e-1 + z * 1.538656002655927e-1;
+    const double d = 1.3300972308611736e-1 + z * 1.2106095736684865e-1;
+    const double e = 8.340062622941338e-2 + z * 1.7018643055517807e-1;
+    const double R = z * ((a + square * b) + fourth * ((c + square * d) + fourth * e));
+    const double half_square = 0.5 * f * f;
+    return half_square - s * (half_square + R);
+}
+
+/* ln(y) where by_y, else ln(1 + x); reduced as in Sun's fdlibm, but for arguments near one, which are taken as they are. */
 MMSMITH_FN double mmsmith_logarithm(double x, double y, int by_y)
 {
     const double sum = 1.0 + x;
     const double u = by_y ? y : sum;
     /* What rounding took from the sum. */
     const double lost = by_y ? 0.0 : x - (sum - 1.0);
-    double m, f, s, z, w, even, odd, half_square, tail;
+    double m, f;
     int k;
+    if (x >= -0.5 && x < 1.0) {
+        return x - mmsmith_rest_of_logarithm(x);
+    }
     if (!(u > 0.0 && u - u == 0.0)) {
         return u == 0.0 ? -HUGE_VAL : u > 0.0 ? u : NAN;
     }
@@ -162,18 +185,10 @@ MMSMITH_FN double mmsmith_logarithm(double x, double y, int by_y)
         m += m;
         --k;
     }
-    /* m - 1 with the digits that the sum has lost; x itself if k = 0. */
+    /* m - 1, with the digits that the sum has lost. */
     f = (m - 1.0) + ldexp(lost, -k);
-    s = f / (2.0 + f);
-    z = s * s;
-    w = z * z;
-    even = w * (3.9999999999409419e-1 + w * (2.2222198432149784e-1 + w * 1.5313837699209373e-1));
-    odd = z
-        * (6.6666666666667351e-1
-            + w * (2.8571428743662391e-1 + w * (1.818357216161805e-1 + w * 1.4798198605116586e-1)));
-    half_square = 0.5 * f * f;
-    tail = s * (half_square + (even + odd)) + k * 1.9082149292705877e-10;
-    return k * 6.931471803691238e-1 - ((half_square - tail) - f);
+    return k * 6.931471803691238e-1
+        - ((mmsmith_rest_of_logarithm(f) - k * 1.9082149292705877e-10) - f);
 }
 
 /* ln(1 + x), within one unit in the last place. */
