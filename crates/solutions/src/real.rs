@@ -270,7 +270,7 @@ fn logarithm(x: f64, y: f64, by_y: bool) -> f64 {
     const WHOLE_ONE: f64 = 4_503_599_627_370_496.0 + 1023.0;
     const LN2_HIGH: f64 = 6.931_471_803_691_238e-1;
     const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
-    /// Still a normal number when 2^54 is taken from it.
+    /// Smaller ones are multiplied by 2^54, so that their scale is a number.
     const TINY: f64 = 1e-290;
     const TWO_TO_54: f64 = 18_014_398_509_481_984.0;
 
