@@ -62,7 +62,7 @@ fn thorough_check_states_the_worst_factor_of_each_field_in_each_class() {
     for result in results {
         assert_eq!(result["code"], "generated");
         let rows = result["accuracy"].as_array().unwrap();
-        let staged = ["b staged", "u staged", "v staged", "F staged", "P staged"];
+        let staged = ["b staged", "b lattice", "u staged", "v staged", "F staged", "P staged"];
         for field in ["u", "v", "a", "H", "F", "J", "P", "b"].into_iter().chain(staged) {
             let row = rows.iter().find(|row| row["field"] == field && row["class"] == "ordinary");
             assert!(row.unwrap()["K"].as_f64().unwrap() <= 8.0, "{field}");

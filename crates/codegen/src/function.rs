@@ -94,6 +94,11 @@ impl<'a> Translator<'a> {
             Operand::Kept(Stage::Fixed, index) => ("self.fixed", index),
             Operand::Kept(Stage::Time, index) => ("time", index),
             Operand::Kept(Stage::Point, index) => ("point", index),
+            Operand::Kept(Stage::Layer(axis), index) => {
+                text.push_str("layers[");
+                push_index(text, axis);
+                ("]", index)
+            }
         };
         text.extend([name, "["]);
         push_index(text, index);

@@ -713,6 +713,8 @@ before. Results equal those of the Rust functions bit for bit where the compiler
                 (false, 1) => return text.push_str("point[stride]"),
                 (false, _) => ("point[", index, " * stride]"),
             },
+            // The header has no form for lattices.
+            Operand::Kept(Stage::Layer(_), index) => ("layer[", index, "]"),
         };
         text.push_str(before);
         push_index(text, index);
@@ -788,7 +790,10 @@ impl Given {
     /// Whether the operand is found in it.
     fn is(self, operand: Operand<'_>) -> bool {
         match operand {
-            Operand::Temporary(_) | Operand::Number(_) | Operand::Pi => false,
+            Operand::Temporary(_)
+            | Operand::Number(_)
+            | Operand::Pi
+            | Operand::Kept(Stage::Layer(_), _) => false,
             Operand::Coordinate(_) => matches!(self, Given::Position),
             Operand::Time => matches!(self, Given::Time),
             Operand::Parameter(_) | Operand::Kept(Stage::Fixed, _) => {

@@ -1,7 +1,7 @@
 //! The items of one solution, and the files that hold them.
 
 use crate::function::{Translator, fill, float};
-use crate::plan::{Measures, Plan, Shape, Stages};
+use crate::plan::{Block, Measures, Plan, Shape, Stages};
 use crate::text::{meaning, one_line};
 use mmsmith_expr::Slot;
 use mmsmith_spec::{Boundary, Condition, DeriveError, Material, Spec, Surface};
@@ -182,11 +182,13 @@ impl Generator<'_> {
         let (body_force, time, point) = self.body_force_stages();
         let (state, state_time, velocity_time, state_point) = self.state_stages();
         let dimension = Literal::usize_unsuffixed(self.spec.dimension);
+        let (on_lattice, lattice_items) = self.body_force_on_lattice(&solution).unzip();
         solution_items.extend(quote! {
             fn body_force_at(
                 &self,
                 X: &[#runtime::nalgebra::SVector<T, #dimension>],
             ) -> ::std::boxed::Box<dyn #runtime::BodyForceAtPoints<T, #dimension> + '_> {
+                #on_lattice
                 ::std::boxed::Box::new(#runtime::StagedPoints::<Self, T, #time, #point>::new(*self, X))
             }
             fn state_at(
@@ -238,6 +240,8 @@ impl Generator<'_> {
             impl<T: #runtime::Real> #runtime::BodyForceStages<T, #dimension, #time, #point> for #solution<T> {
                 #body_force
             }
+
+            #lattice_items
 
             #[allow(unused_variables, clippy::all, clippy::pedantic)]
             impl<T: #runtime::Real>
@@ -415,6 +419,81 @@ impl Generator<'_> {
             }
         };
         (items, time, point)
+    }
+
+    /// Where the body force has a form for lattices: the statement that takes it for points that are one, and the
+    /// implementation of the trait `BodyForceOnLattice`.
+    fn body_force_on_lattice(&self, solution: &Ident) -> Option<(TokenStream, TokenStream)> {
+        let lattice = self.plan.lattice.as_ref()?;
+        let (runtime, vector) = (self.runtime, self.vector());
+        let largest = |count: fn(&Stages) -> usize| -> usize {
+            lattice.layers().iter().map(count).max().unwrap_or(0)
+        };
+        let counts = [Stages::time_count, Stages::point_count, Stages::output_count].map(largest);
+        let [time, point, layer] = counts.map(Literal::usize_unsuffixed);
+        let dimension = Literal::usize_unsuffixed(self.spec.dimension);
+        let of_time = lattice.layers().first()?;
+        let (time_statements, time_values) =
+            self.translator.statements(&self.plan.time_stage(of_time));
+        // One array type for all axes: what one has to spare is zero.
+        let of_axes = |count: usize, blocks: Vec<Block<'_>>| {
+            let arms = blocks.iter().enumerate().map(|(axis, block)| {
+                let axis = Literal::usize_unsuffixed(axis);
+                let (statements, mut values) = self.translator.statements(block);
+                values.resize(count, quote!(T::zero()));
+                quote!(#axis => { #statements [#(#values),*] })
+            });
+            let count = Literal::usize_unsuffixed(count);
+            quote!(match axis { #(#arms)* _ => [T::zero(); #count] })
+        };
+        let layers = lattice.layers().iter();
+        let of_points =
+            of_axes(counts[1], layers.clone().map(|layer| self.plan.point_stage(layer)).collect());
+        let of_layers = of_axes(counts[2], layers.map(|layer| self.plan.staged(layer)).collect());
+        let (statements, values) = self.translator.statements(&self.plan.of_layers(lattice));
+        let b = self.shaped(Shape::Vector, &values);
+        let choice = quote! {
+            if let Some(lattice) = #runtime::Lattice::of(X) {
+                return ::std::boxed::Box::new(
+                    #runtime::LatticePoints::<Self, T, #dimension, #time, #point, #layer>::new(*self, lattice),
+                );
+            }
+        };
+        let items = quote! {
+            #[allow(unused_variables, clippy::all, clippy::pedantic)]
+            impl<T: #runtime::Real>
+                #runtime::BodyForceOnLattice<T, #dimension, #time, #point, #layer> for #solution<T>
+            {
+                #[inline]
+                fn lattice_time(&self, t: T) -> [T; #time] {
+                    #time_statements
+                    [#(#time_values),*]
+                }
+                #[inline]
+                fn lattice_coordinate(&self, axis: usize, X: &#vector) -> [T; #point] {
+                    #of_points
+                }
+                #[inline]
+                fn lattice_layer(
+                    &self,
+                    axis: usize,
+                    time: &[T; #time],
+                    point: &[T; #point],
+                ) -> [T; #layer] {
+                    #of_layers
+                }
+                #[inline(always)]
+                fn lattice_body_force(
+                    &self,
+                    time: &[T; #time],
+                    layers: [&[T; #layer]; #dimension],
+                ) -> #vector {
+                    #statements
+                    #b
+                }
+            }
+        };
+        Some((choice, items))
     }
 
     /// The functions of the trait `StateStages`, and how many values there are of the time, of the time of the velocity,

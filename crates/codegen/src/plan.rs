@@ -18,6 +18,8 @@ pub struct Plan<'a> {
     pub(crate) fields: Vec<Field>,
     /// The body force, arranged for evaluation in stages.
     pub(crate) body_force: Stages,
+    /// The body force at the points of a lattice, where that has a form of its own.
+    pub(crate) lattice: Option<Lattice>,
     /// Displacement, deformation gradient and stress, and the velocity, which may belong to another time: both from what
     /// one stage keeps of a point.
     pub(crate) state: Stages,
@@ -39,6 +41,14 @@ pub(crate) struct Stages {
     outputs: Vec<Slot>,
     time: Vec<Slot>,
     point: Vec<Slot>,
+}
+
+/// Values at the points of a lattice, from values of its layers, in stages.
+pub(crate) struct Lattice {
+    outputs: Vec<Slot>,
+    /// For each axis the values of a layer, from what is kept of its coordinate and from values of the time, which are those
+    /// of all layers.
+    layers: Vec<Stages>,
 }
 
 /// A field of the solution.
@@ -86,6 +96,8 @@ pub(crate) enum Stage {
     Time,
     /// Once a point.
     Point,
+    /// Once a time for each layer of a lattice along this axis.
+    Layer(usize),
 }
 
 /// Where an operation finds a value.
@@ -161,7 +173,9 @@ impl<'a> Plan<'a> {
         outputs.extend(spec.requirements.iter().flat_map(|r| [r.left, r.right]));
         let surfaces = std::mem::take(&mut fields.surfaces);
         outputs.extend(surfaces.iter().flat_map(|s| &s.traction));
-        let program = fields.program(&outputs).with_gathered_factors(staged_places);
+        let program = fields.program(&outputs).with_gathered_factors(staged_places.clone());
+        let separated = program.with_separated_coordinates(staged_places, spec.dimension);
+        let program = separated.unwrap_or(program);
 
         let mut slots = program.outputs().iter().copied();
         let mut take = |n: usize| slots.by_ref().take(n).collect::<Vec<Slot>>();
@@ -190,6 +204,9 @@ impl<'a> Plan<'a> {
         };
         let at_points = program.kept_at_points(&staged, usize::MAX);
         let body_force = stages(staged, at_points);
+        let separated = &program.outputs()[outputs.len()..];
+        let lattice = (!separated.is_empty())
+            .then(|| Lattice::new(&program, &kept, separated.to_vec(), spec.dimension));
         let of = |letters: &[&str]| -> Vec<Slot> {
             let fields = fields.iter().filter(|field| letters.contains(&field.letter));
             fields.flat_map(|field| field.outputs.clone()).collect()
@@ -202,6 +219,7 @@ impl<'a> Plan<'a> {
             program,
             fields,
             body_force,
+            lattice,
             state,
             velocity,
             constants,
@@ -260,6 +278,15 @@ impl<'a> Plan<'a> {
         self.block(&kept, stages.outputs.clone())
     }
 
+    /// The body force at a point of a lattice from the values of its layers.
+    pub(crate) fn of_layers(&self, lattice: &Lattice) -> Block<'_> {
+        let layers = lattice.layers.iter().enumerate();
+        let layers = layers.map(|(axis, stages)| (Stage::Layer(axis), stages.outputs.as_slice()));
+        let uniform = [(Stage::Fixed, self.fixed.as_slice()), (Stage::Time, lattice.time())];
+        let kept: Vec<_> = uniform.into_iter().chain(layers).collect();
+        self.block(&kept, lattice.outputs.clone())
+    }
+
     /// `outputs` from the coordinates, the time, and what the stage of the parameters keeps.
     pub(crate) fn after_parameters(&self, outputs: &[Slot]) -> Block<'_> {
         self.block(&[(Stage::Fixed, &self.fixed)], outputs.to_vec())
@@ -285,7 +312,39 @@ impl<'a> Plan<'a> {
     }
 }
 
+impl Lattice {
+    fn new(
+        program: &Program,
+        kept: &BTreeMap<Slot, (Stage, usize)>,
+        outputs: Vec<Slot>,
+        dimension: usize,
+    ) -> Self {
+        let layers = program.layers(&outputs, dimension);
+        let all: Vec<Slot> = layers.concat().into_iter().chain(outputs.iter().copied()).collect();
+        let time = time_slots(program, kept, &all);
+        let of_axis = |outputs: Vec<Slot>| {
+            let point = program.kept_at_points(&outputs, usize::MAX);
+            Stages { outputs, time: time.clone(), point }
+        };
+        Lattice { outputs, layers: layers.into_iter().map(of_axis).collect() }
+    }
+
+    /// How the values of a layer are computed, for each axis.
+    pub(crate) fn layers(&self) -> &[Stages] {
+        &self.layers
+    }
+
+    fn time(&self) -> &[Slot] {
+        self.layers.first().map_or(&[], |layer| &layer.time)
+    }
+}
+
 impl Stages {
+    /// How many values are computed.
+    pub(crate) fn output_count(&self) -> usize {
+        self.outputs.len()
+    }
+
     /// How many values are kept of the time.
     pub(crate) fn time_count(&self) -> usize {
         self.time.len()

@@ -460,6 +460,28 @@ fn sample(point: usize, input: usize) -> f64 {
 /// Whether the error bound of `after` is hardly larger than that of `before`: at more than half of some sample points
 /// by little, and nowhere by much. At every other point one input is tiny, as an amplitude may be.
 pub(crate) fn as_accurate(before: &Program, after: &Program, inputs: usize) -> bool {
+    let growth = growth_of_bounds(before, after, inputs);
+    // What is not finite any more is infinitely worse.
+    hardly_larger(growth.into_iter().map(|growth| growth.unwrap_or(f64::INFINITY)).collect())
+}
+
+/// The same for a form that need not be defined wherever the other is, only at most points.
+pub(crate) fn as_accurate_where_defined(before: &Program, after: &Program, inputs: usize) -> bool {
+    let growth = growth_of_bounds(before, after, inputs);
+    let known: Vec<f64> = growth.iter().flatten().copied().collect();
+    2 * known.len() >= growth.len() && hardly_larger(known)
+}
+
+fn hardly_larger(mut growth: Vec<f64>) -> bool {
+    growth.sort_by(f64::total_cmp);
+    let usual = growth.get(growth.len() / 2).copied().unwrap_or(1.0);
+    let largest = growth.last().copied().unwrap_or(1.0);
+    usual <= USUAL_GROWTH && largest <= LARGEST_GROWTH
+}
+
+/// How many times as large the bound of each output's error is in `after`, at each of the sample points where it is finite in
+/// `before`; `None` where it is not finite in `after`.
+fn growth_of_bounds(before: &Program, after: &Program, inputs: usize) -> Vec<Option<f64>> {
     let points = 64.max(2 * inputs);
     let mut growth = Vec::new();
     for first in (0..points).step_by(SIDE) {
@@ -469,19 +491,12 @@ pub(crate) fn as_accurate(before: &Program, after: &Program, inputs: usize) -> b
             // Where the point is outside the domain of definition there is nothing to compare.
             let known = old.iter().zip(new).filter(|(old, _)| old.is_finite());
             growth.extend(known.map(|(&old, new)| {
-                // Nothing is as large as nothing; what is not finite any more is infinitely worse.
-                match new.is_finite() {
-                    true if new <= old => 1.0,
-                    true => new / old,
-                    false => f64::INFINITY,
-                }
+                // Nothing is as large as nothing.
+                new.is_finite().then(|| if new <= old { 1.0 } else { new / old })
             }));
         }
     }
-    growth.sort_by(f64::total_cmp);
-    let usual = growth.get(growth.len() / 2).copied().unwrap_or(1.0);
-    let largest = growth.last().copied().unwrap_or(1.0);
-    usual <= USUAL_GROWTH && largest <= LARGEST_GROWTH
+    growth
 }
 
 #[cfg(test)]

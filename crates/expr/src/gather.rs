@@ -51,13 +51,8 @@ impl Program {
         let costs_less = gathered_kept.len() <= kept.len()
             && gathered.cost_at_points(gathered_outputs, &gathered_kept)
                 < self.cost_at_points(outputs, &kept);
-        let input = |operation: &Operation| match operation {
-            Operation::Input(index) => index.checked_add(1),
-            _ => None,
-        };
-        let inputs = self.operations().iter().filter_map(input).max().unwrap_or(0);
-        if costs_less && as_accurate(&self.part(outputs), &gathered.part(gathered_outputs), inputs)
-        {
+        let (before, after) = (self.part(outputs), gathered.part(gathered_outputs));
+        if costs_less && as_accurate(&before, &after, self.input_count()) {
             gathered.compacted()
         } else {
             self.clone()
@@ -65,7 +60,7 @@ impl Program {
     }
 
     /// What `outputs` cost for each point at each time, where the values of `kept` are kept of each point.
-    fn cost_at_points(&self, outputs: &[Slot], kept: &[Slot]) -> usize {
+    pub(crate) fn cost_at_points(&self, outputs: &[Slot], kept: &[Slot]) -> usize {
         let mut seen = vec![false; self.operations().len()];
         let mut stack = outputs.to_vec();
         let mut cost = KEPT_NUMBER * kept.len();

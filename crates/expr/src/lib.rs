@@ -9,7 +9,8 @@
 //! 4. [`arrange`] rewrites expressions that are evaluated at the same points at many times, where asked to.
 //! 5. [`Program::lower`] turns expressions into a list of floating-point operations in which every common
 //!    subexpression is computed once. [`Program::evaluate`] runs it; code generators translate it.
-//! 6. [`Program::with_gathered_factors`] leaves less of it to do for each point at each time, where asked to.
+//! 6. [`Program::with_gathered_factors`] leaves less of it to do for each point at each time, and
+//!    [`Program::with_separated_coordinates`] for each point of a lattice, where asked to.
 //!
 //! The canonical form never expands a product of sums, since that loses digits: it collects like terms,
 //! takes out factors that all terms share, and merges terms that differ in one factor only. Where an author
@@ -49,6 +50,7 @@ mod reciprocal;
 mod replacement;
 mod residue;
 mod reuse;
+mod separate;
 
 pub use arrange::arrange;
 pub use build::BuildError;

@@ -294,6 +294,15 @@ impl Program {
         &self.outputs
     }
 
+    /// One more than the index of the last input.
+    pub(crate) fn input_count(&self) -> usize {
+        let end = |operation: &Operation| match operation {
+            Operation::Input(index) => index.checked_add(1),
+            _ => None,
+        };
+        self.operations.iter().filter_map(end).max().unwrap_or(0)
+    }
+
     /// What the value in `slot` depends on.
     #[must_use]
     pub fn dependence(&self, slot: Slot) -> Dependence {

@@ -4,13 +4,15 @@
 //! be checked before anything is generated from it. It evaluates the straight-line programs that the generator
 //! translates, in double precision, and in the same stages; for work on many points the generated code is still faster.
 
+mod lattice;
 mod staged;
 
+use lattice::LatticeStages;
 use mmsmith_expr::{Drafts, Expr, MOST_KEPT_OF_STATES, Program, Slot, arrange};
 use mmsmith_solutions::nalgebra::{SMatrix, SVector};
 use mmsmith_solutions::{
-    AnySolution, BodyForceAtPoints, Boundary, Condition, Domain, Fields, Material, ParameterError,
-    Solution, StateAtPoints, Surface,
+    AnySolution, BodyForceAtPoints, Boundary, Condition, Domain, Fields, Lattice, Material,
+    ParameterError, Solution, StateAtPoints, Surface,
 };
 use mmsmith_spec::{self as spec, DeriveError, Spec};
 use staged::Stages;
@@ -101,6 +103,8 @@ struct Interpreted<const D: usize> {
     strain_energy: Option<Program>,
     tractions: Vec<(Surface, Program)>,
     body_force_stages: Stages<1>,
+    /// The body force at the points of a lattice, where that has a form of its own.
+    lattice_stages: Option<LatticeStages>,
     /// Of `u`, `F` and `P`, and of `v`.
     state_stages: Stages<2>,
     domain: Domain<f64, D>,
@@ -168,7 +172,9 @@ impl<const D: usize> Interpreted<D> {
             parts.iter().flatten().copied().chain(fields.W).chain(tractions).collect();
         let before_staged = parts[..8].iter().map(Vec::len).sum::<usize>();
         let staged_places = before_staged..before_staged + parts[8].len();
-        let program = fields.program(&outputs).with_gathered_factors(staged_places);
+        let program = fields.program(&outputs).with_gathered_factors(staged_places.clone());
+        let program = program.with_separated_coordinates(staged_places, D).unwrap_or(program);
+        let separated = &program.outputs()[outputs.len()..];
         let mut slots = program.outputs().iter().copied();
         let mut take = |n: usize| slots.by_ref().take(n).collect::<Vec<Slot>>();
         let [u, v, a, H, F, J, P, b, staged] = parts.map(|part| take(part.len()));
@@ -189,6 +195,8 @@ impl<const D: usize> Interpreted<D> {
                 .map(|s| (surface(s.surface), part(&take(s.traction.len()))))
                 .collect(),
             body_force_stages: Stages::new::<D>(&program, [&staged], usize::MAX),
+            lattice_stages: (!separated.is_empty())
+                .then(|| LatticeStages::new::<D>(&program, separated)),
             state_stages: Stages::new::<D>(&program, [&state, &v], MOST_KEPT_OF_STATES),
             domain,
             boundaries: spec.boundaries.iter().map(boundary).collect(),
@@ -269,6 +277,11 @@ impl<const D: usize> Solution<f64, D> for Interpreted<D> {
     }
 
     fn body_force_at(&self, X: &[SVector<f64, D>]) -> Box<dyn BodyForceAtPoints<f64, D> + '_> {
+        if let Some(stages) = &self.lattice_stages
+            && let Some(lattice) = Lattice::of(X)
+        {
+            return Box::new(stages.at(lattice, &self.parameters, self));
+        }
         Box::new(self.body_force_stages.at(X, &self.parameters))
     }
 

@@ -6,24 +6,30 @@ use mmsmith_solutions::nalgebra::SVector;
 use mmsmith_solutions::{BLOCK, BodyForceAtPoints, StateAtPoints, StateRun};
 
 /// One number for each point of a block.
-type Row = [f64; BLOCK];
+pub(crate) type Row = [f64; BLOCK];
 
 /// A section with the program of what is the same at all points.
-struct Stage {
-    section: Section,
+pub(crate) struct Stage {
+    pub(crate) section: Section,
     uniform: Program,
 }
 
 impl Stage {
-    fn new(program: &Program, outputs: &[Slot], given: &[Slot]) -> Self {
+    pub(crate) fn new(program: &Program, outputs: &[Slot], given: &[Slot]) -> Self {
         let (section, uniform) = program.section(outputs, given);
         Stage { section, uniform }
     }
 
-    fn uniform<const D: usize>(&self, t: f64, parameters: &[f64]) -> Vec<f64> {
+    pub(crate) fn uniform<const D: usize>(&self, t: f64, parameters: &[f64]) -> Vec<f64> {
         // These values read no position.
         self.uniform.evaluate(&inputs::<D>(&SVector::zeros(), t, parameters))
     }
+}
+
+/// Where a program reads a coordinate; `None` where nothing does.
+pub(crate) fn coordinate(program: &Program, axis: usize) -> Option<Slot> {
+    let operations = program.operations();
+    program.slots().find(|slot| operations[slot.index()] == Operation::Input(axis))
 }
 
 /// How outputs are computed at points that stay: what is kept of a point once, and `N` groups of outputs from it, each
@@ -44,12 +50,8 @@ impl<const N: usize> Stages<N> {
         most: usize,
     ) -> Self {
         let kept = program.kept_at_points(&outputs.concat(), most);
-        let coordinate = |axis: usize| {
-            let operations = program.operations();
-            program.slots().find(|slot| operations[slot.index()] == Operation::Input(axis))
-        };
         let (axes, coordinates): (Vec<usize>, Vec<Slot>) =
-            (0..D).filter_map(|axis| Some((axis, coordinate(axis)?))).unzip();
+            (0..D).filter_map(|axis| Some((axis, coordinate(program, axis)?))).unzip();
         Stages {
             axes,
             at_points: Stage::new(program, &kept, &coordinates),

@@ -53,7 +53,7 @@ pub enum AccuracyError {
 /// The worst factor of one field in one class.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Worst {
-    /// The letter of the field; `b staged` and the like for those by way of stages.
+    /// The letter of the field; `b staged` and the like for those by way of stages, `b lattice` for points of a lattice.
     pub field: &'static str,
     /// The entry, row by row from 0.
     pub entry: usize,
@@ -144,8 +144,12 @@ impl<'a> Accuracy<'a> {
             .collect();
         let (inputs, definitions, b) = (&fields.inputs, &fields.definitions, &fields.b);
         let staged = arrange(&mut fields.graph, inputs, definitions, &mut Drafts::default(), b);
-        programs.retain(|(letter, _)| *letter != "b staged");
-        let staged = fields.program(&staged).with_gathered_factors(0..staged.len());
+        programs.retain(|(letter, _)| !["b staged", "b lattice"].contains(letter));
+        let count = staged.len();
+        let staged = fields.program(&staged).with_gathered_factors(0..count);
+        let separated = staged.with_separated_coordinates(0..count, self.spec.dimension);
+        let on_lattice = separated.map(|program| program.part(&program.outputs()[count..]));
+        programs.push(("b lattice", on_lattice.unwrap_or_else(|| staged.clone())));
         programs.push(("b staged", staged));
         programs
     }
@@ -406,6 +410,7 @@ fn by_letter(fields: &Fields) -> Vec<(&'static str, Vec<Expr>)> {
         ("P", fields.P.concat()),
         ("b", fields.b.clone()),
         ("b staged", fields.b.clone()),
+        ("b lattice", fields.b.clone()),
         ("u staged", fields.u.clone()),
         ("v staged", fields.v.clone()),
         ("F staged", fields.F.concat()),

@@ -17,6 +17,7 @@ mod domain;
 // Formatted by the generator; the formatter would differ in small things.
 #[rustfmt::skip]
 mod generated;
+mod lattice;
 mod parameters;
 mod real;
 mod solution;
@@ -24,6 +25,7 @@ mod staged;
 
 pub use domain::{Boundary, Condition, Domain, Surface};
 pub use generated::*;
+pub use lattice::{BodyForceOnLattice, Lattice, LatticePoints};
 /// The vectors and matrices of this crate's interface.
 pub use nalgebra;
 pub use parameters::{Description, Parameter, ParameterError};

@@ -1,5 +1,6 @@
 //! What every manufactured solution can do.
 
+use crate::lattice::POINTS_A_LAYER;
 use crate::staged::PlainPoints;
 use crate::{BLOCK, BodyForceAtPoints, Boundary, Domain, Real, StateAtPoints, StateRun, Surface};
 use nalgebra::{SMatrix, SVector};
@@ -147,8 +148,8 @@ pub enum AnySolution<T: Real> {
 
 impl AnySolution<f64> {
     /// Every field at position `X` and time `t`, each by its own function, with its letter and its entries row by row;
-    /// last, as `b staged`, the body force by way of [`Solution::body_force_at`], and as `u staged`, `v staged`, `F staged` and
-    /// `P staged` the fields of [`Solution::state_at`].
+    /// last, as `b staged` and `b lattice`, the body force by way of [`Solution::body_force_at`] of one point and of many that
+    /// share their coordinates, and as `u staged`, `v staged`, `F staged` and `P staged` the fields of [`Solution::state_at`].
     ///
     /// `None` where `X` has not as many coordinates as the solution has dimensions.
     #[must_use]
@@ -161,6 +162,9 @@ impl AnySolution<f64> {
     }
 }
 
+/// A point so often counts as a lattice.
+const ENOUGH_FOR_LATTICE: usize = 3 * POINTS_A_LAYER;
+
 fn each_field<const D: usize>(
     solution: &dyn Solution<f64, D>,
     X: &[f64],
@@ -169,8 +173,9 @@ fn each_field<const D: usize>(
     let X = &SVector::from(<[f64; D]>::try_from(X).ok()?);
     let vector = |v: SVector<f64, D>| v.iter().copied().collect();
     let matrix = |A: SMatrix<f64, D, D>| A.transpose().iter().copied().collect();
-    let mut staged = [SVector::zeros()];
+    let [mut staged, mut on_lattice] = [[SVector::zeros()]; 2];
     solution.body_force_at(&[*X]).evaluate(t, 0, &mut staged);
+    solution.body_force_at(&[*X; ENOUGH_FOR_LATTICE]).evaluate(t, 0, &mut on_lattice);
     let mut run = [StateRun::zero()];
     solution.state_at(&[*X]).evaluate(t, t, 0, &mut run);
     let [run] = run;
@@ -186,6 +191,7 @@ fn each_field<const D: usize>(
         ("P", matrix(solution.first_piola_kirchhoff(X, t))),
         ("b", vector(solution.body_force(X, t))),
         ("b staged", vector(staged[0])),
+        ("b lattice", vector(on_lattice[0])),
         ("u staged", first(run.u)),
         ("v staged", first(run.v)),
         ("F staged", firsts(run.F)),

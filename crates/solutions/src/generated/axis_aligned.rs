@@ -682,6 +682,11 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
+        if let Some(lattice) = crate::Lattice::of(X) {
+            return ::std::boxed::Box::new(
+                crate::LatticePoints::<Self, T, 2, 10, 2, 3>::new(*self, lattice),
+            );
+        }
         ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 10, 4>::new(*self, X))
     }
     fn state_at(
@@ -758,6 +763,102 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 10, 4> for AxisAligned<T> {
         let t240 = time[3] - t239;
         let t241 = point[3] * t240;
         crate::nalgebra::SVector::<T, 2>::new(t228, t241)
+    }
+}
+#[allow(unused_variables, clippy::all, clippy::pedantic)]
+impl<T: crate::Real> crate::BodyForceOnLattice<T, 2, 10, 2, 3> for AxisAligned<T> {
+    #[inline]
+    fn lattice_time(&self, t: T) -> [T; 10] {
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.cos_pi();
+        let t10 = t7.sin_pi();
+        let t14 = self.fixed[1] * t8;
+        let t17 = self.fixed[1] * t10;
+        let t89 = self.fixed[7] * t8;
+        let t121 = self.fixed[7] * t10;
+        let t213 = t8 * t8;
+        let t214 = t213 * t8;
+        let t215 = self.fixed[9] * t214;
+        let t217 = self.fixed[10] * t213;
+        let t223 = self.fixed[11] * t8;
+        let t229 = t10 * t10;
+        let t230 = t229 * t10;
+        let t231 = self.fixed[9] * t230;
+        let t233 = self.fixed[10] * t229;
+        let t236 = self.fixed[11] * t10;
+        [t14, t17, t89, t121, t215, t217, t223, t231, t233, t236]
+    }
+    #[inline]
+    fn lattice_coordinate(
+        &self,
+        axis: usize,
+        X: &crate::nalgebra::SVector<T, 2>,
+    ) -> [T; 2] {
+        match axis {
+            0 => {
+                let t13 = X[0].cos_pi();
+                let t23 = X[0].sin_pi();
+                [t13, t23]
+            }
+            1 => {
+                let t16 = X[1].cos_pi();
+                let t26 = X[1].sin_pi();
+                [t16, t26]
+            }
+            _ => [T::zero(); 2],
+        }
+    }
+    #[inline]
+    fn lattice_layer(&self, axis: usize, time: &[T; 10], point: &[T; 2]) -> [T; 3] {
+        match axis {
+            0 => {
+                let t15 = time[0] * point[0];
+                let t20 = t15 + T::one();
+                let t216 = time[4] * point[0];
+                let t218 = t216 + time[5];
+                let t219 = point[0] * t218;
+                let t242 = t15.ln_of_both(t20);
+                let t244 = time[6] * t242;
+                let t245 = t219 + t244;
+                let t246 = t20 * t20;
+                let t247 = t245 / t246;
+                let t248 = time[2] - t247;
+                let t254 = point[1] * t248;
+                let t255 = time[6] * point[1];
+                let t256 = t255 / t246;
+                let t259 = time[9] * t242;
+                [t254, t256, t259]
+            }
+            1 => {
+                let t18 = time[1] * point[0];
+                let t21 = t18 + T::one();
+                let t232 = time[7] * point[0];
+                let t234 = t232 + time[8];
+                let t235 = point[0] * t234;
+                let t243 = t18.ln_of_both(t21);
+                let t249 = time[9] * t243;
+                let t250 = t235 + t249;
+                let t251 = t21 * t21;
+                let t252 = t250 / t251;
+                let t253 = time[3] - t252;
+                let t260 = point[1] / t251;
+                let t262 = point[1] * t253;
+                [t243, t260, t262]
+            }
+            _ => [T::zero(); 3],
+        }
+    }
+    #[inline(always)]
+    fn lattice_body_force(
+        &self,
+        time: &[T; 10],
+        layers: [&[T; 3]; 2],
+    ) -> crate::nalgebra::SVector<T, 2> {
+        let t257 = layers[0][1] * layers[1][0];
+        let t258 = layers[0][0] - t257;
+        let t261 = layers[0][2] * layers[1][1];
+        let t263 = layers[1][2] - t261;
+        crate::nalgebra::SVector::<T, 2>::new(t258, t263)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

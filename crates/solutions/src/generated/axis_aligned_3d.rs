@@ -1102,6 +1102,11 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 3>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 3> + '_> {
+        if let Some(lattice) = crate::Lattice::of(X) {
+            return ::std::boxed::Box::new(
+                crate::LatticePoints::<Self, T, 3, 15, 2, 5>::new(*self, lattice),
+            );
+        }
         ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 15, 6>::new(*self, X))
     }
     fn state_at(
@@ -1224,6 +1229,163 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 15, 6> for AxisAligned3d<T> {
         let t385 = t384 - time[5];
         let t386 = point[5] * t385;
         crate::nalgebra::SVector::<T, 3>::new(t356, t371, t386)
+    }
+}
+#[allow(unused_variables, clippy::all, clippy::pedantic)]
+impl<T: crate::Real> crate::BodyForceOnLattice<T, 3, 15, 2, 5> for AxisAligned3d<T> {
+    #[inline]
+    fn lattice_time(&self, t: T) -> [T; 15] {
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = t7.cos_pi();
+        let t13 = self.fixed[1] * t11;
+        let t14 = t8 - t13;
+        let t18 = t8 + t13;
+        let t23 = self.fixed[3] * t8;
+        let t26 = self.fixed[4] * t14;
+        let t30 = self.fixed[4] * t18;
+        let t138 = self.fixed[13] * t8;
+        let t161 = self.fixed[16] * t14;
+        let t181 = self.fixed[16] * t18;
+        let t337 = t8 * t8;
+        let t338 = t337 * t8;
+        let t339 = self.fixed[18] * t338;
+        let t341 = self.fixed[19] * t337;
+        let t351 = self.fixed[20] * t8;
+        let t359 = t14 * t14;
+        let t360 = t359 * t14;
+        let t361 = self.fixed[21] * t360;
+        let t363 = self.fixed[22] * t359;
+        let t366 = self.fixed[23] * t14;
+        let t374 = t18 * t18;
+        let t375 = t374 * t18;
+        let t376 = self.fixed[21] * t375;
+        let t378 = self.fixed[22] * t374;
+        let t381 = self.fixed[23] * t18;
+        [
+            t23,
+            t26,
+            t30,
+            t138,
+            t161,
+            t181,
+            t339,
+            t341,
+            t351,
+            t361,
+            t363,
+            t366,
+            t376,
+            t378,
+            t381,
+        ]
+    }
+    #[inline]
+    fn lattice_coordinate(
+        &self,
+        axis: usize,
+        X: &crate::nalgebra::SVector<T, 3>,
+    ) -> [T; 2] {
+        match axis {
+            0 => {
+                let t22 = X[0].cos_pi();
+                let t39 = X[0].sin_pi();
+                [t22, t39]
+            }
+            1 => {
+                let t25 = X[1].cos_pi();
+                let t42 = X[1].sin_pi();
+                [t25, t42]
+            }
+            2 => {
+                let t29 = X[2].cos_pi();
+                let t46 = X[2].sin_pi();
+                [t29, t46]
+            }
+            _ => [T::zero(); 2],
+        }
+    }
+    #[inline]
+    fn lattice_layer(&self, axis: usize, time: &[T; 15], point: &[T; 2]) -> [T; 5] {
+        match axis {
+            0 => {
+                let t24 = time[0] * point[0];
+                let t34 = t24 + T::one();
+                let t340 = time[6] * point[0];
+                let t342 = t340 + time[7];
+                let t343 = point[0] * t342;
+                let t387 = t24.ln_of_both(t34);
+                let t390 = time[8] * t387;
+                let t391 = t343 + t390;
+                let t392 = t34 * t34;
+                let t393 = t391 / t392;
+                let t394 = time[3] - t393;
+                let t405 = point[1] * t394;
+                let t406 = time[8] * point[1];
+                let t407 = t406 / t392;
+                let t412 = time[11] * t387;
+                let t421 = time[14] * t387;
+                [t405, t407, t412, t421, T::zero()]
+            }
+            1 => {
+                let t27 = time[1] * point[0];
+                let t28 = -t27;
+                let t329 = T::one() - t27;
+                let t362 = time[9] * point[0];
+                let t364 = t362 - time[10];
+                let t365 = point[0] * t364;
+                let t388 = t28.ln_of_both(t329);
+                let t395 = time[11] * t388;
+                let t396 = t365 + t395;
+                let t397 = t329 * t329;
+                let t398 = t396 / t397;
+                let t399 = t398 - time[4];
+                let t413 = point[1] / t397;
+                let t415 = time[11] * point[1];
+                let t416 = t415 / t397;
+                let t418 = point[1] * t399;
+                let t424 = time[14] * t388;
+                [t388, t413, t416, t418, t424]
+            }
+            2 => {
+                let t31 = time[2] * point[0];
+                let t32 = -t31;
+                let t330 = T::one() - t31;
+                let t377 = time[12] * point[0];
+                let t379 = t377 - time[13];
+                let t380 = point[0] * t379;
+                let t389 = t32.ln_of_both(t330);
+                let t400 = time[14] * t389;
+                let t401 = t380 + t400;
+                let t402 = t330 * t330;
+                let t403 = t401 / t402;
+                let t404 = t403 - time[5];
+                let t422 = point[1] / t402;
+                let t426 = point[1] * t404;
+                [t389, t422, t426, T::zero(), T::zero()]
+            }
+            _ => [T::zero(); 5],
+        }
+    }
+    #[inline(always)]
+    fn lattice_body_force(
+        &self,
+        time: &[T; 15],
+        layers: [&[T; 5]; 3],
+    ) -> crate::nalgebra::SVector<T, 3> {
+        let t408 = layers[0][1] * layers[1][0];
+        let t409 = layers[0][1] * layers[2][0];
+        let t410 = layers[0][0] - t408;
+        let t411 = t410 - t409;
+        let t414 = layers[0][2] * layers[1][1];
+        let t417 = layers[1][2] * layers[2][0];
+        let t419 = t414 + t417;
+        let t420 = t419 + layers[1][3];
+        let t423 = layers[0][3] * layers[2][1];
+        let t425 = layers[1][4] * layers[2][1];
+        let t427 = t423 + t425;
+        let t428 = t427 + layers[2][2];
+        crate::nalgebra::SVector::<T, 3>::new(t411, t420, t428)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

@@ -515,6 +515,11 @@ impl<T: crate::Real> crate::Solution<T, 2> for RigidMotion<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
+        if let Some(lattice) = crate::Lattice::of(X) {
+            return ::std::boxed::Box::new(
+                crate::LatticePoints::<Self, T, 2, 5, 1, 2>::new(*self, lattice),
+            );
+        }
         ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 5, 2>::new(*self, X))
     }
     fn state_at(
@@ -585,6 +590,88 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 5, 2> for RigidMotion<T> {
         let t119 = time[4] * point[1];
         let t120 = t117 + t119;
         crate::nalgebra::SVector::<T, 2>::new(t115, t120)
+    }
+}
+#[allow(unused_variables, clippy::all, clippy::pedantic)]
+impl<T: crate::Real> crate::BodyForceOnLattice<T, 2, 5, 1, 2> for RigidMotion<T> {
+    #[inline]
+    fn lattice_time(&self, t: T) -> [T; 5] {
+        let t6 = self.fixed[0] * t;
+        let t7 = t6.sin_pi();
+        let t10 = self.fixed[1] * t7;
+        let t11 = t10.sin();
+        let t14 = t10.cos();
+        let t30 = t6.cos_pi();
+        let t49 = t30 * t30;
+        let t66 = t11 * t11;
+        let t69 = t14 * t11;
+        let t85 = t69 + t69;
+        let t86 = t14 * t14;
+        let t87 = t86 - t66;
+        let t88 = t66 - t86;
+        let t89 = t7 * t85;
+        let t90 = self.parameters.A * t89;
+        let t91 = t49 * t88;
+        let t92 = self.fixed[4] * t91;
+        let t93 = t90 + t92;
+        let t94 = t7 * t87;
+        let t95 = self.parameters.A * t94;
+        let t96 = t49 * t85;
+        let t97 = self.fixed[4] * t96;
+        let t98 = t95 + t97;
+        let t99 = t7 * t88;
+        let t100 = self.parameters.A * t96;
+        let t101 = t99 - t100;
+        let t102 = t49 * t87;
+        let t103 = self.parameters.A * t102;
+        let t104 = t89 - t103;
+        let t106 = self.fixed[10] * t7;
+        let t107 = -t106;
+        let t108 = self.fixed[5] * t93;
+        let t109 = -t108;
+        let t112 = self.fixed[5] * t98;
+        let t116 = self.fixed[6] * t101;
+        let t118 = self.fixed[6] * t104;
+        [t107, t109, t112, t116, t118]
+    }
+    #[inline]
+    fn lattice_coordinate(
+        &self,
+        axis: usize,
+        X: &crate::nalgebra::SVector<T, 2>,
+    ) -> [T; 1] {
+        match axis {
+            0 => [X[0]],
+            1 => [X[1]],
+            _ => [T::zero(); 1],
+        }
+    }
+    #[inline]
+    fn lattice_layer(&self, axis: usize, time: &[T; 5], point: &[T; 1]) -> [T; 2] {
+        match axis {
+            0 => {
+                let t110 = time[1] * point[0];
+                let t111 = time[0] - t110;
+                let t117 = time[3] * point[0];
+                [t111, t117]
+            }
+            1 => {
+                let t119 = time[4] * point[0];
+                let t121 = time[2] * point[0];
+                [t119, t121]
+            }
+            _ => [T::zero(); 2],
+        }
+    }
+    #[inline(always)]
+    fn lattice_body_force(
+        &self,
+        time: &[T; 5],
+        layers: [&[T; 2]; 2],
+    ) -> crate::nalgebra::SVector<T, 2> {
+        let t120 = layers[0][1] + layers[1][0];
+        let t122 = layers[0][0] + layers[1][1];
+        crate::nalgebra::SVector::<T, 2>::new(t122, t120)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

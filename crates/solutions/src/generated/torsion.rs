@@ -677,6 +677,11 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 3>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 3> + '_> {
+        if let Some(lattice) = crate::Lattice::of(X) {
+            return ::std::boxed::Box::new(
+                crate::LatticePoints::<Self, T, 3, 7, 1, 4>::new(*self, lattice),
+            );
+        }
         ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 4, 3>::new(*self, X))
     }
     fn state_at(
@@ -742,6 +747,100 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 3> for Torsion<T> {
         let t107 = t97 + t106;
         let t108 = self.fixed[8] * t107;
         crate::nalgebra::SVector::<T, 3>::new(t105, t108, T::zero())
+    }
+}
+#[allow(unused_variables, clippy::all, clippy::pedantic)]
+impl<T: crate::Real> crate::BodyForceOnLattice<T, 3, 7, 1, 4> for Torsion<T> {
+    #[inline]
+    fn lattice_time(&self, t: T) -> [T; 7] {
+        let t7 = self.fixed[0] * t;
+        let t8 = t7.sin_pi();
+        let t11 = self.fixed[1] * t8;
+        let t31 = t7.cos_pi();
+        let t46 = t31 * t31;
+        let t47 = self.parameters.A * t46;
+        let t101 = t8 * t8;
+        let t102 = self.fixed[7] * t101;
+        let t137 = T::nearest(2.0) * t8;
+        let t143 = T::nearest(2.0) * t47;
+        let t155 = T::nearest(2.0) * t102;
+        [t8, t11, t47, t102, t137, t143, t155]
+    }
+    #[inline]
+    fn lattice_coordinate(
+        &self,
+        axis: usize,
+        X: &crate::nalgebra::SVector<T, 3>,
+    ) -> [T; 1] {
+        match axis {
+            0 => {
+                let t163 = self.fixed[8] * X[0];
+                [t163]
+            }
+            1 => {
+                let t165 = self.fixed[8] * X[1];
+                [t165]
+            }
+            2 => [X[2]],
+            _ => [T::zero(); 1],
+        }
+    }
+    #[inline]
+    fn lattice_layer(&self, axis: usize, time: &[T; 7], point: &[T; 1]) -> [T; 4] {
+        match axis {
+            0 => [point[0], T::zero(), T::zero(), T::zero()],
+            1 => [point[0], T::zero(), T::zero(), T::zero()],
+            2 => {
+                let t12 = time[1] * point[0];
+                let t13 = t12.sin();
+                let t16 = t12.cos();
+                let t48 = time[2] * point[0];
+                let t60 = t13 * t13;
+                let t88 = self.fixed[6] * point[0];
+                let t134 = t16 * t16;
+                let t135 = t134 - t60;
+                let t136 = t60 - t134;
+                let t138 = t13 * t16;
+                let t139 = time[4] * t138;
+                let t140 = t48 * t136;
+                let t141 = t139 + t140;
+                let t142 = time[0] * t135;
+                let t144 = time[5] * point[0];
+                let t145 = t144 * t138;
+                let t146 = t142 + t145;
+                let t147 = time[0] * t136;
+                let t148 = t147 - t145;
+                let t149 = t48 * t135;
+                let t150 = t139 - t149;
+                let t151 = t88 * t141;
+                let t152 = time[3] * t136;
+                let t153 = t151 - t152;
+                let t154 = t88 * t146;
+                let t156 = time[6] * t138;
+                let t157 = t154 - t156;
+                let t158 = t88 * t148;
+                let t159 = t158 + t156;
+                let t160 = t88 * t150;
+                let t161 = time[3] * t135;
+                let t162 = t160 + t161;
+                [t153, t157, t159, t162]
+            }
+            _ => [T::zero(); 4],
+        }
+    }
+    #[inline(always)]
+    fn lattice_body_force(
+        &self,
+        time: &[T; 7],
+        layers: [&[T; 4]; 3],
+    ) -> crate::nalgebra::SVector<T, 3> {
+        let t164 = layers[0][0] * layers[2][0];
+        let t166 = layers[1][0] * layers[2][1];
+        let t167 = t164 + t166;
+        let t168 = layers[0][0] * layers[2][2];
+        let t169 = layers[1][0] * layers[2][3];
+        let t170 = t168 + t169;
+        crate::nalgebra::SVector::<T, 3>::new(t167, t170, T::zero())
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

@@ -1,0 +1,405 @@
+//! Values at the points of a lattice from values of its layers.
+//!
+//! In a lattice many points share a coordinate: a layer are the points with one value of one coordinate. What depends on one
+//! coordinate and the time is computed once a layer, which leaves almost nothing for each point where a value is a short
+//! sum of products of such factors. [`Program::with_separated_coordinates`] finds such sums: products and quotients are taken
+//! factor by factor, sums term by term, where terms that differ in one coordinate only are added at once, and the logarithm
+//! of a product is the sum of the logarithms of its factors.
+//!
+//! That sum exists for positive factors only. Whoever evaluates the form has to take another one where it gives no
+//! number: then two factors may have been negative.
+
+use crate::arrange::as_accurate_where_defined;
+use crate::graph::NumberMap;
+use crate::keep::KEPT_NUMBER;
+use crate::program::{Operation, OperationCount, Program, Slot, intern};
+use crate::{Dependence, Function, Rational};
+use num_traits::One;
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+/// Sums of more terms than this are not worth the search.
+const MOST_TERMS: usize = 16;
+/// How many times less than before a point of a lattice must cost, so that the layers and what leads to them pay as well.
+const WORTHWHILE: usize = 2;
+
+impl Program {
+    /// The program with further outputs: those of the given places once more, as sums of products of values of one of the first
+    /// `dimension` inputs each, the coordinates. `None` where they are not such sums, or where points of a lattice would not
+    /// cost much less.
+    ///
+    /// The form has the same value where it is a number. Where several factors of a product are negative whose logarithm
+    /// is taken, it is none.
+    #[must_use]
+    pub fn with_separated_coordinates(
+        &self,
+        places: Range<usize>,
+        dimension: usize,
+    ) -> Option<Program> {
+        let outputs = self.outputs().get(places)?;
+        if dimension < 2 {
+            return None;
+        }
+        let separated = Separating::new(self, dimension).program(outputs)?.compacted();
+        let new = &separated.outputs()[self.outputs().len()..];
+        let kept = self.kept_at_points(outputs, usize::MAX);
+        let pays = WORTHWHILE * separated.cost_in_lattice(new, dimension)
+            <= self.cost_at_points(outputs, &kept);
+        let (before, after) = (self.part(outputs), separated.part(new));
+        (pays && as_accurate_where_defined(&before, &after, self.input_count()))
+            .then_some(separated)
+    }
+
+    /// For each coordinate the values that depend on it and on no other one, and that `outputs` are computed from at points
+    /// of a lattice.
+    #[must_use]
+    pub fn layers(&self, outputs: &[Slot], dimension: usize) -> Vec<Vec<Slot>> {
+        let coordinates = self.coordinates(dimension);
+        let mut layers = vec![Vec::new(); dimension];
+        let mut seen = vec![false; self.operations().len()];
+        let mut stack = outputs.to_vec();
+        while let Some(slot) = stack.pop() {
+            if std::mem::replace(&mut seen[slot.index()], true) {
+                continue;
+            }
+            match coordinates[slot.index()] {
+                Coordinates::None => {}
+                Coordinates::One(axis) => layers[axis].push(slot),
+                Coordinates::Several => stack.extend(self.operations()[slot.index()].operands()),
+            }
+        }
+        layers.iter_mut().for_each(|layer| layer.sort_unstable());
+        layers
+    }
+
+    /// What `outputs` cost for each point of a lattice at each time.
+    fn cost_in_lattice(&self, outputs: &[Slot], dimension: usize) -> usize {
+        let coordinates = self.coordinates(dimension);
+        let of_layers: usize = self.layers(outputs, dimension).iter().map(Vec::len).sum();
+        let needed = self.needed(outputs);
+        let of_points = self.slots().filter(|slot| {
+            needed[slot.index()] && coordinates[slot.index()] == Coordinates::Several
+        });
+        let operations =
+            of_points.map(|slot| OperationCount::of(&self.operations()[slot.index()]).cost());
+        // The numbers of its layers are kept for each point.
+        KEPT_NUMBER + of_layers + operations.sum::<usize>()
+    }
+
+    /// Which of the first `dimension` inputs each value depends on.
+    fn coordinates(&self, dimension: usize) -> Vec<Coordinates> {
+        let mut coordinates = Vec::with_capacity(self.operations().len());
+        for operation in self.operations() {
+            coordinates.push(Coordinates::of(operation, &coordinates, dimension));
+        }
+        coordinates
+    }
+}
+
+/// Which coordinates a value depends on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Coordinates {
+    None,
+    /// The one of this axis.
+    One(usize),
+    Several,
+}
+
+impl Coordinates {
+    /// Those of an operation, from those of its operands.
+    fn of(operation: &Operation, known: &[Coordinates], dimension: usize) -> Self {
+        if let Operation::Input(axis) = *operation {
+            return if axis < dimension { Coordinates::One(axis) } else { Coordinates::None };
+        }
+        let operands = operation.operands().map(|slot| known[slot.index()]);
+        operands.fold(Coordinates::None, |all, own| match (all, own) {
+            (Coordinates::None, one) | (one, Coordinates::None) => one,
+            (a, b) if a == b => a,
+            _ => Coordinates::Several,
+        })
+    }
+}
+
+/// A signed product of values to positive and negative powers, each of at most one coordinate.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Term {
+    negative: bool,
+    powers: BTreeMap<Slot, i32>,
+}
+
+impl Term {
+    fn times(&self, other: &Term, exponent: i32) -> Term {
+        let mut product = Term {
+            negative: self.negative != (other.negative && exponent % 2 != 0),
+            powers: self.powers.clone(),
+        };
+        for (&slot, &power) in &other.powers {
+            let total = product.powers.entry(slot).or_insert(0);
+            *total += exponent * power;
+            if *total == 0 {
+                product.powers.remove(&slot);
+            }
+        }
+        product
+    }
+
+    /// The powers that both have.
+    fn common(&self, other: &Term) -> Term {
+        let powers = self.powers.iter().filter_map(|(&slot, &own)| {
+            let &power = other.powers.get(&slot)?;
+            (own.signum() == power.signum())
+                .then(|| (slot, own.signum() * own.abs().min(power.abs())))
+        });
+        Term { negative: false, powers: powers.collect() }
+    }
+}
+
+struct Separating<'a> {
+    program: &'a Program,
+    dimension: usize,
+    /// The operations of the program, and after them the new ones.
+    operations: Vec<Operation>,
+    dependence: Vec<Dependence>,
+    coordinates: Vec<Coordinates>,
+    interned: NumberMap<Operation, Slot>,
+}
+
+impl<'a> Separating<'a> {
+    fn new(program: &'a Program, dimension: usize) -> Self {
+        let mut interned = NumberMap::default();
+        for slot in program.slots() {
+            interned.entry(program.operations()[slot.index()].clone()).or_insert(slot);
+        }
+        Separating {
+            program,
+            dimension,
+            operations: program.operations().to_vec(),
+            dependence: program.slots().map(|slot| program.dependence(slot)).collect(),
+            coordinates: program.coordinates(dimension),
+            interned,
+        }
+    }
+
+    /// The program with further outputs.
+    fn program(mut self, outputs: &[Slot]) -> Option<Program> {
+        let needed = self.program.needed(outputs);
+        let mut sums: Vec<Vec<Term>> = vec![Vec::new(); self.program.operations().len()];
+        for slot in self.program.slots().filter(|slot| needed[slot.index()]) {
+            sums[slot.index()] = self.terms(slot, &sums)?;
+        }
+        let mut all = self.program.outputs().to_vec();
+        all.extend(outputs.iter().map(|slot| self.sum(&sums[slot.index()])));
+        Some(Program::from_parts(self.operations, self.dependence, all))
+    }
+
+    /// A value as a sum of products, from those of its operands.
+    fn terms(&mut self, slot: Slot, sums: &[Vec<Term>]) -> Option<Vec<Term>> {
+        let of = |slot: Slot| sums[slot.index()].as_slice();
+        let single = |slot: Slot| match of(slot) {
+            [term] => Some(term),
+            _ => None,
+        };
+        let whole = || vec![Term { negative: false, powers: BTreeMap::from([(slot, 1)]) }];
+        let coordinates = self.coordinates[slot.index()];
+        let several = coordinates == Coordinates::Several;
+        match self.program.operations()[slot.index()] {
+            Operation::Number(ref one) if one.is_one() => Some(vec![Term::default()]),
+            Operation::Neg(a) => self.products(of(a), &minus_one()),
+            // Products of what is the same at all points stay as they are.
+            _ if coordinates == Coordinates::None => Some(whole()),
+            Operation::Mul(a, b) => self.products(of(a), of(b)),
+            Operation::Div(a, b) => match single(b) {
+                Some(divisor) => self.products(of(a), &[Term::default().times(divisor, -1)]),
+                None => (!several).then(whole),
+            },
+            _ if !several => Some(whole()),
+            Operation::Add(a, b) => self.merged(of(a).iter().chain(of(b)).cloned()),
+            Operation::Sub(a, b) => {
+                let subtracted = self.products(of(b), &minus_one())?;
+                self.merged(of(a).iter().cloned().chain(subtracted))
+            }
+            Operation::LnOfBoth(_, y) | Operation::Call(Function::Ln, y) => {
+                let logarithms = self.logarithms(single(y)?)?;
+                self.merged(logarithms.into_iter())
+            }
+            _ => None,
+        }
+    }
+
+    fn products(&mut self, a: &[Term], b: &[Term]) -> Option<Vec<Term>> {
+        let each = |a: &Term| b.iter().map(|b| a.times(b, 1)).collect::<Vec<_>>();
+        let products: Vec<Term> = a.iter().flat_map(each).collect();
+        self.merged(products.into_iter())
+    }
+
+    /// The logarithm of a product, as a sum of those of what it has of each coordinate; `None` for a negative one.
+    fn logarithms(&mut self, product: &Term) -> Option<Vec<Term>> {
+        let logarithm = |separating: &mut Self, part: Term| {
+            let y = separating.product(&part);
+            let one = separating.push(Operation::Number(Rational::one()));
+            let beside_one = match separating.operations[y.index()] {
+                Operation::Add(x, unit) | Operation::Add(unit, x) if unit == one => Some(x),
+                Operation::Sub(unit, x) if unit == one => Some(separating.push(Operation::Neg(x))),
+                _ => None,
+            };
+            let slot = separating.push(match beside_one {
+                Some(x) => Operation::LnOfBoth(x, y),
+                None => Operation::Call(Function::Ln, y),
+            });
+            Term { negative: false, powers: BTreeMap::from([(slot, 1)]) }
+        };
+        let parts = (!product.negative).then(|| self.parts(product))?;
+        Some(parts.into_iter().map(|part| logarithm(self, part)).collect())
+    }
+
+    /// Terms in which those are added that differ in one coordinate at most; `None` where too many are left.
+    fn merged(&mut self, terms: impl Iterator<Item = Term>) -> Option<Vec<Term>> {
+        let mut merged: Vec<Term> = Vec::new();
+        for term in terms {
+            let mut added = Some(term);
+            // A sum may meet another term in another coordinate.
+            while let Some(term) = added.take() {
+                let Some(place) = merged.iter().position(|other| self.is_alike(other, &term))
+                else {
+                    merged.push(term);
+                    break;
+                };
+                let other = merged.remove(place);
+                added = self.sum_of_alike(&other, &term);
+            }
+            if merged.len() > MOST_TERMS {
+                return None;
+            }
+        }
+        Some(merged)
+    }
+
+    /// The sum of two terms as one; `None` where they cancel.
+    fn sum_of_alike(&mut self, a: &Term, b: &Term) -> Option<Term> {
+        let common = a.common(b);
+        let [a, b] = [a, b].map(|term| {
+            let rest = term.times(&common, -1);
+            (rest.negative, self.product(&rest))
+        });
+        if a.1 == b.1 && a.0 != b.0 {
+            return None;
+        }
+        let (negative, sum) = self.add(a, b);
+        Some(common.times(&Term { negative, powers: BTreeMap::from([(sum, 1)]) }, 1))
+    }
+
+    /// Whether what two terms do not have in common is of one coordinate at most.
+    fn is_alike(&self, a: &Term, b: &Term) -> bool {
+        let common = a.common(b);
+        let rests = [a, b].map(|term| term.times(&common, -1));
+        let of = rests.iter().flat_map(|rest| rest.powers.keys());
+        let mut axes = of.filter_map(|slot| match self.coordinates[slot.index()] {
+            Coordinates::One(axis) => Some(axis),
+            _ => None,
+        });
+        let first = axes.next();
+        axes.all(|axis| Some(axis) == first)
+    }
+
+    /// What a product has of each coordinate; factors of none are in the first part.
+    fn parts(&self, product: &Term) -> Vec<Term> {
+        let mut parts = vec![Term::default(); self.dimension];
+        let mut uniform = BTreeMap::new();
+        for (&slot, &power) in &product.powers {
+            match self.coordinates[slot.index()] {
+                Coordinates::One(axis) => parts[axis].powers.insert(slot, power),
+                _ => uniform.insert(slot, power),
+            };
+        }
+        parts.retain(|part| !part.powers.is_empty());
+        match parts.first_mut() {
+            Some(first) => first.powers.extend(uniform),
+            None => parts.push(Term { negative: false, powers: uniform }),
+        }
+        parts
+    }
+
+    /// A sum of products, those of each coordinate first.
+    fn sum(&mut self, terms: &[Term]) -> Slot {
+        let mut values = Vec::new();
+        for term in terms {
+            let parts = self.parts(term);
+            let parts: Vec<Slot> = parts.iter().map(|part| self.product(part)).collect();
+            let product = parts.into_iter().reduce(|a, b| self.push(Operation::Mul(a, b)));
+            values.extend(product.map(|product| (term.negative, product)));
+        }
+        let sum = values.into_iter().reduce(|a, b| self.add(a, b));
+        match sum {
+            Some((false, slot)) => slot,
+            Some((true, slot)) => self.push(Operation::Neg(slot)),
+            None => self.push(Operation::Number(Rational::from(0))),
+        }
+    }
+
+    /// A product, what changes least often first, with one quotient for each rate of change; its sign is left out.
+    fn product(&mut self, product: &Term) -> Slot {
+        let mut by_rate: BTreeMap<Dependence, [Vec<(Slot, u32)>; 2]> = BTreeMap::new();
+        for (&slot, &power) in &product.powers {
+            let own = by_rate.entry(self.dependence[slot.index()]).or_default();
+            own[usize::from(power < 0)].push((slot, power.unsigned_abs()));
+        }
+        let one = self.push(Operation::Number(Rational::one()));
+        let mut total = one;
+        for [above, below] in by_rate.into_values() {
+            let [above, below] = [above, below].map(|powers| {
+                let powers = powers.into_iter().map(|(slot, n)| self.power(slot, n));
+                let powers: Vec<Slot> = powers.collect();
+                powers.into_iter().reduce(|a, b| self.push(Operation::Mul(a, b)))
+            });
+            total = match above {
+                Some(above) if total == one => above,
+                Some(above) => self.push(Operation::Mul(total, above)),
+                None => total,
+            };
+            total = below.map_or(total, |below| self.push(Operation::Div(total, below)));
+        }
+        total
+    }
+
+    fn power(&mut self, base: Slot, exponent: u32) -> Slot {
+        if exponent <= 1 {
+            return base;
+        }
+        let half = self.power(base, exponent / 2);
+        let square = self.push(Operation::Mul(half, half));
+        if exponent.is_multiple_of(2) { square } else { self.push(Operation::Mul(square, base)) }
+    }
+
+    /// The sum of signed values; negative only where both are.
+    fn add(&mut self, a: (bool, Slot), b: (bool, Slot)) -> (bool, Slot) {
+        let number = |slot: Slot| match &self.operations[slot.index()] {
+            Operation::Number(value) => Some(value.clone()),
+            _ => None,
+        };
+        if a.0 == b.0
+            && let (Some(x), Some(y)) = (number(a.1), number(b.1))
+        {
+            return (a.0, self.push(Operation::Number(x + y)));
+        }
+        match (a, b) {
+            ((false, a), (true, b)) | ((true, b), (false, a)) => {
+                (false, self.push(Operation::Sub(a, b)))
+            }
+            ((negative, a), (_, b)) => (negative, self.push(Operation::Add(a, b))),
+        }
+    }
+
+    fn push(&mut self, operation: Operation) -> Slot {
+        let coordinates = Coordinates::of(&operation, &self.coordinates, self.dimension);
+        let parts = (&mut self.operations, &mut self.dependence);
+        let slot = intern(operation, Dependence::default(), parts, &mut self.interned);
+        if slot.index() == self.coordinates.len() {
+            self.coordinates.push(coordinates);
+        }
+        slot
+    }
+}
+
+fn minus_one() -> [Term; 1] {
+    [Term { negative: true, powers: BTreeMap::new() }]
+}

@@ -1,0 +1,207 @@
+//! The body force at points that share coordinates.
+//!
+//! In a lattice of `n x m` points there are `n m` points and `n + m` coordinates. Where the body force is a short sum
+//! of products of functions of one coordinate and the time, as it is where each coordinate moves along itself only, these
+//! functions are evaluated once a layer, the points with one value of one coordinate, and a point takes a few products.
+
+use crate::{BodyForceAtPoints, Real, Solution};
+use nalgebra::SVector;
+use std::collections::HashMap;
+
+/// A layer costs as much as some tens of points without it.
+pub(crate) const POINTS_A_LAYER: usize = 16;
+/// As many as short numbers tell apart.
+const MOST_LAYERS: usize = 1 << 16;
+
+/// Points that share their coordinates with many others.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lattice<T, const D: usize> {
+    /// For each axis the coordinates of its layers.
+    coordinates: [Vec<T>; D],
+    /// The layers of each point, one an axis. Short numbers, since a solver reads them in every step.
+    layers: Vec<[u16; D]>,
+}
+
+impl<T: Real, const D: usize> Lattice<T, D> {
+    /// The points `X` by their layers; `None` where there are fewer than sixteen points a layer, or more than 65536 layers.
+    #[must_use]
+    pub fn of(X: &[SVector<T, D>]) -> Option<Self> {
+        let most = (X.len() / POINTS_A_LAYER).min(MOST_LAYERS);
+        let mut coordinates: [Vec<T>; D] = std::array::from_fn(|_| Vec::new());
+        let mut known: [HashMap<u64, u16>; D] = std::array::from_fn(|_| HashMap::new());
+        let mut layers = Vec::new();
+        for X in X {
+            let mut own = [0; D];
+            for axis in 0..D {
+                // Equal to the last bit: -0 and 0 are different layers.
+                let bits = X[axis].to_f64().to_bits();
+                own[axis] = *known[axis].entry(bits).or_insert_with(|| {
+                    coordinates[axis].push(X[axis]);
+                    (coordinates[axis].len() - 1) as u16
+                });
+            }
+            if coordinates.iter().map(Vec::len).sum::<usize>() > most {
+                return None;
+            }
+            layers.push(own);
+        }
+        (most > 0).then_some(Lattice { coordinates, layers })
+    }
+
+    /// The coordinates of the layers along an axis, in the order of the points that had them first.
+    ///
+    /// # Panics
+    ///
+    /// Panics for an axis that there is not.
+    #[must_use]
+    pub fn coordinates(&self, axis: usize) -> &[T] {
+        &self.coordinates[axis]
+    }
+
+    /// For each point the numbers of its layers, one an axis.
+    #[must_use]
+    pub fn layers(&self) -> &[[u16; D]] {
+        &self.layers
+    }
+
+    /// Point number `n`.
+    ///
+    /// # Panics
+    ///
+    /// Panics where there is no such point.
+    #[must_use]
+    pub fn point(&self, n: usize) -> SVector<T, D> {
+        let layers = &self.layers[n];
+        SVector::from_fn(|axis, _| self.coordinates[axis][usize::from(layers[axis])])
+    }
+}
+
+/// The body force at the points of a lattice: what `TIME` values it needs of the time, what `POINT` values of a coordinate,
+/// what `LAYER` values of a layer follow from these, and how it follows from the layers of a point. Generated solutions have
+/// it where it makes points cheap.
+pub trait BodyForceOnLattice<
+    T: Real,
+    const D: usize,
+    const TIME: usize,
+    const POINT: usize,
+    const LAYER: usize,
+>: Solution<T, D>
+{
+    /// What depends on the time alone.
+    fn lattice_time(&self, t: T) -> [T; TIME];
+    /// What depends on one coordinate of `X` alone, that of the axis.
+    fn lattice_coordinate(&self, axis: usize, X: &SVector<T, D>) -> [T; POINT];
+    /// What depends on the time and on one coordinate.
+    fn lattice_layer(&self, axis: usize, time: &[T; TIME], point: &[T; POINT]) -> [T; LAYER];
+    /// The body force per unit mass, from the values of one time and of a point's layers: equal to
+    /// [`Solution::body_force`] but for rounding, or not a number.
+    fn lattice_body_force(&self, time: &[T; TIME], layers: [&[T; LAYER]; D]) -> SVector<T, D>;
+}
+
+/// What the body force of a generated solution keeps of the points of a lattice.
+pub struct LatticePoints<
+    S,
+    T,
+    const D: usize,
+    const TIME: usize,
+    const POINT: usize,
+    const LAYER: usize,
+> {
+    solution: S,
+    lattice: Lattice<T, D>,
+    /// For each axis what is kept of each coordinate.
+    coordinates: [Vec<[T; POINT]>; D],
+}
+
+impl<S, T: Real, const D: usize, const TIME: usize, const POINT: usize, const LAYER: usize>
+    LatticePoints<S, T, D, TIME, POINT, LAYER>
+where
+    S: BodyForceOnLattice<T, D, TIME, POINT, LAYER>,
+{
+    /// Computes what depends on the coordinates alone.
+    #[must_use]
+    pub fn new(solution: S, lattice: Lattice<T, D>) -> Self {
+        let coordinates = std::array::from_fn(|axis| {
+            let of_coordinate = |&coordinate: &T| {
+                let mut X = SVector::zeros();
+                X[axis] = coordinate;
+                solution.lattice_coordinate(axis, &X)
+            };
+            lattice.coordinates(axis).iter().map(of_coordinate).collect()
+        });
+        LatticePoints { solution, lattice, coordinates }
+    }
+
+    /// The number of all layers.
+    fn layers(&self) -> usize {
+        self.coordinates.iter().map(Vec::len).sum()
+    }
+
+    /// The body force of points with their numbers, at a time; `values` are those of the time and of the layers.
+    fn of_points<'a>(
+        &self,
+        values: &[T],
+        points: impl Iterator<Item = (usize, &'a mut SVector<T, D>)>,
+    ) where
+        T: 'a,
+    {
+        let Some((&[t], values)) = values.split_first_chunk::<1>() else {
+            panic!("the values of a time are needed");
+        };
+        let Some((time, layers)) = values.split_first_chunk::<TIME>() else {
+            panic!("{TIME} values of the time are needed, not {}", values.len());
+        };
+        let (mut rest, _) = layers.as_chunks::<LAYER>();
+        assert_eq!(rest.len(), self.layers(), "the values of a time are those of each layer");
+        let tables: [&[[T; LAYER]]; D] = std::array::from_fn(|axis| {
+            let (table, others) = rest.split_at(self.coordinates[axis].len());
+            rest = others;
+            table
+        });
+        for (n, b) in points {
+            let own = self.lattice.layers()[n];
+            let layers = std::array::from_fn(|axis| &tables[axis][usize::from(own[axis])]);
+            *b = self.solution.lattice_body_force(time, layers);
+            if !b.iter().fold(true, |all, value| all & value.is_number()) {
+                *b = self.solution.body_force(&self.lattice.point(n), t);
+            }
+        }
+    }
+}
+
+impl<S, T: Real, const D: usize, const TIME: usize, const POINT: usize, const LAYER: usize>
+    BodyForceAtPoints<T, D> for LatticePoints<S, T, D, TIME, POINT, LAYER>
+where
+    S: BodyForceOnLattice<T, D, TIME, POINT, LAYER>,
+{
+    fn evaluate(&self, t: T, first: usize, b: &mut [SVector<T, D>]) {
+        let mut values = Vec::new();
+        self.of_time(t, &mut values);
+        self.of_points(&values, (first..).zip(b));
+    }
+
+    fn of_time(&self, t: T, values: &mut Vec<T>) {
+        values.reserve(1 + TIME + LAYER * self.layers());
+        let time = self.solution.lattice_time(t);
+        values.push(t);
+        values.extend(time);
+        for (axis, coordinates) in self.coordinates.iter().enumerate() {
+            for point in coordinates {
+                values.extend(self.solution.lattice_layer(axis, &time, point));
+            }
+        }
+    }
+
+    fn evaluate_of(&self, time: &[T], points: &[u32], b: &mut [SVector<T, D>]) {
+        assert_eq!(points.len(), b.len(), "one body force a point");
+        self.of_points(time, points.iter().map(|&n| n as usize).zip(b));
+    }
+
+    fn len(&self) -> usize {
+        self.lattice.layers().len()
+    }
+
+    fn bytes_per_point(&self) -> usize {
+        size_of::<[u16; D]>()
+    }
+}
