@@ -14,11 +14,10 @@
 //! a small remainder is never mixed with the large part that it corrects. A form is taken only where it costs less
 //! and where the bound of its rounding errors, by running error analysis at sample points, is not clearly larger.
 
+use crate::accuracy::Samples;
 use crate::graph::NumberMap;
-use crate::program::SIDE;
 use crate::{Dependence, Drafts, Expr, Graph, Node, Program, Rational};
 use num_traits::{One, Signed, ToPrimitive, Zero};
-use std::array;
 use std::collections::BTreeMap;
 
 /// Numerators with more terms than this are not worth the search.
@@ -27,13 +26,6 @@ const MOST_TERMS: usize = 48;
 const MOST_PRODUCTS: usize = 3000;
 /// Powers beyond this are not multiplied out.
 const LARGEST_POWER: u32 = 6;
-/// How much larger than before the error bound may be: at most points, and at any.
-const USUAL_GROWTH: f64 = 1.5;
-const LARGEST_GROWTH: f64 = 8.0;
-
-const GOLDEN_RATIO: f64 = 0.618_033_988_749_894_9;
-const PLASTIC_RATIO: f64 = 0.324_717_957_244_746;
-
 /// `outputs` in forms of the same value that cost less where position and time meet.
 ///
 /// `inputs` and `definitions` are those of [`Program::lower`], which the result is meant for; `drafts` may have served
@@ -46,10 +38,12 @@ pub fn arrange(
     drafts: &mut Drafts,
     outputs: &[Expr],
 ) -> Vec<Expr> {
+    let program = drafts.lower(graph, inputs, definitions, outputs);
     let mut arranging = Arranging {
         graph,
         inputs,
         definitions,
+        samples: Samples::of(&program, inputs.len()),
         dependence: NumberMap::default(),
         arranged: NumberMap::default(),
         products: 0,
@@ -91,6 +85,8 @@ struct Arranging<'a> {
     inputs: &'a [(Expr, Dependence)],
     definitions: &'a [(Expr, Expr)],
     drafts: &'a mut Drafts,
+    /// Where forms are compared.
+    samples: Samples,
     dependence: NumberMap<Expr, Dependence>,
     arranged: NumberMap<Expr, Expr>,
     /// The products of two terms made so far.
@@ -434,8 +430,7 @@ impl Arranging<'_> {
         };
         let (before, after) = (self.lowered(present), self.lowered(candidate));
         let cost = |program: &Program| program.operations_by_stage(program.outputs()).both.cost();
-        let is_better =
-            cost(&after) <= cost(&before) && as_accurate(&before, &after, self.inputs.len());
+        let is_better = cost(&after) <= cost(&before) && self.samples.admit(&before, &after);
         let (taken, program) = if is_better { (candidate, after) } else { (present, before) };
         self.last = Some((taken, program));
         taken
@@ -448,55 +443,6 @@ impl Arranging<'_> {
             _ => self.drafts.lower(self.graph, self.inputs, self.definitions, &[expr]),
         }
     }
-}
-
-/// An input at a point of a fixed sequence: multiples of the golden ratio, with a different start for each input.
-fn sample(point: usize, input: usize) -> f64 {
-    let turns = GOLDEN_RATIO * point as f64 + PLASTIC_RATIO * input as f64;
-    let scale = if point == 2 * input + 1 { 1e-8 } else { 1.0 };
-    scale * (0.05 + 0.9 * turns.fract())
-}
-
-/// Whether the error bound of `after` is hardly larger than that of `before`: at more than half of some sample points
-/// by little, and nowhere by much. At every other point one input is tiny, as an amplitude may be.
-pub(crate) fn as_accurate(before: &Program, after: &Program, inputs: usize) -> bool {
-    let growth = growth_of_bounds(before, after, inputs);
-    // What is not finite any more is infinitely worse.
-    hardly_larger(growth.into_iter().map(|growth| growth.unwrap_or(f64::INFINITY)).collect())
-}
-
-/// The same for a form that need not be defined wherever the other is, only at most points.
-pub(crate) fn as_accurate_where_defined(before: &Program, after: &Program, inputs: usize) -> bool {
-    let growth = growth_of_bounds(before, after, inputs);
-    let known: Vec<f64> = growth.iter().flatten().copied().collect();
-    2 * known.len() >= growth.len() && hardly_larger(known)
-}
-
-fn hardly_larger(mut growth: Vec<f64>) -> bool {
-    growth.sort_by(f64::total_cmp);
-    let usual = growth.get(growth.len() / 2).copied().unwrap_or(1.0);
-    let largest = growth.last().copied().unwrap_or(1.0);
-    usual <= USUAL_GROWTH && largest <= LARGEST_GROWTH
-}
-
-/// How many times as large the bound of each output's error is in `after`, at each of the sample points where it is finite in
-/// `before`; `None` where it is not finite in `after`.
-fn growth_of_bounds(before: &Program, after: &Program, inputs: usize) -> Vec<Option<f64>> {
-    let points = 64.max(2 * inputs);
-    let mut growth = Vec::new();
-    for first in (0..points).step_by(SIDE) {
-        let places: Vec<[f64; SIDE]> =
-            (0..inputs).map(|input| array::from_fn(|k| sample(first + k, input))).collect();
-        for (old, new) in before.error_bounds(&places).iter().zip(after.error_bounds(&places)) {
-            // Where the point is outside the domain of definition there is nothing to compare.
-            let known = old.iter().zip(new).filter(|(old, _)| old.is_finite());
-            growth.extend(known.map(|(&old, new)| {
-                // Nothing is as large as nothing.
-                new.is_finite().then(|| if new <= old { 1.0 } else { new / old })
-            }));
-        }
-    }
-    growth
 }
 
 #[cfg(test)]
@@ -513,6 +459,7 @@ mod tests {
             graph: &mut graph,
             inputs: &[],
             definitions: &[],
+            samples: Samples::usual(0),
             drafts: &mut Drafts::default(),
             dependence: NumberMap::default(),
             arranged: NumberMap::default(),
@@ -553,78 +500,5 @@ mod tests {
         // What takes no product is never too much.
         assert_eq!(terms(arranging.fraction(t)), Some(1));
         assert_eq!(terms(arranging.fraction(t)), Some(1));
-    }
-
-    /// The points of each input are all over its range, none of two inputs are the same, and each is tiny at one odd point.
-    #[test]
-    fn sample_points_fill_their_range() {
-        for input in 0..20 {
-            let is_tiny = |point: usize| sample(point, input) < 1e-7;
-            let tiny: Vec<usize> = (0..64).filter(|&point| is_tiny(point)).collect();
-            assert_eq!(tiny, [2 * input + 1]);
-            let points = (0..64).filter(|&point| !is_tiny(point));
-            let mut at: Vec<f64> = points.map(|point| sample(point, input)).collect();
-            at.sort_by(f64::total_cmp);
-            assert!(at[0] >= 0.05 && at[0] < 0.1 && at[62] > 0.9 && at[62] <= 0.95, "{at:?}");
-            assert!(at.windows(2).all(|pair| pair[1] - pair[0] < 0.06), "{at:?}");
-        }
-        let mut first: Vec<f64> = (0..20).map(|input| sample(0, input)).collect();
-        first.sort_by(f64::total_cmp);
-        assert!(first.windows(2).all(|pair| pair[1] - pair[0] > 0.01), "{first:?}");
-    }
-
-    /// Only the bounds of the errors are compared, whatever the programs compute: `n x y` has two roundings of `n x y`.
-    #[test]
-    fn bounds_may_hardly_grow() {
-        let mut graph = Graph::new();
-        let inputs = ["x", "y"].map(|name| (graph.symbol(name), Dependence::default()));
-        let mut program = |text: &str| {
-            let ast = Ast::parse(text).unwrap();
-            let expr = graph.build(&ast, &mut |g, name| Ok(g.symbol(name))).unwrap();
-            Program::lower(&mut graph, &inputs, &[], &[expr])
-        };
-        let four = program("4*x*y");
-        for (text, expected) in [
-            ("4*x*y", true),
-            ("x*y", true),
-            ("x", true),
-            // By little, and by more than little at most points.
-            ("5*x*y", true),
-            ("5.9*x*y", true),
-            ("6.1*x*y", false),
-            ("40*x*y", false),
-            // By little where nothing is tiny, and by much where x or y is.
-            ("4*x*y + 1/(10^12*x)", false),
-            ("4*x*y + 1/(10^12*y)", false),
-            // At some points not defined any more, at more than half of them not defined.
-            ("4*x*y + 10^(-20)*sqrt(0.9 - x)", false),
-            ("sqrt(x - 2)", false),
-        ] {
-            assert_eq!(as_accurate(&four, &program(text), 2), expected, "{text}");
-        }
-        // The same but for a factor: it is about one at most points, and up to five, or up to nine, where y is largest.
-        let product = program("4*(x + 1)*(y + 1)");
-        assert!(as_accurate(&product, &program("(x + 1)*(y + 1)^7/12"), 2));
-        assert!(!as_accurate(&product, &program("(x + 1)*(y + 1)^9/27"), 2));
-        // However many inputs there are, each is tiny once.
-        let names: Vec<String> = (0..40).map(|n| format!("x{n}")).collect();
-        let mut graph = Graph::new();
-        let inputs: Vec<_> =
-            names.iter().map(|name| (graph.symbol(name), Dependence::default())).collect();
-        let mut program_of_many = |text: &str| {
-            let ast = Ast::parse(text).unwrap();
-            let expr = graph.build(&ast, &mut |g, name| Ok(g.symbol(name))).unwrap();
-            Program::lower(&mut graph, &inputs, &[], &[expr])
-        };
-        let sum = program_of_many(&names.join(" + "));
-        for name in &names {
-            let candidate = format!("{} + 1/(10^3*{name})", names.join(" + "));
-            assert!(!as_accurate(&sum, &program_of_many(&candidate), 40), "{name}");
-        }
-        // What is defined nowhere has nothing to lose, nor what is exact as long as it stays so.
-        let (nowhere, exact) = (program("sqrt(x - 2)"), program("x"));
-        assert!(as_accurate(&nowhere, &four, 2));
-        assert!(as_accurate(&exact, &program("y"), 2));
-        assert!(!as_accurate(&exact, &four, 2));
     }
 }

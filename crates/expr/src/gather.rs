@@ -13,7 +13,7 @@
 //! only where it costs less, keeps no more values of a point, and where the bound of its rounding errors, by running
 //! error analysis at sample points, is not clearly larger.
 
-use crate::arrange::as_accurate;
+use crate::accuracy::Samples;
 use crate::graph::NumberMap;
 use crate::keep::KEPT_NUMBER;
 use crate::program::{Operation, OperationCount, Program, Slot, intern};
@@ -52,7 +52,7 @@ impl Program {
             && gathered.cost_at_points(gathered_outputs, &gathered_kept)
                 < self.cost_at_points(outputs, &kept);
         let (before, after) = (self.part(outputs), gathered.part(gathered_outputs));
-        if costs_less && as_accurate(&before, &after, self.input_count()) {
+        if costs_less && Samples::of(&before, self.input_count()).admit(&before, &after) {
             gathered.compacted()
         } else {
             self.clone()

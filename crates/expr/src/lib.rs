@@ -31,6 +31,7 @@
 //! assert_eq!(program.evaluate(&[0.5]), [1.0]);
 //! ```
 
+mod accuracy;
 mod arrange;
 mod build;
 mod cancel;

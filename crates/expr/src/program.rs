@@ -361,7 +361,7 @@ impl Program {
     }
 
     /// The value of every operation at `N` places, which are given by the values of each input there.
-    fn values<const N: usize>(&self, inputs: &[[f64; N]]) -> Vec<[f64; N]> {
+    pub(crate) fn values<const N: usize>(&self, inputs: &[[f64; N]]) -> Vec<[f64; N]> {
         let mut values = Vec::with_capacity(self.operations.len());
         for (operation, &number) in self.operations.iter().zip(&self.numbers) {
             values.push(match operation {

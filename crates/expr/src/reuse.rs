@@ -5,7 +5,7 @@
 //! power that fits, and what the components of a vector share; it makes each of them one quantity. That lowers the
 //! number of operations of a single evaluation. (It mixes rates of change, so it is not for evaluation in stages.)
 
-use crate::arrange::as_accurate;
+use crate::accuracy::Samples;
 use crate::{Dependence, Drafts, Expr, Graph, Node, Rational};
 use num_traits::{One, Signed, ToPrimitive};
 use std::collections::{BTreeMap, BTreeSet};
@@ -37,7 +37,7 @@ pub fn reuse(
     }
     let before = drafts.lower(graph, inputs, definitions, outputs);
     let after = drafts.lower(graph, inputs, definitions, &candidate);
-    if after.cost() < before.cost() && as_accurate(&before, &after, inputs.len()) {
+    if after.cost() < before.cost() && Samples::of(&before, inputs.len()).admit(&before, &after) {
         candidate
     } else {
         outputs.to_vec()

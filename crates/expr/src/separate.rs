@@ -4,12 +4,12 @@
 //! coordinate and the time is computed once a layer, which leaves almost nothing for each point where a value is a short
 //! sum of products of such factors. [`Program::with_separated_coordinates`] finds such sums: products and quotients are taken
 //! factor by factor, sums term by term, where terms that differ in one coordinate only are added at once, and the logarithm
-//! of a product is the sum of the logarithms of its factors.
+//! of a product is the sum of the logarithms of its factors, and a root the product of theirs.
 //!
-//! That sum exists for positive factors only. Whoever evaluates the form has to take another one where it gives no
+//! Logarithms and roots exist for positive factors only. Whoever evaluates the form has to take another one where it gives no
 //! number: then two factors may have been negative.
 
-use crate::arrange::as_accurate_where_defined;
+use crate::accuracy::Samples;
 use crate::graph::NumberMap;
 use crate::keep::KEPT_NUMBER;
 use crate::program::{Operation, OperationCount, Program, Slot, intern};
@@ -28,8 +28,8 @@ impl Program {
     /// `dimension` inputs each, the coordinates. `None` where they are not such sums, or where points of a lattice would not
     /// cost much less.
     ///
-    /// The form has the same value where it is a number. Where several factors of a product are negative whose logarithm
-    /// is taken, it is none.
+    /// The form has the same value where it is a number. Where several factors of a product are negative whose logarithm or
+    /// root is taken, it is none.
     #[must_use]
     pub fn with_separated_coordinates(
         &self,
@@ -46,8 +46,9 @@ impl Program {
         let pays = WORTHWHILE * separated.cost_in_lattice(new, dimension)
             <= self.cost_at_points(outputs, &kept);
         let (before, after) = (self.part(outputs), separated.part(new));
-        (pays && as_accurate_where_defined(&before, &after, self.input_count()))
-            .then_some(separated)
+        let is_accurate =
+            || Samples::of(&before, self.input_count()).admit_where_defined(&before, &after);
+        (pays && is_accurate()).then_some(separated)
     }
 
     /// For each coordinate the values that depend on it and on no other one, and that `outputs` are computed from at points
@@ -128,6 +129,10 @@ struct Term {
 }
 
 impl Term {
+    fn of(slot: Slot) -> Self {
+        Term { negative: false, powers: BTreeMap::from([(slot, 1)]) }
+    }
+
     fn times(&self, other: &Term, exponent: i32) -> Term {
         let mut product = Term {
             negative: self.negative != (other.negative && exponent % 2 != 0),
@@ -199,7 +204,7 @@ impl<'a> Separating<'a> {
             [term] => Some(term),
             _ => None,
         };
-        let whole = || vec![Term { negative: false, powers: BTreeMap::from([(slot, 1)]) }];
+        let whole = || vec![Term::of(slot)];
         let coordinates = self.coordinates[slot.index()];
         let several = coordinates == Coordinates::Several;
         match self.program.operations()[slot.index()] {
@@ -222,6 +227,10 @@ impl<'a> Separating<'a> {
                 let logarithms = self.logarithms(single(y)?)?;
                 self.merged(logarithms.into_iter())
             }
+            Operation::Sqrt(a) => self.powers(single(a)?, Operation::Sqrt),
+            Operation::Power(a, ref exponent) => {
+                self.powers(single(a)?, |a| Operation::Power(a, exponent.clone()))
+            }
             _ => None,
         }
     }
@@ -242,14 +251,25 @@ impl<'a> Separating<'a> {
                 Operation::Sub(unit, x) if unit == one => Some(separating.push(Operation::Neg(x))),
                 _ => None,
             };
-            let slot = separating.push(match beside_one {
+            Term::of(separating.push(match beside_one {
                 Some(x) => Operation::LnOfBoth(x, y),
                 None => Operation::Call(Function::Ln, y),
-            });
-            Term { negative: false, powers: BTreeMap::from([(slot, 1)]) }
+            }))
         };
         let parts = (!product.negative).then(|| self.parts(product))?;
         Some(parts.into_iter().map(|part| logarithm(self, part)).collect())
+    }
+
+    /// A root or another power of a product, as the product of those of what it has of each coordinate; `None` for a negative
+    /// one.
+    fn powers(&mut self, product: &Term, power: impl Fn(Slot) -> Operation) -> Option<Vec<Term>> {
+        let parts = (!product.negative).then(|| self.parts(product))?;
+        let mut total = Term::default();
+        for part in parts {
+            let base = self.product(&part);
+            total = total.times(&Term::of(self.push(power(base))), 1);
+        }
+        Some(vec![total])
     }
 
     /// Terms in which those are added that differ in one coordinate at most; `None` where too many are left.
@@ -285,7 +305,7 @@ impl<'a> Separating<'a> {
             return None;
         }
         let (negative, sum) = self.add(a, b);
-        Some(common.times(&Term { negative, powers: BTreeMap::from([(sum, 1)]) }, 1))
+        Some(common.times(&Term { negative, ..Term::of(sum) }, 1))
     }
 
     /// Whether what two terms do not have in common is of one coordinate at most.
