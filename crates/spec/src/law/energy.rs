@@ -7,8 +7,8 @@
 
 use super::{Deformation, Stress, zero_if_vanishing};
 use crate::derivation::Derivation;
-use crate::tensor::{Matrix, Vector, principal_minors};
-use mmsmith_expr::{Ast, Derivatives, Expr, Function, Graph};
+use crate::tensor::{Matrix, Vector, determinant, principal_minors};
+use mmsmith_expr::{Ast, Derivatives, Expr, Function, Graph, Node};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The names that an energy may use, and the components of `F` and `C` with two indices after them.
@@ -31,6 +31,8 @@ pub(super) struct ComponentLaw {
     energy: Option<Expr>,
     /// Quantities of `h` that the deformation has in a form of its own.
     known: BTreeMap<Expr, Expr>,
+    /// Components that vanish, and `J`, where it is a product of stretches then: for derivatives, once they are formed.
+    simpler: BTreeMap<Expr, Expr>,
 }
 
 impl ComponentLaw {
@@ -42,25 +44,25 @@ impl ComponentLaw {
         isotropic: bool,
     ) -> Self {
         let h = symbols(graph, deformation.H.len());
-        let (replacement, known) = in_components(graph, &h, deformation);
+        let Components { replacement, known, simpler } = in_components(graph, &h, deformation);
         let energy = graph.replace(W, &replacement);
         let mut derivatives = Derivatives::limited();
         let P = h
             .iter()
             .map(|row| row.iter().map(|&h| derivatives.of(graph, energy, h)).collect())
             .collect();
-        ComponentLaw { h, P, isotropic, energy: Some(energy), known }
+        ComponentLaw { h, P, isotropic, energy: Some(energy), known, simpler }
     }
 
     /// From the components of the stress.
     pub(super) fn of_stress(graph: &mut Graph, deformation: &Deformation, P: &Matrix) -> Self {
         let h = symbols(graph, deformation.H.len());
-        let (replacement, known) = in_components(graph, &h, deformation);
+        let Components { replacement, known, simpler } = in_components(graph, &h, deformation);
         let P = P
             .iter()
             .map(|row| row.iter().map(|&p| graph.replace(p, &replacement)).collect())
             .collect();
-        ComponentLaw { h, P, isotropic: false, energy: None, known }
+        ComponentLaw { h, P, isotropic: false, energy: None, known, simpler }
     }
 
     pub(super) fn stress(&self, derivation: &mut Derivation, deformation: &Deformation) -> Stress {
@@ -71,8 +73,12 @@ impl ComponentLaw {
             actual.insert(*symbol, *entry);
         }
         let graph = &mut derivation.graph;
+        let mut general = self.P.clone();
         let mut stress = self.P.clone();
         for entry in stress.iter_mut().flatten() {
+            *entry = graph.replace(*entry, &self.simpler);
+        }
+        for entry in general.iter_mut().chain(&mut stress).flatten() {
             let (value, rest) = graph.split_at_zero(*entry, &small);
             let value = zero_if_vanishing(graph, value);
             *entry = graph.add(value, rest);
@@ -94,7 +100,13 @@ impl ComponentLaw {
                     continue;
                 }
                 let graph = &mut derivation.graph;
-                let modulus = derivatives.of(graph, stress[i][J], self.h[k][L]);
+                let h = self.h[k][L];
+                let modulus = if self.simpler.contains_key(&h) {
+                    let modulus = derivatives.of(graph, general[i][J], h);
+                    graph.replace(modulus, &self.simpler)
+                } else {
+                    derivatives.of(graph, stress[i][J], h)
+                };
                 let (value, rest) = graph.split_at_zero(modulus, &small);
                 let value = zero_if_vanishing(graph, value);
                 first.push(graph.mul(value, open[k][L][J]));
@@ -146,13 +158,18 @@ pub(super) fn uses_invariants_only(graph: &mut Graph, energy: Expr, dimension: u
         .all(|name| !symbols.contains(&graph.symbol(&name)))
 }
 
-/// `F`, `C`, `J`, `I1` and `I2` in the components of the displacement gradient, and what the deformation has of them
-/// already. Invariants are those of the deformation in space: nothing stretches along the directions left out.
-fn in_components(
-    graph: &mut Graph,
-    h: &Matrix,
-    deformation: &Deformation,
-) -> (BTreeMap<Expr, Expr>, BTreeMap<Expr, Expr>) {
+/// What a law may be written in.
+struct Components {
+    /// `F`, `C`, `J`, `I1` and `I2` in the components of the displacement gradient.
+    replacement: BTreeMap<Expr, Expr>,
+    /// As in [`ComponentLaw`].
+    known: BTreeMap<Expr, Expr>,
+    simpler: BTreeMap<Expr, Expr>,
+}
+
+/// The components of the displacement gradient. Invariants are those of the deformation in space: nothing stretches along the
+/// directions left out.
+fn in_components(graph: &mut Graph, h: &Matrix, deformation: &Deformation) -> Components {
     let n = h.len();
     let mut replacement = BTreeMap::new();
     // G = C - I = H + H^T + H^T H
@@ -191,10 +208,26 @@ fn in_components(
         replacement.insert(graph.symbol(name), value);
     }
     let log_J = graph.call(Function::Ln1p, &[volume_change]);
-    let known = BTreeMap::from([
+    // Quotients by a product of stretches cancel with the stretches above them; left to rounding they would not where
+    // a stretch almost vanishes.
+    let mut present = h.clone();
+    let mut simpler = BTreeMap::new();
+    for (h, H) in present.iter_mut().flatten().zip(deformation.H.iter().flatten()) {
+        if *H == Graph::ZERO {
+            simpler.insert(std::mem::replace(h, Graph::ZERO), Graph::ZERO);
+        }
+    }
+    for (k, row) in present.iter_mut().enumerate() {
+        row[k] = graph.add(Graph::ONE, row[k]);
+    }
+    if matches!(graph.node(deformation.J), Node::Product(_)) {
+        simpler.insert(J, determinant(graph, &present));
+    }
+    let known = [
         (J, deformation.J),
         (volume_change, deformation.volume_change),
         (log_J, deformation.log_J),
-    ]);
-    (replacement, known)
+    ];
+    let known = known.map(|(of_components, own)| (graph.replace(of_components, &simpler), own));
+    Components { replacement, known: known.into(), simpler }
 }
