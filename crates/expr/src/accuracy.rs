@@ -246,4 +246,33 @@ mod tests {
         assert!(samples.admit(&exact, &program("y")));
         assert!(!samples.admit(&exact, &four));
     }
+
+    /// Where a stretch almost vanishes a sum loses what it keeps elsewhere.
+    #[test]
+    fn bounds_grow_where_divisors_almost_vanish() {
+        let mut graph = Graph::new();
+        let inputs = ["x", "y"].map(|name| (graph.symbol(name), Dependence::default()));
+        let mut program = |text: &str| {
+            let ast = Ast::parse(text).unwrap();
+            let expr = graph.build(&ast, &mut |g, name| Ok(g.symbol(name))).unwrap();
+            Program::lower(&mut graph, &inputs, &[], &[expr])
+        };
+        let before = program("y/(1 - 2*x)");
+        let samples = Samples::of(&before, 2);
+        let found = Samples::usual(2).near_vanishing(&before);
+        assert!(found.len() == CROSSINGS, "{found:?}");
+        for at in &found {
+            let stretch = 1.0 - 2.0 * at[0];
+            assert!(stretch > 0.0 && stretch <= ALMOST_NOTHING, "{at:?}");
+        }
+        let after = program("y*(1 + 1/(1 - 2*x) - 1)");
+        assert!(samples.admit(&before, &after) && Samples::usual(2).admit(&before, &after));
+        let after = program("y*(1 - 4*x + 4*x^2)/(1 - 2*x)^3");
+        assert!(!samples.admit(&before, &after));
+        // What is nowhere defined is not as accurate, even where gaps are allowed.
+        assert!(!samples.admit_where_defined(&before, &program("sqrt(-x)*y")));
+        let with_gaps = program("y/(1 - 2*x) + sqrt(0.9 - x)/10^20");
+        assert!(samples.admit_where_defined(&before, &with_gaps));
+        assert!(!samples.admit(&before, &with_gaps));
+    }
 }

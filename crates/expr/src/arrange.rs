@@ -448,7 +448,6 @@ impl Arranging<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Ast;
 
     /// Limits on terms, products and powers may be reached and not be passed.
     #[test]

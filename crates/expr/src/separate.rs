@@ -423,3 +423,135 @@ impl<'a> Separating<'a> {
 fn minus_one() -> [Term; 1] {
     [Term { negative: true, powers: BTreeMap::new() }]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Ast, Graph};
+    use proptest::prelude::*;
+
+    /// Of `x`, `y` and `z`, which are coordinates, the time `t` and a parameter `a`.
+    fn program(texts: &[&str]) -> Program {
+        let mut graph = Graph::new();
+        let rate = |name: &str| Dependence { position: "xyz".contains(name), time: name == "t" };
+        let names = ["x", "y", "z", "t", "a"];
+        let inputs = names.map(|name| (graph.symbol(name), rate(name)));
+        let mut build = |text: &&str| {
+            let ast = Ast::parse(text).unwrap();
+            graph.build(&ast, &mut |g, name| Ok(g.symbol(name))).unwrap()
+        };
+        let outputs: Vec<_> = texts.iter().map(&mut build).collect();
+        Program::lower(&mut graph, &inputs, &[], &outputs)
+    }
+
+    /// The outputs once more, in their separated form, wanted or not.
+    fn separated(program: &Program) -> Option<Program> {
+        let separated = Separating::new(program, 3).program(program.outputs())?.compacted();
+        Some(separated.part(&separated.outputs()[program.outputs().len()..]))
+    }
+
+    fn close(found: f64, expected: f64, scale: f64) -> bool {
+        (found - expected).abs() <= 1e-13 * scale
+    }
+
+    /// What is left for each point: its operations, and values of layers along each axis.
+    #[test]
+    fn what_is_left_for_points_of_a_lattice() {
+        for (texts, operations, layers) in [
+            (&["t*sin(x)*y"][..], 1, [1, 1, 0]),
+            (&["sin(t*x) + cos(t*y)"], 1, [1, 1, 0]),
+            (&["(1 + t*x)*(1 + t*y)*(2 + t*z)"], 2, [1, 1, 1]),
+            // What is of one coordinate is one value.
+            (&["(x + t)*sin(x)/(1 + x^2) - a*exp(t*x)"], 0, [1, 0, 0]),
+            (&["t + a"], 0, [0, 0, 0]),
+            // Terms that differ in one coordinate are one term, in whatever order they come.
+            (&["x*y + t*sin(x)*y + x^2*y"], 1, [1, 1, 0]),
+            (&["x*sin(y) + t*y*z + x*cos(y)"], 3, [1, 2, 1]),
+            // Products are multiplied out, and factors cancel.
+            (&["(x + y)*t*x/(x + 2)"], 2, [2, 1, 0]),
+            (&["(t*x + t*y)/(x*y)"], 1, [1, 1, 0]),
+            (&["x*(y + sin(y)) - x*(y + cos(y))"], 1, [1, 1, 0]),
+            // Logarithms and roots of products.
+            (&["x*ln((2 + t*x)*(3 + t*y)*z)"], 4, [2, 1, 1]),
+            (&["sqrt((2 + t*x)*y)*a"], 1, [1, 1, 0]),
+            (&["x*((2 + t*x)*y)^(1/3)"], 1, [1, 1, 0]),
+            // Several outputs share values.
+            (&["x*ln((2 + t*x)*(3 + t*y))", "y*ln((2 + t*x)*(3 + t*y))"], 4, [3, 3, 0]),
+        ] {
+            let program = program(texts);
+            let form = separated(&program).unwrap_or_else(|| panic!("{texts:?}"));
+            let coordinates = form.coordinates(3);
+            let several = coordinates.iter().filter(|c| **c == Coordinates::Several).count();
+            let counts: Vec<usize> = form.layers(form.outputs(), 3).iter().map(Vec::len).collect();
+            assert_eq!((several, counts.as_slice()), (operations, &layers[..]), "{texts:?}");
+            let at = [0.75, 1.5, 0.625, 0.5, 0.3];
+            for (old, new) in program.evaluate(&at).iter().zip(form.evaluate(&at)) {
+                assert!(close(new, *old, old.abs()), "{texts:?}: {new}, not {old}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_separated() {
+        for text in ["sin(t*x*y)", "1/(x + y)", "sqrt(x + y)", "ln(x + t*y)", "ln(-(x*y))*t"] {
+            assert!(separated(&program(&[text])).is_none(), "{text}");
+        }
+        // More terms than are worth it.
+        let sum = |count: usize| {
+            let terms: Vec<String> =
+                (1..=count).map(|n| format!("sin(t*{n}*x)*cos(t*{n}*y)")).collect();
+            separated(&program(&[&terms.join(" + ")])).is_some()
+        };
+        assert!(sum(MOST_TERMS) && !sum(MOST_TERMS + 1));
+    }
+
+    /// The form is taken where it costs much less, and only where there are several coordinates.
+    #[test]
+    fn only_what_pays_is_taken() {
+        let dear = program(&["x*sin(t*x)*ln((2 + t*x)*(3 + t*y))/(1 + t*y)"]);
+        let form = dear.with_separated_coordinates(0..1, 2).unwrap();
+        assert_eq!(form.outputs().len(), 2);
+        assert_eq!(form.part(&form.outputs()[..1]).operations(), dear.operations());
+        assert!(dear.with_separated_coordinates(0..1, 1).is_none());
+        assert!(dear.with_separated_coordinates(0..2, 2).is_none());
+        assert!(program(&["t*x + y"]).with_separated_coordinates(0..1, 2).is_none());
+    }
+
+    /// The difference of two coordinates is rounded once, and may not be multiplied out; their sum may.
+    #[test]
+    fn digits_are_kept() {
+        for (sum, taken) in [("x + y", true), ("x - y", false)] {
+            let text = format!("({sum})*sin(t*x)*ln(2 + t*x)*ln(2 + t*y)*sin(t*y)");
+            let program = program(&[&text]);
+            assert!(separated(&program).is_some());
+            assert_eq!(program.with_separated_coordinates(0..1, 2).is_some(), taken, "{text}");
+        }
+    }
+
+    proptest! {
+        /// Sums of products, over a product, and the logarithm of one.
+        #[test]
+        fn values_stay(
+            terms in prop::collection::vec((-9_i32..10, 0..3, 0..3, 0..3, 0..3), 1..6),
+            factor in (-9_i32..10, 1..5, 1..5),
+            at in prop::array::uniform5(0.2_f64..0.9),
+        ) {
+            let term = |(c, i, j, k, l): &(i32, i32, i32, i32, i32)| {
+                format!("({c})*sin(t*x)^{i}*(y + t)^{j}*z^{k}*x^{l}")
+            };
+            let sum: Vec<String> = terms.iter().map(term).collect();
+            let (c, i, j) = factor;
+            let bottom = format!("(x + {i})^{j}*(y*t + {j})");
+            let text = format!(
+                "({})*(({c})*y - z*x)/({bottom}) + x*ln({bottom})",
+                sum.join(" + ")
+            );
+            let program = program(&[&text]);
+            if let Some(form) = separated(&program) {
+                let (old, new) = (program.evaluate(&at)[0], form.evaluate(&at)[0]);
+                let scale: f64 = terms.iter().map(|term| f64::from(term.0.abs())).sum();
+                prop_assert!(close(new, old, 40.0 * (scale + 10.0)), "{text}: {new}, not {old}");
+            }
+        }
+    }
+}

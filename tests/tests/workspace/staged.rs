@@ -22,6 +22,30 @@ fn points<T: Real, const D: usize>(count: usize) -> Vec<SVector<T, D>> {
         .collect()
 }
 
+/// The points of a lattice in the unit cube, off its faces, of which enough share each coordinate.
+fn lattice<T: Real, const D: usize>() -> Vec<SVector<T, D>> {
+    const LAYERS: [usize; 3] = [36, 40, 9];
+    let layers = |axis: usize| if D == 3 { 9 } else { LAYERS[axis] };
+    // Lines need points of the same coordinate.
+    let count = if D == 1 { 16 * layers(0) } else { (0..D).map(layers).product() };
+    let point = |mut n: usize| {
+        SVector::from_fn(|axis, _| {
+            let layer = n % layers(axis);
+            n /= layers(axis);
+            T::nearest(0.05 + 0.9 * (layer as f64 + 0.3) / layers(axis) as f64)
+        })
+    };
+    (0..count).map(point).collect()
+}
+
+/// Whether only the numbers of layers are kept of points.
+fn has_form_for_lattices<T: Real, const D: usize>(
+    solution: &dyn Solution<T, D>,
+    X: &[SVector<T, D>],
+) -> bool {
+    solution.body_force_at(X).bytes_per_point() == size_of::<[u16; D]>()
+}
+
 /// Equal to the last bit; not-a-number counts as equal to itself.
 fn same<T: Real, const D: usize>(a: &SVector<T, D>, b: &SVector<T, D>) -> bool {
     a.iter().zip(b.iter()).all(|(a, b)| a.to_f64().to_bits() == b.to_f64().to_bits())
@@ -49,8 +73,10 @@ fn compare<T: Real, const D: usize>(
     solution: &dyn Solution<T, D>,
     exact: &dyn Solution<f64, D>,
 ) {
-    for count in [0, 1, BLOCK - 1, BLOCK, BLOCK + 1, 5 * BLOCK + 7] {
-        let X = points::<T, D>(count);
+    let counts = [0, 1, BLOCK - 1, BLOCK, BLOCK + 1, 5 * BLOCK + 7];
+    let on_lattice = Some(lattice()).filter(|X| has_form_for_lattices(solution, X));
+    for X in counts.map(points::<T, D>).into_iter().chain(on_lattice) {
+        let count = X.len();
         let kept = solution.body_force_at(&X);
         assert_eq!((kept.len(), kept.is_empty()), (count, count == 0), "{name}");
         let period = solution.period().to_f64();
@@ -145,6 +171,65 @@ fn compare_all<T: Real>() {
         let exact = build::<f64>(name, &[]).unwrap().unwrap();
         compare_both(name, build::<T>(name, &[]).unwrap().unwrap(), exact);
     }
+}
+
+/// Where each coordinate moves along itself only, and in a few others, points of a lattice take their layers' numbers only.
+#[test]
+fn solutions_with_a_form_for_lattices() {
+    let mut found = Vec::new();
+    for Description { name, specification, .. } in CATALOGUE {
+        let spec = Spec::parse(specification, name).unwrap();
+        let has_form = |solution: AnySolution<f64>| match solution {
+            AnySolution::One(solution) => has_form_for_lattices(&*solution, &lattice()),
+            AnySolution::Two(solution) => has_form_for_lattices(&*solution, &lattice()),
+            AnySolution::Three(solution) => has_form_for_lattices(&*solution, &lattice()),
+            _ => panic!("{name} has an unknown dimension"),
+        };
+        let generated = has_form(build(name, &[]).unwrap().unwrap());
+        assert_eq!(generated, has_form(interpret(&spec, []).unwrap()), "{name}");
+        if generated {
+            found.push(*name);
+        }
+    }
+    assert_eq!(found, ["axis-aligned", "axis-aligned-3d", "rigid-motion", "torsion"]);
+}
+
+mod inverting {
+    mmsmith_macros::manufactured_solution!("../../data/specs/inverting.toml");
+}
+
+/// Two stretches may be negative together: then `J` has a logarithm though they have none.
+#[test]
+fn bodies_turned_over_twice() {
+    let text = include_str!("../../data/specs/inverting.toml");
+    let spec = Spec::parse(text, "inverting.toml").unwrap();
+    let [mut right, mut twice, mut never] = [0; 3];
+    let generated = inverting::Inverting::<f64>::new(Default::default()).unwrap();
+    for solution in [interpret(&spec, []).unwrap(), generated.into()] {
+        let AnySolution::Two(solution) = solution else { panic!("in the plane") };
+        let t = 0.13 * solution.period();
+        let X = lattice();
+        let kept = solution.body_force_at(&X);
+        assert!(has_form_for_lattices(&*solution, &X));
+        let mut b = vec![SVector::zeros(); X.len()];
+        kept.evaluate(t, 0, &mut b);
+        for (X, b) in X.iter().zip(&b) {
+            let F = solution.deformation_gradient(X, t);
+            let single = solution.body_force(X, t);
+            if F[(0, 0)] * F[(1, 1)] < 0.0 {
+                never += 1;
+                assert!(b.iter().all(|b| b.is_nan()), "{b} at {X}");
+                continue;
+            }
+            if F[(0, 0)] < 0.0 {
+                twice += 1
+            } else {
+                right += 1
+            }
+            assert!((b - single).norm() <= 1e-12 * single.norm(), "{b}, not {single}, at {X}");
+        }
+    }
+    assert!(right > 100 && twice > 100 && never > 100, "{right}, {twice}, {never}");
 }
 
 #[test]
