@@ -271,7 +271,7 @@ mod tests {
         assert!(!samples.admit(&before, &after));
         // What is nowhere defined is not as accurate, even where gaps are allowed.
         assert!(!samples.admit_where_defined(&before, &program("sqrt(-x)*y")));
-        let with_gaps = program("y/(1 - 2*x) + sqrt(0.9 - x)/10^20");
+        let (before, with_gaps) = (program("4*x*y"), program("4*x*y + 10^(-20)*sqrt(0.9 - x)"));
         assert!(samples.admit_where_defined(&before, &with_gaps));
         assert!(!samples.admit(&before, &with_gaps));
     }
