@@ -271,8 +271,8 @@ mod tests {
         assert!(!samples.admit(&before, &after));
         // What is nowhere defined is not as accurate, even where gaps are allowed.
         assert!(!samples.admit_where_defined(&before, &program("sqrt(-x)*y")));
-        let before = program("x*y*(1 + x)*(1 + y)");
-        let with_gaps = program("x*y*(1 + x)*(1 + y) + 10^(-20)*sqrt(0.9 - x)");
+        let before = program("x*y*(1 + x)*(1 + y)*(2 + x)*(2 + y)");
+        let with_gaps = program("x*y*(1 + x)*(1 + y)*(2 + x)*(2 + y) + 10^(-20)*sqrt(0.9 - x)");
         assert!(samples.admit_where_defined(&before, &with_gaps));
         assert!(!samples.admit(&before, &with_gaps));
     }
