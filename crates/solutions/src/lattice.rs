@@ -205,3 +205,68 @@ where
         size_of::<[u16; D]>()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{AxisAligned, AxisAlignedParameters};
+
+    fn lattice(columns: usize, rows: usize) -> Vec<SVector<f64, 2>> {
+        let point = |n: usize| [(n % columns) as f64, 0.5 * (n / columns) as f64].into();
+        (0..columns * rows).map(point).collect()
+    }
+
+    #[test]
+    fn points_by_their_layers() {
+        let X = lattice(40, 30);
+        let found = Lattice::of(&X).unwrap();
+        assert_eq!((found.coordinates(0).len(), found.coordinates(1).len()), (40, 30));
+        assert_eq!((found.coordinates(1)[3], found.layers()[85]), (1.5, [5, 2]));
+        for (n, X) in X.iter().enumerate() {
+            assert_eq!(found.point(n), *X);
+        }
+        // In any order, and with holes.
+        let some: Vec<_> =
+            X.iter().rev().enumerate().filter(|(n, _)| n % 20 > 0).map(|(_, X)| *X).collect();
+        let found = Lattice::of(&some).unwrap();
+        assert_eq!((0..some.len()).map(|n| found.point(n)).collect::<Vec<_>>(), some);
+    }
+
+    #[test]
+    fn too_many_layers() {
+        // 32 and 32 layers of 16 points each, and one more.
+        let X = lattice(32, 32);
+        assert!(Lattice::of(&X).is_some());
+        assert!(Lattice::of(&X[1..]).is_none());
+        let mut other = X.clone();
+        other[500].x = -0.0;
+        assert!(Lattice::of(&other).is_none(), "zero with a sign is a coordinate of its own");
+        assert!(Lattice::<f64, 2>::of(&[]).is_none());
+        let line = |n: usize| -> Vec<SVector<f64, 1>> {
+            (0..16 * n).map(|i| [(i % n) as f64].into()).collect()
+        };
+        let longest = Lattice::of(&line(MOST_LAYERS)).unwrap();
+        assert_eq!(longest.point(MOST_LAYERS - 1), [(MOST_LAYERS - 1) as f64].into());
+        assert!(Lattice::of(&line(MOST_LAYERS + 1)).is_none());
+    }
+
+    fn points() -> (AxisAligned<f64>, Vec<SVector<f64, 2>>) {
+        let solution = AxisAligned::new(AxisAlignedParameters::default()).unwrap();
+        (solution, lattice(40, 40).iter().map(|X| X * 0.02).collect())
+    }
+
+    #[test]
+    #[should_panic(expected = "index out of bounds")]
+    fn points_beyond_the_last() {
+        let (solution, X) = points();
+        solution.body_force_at(&X).evaluate(0.0, X.len() - 1, &mut [SVector::zeros(); 2]);
+    }
+
+    #[test]
+    #[should_panic(expected = "values of a time are those of each layer")]
+    fn values_of_another_solution() {
+        let (solution, X) = points();
+        let mut b = [SVector::zeros()];
+        solution.body_force_at(&X).evaluate_of(&[0.0; 50], &[7], &mut b);
+    }
+}

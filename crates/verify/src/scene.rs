@@ -250,8 +250,8 @@ impl<const D: usize> Scene<D> {
         particles * per_particle as f64 + nodes * PER_NODE
     }
 
-    /// How many bytes the exact fields keep of each particle: what the body force needs, in values of the solver's size, and
-    /// what the state that errors are measured by needs, in double precision.
+    /// How many bytes the exact fields keep of each particle, at most: what the body force needs, in values of the solver's
+    /// size, and what the state that errors are measured by needs, in double precision.
     pub(crate) fn bytes_of_exact(solution: &dyn Solution<f64, D>, scalar: usize) -> usize {
         let body_force = solution.body_force_at(&[]).bytes_per_point();
         body_force * scalar / size_of::<f64>() + solution.state_at(&[]).bytes_per_point()
