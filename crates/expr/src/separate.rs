@@ -73,18 +73,29 @@ impl Program {
         layers
     }
 
+    /// The operations that `outputs` need for all layers at each time, one along each axis, and for each point of a lattice.
+    #[must_use]
+    pub fn operations_in_lattice(&self, outputs: &[Slot], dimension: usize) -> [OperationCount; 2] {
+        let coordinates = self.coordinates(dimension);
+        let needed = self.needed(outputs);
+        let [mut layers, mut points] = [OperationCount::default(); 2];
+        for slot in self.slots().filter(|slot| needed[slot.index()]) {
+            let operation = &self.operations()[slot.index()];
+            match coordinates[slot.index()] {
+                Coordinates::One(_) if self.dependence(slot).time => layers.count(operation),
+                Coordinates::Several => points.count(operation),
+                _ => {}
+            }
+        }
+        [layers, points]
+    }
+
     /// What `outputs` cost for each point of a lattice at each time.
     fn cost_in_lattice(&self, outputs: &[Slot], dimension: usize) -> usize {
-        let coordinates = self.coordinates(dimension);
         let of_layers: usize = self.layers(outputs, dimension).iter().map(Vec::len).sum();
-        let needed = self.needed(outputs);
-        let of_points = self.slots().filter(|slot| {
-            needed[slot.index()] && coordinates[slot.index()] == Coordinates::Several
-        });
-        let operations =
-            of_points.map(|slot| OperationCount::of(&self.operations()[slot.index()]).cost());
+        let [_, points] = self.operations_in_lattice(outputs, dimension);
         // The numbers of its layers are kept for each point.
-        KEPT_NUMBER + of_layers + operations.sum::<usize>()
+        KEPT_NUMBER + of_layers + points.cost()
     }
 
     /// Which of the first `dimension` inputs each value depends on.

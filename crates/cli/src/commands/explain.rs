@@ -20,7 +20,7 @@ pub(crate) fn explain(options: &ExplainOptions) -> Result<bool> {
     let spec = specification(&options.name)?;
     let mut fields = spec.derive()?;
     let exercises = exercises(&options.name)?;
-    let cost = BodyForceCost::of(&mut fields);
+    let cost = BodyForceCost::of(&mut fields, spec.dimension);
     let selection = Selection::new(&options.name, &[])?;
     let model = Model::new(&selection, Precision::F64)?;
     let predicted = predict::usual(&model).map_err(|error| error.to_string());
@@ -69,27 +69,31 @@ fn exercises(name: &str) -> Result<Vec<Exercise>> {
 
 /// Operations of the generated body force, by how often they are done.
 struct BodyForceCost {
-    stages: [(&'static str, OperationCount); 4],
+    stages: Vec<(&'static str, OperationCount)>,
     /// Values kept for each particle.
     kept: usize,
 }
 
 impl BodyForceCost {
-    fn of(fields: &mut Fields) -> Self {
+    fn of(fields: &mut Fields, dimension: usize) -> Self {
         let (inputs, definitions, b) = (&fields.inputs, &fields.definitions, &fields.b);
         let b = arrange(&mut fields.graph, inputs, definitions, &mut Drafts::default(), b);
         let program: Program = fields.program(&b).with_gathered_factors(0..b.len());
         let kept = program.kept_at_points(program.outputs(), usize::MAX);
         let count = program.operations_with_kept(program.outputs(), &kept);
-        BodyForceCost {
-            stages: [
-                ("once a run", count.fixed),
-                ("once a step", count.time),
-                ("once a particle", count.point),
-                ("each particle and step", count.both),
-            ],
-            kept: kept.len(),
+        let mut stages = vec![
+            ("once a run", count.fixed),
+            ("once a step", count.time),
+            ("once a particle", count.point),
+            ("each particle and step", count.both),
+        ];
+        if let Some(program) = program.with_separated_coordinates(0..b.len(), dimension) {
+            let [layer, point] =
+                program.operations_in_lattice(&program.outputs()[b.len()..], dimension);
+            stages.push(("a layer an axis and step, in a lattice", layer));
+            stages.push(("each particle and step, in a lattice", point));
         }
+        BodyForceCost { stages, kept: kept.len() }
     }
 }
 
