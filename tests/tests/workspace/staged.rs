@@ -204,8 +204,9 @@ fn bodies_turned_over_twice() {
     let text = include_str!("../../data/specs/inverting.toml");
     let spec = Spec::parse(text, "inverting.toml").unwrap();
     let [mut right, mut twice, mut never] = [0; 3];
-    let generated = inverting::Inverting::<f64>::new(Default::default()).unwrap();
-    for solution in [interpret(&spec, []).unwrap(), generated.into()] {
+    let parameters = inverting::InvertingParameters { A: 0.9, ..Default::default() };
+    let generated = inverting::Inverting::<f64>::new(parameters).unwrap();
+    for solution in [interpret(&spec, [("A", 0.9)]).unwrap(), generated.into()] {
         let AnySolution::Two(solution) = solution else { panic!("in the plane") };
         let t = 0.13 * solution.period();
         let X = lattice();

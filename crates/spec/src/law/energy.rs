@@ -221,7 +221,11 @@ fn in_components(graph: &mut Graph, h: &Matrix, deformation: &Deformation) -> Co
         row[k] = graph.add(Graph::ONE, row[k]);
     }
     if matches!(graph.node(deformation.J), Node::Product(_)) {
-        simpler.insert(J, determinant(graph, &present));
+        let product = determinant(graph, &present);
+        let volume_change = graph.replace(volume_change, &simpler);
+        simpler.insert(J, product);
+        let log_of_product = graph.call(Function::LnOfBoth, &[volume_change, product]);
+        simpler.extend([(log_J, log_of_product), (graph.call(Function::Ln, &[J]), log_of_product)]);
     }
     let known = [
         (J, deformation.J),
