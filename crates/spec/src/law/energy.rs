@@ -7,7 +7,7 @@
 
 use super::{Deformation, Stress, zero_if_vanishing};
 use crate::derivation::Derivation;
-use crate::tensor::{Matrix, Vector, determinant, principal_minors};
+use crate::tensor::{Matrix, Vector, cofactor, determinant, principal_minors};
 use mmsmith_expr::{Ast, Derivatives, Expr, Function, Graph, Node};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -224,6 +224,13 @@ fn in_components(graph: &mut Graph, h: &Matrix, deformation: &Deformation) -> Co
         let product = determinant(graph, &present);
         let volume_change = graph.replace(volume_change, &simpler);
         simpler.insert(J, product);
+        let mut derivatives = Derivatives::limited();
+        for (k, row) in h.iter().enumerate() {
+            let cofactor = cofactor(graph, &present, k, k);
+            if matches!(graph.node(cofactor), Node::Product(_)) {
+                simpler.insert(derivatives.of(graph, J, row[k]), cofactor);
+            }
+        }
         let log_of_product = graph.call(Function::LnOfBoth, &[volume_change, product]);
         simpler.extend([(log_J, log_of_product), (graph.call(Function::Ln, &[J]), log_of_product)]);
     }
