@@ -12,8 +12,7 @@ use std::array;
 /// How much larger than before the error bound may be: at most points, and at any.
 const USUAL_GROWTH: f64 = 1.5;
 const LARGEST_GROWTH: f64 = 8.0;
-/// How many quantities are looked at that may vanish, at how many points each, and how small it is there.
-const MOST_QUANTITIES: usize = 8;
+/// At how many points a quantity is looked at that may vanish, and how small it is there.
 const CROSSINGS: usize = 4;
 const ALMOST_NOTHING: f64 = 1e-8;
 
@@ -54,14 +53,22 @@ impl Samples {
         }
         let point =
             |n: usize| -> Vec<f64> { self.0[n / SIDE].iter().map(|row| row[n % SIDE]).collect() };
+        let mut quantities: Vec<_> = divisors(program)
+            .into_iter()
+            .map(|slot| (slot, crossings(&values[slot.index()]).take(CROSSINGS)))
+            .collect();
+        // One point of each, then one more of each, until there are as many as are looked at side by side anyway.
         let mut found = Vec::new();
-        let crosses = |slot: &Slot| crossings(&values[slot.index()]).next().is_some();
-        for slot in divisors(program).into_iter().filter(crosses).take(MOST_QUANTITIES) {
-            let quantity = program.part(&[slot]);
-            for n in crossings(&values[slot.index()]).take(CROSSINGS) {
+        for _ in 0..CROSSINGS {
+            for (slot, crossings) in &mut quantities {
+                let Some(n) = crossings.next() else { continue };
                 let rises = values[slot.index()][n] <= 0.0;
                 let (below, above) = if rises { (n, n + 1) } else { (n + 1, n) };
+                let quantity = program.part(&[*slot]);
                 found.push(almost_zero(&quantity, point(below), point(above)));
+                if found.len() == SIDE {
+                    return found;
+                }
             }
         }
         found
