@@ -12,8 +12,11 @@ use std::array;
 /// How much larger than before the error bound may be: at most points, and at any.
 const USUAL_GROWTH: f64 = 1.5;
 const LARGEST_GROWTH: f64 = 8.0;
-/// At how many points a quantity is looked at that may vanish, and how small it is there.
+/// At how many points a quantity is looked at that may vanish, how many are tried for each, how many there are in all, and
+/// how small it is there.
 const CROSSINGS: usize = 4;
+const MOST_TRIED: usize = 8;
+const MOST_NEAR: usize = 2 * SIDE;
 const ALMOST_NOTHING: f64 = 1e-8;
 
 const GOLDEN_RATIO: f64 = 0.618_033_988_749_894_9;
@@ -55,18 +58,23 @@ impl Samples {
             |n: usize| -> Vec<f64> { self.0[n / SIDE].iter().map(|row| row[n % SIDE]).collect() };
         let mut quantities: Vec<_> = divisors(program)
             .into_iter()
-            .map(|slot| (slot, crossings(&values[slot.index()]).take(CROSSINGS)))
+            .map(|slot| (slot, crossings(&values[slot.index()])))
             .collect();
         // One point of each, then one more of each, until there are as many as are looked at side by side anyway.
         let mut found = Vec::new();
         for _ in 0..CROSSINGS {
             for (slot, crossings) in &mut quantities {
-                let Some(n) = crossings.next() else { continue };
-                let rises = values[slot.index()][n] <= 0.0;
-                let (below, above) = if rises { (n, n + 1) } else { (n + 1, n) };
                 let quantity = program.part(&[*slot]);
-                found.push(almost_zero(&quantity, point(below), point(above)));
-                if found.len() == SIDE {
+                let near = crossings.by_ref().map(|n| {
+                    let rises = values[slot.index()][n] <= 0.0;
+                    let (below, above) = if rises { (n, n + 1) } else { (n + 1, n) };
+                    almost_zero(&quantity, point(below), point(above))
+                });
+                // Where another stretch is negative nothing may be defined.
+                let is_defined =
+                    |at: &Vec<f64>| program.evaluate(at).iter().all(|value| value.is_finite());
+                found.extend(near.take(MOST_TRIED).find(is_defined));
+                if found.len() == MOST_NEAR {
                     return found;
                 }
             }
