@@ -15,7 +15,7 @@ const MOST_PRODUCTS: usize = 400;
 
 /// `outputs` in forms of the same value that cost less in all, where there are such.
 ///
-/// `inputs` and `definitions` are those of [`Program::lower`], which the result is meant for; `drafts` may have served
+/// `inputs` and `definitions` are those of [`Program::lower`](crate::Program::lower), which the result is meant for; `drafts` may have served
 /// with the same ones before.
 #[must_use]
 pub fn reuse(

@@ -20,6 +20,8 @@ use std::ops::Range;
 
 /// Sums of more terms than this are not worth the search.
 const MOST_TERMS: usize = 16;
+/// Powers up to here are told apart from their bases.
+const LARGEST_POWER: u32 = 1 << 16;
 /// How many times less than before a point of a lattice must cost, so that the layers and what leads to them pay as well.
 const WORTHWHILE: usize = 2;
 
@@ -223,11 +225,12 @@ impl<'a> Separating<'a> {
             Operation::Neg(a) => self.products(of(a), &minus_one()),
             // Products of what is the same at all points stay as they are.
             _ if coordinates == Coordinates::None => Some(whole()),
-            Operation::Mul(a, b) => self.products(of(a), of(b)),
-            Operation::Div(a, b) => match single(b) {
-                Some(divisor) => self.products(of(a), &[Term::default().times(divisor, -1)]),
-                None => (!several).then(whole),
-            },
+            Operation::Mul(a, b) => self.products(of(a), of(b)).or_else(|| (!several).then(whole)),
+            Operation::Div(a, b) => {
+                let divisor = single(b).map(|divisor| [Term::default().times(divisor, -1)]);
+                let quotients = divisor.and_then(|divisor| self.products(of(a), &divisor));
+                quotients.or_else(|| (!several).then(whole))
+            }
             _ if !several => Some(whole()),
             Operation::Add(a, b) => self.merged(of(a).iter().chain(of(b)).cloned()),
             Operation::Sub(a, b) => {
@@ -246,10 +249,13 @@ impl<'a> Separating<'a> {
         }
     }
 
+    /// `None` where too many terms are left, or powers are very large.
     fn products(&mut self, a: &[Term], b: &[Term]) -> Option<Vec<Term>> {
         let each = |a: &Term| b.iter().map(|b| a.times(b, 1)).collect::<Vec<_>>();
         let products: Vec<Term> = a.iter().flat_map(each).collect();
-        self.merged(products.into_iter())
+        let mut powers = products.iter().flat_map(|product| product.powers.values());
+        let is_moderate = powers.all(|power| power.unsigned_abs() <= LARGEST_POWER);
+        is_moderate.then(|| self.merged(products.into_iter()))?
     }
 
     /// The logarithm of a product, as a sum of those of what it has of each coordinate; `None` for a negative one.
@@ -506,6 +512,13 @@ mod tests {
     fn what_cannot_be_separated() {
         for text in ["sin(t*x*y)", "1/(x + y)", "sqrt(x + y)", "ln(x + t*y)", "ln(-(x*y))*t"] {
             assert!(separated(&program(&[text])).is_none(), "{text}");
+        }
+        // Powers of any size are values of their coordinate.
+        for power in ["x^65", "(x^1000)^65", "(x^1000)^66", "((x^1000)^1000)^1000"] {
+            let form = separated(&program(&[&format!("t*{power}*y + {power}")])).unwrap();
+            let counts: Vec<usize> = form.layers(form.outputs(), 3).iter().map(Vec::len).collect();
+            assert_eq!(counts, [1, 1, 0], "{power}");
+            assert_eq!(form.evaluate(&[1.0, 3.0, 0.0, 2.0]), [7.0], "{power}");
         }
         // More terms than are worth it.
         let sum = |count: usize| {

@@ -92,7 +92,8 @@ pub trait Solution<T: Real, const D: usize>: Send + Sync {
     fn first_piola_kirchhoff(&self, X: &SVector<T, D>, t: T) -> SMatrix<T, D, D>;
     /// Body force `b` per unit mass, from `rho0 a = Div P + rho0 b`.
     fn body_force(&self, X: &SVector<T, D>, t: T) -> SVector<T, D>;
-    /// The body force at many fixed points: what depends on the points alone is computed here, once, and kept.
+    /// The body force at many fixed points: what depends on the points alone is computed here, once, and kept; where they
+    /// [share their coordinates](crate::Lattice), what depends on one coordinate and the time is computed once for each.
     ///
     /// Solutions that have no stages keep the positions and compute the rest at each evaluation.
     fn body_force_at(&self, X: &[SVector<T, D>]) -> Box<dyn BodyForceAtPoints<T, D> + '_> {
