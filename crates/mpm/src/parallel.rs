@@ -1,7 +1,8 @@
 //! Loops over chunks of arrays, side by side on the threads of the pool.
 //!
 //! What is done with a chunk is called through a reference: the machinery of the pool is then compiled once for each kind
-//! of element, not once for each scheme.
+//! of element, not once for each scheme. Every chunk is a task of its own: left to itself, the pool hands out runs of chunks, of
+//! which those that a slow thread has begun are taken over by nobody, and all threads wait for it.
 
 use rayon::prelude::*;
 
@@ -11,7 +12,8 @@ pub(crate) fn each_chunk<A: Send>(
     size: usize,
     work: &(dyn Fn(usize, &mut [A]) + Sync),
 ) {
-    array.par_chunks_mut(size).enumerate().for_each(|(number, chunk)| work(number, chunk));
+    let chunks = array.par_chunks_mut(size).enumerate().with_max_len(1);
+    chunks.for_each(|(number, chunk)| work(number, chunk));
 }
 
 /// What is done with a chunk of three arrays, by its number.
@@ -24,5 +26,6 @@ pub(crate) fn each_chunk_of_three<A: Send, B: Send, C: Send>(
     work: &OfThree<'_, A, B, C>,
 ) {
     let chunks = a.par_chunks_mut(size).zip(b.par_chunks_mut(size)).zip(c.par_chunks_mut(size));
-    chunks.enumerate().for_each(|(number, ((a, b), c))| work(number, a, b, c));
+    let chunks = chunks.enumerate().with_max_len(1);
+    chunks.for_each(|(number, ((a, b), c))| work(number, a, b, c));
 }
