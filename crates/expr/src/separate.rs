@@ -477,6 +477,7 @@ mod tests {
         for (texts, operations, layers) in [
             (&["t*sin(x)*y"][..], 1, [1, 1, 0]),
             (&["sin(t*x) + cos(t*y)"], 1, [1, 1, 0]),
+            (&["-(t*sin(x)*y)"], 2, [1, 1, 0]),
             (&["(1 + t*x)*(1 + t*y)*(2 + t*z)"], 2, [1, 1, 1]),
             // What is of one coordinate is one value.
             (&["(x + t)*sin(x)/(1 + x^2) - a*exp(t*x)"], 0, [1, 0, 0]),
@@ -506,6 +507,25 @@ mod tests {
                 assert!(close(new, *old, old.abs()), "{texts:?}: {new}, not {old}");
             }
         }
+    }
+
+    /// Next to one it is taken of the difference, where the factor is formed from it.
+    #[test]
+    fn logarithms_of_stretches() {
+        let count = |text: &str| {
+            let form = separated(&program(&[text])).unwrap();
+            let of = |such: fn(&Operation) -> bool| {
+                form.operations().iter().filter(|operation| such(operation)).count()
+            };
+            let [both, plain] = [
+                of(|operation| matches!(operation, Operation::LnOfBoth(..))),
+                of(|operation| matches!(operation, Operation::Call(Function::Ln, _))),
+            ];
+            (both, plain)
+        };
+        assert_eq!(count("x*ln((1 + t*x)*(1 - t*y))"), (2, 0));
+        assert_eq!(count("x*ln((1 + t*x)*(2 + t*y))"), (1, 1));
+        assert_eq!(count("x*ln((1 + t*x)^2*y)"), (0, 2));
     }
 
     #[test]
