@@ -8,6 +8,7 @@
 use crate::program::SIDE;
 use crate::{Function, Operation, Program, Slot};
 use std::array;
+use std::collections::BTreeSet;
 
 /// How much larger than before the error bound may be: at most points, and at any.
 const USUAL_GROWTH: f64 = 1.5;
@@ -58,17 +59,18 @@ impl Samples {
             |n: usize| -> Vec<f64> { self.0[n / SIDE].iter().map(|row| row[n % SIDE]).collect() };
         let mut quantities: Vec<_> = divisors(program)
             .into_iter()
-            .map(|slot| (slot, crossings(&values[slot.index()])))
+            .map(|slot| {
+                let values = &values[slot.index()];
+                (program.part(&[slot]), values, crossings(values))
+            })
             .collect();
-        // One point of each, then one more of each, until there are as many as are looked at side by side anyway.
+        // One point of each, then one more of each, until there are enough.
         let mut found = Vec::new();
         for _ in 0..CROSSINGS {
-            for (slot, crossings) in &mut quantities {
-                let quantity = program.part(&[*slot]);
-                let near = crossings.by_ref().map(|n| {
-                    let rises = values[slot.index()][n] <= 0.0;
-                    let (below, above) = if rises { (n, n + 1) } else { (n + 1, n) };
-                    almost_zero(&quantity, point(below), point(above))
+            for (quantity, values, crossings) in &mut quantities {
+                let near = crossings.map(|n| {
+                    let (above, below) = if values[n] > 0.0 { (n, n + 1) } else { (n + 1, n) };
+                    almost_zero(quantity, point(below), point(above))
                 });
                 // Where another stretch is negative nothing may be defined.
                 let is_defined =
@@ -124,7 +126,7 @@ fn sample(point: usize, input: usize) -> f64 {
 }
 
 /// What a program divides by, or takes the logarithm or a root of, and the factors of these.
-fn divisors(program: &Program) -> Vec<Slot> {
+fn divisors(program: &Program) -> BTreeSet<Slot> {
     let operations = program.operations();
     let divisor = |operation: &Operation| match *operation {
         Operation::Div(_, y)
@@ -134,18 +136,15 @@ fn divisors(program: &Program) -> Vec<Slot> {
         | Operation::Power(y, _) => Some(y),
         _ => None,
     };
-    let mut divisors: Vec<Slot> = operations.iter().filter_map(divisor).collect();
-    let mut next = 0;
-    while let Some(&slot) = divisors.get(next) {
-        next += 1;
-        if let Operation::Mul(a, b) = operations[slot.index()] {
-            divisors.extend(
-                [a, b].into_iter().filter(|factor| !divisors.contains(factor)).collect::<Vec<_>>(),
-            );
+    let mut open: Vec<Slot> = operations.iter().filter_map(divisor).collect();
+    let mut divisors = BTreeSet::new();
+    while let Some(slot) = open.pop() {
+        if divisors.insert(slot)
+            && let Operation::Mul(a, b) = operations[slot.index()]
+        {
+            open.extend([a, b]);
         }
     }
-    divisors.sort_unstable();
-    divisors.dedup();
     divisors
 }
 
@@ -164,14 +163,11 @@ fn almost_zero(quantity: &Program, mut below: Vec<f64>, mut above: Vec<f64>) -> 
             return above;
         }
         let value = quantity.evaluate(&middle)[0];
-        if value > 0.0 {
-            above = middle
-        } else {
-            below = middle
-        }
         if value > 0.0 && value < ALMOST_NOTHING {
-            return above;
+            return middle;
         }
+        let end = if value > 0.0 { &mut above } else { &mut below };
+        *end = middle;
     }
 }
 
