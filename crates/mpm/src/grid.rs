@@ -1,5 +1,7 @@
 //! The background grid: what a scene states of it, and how its nodes lie in memory.
 
+use std::ops::Range;
+
 use nalgebra::{RealField, SVector};
 
 use crate::error::SetupError;
@@ -44,6 +46,13 @@ struct Ghost {
     image: usize,
     /// Whether the component across the wall changes its sign between the two (an odd number of reflections).
     flips: bool,
+}
+
+impl Ghost {
+    /// The component that changes its sign.
+    fn flip(&self) -> Option<usize> {
+        self.flips.then_some(self.axis)
+    }
 }
 
 /// Where the nodes lie in memory: axis 0 fastest, with padding on all sides.
@@ -112,10 +121,10 @@ impl<const D: usize> Layout<D> {
         self.strides[D - 1]
     }
 
-    /// Calls `visit` with the index of every node in a layer across an axis.
-    fn for_layer(&self, axis: usize, layer: usize, mut visit: impl FnMut(usize)) {
+    /// Calls `visit` with the index of every node in a layer across an axis, of `nodes` nodes from the beginning of a row on.
+    fn for_layer(&self, nodes: usize, (axis, layer): (usize, usize), mut visit: impl FnMut(usize)) {
         let (stride, slab) = (self.strides[axis], self.strides[axis] * self.dims[axis]);
-        for start in (layer * stride..self.nodes).step_by(slab) {
+        for start in (layer * stride..nodes).step_by(slab) {
             (start..start + stride).for_each(&mut visit);
         }
     }
@@ -123,33 +132,105 @@ impl<const D: usize> Layout<D> {
     /// Adds what was deposited beyond walls to the mirror images: `add(image, ghost, Some(axis))`, the axis being that
     /// of the component that changes its sign.
     pub(crate) fn fold<N: Copy>(&self, nodes: &mut [N], add: impl Fn(&mut N, N, Option<usize>)) {
-        for g in &self.ghosts {
-            let flip = g.flips.then_some(g.axis);
-            self.for_layer(g.axis, g.layer, |index| {
-                let ghost = nodes[index];
-                add(&mut nodes[self.image(g, index)], ghost, flip);
-            });
-        }
+        self.fold_rows(nodes, &add);
+        self.fold_edge(&(0..self.dims[D - 1]), 0, nodes, &add);
     }
 
     /// Gives the nodes beyond walls the mirrored values: `mirror(image, Some(axis))`, with the axis as in `fold`.
     pub(crate) fn unfold<N: Copy>(&self, nodes: &mut [N], mirror: impl Fn(N, Option<usize>) -> N) {
-        for g in &self.ghosts {
-            let flip = g.flips.then_some(g.axis);
-            self.for_layer(g.axis, g.layer, |index| {
-                nodes[index] = mirror(nodes[self.image(g, index)], flip);
+        self.unfold_rows(nodes, &mirror);
+        self.unfold_edge(&(0..self.dims[D - 1]), 0, nodes, &mirror);
+    }
+
+    /// The part of [`fold`](Self::fold) that stays within a row, for some rows.
+    pub(crate) fn fold_rows<N: Copy>(
+        &self,
+        rows: &mut [N],
+        add: &impl Fn(&mut N, N, Option<usize>),
+    ) {
+        for g in self.ghosts.iter().filter(|g| g.axis < D - 1) {
+            self.for_layer(rows.len(), (g.axis, g.layer), |index| {
+                let ghost = rows[index];
+                add(&mut rows[self.image(g, index)], ghost, g.flip());
             });
         }
+    }
+
+    /// The part of [`unfold`](Self::unfold) that stays within a row, for some rows.
+    pub(crate) fn unfold_rows<N: Copy>(
+        &self,
+        rows: &mut [N],
+        mirror: &impl Fn(N, Option<usize>) -> N,
+    ) {
+        for g in self.ghosts.iter().filter(|g| g.axis < D - 1) {
+            self.for_layer(rows.len(), (g.axis, g.layer), |index| {
+                rows[index] = mirror(rows[self.image(g, index)], g.flip());
+            });
+        }
+    }
+
+    /// The part of [`fold`](Self::fold) that goes from row to row, which comes after that within rows: for one of the
+    /// [edges](Self::edges), among the rows from row `first` on.
+    pub(crate) fn fold_edge<N: Copy>(
+        &self,
+        edge: &Range<usize>,
+        first: usize,
+        rows: &mut [N],
+        add: &impl Fn(&mut N, N, Option<usize>),
+    ) {
+        for g in self.ghosts.iter().filter(|g| g.axis == D - 1 && edge.contains(&g.layer)) {
+            let (ghosts, images) = ((g.layer - first) * self.row(), (g.image - first) * self.row());
+            for node in 0..self.row() {
+                let ghost = rows[ghosts + node];
+                add(&mut rows[images + node], ghost, g.flip());
+            }
+        }
+    }
+
+    /// The part of [`unfold`](Self::unfold) that goes from row to row, as [`fold_edge`](Self::fold_edge).
+    pub(crate) fn unfold_edge<N: Copy>(
+        &self,
+        edge: &Range<usize>,
+        first: usize,
+        rows: &mut [N],
+        mirror: &impl Fn(N, Option<usize>) -> N,
+    ) {
+        for g in self.ghosts.iter().filter(|g| g.axis == D - 1 && edge.contains(&g.layer)) {
+            let (ghosts, images) = ((g.layer - first) * self.row(), (g.image - first) * self.row());
+            for node in 0..self.row() {
+                rows[ghosts + node] = mirror(rows[images + node], g.flip());
+            }
+        }
+    }
+
+    /// The rows that are on walls across the last axis or beyond, and their mirror images: those at the lower end of the
+    /// grid and those at its upper end. On a coarse grid all rows are at the lower end.
+    pub(crate) fn edges(&self) -> [Range<usize>; 2] {
+        let end = self.dims[D - 1];
+        let (mut low, mut high) = (0, end);
+        for g in self.ghosts.iter().filter(|g| g.axis == D - 1) {
+            if g.layer < PAD_BELOW {
+                low = low.max(g.image + 1);
+            } else {
+                high = high.min(g.image);
+            }
+        }
+        if low < high { [0..low, high..end] } else { [0..end, end..end] }
     }
 
     fn image(&self, g: &Ghost, index: usize) -> usize {
         index - g.layer * self.strides[g.axis] + g.image * self.strides[g.axis]
     }
 
-    /// Calls `clear(node, axis)` for every node on a wall across `axis`.
-    pub(crate) fn on_walls<N>(&self, nodes: &mut [N], clear: impl Fn(&mut N, usize)) {
+    /// Calls `clear(node, axis)` for every node on a wall across `axis`, in the rows from row `first` on.
+    pub(crate) fn on_walls<N>(&self, first: usize, rows: &mut [N], clear: impl Fn(&mut N, usize)) {
         for &(axis, layer) in &self.walls {
-            self.for_layer(axis, layer, |index| clear(&mut nodes[index], axis));
+            if axis < D - 1 {
+                self.for_layer(rows.len(), (axis, layer), |index| clear(&mut rows[index], axis));
+            } else if let Some(layer) = layer.checked_sub(first) {
+                let row = rows.chunks_mut(self.row()).nth(layer).unwrap_or_default();
+                row.iter_mut().for_each(|node| clear(node, axis));
+            }
         }
     }
 }

@@ -29,3 +29,9 @@ pub(crate) fn each_chunk_of_three<A: Send, B: Send, C: Send>(
     let chunks = chunks.enumerate().with_max_len(1);
     chunks.for_each(|(number, ((a, b), c))| work(number, a, b, c));
 }
+
+/// Calls `work` with `(i, n)` for i from 0 to n - 1, for as many threads as the pool has, on those that have time.
+pub(crate) fn on_all_threads(work: &(dyn Fn((usize, usize)) + Sync)) {
+    let threads = rayon::current_num_threads();
+    (0..threads).into_par_iter().with_max_len(1).for_each(|thread| work((thread, threads)));
+}

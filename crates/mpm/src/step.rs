@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 
 use nalgebra::{RealField, SMatrix, SVector};
 
-use crate::bands::Bands;
+use crate::bands::{Around, Bands, Cut};
 use crate::block::{BLOCK, Block, Copies};
 use crate::body_force::{AtTime, BodyForce};
 use crate::fault::{Fault, Planted};
@@ -14,6 +14,7 @@ use crate::material::Law;
 use crate::parallel::{each_chunk, each_chunk_of_three};
 use crate::particles::Particles;
 use crate::simd::{Loop, Vectors, dispatch};
+use crate::solution::{Acceleration, Reprojection, Solution, Velocity, VelocityAndAcceleration};
 use crate::tensor::{determinant, product, real};
 use crate::transfer::{Deposits, Gathered, Node};
 use crate::weights::{HALF_SIZE_LIMIT, Rule, WIDE, first_layer, is_wide};
@@ -28,7 +29,7 @@ pub(crate) struct Constants<T, const D: usize> {
     upper: SVector<T, D>,
     pub(crate) inverse_spacing: T,
     pub(crate) strides: [usize; D],
-    band_height: usize,
+    bands: Cut,
     pub(crate) time_step: T,
     /// Nodes with less mass than this are taken to be empty.
     least_mass: T,
@@ -48,7 +49,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
             upper: grid.upper(),
             inverse_spacing: grid.spacing.recip(),
             strides: layout.strides,
-            band_height: bands.height(),
+            bands: bands.cut(),
             time_step,
             // Weights below the square of the rounding error only come about by rounding.
             least_mass: least_particle_mass * T::default_epsilon() * T::default_epsilon(),
@@ -77,7 +78,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
 
     /// The reciprocal of a node's mass, or zero for a node that no particle reaches.
     #[inline(always)]
-    fn inverse_mass(&self, node: &Node<T, D>) -> T {
+    pub(crate) fn inverse_mass(&self, node: &Node<T, D>) -> T {
         if node.mass() > self.least_mass { node.mass().recip() } else { T::zero() }
     }
 
@@ -104,7 +105,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
         }
         let edge = (x[D - 1] - self.lower[D - 1]) * self.inverse_spacing - l[D - 1];
         let width = if wide { WIDE } else { W };
-        let (first, end) = Bands::range(home, self.band_height, width);
+        let (first, end) = self.bands.range(home, width);
         well & (edge >= real(first)) & (edge < real(end))
     }
 
@@ -167,7 +168,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
 
     /// What a wall across `axis` does to a node on it.
     #[inline(always)]
-    fn clear(&self, node: &mut Node<T, D>, axis: usize) {
+    pub(crate) fn clear(&self, node: &mut Node<T, D>, axis: usize) {
         let kept = *node;
         node.clear(axis);
         if self.planted.is(Fault::WallsKeepVelocity) {
@@ -206,23 +207,6 @@ pub(crate) enum Trouble {
     NotFinite,
     LeftGrid,
     TooLarge,
-}
-
-/// Adds what particles gave to nodes beyond walls to the mirror images.
-pub(crate) fn fold_ghosts<T: RealField + Copy, const D: usize>(
-    layout: &Layout<D>,
-    c: &Constants<T, D>,
-    nodes: &mut [Node<T, D>],
-) {
-    layout.fold(nodes, |image, ghost, flip| image.add(&c.ghost(ghost).flipped(flip)));
-}
-
-/// As [`fold_ghosts`] for forces alone.
-fn fold_ghost_forces<T: RealField + Copy, const D: usize>(
-    layout: &Layout<D>,
-    nodes: &mut [Node<T, D>],
-) {
-    layout.fold(nodes, |image, ghost, flip| image.add_acceleration(&ghost.flipped(flip)));
 }
 
 /// What came to light in a pass over the particles.
@@ -282,14 +266,14 @@ pub(crate) struct State<T, const D: usize> {
     pub(crate) reprojected: Vec<Node<T, D>>,
     /// USL: the grid of the step to come while particles add to it.
     pub(crate) next: Vec<Node<T, D>>,
-    /// USL: whether the particles have given to `nodes` what the step to come needs.
+    /// USL: whether `nodes` has velocities and accelerations of the step to come, with no factor on the latter.
     pub(crate) is_ahead: bool,
     /// Room for what the body force needs of the time.
     pub(crate) of_time: Vec<T>,
 }
 
 /// A kernel: takes the state, the body force, the times at the start of the step and at its end, and a factor on all
-/// accelerations.
+/// accelerations of this step.
 pub(crate) type Kernel<T, const D: usize> =
     Box<dyn Fn(&mut State<T, D>, &dyn BodyForce<T, D>, (T, T), T) -> Outcome + Send + Sync>;
 
@@ -306,27 +290,8 @@ where
     R: Rule<T, D, W>,
     L: Law<T>,
 {
-    s.deposit(rule, law, body_force, t);
-    s.solve(scale);
+    s.deposit(rule, law, body_force, (t, scale));
     finish_musl(s, rule)
-}
-
-/// From the momenta given to `reprojected` to velocities, with the masses of `nodes`.
-fn finish_reprojection<T: RealField + Copy, const D: usize>(
-    layout: &Layout<D>,
-    c: &Constants<T, D>,
-    nodes: &[Node<T, D>],
-    reprojected: &mut [Node<T, D>],
-) {
-    layout.fold(reprojected, |image, ghost, flip| image.add(&ghost.flipped(flip)));
-    each_chunk(reprojected, CHUNK, &|chunk, new| {
-        for (new, node) in new.iter_mut().zip(&nodes[chunk * CHUNK..]) {
-            let inverse = c.inverse_mass(node);
-            new.values.iter_mut().for_each(|value| *value *= inverse);
-        }
-    });
-    layout.on_walls(reprojected, Node::clear);
-    layout.unfold(reprojected, Node::flipped);
 }
 
 /// MUSL after the solution on the grid.
@@ -352,12 +317,15 @@ where
             }
         }
     });
-    bands.scatter(layout, reprojected, &|nodes| nodes.fill(Node::zero()), &|piece, first, ids| {
+    let solution = Solution::new(layout, Reprojection { c: &c, nodes });
+    let around =
+        Around { before: &Node::clear_all, after: &|nodes, first| solution.rows(nodes, first) };
+    bands.scatter(layout, reprojected, around, &|piece, first, ids| {
         c.scatter(rule, x, F, piece, first, ids, |_, ids, deposits| {
             deposits.take_momenta(ids, mass, v);
         });
     });
-    finish_reprojection(layout, &c, nodes, reprojected);
+    solution.finish(reprojected);
     let reprojected = if c.planted.is(Fault::NoReprojection) { nodes } else { &reprojected[..] };
     let outcome = advance(particles, bands, c, rule, |block, gathered, _, x, _, F| {
         block.gather(&c.strides, nodes, x.len(), &mut *gathered);
@@ -391,8 +359,7 @@ where
         std::mem::swap(&mut s.particles.F, &mut s.F_next);
         return outcome;
     }
-    s.deposit_force(rule, law, body_force, t);
-    s.solve_acceleration(scale);
+    s.deposit_force(rule, law, body_force, (t, scale));
     finish_usf(s, rule)
 }
 
@@ -535,14 +502,14 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         });
     }
 
-    /// Particles to grid: mass, momentum and force, folded at walls.
+    /// Particles to grid: mass, momentum and force, and from them velocities and accelerations.
     #[inline(never)]
     pub(crate) fn deposit<R, L, const W: usize>(
         &mut self,
         rule: R,
         law: L,
         body_force: &dyn BodyForce<T, D>,
-        t: T,
+        (t, scale): (T, T),
     ) where
         R: Rule<T, D, W>,
         L: Law<T>,
@@ -551,7 +518,10 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let Particles { X, x, v, F, mass, volume, .. } = &*particles;
         let c = *constants;
         let forcing = Forcing::new(body_force, X, t, &c, of_time);
-        bands.scatter(layout, nodes, &|nodes| nodes.fill(Node::zero()), &|piece, first, ids| {
+        let solution = Solution::new(layout, VelocityAndAcceleration { c: &c, scale });
+        let around =
+            Around { before: &Node::clear_all, after: &|nodes, first| solution.rows(nodes, first) };
+        bands.scatter(layout, nodes, around, &|piece, first, ids| {
             c.scatter(rule, x, F, piece, first, ids, |copies, ids, deposits| {
                 forcing.evaluate(ids, &copies.x, &mut deposits.b);
                 deposits.take(ids, mass, volume);
@@ -561,30 +531,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
                 copies.run().stress(&c, law, deposits);
             });
         });
-        fold_ghosts(layout, &c, nodes);
-    }
-
-    /// On the grid: momentum and force to velocity at the end of the step and acceleration.
-    pub(crate) fn solve(&mut self, scale: T) {
-        let Self { constants: c, nodes, .. } = self;
-        each_chunk(nodes, CHUNK, &|_, nodes| {
-            for node in nodes {
-                let inverse = c.inverse_mass(node);
-                for a in 0..D {
-                    let acceleration = node.values[D + a] * (inverse * scale);
-                    node.values[a] = node.values[a] * inverse + acceleration * c.time_step;
-                    node.values[D + a] = acceleration;
-                }
-            }
-        });
-        self.apply_walls();
-    }
-
-    /// Clears what is normal to walls, and gives nodes beyond them the mirrored values.
-    fn apply_walls(&mut self) {
-        let Self { layout, nodes, constants: c, .. } = self;
-        layout.on_walls(nodes, |node, axis| c.clear(node, axis));
-        layout.unfold(nodes, Node::flipped);
+        solution.finish(nodes);
     }
 
     /// USF, first pass: velocities at the start of the step on the grid.
@@ -596,25 +543,15 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let Self { particles, constants, layout, bands, nodes, .. } = self;
         let Particles { x, v, F, mass, .. } = &*particles;
         let c = *constants;
-        bands.scatter(layout, nodes, &|nodes| nodes.fill(Node::zero()), &|piece, first, ids| {
+        let solution = Solution::new(layout, Velocity { c: &c });
+        let around =
+            Around { before: &Node::clear_all, after: &|nodes, first| solution.rows(nodes, first) };
+        bands.scatter(layout, nodes, around, &|piece, first, ids| {
             c.scatter(rule, x, F, piece, first, ids, |_, ids, deposits| {
                 deposits.take_momenta(ids, mass, v);
             });
         });
-        fold_ghosts(layout, &c, nodes);
-        self.solve_velocity();
-    }
-
-    /// USF, on the grid: momentum to velocity at the start of the step.
-    fn solve_velocity(&mut self) {
-        let Self { constants: c, nodes, .. } = self;
-        each_chunk(nodes, CHUNK, &|_, nodes| {
-            for node in nodes {
-                let inverse = c.inverse_mass(node);
-                (0..D).for_each(|a| node.values[a] *= inverse);
-            }
-        });
-        self.apply_walls();
+        solution.finish(nodes);
     }
 
     /// USF, second pass: F at the end of the step, kept beside the old one.
@@ -653,14 +590,15 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         found.all()
     }
 
-    /// USF, third pass: force on the grid, from the updated F with the weights of the old one.
+    /// USF, third pass: force on the grid, from the updated F with the weights of the old one, and from that accelerations and
+    /// the velocities at the end of the step.
     #[inline(never)]
     fn deposit_force<R, L, const W: usize>(
         &mut self,
         rule: R,
         law: L,
         body_force: &dyn BodyForce<T, D>,
-        t: T,
+        (t, scale): (T, T),
     ) where
         R: Rule<T, D, W>,
         L: Law<T>,
@@ -669,8 +607,10 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let Particles { X, x, F, mass, volume, .. } = &*particles;
         let (c, F_next) = (*constants, &F_next[..]);
         let forcing = Forcing::new(body_force, X, t, &c, of_time);
+        let solution = Solution::new(layout, Acceleration { c: &c, scale });
         // What gave its momentum to the nodes gave no force.
-        bands.scatter(layout, nodes, &|_| {}, &|piece, first, ids| {
+        let around = Around { before: &|_| {}, after: &|nodes, first| solution.rows(nodes, first) };
+        bands.scatter(layout, nodes, around, &|piece, first, ids| {
             c.scatter(rule, x, F, piece, first, ids, |copies, ids, deposits| {
                 forcing.evaluate(ids, &copies.x, &mut deposits.b);
                 deposits.take(ids, mass, volume);
@@ -681,22 +621,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
                 copies.run().stress(&c, law, deposits);
             });
         });
-        fold_ghost_forces(layout, nodes);
-    }
-
-    /// USF, on the grid: force to acceleration, velocity to that at the end of the step.
-    fn solve_acceleration(&mut self, scale: T) {
-        let Self { constants: c, nodes, .. } = self;
-        each_chunk(nodes, CHUNK, &|_, nodes| {
-            for node in nodes {
-                let inverse = c.inverse_mass(node) * scale;
-                for a in 0..D {
-                    node.values[D + a] *= inverse;
-                    node.values[a] += node.values[D + a] * c.time_step;
-                }
-            }
-        });
-        self.apply_walls();
+        solution.finish(nodes);
     }
 }
 

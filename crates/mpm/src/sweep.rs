@@ -7,6 +7,7 @@
 
 use nalgebra::{RealField, SMatrix, SVector};
 
+use crate::bands::Around;
 use crate::block::{BLOCK, Block, Copies, Run};
 use crate::body_force::BodyForce;
 use crate::fault::Fault;
@@ -15,7 +16,8 @@ use crate::particles::Particles;
 use crate::partition::Share;
 use crate::prefetch::prefetch;
 use crate::simd::{Quad, Vectors, dispatch};
-use crate::step::{Check, Constants, Forcing, Found, Outcome, State, fold_ghosts};
+use crate::solution::{Solution, VelocityAndAcceleration};
+use crate::step::{Check, Constants, Forcing, Found, Outcome, State};
 use crate::transfer::{Deposits, Gathered, Node, Receive};
 use crate::weights::Rule;
 
@@ -39,9 +41,8 @@ where
         if !s.bands.is_sorted() {
             s.sort(rule);
         }
-        s.deposit(rule, law, body_force, t);
+        s.deposit(rule, law, body_force, (t, scale));
     }
-    s.solve(scale);
     let outcome = s.sweep(rule, law, body_force, t_next);
     // Where particles change their bands or stop, what they gave in part is of no use.
     s.is_ahead = outcome.is_nothing();
@@ -67,12 +68,14 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let forcing = Forcing::new(body_force, X, t_next, c, of_time);
         let step = Sweep { c, rule, law, nodes, mass, volume, alike: *alike, forcing };
         let found = Found::default();
-        let clear = |nodes: &mut [Node<T, D>]| nodes.fill(Node::zero());
-        bands.sweep(layout, next, &clear, (x, v, F), &|piece, first, band, elements| {
+        let solution = Solution::new(layout, VelocityAndAcceleration { c, scale: T::one() });
+        let around =
+            Around { before: &Node::clear_all, after: &|nodes, first| solution.rows(nodes, first) };
+        bands.sweep(layout, next, around, (x, v, F), &|piece, first, band, elements| {
             found.add(step.band(piece, first, band, elements));
         });
+        solution.finish(next);
         std::mem::swap(nodes, next);
-        fold_ghosts(layout, c, nodes);
         found.all()
     }
 }

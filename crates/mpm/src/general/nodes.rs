@@ -64,7 +64,7 @@ impl<const D: usize> Nodes<D> {
 
     /// Clears what is normal to walls there, and gives nodes beyond them the mirrored values.
     pub(crate) fn mirror(&self, field: &mut Field<D>) {
-        self.layout.on_walls(field, |value, axis| value[axis] = 0.0);
+        self.layout.on_walls(0, field, |value, axis| value[axis] = 0.0);
         self.layout.unfold(field, flipped);
     }
 

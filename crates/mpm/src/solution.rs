@@ -1,0 +1,302 @@
+//! On the grid: from the mass, momentum and force that particles gave to nodes to velocities and accelerations.
+//!
+//! A row is solved when no particle is to give to it any more, while it lies in the cache. What is beyond walls belongs to
+//! mirror images in the same row, but for walls across the last axis: the rows near those are solved together.
+
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use nalgebra::RealField;
+
+use crate::grid::Layout;
+use crate::step::Constants;
+use crate::transfer::Node;
+
+/// What comes of what particles gave to a node.
+pub(crate) trait Solve<T: RealField + Copy, const D: usize>: Copy + Sync {
+    /// Adds what particles gave to a node beyond a wall to its mirror image. The component along the axis `flip` changes
+    /// its sign.
+    fn fold(self, image: &mut Node<T, D>, ghost: Node<T, D>, flip: Option<usize>);
+
+    /// Solves for some nodes, of which the first has the index `first`.
+    fn solve(self, nodes: &mut [Node<T, D>], first: usize);
+
+    /// What a wall across `axis` does to a node on it.
+    fn on_wall(self, node: &mut Node<T, D>, axis: usize);
+}
+
+/// Momentum and force to the velocity at the end of the step and the acceleration, that times `scale`.
+#[derive(Clone, Copy)]
+pub(crate) struct VelocityAndAcceleration<'a, T, const D: usize> {
+    pub(crate) c: &'a Constants<T, D>,
+    pub(crate) scale: T,
+}
+
+impl<T: RealField + Copy, const D: usize> Solve<T, D> for VelocityAndAcceleration<'_, T, D> {
+    #[inline(always)]
+    fn fold(self, image: &mut Node<T, D>, ghost: Node<T, D>, flip: Option<usize>) {
+        image.add(&self.c.ghost(ghost).flipped(flip));
+    }
+
+    #[inline(always)]
+    fn solve(self, nodes: &mut [Node<T, D>], _: usize) {
+        let Self { c, scale } = self;
+        for node in nodes {
+            let inverse = c.inverse_mass(node);
+            for a in 0..D {
+                let acceleration = node.values[D + a] * (inverse * scale);
+                node.values[a] = node.values[a] * inverse + acceleration * c.time_step;
+                node.values[D + a] = acceleration;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn on_wall(self, node: &mut Node<T, D>, axis: usize) {
+        self.c.clear(node, axis);
+    }
+}
+
+/// Momentum to the velocity at the start of the step.
+#[derive(Clone, Copy)]
+pub(crate) struct Velocity<'a, T, const D: usize> {
+    pub(crate) c: &'a Constants<T, D>,
+}
+
+impl<T: RealField + Copy, const D: usize> Solve<T, D> for Velocity<'_, T, D> {
+    #[inline(always)]
+    fn fold(self, image: &mut Node<T, D>, ghost: Node<T, D>, flip: Option<usize>) {
+        image.add(&self.c.ghost(ghost).flipped(flip));
+    }
+
+    #[inline(always)]
+    fn solve(self, nodes: &mut [Node<T, D>], _: usize) {
+        for node in nodes {
+            let inverse = self.c.inverse_mass(node);
+            (0..D).for_each(|a| node.values[a] *= inverse);
+        }
+    }
+
+    #[inline(always)]
+    fn on_wall(self, node: &mut Node<T, D>, axis: usize) {
+        self.c.clear(node, axis);
+    }
+}
+
+/// Force to the acceleration, that times `scale`, and the velocity from that at the start of the step to that at its end.
+#[derive(Clone, Copy)]
+pub(crate) struct Acceleration<'a, T, const D: usize> {
+    pub(crate) c: &'a Constants<T, D>,
+    pub(crate) scale: T,
+}
+
+impl<T: RealField + Copy, const D: usize> Solve<T, D> for Acceleration<'_, T, D> {
+    #[inline(always)]
+    fn fold(self, image: &mut Node<T, D>, ghost: Node<T, D>, flip: Option<usize>) {
+        image.add_acceleration(&ghost.flipped(flip));
+    }
+
+    #[inline(always)]
+    fn solve(self, nodes: &mut [Node<T, D>], _: usize) {
+        let Self { c, scale } = self;
+        for node in nodes {
+            let inverse = c.inverse_mass(node) * scale;
+            for a in 0..D {
+                node.values[D + a] *= inverse;
+                node.values[a] += node.values[D + a] * c.time_step;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn on_wall(self, node: &mut Node<T, D>, axis: usize) {
+        self.c.clear(node, axis);
+    }
+}
+
+/// Momentum of the updated particles to their velocity, by the masses that `nodes` have.
+#[derive(Clone, Copy)]
+pub(crate) struct Reprojection<'a, T, const D: usize> {
+    pub(crate) c: &'a Constants<T, D>,
+    pub(crate) nodes: &'a [Node<T, D>],
+}
+
+impl<T: RealField + Copy, const D: usize> Solve<T, D> for Reprojection<'_, T, D> {
+    #[inline(always)]
+    fn fold(self, image: &mut Node<T, D>, ghost: Node<T, D>, flip: Option<usize>) {
+        image.add(&ghost.flipped(flip));
+    }
+
+    #[inline(always)]
+    fn solve(self, nodes: &mut [Node<T, D>], first: usize) {
+        for (new, node) in nodes.iter_mut().zip(self.nodes.get(first..).unwrap_or_default()) {
+            let inverse = self.c.inverse_mass(node);
+            new.values.iter_mut().for_each(|value| *value *= inverse);
+        }
+    }
+
+    #[inline(always)]
+    fn on_wall(self, node: &mut Node<T, D>, axis: usize) {
+        node.clear(axis);
+    }
+}
+
+/// The solution on a grid, rows by rows.
+pub(crate) struct Solution<'a, S, const D: usize> {
+    layout: &'a Layout<D>,
+    solve: S,
+    edges: [Edge; 2],
+}
+
+/// Rows that are to be solved together, since what is beyond a wall across the last axis is mirrored from row to row.
+struct Edge {
+    rows: Range<usize>,
+    is_solved: AtomicBool,
+}
+
+impl Edge {
+    /// Whether there is something to be solved, all of it in some rows.
+    fn is_within(&self, rows: &Range<usize>) -> bool {
+        !self.rows.is_empty() && rows.start <= self.rows.start && self.rows.end <= rows.end
+    }
+}
+
+impl<'a, S, const D: usize> Solution<'a, S, D> {
+    pub(crate) fn new(layout: &'a Layout<D>, solve: S) -> Self {
+        let edges = layout.edges().map(|rows| Edge { rows, is_solved: AtomicBool::new(false) });
+        Self { layout, solve, edges }
+    }
+
+    /// Solves whole rows, from the node of index `first` on, to which all particles gave; those of an edge only where all of
+    /// it is there.
+    pub(crate) fn rows<T>(&self, nodes: &mut [Node<T, D>], first: usize)
+    where
+        T: RealField + Copy,
+        S: Solve<T, D>,
+    {
+        let Self { layout, solve, edges, .. } = self;
+        layout.fold_rows(nodes, &|image, ghost, flip| solve.fold(image, ghost, flip));
+        let rows = first / layout.row()..(first + nodes.len()) / layout.row();
+        let [low, high] = edges;
+        let mut to_solve = rows.clone();
+        if !low.is_within(&rows) {
+            to_solve.start = low.rows.end.clamp(rows.start, rows.end);
+        }
+        if !high.is_within(&rows) {
+            to_solve.end = high.rows.start.clamp(to_solve.start, rows.end);
+        }
+        for edge in edges.iter().filter(|edge| edge.is_within(&rows)) {
+            self.fold(edge, nodes, rows.start);
+        }
+        let skipped = (to_solve.start - rows.start) * layout.row();
+        self.complete(&mut nodes[skipped..][..to_solve.len() * layout.row()], to_solve.start);
+        for edge in edges.iter().filter(|edge| edge.is_within(&rows)) {
+            layout.unfold_edge(&edge.rows, rows.start, nodes, &Node::flipped);
+            edge.is_solved.store(true, Ordering::Relaxed);
+        }
+    }
+
+    /// Solves what [`rows`](Self::rows) left, after it was called for all rows.
+    pub(crate) fn finish<T>(&self, nodes: &mut [Node<T, D>])
+    where
+        T: RealField + Copy,
+        S: Solve<T, D>,
+    {
+        let row = self.layout.row();
+        for edge in self.edges.iter().filter(|edge| !edge.is_solved.load(Ordering::Relaxed)) {
+            self.fold(edge, nodes, 0);
+            let Range { start, end } = edge.rows;
+            self.complete(&mut nodes[start * row..end * row], start);
+            self.layout.unfold_edge(&edge.rows, 0, nodes, &Node::flipped);
+        }
+    }
+
+    /// Adds what was deposited beyond a wall to the mirror images in the rows from row `first` on.
+    fn fold<T>(&self, edge: &Edge, nodes: &mut [Node<T, D>], first: usize)
+    where
+        T: RealField + Copy,
+        S: Solve<T, D>,
+    {
+        let add = |image: &mut _, ghost, flip| self.solve.fold(image, ghost, flip);
+        self.layout.fold_edge(&edge.rows, first, nodes, &add);
+    }
+
+    /// Solves the rows from row `first` on, to which nothing is to be added any more.
+    fn complete<T>(&self, nodes: &mut [Node<T, D>], first: usize)
+    where
+        T: RealField + Copy,
+        S: Solve<T, D>,
+    {
+        let Self { layout, solve, .. } = self;
+        solve.solve(nodes, first * layout.row());
+        layout.on_walls(first, nodes, |node, axis| solve.on_wall(node, axis));
+        layout.unfold_rows(nodes, &Node::flipped);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bands::Bands;
+    use crate::grid::Grid;
+    use nalgebra::SVector;
+
+    /// Nodes with values that no two have in common, and some without mass.
+    fn given<const D: usize>(count: usize) -> Vec<Node<f64, D>> {
+        let value = |index: usize, q: usize| ((index * 8 + q) as f64 * 0.7).sin();
+        let node = |index| {
+            let mut node = Node { values: std::array::from_fn(|q| value(index, q)) };
+            node.values[2 * D] = if index % 5 == 3 { 0.0 } else { 2.0 + node.values[2 * D] };
+            node
+        };
+        (0..count).map(node).collect()
+    }
+
+    /// Whatever rows are solved together and in which order, it comes out as for the whole grid at once.
+    fn check<S: Solve<f64, D>, const D: usize>(layout: &Layout<D>, solve: S) {
+        let mut expected = given(layout.nodes);
+        layout.fold(&mut expected, |image, ghost, flip| solve.fold(image, ghost, flip));
+        solve.solve(&mut expected, 0);
+        layout.on_walls(0, &mut expected, |node, axis| solve.on_wall(node, axis));
+        layout.unfold(&mut expected, Node::flipped);
+        for rows_at_once in [1, 7, 8, 16, layout.dims[D - 1]] {
+            let mut nodes = given(layout.nodes);
+            let solution = Solution::new(layout, solve);
+            let size = rows_at_once * layout.row();
+            let chunks: Vec<_> = nodes.chunks_mut(size).enumerate().collect();
+            for (chunk, nodes) in chunks.into_iter().rev() {
+                solution.rows(nodes, chunk * size);
+            }
+            solution.finish(&mut nodes);
+            for (index, (node, expected)) in nodes.iter().zip(&expected).enumerate() {
+                assert_eq!(node.values, expected.values, "{rows_at_once} rows: node {index}");
+            }
+        }
+    }
+
+    fn check_all<const D: usize>(cells: [usize; D], walls: [[bool; 2]; D]) {
+        let grid = Grid { lower: SVector::zeros(), spacing: 0.5, cells, walls };
+        let layout = Layout::new(&grid, 8).unwrap();
+        let bands = Bands::new(&layout, 1);
+        let c = &Constants::new(&grid, &layout, &bands, 0.1, 1.0);
+        check(&layout, Velocity { c });
+        check(&layout, VelocityAndAcceleration { c, scale: 0.5 });
+        check(&layout, Acceleration { c, scale: 0.5 });
+        check(&layout, Reprojection { c, nodes: &given(layout.nodes) });
+    }
+
+    #[test]
+    fn rows_are_solved_in_whatever_order_as_the_whole_grid() {
+        for lower in [false, true] {
+            for upper in [false, true] {
+                let wall = [lower, upper];
+                // Between walls on a grid of less than three cells layers are mirrored more than once.
+                for cells in [1, 2, 4, 9, 30] {
+                    check_all([cells], [wall]);
+                    check_all([3, cells], [[true, false], wall]);
+                    check_all([2, 3, cells], [[false, true], [true, true], wall]);
+                }
+            }
+        }
+    }
+}
