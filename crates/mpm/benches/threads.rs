@@ -1,0 +1,86 @@
+//! How many times as fast some threads make the solver's step as one does, and what the machine's cores allow.
+//!
+//! One simulation is advanced by some steps on one thread and by as many on several, and then as many simulations as there
+//! are threads side by side, each on its own, in turn for many rounds: a machine whose speed wanders does so for all. A unit
+//! square with 2x2 particles a cell between four walls is set in motion without a body force (ugimp + usl). Stated are
+//! quotients of the times of all rounds, and the quartiles of those of each.
+
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
+use std::time::Instant;
+
+use mmsmith_mpm::{
+    Grid, Integrator, Material, NoBodyForce, Particles, Settings, Shape, Simulation,
+};
+use nalgebra::{Vector2, vector};
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+const STEPS: usize = 20;
+const ROUNDS: usize = 40;
+
+fn main() {
+    let cores = std::thread::available_parallelism().unwrap().get();
+    println!("cells   threads  times as fast as one        as many runs side by side");
+    for cells in [256, 512] {
+        for threads in std::iter::successors(Some(2), |n| Some(2 * n)).take_while(|&n| n <= cores) {
+            compare(cells, threads);
+        }
+    }
+}
+
+fn compare(cells: usize, threads: usize) {
+    let pool = |threads| ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let several = pool(threads);
+    let mut own: Vec<_> = (0..threads).map(|_| (pool(1), simulation(cells))).collect();
+    let round = |_| {
+        let (one, first) = &mut own[0];
+        let alone = seconds(one, first);
+        let together = seconds(&several, first);
+        let side_by_side = std::thread::scope(|scope| {
+            let run = |(pool, simulation): &mut _| seconds(pool, simulation);
+            let runs: Vec<_> = own.iter_mut().map(|own| scope.spawn(move || run(own))).collect();
+            runs.into_iter().map(|run| run.join().unwrap()).sum::<f64>() / threads as f64
+        });
+        [alone, together, side_by_side / threads as f64]
+    };
+    let rounds: Vec<_> = (0..ROUNDS * 256 / cells).map(round).collect();
+    let quotients = |of: usize| {
+        let mut each: Vec<_> = rounds.iter().map(|round| round[0] / round[of]).collect();
+        each.sort_by(f64::total_cmp);
+        let [low, middle, high] = [1, 2, 3].map(|n| each[(each.len() - 1) * n / 4]);
+        let sum = |of: usize| rounds.iter().map(|round| round[of]).sum::<f64>();
+        format!("{:.2} ({low:.2}, {middle:.2}, {high:.2})", sum(0) / sum(of))
+    };
+    println!("{cells:3}^2  {threads:8}  {}     {}", quotients(1), quotients(2));
+}
+
+/// Time that some steps take.
+fn seconds(pool: &ThreadPool, simulation: &mut Simulation<f64, 2>) -> f64 {
+    let mut steps = |count| (0..count).for_each(|_| simulation.step(&NoBodyForce).unwrap());
+    pool.install(|| {
+        // Threads that slept may have to be moved to a core of their own first.
+        steps(STEPS / 4);
+        let started = Instant::now();
+        steps(STEPS);
+        started.elapsed().as_secs_f64()
+    })
+}
+
+fn simulation(cells: usize) -> Simulation<f64, 2> {
+    let (lambda, mu) = (5769.0, 3846.0);
+    let speed = f64::sqrt(lambda + 2.0 * mu);
+    let spacing = 1.0 / cells as f64;
+    let grid = Grid { lower: Vector2::zeros(), spacing, cells: [cells; 2], walls: [[true; 2]; 2] };
+    let mut particles = Particles::lattice(&grid, 2, 1.0, |_| true);
+    for (v, X) in particles.v.iter_mut().zip(&particles.X) {
+        let angle = X * std::f64::consts::PI;
+        *v = vector![angle[0].sin(), angle[1].sin()] * (0.02 * speed * std::f64::consts::PI);
+    }
+    let settings = Settings {
+        shape: Shape::Ugimp,
+        integrator: Integrator::Usl,
+        time_step: 0.2 * spacing / speed,
+        halve_first_acceleration: false,
+    };
+    Simulation::new(grid, particles, Material::NeoHookean { lambda, mu }, settings).unwrap()
+}
