@@ -16,19 +16,23 @@ use nalgebra::{Vector2, vector};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 const STEPS: usize = 20;
+/// For 256 cells; as many fewer as there are more.
 const ROUNDS: usize = 40;
 
 fn main() {
+    // `cargo test --all-targets` calls benchmarks without this, to see that they run.
+    let is_measuring = std::env::args().any(|argument| argument == "--bench");
     let cores = std::thread::available_parallelism().unwrap().get();
     println!("cells   threads  times as fast as one        as many runs side by side");
-    for cells in [256, 512] {
+    for cells in if is_measuring { vec![256, 512] } else { vec![16] } {
         for threads in std::iter::successors(Some(2), |n| Some(2 * n)).take_while(|&n| n <= cores) {
-            compare(cells, threads);
+            let rounds = if is_measuring { ROUNDS * 256 / cells } else { 1 };
+            compare(cells, threads, rounds);
         }
     }
 }
 
-fn compare(cells: usize, threads: usize) {
+fn compare(cells: usize, threads: usize, rounds: usize) {
     let pool = |threads| ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let several = pool(threads);
     let mut own: Vec<_> = (0..threads).map(|_| (pool(1), simulation(cells))).collect();
@@ -43,7 +47,7 @@ fn compare(cells: usize, threads: usize) {
         });
         [alone, together, side_by_side / threads as f64]
     };
-    let rounds: Vec<_> = (0..ROUNDS * 256 / cells).map(round).collect();
+    let rounds: Vec<_> = (0..rounds).map(round).collect();
     let quotients = |of: usize| {
         let mut each: Vec<_> = rounds.iter().map(|round| round[0] / round[of]).collect();
         each.sort_by(f64::total_cmp);

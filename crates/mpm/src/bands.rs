@@ -2,9 +2,9 @@
 //!
 //! The rows of the grid (nodes that share an index along the last axis) are cut into bands of a height that depends on
 //! nothing but the dimension, and every particle belongs to one band. A band writes to its own rows and to at most as
-//! many above: all even bands write to disjoint pieces of the node array, and so do all odd ones. They run in parallel, an odd
-//! one after the even ones beside it; within a band particles come in a fixed order. No sum depends on the number of threads.
-//! Where no band is to come any more, what is to be done with nodes is done while they lie in the cache.
+//! many above: only neighbours overlap. They run in parallel, every other one after its two neighbours
+//! ([`pieces`](crate::pieces)); within a band particles come in a fixed order. No sum depends on the number of threads.
+//! What is to be done with nodes that no band writes to any more is done while they lie in the cache.
 //!
 //! A piece is higher than a band and its stencils need, so that particles may drift for some steps before all are
 //! sorted anew. The order is therefore state of the run: whoever continues a run to the same bits has to carry it over.

@@ -73,7 +73,7 @@ impl Turns {
     /// of `parts` threads begins at a place of its own, so that each stays among neighbours for long.
     fn order(&self, (part, parts): (usize, usize)) -> impl Iterator<Item = usize> + use<> {
         let bands = self.taken.len();
-        // A late piece has the place of its upper neighbour's upper neighbour, which is as late.
+        // A late piece has the place two after its number, next after that of its upper neighbour, which is early.
         let places = bands + 2;
         let first = places * part / parts.max(1);
         let band = move |place: usize| {
