@@ -6,36 +6,21 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod square;
+
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use mmsmith_mpm::{
-    Grid, Integrator, Material, NoBodyForce, Particles, Settings, Shape, Simulation,
-};
-use nalgebra::{Vector2, vector};
+use mmsmith_mpm::{Integrator, NoBodyForce, Shape};
 use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use square::{LAMBDA, MU, simulation, time_step};
 
 const CELLS: usize = 256;
 const STEPS: usize = 10;
-const LAMBDA: f64 = 5769.0;
-const MU: f64 = 3846.0;
 const ITEMS: usize = 4 * CELLS * CELLS * STEPS;
 
 fn main() {
     divan::main();
-}
-
-/// The speed of P-waves.
-fn speed() -> f64 {
-    (LAMBDA + 2.0 * MU).sqrt()
-}
-
-fn velocity(X: &Vector2<f64>) -> Vector2<f64> {
-    let angle = X * std::f64::consts::PI;
-    vector![angle[0].sin(), angle[1].sin()] * (0.02 * speed() * std::f64::consts::PI)
-}
-
-fn time_step() -> f64 {
-    0.2 / (CELLS as f64 * speed())
 }
 
 #[divan::bench(sample_count = 15, sample_size = 1)]
@@ -62,23 +47,10 @@ fn solver(bencher: Bencher, (shape, integrator, threads): (Shape, Integrator, us
     let pool: ThreadPool = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     bencher
         .counter(ItemsCount::new(ITEMS))
-        .with_inputs(|| simulation(shape, integrator))
+        .with_inputs(|| simulation(CELLS, shape, integrator))
         .bench_local_refs(|simulation| {
             pool.install(|| (0..STEPS).for_each(|_| simulation.step(&NoBodyForce).unwrap()));
         });
-}
-
-fn simulation(shape: Shape, integrator: Integrator) -> Simulation<f64, 2> {
-    let spacing = 1.0 / CELLS as f64;
-    let grid = Grid { lower: Vector2::zeros(), spacing, cells: [CELLS; 2], walls: [[true; 2]; 2] };
-    let mut particles = Particles::lattice(&grid, 2, 1.0, |_| true);
-    for (v, X) in particles.v.iter_mut().zip(&particles.X) {
-        *v = velocity(X);
-    }
-    let time_step = time_step();
-    let settings = Settings { shape, integrator, time_step, halve_first_acceleration: false };
-    let material = Material::NeoHookean { lambda: LAMBDA, mu: MU };
-    Simulation::new(grid, particles, material, settings).unwrap()
 }
 
 /// A node of the plain loop.
@@ -104,7 +76,7 @@ struct Plain {
 
 impl Plain {
     fn new() -> Self {
-        let particles = simulation(Shape::Ugimp, Integrator::Usl).particles().clone();
+        let particles = simulation(CELLS, Shape::Ugimp, Integrator::Usl).particles().clone();
         Self {
             x: particles.x.iter().map(|x| [x[0], x[1]]).collect(),
             v: particles.v.iter().map(|v| [v[0], v[1]]).collect(),
@@ -114,7 +86,7 @@ impl Plain {
     }
 
     fn step(&mut self) {
-        let (volume, dt) = (H * H / 4.0, time_step());
+        let (volume, dt) = (H * H / 4.0, time_step(CELLS));
         self.nodes.fill(Node::default());
         for ((x, v), F) in self.x.iter().zip(&self.v).zip(&self.F) {
             let ((bi, sx, gx), (bj, sy, gy)) = (weights(x[0]), weights(x[1]));

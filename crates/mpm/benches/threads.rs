@@ -7,13 +7,14 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
+mod square;
+
 use std::time::Instant;
 
-use mmsmith_mpm::{
-    Grid, Integrator, Material, NoBodyForce, Particles, Settings, Shape, Simulation,
-};
-use nalgebra::{Vector2, vector};
+use mmsmith_mpm::{Integrator, NoBodyForce, Shape, Simulation};
 use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use square::simulation;
 
 const STEPS: usize = 20;
 /// For 256 cells; as many fewer as there are more.
@@ -35,7 +36,8 @@ fn main() {
 fn compare(cells: usize, threads: usize, rounds: usize) {
     let pool = |threads| ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let several = pool(threads);
-    let mut own: Vec<_> = (0..threads).map(|_| (pool(1), simulation(cells))).collect();
+    let mut own: Vec<_> =
+        (0..threads).map(|_| (pool(1), simulation(cells, Shape::Ugimp, Integrator::Usl))).collect();
     let round = |_| {
         let (one, first) = &mut own[0];
         let alone = seconds(one, first);
@@ -68,23 +70,4 @@ fn seconds(pool: &ThreadPool, simulation: &mut Simulation<f64, 2>) -> f64 {
         steps(STEPS);
         started.elapsed().as_secs_f64()
     })
-}
-
-fn simulation(cells: usize) -> Simulation<f64, 2> {
-    let (lambda, mu) = (5769.0, 3846.0);
-    let speed = f64::sqrt(lambda + 2.0 * mu);
-    let spacing = 1.0 / cells as f64;
-    let grid = Grid { lower: Vector2::zeros(), spacing, cells: [cells; 2], walls: [[true; 2]; 2] };
-    let mut particles = Particles::lattice(&grid, 2, 1.0, |_| true);
-    for (v, X) in particles.v.iter_mut().zip(&particles.X) {
-        let angle = X * std::f64::consts::PI;
-        *v = vector![angle[0].sin(), angle[1].sin()] * (0.02 * speed * std::f64::consts::PI);
-    }
-    let settings = Settings {
-        shape: Shape::Ugimp,
-        integrator: Integrator::Usl,
-        time_step: 0.2 * spacing / speed,
-        halve_first_acceleration: false,
-    };
-    Simulation::new(grid, particles, Material::NeoHookean { lambda, mu }, settings).unwrap()
 }

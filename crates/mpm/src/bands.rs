@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use crate::grid::{BAND_ROWS, Layout, PAD_BELOW};
 use crate::parallel::on_all_threads;
 use crate::partition::{Partition, Share};
-use crate::pieces::{Pieces, Turns};
+use crate::pieces::{Pieces, Turns, count};
 
 /// Rows in a band, in two and three dimensions.
 const HEIGHT: usize = 8;
@@ -40,7 +40,7 @@ impl Cut {
     pub(crate) fn new<const D: usize>(layout: &Layout<D>) -> Self {
         // A row is one node in 1D; bands below some hundred particles would cost more to hand out than to compute.
         let height = if D == 1 { BAND_ROWS } else { HEIGHT };
-        Self { height, bands: (layout.dims[D - 1] / height).max(1) }
+        Self { height, bands: count(layout.dims[D - 1], height) }
     }
 
     /// The band of a particle whose stencil begins in a row, when it is sorted.
@@ -87,7 +87,7 @@ pub(crate) struct Bands {
 }
 
 /// What particles give to a piece of the grid: the piece, its first node, and the numbers of the particles.
-type Scatter<'a, N> = dyn Fn(&mut [N], usize, &[u32]) + Sync + 'a;
+pub(crate) type Scatter<'a, N> = dyn Fn(&mut [N], usize, &[u32]) + Sync + 'a;
 
 /// What is done with the nodes of a grid, some rows at a time, before and after particles give to them.
 #[derive(Clone, Copy)]
@@ -99,7 +99,8 @@ pub(crate) struct Around<'a, N> {
 }
 
 /// As [`Scatter`] with the band's number, where its particles' elements of three arrays may change.
-type Sweep<'a, N, A, B, C> = dyn Fn(&mut [N], usize, u32, Share<'_, A, B, C>) + Sync + 'a;
+pub(crate) type Sweep<'a, N, A, B, C> =
+    dyn Fn(&mut [N], usize, u32, Share<'_, A, B, C>) + Sync + 'a;
 
 impl Bands {
     /// Prepares for `particles` particles on the grid; `sort` has to follow.

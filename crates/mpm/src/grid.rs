@@ -148,12 +148,10 @@ impl<const D: usize> Layout<D> {
         rows: &mut [N],
         add: &impl Fn(&mut N, N, Option<usize>),
     ) {
-        for g in self.ghosts.iter().filter(|g| g.axis < D - 1) {
-            self.for_layer(rows.len(), (g.axis, g.layer), |index| {
-                let ghost = rows[index];
-                add(&mut rows[self.image(g, index)], ghost, g.flip());
-            });
-        }
+        self.for_ghosts_in_rows(rows.len(), |ghost, image, flip| {
+            let ghost = rows[ghost];
+            add(&mut rows[image], ghost, flip);
+        });
     }
 
     /// The part of [`unfold`](Self::unfold) that stays within a row, for some rows.
@@ -162,11 +160,9 @@ impl<const D: usize> Layout<D> {
         rows: &mut [N],
         mirror: &impl Fn(N, Option<usize>) -> N,
     ) {
-        for g in self.ghosts.iter().filter(|g| g.axis < D - 1) {
-            self.for_layer(rows.len(), (g.axis, g.layer), |index| {
-                rows[index] = mirror(rows[self.image(g, index)], g.flip());
-            });
-        }
+        self.for_ghosts_in_rows(rows.len(), |ghost, image, flip| {
+            rows[ghost] = mirror(rows[image], flip);
+        });
     }
 
     /// The part of [`fold`](Self::fold) that goes from row to row, which comes after that within rows: for one of the
@@ -178,13 +174,10 @@ impl<const D: usize> Layout<D> {
         rows: &mut [N],
         add: &impl Fn(&mut N, N, Option<usize>),
     ) {
-        for g in self.ghosts.iter().filter(|g| g.axis == D - 1 && edge.contains(&g.layer)) {
-            let (ghosts, images) = ((g.layer - first) * self.row(), (g.image - first) * self.row());
-            for node in 0..self.row() {
-                let ghost = rows[ghosts + node];
-                add(&mut rows[images + node], ghost, g.flip());
-            }
-        }
+        self.for_ghosts_of_edge(edge, first, |ghost, image, flip| {
+            let ghost = rows[ghost];
+            add(&mut rows[image], ghost, flip);
+        });
     }
 
     /// The part of [`unfold`](Self::unfold) that goes from row to row, as [`fold_edge`](Self::fold_edge).
@@ -195,11 +188,36 @@ impl<const D: usize> Layout<D> {
         rows: &mut [N],
         mirror: &impl Fn(N, Option<usize>) -> N,
     ) {
+        self.for_ghosts_of_edge(edge, first, |ghost, image, flip| {
+            rows[ghost] = mirror(rows[image], flip);
+        });
+    }
+
+    /// Calls `visit(ghost, image, flip)` with the indices of every node beyond a wall and of its mirror image in the same row,
+    /// of `nodes` nodes from the beginning of a row on, and with the component that changes its sign.
+    #[inline(always)]
+    fn for_ghosts_in_rows(&self, nodes: usize, mut visit: impl FnMut(usize, usize, Option<usize>)) {
+        for g in self.ghosts.iter().filter(|g| g.axis < D - 1) {
+            let (ghost, image) = (g.layer * self.strides[g.axis], g.image * self.strides[g.axis]);
+            self.for_layer(nodes, (g.axis, g.layer), |index| {
+                visit(index, index - ghost + image, g.flip());
+            });
+        }
+    }
+
+    /// As [`for_ghosts_in_rows`](Self::for_ghosts_in_rows) for nodes whose mirror images are in other rows, both of them at
+    /// one edge; indices count from the beginning of row `first`.
+    #[inline(always)]
+    fn for_ghosts_of_edge(
+        &self,
+        edge: &Range<usize>,
+        first: usize,
+        mut visit: impl FnMut(usize, usize, Option<usize>),
+    ) {
+        let row = self.row();
         for g in self.ghosts.iter().filter(|g| g.axis == D - 1 && edge.contains(&g.layer)) {
-            let (ghosts, images) = ((g.layer - first) * self.row(), (g.image - first) * self.row());
-            for node in 0..self.row() {
-                rows[ghosts + node] = mirror(rows[images + node], g.flip());
-            }
+            let (ghost, image) = ((g.layer - first) * row, (g.image - first) * row);
+            (0..row).for_each(|node| visit(ghost + node, image + node, g.flip()));
         }
     }
 
@@ -216,10 +234,6 @@ impl<const D: usize> Layout<D> {
             }
         }
         if low < high { [0..low, high..end] } else { [0..end, end..end] }
-    }
-
-    fn image(&self, g: &Ghost, index: usize) -> usize {
-        index - g.layer * self.strides[g.axis] + g.image * self.strides[g.axis]
     }
 
     /// Calls `clear(node, axis)` for every node on a wall across `axis`, in the rows from row `first` on.

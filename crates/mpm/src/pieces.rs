@@ -42,6 +42,11 @@ enum Take {
     Nothing,
 }
 
+/// The number of bands of `band_length` in `length`, and so of pieces: the last band has what is left over as well.
+pub(crate) fn count(length: usize, band_length: usize) -> usize {
+    (length / band_length.max(1)).max(1)
+}
+
 /// Whether a piece comes after its neighbours. That of the last band is early, and so the late one before it completes both.
 fn is_late(bands: usize, band: usize) -> bool {
     (bands - band).is_multiple_of(2)
@@ -133,7 +138,7 @@ impl<'a, N> Pieces<'a, N> {
     /// The pieces of `array`, for bands of `band_length` elements; the last one has what is left over as well. What is in
     /// `turns` does not matter; it is room.
     pub(crate) fn new(array: &'a mut [N], band_length: usize, turns: &'a mut Turns) -> Self {
-        let bands = (array.len() / band_length.max(1)).max(1);
+        let bands = count(array.len(), band_length);
         turns.start(bands);
         let (first, length) = (array.as_mut_ptr(), array.len());
         let turns = Mutex::new(turns);

@@ -8,142 +8,135 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::RealField;
 
+use crate::bands::{Around, Bands, Scatter, Sweep};
 use crate::grid::Layout;
 use crate::step::Constants;
 use crate::transfer::Node;
 
-/// What comes of what particles gave to a node.
+/// What comes of what particles gave to nodes.
 pub(crate) trait Solve<T: RealField + Copy, const D: usize>: Copy + Sync {
+    /// Prepares some nodes for what particles are to give to them.
+    fn clear(self, nodes: &mut [Node<T, D>]) {
+        nodes.fill(Node::zero());
+    }
+
     /// Adds what particles gave to a node beyond a wall to its mirror image. The component along the axis `flip` changes
     /// its sign.
-    fn fold(self, image: &mut Node<T, D>, ghost: Node<T, D>, flip: Option<usize>);
+    #[inline(always)]
+    fn fold(
+        self,
+        c: &Constants<T, D>,
+        image: &mut Node<T, D>,
+        ghost: Node<T, D>,
+        flip: Option<usize>,
+    ) {
+        image.add(&c.ghost(ghost).flipped(flip));
+    }
 
     /// Solves for some nodes, of which the first has the index `first`.
-    fn solve(self, nodes: &mut [Node<T, D>], first: usize);
+    fn solve(self, c: &Constants<T, D>, nodes: &mut [Node<T, D>], first: usize);
 
     /// What a wall across `axis` does to a node on it.
-    fn on_wall(self, node: &mut Node<T, D>, axis: usize);
+    #[inline(always)]
+    fn on_wall(self, c: &Constants<T, D>, node: &mut Node<T, D>, axis: usize) {
+        c.clear(node, axis);
+    }
 }
 
-/// Momentum and force to the velocity at the end of the step and the acceleration, that times `scale`.
+/// Momentum and force to the velocity at the end of the step and the acceleration.
 #[derive(Clone, Copy)]
-pub(crate) struct VelocityAndAcceleration<'a, T, const D: usize> {
-    pub(crate) c: &'a Constants<T, D>,
+pub(crate) struct VelocityAndAcceleration<T> {
+    /// Factor on the acceleration.
     pub(crate) scale: T,
 }
 
-impl<T: RealField + Copy, const D: usize> Solve<T, D> for VelocityAndAcceleration<'_, T, D> {
+impl<T: RealField + Copy, const D: usize> Solve<T, D> for VelocityAndAcceleration<T> {
     #[inline(always)]
-    fn fold(self, image: &mut Node<T, D>, ghost: Node<T, D>, flip: Option<usize>) {
-        image.add(&self.c.ghost(ghost).flipped(flip));
-    }
-
-    #[inline(always)]
-    fn solve(self, nodes: &mut [Node<T, D>], _: usize) {
-        let Self { c, scale } = self;
+    fn solve(self, c: &Constants<T, D>, nodes: &mut [Node<T, D>], _: usize) {
         for node in nodes {
             let inverse = c.inverse_mass(node);
             for a in 0..D {
-                let acceleration = node.values[D + a] * (inverse * scale);
+                let acceleration = node.values[D + a] * (inverse * self.scale);
                 node.values[a] = node.values[a] * inverse + acceleration * c.time_step;
                 node.values[D + a] = acceleration;
             }
         }
     }
-
-    #[inline(always)]
-    fn on_wall(self, node: &mut Node<T, D>, axis: usize) {
-        self.c.clear(node, axis);
-    }
 }
 
 /// Momentum to the velocity at the start of the step.
 #[derive(Clone, Copy)]
-pub(crate) struct Velocity<'a, T, const D: usize> {
-    pub(crate) c: &'a Constants<T, D>,
-}
+pub(crate) struct Velocity;
 
-impl<T: RealField + Copy, const D: usize> Solve<T, D> for Velocity<'_, T, D> {
+impl<T: RealField + Copy, const D: usize> Solve<T, D> for Velocity {
     #[inline(always)]
-    fn fold(self, image: &mut Node<T, D>, ghost: Node<T, D>, flip: Option<usize>) {
-        image.add(&self.c.ghost(ghost).flipped(flip));
-    }
-
-    #[inline(always)]
-    fn solve(self, nodes: &mut [Node<T, D>], _: usize) {
+    fn solve(self, c: &Constants<T, D>, nodes: &mut [Node<T, D>], _: usize) {
         for node in nodes {
-            let inverse = self.c.inverse_mass(node);
+            let inverse = c.inverse_mass(node);
             (0..D).for_each(|a| node.values[a] *= inverse);
         }
     }
-
-    #[inline(always)]
-    fn on_wall(self, node: &mut Node<T, D>, axis: usize) {
-        self.c.clear(node, axis);
-    }
 }
 
-/// Force to the acceleration, that times `scale`, and the velocity from that at the start of the step to that at its end.
+/// Force to the acceleration, and the velocity from that at the start of the step to that at its end.
 #[derive(Clone, Copy)]
-pub(crate) struct Acceleration<'a, T, const D: usize> {
-    pub(crate) c: &'a Constants<T, D>,
+pub(crate) struct Acceleration<T> {
+    /// Factor on the acceleration.
     pub(crate) scale: T,
 }
 
-impl<T: RealField + Copy, const D: usize> Solve<T, D> for Acceleration<'_, T, D> {
+impl<T: RealField + Copy, const D: usize> Solve<T, D> for Acceleration<T> {
+    /// What gave its momentum to the nodes gave no force.
+    fn clear(self, _: &mut [Node<T, D>]) {}
+
     #[inline(always)]
-    fn fold(self, image: &mut Node<T, D>, ghost: Node<T, D>, flip: Option<usize>) {
+    fn fold(
+        self,
+        _: &Constants<T, D>,
+        image: &mut Node<T, D>,
+        ghost: Node<T, D>,
+        flip: Option<usize>,
+    ) {
         image.add_acceleration(&ghost.flipped(flip));
     }
 
     #[inline(always)]
-    fn solve(self, nodes: &mut [Node<T, D>], _: usize) {
-        let Self { c, scale } = self;
+    fn solve(self, c: &Constants<T, D>, nodes: &mut [Node<T, D>], _: usize) {
         for node in nodes {
-            let inverse = c.inverse_mass(node) * scale;
+            let inverse = c.inverse_mass(node) * self.scale;
             for a in 0..D {
                 node.values[D + a] *= inverse;
                 node.values[a] += node.values[D + a] * c.time_step;
             }
         }
     }
-
-    #[inline(always)]
-    fn on_wall(self, node: &mut Node<T, D>, axis: usize) {
-        self.c.clear(node, axis);
-    }
 }
 
 /// Momentum of the updated particles to their velocity, by the masses that `nodes` have.
 #[derive(Clone, Copy)]
 pub(crate) struct Reprojection<'a, T, const D: usize> {
-    pub(crate) c: &'a Constants<T, D>,
     pub(crate) nodes: &'a [Node<T, D>],
 }
 
 impl<T: RealField + Copy, const D: usize> Solve<T, D> for Reprojection<'_, T, D> {
     #[inline(always)]
-    fn fold(self, image: &mut Node<T, D>, ghost: Node<T, D>, flip: Option<usize>) {
-        image.add(&ghost.flipped(flip));
-    }
-
-    #[inline(always)]
-    fn solve(self, nodes: &mut [Node<T, D>], first: usize) {
+    fn solve(self, c: &Constants<T, D>, nodes: &mut [Node<T, D>], first: usize) {
         for (new, node) in nodes.iter_mut().zip(self.nodes.get(first..).unwrap_or_default()) {
-            let inverse = self.c.inverse_mass(node);
+            let inverse = c.inverse_mass(node);
             new.values.iter_mut().for_each(|value| *value *= inverse);
         }
     }
 
     #[inline(always)]
-    fn on_wall(self, node: &mut Node<T, D>, axis: usize) {
+    fn on_wall(self, _: &Constants<T, D>, node: &mut Node<T, D>, axis: usize) {
         node.clear(axis);
     }
 }
 
 /// The solution on a grid, rows by rows.
-pub(crate) struct Solution<'a, S, const D: usize> {
+pub(crate) struct Solution<'a, T, S, const D: usize> {
     layout: &'a Layout<D>,
+    c: &'a Constants<T, D>,
     solve: S,
     edges: [Edge; 2],
 }
@@ -161,21 +154,52 @@ impl Edge {
     }
 }
 
-impl<'a, S, const D: usize> Solution<'a, S, D> {
-    pub(crate) fn new(layout: &'a Layout<D>, solve: S) -> Self {
+impl<'a, T, S, const D: usize> Solution<'a, T, S, D>
+where
+    T: RealField + Copy,
+    S: Solve<T, D>,
+{
+    pub(crate) fn new(layout: &'a Layout<D>, c: &'a Constants<T, D>, solve: S) -> Self {
         let edges = layout.edges().map(|rows| Edge { rows, is_solved: AtomicBool::new(false) });
-        Self { layout, solve, edges }
+        Self { layout, c, solve, edges }
+    }
+
+    /// Lets every band add to the nodes, as [`Bands::scatter`], and solves.
+    pub(crate) fn scatter(
+        &self,
+        bands: &mut Bands,
+        nodes: &mut [Node<T, D>],
+        add: &Scatter<'_, Node<T, D>>,
+    ) {
+        let around = Around {
+            before: &|nodes| self.solve.clear(nodes),
+            after: &|nodes, first| self.rows(nodes, first),
+        };
+        bands.scatter(self.layout, nodes, around, add);
+        self.finish(nodes);
+    }
+
+    /// Lets every band add to the nodes and change its own elements of three arrays, as [`Bands::sweep`], and solves.
+    pub(crate) fn sweep<A: Send, B: Send, C: Send>(
+        &self,
+        bands: &mut Bands,
+        nodes: &mut [Node<T, D>],
+        arrays: (&mut [A], &mut [B], &mut [C]),
+        add: &Sweep<'_, Node<T, D>, A, B, C>,
+    ) {
+        let around = Around {
+            before: &|nodes| self.solve.clear(nodes),
+            after: &|nodes, first| self.rows(nodes, first),
+        };
+        bands.sweep(self.layout, nodes, around, arrays, add);
+        self.finish(nodes);
     }
 
     /// Solves whole rows, from the node of index `first` on, to which all particles gave; those of an edge only where all of
     /// it is there.
-    pub(crate) fn rows<T>(&self, nodes: &mut [Node<T, D>], first: usize)
-    where
-        T: RealField + Copy,
-        S: Solve<T, D>,
-    {
-        let Self { layout, solve, edges, .. } = self;
-        layout.fold_rows(nodes, &|image, ghost, flip| solve.fold(image, ghost, flip));
+    fn rows(&self, nodes: &mut [Node<T, D>], first: usize) {
+        let &Self { layout, c, solve, ref edges } = self;
+        layout.fold_rows(nodes, &|image, ghost, flip| solve.fold(c, image, ghost, flip));
         let rows = first / layout.row()..(first + nodes.len()) / layout.row();
         let [low, high] = edges;
         let mut to_solve = rows.clone();
@@ -197,11 +221,7 @@ impl<'a, S, const D: usize> Solution<'a, S, D> {
     }
 
     /// Solves what [`rows`](Self::rows) left, after it was called for all rows.
-    pub(crate) fn finish<T>(&self, nodes: &mut [Node<T, D>])
-    where
-        T: RealField + Copy,
-        S: Solve<T, D>,
-    {
+    fn finish(&self, nodes: &mut [Node<T, D>]) {
         let row = self.layout.row();
         for edge in self.edges.iter().filter(|edge| !edge.is_solved.load(Ordering::Relaxed)) {
             self.fold(edge, nodes, 0);
@@ -212,24 +232,18 @@ impl<'a, S, const D: usize> Solution<'a, S, D> {
     }
 
     /// Adds what was deposited beyond a wall to the mirror images in the rows from row `first` on.
-    fn fold<T>(&self, edge: &Edge, nodes: &mut [Node<T, D>], first: usize)
-    where
-        T: RealField + Copy,
-        S: Solve<T, D>,
-    {
-        let add = |image: &mut _, ghost, flip| self.solve.fold(image, ghost, flip);
-        self.layout.fold_edge(&edge.rows, first, nodes, &add);
+    fn fold(&self, edge: &Edge, nodes: &mut [Node<T, D>], first: usize) {
+        let &Self { layout, c, solve, .. } = self;
+        layout.fold_edge(&edge.rows, first, nodes, &|image, ghost, flip| {
+            solve.fold(c, image, ghost, flip);
+        });
     }
 
     /// Solves the rows from row `first` on, to which nothing is to be added any more.
-    fn complete<T>(&self, nodes: &mut [Node<T, D>], first: usize)
-    where
-        T: RealField + Copy,
-        S: Solve<T, D>,
-    {
-        let Self { layout, solve, .. } = self;
-        solve.solve(nodes, first * layout.row());
-        layout.on_walls(first, nodes, |node, axis| solve.on_wall(node, axis));
+    fn complete(&self, nodes: &mut [Node<T, D>], first: usize) {
+        let &Self { layout, c, solve, .. } = self;
+        solve.solve(c, nodes, first * layout.row());
+        layout.on_walls(first, nodes, |node, axis| solve.on_wall(c, node, axis));
         layout.unfold_rows(nodes, &Node::flipped);
     }
 }
@@ -237,7 +251,6 @@ impl<'a, S, const D: usize> Solution<'a, S, D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bands::Bands;
     use crate::grid::Grid;
     use nalgebra::SVector;
 
@@ -253,15 +266,19 @@ mod tests {
     }
 
     /// Whatever rows are solved together and in which order, it comes out as for the whole grid at once.
-    fn check<S: Solve<f64, D>, const D: usize>(layout: &Layout<D>, solve: S) {
+    fn check<S: Solve<f64, D>, const D: usize>(
+        layout: &Layout<D>,
+        c: &Constants<f64, D>,
+        solve: S,
+    ) {
         let mut expected = given(layout.nodes);
-        layout.fold(&mut expected, |image, ghost, flip| solve.fold(image, ghost, flip));
-        solve.solve(&mut expected, 0);
-        layout.on_walls(0, &mut expected, |node, axis| solve.on_wall(node, axis));
+        layout.fold(&mut expected, |image, ghost, flip| solve.fold(c, image, ghost, flip));
+        solve.solve(c, &mut expected, 0);
+        layout.on_walls(0, &mut expected, |node, axis| solve.on_wall(c, node, axis));
         layout.unfold(&mut expected, Node::flipped);
         for rows_at_once in [1, 7, 8, 16, layout.dims[D - 1]] {
             let mut nodes = given(layout.nodes);
-            let solution = Solution::new(layout, solve);
+            let solution = Solution::new(layout, c, solve);
             let size = rows_at_once * layout.row();
             let chunks: Vec<_> = nodes.chunks_mut(size).enumerate().collect();
             for (chunk, nodes) in chunks.into_iter().rev() {
@@ -279,10 +296,10 @@ mod tests {
         let layout = Layout::new(&grid, 8).unwrap();
         let bands = Bands::new(&layout, 1);
         let c = &Constants::new(&grid, &layout, &bands, 0.1, 1.0);
-        check(&layout, Velocity { c });
-        check(&layout, VelocityAndAcceleration { c, scale: 0.5 });
-        check(&layout, Acceleration { c, scale: 0.5 });
-        check(&layout, Reprojection { c, nodes: &given(layout.nodes) });
+        check(&layout, c, Velocity);
+        check(&layout, c, VelocityAndAcceleration { scale: 0.5 });
+        check(&layout, c, Acceleration { scale: 0.5 });
+        check(&layout, c, Reprojection { nodes: &given(layout.nodes) });
     }
 
     #[test]

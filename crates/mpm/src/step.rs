@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 
 use nalgebra::{RealField, SMatrix, SVector};
 
-use crate::bands::{Around, Bands, Cut};
+use crate::bands::{Bands, Cut};
 use crate::block::{BLOCK, Block, Copies};
 use crate::body_force::{AtTime, BodyForce};
 use crate::fault::{Fault, Planted};
@@ -317,15 +317,12 @@ where
             }
         }
     });
-    let solution = Solution::new(layout, Reprojection { c: &c, nodes });
-    let around =
-        Around { before: &Node::clear_all, after: &|nodes, first| solution.rows(nodes, first) };
-    bands.scatter(layout, reprojected, around, &|piece, first, ids| {
+    let solution = Solution::new(layout, &c, Reprojection { nodes });
+    solution.scatter(bands, reprojected, &|piece, first, ids| {
         c.scatter(rule, x, F, piece, first, ids, |_, ids, deposits| {
             deposits.take_momenta(ids, mass, v);
         });
     });
-    solution.finish(reprojected);
     let reprojected = if c.planted.is(Fault::NoReprojection) { nodes } else { &reprojected[..] };
     let outcome = advance(particles, bands, c, rule, |block, gathered, _, x, _, F| {
         block.gather(&c.strides, nodes, x.len(), &mut *gathered);
@@ -518,10 +515,8 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let Particles { X, x, v, F, mass, volume, .. } = &*particles;
         let c = *constants;
         let forcing = Forcing::new(body_force, X, t, &c, of_time);
-        let solution = Solution::new(layout, VelocityAndAcceleration { c: &c, scale });
-        let around =
-            Around { before: &Node::clear_all, after: &|nodes, first| solution.rows(nodes, first) };
-        bands.scatter(layout, nodes, around, &|piece, first, ids| {
+        let solution = Solution::new(layout, &c, VelocityAndAcceleration { scale });
+        solution.scatter(bands, nodes, &|piece, first, ids| {
             c.scatter(rule, x, F, piece, first, ids, |copies, ids, deposits| {
                 forcing.evaluate(ids, &copies.x, &mut deposits.b);
                 deposits.take(ids, mass, volume);
@@ -531,7 +526,6 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
                 copies.run().stress(&c, law, deposits);
             });
         });
-        solution.finish(nodes);
     }
 
     /// USF, first pass: velocities at the start of the step on the grid.
@@ -543,15 +537,12 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let Self { particles, constants, layout, bands, nodes, .. } = self;
         let Particles { x, v, F, mass, .. } = &*particles;
         let c = *constants;
-        let solution = Solution::new(layout, Velocity { c: &c });
-        let around =
-            Around { before: &Node::clear_all, after: &|nodes, first| solution.rows(nodes, first) };
-        bands.scatter(layout, nodes, around, &|piece, first, ids| {
+        let solution = Solution::new(layout, &c, Velocity);
+        solution.scatter(bands, nodes, &|piece, first, ids| {
             c.scatter(rule, x, F, piece, first, ids, |_, ids, deposits| {
                 deposits.take_momenta(ids, mass, v);
             });
         });
-        solution.finish(nodes);
     }
 
     /// USF, second pass: F at the end of the step, kept beside the old one.
@@ -607,10 +598,8 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let Particles { X, x, F, mass, volume, .. } = &*particles;
         let (c, F_next) = (*constants, &F_next[..]);
         let forcing = Forcing::new(body_force, X, t, &c, of_time);
-        let solution = Solution::new(layout, Acceleration { c: &c, scale });
-        // What gave its momentum to the nodes gave no force.
-        let around = Around { before: &|_| {}, after: &|nodes, first| solution.rows(nodes, first) };
-        bands.scatter(layout, nodes, around, &|piece, first, ids| {
+        let solution = Solution::new(layout, &c, Acceleration { scale });
+        solution.scatter(bands, nodes, &|piece, first, ids| {
             c.scatter(rule, x, F, piece, first, ids, |copies, ids, deposits| {
                 forcing.evaluate(ids, &copies.x, &mut deposits.b);
                 deposits.take(ids, mass, volume);
@@ -621,7 +610,6 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
                 copies.run().stress(&c, law, deposits);
             });
         });
-        solution.finish(nodes);
     }
 }
 

@@ -7,7 +7,6 @@
 
 use nalgebra::{RealField, SMatrix, SVector};
 
-use crate::bands::Around;
 use crate::block::{BLOCK, Block, Copies, Run};
 use crate::body_force::BodyForce;
 use crate::fault::Fault;
@@ -68,13 +67,10 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let forcing = Forcing::new(body_force, X, t_next, c, of_time);
         let step = Sweep { c, rule, law, nodes, mass, volume, alike: *alike, forcing };
         let found = Found::default();
-        let solution = Solution::new(layout, VelocityAndAcceleration { c, scale: T::one() });
-        let around =
-            Around { before: &Node::clear_all, after: &|nodes, first| solution.rows(nodes, first) };
-        bands.sweep(layout, next, around, (x, v, F), &|piece, first, band, elements| {
+        let solution = Solution::new(layout, c, VelocityAndAcceleration { scale: T::one() });
+        solution.sweep(bands, next, (x, v, F), &|piece, first, band, elements| {
             found.add(step.band(piece, first, band, elements));
         });
-        solution.finish(next);
         std::mem::swap(nodes, next);
         found.all()
     }

@@ -23,11 +23,6 @@ impl<T: RealField + Copy, const D: usize> Node<T, D> {
         Self { values: [T::zero(); LANES] }
     }
 
-    /// Makes all of some nodes zero.
-    pub(crate) fn clear_all(nodes: &mut [Self]) {
-        nodes.fill(Self::zero());
-    }
-
     #[inline(always)]
     pub(crate) fn new(velocity: &SVector<T, D>, acceleration: &SVector<T, D>, mass: T) -> Self {
         const { assert!(2 * D < LANES) };
