@@ -152,6 +152,20 @@ fn errors<T: Real, const D: usize>(
     }
 }
 
+/// The place of each number below `count`, and the number of each place, where the numbers stand in as many runs as there are
+/// threads, each backwards.
+///
+/// A step goes through the particles upwards. Who then goes downwards meets first what still lies in the cache, and leaves
+/// there what the next step begins with.
+fn backwards(count: usize, runs: usize) -> impl Fn(usize) -> usize {
+    let start = move |run| count * run / runs;
+    move |number| {
+        // The last run that starts at the number or before it.
+        let run = ((number + 1) * runs - 1) / count;
+        start(run) + start(run + 1) - 1 - number
+    }
+}
+
 /// What `group` makes of each number below `count`, on the threads of the pool; through a reference, so that their
 /// machinery is compiled once for each kind of result.
 pub(crate) fn each_group<R: Send>(count: usize, group: &(dyn Fn(usize) -> R + Sync)) -> Vec<R> {
@@ -187,10 +201,13 @@ pub(crate) fn over_particles<const N: usize>(
         }
         (tallies, worst)
     };
-    let groups = each_group(count.div_ceil(GROUP), &group);
+    let groups = count.div_ceil(GROUP);
+    let place = backwards(groups, rayon::current_num_threads());
+    let at_places = each_group(groups, &|at| group(place(at)));
     let mut total = [Tally::default(); N];
     let mut worst = (0.0, 0);
-    for (tallies, candidate) in &groups {
+    for g in 0..groups {
+        let (tallies, candidate) = &at_places[place(g)];
         for (total, tally) in total.iter_mut().zip(tallies) {
             *total = total.join(tally);
         }
@@ -199,4 +216,23 @@ pub(crate) fn over_particles<const N: usize>(
         }
     }
     (total.map(|tally| tally.norms(count)), worst.1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_thread_s_run_goes_backwards_and_has_its_own_numbers() {
+        let places = |count, runs| (0..count).map(backwards(count, runs)).collect::<Vec<_>>();
+        assert_eq!(places(5, 1), [4, 3, 2, 1, 0]);
+        assert_eq!(places(7, 2), [2, 1, 0, 6, 5, 4, 3]);
+        assert_eq!(places(2, 3), [0, 1]);
+        for (count, runs) in [(1, 1), (1, 5), (6, 3), (64, 7), (1000, 16)] {
+            let place = backwards(count, runs);
+            assert!((0..count).all(|number| place(place(number)) == number), "{count} {runs}");
+            let turns = (1..count).filter(|&n| place(n) != place(n - 1).wrapping_sub(1)).count();
+            assert_eq!(turns + 1, runs.min(count), "{count} {runs}");
+        }
+    }
 }
