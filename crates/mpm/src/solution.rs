@@ -20,17 +20,10 @@ pub(crate) trait Solve<T: RealField + Copy, const D: usize>: Copy + Sync {
         nodes.fill(Node::zero());
     }
 
-    /// Adds what particles gave to a node beyond a wall to its mirror image. The component along the axis `flip` changes
-    /// its sign.
+    /// Adds to a node what particles gave to its mirror image beyond a wall, mirrored.
     #[inline(always)]
-    fn fold(
-        self,
-        c: &Constants<T, D>,
-        image: &mut Node<T, D>,
-        ghost: Node<T, D>,
-        flip: Option<usize>,
-    ) {
-        image.add(&c.ghost(ghost).flipped(flip));
+    fn add(self, node: &mut Node<T, D>, mirrored: &Node<T, D>) {
+        node.add(mirrored);
     }
 
     /// Solves for some nodes, of which the first has the index `first`.
@@ -90,14 +83,8 @@ impl<T: RealField + Copy, const D: usize> Solve<T, D> for Acceleration<T> {
     fn clear(self, _: &mut [Node<T, D>]) {}
 
     #[inline(always)]
-    fn fold(
-        self,
-        _: &Constants<T, D>,
-        image: &mut Node<T, D>,
-        ghost: Node<T, D>,
-        flip: Option<usize>,
-    ) {
-        image.add_acceleration(&ghost.flipped(flip));
+    fn add(self, node: &mut Node<T, D>, mirrored: &Node<T, D>) {
+        node.add_acceleration(mirrored);
     }
 
     #[inline(always)]
@@ -171,12 +158,7 @@ where
         nodes: &mut [Node<T, D>],
         add: &Scatter<'_, Node<T, D>>,
     ) {
-        let around = Around {
-            before: &|nodes| self.solve.clear(nodes),
-            after: &|nodes, first| self.rows(nodes, first),
-        };
-        bands.scatter(self.layout, nodes, around, add);
-        self.finish(nodes);
+        self.around(nodes, |nodes, around| bands.scatter(self.layout, nodes, around, add));
     }
 
     /// Lets every band add to the nodes and change its own elements of three arrays, as [`Bands::sweep`], and solves.
@@ -187,19 +169,28 @@ where
         arrays: (&mut [A], &mut [B], &mut [C]),
         add: &Sweep<'_, Node<T, D>, A, B, C>,
     ) {
-        let around = Around {
-            before: &|nodes| self.solve.clear(nodes),
-            after: &|nodes, first| self.rows(nodes, first),
-        };
-        bands.sweep(self.layout, nodes, around, arrays, add);
+        self.around(nodes, |nodes, around| bands.sweep(self.layout, nodes, around, arrays, add));
+    }
+
+    /// Solves for what `give` lets the bands add to the nodes.
+    fn around(
+        &self,
+        nodes: &mut [Node<T, D>],
+        give: impl FnOnce(&mut [Node<T, D>], Around<'_, Node<T, D>>),
+    ) {
+        let (before, after) = (
+            |nodes: &mut [_]| self.solve.clear(nodes),
+            |nodes: &mut [_], first| self.rows(nodes, first),
+        );
+        give(nodes, Around { before: &before, after: &after });
         self.finish(nodes);
     }
 
     /// Solves whole rows, from the node of index `first` on, to which all particles gave; those of an edge only where all of
     /// it is there.
     fn rows(&self, nodes: &mut [Node<T, D>], first: usize) {
-        let &Self { layout, c, solve, ref edges } = self;
-        layout.fold_rows(nodes, &|image, ghost, flip| solve.fold(c, image, ghost, flip));
+        let Self { layout, edges, .. } = self;
+        layout.fold_rows(nodes, &|image, ghost, flip| self.fold(image, ghost, flip));
         let rows = first / layout.row()..(first + nodes.len()) / layout.row();
         let [low, high] = edges;
         let mut to_solve = rows.clone();
@@ -210,7 +201,7 @@ where
             to_solve.end = high.rows.start.clamp(to_solve.start, rows.end);
         }
         for edge in edges.iter().filter(|edge| edge.is_within(&rows)) {
-            self.fold(edge, nodes, rows.start);
+            self.fold_edge(edge, nodes, rows.start);
         }
         let skipped = (to_solve.start - rows.start) * layout.row();
         self.complete(&mut nodes[skipped..][..to_solve.len() * layout.row()], to_solve.start);
@@ -224,18 +215,24 @@ where
     fn finish(&self, nodes: &mut [Node<T, D>]) {
         let row = self.layout.row();
         for edge in self.edges.iter().filter(|edge| !edge.is_solved.load(Ordering::Relaxed)) {
-            self.fold(edge, nodes, 0);
+            self.fold_edge(edge, nodes, 0);
             let Range { start, end } = edge.rows;
             self.complete(&mut nodes[start * row..end * row], start);
             self.layout.unfold_edge(&edge.rows, 0, nodes, &Node::flipped);
         }
     }
 
-    /// Adds what was deposited beyond a wall to the mirror images in the rows from row `first` on.
-    fn fold(&self, edge: &Edge, nodes: &mut [Node<T, D>], first: usize) {
-        let &Self { layout, c, solve, .. } = self;
-        layout.fold_edge(&edge.rows, first, nodes, &|image, ghost, flip| {
-            solve.fold(c, image, ghost, flip);
+    /// Adds what particles gave to a node beyond a wall to its mirror image. The component along the axis `flip` changes
+    /// its sign.
+    #[inline(always)]
+    fn fold(&self, image: &mut Node<T, D>, ghost: Node<T, D>, flip: Option<usize>) {
+        self.solve.add(image, &self.c.ghost(ghost).flipped(flip));
+    }
+
+    /// The same for one of the edges, among the rows from row `first` on.
+    fn fold_edge(&self, edge: &Edge, nodes: &mut [Node<T, D>], first: usize) {
+        self.layout.fold_edge(&edge.rows, first, nodes, &|image, ghost, flip| {
+            self.fold(image, ghost, flip);
         });
     }
 
@@ -272,7 +269,8 @@ mod tests {
         solve: S,
     ) {
         let mut expected = given(layout.nodes);
-        layout.fold(&mut expected, |image, ghost, flip| solve.fold(c, image, ghost, flip));
+        let whole = Solution::new(layout, c, solve);
+        layout.fold(&mut expected, |image, ghost, flip| whole.fold(image, ghost, flip));
         solve.solve(c, &mut expected, 0);
         layout.on_walls(0, &mut expected, |node, axis| solve.on_wall(c, node, axis));
         layout.unfold(&mut expected, Node::flipped);
