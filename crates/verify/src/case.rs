@@ -371,7 +371,7 @@ fn follow<T: Real, const D: usize>(
             if let Some(frames) = &mut frames {
                 frames.write(solver.observe(), exact, 0, 0.0)?;
             }
-            let at_start = comparison.measure(solver.observe(), 0.0, lag).norms;
+            let at_start = comparison.measure(solver.observe(), 0.0, lag);
             if let Some(recorder) = &mut recorder {
                 let velocity_time = if starts_early(case) { -lag } else { 0.0 };
                 let particles = solver.observe().0;
@@ -398,10 +398,10 @@ fn follow<T: Real, const D: usize>(
         done = step;
         let time = step as f64 * dt;
         let measured = comparison.measure(solver.observe(), time, lag);
-        errors = PerField::combine(&errors, &measured.norms, PerNorm::larger);
-        let error = measured.norms.u.linf;
+        errors = PerField::combine(&errors, &measured, PerNorm::larger);
+        let error = measured.u.linf;
         if error > scene.size || error.is_nan() {
-            let particle = measured.worst_particle;
+            let particle = comparison.worst_particle(solver.observe(), time);
             status = Status::Unstable { step, time, particle, error, size: scene.size };
         }
         if let Some(frames) = &mut frames {
@@ -416,7 +416,7 @@ fn follow<T: Real, const D: usize>(
         if let Some(recorder) = &mut recorder {
             let is_last = status != Status::Ok;
             let particles = solver.observe().0;
-            recorder.take(particles, (step, is_last), (time, time - lag), measured.norms.u);
+            recorder.take(particles, (step, is_last), (time, time - lag), measured.u);
         }
         if status != Status::Ok {
             break;

@@ -8,21 +8,14 @@ use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use crate::norms::{PerField, PerNorm, Tally};
+use crate::norms::{PerField, PerNorm, Tallies, Tally};
 
 /// Particles in a group that one thread works on; fixed, so that sums do not depend on the number of threads.
-const GROUP: usize = 512;
+const GROUP: usize = 1024;
 /// Runs of particles for which what depends on the time alone is computed once.
 pub(crate) const RUNS: usize = 8;
 /// Particles in as many runs; what is compared of them fits into the first-level cache.
 const CHUNK: usize = RUNS * BLOCK;
-
-/// The errors at one instant.
-pub(crate) struct Measured {
-    pub(crate) norms: PerField<PerNorm<f64>>,
-    /// The particle of largest position error.
-    pub(crate) worst_particle: usize,
-}
 
 /// Compares particles with the exact solution; what that needs of their reference positions alone is kept.
 pub(crate) struct Comparison<'a, const D: usize> {
@@ -39,25 +32,74 @@ impl<'a, const D: usize> Comparison<'a, D> {
     /// The errors of all particles at `time`, those of the velocity `lag` earlier.
     pub(crate) fn measure<T: Real>(
         &self,
-        (particles, material): (&Particles<T, D>, &Material<T>),
+        observed: (&Particles<T, D>, &Material<T>),
         time: f64,
         lag: f64,
-    ) -> Measured {
-        let magnitudes = |first: usize, count: usize, magnitudes: &mut [[Row<f64>; 4]]| {
-            let mut exact = [StateRun::zero(); RUNS];
-            let exact = &mut exact[..magnitudes.len()];
-            self.exact.evaluate(time, time - lag, first / BLOCK, exact);
-            let mut run = Run::zero();
-            for (n, (exact, magnitudes)) in exact.iter().zip(magnitudes).enumerate() {
-                let places = first + n * BLOCK..first + count.min((n + 1) * BLOCK);
-                run.pick(particles, places);
-                // A particle that is inside out has no stress; the solver stops at its next step.
-                material.first_piola_kirchhoff_side_by_side(&run.F, &mut run.P);
-                Arch::new().dispatch(Errors { run: &run, exact, magnitudes });
+    ) -> PerField<PerNorm<f64>> {
+        let times = (time, time - lag);
+        let [u, v, F, P] =
+            over_particles(observed.0.len(), Room::zero, |room, first, magnitudes| {
+                self.magnitudes(observed, times, room, first, magnitudes)
+            });
+        PerField { u, v, F, P }
+    }
+
+    /// The particle of largest position error at `time`, the first one without a number if there is such.
+    pub(crate) fn worst_particle<T: Real>(
+        &self,
+        observed: (&Particles<T, D>, &Material<T>),
+        time: f64,
+    ) -> usize {
+        let count = observed.0.len();
+        let mut room = Room::zero();
+        let mut chunk = [[[0.0; BLOCK]; 4]; RUNS];
+        let mut worst = (0.0, 0);
+        for first in (0..count).step_by(CHUNK) {
+            let count = CHUNK.min(count - first);
+            let chunk = &mut chunk[..count.div_ceil(BLOCK)];
+            self.magnitudes(observed, (time, time), &mut room, first, chunk);
+            for (n, &error) in chunk.iter().flat_map(|rows| &rows[0]).take(count).enumerate() {
+                if error > worst.0 || (error.is_nan() && !worst.0.is_nan()) {
+                    worst = (error, first + n);
+                }
             }
-        };
-        let ([u, v, F, P], worst_particle) = over_particles(particles.len(), magnitudes);
-        Measured { norms: PerField { u, v, F, P }, worst_particle }
+        }
+        worst.1
+    }
+
+    /// The magnitudes of the errors of u, v, F and P, for runs of particles from number `first` on; `times` are those of
+    /// positions and of velocities.
+    fn magnitudes<T: Real>(
+        &self,
+        (particles, material): (&Particles<T, D>, &Material<T>),
+        times: (f64, f64),
+        room: &mut Room<T, D>,
+        first: usize,
+        magnitudes: &mut [[Row<f64>; 4]],
+    ) {
+        let Room { exact, run } = room;
+        let exact = &mut exact[..magnitudes.len()];
+        self.exact.evaluate(times.0, times.1, first / BLOCK, exact);
+        for (n, (exact, magnitudes)) in exact.iter().zip(magnitudes).enumerate() {
+            let first = first + n * BLOCK;
+            let places = first..particles.len().min(first + BLOCK);
+            run.pick(particles, places);
+            // A particle that is inside out has no stress; the solver stops at its next step.
+            material.first_piola_kirchhoff_side_by_side(&run.F, &mut run.P);
+            Arch::new().dispatch(Errors { run, exact, magnitudes });
+        }
+    }
+}
+
+/// Room for what is compared.
+struct Room<T, const D: usize> {
+    exact: [StateRun<f64, D>; RUNS],
+    run: Run<T, D>,
+}
+
+impl<T: Real, const D: usize> Room<T, D> {
+    fn zero() -> Self {
+        Self { exact: [StateRun::zero(); RUNS], run: Run::zero() }
     }
 }
 
@@ -172,55 +214,108 @@ pub(crate) fn each_group<R: Send>(count: usize, group: &(dyn Fn(usize) -> R + Sy
     (0..count).into_par_iter().map(group).collect()
 }
 
-/// The norms of `N` magnitudes over `count` particles, and the particle whose first magnitude is the largest.
+/// The norms of `N` magnitudes over `count` particles.
 ///
-/// `magnitudes` is given the number of a first particle, a count, and the rows to write their magnitudes to, at most `RUNS`
-/// times `BLOCK` of them. The result does not depend on the number of threads.
-pub(crate) fn over_particles<const N: usize>(
+/// `magnitudes` is given some room, the number of a first particle, and the rows to write their magnitudes to, at most `RUNS`
+/// times `BLOCK` of them; what the last row has to spare does not matter. The result does not depend on the number of threads.
+pub(crate) fn over_particles<R, const N: usize>(
     count: usize,
-    magnitudes: impl Fn(usize, usize, &mut [[Row<f64>; N]]) + Sync,
-) -> ([PerNorm<f64>; N], usize) {
+    room: impl Fn() -> R + Sync,
+    magnitudes: impl Fn(&mut R, usize, &mut [[Row<f64>; N]]) + Sync,
+) -> [PerNorm<f64>; N] {
     let group = |g: usize| {
-        let mut tallies = [Tally::default(); N];
-        let mut worst = (0.0, g * GROUP);
+        let mut room = room();
+        let mut chunk = [[[0.0; BLOCK]; N]; RUNS];
+        let mut tallies = [Tallies::default(); N];
         for first in (g * GROUP..count.min((g + 1) * GROUP)).step_by(CHUNK) {
             let count = CHUNK.min(count - first);
-            let mut chunk = [[[0.0; BLOCK]; N]; RUNS];
             let chunk = &mut chunk[..count.div_ceil(BLOCK)];
-            magnitudes(first, count, chunk);
-            for p in 0..count {
-                let rows = &chunk[p / BLOCK];
-                for (tally, row) in tallies.iter_mut().zip(rows) {
-                    tally.add(row[p % BLOCK]);
-                }
-                let first_of_it = rows[0][p % BLOCK];
-                if first_of_it > worst.0 || first_of_it.is_nan() {
-                    worst = (first_of_it, first + p);
-                }
+            magnitudes(&mut room, first, chunk);
+            let filled = count % BLOCK;
+            if filled > 0
+                && let Some(rows) = chunk.last_mut()
+            {
+                rows.iter_mut().for_each(|row| row[filled..].fill(0.0));
             }
+            Arch::new().dispatch(Add { rows: chunk, tallies: &mut tallies });
         }
-        (tallies, worst)
+        tallies.map(|tallies| tallies.joined())
     };
     let groups = count.div_ceil(GROUP);
     let place = backwards(groups, rayon::current_num_threads());
     let at_places = each_group(groups, &|at| group(place(at)));
     let mut total = [Tally::default(); N];
-    let mut worst = (0.0, 0);
     for g in 0..groups {
-        let (tallies, candidate) = &at_places[place(g)];
-        for (total, tally) in total.iter_mut().zip(tallies) {
+        for (total, tally) in total.iter_mut().zip(&at_places[place(g)]) {
             *total = total.join(tally);
         }
-        if candidate.0 > worst.0 || candidate.0.is_nan() {
-            worst = *candidate;
+    }
+    total.map(|tally| tally.norms(count))
+}
+
+/// Magnitudes added to their tallies.
+struct Add<'a, const N: usize> {
+    rows: &'a [[Row<f64>; N]],
+    tallies: &'a mut [Tallies<BLOCK>; N],
+}
+
+impl<const N: usize> WithSimd for Add<'_, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for (n, tallies) in self.tallies.iter_mut().enumerate() {
+            self.rows.iter().for_each(|rows| tallies.add(&rows[n]));
         }
     }
-    (total.map(|tally| tally.norms(count)), worst.1)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use mmsmith_solutions::{AxisAligned, AxisAlignedParameters};
+    use nalgebra::SMatrix;
+
+    /// Sums go over whole groups and what is left of one, run and row; the last of each is compared too.
+    #[test]
+    fn every_particle_is_compared_once() {
+        let exact = AxisAligned::<f64>::new(AxisAlignedParameters::default()).unwrap();
+        let material = Material::NeoHookean { lambda: 3.0, mu: 2.0 };
+        for count in [1, BLOCK, CHUNK + 5, GROUP, 2 * GROUP + CHUNK + BLOCK + 3] {
+            let X: Vec<_> = (0..count).map(|n| [0.3, n as f64 / count as f64].into()).collect();
+            let mut particles = Particles {
+                x: X.clone(),
+                v: vec![SVector::zeros(); count],
+                F: vec![SMatrix::identity(); count],
+                mass: vec![1.0; count],
+                volume: vec![1.0; count],
+                half_size: [0.1; 2].into(),
+                X,
+            };
+            let u: Vec<_> = particles.X.iter().map(|X| exact.displacement(X, 0.0)).collect();
+            particles.x.iter_mut().zip(&u).for_each(|(x, u)| *x += u);
+            let comparison = Comparison::new(&exact, &particles.X);
+            let measure = |particles: &_| comparison.measure((particles, &material), 0.0, 0.0);
+            assert!(measure(&particles).u.linf < 1e-15);
+            for p in [0, count / 2, count - 1] {
+                let x = particles.x[p];
+                particles.x[p].x += 3.0;
+                let norms = measure(&particles).u;
+                let (mean, root) = (3.0 / count as f64, 3.0 / (count as f64).sqrt());
+                assert!((norms.linf - 3.0).abs() < 1e-14, "{count} {p}");
+                assert!((norms.l1 / mean - 1.0).abs() < 1e-13, "{count} {p}");
+                assert!((norms.l2 / root - 1.0).abs() < 1e-13, "{count} {p}");
+                assert_eq!(comparison.worst_particle((&particles, &material), 0.0), p);
+                let first = particles.x[0];
+                particles.x[0].y += 5.0;
+                particles.x[p].y = f64::NAN;
+                assert!(measure(&particles).u.linf.is_nan());
+                assert_eq!(comparison.worst_particle((&particles, &material), 0.0), p);
+                particles.x[0] = first;
+                particles.x[p] = x;
+            }
+        }
+    }
 
     #[test]
     fn each_thread_s_run_goes_backwards_and_has_its_own_numbers() {

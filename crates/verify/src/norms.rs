@@ -60,6 +60,7 @@ impl<V> PerNorm<V> {
 }
 
 /// The larger of two magnitudes; unlike `f64::max`, NaN wins, so that it cannot hide.
+#[inline(always)]
 fn larger(a: f64, b: f64) -> f64 {
     if a >= b || a.is_nan() { a } else { b }
 }
@@ -95,6 +96,39 @@ impl Tally {
     }
 }
 
+/// The tallies of `N` sequences of particles side by side: every `N`-th particle belongs to the same one.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tallies<const N: usize> {
+    max: [f64; N],
+    square: [f64; N],
+    sum: [f64; N],
+}
+
+impl<const N: usize> Default for Tallies<N> {
+    fn default() -> Self {
+        let zero = [0.0; N];
+        Self { max: zero, square: zero, sum: zero }
+    }
+}
+
+impl<const N: usize> Tallies<N> {
+    /// Adds one magnitude to each.
+    #[inline(always)]
+    pub(crate) fn add(&mut self, magnitudes: &[f64; N]) {
+        for n in 0..N {
+            self.max[n] = larger(self.max[n], magnitudes[n]);
+            self.square[n] += magnitudes[n] * magnitudes[n];
+            self.sum[n] += magnitudes[n];
+        }
+    }
+
+    /// The sums of all sequences, one after the other.
+    pub(crate) fn joined(&self) -> Tally {
+        let own = |n| Tally { max: self.max[n], square: self.square[n], sum: self.sum[n] };
+        (0..N).map(own).fold(Tally::default(), |all, next| all.join(&next))
+    }
+}
+
 impl PerNorm<f64> {
     /// Norm by norm, the larger of the two.
     pub(crate) fn larger(&self, other: &Self) -> Self {
@@ -121,6 +155,18 @@ mod tests {
         assert_eq!(norms.linf, 4.0);
         assert!((norms.l2 - (25.0_f64 / 3.0).sqrt()).abs() < 1e-15);
         assert!((norms.l1 - 7.0 / 3.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn sequences_side_by_side_are_as_one() {
+        let mut tallies = Tallies::<4>::default();
+        tallies.add(&[3.0, 0.0, 4.0, 1.0]);
+        tallies.add(&[2.0, 5.0, 0.0, 0.0]);
+        let norms = tallies.joined().norms(6);
+        assert_eq!((norms.linf, norms.l1), (5.0, 2.5));
+        assert!((norms.l2 - (55.0_f64 / 6.0).sqrt()).abs() < 1e-15);
+        tallies.add(&[0.0, f64::NAN, 0.0, 0.0]);
+        assert!(tallies.joined().norms(7).linf.is_nan());
     }
 
     #[test]

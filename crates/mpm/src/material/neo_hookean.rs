@@ -26,6 +26,19 @@ impl<T: RealField + Copy> NeoHookean<T> {
         }
         self.lambda * log_jacobian(F)
     }
+
+    /// First Piola-Kirchhoff stress, from `lambda ln J`.
+    #[inline(always)]
+    fn first_piola_kirchhoff_at<const D: usize>(
+        &self,
+        F: &SMatrix<T, D, D>,
+        pressure: T,
+    ) -> SMatrix<T, D, D> {
+        let H = displacement_gradient(F);
+        let K = inverse_transpose_minus_identity(F);
+        let P = plus_diagonal((H - K) * self.mu + K * pressure, pressure);
+        if self.planted.is(Fault::TransposedLaw) { P.transpose() } else { P }
+    }
 }
 
 impl<T: RealField + Copy> Law<T> for NeoHookean<T> {
@@ -50,11 +63,15 @@ impl<T: RealField + Copy> Law<T> for NeoHookean<T> {
 
     #[inline(always)]
     fn first_piola_kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
-        let H = displacement_gradient(F);
-        let K = inverse_transpose_minus_identity(F);
-        let pressure = self.pressure(F);
-        let P = plus_diagonal((H - K) * self.mu + K * pressure, pressure);
-        if self.planted.is(Fault::TransposedLaw) { P.transpose() } else { P }
+        self.first_piola_kirchhoff_at(F, self.pressure(F))
+    }
+
+    #[inline(always)]
+    fn first_piola_kirchhoff_short<const D: usize>(
+        &self,
+        F: &SMatrix<T, D, D>,
+    ) -> SMatrix<T, D, D> {
+        self.first_piola_kirchhoff_at(F, self.lambda * log_jacobian_short(F))
     }
 }
 

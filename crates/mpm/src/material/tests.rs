@@ -116,14 +116,16 @@ fn check_side_by_side<T: RealField + Copy, const D: usize>(all: &[Matrix3<f64>])
 #[test]
 fn stresses_side_by_side_are_those_of_single_particles() {
     // Near inversion, next to the identity, flat, inside out, and no numbers at all among ordinary ones.
-    let all: Vec<Matrix3<f64>> = (0..60)
+    // The last ones all next to the identity, where shorter ways are taken.
+    let all: Vec<Matrix3<f64>> = (0..80)
         .map(|n| {
             let H = |i: usize, j: usize| {
                 (0.618 * f64::from(n) + 0.325 * (3 * i + j) as f64).fract() - 0.5
             };
-            let scale = [0.4, 1e-9, 0.7, 1.5][n as usize % 4];
+            let scale = if n < 60 { [0.4, 1e-9, 0.7, 1.5][n as usize % 4] } else { 0.1 };
             let mut F = Matrix3::from_fn(|i, j| f64::from(u8::from(i == j)) + scale * H(i, j));
             match n % 10 {
+                _ if n >= 60 => {}
                 5 => F.column_mut(0).fill(0.0),
                 6 => F[(0, 0)] = f64::INFINITY,
                 7 => F[(0, 0)] = f64::NAN,

@@ -107,9 +107,10 @@ impl<const D: usize> FrameData<D> {
             [(self.u[p] - exact.u).norm(), v, F, P, F_turned, P_turned]
         };
         let velocity_time = self.v.as_ref().map_or(time, |(_, time)| *time);
-        let magnitudes = |first: usize, count: usize, magnitudes: &mut [[Row<f64>; 6]]| {
-            let mut runs = [StateRun::zero(); RUNS];
+        let room = || [StateRun::zero(); RUNS];
+        let magnitudes = |runs: &mut [_; RUNS], first: usize, magnitudes: &mut [[Row<f64>; 6]]| {
             let runs = &mut runs[..magnitudes.len()];
+            let count = (runs.len() * BLOCK).min(self.X.len() - first);
             // Other frames may have their particles in another order, or others: nothing is worth keeping.
             let X = &self.X[first..first + count];
             exact.state_at(X).evaluate(time, velocity_time, 0, runs);
@@ -120,7 +121,7 @@ impl<const D: usize> FrameData<D> {
                 }
             }
         };
-        let ([u, v, F, P, F_turned, P_turned], _) = over_particles(self.X.len(), magnitudes);
+        let [u, v, F, P, F_turned, P_turned] = over_particles(self.X.len(), room, magnitudes);
         (PerField { u, v, F, P }, [F_turned, P_turned])
     }
 }
