@@ -6,6 +6,7 @@ use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::fault::{Fault, Planted};
 use crate::material::Law;
+use crate::octets::{gather_in_space, scatter_in_space};
 use crate::quads::{gather_runs, scatter_runs};
 use crate::simd::{Loop, Vectors, dispatch};
 use crate::step::Constants;
@@ -299,6 +300,9 @@ impl<T: RealField + Copy, const D: usize, const W: usize> Loop for Scatter<'_, T
         for k in 0..count {
             if let Some((xi, l)) = block.wide(k) {
                 scatter_wide(&xi, &l, strides, piece, first, (deposits, k));
+            } else if D == 3 {
+                let given = (deposits, k);
+                scatter_in_space(vectors, &Lane { block, k }, strides, piece, first, given);
             } else {
                 scatter(&Lane { block, k }, strides, piece, first, (deposits, k));
             }
@@ -340,6 +344,7 @@ impl<T: RealField + Copy, A: Receive<T, D>, const D: usize, const W: usize> Loop
         for k in 0..count {
             let gathered = match block.wide(k) {
                 Some((xi, l)) => gather_wide(&xi, &l, strides, nodes),
+                None if D == 3 => gather_in_space(vectors, &Lane { block, k }, strides, nodes),
                 None => gather(&Lane { block, k }, strides, nodes),
             };
             receiver.receive(k, &gathered);

@@ -59,6 +59,7 @@ pub mod fault;
 pub mod general;
 mod grid;
 mod material;
+mod octets;
 mod parallel;
 mod particles;
 mod partition;

@@ -261,6 +261,7 @@ mod tests {
     use pulp::Scalar;
 
     use super::*;
+    use crate::octets::{gather_in_space, scatter_in_space};
     use crate::transfer::{Gathered, gather, scatter};
     use crate::weights::{AxisWeights, FixedBox, Hat, Rule, index};
 
@@ -313,15 +314,15 @@ mod tests {
         let mut nodes = vec![Node::zero(); SIDE.pow(D as u32)];
         let mut one_by_one = nodes.clone();
         let first = SIDE.pow(D as u32 - 1);
-        scatter_runs(
-            Scalar::new(),
-            |k| &weights[k],
-            &strides,
-            &mut nodes[first..],
-            first,
-            &given,
-            COUNT,
-        );
+        let vectors = Scalar::new();
+        let piece = &mut nodes[first..];
+        if D < 3 {
+            scatter_runs(vectors, |k| &weights[k], &strides, piece, first, &given, COUNT);
+        } else {
+            for k in 0..COUNT {
+                scatter_in_space(vectors, &&weights[k], &strides, piece, first, (&given, k));
+            }
+        }
         for k in 0..COUNT {
             scatter(&&weights[k], &strides, &mut one_by_one[first..], first, (&given, k));
         }
@@ -333,14 +334,14 @@ mod tests {
         prop_assert!(nodes.iter().any(|node| node.mass() > 0.5));
 
         let mut gathered = [Gathered::zero(); COUNT];
-        gather_runs(
-            Scalar::new(),
-            |k| &weights[k],
-            &strides,
-            &nodes,
-            COUNT,
-            &mut &mut gathered[..],
-        );
+        if D < 3 {
+            let receiver = &mut &mut gathered[..];
+            gather_runs(vectors, |k| &weights[k], &strides, &nodes, COUNT, receiver);
+        } else {
+            for (gathered, weights) in gathered.iter_mut().zip(&weights) {
+                *gathered = gather_in_space(vectors, &weights, &strides, &nodes);
+            }
+        }
         for (gathered, weights) in gathered.iter().zip(&weights) {
             let alone = gather(&weights, &strides, &nodes);
             prop_assert!((gathered.velocity - alone.velocity).amax() < 1e-13);
@@ -351,7 +352,7 @@ mod tests {
     }
 
     proptest! {
-        /// In runs that share their nodes, and particles that share them with nobody.
+        /// In runs that share their nodes, and particles that share them with nobody; in three dimensions each alone.
         #[test]
         fn runs_of_particles_exchange_what_each_would_alone(
             places in prop::collection::vec(2.5..9.5, COUNT),
@@ -367,6 +368,8 @@ mod tests {
             compare::<_, 2, 2>(Hat, &places, &numbers)?;
             compare::<_, 1, 3>(FixedBox(SVector::repeat(l)), &places, &numbers)?;
             compare::<_, 2, 3>(FixedBox(SVector::repeat(l)), &places, &numbers)?;
+            compare::<_, 3, 2>(Hat, &places, &numbers)?;
+            compare::<_, 3, 3>(FixedBox(SVector::repeat(l)), &places, &numbers)?;
         }
     }
 }

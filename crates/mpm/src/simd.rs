@@ -262,7 +262,7 @@ pub(crate) fn dispatch(work: impl Loop) {
 mod tests {
     use std::cell::Cell;
 
-    use nalgebra::{Vector2, vector};
+    use nalgebra::SVector;
     use pulp::Scalar;
 
     use super::*;
@@ -305,14 +305,17 @@ mod tests {
         }
     }
 
-    /// The state of a square after some steps, as bits.
-    fn bits(level: Level, shape: Shape, integrator: Integrator) -> Vec<u64> {
-        let spacing = 1.0 / 12.0;
-        let grid = Grid { lower: Vector2::zeros(), spacing, cells: [12; 2], walls: [[true; 2]; 2] };
+    /// The state of a square or a cube after some steps, as bits.
+    fn bits<const D: usize>(level: Level, shape: Shape, integrator: Integrator) -> Vec<u64> {
+        let cells = if D == 3 { 6 } else { 12 };
+        let spacing = 1.0 / cells as f64;
+        let walls = [[true; 2]; D];
+        let grid = Grid { lower: SVector::zeros(), spacing, cells: [cells; D], walls };
         let mut particles = Particles::lattice(&grid, 2, 1.0, |_| true);
         for (v, X) in particles.v.iter_mut().zip(&particles.X) {
-            let angle = X * std::f64::consts::PI;
-            *v = vector![angle[0].sin() * angle[1].cos(), angle[1].sin()] * 20.0;
+            let angle: SVector<f64, D> = X * std::f64::consts::PI;
+            // Along each axis it changes with the next one too, for gradients off the diagonal.
+            *v = SVector::from_fn(|a, _| 20.0 * angle[a].sin() * angle[(a + 1) % D].cos());
         }
         let material = Material::NeoHookean { lambda: 5769.0, mu: 3846.0 };
         let settings =
@@ -378,13 +381,15 @@ mod tests {
             (Shape::Linear, Integrator::Musl),
             (Shape::Gimp, Integrator::Usf),
         ] {
-            let plain = bits(Level::Scalar, shape, integrator);
-            for level in Level::all() {
-                assert!(
-                    bits(level, shape, integrator) == plain,
-                    "{shape:?} {integrator:?} {level:?}"
-                );
+            fn check<const D: usize>(shape: Shape, integrator: Integrator) {
+                let plain = bits::<D>(Level::Scalar, shape, integrator);
+                for level in Level::all() {
+                    let same = bits::<D>(level, shape, integrator) == plain;
+                    assert!(same, "{D} {shape:?} {integrator:?} {level:?}");
+                }
             }
+            check::<2>(shape, integrator);
+            check::<3>(shape, integrator);
         }
     }
 }

@@ -90,7 +90,7 @@ pub(crate) struct Gathered<T, const D: usize> {
 impl<T: RealField + Copy, const D: usize> Gathered<T, D> {
     /// From interpolated values of nodes and their gradients, in the order in which nodes have them.
     #[inline(always)]
-    pub(crate) fn new<const Q: usize>(level: &[T; Q], slope: &[[T; Q]; D]) -> Self {
+    pub(crate) fn new<const Q: usize, const R: usize>(level: &[T; Q], slope: &[[T; R]; D]) -> Self {
         Self {
             velocity: SVector::from_fn(|i, _| level[i]),
             acceleration: SVector::from_fn(|i, _| level[D + i]),
