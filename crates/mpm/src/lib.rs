@@ -58,6 +58,8 @@ mod error;
 pub mod fault;
 pub mod general;
 mod grid;
+#[cfg(all(debug_assertions, not(test)))]
+mod instances;
 mod material;
 mod octets;
 mod parallel;
