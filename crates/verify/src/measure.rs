@@ -52,15 +52,13 @@ impl<'a, const D: usize> Comparison<'a, D> {
     ) -> usize {
         let count = observed.0.len();
         let mut room = Room::zero();
-        let mut chunk = [[[0.0; BLOCK]; 4]; RUNS];
+        let mut magnitudes = [[[0.0; BLOCK]; 4]];
         let mut worst = (0.0, 0);
-        for first in (0..count).step_by(CHUNK) {
-            let count = CHUNK.min(count - first);
-            let chunk = &mut chunk[..count.div_ceil(BLOCK)];
-            self.magnitudes(observed, (time, time), &mut room, first, chunk);
-            for (n, &error) in chunk.iter().flat_map(|rows| &rows[0]).take(count).enumerate() {
+        for first in (0..count).step_by(BLOCK) {
+            self.magnitudes(observed, (time, time), &mut room, first, &mut magnitudes);
+            for (p, &error) in (first..count).zip(&magnitudes[0][0]) {
                 if error > worst.0 || (error.is_nan() && !worst.0.is_nan()) {
-                    worst = (error, first + n);
+                    worst = (error, p);
                 }
             }
         }

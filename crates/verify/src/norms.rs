@@ -68,18 +68,12 @@ fn larger(a: f64, b: f64) -> f64 {
 /// Sums over one group of particles at one step.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Tally {
-    pub(crate) max: f64,
+    max: f64,
     square: f64,
     sum: f64,
 }
 
 impl Tally {
-    pub(crate) fn add(&mut self, magnitude: f64) {
-        self.max = larger(self.max, magnitude);
-        self.square += magnitude * magnitude;
-        self.sum += magnitude;
-    }
-
     /// Appends the sums of the next group.
     pub(crate) fn join(&self, next: &Self) -> Self {
         Self {
@@ -146,12 +140,12 @@ mod tests {
 
     #[test]
     fn norms_of_a_known_set() {
-        let mut first = Tally::default();
-        first.add(3.0);
-        let mut second = Tally::default();
-        second.add(4.0);
-        second.add(0.0);
-        let norms = first.join(&second).norms(3);
+        let mut first = Tallies::<1>::default();
+        first.add(&[3.0]);
+        let mut second = Tallies::<1>::default();
+        second.add(&[4.0]);
+        second.add(&[0.0]);
+        let norms = first.joined().join(&second.joined()).norms(3);
         assert_eq!(norms.linf, 4.0);
         assert!((norms.l2 - (25.0_f64 / 3.0).sqrt()).abs() < 1e-15);
         assert!((norms.l1 - 7.0 / 3.0).abs() < 1e-15);
@@ -172,9 +166,9 @@ mod tests {
     #[test]
     fn not_a_number_is_never_hidden_by_a_number() {
         for magnitudes in [[1.0, f64::NAN], [f64::NAN, 1.0]] {
-            let mut tally = Tally::default();
-            magnitudes.iter().for_each(|m| tally.add(*m));
-            assert!(tally.norms(2).linf.is_nan());
+            let mut tallies = Tallies::<1>::default();
+            magnitudes.iter().for_each(|m| tallies.add(&[*m]));
+            assert!(tallies.joined().norms(2).linf.is_nan());
         }
         assert!(larger(f64::NAN, 2.0).is_nan() && larger(2.0, f64::NAN).is_nan());
     }

@@ -16,7 +16,7 @@ use serde::Serialize;
 use crate::case::{Arithmetic, Case, CaseError, Progress, Status, set_up};
 use crate::dimension::in_arithmetic;
 use crate::general::Precision;
-use crate::norms::{PerField, PerNorm, Tally};
+use crate::norms::{PerField, PerNorm, Tallies};
 use crate::order::Order;
 use crate::plan::{MOST_STEPS, prepare};
 use crate::study::{StudyError, orders_of};
@@ -239,9 +239,9 @@ fn difference<const R: usize, const C: usize>(
     a: &[SMatrix<f64, R, C>],
     b: &[SMatrix<f64, R, C>],
 ) -> PerNorm<f64> {
-    let mut tally = Tally::default();
-    a.iter().zip(b).for_each(|(a, b)| tally.add((a - b).norm()));
-    tally.norms(a.len())
+    let mut tally = Tallies::<1>::default();
+    a.iter().zip(b).for_each(|(a, b)| tally.add(&[(a - b).norm()]));
+    tally.joined().norms(a.len())
 }
 
 fn not_known() -> PerField<PerNorm<f64>> {
