@@ -113,10 +113,9 @@ impl Vectors for Scalar {}
 #[cfg(target_arch = "x86_64")]
 mod x86 {
     use super::{Any, Quad, RealField, Scalar, Vectors, same};
-    use bytemuck::{AnyBitPattern, NoUninit, bytes_of, pod_read_unaligned};
+    use bytemuck::{AnyBitPattern, NoUninit, bytes_of, must_cast, pod_read_unaligned};
     use pulp::x86::{V3, V4};
     use std::arch::x86_64::{__m128, __m256d};
-    use zerocopy::transmute;
 
     /// The instructions for an operation in double and in single precision, if `T` is one of them.
     macro_rules! instructions {
@@ -200,22 +199,22 @@ mod x86 {
 
     #[inline(always)]
     fn double<T: RealField + Copy>(a: Quad<T>) -> Option<__m256d> {
-        same::<_, Quad<f64>>(a).map(|Quad(a)| transmute!(a))
+        same::<_, Quad<f64>>(a).map(|Quad(a)| must_cast(a))
     }
 
     #[inline(always)]
     fn single<T: RealField + Copy>(a: Quad<T>) -> Option<__m128> {
-        same::<_, Quad<f32>>(a).map(|Quad(a)| transmute!(a))
+        same::<_, Quad<f32>>(a).map(|Quad(a)| must_cast(a))
     }
 
     #[inline(always)]
     fn from_double<T: RealField + Copy>(a: __m256d) -> Option<Quad<T>> {
-        same(Quad::<f64>(transmute!(a)))
+        same(Quad::<f64>(must_cast(a)))
     }
 
     #[inline(always)]
     fn from_single<T: RealField + Copy>(a: __m128) -> Option<Quad<T>> {
-        same(Quad::<f32>(transmute!(a)))
+        same(Quad::<f32>(must_cast(a)))
     }
 
     /// For what cannot be.

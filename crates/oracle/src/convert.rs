@@ -1,6 +1,6 @@
 //! Exact rationals to binary floating point of any precision, and back.
 
-use astro_float::{BigFloat, RoundingMode, Sign, Word};
+use astro_float_num::{BigFloat, RoundingMode, Sign, Word};
 use mmsmith_expr::Rational;
 use num_bigint::{BigInt, BigUint};
 use num_traits::Zero;

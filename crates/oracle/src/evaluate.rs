@@ -2,7 +2,7 @@
 
 use crate::convert::{LARGEST_EXPONENT, to_float, to_rational};
 use crate::scientific;
-use astro_float::{BigFloat, Consts, RoundingMode};
+use astro_float_num::{BigFloat, Consts, RoundingMode};
 use mmsmith_expr::{Expr, Function, Graph, Node, Rational};
 use num_integer::Integer;
 use num_traits::{One, Pow, Signed, ToPrimitive, Zero};
