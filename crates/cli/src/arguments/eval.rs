@@ -1,0 +1,23 @@
+//! Options of `mms eval`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::shared::ParameterOptions;
+
+#[derive(Args)]
+pub(crate) struct EvalOptions {
+    /// The solution, by name, or a specification file (SPEC.toml)
+    #[arg(value_name = "NAME|SPEC.toml")]
+    pub(crate) name: String,
+    /// The points: [ { "X": [0.1, 0.2], "t": 0.3, "par": { "A": 0.05 } }, ... ]; "par" may be left out, other keys
+    /// are ignored
+    #[arg(long, value_name = "IN.json")]
+    pub(crate) points: PathBuf,
+    #[command(flatten)]
+    pub(crate) parameters: ParameterOptions,
+    /// Write the fields to this JSON file instead of standard output
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
+}

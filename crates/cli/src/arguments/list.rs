@@ -1,0 +1,12 @@
+//! Options of `mms list`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+#[derive(Args)]
+pub(crate) struct ListOptions {
+    /// Write the list to this JSON file too
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
+}

@@ -1,0 +1,20 @@
+//! Options of `mms reproduce`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::values::{seconds, thread_count};
+
+#[derive(Args)]
+pub(crate) struct ReproduceOptions {
+    /// Write everything to this folder
+    #[arg(long, value_name = "DIR", default_value = "target/reproduce")]
+    pub(crate) out: PathBuf,
+    /// Time for the comparison of schemes by error and cost, for each problem, such as 8s or 2m
+    #[arg(long, value_name = "TIME", default_value = "8s", value_parser = seconds)]
+    pub(crate) budget: f64,
+    /// Number of threads; all cores when left out
+    #[arg(long, value_name = "N", value_parser = thread_count)]
+    pub(crate) threads: Option<usize>,
+}

@@ -1,0 +1,39 @@
+//! Options of `mms run`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::scheme::SchemeOptions;
+use super::values::positive_count;
+
+#[derive(Args)]
+pub(crate) struct RunOptions {
+    /// The solution, by name, or a specification file (SPEC.toml)
+    #[arg(value_name = "NAME|SPEC.toml")]
+    pub(crate) name: String,
+    /// Number of cells along the solution's cell length
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser = positive_count)]
+    pub(crate) cells: usize,
+    #[command(flatten)]
+    pub(crate) scheme: SchemeOptions,
+    /// Write particle files (.vtu, and a .pvd that lists them) to this folder
+    #[arg(long, value_name = "DIR")]
+    pub(crate) vtk: Option<PathBuf>,
+    /// Number of particle files, spread evenly from the first state to the last
+    #[arg(long, value_name = "N", default_value_t = 20, requires = "vtk", value_parser = clap::value_parser!(u64).range(2..))]
+    pub(crate) frames: u64,
+    /// Write all that the next step needs to this folder every so often; after a kill, `mms resume DIR` goes on from there
+    #[arg(long, value_name = "DIR")]
+    pub(crate) checkpoint: Option<PathBuf>,
+    /// Steps between checkpoints
+    #[arg(long, value_name = "N", default_value_t = 1000, requires = "checkpoint", value_parser = clap::value_parser!(u64).range(1..))]
+    pub(crate) every: u64,
+    /// Write errors of u, energies and momentum of the particles and of the exact motion over time to this file as
+    /// comma-separated values, at up to 1000 evenly spread steps; --json then has them too
+    #[arg(long, value_name = "FILE", conflicts_with = "checkpoint")]
+    pub(crate) history: Option<PathBuf>,
+    /// Draw the energy gained and lost against the exact motion over time to this SVG file
+    #[arg(long, value_name = "FILE", conflicts_with = "checkpoint")]
+    pub(crate) plot: Option<PathBuf>,
+}

@@ -1,0 +1,259 @@
+//! Options that choose a scheme, shared by all commands that simulate.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use mmsmith_solutions::AnySolution;
+use mmsmith_verify as verify;
+use serde::Serialize;
+
+use super::shared::{ParameterOptions, parsed};
+use super::values::{finite_number, positive_count, positive_number, thread_count, transfer};
+
+/// How to simulate; what every measuring command shares.
+#[derive(Args, Clone)]
+pub(crate) struct SchemeOptions {
+    /// Weights between particles and grid
+    #[arg(long, value_enum, default_value_t = Shape::Gimp)]
+    pub(crate) shape: Shape,
+    /// Configuration that the weights belong to: updated in each step, or the reference one throughout
+    #[arg(long, value_enum, default_value_t = Frame::Updated)]
+    pub(crate) frame: Frame,
+    /// Mass matrix of the total frame; consistent where nothing is said
+    #[arg(long, value_enum)]
+    pub(crate) mass: Option<Mass>,
+    /// Order of the symmetric composition of leapfrog in the total frame; where nothing is said 4, and 6 for splines of degree 4 and 5
+    #[arg(long, value_enum)]
+    pub(crate) composition: Option<Composition>,
+    /// Where the particles lie; Gauss points in the total frame only, body-fitted ones in the updated frame only. Where nothing is
+    /// said a lattice, and Gauss points in the total frame for a body that is not held between sliding walls
+    #[arg(long, value_enum)]
+    pub(crate) layout: Option<Layout>,
+    /// Coordinates of the background grid; where nothing is said polar for rings and spherical for shells in the total frame
+    #[arg(long, value_enum)]
+    pub(crate) grid: Option<Grid>,
+    /// Speed that the CFL number refers to
+    #[arg(long, value_enum, default_value_t = CflSpeed::Bar)]
+    pub(crate) cfl_speed: CflSpeed,
+    /// Time integrator
+    #[arg(long, value_enum, default_value_t = Integrator::Cd)]
+    pub(crate) integrator: Integrator,
+    /// Velocities from the grid to the particles: flip, pic, apic, or xpic2, xpic3, ... with a filter of that order
+    #[arg(long, value_name = "NAME", default_value = "flip", value_parser = transfer)]
+    pub(crate) transfer: verify::Transfer,
+    /// First velocity of the cd integrator; others ignore it
+    #[arg(long, value_enum, default_value_t = Start::Halved)]
+    pub(crate) start: Start,
+    /// Particles in a cell along each direction; where nothing is said 2, and one more than the degree with Gauss points
+    #[arg(long, value_name = "N", value_parser = positive_count)]
+    pub(crate) ppc: Option<usize>,
+    /// Time step times wave speed over grid spacing
+    #[arg(long, value_name = "X", default_value_t = 0.4, allow_negative_numbers = true, value_parser = positive_number)]
+    pub(crate) cfl: f64,
+    /// End time in periods of the solution
+    #[arg(long, value_name = "X", default_value_t = 1.0, allow_negative_numbers = true, value_parser = positive_number)]
+    pub(crate) periods: f64,
+    /// How much of a ring or a shell is modelled; the part between planes of symmetry where there are such
+    #[arg(long, value_enum)]
+    pub(crate) extent: Option<Extent>,
+    /// Shift of the particles' lattice along every axis, in units of their distance, from -0.5 to 0.5
+    #[arg(long, value_name = "X", default_value_t = 0.0, allow_negative_numbers = true, value_parser = finite_number)]
+    pub(crate) offset: f64,
+    /// Precision of the solver; errors are always measured in f64
+    #[arg(long, value_enum, default_value_t = Precision::F64)]
+    pub(crate) precision: Precision,
+    #[command(flatten)]
+    pub(crate) parameters: ParameterOptions,
+    /// Number of threads; all cores when left out
+    #[arg(long, value_name = "N", value_parser = thread_count)]
+    pub(crate) threads: Option<usize>,
+    /// Write the result to this JSON file
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
+}
+
+impl SchemeOptions {
+    /// What holds where nothing is said, with the given scheme.
+    pub(crate) fn usual(shape: Shape, integrator: Integrator) -> Self {
+        Self { shape, integrator, ..parsed(&[]) }
+    }
+
+    /// The same with what suits a solution where nothing is said.
+    pub(crate) fn for_solution(&self, exact: &AnySolution<f64>) -> Self {
+        let mut settled = self.clone();
+        if self.frame == Frame::Total {
+            settled.layout.get_or_insert(match verify::TotalScheme::layout_for(exact) {
+                verify::Layout::Lattice => Layout::Lattice,
+                verify::Layout::Gauss => Layout::Gauss,
+            });
+            settled.grid.get_or_insert(match verify::TotalScheme::coordinates_for(exact) {
+                verify::Coordinates::Cartesian => Grid::Cartesian,
+                verify::Coordinates::Polar => Grid::Polar,
+                verify::Coordinates::Spherical => Grid::Spherical,
+            });
+        }
+        settled
+    }
+
+    /// Where the particles lie.
+    pub(crate) fn layout(&self) -> Layout {
+        self.layout.unwrap_or(Layout::Lattice)
+    }
+
+    /// Coordinates of the background grid.
+    pub(crate) fn grid(&self) -> Grid {
+        self.grid.unwrap_or(Grid::Cartesian)
+    }
+
+    /// Particles in a cell along each direction.
+    pub(crate) fn ppc(&self) -> usize {
+        const USUAL: usize = 2;
+        self.ppc.unwrap_or_else(|| match (self.layout(), self.shape) {
+            (Layout::Gauss, Shape::Bspline3) => 4,
+            (Layout::Gauss, Shape::Bspline4) => 5,
+            (Layout::Gauss, Shape::Bspline5) => 6,
+            (Layout::Gauss, Shape::Bspline2) => 3,
+            _ => USUAL,
+        })
+    }
+}
+
+/// Weights.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Shape {
+    /// Hat functions at the particle's point
+    Linear,
+    /// GIMP weights of fixed size
+    Ugimp,
+    /// GIMP weights that follow the particle's stretch
+    Gimp,
+    /// Quadratic splines
+    Bspline2,
+    /// Cubic splines
+    Bspline3,
+    /// Quartic splines (total frame)
+    Bspline4,
+    /// Quintic splines (total frame)
+    Bspline5,
+    /// Parallelograms that deform with the particle
+    Cpdi,
+    /// Quadrilaterals whose corners neighbours share (one and two dimensions)
+    Cpdi2,
+}
+
+/// Configurations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Frame {
+    /// The current one, weights anew in each step
+    Updated,
+    /// The reference configuration, weights once
+    Total,
+}
+
+/// Layouts of particles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Layout {
+    /// Centres of equal parts of a cell
+    Lattice,
+    /// Polar cells of equal angle that end at the rims (rings, updated frame)
+    BodyFitted,
+    /// Gauss-Legendre points (total frame)
+    Gauss,
+}
+
+/// Orders in time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Composition {
+    /// Leapfrog
+    #[value(name = "2")]
+    Order2,
+    /// Five stages
+    #[value(name = "4")]
+    Order4,
+    /// Nine stages
+    #[value(name = "6")]
+    Order6,
+}
+
+choices!(
+    /// Time integrators.
+    Integrator => verify::Integrator {
+        /// Update stress first
+        Usf,
+        /// Update stress last
+        Usl,
+        /// Update stress last, with the velocity projected again
+        Musl,
+        /// Stress updated by halves, before the forces and after
+        Usavg,
+        /// Centred differences
+        Cd,
+    }
+);
+
+choices!(
+    /// Starts of centred differences.
+    Start => verify::Start {
+        /// The exact velocity half a step before time zero
+        Exact,
+        /// Velocity and acceleration at time zero
+        Data,
+        /// Velocity at time zero, first acceleration halved
+        Halved,
+    }
+);
+
+choices!(
+    /// Mass matrices.
+    Mass => verify::MassMatrix {
+        /// Row sums on the diagonal
+        Lumped,
+        /// Integrated over the particles
+        Consistent,
+    }
+);
+
+choices!(
+    /// Coordinates of background grids.
+    Grid => verify::Coordinates {
+        /// Cartesian
+        Cartesian,
+        /// Radius and angle
+        Polar,
+        /// Radius, polar angle and azimuth, without a cone of 45 degrees about the third axis
+        Spherical,
+    }
+);
+
+choices!(
+    /// Speeds of CFL numbers.
+    CflSpeed => verify::CflSpeed {
+        /// That of waves in a bar, sqrt(E/rho0), unless the solution has its own
+        Bar,
+        /// That of P-waves in the undeformed solid, sqrt((lambda + 2 mu)/rho0)
+        PWave,
+    }
+);
+
+choices!(
+    /// How much of a ring or a shell.
+    Extent => verify::Extent {
+        /// The part between the planes of symmetry
+        Quarter,
+        /// All of it
+        Full,
+    }
+);
+
+/// Floating-point precision.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Precision {
+    /// Double
+    F64,
+    /// Single
+    F32,
+}

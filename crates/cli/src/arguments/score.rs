@@ -1,0 +1,67 @@
+//! Options of `mms score`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use mmsmith_verify as verify;
+use serde::Serialize;
+
+use super::shared::ParameterOptions;
+use super::values::{finite_number, positive_count, positive_number, role, thread_count};
+
+/// Where another solver's output is, and how it is to be read.
+#[derive(Args)]
+pub(crate) struct ScoreOptions {
+    /// The solution, by name, or a specification file (SPEC.toml)
+    #[arg(value_name = "NAME|SPEC.toml")]
+    pub(crate) name: String,
+    /// Recordings, one for each resolution: a .pvd list, a folder (with one .pvd list, or of frames), or .vtu, .vtp, .vtk
+    /// or .csv files; those of one folder are the frames of one recording, unless --cells or --h has a value for each
+    #[arg(value_name = "FILES", required = true)]
+    pub(crate) files: Vec<PathBuf>,
+    /// Each file is a recording of its own
+    #[arg(long)]
+    pub(crate) each: bool,
+    /// What an array is that has no usual name; repeatable. Roles: displacement, velocity, deformation_gradient,
+    /// first_piola_kirchhoff, reference_position, id
+    #[arg(long, value_name = "ROLE=NAME", value_parser = role)]
+    pub(crate) map: Vec<(verify::Role, String)>,
+    /// What the points of the files are
+    #[arg(long, value_enum, default_value_t = Points::Auto)]
+    pub(crate) points: Points,
+    /// The time of single frames that do not tell it
+    #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite_number)]
+    pub(crate) time: Option<f64>,
+    /// By how much velocities lag behind their frame's time: half a time step for staggered schemes
+    #[arg(long, value_name = "DT", default_value_t = 0.0, allow_negative_numbers = true, value_parser = finite_number)]
+    pub(crate) velocity_lag: f64,
+    /// The time in which frames are expected, in periods of the solution
+    #[arg(long, value_name = "X", default_value_t = 1.0, allow_negative_numbers = true, value_parser = positive_number)]
+    pub(crate) periods: f64,
+    /// Cell counts along the solution's cell length, one for each recording
+    #[arg(long, value_name = "N,...", value_delimiter = ',', value_parser = positive_count, conflicts_with = "h")]
+    pub(crate) cells: Vec<usize>,
+    /// Mesh sizes, one for each recording; estimated from the particles when neither is given
+    #[arg(long, value_name = "H,...", value_delimiter = ',', allow_negative_numbers = true, value_parser = positive_number)]
+    pub(crate) h: Vec<f64>,
+    #[command(flatten)]
+    pub(crate) parameters: ParameterOptions,
+    /// Number of threads; all cores when left out
+    #[arg(long, value_name = "N", value_parser = thread_count)]
+    pub(crate) threads: Option<usize>,
+    /// Write the result to this JSON file
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
+}
+
+choices!(
+    /// What the points of files are.
+    Points => verify::Points {
+        /// Reference positions if they stay while displacements change, else current ones
+        Auto,
+        /// Current positions
+        Current,
+        /// Reference positions
+        Reference,
+    }
+);

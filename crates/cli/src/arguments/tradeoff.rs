@@ -1,0 +1,106 @@
+//! Options of `mms tradeoff`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use mmsmith_verify as verify;
+use serde::Serialize;
+
+use super::shared::{KeepOptions, ParameterOptions, parsed};
+use super::values::{positive_number, seconds, thread_count};
+
+#[derive(Args)]
+pub(crate) struct TradeoffOptions {
+    /// The solution, by name, or a specification file (SPEC.toml)
+    #[arg(value_name = "NAME|SPEC.toml")]
+    pub(crate) name: String,
+    /// Time for everything, such as 90s, 2m or 1h; it is used up, for timings repeated if for nothing better
+    #[arg(long, value_name = "TIME", default_value = "2m", value_parser = seconds)]
+    pub(crate) budget: f64,
+    /// Name the cheapest setting with at most this error, and run it once more to prove it; exit status 1 if there is none
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive_number)]
+    pub(crate) tolerance: Option<f64>,
+    /// Name the most accurate setting whose steps take at most this time, and run it once more to prove it; exit status 1
+    /// if there is none
+    #[arg(long, value_name = "TIME", value_parser = seconds)]
+    pub(crate) time: Option<f64>,
+    /// Field whose error counts. Errors of u are divided by the amplitude A where the solution has one
+    #[arg(long, value_enum, default_value_t = Field::U, ignore_case = true)]
+    pub(crate) field: Field,
+    /// Norm of the error
+    #[arg(long, value_enum, default_value_t = Norm::Linf)]
+    pub(crate) norm: Norm,
+    /// Cost that the error is held against
+    #[arg(long, value_enum, default_value_t = Against::Wall)]
+    pub(crate) against: Against,
+    /// End time in periods of the solution
+    #[arg(long, value_name = "X", default_value_t = 1.0, allow_negative_numbers = true, value_parser = positive_number)]
+    pub(crate) periods: f64,
+    /// Number of threads; 1 when left out, and all cores for comparison
+    #[arg(long, value_name = "N", value_parser = thread_count)]
+    pub(crate) threads: Option<usize>,
+    #[command(flatten)]
+    pub(crate) parameters: ParameterOptions,
+    /// Write the result to this JSON file
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
+    /// Write all settings to this file as comma-separated values
+    #[arg(long, value_name = "FILE")]
+    pub(crate) csv: Option<PathBuf>,
+    /// Draw error against cost, with the front, to this SVG file
+    #[arg(long, value_name = "FILE")]
+    pub(crate) plot: Option<PathBuf>,
+    /// Write a page of advice to this Markdown file, with the figure behind each sentence
+    #[arg(long, value_name = "FILE")]
+    pub(crate) advice: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) kept: KeepOptions,
+}
+
+/// Fields whose error is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+pub(crate) enum Field {
+    /// Displacement
+    #[serde(rename = "u")]
+    U,
+    /// Velocity
+    #[serde(rename = "v")]
+    V,
+    /// Deformation gradient
+    F,
+    /// First Piola-Kirchhoff stress
+    P,
+}
+
+/// Norms.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Norm {
+    /// Largest over particles
+    Linf,
+    /// Root of the mean square
+    L2,
+    /// Mean
+    L1,
+}
+
+choices!(
+    /// Costs.
+    Against => verify::Against {
+        /// Wall-clock time of the steps
+        Wall,
+        /// Processor time of the steps
+        Cpu,
+        /// Number of steps
+        Steps,
+        /// Memory, estimated
+        Memory,
+    }
+);
+
+impl TradeoffOptions {
+    /// What holds where nothing is said.
+    pub(crate) fn usual(name: &str, budget: f64) -> Self {
+        Self { budget, ..parsed(&[name]) }
+    }
+}

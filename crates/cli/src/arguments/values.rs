@@ -1,0 +1,125 @@
+//! Values of options, read from text; every refusal says which values are right.
+
+use mmsmith_verify as verify;
+
+pub(super) fn positive_count(text: &str) -> Result<usize, String> {
+    match text.trim().parse() {
+        Ok(0) | Err(_) => Err("it must be a whole number, at least 1".into()),
+        Ok(count) => Ok(count),
+    }
+}
+
+pub(super) fn sample_count(text: &str) -> Result<usize, String> {
+    positive_count(text)
+        .ok()
+        .filter(|count| *count <= 10_000_000)
+        .ok_or_else(|| "it must be a whole number from 1 to 10000000".into())
+}
+
+pub(super) fn thread_count(text: &str) -> Result<usize, String> {
+    positive_count(text)
+        .ok()
+        .filter(|count| *count <= 1024)
+        .ok_or_else(|| "it must be a whole number from 1 to 1024".into())
+}
+
+pub(super) fn positive_number(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("it must be a positive number, such as 0.4".into()),
+    }
+}
+
+/// A time: seconds, or with a unit.
+pub(super) fn seconds(text: &str) -> Result<f64, String> {
+    let text = text.trim();
+    let units = [("ms", 1e-3), ("s", 1.0), ("m", 60.0), ("h", 3600.0)];
+    let (number, unit) = units
+        .into_iter()
+        .find_map(|(unit, factor)| Some((text.strip_suffix(unit)?, factor)))
+        .unwrap_or((text, 1.0));
+    positive_number(number)
+        .map(|number| number * unit)
+        .map_err(|_| "it must be a positive time, such as 90s, 2m or 1h".into())
+}
+
+pub(super) fn finite_number(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err("it must be a finite number, such as 0.01".into()),
+    }
+}
+
+pub(super) fn transfer(text: &str) -> Result<verify::Transfer, String> {
+    /// Each order costs a pass over the particles, and beyond some tens nothing is left to filter.
+    const MOST: u32 = 100;
+    match text {
+        "flip" => Ok(verify::Transfer::Flip),
+        "pic" => Ok(verify::Transfer::Pic),
+        "apic" => Ok(verify::Transfer::Apic),
+        _ => text
+            .strip_prefix("xpic")
+            .filter(|order| order.bytes().all(|digit| digit.is_ascii_digit()))
+            .and_then(|order| order.parse().ok())
+            .filter(|order| (1..=MOST).contains(order))
+            .map(verify::Transfer::Xpic)
+            .ok_or_else(|| format!("it must be flip, pic, apic, or xpic1 to xpic{MOST}")),
+    }
+}
+
+pub(super) fn role(text: &str) -> Result<(verify::Role, String), String> {
+    let roles = || verify::Role::ALL.map(verify::Role::name).join(", ");
+    let form = || format!("expected ROLE=NAME, such as displacement=disp; roles: {}", roles());
+    let (role, name) = text.split_once('=').ok_or_else(form)?;
+    let known = verify::Role::ALL.into_iter().find(|known| known.name() == role.trim());
+    match known {
+        Some(known) if !name.is_empty() => Ok((known, name.to_owned())),
+        _ => Err(form()),
+    }
+}
+
+pub(super) fn variation(text: &str) -> Result<(String, Vec<String>), String> {
+    let form = || "expected NAME=VALUE,VALUE,..., such as nu=0,0.3,0.49".to_owned();
+    let (name, values) = text.split_once('=').ok_or_else(form)?;
+    let values: Vec<_> = values.split(',').map(|value| value.trim().to_owned()).collect();
+    if name.trim().is_empty() || values.iter().any(String::is_empty) {
+        return Err(form());
+    }
+    Ok((name.trim().to_owned(), values))
+}
+
+pub(super) fn assignment(text: &str) -> Result<(String, f64), String> {
+    let form = "expected NAME=VALUE, such as A=0.05";
+    let (name, value) = text.split_once('=').ok_or(form)?;
+    let name = name.trim();
+    if name.is_empty() {
+        return Err(form.into());
+    }
+    match value.trim().parse::<f64>() {
+        Ok(number) if number.is_finite() => Ok((name.to_owned(), number)),
+        _ => Err(format!("'{value}' is not a finite number; {form}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_that_make_no_sense_are_refused() {
+        for text in ["0", "-1", "2.5", "", "x", "99999999999999999999999"] {
+            assert!(positive_count(text).is_err(), "{text}");
+        }
+        for text in ["0", "-0.4", "nan", "inf", "1e999", "", "0,4"] {
+            assert!(positive_number(text).is_err(), "{text}");
+        }
+        for text in ["A", "=1", "A=", "A=x", "A=nan", "A=inf"] {
+            assert!(assignment(text).is_err(), "{text}");
+        }
+        for text in ["xpic", "xpic0", "xpic101", "xpic+2", "xpic2.5", "PIC", ""] {
+            assert!(transfer(text).is_err(), "{text}");
+        }
+        assert_eq!(transfer("xpic3"), Ok(verify::Transfer::Xpic(3)));
+        assert_eq!(assignment("A = 5e-2"), Ok(("A".into(), 0.05)));
+    }
+}
