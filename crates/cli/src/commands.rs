@@ -37,7 +37,7 @@ use serde_json::{Value, json};
 
 use crate::arguments::{Extent, Frame, Grid, Precision, SchemeOptions};
 use crate::library::Selection;
-use crate::{memory, terminal};
+use crate::{memory, number, terminal};
 
 /// A solution in the precisions that a simulation of it needs.
 struct Model {
@@ -157,16 +157,14 @@ fn caption(selection: &Selection, options: &SchemeOptions, extent: Option<Extent
     };
     let start = start + &scheme::additions(options);
     let extent = extent.map(|extent| format!(", {}", word(&extent))).unwrap_or_default();
-    let parameters: Vec<_> =
-        selection.parameters().iter().map(|(name, value)| format!("{name} = {value}")).collect();
     format!(
         "{} ({}){extent}: {} + {}{start}, {} particles per cell and direction, {} period(s), {}, {} thread(s)\n",
         selection.name(),
-        parameters.join(", "),
+        selection.told_parameters(),
         word(&options.shape),
         word(&options.integrator),
         options.ppc(),
-        options.periods,
+        number::exact(options.periods),
         word(&options.precision),
         rayon::current_num_threads(),
     )

@@ -9,6 +9,8 @@ use mmsmith_interpret::interpret_fields;
 use mmsmith_solutions::{AnySolution, CATALOGUE, Description, Real, build};
 use mmsmith_spec::{Fields, Spec, nearest};
 
+use crate::number;
+
 /// A solution with its parameter values.
 #[derive(Clone)]
 pub(crate) struct Selection {
@@ -120,6 +122,12 @@ impl Selection {
     pub(crate) fn parameters(&self) -> &BTreeMap<String, f64> {
         &self.parameters
     }
+
+    /// The values of all parameters in words: `A = 0.1, E = 10000`.
+    pub(crate) fn told_parameters(&self) -> String {
+        let told = |(name, value): (&String, &f64)| format!("{name} = {}", number::exact(*value));
+        self.parameters.iter().map(told).collect::<Vec<_>>().join(", ")
+    }
 }
 
 /// A solution to check, wherever it comes from.
@@ -205,4 +213,16 @@ fn find(name: &str) -> Result<&'static Description> {
         .map(|known| format!("; did you mean '{known}'?"))
         .unwrap_or_default();
     bail!("there is no solution '{name}'{nearest} (there are: {})", names.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parameters_far_from_one_are_told_with_an_exponent() {
+        let selection = Selection::new("axis-aligned-1d", &[("A".to_owned(), 1e-300)]);
+        let told = selection.expect("the library has it").told_parameters();
+        assert!(told.starts_with("A = 1e-300, E = 10000,"), "{told}");
+    }
 }

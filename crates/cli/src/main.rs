@@ -13,6 +13,7 @@ mod keep;
 mod library;
 mod machine;
 mod memory;
+mod number;
 mod progress;
 mod svg;
 mod table;

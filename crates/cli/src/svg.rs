@@ -21,13 +21,29 @@ pub(crate) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// A number for people: `0.25`, `40`, `10⁻³`, `2·10⁻³`.
+/// A number for people: `0.25`, `40`, `10⁻³`, `2·10⁻³`. Twelve digits: more come from arithmetic, not from what is meant.
 pub(crate) fn number(value: f64) -> String {
     if value == 0.0 || (1e-2..1e4).contains(&value.abs()) {
-        return format!("{value}");
+        return crate::number::rounded(value, 12);
     }
-    let text = format!("{value:e}");
-    let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+    scientific(&format!("{value:e}"))
+}
+
+/// A number of few significant digits for people: `0.25`, `2.5·10⁻³`.
+pub(crate) fn rounded(value: f64, digits: usize) -> String {
+    if value == 0.0 || (1e-2..1e4).contains(&value.abs()) {
+        return crate::number::rounded(value, digits);
+    }
+    scientific(&format!("{value:.*e}", digits.saturating_sub(1)))
+}
+
+/// Text such as `2.50e-3` as `2.5·10⁻³`.
+fn scientific(text: &str) -> String {
+    let (mantissa, exponent) = text.split_once('e').unwrap_or((text, "0"));
+    let mantissa = match mantissa.split_once('.') {
+        Some(_) => mantissa.trim_end_matches('0').trim_end_matches('.'),
+        None => mantissa,
+    };
     let raised: String = exponent
         .chars()
         .map(|digit| match digit {

@@ -7,7 +7,7 @@ use serde_json::json;
 use crate::arguments::ListOptions;
 use crate::json::Output;
 use crate::table::Table;
-use crate::terminal;
+use crate::{number, terminal};
 
 pub(crate) fn list(options: &ListOptions) -> Result<bool> {
     let output = Output::prepare_if(options.json.as_ref())?;
@@ -25,7 +25,7 @@ pub(crate) fn list(options: &ListOptions) -> Result<bool> {
         for parameter in description.parameters {
             table.row([
                 parameter.name.to_owned(),
-                format!("{:?}", parameter.default),
+                number::exact(parameter.default),
                 parameter.unit.to_owned(),
                 parameter.admissible.to_owned(),
                 parameter.description.to_owned(),

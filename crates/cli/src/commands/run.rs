@@ -12,7 +12,7 @@ use crate::library::Selection;
 use crate::progress::Bar;
 use crate::svg::{Course, Drift};
 use crate::table::{self, Table};
-use crate::{csv, terminal};
+use crate::{csv, number, terminal};
 
 pub(crate) fn run(options: &RunOptions) -> Result<bool> {
     if let Some(folder) = &options.checkpoint {
@@ -132,8 +132,13 @@ fn word(value: &dyn std::fmt::Debug) -> String {
 
 fn text(row: &Row) -> String {
     let mut text = format!(
-        "{} cells, h = {:?}, {} particles, {} steps of dt = {:?}, CFL {}\n",
-        row.cells, row.h, row.particles, row.steps, row.dt, row.cfl
+        "{} cells, h = {}, {} particles, {} steps of dt = {}, CFL {}\n",
+        row.cells,
+        number::exact(row.h),
+        row.particles,
+        row.steps,
+        number::exact(row.dt),
+        number::exact(row.cfl)
     );
     if row.status == Status::Ok {
         text += "status: ok\n";

@@ -119,9 +119,7 @@ fn document(selection: &Selection, options: &ScoreOptions, score: &Score) -> Val
 }
 
 fn text(selection: &Selection, score: &Score) -> String {
-    let parameters: Vec<_> =
-        selection.parameters().iter().map(|(name, value)| format!("{name} = {value}")).collect();
-    let mut text = format!("{} ({})\n", selection.name(), parameters.join(", "));
+    let mut text = format!("{} ({})\n", selection.name(), selection.told_parameters());
     for row in &score.rows {
         text += &heading(row);
     }

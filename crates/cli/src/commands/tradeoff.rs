@@ -24,7 +24,7 @@ use crate::library::Selection;
 use crate::progress::Bar;
 use crate::svg::{Front, Point};
 use crate::table::{self, Table};
-use crate::{machine, memory, terminal};
+use crate::{machine, memory, number, terminal};
 
 /// The CFL number that ladders begin with.
 const CFL: f64 = 0.4;
@@ -58,7 +58,9 @@ impl Measure {
         let field = ["u", "v", "F", "P"][self.field];
         let norm = ["L_inf", "L2", "L1"][self.norm];
         match &self.scale {
-            Some((name, value)) => format!("{norm} of {field} over {name} = {value}"),
+            Some((name, value)) => {
+                format!("{norm} of {field} over {name} = {}", number::exact(*value))
+            }
             None => format!("{norm} of {field}, not divided by anything"),
         }
     }
@@ -355,17 +357,11 @@ impl Report<'_> {
     }
 
     fn text(&self) -> String {
-        let parameters: Vec<_> = self
-            .selection
-            .parameters()
-            .iter()
-            .map(|(name, value)| format!("{name} = {value}"))
-            .collect();
         let runs = self.found.entries.len();
         let mut text = format!(
             "{} ({}), {} period(s), {} thread(s) where nothing else is said\n{}\n{runs} settings of {} schemes in {:.1} s of {} s\n",
             self.selection.name(),
-            parameters.join(", "),
+            self.selection.told_parameters(),
             self.options.periods,
             self.threads,
             self.definition(),
@@ -438,11 +434,11 @@ impl Report<'_> {
             .parameters
             .set
             .iter()
-            .map(|(name, value)| format!(" --set {name}={value}"))
+            .map(|(name, value)| format!(" --set {name}={}", number::exact(*value)))
             .collect();
         let periods = match self.options.periods {
             1.0 => String::new(),
-            periods => format!(" --periods {periods}"),
+            periods => format!(" --periods {}", number::exact(periods)),
         };
         format!("mms run {} {}{periods}{set}", self.options.name, words::options(setting))
     }
