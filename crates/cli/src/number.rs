@@ -28,8 +28,7 @@ mod tests {
         let told = [0.0, 0.4, 1e4, -2.5, 1e-4, 123456.7].map(exact);
         assert_eq!(told, ["0", "0.4", "10000", "-2.5", "0.0001", "123456.7"]);
         let told = [1e-300, -9.9e-5, 1e7, 1.5e160, f64::MAX, 5e-324].map(exact);
-        let expected =
-            ["1e-300", "-9.9e-5", "1e7", "1.5e160", "1.7976931348623157e308", "5e-324"];
+        let expected = ["1e-300", "-9.9e-5", "1e7", "1.5e160", "1.7976931348623157e308", "5e-324"];
         assert_eq!(told, expected);
         assert_eq!([f64::NAN, f64::INFINITY].map(exact), ["NaN", "inf"]);
     }
