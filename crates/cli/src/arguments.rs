@@ -32,7 +32,11 @@ mod stability;
 mod tradeoff;
 mod values;
 
-use clap::{Parser, Subcommand};
+use std::ffi::OsString;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::terminal::{Color, Verbosity};
 
 pub(crate) use check::CheckOptions;
 pub(crate) use converge::ConvergeOptions;
@@ -55,8 +59,48 @@ pub(crate) use tradeoff::{Against, TradeoffOptions};
 #[derive(Parser)]
 #[command(name = "mms", version, max_term_width = 100)]
 pub(crate) struct Arguments {
+    #[command(flatten)]
+    pub(crate) talk: TalkOptions,
     #[command(subcommand)]
     pub(crate) command: Command,
+}
+
+/// How much is said, for every command.
+#[derive(Args, Clone, Copy)]
+#[command(next_help_heading = "Messages")]
+pub(crate) struct TalkOptions {
+    /// Results and errors only: no progress, no warnings, no notes
+    #[arg(long, short, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Tell on standard error the version, the settings in full, and what was found where
+    #[arg(long, short, global = true)]
+    verbose: bool,
+    /// Colours of messages
+    #[arg(long, global = true, value_enum, default_value_t = Color::Auto, value_name = "WHEN")]
+    pub(crate) color: Color,
+}
+
+impl TalkOptions {
+    /// How much is said.
+    pub(crate) fn verbosity(self) -> Verbosity {
+        match (self.quiet, self.verbose) {
+            (true, _) => Verbosity::Quiet,
+            (false, true) => Verbosity::Verbose,
+            (false, false) => Verbosity::Usual,
+        }
+    }
+}
+
+/// The colours that a command line asks for, before the whole of it is understood: messages on what is wrong with it
+/// have them too.
+pub(crate) fn color_of(arguments: &[OsString]) -> Color {
+    let words = || arguments.iter().map(|word| word.to_string_lossy());
+    let joined = words().filter_map(|word| word.strip_prefix("--color=").map(str::to_owned));
+    let parted = words().zip(words().skip(1)).filter(|(option, _)| option == "--color");
+    joined
+        .chain(parted.map(|(_, value)| value.into_owned()))
+        .find_map(|value| Color::from_str(&value, false).ok())
+        .unwrap_or(Color::Auto)
 }
 
 #[derive(Subcommand)]

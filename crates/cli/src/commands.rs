@@ -69,7 +69,7 @@ impl Model {
         let plans = cases.iter().filter_map(|case| plan(&self.exact, self.arithmetic(), case).ok());
         let bytes = plans.map(|plan| plan.bytes).fold(0.0, f64::max);
         let (time, memory) = (predict::duration(total), predict::amount(bytes));
-        terminal::complain(&format!("predicted: about {time}, with {memory} of memory\n"));
+        terminal::note(format_args!("predicted: about {time}, with {memory} of memory"));
         Some(seconds)
     }
 
@@ -144,6 +144,7 @@ fn settings(
     if options.grid() == Grid::Spherical {
         settings["polar_angles"] = json!(POLAR_ANGLES);
     }
+    terminal::detail_once(&settings);
     settings
 }
 

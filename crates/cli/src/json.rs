@@ -1,4 +1,4 @@
-//! JSON files that are there whole or not at all.
+//! Files that are there whole or not at all, and documents on standard output.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::Write;
@@ -7,16 +7,28 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use serde::Serialize;
 
-/// A file that will be written at the end of some work, found to be writable before it.
-pub(crate) struct Output {
-    path: PathBuf,
-    /// Holds the place until the content is complete; none for devices and pipes, which cannot be replaced.
-    temporary: Option<PathBuf>,
+use crate::terminal;
+
+/// A document that will be written at the end of some work, to a place found to be writable before it.
+pub(crate) struct Output(Place);
+
+enum Place {
+    /// A file that replaces what has its name; until it is complete it has the temporary one.
+    File { path: PathBuf, temporary: PathBuf },
+    /// A device or a pipe, which cannot be replaced.
+    Device(PathBuf),
+    /// Standard output, kept for this document.
+    Standard,
 }
 
 impl Output {
-    /// Makes sure that `path` can be written, without touching what is there.
+    /// Makes sure that `path` can be written, without touching what is there. `-` is standard output, where nothing else
+    /// is said from now on.
     pub(crate) fn prepare(path: &Path) -> Result<Self> {
+        if path == Path::new("-") {
+            terminal::reserve()?;
+            return Ok(Self(Place::Standard));
+        }
         // A link stays a link; what it points to is replaced.
         let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
         let shown = path.display();
@@ -24,7 +36,7 @@ impl Output {
             bail!("cannot write {shown}: it is a folder");
         }
         if path.exists() && !path.is_file() {
-            return Ok(Self { path, temporary: None });
+            return Ok(Self(Place::Device(path)));
         }
         let Some(name) = path.file_name() else { bail!("cannot write {shown}: it names no file") };
         let name = format!(".{}.{}.tmp", name.to_string_lossy(), std::process::id());
@@ -34,7 +46,7 @@ impl Output {
             .create_new(true)
             .open(&temporary)
             .with_context(|| format!("cannot write {shown}"))?;
-        Ok(Self { path, temporary: Some(temporary) })
+        Ok(Self(Place::File { path, temporary }))
     }
 
     /// [`Output::prepare`] where a file was asked for.
@@ -50,24 +62,34 @@ impl Output {
 
     /// Writes `text` and gives the file its name.
     pub(crate) fn write_text(self, text: &str) -> Result<()> {
-        let write = |path: &Path| -> std::io::Result<()> {
-            let mut file = File::create(path)?;
-            file.write_all(text.as_bytes())?;
-            if self.temporary.is_some() { file.sync_all() } else { Ok(()) }
+        self.write_bytes(text.as_bytes())
+    }
+
+    /// Writes `bytes` and gives the file its name.
+    pub(crate) fn write_bytes(self, bytes: &[u8]) -> Result<()> {
+        let (written, path) = match &self.0 {
+            Place::Standard => return terminal::print(bytes),
+            Place::Device(path) => {
+                (File::create(path).and_then(|mut file| file.write_all(bytes)), path)
+            }
+            Place::File { path, temporary } => {
+                let write = || {
+                    let mut file = File::create(temporary)?;
+                    file.write_all(bytes)?;
+                    file.sync_all()?;
+                    fs::rename(temporary, path)
+                };
+                (write(), path)
+            }
         };
-        let shown = self.path.display();
-        match &self.temporary {
-            None => write(&self.path),
-            Some(temporary) => write(temporary).and_then(|()| fs::rename(temporary, &self.path)),
-        }
-        .with_context(|| format!("cannot write {shown}"))
+        written.with_context(|| format!("cannot write {}", path.display()))
     }
 }
 
 impl Drop for Output {
     fn drop(&mut self) {
         // After a rename there is nothing left to remove.
-        if let Some(temporary) = &self.temporary {
+        if let Place::File { temporary, .. } = &self.0 {
             let _ = fs::remove_file(temporary);
         }
     }

@@ -11,7 +11,7 @@ use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
-use crate::library::is_file;
+use crate::library::{Origin, locate};
 use crate::terminal;
 
 /// How long to wait for cases that other processes are at work on, before they are looked at again.
@@ -112,8 +112,8 @@ impl Keep {
     fn tell_damage(&self) {
         let Some(Place { ledger, .. }) = &self.0 else { return };
         for damage in ledger.take_damaged() {
-            terminal::complain(&format!(
-                "warning: {}, line {}: {}; it is set aside in {}, and its case is computed again\n",
+            terminal::warn(format_args!(
+                "{}, line {}: {}; it is set aside in {}, and its case is computed again",
                 damage.file.display(),
                 damage.line,
                 damage.problem,
@@ -134,12 +134,10 @@ pub(crate) fn decisive(settings: &Value) -> Value {
 pub(crate) fn origin(solution: &str) -> Result<Value> {
     let program = std::env::current_exe().and_then(std::fs::read);
     let program = sum(&program.context("cannot read the program itself")?);
-    let specification = match is_file(solution) {
-        true => {
-            let text = std::fs::read(solution);
-            Some(sum(&text.with_context(|| format!("cannot read {solution}"))?))
-        }
-        false => None,
+    // What was compiled in is part of the program.
+    let specification = match locate(solution)? {
+        Origin::BuiltIn(_) => None,
+        Origin::File { text, .. } => Some(sum(text.as_bytes())),
     };
     Ok(json!({ "program": program, "specification": specification }))
 }

@@ -1,15 +1,215 @@
-//! The solutions of the library: found by name, built with parameters.
+//! The solutions that commands take: found by name or path, built with parameters.
+//!
+//! A path, which ends in `.toml` or has a separator, is the specification in that file. A name is looked for, in this
+//! order, as `NAME.toml` in `mms-specs` of the working folder and of the folders above it, in the folders that the variable
+//! `MMSMITH_SPECS` names, and among the solutions that were compiled in. Where the first file found is the very text that a
+//! compiled solution was generated from, the compiled code serves: it gives the same fields, faster. Any other file is
+//! interpreted.
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::collections::{BTreeMap, BTreeSet};
+use std::env;
+use std::fs;
+use std::path::{Component, Path, PathBuf, is_separator};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use anyhow::{Context, Result, bail};
-use mmsmith_interpret::interpret_fields;
+use mmsmith_interpret::{interpret_fields, interpret_fields_single};
 use mmsmith_solutions::{AnySolution, CATALOGUE, Description, Real, build};
 use mmsmith_spec::{Fields, Spec, nearest};
 
+use crate::input;
 use crate::number;
+use crate::terminal;
+
+/// The folders of specifications, in the working folder or above it.
+const FOLDER: &str = "mms-specs";
+/// The variable with further folders, separated as those of `PATH` are.
+const VARIABLE: &str = "MMSMITH_SPECS";
+/// More bytes than any specification has; what is longer, such as a device, is not read to its end.
+const LONGEST: u64 = 64 << 20;
+
+/// Where a solution was found.
+#[derive(Clone, Debug)]
+pub(crate) enum Origin {
+    /// Among those that were compiled in.
+    BuiltIn(&'static Description),
+    /// In a file.
+    File {
+        /// From the working folder where it is there or above it.
+        path: PathBuf,
+        /// All of it.
+        text: String,
+        /// The solution of the same name that was compiled in, if there is one.
+        instead_of: Option<&'static Description>,
+    },
+}
+
+impl Origin {
+    /// Whether the fields are compiled code; else they are interpreted.
+    pub(crate) fn is_generated(&self) -> bool {
+        matches!(self, Self::BuiltIn(_))
+    }
+
+    /// How the fields are evaluated: `generated` code, or the specification `interpreted`. The two differ in last bits.
+    pub(crate) fn evaluation(&self) -> &'static str {
+        if self.is_generated() { "generated" } else { "interpreted" }
+    }
+
+    /// The specification's text.
+    pub(crate) fn text(&self) -> &str {
+        match self {
+            Self::BuiltIn(description) => description.specification,
+            Self::File { text, .. } => text,
+        }
+    }
+
+    /// What messages call the specification.
+    pub(crate) fn file(&self) -> String {
+        match self {
+            Self::BuiltIn(description) => format!("{}.toml", description.name),
+            Self::File { path, .. } => path.display().to_string(),
+        }
+    }
+
+    /// Where other files of the specification are, if it is a file itself.
+    pub(crate) fn folder(&self) -> Option<&Path> {
+        match self {
+            Self::BuiltIn(_) => None,
+            Self::File { path, .. } => path.parent(),
+        }
+    }
+
+    /// The specification.
+    pub(crate) fn specification(&self) -> Result<Spec> {
+        Ok(Spec::parse(self.text(), &self.file())?)
+    }
+
+    /// Where it was found, in words.
+    pub(crate) fn words(&self) -> String {
+        match self {
+            Self::BuiltIn(_) => "built in".into(),
+            Self::File { path, instead_of: None, .. } => path.display().to_string(),
+            Self::File { path, instead_of: Some(_), .. } => {
+                format!("{}, which differs from the built-in one", path.display())
+            }
+        }
+    }
+
+    fn read(path: PathBuf) -> Result<Self> {
+        let text = input::Source::File(&path).short_text(LONGEST)?;
+        Ok(Self::File { path, text, instead_of: None })
+    }
+}
+
+/// Finds a solution by path or by name; see the [module](self) for the order.
+pub(crate) fn locate(name: &str) -> Result<Origin> {
+    if is_file(name) {
+        return Origin::read(PathBuf::from(name));
+    }
+    let built_in = CATALOGUE.iter().copied().find(|known| known.name == name);
+    let file = format!("{name}.toml");
+    let found = folders().into_iter().map(|folder| folder.join(&file)).find(|path| path.is_file());
+    let origin = match (found, built_in) {
+        (None, Some(description)) => Origin::BuiltIn(description),
+        (None, None) => return Err(unknown(name)),
+        (Some(path), _) => match (Origin::read(path)?, built_in) {
+            (Origin::File { text, .. }, Some(description))
+                if same_lines(&text, description.specification) =>
+            {
+                Origin::BuiltIn(description)
+            }
+            (Origin::File { path, text, .. }, instead_of) => {
+                Origin::File { path, text, instead_of }
+            }
+            (origin, _) => origin,
+        },
+    };
+    tell(name, &origin);
+    Ok(origin)
+}
+
+/// Whether two texts are equal but for the ends of their lines, which tools for versions change.
+fn same_lines(one: &str, other: &str) -> bool {
+    one.lines().eq(other.lines())
+}
+
+/// The folders that names are looked for in, in their order, whether they exist or not; those above the working folder
+/// only where they exist.
+fn folders() -> Vec<PathBuf> {
+    let mut folders = vec![PathBuf::from(FOLDER)];
+    let above = env::current_dir().map_or(0, |folder| {
+        folder.components().filter(|part| matches!(part, Component::Normal(_))).count()
+    });
+    let mut up = PathBuf::new();
+    for _ in 0..above {
+        up.push("..");
+        folders.push(up.join(FOLDER));
+    }
+    let own = Path::new(FOLDER);
+    folders.retain(|folder| folder == own || folder.is_dir());
+    if let Some(list) = env::var_os(VARIABLE) {
+        folders.extend(env::split_paths(&list).filter(|folder| !folder.as_os_str().is_empty()));
+    }
+    folders
+}
+
+/// Says, once for each name, what a user may not expect of where it was found.
+fn tell(name: &str, origin: &Origin) {
+    static TOLD: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+    if !TOLD.lock().unwrap_or_else(PoisonError::into_inner).insert(name.to_owned()) {
+        return;
+    }
+    match origin {
+        Origin::File { path, instead_of: Some(_), .. } => terminal::note(format_args!(
+            "{} differs from the built-in {name}: its fields are interpreted; cargo xtask gen makes them fast",
+            path.display()
+        )),
+        Origin::BuiltIn(_) => terminal::detail(format_args!("{name}: built in, generated code")),
+        Origin::File { path, instead_of: None, .. } => {
+            terminal::detail(format_args!("{name}: {}, interpreted", path.display()));
+        }
+    }
+}
+
+/// The names of all solutions that can be found without a path: those built in, then those of the folders.
+pub(crate) fn names() -> Vec<String> {
+    let mut names: Vec<String> = CATALOGUE.iter().map(|known| known.name.to_owned()).collect();
+    let mut others = BTreeSet::new();
+    for folder in folders() {
+        for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+            let path = entry.path();
+            let is_specification =
+                path.extension().is_some_and(|extension| extension == "toml") && path.is_file();
+            if let Some(stem) = path.file_stem().and_then(|stem| stem.to_str())
+                && is_specification
+                && !names.iter().any(|known| known == stem)
+            {
+                others.insert(stem.to_owned());
+            }
+        }
+    }
+    names.extend(others);
+    names
+}
+
+/// The refusal of a name that leads nowhere: what was meant perhaps, what there is, and where it was looked for.
+fn unknown(name: &str) -> anyhow::Error {
+    let names = names();
+    let file = format!("{name}.toml");
+    let hint = if Path::new(&file).is_file() {
+        format!("; {file} is a file in this folder: write {file}")
+    } else {
+        nearest(name, names.iter().map(String::as_str))
+            .map(|known| format!("; did you mean '{known}'?"))
+            .unwrap_or_default()
+    };
+    let folders: Vec<_> = folders().iter().map(|folder| folder.display().to_string()).collect();
+    anyhow::anyhow!(
+        "there is no solution '{name}'{hint} (there are: {}; {file} was looked for in {})",
+        names.join(", "),
+        folders.join(", ")
+    )
+}
 
 /// A solution with its parameter values.
 #[derive(Clone)]
@@ -28,24 +228,31 @@ enum Source {
 }
 
 impl Selection {
-    /// Finds `name`, a solution of the library or a specification file, and puts `overrides` in place of its
-    /// parameters' defaults.
+    /// Finds `name`, a solution by name or a specification file, and puts `overrides` in place of its parameters' defaults.
     pub(crate) fn new(name: &str, overrides: &[(String, f64)]) -> Result<Self> {
+        Self::of(&locate(name)?, overrides)
+    }
+
+    /// The solution of a specification that was found.
+    fn of(origin: &Origin, overrides: &[(String, f64)]) -> Result<Self> {
         for (index, (name, _)) in overrides.iter().enumerate() {
             if overrides[..index].iter().any(|(earlier, _)| earlier == name) {
                 bail!("--set {name}=... is given twice");
             }
         }
-        let (source, defaults): (Source, BTreeMap<String, f64>) = if is_file(name) {
-            let spec = specification(name)?;
-            let fields = spec.derive().with_context(|| name.to_owned())?;
-            let defaults = spec.parameters.iter().map(|p| (p.name.clone(), p.default)).collect();
-            (Source::File(Arc::new((spec, fields))), defaults)
-        } else {
-            let description = find(name)?;
-            let parameters = description.parameters.iter();
-            let defaults = parameters.map(|p| (p.name.to_owned(), p.default)).collect();
-            (Source::Library(description), defaults)
+        let (source, defaults): (Source, BTreeMap<String, f64>) = match origin {
+            Origin::File { .. } => {
+                let spec = origin.specification()?;
+                let fields = spec.derive().with_context(|| origin.file())?;
+                let pairs = spec.parameters.iter().map(|p| (p.name.clone(), p.default));
+                let defaults = pairs.collect();
+                (Source::File(Arc::new((spec, fields))), defaults)
+            }
+            Origin::BuiltIn(description) => {
+                let parameters = description.parameters.iter();
+                let defaults = parameters.map(|p| (p.name.to_owned(), p.default)).collect();
+                (Source::Library(description), defaults)
+            }
         };
         Self { source, parameters: defaults }.with(overrides).context("--set")
     }
@@ -90,11 +297,18 @@ impl Selection {
     pub(crate) fn build_single(&self) -> Result<AnySolution<f32>> {
         match &self.source {
             Source::Library(description) => self.generated(description),
-            Source::File(source) => bail!(
-                "'{}' is interpreted from its specification, in double precision only; generate code from it with \
-                 cargo xtask gen, or use --precision f64",
-                source.0.name
-            ),
+            Source::File(source) => {
+                let pairs = self.parameters.iter().map(|(name, value)| (name.as_str(), *value));
+                Ok(interpret_fields_single(&source.0, source.1.clone(), pairs)?)
+            }
+        }
+    }
+
+    /// How its fields are evaluated: `generated` code, or the specification `interpreted`. The two differ in last bits.
+    pub(crate) fn evaluation(&self) -> &'static str {
+        match &self.source {
+            Source::Library(_) => "generated",
+            Source::File(_) => "interpreted",
         }
     }
 
@@ -146,8 +360,9 @@ pub(crate) struct Subject {
 impl Subject {
     /// The solution called `name`, or the one that the specification file `name` describes.
     pub(crate) fn new(name: &str, overrides: &[(String, f64)]) -> Result<Self> {
-        let selection = Selection::new(name, overrides)?;
-        let spec = specification(name)?;
+        let origin = locate(name)?;
+        let selection = Selection::of(&origin, overrides)?;
+        let spec = origin.specification()?;
         let mut solutions = vec![selection.build()?];
         let mut parameters = vec![selection.parameters().clone()];
         // What the user set stays; the rest varies, where the specification admits it.
@@ -167,12 +382,7 @@ impl Subject {
                 break;
             }
         }
-        let folder = Path::new(name).parent().unwrap_or(Path::new("")).to_owned();
-        let (file, folder) = if is_file(name) {
-            (name.to_owned(), Some(folder))
-        } else {
-            (format!("{name}.toml"), None)
-        };
+        let (file, folder) = (origin.file(), origin.folder().map(Path::to_owned));
         Ok(Self { name: selection.name().to_owned(), solutions, parameters, spec, file, folder })
     }
 }
@@ -188,41 +398,13 @@ fn variation(attempt: usize, parameter: usize) -> f64 {
     0.75 + 0.5 * ((attempt * 17 + parameter) as f64 * 0.618_033_988_749_894_9).fract()
 }
 
-/// The specification of the library's solution `name`, or the one in the file `name`.
+/// The specification of the solution called `name`, or the one in the file `name`.
 pub(crate) fn specification(name: &str) -> Result<Spec> {
-    if is_file(name) {
-        let text = std::fs::read_to_string(name).with_context(|| format!("cannot read {name}"))?;
-        return Ok(Spec::parse(&text, name)?);
-    }
-    let description = find(name)?;
-    Ok(Spec::parse(description.specification, &format!("{name}.toml"))?)
+    locate(name)?.specification()
 }
 
 /// Whether the user means a specification file.
-pub(crate) fn is_file(name: &str) -> bool {
+fn is_file(name: &str) -> bool {
     Path::new(name).extension().is_some_and(|extension| extension == "toml")
-}
-
-/// The description of the solution `name`; an unknown one is met with those there are.
-fn find(name: &str) -> Result<&'static Description> {
-    if let Some(description) = CATALOGUE.iter().find(|known| known.name == name) {
-        return Ok(description);
-    }
-    let names: Vec<_> = CATALOGUE.iter().map(|known| known.name).collect();
-    let nearest = nearest(name, names.iter().copied())
-        .map(|known| format!("; did you mean '{known}'?"))
-        .unwrap_or_default();
-    bail!("there is no solution '{name}'{nearest} (there are: {})", names.join(", "))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn parameters_far_from_one_are_told_with_an_exponent() {
-        let selection = Selection::new("axis-aligned-1d", &[("A".to_owned(), 1e-300)]);
-        let told = selection.expect("the library has it").told_parameters();
-        assert!(told.starts_with("A = 1e-300, E = 10000,"), "{told}");
-    }
+        || name.contains(is_separator)
 }

@@ -8,6 +8,7 @@ mod arguments;
 mod commands;
 mod csv;
 mod expect;
+mod input;
 mod json;
 mod keep;
 mod library;
@@ -21,12 +22,19 @@ mod terminal;
 
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::{CommandFactory, FromArgMatches};
 
-use arguments::{Arguments, Command};
+use arguments::{Arguments, Command, color_of};
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    let given: Vec<_> = std::env::args_os().collect();
+    let line = Arguments::command().color(color_of(&given).into());
+    let arguments = line
+        .try_get_matches_from(given)
+        .and_then(|matches| Arguments::from_arg_matches(&matches))
+        .unwrap_or_else(|refusal| refusal.exit());
+    terminal::settle(arguments.talk.verbosity(), arguments.talk.color);
+    terminal::detail(format_args!("mms {}", env!("CARGO_PKG_VERSION")));
     let outcome = match &arguments.command {
         Command::List(options) => commands::list(options),
         Command::Check(options) => commands::check(options),
@@ -48,7 +56,7 @@ fn main() -> ExitCode {
             // A diagnostic is laid out as a whole already.
             match error.downcast_ref::<mmsmith_spec::Diagnostic>() {
                 Some(diagnostic) => terminal::complain(&format!("{diagnostic}\n")),
-                None => terminal::complain(&format!("error: {error:#}\n")),
+                None => terminal::error(format_args!("{error:#}")),
             }
             ExitCode::from(2)
         }

@@ -6,6 +6,8 @@ use std::time::{Duration, Instant};
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use mmsmith_verify::Progress;
 
+use crate::terminal;
+
 /// The bar counts thousandths, since work is known as a share.
 const LENGTH: u64 = 1000;
 
@@ -27,7 +29,7 @@ impl Bar {
     /// A bar that tells the time left from the start, for work that is predicted to take so many seconds.
     pub(crate) fn expecting(seconds: Option<f64>) -> Self {
         let bar = ProgressBar::new(LENGTH);
-        if !stderr().is_terminal() {
+        if terminal::is_quiet() || !stderr().is_terminal() {
             bar.set_draw_target(ProgressDrawTarget::hidden());
         }
         let template = match seconds {

@@ -5,6 +5,7 @@
 //! translates, in double precision, and in the same stages; for work on many points the generated code is still faster.
 
 mod lattice;
+mod rounded;
 mod staged;
 
 use lattice::LatticeStages;
@@ -15,6 +16,7 @@ use mmsmith_solutions::{
     ParameterError, Solution, StateAtPoints, Surface,
 };
 use mmsmith_spec::{self as spec, DeriveError, Spec};
+use rounded::Rounded;
 use staged::Stages;
 use thiserror::Error;
 
@@ -57,6 +59,31 @@ pub fn interpret_fields<'a>(
         1 => AnySolution::One(Box::new(Interpreted::<1>::new(spec, fields, values)?)),
         2 => AnySolution::Two(Box::new(Interpreted::<2>::new(spec, fields, values)?)),
         _ => AnySolution::Three(Box::new(Interpreted::<3>::new(spec, fields, values)?)),
+    })
+}
+
+/// As [`interpret_fields`], for solvers in single precision: all is evaluated in double precision, and the results are
+/// rounded.
+///
+/// # Errors
+///
+/// [`InterpretError`] where a parameter is unknown or not admissible.
+pub fn interpret_fields_single<'a>(
+    spec: &Spec,
+    fields: spec::Fields,
+    overrides: impl IntoIterator<Item = (&'a str, f64)>,
+) -> Result<AnySolution<f32>, InterpretError> {
+    let values = resolve(spec, overrides)?;
+    Ok(match spec.dimension {
+        1 => AnySolution::One(Box::new(Rounded {
+            exact: Interpreted::<1>::new(spec, fields, values)?,
+        })),
+        2 => AnySolution::Two(Box::new(Rounded {
+            exact: Interpreted::<2>::new(spec, fields, values)?,
+        })),
+        _ => AnySolution::Three(Box::new(Rounded {
+            exact: Interpreted::<3>::new(spec, fields, values)?,
+        })),
     })
 }
 

@@ -1,5 +1,7 @@
 //! The body in its reference configuration: shape and boundary conditions.
 
+use std::fmt;
+
 use crate::Real;
 use nalgebra::SVector;
 
@@ -25,6 +27,19 @@ pub enum Domain<T: Real, const D: usize> {
 }
 
 impl<T: Real, const D: usize> Domain<T, D> {
+    /// The same shape with `change` applied to each length.
+    #[must_use]
+    pub fn map<U: Real>(&self, change: impl Fn(T) -> U) -> Domain<U, D> {
+        match self {
+            Self::Box { lower, upper } => {
+                Domain::Box { lower: lower.map(&change), upper: upper.map(&change) }
+            }
+            Self::Annulus { inner, outer } => {
+                Domain::Annulus { inner: change(*inner), outer: change(*outer) }
+            }
+        }
+    }
+
     /// The outward reference normal at a point `X` of a surface; `None` where the body has no such surface.
     #[must_use]
     pub fn normal(&self, surface: Surface, X: &SVector<T, D>) -> Option<SVector<T, D>> {
@@ -54,6 +69,19 @@ pub enum Surface {
     Outer,
 }
 
+/// The name that specifications have for it, such as `X-lower`.
+impl fmt::Display for Surface {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let axis = |axis: usize| ["X", "Y", "Z"].get(axis).copied().unwrap_or("?");
+        match self {
+            Self::Lower(index) => f.pad(&format!("{}-lower", axis(*index))),
+            Self::Upper(index) => f.pad(&format!("{}-upper", axis(*index))),
+            Self::Inner => f.pad("inner"),
+            Self::Outer => f.pad("outer"),
+        }
+    }
+}
+
 /// What holds on a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Condition {
@@ -67,6 +95,19 @@ pub enum Condition {
     PrescribedTraction,
     /// The displacement of the solution.
     PrescribedMotion,
+}
+
+/// The name that specifications have for it, such as `sliding`.
+impl fmt::Display for Condition {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Sliding => "sliding",
+            Self::Symmetry => "symmetry",
+            Self::TractionFree => "traction-free",
+            Self::PrescribedTraction => "prescribed-traction",
+            Self::PrescribedMotion => "prescribed-motion",
+        })
+    }
 }
 
 /// A boundary condition.

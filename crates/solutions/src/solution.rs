@@ -50,6 +50,31 @@ pub enum Material<T> {
     Custom,
 }
 
+impl<T> Material<T> {
+    /// The same law with `change` applied to each constant.
+    #[must_use]
+    pub fn map<U>(self, change: impl Fn(T) -> U) -> Material<U> {
+        match self {
+            Self::NeoHookean { lambda, mu } => {
+                Material::NeoHookean { lambda: change(lambda), mu: change(mu) }
+            }
+            Self::StVenantKirchhoff { lambda, mu } => {
+                Material::StVenantKirchhoff { lambda: change(lambda), mu: change(mu) }
+            }
+            Self::Hencky { lambda, mu } => {
+                Material::Hencky { lambda: change(lambda), mu: change(mu) }
+            }
+            Self::LinearElastic { lambda, mu } => {
+                Material::LinearElastic { lambda: change(lambda), mu: change(mu) }
+            }
+            Self::MooneyRivlin { c1, c2, lambda } => {
+                Material::MooneyRivlin { c1: change(c1), c2: change(c2), lambda: change(lambda) }
+            }
+            Self::Custom => Material::Custom,
+        }
+    }
+}
+
 /// Every field of a solution at one point, in Cartesian components.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fields<T: Real, const D: usize> {

@@ -97,6 +97,18 @@ impl<T: Real, const D: usize> StateRun<T, D> {
         Self { u: vector, v: vector, F: matrix, P: matrix }
     }
 
+    /// The same run with `change` applied to each component.
+    #[must_use]
+    pub fn map<U>(self, change: impl Fn(T) -> U) -> StateRun<U, D> {
+        let row = |row: [T; BLOCK]| row.map(&change);
+        StateRun {
+            u: self.u.map(row),
+            v: self.v.map(row),
+            F: self.F.map(|rows| rows.map(row)),
+            P: self.P.map(|rows| rows.map(row)),
+        }
+    }
+
     /// The state of point `n` of the run.
     #[must_use]
     pub fn get(&self, n: usize) -> State<T, D> {

@@ -22,7 +22,7 @@ pub(crate) struct CheckOptions {
     pub(crate) thorough: bool,
     #[command(flatten)]
     pub(crate) parameters: ParameterOptions,
-    /// Write the findings to this JSON file
+    /// Write the findings to this JSON file; - is standard output, which then has nothing else
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
 }

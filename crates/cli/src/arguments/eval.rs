@@ -12,12 +12,12 @@ pub(crate) struct EvalOptions {
     #[arg(value_name = "NAME|SPEC.toml")]
     pub(crate) name: String,
     /// The points: [ { "X": [0.1, 0.2], "t": 0.3, "par": { "A": 0.05 } }, ... ]; "par" may be left out, other keys
-    /// are ignored
+    /// are ignored. - is standard input
     #[arg(long, value_name = "IN.json")]
     pub(crate) points: PathBuf,
     #[command(flatten)]
     pub(crate) parameters: ParameterOptions,
-    /// Write the fields to this JSON file instead of standard output
+    /// Write the fields to this JSON file; - is standard output, as when left out
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
 }

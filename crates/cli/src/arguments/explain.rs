@@ -9,7 +9,7 @@ pub(crate) struct ExplainOptions {
     /// The solution, by name, or a specification file (SPEC.toml)
     #[arg(value_name = "NAME|SPEC.toml")]
     pub(crate) name: String,
-    /// Write it to this JSON file too
+    /// Write it to this JSON file too; - is standard output, which then has nothing else
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
 }

@@ -67,7 +67,7 @@ pub(crate) struct SchemeOptions {
     /// Number of threads; all cores when left out
     #[arg(long, value_name = "N", value_parser = thread_count)]
     pub(crate) threads: Option<usize>,
-    /// Write the result to this JSON file
+    /// Write the result to this JSON file; - is standard output, which then has nothing else
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
 }

@@ -41,7 +41,7 @@ pub(crate) struct TradeoffOptions {
     pub(crate) threads: Option<usize>,
     #[command(flatten)]
     pub(crate) parameters: ParameterOptions,
-    /// Write the result to this JSON file
+    /// Write the result to this JSON file; - is standard output, which then has nothing else
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
     /// Write all settings to this file as comma-separated values

@@ -5,7 +5,6 @@ use mmsmith_expr::nearest_f64;
 use mmsmith_prove::{
     Equality, Outcome, Published, Report, SurfaceProof, surfaces as prove_surfaces,
 };
-use mmsmith_solutions::CATALOGUE;
 use mmsmith_spec::{ClaimKind, Spec};
 use mmsmith_verify::{
     BLUNT, CheckReport, OWN_ERROR_FACTOR, TOLERANCE, Verdict, check as check_fields,
@@ -15,7 +14,7 @@ use std::collections::BTreeMap;
 
 use crate::arguments::CheckOptions;
 use crate::json::Output;
-use crate::library::Subject;
+use crate::library::{Subject, names};
 use crate::table::{self, Table};
 use crate::terminal;
 
@@ -25,11 +24,7 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
     }
     let points = options.points.unwrap_or(300);
     let output = Output::prepare_if(options.json.as_ref())?;
-    let names: Vec<String> = if options.solutions.is_empty() {
-        CATALOGUE.iter().map(|known| known.name.to_owned()).collect()
-    } else {
-        options.solutions.clone()
-    };
+    let names = if options.solutions.is_empty() { names() } else { options.solutions.clone() };
     if names.is_empty() {
         bail!("there is no solution to check");
     }

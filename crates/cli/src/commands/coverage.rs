@@ -1,13 +1,12 @@
 //! `mms coverage`: which terms of the momentum balance each solution exercises, and which solutions test everything.
 
 use anyhow::{Result, bail};
-use mmsmith_solutions::CATALOGUE;
 use mmsmith_verify::{Part, Share, coverage as measure, smallest_set};
 use serde_json::{Map, Value, json};
 
 use crate::arguments::CoverageOptions;
 use crate::json::Output;
-use crate::library::Subject;
+use crate::library::{Subject, names};
 use crate::table::Table;
 use crate::terminal;
 
@@ -18,11 +17,7 @@ pub(crate) const THRESHOLD: f64 = 0.01;
 
 pub(crate) fn coverage(options: &CoverageOptions) -> Result<bool> {
     let output = Output::prepare_if(options.json.as_ref())?;
-    let names: Vec<String> = if options.solutions.is_empty() {
-        CATALOGUE.iter().map(|known| known.name.to_owned()).collect()
-    } else {
-        options.solutions.clone()
-    };
+    let names = if options.solutions.is_empty() { names() } else { options.solutions.clone() };
     let mut shares = Vec::new();
     for name in &names {
         let subject = Subject::new(name, &[])?;

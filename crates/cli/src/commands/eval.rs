@@ -1,13 +1,11 @@
 //! `mms eval`: exact fields at the caller's points.
 
-use std::fs;
-use std::path::Path;
-
 use anyhow::{Context, Result, anyhow, bail};
 use mmsmith_verify::evaluate;
 use serde_json::{Map, Value, json};
 
 use crate::arguments::EvalOptions;
+use crate::input::Source;
 use crate::json::{self, Output};
 use crate::library::Selection;
 use crate::terminal;
@@ -16,8 +14,8 @@ const FORM: &str = r#"{ "X": [numbers], "t": number, "par": { "NAME": number, ..
 
 pub(crate) fn eval(options: &EvalOptions) -> Result<bool> {
     let selection = Selection::new(&options.name, &options.parameters.set)?;
-    let file = options.points.display();
-    let entries = read(&options.points)?;
+    let file = Source::of(&options.points);
+    let entries = read(file)?;
     let mut rows = Vec::with_capacity(entries.len());
     for (index, entry) in entries.iter().enumerate() {
         let row = evaluate_entry(&selection, entry)
@@ -30,6 +28,7 @@ pub(crate) fn eval(options: &EvalOptions) -> Result<bool> {
             "version": env!("CARGO_PKG_VERSION"),
             "solution": selection.name(),
             "parameters": selection.parameters(),
+            "fields": selection.evaluation(),
         },
         "rows": rows,
     });
@@ -42,11 +41,9 @@ pub(crate) fn eval(options: &EvalOptions) -> Result<bool> {
 }
 
 /// The list of points; their form is judged one by one.
-fn read(path: &Path) -> Result<Vec<Value>> {
-    let file = path.display();
-    let text = fs::read_to_string(path).with_context(|| format!("cannot read {file}"))?;
+fn read(file: Source) -> Result<Vec<Value>> {
     let value: Value =
-        serde_json::from_str(&text).with_context(|| format!("{file} is not valid JSON"))?;
+        serde_json::from_str(&file.text()?).with_context(|| format!("{file} is not valid JSON"))?;
     match value {
         Value::Array(entries) => Ok(entries),
         _ => bail!("{file}: expected a list of points, [ {FORM}, ... ]"),

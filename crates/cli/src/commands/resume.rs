@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use clap::Parser;
 use mmsmith_verify::Checkpoints;
 use serde::{Deserialize, Serialize};
@@ -47,8 +47,11 @@ pub(crate) fn resume(options: &ResumeOptions) -> Result<bool> {
     }
     let folder = fs::canonicalize(&options.folder)?;
     let line = ["mms".to_owned()].into_iter().chain(start.arguments);
-    let arguments = Arguments::try_parse_from(line)
-        .with_context(|| format!("{shown}: the arguments are not those of this version"))?;
+    let arguments = Arguments::try_parse_from(line).map_err(|refusal| {
+        let refusal = refusal.to_string();
+        let reason = refusal.strip_prefix("error: ").unwrap_or(&refusal);
+        anyhow!("{shown}: the arguments are not those of this version: {reason}")
+    })?;
     let Command::Run(mut run) = arguments.command else {
         bail!("{shown}: only mms run writes checkpoints");
     };
@@ -85,7 +88,7 @@ pub(super) fn remember(folder: &Path) -> Result<()> {
     };
     Output::prepare(&path)?.write(&start)?;
     let shown = folder.display();
-    terminal::complain(&format!("if this run is stopped, mms resume {shown} goes on with it\n"));
+    terminal::note(format_args!("if this run is stopped, mms resume {shown} goes on with it"));
     Ok(())
 }
 

@@ -5,13 +5,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use anyhow::{Context, Result, anyhow, bail};
 use mmsmith_oracle::{Accuracy, Class, ClassAccuracy, Judged, LARGEST_FACTOR};
-use mmsmith_solutions::{CATALOGUE, build};
+use mmsmith_solutions::build;
 use mmsmith_spec::Spec;
 use serde_json::{Value, json};
 
 use crate::arguments::CheckOptions;
 use crate::json::Output;
-use crate::library::{is_file, specification};
+use crate::library::{locate, names};
 use crate::progress::Bar;
 use crate::table::Table;
 use crate::terminal;
@@ -24,31 +24,30 @@ const STRIDE: usize = 16;
 pub(crate) fn thorough(options: &CheckOptions) -> Result<bool> {
     let output = Output::prepare_if(options.json.as_ref())?;
     let points = options.points.unwrap_or(POINTS);
-    let names: Vec<String> = if options.solutions.is_empty() {
-        CATALOGUE.iter().map(|known| known.name.to_owned()).collect()
-    } else {
-        options.solutions.clone()
-    };
+    let names = if options.solutions.is_empty() { names() } else { options.solutions.clone() };
     if names.is_empty() {
         bail!("there is no solution to check");
     }
     // All names are judged before the first check.
     let specs = names
         .iter()
-        .map(|name| Ok((name.as_str(), specification(name)?)))
-        .collect::<Result<Vec<(&str, Spec)>>>()?;
+        .map(|name| {
+            let origin = locate(name)?;
+            Ok((name.as_str(), origin.specification()?, origin.is_generated()))
+        })
+        .collect::<Result<Vec<(&str, Spec, bool)>>>()?;
     let mut results = Vec::new();
     let mut passed = true;
-    for (name, spec) in &specs {
+    for (name, spec, is_generated) in &specs {
         let fields = spec.derive().with_context(|| (*name).to_owned())?;
         let accuracy = Accuracy::new(spec, fields);
-        let classes = measure(name, spec, &accuracy, points)?;
+        let classes = measure(name, *is_generated, spec, &accuracy, points)?;
         let good = classes.iter().flat_map(|c| &c.worst).all(|w| w.factor <= LARGEST_FACTOR);
         terminal::say(&text(&spec.name, good, &accuracy, &classes))?;
         passed &= good;
         results.push(json!({
             "solution": spec.name,
-            "code": if is_file(name) { "interpreted" } else { "generated" },
+            "code": if *is_generated { "generated" } else { "interpreted" },
             "points": classes.iter().map(|c| (c.class.name(), c.points)).collect::<BTreeMap<_, _>>(),
             "remarks": classes
                 .iter()
@@ -82,12 +81,13 @@ pub(crate) fn thorough(options: &CheckOptions) -> Result<bool> {
 /// Every class in turn: the generated functions of a solution of the library, the interpreted programs of a file.
 fn measure(
     name: &str,
+    is_generated: bool,
     spec: &Spec,
     accuracy: &Accuracy<'_>,
     points: usize,
 ) -> Result<Vec<ClassAccuracy>> {
     let n = accuracy.dimension();
-    let programs = if is_file(name) { accuracy.programs() } else { Vec::new() };
+    let programs = if is_generated { Vec::new() } else { accuracy.programs() };
     let judged = |inputs: &[f64]| -> Result<Judged, String> {
         if !programs.is_empty() {
             return Ok(programs.iter().map(|(letter, p)| (*letter, p.evaluate(inputs))).collect());

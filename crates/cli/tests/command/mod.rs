@@ -2,8 +2,9 @@
 #![allow(dead_code)] // Each test file uses some of it.
 
 use serde_json::Value;
+use std::io::Write;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 /// What one call of `mms` gave.
 pub(crate) struct Called {
@@ -14,11 +15,28 @@ pub(crate) struct Called {
 
 /// Calls `mms` with `arguments`, separated by spaces, in the folder `place`.
 pub(crate) fn mms(place: &Path, arguments: &str) -> Called {
-    let Output { status, stdout, stderr } = Command::new(env!("CARGO_BIN_EXE_mms"))
+    mms_with(place, arguments, &[], "")
+}
+
+/// As [`mms`], with variables of the environment and with text on standard input.
+pub(crate) fn mms_with(
+    place: &Path,
+    arguments: &str,
+    variables: &[(&str, &str)],
+    input: &str,
+) -> Called {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_mms"))
         .current_dir(place)
         .args(arguments.split_whitespace())
-        .output()
+        .envs(variables.iter().copied())
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
         .expect("the binary starts");
+    // What is not read is lost, which is right.
+    let _ = child.stdin.take().expect("a pipe").write_all(input.as_bytes());
+    let Output { status, stdout, stderr } = child.wait_with_output().expect("it ends");
     Called {
         status: status.code().expect("it ends by itself"),
         stdout: String::from_utf8(stdout).expect("text"),

@@ -1,0 +1,87 @@
+//! The conventions that all commands share: documents on standard output, input from a pipe, how much is said, colours.
+
+mod command;
+
+use command::{mms, mms_with, names, read_json, refuses};
+use serde_json::Value;
+
+#[test]
+fn a_dash_writes_the_document_to_standard_output_and_nothing_else() {
+    let place = tempfile::tempdir().expect("a folder");
+    let run = "axis-aligned-1d --cells 4 --periods 0.1 --threads 1";
+    for (arguments, schema) in [
+        ("list".to_owned(), "mmsmith.list/"),
+        ("check axis-aligned-1d --points 20".into(), "mmsmith.check/"),
+        ("coverage axis-aligned-1d".into(), "mmsmith.coverage/"),
+        (format!("run {run}"), "mmsmith.run/"),
+        (format!("stability {run} --at 0.1"), "mmsmith.stability/"),
+        ("converge axis-aligned-1d --cells 4,8 --threads 1".into(), "mmsmith.converge/"),
+    ] {
+        let called = mms(place.path(), &format!("{arguments} --json -"));
+        let document: Value = serde_json::from_str(&called.stdout)
+            .unwrap_or_else(|error| panic!("mms {arguments}: {error} in {}", called.stdout));
+        let found = document["schema"].as_str().expect("a schema");
+        assert!(found.starts_with(schema), "mms {arguments}: {found}");
+    }
+    assert_eq!(names(place.path()), Vec::<String>::new());
+}
+
+#[test]
+fn one_document_fits_on_standard_output() {
+    let place = tempfile::tempdir().expect("a folder");
+    let arguments = "run axis-aligned-1d --cells 4 --json - --history -";
+    refuses(place.path(), arguments, &["standard output takes one document"]);
+    mms(place.path(), "list --json ./-");
+    assert_eq!(names(place.path()), ["-"]);
+    read_json(&place.path().join("-"));
+}
+
+#[test]
+fn points_are_read_from_standard_input() {
+    let place = tempfile::tempdir().expect("a folder");
+    let points = r#"[{ "X": [0.25], "t": 0.1 }]"#;
+    let called = mms_with(place.path(), "eval axis-aligned-1d --points -", &[], points);
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    let document: Value = serde_json::from_str(&called.stdout).expect("JSON");
+    assert_eq!(document["rows"].as_array().map(Vec::len), Some(1));
+    let called = mms_with(place.path(), "eval axis-aligned-1d --points -", &[], "[");
+    assert_eq!(called.status, 2);
+    assert!(called.stderr.contains("standard input is not valid JSON"), "{}", called.stderr);
+}
+
+#[test]
+fn quiet_and_verbose_say_less_and_more() {
+    let place = tempfile::tempdir().expect("a folder");
+    let run = "run axis-aligned-1d --cells 4 --periods 0.1 --threads 1 --json r.json";
+    let usual = mms(place.path(), run);
+    assert_eq!(usual.stderr, "");
+    let quiet = mms(place.path(), &format!("--quiet {run}"));
+    assert_eq!((quiet.status, quiet.stderr.as_str()), (0, ""));
+    assert!(quiet.stdout.contains("status: ok"), "results are said: {}", quiet.stdout);
+    let verbose = mms(place.path(), &format!("{run} -v"));
+    for part in [concat!("mms ", env!("CARGO_PKG_VERSION")), "cfl = 0.4", "shape = \"gimp\""] {
+        assert!(verbose.stderr.contains(part), "'{part}' is missing in {}", verbose.stderr);
+    }
+    // Errors are always said.
+    refuses(place.path(), "--quiet run nothing", &["error: there is no solution 'nothing'"]);
+    refuses(place.path(), "list --quiet --verbose", &["cannot be used with"]);
+}
+
+#[test]
+fn colours_follow_the_option_and_the_usual_variables() {
+    let place = tempfile::tempdir().expect("a folder");
+    let is_colored = |arguments: &str, variables: &[(&str, &str)]| {
+        let called = mms_with(place.path(), arguments, variables, "");
+        assert_eq!(called.status, 2, "mms {arguments}");
+        called.stderr.contains('\x1b')
+    };
+    // Once a message of the program, once one of the reader of the command line.
+    for arguments in ["run nothing", "run ring --cells x"] {
+        assert!(!is_colored(arguments, &[]), "{arguments}: no terminal");
+        assert!(is_colored(&format!("{arguments} --color always"), &[]), "{arguments}");
+        assert!(is_colored(&format!("{arguments} --color=always"), &[("NO_COLOR", "1")]));
+        assert!(is_colored(arguments, &[("CLICOLOR_FORCE", "1")]), "{arguments}");
+        assert!(!is_colored(arguments, &[("CLICOLOR_FORCE", "1"), ("NO_COLOR", "1")]));
+        assert!(!is_colored(&format!("{arguments} --color never"), &[("CLICOLOR_FORCE", "1")]));
+    }
+}
