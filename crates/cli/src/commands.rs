@@ -35,8 +35,9 @@ use mmsmith_verify::{Arithmetic, Case, POLAR_ANGLES, plan};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::arguments::{Extent, Frame, Grid, Precision, SchemeOptions};
+use crate::arguments::{Extent, Frame, Grid, Precision};
 use crate::library::Selection;
+use scheme::Scheme;
 use crate::{memory, number, terminal};
 
 /// A solution in the precisions that a simulation of it needs.
@@ -89,7 +90,7 @@ impl Model {
 }
 
 /// The case that the options describe.
-fn case(options: &SchemeOptions, cells: usize) -> Result<Case> {
+fn case(options: &Scheme, cells: usize) -> Result<Case> {
     let (shape, frame) = scheme::of(options)?;
     Ok(Case {
         shape,
@@ -98,7 +99,7 @@ fn case(options: &SchemeOptions, cells: usize) -> Result<Case> {
         transfer: options.transfer,
         placement: scheme::placement(options)?,
         cells,
-        per_cell: options.ppc(),
+        per_cell: options.ppc,
         cfl: options.cfl,
         periods: options.periods,
         extent: options.extent.map(Into::into),
@@ -112,7 +113,7 @@ fn case(options: &SchemeOptions, cells: usize) -> Result<Case> {
 /// list.
 fn settings(
     selection: &Selection,
-    options: &SchemeOptions,
+    options: &Scheme,
     extent: Option<Extent>,
     cells: impl Serialize,
     cfl: impl Serialize,
@@ -126,22 +127,22 @@ fn settings(
         "shape": options.shape,
         "mass": mass,
         "composition": composition,
-        "layout": options.layout(),
-        "grid": options.grid(),
+        "layout": options.layout,
+        "grid": options.grid,
         "cfl_speed": options.cfl_speed,
         "transfer": options.transfer.to_string(),
         "integrator": options.integrator,
         "start": options.start,
         "cells": cells,
-        "ppc": options.ppc(),
+        "ppc": options.ppc,
         "cfl": cfl,
         "periods": options.periods,
         "offset": options.offset,
         "extent": extent,
         "precision": options.precision,
-        "threads": rayon::current_num_threads(),
+        "threads": threads(options),
     });
-    if options.grid() == Grid::Spherical {
+    if options.grid == Grid::Spherical {
         settings["polar_angles"] = json!(POLAR_ANGLES);
     }
     terminal::detail_once(&settings);
@@ -149,7 +150,7 @@ fn settings(
 }
 
 /// One line that says what was simulated.
-fn caption(selection: &Selection, options: &SchemeOptions, extent: Option<Extent>) -> String {
+fn caption(selection: &Selection, options: &Scheme, extent: Option<Extent>) -> String {
     let word = |value: &dyn std::fmt::Debug| format!("{value:?}").to_lowercase();
     let start = match (options.frame, options.integrator) {
         (Frame::Total, _) => scheme::words(options),
@@ -164,11 +165,32 @@ fn caption(selection: &Selection, options: &SchemeOptions, extent: Option<Extent
         selection.told_parameters(),
         word(&options.shape),
         word(&options.integrator),
-        options.ppc(),
+        options.ppc,
         number::exact(options.periods),
         word(&options.precision),
-        rayon::current_num_threads(),
+        threads(options),
     )
+}
+
+/// On how many threads the steps of a scheme are done.
+fn threads(options: &Scheme) -> usize {
+    let shared = case(options, scheme::USUAL_CELLS).is_ok_and(|case| case.steps_on_threads());
+    if shared { rayon::current_num_threads() } else { 1 }
+}
+
+/// What is said before a caption: a scheme that was chosen, and threads that were asked for in vain.
+fn preface(options: &Scheme) -> String {
+    let mut text = options.choice();
+    if let Some(asked) = options.threads.filter(|asked| *asked > threads(options)) {
+        let which = match options.frame {
+            Frame::Total => "the total frame",
+            Frame::Updated => "the general step, which this scheme takes,",
+        };
+        text += &format!(
+            "--threads {asked}: {which} steps on one thread; errors are measured on {asked}\n"
+        );
+    }
+    text
 }
 
 /// Does `work` with the number of threads asked for.

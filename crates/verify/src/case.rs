@@ -292,6 +292,12 @@ impl Case {
             Frame::Total(total) => total.validate(self),
         }
     }
+
+    /// Whether the steps are shared among threads: those of the fast step are. Errors always are.
+    #[must_use]
+    pub fn steps_on_threads(&self) -> bool {
+        general::fast_step(self).is_some()
+    }
 }
 
 /// Runs one simulation of `exact` and measures its errors after every step.

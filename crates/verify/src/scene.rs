@@ -1,10 +1,11 @@
 //! From a solution to a grid with walls and particles.
 
 use mmsmith_mpm::{Grid, Particles};
-use mmsmith_solutions::{Boundary, Condition, Domain, Real, Solution, Surface};
+use mmsmith_solutions::{AnySolution, Boundary, Condition, Domain, Real, Solution, Surface};
 use nalgebra::SVector;
 use thiserror::Error;
 
+use crate::dimension::in_dimension;
 use crate::total::Frame;
 use crate::{Case, points};
 
@@ -41,7 +42,11 @@ pub enum SceneError {
         fitting: Vec<usize>,
     },
     /// The solver has no model for a boundary condition.
-    #[error("the solver does not model the condition {condition:?} on {surface:?}{instead}")]
+    #[error(
+        "the solver does not model the condition {} on {}{instead}",
+        condition_name(*condition),
+        surface_name(*surface)
+    )]
     Unmodelled {
         /// Where.
         surface: Surface,
@@ -50,13 +55,16 @@ pub enum SceneError {
         /// What would model it, from a separator on; empty where nothing does.
         instead: &'static str,
     },
-    /// A surface of the body without a boundary condition.
+    /// Surfaces of the body without a boundary condition.
     #[error(
-        "the solution declares no condition on {surface:?}, so the solver cannot know what holds there"
+        "the solution declares no condition on {}, so the solver cannot know what holds there; the motion of the solution \
+         holds with these lines in its specification:\n{}",
+        list(surfaces),
+        lines(surfaces)
     )]
     Undeclared {
         /// Where.
-        surface: Surface,
+        surfaces: Vec<Surface>,
     },
     /// The solver has no model for the body's shape or its material.
     #[error("the solver does not model this {what}: {value}")]
@@ -81,6 +89,58 @@ pub enum SceneError {
         /// The cell count asked for.
         cells: usize,
     },
+}
+
+/// A surface as specifications name it.
+#[must_use]
+pub fn surface_name(surface: Surface) -> String {
+    let axis = |axis: usize| ["X", "Y", "Z"].get(axis).copied().unwrap_or("?");
+    match surface {
+        Surface::Lower(at) => format!("{}-lower", axis(at)),
+        Surface::Upper(at) => format!("{}-upper", axis(at)),
+        Surface::Inner => "inner".into(),
+        Surface::Outer => "outer".into(),
+    }
+}
+
+/// A condition as specifications name it.
+#[must_use]
+pub fn condition_name(condition: Condition) -> &'static str {
+    match condition {
+        Condition::Sliding => "sliding",
+        Condition::Symmetry => "symmetry",
+        Condition::TractionFree => "traction-free",
+        Condition::PrescribedTraction => "prescribed-traction",
+        Condition::PrescribedMotion => "prescribed-motion",
+    }
+}
+
+fn list(surfaces: &[Surface]) -> String {
+    surfaces.iter().map(|surface| surface_name(*surface)).collect::<Vec<_>>().join(", ")
+}
+
+/// What a specification says of surfaces that move as the solution does.
+fn lines(surfaces: &[Surface]) -> String {
+    let one = |surface: &Surface| {
+        let condition = condition_name(Condition::PrescribedMotion);
+        format!(
+            "\n[[boundary]]\nsurface = '{}'\ncondition = '{condition}'\n",
+            surface_name(*surface)
+        )
+    };
+    surfaces.iter().map(one).collect::<String>().trim_end().to_owned()
+}
+
+/// A condition of `exact` that the total frame models and the updated one does not, if it has one.
+#[must_use]
+pub fn needs_total_frame(exact: &AnySolution<f64>) -> Option<Boundary> {
+    let needs = |boundary: &&Boundary| is_given(boundary.condition);
+    in_dimension!(exact, |s| s.boundaries().iter().find(needs).copied(), else None)
+}
+
+/// Whether the values of motion or traction come from the solution.
+fn is_given(condition: Condition) -> bool {
+    matches!(condition, Condition::PrescribedMotion | Condition::PrescribedTraction)
 }
 
 fn suggestion(fitting: &[usize]) -> String {
@@ -121,16 +181,16 @@ impl<const D: usize> Scene<D> {
             _ => (0..D).flat_map(|axis| [Surface::Lower(axis), Surface::Upper(axis)]).collect(),
         };
         let declared = |s: &Surface| solution.boundaries().iter().any(|b| b.surface == *s);
-        if let Some(surface) = surfaces.into_iter().find(|surface| !declared(surface)) {
-            return Err(SceneError::Undeclared { surface });
+        let surfaces: Vec<_> =
+            surfaces.into_iter().filter(|surface| !declared(surface)).collect();
+        if !surfaces.is_empty() {
+            return Err(SceneError::Undeclared { surfaces });
         }
         let mut walls = [[false; 2]; D];
         let mut sides = [[Condition::TractionFree; 2]; D];
         for &Boundary { surface, condition } in solution.boundaries() {
             let is_wall = matches!(condition, Condition::Sliding | Condition::Symmetry);
-            let is_given =
-                matches!(condition, Condition::PrescribedMotion | Condition::PrescribedTraction);
-            if is_given && case.frame == Frame::Updated {
+            if is_given(condition) && case.frame == Frame::Updated {
                 let instead = instead(&domain);
                 return Err(SceneError::Unmodelled { surface, condition, instead });
             }

@@ -129,14 +129,16 @@ fn over<T: Precision, const D: usize>(
         states.insert(count, run.map_err(|cause| StudyError { index, cause })?);
         before += count;
     }
-    let (scene, _) = prepare(exact, base).map_err(|cause| StudyError { index: 0, cause })?;
+    let fail = |cause| StudyError { index: 0, cause };
+    let (scene, _) = prepare(exact, base).map_err(fail)?;
+    let speed = base.cfl_speed.of(exact).map_err(fail)?;
     let rows = counts.iter().map(|&count| {
         let dt = end / count as f64;
         let (status, differences) = match (&states[&count], &states[&(2 * count)]) {
             (Ok(coarse), Ok(fine)) => (Status::Ok, largest_difference(coarse, fine)),
             (Err(status), _) | (_, Err(status)) => (status.clone(), not_known()),
         };
-        let cfl = dt * exact.wave_speed() / scene.spacing;
+        let cfl = dt * speed / scene.spacing;
         TemporalRow {
             cells: base.cells,
             h: scene.spacing,

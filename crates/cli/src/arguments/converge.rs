@@ -19,12 +19,12 @@ pub(crate) struct ConvergeOptions {
     /// CFL numbers, separated by commas, for orders in time on one grid
     #[arg(long, value_name = "X,...", value_delimiter = ',', allow_negative_numbers = true, value_parser = positive_number, conflicts_with = "cfl")]
     pub(crate) cfls: Vec<f64>,
-    /// Orders to be met, or else exit status 1: a number for u, or by field and norm, such as u=2,F=1,P.l1=1. With --cfls
-    /// they are orders in time, of the differences on one grid
+    /// Orders to be met in place of those that theory promises: a number for u, or by field and norm, such as
+    /// u=2,F=1,P.l1=1. With --cfls they are orders in time, of the differences on one grid. A missed order, promised or asked
+    /// for, gives exit status 1
     #[arg(long, value_name = "ORDERS")]
     pub(crate) expect: Option<String>,
-    /// How far the order on the finest pair may be from the expected one; 0.1 when left out. With it a missed order gives
-    /// exit status 1
+    /// How far the order on the finest pair may be from the expected one; 0.1 when left out
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) tolerance: Option<f64>,
     #[command(flatten)]

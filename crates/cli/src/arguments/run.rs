@@ -12,9 +12,10 @@ pub(crate) struct RunOptions {
     /// The solution, by name, or a specification file (SPEC.toml)
     #[arg(value_name = "NAME|SPEC.toml")]
     pub(crate) name: String,
-    /// Number of cells along the solution's cell length
-    #[arg(long, value_name = "N", default_value_t = 32, value_parser = positive_count)]
-    pub(crate) cells: usize,
+    /// Number of cells along the solution's cell length; where nothing is said 32, and 16 for a solid in three dimensions in a
+    /// total frame that is not given either
+    #[arg(long, value_name = "N", value_parser = positive_count)]
+    pub(crate) cells: Option<usize>,
     #[command(flatten)]
     pub(crate) scheme: SchemeOptions,
     /// Write particle files (.vtu, and a .pvd that lists them) to this folder

@@ -3,22 +3,22 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use mmsmith_solutions::AnySolution;
 use mmsmith_verify as verify;
 use serde::Serialize;
 
-use super::shared::{ParameterOptions, parsed};
+use super::shared::ParameterOptions;
 use super::values::{finite_number, positive_count, positive_number, thread_count, transfer};
 
 /// How to simulate; what every measuring command shares.
 #[derive(Args, Clone)]
 pub(crate) struct SchemeOptions {
-    /// Weights between particles and grid
-    #[arg(long, value_enum, default_value_t = Shape::Gimp)]
-    pub(crate) shape: Shape,
-    /// Configuration that the weights belong to: updated in each step, or the reference one throughout
-    #[arg(long, value_enum, default_value_t = Frame::Updated)]
-    pub(crate) frame: Frame,
+    /// Weights between particles and grid; where nothing is said gimp, and bspline3 in the total frame
+    #[arg(long, value_enum)]
+    pub(crate) shape: Option<Shape>,
+    /// Configuration that the weights belong to: updated in each step, or the reference one throughout. Where nothing is said the
+    /// updated one, and the total one for a solution with a condition that only that one models
+    #[arg(long, value_enum)]
+    pub(crate) frame: Option<Frame>,
     /// Mass matrix of the total frame; consistent where nothing is said
     #[arg(long, value_enum)]
     pub(crate) mass: Option<Mass>,
@@ -32,9 +32,10 @@ pub(crate) struct SchemeOptions {
     /// Coordinates of the background grid; where nothing is said polar for rings and spherical for shells in the total frame
     #[arg(long, value_enum)]
     pub(crate) grid: Option<Grid>,
-    /// Speed that the CFL number refers to
-    #[arg(long, value_enum, default_value_t = CflSpeed::Bar)]
-    pub(crate) cfl_speed: CflSpeed,
+    /// Speed that the CFL number refers to; where nothing is said bar, and p-wave with a number that is not given either in a
+    /// total frame that is not
+    #[arg(long, value_enum)]
+    pub(crate) cfl_speed: Option<CflSpeed>,
     /// Time integrator
     #[arg(long, value_enum, default_value_t = Integrator::Cd)]
     pub(crate) integrator: Integrator,
@@ -47,9 +48,10 @@ pub(crate) struct SchemeOptions {
     /// Particles in a cell along each direction; where nothing is said 2, and one more than the degree with Gauss points
     #[arg(long, value_name = "N", value_parser = positive_count)]
     pub(crate) ppc: Option<usize>,
-    /// Time step times wave speed over grid spacing
-    #[arg(long, value_name = "X", default_value_t = 0.4, allow_negative_numbers = true, value_parser = positive_number)]
-    pub(crate) cfl: f64,
+    /// Time step times wave speed over grid spacing; where nothing is said 0.4, and one that suits the splines in a total
+    /// frame that is not given either
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive_number)]
+    pub(crate) cfl: Option<f64>,
     /// End time in periods of the solution
     #[arg(long, value_name = "X", default_value_t = 1.0, allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) periods: f64,
@@ -70,52 +72,6 @@ pub(crate) struct SchemeOptions {
     /// Write the result to this JSON file; - is standard output, which then has nothing else
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
-}
-
-impl SchemeOptions {
-    /// What holds where nothing is said, with the given scheme.
-    pub(crate) fn usual(shape: Shape, integrator: Integrator) -> Self {
-        Self { shape, integrator, ..parsed(&[]) }
-    }
-
-    /// The same with what suits a solution where nothing is said.
-    pub(crate) fn for_solution(&self, exact: &AnySolution<f64>) -> Self {
-        let mut settled = self.clone();
-        if self.frame == Frame::Total {
-            settled.layout.get_or_insert(match verify::TotalScheme::layout_for(exact) {
-                verify::Layout::Lattice => Layout::Lattice,
-                verify::Layout::Gauss => Layout::Gauss,
-            });
-            settled.grid.get_or_insert(match verify::TotalScheme::coordinates_for(exact) {
-                verify::Coordinates::Cartesian => Grid::Cartesian,
-                verify::Coordinates::Polar => Grid::Polar,
-                verify::Coordinates::Spherical => Grid::Spherical,
-            });
-        }
-        settled
-    }
-
-    /// Where the particles lie.
-    pub(crate) fn layout(&self) -> Layout {
-        self.layout.unwrap_or(Layout::Lattice)
-    }
-
-    /// Coordinates of the background grid.
-    pub(crate) fn grid(&self) -> Grid {
-        self.grid.unwrap_or(Grid::Cartesian)
-    }
-
-    /// Particles in a cell along each direction.
-    pub(crate) fn ppc(&self) -> usize {
-        const USUAL: usize = 2;
-        self.ppc.unwrap_or_else(|| match (self.layout(), self.shape) {
-            (Layout::Gauss, Shape::Bspline3) => 4,
-            (Layout::Gauss, Shape::Bspline4) => 5,
-            (Layout::Gauss, Shape::Bspline5) => 6,
-            (Layout::Gauss, Shape::Bspline2) => 3,
-            _ => USUAL,
-        })
-    }
 }
 
 /// Weights.

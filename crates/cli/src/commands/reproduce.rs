@@ -22,8 +22,9 @@ use super::converge::{
     Verdicts, difference_curve, difference_tables, differences, document, judge, judge_differences,
     stops, tables, temporal_document, verdict_table,
 };
+use super::scheme::Scheme;
 use super::{Model, case, settings, with_threads};
-use crate::arguments::{Integrator, Precision, ReproduceOptions, SchemeOptions, Shape};
+use crate::arguments::{Integrator, Precision, ReproduceOptions, Shape};
 use crate::json::Output;
 use crate::library::Selection;
 use crate::progress::Bar;
@@ -161,7 +162,7 @@ fn measure_differences(
     kind: &str,
     folder: &Path,
 ) -> Result<Differences> {
-    let options = SchemeOptions::usual(scheme.0, scheme.1);
+    let options = Scheme::usual(scheme.0, scheme.1);
     let base = case(&options, cells)?;
     let extent = model.admit(&[base])?;
     let stem = format!("{kind}-{}-{}", word(scheme.0), word(scheme.1));
@@ -188,8 +189,8 @@ fn measure_problem(problem: &'static str, folder: &Path) -> Result<Results> {
                   sweep: &Sweep,
                   cfl: Option<f64>|
      -> Result<Series> {
-        let usual = SchemeOptions::usual(scheme.0, scheme.1);
-        let options = SchemeOptions { cfl: cfl.unwrap_or(usual.cfl), ..usual };
+        let usual = Scheme::usual(scheme.0, scheme.1);
+        let options = Scheme { cfl: cfl.unwrap_or(usual.cfl), ..usual };
         let base = case(&options, GRID)?;
         let extent = model.admit(&sweep.cases(&base))?;
         let stem = format!("{kind}-{}-{}", word(scheme.0), word(scheme.1));
@@ -223,7 +224,7 @@ fn measure_problem(problem: &'static str, folder: &Path) -> Result<Results> {
     });
     let differences = differences.into_iter().collect::<Result<Vec<_>>>()?;
 
-    let base = case(&SchemeOptions::usual(Shape::Gimp, Integrator::Cd), GRID)?;
+    let base = case(&Scheme::usual(Shape::Gimp, Integrator::Cd), GRID)?;
     let frames =
         FrameOutput { folder: folder.join("particles"), name: problem.to_owned(), count: FRAMES };
     let silent = &mut |_| ();

@@ -5,7 +5,8 @@ use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{FrameOutput, Moment, Outputs, Row, Status, energy_drift, run as simulate};
 use serde_json::{Value, json};
 
-use super::{Model, caption, case, resume, settings, with_threads};
+use super::scheme::{Scheme, name};
+use super::{Model, caption, case, preface, resume, settings, with_threads};
 use crate::arguments::{Frame, RunOptions};
 use crate::json::Output;
 use crate::library::Selection;
@@ -23,11 +24,11 @@ pub(crate) fn run(options: &RunOptions) -> Result<bool> {
 
 /// The run, from its beginning or from its last checkpoint.
 pub(super) fn follow(options: &RunOptions, resume: bool) -> Result<bool> {
-    let scheme = &options.scheme;
-    let selection = Selection::new(&options.name, &scheme.parameters.set)?;
-    let model = Model::new(&selection, scheme.precision)?;
-    let scheme = &scheme.for_solution(&model.exact);
-    let case = case(scheme, options.cells)?;
+    let selection = Selection::new(&options.name, &options.scheme.parameters.set)?;
+    let model = Model::new(&selection, options.scheme.precision)?;
+    let scheme = &Scheme::settle(&options.scheme, &model.exact);
+    let cells = options.cells.unwrap_or(scheme.usual_cells());
+    let case = case(scheme, cells)?;
     let extent = model.admit(&[case])?;
     let output = Output::prepare_if(scheme.json.as_ref())?;
     let [history, plot] =
@@ -39,7 +40,7 @@ pub(super) fn follow(options: &RunOptions, resume: bool) -> Result<bool> {
         name: selection.name().to_owned(),
         count: options.frames,
     });
-    let settings = || settings(&selection, scheme, extent, options.cells, scheme.cfl);
+    let settings = || settings(&selection, scheme, extent, cells, scheme.cfl);
     let checkpoints = match &options.checkpoint {
         Some(folder) => Some(resume::checkpoints(folder, options, &settings(), resume)?),
         None => None,
@@ -48,7 +49,7 @@ pub(super) fn follow(options: &RunOptions, resume: bool) -> Result<bool> {
         let row = {
             let expected = model.announce(&[case]);
             let bar = Bar::expecting(expected.map(|seconds| seconds.iter().sum()));
-            let what = format!("{} cells", options.cells);
+            let what = format!("{cells} cells");
             let show = &mut |progress| bar.show(&what, progress);
             let mut outputs = Outputs {
                 frames: frames.as_ref(),
@@ -58,7 +59,7 @@ pub(super) fn follow(options: &RunOptions, resume: bool) -> Result<bool> {
             };
             simulate(&model.exact, model.arithmetic(), &case, &mut outputs)?
         };
-        terminal::say(&(caption(&selection, scheme, extent) + &text(&row)))?;
+        terminal::say(&(preface(scheme) + &caption(&selection, scheme, extent) + &text(&row)))?;
         if let Some(frames) = &frames {
             let list = frames.folder.join(format!("{}.pvd", frames.name));
             terminal::say(&format!("particle files: {}\n", list.display()))?;
@@ -67,10 +68,13 @@ pub(super) fn follow(options: &RunOptions, resume: bool) -> Result<bool> {
             file.write_text(&csv::history(moments.as_deref().unwrap_or_default()))?;
         }
         if let Some(file) = plot {
-            let name = format!("{} + {}", word(&scheme.shape), word(&scheme.integrator));
-            let name = if scheme.frame == Frame::Total { word(&scheme.shape) } else { name };
-            let course = course(name, &model, moments.as_deref().unwrap_or_default());
-            let title = format!("{}: drift of energy, {} cells", selection.name(), options.cells);
+            let shape = name(scheme.shape);
+            let curve = match scheme.frame {
+                Frame::Total => shape,
+                Frame::Updated => format!("{shape} + {}", name(scheme.integrator)),
+            };
+            let course = course(curve, &model, moments.as_deref().unwrap_or_default());
+            let title = format!("{}: drift of energy, {cells} cells", selection.name());
             file.write_text(&drift_plot(&title, vec![course]))?;
         }
         if let Some(output) = output {
@@ -124,10 +128,6 @@ pub(super) fn course(name: String, model: &Model, history: &[Moment]) -> Course 
 pub(super) fn drift_plot(title: &str, curves: Vec<Course>) -> String {
     let y = "energy, solver - exact, over the largest exact";
     Drift { title, x: "periods", y, curves }.svg()
-}
-
-fn word(value: &dyn std::fmt::Debug) -> String {
-    format!("{value:?}").to_lowercase()
 }
 
 fn text(row: &Row) -> String {

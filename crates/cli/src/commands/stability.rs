@@ -11,7 +11,8 @@ use mmsmith_verify::{
 use serde_json::{Value, json};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use super::{Model, caption, case, settings, with_threads};
+use super::scheme::{Scheme, USUAL_CFL};
+use super::{Model, caption, case, preface, settings, with_threads};
 use crate::arguments::{Extent, SchemeOptions, StabilityOptions};
 use crate::csv;
 use crate::json::Output;
@@ -27,7 +28,7 @@ struct Point {
     /// What the varied settings are here, in their order.
     values: Vec<String>,
     selection: Selection,
-    scheme: SchemeOptions,
+    scheme: Scheme,
     model: Model,
     case: Case,
     extent: Option<Extent>,
@@ -41,7 +42,9 @@ impl Point {
         cells: usize,
     ) -> Result<Self> {
         let model = Model::new(&selection, scheme.precision)?;
-        let scheme = scheme.for_solution(&model.exact);
+        // The CFL number is what is looked for; where none is said, numbers refer to the speed that they usually have.
+        let said = SchemeOptions { cfl: scheme.cfl.or(Some(USUAL_CFL)), ..scheme };
+        let scheme = Scheme::settle(&said, &model.exact);
         let case = case(&scheme, cells)?;
         // The finest step that a search may come to is not known; memory does not depend on it.
         let extent = model.admit(&[Case { cfl: 0.5, ..case }])?;
@@ -115,13 +118,18 @@ impl Survey<'_> {
         self.options.over.iter().map(|(name, _)| name.as_str()).collect()
     }
 
-    fn scheme(&self) -> SchemeOptions {
-        self.options.scheme.for_solution(&self.points[0].model.exact)
+    fn scheme(&self) -> Scheme {
+        let said = SchemeOptions {
+            cfl: self.options.scheme.cfl.or(Some(USUAL_CFL)),
+            ..self.options.scheme.clone()
+        };
+        Scheme::settle(&said, &self.points[0].model.exact)
     }
 
     fn text(&self) -> String {
         let Self { options, selection, search, points, .. } = self;
-        let mut text = caption(selection, &self.scheme(), points[0].extent);
+        let scheme = self.scheme();
+        let mut text = preface(&scheme) + &caption(selection, &scheme, points[0].extent);
         if !self.names().contains(&"cells") {
             text += &format!("{} cells\n", options.cells);
         }
@@ -172,13 +180,13 @@ impl Survey<'_> {
 /// Judges one run.
 fn judge(options: &StabilityOptions, cfl: f64, criteria: &Criteria) -> Result<bool> {
     let selection = Selection::new(&options.name, &options.scheme.parameters.set)?;
-    let scheme = SchemeOptions { cfl, ..options.scheme.clone() };
+    let scheme = SchemeOptions { cfl: Some(cfl), ..options.scheme.clone() };
     let output = Output::prepare_if(scheme.json.as_ref())?;
     let point = Point::new(Vec::new(), selection, scheme, options.cells)?;
     let scheme = &point.scheme;
     with_threads(scheme.threads, || {
         let found = is_stable(&point.model.exact, point.model.arithmetic(), &point.case, criteria)?;
-        let mut text = caption(&point.selection, scheme, point.extent);
+        let mut text = preface(scheme) + &caption(&point.selection, scheme, point.extent);
         text += &definition(criteria);
         text += &match &found.failure {
             None => format!("CFL {cfl}: stable over {} steps\n", found.steps),

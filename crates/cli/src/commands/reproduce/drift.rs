@@ -8,8 +8,9 @@ use serde_json::json;
 
 use super::section::Section;
 use super::{PROBLEMS, name, word};
-use crate::arguments::{Integrator, Precision, SchemeOptions, Shape};
+use crate::arguments::{Integrator, Precision, Shape};
 use crate::commands::run::{course, drift_plot, history_document};
+use crate::commands::scheme::Scheme;
 use crate::commands::{Model, case, settings};
 use crate::csv;
 use crate::json::Output;
@@ -40,8 +41,8 @@ pub(super) fn section(out: &Path) -> Result<Section> {
         let mut table = Table::new(1, header);
         for integrator in INTEGRATORS {
             let scheme = (Shape::Gimp, integrator);
-            let usual = SchemeOptions::usual(scheme.0, scheme.1);
-            let options = SchemeOptions { periods: PERIODS, ..usual };
+            let usual = Scheme::usual(scheme.0, scheme.1);
+            let options = Scheme { periods: PERIODS, ..usual };
             let base = case(&options, CELLS)?;
             let extent = model.admit(&[base])?;
             let stem = format!("drift-{}-{}", word(scheme.0), word(scheme.1));

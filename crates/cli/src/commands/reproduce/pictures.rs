@@ -7,7 +7,8 @@ use mmsmith_verify::{Case, FrameOutput, Outputs, run as simulate};
 use mmsmith_vtk::{Frame, Values, read};
 
 use super::{FRAMES, GRID, PROBLEMS};
-use crate::arguments::{Integrator, SchemeOptions, Shape};
+use crate::arguments::{Integrator, Shape};
+use crate::commands::scheme::Scheme;
 use crate::commands::{Model, case};
 use crate::svg::Particles;
 
@@ -21,7 +22,7 @@ pub(super) fn write_contrast(model: &Model, problem: &str, folder: &Path) -> Res
     if problem != PROBLEMS[0] {
         return Ok(());
     }
-    let base = case(&SchemeOptions::usual(Shape::Ugimp, Integrator::Cd), GRID)?;
+    let base = case(&Scheme::usual(Shape::Ugimp, Integrator::Cd), GRID)?;
     let case = Case { periods: MOMENT as f64 / (FRAMES - 1) as f64, ..base };
     let frames = FrameOutput { folder: folder.join(CONTRAST), name: problem.to_owned(), count: 2 };
     let silent = &mut |_| ();

@@ -11,7 +11,8 @@ use serde_json::{Value, json};
 
 use super::{Point, definition, told, without_threads};
 use crate::arguments::{CflSpeed, Frame, SchemeOptions, StabilityOptions};
-use crate::commands::{caption, settings, with_threads};
+use crate::commands::scheme::Scheme;
+use crate::commands::{caption, preface, settings, with_threads};
 use crate::json::Output;
 use crate::keep::{Keep, Order};
 use crate::library::Selection;
@@ -22,17 +23,15 @@ use crate::terminal;
 const MOST_DRAWS: usize = 100;
 
 pub(super) fn search(options: &StabilityOptions, criteria: &Criteria) -> Result<bool> {
-    let scheme = &options.scheme;
-    let selection = Selection::new(&options.name, &scheme.parameters.set)?;
+    let selection = Selection::new(&options.name, &options.scheme.parameters.set)?;
+    let scheme = &Scheme::settle(&options.scheme, &selection.build()?);
     if options.plot.is_some() || options.csv.is_some() {
         bail!("--search random draws no picture and no table; use --json");
     }
     let output = Output::prepare_if(scheme.json.as_ref())?;
     let points: Vec<Point> = (0..options.samples)
-        .map(|sample| draw(options, &selection, sample))
+        .map(|sample| draw(options, scheme, &selection, sample))
         .collect::<Result<_>>()?;
-    let settled = points.first().map(|point| scheme.for_solution(&point.model.exact));
-    let scheme = settled.as_ref().unwrap_or(scheme);
     let keep = Keep::open(options.kept.out.as_ref(), &options.name)?;
     let keys: Vec<_> = points
         .iter()
@@ -67,7 +66,7 @@ pub(super) fn search(options: &StabilityOptions, criteria: &Criteria) -> Result<
             )?
         };
         let extent = points.first().and_then(|point| point.extent);
-        let mut text = caption(&selection, scheme, extent);
+        let mut text = preface(scheme) + &caption(&selection, scheme, extent);
         text += &definition(criteria);
         text += &format!(
             "{} random settings (seed {}) with CFL numbers up to {} on P-waves:\n",
@@ -100,7 +99,12 @@ pub(super) fn search(options: &StabilityOptions, criteria: &Criteria) -> Result<
 }
 
 /// Setting number `sample`.
-fn draw(options: &StabilityOptions, selection: &Selection, sample: usize) -> Result<Point> {
+fn draw(
+    options: &StabilityOptions,
+    settled: &Scheme,
+    selection: &Selection,
+    sample: usize,
+) -> Result<Point> {
     let mut random = Random::new(options.seed.wrapping_add((sample as u64) << 32));
     let mut last = None;
     for _ in 0..MOST_DRAWS {
@@ -122,13 +126,13 @@ fn draw(options: &StabilityOptions, selection: &Selection, sample: usize) -> Res
         let share = random.between(0.05, 1.0);
         let attempt = selection.with(&parameters).and_then(|selection| {
             let scheme = SchemeOptions {
-                ppc: Some(ppc.max(options.scheme.ppc())),
+                ppc: Some(ppc.max(settled.ppc)),
                 offset,
                 ..options.scheme.clone()
             };
             let mut point = Point::new(Vec::new(), selection, scheme, cells)?;
             let unit = mmsmith_verify::p_wave_limit(&point.model.exact, &point.case)?;
-            point.case.cfl = options.scheme.cfl * unit * share;
+            point.case.cfl = settled.cfl * unit * share;
             Ok(point)
         });
         match attempt {
@@ -151,13 +155,13 @@ fn command(options: &StabilityOptions, point: &Point) -> String {
         options.name,
         case.cfl,
         case.cells,
-        scheme.ppc(),
+        scheme.ppc,
         scheme.offset,
         word(scheme.shape),
         word(scheme.integrator),
         word(scheme.start),
         scheme.transfer,
-        word(scheme.layout()),
+        word(scheme.layout),
         scheme.periods,
         word(scheme.precision),
         options.error_multiple,
@@ -168,7 +172,7 @@ fn command(options: &StabilityOptions, point: &Point) -> String {
         text += &format!(
             " --frame total --mass {} --composition {composition} --grid {}",
             word(mass),
-            word(scheme.grid())
+            word(scheme.grid)
         );
     }
     if scheme.cfl_speed == CflSpeed::PWave {

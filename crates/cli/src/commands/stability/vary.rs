@@ -67,7 +67,7 @@ fn put(draft: &mut Draft, name: &str, text: &str) -> Result<()> {
         "offset" => scheme.offset = number()?,
         "periods" => scheme.periods = number()?,
         "precision" => scheme.precision = word::<Precision>(text)?,
-        "shape" => scheme.shape = word::<Shape>(text)?,
+        "shape" => scheme.shape = Some(word::<Shape>(text)?),
         "integrator" => scheme.integrator = word::<Integrator>(text)?,
         "start" => scheme.start = word::<Start>(text)?,
         "units" => {
