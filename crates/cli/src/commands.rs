@@ -37,8 +37,8 @@ use serde_json::{Value, json};
 
 use crate::arguments::{Extent, Frame, Grid, Precision};
 use crate::library::Selection;
-use scheme::Scheme;
 use crate::{memory, number, terminal};
+use scheme::Scheme;
 
 /// A solution in the precisions that a simulation of it needs.
 struct Model {

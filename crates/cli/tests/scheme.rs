@@ -62,10 +62,14 @@ fn every_solution_runs_to_its_end_where_nothing_is_said() {
             assert_eq!(settings["cfl"], 0.4, "{name}");
         } else {
             assert!(first.starts_with("total Lagrangian, cubic splines on a "), "{first}");
-            assert!(first.contains("the updated formulation does not model prescribed-"), "{first}");
+            assert!(
+                first.contains("the updated formulation does not model prescribed-"),
+                "{first}"
+            );
             assert_eq!([&settings["frame"], &settings["shape"]], ["total", "bspline3"], "{name}");
             // The options of the second line give the same result.
-            let (_, options) = called.stdout.lines().nth(1).unwrap().split_once("as with ").unwrap();
+            let (_, options) =
+                called.stdout.lines().nth(1).unwrap().split_once("as with ").unwrap();
             let call = format!("run {name} --cells {cells} {options} --json same.json");
             assert_eq!(mms(place, &call).status, 0, "{call}");
             let same = read_json(&place.join("same.json"));
@@ -144,9 +148,8 @@ fn one_command_has_one_cfl_number_for_one_time_step() {
     let call = "converge axis-aligned --cells 8 --cfls 0.25,0.125 --cfl-speed p-wave --periods 0.5 --json s.json";
     mms(place.path(), call);
     let study = read_json(&place.path().join("s.json"));
-    let per_dt = |row: &serde_json::Value| {
-        row["cfl"].as_f64().unwrap() / row["dt"].as_f64().unwrap()
-    };
+    let per_dt =
+        |row: &serde_json::Value| row["cfl"].as_f64().unwrap() / row["dt"].as_f64().unwrap();
     let rows = |value: &serde_json::Value| value.as_array().unwrap().clone();
     let all = [rows(&study["rows"]), rows(&study["temporal"]["rows"])].concat();
     assert_eq!(all.len(), 4);

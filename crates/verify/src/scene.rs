@@ -181,8 +181,7 @@ impl<const D: usize> Scene<D> {
             _ => (0..D).flat_map(|axis| [Surface::Lower(axis), Surface::Upper(axis)]).collect(),
         };
         let declared = |s: &Surface| solution.boundaries().iter().any(|b| b.surface == *s);
-        let surfaces: Vec<_> =
-            surfaces.into_iter().filter(|surface| !declared(surface)).collect();
+        let surfaces: Vec<_> = surfaces.into_iter().filter(|surface| !declared(surface)).collect();
         if !surfaces.is_empty() {
             return Err(SceneError::Undeclared { surfaces });
         }

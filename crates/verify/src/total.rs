@@ -110,11 +110,7 @@ impl TotalScheme {
     /// # Errors
     ///
     /// [`CaseError`] for a material that the solver has no law for.
-    pub fn usual_cfl(
-        &self,
-        exact: &AnySolution<f64>,
-        speed: CflSpeed,
-    ) -> Result<f64, CaseError> {
+    pub fn usual_cfl(&self, exact: &AnySolution<f64>, speed: CflSpeed) -> Result<f64, CaseError> {
         const TIMES_DEGREE: f64 = 0.6;
         let on_p_waves = TIMES_DEGREE / self.scheme.degree.max(1) as f64;
         in_dimension!(

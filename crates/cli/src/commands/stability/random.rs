@@ -125,11 +125,8 @@ fn draw(
         // Up to the limit believed stable, on P-waves; the speeds' ratio is known once the solution is.
         let share = random.between(0.05, 1.0);
         let attempt = selection.with(&parameters).and_then(|selection| {
-            let scheme = SchemeOptions {
-                ppc: Some(ppc.max(settled.ppc)),
-                offset,
-                ..options.scheme.clone()
-            };
+            let scheme =
+                SchemeOptions { ppc: Some(ppc.max(settled.ppc)), offset, ..options.scheme.clone() };
             let mut point = Point::new(Vec::new(), selection, scheme, cells)?;
             let unit = mmsmith_verify::p_wave_limit(&point.model.exact, &point.case)?;
             point.case.cfl = settled.cfl * unit * share;
