@@ -142,6 +142,14 @@ pub fn registry_source(names: &[&str]) -> Result<String, NameClash> {
             name: &str,
             values: &[f64],
         ) -> Option<Result<AnySolution<T>, ParameterError>> {
+            T::build(name, values)
+        }
+
+        /// [`build`] in one precision, which [`Real`] instantiates in this crate.
+        pub(crate) fn build_in<T: Real>(
+            name: &str,
+            values: &[f64],
+        ) -> Option<Result<AnySolution<T>, ParameterError>> {
             Some(match name {
                 #arms
                 _ => return None,

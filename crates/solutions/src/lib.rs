@@ -17,8 +17,6 @@ mod domain;
 // Formatted by the generator; the formatter would differ in small things.
 #[rustfmt::skip]
 mod generated;
-#[cfg(all(debug_assertions, not(test)))]
-mod instances;
 mod lattice;
 mod parameters;
 mod real;

@@ -57,6 +57,13 @@ pub fn build<T: Real>(
     name: &str,
     values: &[f64],
 ) -> Option<Result<AnySolution<T>, ParameterError>> {
+    T::build(name, values)
+}
+/// [`build`] in one precision, which [`Real`] instantiates in this crate.
+pub(crate) fn build_in<T: Real>(
+    name: &str,
+    values: &[f64],
+) -> Option<Result<AnySolution<T>, ParameterError>> {
     Some(
         match name {
             "axis-aligned" => AxisAligned::from_values(values).map(AnySolution::from),
