@@ -9,6 +9,11 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
+/// The examples in Rust of the book, which documentation tests compile and run.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/src/guide/code.md")]
+pub struct Examples;
+
 /// The root of the workspace.
 #[must_use]
 pub fn workspace() -> &'static Path {

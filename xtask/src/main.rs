@@ -6,6 +6,7 @@ use generate::{Options, Target};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+mod docs;
 mod generate;
 
 /// Tasks of the repository itself.
@@ -36,23 +37,55 @@ enum Task {
         #[arg(value_name = "SPEC")]
         specs: Vec<PathBuf>,
     },
+    /// Run the examples of README and book, follow their links, and write the measurements of their pages.
+    #[command(group = clap::ArgGroup::new("what").required(true))]
+    Docs {
+        /// Change nothing; run each code block, and fail where a block, a link, a section or a stray measurement is at fault.
+        #[arg(long, group = "what")]
+        check: bool,
+        /// Run the commands that the pages name, and write what they measure into the pages.
+        #[arg(long, group = "what")]
+        write: bool,
+        /// The command mms that is run.
+        #[arg(long, value_name = "FILE", default_value = "target/release/mms")]
+        mms: PathBuf,
+        /// Pages to write, such as README.md or results/library.md; all where none is given.
+        #[arg(value_name = "PAGE", conflicts_with = "check")]
+        pages: Vec<PathBuf>,
+    },
 }
 
 fn main() -> ExitCode {
-    let Arguments { task: Task::Gen { check, times, target, out, specs } } = Arguments::parse();
-    let targets = target.map_or(Target::value_variants().to_vec(), |target| vec![target]);
-    match generate::run(&repository(), &specs, &targets, out.as_deref(), Options { check, times }) {
-        Ok(outcome) => {
-            for line in &outcome.lines {
-                say(line);
-            }
-            if outcome.stale { ExitCode::from(1) } else { ExitCode::SUCCESS }
-        }
+    match run(Arguments::parse().task) {
+        Ok(code) => code,
         Err(error) => {
             complain(&format!("{error:#}"));
             ExitCode::from(2)
         }
     }
+}
+
+fn run(task: Task) -> anyhow::Result<ExitCode> {
+    let (lines, failed) = match task {
+        Task::Gen { check, times, target, out, specs } => {
+            let targets = target.map_or(Target::value_variants().to_vec(), |target| vec![target]);
+            let options = Options { check, times };
+            let outcome = generate::run(&repository(), &specs, &targets, out.as_deref(), options)?;
+            (outcome.lines, outcome.stale)
+        }
+        Task::Docs { write: true, mms, pages, .. } => {
+            docs::write(&repository(), &mms, &pages, say)?;
+            (Vec::new(), false)
+        }
+        Task::Docs { mms, .. } => {
+            let report = docs::check(&repository(), &mms)?;
+            (report.lines, report.failed)
+        }
+    };
+    for line in &lines {
+        say(line);
+    }
+    Ok(if failed { ExitCode::from(1) } else { ExitCode::SUCCESS })
 }
 
 /// The folder of the workspace.

@@ -407,9 +407,9 @@ fn names_of_different_solutions_cannot_clash() {
 }
 
 #[test]
-fn the_example_of_the_readme_compiles_and_gives_the_body_force() {
-    let readme = std::fs::read_to_string(workspace().join("README.md")).unwrap();
-    let (_, rest) = readme.split_once("```c\n").expect("the README has an example in C");
+fn the_example_of_the_book_compiles_and_gives_the_body_force() {
+    let page = std::fs::read_to_string(workspace().join("docs/src/guide/code.md")).unwrap();
+    let (_, rest) = page.split_once("```c\n").expect("the page has an example in C");
     let (example, _) = rest.split_once("```").unwrap();
     let folder = tempfile::tempdir().unwrap();
     let (source, program) = (folder.path().join("example.c"), folder.path().join("example"));

@@ -1,0 +1,444 @@
+//! Sections of a page that commands write, with the date, the commit and the machine.
+
+use super::blocks::Workplace;
+use super::markdown::{Page, Section};
+use anyhow::{Context, bail};
+use serde_json::Value;
+use std::path::Path;
+use std::process::Command;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// How the output of a section's commands is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Form {
+    /// Each command and what it prints.
+    Text,
+    /// What the command prints, which is Markdown and the same at all times.
+    Exact,
+    /// Each command and the Markdown that it writes to `OUT.md`.
+    Tables,
+    /// A row for each study: cells, the error of each field on the finest grid, and its order there.
+    Orders,
+    /// A row for each study: the error of the displacement on each grid, orders, and speed.
+    Displacement,
+    /// A row for each run: particles, steps, time and particle-steps a second.
+    Speed,
+    /// The picture that the command writes to its last word, a path of the repository.
+    Picture,
+}
+
+impl Form {
+    fn of(section: &Section) -> Result<Self, String> {
+        Ok(match section.form.as_str() {
+            "" => Self::Text,
+            "exact" => Self::Exact,
+            "tables" => Self::Tables,
+            "orders" => Self::Orders,
+            "displacement" => Self::Displacement,
+            "speed" => Self::Speed,
+            "picture" => Self::Picture,
+            other => {
+                return Err(format!(
+                    "the form '{other}' is not known; known are exact, tables, orders, displacement, speed and picture"
+                ));
+            }
+        })
+    }
+
+    fn columns(self) -> &'static [&'static str] {
+        match self {
+            Self::Orders => {
+                &["u (m)", "order", "v (m/s)", "order", "F", "order", "P (Pa)", "order"]
+            }
+            Self::Displacement => &["L_inf of u (m)", "orders", "million particle-steps/s"],
+            Self::Speed => &["particles", "steps", "stepping (s)", "million particle-steps/s"],
+            Self::Text | Self::Exact | Self::Tables | Self::Picture => &[],
+        }
+    }
+}
+
+/// The lines that a section must have in this order, whatever its commands measure.
+fn skeleton(form: Form, section: &Section) -> Vec<String> {
+    match form {
+        Form::Text | Form::Tables => {
+            section.commands.iter().map(|command| shown(command)).collect()
+        }
+        Form::Exact => Vec::new(),
+        Form::Picture => section
+            .commands
+            .iter()
+            .filter_map(|command| command.split_whitespace().last())
+            .map(str::to_owned)
+            .collect(),
+        Form::Orders | Form::Displacement | Form::Speed => {
+            let (common, labels) = labels(&section.commands);
+            std::iter::once(format!("Each row is `{common}` with the words of its first column."))
+                .chain(labels.into_iter().map(|label| format!("| `{label}` |")))
+                .collect()
+        }
+    }
+}
+
+/// A command without the words that only name the file for its output.
+fn shown(command: &str) -> String {
+    let words: Vec<&str> = command.split_whitespace().collect();
+    match words.iter().position(|word| *word == "OUT.md") {
+        Some(at) if at > 0 => [&words[..at - 1], &words[at + 1..]].concat().join(" "),
+        _ => words.join(" "),
+    }
+}
+
+/// What commands have in common, and what each has beside it.
+fn labels(commands: &[String]) -> (String, Vec<String>) {
+    let groups: Vec<Vec<String>> = commands.iter().map(|command| groups(command)).collect();
+    let in_all = |group: &String| groups.iter().all(|other| other.contains(group));
+    let common: Vec<String> =
+        groups.first().into_iter().flatten().filter(|group| in_all(group)).cloned().collect();
+    let rest = |of: &Vec<String>| {
+        of.iter().filter(|group| !common.contains(group)).cloned().collect::<Vec<_>>().join(" ")
+    };
+    let labels = groups.iter().map(rest).collect();
+    (common.join(" "), labels)
+}
+
+/// The words of a command, each option together with its value.
+fn groups(command: &str) -> Vec<String> {
+    let mut groups: Vec<String> = Vec::new();
+    let mut takes_value = false;
+    for word in command.split_whitespace() {
+        match groups.last_mut() {
+            Some(last) if takes_value && !word.starts_with("--") => {
+                last.push(' ');
+                last.push_str(word);
+                takes_value = false;
+            }
+            _ => {
+                takes_value = word.starts_with("--");
+                groups.push(word.to_owned());
+            }
+        }
+    }
+    groups
+}
+
+/// What is wrong with a section as it stands; those that are the same at all times are written once more and compared.
+pub(crate) fn fault(section: &Section, lines: &[&str], place: &Workplace) -> Result<(), String> {
+    let form = Form::of(section)?;
+    if section.commands.is_empty() {
+        return Err("the section names no command".to_owned());
+    }
+    let body = &lines[section.body.clone()];
+    if form == Form::Exact {
+        let now = content(form, section, place).map_err(|error| format!("{error:#}"))?;
+        let (now, stated): (Vec<&str>, Vec<&str>) =
+            (solid(now.lines()), solid(body.iter().copied()));
+        return match now.iter().zip(&stated).find(|(now, stated)| now != stated) {
+            Some((now, stated)) => {
+                Err(format!("'{stated}' should be '{now}'; write it with cargo xtask docs --write"))
+            }
+            None if now.len() != stated.len() => Err(
+                "it is not as its command writes it now; write it with cargo xtask docs --write"
+                    .to_owned(),
+            ),
+            None => Ok(()),
+        };
+    }
+    let mut rest = body.iter();
+    for wanted in skeleton(form, section) {
+        if !rest.any(|line| line.contains(&wanted)) {
+            return Err(format!(
+                "it lacks '{wanted}', as if written by other commands; write it with cargo xtask docs --write"
+            ));
+        }
+    }
+    if form != Form::Picture && !body.iter().any(|line| is_stamp(line)) {
+        return Err(
+            "it states no date, commit and machine; write it with cargo xtask docs --write"
+                .to_owned(),
+        );
+    }
+    Ok(())
+}
+
+fn solid<'a>(lines: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    lines.map(str::trim_end).filter(|line| !line.is_empty()).collect()
+}
+
+fn is_stamp(line: &str) -> bool {
+    line.starts_with("*Written on 20")
+        && line.contains(" from commit ")
+        && line.contains("rustc")
+        && line.ends_with("*")
+}
+
+/// A page with its sections written anew, and how many these are.
+pub(crate) fn write(
+    text: &str,
+    place: &Workplace,
+    repository: &Path,
+) -> anyhow::Result<(String, usize)> {
+    let page = Page::parse(text);
+    let lines: Vec<&str> = text.lines().collect();
+    let (mut written, mut at) = (String::new(), 0);
+    for section in &page.sections {
+        let form = Form::of(section).map_err(anyhow::Error::msg)?;
+        let content = match form {
+            Form::Picture => {
+                for command in &section.commands {
+                    succeed(place, &format!("cd \"$REPOSITORY\"\n{command}"))?;
+                }
+                lines[section.body.clone()].join("\n")
+            }
+            Form::Exact => content(form, section, place)?,
+            _ => format!("{}\n\n{}", stamp(repository)?, content(form, section, place)?),
+        };
+        for line in &lines[at..section.body.start] {
+            written.push_str(line);
+            written.push('\n');
+        }
+        written.push_str(&format!("\n{}\n\n", content.trim()));
+        at = section.body.end;
+    }
+    for line in &lines[at..] {
+        written.push_str(line);
+        written.push('\n');
+    }
+    Ok((written, page.sections.len()))
+}
+
+fn content(form: Form, section: &Section, place: &Workplace) -> anyhow::Result<String> {
+    let mut parts = Vec::new();
+    match form {
+        Form::Text => {
+            for command in &section.commands {
+                parts.push(format!(
+                    "```sh\n{command}\n```\n\n```text\n{}\n```\n",
+                    succeed(place, command)?.trim_end()
+                ));
+            }
+        }
+        Form::Exact => {
+            for command in &section.commands {
+                parts.push(succeed(place, command)?);
+            }
+        }
+        Form::Tables => {
+            for command in &section.commands {
+                succeed(place, command)?;
+                parts.push(format!(
+                    "```sh\n{}\n```\n\n{}",
+                    shown(command),
+                    without_headings(&place.read("OUT.md")?)
+                ));
+            }
+        }
+        Form::Orders | Form::Displacement | Form::Speed => {
+            let (common, labels) = labels(&section.commands);
+            parts.push(format!("Each row is `{common}` with the words of its first column.\n"));
+            let columns = form.columns();
+            parts.push(format!("| | {} |", columns.join(" | ")));
+            parts.push(format!("|---|{}", "---:|".repeat(columns.len())));
+            for (command, label) in section.commands.iter().zip(labels) {
+                succeed(place, &format!("{command} --json OUT.json"))?;
+                let document: Value = serde_json::from_str(&place.read("OUT.json")?)
+                    .with_context(|| format!("the JSON of {command}"))?;
+                let cells = match form {
+                    Form::Orders => orders(&document),
+                    Form::Displacement => displacement(&document),
+                    _ => speed(&document),
+                };
+                let cells =
+                    cells.with_context(|| format!("the JSON of '{command}' lacks a row"))?;
+                parts.push(format!("| `{label}` | {} |", cells.join(" | ")));
+            }
+        }
+        Form::Picture => {}
+    }
+    Ok(parts.join("\n"))
+}
+
+/// What a command prints that does its work, whether or not what it measures passes.
+fn succeed(place: &Workplace, command: &str) -> anyhow::Result<String> {
+    let printed = place.run(command)?;
+    // A missed order is a result, and ends with 1 after it was printed.
+    if printed.status != Some(0) && (printed.status != Some(1) || printed.out.is_empty()) {
+        bail!("'{command}' failed:\n{}{}", printed.out, printed.errors);
+    }
+    Ok(printed.out)
+}
+
+/// Headings would stand among those of the page.
+fn without_headings(text: &str) -> String {
+    let line = |line: &str| match line.trim_start_matches('#').strip_prefix(' ') {
+        Some(heading) if line.starts_with('#') => format!("**{}**", heading.trim()),
+        _ => line.to_owned(),
+    };
+    text.lines().map(line).collect::<Vec<_>>().join("\n")
+}
+
+fn orders(document: &Value) -> Option<Vec<String>> {
+    let last = document["rows"].as_array()?.last()?;
+    let mut cells = Vec::new();
+    for field in ["u", "v", "F", "P"] {
+        cells.push(number(&last["errors"][field]["l2"], 1));
+        let local = document["orders"][field]["l2"]["local"].as_array()?.last()?;
+        cells.push(local.as_f64().map_or("-".to_owned(), |order| format!("{order:.2}")));
+    }
+    Some(cells)
+}
+
+fn displacement(document: &Value) -> Option<Vec<String>> {
+    let rows = document["rows"].as_array()?;
+    let errors: Vec<String> =
+        rows.iter().map(|row| number(&row["errors"]["u"]["linf"], 1)).collect();
+    let local = document["orders"]["u"]["linf"]["local"].as_array()?;
+    let local: Vec<String> = local
+        .iter()
+        .map(|order| order.as_f64().map_or("-".to_owned(), |order| format!("{order:.2}")))
+        .collect();
+    Some(vec![errors.join(", "), local.join(", "), rate(rows.last()?)])
+}
+
+fn speed(document: &Value) -> Option<Vec<String>> {
+    let row = document.get("result")?;
+    let count = |name: &str| row[name].as_u64().map_or("-".to_owned(), |count| count.to_string());
+    let seconds = row["wall_s"].as_f64().map_or("-".to_owned(), |seconds| format!("{seconds:.2}"));
+    Some(vec![count("particles"), count("steps"), seconds, rate(row)])
+}
+
+fn rate(row: &Value) -> String {
+    row["particle_steps_per_s"].as_f64().map_or("-".to_owned(), |rate| format!("{:.1}", rate / 1e6))
+}
+
+fn number(value: &Value, digits: usize) -> String {
+    value.as_f64().map_or("-".to_owned(), |value| format!("{value:.digits$e}"))
+}
+
+/// When, from which commit and on which machine a section was written.
+fn stamp(repository: &Path) -> anyhow::Result<String> {
+    let said = |command: &mut Command| -> anyhow::Result<String> {
+        let output = command
+            .current_dir(repository)
+            .output()
+            .with_context(|| format!("cannot start {command:?}"))?;
+        Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
+    };
+    let commit = said(Command::new("git").args(["rev-parse", "--short=10", "HEAD"]))?;
+    let changes = said(Command::new("git").args([
+        "status",
+        "--porcelain",
+        "--",
+        "crates",
+        "mms-specs",
+        "Cargo.lock",
+    ]))?;
+    let changed = if changes.is_empty() { "" } else { " with changes" };
+    let rustc = said(Command::new("rustc").arg("--version"))?;
+    let rustc = rustc.split(" (").next().unwrap_or("rustc");
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let processor = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let processor = processor.lines().find_map(|line| {
+        line.strip_prefix("model name")?.split_once(": ").map(|(_, name)| name.trim())
+    });
+    let processor = processor.unwrap_or(std::env::consts::ARCH);
+    Ok(format!(
+        "*Written on {} from commit {commit}{changed}, on {cores} cores of {processor}, with {rustc}.*",
+        today()
+    ))
+}
+
+fn today() -> String {
+    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
+    let (year, month, day) = date(seconds / 86_400);
+    format!("{year:04}-{month:02}-{day:02}")
+}
+
+/// Year, month and day of a number of days since the first of January 1970, in the Gregorian calendar.
+fn date(days: u64) -> (u64, u64, u64) {
+    // Years that begin in March have their leap day at the end.
+    let days = days + 719_468;
+    let (era, of_era) = (days / 146_097, days % 146_097);
+    let year_of_era = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
+    let of_year = of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let from_march = (5 * of_year + 2) / 153;
+    let day = of_year - (153 * from_march + 2) / 5 + 1;
+    let month = if from_march < 10 { from_march + 3 } else { from_march - 9 };
+    (year_of_era + era * 400 + u64::from(month <= 2), month, day)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn section(text: &str) -> Section {
+        Page::parse(text).sections.remove(0)
+    }
+
+    fn place(name: &str) -> Workplace {
+        Workplace::new(Path::new("/bin/echo"), Path::new(env!("CARGO_MANIFEST_DIR")), name).unwrap()
+    }
+
+    #[test]
+    fn days_are_counted_with_leap_years() {
+        assert_eq!(date(0), (1970, 1, 1));
+        assert_eq!(date(19_782), (2024, 2, 29));
+        assert_eq!(date(20_148), (2025, 3, 1));
+        assert_eq!(date(11_016), (2000, 2, 29));
+    }
+
+    #[test]
+    fn what_all_commands_have_is_said_once() {
+        let commands =
+            ["mms converge a --cells 8,16 --cfl 0.2", "mms converge b --cfl 0.2 --cells 4"]
+                .map(str::to_owned);
+        let (common, labels) = labels(&commands);
+        assert_eq!(common, "mms converge --cfl 0.2");
+        assert_eq!(labels, ["a --cells 8,16", "b --cells 4"]);
+    }
+
+    #[test]
+    fn a_written_section_passes_until_its_commands_change() {
+        let text = "# T\n<!-- begin: mms say this -->\n<!-- end -->\nrest\n";
+        let place = place("written");
+        let (written, count) = write(text, &place, Path::new(env!("CARGO_MANIFEST_DIR"))).unwrap();
+        assert_eq!(count, 1);
+        assert!(
+            written.contains("```text\nsay this\n```") && written.ends_with("<!-- end -->\nrest\n"),
+            "{written}"
+        );
+        let check = |text: &str| fault(&section(text), &text.lines().collect::<Vec<_>>(), &place);
+        assert_eq!(check(&written), Ok(()));
+        assert!(check(text).unwrap_err().contains("lacks 'mms say this'"));
+        let other = written.replacen("mms say this", "mms say that", 1);
+        assert!(check(&other).unwrap_err().contains("written by other commands"));
+        let undated = written.replace("*Written", "Written");
+        assert!(check(&undated).unwrap_err().contains("no date"));
+        // Written once more it stays as it is.
+        assert_eq!(
+            write(&written, &place, Path::new(env!("CARGO_MANIFEST_DIR"))).unwrap().0,
+            written
+        );
+    }
+
+    #[test]
+    fn what_is_the_same_at_all_times_is_compared() {
+        let place = place("exact");
+        let text = "<!-- begin: exact\nmms a\n-->\n\na\n\n<!-- end -->\n";
+        let check = |text: &str| fault(&section(text), &text.lines().collect::<Vec<_>>(), &place);
+        assert_eq!(check(text), Ok(()));
+        assert!(
+            check(&text.replace("\n\na\n", "\n\nb\n")).unwrap_err().contains("'b' should be 'a'")
+        );
+    }
+
+    #[test]
+    fn a_table_has_a_row_for_each_command() {
+        let document: Value = serde_json::from_str(
+            r#"{"rows": [{"errors": {"u": {"linf": 1e-2}}}, {"errors": {"u": {"linf": 2.5e-3}}, "particle_steps_per_s": 3.2e6}],
+                "orders": {"u": {"linf": {"local": [2.0]}}}}"#,
+        )
+        .unwrap();
+        assert_eq!(displacement(&document).unwrap(), ["1.0e-2, 2.5e-3", "2.00", "3.2"]);
+        assert_eq!(orders(&document), None);
+    }
+}
