@@ -29,7 +29,10 @@ pub(crate) fn faults(pages: &Pages, repository: &Path) -> Vec<Fault> {
         for (line, span) in &page.spans {
             let named = span.split([':', ' ', '{', '*', '<']).next().unwrap_or("");
             let is_path = FOLDERS.iter().any(|folder| span.starts_with(folder));
-            if is_path && !repository.join(named).exists() {
+            // NAME stands for any name, and the examples of a page have files of their own.
+            let is_example = named.contains("NAME")
+                || page.blocks.iter().any(|block| block.marks.contains(&format!("file: {named}")));
+            if is_path && !is_example && !repository.join(named).exists() {
                 faults.push((path.clone(), *line, format!("the repository has no {named}")));
             }
         }
