@@ -93,6 +93,7 @@ pub(crate) fn check(repository: &Path, mms: &Path) -> anyhow::Result<Report> {
         faults.push(("README.md".into(), 1, fault));
     }
     faults.extend(links::faults(&pages, repository));
+    faults.extend(links::strangers(&pages, &sources(&repository.join("crates"))?));
     let links: usize = pages.values().map(|page| page.links.len()).sum();
     let failed = !faults.is_empty();
     lines.extend(
@@ -152,21 +153,31 @@ fn require(mms: &Path) -> anyhow::Result<()> {
 /// The README and the pages of the book, by their paths in the repository.
 fn texts(repository: &Path) -> anyhow::Result<Vec<(PathBuf, String)>> {
     let mut paths = vec![PathBuf::from("README.md")];
-    let mut folders = vec![PathBuf::from(BOOK)];
+    for path in files(&repository.join(BOOK), "md")? {
+        paths.push(path.strip_prefix(repository).unwrap_or(&path).to_owned());
+    }
+    paths.into_iter().map(|path| Ok((path.clone(), read(&repository.join(&path))?))).collect()
+}
+
+/// All Rust source of a folder.
+fn sources(folder: &Path) -> anyhow::Result<String> {
+    files(folder, "rs")?.iter().map(|path| read(path)).collect()
+}
+
+/// The files of a folder and those within it that have an ending, in order.
+fn files(folder: &Path, ending: &str) -> anyhow::Result<Vec<PathBuf>> {
+    let (mut found, mut folders) = (Vec::new(), vec![folder.to_owned()]);
     while let Some(folder) = folders.pop() {
-        let at = repository.join(&folder);
-        let entries =
-            std::fs::read_dir(&at).with_context(|| format!("cannot read {}", at.display()))?;
-        for entry in entries {
-            let entry = entry.with_context(|| format!("cannot read {}", at.display()))?;
-            let path = folder.join(entry.file_name());
-            if entry.path().is_dir() {
+        let context = || format!("cannot read {}", folder.display());
+        for entry in std::fs::read_dir(&folder).with_context(context)? {
+            let path = entry.with_context(context)?.path();
+            if path.is_dir() {
                 folders.push(path);
-            } else if path.extension().is_some_and(|extension| extension == "md") {
-                paths.push(path);
+            } else if path.extension().is_some_and(|extension| extension == ending) {
+                found.push(path);
             }
         }
     }
-    paths[1..].sort();
-    paths.into_iter().map(|path| Ok((path.clone(), read(&repository.join(&path))?))).collect()
+    found.sort();
+    Ok(found)
 }

@@ -1,6 +1,6 @@
 //! Rust and C source for manufactured solutions, from their specifications.
 //!
-//! A [`Plan`] derives the fields of a specification and decides what is computed when. It is written down as the items
+//! Specifications are read by [`mmsmith_spec`]. A [`Plan`] derives the fields of a specification and decides what is computed when. It is written down as the items
 //! of a Rust module, a struct for the parameters, a struct for the solution and the implementation of the trait
 //! `Solution`, or as a C header with the same values in the same order. The command `cargo xtask gen` writes both to
 //! files; the macro `manufactured_solution!` puts the Rust items where it stands.

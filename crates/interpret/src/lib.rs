@@ -1,6 +1,6 @@
 //! Manufactured solutions evaluated straight from their specifications, without generated code.
 //!
-//! [`interpret`] turns a specification into the same interface that generated solutions have, so that a file can
+//! [`interpret`] turns a specification into the same interface that [generated solutions](mmsmith_solutions) have, so that a file can
 //! be checked before anything is generated from it. It evaluates the straight-line programs that the generator
 //! translates, in double precision, and in the same stages; for work on many points the generated code is still faster.
 

@@ -1,7 +1,13 @@
 //! The macro `manufactured_solution!`, for crates outside this workspace.
 //!
 //! It makes the same items from a specification as `cargo xtask gen` writes to files, at compile time. The crate
-//! that uses it needs `mmsmith-solutions` as a dependency, which holds the trait that the items implement.
+//! that uses it has two dependencies: this one, and `mmsmith-solutions`, which holds the trait that the items implement.
+//!
+//! ```toml
+//! [dependencies]
+//! mmsmith-macros = { path = "mmsmith/crates/macros" }
+//! mmsmith-solutions = { path = "mmsmith/crates/solutions" }
+//! ```
 
 use mmsmith_spec::Spec;
 use proc_macro::{Span, TokenStream};
@@ -17,6 +23,10 @@ use syn::LitStr;
 ///
 /// ```ignore
 /// mmsmith_macros::manufactured_solution!("my-wave.toml");
+/// use mmsmith_solutions::{Solution, nalgebra::SVector};
+///
+/// let wave = MyWave::new(MyWaveParameters { A: 0.05, ..Default::default() })?;
+/// let b = wave.body_force(&SVector::<f64, 2>::new(0.3, 0.6), 0.01);
 /// ```
 #[proc_macro]
 pub fn manufactured_solution(input: TokenStream) -> TokenStream {

@@ -1,5 +1,5 @@
-//! C listings as Maple's `CodeGeneration[C]` prints them, read into expressions, and proved or refuted equal to
-//! derived fields.
+//! C listings as Maple's `CodeGeneration[C]` prints them, read into expressions, and compared with derived fields in high
+//! precision.
 //!
 //! Authors of manufactured solutions publish the body force as such a listing: assignments to temporaries `t1`,
 //! `t2`, ... and to the entries of an array, as `b[0] = -t4*t11*t12;`.
@@ -10,8 +10,8 @@
 //!    points ([`sample`] draws some), and reports for each component the digits to which the two agree, or the worst
 //!    point with both values.
 //!
-//! Agreement to 40 digits at random points is taken as proof: two different closed forms of this kind agree so at
-//! one random point with a probability that is nil. Numbers are exact as printed; a listing with pi as
+//! Agreement to 40 digits at random points verifies a listing, without a proof in symbols: two different closed forms
+//! of this kind agree so at one random point with a probability that is nil. Numbers are exact as printed; a listing with pi as
 //! `0.3141592653589793e1` agrees to 16 digits, and the report says so.
 //!
 //! ```

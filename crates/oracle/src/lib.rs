@@ -1,4 +1,5 @@
-//! Exact expressions evaluated in arbitrary precision: the truth that double-precision results are held against.
+//! [Exact expressions](mmsmith_expr) evaluated in arbitrary precision: the truth that double-precision results are held
+//! against.
 //!
 //! - [`Oracle::evaluate`] computes expressions of a [`Graph`](mmsmith_expr::Graph) at exact inputs in a stated
 //!   number of bits; [`Oracle::settle`] raises the number of bits until the digits asked for stand still.

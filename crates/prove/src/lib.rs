@@ -1,4 +1,5 @@
-//! What a specification claims about its own fields, proved or refuted in high precision.
+//! The claims of a specification about its own fields: proved where they vanish in symbols, else verified or refuted in
+//! high precision.
 //!
 //! - [`Published`]: the listings of `[[cross-check]]`, which the derived fields should equal.
 //! - [`surfaces`]: what the boundary conditions say is zero, such as the traction on a free surface.

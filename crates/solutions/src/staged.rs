@@ -26,8 +26,8 @@ pub trait BodyForceAtPoints<T: Real, const D: usize>: Send + Sync {
     /// Adds to `values` what [`evaluate_of`](Self::evaluate_of) needs of the time `t`.
     fn of_time(&self, t: T, values: &mut Vec<T>);
 
-    /// As [`evaluate`](Self::evaluate) for the points of the given numbers, in any order, at the time that `time` was made [of
-    /// ](Self::of_time); `b` is as long as `points`.
+    /// As [`evaluate`](Self::evaluate) for the points of the given numbers, in any order, at the time that
+    /// [`of_time`](Self::of_time) made `time` for; `b` is as long as `points`.
     ///
     /// # Panics
     ///

@@ -1,6 +1,8 @@
 //! Measures how far field code and a solver are from a manufactured solution.
 //!
-//! - [`check`] proves the fields of a solution against each other, by finite differences and by the solver's own
+//! Solutions come from [`mmsmith_solutions`], the solver is [`mmsmith_mpm`], files are those of [`mmsmith_vtk`].
+//!
+//! - [`check`] compares the fields of a solution with each other, by finite differences and by the solver's own
 //!   constitutive law, and the declared boundary conditions at sampled boundary points.
 //! - [`coverage()`] measures which terms of the momentum balance a solution exercises.
 //! - [`run`] simulates one [`Case`] and measures the errors of displacement, velocity, deformation gradient and
