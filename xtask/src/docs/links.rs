@@ -58,8 +58,10 @@ pub(crate) fn faults(pages: &Pages, repository: &Path) -> Vec<Fault> {
 pub(crate) fn strangers(pages: &Pages, sources: &str) -> Vec<Fault> {
     let path = Path::new(BOOK).join("contributing/glossary.md");
     let Some(page) = pages.get(&path) else { return Vec::new() };
-    let is_row = |line: usize| page.prose.iter().any(|(at, prose)| *at == line && prose.starts_with("| "));
-    let last_of_line = |i: usize| page.spans.get(i + 1).is_none_or(|(line, _)| *line != page.spans[i].0);
+    let is_row =
+        |line: usize| page.prose.iter().any(|(at, prose)| *at == line && prose.starts_with("| "));
+    let last_of_line =
+        |i: usize| page.spans.get(i + 1).is_none_or(|(line, _)| *line != page.spans[i].0);
     let mut faults = Vec::new();
     for (i, (line, span)) in page.spans.iter().enumerate() {
         if is_row(*line) && last_of_line(i) && !sources.contains(span.as_str()) {
@@ -165,7 +167,8 @@ mod tests {
     #[test]
     fn words_that_the_code_does_not_use_are_named() {
         let text = "| term | code |\n|---|---|\n| a, `x = y` | `fn a` |\n| b | `gone` |\n";
-        let pages = [(PathBuf::from("docs/src/contributing/glossary.md"), Page::parse(text))].into();
+        let pages =
+            [(PathBuf::from("docs/src/contributing/glossary.md"), Page::parse(text))].into();
         let faults = strangers(&pages, "fn a() {}");
         assert_eq!(faults.len(), 1, "{faults:?}");
         assert!(faults[0].2.contains("gone"), "{faults:?}");
