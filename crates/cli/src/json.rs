@@ -1,20 +1,24 @@
 //! Files that are there whole or not at all, and documents on standard output.
 
-use std::fs::{self, File, OpenOptions};
+use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
+use mmsmith_verify::WholeFile;
 use serde::Serialize;
 
 use crate::terminal;
+
+/// A file that cannot have so many bytes is refused before the work for it.
+const ROOM: usize = 1 << 20;
 
 /// A document that will be written at the end of some work, to a place found to be writable before it.
 pub(crate) struct Output(Place);
 
 enum Place {
-    /// A file that replaces what has its name; until it is complete it has the temporary one.
-    File { path: PathBuf, temporary: PathBuf },
+    /// A file that replaces what has its name, once it is complete.
+    File { path: PathBuf, file: WholeFile },
     /// A device or a pipe, which cannot be replaced.
     Device(PathBuf),
     /// Standard output, kept for this document.
@@ -22,8 +26,8 @@ enum Place {
 }
 
 impl Output {
-    /// Makes sure that `path` can be written, without touching what is there. `-` is standard output, where nothing else
-    /// is said from now on.
+    /// Makes sure that `path` can be written and that there is some room for it, without touching what is there. `-` is
+    /// standard output, where nothing else is said from now on.
     pub(crate) fn prepare(path: &Path) -> Result<Self> {
         if path == Path::new("-") {
             terminal::reserve()?;
@@ -38,15 +42,10 @@ impl Output {
         if path.exists() && !path.is_file() {
             return Ok(Self(Place::Device(path)));
         }
-        let Some(name) = path.file_name() else { bail!("cannot write {shown}: it names no file") };
-        let name = format!(".{}.{}.tmp", name.to_string_lossy(), std::process::id());
-        let temporary = path.with_file_name(name);
-        OpenOptions::new()
-            .write(true)
-            .create_new(true)
-            .open(&temporary)
-            .with_context(|| format!("cannot write {shown}"))?;
-        Ok(Self(Place::File { path, temporary }))
+        WholeFile::sweep(&path);
+        let mut file = WholeFile::create(&path).with_context(|| format!("cannot write {shown}"))?;
+        file.probe_room(ROOM).with_context(|| format!("no room for {shown}"))?;
+        Ok(Self(Place::File { path, file }))
     }
 
     /// [`Output::prepare`] where a file was asked for.
@@ -67,32 +66,23 @@ impl Output {
 
     /// Writes `bytes` and gives the file its name.
     pub(crate) fn write_bytes(self, bytes: &[u8]) -> Result<()> {
-        let (written, path) = match &self.0 {
+        let (written, path) = match self.0 {
             Place::Standard => return terminal::print(bytes),
-            Place::Device(path) => {
-                (File::create(path).and_then(|mut file| file.write_all(bytes)), path)
-            }
-            Place::File { path, temporary } => {
-                let write = || {
-                    let mut file = File::create(temporary)?;
-                    file.write_all(bytes)?;
-                    file.sync_all()?;
-                    fs::rename(temporary, path)
-                };
-                (write(), path)
+            Place::Device(path) => (fs::write(&path, bytes), path),
+            Place::File { path, mut file } => {
+                (file.write_all(bytes).and_then(|()| file.finish()), path)
             }
         };
         written.with_context(|| format!("cannot write {}", path.display()))
     }
 }
 
-impl Drop for Output {
-    fn drop(&mut self) {
-        // After a rename there is nothing left to remove.
-        if let Place::File { temporary, .. } = &self.0 {
-            let _ = fs::remove_file(temporary);
-        }
-    }
+/// Makes the folder where there is none, and makes sure that files can be written to it and that there is some room.
+pub(crate) fn prepare_folder(folder: &Path) -> Result<()> {
+    fs::create_dir_all(folder)
+        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    // It goes as it came.
+    Output::prepare(&folder.join("probe")).map(drop)
 }
 
 /// `value` as indented JSON; numbers in shortest round-trip form, those that are not finite as null.

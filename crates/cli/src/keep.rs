@@ -11,6 +11,7 @@ use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
+use crate::json::prepare_folder;
 use crate::library::{Origin, locate};
 use crate::terminal;
 
@@ -40,6 +41,7 @@ impl Keep {
     pub(crate) fn open(folder: Option<&PathBuf>, solution: &str) -> Result<Self> {
         let Some(folder) = folder else { return Ok(Self(None)) };
         let ledger = Ledger::open(folder).context("--out")?;
+        prepare_folder(folder).context("--out")?;
         let keep = Self(Some(Place { ledger, common: origin(solution)? }));
         keep.tell_damage();
         Ok(keep)

@@ -2,25 +2,16 @@
 
 mod command;
 
-use command::{mms, names, read_json, refuses};
+use command::{UnderWay, mms, names, read_json, refuses};
 use serde_json::Value;
 use std::path::Path;
-use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
 
-/// Starts `mms`, and kills it after a while unless it has ended.
-fn killed(place: &Path, arguments: &str, after: Duration) {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_mms"))
-        .current_dir(place)
-        .args(arguments.split_whitespace())
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .expect("the binary starts");
-    std::thread::sleep(after);
-    // It may have ended already.
-    let _ = child.kill();
-    child.wait().expect("it has ended");
+/// How far the checkpoint in a folder is; nowhere without one.
+fn reached(folder: &Path) -> u64 {
+    let Ok(bytes) = std::fs::read(folder.join("checkpoint")) else { return 0 };
+    // Behind how it begins, what run it is of, and two counts.
+    let step = bytes[72..80].try_into().expect("a number");
+    u64::from_le_bytes(step)
 }
 
 /// The result without its times.
@@ -32,25 +23,24 @@ fn result(path: &Path) -> Value {
     result
 }
 
-/// Seven schemes, each killed three times: 21 moments in all.
+/// Seven schemes, each killed three times: once its first checkpoint is there, in the middle, and at its last one.
+#[cfg(unix)]
 #[test]
 fn a_killed_run_goes_on_to_the_same_bits() {
-    let mut random = 12345_u32;
     for scheme in [
-        "axis-aligned --cells 16 --vtk frames --frames 9",
+        "axis-aligned --cells 16 --vtk frames --frames 9 --history history.csv",
         "axis-aligned --cells 16 --precision f32 --threads 2 --integrator musl",
         "ring --cells 16 --shape ugimp --integrator usf --threads 2",
         "ring --cells 12 --shape cpdi2 --layout body-fitted --start data",
         "axis-aligned --cells 10 --transfer apic --integrator usavg",
         "axis-aligned --cells 24 --frame total --shape bspline3",
-        "axis-aligned-3d --cells 4 --shape linear --integrator usl",
+        "axis-aligned-3d --cells 4 --shape linear --integrator usl --history history.csv",
     ] {
         let place = tempfile::tempdir().unwrap();
         let place = place.path();
-        let started = Instant::now();
         let called = mms(place, &format!("run {scheme} --json whole.json"));
-        let whole = started.elapsed();
         assert_eq!(called.status, 0, "{scheme}: {}", called.stderr);
+        let whole = read_json(&place.join("whole.json"));
         let frames = place.join("frames");
         let files = |folder: &Path| -> Vec<(String, Vec<u8>)> {
             let read = |name: String| (name.clone(), std::fs::read(folder.join(name)).unwrap());
@@ -61,30 +51,91 @@ fn a_killed_run_goes_on_to_the_same_bits() {
             std::fs::remove_dir_all(&frames).unwrap();
         }
 
-        let mut moment = || {
-            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            whole.mul_f64(f64::from(random) / f64::from(u32::MAX))
-        };
+        // The result goes to a pipe that nobody reads, so that the run cannot end before it is killed.
+        let parts = place.join("parts.json");
+        command::pipe(&parts);
+        let kept = place.join("kept");
+        let steps = whole["result"]["steps"].as_u64().expect("a number");
         let run = format!("run {scheme} --json parts.json --checkpoint kept --every 3");
-        killed(place, &run, moment());
-        if !place.join("kept/run.json").exists() {
-            // Killed before it began.
-            killed(place, &run, moment().max(whole / 4));
+        for (call, step) in
+            [(run.as_str(), 3), ("resume kept", steps / 2), ("resume kept", steps - steps % 3)]
+        {
+            let mut run = UnderWay::start(place, call);
+            run.wait_for(|| reached(&kept) >= step);
+            run.kill();
         }
-        killed(place, "resume kept", moment());
-        killed(place, "resume kept", moment());
+        std::fs::remove_file(&parts).unwrap();
         let called = mms(place, "resume kept --threads 1");
         assert_eq!(called.status, 0, "{scheme}: {}", called.stderr);
-        assert_eq!(
-            result(&place.join("parts.json")),
-            result(&place.join("whole.json")),
-            "{scheme}"
-        );
+        assert_eq!(result(&parts), result(&place.join("whole.json")), "{scheme}");
+        assert_eq!(read_json(&parts)["history"], whole["history"], "{scheme}");
         if let Some(expected) = expected {
             let left: Vec<_> =
                 files(&frames).into_iter().filter(|(name, _)| !name.ends_with(".tmp")).collect();
             assert!(left == expected, "{scheme}: other particle files");
         }
+        assert_eq!(names(&kept), ["checkpoint", "lock", "run.json"], "{scheme}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_folder_belongs_to_its_run_while_that_lives() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    command::pipe(&place.join("result.json"));
+    let mut run = UnderWay::start(
+        place,
+        "run bar --cells 8 --json result.json --checkpoint kept --every 1",
+    );
+    run.wait_for(|| reached(&place.join("kept")) > 0);
+    refuses(place, "resume kept", &["kept: a process is at work on the run of this folder"]);
+    run.kill();
+    std::fs::remove_file(place.join("result.json")).unwrap();
+    let called = mms(place, "resume kept");
+    assert_eq!(called.status, 0, "{}", called.stderr);
+}
+
+/// A link at the name that was given to checkpoints under way leads nowhere else.
+#[cfg(unix)]
+#[test]
+fn links_in_the_folder_are_not_followed() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    std::fs::write(place.join("mine"), "mine").unwrap();
+    std::fs::create_dir(place.join("kept")).unwrap();
+    std::os::unix::fs::symlink("../mine", place.join("kept/checkpoint.tmp")).unwrap();
+    let called = mms(place, "run bar --cells 8 --checkpoint kept --every 1");
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    assert_eq!(std::fs::read_to_string(place.join("mine")).unwrap(), "mine");
+}
+
+/// A full disk is met before the work, and told once. The limit on the size of files stands for it.
+#[cfg(unix)]
+#[test]
+fn a_full_disk_is_noticed_at_the_door() {
+    let place = tempfile::tempdir().unwrap();
+    for arguments in [
+        "reproduce --out report",
+        "run ring --cells 64 --json a.json",
+        "run ring --cells 64 --vtk frames",
+        "tradeoff ring --csv a.csv",
+        "stability ring --out study",
+        "converge ring --cells 8,16 --plot a.svg",
+    ] {
+        // The signal would end the process; ignored, the limit becomes an error of the write, as a full disk is.
+        let limited = r#"trap '' XFSZ; ulimit -f 8; exec "$0" "$@""#;
+        let output = std::process::Command::new("sh")
+            .args(["-c", limited, env!("CARGO_BIN_EXE_mms")])
+            .args(arguments.split_whitespace())
+            .current_dir(place.path())
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments}: {said}");
+        assert!(said.contains("no room for"), "{arguments}: {said}");
+        assert_eq!(said.matches("os error").count(), 1, "{arguments}: {said}");
+        assert!(output.stdout.is_empty(), "{arguments}: it has begun");
     }
 }
 
@@ -117,8 +168,13 @@ fn folders_that_cannot_be_gone_on_with_are_named() {
 
     let start = place.join("kept/run.json");
     let text = std::fs::read_to_string(&start).unwrap();
-    std::fs::write(&start, text.replace("\"8\"", "\"9\"")).unwrap();
+    for damaged in [text.replace("\"8\"", "\"9\""), "{}".into(), String::new()] {
+        std::fs::write(&start, damaged).unwrap();
+        refuses(place, "resume kept", &["kept/run.json is not what", "its checksum does not match"]);
+    }
+    std::fs::remove_file(&start).unwrap();
+    let called = mms(place, "run bar --cells 9 --checkpoint other --every 1");
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    std::fs::copy(place.join("other/run.json"), &start).unwrap();
     refuses(place, "resume kept", &["belongs to another run"]);
-    std::fs::write(&start, "{}").unwrap();
-    refuses(place, "resume kept", &["run.json is not what mms run --checkpoint writes"]);
 }

@@ -2,11 +2,9 @@
 
 mod command;
 
-use command::{keys, mms, names, read_json, refuses};
+use command::{UnderWay, keys, mms, names, read_json, refuses};
 use serde_json::Value;
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
-use std::time::Duration;
 
 #[test]
 fn a_limit_is_bracketed_and_its_failure_told() {
@@ -137,20 +135,12 @@ fn bad_settings_are_named() {
 const STUDY: &str = "stability axis-aligned --cells 4 --width 0.002 --over nu=-0.2,0,0.1,0.2,0.3,0.4 \
                      --over ppc=2,3 --out study --json table.json";
 
-fn start(place: &Path, arguments: &str) -> Child {
-    Command::new(env!("CARGO_BIN_EXE_mms"))
-        .current_dir(place)
-        .args(arguments.split_whitespace())
-        .stdout(Stdio::null())
-        .spawn()
-        .expect("the binary starts")
-}
-
 fn kept(place: &Path) -> Vec<String> {
     let text = std::fs::read_to_string(place.join("study/cases.jsonl")).unwrap_or_default();
     text.lines().filter(|line| line.ends_with('}')).map(str::to_owned).collect()
 }
 
+#[cfg(unix)]
 #[test]
 fn a_killed_study_goes_on_where_it_stopped_and_ends_with_the_same_table() {
     let [place, whole] = [(); 2].map(|()| tempfile::tempdir().expect("a folder"));
@@ -158,16 +148,19 @@ fn a_killed_study_goes_on_where_it_stopped_and_ends_with_the_same_table() {
     let reference = mms(whole, STUDY);
     assert_eq!(reference.status, 0, "{}", reference.stderr);
 
+    // The table goes to a pipe that nobody reads, so that the study cannot end before it is killed.
+    command::pipe(&place.join("table.json"));
     let mut before = 0;
-    for round in 0..12_u64 {
-        let mut child = start(place, STUDY);
-        std::thread::sleep(Duration::from_millis(20 + round * 37 % 150));
-        child.kill().expect("it can be killed");
-        child.wait().expect("it ends");
+    for finished in [0, 1, 1, 4, 6, 7, 12] {
+        let mut study = UnderWay::start(place, STUDY);
+        let claims = place.join("study/claims");
+        study.wait_for(|| claims.exists() && kept(place).len() >= finished);
+        study.kill();
         let lines = kept(place);
         assert!(lines.len() >= before, "a finished case is lost");
         before = lines.len();
     }
+    std::fs::remove_file(place.join("table.json")).expect("the pipe");
     let ended = mms(place, STUDY);
     assert_eq!(ended.stdout, reference.stdout);
     let rows = |place: &Path| read_json(&place.join("table.json"))["rows"].clone();
@@ -198,9 +191,9 @@ fn two_processes_share_a_study_and_agree() {
     let place = tempfile::tempdir().expect("a folder");
     let place = place.path();
     let other = STUDY.replace("table.json", "other.json");
-    let children = [start(place, STUDY), start(place, &other)];
-    for mut child in children {
-        assert!(child.wait().expect("it ends").success());
+    let studies = [UnderWay::start(place, STUDY), UnderWay::start(place, &other)];
+    for study in studies {
+        assert_eq!(study.end(), 0);
     }
     assert_eq!(kept(place).len(), 12, "no case twice");
     let rows = |name: &str| read_json(&place.join(name))["rows"].clone();

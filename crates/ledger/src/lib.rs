@@ -96,15 +96,16 @@ pub struct Case<'a> {
 }
 
 /// Why a ledger could not be read or written.
+// The message has the cause, which is therefore no `source`: whoever prints both would print it twice.
 #[derive(Debug, Error)]
-#[error("cannot {action} {}: {source}", path.display())]
+#[error("cannot {action} {}: {cause}", path.display())]
 pub struct LedgerError {
     /// What was tried.
     pub action: &'static str,
     /// The file or folder.
     pub path: PathBuf,
     /// Why it failed.
-    pub source: io::Error,
+    pub cause: io::Error,
 }
 
 const CASES: &str = "cases.jsonl";
@@ -381,5 +382,5 @@ fn try_lock(path: &Path) -> Result<Option<File>, LedgerError> {
 }
 
 fn error<'a>(action: &'static str, path: &'a Path) -> impl FnOnce(io::Error) -> LedgerError + 'a {
-    move |source| LedgerError { action, path: path.to_owned(), source }
+    move |cause| LedgerError { action, path: path.to_owned(), cause }
 }

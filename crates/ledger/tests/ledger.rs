@@ -3,17 +3,20 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::fs::{self, File, OpenOptions};
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{BufRead, BufReader, Lines, Write};
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
-use std::time::Duration;
+use std::process::{Child, ChildStdout, Command, Stdio};
 
 use mmsmith_ledger::{Claim, Ledger};
 use serde_json::{Value, json};
 
 const FOLDER: &str = "MMSMITH_LEDGER_FOLDER";
-/// While this file is there, children wait.
+/// While this file is there, children wait, each after the first case that it finished itself.
 const GATE: &str = "gate";
+/// Where this is set, a child that has done its work waits to be killed.
+const KILLED: &str = "MMSMITH_LEDGER_KILLED";
+/// What such a child says before it waits.
+const IDLE: &str = "nothing is left";
 /// Cases of the children's study.
 const CASES: u64 = 400;
 
@@ -25,13 +28,13 @@ fn value(case: u64) -> Value {
     json!({ "error": 1.0 / (case as f64 + 3.0), "text": "x".repeat((case % 7) as usize * 300) })
 }
 
-/// Finishes what it can of the study, naming each case that it finished itself.
-fn work(folder: &Path) {
+/// Finishes what it can of the study, calling `then` with each case that it finished itself.
+fn work(folder: &Path, mut then: impl FnMut(u64)) {
     let ledger = Ledger::open(folder).unwrap();
     for case in 0..CASES {
         if let Claim::Mine(mine) = ledger.claim(&key(case)).unwrap() {
             mine.finish(&value(case)).unwrap();
-            println!("finished {case}");
+            then(case);
         }
     }
 }
@@ -42,28 +45,61 @@ fn work(folder: &Path) {
 fn child() {
     let Some(folder) = std::env::var_os(FOLDER) else { return };
     let folder = Path::new(&folder);
-    while folder.join(GATE).exists() {
-        std::thread::yield_now();
+    work(folder, |case| {
+        println!("finished {case}");
+        while folder.join(GATE).exists() {
+            std::thread::yield_now();
+        }
+    });
+    if std::env::var_os(KILLED).is_some() {
+        println!("{IDLE}");
+        loop {
+            std::thread::park();
+        }
     }
-    work(folder);
 }
 
-fn start(folder: &Path) -> Child {
-    Command::new(std::env::current_exe().unwrap())
-        .args(["--exact", "child", "--ignored", "--nocapture"])
-        .env(FOLDER, folder)
-        .stdout(Stdio::piped())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap()
+/// A child and what it says.
+struct Working {
+    child: Child,
+    said: Lines<BufReader<ChildStdout>>,
 }
 
-/// The cases that a child named before its end.
-fn named(child: &mut Child) -> Vec<u64> {
-    let said = BufReader::new(child.stdout.take().unwrap());
-    // The test harness writes its own words in front of the first line.
-    let case = |line: String| line.split("finished ").nth(1).and_then(|case| case.parse().ok());
-    said.lines().map_while(Result::ok).filter_map(case).collect()
+impl Working {
+    fn start(folder: &Path, is_killed: bool) -> Self {
+        let mut command = Command::new(std::env::current_exe().unwrap());
+        command
+            .args(["--exact", "child", "--ignored", "--nocapture"])
+            .env(FOLDER, folder)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null());
+        if is_killed {
+            command.env(KILLED, "");
+        }
+        let mut child = command.spawn().unwrap();
+        let said = BufReader::new(child.stdout.take().unwrap()).lines();
+        Self { child, said }
+    }
+
+    /// The next case that it finished; none where nothing is left, or where it has ended.
+    fn next(&mut self) -> Option<u64> {
+        // The test harness writes its own words between, and one killed in the middle of a line leaves a part.
+        loop {
+            let line = self.said.next()?.ok()?;
+            if line.contains(IDLE) {
+                return None;
+            }
+            let case = line.split("finished ").nth(1).and_then(|case| case.parse().ok());
+            if case.is_some() {
+                return case;
+            }
+        }
+    }
+
+    /// All others.
+    fn rest(&mut self) -> Vec<u64> {
+        std::iter::from_fn(|| self.next()).collect()
+    }
 }
 
 /// The keys of all lines, which must be whole.
@@ -88,22 +124,19 @@ fn assert_complete(folder: &Path) {
 fn killed_at_thirty_moments_it_loses_no_finished_case_and_doubles_none() {
     let place = tempfile::tempdir().unwrap();
     let mut finished = Vec::new();
-    for round in 0..30_u64 {
-        // With some cases finished, starting again takes a child longer than the wait.
+    for round in 0..30_usize {
         if finished.len() as u64 == CASES {
             fs::remove_dir_all(place.path()).unwrap();
             finished.clear();
         }
-        let mut child = start(place.path());
-        let mut said = child.stdout.take().unwrap();
-        // The moment counts from the child's first word, or it would often be before its first case.
-        let mut first = [0; 1];
-        let _ = said.read(&mut first);
-        std::thread::sleep(Duration::from_micros(round * 7919 % 12_000));
-        child.kill().unwrap();
-        child.wait().unwrap();
-        child.stdout = Some(said);
-        finished.extend(named(&mut child));
+        // It cannot end before it is killed: with nothing left to do it waits for that.
+        let mut working = Working::start(place.path(), true);
+        for _ in 0..1 + round * 7 % 20 {
+            finished.extend(working.next());
+        }
+        working.child.kill().unwrap();
+        working.child.wait().unwrap();
+        finished.extend(working.rest());
         let ledger = Ledger::open(place.path()).unwrap();
         for &case in &finished {
             let claim = ledger.claim(&key(case)).unwrap();
@@ -121,7 +154,7 @@ fn killed_at_thirty_moments_it_loses_no_finished_case_and_doubles_none() {
             .map(|key| serde_json::from_str::<Value>(key).unwrap()["case"].as_u64().unwrap())
             .collect();
     }
-    work(place.path());
+    work(place.path(), |_| {});
     assert_complete(place.path());
 }
 
@@ -130,22 +163,18 @@ fn processes_side_by_side_share_the_cases() {
     let place = tempfile::tempdir().unwrap();
     let gate = place.path().join(GATE);
     fs::write(&gate, "").unwrap();
-    let mut children = [start(place.path()), start(place.path()), start(place.path())];
-    for child in &mut children {
-        // Its first word: it has started.
-        child.stdout.as_mut().unwrap().read_exact(&mut [0; 1]).unwrap();
-    }
+    let mut children = [(); 3].map(|()| Working::start(place.path(), false));
+    // Each has a case of its own before any goes on.
+    let first = children.each_mut().map(|child| child.next().unwrap());
     fs::remove_file(gate).unwrap();
-    let mut shares: Vec<_> = children.iter_mut().map(named).collect();
-    for child in &mut children {
-        assert!(child.wait().unwrap().success());
+    let mut all = first.to_vec();
+    for working in &mut children {
+        all.extend(working.rest());
+        assert!(working.child.wait().unwrap().success());
     }
-    let mut all = shares.concat();
     all.sort_unstable();
     assert_eq!(all, (0..CASES).collect::<Vec<_>>(), "each case by one of them");
     assert_complete(place.path());
-    shares.retain(|share| !share.is_empty());
-    assert!(shares.len() > 1, "they did not run side by side");
 }
 
 #[test]
@@ -186,7 +215,7 @@ fn a_case_is_alone_unless_another_was_under_way() {
 #[test]
 fn damaged_lines_are_named_set_aside_and_free_again() {
     let place = tempfile::tempdir().unwrap();
-    work(place.path());
+    work(place.path(), |_| {});
     let file = place.path().join("cases.jsonl");
     let whole = fs::read_to_string(&file).unwrap();
     let mut lines: Vec<Vec<u8>> = whole.lines().map(|line| line.as_bytes().to_vec()).collect();
@@ -224,7 +253,7 @@ fn damaged_lines_are_named_set_aside_and_free_again() {
     }
     // Each is set aside once, and what is computed anew is kept.
     assert_eq!(Ledger::open(place.path()).unwrap().take_damaged(), []);
-    work(place.path());
+    work(place.path(), |_| {});
     fs::write(&file, fs::read_to_string(&file).unwrap().replacen(&"x".repeat(300), "y", 1))
         .unwrap();
     assert_eq!(Ledger::open(place.path()).unwrap().take_damaged().len(), 1);

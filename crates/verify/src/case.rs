@@ -12,7 +12,7 @@ use nalgebra::SVector;
 use serde::{Serialize, Serializer};
 use thiserror::Error;
 
-use crate::checkpoint::{CheckpointError, Checkpoints, Reached};
+use crate::checkpoint::{CheckpointError, Checkpoints, Reached, TakenUp};
 use crate::dimension::in_arithmetic;
 use crate::frames::{FrameOutput, FrameWriter};
 use crate::general::{self, Placement, Precision};
@@ -120,7 +120,8 @@ pub struct Outputs<'a> {
     /// What a run that is killed goes on from, if that is wanted.
     pub checkpoints: Option<&'a Checkpoints>,
     /// Where errors, energies and momentum go at up to [`MOST_MOMENTS`](crate::MOST_MOMENTS) evenly spread steps, first and
-    /// last state included; what is there before the run is removed. A run that goes on from a checkpoint lacks those before.
+    /// last state included; what is there before the run is removed. A run that goes on from a checkpoint has those before it, if it was written with
+    /// a history.
     pub history: Option<&'a mut Vec<Moment>>,
     /// When to give up: a run that is still under way then ends after its step with [`Status::Cut`].
     pub until: Option<Instant>,
@@ -368,7 +369,10 @@ fn follow<T: Real, const D: usize>(
         None => None,
     };
     let Reached { step: mut done, mut wall_s, mut cpu_s, mut errors } =
-        if let Some(reached) = resumed {
+        if let Some(TakenUp { reached, history }) = resumed {
+            if let Some(recorder) = &mut recorder {
+                recorder.take_up(history);
+            }
             if let Some(frames) = &mut frames {
                 frames.take_up(reached.step, dt);
             }
@@ -430,7 +434,12 @@ fn follow<T: Real, const D: usize>(
         if let Some(checkpoints) = outputs.checkpoints
             && step % checkpoints.every == 0
         {
-            checkpoints.write(&Reached { step, wall_s, cpu_s, errors }, &solver.state())?;
+            let history = recorder.as_ref().map_or(&[][..], Recorder::moments);
+            checkpoints.write(
+                &Reached { step, wall_s, cpu_s, errors },
+                history,
+                &solver.state(),
+            )?;
         }
     }
     let count = solver.observe().0.len();

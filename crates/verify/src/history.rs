@@ -181,6 +181,16 @@ impl<'a, const D: usize> Recorder<'a, D> {
         Self { moments, exact, material, count, steps }
     }
 
+    /// Puts down what was taken down before the run was stopped.
+    pub(crate) fn take_up(&mut self, moments: Vec<Moment>) {
+        *self.moments = moments;
+    }
+
+    /// What was taken down so far.
+    pub(crate) fn moments(&self) -> &[Moment] {
+        self.moments
+    }
+
     /// Takes the state after `step` down if its turn has come, or if it is the `last` one. `times` are those of positions and
     /// of velocities.
     pub(crate) fn take<T: Real>(

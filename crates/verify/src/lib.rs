@@ -43,12 +43,13 @@ mod temporal;
 mod total;
 mod tradeoff;
 mod verdict;
+mod whole_file;
 
 pub use case::{Arithmetic, Case, CaseError, Outputs, Progress, Row, Start, Status, run};
 pub use check::{
     BLUNT, CheckError, CheckReport, Finding, OWN_ERROR_FACTOR, TOLERANCE, Verdict, check,
 };
-pub use checkpoint::{CheckpointError, Checkpoints};
+pub use checkpoint::{CheckpointError, CheckpointFolder, Checkpoints};
 pub use cost::{Cost, CostModel, Timing, time_steps};
 pub use coverage::{Part, Share, coverage, smallest_set};
 pub use evaluate::{FieldRow, WrongLength, evaluate};
@@ -82,3 +83,4 @@ pub use verdict::{
     Behaviour, Expected, ORDER_TOLERANCE, Verdict as OrderVerdict, expected_in_space,
     expected_in_time, verdicts,
 };
+pub use whole_file::WholeFile;

@@ -48,13 +48,13 @@ impl Study {
 }
 
 /// A case of a study could not be run.
+// The message has the cause, which is therefore no `source`: whoever prints both would print it twice.
 #[derive(Debug, Error)]
 #[error("case {}: {cause}", index + 1)]
 pub struct StudyError {
     /// The case's number in the sweep, from 0.
     pub index: usize,
     /// Why.
-    #[source]
     pub cause: CaseError,
 }
 

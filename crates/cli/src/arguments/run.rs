@@ -32,9 +32,9 @@ pub(crate) struct RunOptions {
     pub(crate) every: u64,
     /// Write errors of u, energies and momentum of the particles and of the exact motion over time to this file as
     /// comma-separated values, at up to 1000 evenly spread steps; --json then has them too
-    #[arg(long, value_name = "FILE", conflicts_with = "checkpoint")]
+    #[arg(long, value_name = "FILE")]
     pub(crate) history: Option<PathBuf>,
     /// Draw the energy gained and lost against the exact motion over time to this SVG file
-    #[arg(long, value_name = "FILE", conflicts_with = "checkpoint")]
+    #[arg(long, value_name = "FILE")]
     pub(crate) plot: Option<PathBuf>,
 }

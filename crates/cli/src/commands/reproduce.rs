@@ -8,7 +8,6 @@ mod pictures;
 mod report;
 mod section;
 
-use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, Result};
@@ -25,7 +24,7 @@ use super::converge::{
 use super::scheme::Scheme;
 use super::{Model, case, settings, with_threads};
 use crate::arguments::{Integrator, Precision, ReproduceOptions, Shape};
-use crate::json::Output;
+use crate::json::{Output, prepare_folder};
 use crate::library::Selection;
 use crate::progress::Bar;
 use crate::svg::{Curve, Plot};
@@ -109,9 +108,7 @@ pub(crate) fn reproduce(options: &ReproduceOptions) -> Result<bool> {
     let out = &options.out;
     let report = out.join("report.html");
     for problem in PROBLEMS {
-        let folder = out.join(problem);
-        fs::create_dir_all(&folder)
-            .with_context(|| format!("--out: cannot make the folder {}", folder.display()))?;
+        prepare_folder(&out.join(problem)).context("--out")?;
     }
     let page = Output::prepare(&report).context("--out")?;
     let output = Output::prepare(&out.join("report.md")).context("--out")?;

@@ -5,20 +5,23 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Parser;
-use mmsmith_verify::Checkpoints;
+use mmsmith_verify::{CheckpointFolder, Checkpoints};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 use super::run;
 use crate::arguments::{Arguments, Command, ResumeOptions, RunOptions};
-use crate::json::Output;
+use crate::json::{self, Output};
 use crate::keep;
 use crate::terminal;
 
 /// What a run leaves in its folder before its first step.
 const FILE: &str = "run.json";
 const SCHEMA: &str = "mmsmith.checkpoint/1";
+/// What that file begins with, and what stands between its checksum and all that the checksum is of.
+const BEFORE: &str = "{\"sha256\":\"";
+const AFTER: &str = "\",";
 
 /// How a run was started.
 #[derive(Serialize, Deserialize)]
@@ -30,22 +33,50 @@ struct Start {
     arguments: Vec<String>,
 }
 
-/// Goes on with the run of a folder.
-pub(crate) fn resume(options: &ResumeOptions) -> Result<bool> {
-    let path = options.folder.join(FILE);
-    let shown = path.display();
-    let text = fs::read_to_string(&path).with_context(|| {
-        format!(
-            "cannot read {shown}, which mms run --checkpoint {} writes",
-            options.folder.display()
-        )
+/// The text of a JSON object with the SHA-256 of what follows it as its first member.
+fn sealed(object: &str) -> Option<String> {
+    let rest = object.strip_prefix('{')?;
+    Some(format!("{BEFORE}{}{AFTER}{rest}", sum(rest)))
+}
+
+/// Whether `text` is what [`sealed`] made, to the bit.
+fn is_whole(text: &str) -> bool {
+    let parts = text.strip_prefix(BEFORE).and_then(|text| text.split_once(AFTER));
+    parts.is_some_and(|(found, rest)| found == sum(rest))
+}
+
+fn sum(text: &str) -> String {
+    Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// How the run of `folder` was started.
+fn recall(folder: &Path) -> Result<Start> {
+    let path = folder.join(FILE);
+    let (shown, folder) = (path.display(), folder.display());
+    let bytes = fs::read(&path).with_context(|| {
+        format!("cannot read {shown}, which mms run --checkpoint {folder} writes")
     })?;
+    let text = String::from_utf8(bytes).ok().filter(|text| is_whole(text));
+    let Some(text) = text else {
+        bail!(
+            "{shown} is not what mms run --checkpoint wrote: its checksum does not match; delete {folder} to start the run \
+             anew"
+        );
+    };
     let start: Start = serde_json::from_str(&text)
         .with_context(|| format!("{shown} is not what mms run --checkpoint writes"))?;
     if start.schema != SCHEMA {
         bail!("{shown} is of the form '{}', not '{SCHEMA}'", start.schema);
     }
-    let folder = fs::canonicalize(&options.folder)?;
+    Ok(start)
+}
+
+/// Goes on with the run of a folder.
+pub(crate) fn resume(options: &ResumeOptions) -> Result<bool> {
+    let start = recall(&options.folder)?;
+    let path = options.folder.join(FILE);
+    let shown = path.display();
+    let folder = CheckpointFolder::lock(&fs::canonicalize(&options.folder)?)?;
     let line = ["mms".to_owned()].into_iter().chain(start.arguments);
     let arguments = Arguments::try_parse_from(line).map_err(|refusal| {
         let refusal = refusal.to_string();
@@ -58,13 +89,18 @@ pub(crate) fn resume(options: &ResumeOptions) -> Result<bool> {
     std::env::set_current_dir(&start.folder).with_context(|| {
         format!("cannot enter {}, where the run was started", start.folder.display())
     })?;
-    run.checkpoint = Some(folder);
     run.scheme.threads = options.threads.or(run.scheme.threads);
-    run::follow(&run, true)
+    run::follow(&run, Some(Place { folder, resume: true }))
 }
 
-/// Writes down how this run was started.
-pub(super) fn remember(folder: &Path) -> Result<()> {
+/// Where a run keeps its state, and whether it goes on from there.
+pub(super) struct Place {
+    folder: CheckpointFolder,
+    resume: bool,
+}
+
+/// Takes the folder for this run, and writes down how it was started.
+pub(super) fn remember(folder: &Path) -> Result<Place> {
     let path = folder.join(FILE);
     if path.exists() {
         let shown = folder.display();
@@ -75,6 +111,11 @@ pub(super) fn remember(folder: &Path) -> Result<()> {
     }
     fs::create_dir_all(folder)
         .with_context(|| format!("--checkpoint: cannot create {}", folder.display()))?;
+    let locked = CheckpointFolder::lock(folder).context("--checkpoint")?;
+    // Another run may have come and gone since.
+    if path.exists() {
+        bail!("--checkpoint: {} holds a run already", folder.display());
+    }
     let arguments = std::env::args_os().skip(1).map(|argument| {
         let shown = argument.to_string_lossy().into_owned();
         argument.into_string().ok().with_context(|| {
@@ -86,20 +127,49 @@ pub(super) fn remember(folder: &Path) -> Result<()> {
         folder: std::env::current_dir().context("--checkpoint: cannot tell the current folder")?,
         arguments: arguments.collect::<Result<_>>()?,
     };
-    Output::prepare(&path)?.write(&start)?;
+    let text = sealed(&json::text(&start)?).context("cannot form JSON")?;
+    Output::prepare(&path)?.write_text(&text)?;
     let shown = folder.display();
     terminal::note(format_args!("if this run is stopped, mms resume {shown} goes on with it"));
-    Ok(())
+    Ok(Place { folder: locked, resume: false })
 }
 
-/// Where the run with these settings keeps its state.
+/// The checkpoints of the run with these settings.
 pub(super) fn checkpoints(
-    folder: &Path,
+    place: Place,
     options: &RunOptions,
     settings: &Value,
-    resume: bool,
 ) -> Result<Checkpoints> {
     let (settings, origin) = (keep::decisive(settings), keep::origin(&options.name)?);
     let identity = Sha256::digest(format!("{settings}{origin}")).into();
-    Ok(Checkpoints { folder: folder.to_owned(), every: options.every, identity, resume })
+    let Place { folder, resume } = place;
+    Ok(Checkpoints { folder, every: options.every, identity, resume })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whatever bit of it is turned, the file is refused, and named.
+    #[test]
+    fn every_altered_bit_of_a_start_is_noticed() {
+        let folder = tempfile::tempdir().unwrap();
+        let start = Start {
+            schema: SCHEMA.into(),
+            folder: "/home/user/study".into(),
+            arguments: ["run", "ring", "--cells", "16", "--json", "a.json"].map(Into::into).into(),
+        };
+        let path = folder.path().join(FILE);
+        let text = sealed(&json::text(&start).unwrap()).unwrap();
+        let whole = text.clone().into_bytes();
+        fs::write(&path, &whole).unwrap();
+        assert_eq!(recall(folder.path()).unwrap().arguments, start.arguments);
+        for bit in 0..8 * whole.len() {
+            let mut bytes = whole.clone();
+            bytes[bit / 8] ^= 1 << (bit % 8);
+            fs::write(&path, bytes).unwrap();
+            let Err(error) = recall(folder.path()) else { panic!("bit {bit} of {text}") };
+            assert!(error.to_string().contains(FILE), "{error}");
+        }
+    }
 }

@@ -1,6 +1,6 @@
 //! `mms run`: one simulation.
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{FrameOutput, Moment, Outputs, Row, Status, energy_drift, run as simulate};
 use serde_json::{Value, json};
@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::scheme::{Scheme, name};
 use super::{Model, caption, case, preface, resume, settings, with_threads};
 use crate::arguments::{Frame, RunOptions};
-use crate::json::Output;
+use crate::json::{Output, prepare_folder};
 use crate::library::Selection;
 use crate::progress::Bar;
 use crate::svg::{Course, Drift};
@@ -16,14 +16,12 @@ use crate::table::{self, Table};
 use crate::{csv, number, terminal};
 
 pub(crate) fn run(options: &RunOptions) -> Result<bool> {
-    if let Some(folder) = &options.checkpoint {
-        resume::remember(folder)?;
-    }
-    follow(options, false)
+    let place = options.checkpoint.as_deref().map(resume::remember).transpose()?;
+    follow(options, place)
 }
 
-/// The run, from its beginning or from its last checkpoint.
-pub(super) fn follow(options: &RunOptions, resume: bool) -> Result<bool> {
+/// The run, from its beginning or from the last checkpoint of its place.
+pub(super) fn follow(options: &RunOptions, place: Option<resume::Place>) -> Result<bool> {
     let selection = Selection::new(&options.name, &options.scheme.parameters.set)?;
     let model = Model::new(&selection, options.scheme.precision)?;
     let scheme = &Scheme::settle(&options.scheme, &model.exact);
@@ -34,6 +32,9 @@ pub(super) fn follow(options: &RunOptions, resume: bool) -> Result<bool> {
     let [history, plot] =
         [&options.history, &options.plot].map(|path| Output::prepare_if(path.as_ref()));
     let (history, plot) = (history?, plot?);
+    if let Some(folder) = &options.vtk {
+        prepare_folder(folder).context("--vtk")?;
+    }
     let mut moments = (history.is_some() || plot.is_some()).then(Vec::new);
     let frames = options.vtk.as_ref().map(|folder| FrameOutput {
         folder: folder.clone(),
@@ -41,8 +42,8 @@ pub(super) fn follow(options: &RunOptions, resume: bool) -> Result<bool> {
         count: options.frames,
     });
     let settings = || settings(&selection, scheme, extent, cells, scheme.cfl);
-    let checkpoints = match &options.checkpoint {
-        Some(folder) => Some(resume::checkpoints(folder, options, &settings(), resume)?),
+    let checkpoints = match place {
+        Some(place) => Some(resume::checkpoints(place, options, &settings())?),
         None => None,
     };
     with_threads(scheme.threads, || {

@@ -4,7 +4,8 @@
 use serde_json::Value;
 use std::io::Write;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::Duration;
 
 /// What one call of `mms` gave.
 pub(crate) struct Called {
@@ -77,4 +78,48 @@ pub(crate) fn keys(value: &Value) -> String {
     let mut keys: Vec<_> = value.as_object().expect("an object").keys().cloned().collect();
     keys.sort();
     keys.join(" ")
+}
+
+/// A call of `mms` that is under way.
+pub(crate) struct UnderWay(Child);
+
+impl UnderWay {
+    /// Calls `mms` with `arguments`, separated by spaces, in the folder `place`, and does not wait for it.
+    pub(crate) fn start(place: &Path, arguments: &str) -> Self {
+        let child = Command::new(env!("CARGO_BIN_EXE_mms"))
+            .current_dir(place)
+            .args(arguments.split_whitespace())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn();
+        Self(child.expect("the binary starts"))
+    }
+
+    /// Waits until something has happened, as long as the call is under way.
+    pub(crate) fn wait_for(&mut self, mut has_happened: impl FnMut() -> bool) {
+        while !has_happened() {
+            let ended = self.0.try_wait().expect("its status");
+            assert!(ended.is_none(), "it has ended by itself: {ended:?}");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    /// Kills it; it must be under way still.
+    pub(crate) fn kill(mut self) {
+        assert!(self.0.try_wait().expect("its status").is_none(), "it has ended by itself");
+        self.0.kill().expect("it can be killed");
+        self.0.wait().expect("it has ended");
+    }
+
+    /// Its exit status, once it has ended.
+    pub(crate) fn end(mut self) -> i32 {
+        self.0.wait().expect("it has ended").code().expect("it ends by itself")
+    }
+}
+
+/// A pipe that nobody reads: whoever is to write to it at the end of some work never ends.
+#[cfg(unix)]
+pub(crate) fn pipe(path: &Path) {
+    let made = Command::new("mkfifo").arg(path).status().expect("mkfifo starts");
+    assert!(made.success());
 }
