@@ -84,10 +84,8 @@ fn a_folder_belongs_to_its_run_while_that_lives() {
     let place = tempfile::tempdir().unwrap();
     let place = place.path();
     command::pipe(&place.join("result.json"));
-    let mut run = UnderWay::start(
-        place,
-        "run bar --cells 8 --json result.json --checkpoint kept --every 1",
-    );
+    let mut run =
+        UnderWay::start(place, "run bar --cells 8 --json result.json --checkpoint kept --every 1");
     run.wait_for(|| reached(&place.join("kept")) > 0);
     refuses(place, "resume kept", &["kept: a process is at work on the run of this folder"]);
     run.kill();
@@ -170,7 +168,11 @@ fn folders_that_cannot_be_gone_on_with_are_named() {
     let text = std::fs::read_to_string(&start).unwrap();
     for damaged in [text.replace("\"8\"", "\"9\""), "{}".into(), String::new()] {
         std::fs::write(&start, damaged).unwrap();
-        refuses(place, "resume kept", &["kept/run.json is not what", "its checksum does not match"]);
+        refuses(
+            place,
+            "resume kept",
+            &["kept/run.json is not what", "its checksum does not match"],
+        );
     }
     std::fs::remove_file(&start).unwrap();
     let called = mms(place, "run bar --cells 9 --checkpoint other --every 1");

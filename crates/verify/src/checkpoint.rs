@@ -38,7 +38,8 @@ impl CheckpointFolder {
     /// [`CheckpointError::Busy`] while a run lives that keeps its state there; where the folder cannot be written to.
     pub fn lock(folder: &Path) -> Result<Self, CheckpointError> {
         let path = folder.join(LOCK);
-        let fail = |cause| CheckpointError::FileSystem { action: "lock", path: path.clone(), cause };
+        let fail =
+            |cause| CheckpointError::FileSystem { action: "lock", path: path.clone(), cause };
         // Its content does not matter, and is left as it is.
         let file = OpenOptions::new().read(true).append(true).create(true).open(&path);
         let file = file.map_err(fail)?;

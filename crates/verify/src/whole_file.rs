@@ -154,12 +154,18 @@ mod tests {
         file.probe_room(1000).unwrap();
         file.write_all(b"after").unwrap();
         drop(file);
-        assert_eq!((names(folder.path()).len(), fs::read(&path).unwrap().as_slice()), (1, &b"before"[..]));
+        assert_eq!(
+            (names(folder.path()).len(), fs::read(&path).unwrap().as_slice()),
+            (1, &b"before"[..])
+        );
         let mut file = WholeFile::create(&path).unwrap();
         file.probe_room(1000).unwrap();
         file.write_all(b"after").unwrap();
         file.finish().unwrap();
-        assert_eq!((names(folder.path()).len(), fs::read(&path).unwrap().as_slice()), (1, &b"after"[..]));
+        assert_eq!(
+            (names(folder.path()).len(), fs::read(&path).unwrap().as_slice()),
+            (1, &b"after"[..])
+        );
         assert!(WholeFile::create(&folder.path().join("none/a.json")).is_err());
     }
 
