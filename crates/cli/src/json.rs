@@ -82,7 +82,7 @@ pub(crate) fn prepare_folder(folder: &Path) -> Result<()> {
     fs::create_dir_all(folder)
         .with_context(|| format!("cannot make the folder {}", folder.display()))?;
     // It goes as it came.
-    Output::prepare(&folder.join("probe")).map(drop)
+    Output::prepare(&folder.join(".probe")).map(drop)
 }
 
 /// `value` as indented JSON; numbers in shortest round-trip form, those that are not finite as null.
