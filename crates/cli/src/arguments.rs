@@ -91,6 +91,11 @@ impl TalkOptions {
     }
 }
 
+/// A value as the command line writes it.
+pub(crate) fn word(value: impl ValueEnum) -> String {
+    value.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+}
+
 /// The colours that a command line asks for, before the whole of it is understood: messages on what is wrong with it
 /// have them too.
 pub(crate) fn color_of(arguments: &[OsString]) -> Color {

@@ -35,7 +35,7 @@ use mmsmith_verify::{Arithmetic, Case, POLAR_ANGLES, plan};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::arguments::{Extent, Frame, Grid, Precision};
+use crate::arguments::{Extent, Frame, Grid, Precision, word};
 use crate::library::Selection;
 use crate::{memory, number, terminal};
 use scheme::Scheme;
@@ -151,23 +151,22 @@ fn settings(
 
 /// One line that says what was simulated.
 fn caption(selection: &Selection, options: &Scheme, extent: Option<Extent>) -> String {
-    let word = |value: &dyn std::fmt::Debug| format!("{value:?}").to_lowercase();
     let start = match (options.frame, options.integrator) {
         (Frame::Total, _) => scheme::words(options),
-        (_, crate::arguments::Integrator::Cd) => format!(" ({} start)", word(&options.start)),
+        (_, crate::arguments::Integrator::Cd) => format!(" ({} start)", word(options.start)),
         _ => String::new(),
     };
     let start = start + &scheme::additions(options);
-    let extent = extent.map(|extent| format!(", {}", word(&extent))).unwrap_or_default();
+    let extent = extent.map(|extent| format!(", {}", word(extent))).unwrap_or_default();
     format!(
         "{} ({}){extent}: {} + {}{start}, {} particles per cell and direction, {} period(s), {}, {} thread(s)\n",
         selection.name(),
         selection.told_parameters(),
-        word(&options.shape),
-        word(&options.integrator),
+        word(options.shape),
+        word(options.integrator),
         options.ppc,
         number::exact(options.periods),
-        word(&options.precision),
+        word(options.precision),
         threads(options),
     )
 }

@@ -136,7 +136,10 @@ fn what_is_said_holds() {
     // A fitted layout has no boxes.
     let fitted = "run ring --cells 8 --periods 0.1 --layout body-fitted";
     assert_eq!(settings(fitted)["shape"], "cpdi2");
-    let model = ["prescribed-motion on inner", "--frame total --shape bspline3 --grid polar"];
+    let model = [
+        "prescribed-motion on inner",
+        "--formulation total-lagrangian --shape bspline3 --grid polar",
+    ];
     refuses(place, "run vortex --frame updated", &model);
     refuses(place, "run vortex --shape gimp", &model);
     refuses(place, "run vortex --integrator usl", &model);

@@ -54,7 +54,7 @@ pub enum CrossCheckError {
         assigned: String,
     },
     /// One side has no value at a point.
-    #[error("{entry} has no value at {place}: {source}")]
+    #[error("{entry} has no value at {place}")]
     Value {
         /// The entry.
         entry: String,

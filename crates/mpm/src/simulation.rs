@@ -46,6 +46,18 @@ pub enum Integrator {
     Cd,
 }
 
+/// The name that the field has for it.
+impl fmt::Display for Integrator {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Usf => "usf",
+            Self::Usl => "usl",
+            Self::Musl => "musl",
+            Self::Cd => "cd",
+        })
+    }
+}
+
 /// How a scene is to be integrated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings<T> {
@@ -219,7 +231,7 @@ fn check<T: RealField + Copy, const D: usize>(
         return Err(SetupError::NotFinite { quantity: "the lower corner of the grid".into() });
     }
     if settings.halve_first_acceleration && settings.integrator != Integrator::Cd {
-        return Err(SetupError::HalvedStart { integrator: format!("{:?}", settings.integrator) });
+        return Err(SetupError::HalvedStart { integrator: settings.integrator.to_string() });
     }
     let Particles { X, x, v, F, mass, volume, half_size } = particles;
     let expected = X.len();

@@ -58,7 +58,7 @@ impl SurfaceProof {
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum SurfaceError {
     /// There were no points to look at.
-    #[error("the condition on {surface:?}: {source}")]
+    #[error("the condition on {surface}")]
     Points {
         /// Where.
         surface: Surface,
@@ -66,7 +66,7 @@ pub enum SurfaceError {
         source: PointsError,
     },
     /// A quantity has no value.
-    #[error("the condition on {surface:?}: {source}")]
+    #[error("the condition on {surface}")]
     Value {
         /// Where.
         surface: Surface,

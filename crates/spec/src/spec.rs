@@ -1,5 +1,7 @@
 //! Reading a specification: from the document to checked names, numbers and expressions.
 
+use std::fmt;
+
 use crate::coordinates::CARTESIAN;
 use crate::diagnostic::nearest;
 use crate::document::{BoundaryTable, Document, DomainTable, Entries, Text};
@@ -297,6 +299,18 @@ pub enum Surface {
     Outer,
 }
 
+impl fmt::Display for Surface {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let axis = |axis: usize| CARTESIAN.get(axis).copied().unwrap_or("?");
+        match self {
+            Self::Lower(index) => f.pad(&format!("{}-lower", axis(*index))),
+            Self::Upper(index) => f.pad(&format!("{}-upper", axis(*index))),
+            Self::Inner => f.pad("inner"),
+            Self::Outer => f.pad("outer"),
+        }
+    }
+}
+
 /// What holds on a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Condition {
@@ -320,6 +334,12 @@ impl Condition {
         ("prescribed-traction", Condition::PrescribedTraction),
         ("prescribed-motion", Condition::PrescribedMotion),
     ];
+}
+
+impl fmt::Display for Condition {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(Self::NAMES.iter().find(|(_, known)| known == self).map_or("", |(name, _)| name))
+    }
 }
 
 /// A boundary condition.

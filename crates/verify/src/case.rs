@@ -35,6 +35,17 @@ pub enum Start {
     Halved,
 }
 
+/// The name that the field has for it.
+impl fmt::Display for Start {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Exact => "exact",
+            Self::Data => "data",
+            Self::Halved => "halved",
+        })
+    }
+}
+
 /// The settings of one simulation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Case {

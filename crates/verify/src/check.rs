@@ -426,7 +426,7 @@ fn traction_finding<const D: usize>(
     }
     let stress = |(X, t): &(SVector<f64, D>, f64)| solution.first_piola_kirchhoff(X, *t).amax();
     let stress = samples.iter().map(stress).fold(0.0, f64::max);
-    let mut found = Comparison::new(format!("traction on {surface:?}"), "P N");
+    let mut found = Comparison::new(format!("traction on {surface}"), "P N");
     for (X, N, t) in places {
         let expected = solution.first_piola_kirchhoff(X, *t) * N;
         let traction = solution.traction(surface, X, *t);
@@ -442,7 +442,7 @@ fn boundary_findings<const D: usize>(
     places: &[(SVector<f64, D>, SVector<f64, D>, f64)],
     samples: &[(SVector<f64, D>, f64)],
 ) -> Vec<Finding> {
-    let name = |what: &str| format!("{what} on {:?}", boundary.surface);
+    let name = |what: &str| format!("{what} on {}", boundary.surface);
     // Scales are those of the whole body: on the boundary itself everything may vanish.
     let largest = |field: &dyn Fn(&SVector<f64, D>, f64) -> f64| {
         samples.iter().map(|(X, t)| field(X, *t)).fold(0.0, f64::max)

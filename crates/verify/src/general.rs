@@ -118,7 +118,7 @@ impl Precision for f32 {
         _time_step: f32,
     ) -> Result<Box<dyn Solver<f32, D> + 'a>, CaseError> {
         let admissible = match case.frame {
-            Frame::Total(_) => "f64 in the total frame",
+            Frame::Total(_) => "f64 in the total Lagrangian formulation",
             Frame::Updated => {
                 "f64, but for the shapes linear, ugimp and gimp on a lattice with the transfer flip and the integrators \
                  cd, usl, usf and musl"

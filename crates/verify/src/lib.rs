@@ -62,7 +62,7 @@ pub use norms::{PerField, PerNorm};
 pub use order::Order;
 pub use plan::{Plan, plan};
 pub use record::{Record, TemporalRecord};
-pub use scene::{Extent, SceneError, condition_name, needs_total_frame, surface_name};
+pub use scene::{Extent, SceneError, needs_total_frame};
 pub use score::{
     Input, Points, Remark, Resolution, Role, Score, ScoreError, ScoreOptions, ScoreRow, Source,
     score,

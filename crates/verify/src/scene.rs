@@ -42,11 +42,7 @@ pub enum SceneError {
         fitting: Vec<usize>,
     },
     /// The solver has no model for a boundary condition.
-    #[error(
-        "the solver does not model the condition {} on {}{instead}",
-        condition_name(*condition),
-        surface_name(*surface)
-    )]
+    #[error("the solver does not model the condition {} on {}{instead}", condition, surface)]
     Unmodelled {
         /// Where.
         surface: Surface,
@@ -91,42 +87,15 @@ pub enum SceneError {
     },
 }
 
-/// A surface as specifications name it.
-#[must_use]
-pub fn surface_name(surface: Surface) -> String {
-    let axis = |axis: usize| ["X", "Y", "Z"].get(axis).copied().unwrap_or("?");
-    match surface {
-        Surface::Lower(at) => format!("{}-lower", axis(at)),
-        Surface::Upper(at) => format!("{}-upper", axis(at)),
-        Surface::Inner => "inner".into(),
-        Surface::Outer => "outer".into(),
-    }
-}
-
-/// A condition as specifications name it.
-#[must_use]
-pub fn condition_name(condition: Condition) -> &'static str {
-    match condition {
-        Condition::Sliding => "sliding",
-        Condition::Symmetry => "symmetry",
-        Condition::TractionFree => "traction-free",
-        Condition::PrescribedTraction => "prescribed-traction",
-        Condition::PrescribedMotion => "prescribed-motion",
-    }
-}
-
 fn list(surfaces: &[Surface]) -> String {
-    surfaces.iter().map(|surface| surface_name(*surface)).collect::<Vec<_>>().join(", ")
+    surfaces.iter().map(Surface::to_string).collect::<Vec<_>>().join(", ")
 }
 
 /// What a specification says of surfaces that move as the solution does.
 fn lines(surfaces: &[Surface]) -> String {
     let one = |surface: &Surface| {
-        let condition = condition_name(Condition::PrescribedMotion);
-        format!(
-            "\n[[boundary]]\nsurface = '{}'\ncondition = '{condition}'\n",
-            surface_name(*surface)
-        )
+        let condition = Condition::PrescribedMotion;
+        format!("\n[[boundary]]\nsurface = '{}'\ncondition = '{condition}'\n", surface)
     };
     surfaces.iter().map(one).collect::<String>().trim_end().to_owned()
 }
@@ -365,13 +334,13 @@ impl<const D: usize> Scene<D> {
 fn instead<const D: usize>(domain: &Domain<f64, D>) -> &'static str {
     match domain {
         Domain::Box { .. } => {
-            " in the updated frame; the total frame does: --frame total --shape bspline3"
+            " in the updated Lagrangian formulation; the total Lagrangian one does: --formulation total-lagrangian --shape bspline3"
         }
         Domain::Annulus { .. } if D == 2 => {
-            " in the updated frame; the total frame does: --frame total --shape bspline3 --grid polar"
+            " in the updated Lagrangian formulation; the total Lagrangian one does: --formulation total-lagrangian --shape bspline3 --grid polar"
         }
         Domain::Annulus { .. } => {
-            " in the updated frame; the total frame does: --frame total --shape bspline3 --grid spherical"
+            " in the updated Lagrangian formulation; the total Lagrangian one does: --formulation total-lagrangian --shape bspline3 --grid spherical"
         }
         _ => "",
     }

@@ -129,17 +129,29 @@ impl TotalScheme {
             Err(CaseError::Setting { setting, value, admissible })
         };
         if case.integrator != Integrator::Cd {
-            let value = format!("{:?}", case.integrator).to_lowercase();
-            return refuse("integrator", value, "cd in the total frame");
+            let value = case.integrator.to_string();
+            return refuse("integrator", value, "cd in the total Lagrangian formulation");
         }
         if case.transfer != Transfer::Flip {
-            return refuse("transfer", case.transfer.to_string(), "flip in the total frame");
+            return refuse(
+                "transfer",
+                case.transfer.to_string(),
+                "flip in the total Lagrangian formulation",
+            );
         }
         if case.placement != Placement::Lattice {
-            return refuse("layout", "body-fitted".into(), "lattice or gauss in the total frame");
+            return refuse(
+                "layout",
+                "body-fitted".into(),
+                "lattice or gauss in the total Lagrangian formulation",
+            );
         }
         if case.offset != 0.0 {
-            return refuse("offset", format!("{:?}", case.offset), "0 in the total frame");
+            return refuse(
+                "offset",
+                format!("{:?}", case.offset),
+                "0 in the total Lagrangian formulation",
+            );
         }
         Ok(())
     }
@@ -214,10 +226,18 @@ impl TotalScheme {
                 std::array::from_fn(|k| [across, down, around][k])
             }
             (Domain::Annulus { .. }, _) if D == 2 => {
-                return refuse("grid", name, "polar for a ring in the total frame");
+                return refuse(
+                    "grid",
+                    name,
+                    "polar for a ring in the total Lagrangian formulation",
+                );
             }
             (Domain::Annulus { .. }, _) => {
-                return refuse("grid", name, "spherical for a shell in the total frame");
+                return refuse(
+                    "grid",
+                    name,
+                    "spherical for a shell in the total Lagrangian formulation",
+                );
             }
             _ => return refuse("grid", name, "cartesian for a box"),
         };

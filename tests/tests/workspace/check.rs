@@ -45,7 +45,7 @@ fn a_wrong_declaration_fails_with_the_place() {
     std::fs::write(&spec, text.replace("2*R + Ro", "2.001*R + Ro")).unwrap();
     let (status, out, _) = outcome(mms().arg("check").arg(&spec));
     assert_eq!(status, Some(1), "{out}");
-    assert!(out.contains("P N on Inner is worst at X = ["), "{out}");
+    assert!(out.contains("P N on inner is worst at X = ["), "{out}");
 }
 
 /// The ring's specification with one piece replaced, in a folder of its own.
@@ -150,8 +150,8 @@ fn a_rim_that_is_nearly_free_is_refuted_with_the_worst_point() {
         changed_ring("2*R + Ro - 3*Ri)/d)'", "2.00000000000001*R + Ro - 3*Ri)/d)'");
     let (status, out, _) = outcome(mms().arg("check").arg(&spec));
     assert_eq!(status, Some(1), "{out}");
-    assert!(out.contains("P N on Inner: NOT zero: "), "{out}");
-    assert!(out.contains("zero in symbols, for all parameters: P N on Outer, shear"), "{out}");
+    assert!(out.contains("P N on inner: NOT zero: "), "{out}");
+    assert!(out.contains("zero in symbols, for all parameters: P N on outer, shear"), "{out}");
 }
 
 #[test]
@@ -169,11 +169,11 @@ fn what_symbols_do_not_show_is_shown_in_digits() {
     std::fs::write(&spec, text).unwrap();
     let (status, out, errors) = outcome(mms().arg("check").arg(&spec));
     assert_eq!(status, Some(0), "{out}{errors}");
-    assert!(out.contains("P N on Upper(0): zero to 60 digits at 20 points"), "{out}");
+    assert!(out.contains("P N on X-upper: zero to 60 digits at 20 points"), "{out}");
     std::fs::write(&spec, text.replace("X-upper", "X-lower")).unwrap();
     let (status, out, _) = outcome(mms().arg("check").arg(&spec));
     assert_eq!(status, Some(1), "{out}");
-    assert!(out.contains("P N on Lower(0): NOT zero: "), "{out}");
+    assert!(out.contains("P N on X-lower: NOT zero: "), "{out}");
 }
 
 /// Generated and interpreted tractions are those of the stress; on a free rim they are zero to the last bit.

@@ -148,15 +148,15 @@ fn the_updated_frame_names_the_frame_that_runs_a_solution() {
     for (name, part) in [
         (
             "skew-2d",
-            "PrescribedMotion on Lower(0) in the updated frame; the total frame does: --frame total --shape bspline3",
+            "prescribed-motion on X-lower in the updated Lagrangian formulation; the total Lagrangian one does: --formulation total-lagrangian --shape bspline3",
         ),
         (
             "ring-nu",
-            "PrescribedTraction on Inner in the updated frame; the total frame does: --frame total --shape bspline3",
+            "prescribed-traction on inner in the updated Lagrangian formulation; the total Lagrangian one does: --formulation total-lagrangian --shape bspline3",
         ),
         (
             "sphere-shell",
-            "PrescribedTraction on Inner in the updated frame; the total frame does: --frame total --shape bspline3",
+            "prescribed-traction on inner in the updated Lagrangian formulation; the total Lagrangian one does: --formulation total-lagrangian --shape bspline3",
         ),
     ] {
         let outcome = mms().args(["run", name, "--cells", "8"]).output().unwrap();
@@ -164,7 +164,7 @@ fn the_updated_frame_names_the_frame_that_runs_a_solution() {
         assert_eq!(outcome.status.code(), Some(2), "{message}");
         assert!(message.contains(part), "{message}");
         // And what it names does run.
-        let said = message.split("the total frame does: ").nth(1).unwrap();
+        let said = message.split("the total Lagrangian one does: ").nth(1).unwrap();
         let options = said.split_whitespace().chain(["--cells", "4", "--cfl", "0.1"]);
         let outcome = mms().args(["run", name]).args(options).output().unwrap();
         assert_eq!(outcome.status.code(), Some(0), "{}", String::from_utf8_lossy(&outcome.stderr));

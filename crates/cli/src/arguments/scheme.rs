@@ -12,28 +12,31 @@ use super::values::{finite_number, positive_count, positive_number, thread_count
 /// How to simulate; what every measuring command shares.
 #[derive(Args, Clone)]
 pub(crate) struct SchemeOptions {
-    /// Weights between particles and grid; where nothing is said gimp, and bspline3 in the total frame
+    /// Weights between particles and grid; where nothing is said gimp, and bspline3 in the total Lagrangian formulation
     #[arg(long, value_enum)]
     pub(crate) shape: Option<Shape>,
-    /// Configuration that the weights belong to: updated in each step, or the reference one throughout. Where nothing is said the
-    /// updated one, and the total one for a solution with a condition that only that one models
-    #[arg(long, value_enum)]
+    /// Formulation: updated Lagrangian, with the weights of the current configuration anew in each step, or total
+    /// Lagrangian, with those of the reference configuration throughout. Where nothing is said the updated one, and the
+    /// total one for a solution with a condition that only that one models
+    #[arg(long = "formulation", alias = "frame", value_enum)]
     pub(crate) frame: Option<Frame>,
-    /// Mass matrix of the total frame; consistent where nothing is said
+    /// Mass matrix of the total Lagrangian formulation; consistent where nothing is said
     #[arg(long, value_enum)]
     pub(crate) mass: Option<Mass>,
-    /// Order of the symmetric composition of leapfrog in the total frame; where nothing is said 4, and 6 for splines of degree 4 and 5
+    /// Order of the symmetric composition of leapfrog in the total Lagrangian formulation; where nothing is
+    /// said 4, and 6 for splines of degree 4 and 5
     #[arg(long, value_enum)]
     pub(crate) composition: Option<Composition>,
-    /// Where the particles lie; Gauss points in the total frame only, body-fitted ones in the updated frame only. Where nothing is
-    /// said a lattice, and Gauss points in the total frame for a body that is not held between sliding walls
+    /// Where the particles lie; Gauss points in the total Lagrangian formulation only, body-fitted ones in the updated one
+    /// only. Where nothing is said a lattice, and Gauss points in the total Lagrangian formulation for a body that is not held between sliding walls
     #[arg(long, value_enum)]
     pub(crate) layout: Option<Layout>,
-    /// Coordinates of the background grid; where nothing is said polar for rings and spherical for shells in the total frame
+    /// Coordinates of the background grid; where nothing is said polar for rings and spherical for shells in the total Lagrangian
+    /// formulation
     #[arg(long, value_enum)]
     pub(crate) grid: Option<Grid>,
     /// Speed that the CFL number refers to; where nothing is said bar, and p-wave with a number that is not given either in a
-    /// total frame that is not
+    /// total Lagrangian formulation that is not
     #[arg(long, value_enum)]
     pub(crate) cfl_speed: Option<CflSpeed>,
     /// Time integrator
@@ -88,9 +91,9 @@ pub(crate) enum Shape {
     Bspline2,
     /// Cubic splines
     Bspline3,
-    /// Quartic splines (total frame)
+    /// Quartic splines (total Lagrangian)
     Bspline4,
-    /// Quintic splines (total frame)
+    /// Quintic splines (total Lagrangian)
     Bspline5,
     /// Parallelograms that deform with the particle
     Cpdi,
@@ -98,13 +101,15 @@ pub(crate) enum Shape {
     Cpdi2,
 }
 
-/// Configurations.
+/// Formulations; in JSON they have their old names, updated and total.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Frame {
-    /// The current one, weights anew in each step
+    /// Updated Lagrangian: weights anew in each step, from the current configuration
+    #[value(name = "updated-lagrangian", aliases = ["updated", "ul"])]
     Updated,
-    /// The reference configuration, weights once
+    /// Total Lagrangian: weights once, from the reference configuration
+    #[value(name = "total-lagrangian", aliases = ["total", "tl"])]
     Total,
 }
 
@@ -114,9 +119,9 @@ pub(crate) enum Frame {
 pub(crate) enum Layout {
     /// Centres of equal parts of a cell
     Lattice,
-    /// Polar cells of equal angle that end at the rims (rings, updated frame)
+    /// Polar cells of equal angle that end at the rims (rings, updated Lagrangian)
     BodyFitted,
-    /// Gauss-Legendre points (total frame)
+    /// Gauss-Legendre points (total Lagrangian)
     Gauss,
 }
 

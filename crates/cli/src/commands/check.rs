@@ -142,7 +142,7 @@ impl Claims {
 
     fn text(&self) -> String {
         let mut text = String::new();
-        let name = |proof: &SurfaceProof| format!("{} on {:?}", claim(proof.claim), proof.surface);
+        let name = |proof: &SurfaceProof| format!("{} on {}", claim(proof.claim), proof.surface);
         let symbolic = self.surfaces.iter().filter(|p| p.outcome == Outcome::Symbolic).map(name);
         let symbolic = symbolic.collect::<Vec<_>>().join(", ");
         if !symbolic.is_empty() {
@@ -182,7 +182,7 @@ fn claim(kind: ClaimKind) -> &'static str {
 }
 
 fn surface_document(proof: &SurfaceProof) -> Value {
-    let what = format!("{} on {:?}", claim(proof.claim), proof.surface);
+    let what = format!("{} on {}", claim(proof.claim), proof.surface);
     match &proof.outcome {
         Outcome::Symbolic => json!({ "what": what, "verdict": "proved", "by": "symbols" }),
         Outcome::Numerical { digits, points } => json!({

@@ -136,7 +136,7 @@ fn text(spec: &Spec, exercises: &[Exercise], cost: &BodyForceCost) -> String {
         &format!("  wave speed = {}\n  period = {}\n", print(spec.wave_speed), print(spec.period));
     text += &format!("\nbody\n  {}\n", domain(spec));
     for boundary in &spec.boundaries {
-        text += &format!("  {:?}: {:?}\n", boundary.surface, boundary.condition);
+        text += &format!("  {}: {}\n", boundary.surface, boundary.condition);
     }
     text += "\nwhat a solver can get wrong, and whether this solution would show it\n";
     for exercise in exercises {

@@ -23,7 +23,7 @@ use super::converge::{
 };
 use super::scheme::Scheme;
 use super::{Model, case, settings, with_threads};
-use crate::arguments::{Integrator, Precision, ReproduceOptions, Shape};
+use crate::arguments::{Integrator, Precision, ReproduceOptions, Shape, word};
 use crate::json::{Output, prepare_folder};
 use crate::library::Selection;
 use crate::progress::Bar;
@@ -355,9 +355,4 @@ fn compare(series: &[Series], first: &str, label: impl Fn(&Row) -> String) -> Ta
 
 fn name((shape, integrator): (Shape, Integrator)) -> String {
     format!("{}+{}", word(shape), word(integrator))
-}
-
-/// An argument's value as it is typed.
-fn word(value: impl clap::ValueEnum) -> String {
-    value.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
 }

@@ -5,9 +5,9 @@ use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{FrameOutput, Moment, Outputs, Row, Status, energy_drift, run as simulate};
 use serde_json::{Value, json};
 
-use super::scheme::{Scheme, name};
+use super::scheme::Scheme;
 use super::{Model, caption, case, preface, resume, settings, with_threads};
-use crate::arguments::{Frame, RunOptions};
+use crate::arguments::{Frame, RunOptions, word};
 use crate::json::{Output, prepare_folder};
 use crate::library::Selection;
 use crate::progress::Bar;
@@ -69,10 +69,10 @@ pub(super) fn follow(options: &RunOptions, place: Option<resume::Place>) -> Resu
             file.write_text(&csv::history(moments.as_deref().unwrap_or_default()))?;
         }
         if let Some(file) = plot {
-            let shape = name(scheme.shape);
+            let shape = word(scheme.shape);
             let curve = match scheme.frame {
                 Frame::Total => shape,
-                Frame::Updated => format!("{shape} + {}", name(scheme.integrator)),
+                Frame::Updated => format!("{shape} + {}", word(scheme.integrator)),
             };
             let course = course(curve, &model, moments.as_deref().unwrap_or_default());
             let title = format!("{}: drift of energy, {cells} cells", selection.name());

@@ -3,13 +3,12 @@
 use std::path::PathBuf;
 
 use anyhow::{Result, bail};
-use clap::ValueEnum;
 use mmsmith_solutions::{AnySolution, Boundary};
 use mmsmith_verify as verify;
 
 use crate::arguments::{
     CflSpeed, Composition, Extent, Frame, Grid, Integrator, Layout, Mass, Precision, SchemeOptions,
-    Shape, Start,
+    Shape, Start, word,
 };
 
 /// The CFL number where nothing is said, and nothing else of the scheme was chosen for the solution.
@@ -185,21 +184,18 @@ impl Scheme {
             text += &format!(", CFL {} on {speed}", self.cfl);
         }
         if let Some(Boundary { surface, condition }) = reason {
-            text += &format!(
-                ": the updated formulation does not model {} on {}",
-                verify::condition_name(*condition),
-                verify::surface_name(*surface)
-            );
+            text +=
+                &format!(": the updated formulation does not model {} on {}", condition, surface);
         }
         text += &format!(
-            "\n  as with --frame total --shape {} --grid {} --layout {} --ppc {}",
-            name(self.shape),
-            name(self.grid),
-            name(self.layout),
+            "\n  as with --formulation total-lagrangian --shape {} --grid {} --layout {} --ppc {}",
+            word(self.shape),
+            word(self.grid),
+            word(self.layout),
             self.ppc,
         );
         if *cfl_is_chosen {
-            text += &format!(" --cfl {} --cfl-speed {}", self.cfl, name(self.cfl_speed));
+            text += &format!(" --cfl {} --cfl-speed {}", self.cfl, word(self.cfl_speed));
         }
         text + "\n"
     }
@@ -229,11 +225,6 @@ fn per_cell(layout: Layout, shape: Shape) -> usize {
     }
 }
 
-/// A value as it is written on the command line.
-pub(super) fn name(value: impl ValueEnum) -> String {
-    value.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
-}
-
 /// The weights of the updated frame, and the frame with its own scheme.
 pub(super) fn of(options: &Scheme) -> Result<(verify::Shape, verify::Frame)> {
     match options.frame {
@@ -248,7 +239,7 @@ pub(super) fn placement(options: &Scheme) -> Result<verify::Placement> {
     match (options.frame, options.layout) {
         (Frame::Total, Layout::BodyFitted) => {
             bail!(
-                "--layout body-fitted: the total frame fits a ring by --grid polar; use --layout gauss or lattice with it"
+                "--layout body-fitted: the total Lagrangian formulation fits a ring by --grid polar; use --layout gauss or lattice with it"
             )
         }
         (Frame::Updated, Layout::BodyFitted) => Ok(verify::Placement::BodyFitted),
@@ -265,7 +256,9 @@ fn updated(options: &Scheme) -> Result<verify::Shape> {
         ("--grid spherical", options.grid == Grid::Spherical),
     ];
     if let Some((option, _)) = total_only.iter().find(|(_, given)| *given) {
-        bail!("{option}: the updated frame has none; use it with --frame total");
+        bail!(
+            "{option}: the updated Lagrangian formulation has none; use it with --formulation total-lagrangian"
+        );
     }
     Ok(match options.shape {
         Shape::Linear => verify::Shape::Linear,
@@ -276,9 +269,9 @@ fn updated(options: &Scheme) -> Result<verify::Shape> {
         Shape::Cpdi => verify::Shape::Cpdi,
         Shape::Cpdi2 => verify::Shape::Cpdi2,
         Shape::Bspline4 | Shape::Bspline5 => {
-            let name = name(options.shape);
+            let name = word(options.shape);
             bail!(
-                "--shape {name}: splines of this degree need the reference configuration; add --frame total, or take \
+                "--shape {name}: splines of this degree need the reference configuration; add --formulation total-lagrangian, or take \
                  bspline2 or bspline3"
             )
         }
@@ -292,14 +285,14 @@ fn total(options: &Scheme) -> Result<verify::TotalScheme> {
         Shape::Bspline4 => 4,
         Shape::Bspline5 => 5,
         _ => bail!(
-            "--shape {}: the total frame takes bspline2, bspline3, bspline4 or bspline5",
-            name(options.shape)
+            "--shape {}: the total Lagrangian formulation takes bspline2, bspline3, bspline4 or bspline5",
+            word(options.shape)
         ),
     };
     if options.transfer != verify::Transfer::Flip {
         bail!(
-            "--transfer {}: the total frame keeps velocities on the grid, and has nothing to transfer; use it with \
-             --frame updated",
+            "--transfer {}: the total Lagrangian formulation keeps velocities on the grid, and has nothing to transfer; use it with \
+             --formulation updated-lagrangian",
             options.transfer
         );
     }
@@ -359,9 +352,9 @@ pub(super) fn words(options: &Scheme) -> String {
         }
     };
     format!(
-        " of order {order}, total frame, {} mass, {} layout, {} grid{part}",
-        name(mass),
-        name(options.layout),
-        name(options.grid)
+        " of order {order}, total Lagrangian, {} mass, {} layout, {} grid{part}",
+        word(mass),
+        word(options.layout),
+        word(options.grid)
     )
 }

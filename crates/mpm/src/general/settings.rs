@@ -30,6 +30,21 @@ pub enum Shape {
     Cpdi2,
 }
 
+/// The name that the field has for it.
+impl fmt::Display for Shape {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Linear => "linear",
+            Self::Ugimp => "ugimp",
+            Self::Gimp => "gimp",
+            Self::Bspline2 => "bspline2",
+            Self::Bspline3 => "bspline3",
+            Self::Cpdi => "cpdi",
+            Self::Cpdi2 => "cpdi2",
+        })
+    }
+}
+
 impl Shape {
     /// The same weights of the fast step, where it has them.
     pub fn of_fast_step(self) -> Option<crate::Shape> {
@@ -57,6 +72,19 @@ pub enum Integrator {
     Usavg,
     /// Centred differences: the arithmetic of `Usl`, with particle velocities half a step behind positions.
     Cd,
+}
+
+/// The name that the field has for it.
+impl fmt::Display for Integrator {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Usf => "usf",
+            Self::Usl => "usl",
+            Self::Musl => "musl",
+            Self::Usavg => "usavg",
+            Self::Cd => "cd",
+        })
+    }
 }
 
 impl Integrator {

@@ -529,7 +529,7 @@ fn check<const D: usize>(
         return Err(SetupError::NotPositive { quantity, value: 0.0 });
     }
     if settings.halve_first_acceleration && settings.integrator != Integrator::Cd {
-        let integrator = format!("{:?}", settings.integrator);
+        let integrator = settings.integrator.to_string();
         return Err(SetupError::HalvedStart { integrator });
     }
     let Particles { X, x, v, F, mass, volume, .. } = &body.particles;

@@ -130,7 +130,7 @@ fn a_declared_condition_that_does_not_hold_is_caught() {
         Boundary { surface: Surface::Outer, condition: Condition::Sliding },
     ];
     let report = report(Ring { conditions: WRONG, ..Ring::default() });
-    assert_eq!(failed(&report), ["u.N on Outer"]);
+    assert_eq!(failed(&report), ["u.N on outer"]);
 }
 
 #[test]

@@ -151,7 +151,7 @@ fn conditions_that_the_solver_does_not_model_are_named() {
     };
     let error =
         run(&shear, Arithmetic::Double, &Case::default(), &mut outputs).unwrap_err().to_string();
-    assert!(error.contains("PrescribedMotion on Lower(0)"), "{error}");
+    assert!(error.contains("prescribed-motion on X-lower"), "{error}");
 }
 
 #[test]

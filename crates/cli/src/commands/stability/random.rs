@@ -3,14 +3,13 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use anyhow::{Result, bail};
-use clap::ValueEnum;
 use mmsmith_verify::{Criteria, Observed, is_stable};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use serde_json::{Value, json};
 
 use super::{Point, definition, told, without_threads};
-use crate::arguments::{CflSpeed, Frame, SchemeOptions, StabilityOptions};
+use crate::arguments::{CflSpeed, Frame, SchemeOptions, StabilityOptions, word};
 use crate::commands::scheme::Scheme;
 use crate::commands::{caption, preface, settings, with_threads};
 use crate::json::Output;
@@ -167,7 +166,7 @@ fn command(options: &StabilityOptions, point: &Point) -> String {
     if scheme.frame == Frame::Total {
         let (mass, composition) = crate::commands::scheme::echo(scheme);
         text += &format!(
-            " --frame total --mass {} --composition {composition} --grid {}",
+            " --formulation total-lagrangian --mass {} --composition {composition} --grid {}",
             word(mass),
             word(scheme.grid)
         );
@@ -182,11 +181,6 @@ fn command(options: &StabilityOptions, point: &Point) -> String {
         text += &format!(" --set {name}={value:?}");
     }
     text
-}
-
-/// An argument's value as it is typed.
-fn word(value: impl ValueEnum) -> String {
-    value.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
 }
 
 /// The same numbers on every machine.

@@ -6,10 +6,6 @@ use mmsmith_verify::{
 };
 use serde_json::{Value, json};
 
-fn word(value: &dyn std::fmt::Debug) -> String {
-    format!("{value:?}").to_lowercase()
-}
-
 fn is_total(setting: &Setting) -> bool {
     setting.case.frame != Frame::Updated
 }
@@ -17,7 +13,7 @@ fn is_total(setting: &Setting) -> bool {
 /// The weights.
 fn shape(setting: &Setting) -> String {
     match setting.case.frame {
-        Frame::Updated => word(&setting.case.shape),
+        Frame::Updated => setting.case.shape.to_string(),
         Frame::Total(total) => format!("bspline{}", total.scheme.degree),
     }
 }
@@ -62,7 +58,7 @@ fn composition(setting: &Setting) -> usize {
 pub(super) fn kind(setting: &Setting) -> String {
     let mut text = shape(setting);
     if is_total(setting) {
-        text += ", total frame";
+        text += ", total Lagrangian";
     } else if setting.case.placement == Placement::BodyFitted {
         text += ", body-fitted";
     }
@@ -73,8 +69,10 @@ pub(super) fn kind(setting: &Setting) -> String {
 pub(super) fn scheme(setting: &Setting) -> String {
     let case = &setting.case;
     let mut parts = vec![match is_total(setting) {
-        true => format!("{}, total frame, order {} in time", shape(setting), composition(setting)),
-        false => format!("{} + {}", shape(setting), word(&case.integrator)),
+        true => {
+            format!("{}, total Lagrangian, order {} in time", shape(setting), composition(setting))
+        }
+        false => format!("{} + {}", shape(setting), case.integrator.to_string()),
     }];
     if is_total(setting) && mass(setting) == "lumped" {
         parts.push("lumped mass".into());
@@ -106,9 +104,10 @@ pub(super) fn options(setting: &Setting) -> String {
     let mut text = format!("--cells {} --shape {}", case.cells, shape(setting));
     if is_total(setting) {
         let (mass, composition) = (mass(setting), composition(setting));
-        text += &format!(" --frame total --mass {mass} --composition {composition}");
+        text +=
+            &format!(" --formulation total-lagrangian --mass {mass} --composition {composition}");
     } else if case.integrator != Integrator::Cd {
-        text += &format!(" --integrator {}", word(&case.integrator));
+        text += &format!(" --integrator {}", case.integrator.to_string());
     }
     if case.transfer != Transfer::Flip {
         text += &format!(" --transfer {}", case.transfer);
@@ -133,13 +132,13 @@ pub(super) fn document(setting: &Setting) -> Value {
     json!({
         "frame": if is_total(setting) { "total" } else { "updated" },
         "shape": shape(setting),
-        "integrator": word(&case.integrator),
+        "integrator": case.integrator.to_string(),
         "mass": mass(setting),
         "composition": composition(setting),
         "layout": layout(setting),
         "grid": grid(setting),
         "transfer": case.transfer.to_string(),
-        "start": word(&case.start),
+        "start": case.start.to_string(),
         "ppc": case.per_cell,
         "cfl_asked": case.cfl,
         "cfl_speed": match case.cfl_speed { CflSpeed::Bar => "bar", CflSpeed::PWave => "p-wave" },
@@ -157,7 +156,7 @@ pub(super) fn effect(effect: &Effect, from: &Entry, to: &Entry) -> String {
         Knob::Ppc => format!("ppc {}", setting.case.per_cell),
         Knob::Shape => shape(setting),
         Knob::Integrator if is_total(setting) => format!("order {} in time", composition(setting)),
-        Knob::Integrator => word(&setting.case.integrator),
+        Knob::Integrator => setting.case.integrator.to_string(),
         Knob::Transfer => setting.case.transfer.to_string(),
         Knob::Layout => layout(setting).to_owned(),
         Knob::Mass => format!("{} mass", mass(setting)),
