@@ -46,7 +46,7 @@ pub(crate) use explain::ExplainOptions;
 pub(crate) use list::ListOptions;
 pub(crate) use reproduce::ReproduceOptions;
 pub(crate) use resume::ResumeOptions;
-pub(crate) use run::RunOptions;
+pub(crate) use run::{PictureOptions, RunOptions, Stress};
 pub(crate) use scheme::{
     CflSpeed, Composition, Extent, Frame, Grid, Integrator, Layout, Mass, Precision, SchemeOptions,
     Shape, Start,

@@ -6,6 +6,7 @@ mod coverage;
 mod eval;
 mod explain;
 mod list;
+mod picture;
 mod predict;
 mod reproduce;
 mod resume;

@@ -8,6 +8,7 @@ mod arguments;
 mod commands;
 mod csv;
 mod expect;
+mod html;
 mod input;
 mod json;
 mod keep;

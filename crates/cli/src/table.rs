@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use crate::html;
 use crate::svg::escape;
 
 /// Rows of cells under a header; columns as wide as they need to be.
@@ -18,6 +19,16 @@ impl Table {
 
     pub(crate) fn row<S: Into<String>>(&mut self, cells: impl IntoIterator<Item = S>) {
         self.rows.push(cells.into_iter().map(Into::into).collect());
+    }
+
+    /// The same with the unit of what the columns `named` hold, as `h [m]`.
+    pub(crate) fn with_unit(mut self, named: &[&str], unit: &str) -> Self {
+        for cell in self.rows.first_mut().into_iter().flatten() {
+            if named.contains(&cell.as_str()) {
+                *cell = format!("{cell} [{unit}]");
+            }
+        }
+        self
     }
 
     /// The table as text, each line indented by two spaces.
@@ -82,11 +93,15 @@ impl Table {
         let caption = escape(caption);
         let mut text = format!(
             "<div class=\"scroll\" role=\"region\" aria-label=\"{caption}\" tabindex=\"0\">\n<table>\n\
-             <caption>{caption}</caption>\n"
+             <caption><span>{caption}</span></caption>\n"
         );
+        let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
         for (index, row) in self.rows.iter().enumerate() {
-            let cells = row.iter().enumerate().map(|(column, cell)| {
-                let cell = escape(cell);
+            // Short rows are filled up, so that their lines reach to the end.
+            let missing = columns - row.len();
+            let row = row.iter().map(String::as_str).chain(std::iter::repeat_n("", missing));
+            let cells = row.enumerate().map(|(column, cell)| {
+                let cell = html::text(cell);
                 match (index, column < self.words) {
                     (0, true) => format!("<th scope=\"col\">{cell}</th>"),
                     (0, false) => format!("<th scope=\"col\" class=\"number\">{cell}</th>"),
@@ -153,6 +168,14 @@ mod tests {
     }
 
     #[test]
+    fn units_stand_in_the_header_and_short_rows_are_filled_up() {
+        let mut table = Table::new(1, ["field", "h", "rate", "h"]).with_unit(&["h"], "m");
+        table.row(["h", "1"]);
+        assert!(table.text().starts_with("  field  h [m]  rate  h [m]\n  h          1\n"));
+        assert_eq!(table.html("t").matches("<td").count(), 4);
+    }
+
+    #[test]
     fn numbers_that_are_none_become_dashes() {
         assert_eq!((error(4.0812e-3), error(f64::NAN)), ("4.081e-3".into(), "-".into()));
         assert_eq!((rate(Some(1.996)), rate(None)), ("2.00".into(), "-".into()));
@@ -176,6 +199,6 @@ mod tests {
         table.row(["<b>", "1"]);
         let text = table.html("a & b");
         assert!(text.contains("<td>&lt;b&gt;</td><td class=\"number\">1</td>"), "{text}");
-        assert!(text.contains("<caption>a &amp; b</caption>"), "{text}");
+        assert!(text.contains("<caption><span>a &amp; b</span></caption>"), "{text}");
     }
 }

@@ -423,3 +423,27 @@ fn an_older_result_is_replaced_whole_or_not_at_all() {
     assert_eq!(read_json(&file)["schema"], "mmsmith.run/1");
     assert_eq!(names(place.path()), ["row.json"]);
 }
+
+#[test]
+fn a_run_draws_its_particles_at_a_time_with_axes_and_units() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let run = "run axis-aligned --cells 4 --threads 1 --at 0.5 --stress pressure --picture p.svg";
+    assert_eq!(mms(place, run).status, 0);
+    let picture = std::fs::read_to_string(place.join("p.svg")).unwrap();
+    assert!(picture.contains("axis-aligned: pressure, t = 0.01 s"), "{picture}");
+    assert!(picture.contains(">x [m]<") && picture.contains(">Pa<"), "{picture}");
+    assert_eq!(picture.matches("h0").count(), 64);
+
+    refuses(place, "run axis-aligned --at 0.5", &["--picture"]);
+    refuses(place, "run axis-aligned --at 2 --picture p.svg", &["--at 2", "--periods 2"]);
+    refuses(place, "run axis-aligned --at -1 --picture p.svg", &["--at", "from 0 on"]);
+    refuses(place, "run axis-aligned --picture none/p.svg", &["none"]);
+    let stopped = "run axis-aligned --cells 8 --cfl 2 --threads 1 --picture p.svg";
+    // What was measured until then is told all the same.
+    let called = mms(place, stopped);
+    assert!(called.status == 2 && called.stdout.contains("STOPPED"), "{}", called.stderr);
+    for part in ["--picture", "did not come to 1 period(s)", "--at"] {
+        assert!(called.stderr.contains(part), "{}", called.stderr);
+    }
+}

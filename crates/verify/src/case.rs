@@ -14,7 +14,7 @@ use thiserror::Error;
 
 use crate::checkpoint::{CheckpointError, Checkpoints, Reached, TakenUp};
 use crate::dimension::in_arithmetic;
-use crate::frames::{FrameOutput, FrameWriter};
+use crate::frames::{FrameOutput, FrameWriter, Snapshot};
 use crate::general::{self, Placement, Precision};
 use crate::history::{Moment, Recorder};
 use crate::measure::Comparison;
@@ -128,6 +128,8 @@ pub struct Outputs<'a> {
     pub progress: &'a mut dyn FnMut(Progress),
     /// Particle files, if any are wanted.
     pub frames: Option<&'a FrameOutput>,
+    /// A moment whose particles are kept, if one is wanted.
+    pub snapshot: Option<&'a mut Snapshot>,
     /// What a run that is killed goes on from, if that is wanted.
     pub checkpoints: Option<&'a Checkpoints>,
     /// Where errors, energies and momentum go at up to [`MOST_MOMENTS`](crate::MOST_MOMENTS) evenly spread steps, first and
@@ -141,7 +143,14 @@ pub struct Outputs<'a> {
 impl<'a> Outputs<'a> {
     /// Nothing but what is called after every step.
     pub fn new(progress: &'a mut dyn FnMut(Progress)) -> Self {
-        Self { progress, frames: None, checkpoints: None, history: None, until: None }
+        Self {
+            progress,
+            frames: None,
+            snapshot: None,
+            checkpoints: None,
+            history: None,
+            until: None,
+        }
     }
 }
 
@@ -392,6 +401,9 @@ fn follow<T: Real, const D: usize>(
             if let Some(frames) = &mut frames {
                 frames.write(solver.observe(), exact, 0, 0.0)?;
             }
+            if let Some(snapshot) = &mut outputs.snapshot {
+                snapshot.take(solver.observe(), exact, (0, steps.count), 0.0);
+            }
             let at_start = comparison.measure(solver.observe(), 0.0, lag);
             if let Some(recorder) = &mut recorder {
                 let velocity_time = if starts_early(case) { -lag } else { 0.0 };
@@ -427,6 +439,9 @@ fn follow<T: Real, const D: usize>(
         }
         if let Some(frames) = &mut frames {
             frames.write(solver.observe(), exact, step, time)?;
+        }
+        if let Some(snapshot) = &mut outputs.snapshot {
+            snapshot.take(solver.observe(), exact, (step, steps.count), time);
         }
         let share = step as f64 / steps.count as f64;
         (outputs.progress)(Progress { case: 0, step, steps: steps.count, share });

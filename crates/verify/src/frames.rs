@@ -18,6 +18,30 @@ pub struct FrameOutput {
     pub count: u64,
 }
 
+/// The particles at one moment of a run, kept in memory.
+#[derive(Debug, Default)]
+pub struct Snapshot {
+    /// The moment: a share of the time from the start, 0, to the end, 1. The step nearest to it is taken.
+    pub share: f64,
+    /// The particles, once the run has been there; none where it stopped before, or where a particle is inside out then.
+    pub frame: Option<Frame>,
+}
+
+impl Snapshot {
+    /// Keeps the state after a step, told with the number of all steps, if it is the one wanted.
+    pub(crate) fn take<T: Real, const D: usize>(
+        &mut self,
+        state: (&Particles<T, D>, &Material<T>),
+        exact: &dyn Solution<f64, D>,
+        (step, steps): (u64, u64),
+        time: f64,
+    ) {
+        if step == (self.share.clamp(0.0, 1.0) * steps as f64).round() as u64 {
+            self.frame = frame(state, exact, step, time);
+        }
+    }
+}
+
 /// Writes the frames of one run. Frames tell the time of their velocities, but for the first state, whose velocity belongs to
 /// no time of the scheme yet.
 pub(crate) struct FrameWriter {

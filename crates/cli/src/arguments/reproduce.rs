@@ -14,6 +14,9 @@ pub(crate) struct ReproduceOptions {
     /// Time for the comparison of schemes by error and cost, for each problem, such as 8s or 2m
     #[arg(long, value_name = "TIME", default_value = "8s", value_parser = seconds)]
     pub(crate) budget: f64,
+    /// Draw nothing but the picture of the README to this SVG file: the ring's stress beside its orders
+    #[arg(long, value_name = "FILE", hide = true)]
+    pub(crate) hero: Option<PathBuf>,
     /// Number of threads; all cores when left out
     #[arg(long, value_name = "N", value_parser = thread_count)]
     pub(crate) threads: Option<usize>,

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 
 use super::scheme::SchemeOptions;
-use super::values::positive_count;
+use super::values::{positive_count, time};
 
 #[derive(Args)]
 pub(crate) struct RunOptions {
@@ -37,4 +37,45 @@ pub(crate) struct RunOptions {
     /// Draw the energy gained and lost against the exact motion over time to this SVG file
     #[arg(long, value_name = "FILE")]
     pub(crate) plot: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) picture: PictureOptions,
+}
+
+/// A picture of the particles.
+#[derive(Args)]
+pub(crate) struct PictureOptions {
+    /// Draw the particles, coloured by their Cauchy stress, to this SVG file; those in space as they are seen along the third axis
+    #[arg(long = "picture", value_name = "FILE", conflicts_with = "checkpoint")]
+    pub(crate) file: Option<PathBuf>,
+    /// The time of the picture in periods of the solution, at most --periods; the end when left out
+    #[arg(long, value_name = "PERIODS", requires = "file", allow_negative_numbers = true, value_parser = time)]
+    pub(crate) at: Option<f64>,
+    /// The stress that gives the particles of the picture their colours
+    #[arg(long, value_enum, default_value_t = Stress::VonMises, requires = "file")]
+    pub(crate) stress: Stress,
+}
+
+/// Scalars of a Cauchy stress.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Stress {
+    /// Von Mises' equivalent stress
+    VonMises,
+    /// Pressure, positive in compression
+    Pressure,
+    /// Normal stress along the first axis
+    Xx,
+    /// Normal stress along the second axis
+    Yy,
+    /// Normal stress along the third axis
+    Zz,
+    /// Shear stress
+    Xy,
+    /// Shear stress
+    Xz,
+    /// Shear stress
+    Yz,
+    /// Normal stress away from the third axis
+    Radial,
+    /// Normal stress around the third axis
+    Hoop,
 }

@@ -30,6 +30,14 @@ pub(super) fn positive_number(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A time from the start of a run on.
+pub(super) fn time(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if value >= 0.0 && value.is_finite() => Ok(value),
+        _ => Err("it must be a number from 0 on, such as 0.5".into()),
+    }
+}
+
 /// A time: seconds, or with a unit.
 pub(super) fn seconds(text: &str) -> Result<f64, String> {
     let text = text.trim();

@@ -3,6 +3,7 @@
 mod claims;
 mod cost;
 mod drift;
+mod hero;
 mod limits;
 mod pictures;
 mod report;
@@ -12,14 +13,15 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 use mmsmith_verify::{
-    Case, Expected, FrameOutput, ORDER_TOLERANCE, Outputs, Progress, Row, Start, Status, Study,
-    Sweep, Temporal, converge as measure, expected_in_space, expected_in_time, run as simulate,
+    Case, Expected, FrameOutput, ORDER_TOLERANCE, Outputs, Progress, Row, Start, Status, StepError,
+    Study, Sweep, Temporal, converge as measure, expected_in_space, expected_in_time,
+    run as simulate,
 };
 use serde_json::json;
 
 use super::converge::{
     Verdicts, difference_curve, difference_tables, differences, document, judge, judge_differences,
-    stops, tables, temporal_document, verdict_table,
+    tables, temporal_document, verdict_table,
 };
 use super::scheme::Scheme;
 use super::{Model, case, settings, with_threads};
@@ -29,7 +31,7 @@ use crate::library::Selection;
 use crate::progress::Bar;
 use crate::svg::{Curve, Plot};
 use crate::table::{self, Table};
-use crate::{csv, terminal};
+use crate::{csv, number, terminal};
 
 /// The study's problems, by name.
 const PROBLEMS: [&str; 2] = ["axis-aligned", "ring"];
@@ -105,6 +107,13 @@ struct Results {
 }
 
 pub(crate) fn reproduce(options: &ReproduceOptions) -> Result<bool> {
+    if let Some(file) = &options.hero {
+        let picture = Output::prepare(file).context("--hero")?;
+        return with_threads(options.threads, || {
+            picture.write_text(&hero::svg()?)?;
+            Ok(true)
+        });
+    }
     let out = &options.out;
     let report = out.join("report.html");
     for problem in PROBLEMS {
@@ -299,34 +308,108 @@ fn summary(results: &Results) -> (String, String) {
     let problem = results.problem;
     let space = compare(&results.space, "cells", |row| row.cells.to_string());
     let time = compare(&results.time, "CFL", |row| format!("{:.4}", row.cfl));
-    let stopped = |series: &[Series]| -> String {
-        let lines = series.iter().filter(|s| !stops(&s.study).is_empty());
-        lines.map(|s| format!("{}:\n{}", s.name(), stops(&s.study))).collect()
+    let early = |series| {
+        let table = stopped(&[series]);
+        let text = table.as_ref().map(|table| format!("stopped early\n{}", table.text()));
+        let block = table.map(|table| format!("\nRuns that stopped:\n\n{}", table.markdown()));
+        (text.unwrap_or_default(), block.unwrap_or_default())
     };
-    let (stops_space, stops_time) = (stopped(&results.space), stopped(&results.time));
+    let (stops_space, block_space) = early(&results.space);
+    let (stops_time, block_time) = early(&results.time);
     let said = format!(
-        "\n{problem}: L_inf error of u, and its order in h\n{}{stops_space}\
-         \n{problem}: L_inf error of u on {GRID} cells, and its order in dt\n{}{stops_time}",
+        "\n{problem}: L_inf error of u [m], and its order in h\n{}{stops_space}\
+         \n{problem}: L_inf error of u [m] on {GRID} cells, and its order in dt\n{}{stops_time}",
         space.text(),
         time.text()
     );
-    let block = |text: &str| {
-        if text.is_empty() { String::new() } else { format!("\n```text\n{text}```\n") }
-    };
     let mut written = format!(
         "\n## {problem}\n\n### In space\n\n![error of u against h]({problem}/space.svg)\n\n{}{}\n\
          ### In time, on {GRID} cells\n\n![error of u against dt]({problem}/time.svg)\n\n{}{}\n\
          ### All fields of gimp+cd, in space\n",
         space.markdown(),
-        block(&stops_space),
+        block_space,
         time.markdown(),
-        block(&stops_time),
+        block_time,
     );
     let cells = Sweep::Cells(CELLS.to_vec());
     for (field, table) in tables(&results.space[0].study, &cells, &results.space[0].verdicts) {
-        written += &format!("\nError of {field}:\n\n{}", table.markdown());
+        written +=
+            &format!("\nError of {field}:\n\n{}", errors_with_units(table, field).markdown());
     }
     (said, written)
+}
+
+/// A table of errors of a field, or of differences, with the units of the two problems: those of the SI.
+fn errors_with_units(table: Table, field: &str) -> Table {
+    let table = table.with_unit(&["h"], "m").with_unit(&["dt"], "s");
+    let unit = match field {
+        "u" => "m",
+        "v" => "m/s",
+        "P" => "Pa",
+        // F is a pure number.
+        _ => return table,
+    };
+    table.with_unit(&["linf", "l2", "l1"], unit)
+}
+
+/// The runs that did not come to their end; no table where all did.
+fn stopped(studies: &[&[Series]]) -> Option<Table> {
+    let mut table = Table::new(5, ["scheme", "cells", "CFL", "step", "what happened"]);
+    let mut any = false;
+    for (series, row) in
+        studies.iter().copied().flatten().flat_map(|s| s.study.rows.iter().map(move |row| (s, row)))
+    {
+        let Some((step, what)) = end(&row.status) else { continue };
+        any = true;
+        let cfl = number::rounded(row.cfl, 4);
+        table.row([series.name(), row.cells.to_string(), cfl, step.to_string(), what]);
+    }
+    any.then_some(table)
+}
+
+/// The step that ended a run too early, and why; nothing for a run that came to its end.
+fn end(status: &Status) -> Option<(u64, String)> {
+    let short = |value: f64| number::rounded(value, 3);
+    let told = match status {
+        Status::Ok => return None,
+        Status::Stopped(StepError::Inverted { step, time, particle, J }) => {
+            let (time, J) = (short(*time), short(*J));
+            (
+                *step as u64,
+                format!("at t = {time} s particle {particle} is turned inside out: J = {J}"),
+            )
+        }
+        Status::Stopped(StepError::NotFinite { step, time, particle, .. }) => {
+            let time = short(*time);
+            (*step as u64, format!("at t = {time} s a value of particle {particle} is not finite"))
+        }
+        Status::Stopped(StepError::LeftGrid { step, time, particle, .. }) => {
+            (*step as u64, format!("at t = {} s particle {particle} left the grid", short(*time)))
+        }
+        Status::Stopped(StepError::TooLarge { step, time, particle, .. }) => {
+            let time = short(*time);
+            (
+                *step as u64,
+                format!(
+                    "at t = {time} s the box of particle {particle} is wider than the weights support"
+                ),
+            )
+        }
+        Status::Unstable { step, time, particle, error, size } => {
+            let [time, error, size] = [*time, *error, *size].map(short);
+            (
+                *step,
+                format!(
+                    "at t = {time} s particle {particle} is {error} m from its exact place, further than the body is \
+                     large ({size} m)"
+                ),
+            )
+        }
+        Status::Cut { step, time } => {
+            (*step, format!("its time was over at t = {} s", short(*time)))
+        }
+    };
+    Some(told)
 }
 
 /// One column of errors and one of rates for each scheme.

@@ -5,6 +5,7 @@ use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{FrameOutput, Moment, Outputs, Row, Status, energy_drift, run as simulate};
 use serde_json::{Value, json};
 
+use super::picture::Picture;
 use super::scheme::Scheme;
 use super::{Model, caption, case, preface, resume, settings, with_threads};
 use crate::arguments::{Frame, RunOptions, word};
@@ -35,6 +36,7 @@ pub(super) fn follow(options: &RunOptions, place: Option<resume::Place>) -> Resu
     if let Some(folder) = &options.vtk {
         prepare_folder(folder).context("--vtk")?;
     }
+    let mut picture = Picture::asked(&options.picture, scheme.periods)?;
     let mut moments = (history.is_some() || plot.is_some()).then(Vec::new);
     let frames = options.vtk.as_ref().map(|folder| FrameOutput {
         folder: folder.clone(),
@@ -56,6 +58,7 @@ pub(super) fn follow(options: &RunOptions, place: Option<resume::Place>) -> Resu
                 frames: frames.as_ref(),
                 checkpoints: checkpoints.as_ref(),
                 history: moments.as_mut(),
+                snapshot: picture.as_mut().map(Picture::snapshot),
                 ..Outputs::new(show)
             };
             simulate(&model.exact, model.arithmetic(), &case, &mut outputs)?
@@ -88,6 +91,10 @@ pub(super) fn follow(options: &RunOptions, place: Option<resume::Place>) -> Resu
                 document["history"] = history_document(moments);
             }
             output.write(&document)?;
+        }
+        // Last, since a run that stopped has no picture.
+        if let Some(picture) = picture {
+            picture.write(&selection, &row)?;
         }
         Ok(true)
     })

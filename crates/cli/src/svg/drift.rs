@@ -3,8 +3,10 @@
 use std::fmt::Write;
 
 use super::plot::{BOTTOM, LEFT, LEGEND, LINE, RIGHT, TOP, WIDTH, frame, marker, style};
-use super::{escape, number, open};
+use super::{escape, number, open, round_values, rounded};
 
+/// Where the columns of the legend end.
+const COLUMNS: [f64; 3] = [RIGHT - 164.0, RIGHT - 86.0, RIGHT];
 /// Markers on a curve.
 const MARKERS: usize = 8;
 /// Where one curve goes this many times as far as another, small values are given more room.
@@ -58,22 +60,12 @@ impl Axis {
         ticks
     }
 
-    /// At most nine multiples of a power of ten, of its double or fivefold.
+    /// Round values, or powers of ten where the axis is bent.
     fn ticks(&self) -> Vec<f64> {
         if let Some(bend) = self.bend {
             return self.bent_ticks(bend);
         }
-        let width = self.high - self.low;
-        let power = width.log10().floor() as i32 - 1;
-        let step = (power..power + 3)
-            .flat_map(|power| [1.0, 2.0, 5.0].map(|m| (m, power)))
-            .find(|(m, power)| width / (m * 10_f64.powi(*power)) <= 8.0);
-        let Some((m, power)) = step else { return Vec::new() };
-        let unit = m * 10_f64.powi(power);
-        let (first, last) = ((self.low / unit).ceil() as i64, (self.high / unit).floor() as i64);
-        // By way of text, so that three times a tenth is 0.3.
-        let tick = |n: i64| format!("{}e{power}", n * m as i64).parse().unwrap_or(f64::NAN);
-        (first..=last).map(tick).collect()
+        round_values(self.low, self.high, 8.0)
     }
 }
 
@@ -84,14 +76,19 @@ impl Course {
         sizes.filter(|size| size.is_finite()).fold(0.0, f64::max)
     }
 
-    /// What the legend says.
-    fn label(&self) -> String {
+    /// Its least and its largest value, as far as they are below and above zero, and its last one.
+    fn ends(&self) -> Option<[f64; 3]> {
         let finite = || self.points.iter().map(|point| point.1).filter(|value| value.is_finite());
         let (least, most) = finite().fold((0.0_f64, 0.0_f64), |(l, m), v| (l.min(v), m.max(v)));
-        match finite().next_back() {
+        finite().next_back().map(|last| [least, most, last])
+    }
+
+    /// The curve in words.
+    fn label(&self) -> String {
+        match self.ends() {
             None => format!("{}: none", self.name),
-            Some(last) => {
-                let [least, most, last] = [least, most, last].map(told);
+            Some(ends) => {
+                let [least, most, last] = ends.map(told);
                 format!("{}: from {least} to {most}, {last} at the end", self.name)
             }
         }
@@ -106,7 +103,7 @@ fn told(value: f64) -> String {
 impl Drift<'_> {
     pub(crate) fn svg(&self) -> String {
         let labels: Vec<_> = self.curves.iter().map(Course::label).collect();
-        let height = LEGEND + LINE * labels.len() as f64;
+        let height = LEGEND + LINE * (labels.len() + 1) as f64;
         let mut text = open("plot", WIDTH, height, self.title, &format!("{}.", labels.join("; ")));
         let _ = writeln!(
             text,
@@ -160,9 +157,16 @@ impl Drift<'_> {
             }
         }
         frame(&mut text, self.x, self.y);
-        for (index, label) in labels.iter().enumerate() {
+        for (column, head) in COLUMNS.iter().zip(["least", "largest", "at the end"]) {
+            let _ = writeln!(
+                text,
+                r##"<text x="{column}" y="{}" text-anchor="end" font-size="13" fill="#444">{head}</text>"##,
+                LEGEND + 4.0
+            );
+        }
+        for (index, curve) in self.curves.iter().enumerate() {
             let (colour, dash) = style(index);
-            let line = LEGEND + LINE * index as f64;
+            let line = LEGEND + LINE * (index + 1) as f64;
             let _ = writeln!(
                 text,
                 r##"<path d="M{LEFT} {line}h44" fill="none" stroke="{colour}" stroke-width="2" stroke-dasharray="{dash}"/>"##
@@ -173,8 +177,16 @@ impl Drift<'_> {
                 r##"<text x="{}" y="{}">{}</text>"##,
                 LEFT + 54.0,
                 line + 5.0,
-                escape(label)
+                escape(&curve.name)
             );
+            for (column, end) in COLUMNS.iter().zip(curve.ends().into_iter().flatten()) {
+                let _ = writeln!(
+                    text,
+                    r##"<text x="{column}" y="{}" text-anchor="end" font-size="13">{}</text>"##,
+                    line + 5.0,
+                    rounded(end, 2)
+                );
+            }
         }
         text.push_str("</svg>\n");
         text
@@ -237,6 +249,17 @@ mod tests {
     }
 
     #[test]
+    fn the_legend_is_a_table_so_that_no_line_of_it_is_cut() {
+        let text = svg(&[(0.0, 0.0), (1.0, 0.123), (2.0, -4.56e-9)]);
+        let at = |column: f64| format!(r##"<text x="{column}" y="{}""##, LEGEND + LINE + 5.0);
+        for (column, told) in COLUMNS.into_iter().zip(["-4.6·10⁻⁹", "0.12", "-4.6·10⁻⁹"])
+        {
+            let line = text.lines().find(|line| line.starts_with(&at(column)));
+            assert!(line.is_some_and(|line| line.contains(&format!(">{told}<"))), "{told}: {text}");
+        }
+    }
+
+    #[test]
     fn small_curves_beside_large_ones_are_given_room() {
         let course = |name: &str, size: f64| Course {
             name: name.into(),
@@ -265,14 +288,5 @@ mod tests {
             let text = svg(points);
             assert!(text.ends_with("</svg>\n") && !text.contains("NaN"), "{text}");
         }
-    }
-
-    #[test]
-    fn ticks_are_round_numbers_within_the_axis() {
-        let ticks = |low, high| Axis { low, high, start: 0.0, end: 1.0, bend: None }.ticks();
-        assert_eq!(ticks(0.0, 10.0), [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]);
-        assert_eq!(ticks(-0.11, 0.31), [-0.1, 0.0, 0.1, 0.2, 0.3]);
-        assert_eq!(ticks(-4e-6, 5e-7), [-4e-6, -3e-6, -2e-6, -1e-6, 0.0]);
-        assert_eq!(ticks(0.0, 1.0), [0.0, 0.2, 0.4, 0.6, 0.8, 1.0]);
     }
 }

@@ -28,6 +28,8 @@ pub(super) fn style(index: usize) -> (&'static str, &'static str) {
     (STYLES[(index + index / count) % count].0, STYLES[index % count].1)
 }
 
+/// Room for a triangle below the lowest curve, with its number.
+const TRIANGLE: f64 = 20.0;
 /// Errors within this factor of the round-off floor are near it.
 const NEAR: f64 = 100.0;
 
@@ -54,6 +56,8 @@ pub(crate) struct Curve {
     pub(crate) stopped: usize,
     /// The fitted slope.
     pub(crate) fit: Option<f64>,
+    /// The order that a triangle beside the curve shows.
+    order: Option<i32>,
 }
 
 impl Curve {
@@ -63,7 +67,8 @@ impl Curve {
         cases: impl IntoIterator<Item = (f64, Option<f64>)>,
         fit: Option<f64>,
     ) -> Self {
-        let mut curve = Self { name: name.into(), points: Vec::new(), stopped: 0, fit };
+        let mut curve =
+            Self { name: name.into(), points: Vec::new(), stopped: 0, fit, order: None };
         for (step, error) in cases {
             match error {
                 Some(error) if error > 0.0 && error.is_finite() => curve.points.push((step, error)),
@@ -73,6 +78,11 @@ impl Curve {
             }
         }
         curve
+    }
+
+    /// The same with a triangle that shows an order.
+    pub(crate) fn with_triangle(self, order: i32) -> Self {
+        Self { order: Some(order), ..self }
     }
 
     /// What the legend says.
@@ -96,11 +106,18 @@ pub(super) struct Axis {
 }
 
 impl Axis {
-    /// An axis that holds all values, with some room around them.
+    /// An axis that holds all values, with room around them for their markers.
     pub(super) fn around(values: impl Iterator<Item = f64> + Clone, start: f64, end: f64) -> Self {
         let low = values.clone().fold(f64::INFINITY, f64::min);
         let high = values.fold(0.0, f64::max);
-        Self { low: low / 1.5, high: high * 1.5, start, end }
+        let room = (high / low).powf(0.04).clamp(1.5, 100.0);
+        Self { low: low / room, high: high * room, start, end }
+    }
+
+    /// Moves the lower end so that this length below what was there is free.
+    fn make_room_below(&mut self, length: f64) {
+        let whole = (self.end - self.start).abs();
+        self.low = self.high * (self.low / self.high).powf(whole / (whole - length));
     }
 
     pub(super) fn at(&self, value: f64) -> f64 {
@@ -124,9 +141,14 @@ impl Axis {
 }
 
 impl Plot<'_> {
-    pub(crate) fn svg(&self) -> String {
+    /// The height of the picture.
+    pub(crate) fn height(&self) -> f64 {
         let lines = self.curves.len() + usize::from(self.floor.is_some());
-        let height = LEGEND + LINE * lines as f64;
+        LEGEND + LINE * lines as f64
+    }
+
+    pub(crate) fn svg(&self) -> String {
+        let height = self.height();
         let labels: Vec<_> = self.curves.iter().map(Curve::label).collect();
         let mut text = open("plot", WIDTH, height, self.title, &format!("{}.", labels.join("; ")));
         let _ = writeln!(
@@ -137,10 +159,14 @@ impl Plot<'_> {
         let points = self.curves.iter().flat_map(|curve| &curve.points);
         if points.clone().next().is_some() {
             let x = Axis::around(points.clone().map(|p| p.0), LEFT, RIGHT);
+            let least = points.clone().map(|p| p.1).fold(f64::INFINITY, f64::min);
             let mut y = Axis::around(points.map(|p| p.1), BOTTOM, TOP);
-            let floor = self.floor.filter(|floor| y.low * 1.5 < NEAR * floor);
+            let floor = self.floor.filter(|floor| least < NEAR * floor);
             if let Some(floor) = floor {
                 y.low = y.low.min(floor / 3.0);
+            }
+            if self.curves.iter().any(|curve| curve.order.is_some()) {
+                y.make_room_below(TRIANGLE);
             }
             grid(&mut text, &x, &y);
             if let Some(floor) = floor {
@@ -157,6 +183,7 @@ impl Plot<'_> {
             self.slopes(&mut text, &x, &y);
             for (index, curve) in self.curves.iter().enumerate() {
                 draw(&mut text, index, curve, &x, &y);
+                triangle(&mut text, index, curve, &x, &y);
             }
         }
         frame(&mut text, self.x, self.y);
@@ -268,6 +295,31 @@ fn draw(text: &mut String, index: usize, curve: &Curve, x: &Axis, y: &Axis) {
     text.push_str("</g>\n");
 }
 
+/// A triangle below the two smallest steps of a curve, which shows its slope where it has this order.
+fn triangle(text: &mut String, index: usize, curve: &Curve, x: &Axis, y: &Axis) {
+    /// Room between the curve and the triangle.
+    const DOWN: f64 = 12.0;
+    const SIZE: f64 = 13.0;
+    let Some(order) = curve.order else { return };
+    let mut points = curve.points.clone();
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let [first, second, ..] = points[..] else { return };
+    let (colour, _) = style(index);
+    let rise = y.at(first.1 * (second.0 / first.0).powi(order)) - y.at(first.1);
+    let (left, right) = (x.at(first.0), x.at(second.0));
+    // Neither end of its slope above the curve.
+    let bottom = y.at(first.1).max(y.at(second.1) - rise) + DOWN;
+    let _ = writeln!(
+        text,
+        r##"<path class="order" d="M{left:.1} {bottom:.1}H{right:.1}v{rise:.1}z" fill="{colour}" fill-opacity="0.12" stroke="{colour}"/>
+<text x="{:.1}" y="{:.1}" text-anchor="middle" font-size="{SIZE}">1</text><text x="{:.1}" y="{:.1}" font-size="{SIZE}">{order}</text>"##,
+        (left + right) / 2.0,
+        bottom + SIZE,
+        right + 5.0,
+        bottom + rise / 2.0 + 4.5
+    );
+}
+
 /// A marker of its own shape and fill for each curve, so that the picture can be printed in black.
 pub(super) fn marker(text: &mut String, index: usize, x: f64, y: f64) {
     let (colour, _) = style(index);
@@ -325,6 +377,37 @@ mod tests {
             |error| vec![Curve::new("c", [(0.1, Some(error)), (0.2, Some(2.0 * error))], None)];
         assert!(plot(curve(1e-14), Some(1e-15)).contains("class=\"floor\""));
         assert!(!plot(curve(1e-4), Some(1e-15)).contains("class=\"floor\""));
+    }
+
+    #[test]
+    fn a_triangle_shows_its_order_on_the_axes_of_the_plot() {
+        let cases = [0.1, 0.05, 0.025].map(|h: f64| (h, Some(h.powi(3))));
+        let text = plot(vec![Curve::new("c", cases, Some(3.0)).with_triangle(3)], None);
+        let line = text.lines().find(|line| line.contains("class=\"order\"")).expect("a triangle");
+        let path =
+            line.split(" d=\"").nth(1).and_then(|rest| rest.split('z').next()).expect("a path");
+        let numbers: Vec<f64> = path
+            .split(|c: char| !(c.is_ascii_digit() || c == '-' || c == '.'))
+            .filter_map(|number| number.parse().ok())
+            .collect();
+        let [left, _, right, rise] = numbers[..] else { panic!("{path}") };
+        let points = text.split("points=\"").nth(1).and_then(|rest| rest.split('"').next());
+        let places: Vec<f64> = points
+            .into_iter()
+            .flat_map(|points| points.split([' ', ',']))
+            .filter_map(|number| number.parse().ok())
+            .collect();
+        // Its number lies within the frame too.
+        let bottom = numbers[1] + 14.0;
+        assert!(bottom < BOTTOM, "{bottom}");
+        // The curve has the order of the triangle: its two finest points differ as the triangle's ends do.
+        let [_, _, coarse_x, coarse_y, fine_x, fine_y] = places[..] else { panic!("{places:?}") };
+        assert!((left - fine_x).abs() < 0.2 && (right - coarse_x).abs() < 0.2, "{text}");
+        assert!((rise - (coarse_y - fine_y)).abs() < 0.3, "{text}");
+        assert!(
+            !plot(vec![Curve::new("c", [(0.1, Some(1.0))], None).with_triangle(1)], None)
+                .contains("class=\"order\"")
+        );
     }
 
     #[test]

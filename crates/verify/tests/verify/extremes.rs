@@ -20,6 +20,7 @@ fn row(exact: &AnySolution<f64>, case: &Case) -> Row {
     let mut outputs = Outputs {
         progress: &mut |_| (),
         frames: None,
+        snapshot: None,
         checkpoints: None,
         history: None,
         until: None,
@@ -31,6 +32,7 @@ fn row_in_single(exact: &AnySolution<f64>, single: &AnySolution<f32>, case: &Cas
     let mut outputs = Outputs {
         progress: &mut |_| (),
         frames: None,
+        snapshot: None,
         checkpoints: None,
         history: None,
         until: None,

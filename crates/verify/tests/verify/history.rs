@@ -20,6 +20,7 @@ fn history<S: Plane>(solution: S, case: &Case) -> (Row, Vec<Moment>) {
     let mut outputs = Outputs {
         progress: &mut |_| (),
         frames: None,
+        snapshot: None,
         checkpoints: None,
         history: Some(&mut moments),
         until: None,

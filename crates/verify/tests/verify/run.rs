@@ -5,8 +5,8 @@ use crate::hand_coded;
 use hand_coded::{AxisAligned, Coded, CrossedShear, Ring};
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{
-    Arithmetic, Case, Extent, FrameOutput, Integrator, Outputs, Row, Shape, Start, Status, Sweep,
-    converge, run,
+    Arithmetic, Case, Extent, FrameOutput, Integrator, Outputs, Row, Shape, Snapshot, Start,
+    Status, Sweep, converge, run,
 };
 
 fn axis_aligned() -> AnySolution<f64> {
@@ -21,6 +21,7 @@ fn run_quietly(solution: &AnySolution<f64>, case: &Case) -> Row {
     let mut outputs = Outputs {
         progress: &mut |_| (),
         frames: None,
+        snapshot: None,
         checkpoints: None,
         history: None,
         until: None,
@@ -118,6 +119,7 @@ fn single_precision_has_the_same_particles_and_nearly_the_same_error() {
         let mut outputs = Outputs {
             progress: &mut |_| (),
             frames: None,
+            snapshot: None,
             checkpoints: None,
             history: None,
             until: None,
@@ -145,6 +147,7 @@ fn conditions_that_the_solver_does_not_model_are_named() {
     let mut outputs = Outputs {
         progress: &mut |_| (),
         frames: None,
+        snapshot: None,
         checkpoints: None,
         history: None,
         until: None,
@@ -160,6 +163,7 @@ fn an_extent_is_for_rings_only() {
     let mut outputs = Outputs {
         progress: &mut |_| (),
         frames: None,
+        snapshot: None,
         checkpoints: None,
         history: None,
         until: None,
@@ -172,10 +176,12 @@ fn an_extent_is_for_rings_only() {
 fn frames_hold_what_the_row_measured() {
     let folder = tempfile::tempdir().unwrap();
     let output = FrameOutput { folder: folder.path().to_owned(), name: "box".into(), count: 5 };
+    let mut snapshot = Snapshot { share: 0.75, frame: None };
     let case = Case { cells: 8, ..Case::default() };
     let mut outputs = Outputs {
         progress: &mut |_| (),
         frames: Some(&output),
+        snapshot: Some(&mut snapshot),
         checkpoints: None,
         history: None,
         until: None,
@@ -186,6 +192,8 @@ fn frames_hold_what_the_row_measured() {
     let last = frame(4);
     assert_eq!((last.step, last.time, last.points.len()), (row.steps, 0.02, row.particles));
     assert_eq!((frame(0).step, frame(0).time), (0, 0.0));
+    let kept = snapshot.frame.expect("the run came to its end");
+    assert_eq!((kept.step, &kept.points), (frame(3).step, &frame(3).points));
     let values = |name: &str| &last.arrays.iter().find(|a| a.name == name).unwrap().values;
     let mmsmith_vtk::Values::Scalar(errors) = values("error_magnitude") else { panic!() };
     let largest = errors.iter().copied().fold(0.0, f64::max);

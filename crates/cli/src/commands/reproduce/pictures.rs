@@ -2,15 +2,17 @@
 
 use std::path::Path;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use mmsmith_verify::{Case, FrameOutput, Outputs, run as simulate};
-use mmsmith_vtk::{Frame, Values, read};
+use mmsmith_vtk::{Frame, read};
 
 use super::{FRAMES, GRID, PROBLEMS};
-use crate::arguments::{Integrator, Shape};
+use crate::arguments::{Integrator, Shape, Stress};
+use crate::commands::picture::{Units, draw, range};
 use crate::commands::scheme::Scheme;
 use crate::commands::{Model, case};
-use crate::svg::Particles;
+use crate::number;
+use crate::svg::extremes;
 
 /// The frame of the square's picture: five eighths of the period, where both directions move.
 const MOMENT: u64 = 5 * (FRAMES - 1) / 8;
@@ -43,10 +45,10 @@ pub(super) fn all(problem: &str, out: &Path) -> Result<Vec<Picture>> {
     if problem == PROBLEMS[0] {
         let right = frame(&folder.join("particles"), problem, MOMENT)?;
         let other = frame(&folder.join(CONTRAST), problem, 1)?;
-        let range = range(&scalar(&right, "von_mises")?);
+        let range = range(&Stress::VonMises.values(&right)?);
         let draw = |frame: &Frame, scheme: &str, said: &str| -> Result<Picture> {
-            let values = scalar(frame, "von_mises")?;
-            let title = format!("Von Mises stress, {scheme}");
+            let values = Stress::VonMises.values(frame)?;
+            let title = capitalized(&format!("{}, {scheme}", Stress::VonMises.words()));
             Ok(picture(&title, frame, &values, range, said))
         };
         return Ok(vec![
@@ -59,66 +61,41 @@ pub(super) fn all(problem: &str, out: &Path) -> Result<Vec<Picture>> {
         ]);
     }
     let frame = frame(&folder.join("particles"), problem, FRAMES - 1)?;
-    let stress = frame.arrays.iter().find(|array| array.name == "stress");
-    let Some(Values::Tensor(stress)) = stress.map(|array| &array.values) else {
-        bail!("the particle files of {problem} hold no stress")
+    let draw = |stress: Stress, said: &str| -> Result<Picture> {
+        let values = stress.values(&frame)?;
+        let title = capitalized(&format!("{}, gimp+cd", stress.words()));
+        Ok(picture(&title, &frame, &values, range(&values), said))
     };
-    // Along the position, and across it.
-    let along = |turned: bool| -> Vec<f64> {
-        let each = frame.points.iter().zip(stress).map(|(x, s)| {
-            let length = x[0].hypot(x[1]);
-            let (c, n) = (x[0] / length, x[1] / length);
-            let e = if turned { [-n, c] } else { [c, n] };
-            e[0] * (s[0] * e[0] + s[1] * e[1]) + e[1] * (s[3] * e[0] + s[4] * e[1])
-        });
-        each.collect()
-    };
-    let (radial, hoop) = (along(false), along(true));
-    let said = "The rims are free: what is not zero there is the stair steps' doing.";
     Ok(vec![
-        picture("Radial stress, gimp+cd", &frame, &radial, range(&radial), said),
-        picture(
-            "Hoop stress, gimp+cd",
-            &frame,
-            &hoop,
-            range(&hoop),
-            "Along circles, largest at the inner rim.",
-        ),
+        draw(
+            Stress::Radial,
+            "The rims are free: what is not zero there is the stair steps' doing.",
+        )?,
+        draw(Stress::Hoop, "Along circles, largest at the inner rim.")?,
     ])
 }
 
-fn picture(title: &str, frame: &Frame, values: &[f64], range: (f64, f64), said: &str) -> Picture {
-    let points: Vec<[f64; 2]> = frame.points.iter().map(|p| [p[0], p[1]]).collect();
-    let svg = Particles { title, points: &points, values, range, unit: "Pa" }.svg();
-    let least = values.iter().copied().fold(f64::INFINITY, f64::min);
-    let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let caption = format!(
-        "{title}, at t = {} s, {} particles, from {least:.0} to {most:.0} Pa. The bar spans 98 % of the particles of \
-         gimp+cd. {said}",
-        frame.time,
-        points.len()
-    );
-    Picture { svg, caption }
+/// With the first letter as at the start of a sentence.
+fn capitalized(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
-/// The values between which 98 % of them lie, so that single particles do not take the colours from the rest.
-fn range(values: &[f64]) -> (f64, f64) {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let last = sorted.len().saturating_sub(1);
-    let at =
-        |share: f64| sorted.get((share * last as f64).round() as usize).copied().unwrap_or(0.0);
-    (at(0.01), at(0.99))
+fn picture(title: &str, frame: &Frame, values: &[f64], range: (f64, f64), said: &str) -> Picture {
+    let svg = draw(title, frame, values, range, Units::Si, "");
+    let (least, most) = extremes(values.iter().copied());
+    let caption = format!(
+        "{title}, at t = {} s: {} particles at their current positions, from {} to {} Pa. The colour bar spans 98 % of the \
+         particles of gimp+cd. {said}",
+        number::rounded(frame.time, 4),
+        frame.points.len(),
+        number::rounded(least, 3),
+        number::rounded(most, 3)
+    );
+    Picture { svg, caption }
 }
 
 fn frame(folder: &Path, problem: &str, index: u64) -> Result<Frame> {
     let path = folder.join(format!("{problem}-{index:06}.vtu"));
     read(&path).with_context(|| format!("cannot read {} back", path.display()))
-}
-
-fn scalar(frame: &Frame, name: &str) -> Result<Vec<f64>> {
-    match frame.arrays.iter().find(|array| array.name == name).map(|array| &array.values) {
-        Some(Values::Scalar(values)) => Ok(values.clone()),
-        _ => bail!("the particle files hold no {name}"),
-    }
 }

@@ -12,12 +12,12 @@ use super::claims::{Claim, difference_orders, told_orders};
 use super::section::Section;
 use super::{
     CELLS, DIFFERENCES, Differences, GENTLE, GENTLE_GRID, GRID, PROBLEMS, Results, SMALL_STEP,
-    SMALL_STEP_CELLS, SPACE, TIME, compare, difference_plot, difference_tables, name, pictures,
-    space_plot, stops, tables, time_plot, verdict_table, word,
+    SMALL_STEP_CELLS, SPACE, TIME, compare, difference_plot, difference_tables, errors_with_units,
+    name, pictures, space_plot, stopped, tables, time_plot, verdict_table, word,
 };
-use crate::machine;
 use crate::svg::escape;
 use crate::table::{self, Table};
+use crate::{html, machine, number};
 
 const STYLE: &str = include_str!("report.css");
 
@@ -101,12 +101,12 @@ fn sum_section(results: &[Results], gentle: &[Differences]) -> String {
     let mut small_step = String::new();
     let sweep = Sweep::Cells(SMALL_STEP_CELLS.to_vec());
     let [(_, table), ..] = tables(&square.small_step.study, &sweep, &square.small_step.verdicts);
-    small_step +=
-        &table.html(&format!("{}: error of u of gimp+usl at CFL {SMALL_STEP}", square.problem));
+    small_step += &errors_with_units(table, "u")
+        .html(&format!("{}: error of u of gimp+usl at CFL {SMALL_STEP}", square.problem));
     let mut differences = String::new();
     for one in gentle {
         let [(_, table), ..] = difference_tables(&one.found, &one.verdicts);
-        differences += &table.html(&format!(
+        differences += &errors_with_units(table, "u").html(&format!(
             "Difference of u, {}, A = {GENTLE}, {GENTLE_GRID} cells",
             name(one.scheme)
         ));
@@ -146,8 +146,8 @@ fn problem_section(out: &Path, results: &Results) -> Result<String> {
     for parameter in description.parameters {
         parameters.row([
             parameter.name.to_owned(),
-            parameter.default.to_string(),
-            parameter.unit.to_owned(),
+            number::exact(parameter.default),
+            if parameter.unit.is_empty() { "1".to_owned() } else { parameter.unit.to_owned() },
         ]);
     }
     text += &parameters.html(&format!("{problem}: parameters"));
@@ -183,22 +183,11 @@ fn problem_section(out: &Path, results: &Results) -> Result<String> {
     let cells = |row: &Row| row.cells.to_string();
     let cfl = |row: &Row| format!("{:.4}", row.cfl);
     text += &compare(&results.space, "cells", cells)
-        .html(&format!("{problem}: L_inf error of u and its order in h"));
+        .html(&format!("{problem}: L_inf error of u [m] and its order in h"));
     text += &compare(&results.time, "CFL", cfl)
-        .html(&format!("{problem}: L_inf error of u and its order in dt, {GRID} cells"));
-    let stopped: String = results
-        .space
-        .iter()
-        .chain(&results.time)
-        .filter(|one| !stops(&one.study).is_empty())
-        .map(|one| format!("{}\n{}", one.name(), stops(&one.study)))
-        .collect();
-    if !stopped.is_empty() {
-        let _ = writeln!(
-            text,
-            "<p>Runs that stopped:</p>\n<pre tabindex=\"0\">{}</pre>",
-            escape(&stopped)
-        );
+        .html(&format!("{problem}: L_inf error of u [m] and its order in dt, {GRID} cells"));
+    if let Some(table) = stopped(&[&results.space, &results.time]) {
+        text += &table.html(&format!("{problem}: runs that stopped"));
     }
     let best = &results.space[0];
     text += &verdict_table(&best.verdicts, "h")
@@ -209,12 +198,13 @@ fn problem_section(out: &Path, results: &Results) -> Result<String> {
     }
     let sweep = Sweep::Cells(CELLS.to_vec());
     for (field, table) in tables(&best.study, &sweep, &best.verdicts) {
-        text += &table.html(&format!("{problem}: error of {field}, {}", best.name()));
+        let caption = format!("{problem}: error of {field}, {}", best.name());
+        text += &errors_with_units(table, field).html(&caption);
     }
     for one in &results.differences {
         let [(_, table), ..] = difference_tables(&one.found, &one.verdicts);
-        text +=
-            &table.html(&format!("{problem}: difference of u, {}, {GRID} cells", name(one.scheme)));
+        let caption = format!("{problem}: difference of u, {}, {GRID} cells", name(one.scheme));
+        text += &errors_with_units(table, "u").html(&caption);
     }
     text += &files(results);
     text += "</section>\n";
@@ -237,7 +227,7 @@ fn does_not_converge(results: &Results) -> bool {
 }
 
 pub(super) fn figure(svg: &str, caption: &str) -> String {
-    format!("<figure>\n{svg}<figcaption>{}</figcaption>\n</figure>\n", escape(caption))
+    format!("<figure>\n{svg}<figcaption>{}</figcaption>\n</figure>\n", html::text(caption))
 }
 
 /// Links to the data of a problem, relative to the page.

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use crate::html;
 use crate::svg::escape;
 use crate::table::Table;
 
@@ -21,9 +22,10 @@ pub(super) struct Section {
 
 impl Section {
     pub(super) fn new(id: &'static str, title: &'static str, said: &str) -> Self {
-        let html = format!("<section id=\"{id}\">\n<h2>{title}</h2>\n<p>{}</p>\n", escape(said));
+        let section =
+            format!("<section id=\"{id}\">\n<h2>{title}</h2>\n<p>{}</p>\n", html::text(said));
         let markdown = format!("\n## {title}\n\n{said}\n");
-        Self { id, title, html, markdown, files: Vec::new() }
+        Self { id, title, html: section, markdown, files: Vec::new() }
     }
 
     pub(super) fn html(&self) -> String {
@@ -108,14 +110,14 @@ impl Section {
 
 /// What stands between backquotes as code.
 fn code(sentence: &str) -> String {
-    let mut html = String::new();
+    let mut text = String::new();
     for (index, part) in sentence.split('`').enumerate() {
         match index % 2 {
-            0 => html += &escape(part),
-            _ => html += &format!("<code>{}</code>", escape(part)),
+            0 => text += &html::text(part),
+            _ => text += &format!("<code>{}</code>", escape(part)),
         }
     }
-    html
+    text
 }
 
 #[cfg(test)]

@@ -1,0 +1,209 @@
+//! Pictures of particles, coloured by their stress.
+
+use anyhow::{Result, bail};
+use mmsmith_verify::{Row, Snapshot, Status};
+use mmsmith_vtk::{Frame, Values};
+
+use crate::arguments::{PictureOptions, Stress};
+use crate::json::Output;
+use crate::library::Selection;
+use crate::number;
+use crate::svg::Particles;
+
+impl Stress {
+    /// Its name.
+    pub(super) fn words(self) -> &'static str {
+        match self {
+            Self::VonMises => "von Mises stress",
+            Self::Pressure => "pressure",
+            Self::Xx => "stress xx",
+            Self::Yy => "stress yy",
+            Self::Zz => "stress zz",
+            Self::Xy => "shear stress xy",
+            Self::Xz => "shear stress xz",
+            Self::Yz => "shear stress yz",
+            Self::Radial => "radial stress",
+            Self::Hoop => "hoop stress",
+        }
+    }
+
+    /// Its value at a position with a Cauchy stress, by rows.
+    fn of(self, x: &[f64; 3], s: &[f64; 9]) -> f64 {
+        let [xx, xy, xz, _, yy, yz, _, _, zz] = *s;
+        match self {
+            Self::VonMises => {
+                let normal = (xx - yy).powi(2) + (yy - zz).powi(2) + (zz - xx).powi(2);
+                (0.5 * normal + 3.0 * (xy * xy + yz * yz + xz * xz)).sqrt()
+            }
+            Self::Pressure => -(xx + yy + zz) / 3.0,
+            Self::Xx => xx,
+            Self::Yy => yy,
+            Self::Zz => zz,
+            Self::Xy => xy,
+            Self::Xz => xz,
+            Self::Yz => yz,
+            Self::Radial | Self::Hoop => {
+                let length = x[0].hypot(x[1]);
+                // On the axis every direction is radial.
+                let (c, n) = if length > 0.0 { (x[0] / length, x[1] / length) } else { (1.0, 0.0) };
+                let e = if self == Self::Hoop { [-n, c] } else { [c, n] };
+                e[0] * (xx * e[0] + xy * e[1]) + e[1] * (xy * e[0] + yy * e[1])
+            }
+        }
+    }
+
+    /// Its values at all particles.
+    pub(super) fn values(self, frame: &Frame) -> Result<Vec<f64>> {
+        let stress = frame.arrays.iter().find(|array| array.name == "stress");
+        let Some(Values::Tensor(stress)) = stress.map(|array| &array.values) else {
+            bail!("the particles have no stress")
+        };
+        Ok(frame.points.iter().zip(stress).map(|(x, s)| self.of(x, s)).collect())
+    }
+}
+
+/// The units of a solution's fields.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Units {
+    /// Those of the SI: a parameter in Pa with others that fit it has lengths in metres.
+    Si,
+    /// Not known.
+    Unknown,
+}
+
+impl Units {
+    pub(super) fn of(selection: &Selection) -> Self {
+        if selection.units().values().any(|unit| unit == "Pa") { Self::Si } else { Self::Unknown }
+    }
+
+    /// The unit of stress, empty where it is not known.
+    pub(super) fn stress(self) -> &'static str {
+        match self {
+            Self::Si => "Pa",
+            Self::Unknown => "",
+        }
+    }
+
+    /// The names of the axes.
+    pub(super) fn axes(self) -> [&'static str; 2] {
+        match self {
+            Self::Si => ["x [m]", "y [m]"],
+            Self::Unknown => ["x", "y"],
+        }
+    }
+}
+
+/// The particles of a frame with a value each, and a note below them. In space those nearest to a viewer on the third axis are drawn last.
+pub(super) fn draw(
+    title: &str,
+    frame: &Frame,
+    values: &[f64],
+    range: (f64, f64),
+    units: Units,
+    note: &str,
+) -> String {
+    let mut order: Vec<usize> = (0..frame.points.len()).collect();
+    order.sort_by(|&a, &b| frame.points[a][2].total_cmp(&frame.points[b][2]));
+    let points: Vec<[f64; 2]> =
+        order.iter().map(|&p| [frame.points[p][0], frame.points[p][1]]).collect();
+    let values: Vec<f64> = order.iter().map(|&p| values[p]).collect();
+    let (unit, axes) = (units.stress(), units.axes());
+    Particles { title, points: &points, values: &values, range, unit, axes, note }.svg()
+}
+
+/// The values between which 98 % of them lie, so that single particles do not take the colours from the rest.
+pub(super) fn range(values: &[f64]) -> (f64, f64) {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let last = sorted.len().saturating_sub(1);
+    let at =
+        |share: f64| sorted.get((share * last as f64).round() as usize).copied().unwrap_or(0.0);
+    (at(0.01), at(0.99))
+}
+
+/// A picture that a run was asked for.
+pub(super) struct Picture {
+    stress: Stress,
+    /// The moment in periods.
+    at: f64,
+    output: Output,
+    snapshot: Snapshot,
+}
+
+impl Picture {
+    /// The picture that the options ask for, if any, of a run of so many periods.
+    pub(super) fn asked(options: &PictureOptions, periods: f64) -> Result<Option<Self>> {
+        let Some(output) = Output::prepare_if(options.file.as_ref())? else { return Ok(None) };
+        let at = options.at.unwrap_or(periods);
+        if at > periods {
+            let (at, periods) = (number::exact(at), number::exact(periods));
+            bail!(
+                "--at {at}: the run ends after {periods} period(s); write --periods {at} as well"
+            );
+        }
+        let snapshot = Snapshot { share: at / periods, frame: None };
+        Ok(Some(Self { stress: options.stress, at, output, snapshot }))
+    }
+
+    pub(super) fn snapshot(&mut self) -> &mut Snapshot {
+        &mut self.snapshot
+    }
+
+    /// Draws what the run left.
+    pub(super) fn write(self, selection: &Selection, row: &Row) -> Result<()> {
+        let Some(frame) = &self.snapshot.frame else {
+            match &row.status {
+                Status::Ok => bail!(
+                    "--picture: a particle is turned inside out at {} period(s) and has no stress",
+                    number::exact(self.at)
+                ),
+                status => bail!(
+                    "--picture: the run did not come to {} period(s), and nothing is drawn: {status}; --at TIME draws an \
+                     earlier moment",
+                    number::exact(self.at)
+                ),
+            }
+        };
+        let values = self.stress.values(frame)?;
+        let units = Units::of(selection);
+        let second = if units == Units::Si { " s" } else { "" };
+        let title = format!(
+            "{}: {}, t = {}{second}",
+            selection.name(),
+            self.stress.words(),
+            number::rounded(frame.time, 4)
+        );
+        self.output.write_text(&draw(&title, frame, &values, range(&values), units, ""))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scalars_of_a_stress_are_those_of_the_textbook() {
+        // Uniaxial tension of 2 along the second axis.
+        let pull = [0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0];
+        let on = |x: [f64; 3], stress: Stress| stress.of(&x, &pull);
+        let up = [0.0, 3.0, 1.0];
+        assert_eq!((on(up, Stress::Radial), on(up, Stress::Hoop)), (2.0, 0.0));
+        let right = [3.0, 0.0, 1.0];
+        assert_eq!((on(right, Stress::Radial), on(right, Stress::Hoop)), (0.0, 2.0));
+        assert_eq!((on(up, Stress::Yy), on(up, Stress::Xx)), (2.0, 0.0));
+        assert_eq!((on(up, Stress::VonMises), on(up, Stress::Pressure)), (2.0, -2.0 / 3.0));
+        assert!(on([0.0; 3], Stress::Radial).is_finite());
+        // Pure shear.
+        let shear = [0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        assert!((Stress::VonMises.of(&up, &shear) - 3.0_f64.sqrt()).abs() < 1e-15);
+        assert_eq!((Stress::Xy.of(&up, &shear), Stress::Xz.of(&up, &shear)), (1.0, 0.0));
+    }
+
+    #[test]
+    fn single_particles_do_not_take_the_colours_from_the_rest() {
+        let mut values: Vec<f64> = (0..=100).map(f64::from).collect();
+        values[100] = 1e9;
+        assert_eq!(range(&values), (1.0, 99.0));
+        assert_eq!(range(&[]), (0.0, 0.0));
+    }
+}

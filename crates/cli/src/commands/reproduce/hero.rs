@@ -1,0 +1,100 @@
+//! The ring's stress beside the orders of three schemes on it: the picture that the README begins with.
+
+use anyhow::{Context, Result};
+use mmsmith_verify::{Outputs, Snapshot, Status, Sweep, converge as measure, run as simulate};
+
+use super::GRID;
+use crate::arguments::{Extent, Frame, Grid, Integrator, Layout, Precision, Shape, Stress};
+use crate::commands::picture::{Units, draw, range};
+use crate::commands::scheme::Scheme;
+use crate::commands::{Model, case};
+use crate::library::Selection;
+use crate::svg::{Curve, Plot, beside};
+
+const PROBLEM: &str = "ring";
+/// The grid of the particles that are shown: fine enough for a smooth picture, coarse enough for a small file.
+const SHOWN: usize = 24;
+const CELLS: [usize; 4] = [8, 16, GRID, 64];
+
+/// A scheme, its name in the picture, and the order that it is known to have.
+struct Curved {
+    name: &'static str,
+    scheme: Scheme,
+    order: Option<i32>,
+}
+
+/// The usual scheme, whose particles do not fit the rims; particles that do; and one of high order.
+fn schemes() -> [Curved; 3] {
+    let usual = |shape| Scheme::usual(shape, Integrator::Cd);
+    [
+        Curved { name: "gimp, square lattice", scheme: usual(Shape::Gimp), order: None },
+        Curved {
+            name: "cpdi2, body-fitted particles",
+            scheme: Scheme { layout: Layout::BodyFitted, ..usual(Shape::Cpdi2) },
+            order: Some(2),
+        },
+        Curved {
+            name: "bspline3, total frame",
+            scheme: Scheme {
+                frame: Frame::Total,
+                layout: Layout::Gauss,
+                grid: Grid::Polar,
+                ppc: 4,
+                cfl: 0.2,
+                ..usual(Shape::Bspline3)
+            },
+            order: Some(4),
+        },
+    ]
+}
+
+/// The picture.
+pub(super) fn svg() -> Result<String> {
+    let selection = Selection::new(PROBLEM, &[])?;
+    let model = Model::new(&selection, Precision::F64)?;
+    let units = Units::of(&selection);
+
+    let [_, fitted, _] = schemes();
+    let scheme = Scheme { extent: Some(Extent::Full), ..fitted.scheme };
+    let mut snapshot = Snapshot { share: 1.0, frame: None };
+    let silent = &mut |_| ();
+    let mut outputs = Outputs { snapshot: Some(&mut snapshot), ..Outputs::new(silent) };
+    simulate(&model.exact, model.arithmetic(), &case(&scheme, SHOWN)?, &mut outputs)?;
+    let frame = snapshot.frame.context("the ring's run stopped before its end")?;
+    let hoop = Stress::Hoop.values(&frame)?;
+    let note = format!("{} particles that fit the rims, {SHOWN} cells, cpdi2", frame.points.len());
+    let ring = draw("Hoop stress of the expanding ring", &frame, &hoop, range(&hoop), units, &note);
+
+    let mut curves = Vec::new();
+    for one in schemes() {
+        let base = case(&one.scheme, GRID)?;
+        let sweep = Sweep::Cells(CELLS.to_vec());
+        let study = measure(&model.exact, model.arithmetic(), &base, &sweep, &mut |_| ())?;
+        let cases = study
+            .rows
+            .iter()
+            .map(|row| (row.h, (row.status == Status::Ok).then_some(row.errors.u.linf)));
+        let curve = Curve::new(one.name, cases, study.orders.u.linf.fit);
+        curves.push(match one.order {
+            Some(order) => curve.with_triangle(order),
+            None => curve,
+        });
+    }
+    let plot = Plot {
+        title: "Error against the exact motion",
+        x: "grid spacing h [m]",
+        y: "L_inf error of u [m]",
+        curves,
+        orders: &[],
+        floor: None,
+    };
+    let (height, plot) = (plot.height(), plot.svg());
+    Ok(beside(
+        "A ring that expands and contracts, and the orders of three schemes on it",
+        "Left: the particles of a ring after one period, coloured by hoop stress. Right: the largest error of the \
+         displacement over the grid spacing, for particles on a square lattice, particles that fit the rims, and splines \
+         in the total frame.",
+        height,
+        &[ring, plot],
+    ))
+}
