@@ -5,19 +5,19 @@ use nalgebra::{RealField, SVector};
 /// Force per unit mass on many particles at once.
 pub trait BodyForce<T: Copy, const D: usize>: Sync {
     /// Writes into `b` the body force at the reference positions `X` and time `t`; both slices have the same length.
-    /// They belong to the particles from number `first` on, which never change places: whatever depends on the position
-    /// alone may have been kept from an earlier step.
+    /// They belong to the particles `first`, `first + 1` and so on. Ids never change: values that depend on the reference
+    /// position alone may be kept from an earlier step.
     ///
-    /// Called from several threads, each with its own run of particles; what is in `b` before is unspecified.
+    /// Called from several threads, each with its own run of particles. The contents of `b` on entry are unspecified.
     fn evaluate(&self, first: usize, X: &[SVector<T, D>], t: T, b: &mut [SVector<T, D>]);
 
-    /// Adds to `values`, which is empty, what [`evaluate_of`](Self::evaluate_of) needs of the time alone: it is called with it
-    /// for a few particles at a time. Nothing, unless there is such.
+    /// Precomputes the part that depends on time alone, for [`evaluate_of`](Self::evaluate_of): appended to `values`, which is
+    /// empty. Default: nothing.
     fn of_time(&self, _t: T, _values: &mut Vec<T>) {}
 
     /// Writes into `b` the body force on the particles `ids` at a time; `X` holds the reference positions of all.
     ///
-    /// As [`evaluate`](Self::evaluate) particle by particle, unless there is a faster way; `b` is as long as `ids`.
+    /// Default: [`evaluate`](Self::evaluate) particle by particle. `b` is as long as `ids`.
     fn evaluate_of(
         &self,
         ids: &[u32],
@@ -37,12 +37,12 @@ pub trait BodyForce<T: Copy, const D: usize>: Sync {
     }
 }
 
-/// A time, with what [`BodyForce::of_time`] says of it.
+/// A time, with the values of [`BodyForce::of_time`] at it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AtTime<'a, T> {
     /// The time.
     pub t: T,
-    /// What the body force needs of it.
+    /// The part of the body force that depends on time alone.
     pub values: &'a [T],
 }
 
@@ -55,7 +55,7 @@ where
     }
 }
 
-/// No body force: the step does no work for it.
+/// No body force; the step skips its evaluation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NoBodyForce;
 

@@ -1,10 +1,10 @@
-//! What can go wrong: scenes that cannot be set up, and steps that cannot be completed.
+//! Errors of set-up and of steps.
 
 use thiserror::Error;
 
 /// Why a step could not be completed. Particle ids are indices into [`Particles`](crate::Particles).
 ///
-/// Exhaustive: who keeps results on disk must know every one of them.
+/// Exhaustive: code that stores results on disk has to know every variant.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum StepError {
     /// A deformation gradient lost its orientation.
@@ -109,7 +109,7 @@ pub enum SetupError {
     /// A quantity that has to be positive and finite is not.
     #[error("{quantity} has to be positive and finite, not {value:e}")]
     NotPositive {
-        /// What it is, for example "the time step" or "the mass of particle 7".
+        /// Its name, for example "the time step" or "the mass of particle 7".
         quantity: String,
         /// The value given.
         value: f64,
@@ -125,7 +125,7 @@ pub enum SetupError {
     /// A quantity that has to be finite is not.
     #[error("{quantity} has to be finite")]
     NotFinite {
-        /// What it is, for example "the velocity of particle 7".
+        /// Its name, for example "the velocity of particle 7".
         quantity: String,
     },
     /// An axis without cells.
@@ -144,7 +144,7 @@ pub enum SetupError {
         /// Bytes needed, saturating at the largest representable number.
         bytes: u128,
     },
-    /// A degree of splines that there is no kernel for.
+    /// A degree of splines without a kernel.
     #[error("splines of degree {degree} are not supported; the degree has to be 2 to {most}")]
     Degree {
         /// The degree asked for.
@@ -159,7 +159,7 @@ pub enum SetupError {
         axis: usize,
         /// Its cells.
         cells: usize,
-        /// What would be enough.
+        /// The smallest number that suffices.
         least: usize,
     },
     /// The particles do not determine the splines' coefficients.
@@ -185,12 +185,12 @@ pub enum SetupError {
         /// The grid's dimension.
         dimension: usize,
     },
-    /// GIMP boxes of particles whose domains are none.
+    /// GIMP boxes for particles whose domains are no boxes.
     #[error(
         "the domain of particle {particle} is not a box along the axes, which GIMP weights need; use those of CPDI"
     )]
     NotABox {
-        /// The first such particle.
+        /// The first particle of this kind.
         particle: usize,
     },
     /// Weights between corners that the body does not have.
@@ -202,7 +202,7 @@ pub enum SetupError {
         /// The body's dimension.
         dimension: usize,
     },
-    /// A domain with a corner that is none.
+    /// A domain with a corner that does not exist.
     #[error("a domain has the corner {corner}, but there are only {corners}")]
     NoSuchCorner {
         /// The index.

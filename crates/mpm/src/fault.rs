@@ -1,14 +1,14 @@
-//! Mistakes of the kind that solvers carry, to find out whether the tests would catch them.
+//! Planted faults: mistakes that solvers typically contain, to show that the tests catch them.
 //!
-//! With the feature `planted-faults` a fault is [planted](with) in every simulation that is set up meanwhile on the same
-//! thread, and in no other: simulations beside it and tests on other threads stay sound. Without the feature nothing can
-//! be planted, [`Planted`] has no size, and every question whether a fault is there is a constant.
+//! With the feature `planted-faults`, `with` plants a fault in every simulation that its closure sets up on the same thread, and
+//! in no other: simulations beside it and tests on other threads stay sound. Without the feature no fault can be planted,
+//! [`Planted`] has no size, and all its questions are constants.
 
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::tensor::{determinant, inverse_transpose};
 
-/// What is done wrong.
+/// The mistake.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// Forces from sigma V0 instead of tau V0.
@@ -51,11 +51,11 @@ pub enum Fault {
     AdditiveStretch,
     /// The velocity gradient transposed.
     GradientTransposed,
-    /// GIMP boxes of the size that J gives, alike along all axes.
+    /// GIMP boxes scaled by J, by the same factor along all axes.
     SizeFromJacobian,
     /// Particles read the grid from where their velocity takes them.
     WeightsOfNewPosition,
-    /// Particles in the last cell give nothing to the last node they reach; of three nodes the middle one gets that as well.
+    /// Particles in the last cell contribute nothing to the last node they reach; of three nodes the middle one gets its part.
     LastNodeSkipped,
     /// One sum of a step in single precision.
     SinglePrecision,
@@ -120,7 +120,7 @@ pub fn with<R>(fault: Fault, build: impl FnOnce() -> R) -> R {
 
 #[cfg(feature = "planted-faults")]
 impl Planted {
-    /// What is planted on this thread at present.
+    /// The fault planted on this thread at present.
     #[must_use]
     pub fn here() -> Self {
         Self(HERE.get())

@@ -1,4 +1,4 @@
-//! The background grid: what a scene states of it, and how its nodes lie in memory.
+//! The background grid: its cells and walls, and the layout of its nodes in memory with ghost nodes beyond walls.
 
 use std::ops::Range;
 
@@ -16,8 +16,8 @@ pub struct Grid<T, const D: usize> {
     pub spacing: T,
     /// Number of cells along each axis.
     pub cells: [usize; D],
-    /// `walls[axis][0]` and `[1]`: is the lower, the upper face across this axis a frictionless sliding wall? A symmetry
-    /// plane is the same thing. Faces that are not walls are open: no particle's centre may pass them.
+    /// `walls[axis][0]` for the lower and `walls[axis][1]` for the upper face across an axis: whether it is a frictionless sliding
+    /// wall, which is also a plane of symmetry. All other faces are open: no particle's centre may pass them.
     pub walls: [[bool; 2]; D],
 }
 
@@ -28,17 +28,17 @@ impl<T: RealField + Copy, const D: usize> Grid<T, D> {
     }
 }
 
-/// Rows of nodes that the solver hands to one thread at a time, at most.
-pub(crate) const BAND_ROWS: usize = 256;
-/// Node layers below cell 0: a box of half-size 2 reaches two, and rounding may ask for one more.
+/// Rows in a bin in one dimension, the largest number in any dimension.
+pub(crate) const BIN_ROWS: usize = 256;
+/// Node layers below cell 0: a box of half-size 2 reaches two, and rounding may need one more.
 pub(crate) const PAD_BELOW: usize = 3;
-/// Node layers above the last cell: as many as the widest stencil of a particle on the upper face takes.
+/// Node layers above the last cell, for the extended support of a particle on the upper face.
 const PAD_ABOVE: usize = 5;
 
 /// Node indices along an axis are formed in 32 bits.
 const MAX_LAYERS: usize = i32::MAX as usize;
 
-/// A layer of nodes beyond a wall, and its mirror image within.
+/// A layer of ghost nodes beyond a wall, and the layer of its mirror image.
 #[derive(Clone, Copy, Debug)]
 struct Ghost {
     axis: usize,
@@ -55,7 +55,10 @@ impl Ghost {
     }
 }
 
-/// Where the nodes lie in memory: axis 0 fastest, with padding on all sides.
+/// Layout of the nodes in memory: node `(i, j, k)` is at `i strides[0] + j strides[1] + k strides[2]`, axis 0 fastest, with padding
+/// on all sides.
+///
+/// Operations on ghost nodes come in two parts: within rows, and from row to row for walls across the last axis.
 #[derive(Clone, Debug)]
 pub(crate) struct Layout<const D: usize> {
     pub(crate) dims: [usize; D],
@@ -107,10 +110,10 @@ impl<const D: usize> Layout<D> {
                 }
             }
         }
-        // One band of slack keeps the arithmetic on rows from overflowing.
+        // One bin of slack keeps the arithmetic on rows from overflowing.
         let addressable =
             layout.nodes.checked_mul(bytes_per_node).map(|b| b <= isize::MAX as usize);
-        if addressable != Some(true) || layout.nodes > usize::MAX / (2 * BAND_ROWS) {
+        if addressable != Some(true) || layout.nodes > usize::MAX / (2 * BIN_ROWS) {
             return Err(too_large());
         }
         Ok(layout)
@@ -129,14 +132,14 @@ impl<const D: usize> Layout<D> {
         }
     }
 
-    /// Adds what was deposited beyond walls to the mirror images: `add(image, ghost, Some(axis))`, the axis being that
-    /// of the component that changes its sign.
+    /// Folds the contributions to ghost nodes to their mirror images: `add(image, ghost, Some(axis))`, where the component along
+    /// `axis` changes its sign.
     pub(crate) fn fold<N: Copy>(&self, nodes: &mut [N], add: impl Fn(&mut N, N, Option<usize>)) {
         self.fold_rows(nodes, &add);
         self.fold_edge(&(0..self.dims[D - 1]), 0, nodes, &add);
     }
 
-    /// Gives the nodes beyond walls the mirrored values: `mirror(image, Some(axis))`, with the axis as in `fold`.
+    /// Unfolds: sets ghost nodes to the mirrored values `mirror(image, Some(axis))`, with the axis as in `fold`.
     pub(crate) fn unfold<N: Copy>(&self, nodes: &mut [N], mirror: impl Fn(N, Option<usize>) -> N) {
         self.unfold_rows(nodes, &mirror);
         self.unfold_edge(&(0..self.dims[D - 1]), 0, nodes, &mirror);
@@ -193,8 +196,8 @@ impl<const D: usize> Layout<D> {
         });
     }
 
-    /// Calls `visit(ghost, image, flip)` with the indices of every node beyond a wall and of its mirror image in the same row,
-    /// of `nodes` nodes from the beginning of a row on, and with the component that changes its sign.
+    /// Calls `visit(ghost, image, flip)` for every ghost node with its mirror image in the same row, among `nodes` nodes from the
+    /// beginning of a row on; `flip` is the component that changes its sign.
     #[inline(always)]
     fn for_ghosts_in_rows(&self, nodes: usize, mut visit: impl FnMut(usize, usize, Option<usize>)) {
         for g in self.ghosts.iter().filter(|g| g.axis < D - 1) {
@@ -205,8 +208,8 @@ impl<const D: usize> Layout<D> {
         }
     }
 
-    /// As [`for_ghosts_in_rows`](Self::for_ghosts_in_rows) for nodes whose mirror images are in other rows, both of them at
-    /// one edge; indices count from the beginning of row `first`.
+    /// As [`for_ghosts_in_rows`](Self::for_ghosts_in_rows) for ghost nodes with mirror images in other rows, both at one edge;
+    /// indices count from the beginning of row `first`.
     #[inline(always)]
     fn for_ghosts_of_edge(
         &self,
@@ -261,7 +264,7 @@ mod tests {
     fn folding_conserves_the_sum_and_unfolding_mirrors() {
         for cells in [[1, 1], [2, 3], [5, 4]] {
             let layout = Layout::new(&grid(cells, [[true; 2]; 2]), 8).unwrap();
-            // Weights that are symmetric about both walls of an axis unfold to what they were.
+            // Unfolding restores weights that are symmetric about both walls of an axis.
             let mut nodes = vec![0.0; layout.nodes];
             layout.fold(&mut nodes, |_, _, _| {});
             for (index, node) in nodes.iter_mut().enumerate() {

@@ -1,9 +1,10 @@
 //! A material point solver for solids under large deformation, in one, two and three dimensions.
 //!
-//! Particles carry mass, velocity and deformation gradient; each step moves mass, momentum and internal forces to a
-//! background grid of cubic cells, solves there, and carries the change back ([`Simulation::step`]). Weights are hat
-//! functions or GIMP weights ([`Shape`]); time integration is USF, USL, MUSL or centred differences ([`Integrator`]). Other
-//! weights, transfers and integrators are in [`general`], slower; high order is in [`total_lagrangian`].
+//! Particles carry mass, velocity and deformation gradient. Each step ([`Simulation::step`]) sums mass, momentum and force at
+//! the nodes of a background grid of cubic cells (P2G), computes velocities and accelerations there (grid update), and
+//! interpolates them at the particles (G2P). Shape functions are hat functions or GIMP ([`Shape`]); time integration is USF, USL,
+//! MUSL or centred differences ([`Integrator`]). Other shape functions, transfers and integrators are in [`general`], slower;
+//! high order is in [`total_lagrangian`].
 //!
 //! The scheme, for particle p and node i with weight `S_ip` and gradient `G_ip` taken at `x^n`:
 //!
@@ -48,34 +49,44 @@
 //!
 //! `X` is the reference and `x` the current position, `F[i][J] = dx_i/dX_J`, `J = det F`. Two-dimensional scenes are in
 //! plane strain, one-dimensional ones in uniaxial strain. Units are the caller's, as long as they are consistent.
-//! Runs are reproducible bit for bit, whatever the number of threads in the `rayon` pool around the calls.
+//! Runs are reproducible bit for bit, for any number of threads in the `rayon` pool around the calls.
+//!
+//! # Modules
+//!
+//! - `step`: each integrator as a sequence of `p2g`, `grid_update`, `g2p`; `g2p2g` fuses G2P with the next P2G.
+//! - `shape_function`, `weights`: weights of particles at nodes. `kernel`: sums over them in vector instructions.
+//! - `material`: the laws, one file each. `body_force`, `forcing`: the body force.
+//! - `grid`, `node`: memory layout, walls and ghost nodes. `parallel`: bins of particles and the two-colour schedule.
+//! - `simulation`: set-up and life cycle. `state`, `geometry`, `health`: data and checks that the stages share.
 
-mod bands;
-mod block;
 mod body_force;
 mod error;
 #[doc(hidden)]
 pub mod fault;
+mod forcing;
+mod g2p;
+mod g2p2g;
 pub mod general;
+mod geometry;
 mod grid;
+mod grid_update;
+mod health;
 #[cfg(all(debug_assertions, not(test)))]
 mod instances;
+mod kernel;
 mod material;
-mod octets;
+mod node;
+mod p2g;
 mod parallel;
 mod particles;
-mod partition;
-mod pieces;
 mod prefetch;
-mod quads;
+mod shape_function;
 mod simd;
 mod simulation;
-mod solution;
+mod state;
 mod step;
-mod sweep;
 mod tensor;
 pub mod total_lagrangian;
-mod transfer;
 mod weights;
 
 pub use body_force::{AtTime, BodyForce, NoBodyForce};

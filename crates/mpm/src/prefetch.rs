@@ -5,7 +5,7 @@
 
 #![allow(unsafe_code, reason = "the instruction is declared so, as it takes a pointer")]
 
-/// Asks for what lies `ahead` elements after `element`, wherever that is.
+/// Prefetches the memory `ahead` elements after `element`; any address is allowed.
 #[inline(always)]
 pub(crate) fn prefetch<T>(element: &T, ahead: usize) {
     #[cfg(all(target_arch = "x86_64", not(miri)))]

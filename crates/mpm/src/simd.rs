@@ -1,110 +1,109 @@
-//! Instances of a loop for the vector instructions that the processor has, chosen when the program runs.
+//! Instances of a loop for the vector instructions of the processor, chosen at run time.
 //!
-//! Only the width of the registers differs between them. Sums and products stay what is written: nothing is reordered, and
-//! fused are those that are written as such, which a processor without the instruction works out in many. So all give the
-//! same bits.
+//! The instances differ in the width of registers alone. No sum is reordered, and only explicit `mul_add` is fused, by many
+//! instructions where the processor has no single one. All instances thus give the same bits.
 
 use std::any::Any;
 
 use nalgebra::RealField;
 use pulp::{Arch, Scalar, Simd, WithSimd};
 
-/// A loop that is worth vector instructions. `run` and whatever it calls has to be `#[inline(always)]`.
+/// A loop for vector instructions. `run` and all functions that it calls have to be `#[inline(always)]`.
 pub(crate) trait Loop {
     fn run<V: Vectors>(self, vectors: V);
 }
 
-/// Four numbers that go through the processor together.
+/// Four numbers in the lanes of one register.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
-pub(crate) struct Quad<T>(pub(crate) [T; 4]);
+pub(crate) struct Lane4<T>(pub(crate) [T; 4]);
 
-/// Sums and products of [`Quad`]s. The compiler finds vector instructions for loops over many particles by itself, but not
-/// always for the few numbers of one.
+/// Operations on [`Lane4`]. The compiler vectorises loops over many particles by itself, but not always the four numbers of
+/// one particle.
 pub(crate) trait Vectors: Copy {
     /// Four times the same.
     #[inline(always)]
-    fn splat<T: RealField + Copy>(self, value: T) -> Quad<T> {
-        Quad([value; 4])
+    fn splat<T: RealField + Copy>(self, value: T) -> Lane4<T> {
+        Lane4([value; 4])
     }
 
-    /// Four numbers as they lie in memory. The compiler reads what is only copied from there in whatever pieces its uses suggest.
+    /// Four numbers from memory in one load; the compiler may split a plain copy into smaller loads.
     #[inline(always)]
-    fn load<T: RealField + Copy>(self, values: &[T; 4]) -> Quad<T> {
-        Quad(*values)
-    }
-
-    #[inline(always)]
-    fn add<T: RealField + Copy>(self, Quad(a): Quad<T>, Quad(b): Quad<T>) -> Quad<T> {
-        Quad([a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]])
+    fn load<T: RealField + Copy>(self, values: &[T; 4]) -> Lane4<T> {
+        Lane4(*values)
     }
 
     #[inline(always)]
-    fn mul<T: RealField + Copy>(self, Quad(a): Quad<T>, Quad(b): Quad<T>) -> Quad<T> {
-        Quad([a[0] * b[0], a[1] * b[1], a[2] * b[2], a[3] * b[3]])
+    fn add<T: RealField + Copy>(self, Lane4(a): Lane4<T>, Lane4(b): Lane4<T>) -> Lane4<T> {
+        Lane4([a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]])
     }
 
     #[inline(always)]
-    fn sub<T: RealField + Copy>(self, Quad(a): Quad<T>, Quad(b): Quad<T>) -> Quad<T> {
-        Quad([a[0] - b[0], a[1] - b[1], a[2] - b[2], a[3] - b[3]])
+    fn mul<T: RealField + Copy>(self, Lane4(a): Lane4<T>, Lane4(b): Lane4<T>) -> Lane4<T> {
+        Lane4([a[0] * b[0], a[1] * b[1], a[2] * b[2], a[3] * b[3]])
+    }
+
+    #[inline(always)]
+    fn sub<T: RealField + Copy>(self, Lane4(a): Lane4<T>, Lane4(b): Lane4<T>) -> Lane4<T> {
+        Lane4([a[0] - b[0], a[1] - b[1], a[2] - b[2], a[3] - b[3]])
     }
 
     /// `a b - c`, rounded once.
     #[inline(always)]
     fn mul_sub<T: RealField + Copy>(
         self,
-        Quad(a): Quad<T>,
-        Quad(b): Quad<T>,
-        Quad(c): Quad<T>,
-    ) -> Quad<T> {
-        Quad(std::array::from_fn(|q| a[q].mul_add(b[q], -c[q])))
+        Lane4(a): Lane4<T>,
+        Lane4(b): Lane4<T>,
+        Lane4(c): Lane4<T>,
+    ) -> Lane4<T> {
+        Lane4(std::array::from_fn(|q| a[q].mul_add(b[q], -c[q])))
     }
 
     /// `a b + c`, rounded once.
     #[inline(always)]
     fn mul_add<T: RealField + Copy>(
         self,
-        Quad(a): Quad<T>,
-        Quad(b): Quad<T>,
-        Quad(c): Quad<T>,
-    ) -> Quad<T> {
-        Quad(std::array::from_fn(|q| a[q].mul_add(b[q], c[q])))
+        Lane4(a): Lane4<T>,
+        Lane4(b): Lane4<T>,
+        Lane4(c): Lane4<T>,
+    ) -> Lane4<T> {
+        Lane4(std::array::from_fn(|q| a[q].mul_add(b[q], c[q])))
     }
 
     /// `[a0, a0, a2, a2]`.
     #[inline(always)]
-    fn even<T: RealField + Copy>(self, Quad(a): Quad<T>) -> Quad<T> {
-        Quad([a[0], a[0], a[2], a[2]])
+    fn even<T: RealField + Copy>(self, Lane4(a): Lane4<T>) -> Lane4<T> {
+        Lane4([a[0], a[0], a[2], a[2]])
     }
 
     /// `[a1, a1, a3, a3]`.
     #[inline(always)]
-    fn odd<T: RealField + Copy>(self, Quad(a): Quad<T>) -> Quad<T> {
-        Quad([a[1], a[1], a[3], a[3]])
+    fn odd<T: RealField + Copy>(self, Lane4(a): Lane4<T>) -> Lane4<T> {
+        Lane4([a[1], a[1], a[3], a[3]])
     }
 
     /// `[a0, a1, a0, a1]`.
     #[inline(always)]
-    fn low_twice<T: RealField + Copy>(self, Quad(a): Quad<T>) -> Quad<T> {
-        Quad([a[0], a[1], a[0], a[1]])
+    fn low_twice<T: RealField + Copy>(self, Lane4(a): Lane4<T>) -> Lane4<T> {
+        Lane4([a[0], a[1], a[0], a[1]])
     }
 
     /// `[0, 0, a0, a1]`.
     #[inline(always)]
-    fn low_to_high<T: RealField + Copy>(self, Quad(a): Quad<T>) -> Quad<T> {
-        Quad([T::zero(), T::zero(), a[0], a[1]])
+    fn low_to_high<T: RealField + Copy>(self, Lane4(a): Lane4<T>) -> Lane4<T> {
+        Lane4([T::zero(), T::zero(), a[0], a[1]])
     }
 
     /// `[0, 0, a2, a3]`.
     #[inline(always)]
-    fn high_alone<T: RealField + Copy>(self, Quad(a): Quad<T>) -> Quad<T> {
-        Quad([T::zero(), T::zero(), a[2], a[3]])
+    fn high_alone<T: RealField + Copy>(self, Lane4(a): Lane4<T>) -> Lane4<T> {
+        Lane4([T::zero(), T::zero(), a[2], a[3]])
     }
 
     /// `[a2, a3, b0, b1]`.
     #[inline(always)]
-    fn high_and_low<T: RealField + Copy>(self, Quad(a): Quad<T>, Quad(b): Quad<T>) -> Quad<T> {
-        Quad([a[2], a[3], b[0], b[1]])
+    fn high_and_low<T: RealField + Copy>(self, Lane4(a): Lane4<T>, Lane4(b): Lane4<T>) -> Lane4<T> {
+        Lane4([a[2], a[3], b[0], b[1]])
     }
 }
 
@@ -112,7 +111,7 @@ impl Vectors for Scalar {}
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use super::{Any, Quad, RealField, Scalar, Vectors, same};
+    use super::{Any, Lane4, RealField, Scalar, Vectors, same};
     use bytemuck::{AnyBitPattern, NoUninit, bytes_of, must_cast, pod_read_unaligned};
     use pulp::x86::{V3, V4};
     use std::arch::x86_64::{__m128, __m256d};
@@ -122,7 +121,7 @@ mod x86 {
         ($(fn $name:ident($self:ident, $($a:ident),*) { $double:expr, $single:expr })*) => {
             impl Vectors for V3 {
                 $(#[inline(always)]
-                fn $name<T: RealField + Copy>($self, $($a: Quad<T>),*) -> Quad<T> {
+                fn $name<T: RealField + Copy>($self, $($a: Lane4<T>),*) -> Lane4<T> {
                     if let ($(Some($a),)*) = ($(double($a),)*) {
                         return from_double($double).unwrap_or_else(zero);
                     }
@@ -133,33 +132,33 @@ mod x86 {
                 })*
 
                 #[inline(always)]
-                fn load<T: RealField + Copy>(self, values: &[T; 4]) -> Quad<T> {
+                fn load<T: RealField + Copy>(self, values: &[T; 4]) -> Lane4<T> {
                     let double = at::<_, [f64; 4], __m256d>(values).and_then(from_double);
                     let single = at::<_, [f32; 4], __m128>(values).and_then(from_single);
-                    double.or(single).unwrap_or(Quad(*values))
+                    double.or(single).unwrap_or(Lane4(*values))
                 }
 
                 #[inline(always)]
-                fn splat<T: RealField + Copy>(self, value: T) -> Quad<T> {
+                fn splat<T: RealField + Copy>(self, value: T) -> Lane4<T> {
                     let double = same(value).and_then(|x: f64| from_double(self.avx._mm256_set1_pd(x)));
                     let single = same(value).and_then(|x: f32| from_single(self.sse._mm_set1_ps(x)));
-                    double.or(single).unwrap_or(Quad([value; 4]))
+                    double.or(single).unwrap_or(Lane4([value; 4]))
                 }
             }
 
             impl Vectors for V4 {
                 $(#[inline(always)]
-                fn $name<T: RealField + Copy>(self, $($a: Quad<T>),*) -> Quad<T> {
+                fn $name<T: RealField + Copy>(self, $($a: Lane4<T>),*) -> Lane4<T> {
                     V3::$name(*self, $($a),*)
                 })*
 
                 #[inline(always)]
-                fn load<T: RealField + Copy>(self, values: &[T; 4]) -> Quad<T> {
+                fn load<T: RealField + Copy>(self, values: &[T; 4]) -> Lane4<T> {
                     V3::load(*self, values)
                 }
 
                 #[inline(always)]
-                fn splat<T: RealField + Copy>(self, value: T) -> Quad<T> {
+                fn splat<T: RealField + Copy>(self, value: T) -> Lane4<T> {
                     V3::splat(*self, value)
                 }
             }
@@ -191,40 +190,40 @@ mod x86 {
         }
     }
 
-    /// A register with what lies there, if that is of type `B`.
+    /// Loads a register from `a`, if `A` is `B`.
     #[inline(always)]
     fn at<A: 'static, B: NoUninit + 'static, R: AnyBitPattern>(a: &A) -> Option<R> {
         (a as &dyn Any).downcast_ref::<B>().map(|b| pod_read_unaligned(bytes_of(b)))
     }
 
     #[inline(always)]
-    fn double<T: RealField + Copy>(a: Quad<T>) -> Option<__m256d> {
-        same::<_, Quad<f64>>(a).map(|Quad(a)| must_cast(a))
+    fn double<T: RealField + Copy>(a: Lane4<T>) -> Option<__m256d> {
+        same::<_, Lane4<f64>>(a).map(|Lane4(a)| must_cast(a))
     }
 
     #[inline(always)]
-    fn single<T: RealField + Copy>(a: Quad<T>) -> Option<__m128> {
-        same::<_, Quad<f32>>(a).map(|Quad(a)| must_cast(a))
+    fn single<T: RealField + Copy>(a: Lane4<T>) -> Option<__m128> {
+        same::<_, Lane4<f32>>(a).map(|Lane4(a)| must_cast(a))
     }
 
     #[inline(always)]
-    fn from_double<T: RealField + Copy>(a: __m256d) -> Option<Quad<T>> {
-        same(Quad::<f64>(must_cast(a)))
+    fn from_double<T: RealField + Copy>(a: __m256d) -> Option<Lane4<T>> {
+        same(Lane4::<f64>(must_cast(a)))
     }
 
     #[inline(always)]
-    fn from_single<T: RealField + Copy>(a: __m128) -> Option<Quad<T>> {
-        same(Quad::<f32>(must_cast(a)))
+    fn from_single<T: RealField + Copy>(a: __m128) -> Option<Lane4<T>> {
+        same(Lane4::<f32>(must_cast(a)))
     }
 
-    /// For what cannot be.
+    /// Unreachable: `T` is f32 or f64.
     #[inline(always)]
-    fn zero<T: RealField + Copy>() -> Quad<T> {
-        Quad([T::zero(); 4])
+    fn zero<T: RealField + Copy>() -> Lane4<T> {
+        Lane4([T::zero(); 4])
     }
 }
 
-/// The value, if it is of this type; known when the program is compiled.
+/// The value, if `A` is `B`; resolved at compile time.
 #[inline(always)]
 fn same<A: Copy + 'static, B: Copy + 'static>(a: A) -> Option<B> {
     (&a as &dyn Any).downcast_ref().copied()
@@ -334,10 +333,10 @@ mod tests {
 
     /// All operations on some numbers, one after the other.
     fn operations<T: RealField + Copy>(vectors: impl Vectors) -> Vec<[T; 4]> {
-        let quad = |from: f64| {
-            Quad(std::array::from_fn(|q| nalgebra::convert::<f64, T>((from + q as f64).sqrt())))
+        let lanes = |from: f64| {
+            Lane4(std::array::from_fn(|q| nalgebra::convert::<f64, T>((from + q as f64).sqrt())))
         };
-        let (a, b, c) = (quad(2.0), quad(11.0), quad(20.0));
+        let (a, b, c) = (lanes(2.0), lanes(11.0), lanes(20.0));
         [
             vectors.splat(a.0[1]),
             vectors.load(&b.0),
@@ -353,7 +352,7 @@ mod tests {
             vectors.high_alone(a),
             vectors.high_and_low(a, b),
         ]
-        .map(|Quad(values)| values)
+        .map(|Lane4(values)| values)
         .into()
     }
 

@@ -5,22 +5,22 @@ use std::fmt;
 use bytemuck::{Pod, bytes_of_mut, cast_slice_mut};
 use nalgebra::{RealField, SMatrix, SVector};
 
-use crate::bands::Bands;
 use crate::body_force::BodyForce;
 use crate::error::{SetupError, StepError};
 use crate::fault::Fault;
+use crate::geometry::Constants;
 use crate::grid::{Grid, Layout};
+use crate::health::{Invalid, axis_too_large, invalidity};
 use crate::material::{AnyLaw, Law, Material, NeoHookean, NeoHookeanNoLog};
+use crate::node::Node;
+use crate::parallel::bins::Bins;
 use crate::particles::Particles;
-use crate::step::{
-    Constants, Kernel, State, Trouble, axis_too_large, step_musl, step_usf, trouble,
-};
-use crate::sweep::step_usl;
+use crate::shape_function::{FixedBox, HALF_SIZE_LIMIT, Hat, ShapeFunction, StretchingBox};
+use crate::state::State;
+use crate::step::{Kernel, StepTimes, step_musl, step_usf, step_usl};
 use crate::tensor::{determinant, real};
-use crate::transfer::Node;
-use crate::weights::{FixedBox, HALF_SIZE_LIMIT, Hat, Rule, StretchingBox};
 
-/// Weights by which particles and nodes exchange values.
+/// Shape functions, whose values at particles are the weights of P2G and G2P.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Shape {
@@ -58,10 +58,10 @@ impl fmt::Display for Integrator {
     }
 }
 
-/// How a scene is to be integrated.
+/// The scheme of a simulation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings<T> {
-    /// Weights.
+    /// Shape function.
     pub shape: Shape,
     /// Time integration.
     pub integrator: Integrator,
@@ -100,9 +100,9 @@ impl<T: RealField + Copy, const D: usize> Simulation<T, D> {
         let state = allocate(&grid, particles, &settings)?;
         let cells = state.particles.half_size / grid.spacing;
         let (state, kernel) = match settings.shape {
-            Shape::Linear => with_rule(state, Hat, &material, &settings),
-            Shape::Ugimp => with_rule(state, FixedBox(cells), &material, &settings),
-            Shape::Gimp => with_rule(state, StretchingBox(cells), &material, &settings),
+            Shape::Linear => with_shape(state, Hat, &material, &settings),
+            Shape::Ugimp => with_shape(state, FixedBox(cells), &material, &settings),
+            Shape::Gimp => with_shape(state, StretchingBox(cells), &material, &settings),
         }?;
         Ok(Self { grid, material, settings, state, kernel, steps_done: 0, failed: None })
     }
@@ -124,12 +124,13 @@ impl<T: RealField + Copy, const D: usize> Simulation<T, D> {
             && self.steps_done == 0
             && !planted.is(Fault::NoHalfStep);
         let scale = if halved { real(0.5) } else { T::one() };
-        let times = (self.time(), self.settings.time_step * real((self.steps_done + 1) as f64));
-        let outcome = (self.kernel)(&mut self.state, body_force, times, scale);
-        if let Some((trouble, particle)) = outcome.failure {
+        let end = self.settings.time_step * real((self.steps_done + 1) as f64);
+        let times = StepTimes { start: self.time(), end, scale };
+        let outcome = (self.kernel)(&mut self.state, body_force, times);
+        if let Some((invalid, particle)) = outcome.failure {
             let step = self.steps_done + 1;
             let time = self.settings.time_step * real(step as f64);
-            let error = describe(&self.state, &self.settings, trouble, particle, step, time);
+            let error = describe(&self.state, &self.settings, invalid, particle, step, time);
             self.failed = Some(error.clone());
             return Err(error);
         }
@@ -179,18 +180,16 @@ impl<T: RealField + Copy, const D: usize> Simulation<T, D> {
 }
 
 impl<T: RealField + Pod, const D: usize> Simulation<T, D> {
-    /// The numbers that make up the state between two steps, as bytes in this machine's order; their number and their lengths
-    /// follow from the set-up.
+    /// The state between two steps, as slices of bytes in this machine's order; their number and lengths follow from the set-up.
     ///
-    /// Whoever writes them down, and later over those of a simulation that is set up in the same way, continues to the same
-    /// bits: nothing else of one step is used by the next.
+    /// A copy of these bytes, written over the state of a simulation with the same set-up, continues the run to the same bits.
     pub fn state(&mut self) -> Vec<&mut [u8]> {
-        // Whatever is overwritten, the grid is not what follows from it.
+        // The caller may overwrite the particles, and the grid no longer belongs to them.
         self.state.is_ahead = false;
         let Particles { x, v, F, .. } = &mut self.state.particles;
         let mut state = vec![cast_slice_mut(x), cast_slice_mut(v), cast_slice_mut(F)];
-        // Sums over particles follow the order of the last sort.
-        state.extend(self.state.bands.state());
+        // The order of the last sort decides the order of sums over particles.
+        state.extend(self.state.bins.state());
         state.push(bytes_of_mut(&mut self.steps_done));
         state
     }
@@ -209,7 +208,7 @@ impl<T: RealField, const D: usize> fmt::Debug for Simulation<T, D> {
     }
 }
 
-/// For error messages, whatever the scalar type.
+/// A value for error messages, of any scalar type.
 fn figure<T: RealField>(value: T) -> f64 {
     nalgebra::try_convert(value).unwrap_or(f64::NAN)
 }
@@ -296,14 +295,14 @@ fn allocate<T: RealField + Copy, const D: usize>(
         Ok::<_, SetupError>(nodes)
     };
     let (now, reprojected, next) = (nodes(true)?, nodes(musl)?, nodes(ahead)?);
-    let bands = Bands::new(&layout, particles.len());
+    let bins = Bins::new(&layout, particles.len());
     let least = particles.mass.iter().fold(particles.mass[0], |least, &m| least.min(m));
     let Particles { mass, volume, .. } = &particles;
     let (m, V) = (mass[0], volume[0]);
-    let alike = mass.iter().all(|&mass| mass == m) && volume.iter().all(|&volume| volume == V);
+    let uniform = mass.iter().all(|&mass| mass == m) && volume.iter().all(|&volume| volume == V);
     Ok(State {
-        alike: alike.then_some((m, V)),
-        constants: Constants::new(grid, &layout, &bands, settings.time_step, least),
+        uniform: uniform.then_some((m, V)),
+        constants: Constants::new(grid, &layout, &bins, settings.time_step, least),
         nodes: now,
         F_next: if usf { vec![SMatrix::identity(); particles.len()] } else { Vec::new() },
         reprojected,
@@ -312,73 +311,69 @@ fn allocate<T: RealField + Copy, const D: usize>(
         of_time: Vec::new(),
         particles,
         layout,
-        bands,
+        bins,
     })
 }
 
 type Prepared<T, const D: usize> = Result<(State<T, D>, Kernel<T, D>), SetupError>;
 
-/// Checks the initial state, sorts the particles, and picks the kernel for these weights.
-fn with_rule<T, R, const D: usize, const W: usize>(
+/// Checks the initial state, sorts the particles, and picks the kernel for this shape function.
+fn with_shape<T, R, const D: usize, const W: usize>(
     mut state: State<T, D>,
-    rule: R,
+    shape: R,
     material: &Material<T>,
     settings: &Settings<T>,
 ) -> Prepared<T, D>
 where
     T: RealField + Copy,
-    R: Rule<T, D, W>,
+    R: ShapeFunction<T, D, W>,
 {
     let Particles { x, F, .. } = &state.particles;
     for p in 0..x.len() {
-        if let Some(trouble) = trouble(&rule, &state.constants, &x[p], &F[p]) {
-            let error = describe(&state, settings, trouble, p, 0, T::zero());
+        if let Some(invalid) = invalidity(&shape, &state.constants, &x[p], &F[p]) {
+            let error = describe(&state, settings, invalid, p, 0, T::zero());
             return Err(SetupError::InitialState(error));
         }
     }
-    state.sort(rule);
+    state.sort(shape);
     let kernel = match *material {
         Material::NeoHookean { lambda, mu } if lambda == T::zero() => {
-            with_law(rule, NeoHookeanNoLog { mu }, settings.integrator)
+            with_law(shape, NeoHookeanNoLog { mu }, settings.integrator)
         }
         Material::NeoHookean { lambda, mu } => {
             let planted = state.constants.planted;
-            with_law(rule, NeoHookean { lambda, mu, planted }, settings.integrator)
+            with_law(shape, NeoHookean { lambda, mu, planted }, settings.integrator)
         }
-        other => with_law(rule, AnyLaw(other), settings.integrator),
+        other => with_law(shape, AnyLaw(other), settings.integrator),
     };
     Ok((state, kernel))
 }
 
-/// The kernel for these weights and this law.
+/// The kernel for this shape function and law.
 fn with_law<T, R, L, const D: usize, const W: usize>(
-    rule: R,
+    shape: R,
     law: L,
     integrator: Integrator,
 ) -> Kernel<T, D>
 where
     T: RealField + Copy,
-    R: Rule<T, D, W>,
+    R: ShapeFunction<T, D, W>,
     L: Law<T>,
 {
     match integrator {
         Integrator::Usl | Integrator::Cd => {
-            Box::new(move |s, b, times, scale| step_usl(s, (rule, law), b, times, scale))
+            Box::new(move |s, b, times| step_usl(s, (shape, law), b, times))
         }
-        Integrator::Musl => {
-            Box::new(move |s, b, times, scale| step_musl(s, (rule, law), b, times, scale))
-        }
-        Integrator::Usf => {
-            Box::new(move |s, b, times, scale| step_usf(s, (rule, law), b, times, scale))
-        }
+        Integrator::Musl => Box::new(move |s, b, times| step_musl(s, (shape, law), b, times)),
+        Integrator::Usf => Box::new(move |s, b, times| step_usf(s, (shape, law), b, times)),
     }
 }
 
-/// The error for a particle in trouble, with the figures of its present state.
+/// The error for an invalid particle, with the figures of its present state.
 fn describe<T: RealField + Copy, const D: usize>(
     state: &State<T, D>,
     settings: &Settings<T>,
-    trouble: Trouble,
+    invalid: Invalid,
     particle: usize,
     step: usize,
     time: T,
@@ -386,16 +381,16 @@ fn describe<T: RealField + Copy, const D: usize>(
     let (x, F) = (&state.particles.x[particle], &state.particles.F[particle]);
     let position = x.iter().map(|&x| figure(x)).collect();
     let (time, J) = (figure(time), figure(determinant(F)));
-    match trouble {
-        Trouble::Inverted => StepError::Inverted { step, time, particle, J },
-        Trouble::NotFinite => StepError::NotFinite { step, time, particle, position, J },
-        Trouble::LeftGrid => {
+    match invalid {
+        Invalid::Inverted => StepError::Inverted { step, time, particle, J },
+        Invalid::NotFinite => StepError::NotFinite { step, time, particle, position, J },
+        Invalid::LeftGrid => {
             let axis = state.constants.axis_outside(x).unwrap_or(0);
             let (lower, upper) = state.constants.range(axis);
             let (lower, upper) = (figure(lower), figure(upper));
             StepError::LeftGrid { step, time, particle, position, axis, lower, upper }
         }
-        Trouble::TooLarge => {
+        Invalid::TooLarge => {
             let l0 = &state.particles.half_size;
             let l = match settings.shape {
                 Shape::Gimp => SVector::from_fn(|a, _| (l0[a] * F[(a, a)]).abs()),

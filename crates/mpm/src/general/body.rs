@@ -9,7 +9,7 @@ use crate::error::SetupError;
 use crate::grid::Grid;
 use crate::particles::Particles;
 
-/// Particles, and what region of the body each stands for.
+/// Particles, and the region of the body that each represents.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body<const D: usize> {
     /// The particles. Their common half-size has no meaning here.

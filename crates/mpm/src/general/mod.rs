@@ -1,8 +1,8 @@
-//! Material points with any weights, transfer and integrator, in the current configuration: plain where
+//! The plain step: MPM with all shape functions, transfers and integrators, one particle at a time, where
 //! [`Simulation`](crate::Simulation) is fast.
 //!
-//! In each step every particle gets a list of the nodes it touches with their weights `S_ip` and gradients `G_ip`, by the
-//! rule of its [`Shape`]. Everything else is sums over these lists:
+//! In each step every particle gets a list of its nodes with the weights `S_ip` and gradients `G_ip` of its [`Shape`]. P2G and
+//! G2P are sums over these lists:
 //!
 //! ```text
 //! m_i = sum m_p S_ip;  v_i = sum m_p v_p S_ip / m_i;  f_i = -sum V0_p tau_p G_ip + sum m_p b_p S_ip;  a_i = f_i / m_i

@@ -1,4 +1,4 @@
-//! Values at the nodes, and their exchange with the particles.
+//! P2G, grid update and G2P over the lists of weights.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -27,8 +27,8 @@ impl<const D: usize> Nodes<D> {
         self.layout.nodes
     }
 
-    /// Sums the masses of particles at the nodes.
-    pub(crate) fn weigh(&mut self, stencils: &Stencils<D>, mass: &[f64]) {
+    /// P2G of mass.
+    pub(crate) fn p2g_mass(&mut self, stencils: &Stencils<D>, mass: &[f64]) {
         let sums = &mut self.inverse_mass;
         sums.fill(0.0);
         for (p, m) in mass.iter().enumerate() {
@@ -42,9 +42,9 @@ impl<const D: usize> Nodes<D> {
         }
     }
 
-    /// Sums vectors that particles give to their nodes, over the nodes' masses; what is normal to walls vanishes there, and
-    /// nodes beyond have the mirrored values.
-    pub(crate) fn collect(
+    /// P2G of vectors, and the grid update: `give(particle, entries, sums)` adds a particle's contributions; sums are divided by
+    /// the nodes' masses, components normal to walls vanish on them, and ghost nodes get the mirrored values.
+    pub(crate) fn p2g(
         &self,
         stencils: &Stencils<D>,
         particles: usize,
@@ -62,14 +62,14 @@ impl<const D: usize> Nodes<D> {
         self.mirror(field);
     }
 
-    /// Clears what is normal to walls there, and gives nodes beyond them the mirrored values.
+    /// Clears components normal to walls on them, and sets ghost nodes to the mirrored values.
     pub(crate) fn mirror(&self, field: &mut Field<D>) {
         self.layout.on_walls(0, field, |value, axis| value[axis] = 0.0);
         self.layout.unfold(field, flipped);
     }
 
-    /// The velocity field of particles with velocities `v` and, if they have them, affine parts `C` about their centres.
-    pub(crate) fn project(
+    /// P2G of momentum: the velocity field of particles with velocities `v` and, for APIC, affine parts `C` about their centres.
+    pub(crate) fn p2g_velocity(
         &self,
         raster: &Raster<D>,
         stencils: &Stencils<D>,
@@ -78,7 +78,7 @@ impl<const D: usize> Nodes<D> {
         C: &[SMatrix<f64, D, D>],
         field: &mut Field<D>,
     ) {
-        self.collect(stencils, v.len(), field, |p, entries, sums| {
+        self.p2g(stencils, v.len(), field, |p, entries, sums| {
             let momentum = v[p] * mass[p];
             let Some(C) = C.get(p) else {
                 entries.iter().for_each(|entry| sums[entry.node] += momentum * entry.S);
@@ -111,8 +111,8 @@ pub(crate) fn centre<const D: usize>(raster: &Raster<D>, entries: &[Entry<D>]) -
     entries.iter().map(|entry| raster.node(entry.node) * entry.S).sum()
 }
 
-/// A field at a particle.
-pub(crate) fn value<const D: usize>(entries: &[Entry<D>], field: &Field<D>) -> SVector<f64, D> {
+/// G2P: a field at a particle.
+pub(crate) fn g2p<const D: usize>(entries: &[Entry<D>], field: &Field<D>) -> SVector<f64, D> {
     let mut sum = SVector::zeros();
     for entry in entries {
         sum += field[entry.node] * entry.S;
@@ -120,8 +120,8 @@ pub(crate) fn value<const D: usize>(entries: &[Entry<D>], field: &Field<D>) -> S
     sum
 }
 
-/// The gradient `dv_i/dx_j` of a field at a particle.
-pub(crate) fn gradient<const D: usize>(
+/// G2P: the gradient `dv_i/dx_j` of a field at a particle.
+pub(crate) fn g2p_gradient<const D: usize>(
     entries: &[Entry<D>],
     field: &Field<D>,
 ) -> SMatrix<f64, D, D> {

@@ -1,8 +1,8 @@
-//! The choices that make a scheme.
+//! The settings of a scheme: shape function, integrator, transfer.
 
 use std::fmt;
 
-/// Weights by which particles and nodes exchange values.
+/// Shape functions, whose values at particles are the weights of P2G and G2P.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Shape {
@@ -18,7 +18,7 @@ pub enum Shape {
     /// weights so add up to one in every cell, and fields that are linear and vanish across the wall on it are reproduced:
     /// of linear fields these are all that a frictionless wall admits. Beyond an open face the nodes go on, and all linear
     /// fields are reproduced there. (Steffen, Kirby & Berzins, IJNME 76 (2008) 922-948, change the splines at the boundary
-    /// instead. With lumped mass that costs an order there: such a spline's centre of mass is not where its coefficient is.)
+    /// instead. With lumped mass that costs an order there: the changed spline's centre of mass is not where its coefficient is.)
     Bspline2,
     /// Cubic B-splines about the nodes, at the particle's centre; walls as for `Bspline2`.
     Bspline3,
@@ -100,8 +100,7 @@ impl Integrator {
     }
 }
 
-/// How particles get their velocity back from the grid. Positions and F follow the grid's velocity `v_i + dt a_i` with
-/// all of them.
+/// The velocity update of G2P. With every transfer positions and F follow the grid's velocity `v_i + dt a_i`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Transfer {
     /// The change is added: `v_p += dt sum S_ip a_i`.
@@ -109,12 +108,12 @@ pub enum Transfer {
     Flip,
     /// The grid's velocity is taken: `v_p = sum S_ip (v_i + dt a_i)`; dissipative.
     Pic,
-    /// The grid's velocity and its affine part around the particle, which angular momentum is kept by (Jiang, Schroeder,
+    /// The grid's velocity and its affine part around the particle, which conserves angular momentum (Jiang, Schroeder,
     /// Selle, Teran & Stomakhin, ACM Trans. Graph. 34 (2015) 51). The particle's inertia `D_p` is summed from the weights:
     /// h^2/4 for quadratic and h^2/3 for cubic splines. For hat functions at a point it may be singular, and the affine part
     /// is the gradient of the velocity.
     Apic,
-    /// `XPIC(m)`: PIC with a filter of order m, which takes out only what the grid cannot see (Hammerquist & Nairn, CMAME
+    /// `XPIC(m)`: PIC with a filter of order m, which removes the null space of the grid's interpolation alone (Hammerquist & Nairn, CMAME
     /// 318 (2017) 724-738). `Xpic(1)` is PIC, and the larger m, the nearer to FLIP without its noise.
     Xpic(u32),
 }
@@ -130,10 +129,10 @@ impl fmt::Display for Transfer {
     }
 }
 
-/// How a body is to be integrated.
+/// The scheme of a simulation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Weights.
+    /// Shape function.
     pub shape: Shape,
     /// Time integration.
     pub integrator: Integrator,

@@ -5,7 +5,7 @@ use nalgebra::{SMatrix, SVector};
 
 use super::body::{Body, Mesh};
 use super::domain;
-use super::nodes::{Field, Nodes, centre, gradient, value};
+use super::nodes::{Field, Nodes, centre, g2p, g2p_gradient};
 use super::settings::{Integrator, Settings, Shape, Transfer};
 use super::stencil::{Entry, Raster, Stencils};
 use crate::body_force::BodyForce;
@@ -14,10 +14,10 @@ use crate::fault::{Fault, Planted};
 use crate::grid::{Grid, Layout};
 use crate::material::Material;
 use crate::particles::Particles;
+use crate::shape_function::HALF_SIZE_LIMIT;
 use crate::tensor::{determinant, inverse_transpose, product};
-use crate::weights::HALF_SIZE_LIMIT;
 
-/// A running simulation with any weights, transfer and integrator.
+/// A running simulation with any shape function, transfer and integrator.
 ///
 /// Runs on the calling thread alone, so that its results do not depend on the number of threads.
 #[derive(Clone, Debug)]
@@ -36,14 +36,14 @@ pub struct General<const D: usize> {
     planted: Planted,
 }
 
-/// Arrays that a step works in.
+/// Buffers of a step.
 #[derive(Clone, Debug)]
 struct Work<const D: usize> {
     /// Of the particles, and of the corners that they share.
     stencils: Stencils<D>,
     corner_stencils: Stencils<D>,
     b: Vec<SVector<f64, D>>,
-    /// On the grid: velocities, accelerations, and what filters and projections need besides.
+    /// On the grid: velocities, accelerations, and the fields of the XPIC filter.
     v: Field<D>,
     a: Field<D>,
     filtered: Field<D>,
@@ -52,16 +52,16 @@ struct Work<const D: usize> {
     at_particles: Vec<SVector<f64, D>>,
 }
 
-/// What is wrong with a particle, worst first: where one particle is inverted, others may follow in the same step.
+/// Reasons why a particle is invalid, worst first: where one particle is inverted, others may follow in the same step.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
-enum Trouble {
+enum Invalid {
     Inverted { J: f64 },
     NotFinite,
     LeftGrid { axis: usize },
     TooLarge { axis: usize, half_size: f64 },
 }
 
-impl Trouble {
+impl Invalid {
     fn rank(self) -> usize {
         match self {
             Self::Inverted { .. } => 0,
@@ -125,7 +125,7 @@ impl<const D: usize> General<D> {
             failed: None,
             planted: Planted::here(),
         };
-        if let Some(error) = simulation.trouble(0) {
+        if let Some(error) = simulation.worst_invalidity(0) {
             return Err(SetupError::InitialState(error));
         }
         simulation.start_affine();
@@ -158,13 +158,13 @@ impl<const D: usize> General<D> {
             Integrator::Usl | Integrator::Musl | Integrator::Cd => 0.0,
         };
         let t = self.time();
-        self.list();
-        self.project();
+        self.compute_weights();
+        self.p2g_velocity();
         if early > 0.0 {
-            self.stretch(early * dt);
-            self.look()?;
+            self.g2p_stretch(early * dt);
+            self.check_particles()?;
         }
-        self.accelerate(body_force, t);
+        self.p2g_force(body_force, t);
         self.filter();
         let halved = self.settings.halve_first_acceleration && self.steps_done == 0;
         let scale = if halved { 0.5 } else { 1.0 };
@@ -172,15 +172,15 @@ impl<const D: usize> General<D> {
             *a *= scale;
             *v += *a * dt;
         }
-        self.accept();
-        self.travel();
+        self.g2p_velocity();
+        self.g2p_position();
         if self.settings.integrator == Integrator::Musl {
-            self.project();
+            self.p2g_velocity();
         }
         if early < 1.0 {
-            self.stretch((1.0 - early) * dt);
+            self.g2p_stretch((1.0 - early) * dt);
         }
-        self.look()?;
+        self.check_particles()?;
         self.steps_done += 1;
         Ok(())
     }
@@ -230,11 +230,9 @@ impl<const D: usize> General<D> {
         }
     }
 
-    /// The numbers that make up the state between two steps, as bytes in this machine's order; their number and their lengths
-    /// follow from the set-up.
+    /// The state between two steps, as slices of bytes in this machine's order; their number and lengths follow from the set-up.
     ///
-    /// Whoever writes them down, and later over those of a simulation that is set up in the same way, continues to the same
-    /// bits: nothing else of one step is used by the next.
+    /// A copy of these bytes, written over the state of a simulation with the same set-up, continues the run to the same bits.
     pub fn state(&mut self) -> Vec<&mut [u8]> {
         let Particles { x, v, F, .. } = &mut self.body.particles;
         let mut state = vec![cast_slice_mut(x), cast_slice_mut(v), cast_slice_mut(F)];
@@ -244,23 +242,23 @@ impl<const D: usize> General<D> {
         state
     }
 
-    /// Lists the nodes of every particle, with their masses.
-    fn list(&mut self) {
+    /// The weights of every particle, and P2G of mass.
+    fn compute_weights(&mut self) {
         let Self { settings, body, raster, nodes, work, .. } = self;
         let Work { stencils, corner_stencils, .. } = work;
         list(settings.shape, raster, body, stencils, corner_stencils);
-        nodes.weigh(stencils, &body.particles.mass);
+        nodes.p2g_mass(stencils, &body.particles.mass);
     }
 
-    /// The particles' velocities on the grid.
-    fn project(&mut self) {
+    /// P2G of momentum: the particles' velocities on the grid.
+    fn p2g_velocity(&mut self) {
         let Self { body, affine, raster, nodes, work, .. } = self;
         let Particles { v, mass, .. } = &body.particles;
-        nodes.project(raster, &work.stencils, mass, v, affine, &mut work.v);
+        nodes.p2g_velocity(raster, &work.stencils, mass, v, affine, &mut work.v);
     }
 
-    /// Accelerations on the grid, from the stresses of F as it is.
-    fn accelerate(&mut self, body_force: &dyn BodyForce<f64, D>, t: f64) {
+    /// P2G of forces: accelerations on the grid, from the stresses of the present F.
+    fn p2g_force(&mut self, body_force: &dyn BodyForce<f64, D>, t: f64) {
         let Self { body, material, nodes, work, .. } = self;
         let Particles { X, F, mass, volume, .. } = &body.particles;
         let forced = !body_force.is_absent();
@@ -269,8 +267,8 @@ impl<const D: usize> General<D> {
             body_force.evaluate(0, X, t, &mut work.b);
         }
         let b = &work.b;
-        nodes.collect(&work.stencils, X.len(), &mut work.a, |p, entries, sums| {
-            // All were found to be deformations.
+        nodes.p2g(&work.stencils, X.len(), &mut work.a, |p, entries, sums| {
+            // The checks admitted deformations alone.
             let stress = material.kirchhoff(&F[p]).unwrap_or_else(SMatrix::zeros) * -volume[p];
             let weight = if forced { b[p] * mass[p] } else { SVector::zeros() };
             for entry in entries {
@@ -279,7 +277,7 @@ impl<const D: usize> General<D> {
         });
     }
 
-    /// The part of the grid's velocity that XPIC gives back to the particles:
+    /// The part of the grid's velocity that XPIC interpolates at the particles:
     /// `sum_k (-1)^(k+1) binomial(m, k) (S^+ S)^(k-1) v`, with `S^+` from particles to the grid.
     fn filter(&mut self) {
         let Transfer::Xpic(order) = self.settings.transfer else { return };
@@ -293,8 +291,8 @@ impl<const D: usize> General<D> {
         filtered.iter_mut().zip(&*term).for_each(|(sum, term)| *sum = term * factor);
         for k in 2..=order {
             at_particles.clear();
-            at_particles.extend((0..mass.len()).map(|p| value(stencils.of(p), term)));
-            nodes.project(raster, stencils, mass, at_particles, &[], term);
+            at_particles.extend((0..mass.len()).map(|p| g2p(stencils.of(p), term)));
+            nodes.p2g_velocity(raster, stencils, mass, at_particles, &[], term);
             let k = f64::from(k);
             let sign = if planted.is(Fault::XpicSign) { 1.0 } else { -1.0 };
             factor *= sign * (m - k + 1.0) / k;
@@ -302,51 +300,51 @@ impl<const D: usize> General<D> {
         }
     }
 
-    /// Velocities of the particles, by the transfer.
-    fn accept(&mut self) {
+    /// G2P of velocity, by the transfer.
+    fn g2p_velocity(&mut self) {
         let (dt, planted) = (self.settings.time_step, self.planted);
         let Self { settings, body, affine, raster, work, .. } = self;
         let Work { stencils, v, a, filtered, .. } = work;
         for (p, particle_v) in body.particles.v.iter_mut().enumerate() {
             let entries = stencils.of(p);
             match settings.transfer {
-                Transfer::Flip => *particle_v += value(entries, a) * dt,
-                Transfer::Pic => *particle_v = value(entries, v),
+                Transfer::Flip => *particle_v += g2p(entries, a) * dt,
+                Transfer::Pic => *particle_v = g2p(entries, v),
                 Transfer::Apic => {
-                    *particle_v = value(entries, v);
+                    *particle_v = g2p(entries, v);
                     if !planted.is(Fault::AffinePartDropped) {
                         affine[p] = affine_part(settings.shape, raster, entries, v);
                     }
                 }
                 Transfer::Xpic(_) => {
-                    *particle_v = value(entries, filtered) + value(entries, a) * dt;
+                    *particle_v = g2p(entries, filtered) + g2p(entries, a) * dt;
                 }
             }
         }
     }
 
-    /// Moves particles and corners with the grid.
-    fn travel(&mut self) {
+    /// G2P of position: particles and corners move with the grid.
+    fn g2p_position(&mut self) {
         let (dt, planted) = (self.settings.time_step, self.planted);
         let Self { settings, body, work, .. } = self;
         for (p, x) in body.particles.x.iter_mut().enumerate() {
-            *x += value(work.stencils.of(p), &work.v) * dt;
+            *x += g2p(work.stencils.of(p), &work.v) * dt;
         }
         if let (Shape::Cpdi2, Some(mesh)) = (settings.shape, &mut body.mesh) {
             for (k, x) in mesh.x.iter_mut().enumerate() {
                 if planted.is(Fault::CornersStay) {
                     break;
                 }
-                *x += value(work.corner_stencils.of(k), &work.v) * dt;
+                *x += g2p(work.corner_stencils.of(k), &work.v) * dt;
             }
         }
     }
 
-    /// Stretches the particles with the grid for a time.
-    fn stretch(&mut self, time: f64) {
+    /// G2P of F: the particles stretch with the grid for a time.
+    fn g2p_stretch(&mut self, time: f64) {
         let Self { body, work, .. } = self;
         for (p, F) in body.particles.F.iter_mut().enumerate() {
-            let L = gradient(work.stencils.of(p), &work.v);
+            let L = g2p_gradient(work.stencils.of(p), &work.v);
             *F += product(&(L * time), F);
         }
     }
@@ -356,56 +354,56 @@ impl<const D: usize> General<D> {
         if self.settings.transfer != Transfer::Apic {
             return;
         }
-        self.list();
-        self.project();
+        self.compute_weights();
+        self.p2g_velocity();
         let Self { settings, raster, work, .. } = self;
         let part = |p| affine_part(settings.shape, raster, work.stencils.of(p), &work.v);
         self.affine = (0..self.body.particles.len()).map(part).collect();
     }
 
-    /// An error if some particle is in trouble.
-    fn look(&self) -> Result<(), StepError> {
-        self.trouble(self.steps_done + 1).map_or(Ok(()), Err)
+    /// An error if some particle is invalid.
+    fn check_particles(&self) -> Result<(), StepError> {
+        self.worst_invalidity(self.steps_done + 1).map_or(Ok(()), Err)
     }
 
-    /// The worst trouble that particles are in, if any, as an error of step `step`.
-    fn trouble(&self, step: usize) -> Option<StepError> {
+    /// The worst reason for which a particle is invalid, if any, as an error of step `step`.
+    fn worst_invalidity(&self, step: usize) -> Option<StepError> {
         let Particles { x, F, .. } = &self.body.particles;
-        let (particle, trouble) = (0..x.len())
-            .filter_map(|p| self.trouble_of(p).map(|trouble| (p, trouble)))
-            .min_by_key(|(p, trouble)| (trouble.rank(), *p))?;
+        let (particle, invalid) = (0..x.len())
+            .filter_map(|p| self.invalidity(p).map(|invalid| (p, invalid)))
+            .min_by_key(|(p, invalid)| (invalid.rank(), *p))?;
         let time = self.settings.time_step * step as f64;
         let position = || x[particle].iter().copied().collect();
-        Some(match trouble {
-            Trouble::Inverted { J } => StepError::Inverted { step, time, particle, J },
-            Trouble::NotFinite => {
+        Some(match invalid {
+            Invalid::Inverted { J } => StepError::Inverted { step, time, particle, J },
+            Invalid::NotFinite => {
                 let J = determinant(&F[particle]);
                 StepError::NotFinite { step, time, particle, position: position(), J }
             }
-            Trouble::LeftGrid { axis } => {
+            Invalid::LeftGrid { axis } => {
                 let (lower, upper) = (self.raster.lower[axis], self.raster.upper[axis]);
                 let position = position();
                 StepError::LeftGrid { step, time, particle, position, axis, lower, upper }
             }
-            Trouble::TooLarge { axis, half_size } => {
+            Invalid::TooLarge { axis, half_size } => {
                 let limit = HALF_SIZE_LIMIT * self.raster.spacing;
                 StepError::TooLarge { step, time, particle, axis, half_size, limit }
             }
         })
     }
 
-    fn trouble_of(&self, p: usize) -> Option<Trouble> {
+    fn invalidity(&self, p: usize) -> Option<Invalid> {
         let Particles { x, F, .. } = &self.body.particles;
         let (x, F) = (&x[p], &F[p]);
         let J = determinant(F);
         if J <= 0.0 {
-            return Some(Trouble::Inverted { J });
+            return Some(Invalid::Inverted { J });
         }
         if !J.is_finite() || x.iter().any(|x| !x.is_finite()) {
-            return Some(Trouble::NotFinite);
+            return Some(Invalid::NotFinite);
         }
         if let Some(axis) = self.raster.axis_outside(x) {
-            return Some(Trouble::LeftGrid { axis });
+            return Some(Invalid::LeftGrid { axis });
         }
         let E = &self.body.half_edges[p];
         let half_size = match (self.settings.shape, &self.body.mesh) {
@@ -418,10 +416,10 @@ impl<const D: usize> General<D> {
                 let (_, volume) = domain::of_polygon(&corners);
                 if volume <= 0.0 {
                     let J = volume / self.body.particles.volume[p];
-                    return Some(Trouble::Inverted { J });
+                    return Some(Invalid::Inverted { J });
                 }
                 if !volume.is_finite() {
-                    return Some(Trouble::NotFinite);
+                    return Some(Invalid::NotFinite);
                 }
                 let furthest = |a: usize| {
                     corners[..1 << D].iter().map(|c| (c[a] - x[a]).abs()).fold(0.0, f64::max)
@@ -432,7 +430,7 @@ impl<const D: usize> General<D> {
         let limit = HALF_SIZE_LIMIT * self.raster.spacing;
         (0..D)
             .find(|&a| half_size[a] > limit)
-            .map(|axis| Trouble::TooLarge { axis, half_size: half_size[axis] })
+            .map(|axis| Invalid::TooLarge { axis, half_size: half_size[axis] })
     }
 }
 
@@ -484,7 +482,7 @@ pub(super) fn list<const D: usize>(
 }
 
 impl<const D: usize> domain::Corner<D> {
-    /// What a hat function at the corner contributes to its mean over the domain.
+    /// The contribution of a hat function at the corner to its mean over the domain.
     fn share(&self, hat: &Entry<D>) -> Entry<D> {
         Entry { node: hat.node, S: hat.S * self.w, G: self.g * hat.S }
     }
@@ -499,7 +497,7 @@ pub(super) fn affine_part<const D: usize>(
     field: &Field<D>,
 ) -> SMatrix<f64, D, D> {
     if shape == Shape::Linear {
-        return gradient(entries, field);
+        return g2p_gradient(entries, field);
     }
     let centre = centre(raster, entries);
     let (mut B, mut inertia) = (SMatrix::<f64, D, D>::zeros(), SMatrix::<f64, D, D>::zeros());

@@ -1,7 +1,7 @@
-//! Uniform B-splines about the nodes of one axis, in cells as [`weights`](crate::weights).
+//! Uniform B-splines about the nodes of one axis, in cells as [`shape_function`](crate::shape_function).
 
 use crate::grid::PAD_BELOW;
-use crate::weights::AxisWeights;
+use crate::shape_function::AxisWeights;
 
 /// Quadratic splines: knots halfway between nodes.
 pub(crate) fn quadratic(xi: f64) -> AxisWeights<f64, 3> {

@@ -1,5 +1,4 @@
-//! The nodes that a particle touches, with weights and gradients: lists of them, and the products over the axes that
-//! they come from.
+//! Lists of the nodes that a particle touches, with weights and gradients as products over the axes.
 
 use std::array;
 
@@ -9,7 +8,9 @@ use super::settings::Shape;
 use super::spline;
 use crate::grid::{Grid, Layout, PAD_BELOW};
 use crate::particles::count;
-use crate::weights::{AxisWeights, FixedBox, Hat, Rule, StretchingBox, is_wide, wide_axes};
+use crate::shape_function::{
+    AxisWeights, FixedBox, Hat, ShapeFunction, StretchingBox, extended_axes, is_extended,
+};
 
 /// A node with the weight of a particle there, and the weight's gradient in space.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,7 +50,7 @@ impl<const D: usize> Stencils<D> {
     }
 }
 
-/// Where nodes lie: in space, and in memory.
+/// Positions of nodes in space, and their indices in memory.
 #[derive(Clone, Debug)]
 pub(crate) struct Raster<const D: usize> {
     pub(crate) lower: SVector<f64, D>,
@@ -108,22 +109,22 @@ impl<const D: usize> Raster<D> {
     /// The hat functions at a point.
     pub(crate) fn hats(&self, x: &SVector<f64, D>, visit: impl FnMut(Entry<D>)) {
         let xi = self.in_cells(x);
-        let axis = |a: usize| <Hat as Rule<f64, D, 2>>::along_axis(xi[a], 0.0);
+        let axis = |a: usize| <Hat as ShapeFunction<f64, D, 2>>::axis_weights(xi[a], 0.0);
         self.product(&array::from_fn(axis), visit);
     }
 
-    fn boxed<R: Rule<f64, D, 3>>(
+    fn boxed<R: ShapeFunction<f64, D, 3>>(
         &self,
-        rule: R,
+        shape: R,
         xi: &[f64; D],
         stretch: &SVector<f64, D>,
         visit: impl FnMut(Entry<D>),
     ) {
-        let l: [f64; D] = array::from_fn(|a| rule.half_size(a, stretch[a]));
-        if l.iter().any(|&l| is_wide(l)) {
-            self.product(&wide_axes(xi, &l), visit);
+        let l: [f64; D] = array::from_fn(|a| shape.half_size(a, stretch[a]));
+        if l.iter().any(|&l| is_extended(l)) {
+            self.product(&extended_axes(xi, &l), visit);
         } else {
-            self.product(&array::from_fn(|a| R::along_axis(xi[a], l[a])), visit);
+            self.product(&array::from_fn(|a| R::axis_weights(xi[a], l[a])), visit);
         }
     }
 

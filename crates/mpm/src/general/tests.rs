@@ -6,7 +6,7 @@ use nalgebra::{Matrix2, SMatrix, SVector, Vector2, vector};
 use proptest::prelude::*;
 
 use super::domain::{extent, of_parallelogram, of_polygon};
-use super::nodes::{Field, Nodes, centre, gradient, value};
+use super::nodes::{Field, Nodes, centre, g2p, g2p_gradient};
 use super::simulation::{affine_part, list};
 use super::stencil::{Entry, Raster, Stencils};
 use super::*;
@@ -33,7 +33,7 @@ fn noise(seed: usize) -> f64 {
     (seed as f64 * 12.9898).sin() * 0.5
 }
 
-/// A lattice that fills the grid, distorted by `size` but for what lies on the grid's faces.
+/// A lattice that fills the grid, distorted by `size` except on the grid's faces.
 fn distorted<const D: usize>(grid: &Grid<f64, D>, size: f64) -> Body<D> {
     let mut body = Body::lattice(grid, 2, 2.0, |_| true);
     let p = &mut body.particles;
@@ -70,11 +70,11 @@ fn scene<const D: usize>(grid: &Grid<f64, D>, body: Body<D>, shape: Shape) -> Sc
     let (mut stencils, mut corners) = (Stencils::default(), Stencils::default());
     list(shape, &raster, &body, &mut stencils, &mut corners);
     let mut nodes = Nodes::new(layout, 1e-30);
-    nodes.weigh(&stencils, &body.particles.mass);
+    nodes.p2g_mass(&stencils, &body.particles.mass);
     Scene { raster, nodes, stencils, body }
 }
 
-/// Weights and gradients by node, of whatever size.
+/// Weights and gradients by node, of any size.
 fn merged<const D: usize>(entries: &[Entry<D>]) -> BTreeMap<usize, (f64, SVector<f64, D>)> {
     let mut nodes = BTreeMap::new();
     for entry in entries {
@@ -172,13 +172,13 @@ fn next_to_walls_the_fields_that_walls_admit_are_reproduced() {
             for p in 0..body.particles.len() {
                 let entries = stencils.of(p);
                 let place = centre(raster, entries);
-                assert!((value(entries, &field) - exact(&place)).norm() < 1e-13, "{shape:?}");
+                assert!((g2p(entries, &field) - exact(&place)).norm() < 1e-13, "{shape:?}");
                 let slope = SMatrix::<f64, D, D>::from_fn(|i, j| match (i, j) {
                     (1, 1) => -3.0,
                     (i, j) if i == j => 1.0 + i as f64,
                     _ => 0.0,
                 });
-                assert!((gradient(entries, &field) - slope).norm() < 1e-11, "{shape:?}");
+                assert!((g2p_gradient(entries, &field) - slope).norm() < 1e-11, "{shape:?}");
             }
         }
     }
@@ -388,7 +388,7 @@ fn apic_conserves_linear_and_angular_momentum() {
         let Scene { raster, nodes, stencils, body } = scene(&grid, body, shape);
         let p = &body.particles;
         let mut field: Field<2> = vec![Vector2::zeros(); nodes.len()];
-        nodes.project(&raster, &stencils, &p.mass, &p.v, &C, &mut field);
+        nodes.p2g_velocity(&raster, &stencils, &p.mass, &p.v, &C, &mut field);
         let on_grid = |field: &Field<2>| {
             let (mut linear, mut angular) = (Vector2::zeros(), 0.0);
             for (k, v) in field.iter().enumerate() {
@@ -416,7 +416,7 @@ fn apic_conserves_linear_and_angular_momentum() {
         let (linear_there, angular_there) = on_grid(&field);
         assert!((linear - linear_there).norm() < 1e-12, "{shape:?}");
         assert!((angular - angular_there).abs() < 1e-12, "{shape:?} {angular} {angular_there}");
-        let back: Vec<_> = (0..p.len()).map(|k| value(stencils.of(k), &field)).collect();
+        let back: Vec<_> = (0..p.len()).map(|k| g2p(stencils.of(k), &field)).collect();
         let parts: Vec<_> =
             (0..p.len()).map(|k| affine_part(shape, &raster, stencils.of(k), &field)).collect();
         let (linear_back, angular_back) = of_particles(&back, &parts);

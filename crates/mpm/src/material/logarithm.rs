@@ -18,7 +18,7 @@ pub(super) fn log_of_ratio(growth: f64, ratio: f64) -> f64 {
 
     let near_zero = growth < -0.5;
     let sum = 1.0 + growth;
-    // What rounding took from the sum.
+    // The rounding error of the sum.
     let lost = growth - (sum - 1.0);
     let (u, lost) = if near_zero { (ratio, 0.0) } else { (sum, lost) };
     // u = 2^k m with m between sqrt(1/2) and sqrt(2).

@@ -1,5 +1,8 @@
 //! Constitutive laws, written by hand: they share no source with any derivation of exact solutions.
 //!
+//! To add a law: a file with an `impl Law`, a variant of [`Material`], a row in `with_law` and in
+//! [`small_strain_moduli`](Material::small_strain_moduli), its energy in `energy.rs`.
+//!
 //! All are hyperelastic but for [`Material::LinearElastic`], whose stress ignores how the body turns. Stresses are formed
 //! from H = F - I, so that small strains keep their digits.
 
@@ -72,8 +75,8 @@ pub enum Material<T> {
         /// Resistance to changes of volume, a stress; the first Lame constant at small strain is `lambda + 4 c2`.
         lambda: T,
     },
-    /// Linear elasticity, `P = lambda tr(H) I + mu (H + H^T)`, `H = F - I`: linear in the displacement, whatever its
-    /// size, and not invariant under rotation. Its Kirchhoff stress `P F^T` is symmetric to first order only.
+    /// Linear elasticity, `P = lambda tr(H) I + mu (H + H^T)`, `H = F - I`: linear in displacements of any size, and not
+    /// invariant under rotation. Its Kirchhoff stress `P F^T` is symmetric to first order only.
     LinearElastic {
         /// First Lame constant, a stress.
         lambda: T,
@@ -162,7 +165,7 @@ impl<T: RealField + Copy> Material<T> {
         Some(sum.sqrt())
     }
 
-    /// The Lame constants `(lambda_0, mu_0)` that the law comes down to at small strain; the speed of P-waves in the
+    /// The Lame constants `(lambda_0, mu_0)` of the law at small strain; the speed of P-waves in the
     /// undeformed solid is `sqrt((lambda_0 + 2 mu_0) / rho0)`.
     pub fn small_strain_moduli(&self) -> (T, T) {
         match *self {
@@ -195,8 +198,8 @@ impl<T: RealField + Copy, L: Law<T>, const D: usize, const N: usize> Loop
     }
 }
 
-/// The stresses in the short way or not; whether that may be asked for all of them. As a function of its own, which tells the
-/// compiler that `F` and `P` are in different places.
+/// Computes the stresses by the short form of the law or the full one; returns whether the short form holds for all of them. A
+/// function of its own tells the compiler that `F` and `P` do not overlap.
 #[inline(always)]
 fn stresses<const SHORT: bool, T: RealField + Copy, L: Law<T>, const D: usize, const N: usize>(
     law: L,
@@ -210,7 +213,7 @@ fn stresses<const SHORT: bool, T: RealField + Copy, L: Law<T>, const D: usize, c
         // Without branches: zero times anything that is not finite is not a number.
         let zero = own.fold(J * T::zero(), |sum, entry| sum + entry * T::zero());
         let is_deformation = (J > T::zero()) & (zero == T::zero());
-        // A law may be asked for a stress only where there is one.
+        // Laws are defined for deformations alone.
         let own = SMatrix::<T, D, D>::from_fn(|i, j| match is_deformation {
             true => own[(i, j)],
             false if i == j => T::one(),
@@ -236,7 +239,7 @@ fn jacobian<T: RealField + Copy, const D: usize>(F: &SMatrix<T, D, D>) -> Option
     (J > T::zero() && J.is_finite() && F.iter().all(|entry| entry.is_finite())).then_some(J)
 }
 
-/// A law, for deformation gradients whose J > 0 has been seen to already.
+/// A law, for deformation gradients with J > 0; the caller checks this.
 pub(crate) trait Law<T: RealField + Copy>: Copy + Send + Sync + 'static {
     /// Kirchhoff stress.
     fn kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D>;
@@ -270,7 +273,7 @@ pub(crate) trait Law<T: RealField + Copy>: Copy + Send + Sync + 'static {
     }
 }
 
-/// A law that is looked up at every call: one instance of the kernels serves all laws that have none of their own.
+/// Any law, looked up at every call: one instance of the kernels serves all laws without an instance of their own.
 #[derive(Clone, Copy)]
 pub(crate) struct AnyLaw<T>(pub(crate) Material<T>);
 
@@ -308,7 +311,7 @@ fn log_jacobian<T: RealField + Copy, const D: usize>(F: &SMatrix<T, D, D>) -> T 
     real(logarithm)
 }
 
-/// Whether [`log_jacobian_short`] may be asked for.
+/// Whether [`log_jacobian_short`] holds for this F.
 #[inline(always)]
 fn log_jacobian_is_short<T: RealField + Copy, const D: usize>(F: &SMatrix<T, D, D>) -> bool {
     is_near_one(nalgebra::convert_unchecked(det_minus_one(&displacement_gradient(F))))

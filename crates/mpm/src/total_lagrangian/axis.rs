@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-/// What holds at an end of an axis.
+/// The boundary condition at an end of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
     /// A free surface: a clamped knot vector, nothing prescribed.
@@ -46,7 +46,7 @@ pub struct Axis {
     pub upper: f64,
     /// Number of cells.
     pub cells: usize,
-    /// What holds at the lower and the upper end.
+    /// Boundary conditions at the lower and the upper end.
     pub ends: [End; 2],
 }
 

@@ -30,7 +30,7 @@ pub(crate) struct Basis {
     slope: Vec<f64>,
 }
 
-/// What an operator takes of the functions.
+/// The part of the functions that an operator takes: value or derivative.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Part {
     Value,

@@ -1,4 +1,4 @@
-//! What is given on the sides of a body: its motion, or the traction on it.
+//! Boundary data on the sides of a body: prescribed motion or traction.
 //!
 //! # Sides whose motion is given
 //!
@@ -50,7 +50,7 @@ pub struct Side {
     pub upper: bool,
 }
 
-/// What is given on a side.
+/// The kind of boundary data on a side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// The displacement, a length.
@@ -67,7 +67,7 @@ pub enum Quantity {
 /// those that are [`End::Loaded`](super::End::Loaded).
 pub trait BoundaryData<const D: usize> {
     /// Writes a quantity at the reference positions `X` on a side at time `t`, in Cartesian components; both slices have
-    /// the same length. What is in `values` before is unspecified.
+    /// the same length. The contents of `values` on entry are unspecified.
     fn evaluate(
         &self,
         quantity: Quantity,

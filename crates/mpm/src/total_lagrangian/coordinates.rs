@@ -1,4 +1,4 @@
-//! What the coordinates of a grid mean: places and unit vectors, lengths and volumes, and gradients of components.
+//! Coordinate systems of a grid: positions and unit vectors, lengths and volumes, gradients of components.
 //!
 //! Unknowns are components along the coordinates' unit vectors, which change from place to place; so a gradient has terms
 //! with the components themselves, and the forces have terms with the functions' values (Ogden, "Non-Linear Elastic
@@ -19,7 +19,7 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::error::SetupError;
 
-/// What the coordinates of a grid mean.
+/// The coordinate system of a grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coordinates {
     /// Reference positions.
@@ -37,7 +37,7 @@ pub enum Coordinates {
     Spherical,
 }
 
-/// What the particles in a row along axis 0 have in common.
+/// Factors common to the particles in a row along axis 0.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Row<const D: usize> {
     /// Columns are the unit vectors of the components.

@@ -4,7 +4,7 @@ use super::axis::{Axis, Layout};
 use super::basis::{Basis, Part};
 use super::mass::{Band, Mass};
 
-/// Places along an axis and what they stand for.
+/// Quadrature points along an axis, with the length that each represents.
 #[derive(Clone, Debug)]
 pub(crate) struct Line {
     pub(crate) points: Vec<f64>,

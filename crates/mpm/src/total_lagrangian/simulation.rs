@@ -24,7 +24,7 @@ use crate::tensor::determinant;
 pub struct Grid<const D: usize> {
     /// The axes of the coordinates.
     pub axes: [Axis; D],
-    /// What the coordinates mean.
+    /// The coordinate system.
     pub coordinates: Coordinates,
     /// Particles in a cell along each direction.
     pub per_cell: usize,
@@ -35,7 +35,7 @@ pub struct Grid<const D: usize> {
 /// Mass matrices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MassMatrix {
-    /// Row sums on the diagonal: of second order whatever the degree.
+    /// Row sums on the diagonal: of second order for every degree.
     Lumped,
     /// `M_ij = sum m_p N_i N_j`.
     Consistent,
@@ -397,11 +397,9 @@ impl<const D: usize> TotalLagrangian<D> {
         &self.particles
     }
 
-    /// The numbers that make up the state between two steps, as bytes in this machine's order; their number and their lengths
-    /// follow from the set-up.
+    /// The state between two steps, as slices of bytes in this machine's order; their number and lengths follow from the set-up.
     ///
-    /// Whoever writes them down, and later over those of a simulation that is set up in the same way, continues to the same
-    /// bits: nothing else of one step is used by the next.
+    /// A copy of these bytes, written over the state of a simulation with the same set-up, continues the run to the same bits.
     pub fn state(&mut self) -> Vec<&mut [u8]> {
         let Self { u, v, a, steps_done, .. } = self;
         let coefficients = u.iter_mut().chain(v).chain(a);
@@ -579,7 +577,7 @@ impl<const D: usize> TotalLagrangian<D> {
         bad
     }
 
-    /// What is wrong with the current displacement.
+    /// The error of an invalid displacement.
     #[cold]
     fn describe(&mut self) -> StepError {
         let step = self.steps_done + 1;
@@ -698,7 +696,7 @@ enum Field {
     Velocity,
 }
 
-/// What is integrated against the functions.
+/// The factors of an integrand: of values of the functions, of their slopes, or of both.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Factors {
     Values,
@@ -770,7 +768,7 @@ fn line<const D: usize>(grid: &Grid<D>, k: usize) -> Line {
     Line::new(&grid.axes[k], grid.per_cell, grid.layout, density)
 }
 
-/// What rows of particles along axis 0 have in common; none where components are Cartesian.
+/// Factors common to a row of particles along axis 0; empty where components are Cartesian.
 fn rows<const D: usize>(grid: &Grid<D>, lines: &[Line; D]) -> Vec<Row<D>> {
     let mut counts = lines.each_ref().map(|line| line.points.len());
     counts[0] = 1;

@@ -1,30 +1,31 @@
-//! Sums over a particle's nodes in one or two dimensions, where half of a node's values are all that is used of it: to the
-//! grid, and from it.
+//! P2G and G2P in the plane and on a line: velocity and acceleration of a node fit one register of four lanes.
 
 use nalgebra::RealField;
 
-use crate::simd::{Quad, Vectors};
-use crate::transfer::{Deposits, LANES, Node, Receive, Weights, is_middle};
+use crate::kernel::any::{Contributions, Receive};
+use crate::node::{LANES, Node};
+use crate::simd::{Lane4, Vectors};
+use crate::weights::{Weights, is_middle};
 
-/// The first half of a node's values: in one or two dimensions momentum and force, and for one dimension the mass.
+/// The first four of a node's values: momentum and force in two dimensions; momentum, force and mass in one.
 #[inline(always)]
-fn half<T: RealField + Copy>(values: &[T; LANES]) -> Quad<T> {
+fn half<T: RealField + Copy>(values: &[T; LANES]) -> Lane4<T> {
     const { assert!(LANES >= 4) };
-    // Four numbers at once, even in a build that is hardly optimised.
-    values.first_chunk().map_or(Quad([T::zero(); 4]), |half| Quad(*half))
+    // One load of four numbers even in builds with little optimisation.
+    values.first_chunk().map_or(Lane4([T::zero(); 4]), |half| Lane4(*half))
 }
 
-/// What particles give to a node; the mass is used in two dimensions alone.
+/// Sum of contributions to a node; the mass is used in two dimensions alone.
 #[derive(Clone, Copy)]
 struct Sum<T> {
-    values: Quad<T>,
+    values: Lane4<T>,
     mass: T,
 }
 
 impl<T: RealField + Copy> Sum<T> {
     #[inline(always)]
     fn zero() -> Self {
-        Self { values: Quad([T::zero(); 4]), mass: T::zero() }
+        Self { values: Lane4([T::zero(); 4]), mass: T::zero() }
     }
 
     #[inline(always)]
@@ -33,19 +34,19 @@ impl<T: RealField + Copy> Sum<T> {
     }
 }
 
-/// As [`scatter`](crate::transfer::scatter) for the first `count` particles, particle `k` with the weights `weights(k)`.
+/// P2G of the first `count` particles, particle `k` with the weights `weights(k)`; as [`p2g`](crate::kernel::any::p2g).
 ///
-/// What a run of particles that reach the same nodes gives is summed up in registers. Of three nodes in a row the
-/// [middle](is_middle) one takes what the outer two leave: until the run ends its sum is that of all three, which no
-/// weight goes into.
+/// Successive particles with the same nodes form a run, whose contributions are summed in registers. Of three nodes in a
+/// row the [middle](is_middle) one needs no weight: it sums whole contributions, and the sums of the outer two are
+/// subtracted at the end of the run.
 #[inline(always)]
-pub(crate) fn scatter_runs<T, L, V, const D: usize, const W: usize, const N: usize>(
+pub(crate) fn p2g_in_plane<T, L, V, const D: usize, const W: usize, const N: usize>(
     vectors: V,
     weights: impl Fn(usize) -> L,
     strides: &[usize; D],
-    piece: &mut [Node<T, D>],
+    band: &mut [Node<T, D>],
     first: usize,
-    given: &Deposits<T, D, N>,
+    contributions: &Contributions<T, D, N>,
     count: usize,
 ) where
     T: RealField + Copy,
@@ -60,28 +61,29 @@ pub(crate) fn scatter_runs<T, L, V, const D: usize, const W: usize, const N: usi
         let mut sums = [[Sum::zero(); W]; W];
         loop {
             let w = weights(k);
-            let level = half(&given.level[k].values);
-            let slope = slopes(vectors, given, k);
-            let mass = given.level[k].mass();
+            let value = half(&contributions.value[k].values);
+            let gradient = gradients(vectors, contributions, k);
+            let mass = contributions.value[k].mass();
             for j in 0..rows {
-                let (mut to_level, mut to_slope, mut to_mass) = (level, slope[0], mass);
+                let (mut to_value, mut to_gradient, mut to_mass) = (value, gradient[0], mass);
                 if D > 1 && !is_middle::<W>(j) {
                     let S = vectors.splat(w.S(1, j));
-                    let with_level = vectors.mul(level, S);
-                    to_level = vectors.mul_add(slope[D - 1], vectors.splat(w.G(1, j)), with_level);
-                    to_slope = vectors.mul(to_slope, S);
+                    let with_value = vectors.mul(value, S);
+                    to_value =
+                        vectors.mul_add(gradient[D - 1], vectors.splat(w.G(1, j)), with_value);
+                    to_gradient = vectors.mul(to_gradient, S);
                     to_mass *= w.S(1, j);
                 }
                 for i in 0..W {
                     let sum = &mut sums[j][i];
                     if is_middle::<W>(i) {
-                        sum.values = vectors.add(sum.values, to_level);
+                        sum.values = vectors.add(sum.values, to_value);
                         sum.mass += to_mass;
                         continue;
                     }
                     let (S, G) = (w.S(0, i), w.G(0, i));
-                    let with_slope = vectors.mul_add(to_slope, vectors.splat(G), sum.values);
-                    sum.values = vectors.mul_add(to_level, vectors.splat(S), with_slope);
+                    let with_gradient = vectors.mul_add(to_gradient, vectors.splat(G), sum.values);
+                    sum.values = vectors.mul_add(to_value, vectors.splat(S), with_gradient);
                     sum.mass = to_mass.mul_add(S, sum.mass);
                 }
             }
@@ -93,14 +95,14 @@ pub(crate) fn scatter_runs<T, L, V, const D: usize, const W: usize, const N: usi
         for i in 0..W {
             if D > 1 {
                 let mut column = std::array::from_fn(|j| sums[j][i]);
-                leave_middle::<_, _, W>(vectors, &mut column);
+                subtract_outer::<_, _, W>(vectors, &mut column);
                 (0..W).for_each(|j| sums[j][i] = column[j]);
             }
         }
         for j in 0..rows {
-            leave_middle(vectors, &mut sums[j]);
+            subtract_outer(vectors, &mut sums[j]);
             let place = row_start(start - first, strides, j);
-            let Some(nodes) = piece.get_mut(place..).and_then(|n| n.first_chunk_mut::<W>()) else {
+            let Some(nodes) = band.get_mut(place..).and_then(|n| n.first_chunk_mut::<W>()) else {
                 debug_assert!(false, "a stencil beyond its band");
                 return;
             };
@@ -116,9 +118,9 @@ pub(crate) fn scatter_runs<T, L, V, const D: usize, const W: usize, const N: usi
     }
 }
 
-/// What is left to the middle one of three nodes, if there are three.
+/// Subtracts the sums of the outer nodes from the middle one, where there are three.
 #[inline(always)]
-fn leave_middle<T: RealField + Copy, V: Vectors, const W: usize>(
+fn subtract_outer<T: RealField + Copy, V: Vectors, const W: usize>(
     vectors: V,
     sums: &mut [Sum<T>; W],
 ) {
@@ -127,35 +129,34 @@ fn leave_middle<T: RealField + Copy, V: Vectors, const W: usize>(
     }
 }
 
-/// Where a row of nodes starts, in one and two dimensions.
+/// Index of the first node of a row, in one and two dimensions.
 #[inline(always)]
 fn row_start<const D: usize>(start: usize, strides: &[usize; D], index: usize) -> usize {
     if D == 1 { start } else { start + index * strides[1] }
 }
 
-/// What goes with the gradients along all axes, in the order of a node's values.
+/// The factors of the gradients along all axes, in the order of a node's values.
 #[inline(always)]
-fn slopes<T: RealField + Copy, V: Vectors, const D: usize, const N: usize>(
+fn gradients<T: RealField + Copy, V: Vectors, const D: usize, const N: usize>(
     vectors: V,
-    given: &Deposits<T, D, N>,
+    contributions: &Contributions<T, D, N>,
     k: usize,
-) -> [Quad<T>; D] {
+) -> [Lane4<T>; D] {
     let zero = T::zero();
-    let traction = given.traction[k].as_slice();
-    let Some(&traction) = traction.first_chunk::<4>() else {
-        return [Quad([zero, traction[0], zero, zero]); D];
+    let stress_flux = contributions.stress_flux[k].as_slice();
+    let Some(&stress_flux) = stress_flux.first_chunk::<4>() else {
+        return [Lane4([zero, stress_flux[0], zero, zero]); D];
     };
-    let along = vectors.low_to_high(Quad(traction));
-    let across = vectors.high_alone(Quad(traction));
+    let along = vectors.low_to_high(Lane4(stress_flux));
+    let across = vectors.high_alone(Lane4(stress_flux));
     std::array::from_fn(|a| if a == 0 { along } else { across })
 }
 
-/// As [`gather`](crate::transfer::gather) for the first `count` particles, particle `k` with the weights `weights(k)`: velocity and
-/// acceleration one after the other, and their gradients.
+/// G2P of the first `count` particles, particle `k` with the weights `weights(k)`; as [`g2p`](crate::kernel::any::g2p).
 ///
-/// Differences of nodes serve all particles of a run that reach the same ones.
+/// Successive particles with the same nodes form a run, which shares the differences between nodes.
 #[inline(always)]
-pub(crate) fn gather_runs<T, L, V, const D: usize, const W: usize>(
+pub(crate) fn g2p_in_plane<T, L, V, const D: usize, const W: usize>(
     vectors: V,
     weights: impl Fn(usize) -> L,
     strides: &[usize; D],
@@ -167,7 +168,7 @@ pub(crate) fn gather_runs<T, L, V, const D: usize, const W: usize>(
     V: Vectors,
     L: Weights<T, D, W>,
 {
-    let zero = Quad([T::zero(); 4]);
+    let zero = Lane4([T::zero(); 4]);
     let rows = if D == 1 { 1 } else { W };
     let mut k = 0;
     while k < count {
@@ -195,18 +196,18 @@ pub(crate) fn gather_runs<T, L, V, const D: usize, const W: usize>(
         }
         loop {
             let w = weights(k);
-            let (mut levels, mut slopes) = ([zero; W], [zero; W]);
+            let (mut row_values, mut gradients) = ([zero; W], [zero; W]);
             for j in 0..rows {
-                (levels[j], slopes[j]) = interpolate(vectors, &changes[j], &w, 0);
+                (row_values[j], gradients[j]) = interpolate(vectors, &changes[j], &w, 0);
             }
             if D == 1 {
-                receiver.receive_quads(vectors, k, levels[0], [slopes[0]; D]);
+                receiver.receive_lanes(vectors, k, row_values[0], [gradients[0]; D]);
             } else {
-                let (level, across) = interpolate(vectors, &levels, &w, 1);
-                let (along, _) = interpolate(vectors, &slopes, &w, 1);
-                let mut slope = [across; D];
-                slope[0] = along;
-                receiver.receive_quads(vectors, k, level, slope);
+                let (value, across) = interpolate(vectors, &row_values, &w, 1);
+                let (along, _) = interpolate(vectors, &gradients, &w, 1);
+                let mut gradient = [across; D];
+                gradient[0] = along;
+                receiver.receive_lanes(vectors, k, value, gradient);
             }
             k += 1;
             if k >= count || weights(k).first_node() != start {
@@ -216,10 +217,10 @@ pub(crate) fn gather_runs<T, L, V, const D: usize, const W: usize>(
     }
 }
 
-/// From values at successive nodes of an axis to the changes from one to the next; the value of one node stays, the
-/// [middle](is_middle) one of three and the first of two.
+/// Replaces values at successive nodes of an axis by their differences; one value stays, that of the
+/// [middle](is_middle) one of three nodes or of the first of two.
 #[inline(always)]
-fn differ<T: RealField + Copy, V: Vectors, const W: usize>(vectors: V, values: &mut [Quad<T>; W]) {
+fn differ<T: RealField + Copy, V: Vectors, const W: usize>(vectors: V, values: &mut [Lane4<T>; W]) {
     match &mut values[..] {
         [first, last] => *last = vectors.sub(*last, *first),
         [first, middle, last] => {
@@ -230,17 +231,17 @@ fn differ<T: RealField + Copy, V: Vectors, const W: usize>(vectors: V, values: &
     }
 }
 
-/// What values at successive nodes of an axis come to, and their gradient, given the [changes](differ).
+/// Interpolated value and gradient along an axis, from the [differences](differ) between nodes.
 ///
-/// Products that make up a level are rounded before they are added, not fused: those of a node and of its mirror image
+/// Products that make up a value are rounded before they are added, not fused: those of a node and of its mirror image
 /// then cancel, and a particle on a wall stays there.
 #[inline(always)]
 fn interpolate<T: RealField + Copy, V: Vectors, const D: usize, const W: usize>(
     vectors: V,
-    changes: &[Quad<T>; W],
+    changes: &[Lane4<T>; W],
     weights: &impl Weights<T, D, W>,
     axis: usize,
-) -> (Quad<T>, Quad<T>) {
+) -> (Lane4<T>, Lane4<T>) {
     let last = changes[W - 1];
     let to_last = vectors.mul(last, vectors.splat(weights.S(axis, W - 1)));
     let G = vectors.splat(weights.G(axis, W - 1));
@@ -250,8 +251,8 @@ fn interpolate<T: RealField + Copy, V: Vectors, const D: usize, const W: usize>(
     // The weights of all nodes add up to one, and their gradients to zero.
     let first = changes[0];
     let to_first = vectors.mul(first, vectors.splat(weights.S(axis, 0)));
-    let slope = vectors.mul_sub(last, G, vectors.mul(first, vectors.splat(weights.G(axis, 0))));
-    (vectors.add(changes[1], vectors.sub(to_last, to_first)), slope)
+    let gradient = vectors.mul_sub(last, G, vectors.mul(first, vectors.splat(weights.G(axis, 0))));
+    (vectors.add(changes[1], vectors.sub(to_last, to_first)), gradient)
 }
 
 #[cfg(test)]
@@ -261,14 +262,14 @@ mod tests {
     use pulp::Scalar;
 
     use super::*;
-    use crate::octets::{gather_in_space, scatter_in_space};
-    use crate::transfer::{Gathered, gather, scatter};
-    use crate::weights::{AxisWeights, FixedBox, Hat, Rule, index};
+    use crate::kernel::any::{Interpolated, g2p, p2g};
+    use crate::kernel::lanes_space::{g2p_in_space, p2g_in_space};
+    use crate::shape_function::{AxisWeights, FixedBox, Hat, ShapeFunction, index};
 
     const COUNT: usize = 24;
     const SIDE: usize = 16;
 
-    /// The weights of one particle, as a rule states them.
+    /// The weights of one particle, axis by axis.
     struct Stated<const D: usize, const W: usize>([AxisWeights<f64, W>; D]);
 
     impl<const D: usize, const W: usize> Weights<f64, D, W> for &Stated<D, W> {
@@ -285,14 +286,14 @@ mod tests {
         }
     }
 
-    /// Both ways to the grid and both ways back, for particles at places along a line of cells.
+    /// P2G and G2P by this module and by `any`, for particles at places along a line of cells.
     fn compare<R, const D: usize, const W: usize>(
-        rule: R,
+        shape: R,
         places: &[f64],
         numbers: &[f64],
     ) -> Result<(), TestCaseError>
     where
-        R: Rule<f64, D, W>,
+        R: ShapeFunction<f64, D, W>,
     {
         let mut numbers = numbers.iter().copied().cycle();
         let mut number = || numbers.next().unwrap_or(1.0);
@@ -300,31 +301,31 @@ mod tests {
             .iter()
             .map(|&place| {
                 let xi: [f64; D] = std::array::from_fn(|a| place / (a + 1) as f64);
-                Stated(std::array::from_fn(|a| R::along_axis(xi[a], rule.half_size(a, 1.0))))
+                Stated(std::array::from_fn(|a| R::axis_weights(xi[a], shape.half_size(a, 1.0))))
             })
             .collect();
         let strides: [usize; D] = std::array::from_fn(|a| SIDE.pow(a as u32));
-        let mut given = Deposits::<f64, D, COUNT>::zero();
+        let mut contributions = Contributions::<f64, D, COUNT>::zero();
         for k in 0..COUNT {
             let v = SVector::from_fn(|_, _| number());
-            given.level[k] =
+            contributions.value[k] =
                 Node::new(&v, &SVector::from_fn(|_, _| number()), 1.0 + number().abs());
-            given.traction[k] = SMatrix::from_fn(|_, _| number());
+            contributions.stress_flux[k] = SMatrix::from_fn(|_, _| number());
         }
         let mut nodes = vec![Node::zero(); SIDE.pow(D as u32)];
         let mut one_by_one = nodes.clone();
         let first = SIDE.pow(D as u32 - 1);
         let vectors = Scalar::new();
-        let piece = &mut nodes[first..];
+        let band = &mut nodes[first..];
         if D < 3 {
-            scatter_runs(vectors, |k| &weights[k], &strides, piece, first, &given, COUNT);
+            p2g_in_plane(vectors, |k| &weights[k], &strides, band, first, &contributions, COUNT);
         } else {
             for k in 0..COUNT {
-                scatter_in_space(vectors, &&weights[k], &strides, piece, first, (&given, k));
+                p2g_in_space(vectors, &&weights[k], &strides, band, first, (&contributions, k));
             }
         }
         for k in 0..COUNT {
-            scatter(&&weights[k], &strides, &mut one_by_one[first..], first, (&given, k));
+            p2g(&&weights[k], &strides, &mut one_by_one[first..], first, (&contributions, k));
         }
         for (a, b) in nodes.iter().zip(&one_by_one) {
             for (a, b) in a.values.iter().zip(&b.values) {
@@ -333,26 +334,26 @@ mod tests {
         }
         prop_assert!(nodes.iter().any(|node| node.mass() > 0.5));
 
-        let mut gathered = [Gathered::zero(); COUNT];
+        let mut interpolated = [Interpolated::zero(); COUNT];
         if D < 3 {
-            let receiver = &mut &mut gathered[..];
-            gather_runs(vectors, |k| &weights[k], &strides, &nodes, COUNT, receiver);
+            let receiver = &mut &mut interpolated[..];
+            g2p_in_plane(vectors, |k| &weights[k], &strides, &nodes, COUNT, receiver);
         } else {
-            for (gathered, weights) in gathered.iter_mut().zip(&weights) {
-                *gathered = gather_in_space(vectors, &weights, &strides, &nodes);
+            for (interpolated, weights) in interpolated.iter_mut().zip(&weights) {
+                *interpolated = g2p_in_space(vectors, &weights, &strides, &nodes);
             }
         }
-        for (gathered, weights) in gathered.iter().zip(&weights) {
-            let alone = gather(&weights, &strides, &nodes);
-            prop_assert!((gathered.velocity - alone.velocity).amax() < 1e-13);
-            prop_assert!((gathered.acceleration - alone.acceleration).amax() < 1e-13);
-            prop_assert!((gathered.velocity_gradient - alone.velocity_gradient).amax() < 1e-13);
+        for (interpolated, weights) in interpolated.iter().zip(&weights) {
+            let alone = g2p(&weights, &strides, &nodes);
+            prop_assert!((interpolated.velocity - alone.velocity).amax() < 1e-13);
+            prop_assert!((interpolated.acceleration - alone.acceleration).amax() < 1e-13);
+            prop_assert!((interpolated.velocity_gradient - alone.velocity_gradient).amax() < 1e-13);
         }
         Ok(())
     }
 
     proptest! {
-        /// In runs that share their nodes, and particles that share them with nobody; in three dimensions each alone.
+        /// In runs with the same nodes and in runs of one particle; in three dimensions each alone.
         #[test]
         fn runs_of_particles_exchange_what_each_would_alone(
             places in prop::collection::vec(2.5..9.5, COUNT),

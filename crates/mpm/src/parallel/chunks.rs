@@ -1,8 +1,8 @@
-//! Loops over chunks of arrays, side by side on the threads of the pool.
+//! Loops over chunks of arrays, in parallel on the threads of the pool.
 //!
-//! What is done with a chunk is called through a reference: the machinery of the pool is then compiled once for each kind
-//! of element, not once for each scheme. Every chunk is a task of its own: left to itself, the pool hands out runs of chunks, of
-//! which those that a slow thread has begun are taken over by nobody, and all threads wait for it.
+//! The body of a loop is called through a reference: the machinery of the pool is then compiled once for each kind of
+//! element, not once for each scheme. Every chunk is a task of its own. By default the pool would hand out runs of chunks; once a
+//! slow thread has begun such a run nobody takes over the rest, and all threads wait for it.
 
 use rayon::prelude::*;
 
@@ -16,7 +16,7 @@ pub(crate) fn each_chunk<A: Send>(
     chunks.for_each(|(number, chunk)| work(number, chunk));
 }
 
-/// What is done with a chunk of three arrays, by its number.
+/// The body of a loop over chunks of three arrays: the chunk's number, and the chunks.
 type OfThree<'a, A, B, C> = dyn Fn(usize, &mut [A], &mut [B], &mut [C]) + Sync + 'a;
 
 /// As [`each_chunk`] for three arrays of one length, chunk by chunk together.

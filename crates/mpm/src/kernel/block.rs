@@ -1,47 +1,50 @@
-//! Blocks of particles whose weights and stresses are computed side by side, one lane a particle.
+//! Blocks of 64 particles: weights and stresses in vector instructions, one lane a particle, and the choice of the kernel for
+//! P2G and G2P.
 
 use std::array;
 
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::fault::{Fault, Planted};
+use crate::geometry::Constants;
+use crate::kernel::any::{Contributions, Interpolated, Receive, g2p, p2g};
+use crate::kernel::lanes_plane::{g2p_in_plane, p2g_in_plane};
+use crate::kernel::lanes_space::{g2p_in_space, p2g_in_space};
 use crate::material::Law;
-use crate::octets::{gather_in_space, scatter_in_space};
-use crate::quads::{gather_runs, scatter_runs};
+use crate::node::Node;
+use crate::shape_function::{ShapeFunction, index, is_extended};
 use crate::simd::{Loop, Vectors, dispatch};
-use crate::step::Constants;
 use crate::tensor::real;
-use crate::transfer::{Deposits, Gathered, Node, Receive, Weights, gather, is_middle, scatter};
-use crate::weights::{Rule, WideWeights, index, is_wide};
+use crate::weights::{ExtendedWeights, Weights, is_middle};
 
-/// Particles in a block: as many as keep all of it in the first-level cache.
+/// Particles in a block: as many as keep all of it in the first-value cache.
 pub(crate) const BLOCK: usize = 64;
 
 /// One number for every particle of a block.
-type Row<T> = [T; BLOCK];
+type PerParticle<T> = [T; BLOCK];
 
-/// The particles of a block, as they are at a time.
+/// Positions and deformation gradients of the particles of a block.
 #[derive(Clone, Copy)]
-pub(crate) struct Run<'a, T, const D: usize> {
+pub(crate) struct Kinematics<'a, T, const D: usize> {
     /// Positions.
     pub(crate) x: &'a [SVector<T, D>; BLOCK],
     /// Deformation gradients.
     pub(crate) F: &'a [SMatrix<T, D, D>; BLOCK],
 }
 
-impl<T: RealField + Copy, const D: usize> Run<'_, T, D> {
-    /// States the forces of the particles' stresses, for the reference volumes in `deposits.volume`.
+impl<T: RealField + Copy, const D: usize> Kinematics<'_, T, D> {
+    /// Sets the stress fluxes of the particles, for the reference volumes in `contributions.volume`.
     pub(crate) fn stress<L: Law<T>>(
         self,
         c: &Constants<T, D>,
         law: L,
-        deposits: &mut Deposits<T, D, BLOCK>,
+        contributions: &mut Contributions<T, D, BLOCK>,
     ) {
-        dispatch(Stress { run: self, c, law, deposits });
+        dispatch(Stress { kinematics: self, c, law, contributions });
     }
 }
 
-/// Copies of up to `BLOCK` particles that do not lie side by side.
+/// Copies of up to `BLOCK` particles from scattered places in memory.
 pub(crate) struct Copies<T, const D: usize> {
     /// Positions.
     pub(crate) x: [SVector<T, D>; BLOCK],
@@ -53,13 +56,13 @@ pub(crate) struct Copies<T, const D: usize> {
 
 impl<T: RealField + Copy, const D: usize> Copies<T, D> {
     pub(crate) fn new() -> Self {
-        // Identities, which have a stress.
+        // The identity has a stress in every law.
         let zero = [SVector::zeros(); BLOCK];
         Self { x: zero, v: zero, F: [SMatrix::identity(); BLOCK] }
     }
 
-    pub(crate) fn run(&self) -> Run<'_, T, D> {
-        Run { x: &self.x, F: &self.F }
+    pub(crate) fn kinematics(&self) -> Kinematics<'_, T, D> {
+        Kinematics { x: &self.x, F: &self.F }
     }
 
     /// Takes positions and deformation gradients of the particles `ids`.
@@ -86,20 +89,23 @@ impl<T: RealField + Copy, const D: usize> Copies<T, D> {
 
 /// The weights of up to `BLOCK` particles.
 ///
-/// What comes out of one loop is used by another only after all of the block went through the first: vector loads wait
-/// for the narrower stores that they overlap.
+/// A loop over the block completes before another loop reads its results: vector loads wait for the narrower stores that
+/// they overlap.
+///
+/// Layout: `S[axis][place][k]` is the factor of particle `k` along an axis at its node `place`.
 pub(crate) struct Block<T, const D: usize, const W: usize> {
     /// Index of the first node of every particle.
     first_node: [usize; BLOCK],
-    /// Weights, but for those of the [middle node](is_middle).
-    S: [[Row<T>; W]; D],
-    G: [[Row<T>; W]; D],
-    /// Whether any particle's box takes more nodes than the rule's usual ones.
-    any_wide: bool,
-    /// Positions in cells, from the lower corner; kept up where boxes are wide.
-    xi: [Row<T>; D],
-    /// Half-sizes in cells; kept up where boxes are wide.
-    l: [Row<T>; D],
+    /// Weights `S[axis][place][k]`, except for the [middle node](is_middle).
+    S: [[PerParticle<T>; W]; D],
+    /// Gradients per cell, in the same layout.
+    G: [[PerParticle<T>; W]; D],
+    /// Whether any particle's box has extended support.
+    any_extended: bool,
+    /// Positions in cells from the lower corner, `xi[axis][k]`; valid where `any_extended`.
+    xi: [PerParticle<T>; D],
+    /// Half-sizes in cells, `l[axis][k]`; valid where `any_extended`.
+    l: [PerParticle<T>; D],
 }
 
 impl<T: RealField + Copy, const D: usize, const W: usize> Block<T, D, W> {
@@ -109,32 +115,32 @@ impl<T: RealField + Copy, const D: usize, const W: usize> Block<T, D, W> {
             first_node: [0; BLOCK],
             S: [[zero; W]; D],
             G: [[zero; W]; D],
-            any_wide: false,
+            any_extended: false,
             xi: [zero; D],
             l: [zero; D],
         }
     }
 
     /// Computes the weights of particles.
-    pub(crate) fn weigh<R: Rule<T, D, W>>(
+    pub(crate) fn compute_weights<R: ShapeFunction<T, D, W>>(
         &mut self,
         c: &Constants<T, D>,
-        rule: R,
-        run: Run<'_, T, D>,
+        shape: R,
+        kinematics: Kinematics<'_, T, D>,
     ) {
-        dispatch(Weigh { block: self, c, rule, run });
-        if self.any_wide {
+        dispatch(ComputeWeights { block: self, c, shape, kinematics });
+        if self.any_extended {
             for k in 0..BLOCK {
-                let xi = c.in_cells(&run.x[k]);
+                let xi = c.in_cells(&kinematics.x[k]);
                 for a in 0..D {
                     self.xi[a][k] = xi[a];
-                    self.l[a][k] = rule.half_size(a, stretch(c.planted, &run.F[k], a));
+                    self.l[a][k] = shape.half_size(a, stretch(c.planted, &kinematics.F[k], a));
                 }
             }
         }
     }
 
-    /// A planted fault: particles in the last cell of an axis forget the last node they reach along it.
+    /// A planted fault: particles in the last cell of an axis skip the last node they reach along it.
     pub(crate) fn skip_last_node(&mut self, c: &Constants<T, D>, x: &[SVector<T, D>; BLOCK]) {
         let upper = c.upper_in_cells();
         for (k, x) in x.iter().enumerate() {
@@ -145,45 +151,47 @@ impl<T: RealField + Copy, const D: usize, const W: usize> Block<T, D, W> {
         }
     }
 
-    /// Position and half-sizes of a particle whose box takes more than the usual nodes.
+    /// Position and half-sizes of a particle whose box has extended support.
     #[inline(always)]
-    fn wide(&self, k: usize) -> Option<([T; D], [T; D])> {
+    fn extended(&self, k: usize) -> Option<([T; D], [T; D])> {
         let l = array::from_fn(|a| self.l[a][k]);
-        (self.any_wide && l.iter().any(|&l| is_wide(l)))
+        (self.any_extended && l.iter().any(|&l| is_extended(l)))
             .then(|| (array::from_fn(|a| self.xi[a][k]), l))
     }
 
-    /// Adds what the first `count` particles give to the piece of the grid that starts at node `first`.
-    pub(crate) fn scatter(
+    /// P2G of the first `count` particles, to the band of nodes that starts at node `first`.
+    pub(crate) fn p2g(
         &self,
         strides: &[usize; D],
-        piece: &mut [Node<T, D>],
+        band: &mut [Node<T, D>],
         first: usize,
-        deposits: &Deposits<T, D, BLOCK>,
+        contributions: &Contributions<T, D, BLOCK>,
         count: usize,
     ) {
-        dispatch(Scatter { block: self, strides, piece, first, deposits, count });
+        dispatch(P2g { block: self, strides, band, first, contributions, count });
     }
 
-    /// Interpolates for the first `count` particles.
-    pub(crate) fn gather(
+    /// G2P of the first `count` particles.
+    pub(crate) fn g2p(
         &self,
         strides: &[usize; D],
         nodes: &[Node<T, D>],
         count: usize,
         receiver: impl Receive<T, D>,
     ) {
-        dispatch(Gather { block: self, strides, nodes, count, receiver });
+        dispatch(G2p { block: self, strides, nodes, count, receiver });
     }
 }
 
 /// The weights of particle `k` of a block.
-struct Lane<'a, T, const D: usize, const W: usize> {
+struct ParticleWeights<'a, T, const D: usize, const W: usize> {
     block: &'a Block<T, D, W>,
     k: usize,
 }
 
-impl<T: RealField + Copy, const D: usize, const W: usize> Weights<T, D, W> for Lane<'_, T, D, W> {
+impl<T: RealField + Copy, const D: usize, const W: usize> Weights<T, D, W>
+    for ParticleWeights<'_, T, D, W>
+{
     #[inline(always)]
     fn first_node(&self) -> usize {
         self.block.first_node[self.k]
@@ -208,7 +216,7 @@ impl<T: RealField + Copy, const D: usize, const W: usize> Weights<T, D, W> for L
     }
 }
 
-/// `F_aa` of a particle, which tells the size of its box.
+/// `F_aa` of a particle, which scales its box.
 #[inline(always)]
 fn stretch<T: RealField + Copy, const D: usize>(
     planted: Planted,
@@ -222,50 +230,50 @@ fn stretch<T: RealField + Copy, const D: usize>(
     F[(a, a)]
 }
 
-struct Weigh<'a, T, R, const D: usize, const W: usize> {
+struct ComputeWeights<'a, T, R, const D: usize, const W: usize> {
     block: &'a mut Block<T, D, W>,
     c: &'a Constants<T, D>,
-    rule: R,
-    run: Run<'a, T, D>,
+    shape: R,
+    kinematics: Kinematics<'a, T, D>,
 }
 
-impl<T, R, const D: usize, const W: usize> Loop for Weigh<'_, T, R, D, W>
+impl<T, R, const D: usize, const W: usize> Loop for ComputeWeights<'_, T, R, D, W>
 where
     T: RealField + Copy,
-    R: Rule<T, D, W>,
+    R: ShapeFunction<T, D, W>,
 {
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
-        let Self { block, c, rule, run: Run { x, F } } = self;
+        let Self { block, c, shape, kinematics: Kinematics { x, F } } = self;
         let Block { first_node, S, G, .. } = block;
-        block.any_wide = weigh(c, rule, x, F, first_node, S, G);
+        block.any_extended = compute_weights(c, shape, x, F, first_node, S, G);
     }
 }
 
-/// Computes weights, and tells whether any box is wide. As a function of its own, which tells the compiler that the arrays
-/// are in different places.
+/// Computes weights; returns whether any box has extended support. A function of its own tells the compiler that the arrays
+/// do not overlap.
 #[inline(always)]
-fn weigh<T, R, const D: usize, const W: usize>(
+fn compute_weights<T, R, const D: usize, const W: usize>(
     c: &Constants<T, D>,
-    rule: R,
+    shape: R,
     x: &[SVector<T, D>; BLOCK],
     F: &[SMatrix<T, D, D>; BLOCK],
     first_node: &mut [usize; BLOCK],
-    S: &mut [[Row<T>; W]; D],
-    G: &mut [[Row<T>; W]; D],
+    S: &mut [[PerParticle<T>; W]; D],
+    G: &mut [[PerParticle<T>; W]; D],
 ) -> bool
 where
     T: RealField + Copy,
-    R: Rule<T, D, W>,
+    R: ShapeFunction<T, D, W>,
 {
-    let mut any_wide = false;
+    let mut any_extended = false;
     for k in 0..BLOCK {
         let xi = c.in_cells(&x[k]);
         let mut first = 0.0;
         for a in 0..D {
-            let l = rule.half_size(a, stretch(c.planted, &F[k], a));
-            any_wide |= is_wide(l);
-            let weights = R::along_axis(xi[a], l);
+            let l = shape.half_size(a, stretch(c.planted, &F[k], a));
+            any_extended |= is_extended(l);
+            let weights = R::axis_weights(xi[a], l);
             first += weights.base * c.strides[a] as f64;
             for i in 0..W {
                 if !is_middle::<W>(i) {
@@ -276,53 +284,61 @@ where
         }
         first_node[k] = index(first);
     }
-    any_wide
+    any_extended
 }
 
-struct Scatter<'a, T, const D: usize, const W: usize> {
+struct P2g<'a, T, const D: usize, const W: usize> {
     block: &'a Block<T, D, W>,
     strides: &'a [usize; D],
-    piece: &'a mut [Node<T, D>],
+    band: &'a mut [Node<T, D>],
     first: usize,
-    deposits: &'a Deposits<T, D, BLOCK>,
+    contributions: &'a Contributions<T, D, BLOCK>,
     count: usize,
 }
 
-impl<T: RealField + Copy, const D: usize, const W: usize> Loop for Scatter<'_, T, D, W> {
+impl<T: RealField + Copy, const D: usize, const W: usize> Loop for P2g<'_, T, D, W> {
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
-        let Self { block, strides, piece, first, deposits, count } = self;
+        let Self { block, strides, band, first, contributions, count } = self;
         let count = count.min(BLOCK);
-        if D <= 2 && W <= 3 && !block.any_wide {
-            scatter_runs(vectors, |k| Lane { block, k }, strides, piece, first, deposits, count);
+        if D <= 2 && W <= 3 && !block.any_extended {
+            p2g_in_plane(
+                vectors,
+                |k| ParticleWeights { block, k },
+                strides,
+                band,
+                first,
+                contributions,
+                count,
+            );
             return;
         }
         for k in 0..count {
-            if let Some((xi, l)) = block.wide(k) {
-                scatter_wide(&xi, &l, strides, piece, first, (deposits, k));
+            if let Some((xi, l)) = block.extended(k) {
+                p2g_extended(&xi, &l, strides, band, first, (contributions, k));
             } else if D == 3 {
-                let given = (deposits, k);
-                scatter_in_space(vectors, &Lane { block, k }, strides, piece, first, given);
+                let given = (contributions, k);
+                p2g_in_space(vectors, &ParticleWeights { block, k }, strides, band, first, given);
             } else {
-                scatter(&Lane { block, k }, strides, piece, first, (deposits, k));
+                p2g(&ParticleWeights { block, k }, strides, band, first, (contributions, k));
             }
         }
     }
 }
 
 #[inline(never)]
-fn scatter_wide<T: RealField + Copy, const D: usize>(
+fn p2g_extended<T: RealField + Copy, const D: usize>(
     xi: &[T; D],
     l: &[T; D],
     strides: &[usize; D],
-    piece: &mut [Node<T, D>],
+    band: &mut [Node<T, D>],
     first: usize,
-    deposit: (&Deposits<T, D, BLOCK>, usize),
+    contribution: (&Contributions<T, D, BLOCK>, usize),
 ) {
-    scatter(&WideWeights::new(xi, l, strides), strides, piece, first, deposit);
+    p2g(&ExtendedWeights::new(xi, l, strides), strides, band, first, contribution);
 }
 
-struct Gather<'a, T, A, const D: usize, const W: usize> {
+struct G2p<'a, T, A, const D: usize, const W: usize> {
     block: &'a Block<T, D, W>,
     strides: &'a [usize; D],
     nodes: &'a [Node<T, D>],
@@ -331,61 +347,71 @@ struct Gather<'a, T, A, const D: usize, const W: usize> {
 }
 
 impl<T: RealField + Copy, A: Receive<T, D>, const D: usize, const W: usize> Loop
-    for Gather<'_, T, A, D, W>
+    for G2p<'_, T, A, D, W>
 {
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self { block, strides, nodes, count, mut receiver } = self;
         let count = count.min(BLOCK);
-        if D <= 2 && W <= 3 && !block.any_wide {
-            gather_runs(vectors, |k| Lane { block, k }, strides, nodes, count, &mut receiver);
+        if D <= 2 && W <= 3 && !block.any_extended {
+            g2p_in_plane(
+                vectors,
+                |k| ParticleWeights { block, k },
+                strides,
+                nodes,
+                count,
+                &mut receiver,
+            );
             return;
         }
         for k in 0..count {
-            let gathered = match block.wide(k) {
-                Some((xi, l)) => gather_wide(&xi, &l, strides, nodes),
-                None if D == 3 => gather_in_space(vectors, &Lane { block, k }, strides, nodes),
-                None => gather(&Lane { block, k }, strides, nodes),
+            let interpolated = match block.extended(k) {
+                Some((xi, l)) => g2p_extended(&xi, &l, strides, nodes),
+                None if D == 3 => {
+                    g2p_in_space(vectors, &ParticleWeights { block, k }, strides, nodes)
+                }
+                None => g2p(&ParticleWeights { block, k }, strides, nodes),
             };
-            receiver.receive(k, &gathered);
+            receiver.receive(k, &interpolated);
         }
     }
 }
 
 #[inline(never)]
-fn gather_wide<T: RealField + Copy, const D: usize>(
+fn g2p_extended<T: RealField + Copy, const D: usize>(
     xi: &[T; D],
     l: &[T; D],
     strides: &[usize; D],
     nodes: &[Node<T, D>],
-) -> Gathered<T, D> {
-    gather(&WideWeights::new(xi, l, strides), strides, nodes)
+) -> Interpolated<T, D> {
+    g2p(&ExtendedWeights::new(xi, l, strides), strides, nodes)
 }
 
 struct Stress<'a, T, L, const D: usize> {
-    run: Run<'a, T, D>,
+    kinematics: Kinematics<'a, T, D>,
     c: &'a Constants<T, D>,
     law: L,
-    deposits: &'a mut Deposits<T, D, BLOCK>,
+    contributions: &'a mut Contributions<T, D, BLOCK>,
 }
 
 impl<T: RealField + Copy, L: Law<T>, const D: usize> Loop for Stress<'_, T, L, D> {
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
-        let Self { run: Run { F, .. }, c, law, deposits } = self;
-        if !tractions::<true, _, _, D>(c, law, F, deposits) {
-            tractions::<false, _, _, D>(c, law, F, deposits);
+        let Self { kinematics: Kinematics { F, .. }, c, law, contributions } = self;
+        if !stress_fluxes::<true, _, _, D>(c, law, F, contributions) {
+            stress_fluxes::<false, _, _, D>(c, law, F, contributions);
         }
     }
 }
 
-/// `-V0 tau / h` for all particles of a block, in the short way or not; whether that may be asked for all of them.
+/// Sets `-V0 tau / h` for all particles of a block, by the short form of the law or the full one; returns whether the short
+/// form holds for all of them.
 #[inline(always)]
-fn tractions<const SHORT: bool, T: RealField + Copy, L: Law<T>, const D: usize>(
+fn stress_fluxes<const SHORT: bool, T: RealField + Copy, L: Law<T>, const D: usize>(
     c: &Constants<T, D>,
     law: L,
     F: &[SMatrix<T, D, D>; BLOCK],
-    deposits: &mut Deposits<T, D, BLOCK>,
+    contributions: &mut Contributions<T, D, BLOCK>,
 ) -> bool {
     let mut short = true;
     for k in 0..BLOCK {
@@ -393,7 +419,7 @@ fn tractions<const SHORT: bool, T: RealField + Copy, L: Law<T>, const D: usize>(
         short &= law.is_short(F);
         let tau = if SHORT { law.kirchhoff_short(F) } else { law.kirchhoff(F) };
         let tau = c.planted.stress_in_forces(tau, F);
-        deposits.traction[k] = tau * -(deposits.volume[k] * c.inverse_spacing);
+        contributions.stress_flux[k] = tau * -(contributions.volume[k] * c.inverse_spacing);
     }
     short
 }
@@ -402,17 +428,17 @@ fn tractions<const SHORT: bool, T: RealField + Copy, L: Law<T>, const D: usize>(
 mod tests {
     use super::*;
     use crate::Grid;
-    use crate::bands::Bands;
     use crate::grid::Layout;
     use crate::material::NeoHookean;
-    use crate::weights::StretchingBox;
+    use crate::parallel::bins::Bins;
+    use crate::shape_function::StretchingBox;
 
     fn constants<const D: usize>() -> (Constants<f64, D>, usize) {
         let grid =
             Grid { lower: SVector::zeros(), spacing: 0.5, cells: [8; D], walls: [[false; 2]; D] };
         let layout = Layout::new(&grid, 8).unwrap();
-        let bands = Bands::new(&layout, 1);
-        (Constants::new(&grid, &layout, &bands, 0.1, 1.0), layout.nodes)
+        let bins = Bins::new(&layout, 1);
+        (Constants::new(&grid, &layout, &bins, 0.1, 1.0), layout.nodes)
     }
 
     fn noise(seed: usize) -> f64 {
@@ -421,59 +447,61 @@ mod tests {
 
     /// Boxes may grow and shrink again from one time that a block is used to the next.
     #[test]
-    fn particles_of_a_block_exchange_what_their_boxes_cover_however_many_of_those_are_wide() {
+    fn particles_of_a_block_exchange_what_their_boxes_cover_however_many_have_extended_support() {
         fn check<const D: usize>() {
             let (c, nodes) = constants::<D>();
             let reference = SVector::repeat(0.25);
-            let rule = StretchingBox(reference);
+            let shape = StretchingBox(reference);
             let x: [_; BLOCK] =
                 array::from_fn(|k| SVector::from_fn(|a, _| 2.0 + 1.2 * noise(5 * k + a)));
             let grid: Vec<Node<f64, D>> = (0..nodes)
                 .map(|n| Node { values: array::from_fn(|q| noise(8 * n + q + 1000)) })
                 .collect();
-            let mut deposits = Deposits::<f64, D, BLOCK>::zero();
+            let mut contributions = Contributions::<f64, D, BLOCK>::zero();
             for k in 0..BLOCK {
                 let of = |from: usize| SVector::from_fn(|a, _| noise(3 * k + a + from));
-                deposits.level[k] = Node::new(&of(50), &of(700), 1.0 + 0.5 * noise(k));
-                deposits.traction[k] = SMatrix::from_fn(|i, j| noise(9 * k + 3 * i + j + 2000));
+                contributions.value[k] = Node::new(&of(50), &of(700), 1.0 + 0.5 * noise(k));
+                contributions.stress_flux[k] =
+                    SMatrix::from_fn(|i, j| noise(9 * k + 3 * i + j + 2000));
             }
             let mut block = Block::<f64, D, 3>::new();
-            for wide in [vec![], vec![0], vec![5, BLOCK - 1], (0..BLOCK).collect(), vec![]] {
+            for extended in [vec![], vec![0], vec![5, BLOCK - 1], (0..BLOCK).collect(), vec![]] {
                 let F: [SMatrix<f64, D, D>; BLOCK] = array::from_fn(|k| {
                     let mut F = SMatrix::identity();
-                    if wide.contains(&k) {
+                    if extended.contains(&k) {
                         F[(k % D, k % D)] = 3.0 + noise(k);
                     }
                     F
                 });
-                block.weigh(&c, rule, Run { x: &x, F: &F });
+                block.compute_weights(&c, shape, Kinematics { x: &x, F: &F });
                 let exact = |k: usize| {
                     let l = array::from_fn(|a| reference[a] * F[k][(a, a)]);
-                    WideWeights::new(&c.in_cells(&x[k]), &l, &c.strides)
+                    ExtendedWeights::new(&c.in_cells(&x[k]), &l, &c.strides)
                 };
                 for count in [BLOCK, 41] {
-                    let mut gathered = [Gathered::zero(); BLOCK];
-                    block.gather(&c.strides, &grid, count, &mut gathered[..]);
+                    let mut interpolated = [Interpolated::zero(); BLOCK];
+                    block.g2p(&c.strides, &grid, count, &mut interpolated[..]);
                     for k in 0..count {
-                        let alone = gather(&exact(k), &c.strides, &grid);
-                        let off = (gathered[k].velocity - alone.velocity).amax();
-                        assert!(off < 1e-13, "{wide:?} {k} {off:e}");
-                        let off = (gathered[k].acceleration - alone.acceleration).amax();
-                        assert!(off < 1e-13, "{wide:?} {k} {off:e}");
-                        let off = (gathered[k].velocity_gradient - alone.velocity_gradient).amax();
-                        assert!(off < 1e-13, "{wide:?} {k} {off:e}");
+                        let alone = g2p(&exact(k), &c.strides, &grid);
+                        let off = (interpolated[k].velocity - alone.velocity).amax();
+                        assert!(off < 1e-13, "{extended:?} {k} {off:e}");
+                        let off = (interpolated[k].acceleration - alone.acceleration).amax();
+                        assert!(off < 1e-13, "{extended:?} {k} {off:e}");
+                        let off =
+                            (interpolated[k].velocity_gradient - alone.velocity_gradient).amax();
+                        assert!(off < 1e-13, "{extended:?} {k} {off:e}");
                     }
-                    assert!(gathered[count..].iter().all(|own| own.velocity.amax() == 0.0));
+                    assert!(interpolated[count..].iter().all(|own| own.velocity.amax() == 0.0));
 
                     let mut sums = vec![Node::zero(); nodes];
                     let mut one_by_one = sums.clone();
-                    block.scatter(&c.strides, &mut sums, 0, &deposits, count);
+                    block.p2g(&c.strides, &mut sums, 0, &contributions, count);
                     for k in 0..count {
-                        scatter(&exact(k), &c.strides, &mut one_by_one, 0, (&deposits, k));
+                        p2g(&exact(k), &c.strides, &mut one_by_one, 0, (&contributions, k));
                     }
                     for (a, b) in sums.iter().zip(&one_by_one) {
                         for (a, b) in a.values.iter().zip(&b.values) {
-                            assert!((a - b).abs() < 1e-12, "{wide:?} {a} {b}");
+                            assert!((a - b).abs() < 1e-12, "{extended:?} {a} {b}");
                         }
                     }
                 }
@@ -484,7 +512,7 @@ mod tests {
         check::<3>();
     }
 
-    /// The short way to the stress is right for some deformations alone.
+    /// The short form of the stress holds for some deformations alone.
     #[test]
     fn tractions_are_those_of_each_particle_whatever_else_is_in_its_block() {
         fn check<const D: usize>() {
@@ -498,13 +526,14 @@ mod tests {
                         false => 0.05 * noise(k + 2 * i + j),
                     })
                 });
-                let mut deposits = Deposits::<f64, D, BLOCK>::zero();
-                deposits.volume = array::from_fn(|k| 1.0 + 0.5 * noise(k));
+                let mut contributions = Contributions::<f64, D, BLOCK>::zero();
+                contributions.volume = array::from_fn(|k| 1.0 + 0.5 * noise(k));
                 let x = [SVector::zeros(); BLOCK];
-                Run { x: &x, F: &F }.stress(&c, law, &mut deposits);
+                Kinematics { x: &x, F: &F }.stress(&c, law, &mut contributions);
                 for k in 0..BLOCK {
-                    let expected = -law.kirchhoff(&F[k]) * (deposits.volume[k] * c.inverse_spacing);
-                    assert_eq!(deposits.traction[k], expected, "{large:?} {k}");
+                    let expected =
+                        -law.kirchhoff(&F[k]) * (contributions.volume[k] * c.inverse_spacing);
+                    assert_eq!(contributions.stress_flux[k], expected, "{large:?} {k}");
                 }
             }
         }

@@ -1,0 +1,247 @@
+//! G2P of one step fused with P2G of the next: one pass over the particles a step, for USL and centred differences.
+//!
+//! Memory traffic of particles limits the speed of a step; separate passes for G2P and P2G would read them twice. The fused
+//! pass forms the same sums in the same order. A run can thus continue from its particles alone: P2G forms the grid again.
+//!
+//! Source: Wang et al., "A massively parallel and scalable multi-GPU material point method", ACM Trans. Graph. 39 (2020) 30.
+
+use nalgebra::{RealField, SMatrix, SVector};
+
+use crate::body_force::BodyForce;
+use crate::fault::Fault;
+use crate::forcing::Forcing;
+use crate::geometry::Constants;
+use crate::grid_update::{GridUpdate, VelocityAndAcceleration};
+use crate::health::{Check, Outcome, SharedOutcome};
+use crate::kernel::any::{Contributions, Interpolated, Receive};
+use crate::kernel::block::{BLOCK, Block, Copies, Kinematics};
+use crate::material::Law;
+use crate::node::Node;
+use crate::parallel::disjoint::PartElements;
+use crate::particles::Particles;
+use crate::prefetch::prefetch;
+use crate::shape_function::ShapeFunction;
+use crate::simd::{Lane4, Vectors, dispatch};
+use crate::state::State;
+
+/// Position, velocity and deformation gradient of a bin's particles.
+type Elements<'a, T, const D: usize> =
+    PartElements<'a, SVector<T, D>, SVector<T, D>, SMatrix<T, D, D>>;
+
+impl<T: RealField + Copy, const D: usize> State<T, D> {
+    /// G2P of this step, then P2G and grid update of the next step, whose grid becomes `nodes`.
+    #[inline(never)]
+    pub(crate) fn g2p2g<R, L, const W: usize>(
+        &mut self,
+        shape: R,
+        law: L,
+        body_force: &dyn BodyForce<T, D>,
+        t_next: T,
+    ) -> Outcome
+    where
+        R: ShapeFunction<T, D, W>,
+        L: Law<T>,
+    {
+        let Self { particles, constants: c, layout, bins, nodes, next, uniform, of_time, .. } =
+            self;
+        let Particles { X, x, v, F, mass, volume, .. } = particles;
+        let forcing = Forcing::new(body_force, X, t_next, c, of_time);
+        let step = G2p2g { c, shape, law, nodes, mass, volume, uniform: *uniform, forcing };
+        let found = SharedOutcome::default();
+        let update = GridUpdate::new(layout, c, VelocityAndAcceleration { scale: T::one() });
+        update.g2p2g(bins, next, (x, v, F), &|band, first, bin, elements| {
+            found.add(step.advance_bin(band, first, bin, elements));
+        });
+        std::mem::swap(nodes, next);
+        found.all()
+    }
+}
+
+/// The inputs common to all bins.
+struct G2p2g<'a, T, R, L, const D: usize> {
+    c: &'a Constants<T, D>,
+    shape: R,
+    law: L,
+    /// The grid of this step, updated.
+    nodes: &'a [Node<T, D>],
+    mass: &'a [T],
+    volume: &'a [T],
+    uniform: Option<(T, T)>,
+    /// The body force at the start of the next step.
+    forcing: Forcing<'a, T, D>,
+}
+
+impl<T: RealField + Copy, R, L: Law<T>, const D: usize> G2p2g<'_, T, R, L, D> {
+    /// Advances the particles of a bin, then adds their contributions to its band of the next step's grid, which starts at
+    /// node `first`.
+    fn advance_bin<const W: usize>(
+        &self,
+        band: &mut [Node<T, D>],
+        first: usize,
+        bin: u32,
+        mut elements: Elements<'_, T, D>,
+    ) -> Outcome
+    where
+        R: ShapeFunction<T, D, W>,
+    {
+        let mut outcome = Outcome::default();
+        let mut copies = Copies::new();
+        let contributions = match self.uniform {
+            Some((mass, volume)) => Contributions::uniform(mass, volume),
+            None => Contributions::zero(),
+        };
+        let mut scratch = (Block::new(), contributions);
+        for (index, ids) in elements.indices().chunks(BLOCK).enumerate() {
+            let place = index * BLOCK;
+            if self.uniform.is_none() {
+                scratch.1.take(ids, self.mass, self.volume);
+            }
+            if let Some((x, v, F)) = elements.contiguous::<BLOCK>(place) {
+                let found = self.advance_block(&mut scratch, band, (first, bin), ids, (x, v, F));
+                outcome = outcome.merge(found);
+                continue;
+            }
+            for k in 0..ids.len() {
+                let (x, v, F) = elements.get(place + k);
+                (copies.x[k], copies.v[k], copies.F[k]) = (*x, *v, *F);
+            }
+            let Copies { x, v, F } = &mut copies;
+            let found = self.advance_block(&mut scratch, band, (first, bin), ids, (x, v, F));
+            outcome = outcome.merge(found);
+            for k in 0..ids.len() {
+                let (x, v, F) = elements.get(place + k);
+                (*x, *v, *F) = (copies.x[k], copies.v[k], copies.F[k]);
+            }
+        }
+        outcome
+    }
+
+    /// The same for a block of particles.
+    fn advance_block<const W: usize>(
+        &self,
+        (block, contributions): &mut (Block<T, D, W>, Contributions<T, D, BLOCK>),
+        band: &mut [Node<T, D>],
+        (first, bin): (usize, u32),
+        ids: &[u32],
+        (x, v, F): ContiguousBlock<'_, T, D>,
+    ) -> Outcome
+    where
+        R: ShapeFunction<T, D, W>,
+    {
+        let &Self { c, shape, law, nodes, ref forcing, .. } = self;
+        if c.planted.is(Fault::WeightsOfNewPosition) {
+            let ahead = std::array::from_fn(|k| x[k] + v[k] * c.time_step);
+            block.compute_weights(c, shape, Kinematics { x: &ahead, F });
+        } else {
+            block.compute_weights(c, shape, Kinematics { x, F });
+        }
+        forcing.evaluate(ids, x, &mut contributions.b);
+        let advance = AdvanceParticles {
+            c,
+            time_step: c.time_step,
+            per_cell: c.time_step * c.inverse_spacing,
+            x,
+            v,
+            F,
+            contributions,
+        };
+        block.g2p(&c.strides, nodes, ids.len(), advance);
+        block.compute_weights(c, shape, Kinematics { x, F });
+        let mut all_valid = true;
+        let bins = std::iter::repeat(bin);
+        dispatch(Check { c, shape, bins, x: &x[..ids.len()], F, all_valid: &mut all_valid });
+        if !all_valid {
+            let mut outcome = Outcome::default();
+            for (k, &p) in ids.iter().enumerate() {
+                outcome = outcome.merge(c.diagnose(shape, bin, &x[k], &F[k], p as usize));
+            }
+            // A particle outside its bin would write to nodes beyond the band.
+            if !outcome.is_clean() {
+                return outcome;
+            }
+        }
+        if c.planted.is(Fault::LastNodeSkipped) {
+            block.skip_last_node(c, x);
+        }
+        Kinematics { x, F }.stress(c, law, contributions);
+        block.p2g(&c.strides, band, first, contributions, ids.len());
+        Outcome::default()
+    }
+}
+
+/// Positions, velocities and deformation gradients of the particles of a block, contiguous in memory.
+type ContiguousBlock<'a, T, const D: usize> = (
+    &'a mut [SVector<T, D>; BLOCK],
+    &'a mut [SVector<T, D>; BLOCK],
+    &'a mut [SMatrix<T, D, D>; BLOCK],
+);
+
+/// Receiver of G2P: advances velocity, position and F, and sets mass, momentum and body force of the next P2G.
+struct AdvanceParticles<'a, T, const D: usize> {
+    c: &'a Constants<T, D>,
+    time_step: T,
+    /// Time step over the edge of a cell.
+    per_cell: T,
+    x: &'a mut [SVector<T, D>; BLOCK],
+    v: &'a mut [SVector<T, D>; BLOCK],
+    F: &'a mut [SMatrix<T, D, D>; BLOCK],
+    /// `b` holds the body forces per mass on entry.
+    contributions: &'a mut Contributions<T, D, BLOCK>,
+}
+
+impl<T: RealField + Copy, const D: usize> Receive<T, D> for AdvanceParticles<'_, T, D> {
+    #[inline(always)]
+    fn receive(&mut self, k: usize, interpolated: &Interpolated<T, D>) {
+        let Self { c, contributions, .. } = self;
+        let (x, v, F) = (&mut self.x[k], &mut self.v[k], &mut self.F[k]);
+        *v += interpolated.acceleration * c.time_step;
+        let mut velocity = interpolated.velocity;
+        if c.planted.is(Fault::PicForFlip) {
+            *v = velocity;
+        }
+        if c.planted.is(Fault::OwnVelocity) {
+            velocity = *v;
+        }
+        *x += c.planted.change(velocity * c.time_step);
+        *F = c.stretch(&interpolated.velocity_gradient, F);
+        contributions.set_value(c, k, v);
+    }
+
+    #[inline(always)]
+    fn receive_lanes(
+        &mut self,
+        vectors: impl Vectors,
+        k: usize,
+        value: Lane4<T>,
+        gradient: [Lane4<T>; D],
+    ) {
+        // Faults are planted in the form for all dimensions.
+        if D != 2 || self.c.planted.is_any() {
+            self.receive(k, &Interpolated::new(&value.0, &gradient.map(|gradient| gradient.0)));
+            return;
+        }
+        prefetch(&self.x[k], BLOCK);
+        prefetch(&self.v[k], BLOCK);
+        prefetch(&self.F[k], BLOCK);
+        let Self { time_step, per_cell, contributions, .. } = self;
+        let (Some(x), Some(v), Some(F)) = (
+            self.x[k].as_mut_slice().first_chunk_mut::<2>(),
+            self.v[k].as_mut_slice().first_chunk_mut::<2>(),
+            self.F[k].as_mut_slice().first_chunk_mut::<4>(),
+        ) else {
+            return;
+        };
+        let xv = vectors
+            .add(Lane4([x[0], x[1], v[0], v[1]]), vectors.mul(value, vectors.splat(*time_step)));
+        *x = [xv.0[0], xv.0[1]];
+        *v = [xv.0[2], xv.0[3]];
+        let factor = vectors.splat(*per_cell);
+        let old = vectors.load(F);
+        let along = vectors.mul(vectors.low_twice(gradient[0]), factor);
+        let across = vectors.mul(vectors.low_twice(gradient[D - 1]), factor);
+        let stretch = vectors
+            .add(vectors.mul(along, vectors.even(old)), vectors.mul(across, vectors.odd(old)));
+        *F = vectors.add(old, stretch).0;
+        contributions.set_value_in_plane(vectors, k, xv);
+    }
+}

@@ -1,0 +1,75 @@
+//! A node of the background grid.
+
+use nalgebra::{RealField, SVector};
+
+/// Numbers in a node: enough for three dimensions, and whole vector registers in both precisions.
+pub(crate) const LANES: usize = 8;
+
+/// Values at a node in the order `[velocity, acceleration, mass, zeros]`, D + D + 1 numbers and padding, so that they go through
+/// vector instructions together. P2G sums momentum in place of velocity and force in place of acceleration; the grid update
+/// divides by the mass.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(crate) struct Node<T, const D: usize> {
+    pub(crate) values: [T; LANES],
+}
+
+impl<T: RealField + Copy, const D: usize> Node<T, D> {
+    pub(crate) fn zero() -> Self {
+        Self { values: [T::zero(); LANES] }
+    }
+
+    #[inline(always)]
+    pub(crate) fn new(velocity: &SVector<T, D>, acceleration: &SVector<T, D>, mass: T) -> Self {
+        const { assert!(2 * D < LANES) };
+        let mut values = [T::zero(); LANES];
+        for a in 0..D {
+            values[a] = velocity[a];
+            values[D + a] = acceleration[a];
+        }
+        values[2 * D] = mass;
+        Self { values }
+    }
+
+    #[inline(always)]
+    pub(crate) fn mass(&self) -> T {
+        self.values[2 * D]
+    }
+
+    /// Clears the components across a wall, of velocity and acceleration.
+    #[inline(always)]
+    pub(crate) fn clear(&mut self, axis: usize) {
+        self.values[axis] = T::zero();
+        self.values[D + axis] = T::zero();
+    }
+
+    /// The node, with the signs of one component of velocity and acceleration changed.
+    #[inline(always)]
+    pub(crate) fn flipped(mut self, axis: Option<usize>) -> Self {
+        if let Some(a) = axis {
+            self.values[a] = -self.values[a];
+            self.values[D + a] = -self.values[D + a];
+        }
+        self
+    }
+
+    #[inline(always)]
+    pub(crate) fn set_acceleration(&mut self, acceleration: &SVector<T, D>) {
+        for a in 0..D {
+            self.values[D + a] = acceleration[a];
+        }
+    }
+
+    pub(crate) fn add_acceleration(&mut self, other: &Self) {
+        for a in 0..D {
+            self.values[D + a] += other.values[D + a];
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn add(&mut self, other: &Self) {
+        for q in 0..LANES {
+            self.values[q] += other.values[q];
+        }
+    }
+}

@@ -1,0 +1,381 @@
+//! Bins of particles: P2G in parallel with sums in a fixed order.
+//!
+//! A row is all nodes that share an index along the last axis. Bins divide the rows: each bin owns a fixed number of them,
+//! which depends on the dimension alone. Each particle belongs to one bin. A bin writes to its band: its own rows and the rows
+//! of the next bin. Only the bands of neighbours overlap, and a two-colour schedule keeps those apart in time
+//! ([`coloring`](crate::parallel::coloring)). Particles of a bin come in a fixed order. No sum depends on the number of
+//! threads. The grid update of a row follows its last contribution, while the row lies in the cache.
+//!
+//! A band has more rows than a bin and its stencils need. Particles may thus drift for some steps before the next sort. The
+//! order of the last sort decides the order of all sums: it belongs to the state of a run, and a run that continues to
+//! the same bits restores it.
+
+use bytemuck::cast_slice_mut;
+use rayon::prelude::*;
+
+use crate::grid::{BIN_ROWS, Layout, PAD_BELOW};
+use crate::parallel::chunks::on_all_threads;
+use crate::parallel::coloring::{ColoredBands, Schedule, count};
+use crate::parallel::disjoint::{PartElements, Partition};
+
+/// Rows in a bin, in two and three dimensions.
+const BIN_HEIGHT: usize = 8;
+
+/// Rows by which a particle may sink below its bin before the next sort.
+const SLACK: usize = 3;
+
+/// In three dimensions a bin is divided into sub-bins of this many lines of nodes along axis 0: the nodes that a sub-bin
+/// reaches stay in the cache. In fewer dimensions a bin is one sub-bin.
+const SUB_BIN_LINES: usize = 8;
+
+/// The rows of each bin.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BinRows {
+    /// Rows in a bin; the last one has the remainder as well.
+    height: usize,
+    /// Number of bins.
+    bins: usize,
+}
+
+impl BinRows {
+    pub(crate) fn new<const D: usize>(layout: &Layout<D>) -> Self {
+        // A row is one node in 1D; bins below some hundred particles would cost more to hand out than to compute.
+        let height = if D == 1 { BIN_ROWS } else { BIN_HEIGHT };
+        Self { height, bins: count(layout.dims[D - 1], height) }
+    }
+
+    /// The bin of a particle at a sort, by the first row of its stencil.
+    fn bin_of(self, row: usize) -> usize {
+        (row.saturating_sub(SLACK) / self.height).min(self.bins - 1)
+    }
+
+    /// Range of the lower edge of a particle's box along the last axis within which the particle stays in `bin`, for a
+    /// stencil of `width` rows: from the first value on and below the second, in cells from the lower corner of the grid.
+    #[inline(always)]
+    pub(crate) fn range(self, bin: u32, width: usize) -> (f64, f64) {
+        let Self { height, bins } = self;
+        let first = f64::from(bin) * height as f64 - PAD_BELOW as f64;
+        // Bands that reach the end of the grid hold all stencils up to there.
+        let end = if bin as usize + 2 < bins {
+            first + (2 * height + 1 - width) as f64
+        } else {
+            f64::INFINITY
+        };
+        (first, end)
+    }
+}
+
+/// Particles sorted by bin, within each bin by sub-bin, within each sub-bin by id.
+///
+/// They are not sorted further: neighbours mostly have successive ids, their data then lie side by side in memory, and the
+/// kernels use them in place.
+#[derive(Debug)]
+pub(crate) struct Bins {
+    rows: BinRows,
+    /// Bin of every particle.
+    bin_of: Vec<u32>,
+    /// Particle ids, bin after bin.
+    order: Partition,
+    /// Buffer of the two-colour schedule.
+    schedule: Schedule,
+    /// Sub-bins in a bin.
+    sub_bins: usize,
+    /// Buffer of the sort: particles in each sub-bin, later the place of the next of them.
+    counts: Vec<u32>,
+    /// Buffer of the sort: sub-bin of every particle.
+    keys: Vec<u32>,
+}
+
+/// Adds the particles of one bin to the nodes: `add(band, first, ids)`, with the band of the node array, the index of its first
+/// node, and the particles in order.
+pub(crate) type AddToBand<'a, N> = dyn Fn(&mut [N], usize, &[u32]) + Sync + 'a;
+
+/// As [`AddToBand`] for kernels that change particles: `add(band, first, bin, elements)`, with the bin's number and its
+/// particles' elements of three arrays.
+pub(crate) type UpdateAndAdd<'a, N, A, B, C> =
+    dyn Fn(&mut [N], usize, u32, PartElements<'_, A, B, C>) + Sync + 'a;
+
+/// Calls for each node, some rows at a time: before the first contribution to it and after the last one.
+#[derive(Clone, Copy)]
+pub(crate) struct NodeHooks<'a, N> {
+    /// Before the first contribution.
+    pub(crate) before: &'a (dyn Fn(&mut [N]) + Sync),
+    /// After the last contribution; the second argument is the index of the first node.
+    pub(crate) after: &'a (dyn Fn(&mut [N], usize) + Sync),
+}
+
+impl Bins {
+    /// Allocates for `particles` particles on the grid; `sort` has to follow.
+    pub(crate) fn new<const D: usize>(layout: &Layout<D>, particles: usize) -> Self {
+        let rows = BinRows::new(layout);
+        let bins = rows.bins;
+        let sub_bins = if D == 3 { layout.dims[1].div_ceil(SUB_BIN_LINES) } else { 1 };
+        Self {
+            rows,
+            bin_of: vec![0; particles],
+            order: Partition::new(particles, bins),
+            schedule: Schedule::default(),
+            sub_bins,
+            counts: vec![0; bins * sub_bins + 1],
+            keys: vec![0; particles],
+        }
+    }
+
+    /// The rows of each bin.
+    pub(crate) fn rows(&self) -> BinRows {
+        self.rows
+    }
+
+    /// Bin of every particle.
+    pub(crate) fn bin_of(&self) -> &[u32] {
+        &self.bin_of
+    }
+
+    /// Whether each particle is in exactly one bin: false before the first sort, and after [`state`](Self::state) was
+    /// overwritten by an order that no sort gives.
+    pub(crate) fn is_sorted(&mut self) -> bool {
+        self.order.is_whole()
+    }
+
+    /// The result of the last sort, as bytes: the bin of every particle, the order of the particles, the start of each bin.
+    pub(crate) fn state(&mut self) -> [&mut [u8]; 3] {
+        let Self { bin_of, order, .. } = self;
+        let (order, starts) = order.arrange();
+        [cast_slice_mut(bin_of), cast_slice_mut(order), cast_slice_mut(starts)]
+    }
+
+    /// Sorts all particles by the sub-bin of the first node of their stencils, `first_node(particle)`.
+    pub(crate) fn sort<const D: usize>(
+        &mut self,
+        layout: &Layout<D>,
+        first_node: &(dyn Fn(usize) -> usize + Sync),
+    ) {
+        let Self { rows, sub_bins, .. } = *self;
+        let (row, line) = (layout.row(), layout.dims[0]);
+        self.keys.par_iter_mut().zip(&mut self.bin_of).enumerate().for_each(
+            |(p, (key, bin_of))| {
+                let node = first_node(p);
+                let bin = rows.bin_of(node / row);
+                let sub_bin = if D == 3 { node % row / line / SUB_BIN_LINES } else { 0 };
+                *bin_of = bin as u32;
+                *key = (bin * sub_bins + sub_bin) as u32;
+            },
+        );
+        self.counts.fill(0);
+        for &key in &self.keys {
+            self.counts[key as usize + 1] += 1;
+        }
+        for sub_bin in 1..self.counts.len() {
+            self.counts[sub_bin] += self.counts[sub_bin - 1];
+        }
+        let (order, starts) = self.order.arrange();
+        for (start, first) in starts.iter_mut().zip(self.counts.iter().step_by(sub_bins)) {
+            *start = *first as usize;
+        }
+        for (p, &key) in self.keys.iter().enumerate() {
+            let place = &mut self.counts[key as usize];
+            order[*place as usize] = p as u32;
+            *place += 1;
+        }
+    }
+
+    /// Calls `add` for every bin, in parallel where bands do not overlap.
+    pub(crate) fn for_each<N: Send, const D: usize>(
+        &mut self,
+        layout: &Layout<D>,
+        nodes: &mut [N],
+        hooks: NodeHooks<'_, N>,
+        add: &AddToBand<'_, N>,
+    ) {
+        let Self { rows, order, schedule, .. } = self;
+        let bands = ColoredBands::new(nodes, rows.height * layout.row(), schedule);
+        for_each_band(&bands, hooks, &|band, first, bin| {
+            if let Some(particles) = order.part(bin) {
+                add(band, first, particles);
+            }
+        });
+    }
+
+    /// As [`for_each`](Self::for_each) for kernels that change the bin's elements of three arrays. Does nothing where the
+    /// particles are not [sorted](Self::is_sorted).
+    pub(crate) fn for_each_mut<N, A, B, C, const D: usize>(
+        &mut self,
+        layout: &Layout<D>,
+        nodes: &mut [N],
+        hooks: NodeHooks<'_, N>,
+        arrays: (&mut [A], &mut [B], &mut [C]),
+        add: &UpdateAndAdd<'_, N, A, B, C>,
+    ) where
+        N: Send,
+        A: Send,
+        B: Send,
+        C: Send,
+    {
+        let Self { rows, order, schedule, .. } = self;
+        let Some(elements) = order.elements(arrays) else {
+            debug_assert!(false, "particles that are not sorted");
+            return;
+        };
+        let bands = ColoredBands::new(nodes, rows.height * layout.row(), schedule);
+        for_each_band(&bands, hooks, &|band, first, bin| {
+            if let Some(elements) = elements.take(bin) {
+                add(band, first, bin as u32, elements);
+            }
+        });
+    }
+}
+
+/// Calls `add(band, first, bin)` for each bin, and the hooks around it.
+fn for_each_band<N: Send>(
+    bands: &ColoredBands<'_, N>,
+    hooks: NodeHooks<'_, N>,
+    add: &(dyn Fn(&mut [N], usize, usize) + Sync),
+) {
+    on_all_threads(&|thread| {
+        while let Some(mut band) = bands.take(thread) {
+            (hooks.before)(band.first_touched().0);
+            let bin = band.segment();
+            let (elements, first) = band.elements();
+            add(elements, first, bin);
+            let (completed, first) = band.completed();
+            if !completed.is_empty() {
+                (hooks.after)(completed, first);
+            }
+        }
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grid::Grid;
+    use nalgebra::SVector;
+
+    #[test]
+    fn a_bin_keeps_particles_whose_stencils_lie_in_its_band_and_no_others() {
+        for height in [8, BIN_ROWS] {
+            let cut = BinRows { height, bins: 10 };
+            for width in [2, 3, 6] {
+                for bin in [0, 1, 2, 7] {
+                    let (first, end) = cut.range(bin, width);
+                    // Rows of the stencil from the bin's first row on; a band has those of two bins.
+                    let rows = |edge: f64| {
+                        let row = edge.floor() + PAD_BELOW as f64 - (bin as usize * height) as f64;
+                        (row, row + width as f64)
+                    };
+                    let fits =
+                        |edge: f64| rows(edge).0 >= 0.0 && rows(edge).1 <= 2.0 * height as f64;
+                    for (edge, is_kept) in [
+                        (first, true),
+                        (first.next_down(), false),
+                        (end, false),
+                        (end.next_down(), true),
+                        (f64::midpoint(first, end), true),
+                    ] {
+                        assert_eq!(fits(edge), is_kept, "{height} {width} {bin}");
+                    }
+                }
+                // The last two bands reach to the end of the grid.
+                for bin in [8, 9] {
+                    let first = (bin as usize * height) as f64 - PAD_BELOW as f64;
+                    assert_eq!(cut.range(bin, width), (first, f64::INFINITY));
+                }
+            }
+        }
+    }
+
+    /// Nodes at which stencils may begin, by a lattice of particles and with some layers left out.
+    fn first_nodes<const D: usize>(layout: &Layout<D>) -> Vec<usize> {
+        let row = layout.row();
+        let last = layout.dims[D - 1] - 6;
+        // Numbered from the far end on, so that numbers and places differ in order.
+        (0..last * row).rev().filter(|node| node % 3 != 1).collect()
+    }
+
+    #[test]
+    fn particles_are_sorted_into_bins_with_room_to_drift_both_ways() {
+        fn check<const D: usize>(cells: [usize; D]) {
+            let grid =
+                Grid { lower: SVector::zeros(), spacing: 1.0, cells, walls: [[false; 2]; D] };
+            let layout = Layout::new(&grid, 8).unwrap();
+            let nodes = first_nodes(&layout);
+            let mut bins = Bins::new(&layout, nodes.len());
+            assert!(!bins.is_sorted());
+            bins.sort(&layout, &|p| nodes[p]);
+            assert!(bins.is_sorted());
+            let mut met = vec![0; nodes.len()];
+            let count = bins.rows.bins;
+            for bin in 0..count {
+                let particles = bins.order.part(bin).unwrap();
+                let (first, end) = bins.rows.range(bin as u32, 3);
+                let sub_bin = |p: u32| match D {
+                    3 => nodes[p as usize] / layout.dims[0] % layout.dims[1] / SUB_BIN_LINES,
+                    _ => 0,
+                };
+                let place = |&p: &u32| (sub_bin(p), p);
+                assert!(particles.is_sorted_by_key(place), "by sub-bin, then by id");
+                for &p in particles {
+                    met[p as usize] += 1;
+                    assert_eq!(bins.bin_of()[p as usize] as usize, bin);
+                    let edge = (nodes[p as usize] / layout.row()) as f64 - PAD_BELOW as f64;
+                    // At the lower end of the grid particles cannot drift further.
+                    assert!(bin == 0 || edge - SLACK as f64 >= first, "{edge} {first}");
+                    assert!(edge + SLACK as f64 + 1.0 <= end, "{edge} {end}");
+                }
+            }
+            assert!(bins.order.part(count).is_none());
+            assert!(met.iter().all(|&times| times == 1));
+        }
+        check([700]);
+        check([5, 40]);
+        check([4, 30, 25]);
+    }
+
+    /// Each bin adds to every node of its band, which is its own rows and as many above; the last one's, and the band of the
+    /// one before, end with the grid.
+    #[test]
+    fn bands_are_the_rows_of_a_bin_and_of_the_next() {
+        fn check<const D: usize>(cells: [usize; D]) {
+            let grid =
+                Grid { lower: SVector::zeros(), spacing: 1.0, cells, walls: [[false; 2]; D] };
+            let layout = Layout::new(&grid, 8).unwrap();
+            let mut bins = Bins::new(&layout, 0);
+            bins.sort(&layout, &|_| 0);
+            let (BinRows { height, bins: count }, row) = (bins.rows, layout.row());
+            assert_eq!(count, (layout.dims[D - 1] / height).max(1));
+            let mut nodes = vec![9; layout.nodes];
+            let hooks = NodeHooks {
+                before: &|nodes: &mut [i32]| nodes.fill(0),
+                after: &|nodes: &mut [i32], first| {
+                    assert_eq!(first % row, 0);
+                    nodes.iter_mut().for_each(|node| *node += 100);
+                },
+            };
+            bins.for_each(&layout, &mut nodes, hooks, &|band, first, _| {
+                assert_eq!(first % (height * row), 0);
+                assert!(band.len() == 2 * height * row || first + band.len() == layout.nodes);
+                band.iter_mut().for_each(|node| *node += 1);
+            });
+            for (node, &sum) in nodes.iter().enumerate() {
+                // The lowest bin's rows belong to no other one.
+                let lowest = count == 1 || node < height * row;
+                assert_eq!(sum, if lowest { 101 } else { 102 }, "{node}");
+            }
+            let mut seen = vec![0; layout.nodes];
+            let empty = (&mut [0_u8; 0][..], &mut [0_u8; 0][..], &mut [0_u8; 0][..]);
+            let add =
+                |band: &mut [i32], first: usize, bin: u32, _: PartElements<'_, u8, u8, u8>| {
+                    assert_eq!(first, bin as usize * height * row);
+                    assert!((bin as usize) < count);
+                    band.iter_mut().for_each(|node| *node += 1);
+                };
+            bins.for_each_mut(&layout, &mut seen, hooks, empty, &add);
+            assert_eq!(seen, nodes);
+        }
+        check([1100]);
+        check([5]);
+        check([5, 40]);
+        check([5, 1]);
+        check([4, 3, 25]);
+    }
+}
