@@ -1,7 +1,8 @@
 //! G2P of one step fused with P2G of the next: one pass over the particles a step, for USL and centred differences.
 //!
 //! Memory traffic of particles limits the speed of a step; separate passes for G2P and P2G would read them twice. The fused
-//! pass forms the same sums in the same order. A run can thus continue from its particles alone: P2G forms the grid again.
+//! pass forms the same sums in the same order. A run can thus continue from its particles and their order: P2G forms the
+//! grid again.
 //!
 //! Source: Wang et al., "A massively parallel and scalable multi-GPU material point method", ACM Trans. Graph. 39 (2020) 30.
 

@@ -17,7 +17,7 @@ use crate::simd::{Loop, Vectors, dispatch};
 use crate::tensor::real;
 use crate::weights::{ExtendedWeights, Weights, is_middle};
 
-/// Particles in a block: as many as keep all of it in the first-value cache.
+/// Particles in a block: as many as keep all of it in the first-level cache.
 pub(crate) const BLOCK: usize = 64;
 
 /// One number for every particle of a block.
