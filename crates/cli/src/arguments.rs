@@ -29,12 +29,15 @@ mod scheme;
 mod score;
 mod shared;
 mod stability;
+mod texts;
 mod tradeoff;
 mod values;
 
+use std::any::TypeId;
 use std::ffi::OsString;
+use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Arg, Args, CommandFactory, Parser, Subcommand, ValueEnum};
 
 use crate::terminal::{Color, Verbosity};
 
@@ -53,6 +56,7 @@ pub(crate) use scheme::{
 };
 pub(crate) use score::ScoreOptions;
 pub(crate) use stability::StabilityOptions;
+pub(crate) use texts::{CompletionsOptions, ManOptions};
 pub(crate) use tradeoff::{Against, TradeoffOptions};
 
 /// Manufactured solutions for solid mechanics: check fields, run a material point solver, measure its order.
@@ -134,15 +138,55 @@ pub(crate) enum Command {
     Score(ScoreOptions),
     /// Repeat the original study on both of its problems, with a report, tables, data and particle files
     Reproduce(ReproduceOptions),
+    /// Write the script that lets a shell complete commands and options
+    Completions(CompletionsOptions),
+    /// Write the pages of the manual
+    Man(ManOptions),
+    /// Write the whole command line as Markdown
+    #[command(hide = true)]
+    Reference,
+}
+
+/// Where solutions are found, for the help and the book.
+const WHERE: &str = "\
+A solution is named, or given as a path. A path ends in .toml or has a separator, and is the
+specification in that file. A name is looked for, in this order: as NAME.toml in mms-specs of
+the working folder, then of each folder above it; in the folders that the variable MMSMITH_SPECS
+lists, as PATH lists those of programs; among the solutions built in. Where the first file found
+is the text that a built-in solution was generated from, the generated code serves. Any other
+file is interpreted, and a file that differs from the built-in solution of its name is told on
+standard error. mms list says where each solution comes from.";
+
+/// The command line as it is read.
+///
+/// Values that begin with a hyphen reach the readers of numbers, times and lists, whose refusals say which values are right;
+/// without that, clap takes them for options that do not exist.
+pub(crate) fn line() -> clap::Command {
+    let with_hyphens = |argument: Arg| {
+        let is_option = argument.get_long().is_some() && argument.get_action().takes_values();
+        let is_path = argument.get_value_parser().type_id() == TypeId::of::<PathBuf>();
+        if !is_option || is_path {
+            return argument;
+        }
+        let names = argument.get_value_names().unwrap_or_default();
+        let is_time = names.iter().any(|name| *name == "TIME");
+        if argument.get_value_delimiter().is_some() || is_time {
+            argument.allow_hyphen_values(true)
+        } else {
+            argument.allow_negative_numbers(true)
+        }
+    };
+    Arguments::command()
+        .after_long_help(WHERE)
+        .mut_subcommands(|command| command.mut_args(with_hyphens))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
 
     #[test]
     fn the_command_line_is_consistent() {
-        Arguments::command().debug_assert();
+        line().debug_assert();
     }
 }

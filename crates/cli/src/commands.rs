@@ -14,6 +14,7 @@ mod run;
 mod scheme;
 mod score;
 mod stability;
+mod texts;
 mod thorough;
 mod tradeoff;
 
@@ -28,6 +29,7 @@ pub(crate) use resume::resume;
 pub(crate) use run::run;
 pub(crate) use score::score;
 pub(crate) use stability::stability;
+pub(crate) use texts::{completions, man, reference};
 pub(crate) use tradeoff::tradeoff;
 
 use anyhow::{Context, Result};

@@ -23,14 +23,14 @@ mod terminal;
 
 use std::process::ExitCode;
 
-use clap::{CommandFactory, FromArgMatches};
+use clap::FromArgMatches;
 
-use arguments::{Arguments, Command, color_of};
+use arguments::{Arguments, Command, color_of, line};
 
 fn main() -> ExitCode {
     let given: Vec<_> = std::env::args_os().collect();
-    let line = Arguments::command().color(color_of(&given).into());
-    let arguments = line
+    let arguments = line()
+        .color(color_of(&given).into())
         .try_get_matches_from(given)
         .and_then(|matches| Arguments::from_arg_matches(&matches))
         .unwrap_or_else(|refusal| refusal.exit());
@@ -49,6 +49,9 @@ fn main() -> ExitCode {
         Command::Score(options) => commands::score(options),
         Command::Tradeoff(options) => commands::tradeoff(options),
         Command::Reproduce(options) => commands::reproduce(options),
+        Command::Completions(options) => commands::completions(options),
+        Command::Man(options) => commands::man(options),
+        Command::Reference => commands::reference(),
     };
     match outcome {
         Ok(true) => ExitCode::SUCCESS,

@@ -10,7 +10,7 @@ use super::values::{positive_count, positive_number};
 
 #[derive(Args)]
 pub(crate) struct ConvergeOptions {
-    /// The solution, by name, or a specification file (SPEC.toml)
+    /// The solution, by name, or a specification file (SPEC.toml); mms --help says where names are looked for
     #[arg(value_name = "NAME|SPEC.toml")]
     pub(crate) name: String,
     /// Cell counts, separated by commas; one of them with --cfls

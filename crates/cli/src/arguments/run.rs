@@ -9,7 +9,7 @@ use super::values::{positive_count, time};
 
 #[derive(Args)]
 pub(crate) struct RunOptions {
-    /// The solution, by name, or a specification file (SPEC.toml)
+    /// The solution, by name, or a specification file (SPEC.toml); mms --help says where names are looked for
     #[arg(value_name = "NAME|SPEC.toml")]
     pub(crate) name: String,
     /// Number of cells along the solution's cell length; where nothing is said 32, and 16 for a solid in three dimensions in a

@@ -12,7 +12,7 @@ use super::values::{finite_number, positive_count, positive_number, role, thread
 /// Where another solver's output is, and how it is to be read.
 #[derive(Args)]
 pub(crate) struct ScoreOptions {
-    /// The solution, by name, or a specification file (SPEC.toml)
+    /// The solution, by name, or a specification file (SPEC.toml); mms --help says where names are looked for
     #[arg(value_name = "NAME|SPEC.toml")]
     pub(crate) name: String,
     /// Recordings, one for each resolution: a .pvd list, a folder (with one .pvd list, or of frames), or .vtu, .vtp, .vtk

@@ -11,7 +11,7 @@ use super::values::{positive_count, positive_number, sample_count, variation};
 
 #[derive(Args)]
 pub(crate) struct StabilityOptions {
-    /// The solution, by name, or a specification file (SPEC.toml)
+    /// The solution, by name, or a specification file (SPEC.toml); mms --help says where names are looked for
     #[arg(value_name = "NAME|SPEC.toml")]
     pub(crate) name: String,
     /// Number of cells along the solution's cell length

@@ -11,7 +11,7 @@ use super::values::{positive_number, seconds, thread_count};
 
 #[derive(Args)]
 pub(crate) struct TradeoffOptions {
-    /// The solution, by name, or a specification file (SPEC.toml)
+    /// The solution, by name, or a specification file (SPEC.toml); mms --help says where names are looked for
     #[arg(value_name = "NAME|SPEC.toml")]
     pub(crate) name: String,
     /// Time for everything, such as 90s, 2m or 1h; it is used up, for timings repeated if for nothing better

@@ -156,7 +156,7 @@ fn study(
 ) -> Result<Study> {
     let cases = sweep.cases(base);
     let expected = model.announce(&cases);
-    let bar = Bar::expecting(expected.as_ref().map(|seconds| seconds.iter().sum()));
+    let bar = Bar::expecting("starting", expected.as_ref().map(|seconds| seconds.iter().sum()));
     // Without a prediction a particle's step is the unit of work.
     let work = match expected {
         Some(seconds) => seconds,
@@ -195,7 +195,7 @@ pub(super) fn differences(
     cfls: &[f64],
     what: &str,
 ) -> Result<Temporal> {
-    let bar = Bar::new();
+    let bar = Bar::new(what);
     let mut show = |progress: mmsmith_verify::Progress| {
         bar.show(&format!("{what}, CFL {}", cfls[progress.case]), progress);
     };

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use mmsmith_solutions::Description;
-use mmsmith_spec::Spec;
+use mmsmith_spec::{Diagnostic, Spec};
 use serde_json::{Value, json};
 
 use crate::arguments::ListOptions;
@@ -24,8 +24,14 @@ pub(crate) fn list(options: &ListOptions) -> Result<bool> {
             }
             // One mistake in a file does not hide the others.
             Err(error) => {
-                terminal::warn(format_args!("{name} cannot be used: {error:#}"));
-                unreadable.push(json!({ "name": name, "problem": format!("{error:#}") }));
+                let problem = match error.downcast_ref::<Diagnostic>() {
+                    Some(Diagnostic { message, file, .. }) => format!("{file}: {message}"),
+                    None => format!("{error:#}"),
+                };
+                terminal::warn(format_args!(
+                    "{name} cannot be used: {problem}; mms check {name} shows the place"
+                ));
+                unreadable.push(json!({ "name": name, "problem": problem }));
             }
         }
     }

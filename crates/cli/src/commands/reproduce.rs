@@ -202,8 +202,8 @@ fn measure_problem(problem: &'static str, folder: &Path) -> Result<Results> {
         let stem = format!("{kind}-{}-{}", word(scheme.0), word(scheme.1));
         let json = Output::prepare(&folder.join(format!("{stem}.json")))?;
         let csv = Output::prepare(&folder.join(format!("{stem}.csv")))?;
-        let bar = Bar::new();
         let what = format!("{problem}, {kind}, {}", name(scheme));
+        let bar = Bar::new(&what);
         let mut show = |progress: Progress| bar.show(&what, progress);
         let study = measure(&model.exact, model.arithmetic(), &base, sweep, &mut show)?;
         let expected = match sweep {

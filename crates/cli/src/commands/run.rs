@@ -51,7 +51,7 @@ pub(super) fn follow(options: &RunOptions, place: Option<resume::Place>) -> Resu
     with_threads(scheme.threads, || {
         let row = {
             let expected = model.announce(&[case]);
-            let bar = Bar::expecting(expected.map(|seconds| seconds.iter().sum()));
+            let bar = Bar::expecting("starting", expected.map(|seconds| seconds.iter().sum()));
             let what = format!("{cells} cells");
             let show = &mut |progress| bar.show(&what, progress);
             let mut outputs = Outputs {

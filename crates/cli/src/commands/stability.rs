@@ -214,7 +214,7 @@ fn limits(points: &[Point], search: &Search, keep: &Keep) -> Result<Vec<Stabilit
         .map(without_threads)
         .collect();
     let order = if points.len() > 1 { Order::AtOnce } else { Order::OneByOne };
-    let bar = Bar::new();
+    let bar = Bar::new("largest stable CFL number");
     let done = AtomicUsize::new(0);
     keep.all(
         &keys,
@@ -222,7 +222,10 @@ fn limits(points: &[Point], search: &Search, keep: &Keep) -> Result<Vec<Stabilit
         |_| {},
         |index| {
             let point = &points[index];
-            let name = point.values.join(", ");
+            let name = match point.values.as_slice() {
+                [] => point.selection.name().to_owned(),
+                values => values.join(", "),
+            };
             let share = || done.load(Ordering::Relaxed) as f64 / points.len() as f64;
             let mut show = |run: usize| bar.show_share(|| format!("{name}, run {run}"), share());
             let row =

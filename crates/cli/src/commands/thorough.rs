@@ -99,7 +99,7 @@ fn measure(
             .each_field(&inputs[..n], inputs[n])
             .ok_or_else(|| format!("the solution '{name}' does not have {n} dimensions"))
     };
-    let bar = Bar::new();
+    let bar = Bar::new(&spec.name);
     Class::ALL
         .into_iter()
         .map(|class| {

@@ -225,7 +225,7 @@ pub(super) fn sweep(options: &TradeoffOptions) -> Result<Report<'_>> {
         repeat: &|setting: &Setting, most_s| runner.repeat(setting, most_s),
         clock: &|| runner.started.elapsed().as_secs_f64(),
     };
-    let bar = Bar::new();
+    let bar = Bar::new("planning");
     let mut show = |setting: &Setting| {
         let share = runner.started.elapsed().as_secs_f64() / options.budget;
         bar.show_share(|| words::line(setting), share.min(1.0));

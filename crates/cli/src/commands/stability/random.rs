@@ -47,7 +47,7 @@ pub(super) fn search(options: &StabilityOptions, criteria: &Criteria) -> Result<
         .collect();
     with_threads(scheme.threads, || {
         let found: Vec<Observed> = {
-            let bar = Bar::new();
+            let bar = Bar::new("random settings");
             let done = AtomicUsize::new(0);
             keep.all(
                 &keys,

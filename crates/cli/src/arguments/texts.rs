@@ -1,0 +1,20 @@
+//! Options of the commands that tell of the command line itself.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use clap_complete::Shell;
+
+#[derive(Args)]
+pub(crate) struct CompletionsOptions {
+    /// The shell that is to complete commands
+    #[arg(value_enum, value_name = "SHELL")]
+    pub(crate) shell: Shell,
+}
+
+#[derive(Args)]
+pub(crate) struct ManOptions {
+    /// Write mms.1 and a page for each command to this folder
+    #[arg(value_name = "DIR")]
+    pub(crate) folder: PathBuf,
+}
