@@ -3,6 +3,12 @@
 //!
 //! Exit status: 0 done, and whatever was checked passed; 1 a check failed; 2 bad input, or output that could not
 //! be written.
+//!
+//! The libraries under it, in the order in which a specification meets them: [`mmsmith_spec`] reads and derives it,
+//! [`mmsmith_expr`] holds its expressions, `mmsmith-codegen` writes code, [`mmsmith_solutions`] holds that code,
+//! [`mmsmith_interpret`] does without it, [`mmsmith_prove`] and [`mmsmith_oracle`] judge both, `mmsmith-mpm` simulates,
+//! [`mmsmith_verify`] measures, [`mmsmith_vtk`] and [`mmsmith_ledger`] read and write files. The book in `docs/` has a guide, a
+//! reference and a map of the code.
 
 mod arguments;
 mod commands;
