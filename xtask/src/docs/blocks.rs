@@ -86,7 +86,7 @@ pub(crate) struct Workplace {
     repository: PathBuf,
 }
 
-/// Makes `mms` and `cargo mms` the given program, and the generated headers those of the repository.
+/// Makes `mms` and `cargo mms` the given program, and the sources those of the repository.
 const PRELUDE: &str = r#"set -e
 mms() { "$MMS" "$@"; }
 cargo() {
@@ -94,7 +94,9 @@ cargo() {
     shift
     "$MMS" "$@"
 }
-[ -e crates ] || [ -L crates ] || ln -s "$REPOSITORY/crates" crates
+for folder in crates tests; do
+    [ -e $folder ] || [ -L $folder ] || ln -s "$REPOSITORY/$folder" $folder
+done
 "#;
 
 /// What a script printed, and how it ended.
