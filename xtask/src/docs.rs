@@ -121,9 +121,8 @@ pub(crate) fn write(
     let texts = texts(repository)?;
     let is_wanted =
         |path: &Path| wanted.is_empty() || wanted.iter().any(|wanted| path.ends_with(wanted));
-    for missing in
-        wanted.iter().filter(|wanted| !texts.iter().any(|(path, _)| path.ends_with(wanted)))
-    {
+    let is_known = |wanted: &Path| texts.iter().any(|(path, _)| path.ends_with(wanted));
+    if let Some(missing) = wanted.iter().find(|wanted| !is_known(wanted)) {
         bail!("no page {}; pages are README.md and those in {BOOK}", missing.display());
     }
     for (path, text) in texts.iter().filter(|(path, _)| is_wanted(path)) {
