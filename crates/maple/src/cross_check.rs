@@ -54,14 +54,14 @@ pub enum CrossCheckError {
         assigned: String,
     },
     /// One side has no value at a point.
-    #[error("{entry} has no value at {place}")]
+    #[error("{entry} has no value at {place}: {cause}")]
     Value {
         /// The entry.
         entry: String,
         /// The point.
         place: String,
         /// Why.
-        source: Box<OracleError>,
+        cause: Box<OracleError>,
     },
     /// The precision is not offered.
     #[error(transparent)]
@@ -186,14 +186,14 @@ pub fn cross_check(
         let point = Point { graph: &graph, definitions: check.definitions, values: &values };
         for ((side, worst), target) in sides.iter().zip(&mut worst).zip(check.targets) {
             let found = oracle.settle(&point, side, SETTLED_DIGITS);
-            let found = found.map_err(|source| CrossCheckError::Value {
+            let found = found.map_err(|error| CrossCheckError::Value {
                 entry: target.entry.clone(),
                 place: place(&graph, &values)
                     .iter()
                     .map(|(name, value)| format!("{name} = {value:?}"))
                     .collect::<Vec<_>>()
                     .join(", "),
-                source: Box::new(source),
+                cause: Box::new(error),
             })?;
             let [listing, derived] = [found[0].clone(), found[1].clone()];
             let digits = digits_in_common(&listing, &derived);

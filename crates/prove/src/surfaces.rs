@@ -55,23 +55,24 @@ impl SurfaceProof {
 }
 
 /// Why a claim could be neither proved nor refuted.
+// The message has the cause, which is therefore no `source`: whoever prints both would print it twice.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum SurfaceError {
     /// There were no points to look at.
-    #[error("the condition on {surface}")]
+    #[error("the condition on {surface}: {cause}")]
     Points {
         /// Where.
         surface: Surface,
         /// Why.
-        source: PointsError,
+        cause: PointsError,
     },
     /// A quantity has no value.
-    #[error("the condition on {surface}")]
+    #[error("the condition on {surface}: {cause}")]
     Value {
         /// Where.
         surface: Surface,
         /// Why.
-        source: Box<OracleError>,
+        cause: Box<OracleError>,
     },
 }
 
@@ -110,7 +111,7 @@ fn numerical(
     quantities: &[Expr],
     field: &[Expr],
 ) -> Result<Outcome, SurfaceError> {
-    let no_points = |source| SurfaceError::Points { surface, source };
+    let no_points = |cause| SurfaceError::Points { surface, cause };
     let inside = points(spec, fields, field, None, POINTS).map_err(no_points)?;
     let (scale, _) = largest(fields, &inside, field, surface)?;
     let there = points(spec, fields, quantities, Some(surface), POINTS).map_err(no_points)?;
@@ -136,7 +137,7 @@ fn largest(
     expressions: &[Expr],
     surface: Surface,
 ) -> Result<(Rational, usize), SurfaceError> {
-    let failed = |source| SurfaceError::Value { surface, source: Box::new(source) };
+    let failed = |error| SurfaceError::Value { surface, cause: Box::new(error) };
     let mut oracle = Oracle::new(Oracle::USUAL_BITS).map_err(failed)?;
     let mut found = (Rational::zero(), 0);
     for (index, values) in points.iter().enumerate() {

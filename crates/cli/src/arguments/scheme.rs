@@ -18,7 +18,7 @@ pub(crate) struct SchemeOptions {
     /// Formulation: updated Lagrangian, with the weights of the current configuration anew in each step, or total
     /// Lagrangian, with those of the reference configuration throughout. Where nothing is said the updated one, and the
     /// total one for a solution with a condition that only that one models
-    #[arg(long = "formulation", alias = "frame", value_enum)]
+    #[arg(long = "formulation", alias = "frame", value_enum, value_name = "FORMULATION")]
     pub(crate) frame: Option<Frame>,
     /// Mass matrix of the total Lagrangian formulation; consistent where nothing is said
     #[arg(long, value_enum)]
