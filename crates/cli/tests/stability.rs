@@ -123,6 +123,8 @@ fn bad_settings_are_named() {
     refuses(place, &call("--over nu=0 --over ppc=2 --over cells=4"), &["two make a map", "3"]);
     refuses(place, &call("--lower 0.9 --upper 0.5"), &["--lower", "--upper"]);
     refuses(place, &call("--width 0"), &["--width", "positive"]);
+    refuses(place, &call("--width 1e-16"), &["width = 1e-16", "at least 1e-15"]);
+    refuses(place, &call("--width 1e-9 --precision f32"), &["width = 1e-9", "at least 1e-6"]);
     refuses(place, &call("--plot p.svg"), &["--over"]);
     refuses(place, &call("--samples 3"), &["--search"]);
     refuses(place, &call("--over units=x"), &["whole number"]);

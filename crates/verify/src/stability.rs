@@ -61,6 +61,54 @@ pub struct Search {
     pub criteria: Criteria,
 }
 
+impl Search {
+    /// Refuses what no search could come to.
+    ///
+    /// # Errors
+    ///
+    /// [`CaseError::Setting`] for a width that the solver's precision cannot resolve.
+    pub fn validate(&self, arithmetic: Arithmetic<'_>) -> Result<(), CaseError> {
+        let (least, admissible) = match arithmetic {
+            Arithmetic::Double => {
+                (1e-15, "at least 1e-15: in f64 CFL numbers closer than that give the same time step")
+            }
+            Arithmetic::Single(_) => {
+                (1e-6, "at least 1e-6: in f32 CFL numbers closer than that give the same time step")
+            }
+        };
+        if self.width >= least {
+            return Ok(());
+        }
+        let (setting, value) = ("width", format!("{:e}", self.width));
+        Err(CaseError::Setting { setting, value, admissible })
+    }
+
+    /// Whether the search goes on between a stable and an unstable CFL number, where `unit` is that of P-waves.
+    fn goes_on(&self, arithmetic: Arithmetic<'_>, stable: f64, unstable: f64, unit: f64) -> bool {
+        let resolution = match arithmetic {
+            Arithmetic::Double => f64::EPSILON,
+            Arithmetic::Single(_) => f64::from(f32::EPSILON),
+        };
+        let gap = unstable - stable;
+        // Closer together than that, the middle is one of the ends.
+        gap > self.width * unit && gap > resolution * unstable
+    }
+
+    /// How many times a bracket of this width is halved.
+    fn halvings(&self, gap: f64, unit: f64) -> usize {
+        (gap / (self.width * unit)).log2().ceil().max(0.0) as usize
+    }
+}
+
+/// How far a search is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SearchProgress {
+    /// The number of the run under way, from 1.
+    pub run: usize,
+    /// The share of the runs that are done, by how many the search will take as far as that is known; it never falls.
+    pub share: f64,
+}
+
 /// What was unstable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -154,7 +202,7 @@ const MOMENTS: usize = 16;
 
 /// Looks for the largest stable CFL number of `case` by bisection; its own CFL number does not matter.
 ///
-/// `progress` is told the number of runs done.
+/// `progress` is told of each run before it begins.
 ///
 /// # Errors
 ///
@@ -164,15 +212,21 @@ pub fn stability(
     arithmetic: Arithmetic<'_>,
     case: &Case,
     search: &Search,
-    progress: &mut dyn FnMut(usize),
+    progress: &mut dyn FnMut(SearchProgress),
 ) -> Result<StabilityRow, CaseError> {
+    search.validate(arithmetic)?;
     let bench = Bench::new(exact, arithmetic, case)?;
     let mut runs = 0;
     let reference = bench.reference()?;
     let limits = bench.limits(&search.criteria, &reference);
-    let mut attempt = |cfl: f64| -> Result<Observed, CaseError> {
+    let mut share = 0.0_f64;
+    // With the number of runs that are left, this one included.
+    let mut attempt = |cfl: f64, left: usize| -> Result<Observed, CaseError> {
+        // The reference run is one of them.
+        let done = runs as f64 + 1.0;
+        share = share.max(done / (done + left as f64));
         runs += 1;
-        progress(runs);
+        progress(SearchProgress { run: runs, share });
         bench.run(cfl, Some(&limits))
     };
     let unit = bench.p_wave_limit;
@@ -180,8 +234,9 @@ pub fn stability(
     let mut unstable: Option<Observed> = None;
     let start = search.lower.unwrap_or(REFERENCE * unit);
     let mut cfl = start;
+    let expected = search.halvings(search.upper.unwrap_or(unit) - start, unit) + PROBES.len() + 1;
     for _ in 0..=MOST_WIDENINGS {
-        let found = attempt(cfl)?;
+        let found = attempt(cfl, expected + 1)?;
         if found.failure.is_none() {
             stable = Some(found);
             break;
@@ -192,7 +247,7 @@ pub fn stability(
     if stable.is_some() && unstable.is_none() {
         let mut cfl = search.upper.unwrap_or(unit).max(start * WIDENING);
         for _ in 0..=MOST_WIDENINGS {
-            let found = attempt(cfl)?;
+            let found = attempt(cfl, expected)?;
             if found.failure.is_some() {
                 unstable = Some(found);
                 break;
@@ -202,17 +257,18 @@ pub fn stability(
         }
     }
     while let (Some(low), Some(high)) = (&stable, &unstable)
-        && high.cfl - low.cfl > search.width * unit
+        && search.goes_on(arithmetic, low.cfl, high.cfl, unit)
     {
-        let found = attempt(0.5 * (low.cfl + high.cfl))?;
+        let left = search.halvings(high.cfl - low.cfl, unit) + PROBES.len();
+        let found = attempt(0.5 * (low.cfl + high.cfl), left)?;
         let end = if found.failure.is_none() { &mut stable } else { &mut unstable };
         *end = Some(found);
     }
     let mut unstable_below = Vec::new();
     if let (Some(limit), Some(_)) = (&stable, &unstable) {
         let limit = limit.cfl;
-        for share in PROBES {
-            let found = attempt(share * limit)?;
+        for (index, share) in PROBES.into_iter().enumerate() {
+            let found = attempt(share * limit, PROBES.len() - index)?;
             if found.failure.is_some() {
                 unstable_below.push(found);
             }
@@ -502,5 +558,63 @@ impl From<&StepError> for Failure {
             value: finite(value),
             limit: finite(limit),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn search(width: f64) -> Search {
+        Search { lower: None, upper: None, width, criteria: Criteria::default() }
+    }
+
+    /// Wherever the limit is: no width keeps a search between two numbers that have none between them.
+    #[test]
+    fn bisection_ends_whatever_the_width() {
+        for width in [1e-2, 1e-15, 1e-16, 1e-300] {
+            for limit in [0.3, 0.500_000_1, 1.0 - 1e-16, 2.0, 7.3] {
+                let search = search(width);
+                let (mut stable, mut unstable) = (0.125, 8.0);
+                let mut halvings = 0;
+                while search.goes_on(Arithmetic::Double, stable, unstable, 1.0) {
+                    let middle = 0.5 * (stable + unstable);
+                    assert!(stable < middle && middle < unstable, "{width:e} at {limit}");
+                    *(if middle < limit { &mut stable } else { &mut unstable }) = middle;
+                    halvings += 1;
+                }
+                assert!(halvings <= 64, "{halvings} for {width:e} at {limit}");
+                assert!(unstable - stable <= width.max(2e-15), "{width:e} at {limit}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_width_that_no_time_step_can_have_is_refused_with_one_that_can() {
+        let exact = mmsmith_solutions::build::<f32>("bar", &[]).unwrap().unwrap();
+        let single = Arithmetic::Single(&exact);
+        search(1e-15).validate(Arithmetic::Double).unwrap();
+        search(1e-6).validate(single).unwrap();
+        let message = search(1e-16).validate(Arithmetic::Double).unwrap_err().to_string();
+        assert!(message.contains("width = 1e-16: it must be at least 1e-15"), "{message}");
+        let message = search(1e-15).validate(single).unwrap_err().to_string();
+        assert!(message.contains("at least 1e-6"), "{message}");
+        search(f64::NAN).validate(single).unwrap_err();
+    }
+
+    #[test]
+    fn the_share_of_a_search_grows_to_its_end() {
+        let exact = mmsmith_solutions::build::<f64>("bar", &[]).unwrap().unwrap();
+        let case = Case { cells: 4, ..Case::default() };
+        let mut told: Vec<SearchProgress> = Vec::new();
+        let show = &mut |progress| told.push(progress);
+        let found = stability(&exact, Arithmetic::Double, &case, &search(0.05), show).unwrap();
+        assert!(told.windows(2).all(|pair| pair[0].share <= pair[1].share), "{told:?}");
+        assert!(told.iter().zip(1..).all(|(progress, run)| progress.run == run));
+        assert!(told.iter().all(|progress| (0.0..1.0).contains(&progress.share)));
+        // The reference run is not told of.
+        assert_eq!(told.len() + 1, found.runs);
+        let last = told.last().unwrap().share;
+        assert!((last - (1.0 - 1.0 / found.runs as f64)).abs() < 1e-12, "{told:?}");
     }
 }

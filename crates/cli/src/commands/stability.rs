@@ -5,11 +5,11 @@ mod vary;
 
 use anyhow::{Result, bail};
 use mmsmith_verify::{
-    Case, Criteria, Failure, FailureKind, Observed, Search, StabilityRow, is_stable,
+    Case, Criteria, Failure, FailureKind, Observed, Search, SearchProgress, StabilityRow, is_stable,
     stability as find,
 };
 use serde_json::{Value, json};
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::scheme::{Scheme, USUAL_CFL};
 use super::{Model, caption, case, preface, settings, with_threads};
@@ -108,6 +108,7 @@ pub(super) fn survey(options: &StabilityOptions) -> Result<Survey<'_>> {
         bail!("--lower {lower} --upper {upper}: the lower CFL number must be below the upper one");
     }
     let search = Search { lower, upper, width: options.width, criteria };
+    points.iter().try_for_each(|point| search.validate(point.model.arithmetic()))?;
     let keep = Keep::open(options.kept.out.as_ref(), &options.name)?;
     let rows = limits(&points, &search, &keep)?;
     Ok(Survey { options, selection, search, points, rows })
@@ -215,7 +216,7 @@ fn limits(points: &[Point], search: &Search, keep: &Keep) -> Result<Vec<Stabilit
         .collect();
     let order = if points.len() > 1 { Order::AtOnce } else { Order::OneByOne };
     let bar = Bar::new("largest stable CFL number");
-    let done = AtomicUsize::new(0);
+    let shares = Shares::of(points.len());
     keep.all(
         &keys,
         order,
@@ -226,15 +227,31 @@ fn limits(points: &[Point], search: &Search, keep: &Keep) -> Result<Vec<Stabilit
                 [] => point.selection.name().to_owned(),
                 values => values.join(", "),
             };
-            let share = || done.load(Ordering::Relaxed) as f64 / points.len() as f64;
-            let mut show = |run: usize| bar.show_share(|| format!("{name}, run {run}"), share());
+            let mut show = |SearchProgress { run, share }: SearchProgress| {
+                bar.show_share(|| format!("{name}, run {run}"), shares.set(index, share));
+            };
             let row =
                 find(&point.model.exact, point.model.arithmetic(), &point.case, search, &mut show)?;
-            done.fetch_add(1, Ordering::Relaxed);
-            bar.show_share(|| name.clone(), share());
+            bar.show_share(|| name.clone(), shares.set(index, 1.0));
             Ok(row)
         },
     )
+}
+
+/// How much of each case is done, where several are under way.
+struct Shares(Vec<AtomicU64>);
+
+impl Shares {
+    fn of(cases: usize) -> Self {
+        Self((0..cases).map(|_| AtomicU64::new(0.0_f64.to_bits())).collect())
+    }
+
+    /// Takes down the share of one case that is done, and gives that of all.
+    fn set(&self, case: usize, share: f64) -> f64 {
+        self.0[case].store(share.to_bits(), Ordering::Relaxed);
+        let shares = self.0.iter().map(|share| f64::from_bits(share.load(Ordering::Relaxed)));
+        shares.sum::<f64>() / self.0.len() as f64
+    }
 }
 
 /// Results do not depend on the number of threads.
@@ -409,5 +426,17 @@ fn picture(selection: &Selection, options: &StabilityOptions, rows: &[StabilityR
             Limits { title: &title, x, values, measured: &measured, analytic: &analytic }.svg()
         }
         [] => String::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cases_side_by_side_have_one_share() {
+        let shares = Shares::of(4);
+        assert_eq!((shares.set(2, 0.5), shares.set(0, 1.0)), (0.125, 0.375));
+        assert_eq!([1, 2, 3].map(|case| shares.set(case, 1.0))[2], 1.0);
     }
 }
