@@ -132,7 +132,7 @@ pub(crate) enum Command {
     Converge(ConvergeOptions),
     /// Find the largest stable CFL number by bisection, over one or two settings or parameters
     Stability(StabilityOptions),
-    /// Measure error against cost over all schemes that fit, name the cheapest setting for an error, and say what each knob buys
+    /// Measure error against cost over all schemes that fit, name the cheapest setting for an error, and say what each setting buys
     Tradeoff(TradeoffOptions),
     /// Measure errors and orders of what another solver wrote (.vtu, .vtp, .vtk, .pvd, .csv)
     Score(ScoreOptions),

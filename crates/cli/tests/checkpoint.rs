@@ -143,6 +143,7 @@ fn folders_that_cannot_be_gone_on_with_are_named() {
     let place = place.path();
     refuses(place, "resume nowhere", &["nowhere", "mms run --checkpoint nowhere writes"]);
     refuses(place, "run bar --every 3", &["--checkpoint"]);
+    refuses(place, "run bars --checkpoint kept", &["did you mean 'bar'"]);
 
     let called = mms(place, "run bar --cells 8 --checkpoint kept --every 1");
     assert_eq!(called.status, 0, "{}", called.stderr);

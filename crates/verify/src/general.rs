@@ -39,6 +39,12 @@ pub(crate) fn fast_step(case: &Case) -> Option<(FastShape, FastIntegrator)> {
     case.shape.of_fast_step().zip(case.integrator.of_fast_step())
 }
 
+/// Whether the steps of a case use more than one thread, where there are more.
+#[must_use]
+pub fn uses_threads(case: &Case) -> bool {
+    fast_step(case).is_some()
+}
+
 /// Refuses what makes no sense whatever the solution.
 pub(crate) fn validate(case: &Case) -> Result<(), CaseError> {
     if case.offset != 0.0 && fast_step(case).is_none() {

@@ -54,7 +54,7 @@ pub use cost::{Cost, CostModel, Timing, time_steps};
 pub use coverage::{Part, Share, coverage, smallest_set};
 pub use evaluate::{FieldRow, WrongLength, evaluate};
 pub use frames::{FrameOutput, Snapshot};
-pub use general::Placement;
+pub use general::{Placement, uses_threads};
 pub use history::{MOST_MOMENTS, Moment, Sums, energy_drift};
 pub use mmsmith_mpm::StepError;
 pub use mmsmith_mpm::general::{Integrator, Shape, Transfer};
@@ -69,16 +69,16 @@ pub use score::{
     score,
 };
 pub use stability::{
-    Criteria, Failure, FailureKind, Observed, Search, StabilityRow, is_stable, p_wave_limit,
-    stability,
+    Criteria, Failure, FailureKind, Observed, Search, SearchProgress, StabilityRow, is_stable,
+    p_wave_limit, stability,
 };
 pub use study::{Study, StudyError, Sweep, converge};
 pub use temporal::{Temporal, TemporalRow, temporal};
 pub use total::{CflSpeed, Frame, POLAR_ANGLES, TotalScheme};
 pub use tradeoff::{
-    Against, Cheapest, Chosen, Effect, Entry, Goal, Knob, LADDER, MARGIN, Machine, Repeat,
-    RepeatOutcome, RunOutcome, Setting, Skip, TOLERANCES, Tradeoff, differences, extrapolate,
-    families, median, pareto, tradeoff,
+    Against, Cheapest, Chosen, Effect, Entry, Goal, LADDER, MARGIN, Machine, Range, Repeat,
+    RepeatOutcome, RunOutcome, Setting, SettingName, Skip, TOLERANCES, TimeEffect, Tradeoff,
+    differences, extrapolate, families, leading, median, pareto, tradeoff,
 };
 pub use verdict::{
     Behaviour, Expected, ORDER_TOLERANCE, Verdict as OrderVerdict, expected_in_space,

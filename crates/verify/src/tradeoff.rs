@@ -12,11 +12,12 @@
 
 use mmsmith_mpm::general::{Integrator, Shape, Transfer};
 use mmsmith_mpm::total_lagrangian::{Composition, Coordinates, Layout, MassMatrix};
+use serde::Serialize;
 use std::collections::BTreeMap;
 
 use crate::case::{Case, Row, Status};
 use crate::cost::{Cost, CostModel};
-use crate::general::Placement;
+use crate::general::{Placement, uses_threads};
 use crate::plan::Plan;
 use crate::total::{Frame, TotalScheme};
 
@@ -27,7 +28,7 @@ pub const MARGIN: f64 = 1.25;
 /// Errors that the cheapest settings are named for.
 pub const TOLERANCES: [f64; 7] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8];
 
-/// Shares of the budget at which the sweep, the comparisons of knobs, the proofs on neighbouring grids and the repeats
+/// Shares of the budget at which the sweep, the comparisons of single settings, the proofs on neighbouring grids and the repeats
 /// for timing end.
 const PHASES: [f64; 4] = [0.58, 0.68, 0.92, 0.98];
 /// The largest share of the budget that one run may take, so that its neighbours can be run as well; and one that settings
@@ -40,6 +41,14 @@ const UNCERTAINTY: f64 = 1.3;
 const SHORT_S: f64 = 0.2;
 /// The fewest timings of a short run.
 const TIMINGS: usize = 3;
+/// Shorter runs are not compared by their time.
+const LEAST_TIMED_S: f64 = 0.05;
+/// Times that differ by no more than this share may do so by chance, however few timings there are.
+const SCATTER: f64 = 0.05;
+/// The most pairs of runs that an effect is told of, the finest ones.
+const MOST_PAIRS: usize = 3;
+/// Effects below this factor are not worth telling.
+const LEAST_EFFECT: f64 = 1.1;
 
 /// What is run: a case, its precision, and its threads.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -166,24 +175,129 @@ pub struct Chosen {
     pub proof: Row,
 }
 
-/// What one knob does, the other settings being equal.
+/// The least and the largest of what several pairs of runs showed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Range {
+    /// The least.
+    pub least: f64,
+    /// The largest.
+    pub most: f64,
+}
+
+impl Range {
+    /// The range of `values`; none where there is none.
+    fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
+        values.into_iter().fold(None, |range: Option<Self>, value| {
+            let Self { least, most } = range.unwrap_or(Self { least: value, most: value });
+            Some(Self { least: least.min(value), most: most.max(value) })
+        })
+    }
+
+    /// Its middle, as a factor.
+    #[must_use]
+    pub fn middle(&self) -> f64 {
+        (self.least * self.most).sqrt()
+    }
+
+    /// How far the middle is from no change, as a factor of at least one.
+    fn strength(&self) -> f64 {
+        self.middle().max(1.0 / self.middle())
+    }
+}
+
+/// What a change does to the time.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TimeEffect {
+    /// The factor of the wall-clock time, over all timings of all pairs.
+    Factor(Range),
+    /// That factor, where the timings differ by as much as the settings do: it says nothing.
+    WithinScatter(Range),
+    /// No two runs lasted long enough to be compared.
+    TooShort,
+}
+
+impl TimeEffect {
+    /// From the timings, in seconds, of pairs of runs before and after a change.
+    #[must_use]
+    pub fn of(pairs: &[(&[f64], &[f64])]) -> Self {
+        let factors = pairs.iter().filter(|pair| lasts(pair.0) && lasts(pair.1)).flat_map(
+            |(before, after)| {
+                after.iter().flat_map(|after| before.iter().map(move |before| after / before))
+            },
+        );
+        match Range::of(factors) {
+            None => Self::TooShort,
+            Some(range) if range.least < 1.0 + SCATTER && range.most > 1.0 / (1.0 + SCATTER) => {
+                Self::WithinScatter(range)
+            }
+            Some(range) => Self::Factor(range),
+        }
+    }
+
+    /// The factor, where there is one that says something.
+    #[must_use]
+    pub fn factor(&self) -> Option<Range> {
+        match self {
+            Self::Factor(range) => Some(*range),
+            Self::WithinScatter(_) | Self::TooShort => None,
+        }
+    }
+}
+
+/// Whether a run lasted long enough for its time to say something.
+fn lasts(walls: &[f64]) -> bool {
+    median(walls) >= LEAST_TIMED_S
+}
+
+/// What the change of one setting does, the others being equal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effect {
     /// Which.
-    pub knob: Knob,
-    /// The entry before it was turned.
+    pub setting: SettingName,
+    /// The entry before it was changed, of the finest pair of runs.
     pub from: usize,
     /// The entry after.
     pub to: usize,
-    /// Factor of the wall-clock time.
-    pub time: f64,
-    /// Factor of the error.
-    pub error: f64,
+    /// How many pairs of runs this is told of.
+    pub pairs: usize,
+    /// What it does to the wall-clock time.
+    pub time: TimeEffect,
+    /// The factor of the error.
+    pub error: Range,
+}
+
+impl Effect {
+    /// By what factor time or error change, whichever does so more.
+    fn strength(&self) -> f64 {
+        self.time.factor().map_or(1.0, |range| range.strength()).max(self.error.strength())
+    }
+}
+
+/// The effects that matter most, `count` of them at most: the strongest one of each setting, then the strongest of all;
+/// sorted by setting and strength. What changes neither time nor error is not among them.
+#[must_use]
+pub fn leading(effects: &[Effect], count: usize) -> Vec<&Effect> {
+    let mut all: Vec<&Effect> =
+        effects.iter().filter(|effect| effect.strength() >= LEAST_EFFECT).collect();
+    all.sort_by(|a, b| b.strength().total_cmp(&a.strength()));
+    let mut firsts: Vec<&Effect> = Vec::new();
+    let mut others = Vec::new();
+    for effect in all {
+        let is_first = firsts.iter().all(|first| first.setting != effect.setting);
+        (if is_first { &mut firsts } else { &mut others }).push(effect);
+    }
+    let mut chosen: Vec<&Effect> = firsts.into_iter().chain(others).take(count).collect();
+    chosen.sort_by(|a, b| {
+        a.setting.cmp(&b.setting).then(b.strength().total_cmp(&a.strength()))
+    });
+    chosen
 }
 
 /// What can be set.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Knob {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SettingName {
     /// Number of cells.
     Cells,
     /// Time step.
@@ -219,7 +333,7 @@ pub struct Tradeoff {
     pub for_tolerance: Option<Chosen>,
     /// The most accurate setting within the time asked for, if one is within it.
     pub for_time: Option<Chosen>,
-    /// What each knob does.
+    /// What the change of each setting does.
     pub effects: Vec<Effect>,
     /// What was not run, with its reason and how many grids that were.
     pub skipped: BTreeMap<Skip, usize>,
@@ -350,6 +464,12 @@ pub fn families(
         LADDER.iter().any(|&cells| plan(&at(cells)).is_some())
     };
     all.retain(fits);
+    for setting in &mut all {
+        // More of them would stand idle.
+        if !uses_threads(&setting.case) {
+            setting.threads = 1;
+        }
+    }
     all
 }
 
@@ -375,9 +495,9 @@ fn weights(setting: &Setting) -> Weights {
     }
 }
 
-/// Which knobs differ.
+/// Which settings differ.
 #[must_use]
-pub fn differences(a: &Setting, b: &Setting) -> Vec<Knob> {
+pub fn differences(a: &Setting, b: &Setting) -> Vec<SettingName> {
     let scheme = |setting: &Setting| match setting.case.frame {
         Frame::Updated => None,
         Frame::Total(total) => Some(total),
@@ -389,19 +509,19 @@ pub fn differences(a: &Setting, b: &Setting) -> Vec<Knob> {
     let order = |total: Option<TotalScheme>| total.map(|total| total.scheme.composition);
     let layout = |total: Option<TotalScheme>| total.map(|total| (total.layout, total.coordinates));
     [
-        (Knob::Cells, x.cells != y.cells),
-        (Knob::Cfl, x.cfl != y.cfl),
-        (Knob::Ppc, x.per_cell != y.per_cell),
-        (Knob::Shape, x.shape != y.shape || degree(s) != degree(t)),
-        (Knob::Integrator, x.integrator != y.integrator || order(s) != order(t)),
-        (Knob::Transfer, x.transfer != y.transfer),
-        (Knob::Layout, x.placement != y.placement || layout(s) != layout(t)),
-        (Knob::Mass, mass(s) != mass(t)),
-        (Knob::Precision, a.single != b.single),
-        (Knob::Threads, a.threads != b.threads),
+        (SettingName::Cells, x.cells != y.cells),
+        (SettingName::Cfl, x.cfl != y.cfl),
+        (SettingName::Ppc, x.per_cell != y.per_cell),
+        (SettingName::Shape, x.shape != y.shape || degree(s) != degree(t)),
+        (SettingName::Integrator, x.integrator != y.integrator || order(s) != order(t)),
+        (SettingName::Transfer, x.transfer != y.transfer),
+        (SettingName::Layout, x.placement != y.placement || layout(s) != layout(t)),
+        (SettingName::Mass, mass(s) != mass(t)),
+        (SettingName::Precision, a.single != b.single),
+        (SettingName::Threads, a.threads != b.threads),
     ]
     .into_iter()
-    .filter_map(|(knob, differs)| differs.then_some(knob))
+    .filter_map(|(name, differs)| differs.then_some(name))
     .collect()
 }
 
@@ -490,7 +610,7 @@ pub fn tradeoff<E>(
         found: Tradeoff { families: families.len(), ..Tradeoff::default() },
     };
     sweep.climb(progress)?;
-    sweep.compare_knobs(progress)?;
+    sweep.compare_settings(progress)?;
     sweep.name_cheapest(progress)?;
     sweep.fill(progress)?;
     sweep.found.for_tolerance = sweep.prove(sweep.cheapest_for_tolerance(), progress)?;
@@ -751,8 +871,8 @@ impl<E> Sweep<'_, E> {
         Ok(true)
     }
 
-    /// Runs what is missing for comparisons in which one knob differs, on the finest grid that is cheap.
-    fn compare_knobs(&mut self, progress: &mut dyn FnMut(&Setting)) -> Result<(), E> {
+    /// Runs what is missing for comparisons in which one setting differs, on the finest grid that is cheap.
+    fn compare_settings(&mut self, progress: &mut dyn FnMut(&Setting)) -> Result<(), E> {
         let cheap = 0.004 * self.goal.budget_s;
         let references = [
             self.families.iter().position(|f| f.setting.case.frame == Frame::Updated),
@@ -911,95 +1031,182 @@ impl<E> Sweep<'_, E> {
         }
     }
 
-    /// What each knob did: of the pairs that differ in it alone, the finest one for each pair of values.
+    /// What the change of each setting did: of all pairs of runs that differ in it alone, the finest few whose time says
+    /// something, or else the finest few, for each pair of values.
     fn effects(&self) -> Vec<Effect> {
         let entries = &self.found.entries;
         let Some(plain) = self.families.first().map(|family| family.setting) else {
             return Vec::new();
         };
-        let mut best: BTreeMap<(Knob, String), Effect> = BTreeMap::new();
+        let mut changes: Vec<(Change, Vec<(usize, usize)>)> = Vec::new();
         for from in 0..entries.len() {
             for to in 0..entries.len() {
                 let (a, b) = (&entries[from].setting, &entries[to].setting);
-                let &[knob] = differences(a, b).as_slice() else { continue };
-                // Told of plain settings: with f32 or PIC, say, another knob's effect is another one.
+                let &[name] = differences(a, b).as_slice() else { continue };
+                // Told of plain settings: with f32 or PIC, say, another setting's effect is another one.
                 let is_plain = a.case.transfer == Transfer::Flip
                     && !a.single
-                    && a.threads == plain.threads
+                    && (a.threads == plain.threads || !uses_threads(&a.case))
                     && a.case.cfl <= plain.case.cfl
                     && (a.case.per_cell == 2
-                        || knob == Knob::Ppc
+                        || name == SettingName::Ppc
                         || a.case.frame != Frame::Updated);
-                let Some(turned) = turn(knob, a, b).filter(|_| is_plain) else { continue };
+                let Some(change) = Change::of(name, a, b).filter(|_| is_plain) else { continue };
                 let error = self.error(to) / self.error(from);
-                let time = entries[to].row.wall_s / entries[from].row.wall_s;
-                if !(error.is_finite() && time.is_finite()) {
+                if !(error.is_finite() && error > 0.0) {
                     continue;
                 }
-                let effect = Effect { knob, from, to, time, error };
-                let finer = |known: &Effect| entries[known.from].setting.case.cells < a.case.cells;
-                match best.entry((knob, turned)) {
-                    std::collections::btree_map::Entry::Vacant(place) => {
-                        place.insert(effect);
-                    }
-                    std::collections::btree_map::Entry::Occupied(mut place) => {
-                        if finer(place.get()) {
-                            place.insert(effect);
-                        }
-                    }
+                match changes.iter_mut().find(|(known, _)| *known == change) {
+                    Some((_, pairs)) => pairs.push((from, to)),
+                    None => changes.push((change, vec![(from, to)])),
                 }
             }
         }
-        best.into_values().collect()
+        let mut effects: Vec<Effect> =
+            changes.into_iter().filter_map(|(change, pairs)| self.effect(change, pairs)).collect();
+        effects.sort_by_key(|effect| effect.setting);
+        effects
+    }
+
+    fn effect(&self, change: Change, mut pairs: Vec<(usize, usize)>) -> Option<Effect> {
+        let entries = &self.found.entries;
+        let is_timed =
+            |&(from, to): &(usize, usize)| lasts(&entries[from].walls) && lasts(&entries[to].walls);
+        if pairs.iter().any(is_timed) {
+            pairs.retain(is_timed);
+        }
+        pairs.sort_by_key(|&(from, _)| std::cmp::Reverse(entries[from].setting.case.cells));
+        pairs.truncate(MOST_PAIRS);
+        let walls: Vec<_> = pairs
+            .iter()
+            .map(|&(from, to)| (entries[from].walls.as_slice(), entries[to].walls.as_slice()))
+            .collect();
+        let errors = pairs.iter().map(|&(from, to)| self.error(to) / self.error(from));
+        let &(from, to) = pairs.first()?;
+        Some(Effect {
+            setting: change.name(),
+            from,
+            to,
+            pairs: pairs.len(),
+            time: TimeEffect::of(&walls),
+            error: Range::of(errors)?,
+        })
     }
 }
 
-/// By what a knob is turned, as a key that sorts alike turns together; `None` for the other way round of a turn, and for
-/// turns that nobody asks for.
-fn turn(knob: Knob, a: &Setting, b: &Setting) -> Option<String> {
-    let frame = if a.case.frame == Frame::Updated { "updated" } else { "total" };
-    let (x, y) = (&a.case, &b.case);
-    let of = |setting: &Setting| match setting.case.frame {
-        Frame::Updated => {
-            (format!("{:?}", setting.case.shape), 0, format!("{:?}", setting.case.integrator))
+/// The weights that a change is told of: those of the updated frame, or the degree of the total frame's splines.
+#[derive(Clone, Copy, PartialEq)]
+enum Basis {
+    Updated(Shape),
+    Total(usize),
+}
+
+impl Basis {
+    fn of(setting: &Setting) -> Self {
+        match setting.case.frame {
+            Frame::Updated => Self::Updated(setting.case.shape),
+            Frame::Total(total) => Self::Total(total.scheme.degree),
         }
-        Frame::Total(t) => (String::new(), t.scheme.degree, format!("{:?}", t.scheme.composition)),
-    };
-    let ((shape, degree, integrator), (shape_b, degree_b, integrator_b)) = (of(a), of(b));
-    let is_usual = x.shape == Shape::Gimp || x.placement == Placement::BodyFitted;
-    let key = match knob {
-        Knob::Cells => {
-            (y.cells == 2 * x.cells).then(|| format!("{shape} {degree} {:?}", x.placement))
+    }
+}
+
+/// How a scheme goes on in time.
+#[derive(Clone, Copy, PartialEq)]
+enum Stepping {
+    Updated(Integrator),
+    Total(Composition),
+}
+
+impl Stepping {
+    fn of(setting: &Setting) -> Self {
+        match setting.case.frame {
+            Frame::Updated => Self::Updated(setting.case.integrator),
+            Frame::Total(total) => Self::Total(total.scheme.composition),
         }
-        Knob::Cfl => (y.cfl == x.cfl / 2.0 && (is_usual || frame == "total"))
-            .then(|| format!("{shape} {degree} {integrator}")),
-        Knob::Ppc => {
-            (y.per_cell == x.per_cell + 1).then(|| format!("{shape} {degree} {}", x.per_cell))
-        }
-        Knob::Shape if frame == "total" => (degree_b == degree + 1).then(|| format!("{degree}")),
-        Knob::Shape => is_usual.then(|| format!("{shape} {shape_b}")),
-        // From centred differences to another one; between compositions to the next order.
-        Knob::Integrator if frame == "updated" => {
-            (x.integrator == Integrator::Cd).then(|| format!("{shape} {integrator_b}"))
-        }
-        Knob::Integrator => (integrator < integrator_b
-            && (integrator.as_str(), integrator_b.as_str()) != ("Order2", "Order6"))
-            .then(|| format!("{degree} {integrator}")),
-        Knob::Transfer => (x.transfer == Transfer::Flip).then(|| format!("{shape} {}", y.transfer)),
-        Knob::Layout => match x.frame {
-            Frame::Updated => (x.placement == Placement::Lattice).then(|| shape.clone()),
-            Frame::Total(total) => (total.layout == Layout::Lattice).then(|| format!("{degree}")),
-        },
-        Knob::Mass => match x.frame {
-            Frame::Total(total) if total.scheme.mass == MassMatrix::Lumped => {
-                Some(format!("{degree}"))
+    }
+}
+
+/// A change of one setting. Changes that are equal are told together, with the range of what they do.
+#[derive(Clone, Copy, PartialEq)]
+enum Change {
+    Cells(Weights),
+    Cfl(Basis, Stepping),
+    Ppc(Basis, usize),
+    Shape { from: Shape, to: Shape },
+    Degree(usize),
+    Integrator(Shape, Integrator),
+    Composition { degree: usize, from: Composition },
+    Transfer(Shape, Transfer),
+    Layout(Basis),
+    Mass(usize),
+    Precision(Shape),
+    Threads(Shape),
+}
+
+impl Change {
+    /// The change of the setting `name` from `a` to `b`; none for the other way round, and for what nobody asks for.
+    fn of(name: SettingName, a: &Setting, b: &Setting) -> Option<Self> {
+        let (x, y) = (&a.case, &b.case);
+        let basis = Basis::of(a);
+        let is_usual = x.shape == Shape::Gimp || x.placement == Placement::BodyFitted;
+        match (name, x.frame, y.frame) {
+            (SettingName::Cells, ..) => (y.cells == 2 * x.cells).then(|| Self::Cells(weights(a))),
+            (SettingName::Cfl, frame, _) => (y.cfl == x.cfl / 2.0
+                && (is_usual || frame != Frame::Updated))
+                .then(|| Self::Cfl(basis, Stepping::of(a))),
+            (SettingName::Ppc, ..) => {
+                (y.per_cell == x.per_cell + 1).then_some(Self::Ppc(basis, x.per_cell))
             }
+            (SettingName::Shape, Frame::Total(from), Frame::Total(to)) => {
+                let (from, to) = (from.scheme.degree, to.scheme.degree);
+                (to == from + 1).then_some(Self::Degree(from))
+            }
+            (SettingName::Shape, Frame::Updated, Frame::Updated) => {
+                is_usual.then_some(Self::Shape { from: x.shape, to: y.shape })
+            }
+            // From centred differences to another one; between compositions to the next order.
+            (SettingName::Integrator, Frame::Updated, _) => (x.integrator == Integrator::Cd)
+                .then_some(Self::Integrator(x.shape, y.integrator)),
+            (SettingName::Integrator, Frame::Total(from), Frame::Total(to)) => {
+                let degree = from.scheme.degree;
+                let (from, to) = (from.scheme.composition, to.scheme.composition);
+                (to.order() == from.order() + 2).then_some(Self::Composition { degree, from })
+            }
+            (SettingName::Transfer, ..) => (x.transfer == Transfer::Flip)
+                .then_some(Self::Transfer(x.shape, y.transfer)),
+            (SettingName::Layout, Frame::Updated, _) => {
+                (x.placement == Placement::Lattice).then_some(Self::Layout(basis))
+            }
+            (SettingName::Layout, Frame::Total(total), _) => {
+                (total.layout == Layout::Lattice).then_some(Self::Layout(basis))
+            }
+            (SettingName::Mass, Frame::Total(total), _) => {
+                let is_lumped = total.scheme.mass == MassMatrix::Lumped;
+                is_lumped.then_some(Self::Mass(total.scheme.degree))
+            }
+            (SettingName::Precision, ..) => (!a.single).then_some(Self::Precision(x.shape)),
+            (SettingName::Threads, ..) => {
+                (b.threads > a.threads).then_some(Self::Threads(x.shape))
+            }
+            // Frames are no setting that is compared.
             _ => None,
-        },
-        Knob::Precision => (!a.single).then(|| shape.clone()),
-        Knob::Threads => (b.threads > a.threads).then(|| shape.clone()),
-    };
-    key.map(|key| format!("{frame} {key}"))
+        }
+    }
+
+    fn name(self) -> SettingName {
+        match self {
+            Self::Cells(_) => SettingName::Cells,
+            Self::Cfl(..) => SettingName::Cfl,
+            Self::Ppc(..) => SettingName::Ppc,
+            Self::Shape { .. } | Self::Degree(_) => SettingName::Shape,
+            Self::Integrator(..) | Self::Composition { .. } => SettingName::Integrator,
+            Self::Transfer(..) => SettingName::Transfer,
+            Self::Layout(_) => SettingName::Layout,
+            Self::Mass(_) => SettingName::Mass,
+            Self::Precision(_) => SettingName::Precision,
+            Self::Threads(_) => SettingName::Threads,
+        }
+    }
 }
 
 /// The setting on the next coarser and the next finer grid that fit.

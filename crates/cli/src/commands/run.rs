@@ -17,11 +17,10 @@ use crate::table::{self, Table};
 use crate::{csv, number, terminal};
 
 pub(crate) fn run(options: &RunOptions) -> Result<bool> {
-    let place = options.checkpoint.as_deref().map(resume::remember).transpose()?;
-    follow(options, place)
+    follow(options, None)
 }
 
-/// The run, from its beginning or from the last checkpoint of its place.
+/// The run, from its beginning or, where it has a place already, from the last checkpoint there.
 pub(super) fn follow(options: &RunOptions, place: Option<resume::Place>) -> Result<bool> {
     let selection = Selection::new(&options.name, &options.scheme.parameters.set)?;
     let model = Model::new(&selection, options.scheme.precision)?;
@@ -44,6 +43,11 @@ pub(super) fn follow(options: &RunOptions, place: Option<resume::Place>) -> Resu
         count: options.frames,
     });
     let settings = || settings(&selection, scheme, extent, cells, scheme.cfl);
+    // Nothing is left in the folder of a run that cannot begin.
+    let place = match (place, &options.checkpoint) {
+        (None, Some(folder)) => Some(resume::remember(folder)?),
+        (place, _) => place,
+    };
     let checkpoints = match place {
         Some(place) => Some(resume::checkpoints(place, options, &settings())?),
         None => None,

@@ -1,20 +1,22 @@
 //! `mms tradeoff`: error against cost, and the cheapest setting for a need.
 
 mod advice;
+mod time;
 mod words;
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use mmsmith_verify::{
-    Arithmetic, Case, CaseError, Chosen, Entry, Goal, MARGIN, Machine, Outputs, Record, Repeat,
-    Row, Setting, Skip, Status, Tradeoff, families, plan, run as simulate, time_steps,
-    tradeoff as measure,
+    Arithmetic, Case, CaseError, Chosen, Effect, Entry, Goal, MARGIN, Machine, Outputs, Record, Repeat,
+    Row, Setting, Skip, Status, Tradeoff, families, leading, plan, run as simulate, time_steps,
+    tradeoff as measure, uses_threads,
 };
 use serde_json::{Value, json};
 
+use self::time::Time;
 use super::Model;
 use crate::arguments::{Against, Precision, TradeoffOptions};
 use crate::csv;
@@ -30,6 +32,10 @@ use crate::{machine, memory, number, terminal};
 const CFL: f64 = 0.4;
 /// More threads than this are not compared with one.
 const MOST_THREADS: usize = 64;
+/// Lines on what settings buy, of which there may be many more.
+const MAIN_EFFECTS: usize = 10;
+/// Of those, at most so many on single precision.
+const OF_SINGLE_PRECISION: usize = 2;
 
 /// How errors are compared.
 struct Measure {
@@ -71,7 +77,7 @@ struct Runner<'a> {
     exact: &'a Model,
     single: Option<&'a Model>,
     pools: BTreeMap<usize, rayon::ThreadPool>,
-    started: Instant,
+    time: Time,
     keep: Keep,
     selection: &'a Selection,
 }
@@ -101,9 +107,9 @@ impl Runner<'_> {
     }
 
     fn run(&self, setting: &Setting, most_s: f64) -> Result<Option<Row>> {
-        let until = until(most_s);
+        let until = self.time.until(most_s);
         let compute = |_: usize| -> Result<Record> {
-            let row = self.pool(setting)?.install(|| {
+            let mut row = self.pool(setting)?.install(|| {
                 let silent = &mut |_| ();
                 let mut outputs = Outputs { until, ..Outputs::new(silent) };
                 simulate(&self.exact.exact, self.arithmetic(setting), &setting.case, &mut outputs)
@@ -111,6 +117,7 @@ impl Runner<'_> {
             if matches!(row.status, Status::Cut { .. }) {
                 return Err(CutShort(row).into());
             }
+            self.time.ran(setting, &mut row);
             Ok(Record::from(&row))
         };
         let mut key = words::document(setting);
@@ -139,7 +146,10 @@ impl Runner<'_> {
     }
 
     fn repeat(&self, setting: &Setting, most_s: f64) -> Result<Option<Repeat>> {
-        let until = until(most_s);
+        if let Some(repeat) = self.time.repeated(setting) {
+            return Ok(Some(repeat));
+        }
+        let until = self.time.until(most_s);
         let timing = self.pool(setting)?.install(|| {
             let arithmetic = self.arithmetic(setting);
             time_steps(&self.exact.exact, arithmetic, &setting.case, u64::MAX, until)
@@ -147,11 +157,6 @@ impl Runner<'_> {
         let repeat = Repeat { wall_s: timing.wall_s, cpu_s: timing.cpu_s };
         Ok(timing.complete.then_some(repeat))
     }
-}
-
-fn until(most_s: f64) -> Option<Instant> {
-    // Longer than any study: no limit.
-    Duration::try_from_secs_f64(most_s.max(0.0)).ok().and_then(|d| Instant::now().checked_add(d))
 }
 
 pub(crate) fn tradeoff(options: &TradeoffOptions) -> Result<bool> {
@@ -178,7 +183,10 @@ pub(crate) fn tradeoff(options: &TradeoffOptions) -> Result<bool> {
 
 /// Measures what was asked for.
 pub(super) fn sweep(options: &TradeoffOptions) -> Result<Report<'_>> {
-    let started = Instant::now();
+    sweep_in(options, Time::Real(Instant::now()))
+}
+
+fn sweep_in(options: &TradeoffOptions, time: Time) -> Result<Report<'_>> {
     let selection = Selection::new(&options.name, &options.parameters.set)?;
     let exact = Model::new(&selection, Precision::F64)?;
     // What is interpreted has double precision only.
@@ -190,13 +198,14 @@ pub(super) fn sweep(options: &TradeoffOptions) -> Result<Report<'_>> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         Ok((threads, pool.context("--threads: cannot start the threads")?))
     };
-    let pools = std::iter::once(threads).chain(more).map(pool).collect::<Result<_>>()?;
+    // Some schemes use one thread, whatever is asked for.
+    let pools = [1, threads].into_iter().chain(more).map(pool).collect::<Result<_>>()?;
     let keep = Keep::open(options.kept.out.as_ref(), &options.name)?;
     let runner = Runner {
         exact: &exact,
         single: single.as_ref(),
         pools,
-        started,
+        time,
         keep,
         selection: &selection,
     };
@@ -223,16 +232,16 @@ pub(super) fn sweep(options: &TradeoffOptions) -> Result<Report<'_>> {
         plan: &what,
         run: &|setting: &Setting, most_s| runner.run(setting, most_s),
         repeat: &|setting: &Setting, most_s| runner.repeat(setting, most_s),
-        clock: &|| runner.started.elapsed().as_secs_f64(),
+        clock: &|| runner.time.now(),
     };
     let bar = Bar::new("planning");
     let mut show = |setting: &Setting| {
-        let share = runner.started.elapsed().as_secs_f64() / options.budget;
+        let share = runner.time.now() / options.budget;
         bar.show_share(|| words::line(setting), share.min(1.0));
     };
     let found = measure(&tried, &goal, &calls, &mut show)?;
     drop(bar);
-    let used_s = started.elapsed().as_secs_f64();
+    let used_s = runner.time.now();
     Ok(Report { options, selection, found, compared, threads, used_s })
 }
 
@@ -359,7 +368,7 @@ impl Report<'_> {
     fn text(&self) -> String {
         let runs = self.found.entries.len();
         let mut text = format!(
-            "{} ({}), {} period(s), {} thread(s) where nothing else is said\n{}\n{runs} settings of {} schemes in {:.1} s of {} s\n",
+            "{} ({}), {} period(s), {} thread(s) for schemes that use several, where nothing else is said\n{}\n{runs} settings of {} schemes in {:.1} s of {} s\n",
             self.selection.name(),
             self.selection.told_parameters(),
             self.options.periods,
@@ -376,8 +385,13 @@ impl Report<'_> {
             "\nthe front: no other setting is both cheaper and more accurate\n{}",
             self.front().text()
         );
-        text += "\nwhat each knob buys, the other settings being equal\n";
-        for line in self.knobs() {
+        let (main, all) = (self.main_effects(), self.effects().len());
+        text += "\nwhat each setting buys, the others being equal";
+        if main.len() < all {
+            text += &format!(": the {} of {all} that matter most (--json has all)", main.len());
+        }
+        text.push('\n');
+        for line in main {
             text += &format!("  {line}\n");
         }
         text +=
@@ -443,17 +457,30 @@ impl Report<'_> {
         format!("mms run {} {}{periods}{set}", self.options.name, words::options(setting))
     }
 
-    /// What each knob did, a line each.
-    pub(super) fn knobs(&self) -> Vec<String> {
-        let entries = &self.found.entries;
-        let mut lines: Vec<String> = self
-            .found
-            .effects
-            .iter()
-            .map(|effect| words::effect(effect, &entries[effect.from], &entries[effect.to]))
-            .collect();
+    /// What the change of each setting did, a line each.
+    fn effects(&self) -> Vec<String> {
+        let mut lines: Vec<String> =
+            self.found.effects.iter().map(|effect| self.effect(effect)).collect();
         lines.extend(self.single_precision());
         lines
+    }
+
+    /// The lines of those that matter most.
+    pub(super) fn main_effects(&self) -> Vec<String> {
+        let mut single = self.single_precision();
+        single.truncate(OF_SINGLE_PRECISION);
+        let main = leading(&self.found.effects, MAIN_EFFECTS - single.len());
+        main.into_iter().map(|effect| self.effect(effect)).chain(single).collect()
+    }
+
+    fn effect(&self, effect: &Effect) -> String {
+        let entries = &self.found.entries;
+        words::effect(effect, &entries[effect.from], &entries[effect.to])
+    }
+
+    /// Whether an entry was run with the threads that all were run with, as far as its scheme uses them.
+    fn is_of_usual_threads(&self, entry: &Entry) -> bool {
+        entry.setting.threads == self.threads || !uses_threads(&entry.setting.case)
     }
 
     /// From where on single precision stops improving: for each scheme that was run in both, its errors grid by grid.
@@ -553,6 +580,22 @@ impl Report<'_> {
             .iter()
             .map(|(skip, count)| json!({ "reason": reason(*skip), "count": count }))
             .collect();
+        let effects: Vec<Value> = self
+            .found
+            .effects
+            .iter()
+            .map(|effect| {
+                let time = effect.time.factor();
+                json!({
+                    "setting": effect.setting,
+                    "from": effect.from,
+                    "to": effect.to,
+                    "pairs": effect.pairs,
+                    "time": time.map(|range| [range.least, range.most]),
+                    "error": [effect.error.least, effect.error.most],
+                })
+            })
+            .collect();
         Ok(json!({
             "schema": "mmsmith.tradeoff/1",
             "settings": {
@@ -574,7 +617,8 @@ impl Report<'_> {
             "front": self.found.front,
             "tolerances": tolerances,
             "chosen": chosen,
-            "knobs": self.knobs(),
+            "knobs": self.effects(),
+            "effects": effects,
             "skipped": skipped,
         }))
     }
@@ -631,3 +675,6 @@ fn spread(values: &[f64]) -> f64 {
     let median = mmsmith_verify::median(values);
     if median > 0.0 { (most - least) / median } else { 0.0 }
 }
+
+#[cfg(test)]
+mod tests;

@@ -142,19 +142,81 @@ fn no_setting_runs_twice_and_named_ones_hold_on_neighbours() {
 #[test]
 fn effects_are_those_of_the_formula() {
     let found = formula(1.0).measure(60.0);
-    let of = |knob| found.effects.iter().filter(move |effect| effect.knob == knob);
-    for effect in of(Knob::Cfl) {
-        assert!(
-            (effect.error - 1.0).abs() < 1e-12 && (effect.time - 2.0).abs() < 0.1,
-            "{effect:?}"
-        );
+    let of = |name| found.effects.iter().filter(move |effect| effect.setting == name);
+    let lasts = |entry: usize| found.entries[entry].row.wall_s >= LEAST_TIMED_S;
+    for effect in &found.effects {
+        assert!((1..=MOST_PAIRS).contains(&effect.pairs), "{effect:?}");
+        if effect.time != TimeEffect::TooShort {
+            assert!(lasts(effect.from) && lasts(effect.to), "{effect:?}");
+        }
     }
-    assert!(of(Knob::Cfl).count() > 1);
-    let threads = of(Knob::Threads).next().unwrap();
-    assert!((threads.time - 0.5).abs() < 1e-9);
-    let precision = of(Knob::Precision).next().unwrap();
+    for effect in of(SettingName::Cfl) {
+        let Range { least, most } = effect.error;
+        assert!((least - 1.0).abs() < 1e-12 && (most - 1.0).abs() < 1e-12, "{effect:?}");
+        if let Some(time) = effect.time.factor() {
+            assert!((time.least - 2.0).abs() < 0.1 && (time.most - 2.0).abs() < 0.1, "{effect:?}");
+        }
+    }
+    assert!(of(SettingName::Cfl).filter(|effect| effect.time.factor().is_some()).count() > 1);
+    let threads = of(SettingName::Threads).next().unwrap().time.factor().unwrap();
+    assert!((threads.most - 0.5).abs() < 1e-9 && (threads.least - 0.5).abs() < 1e-9);
+    // The formula gives single precision no time of its own.
+    let precision = of(SettingName::Precision).next().unwrap();
+    assert!(matches!(precision.time, TimeEffect::WithinScatter(_)), "{precision:?}");
     let fine = found.entries[precision.from].setting.case.cells as f64;
-    assert!((precision.error - (1.0 + 1e-4 * fine * fine)).abs() < 1e-6);
+    assert!((precision.error.most - (1.0 + 1e-4 * fine * fine)).abs() < 1e-6);
+}
+
+#[test]
+fn times_are_told_of_runs_that_last_and_differ_by_more_than_they_scatter() {
+    let factor = |pairs: &[(&[f64], &[f64])]| TimeEffect::of(pairs);
+    let range = |least, most| Range { least, most };
+    // Milliseconds say nothing, whatever they differ by; nor does a pair of which one is short.
+    assert_eq!(factor(&[(&[0.01, 0.011], &[0.0015])]), TimeEffect::TooShort);
+    assert_eq!(factor(&[(&[1.0], &[0.049])]), TimeEffect::TooShort);
+    assert_eq!(factor(&[]), TimeEffect::TooShort);
+    assert_eq!(factor(&[(&[0.5], &[1.0])]), TimeEffect::Factor(range(2.0, 2.0)));
+    // Of several pairs and timings the range; short pairs are left out of it.
+    let pairs: &[(&[f64], &[f64])] = &[(&[0.5, 1.0], &[2.0]), (&[0.1], &[0.8]), (&[0.01], &[1.0])];
+    assert_eq!(factor(pairs), TimeEffect::Factor(range(2.0, 8.0)));
+    // Twice as fast once and twice as slow once is no effect, and neither is a difference of a few percent.
+    let pairs: &[(&[f64], &[f64])] = &[(&[1.0], &[2.0]), (&[2.0], &[1.0])];
+    assert_eq!(factor(pairs), TimeEffect::WithinScatter(range(0.5, 2.0)));
+    assert_eq!(factor(&[(&[1.0], &[0.97])]), TimeEffect::WithinScatter(range(0.97, 0.97)));
+    assert_eq!(factor(pairs).factor(), None);
+}
+
+#[test]
+fn the_effects_that_matter_most_come_from_all_settings() {
+    let effect = |setting, time: f64, error: f64| Effect {
+        setting,
+        from: 0,
+        to: 1,
+        pairs: 1,
+        time: TimeEffect::Factor(Range { least: time, most: time }),
+        error: Range { least: error, most: error },
+    };
+    let mut effects: Vec<Effect> =
+        (0..40).map(|n| effect(SettingName::Cells, 8.0, 0.1 + 0.001 * f64::from(n))).collect();
+    effects.push(effect(SettingName::Threads, 0.6, 1.0));
+    effects.push(effect(SettingName::Cfl, 1.2, 1.0));
+    effects.push(effect(SettingName::Precision, 1.01, 1.02));
+    let noise = TimeEffect::WithinScatter(Range { least: 0.1, most: 9.0 });
+    effects.push(Effect { time: noise, ..effect(SettingName::Ppc, 1.0, 1.0) });
+    let chosen: Vec<_> = leading(&effects, 10).iter().map(|e| (e.setting, e.error.most)).collect();
+    assert_eq!(chosen.len(), 10);
+    assert_eq!(chosen[0], (SettingName::Cells, 0.1));
+    assert_eq!(chosen[7], (SettingName::Cells, 0.1 + 0.001 * 7.0));
+    assert_eq!(chosen[8..], [(SettingName::Cfl, 1.0), (SettingName::Threads, 1.0)]);
+    assert!(leading(&[], 10).is_empty());
+}
+
+#[test]
+fn schemes_of_one_thread_are_given_one() {
+    let base = Setting { case: Case::default(), single: false, threads: 4 };
+    for setting in families(&base, Some(8), true, &Formula::plan) {
+        assert_eq!(setting.threads > 1, uses_threads(&setting.case), "{setting:?}");
+    }
 }
 
 #[test]

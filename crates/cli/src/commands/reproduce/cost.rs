@@ -49,7 +49,7 @@ pub(super) fn section(out: &Path, budget: f64) -> Result<Section> {
             &format!("{problem}: seconds to each error, by the cheapest setting of each kind"),
         );
         section.list("Advice", &report.sentences());
-        section.list("What each knob buys, the other settings being equal", &report.knobs());
+        section.list("What each setting buys, the others being equal", &report.main_effects());
         section.files(problem, "tradeoff", &["json", "csv", "svg", "md"]);
     }
     Ok(section)

@@ -26,8 +26,8 @@ impl Report<'_> {
         for line in self.sentences() {
             text += &format!("- {line}\n");
         }
-        text += "\n## What each knob buys\n\n";
-        for line in self.knobs() {
+        text += "\n## What each setting buys\n\n";
+        for line in self.main_effects() {
             text += &format!("- {line}\n");
         }
         text
@@ -42,7 +42,7 @@ impl Report<'_> {
                 let meets = |entry: &&Entry| {
                     words::kind(&entry.setting) == kind
                         && self.error(entry) <= tolerance
-                        && entry.setting.threads == self.threads
+                        && self.is_of_usual_threads(entry)
                 };
                 let costs = self.found.entries.iter().filter(meets).map(|entry| entry.row.wall_s);
                 let least = costs.fold(f64::INFINITY, f64::min);
@@ -93,7 +93,7 @@ impl Report<'_> {
             let own = entries.iter().filter(|entry| {
                 words::kind(&entry.setting) == kind
                     && self.error(entry).is_finite()
-                    && entry.setting.threads == self.threads
+                    && self.is_of_usual_threads(entry)
             });
             let best = own.min_by(|a, b| self.error(a).total_cmp(&self.error(b)));
             let Some(best) = best else {
@@ -103,7 +103,7 @@ impl Report<'_> {
             let cheaper = entries
                 .iter()
                 .filter(|entry| {
-                    self.error(entry) <= self.error(best) && entry.setting.threads == self.threads
+                    self.error(entry) <= self.error(best) && self.is_of_usual_threads(entry)
                 })
                 .min_by(|a, b| a.row.wall_s.total_cmp(&b.row.wall_s));
             let Some(cheaper) = cheaper.filter(|cheaper| words::kind(&cheaper.setting) != kind)

@@ -1,8 +1,8 @@
 //! Settings of a sweep in words: for people, for JSON, and as options of `mms run`.
 
 use mmsmith_verify::{
-    CflSpeed, Coordinates, Effect, Entry, Frame, Integrator, Knob, Layout, MassMatrix, Placement,
-    Setting, Transfer,
+    CflSpeed, Coordinates, Effect, Entry, Frame, Integrator, Layout, MassMatrix, Placement, Range,
+    Setting, SettingName, TimeEffect, Transfer,
 };
 use serde_json::{Value, json};
 
@@ -72,7 +72,7 @@ pub(super) fn scheme(setting: &Setting) -> String {
         true => {
             format!("{}, total Lagrangian, order {} in time", shape(setting), composition(setting))
         }
-        false => format!("{} + {}", shape(setting), case.integrator.to_string()),
+        false => format!("{} + {}", shape(setting), case.integrator),
     }];
     if is_total(setting) && mass(setting) == "lumped" {
         parts.push("lumped mass".into());
@@ -107,7 +107,7 @@ pub(super) fn options(setting: &Setting) -> String {
         text +=
             &format!(" --formulation total-lagrangian --mass {mass} --composition {composition}");
     } else if case.integrator != Integrator::Cd {
-        text += &format!(" --integrator {}", case.integrator.to_string());
+        text += &format!(" --integrator {}", case.integrator);
     }
     if case.transfer != Transfer::Flip {
         text += &format!(" --transfer {}", case.transfer);
@@ -147,43 +147,91 @@ pub(super) fn document(setting: &Setting) -> Value {
     })
 }
 
-/// What a knob did.
+/// What the change of a setting did.
 pub(super) fn effect(effect: &Effect, from: &Entry, to: &Entry) -> String {
     let (a, b) = (&from.setting, &to.setting);
-    let value = |setting: &Setting| match effect.knob {
-        Knob::Cells => format!("{} cells", setting.case.cells),
-        Knob::Cfl => format!("CFL {}", setting.case.cfl),
-        Knob::Ppc => format!("ppc {}", setting.case.per_cell),
-        Knob::Shape => shape(setting),
-        Knob::Integrator if is_total(setting) => format!("order {} in time", composition(setting)),
-        Knob::Integrator => setting.case.integrator.to_string(),
-        Knob::Transfer => setting.case.transfer.to_string(),
-        Knob::Layout => layout(setting).to_owned(),
-        Knob::Mass => format!("{} mass", mass(setting)),
-        Knob::Precision => (if setting.single { "f32" } else { "f64" }).to_owned(),
-        Knob::Threads => format!("{} thread(s)", setting.threads),
+    let value = |setting: &Setting| match effect.setting {
+        SettingName::Cells => format!("{} cells", setting.case.cells),
+        SettingName::Cfl => format!("CFL {}", setting.case.cfl),
+        SettingName::Ppc => format!("ppc {}", setting.case.per_cell),
+        SettingName::Shape => shape(setting),
+        SettingName::Integrator if is_total(setting) => {
+            format!("order {} in time", composition(setting))
+        }
+        SettingName::Integrator => setting.case.integrator.to_string(),
+        SettingName::Transfer => setting.case.transfer.to_string(),
+        SettingName::Layout => layout(setting).to_owned(),
+        SettingName::Mass => format!("{} mass", mass(setting)),
+        SettingName::Precision => (if setting.single { "f32" } else { "f64" }).to_owned(),
+        SettingName::Threads => format!("{} thread(s)", setting.threads),
     };
-    let percent = 100.0 * (effect.error - 1.0);
-    let error = match effect.error {
-        factor if factor < 1.0 / 1.5 => format!("the error {:.1} times smaller", 1.0 / factor),
-        factor if factor > 1.5 => format!("the error {factor:.1} times larger"),
-        _ if percent.abs() < 0.05 => "the same error".into(),
-        _ if percent < 0.0 => format!("the error {:.1} % smaller", -percent),
-        _ => format!("the error {percent:.1} % larger"),
+    // Where runs are too short, or scatter by as much as they differ, their time says nothing, and neither does this.
+    let time = match effect.time {
+        TimeEffect::Factor(range) => format!("{} times the time, ", factors(range, 2)),
+        TimeEffect::WithinScatter(_) | TimeEffect::TooShort => String::new(),
     };
-    let remark = match effect.knob {
-        Knob::Cfl if effect.error > 0.9 => "; a shorter step gains nothing here",
-        Knob::Cells if effect.error > 0.9 => "; a finer grid gains nothing here",
+    let gains = effect.error.most <= 0.9;
+    let remark = match effect.setting {
+        SettingName::Cfl if !gains => "; a shorter step gains nothing here",
+        SettingName::Cells if !gains => "; a finer grid gains nothing here",
         _ => "",
     };
-    let of = match effect.knob {
-        Knob::Cells => format!("CFL {}, {}", a.case.cfl, scheme(a)),
+    let of = match effect.setting {
+        SettingName::Cells => format!("CFL {}, {}", a.case.cfl, scheme(a)),
         _ => line(a),
     };
-    format!(
-        "{} to {}: {:.2} times the time, {error}{remark} (from {of})",
-        value(a),
-        value(b),
-        effect.time
-    )
+    let of = match effect.pairs {
+        1 => of,
+        pairs => format!("{of}, the finest of {pairs} pairs of runs"),
+    };
+    format!("{} to {}: {time}{}{remark} (from {of})", value(a), value(b), error(effect.error))
+}
+
+/// One factor where both ends of a range are as good as one, or both.
+fn factors(range: Range, digits: usize) -> String {
+    match range.most / range.least {
+        ratio if ratio < 1.05 => format!("{:.digits$}", range.middle()),
+        _ => format!("{:.digits$} to {:.digits$}", range.least, range.most),
+    }
+}
+
+/// A factor of the error.
+fn error(range: Range) -> String {
+    let Range { least, most } = range;
+    let percent = |factor: f64| 100.0 * (factor - 1.0);
+    if most < 1.0 / 1.5 {
+        let gained = Range { least: 1.0 / most, most: 1.0 / least };
+        return format!("the error {} times smaller", factors(gained, 1));
+    }
+    if least > 1.5 {
+        return format!("the error {} times larger", factors(range, 1));
+    }
+    if percent(least).abs() < 0.05 && percent(most).abs() < 0.05 {
+        return "the same error".into();
+    }
+    match (percent(least), percent(most)) {
+        (least, most) if most - least < 0.1 && most < 0.0 => {
+            format!("the error {:.1} % smaller", -least)
+        }
+        (least, most) if most - least < 0.1 => format!("the error {most:.1} % larger"),
+        (least, most) => format!("the error changed by {least:+.1} to {most:+.1} %"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn factors_are_told_with_their_spread() {
+        let range = |least, most| Range { least, most };
+        assert_eq!(factors(range(2.0, 2.0), 2), "2.00");
+        assert_eq!(factors(range(1.9, 2.1), 2), "1.90 to 2.10");
+        assert_eq!(error(range(0.25, 0.25)), "the error 4.0 times smaller");
+        assert_eq!(error(range(0.2, 0.25)), "the error 4.0 to 5.0 times smaller");
+        assert_eq!(error(range(2.0, 3.0)), "the error 2.0 to 3.0 times larger");
+        assert_eq!(error(range(1.0, 1.0001)), "the same error");
+        assert_eq!(error(range(0.9, 0.9)), "the error 10.0 % smaller");
+        assert_eq!(error(range(0.9, 1.2)), "the error changed by -10.0 to +20.0 %");
+    }
 }
