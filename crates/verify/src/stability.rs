@@ -69,9 +69,10 @@ impl Search {
     /// [`CaseError::Setting`] for a width that the solver's precision cannot resolve.
     pub fn validate(&self, arithmetic: Arithmetic<'_>) -> Result<(), CaseError> {
         let (least, admissible) = match arithmetic {
-            Arithmetic::Double => {
-                (1e-15, "at least 1e-15: in f64 CFL numbers closer than that give the same time step")
-            }
+            Arithmetic::Double => (
+                1e-15,
+                "at least 1e-15: in f64 CFL numbers closer than that give the same time step",
+            ),
             Arithmetic::Single(_) => {
                 (1e-6, "at least 1e-6: in f32 CFL numbers closer than that give the same time step")
             }

@@ -288,9 +288,7 @@ pub fn leading(effects: &[Effect], count: usize) -> Vec<&Effect> {
         (if is_first { &mut firsts } else { &mut others }).push(effect);
     }
     let mut chosen: Vec<&Effect> = firsts.into_iter().chain(others).take(count).collect();
-    chosen.sort_by(|a, b| {
-        a.setting.cmp(&b.setting).then(b.strength().total_cmp(&a.strength()))
-    });
+    chosen.sort_by(|a, b| a.setting.cmp(&b.setting).then(b.strength().total_cmp(&a.strength())));
     chosen
 }
 
@@ -1165,15 +1163,17 @@ impl Change {
                 is_usual.then_some(Self::Shape { from: x.shape, to: y.shape })
             }
             // From centred differences to another one; between compositions to the next order.
-            (SettingName::Integrator, Frame::Updated, _) => (x.integrator == Integrator::Cd)
-                .then_some(Self::Integrator(x.shape, y.integrator)),
+            (SettingName::Integrator, Frame::Updated, _) => {
+                (x.integrator == Integrator::Cd).then_some(Self::Integrator(x.shape, y.integrator))
+            }
             (SettingName::Integrator, Frame::Total(from), Frame::Total(to)) => {
                 let degree = from.scheme.degree;
                 let (from, to) = (from.scheme.composition, to.scheme.composition);
                 (to.order() == from.order() + 2).then_some(Self::Composition { degree, from })
             }
-            (SettingName::Transfer, ..) => (x.transfer == Transfer::Flip)
-                .then_some(Self::Transfer(x.shape, y.transfer)),
+            (SettingName::Transfer, ..) => {
+                (x.transfer == Transfer::Flip).then_some(Self::Transfer(x.shape, y.transfer))
+            }
             (SettingName::Layout, Frame::Updated, _) => {
                 (x.placement == Placement::Lattice).then_some(Self::Layout(basis))
             }
@@ -1185,9 +1185,7 @@ impl Change {
                 is_lumped.then_some(Self::Mass(total.scheme.degree))
             }
             (SettingName::Precision, ..) => (!a.single).then_some(Self::Precision(x.shape)),
-            (SettingName::Threads, ..) => {
-                (b.threads > a.threads).then_some(Self::Threads(x.shape))
-            }
+            (SettingName::Threads, ..) => (b.threads > a.threads).then_some(Self::Threads(x.shape)),
             // Frames are no setting that is compared.
             _ => None,
         }

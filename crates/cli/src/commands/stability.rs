@@ -5,8 +5,8 @@ mod vary;
 
 use anyhow::{Result, bail};
 use mmsmith_verify::{
-    Case, Criteria, Failure, FailureKind, Observed, Search, SearchProgress, StabilityRow, is_stable,
-    stability as find,
+    Case, Criteria, Failure, FailureKind, Observed, Search, SearchProgress, StabilityRow,
+    is_stable, stability as find,
 };
 use serde_json::{Value, json};
 use std::sync::atomic::{AtomicU64, Ordering};

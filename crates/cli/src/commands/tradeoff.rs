@@ -10,9 +10,9 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use mmsmith_verify::{
-    Arithmetic, Case, CaseError, Chosen, Effect, Entry, Goal, MARGIN, Machine, Outputs, Record, Repeat,
-    Row, Setting, Skip, Status, Tradeoff, families, leading, plan, run as simulate, time_steps,
-    tradeoff as measure, uses_threads,
+    Arithmetic, Case, CaseError, Chosen, Effect, Entry, Goal, MARGIN, Machine, Outputs, Record,
+    Repeat, Row, Setting, Skip, Status, Tradeoff, families, leading, plan, run as simulate,
+    time_steps, tradeoff as measure, uses_threads,
 };
 use serde_json::{Value, json};
 
@@ -201,14 +201,8 @@ fn sweep_in(options: &TradeoffOptions, time: Time) -> Result<Report<'_>> {
     // Some schemes use one thread, whatever is asked for.
     let pools = [1, threads].into_iter().chain(more).map(pool).collect::<Result<_>>()?;
     let keep = Keep::open(options.kept.out.as_ref(), &options.name)?;
-    let runner = Runner {
-        exact: &exact,
-        single: single.as_ref(),
-        pools,
-        time,
-        keep,
-        selection: &selection,
-    };
+    let runner =
+        Runner { exact: &exact, single: single.as_ref(), pools, time, keep, selection: &selection };
     let what =
         |setting: &Setting| plan(&exact.exact, runner.arithmetic(setting), &setting.case).ok();
     let case = Case { cfl: CFL, periods: options.periods, ..Case::default() };
