@@ -6,8 +6,8 @@ use mmsmith_verify::{Moment, Order, PerField, PerNorm, Study, Sums, Temporal};
 
 use crate::table;
 
-/// One line for each row: numbers in shortest round-trip form, empty where there is none; right of each error its rate
-/// against the row before, two decimals, `-` where there is none.
+/// One line for each row: numbers in shortest round-trip form, `nan` where there is none; right of each error its rate
+/// against the row before, two decimals, `nan` where there is none, as readers of numbers want it.
 pub(crate) fn text(study: &Study) -> String {
     let mut text = "cells,h,dt,cfl,steps,particles,wall_s,particle_steps_per_s,status".to_owned();
     head(&mut text, &study.orders);
@@ -51,7 +51,7 @@ pub(crate) fn temporal(temporal: &Temporal) -> String {
     text
 }
 
-/// A run's history: a line that says what is what, the header, and a line for each moment; empty where there is no number.
+/// A run's history: a line that says what is what, the header, and a line for each moment; `nan` where there is no number.
 pub(crate) fn history(history: &[Moment]) -> String {
     let axes = history.first().map_or(0, |moment| moment.exact.momentum.len());
     let names = |of: &str| {
@@ -76,7 +76,7 @@ pub(crate) fn history(history: &[Moment]) -> String {
         for value in values.chain(sums(computed)).chain(sums(exact)) {
             let _ = match value.is_finite() {
                 true => write!(text, ",{value:?}"),
-                false => write!(text, ","),
+                false => write!(text, ",nan"),
             };
         }
         text.push('\n');
@@ -105,9 +105,10 @@ fn values(
 ) {
     for ((_, norms), (_, orders)) in errors.named().iter().zip(orders.named()) {
         for ((_, value), (_, order)) in norms.named().iter().zip(orders.named()) {
-            let value = if value.is_finite() { format!("{value:?}") } else { String::new() };
+            let value = if value.is_finite() { format!("{value:?}") } else { "nan".into() };
             let local = index.checked_sub(1).and_then(|pair| order.local[pair]);
-            let _ = write!(text, ",{value},{}", table::rate(local));
+            let rate = local.map_or_else(|| "nan".into(), |rate| table::rate(Some(rate)));
+            let _ = write!(text, ",{value},{rate}");
         }
     }
     text.push('\n');

@@ -21,6 +21,7 @@ mod keep;
 mod library;
 mod machine;
 mod memory;
+mod npy;
 mod number;
 mod progress;
 mod svg;

@@ -2,7 +2,7 @@
 
 mod command;
 
-use command::{keys, mms, read_json, refuses};
+use command::{keys, mms, mms_with, read_json, refuses};
 use std::fs;
 
 #[test]
@@ -94,7 +94,8 @@ fn eval_gives_all_fields_at_each_point() {
     let called = mms(place.path(), "eval axis-aligned --points in.json");
     assert_eq!(called.status, 0, "{}", called.stderr);
     let fields: serde_json::Value = serde_json::from_str(&called.stdout).unwrap();
-    assert_eq!(keys(&fields), "rows schema settings");
+    assert_eq!(keys(&fields), "fields rows schema settings");
+    assert_eq!(fields["fields"], "generated");
     assert_eq!(fields["schema"], "mmsmith.eval/1");
     let rows = fields["rows"].as_array().unwrap();
     assert_eq!(rows.len(), 2);
@@ -104,6 +105,55 @@ fn eval_gives_all_fields_at_each_point() {
     let written = mms(place.path(), "eval axis-aligned --points in.json --json out.json");
     assert_eq!((written.status, written.stdout.as_str()), (0, ""));
     assert_eq!(read_json(&place.path().join("out.json")), fields);
+}
+
+#[test]
+fn eval_tells_of_points_outside_and_of_values_that_are_no_numbers() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let points = r#"[ { "X": [0.6, 0.3], "t": 0.01 }, { "X": [0.1, 0.1], "t": 0.01 }, { "X": [0, 1], "t": 0.01 } ]"#;
+    let called = mms_with(place, "eval ring --points -", &[], points);
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    assert!(called.stderr.contains("1 of 3 points lie outside the body"), "{}", called.stderr);
+    let fields: serde_json::Value = serde_json::from_str(&called.stdout).unwrap();
+    assert_eq!(fields["rows"][1]["outside"], true);
+    assert_eq!(keys(&fields["rows"][2]), "F H J P a b u v");
+
+    let points = r#"[ { "X": [0.6, 0.3], "t": 0.01 }, { "X": [0, 0], "t": 0.01 } ]"#;
+    let called = mms_with(place, "eval ring --points -", &[], points);
+    assert_eq!(called.status, 1, "{}", called.stderr);
+    assert!(called.stderr.contains("entry 1: "), "{}", called.stderr);
+    let fields: serde_json::Value = serde_json::from_str(&called.stdout).unwrap();
+    assert!(!fields["rows"][1]["not_finite"].as_array().unwrap().is_empty());
+}
+
+#[test]
+fn eval_writes_tables_and_arrays() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let points = r#"[ { "X": [0.6, 0.3], "t": 0.01 }, { "X": [0.5, 0.1], "t": 0.01 } ]"#;
+    let called = mms_with(
+        place,
+        "eval ring --points - --csv out.csv --npy arrays --json out.json",
+        &[],
+        points,
+    );
+    assert_eq!((called.status, called.stdout.as_str()), (0, ""), "{}", called.stderr);
+    let rows = read_json(&place.join("out.json"))["rows"].clone();
+    let table = fs::read_to_string(place.join("out.csv")).unwrap();
+    let lines: Vec<_> = table.lines().collect();
+    assert_eq!(lines.len(), 3);
+    assert_eq!(
+        lines[0],
+        "u1,u2,v1,v2,a1,a2,H11,H12,H21,H22,F11,F12,F21,F22,J,P11,P12,P21,P22,b1,b2"
+    );
+    let second: Vec<f64> = lines[2].split(',').map(|number| number.parse().unwrap()).collect();
+    assert_eq!(rows[1]["P"][0][1], second[16]);
+    let P = fs::read(place.join("arrays/P.npy")).unwrap();
+    let numbers: Vec<f64> =
+        P[128..].chunks(8).map(|bytes| f64::from_le_bytes(bytes.try_into().unwrap())).collect();
+    assert_eq!(numbers[4..], second[15..19]);
+    assert!(place.join("arrays/J.npy").is_file());
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! The exact fields at one point, in a form that can be written.
 
 use crate::dimension::in_dimension;
+use crate::points::outside;
 use mmsmith_solutions::{AnySolution, Fields, Solution};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
@@ -25,6 +26,39 @@ pub struct FieldRow {
     pub P: Vec<Vec<f64>>,
     /// Body force per unit mass.
     pub b: Vec<f64>,
+    /// Whether `X` lies outside the body, where the fields are those of the same formulas. Written where it is true.
+    #[serde(skip_serializing_if = "is_false")]
+    pub outside: bool,
+    /// The fields that have entries which are no finite numbers, and are written as null. Written where there are any.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub not_finite: Vec<&'static str>,
+}
+
+fn is_false(value: &bool) -> bool {
+    !value
+}
+
+/// Share of the body's size by which a point may lie outside before it is told: rounding of points on the surface.
+const OUTSIDE: f64 = 1e-12;
+
+impl FieldRow {
+    /// Each field's letter, the shape of its value at a point, and its entries row by row.
+    #[must_use]
+    pub fn named(&self) -> [(&'static str, Vec<usize>, Vec<f64>); 8] {
+        let vector = |list: &[f64]| (vec![list.len()], list.to_vec());
+        let matrix = |rows: &[Vec<f64>]| (vec![rows.len(); 2], rows.concat());
+        let named = |name, (shape, values)| (name, shape, values);
+        [
+            named("u", vector(&self.u)),
+            named("v", vector(&self.v)),
+            named("a", vector(&self.a)),
+            named("H", matrix(&self.H)),
+            named("F", matrix(&self.F)),
+            named("J", (Vec::new(), vec![self.J])),
+            named("P", matrix(&self.P)),
+            named("b", vector(&self.b)),
+        ]
+    }
 }
 
 /// A position with the wrong number of coordinates.
@@ -54,8 +88,9 @@ fn evaluate_in<const D: usize>(
 ) -> Result<FieldRow, WrongLength> {
     let position: [f64; D] =
         X.try_into().map_err(|_| WrongLength { given: X.len(), dimension: D })?;
-    let Fields { u, v, a, H, F, J, P, b } = solution.fields(&SVector::from(position), t);
-    Ok(FieldRow {
+    let X = SVector::from(position);
+    let Fields { u, v, a, H, F, J, P, b } = solution.fields(&X, t);
+    let mut row = FieldRow {
         u: list(&u),
         v: list(&v),
         a: list(&a),
@@ -64,7 +99,14 @@ fn evaluate_in<const D: usize>(
         J,
         P: rows(&P),
         b: list(&b),
-    })
+        outside: outside(&solution.domain(), &X).is_some_and(|share| share > OUTSIDE),
+        not_finite: Vec::new(),
+    };
+    let bad = |values: &[f64]| !values.iter().all(|value| value.is_finite());
+    let fields = row.named();
+    row.not_finite =
+        fields.iter().filter(|(.., values)| bad(values)).map(|(name, ..)| *name).collect();
+    Ok(row)
 }
 
 fn list<const D: usize>(vector: &SVector<f64, D>) -> Vec<f64> {

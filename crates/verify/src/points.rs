@@ -70,6 +70,20 @@ pub(crate) fn reach<const D: usize>(
     }
 }
 
+/// By how much `X` lies outside of the body, in shares of the body's size; zero or less for places in it. `None` for a shape
+/// that is not known here.
+pub(crate) fn outside<const D: usize>(domain: &Domain<f64, D>, X: &SVector<f64, D>) -> Option<f64> {
+    match domain {
+        Domain::Box { lower, upper } => {
+            let beyond = |i: usize| (lower[i] - X[i]).max(X[i] - upper[i]);
+            let distance = (0..D).map(beyond).fold(f64::NEG_INFINITY, f64::max);
+            Some(distance / (upper - lower).amax())
+        }
+        Domain::Annulus { inner, outer } => Some((inner - X.norm()).max(X.norm() - outer) / outer),
+        _ => None,
+    }
+}
+
 /// The largest extent of the body.
 pub(crate) fn size<const D: usize>(domain: &Domain<f64, D>) -> Option<f64> {
     match domain {

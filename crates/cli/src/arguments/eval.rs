@@ -17,7 +17,14 @@ pub(crate) struct EvalOptions {
     pub(crate) points: PathBuf,
     #[command(flatten)]
     pub(crate) parameters: ParameterOptions,
-    /// Write the fields to this JSON file; - is standard output, as when left out
+    /// Write the fields to this JSON file; - is standard output, as when neither this nor --csv nor --npy is given
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
+    /// Write the fields to this file as comma-separated values, a line a point; - is standard output
+    #[arg(long, value_name = "FILE")]
+    pub(crate) csv: Option<PathBuf>,
+    /// Write the fields to this folder as NumPy arrays: u.npy of shape (points, dimension), F.npy of shape (points, dimension,
+    /// dimension), J.npy of shape (points,), and so on
+    #[arg(long, value_name = "DIR")]
+    pub(crate) npy: Option<PathBuf>,
 }

@@ -12,6 +12,7 @@ use super::reference::{Scheme, Traced};
 use super::{ScoreError, ScoreOptions};
 use crate::measure::{RUNS, Row, over_particles};
 use crate::norms::{PerField, PerNorm};
+use crate::points;
 
 /// Share of the body's size by which a reference position may lie outside before it is told.
 const OUTSIDE: f64 = 1e-6;
@@ -341,21 +342,14 @@ impl<const D: usize> FrameReader<'_, D> {
     }
 }
 
-/// How many places lie outside of the body, and the furthest of them.
+/// How many places lie outside of the body, and the furthest of them, a length.
 fn outside<const D: usize>(domain: &Domain<f64, D>, X: &[SVector<f64, D>]) -> (usize, f64) {
     let size = match domain {
         Domain::Box { lower, upper } => (upper - lower).amax(),
         Domain::Annulus { outer, .. } => *outer,
         _ => return (0, 0.0),
     };
-    let distance = |X: &SVector<f64, D>| match domain {
-        Domain::Box { lower, upper } => {
-            let beyond = |i: usize| (lower[i] - X[i]).max(X[i] - upper[i]);
-            (0..D).map(beyond).fold(f64::NEG_INFINITY, f64::max)
-        }
-        Domain::Annulus { inner, outer } => (inner - X.norm()).max(X.norm() - outer),
-        _ => 0.0,
-    };
-    let distances = X.iter().map(distance).filter(|distance| *distance > OUTSIDE * size);
-    distances.fold((0, 0.0), |(count, furthest), distance| (count + 1, furthest.max(distance)))
+    let shares =
+        X.iter().filter_map(|X| points::outside(domain, X)).filter(|share| *share > OUTSIDE);
+    shares.fold((0, 0.0), |(count, furthest), share| (count + 1, furthest.max(share * size)))
 }
