@@ -22,16 +22,6 @@ impl<'a> Source<'a> {
         if path == Path::new("-") { Self::Standard } else { Self::File(path) }
     }
 
-    /// All of it.
-    pub(crate) fn bytes(self) -> Result<Vec<u8>> {
-        self.at_most(u64::MAX)
-    }
-
-    /// All of it as text.
-    pub(crate) fn text(self) -> Result<String> {
-        self.as_text(self.bytes()?)
-    }
-
     /// All of it as text, and a refusal where it is longer than `most` bytes; not more than those are read.
     pub(crate) fn short_text(self, most: u64) -> Result<String> {
         self.as_text(self.at_most(most)?)
