@@ -283,6 +283,13 @@ impl Graph {
         self.size
     }
 
+    /// The work that has been done in this graph: nodes and references made, and operands that sums and products
+    /// handled. A count, the same on every machine, however busy.
+    #[must_use]
+    pub fn work(&self) -> usize {
+        self.size + self.work
+    }
+
     /// Whether the graph is empty, which it never is: zero and one are always there.
     #[must_use]
     pub fn is_empty(&self) -> bool {
