@@ -25,8 +25,8 @@ use crate::terminal;
 const FOLDER: &str = "mms-specs";
 /// The variable with further folders, separated as those of `PATH` are.
 const VARIABLE: &str = "MMSMITH_SPECS";
-/// More bytes than any specification has; what is longer, such as a device, is not read to its end.
-const LONGEST: u64 = 64 << 20;
+/// The longest specification; what is longer, such as a device, is not read to its end.
+const LONGEST: u64 = mmsmith_spec::LONGEST_FILE as u64;
 
 /// Where a solution was found.
 #[derive(Clone, Debug)]

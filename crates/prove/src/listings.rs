@@ -3,7 +3,7 @@
 use crate::points::points;
 use mmsmith_expr::{Ast, AstKind, Expr, Graph};
 use mmsmith_maple::{CrossCheckError, Listing, Problem, Report, Target, cross_check};
-use mmsmith_spec::{CrossCheck, Diagnostic, Fields, ListingText, Spec};
+use mmsmith_spec::{CrossCheck, Diagnostic, Fields, LONGEST_FILE, ListingText, Spec, read_text};
 use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::Path;
@@ -65,7 +65,7 @@ impl<'a> Published<'a> {
                     return Err(fail(message, "give the text here: listing = '''...'''"));
                 };
                 let place = folder.join(path);
-                let text = std::fs::read_to_string(&place).map_err(|error| {
+                let text = read_text(&place, LONGEST_FILE).map_err(|error| {
                     let message = format!("cannot read the listing {}: {error}", place.display());
                     fail(message, "the path starts at the folder of the specification")
                 })?;

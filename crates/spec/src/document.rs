@@ -1,61 +1,103 @@
 //! The TOML document as it stands: tables, keys and strings with their places, no meaning yet.
 
-use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
+use crate::Diagnostic;
+use crate::scope::Source;
+use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 use std::fmt;
 use std::marker::PhantomData;
 use std::ops::Range;
 use toml::Spanned;
 
 #[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+#[serde(
+    deny_unknown_fields,
+    rename_all = "kebab-case",
+    expecting = "a specification, with name = '...' in its first line"
+)]
 pub(crate) struct Document {
     pub(crate) name: Spanned<String>,
     pub(crate) title: Spanned<String>,
     #[serde(default = "no_text")]
     pub(crate) reference: Spanned<String>,
     pub(crate) coordinates: Spanned<String>,
-    pub(crate) dimension: Spanned<usize>,
+    pub(crate) dimension: Spanned<Dimension>,
     #[serde(default)]
-    pub(crate) parameters: Entries<Spanned<ParameterTable>>,
+    pub(crate) parameters: Entries<ParameterEntry>,
     #[serde(default, rename = "let")]
     pub(crate) lets: Entries<Text>,
     #[serde(default)]
-    pub(crate) require: Vec<Text>,
+    pub(crate) require: List<Text>,
     pub(crate) displacement: Entries<Text>,
     pub(crate) material: Spanned<MaterialTable>,
     pub(crate) domain: Spanned<DomainTable>,
     #[serde(default)]
-    pub(crate) boundary: Vec<BoundaryTable>,
+    pub(crate) boundary: List<BoundaryTable>,
     pub(crate) solve: Option<Spanned<SolveTable>>,
     pub(crate) with_rotation: Option<Spanned<RotationTable>>,
     #[serde(default)]
-    pub(crate) cross_check: Vec<Spanned<CrossCheckTable>>,
+    pub(crate) cross_check: List<Spanned<CrossCheckTable>>,
     pub(crate) time: Spanned<TimeTable>,
 }
+
+/// The most parameters; each costs every evaluation of every field.
+const MOST_PARAMETERS: usize = 1_000;
+/// The most entries of `[let]`.
+const MOST_LETS: usize = 20_000;
+/// The most entries of any other list or table.
+const MOST_ENTRIES: usize = 1_000;
 
 fn no_text() -> Spanned<String> {
     Spanned::new(0..0, String::new())
 }
 
 impl Document {
+    /// Refuses more entries than can be worked through soon.
+    pub(crate) fn check_sizes(&self, source: &Source<'_>) -> Result<(), Diagnostic> {
+        let solve = self.solve.as_ref().map(Spanned::get_ref);
+        let sizes = [
+            ("[parameters]", self.parameters.0.len(), MOST_PARAMETERS),
+            ("[let]", self.lets.0.len(), MOST_LETS),
+            ("require", self.require.0.len(), MOST_ENTRIES),
+            ("[displacement]", self.displacement.0.len(), MOST_ENTRIES),
+            ("[[boundary]]", self.boundary.0.len(), MOST_ENTRIES),
+            ("[[cross-check]]", self.cross_check.0.len(), MOST_ENTRIES),
+            ("unknowns", solve.map_or(0, |s| s.unknowns.0.len()), MOST_ENTRIES),
+            ("conditions", solve.map_or(0, |s| s.conditions.0.len()), MOST_ENTRIES),
+        ];
+        for (what, count, most) in sizes {
+            if count > most {
+                let message = format!("{count} entries of {what}; {most} are the limit");
+                return Err(source.error(message, 0..0, None));
+            }
+        }
+        Ok(())
+    }
+
     /// Text for people, each with the place of what it belongs to.
     pub(crate) fn free_text(&self) -> impl Iterator<Item = (&str, Range<usize>)> {
-        let parameters = self.parameters.0.iter().flat_map(|(name, table)| {
-            let (span, table) = (name.span(), table.get_ref());
+        let parameters = self.parameters.0.iter().filter_map(|(name, entry)| match entry {
+            ParameterEntry::Table(table) => Some((name.span(), table)),
+            ParameterEntry::Bare(_) => None,
+        });
+        let parameters = parameters.flat_map(|(span, table)| {
             [(table.unit.as_str(), span.clone()), (table.description.as_str(), span)]
         });
         let head =
             [&self.title, &self.reference].map(|text| (text.get_ref().as_str(), text.span()));
-        let listings = self.cross_check.iter().map(|table| &table.get_ref().source);
+        let listings = self.cross_check.0.iter().map(|table| &table.get_ref().source);
         let listings = listings.map(|source| (source.get_ref().as_str(), source.span()));
         head.into_iter().chain(parameters).chain(listings)
     }
 }
 
 #[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+#[serde(
+    deny_unknown_fields,
+    rename_all = "kebab-case",
+    expecting = "a table, as in A = { default = 0.1 }"
+)]
 pub(crate) struct ParameterTable {
-    pub(crate) default: Spanned<f64>,
+    pub(crate) default: Spanned<Number>,
     #[serde(default)]
     pub(crate) range: Option<Text>,
     #[serde(default)]
@@ -65,7 +107,11 @@ pub(crate) struct ParameterTable {
 }
 
 #[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+#[serde(
+    deny_unknown_fields,
+    rename_all = "kebab-case",
+    expecting = "a table, as in [material] and below it law = 'neo-hookean'"
+)]
 pub(crate) struct MaterialTable {
     pub(crate) law: Spanned<String>,
     pub(crate) lambda: Option<Text>,
@@ -80,39 +126,59 @@ pub(crate) struct MaterialTable {
 }
 
 #[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+#[serde(
+    deny_unknown_fields,
+    rename_all = "kebab-case",
+    expecting = "a table, as in [domain] and below it shape = 'box', lower = [0, 0], upper = [1, 1]"
+)]
 pub(crate) struct DomainTable {
     pub(crate) shape: Spanned<String>,
-    pub(crate) lower: Option<Spanned<Vec<Text>>>,
-    pub(crate) upper: Option<Spanned<Vec<Text>>>,
+    pub(crate) lower: Option<Spanned<List<Text>>>,
+    pub(crate) upper: Option<Spanned<List<Text>>>,
     pub(crate) inner: Option<Text>,
     pub(crate) outer: Option<Text>,
     pub(crate) cell_length: Option<Text>,
 }
 
 #[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+#[serde(
+    deny_unknown_fields,
+    rename_all = "kebab-case",
+    expecting = "a table, as in [[boundary]] and below it surface = 'X-lower', condition = 'sliding'"
+)]
 pub(crate) struct BoundaryTable {
     pub(crate) surface: Spanned<String>,
     pub(crate) condition: Spanned<String>,
 }
 
 #[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+#[serde(
+    deny_unknown_fields,
+    rename_all = "kebab-case",
+    expecting = "a table, as in [solve] and below it unknowns = ['a'], conditions = ['P_RR(Ri) = 0']"
+)]
 pub(crate) struct SolveTable {
-    pub(crate) unknowns: Vec<Spanned<String>>,
-    pub(crate) conditions: Vec<Text>,
+    pub(crate) unknowns: List<Spanned<String>>,
+    pub(crate) conditions: List<Text>,
 }
 
 #[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+#[serde(
+    deny_unknown_fields,
+    rename_all = "kebab-case",
+    expecting = "a table, as in [with-rotation] and below it angle = 'omega*t'"
+)]
 pub(crate) struct RotationTable {
     pub(crate) angle: Text,
     pub(crate) axis: Option<Spanned<String>>,
 }
 
 #[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+#[serde(
+    deny_unknown_fields,
+    rename_all = "kebab-case",
+    expecting = "a table, as in [[cross-check]] and below it source = '...', file = 'listing.txt'"
+)]
 pub(crate) struct CrossCheckTable {
     pub(crate) source: Spanned<String>,
     pub(crate) listing: Option<Text>,
@@ -122,10 +188,172 @@ pub(crate) struct CrossCheckTable {
 }
 
 #[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+#[serde(
+    deny_unknown_fields,
+    rename_all = "kebab-case",
+    expecting = "a table, as in [time] and below it period = '2/c'"
+)]
 pub(crate) struct TimeTable {
     pub(crate) period: Text,
     pub(crate) wave_speed: Option<Text>,
+}
+
+/// A parameter as it is written; one without a table is met with the line to write.
+pub(crate) enum ParameterEntry {
+    Table(ParameterTable),
+    Bare(Text),
+}
+
+impl<'de> Deserialize<'de> for ParameterEntry {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        enum Entry {
+            Table(ParameterTable),
+            Bare(String),
+        }
+        struct EntryVisitor;
+        impl<'de> Visitor<'de> for EntryVisitor {
+            type Value = Entry;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a table, as in A = { default = 0.1 }")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Entry, A::Error> {
+                let table = serde::de::value::MapAccessDeserializer::new(map);
+                ParameterTable::deserialize(table).map(Entry::Table)
+            }
+
+            fn visit_i64<E>(self, value: i64) -> Result<Entry, E> {
+                Ok(Entry::Bare(value.to_string()))
+            }
+
+            fn visit_f64<E>(self, value: f64) -> Result<Entry, E> {
+                Ok(Entry::Bare(format!("{value:?}")))
+            }
+        }
+        impl<'de> Deserialize<'de> for Entry {
+            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                deserializer.deserialize_any(EntryVisitor)
+            }
+        }
+        let spanned = Spanned::<Entry>::deserialize(deserializer)?;
+        let span = spanned.span();
+        Ok(match spanned.into_inner() {
+            Entry::Table(table) => ParameterEntry::Table(table),
+            Entry::Bare(value) => ParameterEntry::Bare(Text { value, span }),
+        })
+    }
+}
+
+/// A number as a specification writes it, whole or not.
+pub(crate) struct Number(pub(crate) f64);
+
+impl<'de> Deserialize<'de> for Number {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct NumberVisitor;
+        impl Visitor<'_> for NumberVisitor {
+            type Value = Number;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a number without quotes, as in 0.1")
+            }
+
+            fn visit_i64<E>(self, value: i64) -> Result<Number, E> {
+                Ok(Number(value as f64))
+            }
+
+            fn visit_f64<E>(self, value: f64) -> Result<Number, E> {
+                Ok(Number(value))
+            }
+        }
+        deserializer.deserialize_any(NumberVisitor)
+    }
+}
+
+/// The number of space dimensions as it is written.
+pub(crate) struct Dimension(pub(crate) usize);
+
+impl<'de> Deserialize<'de> for Dimension {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct DimensionVisitor;
+        impl Visitor<'_> for DimensionVisitor {
+            type Value = Dimension;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("1, 2 or 3, without quotes")
+            }
+
+            fn visit_i64<E: serde::de::Error>(self, value: i64) -> Result<Dimension, E> {
+                let whole = usize::try_from(value).map(Dimension);
+                let unexpected = serde::de::Unexpected::Signed(value);
+                whole.map_err(|_| E::invalid_value(unexpected, &self))
+            }
+        }
+        deserializer.deserialize_any(DimensionVisitor)
+    }
+}
+
+/// What stands in a list, and how such a list is written.
+pub(crate) trait Listed {
+    /// For messages where there is something else.
+    const FORM: &'static str;
+}
+
+impl Listed for Text {
+    const FORM: &'static str = "a list in brackets, as in ['...', '...']";
+}
+
+impl Listed for Spanned<String> {
+    const FORM: &'static str = "a list of names in brackets, as in ['a', 'b']";
+}
+
+impl Listed for BoundaryTable {
+    const FORM: &'static str =
+        "[[boundary]] in two pairs of brackets, once for each surface, with surface and condition";
+}
+
+impl Listed for Spanned<CrossCheckTable> {
+    const FORM: &'static str =
+        "[[cross-check]] in two pairs of brackets, once for each listing, with source and listing";
+}
+
+/// A list, or tables of one name.
+pub(crate) struct List<V>(pub(crate) Vec<V>);
+
+impl<V> std::ops::Deref for List<V> {
+    type Target = [V];
+
+    fn deref(&self) -> &[V] {
+        &self.0
+    }
+}
+
+impl<V> Default for List<V> {
+    fn default() -> Self {
+        List(Vec::new())
+    }
+}
+
+impl<'de, V: Deserialize<'de> + Listed> Deserialize<'de> for List<V> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct ListVisitor<V>(PhantomData<V>);
+        impl<'de, V: Deserialize<'de> + Listed> Visitor<'de> for ListVisitor<V> {
+            type Value = List<V>;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(V::FORM)
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<List<V>, A::Error> {
+                let mut values = Vec::new();
+                while let Some(value) = list.next_element()? {
+                    values.push(value);
+                }
+                Ok(List(values))
+            }
+        }
+        deserializer.deserialize_seq(ListVisitor(PhantomData))
+    }
 }
 
 /// The text of an expression and its place; a bare number counts as text.
@@ -203,7 +431,7 @@ impl<'de, V: Deserialize<'de>> Deserialize<'de> for Entries<V> {
             type Value = Entries<V>;
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a table")
+                f.write_str("a table of lines such as name = '...'")
             }
 
             fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Entries<V>, A::Error> {

@@ -14,8 +14,10 @@ mod derive;
 mod diagnostic;
 mod document;
 mod law;
+mod read;
 mod rotation;
 mod scope;
+mod sense;
 mod solve;
 mod spec;
 mod surface;
@@ -25,6 +27,7 @@ pub use coordinates::Coordinates;
 pub use cross_check::{CrossCheck, InlineText, ListingText};
 pub use derive::{DeriveError, Fields};
 pub use diagnostic::{Diagnostic, nearest};
+pub use read::{LONGEST_FILE, ReadError, read_text};
 pub use rotation::Rotation;
 pub use solve::{Solved, SolvedCondition};
 pub use spec::{

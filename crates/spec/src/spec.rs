@@ -4,7 +4,8 @@ use std::fmt;
 
 use crate::coordinates::CARTESIAN;
 use crate::diagnostic::nearest;
-use crate::document::{BoundaryTable, Document, DomainTable, Entries, Text};
+use crate::document::{BoundaryTable, Document, DomainTable, Entries, List, ParameterEntry, Text};
+use crate::read::LONGEST_FILE;
 use crate::law::energy::{INVARIANTS, component_names};
 use crate::scope::{Scope, Source};
 use crate::{Coordinates, CrossCheck, DeriveError, Diagnostic, Fields, Rotation, Solved};
@@ -407,6 +408,12 @@ impl Spec {
     /// A [`Diagnostic`] for the first mistake found.
     pub fn parse(text: &str, file: &str) -> Result<Self, Diagnostic> {
         let source = Source { file, text };
+        if text.len() > LONGEST_FILE {
+            // Nothing of it is shown: nobody looks through a line of so many bytes.
+            let message =
+                format!("a specification of {} bytes; {LONGEST_FILE} are the limit", text.len());
+            return Err(Source { file, text: "" }.error(message, 0..0, None));
+        }
         if let Some((start, c)) = text.char_indices().find(|(_, c)| turns_text(*c)) {
             return Err(turning_character(&source, c, start..start + c.len_utf8()));
         }
@@ -414,6 +421,7 @@ impl Spec {
             let span = e.span().unwrap_or(0..0);
             source.error(e.message().to_owned(), span, None)
         })?;
+        document.check_sizes(&source)?;
         // Escapes may hide them, too.
         for (text, span) in document.free_text() {
             if let Some(c) = text.chars().find(|c| turns_text(*c)) {
@@ -461,7 +469,7 @@ impl<'a> Reader<'a> {
             let help = format!("coordinates = {}", Coordinates::known());
             return Err(source.error(message, document.coordinates.span(), Some(help)));
         };
-        let dimension = *document.dimension.get_ref();
+        let dimension = document.dimension.get_ref().0;
         if !coordinates.allows_dimension(dimension) {
             let message =
                 format!("{} coordinates do not come in {dimension} dimensions", coordinates.name());
@@ -475,7 +483,7 @@ impl<'a> Reader<'a> {
     fn read(mut self, document: &Document) -> Result<Spec, Diagnostic> {
         let parameters = self.parameters(document)?;
         let solve = document.solve.as_ref();
-        for unknown in solve.map_or(&[][..], |table| table.get_ref().unknowns.as_slice()) {
+        for unknown in solve.map_or(&[][..], |table| table.get_ref().unknowns.0.as_slice()) {
             self.scope.declare_unknown(unknown.get_ref(), unknown.span())?;
         }
         self.scope.define_all(&document.lets.0)?;
@@ -492,16 +500,18 @@ impl<'a> Reader<'a> {
         };
         let boundaries = document
             .boundary
+            .0
             .iter()
             .map(|table| self.boundary(table, &domain))
             .collect::<Result<Vec<_>, _>>()?;
         let mut rotation = None;
         if let Some(table) = &document.with_rotation {
             rotation = Some(Rotation::read(&mut self.scope, table, self.dimension)?);
-            Rotation::check(&self.scope, table, &material, &boundaries, &document.boundary)?;
+            Rotation::check(&self.scope, table, &material, &boundaries, &document.boundary.0)?;
         }
         let cross_checks = document
             .cross_check
+            .0
             .iter()
             .map(|table| CrossCheck::read(&mut self.scope, table))
             .collect::<Result<Vec<_>, _>>()?;
@@ -533,6 +543,7 @@ impl<'a> Reader<'a> {
             wave_speed,
             period,
         };
+        crate::sense::check(&self.scope, document, &spec)?;
         if let Some(table) = solve {
             spec.solve(&self.scope, table)?;
         }
@@ -543,8 +554,16 @@ impl<'a> Reader<'a> {
         let mut parameters = Vec::new();
         for (name, table) in &document.parameters.0 {
             self.scope.declare(name.get_ref(), name.span())?;
-            let table = table.get_ref();
-            let default = *table.default.get_ref();
+            let table = match table {
+                ParameterEntry::Table(table) => table,
+                ParameterEntry::Bare(value) => {
+                    let name = name.get_ref();
+                    let message = format!("the parameter '{name}' is a table, not a value alone");
+                    let help = format!("{name} = {{ default = {} }}", value.value);
+                    return Err(self.scope.source.error(message, value.span.clone(), Some(help)));
+                }
+            };
+            let default = table.default.get_ref().0;
             let bounds = match &table.range {
                 Some(range) => self.bounds(range)?,
                 None => Vec::new(),
@@ -607,7 +626,7 @@ impl<'a> Reader<'a> {
         parameters: &[Parameter],
     ) -> Result<Vec<Requirement>, Diagnostic> {
         let mut requirements = Vec::new();
-        for text in &document.require {
+        for text in &document.require.0 {
             let split = Relation::SIGNS
                 .iter()
                 .find_map(|(sign, relation)| Some((*relation, text.value.split_once(sign)?)));
@@ -847,17 +866,17 @@ impl<'a> Reader<'a> {
         Ok(Domain::Box { lower: self.corner(&keys.lower)?, upper: self.corner(&keys.upper)? })
     }
 
-    fn corner(&mut self, texts: &Option<Spanned<Vec<Text>>>) -> Result<Vec<Expr>, Diagnostic> {
+    fn corner(&mut self, texts: &Option<Spanned<List<Text>>>) -> Result<Vec<Expr>, Diagnostic> {
         let Some(texts) = texts else { return Ok(Vec::new()) };
-        if texts.get_ref().len() != self.dimension {
+        if texts.get_ref().0.len() != self.dimension {
             let message = format!(
                 "{} coordinate(s) given for a corner in {} dimension(s)",
-                texts.get_ref().len(),
+                texts.get_ref().0.len(),
                 self.dimension
             );
             return Err(self.scope.source.error(message, texts.span(), None));
         }
-        texts.get_ref().iter().map(|text| self.scope.constant(text, "a corner")).collect()
+        texts.get_ref().0.iter().map(|text| self.scope.constant(text, "a corner")).collect()
     }
 
     fn boundary(&mut self, table: &BoundaryTable, domain: &Domain) -> Result<Boundary, Diagnostic> {

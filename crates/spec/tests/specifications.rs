@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 use mmsmith_expr::{Ast, Graph};
-use mmsmith_spec::{DeriveError, Diagnostic, ListingText, Spec, Surface};
+use mmsmith_spec::{DeriveError, Diagnostic, LONGEST_FILE, ListingText, Spec, Surface};
 use std::path::{Path, PathBuf};
 
 fn cases(folder: &str) -> Vec<PathBuf> {
@@ -52,6 +52,25 @@ fn mistakes_get_the_expected_message() {
         }
     }
     assert!(failures.is_empty(), "{}", failures.join("\n\n"));
+}
+
+#[test]
+fn files_and_tables_without_end_are_refused_at_their_limit() {
+    let parameters = |count: usize| {
+        let lines: String = (0..count).map(|n| format!("p{n} = {{ default = 1 }}\n")).collect();
+        format!(
+            "name = 'a'\ntitle = 'A'\ncoordinates = 'cartesian'\ndimension = 1\n[parameters]\n{lines}\
+             [displacement]\nX = 'p0*X*t/9'\n[material]\nlaw = 'neo-hookean'\nlambda = 1\nmu = 1\ndensity = 1\n\
+             [domain]\nshape = 'box'\nlower = [0]\nupper = [1]\n[time]\nperiod = 1\n"
+        )
+    };
+    assert!(Spec::parse(&parameters(1_000), "many.toml").is_ok());
+    let message = |text: &str| Spec::parse(text, "many.toml").unwrap_err().to_string();
+    let found = message(&parameters(1_001));
+    assert!(found.contains("1001 entries of [parameters]; 1000 are the limit"), "{found}");
+    let long = parameters(1) + &"\n".repeat(LONGEST_FILE);
+    let found = message(&long);
+    assert!(found.contains(&format!("{} bytes; {LONGEST_FILE} are", long.len())), "{found}");
 }
 
 #[test]
