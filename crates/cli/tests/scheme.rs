@@ -1,5 +1,7 @@
 //! Schemes that are chosen where nothing is said, as a user meets them.
 
+#![allow(non_snake_case)]
+
 mod command;
 
 use command::{mms, read_json, refuses};
@@ -175,4 +177,59 @@ fn steps_on_one_thread_are_called_so() {
     }
     let called = mms(place, "run axis-aligned-1d --cells 8 --threads 2");
     assert!(called.stdout.contains(", 2 thread(s)\n"), "{}", called.stdout);
+}
+
+#[test]
+fn errors_at_rounding_judge_nothing() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let study = "converge axis-aligned-1d --frame total --shape bspline5 --cfl 0.2";
+    let called = mms(place, &format!("{study} --cells 128,256 --expect u.linf=1 --tolerance 0.1"));
+    assert_eq!(called.status, 1, "{}", called.stdout);
+    let expected = "FAILED, fewer than two errors above rounding";
+    assert!(called.stdout.contains(expected), "{}", called.stdout);
+    assert!(called.stdout.contains("at rounding"), "{}", called.stdout);
+    // Finer grids than that do not hide the order of the others.
+    let called = mms(place, &format!("{study} --cells 16,32,256 --json study.json"));
+    assert_eq!(called.status, 0, "{}", called.stdout);
+    let study = read_json(&place.join("study.json"));
+    let verdict = &study["verdicts"]["u"]["l2"];
+    assert_eq!(verdict["rounding_rows"], serde_json::json!([2]));
+    assert_eq!((&verdict["passed"], verdict["expected"].as_f64()), (&true.into(), Some(6.0)));
+    assert!(study["orders"]["u"]["l2"]["local"][1].is_null());
+}
+
+#[test]
+fn errors_that_say_nothing_are_no_success() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let status = |call: &str| {
+        let called = mms(place, &format!("{call} --json row.json"));
+        assert_eq!(called.status, 0, "{}", called.stderr);
+        let row = read_json(&place.join("row.json"))["result"].clone();
+        (row["status"].as_str().unwrap().to_owned(), row["errors"].clone())
+    };
+    let (tiny, errors) = status("run axis-aligned --cells 8 --set A=1e-200");
+    assert!(tiny.contains("not judged") && tiny.contains("below the rounding"), "{tiny}");
+    // All of the displacement is missing.
+    let u = errors["u"]["linf"].as_f64().unwrap();
+    assert!((0.9e-200..1.1e-200).contains(&u), "{u:e}");
+    assert!(errors["u"]["l2"].as_f64().unwrap() > 1e-201, "{errors}");
+    // In single precision positions are rounded at more.
+    let (single, _) = status("run axis-aligned --cells 8 --set A=1e-9 --precision f32");
+    assert!(single.contains("not judged"), "{single}");
+    assert_eq!(status("run axis-aligned --cells 8 --set A=1e-9").0, "ok");
+    // A body at rest is at rest.
+    assert_eq!(status("run axis-aligned --cells 8 --set A=0").0, "ok");
+    let (stiff, errors) = status("run axis-aligned --cells 8 --set E=1e160");
+    assert_eq!(stiff, "ok");
+    let P = [&errors["P"]["linf"], &errors["P"]["l2"], &errors["P"]["l1"]];
+    assert!(P.iter().all(|norm| norm.as_f64().is_some_and(|norm| norm > 1e157)), "{errors}");
+    let study = "converge axis-aligned --cells 8,16";
+    let called = mms(place, &format!("{study} --set A=1e-200"));
+    assert_eq!(called.status, 1, "{}", called.stdout);
+    assert!(called.stdout.contains("FAILED, the finest run's errors say nothing"));
+    assert!(!called.stdout.contains("STOPPED"), "{}", called.stdout);
+    let called = mms(place, &format!("{study} --set E=1e160"));
+    assert_eq!(called.status, 0, "{}", called.stdout);
 }

@@ -9,7 +9,7 @@ use mmsmith_mpm::general::{Integrator, Shape, Transfer};
 use mmsmith_mpm::{AtTime, BodyForce, Particles, Settings, SetupError, Simulation, StepError};
 use mmsmith_solutions::{AnySolution, BodyForceAtPoints, Material, Real, Solution};
 use nalgebra::SVector;
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Serialize, Serializer};
 use thiserror::Error;
 
 use crate::checkpoint::{CheckpointError, Checkpoints, Reached, TakenUp};
@@ -18,8 +18,9 @@ use crate::frames::{FrameOutput, FrameWriter, Snapshot};
 use crate::general::{self, Placement, Precision};
 use crate::history::{Moment, Recorder};
 use crate::measure::Comparison;
-use crate::norms::{PerField, PerNorm};
+use crate::norms::{PerField, PerNorm, magnitude};
 use crate::plan::{MOST_STEPS, Steps, prepare};
+use crate::points;
 use crate::scene::{Extent, Scene, SceneError};
 use crate::solver::Solver;
 use crate::total::{CflSpeed, Frame};
@@ -174,6 +175,19 @@ pub enum Status {
         /// The body's largest extent.
         size: f64,
     },
+    /// At the end time, but the motion is too small to be told from rest in the positions' precision, so that the errors say
+    /// nothing.
+    Unresolved {
+        /// The largest displacement of the exact motion that was seen.
+        displacement: f64,
+        /// The rounding of a position.
+        resolution: f64,
+    },
+    /// At the end time, with an error that is not a number.
+    NotFinite {
+        /// The field.
+        field: ErrorField,
+    },
     /// The time that it was given was over.
     Cut {
         /// The last step done.
@@ -181,6 +195,48 @@ pub enum Status {
         /// Its time.
         time: f64,
     },
+}
+
+/// A field whose error is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ErrorField {
+    /// Displacement.
+    #[serde(rename = "u")]
+    Displacement,
+    /// Velocity.
+    #[serde(rename = "v")]
+    Velocity,
+    /// Deformation gradient.
+    #[serde(rename = "F")]
+    DeformationGradient,
+    /// First Piola-Kirchhoff stress.
+    #[serde(rename = "P")]
+    Stress,
+}
+
+impl ErrorField {
+    /// All of them, in the order of [`PerField`].
+    pub const ALL: [Self; 4] =
+        [Self::Displacement, Self::Velocity, Self::DeformationGradient, Self::Stress];
+
+    /// Its letter.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Displacement => "u",
+            Self::Velocity => "v",
+            Self::DeformationGradient => "F",
+            Self::Stress => "P",
+        }
+    }
+}
+
+impl Status {
+    /// Whether the run came to its end time, and its errors say nothing all the same.
+    #[must_use]
+    pub fn is_not_judged(&self) -> bool {
+        matches!(self, Self::Unresolved { .. } | Self::NotFinite { .. })
+    }
 }
 
 impl fmt::Display for Status {
@@ -193,6 +249,14 @@ impl fmt::Display for Status {
                 "unstable: position error {error:.3e} exceeds the body's size {size:.3e} at step {step}, \
                  t = {time:.6e}, particle {particle}"
             ),
+            Self::Unresolved { displacement, resolution } => write!(
+                f,
+                "not judged: the largest displacement {displacement:.3e} is below the rounding {resolution:.3e} of \
+                 positions; errors say nothing"
+            ),
+            Self::NotFinite { field } => {
+                write!(f, "not judged: an error of {} is not a finite number", field.name())
+            }
             Self::Cut { step, time } => {
                 write!(f, "cut after step {step}, t = {time:.6e}: its time was over")
             }
@@ -360,7 +424,41 @@ fn run_in<T: Precision, const D: usize>(
     let dt = time_step.to_f64();
 
     let (mut solver, body_force) = set_up(exact, model, case, &scene, time_step)?;
-    follow(solver.as_mut(), &body_force, exact, case, &scene, Steps { dt, ..steps }, outputs)
+    let steps = Steps { dt, ..steps };
+    let mut row = follow(solver.as_mut(), &body_force, exact, case, &scene, steps, outputs)?;
+    if row.status == Status::Ok {
+        let unit = T::default_epsilon().to_f64() / 2.0;
+        let end = steps.count as f64 * dt;
+        row.status = judged(exact, &row.errors, end, unit * scene.reach());
+    }
+    Ok(row)
+}
+
+/// The status of a run that came to its end: whether its errors say anything.
+fn judged<const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    errors: &PerField<PerNorm<f64>>,
+    end: f64,
+    resolution: f64,
+) -> Status {
+    const SAMPLES: usize = 64;
+    let domain = exact.domain();
+    // Periodic motion repeats.
+    let span = end.min(exact.period());
+    let seen = (0..SAMPLES).filter_map(|n| points::interior(&domain, span, n));
+    let displacement = seen
+        .flat_map(|(X, t)| [0.0, t].map(|t| exact.displacement(&X, t)))
+        .map(|u| magnitude(u.iter().copied()))
+        .fold(0.0, f64::max);
+    // A body at rest is at rest in every precision.
+    if displacement > 0.0 && displacement <= resolution {
+        return Status::Unresolved { displacement, resolution };
+    }
+    let norms = errors.named().into_iter().zip(ErrorField::ALL);
+    norms
+        .into_iter()
+        .find(|((_, norms), _)| norms.named().iter().any(|(_, value)| !value.is_finite()))
+        .map_or(Status::Ok, |(_, field)| Status::NotFinite { field })
 }
 
 /// Steps to the end and measures the errors on the way.

@@ -45,7 +45,9 @@ mod tradeoff;
 mod verdict;
 mod whole_file;
 
-pub use case::{Arithmetic, Case, CaseError, Outputs, Progress, Row, Start, Status, run};
+pub use case::{
+    Arithmetic, Case, CaseError, ErrorField, Outputs, Progress, Row, Start, Status, run,
+};
 pub use check::{
     BLUNT, CheckError, CheckReport, Finding, OWN_ERROR_FACTOR, TOLERANCE, Verdict, check,
 };
@@ -61,7 +63,7 @@ pub use mmsmith_mpm::general::{Integrator, Shape, Transfer};
 pub use mmsmith_mpm::total_lagrangian::{Composition, Coordinates, Layout, MassMatrix, Scheme};
 pub use norms::{PerField, PerNorm};
 pub use order::Order;
-pub use plan::{Plan, plan};
+pub use plan::{Plan, plan, round_off};
 pub use record::{Record, TemporalRecord};
 pub use scene::{Extent, SceneError, needs_total_frame};
 pub use score::{
@@ -72,7 +74,7 @@ pub use stability::{
     Criteria, Failure, FailureKind, Observed, Search, SearchProgress, StabilityRow, is_stable,
     p_wave_limit, stability,
 };
-pub use study::{Study, StudyError, Sweep, converge};
+pub use study::{Study, StudyError, Sweep, converge, orders_above};
 pub use temporal::{Temporal, TemporalRow, temporal};
 pub use total::{CflSpeed, Frame, POLAR_ANGLES, TotalScheme};
 pub use tradeoff::{
@@ -81,7 +83,7 @@ pub use tradeoff::{
     differences, extrapolate, families, leading, median, pareto, tradeoff,
 };
 pub use verdict::{
-    Behaviour, Expected, ORDER_TOLERANCE, Verdict as OrderVerdict, expected_in_space,
-    expected_in_time, verdicts,
+    Behaviour, Expected, ORDER_TOLERANCE, Values, Verdict as OrderVerdict, expected_in_space,
+    expected_in_time, verdicts, verdicts_above,
 };
 pub use whole_file::WholeFile;

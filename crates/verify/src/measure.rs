@@ -8,7 +8,7 @@ use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use crate::norms::{PerField, PerNorm, Tallies, Tally};
+use crate::norms::{PerField, PerNorm, Tallies, Tally, is_squarable, magnitude};
 
 /// Particles in a group that one thread works on; fixed, so that sums do not depend on the number of threads.
 const GROUP: usize = 1024;
@@ -190,6 +190,36 @@ fn errors<T: Real, const D: usize>(
         magnitudes[2][n] = distance(&run.F, &exact.F, n);
         magnitudes[3][n] = distance(&run.P, &exact.P, n);
     }
+    // Squares that have vanished or overflowed: once more, with a scale.
+    for (field, magnitudes) in magnitudes.iter_mut().enumerate() {
+        if magnitudes.iter().all(|magnitude| is_squarable(*magnitude)) {
+            continue;
+        }
+        rescale(run, exact, field, magnitudes);
+    }
+}
+
+/// The magnitudes of the errors of one field, whatever their size.
+#[cold]
+fn rescale<T: Real, const D: usize>(
+    run: &Run<T, D>,
+    exact: &StateRun<f64, D>,
+    field: usize,
+    magnitudes: &mut Row<f64>,
+) {
+    for (n, value) in magnitudes.iter_mut().enumerate().filter(|(_, value)| !is_squarable(**value))
+    {
+        let vector = |error: &dyn Fn(usize) -> f64| magnitude((0..D).map(error));
+        let matrix = |error: &dyn Fn(usize, usize) -> f64| {
+            magnitude((0..D * D).map(|k| error(k % D, k / D)))
+        };
+        *value = match field {
+            0 => vector(&|i| run.x[i][n].to_f64() - run.X[i][n].to_f64() - exact.u[i][n]),
+            1 => vector(&|i| run.v[i][n].to_f64() - exact.v[i][n]),
+            2 => matrix(&|i, j| run.F[i][j][n].to_f64() - exact.F[i][j][n]),
+            _ => matrix(&|i, j| run.P[i][j][n].to_f64() - exact.P[i][j][n]),
+        };
+    }
 }
 
 /// The place of each number below `count`, and the number of each place, where the numbers stand in as many runs as there are
@@ -221,7 +251,7 @@ pub(crate) fn over_particles<R, const N: usize>(
     room: impl Fn() -> R + Sync,
     magnitudes: impl Fn(&mut R, usize, &mut [[Row<f64>; N]]) + Sync,
 ) -> [PerNorm<f64>; N] {
-    let group = |g: usize| {
+    let pass = |g: usize, scales: [f64; N]| {
         let mut room = room();
         let mut chunk = [[[0.0; BLOCK]; N]; RUNS];
         let mut tallies = [Tallies::default(); N];
@@ -235,9 +265,19 @@ pub(crate) fn over_particles<R, const N: usize>(
             {
                 rows.iter_mut().for_each(|row| row[filled..].fill(0.0));
             }
+            for (n, scale) in scales.into_iter().enumerate().filter(|(_, scale)| *scale != 1.0) {
+                chunk.iter_mut().for_each(|rows| rows[n].iter_mut().for_each(|m| *m /= scale));
+            }
             Arch::new().dispatch(Add { rows: chunk, tallies: &mut tallies });
         }
-        tallies.map(|tallies| tallies.joined())
+        let mut scaled = tallies.map(|tallies| tallies.joined());
+        scaled.iter_mut().zip(scales).for_each(|(tally, scale)| *tally = tally.divided_by(scale));
+        scaled
+    };
+    let group = |g: usize| {
+        let tallies = pass(g, [1.0; N]);
+        let scales = tallies.map(|tally| tally.scale_to_take());
+        if scales == [1.0; N] { tallies } else { pass(g, scales) }
     };
     let groups = count.div_ceil(GROUP);
     let place = backwards(groups, rayon::current_num_threads());

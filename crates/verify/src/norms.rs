@@ -65,28 +65,96 @@ fn larger(a: f64, b: f64) -> f64 {
     if a >= b || a.is_nan() { a } else { b }
 }
 
-/// Sums over one group of particles at one step.
-#[derive(Clone, Copy, Debug, Default)]
+/// Between these, squares of magnitudes and their sums neither vanish nor overflow.
+const SQUARABLE: std::ops::RangeInclusive<f64> = 1e-140..=1e140;
+
+/// The power of two that magnitudes are divided by before they are squared, where the largest of them is `max`: one unless
+/// their squares would vanish or overflow.
+pub(crate) fn scale_of(max: f64) -> f64 {
+    if max == 0.0 || !max.is_finite() || SQUARABLE.contains(&max) {
+        return 1.0;
+    }
+    // Its inverse is a number, too.
+    2.0_f64.powi(max.log2().floor().clamp(-1000.0, 1000.0) as i32)
+}
+
+/// The root of the sum of the squares of components, whatever their size.
+pub(crate) fn magnitude(components: impl Iterator<Item = f64> + Clone) -> f64 {
+    let largest = components.clone().fold(0.0, |largest, c: f64| larger(largest, c.abs()));
+    let scale = scale_of(largest);
+    scale * components.fold(0.0, |sum, c| sum + (c / scale) * (c / scale)).sqrt()
+}
+
+/// Whether squares have served well for a magnitude; for zero they may have vanished.
+#[inline(always)]
+pub(crate) fn is_squarable(magnitude: f64) -> bool {
+    SQUARABLE.contains(&magnitude)
+}
+
+/// Sums over one group of particles at one step, of magnitudes divided by a power of two.
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Tally {
     max: f64,
     square: f64,
     sum: f64,
+    scale: f64,
+}
+
+impl Default for Tally {
+    fn default() -> Self {
+        Self { max: 0.0, square: 0.0, sum: 0.0, scale: 1.0 }
+    }
 }
 
 impl Tally {
     /// Appends the sums of the next group.
     pub(crate) fn join(&self, next: &Self) -> Self {
+        if self.scale != next.scale {
+            // What has no magnitude has no scale.
+            let scale = match (self.max == 0.0, next.max == 0.0) {
+                (true, _) => next.scale,
+                (_, true) => self.scale,
+                _ => self.scale.max(next.scale),
+            };
+            return self.at(scale).join(&next.at(scale));
+        }
         Self {
             max: larger(self.max, next.max),
             square: self.square + next.square,
             sum: self.sum + next.sum,
+            scale: self.scale,
         }
+    }
+
+    /// The same with magnitudes divided by another power of two.
+    fn at(&self, scale: f64) -> Self {
+        let ratio = self.scale / scale;
+        Self {
+            max: self.max * ratio,
+            square: self.square * ratio * ratio,
+            sum: self.sum * ratio,
+            scale,
+        }
+    }
+
+    /// Sums of magnitudes that had been divided by `scale`.
+    pub(crate) fn divided_by(self, scale: f64) -> Self {
+        Self { scale, ..self }
+    }
+
+    /// The power of two that these magnitudes have to be divided by before they are squared.
+    pub(crate) fn scale_to_take(&self) -> f64 {
+        scale_of(self.max)
     }
 
     /// The norms over `count` particles.
     pub(crate) fn norms(&self, count: usize) -> PerNorm<f64> {
         let count = count as f64;
-        PerNorm { linf: self.max, l2: (self.square / count).sqrt(), l1: self.sum / count }
+        PerNorm {
+            linf: self.scale * self.max,
+            l2: self.scale * (self.square / count).sqrt(),
+            l1: self.scale * (self.sum / count),
+        }
     }
 }
 
@@ -118,7 +186,8 @@ impl<const N: usize> Tallies<N> {
 
     /// The sums of all sequences, one after the other.
     pub(crate) fn joined(&self) -> Tally {
-        let own = |n| Tally { max: self.max[n], square: self.square[n], sum: self.sum[n] };
+        let own =
+            |n| Tally { max: self.max[n], square: self.square[n], sum: self.sum[n], scale: 1.0 };
         (0..N).map(own).fold(Tally::default(), |all, next| all.join(&next))
     }
 }
@@ -149,6 +218,37 @@ mod tests {
         assert_eq!(norms.linf, 4.0);
         assert!((norms.l2 - (25.0_f64 / 3.0).sqrt()).abs() < 1e-15);
         assert!((norms.l1 - 7.0 / 3.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn magnitudes_whose_squares_are_no_numbers_have_norms_all_the_same() {
+        for unit in [1e-310, 1e-200, 1e-141, 1.0, 1e141, 1e160, 1e300] {
+            let scale = scale_of(4.0 * unit);
+            let mut tally = Tallies::<1>::default();
+            [3.0, 4.0, 0.0].iter().for_each(|value| tally.add(&[value * unit / scale]));
+            let norms = tally.joined().divided_by(scale).join(&Tally::default()).norms(3);
+            assert!((norms.linf / unit / 4.0 - 1.0).abs() < 1e-12, "{unit:e} {norms:?}");
+            assert!((norms.l2 / unit / (25.0_f64 / 3.0).sqrt() - 1.0).abs() < 1e-12, "{unit:e}");
+            assert!((norms.l1 / unit / (7.0 / 3.0) - 1.0).abs() < 1e-12, "{unit:e}");
+            let length = magnitude([3.0 * unit, -4.0 * unit].into_iter());
+            assert!((length / unit / 5.0 - 1.0).abs() < 1e-12, "{unit:e} {length:e}");
+        }
+        assert!(magnitude([f64::NAN, 1.0].into_iter()).is_nan());
+        assert_eq!(magnitude([f64::INFINITY, 1.0].into_iter()), f64::INFINITY);
+    }
+
+    #[test]
+    fn groups_of_very_different_size_are_joined_in_the_larger_ones_scale() {
+        let one = |value: f64| {
+            let scale = scale_of(value);
+            let mut tally = Tallies::<1>::default();
+            tally.add(&[value / scale]);
+            tally.joined().divided_by(scale)
+        };
+        for (a, b) in [(1e-200, 2.0), (2.0, 1e-200), (1e200, 2.0), (1e-200, 1e200)] {
+            let norms = one(a).join(&one(b)).norms(1);
+            assert!((norms.l2 / a.max(b) - 1.0).abs() < 1e-14, "{a:e} {b:e}");
+        }
     }
 
     #[test]

@@ -5,8 +5,9 @@ use mmsmith_solutions::{AnySolution, Solution};
 use crate::case::{Arithmetic, Case, CaseError};
 use crate::dimension::in_dimension;
 use crate::general;
+use crate::norms::PerField;
 use crate::scene::{Extent, Scene};
-use crate::total::Frame;
+use crate::total::{CflSpeed, Frame};
 
 /// Steps that no run should have; a typing error in a CFL number reaches it easily.
 pub(crate) const MOST_STEPS: f64 = 1e12;
@@ -22,8 +23,8 @@ pub struct Plan {
     pub bytes: f64,
     /// How much of an annulus is modelled; `None` for other shapes.
     pub extent: Option<Extent>,
-    /// The error of `u` that rounding alone may cause, a length: half a unit in the last place of the body's size
-    /// at each step, added up as a random walk.
+    /// The error of `u` that rounding alone may cause, a length: half a unit in the last place of the body's size,
+    /// or of its largest coordinate, at each step, added up as a random walk.
     pub round_off: f64,
 }
 
@@ -42,6 +43,32 @@ pub fn plan(
         Arithmetic::Single(_) => (size_of::<f32>(), f64::from(f32::EPSILON) / 2.0),
     };
     in_dimension!(exact, |s| plan_in(s, scalar, unit, case), else Err(CaseError::Dimension))
+}
+
+/// The errors that rounding alone may cause, field by field.
+///
+/// That of `u` is the plan's. Between neighbouring nodes it differs by as much, so that the deformation gradient has it over
+/// the spacing, stresses that times the stiffness, and velocities that times the speed of P-waves, which carry it on.
+///
+/// # Errors
+///
+/// [`CaseError`] for settings that cannot be run.
+pub fn round_off(
+    exact: &AnySolution<f64>,
+    arithmetic: Arithmetic<'_>,
+    case: &Case,
+) -> Result<PerField<f64>, CaseError> {
+    let u = plan(exact, arithmetic, case)?.round_off;
+    in_dimension!(
+        exact,
+        |s| {
+            let (scene, _) = prepare(s, case)?;
+            let speed = CflSpeed::PWave.of(s)?;
+            let strain = u / scene.spacing;
+            Ok(PerField { u, v: speed * strain, F: strain, P: s.density() * speed * speed * strain })
+        },
+        else Err(CaseError::Dimension)
+    )
 }
 
 fn plan_in<const D: usize>(
@@ -71,7 +98,7 @@ fn plan_in<const D: usize>(
             false => scene.bytes_expected(case.per_cell, scalar, kept),
         },
         extent: scene.extent(),
-        round_off: unit * scene.size * (steps.count as f64).sqrt(),
+        round_off: unit * scene.reach() * (steps.count as f64).sqrt(),
     })
 }
 

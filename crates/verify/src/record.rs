@@ -7,7 +7,7 @@ use mmsmith_mpm::StepError;
 use serde::de::{Error, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::case::{Row, Status};
+use crate::case::{ErrorField, Row, Status};
 use crate::norms::{PerField, PerNorm};
 use crate::temporal::{Temporal, TemporalRow};
 
@@ -132,6 +132,13 @@ enum End {
         error: Exact,
         size: Exact,
     },
+    Unresolved {
+        displacement: Exact,
+        resolution: Exact,
+    },
+    NotFiniteError {
+        field: ErrorField,
+    },
     Cut {
         step: u64,
         time: Exact,
@@ -177,6 +184,11 @@ impl From<&Status> for End {
                 let (time, error, size) = (Exact(time), Exact(error), Exact(size));
                 Self::Unstable { step, time, particle, error, size }
             }
+            &Status::Unresolved { displacement, resolution } => Self::Unresolved {
+                displacement: Exact(displacement),
+                resolution: Exact(resolution),
+            },
+            &Status::NotFinite { field } => Self::NotFiniteError { field },
             &Status::Cut { step, time } => Self::Cut { step, time: Exact(time) },
             Status::Stopped(error) => match *error {
                 StepError::Inverted { step, time, particle, J } => {
@@ -209,6 +221,11 @@ impl From<End> for Status {
                 let (time, error, size) = (time.0, error.0, size.0);
                 return Self::Unstable { step, time, particle, error, size };
             }
+            End::Unresolved { displacement, resolution } => {
+                let (displacement, resolution) = (displacement.0, resolution.0);
+                return Self::Unresolved { displacement, resolution };
+            }
+            End::NotFiniteError { field } => return Self::NotFinite { field },
             End::Cut { step, time } => return Self::Cut { step, time: time.0 },
             End::Inverted { step, time, particle, J } => {
                 StepError::Inverted { step, time: time.0, particle, J: J.0 }
@@ -317,7 +334,15 @@ mod tests {
         let unstable =
             Status::Unstable { step: 1, time, particle, error: f64::INFINITY, size: 1.0 };
         let cut = Status::Cut { step: 7, time };
-        let statuses = stops.into_iter().map(Status::Stopped).chain([Status::Ok, unstable, cut]);
+        let unresolved = Status::Unresolved { displacement: 1e-200, resolution: 1e-16 };
+        let not_finite = Status::NotFinite { field: ErrorField::Stress };
+        let statuses = stops.into_iter().map(Status::Stopped).chain([
+            Status::Ok,
+            unstable,
+            cut,
+            unresolved,
+            not_finite,
+        ]);
         let odd_nan = f64::from_bits(0xfff8_0000_0000_0123);
         for status in statuses {
             for error in [1.6e-2, f64::NAN, f64::INFINITY, odd_nan] {

@@ -229,6 +229,16 @@ impl<const D: usize> Scene<D> {
         Ok(Self { lower, spacing, cells, walls, sides, domain, size })
     }
 
+    /// The largest coordinate that a particle at rest may have, and at least the size of the body: what positions are rounded
+    /// at.
+    pub(crate) fn reach(&self) -> f64 {
+        let coordinate = match &self.domain {
+            Domain::Box { lower, upper } => lower.amax().max(upper.amax()),
+            _ => 0.0,
+        };
+        self.size.max(coordinate)
+    }
+
     /// The grid in the solver's precision.
     pub(crate) fn grid<T: Real>(&self) -> Grid<T, D> {
         Grid {

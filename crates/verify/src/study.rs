@@ -104,6 +104,22 @@ fn orders(rows: &[Row], sweep: &Sweep) -> PerField<PerNorm<Order>> {
     orders_of(&rows.collect::<Vec<_>>())
 }
 
+/// The orders of errors over steps, those left out that rounding may have caused: at or below `floors`, row by row.
+#[must_use]
+pub fn orders_above(
+    steps: &[f64],
+    values: &[Option<&PerField<PerNorm<f64>>>],
+    floors: &[PerField<f64>],
+) -> PerField<PerNorm<Order>> {
+    each_norm(values, |field, _, errors| {
+        let floor = |row: usize| floors.get(row).map_or(0.0, |floor| *floor.named()[field].1);
+        let above =
+            |(row, error): (usize, &Option<f64>)| error.filter(|error| *error >= floor(row));
+        let errors: Vec<_> = errors.iter().enumerate().map(above).collect();
+        Order::of(steps, &errors)
+    })
+}
+
 /// The orders of errors, `None` where a case failed, with respect to the steps beside them.
 pub(crate) fn orders_of(
     rows: &[(f64, Option<&PerField<PerNorm<f64>>>)],

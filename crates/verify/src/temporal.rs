@@ -16,7 +16,7 @@ use serde::Serialize;
 use crate::case::{Arithmetic, Case, CaseError, Progress, Status, set_up};
 use crate::dimension::in_arithmetic;
 use crate::general::Precision;
-use crate::norms::{PerField, PerNorm, Tallies};
+use crate::norms::{PerField, PerNorm, Tallies, is_squarable, magnitude, scale_of};
 use crate::order::Order;
 use crate::plan::{MOST_STEPS, prepare};
 use crate::study::{StudyError, orders_of};
@@ -241,9 +241,15 @@ fn difference<const R: usize, const C: usize>(
     a: &[SMatrix<f64, R, C>],
     b: &[SMatrix<f64, R, C>],
 ) -> PerNorm<f64> {
+    let squarable = |a: &SMatrix<f64, R, C>, b: &SMatrix<f64, R, C>| {
+        let (difference, norm) = (a - b, (a - b).norm());
+        if is_squarable(norm) { norm } else { magnitude(difference.iter().copied()) }
+    };
+    let magnitudes: Vec<f64> = a.iter().zip(b).map(|(a, b)| squarable(a, b)).collect();
+    let scale = scale_of(magnitudes.iter().copied().fold(0.0, f64::max));
     let mut tally = Tallies::<1>::default();
-    a.iter().zip(b).for_each(|(a, b)| tally.add(&[(a - b).norm()]));
-    tally.joined().norms(a.len())
+    magnitudes.iter().for_each(|magnitude| tally.add(&[magnitude / scale]));
+    tally.joined().divided_by(scale).norms(a.len())
 }
 
 fn not_known() -> PerField<PerNorm<f64>> {

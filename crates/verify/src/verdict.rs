@@ -31,6 +31,10 @@ pub enum Behaviour {
     DoesNotConverge,
     /// The finest case did not reach its end.
     Stopped,
+    /// The finest case reached its end with errors that say nothing.
+    NotJudged,
+    /// Errors are so small that rounding may have caused them, but for fewer than two cases.
+    AtRounding,
     /// Fewer than two cases with an error and different steps.
     NoOrder,
 }
@@ -48,6 +52,8 @@ pub struct Verdict {
     pub behaviour: Behaviour,
     /// The rows inside the asymptotic range, numbered from 0, in the order of the rows; empty where there is none.
     pub asymptotic_rows: Vec<usize>,
+    /// The rows whose error is so small that rounding may have caused it, numbered from 0; they are left out of all judgement.
+    pub rounding_rows: Vec<usize>,
     /// `C` of the leading term `C s^p` in the step `s`, from the finest case.
     pub coefficient: Option<f64>,
     /// The `p` of that term: the expected order if it was met, else that of the finest pair.
@@ -57,7 +63,7 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Judges errors (`None` where a case failed) over `steps`, in any order.
+    /// Judges errors (`None` where a case failed, not a number where it has none to judge) over `steps`, in any order.
     #[must_use]
     pub fn of(
         steps: &[f64],
@@ -65,7 +71,25 @@ impl Verdict {
         expected: Option<f64>,
         tolerance: f64,
     ) -> Self {
-        let mut rows: Vec<usize> = (0..steps.len().min(errors.len())).collect();
+        Self::above(steps, errors, &[], expected, tolerance)
+    }
+
+    /// The same, where errors below `floors`, row by row, may be rounding and judge nothing.
+    #[must_use]
+    pub fn above(
+        steps: &[f64],
+        errors: &[Option<f64>],
+        floors: &[f64],
+        expected: Option<f64>,
+        tolerance: f64,
+    ) -> Self {
+        let is_rounding = |row: usize| {
+            let floor = floors.get(row).copied().unwrap_or(0.0);
+            errors.get(row).copied().flatten().is_some_and(|error| error < floor)
+        };
+        let all = 0..steps.len().min(errors.len());
+        let (rounding_rows, mut rows): (Vec<usize>, Vec<usize>) =
+            all.partition(|row| is_rounding(*row));
         rows.sort_by(|&a, &b| steps[b].total_cmp(&steps[a]));
         rows.dedup_by(|a, b| steps[*a] == steps[*b]);
         let log = |row: usize| errors[row].filter(|e| e.is_finite() && *e > 0.0).map(f64::ln);
@@ -81,10 +105,12 @@ impl Verdict {
                 |order: &&Option<f64>| order.is_some_and(|o| (o - finest).abs() <= tolerance);
             orders.iter().rev().take_while(same).count()
         });
-        let stopped = rows.last().is_some_and(|&row| errors[row].is_none_or(|e| !e.is_finite()));
+        let last = rows.last().map(|&row| errors[row]);
         let behaviour = match finest {
+            _ if rows.len() < 2 && !rounding_rows.is_empty() => Behaviour::AtRounding,
             _ if rows.len() < 2 => Behaviour::NoOrder,
-            _ if stopped => Behaviour::Stopped,
+            _ if last == Some(None) => Behaviour::Stopped,
+            _ if last.flatten().is_some_and(|error| !error.is_finite()) => Behaviour::NotJudged,
             None => Behaviour::NoOrder,
             Some(order) if order <= tolerance => Behaviour::DoesNotConverge,
             Some(_) if settled >= 2 => Behaviour::Asymptotic,
@@ -109,11 +135,23 @@ impl Verdict {
             finest,
             behaviour,
             asymptotic_rows,
+            rounding_rows,
             coefficient,
             exponent,
             passed,
         }
     }
+}
+
+/// Errors over the steps of a series, to be judged.
+#[derive(Clone, Copy, Debug)]
+pub struct Values<'a> {
+    /// The steps.
+    pub steps: &'a [f64],
+    /// The errors; `None` where a case failed, not numbers where it has none to judge.
+    pub errors: &'a [Option<&'a PerField<PerNorm<f64>>>],
+    /// What rounding alone may cause, row by row ([`round_off`](crate::round_off)); empty where that does not count.
+    pub floors: &'a [PerField<f64>],
 }
 
 /// Judges every field and norm; `values` are `None` where a case failed.
@@ -124,9 +162,20 @@ pub fn verdicts(
     expected: &Expected,
     tolerance: f64,
 ) -> PerField<PerNorm<Verdict>> {
-    crate::study::each_norm(values, |field, norm, errors| {
+    verdicts_above(&Values { steps, errors: values, floors: &[] }, expected, tolerance)
+}
+
+/// The same for errors that are above what rounding alone may cause.
+#[must_use]
+pub fn verdicts_above(
+    values: &Values<'_>,
+    expected: &Expected,
+    tolerance: f64,
+) -> PerField<PerNorm<Verdict>> {
+    crate::study::each_norm(values.errors, |field, norm, errors| {
         let expected = *expected.named()[field].1.named()[norm].1;
-        Verdict::of(steps, errors, expected, tolerance)
+        let floors: Vec<f64> = values.floors.iter().map(|floor| *floor.named()[field].1).collect();
+        Verdict::above(values.steps, errors, &floors, expected, tolerance)
     })
 }
 
@@ -260,6 +309,31 @@ mod tests {
         assert_eq!(judge(&[4.0], Some(2.0)).behaviour, Behaviour::NoOrder);
         assert_eq!(judge(&[4.0], Some(2.0)).passed, Some(false));
         assert_eq!(judge(&[], None).behaviour, Behaviour::NoOrder);
+    }
+
+    #[test]
+    fn rows_at_rounding_judge_nothing() {
+        let steps = [1.0, 0.5, 0.25, 0.125];
+        let judge = |errors: [f64; 4], expected| {
+            Verdict::above(&steps, &errors.map(Some), &[1e-3; 4], expected, 0.1)
+        };
+        // The order of the two rows above, whatever the others do.
+        let verdict = judge([1.0, 0.25, 2e-4, 9e-4], Some(2.0));
+        assert_eq!((verdict.finest, verdict.passed), (Some(2.0), Some(true)));
+        assert_eq!(verdict.rounding_rows, [2, 3]);
+        assert_eq!(verdict.behaviour, Behaviour::NotSettled);
+        // Nothing can judge the expectation, so that it is not met.
+        let verdict = judge([8e-4, 4e-4, 2e-4, 1e-4], Some(1.0));
+        assert_eq!((verdict.behaviour, verdict.passed), (Behaviour::AtRounding, Some(false)));
+        assert_eq!((verdict.finest, verdict.coefficient), (None, None));
+        let verdict = judge([1.0, 4e-4, 2e-4, 0.0], None);
+        assert_eq!((verdict.behaviour, verdict.passed), (Behaviour::AtRounding, None));
+    }
+
+    #[test]
+    fn a_finest_case_without_a_number_did_not_stop() {
+        let verdict = Verdict::of(&[1.0, 0.5], &[Some(1.0), Some(f64::NAN)], Some(2.0), 0.1);
+        assert_eq!((verdict.behaviour, verdict.passed), (Behaviour::NotJudged, Some(false)));
     }
 
     #[test]

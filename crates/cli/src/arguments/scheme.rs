@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use mmsmith_verify as verify;
 use serde::Serialize;
 
-use super::shared::ParameterOptions;
+use super::shared::{ParameterOptions, parsed};
 use super::values::{finite_number, positive_count, positive_number, thread_count, transfer};
 
 /// How to simulate; what every measuring command shares.
@@ -75,6 +75,13 @@ pub(crate) struct SchemeOptions {
     /// Write the result to this JSON file; - is standard output, which then has nothing else
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
+}
+
+impl SchemeOptions {
+    /// Nothing said.
+    pub(crate) fn open() -> Self {
+        parsed(&[])
+    }
 }
 
 /// Weights.

@@ -4,8 +4,8 @@ use anyhow::{Context, Result, bail};
 use mmsmith_verify::{
     Behaviour, Case, Expected, ORDER_TOLERANCE, Order as ObservedOrder, OrderVerdict, Outputs,
     PerField, PerNorm, Progress, Record, Row, Status, Study, StudyError, Sweep, Temporal,
-    TemporalRecord, expected_in_space, expected_in_time, plan, run,
-    temporal as measure_differences, verdicts,
+    TemporalRecord, Values, expected_in_space, expected_in_time, orders_above, plan, run,
+    temporal as measure_differences, verdicts_above,
 };
 use serde_json::{Value, json};
 
@@ -53,7 +53,11 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
             (Sweep::Cells(_), None) => expected_in_space(&model.exact, &base),
             (Sweep::Cfls(_), _) => Expected::default(),
         };
-        let judged = judge(&study, &sweep, &in_space, tolerance);
+        let floors = floors(&model, &base, &sweep)?;
+        // What theory promises is no failure where nothing can judge it; what was asked for is.
+        let strict = options.expect.is_some() || options.tolerance.is_some();
+        let settle = |judged: Verdicts| if strict { judged } else { unless_unjudged(judged) };
+        let judged = settle(judge_above(&study, &sweep, &in_space, tolerance, &floors));
         let differences = match &sweep {
             Sweep::Cfls(cfls) => {
                 let mut what = settings(&selection, scheme, extent, base.cells, cfls);
@@ -71,7 +75,7 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
                     bail!("no differences were measured");
                 };
                 let expected = asked.unwrap_or_else(|| expected_in_time(&base));
-                let judged = judge_differences(&found, &expected, tolerance);
+                let judged = settle(judge_differences(&found, &expected, tolerance));
                 Some((found, judged))
             }
             Sweep::Cells(_) => None,
@@ -94,6 +98,10 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
         sections.push((what.into(), verdict_table(&judged, step_name(&sweep))));
         if has_range(&judged) || differences.as_ref().is_some_and(|(_, judged)| has_range(judged)) {
             notes += "Rows in parentheses are outside the asymptotic range.\n";
+        }
+        if has_rounding(&judged) {
+            notes +=
+                "A row at rounding has errors that rounding alone may cause; it judges nothing.\n";
         }
         let mut text = preface(scheme) + &caption;
         for (title, table) in &sections {
@@ -185,7 +193,13 @@ fn study(
         let row = run(&model.exact, model.arithmetic(), &cases[index], &mut outputs);
         Ok(Record::from(&row.map_err(|cause| StudyError { index, cause })?))
     })?;
-    Ok(Study::new(records.into_iter().map(Row::from).collect(), sweep))
+    let mut study = Study::new(records.into_iter().map(Row::from).collect(), sweep);
+    // Rows that rounding may have caused have no order.
+    let steps: Vec<f64> = study.rows.iter().map(|row| step(row, sweep)).collect();
+    let errors: Vec<_> =
+        study.rows.iter().map(|row| (row.status == Status::Ok).then_some(&row.errors)).collect();
+    study.orders = orders_above(&steps, &errors, &floors(model, base, sweep)?);
+    Ok(study)
 }
 
 /// The differences over `cfls` on the grid of `base`, with a progress bar that says `what`.
@@ -202,15 +216,78 @@ pub(super) fn differences(
     Ok(measure_differences(&model.exact, model.arithmetic(), base, cfls, &mut show)?)
 }
 
-/// Judges the errors of a study.
+/// The step that orders of a study are about.
+fn step(row: &Row, sweep: &Sweep) -> f64 {
+    if matches!(sweep, Sweep::Cells(_)) { row.h } else { row.dt }
+}
+
+/// What rounding alone may cause, case by case.
+fn floors(model: &Model, base: &Case, sweep: &Sweep) -> Result<Vec<PerField<f64>>> {
+    let cases = sweep.cases(base).into_iter();
+    let floors =
+        cases.map(|case| mmsmith_verify::round_off(&model.exact, model.arithmetic(), &case));
+    Ok(floors.collect::<Result<_, _>>()?)
+}
+
+/// Judges the errors of a study, large or small.
 pub(super) fn judge(study: &Study, sweep: &Sweep, expected: &Expected, tolerance: f64) -> Verdicts {
-    let steps: Vec<f64> = study
-        .rows
+    judge_above(study, sweep, expected, tolerance, &[])
+}
+
+/// Judges the errors of a study that are above what rounding alone may cause.
+fn judge_above(
+    study: &Study,
+    sweep: &Sweep,
+    expected: &Expected,
+    tolerance: f64,
+    floors: &[PerField<f64>],
+) -> Verdicts {
+    let nothing = {
+        let none = PerNorm { linf: f64::NAN, l2: f64::NAN, l1: f64::NAN };
+        PerField { u: none, v: none, F: none, P: none }
+    };
+    let steps: Vec<f64> = study.rows.iter().map(|row| step(row, sweep)).collect();
+    let errors = study.rows.iter().map(|row| match &row.status {
+        Status::Ok => Some(&row.errors),
+        status if status.is_not_judged() => Some(&nothing),
+        _ => None,
+    });
+    let errors: Vec<_> = errors.collect();
+    verdicts_above(&Values { steps: &steps, errors: &errors, floors }, expected, tolerance)
+}
+
+/// Verdicts where an expectation that nothing can judge is none.
+fn unless_unjudged(mut judged: Verdicts) -> Verdicts {
+    for norms in [&mut judged.u, &mut judged.v, &mut judged.F, &mut judged.P] {
+        for one in [&mut norms.linf, &mut norms.l2, &mut norms.l1] {
+            if matches!(one.behaviour, Behaviour::NoOrder | Behaviour::AtRounding) {
+                one.passed = None;
+            }
+        }
+    }
+    judged
+}
+
+/// What a table says of how a case ended, and of its errors of one field.
+fn status(status: &Status, is_rounding: bool) -> String {
+    match status {
+        Status::Ok if is_rounding => "at rounding",
+        Status::Ok => "ok",
+        other if other.is_not_judged() => "not judged",
+        _ => "STOPPED",
+    }
+    .to_owned()
+}
+
+fn is_rounding(judged: &Verdicts, field: usize, row: usize) -> bool {
+    judged.named()[field].1.named().iter().any(|(_, one)| one.rounding_rows.contains(&row))
+}
+
+fn has_rounding(judged: &Verdicts) -> bool {
+    let norms = judged.named();
+    norms
         .iter()
-        .map(|row| if matches!(sweep, Sweep::Cells(_)) { row.h } else { row.dt })
-        .collect();
-    let errors = study.rows.iter().map(|row| (row.status == Status::Ok).then_some(&row.errors));
-    verdicts(&steps, &errors.collect::<Vec<_>>(), expected, tolerance)
+        .any(|(_, norms)| norms.named().iter().any(|(_, one)| !one.rounding_rows.is_empty()))
 }
 
 /// Judges the differences on one grid.
@@ -222,7 +299,8 @@ pub(super) fn judge_differences(
     let steps: Vec<f64> = temporal.rows.iter().map(|row| row.dt).collect();
     let rows = temporal.rows.iter();
     let values = rows.map(|row| (row.status == Status::Ok).then_some(&row.differences));
-    verdicts(&steps, &values.collect::<Vec<_>>(), expected, tolerance)
+    let errors: Vec<_> = values.collect();
+    verdicts_above(&Values { steps: &steps, errors: &errors, floors: &[] }, expected, tolerance)
 }
 
 /// A study as it is written to JSON.
@@ -292,7 +370,7 @@ pub(super) fn tables(
                 format!("{:.4}", row.cfl),
             ];
             cells.extend(norms(index, field, errors[index], &study.orders, judged));
-            cells.push(if row.status == Status::Ok { "ok" } else { "STOPPED" }.into());
+            cells.push(status(&row.status, is_rounding(judged, field, index)));
             table.row(cells);
         }
         let empty = String::new;
@@ -317,7 +395,7 @@ pub(super) fn difference_tables(
             let mut cells =
                 vec![table::error(row.dt), format!("{:.4}", row.cfl), row.steps.to_string()];
             cells.extend(norms(index, field, &row.differences, &temporal.orders, judged));
-            cells.push(if row.status == Status::Ok { "ok" } else { "STOPPED" }.into());
+            cells.push(status(&row.status, is_rounding(judged, field, index)));
             table.row(cells);
         }
         let empty = String::new;
@@ -382,6 +460,8 @@ pub(super) fn verdict_table(judged: &Verdicts, step: &str) -> Table {
                 Behaviour::NotSettled => "no asymptotic range",
                 Behaviour::DoesNotConverge => "DOES NOT CONVERGE",
                 Behaviour::Stopped => "the finest run STOPPED",
+                Behaviour::NotJudged => "the finest run's errors say nothing",
+                Behaviour::AtRounding => "fewer than two errors above rounding",
                 Behaviour::NoOrder => "no order",
             };
             let verdict = match one.passed {
@@ -410,6 +490,9 @@ pub(super) fn stops(study: &Study) -> String {
     let stopped = study.rows.iter().filter(|row| row.status != Status::Ok);
     stopped
         .map(|row| {
+            if row.status.is_not_judged() {
+                return format!("{} cells, CFL {:.4}: {}\n", row.cells, row.cfl, row.status);
+            }
             format!("STOPPED with {} cells, CFL {:.4}: {}\n", row.cells, row.cfl, row.status)
         })
         .collect()

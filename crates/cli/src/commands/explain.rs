@@ -1,5 +1,7 @@
 //! `mms explain`: what a solution models, which parts of a solver it exercises, and what its body force costs.
 
+mod compare;
+
 use anyhow::{Result, bail};
 use mmsmith_expr::{Drafts, Expr, OperationCount, Program, arrange};
 use mmsmith_solutions::CATALOGUE;
@@ -8,12 +10,14 @@ use mmsmith_verify::{Cost, Part, Plan, Share, coverage};
 use serde_json::{Value, json};
 
 use super::coverage::{POINTS, THRESHOLD};
-use super::{Model, predict};
-use crate::arguments::{ExplainOptions, Precision};
+use super::scheme::{Scheme, USUAL_CELLS};
+use super::{Model, case, predict};
+use crate::arguments::{ExplainOptions, Precision, SchemeOptions};
 use crate::json::Output;
 use crate::library::{Selection, Subject, specification};
 use crate::table::Table;
 use crate::terminal;
+use compare::Comparison;
 
 pub(crate) fn explain(options: &ExplainOptions) -> Result<bool> {
     let output = Output::prepare_if(options.json.as_ref())?;
@@ -23,10 +27,24 @@ pub(crate) fn explain(options: &ExplainOptions) -> Result<bool> {
     let cost = BodyForceCost::of(&mut fields, spec.dimension);
     let selection = Selection::new(&options.name, &[])?;
     let model = Model::new(&selection, Precision::F64)?;
-    let predicted = predict::usual(&model).map_err(|error| error.to_string());
-    terminal::say(&(text(&spec, &exercises, &cost) + &runs(&predicted)))?;
+    let scheme = Scheme::settle(&SchemeOptions::open(), &model.exact);
+    let base = case(&scheme, USUAL_CELLS)?;
+    let predicted = predict::on_grids(&model, &base).map_err(|error| error.to_string());
+    let words = scheme.choice();
+    terminal::say(&(text(&spec, &exercises, &cost) + &runs(&predicted, &words)))?;
+    let compared = match options.compare {
+        true => Some(Comparison::measure(&model)?),
+        false => None,
+    };
+    if let Some(compared) = &compared {
+        terminal::say(&compared.text())?;
+    }
     if let Some(output) = output {
-        output.write(&document(&spec, &exercises, &cost, &predicted))?;
+        let mut document = document(&spec, &exercises, &cost, &predicted);
+        if let Some(compared) = &compared {
+            document["compared"] = json!(compared);
+        }
+        output.write(&document)?;
     }
     Ok(true)
 }
@@ -172,7 +190,7 @@ fn text(spec: &Spec, exercises: &[Exercise], cost: &BodyForceCost) -> String {
 /// What runs of the usual scheme are predicted to take, or why there are none.
 type Predicted = Result<Vec<(usize, Plan, Cost)>, String>;
 
-fn runs(predicted: &Predicted) -> String {
+fn runs(predicted: &Predicted, choice: &str) -> String {
     let rows = match predicted {
         Ok(rows) => rows,
         Err(reason) => return format!("\nnot simulated in the usual scheme: {reason}\n"),
@@ -190,7 +208,7 @@ fn runs(predicted: &Predicted) -> String {
         ]);
     }
     format!(
-        "\na run with the usual scheme on {} thread(s), predicted from a few steps made just now\n{}",
+        "\na run with the usual scheme on {} thread(s), predicted from a few steps made just now\n{choice}{}",
         rayon::current_num_threads(),
         table.text()
     )

@@ -13,8 +13,8 @@ const LITTLE_WORK: f64 = 1e7;
 /// Calibration in seconds for each particle and step of the work, a small part of it; and its limits.
 const EFFORT: f64 = 5e-9;
 const EFFORTS: (f64, f64) = (0.05, 0.5);
-/// What `mms explain` spends on it.
-const BRIEF: Duration = Duration::from_millis(200);
+/// What `mms explain` spends on it: enough for some steps on its finest grid, where two dimensions are all.
+const BRIEF: Duration = Duration::from_millis(1500);
 
 /// The seconds that each of `cases`, of one scheme, will take; none for work so little that it is not worth calibrating for,
 /// and where nothing could be measured.
@@ -33,9 +33,17 @@ pub(super) fn seconds(model: &Model, cases: &[Case]) -> Option<Vec<f64>> {
     plans.iter().map(|plan| Some(learnt.predict(plan)?.total_s)).collect()
 }
 
-/// What the usual scheme takes on some grids; grids that do not fit the solution are left out.
-pub(super) fn usual(model: &Model) -> Result<Vec<(usize, Plan, Cost)>, mmsmith_verify::CaseError> {
-    let at = |cells| Case { cells, ..Case::default() };
+/// What is learnt from a few steps of a case's scheme, on grids up to its own.
+pub(super) fn learn(model: &Model, case: &Case) -> Result<CostModel, mmsmith_verify::CaseError> {
+    CostModel::calibrate(&model.exact, model.arithmetic(), case, BRIEF)
+}
+
+/// What the scheme of `base` takes on some grids; grids that do not fit the solution are left out.
+pub(super) fn on_grids(
+    model: &Model,
+    base: &Case,
+) -> Result<Vec<(usize, Plan, Cost)>, mmsmith_verify::CaseError> {
+    let at = |cells| Case { cells, ..*base };
     let mut fitting: Vec<(usize, Plan)> = Vec::new();
     let mut refused = None;
     for cells in GRIDS {
@@ -48,7 +56,7 @@ pub(super) fn usual(model: &Model) -> Result<Vec<(usize, Plan, Cost)>, mmsmith_v
         return Err(error);
     }
     let Some(&(finest, _)) = fitting.last() else { return Ok(Vec::new()) };
-    let learnt = CostModel::calibrate(&model.exact, model.arithmetic(), &at(finest), BRIEF)?;
+    let learnt = learn(model, &at(finest))?;
     let row = |(cells, plan): (usize, Plan)| Some((cells, plan, learnt.predict(&plan)?));
     Ok(fitting.into_iter().filter_map(row).collect())
 }

@@ -152,8 +152,8 @@ fn text(row: &Row) -> String {
         number::exact(row.dt),
         number::exact(row.cfl)
     );
-    if row.status == Status::Ok {
-        text += "status: ok\n";
+    if row.status == Status::Ok || row.status.is_not_judged() {
+        text += &format!("status: {}\n", row.status);
     } else {
         text += &format!("STOPPED: {}\nThe errors are those until then.\n", row.status);
     }
