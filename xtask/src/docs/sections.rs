@@ -91,7 +91,11 @@ fn shown(command: &str) -> String {
 /// What commands have in common, and what each has beside it.
 fn labels(commands: &[String]) -> (String, Vec<String>) {
     let groups: Vec<Vec<String>> = commands.iter().map(|command| groups(command)).collect();
-    let in_all = |group: &String| groups.iter().all(|other| other.contains(group));
+    // One command alone has all its words in common with itself.
+    let is_verb = |group: &String| groups[0].iter().take(2).any(|word| word == group);
+    let in_all = |group: &String| {
+        groups.iter().all(|other| other.contains(group)) && (groups.len() > 1 || is_verb(group))
+    };
     let common: Vec<String> =
         groups.first().into_iter().flatten().filter(|group| in_all(group)).cloned().collect();
     let rest = |of: &Vec<String>| {
@@ -394,6 +398,11 @@ mod tests {
         let (common, labels) = labels(&commands);
         assert_eq!(common, "mms converge --cfl 0.2");
         assert_eq!(labels, ["a --cells 8,16", "b --cells 4"]);
+        let (common, labels) = super::labels(&commands[..1]);
+        assert_eq!(
+            (common.as_str(), labels[0].as_str()),
+            ("mms converge", "a --cells 8,16 --cfl 0.2")
+        );
     }
 
     #[test]
