@@ -141,7 +141,8 @@ fn no_setting_runs_twice_and_named_ones_hold_on_neighbours() {
 
 #[test]
 fn effects_are_those_of_the_formula() {
-    let found = formula(1.0).measure(60.0);
+    // Long enough for runs that last on two threads as well.
+    let found = formula(1.0).measure(240.0);
     let of = |name| found.effects.iter().filter(move |effect| effect.setting == name);
     let lasts = |entry: usize| found.entries[entry].row.wall_s >= LEAST_TIMED_S;
     for effect in &found.effects {
