@@ -1,7 +1,8 @@
 //! A progress bar for long work, on standard error, and only where a person sees it.
 
+use std::cell::Cell;
 use std::io::{IsTerminal, stderr};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -12,8 +13,15 @@ use crate::terminal;
 /// The bar counts thousandths, since work is known as a share.
 const LENGTH: u64 = 1000;
 
-/// A bar that nobody sees unless standard error is a terminal.
+/// A bar that nobody sees unless standard error is a terminal; or, of such a bar, the stretch that a part of the work fills.
 pub(crate) struct Bar {
+    line: Arc<Line>,
+    /// The share of the whole at which this part begins and at which it ends.
+    stretch: (f64, f64),
+}
+
+/// The line on the terminal.
+struct Line {
     bar: ProgressBar,
     begun: Instant,
     /// The seconds that the work will take, where that is known from the start.
@@ -43,12 +51,34 @@ impl Bar {
         if let Ok(style) = ProgressStyle::with_template("{msg} [{bar:30}] {percent}%, {prefix}") {
             bar.set_style(style.progress_chars("=> "));
         }
-        let bar = Self { bar, begun: Instant::now(), predicted_s, first: OnceLock::new() };
-        bar.bar.set_message(name.to_owned());
-        bar.bar.set_prefix(in_words(left(Duration::ZERO, predicted_s, 0.0)));
+        let line = Line { bar, begun: Instant::now(), predicted_s, first: OnceLock::new() };
+        line.bar.set_message(name.to_owned());
+        line.bar.set_prefix(in_words(left(Duration::ZERO, predicted_s, 0.0)));
         // What the bar says is complete before it is first drawn.
-        bar.bar.enable_steady_tick(Duration::from_millis(500));
+        line.bar.enable_steady_tick(Duration::from_millis(500));
+        let bar = Self { line: Arc::new(line), stretch: (0.0, 1.0) };
         bar
+    }
+
+    /// The same bar for a part of its work, from one share of it to another.
+    fn part(&self, from: f64, to: f64) -> Self {
+        Self { line: Arc::clone(&self.line), stretch: (self.at(from), self.at(to)) }
+    }
+
+    /// The share of the whole bar at a share of this part.
+    fn at(&self, share: f64) -> f64 {
+        let (from, to) = self.stretch;
+        from + share.clamp(0.0, 1.0) * (to - from)
+    }
+
+    /// Whether nobody sees it.
+    pub(crate) fn is_hidden(&self) -> bool {
+        self.line.bar.is_hidden()
+    }
+
+    /// Does something with the bar out of the way, such as saying what was found.
+    pub(crate) fn aside<R>(&self, work: impl FnOnce() -> R) -> R {
+        self.line.bar.suspend(work)
     }
 
     /// Shows how far the work is; `what` names the case under way.
@@ -60,28 +90,60 @@ impl Bar {
     /// Shows the share of the work that is done, with the message that `what` gives.
     pub(crate) fn show_share(&self, what: impl FnOnce() -> String, share: f64) {
         // Formatting a message costs more than some steps do.
-        if self.bar.is_hidden() {
+        if self.is_hidden() {
             return;
         }
-        let elapsed = self.begun.elapsed();
-        let (since, before) = *self.first.get_or_init(|| (elapsed, share));
-        let time = match self.predicted_s {
-            Some(_) => left(elapsed, self.predicted_s, share),
+        let (line, share) = (&self.line, self.at(share));
+        let elapsed = line.begun.elapsed();
+        let (since, before) = *line.first.get_or_init(|| (elapsed, share));
+        let time = match line.predicted_s {
+            Some(_) => left(elapsed, line.predicted_s, share),
             None if before < 1.0 => {
                 let done = (share - before) / (1.0 - before);
                 left(elapsed.saturating_sub(since), None, done)
             }
             None => None,
         };
-        self.bar.set_prefix(in_words(time));
-        self.bar.set_message(what());
-        self.bar.set_position((share * LENGTH as f64) as u64);
+        line.bar.set_prefix(in_words(time));
+        line.bar.set_message(what());
+        line.bar.set_position((share * LENGTH as f64) as u64);
     }
 }
 
-impl Drop for Bar {
+impl Drop for Line {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
+    }
+}
+
+/// One bar over works that follow each other, each of which is predicted to take some seconds.
+pub(crate) struct Agenda {
+    whole: Bar,
+    total_s: f64,
+    begun_s: Cell<f64>,
+}
+
+impl Agenda {
+    /// A bar over all of the work.
+    pub(crate) fn new(total_s: f64) -> Self {
+        Self {
+            whole: Bar::expecting("the report", Some(total_s)),
+            total_s,
+            begun_s: Cell::new(0.0),
+        }
+    }
+
+    /// The next work's part of the bar; it begins where the last one ends.
+    pub(crate) fn next(&self, seconds: f64) -> Bar {
+        let from = self.begun_s.get();
+        self.begun_s.set(from + seconds);
+        let share = |seconds: f64| if self.total_s > 0.0 { seconds / self.total_s } else { 0.0 };
+        self.whole.part(share(from), share(from + seconds))
+    }
+
+    /// Does something with the bar out of the way.
+    pub(crate) fn aside<R>(&self, work: impl FnOnce() -> R) -> R {
+        self.whole.aside(work)
     }
 }
 
@@ -98,7 +160,8 @@ fn left(elapsed: Duration, predicted_s: Option<f64>, share: f64) -> Option<Durat
 
 fn in_words(left: Option<Duration>) -> String {
     match left {
-        Some(left) => format!("{} left", HumanDuration(left)),
+        // Never none while there is work.
+        Some(left) => format!("{} left", HumanDuration(left.max(Duration::from_secs(1)))),
         None => "estimating the time left".into(),
     }
 }
@@ -109,6 +172,18 @@ mod tests {
 
     fn seconds(elapsed_s: u64, predicted_s: Option<f64>, share: f64) -> Option<f64> {
         left(Duration::from_secs(elapsed_s), predicted_s, share).map(|left| left.as_secs_f64())
+    }
+
+    #[test]
+    fn works_that_follow_each_other_fill_one_bar_by_their_predicted_times() {
+        let agenda = Agenda::new(40.0);
+        let [first, second, third] = [10.0, 25.0, 5.0].map(|seconds| agenda.next(seconds));
+        assert_eq!((first.at(0.0), first.at(0.5), first.at(1.0)), (0.0, 0.125, 0.25));
+        assert_eq!((second.at(0.0), second.at(1.0)), (0.25, 0.875));
+        assert_eq!((third.at(0.0), third.at(1.0), third.at(7.0)), (0.875, 1.0, 1.0));
+        // More work than was predicted stays at the end, and a part has parts of its own.
+        assert_eq!(agenda.next(100.0).at(1.0), 1.0);
+        assert_eq!(second.part(0.0, 0.5).at(1.0), 0.5625);
     }
 
     #[test]
@@ -124,5 +199,6 @@ mod tests {
         assert_eq!(seconds(10, None, 0.25), Some(30.0));
         assert_eq!(in_words(None), "estimating the time left");
         assert_eq!(in_words(Some(Duration::from_secs(30))), "30 seconds left");
+        assert_eq!(in_words(Some(Duration::ZERO)), "1 second left");
     }
 }

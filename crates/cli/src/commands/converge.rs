@@ -67,7 +67,7 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
                     Order::OneByOne,
                     |_| {},
                     |_| {
-                        differences(&model, &base, cfls, "difference")
+                        differences(&model, &base, cfls, "difference", &Bar::new("difference"))
                             .map(|found| TemporalRecord::from(&found))
                     },
                 )?;
@@ -202,14 +202,14 @@ fn study(
     Ok(study)
 }
 
-/// The differences over `cfls` on the grid of `base`, with a progress bar that says `what`.
+/// The differences over `cfls` on the grid of `base`; the bar says `what`.
 pub(super) fn differences(
     model: &Model,
     base: &Case,
     cfls: &[f64],
     what: &str,
+    bar: &Bar,
 ) -> Result<Temporal> {
-    let bar = Bar::new(what);
     let mut show = |progress: mmsmith_verify::Progress| {
         bar.show(&format!("{what}, CFL {}", cfls[progress.case]), progress);
     };

@@ -10,12 +10,13 @@ mod report;
 mod section;
 
 use std::path::Path;
+use std::time::Duration;
 
 use anyhow::{Context, Result};
 use mmsmith_verify::{
-    Case, Expected, FrameOutput, ORDER_TOLERANCE, Outputs, Progress, Row, Start, Status, StepError,
-    Study, Sweep, Temporal, converge as measure, expected_in_space, expected_in_time,
-    run as simulate,
+    Case, CostModel, Expected, FrameOutput, ORDER_TOLERANCE, Outputs, Progress, Row, Start, Status,
+    StepError, Study, Sweep, Temporal, converge as measure, expected_in_space, expected_in_time,
+    plan, run as simulate,
 };
 use serde_json::json;
 
@@ -28,7 +29,7 @@ use super::{Model, case, settings, with_threads};
 use crate::arguments::{Integrator, Precision, ReproduceOptions, Shape, word};
 use crate::json::{Output, prepare_folder};
 use crate::library::Selection;
-use crate::progress::Bar;
+use crate::progress::{Agenda, Bar};
 use crate::svg::{Curve, Plot};
 use crate::table::{self, Table};
 use crate::{csv, number, terminal};
@@ -123,21 +124,25 @@ pub(crate) fn reproduce(options: &ReproduceOptions) -> Result<bool> {
     let output = Output::prepare(&out.join("report.md")).context("--out")?;
     with_threads(options.threads, || {
         let mut text = introduction();
+        let paces = PROBLEMS.map(Pace::of).into_iter().collect::<Result<Vec<_>>>()?;
+        let agenda = Agenda::new(total_seconds(&paces, options.budget)?);
         let mut results = Vec::new();
-        for problem in PROBLEMS {
-            let measured = measure_problem(problem, &out.join(problem))?;
+        for (problem, pace) in PROBLEMS.into_iter().zip(&paces) {
+            let measured = measure_problem(problem, &out.join(problem), pace, &agenda)?;
             let (terminal_text, report_text) = summary(&measured);
-            terminal::say(&terminal_text)?;
+            agenda.aside(|| terminal::say(&terminal_text))?;
             text += &report_text;
             results.push(measured);
         }
-        let gentle = gentle_differences(&out.join(PROBLEMS[0]))?;
+        let gentle = gentle_differences(&out.join(PROBLEMS[0]), &paces[0], &agenda)?;
         let claims = claims::judge(&results[0], &results[1], &gentle);
         let (said, written) = claims::texts(&claims);
-        terminal::say(&said)?;
+        agenda.aside(|| terminal::say(&said))?;
         text += &written;
-        let sections =
-            [drift::section(out)?, limits::section(out)?, cost::section(out, options.budget)?];
+        let energy = drift::section(out, &paces, &agenda)?;
+        let stable = limits::section(out, &agenda.next(limits::seconds(&paces[0])?))?;
+        let sections = [energy, stable, cost::section(out, options.budget, &agenda)?];
+        drop(agenda);
         for section in &sections {
             text += section.markdown();
         }
@@ -148,12 +153,82 @@ pub(crate) fn reproduce(options: &ReproduceOptions) -> Result<bool> {
     })
 }
 
+/// What runs of a problem take, from a few steps made just now.
+struct Pace {
+    model: Model,
+    learnt: Option<CostModel>,
+}
+
+impl Pace {
+    fn of(problem: &str) -> Result<Self> {
+        /// Spent on the steps.
+        const EFFORT: Duration = Duration::from_millis(100);
+        let model = Model::new(&Selection::new(problem, &[])?, Precision::F64)?;
+        let usual = case(&Scheme::usual(Shape::Gimp, Integrator::Cd), GRID)?;
+        // Only the bar depends on it.
+        let learnt = CostModel::calibrate(&model.exact, model.arithmetic(), &usual, EFFORT).ok();
+        Ok(Self { model, learnt })
+    }
+
+    /// The seconds that cases will take; what nobody can tell counts as nothing.
+    fn seconds(&self, cases: &[Case]) -> f64 {
+        let one = |case| {
+            let plan = plan(&self.model.exact, self.model.arithmetic(), case).ok()?;
+            Some(self.learnt.as_ref()?.predict(&plan)?.total_s)
+        };
+        cases.iter().filter_map(one).sum()
+    }
+}
+
+/// The seconds of a scheme's differences: every run once, and once more with half the finest step.
+fn difference_seconds(
+    pace: &Pace,
+    (shape, integrator): (Shape, Integrator),
+    cells: usize,
+    cfls: &[f64],
+) -> Result<f64> {
+    let base = case(&Scheme::usual(shape, integrator), cells)?;
+    let finest = cfls.iter().copied().reduce(f64::min).map(|cfl| cfl / 2.0);
+    let all = cfls.iter().copied().chain(finest);
+    Ok(pace.seconds(&all.map(|cfl| Case { cfl, ..base }).collect::<Vec<_>>()))
+}
+
+/// The seconds that the whole report will take.
+fn total_seconds(paces: &[Pace], budget: f64) -> Result<f64> {
+    let mut total = limits::seconds(&paces[0])?;
+    for pace in paces {
+        let study = |(shape, integrator), sweep: &Sweep, cfl: f64| -> Result<f64> {
+            let base = case(&Scheme { cfl, ..Scheme::usual(shape, integrator) }, GRID)?;
+            Ok(pace.seconds(&sweep.cases(&base)))
+        };
+        let usual = Case::default().cfl;
+        for scheme in SPACE {
+            total += study(scheme, &Sweep::Cells(CELLS.to_vec()), usual)?;
+        }
+        for scheme in TIME {
+            total += study(scheme, &Sweep::Cfls(CFLS.to_vec()), usual)?;
+        }
+        let few = Sweep::Cells(SMALL_STEP_CELLS.to_vec());
+        total += study((Shape::Gimp, Integrator::Usl), &few, SMALL_STEP)?;
+        for scheme in DIFFERENCES {
+            total += difference_seconds(pace, scheme, GRID, &DIFFERENCE_CFLS)?;
+        }
+        total += pace.seconds(&drift::cases()?) + budget;
+    }
+    for scheme in DIFFERENCES {
+        total += difference_seconds(&paces[0], scheme, GENTLE_GRID, &GENTLE_CFLS)?;
+    }
+    Ok(total)
+}
+
 /// The differences of the first problem at a small amplitude on a fine grid.
-fn gentle_differences(folder: &Path) -> Result<Vec<Differences>> {
+fn gentle_differences(folder: &Path, pace: &Pace, agenda: &Agenda) -> Result<Vec<Differences>> {
     let selection = Selection::new(PROBLEMS[0], &[("A".to_owned(), GENTLE)])?;
     let model = Model::new(&selection, Precision::F64)?;
     let all = DIFFERENCES.map(|scheme| {
-        measure_differences(&selection, &model, scheme, GENTLE_GRID, &GENTLE_CFLS, "gentle", folder)
+        let bar = agenda.next(difference_seconds(pace, scheme, GENTLE_GRID, &GENTLE_CFLS)?);
+        let cfls = &GENTLE_CFLS;
+        measure_differences(&selection, &model, scheme, GENTLE_GRID, cfls, "gentle", folder, &bar)
     });
     all.into_iter().collect()
 }
@@ -167,6 +242,7 @@ fn measure_differences(
     cfls: &[f64],
     kind: &str,
     folder: &Path,
+    bar: &Bar,
 ) -> Result<Differences> {
     let options = Scheme::usual(scheme.0, scheme.1);
     let base = case(&options, cells)?;
@@ -175,7 +251,7 @@ fn measure_differences(
     let json = Output::prepare(&folder.join(format!("{stem}.json")))?;
     let csv = Output::prepare(&folder.join(format!("{stem}.csv")))?;
     let what = format!("{}, {kind}, {}", selection.name(), name(scheme));
-    let found = differences(model, &base, cfls, &what)?;
+    let found = differences(model, &base, cfls, &what, bar)?;
     let verdicts = judge_differences(&found, &expected_in_time(&base), ORDER_TOLERANCE);
     json.write(&json!({
         "schema": "mmsmith.temporal/1",
@@ -187,7 +263,12 @@ fn measure_differences(
 }
 
 /// Measures everything for one problem and writes its data into `folder`.
-fn measure_problem(problem: &'static str, folder: &Path) -> Result<Results> {
+fn measure_problem(
+    problem: &'static str,
+    folder: &Path,
+    pace: &Pace,
+    agenda: &Agenda,
+) -> Result<Results> {
     let selection = Selection::new(problem, &[])?;
     let model = Model::new(&selection, Precision::F64)?;
     let series = |kind: &str,
@@ -202,8 +283,8 @@ fn measure_problem(problem: &'static str, folder: &Path) -> Result<Results> {
         let stem = format!("{kind}-{}-{}", word(scheme.0), word(scheme.1));
         let json = Output::prepare(&folder.join(format!("{stem}.json")))?;
         let csv = Output::prepare(&folder.join(format!("{stem}.csv")))?;
+        let bar = agenda.next(pace.seconds(&sweep.cases(&base)));
         let what = format!("{problem}, {kind}, {}", name(scheme));
-        let bar = Bar::new(&what);
         let mut show = |progress: Progress| bar.show(&what, progress);
         let study = measure(&model.exact, model.arithmetic(), &base, sweep, &mut show)?;
         let expected = match sweep {
@@ -226,7 +307,8 @@ fn measure_problem(problem: &'static str, folder: &Path) -> Result<Results> {
     let small_step = series("small-step", usl, &few, Some(SMALL_STEP))?;
     let differences = DIFFERENCES.map(|scheme| {
         let cfls = &DIFFERENCE_CFLS;
-        measure_differences(&selection, &model, scheme, GRID, cfls, "differences", folder)
+        let bar = agenda.next(difference_seconds(pace, scheme, GRID, cfls)?);
+        measure_differences(&selection, &model, scheme, GRID, cfls, "differences", folder, &bar)
     });
     let differences = differences.into_iter().collect::<Result<Vec<_>>>()?;
 

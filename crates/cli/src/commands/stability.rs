@@ -71,7 +71,7 @@ pub(crate) fn stability(options: &StabilityOptions) -> Result<bool> {
         [&options.plot, &options.csv].map(|path| Output::prepare_if(path.as_ref()));
     let (plot, values) = (plot?, values?);
     with_threads(options.scheme.threads, || {
-        let found = survey(options)?;
+        let found = survey(options, &Bar::new("largest stable CFL number"))?;
         terminal::say(&found.text())?;
         if let Some(output) = output {
             output.write(&found.document()?)?;
@@ -96,7 +96,7 @@ pub(super) struct Survey<'a> {
 }
 
 /// Looks for the limits that were asked for.
-pub(super) fn survey(options: &StabilityOptions) -> Result<Survey<'_>> {
+pub(super) fn survey<'a>(options: &'a StabilityOptions, bar: &Bar) -> Result<Survey<'a>> {
     let criteria =
         Criteria { error_multiple: options.error_multiple, energy_rate: options.energy_rate };
     let selection = Selection::new(&options.name, &options.scheme.parameters.set)?;
@@ -110,7 +110,7 @@ pub(super) fn survey(options: &StabilityOptions) -> Result<Survey<'_>> {
     let search = Search { lower, upper, width: options.width, criteria };
     points.iter().try_for_each(|point| search.validate(point.model.arithmetic()))?;
     let keep = Keep::open(options.kept.out.as_ref(), &options.name)?;
-    let rows = limits(&points, &search, &keep)?;
+    let rows = limits(&points, &search, &keep, bar)?;
     Ok(Survey { options, selection, search, points, rows })
 }
 
@@ -208,14 +208,13 @@ fn judge(options: &StabilityOptions, cfl: f64, criteria: &Criteria) -> Result<bo
 }
 
 /// The limits of all points; the cases are independent, and go side by side where there are several.
-fn limits(points: &[Point], search: &Search, keep: &Keep) -> Result<Vec<StabilityRow>> {
+fn limits(points: &[Point], search: &Search, keep: &Keep, bar: &Bar) -> Result<Vec<StabilityRow>> {
     let keys: Vec<_> = points
         .iter()
         .map(|point| json!({ "case": point.settings(), "search": search }))
         .map(without_threads)
         .collect();
     let order = if points.len() > 1 { Order::AtOnce } else { Order::OneByOne };
-    let bar = Bar::new("largest stable CFL number");
     let shares = Shares::of(points.len());
     keep.all(
         &keys,

@@ -164,7 +164,7 @@ pub(crate) fn tradeoff(options: &TradeoffOptions) -> Result<bool> {
         .map(|path| Output::prepare_if(path.as_ref()));
     let [json, csv, plot, advice] = outputs;
     let (json, csv, plot, advice) = (json?, csv?, plot?, advice?);
-    let report = sweep(options)?;
+    let report = sweep(options, &Bar::new("planning"))?;
     terminal::say(&report.text())?;
     if let Some(file) = json {
         file.write(&report.document()?)?;
@@ -182,11 +182,11 @@ pub(crate) fn tradeoff(options: &TradeoffOptions) -> Result<bool> {
 }
 
 /// Measures what was asked for.
-pub(super) fn sweep(options: &TradeoffOptions) -> Result<Report<'_>> {
-    sweep_in(options, Time::Real(Instant::now()))
+pub(super) fn sweep<'a>(options: &'a TradeoffOptions, bar: &Bar) -> Result<Report<'a>> {
+    sweep_in(options, Time::Real(Instant::now()), bar)
 }
 
-fn sweep_in(options: &TradeoffOptions, time: Time) -> Result<Report<'_>> {
+fn sweep_in<'a>(options: &'a TradeoffOptions, time: Time, bar: &Bar) -> Result<Report<'a>> {
     let selection = Selection::new(&options.name, &options.parameters.set)?;
     let exact = Model::new(&selection, Precision::F64)?;
     // What is interpreted has double precision only.
@@ -228,13 +228,11 @@ fn sweep_in(options: &TradeoffOptions, time: Time) -> Result<Report<'_>> {
         repeat: &|setting: &Setting, most_s| runner.repeat(setting, most_s),
         clock: &|| runner.time.now(),
     };
-    let bar = Bar::new("planning");
     let mut show = |setting: &Setting| {
         let share = runner.time.now() / options.budget;
         bar.show_share(|| words::line(setting), share.min(1.0));
     };
     let found = measure(&tried, &goal, &calls, &mut show)?;
-    drop(bar);
     let used_s = runner.time.now();
     Ok(Report { options, selection, found, compared, threads, used_s })
 }

@@ -9,10 +9,11 @@ use super::section::Section;
 use crate::arguments::TradeoffOptions;
 use crate::commands::tradeoff::sweep;
 use crate::json::Output;
+use crate::progress::Agenda;
 use crate::terminal;
 
 /// Measures both problems for `budget` seconds each and writes their data into the folders of `out`.
-pub(super) fn section(out: &Path, budget: f64) -> Result<Section> {
+pub(super) fn section(out: &Path, budget: f64, agenda: &Agenda) -> Result<Section> {
     let said = format!(
         "All schemes that fit a problem, from cheap to dear, for {budget} s each, as mms tradeoff NAME --budget {budget}s \
          measures them. With more time the front goes further down, and more settings are proved on neighbouring cell \
@@ -26,9 +27,10 @@ pub(super) fn section(out: &Path, budget: f64) -> Result<Section> {
             ["tradeoff.json", "tradeoff.csv", "tradeoff.svg", "tradeoff.md"].map(file);
         let (json, csv, plot, advice) = (json?, csv?, plot?, advice?);
         let options = TradeoffOptions::usual(problem, budget);
-        let report = sweep(&options)?;
+        let report = sweep(&options, &agenda.next(budget))?;
         let (svg, front) = (report.picture(), report.front());
-        terminal::say(&format!("\n{problem}: the front of error against cost\n{}", front.text()))?;
+        let said = format!("\n{problem}: the front of error against cost\n{}", front.text());
+        agenda.aside(|| terminal::say(&said))?;
         json.write(&report.document()?)?;
         csv.write_text(&report.sheet())?;
         plot.write_text(&svg)?;

@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use anyhow::Result;
-use mmsmith_verify::{Case, Moment, Outputs, Row, Status, energy_drift, run as simulate};
+use mmsmith_verify::{Case, Moment, Outputs, Progress, Row, Status, energy_drift, run as simulate};
 use serde_json::json;
 
 use super::section::Section;
-use super::{PROBLEMS, name, word};
+use super::{PROBLEMS, Pace, name, word};
 use crate::arguments::{Integrator, Precision, Shape};
 use crate::commands::run::{course, drift_plot, history_document};
 use crate::commands::scheme::Scheme;
@@ -15,6 +15,7 @@ use crate::commands::{Model, case, settings};
 use crate::csv;
 use crate::json::Output;
 use crate::library::Selection;
+use crate::progress::Agenda;
 use crate::table::Table;
 
 const CELLS: usize = 16;
@@ -22,8 +23,14 @@ const PERIODS: f64 = 10.0;
 const INTEGRATORS: [Integrator; 4] =
     [Integrator::Cd, Integrator::Usl, Integrator::Usf, Integrator::Musl];
 
+/// The runs of a problem.
+pub(super) fn cases() -> Result<Vec<Case>> {
+    let scheme = |integrator| Scheme { periods: PERIODS, ..Scheme::usual(Shape::Gimp, integrator) };
+    INTEGRATORS.into_iter().map(|integrator| case(&scheme(integrator), CELLS)).collect()
+}
+
 /// Runs both problems with every integrator and writes the histories into the folders of `out`.
-pub(super) fn section(out: &Path) -> Result<Section> {
+pub(super) fn section(out: &Path, paces: &[Pace], agenda: &Agenda) -> Result<Section> {
     let said = format!(
         "Kinetic and strain energy of the particles, less that of the exact motion at the same particles and times, in units \
          of the exact motion's largest energy: {CELLS} cells, gimp, CFL 0.4, {PERIODS} periods. The body force does work, and \
@@ -32,7 +39,7 @@ pub(super) fn section(out: &Path) -> Result<Section> {
     let mut section = Section::new("drift", "Energy over time", &said);
     let mut figures = Vec::new();
     let mut tables = Vec::new();
-    for problem in PROBLEMS {
+    for (problem, pace) in PROBLEMS.into_iter().zip(paces) {
         let folder = out.join(problem);
         let selection = Selection::new(problem, &[])?;
         let model = Model::new(&selection, Precision::F64)?;
@@ -48,7 +55,9 @@ pub(super) fn section(out: &Path) -> Result<Section> {
             let stem = format!("drift-{}-{}", word(scheme.0), word(scheme.1));
             let json = Output::prepare(&folder.join(format!("{stem}.json")))?;
             let sheet = Output::prepare(&folder.join(format!("{stem}.csv")))?;
-            let (row, history) = run(&model, &base)?;
+            let bar = agenda.next(pace.seconds(&[base]));
+            let what = format!("{problem}, energy, {}", name(scheme));
+            let (row, history) = run(&model, &base, &mut |progress| bar.show(&what, progress))?;
             json.write(&json!({
                 "schema": "mmsmith.run/1",
                 "settings": settings(&selection, &options, extent, CELLS, options.cfl),
@@ -75,10 +84,9 @@ pub(super) fn section(out: &Path) -> Result<Section> {
     Ok(section)
 }
 
-fn run(model: &Model, case: &Case) -> Result<(Row, Vec<Moment>)> {
+fn run(model: &Model, case: &Case, show: &mut dyn FnMut(Progress)) -> Result<(Row, Vec<Moment>)> {
     let mut history = Vec::new();
-    let silent = &mut |_| ();
-    let mut outputs = Outputs { history: Some(&mut history), ..Outputs::new(silent) };
+    let mut outputs = Outputs { history: Some(&mut history), ..Outputs::new(show) };
     let row = simulate(&model.exact, model.arithmetic(), case, &mut outputs)?;
     Ok((row, history))
 }

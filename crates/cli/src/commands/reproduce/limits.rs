@@ -4,25 +4,37 @@ use std::path::Path;
 
 use anyhow::Result;
 
-use super::PROBLEMS;
 use super::section::Section;
-use crate::arguments::StabilityOptions;
+use super::{PROBLEMS, Pace};
+use crate::arguments::{Integrator, Shape, StabilityOptions};
+use crate::commands::case;
+use crate::commands::scheme::Scheme;
 use crate::commands::stability::survey;
 use crate::json::Output;
+use crate::progress::Bar;
 
 /// A small grid: the limit depends little on it.
 const CELLS: usize = 16;
 const OVER: [&str; 2] = ["amplitude=1e-6,0.03,0.1,0.2", "nu=0,0.3,0.4,0.45"];
 
+/// What it will take: the runs of a search, of which those that are unstable end early.
+pub(super) fn seconds(pace: &Pace) -> Result<f64> {
+    /// Points of the map, and the runs that find the limit of one.
+    const POINTS: f64 = 16.0;
+    const RUNS: f64 = 10.0;
+    let case = case(&Scheme::usual(Shape::Gimp, Integrator::Cd), CELLS)?;
+    Ok(POINTS * RUNS * pace.seconds(&[case]))
+}
+
 /// Finds the limits of gimp+cd and writes them into the folder of the first problem.
-pub(super) fn section(out: &Path) -> Result<Section> {
+pub(super) fn section(out: &Path, bar: &Bar) -> Result<Section> {
     let problem = PROBLEMS[0];
     let folder = out.join(problem);
     let file = |name: &str| Output::prepare(&folder.join(name));
     let (json, csv, plot) =
         (file("stability.json")?, file("stability.csv")?, file("stability.svg")?);
     let options = StabilityOptions::map(problem, CELLS, OVER);
-    let found = survey(&options)?;
+    let found = survey(&options, bar)?;
     json.write(&found.document()?)?;
     csv.write_text(&found.sheet())?;
     let svg = found.picture();

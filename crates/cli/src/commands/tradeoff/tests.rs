@@ -46,7 +46,8 @@ impl Counted {
 }
 
 fn sweep_of(options: &TradeoffOptions) -> Report<'_> {
-    sweep_in(options, Time::Counted(Counted::default())).expect("a sweep")
+    let bar = Bar::new("planning");
+    sweep_in(options, Time::Counted(Counted::default()), &bar).expect("a sweep")
 }
 
 /// All that a sweep promises beside its files, with a clock that no other work on the machine can hold up.
