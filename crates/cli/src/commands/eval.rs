@@ -37,7 +37,7 @@ pub(crate) fn eval(options: &EvalOptions) -> Result<bool> {
     }
 
     let solution = selection.build()?;
-    let bar = Bar::new();
+    let bar = Bar::new("points");
     let mut rows = Vec::with_capacity(entries.len());
     for portion in entries.chunks(PORTION) {
         let first = rows.len();
