@@ -118,7 +118,7 @@ fn frame<T: Real, const D: usize>(
     let mut stress = Vec::with_capacity(count);
     let mut first_piola_kirchhoff = Vec::with_capacity(count);
     let mut von_mises = Vec::with_capacity(count);
-    let mut initial_position = Vec::with_capacity(count);
+    let mut reference_position = Vec::with_capacity(count);
     let mut exact_displacement = Vec::with_capacity(count);
     let mut error = Vec::with_capacity(count);
     let mut error_magnitude = Vec::with_capacity(count);
@@ -142,7 +142,7 @@ fn frame<T: Real, const D: usize>(
         let in_plane = law.first_piola_kirchhoff(&particles.F[p])?.map(Real::to_f64);
         P.fixed_view_mut::<D, D>(0, 0).copy_from(&in_plane);
         first_piola_kirchhoff.push(by_rows(&P));
-        initial_position.push(padded(&X));
+        reference_position.push(padded(&X));
         von_mises.push(law.von_mises(&F_solver)?.to_f64());
         exact_displacement.push(padded(&u));
         error.push(padded(&delta));
@@ -166,7 +166,7 @@ fn frame<T: Real, const D: usize>(
             array("error", Values::Vector(error)),
             array("error_magnitude", Values::Scalar(error_magnitude)),
             array("volume", Values::Scalar(volume)),
-            array("initial_position", Values::Vector(initial_position)),
+            array("reference_position", Values::Vector(reference_position)),
             array("id", Values::Id((0..count as u64).collect())),
         ],
     })

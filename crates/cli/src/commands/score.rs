@@ -37,7 +37,7 @@ pub(crate) fn score(options: &ScoreOptions) -> Result<bool> {
         if let Some(output) = output {
             output.write(&document(&selection, options, &score))?;
         }
-        Ok(true)
+        Ok(score.rows.iter().all(ScoreRow::is_ok))
     })
 }
 

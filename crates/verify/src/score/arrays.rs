@@ -1,6 +1,6 @@
 //! Which array of a file is which field, and its numbers as vectors and matrices.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use mmsmith_vtk::foreign::{ArrayHead, Snapshot};
@@ -183,6 +183,37 @@ impl Chosen {
                 ),
             );
         }
+        for (array, digits) in chosen.values().filter_map(|array| Some((array, array.digits?))) {
+            if digits < DIGITS_OF_A_DOUBLE {
+                let what = format!(
+                    "array `{}` is text of {digits} digits, where a double has 17: errors below about 1e-{digits} of its \
+                     values are rounding",
+                    array.name
+                );
+                remarks.note("few-digits", false, what);
+            }
+        }
+        let missing: Vec<_> =
+            [Role::Velocity, Role::DeformationGradient, Role::FirstPiolaKirchhoff]
+                .into_iter()
+                .filter(|role| !chosen.contains_key(role))
+                .collect();
+        let taken: BTreeSet<_> = chosen.values().map(|array| array.name.as_str()).collect();
+        let left: Vec<_> = snapshot
+            .arrays()
+            .iter()
+            .map(|array| array.name.as_str())
+            .filter(|name| !taken.contains(name) && *name != POINTS)
+            .collect();
+        if let (Some(role), Some(name)) = (missing.first(), left.first()) {
+            let roles: Vec<_> = missing.iter().map(|role| role.name()).collect();
+            let what = format!(
+                "no array is known to be {}; arrays that are not taken: {}; --map {role}={name} would take one",
+                roles.join(", "),
+                shortened(&left)
+            );
+            remarks.note("not-compared", false, what);
+        }
         Ok(Self(chosen))
     }
 
@@ -191,10 +222,24 @@ impl Chosen {
     }
 }
 
+/// The name of the positions among the arrays of a table.
+const POINTS: &str = "Points";
+/// Text of so many digits gives a double in most cases; 17 always do.
+const DIGITS_OF_A_DOUBLE: usize = 15;
+
 /// The names of a frame's arrays, for messages.
-fn there(snapshot: &Snapshot) -> String {
+pub(super) fn there(snapshot: &Snapshot) -> String {
     let names: Vec<_> = snapshot.arrays().iter().map(|array| array.name.as_str()).collect();
-    if names.is_empty() { "none".into() } else { names.join(", ") }
+    if names.is_empty() { "none".into() } else { shortened(&names) }
+}
+
+/// A list of names that fits a message.
+fn shortened(names: &[&str]) -> String {
+    const MOST: usize = 20;
+    match names.len().checked_sub(MOST) {
+        None | Some(0) => names.join(", "),
+        Some(more) => format!("{} and {more} more", names[..MOST].join(", ")),
+    }
 }
 
 /// One vector a particle; components beyond `D`, which must vanish, are counted where they do not.

@@ -67,11 +67,13 @@ pub enum ScoreError {
     /// Nothing tells displacements.
     #[error(
         "{}: nothing tells displacements: give an array of displacements or of reference positions \
-         (--map displacement=NAME or --map reference_position=NAME), or more than one frame", path.display()
+         (--map displacement=NAME or --map reference_position=NAME), or more than one frame (arrays there are: {there})", path.display()
     )]
     NoDisplacement {
         /// The file.
         path: PathBuf,
+        /// The names of its arrays.
+        there: String,
     },
     /// A frame lacks an array that the first one has, and that all need.
     #[error("{}: there is no array `{name}`, which the first frame has", path.display())]

@@ -70,6 +70,11 @@ impl Remarks {
         }
     }
 
+    /// Whether anything of this kind was met.
+    pub(super) fn has(&self, kind: &str) -> bool {
+        self.met.iter().any(|(known, _)| known.kind == kind)
+    }
+
     /// Everything in words; problems first.
     pub(super) fn list(self) -> Vec<Remark> {
         let mut remarks: Vec<_> = self

@@ -161,7 +161,9 @@ impl<const D: usize> FrameReader<'_, D> {
                 let X =
                     need(self.vector(Role::ReferencePosition, snapshot)?, Role::ReferencePosition)?;
                 let u = if *displacement {
-                    need(self.vector(Role::Displacement, snapshot)?, Role::Displacement)?
+                    let u = need(self.vector(Role::Displacement, snapshot)?, Role::Displacement)?;
+                    self.hold_against_points(&X, &u, snapshot)?;
+                    u
                 } else {
                     let x = positions(snapshot, self.remarks)?;
                     x.iter().zip(&X).map(|(x, X)| x - X).collect()
@@ -275,6 +277,40 @@ impl<const D: usize> FrameReader<'_, D> {
                 expected: traced.X.len(),
             }),
         }
+    }
+
+    /// Tells of displacements that are not those of the points, where there are points that are neither `X` nor `X + u`.
+    fn hold_against_points(
+        &mut self,
+        X: &[SVector<f64, D>],
+        u: &[SVector<f64, D>],
+        snapshot: &Snapshot,
+    ) -> Result<(), ScoreError> {
+        let Some(head) = snapshot.points().filter(|head| (D..=3).contains(&head.components)) else {
+            return Ok(());
+        };
+        let flat = snapshot.positions()?;
+        let (x, _) = vectors::<D>(&flat, head.components);
+        let size = X.iter().map(|X| X.amax()).fold(0.0, f64::max);
+        let far = |distance: f64| distance > OUTSIDE * size;
+        let distances = |u: &dyn Fn(usize) -> SVector<f64, D>| -> Vec<f64> {
+            x.iter().zip(X).enumerate().map(|(p, (x, X))| (x - X - u(p)).amax()).collect()
+        };
+        if !distances(&|_| SVector::zeros()).into_iter().any(far) {
+            return Ok(());
+        }
+        let apart = distances(&|p| u[p]);
+        let count = apart.iter().filter(|distance| far(**distance)).count();
+        let worst = apart.iter().enumerate().max_by(|one, other| one.1.total_cmp(other.1));
+        let what = "particle(s) whose displacement is not the difference of their point and reference position; the array \
+                    of displacements is compared";
+        let first = || {
+            let (particle, distance) =
+                worst.map_or((0, 0.0), |(particle, distance)| (particle, *distance));
+            format!("by {distance:.3e} at {}", place(particle, snapshot))
+        };
+        self.remarks.met("displacement-not-of-points", false, count, what, first);
+        Ok(())
     }
 
     /// Tells of reference positions that no part of the body has.

@@ -296,6 +296,19 @@ fn recording<const D: usize>(
             remarks.note("transposed", false, what);
         }
     }
+    for (field, norms) in errors.named() {
+        let is_compared = fields.contains(&field);
+        // What is not finite in the files has been told.
+        if is_compared
+            && !remarks.has("not-finite")
+            && norms.named().iter().any(|(_, value)| !value.is_finite())
+        {
+            let what = format!(
+                "the errors of {field} are too large for a double, though its values are finite: is the array damaged?"
+            );
+            remarks.note("overflow", true, what);
+        }
+    }
     if input.resolution == Resolution::Estimated {
         let what = "h is estimated, as the spacing of as many points spread evenly over their bounding box; --cells or \
                     --h tells it";

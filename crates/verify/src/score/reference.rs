@@ -6,7 +6,7 @@ use mmsmith_solutions::Solution;
 use mmsmith_vtk::foreign::Snapshot;
 use nalgebra::SVector;
 
-use super::arrays::{Chosen, Role};
+use super::arrays::{Chosen, Role, there};
 use super::findings::Remarks;
 use super::frame::positions;
 use super::{Points, ScoreError, ScoreOptions, Timed, open};
@@ -62,7 +62,10 @@ pub(super) fn scheme<const D: usize>(
         return Ok(if is_at_rest { Scheme::PointsAtRest } else { Scheme::Recovered });
     }
     if timed.len() < 2 {
-        return Err(ScoreError::NoDisplacement { path: first.path().to_owned() });
+        return Err(ScoreError::NoDisplacement {
+            path: first.path().to_owned(),
+            there: there(first),
+        });
     }
     trace(exact, &timed[0], first, chosen, remarks)
 }

@@ -265,6 +265,8 @@ pub struct ArrayHead {
     pub components: usize,
     /// Whether the file holds them as 32-bit floats.
     pub is_single: bool,
+    /// The significant digits of its longest number, where it is text of a table and has enough numbers to tell.
+    pub digits: Option<usize>,
 }
 
 /// One instant as some program wrote it.
@@ -293,8 +295,9 @@ impl Snapshot {
         if let Some((table, index)) = &frame.table {
             let arrays = table.arrays.iter().map(|columns| ArrayHead {
                 name: columns.name.clone(),
-                components: table.components(&columns.name).unwrap_or(0),
+                components: columns.components(),
                 is_single: false,
+                digits: columns.digits(table),
             });
             let (arrays, particles) = (arrays.collect(), table.frames[*index].range.len());
             let data = Data::Table { table: Arc::clone(table), frame: *index };
@@ -331,6 +334,7 @@ impl Snapshot {
                         name: entry.name.clone(),
                         components: entry.components,
                         is_single: entry.kind == Kind::F32,
+                        digits: None,
                     });
                 }
             }
@@ -371,6 +375,7 @@ impl Snapshot {
                 name: table::POINTS.into(),
                 components: piece.points.components,
                 is_single: piece.points.kind == Kind::F32,
+                digits: None,
             }),
             Data::Table { .. } => self.array(table::POINTS).cloned(),
         }

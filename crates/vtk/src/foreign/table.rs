@@ -11,6 +11,8 @@ use super::numbers::to_whole;
 pub(super) struct Table {
     pub(super) arrays: Vec<Columns>,
     columns: Vec<Vec<f64>>,
+    /// How many digits the numbers of each column have.
+    digits: Vec<Digits>,
     /// The frames, in order.
     pub(super) frames: Vec<Rows>,
 }
@@ -39,17 +41,23 @@ const REFERENCE: &str = "X";
 impl Table {
     /// Reads a file with one header line.
     pub(super) fn read(bytes: &[u8]) -> Result<Self, String> {
-        let mut reader =
-            csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(bytes);
+        let delimiter = delimiter(bytes)?;
+        let mut reader = csv::ReaderBuilder::new()
+            .trim(csv::Trim::All)
+            .comment(Some(b'#'))
+            .delimiter(delimiter)
+            .from_reader(bytes);
         let header = reader.headers().map_err(|cause| cause.to_string())?.clone();
         let mut columns: Vec<Vec<f64>> = vec![vec![]; header.len()];
+        let mut digits = vec![Digits::default(); header.len()];
         let mut record = csv::StringRecord::new();
-        while reader.read_record(&mut record).map_err(|cause| cause.to_string())? {
+        while reader.read_record(&mut record).map_err(|cause| damage(&cause, &header))? {
             for (index, (column, word)) in columns.iter_mut().zip(&record).enumerate() {
-                let value = word.parse().map_err(|_| {
+                let value = number(word, delimiter).map_err(|hint| {
                     let line = record.position().map_or(0, csv::Position::line);
-                    format!("line {line}, column `{}`: {word:?} is no number", &header[index])
+                    format!("line {line}, column `{}`: {word:?} is no number{hint}", &header[index])
                 })?;
+                digits[index].count(word);
                 column.push(value);
             }
         }
@@ -58,11 +66,7 @@ impl Table {
             header.iter().position(|name| ["t", "time", "Time", "TimeValue"].contains(&name));
         let rows = columns.first().map_or(0, Vec::len);
         let frames = frames(time.map(|time| &columns[time][..]), rows)?;
-        Ok(Self { arrays, columns, frames })
-    }
-
-    pub(super) fn components(&self, name: &str) -> Option<usize> {
-        self.find(name).map(|columns| columns.indices.len())
+        Ok(Self { arrays, columns, digits, frames })
     }
 
     fn find(&self, name: &str) -> Option<&Columns> {
@@ -82,6 +86,102 @@ impl Table {
         rows: Range<usize>,
     ) -> Option<Result<Vec<i64>, String>> {
         Some(self.floats(name, rows)?.into_iter().map(to_whole).collect())
+    }
+}
+
+/// More columns than a table of particles has.
+const MOST_COLUMNS: usize = 10_000;
+
+/// The character between the columns: comma, semicolon or tab, the one that the header has most often.
+fn delimiter(bytes: &[u8]) -> Result<u8, String> {
+    let lines = bytes.split(|byte| *byte == b'\n');
+    let header = lines.into_iter().find(|line| !line.trim_ascii().is_empty() && line[0] != b'#');
+    let header = header.unwrap_or_default();
+    let count = |delimiter: u8| header.iter().filter(|byte| **byte == delimiter).count();
+    // Of equals the last one is taken, which is the comma.
+    let (count, delimiter) = [b'\t', b';', b',']
+        .map(|delimiter| (count(delimiter), delimiter))
+        .into_iter()
+        .max_by_key(|(count, _)| *count)
+        .unwrap_or((0, b','));
+    if count >= MOST_COLUMNS {
+        return Err(format!("it has {} columns; at most {MOST_COLUMNS} are read", count + 1));
+    }
+    Ok(delimiter)
+}
+
+/// A number with a decimal point, or with a decimal comma where commas do not separate columns; else the reason, to be added
+/// to the refusal.
+fn number(word: &str, delimiter: u8) -> Result<f64, &'static str> {
+    if let Ok(value) = word.parse() {
+        return Ok(value);
+    }
+    if delimiter != b',' && word.contains(',') {
+        return word.replacen(',', ".", 1).parse().map_err(|_| "");
+    }
+    // A whole line in one column.
+    Err(match word.contains(';') {
+        true => {
+            "; columns are separated by the character that the header has: write the header with semicolons too"
+        }
+        false => "",
+    })
+}
+
+/// The reader's own words, and the likeliest reason where lines have more columns than the header.
+fn damage(cause: &csv::Error, header: &csv::StringRecord) -> String {
+    let decimal_commas = match cause.kind() {
+        csv::ErrorKind::UnequalLengths { len, .. } => *len > header.len() as u64,
+        _ => false,
+    };
+    match decimal_commas {
+        true => format!(
+            "{cause}; are there decimal commas? Write decimal points (0.5), or separate columns by semicolons (x;y)"
+        ),
+        false => cause.to_string(),
+    }
+}
+
+/// How many significant digits numbers have, as they are written.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Digits {
+    /// Numbers with a fraction or an exponent.
+    fractions: usize,
+    /// The most digits that one of them has.
+    most: usize,
+}
+
+impl Digits {
+    /// As many numbers with a fraction tell the digits of all: fewer may happen to be short.
+    const ENOUGH: usize = 8;
+
+    pub(super) fn count(&mut self, word: &str) {
+        let mantissa = word.split(['e', 'E', 'd', 'D']).next().unwrap_or_default();
+        if !word.contains(['.', ',', 'e', 'E']) {
+            return;
+        }
+        let significant =
+            mantissa.bytes().filter(u8::is_ascii_digit).skip_while(|digit| *digit == b'0').count();
+        if significant > 0 {
+            self.fractions += 1;
+            self.most = self.most.max(significant);
+        }
+    }
+
+    /// The digits of the longest number, where there are enough to tell.
+    pub(super) fn most(self) -> Option<usize> {
+        (self.fractions >= Self::ENOUGH).then_some(self.most)
+    }
+}
+
+impl Columns {
+    pub(super) fn components(&self) -> usize {
+        self.indices.len()
+    }
+
+    /// The digits of the longest number of an array, where its columns tell.
+    pub(super) fn digits(&self, table: &Table) -> Option<usize> {
+        self.indices.iter().filter_map(|index| table.digits[*index].most()).max()
     }
 }
 
@@ -221,11 +321,46 @@ mod tests {
         assert_eq!(table.floats("F", 0..1), Some(vec![5.0, 6.0, 7.0, 8.0]));
         assert_eq!(table.floats("v", 0..1), Some(vec![9.0, 10.0]));
         assert_eq!(table.integers("id", 0..2), Some(Ok(vec![1, 2])));
-        assert_eq!(table.components("mass"), Some(1));
+        assert_eq!(
+            table.arrays.iter().find(|array| array.name == "mass").map(Columns::components),
+            Some(1)
+        );
         assert_eq!(table.floats("w", 0..1), None);
         let table = Table::read(b"x,node_1,node_3,S12\n1,2,3,4\n").unwrap();
         assert_eq!(table.floats("node_3", 0..1), Some(vec![3.0]));
         assert_eq!(table.floats("S12", 0..1), Some(vec![4.0]));
+    }
+
+    #[test]
+    fn semicolons_and_tabs_separate_columns_and_leave_commas_for_decimals() {
+        for text in ["x;y\n0,5;1.5\n", "x\ty\n0,5\t1,5\n", "x,y\n0.5,1.5\n"] {
+            let table = Table::read(text.as_bytes()).expect(text);
+            assert_eq!(table.floats(POINTS, 0..1), Some(vec![0.5, 1.5]), "{text}");
+        }
+    }
+
+    #[test]
+    fn the_digits_of_text_are_counted_where_there_are_enough_numbers() {
+        let table = |word: &str| {
+            Table::read(format!("mass\n{}", format!("{word}\n").repeat(8)).as_bytes()).unwrap()
+        };
+        for (word, expected) in [
+            ("0.0012345", Some(5)),
+            ("-1.2345e-07", Some(5)),
+            ("0.30000000000000004", Some(17)),
+            ("12", None),
+            ("0.0", None),
+        ] {
+            let table = table(word);
+            assert_eq!(table.arrays[0].digits(&table), expected, "{word}");
+        }
+    }
+
+    #[test]
+    fn more_columns_than_anybody_has_are_refused_by_their_header_alone() {
+        let header = "a,".repeat(MOST_COLUMNS) + "b\n";
+        let message = Table::read(header.as_bytes()).unwrap_err();
+        assert!(message.contains("10001 columns; at most 10000"), "{message}");
     }
 
     #[test]
@@ -237,6 +372,7 @@ mod tests {
             ("F11,F12,F21\n1,2,3\n", "no complete vector or tensor `F`"),
             ("t,x\n0,1\n1,1\n0,2\n", "sort the rows by time"),
             ("x,x\n0,1\n", "no complete"),
+            ("x,y\n0,5,1,5\n", "decimal commas? Write decimal points (0.5)"),
         ] {
             let message = Table::read(text.as_bytes()).expect_err(text);
             assert!(message.contains(expected), "{text:?}: {message}");

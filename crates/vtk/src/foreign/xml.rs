@@ -8,6 +8,9 @@ use quick_xml::events::{BytesStart, Event};
 use super::contents::{Appended, Contents, Entry, Piece, Place};
 use super::numbers::{ByteOrder, Kind, Packing};
 
+/// More attributes than an element of a VTK file has.
+const MOST_ATTRIBUTES: usize = 1000;
+
 /// The attributes of an element.
 struct Tag {
     attributes: HashMap<String, String>,
@@ -16,10 +19,17 @@ struct Tag {
 impl Tag {
     fn new(element: &BytesStart<'_>) -> Result<Self, String> {
         let mut attributes = HashMap::new();
-        for attribute in element.attributes() {
+        // Its own search for attributes that are given twice takes the square of their number.
+        for attribute in element.attributes().with_checks(false) {
+            if attributes.len() == MOST_ATTRIBUTES {
+                return Err(format!("an element has more than {MOST_ATTRIBUTES} attributes"));
+            }
             let attribute = attribute.map_err(|cause| format!("a bad attribute: {cause}"))?;
             let key = String::from_utf8_lossy(attribute.key.as_ref()).into_owned();
             let value = attribute.unescape_value().map_err(|cause| format!("{key}: {cause}"))?;
+            if attributes.contains_key(&key) {
+                return Err(format!("the attribute {key} is given twice"));
+            }
             attributes.insert(key, value.into_owned());
         }
         Ok(Self { attributes })
