@@ -56,8 +56,7 @@ impl Bar {
         line.bar.set_prefix(in_words(left(Duration::ZERO, predicted_s, 0.0)));
         // What the bar says is complete before it is first drawn.
         line.bar.enable_steady_tick(Duration::from_millis(500));
-        let bar = Self { line: Arc::new(line), stretch: (0.0, 1.0) };
-        bar
+        Self { line: Arc::new(line), stretch: (0.0, 1.0) }
     }
 
     /// The same bar for a part of its work, from one share of it to another.

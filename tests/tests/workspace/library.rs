@@ -159,7 +159,8 @@ fn the_updated_frame_names_the_frame_that_runs_a_solution() {
             "prescribed-traction on inner in the updated Lagrangian formulation; the total Lagrangian one does: --formulation total-lagrangian --shape bspline3",
         ),
     ] {
-        let outcome = mms().args(["run", name, "--cells", "8"]).output().unwrap();
+        let updated = ["run", name, "--cells", "8", "--formulation", "updated-lagrangian"];
+        let outcome = mms().args(updated).output().unwrap();
         let message = String::from_utf8(outcome.stderr).unwrap();
         assert_eq!(outcome.status.code(), Some(2), "{message}");
         assert!(message.contains(part), "{message}");

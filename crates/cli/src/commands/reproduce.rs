@@ -227,10 +227,18 @@ fn gentle_differences(folder: &Path, pace: &Pace, agenda: &Agenda) -> Result<Vec
     let model = Model::new(&selection, Precision::F64)?;
     let all = DIFFERENCES.map(|scheme| {
         let bar = agenda.next(difference_seconds(pace, scheme, GENTLE_GRID, &GENTLE_CFLS)?);
-        let cfls = &GENTLE_CFLS;
-        measure_differences(&selection, &model, scheme, GENTLE_GRID, cfls, "gentle", folder, &bar)
+        let ladder = TimeLadder { kind: "gentle", cells: GENTLE_GRID, cfls: &GENTLE_CFLS };
+        measure_differences(&selection, &model, scheme, &ladder, folder, &bar)
     });
     all.into_iter().collect()
+}
+
+/// Time steps on one grid.
+struct TimeLadder<'a> {
+    /// The word for them in names of files.
+    kind: &'a str,
+    cells: usize,
+    cfls: &'a [f64],
 }
 
 /// Measures the differences of a scheme on one grid and writes them into `folder`.
@@ -238,12 +246,11 @@ fn measure_differences(
     selection: &Selection,
     model: &Model,
     scheme: (Shape, Integrator),
-    cells: usize,
-    cfls: &[f64],
-    kind: &str,
+    ladder: &TimeLadder<'_>,
     folder: &Path,
     bar: &Bar,
 ) -> Result<Differences> {
+    let &TimeLadder { kind, cells, cfls } = ladder;
     let options = Scheme::usual(scheme.0, scheme.1);
     let base = case(&options, cells)?;
     let extent = model.admit(&[base])?;
@@ -308,7 +315,8 @@ fn measure_problem(
     let differences = DIFFERENCES.map(|scheme| {
         let cfls = &DIFFERENCE_CFLS;
         let bar = agenda.next(difference_seconds(pace, scheme, GRID, cfls)?);
-        measure_differences(&selection, &model, scheme, GRID, cfls, "differences", folder, &bar)
+        let ladder = TimeLadder { kind: "differences", cells: GRID, cfls };
+        measure_differences(&selection, &model, scheme, &ladder, folder, &bar)
     });
     let differences = differences.into_iter().collect::<Result<Vec<_>>>()?;
 
