@@ -133,7 +133,7 @@ fn schemes(model: &Model) -> Vec<(String, Scheme)> {
         };
         vec![
             said(Shape::Gimp, cd),
-            said(Shape::Linear, usl),
+            said(Shape::Ugimp, usl),
             said(Shape::Ugimp, musl),
             said(Shape::Cpdi, cd),
             total,
