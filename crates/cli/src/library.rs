@@ -14,8 +14,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use anyhow::{Context, Result, bail};
 use mmsmith_interpret::{interpret_fields, interpret_fields_single};
+use mmsmith_prove::admissible_value;
 use mmsmith_solutions::{AnySolution, CATALOGUE, Description, Real, build};
-use mmsmith_spec::{Fields, Spec, nearest};
+use mmsmith_spec::{Fields, Parameter, Spec, nearest};
+use mmsmith_verify::has_body;
 
 use crate::input;
 use crate::number;
@@ -372,10 +374,13 @@ impl Subject {
                 .iter()
                 .enumerate()
                 .filter(|(_, p)| overrides.iter().all(|(name, _)| *name != p.name))
-                .map(|(index, p)| (p.name.clone(), p.default * variation(attempt, index)))
+                .map(|(index, p)| (p.name.clone(), variation(attempt, index, p)))
                 .collect();
-            if let Ok(varied) = selection.with(&set) {
-                solutions.push(varied.build()?);
+            if let Ok(varied) = selection.with(&set)
+                && let solution = varied.build()?
+                && has_body(&solution)
+            {
+                solutions.push(solution);
                 parameters.push(varied.parameters().clone());
             }
             if solutions.len() > VARIATIONS {
@@ -388,14 +393,18 @@ impl Subject {
 }
 
 /// Sets of parameters that are checked beside the one asked for.
-const VARIATIONS: usize = 2;
-/// As many sets are tried for that; the specification may refuse some.
-const MOST_ATTEMPTS: usize = 50;
+const VARIATIONS: usize = 4;
+/// As many sets are tried for that; the specification may refuse some, and for others there may be no body.
+const MOST_ATTEMPTS: usize = 30;
 
-/// A factor between 0.75 and 1.25 that repeats for no two parameters.
-fn variation(attempt: usize, parameter: usize) -> f64 {
-    // Multiples of the golden ratio, spread evenly over the unit interval.
-    0.75 + 0.5 * ((attempt * 17 + parameter) as f64 * 0.618_033_988_749_894_9).fract()
+/// A value between 0.75 and 1.25 of the default in every third attempt, else anywhere in the admissible range.
+fn variation(attempt: usize, index: usize, parameter: &Parameter) -> f64 {
+    // Multiples of the golden ratio, spread evenly over the unit interval, which repeat for no two parameters.
+    let share = ((attempt * 17 + index) as f64 * 0.618_033_988_749_894_9).fract();
+    if attempt % 3 == 1 {
+        return parameter.default * (0.75 + 0.5 * share);
+    }
+    admissible_value(parameter, share)
 }
 
 /// The specification of the solution called `name`, or the one in the file `name`.

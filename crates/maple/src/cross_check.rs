@@ -81,7 +81,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// Whether every component is proved.
+    /// Whether every component is verified: agrees to 40 digits or more at every point.
     #[must_use]
     pub fn proved(&self) -> bool {
         self.components.iter().all(|component| matches!(component.verdict, Verdict::Proved { .. }))
@@ -139,7 +139,7 @@ impl fmt::Display for Component {
         let Component { entry, points, verdict } = self;
         match verdict {
             Verdict::Proved { digits } => {
-                write!(f, "{entry} agrees to {digits:.0} digits at {points} points")
+                write!(f, "{entry} verified: agrees to {digits:.0} digits at {points} points")
             }
             Verdict::Refuted { digits, differing, place, listing, derived } => {
                 let place: Vec<String> =

@@ -1,5 +1,6 @@
 //! Reproducible points in the body and on its surfaces, for random admissible parameters.
 
+use crate::parameters::{VARIATION, admissible_value, near};
 use mmsmith_expr::{Dependence, Expr, Graph, Program, Rational, nearest_f64};
 use mmsmith_maple::sample;
 use mmsmith_oracle::{Oracle, Point, exact};
@@ -7,8 +8,8 @@ use mmsmith_spec::{Domain, Fields, Parameter, Spec, Surface};
 use num_traits::One;
 use thiserror::Error;
 
-/// Parameters vary by this share of their defaults; those that are zero by default, by this number.
-const VARIATION: f64 = 0.1;
+/// Of so many draws one has its parameters near their defaults, the others anywhere in the admissible range.
+const NEAR: usize = 4;
 /// Draws for each point that is wanted.
 const DRAWS: usize = 50;
 
@@ -16,7 +17,7 @@ const DRAWS: usize = 50;
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error(
     "found {found} of {wanted} points in the body where the parameters are admissible, J > 0 and every field has a \
-     value, with parameters within {:.0} % of their defaults",
+     value, with parameters within {:.0} % of their defaults or in the whole admissible range",
     100.0 * VARIATION
 )]
 pub struct PointsError {
@@ -30,7 +31,7 @@ pub struct PointsError {
 pub(crate) type Values = Vec<(Expr, Rational)>;
 
 /// `count` points. Positions are in the body, or on `surface` to far more digits than doubles have; times are within a
-/// period, parameters near their defaults; the values of `expressions` are finite and `J > 0`.
+/// period, parameters admissible, some near their defaults; the values of `expressions` are finite and `J > 0`.
 pub(crate) fn points(
     spec: &Spec,
     fields: &Fields,
@@ -48,22 +49,20 @@ pub(crate) fn points(
     let parameters: Vec<(Expr, Dependence)> =
         inputs[n + 1..].iter().map(|&p| (p, Dependence::default())).collect();
     let sides = Program::lower(&mut graph, &parameters, &[], &sides);
-    // Coordinates and time as shares, parameters as they are.
-    let bounds: Vec<(Expr, [f64; 2])> = inputs
-        .iter()
-        .enumerate()
-        .map(|(index, &input)| match index.checked_sub(n + 1) {
-            None => (input, [0.0, 1.0]),
-            Some(parameter) => (input, range(&spec.parameters[parameter])),
-        })
-        .collect();
+    // Everything as shares.
+    let bounds: Vec<(Expr, [f64; 2])> = inputs.iter().map(|&input| (input, [0.0, 1.0])).collect();
     let mut found = Vec::new();
-    for draw in sample(&bounds, DRAWS * count, 1) {
-        let (shares, parameters) = draw.split_at(n + 1);
-        if !admissible(spec, &sides, parameters) {
+    for (number, draw) in sample(&bounds, DRAWS * count, 1).enumerate() {
+        let (shares, of_parameters) = draw.split_at(n + 1);
+        let value = if number % NEAR == 0 { near } else { admissible_value };
+        let parameters = spec.parameters.iter().zip(of_parameters).map(|(parameter, drawn)| {
+            Some((drawn.0, exact(value(parameter, nearest_f64(&drawn.1)))?))
+        });
+        let Some(parameters) = parameters.collect::<Option<Vec<_>>>() else { continue };
+        if !admissible(spec, &sides, &parameters) {
             continue;
         }
-        let Some(values) = place(spec, &graph, surface, shares, parameters) else { continue };
+        let Some(values) = place(spec, &graph, surface, shares, &parameters) else { continue };
         let rounded: Vec<f64> = values.iter().map(|(_, value)| nearest_f64(value)).collect();
         let fine = everything.evaluate(&rounded);
         if fine[0] > 0.0 && fine.iter().all(|value| value.is_finite()) {
@@ -74,13 +73,6 @@ pub(crate) fn points(
         }
     }
     Err(PointsError { found: found.len(), wanted: count })
-}
-
-/// Where a parameter is drawn from.
-fn range(parameter: &Parameter) -> [f64; 2] {
-    let middle = parameter.default;
-    let half = if middle == 0.0 { VARIATION } else { VARIATION * middle.abs() };
-    [middle - half, middle + half]
 }
 
 fn admissible(spec: &Spec, sides: &Program, parameters: &[(Expr, Rational)]) -> bool {

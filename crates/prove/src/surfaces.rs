@@ -1,4 +1,4 @@
-//! What boundary conditions say about a solution, proved or refuted.
+//! What boundary conditions say about a solution: proved in symbols, verified in high precision, or refuted.
 
 use crate::points::{PointsError, Values, points};
 use mmsmith_expr::{Expr, Graph, Rational, nearest_f64};
@@ -54,7 +54,7 @@ impl SurfaceProof {
     }
 }
 
-/// Why a claim could be neither proved nor refuted.
+/// Why a claim could be neither verified nor refuted.
 // The message has the cause, which is therefore no `source`: whoever prints both would print it twice.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum SurfaceError {

@@ -84,6 +84,20 @@ pub(crate) fn outside<const D: usize>(domain: &Domain<f64, D>, X: &SVector<f64, 
     }
 }
 
+/// How far one may go from `X` along `direction`, which has unit length and in an annulus leads away from the origin, and
+/// back, without leaving the body.
+pub(crate) fn reach_along<const D: usize>(
+    domain: &Domain<f64, D>,
+    X: &SVector<f64, D>,
+    direction: &SVector<f64, D>,
+) -> f64 {
+    let along = |axis: usize| match domain {
+        Domain::Box { .. } => reach(domain, X, axis) / direction[axis].abs(),
+        _ => reach(domain, X, axis),
+    };
+    (0..D).filter(|&axis| direction[axis] != 0.0).map(along).fold(f64::INFINITY, f64::min)
+}
+
 /// The largest extent of the body.
 pub(crate) fn size<const D: usize>(domain: &Domain<f64, D>) -> Option<f64> {
     match domain {

@@ -59,14 +59,14 @@ fn changed_ring(right: &str, wrong: &str) -> (tempfile::TempDir, std::path::Path
 }
 
 #[test]
-fn the_published_listing_is_proved_and_told_in_json() {
+fn the_published_listing_is_verified_and_told_in_json() {
     let result = mmsmith_tests::json(&["check", "ring"]);
     let checks = result["results"][0]["cross_checks"].as_array().unwrap();
     assert_eq!(checks.len(), 1);
     let components = checks[0]["components"].as_array().unwrap();
     let entries: Vec<&str> = components.iter().map(|c| c["entry"].as_str().unwrap()).collect();
     assert_eq!(entries, ["b[0]", "b[1]", "b[2]"]);
-    assert!(components.iter().all(|c| c["verdict"] == "proved"), "{checks:?}");
+    assert!(components.iter().all(|c| c["verdict"] == "verified"), "{checks:?}");
 }
 
 #[test]
@@ -77,7 +77,7 @@ fn a_listing_with_one_wrong_digit_is_refuted_with_the_worst_point() {
     assert_eq!(status, Some(1), "{out}");
     assert!(out.contains("ring: FAILED"), "{out}");
     assert!(out.contains("b[0] differs at 20 of 20 points, most at X = "), "{out}");
-    assert!(out.contains("b[2] agrees to 60 digits at 20 points"), "{out}");
+    assert!(out.contains("b[2] verified: agrees to 60 digits at 20 points"), "{out}");
     let result: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap();
     let component = &result["results"][0]["cross_checks"][0]["components"][1];
@@ -134,7 +134,7 @@ fn a_listing_may_be_a_file_beside_the_specification() {
     std::fs::write(folder.path().join("ring.c"), listing).unwrap();
     let (status, out, errors) = outcome(mms().arg("check").arg(&spec));
     assert_eq!(status, Some(0), "{errors}");
-    assert!(out.contains("b[1] agrees to 60 digits"), "{out}");
+    assert!(out.contains("b[1] verified: agrees to 60 digits"), "{out}");
 
     std::fs::write(folder.path().join("ring.c"), listing.replace("t6 = t5*R;", "t6 = t5 R;"))
         .unwrap();
@@ -151,7 +151,10 @@ fn a_rim_that_is_nearly_free_is_refuted_with_the_worst_point() {
     let (status, out, _) = outcome(mms().arg("check").arg(&spec));
     assert_eq!(status, Some(1), "{out}");
     assert!(out.contains("P N on inner: NOT zero: "), "{out}");
-    assert!(out.contains("zero in symbols, for all parameters: P N on outer, shear"), "{out}");
+    assert!(
+        out.contains("proved, zero in symbols for all parameters: P N on outer, shear"),
+        "{out}"
+    );
 }
 
 #[test]
@@ -169,7 +172,7 @@ fn what_symbols_do_not_show_is_shown_in_digits() {
     std::fs::write(&spec, text).unwrap();
     let (status, out, errors) = outcome(mms().arg("check").arg(&spec));
     assert_eq!(status, Some(0), "{out}{errors}");
-    assert!(out.contains("P N on X-upper: zero to 60 digits at 20 points"), "{out}");
+    assert!(out.contains("P N on X-upper: verified: zero to 60 digits at 20 points"), "{out}");
     std::fs::write(&spec, text.replace("X-upper", "X-lower")).unwrap();
     let (status, out, _) = outcome(mms().arg("check").arg(&spec));
     assert_eq!(status, Some(1), "{out}");

@@ -79,7 +79,7 @@ fn the_coefficients_of_the_ring_free_its_rims_of_traction() {
     assert_eq!(rims.len(), 2, "{out}");
     assert!(rims.iter().all(|line| line.contains("passed")), "{out}");
     assert!(
-        out.contains("zero in symbols, for all parameters: P N on inner, P N on outer"),
+        out.contains("proved, zero in symbols for all parameters: P N on inner, P N on outer"),
         "{out}"
     );
 }

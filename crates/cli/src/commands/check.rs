@@ -93,7 +93,7 @@ impl Comparison {
             Equality::Proved { digits } => json!({
                 "entry": component.entry,
                 "points": component.points,
-                "verdict": "proved",
+                "verdict": "verified",
                 "digits": digits,
             }),
             Equality::Refuted { digits, differing, place, listing, derived } => json!({
@@ -146,13 +146,15 @@ impl Claims {
         let symbolic = self.surfaces.iter().filter(|p| p.outcome == Outcome::Symbolic).map(name);
         let symbolic = symbolic.collect::<Vec<_>>().join(", ");
         if !symbolic.is_empty() {
-            text += &format!("  zero in symbols, for all parameters: {symbolic}\n");
+            text += &format!("  proved, zero in symbols for all parameters: {symbolic}\n");
         }
         for proof in &self.surfaces {
             let outcome = match &proof.outcome {
                 Outcome::Symbolic => continue,
                 Outcome::Numerical { digits, points } => {
-                    format!("zero to {digits:.0} digits at {points} points with random parameters")
+                    format!(
+                        "verified: zero to {digits:.0} digits at {points} points with random parameters"
+                    )
                 }
                 Outcome::Refuted { value, scale, place } => {
                     let place: Vec<String> =
@@ -187,7 +189,7 @@ fn surface_document(proof: &SurfaceProof) -> Value {
         Outcome::Symbolic => json!({ "what": what, "verdict": "proved", "by": "symbols" }),
         Outcome::Numerical { digits, points } => json!({
             "what": what,
-            "verdict": "proved",
+            "verdict": "verified",
             "by": "digits",
             "digits": digits,
             "points": points,
@@ -226,7 +228,7 @@ fn text(
         let verdict = match finding.verdict {
             Verdict::Passed => "passed",
             Verdict::Failed => "FAILED",
-            Verdict::Inconclusive => "inconclusive",
+            Verdict::Inconclusive => "cannot judge",
         };
         // A field that is zero everywhere has no scale to be relative to.
         let unit = if finding.scale > 0.0 { finding.scale } else { 1.0 };

@@ -78,13 +78,17 @@ fn text(names: &[String], shares: &[Vec<Share>], set: &[&String], missing: &[Par
     }
     text += &table.text();
     let names: Vec<&str> = set.iter().map(|name| name.as_str()).collect();
-    text += &format!(
-        "The fewest that exercise all of it, each part to {} % at least: {}\n",
-        100.0 * THRESHOLD,
-        names.join(", ")
-    );
+    let least = 100.0 * THRESHOLD;
+    if shares.len() > 1 {
+        let all = if missing.is_empty() { "all of it" } else { "all that any of these does" };
+        text += &format!(
+            "The fewest that exercise {all}, each part to {least} % at least: {}\n",
+            names.join(", ")
+        );
+    }
+    let subject = if shares.len() > 1 { "None of these exercises" } else { "It does not exercise" };
     for part in missing {
-        text += &format!("Nothing here exercises: {part}\n");
+        text += &format!("{subject}, to {least} %: {part}\n");
     }
     text
 }
