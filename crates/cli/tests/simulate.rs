@@ -358,7 +358,11 @@ fn bad_input_is_met_with_what_would_be_right() {
     refuses(place, &format!("run ring --shape gimp {fitted}"), &["layout", "lattice", "cpdi2"]);
     refuses(place, &format!("run axis-aligned --shape cpdi2 {fitted}"), &["lattice for a box"]);
     refuses(place, &format!("{total} {fitted}"), &["--layout", "gauss or lattice"]);
-    refuses(place, &format!("{total} --transfer apic"), &["--transfer apic", "--frame updated"]);
+    refuses(
+        place,
+        &format!("{total} --transfer apic"),
+        &["--transfer apic", "--formulation updated-lagrangian"],
+    );
     refuses(place, &format!("{total} --integrator usavg"), &["usavg", "cd"]);
     refuses(
         place,

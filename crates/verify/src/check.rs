@@ -12,7 +12,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::case::law;
-use crate::difference::derivative;
+use crate::difference::{derivative, derivative_of_sum};
 use crate::dimension::in_dimension;
 use crate::points;
 use crate::scene::SceneError;
@@ -370,10 +370,13 @@ fn field_findings<const D: usize>(
             let on_ray = |s: f64| X + ray * s;
             let reach = points::reach_along(&domain, X, &ray).min(REACH * size);
             let changes = [
-                (derivative(|s| of(X, s).0, *t, reach_t), derivative(|s| of(X, s).1, *t, reach_t)),
+                (
+                    derivative(|s| of(X, s).0, *t, reach_t),
+                    derivative_of_sum(|s| of(X, s).1, *t, reach_t, stiffness),
+                ),
                 (
                     derivative(|s| of(&on_ray(s), *t).0, 0.0, reach),
-                    derivative(|s| of(&on_ray(s), *t).1, 0.0, reach),
+                    derivative_of_sum(|s| of(&on_ray(s), *t).1, 0.0, reach, stiffness),
                 ),
             ];
             for ((dF, dW), (joined, unit)) in

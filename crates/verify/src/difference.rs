@@ -34,8 +34,18 @@ pub(crate) fn derivative<const R: usize, const C: usize>(
     x: f64,
     reach: f64,
 ) -> Derivative<R, C> {
+    derivative_of_sum(f, x, reach, 0.0)
+}
+
+/// The same for a sum of terms as large as `terms` that may nearly cancel: its rounding is that of the terms.
+pub(crate) fn derivative_of_sum<const R: usize, const C: usize>(
+    f: impl Fn(f64) -> SMatrix<f64, R, C>,
+    x: f64,
+    reach: f64,
+    terms: f64,
+) -> Derivative<R, C> {
     let nothing = Derivative { value: SMatrix::repeat(f64::NAN), error: f64::INFINITY };
-    let (mut largest, mut steepest) = (0.0_f64, 0.0_f64);
+    let (mut largest, mut steepest) = (terms, 0.0_f64);
     let mut coarser: Option<[SMatrix<f64, R, C>; 2]> = None;
     let mut row: Vec<SMatrix<f64, R, C>> = Vec::with_capacity(STEPS);
     let steps: Vec<f64> = (0..STEPS as i32).map(|level| reach * 0.5_f64.powi(level)).collect();
@@ -146,6 +156,15 @@ mod tests {
             let d = derivative(|s: f64| Vector1::new((k * s).sin()), 0.3, 0.1);
             assert!(d.error.is_infinite(), "{k:e}: {:e}", d.error);
         }
+    }
+
+    #[test]
+    fn a_sum_whose_terms_cancel_is_judged_by_its_terms() {
+        // Terms of one that leave 1e-8.
+        let energy = |s: f64| Vector1::new((1.0 + (1e-4 * s).powi(2)) - 1.0);
+        let d = derivative_of_sum(energy, 1.0, 0.1, 1.0);
+        let difference = (d.value[0] - 2e-8).abs();
+        assert!(difference <= 4.0 * d.error && d.error < 1e-12, "{difference:e}, {:e}", d.error);
     }
 
     #[test]
