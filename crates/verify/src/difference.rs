@@ -78,7 +78,8 @@ pub(crate) fn derivative_of_sum<const R: usize, const C: usize>(
     let scatter = (last - FINEST..last)
         .map(|level| apart(level, level + 1) * finest_step(level + 1))
         .fold(0.0, |m: f64, d| if d.is_nan() { f64::NAN } else { m.max(d) });
-    if !(scatter <= LARGEST_SCATTER * largest) {
+    let is_rounding = scatter <= LARGEST_SCATTER * largest;
+    if !is_rounding {
         return nothing;
     }
     // The argument is rounded, too, which matters where the function is steep, though it may be flat at `x` itself.
