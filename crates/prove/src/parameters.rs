@@ -36,7 +36,10 @@ pub fn admissible_value(parameter: &Parameter, share: f64) -> f64 {
             let width = high - low;
             match share {
                 s if s < 0.25 => low + width * power(NEXT_TO_LIMIT, 4.0 * s),
-                s if s < 0.75 => low + width * 2.0 * (s - 0.25),
+                s if s < 0.75 => {
+                    let closest = 10_f64.powf(NEXT_TO_LIMIT[0]);
+                    low + width * (2.0 * (s - 0.25)).clamp(closest, 1.0 - closest)
+                }
                 s => high - width * power(NEXT_TO_LIMIT, 4.0 * (s - 0.75)),
             }
         }

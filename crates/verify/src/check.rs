@@ -175,12 +175,28 @@ fn has_body_in<const D: usize>(solution: &dyn Solution<f64, D>) -> bool {
     };
     let positive = |value: f64| value > 0.0 && value.is_finite();
     let constants = [solution.density(), solution.period(), solution.wave_speed()];
+    let surfaces: Vec<Surface> = (0..D)
+        .flat_map(|axis| [Surface::Lower(axis), Surface::Upper(axis)])
+        .chain([Surface::Inner, Surface::Outer])
+        .collect();
+    let keeps_volume = |X: &SVector<f64, D>, t: f64| {
+        let J = solution.jacobian(X, t);
+        J >= LEAST_VOLUME && J.is_finite()
+    };
     is_solid
         && constants.into_iter().all(positive)
         && (0..BODY_POINTS)
-            .filter_map(|n| points::interior(&domain, solution.period(), n))
-            .all(|(X, t)| positive(solution.jacobian(&X, t)))
+            .filter_map(|n| Some((n, points::interior(&domain, solution.period(), n)?)))
+            .all(|(n, (X, t))| {
+                // Stretches are extreme on surfaces.
+                let mut on = surfaces.iter().filter_map(|at| points::surface(&domain, *at, n));
+                keeps_volume(&X, t) && on.all(|(X, _)| keeps_volume(&X, t))
+            })
 }
+
+/// The least ratio of volumes of a body that is checked: below it, it may be turned inside
+/// out between the points that are looked at.
+const LEAST_VOLUME: f64 = 0.1;
 
 fn check_in<const D: usize>(
     solution: &dyn Solution<f64, D>,
