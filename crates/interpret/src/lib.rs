@@ -54,7 +54,15 @@ pub fn interpret_fields<'a>(
     fields: spec::Fields,
     overrides: impl IntoIterator<Item = (&'a str, f64)>,
 ) -> Result<AnySolution<f64>, InterpretError> {
-    let values = resolve(spec, overrides)?;
+    in_double(spec, fields, resolve(spec, overrides)?)
+}
+
+/// Not generic, so that [`Interpreted`] is compiled in this crate, and not in each that calls it.
+fn in_double(
+    spec: &Spec,
+    fields: spec::Fields,
+    values: Vec<f64>,
+) -> Result<AnySolution<f64>, InterpretError> {
     Ok(match spec.dimension {
         1 => AnySolution::One(Box::new(Interpreted::<1>::new(spec, fields, values)?)),
         2 => AnySolution::Two(Box::new(Interpreted::<2>::new(spec, fields, values)?)),
@@ -73,7 +81,15 @@ pub fn interpret_fields_single<'a>(
     fields: spec::Fields,
     overrides: impl IntoIterator<Item = (&'a str, f64)>,
 ) -> Result<AnySolution<f32>, InterpretError> {
-    let values = resolve(spec, overrides)?;
+    in_single(spec, fields, resolve(spec, overrides)?)
+}
+
+/// Not generic, as [`in_double`].
+fn in_single(
+    spec: &Spec,
+    fields: spec::Fields,
+    values: Vec<f64>,
+) -> Result<AnySolution<f32>, InterpretError> {
     Ok(match spec.dimension {
         1 => AnySolution::One(Box::new(Rounded {
             exact: Interpreted::<1>::new(spec, fields, values)?,
