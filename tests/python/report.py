@@ -3,7 +3,8 @@
     python report.py REPORT.html SCREENSHOTS
 
 At 1280 and at 400 pixels width the page must write nothing to the console, ask for nothing outside itself, be no wider
-than the window, and show every plot: pixels of each curve's own colour inside the plot's box, found in a screenshot.
+than the window, break no number in two lines, and show every plot: pixels of each curve's own colour inside the plot's
+box, found in a screenshot, and every word of it within that box. On paper no table may reach beyond the sheet.
 The screenshots stay in the folder SCREENSHOTS. Before the report, a page with one fault of each kind is opened, so
 that a check that sees nothing is found out.
 
@@ -53,6 +54,44 @@ JSON.stringify([...document.querySelectorAll('svg')].map(svg => {
 }))
 """
 
+# Words of plots that reach beyond the plot, and numbers that are broken in two lines.
+TEXTS = r"""
+(() => {
+  const cut = [], broken = [];
+  for (const svg of document.querySelectorAll('svg')) {
+    const box = svg.getBoundingClientRect();
+    for (const text of svg.querySelectorAll('text')) {
+      const own = text.getBoundingClientRect();
+      if (own.width && (own.left < box.left - 1 || own.right > box.right + 1 || own.top < box.top - 1
+          || own.bottom > box.bottom + 1)) cut.push(text.textContent);
+    }
+  }
+  const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while (texts.nextNode()) {
+    const node = texts.currentNode;
+    if (node.parentElement.closest('svg, script, style, pre')) continue;
+    for (const number of node.data.matchAll(/-?\d[\d.]*(e[-+]?\d+)?/g)) {
+      const range = document.createRange();
+      range.setStart(node, number.index);
+      range.setEnd(node, number.index + number[0].length);
+      const lines = new Set([...range.getClientRects()].filter(r => r.width > 0).map(r => Math.round(r.top)));
+      if (lines.size > 1) broken.push(number[0]);
+    }
+  }
+  return JSON.stringify({cut, broken});
+})()
+"""
+
+# Tables that are wider than what holds them: on paper nobody can scroll.
+TOO_WIDE = """
+JSON.stringify([...document.querySelectorAll('table')].filter(table => {
+  const box = table.getBoundingClientRect();
+  return box.right > document.documentElement.clientWidth + 1;
+}).map(table => table.innerText.slice(0, 60)))
+"""
+# The printable width of a sheet of A4 with Chromium's margins, in pixels.
+SHEET = 718
+
 # What the sections that are not from the study hold.
 SECTIONS = """
 (() => {
@@ -74,8 +113,11 @@ FAULTS = """<!DOCTYPE html><html><head><title>faults</title></head><body>
 <svg class="plot" viewBox="0 0 100 100" aria-label="faulty" width="300">
 <title>faulty</title>
 <text x="1" y="9" font-size="9">t</text>
+<text x="90" y="50" font-size="9">beyond its plot</text>
 <g class="curve" data-name="unseen" data-colour="#0072b2"></g>
-</svg></body></html>
+</svg>
+<p style="width: 2em; overflow-wrap: anywhere">3.40e-2718281828</p>
+<table style="width: 2000px"><tr><td>a wide table</td></tr></table></body></html>
 """
 
 
@@ -221,6 +263,9 @@ def inspect(browser, address, width, picture):
             asked = parameters["request"]["url"]
             if asked != address and not asked.startswith("data:"):
                 wrong.append(f"outside request: {asked}")
+    texts = json.loads(browser.evaluate(TEXTS))
+    wrong += [f"words beyond their plot: {text}" for text in texts["cut"]]
+    wrong += [f"a number in two lines: {number}" for number in texts["broken"]]
     total = browser.evaluate("document.documentElement.scrollWidth")
     if total > width:
         wrong.append(f"the page is {total} pixels wide")
@@ -247,6 +292,15 @@ def inspect(browser, address, width, picture):
     return wrong, len(plots), sum(len(plot["marks"]) for plot in plots)
 
 
+def printed(browser):
+    """What of the open page a sheet of paper does not hold."""
+    browser.call("Emulation.setEmulatedMedia", media="print")
+    browser.call("Emulation.setDeviceMetricsOverride", width=SHEET, height=HEIGHT, deviceScaleFactor=1, mobile=False)
+    wide = json.loads(browser.evaluate(TOO_WIDE))
+    browser.call("Emulation.setEmulatedMedia", media="")
+    return [f"on paper, a table is cut: {table}" for table in wide]
+
+
 def main(arguments):
     if len(arguments) != 2:
         print("usage: python report.py REPORT.html SCREENSHOTS", file=sys.stderr)
@@ -263,7 +317,17 @@ def main(arguments):
             faulty = Path(folder) / "faults.html"
             faulty.write_text(FAULTS, encoding="utf-8")
             wrong, _, _ = inspect(browser, faulty.as_uri(), WIDTHS[0], f"{folder}/faults.png")
-            for part in ("console: error: planted", "outside request", "pixels wide", "unseen is not visible"):
+            wrong += printed(browser)
+            planted = (
+                "console: error: planted",
+                "outside request",
+                "pixels wide",
+                "unseen is not visible",
+                "beyond its plot",
+                "a number in two lines: 3.40e-2718281828",
+                "on paper, a table is cut: a wide table",
+            )
+            for part in planted:
                 if not any(part in line for line in wrong):
                     failed += 1
                     print(f"FAILED: the planted fault '{part}' was not found in {wrong}")
@@ -273,7 +337,7 @@ def main(arguments):
                 # Space, time, two pictures, energy and cost for each problem, three of differences, and a map of limits.
                 if plots != 16:
                     wrong.append(f"{plots} plots, not 16")
-                wrong += missing(browser)
+                wrong += missing(browser) + printed(browser)
                 failed += len(wrong)
                 print(f"{width} pixels: {plots} plots, {marks} curves and colours; {picture}")
                 for line in wrong:

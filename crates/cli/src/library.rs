@@ -17,7 +17,7 @@ use mmsmith_interpret::{interpret_fields, interpret_fields_single};
 use mmsmith_prove::admissible_value;
 use mmsmith_solutions::{AnySolution, CATALOGUE, Description, Real, build};
 use mmsmith_spec::{Fields, Parameter, Spec, nearest};
-use mmsmith_verify::has_body;
+use mmsmith_verify::{body_of, has_body};
 
 use crate::input;
 use crate::number;
@@ -256,7 +256,11 @@ impl Selection {
                 (Source::Library(description), defaults)
             }
         };
-        Self { source, parameters: defaults }.with(overrides).context("--set")
+        let selection = Self { source, parameters: defaults }.with(overrides).context("--set")?;
+        if !overrides.is_empty() {
+            body_of(&selection.build()?).context("--set")?;
+        }
+        Ok(selection)
     }
 
     /// The same solution with other values of the parameters named; of two values for one name the later one holds.

@@ -9,7 +9,7 @@ use thiserror::Error;
 pub enum StepError {
     /// A deformation gradient lost its orientation.
     #[error(
-        "step {step}, time {time:e}: particle {particle} is turned inside out (J = {J:e}); \
+        "step {step}, time {time:.6e}: particle {particle} is turned inside out (J = {J:.3e}); \
          try a smaller time step, more particles per cell or smoother weights"
     )]
     Inverted {
@@ -24,8 +24,8 @@ pub enum StepError {
     },
     /// A position or a deformation gradient overflowed or became NaN.
     #[error(
-        "step {step}, time {time:e}: particle {particle} has a value that is not finite \
-         (x = {position:?}, J = {J:e}); the run is unstable, or the body force is not finite there"
+        "step {step}, time {time:.6e}: particle {particle} has a value that is not finite \
+         (x = {position:.6?}, J = {J:.3e}); the run is unstable, or the body force is not finite there"
     )]
     NotFinite {
         /// Number of the failed step, counted from 1; 0 for the initial state.
@@ -41,8 +41,8 @@ pub enum StepError {
     },
     /// A particle's centre moved out of the grid.
     #[error(
-        "step {step}, time {time:e}: particle {particle} left the grid at x = {position:?} \
-         (axis {axis}: {lower:e} to {upper:e}); make the grid larger or the time step smaller"
+        "step {step}, time {time:.6e}: particle {particle} left the grid at x = {position:.6?} \
+         (axis {axis}: {lower:.3e} to {upper:.3e}); make the grid larger or the time step smaller"
     )]
     LeftGrid {
         /// Number of the failed step, counted from 1; 0 for the initial state.
@@ -62,8 +62,8 @@ pub enum StepError {
     },
     /// A particle box grew wider than the weights support.
     #[error(
-        "step {step}, time {time:e}: the box of particle {particle} has half-size {half_size:e} along axis {axis}, \
-         more than the supported {limit:e} (two cells); use more particles per cell"
+        "step {step}, time {time:.6e}: the box of particle {particle} has half-size {half_size:.3e} along axis {axis}, \
+         more than the supported {limit:.3e} (two cells); use more particles per cell"
     )]
     TooLarge {
         /// Number of the failed step, counted from 1; 0 for the initial state.

@@ -96,6 +96,19 @@ pub struct CheckReport {
     pub points: usize,
     /// The comparisons of fields, then those of boundary conditions.
     pub findings: Vec<Finding>,
+    /// Of a motion that is not the same after its period: how much it is not. No failure, since a run may last any time.
+    pub not_periodic: Option<Change>,
+}
+
+/// How much a motion differs after its period from its beginning, over all points sampled.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Change {
+    /// The period.
+    pub period: f64,
+    /// Of the displacement, over its largest magnitude.
+    pub u: f64,
+    /// Of the velocity, over its largest magnitude.
+    pub v: f64,
 }
 
 impl CheckReport {
@@ -104,9 +117,10 @@ impl CheckReport {
     /// A mistake may hide at particular values, such as a density of one.
     #[must_use]
     pub fn worst_of(reports: Vec<CheckReport>) -> CheckReport {
-        let mut worst = CheckReport { points: 0, findings: Vec::new() };
+        let mut worst = CheckReport { points: 0, findings: Vec::new(), not_periodic: None };
         for (set, report) in reports.into_iter().enumerate() {
             worst.points += report.points;
+            worst.not_periodic = worst.not_periodic.or(report.not_periodic);
             for (index, mut finding) in report.findings.into_iter().enumerate() {
                 finding.parameter_set = set;
                 match worst.findings.get_mut(index) {
@@ -157,8 +171,59 @@ pub fn check(solution: &AnySolution<f64>, count: usize) -> Result<CheckReport, C
     in_dimension!(solution, |s| check_in(s, count), else Err(CheckError::Dimension))
 }
 
-/// Whether there is a body, with volume, mass and a period, that its motion never turns inside out, as far as a few points
-/// show.
+/// A body without volume or mass, or a motion without a period.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum NoBody {
+    /// A lower surface that is not below the upper one, or an inner one that is not within the outer one.
+    #[error("the body has no volume: it reaches {0}")]
+    Volume(String),
+    /// A constant that has to be positive and finite.
+    #[error("the {quantity} is {value:?}; it has to be positive and finite")]
+    Constant {
+        /// Which constant.
+        quantity: &'static str,
+        /// Its value.
+        value: f64,
+    },
+}
+
+/// Whether there is a body with volume and mass, and a motion with a period.
+///
+/// A specification may admit parameters for which there is none.
+///
+/// # Errors
+///
+/// [`NoBody`] says what is missing.
+pub fn body_of(solution: &AnySolution<f64>) -> Result<(), NoBody> {
+    in_dimension!(solution, |s| body_in(s), else Ok(()))
+}
+
+fn body_in<const D: usize>(solution: &dyn Solution<f64, D>) -> Result<(), NoBody> {
+    let (is_solid, extent) = match solution.domain() {
+        Domain::Box { lower, upper } => (
+            (0..D).all(|axis| lower[axis] < upper[axis]),
+            format!("from {:?} to {:?}", lower.as_slice(), upper.as_slice()),
+        ),
+        Domain::Annulus { inner, outer } => {
+            (0.0 <= inner && inner < outer, format!("from radius {inner:?} to radius {outer:?}"))
+        }
+        _ => (true, String::new()),
+    };
+    if !is_solid {
+        return Err(NoBody::Volume(extent));
+    }
+    let constants = [
+        ("density", solution.density()),
+        ("period", solution.period()),
+        ("wave speed", solution.wave_speed()),
+    ];
+    match constants.into_iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
+        Some((quantity, value)) => Err(NoBody::Constant { quantity, value }),
+        None => Ok(()),
+    }
+}
+
+/// Whether there is [a body](body_of) that its motion never turns inside out, as far as a few points show.
 ///
 /// A specification may admit parameters for which there is none: these are no use for a check.
 #[must_use]
@@ -168,13 +233,6 @@ pub fn has_body(solution: &AnySolution<f64>) -> bool {
 
 fn has_body_in<const D: usize>(solution: &dyn Solution<f64, D>) -> bool {
     let domain = solution.domain();
-    let is_solid = match &domain {
-        Domain::Box { lower, upper } => (0..D).all(|axis| lower[axis] < upper[axis]),
-        Domain::Annulus { inner, outer } => 0.0 <= *inner && inner < outer,
-        _ => true,
-    };
-    let positive = |value: f64| value > 0.0 && value.is_finite();
-    let constants = [solution.density(), solution.period(), solution.wave_speed()];
     let surfaces: Vec<Surface> = (0..D)
         .flat_map(|axis| [Surface::Lower(axis), Surface::Upper(axis)])
         .chain([Surface::Inner, Surface::Outer])
@@ -183,8 +241,7 @@ fn has_body_in<const D: usize>(solution: &dyn Solution<f64, D>) -> bool {
         let J = solution.jacobian(X, t);
         J >= LEAST_VOLUME && J.is_finite()
     };
-    is_solid
-        && constants.into_iter().all(positive)
+    body_in(solution).is_ok()
         && (0..BODY_POINTS)
             .filter_map(|n| Some((n, points::interior(&domain, solution.period(), n)?)))
             .all(|(n, (X, t))| {
@@ -233,7 +290,30 @@ fn check_in<const D: usize>(
         }
         findings.extend(boundary_findings(solution, boundary, &places, &samples));
     }
-    Ok(CheckReport { points: count, findings })
+    Ok(CheckReport { points: count, findings, not_periodic: change(solution, &samples) })
+}
+
+/// A change of the motion from one period to the next that is more than rounding, as a share of its largest values.
+const PERIODIC: f64 = 1e-6;
+
+/// By how much the motion differs one period later, if it does.
+fn change<const D: usize>(
+    solution: &dyn Solution<f64, D>,
+    samples: &[(SVector<f64, D>, f64)],
+) -> Option<Change> {
+    let period = solution.period();
+    let share = |field: &dyn Fn(&SVector<f64, D>, f64) -> SVector<f64, D>| {
+        let (mut change, mut largest) = (0.0_f64, 0.0_f64);
+        for (X, t) in samples {
+            let (now, later) = (field(X, *t), field(X, *t + period));
+            change = change.max((later - now).amax());
+            largest = largest.max(now.amax()).max(later.amax());
+        }
+        if largest > 0.0 { change / largest } else { 0.0 }
+    };
+    let u = share(&|X, t| solution.displacement(X, t));
+    let v = share(&|X, t| solution.velocity(X, t));
+    (u > PERIODIC || v > PERIODIC).then_some(Change { period, u, v })
 }
 
 /// Collects the differences of one comparison until its scale is known.

@@ -97,7 +97,7 @@ impl fmt::Display for Part {
 pub struct Share {
     /// The part.
     pub part: Part,
-    /// Between 0, not there at all, and about 1.
+    /// Between 0, not there at all, and about 1; of a loaded surface it is above 1 where stresses are largest there.
     pub share: f64,
 }
 

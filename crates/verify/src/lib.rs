@@ -49,7 +49,8 @@ pub use case::{
     Arithmetic, Case, CaseError, ErrorField, Outputs, Progress, Row, Start, Status, run,
 };
 pub use check::{
-    BLUNT, CheckError, CheckReport, Finding, OWN_ERROR_FACTOR, TOLERANCE, Verdict, check, has_body,
+    BLUNT, Change, CheckError, CheckReport, Finding, NoBody, OWN_ERROR_FACTOR, TOLERANCE, Verdict,
+    body_of, check, has_body,
 };
 pub use checkpoint::{CheckpointError, CheckpointFolder, Checkpoints};
 pub use cost::{Cost, CostModel, Timing, time_steps};

@@ -36,6 +36,107 @@ fn the_whole_library_passes() {
     assert_eq!(out.matches(": passed at").count(), specs, "{out}");
 }
 
+/// A bar that swings along itself; `u`, more lines of the parameters, and the period.
+fn bar(u: &str, parameters: &str, period: &str) -> (tempfile::TempDir, std::path::PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("bar.toml");
+    let text = format!(
+        "name = 'bar'
+title = 'A bar'
+coordinates = 'cartesian'
+dimension = 1
+
+[parameters]
+E = {{ default = 400.0, range = '> 0' }}
+rho0 = {{ default = 3.0 }}
+L = {{ default = 2.0 }}
+{parameters}
+
+[let]
+c = 'sqrt(E/rho0)'
+
+[displacement]
+X = '{u}'
+
+[material]
+law = 'neo-hookean'
+lambda = 'E/2'
+mu = 'E/3'
+density = 'rho0'
+
+[domain]
+shape = 'box'
+lower = [0]
+upper = ['L']
+
+[[boundary]]
+surface = 'X-lower'
+condition = 'sliding'
+
+[time]
+period = '{period}'
+wave-speed = 'c'
+"
+    );
+    std::fs::write(&file, text).unwrap();
+    (folder, file)
+}
+
+#[test]
+fn many_waves_in_a_body_pass_and_a_step_that_differences_cannot_resolve_does_not() {
+    for waves in [9, 37, 150, 1200] {
+        let u = format!("sin({waves}*Pi*X)/{}*cos(c*t)", 20 * waves);
+        let (_folder, file) = bar(&u, "", "2*Pi/c");
+        let (status, out, errors) = outcome(mms().arg("check").arg(&file));
+        assert_eq!(status, Some(0), "{waves}: {out}{errors}");
+    }
+    let (_folder, file) = bar("1e-9*tanh(1e8*(X - 7/10))*X*cos(c*t)", "", "2*Pi/c");
+    let (status, out, errors) = outcome(mms().arg("check").arg(&file));
+    assert_eq!(status, Some(1), "{out}{errors}");
+    assert!(out.contains("cannot judge") || out.contains("FAILED"), "{out}");
+}
+
+#[test]
+fn a_claim_that_is_false_far_from_the_defaults_fails() {
+    // No motion of X = 0 for s below three only.
+    let u = "X/30*sin(c*t) + (sqrt((s - 3)^2) + s - 3)/50";
+    let (_folder, file) = bar(u, "s = { default = 1.0, range = '> 0' }", "2*Pi/c");
+    let (status, out, errors) = outcome(mms().arg("check").arg(&file));
+    assert_eq!(status, Some(1), "{out}{errors}");
+    assert!(out.contains("on X-lower"), "{out}");
+}
+
+#[test]
+fn a_motion_that_does_not_repeat_is_a_remark_and_no_failure() {
+    let remark = "remark: the motion is not the same after its period";
+    for (period, repeats) in [("2*Pi/c", true), ("3/c", false)] {
+        let (_folder, file) = bar("X/25*sin(c*t)", "", period);
+        let (status, out, errors) = outcome(mms().args(["check", "--json", "-"]).arg(&file));
+        assert_eq!(status, Some(0), "{out}{errors}");
+        let document: serde_json::Value = serde_json::from_str(&out).unwrap();
+        assert_eq!(document["results"][0]["not_periodic"].is_null(), repeats, "{out}");
+        let (_, out, _) = outcome(mms().arg("check").arg(&file));
+        assert_eq!(!out.contains(remark), repeats, "{out}");
+    }
+}
+
+#[test]
+fn values_that_leave_no_body_are_refused() {
+    let (_folder, file) = bar("X/25*sin(c*t)", "T = { default = 1.0 }", "T*2*Pi/c");
+    for (set, message) in [
+        ("rho0=-2", "the density is -2.0; it has to be positive and finite"),
+        ("T=-1", "the period is -"),
+        ("L=-3", "the body has no volume: it reaches from [0.0] to [-3.0]"),
+    ] {
+        for command in [&["check"][..], &["run"], &["converge", "--cells", "4,8"]] {
+            let (status, _, errors) =
+                outcome(mms().arg(command[0]).arg(&file).args(&command[1..]).args(["--set", set]));
+            assert_eq!(status, Some(2), "{command:?} {set}: {errors}");
+            assert!(errors.contains(message), "{command:?} {set}: {errors}");
+        }
+    }
+}
+
 #[test]
 fn a_wrong_declaration_fails_with_the_place() {
     let folder = tempfile::tempdir().unwrap();

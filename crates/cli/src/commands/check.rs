@@ -7,7 +7,7 @@ use mmsmith_prove::{
 };
 use mmsmith_spec::{ClaimKind, Spec};
 use mmsmith_verify::{
-    BLUNT, CheckReport, OWN_ERROR_FACTOR, TOLERANCE, Verdict, check as check_fields,
+    BLUNT, Change, CheckReport, OWN_ERROR_FACTOR, TOLERANCE, Verdict, check as check_fields,
 };
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
@@ -15,6 +15,7 @@ use std::collections::BTreeMap;
 use crate::arguments::CheckOptions;
 use crate::json::Output;
 use crate::library::{Subject, names};
+use crate::number;
 use crate::table::{self, Table};
 use crate::terminal;
 
@@ -54,6 +55,7 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
             "parameter_sets": parameters,
             "points": report.points,
             "findings": report.findings,
+            "not_periodic": report.not_periodic,
             "surfaces": claims.surfaces.iter().map(surface_document).collect::<Vec<_>>(),
             "cross_checks": claims.listings.iter().map(Comparison::document).collect::<Vec<_>>(),
             "passed": all_passed,
@@ -255,6 +257,14 @@ fn text(
     }
     text += &table.text();
     text += &places;
+    if let Some(Change { period, u, v }) = report.not_periodic {
+        text += &format!(
+            "  remark: the motion is not the same after its period of {}: u differs by {:.2} % of its largest, v by {:.2} %\n",
+            number::exact(period),
+            100.0 * u,
+            100.0 * v
+        );
+    }
     text += &claims.text();
     text.push('\n');
     text

@@ -77,6 +77,11 @@ fn text(names: &[String], shares: &[Vec<Share>], set: &[&String], missing: &[Par
         table.row(std::iter::once(part.to_string()).chain(cells));
     }
     text += &table.text();
+    let exceeds = |share: &Share| share.part == Part::LoadedSurface && share.share > 1.0;
+    if shares.iter().flatten().any(exceeds) {
+        text += "Loaded surface: the traction there over the stress within the body, root mean squares. Above 100, \
+                 stresses are largest on the surface.\n";
+    }
     let names: Vec<&str> = set.iter().map(|name| name.as_str()).collect();
     let least = 100.0 * THRESHOLD;
     if shares.len() > 1 {
