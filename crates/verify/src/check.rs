@@ -120,7 +120,9 @@ impl CheckReport {
         let mut worst = CheckReport { points: 0, findings: Vec::new(), not_periodic: None };
         for (set, report) in reports.into_iter().enumerate() {
             worst.points += report.points;
-            worst.not_periodic = worst.not_periodic.or(report.not_periodic);
+            if set == 0 {
+                worst.not_periodic = report.not_periodic;
+            }
             for (index, mut finding) in report.findings.into_iter().enumerate() {
                 finding.parameter_set = set;
                 match worst.findings.get_mut(index) {
