@@ -7,6 +7,7 @@ mod claims;
 mod golden;
 mod high_order;
 mod hostile_text;
+mod kept_runs;
 mod library;
 mod new_solution;
 mod orders;

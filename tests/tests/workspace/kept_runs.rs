@@ -1,0 +1,45 @@
+//! Runs of every kind against the errors that they had when `data/runs.json` was written.
+//!
+//! A change of structure keeps them to the bit. Where a change of arithmetic is meant, `UPDATE_EXPECT=1` writes the file
+//! anew, and the difference is there to be looked at.
+
+#![allow(clippy::unwrap_used)]
+
+use mmsmith_tests::{mms, outcome, workspace};
+use serde_json::{Value, json};
+use std::fs;
+
+/// Of a run, whatever does not depend on clocks and machines.
+fn kept(command: &str) -> Value {
+    let words: Vec<&str> = command.split(' ').collect();
+    let (_, out, errors) = outcome(mms().arg("run").args(&words).args(["--json", "-"]));
+    let document: Value =
+        serde_json::from_str(&out).unwrap_or_else(|_| panic!("mms run {command}: {errors}"));
+    let result = &document["result"];
+    json!({
+        "command": command,
+        "status": result["status"],
+        "steps": result["steps"],
+        "particles": result["particles"],
+        "errors": result["errors"],
+    })
+}
+
+#[test]
+fn runs_of_every_kind_keep_their_errors_to_the_bit() {
+    let file = workspace().join("tests/data/runs.json");
+    let expected: Vec<Value> = serde_json::from_str(&fs::read_to_string(&file).unwrap()).unwrap();
+    let commands: Vec<&str> = expected.iter().map(|run| run["command"].as_str().unwrap()).collect();
+    let found: Vec<Value> = commands.iter().map(|command| kept(command)).collect();
+    if std::env::var_os("UPDATE_EXPECT").is_some() {
+        fs::write(&file, serde_json::to_string_pretty(&found).unwrap() + "\n").unwrap();
+        return;
+    }
+    let differing: Vec<String> = expected
+        .iter()
+        .zip(&found)
+        .filter(|(expected, found)| expected != found)
+        .map(|(expected, found)| format!("expected {expected}\n   found {found}"))
+        .collect();
+    assert!(differing.is_empty(), "{}", differing.join("\n"));
+}
