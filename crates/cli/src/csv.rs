@@ -71,7 +71,7 @@ pub(crate) fn history(history: &[Moment]) -> String {
             let energies = [sums.kinetic_energy, sums.strain_energy];
             energies.into_iter().chain(sums.momentum.iter().copied()).collect::<Vec<_>>()
         };
-        let errors = u.named().map(|(_, value)| *value);
+        let errors = u.iter().map(|(_, value)| *value);
         let values = [*time, *velocity_time].into_iter().chain(errors);
         for value in values.chain(sums(computed)).chain(sums(exact)) {
             let _ = match value.is_finite() {
@@ -89,8 +89,8 @@ pub(crate) fn quoted(text: &str) -> String {
 }
 
 fn head(text: &mut String, orders: &PerField<PerNorm<Order>>) {
-    for (field, norms) in orders.named() {
-        for (norm, _) in norms.named() {
+    for (field, norms) in orders.iter() {
+        for (norm, _) in norms.iter() {
             let _ = write!(text, ",{field}_{norm},{field}_{norm}_rate");
         }
     }
@@ -103,8 +103,8 @@ fn values(
     errors: &PerField<PerNorm<f64>>,
     orders: &PerField<PerNorm<Order>>,
 ) {
-    for ((_, norms), (_, orders)) in errors.named().iter().zip(orders.named()) {
-        for ((_, value), (_, order)) in norms.named().iter().zip(orders.named()) {
+    for ((_, norms), (_, orders)) in errors.iter().zip(orders.iter()) {
+        for ((_, value), (_, order)) in norms.iter().zip(orders.iter()) {
             let value = if value.is_finite() { format!("{value:?}") } else { "nan".into() };
             let local = index.checked_sub(1).and_then(|pair| order.local[pair]);
             let rate = local.map_or_else(|| "nan".into(), |rate| table::rate(Some(rate)));

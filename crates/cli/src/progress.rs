@@ -60,7 +60,7 @@ impl Bar {
     }
 
     /// The same bar for a part of its work, from one share of it to another.
-    fn part(&self, from: f64, to: f64) -> Self {
+    pub(crate) fn part(&self, from: f64, to: f64) -> Self {
         Self { line: Arc::clone(&self.line), stretch: (self.at(from), self.at(to)) }
     }
 

@@ -9,7 +9,7 @@ use mmsmith_mpm::general::{Integrator, Shape, Transfer};
 use mmsmith_mpm::{AtTime, BodyForce, Particles, Settings, SetupError, Simulation, StepError};
 use mmsmith_solutions::{AnySolution, BodyForceAtPoints, Material, Real, Solution};
 use nalgebra::SVector;
-use serde::{Deserialize, Serialize, Serializer};
+use serde::{Serialize, Serializer};
 use thiserror::Error;
 
 use crate::checkpoint::{CheckpointError, Checkpoints, Reached, TakenUp};
@@ -18,7 +18,7 @@ use crate::frames::{FrameOutput, FrameWriter, Snapshot};
 use crate::general::{self, Placement, Precision};
 use crate::history::{Moment, Recorder};
 use crate::measure::Comparison;
-use crate::norms::{PerField, PerNorm, magnitude};
+use crate::norms::{Field, PerField, PerNorm, magnitude};
 use crate::plan::{MOST_STEPS, Steps, prepare};
 use crate::points;
 use crate::scene::{Extent, Scene, SceneError};
@@ -186,7 +186,7 @@ pub enum Status {
     /// At the end time, with an error that is not a number.
     NotFinite {
         /// The field.
-        field: ErrorField,
+        field: Field,
     },
     /// The time that it was given was over.
     Cut {
@@ -195,40 +195,6 @@ pub enum Status {
         /// Its time.
         time: f64,
     },
-}
-
-/// A field whose error is measured.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum ErrorField {
-    /// Displacement.
-    #[serde(rename = "u")]
-    Displacement,
-    /// Velocity.
-    #[serde(rename = "v")]
-    Velocity,
-    /// Deformation gradient.
-    #[serde(rename = "F")]
-    DeformationGradient,
-    /// First Piola-Kirchhoff stress.
-    #[serde(rename = "P")]
-    Stress,
-}
-
-impl ErrorField {
-    /// All of them, in the order of [`PerField`].
-    pub const ALL: [Self; 4] =
-        [Self::Displacement, Self::Velocity, Self::DeformationGradient, Self::Stress];
-
-    /// Its letter.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Displacement => "u",
-            Self::Velocity => "v",
-            Self::DeformationGradient => "F",
-            Self::Stress => "P",
-        }
-    }
 }
 
 impl Status {
@@ -255,7 +221,7 @@ impl fmt::Display for Status {
                  positions; errors say nothing"
             ),
             Self::NotFinite { field } => {
-                write!(f, "not judged: an error of {} is not a finite number", field.name())
+                write!(f, "not judged: an error of {field} is not a finite number")
             }
             Self::Cut { step, time } => {
                 write!(f, "cut after step {step}, t = {time:.6e}: its time was over")
@@ -454,11 +420,10 @@ fn judged<const D: usize>(
     if displacement > 0.0 && displacement <= resolution {
         return Status::Unresolved { displacement, resolution };
     }
-    let norms = errors.named().into_iter().zip(ErrorField::ALL);
-    norms
-        .into_iter()
-        .find(|((_, norms), _)| norms.named().iter().any(|(_, value)| !value.is_finite()))
-        .map_or(Status::Ok, |(_, field)| Status::NotFinite { field })
+    errors
+        .iter()
+        .find(|(_, norms)| norms.iter().any(|(_, value)| !value.is_finite()))
+        .map_or(Status::Ok, |(field, _)| Status::NotFinite { field })
 }
 
 /// Steps to the end and measures the errors on the way.

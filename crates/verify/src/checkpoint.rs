@@ -136,8 +136,8 @@ impl Reached {
     const NUMBERS: usize = 15;
 
     fn numbers(&self) -> Vec<u64> {
-        let errors = self.errors.named();
-        let errors = errors.iter().flat_map(|(_, norms)| norms.named().map(|(_, e)| e.to_bits()));
+        let errors = self.errors.iter();
+        let errors = errors.flat_map(|(_, norms)| norms.iter().map(|(_, e)| e.to_bits()));
         [self.step, self.wall_s.to_bits(), self.cpu_s.to_bits()].into_iter().chain(errors).collect()
     }
 

@@ -45,9 +45,7 @@ mod tradeoff;
 mod verdict;
 mod whole_file;
 
-pub use case::{
-    Arithmetic, Case, CaseError, ErrorField, Outputs, Progress, Row, Start, Status, run,
-};
+pub use case::{Arithmetic, Case, CaseError, Outputs, Progress, Row, Start, Status, run};
 pub use check::{
     BLUNT, Change, CheckError, CheckReport, Finding, NoBody, OWN_ERROR_FACTOR, TOLERANCE, Verdict,
     body_of, check, has_body,
@@ -62,7 +60,7 @@ pub use history::{MOST_MOMENTS, Moment, Sums, energy_drift};
 pub use mmsmith_mpm::StepError;
 pub use mmsmith_mpm::general::{Integrator, Shape, Transfer};
 pub use mmsmith_mpm::total_lagrangian::{Composition, Coordinates, Layout, MassMatrix, Scheme};
-pub use norms::{PerField, PerNorm};
+pub use norms::{Field, Norm, PerField, PerNorm};
 pub use order::Order;
 pub use plan::{Plan, plan, round_off};
 pub use record::{Record, TemporalRecord};

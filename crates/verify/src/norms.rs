@@ -5,6 +5,82 @@
 //! particles and are added in order, so the result does not depend on the number of threads.
 
 use serde::{Deserialize, Serialize};
+use std::array;
+use std::fmt;
+use std::ops::Index;
+
+/// A field whose error is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum Field {
+    /// Displacement.
+    #[serde(rename = "u")]
+    Displacement,
+    /// Velocity.
+    #[serde(rename = "v")]
+    Velocity,
+    /// Deformation gradient.
+    #[serde(rename = "F")]
+    DeformationGradient,
+    /// First Piola-Kirchhoff stress.
+    #[serde(rename = "P")]
+    Stress,
+}
+
+impl Field {
+    /// All of them, in the order of [`PerField`].
+    pub const ALL: [Self; 4] =
+        [Self::Displacement, Self::Velocity, Self::DeformationGradient, Self::Stress];
+}
+
+/// Its letter.
+impl fmt::Display for Field {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Displacement => "u",
+            Self::Velocity => "v",
+            Self::DeformationGradient => "F",
+            Self::Stress => "P",
+        })
+    }
+}
+
+/// A norm over the particles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Norm {
+    /// The largest magnitude.
+    Linf,
+    /// The root of the mean square.
+    L2,
+    /// The mean.
+    L1,
+}
+
+impl Norm {
+    /// All of them, in the order of [`PerNorm`].
+    pub const ALL: [Self; 3] = [Self::Linf, Self::L2, Self::L1];
+
+    /// The name in captions.
+    #[must_use]
+    pub fn caption(self) -> &'static str {
+        match self {
+            Self::Linf => "L_inf",
+            Self::L2 => "L2",
+            Self::L1 => "L1",
+        }
+    }
+}
+
+/// The name in options, tables and JSON.
+impl fmt::Display for Norm {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Linf => "linf",
+            Self::L2 => "l2",
+            Self::L1 => "l1",
+        })
+    }
+}
 
 /// One value for each field whose error is measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -30,32 +106,69 @@ pub struct PerNorm<V> {
     pub l1: V,
 }
 
+impl<N> Index<Field> for PerField<N> {
+    type Output = N;
+
+    fn index(&self, field: Field) -> &N {
+        match field {
+            Field::Displacement => &self.u,
+            Field::Velocity => &self.v,
+            Field::DeformationGradient => &self.F,
+            Field::Stress => &self.P,
+        }
+    }
+}
+
+impl<V> Index<Norm> for PerNorm<V> {
+    type Output = V;
+
+    fn index(&self, norm: Norm) -> &V {
+        match norm {
+            Norm::Linf => &self.linf,
+            Norm::L2 => &self.l2,
+            Norm::L1 => &self.l1,
+        }
+    }
+}
+
 impl<N> PerField<N> {
-    /// The fields' names with their values, in the order of the struct.
-    pub fn named(&self) -> [(&'static str, &N); 4] {
-        [("u", &self.u), ("v", &self.v), ("F", &self.F), ("P", &self.P)]
+    /// One value for each field.
+    pub fn from_fn(f: impl Fn(Field) -> N) -> Self {
+        let [u, v, F, P] = Field::ALL.map(f);
+        Self { u, v, F, P }
+    }
+
+    /// The values with their fields, in the order of [`Field::ALL`].
+    pub fn iter(&self) -> array::IntoIter<(Field, &N), 4> {
+        Field::ALL.map(|field| (field, &self[field])).into_iter()
     }
 
     /// Field by field, what `f` makes of the value.
     pub(crate) fn map<M>(&self, f: impl Fn(&N) -> M) -> PerField<M> {
-        PerField { u: f(&self.u), v: f(&self.v), F: f(&self.F), P: f(&self.P) }
+        PerField::from_fn(|field| f(&self[field]))
     }
 
     /// Field by field, what `f` makes of two values.
     pub(crate) fn combine<A, B>(a: &PerField<A>, b: &PerField<B>, f: impl Fn(&A, &B) -> N) -> Self {
-        Self { u: f(&a.u, &b.u), v: f(&a.v, &b.v), F: f(&a.F, &b.F), P: f(&a.P, &b.P) }
+        Self::from_fn(|field| f(&a[field], &b[field]))
     }
 }
 
 impl<V> PerNorm<V> {
-    /// The norms' names with their values, in the order of the struct.
-    pub fn named(&self) -> [(&'static str, &V); 3] {
-        [("linf", &self.linf), ("l2", &self.l2), ("l1", &self.l1)]
+    /// One value for each norm.
+    pub fn from_fn(f: impl Fn(Norm) -> V) -> Self {
+        let [linf, l2, l1] = Norm::ALL.map(f);
+        Self { linf, l2, l1 }
+    }
+
+    /// The values with their norms, in the order of [`Norm::ALL`].
+    pub fn iter(&self) -> array::IntoIter<(Norm, &V), 3> {
+        Norm::ALL.map(|norm| (norm, &self[norm])).into_iter()
     }
 
     /// Norm by norm, what `f` makes of the value.
     pub(crate) fn map<M>(&self, f: impl Fn(&V) -> M) -> PerNorm<M> {
-        PerNorm { linf: f(&self.linf), l2: f(&self.l2), l1: f(&self.l1) }
+        PerNorm::from_fn(|norm| f(&self[norm]))
     }
 }
 
@@ -195,11 +308,7 @@ impl<const N: usize> Tallies<N> {
 impl PerNorm<f64> {
     /// Norm by norm, the larger of the two.
     pub(crate) fn larger(&self, other: &Self) -> Self {
-        Self {
-            linf: larger(self.linf, other.linf),
-            l2: larger(self.l2, other.l2),
-            l1: larger(self.l1, other.l1),
-        }
+        Self::from_fn(|norm| larger(self[norm], other[norm]))
     }
 }
 

@@ -7,8 +7,8 @@ use mmsmith_mpm::StepError;
 use serde::de::{Error, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::case::{ErrorField, Row, Status};
-use crate::norms::{PerField, PerNorm};
+use crate::case::{Row, Status};
+use crate::norms::{Field, PerField, PerNorm};
 use crate::temporal::{Temporal, TemporalRow};
 
 /// A [`Row`] to be kept: written and read, it gives the same row to the bit.
@@ -137,7 +137,7 @@ enum End {
         resolution: Exact,
     },
     NotFiniteError {
-        field: ErrorField,
+        field: Field,
     },
     Cut {
         step: u64,
@@ -335,7 +335,7 @@ mod tests {
             Status::Unstable { step: 1, time, particle, error: f64::INFINITY, size: 1.0 };
         let cut = Status::Cut { step: 7, time };
         let unresolved = Status::Unresolved { displacement: 1e-200, resolution: 1e-16 };
-        let not_finite = Status::NotFinite { field: ErrorField::Stress };
+        let not_finite = Status::NotFinite { field: Field::Stress };
         let statuses = stops.into_iter().map(Status::Stopped).chain([
             Status::Ok,
             unstable,

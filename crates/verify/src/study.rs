@@ -5,7 +5,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::case::{Arithmetic, Case, CaseError, Outputs, Progress, Row, Status, run};
-use crate::norms::{PerField, PerNorm};
+use crate::norms::{Field, Norm, PerField, PerNorm};
 use crate::order::Order;
 use crate::plan::plan;
 
@@ -112,7 +112,7 @@ pub fn orders_above(
     floors: &[PerField<f64>],
 ) -> PerField<PerNorm<Order>> {
     each_norm(values, |field, _, errors| {
-        let floor = |row: usize| floors.get(row).map_or(0.0, |floor| *floor.named()[field].1);
+        let floor = |row: usize| floors.get(row).map_or(0.0, |floor| floor[field]);
         let above =
             |(row, error): (usize, &Option<f64>)| error.filter(|error| *error >= floor(row));
         let errors: Vec<_> = errors.iter().enumerate().map(above).collect();
@@ -129,16 +129,16 @@ pub(crate) fn orders_of(
     each_norm(&values, |_, _, errors| Order::of(&steps, errors))
 }
 
-/// What `judge` makes of the series of values of every field and norm, which it is told by number.
+/// What `judge` makes of the series of values of every field and norm.
 pub(crate) fn each_norm<R>(
     values: &[Option<&PerField<PerNorm<f64>>>],
-    judge: impl Fn(usize, usize, &[Option<f64>]) -> R,
+    judge: impl Fn(Field, Norm, &[Option<f64>]) -> R,
 ) -> PerField<PerNorm<R>> {
-    let one = |field: usize, norm: usize| {
-        let pick = |value: &PerField<PerNorm<f64>>| *value.named()[field].1.named()[norm].1;
-        let series: Vec<_> = values.iter().map(|value| value.map(pick)).collect();
-        judge(field, norm, &series)
-    };
-    let norms = |field| PerNorm { linf: one(field, 0), l2: one(field, 1), l1: one(field, 2) };
-    PerField { u: norms(0), v: norms(1), F: norms(2), P: norms(3) }
+    PerField::from_fn(|field| {
+        PerNorm::from_fn(|norm| {
+            let pick = |value: &PerField<PerNorm<f64>>| value[field][norm];
+            let series: Vec<_> = values.iter().map(|value| value.map(pick)).collect();
+            judge(field, norm, &series)
+        })
+    })
 }

@@ -173,8 +173,8 @@ pub fn verdicts_above(
     tolerance: f64,
 ) -> PerField<PerNorm<Verdict>> {
     crate::study::each_norm(values.errors, |field, norm, errors| {
-        let expected = *expected.named()[field].1.named()[norm].1;
-        let floors: Vec<f64> = values.floors.iter().map(|floor| *floor.named()[field].1).collect();
+        let expected = expected[field][norm];
+        let floors: Vec<f64> = values.floors.iter().map(|floor| floor[field]).collect();
         Verdict::above(values.steps, errors, &floors, expected, tolerance)
     })
 }

@@ -582,8 +582,8 @@ fn promised(study: &Study, exact: &AnySolution<f64>, case: &Case) -> Vec<String>
 fn judged(
     verdicts: &mmsmith_verify::PerField<mmsmith_verify::PerNorm<mmsmith_verify::OrderVerdict>>,
 ) -> Vec<String> {
-    let norms = verdicts.named().into_iter().flat_map(|(field, verdicts)| {
-        verdicts.named().map(|(norm, verdict)| (format!("{field} {norm}"), verdict.clone()))
+    let norms = verdicts.iter().flat_map(|(field, verdicts)| {
+        verdicts.iter().map(move |(norm, verdict)| (format!("{field} {norm}"), verdict.clone()))
     });
     let failed = norms.filter(|(_, verdict)| verdict.passed == Some(false));
     failed.map(|(what, v)| format!("{what}: {:?} {:.2?}", v.behaviour, v.finest)).collect()

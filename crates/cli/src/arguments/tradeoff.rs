@@ -72,17 +72,28 @@ pub(crate) enum Field {
     P,
 }
 
-/// Norms.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub(crate) enum Norm {
-    /// Largest over particles
-    Linf,
-    /// Root of the mean square
-    L2,
-    /// Mean
-    L1,
+impl From<Field> for verify::Field {
+    fn from(field: Field) -> Self {
+        match field {
+            Field::U => Self::Displacement,
+            Field::V => Self::Velocity,
+            Field::F => Self::DeformationGradient,
+            Field::P => Self::Stress,
+        }
+    }
 }
+
+choices!(
+    /// Norms.
+    Norm => verify::Norm {
+        /// Largest over particles
+        Linf,
+        /// Root of the mean square
+        L2,
+        /// Mean
+        L1,
+    }
+);
 
 choices!(
     /// Costs.

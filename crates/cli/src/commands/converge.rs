@@ -2,8 +2,8 @@
 
 use anyhow::{Context, Result, bail};
 use mmsmith_verify::{
-    Behaviour, Case, Expected, ORDER_TOLERANCE, Order as ObservedOrder, OrderVerdict, Outputs,
-    PerField, PerNorm, Progress, Record, Row, Status, Study, StudyError, Sweep, Temporal,
+    Behaviour, Case, Expected, Field, Norm, ORDER_TOLERANCE, Order as ObservedOrder, OrderVerdict,
+    Outputs, PerField, PerNorm, Progress, Record, Row, Status, Study, StudyError, Sweep, Temporal,
     TemporalRecord, Values, expected_in_space, expected_in_time, orders_above, plan, run,
     temporal as measure_differences, verdicts_above,
 };
@@ -44,7 +44,13 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
             .map(|path| Output::prepare_if(path.as_ref()));
     let (plot, values, markdown, latex) = (plot?, values?, markdown?, latex?);
     with_threads(scheme.threads, || {
-        let study = study(&model, &base, &sweep, &keep, |case| {
+        let expected = model.announce(&sweep.cases(&base));
+        // The differences take each run once more, and one with half its step.
+        let parts = if options.cfls.is_empty() { 1.0 } else { 4.0 };
+        let predicted_s = expected.as_ref().map(|seconds| parts * seconds.iter().sum::<f64>());
+        let whole = Bar::expecting("starting", predicted_s);
+        let bar = whole.part(0.0, 1.0 / parts);
+        let study = study(&model, &base, &sweep, &keep, expected, &bar, |case| {
             settings(&selection, scheme, extent, case.cells, case.cfl)
         })?;
         // In time the expectation is about the differences; the total error is mostly a spatial one.
@@ -67,7 +73,8 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
                     Order::OneByOne,
                     |_| {},
                     |_| {
-                        differences(&model, &base, cfls, "difference", &Bar::new("difference"))
+                        let bar = whole.part(1.0 / parts, 1.0);
+                        differences(&model, &base, cfls, "difference", &bar)
                             .map(|found| TemporalRecord::from(&found))
                     },
                 )?;
@@ -80,6 +87,8 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
             }
             Sweep::Cells(_) => None,
         };
+        // It must not stand between the tables.
+        drop((bar, whole));
 
         let caption = caption(&selection, scheme, extent);
         let mut sections: Vec<(String, Table)> = Vec::new();
@@ -147,9 +156,8 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
             None => &judged,
         };
         let failed = decisive
-            .named()
             .iter()
-            .any(|(_, norms)| norms.named().iter().any(|(_, one)| one.passed == Some(false)));
+            .any(|(_, norms)| norms.iter().any(|(_, one)| one.passed == Some(false)));
         Ok(!failed)
     })
 }
@@ -160,13 +168,13 @@ fn study(
     base: &Case,
     sweep: &Sweep,
     keep: &Keep,
+    seconds: Option<Vec<f64>>,
+    bar: &Bar,
     settings: impl Fn(&Case) -> Value,
 ) -> Result<Study> {
     let cases = sweep.cases(base);
-    let expected = model.announce(&cases);
-    let bar = Bar::expecting("starting", expected.as_ref().map(|seconds| seconds.iter().sum()));
     // Without a prediction a particle's step is the unit of work.
-    let work = match expected {
+    let work = match seconds {
         Some(seconds) => seconds,
         None => {
             let work = |case| -> Result<f64> {
@@ -287,15 +295,12 @@ fn status(status: &Status, is_rounding: bool) -> String {
     .to_owned()
 }
 
-fn is_rounding(judged: &Verdicts, field: usize, row: usize) -> bool {
-    judged.named()[field].1.named().iter().any(|(_, one)| one.rounding_rows.contains(&row))
+fn is_rounding(judged: &Verdicts, field: Field, row: usize) -> bool {
+    judged[field].iter().any(|(_, one)| one.rounding_rows.contains(&row))
 }
 
 fn has_rounding(judged: &Verdicts) -> bool {
-    let norms = judged.named();
-    norms
-        .iter()
-        .any(|(_, norms)| norms.named().iter().any(|(_, one)| !one.rounding_rows.is_empty()))
+    judged.iter().any(|(_, norms)| norms.iter().any(|(_, one)| !one.rounding_rows.is_empty()))
 }
 
 /// Judges the differences on one grid.
@@ -361,13 +366,9 @@ fn step_name(sweep: &Sweep) -> &'static str {
 const NORMS: [&str; 6] = ["linf", "rate", "l2", "rate", "l1", "rate"];
 
 /// One table for each field: a row a case, and the rate right of each norm.
-pub(super) fn tables(
-    study: &Study,
-    sweep: &Sweep,
-    judged: &Verdicts,
-) -> [(&'static str, Table); 4] {
+pub(super) fn tables(study: &Study, sweep: &Sweep, judged: &Verdicts) -> [(Field, Table); 4] {
     let errors: Vec<_> = study.rows.iter().map(|row| &row.errors).collect();
-    std::array::from_fn(|field| {
+    Field::ALL.map(|field| {
         let header = ["cells", "particles", "h", "CFL"].into_iter().chain(NORMS).chain(["status"]);
         let mut table = Table::new(0, header);
         for (index, row) in study.rows.iter().enumerate() {
@@ -387,16 +388,13 @@ pub(super) fn tables(
             field,
             &study.orders,
         ));
-        (study.orders.named()[field].0, table)
+        (field, table)
     })
 }
 
 /// The same for differences on one grid.
-pub(super) fn difference_tables(
-    temporal: &Temporal,
-    judged: &Verdicts,
-) -> [(&'static str, Table); 4] {
-    std::array::from_fn(|field| {
+pub(super) fn difference_tables(temporal: &Temporal, judged: &Verdicts) -> [(Field, Table); 4] {
+    Field::ALL.map(|field| {
         let header = ["dt", "CFL", "steps"].into_iter().chain(NORMS).chain(["status"]);
         let mut table = Table::new(0, header);
         for (index, row) in temporal.rows.iter().enumerate() {
@@ -408,27 +406,25 @@ pub(super) fn difference_tables(
         }
         let empty = String::new;
         table.row(fits(["fit in dt".into(), empty(), empty()], field, &temporal.orders));
-        (temporal.orders.named()[field].0, table)
+        (field, table)
     })
 }
 
 /// Error and rate in each norm; in parentheses outside the asymptotic range, if there is one.
 fn norms(
     row: usize,
-    field: usize,
+    field: Field,
     errors: &PerField<PerNorm<f64>>,
     orders: &PerField<PerNorm<ObservedOrder>>,
     judged: &Verdicts,
 ) -> Vec<String> {
-    let errors = errors.named()[field].1.named();
-    let orders = orders.named()[field].1.named();
-    let judged = judged.named()[field].1.named();
-    (0..errors.len())
+    Norm::ALL
+        .into_iter()
         .flat_map(|norm| {
-            let range = &judged[norm].1.asymptotic_rows;
-            let error = table::error(*errors[norm].1);
+            let range = &judged[field][norm].asymptotic_rows;
+            let error = table::error(errors[field][norm]);
             let outside = !range.is_empty() && !range.contains(&row) && error != "-";
-            let local = row.checked_sub(1).and_then(|pair| orders[norm].1.local[pair]);
+            let local = row.checked_sub(1).and_then(|pair| orders[field][norm].local[pair]);
             [if outside { format!("({error})") } else { error }, table::rate(local)]
         })
         .collect()
@@ -436,29 +432,26 @@ fn norms(
 
 fn fits<const N: usize>(
     first: [String; N],
-    field: usize,
+    field: Field,
     orders: &PerField<PerNorm<ObservedOrder>>,
 ) -> Vec<String> {
     let mut cells = first.to_vec();
-    for (_, order) in orders.named()[field].1.named() {
+    for (_, order) in orders[field].iter() {
         cells.extend([String::new(), table::rate(order.fit)]);
     }
     cells
 }
 
 fn has_range(judged: &Verdicts) -> bool {
-    judged
-        .named()
-        .iter()
-        .any(|(_, norms)| norms.named().iter().any(|(_, one)| !one.asymptotic_rows.is_empty()))
+    judged.iter().any(|(_, norms)| norms.iter().any(|(_, one)| !one.asymptotic_rows.is_empty()))
 }
 
 /// What each field and norm shows, a row each.
 pub(super) fn verdict_table(judged: &Verdicts, step: &str) -> Table {
     let header = ["field", "norm", "expected", "finest pair", "leading term", "verdict"];
     let mut table = Table::new(2, header);
-    for (field, norms) in judged.named() {
-        for (norm, one) in norms.named() {
+    for (field, norms) in judged.iter() {
+        for (norm, one) in norms.iter() {
             let term = one
                 .coefficient
                 .zip(one.exponent)
@@ -481,8 +474,8 @@ pub(super) fn verdict_table(judged: &Verdicts, step: &str) -> Table {
                 .expected
                 .map_or_else(|| "-".into(), |order| format!("{order} +/- {}", one.tolerance));
             table.row([
-                field.to_owned(),
-                norm.to_owned(),
+                field.to_string(),
+                norm.to_string(),
                 expected,
                 table::rate(one.finest),
                 term,
@@ -528,15 +521,15 @@ fn picture(
         Sweep::Cells(_) => ("grid spacing h", &study.orders.u),
         Sweep::Cfls(_) => ("time step dt", &study.orders.u),
     };
-    let curve = |norm: usize, name: &str| {
+    let curve = |norm: Norm| {
         let cases = study.rows.iter().map(|row| {
             let step = if matches!(sweep, Sweep::Cells(_)) { row.h } else { row.dt };
-            let error = *row.errors.u.named()[norm].1;
+            let error = row.errors.u[norm];
             (step, (row.status == Status::Ok).then_some(error))
         });
-        Curve::new(name, cases, orders.named()[norm].1.fit)
+        Curve::new(norm.caption(), cases, orders[norm].fit)
     };
-    let mut curves = vec![curve(0, "L_inf"), curve(1, "L2"), curve(2, "L1")];
+    let mut curves = Vec::from(Norm::ALL.map(curve));
     if let Some(found) = differences {
         curves.push(difference_curve("L_inf of the difference", found));
     }

@@ -14,9 +14,9 @@ use std::time::Duration;
 
 use anyhow::{Context, Result};
 use mmsmith_verify::{
-    Case, CostModel, Expected, FrameOutput, ORDER_TOLERANCE, Outputs, Progress, Row, Start, Status,
-    StepError, Study, Sweep, Temporal, converge as measure, expected_in_space, expected_in_time,
-    plan, run as simulate,
+    Case, CostModel, Expected, Field, FrameOutput, ORDER_TOLERANCE, Outputs, Progress, Row, Start,
+    Status, StepError, Study, Sweep, Temporal, converge as measure, expected_in_space,
+    expected_in_time, plan, run as simulate,
 };
 use serde_json::json;
 
@@ -430,14 +430,14 @@ fn summary(results: &Results) -> (String, String) {
 }
 
 /// A table of errors of a field, or of differences, with the units of the two problems: those of the SI.
-fn errors_with_units(table: Table, field: &str) -> Table {
+fn errors_with_units(table: Table, field: Field) -> Table {
     let table = table.with_unit(&["h"], "m").with_unit(&["dt"], "s");
     let unit = match field {
-        "u" => "m",
-        "v" => "m/s",
-        "P" => "Pa",
-        // F is a pure number.
-        _ => return table,
+        Field::Displacement => "m",
+        Field::Velocity => "m/s",
+        Field::Stress => "Pa",
+        // A pure number.
+        Field::DeformationGradient => return table,
     };
     table.with_unit(&["linf", "l2", "l1"], unit)
 }

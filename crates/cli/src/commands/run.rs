@@ -158,9 +158,9 @@ fn text(row: &Row) -> String {
         text += &format!("STOPPED: {}\nThe errors are those until then.\n", row.status);
     }
     let mut table = Table::new(1, ["error", "linf", "l2", "l1"]);
-    for (field, norms) in row.errors.named() {
-        let mut cells = vec![field.to_owned()];
-        cells.extend(norms.named().map(|(_, value)| table::error(*value)));
+    for (field, norms) in row.errors.iter() {
+        let mut cells = vec![field.to_string()];
+        cells.extend(norms.iter().map(|(_, value)| table::error(*value)));
         table.row(cells);
     }
     text += &table.text();

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
-use mmsmith_verify::{Input, Resolution, Score, ScoreRow, score as measure};
+use mmsmith_verify::{Field, Input, Order, PerNorm, Resolution, Score, ScoreRow, score as measure};
 use serde_json::{Value, json};
 
 use super::with_threads;
@@ -155,10 +155,10 @@ fn heading(row: &ScoreRow) -> String {
 /// The errors of one recording.
 fn errors(row: &ScoreRow) -> String {
     let mut table = Table::new(1, ["error", "linf", "l2", "l1"]);
-    for (field, norms) in row.errors.named() {
+    for (field, norms) in row.errors.iter() {
         if row.fields.contains(&field) {
-            let mut cells = vec![field.to_owned()];
-            cells.extend(norms.named().map(|(_, value)| table::error(*value)));
+            let mut cells = vec![field.to_string()];
+            cells.extend(norms.iter().map(|(_, value)| table::error(*value)));
             table.row(cells);
         }
     }
@@ -166,35 +166,30 @@ fn errors(row: &ScoreRow) -> String {
 }
 
 /// One table for each field that any recording has: a row a recording, and the rate right of each norm.
-fn tables(score: &Score) -> Vec<(&'static str, Table)> {
+fn tables(score: &Score) -> Vec<(Field, Table)> {
     let Some(orders) = &score.orders else { return vec![] };
-    let fields = orders.named();
-    let known = fields
-        .iter()
-        .enumerate()
-        .filter(|(_, (field, _))| score.rows.iter().any(|row| row.fields.contains(field)));
-    let table = |(field, (name, order)): (usize, &(&'static str, &mmsmith_verify::PerNorm<_>))| {
+    let known =
+        orders.iter().filter(|(field, _)| score.rows.iter().any(|row| row.fields.contains(field)));
+    let table = |(field, order): (Field, &PerNorm<Order>)| {
         let header =
             ["cells", "particles", "h", "linf", "rate", "l2", "rate", "l1", "rate", "status"];
         let mut table = Table::new(0, header);
         for (index, row) in score.rows.iter().enumerate() {
             let cells = row.cells.map_or_else(|| "-".into(), |cells| cells.to_string());
             let mut line = vec![cells, row.particles.to_string(), table::error(row.h)];
-            let errors = row.errors.named()[field].1.named();
-            for ((_, value), (_, order)) in errors.iter().zip(order.named()) {
-                let order: &mmsmith_verify::Order = order;
+            for ((_, value), (_, order)) in row.errors[field].iter().zip(order.iter()) {
                 let local = index.checked_sub(1).and_then(|pair| order.local[pair]);
-                line.extend([table::error(**value), table::rate(local)]);
+                line.extend([table::error(*value), table::rate(local)]);
             }
             line.push(if row.is_ok() { "ok" } else { "PROBLEM" }.into());
             table.row(line);
         }
         let mut fit = vec!["fit in h".to_owned(), String::new(), String::new()];
-        for (_, order) in order.named() {
+        for (_, order) in order.iter() {
             fit.extend([String::new(), table::rate(order.fit)]);
         }
         table.row(fit);
-        (*name, table)
+        (field, table)
     };
     known.map(table).collect()
 }

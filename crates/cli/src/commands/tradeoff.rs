@@ -10,9 +10,9 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use mmsmith_verify::{
-    Arithmetic, Case, CaseError, Chosen, Effect, Entry, Goal, MARGIN, Machine, Outputs, Record,
-    Repeat, Row, Setting, Skip, Status, Tradeoff, families, leading, plan, run as simulate,
-    time_steps, tradeoff as measure, uses_threads,
+    Arithmetic, Case, CaseError, Chosen, Effect, Entry, Field, Goal, MARGIN, Machine, Norm,
+    Outputs, Record, Repeat, Row, Setting, Skip, Status, Tradeoff, families, leading, plan,
+    run as simulate, time_steps, tradeoff as measure, uses_threads,
 };
 use serde_json::{Value, json};
 
@@ -39,30 +39,30 @@ const OF_SINGLE_PRECISION: usize = 2;
 
 /// How errors are compared.
 struct Measure {
-    field: usize,
-    norm: usize,
+    field: Field,
+    norm: Norm,
     /// What errors are divided by, and its name.
     scale: Option<(String, f64)>,
 }
 
 impl Measure {
     fn new(options: &TradeoffOptions, selection: &Selection) -> Self {
+        let (field, norm) = (options.field.into(), options.norm.into());
         let amplitude = selection.parameters().get("A").filter(|A| **A != 0.0);
         // Displacements go with the amplitude; other fields have other units.
         let scale =
-            amplitude.filter(|_| options.field as usize == 0).map(|A| ("A".into(), A.abs()));
-        Self { field: options.field as usize, norm: options.norm as usize, scale }
+            amplitude.filter(|_| field == Field::Displacement).map(|A| ("A".into(), A.abs()));
+        Self { field, norm, scale }
     }
 
     fn of(&self, row: &Row) -> f64 {
-        let error = *row.errors.named()[self.field].1.named()[self.norm].1;
+        let error = row.errors[self.field][self.norm];
         error / self.scale.as_ref().map_or(1.0, |(_, scale)| *scale)
     }
 
     /// What the errors are, in words.
     fn words(&self) -> String {
-        let field = ["u", "v", "F", "P"][self.field];
-        let norm = ["L_inf", "L2", "L1"][self.norm];
+        let (field, norm) = (self.field, self.norm.caption());
         match &self.scale {
             Some((name, value)) => {
                 format!("{norm} of {field} over {name} = {}", number::exact(*value))

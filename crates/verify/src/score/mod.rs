@@ -22,7 +22,7 @@ use mmsmith_vtk::foreign::{FrameFile, Snapshot, frames};
 use nalgebra::SVector;
 use serde::Serialize;
 
-use crate::norms::{PerField, PerNorm};
+use crate::norms::{Field, PerField, PerNorm};
 use crate::order::Order;
 use crate::study::orders_of;
 use arrays::Chosen;
@@ -144,7 +144,7 @@ pub struct ScoreRow {
     /// Where displacements are from.
     pub displacements: Source,
     /// The fields, of u, v, F and P, that the files hold.
-    pub fields: Vec<&'static str>,
+    pub fields: Vec<Field>,
     /// `ok`, or what is wrong with the recording.
     pub status: String,
     /// The errors; not a number for fields that are not there, and where a number of the files is none.
@@ -265,7 +265,7 @@ fn recording<const D: usize>(
     let roles =
         [Role::Displacement, Role::Velocity, Role::DeformationGradient, Role::FirstPiolaKirchhoff];
     let mut fields = vec![];
-    for ((field, role), count) in ["u", "v", "F", "P"].into_iter().zip(roles).zip(compared) {
+    for ((field, role), count) in Field::ALL.into_iter().zip(roles).zip(compared) {
         if count > 0 {
             fields.push(field);
         }
@@ -284,9 +284,8 @@ fn recording<const D: usize>(
             }
         }
     }
-    for ((field, given), turned) in
-        [("F", errors.F.l2), ("P", errors.P.l2)].into_iter().zip(transposed)
-    {
+    for (field, turned) in [Field::DeformationGradient, Field::Stress].into_iter().zip(transposed) {
+        let given = errors[field].l2;
         if turned.l2 < 0.5 * given {
             let what = format!(
                 "the transpose of {field} has the L2 error {:.3e} instead of {given:.3e}: is {field} written column by \
@@ -296,12 +295,12 @@ fn recording<const D: usize>(
             remarks.note("transposed", false, what);
         }
     }
-    for (field, norms) in errors.named() {
+    for (field, norms) in errors.iter() {
         let is_compared = fields.contains(&field);
         // What is not finite in the files has been told.
         if is_compared
             && !remarks.has("not-finite")
-            && norms.named().iter().any(|(_, value)| !value.is_finite())
+            && norms.iter().any(|(_, value)| !value.is_finite())
         {
             let what = format!(
                 "the errors of {field} are too large for a double, though its values are finite: is the array damaged?"

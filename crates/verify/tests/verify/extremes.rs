@@ -108,8 +108,7 @@ fn zero_amplitude_stays_exactly_at_rest() {
 /// The errors of a scaled problem over those of the first, which must be one and the same power of two in all norms.
 fn assert_scaled(case: &Case, a: &Row, b: &Row, factors: [f64; 4]) {
     assert_eq!((a.steps, a.particles, a.cfl), (b.steps, b.particles, b.cfl), "{case:?}");
-    for (((name, a), (_, b)), factor) in a.errors.named().iter().zip(b.errors.named()).zip(factors)
-    {
+    for (((name, a), (_, b)), factor) in a.errors.iter().zip(b.errors.iter()).zip(factors) {
         let scaled = PerNorm { linf: a.linf * factor, l2: a.l2 * factor, l1: a.l1 * factor };
         assert_eq!(scaled, *b, "{name}: {case:?}");
     }

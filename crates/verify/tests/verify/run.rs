@@ -47,7 +47,7 @@ fn gimp_with_centred_differences_has_the_known_errors_and_second_order() {
     }
     let order = &study.orders.u.linf;
     assert!((order.local[1].unwrap() - 2.0).abs() < 0.05, "{order:?}");
-    for (name, field) in study.orders.named() {
+    for (name, field) in study.orders.iter() {
         assert!(field.l2.fit.unwrap() > 1.5, "{name}: {:?}", field.l2);
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 use mmsmith_solutions::{CATALOGUE, Description};
-use mmsmith_verify::{Row, Sweep};
+use mmsmith_verify::{Field, Row, Sweep};
 use sha2::{Digest, Sha256};
 
 use super::claims::{Claim, difference_orders, told_orders};
@@ -101,12 +101,12 @@ fn sum_section(results: &[Results], gentle: &[Differences]) -> String {
     let mut small_step = String::new();
     let sweep = Sweep::Cells(SMALL_STEP_CELLS.to_vec());
     let [(_, table), ..] = tables(&square.small_step.study, &sweep, &square.small_step.verdicts);
-    small_step += &errors_with_units(table, "u")
+    small_step += &errors_with_units(table, Field::Displacement)
         .html(&format!("{}: error of u of gimp+usl at CFL {SMALL_STEP}", square.problem));
     let mut differences = String::new();
     for one in gentle {
         let [(_, table), ..] = difference_tables(&one.found, &one.verdicts);
-        differences += &errors_with_units(table, "u").html(&format!(
+        differences += &errors_with_units(table, Field::Displacement).html(&format!(
             "Difference of u, {}, A = {GENTLE}, {GENTLE_GRID} cells",
             name(one.scheme)
         ));
@@ -204,7 +204,7 @@ fn problem_section(out: &Path, results: &Results) -> Result<String> {
     for one in &results.differences {
         let [(_, table), ..] = difference_tables(&one.found, &one.verdicts);
         let caption = format!("{problem}: difference of u, {}, {GRID} cells", name(one.scheme));
-        text += &errors_with_units(table, "u").html(&caption);
+        text += &errors_with_units(table, Field::Displacement).html(&caption);
     }
     text += &files(results);
     text += "</section>\n";
