@@ -10,14 +10,13 @@ use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::fault::Fault;
 use crate::geometry::Constants;
-use crate::health::{Check, Outcome, SharedOutcome, invalidity};
+use crate::health::{CheckBlock, Outcome, SharedOutcome, invalidity};
 use crate::kernel::any::Interpolated;
 use crate::kernel::block::{BLOCK, Block, Copies};
 use crate::parallel::bins::Bins;
 use crate::parallel::chunks::{each_chunk, each_chunk_of_three};
 use crate::particles::Particles;
-use crate::shape_function::ShapeFunction;
-use crate::simd::dispatch;
+use crate::shape_function::ShapeChoice;
 use crate::state::State;
 
 /// Particles handed to a thread at a time; fixed, so that nothing depends on the number of threads.
@@ -28,7 +27,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
     #[inline(never)]
     pub(crate) fn g2p_stretch<R, const W: usize>(&mut self, shape: R) -> Outcome
     where
-        R: ShapeFunction<T, D, W>,
+        R: ShapeChoice<T, D, W>,
     {
         let Self { particles, constants, nodes, F_next, .. } = self;
         let (nodes, c) = (&nodes[..], *constants);
@@ -64,7 +63,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
     #[inline(never)]
     pub(crate) fn g2p_stretched<R, const W: usize>(&mut self, shape: R) -> Outcome
     where
-        R: ShapeFunction<T, D, W>,
+        R: ShapeChoice<T, D, W>,
     {
         let Self { particles, constants, nodes, bins, F_next, .. } = self;
         let (nodes, c) = (&nodes[..], *constants);
@@ -82,7 +81,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
     #[inline(never)]
     pub(crate) fn g2p_velocity<R, const W: usize>(&mut self, shape: R)
     where
-        R: ShapeFunction<T, D, W>,
+        R: ShapeChoice<T, D, W>,
     {
         let Self { particles, constants, nodes, .. } = self;
         let (nodes, c) = (&nodes[..], *constants);
@@ -106,7 +105,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
     #[inline(never)]
     pub(crate) fn g2p_reprojected<R, const W: usize>(&mut self, shape: R) -> Outcome
     where
-        R: ShapeFunction<T, D, W>,
+        R: ShapeChoice<T, D, W>,
     {
         let Self { particles, constants, nodes, bins, reprojected, .. } = self;
         let (nodes, c) = (&nodes[..], *constants);
@@ -143,7 +142,7 @@ fn g2p<T, R, const D: usize, const W: usize>(
 ) -> Outcome
 where
     T: RealField + Copy,
-    R: ShapeFunction<T, D, W>,
+    R: ShapeChoice<T, D, W>,
 {
     let Particles { x, v, F, .. } = particles;
     let (bin_of, found) = (bins.bin_of(), SharedOutcome::default());
@@ -166,10 +165,7 @@ where
             }
             block.compute_weights(&c, shape, copies.kinematics());
             update(&block, &mut interpolated[..x.len()], first, x, v, F);
-            let mut all_valid = true;
-            let own_bins = bins.iter().copied();
-            dispatch(Check { c: &c, shape, bins: own_bins, x, F, all_valid: &mut all_valid });
-            if all_valid {
+            if shape.with(CheckBlock { c: &c, bins: bins.iter().copied(), x, F }) {
                 continue;
             }
             for (k, ((x, F), &bin)) in x.iter().zip(F).zip(bins).enumerate() {

@@ -13,7 +13,7 @@ use crate::fault::Fault;
 use crate::forcing::Forcing;
 use crate::geometry::Constants;
 use crate::grid_update::{GridUpdate, VelocityAndAcceleration};
-use crate::health::{Check, Outcome, SharedOutcome};
+use crate::health::{CheckBlock, Outcome, SharedOutcome};
 use crate::kernel::any::{Contributions, Interpolated, Receive};
 use crate::kernel::block::{BLOCK, Block, Copies, Kinematics};
 use crate::material::Law;
@@ -21,8 +21,8 @@ use crate::node::Node;
 use crate::parallel::disjoint::PartElements;
 use crate::particles::Particles;
 use crate::prefetch::prefetch;
-use crate::shape_function::ShapeFunction;
-use crate::simd::{Lane4, Vectors, dispatch};
+use crate::shape_function::ShapeChoice;
+use crate::simd::{Lane4, Vectors};
 use crate::state::State;
 
 /// Position, velocity and deformation gradient of a bin's particles.
@@ -40,7 +40,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         t_next: T,
     ) -> Outcome
     where
-        R: ShapeFunction<T, D, W>,
+        R: ShapeChoice<T, D, W>,
         L: Law<T>,
     {
         let Self { particles, constants: c, layout, bins, nodes, next, uniform, of_time, .. } =
@@ -83,7 +83,7 @@ impl<T: RealField + Copy, R, L: Law<T>, const D: usize> G2p2g<'_, T, R, L, D> {
         mut elements: Elements<'_, T, D>,
     ) -> Outcome
     where
-        R: ShapeFunction<T, D, W>,
+        R: ShapeChoice<T, D, W>,
     {
         let mut outcome = Outcome::default();
         let mut copies = Copies::new();
@@ -127,7 +127,7 @@ impl<T: RealField + Copy, R, L: Law<T>, const D: usize> G2p2g<'_, T, R, L, D> {
         (x, v, F): ContiguousBlock<'_, T, D>,
     ) -> Outcome
     where
-        R: ShapeFunction<T, D, W>,
+        R: ShapeChoice<T, D, W>,
     {
         let &Self { c, shape, law, nodes, ref forcing, .. } = self;
         if c.planted.is(Fault::WeightsOfNewPosition) {
@@ -148,10 +148,8 @@ impl<T: RealField + Copy, R, L: Law<T>, const D: usize> G2p2g<'_, T, R, L, D> {
         };
         block.g2p(&c.strides, nodes, ids.len(), advance);
         block.compute_weights(c, shape, Kinematics { x, F });
-        let mut all_valid = true;
         let bins = std::iter::repeat(bin);
-        dispatch(Check { c, shape, bins, x: &x[..ids.len()], F, all_valid: &mut all_valid });
-        if !all_valid {
+        if !shape.with(CheckBlock { c, bins, x: &x[..ids.len()], F }) {
             let mut outcome = Outcome::default();
             for (k, &p) in ids.iter().enumerate() {
                 outcome = outcome.merge(c.diagnose(shape, bin, &x[k], &F[k], p as usize));

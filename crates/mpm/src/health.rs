@@ -6,8 +6,10 @@ use std::sync::{Mutex, PoisonError};
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::geometry::Constants;
-use crate::shape_function::{EXTENDED, HALF_SIZE_LIMIT, ShapeFunction, is_extended};
-use crate::simd::{Loop, Vectors};
+use crate::shape_function::{
+    EXTENDED, HALF_SIZE_LIMIT, ShapeChoice, ShapeFunction, ShapeWork, is_extended,
+};
+use crate::simd::{Loop, Vectors, dispatch};
 use crate::tensor::{determinant, real};
 
 impl<T: RealField + Copy, const D: usize> Constants<T, D> {
@@ -21,7 +23,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
         F: &SMatrix<T, D, D>,
     ) -> bool
     where
-        R: ShapeFunction<T, D, W>,
+        R: ShapeChoice<T, D, W>,
     {
         let l: [T; D] = array::from_fn(|a| shape.half_size(a, F[(a, a)]));
         let mut valid = determinant(F) > T::zero();
@@ -47,7 +49,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
         particle: usize,
     ) -> Outcome
     where
-        R: ShapeFunction<T, D, W>,
+        R: ShapeChoice<T, D, W>,
     {
         if self.is_valid(shape, bin, x, F) {
             return Outcome::default();
@@ -76,7 +78,7 @@ pub(crate) fn invalidity<T, R, const D: usize, const W: usize>(
 ) -> Option<Invalid>
 where
     T: RealField + Copy,
-    R: ShapeFunction<T, D, W>,
+    R: ShapeChoice<T, D, W>,
 {
     let J = determinant(F);
     let l = SVector::<T, D>::from_fn(|a, _| shape.half_size(a, F[(a, a)]));
@@ -144,17 +146,36 @@ impl SharedOutcome {
     }
 }
 
-/// Checks whether all particles of a block are [valid](Constants::is_valid), each in its own of `bins`.
-pub(crate) struct Check<'a, T, R, H, const D: usize, const W: usize> {
+/// Whether all particles of a block are [valid](Constants::is_valid), each in its own of `bins`.
+pub(crate) struct CheckBlock<'a, T, H, const D: usize> {
     pub(crate) c: &'a Constants<T, D>,
-    pub(crate) shape: R,
     pub(crate) bins: H,
     pub(crate) x: &'a [SVector<T, D>],
     pub(crate) F: &'a [SMatrix<T, D, D>],
-    pub(crate) all_valid: &'a mut bool,
 }
 
-impl<T, R, H, const D: usize, const W: usize> Loop for Check<'_, T, R, H, D, W>
+impl<T, H, const D: usize, const W: usize> ShapeWork<T, D, W> for CheckBlock<'_, T, H, D>
+where
+    T: RealField + Copy,
+    H: Iterator<Item = u32>,
+{
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<R: ShapeFunction<T, D, W>>(self, shape: R) -> bool {
+        let mut all_valid = true;
+        dispatch(Check { work: self, shape, all_valid: &mut all_valid });
+        all_valid
+    }
+}
+
+struct Check<'a, 'b, T, R, H, const D: usize, const W: usize> {
+    work: CheckBlock<'a, T, H, D>,
+    shape: R,
+    all_valid: &'b mut bool,
+}
+
+impl<T, R, H, const D: usize, const W: usize> Loop for Check<'_, '_, T, R, H, D, W>
 where
     T: RealField + Copy,
     R: ShapeFunction<T, D, W>,
@@ -162,7 +183,7 @@ where
 {
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
-        let Self { c, shape, bins, x, F, all_valid } = self;
+        let Self { work: CheckBlock { c, bins, x, F }, shape, all_valid } = self;
         let mut valid = true;
         for ((x, F), bin) in x.iter().zip(F).zip(bins) {
             valid &= c.is_valid(shape, bin, x, F);

@@ -20,7 +20,7 @@ use crate::kernel::block::{BLOCK, Block, Copies};
 use crate::material::Law;
 use crate::node::Node;
 use crate::particles::Particles;
-use crate::shape_function::ShapeFunction;
+use crate::shape_function::ShapeChoice;
 use crate::state::State;
 
 impl<T: RealField + Copy, const D: usize> State<T, D> {
@@ -33,7 +33,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         body_force: &dyn BodyForce<T, D>,
         (t, scale): (T, T),
     ) where
-        R: ShapeFunction<T, D, W>,
+        R: ShapeChoice<T, D, W>,
         L: Law<T>,
     {
         let Self { particles, constants, layout, bins, nodes, of_time, .. } = self;
@@ -57,7 +57,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
     #[inline(never)]
     pub(crate) fn p2g_momentum<R, const W: usize>(&mut self, shape: R)
     where
-        R: ShapeFunction<T, D, W>,
+        R: ShapeChoice<T, D, W>,
     {
         let Self { particles, constants, layout, bins, nodes, .. } = self;
         let Particles { x, v, F, mass, .. } = &*particles;
@@ -80,7 +80,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         body_force: &dyn BodyForce<T, D>,
         (t, scale): (T, T),
     ) where
-        R: ShapeFunction<T, D, W>,
+        R: ShapeChoice<T, D, W>,
         L: Law<T>,
     {
         let Self { particles, constants, layout, bins, nodes, F_next, of_time, .. } = self;
@@ -105,7 +105,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
     #[inline(never)]
     pub(crate) fn p2g_updated_momentum<R, const W: usize>(&mut self, shape: R)
     where
-        R: ShapeFunction<T, D, W>,
+        R: ShapeChoice<T, D, W>,
     {
         let Self { particles, constants, layout, bins, nodes, reprojected, .. } = self;
         let Particles { x, v, F, mass, .. } = &*particles;
@@ -133,7 +133,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
         ids: &[u32],
         set: impl Fn(&mut Copies<T, D>, &[u32], &mut Contributions<T, D, BLOCK>),
     ) where
-        R: ShapeFunction<T, D, W>,
+        R: ShapeChoice<T, D, W>,
     {
         let mut copies = Copies::new();
         let mut block = Block::new();

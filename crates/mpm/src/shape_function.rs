@@ -1,9 +1,10 @@
-//! Shape functions on one axis: hat functions, uGIMP and GIMP. A weight `S_ip` is their product over the axes.
+//! Shape functions on one axis: hat functions, uGIMP, GIMP and quadratic splines. A weight `S_ip` is their product over the axes.
 //!
 //! All lengths are in cells (`h = 1`). Positions count from the lower corner of the grid, `xi = (x - lower) / h`; half-sizes `l`
 //! of particle boxes and gradients are per cell too.
 //!
-//! To add a shape function: implement [`ShapeFunction`] here, and choose it in [`Simulation::new`](crate::Simulation::new).
+//! To add a shape function with three nodes along each axis: implement [`ShapeFunction`] here, add it to [`ThreeNodes`], and
+//! choose it in [`Simulation::new`](crate::Simulation::new).
 
 use nalgebra::{RealField, SVector};
 
@@ -32,27 +33,81 @@ pub(crate) fn extended_axes<T: RealField + Copy, const D: usize>(
     std::array::from_fn(|a| extended_axis(xi[a], l[a]))
 }
 
-/// A shape function; `W` is the number of nodes along each axis, except for a box with [extended](is_extended) support.
-pub(crate) trait ShapeFunction<T: RealField + Copy, const D: usize, const W: usize>:
+/// A shape function that a simulation was set up with; `W` is the number of nodes along each axis, except for a box with
+/// [extended](is_extended) support.
+///
+/// Steps are compiled once for all that have the same `W`. Loops over a block of particles are compiled for each of them:
+/// [`with`](Self::with) says which one it is, once a block.
+pub(crate) trait ShapeChoice<T: RealField + Copy, const D: usize, const W: usize>:
     Copy + Send + Sync + 'static
 {
     /// Half-size of a particle's box along an axis, in cells, for the diagonal entry `F_aa` of the deformation gradient.
     fn half_size(&self, axis: usize, F_aa: T) -> T;
 
+    /// Does work that is compiled for the shape function itself.
+    fn with<K: ShapeWork<T, D, W>>(self, work: K) -> K::Output;
+}
+
+/// Work on a block of particles that is compiled for each shape function.
+pub(crate) trait ShapeWork<T: RealField + Copy, const D: usize, const W: usize> {
+    type Output;
+
+    fn run<R: ShapeFunction<T, D, W>>(self, shape: R) -> Self::Output;
+}
+
+/// A shape function that is known where code is compiled.
+pub(crate) trait ShapeFunction<T: RealField + Copy, const D: usize, const W: usize>:
+    ShapeChoice<T, D, W>
+{
     /// The weights along one axis, for a half-size without [extended](is_extended) support.
     fn axis_weights(xi: T, l: T) -> AxisWeights<T, W>;
+}
+
+/// One of the shape functions with three nodes along each axis.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum ThreeNodes<T, const D: usize> {
+    FixedBox(FixedBox<T, D>),
+    StretchingBox(StretchingBox<T, D>),
+    Quadratic(QuadraticSpline),
+}
+
+impl<T: RealField + Copy, const D: usize> ShapeChoice<T, D, 3> for ThreeNodes<T, D> {
+    #[inline(always)]
+    fn half_size(&self, axis: usize, F_aa: T) -> T {
+        match self {
+            Self::FixedBox(shape) => shape.half_size(axis, F_aa),
+            Self::StretchingBox(shape) => shape.half_size(axis, F_aa),
+            Self::Quadratic(shape) => <_ as ShapeChoice<T, D, 3>>::half_size(shape, axis, F_aa),
+        }
+    }
+
+    #[inline(always)]
+    fn with<K: ShapeWork<T, D, 3>>(self, work: K) -> K::Output {
+        match self {
+            Self::FixedBox(shape) => work.run(shape),
+            Self::StretchingBox(shape) => work.run(shape),
+            Self::Quadratic(shape) => work.run(shape),
+        }
+    }
 }
 
 /// Hat functions at the particle's centre.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Hat;
 
-impl<T: RealField + Copy, const D: usize> ShapeFunction<T, D, 2> for Hat {
+impl<T: RealField + Copy, const D: usize> ShapeChoice<T, D, 2> for Hat {
     #[inline(always)]
     fn half_size(&self, _axis: usize, _F_aa: T) -> T {
         T::zero()
     }
 
+    #[inline(always)]
+    fn with<K: ShapeWork<T, D, 2>>(self, work: K) -> K::Output {
+        work.run(self)
+    }
+}
+
+impl<T: RealField + Copy, const D: usize> ShapeFunction<T, D, 2> for Hat {
     #[inline(always)]
     fn axis_weights(xi: T, _l: T) -> AxisWeights<T, 2> {
         let (base, node) = node_below(xi);
@@ -65,12 +120,19 @@ impl<T: RealField + Copy, const D: usize> ShapeFunction<T, D, 2> for Hat {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FixedBox<T, const D: usize>(pub(crate) SVector<T, D>);
 
-impl<T: RealField + Copy, const D: usize> ShapeFunction<T, D, 3> for FixedBox<T, D> {
+impl<T: RealField + Copy, const D: usize> ShapeChoice<T, D, 3> for FixedBox<T, D> {
     #[inline(always)]
     fn half_size(&self, axis: usize, _F_aa: T) -> T {
         self.0[axis]
     }
 
+    #[inline(always)]
+    fn with<K: ShapeWork<T, D, 3>>(self, work: K) -> K::Output {
+        work.run(self)
+    }
+}
+
+impl<T: RealField + Copy, const D: usize> ShapeFunction<T, D, 3> for FixedBox<T, D> {
     #[inline(always)]
     fn axis_weights(xi: T, l: T) -> AxisWeights<T, 3> {
         gimp_axis(xi, l)
@@ -81,7 +143,7 @@ impl<T: RealField + Copy, const D: usize> ShapeFunction<T, D, 3> for FixedBox<T,
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StretchingBox<T, const D: usize>(pub(crate) SVector<T, D>);
 
-impl<T: RealField + Copy, const D: usize> ShapeFunction<T, D, 3> for StretchingBox<T, D> {
+impl<T: RealField + Copy, const D: usize> ShapeChoice<T, D, 3> for StretchingBox<T, D> {
     #[inline(always)]
     fn half_size(&self, axis: usize, F_aa: T) -> T {
         // A quarter turn makes F_aa zero, and the weights divide by l.
@@ -90,8 +152,47 @@ impl<T: RealField + Copy, const D: usize> ShapeFunction<T, D, 3> for StretchingB
     }
 
     #[inline(always)]
+    fn with<K: ShapeWork<T, D, 3>>(self, work: K) -> K::Output {
+        work.run(self)
+    }
+}
+
+impl<T: RealField + Copy, const D: usize> ShapeFunction<T, D, 3> for StretchingBox<T, D> {
+    #[inline(always)]
     fn axis_weights(xi: T, l: T) -> AxisWeights<T, 3> {
         gimp_axis(xi, l)
+    }
+}
+
+/// Quadratic B-splines at the particle's centre, over three cells.
+///
+/// Steffen, Kirby and Berzins, Analysis and reduction of quadrature errors in the material point method, 2008.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct QuadraticSpline;
+
+impl<T: RealField + Copy, const D: usize> ShapeChoice<T, D, 3> for QuadraticSpline {
+    /// As of a box over one cell: the first node is the one below its lower edge.
+    #[inline(always)]
+    fn half_size(&self, _axis: usize, _F_aa: T) -> T {
+        real(0.5)
+    }
+
+    #[inline(always)]
+    fn with<K: ShapeWork<T, D, 3>>(self, work: K) -> K::Output {
+        work.run(self)
+    }
+}
+
+impl<T: RealField + Copy, const D: usize> ShapeFunction<T, D, 3> for QuadraticSpline {
+    #[inline(always)]
+    fn axis_weights(xi: T, l: T) -> AxisWeights<T, 3> {
+        let one = T::one();
+        let (base, node) = node_below(xi - l);
+        // From the middle of the first cell, between 0 and 1.
+        let r = xi - l - node;
+        let s = one - r;
+        let (S0, S2) = (s * s * real(0.5), r * r * real(0.5));
+        AxisWeights { base, S: [S0, one - S0 - S2, S2], G: [-s, s - r, r] }
     }
 }
 
@@ -198,6 +299,10 @@ mod tests {
         <Hat as ShapeFunction<f64, 1, 2>>::axis_weights(xi, 0.0)
     }
 
+    fn quadratic(xi: f64) -> AxisWeights<f64, 3> {
+        <QuadraticSpline as ShapeFunction<f64, 1, 3>>::axis_weights(xi, 0.5)
+    }
+
     /// The formula as printed in the source.
     fn printed(r: f64, l: f64) -> f64 {
         let r = r.abs();
@@ -233,6 +338,7 @@ mod tests {
         fn linear_fields_are_reproduced(xi in 0.0..20.0_f64, l in 1e-3..0.5_f64, wide in 1e-2..2.0_f64) {
             check(&hat(xi), xi)?;
             check(&gimp_axis(xi, l), xi)?;
+            check(&quadratic(xi), xi)?;
             check(&extended_axis(xi, wide), xi)?;
         }
 
@@ -267,6 +373,7 @@ mod tests {
             let d = 1e-7;
             for (minus, here, plus) in [
                 (spread(&gimp_axis(xi - d, l)), spread(&gimp_axis(xi, l)), spread(&gimp_axis(xi + d, l))),
+                (spread(&quadratic(xi - d)), spread(&quadratic(xi)), spread(&quadratic(xi + d))),
                 (spread(&extended_axis(xi - d, wide)), spread(&extended_axis(xi, wide)), spread(&extended_axis(xi + d, wide))),
             ] {
                 for &(node, _, G) in &here {

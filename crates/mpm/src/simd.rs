@@ -378,6 +378,7 @@ mod tests {
             (Shape::Ugimp, Integrator::Usl),
             (Shape::Linear, Integrator::Musl),
             (Shape::Gimp, Integrator::Usf),
+            (Shape::Bspline2, Integrator::Cd),
         ] {
             fn check<const D: usize>(shape: Shape, integrator: Integrator) {
                 let plain = bits::<D>(Level::Scalar, shape, integrator);

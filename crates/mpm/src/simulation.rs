@@ -15,7 +15,9 @@ use crate::material::{AnyLaw, Law, Material, NeoHookean, NeoHookeanNoLog};
 use crate::node::Node;
 use crate::parallel::bins::Bins;
 use crate::particles::Particles;
-use crate::shape_function::{FixedBox, HALF_SIZE_LIMIT, Hat, ShapeFunction, StretchingBox};
+use crate::shape_function::{
+    FixedBox, HALF_SIZE_LIMIT, Hat, QuadraticSpline, ShapeChoice, StretchingBox, ThreeNodes,
+};
 use crate::state::State;
 use crate::step::{Kernel, StepTimes, step_musl, step_usf, step_usl};
 use crate::tensor::{determinant, real};
@@ -30,6 +32,8 @@ pub enum Shape {
     Ugimp,
     /// GIMP weights with boxes of half-size `l0 F_aa` along axis a (contiguous particles).
     Gimp,
+    /// Quadratic B-splines at the particle's centre.
+    Bspline2,
 }
 
 /// Time integration.
@@ -101,8 +105,18 @@ impl<T: RealField + Copy, const D: usize> Simulation<T, D> {
         let cells = state.particles.half_size / grid.spacing;
         let (state, kernel) = match settings.shape {
             Shape::Linear => with_shape(state, Hat, &material, &settings),
-            Shape::Ugimp => with_shape(state, FixedBox(cells), &material, &settings),
-            Shape::Gimp => with_shape(state, StretchingBox(cells), &material, &settings),
+            Shape::Ugimp => {
+                let shape = ThreeNodes::FixedBox(FixedBox(cells));
+                with_shape(state, shape, &material, &settings)
+            }
+            Shape::Gimp => {
+                let shape = ThreeNodes::StretchingBox(StretchingBox(cells));
+                with_shape(state, shape, &material, &settings)
+            }
+            Shape::Bspline2 => {
+                let shape = ThreeNodes::Quadratic(QuadraticSpline);
+                with_shape(state, shape, &material, &settings)
+            }
         }?;
         Ok(Self { grid, material, settings, state, kernel, steps_done: 0, failed: None })
     }
@@ -252,7 +266,7 @@ fn check<T: RealField + Copy, const D: usize>(
     if expected > limit {
         return Err(SetupError::TooManyParticles { particles: expected, limit });
     }
-    if settings.shape != Shape::Linear {
+    if matches!(settings.shape, Shape::Ugimp | Shape::Gimp) {
         for (axis, &l) in half_size.iter().enumerate() {
             positive(&|| format!("the half-size of particles along axis {axis}"), l)?;
         }
@@ -326,7 +340,7 @@ fn with_shape<T, R, const D: usize, const W: usize>(
 ) -> Prepared<T, D>
 where
     T: RealField + Copy,
-    R: ShapeFunction<T, D, W>,
+    R: ShapeChoice<T, D, W>,
 {
     let Particles { x, F, .. } = &state.particles;
     for p in 0..x.len() {
@@ -357,7 +371,7 @@ fn with_law<T, R, L, const D: usize, const W: usize>(
 ) -> Kernel<T, D>
 where
     T: RealField + Copy,
-    R: ShapeFunction<T, D, W>,
+    R: ShapeChoice<T, D, W>,
     L: Law<T>,
 {
     match integrator {
@@ -394,7 +408,7 @@ fn describe<T: RealField + Copy, const D: usize>(
             let l0 = &state.particles.half_size;
             let l = match settings.shape {
                 Shape::Gimp => SVector::from_fn(|a, _| (l0[a] * F[(a, a)]).abs()),
-                Shape::Linear | Shape::Ugimp => *l0,
+                Shape::Linear | Shape::Ugimp | Shape::Bspline2 => *l0,
             };
             let spacing = state.constants.spacing();
             let axis = axis_too_large(&(l / spacing)).unwrap_or(0);

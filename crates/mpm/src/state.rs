@@ -8,7 +8,7 @@ use crate::health::Outcome;
 use crate::node::Node;
 use crate::parallel::bins::Bins;
 use crate::particles::Particles;
-use crate::shape_function::{ShapeFunction, first_layer};
+use crate::shape_function::{ShapeChoice, first_layer};
 
 /// Everything that a step reads and changes.
 #[derive(Debug)]
@@ -36,7 +36,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
     /// Sorts the particles into bins, if one of them left its bin in the last pass.
     pub(crate) fn resort_if<R, const W: usize>(&mut self, outcome: Outcome, shape: R) -> Outcome
     where
-        R: ShapeFunction<T, D, W>,
+        R: ShapeChoice<T, D, W>,
     {
         if outcome.resort && outcome.failure.is_none() {
             self.sort(shape);
@@ -48,7 +48,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
     #[inline(never)]
     pub(crate) fn sort<R, const W: usize>(&mut self, shape: R)
     where
-        R: ShapeFunction<T, D, W>,
+        R: ShapeChoice<T, D, W>,
     {
         let (c, Particles { x, F, .. }) = (self.constants, &self.particles);
         self.bins.sort(&self.layout, &|p| {

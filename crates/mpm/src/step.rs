@@ -8,7 +8,7 @@ use nalgebra::RealField;
 use crate::body_force::BodyForce;
 use crate::health::Outcome;
 use crate::material::Law;
-use crate::shape_function::ShapeFunction;
+use crate::shape_function::ShapeChoice;
 use crate::state::State;
 
 /// Times of a step, and the factor on its accelerations.
@@ -35,7 +35,7 @@ pub(crate) fn step_usl<T, R, L, const D: usize, const W: usize>(
 ) -> Outcome
 where
     T: RealField + Copy,
-    R: ShapeFunction<T, D, W>,
+    R: ShapeChoice<T, D, W>,
     L: Law<T>,
 {
     if !s.is_ahead {
@@ -59,7 +59,7 @@ pub(crate) fn step_musl<T, R, L, const D: usize, const W: usize>(
 ) -> Outcome
 where
     T: RealField + Copy,
-    R: ShapeFunction<T, D, W>,
+    R: ShapeChoice<T, D, W>,
     L: Law<T>,
 {
     s.p2g(shape, law, body_force, (times.start, times.scale));
@@ -78,7 +78,7 @@ pub(crate) fn step_usf<T, R, L, const D: usize, const W: usize>(
 ) -> Outcome
 where
     T: RealField + Copy,
-    R: ShapeFunction<T, D, W>,
+    R: ShapeChoice<T, D, W>,
     L: Law<T>,
 {
     s.p2g_momentum(shape);

@@ -52,7 +52,7 @@ pub(crate) fn validate(case: &Case) -> Result<(), CaseError> {
         return refuse(
             "offset",
             &value,
-            "0, but for the shapes linear, ugimp and gimp on a lattice with the transfer flip and the integrators cd, usl, usf \
+            "0, but for the shapes linear, ugimp, gimp and bspline2 on a lattice with the transfer flip and the integrators cd, usl, usf \
              and musl",
         );
     }
@@ -126,7 +126,7 @@ impl Precision for f32 {
         let admissible = match case.frame {
             Frame::Total(_) => "f64 in the total Lagrangian formulation",
             Frame::Updated => {
-                "f64, but for the shapes linear, ugimp and gimp on a lattice with the transfer flip and the integrators \
+                "f64, but for the shapes linear, ugimp, gimp and bspline2 on a lattice with the transfer flip and the integrators \
                  cd, usl, usf and musl"
             }
         };

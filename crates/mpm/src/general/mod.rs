@@ -9,7 +9,7 @@
 //! v_p by the transfer;  x_p += dt sum S_ip (v_i + dt a_i);  F_p <- (I + dt grad v) F_p
 //! ```
 //!
-//! For `linear`, `ugimp` and `gimp` with FLIP this is the scheme of the fast step, written independently of it; the two
+//! For `linear`, `ugimp`, `gimp` and `bspline2` with FLIP this is the scheme of the fast step, written independently of it; the two
 //! agree to rounding. It runs on the calling thread alone, so that its results do not depend on the number of threads.
 //!
 //! # Example

@@ -52,7 +52,8 @@ impl Shape {
             Self::Linear => Some(crate::Shape::Linear),
             Self::Ugimp => Some(crate::Shape::Ugimp),
             Self::Gimp => Some(crate::Shape::Gimp),
-            Self::Bspline2 | Self::Bspline3 | Self::Cpdi | Self::Cpdi2 => None,
+            Self::Bspline2 => Some(crate::Shape::Bspline2),
+            Self::Bspline3 | Self::Cpdi | Self::Cpdi2 => None,
         }
     }
 }

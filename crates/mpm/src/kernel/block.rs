@@ -12,7 +12,7 @@ use crate::kernel::lanes_plane::{g2p_in_plane, p2g_in_plane};
 use crate::kernel::lanes_space::{g2p_in_space, p2g_in_space};
 use crate::material::Law;
 use crate::node::Node;
-use crate::shape_function::{ShapeFunction, index, is_extended};
+use crate::shape_function::{ShapeChoice, ShapeFunction, ShapeWork, index, is_extended};
 use crate::simd::{Loop, Vectors, dispatch};
 use crate::tensor::real;
 use crate::weights::{ExtendedWeights, Weights, is_middle};
@@ -122,13 +122,13 @@ impl<T: RealField + Copy, const D: usize, const W: usize> Block<T, D, W> {
     }
 
     /// Computes the weights of particles.
-    pub(crate) fn compute_weights<R: ShapeFunction<T, D, W>>(
+    pub(crate) fn compute_weights<R: ShapeChoice<T, D, W>>(
         &mut self,
         c: &Constants<T, D>,
         shape: R,
         kinematics: Kinematics<'_, T, D>,
     ) {
-        dispatch(ComputeWeights { block: self, c, shape, kinematics });
+        shape.with(WeightsOfBlock { block: self, c, kinematics });
         if self.any_extended {
             for k in 0..BLOCK {
                 let xi = c.in_cells(&kinematics.x[k]);
@@ -230,11 +230,26 @@ fn stretch<T: RealField + Copy, const D: usize>(
     F[(a, a)]
 }
 
-struct ComputeWeights<'a, T, R, const D: usize, const W: usize> {
+struct WeightsOfBlock<'a, T, const D: usize, const W: usize> {
     block: &'a mut Block<T, D, W>,
     c: &'a Constants<T, D>,
-    shape: R,
     kinematics: Kinematics<'a, T, D>,
+}
+
+impl<T: RealField + Copy, const D: usize, const W: usize> ShapeWork<T, D, W>
+    for WeightsOfBlock<'_, T, D, W>
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn run<R: ShapeFunction<T, D, W>>(self, shape: R) {
+        dispatch(ComputeWeights { work: self, shape });
+    }
+}
+
+struct ComputeWeights<'a, T, R, const D: usize, const W: usize> {
+    work: WeightsOfBlock<'a, T, D, W>,
+    shape: R,
 }
 
 impl<T, R, const D: usize, const W: usize> Loop for ComputeWeights<'_, T, R, D, W>
@@ -244,7 +259,8 @@ where
 {
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
-        let Self { block, c, shape, kinematics: Kinematics { x, F } } = self;
+        let Self { work: WeightsOfBlock { block, c, kinematics: Kinematics { x, F } }, shape } =
+            self;
         let Block { first_node, S, G, .. } = block;
         block.any_extended = compute_weights(c, shape, x, F, first_node, S, G);
     }

@@ -7,7 +7,7 @@ use mmsmith_mpm::{
 };
 use nalgebra::{Matrix2, SMatrix, SVector, Vector1, Vector2, Vector3, vector};
 
-const SHAPES: [Shape; 3] = [Shape::Linear, Shape::Ugimp, Shape::Gimp];
+const SHAPES: [Shape; 4] = [Shape::Linear, Shape::Ugimp, Shape::Gimp, Shape::Bspline2];
 const INTEGRATORS: [Integrator; 4] =
     [Integrator::Usf, Integrator::Usl, Integrator::Musl, Integrator::Cd];
 const SOFT: Material<f64> = Material::NeoHookean { lambda: 60.0, mu: 40.0 };

@@ -138,7 +138,8 @@ fn is_continued<S>(
 
 fn fast_schemes() -> impl Iterator<Item = Settings<f64>> {
     let integrators = [Integrator::Usf, Integrator::Usl, Integrator::Musl, Integrator::Cd];
-    [Shape::Linear, Shape::Ugimp, Shape::Gimp].into_iter().flat_map(move |shape| {
+    let shapes = [Shape::Linear, Shape::Ugimp, Shape::Gimp, Shape::Bspline2];
+    shapes.into_iter().flat_map(move |shape| {
         integrators.map(|integrator| Settings {
             shape,
             integrator,
