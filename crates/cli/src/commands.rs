@@ -184,12 +184,8 @@ fn threads(options: &Scheme) -> usize {
 fn preface(options: &Scheme) -> String {
     let mut text = options.choice();
     if let Some(asked) = options.threads.filter(|asked| *asked > threads(options)) {
-        let which = match options.frame {
-            Frame::Total => "the total frame",
-            Frame::Updated => "the general step, which this scheme takes,",
-        };
         text += &format!(
-            "--threads {asked}: {which} steps on one thread; errors are measured on {asked}\n"
+            "--threads {asked}: the total frame steps on one thread; errors are measured on {asked}\n"
         );
     }
     text

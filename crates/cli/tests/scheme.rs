@@ -169,16 +169,22 @@ fn one_command_has_one_cfl_number_for_one_time_step() {
 fn steps_on_one_thread_are_called_so() {
     let place = tempfile::tempdir().unwrap();
     let place = place.path();
-    for scheme in ["--frame total --shape bspline3 --cfl 0.2", "--shape bspline3"] {
+    let run = |scheme: &str| {
         let call = format!("run axis-aligned-1d --cells 8 {scheme} --threads 2 --json row.json");
         let called = mms(place, &call);
         assert_eq!(called.status, 0, "{}", called.stderr);
-        assert!(called.stdout.starts_with("--threads 2: "), "{}", called.stdout);
-        assert!(called.stdout.contains(", 1 thread(s)\n"), "{}", called.stdout);
-        assert_eq!(read_json(&place.join("row.json"))["settings"]["threads"], 1);
+        (called.stdout, read_json(&place.join("row.json"))["settings"]["threads"].clone())
+    };
+    let (text, threads) = run("--frame total --shape bspline3 --cfl 0.2");
+    assert!(text.starts_with("--threads 2: the total frame steps on one thread"), "{text}");
+    assert!(text.contains(", 1 thread(s)\n"), "{text}");
+    assert_eq!(threads, 1);
+    // Of the updated frame all do on all.
+    for scheme in ["", "--shape bspline3", "--shape cpdi2 --integrator usavg", "--transfer xpic2"] {
+        let (text, threads) = run(scheme);
+        assert!(text.contains(", 2 thread(s)\n") && !text.contains("--threads 2: "), "{text}");
+        assert_eq!(threads, 2, "{scheme}");
     }
-    let called = mms(place, "run axis-aligned-1d --cells 8 --threads 2");
-    assert!(called.stdout.contains(", 2 thread(s)\n"), "{}", called.stdout);
 }
 
 #[test]

@@ -366,13 +366,8 @@ fn bad_input_is_met_with_what_would_be_right() {
     refuses(place, &format!("{total} --integrator usavg"), &["usavg", "cd"]);
     refuses(
         place,
-        "run axis-aligned-3d --cells 4 --shape cpdi2",
-        &["shape = cpdi2", "cpdi in three"],
-    );
-    refuses(
-        place,
-        "run ring --cells 8 --shape cpdi --precision f32",
-        &["precision", "f64", "gimp"],
+        &format!("run ring --shape cpdi2 {fitted} --offset 0.25"),
+        &["offset", "0 with particles fitted to the body", "lattice"],
     );
     refuses(place, "run ring --transfer xpic0", &["--transfer", "xpic1 to"]);
     refuses(place, "run ring --frame total --shape cpdi", &["--shape cpdi", "bspline3"]);

@@ -162,6 +162,9 @@ pub enum SetupError {
         /// The smallest number that suffices.
         least: usize,
     },
+    /// The total Lagrangian formulation in single precision.
+    #[error("the total Lagrangian formulation computes in double precision only")]
+    DoublePrecisionOnly,
     /// The particles do not determine the splines' coefficients.
     #[error(
         "the mass matrix along axis {axis} is singular: {per_cell} particles per cell do not determine the splines' \
@@ -194,14 +197,8 @@ pub enum SetupError {
         particle: usize,
     },
     /// Weights between corners that the body does not have.
-    #[error(
-        "a body of dimension {dimension} without shared corners cannot have the weights of CPDI2, which are for one and \
-         two dimensions; use those of CPDI"
-    )]
-    NoCorners {
-        /// The body's dimension.
-        dimension: usize,
-    },
+    #[error("a body without shared corners cannot have the weights of CPDI2; use those of CPDI")]
+    NoCorners,
     /// A domain with a corner that does not exist.
     #[error("a domain has the corner {corner}, but there are only {corners}")]
     NoSuchCorner {

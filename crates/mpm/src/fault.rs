@@ -87,11 +87,11 @@ pub enum Fault {
     BoundaryInertiaDropped,
     /// Total frame: sides with a given motion late by a stage.
     LateBoundary,
-    /// General step: corners of CPDI2 that are never moved.
+    /// Corners of CPDI2 that are never moved.
     CornersStay,
-    /// General step: APIC without its affine part.
+    /// APIC without its affine part.
     AffinePartDropped,
-    /// General step: the terms of XPIC all with the same sign.
+    /// The terms of XPIC all with the same sign.
     XpicSign,
 }
 

@@ -1,54 +1,52 @@
 //! Grid to particles: velocity, position and deformation gradient follow the grid.
 //!
 //! ```text
-//! v_p += dt sum S_ip a_i;   x_p += dt sum S_ip (v_i + dt a_i);   F_p <- (I + dt grad v) F_p
+//! v_p by the transfer;   x_p += dt sum S_ip (v_i + dt a_i);   F_p <- (I + dt grad v) F_p
 //! ```
 //!
-//! USL and centred differences fuse this pass with the next P2G ([`g2p2g`](crate::g2p2g)).
+//! Steps in a [single pass](crate::step::is_fused) fuse this with the next P2G ([`g2p2g`](crate::g2p2g)).
 
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::fault::Fault;
 use crate::geometry::Constants;
-use crate::health::{CheckBlock, Outcome, SharedOutcome, invalidity};
+use crate::health::{Outcome, SharedOutcome};
 use crate::kernel::any::Interpolated;
 use crate::kernel::block::{BLOCK, Block, Copies};
+use crate::kernel::corners::velocity_at;
 use crate::parallel::bins::Bins;
-use crate::parallel::chunks::{each_chunk, each_chunk_of_three};
+use crate::parallel::chunks::{ChunkOfFour, each_chunk, each_chunk_of_four};
 use crate::particles::Particles;
-use crate::shape_function::ShapeChoice;
+use crate::scheme::Transfer;
 use crate::state::State;
+use crate::support::Support;
 
 /// Particles handed to a thread at a time; fixed, so that nothing depends on the number of threads.
 const CHUNK: usize = 1024;
 
 impl<T: RealField + Copy, const D: usize> State<T, D> {
-    /// USF, first G2P: F at the end of the step, by the grid velocity at its start; stored beside the old F.
-    #[inline(never)]
-    pub(crate) fn g2p_stretch<R, const W: usize>(&mut self, shape: R) -> Outcome
-    where
-        R: ShapeChoice<T, D, W>,
-    {
-        let Self { particles, constants, nodes, F_next, .. } = self;
+    /// F follows the velocity at the start of the step for a time, before forces are computed; stored beside the old F.
+    pub(crate) fn g2p_stretch(&mut self, time: T) -> Outcome {
+        let Self { particles, constants, nodes, F_early, support, .. } = self;
         let (nodes, c) = (&nodes[..], *constants);
         let Particles { x, F, .. } = &*particles;
-        let found = SharedOutcome::default();
-        each_chunk(F_next, CHUNK, &|chunk, F_next| {
+        let (support, found) = (&*support, SharedOutcome::default());
+        each_chunk(F_early, CHUNK, &|chunk, F_early| {
             let mut outcome = Outcome::default();
-            let (mut copies, mut block) = (Copies::new(), Block::new());
+            let (mut copies, mut block) = (Copies::new(), Block::new(support, false));
             let (x, F) = (&x[chunk * CHUNK..], &F[chunk * CHUNK..]);
-            let blocks = F_next.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK));
-            for (index, ((F_next, x), F)) in blocks.enumerate() {
-                copies.copy(x, F);
-                block.compute_weights(&c, shape, copies.kinematics());
-                let interpolated = &mut [Interpolated::zero(); BLOCK][..x.len()];
-                block.g2p(&c.strides, nodes, x.len(), &mut *interpolated);
+            let blocks = F_early.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK));
+            for (index, ((F_early, x), F)) in blocks.enumerate() {
                 let first = chunk * CHUNK + index * BLOCK;
-                for (k, (((F_next, interpolated), x), F)) in
-                    F_next.iter_mut().zip(interpolated).zip(x).zip(F).enumerate()
+                copies.copy(x, F);
+                block.compute_weights(&c, support, &ids(first)[..x.len()], copies.kinematics());
+                let interpolated = &mut [Interpolated::zero(); BLOCK][..x.len()];
+                block.g2p(&c.strides, nodes, interpolated);
+                for (k, (((F_early, interpolated), x), F)) in
+                    F_early.iter_mut().zip(interpolated).zip(x).zip(F).enumerate()
                 {
-                    *F_next = c.stretch(&interpolated.velocity_gradient, F);
-                    if let Some(invalid) = invalidity(&shape, &c, x, F_next) {
+                    *F_early = c.stretch_for(time, &interpolated.velocity_gradient, F);
+                    if let Some(invalid) = support.invalidity(&c, first + k, x, F_early) {
                         let failure = Some((invalid, first + k));
                         outcome = outcome.merge(Outcome { failure, ..Outcome::default() });
                     }
@@ -59,120 +57,239 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         found.all()
     }
 
-    /// USF, second G2P: velocity and position; F becomes the one of the [first](Self::g2p_stretch).
-    #[inline(never)]
-    pub(crate) fn g2p_stretched<R, const W: usize>(&mut self, shape: R) -> Outcome
-    where
-        R: ShapeChoice<T, D, W>,
-    {
-        let Self { particles, constants, nodes, bins, F_next, .. } = self;
-        let (nodes, c) = (&nodes[..], *constants);
-        g2p(particles, bins, c, shape, |block, interpolated, first, x, v, F| {
-            block.g2p(&c.strides, nodes, x.len(), &mut *interpolated);
-            for ((x, v), interpolated) in x.iter_mut().zip(v).zip(interpolated) {
-                *v += interpolated.acceleration * c.time_step;
+    /// Velocity by the transfer, position, and F for the rest of the step.
+    pub(crate) fn g2p(&mut self, late: T) -> Outcome {
+        let Self { particles, constants, nodes, bins, F_early, support, affine, transfer, .. } =
+            self;
+        let (nodes, c, transfer) = (&nodes[..], *constants, *transfer);
+        let arrays = (particles, affine);
+        g2p(arrays, bins, c, support, transfer, |block, interpolated, first, of_block| {
+            let OfBlock { x, v, F, affine } = of_block;
+            block.g2p(&c.strides, nodes, interpolated);
+            take_velocity(&c, transfer, interpolated, v, affine);
+            for (x, interpolated) in x.iter_mut().zip(&*interpolated) {
                 *x += interpolated.velocity * c.time_step;
             }
-            F.copy_from_slice(&F_next[first..first + F.len()]);
+            if let Some(F_early) = F_early.get(first..first + F.len()) {
+                F.copy_from_slice(F_early);
+            }
+            if late > T::zero() {
+                for (F, interpolated) in F.iter_mut().zip(interpolated) {
+                    *F = c.stretch_for(late, &interpolated.velocity_gradient, F);
+                }
+            }
         })
     }
 
     /// MUSL, first G2P: velocity alone.
-    #[inline(never)]
-    pub(crate) fn g2p_velocity<R, const W: usize>(&mut self, shape: R)
-    where
-        R: ShapeChoice<T, D, W>,
-    {
-        let Self { particles, constants, nodes, .. } = self;
-        let (nodes, c) = (&nodes[..], *constants);
+    pub(crate) fn g2p_velocity(&mut self) {
+        let Self { particles, constants, nodes, support, affine, transfer, .. } = self;
+        let (nodes, c, support, transfer) = (&nodes[..], *constants, &*support, *transfer);
         let Particles { x, v, F, .. } = particles;
-        each_chunk(v, CHUNK, &|chunk, v| {
-            let (mut copies, mut block) = (Copies::new(), Block::new());
-            let (x, F) = (&x[chunk * CHUNK..], &F[chunk * CHUNK..]);
-            for ((v, x), F) in v.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK)) {
+        each_chunk_of_four((x, v, F, affine), CHUNK, &|chunk| {
+            let (mut copies, mut block) = (Copies::new(), Block::new(support, is_affine(transfer)));
+            for_blocks(chunk, |first, OfBlock { x, v, F, affine }| {
                 copies.copy(x, F);
-                block.compute_weights(&c, shape, copies.kinematics());
+                block.compute_weights(&c, support, &ids(first)[..x.len()], copies.kinematics());
                 let interpolated = &mut [Interpolated::zero(); BLOCK][..x.len()];
-                block.g2p(&c.strides, nodes, x.len(), &mut *interpolated);
-                for (v, interpolated) in v.iter_mut().zip(interpolated) {
-                    *v += interpolated.acceleration * c.time_step;
-                }
-            }
+                block.g2p(&c.strides, nodes, interpolated);
+                take_velocity(&c, transfer, interpolated, v, affine);
+            });
         });
     }
 
     /// MUSL, second G2P: position by the grid velocity, F by the reprojected one.
-    #[inline(never)]
-    pub(crate) fn g2p_reprojected<R, const W: usize>(&mut self, shape: R) -> Outcome
-    where
-        R: ShapeChoice<T, D, W>,
-    {
-        let Self { particles, constants, nodes, bins, reprojected, .. } = self;
+    pub(crate) fn g2p_reprojected(&mut self) -> Outcome {
+        let Self { particles, constants, nodes, bins, reprojected, support, .. } = self;
         let (nodes, c) = (&nodes[..], *constants);
         let reprojected =
             if c.planted.is(Fault::NoReprojection) { nodes } else { &reprojected[..] };
-        g2p(particles, bins, c, shape, |block, interpolated, _, x, _, F| {
-            block.g2p(&c.strides, nodes, x.len(), &mut *interpolated);
+        let arrays = (particles, &mut Vec::new());
+        g2p(arrays, bins, c, support, Transfer::Flip, |block, interpolated, _, of_block| {
+            let OfBlock { x, F, .. } = of_block;
+            block.g2p(&c.strides, nodes, interpolated);
             for (x, interpolated) in x.iter_mut().zip(&*interpolated) {
                 *x += interpolated.velocity * c.time_step;
             }
-            block.g2p(&c.strides, reprojected, x.len(), &mut *interpolated);
+            block.g2p(&c.strides, reprojected, interpolated);
             for (F, interpolated) in F.iter_mut().zip(interpolated) {
                 *F = c.stretch(&interpolated.velocity_gradient, F);
             }
         })
     }
+
+    /// APIC: the affine velocities of particles that have none yet are those of their velocities on the grid.
+    pub(crate) fn start_affine(&mut self) {
+        if !self.is_affine() {
+            return;
+        }
+        self.affine = vec![SMatrix::zeros(); self.particles.x.len()];
+        self.p2g_momentum();
+        for node in &mut self.nodes {
+            node.values.copy_within(..D, D);
+        }
+        let Self { particles, constants, nodes, support, affine, .. } = self;
+        let Particles { x, F, .. } = &*particles;
+        let (mut copies, mut block) = (Copies::new(), Block::new(support, true));
+        let blocks = affine.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK));
+        for (index, ((affine, x), F)) in blocks.enumerate() {
+            copies.copy(x, F);
+            block.compute_weights(
+                constants,
+                support,
+                &ids(index * BLOCK)[..x.len()],
+                copies.kinematics(),
+            );
+            let interpolated = &mut [Interpolated::zero(); BLOCK][..x.len()];
+            block.g2p(&constants.strides, nodes, interpolated);
+            for (affine, interpolated) in affine.iter_mut().zip(interpolated) {
+                *affine = interpolated.affine;
+            }
+        }
+    }
+
+    /// CPDI2: the corners of domains move with the grid; their new positions are stored beside the old.
+    pub(crate) fn move_corners(&mut self) {
+        let Self { constants, nodes, support, .. } = self;
+        let (nodes, c) = (&nodes[..], *constants);
+        let Support::Cpdi2 { mesh, next } = support else { return };
+        each_chunk(next, CHUNK, &|chunk, next| {
+            for (next, x) in next.iter_mut().zip(&mesh.x[chunk * CHUNK..]) {
+                *next = *x;
+                if !c.planted.is(Fault::CornersStay) {
+                    *next += velocity_at(&c, nodes, x) * c.time_step;
+                }
+            }
+        });
+    }
 }
 
-/// Calls `update(weights, buffer for interpolated values, first id, x, v, F)` for every block of particles, then checks that
+/// The ids of a block of particles in order.
+fn ids(first: usize) -> [u32; BLOCK] {
+    std::array::from_fn(|k| (first + k) as u32)
+}
+
+fn is_affine(transfer: Transfer) -> bool {
+    transfer == Transfer::Apic
+}
+
+/// Velocities, and affine ones, by the transfer.
+fn take_velocity<T: RealField + Copy, const D: usize>(
+    c: &Constants<T, D>,
+    transfer: Transfer,
+    interpolated: &[Interpolated<T, D>],
+    v: &mut [SVector<T, D>],
+    affine: &mut [SMatrix<T, D, D>],
+) {
+    match transfer {
+        Transfer::Flip => {
+            for (v, interpolated) in v.iter_mut().zip(interpolated) {
+                *v += interpolated.second * c.time_step;
+            }
+        }
+        Transfer::Pic | Transfer::Apic | Transfer::Xpic(_) => {
+            for (v, interpolated) in v.iter_mut().zip(interpolated) {
+                *v = interpolated.second;
+            }
+        }
+    }
+    if !c.planted.is(Fault::AffinePartDropped) {
+        for (affine, interpolated) in affine.iter_mut().zip(interpolated) {
+            *affine = interpolated.affine;
+        }
+    }
+}
+
+/// What belongs to the particles of a block.
+struct OfBlock<'a, T, const D: usize> {
+    x: &'a mut [SVector<T, D>],
+    v: &'a mut [SVector<T, D>],
+    F: &'a mut [SMatrix<T, D, D>],
+    /// Empty without affine velocities.
+    affine: &'a mut [SMatrix<T, D, D>],
+}
+
+type Chunk<'a, T, const D: usize> =
+    ChunkOfFour<'a, SVector<T, D>, SVector<T, D>, SMatrix<T, D, D>, SMatrix<T, D, D>>;
+
+/// Calls `work(first id, arrays)` for every block of a chunk.
+fn for_blocks<T, const D: usize>(
+    chunk: Chunk<'_, T, D>,
+    mut work: impl FnMut(usize, OfBlock<'_, T, D>),
+) {
+    let ChunkOfFour { number, a, b, c, e } = chunk;
+    let mut of_e = e.chunks_mut(BLOCK);
+    let blocks = a.chunks_mut(BLOCK).zip(b.chunks_mut(BLOCK)).zip(c.chunks_mut(BLOCK));
+    for (index, ((x, v), F)) in blocks.enumerate() {
+        let affine = of_e.next().unwrap_or_default();
+        work(number * CHUNK + index * BLOCK, OfBlock { x, v, F, affine });
+    }
+}
+
+/// Calls `update(weights, buffer for interpolated values, first id, arrays)` for every block of particles, then checks that
 /// each particle is valid and in its bin.
-fn g2p<T, R, const D: usize, const W: usize>(
-    particles: &mut Particles<T, D>,
+fn g2p<T: RealField + Copy, const D: usize>(
+    (particles, affine): (&mut Particles<T, D>, &mut Vec<SMatrix<T, D, D>>),
     bins: &Bins,
     c: Constants<T, D>,
-    shape: R,
-    update: impl Fn(
-        &Block<T, D, W>,
-        &mut [Interpolated<T, D>],
-        usize,
-        &mut [SVector<T, D>],
-        &mut [SVector<T, D>],
-        &mut [SMatrix<T, D, D>],
-    ) + Sync,
-) -> Outcome
-where
-    T: RealField + Copy,
-    R: ShapeChoice<T, D, W>,
-{
+    support: &mut Support<T, D>,
+    transfer: Transfer,
+    update: impl Fn(&Block<T, D>, &mut [Interpolated<T, D>], usize, &mut OfBlock<'_, T, D>) + Sync,
+) -> Outcome {
     let Particles { x, v, F, .. } = particles;
     let (bin_of, found) = (bins.bin_of(), SharedOutcome::default());
-    each_chunk_of_three((x, v, F), CHUNK, &|chunk, x, v, F| {
+    let at_start = &*support;
+    each_chunk_of_four((x, v, F, affine), CHUNK, &|chunk| {
         let mut outcome = Outcome::default();
-        let (mut copies, mut block) = (Copies::new(), Block::new());
+        let (mut copies, mut block) = (Copies::new(), Block::new(at_start, is_affine(transfer)));
         let mut interpolated = [Interpolated::zero(); BLOCK];
-        let blocks = x
-            .chunks_mut(BLOCK)
-            .zip(v.chunks_mut(BLOCK))
-            .zip(F.chunks_mut(BLOCK))
-            .zip(bin_of[chunk * CHUNK..].chunks(BLOCK));
-        for (index, (((x, v), F), bins)) in blocks.enumerate() {
-            let first = chunk * CHUNK + index * BLOCK;
-            copies.copy(x, F);
+        for_blocks(chunk, |first, mut of_block| {
+            copies.copy(of_block.x, of_block.F);
             if c.planted.is(Fault::WeightsOfNewPosition) {
-                for (x, v) in copies.x.iter_mut().zip(&*v) {
+                for (x, v) in copies.x.iter_mut().zip(&*of_block.v) {
                     *x += v * c.time_step;
                 }
             }
-            block.compute_weights(&c, shape, copies.kinematics());
-            update(&block, &mut interpolated[..x.len()], first, x, v, F);
-            if shape.with(CheckBlock { c: &c, bins: bins.iter().copied(), x, F }) {
-                continue;
+            let count = of_block.x.len();
+            block.compute_weights(&c, at_start, &ids(first)[..count], copies.kinematics());
+            update(&block, &mut interpolated[..count], first, &mut of_block);
+            if let Support::Cpdi2 { .. } = at_start {
+                // Checked below, when all corners are at their new places.
+                return;
             }
-            for (k, ((x, F), &bin)) in x.iter().zip(F).zip(bins).enumerate() {
-                outcome = outcome.merge(c.diagnose(shape, bin, x, F, first + k));
-            }
-        }
+            outcome = outcome.merge(check(&c, at_start, first, bin_of, of_block.x, of_block.F));
+        });
+        found.add(outcome);
+    });
+    let Support::Cpdi2 { mesh, next } = support else { return found.all() };
+    std::mem::swap(&mut mesh.x, next);
+    let support = &*support;
+    each_chunk_of_four((x, v, F, affine), CHUNK, &|chunk| {
+        let mut outcome = Outcome::default();
+        for_blocks(chunk, |first, OfBlock { x, F, .. }| {
+            outcome = outcome.merge(check(&c, support, first, bin_of, x, F));
+        });
         found.add(outcome);
     });
     found.all()
+}
+
+/// Checks the particles of a block, from the id `first` on.
+fn check<T: RealField + Copy, const D: usize>(
+    c: &Constants<T, D>,
+    support: &Support<T, D>,
+    first: usize,
+    bin_of: &[u32],
+    x: &[SVector<T, D>],
+    F: &[SMatrix<T, D, D>],
+) -> Outcome {
+    let bins = &bin_of[first..];
+    let mut outcome = Outcome::default();
+    if support.are_valid(c, &ids(first)[..x.len()], bins.iter().copied(), x, F) {
+        return outcome;
+    }
+    for (k, ((x, F), &bin)) in x.iter().zip(F).zip(bins).enumerate() {
+        outcome = outcome.merge(support.diagnose(c, first + k, bin, x, F));
+    }
+    outcome
 }

@@ -12,18 +12,18 @@ use crate::body_force::BodyForce;
 use crate::fault::Fault;
 use crate::forcing::Forcing;
 use crate::geometry::Constants;
-use crate::grid_update::{GridUpdate, VelocityAndAcceleration};
-use crate::health::{CheckBlock, Outcome, SharedOutcome};
+use crate::grid_update::{GridUpdate, NodeVectors, VelocityAndAcceleration};
+use crate::health::{Outcome, SharedOutcome};
 use crate::kernel::any::{Contributions, Interpolated, Receive};
-use crate::kernel::block::{BLOCK, Block, Copies, Kinematics};
-use crate::material::Law;
+use crate::kernel::block::{BLOCK, Block, BlockLaw, Copies, Kinematics};
 use crate::node::Node;
 use crate::parallel::disjoint::PartElements;
 use crate::particles::Particles;
 use crate::prefetch::prefetch;
-use crate::shape_function::ShapeChoice;
 use crate::simd::{Lane4, Vectors};
 use crate::state::State;
+use crate::support::Support;
+use crate::weights::Weights;
 
 /// Position, velocity and deformation gradient of a bin's particles.
 type Elements<'a, T, const D: usize> =
@@ -31,25 +31,17 @@ type Elements<'a, T, const D: usize> =
 
 impl<T: RealField + Copy, const D: usize> State<T, D> {
     /// G2P of this step, then P2G and grid update of the next step, whose grid becomes `nodes`.
-    #[inline(never)]
-    pub(crate) fn g2p2g<R, L, const W: usize>(
-        &mut self,
-        shape: R,
-        law: L,
-        body_force: &dyn BodyForce<T, D>,
-        t_next: T,
-    ) -> Outcome
-    where
-        R: ShapeChoice<T, D, W>,
-        L: Law<T>,
-    {
+    pub(crate) fn g2p2g(&mut self, body_force: &dyn BodyForce<T, D>, t_next: T) -> Outcome {
         let Self { particles, constants: c, layout, bins, nodes, next, uniform, of_time, .. } =
             self;
+        let (support, law) = (&self.support, &*self.law);
         let Particles { X, x, v, F, mass, volume, .. } = particles;
         let forcing = Forcing::new(body_force, X, t_next, c, of_time);
-        let step = G2p2g { c, shape, law, nodes, mass, volume, uniform: *uniform, forcing };
+        let step = G2p2g { c, support, law, nodes, mass, volume, uniform: *uniform, forcing };
         let found = SharedOutcome::default();
-        let update = GridUpdate::new(layout, c, VelocityAndAcceleration { scale: T::one() });
+        let vectors = NodeVectors::VelocityAndAcceleration;
+        let update =
+            GridUpdate::new(layout, c, VelocityAndAcceleration { scale: T::one(), vectors });
         update.g2p2g(bins, next, (x, v, F), &|band, first, bin, elements| {
             found.add(step.advance_bin(band, first, bin, elements));
         });
@@ -59,10 +51,10 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
 }
 
 /// The inputs common to all bins.
-struct G2p2g<'a, T, R, L, const D: usize> {
+struct G2p2g<'a, T, const D: usize> {
     c: &'a Constants<T, D>,
-    shape: R,
-    law: L,
+    support: &'a Support<T, D>,
+    law: &'a dyn BlockLaw<T, D>,
     /// The grid of this step, updated.
     nodes: &'a [Node<T, D>],
     mass: &'a [T],
@@ -72,26 +64,23 @@ struct G2p2g<'a, T, R, L, const D: usize> {
     forcing: Forcing<'a, T, D>,
 }
 
-impl<T: RealField + Copy, R, L: Law<T>, const D: usize> G2p2g<'_, T, R, L, D> {
+impl<T: RealField + Copy, const D: usize> G2p2g<'_, T, D> {
     /// Advances the particles of a bin, then adds their contributions to its band of the next step's grid, which starts at
     /// node `first`.
-    fn advance_bin<const W: usize>(
+    fn advance_bin(
         &self,
         band: &mut [Node<T, D>],
         first: usize,
         bin: u32,
         mut elements: Elements<'_, T, D>,
-    ) -> Outcome
-    where
-        R: ShapeChoice<T, D, W>,
-    {
+    ) -> Outcome {
         let mut outcome = Outcome::default();
         let mut copies = Copies::new();
         let contributions = match self.uniform {
             Some((mass, volume)) => Contributions::uniform(mass, volume),
             None => Contributions::zero(),
         };
-        let mut scratch = (Block::new(), contributions);
+        let mut scratch = (Block::new(self.support, false), contributions);
         for (index, ids) in elements.indices().chunks(BLOCK).enumerate() {
             let place = index * BLOCK;
             if self.uniform.is_none() {
@@ -118,23 +107,20 @@ impl<T: RealField + Copy, R, L: Law<T>, const D: usize> G2p2g<'_, T, R, L, D> {
     }
 
     /// The same for a block of particles.
-    fn advance_block<const W: usize>(
+    fn advance_block(
         &self,
-        (block, contributions): &mut (Block<T, D, W>, Contributions<T, D, BLOCK>),
+        (block, contributions): &mut (Block<T, D>, Contributions<T, D, BLOCK>),
         band: &mut [Node<T, D>],
         (first, bin): (usize, u32),
         ids: &[u32],
         (x, v, F): ContiguousBlock<'_, T, D>,
-    ) -> Outcome
-    where
-        R: ShapeChoice<T, D, W>,
-    {
-        let &Self { c, shape, law, nodes, ref forcing, .. } = self;
+    ) -> Outcome {
+        let &Self { c, support, law, nodes, ref forcing, .. } = self;
         if c.planted.is(Fault::WeightsOfNewPosition) {
             let ahead = std::array::from_fn(|k| x[k] + v[k] * c.time_step);
-            block.compute_weights(c, shape, Kinematics { x: &ahead, F });
+            block.compute_weights(c, support, ids, Kinematics { x: &ahead, F });
         } else {
-            block.compute_weights(c, shape, Kinematics { x, F });
+            block.compute_weights(c, support, ids, Kinematics { x, F });
         }
         forcing.evaluate(ids, x, &mut contributions.b);
         let advance = AdvanceParticles {
@@ -146,13 +132,13 @@ impl<T: RealField + Copy, R, L: Law<T>, const D: usize> G2p2g<'_, T, R, L, D> {
             F,
             contributions,
         };
-        block.g2p(&c.strides, nodes, ids.len(), advance);
-        block.compute_weights(c, shape, Kinematics { x, F });
+        block.g2p_with(&c.strides, nodes, ids.len(), advance);
+        block.compute_weights(c, support, ids, Kinematics { x, F });
         let bins = std::iter::repeat(bin);
-        if !shape.with(CheckBlock { c, bins, x: &x[..ids.len()], F }) {
+        if !support.are_valid(c, ids, bins, &x[..ids.len()], F) {
             let mut outcome = Outcome::default();
             for (k, &p) in ids.iter().enumerate() {
-                outcome = outcome.merge(c.diagnose(shape, bin, &x[k], &F[k], p as usize));
+                outcome = outcome.merge(support.diagnose(c, p as usize, bin, &x[k], &F[k]));
             }
             // A particle outside its bin would write to nodes beyond the band.
             if !outcome.is_clean() {
@@ -162,7 +148,7 @@ impl<T: RealField + Copy, R, L: Law<T>, const D: usize> G2p2g<'_, T, R, L, D> {
         if c.planted.is(Fault::LastNodeSkipped) {
             block.skip_last_node(c, x);
         }
-        Kinematics { x, F }.stress(c, law, contributions);
+        law.stress(c, F, contributions);
         block.p2g(&c.strides, band, first, contributions, ids.len());
         Outcome::default()
     }
@@ -193,7 +179,7 @@ impl<T: RealField + Copy, const D: usize> Receive<T, D> for AdvanceParticles<'_,
     fn receive(&mut self, k: usize, interpolated: &Interpolated<T, D>) {
         let Self { c, contributions, .. } = self;
         let (x, v, F) = (&mut self.x[k], &mut self.v[k], &mut self.F[k]);
-        *v += interpolated.acceleration * c.time_step;
+        *v += interpolated.second * c.time_step;
         let mut velocity = interpolated.velocity;
         if c.planted.is(Fault::PicForFlip) {
             *v = velocity;
@@ -207,16 +193,20 @@ impl<T: RealField + Copy, const D: usize> Receive<T, D> for AdvanceParticles<'_,
     }
 
     #[inline(always)]
-    fn receive_lanes(
+    fn receive_lanes<const W: usize>(
         &mut self,
         vectors: impl Vectors,
         k: usize,
+        weights: &impl Weights<T, D, W>,
         value: Lane4<T>,
         gradient: [Lane4<T>; D],
     ) {
         // Faults are planted in the form for all dimensions.
         if D != 2 || self.c.planted.is_any() {
-            self.receive(k, &Interpolated::new(&value.0, &gradient.map(|gradient| gradient.0)));
+            self.receive(
+                k,
+                &Interpolated::new(weights, &value.0, &gradient.map(|gradient| gradient.0)),
+            );
             return;
         }
         prefetch(&self.x[k], BLOCK);

@@ -55,7 +55,18 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
     /// `(I + dt L) F`, for a velocity gradient `L` per cell.
     #[inline(always)]
     pub(crate) fn stretch(&self, L: &SMatrix<T, D, D>, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
-        let change = L * (self.time_step * self.inverse_spacing);
+        self.stretch_for(self.time_step, L, F)
+    }
+
+    /// The same for another time than a step.
+    #[inline(always)]
+    pub(crate) fn stretch_for(
+        &self,
+        time: T,
+        L: &SMatrix<T, D, D>,
+        F: &SMatrix<T, D, D>,
+    ) -> SMatrix<T, D, D> {
+        let change = L * (time * self.inverse_spacing);
         if self.planted.is(Fault::AdditiveStretch) {
             return F + change;
         }

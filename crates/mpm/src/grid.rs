@@ -134,12 +134,14 @@ impl<const D: usize> Layout<D> {
 
     /// Folds the contributions to ghost nodes to their mirror images: `add(image, ghost, Some(axis))`, where the component along
     /// `axis` changes its sign.
+    #[cfg(test)]
     pub(crate) fn fold<N: Copy>(&self, nodes: &mut [N], add: impl Fn(&mut N, N, Option<usize>)) {
         self.fold_rows(nodes, &add);
         self.fold_edge(&(0..self.dims[D - 1]), 0, nodes, &add);
     }
 
     /// Unfolds: sets ghost nodes to the mirrored values `mirror(image, Some(axis))`, with the axis as in `fold`.
+    #[cfg(test)]
     pub(crate) fn unfold<N: Copy>(&self, nodes: &mut [N], mirror: impl Fn(N, Option<usize>) -> N) {
         self.unfold_rows(nodes, &mirror);
         self.unfold_edge(&(0..self.dims[D - 1]), 0, nodes, &mirror);

@@ -13,6 +13,7 @@ use crate::geometry::Constants;
 use crate::grid::Layout;
 use crate::node::Node;
 use crate::parallel::bins::{AddToBand, Bins, NodeHooks, UpdateAndAdd};
+use crate::scheme::Transfer;
 
 /// How the grid is updated after P2G.
 pub(crate) trait NodeUpdate<T: RealField + Copy, const D: usize>: Copy + Sync {
@@ -37,11 +38,50 @@ pub(crate) trait NodeUpdate<T: RealField + Copy, const D: usize>: Copy + Sync {
     }
 }
 
-/// Momentum and force to the velocity at the end of the step and the acceleration.
+/// The two vectors that a node has after the last P2G of forces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum NodeVectors {
+    /// The velocity at the end of the step and the acceleration: FLIP adds the latter.
+    VelocityAndAcceleration,
+    /// The velocity at the end of the step, twice: particles take it.
+    VelocityTwice,
+    /// The velocity at the start of the step and the acceleration, for the filter of XPIC.
+    StartAndAcceleration,
+}
+
+impl NodeVectors {
+    pub(crate) fn of(transfer: Transfer) -> Self {
+        match transfer {
+            Transfer::Flip => Self::VelocityAndAcceleration,
+            Transfer::Pic | Transfer::Apic => Self::VelocityTwice,
+            Transfer::Xpic(_) => Self::StartAndAcceleration,
+        }
+    }
+
+    /// From the velocity at the start of the step and the acceleration.
+    #[inline(always)]
+    fn set<T: RealField + Copy, const D: usize>(
+        self,
+        node: &mut Node<T, D>,
+        a: usize,
+        (velocity, acceleration): (T, T),
+        time_step: T,
+    ) {
+        let end = velocity + acceleration * time_step;
+        (node.values[a], node.values[D + a]) = match self {
+            Self::VelocityAndAcceleration => (end, acceleration),
+            Self::VelocityTwice => (end, end),
+            Self::StartAndAcceleration => (velocity, acceleration),
+        };
+    }
+}
+
+/// Momentum and force to velocities and accelerations.
 #[derive(Clone, Copy)]
 pub(crate) struct VelocityAndAcceleration<T> {
     /// Factor on the acceleration.
     pub(crate) scale: T,
+    pub(crate) vectors: NodeVectors,
 }
 
 impl<T: RealField + Copy, const D: usize> NodeUpdate<T, D> for VelocityAndAcceleration<T> {
@@ -51,14 +91,14 @@ impl<T: RealField + Copy, const D: usize> NodeUpdate<T, D> for VelocityAndAccele
             let inverse = c.inverse_mass(node);
             for a in 0..D {
                 let acceleration = node.values[D + a] * (inverse * self.scale);
-                node.values[a] = node.values[a] * inverse + acceleration * c.time_step;
-                node.values[D + a] = acceleration;
+                let velocity = node.values[a] * inverse;
+                self.vectors.set(node, a, (velocity, acceleration), c.time_step);
             }
         }
     }
 }
 
-/// Momentum to the velocity at the start of the step.
+/// Momentum to the velocity at the start of the step; the second vector stays zero, for forces.
 #[derive(Clone, Copy)]
 pub(crate) struct Velocity;
 
@@ -72,11 +112,12 @@ impl<T: RealField + Copy, const D: usize> NodeUpdate<T, D> for Velocity {
     }
 }
 
-/// Force to the acceleration, and the velocity from that at the start of the step to that at its end.
+/// Force to the acceleration, with the velocity at the start of the step to those at its end.
 #[derive(Clone, Copy)]
 pub(crate) struct Acceleration<T> {
     /// Factor on the acceleration.
     pub(crate) scale: T,
+    pub(crate) vectors: NodeVectors,
 }
 
 impl<T: RealField + Copy, const D: usize> NodeUpdate<T, D> for Acceleration<T> {
@@ -93,8 +134,8 @@ impl<T: RealField + Copy, const D: usize> NodeUpdate<T, D> for Acceleration<T> {
         for node in nodes {
             let inverse = c.inverse_mass(node) * self.scale;
             for a in 0..D {
-                node.values[D + a] *= inverse;
-                node.values[a] += node.values[D + a] * c.time_step;
+                let acceleration = node.values[D + a] * inverse;
+                self.vectors.set(node, a, (node.values[a], acceleration), c.time_step);
             }
         }
     }
@@ -297,8 +338,14 @@ mod tests {
         let bins = Bins::new(&layout, 1);
         let c = &Constants::new(&grid, &layout, &bins, 0.1, 1.0);
         check(&layout, c, Velocity);
-        check(&layout, c, VelocityAndAcceleration { scale: 0.5 });
-        check(&layout, c, Acceleration { scale: 0.5 });
+        for vectors in [
+            NodeVectors::VelocityAndAcceleration,
+            NodeVectors::VelocityTwice,
+            NodeVectors::StartAndAcceleration,
+        ] {
+            check(&layout, c, VelocityAndAcceleration { scale: 0.5, vectors });
+            check(&layout, c, Acceleration { scale: 0.5, vectors });
+        }
         check(&layout, c, Reprojection { nodes: &given(layout.nodes) });
     }
 

@@ -1,63 +1,18 @@
 //! Checks of particles after each step: invalid particles end the run, particles that left their bin cause a new sort.
 
-use std::array;
 use std::sync::{Mutex, PoisonError};
 
 use nalgebra::{RealField, SMatrix, SVector};
 
+use crate::body::Mesh;
+use crate::domain::{MOST_CORNERS, volume_of_cell};
 use crate::geometry::Constants;
-use crate::shape_function::{
-    EXTENDED, HALF_SIZE_LIMIT, ShapeChoice, ShapeFunction, ShapeWork, is_extended,
-};
-use crate::simd::{Loop, Vectors, dispatch};
+use crate::kernel::block::BLOCK;
+use crate::kernel::corners::padded;
+use crate::shape_function::{EXTENDED, HALF_SIZE_LIMIT, ProductShape};
+use crate::simd::{Eight, Lane8, Loop, Vectors, dispatch};
+use crate::support::{Rows, Support};
 use crate::tensor::{determinant, real};
-
-impl<T: RealField + Copy, const D: usize> Constants<T, D> {
-    /// Whether a particle is valid and still fits its bin. Nearly all do, and one branch tells.
-    #[inline(always)]
-    pub(crate) fn is_valid<R, const W: usize>(
-        &self,
-        shape: R,
-        bin: u32,
-        x: &SVector<T, D>,
-        F: &SMatrix<T, D, D>,
-    ) -> bool
-    where
-        R: ShapeChoice<T, D, W>,
-    {
-        let l: [T; D] = array::from_fn(|a| shape.half_size(a, F[(a, a)]));
-        let mut valid = determinant(F) > T::zero();
-        let mut extended = false;
-        for a in 0..D {
-            valid &=
-                (x[a] >= self.lower[a]) & (x[a] <= self.upper[a]) & (l[a] <= real(HALF_SIZE_LIMIT));
-            extended |= is_extended(l[a]);
-        }
-        let edge = (x[D - 1] - self.lower[D - 1]) * self.inverse_spacing - l[D - 1];
-        let width = if extended { EXTENDED } else { W };
-        let (first, end) = self.bins.range(bin, width);
-        valid & (edge >= real(first)) & (edge < real(end))
-    }
-
-    /// Diagnoses a particle that may not be [valid](Self::is_valid).
-    pub(crate) fn diagnose<R, const W: usize>(
-        &self,
-        shape: R,
-        bin: u32,
-        x: &SVector<T, D>,
-        F: &SMatrix<T, D, D>,
-        particle: usize,
-    ) -> Outcome
-    where
-        R: ShapeChoice<T, D, W>,
-    {
-        if self.is_valid(shape, bin, x, F) {
-            return Outcome::default();
-        }
-        let failure = invalidity(&shape, self, x, F).map(|invalid| (invalid, particle));
-        Outcome { failure, resort: failure.is_none() }
-    }
-}
 
 /// Reasons why a particle is invalid, worst first: where one particle is inverted, others may follow in the same step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -68,41 +23,133 @@ pub(crate) enum Invalid {
     TooLarge,
 }
 
-/// The reason why a particle is invalid, if it is.
-#[inline(always)]
-pub(crate) fn invalidity<T, R, const D: usize, const W: usize>(
-    shape: &R,
-    c: &Constants<T, D>,
-    x: &SVector<T, D>,
-    F: &SMatrix<T, D, D>,
-) -> Option<Invalid>
-where
-    T: RealField + Copy,
-    R: ShapeChoice<T, D, W>,
-{
-    let J = determinant(F);
-    let l = SVector::<T, D>::from_fn(|a, _| shape.half_size(a, F[(a, a)]));
-    let is_deformation = J > T::zero() && J.is_finite();
-    if is_deformation && c.axis_outside(x).is_none() && axis_too_large(&l).is_none() {
-        return None;
+impl<T: RealField + Copy, const D: usize> Support<T, D> {
+    /// The reason why a particle is invalid, if it is.
+    pub(crate) fn invalidity(
+        &self,
+        c: &Constants<T, D>,
+        p: usize,
+        x: &SVector<T, D>,
+        F: &SMatrix<T, D, D>,
+    ) -> Option<Invalid> {
+        let J = determinant(F);
+        if J <= T::zero() {
+            return Some(Invalid::Inverted);
+        }
+        if !J.is_finite() || x.iter().any(|x| !x.is_finite()) {
+            return Some(Invalid::NotFinite);
+        }
+        if c.axis_outside(x).is_some() {
+            return Some(Invalid::LeftGrid);
+        }
+        if let Some(volume) = self.volume(p) {
+            if volume <= T::zero() {
+                return Some(Invalid::Inverted);
+            }
+            if !volume.is_finite() {
+                return Some(Invalid::NotFinite);
+            }
+        }
+        self.axis_too_large(&self.half_size(c, p, x, F)).map(|_| Invalid::TooLarge)
     }
-    Some(if J <= T::zero() {
-        Invalid::Inverted
-    } else if !J.is_finite() || x.iter().any(|x| !x.is_finite()) {
-        Invalid::NotFinite
-    } else if c.axis_outside(x).is_some() {
-        Invalid::LeftGrid
-    } else {
-        Invalid::TooLarge
-    })
+
+    /// Diagnoses a particle that may be invalid or outside its bin.
+    pub(crate) fn diagnose(
+        &self,
+        c: &Constants<T, D>,
+        p: usize,
+        bin: u32,
+        x: &SVector<T, D>,
+        F: &SMatrix<T, D, D>,
+    ) -> Outcome {
+        if let Some(invalid) = self.invalidity(c, p, x, F) {
+            return Outcome { failure: Some((invalid, p)), resort: false };
+        }
+        let l = self.half_size(c, p, x, F);
+        let Rows { edge, width } = self.rows(c, p, x, F, &l);
+        let (first, end) = c.bins.range(bin, width);
+        let is_inside = edge >= real(first) && edge < real(end);
+        Outcome { failure: None, resort: !is_inside }
+    }
+
+    /// Whether all particles `ids` of a block are valid, each in its own of `bins`. Nearly all are, and this tells it sooner
+    /// than [`diagnose`](Self::diagnose).
+    pub(crate) fn are_valid(
+        &self,
+        c: &Constants<T, D>,
+        ids: &[u32],
+        bins: impl Iterator<Item = u32>,
+        x: &[SVector<T, D>],
+        F: &[SMatrix<T, D, D>],
+    ) -> bool {
+        let particles = x.iter().zip(F).zip(bins);
+        match self {
+            Self::Product(shape) => {
+                let mut all_valid = true;
+                dispatch(Check { c, shape, particles, all_valid: &mut all_valid });
+                all_valid
+            }
+            Self::Cpdi { .. } => {
+                let of_domain = |p: usize, x: &SVector<T, D>, F: &SMatrix<T, D, D>| {
+                    let l = self.half_size(c, p, x, F);
+                    (l, self.rows(c, p, x, F, &l))
+                };
+                let mut all_valid = true;
+                let all = &mut all_valid;
+                dispatch(CheckDomains { c, ids, of_domain, particles, all_valid: all });
+                all_valid
+            }
+            Self::Cpdi2 { mesh, .. } => {
+                let mut all_valid = true;
+                dispatch(CheckCells { mesh, ids: &padded(ids), all_valid: &mut all_valid });
+                let of_domain = |p: usize, x: &SVector<T, D>, F: &SMatrix<T, D, D>| {
+                    let l = self.half_size(c, p, x, F);
+                    (l, self.rows(c, p, x, F, &l))
+                };
+                let mut boxes_valid = true;
+                let all = &mut boxes_valid;
+                dispatch(CheckDomains { c, ids, of_domain, particles, all_valid: all });
+                all_valid && boxes_valid
+            }
+        }
+    }
 }
 
-/// The first axis along which a half-size, in cells, exceeds the limit of the shape functions.
-#[inline(always)]
-pub(crate) fn axis_too_large<T: RealField + Copy, const D: usize>(
-    l: &SVector<T, D>,
-) -> Option<usize> {
-    (0..D).find(|&a| l[a] > real(HALF_SIZE_LIMIT))
+struct Check<'a, 'b, T, I, const D: usize> {
+    c: &'a Constants<T, D>,
+    shape: &'a ProductShape<T, D>,
+    particles: I,
+    all_valid: &'b mut bool,
+}
+
+impl<'a, T, I, const D: usize> Loop for Check<'a, '_, T, I, D>
+where
+    T: RealField + Copy,
+    I: Iterator<Item = ((&'a SVector<T, D>, &'a SMatrix<T, D, D>), u32)>,
+{
+    #[inline(always)]
+    fn run<V: Vectors>(self, _: V) {
+        let Self { c, shape, particles, all_valid } = self;
+        let (half_sizes, width, above) = (shape.half_sizes, shape.width(), shape.extended_above());
+        let mut all = true;
+        for ((x, F), bin) in particles {
+            let mut valid = determinant(F) > T::zero();
+            let mut extended = false;
+            let mut last = T::zero();
+            for a in 0..D {
+                let l = half_sizes.along(a, F[(a, a)]);
+                valid &= (x[a] >= c.lower[a]) & (x[a] <= c.upper[a]) & (l <= real(HALF_SIZE_LIMIT));
+                extended |= l > above;
+                last = l;
+            }
+            let edge = (x[D - 1] - c.lower[D - 1]) * c.inverse_spacing - last;
+            let (first, end) = c.bins.range(bin, width);
+            let (_, end_of_extended) = c.bins.range(bin, EXTENDED);
+            let end = if extended { end_of_extended } else { end };
+            all &= valid & (edge >= real(first)) & (edge < real(end));
+        }
+        *all_valid = all;
+    }
 }
 
 /// Result of a pass over particles.
@@ -146,49 +193,67 @@ impl SharedOutcome {
     }
 }
 
-/// Whether all particles of a block are [valid](Constants::is_valid), each in its own of `bins`.
-pub(crate) struct CheckBlock<'a, T, H, const D: usize> {
-    pub(crate) c: &'a Constants<T, D>,
-    pub(crate) bins: H,
-    pub(crate) x: &'a [SVector<T, D>],
-    pub(crate) F: &'a [SMatrix<T, D, D>],
-}
-
-impl<T, H, const D: usize, const W: usize> ShapeWork<T, D, W> for CheckBlock<'_, T, H, D>
-where
-    T: RealField + Copy,
-    H: Iterator<Item = u32>,
-{
-    type Output = bool;
-
-    #[inline(always)]
-    fn run<R: ShapeFunction<T, D, W>>(self, shape: R) -> bool {
-        let mut all_valid = true;
-        dispatch(Check { work: self, shape, all_valid: &mut all_valid });
-        all_valid
-    }
-}
-
-struct Check<'a, 'b, T, R, H, const D: usize, const W: usize> {
-    work: CheckBlock<'a, T, H, D>,
-    shape: R,
+struct CheckDomains<'a, 'b, T, I, H, const D: usize> {
+    c: &'a Constants<T, D>,
+    ids: &'a [u32],
+    /// Half-sizes of a particle at a place with a deformation gradient, and the rows that it reaches.
+    of_domain: H,
+    particles: I,
     all_valid: &'b mut bool,
 }
 
-impl<T, R, H, const D: usize, const W: usize> Loop for Check<'_, '_, T, R, H, D, W>
+impl<'a, T, I, H, const D: usize> Loop for CheckDomains<'a, '_, T, I, H, D>
 where
     T: RealField + Copy,
-    R: ShapeFunction<T, D, W>,
-    H: Iterator<Item = u32>,
+    I: Iterator<Item = ((&'a SVector<T, D>, &'a SMatrix<T, D, D>), u32)>,
+    H: Fn(usize, &SVector<T, D>, &SMatrix<T, D, D>) -> (SVector<T, D>, Rows<T>),
 {
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
-        let Self { work: CheckBlock { c, bins, x, F }, shape, all_valid } = self;
-        let mut valid = true;
-        for ((x, F), bin) in x.iter().zip(F).zip(bins) {
-            valid &= c.is_valid(shape, bin, x, F);
+        let Self { c, ids, of_domain, particles, all_valid } = self;
+        let mut all = true;
+        for (((x, F), bin), &p) in particles.zip(ids) {
+            let (l, Rows { edge, width }) = of_domain(p as usize, x, F);
+            let mut valid = determinant(F) > T::zero();
+            for a in 0..D {
+                valid &=
+                    (x[a] >= c.lower[a]) & (x[a] <= c.upper[a]) & (l[a] <= real(HALF_SIZE_LIMIT));
+            }
+            let (first, end) = c.bins.range(bin, width);
+            all &= valid & (edge >= real(first)) & (edge < real(end));
         }
-        *all_valid = valid;
+        *all_valid = all;
+    }
+}
+
+/// Whether all cells of a mesh have a volume.
+struct CheckCells<'a, 'b, T, const D: usize> {
+    mesh: &'a Mesh<T, D>,
+    ids: &'a [usize; BLOCK],
+    all_valid: &'b mut bool,
+}
+
+impl<T: RealField + Copy, const D: usize> Loop for CheckCells<'_, '_, T, D> {
+    #[inline(always)]
+    fn run<V: Vectors>(self, vectors: V) {
+        let Self { mesh: Mesh { x, corners, .. }, ids, all_valid } = self;
+        let mut all = true;
+        for ids in ids.chunks_exact(8) {
+            let zero = Eight { lanes: vectors.splat8(T::zero()), vectors };
+            let mut cells = [[zero; D]; MOST_CORNERS];
+            for (corner, at) in cells.iter_mut().enumerate().take(1 << D) {
+                for a in 0..D {
+                    for n in 0..8 {
+                        at[a].lanes.0[n] = x[corners[ids[n]][corner]][a];
+                    }
+                }
+            }
+            let Lane8(volumes) = volume_of_cell(&cells).lanes;
+            for volume in volumes {
+                all &= volume > T::zero();
+            }
+        }
+        *all_valid = all;
     }
 }
 
@@ -197,7 +262,6 @@ mod tests {
     use super::*;
     use crate::grid::{Grid, Layout};
     use crate::parallel::bins::Bins;
-    use crate::shape_function::{FixedBox, Hat, StretchingBox};
     use nalgebra::{Matrix2, Vector2, vector};
 
     fn constants() -> Constants<f64, 2> {
@@ -244,11 +308,21 @@ mod tests {
         let c = constants();
         let with = |a: f64, b: f64| Matrix2::from_diagonal(&vector![a, b]);
         let one = with(1.0, 1.0);
-        for_all_limits("hat", one, 0.0, 28.0, &|x, F| c.is_valid(Hat, 2, &x, &F));
-        let fixed = FixedBox(Vector2::repeat(0.25));
-        for_all_limits("fixed", one, 0.25, 27.0, &|x, F| c.is_valid(fixed, 2, &x, &F));
-        let stretching = StretchingBox(Vector2::repeat(0.25));
-        let of_box = |x: Vector2<f64>, F: Matrix2<f64>| c.is_valid(stretching, 2, &x, &F);
+        let valid = |shape: ProductShape<f64, 2>| {
+            let support = Support::Product(shape);
+            move |x, F| {
+                let is_valid = support.are_valid(&c, &[0], [2].into_iter(), &[x], &[F]);
+                let outcome = support.diagnose(&c, 0, 2, &x, &F);
+                assert_eq!(is_valid, outcome.is_clean(), "{x} {F}");
+                is_valid
+            }
+        };
+        for_all_limits("hat", one, 0.0, 28.0, &valid(ProductShape::hat()));
+        let fixed = ProductShape::ugimp(Vector2::repeat(0.25));
+        for_all_limits("fixed", one, 0.25, 27.0, &valid(fixed));
+        for_all_limits("quadratic", one, 0.5, 27.0, &valid(ProductShape::quadratic()));
+        for_all_limits("cubic", one, 1.0, 26.0, &valid(ProductShape::cubic()));
+        let of_box = valid(ProductShape::gimp(Vector2::repeat(0.25)));
         for (F, half_size, end) in [
             (one, 0.25, 27.0),
             (with(1.0, 2.0), 0.5, 27.0),
@@ -267,7 +341,9 @@ mod tests {
         for (bin, y, valid) in
             [(0, 0.0, true), (0, -5e-324, false), (7, 30.0, true), (7, 30.0_f64.next_up(), false)]
         {
-            assert_eq!(c.is_valid(Hat, bin, &vector![1.2, y], &one), valid, "{bin} {y}");
+            let hat = Support::Product(ProductShape::hat());
+            let found = hat.are_valid(&c, &[0], [bin].into_iter(), &[vector![1.2, y]], &[one]);
+            assert_eq!(found, valid, "{bin} {y}");
         }
     }
 
@@ -275,7 +351,8 @@ mod tests {
     fn a_particle_that_left_its_bin_is_sorted_anew_and_an_invalid_one_stops_the_run() {
         let c = constants();
         let one = Matrix2::identity();
-        let diagnose = |y: f64, F: &Matrix2<f64>| c.diagnose(Hat, 2, &vector![1.2, y], F, 41);
+        let hat = Support::Product(ProductShape::hat());
+        let diagnose = |y: f64, F: &Matrix2<f64>| hat.diagnose(&c, 41, 2, &vector![1.2, y], F);
         assert!(diagnose(9.0, &one).is_clean());
         let moved = diagnose(15.0, &one);
         assert!(moved.resort && moved.failure.is_none() && !moved.is_clean());

@@ -2,15 +2,14 @@
 //!
 //! Particles carry mass, velocity and deformation gradient. Each step ([`Simulation::step`]) sums mass, momentum and force at
 //! the nodes of a background grid of cubic cells (P2G), computes velocities and accelerations there (grid update), and
-//! interpolates them at the particles (G2P). Shape functions are hat functions or GIMP ([`Shape`]); time integration is USF, USL,
-//! MUSL or centred differences ([`Integrator`]). Other shape functions, transfers and integrators are in [`general`], slower;
-//! high order is in [`total_lagrangian`].
+//! interpolates them at the particles (G2P). Shape functions ([`Shape`]), time integration ([`Integrator`]) and the velocity update
+//! ([`Transfer`]) combine freely; high order is in [`total_lagrangian`].
 //!
 //! The scheme, for particle p and node i with weight `S_ip` and gradient `G_ip` taken at `x^n`:
 //!
 //! ```text
 //! m_i = sum m_p S_ip;  v_i = sum m_p v_p S_ip / m_i;  f_i = -sum V0_p tau_p G_ip + sum m_p b_p S_ip;  a_i = f_i / m_i
-//! v_p += dt sum S_ip a_i;   x_p += dt sum S_ip (v_i + dt a_i);   F_p <- (I + dt grad v) F_p
+//! v_p += dt sum S_ip a_i (FLIP);   x_p += dt sum S_ip (v_i + dt a_i);   F_p <- (I + dt grad v) F_p
 //! ```
 //!
 //! Sources: Bardenhagen & Kober, "The generalized interpolation material point method", CMES 5 (2004) 477-495;
@@ -22,7 +21,9 @@
 //! A bar between two walls, set in motion:
 //!
 //! ```
-//! use mmsmith_mpm::{Grid, Integrator, Material, NoBodyForce, Particles, Settings, Shape, Simulation};
+//! use mmsmith_mpm::{
+//!     Grid, Integrator, Material, NoBodyForce, Particles, Settings, Shape, Simulation, Transfer,
+//! };
 //! use nalgebra::vector;
 //!
 //! let grid = Grid { lower: vector![0.0], spacing: 0.1, cells: [10], walls: [[true, true]] };
@@ -33,6 +34,7 @@
 //! let settings = Settings {
 //!     shape: Shape::Gimp,
 //!     integrator: Integrator::Cd,
+//!     transfer: Transfer::Flip,
 //!     time_step: 4e-4,
 //!     halve_first_acceleration: true,
 //! };
@@ -53,26 +55,26 @@
 //!
 //! # Modules
 //!
-//! - `step`: each integrator as a sequence of `p2g`, `grid_update`, `g2p`; `g2p2g` fuses G2P with the next P2G.
-//! - `shape_function`, `weights`: weights of particles at nodes. `kernel`: sums over them in vector instructions.
+//! - `step`: each integrator as a sequence of `p2g`, `grid_update`, `g2p`; `g2p2g` fuses G2P with the next P2G; `xpic`: its filter.
+//! - `scheme`: the choices. `support`, `shape_function`, `domain`, `weights`: weights of particles at nodes. `kernel`: sums over
+//!   them in vector instructions. `body`: particles with their domains.
 //! - `material`: the laws, one file each. `body_force`, `forcing`: the body force.
 //! - `grid`, `node`: memory layout, walls and ghost nodes. `parallel`: bins of particles and the two-colour schedule.
 //! - `simulation`: set-up and life cycle. `state`, `geometry`, `health`: data and checks that the stages share.
 
+mod body;
 mod body_force;
+mod domain;
 mod error;
 #[doc(hidden)]
 pub mod fault;
 mod forcing;
 mod g2p;
 mod g2p2g;
-pub mod general;
 mod geometry;
 mod grid;
 mod grid_update;
 mod health;
-#[cfg(all(debug_assertions, not(test)))]
-mod instances;
 mod kernel;
 mod material;
 mod node;
@@ -80,18 +82,25 @@ mod p2g;
 mod parallel;
 mod particles;
 mod prefetch;
+mod scheme;
 mod shape_function;
 mod simd;
 mod simulation;
+mod solver;
 mod state;
 mod step;
+mod support;
 mod tensor;
 pub mod total_lagrangian;
 mod weights;
+mod xpic;
 
+pub use body::{Annulus, Body, Mesh};
 pub use body_force::{AtTime, BodyForce, NoBodyForce};
 pub use error::{SetupError, StepError};
 pub use grid::Grid;
 pub use material::Material;
 pub use particles::Particles;
-pub use simulation::{Integrator, Settings, Shape, Simulation};
+pub use scheme::{Integrator, Settings, Shape, Transfer};
+pub use simulation::Simulation;
+pub use solver::{Scalar, Solver, TotalSetUp};

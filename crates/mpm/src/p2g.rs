@@ -1,10 +1,11 @@
 //! Particles to grid: sums of mass, momentum and force at the nodes, followed by the grid update.
 //!
 //! ```text
-//! m_i = sum m_p S_ip;  m_i v_i = sum m_p v_p S_ip;  f_i = -sum V0_p tau_p G_ip + sum m_p b_p S_ip
+//! m_i = sum m_p S_ip;  m_i v_i = sum m_p (v_p + C_p (x_i - x_p)) S_ip;  f_i = -sum V0_p tau_p G_ip + sum m_p b_p S_ip
 //! ```
 //!
-//! The sums of one particle are in [`kernel`](crate::kernel), bins and threads in [`parallel`](crate::parallel).
+//! The affine velocity `C_p` is that of APIC. The sums of one particle are in [`kernel`](crate::kernel), bins and threads in
+//! [`parallel`](crate::parallel).
 
 use nalgebra::{RealField, SMatrix, SVector};
 
@@ -13,139 +14,155 @@ use crate::fault::Fault;
 use crate::forcing::Forcing;
 use crate::geometry::Constants;
 use crate::grid_update::{
-    Acceleration, GridUpdate, Reprojection, Velocity, VelocityAndAcceleration,
+    Acceleration, GridUpdate, NodeVectors, Reprojection, Velocity, VelocityAndAcceleration,
 };
-use crate::kernel::any::Contributions;
+use crate::kernel::any::{Contributions, Interpolated};
 use crate::kernel::block::{BLOCK, Block, Copies};
-use crate::material::Law;
 use crate::node::Node;
 use crate::particles::Particles;
-use crate::shape_function::ShapeChoice;
+use crate::scheme::Transfer;
 use crate::state::State;
+use crate::step::StepTimes;
+use crate::support::Support;
 
 impl<T: RealField + Copy, const D: usize> State<T, D> {
-    /// P2G of mass, momentum and force at time `t`, and from them velocities and accelerations; `scale` multiplies the latter.
-    #[inline(never)]
-    pub(crate) fn p2g<R, L, const W: usize>(
-        &mut self,
-        shape: R,
-        law: L,
-        body_force: &dyn BodyForce<T, D>,
-        (t, scale): (T, T),
-    ) where
-        R: ShapeChoice<T, D, W>,
-        L: Law<T>,
-    {
+    /// P2G of mass, momentum and force, and from them velocities and accelerations.
+    pub(crate) fn p2g(&mut self, body_force: &dyn BodyForce<T, D>, times: StepTimes<T>) {
         let Self { particles, constants, layout, bins, nodes, of_time, .. } = self;
+        let (support, law, affine, transfer) =
+            (&self.support, &self.law, &self.affine, self.transfer);
         let Particles { X, x, v, F, mass, volume, .. } = &*particles;
         let c = *constants;
-        let forcing = Forcing::new(body_force, X, t, &c, of_time);
-        let update = GridUpdate::new(layout, &c, VelocityAndAcceleration { scale });
+        let forcing = Forcing::new(body_force, X, times.start, &c, of_time);
+        let vectors = NodeVectors::of(transfer);
+        let update =
+            GridUpdate::new(layout, &c, VelocityAndAcceleration { scale: times.scale, vectors });
+        let p2g = P2g { c: &c, support, is_affine: transfer == Transfer::Apic, x, F };
         update.p2g(bins, nodes, &|band, first, ids| {
-            c.p2g(shape, x, F, band, first, ids, |copies, ids, contributions| {
+            p2g.bin(band, first, ids, |_, copies, ids, contributions| {
                 forcing.evaluate(ids, &copies.x, &mut contributions.b);
                 contributions.take(ids, mass, volume);
                 for (k, &p) in ids.iter().enumerate() {
                     contributions.set_value(&c, k, &v[p as usize]);
                 }
-                copies.kinematics().stress(&c, law, contributions);
+                contributions.take_affine(ids, mass, affine);
+                law.stress(&c, &copies.F, contributions);
             });
         });
     }
 
-    /// USF: P2G of mass and momentum, and from them the velocities at the start of the step.
-    #[inline(never)]
-    pub(crate) fn p2g_momentum<R, const W: usize>(&mut self, shape: R)
-    where
-        R: ShapeChoice<T, D, W>,
-    {
-        let Self { particles, constants, layout, bins, nodes, .. } = self;
+    /// P2G of mass and momentum, and from them the velocities at the start of the step.
+    pub(crate) fn p2g_momentum(&mut self) {
+        let Self { particles, constants, layout, bins, nodes, support, affine, transfer, .. } =
+            self;
+        let transfer = *transfer;
         let Particles { x, v, F, mass, .. } = &*particles;
         let c = *constants;
         let update = GridUpdate::new(layout, &c, Velocity);
+        let p2g = P2g { c: &c, support, is_affine: transfer == Transfer::Apic, x, F };
         update.p2g(bins, nodes, &|band, first, ids| {
-            c.p2g(shape, x, F, band, first, ids, |_, ids, contributions| {
+            p2g.bin(band, first, ids, |_, _, ids, contributions| {
                 contributions.take_momenta(ids, mass, v);
+                contributions.take_affine(ids, mass, affine);
             });
         });
     }
 
-    /// USF: P2G of forces, by the stress of the updated F with the weights of the old one; from them accelerations and the
-    /// velocities at the end of the step.
-    #[inline(never)]
-    pub(crate) fn p2g_force<R, L, const W: usize>(
-        &mut self,
-        shape: R,
-        law: L,
-        body_force: &dyn BodyForce<T, D>,
-        (t, scale): (T, T),
-    ) where
-        R: ShapeChoice<T, D, W>,
-        L: Law<T>,
-    {
-        let Self { particles, constants, layout, bins, nodes, F_next, of_time, .. } = self;
+    /// P2G of forces, by the stress of the F that has followed the grid with the weights of the one before; from them
+    /// accelerations and the velocities at the end of the step.
+    pub(crate) fn p2g_force(&mut self, body_force: &dyn BodyForce<T, D>, times: StepTimes<T>) {
+        let Self { particles, constants, layout, bins, nodes, F_early, of_time, .. } = self;
+        let (support, law, transfer) = (&self.support, &self.law, self.transfer);
         let Particles { X, x, F, mass, volume, .. } = &*particles;
-        let (c, F_next) = (*constants, &F_next[..]);
-        let forcing = Forcing::new(body_force, X, t, &c, of_time);
-        let update = GridUpdate::new(layout, &c, Acceleration { scale });
+        let (c, F_early) = (*constants, &F_early[..]);
+        let forcing = Forcing::new(body_force, X, times.start, &c, of_time);
+        let vectors = NodeVectors::of(transfer);
+        let update = GridUpdate::new(layout, &c, Acceleration { scale: times.scale, vectors });
+        let p2g = P2g { c: &c, support, is_affine: false, x, F };
         update.p2g(bins, nodes, &|band, first, ids| {
-            c.p2g(shape, x, F, band, first, ids, |copies, ids, contributions| {
+            p2g.bin(band, first, ids, |_, copies, ids, contributions| {
                 forcing.evaluate(ids, &copies.x, &mut contributions.b);
                 contributions.take(ids, mass, volume);
                 (0..ids.len()).for_each(|k| contributions.set_force(&c, k));
                 if !c.planted.is(Fault::StressOfOldStretch) {
-                    copies.pick_F(ids, F_next);
+                    copies.pick_F(ids, F_early);
                 }
-                copies.kinematics().stress(&c, law, contributions);
+                law.stress(&c, &copies.F, contributions);
             });
         });
     }
 
     /// MUSL: P2G of the updated momenta, and from them the reprojected velocities, by the masses that the nodes have.
-    #[inline(never)]
-    pub(crate) fn p2g_updated_momentum<R, const W: usize>(&mut self, shape: R)
-    where
-        R: ShapeChoice<T, D, W>,
-    {
-        let Self { particles, constants, layout, bins, nodes, reprojected, .. } = self;
+    pub(crate) fn p2g_updated_momentum(&mut self) {
+        let Self { particles, constants, layout, bins, nodes, reprojected, support, .. } = self;
+        let (affine, transfer) = (&self.affine, self.transfer);
         let Particles { x, v, F, mass, .. } = &*particles;
         let c = *constants;
         let update = GridUpdate::new(layout, &c, Reprojection { nodes: &nodes[..] });
+        let p2g = P2g { c: &c, support, is_affine: transfer == Transfer::Apic, x, F };
         update.p2g(bins, reprojected, &|band, first, ids| {
-            c.p2g(shape, x, F, band, first, ids, |_, ids, contributions| {
+            p2g.bin(band, first, ids, |_, _, ids, contributions| {
                 contributions.take_momenta(ids, mass, v);
+                contributions.take_affine(ids, mass, affine);
+            });
+        });
+    }
+
+    /// XPIC: the grid's velocities go to the particles and back. `next` gets those of `reprojected`, or of `nodes` at first.
+    pub(crate) fn p2g_g2p_velocity(&mut self, is_first: bool) {
+        let Self { particles, constants, layout, bins, nodes, reprojected, next, support, .. } =
+            self;
+        let Particles { x, F, mass, .. } = &*particles;
+        let c = *constants;
+        let from = if is_first { &nodes[..] } else { &reprojected[..] };
+        let update = GridUpdate::new(layout, &c, Reprojection { nodes: &nodes[..] });
+        let p2g = P2g { c: &c, support, is_affine: false, x, F };
+        update.p2g(bins, next, &|band, first, ids| {
+            p2g.bin(band, first, ids, |block, _, ids, contributions| {
+                let interpolated = &mut [Interpolated::zero(); BLOCK][..ids.len()];
+                block.g2p(&c.strides, from, interpolated);
+                for (value, (interpolated, &p)) in
+                    contributions.value.iter_mut().zip(interpolated.iter().zip(ids))
+                {
+                    let m = mass[p as usize];
+                    *value = Node::new(&(interpolated.velocity * m), &SVector::zeros(), m);
+                }
             });
         });
     }
 }
 
-impl<T: RealField + Copy, const D: usize> Constants<T, D> {
-    /// P2G of the particles `ids` of one bin, block by block, to the band of nodes that starts at node `first`.
-    /// `set(copies, ids, contributions)` sets the contributions of a block.
-    #[expect(clippy::too_many_arguments, reason = "the arrays of a bin's particles")]
-    fn p2g<R, const W: usize>(
+/// P2G of the particles of a bin.
+struct P2g<'a, T, const D: usize> {
+    c: &'a Constants<T, D>,
+    support: &'a Support<T, D>,
+    is_affine: bool,
+    x: &'a [SVector<T, D>],
+    F: &'a [SMatrix<T, D, D>],
+}
+
+impl<T: RealField + Copy, const D: usize> P2g<'_, T, D> {
+    /// Adds the particles `ids`, block by block, to the band of nodes that starts at node `first`.
+    /// `set(weights, copies, ids, contributions)` sets the contributions of a block.
+    fn bin(
         &self,
-        shape: R,
-        x: &[SVector<T, D>],
-        F: &[SMatrix<T, D, D>],
         band: &mut [Node<T, D>],
         first: usize,
         ids: &[u32],
-        set: impl Fn(&mut Copies<T, D>, &[u32], &mut Contributions<T, D, BLOCK>),
-    ) where
-        R: ShapeChoice<T, D, W>,
-    {
+        set: impl Fn(&Block<T, D>, &mut Copies<T, D>, &[u32], &mut Contributions<T, D, BLOCK>),
+    ) {
+        let &Self { c, support, is_affine, x, F } = self;
         let mut copies = Copies::new();
-        let mut block = Block::new();
+        let mut block = Block::new(support, is_affine);
         let mut contributions = Contributions::zero();
         for ids in ids.chunks(BLOCK) {
             copies.pick(ids, x, F);
-            block.compute_weights(self, shape, copies.kinematics());
-            if self.planted.is(Fault::LastNodeSkipped) {
-                block.skip_last_node(self, &copies.x);
+            block.compute_weights(c, support, ids, copies.kinematics());
+            if c.planted.is(Fault::LastNodeSkipped) {
+                block.skip_last_node(c, &copies.x);
             }
-            set(&mut copies, ids, &mut contributions);
-            block.p2g(&self.strides, band, first, &contributions, ids.len());
+            set(&block, &mut copies, ids, &mut contributions);
+            block.p2g(&c.strides, band, first, &contributions, ids.len());
         }
     }
 }

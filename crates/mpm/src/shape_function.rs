@@ -1,10 +1,9 @@
-//! Shape functions on one axis: hat functions, uGIMP, GIMP and quadratic splines. A weight `S_ip` is their product over the axes.
+//! Shape functions on one axis: hat functions, GIMP, quadratic and cubic splines. A weight `S_ip` is their product over the axes.
 //!
 //! All lengths are in cells (`h = 1`). Positions count from the lower corner of the grid, `xi = (x - lower) / h`; half-sizes `l`
 //! of particle boxes and gradients are per cell too.
 //!
-//! To add a shape function with three nodes along each axis: implement [`ShapeFunction`] here, add it to [`ThreeNodes`], and
-//! choose it in [`Simulation::new`](crate::Simulation::new).
+//! To add one: implement [`ShapeFunction`] here, add it to [`OnAxis`], and choose it in [`Support::new`](crate::support::Support).
 
 use nalgebra::{RealField, SVector};
 
@@ -25,6 +24,25 @@ pub(crate) struct AxisWeights<T, const W: usize> {
     pub(crate) G: [T; W],
 }
 
+impl<T: RealField + Copy, const W: usize> AxisWeights<T, W> {
+    /// A position `xi` counted from the first node.
+    #[inline(always)]
+    pub(crate) fn after_first(&self, xi: T) -> T {
+        xi - real(self.base - PAD_BELOW as f64)
+    }
+}
+
+/// The inertia along an axis, `sum S arm^2` in cells squared, of weights about a position counted from the first node.
+#[inline(always)]
+pub(crate) fn moment<T: RealField + Copy, const W: usize>(S: &[T; W], after_first: T) -> T {
+    let mut sum = T::zero();
+    for (i, S) in S.iter().enumerate() {
+        let arm = real::<T>(i as f64) - after_first;
+        sum += *S * arm * arm;
+    }
+    sum
+}
+
 /// The weights along all axes of a box with extended support.
 pub(crate) fn extended_axes<T: RealField + Copy, const D: usize>(
     xi: &[T; D],
@@ -33,133 +51,32 @@ pub(crate) fn extended_axes<T: RealField + Copy, const D: usize>(
     std::array::from_fn(|a| extended_axis(xi[a], l[a]))
 }
 
-/// A shape function that a simulation was set up with; `W` is the number of nodes along each axis, except for a box with
-/// [extended](is_extended) support.
-///
-/// Steps are compiled once for all that have the same `W`. Loops over a block of particles are compiled for each of them:
-/// [`with`](Self::with) says which one it is, once a block.
-pub(crate) trait ShapeChoice<T: RealField + Copy, const D: usize, const W: usize>:
-    Copy + Send + Sync + 'static
-{
-    /// Half-size of a particle's box along an axis, in cells, for the diagonal entry `F_aa` of the deformation gradient.
-    fn half_size(&self, axis: usize, F_aa: T) -> T;
-
-    /// Does work that is compiled for the shape function itself.
-    fn with<K: ShapeWork<T, D, W>>(self, work: K) -> K::Output;
-}
-
-/// Work on a block of particles that is compiled for each shape function.
-pub(crate) trait ShapeWork<T: RealField + Copy, const D: usize, const W: usize> {
-    type Output;
-
-    fn run<R: ShapeFunction<T, D, W>>(self, shape: R) -> Self::Output;
-}
-
-/// A shape function that is known where code is compiled.
-pub(crate) trait ShapeFunction<T: RealField + Copy, const D: usize, const W: usize>:
-    ShapeChoice<T, D, W>
-{
-    /// The weights along one axis, for a half-size without [extended](is_extended) support.
-    fn axis_weights(xi: T, l: T) -> AxisWeights<T, W>;
-}
-
-/// One of the shape functions with three nodes along each axis.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum ThreeNodes<T, const D: usize> {
-    FixedBox(FixedBox<T, D>),
-    StretchingBox(StretchingBox<T, D>),
-    Quadratic(QuadraticSpline),
-}
-
-impl<T: RealField + Copy, const D: usize> ShapeChoice<T, D, 3> for ThreeNodes<T, D> {
-    #[inline(always)]
-    fn half_size(&self, axis: usize, F_aa: T) -> T {
-        match self {
-            Self::FixedBox(shape) => shape.half_size(axis, F_aa),
-            Self::StretchingBox(shape) => shape.half_size(axis, F_aa),
-            Self::Quadratic(shape) => <_ as ShapeChoice<T, D, 3>>::half_size(shape, axis, F_aa),
-        }
-    }
-
-    #[inline(always)]
-    fn with<K: ShapeWork<T, D, 3>>(self, work: K) -> K::Output {
-        match self {
-            Self::FixedBox(shape) => work.run(shape),
-            Self::StretchingBox(shape) => work.run(shape),
-            Self::Quadratic(shape) => work.run(shape),
-        }
-    }
+/// A shape function along one axis, with `W` nodes.
+pub(crate) trait ShapeFunction<const W: usize>: Copy + Send + Sync + 'static {
+    /// The weights at `xi` for a half-size without extended support.
+    fn axis_weights<T: RealField + Copy>(xi: T, l: T) -> AxisWeights<T, W>;
 }
 
 /// Hat functions at the particle's centre.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Hat;
 
-impl<T: RealField + Copy, const D: usize> ShapeChoice<T, D, 2> for Hat {
+impl ShapeFunction<2> for Hat {
     #[inline(always)]
-    fn half_size(&self, _axis: usize, _F_aa: T) -> T {
-        T::zero()
-    }
-
-    #[inline(always)]
-    fn with<K: ShapeWork<T, D, 2>>(self, work: K) -> K::Output {
-        work.run(self)
-    }
-}
-
-impl<T: RealField + Copy, const D: usize> ShapeFunction<T, D, 2> for Hat {
-    #[inline(always)]
-    fn axis_weights(xi: T, _l: T) -> AxisWeights<T, 2> {
+    fn axis_weights<T: RealField + Copy>(xi: T, _l: T) -> AxisWeights<T, 2> {
         let (base, node) = node_below(xi);
         let r = xi - node;
         AxisWeights { base, S: [T::one() - r, r], G: [-T::one(), T::one()] }
     }
 }
 
-/// GIMP weights for boxes of fixed size, half-sizes in cells ("uGIMP").
+/// Means of hat functions over a box.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct FixedBox<T, const D: usize>(pub(crate) SVector<T, D>);
+pub(crate) struct Gimp;
 
-impl<T: RealField + Copy, const D: usize> ShapeChoice<T, D, 3> for FixedBox<T, D> {
+impl ShapeFunction<3> for Gimp {
     #[inline(always)]
-    fn half_size(&self, axis: usize, _F_aa: T) -> T {
-        self.0[axis]
-    }
-
-    #[inline(always)]
-    fn with<K: ShapeWork<T, D, 3>>(self, work: K) -> K::Output {
-        work.run(self)
-    }
-}
-
-impl<T: RealField + Copy, const D: usize> ShapeFunction<T, D, 3> for FixedBox<T, D> {
-    #[inline(always)]
-    fn axis_weights(xi: T, l: T) -> AxisWeights<T, 3> {
-        gimp_axis(xi, l)
-    }
-}
-
-/// GIMP weights for boxes that stretch with the diagonal of F, reference half-sizes in cells (contiguous particles).
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct StretchingBox<T, const D: usize>(pub(crate) SVector<T, D>);
-
-impl<T: RealField + Copy, const D: usize> ShapeChoice<T, D, 3> for StretchingBox<T, D> {
-    #[inline(always)]
-    fn half_size(&self, axis: usize, F_aa: T) -> T {
-        // A quarter turn makes F_aa zero, and the weights divide by l.
-        let (l, smallest) = ((self.0[axis] * F_aa).abs(), real(1e-6));
-        if l > smallest { l } else { smallest }
-    }
-
-    #[inline(always)]
-    fn with<K: ShapeWork<T, D, 3>>(self, work: K) -> K::Output {
-        work.run(self)
-    }
-}
-
-impl<T: RealField + Copy, const D: usize> ShapeFunction<T, D, 3> for StretchingBox<T, D> {
-    #[inline(always)]
-    fn axis_weights(xi: T, l: T) -> AxisWeights<T, 3> {
+    fn axis_weights<T: RealField + Copy>(xi: T, l: T) -> AxisWeights<T, 3> {
         gimp_axis(xi, l)
     }
 }
@@ -170,22 +87,10 @@ impl<T: RealField + Copy, const D: usize> ShapeFunction<T, D, 3> for StretchingB
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct QuadraticSpline;
 
-impl<T: RealField + Copy, const D: usize> ShapeChoice<T, D, 3> for QuadraticSpline {
-    /// As of a box over one cell: the first node is the one below its lower edge.
+impl ShapeFunction<3> for QuadraticSpline {
+    /// As of a box over one cell: the first node is the one below its lower edge, and `l` is 1/2.
     #[inline(always)]
-    fn half_size(&self, _axis: usize, _F_aa: T) -> T {
-        real(0.5)
-    }
-
-    #[inline(always)]
-    fn with<K: ShapeWork<T, D, 3>>(self, work: K) -> K::Output {
-        work.run(self)
-    }
-}
-
-impl<T: RealField + Copy, const D: usize> ShapeFunction<T, D, 3> for QuadraticSpline {
-    #[inline(always)]
-    fn axis_weights(xi: T, l: T) -> AxisWeights<T, 3> {
+    fn axis_weights<T: RealField + Copy>(xi: T, l: T) -> AxisWeights<T, 3> {
         let one = T::one();
         let (base, node) = node_below(xi - l);
         // From the middle of the first cell, between 0 and 1.
@@ -196,10 +101,125 @@ impl<T: RealField + Copy, const D: usize> ShapeFunction<T, D, 3> for QuadraticSp
     }
 }
 
-/// Whether a box of this half-size has extended support: it may touch more than three nodes.
-#[inline(always)]
-pub(crate) fn is_extended<T: RealField + Copy>(l: T) -> bool {
-    l > real(0.5)
+/// Cubic B-splines at the particle's centre, over four cells; source as of [`QuadraticSpline`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CubicSpline;
+
+impl ShapeFunction<4> for CubicSpline {
+    /// As of a box over two cells: the first node is the one below its lower edge, and `l` is 1.
+    #[inline(always)]
+    fn axis_weights<T: RealField + Copy>(xi: T, l: T) -> AxisWeights<T, 4> {
+        let one = T::one();
+        let (base, node) = node_below(xi - l);
+        // From the second node, between 0 and 1.
+        let r = xi - l - node;
+        let q = one - r;
+        let (sixth, half, two_thirds) =
+            (real::<T>(1.0 / 6.0), real::<T>(0.5), real::<T>(2.0 / 3.0));
+        let (two, three_halves) = (real::<T>(2.0), real::<T>(1.5));
+        AxisWeights {
+            base,
+            S: [
+                q * q * q * sixth,
+                two_thirds - r * r * (one - half * r),
+                two_thirds - q * q * (one - half * q),
+                r * r * r * sixth,
+            ],
+            G: [
+                -half * q * q,
+                r * (three_halves * r - two),
+                q * (two - three_halves * q),
+                half * r * r,
+            ],
+        }
+    }
+}
+
+/// The half-size of a particle's box along each axis, in cells: `fixed + |stretching F_aa|`, and no less than `least`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct HalfSizes<T, const D: usize> {
+    fixed: SVector<T, D>,
+    stretching: SVector<T, D>,
+    least: T,
+}
+
+impl<T: RealField + Copy, const D: usize> HalfSizes<T, D> {
+    /// The same for all particles at all times.
+    pub(crate) fn fixed(l: SVector<T, D>) -> Self {
+        Self { fixed: l, stretching: SVector::zeros(), least: T::zero() }
+    }
+
+    /// Stretched by the diagonal of F.
+    pub(crate) fn stretching(l: SVector<T, D>) -> Self {
+        // A quarter turn makes F_aa zero, and the weights divide by l.
+        Self { fixed: SVector::zeros(), stretching: l, least: real(1e-6) }
+    }
+
+    /// Along an axis, for the diagonal entry `F_aa` of the deformation gradient.
+    #[inline(always)]
+    pub(crate) fn along(&self, axis: usize, F_aa: T) -> T {
+        let l = self.fixed[axis] + (self.stretching[axis] * F_aa).abs();
+        if l > self.least { l } else { self.least }
+    }
+}
+
+/// Shape functions on one axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum OnAxis {
+    Hat,
+    Gimp,
+    Quadratic,
+    Cubic,
+}
+
+/// A shape function whose weights are products over the axes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ProductShape<T, const D: usize> {
+    pub(crate) on_axis: OnAxis,
+    pub(crate) half_sizes: HalfSizes<T, D>,
+}
+
+impl<T: RealField + Copy, const D: usize> ProductShape<T, D> {
+    pub(crate) fn hat() -> Self {
+        Self { on_axis: OnAxis::Hat, half_sizes: HalfSizes::fixed(SVector::zeros()) }
+    }
+
+    /// GIMP weights for boxes of fixed half-size `l` in cells ("uGIMP").
+    pub(crate) fn ugimp(l: SVector<T, D>) -> Self {
+        Self { on_axis: OnAxis::Gimp, half_sizes: HalfSizes::fixed(l) }
+    }
+
+    /// GIMP weights for boxes that stretch with the diagonal of F, reference half-sizes `l` in cells (contiguous particles).
+    pub(crate) fn gimp(l: SVector<T, D>) -> Self {
+        Self { on_axis: OnAxis::Gimp, half_sizes: HalfSizes::stretching(l) }
+    }
+
+    pub(crate) fn quadratic() -> Self {
+        let half_sizes = HalfSizes::fixed(SVector::repeat(real(0.5)));
+        Self { on_axis: OnAxis::Quadratic, half_sizes }
+    }
+
+    pub(crate) fn cubic() -> Self {
+        let half_sizes = HalfSizes::fixed(SVector::repeat(real(1.0)));
+        Self { on_axis: OnAxis::Cubic, half_sizes }
+    }
+
+    /// Nodes along each axis, except for a box with extended support.
+    pub(crate) fn width(&self) -> usize {
+        match self.on_axis {
+            OnAxis::Hat => 2,
+            OnAxis::Gimp | OnAxis::Quadratic => 3,
+            OnAxis::Cubic => 4,
+        }
+    }
+
+    /// Half-size beyond which the support is extended.
+    pub(crate) fn extended_above(&self) -> T {
+        match self.on_axis {
+            OnAxis::Gimp => real(0.5),
+            OnAxis::Hat | OnAxis::Quadratic | OnAxis::Cubic => real(HALF_SIZE_LIMIT),
+        }
+    }
 }
 
 /// 2^52: a double of this size is a whole number, stored in its last 52 bits.
@@ -217,7 +237,7 @@ pub(crate) fn index(whole: f64) -> usize {
 ///
 /// Made of sums alone, which vectorise on all processors; rounding down does not.
 #[inline(always)]
-fn node_below<T: RealField + Copy>(s: T) -> (f64, T) {
+pub(crate) fn node_below<T: RealField + Copy>(s: T) -> (f64, T) {
     let padded = nalgebra::convert_unchecked::<T, f64>(s + real(PAD_BELOW as f64));
     let nearest = (padded + WHOLE) - WHOLE;
     let below = if nearest > padded { nearest - 1.0 } else { nearest };
@@ -296,11 +316,15 @@ mod tests {
     }
 
     fn hat(xi: f64) -> AxisWeights<f64, 2> {
-        <Hat as ShapeFunction<f64, 1, 2>>::axis_weights(xi, 0.0)
+        Hat::axis_weights(xi, 0.0)
     }
 
     fn quadratic(xi: f64) -> AxisWeights<f64, 3> {
-        <QuadraticSpline as ShapeFunction<f64, 1, 3>>::axis_weights(xi, 0.5)
+        QuadraticSpline::axis_weights(xi, 0.5)
+    }
+
+    fn cubic(xi: f64) -> AxisWeights<f64, 4> {
+        CubicSpline::axis_weights(xi, 1.0)
     }
 
     /// The formula as printed in the source.
@@ -339,6 +363,7 @@ mod tests {
             check(&hat(xi), xi)?;
             check(&gimp_axis(xi, l), xi)?;
             check(&quadratic(xi), xi)?;
+            check(&cubic(xi), xi)?;
             check(&extended_axis(xi, wide), xi)?;
         }
 
@@ -374,6 +399,7 @@ mod tests {
             for (minus, here, plus) in [
                 (spread(&gimp_axis(xi - d, l)), spread(&gimp_axis(xi, l)), spread(&gimp_axis(xi + d, l))),
                 (spread(&quadratic(xi - d)), spread(&quadratic(xi)), spread(&quadratic(xi + d))),
+                (spread(&cubic(xi - d)), spread(&cubic(xi)), spread(&cubic(xi + d))),
                 (spread(&extended_axis(xi - d, wide)), spread(&extended_axis(xi, wide)), spread(&extended_axis(xi + d, wide))),
             ] {
                 for &(node, _, G) in &here {
@@ -386,9 +412,9 @@ mod tests {
 
     #[test]
     fn a_stretching_box_follows_the_diagonal_of_F() {
-        let shape = StretchingBox(SVector::<f64, 2>::new(0.25, 0.125));
-        assert_eq!(shape.half_size(0, 1.5), 0.375);
-        assert_eq!(shape.half_size(1, -1.5), 0.1875);
-        assert_eq!(shape.half_size(1, 0.0), 1e-6);
+        let shape = HalfSizes::stretching(SVector::<f64, 2>::new(0.25, 0.125));
+        assert_eq!(shape.along(0, 1.5), 0.375);
+        assert_eq!(shape.along(1, -1.5), 0.1875);
+        assert_eq!(shape.along(1, 0.0), 1e-6);
     }
 }

@@ -4,9 +4,12 @@
 //! instructions where the processor has no single one. All instances thus give the same bits.
 
 use std::any::Any;
+use std::ops::{Add, Mul, Sub};
 
 use nalgebra::RealField;
 use pulp::{Arch, Scalar, Simd, WithSimd};
+
+use crate::tensor::real;
 
 /// A loop for vector instructions. `run` and all functions that it calls have to be `#[inline(always)]`.
 pub(crate) trait Loop {
@@ -18,7 +21,19 @@ pub(crate) trait Loop {
 #[repr(C, align(32))]
 pub(crate) struct Lane4<T>(pub(crate) [T; 4]);
 
-/// Operations on [`Lane4`]. The compiler vectorises loops over many particles by itself, but not always the four numbers of
+/// Eight numbers in the lanes of one register, or of two where registers are shorter.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(crate) struct Lane8<T>(pub(crate) [T; 8]);
+
+impl<T: RealField + Copy> Lane8<T> {
+    #[inline(always)]
+    pub(crate) fn zero() -> Self {
+        Self([T::zero(); 8])
+    }
+}
+
+/// Operations on [`Lane4`] and [`Lane8`]. The compiler vectorises loops over many particles by itself, but not always the four numbers of
 /// one particle.
 pub(crate) trait Vectors: Copy {
     /// Four times the same.
@@ -105,30 +120,202 @@ pub(crate) trait Vectors: Copy {
     fn high_and_low<T: RealField + Copy>(self, Lane4(a): Lane4<T>, Lane4(b): Lane4<T>) -> Lane4<T> {
         Lane4([a[2], a[3], b[0], b[1]])
     }
+
+    /// `[a0, a1, b2, b3]`.
+    #[inline(always)]
+    fn low_and_high<T: RealField + Copy>(self, Lane4(a): Lane4<T>, Lane4(b): Lane4<T>) -> Lane4<T> {
+        Lane4([a[0], a[1], b[2], b[3]])
+    }
+
+    /// Eight times the same.
+    #[inline(always)]
+    fn splat8<T: RealField + Copy>(self, value: T) -> Lane8<T> {
+        Lane8([value; 8])
+    }
+
+    /// Eight numbers from memory in one load.
+    #[inline(always)]
+    fn load8<T: RealField + Copy>(self, values: &[T; 8]) -> Lane8<T> {
+        Lane8(*values)
+    }
+
+    #[inline(always)]
+    fn add8<T: RealField + Copy>(self, Lane8(a): Lane8<T>, Lane8(b): Lane8<T>) -> Lane8<T> {
+        Lane8(std::array::from_fn(|q| a[q] + b[q]))
+    }
+
+    #[inline(always)]
+    fn mul8<T: RealField + Copy>(self, Lane8(a): Lane8<T>, Lane8(b): Lane8<T>) -> Lane8<T> {
+        Lane8(std::array::from_fn(|q| a[q] * b[q]))
+    }
+
+    #[inline(always)]
+    fn sub8<T: RealField + Copy>(self, Lane8(a): Lane8<T>, Lane8(b): Lane8<T>) -> Lane8<T> {
+        Lane8(std::array::from_fn(|q| a[q] - b[q]))
+    }
+
+    #[inline(always)]
+    fn div8<T: RealField + Copy>(self, Lane8(a): Lane8<T>, Lane8(b): Lane8<T>) -> Lane8<T> {
+        Lane8(std::array::from_fn(|q| a[q] / b[q]))
+    }
+
+    /// The smaller of both; `b` where one is not a number.
+    #[inline(always)]
+    fn min8<T: RealField + Copy>(self, Lane8(a): Lane8<T>, Lane8(b): Lane8<T>) -> Lane8<T> {
+        Lane8(std::array::from_fn(|q| if a[q] < b[q] { a[q] } else { b[q] }))
+    }
+
+    /// The larger of both; `b` where one is not a number.
+    #[inline(always)]
+    fn max8<T: RealField + Copy>(self, Lane8(a): Lane8<T>, Lane8(b): Lane8<T>) -> Lane8<T> {
+        Lane8(std::array::from_fn(|q| if a[q] > b[q] { a[q] } else { b[q] }))
+    }
+
+    /// `a b + c`, rounded once.
+    #[inline(always)]
+    fn mul_add8<T: RealField + Copy>(
+        self,
+        Lane8(a): Lane8<T>,
+        Lane8(b): Lane8<T>,
+        Lane8(c): Lane8<T>,
+    ) -> Lane8<T> {
+        Lane8(std::array::from_fn(|q| a[q].mul_add(b[q], c[q])))
+    }
 }
 
-impl Vectors for Scalar {}
+/// On x86 these are for processors without fused multiply-adds, which take a call for each number: in line they would make half of
+/// the code.
+impl Vectors for Scalar {
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    fn mul_sub<T: RealField + Copy>(
+        self,
+        Lane4(a): Lane4<T>,
+        Lane4(b): Lane4<T>,
+        Lane4(c): Lane4<T>,
+    ) -> Lane4<T> {
+        Lane4(std::array::from_fn(|q| a[q].mul_add(b[q], -c[q])))
+    }
+
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    fn mul_add<T: RealField + Copy>(
+        self,
+        Lane4(a): Lane4<T>,
+        Lane4(b): Lane4<T>,
+        Lane4(c): Lane4<T>,
+    ) -> Lane4<T> {
+        Lane4(std::array::from_fn(|q| a[q].mul_add(b[q], c[q])))
+    }
+
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    fn mul_add8<T: RealField + Copy>(
+        self,
+        Lane8(a): Lane8<T>,
+        Lane8(b): Lane8<T>,
+        Lane8(c): Lane8<T>,
+    ) -> Lane8<T> {
+        Lane8(std::array::from_fn(|q| a[q].mul_add(b[q], c[q])))
+    }
+}
+
+/// What formulas for one particle need of numbers, so that they hold for eight at once as well.
+pub(crate) trait Number:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
+{
+    fn divided_by(self, divisor: Self) -> Self;
+    /// A constant like this number.
+    fn constant(self, value: f64) -> Self;
+}
+
+/// One number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct One<T>(pub(crate) T);
+
+/// A number of each of eight particles.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Eight<T, V> {
+    pub(crate) lanes: Lane8<T>,
+    pub(crate) vectors: V,
+}
+
+macro_rules! operators {
+    ($($trait:ident $method:ident $eight:ident;)*) => {
+        $(impl<T: RealField + Copy> $trait for One<T> {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self(self.0.$method(other.0))
+            }
+        }
+
+        impl<T: RealField + Copy, V: Vectors> $trait for Eight<T, V> {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self { lanes: self.vectors.$eight(self.lanes, other.lanes), ..self }
+            }
+        })*
+    };
+}
+
+operators! {
+    Add add add8;
+    Sub sub sub8;
+    Mul mul mul8;
+}
+
+impl<T: RealField + Copy> Number for One<T> {
+    #[inline(always)]
+    fn divided_by(self, divisor: Self) -> Self {
+        Self(self.0 / divisor.0)
+    }
+
+    #[inline(always)]
+    fn constant(self, value: f64) -> Self {
+        Self(real(value))
+    }
+}
+
+impl<T: RealField + Copy, V: Vectors> Number for Eight<T, V> {
+    #[inline(always)]
+    fn divided_by(self, divisor: Self) -> Self {
+        Self { lanes: self.vectors.div8(self.lanes, divisor.lanes), ..self }
+    }
+
+    #[inline(always)]
+    fn constant(self, value: f64) -> Self {
+        Self { lanes: self.vectors.splat8(real(value)), ..self }
+    }
+}
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use super::{Any, Lane4, RealField, Scalar, Vectors, same};
+    use super::{Any, Lane4, Lane8, RealField, Scalar, Vectors, same};
     use bytemuck::{AnyBitPattern, NoUninit, bytes_of, must_cast, pod_read_unaligned};
     use pulp::x86::{V3, V4};
-    use std::arch::x86_64::{__m128, __m256d};
+    use std::arch::x86_64::{__m128, __m256, __m256d, __m512d};
 
-    /// The instructions for an operation in double and in single precision, if `T` is one of them.
+    /// The instructions for an operation on four numbers and for one on eight, in double and in single precision, if `T` is
+    /// one of them. Registers of 512 bits hold eight numbers in double precision, others half of them.
     macro_rules! instructions {
-        ($(fn $name:ident($self:ident, $($a:ident),*) { $double:expr, $single:expr })*) => {
+        (
+            $(fn $four:ident($self:ident, $($a:ident),*) { $double:expr, $single:expr })*
+            eight:
+            $(fn $eight:ident($self8:ident, $($a8:ident),*) {
+                $wide:expr, each half $half:expr, $single8:expr
+            })*
+        ) => {
             impl Vectors for V3 {
                 $(#[inline(always)]
-                fn $name<T: RealField + Copy>($self, $($a: Lane4<T>),*) -> Lane4<T> {
+                fn $four<T: RealField + Copy>($self, $($a: Lane4<T>),*) -> Lane4<T> {
                     if let ($(Some($a),)*) = ($(double($a),)*) {
                         return from_double($double).unwrap_or_else(zero);
                     }
                     if let ($(Some($a),)*) = ($(single($a),)*) {
                         return from_single($single).unwrap_or_else(zero);
                     }
-                    Scalar::new().$name($($a),*)
+                    Scalar::new().$four($($a),*)
                 })*
 
                 #[inline(always)]
@@ -144,12 +331,43 @@ mod x86 {
                     let single = same(value).and_then(|x: f32| from_single(self.sse._mm_set1_ps(x)));
                     double.or(single).unwrap_or(Lane4([value; 4]))
                 }
+
+                $(#[inline(always)]
+                fn $eight<T: RealField + Copy>($self8, $($a8: Lane8<T>),*) -> Lane8<T> {
+                    if let ($(Some($a8),)*) = ($(halves($a8),)*) {
+                        let half = |half: usize| {
+                            let ($($a8,)*) = ($($a8[half],)*);
+                            $half
+                        };
+                        return from_halves([half(0), half(1)]).unwrap_or_else(Lane8::zero);
+                    }
+                    if let ($(Some($a8),)*) = ($(single8($a8),)*) {
+                        return from_single8($single8).unwrap_or_else(Lane8::zero);
+                    }
+                    Scalar::new().$eight($($a8),*)
+                })*
+
+                #[inline(always)]
+                fn load8<T: RealField + Copy>(self, values: &[T; 8]) -> Lane8<T> {
+                    let double = at::<_, [f64; 8], [__m256d; 2]>(values).and_then(from_halves);
+                    let single = at::<_, [f32; 8], __m256>(values).and_then(from_single8);
+                    double.or(single).unwrap_or(Lane8(*values))
+                }
+
+                #[inline(always)]
+                fn splat8<T: RealField + Copy>(self, value: T) -> Lane8<T> {
+                    let double =
+                        same(value).and_then(|x: f64| from_halves([self.avx._mm256_set1_pd(x); 2]));
+                    let single =
+                        same(value).and_then(|x: f32| from_single8(self.avx._mm256_set1_ps(x)));
+                    double.or(single).unwrap_or(Lane8([value; 8]))
+                }
             }
 
             impl Vectors for V4 {
                 $(#[inline(always)]
-                fn $name<T: RealField + Copy>(self, $($a: Lane4<T>),*) -> Lane4<T> {
-                    V3::$name(*self, $($a),*)
+                fn $four<T: RealField + Copy>($self, $($a: Lane4<T>),*) -> Lane4<T> {
+                    V3::$four(*$self, $($a),*)
                 })*
 
                 #[inline(always)]
@@ -160,6 +378,28 @@ mod x86 {
                 #[inline(always)]
                 fn splat<T: RealField + Copy>(self, value: T) -> Lane4<T> {
                     V3::splat(*self, value)
+                }
+
+                $(#[inline(always)]
+                fn $eight<T: RealField + Copy>($self8, $($a8: Lane8<T>),*) -> Lane8<T> {
+                    if let ($(Some($a8),)*) = ($(whole($a8),)*) {
+                        return from_whole($wide).unwrap_or_else(Lane8::zero);
+                    }
+                    V3::$eight(*$self8, $($a8),*)
+                })*
+
+                #[inline(always)]
+                fn load8<T: RealField + Copy>(self, values: &[T; 8]) -> Lane8<T> {
+                    at::<_, [f64; 8], __m512d>(values)
+                        .and_then(from_whole)
+                        .unwrap_or_else(|| V3::load8(*self, values))
+                }
+
+                #[inline(always)]
+                fn splat8<T: RealField + Copy>(self, value: T) -> Lane8<T> {
+                    same(value)
+                        .and_then(|x: f64| from_whole(self.avx512f._mm512_set1_pd(x)))
+                        .unwrap_or_else(|| V3::splat8(*self, value))
                 }
             }
         };
@@ -187,6 +427,45 @@ mod x86 {
         fn high_and_low(self, a, b) {
             self.avx._mm256_permute2f128_pd::<0x21>(a, b),
             self.sse._mm_shuffle_ps::<0b01_00_11_10>(a, b)
+        }
+        fn low_and_high(self, a, b) {
+            self.avx._mm256_blend_pd::<0b1100>(a, b), self.sse4_1._mm_blend_ps::<0b1100>(a, b)
+        }
+        eight:
+        fn add8(self, a, b) {
+            self.avx512f._mm512_add_pd(a, b),
+            each half self.avx._mm256_add_pd(a, b),
+            self.avx._mm256_add_ps(a, b)
+        }
+        fn mul8(self, a, b) {
+            self.avx512f._mm512_mul_pd(a, b),
+            each half self.avx._mm256_mul_pd(a, b),
+            self.avx._mm256_mul_ps(a, b)
+        }
+        fn sub8(self, a, b) {
+            self.avx512f._mm512_sub_pd(a, b),
+            each half self.avx._mm256_sub_pd(a, b),
+            self.avx._mm256_sub_ps(a, b)
+        }
+        fn div8(self, a, b) {
+            self.avx512f._mm512_div_pd(a, b),
+            each half self.avx._mm256_div_pd(a, b),
+            self.avx._mm256_div_ps(a, b)
+        }
+        fn min8(self, a, b) {
+            self.avx512f._mm512_min_pd(a, b),
+            each half self.avx._mm256_min_pd(a, b),
+            self.avx._mm256_min_ps(a, b)
+        }
+        fn max8(self, a, b) {
+            self.avx512f._mm512_max_pd(a, b),
+            each half self.avx._mm256_max_pd(a, b),
+            self.avx._mm256_max_ps(a, b)
+        }
+        fn mul_add8(self, a, b, c) {
+            self.avx512f._mm512_fmadd_pd(a, b, c),
+            each half self.fma._mm256_fmadd_pd(a, b, c),
+            self.fma._mm256_fmadd_ps(a, b, c)
         }
     }
 
@@ -216,6 +495,36 @@ mod x86 {
         same(Lane4::<f32>(must_cast(a)))
     }
 
+    #[inline(always)]
+    fn whole<T: RealField + Copy>(a: Lane8<T>) -> Option<__m512d> {
+        same::<_, Lane8<f64>>(a).map(|Lane8(a)| must_cast(a))
+    }
+
+    #[inline(always)]
+    fn halves<T: RealField + Copy>(a: Lane8<T>) -> Option<[__m256d; 2]> {
+        same::<_, Lane8<f64>>(a).map(|Lane8(a)| must_cast(a))
+    }
+
+    #[inline(always)]
+    fn single8<T: RealField + Copy>(a: Lane8<T>) -> Option<__m256> {
+        same::<_, Lane8<f32>>(a).map(|Lane8(a)| must_cast(a))
+    }
+
+    #[inline(always)]
+    fn from_whole<T: RealField + Copy>(a: __m512d) -> Option<Lane8<T>> {
+        same(Lane8::<f64>(must_cast(a)))
+    }
+
+    #[inline(always)]
+    fn from_halves<T: RealField + Copy>(a: [__m256d; 2]) -> Option<Lane8<T>> {
+        same(Lane8::<f64>(must_cast(a)))
+    }
+
+    #[inline(always)]
+    fn from_single8<T: RealField + Copy>(a: __m256) -> Option<Lane8<T>> {
+        same(Lane8::<f32>(must_cast(a)))
+    }
+
     /// Unreachable: `T` is f32 or f64.
     #[inline(always)]
     fn zero<T: RealField + Copy>() -> Lane4<T> {
@@ -241,12 +550,9 @@ impl<L: Loop, V: Vectors> WithSimd for Instance<L, V> {
 }
 
 /// Runs the widest instance that this processor supports.
+#[cfg(not(test))]
 #[inline(never)]
 pub(crate) fn dispatch(work: impl Loop) {
-    #[cfg(test)]
-    if let Some(level) = tests::LEVEL.get() {
-        return level.run(work);
-    }
     match Arch::new() {
         #[cfg(target_arch = "x86_64")]
         Arch::V4(simd) => Simd::vectorize(simd, Instance(work, simd)),
@@ -254,6 +560,14 @@ pub(crate) fn dispatch(work: impl Loop) {
         Arch::V3(simd) => Simd::vectorize(simd, Instance(work, simd)),
         arch => arch.dispatch(Instance(work, Scalar::new())),
     }
+}
+
+/// Runs the instance that a test chose on this thread, or else the widest one. One set of instances serves both, so that no
+/// kernel is compiled twice.
+#[cfg(test)]
+#[inline(never)]
+pub(crate) fn dispatch(work: impl Loop) {
+    tests::LEVEL.get().unwrap_or_else(tests::Level::widest).run(work);
 }
 
 #[cfg(test)]
@@ -264,7 +578,10 @@ mod tests {
     use pulp::Scalar;
 
     use super::*;
-    use crate::{Grid, Integrator, Material, NoBodyForce, Particles, Settings, Shape, Simulation};
+    use crate::{
+        Body, Grid, Integrator, Material, NoBodyForce, Particles, Settings, Shape, Simulation,
+        Transfer,
+    };
 
     thread_local! {
         /// The instance that this thread has to take instead of the widest one.
@@ -291,6 +608,16 @@ mod tests {
             }
         }
 
+        pub(super) fn widest() -> Self {
+            match Arch::new() {
+                #[cfg(target_arch = "x86_64")]
+                Arch::V4(simd) => Self::V4(simd),
+                #[cfg(target_arch = "x86_64")]
+                Arch::V3(simd) => Self::V3(simd),
+                _ => Self::Scalar,
+            }
+        }
+
         /// Those that this processor has.
         fn all() -> Vec<Self> {
             let mut all = vec![Self::Scalar];
@@ -303,32 +630,41 @@ mod tests {
         }
     }
 
-    /// The state of a square or a cube after some steps, as bits.
-    fn bits<const D: usize>(level: Level, shape: Shape, integrator: Integrator) -> Vec<u64> {
-        let cells = if D == 3 { 6 } else { 12 };
-        let spacing = 1.0 / cells as f64;
+    /// The state of a square or a cube after some steps, as bits, computed by some threads that all have the same instance.
+    fn bits<T: RealField + Copy, const D: usize>(
+        level: Level,
+        threads: usize,
+        (shape, integrator, transfer): (Shape, Integrator, Transfer),
+    ) -> Vec<u64> {
+        let number = nalgebra::convert::<f64, T>;
+        // Of three bins in the plane, of two in space.
+        let cells = if D == 3 { 7 } else { 21 };
+        let spacing = number(1.0 / cells as f64);
         let walls = [[true; 2]; D];
         let grid = Grid { lower: SVector::zeros(), spacing, cells: [cells; D], walls };
-        let mut particles = Particles::lattice(&grid, 2, 1.0, |_| true);
-        for (v, X) in particles.v.iter_mut().zip(&particles.X) {
-            let angle: SVector<f64, D> = X * std::f64::consts::PI;
+        let mut body = Body::lattice(&grid, 2, number(1.0), |_| true);
+        for (v, X) in body.particles.v.iter_mut().zip(&body.particles.X) {
+            let angle: SVector<T, D> = X * T::pi();
             // Along each axis it changes with the next one too, for gradients off the diagonal.
-            *v = SVector::from_fn(|a, _| 20.0 * angle[a].sin() * angle[(a + 1) % D].cos());
+            *v = SVector::from_fn(|a, _| number(20.0) * angle[a].sin() * angle[(a + 1) % D].cos());
         }
-        let material = Material::NeoHookean { lambda: 5769.0, mu: 3846.0 };
+        let material = Material::NeoHookean { lambda: number(5769.0), mu: number(3846.0) };
+        let time_step = number(2e-4);
         let settings =
-            Settings { shape, integrator, time_step: 2e-4, halve_first_acceleration: false };
-        let run = || {
-            LEVEL.set(Some(level));
-            let mut simulation = Simulation::new(grid, particles, material, settings).unwrap();
-            (0..30).for_each(|_| simulation.step(&NoBodyForce).unwrap());
-            LEVEL.set(None);
+            Settings { shape, integrator, transfer, time_step, halve_first_acceleration: false };
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .start_handler(move |_| LEVEL.set(Some(level)))
+            .build()
+            .unwrap();
+        pool.install(|| {
+            let mut simulation = Simulation::new(grid, body, material, settings).unwrap();
+            let steps = if D == 3 { 2 } else { 5 };
+            (0..steps).for_each(|_| simulation.step(&NoBodyForce).unwrap());
             let Particles { x, v, F, .. } = simulation.particles();
             let numbers = x.iter().chain(v).flatten().chain(F.iter().flatten());
-            numbers.map(|value| value.to_bits()).collect()
-        };
-        // All of it on the one thread whose level is set.
-        rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap().install(run)
+            numbers.map(|&value| nalgebra::convert_unchecked::<T, f64>(value).to_bits()).collect()
+        })
     }
 
     /// All operations on some numbers, one after the other.
@@ -351,8 +687,30 @@ mod tests {
             vectors.low_to_high(a),
             vectors.high_alone(a),
             vectors.high_and_low(a, b),
+            vectors.low_and_high(a, b),
         ]
         .map(|Lane4(values)| values)
+        .into()
+    }
+
+    /// The same for eight numbers.
+    fn operations8<T: RealField + Copy>(vectors: impl Vectors) -> Vec<[T; 8]> {
+        let lanes = |from: f64| {
+            Lane8(std::array::from_fn(|q| nalgebra::convert::<f64, T>((from + q as f64).sqrt())))
+        };
+        let (a, b, c) = (lanes(2.0), lanes(11.0), lanes(20.0));
+        [
+            vectors.splat8(a.0[1]),
+            vectors.load8(&b.0),
+            vectors.add8(a, b),
+            vectors.mul8(a, b),
+            vectors.sub8(a, b),
+            vectors.div8(a, b),
+            vectors.min8(a, vectors.splat8(a.0[2])),
+            vectors.max8(a, vectors.splat8(a.0[2])),
+            vectors.mul_add8(a, b, c),
+        ]
+        .map(|Lane8(values)| values)
         .into()
     }
 
@@ -366,29 +724,61 @@ mod tests {
                 #[cfg(target_arch = "x86_64")]
                 Level::V4(simd) => (operations(simd), operations(simd)),
             };
+            let (double8, single8): (Vec<[f64; 8]>, Vec<[f32; 8]>) = match level {
+                Level::Scalar => continue,
+                #[cfg(target_arch = "x86_64")]
+                Level::V3(simd) => (operations8(simd), operations8(simd)),
+                #[cfg(target_arch = "x86_64")]
+                Level::V4(simd) => (operations8(simd), operations8(simd)),
+            };
+            assert_eq!(double8, operations8(Scalar::new()), "{level:?}");
+            assert_eq!(single8, operations8(Scalar::new()), "{level:?}");
             assert_eq!(double, operations(Scalar::new()), "{level:?}");
             assert_eq!(single, operations(Scalar::new()), "{level:?}");
         }
     }
 
-    #[test]
-    fn all_widths_of_registers_give_the_same_bits() {
-        for (shape, integrator) in [
-            (Shape::Gimp, Integrator::Cd),
-            (Shape::Ugimp, Integrator::Usl),
-            (Shape::Linear, Integrator::Musl),
-            (Shape::Gimp, Integrator::Usf),
-            (Shape::Bspline2, Integrator::Cd),
-        ] {
-            fn check<const D: usize>(shape: Shape, integrator: Integrator) {
-                let plain = bits::<D>(Level::Scalar, shape, integrator);
-                for level in Level::all() {
-                    let same = bits::<D>(level, shape, integrator) == plain;
-                    assert!(same, "{D} {shape:?} {integrator:?} {level:?}");
+    /// Every shape function with every transfer; integrators take turns, so that each meets each shape and each transfer.
+    fn schemes() -> impl Iterator<Item = (Shape, Integrator, Transfer)> {
+        const SHAPES: [Shape; 7] = [
+            Shape::Linear,
+            Shape::Ugimp,
+            Shape::Gimp,
+            Shape::Bspline2,
+            Shape::Bspline3,
+            Shape::Cpdi,
+            Shape::Cpdi2,
+        ];
+        const TRANSFERS: [Transfer; 4] =
+            [Transfer::Flip, Transfer::Pic, Transfer::Apic, Transfer::Xpic(3)];
+        const INTEGRATORS: [Integrator; 5] =
+            [Integrator::Usf, Integrator::Usl, Integrator::Musl, Integrator::Usavg, Integrator::Cd];
+        let pairs = SHAPES.into_iter().enumerate().flat_map(|(i, shape)| {
+            TRANSFERS.into_iter().enumerate().map(move |(j, transfer)| (i + 2 * j, shape, transfer))
+        });
+        pairs.map(|(turn, shape, transfer)| (shape, INTEGRATORS[turn % 5], transfer))
+    }
+
+    fn check_bits<T: RealField + Copy, const D: usize>() {
+        for scheme in schemes() {
+            let plain = bits::<T, D>(Level::Scalar, 1, scheme);
+            for (turn, level) in Level::all().into_iter().rev().enumerate() {
+                // The widest registers with every number of threads, the others with some.
+                for threads in [1, 2, 3].into_iter().filter(|&n| turn == 0 || n == turn + 1) {
+                    let same = bits::<T, D>(level, threads, scheme) == plain;
+                    assert!(same, "{D} {scheme:?} {level:?} {threads} threads");
                 }
             }
-            check::<2>(shape, integrator);
-            check::<3>(shape, integrator);
         }
+    }
+
+    #[test]
+    fn all_registers_and_numbers_of_threads_give_the_same_bits() {
+        check_bits::<f64, 1>();
+        check_bits::<f64, 2>();
+        check_bits::<f64, 3>();
+        check_bits::<f32, 1>();
+        check_bits::<f32, 2>();
+        check_bits::<f32, 3>();
     }
 }

@@ -5,76 +5,24 @@ use std::fmt;
 use bytemuck::{Pod, bytes_of_mut, cast_slice_mut};
 use nalgebra::{RealField, SMatrix, SVector};
 
+use crate::body::{Body, Mesh};
 use crate::body_force::BodyForce;
 use crate::error::{SetupError, StepError};
 use crate::fault::Fault;
 use crate::geometry::Constants;
 use crate::grid::{Grid, Layout};
-use crate::health::{Invalid, axis_too_large, invalidity};
-use crate::material::{AnyLaw, Law, Material, NeoHookean, NeoHookeanNoLog};
+use crate::health::Invalid;
+use crate::kernel::block::BlockLaw;
+use crate::material::{AnyLaw, Material, NeoHookean, NeoHookeanNoLog};
 use crate::node::Node;
 use crate::parallel::bins::Bins;
 use crate::particles::Particles;
-use crate::shape_function::{
-    FixedBox, HALF_SIZE_LIMIT, Hat, QuadraticSpline, ShapeChoice, StretchingBox, ThreeNodes,
-};
+use crate::scheme::{Settings, Shape, Transfer};
+use crate::shape_function::HALF_SIZE_LIMIT;
 use crate::state::State;
-use crate::step::{Kernel, StepTimes, step_musl, step_usf, step_usl};
+use crate::step::{StepTimes, is_fused};
+use crate::support::Support;
 use crate::tensor::{determinant, real};
-
-/// Shape functions, whose values at particles are the weights of P2G and G2P.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Shape {
-    /// Hat functions at the particle's centre.
-    Linear,
-    /// GIMP weights with boxes of fixed half-size l0.
-    Ugimp,
-    /// GIMP weights with boxes of half-size `l0 F_aa` along axis a (contiguous particles).
-    Gimp,
-    /// Quadratic B-splines at the particle's centre.
-    Bspline2,
-}
-
-/// Time integration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Integrator {
-    /// Update stress first: F is updated before forces are computed.
-    Usf,
-    /// Update stress last: F is updated with the grid velocity at the end of the step.
-    Usl,
-    /// Modified update stress last: as `Usl`, with velocities projected anew from the updated particles.
-    Musl,
-    /// Centred differences: the arithmetic of `Usl`, with particle velocities half a step behind positions.
-    Cd,
-}
-
-/// The name that the field has for it.
-impl fmt::Display for Integrator {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Usf => "usf",
-            Self::Usl => "usl",
-            Self::Musl => "musl",
-            Self::Cd => "cd",
-        })
-    }
-}
-
-/// The scheme of a simulation.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings<T> {
-    /// Shape function.
-    pub shape: Shape,
-    /// Time integration.
-    pub integrator: Integrator,
-    /// Time step dt.
-    pub time_step: T,
-    /// Centred differences from velocities at time 0: halves the accelerations of the first step, so that they carry
-    /// the velocities to dt/2 only. Without it the initial velocities are those at -dt/2.
-    pub halve_first_acceleration: bool,
-}
 
 /// A running simulation.
 pub struct Simulation<T, const D: usize> {
@@ -82,43 +30,45 @@ pub struct Simulation<T, const D: usize> {
     material: Material<T>,
     settings: Settings<T>,
     state: State<T, D>,
-    kernel: Kernel<T, D>,
     steps_done: usize,
     failed: Option<StepError>,
 }
 
 impl<T: RealField + Copy, const D: usize> Simulation<T, D> {
-    /// Sets up a simulation at time 0.
+    /// Sets up a simulation at time 0, of a [`Body`] or of [`Particles`] with boxes.
     ///
     /// # Errors
     ///
     /// Where the scene makes no sense (see [`SetupError`]) or does not fit into memory.
     pub fn new(
         grid: Grid<T, D>,
-        particles: Particles<T, D>,
+        body: impl Into<Body<T, D>>,
+        material: Material<T>,
+        settings: Settings<T>,
+    ) -> Result<Self, SetupError> {
+        Self::set_up(grid, body.into(), material, settings)
+    }
+
+    pub(crate) fn set_up(
+        grid: Grid<T, D>,
+        body: Body<T, D>,
         material: Material<T>,
         settings: Settings<T>,
     ) -> Result<Self, SetupError> {
         const { assert!(1 <= D && D <= 3, "one, two or three dimensions") };
-        check(&grid, &particles, &settings)?;
-        let state = allocate(&grid, particles, &settings)?;
-        let cells = state.particles.half_size / grid.spacing;
-        let (state, kernel) = match settings.shape {
-            Shape::Linear => with_shape(state, Hat, &material, &settings),
-            Shape::Ugimp => {
-                let shape = ThreeNodes::FixedBox(FixedBox(cells));
-                with_shape(state, shape, &material, &settings)
-            }
-            Shape::Gimp => {
-                let shape = ThreeNodes::StretchingBox(StretchingBox(cells));
-                with_shape(state, shape, &material, &settings)
-            }
-            Shape::Bspline2 => {
-                let shape = ThreeNodes::Quadratic(QuadraticSpline);
-                with_shape(state, shape, &material, &settings)
-            }
-        }?;
-        Ok(Self { grid, material, settings, state, kernel, steps_done: 0, failed: None })
+        check(&grid, &body, &settings)?;
+        let mut state = allocate(&grid, body, law(&material), &settings)?;
+        let Particles { x, F, .. } = &state.particles;
+        let worst = (0..x.len())
+            .filter_map(|p| Some((state.support.invalidity(&state.constants, p, &x[p], &F[p])?, p)))
+            .min();
+        if let Some((invalid, particle)) = worst {
+            let error = describe(&state, invalid, particle, 0, T::zero());
+            return Err(SetupError::InitialState(error));
+        }
+        state.sort();
+        state.start_affine();
+        Ok(Self { grid, material, settings, state, steps_done: 0, failed: None })
     }
 
     /// Advances by one time step.
@@ -140,11 +90,11 @@ impl<T: RealField + Copy, const D: usize> Simulation<T, D> {
         let scale = if halved { real(0.5) } else { T::one() };
         let end = self.settings.time_step * real((self.steps_done + 1) as f64);
         let times = StepTimes { start: self.time(), end, scale };
-        let outcome = (self.kernel)(&mut self.state, body_force, times);
+        let outcome = self.state.step(self.settings.integrator, body_force, times);
         if let Some((invalid, particle)) = outcome.failure {
             let step = self.steps_done + 1;
             let time = self.settings.time_step * real(step as f64);
-            let error = describe(&self.state, &self.settings, invalid, particle, step, time);
+            let error = describe(&self.state, invalid, particle, step, time);
             self.failed = Some(error.clone());
             return Err(error);
         }
@@ -155,6 +105,14 @@ impl<T: RealField + Copy, const D: usize> Simulation<T, D> {
     /// The particles at the current time; their velocities lag by [`velocity_lag`](Self::velocity_lag).
     pub fn particles(&self) -> &Particles<T, D> {
         &self.state.particles
+    }
+
+    /// The corners of the particles' domains at the current time, with CPDI2.
+    pub fn mesh(&self) -> Option<&Mesh<T, D>> {
+        match &self.state.support {
+            Support::Cpdi2 { mesh, .. } => Some(mesh),
+            Support::Product(_) | Support::Cpdi { .. } => None,
+        }
     }
 
     /// Number of completed steps.
@@ -186,9 +144,10 @@ impl<T: RealField + Copy, const D: usize> Simulation<T, D> {
     ///
     /// With a halved first acceleration that holds from the first step on; the initial velocities are those at time 0.
     pub fn velocity_lag(&self) -> T {
-        match self.settings.integrator {
-            Integrator::Cd => self.settings.time_step * real(0.5),
-            Integrator::Usf | Integrator::Usl | Integrator::Musl => T::zero(),
+        if self.settings.integrator.is_staggered() {
+            self.settings.time_step * real(0.5)
+        } else {
+            T::zero()
         }
     }
 }
@@ -200,10 +159,15 @@ impl<T: RealField + Pod, const D: usize> Simulation<T, D> {
     pub fn state(&mut self) -> Vec<&mut [u8]> {
         // The caller may overwrite the particles, and the grid no longer belongs to them.
         self.state.is_ahead = false;
-        let Particles { x, v, F, .. } = &mut self.state.particles;
+        let State { particles, affine, support, bins, .. } = &mut self.state;
+        let Particles { x, v, F, .. } = particles;
         let mut state = vec![cast_slice_mut(x), cast_slice_mut(v), cast_slice_mut(F)];
+        state.push(cast_slice_mut(affine));
+        if let Support::Cpdi2 { mesh, .. } = support {
+            state.push(cast_slice_mut(&mut mesh.x));
+        }
         // The order of the last sort decides the order of sums over particles.
-        state.extend(self.state.bins.state());
+        state.extend(bins.state());
         state.push(bytes_of_mut(&mut self.steps_done));
         state
     }
@@ -227,9 +191,21 @@ fn figure<T: RealField>(value: T) -> f64 {
     nalgebra::try_convert(value).unwrap_or(f64::NAN)
 }
 
+/// The law, for blocks of particles.
+fn law<T: RealField + Copy, const D: usize>(material: &Material<T>) -> Box<dyn BlockLaw<T, D>> {
+    let planted = crate::fault::Planted::here();
+    match *material {
+        Material::NeoHookean { lambda, mu } if lambda == T::zero() => {
+            Box::new(NeoHookeanNoLog { mu })
+        }
+        Material::NeoHookean { lambda, mu } => Box::new(NeoHookean { lambda, mu, planted }),
+        other => Box::new(AnyLaw(other)),
+    }
+}
+
 fn check<T: RealField + Copy, const D: usize>(
     grid: &Grid<T, D>,
-    particles: &Particles<T, D>,
+    body: &Body<T, D>,
     settings: &Settings<T>,
 ) -> Result<(), SetupError> {
     let positive = |quantity: &dyn Fn() -> String, value: T| {
@@ -240,20 +216,28 @@ fn check<T: RealField + Copy, const D: usize>(
     };
     positive(&|| "the time step".into(), settings.time_step)?;
     positive(&|| "the grid spacing".into(), grid.spacing)?;
+    if settings.transfer == Transfer::Xpic(0) {
+        let quantity = "the order of XPIC".into();
+        return Err(SetupError::NotPositive { quantity, value: 0.0 });
+    }
     if grid.lower.iter().any(|x| !x.is_finite()) {
         return Err(SetupError::NotFinite { quantity: "the lower corner of the grid".into() });
     }
-    if settings.halve_first_acceleration && settings.integrator != Integrator::Cd {
+    if settings.halve_first_acceleration && !settings.integrator.is_staggered() {
         return Err(SetupError::HalvedStart { integrator: settings.integrator.to_string() });
     }
+    let Body { particles, half_edges, mesh } = body;
     let Particles { X, x, v, F, mass, volume, half_size } = particles;
     let expected = X.len();
+    let boxes = if half_edges.is_empty() { expected } else { half_edges.len() };
     for (array, found) in [
         ("x", x.len()),
         ("v", v.len()),
         ("F", F.len()),
         ("mass", mass.len()),
         ("volume", volume.len()),
+        ("half_edges", boxes),
+        ("corners", mesh.as_ref().map_or(expected, |mesh| mesh.corners.len())),
     ] {
         if found != expected {
             return Err(SetupError::LengthMismatch { array, found, expected });
@@ -266,7 +250,9 @@ fn check<T: RealField + Copy, const D: usize>(
     if expected > limit {
         return Err(SetupError::TooManyParticles { particles: expected, limit });
     }
-    if matches!(settings.shape, Shape::Ugimp | Shape::Gimp) {
+    let of_boxes = matches!(settings.shape, Shape::Ugimp | Shape::Gimp);
+    let of_domains = settings.shape == Shape::Cpdi && half_edges.is_empty();
+    if of_boxes || of_domains {
         for (axis, &l) in half_size.iter().enumerate() {
             positive(&|| format!("the half-size of particles along axis {axis}"), l)?;
         }
@@ -282,20 +268,61 @@ fn check<T: RealField + Copy, const D: usize>(
             }
         }
     }
-    Ok(())
+    let of_box = SMatrix::from_diagonal(half_size);
+    for (particle, E) in half_edges.iter().enumerate() {
+        match settings.shape {
+            Shape::Ugimp | Shape::Gimp if *E != of_box => {
+                return Err(SetupError::NotABox { particle });
+            }
+            Shape::Cpdi => {
+                positive(&|| format!("the domain of particle {particle}"), determinant(E))?;
+            }
+            _ => {}
+        }
+    }
+    match mesh {
+        _ if settings.shape != Shape::Cpdi2 => Ok(()),
+        Some(mesh) => check_corners(mesh),
+        None => Err(SetupError::NoCorners),
+    }
+}
+
+fn check_corners<T, const D: usize>(mesh: &Mesh<T, D>) -> Result<(), SetupError> {
+    let (expected, found) = (mesh.X.len(), mesh.x.len());
+    if found != expected {
+        return Err(SetupError::LengthMismatch { array: "x of the corners", found, expected });
+    }
+    let mut idle = vec![true; expected];
+    for &corner in mesh.corners.iter().flat_map(|corners| &corners[..1 << D]) {
+        *idle.get_mut(corner).ok_or(SetupError::NoSuchCorner { corner, corners: expected })? =
+            false;
+    }
+    match idle.iter().position(|&idle| idle) {
+        Some(corner) => Err(SetupError::IdleCorner { corner }),
+        None => Ok(()),
+    }
 }
 
 /// Reserves all memory of a run.
 fn allocate<T: RealField + Copy, const D: usize>(
     grid: &Grid<T, D>,
-    particles: Particles<T, D>,
+    mut body: Body<T, D>,
+    law: Box<dyn BlockLaw<T, D>>,
     settings: &Settings<T>,
 ) -> Result<State<T, D>, SetupError> {
-    let usf = settings.integrator == Integrator::Usf;
-    let musl = settings.integrator == Integrator::Musl;
-    let ahead = !usf && !musl;
-    let grids = if musl || ahead { 2 } else { 1 };
-    let bytes_per_node = grids * size_of::<Node<T, D>>();
+    let Settings { shape, integrator, transfer, .. } = *settings;
+    let count = body.particles.x.len();
+    if shape == Shape::Cpdi && body.half_edges.is_empty() {
+        body.half_edges = vec![SMatrix::from_diagonal(&body.particles.half_size); count];
+    }
+    let (support, particles) = Support::new(shape, body, grid.spacing);
+    let fused = is_fused(integrator, transfer, &support);
+    let filtered = matches!(transfer, Transfer::Xpic(order) if order > 1);
+    let reprojects = integrator.reprojects() || filtered;
+    let ahead = fused || filtered;
+    let grids = 1 + usize::from(reprojects) + usize::from(ahead);
+    let of_filter = if filtered { size_of::<SVector<T, D>>() } else { 0 };
+    let bytes_per_node = grids * size_of::<Node<T, D>>() + of_filter;
     let layout = Layout::new(grid, bytes_per_node)?;
     // Asking first turns a grid that is too large into an error instead of an abort.
     let nodes = |is_needed: bool| {
@@ -308,112 +335,66 @@ fn allocate<T: RealField + Copy, const D: usize>(
         nodes.resize(count, Node::zero());
         Ok::<_, SetupError>(nodes)
     };
-    let (now, reprojected, next) = (nodes(true)?, nodes(musl)?, nodes(ahead)?);
-    let bins = Bins::new(&layout, particles.len());
+    let (now, reprojected, next) = (nodes(true)?, nodes(reprojects)?, nodes(ahead)?);
+    let bins = Bins::new(&layout, count);
     let least = particles.mass.iter().fold(particles.mass[0], |least, &m| least.min(m));
     let Particles { mass, volume, .. } = &particles;
     let (m, V) = (mass[0], volume[0]);
     let uniform = mass.iter().all(|&mass| mass == m) && volume.iter().all(|&volume| volume == V);
+    let early = integrator.early() > 0.0;
     Ok(State {
         uniform: uniform.then_some((m, V)),
         constants: Constants::new(grid, &layout, &bins, settings.time_step, least),
         nodes: now,
-        F_next: if usf { vec![SMatrix::identity(); particles.len()] } else { Vec::new() },
+        F_early: if early { vec![SMatrix::identity(); count] } else { Vec::new() },
         reprojected,
         next,
         is_ahead: false,
+        filtered: if filtered { vec![SVector::zeros(); layout.nodes] } else { Vec::new() },
         of_time: Vec::new(),
+        affine: Vec::new(),
         particles,
+        support,
+        law,
+        transfer,
         layout,
         bins,
     })
 }
 
-type Prepared<T, const D: usize> = Result<(State<T, D>, Kernel<T, D>), SetupError>;
-
-/// Checks the initial state, sorts the particles, and picks the kernel for this shape function.
-fn with_shape<T, R, const D: usize, const W: usize>(
-    mut state: State<T, D>,
-    shape: R,
-    material: &Material<T>,
-    settings: &Settings<T>,
-) -> Prepared<T, D>
-where
-    T: RealField + Copy,
-    R: ShapeChoice<T, D, W>,
-{
-    let Particles { x, F, .. } = &state.particles;
-    for p in 0..x.len() {
-        if let Some(invalid) = invalidity(&shape, &state.constants, &x[p], &F[p]) {
-            let error = describe(&state, settings, invalid, p, 0, T::zero());
-            return Err(SetupError::InitialState(error));
-        }
-    }
-    state.sort(shape);
-    let kernel = match *material {
-        Material::NeoHookean { lambda, mu } if lambda == T::zero() => {
-            with_law(shape, NeoHookeanNoLog { mu }, settings.integrator)
-        }
-        Material::NeoHookean { lambda, mu } => {
-            let planted = state.constants.planted;
-            with_law(shape, NeoHookean { lambda, mu, planted }, settings.integrator)
-        }
-        other => with_law(shape, AnyLaw(other), settings.integrator),
-    };
-    Ok((state, kernel))
-}
-
-/// The kernel for this shape function and law.
-fn with_law<T, R, L, const D: usize, const W: usize>(
-    shape: R,
-    law: L,
-    integrator: Integrator,
-) -> Kernel<T, D>
-where
-    T: RealField + Copy,
-    R: ShapeChoice<T, D, W>,
-    L: Law<T>,
-{
-    match integrator {
-        Integrator::Usl | Integrator::Cd => {
-            Box::new(move |s, b, times| step_usl(s, (shape, law), b, times))
-        }
-        Integrator::Musl => Box::new(move |s, b, times| step_musl(s, (shape, law), b, times)),
-        Integrator::Usf => Box::new(move |s, b, times| step_usf(s, (shape, law), b, times)),
-    }
-}
-
 /// The error for an invalid particle, with the figures of its present state.
 fn describe<T: RealField + Copy, const D: usize>(
     state: &State<T, D>,
-    settings: &Settings<T>,
     invalid: Invalid,
     particle: usize,
     step: usize,
     time: T,
 ) -> StepError {
-    let (x, F) = (&state.particles.x[particle], &state.particles.F[particle]);
+    let State { constants: c, support, particles, .. } = state;
+    let (x, F) = (&particles.x[particle], &particles.F[particle]);
     let position = x.iter().map(|&x| figure(x)).collect();
     let (time, J) = (figure(time), figure(determinant(F)));
     match invalid {
+        // It may be the domain between the corners that is inverted.
+        Invalid::Inverted if J > 0.0 => {
+            let volume = support.volume(particle).map_or(J, figure);
+            let J = volume / figure(particles.volume[particle]);
+            StepError::Inverted { step, time, particle, J }
+        }
         Invalid::Inverted => StepError::Inverted { step, time, particle, J },
         Invalid::NotFinite => StepError::NotFinite { step, time, particle, position, J },
         Invalid::LeftGrid => {
-            let axis = state.constants.axis_outside(x).unwrap_or(0);
-            let (lower, upper) = state.constants.range(axis);
+            let axis = c.axis_outside(x).unwrap_or(0);
+            let (lower, upper) = c.range(axis);
             let (lower, upper) = (figure(lower), figure(upper));
             StepError::LeftGrid { step, time, particle, position, axis, lower, upper }
         }
         Invalid::TooLarge => {
-            let l0 = &state.particles.half_size;
-            let l = match settings.shape {
-                Shape::Gimp => SVector::from_fn(|a, _| (l0[a] * F[(a, a)]).abs()),
-                Shape::Linear | Shape::Ugimp | Shape::Bspline2 => *l0,
-            };
-            let spacing = state.constants.spacing();
-            let axis = axis_too_large(&(l / spacing)).unwrap_or(0);
-            let limit = figure(spacing) * HALF_SIZE_LIMIT;
-            StepError::TooLarge { step, time, particle, axis, half_size: figure(l[axis]), limit }
+            let l = support.half_size(c, particle, x, F);
+            let axis = support.axis_too_large(&l).unwrap_or(0);
+            let spacing = figure(c.spacing());
+            let (half_size, limit) = (figure(l[axis]) * spacing, spacing * HALF_SIZE_LIMIT);
+            StepError::TooLarge { step, time, particle, axis, half_size, limit }
         }
     }
 }

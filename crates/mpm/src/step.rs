@@ -1,15 +1,16 @@
-//! One time step: each integrator is a sequence of P2G, grid update and G2P. To add an integrator, add its sequence here and
-//! choose it in [`Simulation::new`](crate::Simulation::new).
+//! One time step: a sequence of P2G, grid update and G2P.
 //!
-//! Kernels have one instance for every combination of dimension, shape function and law.
+//! Integrators differ in the time at which F follows the grid: before forces are computed, after it, or both. To add one, say so
+//! in [`Integrator`](crate::Integrator).
 
 use nalgebra::RealField;
 
 use crate::body_force::BodyForce;
 use crate::health::Outcome;
-use crate::material::Law;
-use crate::shape_function::ShapeChoice;
+use crate::scheme::{Integrator, Transfer};
 use crate::state::State;
+use crate::support::Support;
+use crate::tensor::real;
 
 /// Times of a step, and the factor on its accelerations.
 #[derive(Clone, Copy, Debug)]
@@ -20,74 +21,67 @@ pub(crate) struct StepTimes<T> {
     pub(crate) scale: T,
 }
 
-/// A step of one integrator, with its shape function and law.
-pub(crate) type Kernel<T, const D: usize> =
-    Box<dyn Fn(&mut State<T, D>, &dyn BodyForce<T, D>, StepTimes<T>) -> Outcome + Send + Sync>;
-
-/// USL, and with it centred differences: stress from `F^n`, F updated with the grid velocity at the end of the step.
+/// Whether steps are single passes, G2P of one fused with P2G of the next.
 ///
-/// One pass a step: G2P of this step is fused with P2G of the next one.
-pub(crate) fn step_usl<T, R, L, const D: usize, const W: usize>(
-    s: &mut State<T, D>,
-    (shape, law): (R, L),
-    body_force: &dyn BodyForce<T, D>,
-    times: StepTimes<T>,
-) -> Outcome
-where
-    T: RealField + Copy,
-    R: ShapeChoice<T, D, W>,
-    L: Law<T>,
-{
-    if !s.is_ahead {
-        if !s.bins.is_sorted() {
-            s.sort(shape);
+/// They are where F follows the grid last, and all that P2G needs is known of a particle right after G2P.
+pub(crate) fn is_fused<T, const D: usize>(
+    integrator: Integrator,
+    transfer: Transfer,
+    support: &Support<T, D>,
+) -> bool {
+    let stress_last = integrator.early() == 0.0 && !integrator.reprojects();
+    stress_last && transfer == Transfer::Flip && matches!(support, Support::Product(_))
+}
+
+impl<T: RealField + Copy, const D: usize> State<T, D> {
+    /// Advances by a step.
+    pub(crate) fn step(
+        &mut self,
+        integrator: Integrator,
+        body_force: &dyn BodyForce<T, D>,
+        times: StepTimes<T>,
+    ) -> Outcome {
+        if !self.bins.is_sorted() {
+            self.sort();
         }
-        s.p2g(shape, law, body_force, (times.start, times.scale));
+        if is_fused(integrator, self.transfer, &self.support) {
+            return self.fused_step(body_force, times);
+        }
+        let early = integrator.early();
+        let dt = self.constants.time_step;
+        if early > 0.0 {
+            self.p2g_momentum();
+            let outcome = self.g2p_stretch(dt * real(early));
+            if outcome.failure.is_some() {
+                std::mem::swap(&mut self.particles.F, &mut self.F_early);
+                return outcome;
+            }
+            self.p2g_force(body_force, times);
+        } else {
+            self.p2g(body_force, times);
+        }
+        if let Transfer::Xpic(order) = self.transfer {
+            self.filter(order);
+        }
+        self.move_corners();
+        let outcome = if integrator.reprojects() {
+            self.g2p_velocity();
+            self.p2g_updated_momentum();
+            self.g2p_reprojected()
+        } else {
+            self.g2p(dt * real(1.0 - early))
+        };
+        self.resort_if(outcome)
     }
-    let outcome = s.g2p2g(shape, law, body_force, times.end);
-    // After a sort or a failure the partial sums on the grid are of no use.
-    s.is_ahead = outcome.is_clean();
-    s.resort_if(outcome, shape)
-}
 
-/// MUSL: as USL, but F is updated with velocities projected anew from the updated particles.
-pub(crate) fn step_musl<T, R, L, const D: usize, const W: usize>(
-    s: &mut State<T, D>,
-    (shape, law): (R, L),
-    body_force: &dyn BodyForce<T, D>,
-    times: StepTimes<T>,
-) -> Outcome
-where
-    T: RealField + Copy,
-    R: ShapeChoice<T, D, W>,
-    L: Law<T>,
-{
-    s.p2g(shape, law, body_force, (times.start, times.scale));
-    s.g2p_velocity(shape);
-    s.p2g_updated_momentum(shape);
-    let outcome = s.g2p_reprojected(shape);
-    s.resort_if(outcome, shape)
-}
-
-/// USF: F is updated first, with the grid velocity at the start of the step; stress from the updated F.
-pub(crate) fn step_usf<T, R, L, const D: usize, const W: usize>(
-    s: &mut State<T, D>,
-    (shape, law): (R, L),
-    body_force: &dyn BodyForce<T, D>,
-    times: StepTimes<T>,
-) -> Outcome
-where
-    T: RealField + Copy,
-    R: ShapeChoice<T, D, W>,
-    L: Law<T>,
-{
-    s.p2g_momentum(shape);
-    let outcome = s.g2p_stretch(shape);
-    if outcome.failure.is_some() {
-        std::mem::swap(&mut s.particles.F, &mut s.F_next);
-        return outcome;
+    /// A step in a single pass.
+    fn fused_step(&mut self, body_force: &dyn BodyForce<T, D>, times: StepTimes<T>) -> Outcome {
+        if !self.is_ahead {
+            self.p2g(body_force, times);
+        }
+        let outcome = self.g2p2g(body_force, times.end);
+        // After a sort or a failure the partial sums on the grid are of no use.
+        self.is_ahead = outcome.is_clean();
+        self.resort_if(outcome)
     }
-    s.p2g_force(shape, law, body_force, (times.start, times.scale));
-    let outcome = s.g2p_stretched(shape);
-    s.resort_if(outcome, shape)
 }

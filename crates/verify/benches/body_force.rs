@@ -9,7 +9,7 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use mmsmith_mpm::{
     AtTime, BodyForce, Grid, Integrator, Material, NoBodyForce, Particles, Settings, Shape,
-    Simulation,
+    Simulation, Transfer,
 };
 use mmsmith_solutions::{
     AxisAligned, AxisAlignedParameters, BodyForceAtPoints, Material as Law, Solution,
@@ -95,7 +95,9 @@ fn simulation((shape, integrator): (Shape, Integrator)) -> Simulation<f64, 2> {
         *v = exact.velocity(X, 0.0);
     }
     let time_step = 0.2 * spacing / exact.wave_speed();
-    let settings = Settings { shape, integrator, time_step, halve_first_acceleration: false };
+    let transfer = Transfer::Flip;
+    let settings =
+        Settings { shape, integrator, transfer, time_step, halve_first_acceleration: false };
     let Law::NeoHookean { lambda, mu } = exact.material() else { unreachable!() };
     Simulation::new(grid, particles, Material::NeoHookean { lambda, mu }, settings).unwrap()
 }

@@ -5,8 +5,10 @@ use std::time::Instant;
 
 use cpu_time::ProcessTime;
 use mmsmith_mpm::fault::{Fault, Planted};
-use mmsmith_mpm::general::{Integrator, Shape, Transfer};
-use mmsmith_mpm::{AtTime, BodyForce, Particles, Settings, SetupError, Simulation, StepError};
+use mmsmith_mpm::{
+    AtTime, BodyForce, Integrator, Particles, Scalar, SetupError, Shape, Solver, StepError,
+    Transfer,
+};
 use mmsmith_solutions::{AnySolution, BodyForceAtPoints, Material, Real, Solution};
 use nalgebra::SVector;
 use serde::{Serialize, Serializer};
@@ -15,15 +17,14 @@ use thiserror::Error;
 use crate::checkpoint::{CheckpointError, Checkpoints, Reached, TakenUp};
 use crate::dimension::in_arithmetic;
 use crate::frames::{FrameOutput, FrameWriter, Snapshot};
-use crate::general::{self, Placement, Precision};
 use crate::history::{Moment, Recorder};
 use crate::measure::Comparison;
 use crate::norms::{Field, PerField, PerNorm, magnitude};
 use crate::plan::{MOST_STEPS, Steps, prepare};
 use crate::points;
 use crate::scene::{Extent, Scene, SceneError};
-use crate::solver::Solver;
 use crate::total::{CflSpeed, Frame};
+use crate::updated::{self, Placement};
 
 /// How the centred-difference integrator gets its first velocity, half a step before the start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -339,15 +340,15 @@ impl Case {
             return Err(CaseError::Setting { setting, value, admissible: "from -0.5 to 0.5" });
         }
         match &self.frame {
-            Frame::Updated => general::validate(self),
+            Frame::Updated => updated::validate(self),
             Frame::Total(total) => total.validate(self),
         }
     }
 
-    /// Whether the steps are shared among threads: those of the fast step are. Errors always are.
+    /// Whether the steps are shared among threads. Errors always are.
     #[must_use]
     pub fn steps_on_threads(&self) -> bool {
-        general::fast_step(self).is_some()
+        self.frame == Frame::Updated
     }
 }
 
@@ -378,7 +379,7 @@ pub fn run(
     )
 }
 
-fn run_in<T: Precision, const D: usize>(
+fn run_in<T: Real + Scalar<D>, const D: usize>(
     exact: &dyn Solution<f64, D>,
     model: &dyn Solution<T, D>,
     case: &Case,
@@ -437,7 +438,7 @@ fn follow<T: Real, const D: usize>(
     outputs: &mut Outputs<'_>,
 ) -> Result<Row, CaseError> {
     let dt = steps.dt;
-    let lag = solver.velocity_lag();
+    let lag = solver.velocity_lag().to_f64();
     let comparison = Comparison::new(exact, &solver.observe().0.X);
     let mut frames = match outputs.frames {
         Some(output) => Some(FrameWriter::new(output, steps.count, lag)?),
@@ -552,30 +553,17 @@ fn follow<T: Real, const D: usize>(
 /// A solver at time zero, and the body force that drives it.
 type Driven<'a, T, const D: usize> = (Box<dyn Solver<T, D> + 'a>, ExactBodyForce<'a, T, D>);
 
-/// The solver of a case with steps of `time_step`: the fast step where it has the case.
-pub(crate) fn set_up<'a, T: Precision, const D: usize>(
+/// The solver of a case with steps of `time_step`, and the body force that drives it.
+pub(crate) fn set_up<'a, T: Real + Scalar<D>, const D: usize>(
     exact: &'a dyn Solution<f64, D>,
     model: &'a dyn Solution<T, D>,
     case: &Case,
     scene: &Scene<D>,
     time_step: T,
 ) -> Result<Driven<'a, T, D>, CaseError> {
-    let Some((shape, integrator)) = general::fast_step(case) else {
-        let mut solver = T::other(exact, case, scene, time_step)?;
-        let body_force = ExactBodyForce::new(model, &solver.observe().0.X);
-        return Ok((solver, body_force));
-    };
-    let grid = scene.grid::<T>();
-    let mut particles = scene.particles(&grid, case, exact.density());
-    if particles.is_empty() {
-        return Err(SceneError::Empty { cells: case.cells }.into());
-    }
-    set_in_motion(&mut particles, exact, case, time_step.to_f64());
-    let settings =
-        Settings { shape, integrator, time_step, halve_first_acceleration: starts_halved(case) };
-    let body_force = ExactBodyForce::new(model, &particles.X);
-    let simulation = Simulation::new(grid, particles, law(model.material())?, settings)?;
-    Ok((Box::new(simulation), body_force))
+    let mut solver = updated::solver(exact, model, case, scene, time_step)?;
+    let body_force = ExactBodyForce::new(model, &solver.observe().0.X);
+    Ok((solver, body_force))
 }
 
 /// Whether the first step's acceleration is halved.

@@ -7,15 +7,13 @@
 use std::time::{Duration, Instant};
 
 use cpu_time::ProcessTime;
-use mmsmith_mpm::BodyForce;
+use mmsmith_mpm::{BodyForce, Scalar, Solver};
 use mmsmith_solutions::{AnySolution, Real, Solution};
 
 use crate::case::{Arithmetic, Case, CaseError, set_up};
 use crate::dimension::in_arithmetic;
-use crate::general::Precision;
 use crate::measure::Comparison;
 use crate::plan::{Plan, plan, prepare};
-use crate::solver::Solver;
 
 /// Of how many steps the times are kept.
 const FIRST_STEPS: usize = 63;
@@ -70,7 +68,7 @@ struct Limits {
     until: Option<Instant>,
 }
 
-fn time_in<T: Precision, const D: usize>(
+fn time_in<T: Real + Scalar<D>, const D: usize>(
     exact: &dyn Solution<f64, D>,
     model: &dyn Solution<T, D>,
     case: &Case,
@@ -107,7 +105,7 @@ fn advance<T: Real, const D: usize>(
         }
     }
     let (wall_s, cpu_s) = (started.elapsed().as_secs_f64(), computing.elapsed().as_secs_f64());
-    let lag = solver.velocity_lag();
+    let lag = solver.velocity_lag().to_f64();
     let started = Instant::now();
     let comparison = Comparison::new(exact, &solver.observe().0.X);
     let setup_s = setup_s + started.elapsed().as_secs_f64();

@@ -26,7 +26,6 @@ mod difference;
 mod dimension;
 mod evaluate;
 mod frames;
-mod general;
 mod history;
 mod measure;
 mod norms;
@@ -36,12 +35,12 @@ mod points;
 mod record;
 mod scene;
 mod score;
-mod solver;
 mod stability;
 mod study;
 mod temporal;
 mod total;
 mod tradeoff;
+mod updated;
 mod verdict;
 mod whole_file;
 
@@ -55,11 +54,11 @@ pub use cost::{Cost, CostModel, Timing, time_steps};
 pub use coverage::{Part, Share, coverage, smallest_set};
 pub use evaluate::{FieldRow, WrongLength, evaluate};
 pub use frames::{FrameOutput, Snapshot};
-pub use general::{Placement, uses_threads};
+
 pub use history::{MOST_MOMENTS, Moment, Sums, energy_drift};
 pub use mmsmith_mpm::StepError;
-pub use mmsmith_mpm::general::{Integrator, Shape, Transfer};
 pub use mmsmith_mpm::total_lagrangian::{Composition, Coordinates, Layout, MassMatrix, Scheme};
+pub use mmsmith_mpm::{Integrator, Shape, Transfer};
 pub use norms::{Field, Norm, PerField, PerNorm};
 pub use order::Order;
 pub use plan::{Plan, plan, round_off};
@@ -81,6 +80,7 @@ pub use tradeoff::{
     RepeatOutcome, RunOutcome, Setting, SettingName, Skip, TOLERANCES, TimeEffect, Tradeoff,
     differences, extrapolate, families, leading, median, pareto, tradeoff,
 };
+pub use updated::Placement;
 pub use verdict::{
     Behaviour, Expected, ORDER_TOLERANCE, Values, Verdict as OrderVerdict, expected_in_space,
     expected_in_time, verdicts, verdicts_above,

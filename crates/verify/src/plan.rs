@@ -4,10 +4,10 @@ use mmsmith_solutions::{AnySolution, Solution};
 
 use crate::case::{Arithmetic, Case, CaseError};
 use crate::dimension::in_dimension;
-use crate::general;
 use crate::norms::PerField;
 use crate::scene::{Extent, Scene};
 use crate::total::{CflSpeed, Frame};
+use crate::updated;
 
 /// Steps that no run should have; a typing error in a CFL number reaches it easily.
 pub(crate) const MOST_STEPS: f64 = 1e12;
@@ -79,23 +79,22 @@ fn plan_in<const D: usize>(
 ) -> Result<Plan, CaseError> {
     let (scene, steps) = prepare(exact, case)?;
     let particles = match &case.frame {
-        Frame::Updated => scene.particles_expected(case.per_cell),
+        Frame::Updated => {
+            updated::admit(&scene, case)?;
+            scene.particles_expected(case.per_cell)
+        }
         Frame::Total(total) => {
             let grid = total.grid(&scene, case.per_cell)?;
             grid.axes.iter().map(|axis| axis.cells as f64 * case.per_cell as f64).product()
         }
     };
-    let is_general = case.frame == Frame::Updated && general::fast_step(case).is_none();
-    if is_general {
-        general::admit(&scene, case)?;
-    }
     let kept = Scene::bytes_of_exact(exact, scalar);
     Ok(Plan {
         steps: steps.count,
         particles,
-        bytes: match is_general {
-            true => general::bytes_expected(&scene, case, kept),
-            false => scene.bytes_expected(case.per_cell, scalar, kept),
+        bytes: match &case.frame {
+            Frame::Updated => updated::bytes_expected(&scene, case, scalar, kept),
+            Frame::Total(_) => scene.bytes_expected(case.per_cell, scalar, kept),
         },
         extent: scene.extent(),
         round_off: unit * scene.reach() * (steps.count as f64).sqrt(),

@@ -1,6 +1,6 @@
 //! From a solution to a grid with walls and particles.
 
-use mmsmith_mpm::{Grid, Particles};
+use mmsmith_mpm::Grid;
 use mmsmith_solutions::{AnySolution, Boundary, Condition, Domain, Real, Solution, Surface};
 use nalgebra::SVector;
 use thiserror::Error;
@@ -293,26 +293,6 @@ impl<const D: usize> Scene<D> {
     pub(crate) fn bytes_of_exact(solution: &dyn Solution<f64, D>, scalar: usize) -> usize {
         let body_force = solution.body_force_at(&[]).bytes_per_point();
         body_force * scalar / size_of::<f64>() + solution.state_at(&[]).bytes_per_point()
-    }
-
-    /// The particles at rest in the reference configuration: those whose centre lies in the body.
-    pub(crate) fn particles<T: Real>(
-        &self,
-        grid: &Grid<T, D>,
-        case: &Case,
-        density: f64,
-    ) -> Particles<T, D> {
-        let inside = self.inside(case.per_cell, case.offset);
-        let mut particles = Particles::lattice(grid, case.per_cell, Real::nearest(density), inside);
-        if case.offset != 0.0 {
-            let distance = self.spacing / case.per_cell as f64;
-            let shift: SVector<T, D> = SVector::repeat(Real::nearest(case.offset * distance));
-            for (X, x) in particles.X.iter_mut().zip(&mut particles.x) {
-                *X += shift;
-                *x = *X;
-            }
-        }
-        particles
     }
 
     /// Whether a place of the lattice with `per_cell` particles in a cell and direction lies in the body once it is shifted

@@ -16,17 +16,15 @@
 //! be left. A run has the length of its periods, and at least that of 64 cells at the speed that the CFL number refers to,
 //! so that an instability has steps to grow in.
 
-use mmsmith_mpm::{BodyForce, Material, Particles, StepError};
+use mmsmith_mpm::{BodyForce, Material, Particles, Scalar, Solver, StepError};
 use mmsmith_solutions::{AnySolution, Real, Solution};
 use serde::{Deserialize, Serialize};
 
 use crate::case::{Arithmetic, Case, CaseError, law, set_up};
 use crate::dimension::{in_arithmetic, in_dimension};
-use crate::general::Precision;
 use crate::history::Totals;
 use crate::plan::{MOST_STEPS, plan, prepare};
 use crate::scene::Scene;
-use crate::solver::Solver;
 use crate::total::CflSpeed;
 
 /// When a run counts as unstable.
@@ -411,7 +409,7 @@ fn scales<const D: usize>(
     Ok((unit, periods.max(LEAST_CELLS * scene.spacing / speed)))
 }
 
-fn run_in<T: Precision, const D: usize>(
+fn run_in<T: Real + Scalar<D>, const D: usize>(
     exact: &dyn Solution<f64, D>,
     model: &dyn Solution<T, D>,
     case: &Case,
@@ -447,7 +445,7 @@ impl<const D: usize> Run<'_, D> {
         solver: &mut dyn Solver<T, D>,
         body_force: &dyn BodyForce<T, D>,
     ) -> Result<Observed, CaseError> {
-        let lag = solver.velocity_lag();
+        let lag = solver.velocity_lag().to_f64();
         let material = law::<f64>(self.exact.material())?;
         let scales = self.largest(solver.observe().0, &material);
         let (mut error, mut energy, mut momentum) = (0.0_f64, 0.0_f64, 0.0_f64);

@@ -9,13 +9,13 @@
 
 use std::collections::BTreeMap;
 
+use mmsmith_mpm::Scalar;
 use mmsmith_solutions::{AnySolution, Real, Solution};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 
 use crate::case::{Arithmetic, Case, CaseError, Progress, Status, set_up};
 use crate::dimension::in_arithmetic;
-use crate::general::Precision;
 use crate::norms::{PerField, PerNorm, Tallies, is_squarable, magnitude, scale_of};
 use crate::order::Order;
 use crate::plan::{MOST_STEPS, prepare};
@@ -92,7 +92,7 @@ pub fn temporal(
     )
 }
 
-fn over<T: Precision, const D: usize>(
+fn over<T: Real + Scalar<D>, const D: usize>(
     exact: &dyn Solution<f64, D>,
     model: &dyn Solution<T, D>,
     base: &Case,
@@ -162,7 +162,7 @@ struct State<const D: usize> {
 }
 
 /// The states at the common times of a run with `count` steps, or how it failed.
-fn observe<T: Precision, const D: usize>(
+fn observe<T: Real + Scalar<D>, const D: usize>(
     exact: &dyn Solution<f64, D>,
     model: &dyn Solution<T, D>,
     case: &Case,
@@ -172,7 +172,7 @@ fn observe<T: Precision, const D: usize>(
     let (scene, _) = prepare(exact, case)?;
     let time_step: T = Real::nearest(case.periods * exact.period() / count as f64);
     let (mut simulation, body_force) = set_up(exact, model, case, &scene, time_step)?;
-    let lags = simulation.velocity_lag() > 0.0;
+    let lags = simulation.velocity_lag() > T::zero();
     let mut states: Vec<State<D>> = Vec::new();
     // One step more than the run has: the last velocity at a full step needs it.
     for step in 1..=count + u64::from(lags) {

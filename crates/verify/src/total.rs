@@ -1,20 +1,18 @@
 //! Runs in the reference configuration: from a solution to splines, a layout of particles, and their motion.
 
-use mmsmith_mpm::general::{Integrator, Transfer};
 use mmsmith_mpm::total_lagrangian::{
     Axis, BoundaryData, Composition, Coordinates, End, Grid, Layout, MassMatrix, Quantity, Scheme,
-    Side, TotalLagrangian,
+    Side,
 };
-use mmsmith_mpm::{BodyForce, Material, Particles, StepError};
-use mmsmith_solutions::{AnySolution, Condition, Domain, Solution, Surface};
+use mmsmith_mpm::{Integrator, Scalar, SetupError, Solver, TotalSetUp, Transfer};
+use mmsmith_solutions::{AnySolution, Condition, Domain, Real, Solution, Surface};
 use nalgebra::SVector;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
 use crate::case::{Case, CaseError, law};
 use crate::dimension::in_dimension;
-use crate::general::Placement;
 use crate::scene::{Extent, Scene};
-use crate::solver::Solver;
+use crate::updated::Placement;
 
 /// Polar angles of the part of a spherical shell that is modelled, from the third axis: beyond a cone about it, which moves as the
 /// solution says.
@@ -289,12 +287,6 @@ fn end(condition: Condition) -> End {
     }
 }
 
-/// A body in the total frame, with the exact motion and traction on the sides where the solution prescribes them.
-struct DrivenBody<'a, const D: usize> {
-    body: TotalLagrangian<D>,
-    boundary: ExactBoundary<'a, D>,
-}
-
 /// The exact solution on the sides of the body.
 struct ExactBoundary<'a, const D: usize>(&'a dyn Solution<f64, D>);
 
@@ -328,40 +320,28 @@ impl<const D: usize> BoundaryData<D> for ExactBoundary<'_, D> {
     }
 }
 
-impl<const D: usize> Solver<f64, D> for DrivenBody<'_, D> {
-    fn step(&mut self, body_force: &dyn BodyForce<f64, D>) -> Result<(), StepError> {
-        self.body.step_with_boundary(body_force, &self.boundary)
-    }
-
-    fn observe(&mut self) -> (&Particles<f64, D>, &Material<f64>) {
-        self.body.observe();
-        (self.body.particles(), self.body.material())
-    }
-
-    fn velocity_lag(&self) -> f64 {
-        0.0
-    }
-
-    fn state(&mut self) -> Vec<&mut [u8]> {
-        self.body.state()
-    }
-}
-
-/// The solver at time zero with steps of `dt`.
-pub(crate) fn set_up<'a, const D: usize>(
+/// The solver at time zero with steps of `time_step`.
+pub(crate) fn set_up<'a, T: Real + Scalar<D>, const D: usize>(
     exact: &'a dyn Solution<f64, D>,
     total: &TotalScheme,
     case: &Case,
     scene: &Scene<D>,
-    dt: f64,
-) -> Result<Box<dyn Solver<f64, D> + 'a>, CaseError> {
-    let grid = total.grid(scene, case.per_cell)?;
-    let material = law(exact.material())?;
-    let mut body = TotalLagrangian::new(grid, total.scheme, material, exact.density(), dt)?;
-    let X = body.positions();
-    let u: Vec<_> = X.iter().map(|X| exact.displacement(X, 0.0)).collect();
-    let v: Vec<_> = X.iter().map(|X| exact.velocity(X, 0.0)).collect();
-    let boundary = ExactBoundary(exact);
-    body.start_with_boundary(&u, &v, &boundary)?;
-    Ok(Box::new(DrivenBody { body, boundary }))
+    time_step: T,
+) -> Result<Box<dyn Solver<T, D> + 'a>, CaseError> {
+    let set_up = TotalSetUp {
+        grid: total.grid(scene, case.per_cell)?,
+        scheme: total.scheme,
+        material: law(exact.material())?,
+        density: exact.density(),
+        time_step: time_step.to_f64(),
+        motion: &|X| [exact.displacement(X, 0.0), exact.velocity(X, 0.0)],
+    };
+    T::total_lagrangian(set_up, Box::new(ExactBoundary(exact))).map_err(|error| match error {
+        SetupError::DoublePrecisionOnly => CaseError::Setting {
+            setting: "precision",
+            value: "f32".into(),
+            admissible: "f64 in the total Lagrangian formulation",
+        },
+        error => error.into(),
+    })
 }

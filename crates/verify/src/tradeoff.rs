@@ -10,16 +10,16 @@
 //!
 //! Nothing here knows a clock or a solver: both are given, so that tests can state them.
 
-use mmsmith_mpm::general::{Integrator, Shape, Transfer};
 use mmsmith_mpm::total_lagrangian::{Composition, Coordinates, Layout, MassMatrix};
+use mmsmith_mpm::{Integrator, Shape, Transfer};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
 use crate::case::{Case, Row, Status};
 use crate::cost::{Cost, CostModel};
-use crate::general::{Placement, uses_threads};
 use crate::plan::Plan;
 use crate::total::{Frame, TotalScheme};
+use crate::updated::Placement;
 
 /// Cell counts of a ladder.
 pub const LADDER: [usize; 15] = [4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512];
@@ -464,7 +464,7 @@ pub fn families(
     all.retain(fits);
     for setting in &mut all {
         // More of them would stand idle.
-        if !uses_threads(&setting.case) {
+        if !setting.case.steps_on_threads() {
             setting.threads = 1;
         }
     }
@@ -1044,7 +1044,7 @@ impl<E> Sweep<'_, E> {
                 // Told of plain settings: with f32 or PIC, say, another setting's effect is another one.
                 let is_plain = a.case.transfer == Transfer::Flip
                     && !a.single
-                    && (a.threads == plain.threads || !uses_threads(&a.case))
+                    && (a.threads == plain.threads || !a.case.steps_on_threads())
                     && a.case.cfl <= plain.case.cfl
                     && (a.case.per_cell == 2
                         || name == SettingName::Ppc

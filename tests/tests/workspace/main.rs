@@ -13,5 +13,7 @@ mod new_solution;
 mod orders;
 mod planted_faults;
 mod planted_solver_faults;
+#[path = "../../../crates/mpm/tests/reference/mod.rs"]
+mod reference;
 mod staged;
 mod updated_frame;

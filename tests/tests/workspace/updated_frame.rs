@@ -1,4 +1,4 @@
-//! The general step of the updated frame: CPDI, CPDI2 on fitted particles, splines, transfers and USAVG, through `mms`.
+//! The updated frame: CPDI, CPDI2 on fitted particles, splines, transfers and USAVG, through `mms`.
 //!
 //! These simulate for seconds and run in release mode, as those in `orders.rs`.
 

@@ -23,6 +23,9 @@ enum Form {
     Displacement,
     /// A row for each run: particles, steps, time and particle-steps a second.
     Speed,
+    /// A table for each command with two lists `{a,b}`: rows for the first list, columns for the second, and in each cell the
+    /// nanoseconds that a step of a particle takes in that run, and how many times those of `gimp` with `flip` that is.
+    Pairs,
     /// The picture that the command writes to its last word, a path of the repository.
     Picture,
 }
@@ -36,10 +39,11 @@ impl Form {
             "orders" => Self::Orders,
             "displacement" => Self::Displacement,
             "speed" => Self::Speed,
+            "pairs" => Self::Pairs,
             "picture" => Self::Picture,
             other => {
                 return Err(format!(
-                    "the form '{other}' is not known; known are exact, tables, orders, displacement, speed and picture"
+                    "the form '{other}' is not known; known are exact, tables, orders, displacement, speed, pairs and picture"
                 ));
             }
         })
@@ -52,7 +56,7 @@ impl Form {
             }
             Self::Displacement => &["L_inf of u (m)", "orders", "million particle-steps/s"],
             Self::Speed => &["particles", "steps", "stepping (s)", "million particle-steps/s"],
-            Self::Text | Self::Exact | Self::Tables | Self::Picture => &[],
+            Self::Text | Self::Exact | Self::Tables | Self::Pairs | Self::Picture => &[],
         }
     }
 }
@@ -60,7 +64,7 @@ impl Form {
 /// The lines that a section must have in this order, whatever its commands measure.
 fn skeleton(form: Form, section: &Section) -> Vec<String> {
     match form {
-        Form::Text | Form::Tables => {
+        Form::Text | Form::Tables | Form::Pairs => {
             section.commands.iter().map(|command| shown(command)).collect()
         }
         Form::Exact => Vec::new(),
@@ -256,9 +260,62 @@ fn content(form: Form, section: &Section, place: &Workplace) -> anyhow::Result<S
                 parts.push(format!("| `{label}` | {} |", cells.join(" | ")));
             }
         }
+        Form::Pairs => {
+            for command in &section.commands {
+                parts.push(pairs(command, place)?);
+            }
+        }
         Form::Picture => {}
     }
     Ok(parts.join("\n"))
+}
+
+/// A list `{a,b}` of a command: what is before it, its entries, and what is behind it.
+fn list(command: &str) -> Option<(&str, Vec<&str>, &str)> {
+    let (before, rest) = command.split_once('{')?;
+    let (entries, behind) = rest.split_once('}')?;
+    Some((before, entries.split(',').collect(), behind))
+}
+
+/// The table of a command with two lists.
+fn pairs(command: &str, place: &Workplace) -> anyhow::Result<String> {
+    let lists = list(command).and_then(|(before, rows, behind)| {
+        let (between, columns, behind) = list(behind)?;
+        Some((before, rows, between, columns, behind))
+    });
+    let (before, rows, between, columns, behind) =
+        lists.with_context(|| format!("'{command}' has no two lists in braces"))?;
+    let time = |row: &str, column: &str| -> anyhow::Result<f64> {
+        let one = format!("{before}{row}{between}{column}{behind}");
+        succeed(place, &format!("{one} --json OUT.json"))?;
+        let document: Value = serde_json::from_str(&place.read("OUT.json")?)
+            .with_context(|| format!("the JSON of {one}"))?;
+        let rate = document["result"]["particle_steps_per_s"].as_f64();
+        Ok(1e9 / rate.with_context(|| format!("the JSON of '{one}' lacks a rate"))?)
+    };
+    // A processor that was idle is slow at first.
+    let unit = [(); 3]
+        .into_iter()
+        .map(|()| time("gimp", "flip"))
+        .collect::<anyhow::Result<Vec<_>>>()?
+        .into_iter()
+        .fold(f64::INFINITY, f64::min);
+    let mut lines = vec![
+        format!("```sh\n{command}\n```\n"),
+        format!("| ns | {} |", columns.join(" | ")),
+        format!("|---|{}", "---:|".repeat(columns.len())),
+    ];
+    for row in rows {
+        let cells = columns
+            .iter()
+            .map(|column| {
+                let time = time(row, column)?;
+                Ok(format!("{time:.0} ({:.2})", time / unit))
+            })
+            .collect::<anyhow::Result<Vec<_>>>()?;
+        lines.push(format!("| {row} | {} |", cells.join(" | ")));
+    }
+    Ok(lines.join("\n") + "\n")
 }
 
 /// What a command prints that does its work, whether or not what it measures passes.
@@ -438,6 +495,15 @@ mod tests {
         assert!(
             check(&text.replace("\n\na\n", "\n\nb\n")).unwrap_err().contains("'b' should be 'a'")
         );
+    }
+
+    #[test]
+    fn lists_in_braces_are_found_one_after_the_other() {
+        let (before, entries, behind) = list("a --b {c,d} --e {f} g").unwrap();
+        assert_eq!((before, entries.as_slice()), ("a --b ", ["c", "d"].as_slice()));
+        let (between, entries, behind) = list(behind).unwrap();
+        assert_eq!((between, entries.as_slice(), behind), (" --e ", ["f"].as_slice(), " g"));
+        assert_eq!(list(behind), None);
     }
 
     #[test]

@@ -104,7 +104,7 @@ pub(crate) enum Shape {
     Bspline5,
     /// Parallelograms that deform with the particle
     Cpdi,
-    /// Quadrilaterals whose corners neighbours share (one and two dimensions)
+    /// Quadrilaterals (in space hexahedra) whose corners neighbours share
     Cpdi2,
 }
 

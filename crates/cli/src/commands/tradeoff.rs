@@ -12,7 +12,7 @@ use anyhow::{Context, Result, bail};
 use mmsmith_verify::{
     Arithmetic, Case, CaseError, Chosen, Effect, Entry, Field, Goal, MARGIN, Machine, Norm,
     Outputs, Record, Repeat, Row, Setting, Skip, Status, Tradeoff, families, leading, plan,
-    run as simulate, time_steps, tradeoff as measure, uses_threads,
+    run as simulate, time_steps, tradeoff as measure,
 };
 use serde_json::{Value, json};
 
@@ -472,7 +472,7 @@ impl Report<'_> {
 
     /// Whether an entry was run with the threads that all were run with, as far as its scheme uses them.
     fn is_of_usual_threads(&self, entry: &Entry) -> bool {
-        entry.setting.threads == self.threads || !uses_threads(&entry.setting.case)
+        entry.setting.threads == self.threads || !entry.setting.case.steps_on_threads()
     }
 
     /// From where on single precision stops improving: for each scheme that was run in both, its errors grid by grid.

@@ -1,6 +1,6 @@
 //! What is advanced: a unit square with 2x2 particles a cell between four walls, set in motion without a body force.
 
-use mmsmith_mpm::{Grid, Integrator, Material, Particles, Settings, Shape, Simulation};
+use mmsmith_mpm::{Grid, Integrator, Material, Particles, Settings, Shape, Simulation, Transfer};
 use nalgebra::{Vector2, vector};
 
 pub(crate) const LAMBDA: f64 = 5769.0;
@@ -28,7 +28,9 @@ pub(crate) fn simulation(cells: usize, shape: Shape, integrator: Integrator) -> 
         *v = velocity(X);
     }
     let time_step = time_step(cells);
-    let settings = Settings { shape, integrator, time_step, halve_first_acceleration: false };
+    let transfer = Transfer::Flip;
+    let settings =
+        Settings { shape, integrator, transfer, time_step, halve_first_acceleration: false };
     let material = Material::NeoHookean { lambda: LAMBDA, mu: MU };
     Simulation::new(grid, particles, material, settings).unwrap()
 }

@@ -6,37 +6,50 @@ use crate::fault::Fault;
 use crate::geometry::Constants;
 use crate::node::{LANES, Node};
 use crate::shape_function::EXTENDED;
-use crate::simd::{Lane4, Vectors};
+use crate::simd::{Lane4, Lane8, Vectors};
 use crate::weights::Weights;
 
 /// Values of the grid at a particle, the result of G2P.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Interpolated<T, const D: usize> {
     pub(crate) velocity: SVector<T, D>,
-    pub(crate) acceleration: SVector<T, D>,
+    /// The second vector of the nodes: the acceleration, or the velocity that particles take.
+    pub(crate) second: SVector<T, D>,
     /// `dv_i/dx_j` per cell.
     pub(crate) velocity_gradient: SMatrix<T, D, D>,
+    /// The affine velocity per cell of the second vector at nodes, where there are [weights](Weights) for it.
+    pub(crate) affine: SMatrix<T, D, D>,
 }
 
 impl<T: RealField + Copy, const D: usize> Interpolated<T, D> {
-    /// From interpolated values and their gradients: `value[q]`, `gradient[axis][q]`, with `q` as in [`Node`].
+    /// From interpolated values and their slopes along each axis, `value[q]` and `slope[axis][q]`, with `q` as in [`Node`].
     #[inline(always)]
-    pub(crate) fn new<const Q: usize, const R: usize>(
+    pub(crate) fn new<const Q: usize, const R: usize, const W: usize, L: Weights<T, D, W>>(
+        weights: &L,
         value: &[T; Q],
-        gradient: &[[T; R]; D],
+        slope: &[[T; R]; D],
     ) -> Self {
+        let velocity_gradient = SMatrix::from_fn(|i, j| slope[j][i]);
+        let affine = if L::AFFINE {
+            let moments = SMatrix::from_fn(|i, j| slope[j][(D + i).min(R - 1)]);
+            weights.affine(moments, &velocity_gradient)
+        } else {
+            SMatrix::zeros()
+        };
         Self {
             velocity: SVector::from_fn(|i, _| value[i]),
-            acceleration: SVector::from_fn(|i, _| value[D + i]),
-            velocity_gradient: SMatrix::from_fn(|i, j| gradient[j][i]),
+            second: SVector::from_fn(|i, _| value[D + i]),
+            velocity_gradient,
+            affine,
         }
     }
 
     pub(crate) fn zero() -> Self {
         Self {
             velocity: SVector::zeros(),
-            acceleration: SVector::zeros(),
+            second: SVector::zeros(),
             velocity_gradient: SMatrix::zeros(),
+            affine: SMatrix::zeros(),
         }
     }
 }
@@ -46,13 +59,19 @@ pub(crate) trait Receive<T, const D: usize> {
     /// The values at particle `k` of a block.
     fn receive(&mut self, k: usize, interpolated: &Interpolated<T, D>);
 
-    /// The same in one or two dimensions, in four lanes: `[velocity, acceleration]`, and their gradient along each axis.
+    /// The same in one or two dimensions, in four lanes: `[velocity, acceleration]`, and their slopes along each axis.
     #[inline(always)]
-    fn receive_lanes(&mut self, _: impl Vectors, k: usize, value: Lane4<T>, gradient: [Lane4<T>; D])
-    where
+    fn receive_lanes<const W: usize>(
+        &mut self,
+        _: impl Vectors,
+        k: usize,
+        weights: &impl Weights<T, D, W>,
+        value: Lane4<T>,
+        slope: [Lane4<T>; D],
+    ) where
         T: RealField + Copy,
     {
-        self.receive(k, &Interpolated::new(&value.0, &gradient.map(|gradient| gradient.0)));
+        self.receive(k, &Interpolated::new(weights, &value.0, &slope.map(|slope| slope.0)));
     }
 }
 
@@ -66,7 +85,8 @@ impl<T: RealField + Copy, const D: usize> Receive<T, D> for &mut [Interpolated<T
     }
 }
 
-/// Contributions of particles to their nodes: `value S + sum_a stress_flux[a] G_a`; the second term is a force.
+/// Contributions of particles to their nodes: `value S + sum_a stress_flux[a] G_a + sum_a affine[a] Z_a`; the second term is a
+/// force, the third a momentum.
 ///
 /// Entry `k` of each array belongs to particle `k` of a block.
 pub(crate) struct Contributions<T, const D: usize, const N: usize> {
@@ -79,6 +99,8 @@ pub(crate) struct Contributions<T, const D: usize, const N: usize> {
     pub(crate) value: [Node<T, D>; N],
     /// `-V0 tau / h`: column `a` multiplies the gradient along axis `a`, per cell.
     pub(crate) stress_flux: [SMatrix<T, D, D>; N],
+    /// APIC: mass times the affine velocity per cell; column `a` multiplies the arm along axis `a`, in cells.
+    pub(crate) affine: [SMatrix<T, D, D>; N],
 }
 
 impl<T: RealField + Copy, const D: usize, const N: usize> Contributions<T, D, N> {
@@ -89,6 +111,7 @@ impl<T: RealField + Copy, const D: usize, const N: usize> Contributions<T, D, N>
             b: [SVector::zeros(); N],
             value: [Node::zero(); N],
             stress_flux: [SMatrix::zeros(); N],
+            affine: [SMatrix::zeros(); N],
         }
     }
 
@@ -109,6 +132,14 @@ impl<T: RealField + Copy, const D: usize, const N: usize> Contributions<T, D, N>
         for (value, &p) in self.value.iter_mut().zip(ids) {
             let m = mass[p as usize];
             *value = Node::new(&(v[p as usize] * m), &SVector::zeros(), m);
+        }
+    }
+
+    /// Sets affine momenta of the particles `ids`, for affine velocities per cell; none where there are none.
+    pub(crate) fn take_affine(&mut self, ids: &[u32], mass: &[T], affine: &[SMatrix<T, D, D>]) {
+        for (own, &p) in self.affine.iter_mut().zip(ids) {
+            let p = p as usize;
+            *own = affine.get(p).map_or_else(SMatrix::zeros, |affine| affine * mass[p]);
         }
     }
 
@@ -142,26 +173,74 @@ impl<T: RealField + Copy, const D: usize, const N: usize> Contributions<T, D, N>
         self.b[k] * if per_volume { self.volume[k] } else { self.mass[k] }
     }
 
-    /// The factors of the gradients, `gradient_factors[axis][q]`, with `q` in the order of a node's values.
+    /// The factors of the slopes along an axis, in the order of a node's values.
     #[inline(always)]
-    fn gradient_factors(&self, k: usize) -> [[T; LANES]; D] {
-        let mut gradient_factors = [[T::zero(); LANES]; D];
-        for (a, gradient) in gradient_factors.iter_mut().enumerate() {
-            for i in 0..D {
-                gradient[D + i] = self.stress_flux[k][(i, a)];
+    pub(crate) fn slope_lanes(&self, k: usize, axis: usize, is_affine: bool) -> Lane8<T> {
+        let mut lanes = [T::zero(); LANES];
+        for i in 0..D {
+            lanes[D + i] = self.stress_flux[k][(i, axis)];
+            if is_affine {
+                lanes[i] = self.affine[k][(i, axis)];
             }
         }
-        gradient_factors
+        Lane8(lanes)
+    }
+
+    /// The affine momenta along an axis, in the order of a node's values.
+    #[inline(always)]
+    pub(crate) fn affine_lanes(&self, k: usize, axis: usize) -> Lane8<T> {
+        let mut lanes = Lane8::zero();
+        for i in 0..D {
+            lanes.0[i] = self.affine[k][(i, axis)];
+        }
+        lanes
+    }
+
+    /// Both along all axes, `slope_factors[axis][q]`.
+    #[inline(always)]
+    fn slope_factors(&self, k: usize, is_affine: bool) -> [[T; LANES]; D] {
+        std::array::from_fn(|axis| self.slope_lanes(k, axis, is_affine).0)
     }
 }
 
-/// A row of nodes along axis 0, with the product of the weights along the other axes.
+/// The weights of a node along an axis, or of a row of nodes.
+struct Factors<T> {
+    S: T,
+    G: T,
+    Z: T,
+}
+
+impl<T: RealField + Copy> Factors<T> {
+    #[inline(always)]
+    fn of<const D: usize, const W: usize, L: Weights<T, D, W>>(
+        weights: &L,
+        axis: usize,
+        place: usize,
+    ) -> Self {
+        let Z = if L::AFFINE { weights.Z(axis, place) } else { T::zero() };
+        Self { S: weights.S(axis, place), G: weights.G(axis, place), Z }
+    }
+
+    /// The slope that goes with number `q` of a node in P2G: forces have gradients, affine momenta arms.
+    #[inline(always)]
+    fn p2g_slope<const D: usize>(&self, is_affine: bool, q: usize) -> T {
+        if is_affine && q < D { self.Z } else { self.G }
+    }
+
+    /// The slope that goes with number `q` of a node in G2P: the first vector has a gradient, the second a moment.
+    #[inline(always)]
+    fn g2p_slope<const D: usize>(&self, is_affine: bool, q: usize) -> T {
+        if is_affine && q >= D { self.Z } else { self.G }
+    }
+}
+
+/// A row of nodes along axis 0.
 struct Row<T, const D: usize> {
     start: usize,
     /// Product of the weights along axes 1 and up.
     S: T,
-    /// Its gradient; entry 0 is unused.
-    G: [T; D],
+    /// The same with the slope along an axis in place of its weight; entry 0 is unused.
+    slopes: [Factors<T>; D],
 }
 
 /// Number of rows in a particle's support.
@@ -179,86 +258,90 @@ fn row<T: RealField + Copy, const D: usize, const W: usize>(
     strides: &[usize; D],
     index: usize,
 ) -> Row<T, D> {
-    let mut row = Row { start: first, S: T::one(), G: [T::zero(); D] };
+    let none = || Factors { S: T::one(), G: T::zero(), Z: T::zero() };
+    let mut row = Row { start: first, S: T::one(), slopes: std::array::from_fn(|_| none()) };
     match D {
         1 => {}
         2 => {
             row.start += index * strides[1];
-            row.S = weights.S(1, index);
-            row.G[1] = weights.G(1, index);
+            row.slopes[1] = Factors::of(weights, 1, index);
+            row.S = row.slopes[1].S;
         }
         _ => {
             let (j, k) = (index % W, index / W);
             row.start += j * strides[1] + k * strides[2];
-            row.S = weights.S(1, j) * weights.S(2, k);
-            row.G[1] = weights.G(1, j) * weights.S(2, k);
-            row.G[2] = weights.S(1, j) * weights.G(2, k);
+            let (along, up) = (Factors::of(weights, 1, j), Factors::of(weights, 2, k));
+            row.S = along.S * up.S;
+            row.slopes[1] = Factors { S: row.S, G: along.G * up.S, Z: along.Z * up.S };
+            row.slopes[2] = Factors { S: row.S, G: along.S * up.G, Z: along.S * up.Z };
         }
     }
     row
 }
 
-/// Contribution of a particle to a row of nodes, `value S + gradient G` with the weights along axis 0.
+/// Contribution of a particle to a row of nodes, `value S + slope G` with the weights along axis 0.
 #[inline(always)]
 fn contributions_to_row<T: RealField + Copy, const D: usize>(
     value: &[T; LANES],
-    gradient: &[[T; LANES]; D],
+    slope: &[[T; LANES]; D],
     row: &Row<T, D>,
+    is_affine: bool,
 ) -> [[T; LANES]; 2] {
-    let (mut to_value, mut to_gradient) = (*value, gradient[0]);
+    let (mut to_value, mut to_slope) = (*value, slope[0]);
     for q in 0..LANES {
         to_value[q] *= row.S;
-        to_gradient[q] *= row.S;
+        to_slope[q] *= row.S;
         for a in 1..D {
-            to_value[q] = gradient[a][q].mul_add(row.G[a], to_value[q]);
+            let factor = row.slopes[a].p2g_slope::<D>(is_affine, q);
+            to_value[q] = slope[a][q].mul_add(factor, to_value[q]);
         }
     }
-    [to_value, to_gradient]
-}
-
-/// Adds the contribution of a particle to a node.
-#[inline(always)]
-fn add<T: RealField + Copy>(sum: &mut [T; LANES], [value, gradient]: &[[T; LANES]; 2], S: T, G: T) {
-    for q in 0..LANES {
-        sum[q] = value[q].mul_add(S, gradient[q].mul_add(G, sum[q]));
-    }
+    [to_value, to_slope]
 }
 
 /// P2G of particle `k`: adds its contribution to the band of nodes that starts at node `first`.
 #[inline(always)]
-pub(crate) fn p2g<T: RealField + Copy, const D: usize, const W: usize, const N: usize>(
-    weights: &impl Weights<T, D, W>,
+pub(crate) fn p2g<T, L, const D: usize, const W: usize, const N: usize>(
+    weights: &L,
     strides: &[usize; D],
     band: &mut [Node<T, D>],
     first: usize,
     (given, k): (&Contributions<T, D, N>, usize),
-) {
+) where
+    T: RealField + Copy,
+    L: Weights<T, D, W>,
+{
     let start = weights.first_node() - first;
     let value = &given.value[k].values;
-    let gradient = given.gradient_factors(k);
+    let slope = given.slope_factors(k, L::AFFINE);
     for index in 0..rows::<D, W>() {
         let row = row(weights, start, strides, index);
-        let to_row = contributions_to_row(value, &gradient, &row);
+        let [to_value, to_slope] = contributions_to_row(value, &slope, &row, L::AFFINE);
         let Some(nodes) = band.get_mut(row.start..).and_then(|n| n.first_chunk_mut::<W>()) else {
             debug_assert!(false, "a stencil beyond its band");
             return;
         };
-        for (i, node) in nodes.iter_mut().enumerate() {
-            add(&mut node.values, &to_row, weights.S(0, i), weights.G(0, i));
+        for (i, Node { values }) in nodes.iter_mut().enumerate() {
+            let factors = Factors::of(weights, 0, i);
+            for q in 0..LANES {
+                let with_slope =
+                    to_slope[q].mul_add(factors.p2g_slope::<D>(L::AFFINE, q), values[q]);
+                values[q] = to_value[q].mul_add(factors.S, with_slope);
+            }
         }
     }
 }
 
-/// Sums of G2P: all values of a node interpolated, `value[q]`, and their gradients per cell, `gradient[axis][q]`.
+/// Sums of G2P: all values of a node interpolated, `value[q]`, and their slopes, `slope[axis][q]`.
 struct InterpolationSums<T, const D: usize> {
     value: [T; LANES],
-    gradient: [[T; LANES]; D],
+    slope: [[T; LANES]; D],
 }
 
 impl<T: RealField + Copy, const D: usize> InterpolationSums<T, D> {
     #[inline(always)]
     fn zero() -> Self {
-        Self { value: [T::zero(); LANES], gradient: [[T::zero(); LANES]; D] }
+        Self { value: [T::zero(); LANES], slope: [[T::zero(); LANES]; D] }
     }
 
     /// Adds a row of nodes.
@@ -266,41 +349,48 @@ impl<T: RealField + Copy, const D: usize> InterpolationSums<T, D> {
     /// Products that make up a value are rounded before they are added, not fused: those of a node and of its mirror image
     /// then cancel, and a particle on a wall stays there.
     #[inline(always)]
-    fn add_row<const W: usize>(
+    fn add_row<const W: usize, L: Weights<T, D, W>>(
         &mut self,
-        weights: &impl Weights<T, D, W>,
+        weights: &L,
         row: &Row<T, D>,
         nodes: &[Node<T, D>; W],
     ) {
         let mut row_value = [T::zero(); LANES];
-        let mut row_gradient = [T::zero(); LANES];
+        let mut row_slope = [T::zero(); LANES];
         for i in 0..W {
-            let (S, G) = (weights.S(0, i), weights.G(0, i));
+            let factors = Factors::of(weights, 0, i);
             for q in 0..LANES {
                 let nodal = nodes[i].values[q];
-                row_value[q] = if i == 0 { nodal * S } else { row_value[q] + nodal * S };
-                row_gradient[q] =
-                    if i == 0 { nodal * G } else { nodal.mul_add(G, row_gradient[q]) };
+                let slope = factors.g2p_slope::<D>(L::AFFINE, q);
+                row_value[q] =
+                    if i == 0 { nodal * factors.S } else { row_value[q] + nodal * factors.S };
+                row_slope[q] =
+                    if i == 0 { nodal * slope } else { nodal.mul_add(slope, row_slope[q]) };
             }
         }
-        let Self { value, gradient } = self;
+        let Self { value, slope } = self;
         for q in 0..LANES {
             value[q] += row_value[q] * row.S;
-            gradient[0][q] = row_gradient[q].mul_add(row.S, gradient[0][q]);
+            slope[0][q] = row_slope[q].mul_add(row.S, slope[0][q]);
             for a in 1..D {
-                gradient[a][q] = row_value[q].mul_add(row.G[a], gradient[a][q]);
+                let factor = row.slopes[a].g2p_slope::<D>(L::AFFINE, q);
+                slope[a][q] = row_value[q].mul_add(factor, slope[a][q]);
             }
         }
     }
 }
 
-/// G2P of one particle: velocity, acceleration and velocity gradient.
+/// G2P of one particle.
 #[inline(always)]
-pub(crate) fn g2p<T: RealField + Copy, const D: usize, const W: usize>(
-    weights: &impl Weights<T, D, W>,
+pub(crate) fn g2p<T, L, const D: usize, const W: usize>(
+    weights: &L,
     strides: &[usize; D],
     nodes: &[Node<T, D>],
-) -> Interpolated<T, D> {
+) -> Interpolated<T, D>
+where
+    T: RealField + Copy,
+    L: Weights<T, D, W>,
+{
     let mut sums = InterpolationSums::zero();
     let start = weights.first_node();
     for index in 0..rows::<D, W>() {
@@ -311,5 +401,5 @@ pub(crate) fn g2p<T: RealField + Copy, const D: usize, const W: usize>(
         };
         sums.add_row(weights, &row, nodes);
     }
-    Interpolated::new(&sums.value, &sums.gradient)
+    Interpolated::new(weights, &sums.value, &sums.slope)
 }

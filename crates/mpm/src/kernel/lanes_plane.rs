@@ -34,6 +34,73 @@ impl<T: RealField + Copy> Sum<T> {
     }
 }
 
+/// The factor of a particle's slope along an axis in P2G: gradients for forces, arms for affine momenta.
+#[inline(always)]
+fn p2g_slope<T, V, L, const D: usize, const W: usize>(
+    vectors: V,
+    weights: &L,
+    axis: usize,
+    place: usize,
+) -> Lane4<T>
+where
+    T: RealField + Copy,
+    V: Vectors,
+    L: Weights<T, D, W>,
+{
+    let G = vectors.splat(weights.G(axis, place));
+    if !L::AFFINE {
+        return G;
+    }
+    of_both(vectors, D, vectors.splat(weights.Z(axis, place)), G)
+}
+
+/// The same in G2P: gradients for the first vector of a node, arms for the second.
+#[inline(always)]
+fn g2p_slope<T, V, L, const D: usize, const W: usize>(
+    vectors: V,
+    weights: &L,
+    axis: usize,
+    place: usize,
+) -> Lane4<T>
+where
+    T: RealField + Copy,
+    V: Vectors,
+    L: Weights<T, D, W>,
+{
+    let G = vectors.splat(weights.G(axis, place));
+    if !L::AFFINE {
+        return G;
+    }
+    of_both(vectors, D, G, vectors.splat(weights.Z(axis, place)))
+}
+
+/// One number for the first vector of a node, and another for the second.
+#[inline(always)]
+fn of_both<T: RealField + Copy>(
+    vectors: impl Vectors,
+    dimension: usize,
+    first: Lane4<T>,
+    second: Lane4<T>,
+) -> Lane4<T> {
+    if dimension == 1 {
+        let (Lane4([a, ..]), Lane4([_, b, c, d])) = (first, second);
+        return Lane4([a, b, c, d]);
+    }
+    vectors.low_and_high(first, second)
+}
+
+/// Rows of nodes along axis 0 that a particle reaches. Loops over more than three are not to be unrolled: they would be long.
+#[inline(always)]
+fn rows<const D: usize, const W: usize>() -> usize {
+    if D == 1 {
+        1
+    } else if W > 3 {
+        std::hint::black_box(W).min(W)
+    } else {
+        W
+    }
+}
+
 /// P2G of the first `count` particles, particle `k` with the weights `weights(k)`; as [`p2g`](crate::kernel::any::p2g).
 ///
 /// Successive particles with the same nodes form a run, whose contributions are summed in registers. Of three nodes in a
@@ -53,8 +120,7 @@ pub(crate) fn p2g_in_plane<T, L, V, const D: usize, const W: usize, const N: usi
     V: Vectors,
     L: Weights<T, D, W>,
 {
-    const { assert!(W <= 3, "more nodes than registers") };
-    let rows = if D == 1 { 1 } else { W };
+    let rows = rows::<D, W>();
     let mut k = 0;
     while k < count {
         let start = weights(k).first_node();
@@ -62,7 +128,7 @@ pub(crate) fn p2g_in_plane<T, L, V, const D: usize, const W: usize, const N: usi
         loop {
             let w = weights(k);
             let value = half(&contributions.value[k].values);
-            let gradient = gradients(vectors, contributions, k);
+            let gradient = slopes(vectors, contributions, k, L::AFFINE);
             let mass = contributions.value[k].mass();
             for j in 0..rows {
                 let (mut to_value, mut to_gradient, mut to_mass) = (value, gradient[0], mass);
@@ -70,7 +136,7 @@ pub(crate) fn p2g_in_plane<T, L, V, const D: usize, const W: usize, const N: usi
                     let S = vectors.splat(w.S(1, j));
                     let with_value = vectors.mul(value, S);
                     to_value =
-                        vectors.mul_add(gradient[D - 1], vectors.splat(w.G(1, j)), with_value);
+                        vectors.mul_add(gradient[D - 1], p2g_slope(vectors, &w, 1, j), with_value);
                     to_gradient = vectors.mul(to_gradient, S);
                     to_mass *= w.S(1, j);
                 }
@@ -81,8 +147,8 @@ pub(crate) fn p2g_in_plane<T, L, V, const D: usize, const W: usize, const N: usi
                         sum.mass += to_mass;
                         continue;
                     }
-                    let (S, G) = (w.S(0, i), w.G(0, i));
-                    let with_gradient = vectors.mul_add(to_gradient, vectors.splat(G), sum.values);
+                    let (S, slope) = (w.S(0, i), p2g_slope(vectors, &w, 0, i));
+                    let with_gradient = vectors.mul_add(to_gradient, slope, sum.values);
                     sum.values = vectors.mul_add(to_value, vectors.splat(S), with_gradient);
                     sum.mass = to_mass.mul_add(S, sum.mass);
                 }
@@ -135,20 +201,29 @@ fn row_start<const D: usize>(start: usize, strides: &[usize; D], index: usize) -
     if D == 1 { start } else { start + index * strides[1] }
 }
 
-/// The factors of the gradients along all axes, in the order of a node's values.
+/// The factors of the slopes along all axes, in the order of a node's values.
 #[inline(always)]
-fn gradients<T: RealField + Copy, V: Vectors, const D: usize, const N: usize>(
+fn slopes<T: RealField + Copy, V: Vectors, const D: usize, const N: usize>(
     vectors: V,
     contributions: &Contributions<T, D, N>,
     k: usize,
+    is_affine: bool,
 ) -> [Lane4<T>; D] {
     let zero = T::zero();
     let stress_flux = contributions.stress_flux[k].as_slice();
-    let Some(&stress_flux) = stress_flux.first_chunk::<4>() else {
-        return [Lane4([zero, stress_flux[0], zero, zero]); D];
+    let affine = contributions.affine[k].as_slice();
+    let (Some(&flux), Some(&affine)) = (stress_flux.first_chunk::<4>(), affine.first_chunk::<4>())
+    else {
+        let momentum = if is_affine { affine[0] } else { zero };
+        return [Lane4([momentum, stress_flux[0], zero, zero]); D];
     };
-    let along = vectors.low_to_high(Lane4(stress_flux));
-    let across = vectors.high_alone(Lane4(stress_flux));
+    let (flux, affine) = (Lane4(flux), Lane4(affine));
+    let mut along = vectors.low_to_high(flux);
+    let mut across = vectors.high_alone(flux);
+    if is_affine {
+        along = vectors.low_and_high(affine, along);
+        across = vectors.high_and_low(affine, vectors.high_and_low(flux, flux));
+    }
     std::array::from_fn(|a| if a == 0 { along } else { across })
 }
 
@@ -169,7 +244,7 @@ pub(crate) fn g2p_in_plane<T, L, V, const D: usize, const W: usize>(
     L: Weights<T, D, W>,
 {
     let zero = Lane4([T::zero(); 4]);
-    let rows = if D == 1 { 1 } else { W };
+    let rows = rows::<D, W>();
     let mut k = 0;
     while k < count {
         let start = weights(k).first_node();
@@ -201,13 +276,13 @@ pub(crate) fn g2p_in_plane<T, L, V, const D: usize, const W: usize>(
                 (row_values[j], gradients[j]) = interpolate(vectors, &changes[j], &w, 0);
             }
             if D == 1 {
-                receiver.receive_lanes(vectors, k, row_values[0], [gradients[0]; D]);
+                receiver.receive_lanes(vectors, k, &w, row_values[0], [gradients[0]; D]);
             } else {
                 let (value, across) = interpolate(vectors, &row_values, &w, 1);
                 let (along, _) = interpolate(vectors, &gradients, &w, 1);
                 let mut gradient = [across; D];
                 gradient[0] = along;
-                receiver.receive_lanes(vectors, k, value, gradient);
+                receiver.receive_lanes(vectors, k, &w, value, gradient);
             }
             k += 1;
             if k >= count || weights(k).first_node() != start {
@@ -231,7 +306,7 @@ fn differ<T: RealField + Copy, V: Vectors, const W: usize>(vectors: V, values: &
     }
 }
 
-/// Interpolated value and gradient along an axis, from the [differences](differ) between nodes.
+/// Interpolated value and slope along an axis, from the [differences](differ) between nodes; of four nodes from their values.
 ///
 /// Products that make up a value are rounded before they are added, not fused: those of a node and of its mirror image
 /// then cancel, and a particle on a wall stays there.
@@ -242,16 +317,26 @@ fn interpolate<T: RealField + Copy, V: Vectors, const D: usize, const W: usize>(
     weights: &impl Weights<T, D, W>,
     axis: usize,
 ) -> (Lane4<T>, Lane4<T>) {
+    if W > 3 {
+        let mut value = vectors.mul(changes[0], vectors.splat(weights.S(axis, 0)));
+        let mut slope = vectors.mul(changes[0], g2p_slope(vectors, weights, axis, 0));
+        for (place, nodal) in changes.iter().enumerate().skip(1) {
+            value = vectors.add(value, vectors.mul(*nodal, vectors.splat(weights.S(axis, place))));
+            slope = vectors.mul_add(*nodal, g2p_slope(vectors, weights, axis, place), slope);
+        }
+        return (value, slope);
+    }
     let last = changes[W - 1];
     let to_last = vectors.mul(last, vectors.splat(weights.S(axis, W - 1)));
-    let G = vectors.splat(weights.G(axis, W - 1));
+    let slope = g2p_slope(vectors, weights, axis, W - 1);
     if W == 2 {
-        return (vectors.add(changes[0], to_last), vectors.mul(last, G));
+        return (vectors.add(changes[0], to_last), vectors.mul(last, slope));
     }
     // The weights of all nodes add up to one, and their gradients to zero.
     let first = changes[0];
     let to_first = vectors.mul(first, vectors.splat(weights.S(axis, 0)));
-    let gradient = vectors.mul_sub(last, G, vectors.mul(first, vectors.splat(weights.G(axis, 0))));
+    let gradient =
+        vectors.mul_sub(last, slope, vectors.mul(first, g2p_slope(vectors, weights, axis, 0)));
     (vectors.add(changes[1], vectors.sub(to_last, to_first)), gradient)
 }
 
@@ -264,44 +349,68 @@ mod tests {
     use super::*;
     use crate::kernel::any::{Interpolated, g2p, p2g};
     use crate::kernel::lanes_space::{g2p_in_space, p2g_in_space};
-    use crate::shape_function::{AxisWeights, FixedBox, Hat, ShapeFunction, index};
+    use crate::shape_function::{
+        AxisWeights, CubicSpline, Gimp, Hat, QuadraticSpline, ShapeFunction, index, moment,
+    };
 
     const COUNT: usize = 24;
     const SIDE: usize = 16;
 
-    /// The weights of one particle, axis by axis.
-    struct Stated<const D: usize, const W: usize>([AxisWeights<f64, W>; D]);
+    /// The weights of one particle at places along the axes, in cells.
+    struct Stated<const D: usize, const W: usize, const AFFINE: bool> {
+        axes: [AxisWeights<f64, W>; D],
+        place: [f64; D],
+    }
 
-    impl<const D: usize, const W: usize> Weights<f64, D, W> for &Stated<D, W> {
+    impl<const D: usize, const W: usize, const AFFINE: bool> Weights<f64, D, W>
+        for &Stated<D, W, AFFINE>
+    {
+        const AFFINE: bool = AFFINE;
+
         fn first_node(&self) -> usize {
-            (0..D).map(|a| index(self.0[a].base) * SIDE.pow(a as u32)).sum()
+            (0..D).map(|a| index(self.axes[a].base) * SIDE.pow(a as u32)).sum()
         }
 
         fn S(&self, axis: usize, place: usize) -> f64 {
-            self.0[axis].S[place]
+            self.axes[axis].S[place]
         }
 
         fn G(&self, axis: usize, place: usize) -> f64 {
-            self.0[axis].G[place]
+            self.axes[axis].G[place]
+        }
+
+        fn Z(&self, axis: usize, place: usize) -> f64 {
+            self.axes[axis].S[place] * (place as f64 - self.place[axis])
+        }
+
+        fn affine(
+            &self,
+            moments: SMatrix<f64, D, D>,
+            _: &SMatrix<f64, D, D>,
+        ) -> SMatrix<f64, D, D> {
+            let inertia = |a: usize| 0.1 + moment(&self.axes[a].S, self.place[a]);
+            SMatrix::from_fn(|i, j| moments[(i, j)] / inertia(j))
         }
     }
 
     /// P2G and G2P by this module and by `any`, for particles at places along a line of cells.
-    fn compare<R, const D: usize, const W: usize>(
-        shape: R,
+    fn compare<R, const D: usize, const W: usize, const AFFINE: bool>(
+        _: R,
+        l: f64,
         places: &[f64],
         numbers: &[f64],
     ) -> Result<(), TestCaseError>
     where
-        R: ShapeFunction<f64, D, W>,
+        R: ShapeFunction<W>,
     {
         let mut numbers = numbers.iter().copied().cycle();
         let mut number = || numbers.next().unwrap_or(1.0);
-        let weights: Vec<Stated<D, W>> = places
+        let weights: Vec<Stated<D, W, AFFINE>> = places
             .iter()
             .map(|&place| {
                 let xi: [f64; D] = std::array::from_fn(|a| place / (a + 1) as f64);
-                Stated(std::array::from_fn(|a| R::axis_weights(xi[a], shape.half_size(a, 1.0))))
+                let axes: [_; D] = std::array::from_fn(|a| R::axis_weights(xi[a], l));
+                Stated { place: std::array::from_fn(|a| axes[a].after_first(xi[a])), axes }
             })
             .collect();
         let strides: [usize; D] = std::array::from_fn(|a| SIDE.pow(a as u32));
@@ -311,6 +420,7 @@ mod tests {
             contributions.value[k] =
                 Node::new(&v, &SVector::from_fn(|_, _| number()), 1.0 + number().abs());
             contributions.stress_flux[k] = SMatrix::from_fn(|_, _| number());
+            contributions.affine[k] = SMatrix::from_fn(|_, _| number());
         }
         let mut nodes = vec![Node::zero(); SIDE.pow(D as u32)];
         let mut one_by_one = nodes.clone();
@@ -346,8 +456,9 @@ mod tests {
         for (interpolated, weights) in interpolated.iter().zip(&weights) {
             let alone = g2p(&weights, &strides, &nodes);
             prop_assert!((interpolated.velocity - alone.velocity).amax() < 1e-13);
-            prop_assert!((interpolated.acceleration - alone.acceleration).amax() < 1e-13);
+            prop_assert!((interpolated.second - alone.second).amax() < 1e-13);
             prop_assert!((interpolated.velocity_gradient - alone.velocity_gradient).amax() < 1e-13);
+            prop_assert!((interpolated.affine - alone.affine).amax() < 1e-12);
         }
         Ok(())
     }
@@ -365,12 +476,24 @@ mod tests {
             if sort {
                 places.sort_by(f64::total_cmp);
             }
-            compare::<_, 1, 2>(Hat, &places, &numbers)?;
-            compare::<_, 2, 2>(Hat, &places, &numbers)?;
-            compare::<_, 1, 3>(FixedBox(SVector::repeat(l)), &places, &numbers)?;
-            compare::<_, 2, 3>(FixedBox(SVector::repeat(l)), &places, &numbers)?;
-            compare::<_, 3, 2>(Hat, &places, &numbers)?;
-            compare::<_, 3, 3>(FixedBox(SVector::repeat(l)), &places, &numbers)?;
+            fn all<const AFFINE: bool>(
+                l: f64,
+                places: &[f64],
+                numbers: &[f64],
+            ) -> Result<(), TestCaseError> {
+                compare::<_, 1, 2, AFFINE>(Hat, 0.0, places, numbers)?;
+                compare::<_, 2, 2, AFFINE>(Hat, 0.0, places, numbers)?;
+                compare::<_, 3, 2, AFFINE>(Hat, 0.0, places, numbers)?;
+                compare::<_, 1, 3, AFFINE>(Gimp, l, places, numbers)?;
+                compare::<_, 2, 3, AFFINE>(Gimp, l, places, numbers)?;
+                compare::<_, 3, 3, AFFINE>(Gimp, l, places, numbers)?;
+                compare::<_, 2, 3, AFFINE>(QuadraticSpline, 0.5, places, numbers)?;
+                compare::<_, 1, 4, AFFINE>(CubicSpline, 1.0, places, numbers)?;
+                compare::<_, 2, 4, AFFINE>(CubicSpline, 1.0, places, numbers)?;
+                compare::<_, 3, 4, AFFINE>(CubicSpline, 1.0, places, numbers)
+            }
+            all::<false>(l, &places, &numbers)?;
+            all::<true>(l, &places, &numbers)?;
         }
     }
 }

@@ -1,82 +1,51 @@
-//! P2G and G2P in space: the values of a node fill two registers of four lanes.
+//! P2G and G2P in space: the values of a node in eight lanes.
+
+use std::array;
 
 use nalgebra::RealField;
 
 use crate::kernel::any::{Contributions, Interpolated};
-use crate::node::{LANES, Node};
-use crate::simd::{Lane4, Vectors};
+use crate::node::Node;
+use crate::simd::{Lane8, Vectors};
 use crate::weights::Weights;
 
-/// All values of a node, in two registers.
-#[derive(Clone, Copy)]
-struct Lane8<T> {
-    /// The velocity and the first component of the acceleration.
-    low: Lane4<T>,
-    high: Lane4<T>,
-}
-
-impl<T: RealField + Copy> Lane8<T> {
-    #[inline(always)]
-    fn zero() -> Self {
-        let zero = Lane4([T::zero(); 4]);
-        Self { low: zero, high: zero }
-    }
-
-    #[inline(always)]
-    fn load(vectors: impl Vectors, values: &[T; LANES]) -> Self {
-        match values.as_chunks::<4>().0 {
-            [low, high] => Self { low: vectors.load(low), high: vectors.load(high) },
-            _ => Self::zero(),
-        }
-    }
-
-    #[inline(always)]
-    fn store(self, values: &mut [T; LANES]) {
-        if let [low, high] = values.as_chunks_mut::<4>().0 {
-            (*low, *high) = (self.low.0, self.high.0);
-        }
-    }
-
-    /// Adds the sum over the places before this one; the first place has none.
-    #[inline(always)]
-    fn after(self, vectors: impl Vectors, sum: Self, place: usize) -> Self {
-        if place == 0 {
-            return self;
-        }
-        Self { low: vectors.add(sum.low, self.low), high: vectors.add(sum.high, self.high) }
-    }
-
-    #[inline(always)]
-    fn mul(self, vectors: impl Vectors, factor: Lane4<T>) -> Self {
-        Self { low: vectors.mul(self.low, factor), high: vectors.mul(self.high, factor) }
-    }
-
-    /// `self factor + sum`, rounded once.
-    #[inline(always)]
-    fn mul_add(self, vectors: impl Vectors, factor: Lane4<T>, sum: Self) -> Self {
-        Self {
-            low: vectors.mul_add(self.low, factor, sum.low),
-            high: vectors.mul_add(self.high, factor, sum.high),
-        }
-    }
-}
-
-/// The weights of a particle along an axis and their gradients, each as a factor of four numbers.
+/// The weights of a particle along an axis, each as a factor of eight numbers.
 #[inline(always)]
-fn factors<T, V, L, const D: usize, const W: usize>(
+fn weights_on_axis<T, V, L, const D: usize, const W: usize>(
     vectors: V,
     weights: &L,
     axis: usize,
-) -> [[Lane4<T>; W]; 2]
+) -> [Lane8<T>; W]
 where
     T: RealField + Copy,
     V: Vectors,
     L: Weights<T, D, W>,
 {
-    [
-        std::array::from_fn(|place| vectors.splat(weights.S(axis, place))),
-        std::array::from_fn(|place| vectors.splat(weights.G(axis, place))),
-    ]
+    array::from_fn(|place| vectors.splat8(weights.S(axis, place)))
+}
+
+/// The slopes of a particle along an axis: gradients, and where velocities are affine arms, for the first vector of a node or for
+/// what follows it.
+#[inline(always)]
+fn slopes_on_axis<T, V, L, const D: usize, const W: usize>(
+    vectors: V,
+    weights: &L,
+    axis: usize,
+    arms_first: bool,
+) -> [Lane8<T>; W]
+where
+    T: RealField + Copy,
+    V: Vectors,
+    L: Weights<T, D, W>,
+{
+    array::from_fn(|place| {
+        let G = weights.G(axis, place);
+        if !L::AFFINE {
+            return vectors.splat8(G);
+        }
+        let Z = weights.Z(axis, place);
+        Lane8(array::from_fn(|q| if (q < D) == arms_first { Z } else { G }))
+    })
 }
 
 /// P2G of particle `k`, as [`p2g`](crate::kernel::any::p2g): plane by plane, row by row, node by node.
@@ -94,38 +63,51 @@ pub(crate) fn p2g_in_space<T, L, V, const D: usize, const W: usize, const N: usi
     L: Weights<T, D, W>,
 {
     let start = weights.first_node() - first;
-    let value = Lane8::load(vectors, &contributions.value[k].values);
-    let zero = T::zero();
-    let gradient = |axis: usize| {
-        let column = contributions.stress_flux[k].column(axis);
-        Lane8 {
-            low: Lane4([zero, zero, zero, column[0]]),
-            high: Lane4([column[1], column[D - 1], zero, zero]),
-        }
-    };
-    let (along, across, up) = (gradient(0), gradient(1), gradient(D - 1));
-    let [S, G] = factors(vectors, weights, 0);
-    let [S_across, G_across] = factors(vectors, weights, 1);
-    let [S_up, G_up] = factors(vectors, weights, D - 1);
-    for plane in 0..W {
-        let to_value = up.mul_add(vectors, G_up[plane], value.mul(vectors, S_up[plane]));
-        let to_along = along.mul(vectors, S_up[plane]);
-        let to_across = across.mul(vectors, S_up[plane]);
-        for row in 0..W {
-            let with_value = to_value.mul(vectors, S_across[row]);
-            let to_value = to_across.mul_add(vectors, G_across[row], with_value);
-            let to_along = to_along.mul(vectors, S_across[row]);
+    let value = vectors.load8(&contributions.value[k].values);
+    let slope = |axis: usize| contributions.slope_lanes(k, axis, L::AFFINE);
+    let (along, across, up) = (slope(0), slope(1), slope(D - 1));
+    let (S, G) = (weights_on_axis(vectors, weights, 0), slopes_on_axis(vectors, weights, 0, true));
+    let (S_across, G_across) =
+        (weights_on_axis(vectors, weights, 1), slopes_on_axis(vectors, weights, 1, true));
+    let (S_up, G_up) =
+        (weights_on_axis(vectors, weights, D - 1), slopes_on_axis(vectors, weights, D - 1, true));
+    for plane in 0..places::<W>() {
+        let with_value = vectors.mul8(value, S_up[plane]);
+        let to_value = vectors.mul_add8(up, G_up[plane], with_value);
+        let to_along = vectors.mul8(along, S_up[plane]);
+        let to_across = vectors.mul8(across, S_up[plane]);
+        for row in 0..places::<W>() {
+            let with_value = vectors.mul8(to_value, S_across[row]);
+            let to_value = vectors.mul_add8(to_across, G_across[row], with_value);
+            let to_along = vectors.mul8(to_along, S_across[row]);
             let place = start + row * strides[1] + plane * strides[D - 1];
             let Some(nodes) = band.get_mut(place..).and_then(|n| n.first_chunk_mut::<W>()) else {
                 debug_assert!(false, "a stencil beyond its band");
                 return;
             };
             for (i, Node { values }) in nodes.iter_mut().enumerate() {
-                let with_gradient = to_along.mul_add(vectors, G[i], Lane8::load(vectors, values));
-                to_value.mul_add(vectors, S[i], with_gradient).store(values);
+                let with_slope = vectors.mul_add8(to_along, G[i], vectors.load8(values));
+                *values = vectors.mul_add8(to_value, S[i], with_slope).0;
             }
         }
     }
+}
+
+/// Nodes along an axis. Loops over more than three are not to be unrolled: they would be long.
+#[inline(always)]
+fn places<const W: usize>() -> usize {
+    if W > 3 { std::hint::black_box(W) } else { W }
+}
+
+/// Adds the sum over the places before this one; the first place has none.
+#[inline(always)]
+fn after<T: RealField + Copy>(
+    vectors: impl Vectors,
+    sum: Lane8<T>,
+    term: Lane8<T>,
+    place: usize,
+) -> Lane8<T> {
+    if place == 0 { term } else { vectors.add8(sum, term) }
 }
 
 /// G2P, as [`g2p`](crate::kernel::any::g2p): nodes are summed to rows, rows to planes, planes to the result.
@@ -145,36 +127,36 @@ where
     L: Weights<T, D, W>,
 {
     let start = weights.first_node();
-    let zero = Lane4([T::zero(); 4]);
-    let [S, G] = factors(vectors, weights, 0);
-    let [S_across, G_across] = factors(vectors, weights, 1);
-    let [S_up, G_up] = factors(vectors, weights, D - 1);
-    let (mut value, mut along, mut across, mut up) = (Lane8::zero(), zero, zero, zero);
-    for plane in 0..W {
-        let (mut plane_value, mut plane_along, mut plane_across) = (Lane8::zero(), zero, zero);
-        for row in 0..W {
+    let zero = Lane8::zero();
+    let (S, G) = (weights_on_axis(vectors, weights, 0), slopes_on_axis(vectors, weights, 0, false));
+    let (S_across, G_across) =
+        (weights_on_axis(vectors, weights, 1), slopes_on_axis(vectors, weights, 1, false));
+    let (S_up, G_up) =
+        (weights_on_axis(vectors, weights, D - 1), slopes_on_axis(vectors, weights, D - 1, false));
+    let (mut value, mut along, mut across, mut up) = (zero, zero, zero, zero);
+    for plane in 0..places::<W>() {
+        let (mut plane_value, mut plane_along, mut plane_across) = (zero, zero, zero);
+        for row in 0..places::<W>() {
             let place = start + row * strides[1] + plane * strides[D - 1];
             let Some(nodes) = nodes.get(place..).and_then(|n| n.first_chunk::<W>()) else {
                 debug_assert!(false, "a stencil beyond the grid");
                 return Interpolated::zero();
             };
-            let (mut row_value, mut row_along) = (Lane8::zero(), zero);
+            let (mut row_value, mut row_along) = (zero, zero);
             for (i, Node { values }) in nodes.iter().enumerate() {
-                let nodal = Lane8::load(vectors, values);
-                row_value = nodal.mul(vectors, S[i]).after(vectors, row_value, i);
-                row_along = vectors.mul_add(nodal.low, G[i], row_along);
+                let nodal = vectors.load8(values);
+                row_value = after(vectors, row_value, vectors.mul8(nodal, S[i]), i);
+                row_along = vectors.mul_add8(nodal, G[i], row_along);
             }
-            plane_value = row_value.mul(vectors, S_across[row]).after(vectors, plane_value, row);
-            plane_along = vectors.mul_add(row_along, S_across[row], plane_along);
-            plane_across = vectors.mul_add(row_value.low, G_across[row], plane_across);
+            let weighted = vectors.mul8(row_value, S_across[row]);
+            plane_value = after(vectors, plane_value, weighted, row);
+            plane_along = vectors.mul_add8(row_along, S_across[row], plane_along);
+            plane_across = vectors.mul_add8(row_value, G_across[row], plane_across);
         }
-        value = plane_value.mul(vectors, S_up[plane]).after(vectors, value, plane);
-        along = vectors.mul_add(plane_along, S_up[plane], along);
-        across = vectors.mul_add(plane_across, S_up[plane], across);
-        up = vectors.mul_add(plane_value.low, G_up[plane], up);
+        value = after(vectors, value, vectors.mul8(plane_value, S_up[plane]), plane);
+        along = vectors.mul_add8(plane_along, S_up[plane], along);
+        across = vectors.mul_add8(plane_across, S_up[plane], across);
+        up = vectors.mul_add8(plane_value, G_up[plane], up);
     }
-    let mut values = [T::zero(); LANES];
-    value.store(&mut values);
-    let gradients = std::array::from_fn(|axis| [along, across, up][axis].0);
-    Interpolated::new(&values, &gradients)
+    Interpolated::new(weights, &value.0, &array::from_fn(|axis| [along, across, up][axis].0))
 }

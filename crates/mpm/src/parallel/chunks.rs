@@ -16,18 +16,37 @@ pub(crate) fn each_chunk<A: Send>(
     chunks.for_each(|(number, chunk)| work(number, chunk));
 }
 
-/// The body of a loop over chunks of three arrays: the chunk's number, and the chunks.
-type OfThree<'a, A, B, C> = dyn Fn(usize, &mut [A], &mut [B], &mut [C]) + Sync + 'a;
+/// A chunk of each of four arrays.
+pub(crate) struct ChunkOfFour<'a, A, B, C, E> {
+    pub(crate) number: usize,
+    pub(crate) a: &'a mut [A],
+    pub(crate) b: &'a mut [B],
+    pub(crate) c: &'a mut [C],
+    /// Empty where the whole array is.
+    pub(crate) e: &'a mut [E],
+}
 
-/// As [`each_chunk`] for three arrays of one length, chunk by chunk together.
-pub(crate) fn each_chunk_of_three<A: Send, B: Send, C: Send>(
-    (a, b, c): (&mut [A], &mut [B], &mut [C]),
+/// The body of a loop over chunks of four arrays.
+type OfFour<'a, A, B, C, E> = dyn Fn(ChunkOfFour<'_, A, B, C, E>) + Sync + 'a;
+
+/// As [`each_chunk`] for four arrays of one length, chunk by chunk together; the last one may be empty.
+pub(crate) fn each_chunk_of_four<A: Send, B: Send, C: Send, E: Send>(
+    (a, b, c, e): (&mut [A], &mut [B], &mut [C], &mut [E]),
     size: usize,
-    work: &OfThree<'_, A, B, C>,
+    work: &OfFour<'_, A, B, C, E>,
 ) {
-    let chunks = a.par_chunks_mut(size).zip(b.par_chunks_mut(size)).zip(c.par_chunks_mut(size));
-    let chunks = chunks.enumerate().with_max_len(1);
-    chunks.for_each(|(number, ((a, b), c))| work(number, a, b, c));
+    let mut of_e = e.chunks_mut(size);
+    let chunks = a.chunks_mut(size).zip(b.chunks_mut(size)).zip(c.chunks_mut(size)).enumerate();
+    let chunks: Vec<_> = chunks
+        .map(|(number, ((a, b), c))| ChunkOfFour {
+            number,
+            a,
+            b,
+            c,
+            e: of_e.next().unwrap_or_default(),
+        })
+        .collect();
+    chunks.into_par_iter().with_max_len(1).for_each(work);
 }
 
 /// Calls `work` with `(i, n)` for i from 0 to n - 1, for as many threads as the pool has, on those that have time.

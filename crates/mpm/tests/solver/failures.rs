@@ -2,16 +2,15 @@
 
 #![allow(clippy::unwrap_used)]
 
-use mmsmith_mpm::general::{self, Annulus, Body, General, Transfer};
 use mmsmith_mpm::{
-    Grid, Integrator, Material, NoBodyForce, Particles, Settings, SetupError, Shape, Simulation,
-    StepError,
+    Annulus, Body, Grid, Integrator, Material, NoBodyForce, Particles, Settings, SetupError, Shape,
+    Simulation, StepError, Transfer,
 };
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{SVector, Vector2};
+
+use crate::schemes::{INTEGRATORS, SHAPES, single};
 
 const SOFT: Material<f64> = Material::NeoHookean { lambda: 60.0, mu: 40.0 };
-const INTEGRATORS: [Integrator; 4] =
-    [Integrator::Usf, Integrator::Usl, Integrator::Musl, Integrator::Cd];
 
 /// Of binary fractions, and with axes that differ.
 fn grid<const D: usize>() -> Grid<f64, D> {
@@ -23,30 +22,24 @@ fn grid<const D: usize>() -> Grid<f64, D> {
     }
 }
 
-fn fast(shape: Shape, integrator: Integrator, time_step: f64) -> Settings<f64> {
-    Settings { shape, integrator, time_step, halve_first_acceleration: false }
+fn flip(shape: Shape, integrator: Integrator, time_step: f64) -> Settings<f64> {
+    let transfer = Transfer::Flip;
+    Settings { shape, integrator, transfer, time_step, halve_first_acceleration: false }
 }
 
-/// The errors of the fast and of the general simulation, if any, for the initial state of a body.
+/// A body with the half-edges of its domains, and without: boxes then.
+fn with_and_without_edges<const D: usize>(body: Body<f64, D>) -> [Body<f64, D>; 2] {
+    [body.clone(), Body { half_edges: Vec::new(), ..body }]
+}
+
+/// The errors, if any, for the initial state of a body, whose domains are given in either way.
 fn refusals<const D: usize>(
-    body: &Body<D>,
-    shape: general::Shape,
+    body: &Body<f64, D>,
+    shape: Shape,
 ) -> impl Iterator<Item = Option<StepError>> {
-    let settings = general::Settings {
-        shape,
-        integrator: general::Integrator::Cd,
-        transfer: Transfer::Flip,
-        time_step: 1e-3,
-        halve_first_acceleration: false,
-    };
-    let general = General::new(grid(), body.clone(), SOFT, settings).err();
-    let fast = shape.of_fast_step().map(|shape| {
-        let mut particles = body.particles.clone();
-        particles.half_size = body.half_edges[0].diagonal();
-        Simulation::new(grid(), particles, SOFT, fast(shape, Integrator::Cd, 1e-3)).err()
-    });
-    [general].into_iter().chain(fast).map(|error| {
-        error.map(|error| match error {
+    let settings = flip(shape, Integrator::Cd, 1e-3);
+    with_and_without_edges(body.clone()).into_iter().map(move |body| {
+        Simulation::new(grid(), body, SOFT, settings).err().map(|error| match error {
             SetupError::InitialState(error) => error,
             other => panic!("{other}"),
         })
@@ -56,27 +49,28 @@ fn refusals<const D: usize>(
 #[test]
 fn initial_states_are_admitted_up_to_the_limits() {
     fn check<const D: usize>() {
-        use general::Shape;
         let grid = grid::<D>();
         let fine = Body::lattice(&grid, 1, 2.0, |_| true);
         let particle = fine.particles.len() / 2;
         let (step, time) = (0, 0.0);
-        let of = |shape: Shape, change: &dyn Fn(&mut Body<D>), expected: Option<&StepError>| {
-            let mut body = fine.clone();
-            change(&mut body);
-            for found in refusals(&body, shape) {
-                assert_eq!(found.as_ref(), expected, "{D} {shape:?}");
-            }
-        };
+        let of =
+            |shape: Shape, change: &dyn Fn(&mut Body<f64, D>), expected: Option<&StepError>| {
+                let mut body = fine.clone();
+                change(&mut body);
+                for found in refusals(&body, shape) {
+                    assert_eq!(found.as_ref(), expected, "{D} {shape:?}");
+                }
+            };
         for axis in 0..D {
             let (lower, upper) = (grid.lower[axis], grid.upper()[axis]);
-            let shapes = [Shape::Linear, Shape::Ugimp, Shape::Gimp, Shape::Bspline3, Shape::Cpdi];
-            for shape in shapes {
+            // Domains between corners have limits of their own, see below.
+            for shape in SHAPES.into_iter().filter(|&shape| shape != Shape::Cpdi2) {
                 for (on, beyond) in
                     [(lower, lower.next_down()), (upper, upper.next_up()), (upper, upper + 9.0)]
                 {
-                    let put =
-                        |x: f64| move |body: &mut Body<D>| body.particles.x[particle][axis] = x;
+                    let put = |x: f64| {
+                        move |body: &mut Body<f64, D>| body.particles.x[particle][axis] = x
+                    };
                     of(shape, &put(on), None);
                     let mut position: Vec<f64> =
                         fine.particles.x[particle].iter().copied().collect();
@@ -86,7 +80,7 @@ fn initial_states_are_admitted_up_to_the_limits() {
                     of(shape, &put(beyond), Some(&error));
                 }
                 let stretch = |by: f64| {
-                    move |body: &mut Body<D>| body.particles.F[particle][(axis, axis)] = by
+                    move |body: &mut Body<f64, D>| body.particles.F[particle][(axis, axis)] = by
                 };
                 for J in [0.0, -0.5] {
                     let error = StepError::Inverted { step, time, particle, J };
@@ -109,7 +103,8 @@ fn initial_states_are_admitted_up_to_the_limits() {
                 of(shape, &stretch(4.5), stretches.then_some(&error));
             }
             let size = |half: f64| {
-                move |body: &mut Body<D>| {
+                move |body: &mut Body<f64, D>| {
+                    body.particles.half_size[axis] = half;
                     body.half_edges.iter_mut().for_each(|E| E[(axis, axis)] = half);
                 }
             };
@@ -134,7 +129,7 @@ fn what_is_not_finite_is_refused_with_its_position() {
         moved.particles.x[3][1] = bad;
         let mut stretched = body.clone();
         stretched.particles.F[3][(0, 0)] = bad;
-        for shape in [general::Shape::Gimp, general::Shape::Linear, general::Shape::Cpdi] {
+        for shape in [Shape::Gimp, Shape::Linear, Shape::Cpdi] {
             for error in refusals(&moved, shape) {
                 let Some(StepError::NotFinite { step: 0, particle: 3, position, J, .. }) = error
                 else {
@@ -163,16 +158,10 @@ fn what_is_not_finite_is_refused_with_its_position() {
 #[test]
 fn of_several_particles_the_one_in_the_worst_trouble_is_named() {
     let mut body = Body::lattice(&grid::<2>(), 1, 2.0, |_| true);
-    let settings = general::Settings {
-        shape: general::Shape::Gimp,
-        integrator: general::Integrator::Cd,
-        transfer: Transfer::Flip,
-        time_step: 1e-3,
-        halve_first_acceleration: false,
-    };
+    let settings = flip(Shape::Gimp, Integrator::Cd, 1e-3);
     let mut expect = |change: &dyn Fn(&mut Particles<f64, 2>), is: &dyn Fn(&StepError) -> bool| {
         change(&mut body.particles);
-        let error = General::new(grid(), body.clone(), SOFT, settings).unwrap_err();
+        let error = Simulation::new(grid(), body.clone(), SOFT, settings).unwrap_err();
         let SetupError::InitialState(error) = error else { panic!("{error}") };
         assert!(is(&error), "{error}");
     };
@@ -205,13 +194,13 @@ fn long<const D: usize>(
     cells[D - 1] = [600, 150, 40][D - 1];
     let grid = Grid { lower: SVector::zeros(), spacing: 1.0, cells, walls: [[false; 2]; D] };
     let particles = Particles::lattice(&grid, 2, 2.0, |_| true);
-    (grid, particles, fast(shape, integrator, 0.125))
+    (grid, particles, flip(shape, integrator, 0.125))
 }
 
 #[test]
 fn a_failed_step_names_the_first_particle_that_left_the_grid() {
     fn check<const D: usize>() {
-        for shape in [Shape::Linear, Shape::Gimp] {
+        for shape in [Shape::Linear, Shape::Gimp, Shape::Bspline3, Shape::Cpdi] {
             for integrator in INTEGRATORS {
                 for side in [1.0, -1.0] {
                     let (grid, mut particles, settings) = long::<D>(shape, integrator);
@@ -243,12 +232,12 @@ fn a_failed_step_names_the_first_particle_that_left_the_grid() {
 #[test]
 fn a_failed_step_names_the_first_particle_that_is_turned_inside_out() {
     fn check<const D: usize>() {
-        for shape in [Shape::Linear, Shape::Gimp] {
+        for shape in [Shape::Linear, Shape::Gimp, Shape::Bspline3, Shape::Cpdi] {
             for integrator in INTEGRATORS {
                 let (grid, mut particles, settings) = long::<D>(shape, integrator);
                 let far = 0.95 * grid.upper()[D - 1];
                 for (v, X) in particles.v.iter_mut().zip(&particles.X) {
-                    v[D - 1] = (far - X[D - 1]).min(0.0) * 10.0;
+                    v[D - 1] = (far - X[D - 1]).min(0.0) * 40.0;
                 }
                 let mut run = Simulation::new(grid, particles, SOFT, settings).unwrap();
                 let error = run.step(&NoBodyForce).unwrap_err();
@@ -264,7 +253,8 @@ fn a_failed_step_names_the_first_particle_that_is_turned_inside_out() {
                 assert!((found - J).abs() < 1e-15 * J.abs().max(1.0));
                 assert!(p.X[particle][D - 1] > far - 2.0 && particle > 1100);
                 // Where F comes first, a step that fails so has moved nothing.
-                assert!(integrator != Integrator::Usf || p.x == p.X);
+                let early = matches!(integrator, Integrator::Usf | Integrator::Usavg);
+                assert!(!early || p.x == p.X);
                 assert!(p.x.iter().chain(&p.v).all(|x| x.iter().all(|x| x.is_finite())));
                 assert_eq!(run.step(&NoBodyForce), Err(error));
             }
@@ -303,72 +293,111 @@ fn what_is_not_finite_is_named_before_what_left_the_grid() {
 }
 
 #[test]
-fn a_box_that_grows_too_wide_is_named_with_its_size() {
-    fn check<const D: usize>(axis: usize) {
+fn a_domain_that_grows_too_wide_is_named_with_its_size() {
+    fn check<const D: usize>(shape: Shape, axis: usize) {
         for integrator in INTEGRATORS {
             let grid = Grid { cells: [36; D], ..grid::<D>() };
             let middle = (grid.lower + grid.upper()) * 0.5;
-            let mut particles = Particles::lattice(&grid, 2, 2.0, |X| (X - middle).amax() < 0.5);
-            for (v, X) in particles.v.iter_mut().zip(&particles.X) {
+            let mut body = Body::lattice(&grid, 2, 2.0, |X| (X - middle).amax() < 0.5);
+            let p = &mut body.particles;
+            for (v, X) in p.v.iter_mut().zip(&p.X) {
                 v[axis] = (X - middle)[axis] * 50.0;
             }
-            let settings = fast(Shape::Gimp, integrator, 0.02);
+            let settings = flip(shape, integrator, 0.02);
             let softest = Material::NeoHookean { lambda: 0.06, mu: 0.04 };
-            let mut run = Simulation::new(grid, particles, softest, settings).unwrap();
+            let mut run = Simulation::new(grid, body, softest, settings).unwrap();
             let error = (0..20).find_map(|_| run.step(&NoBodyForce).err()).unwrap();
             let p = run.particles();
-            let of = |F: &SMatrix<f64, D, D>| F[(axis, axis)] * 0.0625;
-            let particle = p.F.iter().position(|F| of(F) > 0.5).unwrap();
+            let of = |k: usize| match (shape, run.mesh()) {
+                (Shape::Gimp, _) => p.F[k][(axis, axis)] * 0.0625,
+                (_, Some(mesh)) => {
+                    let away = |&c: &usize| (mesh.x[c] - p.x[k])[axis].abs();
+                    mesh.corners[k][..1 << D].iter().map(away).fold(0.0, f64::max)
+                }
+                _ => p.F[k].row(axis).iter().map(|F| F.abs()).sum::<f64>() * 0.0625,
+            };
+            let particle = (0..p.len()).position(|k| of(k) > 0.5).unwrap();
             let step = run.steps_done() + 1;
-            let (time, half_size, limit) = (0.02 * step as f64, of(&p.F[particle]), 0.5);
+            let (time, half_size, limit) = (0.02 * step as f64, of(particle), 0.5);
             let expected = StepError::TooLarge { step, time, particle, axis, half_size, limit };
-            assert_eq!(error, expected, "{D} {integrator:?}");
+            assert_eq!(error, expected, "{D} {shape} {integrator:?}");
         }
     }
-    check::<1>(0);
-    check::<2>(0);
-    check::<2>(1);
-    check::<3>(2);
+    for shape in [Shape::Gimp, Shape::Cpdi, Shape::Cpdi2] {
+        check::<1>(shape, 0);
+        check::<2>(shape, 0);
+        check::<2>(shape, 1);
+        check::<3>(shape, 2);
+    }
 }
 
-type Change<'a> = &'a dyn Fn(&mut Grid<f64, 2>, &mut Body<2>, &mut f64);
+/// The figures of errors are those of the simulation, whatever its precision.
+#[test]
+fn single_precision_has_the_same_limits() {
+    let body = Body::lattice(&grid::<2>(), 1, 2.0, |_| true);
+    let grid = Grid {
+        lower: Vector2::new(-0.5, 0.25),
+        spacing: 0.25,
+        cells: [4, 5],
+        walls: [[false; 2]; 2],
+    };
+    let material = Material::NeoHookean { lambda: 60.0, mu: 40.0 };
+    for shape in SHAPES.into_iter().filter(|&shape| shape != Shape::Cpdi2) {
+        let of = |change: &dyn Fn(&mut Body<f32, 2>)| {
+            let mut body = single(&body);
+            change(&mut body);
+            let settings = Settings {
+                shape,
+                integrator: Integrator::Usl,
+                transfer: Transfer::Flip,
+                time_step: 1e-3,
+                halve_first_acceleration: false,
+            };
+            Simulation::new(grid.clone(), body, material, settings).err()
+        };
+        assert_eq!(of(&|body| body.particles.x[3][1] = 1.5), None);
+        let beyond = 1.5_f32.next_up();
+        let outside = StepError::LeftGrid {
+            step: 0,
+            time: 0.0,
+            particle: 3,
+            position: vec![0.375, f64::from(beyond)],
+            axis: 1,
+            lower: 0.25,
+            upper: 1.5,
+        };
+        let error = of(&|body| body.particles.x[3][1] = beyond);
+        assert_eq!(error, Some(SetupError::InitialState(outside)), "{shape}");
+        let inverted = StepError::Inverted { step: 0, time: 0.0, particle: 3, J: -0.5 };
+        let error = of(&|body| body.particles.F[3][(1, 1)] = -0.5);
+        assert_eq!(error, Some(SetupError::InitialState(inverted)), "{shape}");
+    }
+}
 
-/// What both simulations answer to a change of a sound scene.
-fn answers(shape: general::Shape, change: Change) -> Vec<Option<SetupError>> {
+type Change<'a> = &'a dyn Fn(&mut Grid<f64, 2>, &mut Body<f64, 2>, &mut f64);
+
+/// What is answered to a change of a sound scene, with the half-edges of domains and without.
+fn answers(shape: Shape, change: Change) -> [Option<SetupError>; 2] {
     let (mut grid, mut time_step) = (grid::<2>(), 1e-3);
     let mut body = Body::lattice(&grid, 2, 2.0, |_| true);
     change(&mut grid, &mut body, &mut time_step);
-    let settings = general::Settings {
-        shape,
-        integrator: general::Integrator::Usl,
-        transfer: Transfer::Apic,
-        time_step,
-        halve_first_acceleration: false,
-    };
-    let mut particles = body.particles.clone();
-    if let Some(E) = body.half_edges.first() {
-        particles.half_size = E.diagonal();
-    }
-    let mut answers = Vec::new();
-    if let Some(shape) = shape.of_fast_step() {
-        let settings = fast(shape, Integrator::Usl, time_step);
-        answers.push(Simulation::new(grid.clone(), particles, SOFT, settings).err());
-    }
-    answers.push(General::new(grid, body, SOFT, settings).err());
-    answers
+    let transfer = Transfer::Apic;
+    let settings = Settings { transfer, ..flip(shape, Integrator::Usl, time_step) };
+    with_and_without_edges(body)
+        .map(|body| Simulation::new(grid.clone(), body, SOFT, settings).err())
 }
 
 #[test]
 fn what_has_to_be_positive_and_finite_is_named() {
-    use general::Shape;
+    let names = |answer: &Option<SetupError>, parts: &[&str], value: f64| {
+        let Some(SetupError::NotPositive { quantity, value: found }) = answer else {
+            panic!("{parts:?} {value}: {answer:?}")
+        };
+        assert!(parts.iter().all(|part| quantity.contains(part)), "{quantity} {parts:?}");
+        assert!(*found == value || found.is_nan() && value.is_nan());
+    };
     let refused = |shape: Shape, change: Change, parts: &[&str], value: f64| {
-        for answer in answers(shape, change) {
-            let Some(SetupError::NotPositive { quantity, value: found }) = &answer else {
-                panic!("{parts:?} {value}: {answer:?}")
-            };
-            assert!(parts.iter().all(|part| quantity.contains(part)), "{quantity} {parts:?}");
-            assert!(*found == value || found.is_nan() && value.is_nan());
-        }
+        answers(shape, change).iter().for_each(|answer| names(answer, parts, value));
     };
     for bad in [0.0, -0.0, -1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         for shape in [Shape::Linear, Shape::Gimp, Shape::Cpdi, Shape::Cpdi2] {
@@ -379,15 +408,20 @@ fn what_has_to_be_positive_and_finite_is_named() {
             let volume: Change = &|_, body, _| body.particles.volume[3] = bad;
             refused(shape, volume, &["volume", "particle 3"], bad);
         }
-        let flat: Change = &|_, body, _| body.half_edges[0][(1, 1)] = bad;
+        let flat: Change = &|_, body, _| {
+            body.particles.half_size[1] = bad;
+            body.half_edges[0][(1, 1)] = bad;
+        };
         for shape in [Shape::Ugimp, Shape::Gimp] {
             refused(shape, flat, &["half-size", "axis 1"], bad);
         }
-        for shape in [Shape::Linear, Shape::Bspline2, Shape::Bspline3] {
+        for shape in [Shape::Linear, Shape::Bspline2, Shape::Bspline3, Shape::Cpdi2] {
             assert!(answers(shape, flat).iter().all(Option::is_none), "a point has no size");
         }
+        let [given, boxes] = answers(Shape::Cpdi, flat);
+        names(&boxes, &["half-size", "axis 1"], bad);
         if bad.is_finite() {
-            refused(Shape::Cpdi, flat, &["domain", "particle 0"], bad * 0.0625);
+            names(&given, &["domain", "particle 0"], bad * 0.0625);
         }
     }
     for small in [f64::MIN_POSITIVE, 1e-9] {
@@ -398,7 +432,6 @@ fn what_has_to_be_positive_and_finite_is_named() {
 
 #[test]
 fn what_has_to_be_finite_is_named() {
-    use general::Shape;
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         for shape in [Shape::Linear, Shape::Gimp, Shape::Cpdi, Shape::Cpdi2] {
             let cases: [(&str, Change); 2] = [
@@ -419,7 +452,6 @@ fn what_has_to_be_finite_is_named() {
 
 #[test]
 fn arrays_of_another_length_are_named() {
-    use general::Shape;
     // Four by five cells.
     let expected = 80;
     let cases: [(&str, Change); 7] = [
@@ -432,15 +464,12 @@ fn arrays_of_another_length_are_named() {
         ("corners", &|_, body, _| body.mesh.as_mut().unwrap().corners.truncate(79)),
     ];
     for (array, change) in cases {
-        // Only the general simulation has the last two.
-        for answer in answers(Shape::Cpdi2, change) {
-            assert_eq!(answer, Some(SetupError::LengthMismatch { array, found: 79, expected }));
+        for shape in [Shape::Cpdi2, Shape::Cpdi, Shape::Gimp, Shape::Linear] {
+            let error = Some(SetupError::LengthMismatch { array, found: 79, expected });
+            let [given, boxes] = answers(shape, change);
+            assert_eq!(given, error, "{shape}");
+            assert_eq!(boxes, if array == "half_edges" { None } else { error }, "{shape}");
         }
-        for answer in answers(Shape::Gimp, change).iter().flatten() {
-            assert!(matches!(answer, SetupError::LengthMismatch { found: 79, .. }), "{answer}");
-        }
-        let count = answers(Shape::Gimp, change).iter().flatten().count();
-        assert_eq!(count, if array.len() > 6 { 1 } else { 2 }, "{array}");
     }
 }
 
@@ -451,24 +480,27 @@ fn a_grid_beyond_memory_is_refused_with_the_bytes_it_needs() {
         let body = Body::lattice(&grid::<D>(), 1, 2.0, |_| true);
         let large = Grid { cells, ..grid::<D>() };
         let nodes: u128 = cells.iter().map(|&n| n as u128 + 9).product();
-        let settings = general::Settings {
-            shape: general::Shape::Gimp,
-            integrator: general::Integrator::Usl,
-            transfer: Transfer::Flip,
-            time_step: 1e-3,
-            halve_first_acceleration: false,
-        };
-        let error = General::new(large.clone(), body.clone(), SOFT, settings).unwrap_err();
-        // A mass and four vectors.
-        let bytes = nodes * (8 + 4 * 8 * D as u128);
-        assert_eq!(error, SetupError::GridTooLarge { cells: cells.to_vec(), bytes });
-        for integrator in INTEGRATORS {
-            let mut particles = body.particles.clone();
-            particles.half_size = SVector::repeat(0.125);
-            let settings = fast(Shape::Gimp, integrator, 1e-3);
-            let error = Simulation::new(large.clone(), particles, SOFT, settings).unwrap_err();
-            let grids = if integrator == Integrator::Usf { 1 } else { 2 };
-            let bytes = nodes * of_node * grids;
+        for (shape, integrator, transfer, grids) in [
+            (Shape::Gimp, Integrator::Usf, Transfer::Flip, 1),
+            (Shape::Gimp, Integrator::Usavg, Transfer::Apic, 1),
+            // Particles add to the grid of the next step.
+            (Shape::Gimp, Integrator::Usl, Transfer::Flip, 2),
+            (Shape::Bspline3, Integrator::Cd, Transfer::Flip, 2),
+            (Shape::Gimp, Integrator::Cd, Transfer::Pic, 1),
+            (Shape::Gimp, Integrator::Usl, Transfer::Xpic(1), 1),
+            (Shape::Cpdi, Integrator::Usl, Transfer::Flip, 1),
+            (Shape::Cpdi2, Integrator::Cd, Transfer::Apic, 1),
+            // Velocities that are projected anew, and the terms of a filter.
+            (Shape::Gimp, Integrator::Musl, Transfer::Flip, 2),
+            (Shape::Cpdi, Integrator::Musl, Transfer::Apic, 2),
+            (Shape::Gimp, Integrator::Usl, Transfer::Xpic(2), 3),
+            (Shape::Cpdi2, Integrator::Musl, Transfer::Xpic(5), 3),
+        ] {
+            let settings = Settings { transfer, ..flip(shape, integrator, 1e-3) };
+            let error = Simulation::new(large.clone(), body.clone(), SOFT, settings).unwrap_err();
+            // The filter sums velocities.
+            let filter = if matches!(transfer, Transfer::Xpic(2..)) { 8 * D } else { 0 };
+            let bytes = nodes * (of_node * grids + filter as u128);
             assert_eq!(error, SetupError::GridTooLarge { cells: cells.to_vec(), bytes });
         }
     }
@@ -482,22 +514,15 @@ fn a_grid_beyond_memory_is_refused_with_the_bytes_it_needs() {
 }
 
 #[test]
-fn a_failed_step_of_the_general_simulation_names_the_first_particle_that_left_the_grid() {
-    use general::Shape;
+fn a_failed_step_names_the_first_particle_that_left_the_grid_through_any_face() {
     fn check<const D: usize>(shape: Shape) {
         for axis in 0..D {
             for side in [1.0, -1.0] {
                 let grid = grid::<D>();
                 let mut body = Body::lattice(&grid, 2, 2.0, |_| true);
                 body.particles.v.iter_mut().for_each(|v| v[axis] = side);
-                let settings = general::Settings {
-                    shape,
-                    integrator: general::Integrator::Usl,
-                    transfer: Transfer::Flip,
-                    time_step: 1.0 / 32.0,
-                    halve_first_acceleration: false,
-                };
-                let mut run = General::new(grid.clone(), body, SOFT, settings).unwrap();
+                let settings = flip(shape, Integrator::Usl, 1.0 / 32.0);
+                let mut run = Simulation::new(grid.clone(), body, SOFT, settings).unwrap();
                 let error = (0..10).find_map(|_| run.step(&NoBodyForce).err()).unwrap();
                 let (lower, upper) = (grid.lower[axis], grid.upper()[axis]);
                 let is_out = |x: &SVector<f64, D>| !(lower..=upper).contains(&x[axis]);
@@ -513,88 +538,89 @@ fn a_failed_step_of_the_general_simulation_names_the_first_particle_that_left_th
             }
         }
     }
-    for shape in [Shape::Linear, Shape::Gimp, Shape::Bspline2, Shape::Cpdi] {
+    for shape in SHAPES {
         check::<1>(shape);
         check::<2>(shape);
         check::<3>(shape);
     }
-    check::<1>(Shape::Cpdi2);
-    check::<2>(Shape::Cpdi2);
 }
 
 /// Domains between corners have a volume of their own, whatever F is.
 #[test]
 fn domains_between_corners_are_admitted_up_to_the_limits() {
-    let grid = grid::<2>();
-    let settings = general::Settings {
-        shape: general::Shape::Cpdi2,
-        integrator: general::Integrator::Usl,
-        transfer: Transfer::Flip,
-        time_step: 1e-3,
-        halve_first_acceleration: false,
-    };
-    let particle = 2;
-    let of = |change: &dyn Fn(&mut [SVector<f64, 2>])| {
-        let mut body = Body::lattice(&grid, 1, 2.0, |_| true);
-        let mesh = body.mesh.as_mut().unwrap();
-        // A domain that shares no corner.
-        let own = mesh.corners[particle].map(|k| mesh.X[k]);
-        mesh.corners[particle] = std::array::from_fn(|k| mesh.X.len() + k);
-        mesh.X.extend(own);
-        mesh.x.extend(own);
-        let first = mesh.x.len() - 4;
-        change(&mut mesh.x[first..]);
-        General::new(grid.clone(), body, SOFT, settings).err()
-    };
-    assert_eq!(of(&|_| {}), None);
-    let (step, time, limit) = (0, 0.0, 0.5);
-    for axis in 0..2 {
-        // From the particle, in the middle of its cell, two cells are the limit.
-        for (away, admitted) in [(0.375, true), (0.375 + 1e-9, false)] {
-            for corners in [[0, 3], [1, 2]] {
+    fn check<const D: usize>() {
+        let grid = grid::<D>();
+        let settings = flip(Shape::Cpdi2, Integrator::Usl, 1e-3);
+        let particle = 2;
+        let fine = Body::lattice(&grid, 1, 2.0, |_| true);
+        let centre = fine.particles.X[particle];
+        let of = |change: &dyn Fn(&mut [SVector<f64, D>])| {
+            let mut body = fine.clone();
+            let mesh = body.mesh.as_mut().unwrap();
+            // A domain that shares no corner.
+            let corners = &mut mesh.corners[particle][..1 << D];
+            let own: Vec<_> = corners.iter().map(|&k| mesh.X[k]).collect();
+            let first = mesh.X.len();
+            corners.iter_mut().enumerate().for_each(|(k, corner)| *corner = first + k);
+            mesh.X.extend(&own);
+            mesh.x.extend(&own);
+            change(&mut mesh.x[first..]);
+            Simulation::new(grid.clone(), body, SOFT, settings).err()
+        };
+        assert_eq!(of(&|_| {}), None);
+        let (step, time, limit) = (0, 0.0, 0.5);
+        for axis in 0..D {
+            // From the particle, in the middle of its cell, two cells are the limit.
+            for (away, admitted) in [(0.375, true), (0.375 + 1e-9, false)] {
+                for side in [-1.0, 1.0] {
+                    let error = of(&|x| {
+                        for x in x.iter_mut().filter(|x| (x[axis] - centre[axis]) * side > 0.0) {
+                            x[axis] += side * away;
+                        }
+                    });
+                    let is_wide = |error: &SetupError| {
+                        matches!(error, SetupError::InitialState(StepError::TooLarge {
+                            step: 0, particle: 2, axis: found, half_size, limit: 0.5, ..
+                        }) if *found == axis && *half_size > limit && *half_size < limit + 1e-8)
+                    };
+                    assert!(
+                        error.as_ref().map_or(admitted, |e| !admitted && is_wide(e)),
+                        "{D}: {error:?}"
+                    );
+                }
+            }
+            // Its volume in its reference volume.
+            for J in [0.0, -0.5, -3.0] {
                 let error = of(&|x| {
-                    let sign = if corners[0] == 0 { -1.0 } else { 1.0 };
-                    for k in if axis == 0 { corners } else { [corners[0] * 2, corners[0] * 2 + 1] }
-                    {
-                        x[k][axis] += sign * away;
+                    for x in x.iter_mut().filter(|x| x[axis] > centre[axis]) {
+                        x[axis] += 0.25 * (J - 1.0);
                     }
                 });
-                let is_wide = |error: &SetupError| {
-                    matches!(error, SetupError::InitialState(StepError::TooLarge {
-                        step: 0, particle: 2, axis: found, half_size, limit: 0.5, ..
-                    }) if *found == axis && *half_size > limit && *half_size < limit + 1e-8)
-                };
-                assert!(error.as_ref().map_or(admitted, |e| !admitted && is_wide(e)), "{error:?}");
+                let inverted = StepError::Inverted { step, time, particle, J };
+                assert_eq!(error, Some(SetupError::InitialState(inverted)), "{D}");
             }
         }
+        for bad in [f64::NAN, f64::INFINITY] {
+            let error = of(&|x| x[1][0] = bad);
+            assert!(
+                matches!(
+                    error,
+                    Some(SetupError::InitialState(StepError::NotFinite { particle: 2, .. }))
+                ),
+                "{D}: {error:?}"
+            );
+        }
     }
-    // Its area in its reference area.
-    for (height, J) in [(0.0, 0.0), (-0.5, -0.5), (-3.0, -3.0)] {
-        let error = of(&|x| {
-            for (low, high) in [(0, 3), (1, 2)] {
-                x[high][1] = x[low][1] + 0.25 * height;
-            }
-        });
-        let inverted = StepError::Inverted { step, time, particle, J };
-        assert_eq!(error, Some(SetupError::InitialState(inverted)));
-    }
-    for bad in [f64::NAN, f64::INFINITY] {
-        let error = of(&|x| x[1][0] = bad);
-        assert!(
-            matches!(
-                error,
-                Some(SetupError::InitialState(StepError::NotFinite { particle: 2, .. }))
-            ),
-            "{error:?}"
-        );
-    }
+    check::<1>();
+    check::<2>();
+    check::<3>();
 }
 
 #[test]
 fn rings_that_are_none_are_refused() {
     let of = |inner: f64, outer: f64, spacing: f64, density: f64| {
         let ring = Annulus { inner, outer, quarter: true };
-        Body::<2>::annulus(&ring, spacing, 2, density).err()
+        Body::<f64, 2>::annulus(&ring, spacing, 2, density).err()
     };
     assert_eq!(of(0.4, 0.6, 0.1, 2.0), None);
     for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
@@ -613,6 +639,6 @@ fn rings_that_are_none_are_refused() {
         }
     }
     let ring = Annulus { inner: 0.4, outer: 0.6, quarter: true };
-    let error = Body::<3>::annulus(&ring, 0.1, 2, 1.0).err();
+    let error = Body::<f64, 3>::annulus(&ring, 0.1, 2, 1.0).err();
     assert_eq!(error, Some(SetupError::PolarDimension { dimension: 3 }));
 }

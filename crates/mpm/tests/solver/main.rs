@@ -2,9 +2,11 @@
 
 mod boundary;
 mod failures;
-mod general;
 mod mechanics;
 mod order;
+#[path = "../reference/mod.rs"]
+mod reference;
 mod ring;
+mod schemes;
 mod state;
 mod total_lagrangian;

@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use mmsmith_mpm::{Grid, Integrator, Material, Particles, Settings, Shape, Simulation};
+use mmsmith_mpm::{Grid, Integrator, Material, Particles, Settings, Shape, Simulation, Transfer};
 use nalgebra::{Vector2, vector};
 
 const AMPLITUDE: f64 = 0.1;
@@ -81,7 +81,8 @@ fn error(shape: Shape, integrator: Integrator, start: Start, cells: usize) -> f6
     }
     let material = Material::NeoHookean { lambda: LAMBDA, mu: MU };
     let halve_first_acceleration = centred && matches!(start, Start::Halved);
-    let settings = Settings { shape, integrator, time_step, halve_first_acceleration };
+    let transfer = Transfer::Flip;
+    let settings = Settings { shape, integrator, transfer, time_step, halve_first_acceleration };
     let mut simulation =
         Simulation::new(grid, particles, material, settings).expect("a sound scene");
     let mut largest = 0.0_f64;

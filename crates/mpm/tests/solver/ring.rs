@@ -2,7 +2,9 @@
 
 use std::f64::consts::PI;
 
-use mmsmith_mpm::{Grid, Integrator, Material, Particles, Settings, Shape, Simulation, StepError};
+use mmsmith_mpm::{
+    Grid, Integrator, Material, Particles, Settings, Shape, Simulation, StepError, Transfer,
+};
 use nalgebra::Vector2;
 
 const AMPLITUDE: f64 = 0.1;
@@ -68,6 +70,7 @@ fn errors(shape: Shape, cells: usize) -> Result<[f64; 2], StepError> {
     let settings = Settings {
         shape,
         integrator: Integrator::Cd,
+        transfer: Transfer::Flip,
         time_step: 2.0 / E.sqrt() / steps as f64,
         halve_first_acceleration: true,
     };

@@ -2,18 +2,17 @@
 
 #![allow(clippy::unwrap_used)]
 
-use mmsmith_mpm::general::{self, Body, General, Transfer};
 use mmsmith_mpm::total_lagrangian::{
     self as total, Axis, BoundaryData, Composition, Coordinates, End, HeldBoundary, Layout,
     MassMatrix, Quantity, Scheme, Side, TotalLagrangian,
 };
 use mmsmith_mpm::{
-    AtTime, BodyForce, Grid, Integrator, Material, NoBodyForce, Particles, Settings, Shape,
-    Simulation,
+    AtTime, Body, BodyForce, Grid, Integrator, Material, NoBodyForce, Particles, Settings, Shape,
+    Simulation, Transfer,
 };
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{SMatrix, SVector, Vector2};
 
-use crate::general::{INTEGRATORS, SHAPES};
+use crate::schemes::{self, noise, single};
 
 /// Sizes of the units in which lengths, times and masses are given: powers of two, so that nothing is rounded in another way.
 #[derive(Clone, Copy)]
@@ -74,7 +73,7 @@ impl Units {
         p
     }
 
-    fn body<const D: usize>(self, mut body: Body<D>) -> Body<D> {
+    fn body<const D: usize>(self, mut body: Body<f64, D>) -> Body<f64, D> {
         body.particles = self.particles(body.particles);
         body.half_edges.iter_mut().for_each(|E| *E *= self.length);
         if let Some(mesh) = &mut body.mesh {
@@ -94,13 +93,8 @@ impl Units {
     }
 }
 
-/// Different for every particle and component, and far from any regularity.
-fn noise(seed: usize) -> f64 {
-    (seed as f64 * 12.9898).sin() * 0.5
-}
-
 /// A moving, deformed body of unequal masses at the walls.
-fn body<const D: usize>() -> Body<D> {
+fn body<const D: usize>() -> Body<f64, D> {
     let mut body = Body::lattice(&ONE.grid::<D>(), 2, 2.0, |X| X.iter().all(|&x| x < 0.1));
     let p = &mut body.particles;
     for k in 0..p.len() {
@@ -136,33 +130,18 @@ fn is_continued<S>(
     assert!(read(&mut one) != written, "{what}");
 }
 
-fn fast_schemes() -> impl Iterator<Item = Settings<f64>> {
-    let integrators = [Integrator::Usf, Integrator::Usl, Integrator::Musl, Integrator::Cd];
-    let shapes = [Shape::Linear, Shape::Ugimp, Shape::Gimp, Shape::Bspline2];
-    shapes.into_iter().flat_map(move |shape| {
-        integrators.map(|integrator| Settings {
-            shape,
-            integrator,
-            time_step: 1.0 / 512.0,
-            halve_first_acceleration: integrator == Integrator::Cd,
-        })
+/// Every scheme, centred differences from velocities at time 0.
+fn updated_schemes() -> impl Iterator<Item = Settings<f64>> {
+    schemes::schemes().map(|settings| Settings {
+        time_step: 1.0 / 512.0,
+        halve_first_acceleration: settings.integrator == Integrator::Cd,
+        ..settings
     })
 }
 
-fn general_schemes() -> impl Iterator<Item = general::Settings> {
-    let transfers = [Transfer::Flip, Transfer::Pic, Transfer::Apic, Transfer::Xpic(3)];
-    SHAPES.into_iter().flat_map(move |shape| {
-        // Every integrator and every transfer with each of the weights.
-        INTEGRATORS.into_iter().zip(transfers.into_iter().cycle()).map(
-            move |(integrator, transfer)| general::Settings {
-                shape,
-                integrator,
-                transfer,
-                time_step: 1.0 / 512.0,
-                halve_first_acceleration: integrator == general::Integrator::Cd,
-            },
-        )
-    })
+/// Set up with the body of unit [`ONE`].
+fn simulation<const D: usize>(settings: Settings<f64>) -> Simulation<f64, D> {
+    Simulation::new(ONE.grid(), body::<D>(), ONE.material::<D>(), settings).unwrap()
 }
 
 fn total_scenes() -> impl Iterator<Item = (Coordinates, [End; 2], Scheme)> {
@@ -210,22 +189,10 @@ fn total_scene(
 fn runs_continue_from_their_state_to_the_same_bits() {
     fn check<const D: usize>() {
         let force = ONE.body_force::<D>();
-        for settings in fast_schemes() {
-            let new = || {
-                let (grid, particles) = (ONE.grid(), body::<D>().particles);
-                Simulation::new(grid, particles, ONE.material::<D>(), settings).unwrap()
-            };
+        for settings in updated_schemes() {
+            let two = [simulation(settings), simulation(settings)];
             let what = format!("{D} {settings:?}");
-            is_continued([new(), new()], |s| s.step(&force).unwrap(), Simulation::state, &what);
-        }
-        for settings in general_schemes() {
-            if D == 3 && settings.shape == general::Shape::Cpdi2 {
-                continue;
-            }
-            let new =
-                || General::new(ONE.grid(), body::<D>(), ONE.material::<D>(), settings).unwrap();
-            let what = format!("{D} {settings:?}");
-            is_continued([new(), new()], |s| s.step(&force).unwrap(), General::state, &what);
+            is_continued(two, |s| s.step(&force).unwrap(), Simulation::state, &what);
         }
     }
     check::<1>();
@@ -239,24 +206,42 @@ fn runs_continue_from_their_state_to_the_same_bits() {
     }
 }
 
+#[test]
+fn runs_in_single_precision_continue_from_their_state_to_the_same_bits() {
+    let force = |X: &[SVector<f32, 2>], t: f32, b: &mut [SVector<f32, 2>]| {
+        b.iter_mut().zip(X).for_each(|(b, X)| *b = X.map(|x| 3.0 * x + 5.0 * t));
+    };
+    for Settings { shape, integrator, transfer, halve_first_acceleration, .. } in updated_schemes()
+    {
+        let time_step = 1.0 / 512.0;
+        let settings =
+            Settings { shape, integrator, transfer, time_step, halve_first_acceleration };
+        let new = || {
+            let Grid { walls, cells, .. } = ONE.grid::<2>();
+            let grid = Grid { lower: Vector2::repeat(-0.25), spacing: 0.125, cells, walls };
+            let material = Material::NeoHookean { lambda: 60.0, mu: 40.0 };
+            Simulation::new(grid, single(&body::<2>()), material, settings).unwrap()
+        };
+        let what = format!("{settings:?}");
+        is_continued([new(), new()], |s| s.step(&force).unwrap(), Simulation::state, &what);
+    }
+}
+
 /// What a step that looks first whether its particles are sorted does with an order that no sort can give.
 #[test]
 fn particles_in_an_order_that_cannot_be_are_sorted_anew() {
-    let looks =
-        |settings: &Settings<f64>| matches!(settings.integrator, Integrator::Usl | Integrator::Cd);
     let force = ONE.body_force::<2>();
-    for settings in fast_schemes().filter(looks) {
-        let [mut one, mut two] = [(); 2].map(|()| {
-            let (grid, particles) = (ONE.grid(), body::<2>().particles);
-            Simulation::new(grid, particles, ONE.material::<2>(), settings).unwrap()
-        });
+    for settings in updated_schemes() {
+        let [mut one, mut two] = [simulation::<2>(settings), simulation(settings)];
         for simulation in [&mut one, &mut two] {
             (0..3).for_each(|_| simulation.step(&force).unwrap());
         }
-        // Positions, velocities and deformations come first, and last the number of steps.
+        // Positions, velocities, deformations, affine velocities and corners come first, and last the number of steps.
+        let first = if settings.shape == Shape::Cpdi2 { 5 } else { 4 };
         let mut parts = two.state();
         let order = parts.len() - 1;
-        parts[3..order].iter_mut().for_each(|part| part.fill(1));
+        assert_eq!(order, first + 3);
+        parts[first..order].iter_mut().for_each(|part| part.fill(1));
         for simulation in [&mut one, &mut two] {
             (0..3).for_each(|_| simulation.step(&force).unwrap());
         }
@@ -285,12 +270,11 @@ fn are_same<const D: usize>(
 #[test]
 fn results_in_other_units_are_the_same_to_the_bit() {
     fn check<const D: usize>() {
-        for settings in fast_schemes() {
+        for settings in updated_schemes() {
             let run = |units: Units| {
                 let settings = Settings { time_step: settings.time_step * units.time, ..settings };
-                let (grid, particles) = (units.grid(), units.particles(body::<D>().particles));
-                let material = units.material::<D>();
-                let mut run = Simulation::new(grid, particles, material, settings).unwrap();
+                let (material, body) = (units.material::<D>(), units.body(body::<D>()));
+                let mut run = Simulation::new(units.grid(), body, material, settings).unwrap();
                 (0..5).for_each(|_| run.step(&units.body_force::<D>()).unwrap());
                 assert_eq!(run.time(), units.time * 5.0 / 512.0);
                 run
@@ -300,25 +284,10 @@ fn results_in_other_units_are_the_same_to_the_bit() {
                 let (what, here) = (format!("{D} {settings:?}"), run(units));
                 are_same(units, here.particles(), there.particles(), &what);
                 assert_eq!(here.velocity_lag() / units.time, there.velocity_lag());
-            }
-        }
-        for settings in general_schemes() {
-            if D == 3 && settings.shape == general::Shape::Cpdi2 {
-                continue;
-            }
-            let run = |units: Units| {
-                let time_step = settings.time_step * units.time;
-                let settings = general::Settings { time_step, ..settings };
-                let (material, body) = (units.material::<D>(), units.body(body::<D>()));
-                let mut run = General::new(units.grid(), body, material, settings).unwrap();
-                (0..5).for_each(|_| run.step(&units.body_force::<D>()).unwrap());
-                assert_eq!(run.time(), units.time * 5.0 / 512.0);
-                run
-            };
-            let there = run(ONE);
-            for units in units() {
-                let (what, here) = (format!("{D} {settings:?}"), run(units));
-                are_same(units, here.particles(), there.particles(), &what);
+                if let (Some(here), Some(there)) = (here.mesh(), there.mesh()) {
+                    let here: Vec<_> = here.x.iter().map(|x| x / units.length).collect();
+                    assert_eq!(here, there.x, "{what}");
+                }
             }
         }
     }
@@ -342,31 +311,20 @@ fn results_in_other_units_are_the_same_to_the_bit() {
 #[test]
 fn runs_tell_what_they_were_set_up_with_and_how_far_they_are() {
     let force = ONE.body_force::<2>();
-    for settings in fast_schemes() {
-        let particles = body::<2>().particles;
-        let mut run =
-            Simulation::new(ONE.grid(), particles, ONE.material::<2>(), settings).unwrap();
+    for settings in updated_schemes() {
+        let mut run = simulation::<2>(settings);
         (0..3).for_each(|_| run.step(&force).unwrap());
         assert_eq!((run.grid(), run.settings()), (&ONE.grid(), &settings));
         assert_eq!(run.material(), &ONE.material::<2>());
         let lag = if settings.integrator == Integrator::Cd { 1.0 / 1024.0 } else { 0.0 };
         assert_eq!((run.velocity_lag(), run.time(), run.steps_done()), (lag, 3.0 / 512.0, 3));
+        let has_corners = settings.shape == Shape::Cpdi2;
+        assert_eq!(run.mesh().is_some(), has_corners, "nothing would move them");
         let printed = format!("{run:?}");
         let shape = format!("{:?}", settings.shape);
         for part in ["steps_done: 3", "failed: None", "NeoHookean", &shape] {
             assert!(printed.contains(part), "{printed}");
         }
-    }
-    for settings in general_schemes() {
-        let mut run = General::new(ONE.grid(), body(), ONE.material::<2>(), settings).unwrap();
-        (0..3).for_each(|_| run.step(&force).unwrap());
-        assert_eq!((run.grid(), run.settings()), (&ONE.grid(), &settings));
-        assert_eq!(run.material(), &ONE.material::<2>());
-        let centred = settings.integrator == general::Integrator::Cd;
-        let lag = if centred { 1.0 / 1024.0 } else { 0.0 };
-        assert_eq!((run.velocity_lag(), run.time(), run.steps_done()), (lag, 3.0 / 512.0, 3));
-        let has_corners = settings.shape == general::Shape::Cpdi2;
-        assert_eq!(run.body().mesh.is_some(), has_corners, "nothing would move them");
     }
     for scene in total_scenes() {
         let mut run = total_scene(ONE, scene);

@@ -216,7 +216,7 @@ fn the_effects_that_matter_most_come_from_all_settings() {
 fn schemes_of_one_thread_are_given_one() {
     let base = Setting { case: Case::default(), single: false, threads: 4 };
     for setting in families(&base, Some(8), true, &Formula::plan) {
-        assert_eq!(setting.threads > 1, uses_threads(&setting.case), "{setting:?}");
+        assert_eq!(setting.threads > 1, setting.case.steps_on_threads(), "{setting:?}");
     }
 }
 

@@ -119,7 +119,7 @@ impl Comparison {
     }
 }
 
-/// Five schemes that may fit a solution, of different cost: in the updated frame by the fast and by the general step, and in the
+/// Five schemes that may fit a solution, of different cost: in the updated frame in one pass a step and in several, and in the
 /// total one.
 fn schemes(model: &Model) -> Vec<(String, Scheme)> {
     let open = SchemeOptions::open();

@@ -94,8 +94,8 @@ fn threads_are_told_of_schemes_that_use_them() {
     let entries = &report.found.entries;
     assert!(entries.iter().any(|entry| entry.setting.threads == 2));
     for Entry { setting, .. } in entries {
-        assert_eq!(setting.threads == 2, uses_threads(&setting.case), "{setting:?}");
+        assert_eq!(setting.threads == 2, setting.case.steps_on_threads(), "{setting:?}");
         let is_told = words::scheme(setting).contains("2 threads");
-        assert_eq!(is_told, uses_threads(&setting.case), "{setting:?}");
+        assert_eq!(is_told, setting.case.steps_on_threads(), "{setting:?}");
     }
 }

@@ -1,4 +1,4 @@
-//! The settings of a scheme: shape function, integrator, transfer.
+//! The scheme of a simulation: shape function, integrator, transfer.
 
 use std::fmt;
 
@@ -25,8 +25,8 @@ pub enum Shape {
     /// Hat functions interpolated between the corners of a parallelogram that F carries along (CPDI: Sadeghirad, Brannon
     /// & Burghardt, IJNME 86 (2011) 1435-1456); segments, parallelograms, parallelepipeds.
     Cpdi,
-    /// The same on quadrilaterals whose corners are points of the body, which neighbours share and which move with the
-    /// grid (CPDI2: Sadeghirad, Brannon & Guilkey, IJNME 95 (2013) 928-952); in one and two dimensions.
+    /// The same on segments, quadrilaterals and hexahedra whose corners are points of the body, which neighbours share and
+    /// which move with the grid (CPDI2: Sadeghirad, Brannon & Guilkey, IJNME 95 (2013) 928-952).
     Cpdi2,
 }
 
@@ -42,19 +42,6 @@ impl fmt::Display for Shape {
             Self::Cpdi => "cpdi",
             Self::Cpdi2 => "cpdi2",
         })
-    }
-}
-
-impl Shape {
-    /// The same weights of the fast step, where it has them.
-    pub fn of_fast_step(self) -> Option<crate::Shape> {
-        match self {
-            Self::Linear => Some(crate::Shape::Linear),
-            Self::Ugimp => Some(crate::Shape::Ugimp),
-            Self::Gimp => Some(crate::Shape::Gimp),
-            Self::Bspline2 => Some(crate::Shape::Bspline2),
-            Self::Bspline3 | Self::Cpdi | Self::Cpdi2 => None,
-        }
     }
 }
 
@@ -89,15 +76,23 @@ impl fmt::Display for Integrator {
 }
 
 impl Integrator {
-    /// The same integrator of the fast step, where it has it.
-    pub fn of_fast_step(self) -> Option<crate::Integrator> {
+    /// The share of a step by which F is updated before the forces.
+    pub(crate) fn early(self) -> f64 {
         match self {
-            Self::Usf => Some(crate::Integrator::Usf),
-            Self::Usl => Some(crate::Integrator::Usl),
-            Self::Musl => Some(crate::Integrator::Musl),
-            Self::Cd => Some(crate::Integrator::Cd),
-            Self::Usavg => None,
+            Self::Usf => 1.0,
+            Self::Usavg => 0.5,
+            Self::Usl | Self::Musl | Self::Cd => 0.0,
         }
+    }
+
+    /// Whether F follows velocities that are projected anew from the updated particles.
+    pub(crate) fn reprojects(self) -> bool {
+        self == Self::Musl
+    }
+
+    /// Whether velocities are half a step behind positions.
+    pub(crate) fn is_staggered(self) -> bool {
+        self == Self::Cd
     }
 }
 
@@ -132,7 +127,7 @@ impl fmt::Display for Transfer {
 
 /// The scheme of a simulation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
+pub struct Settings<T> {
     /// Shape function.
     pub shape: Shape,
     /// Time integration.
@@ -140,7 +135,7 @@ pub struct Settings {
     /// Velocities from the grid to the particles.
     pub transfer: Transfer,
     /// Time step dt.
-    pub time_step: f64,
+    pub time_step: T,
     /// Centred differences from velocities at time 0: halves the accelerations of the first step, so that they carry
     /// the velocities to dt/2 only. Without it the initial velocities are those at -dt/2.
     pub halve_first_acceleration: bool,

@@ -1,62 +1,74 @@
-//! Layouts: bodies of particles with the shapes of their domains.
+//! Bodies of particles with the domains that they represent.
 
-use std::collections::BTreeMap;
-use std::f64::consts::FRAC_PI_2;
-
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::error::SetupError;
 use crate::grid::Grid;
 use crate::particles::Particles;
+use crate::tensor::real;
 
 /// Particles, and the region of the body that each represents.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Body<const D: usize> {
-    /// The particles. Their common half-size has no meaning here.
-    pub particles: Particles<f64, D>,
+pub struct Body<T, const D: usize> {
+    /// The particles.
+    pub particles: Particles<T, D>,
     /// For each particle half the edges of its parallelogram in the reference configuration, one a column: it is the set
-    /// of `X + E s`, `|s_a| <= 1`.
-    pub half_edges: Vec<SMatrix<f64, D, D>>,
+    /// of `X + E s`, `|s_a| <= 1`. Empty where all are the boxes of half-size [`Particles::half_size`].
+    pub half_edges: Vec<SMatrix<T, D, D>>,
     /// The corners of the particles' domains, where there are any.
-    pub mesh: Option<Mesh<D>>,
+    pub mesh: Option<Mesh<T, D>>,
+}
+
+/// Particles whose domains are boxes, all of the same half-size, without common corners.
+impl<T, const D: usize> From<Particles<T, D>> for Body<T, D> {
+    fn from(particles: Particles<T, D>) -> Self {
+        Self { particles, half_edges: Vec::new(), mesh: None }
+    }
 }
 
 /// Corners that the domains of neighbouring particles share.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Mesh<const D: usize> {
+pub struct Mesh<T, const D: usize> {
     /// Reference positions.
-    pub X: Vec<SVector<f64, D>>,
+    pub X: Vec<SVector<T, D>>,
     /// Current positions.
-    pub x: Vec<SVector<f64, D>>,
-    /// The corners of each particle's domain: in two dimensions four, counter-clockwise; in one dimension the first two
-    /// entries, from left to right.
-    pub corners: Vec<[usize; 4]>,
+    pub x: Vec<SVector<T, D>>,
+    /// The corners of each particle's domain: in one dimension the first two entries, from left to right; in two the first
+    /// four, counter-clockwise; in three all, counter-clockwise as seen from above those of the lower face, then those above
+    /// them.
+    pub corners: Vec<[usize; 8]>,
+}
+
+impl<T, const D: usize> Default for Mesh<T, D> {
+    fn default() -> Self {
+        Self { X: Vec::new(), x: Vec::new(), corners: Vec::new() }
+    }
 }
 
 /// A ring in the plane about the origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Annulus {
+pub struct Annulus<T> {
     /// Inner radius.
-    pub inner: f64,
+    pub inner: T,
     /// Outer radius.
-    pub outer: f64,
+    pub outer: T,
     /// Only the part of positive coordinates.
     pub quarter: bool,
 }
 
-impl<const D: usize> Body<D> {
+impl<T: RealField + Copy, const D: usize> Body<T, D> {
     /// A body at rest on a square lattice, see [`Particles::lattice`]; its squares share corners.
     pub fn lattice(
-        grid: &Grid<f64, D>,
+        grid: &Grid<T, D>,
         per_cell: usize,
-        density: f64,
-        inside: impl Fn(&SVector<f64, D>) -> bool,
+        density: T,
+        inside: impl Fn(&SVector<T, D>) -> bool,
     ) -> Self {
         let particles = Particles::lattice(grid, per_cell, density, inside);
         let half_edge = SMatrix::from_diagonal(&particles.half_size);
         Self {
             half_edges: vec![half_edge; particles.len()],
-            mesh: (D <= 2).then(|| mesh_of_boxes(grid, &particles)),
+            mesh: Some(mesh_of_boxes(grid, &particles)),
             particles,
         }
     }
@@ -73,10 +85,10 @@ impl<const D: usize> Body<D> {
     /// [`SetupError::PolarDimension`] in other dimensions than two, and [`SetupError::NotPositive`] for radii or a density
     /// that are none.
     pub fn annulus(
-        ring: &Annulus,
-        spacing: f64,
+        ring: &Annulus<T>,
+        spacing: T,
         per_cell: usize,
-        density: f64,
+        density: T,
     ) -> Result<Self, SetupError> {
         if D != 2 {
             return Err(SetupError::PolarDimension { dimension: D });
@@ -88,22 +100,28 @@ impl<const D: usize> Body<D> {
             ("the spacing", spacing),
             ("the density", density),
         ] {
-            if !(value > 0.0 && value.is_finite()) {
+            if !(value > T::zero() && value.is_finite()) {
+                let value = nalgebra::try_convert(value).unwrap_or(f64::NAN);
                 return Err(SetupError::NotPositive { quantity: quantity.into(), value });
             }
         }
-        let across = (per_cell as f64 * (outer - inner) / spacing).round().max(1.0) as usize;
-        let width = (outer - inner) / across as f64;
-        let mean = 0.5 * (inner + outer);
-        let around = (FRAC_PI_2 * mean / width).round().max(1.0) as usize;
-        let angle = FRAC_PI_2 / around as f64;
+        let number = |count: usize| real::<T>(count as f64);
+        let rounded = |value: T| {
+            nalgebra::try_convert::<T, f64>(value).unwrap_or(0.0).round().max(1.0) as usize
+        };
+        let half = real::<T>(0.5);
+        let across = rounded(number(per_cell) * (outer - inner) / spacing);
+        let width = (outer - inner) / number(across);
+        let mean = half * (inner + outer);
+        let around = rounded(T::frac_pi_2() * mean / width);
+        let angle = T::frac_pi_2() / number(around);
         let quarters = if quarter { 1 } else { 4 };
         let cells = around * quarters;
         // All quarters of a full ring: the last corners are the first.
         let rays = if quarter { cells + 1 } else { cells };
 
-        let vector = |cos: f64, sin: f64| SVector::from_fn(|a, _| if a == 0 { cos } else { sin });
-        let radius = |i: usize| inner + width * i as f64;
+        let vector = |cos: T, sin: T| SVector::from_fn(|a, _| if a == 0 { cos } else { sin });
+        let radius = |i: usize| inner + width * number(i);
         let mut mesh = Mesh { X: Vec::new(), x: Vec::new(), corners: Vec::new() };
         for j in 0..rays {
             let (cos, sin) = direction(j, around);
@@ -116,23 +134,20 @@ impl<const D: usize> Body<D> {
         for j in 0..cells {
             let (cos, sin) = direction(2 * j + 1, 2 * around);
             // A chord's centroid lies inside its arc.
-            let chord = (0.5 * angle).sin() / (0.5 * angle);
+            let chord = (half * angle).sin() / (half * angle);
             for i in 0..across {
                 let (low, high) = (radius(i), radius(i + 1));
-                let middle = 0.5 * (low + high);
+                let middle = half * (low + high);
                 // 2/3 (high^3 - low^3) / (high^2 - low^2)
-                let centre = middle + width * width / (12.0 * middle);
+                let centre = middle + width * width / (real::<T>(12.0) * middle);
                 X.push(vector(cos, sin) * (centre * chord));
                 volume.push(middle * width * angle);
                 let edges = [vector(cos, sin) * width, vector(-sin, cos) * (middle * angle)];
-                half_edges.push(SMatrix::from_fn(|a, k| 0.5 * edges[k][a]));
+                half_edges.push(SMatrix::from_fn(|a, k| half * edges[k][a]));
                 let corner = |i: usize, j: usize| (j % rays) * (across + 1) + i;
-                mesh.corners.push([
-                    corner(i, j),
-                    corner(i + 1, j),
-                    corner(i + 1, j + 1),
-                    corner(i, j + 1),
-                ]);
+                let of_cell =
+                    [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
+                mesh.corners.push(std::array::from_fn(|k| of_cell[k % 4]));
             }
         }
         let particles = Particles {
@@ -140,19 +155,19 @@ impl<const D: usize> Body<D> {
             X,
             v: vec![SVector::zeros(); count],
             F: vec![SMatrix::identity(); count],
-            mass: volume.iter().map(|area| area * density).collect(),
+            mass: volume.iter().map(|&area| area * density).collect(),
             volume,
-            half_size: SVector::repeat(0.5 * width),
+            half_size: SVector::repeat(half * width),
         };
         Ok(Self { particles, half_edges, mesh: Some(mesh) })
     }
 }
 
 /// Cosine and sine of `index` parts of a quarter turn, each of which has `per_quarter`; exact on the axes.
-fn direction(index: usize, per_quarter: usize) -> (f64, f64) {
+fn direction<T: RealField + Copy>(index: usize, per_quarter: usize) -> (T, T) {
     let rest = index % per_quarter;
-    let angle = FRAC_PI_2 * rest as f64 / per_quarter as f64;
-    let (cos, sin) = if rest == 0 { (1.0, 0.0) } else { (angle.cos(), angle.sin()) };
+    let angle = T::frac_pi_2() * real(rest as f64) / real(per_quarter as f64);
+    let (cos, sin) = if rest == 0 { (T::one(), T::zero()) } else { (angle.cos(), angle.sin()) };
     match index / per_quarter % 4 {
         0 => (cos, sin),
         1 => (-sin, cos),
@@ -161,22 +176,37 @@ fn direction(index: usize, per_quarter: usize) -> (f64, f64) {
     }
 }
 
-/// The shared corners of a lattice's boxes, in one or two dimensions.
-fn mesh_of_boxes<const D: usize>(grid: &Grid<f64, D>, particles: &Particles<f64, D>) -> Mesh<D> {
-    const AROUND: [[i64; 2]; 4] = [[0, 0], [1, 0], [1, 1], [0, 1]];
-    let edge = particles.half_size * 2.0;
-    let mut mesh = Mesh { X: Vec::new(), x: Vec::new(), corners: Vec::new() };
-    let mut known = BTreeMap::new();
+/// The shared corners of a lattice's boxes.
+fn mesh_of_boxes<T: RealField + Copy, const D: usize>(
+    grid: &Grid<T, D>,
+    particles: &Particles<T, D>,
+) -> Mesh<T, D> {
+    const AROUND: [[usize; 3]; 8] =
+        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]];
+    let edge = particles.half_size * real::<T>(2.0);
+    let in_boxes =
+        |length: T, a: usize| nalgebra::try_convert::<T, f64>(length / edge[a]).unwrap_or(0.0);
+    let count: [usize; D] = std::array::from_fn(|a| {
+        in_boxes(grid.spacing * real(grid.cells[a] as f64), a).round() as usize + 1
+    });
+    const NONE: usize = usize::MAX;
+    let mut known = vec![NONE; count.iter().product()];
+    let mut mesh = Mesh::default();
     for X in &particles.X {
-        let mut corners = [0; 4];
+        let mut corners = [0; 8];
         for (corner, offset) in corners.iter_mut().zip(&AROUND[..1 << D]) {
-            let index: [i64; D] = std::array::from_fn(|a| {
-                ((X[a] - grid.lower[a]) / edge[a] - 0.5).round() as i64 + offset[a]
+            let index: [usize; D] = std::array::from_fn(|a| {
+                let below = in_boxes(X[a] - grid.lower[a], a) - 0.5;
+                below.round().max(0.0) as usize + offset[a]
             });
-            *corner = *known.entry(index).or_insert_with(|| {
-                mesh.X.push(SVector::from_fn(|a, _| grid.lower[a] + index[a] as f64 * edge[a]));
-                mesh.X.len() - 1
-            });
+            let place = (0..D).rev().fold(0, |place, a| place * count[a] + index[a]);
+            if known[place] == NONE {
+                known[place] = mesh.X.len();
+                mesh.X.push(SVector::from_fn(|a, _| {
+                    grid.lower[a] + real::<T>(index[a] as f64) * edge[a]
+                }));
+            }
+            *corner = known[place];
         }
         mesh.corners.push(corners);
     }
@@ -196,7 +226,7 @@ mod tests {
             [(0.3, 1.0, 0.25, 8, 12), (0.5, 0.51, 1.0, 1, 79), (2.0, 5.0, 0.5, 18, 33)]
         {
             let ring = Annulus { inner, outer, quarter: true };
-            let body = Body::<2>::annulus(&ring, spacing, 3, 1.0).unwrap();
+            let body = Body::<f64, 2>::annulus(&ring, spacing, 3, 1.0).unwrap();
             assert_eq!(body.particles.len(), across * around, "{ring:?}");
             let half_size = 0.5 * (outer - inner) / across as f64;
             assert!((body.particles.half_size / half_size).iter().all(|r| (r - 1.0).abs() < 1e-13));
@@ -208,7 +238,7 @@ mod tests {
         for quarter in [true, false] {
             let ring = Annulus { inner: 0.4, outer: 0.6, quarter };
             for (spacing, per_cell) in [(0.1, 1), (0.1, 2), (0.03, 3), (1.0, 1)] {
-                let body = Body::<2>::annulus(&ring, spacing, per_cell, 3.0).unwrap();
+                let body = Body::<f64, 2>::annulus(&ring, spacing, per_cell, 3.0).unwrap();
                 let p = &body.particles;
                 let part = if quarter { 0.25 } else { 1.0 };
                 let area = part * PI * (0.36 - 0.16);
@@ -220,7 +250,7 @@ mod tests {
                 assert!((moment - Vector2::repeat(exact)).norm() < 1e-14, "{moment}");
                 let mesh = body.mesh.unwrap();
                 for (corners, E) in mesh.corners.iter().zip(&body.half_edges) {
-                    let [a, b, c, d] = corners.map(|k| mesh.X[k]);
+                    let [a, b, c, d] = std::array::from_fn(|k| mesh.X[corners[k]]);
                     let area = 0.5 * (c - a).perp(&(d - b));
                     assert!(area > 0.0 && E.determinant() > 0.0);
                 }
@@ -246,7 +276,7 @@ mod tests {
         let mesh = body.mesh.unwrap();
         assert_eq!(mesh.X.len(), 7 * 5);
         for (corners, X) in mesh.corners.iter().zip(&body.particles.X) {
-            let corners = corners.map(|k| mesh.X[k] - X);
+            let corners: [Vector2<f64>; 4] = std::array::from_fn(|k| mesh.X[corners[k]] - X);
             let h = 0.125;
             let expected = [[-h, -h], [h, -h], [h, h], [-h, h]].map(Vector2::from);
             for (corner, expected) in corners.iter().zip(expected) {
@@ -258,9 +288,10 @@ mod tests {
     #[test]
     fn only_rings_of_the_plane_have_polar_cells() {
         let ring = Annulus { inner: 0.4, outer: 0.6, quarter: true };
-        let found = Body::<3>::annulus(&ring, 0.1, 2, 1.0).unwrap_err();
+        let found = Body::<f64, 3>::annulus(&ring, 0.1, 2, 1.0).unwrap_err();
         assert_eq!(found, SetupError::PolarDimension { dimension: 3 });
-        let found = Body::<2>::annulus(&Annulus { outer: 0.3, ..ring }, 0.1, 2, 1.0).unwrap_err();
+        let found =
+            Body::<f64, 2>::annulus(&Annulus { outer: 0.3, ..ring }, 0.1, 2, 1.0).unwrap_err();
         assert!(matches!(found, SetupError::NotPositive { .. }), "{found}");
     }
 }

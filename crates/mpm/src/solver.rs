@@ -1,0 +1,166 @@
+//! Solvers of any scheme behind one door, compiled with this crate.
+
+use nalgebra::{RealField, SVector};
+
+use crate::body::Body;
+use crate::body_force::BodyForce;
+use crate::error::{SetupError, StepError};
+use crate::grid::Grid;
+use crate::material::Material;
+use crate::particles::Particles;
+use crate::scheme::Settings;
+use crate::simulation::Simulation;
+use crate::total_lagrangian::{self, BoundaryData, Scheme, TotalLagrangian};
+
+/// A solver that can be stepped and looked at.
+pub trait Solver<T, const D: usize> {
+    /// Advances by one time step.
+    ///
+    /// # Errors
+    ///
+    /// See [`Simulation::step`].
+    fn step(&mut self, body_force: &dyn BodyForce<T, D>) -> Result<(), StepError>;
+
+    /// The particles as they are now, and their law.
+    fn observe(&mut self) -> (&Particles<T, D>, &Material<T>);
+
+    /// How far velocities lag behind positions, a time.
+    fn velocity_lag(&self) -> T;
+
+    /// The state between two steps, see [`Simulation::state`].
+    fn state(&mut self) -> Vec<&mut [u8]>;
+}
+
+/// A simulation in the total Lagrangian formulation, and its motion at time 0.
+pub struct TotalSetUp<'a, const D: usize> {
+    /// The splines' cells, and the particles in them.
+    pub grid: total_lagrangian::Grid<D>,
+    /// Degree, mass matrix, composition in time.
+    pub scheme: Scheme,
+    /// The law.
+    pub material: Material<f64>,
+    /// The reference density.
+    pub density: f64,
+    /// Time step dt.
+    pub time_step: f64,
+    /// Displacement and velocity at a reference position.
+    pub motion: &'a dyn Fn(&SVector<f64, D>) -> [SVector<f64, D>; 2],
+}
+
+/// A body in the total Lagrangian formulation, with given motion and traction on its sides.
+struct DrivenBody<'a, const D: usize> {
+    body: TotalLagrangian<D>,
+    boundary: Box<dyn BoundaryData<D> + 'a>,
+}
+
+/// The precisions of the solver: `f64` and `f32`.
+///
+/// Steps are generic over precision and dimension. Here they are set up by functions that are not, so that they are compiled
+/// once, with this crate.
+pub trait Scalar<const D: usize>: RealField + Copy {
+    /// As [`Simulation::new`].
+    ///
+    /// # Errors
+    ///
+    /// As [`Simulation::new`].
+    fn simulation(
+        grid: Grid<Self, D>,
+        body: Body<Self, D>,
+        material: Material<Self>,
+        settings: Settings<Self>,
+    ) -> Result<Box<dyn Solver<Self, D>>, SetupError>;
+
+    /// A simulation in the total Lagrangian formulation.
+    ///
+    /// # Errors
+    ///
+    /// As [`TotalLagrangian::new`] and [`TotalLagrangian::start_with_boundary`], and [`SetupError::DoublePrecisionOnly`] for `f32`.
+    fn total_lagrangian<'a>(
+        set_up: TotalSetUp<'_, D>,
+        boundary: Box<dyn BoundaryData<D> + 'a>,
+    ) -> Result<Box<dyn Solver<Self, D> + 'a>, SetupError>;
+}
+
+macro_rules! scalar {
+    ($($T:tt: $($D:literal)*;)*) => {
+        $($(
+            impl Solver<$T, $D> for Simulation<$T, $D> {
+                fn step(&mut self, body_force: &dyn BodyForce<$T, $D>) -> Result<(), StepError> {
+                    Simulation::step(self, body_force)
+                }
+
+                fn observe(&mut self) -> (&Particles<$T, $D>, &Material<$T>) {
+                    (self.particles(), self.material())
+                }
+
+                fn velocity_lag(&self) -> $T {
+                    Simulation::velocity_lag(self)
+                }
+
+                fn state(&mut self) -> Vec<&mut [u8]> {
+                    Simulation::state(self)
+                }
+            }
+
+            impl Scalar<$D> for $T {
+                fn simulation(
+                    grid: Grid<Self, $D>,
+                    body: Body<Self, $D>,
+                    material: Material<Self>,
+                    settings: Settings<Self>,
+                ) -> Result<Box<dyn Solver<Self, $D>>, SetupError> {
+                    Ok(Box::new(Simulation::new(grid, body, material, settings)?))
+                }
+
+                fn total_lagrangian<'a>(
+                    set_up: TotalSetUp<'_, $D>,
+                    boundary: Box<dyn BoundaryData<$D> + 'a>,
+                ) -> Result<Box<dyn Solver<Self, $D> + 'a>, SetupError> {
+                    scalar!(@total $T, $D, set_up, boundary)
+                }
+            }
+        )*)*
+    };
+    (@total f64, $D:literal, $set_up:ident, $boundary:ident) => {{
+        let TotalSetUp { grid, scheme, material, density, time_step, motion } = $set_up;
+        let mut body = TotalLagrangian::<$D>::new(grid, scheme, material, density, time_step)?;
+        let (u, v): (Vec<_>, Vec<_>) =
+            body.positions().iter().map(motion).map(|[u, v]| (u, v)).unzip();
+        body.start_with_boundary(&u, &v, $boundary.as_ref())?;
+        Ok(Box::new(DrivenBody { body, boundary: $boundary }))
+    }};
+    (@total f32, $D:literal, $set_up:ident, $boundary:ident) => {{
+        let _ = ($set_up, $boundary);
+        Err(SetupError::DoublePrecisionOnly)
+    }};
+}
+
+scalar! {
+    f64: 1 2 3;
+    f32: 1 2 3;
+}
+
+macro_rules! driven {
+    ($($D:literal)*) => {
+        $(impl Solver<f64, $D> for DrivenBody<'_, $D> {
+            fn step(&mut self, body_force: &dyn BodyForce<f64, $D>) -> Result<(), StepError> {
+                self.body.step_with_boundary(body_force, self.boundary.as_ref())
+            }
+
+            fn observe(&mut self) -> (&Particles<f64, $D>, &Material<f64>) {
+                self.body.observe();
+                (self.body.particles(), self.body.material())
+            }
+
+            fn velocity_lag(&self) -> f64 {
+                0.0
+            }
+
+            fn state(&mut self) -> Vec<&mut [u8]> {
+                self.body.state()
+            }
+        })*
+    };
+}
+
+driven! { 1 2 3 }
