@@ -26,6 +26,13 @@ pub(crate) struct Lane4<T>(pub(crate) [T; 4]);
 #[repr(C, align(64))]
 pub(crate) struct Lane8<T>(pub(crate) [T; 8]);
 
+impl<T: RealField + Copy> Lane4<T> {
+    #[inline(always)]
+    pub(crate) fn zero() -> Self {
+        Self([T::zero(); 4])
+    }
+}
+
 impl<T: RealField + Copy> Lane8<T> {
     #[inline(always)]
     pub(crate) fn zero() -> Self {
@@ -37,184 +44,120 @@ impl<T: RealField + Copy> Lane8<T> {
 /// one particle.
 pub(crate) trait Vectors: Copy {
     /// Four times the same.
-    #[inline(always)]
-    fn splat<T: RealField + Copy>(self, value: T) -> Lane4<T> {
-        Lane4([value; 4])
-    }
-
+    fn splat<T: RealField + Copy>(self, value: T) -> Lane4<T>;
     /// Four numbers from memory in one load; the compiler may split a plain copy into smaller loads.
-    #[inline(always)]
-    fn load<T: RealField + Copy>(self, values: &[T; 4]) -> Lane4<T> {
-        Lane4(*values)
-    }
-
-    #[inline(always)]
-    fn add<T: RealField + Copy>(self, Lane4(a): Lane4<T>, Lane4(b): Lane4<T>) -> Lane4<T> {
-        Lane4([a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]])
-    }
-
-    #[inline(always)]
-    fn mul<T: RealField + Copy>(self, Lane4(a): Lane4<T>, Lane4(b): Lane4<T>) -> Lane4<T> {
-        Lane4([a[0] * b[0], a[1] * b[1], a[2] * b[2], a[3] * b[3]])
-    }
-
-    #[inline(always)]
-    fn sub<T: RealField + Copy>(self, Lane4(a): Lane4<T>, Lane4(b): Lane4<T>) -> Lane4<T> {
-        Lane4([a[0] - b[0], a[1] - b[1], a[2] - b[2], a[3] - b[3]])
-    }
-
+    fn load<T: RealField + Copy>(self, values: &[T; 4]) -> Lane4<T>;
+    fn add<T: RealField + Copy>(self, a: Lane4<T>, b: Lane4<T>) -> Lane4<T>;
+    fn sub<T: RealField + Copy>(self, a: Lane4<T>, b: Lane4<T>) -> Lane4<T>;
+    fn mul<T: RealField + Copy>(self, a: Lane4<T>, b: Lane4<T>) -> Lane4<T>;
+    /// `a b + c`, rounded once.
+    fn mul_add<T: RealField + Copy>(self, a: Lane4<T>, b: Lane4<T>, c: Lane4<T>) -> Lane4<T>;
     /// `a b - c`, rounded once.
-    #[inline(always)]
-    fn mul_sub<T: RealField + Copy>(
-        self,
-        Lane4(a): Lane4<T>,
-        Lane4(b): Lane4<T>,
-        Lane4(c): Lane4<T>,
-    ) -> Lane4<T> {
-        Lane4(std::array::from_fn(|q| a[q].mul_add(b[q], -c[q])))
-    }
-
-    /// `a b + c`, rounded once.
-    #[inline(always)]
-    fn mul_add<T: RealField + Copy>(
-        self,
-        Lane4(a): Lane4<T>,
-        Lane4(b): Lane4<T>,
-        Lane4(c): Lane4<T>,
-    ) -> Lane4<T> {
-        Lane4(std::array::from_fn(|q| a[q].mul_add(b[q], c[q])))
-    }
-
+    fn mul_sub<T: RealField + Copy>(self, a: Lane4<T>, b: Lane4<T>, c: Lane4<T>) -> Lane4<T>;
     /// `[a0, a0, a2, a2]`.
-    #[inline(always)]
-    fn even<T: RealField + Copy>(self, Lane4(a): Lane4<T>) -> Lane4<T> {
-        Lane4([a[0], a[0], a[2], a[2]])
-    }
-
+    fn even<T: RealField + Copy>(self, a: Lane4<T>) -> Lane4<T>;
     /// `[a1, a1, a3, a3]`.
-    #[inline(always)]
-    fn odd<T: RealField + Copy>(self, Lane4(a): Lane4<T>) -> Lane4<T> {
-        Lane4([a[1], a[1], a[3], a[3]])
-    }
-
+    fn odd<T: RealField + Copy>(self, a: Lane4<T>) -> Lane4<T>;
     /// `[a0, a1, a0, a1]`.
-    #[inline(always)]
-    fn low_twice<T: RealField + Copy>(self, Lane4(a): Lane4<T>) -> Lane4<T> {
-        Lane4([a[0], a[1], a[0], a[1]])
-    }
-
+    fn low_twice<T: RealField + Copy>(self, a: Lane4<T>) -> Lane4<T>;
     /// `[0, 0, a0, a1]`.
-    #[inline(always)]
-    fn low_to_high<T: RealField + Copy>(self, Lane4(a): Lane4<T>) -> Lane4<T> {
-        Lane4([T::zero(), T::zero(), a[0], a[1]])
-    }
-
+    fn low_to_high<T: RealField + Copy>(self, a: Lane4<T>) -> Lane4<T>;
     /// `[0, 0, a2, a3]`.
-    #[inline(always)]
-    fn high_alone<T: RealField + Copy>(self, Lane4(a): Lane4<T>) -> Lane4<T> {
-        Lane4([T::zero(), T::zero(), a[2], a[3]])
-    }
-
+    fn high_alone<T: RealField + Copy>(self, a: Lane4<T>) -> Lane4<T>;
     /// `[a2, a3, b0, b1]`.
-    #[inline(always)]
-    fn high_and_low<T: RealField + Copy>(self, Lane4(a): Lane4<T>, Lane4(b): Lane4<T>) -> Lane4<T> {
-        Lane4([a[2], a[3], b[0], b[1]])
-    }
-
+    fn high_and_low<T: RealField + Copy>(self, a: Lane4<T>, b: Lane4<T>) -> Lane4<T>;
     /// `[a0, a1, b2, b3]`.
-    #[inline(always)]
-    fn low_and_high<T: RealField + Copy>(self, Lane4(a): Lane4<T>, Lane4(b): Lane4<T>) -> Lane4<T> {
-        Lane4([a[0], a[1], b[2], b[3]])
-    }
-
+    fn low_and_high<T: RealField + Copy>(self, a: Lane4<T>, b: Lane4<T>) -> Lane4<T>;
     /// Eight times the same.
-    #[inline(always)]
-    fn splat8<T: RealField + Copy>(self, value: T) -> Lane8<T> {
-        Lane8([value; 8])
-    }
-
+    fn splat8<T: RealField + Copy>(self, value: T) -> Lane8<T>;
     /// Eight numbers from memory in one load.
-    #[inline(always)]
-    fn load8<T: RealField + Copy>(self, values: &[T; 8]) -> Lane8<T> {
-        Lane8(*values)
-    }
-
-    #[inline(always)]
-    fn add8<T: RealField + Copy>(self, Lane8(a): Lane8<T>, Lane8(b): Lane8<T>) -> Lane8<T> {
-        Lane8(std::array::from_fn(|q| a[q] + b[q]))
-    }
-
-    #[inline(always)]
-    fn mul8<T: RealField + Copy>(self, Lane8(a): Lane8<T>, Lane8(b): Lane8<T>) -> Lane8<T> {
-        Lane8(std::array::from_fn(|q| a[q] * b[q]))
-    }
-
-    #[inline(always)]
-    fn sub8<T: RealField + Copy>(self, Lane8(a): Lane8<T>, Lane8(b): Lane8<T>) -> Lane8<T> {
-        Lane8(std::array::from_fn(|q| a[q] - b[q]))
-    }
-
-    #[inline(always)]
-    fn div8<T: RealField + Copy>(self, Lane8(a): Lane8<T>, Lane8(b): Lane8<T>) -> Lane8<T> {
-        Lane8(std::array::from_fn(|q| a[q] / b[q]))
-    }
-
-    /// The smaller of both; `b` where one is not a number.
-    #[inline(always)]
-    fn min8<T: RealField + Copy>(self, Lane8(a): Lane8<T>, Lane8(b): Lane8<T>) -> Lane8<T> {
-        Lane8(std::array::from_fn(|q| if a[q] < b[q] { a[q] } else { b[q] }))
-    }
-
-    /// The larger of both; `b` where one is not a number.
-    #[inline(always)]
-    fn max8<T: RealField + Copy>(self, Lane8(a): Lane8<T>, Lane8(b): Lane8<T>) -> Lane8<T> {
-        Lane8(std::array::from_fn(|q| if a[q] > b[q] { a[q] } else { b[q] }))
-    }
-
+    fn load8<T: RealField + Copy>(self, values: &[T; 8]) -> Lane8<T>;
+    fn add8<T: RealField + Copy>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
+    fn sub8<T: RealField + Copy>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
+    fn mul8<T: RealField + Copy>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
+    fn div8<T: RealField + Copy>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
     /// `a b + c`, rounded once.
-    #[inline(always)]
-    fn mul_add8<T: RealField + Copy>(
-        self,
-        Lane8(a): Lane8<T>,
-        Lane8(b): Lane8<T>,
-        Lane8(c): Lane8<T>,
-    ) -> Lane8<T> {
-        Lane8(std::array::from_fn(|q| a[q].mul_add(b[q], c[q])))
-    }
+    fn mul_add8<T: RealField + Copy>(self, a: Lane8<T>, b: Lane8<T>, c: Lane8<T>) -> Lane8<T>;
+    /// The smaller of both; `b` where one is not a number.
+    fn min8<T: RealField + Copy>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
+    /// The larger of both; `b` where one is not a number.
+    fn max8<T: RealField + Copy>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
 }
 
-/// On x86 these are for processors without fused multiply-adds, which take a call for each number: in line they would make half of
-/// the code.
-impl Vectors for Scalar {
-    #[cfg_attr(target_arch = "x86_64", inline(never))]
-    fn mul_sub<T: RealField + Copy>(
-        self,
-        Lane4(a): Lane4<T>,
-        Lane4(b): Lane4<T>,
-        Lane4(c): Lane4<T>,
-    ) -> Lane4<T> {
-        Lane4(std::array::from_fn(|q| a[q].mul_add(b[q], -c[q])))
-    }
+/// Operations lane by lane, and moves between lanes.
+///
+/// On x86 this is for processors without fused multiply-adds, which take a call for each number: in line the operations would make
+/// half of the code.
+macro_rules! lane_by_lane {
+    (
+        $(fn $name:ident($($a:ident),+; $q:ident of $of:ident) { $term:expr })*
+        moves: $(fn $move:ident($($b:ident),+) { [$($lane:expr),+] })*
+    ) => {
+        impl Vectors for Scalar {
+            #[inline(always)]
+            fn splat<T: RealField + Copy>(self, value: T) -> Lane4<T> {
+                Lane4([value; 4])
+            }
 
-    #[cfg_attr(target_arch = "x86_64", inline(never))]
-    fn mul_add<T: RealField + Copy>(
-        self,
-        Lane4(a): Lane4<T>,
-        Lane4(b): Lane4<T>,
-        Lane4(c): Lane4<T>,
-    ) -> Lane4<T> {
-        Lane4(std::array::from_fn(|q| a[q].mul_add(b[q], c[q])))
-    }
+            #[inline(always)]
+            fn load<T: RealField + Copy>(self, values: &[T; 4]) -> Lane4<T> {
+                Lane4(*values)
+            }
 
-    #[cfg_attr(target_arch = "x86_64", inline(never))]
-    fn mul_add8<T: RealField + Copy>(
-        self,
-        Lane8(a): Lane8<T>,
-        Lane8(b): Lane8<T>,
-        Lane8(c): Lane8<T>,
-    ) -> Lane8<T> {
-        Lane8(std::array::from_fn(|q| a[q].mul_add(b[q], c[q])))
-    }
+            #[inline(always)]
+            fn splat8<T: RealField + Copy>(self, value: T) -> Lane8<T> {
+                Lane8([value; 8])
+            }
+
+            #[inline(always)]
+            fn load8<T: RealField + Copy>(self, values: &[T; 8]) -> Lane8<T> {
+                Lane8(*values)
+            }
+
+            $(
+                #[cfg_attr(target_arch = "x86_64", inline(never))]
+                #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+                fn $name<T: RealField + Copy>(self, $($a: $of<T>),+) -> $of<T> {
+                    $(let $of($a) = $a;)+
+                    let mut result = $of::zero();
+                    for ($q, lane) in result.0.iter_mut().enumerate() {
+                        *lane = $term;
+                    }
+                    result
+                }
+            )*
+
+            $(
+                #[inline(always)]
+                fn $move<T: RealField + Copy>(self, $(Lane4($b): Lane4<T>),+) -> Lane4<T> {
+                    Lane4([$($lane),+])
+                }
+            )*
+        }
+    };
+}
+
+lane_by_lane! {
+    fn add(a, b; q of Lane4) { a[q] + b[q] }
+    fn sub(a, b; q of Lane4) { a[q] - b[q] }
+    fn mul(a, b; q of Lane4) { a[q] * b[q] }
+    fn mul_add(a, b, c; q of Lane4) { a[q].mul_add(b[q], c[q]) }
+    fn mul_sub(a, b, c; q of Lane4) { a[q].mul_add(b[q], -c[q]) }
+    fn add8(a, b; q of Lane8) { a[q] + b[q] }
+    fn sub8(a, b; q of Lane8) { a[q] - b[q] }
+    fn mul8(a, b; q of Lane8) { a[q] * b[q] }
+    fn div8(a, b; q of Lane8) { a[q] / b[q] }
+    fn mul_add8(a, b, c; q of Lane8) { a[q].mul_add(b[q], c[q]) }
+    fn min8(a, b; q of Lane8) { if a[q] < b[q] { a[q] } else { b[q] } }
+    fn max8(a, b; q of Lane8) { if a[q] > b[q] { a[q] } else { b[q] } }
+    moves:
+    fn even(a) { [a[0], a[0], a[2], a[2]] }
+    fn odd(a) { [a[1], a[1], a[3], a[3]] }
+    fn low_twice(a) { [a[0], a[1], a[0], a[1]] }
+    fn low_to_high(a) { [T::zero(), T::zero(), a[0], a[1]] }
+    fn high_alone(a) { [T::zero(), T::zero(), a[2], a[3]] }
+    fn high_and_low(a, b) { [a[2], a[3], b[0], b[1]] }
+    fn low_and_high(a, b) { [a[0], a[1], b[2], b[3]] }
 }
 
 /// What formulas for one particle need of numbers, so that they hold for eight at once as well.
@@ -310,10 +253,10 @@ mod x86 {
                 $(#[inline(always)]
                 fn $four<T: RealField + Copy>($self, $($a: Lane4<T>),*) -> Lane4<T> {
                     if let ($(Some($a),)*) = ($(double($a),)*) {
-                        return from_double($double).unwrap_or_else(zero);
+                        return from_double($double).unwrap_or_else(Lane4::zero);
                     }
                     if let ($(Some($a),)*) = ($(single($a),)*) {
-                        return from_single($single).unwrap_or_else(zero);
+                        return from_single($single).unwrap_or_else(Lane4::zero);
                     }
                     Scalar::new().$four($($a),*)
                 })*
@@ -523,12 +466,6 @@ mod x86 {
     #[inline(always)]
     fn from_single8<T: RealField + Copy>(a: __m256) -> Option<Lane8<T>> {
         same(Lane8::<f32>(must_cast(a)))
-    }
-
-    /// Unreachable: `T` is f32 or f64.
-    #[inline(always)]
-    fn zero<T: RealField + Copy>() -> Lane4<T> {
-        Lane4([T::zero(); 4])
     }
 }
 

@@ -29,21 +29,22 @@ impl<T: RealField + Copy, const D: usize> Interpolated<T, D> {
         value: &[T; Q],
         slope: &[[T; R]; D],
     ) -> Self {
-        let velocity_gradient = SMatrix::from_fn(|i, j| slope[j][i]);
-        let affine = if L::AFFINE {
-            let moments = SMatrix::from_fn(|i, j| slope[j][(D + i).min(R - 1)]);
-            weights.affine(moments, &velocity_gradient)
-        } else {
-            SMatrix::zeros()
-        };
-        Self {
-            velocity: SVector::from_fn(|i, _| value[i]),
-            second: SVector::from_fn(|i, _| value[D + i]),
-            velocity_gradient,
-            affine,
+        let mut own = Self::zero();
+        let mut moments = SMatrix::zeros();
+        for i in 0..D {
+            (own.velocity[i], own.second[i]) = (value[i], value[D + i]);
+            for j in 0..D {
+                own.velocity_gradient[(i, j)] = slope[j][i];
+                moments[(i, j)] = slope[j][(D + i).min(R - 1)];
+            }
         }
+        if L::AFFINE {
+            own.affine = weights.affine(moments, &own.velocity_gradient);
+        }
+        own
     }
 
+    #[inline(always)]
     pub(crate) fn zero() -> Self {
         Self {
             velocity: SVector::zeros(),
@@ -71,7 +72,11 @@ pub(crate) trait Receive<T, const D: usize> {
     ) where
         T: RealField + Copy,
     {
-        self.receive(k, &Interpolated::new(weights, &value.0, &slope.map(|slope| slope.0)));
+        let mut slopes = [[T::zero(); 4]; D];
+        for (own, slope) in slopes.iter_mut().zip(slope) {
+            *own = slope.0;
+        }
+        self.receive(k, &Interpolated::new(weights, &value.0, &slopes));
     }
 }
 

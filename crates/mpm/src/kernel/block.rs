@@ -1,7 +1,6 @@
 //! Blocks of 64 particles: weights and stresses in vector instructions, one lane a particle, and the choice of the kernel for
 //! P2G and G2P.
 
-use std::array;
 use std::marker::PhantomData;
 
 use nalgebra::{RealField, SMatrix, SVector};
@@ -263,9 +262,15 @@ impl<T: RealField + Copy, const D: usize> Block<T, D> {
     /// Position and half-sizes of a particle whose box has extended support.
     #[inline(always)]
     fn extended(&self, k: usize) -> Option<([T; D], [T; D])> {
-        let l = array::from_fn(|a| self.l[a][k]);
-        (self.any_extended && l.iter().any(|&l| l > self.extended_above))
-            .then(|| (array::from_fn(|a| self.xi[a][k]), l))
+        if !self.any_extended {
+            return None;
+        }
+        let (mut xi, mut l, mut is_extended) = ([T::zero(); D], [T::zero(); D], false);
+        for a in 0..D {
+            (xi[a], l[a]) = (self.xi[a][k], self.l[a][k]);
+            is_extended |= l[a] > self.extended_above;
+        }
+        is_extended.then_some((xi, l))
     }
 
     /// P2G of the first `count` particles, to the band of nodes that starts at node `first`.

@@ -12,7 +12,7 @@ use crate::weights::{Weights, is_middle};
 fn half<T: RealField + Copy>(values: &[T; LANES]) -> Lane4<T> {
     const { assert!(LANES >= 4) };
     // One load of four numbers even in builds with little optimisation.
-    values.first_chunk().map_or(Lane4([T::zero(); 4]), |half| Lane4(*half))
+    values.first_chunk().map_or(Lane4::zero(), |half| Lane4(*half))
 }
 
 /// Sum of contributions to a node; the mass is used in two dimensions alone.
@@ -25,7 +25,7 @@ struct Sum<T> {
 impl<T: RealField + Copy> Sum<T> {
     #[inline(always)]
     fn zero() -> Self {
-        Self { values: Lane4([T::zero(); 4]), mass: T::zero() }
+        Self { values: Lane4::zero(), mass: T::zero() }
     }
 
     #[inline(always)]
@@ -160,7 +160,8 @@ pub(crate) fn p2g_in_plane<T, L, V, const D: usize, const W: usize, const N: usi
         }
         for i in 0..W {
             if D > 1 {
-                let mut column = std::array::from_fn(|j| sums[j][i]);
+                let mut column = [sums[0][i]; W];
+                (1..W).for_each(|j| column[j] = sums[j][i]);
                 subtract_outer::<_, _, W>(vectors, &mut column);
                 (0..W).for_each(|j| sums[j][i] = column[j]);
             }
@@ -224,7 +225,9 @@ fn slopes<T: RealField + Copy, V: Vectors, const D: usize, const N: usize>(
         along = vectors.low_and_high(affine, along);
         across = vectors.high_and_low(affine, vectors.high_and_low(flux, flux));
     }
-    std::array::from_fn(|a| if a == 0 { along } else { across })
+    let mut slopes = [across; D];
+    slopes[0] = along;
+    slopes
 }
 
 /// G2P of the first `count` particles, particle `k` with the weights `weights(k)`; as [`g2p`](crate::kernel::any::g2p).
@@ -243,7 +246,7 @@ pub(crate) fn g2p_in_plane<T, L, V, const D: usize, const W: usize>(
     V: Vectors,
     L: Weights<T, D, W>,
 {
-    let zero = Lane4([T::zero(); 4]);
+    let zero = Lane4::zero();
     let rows = rows::<D, W>();
     let mut k = 0;
     while k < count {
@@ -261,7 +264,8 @@ pub(crate) fn g2p_in_plane<T, L, V, const D: usize, const W: usize>(
         }
         for i in 0..W {
             if D > 1 {
-                let mut column = std::array::from_fn(|j| changes[j][i]);
+                let mut column = [changes[0][i]; W];
+                (1..W).for_each(|j| column[j] = changes[j][i]);
                 differ::<_, _, W>(vectors, &mut column);
                 (0..W).for_each(|j| changes[j][i] = column[j]);
             }

@@ -1,11 +1,11 @@
 //! P2G and G2P in space: the values of a node in eight lanes.
-
-use std::array;
+//!
+//! Loops, not closures: functions of the standard library that call one are compiled without the registers of the kernel.
 
 use nalgebra::RealField;
 
 use crate::kernel::any::{Contributions, Interpolated};
-use crate::node::Node;
+use crate::node::{LANES, Node};
 use crate::simd::{Lane8, Vectors};
 use crate::weights::Weights;
 
@@ -21,7 +21,11 @@ where
     V: Vectors,
     L: Weights<T, D, W>,
 {
-    array::from_fn(|place| vectors.splat8(weights.S(axis, place)))
+    let mut factors = [Lane8::zero(); W];
+    for (place, factor) in factors.iter_mut().enumerate() {
+        *factor = vectors.splat8(weights.S(axis, place));
+    }
+    factors
 }
 
 /// The slopes of a particle along an axis: gradients, and where velocities are affine arms, for the first vector of a node or for
@@ -38,14 +42,18 @@ where
     V: Vectors,
     L: Weights<T, D, W>,
 {
-    array::from_fn(|place| {
-        let G = weights.G(axis, place);
-        if !L::AFFINE {
-            return vectors.splat8(G);
+    let mut factors = [Lane8::zero(); W];
+    for (place, factor) in factors.iter_mut().enumerate() {
+        *factor = vectors.splat8(weights.G(axis, place));
+        if L::AFFINE {
+            let Z = weights.Z(axis, place);
+            let arms = if arms_first { 0..D } else { D..LANES };
+            for q in arms {
+                factor.0[q] = Z;
+            }
         }
-        let Z = weights.Z(axis, place);
-        Lane8(array::from_fn(|q| if (q < D) == arms_first { Z } else { G }))
-    })
+    }
+    factors
 }
 
 /// P2G of particle `k`, as [`p2g`](crate::kernel::any::p2g): plane by plane, row by row, node by node.
@@ -158,5 +166,8 @@ where
         across = vectors.mul_add8(plane_across, S_up[plane], across);
         up = vectors.mul_add8(plane_value, G_up[plane], up);
     }
-    Interpolated::new(weights, &value.0, &array::from_fn(|axis| [along, across, up][axis].0))
+    let mut slopes = [along.0; D];
+    slopes[1] = across.0;
+    slopes[D - 1] = up.0;
+    Interpolated::new(weights, &value.0, &slopes)
 }
