@@ -36,7 +36,7 @@ pub struct Mesh<T, const D: usize> {
     /// The corners of each particle's domain: in one dimension the first two entries, from left to right; in two the first
     /// four, counter-clockwise; in three all, counter-clockwise as seen from above those of the lower face, then those above
     /// them.
-    pub corners: Vec<[usize; 8]>,
+    pub corners: Vec<[u32; 8]>,
 }
 
 impl<T, const D: usize> Default for Mesh<T, D> {
@@ -144,7 +144,7 @@ impl<T: RealField + Copy, const D: usize> Body<T, D> {
                 volume.push(middle * width * angle);
                 let edges = [vector(cos, sin) * width, vector(-sin, cos) * (middle * angle)];
                 half_edges.push(SMatrix::from_fn(|a, k| half * edges[k][a]));
-                let corner = |i: usize, j: usize| (j % rays) * (across + 1) + i;
+                let corner = |i: usize, j: usize| ((j % rays) * (across + 1) + i) as u32;
                 let of_cell =
                     [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
                 mesh.corners.push(std::array::from_fn(|k| of_cell[k % 4]));
@@ -189,7 +189,7 @@ fn mesh_of_boxes<T: RealField + Copy, const D: usize>(
     let count: [usize; D] = std::array::from_fn(|a| {
         in_boxes(grid.spacing * real(grid.cells[a] as f64), a).round() as usize + 1
     });
-    const NONE: usize = usize::MAX;
+    const NONE: u32 = u32::MAX;
     let mut known = vec![NONE; count.iter().product()];
     let mut mesh = Mesh::default();
     for X in &particles.X {
@@ -201,7 +201,7 @@ fn mesh_of_boxes<T: RealField + Copy, const D: usize>(
             });
             let place = (0..D).rev().fold(0, |place, a| place * count[a] + index[a]);
             if known[place] == NONE {
-                known[place] = mesh.X.len();
+                known[place] = mesh.X.len() as u32;
                 mesh.X.push(SVector::from_fn(|a, _| {
                     grid.lower[a] + real::<T>(index[a] as f64) * edge[a]
                 }));
@@ -250,7 +250,7 @@ mod tests {
                 assert!((moment - Vector2::repeat(exact)).norm() < 1e-14, "{moment}");
                 let mesh = body.mesh.unwrap();
                 for (corners, E) in mesh.corners.iter().zip(&body.half_edges) {
-                    let [a, b, c, d] = std::array::from_fn(|k| mesh.X[corners[k]]);
+                    let [a, b, c, d] = std::array::from_fn(|k| mesh.X[corners[k] as usize]);
                     let area = 0.5 * (c - a).perp(&(d - b));
                     assert!(area > 0.0 && E.determinant() > 0.0);
                 }
@@ -276,7 +276,8 @@ mod tests {
         let mesh = body.mesh.unwrap();
         assert_eq!(mesh.X.len(), 7 * 5);
         for (corners, X) in mesh.corners.iter().zip(&body.particles.X) {
-            let corners: [Vector2<f64>; 4] = std::array::from_fn(|k| mesh.X[corners[k]] - X);
+            let corners: [Vector2<f64>; 4] =
+                std::array::from_fn(|k| mesh.X[corners[k] as usize] - X);
             let h = 0.125;
             let expected = [[-h, -h], [h, -h], [h, h], [-h, h]].map(Vector2::from);
             for (corner, expected) in corners.iter().zip(expected) {

@@ -81,6 +81,11 @@ pub(crate) fn slopes_of_parallelogram<N: Number, const D: usize>(
     (w, slopes)
 }
 
+#[inline(always)]
+pub(crate) fn determinant<N: Number, const D: usize>(A: &[[N; D]; D]) -> N {
+    cofactors(A).1
+}
+
 /// The cofactors of a matrix, and its determinant.
 #[inline(always)]
 fn cofactors<N: Number, const D: usize>(E: &[[N; D]; D]) -> ([[N; D]; D], N) {
@@ -140,7 +145,7 @@ pub(crate) fn volume_of_cell<N: Number, const D: usize>(x: &[[N; D]; MOST_CORNER
     match D {
         1 => x[1][0] - x[0][0],
         2 => area(x),
-        _ => sum(&normals(x).1),
+        _ => hexahedron_volume(x),
     }
 }
 
@@ -194,138 +199,161 @@ fn quadrilateral<N: Number, const D: usize>(x: &[[N; D]; MOST_CORNERS]) -> (Shar
     (Shares { w, g }, area)
 }
 
-/// The points of Gauss on each axis are at `+-1/sqrt(3)`, with weight 1.
-const GAUSS: f64 = 0.577_350_269_189_625_8;
+/// The place of each corner of a hexahedron where bit `a` says on which side of axis `a` it is.
+const BITS: [usize; MOST_CORNERS] = [0, 1, 3, 2, 4, 5, 7, 6];
 
-/// Replaces values at the corners of the cube by sums and differences along each axis: entry 1 of each pair becomes half the
-/// difference, entry 0 half the sum. The corners come in the order of [`BITS`].
-///
-/// They are then the coefficients of `1, s_0, s_1, s_0 s_1, s_2, ...` of the trilinear function with those values.
+/// From values at the corners of the cube, by their [bits](BITS), to eight times the coefficients of
+/// `1, s_0, s_1, s_0 s_1, s_2, s_0 s_2, s_1 s_2, s_0 s_1 s_2` in the trilinear function with those values.
 #[inline(always)]
 fn to_coefficients<N: Number>(values: &mut [N; MOST_CORNERS]) {
-    let half = values[0].constant(0.5);
-    for axis in 0..3 {
-        let bit = 1 << axis;
+    for bit in [1, 2, 4] {
         for lower in 0..MOST_CORNERS {
             if lower & bit == 0 {
-                let (a, b) = (values[lower] * half, values[lower | bit] * half);
+                let (a, b) = (values[lower], values[lower | bit]);
                 (values[lower], values[lower | bit]) = (a + b, b - a);
             }
         }
     }
 }
 
-/// The place of each corner where bit `a` says on which side of axis `a` it is.
-const BITS: [usize; MOST_CORNERS] = [0, 1, 3, 2, 4, 5, 7, 6];
-
-/// The vectors `n_a = dx/ds_b x dx/ds_c` and the volume `dV = dx/ds_0 . n_0` at the points of Gauss, in the order of corners with
-/// [bits](BITS); integrands below are of degree 3 at most in each variable, and so exact there.
+/// From coefficients, in the order of [`to_coefficients`], to values at the corners.
 #[inline(always)]
-fn normals<N: Number, const D: usize>(
-    x: &[[N; D]; MOST_CORNERS],
-) -> ([[[N; D]; 3]; MOST_CORNERS], [N; MOST_CORNERS]) {
-    let zero = x[0][0].constant(0.0);
-    let gauss = zero.constant(GAUSS);
-    // Coefficients of the map, component by component, in units that make the points of Gauss lie at +-1.
-    let mut map = [[zero; MOST_CORNERS]; D];
-    for i in 0..D {
-        for corner in 0..MOST_CORNERS {
-            map[i][BITS[corner]] = x[corner][i];
-        }
-        to_coefficients(&mut map[i]);
-    }
-    // Tangents: along axis a, at the four places of the other axes.
-    let mut tangents = [[[zero; D]; MOST_CORNERS]; 3];
-    for a in 0..3 {
-        let (along, b, c) = (1 << a, 1 << ((a + 1) % 3), 1 << ((a + 2) % 3));
-        for i in 0..D {
-            let first = map[i][along];
-            let of_b = map[i][along | b] * gauss;
-            let of_c = map[i][along | c] * gauss;
-            let of_both = map[i][along | b | c] * gauss * gauss;
-            for place in [0, b, c, b | c] {
-                let mut sum = if place & b == 0 { first - of_b } else { first + of_b };
-                let rest = if place & b == 0 { of_c - of_both } else { of_c + of_both };
-                sum = if place & c == 0 { sum - rest } else { sum + rest };
-                tangents[a][place][i] = sum;
-                tangents[a][place | along][i] = sum;
-            }
-        }
-    }
-    let mut normals = [[[zero; D]; 3]; MOST_CORNERS];
-    let mut volumes = [zero; MOST_CORNERS];
-    for point in 0..MOST_CORNERS {
-        for a in 0..3 {
-            let (b, c) = (tangents[(a + 1) % 3][point], tangents[(a + 2) % 3][point]);
-            for i in 0..D {
-                let (j, k) = ((i + 1) % D, (i + 2) % D);
-                normals[point][a][i] = b[j] * c[k] - b[k] * c[j];
-            }
-        }
-        for i in 0..D {
-            volumes[point] = volumes[point] + tangents[0][point][i] * normals[point][0][i];
-        }
-    }
-    (normals, volumes)
-}
-
-/// From values at the points of Gauss to their sums weighted with `N_c`, for each corner; along the axis `slope` with
-/// `dN_c/ds` instead.
-#[inline(always)]
-fn to_corners<N: Number>(values: &mut [N; MOST_CORNERS], slope: Option<usize>) {
-    // N at a point on the same side and on the other one.
-    let near = values[0].constant(0.5 * (1.0 + GAUSS));
-    let far = values[0].constant(0.5 * (1.0 - GAUSS));
-    let half = values[0].constant(0.5);
-    for axis in 0..3 {
-        let bit = 1 << axis;
+fn to_corners<N: Number>(coefficients: &mut [N; MOST_CORNERS]) {
+    for bit in [1, 2, 4] {
         for lower in 0..MOST_CORNERS {
             if lower & bit == 0 {
-                let (a, b) = (values[lower], values[lower | bit]);
-                (values[lower], values[lower | bit]) = if slope == Some(axis) {
-                    let sum = (a + b) * half;
-                    (values[0].constant(0.0) - sum, sum)
-                } else {
-                    (a * near + b * far, a * far + b * near)
-                };
+                let (a, b) = (coefficients[lower], coefficients[lower | bit]);
+                (coefficients[lower], coefficients[lower | bit]) = (a - b, a + b);
             }
         }
     }
 }
 
+/// `a x b` in space.
 #[inline(always)]
-fn hexahedron<N: Number, const D: usize>(x: &[[N; D]; MOST_CORNERS]) -> (Shares<N, D>, N) {
-    let (normals, mut volumes) = normals(x);
-    let whole = sum(&volumes);
-    let inverse = whole.constant(1.0).divided_by(whole);
-    let zero = whole.constant(0.0);
-    let mut shares = Shares { w: [zero; MOST_CORNERS], g: [[zero; D]; MOST_CORNERS] };
-    to_corners(&mut volumes, None);
-    for corner in 0..MOST_CORNERS {
-        shares.w[corner] = volumes[BITS[corner]] * inverse;
+fn normal<N: Number, const D: usize>(a: [N; D], b: [N; D]) -> [N; D] {
+    let mut normal = a;
+    for i in 0..D {
+        let (j, k) = ((i + 1) % D, (i + 2) % D);
+        normal[i] = a[j] * b[k] - a[k] * b[j];
     }
-    for a in 0..3 {
-        for i in 0..D {
-            let mut values = [zero; MOST_CORNERS];
-            for point in 0..MOST_CORNERS {
-                values[point] = normals[point][a][i] * inverse;
-            }
-            to_corners(&mut values, Some(a));
-            for corner in 0..MOST_CORNERS {
-                shares.g[corner][i] = shares.g[corner][i] + values[BITS[corner]];
-            }
-        }
-    }
-    (shares, whole)
+    normal
 }
 
 #[inline(always)]
-fn sum<N: Number>(values: &[N; MOST_CORNERS]) -> N {
-    let mut sum = values[0];
-    for value in &values[1..] {
-        sum = sum + *value;
+fn dot<N: Number, const D: usize>(a: [N; D], b: [N; D]) -> N {
+    let mut sum = a[0] * b[0];
+    for i in 1..D {
+        sum = sum + a[i] * b[i];
     }
     sum
+}
+
+#[inline(always)]
+fn plus<N: Number, const D: usize>(mut a: [N; D], b: [N; D]) -> [N; D] {
+    for i in 0..D {
+        a[i] = a[i] + b[i];
+    }
+    a
+}
+
+#[inline(always)]
+fn times<N: Number, const D: usize>(mut a: [N; D], factor: N) -> [N; D] {
+    for number in &mut a {
+        *number = *number * factor;
+    }
+    a
+}
+
+/// Eight times the coefficients of the map from the cube, see [`to_coefficients`].
+#[inline(always)]
+fn coefficients_of_map<N: Number, const D: usize>(
+    x: &[[N; D]; MOST_CORNERS],
+) -> [[N; D]; MOST_CORNERS] {
+    let mut m = *x;
+    for i in 0..D {
+        let mut values = [x[0][i]; MOST_CORNERS];
+        for corner in 0..MOST_CORNERS {
+            values[BITS[corner]] = x[corner][i];
+        }
+        to_coefficients(&mut values);
+        for k in 0..MOST_CORNERS {
+            m[k][i] = values[k];
+        }
+    }
+    m
+}
+
+/// The volume of a [hexahedron].
+#[inline(always)]
+fn hexahedron_volume<N: Number, const D: usize>(x: &[[N; D]; MOST_CORNERS]) -> N {
+    let [_, m1, m2, m3, m4, m5, m6, _] = coefficients_of_map(x);
+    let third = m1[0].constant(1.0 / 3.0);
+    let first = plus(normal(m2, m4), times(normal(m3, m5), third));
+    let whole = dot(m1, first) + dot(m6, times(plus(normal(m3, m2), normal(m4, m5)), third));
+    whole * third.constant(1.0 / 64.0)
+}
+
+/// The map's determinant is `(m_1 + m_3 s_1 + m_5 s_2 + m_7 s_1 s_2) . (m_2 + m_3 s_0 + m_6 s_2 + m_7 s_0 s_2) x (m_4 + m_5 s_0 +
+/// m_6 s_1 + m_7 s_0 s_1)`, where `m_k` belongs to the product of those `s_a` whose bit is in k. Integrated over the cube,
+///
+/// ```text
+/// V/8 = m_1 . (m_2 x m_4) + (m_1 . (m_3 x m_5) + m_6 . (m_3 x m_2 + m_4 x m_5)) / 3
+/// ```
+///
+/// The share of a mean gradient is `g_c = dV/dx_c / V`, and `w_c` a sum of the moments of the determinant, since `N_c` is one of the
+/// products.
+#[inline(always)]
+fn hexahedron<N: Number, const D: usize>(x: &[[N; D]; MOST_CORNERS]) -> (Shares<N, D>, N) {
+    let [_, m1, m2, m3, m4, m5, m6, m7] = coefficients_of_map(x);
+    let one = m1[0].constant(1.0);
+    let third = one.constant(1.0 / 3.0);
+    let (n24, n41, n12) = (normal(m2, m4), normal(m4, m1), normal(m1, m2));
+    let (n35, n63, n56) = (normal(m3, m5), normal(m6, m3), normal(m5, m6));
+    let (n51, n26) = (normal(m5, m1), normal(m2, m6));
+    let (n13, n64) = (normal(m1, m3), normal(m6, m4));
+    let (n32, n45) = (normal(m3, m2), normal(m4, m5));
+    // The derivatives of 64 V with respect to each coefficient.
+    let zero = one.constant(0.0);
+    let slopes = [
+        [zero; D],
+        plus(n24, times(n35, third)),
+        plus(n41, times(n63, third)),
+        times(plus(n51, n26), third),
+        plus(n12, times(n56, third)),
+        times(plus(n13, n64), third),
+        times(plus(n32, n45), third),
+        [zero; D],
+    ];
+    let whole = dot(m1, slopes[1]) + dot(m6, slopes[6]);
+    let inverse = one.divided_by(whole);
+    let (first, second) = (inverse * one.constant(1.0 / 24.0), inverse * one.constant(1.0 / 72.0));
+    let mut w = [
+        one.constant(0.125),
+        (dot(m3, n41) + dot(m5, n12) + dot(m7, slopes[6])) * first,
+        (dot(m3, n24) + dot(m6, n12) + dot(m7, slopes[5])) * first,
+        (dot(m5, n32) + dot(m6, n13) + dot(m7, minus(n12, times(n56, third)))) * second,
+        (dot(m5, n24) + dot(m6, n41) + dot(m7, slopes[3])) * first,
+        (dot(m3, n45) + dot(m6, n51) + dot(m7, minus(n41, times(n63, third)))) * second,
+        (dot(m3, n64) + dot(m5, n26) + dot(m7, minus(n24, times(n35, third)))) * second,
+        dot(m5, n63) * (inverse * one.constant(-1.0 / 108.0)),
+    ];
+    to_corners(&mut w);
+    let mut shares = Shares { w, g: [[zero; D]; MOST_CORNERS] };
+    for corner in 0..MOST_CORNERS {
+        shares.w[corner] = w[BITS[corner]];
+    }
+    for i in 0..D {
+        let mut values = [zero; MOST_CORNERS];
+        for k in 1..MOST_CORNERS - 1 {
+            values[k] = slopes[k][i] * inverse;
+        }
+        to_corners(&mut values);
+        for corner in 0..MOST_CORNERS {
+            shares.g[corner][i] = values[BITS[corner]];
+        }
+    }
+    (shares, whole * one.constant(1.0 / 64.0))
 }
 
 #[cfg(test)]
@@ -448,8 +476,7 @@ mod tests {
             }
         }
 
-        /// A linear field has its gradient, and the mean that it has at the centroid, in any hexahedron; the centroid is found by
-        /// dividing the cube of the map into many small ones.
+        /// A linear field has its gradient in any hexahedron; shares against Gauss points of higher order on the trilinear map.
         #[test]
         fn means_over_hexahedra_are_exact(numbers in prop::array::uniform24(-0.2..0.2_f64)) {
             let x: [SVector<f64, 3>; 8] =
@@ -459,9 +486,8 @@ mod tests {
             let gradient: SMatrix<f64, 3, 3> =
                 shares.iter().zip(&x).map(|((_, g), x)| x * g.transpose()).sum();
             prop_assert!((gradient - SMatrix::identity()).norm() < 1e-13);
-            // Gauss points of higher order on the map.
             let nodes = [(-0.774_596_669_241_483_4, 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)];
-            let (mut whole, mut w) = (0.0, [0.0; 8]);
+            let (mut whole, mut w, mut g) = (0.0, [0.0; 8], [SVector::<f64, 3>::zeros(); 8]);
             for (r, wr) in nodes {
                 for (s, ws) in nodes {
                     for (t, wt) in nodes {
@@ -474,10 +500,11 @@ mod tests {
                         };
                         let map = SMatrix::<f64, 3, 3>::from_fn(|i, a| (0..8).map(|c| x[c][i] * slope(c, a)).sum());
                         let J = wr * ws * wt * determinant(&map);
-                        prop_assert!(inverse_transpose(&map, determinant(&map)).norm().is_finite());
+                        let to_space = inverse_transpose(&map, determinant(&map));
                         whole += J;
                         for c in 0..8 {
                             w[c] += N[c] * J;
+                            g[c] += to_space * SVector::from_fn(|a, _| slope(c, a)) * J;
                         }
                     }
                 }
@@ -485,6 +512,7 @@ mod tests {
             prop_assert!((whole - volume).abs() < 1e-13 * whole);
             for c in 0..8 {
                 prop_assert!((shares[c].0 - w[c] / whole).abs() < 1e-13);
+                prop_assert!((shares[c].1 - g[c] / whole).norm() < 1e-12);
             }
         }
     }

@@ -257,7 +257,8 @@ fn g2p<T: RealField + Copy, const D: usize>(
                 // Checked below, when all corners are at their new places.
                 return;
             }
-            outcome = outcome.merge(check(&c, at_start, first, bin_of, of_block.x, of_block.F));
+            let OfBlock { x, F, .. } = of_block;
+            outcome = outcome.merge(check(&c, at_start, &mut copies, first, bin_of, x, F));
         });
         found.add(outcome);
     });
@@ -265,9 +266,9 @@ fn g2p<T: RealField + Copy, const D: usize>(
     std::mem::swap(&mut mesh.x, next);
     let support = &*support;
     each_chunk_of_four((x, v, F, affine), CHUNK, &|chunk| {
-        let mut outcome = Outcome::default();
+        let (mut outcome, mut copies) = (Outcome::default(), Copies::new());
         for_blocks(chunk, |first, OfBlock { x, F, .. }| {
-            outcome = outcome.merge(check(&c, support, first, bin_of, x, F));
+            outcome = outcome.merge(check(&c, support, &mut copies, first, bin_of, x, F));
         });
         found.add(outcome);
     });
@@ -278,17 +279,20 @@ fn g2p<T: RealField + Copy, const D: usize>(
 fn check<T: RealField + Copy, const D: usize>(
     c: &Constants<T, D>,
     support: &Support<T, D>,
+    copies: &mut Copies<T, D>,
     first: usize,
     bin_of: &[u32],
     x: &[SVector<T, D>],
     F: &[SMatrix<T, D, D>],
 ) -> Outcome {
-    let bins = &bin_of[first..];
+    let mut bins = [0; BLOCK];
+    bins[..x.len()].copy_from_slice(&bin_of[first..first + x.len()]);
+    copies.copy(x, F);
     let mut outcome = Outcome::default();
-    if support.are_valid(c, &ids(first)[..x.len()], bins.iter().copied(), x, F) {
+    if support.are_valid(c, &ids(first)[..x.len()], &bins, copies.kinematics()) {
         return outcome;
     }
-    for (k, ((x, F), &bin)) in x.iter().zip(F).zip(bins).enumerate() {
+    for (k, ((x, F), bin)) in x.iter().zip(F).zip(bins).enumerate() {
         outcome = outcome.merge(support.diagnose(c, first + k, bin, x, F));
     }
     outcome

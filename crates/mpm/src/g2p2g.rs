@@ -134,8 +134,7 @@ impl<T: RealField + Copy, const D: usize> G2p2g<'_, T, D> {
         };
         block.g2p_with(&c.strides, nodes, ids.len(), advance);
         block.compute_weights(c, support, ids, Kinematics { x, F });
-        let bins = std::iter::repeat(bin);
-        if !support.are_valid(c, ids, bins, &x[..ids.len()], F) {
+        if !support.are_valid(c, ids, &[bin; BLOCK], Kinematics { x, F }) {
             let mut outcome = Outcome::default();
             for (k, &p) in ids.iter().enumerate() {
                 outcome = outcome.merge(support.diagnose(c, p as usize, bin, &x[k], &F[k]));

@@ -5,13 +5,13 @@ use std::sync::{Mutex, PoisonError};
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::body::Mesh;
-use crate::domain::{MOST_CORNERS, volume_of_cell};
+use crate::domain::{self, MOST_CORNERS, corner_of_parallelogram, volume_of_cell};
 use crate::geometry::Constants;
-use crate::kernel::block::BLOCK;
-use crate::kernel::corners::padded;
-use crate::shape_function::{EXTENDED, HALF_SIZE_LIMIT, ProductShape};
-use crate::simd::{Eight, Lane8, Loop, Vectors, dispatch};
-use crate::support::{Rows, Support};
+use crate::kernel::block::{BLOCK, Kinematics};
+use crate::kernel::corners::{GROUP, REACHED, cells, gather, padded, parallelograms};
+use crate::shape_function::{EXTENDED, HALF_SIZE_LIMIT, ProductShape, node_below};
+use crate::simd::{Eight, Loop, Vectors, dispatch};
+use crate::support::{HalfEdges, Rows, Support};
 use crate::tensor::{determinant, real};
 
 /// Reasons why a particle is invalid, worst first: where one particle is inverted, others may follow in the same step.
@@ -73,66 +73,112 @@ impl<T: RealField + Copy, const D: usize> Support<T, D> {
     }
 
     /// Whether all particles `ids` of a block are valid, each in its own of `bins`. Nearly all are, and this tells it sooner
-    /// than [`diagnose`](Self::diagnose).
+    /// than [`diagnose`](Self::diagnose), which has to tell for the others.
     pub(crate) fn are_valid(
         &self,
         c: &Constants<T, D>,
         ids: &[u32],
-        bins: impl Iterator<Item = u32>,
-        x: &[SVector<T, D>],
-        F: &[SMatrix<T, D, D>],
+        bins: &[u32; BLOCK],
+        kinematics: Kinematics<'_, T, D>,
     ) -> bool {
-        let particles = x.iter().zip(F).zip(bins);
+        let mut all_valid = true;
+        let of_block = OfBlock { c, kinematics, bins, count: ids.len().min(BLOCK) };
+        let all = &mut all_valid;
         match self {
-            Self::Product(shape) => {
-                let mut all_valid = true;
-                dispatch(Check { c, shape, particles, all_valid: &mut all_valid });
-                all_valid
-            }
-            Self::Cpdi { .. } => {
-                let of_domain = |p: usize, x: &SVector<T, D>, F: &SMatrix<T, D, D>| {
-                    let l = self.half_size(c, p, x, F);
-                    (l, self.rows(c, p, x, F, &l))
-                };
-                let mut all_valid = true;
-                let all = &mut all_valid;
-                dispatch(CheckDomains { c, ids, of_domain, particles, all_valid: all });
-                all_valid
+            Self::Product(shape) => dispatch(CheckBoxes { of_block, shape, all_valid: all }),
+            Self::Cpdi { half_edges } => {
+                let ids = &padded(ids);
+                dispatch(CheckParallelograms { of_block, half_edges, ids, all_valid: all });
             }
             Self::Cpdi2 { mesh, .. } => {
-                let mut all_valid = true;
-                dispatch(CheckCells { mesh, ids: &padded(ids), all_valid: &mut all_valid });
-                let of_domain = |p: usize, x: &SVector<T, D>, F: &SMatrix<T, D, D>| {
-                    let l = self.half_size(c, p, x, F);
-                    (l, self.rows(c, p, x, F, &l))
-                };
-                let mut boxes_valid = true;
-                let all = &mut boxes_valid;
-                dispatch(CheckDomains { c, ids, of_domain, particles, all_valid: all });
-                all_valid && boxes_valid
+                dispatch(CheckCells { of_block, mesh, ids: &padded(ids), all_valid: all });
             }
         }
+        all_valid
     }
 }
 
-struct Check<'a, 'b, T, I, const D: usize> {
+/// Particles of a block that are to be checked: the first `count`, each in one of `bins`.
+#[derive(Clone, Copy)]
+struct OfBlock<'a, T, const D: usize> {
     c: &'a Constants<T, D>,
+    kinematics: Kinematics<'a, T, D>,
+    bins: &'a [u32; BLOCK],
+    count: usize,
+}
+
+impl<T: RealField + Copy, const D: usize> OfBlock<'_, T, D> {
+    /// Whether all particles of a group are valid: inside the grid, with small domains between these corners, in cells, and in
+    /// their bins.
+    #[inline(always)]
+    fn are_domains_valid<V: Vectors>(
+        &self,
+        vectors: V,
+        group: usize,
+        corners: &[[Eight<T, V>; D]; MOST_CORNERS],
+    ) -> bool {
+        let &Self { c, kinematics: Kinematics { x, F }, bins, count } = self;
+        let constant = |value: T| Eight { lanes: vectors.splat8(value), vectors };
+        // The sign of a difference is exact: none of these may be negative.
+        let mut slack = constant(T::one()).lanes;
+        let (mut low, mut high) = (corners[0], corners[0]);
+        for a in 0..D {
+            for corner in &corners[1..1 << D] {
+                low[a].lanes = vectors.min8(low[a].lanes, corner[a].lanes);
+                high[a].lanes = vectors.max8(high[a].lanes, corner[a].lanes);
+            }
+            let x = gather(vectors, group, |k| x[k][a]);
+            let above = x - constant(c.lower[a]);
+            let xi = above * constant(c.inverse_spacing);
+            let small = constant(real(SMALL));
+            for slack_of in
+                [above, constant(c.upper[a]) - x, small - (xi - low[a]), small - (high[a] - xi)]
+            {
+                slack = vectors.min8(slack, slack_of.lanes);
+            }
+        }
+        let mut lanes_of_F = [[corners[0][0]; D]; D];
+        for i in 0..D {
+            for j in 0..D {
+                lanes_of_F[i][j] = gather(vectors, group, |k| F[k][(i, j)]);
+            }
+        }
+        let J = domain::determinant(&lanes_of_F).lanes;
+        let (low, high) = (low[D - 1].lanes, high[D - 1].lanes);
+        let mut all = true;
+        for n in 0..GROUP {
+            let k = group * GROUP + n;
+            let (first, end) = c.bins.range(bins[k], REACHED);
+            let rows = node_below(high.0[n]).0 - node_below(low.0[n]).0;
+            let is_valid = (J.0[n] > T::zero())
+                & (slack.0[n] >= T::zero())
+                & (rows <= (REACHED - 2) as f64)
+                & (low.0[n] >= real(first))
+                & (low.0[n] < real(end));
+            all &= is_valid | (k >= count);
+        }
+        all
+    }
+}
+
+/// Half-size of a domain, in cells, that is below [`HALF_SIZE_LIMIT`] however it is rounded.
+const SMALL: f64 = HALF_SIZE_LIMIT - 0.125;
+
+struct CheckBoxes<'a, 'b, T, const D: usize> {
+    of_block: OfBlock<'a, T, D>,
     shape: &'a ProductShape<T, D>,
-    particles: I,
     all_valid: &'b mut bool,
 }
 
-impl<'a, T, I, const D: usize> Loop for Check<'a, '_, T, I, D>
-where
-    T: RealField + Copy,
-    I: Iterator<Item = ((&'a SVector<T, D>, &'a SMatrix<T, D, D>), u32)>,
-{
+impl<T: RealField + Copy, const D: usize> Loop for CheckBoxes<'_, '_, T, D> {
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
-        let Self { c, shape, particles, all_valid } = self;
+        let Self { of_block, shape, all_valid } = self;
+        let OfBlock { c, kinematics: Kinematics { x, F }, bins, count } = of_block;
         let (half_sizes, width, above) = (shape.half_sizes, shape.width(), shape.extended_above());
         let mut all = true;
-        for ((x, F), bin) in particles {
+        for k in 0..count.min(BLOCK) {
+            let (x, F) = (&x[k], &F[k]);
             let mut valid = determinant(F) > T::zero();
             let mut extended = false;
             let mut last = T::zero();
@@ -143,10 +189,60 @@ where
                 last = l;
             }
             let edge = (x[D - 1] - c.lower[D - 1]) * c.inverse_spacing - last;
-            let (first, end) = c.bins.range(bin, width);
-            let (_, end_of_extended) = c.bins.range(bin, EXTENDED);
+            let (first, end) = c.bins.range(bins[k], width);
+            let (_, end_of_extended) = c.bins.range(bins[k], EXTENDED);
             let end = if extended { end_of_extended } else { end };
             all &= valid & (edge >= real(first)) & (edge < real(end));
+        }
+        *all_valid = all;
+    }
+}
+
+struct CheckParallelograms<'a, 'b, T, const D: usize> {
+    of_block: OfBlock<'a, T, D>,
+    half_edges: &'a HalfEdges<T, D>,
+    ids: &'a [usize; BLOCK],
+    all_valid: &'b mut bool,
+}
+
+impl<T: RealField + Copy, const D: usize> Loop for CheckParallelograms<'_, '_, T, D> {
+    #[inline(always)]
+    fn run<V: Vectors>(self, vectors: V) {
+        let Self { of_block, half_edges, ids, all_valid } = self;
+        let OfBlock { c, kinematics, count, .. } = of_block;
+        let mut all = true;
+        for group in 0..count.div_ceil(GROUP).min(BLOCK / GROUP) {
+            let (xi, E) = parallelograms(vectors, c, half_edges, ids, kinematics, group);
+            let mut corners = [xi; MOST_CORNERS];
+            for (corner, at) in corners.iter_mut().enumerate().take(1 << D) {
+                *at = corner_of_parallelogram(&xi, &E, corner);
+            }
+            all &= of_block.are_domains_valid(vectors, group, &corners);
+        }
+        *all_valid = all;
+    }
+}
+
+struct CheckCells<'a, 'b, T, const D: usize> {
+    of_block: OfBlock<'a, T, D>,
+    mesh: &'a Mesh<T, D>,
+    ids: &'a [usize; BLOCK],
+    all_valid: &'b mut bool,
+}
+
+impl<T: RealField + Copy, const D: usize> Loop for CheckCells<'_, '_, T, D> {
+    #[inline(always)]
+    fn run<V: Vectors>(self, vectors: V) {
+        let Self { of_block, mesh, ids, all_valid } = self;
+        let OfBlock { c, count, .. } = of_block;
+        let mut all = true;
+        for group in 0..count.div_ceil(GROUP).min(BLOCK / GROUP) {
+            let corners = cells(vectors, c, mesh, ids, group);
+            let volumes = volume_of_cell(&corners).lanes;
+            for volume in volumes.0 {
+                all &= volume > T::zero();
+            }
+            all &= of_block.are_domains_valid(vectors, group, &corners);
         }
         *all_valid = all;
     }
@@ -193,74 +289,11 @@ impl SharedOutcome {
     }
 }
 
-struct CheckDomains<'a, 'b, T, I, H, const D: usize> {
-    c: &'a Constants<T, D>,
-    ids: &'a [u32],
-    /// Half-sizes of a particle at a place with a deformation gradient, and the rows that it reaches.
-    of_domain: H,
-    particles: I,
-    all_valid: &'b mut bool,
-}
-
-impl<'a, T, I, H, const D: usize> Loop for CheckDomains<'a, '_, T, I, H, D>
-where
-    T: RealField + Copy,
-    I: Iterator<Item = ((&'a SVector<T, D>, &'a SMatrix<T, D, D>), u32)>,
-    H: Fn(usize, &SVector<T, D>, &SMatrix<T, D, D>) -> (SVector<T, D>, Rows<T>),
-{
-    #[inline(always)]
-    fn run<V: Vectors>(self, _: V) {
-        let Self { c, ids, of_domain, particles, all_valid } = self;
-        let mut all = true;
-        for (((x, F), bin), &p) in particles.zip(ids) {
-            let (l, Rows { edge, width }) = of_domain(p as usize, x, F);
-            let mut valid = determinant(F) > T::zero();
-            for a in 0..D {
-                valid &=
-                    (x[a] >= c.lower[a]) & (x[a] <= c.upper[a]) & (l[a] <= real(HALF_SIZE_LIMIT));
-            }
-            let (first, end) = c.bins.range(bin, width);
-            all &= valid & (edge >= real(first)) & (edge < real(end));
-        }
-        *all_valid = all;
-    }
-}
-
-/// Whether all cells of a mesh have a volume.
-struct CheckCells<'a, 'b, T, const D: usize> {
-    mesh: &'a Mesh<T, D>,
-    ids: &'a [usize; BLOCK],
-    all_valid: &'b mut bool,
-}
-
-impl<T: RealField + Copy, const D: usize> Loop for CheckCells<'_, '_, T, D> {
-    #[inline(always)]
-    fn run<V: Vectors>(self, vectors: V) {
-        let Self { mesh: Mesh { x, corners, .. }, ids, all_valid } = self;
-        let mut all = true;
-        for ids in ids.chunks_exact(8) {
-            let zero = Eight { lanes: vectors.splat8(T::zero()), vectors };
-            let mut cells = [[zero; D]; MOST_CORNERS];
-            for (corner, at) in cells.iter_mut().enumerate().take(1 << D) {
-                for a in 0..D {
-                    for n in 0..8 {
-                        at[a].lanes.0[n] = x[corners[ids[n]][corner]][a];
-                    }
-                }
-            }
-            let Lane8(volumes) = volume_of_cell(&cells).lanes;
-            for volume in volumes {
-                all &= volume > T::zero();
-            }
-        }
-        *all_valid = all;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::grid::{Grid, Layout};
+    use crate::kernel::block::Copies;
     use crate::parallel::bins::Bins;
     use nalgebra::{Matrix2, Vector2, vector};
 
@@ -303,6 +336,18 @@ mod tests {
         }
     }
 
+    fn is_valid(
+        c: &Constants<f64, 2>,
+        support: &Support<f64, 2>,
+        bin: u32,
+        x: Vector2<f64>,
+        F: Matrix2<f64>,
+    ) -> bool {
+        let mut copies = Copies::new();
+        copies.copy(&[x], &[F]);
+        support.are_valid(c, &[0], &[bin; BLOCK], copies.kinematics())
+    }
+
     #[test]
     fn particles_are_valid_up_to_the_limits_of_grid_bin_and_box() {
         let c = constants();
@@ -311,7 +356,7 @@ mod tests {
         let valid = |shape: ProductShape<f64, 2>| {
             let support = Support::Product(shape);
             move |x, F| {
-                let is_valid = support.are_valid(&c, &[0], [2].into_iter(), &[x], &[F]);
+                let is_valid = is_valid(&c, &support, 2, x, F);
                 let outcome = support.diagnose(&c, 0, 2, &x, &F);
                 assert_eq!(is_valid, outcome.is_clean(), "{x} {F}");
                 is_valid
@@ -342,8 +387,7 @@ mod tests {
             [(0, 0.0, true), (0, -5e-324, false), (7, 30.0, true), (7, 30.0_f64.next_up(), false)]
         {
             let hat = Support::Product(ProductShape::hat());
-            let found = hat.are_valid(&c, &[0], [bin].into_iter(), &[vector![1.2, y]], &[one]);
-            assert_eq!(found, valid, "{bin} {y}");
+            assert_eq!(is_valid(&c, &hat, bin, vector![1.2, y], one), valid, "{bin} {y}");
         }
     }
 

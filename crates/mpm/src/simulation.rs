@@ -294,6 +294,7 @@ fn check_corners<T, const D: usize>(mesh: &Mesh<T, D>) -> Result<(), SetupError>
     }
     let mut idle = vec![true; expected];
     for &corner in mesh.corners.iter().flat_map(|corners| &corners[..1 << D]) {
+        let corner = corner as usize;
         *idle.get_mut(corner).ok_or(SetupError::NoSuchCorner { corner, corners: expected })? =
             false;
     }

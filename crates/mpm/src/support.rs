@@ -20,13 +20,38 @@ pub(crate) enum Support<T, const D: usize> {
     Product(ProductShape<T, D>),
     /// CPDI: hat functions interpolated between the corners of parallelograms, half of whose edges in the reference
     /// configuration are the columns of a matrix, lengths.
-    Cpdi { half_edges: Vec<SMatrix<T, D, D>> },
+    Cpdi { half_edges: HalfEdges<T, D> },
     /// CPDI2: the same between corners that particles share.
     Cpdi2 {
         mesh: Mesh<T, D>,
         /// Buffer for the positions of the corners at the end of a step.
         next: Vec<SVector<T, D>>,
     },
+}
+
+/// The half-edges of all particles.
+#[derive(Debug)]
+pub(crate) enum HalfEdges<T, const D: usize> {
+    /// As those of a lattice.
+    Same(SMatrix<T, D, D>),
+    Each(Vec<SMatrix<T, D, D>>),
+}
+
+impl<T: RealField + Copy, const D: usize> HalfEdges<T, D> {
+    fn new(each: Vec<SMatrix<T, D, D>>) -> Self {
+        match each.first() {
+            Some(first) if each.iter().all(|own| own == first) => Self::Same(*first),
+            _ => Self::Each(each),
+        }
+    }
+
+    /// Those of a particle.
+    fn of(&self, p: usize) -> &SMatrix<T, D, D> {
+        match self {
+            Self::Same(half_edges) => half_edges,
+            Self::Each(half_edges) => &half_edges[p],
+        }
+    }
 }
 
 impl<T: RealField + Copy, const D: usize> Support<T, D> {
@@ -44,7 +69,7 @@ impl<T: RealField + Copy, const D: usize> Support<T, D> {
             Shape::Gimp => Self::Product(ProductShape::gimp(cells)),
             Shape::Bspline2 => Self::Product(ProductShape::quadratic()),
             Shape::Bspline3 => Self::Product(ProductShape::cubic()),
-            Shape::Cpdi => Self::Cpdi { half_edges },
+            Shape::Cpdi => Self::Cpdi { half_edges: HalfEdges::new(half_edges) },
             Shape::Cpdi2 => {
                 let mesh = mesh.unwrap_or_default();
                 Self::Cpdi2 { next: mesh.x.clone(), mesh }
@@ -63,11 +88,11 @@ impl<T: RealField + Copy, const D: usize> Support<T, D> {
     ) -> SVector<T, D> {
         match self {
             Self::Product(shape) => SVector::from_fn(|a, _| shape.half_sizes.along(a, F[(a, a)])),
-            Self::Cpdi { half_edges } => extent(&product(F, &half_edges[p])) * c.inverse_spacing,
+            Self::Cpdi { half_edges } => extent(&product(F, half_edges.of(p))) * c.inverse_spacing,
             Self::Cpdi2 { mesh, .. } => {
                 let mut l = SVector::zeros();
                 for &corner in &mesh.corners[p][..1 << D] {
-                    let away = mesh.x[corner] - x;
+                    let away = mesh.x[corner as usize] - x;
                     l = SVector::from_fn(|a, _| {
                         let away: T = away[a].abs();
                         if away > l[a] { away } else { l[a] }
@@ -95,7 +120,7 @@ impl<T: RealField + Copy, const D: usize> Support<T, D> {
             }
             Self::Cpdi { half_edges } => {
                 // The last component of the corners, in the operations of `deformed` and `corner_of_parallelogram`.
-                let (own, last, height) = (&half_edges[p], D - 1, c.in_cells(x)[D - 1]);
+                let (own, last, height) = (half_edges.of(p), D - 1, c.in_cells(x)[D - 1]);
                 let edges: [T; D] = array::from_fn(|j| {
                     let term = |l: usize| F[(last, l)] * c.inverse_spacing * own[(l, j)];
                     (1..D).fold(term(0), |sum, l| sum + term(l))
@@ -108,7 +133,9 @@ impl<T: RealField + Copy, const D: usize> Support<T, D> {
             }
             Self::Cpdi2 { mesh, .. } => {
                 let corners = &mesh.corners[p][..1 << D];
-                Rows::between(corners.iter().map(|&corner| c.in_cells(&mesh.x[corner])[D - 1]))
+                Rows::between(
+                    corners.iter().map(|&corner| c.in_cells(&mesh.x[corner as usize])[D - 1]),
+                )
             }
         }
     }
@@ -131,7 +158,7 @@ impl<T: RealField + Copy, const D: usize> Support<T, D> {
     pub(crate) fn volume(&self, p: usize) -> Option<T> {
         let Self::Cpdi2 { mesh, .. } = self else { return None };
         let corners = mesh.corners[p];
-        let x = array::from_fn(|k| array::from_fn(|a| One(mesh.x[corners[k]][a])));
+        let x = array::from_fn(|k| array::from_fn(|a| One(mesh.x[corners[k] as usize][a])));
         Some(volume_of_cell::<_, D>(&x).0)
     }
 

@@ -9,7 +9,7 @@ use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::body::Mesh;
 use crate::domain::{
-    MOST_CORNERS, corner_of_parallelogram, deformed, inverse, shares_of_cell,
+    MOST_CORNERS, Shares, corner_of_parallelogram, deformed, inverse, shares_of_cell,
     slopes_of_parallelogram,
 };
 use crate::geometry::Constants;
@@ -18,13 +18,14 @@ use crate::kernel::block::{BLOCK, Kinematics};
 use crate::node::Node;
 use crate::shape_function::{Hat, ShapeFunction, index, node_below};
 use crate::simd::{Eight, Lane8, Loop, Number, Vectors, dispatch};
+use crate::support::HalfEdges;
 use crate::tensor::{product, real};
 
 /// One number for every particle of a block, `[group].0[n]`; aligned with vector registers.
 type PerParticle<T> = [Lane8<T>; BLOCK / GROUP];
 
 /// Particles whose weights are computed together.
-const GROUP: usize = 8;
+pub(crate) const GROUP: usize = 8;
 
 /// Nodes that a domain within two cells reaches along an axis, and in all.
 pub(crate) const REACHED: usize = 3;
@@ -48,8 +49,6 @@ pub(crate) struct Corners<T, const D: usize> {
     g: [[PerParticle<T>; D]; MOST_CORNERS],
     /// The domain's centre; valid where `is_affine`.
     centre: [PerParticle<T>; D],
-    /// The inverse of the inertia `sum S arm arm`, in cells; valid where `is_affine`.
-    inverse_inertia: [SMatrix<T, D, D>; BLOCK],
 }
 
 impl<T: RealField + Copy, const D: usize> Corners<T, D> {
@@ -63,7 +62,6 @@ impl<T: RealField + Copy, const D: usize> Corners<T, D> {
             w: [zero; MOST_CORNERS],
             g: [[zero; D]; MOST_CORNERS],
             centre: [zero; D],
-            inverse_inertia: [SMatrix::zeros(); BLOCK],
         }
     }
 
@@ -71,7 +69,7 @@ impl<T: RealField + Copy, const D: usize> Corners<T, D> {
     pub(crate) fn of_parallelograms(
         &mut self,
         c: &Constants<T, D>,
-        half_edges: &[SMatrix<T, D, D>],
+        half_edges: &HalfEdges<T, D>,
         ids: &[u32],
         kinematics: Kinematics<'_, T, D>,
     ) {
@@ -83,27 +81,39 @@ impl<T: RealField + Copy, const D: usize> Corners<T, D> {
         dispatch(Cells { corners: self, c, mesh, ids: &padded(ids) });
     }
 
-    /// Moves the origin of a group's positions, in cells from the lower corner of the grid, to the first nodes.
+    /// Takes the corners of a group, in cells from the lower corner of the grid, and their shares of means.
     #[inline(always)]
-    fn find_first_nodes<V: Vectors>(&mut self, vectors: V, c: &Constants<T, D>, group: usize) {
+    fn take<V: Vectors>(
+        &mut self,
+        vectors: V,
+        c: &Constants<T, D>,
+        group: usize,
+        at: &[[Eight<T, V>; D]; MOST_CORNERS],
+        shares: &Shares<Eight<T, V>, D>,
+    ) {
         let mut first = [0.0; GROUP];
         let mut reach = Lane8::zero();
         for a in 0..D {
-            let mut lowest = load(vectors, &self.at[0][a], group).lanes;
-            for corner in 1..1 << D {
-                lowest = vectors.min8(lowest, load(vectors, &self.at[corner][a], group).lanes);
+            let (mut low, mut high) = (at[0][a].lanes, at[0][a].lanes);
+            for corner in &at[1..1 << D] {
+                low = vectors.min8(low, corner[a].lanes);
+                high = vectors.max8(high, corner[a].lanes);
             }
-            let mut node = Lane8::zero();
+            let mut node = Eight { lanes: Lane8::zero(), vectors };
             for n in 0..GROUP {
-                let (base, at) = node_below(lowest.0[n]);
+                let (base, at) = node_below(low.0[n]);
                 first[n] += base * c.strides[a] as f64;
-                node.0[n] = at;
+                node.lanes.0[n] = at;
             }
+            reach = vectors.max8(reach, vectors.sub8(high, node.lanes));
             for corner in 0..1 << D {
-                let at = &mut self.at[corner][a];
-                let moved = vectors.sub8(load(vectors, at, group).lanes, node);
-                reach = vectors.max8(reach, moved);
-                store(at, group, Eight { lanes: moved, vectors });
+                store(&mut self.at[corner][a], group, at[corner][a] - node);
+            }
+        }
+        for corner in 0..1 << D {
+            store(&mut self.w[corner], group, shares.w[corner]);
+            for a in 0..D {
+                store(&mut self.g[corner][a], group, shares.g[corner][a]);
             }
         }
         for n in 0..GROUP {
@@ -111,28 +121,28 @@ impl<T: RealField + Copy, const D: usize> Corners<T, D> {
             self.is_small[group * GROUP + n] = reach.0[n] <= real(2.0);
         }
         if self.is_affine {
-            self.find_inertia(vectors, group);
+            for a in 0..D {
+                let mut centre = load(vectors, &self.at[0][a], group) * shares.w[0];
+                for corner in 1..1 << D {
+                    centre = centre + load(vectors, &self.at[corner][a], group) * shares.w[corner];
+                }
+                store(&mut self.centre[a], group, centre);
+            }
         }
     }
 
-    /// Sets centres, and the inverses of the inertia about them: of each corner its own, and that of the hat functions around it.
+    /// The inverse of the inertia `sum S arm arm` about the centres, in cells: of each corner its own, and that of the hat functions
+    /// around it.
     #[inline(always)]
-    fn find_inertia<V: Vectors>(&mut self, vectors: V, group: usize) {
+    fn inverse_inertia<V: Vectors>(&self, vectors: V, group: usize) -> [[Eight<T, V>; D]; D] {
         let zero = Eight { lanes: Lane8::zero(), vectors };
-        let mut centre = [zero; D];
-        for corner in 0..1 << D {
-            let w = load(vectors, &self.w[corner], group);
-            for a in 0..D {
-                centre[a] = centre[a] + load(vectors, &self.at[corner][a], group) * w;
-            }
-        }
         let mut inertia = [[zero; D]; D];
         for corner in 0..1 << D {
             let w = load(vectors, &self.w[corner], group);
             let mut arms = [zero; D];
             for a in 0..D {
                 let at = load(vectors, &self.at[corner][a], group);
-                arms[a] = at - centre[a];
+                arms[a] = at - load(vectors, &self.centre[a], group);
                 let mut place = at;
                 for n in 0..GROUP {
                     place.lanes.0[n] -= place.lanes.0[n].floor();
@@ -140,20 +150,17 @@ impl<T: RealField + Copy, const D: usize> Corners<T, D> {
                 inertia[a][a] = inertia[a][a] + w * place * (zero.constant(1.0) - place);
             }
             for a in 0..D {
-                for b in 0..D {
+                for b in 0..=a {
                     inertia[a][b] = inertia[a][b] + w * (arms[a] * arms[b]);
                 }
             }
         }
-        let inverse = inverse(&inertia);
         for a in 0..D {
-            store(&mut self.centre[a], group, centre[a]);
-            for b in 0..D {
-                for n in 0..GROUP {
-                    self.inverse_inertia[group * GROUP + n][(a, b)] = inverse[a][b].lanes.0[n];
-                }
+            for b in a + 1..D {
+                inertia[a][b] = inertia[b][a];
             }
         }
+        inverse(&inertia)
     }
 
     /// P2G of the first `count` particles, to the band of nodes that starts at node `first`.
@@ -217,7 +224,7 @@ fn load<T: RealField + Copy, V: Vectors>(
 
 /// One number of each particle of a group.
 #[inline(always)]
-fn gather<T: RealField + Copy, V: Vectors>(
+pub(crate) fn gather<T: RealField + Copy, V: Vectors>(
     vectors: V,
     group: usize,
     number: impl Fn(usize) -> T,
@@ -232,7 +239,7 @@ fn gather<T: RealField + Copy, V: Vectors>(
 struct Parallelograms<'a, T, const D: usize> {
     corners: &'a mut Corners<T, D>,
     c: &'a Constants<T, D>,
-    half_edges: &'a [SMatrix<T, D, D>],
+    half_edges: &'a HalfEdges<T, D>,
     ids: &'a [usize; BLOCK],
     kinematics: Kinematics<'a, T, D>,
 }
@@ -240,32 +247,46 @@ struct Parallelograms<'a, T, const D: usize> {
 impl<T: RealField + Copy, const D: usize> Loop for Parallelograms<'_, T, D> {
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
-        let Self { corners, c, half_edges, ids, kinematics: Kinematics { x, F } } = self;
+        let Self { corners, c, half_edges, ids, kinematics } = self;
         for group in 0..BLOCK / GROUP {
-            let per_cell = Eight { lanes: vectors.splat8(c.inverse_spacing), vectors };
-            let mut xi = [per_cell; D];
-            let (mut of_F, mut own) = ([[per_cell; D]; D], [[per_cell; D]; D]);
-            for i in 0..D {
-                xi[i] = gather(vectors, group, |k| x[k][i] - c.lower[i]) * per_cell;
-                for j in 0..D {
-                    of_F[i][j] = gather(vectors, group, |k| F[k][(i, j)]);
-                    own[i][j] = gather(vectors, group, |k| half_edges[ids[k]][(i, j)]);
-                }
-            }
-            let E = deformed(&of_F, &own, per_cell);
+            let (xi, E) = parallelograms(vectors, c, half_edges, ids, kinematics, group);
             let (w, slopes) = slopes_of_parallelogram(&E);
+            let mut at = [xi; MOST_CORNERS];
+            let mut shares = Shares { w: [w; MOST_CORNERS], g: at };
             for corner in 0..1 << D {
-                let at = corner_of_parallelogram(&xi, &E, corner);
-                let g = corner_of_parallelogram(&[w.constant(0.0); D], &slopes, corner);
-                store(&mut corners.w[corner], group, w);
-                for a in 0..D {
-                    store(&mut corners.at[corner][a], group, at[a]);
-                    store(&mut corners.g[corner][a], group, g[a]);
-                }
+                at[corner] = corner_of_parallelogram(&xi, &E, corner);
+                let none = [w.constant(0.0); D];
+                shares.g[corner] = corner_of_parallelogram(&none, &slopes, corner);
             }
-            corners.find_first_nodes(vectors, c, group);
+            corners.take(vectors, c, group, &at, &shares);
         }
     }
+}
+
+/// Centres and half-edges `E[axis][edge]` of the domains of a group of particles, in cells.
+#[inline(always)]
+pub(crate) fn parallelograms<T: RealField + Copy, V: Vectors, const D: usize>(
+    vectors: V,
+    c: &Constants<T, D>,
+    half_edges: &HalfEdges<T, D>,
+    ids: &[usize; BLOCK],
+    Kinematics { x, F }: Kinematics<'_, T, D>,
+    group: usize,
+) -> ([Eight<T, V>; D], [[Eight<T, V>; D]; D]) {
+    let per_cell = Eight { lanes: vectors.splat8(c.inverse_spacing), vectors };
+    let mut xi = [per_cell; D];
+    let (mut of_F, mut own) = ([[per_cell; D]; D], [[per_cell; D]; D]);
+    for i in 0..D {
+        xi[i] = gather(vectors, group, |k| x[k][i] - c.lower[i]) * per_cell;
+        for j in 0..D {
+            of_F[i][j] = gather(vectors, group, |k| F[k][(i, j)]);
+            own[i][j] = match half_edges {
+                HalfEdges::Same(E) => Eight { lanes: vectors.splat8(E[(i, j)]), vectors },
+                HalfEdges::Each(E) => gather(vectors, group, |k| E[ids[k]][(i, j)]),
+            };
+        }
+    }
+    (xi, deformed(&of_F, &own, per_cell))
 }
 
 struct Cells<'a, T, const D: usize> {
@@ -278,28 +299,33 @@ struct Cells<'a, T, const D: usize> {
 impl<T: RealField + Copy, const D: usize> Loop for Cells<'_, T, D> {
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
-        let Self { corners, c, mesh: Mesh { x, corners: of_particles, .. }, ids } = self;
+        let Self { corners, c, mesh, ids } = self;
         for group in 0..BLOCK / GROUP {
-            let per_cell = Eight { lanes: vectors.splat8(c.inverse_spacing), vectors };
-            let mut xi = [[per_cell; D]; MOST_CORNERS];
-            for corner in 0..1 << D {
-                for a in 0..D {
-                    let at = |k: usize| x[of_particles[ids[k]][corner]][a] - c.lower[a];
-                    let place = gather(vectors, group, at);
-                    xi[corner][a] = place * per_cell;
-                }
-            }
-            let (shares, _) = shares_of_cell(&xi);
-            for corner in 0..1 << D {
-                store(&mut corners.w[corner], group, shares.w[corner]);
-                for a in 0..D {
-                    store(&mut corners.at[corner][a], group, xi[corner][a]);
-                    store(&mut corners.g[corner][a], group, shares.g[corner][a]);
-                }
-            }
-            corners.find_first_nodes(vectors, c, group);
+            let at = cells(vectors, c, mesh, ids, group);
+            let (shares, _) = shares_of_cell(&at);
+            corners.take(vectors, c, group, &at, &shares);
         }
     }
+}
+
+/// The corners of the domains of a group of particles, in cells from the lower corner of the grid.
+#[inline(always)]
+pub(crate) fn cells<T: RealField + Copy, V: Vectors, const D: usize>(
+    vectors: V,
+    c: &Constants<T, D>,
+    Mesh { x, corners, .. }: &Mesh<T, D>,
+    ids: &[usize; BLOCK],
+    group: usize,
+) -> [[Eight<T, V>; D]; MOST_CORNERS] {
+    let per_cell = Eight { lanes: vectors.splat8(c.inverse_spacing), vectors };
+    let mut xi = [[per_cell; D]; MOST_CORNERS];
+    for corner in 0..1 << D {
+        for a in 0..D {
+            let at = |k: usize| x[corners[ids[k]][corner] as usize][a] - c.lower[a];
+            xi[corner][a] = gather(vectors, group, at) * per_cell;
+        }
+    }
+    xi
 }
 
 /// The weights of a group of particles with small domains at the nodes that they reach, axis 0 fastest; `[node].0[n]` is of the
@@ -509,14 +535,31 @@ impl<T: RealField + Copy, const D: usize, const AFFINE: bool> Loop for G2p<'_, T
         let mut weights = GroupWeights::<T, D>::zero();
         for group in 0..count.div_ceil(GROUP) {
             weights.compute(vectors, corners, group);
+            let mut inverse_inertia = [[Lane8::zero(); D]; D];
+            if AFFINE {
+                let inverse = corners.inverse_inertia(vectors, group);
+                for a in 0..D {
+                    for b in 0..D {
+                        inverse_inertia[a][b] = inverse[a][b].lanes;
+                    }
+                }
+            }
             for n in 0..GROUP.min(count - group * GROUP) {
                 let k = group * GROUP + n;
+                let mut inverse = SMatrix::zeros();
+                if AFFINE {
+                    for a in 0..D {
+                        for b in 0..D {
+                            inverse[(a, b)] = inverse_inertia[a][b].0[n];
+                        }
+                    }
+                }
                 if !corners.is_small[k] {
-                    receiver[k] = g2p_from_corners::<T, D, AFFINE>(corners, strides, nodes, k);
+                    let sums = g2p_from_corners::<T, D, AFFINE>(corners, strides, nodes, k);
+                    receiver[k] = sums.interpolated(AFFINE, &inverse);
                     continue;
                 }
-                let (mut value, mut gradients) = (Lane8::zero(), [Lane8::zero(); D]);
-                let mut moments = [Lane8::zero(); D];
+                let Sums { mut value, mut gradients, mut moments } = Sums::zero();
                 for row in 0..weights.rows() {
                     let place = weights.place(row);
                     let start =
@@ -549,7 +592,7 @@ impl<T: RealField + Copy, const D: usize, const AFFINE: bool> Loop for G2p<'_, T
                         }
                     }
                 }
-                receiver[k] = corners.interpolated(k, AFFINE, value, &gradients, &moments);
+                receiver[k] = Sums { value, gradients, moments }.interpolated(AFFINE, &inverse);
             }
         }
     }
@@ -593,28 +636,43 @@ impl<T: RealField + Copy, const D: usize> Corners<T, D> {
     fn arm(&self, k: usize, axis: usize, place: usize) -> T {
         real::<T>(place as f64) - self.centre[axis][k / GROUP].0[k % GROUP]
     }
+}
 
-    /// The result of G2P from its sums.
+/// The sums of G2P over nodes, with all numbers of a node.
+struct Sums<T, const D: usize> {
+    value: Lane8<T>,
+    gradients: [Lane8<T>; D],
+    /// Of the values times the arms along each axis.
+    moments: [Lane8<T>; D],
+}
+
+impl<T: RealField + Copy, const D: usize> Sums<T, D> {
+    #[inline(always)]
+    fn zero() -> Self {
+        let zero = Lane8::zero();
+        Self { value: zero, gradients: [zero; D], moments: [zero; D] }
+    }
+
+    /// The result, with the inverse of the inertia where there are affine velocities.
     #[inline(always)]
     fn interpolated(
         &self,
-        k: usize,
         is_affine: bool,
-        value: Lane8<T>,
-        gradients: &[Lane8<T>; D],
-        moments: &[Lane8<T>; D],
+        inverse_inertia: &SMatrix<T, D, D>,
     ) -> Interpolated<T, D> {
-        let mut affine = SMatrix::zeros();
+        let mut own = Interpolated::zero();
+        let mut moments = SMatrix::zeros();
+        for i in 0..D {
+            (own.velocity[i], own.second[i]) = (self.value.0[i], self.value.0[D + i]);
+            for j in 0..D {
+                own.velocity_gradient[(i, j)] = self.gradients[j].0[i];
+                moments[(i, j)] = self.moments[j].0[D + i];
+            }
+        }
         if is_affine {
-            let moments = SMatrix::from_fn(|i, j| moments[j].0[D + i]);
-            affine = product(&moments, &self.inverse_inertia[k]);
+            own.affine = product(&moments, inverse_inertia);
         }
-        Interpolated {
-            velocity: SVector::from_fn(|i, _| value.0[i]),
-            second: SVector::from_fn(|i, _| value.0[D + i]),
-            velocity_gradient: SMatrix::from_fn(|i, j| gradients[j].0[i]),
-            affine,
-        }
+        own
     }
 }
 
@@ -657,10 +715,9 @@ fn g2p_from_corners<T: RealField + Copy, const D: usize, const AFFINE: bool>(
     strides: &[usize; D],
     nodes: &[Node<T, D>],
     k: usize,
-) -> Interpolated<T, D> {
+) -> Sums<T, D> {
     let start = corners.first_node[k];
-    let (mut value, mut gradients) = (Lane8::zero(), [Lane8::zero(); D]);
-    let mut moments = [Lane8::zero(); D];
+    let Sums { mut value, mut gradients, mut moments } = Sums::zero();
     corners.for_nodes(strides, k, |Place { corner, node, hat, arm }| {
         let Some(Node { values }) = nodes.get(start + node) else {
             debug_assert!(false, "a corner beyond the grid");
@@ -677,7 +734,7 @@ fn g2p_from_corners<T: RealField + Copy, const D: usize, const AFFINE: bool>(
             }
         }
     });
-    corners.interpolated(k, AFFINE, value, &gradients, &moments)
+    Sums { value, gradients, moments }
 }
 
 /// The velocity of the grid at a point.

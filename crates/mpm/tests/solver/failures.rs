@@ -311,7 +311,7 @@ fn a_domain_that_grows_too_wide_is_named_with_its_size() {
             let of = |k: usize| match (shape, run.mesh()) {
                 (Shape::Gimp, _) => p.F[k][(axis, axis)] * 0.0625,
                 (_, Some(mesh)) => {
-                    let away = |&c: &usize| (mesh.x[c] - p.x[k])[axis].abs();
+                    let away = |&c: &u32| (mesh.x[c as usize] - p.x[k])[axis].abs();
                     mesh.corners[k][..1 << D].iter().map(away).fold(0.0, f64::max)
                 }
                 _ => p.F[k].row(axis).iter().map(|F| F.abs()).sum::<f64>() * 0.0625,
@@ -559,9 +559,9 @@ fn domains_between_corners_are_admitted_up_to_the_limits() {
             let mesh = body.mesh.as_mut().unwrap();
             // A domain that shares no corner.
             let corners = &mut mesh.corners[particle][..1 << D];
-            let own: Vec<_> = corners.iter().map(|&k| mesh.X[k]).collect();
+            let own: Vec<_> = corners.iter().map(|&k| mesh.X[k as usize]).collect();
             let first = mesh.X.len();
-            corners.iter_mut().enumerate().for_each(|(k, corner)| *corner = first + k);
+            corners.iter_mut().zip(first as u32..).for_each(|(corner, k)| *corner = k);
             mesh.X.extend(&own);
             mesh.x.extend(&own);
             change(&mut mesh.x[first..]);

@@ -91,7 +91,7 @@ fn a_wall_is_a_mirror() {
                             mesh.x.push(reflect * (corner + moved));
                         }
                         // Counter-clockwise in the image, too.
-                        let mut corners = [0, 1, 2, 3, 0, 0, 0, 0].map(|k| first + k);
+                        let mut corners = [0, 1, 2, 3, 0, 0, 0, 0].map(|k| first as u32 + k);
                         if side < 0.0 {
                             corners[..4].reverse();
                         }
@@ -214,7 +214,7 @@ fn a_body_flies_straight_past_another_through_the_bands() {
         };
         let (mut body, flying) = (part(0.0..64.0, 18.0..22.0), part(70.0..134.0, 6.0..10.0));
         let mesh = body.mesh.as_mut().unwrap();
-        let (first, other) = (mesh.X.len(), flying.mesh.unwrap());
+        let (first, other) = (mesh.X.len() as u32, flying.mesh.unwrap());
         mesh.corners.extend(other.corners.iter().map(|corners| corners.map(|k| first + k)));
         mesh.X.extend(other.X);
         mesh.x.extend(other.x);

@@ -1,0 +1,570 @@
+//! Weights that are products over the axes, of blocks of 64 particles: one lane a particle. P2G and G2P with them.
+
+use std::marker::PhantomData;
+
+use nalgebra::{RealField, SMatrix, SVector};
+
+use crate::fault::{Fault, Planted};
+use crate::geometry::Constants;
+use crate::kernel::any::{Contributions, Interpolated, Receive, g2p, p2g};
+use crate::kernel::block::{BLOCK, Kinematics};
+use crate::kernel::lanes_plane::{g2p_in_plane, p2g_in_plane};
+use crate::kernel::lanes_space::{g2p_in_space, p2g_in_space};
+use crate::node::Node;
+use crate::shape_function::{
+    CubicSpline, Gimp, HalfSizes, Hat, OnAxis, ProductShape, QuadraticSpline, ShapeFunction, index,
+    moment,
+};
+use crate::simd::{Loop, Vectors, dispatch};
+use crate::tensor::real;
+use crate::weights::{ExtendedWeights, Weights, is_middle};
+
+/// One number for every particle of a block.
+type PerParticle<T> = [T; BLOCK];
+
+/// Numbers of every particle at each of its nodes along each axis.
+type AtNodes<T, const D: usize> = [[PerParticle<T>; MOST_NODES]; D];
+
+/// Nodes along an axis of the widest shape function.
+const MOST_NODES: usize = 4;
+
+/// The weights of up to `BLOCK` particles.
+///
+/// Layout: `S[axis][place][k]` is the factor of particle `k` along an axis at its node `place`.
+pub(crate) struct ProductWeights<T, const D: usize> {
+    /// Nodes along each axis: 2, 3 or 4.
+    width: usize,
+    /// Whether there are affine velocities (APIC).
+    is_affine: bool,
+    /// Index of the first node of every particle.
+    first_node: [usize; BLOCK],
+    /// Weights `S[axis][place][k]`, except for the [middle node](is_middle).
+    S: AtNodes<T, D>,
+    /// Gradients per cell, in the same layout.
+    G: AtNodes<T, D>,
+    /// Weights times arms in cells, in the same layout; valid where `is_affine`.
+    Z: AtNodes<T, D>,
+    /// One over the inertia along each axis; valid where `is_affine`.
+    inverse_inertia: [PerParticle<T>; D],
+    /// Whether any particle's box has extended support.
+    any_extended: bool,
+    /// Half-size beyond which it is.
+    extended_above: T,
+    /// Positions in cells from the lower corner, `xi[axis][k]`; valid where `any_extended`.
+    xi: [PerParticle<T>; D],
+    /// Half-sizes in cells, `l[axis][k]`; valid where `any_extended`.
+    l: [PerParticle<T>; D],
+}
+
+impl<T: RealField + Copy, const D: usize> ProductWeights<T, D> {
+    pub(crate) fn new(shape: &ProductShape<T, D>, is_affine: bool) -> Self {
+        let zero = [T::zero(); BLOCK];
+        Self {
+            width: shape.width(),
+            is_affine,
+            first_node: [0; BLOCK],
+            S: [[zero; MOST_NODES]; D],
+            G: [[zero; MOST_NODES]; D],
+            Z: [[zero; MOST_NODES]; D],
+            inverse_inertia: [zero; D],
+            any_extended: false,
+            extended_above: shape.extended_above(),
+            xi: [zero; D],
+            l: [zero; D],
+        }
+    }
+
+    pub(crate) fn compute(
+        &mut self,
+        c: &Constants<T, D>,
+        shape: &ProductShape<T, D>,
+        kinematics: Kinematics<'_, T, D>,
+    ) {
+        let half_sizes = &shape.half_sizes;
+        match shape.on_axis {
+            OnAxis::Hat => self.compute_on_axes::<Hat, 2>(c, half_sizes, kinematics),
+            OnAxis::Gimp => self.compute_on_axes::<Gimp, 3>(c, half_sizes, kinematics),
+            OnAxis::Quadratic => {
+                self.compute_on_axes::<QuadraticSpline, 3>(c, half_sizes, kinematics);
+            }
+            OnAxis::Cubic => self.compute_on_axes::<CubicSpline, 4>(c, half_sizes, kinematics),
+        }
+        if self.any_extended {
+            for k in 0..BLOCK {
+                let xi = c.in_cells(&kinematics.x[k]);
+                for a in 0..D {
+                    self.xi[a][k] = xi[a];
+                    self.l[a][k] = half_sizes.along(a, stretch(c.planted, &kinematics.F[k], a));
+                }
+            }
+        }
+    }
+
+    fn compute_on_axes<R: ShapeFunction<W>, const W: usize>(
+        &mut self,
+        c: &Constants<T, D>,
+        half_sizes: &HalfSizes<T, D>,
+        kinematics: Kinematics<'_, T, D>,
+    ) {
+        let on_axis = PhantomData::<R>;
+        dispatch(ComputeWeights { weights: self, c, kinematics, half_sizes, on_axis });
+        if self.is_affine {
+            dispatch(ComputeMoments { weights: self, c, kinematics, half_sizes, on_axis });
+        }
+    }
+
+    /// A planted fault: particles in the last cell of an axis skip the last node they reach along it.
+    pub(crate) fn skip_last_node(&mut self, c: &Constants<T, D>, x: &[SVector<T, D>; BLOCK]) {
+        let upper = c.upper_in_cells();
+        let last = self.width - 1;
+        for (k, x) in x.iter().enumerate() {
+            let xi = c.in_cells(x);
+            for a in (0..D).filter(|&a| xi[a] >= upper[a] - T::one()) {
+                (self.S[a][last][k], self.G[a][last][k]) = (T::zero(), T::zero());
+            }
+        }
+    }
+
+    /// P2G of the first `count` particles, to the band of nodes that starts at node `first`.
+    pub(crate) fn p2g(
+        &self,
+        strides: &[usize; D],
+        band: &mut [Node<T, D>],
+        first: usize,
+        contributions: &Contributions<T, D, BLOCK>,
+        count: usize,
+    ) {
+        let of_block = P2gOfBlock { weights: self, strides, band, first, contributions, count };
+        match (self.width, self.is_affine) {
+            (2, false) => dispatch(P2g::<_, D, 2, false>(of_block)),
+            (3, false) => dispatch(P2g::<_, D, 3, false>(of_block)),
+            (_, false) => dispatch(P2g::<_, D, 4, false>(of_block)),
+            (2, true) => dispatch(P2g::<_, D, 2, true>(of_block)),
+            (3, true) => dispatch(P2g::<_, D, 3, true>(of_block)),
+            (_, true) => dispatch(P2g::<_, D, 4, true>(of_block)),
+        }
+    }
+
+    /// G2P of the first `count` particles without affine velocities, to a receiver that is compiled into the kernel.
+    pub(crate) fn g2p_with(
+        &self,
+        strides: &[usize; D],
+        nodes: &[Node<T, D>],
+        count: usize,
+        receiver: impl Receive<T, D>,
+    ) {
+        let of_block = G2pOfBlock { weights: self, strides, nodes, count, receiver };
+        match self.width {
+            2 => dispatch(G2p::<_, _, D, 2, false>(of_block)),
+            3 => dispatch(G2p::<_, _, D, 3, false>(of_block)),
+            _ => dispatch(G2p::<_, _, D, 4, false>(of_block)),
+        }
+    }
+
+    /// G2P of the first particles, as many as `receiver` has places.
+    pub(crate) fn g2p(
+        &self,
+        strides: &[usize; D],
+        nodes: &[Node<T, D>],
+        receiver: &mut [Interpolated<T, D>],
+    ) {
+        let count = receiver.len();
+        if !self.is_affine {
+            self.g2p_with(strides, nodes, count, receiver);
+            return;
+        }
+        let of_block = G2pOfBlock { weights: self, strides, nodes, count, receiver };
+        match self.width {
+            2 => dispatch(G2p::<_, _, D, 2, true>(of_block)),
+            3 => dispatch(G2p::<_, _, D, 3, true>(of_block)),
+            _ => dispatch(G2p::<_, _, D, 4, true>(of_block)),
+        }
+    }
+
+    /// Position and half-sizes of a particle whose box has extended support.
+    #[inline(always)]
+    fn extended(&self, k: usize) -> Option<([T; D], [T; D])> {
+        if !self.any_extended {
+            return None;
+        }
+        let (mut xi, mut l, mut is_extended) = ([T::zero(); D], [T::zero(); D], false);
+        for a in 0..D {
+            (xi[a], l[a]) = (self.xi[a][k], self.l[a][k]);
+            is_extended |= l[a] > self.extended_above;
+        }
+        is_extended.then_some((xi, l))
+    }
+}
+
+/// The weights of particle `k` of a block.
+struct ParticleWeights<'a, T, const D: usize, const W: usize, const AFFINE: bool> {
+    weights: &'a ProductWeights<T, D>,
+    k: usize,
+}
+
+impl<T: RealField + Copy, const D: usize, const W: usize, const AFFINE: bool> Weights<T, D, W>
+    for ParticleWeights<'_, T, D, W, AFFINE>
+{
+    const AFFINE: bool = AFFINE;
+
+    #[inline(always)]
+    fn first_node(&self) -> usize {
+        self.weights.first_node[self.k]
+    }
+
+    #[inline(always)]
+    fn S(&self, axis: usize, place: usize) -> T {
+        let S = &self.weights.S[axis];
+        if is_middle::<W>(place) {
+            return T::one() - S[place - 1][self.k] - S[place + 1][self.k];
+        }
+        S[place][self.k]
+    }
+
+    #[inline(always)]
+    fn G(&self, axis: usize, place: usize) -> T {
+        let G = &self.weights.G[axis];
+        if is_middle::<W>(place) {
+            return -G[place - 1][self.k] - G[place + 1][self.k];
+        }
+        G[place][self.k]
+    }
+
+    #[inline(always)]
+    fn Z(&self, axis: usize, place: usize) -> T {
+        let Z = &self.weights.Z[axis];
+        if is_middle::<W>(place) {
+            return -Z[place - 1][self.k] - Z[place + 1][self.k];
+        }
+        Z[place][self.k]
+    }
+
+    #[inline(always)]
+    fn affine(
+        &self,
+        mut moments: SMatrix<T, D, D>,
+        gradient: &SMatrix<T, D, D>,
+    ) -> SMatrix<T, D, D> {
+        // For hat functions at a point the inertia may vanish, and the quotient is the gradient.
+        if W == 2 {
+            return *gradient;
+        }
+        for a in 0..D {
+            for i in 0..D {
+                moments[(i, a)] *= self.weights.inverse_inertia[a][self.k];
+            }
+        }
+        moments
+    }
+}
+
+/// `F_aa` of a particle, which scales its box.
+#[inline(always)]
+fn stretch<T: RealField + Copy, const D: usize>(
+    planted: Planted,
+    F: &SMatrix<T, D, D>,
+    a: usize,
+) -> T {
+    if planted.is(Fault::SizeFromJacobian) {
+        let J = (0..D).fold(T::one(), |product, i| product * F[(i, i)]);
+        return J.powf(real(1.0 / D as f64));
+    }
+    F[(a, a)]
+}
+
+struct ComputeWeights<'a, T, R, const D: usize, const W: usize> {
+    weights: &'a mut ProductWeights<T, D>,
+    c: &'a Constants<T, D>,
+    kinematics: Kinematics<'a, T, D>,
+    half_sizes: &'a HalfSizes<T, D>,
+    on_axis: PhantomData<R>,
+}
+
+impl<T, R, const D: usize, const W: usize> Loop for ComputeWeights<'_, T, R, D, W>
+where
+    T: RealField + Copy,
+    R: ShapeFunction<W>,
+{
+    #[inline(always)]
+    fn run<V: Vectors>(self, _: V) {
+        let Self { weights, c, kinematics, half_sizes, .. } = self;
+        let ProductWeights { first_node, S, G, extended_above, .. } = weights;
+        let half_sizes = (half_sizes, *extended_above);
+        weights.any_extended =
+            compute_weights::<T, R, D, W>(c, half_sizes, kinematics, first_node, S, G);
+    }
+}
+
+/// Computes weights times arms, and one over the inertia.
+struct ComputeMoments<'a, T, R, const D: usize, const W: usize> {
+    weights: &'a mut ProductWeights<T, D>,
+    c: &'a Constants<T, D>,
+    kinematics: Kinematics<'a, T, D>,
+    half_sizes: &'a HalfSizes<T, D>,
+    on_axis: PhantomData<R>,
+}
+
+impl<T, R, const D: usize, const W: usize> Loop for ComputeMoments<'_, T, R, D, W>
+where
+    T: RealField + Copy,
+    R: ShapeFunction<W>,
+{
+    #[inline(always)]
+    fn run<V: Vectors>(self, _: V) {
+        let Self { weights, c, kinematics, half_sizes, .. } = self;
+        let ProductWeights { Z, inverse_inertia, .. } = weights;
+        compute_moments::<T, R, D, W>(c, half_sizes, kinematics, Z, inverse_inertia);
+    }
+}
+
+/// Computes weights; returns whether any box has extended support. A function of its own tells the compiler that the arrays
+/// do not overlap.
+#[inline(always)]
+fn compute_weights<T, R, const D: usize, const W: usize>(
+    c: &Constants<T, D>,
+    (half_sizes, extended_above): (&HalfSizes<T, D>, T),
+    Kinematics { x, F }: Kinematics<'_, T, D>,
+    first_node: &mut [usize; BLOCK],
+    S: &mut AtNodes<T, D>,
+    G: &mut AtNodes<T, D>,
+) -> bool
+where
+    T: RealField + Copy,
+    R: ShapeFunction<W>,
+{
+    let mut any_extended = false;
+    for k in 0..BLOCK {
+        let xi = c.in_cells(&x[k]);
+        let mut first = 0.0;
+        for a in 0..D {
+            let l = half_sizes.along(a, stretch(c.planted, &F[k], a));
+            any_extended |= l > extended_above;
+            let weights = R::axis_weights(xi[a], l);
+            first += weights.base * c.strides[a] as f64;
+            for i in 0..W {
+                if !is_middle::<W>(i) {
+                    S[a][i][k] = weights.S[i];
+                    G[a][i][k] = weights.G[i];
+                }
+            }
+        }
+        first_node[k] = index(first);
+    }
+    any_extended
+}
+
+#[inline(always)]
+fn compute_moments<T, R, const D: usize, const W: usize>(
+    c: &Constants<T, D>,
+    half_sizes: &HalfSizes<T, D>,
+    Kinematics { x, F }: Kinematics<'_, T, D>,
+    Z: &mut AtNodes<T, D>,
+    inverse_inertia: &mut [PerParticle<T>; D],
+) where
+    T: RealField + Copy,
+    R: ShapeFunction<W>,
+{
+    for k in 0..BLOCK {
+        let xi = c.in_cells(&x[k]);
+        for a in 0..D {
+            let weights = R::axis_weights(xi[a], half_sizes.along(a, stretch(c.planted, &F[k], a)));
+            let place = weights.after_first(xi[a]);
+            for i in 0..W {
+                if !is_middle::<W>(i) {
+                    Z[a][i][k] = weights.S[i] * (real::<T>(i as f64) - place);
+                }
+            }
+            inverse_inertia[a][k] = moment(&weights.S, place).recip();
+        }
+    }
+}
+
+struct P2g<'a, T, const D: usize, const W: usize, const AFFINE: bool>(P2gOfBlock<'a, T, D>);
+
+struct P2gOfBlock<'a, T, const D: usize> {
+    weights: &'a ProductWeights<T, D>,
+    strides: &'a [usize; D],
+    band: &'a mut [Node<T, D>],
+    first: usize,
+    contributions: &'a Contributions<T, D, BLOCK>,
+    count: usize,
+}
+
+impl<T: RealField + Copy, const D: usize, const W: usize, const AFFINE: bool> Loop
+    for P2g<'_, T, D, W, AFFINE>
+{
+    #[inline(always)]
+    fn run<V: Vectors>(self, vectors: V) {
+        let Self(P2gOfBlock { weights, strides, band, first, contributions, count }) = self;
+        let count = count.min(BLOCK);
+        let of_particle = |k| ParticleWeights::<T, D, W, AFFINE> { weights, k };
+        if D <= 2 && !weights.any_extended {
+            p2g_in_plane(vectors, of_particle, strides, band, first, contributions, count);
+            return;
+        }
+        for k in 0..count {
+            let given = (contributions, k);
+            if let Some((xi, l)) = weights.extended(k) {
+                p2g_extended::<T, D, AFFINE>(&xi, &l, strides, band, first, given);
+            } else if D == 3 {
+                p2g_in_space(vectors, &of_particle(k), strides, band, first, given);
+            } else {
+                p2g(&of_particle(k), strides, band, first, given);
+            }
+        }
+    }
+}
+
+#[inline(never)]
+fn p2g_extended<T: RealField + Copy, const D: usize, const AFFINE: bool>(
+    xi: &[T; D],
+    l: &[T; D],
+    strides: &[usize; D],
+    band: &mut [Node<T, D>],
+    first: usize,
+    contribution: (&Contributions<T, D, BLOCK>, usize),
+) {
+    let weights = ExtendedWeights::<T, D, AFFINE>::new(xi, l, strides);
+    p2g(&weights, strides, band, first, contribution);
+}
+
+struct G2p<'a, T, A, const D: usize, const W: usize, const AFFINE: bool>(G2pOfBlock<'a, T, A, D>);
+
+struct G2pOfBlock<'a, T, A, const D: usize> {
+    weights: &'a ProductWeights<T, D>,
+    strides: &'a [usize; D],
+    nodes: &'a [Node<T, D>],
+    count: usize,
+    receiver: A,
+}
+
+impl<T, A, const D: usize, const W: usize, const AFFINE: bool> Loop for G2p<'_, T, A, D, W, AFFINE>
+where
+    T: RealField + Copy,
+    A: Receive<T, D>,
+{
+    #[inline(always)]
+    fn run<V: Vectors>(self, vectors: V) {
+        let Self(G2pOfBlock { weights, strides, nodes, count, mut receiver }) = self;
+        let count = count.min(BLOCK);
+        let of_particle = |k| ParticleWeights::<T, D, W, AFFINE> { weights, k };
+        if D <= 2 && !weights.any_extended {
+            g2p_in_plane(vectors, of_particle, strides, nodes, count, &mut receiver);
+            return;
+        }
+        for k in 0..count {
+            let interpolated = match weights.extended(k) {
+                Some((xi, l)) => g2p_extended::<T, D, AFFINE>(&xi, &l, strides, nodes),
+                None if D == 3 => g2p_in_space(vectors, &of_particle(k), strides, nodes),
+                None => g2p(&of_particle(k), strides, nodes),
+            };
+            receiver.receive(k, &interpolated);
+        }
+    }
+}
+
+#[inline(never)]
+fn g2p_extended<T: RealField + Copy, const D: usize, const AFFINE: bool>(
+    xi: &[T; D],
+    l: &[T; D],
+    strides: &[usize; D],
+    nodes: &[Node<T, D>],
+) -> Interpolated<T, D> {
+    g2p(&ExtendedWeights::<T, D, AFFINE>::new(xi, l, strides), strides, nodes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::array;
+
+    use crate::Grid;
+    use crate::grid::Layout;
+    use crate::parallel::bins::Bins;
+
+    fn constants<const D: usize>() -> (Constants<f64, D>, usize) {
+        let grid =
+            Grid { lower: SVector::zeros(), spacing: 0.5, cells: [8; D], walls: [[false; 2]; D] };
+        let layout = Layout::new(&grid, 8).unwrap();
+        let bins = Bins::new(&layout, 1);
+        (Constants::new(&grid, &layout, &bins, 0.1, 1.0), layout.nodes)
+    }
+
+    fn noise(seed: usize) -> f64 {
+        (seed as f64 * 12.9898).sin()
+    }
+
+    /// Boxes may grow and shrink again from one time that a block is used to the next.
+    #[test]
+    fn particles_of_a_block_exchange_what_their_boxes_cover_however_many_have_extended_support() {
+        fn check<const D: usize, const AFFINE: bool>() {
+            let (c, nodes) = constants::<D>();
+            let reference = SVector::repeat(0.25);
+            let shape = ProductShape::gimp(reference);
+            let x: [_; BLOCK] =
+                array::from_fn(|k| SVector::from_fn(|a, _| 2.0 + 1.2 * noise(5 * k + a)));
+            let grid: Vec<Node<f64, D>> = (0..nodes)
+                .map(|n| Node { values: array::from_fn(|q| noise(8 * n + q + 1000)) })
+                .collect();
+            let mut contributions = Contributions::<f64, D, BLOCK>::zero();
+            for k in 0..BLOCK {
+                let of = |from: usize| SVector::from_fn(|a, _| noise(3 * k + a + from));
+                contributions.value[k] = Node::new(&of(50), &of(700), 1.0 + 0.5 * noise(k));
+                contributions.stress_flux[k] =
+                    SMatrix::from_fn(|i, j| noise(9 * k + 3 * i + j + 2000));
+                contributions.affine[k] = SMatrix::from_fn(|i, j| noise(7 * k + 3 * i + j + 3000));
+            }
+            let mut block = ProductWeights::new(&shape, AFFINE);
+            for extended in [vec![], vec![0], vec![5, BLOCK - 1], (0..BLOCK).collect(), vec![]] {
+                let F: [SMatrix<f64, D, D>; BLOCK] = array::from_fn(|k| {
+                    let mut F = SMatrix::identity();
+                    if extended.contains(&k) {
+                        F[(k % D, k % D)] = 3.0 + noise(k);
+                    }
+                    F
+                });
+                block.compute(&c, &shape, Kinematics { x: &x, F: &F });
+                let exact = |k: usize| {
+                    let l = array::from_fn(|a| reference[a] * F[k][(a, a)]);
+                    ExtendedWeights::<_, D, AFFINE>::new(&c.in_cells(&x[k]), &l, &c.strides)
+                };
+                for count in [BLOCK, 41] {
+                    let mut interpolated = [Interpolated::zero(); BLOCK];
+                    block.g2p(&c.strides, &grid, &mut interpolated[..count]);
+                    for k in 0..count {
+                        let alone = g2p(&exact(k), &c.strides, &grid);
+                        let off = (interpolated[k].velocity - alone.velocity).amax();
+                        assert!(off < 1e-13, "{extended:?} {k} {off:e}");
+                        let off = (interpolated[k].second - alone.second).amax();
+                        assert!(off < 1e-13, "{extended:?} {k} {off:e}");
+                        let off =
+                            (interpolated[k].velocity_gradient - alone.velocity_gradient).amax();
+                        assert!(off < 1e-13, "{extended:?} {k} {off:e}");
+                        // Divided by an inertia of some hundredths of a cell.
+                        let off = (interpolated[k].affine - alone.affine).amax();
+                        assert!(off < 1e-11, "{extended:?} {k} {off:e}");
+                    }
+                    assert!(interpolated[count..].iter().all(|own| own.velocity.amax() == 0.0));
+
+                    let mut sums = vec![Node::zero(); nodes];
+                    let mut one_by_one = sums.clone();
+                    block.p2g(&c.strides, &mut sums, 0, &contributions, count);
+                    for k in 0..count {
+                        p2g(&exact(k), &c.strides, &mut one_by_one, 0, (&contributions, k));
+                    }
+                    for (a, b) in sums.iter().zip(&one_by_one) {
+                        for (a, b) in a.values.iter().zip(&b.values) {
+                            assert!((a - b).abs() < 1e-12, "{extended:?} {a} {b}");
+                        }
+                    }
+                }
+            }
+        }
+        check::<1, false>();
+        check::<2, false>();
+        check::<3, false>();
+        check::<1, true>();
+        check::<2, true>();
+        check::<3, true>();
+    }
+}
