@@ -8,7 +8,7 @@ use crate::body::Mesh;
 use crate::domain::{self, MOST_CORNERS, corner_of_parallelogram, volume_of_cell};
 use crate::geometry::Constants;
 use crate::kernel::block::{BLOCK, Kinematics};
-use crate::kernel::corners::{GROUP, REACHED, cells, gather, padded, parallelograms};
+use crate::kernel::corners::{GROUP, OfGroup, REACHED, cells, gather, padded, parallelograms};
 use crate::shape_function::{EXTENDED, HALF_SIZE_LIMIT, ProductShape, node_below};
 use crate::simd::{Eight, Loop, Vectors, dispatch};
 use crate::support::{HalfEdges, Rows, Support};
@@ -212,7 +212,7 @@ impl<T: RealField + Copy, const D: usize> Loop for CheckParallelograms<'_, '_, T
         let OfBlock { c, kinematics, count, .. } = of_block;
         let mut all = true;
         for group in 0..count.div_ceil(GROUP).min(BLOCK / GROUP) {
-            let (xi, E) = parallelograms(vectors, c, half_edges, ids, kinematics, group);
+            let OfGroup { xi, E } = parallelograms(vectors, c, half_edges, ids, kinematics, group);
             let mut corners = [xi; MOST_CORNERS];
             for (corner, at) in corners.iter_mut().enumerate().take(1 << D) {
                 *at = corner_of_parallelogram(&xi, &E, corner);

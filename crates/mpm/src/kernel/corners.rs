@@ -249,7 +249,7 @@ impl<T: RealField + Copy, const D: usize> Loop for Parallelograms<'_, T, D> {
     fn run<V: Vectors>(self, vectors: V) {
         let Self { corners, c, half_edges, ids, kinematics } = self;
         for group in 0..BLOCK / GROUP {
-            let (xi, E) = parallelograms(vectors, c, half_edges, ids, kinematics, group);
+            let OfGroup { xi, E } = parallelograms(vectors, c, half_edges, ids, kinematics, group);
             let (w, slopes) = slopes_of_parallelogram(&E);
             let mut at = [xi; MOST_CORNERS];
             let mut shares = Shares { w: [w; MOST_CORNERS], g: at };
@@ -263,7 +263,13 @@ impl<T: RealField + Copy, const D: usize> Loop for Parallelograms<'_, T, D> {
     }
 }
 
-/// Centres and half-edges `E[axis][edge]` of the domains of a group of particles, in cells.
+/// Centres and half-edges `E[axis][edge]` of the parallelograms of a group of particles, in cells.
+pub(crate) struct OfGroup<T, V, const D: usize> {
+    pub(crate) xi: [Eight<T, V>; D],
+    pub(crate) E: [[Eight<T, V>; D]; D],
+}
+
+/// The parallelograms that F makes of those with these half-edges.
 #[inline(always)]
 pub(crate) fn parallelograms<T: RealField + Copy, V: Vectors, const D: usize>(
     vectors: V,
@@ -272,7 +278,7 @@ pub(crate) fn parallelograms<T: RealField + Copy, V: Vectors, const D: usize>(
     ids: &[usize; BLOCK],
     Kinematics { x, F }: Kinematics<'_, T, D>,
     group: usize,
-) -> ([Eight<T, V>; D], [[Eight<T, V>; D]; D]) {
+) -> OfGroup<T, V, D> {
     let per_cell = Eight { lanes: vectors.splat8(c.inverse_spacing), vectors };
     let mut xi = [per_cell; D];
     let (mut of_F, mut own) = ([[per_cell; D]; D], [[per_cell; D]; D]);
@@ -286,7 +292,7 @@ pub(crate) fn parallelograms<T: RealField + Copy, V: Vectors, const D: usize>(
             };
         }
     }
-    (xi, deformed(&of_F, &own, per_cell))
+    OfGroup { xi, E: deformed(&of_F, &own, per_cell) }
 }
 
 struct Cells<'a, T, const D: usize> {
