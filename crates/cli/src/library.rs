@@ -15,7 +15,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use anyhow::{Context, Result, bail};
 use mmsmith_interpret::{interpret_fields, interpret_fields_single};
 use mmsmith_prove::admissible_value;
-use mmsmith_solutions::{AnySolution, CATALOGUE, Description, Real, build};
+use mmsmith_solutions::{AnySolution, CATALOGUE, Description, Precision, build};
 use mmsmith_spec::{Fields, Parameter, Spec, nearest};
 use mmsmith_verify::{body_of, has_body};
 
@@ -318,7 +318,7 @@ impl Selection {
         }
     }
 
-    fn generated<T: Real>(&self, description: &Description) -> Result<AnySolution<T>> {
+    fn generated<T: Precision>(&self, description: &Description) -> Result<AnySolution<T>> {
         let pairs = self.parameters.iter().map(|(name, value)| (name.as_str(), *value));
         match build(description.name, &description.resolve(pairs)?) {
             Some(solution) => Ok(solution?),

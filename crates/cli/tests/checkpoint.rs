@@ -36,46 +36,87 @@ fn a_killed_run_goes_on_to_the_same_bits() {
         "axis-aligned --cells 24 --frame total --shape bspline3",
         "axis-aligned-3d --cells 4 --shape linear --integrator usl --history history.csv",
     ] {
-        let place = tempfile::tempdir().unwrap();
-        let place = place.path();
-        let called = mms(place, &format!("run {scheme} --json whole.json"));
-        assert_eq!(called.status, 0, "{scheme}: {}", called.stderr);
-        let whole = read_json(&place.join("whole.json"));
-        let frames = place.join("frames");
-        let files = |folder: &Path| -> Vec<(String, Vec<u8>)> {
-            let read = |name: String| (name.clone(), std::fs::read(folder.join(name)).unwrap());
-            names(folder).into_iter().map(read).collect()
-        };
-        let expected = frames.exists().then(|| files(&frames));
-        if expected.is_some() {
-            std::fs::remove_dir_all(&frames).unwrap();
-        }
-
-        // The result goes to a pipe that nobody reads, so that the run cannot end before it is killed.
-        let parts = place.join("parts.json");
-        command::pipe(&parts);
-        let kept = place.join("kept");
-        let steps = whole["result"]["steps"].as_u64().expect("a number");
-        let run = format!("run {scheme} --json parts.json --checkpoint kept --every 3");
-        for (call, step) in
-            [(run.as_str(), 3), ("resume kept", steps / 2), ("resume kept", steps - steps % 3)]
-        {
-            let mut run = UnderWay::start(place, call);
-            run.wait_for(|| reached(&kept) >= step);
-            run.kill();
-        }
-        std::fs::remove_file(&parts).unwrap();
-        let called = mms(place, "resume kept --threads 1");
-        assert_eq!(called.status, 0, "{scheme}: {}", called.stderr);
-        assert_eq!(result(&parts), result(&place.join("whole.json")), "{scheme}");
-        assert_eq!(read_json(&parts)["history"], whole["history"], "{scheme}");
-        if let Some(expected) = expected {
-            let left: Vec<_> =
-                files(&frames).into_iter().filter(|(name, _)| !name.ends_with(".tmp")).collect();
-            assert!(left == expected, "{scheme}: other particle files");
-        }
-        assert_eq!(names(&kept), ["checkpoint", "lock", "run.json"], "{scheme}");
+        is_killed_and_goes_on(scheme, &|steps| vec![3, steps / 2, steps - steps % 3]);
     }
+}
+
+/// Every shape function with every integrator and transfer, in turns of dimension, precision and threads, and the splines of the
+/// total Lagrangian formulation; each killed once.
+#[cfg(unix)]
+#[test]
+#[ignore = "minutes: .ci/long runs it"]
+fn a_killed_run_of_any_scheme_goes_on_to_the_same_bits() {
+    let solutions =
+        ["axis-aligned --cells 6", "axis-aligned-1d --cells 12", "axis-aligned-3d --cells 3"];
+    let mut schemes = Vec::new();
+    for shape in ["linear", "ugimp", "gimp", "bspline2", "bspline3", "cpdi", "cpdi2"] {
+        for integrator in ["usf", "usavg", "usl", "musl", "cd"] {
+            for transfer in ["flip", "pic", "apic", "xpic2", "xpic3"] {
+                let turn = schemes.len();
+                let solution = solutions[turn % 3];
+                let precision = ["f64", "f32"][turn / 3 % 2];
+                let threads = 1 + turn % 2;
+                schemes.push(format!(
+                    "{solution} --shape {shape} --integrator {integrator} --transfer {transfer} --precision {precision} \
+                     --threads {threads} --periods 0.5 --cfl 0.1"
+                ));
+            }
+        }
+    }
+    for degree in 2..=5 {
+        for mass in ["lumped", "consistent"] {
+            schemes.push(format!(
+                "axis-aligned --cells 8 --formulation total-lagrangian --shape bspline{degree} --mass {mass} --cfl 0.1"
+            ));
+        }
+    }
+    for scheme in schemes {
+        is_killed_and_goes_on(&scheme, &|steps| vec![steps / 2]);
+    }
+}
+
+/// Runs a scheme whole, and killed where its checkpoint has come to the given steps; both have to end alike.
+#[cfg(unix)]
+fn is_killed_and_goes_on(scheme: &str, kills: &dyn Fn(u64) -> Vec<u64>) {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let called = mms(place, &format!("run {scheme} --json whole.json"));
+    assert_eq!(called.status, 0, "{scheme}: {}", called.stderr);
+    let whole = read_json(&place.join("whole.json"));
+    let frames = place.join("frames");
+    let files = |folder: &Path| -> Vec<(String, Vec<u8>)> {
+        let read = |name: String| (name.clone(), std::fs::read(folder.join(name)).unwrap());
+        names(folder).into_iter().map(read).collect()
+    };
+    let expected = frames.exists().then(|| files(&frames));
+    if expected.is_some() {
+        std::fs::remove_dir_all(&frames).unwrap();
+    }
+
+    // The result goes to a pipe that nobody reads, so that the run cannot end before it is killed.
+    let parts = place.join("parts.json");
+    command::pipe(&parts);
+    let kept = place.join("kept");
+    let steps = whole["result"]["steps"].as_u64().expect("a number");
+    let run = format!("run {scheme} --json parts.json --checkpoint kept --every 3");
+    let mut call = run.as_str();
+    for step in kills(steps) {
+        let mut run = UnderWay::start(place, call);
+        run.wait_for(|| reached(&kept) >= step);
+        run.kill();
+        call = "resume kept";
+    }
+    std::fs::remove_file(&parts).unwrap();
+    let called = mms(place, "resume kept --threads 1");
+    assert_eq!(called.status, 0, "{scheme}: {}", called.stderr);
+    assert_eq!(result(&parts), result(&place.join("whole.json")), "{scheme}");
+    assert_eq!(read_json(&parts)["history"], whole["history"], "{scheme}");
+    if let Some(expected) = expected {
+        let left: Vec<_> =
+            files(&frames).into_iter().filter(|(name, _)| !name.ends_with(".tmp")).collect();
+        assert!(left == expected, "{scheme}: other particle files");
+    }
+    assert_eq!(names(&kept), ["checkpoint", "lock", "run.json"], "{scheme}");
 }
 
 #[cfg(unix)]

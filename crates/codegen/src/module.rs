@@ -39,7 +39,7 @@ impl Names {
     }
 }
 
-/// The items of a solution; `runtime` is the path to the crate `mmsmith_solutions`.
+/// The items of a solution; `runtime` is the path to the crate `mmsmith_runtime`, or to one that has all of it.
 ///
 /// # Errors
 ///
@@ -49,7 +49,7 @@ pub fn items(spec: &Spec, runtime: &TokenStream) -> Result<TokenStream, DeriveEr
 }
 
 impl Plan<'_> {
-    /// The items of the solution in Rust; `runtime` is the path to the crate `mmsmith_solutions`.
+    /// The items of the solution in Rust; `runtime` is the path to the crate `mmsmith_runtime`, or to one that has all of it.
     #[must_use]
     pub fn items(&self, runtime: &TokenStream) -> TokenStream {
         self.items_with(runtime, None)
@@ -131,6 +131,25 @@ pub fn registry_source(names: &[&str]) -> Result<String, NameClash> {
         /// Every solution of the library, in alphabetical order of the names.
         pub const CATALOGUE: &[&Description] = &[#descriptions];
 
+        /// A precision that the solutions are compiled in, here and not again by each crate that calls them.
+        pub trait Precision: Real {
+            /// See [`build`].
+            #[doc(hidden)]
+            fn build(name: &str, values: &[f64]) -> Option<Result<AnySolution<Self>, ParameterError>>;
+        }
+
+        impl Precision for f32 {
+            fn build(name: &str, values: &[f64]) -> Option<Result<AnySolution<Self>, ParameterError>> {
+                build_in(name, values)
+            }
+        }
+
+        impl Precision for f64 {
+            fn build(name: &str, values: &[f64]) -> Option<Result<AnySolution<Self>, ParameterError>> {
+                build_in(name, values)
+            }
+        }
+
         /// Builds the solution `name` with the given parameter values, in the order of its description.
         ///
         /// Returns `None` for a name that is not in the [`CATALOGUE`].
@@ -138,15 +157,14 @@ pub fn registry_source(names: &[&str]) -> Result<String, NameClash> {
         /// # Errors
         ///
         /// [`ParameterError`] for values that are not admissible.
-        pub fn build<T: Real>(
+        pub fn build<T: Precision>(
             name: &str,
             values: &[f64],
         ) -> Option<Result<AnySolution<T>, ParameterError>> {
             T::build(name, values)
         }
 
-        /// [`build`] in one precision, which [`Real`] instantiates in this crate.
-        pub(crate) fn build_in<T: Real>(
+        fn build_in<T: Real>(
             name: &str,
             values: &[f64],
         ) -> Option<Result<AnySolution<T>, ParameterError>> {

@@ -2,8 +2,8 @@
 
 use crate::staged::{Row, Stage, coordinate};
 use mmsmith_expr::{Program, Slot};
-use mmsmith_solutions::nalgebra::SVector;
-use mmsmith_solutions::{BLOCK, BodyForceAtPoints, Lattice, Solution};
+use mmsmith_runtime::nalgebra::SVector;
+use mmsmith_runtime::{BLOCK, BodyForceAtPoints, Lattice, Solution};
 
 /// How the body force of points follows from their layers, and that of layers from their coordinates.
 pub(crate) struct LatticeStages {

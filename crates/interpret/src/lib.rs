@@ -1,6 +1,6 @@
 //! Manufactured solutions evaluated straight from their specifications, without generated code.
 //!
-//! [`interpret`] turns a specification into the same interface that [generated solutions](mmsmith_solutions) have, so that a file can
+//! [`interpret`] turns a specification into the same interface that [generated solutions](mmsmith_runtime) have, so that a file can
 //! be checked before anything is generated from it. It evaluates the straight-line programs that the generator
 //! translates, in double precision, and in the same stages; for work on many points the generated code is still faster.
 
@@ -10,8 +10,8 @@ mod staged;
 
 use lattice::LatticeStages;
 use mmsmith_expr::{Drafts, Expr, MOST_KEPT_OF_STATES, Program, Slot, arrange};
-use mmsmith_solutions::nalgebra::{SMatrix, SVector};
-use mmsmith_solutions::{
+use mmsmith_runtime::nalgebra::{SMatrix, SVector};
+use mmsmith_runtime::{
     AnySolution, BodyForceAtPoints, Boundary, Condition, Domain, Fields, Lattice, Material,
     ParameterError, Solution, StateAtPoints, Surface,
 };

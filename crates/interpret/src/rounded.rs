@@ -2,8 +2,8 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use mmsmith_solutions::nalgebra::{SMatrix, SVector};
-use mmsmith_solutions::{
+use mmsmith_runtime::nalgebra::{SMatrix, SVector};
+use mmsmith_runtime::{
     BodyForceAtPoints, Boundary, Domain, Fields, Material, Real, Solution, StateAtPoints, StateRun,
     Surface,
 };

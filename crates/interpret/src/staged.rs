@@ -2,8 +2,8 @@
 
 use crate::inputs;
 use mmsmith_expr::{Operation, Program, Section, Slot};
-use mmsmith_solutions::nalgebra::SVector;
-use mmsmith_solutions::{BLOCK, BodyForceAtPoints, StateAtPoints, StateRun};
+use mmsmith_runtime::nalgebra::SVector;
+use mmsmith_runtime::{BLOCK, BodyForceAtPoints, StateAtPoints, StateRun};
 
 /// One number for each point of a block.
 pub(crate) type Row = [f64; BLOCK];

@@ -1,37 +1,11 @@
-//! Manufactured solutions as Rust functions: the generated modules, and the trait they implement.
+//! The library of manufactured solutions: one generated module for each file in `mms-specs/`, and all of [`mmsmith_runtime`], which
+//! they are built on.
 //!
-//! A manufactured solution is a displacement field `u(X, t)`, chosen freely, together with the body force `b`
-//! that makes it an exact solution of the equations of motion for a given material. This crate holds one
-//! generated module for each file in `mms-specs/`; everything else in it is what those modules need at run time.
-//! It knows nothing of specifications, symbols or solvers.
-//!
-//! # Conventions
-//!
-//! `X` is the reference position and `x = X + u` the current one. `F[i][J] = dx_i/dX_J` is the deformation
-//! gradient, `H = F - I` the displacement gradient, `J = det F`. `P` is the *first* Piola-Kirchhoff stress:
-//! `P = tau F^-T`, the traction on a surface with reference normal `N` is `P N`, and momentum balance reads
-//! `rho0 a_i = sum_J dP[i][J]/dX_J + rho0 b_i`. The body force `b` is a force per unit *mass*. In two dimensions
-//! the deformation is plane strain. All components are Cartesian.
+//! The functions of all solutions are compiled in this crate, in both precisions, and not again by those who call them.
 
-mod domain;
 // Formatted by the generator; the formatter would differ in small things.
 #[rustfmt::skip]
 mod generated;
-mod lattice;
-mod parameters;
-mod real;
-mod solution;
-mod staged;
 
-pub use domain::{Boundary, Condition, Domain, Surface};
 pub use generated::*;
-pub use lattice::{BodyForceOnLattice, Lattice, LatticePoints};
-/// The vectors and matrices of this crate's interface.
-pub use nalgebra;
-pub use parameters::{Description, Parameter, ParameterError};
-pub use real::Real;
-pub use solution::{AnySolution, Fields, Material, Solution};
-pub use staged::{
-    BLOCK, BodyForceAtPoints, BodyForceStages, StagedPoints, StagedStates, State, StateAtPoints,
-    StateRun, StateStages,
-};
+pub use mmsmith_runtime::*;

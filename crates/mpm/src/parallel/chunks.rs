@@ -12,8 +12,21 @@ pub(crate) fn each_chunk<A: Send>(
     size: usize,
     work: &(dyn Fn(usize, &mut [A]) + Sync),
 ) {
+    if array.len() <= size {
+        work(0, array);
+        return;
+    }
     let chunks = array.par_chunks_mut(size).enumerate().with_max_len(1);
     chunks.for_each(|(number, chunk)| work(number, chunk));
+}
+
+/// Calls `work` with each of several pieces of work.
+pub(crate) fn each<A: Send>(pieces: Vec<A>, work: &(dyn Fn(A) + Sync)) {
+    if pieces.len() <= 1 {
+        pieces.into_iter().for_each(work);
+        return;
+    }
+    pieces.into_par_iter().with_max_len(1).for_each(work);
 }
 
 /// A chunk of each of four arrays.

@@ -2,8 +2,11 @@
 //!
 //! Piegl & Tiller, "The NURBS Book", 2nd ed. (1997), chapter 2: recurrence and derivative.
 
+use std::ops::Range;
+
 use super::axis::{Axis, End};
 use crate::fault::{Fault, Planted};
+use crate::parallel::chunks::each_chunk;
 
 /// The largest degree.
 pub(crate) const MOST_DEGREE: usize = 5;
@@ -28,7 +31,20 @@ pub(crate) struct Basis {
     value: Vec<f64>,
     /// `width` derivatives for each particle.
     slope: Vec<f64>,
+    /// Particles that are integrated together, and for each function the range of those in which it is.
+    together: Vec<Together>,
+    together_of: Vec<Range<usize>>,
 }
+
+/// One particle, or two successive ones with the same functions: for half of the loads and stores.
+#[derive(Clone, Copy, Debug)]
+struct Together {
+    start: usize,
+    are_two: bool,
+}
+
+/// Numbers that a thread is given at a time; fewer are done sooner than they are handed out.
+const PIECE: usize = 8192;
 
 /// The part of the functions that an operator takes: value or derivative.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,6 +97,8 @@ impl Basis {
             first: Vec::with_capacity(points.len()),
             value: vec![0.0; points.len() * width],
             slope: vec![0.0; points.len() * width],
+            together: Vec::new(),
+            together_of: Vec::new(),
         };
         let per_cell = points.len() / n;
         for (q, &x) in points.iter().enumerate() {
@@ -98,7 +116,24 @@ impl Basis {
             }
             basis.first.push(first);
         }
+        basis.put_together();
         Some(basis)
+    }
+
+    fn put_together(&mut self) {
+        let mut start = 0;
+        while start < self.points {
+            let are_two = self.first.get(start + 1) == Some(&self.first[start]);
+            self.together.push(Together { start, are_two });
+            start += if are_two { 2 } else { 1 };
+        }
+        let mut ranges = vec![self.together.len()..0; self.functions];
+        for (place, Together { start, .. }) in self.together.iter().enumerate() {
+            for range in &mut ranges[self.first[*start]..][..self.width] {
+                *range = range.start.min(place)..place + 1;
+            }
+        }
+        self.together_of = ranges;
     }
 
     /// The row of particle `q`: its first function, and the values from there on.
@@ -146,21 +181,29 @@ impl Basis {
         output: &mut [f64],
     ) {
         let (rows, _) = self.weights(part).as_chunks::<W>();
-        let blocks = input.chunks_exact(self.functions * inner);
-        for (input, output) in blocks.zip(output.chunks_exact_mut(self.points * inner)) {
-            if inner == 1 {
-                for ((&first, row), output) in self.first.iter().zip(rows).zip(output) {
-                    let window = &input[first..first + W];
-                    let mut sum = row[0] * window[0];
-                    for k in 1..W {
-                        sum += row[k] * window[k];
+        if inner == 1 {
+            let blocks = PIECE.div_ceil(self.points);
+            each_chunk(output, blocks * self.points, &|piece, output| {
+                let input = input[piece * blocks * self.functions..].chunks_exact(self.functions);
+                for (input, output) in input.zip(output.chunks_exact_mut(self.points)) {
+                    for ((&first, row), output) in self.first.iter().zip(rows).zip(output) {
+                        let window = &input[first..first + W];
+                        let mut sum = row[0] * window[0];
+                        for k in 1..W {
+                            sum += row[k] * window[k];
+                        }
+                        *output = sum;
                     }
-                    *output = sum;
                 }
-                continue;
-            }
-            let outputs = output.chunks_exact_mut(inner);
-            for ((&first, row), output) in self.first.iter().zip(rows).zip(outputs) {
+            });
+            return;
+        }
+        let lines = PIECE.div_ceil(inner);
+        each_chunk(output, lines * inner, &|piece, output| {
+            for (line, output) in output.chunks_exact_mut(inner).enumerate() {
+                let (block, q) = divided(piece * lines + line, self.points);
+                let first = block * self.functions + self.first[q];
+                let row = &rows[q];
                 let lines: [&[f64]; W] =
                     std::array::from_fn(|k| &input[(first + k) * inner..][..inner]);
                 for i in 0..inner {
@@ -171,7 +214,7 @@ impl Basis {
                     output[i] = sum;
                 }
             }
-        }
+        });
     }
 
     fn integrate_of<const W: usize>(
@@ -182,56 +225,66 @@ impl Basis {
         output: &mut [f64],
     ) {
         let (rows, _) = self.weights(part).as_chunks::<W>();
-        let blocks = input.chunks_exact(self.points * inner);
-        for (input, output) in blocks.zip(output.chunks_exact_mut(self.functions * inner)) {
-            if inner == 1 {
-                // The particles of a cell share their window, which is written once.
-                let mut window = (0, [0.0; W]);
-                let mut flush = |(first, sums): (usize, [f64; W])| {
-                    let window = &mut output[first..first + W];
-                    for k in 0..W {
-                        window[k] += sums[k];
-                    }
-                };
-                for ((&first, row), &input) in self.first.iter().zip(rows).zip(input) {
-                    if first != window.0 {
-                        flush(window);
-                        window = (first, [0.0; W]);
-                    }
-                    for k in 0..W {
-                        window.1[k] += row[k] * input;
-                    }
+        if inner == 1 {
+            let blocks = PIECE.div_ceil(self.functions);
+            each_chunk(output, blocks * self.functions, &|piece, output| {
+                let input = input[piece * blocks * self.points..].chunks_exact(self.points);
+                for (input, output) in input.zip(output.chunks_exact_mut(self.functions)) {
+                    self.integrate_line(rows, input, output);
                 }
-                flush(window);
-                continue;
-            }
-            let mut q = 0;
-            while q < self.points {
-                let first = self.first[q];
-                let line = |q: usize| &input[q * inner..][..inner];
-                let output = &mut output[first * inner..][..W * inner];
-                // Two particles of a cell at a time, for half of the loads and stores.
-                if q + 1 < self.points && self.first[q + 1] == first {
-                    let (a, b) = (line(q), line(q + 1));
-                    for (k, output) in output.chunks_exact_mut(inner).enumerate() {
+            });
+            return;
+        }
+        // Function by function, so that no two threads write to one; the order of its sum is that of the particles.
+        let lines = PIECE.div_ceil(inner);
+        each_chunk(output, lines * inner, &|piece, output| {
+            for (line, output) in output.chunks_exact_mut(inner).enumerate() {
+                let (block, j) = divided(piece * lines + line, self.functions);
+                let line = |q: usize| &input[(block * self.points + q) * inner..][..inner];
+                for &Together { start: q, are_two } in &self.together[self.together_of[j].clone()] {
+                    let Some(k) = j.checked_sub(self.first[q]).filter(|k| *k < W) else { continue };
+                    if are_two {
+                        let (a, b) = (line(q), line(q + 1));
                         let (of_a, of_b) = (rows[q][k], rows[q + 1][k]);
                         for i in 0..inner {
                             output[i] += of_a * a[i] + of_b * b[i];
                         }
-                    }
-                    q += 2;
-                } else {
-                    let a = line(q);
-                    for (k, output) in output.chunks_exact_mut(inner).enumerate() {
+                    } else {
+                        let (a, of_a) = (line(q), rows[q][k]);
                         for i in 0..inner {
-                            output[i] += rows[q][k] * a[i];
+                            output[i] += of_a * a[i];
                         }
                     }
-                    q += 1;
                 }
             }
-        }
+        });
     }
+
+    fn integrate_line<const W: usize>(&self, rows: &[[f64; W]], input: &[f64], output: &mut [f64]) {
+        // The particles of a cell share their window, which is written once.
+        let mut window = (0, [0.0; W]);
+        let mut flush = |(first, sums): (usize, [f64; W])| {
+            let window = &mut output[first..first + W];
+            for k in 0..W {
+                window[k] += sums[k];
+            }
+        };
+        for ((&first, row), &input) in self.first.iter().zip(rows).zip(input) {
+            if first != window.0 {
+                flush(window);
+                window = (first, [0.0; W]);
+            }
+            for k in 0..W {
+                window.1[k] += row[k] * input;
+            }
+        }
+        flush(window);
+    }
+}
+
+/// Quotient and remainder.
+fn divided(number: usize, divisor: usize) -> (usize, usize) {
+    (number / divisor, number % divisor)
 }
 
 /// The knots: repeated at ends that are clamped, equally spaced beyond the others.

@@ -6,6 +6,7 @@
 use super::axis::{Axis, End};
 use super::basis::{Basis, Part};
 use crate::fault::{Fault, Planted};
+use crate::parallel::chunks::{each, each_chunk};
 
 /// The mass matrix along one axis, which can be solved for.
 #[derive(Clone, Debug)]
@@ -310,31 +311,57 @@ impl Ldl {
 
     fn solve_of<const B: usize>(&self, inner: usize, values: &mut [f64]) {
         if inner == 1 {
-            let mut groups = values.chunks_exact_mut(LINES * self.size);
-            groups.by_ref().for_each(|lines| self.solve_lines::<B, LINES>(lines));
-            let rest = groups.into_remainder().chunks_exact_mut(self.size);
-            rest.for_each(|line| self.solve_lines::<B, 1>(line));
+            let groups = PIECE.div_ceil(LINES * self.size);
+            each_chunk(values, groups * LINES * self.size, &|_, values| {
+                let mut groups = values.chunks_exact_mut(LINES * self.size);
+                groups.by_ref().for_each(|lines| self.solve_lines::<B, LINES>(lines));
+                let rest = groups.into_remainder().chunks_exact_mut(self.size);
+                rest.for_each(|line| self.solve_lines::<B, 1>(line));
+            });
             return;
         }
-        for block in values.chunks_exact_mut(self.size * inner) {
-            for i in 0..self.size {
-                let (before, rest) = block.split_at_mut(i * inner);
-                let line = &mut rest[..inner];
-                for d in (1..=B.min(i)).rev() {
-                    let factor = self.below[i * B + B - d];
-                    let other = &before[(i - d) * inner..][..inner];
-                    line.iter_mut().zip(other).for_each(|(x, y)| *x -= factor * y);
+        let size = self.size * inner;
+        if size <= PIECE {
+            each_chunk(values, PIECE / size * size, &|_, values| {
+                for block in values.chunks_exact_mut(size) {
+                    let mut lines: Vec<_> = block.chunks_exact_mut(inner).collect();
+                    self.solve_columns::<B>(&mut lines);
+                }
+            });
+            return;
+        }
+        // The lines of a block, each cut into columns that depend on no others.
+        let columns = (PIECE / self.size).max(LEAST_COLUMNS);
+        let mut pieces = Vec::new();
+        for block in values.chunks_exact_mut(size) {
+            let mut of_block: Vec<Vec<&mut [f64]>> = Vec::new();
+            of_block.resize_with(inner.div_ceil(columns), || Vec::with_capacity(self.size));
+            for line in block.chunks_exact_mut(inner) {
+                for (piece, columns) in of_block.iter_mut().zip(line.chunks_mut(columns)) {
+                    piece.push(columns);
                 }
             }
-            for i in (0..self.size).rev() {
-                let (upto, after) = block.split_at_mut((i + 1) * inner);
-                let line = &mut upto[i * inner..];
-                line.iter_mut().for_each(|x| *x *= self.reciprocal[i]);
-                for d in (1..=B.min(self.size - 1 - i)).rev() {
-                    let factor = self.below[(i + d) * B + B - d];
-                    let other = &after[(d - 1) * inner..][..inner];
-                    line.iter_mut().zip(other).for_each(|(x, y)| *x -= factor * y);
-                }
+            pieces.append(&mut of_block);
+        }
+        each(pieces, &|mut lines| self.solve_columns::<B>(&mut lines));
+    }
+
+    /// Solves for values side by side: line i has those of place i along the axis.
+    fn solve_columns<const B: usize>(&self, lines: &mut [&mut [f64]]) {
+        for i in 0..self.size {
+            let (before, rest) = lines.split_at_mut(i);
+            for d in (1..=B.min(i)).rev() {
+                let factor = self.below[i * B + B - d];
+                rest[0].iter_mut().zip(&*before[i - d]).for_each(|(x, y)| *x -= factor * y);
+            }
+        }
+        for i in (0..self.size).rev() {
+            let (upto, after) = lines.split_at_mut(i + 1);
+            let line = &mut upto[i];
+            line.iter_mut().for_each(|x| *x *= self.reciprocal[i]);
+            for d in (1..=B.min(self.size - 1 - i)).rev() {
+                let factor = self.below[(i + d) * B + B - d];
+                line.iter_mut().zip(&*after[d - 1]).for_each(|(x, y)| *x -= factor * y);
             }
         }
     }
@@ -370,6 +397,10 @@ impl Ldl {
 
 /// Lines that are solved side by side: each value of a line has to wait for the one before it.
 const LINES: usize = 8;
+
+/// Numbers that a thread is given at a time, and values side by side at least.
+const PIECE: usize = 8192;
+const LEAST_COLUMNS: usize = 64;
 
 #[cfg(test)]
 mod tests {

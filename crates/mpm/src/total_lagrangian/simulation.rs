@@ -1,5 +1,6 @@
 //! The simulation: coefficients of displacement and velocity, and the forces on them.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::{array, mem};
 
 use bytemuck::{bytes_of_mut, cast_slice_mut};
@@ -16,6 +17,7 @@ use crate::body_force::BodyForce;
 use crate::error::{SetupError, StepError};
 use crate::fault::{Fault, Planted};
 use crate::material::{AnyLaw, Law, Material, NeoHookean, NeoHookeanNoLog};
+use crate::parallel::chunks::{each, each_chunk};
 use crate::particles::Particles;
 use crate::tensor::determinant;
 
@@ -54,7 +56,7 @@ pub struct Scheme {
 
 /// A running simulation in the reference configuration.
 ///
-/// Runs on the calling thread alone, so that its results do not depend on the number of threads.
+/// All loops over particles and coefficients are shared among the threads of the pool; no sum depends on their number.
 #[derive(Clone, Debug)]
 pub struct TotalLagrangian<const D: usize> {
     grid: Grid<D>,
@@ -370,25 +372,36 @@ impl<const D: usize> TotalLagrangian<D> {
         for component in 0..D {
             self.evaluate(component, Field::Velocity, true);
         }
-        for p in 0..self.particles.len() {
-            let local = SVector::from_fn(|i, _| self.work.values[i][p]);
-            self.particles.v[p] = self.cartesian(p / row, &local);
-        }
+        let Self { work: Work { values, .. }, particles, rows, .. } = self;
+        let (values, rows) = (&*values, &rows[..]);
+        each_chunk(&mut particles.v, PIECE, &|piece, v| {
+            for (v, p) in v.iter_mut().zip(piece * PIECE..) {
+                let local = SVector::from_fn(|i, _| values[i][p]);
+                *v = cartesian(rows, p / row, &local);
+            }
+        });
         for component in 0..D {
             self.evaluate(component, Field::Displacement, true);
         }
-        for p in 0..self.particles.len() {
-            let Work { values, slopes, .. } = &self.work;
-            let local = SVector::from_fn(|i, _| values[i][p]);
-            let mut H = SMatrix::from_fn(|i, k| slopes[i][k][p]);
-            if let Some(at) = self.rows.get(p / row) {
-                let reciprocal_radius = self.reciprocal_radius[p % row];
-                H = self.grid.coordinates.gradient(&local, &H, reciprocal_radius, at);
-                H = at.frame * H * at.frame.transpose();
+        let Self { work: Work { values, slopes, .. }, particles, rows, grid, .. } = self;
+        let (values, slopes, rows) = (&*values, &*slopes, &rows[..]);
+        let reciprocal_radius = &self.reciprocal_radius[..];
+        let Particles { X, x, F, .. } = particles;
+        let X = &X[..];
+        let pieces = x.chunks_mut(PIECE).zip(F.chunks_mut(PIECE)).enumerate().collect();
+        each(pieces, &|(piece, (x, F))| {
+            for ((x, F), p) in x.iter_mut().zip(F).zip(piece * PIECE..) {
+                let local = SVector::from_fn(|i, _| values[i][p]);
+                let mut H = SMatrix::from_fn(|i, k| slopes[i][k][p]);
+                if let Some(at) = rows.get(p / row) {
+                    let reciprocal_radius = reciprocal_radius[p % row];
+                    H = grid.coordinates.gradient(&local, &H, reciprocal_radius, at);
+                    H = at.frame * H * at.frame.transpose();
+                }
+                *F = SMatrix::identity() + H;
+                *x = X[p] + cartesian(rows, p / row, &local);
             }
-            self.particles.F[p] = SMatrix::identity() + H;
-            self.particles.x[p] = self.particles.X[p] + self.cartesian(p / row, &local);
-        }
+        });
         &self.particles
     }
 
@@ -443,11 +456,6 @@ impl<const D: usize> TotalLagrangian<D> {
         self.rows.get(row).map_or(*vector, |row| row.frame.tr_mul(vector))
     }
 
-    /// The inverse of [`components`](Self::components).
-    fn cartesian(&self, row: usize, components: &SVector<f64, D>) -> SVector<f64, D> {
-        self.rows.get(row).map_or(*components, |row| row.frame * components)
-    }
-
     /// The accelerations at the current displacement and at `time`.
     fn accelerate(
         &mut self,
@@ -460,16 +468,14 @@ impl<const D: usize> TotalLagrangian<D> {
             self.evaluate(component, Field::Displacement, curvilinear);
         }
         let forced = !body_force.is_absent() && !self.planted.is(Fault::NoBodyForce);
-        if forced {
-            body_force.evaluate(0, &self.particles.X, time, &mut self.work.b);
-        }
+        let force = forced.then_some((body_force, time));
         let bad = match self.material {
-            Material::NeoHookean { lambda: 0.0, mu } => self.stress(NeoHookeanNoLog { mu }, forced),
+            Material::NeoHookean { lambda: 0.0, mu } => self.stress(NeoHookeanNoLog { mu }, force),
             Material::NeoHookean { lambda, mu } => {
                 let planted = self.planted;
-                self.stress(NeoHookean { lambda, mu, planted }, forced)
+                self.stress(NeoHookean { lambda, mu, planted }, force)
             }
-            other => self.stress(AnyLaw(other), forced),
+            other => self.stress(AnyLaw(other), force),
         };
         if bad {
             return Err(self.describe());
@@ -516,65 +522,48 @@ impl<const D: usize> TotalLagrangian<D> {
     }
 
     /// Turns displacements and their slopes at the particles into the factors of the functions' values and slopes in the
-    /// forces. True where a particle has no stress.
-    fn stress<L: Law<f64>>(&mut self, law: L, forced: bool) -> bool {
-        let (row, planted, coordinates) = (self.row(), self.planted, self.grid.coordinates);
-        let Work { values, slopes, b, .. } = &mut self.work;
-        let mut bad = false;
-        for (index, volume) in self.particles.volume.chunks_exact(row).enumerate() {
-            let range = index * row..(index + 1) * row;
-            let at = self.rows.get(index);
-            let values = values.each_mut().map(|array| &mut array[range.clone()]);
-            let slopes = slopes
-                .each_mut()
-                .map(|arrays| arrays.each_mut().map(|array| &mut array[range.clone()]));
-            for i in 0..row {
-                let mut H = SMatrix::<f64, D, D>::from_fn(|c, k| slopes[c][k][i]);
-                if let Some(at) = at {
-                    let u = SVector::from_fn(|c, _| values[c][i]);
-                    H = coordinates.gradient(&u, &H, self.reciprocal_radius[i], at);
-                }
-                let F = SMatrix::identity() + H;
-                bad |= !is_deformation(&F);
-                let P = planted.piola_in_forces(law.first_piola_kirchhoff(&F), &F);
-                let mut force = P * -volume[i];
-                if let Some(at) = at {
-                    let reciprocal_radius = self.reciprocal_radius[i];
-                    let of_values;
-                    (of_values, force) =
-                        coordinates.transposed_gradient(&force, reciprocal_radius, at);
-                    for c in 0..D {
-                        values[c][i] = of_values[c];
-                    }
-                    if planted.is(Fault::HoopStressDropped) {
-                        values[0][i] = 0.0;
-                    }
-                    if planted.is(Fault::HoopShearDropped) {
-                        values[1][i] = 0.0;
-                    }
-                    if planted.is(Fault::CotangentDropped) && D == 3 {
-                        values[1][i] -= force[(2, 2)] * at.cotangent * self.reciprocal_radius[i];
-                    }
-                }
-                for c in 0..D {
-                    for k in 0..D {
-                        slopes[c][k][i] = force[(c, k)];
-                    }
-                }
+    /// forces, with the body force at a time if there is one. True where a particle has no stress.
+    fn stress<L: Law<f64>>(
+        &mut self,
+        law: L,
+        force: Option<(&dyn BodyForce<f64, D>, f64)>,
+    ) -> bool {
+        let row = self.row();
+        let Self { work: Work { values, slopes, b, .. }, particles, .. } = self;
+        let size = PIECE.div_ceil(row) * row;
+        let mut values = values.each_mut().map(|array| array.chunks_mut(size));
+        let mut slopes =
+            slopes.each_mut().map(|arrays| arrays.each_mut().map(|array| array.chunks_mut(size)));
+        let pieces: Vec<_> = b
+            .chunks_mut(size)
+            .enumerate()
+            .map(|(piece, b)| Places {
+                first: piece * size,
+                values: values.each_mut().map(|chunks| chunks.next().unwrap_or_default()),
+                slopes: slopes.each_mut().map(|chunks| {
+                    chunks.each_mut().map(|chunks| chunks.next().unwrap_or_default())
+                }),
+                b,
+            })
+            .collect();
+        let stress = Stress {
+            law,
+            force,
+            row,
+            particles,
+            density: self.density,
+            coordinates: self.grid.coordinates,
+            rows: &self.rows,
+            reciprocal_radius: &self.reciprocal_radius,
+            planted: self.planted,
+        };
+        let bad = AtomicBool::new(false);
+        each(pieces, &|places| {
+            if stress.at(places) {
+                bad.store(true, Ordering::Relaxed);
             }
-            if forced {
-                for (i, b) in b[range].iter().enumerate() {
-                    let mut b = b * (volume[i] * self.density);
-                    if let Some(at) = at {
-                        b = at.frame.tr_mul(&b);
-                    }
-                    for c in 0..D {
-                        values[c][i] = if at.is_some() { values[c][i] + b[c] } else { b[c] };
-                    }
-                }
-            }
-        }
-        bad
+        });
+        bad.into_inner()
     }
 
     /// The error of an invalid displacement.
@@ -676,6 +665,96 @@ impl<const D: usize> TotalLagrangian<D> {
     }
 }
 
+/// Some rows of particles, with what stands there.
+struct Places<'a, const D: usize> {
+    /// Index of the first particle.
+    first: usize,
+    values: [&'a mut [f64]; D],
+    slopes: [[&'a mut [f64]; D]; D],
+    b: &'a mut [SVector<f64, D>],
+}
+
+/// From displacements to forces, at the particles.
+struct Stress<'a, L, const D: usize> {
+    law: L,
+    /// The body force, and its time.
+    force: Option<(&'a dyn BodyForce<f64, D>, f64)>,
+    /// Particles in a row along axis 0.
+    row: usize,
+    particles: &'a Particles<f64, D>,
+    density: f64,
+    coordinates: Coordinates,
+    rows: &'a [Row<D>],
+    reciprocal_radius: &'a [f64],
+    planted: Planted,
+}
+
+impl<L: Law<f64>, const D: usize> Stress<'_, L, D> {
+    /// See [`TotalLagrangian::stress`].
+    fn at(&self, Places { first, values, slopes, b }: Places<'_, D>) -> bool {
+        let Self { row, planted, coordinates, reciprocal_radius, .. } = *self;
+        if let Some((body_force, time)) = self.force {
+            body_force.evaluate(first, &self.particles.X[first..first + b.len()], time, b);
+        }
+        let volumes = &self.particles.volume[first..first + b.len()];
+        let mut bad = false;
+        for (index, volume) in volumes.chunks_exact(row).enumerate() {
+            let start = index * row;
+            let at = self.rows.get(first / row + index);
+            for i in 0..row {
+                let place = start + i;
+                let mut H = SMatrix::<f64, D, D>::from_fn(|c, k| slopes[c][k][place]);
+                if let Some(at) = at {
+                    let u = SVector::from_fn(|c, _| values[c][place]);
+                    H = coordinates.gradient(&u, &H, reciprocal_radius[i], at);
+                }
+                let F = SMatrix::identity() + H;
+                bad |= !is_deformation(&F);
+                let P = planted.piola_in_forces(self.law.first_piola_kirchhoff(&F), &F);
+                let mut force = P * -volume[i];
+                if let Some(at) = at {
+                    let of_values;
+                    (of_values, force) =
+                        coordinates.transposed_gradient(&force, reciprocal_radius[i], at);
+                    for c in 0..D {
+                        values[c][place] = of_values[c];
+                    }
+                    if planted.is(Fault::HoopStressDropped) {
+                        values[0][place] = 0.0;
+                    }
+                    if planted.is(Fault::HoopShearDropped) {
+                        values[1][place] = 0.0;
+                    }
+                    if planted.is(Fault::CotangentDropped) && D == 3 {
+                        values[1][place] -= force[(2, 2)] * at.cotangent * reciprocal_radius[i];
+                    }
+                }
+                for c in 0..D {
+                    for k in 0..D {
+                        slopes[c][k][place] = force[(c, k)];
+                    }
+                }
+            }
+            if self.force.is_some() {
+                for (i, b) in b[start..start + row].iter().enumerate() {
+                    let mut b = b * (volume[i] * self.density);
+                    if let Some(at) = at {
+                        b = at.frame.tr_mul(&b);
+                    }
+                    for c in 0..D {
+                        let value = &mut values[c][start + i];
+                        *value = if at.is_some() { *value + b[c] } else { b[c] };
+                    }
+                }
+            }
+        }
+        bad
+    }
+}
+
+/// Particles that a thread is given at a time, and numbers of an array.
+const PIECE: usize = 4096;
+
 /// Solves in place for coefficients, `functions` by axis, with one mass matrix for each axis.
 fn solve<'a, const D: usize>(
     functions: &[usize; D],
@@ -748,6 +827,15 @@ fn layer(bases: &[Basis; 2], of_particles: bool) -> usize {
     if of_particles { even.points } else { even.functions.max(odd.functions) }
 }
 
+/// The Cartesian vector with these components in row `row` of particles.
+fn cartesian<const D: usize>(
+    rows: &[Row<D>],
+    row: usize,
+    components: &SVector<f64, D>,
+) -> SVector<f64, D> {
+    rows.get(row).map_or(*components, |row| row.frame * components)
+}
+
 /// Whether F is a deformation gradient; false where it is not a number, too.
 #[inline(always)]
 fn is_deformation<const D: usize>(F: &SMatrix<f64, D, D>) -> bool {
@@ -758,7 +846,10 @@ fn is_deformation<const D: usize>(F: &SMatrix<f64, D, D>) -> bool {
 /// `target += factor * source`, component by component.
 fn add<const D: usize>(target: &mut [Vec<f64>; D], factor: f64, source: &[Vec<f64>; D]) {
     for (target, source) in target.iter_mut().zip(source) {
-        target.iter_mut().zip(source).for_each(|(x, y)| *x += factor * y);
+        each_chunk(target, PIECE, &|piece, target| {
+            let source = &source[piece * PIECE..];
+            target.iter_mut().zip(source).for_each(|(x, y)| *x += factor * y);
+        });
     }
 }
 

@@ -385,3 +385,36 @@ fn set_ups_that_make_no_sense_are_refused() {
     let mut body = TotalLagrangian::new(fine.0, fine.1, SOFT, DENSITY, 1e-3).unwrap();
     assert!(matches!(body.start(&[], &[]), Err(SetupError::LengthMismatch { found: 0, .. })));
 }
+
+/// On grids that are large enough for every loop to be shared among threads.
+#[test]
+fn runs_have_the_same_bits_on_any_number_of_threads() {
+    fn check<const D: usize>(grid: Grid<D>, scheme: Scheme) {
+        let force = |X: &[SVector<f64, D>], t: f64, b: &mut [SVector<f64, D>]| {
+            b.iter_mut().zip(X).for_each(|(b, X)| *b = X.map(|x| 3.0 * x + 5.0 * t));
+        };
+        let run = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| {
+                let mut body = moving(grid.clone(), scheme, 1e-6);
+                (0..2).for_each(|_| body.step(&force).unwrap());
+                let state: Vec<Vec<u8>> = body.state().iter().map(|part| part.to_vec()).collect();
+                let particles = body.observe();
+                (state, particles.x.clone(), particles.v.clone(), particles.F.clone())
+            })
+        };
+        let one = run(1);
+        assert!(run(2) == one && run(3) == one, "{scheme:?} {:?}", grid.coordinates);
+    }
+    for mass in [MassMatrix::Consistent, MassMatrix::Lumped] {
+        for degree in [3, 4] {
+            let scheme = Scheme { degree, mass, composition: Composition::Order2 };
+            check::<1>(open_box(5_000), scheme);
+            check::<2>(open_box(48), scheme);
+            check::<3>(open_box(9), scheme);
+            let mut fine = ring();
+            (fine.axes[0].cells, fine.axes[1].cells) = (32, 64);
+            check(fine, scheme);
+        }
+    }
+}

@@ -46,6 +46,31 @@ pub const CATALOGUE: &[&Description] = &[
     &Torsion::<f64>::DESCRIPTION,
     &Vortex::<f64>::DESCRIPTION,
 ];
+/// A precision that the solutions are compiled in, here and not again by each crate that calls them.
+pub trait Precision: Real {
+    /// See [`build`].
+    #[doc(hidden)]
+    fn build(
+        name: &str,
+        values: &[f64],
+    ) -> Option<Result<AnySolution<Self>, ParameterError>>;
+}
+impl Precision for f32 {
+    fn build(
+        name: &str,
+        values: &[f64],
+    ) -> Option<Result<AnySolution<Self>, ParameterError>> {
+        build_in(name, values)
+    }
+}
+impl Precision for f64 {
+    fn build(
+        name: &str,
+        values: &[f64],
+    ) -> Option<Result<AnySolution<Self>, ParameterError>> {
+        build_in(name, values)
+    }
+}
 /// Builds the solution `name` with the given parameter values, in the order of its description.
 ///
 /// Returns `None` for a name that is not in the [`CATALOGUE`].
@@ -53,14 +78,13 @@ pub const CATALOGUE: &[&Description] = &[
 /// # Errors
 ///
 /// [`ParameterError`] for values that are not admissible.
-pub fn build<T: Real>(
+pub fn build<T: Precision>(
     name: &str,
     values: &[f64],
 ) -> Option<Result<AnySolution<T>, ParameterError>> {
     T::build(name, values)
 }
-/// [`build`] in one precision, which [`Real`] instantiates in this crate.
-pub(crate) fn build_in<T: Real>(
+fn build_in<T: Real>(
     name: &str,
     values: &[f64],
 ) -> Option<Result<AnySolution<T>, ParameterError>> {

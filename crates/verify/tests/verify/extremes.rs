@@ -1,6 +1,6 @@
 //! What the schemes promise at the extremes.
 
-use mmsmith_solutions::{AnySolution, CATALOGUE, Real, build};
+use mmsmith_solutions::{AnySolution, CATALOGUE, Precision, build};
 use mmsmith_verify::{
     Arithmetic, Case, Coordinates, Criteria, Frame, Integrator, Layout, Outputs, PerField, PerNorm,
     Row, Search, Shape, Status, TotalScheme, Transfer, is_stable, plan, run, stability,
@@ -10,7 +10,7 @@ const SHAPES: [Shape; 3] = [Shape::Linear, Shape::Ugimp, Shape::Gimp];
 const INTEGRATORS: [Integrator; 4] =
     [Integrator::Cd, Integrator::Usf, Integrator::Usl, Integrator::Musl];
 
-fn solution<T: Real>(name: &str, set: &[(&str, f64)]) -> AnySolution<T> {
+fn solution<T: Precision>(name: &str, set: &[(&str, f64)]) -> AnySolution<T> {
     let description = CATALOGUE.iter().find(|known| known.name == name).expect("a solution");
     let values = description.resolve(set.iter().copied()).expect("its parameters");
     build(name, &values).expect("a solution").expect("admissible values")

@@ -2,19 +2,12 @@
 
 use nalgebra::RealField;
 
-use crate::generated::build_in;
-use crate::{AnySolution, ParameterError};
-
 /// A floating-point scalar: `f32` or `f64`.
 ///
 /// Beyond nalgebra's field it has the two functions that generated code needs and nalgebra lacks: sine and
 /// cosine of a multiple of pi. The argument is reduced *before* it is multiplied by pi, which is exact, so that
 /// `sin_pi(1)` is zero and a phase of a million periods loses no digits to the rounding of pi.
 pub trait Real: RealField + Copy {
-    /// [`build`](crate::build) in this precision. The functions of all solutions are compiled where this is implemented, in this
-    /// crate, and not again by each crate that calls it.
-    #[doc(hidden)]
-    fn build(name: &str, values: &[f64]) -> Option<Result<AnySolution<Self>, ParameterError>>;
     /// The nearest value of this type.
     fn nearest(value: f64) -> Self;
     /// The value in double precision; exact for both types.
@@ -116,10 +109,6 @@ fn log_ratio<T: Real>(z: T) -> T {
 }
 
 impl Real for f64 {
-    fn build(name: &str, values: &[f64]) -> Option<Result<AnySolution<Self>, ParameterError>> {
-        build_in(name, values)
-    }
-
     #[inline]
     fn nearest(value: f64) -> Self {
         value
@@ -176,10 +165,6 @@ impl Real for f64 {
 }
 
 impl Real for f32 {
-    fn build(name: &str, values: &[f64]) -> Option<Result<AnySolution<Self>, ParameterError>> {
-        build_in(name, values)
-    }
-
     #[inline]
     fn nearest(value: f64) -> Self {
         value as f32

@@ -209,7 +209,6 @@ where
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{AxisAligned, AxisAlignedParameters};
 
     fn lattice(columns: usize, rows: usize) -> Vec<SVector<f64, 2>> {
         let point = |n: usize| [(n % columns) as f64, 0.5 * (n / columns) as f64].into();
@@ -248,25 +247,5 @@ mod tests {
         let longest = Lattice::of(&line(MOST_LAYERS)).unwrap();
         assert_eq!(longest.point(MOST_LAYERS - 1), [(MOST_LAYERS - 1) as f64].into());
         assert!(Lattice::of(&line(MOST_LAYERS + 1)).is_none());
-    }
-
-    fn points() -> (AxisAligned<f64>, Vec<SVector<f64, 2>>) {
-        let solution = AxisAligned::new(AxisAlignedParameters::default()).unwrap();
-        (solution, lattice(40, 40).iter().map(|X| X * 0.02).collect())
-    }
-
-    #[test]
-    #[should_panic(expected = "index out of bounds")]
-    fn points_beyond_the_last() {
-        let (solution, X) = points();
-        solution.body_force_at(&X).evaluate(0.0, X.len() - 1, &mut [SVector::zeros(); 2]);
-    }
-
-    #[test]
-    #[should_panic(expected = "values of a time are those of each layer")]
-    fn values_of_another_solution() {
-        let (solution, X) = points();
-        let mut b = [SVector::zeros()];
-        solution.body_force_at(&X).evaluate_of(&[0.0; 50], &[7], &mut b);
     }
 }

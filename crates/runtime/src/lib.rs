@@ -1,0 +1,33 @@
+//! What manufactured solutions need at run time: the trait that they implement, the body that they belong to, their parameters, and the
+//! evaluation at many points.
+//!
+//! A manufactured solution is a displacement field `u(X, t)`, chosen freely, together with the body force `b`
+//! that makes it an exact solution of the equations of motion for a given material. Generated code, interpreted
+//! specifications and solutions written by hand implement [`Solution`]; whatever uses them knows nothing of specifications and symbols.
+//!
+//! # Conventions
+//!
+//! `X` is the reference position and `x = X + u` the current one. `F[i][J] = dx_i/dX_J` is the deformation
+//! gradient, `H = F - I` the displacement gradient, `J = det F`. `P` is the *first* Piola-Kirchhoff stress:
+//! `P = tau F^-T`, the traction on a surface with reference normal `N` is `P N`, and momentum balance reads
+//! `rho0 a_i = sum_J dP[i][J]/dX_J + rho0 b_i`. The body force `b` is a force per unit *mass*. In two dimensions
+//! the deformation is plane strain. All components are Cartesian.
+
+mod domain;
+mod lattice;
+mod parameters;
+mod real;
+mod solution;
+mod staged;
+
+pub use domain::{Boundary, Condition, Domain, Surface};
+pub use lattice::{BodyForceOnLattice, Lattice, LatticePoints};
+/// The vectors and matrices of this crate's interface.
+pub use nalgebra;
+pub use parameters::{Description, Parameter, ParameterError};
+pub use real::Real;
+pub use solution::{AnySolution, Fields, Material, Solution};
+pub use staged::{
+    BLOCK, BodyForceAtPoints, BodyForceStages, StagedPoints, StagedStates, State, StateAtPoints,
+    StateRun, StateStages,
+};
