@@ -34,14 +34,14 @@ pub(crate) use tradeoff::tradeoff;
 
 use anyhow::{Context, Result};
 use mmsmith_solutions::AnySolution;
-use mmsmith_verify::{Arithmetic, Case, POLAR_ANGLES, plan};
+use mmsmith_verify::{Arithmetic, Case, Coordinates, Extent, POLAR_ANGLES, Parts, plan};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::arguments::{Extent, Frame, Grid, Precision, word};
+use crate::arguments::{Precision, word};
 use crate::library::Selection;
 use crate::{memory, number, terminal};
-use scheme::Scheme;
+use scheme::Settled;
 
 /// A solution in the precisions that a simulation of it needs.
 struct Model {
@@ -83,69 +83,47 @@ impl Model {
         for case in cases {
             let plan = plan(&self.exact, self.arithmetic(), case)?;
             memory::require(plan.bytes, case.cells)?;
-            extent = plan.extent.map(|extent| match extent {
-                mmsmith_verify::Extent::Quarter => Extent::Quarter,
-                mmsmith_verify::Extent::Full => Extent::Full,
-            });
+            extent = plan.extent;
         }
         Ok(extent)
     }
-}
-
-/// The case that the options describe.
-fn case(options: &Scheme, cells: usize) -> Result<Case> {
-    let (shape, frame) = scheme::of(options)?;
-    Ok(Case {
-        shape,
-        integrator: options.integrator.into(),
-        start: options.start.into(),
-        transfer: options.transfer,
-        placement: scheme::placement(options)?,
-        cells,
-        per_cell: options.ppc,
-        cfl: options.cfl,
-        periods: options.periods,
-        extent: options.extent.map(Into::into),
-        frame,
-        cfl_speed: options.cfl_speed.into(),
-        offset: options.offset,
-    })
 }
 
 /// Settings as they are written to JSON: everything that a result depends on. `cells` and `cfl` are a number or a
 /// list.
 fn settings(
     selection: &Selection,
-    options: &Scheme,
+    settled: &Settled,
     extent: Option<Extent>,
     cells: impl Serialize,
     cfl: impl Serialize,
 ) -> Value {
-    let (mass, composition) = scheme::echo(options);
+    let Case { scheme, per_cell, cfl_speed, periods, .. } = settled.case;
+    let parts = scheme.parts();
     let mut settings = json!({
         "version": env!("CARGO_PKG_VERSION"),
         "solution": selection.name(),
         "parameters": selection.parameters(),
-        "frame": options.frame,
-        "shape": options.shape,
-        "mass": mass,
-        "composition": composition,
-        "layout": options.layout,
-        "grid": options.grid,
-        "cfl_speed": options.cfl_speed,
-        "transfer": options.transfer.to_string(),
-        "integrator": options.integrator,
-        "start": options.start,
+        "frame": parts.frame,
+        "shape": parts.shape,
+        "mass": parts.mass,
+        "composition": parts.composition,
+        "layout": parts.layout,
+        "grid": parts.grid,
+        "cfl_speed": cfl_speed.to_string(),
+        "transfer": parts.transfer,
+        "integrator": parts.integrator,
+        "start": parts.start,
         "cells": cells,
-        "ppc": options.ppc,
+        "ppc": per_cell,
         "cfl": cfl,
-        "periods": options.periods,
-        "offset": options.offset,
-        "extent": extent,
-        "precision": options.precision,
-        "threads": threads(options),
+        "periods": periods,
+        "offset": parts.offset,
+        "extent": extent.map(|extent| extent.to_string()),
+        "precision": settled.precision,
+        "threads": rayon::current_num_threads(),
     });
-    if options.grid == Grid::Spherical {
+    if scheme.total().is_some_and(|total| total.coordinates == Coordinates::Spherical) {
         settings["polar_angles"] = json!(POLAR_ANGLES);
     }
     terminal::detail_once(&settings);
@@ -153,42 +131,19 @@ fn settings(
 }
 
 /// One line that says what was simulated.
-fn caption(selection: &Selection, options: &Scheme, extent: Option<Extent>) -> String {
-    let start = match (options.frame, options.integrator) {
-        (Frame::Total, _) => scheme::words(options),
-        (_, crate::arguments::Integrator::Cd) => format!(" ({} start)", word(options.start)),
-        _ => String::new(),
-    };
-    let start = start + &scheme::additions(options);
-    let extent = extent.map(|extent| format!(", {}", word(extent))).unwrap_or_default();
+fn caption(selection: &Selection, settled: &Settled, extent: Option<Extent>) -> String {
+    let Case { scheme, per_cell, periods, .. } = settled.case;
+    let Parts { shape, integrator, .. } = scheme.parts();
+    let extent = extent.map(|extent| format!(", {extent}")).unwrap_or_default();
     format!(
-        "{} ({}){extent}: {} + {}{start}, {} particles per cell and direction, {} period(s), {}, {} thread(s)\n",
+        "{} ({}){extent}: {shape} + {integrator}{}, {per_cell} particles per cell and direction, {} period(s), {}, {} thread(s)\n",
         selection.name(),
         selection.told_parameters(),
-        word(options.shape),
-        word(options.integrator),
-        options.ppc,
-        number::exact(options.periods),
-        word(options.precision),
-        threads(options),
+        scheme::words(&scheme),
+        number::exact(periods),
+        word(settled.precision),
+        rayon::current_num_threads(),
     )
-}
-
-/// On how many threads the steps of a scheme are done.
-fn threads(options: &Scheme) -> usize {
-    let shared = case(options, scheme::USUAL_CELLS).is_ok_and(|case| case.steps_on_threads());
-    if shared { rayon::current_num_threads() } else { 1 }
-}
-
-/// What is said before a caption: a scheme that was chosen, and threads that were asked for in vain.
-fn preface(options: &Scheme) -> String {
-    let mut text = options.choice();
-    if let Some(asked) = options.threads.filter(|asked| *asked > threads(options)) {
-        text += &format!(
-            "--threads {asked}: the total frame steps on one thread; errors are measured on {asked}\n"
-        );
-    }
-    text
 }
 
 /// Does `work` with the number of threads asked for.

@@ -6,7 +6,7 @@
 //! definition; nothing lies below it. Derivatives are extrapolated finite differences that know their own error.
 
 use mmsmith_mpm::Material;
-use mmsmith_solutions::{AnySolution, Boundary, Condition, Domain, Fields, Solution, Surface};
+use mmsmith_runtime::{AnySolution, Boundary, Condition, Domain, Fields, Solution, Surface};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 use thiserror::Error;
@@ -14,8 +14,8 @@ use thiserror::Error;
 use crate::case::law;
 use crate::difference::{derivative, derivative_of_sum};
 use crate::dimension::in_dimension;
+use crate::error::SceneError;
 use crate::points;
-use crate::scene::SceneError;
 
 /// A difference up to this multiple of the check's own estimated error is no evidence against a field.
 pub const OWN_ERROR_FACTOR: f64 = 8.0;

@@ -4,16 +4,18 @@
 //! each scheme, solution and number of threads would need its own. A few steps on some grids take a tenth of a second
 //! and have all of that in them. Between grids the time of a step goes by a power of the number of particles.
 
+use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-use cpu_time::ProcessTime;
-use mmsmith_mpm::{BodyForce, Scalar, Solver};
-use mmsmith_solutions::{AnySolution, Real, Solution};
+use mmsmith_mpm::Scalar;
+use mmsmith_runtime::{AnySolution, Real, Solution};
 
-use crate::case::{Arithmetic, Case, CaseError, set_up};
+use crate::case::{Arithmetic, Case};
 use crate::dimension::in_arithmetic;
+use crate::drive::Driven;
+use crate::error::CaseError;
 use crate::measure::Comparison;
-use crate::plan::{Plan, plan, prepare};
+use crate::plan::{Plan, Prepared, plan, prepare};
 
 /// Of how many steps the times are kept.
 const FIRST_STEPS: usize = 63;
@@ -53,58 +55,39 @@ pub fn time_steps(
     most: u64,
     until: Option<Instant>,
 ) -> Result<Timing, CaseError> {
-    let limits = Limits { most, until };
     in_arithmetic!(
         exact,
         arithmetic,
-        |exact, model| time_in(exact, model, case, limits),
+        |exact, model| time_in(exact, model, case, most, until),
         else Err(CaseError::Dimension)
     )
-}
-
-#[derive(Clone, Copy)]
-struct Limits {
-    most: u64,
-    until: Option<Instant>,
 }
 
 fn time_in<T: Real + Scalar<D>, const D: usize>(
     exact: &dyn Solution<f64, D>,
     model: &dyn Solution<T, D>,
     case: &Case,
-    limits: Limits,
+    most: u64,
+    until: Option<Instant>,
 ) -> Result<Timing, CaseError> {
     let started = Instant::now();
-    let (scene, steps) = prepare(exact, case)?;
-    let (mut solver, body_force) = set_up(exact, model, case, &scene, Real::nearest(steps.dt))?;
+    let Prepared { scene, steps, .. } = prepare(exact, case)?;
+    let mut driven = Driven::set_up(exact, model, case, &scene, steps.dt)?;
     let setup_s = started.elapsed().as_secs_f64();
-    Ok(advance(solver.as_mut(), &body_force, exact, steps.count, limits, setup_s))
-}
-
-fn advance<T: Real, const D: usize>(
-    solver: &mut dyn Solver<T, D>,
-    body_force: &dyn BodyForce<T, D>,
-    exact: &dyn Solution<f64, D>,
-    steps: u64,
-    limits: Limits,
-    setup_s: f64,
-) -> Timing {
-    let (computing, started) = (ProcessTime::now(), Instant::now());
-    let mut done = 0;
+    let (mut done, mut wall_s, mut cpu_s) = (0, 0.0, 0.0);
     let mut each = Vec::new();
-    let mut before = started;
-    while done < steps.min(limits.most) && solver.step(body_force).is_ok() {
-        done += 1;
-        let now = Instant::now();
+    // Steps until the solver gives up count as well.
+    driven.advance(1..=steps.count.min(most), &mut |stepped| {
+        done = stepped.step;
+        wall_s += stepped.wall_s;
+        cpu_s += stepped.cpu_s;
         if each.len() < FIRST_STEPS {
-            each.push((now - before).as_secs_f64());
+            each.push(stepped.wall_s);
         }
-        before = now;
-        if limits.until.is_some_and(|until| now >= until) {
-            break;
-        }
-    }
-    let (wall_s, cpu_s) = (started.elapsed().as_secs_f64(), computing.elapsed().as_secs_f64());
+        let is_over = until.is_some_and(|until| Instant::now() >= until);
+        Ok(if is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+    })?;
+    let solver = driven.solver.as_mut();
     let lag = solver.velocity_lag().to_f64();
     let started = Instant::now();
     let comparison = Comparison::new(exact, &solver.observe().0.X);
@@ -116,8 +99,8 @@ fn advance<T: Real, const D: usize>(
     });
     let (step_s, measure_s) = (step_time(&mut each), measured.into_iter().fold(f64::NAN, f64::min));
     let particles = solver.observe().0.len();
-    let complete = done == steps;
-    Timing { particles, steps: done, complete, setup_s, wall_s, step_s, cpu_s, measure_s }
+    let complete = done == steps.count;
+    Ok(Timing { particles, steps: done, complete, setup_s, wall_s, step_s, cpu_s, measure_s })
 }
 
 /// What a step takes in the course of a run: the median of those after the cold ones, or of all where there are no others; not

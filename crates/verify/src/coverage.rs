@@ -4,18 +4,17 @@
 //! points and times: root mean squares, relative to those of what the part is a part of.
 
 use mmsmith_mpm::Material;
-use mmsmith_solutions::{AnySolution, Condition, Solution};
+use mmsmith_runtime::{AnySolution, Condition, Solution};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 use std::fmt;
 
-use crate::CheckError;
 use crate::case::law;
-use crate::check::with;
+use crate::check::{CheckError, with};
 use crate::difference::derivative;
 use crate::dimension::in_dimension;
+use crate::error::SceneError;
 use crate::points;
-use crate::scene::SceneError;
 
 /// A part of the balance, or of what a solver must model, in which a mistake may be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]

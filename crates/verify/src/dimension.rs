@@ -3,7 +3,7 @@
 /// `$body` with `$s` bound to the solution in its dimension; `$otherwise` for a dimension that is not known here.
 macro_rules! in_dimension {
     ($exact:expr, |$s:ident| $body:expr, else $otherwise:expr) => {{
-        use mmsmith_solutions::AnySolution;
+        use mmsmith_runtime::AnySolution;
         match $exact {
             AnySolution::One(solution) => {
                 let $s = solution.as_ref();
@@ -26,7 +26,7 @@ macro_rules! in_dimension {
 /// `$otherwise` where their dimensions differ or are not known here.
 macro_rules! in_arithmetic {
     ($exact:expr, $arithmetic:expr, |$s:ident, $m:ident| $body:expr, else $otherwise:expr) => {{
-        use mmsmith_solutions::AnySolution::{One, Three, Two};
+        use mmsmith_runtime::AnySolution::{One, Three, Two};
         use $crate::case::Arithmetic::{Double, Single};
         match ($exact, $arithmetic) {
             (One(s), Double) => in_arithmetic!(@ s, s, $s, $m, $body),

@@ -2,7 +2,7 @@
 
 use crate::dimension::in_dimension;
 use crate::points::outside;
-use mmsmith_solutions::{AnySolution, Fields, Solution};
+use mmsmith_runtime::{AnySolution, Fields, Solution};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 use thiserror::Error;

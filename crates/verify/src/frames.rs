@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use mmsmith_mpm::{Material, Particles};
-use mmsmith_solutions::{Real, Solution};
+use mmsmith_runtime::{Real, Solution};
 use mmsmith_vtk::{Array, Error, Frame, Series, Values};
 use nalgebra::{Matrix3, SMatrix, SVector};
 

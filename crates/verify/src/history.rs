@@ -4,7 +4,7 @@
 //! gains or loses is the difference between the two.
 
 use mmsmith_mpm::{Material, Particles};
-use mmsmith_solutions::{Real, Solution};
+use mmsmith_runtime::{Real, Solution};
 use serde::Serialize;
 
 use crate::measure::each_group;

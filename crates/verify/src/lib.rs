@@ -1,6 +1,6 @@
 //! Measures how far field code and a solver are from a manufactured solution.
 //!
-//! Solutions come from [`mmsmith_solutions`], the solver is [`mmsmith_mpm`], files are those of [`mmsmith_vtk`].
+//! Solutions come from [`mmsmith_runtime`], the solver is [`mmsmith_mpm`], files are those of [`mmsmith_vtk`].
 //!
 //! - [`check`] compares the fields of a solution with each other, by finite differences and by the solver's own
 //!   constitutive law, and the declared boundary conditions at sampled boundary points.
@@ -24,6 +24,8 @@ mod cost;
 mod coverage;
 mod difference;
 mod dimension;
+mod drive;
+mod error;
 mod evaluate;
 mod frames;
 mod history;
@@ -33,7 +35,9 @@ mod order;
 mod plan;
 mod points;
 mod record;
+mod run;
 mod scene;
+mod scheme;
 mod score;
 mod stability;
 mod study;
@@ -44,7 +48,7 @@ mod updated;
 mod verdict;
 mod whole_file;
 
-pub use case::{Arithmetic, Case, CaseError, Outputs, Progress, Row, Start, Status, run};
+pub use case::{Arithmetic, Case, CflSpeed, Extent};
 pub use check::{
     BLUNT, Change, CheckError, CheckReport, Finding, NoBody, OWN_ERROR_FACTOR, TOLERANCE, Verdict,
     body_of, check, has_body,
@@ -52,18 +56,21 @@ pub use check::{
 pub use checkpoint::{CheckpointError, CheckpointFolder, Checkpoints};
 pub use cost::{Cost, CostModel, Timing, time_steps};
 pub use coverage::{Part, Share, coverage, smallest_set};
+pub use error::{CaseError, SceneError};
 pub use evaluate::{FieldRow, WrongLength, evaluate};
 pub use frames::{FrameOutput, Snapshot};
 
 pub use history::{MOST_MOMENTS, Moment, Sums, energy_drift};
 pub use mmsmith_mpm::StepError;
-pub use mmsmith_mpm::total_lagrangian::{Composition, Coordinates, Layout, MassMatrix, Scheme};
+pub use mmsmith_mpm::total_lagrangian::{Composition, Coordinates, Layout, MassMatrix};
 pub use mmsmith_mpm::{Integrator, Shape, Transfer};
 pub use norms::{Field, Norm, PerField, PerNorm};
 pub use order::Order;
 pub use plan::{Plan, plan, round_off};
 pub use record::{Record, TemporalRecord};
-pub use scene::{Extent, SceneError, needs_total_frame};
+pub use run::{Outputs, Progress, Row, Status, run};
+pub use scene::needs_total_frame;
+pub use scheme::{Parts, Placement, Scheme, Start, Stepping, Total, Updated};
 pub use score::{
     Input, Points, Remark, Resolution, Role, Score, ScoreError, ScoreOptions, ScoreRow, Source,
     score,
@@ -74,13 +81,12 @@ pub use stability::{
 };
 pub use study::{Study, StudyError, Sweep, converge, orders_above};
 pub use temporal::{Temporal, TemporalRow, temporal};
-pub use total::{CflSpeed, Frame, POLAR_ANGLES, TotalScheme};
+pub use total::POLAR_ANGLES;
 pub use tradeoff::{
     Against, Cheapest, Chosen, Effect, Entry, Goal, LADDER, MARGIN, Machine, Range, Repeat,
     RepeatOutcome, RunOutcome, Setting, SettingName, Skip, TOLERANCES, TimeEffect, Tradeoff,
     differences, extrapolate, families, leading, median, pareto, tradeoff,
 };
-pub use updated::Placement;
 pub use verdict::{
     Behaviour, Expected, ORDER_TOLERANCE, Values, Verdict as OrderVerdict, expected_in_space,
     expected_in_time, verdicts, verdicts_above,

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use mmsmith_mpm::{Material, Particles};
-use mmsmith_solutions::{BLOCK, Real, Solution, StateAtPoints, StateRun};
+use mmsmith_runtime::{BLOCK, Real, Solution, StateAtPoints, StateRun};
 use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;

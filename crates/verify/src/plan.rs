@@ -1,16 +1,14 @@
 //! What a case comes to, judged before it is run: its steps, its size.
 
-use mmsmith_solutions::{AnySolution, Solution};
+use mmsmith_runtime::{AnySolution, Solution};
 
-use crate::case::{Arithmetic, Case, CaseError};
+use crate::case::{Arithmetic, Case, CflSpeed, Extent};
 use crate::dimension::in_dimension;
+use crate::error::{CaseError, MOST_STEPS};
 use crate::norms::PerField;
-use crate::scene::{Extent, Scene};
-use crate::total::{CflSpeed, Frame};
+use crate::scene::Scene;
+use crate::scheme::Scheme;
 use crate::updated;
-
-/// Steps that no run should have; a typing error in a CFL number reaches it easily.
-pub(crate) const MOST_STEPS: f64 = 1e12;
 
 /// What a case comes to, known without running it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,7 +60,7 @@ pub fn round_off(
     in_dimension!(
         exact,
         |s| {
-            let (scene, _) = prepare(s, case)?;
+            let scene = prepare(s, case)?.scene;
             let speed = CflSpeed::PWave.of(s)?;
             let strain = u / scene.spacing;
             Ok(PerField { u, v: speed * strain, F: strain, P: s.density() * speed * speed * strain })
@@ -77,40 +75,73 @@ fn plan_in<const D: usize>(
     unit: f64,
     case: &Case,
 ) -> Result<Plan, CaseError> {
-    let (scene, steps) = prepare(exact, case)?;
-    let particles = match &case.frame {
-        Frame::Updated => {
-            updated::admit(&scene, case)?;
-            scene.particles_expected(case.per_cell)
+    let Prepared { scene, steps, .. } = prepare(exact, case)?;
+    let per_cell = case.per_cell;
+    let kept = Scene::bytes_of_exact(exact, scalar);
+    let (particles, bytes) = match &case.scheme {
+        Scheme::Updated(updated) => {
+            let bytes = updated::bytes_expected(&scene, updated, per_cell, scalar, kept);
+            (scene.particles_expected(per_cell), bytes)
         }
-        Frame::Total(total) => {
-            let grid = total.grid(&scene, case.per_cell)?;
-            grid.axes.iter().map(|axis| axis.cells as f64 * case.per_cell as f64).product()
+        Scheme::Total(total) => {
+            let grid = total.grid(&scene, per_cell)?;
+            let particles =
+                grid.axes.iter().map(|axis| axis.cells as f64 * per_cell as f64).product();
+            (particles, scene.bytes_expected(per_cell, scalar, kept))
         }
     };
-    let kept = Scene::bytes_of_exact(exact, scalar);
     Ok(Plan {
         steps: steps.count,
         particles,
-        bytes: match &case.frame {
-            Frame::Updated => updated::bytes_expected(&scene, case, scalar, kept),
-            Frame::Total(_) => scene.bytes_expected(case.per_cell, scalar, kept),
-        },
+        bytes,
         extent: scene.extent(),
         round_off: unit * scene.reach() * (steps.count as f64).sqrt(),
     })
 }
 
-/// The scene and the steps of a case.
+/// A case that can be run, on its grid.
+pub(crate) struct Prepared<const D: usize> {
+    pub(crate) scene: Scene<D>,
+    /// The waves that the case's CFL number refers to.
+    pub(crate) waves: Waves,
+    /// The end time.
+    pub(crate) end: f64,
+    pub(crate) steps: Steps,
+}
+
+/// Judges a case, and puts it on its grid.
 pub(crate) fn prepare<const D: usize>(
     exact: &dyn Solution<f64, D>,
     case: &Case,
-) -> Result<(Scene<D>, Steps), CaseError> {
+) -> Result<Prepared<D>, CaseError> {
     case.validate()?;
     let end = case.periods * exact.period();
     let scene = Scene::new(exact, case, end)?;
-    let steps = Steps::new(case, end, scene.spacing, case.cfl_speed.of(exact)?)?;
-    Ok((scene, steps))
+    let waves = Waves { speed: case.cfl_speed.of(exact)?, spacing: scene.spacing };
+    let steps = Steps::new(case.cfl, end, waves)?;
+    if let Scheme::Updated(updated) = &case.scheme {
+        updated::admit(&scene, updated)?;
+    }
+    Ok(Prepared { scene, waves, end, steps })
+}
+
+/// Waves that cross the cells of a grid: what time steps and CFL numbers have to do with each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Waves {
+    pub(crate) speed: f64,
+    pub(crate) spacing: f64,
+}
+
+impl Waves {
+    /// The time step of a CFL number.
+    pub(crate) fn time_step(self, cfl: f64) -> f64 {
+        cfl * self.spacing / self.speed
+    }
+
+    /// The CFL number of a time step.
+    pub(crate) fn cfl(self, time_step: f64) -> f64 {
+        time_step * self.speed / self.spacing
+    }
 }
 
 /// The steps of a run: `count` of equal length `dt` that end exactly at the end time.
@@ -122,19 +153,23 @@ pub(crate) struct Steps {
 }
 
 impl Steps {
-    fn new(case: &Case, end: f64, spacing: f64, speed: f64) -> Result<Self, CaseError> {
-        let longest = case.cfl * spacing / speed;
-        let exact = end / longest;
-        // Slightly more than a whole number is rounding, not another step.
-        let count = (exact - 1e-9).ceil().max(1.0);
-        if count.is_nan() || count > MOST_STEPS {
-            return Err(CaseError::TooManySteps { end, dt: longest, steps: count });
-        }
-        let dt = end / count;
-        let is_whole = (exact - count).abs() <= 1e-9;
-        let cfl = if is_whole { case.cfl } else { dt * speed / spacing };
-        Ok(Self { count: count as u64, dt, cfl })
+    fn new(cfl: f64, end: f64, waves: Waves) -> Result<Self, CaseError> {
+        let longest = waves.time_step(cfl);
+        let count = steps_to(end, longest)?;
+        let dt = end / count as f64;
+        let is_whole = (end / longest - count as f64).abs() <= 1e-9;
+        Ok(Self { count, dt, cfl: if is_whole { cfl } else { waves.cfl(dt) } })
     }
+}
+
+/// How many steps of at most `dt` lead to the end time.
+pub(crate) fn steps_to(end: f64, dt: f64) -> Result<u64, CaseError> {
+    // Slightly more than a whole number is rounding, not another step.
+    let steps = (end / dt - 1e-9).ceil().max(1.0);
+    if steps.is_nan() || steps > MOST_STEPS {
+        return Err(CaseError::TooManySteps { end, dt, steps });
+    }
+    Ok(steps as u64)
 }
 
 #[cfg(test)]
@@ -155,21 +190,20 @@ mod tests {
 
     #[test]
     fn whole_steps_keep_the_cfl_number_and_others_shorten_the_step() {
-        let case = Case { cfl: 0.4, ..Case::default() };
-        let steps = Steps::new(&case, 0.02, 1.0 / 16.0, 100.0).unwrap();
+        let waves = Waves { speed: 100.0, spacing: 1.0 / 16.0 };
+        let steps = Steps::new(0.4, 0.02, waves).unwrap();
         assert_eq!((steps.count, steps.cfl), (80, 0.4));
         assert_eq!(steps.dt, 0.02 / 80.0);
-        let case = Case { cfl: 0.3, ..Case::default() };
-        let steps = Steps::new(&case, 0.02, 1.0 / 16.0, 100.0).unwrap();
+        let steps = Steps::new(0.3, 0.02, waves).unwrap();
         assert_eq!(steps.count, 107);
         assert!((steps.cfl - 32.0 / 107.0).abs() < 1e-15 && steps.cfl < 0.3);
     }
 
     #[test]
     fn a_step_longer_than_the_end_time_becomes_one_step() {
-        let case = Case { cfl: 1e9, ..Case::default() };
-        assert_eq!(Steps::new(&case, 0.02, 0.1, 100.0).unwrap().count, 1);
-        let case = Case { cfl: 1e-300, ..Case::default() };
-        assert!(matches!(Steps::new(&case, 0.02, 0.1, 100.0), Err(CaseError::TooManySteps { .. })));
+        let waves = Waves { speed: 100.0, spacing: 0.1 };
+        assert_eq!(Steps::new(1e9, 0.02, waves).unwrap().count, 1);
+        let found = Steps::new(1e-300, 0.02, waves);
+        assert!(matches!(found, Err(CaseError::TooManySteps { .. })));
     }
 }

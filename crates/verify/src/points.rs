@@ -4,7 +4,7 @@
 //! fractional part of `1/2 + n g^-(j+1)`, `g` the positive root of `g^(d+1) = g + 1`. M. Roberts, "The
 //! unreasonable effectiveness of quasirandom sequences" (2018).
 
-use mmsmith_solutions::{Domain, Surface};
+use mmsmith_runtime::{Domain, Surface};
 use nalgebra::SVector;
 
 /// Share of the body's size, and of the time span, that samples keep away from the ends.

@@ -7,8 +7,8 @@ use mmsmith_mpm::StepError;
 use serde::de::{Error, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::case::{Row, Status};
 use crate::norms::{Field, PerField, PerNorm};
+use crate::run::{Row, Status};
 use crate::temporal::{Temporal, TemporalRow};
 
 /// A [`Row`] to be kept: written and read, it gives the same row to the bit.

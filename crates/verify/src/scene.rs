@@ -1,104 +1,16 @@
 //! From a solution to a grid with walls and particles.
 
 use mmsmith_mpm::Grid;
-use mmsmith_solutions::{AnySolution, Boundary, Condition, Domain, Real, Solution, Surface};
+use mmsmith_runtime::{AnySolution, Boundary, Condition, Domain, Real, Solution, Surface};
 use nalgebra::SVector;
-use thiserror::Error;
 
+use crate::case::{Case, Extent};
 use crate::dimension::in_dimension;
-use crate::total::Frame;
-use crate::{Case, points};
+use crate::error::SceneError;
+use crate::points;
 
 /// Free cells beyond the furthest place that a free surface reaches.
 const MARGIN_CELLS: f64 = 3.0;
-
-/// How much of an annulus or a spherical shell is modelled.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Extent {
-    /// The part of positive coordinates, between the declared planes of symmetry: a quarter of the plane, an eighth of
-    /// space.
-    Quarter,
-    /// All of it, without planes of symmetry.
-    Full,
-}
-
-/// Why a solution could not be put onto a grid.
-#[derive(Clone, Debug, Error, PartialEq)]
-pub enum SceneError {
-    /// The box's sides are not whole multiples of the spacing.
-    #[error(
-        "{cells} cells make the spacing {spacing:?}, which does not divide the box's sides {sides:?}; \
-         {}",
-        suggestion(fitting)
-    )]
-    Misfit {
-        /// The cell count asked for.
-        cells: usize,
-        /// The spacing that follows from it.
-        spacing: f64,
-        /// The box's sides.
-        sides: Vec<f64>,
-        /// The nearest cell counts that would fit.
-        fitting: Vec<usize>,
-    },
-    /// The solver has no model for a boundary condition.
-    #[error("the solver does not model the condition {} on {}{instead}", condition, surface)]
-    Unmodelled {
-        /// Where.
-        surface: Surface,
-        /// What.
-        condition: Condition,
-        /// What would model it, from a separator on; empty where nothing does.
-        instead: &'static str,
-    },
-    /// Surfaces of the body without a boundary condition.
-    #[error(
-        "the solution declares no condition on {}, so the solver cannot know what holds there; the motion of the solution \
-         holds with these lines in its specification:\n{}",
-        list(surfaces),
-        lines(surfaces)
-    )]
-    Undeclared {
-        /// Where.
-        surfaces: Vec<Surface>,
-    },
-    /// The solver has no model for the body's shape or its material.
-    #[error("the solver does not model this {what}: {value}")]
-    Unknown {
-        /// `shape` or `material`.
-        what: &'static str,
-        /// Its debug form.
-        value: String,
-    },
-    /// A material that the solver has no law of its own for.
-    #[error(
-        "only the specification states this material; the solver's laws are written by hand, and it has none to run it \
-         with (mms check and mms eval serve it all the same)"
-    )]
-    NoLaw,
-    /// An extent was asked for that the body does not have.
-    #[error("{0}")]
-    Extent(&'static str),
-    /// No lattice point lies in the body.
-    #[error("no particle lies inside the body with {cells} cells; use more cells or particles")]
-    Empty {
-        /// The cell count asked for.
-        cells: usize,
-    },
-}
-
-fn list(surfaces: &[Surface]) -> String {
-    surfaces.iter().map(Surface::to_string).collect::<Vec<_>>().join(", ")
-}
-
-/// What a specification says of surfaces that move as the solution does.
-fn lines(surfaces: &[Surface]) -> String {
-    let one = |surface: &Surface| {
-        let condition = Condition::PrescribedMotion;
-        format!("\n[[boundary]]\nsurface = '{}'\ncondition = '{condition}'\n", surface)
-    };
-    surfaces.iter().map(one).collect::<String>().trim_end().to_owned()
-}
 
 /// A condition of `exact` that the total frame models and the updated one does not, if it has one.
 #[must_use]
@@ -110,14 +22,6 @@ pub fn needs_total_frame(exact: &AnySolution<f64>) -> Option<Boundary> {
 /// Whether the values of motion or traction come from the solution.
 fn is_given(condition: Condition) -> bool {
     matches!(condition, Condition::PrescribedMotion | Condition::PrescribedTraction)
-}
-
-fn suggestion(fitting: &[usize]) -> String {
-    if fitting.is_empty() {
-        return "no cell count near it does".into();
-    }
-    let counts: Vec<_> = fitting.iter().map(usize::to_string).collect();
-    format!("cell counts that do: {}", counts.join(", "))
 }
 
 /// A body on a background grid, in double precision.
@@ -158,7 +62,7 @@ impl<const D: usize> Scene<D> {
         let mut sides = [[Condition::TractionFree; 2]; D];
         for &Boundary { surface, condition } in solution.boundaries() {
             let is_wall = matches!(condition, Condition::Sliding | Condition::Symmetry);
-            if is_given(condition) && case.frame == Frame::Updated {
+            if is_given(condition) && case.scheme.updated().is_some() {
                 let instead = instead(&domain);
                 return Err(SceneError::Unmodelled { surface, condition, instead });
             }

@@ -16,16 +16,19 @@
 //! be left. A run has the length of its periods, and at least that of 64 cells at the speed that the CFL number refers to,
 //! so that an instability has steps to grow in.
 
-use mmsmith_mpm::{BodyForce, Material, Particles, Scalar, Solver, StepError};
-use mmsmith_solutions::{AnySolution, Real, Solution};
+use std::ops::ControlFlow;
+
+use mmsmith_mpm::{Material, Particles, Scalar, StepError};
+use mmsmith_runtime::{AnySolution, Real, Solution};
 use serde::{Deserialize, Serialize};
 
-use crate::case::{Arithmetic, Case, CaseError, law, set_up};
+use crate::case::{Arithmetic, Case, CflSpeed, law};
 use crate::dimension::{in_arithmetic, in_dimension};
+use crate::drive::{Driven, Outcome, Stepped};
+use crate::error::CaseError;
 use crate::history::Totals;
-use crate::plan::{MOST_STEPS, plan, prepare};
+use crate::plan::{Prepared, plan, prepare, steps_to};
 use crate::scene::Scene;
-use crate::total::CflSpeed;
 
 /// When a run counts as unstable.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -78,8 +81,7 @@ impl Search {
         if self.width >= least {
             return Ok(());
         }
-        let (setting, value) = ("width", format!("{:e}", self.width));
-        Err(CaseError::Setting { setting, value, admissible })
+        Err(CaseError::setting("width", format!("{:e}", self.width), admissible))
     }
 
     /// Whether the search goes on between a stable and an unstable CFL number, where `unit` is that of P-waves.
@@ -402,11 +404,9 @@ fn scales<const D: usize>(
     exact: &dyn Solution<f64, D>,
     case: &Case,
 ) -> Result<(f64, f64), CaseError> {
-    let (scene, _) = prepare(exact, case)?;
-    let speed = case.cfl_speed.of(exact)?;
-    let unit = speed / CflSpeed::PWave.of(exact)?;
-    let periods = case.periods * exact.period();
-    Ok((unit, periods.max(LEAST_CELLS * scene.spacing / speed)))
+    let Prepared { waves, end, .. } = prepare(exact, case)?;
+    let unit = waves.speed / CflSpeed::PWave.of(exact)?;
+    Ok((unit, end.max(waves.time_step(LEAST_CELLS))))
 }
 
 fn run_in<T: Real + Scalar<D>, const D: usize>(
@@ -416,17 +416,12 @@ fn run_in<T: Real + Scalar<D>, const D: usize>(
     end: f64,
     limits: Option<&Limits>,
 ) -> Result<Observed, CaseError> {
-    let (scene, _) = prepare(exact, case)?;
-    let longest = case.cfl * scene.spacing / case.cfl_speed.of(exact)?;
-    let time_step: T = Real::nearest(longest);
-    let dt = time_step.to_f64();
-    let count = (end / dt - 1e-9).ceil().max(1.0);
-    if count.is_nan() || count > MOST_STEPS {
-        return Err(CaseError::TooManySteps { end, dt, steps: count });
-    }
-    let run = Run { exact, scene: &scene, cfl: case.cfl, dt, count: count as u64, limits };
-    let (mut solver, body_force) = set_up(exact, model, case, &scene, time_step)?;
-    run.follow(solver.as_mut(), &body_force)
+    let Prepared { scene, waves, .. } = prepare(exact, case)?;
+    let time_step = waves.time_step(case.cfl);
+    // In the solver's precision, which is what it steps with.
+    let count = steps_to(end, <T as Real>::nearest(time_step).to_f64())?;
+    let mut driven = Driven::set_up(exact, model, case, &scene, time_step)?;
+    Run { exact, scene: &scene, cfl: case.cfl, count, limits }.follow(&mut driven)
 }
 
 /// One run.
@@ -434,30 +429,23 @@ struct Run<'a, const D: usize> {
     exact: &'a dyn Solution<f64, D>,
     scene: &'a Scene<D>,
     cfl: f64,
-    dt: f64,
     count: u64,
     limits: Option<&'a Limits>,
 }
 
 impl<const D: usize> Run<'_, D> {
-    fn follow<T: Real>(
+    fn follow<T: Real + Scalar<D>>(
         &self,
-        solver: &mut dyn Solver<T, D>,
-        body_force: &dyn BodyForce<T, D>,
+        driven: &mut Driven<'_, T, D>,
     ) -> Result<Observed, CaseError> {
-        let lag = solver.velocity_lag().to_f64();
+        let lag = driven.solver.velocity_lag().to_f64();
         let material = law::<f64>(self.exact.material())?;
-        let scales = self.largest(solver.observe().0, &material);
+        let scales = self.largest(driven.solver.observe().0, &material);
         let (mut error, mut energy, mut momentum) = (0.0_f64, 0.0_f64, 0.0_f64);
-        let mut failure = None;
         let mut steps = 0;
-        for step in 1..=self.count {
-            if let Err(error) = solver.step(body_force) {
-                failure = Some(Failure::from(&error));
-                break;
-            }
+        let outcome = driven.advance(1..=self.count, &mut |stepped| {
+            let Stepped { step, time, solver, .. } = stepped;
             steps = step;
-            let time = step as f64 * self.dt;
             let particles = solver.observe().0;
             let totals = Totals::of(particles, &material, self.exact, time, time - lag);
             error = error.max(totals.error);
@@ -466,11 +454,14 @@ impl<const D: usize> Run<'_, D> {
             let momenta = totals.computed.momentum.iter().zip(&totals.exact.momentum);
             let length = momenta.map(|(p, q)| (p - q) * (p - q)).sum::<f64>().sqrt();
             momentum = momentum.max(length / scales.1);
-            failure = self.judge(step, time, &totals, gain, scales.0);
-            if failure.is_some() {
-                break;
-            }
-        }
+            let failure = self.judge(step, time, &totals, gain, scales.0);
+            Ok(failure.map_or(ControlFlow::Continue(()), ControlFlow::Break))
+        })?;
+        let failure = match outcome {
+            Outcome::Done => None,
+            Outcome::Stopped(error) => Some(Failure::from(&error)),
+            Outcome::Left(failure) => Some(failure),
+        };
         let finite = |value: f64| value.is_finite().then_some(value);
         Ok(Observed {
             cfl: self.cfl,

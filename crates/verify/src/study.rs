@@ -1,13 +1,15 @@
 //! Convergence studies: the same case on several grids or with several time steps.
 
-use mmsmith_solutions::AnySolution;
+use mmsmith_runtime::AnySolution;
 use serde::Serialize;
 use thiserror::Error;
 
-use crate::case::{Arithmetic, Case, CaseError, Outputs, Progress, Row, Status, run};
+use crate::case::{Arithmetic, Case};
+use crate::error::CaseError;
 use crate::norms::{Field, Norm, PerField, PerNorm};
 use crate::order::Order;
 use crate::plan::plan;
+use crate::run::{Outputs, Progress, Row, Status, run};
 
 /// What changes from row to row.
 #[derive(Clone, Debug, PartialEq)]

@@ -8,17 +8,22 @@
 //! reference 16 times finer.
 
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 
 use mmsmith_mpm::Scalar;
-use mmsmith_solutions::{AnySolution, Real, Solution};
+use mmsmith_runtime::{AnySolution, Real, Solution};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 
-use crate::case::{Arithmetic, Case, CaseError, Progress, Status, set_up};
+use crate::case::{Arithmetic, Case};
 use crate::dimension::in_arithmetic;
+use crate::drive::{Driven, Outcome, Stepped};
+use crate::error::{CaseError, MOST_STEPS};
 use crate::norms::{PerField, PerNorm, Tallies, is_squarable, magnitude, scale_of};
 use crate::order::Order;
-use crate::plan::{MOST_STEPS, prepare};
+use crate::plan::{Prepared, prepare};
+use crate::run::{Progress, Status};
+use crate::scene::Scene;
 use crate::study::{StudyError, orders_of};
 
 /// The runs are compared at this many times, evenly spread, the last one the end.
@@ -103,7 +108,7 @@ fn over<T: Real + Scalar<D>, const D: usize>(
     let mut counts = Vec::with_capacity(cfls.len());
     for (index, &cfl) in cfls.iter().enumerate() {
         let fail = |cause| StudyError { index, cause };
-        let (_, steps) = prepare(exact, &Case { cfl, ..*base }).map_err(fail)?;
+        let steps = prepare(exact, &Case { cfl, ..*base }).map_err(fail)?.steps;
         let count = steps.count.div_ceil(INSTANTS) * INSTANTS;
         if 2.0 * count as f64 > MOST_STEPS {
             let (dt, steps) = (end / (2 * count) as f64, 2.0 * count as f64);
@@ -111,6 +116,8 @@ fn over<T: Real + Scalar<D>, const D: usize>(
         }
         counts.push(count);
     }
+    let fail = |cause| StudyError { index: 0, cause };
+    let Prepared { scene, waves, .. } = prepare(exact, base).map_err(fail)?;
     // Halves of one row are often the whole of the next.
     let mut runs = BTreeMap::new();
     for (index, &count) in counts.iter().enumerate() {
@@ -125,20 +132,18 @@ fn over<T: Real + Scalar<D>, const D: usize>(
             let share = (before + step) as f64 / total as f64;
             progress(Progress { case: index, step, steps: count, share });
         };
-        let run = observe(exact, model, base, count, &mut report);
+        let set_up = Driven::set_up(exact, model, base, &scene, end / count as f64);
+        let run = set_up.and_then(|driven| observe(driven, exact, &scene, count, &mut report));
         states.insert(count, run.map_err(|cause| StudyError { index, cause })?);
         before += count;
     }
-    let fail = |cause| StudyError { index: 0, cause };
-    let (scene, _) = prepare(exact, base).map_err(fail)?;
-    let speed = base.cfl_speed.of(exact).map_err(fail)?;
     let rows = counts.iter().map(|&count| {
         let dt = end / count as f64;
         let (status, differences) = match (&states[&count], &states[&(2 * count)]) {
             (Ok(coarse), Ok(fine)) => (Status::Ok, largest_difference(coarse, fine)),
             (Err(status), _) | (_, Err(status)) => (status.clone(), not_known()),
         };
-        let cfl = dt * speed / scene.spacing;
+        let cfl = waves.cfl(dt);
         TemporalRow {
             cells: base.cells,
             h: scene.spacing,
@@ -163,23 +168,18 @@ struct State<const D: usize> {
 
 /// The states at the common times of a run with `count` steps, or how it failed.
 fn observe<T: Real + Scalar<D>, const D: usize>(
+    mut driven: Driven<'_, T, D>,
     exact: &dyn Solution<f64, D>,
-    model: &dyn Solution<T, D>,
-    case: &Case,
+    scene: &Scene<D>,
     count: u64,
     progress: &mut dyn FnMut(u64),
 ) -> Result<Result<Vec<State<D>>, Status>, CaseError> {
-    let (scene, _) = prepare(exact, case)?;
-    let time_step: T = Real::nearest(case.periods * exact.period() / count as f64);
-    let (mut simulation, body_force) = set_up(exact, model, case, &scene, time_step)?;
-    let lags = simulation.velocity_lag() > T::zero();
+    let lags = driven.solver.velocity_lag() > T::zero();
     let mut states: Vec<State<D>> = Vec::new();
     // One step more than the run has: the last velocity at a full step needs it.
-    for step in 1..=count + u64::from(lags) {
-        if let Err(error) = simulation.step(&body_force) {
-            return Ok(Err(Status::Stopped(error)));
-        }
-        let (particles, law) = simulation.observe();
+    let outcome = driven.advance(1..=count + u64::from(lags), &mut |stepped| {
+        let Stepped { step, time, solver, .. } = stepped;
+        let (particles, law) = solver.observe();
         let v = || particles.v.iter().map(|v| v.map(Real::to_f64));
         if lags
             && (step - 1) % (count / INSTANTS) == 0
@@ -193,13 +193,13 @@ fn observe<T: Real + Scalar<D>, const D: usize>(
         }
         if step % (count / INSTANTS) == 0 && step <= count {
             let x: Vec<_> = particles.x.iter().map(|x| x.map(Real::to_f64)).collect();
-            let time = step as f64 * time_step.to_f64();
             for (particle, x) in x.iter().enumerate() {
                 let X = particles.X[particle].map(Real::to_f64);
                 let error = (x - X - exact.displacement(&X, time)).norm();
                 if error > scene.size || error.is_nan() {
                     let size = scene.size;
-                    return Ok(Err(Status::Unstable { step, time, particle, error, size }));
+                    let end = Status::Unstable { step, time, particle, error, size };
+                    return Ok(ControlFlow::Break(end));
                 }
             }
             // A particle that is inside out has no stress; the solver stops at its next step.
@@ -215,8 +215,13 @@ fn observe<T: Real + Scalar<D>, const D: usize>(
             });
         }
         progress(step.min(count));
-    }
-    Ok(Ok(states))
+        Ok(ControlFlow::Continue(()))
+    })?;
+    Ok(match outcome {
+        Outcome::Done => Ok(states),
+        Outcome::Stopped(error) => Err(Status::Stopped(error)),
+        Outcome::Left(status) => Err(status),
+    })
 }
 
 /// The norms of the difference over the particles, the largest over the times.

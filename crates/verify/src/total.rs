@@ -4,15 +4,16 @@ use mmsmith_mpm::total_lagrangian::{
     Axis, BoundaryData, Composition, Coordinates, End, Grid, Layout, MassMatrix, Quantity, Scheme,
     Side,
 };
-use mmsmith_mpm::{Integrator, Scalar, SetupError, Solver, TotalSetUp, Transfer};
-use mmsmith_solutions::{AnySolution, Condition, Domain, Real, Solution, Surface};
+use mmsmith_mpm::{Scalar, SetupError, Solver, TotalSetUp};
+use mmsmith_runtime::{AnySolution, Condition, Domain, Real, Solution, Surface};
 use nalgebra::SVector;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
-use crate::case::{Case, CaseError, law};
+use crate::case::{Case, CflSpeed, Extent, law};
 use crate::dimension::in_dimension;
-use crate::scene::{Extent, Scene};
-use crate::updated::Placement;
+use crate::error::CaseError;
+use crate::scene::Scene;
+use crate::scheme::{Total, grid_name};
 
 /// Polar angles of the part of a spherical shell that is modelled, from the third axis: beyond a cone about it, which moves as the
 /// solution says.
@@ -22,56 +23,15 @@ use crate::updated::Placement;
 /// eighth about the third axis is what is modelled about the first and the second.
 pub const POLAR_ANGLES: [f64; 2] = [FRAC_PI_4, FRAC_PI_2];
 
-/// The configuration that the weights belong to.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Frame {
-    /// Weights anew in each step, at the current positions.
-    #[default]
-    Updated,
-    /// Weights once, at the reference positions.
-    Total(TotalScheme),
-}
-
-/// A scheme in the reference configuration.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TotalScheme {
-    /// Degree of the splines, mass matrix and composition of leapfrog.
-    pub scheme: Scheme,
-    /// Where the particles lie in a cell.
-    pub layout: Layout,
-    /// What the grid's coordinates mean.
-    pub coordinates: Coordinates,
-}
-
-/// The speed that CFL numbers refer to.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum CflSpeed {
-    /// The solution's own, of waves in a bar unless its specification says otherwise.
-    #[default]
-    Bar,
-    /// P-waves in the undeformed solid, `sqrt((lambda + 2 mu)/rho0)`.
-    PWave,
-}
-
-impl CflSpeed {
-    pub(crate) fn of<const D: usize>(self, exact: &dyn Solution<f64, D>) -> Result<f64, CaseError> {
-        match self {
-            Self::Bar => Ok(exact.wave_speed()),
-            Self::PWave => {
-                let (lambda, mu) = law::<f64>(exact.material())?.small_strain_moduli();
-                Ok(((lambda + 2.0 * mu) / exact.density()).sqrt())
-            }
-        }
-    }
-}
-
-impl TotalScheme {
+impl Total {
     /// Splines of a degree with what goes best with them: consistent mass, and a composition of no lower order.
     #[must_use]
     pub fn of_degree(degree: usize) -> Self {
         let composition = if degree > 3 { Composition::Order6 } else { Composition::Order4 };
         Self {
-            scheme: Scheme { degree, mass: MassMatrix::Consistent, composition },
+            degree,
+            mass: MassMatrix::Consistent,
+            composition,
             layout: Layout::Lattice,
             coordinates: Coordinates::Cartesian,
         }
@@ -110,7 +70,7 @@ impl TotalScheme {
     /// [`CaseError`] for a material that the solver has no law for.
     pub fn usual_cfl(&self, exact: &AnySolution<f64>, speed: CflSpeed) -> Result<f64, CaseError> {
         const TIMES_DEGREE: f64 = 0.6;
-        let on_p_waves = TIMES_DEGREE / self.scheme.degree.max(1) as f64;
+        let on_p_waves = TIMES_DEGREE / self.degree.max(1) as f64;
         in_dimension!(
             exact,
             |s| {
@@ -121,55 +81,15 @@ impl TotalScheme {
         )
     }
 
-    /// Refuses what this scheme has no meaning for.
-    pub(crate) fn validate(&self, case: &Case) -> Result<(), CaseError> {
-        let refuse = |setting, value: String, admissible| {
-            Err(CaseError::Setting { setting, value, admissible })
-        };
-        if case.integrator != Integrator::Cd {
-            let value = case.integrator.to_string();
-            return refuse("integrator", value, "cd in the total Lagrangian formulation");
-        }
-        if case.transfer != Transfer::Flip {
-            return refuse(
-                "transfer",
-                case.transfer.to_string(),
-                "flip in the total Lagrangian formulation",
-            );
-        }
-        if case.placement != Placement::Lattice {
-            return refuse(
-                "layout",
-                "body-fitted".into(),
-                "lattice or gauss in the total Lagrangian formulation",
-            );
-        }
-        if case.offset != 0.0 {
-            return refuse(
-                "offset",
-                format!("{:?}", case.offset),
-                "0 in the total Lagrangian formulation",
-            );
-        }
-        Ok(())
-    }
-
     /// The grid that covers the body of a scene.
     pub(crate) fn grid<const D: usize>(
         &self,
         scene: &Scene<D>,
         per_cell: usize,
     ) -> Result<Grid<D>, CaseError> {
-        let refuse = |setting, value: &str, admissible| {
-            Err(CaseError::Setting { setting, value: value.into(), admissible })
-        };
         // As many cells as make none longer than the spacing across, and along the mean circle or sphere.
         let count = |length: f64| (length / scene.spacing - 1e-9).ceil().max(2.0) as usize;
-        let name = match self.coordinates {
-            Coordinates::Cartesian => "cartesian",
-            Coordinates::Polar => "polar",
-            Coordinates::Spherical => "spherical",
-        };
+        let name = grid_name(self.coordinates);
         let axes = match (&scene.domain, self.coordinates) {
             (Domain::Box { lower, upper }, Coordinates::Cartesian) => {
                 std::array::from_fn(|k| Axis {
@@ -185,7 +105,7 @@ impl TotalScheme {
                     _ => (FRAC_PI_2, End::Wall),
                 };
                 // Along a periodic axis no spline may meet itself.
-                let least = if end == End::Periodic { self.scheme.degree + 1 } else { 2 };
+                let least = if end == End::Periodic { self.degree + 1 } else { 2 };
                 let around = Axis {
                     lower: 0.0,
                     upper: angle,
@@ -198,11 +118,11 @@ impl TotalScheme {
             (Domain::Annulus { .. }, Coordinates::Spherical)
                 if D == 3 && scene.extent() == Some(Extent::Full) =>
             {
-                return refuse(
+                return Err(CaseError::setting(
                     "extent",
                     "full",
                     "quarter on a spherical grid, between planes of symmetry that the solution declares",
-                );
+                ));
             }
             (Domain::Annulus { inner, outer }, Coordinates::Spherical) if D == 3 => {
                 let radius = 0.5 * (inner + outer);
@@ -211,7 +131,7 @@ impl TotalScheme {
                     lower,
                     upper,
                     // The mirror images at the equator have to be splines that the cone does not cut.
-                    cells: count((upper - lower) * radius).max(self.scheme.degree),
+                    cells: count((upper - lower) * radius).max(self.degree),
                     ends: [End::Moved, End::Wall],
                 };
                 let around = Axis {
@@ -224,20 +144,20 @@ impl TotalScheme {
                 std::array::from_fn(|k| [across, down, around][k])
             }
             (Domain::Annulus { .. }, _) if D == 2 => {
-                return refuse(
+                return Err(CaseError::setting(
                     "grid",
                     name,
                     "polar for a ring in the total Lagrangian formulation",
-                );
+                ));
             }
             (Domain::Annulus { .. }, _) => {
-                return refuse(
+                return Err(CaseError::setting(
                     "grid",
                     name,
                     "spherical for a shell in the total Lagrangian formulation",
-                );
+                ));
             }
-            _ => return refuse("grid", name, "cartesian for a box"),
+            _ => return Err(CaseError::setting("grid", name, "cartesian for a box")),
         };
         Ok(Grid { axes, coordinates: self.coordinates, per_cell, layout: self.layout })
     }
@@ -323,25 +243,24 @@ impl<const D: usize> BoundaryData<D> for ExactBoundary<'_, D> {
 /// The solver at time zero with steps of `time_step`.
 pub(crate) fn set_up<'a, T: Real + Scalar<D>, const D: usize>(
     exact: &'a dyn Solution<f64, D>,
-    total: &TotalScheme,
+    total: &Total,
     case: &Case,
     scene: &Scene<D>,
     time_step: T,
 ) -> Result<Box<dyn Solver<T, D> + 'a>, CaseError> {
+    let Total { degree, mass, composition, .. } = *total;
     let set_up = TotalSetUp {
         grid: total.grid(scene, case.per_cell)?,
-        scheme: total.scheme,
+        scheme: Scheme { degree, mass, composition },
         material: law(exact.material())?,
         density: exact.density(),
         time_step: time_step.to_f64(),
         motion: &|X| [exact.displacement(X, 0.0), exact.velocity(X, 0.0)],
     };
     T::total_lagrangian(set_up, Box::new(ExactBoundary(exact))).map_err(|error| match error {
-        SetupError::DoublePrecisionOnly => CaseError::Setting {
-            setting: "precision",
-            value: "f32".into(),
-            admissible: "f64 in the total Lagrangian formulation",
-        },
+        SetupError::DoublePrecisionOnly => {
+            CaseError::setting("precision", "f32", "f64 in the total Lagrangian formulation")
+        }
         error => error.into(),
     })
 }

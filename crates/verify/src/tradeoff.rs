@@ -11,15 +11,15 @@
 //! Nothing here knows a clock or a solver: both are given, so that tests can state them.
 
 use mmsmith_mpm::total_lagrangian::{Composition, Coordinates, Layout, MassMatrix};
-use mmsmith_mpm::{Integrator, Shape, Transfer};
+use mmsmith_mpm::{Shape, Transfer};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-use crate::case::{Case, Row, Status};
+use crate::case::Case;
 use crate::cost::{Cost, CostModel};
 use crate::plan::Plan;
-use crate::total::{Frame, TotalScheme};
-use crate::updated::Placement;
+use crate::run::{Row, Status};
+use crate::scheme::{Placement, Scheme, Stepping, Total, Updated};
 
 /// Cell counts of a ladder.
 pub const LADDER: [usize; 15] = [4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512];
@@ -390,14 +390,16 @@ pub fn families(
     plan: &dyn Fn(&Setting) -> Option<Plan>,
 ) -> Vec<Setting> {
     let mut all = Vec::new();
-    let updated =
-        Case { frame: Frame::Updated, integrator: Integrator::Cd, per_cell: 2, ..base.case };
-    let mut add = |case: Case| all.push(Setting { case, ..*base });
-    for placement in [Placement::Lattice, Placement::BodyFitted] {
-        let updated = Case { placement, ..updated };
-        let usual = if placement == Placement::Lattice { Shape::Gimp } else { Shape::Cpdi2 };
-        let usual = Case { shape: usual, ..updated };
-        add(usual);
+    let with = |scheme: Scheme, per_cell: usize| Setting {
+        case: Case { scheme, per_cell, ..base.case },
+        ..*base
+    };
+    let square = Updated::default();
+    let fitted =
+        Updated { shape: Shape::Cpdi2, placement: Placement::BodyFitted, ..Updated::default() };
+    for usual in [square, fitted] {
+        let mut add = |scheme: Updated, per_cell| all.push(with(Scheme::Updated(scheme), per_cell));
+        add(usual, 2);
         let shapes = [
             Shape::Linear,
             Shape::Ugimp,
@@ -408,53 +410,46 @@ pub fn families(
             Shape::Bspline3,
         ];
         for shape in shapes.into_iter().filter(|shape| *shape != usual.shape) {
-            add(Case { shape, ..updated });
+            add(Updated { shape, ..usual }, 2);
         }
-        for integrator in [Integrator::Usl, Integrator::Usf, Integrator::Musl, Integrator::Usavg] {
-            add(Case { integrator, ..usual });
+        for stepping in [Stepping::Usl, Stepping::Usf, Stepping::Musl, Stepping::Usavg] {
+            add(Updated { stepping, ..usual }, 2);
         }
         for per_cell in [1, 3, 4] {
-            add(Case { per_cell, ..usual });
+            add(usual, per_cell);
         }
-        add(Case { shape: Shape::Bspline3, per_cell: 4, ..updated });
+        add(Updated { shape: Shape::Bspline3, ..usual }, 4);
         for transfer in [Transfer::Pic, Transfer::Apic, Transfer::Xpic(2)] {
-            add(Case { transfer, ..usual });
+            add(Updated { transfer, ..usual }, 2);
         }
     }
-    let usual = Case { shape: Shape::Gimp, placement: Placement::Lattice, ..updated };
     if let Some(threads) = more_threads {
-        all.push(Setting { case: usual, threads, ..*base });
+        all.push(Setting { threads, ..with(Scheme::Updated(square), 2) });
     }
     if has_single {
         for shape in [Shape::Gimp, Shape::Ugimp] {
-            all.push(Setting { case: Case { shape, ..usual }, single: true, ..*base });
+            let scheme = Scheme::Updated(Updated { shape, ..square });
+            all.push(Setting { single: true, ..with(scheme, 2) });
         }
     }
     for coordinates in [Coordinates::Cartesian, Coordinates::Polar, Coordinates::Spherical] {
         for degree in 2..=5 {
-            let total = TotalScheme { coordinates, ..TotalScheme::of_degree(degree) };
-            let mut add = |total: TotalScheme, layout: Layout, per_cell: usize| {
-                let frame = Frame::Total(TotalScheme { layout, ..total });
-                let case = Case { frame, per_cell, shape: Shape::Gimp, ..updated };
-                all.push(Setting { case, ..*base });
-            };
+            let lattice = Total { coordinates, ..Total::of_degree(degree) };
+            let gauss = Total { layout: Layout::Gauss, ..lattice };
+            let mut add = |scheme: Total, per_cell| all.push(with(Scheme::Total(scheme), per_cell));
             for per_cell in [2, 3, 4] {
-                add(total, Layout::Lattice, per_cell);
+                add(lattice, per_cell);
             }
             for per_cell in [degree - 1, degree, degree + 1] {
-                add(total, Layout::Gauss, per_cell);
+                add(gauss, per_cell);
             }
             for composition in [Composition::Order2, Composition::Order4, Composition::Order6] {
-                if composition != total.scheme.composition {
-                    let mut other = total;
-                    other.scheme.composition = composition;
-                    add(other, Layout::Gauss, degree);
+                if composition != gauss.composition {
+                    add(Total { composition, ..gauss }, degree);
                 }
             }
-            let mut lumped = total;
-            lumped.scheme.mass = MassMatrix::Lumped;
-            lumped.scheme.composition = Composition::Order2;
-            add(lumped, Layout::Lattice, 2);
+            let (mass, composition) = (MassMatrix::Lumped, Composition::Order2);
+            add(Total { mass, composition, ..lattice }, 2);
         }
     }
     let fits = |setting: &Setting| {
@@ -462,21 +457,12 @@ pub fn families(
         LADDER.iter().any(|&cells| plan(&at(cells)).is_some())
     };
     all.retain(fits);
-    for setting in &mut all {
-        // More of them would stand idle.
-        if !setting.case.steps_on_threads() {
-            setting.threads = 1;
-        }
-    }
     all
 }
 
 /// The order that a scheme may have.
 fn hint(setting: &Setting) -> f64 {
-    match &setting.case.frame {
-        Frame::Updated => 2.0,
-        Frame::Total(total) => total.scheme.degree as f64 + 1.0,
-    }
+    setting.case.scheme.total().map_or(2.0, |total| total.degree as f64 + 1.0)
 }
 
 /// What the weights are: the shape and where its particles lie, or the degree of the total frame's splines.
@@ -487,34 +473,42 @@ enum Weights {
 }
 
 fn weights(setting: &Setting) -> Weights {
-    match &setting.case.frame {
-        Frame::Updated => Weights::Updated(setting.case.shape, setting.case.placement),
-        Frame::Total(total) => Weights::Total(total.scheme.degree),
+    match &setting.case.scheme {
+        Scheme::Updated(updated) => Weights::Updated(updated.shape, updated.placement),
+        Scheme::Total(total) => Weights::Total(total.degree),
     }
 }
 
 /// Which settings differ.
 #[must_use]
 pub fn differences(a: &Setting, b: &Setting) -> Vec<SettingName> {
-    let scheme = |setting: &Setting| match setting.case.frame {
-        Frame::Updated => None,
-        Frame::Total(total) => Some(total),
-    };
     let (x, y) = (&a.case, &b.case);
-    let (s, t) = (scheme(a), scheme(b));
-    let degree = |total: Option<TotalScheme>| total.map(|total| total.scheme.degree);
-    let mass = |total: Option<TotalScheme>| total.map(|total| total.scheme.mass);
-    let order = |total: Option<TotalScheme>| total.map(|total| total.scheme.composition);
-    let layout = |total: Option<TotalScheme>| total.map(|total| (total.layout, total.coordinates));
+    let [shape, integrator, transfer, layout, mass] = match (&x.scheme, &y.scheme) {
+        (Scheme::Updated(x), Scheme::Updated(y)) => [
+            x.shape != y.shape,
+            x.stepping != y.stepping,
+            x.transfer != y.transfer,
+            x.placement != y.placement,
+            false,
+        ],
+        (Scheme::Total(x), Scheme::Total(y)) => [
+            x.degree != y.degree,
+            x.composition != y.composition,
+            false,
+            (x.layout, x.coordinates) != (y.layout, y.coordinates),
+            x.mass != y.mass,
+        ],
+        _ => [true, true, false, true, true],
+    };
     [
         (SettingName::Cells, x.cells != y.cells),
         (SettingName::Cfl, x.cfl != y.cfl),
         (SettingName::Ppc, x.per_cell != y.per_cell),
-        (SettingName::Shape, x.shape != y.shape || degree(s) != degree(t)),
-        (SettingName::Integrator, x.integrator != y.integrator || order(s) != order(t)),
-        (SettingName::Transfer, x.transfer != y.transfer),
-        (SettingName::Layout, x.placement != y.placement || layout(s) != layout(t)),
-        (SettingName::Mass, mass(s) != mass(t)),
+        (SettingName::Shape, shape),
+        (SettingName::Integrator, integrator),
+        (SettingName::Transfer, transfer),
+        (SettingName::Layout, layout),
+        (SettingName::Mass, mass),
         (SettingName::Precision, a.single != b.single),
         (SettingName::Threads, a.threads != b.threads),
     ]
@@ -872,10 +866,13 @@ impl<E> Sweep<'_, E> {
     /// Runs what is missing for comparisons in which one setting differs, on the finest grid that is cheap.
     fn compare_settings(&mut self, progress: &mut dyn FnMut(&Setting)) -> Result<(), E> {
         let cheap = 0.004 * self.goal.budget_s;
+        let first = |is_wanted: fn(&Scheme) -> bool| {
+            self.families.iter().position(|family| is_wanted(&family.setting.case.scheme))
+        };
         let references = [
-            self.families.iter().position(|f| f.setting.case.frame == Frame::Updated),
-            self.families.iter().position(|f| f.setting.case.placement == Placement::BodyFitted),
-            self.families.iter().position(|f| f.setting.case.frame != Frame::Updated),
+            first(|scheme| scheme.updated().is_some()),
+            first(|scheme| scheme.updated().is_some_and(|u| u.placement == Placement::BodyFitted)),
+            first(|scheme| scheme.total().is_some()),
         ];
         for reference in references.into_iter().flatten() {
             let of = self.families[reference].setting;
@@ -1042,13 +1039,13 @@ impl<E> Sweep<'_, E> {
                 let (a, b) = (&entries[from].setting, &entries[to].setting);
                 let &[name] = differences(a, b).as_slice() else { continue };
                 // Told of plain settings: with f32 or PIC, say, another setting's effect is another one.
-                let is_plain = a.case.transfer == Transfer::Flip
-                    && !a.single
-                    && (a.threads == plain.threads || !a.case.steps_on_threads())
+                let is_plain = !a.single
+                    && a.threads == plain.threads
                     && a.case.cfl <= plain.case.cfl
-                    && (a.case.per_cell == 2
-                        || name == SettingName::Ppc
-                        || a.case.frame != Frame::Updated);
+                    && a.case.scheme.updated().is_none_or(|updated| {
+                        updated.transfer == Transfer::Flip
+                            && (a.case.per_cell == 2 || name == SettingName::Ppc)
+                    });
                 let Some(change) = Change::of(name, a, b).filter(|_| is_plain) else { continue };
                 let error = self.error(to) / self.error(from);
                 if !(error.is_finite() && error > 0.0) {
@@ -1100,26 +1097,26 @@ enum Basis {
 }
 
 impl Basis {
-    fn of(setting: &Setting) -> Self {
-        match setting.case.frame {
-            Frame::Updated => Self::Updated(setting.case.shape),
-            Frame::Total(total) => Self::Total(total.scheme.degree),
+    fn of(scheme: &Scheme) -> Self {
+        match scheme {
+            Scheme::Updated(updated) => Self::Updated(updated.shape),
+            Scheme::Total(total) => Self::Total(total.degree),
         }
     }
 }
 
 /// How a scheme goes on in time.
 #[derive(Clone, Copy, PartialEq)]
-enum Stepping {
-    Updated(Integrator),
+enum InTime {
+    Updated(Stepping),
     Total(Composition),
 }
 
-impl Stepping {
-    fn of(setting: &Setting) -> Self {
-        match setting.case.frame {
-            Frame::Updated => Self::Updated(setting.case.integrator),
-            Frame::Total(total) => Self::Total(total.scheme.composition),
+impl InTime {
+    fn of(scheme: &Scheme) -> Self {
+        match scheme {
+            Scheme::Updated(updated) => Self::Updated(updated.stepping),
+            Scheme::Total(total) => Self::Total(total.composition),
         }
     }
 }
@@ -1128,11 +1125,11 @@ impl Stepping {
 #[derive(Clone, Copy, PartialEq)]
 enum Change {
     Cells(Weights),
-    Cfl(Basis, Stepping),
+    Cfl(Basis, InTime),
     Ppc(Basis, usize),
     Shape { from: Shape, to: Shape },
     Degree(usize),
-    Integrator(Shape, Integrator),
+    Integrator(Shape, Stepping),
     Composition { degree: usize, from: Composition },
     Transfer(Shape, Transfer),
     Layout(Basis),
@@ -1144,48 +1141,52 @@ enum Change {
 impl Change {
     /// The change of the setting `name` from `a` to `b`; none for the other way round, and for what nobody asks for.
     fn of(name: SettingName, a: &Setting, b: &Setting) -> Option<Self> {
-        let (x, y) = (&a.case, &b.case);
-        let basis = Basis::of(a);
-        let is_usual = x.shape == Shape::Gimp || x.placement == Placement::BodyFitted;
-        match (name, x.frame, y.frame) {
-            (SettingName::Cells, ..) => (y.cells == 2 * x.cells).then(|| Self::Cells(weights(a))),
-            (SettingName::Cfl, frame, _) => (y.cfl == x.cfl / 2.0
-                && (is_usual || frame != Frame::Updated))
-                .then(|| Self::Cfl(basis, Stepping::of(a))),
-            (SettingName::Ppc, ..) => {
-                (y.per_cell == x.per_cell + 1).then_some(Self::Ppc(basis, x.per_cell))
+        let (basis, in_time) = (Basis::of(&a.case.scheme), InTime::of(&a.case.scheme));
+        let is_usual = |updated: &Updated| {
+            updated.shape == Shape::Gimp || updated.placement == Placement::BodyFitted
+        };
+        match (name, &a.case.scheme, &b.case.scheme) {
+            (SettingName::Cells, ..) => {
+                (b.case.cells == 2 * a.case.cells).then(|| Self::Cells(weights(a)))
             }
-            (SettingName::Shape, Frame::Total(from), Frame::Total(to)) => {
-                let (from, to) = (from.scheme.degree, to.scheme.degree);
-                (to == from + 1).then_some(Self::Degree(from))
+            (SettingName::Cfl, scheme, _) => (b.case.cfl == a.case.cfl / 2.0
+                && scheme.updated().is_none_or(is_usual))
+            .then_some(Self::Cfl(basis, in_time)),
+            (SettingName::Ppc, ..) => (b.case.per_cell == a.case.per_cell + 1)
+                .then_some(Self::Ppc(basis, a.case.per_cell)),
+            (SettingName::Shape, Scheme::Total(from), Scheme::Total(to)) => {
+                (to.degree == from.degree + 1).then_some(Self::Degree(from.degree))
             }
-            (SettingName::Shape, Frame::Updated, Frame::Updated) => {
-                is_usual.then_some(Self::Shape { from: x.shape, to: y.shape })
+            (SettingName::Shape, Scheme::Updated(from), Scheme::Updated(to)) => {
+                is_usual(from).then_some(Self::Shape { from: from.shape, to: to.shape })
             }
             // From centred differences to another one; between compositions to the next order.
-            (SettingName::Integrator, Frame::Updated, _) => {
-                (x.integrator == Integrator::Cd).then_some(Self::Integrator(x.shape, y.integrator))
+            (SettingName::Integrator, Scheme::Updated(from), Scheme::Updated(to)) => {
+                matches!(from.stepping, Stepping::Cd(_))
+                    .then_some(Self::Integrator(from.shape, to.stepping))
             }
-            (SettingName::Integrator, Frame::Total(from), Frame::Total(to)) => {
-                let degree = from.scheme.degree;
-                let (from, to) = (from.scheme.composition, to.scheme.composition);
-                (to.order() == from.order() + 2).then_some(Self::Composition { degree, from })
+            (SettingName::Integrator, Scheme::Total(from), Scheme::Total(to)) => {
+                (to.composition.order() == from.composition.order() + 2)
+                    .then_some(Self::Composition { degree: from.degree, from: from.composition })
             }
-            (SettingName::Transfer, ..) => {
-                (x.transfer == Transfer::Flip).then_some(Self::Transfer(x.shape, y.transfer))
+            (SettingName::Transfer, Scheme::Updated(from), Scheme::Updated(to)) => {
+                (from.transfer == Transfer::Flip).then_some(Self::Transfer(from.shape, to.transfer))
             }
-            (SettingName::Layout, Frame::Updated, _) => {
-                (x.placement == Placement::Lattice).then_some(Self::Layout(basis))
+            (SettingName::Layout, Scheme::Updated(from), _) => {
+                (from.placement != Placement::BodyFitted).then_some(Self::Layout(basis))
             }
-            (SettingName::Layout, Frame::Total(total), _) => {
-                (total.layout == Layout::Lattice).then_some(Self::Layout(basis))
+            (SettingName::Layout, Scheme::Total(from), _) => {
+                (from.layout == Layout::Lattice).then_some(Self::Layout(basis))
             }
-            (SettingName::Mass, Frame::Total(total), _) => {
-                let is_lumped = total.scheme.mass == MassMatrix::Lumped;
-                is_lumped.then_some(Self::Mass(total.scheme.degree))
+            (SettingName::Mass, Scheme::Total(from), _) => {
+                (from.mass == MassMatrix::Lumped).then_some(Self::Mass(from.degree))
             }
-            (SettingName::Precision, ..) => (!a.single).then_some(Self::Precision(x.shape)),
-            (SettingName::Threads, ..) => (b.threads > a.threads).then_some(Self::Threads(x.shape)),
+            (SettingName::Precision, Scheme::Updated(from), _) => {
+                (!a.single).then_some(Self::Precision(from.shape))
+            }
+            (SettingName::Threads, Scheme::Updated(from), _) => {
+                (b.threads > a.threads).then_some(Self::Threads(from.shape))
+            }
             // Frames are no setting that is compared.
             _ => None,
         }

@@ -1,118 +1,75 @@
 //! Runs in the updated Lagrangian formulation: from a solution to a grid, particles with their domains, and their motion.
 
 use mmsmith_mpm::{Annulus, Body, Particles, Scalar, Settings, Shape, Solver, Transfer};
-use mmsmith_solutions::{Domain, Real, Solution};
+use mmsmith_runtime::{Domain, Real, Solution};
 use nalgebra::SVector;
 
-use crate::case::{Case, CaseError, law, set_in_motion, starts_halved};
-use crate::scene::{Extent, Scene, SceneError};
-use crate::total::{self, Frame};
-
-/// Where the particles of the updated frame lie.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Placement {
-    /// At the centres of equal parts of the background cells.
-    #[default]
-    Lattice,
-    /// For rings: at the centroids of polar cells, whose corners lie on the rims.
-    BodyFitted,
-}
-
-impl Placement {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Lattice => "lattice",
-            Self::BodyFitted => "body-fitted",
-        }
-    }
-}
-
-/// Refuses what makes no sense whatever the solution.
-pub(crate) fn validate(case: &Case) -> Result<(), CaseError> {
-    if case.placement == Placement::BodyFitted && case.offset != 0.0 {
-        let value = format!("{:?}", case.offset);
-        return refuse(
-            "offset",
-            &value,
-            "0 with particles fitted to the body, or the layout lattice",
-        );
-    }
-    let boxed = matches!(case.shape, Shape::Ugimp | Shape::Gimp);
-    if boxed && case.placement == Placement::BodyFitted {
-        return refuse(
-            "layout",
-            case.placement.name(),
-            "lattice with gimp and ugimp, whose boxes lie along the axes, or the shape cpdi2, cpdi, linear, bspline2 or \
-             bspline3",
-        );
-    }
-    Ok(())
-}
+use crate::case::{Case, Extent, law};
+use crate::error::{CaseError, SceneError};
+use crate::scene::Scene;
+use crate::scheme::{Placement, Start, Stepping, Updated};
 
 /// Refuses what makes no sense on this scene.
-pub(crate) fn admit<const D: usize>(scene: &Scene<D>, case: &Case) -> Result<(), CaseError> {
-    if case.placement == Placement::BodyFitted {
-        let fitted = case.placement.name();
-        match scene.domain {
-            Domain::Annulus { .. } if D == 2 => {}
-            Domain::Annulus { .. } => return refuse("layout", fitted, "lattice for a shell"),
-            _ => return refuse("layout", fitted, "lattice for a box, which that fits"),
-        }
-    }
-    Ok(())
-}
-
-fn refuse<T>(setting: &'static str, value: &str, admissible: &'static str) -> Result<T, CaseError> {
-    Err(CaseError::Setting { setting, value: value.into(), admissible })
+pub(crate) fn admit<const D: usize>(scene: &Scene<D>, updated: &Updated) -> Result<(), CaseError> {
+    let instead = match (updated.placement, &scene.domain) {
+        (Placement::Lattice { .. }, _) => return Ok(()),
+        (Placement::BodyFitted, Domain::Annulus { .. }) if D == 2 => return Ok(()),
+        (Placement::BodyFitted, Domain::Annulus { .. }) => "lattice for a shell",
+        (Placement::BodyFitted, _) => "lattice for a box, which that fits",
+    };
+    Err(CaseError::setting("layout", updated.placement.name(), instead))
 }
 
 /// About how many bytes a run keeps, for values of `scalar` bytes, where the exact fields keep `exact` bytes of each particle.
 pub(crate) fn bytes_expected<const D: usize>(
     scene: &Scene<D>,
-    case: &Case,
+    updated: &Updated,
+    per_cell: usize,
     scalar: usize,
     exact: usize,
 ) -> f64 {
     // Numbers of a particle, and of a node, that other schemes than those of one pass with boxes keep beside those.
-    let of_shape = match case.shape {
+    let of_shape = match updated.shape {
         Shape::Cpdi => D * D,
         // Corners, in three configurations, are as many as particles; a domain has eight indices.
         Shape::Cpdi2 => 3 * D + D * D + size_of::<[usize; 8]>() / scalar,
         _ => 0,
     };
-    let (of_transfer, of_node) = match case.transfer {
+    let (of_transfer, of_node) = match updated.transfer {
         Transfer::Apic => (D * D, 0),
         Transfer::Xpic(order) if order > 1 => (0, D + 8),
         _ => (0, 0),
     };
     let nodes: f64 = scene.cells.iter().map(|&cells| cells as f64 + 9.0).product();
-    let particles = scene.particles_expected(case.per_cell);
-    scene.bytes_expected(case.per_cell, scalar, exact)
+    let particles = scene.particles_expected(per_cell);
+    scene.bytes_expected(per_cell, scalar, exact)
         + scalar as f64 * (particles * (of_shape + of_transfer) as f64 + nodes * of_node as f64)
 }
 
 /// The body of a case at rest in the reference configuration.
 fn body<T: Real, const D: usize>(
     scene: &Scene<D>,
-    case: &Case,
+    updated: &Updated,
+    per_cell: usize,
     density: f64,
 ) -> Result<Body<T, D>, CaseError> {
     let (grid, density) = (scene.grid::<T>(), T::nearest(density));
-    if let (Placement::BodyFitted, &Domain::Annulus { inner, outer }) =
-        (case.placement, &scene.domain)
-    {
-        let quarter = scene.extent() == Some(Extent::Quarter);
-        let ring = Annulus { inner: T::nearest(inner), outer: T::nearest(outer), quarter };
-        return Ok(Body::annulus(&ring, grid.spacing, case.per_cell, density)?);
-    }
-    let inside = scene.inside(case.per_cell, case.offset);
-    let mut body = match case.shape {
-        Shape::Cpdi2 => Body::lattice(&grid, case.per_cell, density, inside),
-        _ => Particles::lattice(&grid, case.per_cell, density, inside).into(),
+    let offset = match (updated.placement, &scene.domain) {
+        (Placement::BodyFitted, &Domain::Annulus { inner, outer }) => {
+            let quarter = scene.extent() == Some(Extent::Quarter);
+            let ring = Annulus { inner: T::nearest(inner), outer: T::nearest(outer), quarter };
+            return Ok(Body::annulus(&ring, grid.spacing, per_cell, density)?);
+        }
+        (placement, _) => placement.offset(),
     };
-    if case.offset != 0.0 {
-        let distance = scene.spacing / case.per_cell as f64;
-        let shift: SVector<T, D> = SVector::repeat(T::nearest(case.offset * distance));
+    let inside = scene.inside(per_cell, offset);
+    let mut body = match updated.shape {
+        Shape::Cpdi2 => Body::lattice(&grid, per_cell, density, inside),
+        _ => Particles::lattice(&grid, per_cell, density, inside).into(),
+    };
+    if offset != 0.0 {
+        let distance = scene.spacing / per_cell as f64;
+        let shift: SVector<T, D> = SVector::repeat(T::nearest(offset * distance));
         let Particles { X, x, .. } = &mut body.particles;
         X.iter_mut().chain(x).for_each(|place| *place += shift);
         if let Some(mesh) = &mut body.mesh {
@@ -126,16 +83,16 @@ fn body<T: Real, const D: usize>(
 pub(crate) fn set_up<T: Real + Scalar<D>, const D: usize>(
     exact: &dyn Solution<f64, D>,
     model: &dyn Solution<T, D>,
+    updated: &Updated,
     case: &Case,
     scene: &Scene<D>,
     time_step: T,
 ) -> Result<Box<dyn Solver<T, D>>, CaseError> {
-    admit(scene, case)?;
-    let mut body = body::<T, D>(scene, case, exact.density())?;
+    let mut body = body::<T, D>(scene, updated, case.per_cell, exact.density())?;
     if body.particles.is_empty() {
         return Err(SceneError::Empty { cells: case.cells }.into());
     }
-    set_in_motion(&mut body.particles, exact, case, time_step.to_f64());
+    set_in_motion(&mut body.particles, exact, updated.stepping, time_step.to_f64());
     if let Some(mesh) = &mut body.mesh {
         for (x, X) in mesh.x.iter_mut().zip(&mesh.X) {
             let place = X.map(Real::to_f64);
@@ -149,25 +106,33 @@ pub(crate) fn set_up<T: Real + Scalar<D>, const D: usize>(
         }
     }
     let settings = Settings {
-        shape: case.shape,
-        integrator: case.integrator,
-        transfer: case.transfer,
+        shape: updated.shape,
+        integrator: updated.stepping.into(),
+        transfer: updated.transfer,
         time_step,
-        halve_first_acceleration: starts_halved(case),
+        halve_first_acceleration: updated.stepping == Stepping::Cd(Start::Halved),
     };
     Ok(T::simulation(scene.grid(), body, law(model.material())?, settings)?)
 }
 
-/// The solver of a case at time zero with steps of `time_step`, whatever its formulation.
-pub(crate) fn solver<'a, T: Real + Scalar<D>, const D: usize>(
-    exact: &'a dyn Solution<f64, D>,
-    model: &'a dyn Solution<T, D>,
-    case: &Case,
-    scene: &Scene<D>,
-    time_step: T,
-) -> Result<Box<dyn Solver<T, D> + 'a>, CaseError> {
-    match &case.frame {
-        Frame::Total(scheme) => total::set_up(exact, scheme, case, scene, time_step),
-        Frame::Updated => set_up(exact, model, case, scene, time_step),
+/// Gives particles at rest the exact state at time zero, with the velocity that the integrator starts from.
+fn set_in_motion<T: Real, const D: usize>(
+    particles: &mut Particles<T, D>,
+    exact: &dyn Solution<f64, D>,
+    stepping: Stepping,
+    dt: f64,
+) {
+    for p in 0..particles.len() {
+        let X = particles.X[p].map(Real::to_f64);
+        let v = match stepping {
+            Stepping::Cd(Start::Exact) => exact.velocity(&X, -dt / 2.0),
+            Stepping::Cd(Start::Data) => {
+                exact.velocity(&X, 0.0) - exact.acceleration(&X, 0.0) * (dt / 2.0)
+            }
+            _ => exact.velocity(&X, 0.0),
+        };
+        particles.x[p] = (X + exact.displacement(&X, 0.0)).map(Real::nearest);
+        particles.v[p] = v.map(Real::nearest);
+        particles.F[p] = exact.deformation_gradient(&X, 0.0).map(Real::nearest);
     }
 }

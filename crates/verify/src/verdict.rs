@@ -2,13 +2,15 @@
 //! the expected one.
 
 use mmsmith_mpm::total_lagrangian::{Layout, MassMatrix};
-use mmsmith_solutions::{AnySolution, Domain, Solution};
+use mmsmith_mpm::{Shape, Transfer};
+use mmsmith_runtime::{AnySolution, Domain, Solution};
 use serde::Serialize;
 
 use crate::case::Case;
 use crate::dimension::in_dimension;
 use crate::norms::{PerField, PerNorm};
-use crate::{Frame, Integrator, Placement, Shape, Transfer, points};
+use crate::points;
+use crate::scheme::{Placement, Scheme, Stepping, Total, Updated};
 
 /// How far an order on the finest pair of cases may be from the expected one where nothing else is said.
 pub const ORDER_TOLERANCE: f64 = 0.1;
@@ -191,26 +193,34 @@ pub fn verdicts_above(
 /// Method; Sadeghirad, Brannon and Guilkey, Second-order convected particle domain interpolation.
 #[must_use]
 pub fn expected_in_space(exact: &AnySolution<f64>, case: &Case) -> Expected {
-    let aligned = in_dimension!(exact, |s| stays_aligned(s), else false);
-    let contiguous = match (case.placement, case.shape) {
-        (Placement::Lattice, Shape::Gimp | Shape::Cpdi | Shape::Cpdi2) => aligned,
-        (Placement::BodyFitted, Shape::Cpdi2) => true,
-        _ => false,
-    };
-    let second = case.frame == Frame::Updated
-        && case.integrator == Integrator::Cd
-        && case.transfer == Transfer::Flip
-        && contiguous;
-    let order = second.then_some(2.0);
-    let mean = match &case.frame {
-        Frame::Total(total) if total.scheme.mass == MassMatrix::Consistent => {
-            let [space, time] = [total.scheme.degree + 1, total.scheme.composition.order()];
-            let exact = total.layout == Layout::Gauss || total.scheme.degree % 2 == 1;
-            (space <= time && exact).then_some(space as f64)
+    let u = match case.scheme {
+        Scheme::Updated(Updated {
+            shape,
+            stepping: Stepping::Cd(_),
+            transfer: Transfer::Flip,
+            placement,
+        }) => {
+            let contiguous = match (placement, shape) {
+                (Placement::Lattice { .. }, Shape::Gimp | Shape::Cpdi | Shape::Cpdi2) => {
+                    in_dimension!(exact, |s| stays_aligned(s), else false)
+                }
+                (Placement::BodyFitted, Shape::Cpdi2) => true,
+                _ => false,
+            };
+            let order = contiguous.then_some(2.0);
+            PerNorm { linf: order, l2: order, l1: order }
         }
-        _ => order,
+        Scheme::Total(Total {
+            degree, mass: MassMatrix::Consistent, composition, layout, ..
+        }) => {
+            let [space, time] = [degree + 1, composition.order()];
+            let exact = layout == Layout::Gauss || degree % 2 == 1;
+            let mean = (space <= time && exact).then_some(space as f64);
+            PerNorm { l2: mean, ..PerNorm::default() }
+        }
+        Scheme::Updated(_) | Scheme::Total(_) => PerNorm::default(),
     };
-    PerField { u: PerNorm { linf: order, l2: mean, l1: order }, ..Expected::default() }
+    PerField { u, ..Expected::default() }
 }
 
 /// The orders in `dt` of the differences on one grid ([`temporal`](crate::temporal())) that theory promises for the
@@ -222,19 +232,16 @@ pub fn expected_in_space(exact: &AnySolution<f64>, case: &Case) -> Expected {
 /// `dt h^2`.
 #[must_use]
 pub fn expected_in_time(case: &Case) -> Expected {
-    // The other transfers lose a part of the velocities in every step, however short.
-    let keeps_velocities = case.transfer == Transfer::Flip;
-    let order = match case.integrator {
+    let order = match case.scheme {
         // Weights that stay let the composition of leapfrog show its order.
-        Integrator::Cd if let Frame::Total(total) = &case.frame => {
-            Some(total.scheme.composition.order() as f64)
-        }
-        Integrator::Usf | Integrator::Usl | Integrator::Musl | Integrator::Usavg
-            if keeps_velocities =>
-        {
-            Some(1.0)
-        }
-        _ => None,
+        Scheme::Total(total) => Some(total.composition.order() as f64),
+        // The other transfers lose a part of the velocities in every step, however short.
+        Scheme::Updated(Updated {
+            stepping: Stepping::Usf | Stepping::Usl | Stepping::Musl | Stepping::Usavg,
+            transfer: Transfer::Flip,
+            ..
+        }) => Some(1.0),
+        Scheme::Updated(_) => None,
     };
     PerField { u: PerNorm { linf: order, l2: order, l1: order }, ..Expected::default() }
 }

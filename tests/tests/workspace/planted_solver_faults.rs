@@ -6,13 +6,15 @@
 #![allow(clippy::unwrap_used)]
 
 use mmsmith_mpm::fault::{self, Fault};
-use mmsmith_mpm::total_lagrangian::{Axis, End, Grid as SplineGrid, TotalLagrangian};
+use mmsmith_mpm::total_lagrangian::{
+    Axis, End, Grid as SplineGrid, MassMatrix, Scheme as SplineScheme, TotalLagrangian,
+};
 use mmsmith_mpm::{Body, Grid, Material, NoBodyForce, Particles, Settings, Simulation};
 use mmsmith_solutions::{AnySolution, CATALOGUE, build};
 use mmsmith_verify::{
-    Arithmetic, Case, CflSpeed, Composition, Coordinates, Frame, Integrator, Layout, MassMatrix,
-    ORDER_TOLERANCE, Placement, Scheme, Shape, Status, Study, Sweep, TotalScheme, Transfer, check,
-    converge, expected_in_space, expected_in_time, temporal, verdicts,
+    Arithmetic, Case, CflSpeed, Composition, Coordinates, Integrator, Layout, ORDER_TOLERANCE,
+    Placement, Scheme, Shape, Start, Status, Stepping, Study, Sweep, Total, Transfer, Updated,
+    check, converge, expected_in_space, expected_in_time, temporal, verdicts,
 };
 use nalgebra::{Const, DimMin, SMatrix, SVector};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -560,7 +562,7 @@ where
         (0..p.len()).map(of).sum()
     };
     let scheme =
-        Scheme { degree: 3, mass: MassMatrix::Consistent, composition: Composition::Order4 };
+        SplineScheme { degree: 3, mass: MassMatrix::Consistent, composition: Composition::Order4 };
     let material = Material::NeoHookean { lambda: LAMBDA, mu: MU };
     let drift = |parts: usize| {
         let step = dt / parts as f64;
@@ -649,16 +651,19 @@ fn order_in_two_dimensions(fault: Option<Fault>) -> Vec<String> {
 
 fn known_errors_of_other_schemes(fault: Option<Fault>) -> Vec<String> {
     let exact = solution("axis-aligned", &[]);
-    let scheme =
-        |shape, integrator, transfer| Case { shape, integrator, transfer, ..Case::default() };
+    let cd = Stepping::Cd(Start::Halved);
+    let scheme = |shape, stepping, transfer| {
+        let scheme = Updated { shape, stepping, transfer, ..Updated::default() };
+        Case { scheme: Scheme::Updated(scheme), ..Case::default() }
+    };
     let mut problems = Vec::new();
     for (case, known) in [
-        (scheme(Shape::Gimp, Integrator::Usl, Transfer::Flip), 1.534e-2),
-        (scheme(Shape::Gimp, Integrator::Musl, Transfer::Flip), 1.692e-2),
-        (scheme(Shape::Gimp, Integrator::Usf, Transfer::Flip), 2.746e-2),
-        (scheme(Shape::Ugimp, Integrator::Cd, Transfer::Flip), 1.790e-2),
-        (scheme(Shape::Gimp, Integrator::Cd, Transfer::Apic), 7.499e-3),
-        (scheme(Shape::Gimp, Integrator::Cd, Transfer::Xpic(2)), 1.577e-2),
+        (scheme(Shape::Gimp, Stepping::Usl, Transfer::Flip), 1.534e-2),
+        (scheme(Shape::Gimp, Stepping::Musl, Transfer::Flip), 1.692e-2),
+        (scheme(Shape::Gimp, Stepping::Usf, Transfer::Flip), 2.746e-2),
+        (scheme(Shape::Ugimp, cd, Transfer::Flip), 1.790e-2),
+        (scheme(Shape::Gimp, cd, Transfer::Apic), 7.499e-3),
+        (scheme(Shape::Gimp, cd, Transfer::Xpic(2)), 1.577e-2),
     ] {
         problems.extend(beside(&study(fault, &exact, &case, &[8]), known));
     }
@@ -673,8 +678,9 @@ fn known_errors_on_the_ring(fault: Option<Fault>) -> Vec<String> {
 fn order_in_time(fault: Option<Fault>) -> Vec<String> {
     let exact = solution("axis-aligned-1d", &[]);
     let mut problems = Vec::new();
-    for integrator in [Integrator::Usl, Integrator::Musl, Integrator::Usf] {
-        let case = Case { integrator, cells: 16, ..Case::default() };
+    for stepping in [Stepping::Usl, Stepping::Musl, Stepping::Usf] {
+        let scheme = Updated { stepping, ..Updated::default() };
+        let case = Case { scheme: Scheme::Updated(scheme), cells: 16, ..Case::default() };
         let cfls = [0.4, 0.2, 0.1];
         let study = with(fault, || temporal(&exact, Arithmetic::Double, &case, &cfls, &mut |_| ()))
             .unwrap();
@@ -683,16 +689,25 @@ fn order_in_time(fault: Option<Fault>) -> Vec<String> {
             study.rows.iter().map(|row| (row.status == Status::Ok).then_some(&row.differences));
         let verdicts =
             verdicts(&steps, &ok.collect::<Vec<_>>(), &expected_in_time(&case), ORDER_TOLERANCE);
-        problems.extend(judged(&verdicts).into_iter().map(|p| format!("{integrator:?} {p}")));
+        problems.extend(judged(&verdicts).into_iter().map(|p| format!("{stepping:?} {p}")));
     }
     problems
 }
 
+/// Splines between walls.
 fn total(degree: usize, composition: Composition) -> Case {
-    let scheme = Scheme { degree, mass: MassMatrix::Consistent, composition };
-    let total =
-        TotalScheme { scheme, layout: Layout::Lattice, coordinates: Coordinates::Cartesian };
-    Case { frame: Frame::Total(total), cfl_speed: CflSpeed::PWave, ..Case::default() }
+    with_scheme(Total { composition, ..Total::of_degree(degree) })
+}
+
+/// Cubic splines with Gauss points, and what is usual with them.
+fn cubic(coordinates: Coordinates) -> Case {
+    let composition = Composition::Order4;
+    let scheme = Total { composition, layout: Layout::Gauss, coordinates, ..Total::of_degree(3) };
+    Case { per_cell: 4, cfl: 0.2, ..with_scheme(scheme) }
+}
+
+fn with_scheme(scheme: Total) -> Case {
+    Case { scheme: Scheme::Total(scheme), cfl_speed: CflSpeed::PWave, ..Case::default() }
 }
 
 /// Errors and orders as reached by an independent implementation.
@@ -730,52 +745,35 @@ fn high_order_on_a_box(fault: Option<Fault>) -> Vec<String> {
 
 fn high_order_on_the_ring(fault: Option<Fault>) -> Vec<String> {
     let ring = solution("ring", &[("Ri", 0.4), ("Ro", 0.6)]);
-    let case = total(3, Composition::Order4);
-    let Frame::Total(scheme) = case.frame else { unreachable!() };
-    let polar = TotalScheme { layout: Layout::Gauss, coordinates: Coordinates::Polar, ..scheme };
-    let case = Case { frame: Frame::Total(polar), per_cell: 4, cfl: 0.2, ..case };
+    let case = cubic(Coordinates::Polar);
     reached(&study(fault, &ring, &case, &[8, 16]), 0.1, &[1.2e-5, 5.4e-7], 3.8)
 }
 
 /// A square whose sides move as the solution prescribes, without any symmetry.
 fn high_order_with_moved_sides(fault: Option<Fault>) -> Vec<String> {
     let skew = solution("skew-2d", &[]);
-    let case = total(3, Composition::Order4);
-    let Frame::Total(scheme) = case.frame else { unreachable!() };
-    let gauss = TotalScheme { layout: Layout::Gauss, ..scheme };
-    let case = Case { frame: Frame::Total(gauss), per_cell: 4, cfl: 0.3, periods: 0.5, ..case };
+    let case = Case { cfl: 0.3, periods: 0.5, ..cubic(Coordinates::Cartesian) };
     reached(&study(fault, &skew, &case, &[4, 8]), 0.1, &[5.8e-4, 2.9e-5], 3.8)
 }
 
 /// The ring with lateral contraction, under the tractions that the solution prescribes.
 fn high_order_with_loaded_rims(fault: Option<Fault>) -> Vec<String> {
     let ring = solution("ring-nu", &[("Ri", 0.4), ("Ro", 0.6)]);
-    let case = total(3, Composition::Order4);
-    let Frame::Total(scheme) = case.frame else { unreachable!() };
-    let polar = TotalScheme { layout: Layout::Gauss, coordinates: Coordinates::Polar, ..scheme };
-    let case = Case { frame: Frame::Total(polar), per_cell: 4, cfl: 0.2, ..case };
+    let case = cubic(Coordinates::Polar);
     reached(&study(fault, &ring, &case, &[8, 16]), 0.1, &[1.3e-7, 7.8e-9], 3.8)
 }
 
 /// A whole ring whose circles turn: shear in polar coordinates, and an axis without ends.
 fn high_order_in_the_vortex(fault: Option<Fault>) -> Vec<String> {
     let vortex = solution("vortex", &[("A", 0.2)]);
-    let case = total(3, Composition::Order4);
-    let Frame::Total(scheme) = case.frame else { unreachable!() };
-    let polar = TotalScheme { layout: Layout::Gauss, coordinates: Coordinates::Polar, ..scheme };
-    let case = Case { frame: Frame::Total(polar), per_cell: 4, cfl: 0.2, periods: 0.1, ..case };
+    let case = Case { periods: 0.1, ..cubic(Coordinates::Polar) };
     reached(&study(fault, &vortex, &case, &[8, 16]), 0.2, &[1.6e-3, 1.4e-4], 3.4)
 }
 
 /// A spherical shell under the tractions that the solution prescribes.
 fn high_order_on_the_shell(fault: Option<Fault>) -> Vec<String> {
     let shell = solution("sphere-shell", &[]);
-    let case = total(3, Composition::Order4);
-    let Frame::Total(scheme) = case.frame else { unreachable!() };
-    let spherical =
-        TotalScheme { layout: Layout::Gauss, coordinates: Coordinates::Spherical, ..scheme };
-    let case =
-        Case { frame: Frame::Total(spherical), per_cell: 4, cfl: 0.291, periods: 0.5, ..case };
+    let case = Case { cfl: 0.291, periods: 0.5, ..cubic(Coordinates::Spherical) };
     reached(&study(fault, &shell, &case, &[4, 8]), 0.05, &[4.3e-6, 2.7e-7], 3.8)
 }
 
@@ -794,7 +792,8 @@ fn high_order_in_time(fault: Option<Fault>) -> Vec<String> {
 fn order_on_the_fitted_ring(fault: Option<Fault>) -> Vec<String> {
     let exact = solution("ring", &[]);
     let (shape, placement) = (Shape::Cpdi2, Placement::BodyFitted);
-    let case = Case { shape, placement, periods: 0.5, ..Case::default() };
+    let scheme = Updated { shape, placement, ..Updated::default() };
+    let case = Case { scheme: Scheme::Updated(scheme), periods: 0.5, ..Case::default() };
     promised(&study(fault, &exact, &case, &[8, 16]), &exact, &case)
 }
 

@@ -6,7 +6,7 @@
 use mmsmith_interpret::interpret;
 use mmsmith_solutions::nalgebra::SVector;
 use mmsmith_solutions::{
-    AnySolution, BLOCK, CATALOGUE, Description, Real, Solution, State, StateRun, build,
+    AnySolution, BLOCK, CATALOGUE, Description, Precision, Real, Solution, State, StateRun, build,
 };
 use mmsmith_spec::Spec;
 
@@ -166,7 +166,7 @@ fn compare_both<T: Real>(name: &str, solution: AnySolution<T>, exact: AnySolutio
     }
 }
 
-fn compare_all<T: Real>() {
+fn compare_all<T: Precision>() {
     for Description { name, .. } in CATALOGUE {
         let exact = build::<f64>(name, &[]).unwrap().unwrap();
         compare_both(name, build::<T>(name, &[]).unwrap().unwrap(), exact);

@@ -85,8 +85,7 @@ impl SchemeOptions {
 }
 
 /// Weights.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Shape {
     /// Hat functions at the particle's point
     Linear,
@@ -108,9 +107,8 @@ pub(crate) enum Shape {
     Cpdi2,
 }
 
-/// Formulations; in JSON they have their old names, updated and total.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
-#[serde(rename_all = "kebab-case")]
+/// Formulations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Frame {
     /// Updated Lagrangian: weights anew in each step, from the current configuration
     #[value(name = "updated-lagrangian", aliases = ["updated", "ul"])]
@@ -121,8 +119,7 @@ pub(crate) enum Frame {
 }
 
 /// Layouts of particles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Layout {
     /// Centres of equal parts of a cell
     Lattice,
@@ -132,35 +129,35 @@ pub(crate) enum Layout {
     Gauss,
 }
 
-/// Orders in time.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Composition {
-    /// Leapfrog
-    #[value(name = "2")]
-    Order2,
-    /// Five stages
-    #[value(name = "4")]
-    Order4,
-    /// Nine stages
-    #[value(name = "6")]
-    Order6,
-}
-
 choices!(
-    /// Time integrators.
-    Integrator => verify::Integrator {
-        /// Update stress first
-        Usf,
-        /// Update stress last
-        Usl,
-        /// Update stress last, with the velocity projected again
-        Musl,
-        /// Stress updated by halves, before the forces and after
-        Usavg,
-        /// Centred differences
-        Cd,
+    /// Orders in time.
+    Composition => verify::Composition {
+        /// Leapfrog
+        #[value(name = "2")]
+        Order2,
+        /// Five stages
+        #[value(name = "4")]
+        Order4,
+        /// Nine stages
+        #[value(name = "6")]
+        Order6,
     }
 );
+
+/// Time integrators.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Integrator {
+    /// Update stress first
+    Usf,
+    /// Update stress last
+    Usl,
+    /// Update stress last, with the velocity projected again
+    Musl,
+    /// Stress updated by halves, before the forces and after
+    Usavg,
+    /// Centred differences
+    Cd,
+}
 
 choices!(
     /// Starts of centred differences.

@@ -2,16 +2,16 @@
 
 use anyhow::{Context, Result, bail};
 use mmsmith_verify::{
-    Behaviour, Case, Expected, Field, Norm, ORDER_TOLERANCE, Order as ObservedOrder, OrderVerdict,
-    Outputs, PerField, PerNorm, Progress, Record, Row, Status, Study, StudyError, Sweep, Temporal,
-    TemporalRecord, Values, expected_in_space, expected_in_time, orders_above, plan, run,
-    temporal as measure_differences, verdicts_above,
+    Behaviour, Case, Expected, Extent, Field, Norm, ORDER_TOLERANCE, Order as ObservedOrder,
+    OrderVerdict, Outputs, PerField, PerNorm, Progress, Record, Row, Status, Study, StudyError,
+    Sweep, Temporal, TemporalRecord, Values, expected_in_space, expected_in_time, orders_above,
+    plan, run, temporal as measure_differences, verdicts_above,
 };
 use serde_json::{Value, json};
 
-use super::scheme::Scheme;
-use super::{Model, caption, case, preface, settings, with_threads};
-use crate::arguments::{ConvergeOptions, Extent, SchemeOptions};
+use super::scheme::Settled;
+use super::{Model, caption, settings, with_threads};
+use crate::arguments::{ConvergeOptions, SchemeOptions};
 use crate::json::Output;
 use crate::keep::{Keep, Order};
 use crate::library::Selection;
@@ -34,16 +34,16 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
         cfl: options.scheme.cfl.or(options.cfls.first().copied()),
         ..options.scheme.clone()
     };
-    let scheme = &Scheme::settle(&said, &model.exact);
-    let base = case(scheme, options.cells[0])?;
+    let settled = &Settled::settle(&said, &model.exact)?;
+    let base = Case { cells: options.cells[0], ..settled.case };
     let extent = model.admit(&sweep.cases(&base))?;
     let keep = Keep::open(options.kept.out.as_ref(), &options.name)?;
-    let output = Output::prepare_if(scheme.json.as_ref())?;
+    let output = Output::prepare_if(settled.json.as_ref())?;
     let [plot, values, markdown, latex] =
         [&options.plot, &options.csv, &options.markdown, &options.latex]
             .map(|path| Output::prepare_if(path.as_ref()));
     let (plot, values, markdown, latex) = (plot?, values?, markdown?, latex?);
-    with_threads(scheme.threads, || {
+    with_threads(settled.threads, || {
         let expected = model.announce(&sweep.cases(&base));
         // The differences take each run once more, and one with half its step.
         let parts = if options.cfls.is_empty() { 1.0 } else { 4.0 };
@@ -51,7 +51,7 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
         let whole = Bar::expecting("starting", predicted_s);
         let bar = whole.part(0.0, 1.0 / parts);
         let study = study(&model, &base, &sweep, &keep, expected, &bar, |case| {
-            settings(&selection, scheme, extent, case.cells, case.cfl)
+            settings(&selection, settled, extent, case.cells, case.cfl)
         })?;
         // In time the expectation is about the differences; the total error is mostly a spatial one.
         let in_space = match (&sweep, asked) {
@@ -66,7 +66,7 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
         let judged = settle(judge_above(&study, &sweep, &in_space, tolerance, &floors));
         let differences = match &sweep {
             Sweep::Cfls(cfls) => {
-                let mut what = settings(&selection, scheme, extent, base.cells, cfls);
+                let mut what = settings(&selection, settled, extent, base.cells, cfls);
                 what["differences"] = true.into();
                 let found = keep.all(
                     &[what],
@@ -90,7 +90,7 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
         // It must not stand between the tables.
         drop((bar, whole));
 
-        let caption = caption(&selection, scheme, extent);
+        let caption = caption(&selection, settled, extent);
         let mut sections: Vec<(String, Table)> = Vec::new();
         for (field, table) in tables(&study, &sweep, &judged) {
             sections.push((format!("error of {field}"), table));
@@ -112,14 +112,15 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
             notes +=
                 "A row at rounding has errors that rounding alone may cause; it judges nothing.\n";
         }
-        let mut text = preface(scheme) + &caption;
+        let mut text = settled.choice() + &caption;
         for (title, table) in &sections {
             text += &format!("\n{title}\n{}", table.text());
         }
         terminal::say(&(text + &notes))?;
 
         if let Some(output) = output {
-            let mut document = document(&selection, scheme, extent, &base, &sweep, &study, &judged);
+            let mut document =
+                document(&selection, settled, extent, &base, &sweep, &study, &judged);
             if let Some((found, judged)) = &differences {
                 document["temporal"] = temporal_document(found, judged);
             }
@@ -319,7 +320,7 @@ pub(super) fn judge_differences(
 /// A study as it is written to JSON.
 pub(super) fn document(
     selection: &Selection,
-    scheme: &Scheme,
+    settled: &Settled,
     extent: Option<Extent>,
     base: &Case,
     sweep: &Sweep,
@@ -327,8 +328,8 @@ pub(super) fn document(
     judged: &Verdicts,
 ) -> Value {
     let settings = match sweep {
-        Sweep::Cells(cells) => settings(selection, scheme, extent, cells, base.cfl),
-        Sweep::Cfls(cfls) => settings(selection, scheme, extent, base.cells, cfls),
+        Sweep::Cells(cells) => settings(selection, settled, extent, cells, base.cfl),
+        Sweep::Cfls(cfls) => settings(selection, settled, extent, base.cells, cfls),
     };
     json!({
         "schema": "mmsmith.converge/1",

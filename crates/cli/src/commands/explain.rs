@@ -6,12 +6,12 @@ use anyhow::{Result, bail};
 use mmsmith_expr::{Drafts, Expr, OperationCount, Program, arrange};
 use mmsmith_solutions::CATALOGUE;
 use mmsmith_spec::{Domain, Fields, SolvedCondition, Spec};
-use mmsmith_verify::{Cost, Part, Plan, Share, coverage};
+use mmsmith_verify::{Case, Cost, Part, Plan, Share, coverage};
 use serde_json::{Value, json};
 
 use super::coverage::{POINTS, THRESHOLD};
-use super::scheme::{Scheme, USUAL_CELLS};
-use super::{Model, case, predict};
+use super::scheme::{Settled, USUAL_CELLS};
+use super::{Model, predict};
 use crate::arguments::{ExplainOptions, Precision, SchemeOptions};
 use crate::json::Output;
 use crate::library::{Selection, Subject, specification};
@@ -27,10 +27,10 @@ pub(crate) fn explain(options: &ExplainOptions) -> Result<bool> {
     let cost = BodyForceCost::of(&mut fields, spec.dimension);
     let selection = Selection::new(&options.name, &[])?;
     let model = Model::new(&selection, Precision::F64)?;
-    let scheme = Scheme::settle(&SchemeOptions::open(), &model.exact);
-    let base = case(&scheme, USUAL_CELLS)?;
+    let settled = Settled::settle(&SchemeOptions::open(), &model.exact)?;
+    let base = Case { cells: USUAL_CELLS, ..settled.case };
     let predicted = predict::on_grids(&model, &base).map_err(|error| error.to_string());
-    let words = scheme.choice();
+    let words = settled.choice();
     terminal::say(&(text(&spec, &exercises, &cost) + &runs(&predicted, &words)))?;
     let compared = match options.compare {
         true => Some(Comparison::measure(&model)?),

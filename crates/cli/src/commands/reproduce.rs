@@ -14,9 +14,9 @@ use std::time::Duration;
 
 use anyhow::{Context, Result};
 use mmsmith_verify::{
-    Case, CostModel, Expected, Field, FrameOutput, ORDER_TOLERANCE, Outputs, Progress, Row, Start,
-    Status, StepError, Study, Sweep, Temporal, converge as measure, expected_in_space,
-    expected_in_time, plan, run as simulate,
+    Case, CostModel, Expected, Field, FrameOutput, ORDER_TOLERANCE, Outputs, Progress, Row, Shape,
+    Start, Status, StepError, Stepping, Study, Sweep, Temporal, converge as measure,
+    expected_in_space, expected_in_time, plan, run as simulate,
 };
 use serde_json::json;
 
@@ -24,9 +24,9 @@ use super::converge::{
     Verdicts, difference_curve, difference_tables, differences, document, judge, judge_differences,
     tables, temporal_document, verdict_table,
 };
-use super::scheme::Scheme;
-use super::{Model, case, settings, with_threads};
-use crate::arguments::{Integrator, Precision, ReproduceOptions, Shape, word};
+use super::scheme::{Settled, usual};
+use super::{Model, settings, with_threads};
+use crate::arguments::{Precision, ReproduceOptions};
 use crate::json::{Output, prepare_folder};
 use crate::library::Selection;
 use crate::progress::{Agenda, Bar};
@@ -36,17 +36,18 @@ use crate::{csv, number, terminal};
 
 /// The study's problems, by name.
 const PROBLEMS: [&str; 2] = ["axis-aligned", "ring"];
+const CD: Stepping = Stepping::Cd(Start::Halved);
 /// The schemes compared in space.
-const SPACE: [(Shape, Integrator); 5] = [
-    (Shape::Gimp, Integrator::Cd),
-    (Shape::Gimp, Integrator::Usl),
-    (Shape::Gimp, Integrator::Usf),
-    (Shape::Ugimp, Integrator::Cd),
-    (Shape::Linear, Integrator::Cd),
+const SPACE: [(Shape, Stepping); 5] = [
+    (Shape::Gimp, CD),
+    (Shape::Gimp, Stepping::Usl),
+    (Shape::Gimp, Stepping::Usf),
+    (Shape::Ugimp, CD),
+    (Shape::Linear, CD),
 ];
 /// The schemes compared in time.
-const TIME: [(Shape, Integrator); 3] =
-    [(Shape::Gimp, Integrator::Cd), (Shape::Gimp, Integrator::Usl), (Shape::Ugimp, Integrator::Cd)];
+const TIME: [(Shape, Stepping); 3] =
+    [(Shape::Gimp, CD), (Shape::Gimp, Stepping::Usl), (Shape::Ugimp, CD)];
 const CELLS: [usize; 5] = [8, 16, 32, 64, 128];
 const CFLS: [f64; 8] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8];
 /// The grid of the studies in time and of the particle files.
@@ -57,8 +58,7 @@ const FRAMES: u64 = 17;
 const SMALL_STEP_CELLS: [usize; 4] = [8, 16, 32, 64];
 const SMALL_STEP: f64 = 0.05;
 /// The schemes whose differences on one grid are measured, and the CFL numbers.
-const DIFFERENCES: [(Shape, Integrator); 2] =
-    [(Shape::Gimp, Integrator::Cd), (Shape::Gimp, Integrator::Usl)];
+const DIFFERENCES: [(Shape, Stepping); 2] = [(Shape::Gimp, CD), (Shape::Gimp, Stepping::Usl)];
 const DIFFERENCE_CFLS: [f64; 4] = [0.4, 0.2, 0.1, 0.05];
 /// The same with a small amplitude on a fine grid, where the order of centred differences shows.
 const GENTLE: f64 = 1e-3;
@@ -69,14 +69,14 @@ const GENTLE_RANGE: f64 = 0.15;
 
 /// A study of one scheme.
 struct Series {
-    scheme: (Shape, Integrator),
+    scheme: (Shape, Stepping),
     study: Study,
     verdicts: Verdicts,
 }
 
 /// The differences of one scheme on one grid.
 struct Differences {
-    scheme: (Shape, Integrator),
+    scheme: (Shape, Stepping),
     found: Temporal,
     verdicts: Verdicts,
 }
@@ -125,7 +125,7 @@ pub(crate) fn reproduce(options: &ReproduceOptions) -> Result<bool> {
     with_threads(options.threads, || {
         let mut text = introduction();
         let paces = PROBLEMS.map(Pace::of).into_iter().collect::<Result<Vec<_>>>()?;
-        let agenda = Agenda::new(total_seconds(&paces, options.budget)?);
+        let agenda = Agenda::new(total_seconds(&paces, options.budget));
         let mut results = Vec::new();
         for (problem, pace) in PROBLEMS.into_iter().zip(&paces) {
             let measured = measure_problem(problem, &out.join(problem), pace, &agenda)?;
@@ -140,7 +140,7 @@ pub(crate) fn reproduce(options: &ReproduceOptions) -> Result<bool> {
         agenda.aside(|| terminal::say(&said))?;
         text += &written;
         let energy = drift::section(out, &paces, &agenda)?;
-        let stable = limits::section(out, &agenda.next(limits::seconds(&paces[0])?))?;
+        let stable = limits::section(out, &agenda.next(limits::seconds(&paces[0])))?;
         let sections = [energy, stable, cost::section(out, options.budget, &agenda)?];
         drop(agenda);
         for section in &sections {
@@ -164,7 +164,7 @@ impl Pace {
         /// Spent on the steps.
         const EFFORT: Duration = Duration::from_millis(100);
         let model = Model::new(&Selection::new(problem, &[])?, Precision::F64)?;
-        let usual = case(&Scheme::usual(Shape::Gimp, Integrator::Cd), GRID)?;
+        let usual = usual(Shape::Gimp, CD, GRID);
         // Only the bar depends on it.
         let learnt = CostModel::calibrate(&model.exact, model.arithmetic(), &usual, EFFORT).ok();
         Ok(Self { model, learnt })
@@ -183,42 +183,41 @@ impl Pace {
 /// The seconds of a scheme's differences: every run once, and once more with half the finest step.
 fn difference_seconds(
     pace: &Pace,
-    (shape, integrator): (Shape, Integrator),
+    (shape, stepping): (Shape, Stepping),
     cells: usize,
     cfls: &[f64],
-) -> Result<f64> {
-    let base = case(&Scheme::usual(shape, integrator), cells)?;
+) -> f64 {
+    let base = usual(shape, stepping, cells);
     let finest = cfls.iter().copied().reduce(f64::min).map(|cfl| cfl / 2.0);
     let all = cfls.iter().copied().chain(finest);
-    Ok(pace.seconds(&all.map(|cfl| Case { cfl, ..base }).collect::<Vec<_>>()))
+    pace.seconds(&all.map(|cfl| Case { cfl, ..base }).collect::<Vec<_>>())
 }
 
 /// The seconds that the whole report will take.
-fn total_seconds(paces: &[Pace], budget: f64) -> Result<f64> {
-    let mut total = limits::seconds(&paces[0])?;
+fn total_seconds(paces: &[Pace], budget: f64) -> f64 {
+    let mut total = limits::seconds(&paces[0]);
     for pace in paces {
-        let study = |(shape, integrator), sweep: &Sweep, cfl: f64| -> Result<f64> {
-            let base = case(&Scheme { cfl, ..Scheme::usual(shape, integrator) }, GRID)?;
-            Ok(pace.seconds(&sweep.cases(&base)))
+        let study = |(shape, stepping), sweep: &Sweep, cfl: f64| {
+            pace.seconds(&sweep.cases(&Case { cfl, ..usual(shape, stepping, GRID) }))
         };
-        let usual = Case::default().cfl;
+        let usual_cfl = Case::default().cfl;
         for scheme in SPACE {
-            total += study(scheme, &Sweep::Cells(CELLS.to_vec()), usual)?;
+            total += study(scheme, &Sweep::Cells(CELLS.to_vec()), usual_cfl);
         }
         for scheme in TIME {
-            total += study(scheme, &Sweep::Cfls(CFLS.to_vec()), usual)?;
+            total += study(scheme, &Sweep::Cfls(CFLS.to_vec()), usual_cfl);
         }
         let few = Sweep::Cells(SMALL_STEP_CELLS.to_vec());
-        total += study((Shape::Gimp, Integrator::Usl), &few, SMALL_STEP)?;
+        total += study((Shape::Gimp, Stepping::Usl), &few, SMALL_STEP);
         for scheme in DIFFERENCES {
-            total += difference_seconds(pace, scheme, GRID, &DIFFERENCE_CFLS)?;
+            total += difference_seconds(pace, scheme, GRID, &DIFFERENCE_CFLS);
         }
-        total += pace.seconds(&drift::cases()?) + budget;
+        total += pace.seconds(&drift::cases()) + budget;
     }
     for scheme in DIFFERENCES {
-        total += difference_seconds(&paces[0], scheme, GENTLE_GRID, &GENTLE_CFLS)?;
+        total += difference_seconds(&paces[0], scheme, GENTLE_GRID, &GENTLE_CFLS);
     }
-    Ok(total)
+    total
 }
 
 /// The differences of the first problem at a small amplitude on a fine grid.
@@ -226,7 +225,7 @@ fn gentle_differences(folder: &Path, pace: &Pace, agenda: &Agenda) -> Result<Vec
     let selection = Selection::new(PROBLEMS[0], &[("A".to_owned(), GENTLE)])?;
     let model = Model::new(&selection, Precision::F64)?;
     let all = DIFFERENCES.map(|scheme| {
-        let bar = agenda.next(difference_seconds(pace, scheme, GENTLE_GRID, &GENTLE_CFLS)?);
+        let bar = agenda.next(difference_seconds(pace, scheme, GENTLE_GRID, &GENTLE_CFLS));
         let ladder = TimeLadder { kind: "gentle", cells: GENTLE_GRID, cfls: &GENTLE_CFLS };
         measure_differences(&selection, &model, scheme, &ladder, folder, &bar)
     });
@@ -245,16 +244,15 @@ struct TimeLadder<'a> {
 fn measure_differences(
     selection: &Selection,
     model: &Model,
-    scheme: (Shape, Integrator),
+    scheme: (Shape, Stepping),
     ladder: &TimeLadder<'_>,
     folder: &Path,
     bar: &Bar,
 ) -> Result<Differences> {
     let &TimeLadder { kind, cells, cfls } = ladder;
-    let options = Scheme::usual(scheme.0, scheme.1);
-    let base = case(&options, cells)?;
+    let base = usual(scheme.0, scheme.1, cells);
     let extent = model.admit(&[base])?;
-    let stem = format!("{kind}-{}-{}", word(scheme.0), word(scheme.1));
+    let stem = format!("{kind}-{}-{}", scheme.0, scheme.1);
     let json = Output::prepare(&folder.join(format!("{stem}.json")))?;
     let csv = Output::prepare(&folder.join(format!("{stem}.csv")))?;
     let what = format!("{}, {kind}, {}", selection.name(), name(scheme));
@@ -262,7 +260,7 @@ fn measure_differences(
     let verdicts = judge_differences(&found, &expected_in_time(&base), ORDER_TOLERANCE);
     json.write(&json!({
         "schema": "mmsmith.temporal/1",
-        "settings": settings(selection, &options, extent, cells, cfls),
+        "settings": settings(selection, &Settled::of(base), extent, cells, cfls),
         "temporal": temporal_document(&found, &verdicts),
     }))?;
     csv.write_text(&csv::temporal(&found))?;
@@ -279,15 +277,14 @@ fn measure_problem(
     let selection = Selection::new(problem, &[])?;
     let model = Model::new(&selection, Precision::F64)?;
     let series = |kind: &str,
-                  scheme: (Shape, Integrator),
+                  scheme: (Shape, Stepping),
                   sweep: &Sweep,
                   cfl: Option<f64>|
      -> Result<Series> {
-        let usual = Scheme::usual(scheme.0, scheme.1);
-        let options = Scheme { cfl: cfl.unwrap_or(usual.cfl), ..usual };
-        let base = case(&options, GRID)?;
+        let usual = usual(scheme.0, scheme.1, GRID);
+        let base = Case { cfl: cfl.unwrap_or(usual.cfl), ..usual };
         let extent = model.admit(&sweep.cases(&base))?;
-        let stem = format!("{kind}-{}-{}", word(scheme.0), word(scheme.1));
+        let stem = format!("{kind}-{}-{}", scheme.0, scheme.1);
         let json = Output::prepare(&folder.join(format!("{stem}.json")))?;
         let csv = Output::prepare(&folder.join(format!("{stem}.csv")))?;
         let bar = agenda.next(pace.seconds(&sweep.cases(&base)));
@@ -299,7 +296,8 @@ fn measure_problem(
             Sweep::Cfls(_) => Expected::default(),
         };
         let verdicts = judge(&study, sweep, &expected, ORDER_TOLERANCE);
-        json.write(&document(&selection, &options, extent, &base, sweep, &study, &verdicts))?;
+        let settled = Settled::of(base);
+        json.write(&document(&selection, &settled, extent, &base, sweep, &study, &verdicts))?;
         csv.write_text(&csv::text(&study))?;
         Ok(Series { scheme, study, verdicts })
     };
@@ -310,23 +308,23 @@ fn measure_problem(
     let time = TIME.map(|scheme| series("time", scheme, &cfls, None));
     let time = time.into_iter().collect::<Result<Vec<_>>>()?;
     let few = Sweep::Cells(SMALL_STEP_CELLS.to_vec());
-    let usl = (Shape::Gimp, Integrator::Usl);
+    let usl = (Shape::Gimp, Stepping::Usl);
     let small_step = series("small-step", usl, &few, Some(SMALL_STEP))?;
     let differences = DIFFERENCES.map(|scheme| {
         let cfls = &DIFFERENCE_CFLS;
-        let bar = agenda.next(difference_seconds(pace, scheme, GRID, cfls)?);
+        let bar = agenda.next(difference_seconds(pace, scheme, GRID, cfls));
         let ladder = TimeLadder { kind: "differences", cells: GRID, cfls };
         measure_differences(&selection, &model, scheme, &ladder, folder, &bar)
     });
     let differences = differences.into_iter().collect::<Result<Vec<_>>>()?;
 
-    let base = case(&Scheme::usual(Shape::Gimp, Integrator::Cd), GRID)?;
+    let base = usual(Shape::Gimp, CD, GRID);
     let frames =
         FrameOutput { folder: folder.join("particles"), name: problem.to_owned(), count: FRAMES };
     let silent = &mut |_| ();
     let mut outputs = Outputs { frames: Some(&frames), ..Outputs::new(silent) };
     simulate(&model.exact, model.arithmetic(), &base, &mut outputs)?;
-    let base = Case { start: Start::Exact, ..base };
+    let base = usual(Shape::Gimp, Stepping::Cd(Start::Exact), GRID);
     let silent = &mut |_| ();
     let mut outputs = Outputs::new(silent);
     let exact_start = simulate(&model.exact, model.arithmetic(), &base, &mut outputs)?;
@@ -526,6 +524,6 @@ fn compare(series: &[Series], first: &str, label: impl Fn(&Row) -> String) -> Ta
     table
 }
 
-fn name((shape, integrator): (Shape, Integrator)) -> String {
-    format!("{}+{}", word(shape), word(integrator))
+fn name((shape, stepping): (Shape, Stepping)) -> String {
+    format!("{shape}+{stepping}")
 }

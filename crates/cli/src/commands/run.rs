@@ -2,13 +2,15 @@
 
 use anyhow::{Context, Result};
 use mmsmith_solutions::AnySolution;
-use mmsmith_verify::{FrameOutput, Moment, Outputs, Row, Status, energy_drift, run as simulate};
+use mmsmith_verify::{
+    Case, FrameOutput, Moment, Outputs, Parts, Row, Scheme, Status, energy_drift, run as simulate,
+};
 use serde_json::{Value, json};
 
 use super::picture::Picture;
-use super::scheme::Scheme;
-use super::{Model, caption, case, preface, resume, settings, with_threads};
-use crate::arguments::{Frame, RunOptions, word};
+use super::scheme::Settled;
+use super::{Model, caption, resume, settings, with_threads};
+use crate::arguments::RunOptions;
 use crate::json::{Output, prepare_folder};
 use crate::library::Selection;
 use crate::progress::Bar;
@@ -24,25 +26,25 @@ pub(crate) fn run(options: &RunOptions) -> Result<bool> {
 pub(super) fn follow(options: &RunOptions, place: Option<resume::Place>) -> Result<bool> {
     let selection = Selection::new(&options.name, &options.scheme.parameters.set)?;
     let model = Model::new(&selection, options.scheme.precision)?;
-    let scheme = &Scheme::settle(&options.scheme, &model.exact);
-    let cells = options.cells.unwrap_or(scheme.usual_cells());
-    let case = case(scheme, cells)?;
+    let settled = &Settled::settle(&options.scheme, &model.exact)?;
+    let cells = options.cells.unwrap_or(settled.case.cells);
+    let case = Case { cells, ..settled.case };
     let extent = model.admit(&[case])?;
-    let output = Output::prepare_if(scheme.json.as_ref())?;
+    let output = Output::prepare_if(settled.json.as_ref())?;
     let [history, plot] =
         [&options.history, &options.plot].map(|path| Output::prepare_if(path.as_ref()));
     let (history, plot) = (history?, plot?);
     if let Some(folder) = &options.vtk {
         prepare_folder(folder).context("--vtk")?;
     }
-    let mut picture = Picture::asked(&options.picture, scheme.periods)?;
+    let mut picture = Picture::asked(&options.picture, case.periods)?;
     let mut moments = (history.is_some() || plot.is_some()).then(Vec::new);
     let frames = options.vtk.as_ref().map(|folder| FrameOutput {
         folder: folder.clone(),
         name: selection.name().to_owned(),
         count: options.frames,
     });
-    let settings = || settings(&selection, scheme, extent, cells, scheme.cfl);
+    let settings = || settings(&selection, settled, extent, cells, case.cfl);
     // Nothing is left in the folder of a run that cannot begin.
     let place = match (place, &options.checkpoint) {
         (None, Some(folder)) => Some(resume::remember(folder)?),
@@ -52,7 +54,7 @@ pub(super) fn follow(options: &RunOptions, place: Option<resume::Place>) -> Resu
         Some(place) => Some(resume::checkpoints(place, options, &settings())?),
         None => None,
     };
-    with_threads(scheme.threads, || {
+    with_threads(settled.threads, || {
         let row = {
             let expected = model.announce(&[case]);
             let bar = Bar::expecting("starting", expected.map(|seconds| seconds.iter().sum()));
@@ -67,7 +69,7 @@ pub(super) fn follow(options: &RunOptions, place: Option<resume::Place>) -> Resu
             };
             simulate(&model.exact, model.arithmetic(), &case, &mut outputs)?
         };
-        terminal::say(&(preface(scheme) + &caption(&selection, scheme, extent) + &text(&row)))?;
+        terminal::say(&(settled.choice() + &caption(&selection, settled, extent) + &text(&row)))?;
         if let Some(frames) = &frames {
             let list = frames.folder.join(format!("{}.pvd", frames.name));
             terminal::say(&format!("particle files: {}\n", list.display()))?;
@@ -76,10 +78,10 @@ pub(super) fn follow(options: &RunOptions, place: Option<resume::Place>) -> Resu
             file.write_text(&csv::history(moments.as_deref().unwrap_or_default()))?;
         }
         if let Some(file) = plot {
-            let shape = word(scheme.shape);
-            let curve = match scheme.frame {
-                Frame::Total => shape,
-                Frame::Updated => format!("{shape} + {}", word(scheme.integrator)),
+            let Parts { shape, integrator, .. } = case.scheme.parts();
+            let curve = match case.scheme {
+                Scheme::Total(_) => shape,
+                Scheme::Updated(_) => format!("{shape} + {integrator}"),
             };
             let course = course(curve, &model, moments.as_deref().unwrap_or_default());
             let title = format!("{}: drift of energy, {cells} cells", selection.name());

@@ -5,15 +5,15 @@ mod vary;
 
 use anyhow::{Result, bail};
 use mmsmith_verify::{
-    Case, Criteria, Failure, FailureKind, Observed, Search, SearchProgress, StabilityRow,
+    Case, Criteria, Extent, Failure, FailureKind, Observed, Search, SearchProgress, StabilityRow,
     is_stable, stability as find,
 };
 use serde_json::{Value, json};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::scheme::{Scheme, USUAL_CFL};
-use super::{Model, caption, case, preface, settings, with_threads};
-use crate::arguments::{Extent, SchemeOptions, StabilityOptions};
+use super::scheme::{Settled, USUAL_CFL};
+use super::{Model, caption, settings, with_threads};
+use crate::arguments::{SchemeOptions, StabilityOptions};
 use crate::csv;
 use crate::json::Output;
 use crate::keep::{Keep, Order};
@@ -28,32 +28,37 @@ struct Point {
     /// What the varied settings are here, in their order.
     values: Vec<String>,
     selection: Selection,
-    scheme: Scheme,
+    /// With the number of cells that the point has.
+    settled: Settled,
     model: Model,
-    case: Case,
     extent: Option<Extent>,
+}
+
+/// The CFL number is what is looked for; where none is said, numbers refer to the speed that they usually have.
+fn settle(options: &SchemeOptions, model: &Model) -> Result<Settled> {
+    let said = SchemeOptions { cfl: options.cfl.or(Some(USUAL_CFL)), ..options.clone() };
+    Settled::settle(&said, &model.exact)
 }
 
 impl Point {
     fn new(
         values: Vec<String>,
         selection: Selection,
-        scheme: SchemeOptions,
+        options: &SchemeOptions,
         cells: usize,
     ) -> Result<Self> {
-        let model = Model::new(&selection, scheme.precision)?;
-        // The CFL number is what is looked for; where none is said, numbers refer to the speed that they usually have.
-        let said = SchemeOptions { cfl: scheme.cfl.or(Some(USUAL_CFL)), ..scheme };
-        let scheme = Scheme::settle(&said, &model.exact);
-        let case = case(&scheme, cells)?;
+        let model = Model::new(&selection, options.precision)?;
+        let mut settled = settle(options, &model)?;
+        settled.case.cells = cells;
         // The finest step that a search may come to is not known; memory does not depend on it.
-        let extent = model.admit(&[Case { cfl: 0.5, ..case }])?;
-        Ok(Self { values, selection, scheme, model, case, extent })
+        let extent = model.admit(&[Case { cfl: 0.5, ..settled.case }])?;
+        Ok(Self { values, selection, settled, model, extent })
     }
 
     /// Everything but the CFL number.
     fn settings(&self) -> Value {
-        settings(&self.selection, &self.scheme, self.extent, self.case.cells, Value::Null)
+        let cells = self.settled.case.cells;
+        settings(&self.selection, &self.settled, self.extent, cells, Value::Null)
     }
 }
 
@@ -90,6 +95,7 @@ pub(crate) fn stability(options: &StabilityOptions) -> Result<bool> {
 pub(super) struct Survey<'a> {
     options: &'a StabilityOptions,
     selection: Selection,
+    settled: Settled,
     search: Search,
     points: Vec<Point>,
     rows: Vec<StabilityRow>,
@@ -111,7 +117,10 @@ pub(super) fn survey<'a>(options: &'a StabilityOptions, bar: &Bar) -> Result<Sur
     points.iter().try_for_each(|point| search.validate(point.model.arithmetic()))?;
     let keep = Keep::open(options.kept.out.as_ref(), &options.name)?;
     let rows = limits(&points, &search, &keep, bar)?;
-    Ok(Survey { options, selection, search, points, rows })
+    // What is varied may have no meaning without its values.
+    let settled = settle(&options.scheme, &points[0].model);
+    let settled = settled.unwrap_or_else(|_| points[0].settled.clone());
+    Ok(Survey { options, selection, settled, search, points, rows })
 }
 
 impl Survey<'_> {
@@ -119,18 +128,9 @@ impl Survey<'_> {
         self.options.over.iter().map(|(name, _)| name.as_str()).collect()
     }
 
-    fn scheme(&self) -> Scheme {
-        let said = SchemeOptions {
-            cfl: self.options.scheme.cfl.or(Some(USUAL_CFL)),
-            ..self.options.scheme.clone()
-        };
-        Scheme::settle(&said, &self.points[0].model.exact)
-    }
-
     fn text(&self) -> String {
-        let Self { options, selection, search, points, .. } = self;
-        let scheme = self.scheme();
-        let mut text = preface(&scheme) + &caption(selection, &scheme, points[0].extent);
+        let Self { options, selection, settled, search, points, .. } = self;
+        let mut text = settled.choice() + &caption(selection, settled, points[0].extent);
         if !self.names().contains(&"cells") {
             text += &format!("{} cells\n", options.cells);
         }
@@ -156,9 +156,8 @@ impl Survey<'_> {
     }
 
     pub(super) fn document(&self) -> Result<Value> {
-        let Self { options, selection, search, points, rows } = self;
-        let settings =
-            settings(selection, &self.scheme(), points[0].extent, options.cells, Value::Null);
+        let Self { options, selection, settled, search, points, rows } = self;
+        let settings = settings(selection, settled, points[0].extent, options.cells, Value::Null);
         let rows = points.iter().zip(rows).map(|(point, row)| document(options, point, row));
         Ok(json!({
             "schema": "mmsmith.stability/1",
@@ -183,11 +182,11 @@ fn judge(options: &StabilityOptions, cfl: f64, criteria: &Criteria) -> Result<bo
     let selection = Selection::new(&options.name, &options.scheme.parameters.set)?;
     let scheme = SchemeOptions { cfl: Some(cfl), ..options.scheme.clone() };
     let output = Output::prepare_if(scheme.json.as_ref())?;
-    let point = Point::new(Vec::new(), selection, scheme, options.cells)?;
-    let scheme = &point.scheme;
-    with_threads(scheme.threads, || {
-        let found = is_stable(&point.model.exact, point.model.arithmetic(), &point.case, criteria)?;
-        let mut text = preface(scheme) + &caption(&point.selection, scheme, point.extent);
+    let point = Point::new(Vec::new(), selection, &scheme, options.cells)?;
+    let Point { selection, settled, model, extent, .. } = &point;
+    with_threads(settled.threads, || {
+        let found = is_stable(&model.exact, model.arithmetic(), &settled.case, criteria)?;
+        let mut text = settled.choice() + &caption(selection, settled, *extent);
         text += &definition(criteria);
         text += &match &found.failure {
             None => format!("CFL {cfl}: stable over {} steps\n", found.steps),
@@ -195,7 +194,7 @@ fn judge(options: &StabilityOptions, cfl: f64, criteria: &Criteria) -> Result<bo
         };
         terminal::say(&text)?;
         if let Some(output) = output {
-            let settings = settings(&point.selection, scheme, point.extent, options.cells, cfl);
+            let settings = settings(selection, settled, *extent, options.cells, cfl);
             output.write(&json!({
                 "schema": "mmsmith.stability/1",
                 "settings": settings,
@@ -229,8 +228,8 @@ fn limits(points: &[Point], search: &Search, keep: &Keep, bar: &Bar) -> Result<V
             let mut show = |SearchProgress { run, share }: SearchProgress| {
                 bar.show_share(|| format!("{name}, run {run}"), shares.set(index, share));
             };
-            let row =
-                find(&point.model.exact, point.model.arithmetic(), &point.case, search, &mut show)?;
+            let Point { model, settled, .. } = point;
+            let row = find(&model.exact, model.arithmetic(), &settled.case, search, &mut show)?;
             bar.show_share(|| name.clone(), shares.set(index, 1.0));
             Ok(row)
         },

@@ -472,7 +472,7 @@ impl Report<'_> {
 
     /// Whether an entry was run with the threads that all were run with, as far as its scheme uses them.
     fn is_of_usual_threads(&self, entry: &Entry) -> bool {
-        entry.setting.threads == self.threads || !entry.setting.case.steps_on_threads()
+        entry.setting.threads == self.threads
     }
 
     /// From where on single precision stops improving: for each scheme that was run in both, its errors grid by grid.

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use mmsmith_solutions::{BLOCK, Domain, Solution, State, StateRun};
+use mmsmith_runtime::{BLOCK, Domain, Solution, State, StateRun};
 use mmsmith_vtk::foreign::{ArrayHead, Snapshot};
 use nalgebra::{SMatrix, SVector};
 

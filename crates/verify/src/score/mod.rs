@@ -17,7 +17,7 @@ pub use findings::Remark;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use mmsmith_solutions::{AnySolution, Solution};
+use mmsmith_runtime::{AnySolution, Solution};
 use mmsmith_vtk::foreign::{FrameFile, Snapshot, frames};
 use nalgebra::SVector;
 use serde::Serialize;

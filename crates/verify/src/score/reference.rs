@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use mmsmith_solutions::Solution;
+use mmsmith_runtime::Solution;
 use mmsmith_vtk::foreign::Snapshot;
 use nalgebra::SVector;
 

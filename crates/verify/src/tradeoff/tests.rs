@@ -15,10 +15,7 @@ struct Formula {
 
 impl Formula {
     fn order(setting: &Setting) -> f64 {
-        match setting.case.frame {
-            Frame::Updated => 2.0,
-            Frame::Total(total) => total.scheme.degree as f64 + 1.0,
-        }
+        setting.case.scheme.total().map_or(2.0, |total| total.degree as f64 + 1.0)
     }
 
     fn plan(setting: &Setting) -> Option<Plan> {
@@ -36,7 +33,7 @@ impl Formula {
 
     fn time(&self, setting: &Setting) -> f64 {
         let plan = Self::plan(setting).unwrap();
-        let each = if setting.case.frame == Frame::Updated { 1e-7 } else { 1e-6 };
+        let each = if setting.case.scheme.updated().is_some() { 1e-7 } else { 1e-6 };
         plan.steps as f64 * (1e-6 + plan.particles * each) / setting.threads as f64
     }
 
@@ -81,7 +78,8 @@ impl Formula {
             plan: &Self::plan,
             run: &|setting, _| {
                 // Some schemes are refused.
-                let is_refused = setting.case.shape == Shape::Bspline2;
+                let updated = setting.case.scheme.updated();
+                let is_refused = updated.is_some_and(|u| u.shape == Shape::Bspline2);
                 Ok::<_, std::convert::Infallible>((!is_refused).then(|| self.run(setting)))
             },
             repeat: &|setting, _| {
@@ -210,14 +208,6 @@ fn the_effects_that_matter_most_come_from_all_settings() {
     assert_eq!(chosen[7], (SettingName::Cells, 0.1 + 0.001 * 7.0));
     assert_eq!(chosen[8..], [(SettingName::Cfl, 1.0), (SettingName::Threads, 1.0)]);
     assert!(leading(&[], 10).is_empty());
-}
-
-#[test]
-fn schemes_of_one_thread_are_given_one() {
-    let base = Setting { case: Case::default(), single: false, threads: 4 };
-    for setting in families(&base, Some(8), true, &Formula::plan) {
-        assert_eq!(setting.threads > 1, setting.case.steps_on_threads(), "{setting:?}");
-    }
 }
 
 #[test]

@@ -2,13 +2,14 @@
 
 use mmsmith_solutions::{AnySolution, CATALOGUE, Precision, build};
 use mmsmith_verify::{
-    Arithmetic, Case, Coordinates, Criteria, Frame, Integrator, Layout, Outputs, PerField, PerNorm,
-    Row, Search, Shape, Status, TotalScheme, Transfer, is_stable, plan, run, stability,
+    Arithmetic, Case, Coordinates, Criteria, Layout, Outputs, PerField, PerNorm, Placement, Row,
+    Scheme, Search, Shape, Start, Status, Stepping, Total, Transfer, Updated, is_stable, plan, run,
+    stability,
 };
 
 const SHAPES: [Shape; 3] = [Shape::Linear, Shape::Ugimp, Shape::Gimp];
-const INTEGRATORS: [Integrator; 4] =
-    [Integrator::Cd, Integrator::Usf, Integrator::Usl, Integrator::Musl];
+const STEPPINGS: [Stepping; 4] =
+    [Stepping::Cd(Start::Halved), Stepping::Usf, Stepping::Usl, Stepping::Musl];
 
 fn solution<T: Precision>(name: &str, set: &[(&str, f64)]) -> AnySolution<T> {
     let description = CATALOGUE.iter().find(|known| known.name == name).expect("a solution");
@@ -42,38 +43,50 @@ fn row_in_single(exact: &AnySolution<f64>, single: &AnySolution<f32>, case: &Cas
 
 /// Every scheme of the updated frame on a few cells, and one of the total frame that suits a box.
 fn schemes() -> Vec<Case> {
-    let few = Case { cells: 6, ..Case::default() };
+    let usual = Updated::default();
     let updated = SHAPES.into_iter().flat_map(|shape| {
-        INTEGRATORS.into_iter().map(move |integrator| Case { shape, integrator, ..few })
+        STEPPINGS.into_iter().map(move |stepping| Updated { shape, stepping, ..usual })
     });
-    updated.chain(further(few)).chain([total(few)]).collect()
+    let updated = updated.chain(further(usual)).map(Scheme::Updated);
+    let all = updated.chain([Scheme::Total(Total::of_degree(3))]);
+    all.map(|scheme| Case { scheme, cells: 6, ..Case::default() }).collect()
 }
 
 /// Further weights, transfers and integrators.
-fn further(few: Case) -> impl Iterator<Item = Case> {
+fn further(usual: Updated) -> impl Iterator<Item = Updated> {
     let shapes = [Shape::Cpdi, Shape::Cpdi2, Shape::Bspline2, Shape::Bspline3];
     let transfers = [Transfer::Pic, Transfer::Apic, Transfer::Xpic(2)];
-    let shapes = shapes.into_iter().map(move |shape| Case { shape, ..few });
-    let transfers = transfers.into_iter().map(move |transfer| Case { transfer, ..few });
-    shapes.chain(transfers).chain([Case { integrator: Integrator::Usavg, ..few }])
-}
-
-fn total(case: Case) -> Case {
-    Case { frame: Frame::Total(TotalScheme::of_degree(3)), ..case }
+    let shapes = shapes.into_iter().map(move |shape| Updated { shape, ..usual });
+    let transfers = transfers.into_iter().map(move |transfer| Updated { transfer, ..usual });
+    shapes.chain(transfers).chain([Updated { stepping: Stepping::Usavg, ..usual }])
 }
 
 fn total_on(coordinates: Coordinates, case: Case) -> Case {
-    let scheme = TotalScheme { layout: Layout::Gauss, coordinates, ..TotalScheme::of_degree(3) };
-    Case { frame: Frame::Total(scheme), per_cell: 4, cfl: 0.1, ..case }
+    let scheme = Total { layout: Layout::Gauss, coordinates, ..Total::of_degree(3) };
+    Case { scheme: Scheme::Total(scheme), per_cell: 4, cfl: 0.1, ..case }
+}
+
+/// The schemes of the updated frame, each with a case.
+fn updated_schemes() -> impl Iterator<Item = (Updated, Case)> {
+    schemes().into_iter().filter_map(|case| Some((*case.scheme.updated()?, case)))
+}
+
+fn on_shifted_lattice(offset: f64, updated: Updated) -> Scheme {
+    Scheme::Updated(Updated { placement: Placement::Lattice { offset }, ..updated })
+}
+
+/// Whether particles that cross cell edges spoil the weights.
+fn is_linear(case: &Case) -> bool {
+    case.scheme.updated().is_some_and(|updated| updated.shape == Shape::Linear)
 }
 
 /// Every scheme of [`schemes`] that a solution can be run with, fitted to its body.
 fn schemes_for(name: &str) -> Vec<Case> {
     let mut schemes = schemes();
     if name == "sphere-shell" {
-        schemes.retain(|case| case.frame != Frame::Updated);
+        schemes.retain(|case| case.scheme.total().is_some());
     }
-    for case in schemes.iter_mut().filter(|case| case.frame != Frame::Updated) {
+    for case in schemes.iter_mut().filter(|case| case.scheme.total().is_some()) {
         match name {
             "ring" => *case = total_on(Coordinates::Polar, *case),
             "sphere-shell" => *case = total_on(Coordinates::Spherical, *case),
@@ -89,7 +102,7 @@ fn zero_amplitude_stays_exactly_at_rest() {
         let (exact, single) = (solution(name, &[("A", 0.0)]), solution(name, &[("A", 0.0)]));
         for case in schemes_for(name) {
             let mut rows = vec![row(&exact, &case)];
-            if case.frame == Frame::Updated {
+            if case.scheme.updated().is_some() {
                 rows.push(row_in_single(&exact, &single, &case));
             }
             for row in rows {
@@ -146,7 +159,7 @@ fn units_that_differ_by_powers_of_two_give_the_same_bits() {
             continue;
         }
         let (small_plain, small_scaled) = (solution(name, &[]), solution(name, &values));
-        for case in schemes().into_iter().filter(|case| case.frame == Frame::Updated) {
+        for (_, case) in updated_schemes() {
             let a = row_in_single(&plain, &small_plain, &case);
             assert_scaled(&case, &a, &row_in_single(&scaled, &small_scaled, &case), factors);
         }
@@ -156,7 +169,7 @@ fn units_that_differ_by_powers_of_two_give_the_same_bits() {
 #[test]
 fn small_amplitudes_keep_their_relative_accuracy_until_positions_round() {
     for mut case in schemes() {
-        if case.shape == Shape::Linear && case.frame == Frame::Updated {
+        if is_linear(&case) {
             // Particles that cross cell edges make hat functions as wrong as the motion is large.
             continue;
         }
@@ -184,15 +197,16 @@ fn small_amplitudes_keep_their_relative_accuracy_until_positions_round() {
 fn particles_may_lie_on_cell_edges_and_on_walls() {
     let exact = solution("axis-aligned", &[("A", 0.05)]);
     let still = solution("axis-aligned", &[("A", 0.0)]);
-    for case in schemes().into_iter().filter(|case| case.frame == Frame::Updated) {
+    for (updated, case) in updated_schemes() {
         for offset in [-0.5, 0.5] {
-            let case = Case { offset, cfl: 0.2, ..case };
+            let scheme = on_shifted_lattice(offset, updated);
+            let case = Case { scheme, cfl: 0.2, ..case };
             let at_rest = row(&still, &case);
             assert_eq!(at_rest.status, Status::Ok, "{case:?}");
             assert_eq!(at_rest.errors, PerField::default(), "{case:?}");
             let moving = row(&exact, &case);
             assert!(moving.errors.u.linf.is_finite(), "{case:?}: {}", moving.status);
-            if case.shape == Shape::Gimp && case.integrator == Integrator::Cd {
+            if updated.shape == Shape::Gimp && updated.stepping == Stepping::Cd(Start::Halved) {
                 assert_eq!(moving.status, Status::Ok);
             }
         }
@@ -202,7 +216,7 @@ fn particles_may_lie_on_cell_edges_and_on_walls() {
 #[test]
 fn one_cell_and_one_particle_are_enough_for_a_run() {
     let exact = solution("axis-aligned-1d", &[("A", 0.01)]);
-    for case in schemes().into_iter().filter(|case| case.frame == Frame::Updated) {
+    for (_, case) in updated_schemes() {
         for per_cell in [1, 2] {
             let case = Case { cells: 1, per_cell, ..case };
             let row = row(&exact, &case);
@@ -233,7 +247,8 @@ fn nearly_empty_cells_at_the_rim_of_a_ring_stay_stable() {
     // Shifts that leave slivers of the body in some cells; the error stays that of the grid.
     let exact = solution("ring", &[]);
     let error = |offset: f64| {
-        let case = Case { cells: 12, cfl: 0.2, offset, ..Case::default() };
+        let scheme = on_shifted_lattice(offset, Updated::default());
+        let case = Case { scheme, cells: 12, cfl: 0.2, ..Case::default() };
         let row = row(&exact, &case);
         assert_eq!(row.status, Status::Ok, "{offset}");
         row.errors.u.linf
@@ -271,7 +286,7 @@ fn stiffness_and_density_over_24_decades_change_nothing_but_rounding() {
     for mut case in schemes() {
         // In this time hat functions part runs that differ by rounding.
         case.cells = 8;
-        case.periods = if case.shape == Shape::Linear { 0.25 } else { 1.0 };
+        case.periods = if is_linear(&case) { 0.25 } else { 1.0 };
         let expected = row(&reference, &case);
         for E in decades {
             for rho0 in decades {

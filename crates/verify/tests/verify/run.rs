@@ -5,8 +5,8 @@ use crate::hand_coded;
 use hand_coded::{AxisAligned, Coded, CrossedShear, Ring};
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{
-    Arithmetic, Case, Extent, FrameOutput, Integrator, Outputs, Row, Shape, Snapshot, Start,
-    Status, Sweep, converge, run,
+    Arithmetic, Case, Extent, FrameOutput, Outputs, Row, Scheme, Shape, Snapshot, Start, Status,
+    Stepping, Sweep, Updated, converge, run,
 };
 
 fn axis_aligned() -> AnySolution<f64> {
@@ -27,6 +27,10 @@ fn run_quietly(solution: &AnySolution<f64>, case: &Case) -> Row {
         until: None,
     };
     run(solution, Arithmetic::Double, case, &mut outputs).expect("a case that can be run")
+}
+
+fn from(start: Start) -> Scheme {
+    Scheme::Updated(Updated { stepping: Stepping::Cd(start), ..Updated::default() })
 }
 
 /// A row without what differs from run to run.
@@ -55,7 +59,8 @@ fn gimp_with_centred_differences_has_the_known_errors_and_second_order() {
 #[test]
 fn the_three_starts_of_centred_differences_agree_to_second_order() {
     let error = |start| {
-        run_quietly(&axis_aligned(), &Case { start, cells: 16, ..Case::default() }).errors.u.linf
+        let case = Case { scheme: from(start), cells: 16, ..Case::default() };
+        run_quietly(&axis_aligned(), &case).errors.u.linf
     };
     let [exact, data, halved] = [Start::Exact, Start::Data, Start::Halved].map(error);
     assert!((data / exact - 1.0).abs() < 0.2, "{data:e} {exact:e}");
@@ -65,7 +70,7 @@ fn the_three_starts_of_centred_differences_agree_to_second_order() {
 #[test]
 fn the_first_state_is_the_exact_one() {
     // One step, so short that all errors are those of the start.
-    let case = Case { periods: 1e-9, start: Start::Exact, cells: 16, ..Case::default() };
+    let case = Case { periods: 1e-9, scheme: from(Start::Exact), cells: 16, ..Case::default() };
     let row = run_quietly(&ring(), &case);
     assert_eq!(row.steps, 1);
     assert!(row.errors.u.linf < 1e-12 && row.errors.F.linf < 1e-9, "{row:?}");
@@ -76,8 +81,11 @@ fn the_first_state_is_the_exact_one() {
 fn every_pair_of_shape_and_integrator_gives_a_row_on_both_problems() {
     for solution in [axis_aligned(), ring()] {
         for shape in [Shape::Linear, Shape::Ugimp, Shape::Gimp] {
-            for integrator in [Integrator::Usf, Integrator::Usl, Integrator::Musl, Integrator::Cd] {
-                let case = Case { shape, integrator, cells: 8, ..Case::default() };
+            for stepping in
+                [Stepping::Usf, Stepping::Usl, Stepping::Musl, Stepping::Cd(Start::Halved)]
+            {
+                let scheme = Updated { shape, stepping, ..Updated::default() };
+                let case = Case { scheme: Scheme::Updated(scheme), cells: 8, ..Case::default() };
                 let row = run_quietly(&solution, &case);
                 assert!(row.errors.u.linf > 0.0 && row.errors.u.linf.is_finite(), "{row:?}");
             }

@@ -1,12 +1,12 @@
 //! What runs take beside what was predicted of them.
 
 use anyhow::Result;
-use mmsmith_verify::{Case, CostModel, Outputs, Plan, Status, median, plan, run};
+use mmsmith_verify::{Case, CostModel, Outputs, Parts, Plan, Scheme, Status, median, plan, run};
 use serde::Serialize;
 
-use crate::arguments::{Integrator, Mass, SchemeOptions, Shape, word};
-use crate::commands::scheme::Scheme;
-use crate::commands::{Model, case, predict};
+use crate::arguments::{Frame, Integrator, Mass, SchemeOptions, Shape};
+use crate::commands::scheme::Settled;
+use crate::commands::{Model, predict};
 use crate::memory;
 use crate::table::Table;
 
@@ -54,10 +54,10 @@ impl Comparison {
     /// Runs the schemes that fit a solution on the grids that fit it and are done in seconds.
     pub(super) fn measure(model: &Model) -> Result<Self> {
         let mut rows = Vec::new();
-        for (words, scheme) in schemes(model) {
+        for (words, base) in schemes(model)? {
             let fitting: Vec<(Case, Plan)> = LADDER
                 .into_iter()
-                .filter_map(|cells| fitting(model, &case(&scheme, cells).ok()?))
+                .filter_map(|cells| fitting(model, &Case { cells, ..base }))
                 .collect();
             let Some((finest, _)) = fitting.last() else { continue };
             let Ok(learnt) = predict::learn(model, finest) else { continue };
@@ -121,13 +121,13 @@ impl Comparison {
 
 /// Five schemes that may fit a solution, of different cost: in the updated frame in one pass a step and in several, and in the
 /// total one.
-fn schemes(model: &Model) -> Vec<(String, Scheme)> {
+fn schemes(model: &Model) -> Result<Vec<(String, Case)>> {
     let open = SchemeOptions::open();
     let said = |shape, integrator| SchemeOptions { shape: Some(shape), integrator, ..open.clone() };
     let (cd, usl, musl) = (Integrator::Cd, Integrator::Usl, Integrator::Musl);
     let all = if mmsmith_verify::needs_total_frame(&model.exact).is_none() {
         let total = SchemeOptions {
-            frame: Some(crate::arguments::Frame::Total),
+            frame: Some(Frame::Total),
             cfl: Some(0.2),
             ..said(Shape::Bspline3, cd)
         };
@@ -149,17 +149,16 @@ fn schemes(model: &Model) -> Vec<(String, Scheme)> {
         ]
     };
     let told = |options: &SchemeOptions| {
-        let scheme = Scheme::settle(options, &model.exact);
-        let mut words = word(scheme.shape);
-        if scheme.frame == crate::arguments::Frame::Updated {
-            words += &format!(" + {}", word(scheme.integrator));
-        } else {
-            words += ", total frame";
-        }
+        let case = Settled::settle(options, &model.exact)?.case;
+        let Parts { shape, integrator, .. } = case.scheme.parts();
+        let mut words = match case.scheme {
+            Scheme::Updated(_) => format!("{shape} + {integrator}"),
+            Scheme::Total(_) => format!("{shape}, total frame"),
+        };
         if options.mass.is_some() {
             words += ", lumped mass";
         }
-        (words, scheme)
+        Ok((words, case))
     };
     all.iter().map(told).collect()
 }

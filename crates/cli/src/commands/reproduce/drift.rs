@@ -3,15 +3,17 @@
 use std::path::Path;
 
 use anyhow::Result;
-use mmsmith_verify::{Case, Moment, Outputs, Progress, Row, Status, energy_drift, run as simulate};
+use mmsmith_verify::{
+    Case, Moment, Outputs, Progress, Row, Shape, Status, Stepping, energy_drift, run as simulate,
+};
 use serde_json::json;
 
 use super::section::Section;
-use super::{PROBLEMS, Pace, name, word};
-use crate::arguments::{Integrator, Precision, Shape};
+use super::{CD, PROBLEMS, Pace, name};
+use crate::arguments::Precision;
 use crate::commands::run::{course, drift_plot, history_document};
-use crate::commands::scheme::Scheme;
-use crate::commands::{Model, case, settings};
+use crate::commands::scheme::{Settled, usual};
+use crate::commands::{Model, settings};
 use crate::csv;
 use crate::json::Output;
 use crate::library::Selection;
@@ -20,13 +22,15 @@ use crate::table::Table;
 
 const CELLS: usize = 16;
 const PERIODS: f64 = 10.0;
-const INTEGRATORS: [Integrator; 4] =
-    [Integrator::Cd, Integrator::Usl, Integrator::Usf, Integrator::Musl];
+const STEPPINGS: [Stepping; 4] = [CD, Stepping::Usl, Stepping::Usf, Stepping::Musl];
+
+fn case(stepping: Stepping) -> Case {
+    Case { periods: PERIODS, ..usual(Shape::Gimp, stepping, CELLS) }
+}
 
 /// The runs of a problem.
-pub(super) fn cases() -> Result<Vec<Case>> {
-    let scheme = |integrator| Scheme { periods: PERIODS, ..Scheme::usual(Shape::Gimp, integrator) };
-    INTEGRATORS.into_iter().map(|integrator| case(&scheme(integrator), CELLS)).collect()
+pub(super) fn cases() -> [Case; STEPPINGS.len()] {
+    STEPPINGS.map(case)
 }
 
 /// Runs both problems with every integrator and writes the histories into the folders of `out`.
@@ -46,13 +50,11 @@ pub(super) fn section(out: &Path, paces: &[Pace], agenda: &Agenda) -> Result<Sec
         let mut curves = Vec::new();
         let header = ["scheme", "least", "largest", "at the end", "momentum", "status"];
         let mut table = Table::new(1, header);
-        for integrator in INTEGRATORS {
-            let scheme = (Shape::Gimp, integrator);
-            let usual = Scheme::usual(scheme.0, scheme.1);
-            let options = Scheme { periods: PERIODS, ..usual };
-            let base = case(&options, CELLS)?;
+        for stepping in STEPPINGS {
+            let scheme = (Shape::Gimp, stepping);
+            let base = case(stepping);
             let extent = model.admit(&[base])?;
-            let stem = format!("drift-{}-{}", word(scheme.0), word(scheme.1));
+            let stem = format!("drift-{}-{}", scheme.0, scheme.1);
             let json = Output::prepare(&folder.join(format!("{stem}.json")))?;
             let sheet = Output::prepare(&folder.join(format!("{stem}.csv")))?;
             let bar = agenda.next(pace.seconds(&[base]));
@@ -60,7 +62,7 @@ pub(super) fn section(out: &Path, paces: &[Pace], agenda: &Agenda) -> Result<Sec
             let (row, history) = run(&model, &base, &mut |progress| bar.show(&what, progress))?;
             json.write(&json!({
                 "schema": "mmsmith.run/1",
-                "settings": settings(&selection, &options, extent, CELLS, options.cfl),
+                "settings": settings(&selection, &Settled::of(base), extent, CELLS, base.cfl),
                 "result": row,
                 "history": history_document(&history),
             }))?;

@@ -1,13 +1,15 @@
 //! The ring's stress beside the orders of three schemes on it: the picture that the README begins with.
 
 use anyhow::{Context, Result};
-use mmsmith_verify::{Outputs, Snapshot, Status, Sweep, converge as measure, run as simulate};
+use mmsmith_verify::{
+    Case, Coordinates, Extent, Layout, Outputs, Placement, Scheme, Shape, Snapshot, Status, Sweep,
+    Total, Updated, converge as measure, run as simulate,
+};
 
 use super::GRID;
-use crate::arguments::{Extent, Frame, Grid, Integrator, Layout, Precision, Shape, Stress};
+use crate::arguments::{Precision, Stress};
+use crate::commands::Model;
 use crate::commands::picture::{Units, draw, range};
-use crate::commands::scheme::Scheme;
-use crate::commands::{Model, case};
 use crate::library::Selection;
 use crate::svg::{Curve, Plot, beside};
 
@@ -19,30 +21,27 @@ const CELLS: [usize; 4] = [8, 16, GRID, 64];
 /// A scheme, its name in the picture, and the order that it is known to have.
 struct Curved {
     name: &'static str,
-    scheme: Scheme,
+    case: Case,
     order: Option<i32>,
 }
 
 /// The usual scheme, whose particles do not fit the rims; particles that do; and one of high order.
 fn schemes() -> [Curved; 3] {
-    let usual = |shape| Scheme::usual(shape, Integrator::Cd);
+    let usual = Case { cells: GRID, ..Case::default() };
+    let fitted =
+        Updated { shape: Shape::Cpdi2, placement: Placement::BodyFitted, ..Updated::default() };
+    let (layout, coordinates) = (Layout::Gauss, Coordinates::Polar);
+    let splines = Total { layout, coordinates, ..Total::of_degree(3) };
     [
-        Curved { name: "gimp, square lattice", scheme: usual(Shape::Gimp), order: None },
+        Curved { name: "gimp, square lattice", case: usual, order: None },
         Curved {
             name: "cpdi2, body-fitted particles",
-            scheme: Scheme { layout: Layout::BodyFitted, ..usual(Shape::Cpdi2) },
+            case: Case { scheme: Scheme::Updated(fitted), ..usual },
             order: Some(2),
         },
         Curved {
             name: "bspline3, total frame",
-            scheme: Scheme {
-                frame: Frame::Total,
-                layout: Layout::Gauss,
-                grid: Grid::Polar,
-                ppc: 4,
-                cfl: 0.2,
-                ..usual(Shape::Bspline3)
-            },
+            case: Case { scheme: Scheme::Total(splines), per_cell: 4, cfl: 0.2, ..usual },
             order: Some(4),
         },
     ]
@@ -55,11 +54,11 @@ pub(super) fn svg() -> Result<String> {
     let units = Units::of(&selection);
 
     let [_, fitted, _] = schemes();
-    let scheme = Scheme { extent: Some(Extent::Full), ..fitted.scheme };
+    let case = Case { extent: Some(Extent::Full), cells: SHOWN, ..fitted.case };
     let mut snapshot = Snapshot { share: 1.0, frame: None };
     let silent = &mut |_| ();
     let mut outputs = Outputs { snapshot: Some(&mut snapshot), ..Outputs::new(silent) };
-    simulate(&model.exact, model.arithmetic(), &case(&scheme, SHOWN)?, &mut outputs)?;
+    simulate(&model.exact, model.arithmetic(), &case, &mut outputs)?;
     let frame = snapshot.frame.context("the ring's run stopped before its end")?;
     let hoop = Stress::Hoop.values(&frame)?;
     let note = format!("{} particles that fit the rims, {SHOWN} cells, cpdi2", frame.points.len());
@@ -67,9 +66,8 @@ pub(super) fn svg() -> Result<String> {
 
     let mut curves = Vec::new();
     for one in schemes() {
-        let base = case(&one.scheme, GRID)?;
         let sweep = Sweep::Cells(CELLS.to_vec());
-        let study = measure(&model.exact, model.arithmetic(), &base, &sweep, &mut |_| ())?;
+        let study = measure(&model.exact, model.arithmetic(), &one.case, &sweep, &mut |_| ())?;
         let cases = study
             .rows
             .iter()

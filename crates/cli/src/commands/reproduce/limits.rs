@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use anyhow::Result;
+use mmsmith_verify::Shape;
 
 use super::section::Section;
-use super::{PROBLEMS, Pace};
-use crate::arguments::{Integrator, Shape, StabilityOptions};
-use crate::commands::case;
-use crate::commands::scheme::Scheme;
+use super::{CD, PROBLEMS, Pace};
+use crate::arguments::StabilityOptions;
+use crate::commands::scheme::usual;
 use crate::commands::stability::survey;
 use crate::json::Output;
 use crate::progress::Bar;
@@ -18,12 +18,11 @@ const CELLS: usize = 16;
 const OVER: [&str; 2] = ["amplitude=1e-6,0.03,0.1,0.2", "nu=0,0.3,0.4,0.45"];
 
 /// What it will take: the runs of a search, of which those that are unstable end early.
-pub(super) fn seconds(pace: &Pace) -> Result<f64> {
+pub(super) fn seconds(pace: &Pace) -> f64 {
     /// Points of the map, and the runs that find the limit of one.
     const POINTS: f64 = 16.0;
     const RUNS: f64 = 10.0;
-    let case = case(&Scheme::usual(Shape::Gimp, Integrator::Cd), CELLS)?;
-    Ok(POINTS * RUNS * pace.seconds(&[case]))
+    POINTS * RUNS * pace.seconds(&[usual(Shape::Gimp, CD, CELLS)])
 }
 
 /// Finds the limits of gimp+cd and writes them into the folder of the first problem.

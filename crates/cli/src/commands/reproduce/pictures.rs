@@ -3,14 +3,14 @@
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use mmsmith_verify::{Case, FrameOutput, Outputs, run as simulate};
+use mmsmith_verify::{Case, FrameOutput, Outputs, Shape, run as simulate};
 use mmsmith_vtk::{Frame, read};
 
-use super::{FRAMES, GRID, PROBLEMS};
-use crate::arguments::{Integrator, Shape, Stress};
+use super::{CD, FRAMES, GRID, PROBLEMS};
+use crate::arguments::Stress;
+use crate::commands::Model;
 use crate::commands::picture::{Units, draw, range};
-use crate::commands::scheme::Scheme;
-use crate::commands::{Model, case};
+use crate::commands::scheme::usual;
 use crate::number;
 use crate::svg::extremes;
 
@@ -24,8 +24,8 @@ pub(super) fn write_contrast(model: &Model, problem: &str, folder: &Path) -> Res
     if problem != PROBLEMS[0] {
         return Ok(());
     }
-    let base = case(&Scheme::usual(Shape::Ugimp, Integrator::Cd), GRID)?;
-    let case = Case { periods: MOMENT as f64 / (FRAMES - 1) as f64, ..base };
+    let periods = MOMENT as f64 / (FRAMES - 1) as f64;
+    let case = Case { periods, ..usual(Shape::Ugimp, CD, GRID) };
     let frames = FrameOutput { folder: folder.join(CONTRAST), name: problem.to_owned(), count: 2 };
     let silent = &mut |_| ();
     let mut outputs = Outputs { frames: Some(&frames), ..Outputs::new(silent) };

@@ -13,7 +13,7 @@ use super::section::Section;
 use super::{
     CELLS, DIFFERENCES, Differences, GENTLE, GENTLE_GRID, GRID, PROBLEMS, Results, SMALL_STEP,
     SMALL_STEP_CELLS, SPACE, TIME, compare, difference_plot, difference_tables, errors_with_units,
-    name, pictures, space_plot, stopped, tables, time_plot, verdict_table, word,
+    name, pictures, space_plot, stopped, tables, time_plot, verdict_table,
 };
 use crate::svg::escape;
 use crate::table::{self, Table};
@@ -240,8 +240,8 @@ fn files(results: &Results) -> String {
     let schemes = schemes.chain(DIFFERENCES.map(|one| ("differences", one)));
     let gentle = DIFFERENCES.map(|one| ("gentle", one)).into_iter();
     let gentle = gentle.filter(|_| problem == PROBLEMS[0]);
-    for (kind, (shape, integrator)) in schemes.chain(gentle) {
-        stems.push(format!("{kind}-{}-{}", word(shape), word(integrator)));
+    for (kind, (shape, stepping)) in schemes.chain(gentle) {
+        stems.push(format!("{kind}-{shape}-{stepping}"));
     }
     let mut text = format!(
         "<h3>Files</h3>\n<ul>\n<li>particles of gimp+cd: <a href=\"{problem}/particles/{problem}.pvd\">{problem}.pvd</a></li>\n"

@@ -3,15 +3,15 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use anyhow::{Result, bail};
-use mmsmith_verify::{Criteria, Observed, is_stable};
+use mmsmith_verify::{Case, CflSpeed, Criteria, Observed, is_stable};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use serde_json::{Value, json};
 
 use super::{Point, definition, told, without_threads};
-use crate::arguments::{CflSpeed, Frame, SchemeOptions, StabilityOptions, word};
-use crate::commands::scheme::Scheme;
-use crate::commands::{caption, preface, settings, with_threads};
+use crate::arguments::{SchemeOptions, StabilityOptions, word};
+use crate::commands::scheme::Settled;
+use crate::commands::{caption, settings, with_threads};
 use crate::json::Output;
 use crate::keep::{Keep, Order};
 use crate::library::Selection;
@@ -23,29 +23,25 @@ const MOST_DRAWS: usize = 100;
 
 pub(super) fn search(options: &StabilityOptions, criteria: &Criteria) -> Result<bool> {
     let selection = Selection::new(&options.name, &options.scheme.parameters.set)?;
-    let scheme = &Scheme::settle(&options.scheme, &selection.build()?);
+    let settled = &Settled::settle(&options.scheme, &selection.build()?)?;
+    let cfl = settled.case.cfl;
     if options.plot.is_some() || options.csv.is_some() {
         bail!("--search random draws no picture and no table; use --json");
     }
-    let output = Output::prepare_if(scheme.json.as_ref())?;
+    let output = Output::prepare_if(settled.json.as_ref())?;
     let points: Vec<Point> = (0..options.samples)
-        .map(|sample| draw(options, scheme, &selection, sample))
+        .map(|sample| draw(options, &settled.case, &selection, sample))
         .collect::<Result<_>>()?;
     let keep = Keep::open(options.kept.out.as_ref(), &options.name)?;
     let keys: Vec<_> = points
         .iter()
-        .map(|point| {
-            let case = settings(
-                &point.selection,
-                &point.scheme,
-                point.extent,
-                point.case.cells,
-                point.case.cfl,
-            );
+        .map(|Point { selection, settled, extent, .. }| {
+            let Case { cells, cfl, .. } = settled.case;
+            let case = settings(selection, settled, *extent, cells, cfl);
             without_threads(json!({ "case": case, "criteria": criteria }))
         })
         .collect();
-    with_threads(scheme.threads, || {
+    with_threads(settled.threads, || {
         let found: Vec<Observed> = {
             let bar = Bar::new("random settings");
             let done = AtomicUsize::new(0);
@@ -54,9 +50,9 @@ pub(super) fn search(options: &StabilityOptions, criteria: &Criteria) -> Result<
                 Order::AtOnce,
                 |_| {},
                 |index| {
-                    let point = &points[index];
-                    let model = &point.model;
-                    let found = is_stable(&model.exact, model.arithmetic(), &point.case, criteria)?;
+                    let Point { model, settled, .. } = &points[index];
+                    let case = &settled.case;
+                    let found = is_stable(&model.exact, model.arithmetic(), case, criteria)?;
                     let done = done.fetch_add(1, Ordering::Relaxed) + 1;
                     let share = done as f64 / points.len() as f64;
                     bar.show_share(|| format!("setting {done}/{}", points.len()), share);
@@ -65,20 +61,21 @@ pub(super) fn search(options: &StabilityOptions, criteria: &Criteria) -> Result<
             )?
         };
         let extent = points.first().and_then(|point| point.extent);
-        let mut text = preface(scheme) + &caption(&selection, scheme, extent);
+        let mut text = settled.choice() + &caption(&selection, settled, extent);
         text += &definition(criteria);
         text += &format!(
             "{} random settings (seed {}) with CFL numbers up to {} on P-waves:\n",
             points.len(),
             options.seed,
-            scheme.cfl
+            cfl
         );
         let mut failures = Vec::new();
         for (point, found) in points.iter().zip(&found) {
             let Some(failure) = &found.failure else { continue };
             let command = command(options, point);
             text += &format!("UNSTABLE: {}\n  {command}\n", told(failure));
-            failures.push(json!({ "command": command, "cfl": point.case.cfl, "failure": failure }));
+            let cfl = point.settled.case.cfl;
+            failures.push(json!({ "command": command, "cfl": cfl, "failure": failure }));
         }
         text += &format!("{} of {} unstable\n", failures.len(), points.len());
         terminal::say(&text)?;
@@ -86,7 +83,7 @@ pub(super) fn search(options: &StabilityOptions, criteria: &Criteria) -> Result<
         if let Some(output) = output {
             output.write(&json!({
                 "schema": "mmsmith.stability/1",
-                "settings": settings(&selection, scheme, extent, Value::Null, scheme.cfl),
+                "settings": settings(&selection, settled, extent, Value::Null, cfl),
                 "criteria": criteria,
                 "samples": points.len(),
                 "seed": options.seed,
@@ -100,7 +97,7 @@ pub(super) fn search(options: &StabilityOptions, criteria: &Criteria) -> Result<
 /// Setting number `sample`.
 fn draw(
     options: &StabilityOptions,
-    settled: &Scheme,
+    base: &Case,
     selection: &Selection,
     sample: usize,
 ) -> Result<Point> {
@@ -124,11 +121,11 @@ fn draw(
         // Up to the limit believed stable, on P-waves; the speeds' ratio is known once the solution is.
         let share = random.between(0.05, 1.0);
         let attempt = selection.with(&parameters).and_then(|selection| {
-            let scheme =
-                SchemeOptions { ppc: Some(ppc.max(settled.ppc)), offset, ..options.scheme.clone() };
-            let mut point = Point::new(Vec::new(), selection, scheme, cells)?;
-            let unit = mmsmith_verify::p_wave_limit(&point.model.exact, &point.case)?;
-            point.case.cfl = settled.cfl * unit * share;
+            let ppc = Some(ppc.max(base.per_cell));
+            let scheme = SchemeOptions { ppc, offset, ..options.scheme.clone() };
+            let mut point = Point::new(Vec::new(), selection, &scheme, cells)?;
+            let unit = mmsmith_verify::p_wave_limit(&point.model.exact, &point.settled.case)?;
+            point.settled.case.cfl = base.cfl * unit * share;
             Ok(point)
         });
         match attempt {
@@ -144,38 +141,33 @@ fn draw(
 
 /// The command line that repeats a setting.
 fn command(options: &StabilityOptions, point: &Point) -> String {
-    let Point { scheme, case, .. } = point;
+    let Case { scheme, cells, per_cell, cfl, cfl_speed, periods, extent } = point.settled.case;
+    let parts = scheme.parts();
     let mut text = format!(
-        "mms stability {} --at {:?} --cells {} --ppc {} --offset {:?} --shape {} --integrator {} --start {} --transfer {} \
-         --layout {} --periods {:?} --precision {} --error-multiple {:?} --energy-rate {:?}",
+        "mms stability {} --at {cfl:?} --cells {cells} --ppc {per_cell} --offset {:?} --shape {} --integrator {} --start {} \
+         --transfer {} --layout {} --periods {periods:?} --precision {} --error-multiple {:?} --energy-rate {:?}",
         options.name,
-        case.cfl,
-        case.cells,
-        scheme.ppc,
-        scheme.offset,
-        word(scheme.shape),
-        word(scheme.integrator),
-        word(scheme.start),
-        scheme.transfer,
-        word(scheme.layout),
-        scheme.periods,
-        word(scheme.precision),
+        parts.offset,
+        parts.shape,
+        parts.integrator,
+        parts.start,
+        parts.transfer,
+        parts.layout,
+        word(point.settled.precision),
         options.error_multiple,
         options.energy_rate,
     );
-    if scheme.frame == Frame::Total {
-        let (mass, composition) = crate::commands::scheme::echo(scheme);
+    if scheme.total().is_some() {
         text += &format!(
-            " --formulation total-lagrangian --mass {} --composition {composition} --grid {}",
-            word(mass),
-            word(scheme.grid)
+            " --formulation total-lagrangian --mass {} --composition {} --grid {}",
+            parts.mass, parts.composition, parts.grid
         );
     }
-    if scheme.cfl_speed == CflSpeed::PWave {
-        text += " --cfl-speed p-wave";
+    if cfl_speed != CflSpeed::Bar {
+        text += &format!(" --cfl-speed {cfl_speed}");
     }
-    if let Some(extent) = scheme.extent {
-        text += &format!(" --extent {}", word(extent));
+    if let Some(extent) = extent {
+        text += &format!(" --extent {extent}");
     }
     for (name, value) in point.selection.parameters() {
         text += &format!(" --set {name}={value:?}");

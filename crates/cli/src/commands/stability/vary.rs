@@ -44,7 +44,7 @@ pub(super) fn points(options: &StabilityOptions, selection: &Selection) -> Resul
                 place += &format!("{}{name}={value}", if place.is_empty() { "" } else { ", " });
             }
             let Draft { selection, scheme, cells } = draft;
-            let point = Point::new(values, selection, scheme, cells);
+            let point = Point::new(values, selection, &scheme, cells);
             if place.is_empty() { point } else { point.with_context(|| format!("--over {place}")) }
         })
         .collect()

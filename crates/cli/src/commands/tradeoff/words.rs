@@ -1,96 +1,68 @@
 //! Settings of a sweep in words: for people, for JSON, and as options of `mms run`.
 
 use mmsmith_verify::{
-    CflSpeed, Coordinates, Effect, Entry, Frame, Integrator, Layout, MassMatrix, Placement, Range,
-    Setting, SettingName, TimeEffect, Transfer,
+    Coordinates, Effect, Entry, Layout, MassMatrix, Parts, Placement, Range, Scheme, Setting,
+    SettingName, Stepping, TimeEffect, Transfer, Updated,
 };
 use serde_json::{Value, json};
 
-fn is_total(setting: &Setting) -> bool {
-    setting.case.frame != Frame::Updated
+fn parts(setting: &Setting) -> Parts {
+    setting.case.scheme.parts()
 }
 
-/// The weights.
-fn shape(setting: &Setting) -> String {
-    match setting.case.frame {
-        Frame::Updated => setting.case.shape.to_string(),
-        Frame::Total(total) => format!("bspline{}", total.scheme.degree),
-    }
-}
-
-fn layout(setting: &Setting) -> &'static str {
-    match (setting.case.frame, setting.case.placement) {
-        (Frame::Updated, Placement::Lattice) => "lattice",
-        (Frame::Updated, Placement::BodyFitted) => "body-fitted",
-        (Frame::Total(total), _) => match total.layout {
-            Layout::Lattice => "lattice",
-            Layout::Gauss => "gauss",
-        },
-    }
-}
-
-fn mass(setting: &Setting) -> &'static str {
-    match setting.case.frame {
-        Frame::Total(total) if total.scheme.mass == MassMatrix::Consistent => "consistent",
-        _ => "lumped",
-    }
-}
-
-fn grid(setting: &Setting) -> &'static str {
-    match setting.case.frame {
-        Frame::Updated => "cartesian",
-        Frame::Total(total) => match total.coordinates {
-            Coordinates::Cartesian => "cartesian",
-            Coordinates::Polar => "polar",
-            Coordinates::Spherical => "spherical",
-        },
-    }
-}
-
-fn composition(setting: &Setting) -> usize {
-    match setting.case.frame {
-        Frame::Updated => 2,
-        Frame::Total(total) => total.scheme.composition.order(),
-    }
+fn precision(setting: &Setting) -> &'static str {
+    if setting.single { "f32" } else { "f64" }
 }
 
 /// What settings are drawn and tabulated alike: the weights, the frame, and whether particles fit the body.
 pub(super) fn kind(setting: &Setting) -> String {
-    let mut text = shape(setting);
-    if is_total(setting) {
-        text += ", total Lagrangian";
-    } else if setting.case.placement == Placement::BodyFitted {
-        text += ", body-fitted";
+    let Parts { shape, layout, .. } = parts(setting);
+    match setting.case.scheme {
+        Scheme::Total(_) => format!("{shape}, total Lagrangian"),
+        Scheme::Updated(Updated { placement: Placement::BodyFitted, .. }) => {
+            format!("{shape}, {layout}")
+        }
+        Scheme::Updated(_) => shape,
     }
-    text
 }
 
 /// The scheme: everything but grid and time step.
 pub(super) fn scheme(setting: &Setting) -> String {
-    let case = &setting.case;
-    let mut parts = vec![match is_total(setting) {
-        true => {
-            format!("{}, total Lagrangian, order {} in time", shape(setting), composition(setting))
+    let Parts { shape, integrator, transfer, composition, mass, layout, .. } = parts(setting);
+    let mut told = Vec::new();
+    match setting.case.scheme {
+        Scheme::Updated(updated) => {
+            told.push(format!("{shape} + {integrator}"));
+            if updated.transfer != Transfer::Flip {
+                told.push(transfer);
+            }
         }
-        false => format!("{} + {}", shape(setting), case.integrator),
-    }];
-    if is_total(setting) && mass(setting) == "lumped" {
-        parts.push("lumped mass".into());
+        Scheme::Total(total) => {
+            told.push(format!("{shape}, total Lagrangian, order {composition} in time"));
+            if total.mass == MassMatrix::Lumped {
+                told.push(format!("{mass} mass"));
+            }
+        }
     }
-    if case.transfer != Transfer::Flip {
-        parts.push(case.transfer.to_string());
+    if !is_lattice(&setting.case.scheme) {
+        told.push(layout.into());
     }
-    if layout(setting) != "lattice" {
-        parts.push(layout(setting).into());
-    }
-    parts.push(format!("ppc {}", case.per_cell));
+    told.push(format!("ppc {}", setting.case.per_cell));
     if setting.single {
-        parts.push("f32".into());
+        told.push(precision(setting).into());
     }
     if setting.threads > 1 {
-        parts.push(format!("{} threads", setting.threads));
+        told.push(format!("{} threads", setting.threads));
     }
-    parts.join(", ")
+    told.join(", ")
+}
+
+/// Whether the particles lie as they do where nothing is said.
+fn is_lattice(scheme: &Scheme) -> bool {
+    match scheme {
+        Scheme::Updated(updated) => updated.placement != Placement::BodyFitted,
+        Scheme::Total(total) => total.layout == Layout::Lattice,
+    }
 }
 
 /// The scheme with its grid and time step.
@@ -101,48 +73,53 @@ pub(super) fn line(setting: &Setting) -> String {
 /// The options of `mms run` that run a setting.
 pub(super) fn options(setting: &Setting) -> String {
     let case = &setting.case;
-    let mut text = format!("--cells {} --shape {}", case.cells, shape(setting));
-    if is_total(setting) {
-        let (mass, composition) = (mass(setting), composition(setting));
-        text +=
-            &format!(" --formulation total-lagrangian --mass {mass} --composition {composition}");
-    } else if case.integrator != Integrator::Cd {
-        text += &format!(" --integrator {}", case.integrator);
-    }
-    if case.transfer != Transfer::Flip {
-        text += &format!(" --transfer {}", case.transfer);
-    }
-    for (option, value, usual) in
-        [("--layout", layout(setting), "lattice"), ("--grid", grid(setting), "cartesian")]
-    {
-        if value != usual {
-            text += &format!(" {option} {value}");
+    let Parts { shape, integrator, transfer, composition, mass, layout, grid, .. } = parts(setting);
+    let mut text = format!("--cells {} --shape {shape}", case.cells);
+    match case.scheme {
+        Scheme::Updated(updated) => {
+            if !matches!(updated.stepping, Stepping::Cd(_)) {
+                text += &format!(" --integrator {integrator}");
+            }
+            if updated.transfer != Transfer::Flip {
+                text += &format!(" --transfer {transfer}");
+            }
         }
+        Scheme::Total(_) => {
+            text += &format!(
+                " --formulation total-lagrangian --mass {mass} --composition {composition}"
+            );
+        }
+    }
+    if !is_lattice(&case.scheme) {
+        text += &format!(" --layout {layout}");
+    }
+    if case.scheme.total().is_some_and(|total| total.coordinates != Coordinates::Cartesian) {
+        text += &format!(" --grid {grid}");
     }
     text += &format!(" --ppc {} --cfl {}", case.per_cell, case.cfl);
     if setting.single {
-        text += " --precision f32";
+        text += &format!(" --precision {}", precision(setting));
     }
     text + &format!(" --threads {}", setting.threads)
 }
 
 /// The scheme as it is written to JSON, in the words of the options.
 pub(super) fn document(setting: &Setting) -> Value {
-    let case = &setting.case;
+    let (case, parts) = (&setting.case, parts(setting));
     json!({
-        "frame": if is_total(setting) { "total" } else { "updated" },
-        "shape": shape(setting),
-        "integrator": case.integrator.to_string(),
-        "mass": mass(setting),
-        "composition": composition(setting),
-        "layout": layout(setting),
-        "grid": grid(setting),
-        "transfer": case.transfer.to_string(),
-        "start": case.start.to_string(),
+        "frame": parts.frame,
+        "shape": parts.shape,
+        "integrator": parts.integrator,
+        "mass": parts.mass,
+        "composition": parts.composition,
+        "layout": parts.layout,
+        "grid": parts.grid,
+        "transfer": parts.transfer,
+        "start": parts.start,
         "ppc": case.per_cell,
         "cfl_asked": case.cfl,
-        "cfl_speed": match case.cfl_speed { CflSpeed::Bar => "bar", CflSpeed::PWave => "p-wave" },
-        "precision": if setting.single { "f32" } else { "f64" },
+        "cfl_speed": case.cfl_speed.to_string(),
+        "precision": precision(setting),
         "threads": setting.threads,
     })
 }
@@ -154,15 +131,15 @@ pub(super) fn effect(effect: &Effect, from: &Entry, to: &Entry) -> String {
         SettingName::Cells => format!("{} cells", setting.case.cells),
         SettingName::Cfl => format!("CFL {}", setting.case.cfl),
         SettingName::Ppc => format!("ppc {}", setting.case.per_cell),
-        SettingName::Shape => shape(setting),
-        SettingName::Integrator if is_total(setting) => {
-            format!("order {} in time", composition(setting))
-        }
-        SettingName::Integrator => setting.case.integrator.to_string(),
-        SettingName::Transfer => setting.case.transfer.to_string(),
-        SettingName::Layout => layout(setting).to_owned(),
-        SettingName::Mass => format!("{} mass", mass(setting)),
-        SettingName::Precision => (if setting.single { "f32" } else { "f64" }).to_owned(),
+        SettingName::Shape => parts(setting).shape,
+        SettingName::Integrator => match setting.case.scheme {
+            Scheme::Updated(_) => parts(setting).integrator,
+            Scheme::Total(_) => format!("order {} in time", parts(setting).composition),
+        },
+        SettingName::Transfer => parts(setting).transfer,
+        SettingName::Layout => parts(setting).layout.to_owned(),
+        SettingName::Mass => format!("{} mass", parts(setting).mass),
+        SettingName::Precision => precision(setting).to_owned(),
         SettingName::Threads => format!("{} thread(s)", setting.threads),
     };
     // Where runs are too short, or scatter by as much as they differ, their time says nothing, and neither does this.

@@ -1,0 +1,148 @@
+//! Why a case cannot be run.
+
+use mmsmith_mpm::SetupError;
+use mmsmith_runtime::{Condition, Surface};
+use thiserror::Error;
+
+use crate::checkpoint::CheckpointError;
+
+/// Steps that no run should have; a typing error in a CFL number reaches it easily.
+pub(crate) const MOST_STEPS: f64 = 1e12;
+
+/// Why a case could not be run.
+#[derive(Debug, Error)]
+pub enum CaseError {
+    /// A setting that makes no sense.
+    #[error("{setting} = {value}: it must be {admissible}")]
+    Setting {
+        /// Which.
+        setting: &'static str,
+        /// Its value.
+        value: String,
+        /// What would be right.
+        admissible: &'static str,
+    },
+    /// More steps than anybody can wait for.
+    #[error(
+        "the end time {end:e} with steps of {dt:e} takes {steps:e} steps; at most {MOST_STEPS:e} are allowed"
+    )]
+    TooManySteps {
+        /// The end time.
+        end: f64,
+        /// The time step.
+        dt: f64,
+        /// The number of steps.
+        steps: f64,
+    },
+    /// The solution of the body force and the exact one differ in dimension, or have one that is not known here.
+    #[error(
+        "the solutions of both precisions must have one, two or three dimensions, and the same"
+    )]
+    Dimension,
+    /// The solution has no place on a grid.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The solver refused the set-up.
+    #[error(transparent)]
+    Setup(#[from] SetupError),
+    /// A particle file could not be written.
+    #[error(transparent)]
+    Frames(#[from] mmsmith_vtk::Error),
+    /// A checkpoint could not be written or read.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+}
+
+impl CaseError {
+    /// A setting whose value makes no sense, and what would.
+    #[must_use]
+    pub fn setting(setting: &'static str, value: impl ToString, admissible: &'static str) -> Self {
+        Self::Setting { setting, value: value.to_string(), admissible }
+    }
+}
+
+/// Why a solution could not be put onto a grid.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum SceneError {
+    /// The box's sides are not whole multiples of the spacing.
+    #[error(
+        "{cells} cells make the spacing {spacing:?}, which does not divide the box's sides {sides:?}; \
+         {}",
+        suggestion(fitting)
+    )]
+    Misfit {
+        /// The cell count asked for.
+        cells: usize,
+        /// The spacing that follows from it.
+        spacing: f64,
+        /// The box's sides.
+        sides: Vec<f64>,
+        /// The nearest cell counts that would fit.
+        fitting: Vec<usize>,
+    },
+    /// The solver has no model for a boundary condition.
+    #[error("the solver does not model the condition {} on {}{instead}", condition, surface)]
+    Unmodelled {
+        /// Where.
+        surface: Surface,
+        /// What.
+        condition: Condition,
+        /// What would model it, from a separator on; empty where nothing does.
+        instead: &'static str,
+    },
+    /// Surfaces of the body without a boundary condition.
+    #[error(
+        "the solution declares no condition on {}, so the solver cannot know what holds there; the motion of the solution \
+         holds with these lines in its specification:\n{}",
+        list(surfaces),
+        lines(surfaces)
+    )]
+    Undeclared {
+        /// Where.
+        surfaces: Vec<Surface>,
+    },
+    /// The solver has no model for the body's shape or its material.
+    #[error("the solver does not model this {what}: {value}")]
+    Unknown {
+        /// `shape` or `material`.
+        what: &'static str,
+        /// Its debug form.
+        value: String,
+    },
+    /// A material that the solver has no law of its own for.
+    #[error(
+        "only the specification states this material; the solver's laws are written by hand, and it has none to run it \
+         with (mms check and mms eval serve it all the same)"
+    )]
+    NoLaw,
+    /// An extent was asked for that the body does not have.
+    #[error("{0}")]
+    Extent(&'static str),
+    /// No lattice point lies in the body.
+    #[error("no particle lies inside the body with {cells} cells; use more cells or particles")]
+    Empty {
+        /// The cell count asked for.
+        cells: usize,
+    },
+}
+
+fn list(surfaces: &[Surface]) -> String {
+    surfaces.iter().map(Surface::to_string).collect::<Vec<_>>().join(", ")
+}
+
+/// What a specification says of surfaces that move as the solution does.
+fn lines(surfaces: &[Surface]) -> String {
+    let one = |surface: &Surface| {
+        let condition = Condition::PrescribedMotion;
+        format!("\n[[boundary]]\nsurface = '{}'\ncondition = '{condition}'\n", surface)
+    };
+    surfaces.iter().map(one).collect::<String>().trim_end().to_owned()
+}
+
+fn suggestion(fitting: &[usize]) -> String {
+    if fitting.is_empty() {
+        return "no cell count near it does".into();
+    }
+    let counts: Vec<_> = fitting.iter().map(usize::to_string).collect();
+    format!("cell counts that do: {}", counts.join(", "))
+}

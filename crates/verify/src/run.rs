@@ -1,0 +1,371 @@
+//! One run of a case, and the row of errors that comes out.
+
+use std::fmt;
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+use mmsmith_mpm::{Scalar, StepError};
+use mmsmith_runtime::{AnySolution, Real, Solution};
+use serde::{Serialize, Serializer};
+
+use crate::case::{Arithmetic, Case, law};
+use crate::checkpoint::{Checkpoints, Reached, TakenUp};
+use crate::dimension::in_arithmetic;
+use crate::drive::{Driven, Outcome, Stepped};
+use crate::error::CaseError;
+use crate::frames::{FrameOutput, FrameWriter, Snapshot};
+use crate::history::{Moment, Recorder};
+use crate::measure::Comparison;
+use crate::norms::{Field, PerField, PerNorm, magnitude};
+use crate::plan::{Prepared, Steps, prepare};
+use crate::points;
+use crate::scene::Scene;
+
+/// How far a run or a study is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Progress {
+    /// The number of the case under way, from 0.
+    pub case: usize,
+    /// Steps done in it.
+    pub step: u64,
+    /// Steps to its end.
+    pub steps: u64,
+    /// The share of all work that is done, where a particle's step is the unit of work.
+    pub share: f64,
+}
+
+/// What a run tells and writes on its way.
+pub struct Outputs<'a> {
+    /// Called after every step.
+    pub progress: &'a mut dyn FnMut(Progress),
+    /// Particle files, if any are wanted.
+    pub frames: Option<&'a FrameOutput>,
+    /// A moment whose particles are kept, if one is wanted.
+    pub snapshot: Option<&'a mut Snapshot>,
+    /// What a run that is killed goes on from, if that is wanted.
+    pub checkpoints: Option<&'a Checkpoints>,
+    /// Where errors, energies and momentum go at up to [`MOST_MOMENTS`](crate::MOST_MOMENTS) evenly spread steps, first and
+    /// last state included; what is there before the run is removed. A run that goes on from a checkpoint has those before it, if it was written with
+    /// a history.
+    pub history: Option<&'a mut Vec<Moment>>,
+    /// When to give up: a run that is still under way then ends after its step with [`Status::Cut`].
+    pub until: Option<Instant>,
+}
+
+impl<'a> Outputs<'a> {
+    /// Nothing but what is called after every step.
+    pub fn new(progress: &'a mut dyn FnMut(Progress)) -> Self {
+        Self {
+            progress,
+            frames: None,
+            snapshot: None,
+            checkpoints: None,
+            history: None,
+            until: None,
+        }
+    }
+}
+
+/// How a run ended.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Status {
+    /// At the end time.
+    Ok,
+    /// The solver gave up.
+    Stopped(StepError),
+    /// A particle was further from its exact position than the body is large.
+    Unstable {
+        /// The step, from 1.
+        step: u64,
+        /// Its time.
+        time: f64,
+        /// The particle of largest error.
+        particle: usize,
+        /// Its error, a length.
+        error: f64,
+        /// The body's largest extent.
+        size: f64,
+    },
+    /// At the end time, but the motion is too small to be told from rest in the positions' precision, so that the errors say
+    /// nothing.
+    Unresolved {
+        /// The largest displacement of the exact motion that was seen.
+        displacement: f64,
+        /// The rounding of a position.
+        resolution: f64,
+    },
+    /// At the end time, with an error that is not a number.
+    NotFinite {
+        /// The field.
+        field: Field,
+    },
+    /// The time that it was given was over.
+    Cut {
+        /// The last step done.
+        step: u64,
+        /// Its time.
+        time: f64,
+    },
+}
+
+impl Status {
+    /// Whether the run came to its end time, and its errors say nothing all the same.
+    #[must_use]
+    pub fn is_not_judged(&self) -> bool {
+        matches!(self, Self::Unresolved { .. } | Self::NotFinite { .. })
+    }
+}
+
+impl fmt::Display for Status {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Ok => f.write_str("ok"),
+            Self::Stopped(error) => error.fmt(f),
+            Self::Unstable { step, time, particle, error, size } => write!(
+                f,
+                "unstable: position error {error:.3e} exceeds the body's size {size:.3e} at step {step}, \
+                 t = {time:.6e}, particle {particle}"
+            ),
+            Self::Unresolved { displacement, resolution } => write!(
+                f,
+                "not judged: the largest displacement {displacement:.3e} is below the rounding {resolution:.3e} of \
+                 positions; errors say nothing"
+            ),
+            Self::NotFinite { field } => {
+                write!(f, "not judged: an error of {field} is not a finite number")
+            }
+            Self::Cut { step, time } => {
+                write!(f, "cut after step {step}, t = {time:.6e}: its time was over")
+            }
+        }
+    }
+}
+
+impl Serialize for Status {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// What one simulation gave.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// Number of cells along the cell length.
+    pub cells: usize,
+    /// Grid spacing, a length.
+    pub h: f64,
+    /// Time step.
+    pub dt: f64,
+    /// `dt c/h`.
+    pub cfl: f64,
+    /// Steps to the end time, whether or not the run got there.
+    pub steps: u64,
+    /// Number of particles.
+    pub particles: usize,
+    /// Wall-clock time of the steps alone, without set-up, measuring and writing, in seconds.
+    pub wall_s: f64,
+    /// Processor time of the steps on all threads, in seconds.
+    pub cpu_s: f64,
+    /// Particles times steps done over `wall_s`.
+    pub particle_steps_per_s: f64,
+    /// Whether no other case of the same study ran beside it: where one did, its times are those of a shared machine.
+    /// Written where it is false.
+    #[serde(skip_serializing_if = "is_true")]
+    pub timed_alone: bool,
+    /// How it ended.
+    pub status: Status,
+    /// The errors until then.
+    pub errors: PerField<PerNorm<f64>>,
+}
+
+fn is_true(value: &bool) -> bool {
+    *value
+}
+
+/// Runs one simulation of `exact` and measures its errors after every step.
+///
+/// The solver starts from the exact positions, velocities and deformation gradients at time zero and is driven
+/// by the body force at the reference positions. `u` is compared as `(x - X) - u(X, t)`, `v` at the time where
+/// the integrator stores it, `F` directly, and `P` as the solver's own law gives it for the particle's `F`.
+/// A run that the solver gives up, or whose particles leave the exact ones by more than the body's size, ends
+/// early with a [`Status`] that says so; it is not an error of this function.
+///
+/// The errors do not depend on the number of threads.
+///
+/// # Errors
+///
+/// [`CaseError`] for settings that cannot be run, and for particle files that cannot be written.
+pub fn run(
+    exact: &AnySolution<f64>,
+    arithmetic: Arithmetic<'_>,
+    case: &Case,
+    outputs: &mut Outputs<'_>,
+) -> Result<Row, CaseError> {
+    in_arithmetic!(
+        exact,
+        arithmetic,
+        |exact, model| run_in(exact, model, case, outputs),
+        else Err(CaseError::Dimension)
+    )
+}
+
+fn run_in<T: Real + Scalar<D>, const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    model: &dyn Solution<T, D>,
+    case: &Case,
+    outputs: &mut Outputs<'_>,
+) -> Result<Row, CaseError> {
+    let Prepared { scene, steps, .. } = prepare(exact, case)?;
+    let mut driven = Driven::set_up(exact, model, case, &scene, steps.dt)?;
+    let mut row = follow(&mut driven, exact, case, &scene, steps, outputs)?;
+    if row.status == Status::Ok {
+        let unit = T::default_epsilon().to_f64() / 2.0;
+        let end = steps.count as f64 * driven.dt;
+        row.status = judged(exact, &row.errors, end, unit * scene.reach());
+    }
+    Ok(row)
+}
+
+/// The status of a run that came to its end: whether its errors say anything.
+fn judged<const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    errors: &PerField<PerNorm<f64>>,
+    end: f64,
+    resolution: f64,
+) -> Status {
+    const SAMPLES: usize = 64;
+    let domain = exact.domain();
+    // Periodic motion repeats.
+    let span = end.min(exact.period());
+    let seen = (0..SAMPLES).filter_map(|n| points::interior(&domain, span, n));
+    let displacement = seen
+        .flat_map(|(X, t)| [0.0, t].map(|t| exact.displacement(&X, t)))
+        .map(|u| magnitude(u.iter().copied()))
+        .fold(0.0, f64::max);
+    // A body at rest is at rest in every precision.
+    if displacement > 0.0 && displacement <= resolution {
+        return Status::Unresolved { displacement, resolution };
+    }
+    errors
+        .iter()
+        .find(|(_, norms)| norms.iter().any(|(_, value)| !value.is_finite()))
+        .map_or(Status::Ok, |(field, _)| Status::NotFinite { field })
+}
+
+/// Steps to the end and measures the errors on the way.
+fn follow<T: Real + Scalar<D>, const D: usize>(
+    driven: &mut Driven<'_, T, D>,
+    exact: &dyn Solution<f64, D>,
+    case: &Case,
+    scene: &Scene<D>,
+    steps: Steps,
+    outputs: &mut Outputs<'_>,
+) -> Result<Row, CaseError> {
+    let dt = driven.dt;
+    let solver = driven.solver.as_mut();
+    let lag = solver.velocity_lag().to_f64();
+    let comparison = Comparison::new(exact, &solver.observe().0.X);
+    let mut frames = match outputs.frames {
+        Some(output) => Some(FrameWriter::new(output, steps.count, lag)?),
+        None => None,
+    };
+    let mut recorder = match &mut outputs.history {
+        Some(moments) => Some(Recorder::new(moments, exact, law(exact.material())?, steps.count)),
+        None => None,
+    };
+    let resumed = match outputs.checkpoints.filter(|checkpoints| checkpoints.resume) {
+        Some(checkpoints) => checkpoints.read(&mut solver.state())?,
+        None => None,
+    };
+    let Reached { step: mut done, mut wall_s, mut cpu_s, mut errors } =
+        if let Some(TakenUp { reached, history }) = resumed {
+            if let Some(recorder) = &mut recorder {
+                recorder.take_up(history);
+            }
+            if let Some(frames) = &mut frames {
+                frames.take_up(reached.step, dt);
+            }
+            reached
+        } else {
+            if let Some(frames) = &mut frames {
+                frames.write(solver.observe(), exact, 0, 0.0)?;
+            }
+            if let Some(snapshot) = &mut outputs.snapshot {
+                snapshot.take(solver.observe(), exact, (0, steps.count), 0.0);
+            }
+            let at_start = comparison.measure(solver.observe(), 0.0, lag);
+            if let Some(recorder) = &mut recorder {
+                let velocity_time = if case.scheme.starts_early() { -lag } else { 0.0 };
+                let particles = solver.observe().0;
+                recorder.take(particles, (0, false), (0.0, velocity_time), at_start.u);
+            }
+            // Before the first step no velocity is stored yet that belongs to a time of the scheme.
+            Reached {
+                step: 0,
+                wall_s: 0.0,
+                cpu_s: 0.0,
+                errors: PerField { v: PerNorm::default(), ..at_start },
+            }
+        };
+    let outcome = driven.advance(done + 1..=steps.count, &mut |stepped| {
+        let Stepped { step, time, solver, wall_s: step_wall_s, cpu_s: step_cpu_s } = stepped;
+        done = step;
+        wall_s += step_wall_s;
+        cpu_s += step_cpu_s;
+        let measured = comparison.measure(solver.observe(), time, lag);
+        errors = PerField::combine(&errors, &measured, PerNorm::larger);
+        let error = measured.u.linf;
+        let mut end = (error > scene.size || error.is_nan()).then(|| {
+            let particle = comparison.worst_particle(solver.observe(), time);
+            Status::Unstable { step, time, particle, error, size: scene.size }
+        });
+        if let Some(frames) = &mut frames {
+            frames.write(solver.observe(), exact, step, time)?;
+        }
+        if let Some(snapshot) = &mut outputs.snapshot {
+            snapshot.take(solver.observe(), exact, (step, steps.count), time);
+        }
+        let share = step as f64 / steps.count as f64;
+        (outputs.progress)(Progress { case: 0, step, steps: steps.count, share });
+        let late = step < steps.count && outputs.until.is_some_and(|until| Instant::now() >= until);
+        if late && end.is_none() {
+            end = Some(Status::Cut { step, time });
+        }
+        if let Some(recorder) = &mut recorder {
+            let particles = solver.observe().0;
+            recorder.take(particles, (step, end.is_some()), (time, time - lag), measured.u);
+        }
+        if let Some(end) = end {
+            return Ok(ControlFlow::Break(end));
+        }
+        if let Some(checkpoints) = outputs.checkpoints
+            && step % checkpoints.every == 0
+        {
+            let history = recorder.as_ref().map_or(&[][..], Recorder::moments);
+            let reached = Reached { step, wall_s, cpu_s, errors };
+            checkpoints.write(&reached, history, &solver.state())?;
+        }
+        Ok(ControlFlow::Continue(()))
+    })?;
+    let status = match outcome {
+        Outcome::Done => Status::Ok,
+        Outcome::Stopped(error) => Status::Stopped(error),
+        Outcome::Left(status) => status,
+    };
+    let count = driven.solver.observe().0.len();
+    let particle_steps = count as f64 * done as f64;
+    Ok(Row {
+        cells: case.cells,
+        h: scene.spacing,
+        dt,
+        cfl: steps.cfl,
+        steps: steps.count,
+        particles: count,
+        wall_s,
+        cpu_s,
+        particle_steps_per_s: if wall_s > 0.0 { particle_steps / wall_s } else { 0.0 },
+        timed_alone: true,
+        status,
+        errors,
+    })
+}
