@@ -1,5 +1,7 @@
 //! `mms run --checkpoint` and `mms resume`: a run that is killed at any moment goes on to the same bits.
 
+#![allow(clippy::unwrap_used)]
+
 mod command;
 
 use command::{UnderWay, mms, names, read_json, refuses};

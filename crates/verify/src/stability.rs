@@ -462,7 +462,6 @@ impl<const D: usize> Run<'_, D> {
             Outcome::Stopped(error) => Some(Failure::from(&error)),
             Outcome::Left(failure) => Some(failure),
         };
-        let finite = |value: f64| value.is_finite().then_some(value);
         Ok(Observed {
             cfl: self.cfl,
             steps,
@@ -481,7 +480,6 @@ impl<const D: usize> Run<'_, D> {
         gain: f64,
         largest_energy: f64,
     ) -> Option<Failure> {
-        let finite = |value: f64| value.is_finite().then_some(value);
         let failure = |kind, particle, value: f64, limit: f64| {
             let (value, limit) = (finite(value), finite(limit));
             Some(Failure { kind, step, time, particle, value, limit })
@@ -521,6 +519,10 @@ impl<const D: usize> Run<'_, D> {
     }
 }
 
+fn finite(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}
+
 impl From<&StepError> for Failure {
     fn from(error: &StepError) -> Self {
         let (kind, step, time, particle, value, limit) = match *error {
@@ -539,7 +541,6 @@ impl From<&StepError> for Failure {
                 (FailureKind::TooLarge, step, time, particle, half_size, limit)
             }
         };
-        let finite = |value: f64| value.is_finite().then_some(value);
         Self {
             kind,
             step: step as u64,

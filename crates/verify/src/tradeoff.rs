@@ -465,17 +465,13 @@ fn hint(setting: &Setting) -> f64 {
     setting.case.scheme.total().map_or(2.0, |total| total.degree as f64 + 1.0)
 }
 
-/// What the weights are: the shape and where its particles lie, or the degree of the total frame's splines.
-#[derive(Clone, Copy, PartialEq)]
-enum Weights {
-    Updated(Shape, Placement),
-    Total(usize),
-}
-
-fn weights(setting: &Setting) -> Weights {
-    match &setting.case.scheme {
-        Scheme::Updated(updated) => Weights::Updated(updated.shape, updated.placement),
-        Scheme::Total(total) => Weights::Total(total.degree),
+/// A scheme's weights, and where its particles lie in the updated frame: all else as usual.
+fn weights(scheme: &Scheme) -> Scheme {
+    match *scheme {
+        Scheme::Updated(Updated { shape, placement, .. }) => {
+            Scheme::Updated(Updated { shape, placement, ..Updated::default() })
+        }
+        Scheme::Total(total) => Scheme::Total(Total::of_degree(total.degree)),
     }
 }
 
@@ -638,10 +634,11 @@ impl<E> Sweep<'_, E> {
     }
 
     /// The front among settings of the same weights.
-    fn front_of(&self, of: Weights) -> Vec<usize> {
+    fn front_of(&self, of: Scheme) -> Vec<usize> {
         let entries = &self.found.entries;
-        let own: Vec<usize> =
-            (0..entries.len()).filter(|&index| weights(&entries[index].setting) == of).collect();
+        let own: Vec<usize> = (0..entries.len())
+            .filter(|&index| weights(&entries[index].setting.case.scheme) == of)
+            .collect();
         pareto(&self.points(own.iter().copied())).into_iter().map(|place| own[place]).collect()
     }
 
@@ -669,9 +666,9 @@ impl<E> Sweep<'_, E> {
         loop {
             let front = self.points(self.front());
             let left = self.left(0);
-            let mut own: Vec<(Weights, Vec<(f64, f64)>)> = Vec::new();
+            let mut own: Vec<(Scheme, Vec<(f64, f64)>)> = Vec::new();
             for family in &self.families {
-                let weights = weights(&family.setting);
+                let weights = weights(&family.setting.case.scheme);
                 if own.iter().all(|(known, _)| *known != weights) {
                     own.push((weights, self.points(self.front_of(weights))));
                 }
@@ -681,7 +678,8 @@ impl<E> Sweep<'_, E> {
                 if !self.ladders[index].open {
                     continue;
                 }
-                let weights = weights(&self.families[self.ladders[index].family].setting);
+                let family = &self.families[self.ladders[index].family];
+                let weights = weights(&family.setting.case.scheme);
                 let own = own.iter().find(|(known, _)| *known == weights);
                 let own = own.map_or(&[][..], |(_, points)| points.as_slice());
                 match self.next(&self.ladders[index], own, &front, left) {
@@ -1089,34 +1087,24 @@ impl<E> Sweep<'_, E> {
     }
 }
 
-/// The weights that a change is told of: those of the updated frame, or the degree of the total frame's splines.
-#[derive(Clone, Copy, PartialEq)]
-enum Basis {
-    Updated(Shape),
-    Total(usize),
-}
-
-impl Basis {
-    fn of(scheme: &Scheme) -> Self {
-        match scheme {
-            Scheme::Updated(updated) => Self::Updated(updated.shape),
-            Scheme::Total(total) => Self::Total(total.degree),
+/// A scheme's weights alone: all else as usual.
+fn basis(scheme: &Scheme) -> Scheme {
+    match *scheme {
+        Scheme::Updated(Updated { shape, .. }) => {
+            Scheme::Updated(Updated { shape, ..Updated::default() })
         }
+        Scheme::Total(total) => Scheme::Total(Total::of_degree(total.degree)),
     }
 }
 
-/// How a scheme goes on in time.
-#[derive(Clone, Copy, PartialEq)]
-enum InTime {
-    Updated(Stepping),
-    Total(Composition),
-}
-
-impl InTime {
-    fn of(scheme: &Scheme) -> Self {
-        match scheme {
-            Scheme::Updated(updated) => Self::Updated(updated.stepping),
-            Scheme::Total(total) => Self::Total(total.composition),
+/// A scheme's weights, and how it goes on in time: all else as usual.
+fn basis_in_time(scheme: &Scheme) -> Scheme {
+    match *scheme {
+        Scheme::Updated(Updated { shape, stepping, .. }) => {
+            Scheme::Updated(Updated { shape, stepping, ..Updated::default() })
+        }
+        Scheme::Total(Total { degree, composition, .. }) => {
+            Scheme::Total(Total { composition, ..Total::of_degree(degree) })
         }
     }
 }
@@ -1124,15 +1112,15 @@ impl InTime {
 /// A change of one setting. Changes that are equal are told together, with the range of what they do.
 #[derive(Clone, Copy, PartialEq)]
 enum Change {
-    Cells(Weights),
-    Cfl(Basis, InTime),
-    Ppc(Basis, usize),
+    Cells(Scheme),
+    Cfl(Scheme),
+    Ppc(Scheme, usize),
     Shape { from: Shape, to: Shape },
     Degree(usize),
     Integrator(Shape, Stepping),
     Composition { degree: usize, from: Composition },
     Transfer(Shape, Transfer),
-    Layout(Basis),
+    Layout(Scheme),
     Mass(usize),
     Precision(Shape),
     Threads(Shape),
@@ -1141,19 +1129,18 @@ enum Change {
 impl Change {
     /// The change of the setting `name` from `a` to `b`; none for the other way round, and for what nobody asks for.
     fn of(name: SettingName, a: &Setting, b: &Setting) -> Option<Self> {
-        let (basis, in_time) = (Basis::of(&a.case.scheme), InTime::of(&a.case.scheme));
         let is_usual = |updated: &Updated| {
             updated.shape == Shape::Gimp || updated.placement == Placement::BodyFitted
         };
         match (name, &a.case.scheme, &b.case.scheme) {
             (SettingName::Cells, ..) => {
-                (b.case.cells == 2 * a.case.cells).then(|| Self::Cells(weights(a)))
+                (b.case.cells == 2 * a.case.cells).then(|| Self::Cells(weights(&a.case.scheme)))
             }
             (SettingName::Cfl, scheme, _) => (b.case.cfl == a.case.cfl / 2.0
                 && scheme.updated().is_none_or(is_usual))
-            .then_some(Self::Cfl(basis, in_time)),
-            (SettingName::Ppc, ..) => (b.case.per_cell == a.case.per_cell + 1)
-                .then_some(Self::Ppc(basis, a.case.per_cell)),
+            .then(|| Self::Cfl(basis_in_time(scheme))),
+            (SettingName::Ppc, scheme, _) => (b.case.per_cell == a.case.per_cell + 1)
+                .then(|| Self::Ppc(basis(scheme), a.case.per_cell)),
             (SettingName::Shape, Scheme::Total(from), Scheme::Total(to)) => {
                 (to.degree == from.degree + 1).then_some(Self::Degree(from.degree))
             }
@@ -1172,11 +1159,11 @@ impl Change {
             (SettingName::Transfer, Scheme::Updated(from), Scheme::Updated(to)) => {
                 (from.transfer == Transfer::Flip).then_some(Self::Transfer(from.shape, to.transfer))
             }
-            (SettingName::Layout, Scheme::Updated(from), _) => {
-                (from.placement != Placement::BodyFitted).then_some(Self::Layout(basis))
-            }
+            (SettingName::Layout, Scheme::Updated(from), _) => (from.placement
+                != Placement::BodyFitted)
+                .then(|| Self::Layout(basis(&a.case.scheme))),
             (SettingName::Layout, Scheme::Total(from), _) => {
-                (from.layout == Layout::Lattice).then_some(Self::Layout(basis))
+                (from.layout == Layout::Lattice).then(|| Self::Layout(basis(&a.case.scheme)))
             }
             (SettingName::Mass, Scheme::Total(from), _) => {
                 (from.mass == MassMatrix::Lumped).then_some(Self::Mass(from.degree))

@@ -6,11 +6,11 @@ use anyhow::{Result, bail};
 use mmsmith_expr::{Drafts, Expr, OperationCount, Program, arrange};
 use mmsmith_solutions::CATALOGUE;
 use mmsmith_spec::{Domain, Fields, SolvedCondition, Spec};
-use mmsmith_verify::{Case, Cost, Part, Plan, Share, coverage};
+use mmsmith_verify::{Cost, Part, Plan, Share, coverage};
 use serde_json::{Value, json};
 
 use super::coverage::{POINTS, THRESHOLD};
-use super::scheme::{Settled, USUAL_CELLS};
+use super::scheme::Settled;
 use super::{Model, predict};
 use crate::arguments::{ExplainOptions, Precision, SchemeOptions};
 use crate::json::Output;
@@ -28,8 +28,7 @@ pub(crate) fn explain(options: &ExplainOptions) -> Result<bool> {
     let selection = Selection::new(&options.name, &[])?;
     let model = Model::new(&selection, Precision::F64)?;
     let settled = Settled::settle(&SchemeOptions::open(), &model.exact)?;
-    let base = Case { cells: USUAL_CELLS, ..settled.case };
-    let predicted = predict::on_grids(&model, &base).map_err(|error| error.to_string());
+    let predicted = predict::on_grids(&model, &settled.case).map_err(|error| error.to_string());
     let words = settled.choice();
     terminal::say(&(text(&spec, &exercises, &cost) + &runs(&predicted, &words)))?;
     let compared = match options.compare {

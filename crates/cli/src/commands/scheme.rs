@@ -16,7 +16,7 @@ use crate::arguments::{
 /// The CFL number where nothing is said, and nothing else of the scheme was chosen for the solution.
 pub(super) const USUAL_CFL: f64 = 0.4;
 /// The number of cells where nothing is said.
-pub(super) const USUAL_CELLS: usize = 32;
+const USUAL_CELLS: usize = 32;
 /// The same for a solid of three dimensions in a total frame that was not asked for, whose cells have 64 particles each.
 const USUAL_CELLS_OF_SOLIDS: usize = 16;
 /// Particles in a cell along each direction, but for Gauss points.
@@ -73,35 +73,33 @@ impl Settled {
         } else {
             Scheme::Updated(updated(options)?)
         };
-        let chosen = scheme
-            .total()
-            .filter(|_| options.frame.is_none() || options.shape.is_none())
-            .map(|scheme| Choice {
-                scheme: *scheme,
-                reason: needed.filter(|_| options.frame.is_none()),
-                cfl_is_chosen: options.cfl.is_none(),
-            });
-        let is_solid = matches!(exact, AnySolution::Three(_));
-        let of_solid = chosen.as_ref().is_some_and(|choice| choice.reason.is_some() && is_solid);
-        let said_speed = options.cfl_speed.map(CflSpeed::from);
-        let chosen_cfl = chosen.as_ref().filter(|choice| choice.cfl_is_chosen).and_then(|choice| {
-            let speed = said_speed.unwrap_or(CflSpeed::PWave);
-            // What cannot be told from here is refused when the case is looked at.
-            Some((choice.scheme.usual_cfl(exact, speed).ok()?, speed))
-        });
-        let (cfl, cfl_speed) = chosen_cfl
-            .unwrap_or((options.cfl.unwrap_or(USUAL_CFL), said_speed.unwrap_or(CflSpeed::Bar)));
+        let speed = options.cfl_speed.map(CflSpeed::from);
         let case = Case {
             scheme,
-            cells: if of_solid { USUAL_CELLS_OF_SOLIDS } else { USUAL_CELLS },
+            cells: USUAL_CELLS,
             per_cell: options.ppc.unwrap_or_else(|| per_cell(&scheme)),
-            cfl,
-            cfl_speed,
+            cfl: options.cfl.unwrap_or(USUAL_CFL),
+            cfl_speed: speed.unwrap_or(CflSpeed::Bar),
             periods: options.periods,
             extent: options.extent.map(Into::into),
         };
         let SchemeOptions { precision, threads, ref json, .. } = *options;
-        Ok(Self { case, precision, threads, json: json.clone(), chosen })
+        let mut settled = Self { case, precision, threads, json: json.clone(), chosen: None };
+        if let Scheme::Total(scheme) = scheme
+            && (options.frame.is_none() || options.shape.is_none())
+        {
+            let reason = needed.filter(|_| options.frame.is_none());
+            if reason.is_some() && matches!(exact, AnySolution::Three(_)) {
+                settled.case.cells = USUAL_CELLS_OF_SOLIDS;
+            }
+            let (speed, cfl_is_chosen) = (speed.unwrap_or(CflSpeed::PWave), options.cfl.is_none());
+            // What cannot be told from here is refused when the case is looked at.
+            if cfl_is_chosen && let Ok(cfl) = scheme.usual_cfl(exact, speed) {
+                (settled.case.cfl, settled.case.cfl_speed) = (cfl, speed);
+            }
+            settled.chosen = Some(Choice { scheme, reason, cfl_is_chosen });
+        }
+        Ok(settled)
     }
 
     /// A line that says what was chosen and why, and one with the options that say the same; empty where all is as usual.

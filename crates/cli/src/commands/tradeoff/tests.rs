@@ -88,7 +88,8 @@ fn a_sweep_keeps_its_budget_and_its_promises() {
 #[test]
 fn threads_are_told() {
     let usual = TradeoffOptions::usual("axis-aligned-1d", 4.0);
-    let report = sweep_of(&TradeoffOptions { threads: Some(2), ..usual });
+    let options = TradeoffOptions { threads: Some(2), ..usual };
+    let report = sweep_of(&options);
     for Entry { setting, .. } in &report.found.entries {
         assert_eq!(setting.threads, 2);
         assert!(words::scheme(setting).contains("2 threads"));
