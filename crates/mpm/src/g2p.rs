@@ -14,6 +14,7 @@ use crate::health::{Outcome, SharedOutcome};
 use crate::kernel::any::Interpolated;
 use crate::kernel::block::{BLOCK, Block, Copies};
 use crate::kernel::corners::velocity_at;
+use crate::node::Node;
 use crate::parallel::bins::Bins;
 use crate::parallel::chunks::{ChunkOfFour, each_chunk, each_chunk_of_four};
 use crate::particles::Particles;
@@ -33,15 +34,12 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let (support, found) = (&*support, SharedOutcome::default());
         each_chunk(F_early, CHUNK, &|chunk, F_early| {
             let mut outcome = Outcome::default();
-            let (mut copies, mut block) = (Copies::new(), Block::new(support, false));
+            let mut grid = FromGrid::new(&c, support, nodes, false);
             let (x, F) = (&x[chunk * CHUNK..], &F[chunk * CHUNK..]);
             let blocks = F_early.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK));
             for (index, ((F_early, x), F)) in blocks.enumerate() {
                 let first = chunk * CHUNK + index * BLOCK;
-                copies.copy(x, F);
-                block.compute_weights(&c, support, &ids(first)[..x.len()], copies.kinematics());
-                let interpolated = &mut [Interpolated::zero(); BLOCK][..x.len()];
-                block.g2p(&c.strides, nodes, interpolated);
+                let interpolated = grid.g2p(first, x, F);
                 for (k, (((F_early, interpolated), x), F)) in
                     F_early.iter_mut().zip(interpolated).zip(x).zip(F).enumerate()
                 {
@@ -87,13 +85,9 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let (nodes, c, support, transfer) = (&nodes[..], *constants, &*support, *transfer);
         let Particles { x, v, F, .. } = particles;
         each_chunk_of_four((x, v, F, affine), CHUNK, &|chunk| {
-            let (mut copies, mut block) = (Copies::new(), Block::new(support, is_affine(transfer)));
+            let mut grid = FromGrid::new(&c, support, nodes, transfer.is_affine());
             for_blocks(chunk, |first, OfBlock { x, v, F, affine }| {
-                copies.copy(x, F);
-                block.compute_weights(&c, support, &ids(first)[..x.len()], copies.kinematics());
-                let interpolated = &mut [Interpolated::zero(); BLOCK][..x.len()];
-                block.g2p(&c.strides, nodes, interpolated);
-                take_velocity(&c, transfer, interpolated, v, affine);
+                take_velocity(&c, transfer, grid.g2p(first, x, F), v, affine);
             });
         });
     }
@@ -120,7 +114,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
 
     /// APIC: the affine velocities of particles that have none yet are those of their velocities on the grid.
     pub(crate) fn start_affine(&mut self) {
-        if !self.is_affine() {
+        if !self.transfer.is_affine() {
             return;
         }
         self.affine = vec![SMatrix::zeros(); self.particles.x.len()];
@@ -130,18 +124,10 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         }
         let Self { particles, constants, nodes, support, affine, .. } = self;
         let Particles { x, F, .. } = &*particles;
-        let (mut copies, mut block) = (Copies::new(), Block::new(support, true));
+        let mut grid = FromGrid::new(constants, support, nodes, true);
         let blocks = affine.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK));
         for (index, ((affine, x), F)) in blocks.enumerate() {
-            copies.copy(x, F);
-            block.compute_weights(
-                constants,
-                support,
-                &ids(index * BLOCK)[..x.len()],
-                copies.kinematics(),
-            );
-            let interpolated = &mut [Interpolated::zero(); BLOCK][..x.len()];
-            block.g2p(&constants.strides, nodes, interpolated);
+            let interpolated = grid.g2p(index * BLOCK, x, F);
             for (affine, interpolated) in affine.iter_mut().zip(interpolated) {
                 *affine = interpolated.affine;
             }
@@ -169,8 +155,40 @@ fn ids(first: usize) -> [u32; BLOCK] {
     std::array::from_fn(|k| (first + k) as u32)
 }
 
-fn is_affine(transfer: Transfer) -> bool {
-    transfer == Transfer::Apic
+/// G2P of successive particles, block by block.
+struct FromGrid<'a, T, const D: usize> {
+    c: &'a Constants<T, D>,
+    support: &'a Support<T, D>,
+    nodes: &'a [Node<T, D>],
+    copies: Copies<T, D>,
+    block: Block<T, D>,
+    interpolated: [Interpolated<T, D>; BLOCK],
+}
+
+impl<'a, T: RealField + Copy, const D: usize> FromGrid<'a, T, D> {
+    fn new(
+        c: &'a Constants<T, D>,
+        support: &'a Support<T, D>,
+        nodes: &'a [Node<T, D>],
+        is_affine: bool,
+    ) -> Self {
+        let (copies, block) = (Copies::new(), Block::new(support, is_affine));
+        Self { c, support, nodes, copies, block, interpolated: [Interpolated::zero(); BLOCK] }
+    }
+
+    /// Of the particles from the id `first` on, no more than a block.
+    fn g2p(
+        &mut self,
+        first: usize,
+        x: &[SVector<T, D>],
+        F: &[SMatrix<T, D, D>],
+    ) -> &[Interpolated<T, D>] {
+        let Self { c, support, nodes, copies, block, interpolated } = self;
+        let interpolated = &mut interpolated[..x.len()];
+        block.compute_weights(c, support, &ids(first)[..x.len()], copies.of_successive(x, F));
+        block.g2p(&c.strides, nodes, interpolated);
+        interpolated
+    }
 }
 
 /// Velocities, and affine ones, by the transfer.
@@ -241,7 +259,7 @@ fn g2p<T: RealField + Copy, const D: usize>(
     let at_start = &*support;
     each_chunk_of_four((x, v, F, affine), CHUNK, &|chunk| {
         let mut outcome = Outcome::default();
-        let (mut copies, mut block) = (Copies::new(), Block::new(at_start, is_affine(transfer)));
+        let (mut copies, mut block) = (Copies::new(), Block::new(at_start, transfer.is_affine()));
         let mut interpolated = [Interpolated::zero(); BLOCK];
         for_blocks(chunk, |first, mut of_block| {
             copies.copy(of_block.x, of_block.F);
@@ -287,9 +305,8 @@ fn check<T: RealField + Copy, const D: usize>(
 ) -> Outcome {
     let mut bins = [0; BLOCK];
     bins[..x.len()].copy_from_slice(&bin_of[first..first + x.len()]);
-    copies.copy(x, F);
     let mut outcome = Outcome::default();
-    if support.are_valid(c, &ids(first)[..x.len()], &bins, copies.kinematics()) {
+    if support.are_valid(c, &ids(first)[..x.len()], &bins, copies.of_successive(x, F)) {
         return outcome;
     }
     for (k, ((x, F), bin)) in x.iter().zip(F).zip(bins).enumerate() {

@@ -20,7 +20,6 @@ use crate::kernel::any::{Contributions, Interpolated};
 use crate::kernel::block::{BLOCK, Block, Copies};
 use crate::node::Node;
 use crate::particles::Particles;
-use crate::scheme::Transfer;
 use crate::state::State;
 use crate::step::StepTimes;
 use crate::support::Support;
@@ -37,7 +36,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let vectors = NodeVectors::of(transfer);
         let update =
             GridUpdate::new(layout, &c, VelocityAndAcceleration { scale: times.scale, vectors });
-        let p2g = P2g { c: &c, support, is_affine: transfer == Transfer::Apic, x, F };
+        let p2g = P2g { c: &c, support, is_affine: transfer.is_affine(), x, F };
         update.p2g(bins, nodes, &|band, first, ids| {
             p2g.bin(band, first, ids, |_, copies, ids, contributions| {
                 forcing.evaluate(ids, &copies.x, &mut contributions.b);
@@ -59,12 +58,9 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let Particles { x, v, F, mass, .. } = &*particles;
         let c = *constants;
         let update = GridUpdate::new(layout, &c, Velocity);
-        let p2g = P2g { c: &c, support, is_affine: transfer == Transfer::Apic, x, F };
+        let p2g = P2g { c: &c, support, is_affine: transfer.is_affine(), x, F };
         update.p2g(bins, nodes, &|band, first, ids| {
-            p2g.bin(band, first, ids, |_, _, ids, contributions| {
-                contributions.take_momenta(ids, mass, v);
-                contributions.take_affine(ids, mass, affine);
-            });
+            p2g.momenta_of_bin(band, first, ids, (mass, v, affine));
         });
     }
 
@@ -99,12 +95,9 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         let Particles { x, v, F, mass, .. } = &*particles;
         let c = *constants;
         let update = GridUpdate::new(layout, &c, Reprojection { nodes: &nodes[..] });
-        let p2g = P2g { c: &c, support, is_affine: transfer == Transfer::Apic, x, F };
+        let p2g = P2g { c: &c, support, is_affine: transfer.is_affine(), x, F };
         update.p2g(bins, reprojected, &|band, first, ids| {
-            p2g.bin(band, first, ids, |_, _, ids, contributions| {
-                contributions.take_momenta(ids, mass, v);
-                contributions.take_affine(ids, mass, affine);
-            });
+            p2g.momenta_of_bin(band, first, ids, (mass, v, affine));
         });
     }
 
@@ -142,6 +135,21 @@ struct P2g<'a, T, const D: usize> {
 }
 
 impl<T: RealField + Copy, const D: usize> P2g<'_, T, D> {
+    /// Adds mass and momentum of the particles `ids`, with the affine part where there is one, to the band of nodes that starts at
+    /// node `first`.
+    fn momenta_of_bin(
+        &self,
+        band: &mut [Node<T, D>],
+        first: usize,
+        ids: &[u32],
+        (mass, v, affine): (&[T], &[SVector<T, D>], &[SMatrix<T, D, D>]),
+    ) {
+        self.bin(band, first, ids, |_, _, ids, contributions| {
+            contributions.take_momenta(ids, mass, v);
+            contributions.take_affine(ids, mass, affine);
+        });
+    }
+
     /// Adds the particles `ids`, block by block, to the band of nodes that starts at node `first`.
     /// `set(weights, copies, ids, contributions)` sets the contributions of a block.
     fn bin(

@@ -114,6 +114,13 @@ pub enum Transfer {
     Xpic(u32),
 }
 
+impl Transfer {
+    /// Whether particles have affine velocities.
+    pub(crate) fn is_affine(self) -> bool {
+        self == Self::Apic
+    }
+}
+
 impl fmt::Display for Transfer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

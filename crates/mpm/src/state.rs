@@ -41,11 +41,6 @@ pub(crate) struct State<T, const D: usize> {
 }
 
 impl<T: RealField + Copy, const D: usize> State<T, D> {
-    /// Whether velocities have an affine part (APIC).
-    pub(crate) fn is_affine(&self) -> bool {
-        self.transfer == Transfer::Apic
-    }
-
     /// Sorts the particles into bins, if one of them left its bin in the last pass.
     pub(crate) fn resort_if(&mut self, outcome: Outcome) -> Outcome {
         if outcome.resort && outcome.failure.is_none() {

@@ -32,7 +32,7 @@ pub(crate) fn bytes_expected<const D: usize>(
     let of_shape = match updated.shape {
         Shape::Cpdi => D * D,
         // Corners, in three configurations, are as many as particles; a domain has eight indices.
-        Shape::Cpdi2 => 3 * D + D * D + size_of::<[usize; 8]>() / scalar,
+        Shape::Cpdi2 => 3 * D + D * D + size_of::<[u32; 8]>() / scalar,
         _ => 0,
     };
     let (of_transfer, of_node) = match updated.transfer {

@@ -82,6 +82,19 @@ impl<T: RealField + Copy, const D: usize> Copies<T, D> {
         }
     }
 
+    /// Particles that lie side by side: in place where they fill a block, else copied.
+    pub(crate) fn of_successive<'a>(
+        &'a mut self,
+        x: &'a [SVector<T, D>],
+        F: &'a [SMatrix<T, D, D>],
+    ) -> Kinematics<'a, T, D> {
+        if let (Some(x), Some(F)) = (x.first_chunk(), F.first_chunk()) {
+            return Kinematics { x, F };
+        }
+        self.copy(x, F);
+        self.kinematics()
+    }
+
     /// Takes whole arrays, no longer than a block.
     pub(crate) fn copy(&mut self, x: &[SVector<T, D>], F: &[SMatrix<T, D, D>]) {
         self.x[..x.len()].copy_from_slice(x);
@@ -217,7 +230,7 @@ fn stress_fluxes<const SHORT: bool, T: RealField + Copy, L: Law<T>, const D: usi
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use std::array;
 
@@ -226,7 +239,7 @@ mod tests {
     use crate::material::NeoHookean;
     use crate::parallel::bins::Bins;
 
-    fn constants<const D: usize>() -> (Constants<f64, D>, usize) {
+    pub(in crate::kernel) fn constants<const D: usize>() -> (Constants<f64, D>, usize) {
         let grid =
             Grid { lower: SVector::zeros(), spacing: 0.5, cells: [8; D], walls: [[false; 2]; D] };
         let layout = Layout::new(&grid, 8).unwrap();
@@ -234,7 +247,7 @@ mod tests {
         (Constants::new(&grid, &layout, &bins, 0.1, 1.0), layout.nodes)
     }
 
-    fn noise(seed: usize) -> f64 {
+    pub(in crate::kernel) fn noise(seed: usize) -> f64 {
         (seed as f64 * 12.9898).sin()
     }
 

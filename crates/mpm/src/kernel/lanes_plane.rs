@@ -34,13 +34,14 @@ impl<T: RealField + Copy> Sum<T> {
     }
 }
 
-/// The factor of a particle's slope along an axis in P2G: gradients for forces, arms for affine momenta.
+/// The factor of a particle's slope along an axis: gradients, and where velocities are affine arms, for the first vector of a node
+/// (P2G: affine momenta) or for the second (G2P: moments).
 #[inline(always)]
-fn p2g_slope<T, V, L, const D: usize, const W: usize>(
+fn slope_factor<T, V, L, const D: usize, const W: usize>(
     vectors: V,
     weights: &L,
-    axis: usize,
-    place: usize,
+    (axis, place): (usize, usize),
+    arms_first: bool,
 ) -> Lane4<T>
 where
     T: RealField + Copy,
@@ -51,27 +52,9 @@ where
     if !L::AFFINE {
         return G;
     }
-    of_both(vectors, D, vectors.splat(weights.Z(axis, place)), G)
-}
-
-/// The same in G2P: gradients for the first vector of a node, arms for the second.
-#[inline(always)]
-fn g2p_slope<T, V, L, const D: usize, const W: usize>(
-    vectors: V,
-    weights: &L,
-    axis: usize,
-    place: usize,
-) -> Lane4<T>
-where
-    T: RealField + Copy,
-    V: Vectors,
-    L: Weights<T, D, W>,
-{
-    let G = vectors.splat(weights.G(axis, place));
-    if !L::AFFINE {
-        return G;
-    }
-    of_both(vectors, D, G, vectors.splat(weights.Z(axis, place)))
+    let Z = vectors.splat(weights.Z(axis, place));
+    let (first, second) = if arms_first { (Z, G) } else { (G, Z) };
+    of_both(vectors, D, first, second)
 }
 
 /// One number for the first vector of a node, and another for the second.
@@ -135,8 +118,11 @@ pub(crate) fn p2g_in_plane<T, L, V, const D: usize, const W: usize, const N: usi
                 if D > 1 && !is_middle::<W>(j) {
                     let S = vectors.splat(w.S(1, j));
                     let with_value = vectors.mul(value, S);
-                    to_value =
-                        vectors.mul_add(gradient[D - 1], p2g_slope(vectors, &w, 1, j), with_value);
+                    to_value = vectors.mul_add(
+                        gradient[D - 1],
+                        slope_factor(vectors, &w, (1, j), true),
+                        with_value,
+                    );
                     to_gradient = vectors.mul(to_gradient, S);
                     to_mass *= w.S(1, j);
                 }
@@ -147,7 +133,7 @@ pub(crate) fn p2g_in_plane<T, L, V, const D: usize, const W: usize, const N: usi
                         sum.mass += to_mass;
                         continue;
                     }
-                    let (S, slope) = (w.S(0, i), p2g_slope(vectors, &w, 0, i));
+                    let (S, slope) = (w.S(0, i), slope_factor(vectors, &w, (0, i), true));
                     let with_gradient = vectors.mul_add(to_gradient, slope, sum.values);
                     sum.values = vectors.mul_add(to_value, vectors.splat(S), with_gradient);
                     sum.mass = to_mass.mul_add(S, sum.mass);
@@ -323,24 +309,31 @@ fn interpolate<T: RealField + Copy, V: Vectors, const D: usize, const W: usize>(
 ) -> (Lane4<T>, Lane4<T>) {
     if W > 3 {
         let mut value = vectors.mul(changes[0], vectors.splat(weights.S(axis, 0)));
-        let mut slope = vectors.mul(changes[0], g2p_slope(vectors, weights, axis, 0));
+        let mut slope = vectors.mul(changes[0], slope_factor(vectors, weights, (axis, 0), false));
         for (place, nodal) in changes.iter().enumerate().skip(1) {
             value = vectors.add(value, vectors.mul(*nodal, vectors.splat(weights.S(axis, place))));
-            slope = vectors.mul_add(*nodal, g2p_slope(vectors, weights, axis, place), slope);
+            slope = vectors.mul_add(
+                *nodal,
+                slope_factor(vectors, weights, (axis, place), false),
+                slope,
+            );
         }
         return (value, slope);
     }
     let last = changes[W - 1];
     let to_last = vectors.mul(last, vectors.splat(weights.S(axis, W - 1)));
-    let slope = g2p_slope(vectors, weights, axis, W - 1);
+    let slope = slope_factor(vectors, weights, (axis, W - 1), false);
     if W == 2 {
         return (vectors.add(changes[0], to_last), vectors.mul(last, slope));
     }
     // The weights of all nodes add up to one, and their gradients to zero.
     let first = changes[0];
     let to_first = vectors.mul(first, vectors.splat(weights.S(axis, 0)));
-    let gradient =
-        vectors.mul_sub(last, slope, vectors.mul(first, g2p_slope(vectors, weights, axis, 0)));
+    let gradient = vectors.mul_sub(
+        last,
+        slope,
+        vectors.mul(first, slope_factor(vectors, weights, (axis, 0), false)),
+    );
     (vectors.add(changes[1], vectors.sub(to_last, to_first)), gradient)
 }
 

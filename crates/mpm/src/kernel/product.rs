@@ -106,10 +106,12 @@ impl<T: RealField + Copy, const D: usize> ProductWeights<T, D> {
         half_sizes: &HalfSizes<T, D>,
         kinematics: Kinematics<'_, T, D>,
     ) {
-        let on_axis = PhantomData::<R>;
-        dispatch(ComputeWeights { weights: self, c, kinematics, half_sizes, on_axis });
-        if self.is_affine {
-            dispatch(ComputeMoments { weights: self, c, kinematics, half_sizes, on_axis });
+        let (is_affine, on_axis) = (self.is_affine, PhantomData::<R>);
+        let weights = &mut *self;
+        dispatch(Compute::<_, _, D, W, false> { weights, c, kinematics, half_sizes, on_axis });
+        if is_affine {
+            let weights = self;
+            dispatch(Compute::<_, _, D, W, true> { weights, c, kinematics, half_sizes, on_axis });
         }
     }
 
@@ -272,7 +274,8 @@ fn stretch<T: RealField + Copy, const D: usize>(
     F[(a, a)]
 }
 
-struct ComputeWeights<'a, T, R, const D: usize, const W: usize> {
+/// Computes weights and gradients, or else `MOMENTS`: weights times arms, and one over the inertia.
+struct Compute<'a, T, R, const D: usize, const W: usize, const MOMENTS: bool> {
     weights: &'a mut ProductWeights<T, D>,
     c: &'a Constants<T, D>,
     kinematics: Kinematics<'a, T, D>,
@@ -280,7 +283,8 @@ struct ComputeWeights<'a, T, R, const D: usize, const W: usize> {
     on_axis: PhantomData<R>,
 }
 
-impl<T, R, const D: usize, const W: usize> Loop for ComputeWeights<'_, T, R, D, W>
+impl<T, R, const D: usize, const W: usize, const MOMENTS: bool> Loop
+    for Compute<'_, T, R, D, W, MOMENTS>
 where
     T: RealField + Copy,
     R: ShapeFunction<W>,
@@ -288,32 +292,14 @@ where
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self { weights, c, kinematics, half_sizes, .. } = self;
-        let ProductWeights { first_node, S, G, extended_above, .. } = weights;
+        let ProductWeights { first_node, S, G, Z, inverse_inertia, extended_above, .. } = weights;
+        if MOMENTS {
+            compute_moments::<T, R, D, W>(c, half_sizes, kinematics, Z, inverse_inertia);
+            return;
+        }
         let half_sizes = (half_sizes, *extended_above);
         weights.any_extended =
             compute_weights::<T, R, D, W>(c, half_sizes, kinematics, first_node, S, G);
-    }
-}
-
-/// Computes weights times arms, and one over the inertia.
-struct ComputeMoments<'a, T, R, const D: usize, const W: usize> {
-    weights: &'a mut ProductWeights<T, D>,
-    c: &'a Constants<T, D>,
-    kinematics: Kinematics<'a, T, D>,
-    half_sizes: &'a HalfSizes<T, D>,
-    on_axis: PhantomData<R>,
-}
-
-impl<T, R, const D: usize, const W: usize> Loop for ComputeMoments<'_, T, R, D, W>
-where
-    T: RealField + Copy,
-    R: ShapeFunction<W>,
-{
-    #[inline(always)]
-    fn run<V: Vectors>(self, _: V) {
-        let Self { weights, c, kinematics, half_sizes, .. } = self;
-        let ProductWeights { Z, inverse_inertia, .. } = weights;
-        compute_moments::<T, R, D, W>(c, half_sizes, kinematics, Z, inverse_inertia);
     }
 }
 
@@ -478,21 +464,7 @@ mod tests {
     use super::*;
     use std::array;
 
-    use crate::Grid;
-    use crate::grid::Layout;
-    use crate::parallel::bins::Bins;
-
-    fn constants<const D: usize>() -> (Constants<f64, D>, usize) {
-        let grid =
-            Grid { lower: SVector::zeros(), spacing: 0.5, cells: [8; D], walls: [[false; 2]; D] };
-        let layout = Layout::new(&grid, 8).unwrap();
-        let bins = Bins::new(&layout, 1);
-        (Constants::new(&grid, &layout, &bins, 0.1, 1.0), layout.nodes)
-    }
-
-    fn noise(seed: usize) -> f64 {
-        (seed as f64 * 12.9898).sin()
-    }
+    use crate::kernel::block::tests::{constants, noise};
 
     /// Boxes may grow and shrink again from one time that a block is used to the next.
     #[test]

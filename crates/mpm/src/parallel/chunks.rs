@@ -59,7 +59,7 @@ pub(crate) fn each_chunk_of_four<A: Send, B: Send, C: Send, E: Send>(
             e: of_e.next().unwrap_or_default(),
         })
         .collect();
-    chunks.into_par_iter().with_max_len(1).for_each(work);
+    each(chunks, &|chunk| work(chunk));
 }
 
 /// Calls `work` with `(i, n)` for i from 0 to n - 1, for as many threads as the pool has, on those that have time.

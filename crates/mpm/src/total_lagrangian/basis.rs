@@ -4,6 +4,7 @@
 
 use std::ops::Range;
 
+use super::PIECE;
 use super::axis::{Axis, End};
 use crate::fault::{Fault, Planted};
 use crate::parallel::chunks::each_chunk;
@@ -42,9 +43,6 @@ struct Together {
     start: usize,
     are_two: bool,
 }
-
-/// Numbers that a thread is given at a time; fewer are done sooner than they are handed out.
-const PIECE: usize = 8192;
 
 /// The part of the functions that an operator takes: value or derivative.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,6 +3,7 @@
 //! With particle masses that are products over the axes, the consistent mass matrix is the Kronecker product of one
 //! banded matrix for each axis, so that its inverse is applied axis after axis.
 
+use super::PIECE;
 use super::axis::{Axis, End};
 use super::basis::{Basis, Part};
 use crate::fault::{Fault, Planted};
@@ -398,8 +399,7 @@ impl Ldl {
 /// Lines that are solved side by side: each value of a line has to wait for the one before it.
 const LINES: usize = 8;
 
-/// Numbers that a thread is given at a time, and values side by side at least.
-const PIECE: usize = 8192;
+/// Values side by side that are worth a piece of their own.
 const LEAST_COLUMNS: usize = 64;
 
 #[cfg(test)]

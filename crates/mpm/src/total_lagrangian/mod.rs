@@ -55,3 +55,6 @@ pub use boundary::{BoundaryData, HeldBoundary, Quantity, Side};
 pub use composition::Composition;
 pub use coordinates::Coordinates;
 pub use simulation::{Grid, MassMatrix, Scheme, TotalLagrangian};
+
+/// Particles, or numbers of an array, that a thread is given at a time; fewer are done sooner than they are handed out.
+const PIECE: usize = 8192;

@@ -6,6 +6,7 @@ use std::{array, mem};
 use bytemuck::{bytes_of_mut, cast_slice_mut};
 use nalgebra::{SMatrix, SVector};
 
+use super::PIECE;
 use super::axis::{Axis, End, Layout};
 use super::basis::{Basis, MOST_DEGREE, Part};
 use super::boundary::{BoundaryData, Face, HeldBoundary, Quantity, Side};
@@ -751,9 +752,6 @@ impl<L: Law<f64>, const D: usize> Stress<'_, L, D> {
         bad
     }
 }
-
-/// Particles that a thread is given at a time, and numbers of an array.
-const PIECE: usize = 4096;
 
 /// Solves in place for coefficients, `functions` by axis, with one mass matrix for each axis.
 fn solve<'a, const D: usize>(
