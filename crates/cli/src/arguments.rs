@@ -51,7 +51,7 @@ pub(crate) use reproduce::ReproduceOptions;
 pub(crate) use resume::ResumeOptions;
 pub(crate) use run::{PictureOptions, RunOptions, Stress};
 pub(crate) use scheme::{
-    Composition, Frame, Grid, Integrator, Layout, Mass, Precision, SchemeOptions, Shape, Start,
+    Composition, Frame, Grid, HighDegree, Layout, Mass, Precision, SchemeOptions, Start, Weights,
 };
 pub(crate) use score::ScoreOptions;
 pub(crate) use stability::StabilityOptions;

@@ -18,7 +18,7 @@ use crate::node::Node;
 use crate::parallel::bins::Bins;
 use crate::parallel::chunks::{ChunkOfFour, each_chunk, each_chunk_of_four};
 use crate::particles::Particles;
-use crate::scheme::Transfer;
+use crate::scheme::{Taken, Transfer};
 use crate::state::State;
 use crate::support::Support;
 
@@ -68,14 +68,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
             for (x, interpolated) in x.iter_mut().zip(&*interpolated) {
                 *x += interpolated.velocity * c.time_step;
             }
-            if let Some(F_early) = F_early.get(first..first + F.len()) {
-                F.copy_from_slice(F_early);
-            }
-            if late > T::zero() {
-                for (F, interpolated) in F.iter_mut().zip(interpolated) {
-                    *F = c.stretch_for(late, &interpolated.velocity_gradient, F);
-                }
-            }
+            stretch(&c, late, F_early.get(first..first + F.len()), interpolated, F);
         })
     }
 
@@ -92,23 +85,21 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         });
     }
 
-    /// MUSL, second G2P: position by the grid velocity, F by the reprojected one.
-    pub(crate) fn g2p_reprojected(&mut self) -> Outcome {
-        let Self { particles, constants, nodes, bins, reprojected, support, .. } = self;
+    /// MUSL, second G2P: position by the grid velocity, and F, for a time `late`, by the reprojected one.
+    pub(crate) fn g2p_reprojected(&mut self, late: T) -> Outcome {
+        let Self { particles, constants, nodes, bins, reprojected, support, F_early, .. } = self;
         let (nodes, c) = (&nodes[..], *constants);
         let reprojected =
             if c.planted.is(Fault::NoReprojection) { nodes } else { &reprojected[..] };
         let arrays = (particles, &mut Vec::new());
-        g2p(arrays, bins, c, support, Transfer::Flip, |block, interpolated, _, of_block| {
+        g2p(arrays, bins, c, support, Transfer::Flip, |block, interpolated, first, of_block| {
             let OfBlock { x, F, .. } = of_block;
             block.g2p(&c.strides, nodes, interpolated);
             for (x, interpolated) in x.iter_mut().zip(&*interpolated) {
                 *x += interpolated.velocity * c.time_step;
             }
             block.g2p(&c.strides, reprojected, interpolated);
-            for (F, interpolated) in F.iter_mut().zip(interpolated) {
-                *F = c.stretch(&interpolated.velocity_gradient, F);
-            }
+            stretch(&c, late, F_early.get(first..first + F.len()), interpolated, F);
         })
     }
 
@@ -199,13 +190,13 @@ fn take_velocity<T: RealField + Copy, const D: usize>(
     v: &mut [SVector<T, D>],
     affine: &mut [SMatrix<T, D, D>],
 ) {
-    match transfer {
-        Transfer::Flip => {
+    match transfer.taken() {
+        Taken::Change => {
             for (v, interpolated) in v.iter_mut().zip(interpolated) {
                 *v += interpolated.second * c.time_step;
             }
         }
-        Transfer::Pic | Transfer::Apic | Transfer::Xpic(_) => {
+        Taken::Whole | Taken::Filtered(_) => {
             for (v, interpolated) in v.iter_mut().zip(interpolated) {
                 *v = interpolated.second;
             }
@@ -214,6 +205,24 @@ fn take_velocity<T: RealField + Copy, const D: usize>(
     if !c.planted.is(Fault::AffinePartDropped) {
         for (affine, interpolated) in affine.iter_mut().zip(interpolated) {
             *affine = interpolated.affine;
+        }
+    }
+}
+
+/// F at the end of the step: that after its early part, where it has one, stretched for a time `late`.
+fn stretch<T: RealField + Copy, const D: usize>(
+    c: &Constants<T, D>,
+    late: T,
+    F_early: Option<&[SMatrix<T, D, D>]>,
+    interpolated: &[Interpolated<T, D>],
+    F: &mut [SMatrix<T, D, D>],
+) {
+    if let Some(F_early) = F_early {
+        F.copy_from_slice(F_early);
+    }
+    if late > T::zero() {
+        for (F, interpolated) in F.iter_mut().zip(interpolated) {
+            *F = c.stretch_for(late, &interpolated.velocity_gradient, F);
         }
     }
 }

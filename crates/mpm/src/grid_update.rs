@@ -13,7 +13,7 @@ use crate::geometry::Constants;
 use crate::grid::Layout;
 use crate::node::Node;
 use crate::parallel::bins::{AddToBand, Bins, NodeHooks, UpdateAndAdd};
-use crate::scheme::Transfer;
+use crate::scheme::{Taken, Transfer};
 
 /// How the grid is updated after P2G.
 pub(crate) trait NodeUpdate<T: RealField + Copy, const D: usize>: Copy + Sync {
@@ -51,10 +51,10 @@ pub(crate) enum NodeVectors {
 
 impl NodeVectors {
     pub(crate) fn of(transfer: Transfer) -> Self {
-        match transfer {
-            Transfer::Flip => Self::VelocityAndAcceleration,
-            Transfer::Pic | Transfer::Apic => Self::VelocityTwice,
-            Transfer::Xpic(_) => Self::StartAndAcceleration,
+        match transfer.taken() {
+            Taken::Change => Self::VelocityAndAcceleration,
+            Taken::Whole => Self::VelocityTwice,
+            Taken::Filtered(_) => Self::StartAndAcceleration,
         }
     }
 

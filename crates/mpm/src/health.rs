@@ -295,7 +295,12 @@ mod tests {
     use crate::grid::{Grid, Layout};
     use crate::kernel::block::Copies;
     use crate::parallel::bins::Bins;
+    use crate::scheme::Shape;
     use nalgebra::{Matrix2, Vector2, vector};
+
+    fn shape(shape: Shape) -> ProductShape<f64, 2> {
+        ProductShape::new(shape, Vector2::repeat(0.25)).unwrap()
+    }
 
     fn constants() -> Constants<f64, 2> {
         let grid =
@@ -362,12 +367,12 @@ mod tests {
                 is_valid
             }
         };
-        for_all_limits("hat", one, 0.0, 28.0, &valid(ProductShape::hat()));
-        let fixed = ProductShape::ugimp(Vector2::repeat(0.25));
+        for_all_limits("hat", one, 0.0, 28.0, &valid(shape(Shape::Linear)));
+        let fixed = shape(Shape::Ugimp);
         for_all_limits("fixed", one, 0.25, 27.0, &valid(fixed));
-        for_all_limits("quadratic", one, 0.5, 27.0, &valid(ProductShape::quadratic()));
-        for_all_limits("cubic", one, 1.0, 26.0, &valid(ProductShape::cubic()));
-        let of_box = valid(ProductShape::gimp(Vector2::repeat(0.25)));
+        for_all_limits("quadratic", one, 0.5, 27.0, &valid(shape(Shape::Bspline2)));
+        for_all_limits("cubic", one, 1.0, 26.0, &valid(shape(Shape::Bspline3)));
+        let of_box = valid(shape(Shape::Gimp));
         for (F, half_size, end) in [
             (one, 0.25, 27.0),
             (with(1.0, 2.0), 0.5, 27.0),
@@ -386,7 +391,7 @@ mod tests {
         for (bin, y, valid) in
             [(0, 0.0, true), (0, -5e-324, false), (7, 30.0, true), (7, 30.0_f64.next_up(), false)]
         {
-            let hat = Support::Product(ProductShape::hat());
+            let hat = Support::Product(shape(Shape::Linear));
             assert_eq!(is_valid(&c, &hat, bin, vector![1.2, y], one), valid, "{bin} {y}");
         }
     }
@@ -395,7 +400,7 @@ mod tests {
     fn a_particle_that_left_its_bin_is_sorted_anew_and_an_invalid_one_stops_the_run() {
         let c = constants();
         let one = Matrix2::identity();
-        let hat = Support::Product(ProductShape::hat());
+        let hat = Support::Product(shape(Shape::Linear));
         let diagnose = |y: f64, F: &Matrix2<f64>| hat.diagnose(&c, 41, 2, &vector![1.2, y], F);
         assert!(diagnose(9.0, &one).is_clean());
         let moved = diagnose(15.0, &one);

@@ -101,6 +101,6 @@ pub use error::{SetupError, StepError};
 pub use grid::Grid;
 pub use material::Material;
 pub use particles::Particles;
-pub use scheme::{Integrator, Settings, Shape, Transfer};
+pub use scheme::{Integrator, Settings, Shape, Transfer, UnknownName};
 pub use simulation::Simulation;
 pub use solver::{Scalar, Solver, TotalSetUp};

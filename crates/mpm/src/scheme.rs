@@ -1,79 +1,139 @@
 //! The scheme of a simulation: shape function, integrator, transfer.
 
 use std::fmt;
+use std::str::FromStr;
 
-/// Shape functions, whose values at particles are the weights of P2G and G2P.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Shape {
-    /// Hat functions at the particle's centre.
-    Linear,
-    /// GIMP weights with boxes of fixed size.
-    Ugimp,
-    /// GIMP weights with boxes that stretch with the diagonal of F.
-    Gimp,
-    /// Quadratic B-splines about the nodes, at the particle's centre.
-    ///
-    /// Splines beyond a wall are folded on their mirror images, the component across the wall with the opposite sign. The
-    /// weights so add up to one in every cell, and fields that are linear and vanish across the wall on it are reproduced:
-    /// of linear fields these are all that a frictionless wall admits. Beyond an open face the nodes go on, and all linear
-    /// fields are reproduced there. (Steffen, Kirby & Berzins, IJNME 76 (2008) 922-948, change the splines at the boundary
-    /// instead. With lumped mass that costs an order there: the changed spline's centre of mass is not where its coefficient is.)
-    Bspline2,
-    /// Cubic B-splines about the nodes, at the particle's centre; walls as for `Bspline2`.
-    Bspline3,
-    /// Hat functions interpolated between the corners of a parallelogram that F carries along (CPDI: Sadeghirad, Brannon
-    /// & Burghardt, IJNME 86 (2011) 1435-1456); segments, parallelograms, parallelepipeds.
-    Cpdi,
-    /// The same on segments, quadrilaterals and hexahedra whose corners are points of the body, which neighbours share and
-    /// which move with the grid (CPDI2: Sadeghirad, Brannon & Guilkey, IJNME 95 (2013) 928-952).
-    Cpdi2,
+/// Enums whose values have names that options, files and captions share, and a line about each: the first of its documentation.
+macro_rules! named {
+    ($(
+        $(#[$of_enum:meta])*
+        pub enum $Enum:ident {
+            $(#[doc = $about:literal] $(#[doc = $more:literal])* $Value:ident = $name:literal,)+
+        }
+    )+) => {$(
+        $(#[$of_enum])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum $Enum {
+            $(#[doc = $about] $(#[doc = $more])* $Value,)+
+        }
+
+        impl $Enum {
+            /// All there are.
+            pub const ALL: [Self; [$(Self::$Value),+].len()] = [$(Self::$Value),+];
+
+            /// The name that the field has for it.
+            #[must_use]
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$Value => $name,)+
+                }
+            }
+
+            /// A line about it.
+            #[must_use]
+            pub fn about(self) -> &'static str {
+                match self {
+                    $(Self::$Value => $about.trim_ascii(),)+
+                }
+            }
+        }
+
+        impl fmt::Display for $Enum {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.pad(self.name())
+            }
+        }
+
+        impl FromStr for $Enum {
+            type Err = UnknownName;
+
+            fn from_str(name: &str) -> Result<Self, UnknownName> {
+                let known = || Self::ALL.map(Self::name).join(", ");
+                Self::ALL
+                    .into_iter()
+                    .find(|value| value.name() == name)
+                    .ok_or_else(|| UnknownName { known: known() })
+            }
+        }
+    )+};
 }
 
-/// The name that the field has for it.
-impl fmt::Display for Shape {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Linear => "linear",
-            Self::Ugimp => "ugimp",
-            Self::Gimp => "gimp",
-            Self::Bspline2 => "bspline2",
-            Self::Bspline3 => "bspline3",
-            Self::Cpdi => "cpdi",
-            Self::Cpdi2 => "cpdi2",
-        })
+named! {
+    /// Shape functions, whose values at particles are the weights of P2G and G2P.
+    pub enum Shape {
+        /// Hat functions at the particle's point
+        Linear = "linear",
+        /// GIMP weights of fixed size
+        Ugimp = "ugimp",
+        /// GIMP weights that follow the particle's stretch
+        ///
+        /// The boxes stretch with the diagonal of F.
+        Gimp = "gimp",
+        /// Quadratic splines
+        ///
+        /// B-splines about the nodes, at the particle's centre. Splines beyond a wall are folded on their mirror images, the
+        /// component across the wall with the opposite sign. The weights so add up to one in every cell, and fields that are
+        /// linear and vanish across the wall on it are reproduced: of linear fields these are all that a frictionless wall
+        /// admits. Beyond an open face the nodes go on, and all linear fields are reproduced there. (Steffen, Kirby & Berzins,
+        /// IJNME 76 (2008) 922-948, change the splines at the boundary instead. With lumped mass that costs an order there:
+        /// the changed spline's centre of mass is not where its coefficient is.)
+        Bspline2 = "bspline2",
+        /// Cubic splines
+        ///
+        /// Walls as for `Bspline2`.
+        Bspline3 = "bspline3",
+        /// Parallelograms that deform with the particle
+        ///
+        /// Hat functions interpolated between the corners of a parallelogram that F carries along (CPDI: Sadeghirad, Brannon
+        /// & Burghardt, IJNME 86 (2011) 1435-1456); segments, parallelograms, parallelepipeds.
+        Cpdi = "cpdi",
+        /// Quadrilaterals (in space hexahedra) whose corners neighbours share
+        ///
+        /// The same as `Cpdi` on segments, quadrilaterals and hexahedra whose corners are points of the body, which move with
+        /// the grid (CPDI2: Sadeghirad, Brannon & Guilkey, IJNME 95 (2013) 928-952).
+        Cpdi2 = "cpdi2",
+    }
+
+    /// Time integration.
+    pub enum Integrator {
+        /// Update stress first
+        ///
+        /// F is updated before forces are computed.
+        Usf = "usf",
+        /// Update stress last
+        ///
+        /// F is updated with the grid velocity at the end of the step.
+        Usl = "usl",
+        /// Update stress last, with the velocity projected again
+        ///
+        /// As `Usl`, with velocities projected anew from the updated particles.
+        Musl = "musl",
+        /// Stress updated by halves, before the forces and after
+        ///
+        /// F is updated by half a step with the grid velocity before forces are computed, and by the other half with that at
+        /// the end of the step (Nairn, CMES 4 (2003) 649-663).
+        Usavg = "usavg",
+        /// Centred differences
+        ///
+        /// The arithmetic of `Usl`, with particle velocities half a step behind positions.
+        Cd = "cd",
     }
 }
 
-/// Time integration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Integrator {
-    /// Update stress first: F is updated before forces are computed.
-    Usf,
-    /// Update stress last: F is updated with the grid velocity at the end of the step.
-    Usl,
-    /// Modified update stress last: as `Usl`, with velocities projected anew from the updated particles.
-    Musl,
-    /// Update stress averaged: F is updated by half a step with the grid velocity before forces are computed, and by the
-    /// other half with that at the end of the step (Nairn, CMES 4 (2003) 649-663).
-    Usavg,
-    /// Centred differences: the arithmetic of `Usl`, with particle velocities half a step behind positions.
-    Cd,
+/// A name that nothing has.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UnknownName {
+    /// The names that there are.
+    known: String,
 }
 
-/// The name that the field has for it.
-impl fmt::Display for Integrator {
+impl fmt::Display for UnknownName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Usf => "usf",
-            Self::Usl => "usl",
-            Self::Musl => "musl",
-            Self::Usavg => "usavg",
-            Self::Cd => "cd",
-        })
+        write!(f, "it must be one of {}", self.known)
     }
 }
+
+impl std::error::Error for UnknownName {}
 
 impl Integrator {
     /// The share of a step by which F is updated before the forces.
@@ -114,21 +174,67 @@ pub enum Transfer {
     Xpic(u32),
 }
 
+/// What particles take of the grid's velocity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Taken {
+    /// Its change.
+    Change,
+    /// It.
+    Whole,
+    /// It, after a filter of this order.
+    Filtered(u32),
+}
+
 impl Transfer {
+    /// The largest order of a filter: each costs a pass over the particles, and beyond some tens nothing is left to filter.
+    const HIGHEST_ORDER: u32 = 100;
+
+    /// What particles take of the grid's velocity.
+    pub(crate) fn taken(self) -> Taken {
+        match self {
+            Self::Flip => Taken::Change,
+            Self::Pic | Self::Apic => Taken::Whole,
+            Self::Xpic(order) => Taken::Filtered(order),
+        }
+    }
+
     /// Whether particles have affine velocities.
-    pub(crate) fn is_affine(self) -> bool {
+    #[must_use]
+    pub fn is_affine(self) -> bool {
         self == Self::Apic
+    }
+
+    /// Whether a step goes to particles and back to filter velocities.
+    #[must_use]
+    pub fn is_filtered(self) -> bool {
+        matches!(self.taken(), Taken::Filtered(order) if order > 1)
     }
 }
 
 impl fmt::Display for Transfer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Flip => f.write_str("flip"),
-            Self::Pic => f.write_str("pic"),
-            Self::Apic => f.write_str("apic"),
-            Self::Xpic(order) => write!(f, "xpic{order}"),
+            Self::Flip => f.pad("flip"),
+            Self::Pic => f.pad("pic"),
+            Self::Apic => f.pad("apic"),
+            Self::Xpic(order) => f.pad(&format!("xpic{order}")),
         }
+    }
+}
+
+impl FromStr for Transfer {
+    type Err = UnknownName;
+
+    fn from_str(name: &str) -> Result<Self, UnknownName> {
+        let plain = [Self::Flip, Self::Pic, Self::Apic];
+        let filtered = || (1..=Self::HIGHEST_ORDER).map(Self::Xpic);
+        plain
+            .into_iter()
+            .chain(filtered())
+            .find(|transfer| transfer.to_string() == name)
+            .ok_or_else(|| UnknownName {
+                known: format!("flip, pic, apic, xpic1 to xpic{}", Self::HIGHEST_ORDER),
+            })
     }
 }
 
@@ -146,4 +252,29 @@ pub struct Settings<T> {
     /// Centred differences from velocities at time 0: halves the accelerations of the first step, so that they carry
     /// the velocities to dt/2 only. Without it the initial velocities are those at -dt/2.
     pub halve_first_acceleration: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_read_as_it_is_written() {
+        for shape in Shape::ALL {
+            assert_eq!(shape.to_string().parse(), Ok(shape));
+        }
+        for integrator in Integrator::ALL {
+            assert_eq!(integrator.to_string().parse(), Ok(integrator));
+        }
+        let transfers = [Transfer::Flip, Transfer::Pic, Transfer::Apic];
+        for transfer in transfers.into_iter().chain([1, 3, 100].map(Transfer::Xpic)) {
+            assert_eq!(transfer.to_string().parse(), Ok(transfer));
+        }
+        for text in ["xpic", "xpic0", "xpic101", "xpic+2", "xpic2.5", "PIC", ""] {
+            assert!(text.parse::<Transfer>().is_err(), "{text}");
+        }
+        let refusal = "GIMP".parse::<Shape>().unwrap_err().to_string();
+        assert!(refusal.contains("linear, ugimp, gimp, bspline2"), "{refusal}");
+        assert_eq!(Integrator::Usl.about(), "Update stress last");
+    }
 }

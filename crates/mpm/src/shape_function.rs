@@ -3,11 +3,13 @@
 //! All lengths are in cells (`h = 1`). Positions count from the lower corner of the grid, `xi = (x - lower) / h`; half-sizes `l`
 //! of particle boxes and gradients are per cell too.
 //!
-//! To add one: implement [`ShapeFunction`] here, add it to [`OnAxis`], and choose it in [`Support::new`](crate::support::Support).
+//! To add one: name it in [`Shape`], implement [`ShapeFunction`] here and add it to [`OnAxis`]. The compiler tells of the rest, which is
+//! in this file and in `kernel/product.rs`.
 
 use nalgebra::{RealField, SVector};
 
 use crate::grid::PAD_BELOW;
+use crate::scheme::Shape;
 use crate::tensor::real;
 
 /// Largest supported half-size of a particle's box, in cells.
@@ -180,28 +182,19 @@ pub(crate) struct ProductShape<T, const D: usize> {
 }
 
 impl<T: RealField + Copy, const D: usize> ProductShape<T, D> {
-    pub(crate) fn hat() -> Self {
-        Self { on_axis: OnAxis::Hat, half_sizes: HalfSizes::fixed(SVector::zeros()) }
-    }
-
-    /// GIMP weights for boxes of fixed half-size `l` in cells ("uGIMP").
-    pub(crate) fn ugimp(l: SVector<T, D>) -> Self {
-        Self { on_axis: OnAxis::Gimp, half_sizes: HalfSizes::fixed(l) }
-    }
-
-    /// GIMP weights for boxes that stretch with the diagonal of F, reference half-sizes `l` in cells (contiguous particles).
-    pub(crate) fn gimp(l: SVector<T, D>) -> Self {
-        Self { on_axis: OnAxis::Gimp, half_sizes: HalfSizes::stretching(l) }
-    }
-
-    pub(crate) fn quadratic() -> Self {
-        let half_sizes = HalfSizes::fixed(SVector::repeat(real(0.5)));
-        Self { on_axis: OnAxis::Quadratic, half_sizes }
-    }
-
-    pub(crate) fn cubic() -> Self {
-        let half_sizes = HalfSizes::fixed(SVector::repeat(real(1.0)));
-        Self { on_axis: OnAxis::Cubic, half_sizes }
+    /// That of this name, for particles with reference half-sizes `l` in cells; none where weights are no products.
+    pub(crate) fn new(shape: Shape, l: SVector<T, D>) -> Option<Self> {
+        let box_of = |cells: f64| HalfSizes::fixed(SVector::repeat(real(cells)));
+        let (on_axis, half_sizes) = match shape {
+            Shape::Linear => (OnAxis::Hat, box_of(0.0)),
+            Shape::Ugimp => (OnAxis::Gimp, HalfSizes::fixed(l)),
+            // Contiguous particles.
+            Shape::Gimp => (OnAxis::Gimp, HalfSizes::stretching(l)),
+            Shape::Bspline2 => (OnAxis::Quadratic, box_of(0.5)),
+            Shape::Bspline3 => (OnAxis::Cubic, box_of(1.0)),
+            Shape::Cpdi | Shape::Cpdi2 => return None,
+        };
+        Some(Self { on_axis, half_sizes })
     }
 
     /// Nodes along each axis, except for a box with extended support.

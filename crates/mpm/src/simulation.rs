@@ -17,7 +17,7 @@ use crate::material::{AnyLaw, Material, NeoHookean, NeoHookeanNoLog};
 use crate::node::Node;
 use crate::parallel::bins::Bins;
 use crate::particles::Particles;
-use crate::scheme::{Settings, Shape, Transfer};
+use crate::scheme::{Settings, Shape, Taken};
 use crate::shape_function::HALF_SIZE_LIMIT;
 use crate::state::State;
 use crate::step::{StepTimes, is_fused};
@@ -216,7 +216,7 @@ fn check<T: RealField + Copy, const D: usize>(
     };
     positive(&|| "the time step".into(), settings.time_step)?;
     positive(&|| "the grid spacing".into(), grid.spacing)?;
-    if settings.transfer == Transfer::Xpic(0) {
+    if settings.transfer.taken() == Taken::Filtered(0) {
         let quantity = "the order of XPIC".into();
         return Err(SetupError::NotPositive { quantity, value: 0.0 });
     }
@@ -318,7 +318,7 @@ fn allocate<T: RealField + Copy, const D: usize>(
     }
     let (support, particles) = Support::new(shape, body, grid.spacing);
     let fused = is_fused(integrator, transfer, &support);
-    let filtered = matches!(transfer, Transfer::Xpic(order) if order > 1);
+    let filtered = transfer.is_filtered();
     let reprojects = integrator.reprojects() || filtered;
     let ahead = fused || filtered;
     let grids = 1 + usize::from(reprojects) + usize::from(ahead);

@@ -7,7 +7,7 @@ use nalgebra::RealField;
 
 use crate::body_force::BodyForce;
 use crate::health::Outcome;
-use crate::scheme::{Integrator, Transfer};
+use crate::scheme::{Integrator, Taken, Transfer};
 use crate::state::State;
 use crate::support::Support;
 use crate::tensor::real;
@@ -49,6 +49,7 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         }
         let early = integrator.early();
         let dt = self.constants.time_step;
+        let late = dt * real(1.0 - early);
         if early > 0.0 {
             self.p2g_momentum();
             let outcome = self.g2p_stretch(dt * real(early));
@@ -60,16 +61,16 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         } else {
             self.p2g(body_force, times);
         }
-        if let Transfer::Xpic(order) = self.transfer {
+        if let Taken::Filtered(order) = self.transfer.taken() {
             self.filter(order);
         }
         self.move_corners();
         let outcome = if integrator.reprojects() {
             self.g2p_velocity();
             self.p2g_updated_momentum();
-            self.g2p_reprojected()
+            self.g2p_reprojected(late)
         } else {
-            self.g2p(dt * real(1.0 - early))
+            self.g2p(late)
         };
         self.resort_if(outcome)
     }

@@ -63,17 +63,14 @@ impl<T: RealField + Copy, const D: usize> Support<T, D> {
     ) -> (Self, crate::Particles<T, D>) {
         let Body { particles, half_edges, mesh } = body;
         let cells = particles.half_size / spacing;
-        let support = match shape {
-            Shape::Linear => Self::Product(ProductShape::hat()),
-            Shape::Ugimp => Self::Product(ProductShape::ugimp(cells)),
-            Shape::Gimp => Self::Product(ProductShape::gimp(cells)),
-            Shape::Bspline2 => Self::Product(ProductShape::quadratic()),
-            Shape::Bspline3 => Self::Product(ProductShape::cubic()),
-            Shape::Cpdi => Self::Cpdi { half_edges: HalfEdges::new(half_edges) },
-            Shape::Cpdi2 => {
-                let mesh = mesh.unwrap_or_default();
-                Self::Cpdi2 { next: mesh.x.clone(), mesh }
-            }
+        if let Some(product) = ProductShape::new(shape, cells) {
+            return (Self::Product(product), particles);
+        }
+        let support = if shape == Shape::Cpdi2 {
+            let mesh = mesh.unwrap_or_default();
+            Self::Cpdi2 { next: mesh.x.clone(), mesh }
+        } else {
+            Self::Cpdi { half_edges: HalfEdges::new(half_edges) }
         };
         (support, particles)
     }

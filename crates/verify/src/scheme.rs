@@ -118,6 +118,20 @@ impl Default for Updated {
     }
 }
 
+impl Stepping {
+    /// By an integrator, which has that start if it is centred differences.
+    #[must_use]
+    pub fn new(integrator: Integrator, start: Start) -> Self {
+        match integrator {
+            Integrator::Usf => Self::Usf,
+            Integrator::Usl => Self::Usl,
+            Integrator::Musl => Self::Musl,
+            Integrator::Usavg => Self::Usavg,
+            Integrator::Cd => Self::Cd(start),
+        }
+    }
+}
+
 impl From<Stepping> for Integrator {
     fn from(stepping: Stepping) -> Self {
         match stepping {

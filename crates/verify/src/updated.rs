@@ -1,6 +1,6 @@
 //! Runs in the updated Lagrangian formulation: from a solution to a grid, particles with their domains, and their motion.
 
-use mmsmith_mpm::{Annulus, Body, Particles, Scalar, Settings, Shape, Solver, Transfer};
+use mmsmith_mpm::{Annulus, Body, Particles, Scalar, Settings, Shape, Solver};
 use mmsmith_runtime::{Domain, Real, Solution};
 use nalgebra::SVector;
 
@@ -35,11 +35,8 @@ pub(crate) fn bytes_expected<const D: usize>(
         Shape::Cpdi2 => 3 * D + D * D + size_of::<[u32; 8]>() / scalar,
         _ => 0,
     };
-    let (of_transfer, of_node) = match updated.transfer {
-        Transfer::Apic => (D * D, 0),
-        Transfer::Xpic(order) if order > 1 => (0, D + 8),
-        _ => (0, 0),
-    };
+    let of_transfer = if updated.transfer.is_affine() { D * D } else { 0 };
+    let of_node = if updated.transfer.is_filtered() { D + 8 } else { 0 };
     let nodes: f64 = scene.cells.iter().map(|&cells| cells as f64 + 9.0).product();
     let particles = scene.particles_expected(per_cell);
     scene.bytes_expected(per_cell, scalar, exact)

@@ -1,20 +1,22 @@
 //! Options that choose a scheme, shared by all commands that simulate.
 
 use std::path::PathBuf;
+use std::str::FromStr;
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use mmsmith_verify as verify;
 use serde::Serialize;
 
 use super::shared::{ParameterOptions, parsed};
-use super::values::{finite_number, positive_count, positive_number, thread_count, transfer};
+use super::values::{finite_number, positive_count, positive_number, thread_count};
 
 /// How to simulate; what every measuring command shares.
 #[derive(Args, Clone)]
 pub(crate) struct SchemeOptions {
     /// Weights between particles and grid; where nothing is said gimp, and bspline3 in the total Lagrangian formulation
-    #[arg(long, value_enum)]
-    pub(crate) shape: Option<Shape>,
+    #[arg(long, value_parser = weights())]
+    pub(crate) shape: Option<Weights>,
     /// Formulation: updated Lagrangian, with the weights of the current configuration anew in each step, or total
     /// Lagrangian, with those of the reference configuration throughout. Where nothing is said the updated one, and the
     /// total one for a solution with a condition that only that one models
@@ -40,10 +42,10 @@ pub(crate) struct SchemeOptions {
     #[arg(long, value_enum)]
     pub(crate) cfl_speed: Option<CflSpeed>,
     /// Time integrator
-    #[arg(long, value_enum, default_value_t = Integrator::Cd)]
-    pub(crate) integrator: Integrator,
+    #[arg(long, value_parser = integrators(), default_value_t = verify::Integrator::Cd)]
+    pub(crate) integrator: verify::Integrator,
     /// Velocities from the grid to the particles: flip, pic, apic, or xpic2, xpic3, ... with a filter of that order
-    #[arg(long, value_name = "NAME", default_value = "flip", value_parser = transfer)]
+    #[arg(long, value_name = "NAME", default_value_t = verify::Transfer::Flip, value_parser = str::parse::<verify::Transfer>)]
     pub(crate) transfer: verify::Transfer,
     /// First velocity of the cd integrator; others ignore it
     #[arg(long, value_enum, default_value_t = Start::Halved)]
@@ -85,26 +87,76 @@ impl SchemeOptions {
 }
 
 /// Weights.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Shape {
-    /// Hat functions at the particle's point
-    Linear,
-    /// GIMP weights of fixed size
-    Ugimp,
-    /// GIMP weights that follow the particle's stretch
-    Gimp,
-    /// Quadratic splines
-    Bspline2,
-    /// Cubic splines
-    Bspline3,
-    /// Quartic splines (total Lagrangian)
-    Bspline4,
-    /// Quintic splines (total Lagrangian)
-    Bspline5,
-    /// Parallelograms that deform with the particle
-    Cpdi,
-    /// Quadrilaterals (in space hexahedra) whose corners neighbours share
-    Cpdi2,
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Weights {
+    /// Those of the updated Lagrangian formulation; splines are in the total one as well.
+    Of(verify::Shape),
+    /// Splines of a degree that needs the reference configuration.
+    Spline(HighDegree),
+}
+
+/// A degree of splines in the total Lagrangian formulation alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum HighDegree {
+    Four,
+    Five,
+}
+
+impl Weights {
+    fn all() -> impl Iterator<Item = Self> {
+        let splines = [HighDegree::Four, HighDegree::Five].map(Self::Spline);
+        verify::Shape::ALL.map(Self::Of).into_iter().chain(splines)
+    }
+
+    /// As the option spells it.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Of(shape) => shape.name(),
+            Self::Spline(HighDegree::Four) => "bspline4",
+            Self::Spline(HighDegree::Five) => "bspline5",
+        }
+    }
+
+    fn about(self) -> &'static str {
+        match self {
+            Self::Of(shape) => shape.about(),
+            Self::Spline(HighDegree::Four) => "Quartic splines (total Lagrangian)",
+            Self::Spline(HighDegree::Five) => "Quintic splines (total Lagrangian)",
+        }
+    }
+
+    /// The degree of splines; nothing for other weights.
+    pub(crate) fn degree(self) -> Option<usize> {
+        match self {
+            Self::Of(verify::Shape::Bspline2) => Some(2),
+            Self::Of(verify::Shape::Bspline3) => Some(3),
+            Self::Of(_) => None,
+            Self::Spline(HighDegree::Four) => Some(4),
+            Self::Spline(HighDegree::Five) => Some(5),
+        }
+    }
+}
+
+impl FromStr for Weights {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        let known = || Self::all().map(Self::name).collect::<Vec<_>>().join(", ");
+        Self::all()
+            .find(|weights| weights.name() == name)
+            .ok_or_else(|| format!("it must be one of {}", known()))
+    }
+}
+
+fn weights() -> impl TypedValueParser<Value = Weights> {
+    let values = Weights::all().map(|own| PossibleValue::new(own.name()).help(own.about()));
+    PossibleValuesParser::new(values).try_map(|name| name.parse::<Weights>())
+}
+
+fn integrators() -> impl TypedValueParser<Value = verify::Integrator> {
+    let all = verify::Integrator::ALL;
+    let values = all.map(|own| PossibleValue::new(own.name()).help(own.about()));
+    PossibleValuesParser::new(values).try_map(|name| name.parse::<verify::Integrator>())
 }
 
 /// Formulations.
@@ -143,21 +195,6 @@ choices!(
         Order6,
     }
 );
-
-/// Time integrators.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Integrator {
-    /// Update stress first
-    Usf,
-    /// Update stress last
-    Usl,
-    /// Update stress last, with the velocity projected again
-    Musl,
-    /// Stress updated by halves, before the forces and after
-    Usavg,
-    /// Centred differences
-    Cd,
-}
 
 choices!(
     /// Starts of centred differences.

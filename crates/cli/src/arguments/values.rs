@@ -58,23 +58,6 @@ pub(super) fn finite_number(text: &str) -> Result<f64, String> {
     }
 }
 
-pub(super) fn transfer(text: &str) -> Result<verify::Transfer, String> {
-    /// Each order costs a pass over the particles, and beyond some tens nothing is left to filter.
-    const MOST: u32 = 100;
-    match text {
-        "flip" => Ok(verify::Transfer::Flip),
-        "pic" => Ok(verify::Transfer::Pic),
-        "apic" => Ok(verify::Transfer::Apic),
-        _ => text
-            .strip_prefix("xpic")
-            .filter(|order| order.bytes().all(|digit| digit.is_ascii_digit()))
-            .and_then(|order| order.parse().ok())
-            .filter(|order| (1..=MOST).contains(order))
-            .map(verify::Transfer::Xpic)
-            .ok_or_else(|| format!("it must be flip, pic, apic, or xpic1 to xpic{MOST}")),
-    }
-}
-
 pub(super) fn role(text: &str) -> Result<(verify::Role, String), String> {
     let roles = || verify::Role::ALL.map(verify::Role::name).join(", ");
     let form = || format!("expected ROLE=NAME, such as displacement=disp; roles: {}", roles());
@@ -124,10 +107,6 @@ mod tests {
         for text in ["A", "=1", "A=", "A=x", "A=nan", "A=inf"] {
             assert!(assignment(text).is_err(), "{text}");
         }
-        for text in ["xpic", "xpic0", "xpic101", "xpic+2", "xpic2.5", "PIC", ""] {
-            assert!(transfer(text).is_err(), "{text}");
-        }
-        assert_eq!(transfer("xpic3"), Ok(verify::Transfer::Xpic(3)));
         assert_eq!(assignment("A = 5e-2"), Ok(("A".into(), 0.05)));
     }
 }

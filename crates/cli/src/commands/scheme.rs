@@ -5,13 +5,11 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use mmsmith_solutions::{AnySolution, Boundary};
 use mmsmith_verify::{
-    self as verify, Case, CaseError, CflSpeed, Coordinates, Parts, Placement, Scheme, Stepping,
-    Total, Transfer, Updated,
+    self as verify, Case, CaseError, CflSpeed, Coordinates, Integrator, Parts, Placement, Scheme,
+    Shape, Stepping, Total, Transfer, Updated,
 };
 
-use crate::arguments::{
-    Composition, Frame, Grid, Integrator, Layout, Mass, Precision, SchemeOptions, Shape, word,
-};
+use crate::arguments::{Composition, Frame, Grid, Layout, Mass, Precision, SchemeOptions, Weights};
 
 /// The CFL number where nothing is said, and nothing else of the scheme was chosen for the solution.
 pub(super) const USUAL_CFL: f64 = 0.4;
@@ -148,23 +146,12 @@ impl Settled {
 
 /// Whether the options say something that only the updated frame has.
 fn says_updated(options: &SchemeOptions) -> bool {
-    options.shape.is_some_and(|shape| degree(shape).is_none())
+    options.shape.is_some_and(|shape| shape.degree().is_none())
         || options.integrator != Integrator::Cd
         || options.transfer != Transfer::Flip
         || options.layout == Some(Layout::BodyFitted)
         || options.offset != 0.0
         || options.precision == Precision::F32
-}
-
-/// The degree of splines; nothing for other weights.
-fn degree(shape: Shape) -> Option<usize> {
-    match shape {
-        Shape::Bspline2 => Some(2),
-        Shape::Bspline3 => Some(3),
-        Shape::Bspline4 => Some(4),
-        Shape::Bspline5 => Some(5),
-        Shape::Linear | Shape::Ugimp | Shape::Gimp | Shape::Cpdi | Shape::Cpdi2 => None,
-    }
 }
 
 /// Particles in a cell along each direction where nothing is said: as many Gauss points as integrate the splines' squares.
@@ -190,22 +177,14 @@ fn updated(options: &SchemeOptions) -> Result<Updated> {
     }
     let fitted = options.layout == Some(Layout::BodyFitted);
     // The boxes of GIMP lie along the axes.
-    let shape = options.shape.unwrap_or(if fitted { Shape::Cpdi2 } else { Shape::Gimp });
-    let shape = match shape {
-        Shape::Linear => verify::Shape::Linear,
-        Shape::Ugimp => verify::Shape::Ugimp,
-        Shape::Gimp => verify::Shape::Gimp,
-        Shape::Bspline2 => verify::Shape::Bspline2,
-        Shape::Bspline3 => verify::Shape::Bspline3,
-        Shape::Cpdi => verify::Shape::Cpdi,
-        Shape::Cpdi2 => verify::Shape::Cpdi2,
-        Shape::Bspline4 | Shape::Bspline5 => {
-            let name = word(shape);
-            bail!(
-                "--shape {name}: splines of this degree need the reference configuration; add --formulation total-lagrangian, or take \
-                 bspline2 or bspline3"
-            )
-        }
+    let usual = Weights::Of(if fitted { Shape::Cpdi2 } else { Shape::Gimp });
+    let shape = match options.shape.unwrap_or(usual) {
+        Weights::Of(shape) => shape,
+        high @ Weights::Spline(_) => bail!(
+            "--shape {}: splines of this degree need the reference configuration; add --formulation total-lagrangian, or take \
+             bspline2 or bspline3",
+            high.name()
+        ),
     };
     let placement = match (fitted, options.offset) {
         (false, offset) => Placement::Lattice { offset },
@@ -219,21 +198,15 @@ fn updated(options: &SchemeOptions) -> Result<Updated> {
 }
 
 fn stepping(options: &SchemeOptions) -> Stepping {
-    match options.integrator {
-        Integrator::Usf => Stepping::Usf,
-        Integrator::Usl => Stepping::Usl,
-        Integrator::Musl => Stepping::Musl,
-        Integrator::Usavg => Stepping::Usavg,
-        Integrator::Cd => Stepping::Cd(options.start.into()),
-    }
+    Stepping::new(options.integrator, options.start.into())
 }
 
 fn total(options: &SchemeOptions, exact: &AnySolution<f64>) -> Result<Total> {
-    let shape = options.shape.unwrap_or(Shape::Bspline3);
-    let Some(degree) = degree(shape) else {
+    let shape = options.shape.unwrap_or(Weights::Of(Shape::Bspline3));
+    let Some(degree) = shape.degree() else {
         bail!(
             "--shape {}: the total Lagrangian formulation takes bspline2, bspline3, bspline4 or bspline5",
-            word(shape)
+            shape.name()
         )
     };
     if options.transfer != Transfer::Flip {
@@ -277,7 +250,7 @@ pub(super) fn words(scheme: &Scheme) -> String {
         Scheme::Updated(updated) => {
             let mut text = match updated.stepping {
                 Stepping::Cd(_) => format!(" ({start} start)"),
-                Stepping::Usf | Stepping::Usl | Stepping::Musl | Stepping::Usavg => String::new(),
+                _ => String::new(),
             };
             if updated.transfer != Transfer::Flip {
                 text += &format!(", transfer {}", updated.transfer);

@@ -462,6 +462,7 @@ fn g2p_extended<T: RealField + Copy, const D: usize, const AFFINE: bool>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scheme::Shape;
     use std::array;
 
     use crate::kernel::block::tests::{constants, noise};
@@ -472,7 +473,7 @@ mod tests {
         fn check<const D: usize, const AFFINE: bool>() {
             let (c, nodes) = constants::<D>();
             let reference = SVector::repeat(0.25);
-            let shape = ProductShape::gimp(reference);
+            let shape = ProductShape::new(Shape::Gimp, reference).unwrap();
             let x: [_; BLOCK] =
                 array::from_fn(|k| SVector::from_fn(|a, _| 2.0 + 1.2 * noise(5 * k + a)));
             let grid: Vec<Node<f64, D>> = (0..nodes)

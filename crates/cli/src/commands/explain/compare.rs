@@ -1,10 +1,12 @@
 //! What runs take beside what was predicted of them.
 
 use anyhow::Result;
-use mmsmith_verify::{Case, CostModel, Outputs, Parts, Plan, Scheme, Status, median, plan, run};
+use mmsmith_verify::{
+    Case, CostModel, Integrator, Outputs, Parts, Plan, Scheme, Shape, Status, median, plan, run,
+};
 use serde::Serialize;
 
-use crate::arguments::{Frame, Integrator, Mass, SchemeOptions, Shape};
+use crate::arguments::{Frame, HighDegree, Mass, SchemeOptions, Weights};
 use crate::commands::scheme::Settled;
 use crate::commands::{Model, predict};
 use crate::memory;
@@ -123,7 +125,9 @@ impl Comparison {
 /// total one.
 fn schemes(model: &Model) -> Result<Vec<(String, Case)>> {
     let open = SchemeOptions::open();
-    let said = |shape, integrator| SchemeOptions { shape: Some(shape), integrator, ..open.clone() };
+    let with =
+        |weights, integrator| SchemeOptions { shape: Some(weights), integrator, ..open.clone() };
+    let said = |shape, integrator| with(Weights::Of(shape), integrator);
     let (cd, usl, musl) = (Integrator::Cd, Integrator::Usl, Integrator::Musl);
     let all = if mmsmith_verify::needs_total_frame(&model.exact).is_none() {
         let total = SchemeOptions {
@@ -143,8 +147,8 @@ fn schemes(model: &Model) -> Result<Vec<(String, Case)>> {
         vec![
             said(Shape::Bspline2, cd),
             said(Shape::Bspline3, cd),
-            said(Shape::Bspline4, cd),
-            said(Shape::Bspline5, cd),
+            with(Weights::Spline(HighDegree::Four), cd),
+            with(Weights::Spline(HighDegree::Five), cd),
             lumped,
         ]
     };

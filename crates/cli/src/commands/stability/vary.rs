@@ -1,10 +1,10 @@
 //! The points of a line or map.
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Error, Result, bail};
 use clap::ValueEnum;
 
 use super::Point;
-use crate::arguments::{Integrator, Precision, SchemeOptions, Shape, StabilityOptions, Start};
+use crate::arguments::{Precision, SchemeOptions, StabilityOptions, Start};
 use crate::library::Selection;
 
 /// What a point is made from, while settings are put into it.
@@ -67,8 +67,8 @@ fn put(draft: &mut Draft, name: &str, text: &str) -> Result<()> {
         "offset" => scheme.offset = number()?,
         "periods" => scheme.periods = number()?,
         "precision" => scheme.precision = word::<Precision>(text)?,
-        "shape" => scheme.shape = Some(word::<Shape>(text)?),
-        "integrator" => scheme.integrator = word::<Integrator>(text)?,
+        "shape" => scheme.shape = Some(text.parse().map_err(Error::msg)?),
+        "integrator" => scheme.integrator = text.parse()?,
         "start" => scheme.start = word::<Start>(text)?,
         "units" => {
             let power = text.parse::<i32>().ok().filter(|power| power.abs() <= 100);
