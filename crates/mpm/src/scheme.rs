@@ -181,8 +181,14 @@ pub(crate) enum Taken {
     Change,
     /// It.
     Whole,
-    /// It, after a filter of this order.
-    Filtered(u32),
+    /// It, filtered.
+    Filtered(Filter),
+}
+
+/// A filter of the grid's velocity: see `xpic.rs`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Filter {
+    pub(crate) order: u32,
 }
 
 impl Transfer {
@@ -194,7 +200,7 @@ impl Transfer {
         match self {
             Self::Flip => Taken::Change,
             Self::Pic | Self::Apic => Taken::Whole,
-            Self::Xpic(order) => Taken::Filtered(order),
+            Self::Xpic(order) => Taken::Filtered(Filter { order }),
         }
     }
 
@@ -207,7 +213,7 @@ impl Transfer {
     /// Whether a step goes to particles and back to filter velocities.
     #[must_use]
     pub fn is_filtered(self) -> bool {
-        matches!(self.taken(), Taken::Filtered(order) if order > 1)
+        matches!(self.taken(), Taken::Filtered(filter) if filter.order > 1)
     }
 }
 

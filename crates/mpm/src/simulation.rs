@@ -216,7 +216,7 @@ fn check<T: RealField + Copy, const D: usize>(
     };
     positive(&|| "the time step".into(), settings.time_step)?;
     positive(&|| "the grid spacing".into(), grid.spacing)?;
-    if settings.transfer.taken() == Taken::Filtered(0) {
+    if matches!(settings.transfer.taken(), Taken::Filtered(filter) if filter.order == 0) {
         let quantity = "the order of XPIC".into();
         return Err(SetupError::NotPositive { quantity, value: 0.0 });
     }

@@ -61,8 +61,8 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
         } else {
             self.p2g(body_force, times);
         }
-        if let Taken::Filtered(order) = self.transfer.taken() {
-            self.filter(order);
+        if let Taken::Filtered(filter) = self.transfer.taken() {
+            self.filter(filter);
         }
         self.move_corners();
         let outcome = if integrator.reprojects() {

@@ -11,6 +11,7 @@ use nalgebra::{RealField, SVector};
 use crate::fault::Fault;
 use crate::node::Node;
 use crate::parallel::chunks::each_chunk;
+use crate::scheme::Filter;
 use crate::state::State;
 use crate::tensor::real;
 
@@ -20,7 +21,7 @@ const CHUNK: usize = 1024;
 impl<T: RealField + Copy, const D: usize> State<T, D> {
     /// From nodes with the velocity `v` at the start of the step and the acceleration `a` to nodes with `v + dt a` and
     /// `filtered v + dt a`.
-    pub(crate) fn filter(&mut self, order: u32) {
+    pub(crate) fn filter(&mut self, Filter { order }: Filter) {
         let planted = self.constants.planted;
         let m = f64::from(order);
         let mut factor = m;
