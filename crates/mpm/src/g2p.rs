@@ -6,7 +6,7 @@
 //!
 //! Steps in a [single pass](crate::step::is_fused) fuse this with the next P2G ([`g2p2g`](crate::g2p2g)).
 
-use nalgebra::{RealField, SMatrix, SVector};
+use nalgebra::{SMatrix, SVector};
 
 use crate::fault::Fault;
 use crate::geometry::Constants;
@@ -19,13 +19,14 @@ use crate::parallel::bins::Bins;
 use crate::parallel::chunks::{ChunkOfFour, each_chunk, each_chunk_of_four};
 use crate::particles::Particles;
 use crate::scheme::{Taken, Transfer};
+use crate::simd::Lanes;
 use crate::state::State;
 use crate::support::Support;
 
 /// Particles handed to a thread at a time; fixed, so that nothing depends on the number of threads.
 const CHUNK: usize = 1024;
 
-impl<T: RealField + Copy, const D: usize> State<T, D> {
+impl<T: Lanes, const D: usize> State<T, D> {
     /// F follows the velocity at the start of the step for a time, before forces are computed; stored beside the old F.
     pub(crate) fn g2p_stretch(&mut self, time: T) -> Outcome {
         let Self { particles, constants, nodes, F_early, support, .. } = self;
@@ -156,7 +157,7 @@ struct FromGrid<'a, T, const D: usize> {
     interpolated: [Interpolated<T, D>; BLOCK],
 }
 
-impl<'a, T: RealField + Copy, const D: usize> FromGrid<'a, T, D> {
+impl<'a, T: Lanes, const D: usize> FromGrid<'a, T, D> {
     fn new(
         c: &'a Constants<T, D>,
         support: &'a Support<T, D>,
@@ -183,7 +184,7 @@ impl<'a, T: RealField + Copy, const D: usize> FromGrid<'a, T, D> {
 }
 
 /// Velocities, and affine ones, by the transfer.
-fn take_velocity<T: RealField + Copy, const D: usize>(
+fn take_velocity<T: Lanes, const D: usize>(
     c: &Constants<T, D>,
     transfer: Transfer,
     interpolated: &[Interpolated<T, D>],
@@ -210,7 +211,7 @@ fn take_velocity<T: RealField + Copy, const D: usize>(
 }
 
 /// F at the end of the step: that after its early part, where it has one, stretched for a time `late`.
-fn stretch<T: RealField + Copy, const D: usize>(
+fn stretch<T: Lanes, const D: usize>(
     c: &Constants<T, D>,
     late: T,
     F_early: Option<&[SMatrix<T, D, D>]>,
@@ -255,7 +256,7 @@ fn for_blocks<T, const D: usize>(
 
 /// Calls `update(weights, buffer for interpolated values, first id, arrays)` for every block of particles, then checks that
 /// each particle is valid and in its bin.
-fn g2p<T: RealField + Copy, const D: usize>(
+fn g2p<T: Lanes, const D: usize>(
     (particles, affine): (&mut Particles<T, D>, &mut Vec<SMatrix<T, D, D>>),
     bins: &Bins,
     c: Constants<T, D>,
@@ -303,7 +304,7 @@ fn g2p<T: RealField + Copy, const D: usize>(
 }
 
 /// Checks the particles of a block, from the id `first` on.
-fn check<T: RealField + Copy, const D: usize>(
+fn check<T: Lanes, const D: usize>(
     c: &Constants<T, D>,
     support: &Support<T, D>,
     copies: &mut Copies<T, D>,

@@ -6,7 +6,7 @@
 //!
 //! Source: Wang et al., "A massively parallel and scalable multi-GPU material point method", ACM Trans. Graph. 39 (2020) 30.
 
-use nalgebra::{RealField, SMatrix, SVector};
+use nalgebra::{SMatrix, SVector};
 
 use crate::body_force::BodyForce;
 use crate::fault::Fault;
@@ -20,7 +20,7 @@ use crate::node::Node;
 use crate::parallel::disjoint::PartElements;
 use crate::particles::Particles;
 use crate::prefetch::prefetch;
-use crate::simd::{Lane4, Vectors};
+use crate::simd::{Lane4, Lanes, Vectors};
 use crate::state::State;
 use crate::support::Support;
 use crate::weights::Weights;
@@ -29,7 +29,7 @@ use crate::weights::Weights;
 type Elements<'a, T, const D: usize> =
     PartElements<'a, SVector<T, D>, SVector<T, D>, SMatrix<T, D, D>>;
 
-impl<T: RealField + Copy, const D: usize> State<T, D> {
+impl<T: Lanes, const D: usize> State<T, D> {
     /// G2P of this step, then P2G and grid update of the next step, whose grid becomes `nodes`.
     pub(crate) fn g2p2g(&mut self, body_force: &dyn BodyForce<T, D>, t_next: T) -> Outcome {
         let Self { particles, constants: c, layout, bins, nodes, next, uniform, of_time, .. } =
@@ -64,7 +64,7 @@ struct G2p2g<'a, T, const D: usize> {
     forcing: Forcing<'a, T, D>,
 }
 
-impl<T: RealField + Copy, const D: usize> G2p2g<'_, T, D> {
+impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
     /// Advances the particles of a bin, then adds their contributions to its band of the next step's grid, which starts at
     /// node `first`.
     fn advance_bin(
@@ -173,7 +173,7 @@ struct AdvanceParticles<'a, T, const D: usize> {
     contributions: &'a mut Contributions<T, D, BLOCK>,
 }
 
-impl<T: RealField + Copy, const D: usize> Receive<T, D> for AdvanceParticles<'_, T, D> {
+impl<T: Lanes, const D: usize> Receive<T, D> for AdvanceParticles<'_, T, D> {
     #[inline(always)]
     fn receive(&mut self, k: usize, interpolated: &Interpolated<T, D>) {
         let Self { c, contributions, .. } = self;

@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use nalgebra::{RealField, SMatrix, SVector};
+use nalgebra::{SMatrix, SVector};
 
 use crate::body::Mesh;
 use crate::domain::{self, MOST_CORNERS, corner_of_parallelogram, volume_of_cell};
@@ -10,7 +10,7 @@ use crate::geometry::Constants;
 use crate::kernel::block::{BLOCK, Kinematics};
 use crate::kernel::corners::{GROUP, OfGroup, REACHED, cells, gather, padded, parallelograms};
 use crate::shape_function::{EXTENDED, HALF_SIZE_LIMIT, ProductShape, node_below};
-use crate::simd::{Eight, Loop, Vectors, dispatch};
+use crate::simd::{Eight, Lanes, Loop, Vectors, dispatch};
 use crate::support::{HalfEdges, Rows, Support};
 use crate::tensor::{determinant, real};
 
@@ -23,7 +23,7 @@ pub(crate) enum Invalid {
     TooLarge,
 }
 
-impl<T: RealField + Copy, const D: usize> Support<T, D> {
+impl<T: Lanes, const D: usize> Support<T, D> {
     /// The reason why a particle is invalid, if it is.
     pub(crate) fn invalidity(
         &self,
@@ -107,7 +107,7 @@ struct OfBlock<'a, T, const D: usize> {
     count: usize,
 }
 
-impl<T: RealField + Copy, const D: usize> OfBlock<'_, T, D> {
+impl<T: Lanes, const D: usize> OfBlock<'_, T, D> {
     /// Whether all particles of a group are valid: inside the grid, with small domains between these corners, in cells, and in
     /// their bins.
     #[inline(always)]
@@ -170,7 +170,7 @@ struct CheckBoxes<'a, 'b, T, const D: usize> {
     all_valid: &'b mut bool,
 }
 
-impl<T: RealField + Copy, const D: usize> Loop for CheckBoxes<'_, '_, T, D> {
+impl<T: Lanes, const D: usize> Loop for CheckBoxes<'_, '_, T, D> {
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self { of_block, shape, all_valid } = self;
@@ -205,7 +205,7 @@ struct CheckParallelograms<'a, 'b, T, const D: usize> {
     all_valid: &'b mut bool,
 }
 
-impl<T: RealField + Copy, const D: usize> Loop for CheckParallelograms<'_, '_, T, D> {
+impl<T: Lanes, const D: usize> Loop for CheckParallelograms<'_, '_, T, D> {
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self { of_block, half_edges, ids, all_valid } = self;
@@ -230,7 +230,7 @@ struct CheckCells<'a, 'b, T, const D: usize> {
     all_valid: &'b mut bool,
 }
 
-impl<T: RealField + Copy, const D: usize> Loop for CheckCells<'_, '_, T, D> {
+impl<T: Lanes, const D: usize> Loop for CheckCells<'_, '_, T, D> {
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self { of_block, mesh, ids, all_valid } = self;

@@ -7,7 +7,7 @@
 //! The affine velocity `C_p` is that of APIC. The sums of one particle are in [`kernel`](crate::kernel), bins and threads in
 //! [`parallel`](crate::parallel).
 
-use nalgebra::{RealField, SMatrix, SVector};
+use nalgebra::{SMatrix, SVector};
 
 use crate::body_force::BodyForce;
 use crate::fault::Fault;
@@ -20,11 +20,12 @@ use crate::kernel::any::{Contributions, Interpolated};
 use crate::kernel::block::{BLOCK, Block, Copies};
 use crate::node::Node;
 use crate::particles::Particles;
+use crate::simd::Lanes;
 use crate::state::State;
 use crate::step::StepTimes;
 use crate::support::Support;
 
-impl<T: RealField + Copy, const D: usize> State<T, D> {
+impl<T: Lanes, const D: usize> State<T, D> {
     /// P2G of mass, momentum and force, and from them velocities and accelerations.
     pub(crate) fn p2g(&mut self, body_force: &dyn BodyForce<T, D>, times: StepTimes<T>) {
         let Self { particles, constants, layout, bins, nodes, of_time, .. } = self;
@@ -134,7 +135,7 @@ struct P2g<'a, T, const D: usize> {
     F: &'a [SMatrix<T, D, D>],
 }
 
-impl<T: RealField + Copy, const D: usize> P2g<'_, T, D> {
+impl<T: Lanes, const D: usize> P2g<'_, T, D> {
     /// Adds mass and momentum of the particles `ids`, with the affine part where there is one, to the band of nodes that starts at
     /// node `first`.
     fn momenta_of_bin(

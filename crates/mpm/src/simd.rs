@@ -3,7 +3,6 @@
 //! The instances differ in the width of registers alone. No sum is reordered, and only explicit `mul_add` is fused, by many
 //! instructions where the processor has no single one. All instances thus give the same bits.
 
-use std::any::Any;
 use std::ops::{Add, Mul, Sub};
 
 use nalgebra::RealField;
@@ -19,12 +18,12 @@ pub(crate) trait Loop {
 /// Four numbers in the lanes of one register.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
-pub(crate) struct Lane4<T>(pub(crate) [T; 4]);
+pub struct Lane4<T>(pub(crate) [T; 4]);
 
 /// Eight numbers in the lanes of one register, or of two where registers are shorter.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-pub(crate) struct Lane8<T>(pub(crate) [T; 8]);
+pub struct Lane8<T>(pub(crate) [T; 8]);
 
 impl<T: RealField + Copy> Lane4<T> {
     #[inline(always)]
@@ -44,44 +43,44 @@ impl<T: RealField + Copy> Lane8<T> {
 /// one particle.
 pub(crate) trait Vectors: Copy {
     /// Four times the same.
-    fn splat<T: RealField + Copy>(self, value: T) -> Lane4<T>;
+    fn splat<T: Lanes>(self, value: T) -> Lane4<T>;
     /// Four numbers from memory in one load; the compiler may split a plain copy into smaller loads.
-    fn load<T: RealField + Copy>(self, values: &[T; 4]) -> Lane4<T>;
-    fn add<T: RealField + Copy>(self, a: Lane4<T>, b: Lane4<T>) -> Lane4<T>;
-    fn sub<T: RealField + Copy>(self, a: Lane4<T>, b: Lane4<T>) -> Lane4<T>;
-    fn mul<T: RealField + Copy>(self, a: Lane4<T>, b: Lane4<T>) -> Lane4<T>;
+    fn load<T: Lanes>(self, values: &[T; 4]) -> Lane4<T>;
+    fn add<T: Lanes>(self, a: Lane4<T>, b: Lane4<T>) -> Lane4<T>;
+    fn sub<T: Lanes>(self, a: Lane4<T>, b: Lane4<T>) -> Lane4<T>;
+    fn mul<T: Lanes>(self, a: Lane4<T>, b: Lane4<T>) -> Lane4<T>;
     /// `a b + c`, rounded once.
-    fn mul_add<T: RealField + Copy>(self, a: Lane4<T>, b: Lane4<T>, c: Lane4<T>) -> Lane4<T>;
+    fn mul_add<T: Lanes>(self, a: Lane4<T>, b: Lane4<T>, c: Lane4<T>) -> Lane4<T>;
     /// `a b - c`, rounded once.
-    fn mul_sub<T: RealField + Copy>(self, a: Lane4<T>, b: Lane4<T>, c: Lane4<T>) -> Lane4<T>;
+    fn mul_sub<T: Lanes>(self, a: Lane4<T>, b: Lane4<T>, c: Lane4<T>) -> Lane4<T>;
     /// `[a0, a0, a2, a2]`.
-    fn even<T: RealField + Copy>(self, a: Lane4<T>) -> Lane4<T>;
+    fn even<T: Lanes>(self, a: Lane4<T>) -> Lane4<T>;
     /// `[a1, a1, a3, a3]`.
-    fn odd<T: RealField + Copy>(self, a: Lane4<T>) -> Lane4<T>;
+    fn odd<T: Lanes>(self, a: Lane4<T>) -> Lane4<T>;
     /// `[a0, a1, a0, a1]`.
-    fn low_twice<T: RealField + Copy>(self, a: Lane4<T>) -> Lane4<T>;
+    fn low_twice<T: Lanes>(self, a: Lane4<T>) -> Lane4<T>;
     /// `[0, 0, a0, a1]`.
-    fn low_to_high<T: RealField + Copy>(self, a: Lane4<T>) -> Lane4<T>;
+    fn low_to_high<T: Lanes>(self, a: Lane4<T>) -> Lane4<T>;
     /// `[0, 0, a2, a3]`.
-    fn high_alone<T: RealField + Copy>(self, a: Lane4<T>) -> Lane4<T>;
+    fn high_alone<T: Lanes>(self, a: Lane4<T>) -> Lane4<T>;
     /// `[a2, a3, b0, b1]`.
-    fn high_and_low<T: RealField + Copy>(self, a: Lane4<T>, b: Lane4<T>) -> Lane4<T>;
+    fn high_and_low<T: Lanes>(self, a: Lane4<T>, b: Lane4<T>) -> Lane4<T>;
     /// `[a0, a1, b2, b3]`.
-    fn low_and_high<T: RealField + Copy>(self, a: Lane4<T>, b: Lane4<T>) -> Lane4<T>;
+    fn low_and_high<T: Lanes>(self, a: Lane4<T>, b: Lane4<T>) -> Lane4<T>;
     /// Eight times the same.
-    fn splat8<T: RealField + Copy>(self, value: T) -> Lane8<T>;
+    fn splat8<T: Lanes>(self, value: T) -> Lane8<T>;
     /// Eight numbers from memory in one load.
-    fn load8<T: RealField + Copy>(self, values: &[T; 8]) -> Lane8<T>;
-    fn add8<T: RealField + Copy>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
-    fn sub8<T: RealField + Copy>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
-    fn mul8<T: RealField + Copy>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
-    fn div8<T: RealField + Copy>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
+    fn load8<T: Lanes>(self, values: &[T; 8]) -> Lane8<T>;
+    fn add8<T: Lanes>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
+    fn sub8<T: Lanes>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
+    fn mul8<T: Lanes>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
+    fn div8<T: Lanes>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
     /// `a b + c`, rounded once.
-    fn mul_add8<T: RealField + Copy>(self, a: Lane8<T>, b: Lane8<T>, c: Lane8<T>) -> Lane8<T>;
+    fn mul_add8<T: Lanes>(self, a: Lane8<T>, b: Lane8<T>, c: Lane8<T>) -> Lane8<T>;
     /// The smaller of both; `b` where one is not a number.
-    fn min8<T: RealField + Copy>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
+    fn min8<T: Lanes>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
     /// The larger of both; `b` where one is not a number.
-    fn max8<T: RealField + Copy>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
+    fn max8<T: Lanes>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
 }
 
 /// Operations lane by lane, and moves between lanes.
@@ -95,29 +94,29 @@ macro_rules! lane_by_lane {
     ) => {
         impl Vectors for Scalar {
             #[inline(always)]
-            fn splat<T: RealField + Copy>(self, value: T) -> Lane4<T> {
+            fn splat<T: Lanes>(self, value: T) -> Lane4<T> {
                 Lane4([value; 4])
             }
 
             #[inline(always)]
-            fn load<T: RealField + Copy>(self, values: &[T; 4]) -> Lane4<T> {
+            fn load<T: Lanes>(self, values: &[T; 4]) -> Lane4<T> {
                 Lane4(*values)
             }
 
             #[inline(always)]
-            fn splat8<T: RealField + Copy>(self, value: T) -> Lane8<T> {
+            fn splat8<T: Lanes>(self, value: T) -> Lane8<T> {
                 Lane8([value; 8])
             }
 
             #[inline(always)]
-            fn load8<T: RealField + Copy>(self, values: &[T; 8]) -> Lane8<T> {
+            fn load8<T: Lanes>(self, values: &[T; 8]) -> Lane8<T> {
                 Lane8(*values)
             }
 
             $(
                 #[cfg_attr(target_arch = "x86_64", inline(never))]
                 #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
-                fn $name<T: RealField + Copy>(self, $($a: $of<T>),+) -> $of<T> {
+                fn $name<T: Lanes>(self, $($a: $of<T>),+) -> $of<T> {
                     $(let $of($a) = $a;)+
                     let mut result = $of::zero();
                     for ($q, lane) in result.0.iter_mut().enumerate() {
@@ -129,7 +128,7 @@ macro_rules! lane_by_lane {
 
             $(
                 #[inline(always)]
-                fn $move<T: RealField + Copy>(self, $(Lane4($b): Lane4<T>),+) -> Lane4<T> {
+                fn $move<T: Lanes>(self, $(Lane4($b): Lane4<T>),+) -> Lane4<T> {
                     Lane4([$($lane),+])
                 }
             )*
@@ -191,7 +190,7 @@ macro_rules! operators {
             }
         }
 
-        impl<T: RealField + Copy, V: Vectors> $trait for Eight<T, V> {
+        impl<T: Lanes, V: Vectors> $trait for Eight<T, V> {
             type Output = Self;
 
             #[inline(always)]
@@ -220,7 +219,7 @@ impl<T: RealField + Copy> Number for One<T> {
     }
 }
 
-impl<T: RealField + Copy, V: Vectors> Number for Eight<T, V> {
+impl<T: Lanes, V: Vectors> Number for Eight<T, V> {
     #[inline(always)]
     fn divided_by(self, divisor: Self) -> Self {
         Self { lanes: self.vectors.div8(self.lanes, divisor.lanes), ..self }
@@ -232,247 +231,295 @@ impl<T: RealField + Copy, V: Vectors> Number for Eight<T, V> {
     }
 }
 
+/// A number that registers hold several of: `f64` or `f32`.
+///
+/// The operations are functions of the number's type, not questions for it: a kernel calls them some thousand times, and each
+/// question would have to be answered for each call before anything else is compiled.
+#[cfg(target_arch = "x86_64")]
+pub trait Lanes:
+    RealField + Copy + x86::Instructions<pulp::x86::V3> + x86::Instructions<pulp::x86::V4>
+{
+}
+
+/// A number that registers hold several of: `f64` or `f32`.
+#[cfg(not(target_arch = "x86_64"))]
+pub trait Lanes: RealField + Copy {}
+
+impl Lanes for f64 {}
+impl Lanes for f32 {}
+
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use super::{Any, Lane4, Lane8, RealField, Scalar, Vectors, same};
-    use bytemuck::{AnyBitPattern, NoUninit, bytes_of, must_cast, pod_read_unaligned};
+    use super::{Lane4, Lane8, Lanes, Vectors};
+    use bytemuck::{bytes_of, must_cast, pod_read_unaligned};
     use pulp::x86::{V3, V4};
     use std::arch::x86_64::{__m128, __m256, __m256d, __m512d};
 
-    /// The instructions for an operation on four numbers and for one on eight, in double and in single precision, if `T` is
-    /// one of them. Registers of 512 bits hold eight numbers in double precision, others half of them.
+    /// The instructions for an operation on four numbers and for one on eight, in double and in single precision. Registers of 512 bits
+    /// hold eight numbers in double precision, others half of them.
     macro_rules! instructions {
         (
-            $(fn $four:ident($self:ident, $($a:ident),*) { $double:expr, $single:expr })*
+            $(fn $four:ident($vectors:ident, $($a:ident),*) { $double:expr, $single:expr })*
             eight:
-            $(fn $eight:ident($self8:ident, $($a8:ident),*) {
+            $(fn $eight:ident($vectors8:ident, $($a8:ident),*) {
                 $wide:expr, each half $half:expr, $single8:expr
             })*
         ) => {
-            impl Vectors for V3 {
+            /// The operations of [`Vectors`] in the registers `V`.
+            pub trait Instructions<V>: Sized {
+                $(fn $four(vectors: V, $($a: Lane4<Self>),*) -> Lane4<Self>;)*
+                $(fn $eight(vectors: V, $($a8: Lane8<Self>),*) -> Lane8<Self>;)*
+                fn splat(vectors: V, value: Self) -> Lane4<Self>;
+                fn splat8(vectors: V, value: Self) -> Lane8<Self>;
+                fn load(vectors: V, values: &[Self; 4]) -> Lane4<Self>;
+                fn load8(vectors: V, values: &[Self; 8]) -> Lane8<Self>;
+            }
+
+            impl Instructions<V3> for f64 {
                 $(#[inline(always)]
-                fn $four<T: RealField + Copy>($self, $($a: Lane4<T>),*) -> Lane4<T> {
-                    if let ($(Some($a),)*) = ($(double($a),)*) {
-                        return from_double($double).unwrap_or_else(Lane4::zero);
-                    }
-                    if let ($(Some($a),)*) = ($(single($a),)*) {
-                        return from_single($single).unwrap_or_else(Lane4::zero);
-                    }
-                    Scalar::new().$four($($a),*)
+                fn $four($vectors: V3, $($a: Lane4<Self>),*) -> Lane4<Self> {
+                    $(let $a: __m256d = must_cast($a.0);)*
+                    Lane4(must_cast($double))
+                })*
+
+                $(#[inline(always)]
+                fn $eight($vectors8: V3, $($a8: Lane8<Self>),*) -> Lane8<Self> {
+                    $(let $a8: [__m256d; 2] = must_cast($a8.0);)*
+                    let low = {
+                        $(let $a8 = $a8[0];)*
+                        $half
+                    };
+                    let high = {
+                        $(let $a8 = $a8[1];)*
+                        $half
+                    };
+                    Lane8(must_cast([low, high]))
                 })*
 
                 #[inline(always)]
-                fn load<T: RealField + Copy>(self, values: &[T; 4]) -> Lane4<T> {
-                    let double = at::<_, [f64; 4], __m256d>(values).and_then(from_double);
-                    let single = at::<_, [f32; 4], __m128>(values).and_then(from_single);
-                    double.or(single).unwrap_or(Lane4(*values))
+                fn splat(vectors: V3, value: Self) -> Lane4<Self> {
+                    Lane4(must_cast(vectors.avx._mm256_set1_pd(value)))
                 }
 
                 #[inline(always)]
-                fn splat<T: RealField + Copy>(self, value: T) -> Lane4<T> {
-                    let double = same(value).and_then(|x: f64| from_double(self.avx._mm256_set1_pd(x)));
-                    let single = same(value).and_then(|x: f32| from_single(self.sse._mm_set1_ps(x)));
-                    double.or(single).unwrap_or(Lane4([value; 4]))
-                }
-
-                $(#[inline(always)]
-                fn $eight<T: RealField + Copy>($self8, $($a8: Lane8<T>),*) -> Lane8<T> {
-                    if let ($(Some($a8),)*) = ($(halves($a8),)*) {
-                        let half = |half: usize| {
-                            let ($($a8,)*) = ($($a8[half],)*);
-                            $half
-                        };
-                        return from_halves([half(0), half(1)]).unwrap_or_else(Lane8::zero);
-                    }
-                    if let ($(Some($a8),)*) = ($(single8($a8),)*) {
-                        return from_single8($single8).unwrap_or_else(Lane8::zero);
-                    }
-                    Scalar::new().$eight($($a8),*)
-                })*
-
-                #[inline(always)]
-                fn load8<T: RealField + Copy>(self, values: &[T; 8]) -> Lane8<T> {
-                    let double = at::<_, [f64; 8], [__m256d; 2]>(values).and_then(from_halves);
-                    let single = at::<_, [f32; 8], __m256>(values).and_then(from_single8);
-                    double.or(single).unwrap_or(Lane8(*values))
+                fn splat8(vectors: V3, value: Self) -> Lane8<Self> {
+                    Lane8(must_cast([vectors.avx._mm256_set1_pd(value); 2]))
                 }
 
                 #[inline(always)]
-                fn splat8<T: RealField + Copy>(self, value: T) -> Lane8<T> {
-                    let double =
-                        same(value).and_then(|x: f64| from_halves([self.avx._mm256_set1_pd(x); 2]));
-                    let single =
-                        same(value).and_then(|x: f32| from_single8(self.avx._mm256_set1_ps(x)));
-                    double.or(single).unwrap_or(Lane8([value; 8]))
+                fn load(_: V3, values: &[Self; 4]) -> Lane4<Self> {
+                    Lane4(must_cast(pod_read_unaligned::<__m256d>(bytes_of(values))))
+                }
+
+                #[inline(always)]
+                fn load8(_: V3, values: &[Self; 8]) -> Lane8<Self> {
+                    Lane8(must_cast(pod_read_unaligned::<[__m256d; 2]>(bytes_of(values))))
                 }
             }
 
-            impl Vectors for V4 {
+            impl Instructions<V3> for f32 {
                 $(#[inline(always)]
-                fn $four<T: RealField + Copy>($self, $($a: Lane4<T>),*) -> Lane4<T> {
-                    V3::$four(*$self, $($a),*)
+                fn $four($vectors: V3, $($a: Lane4<Self>),*) -> Lane4<Self> {
+                    $(let $a: __m128 = must_cast($a.0);)*
+                    Lane4(must_cast($single))
+                })*
+
+                $(#[inline(always)]
+                fn $eight($vectors8: V3, $($a8: Lane8<Self>),*) -> Lane8<Self> {
+                    $(let $a8: __m256 = must_cast($a8.0);)*
+                    Lane8(must_cast($single8))
                 })*
 
                 #[inline(always)]
-                fn load<T: RealField + Copy>(self, values: &[T; 4]) -> Lane4<T> {
-                    V3::load(*self, values)
+                fn splat(vectors: V3, value: Self) -> Lane4<Self> {
+                    Lane4(must_cast(vectors.sse._mm_set1_ps(value)))
                 }
 
                 #[inline(always)]
-                fn splat<T: RealField + Copy>(self, value: T) -> Lane4<T> {
-                    V3::splat(*self, value)
+                fn splat8(vectors: V3, value: Self) -> Lane8<Self> {
+                    Lane8(must_cast(vectors.avx._mm256_set1_ps(value)))
                 }
 
+                #[inline(always)]
+                fn load(_: V3, values: &[Self; 4]) -> Lane4<Self> {
+                    Lane4(must_cast(pod_read_unaligned::<__m128>(bytes_of(values))))
+                }
+
+                #[inline(always)]
+                fn load8(_: V3, values: &[Self; 8]) -> Lane8<Self> {
+                    Lane8(must_cast(pod_read_unaligned::<__m256>(bytes_of(values))))
+                }
+            }
+
+            impl Instructions<V4> for f64 {
                 $(#[inline(always)]
-                fn $eight<T: RealField + Copy>($self8, $($a8: Lane8<T>),*) -> Lane8<T> {
-                    if let ($(Some($a8),)*) = ($(whole($a8),)*) {
-                        return from_whole($wide).unwrap_or_else(Lane8::zero);
-                    }
-                    V3::$eight(*$self8, $($a8),*)
+                fn $four(vectors: V4, $($a: Lane4<Self>),*) -> Lane4<Self> {
+                    <Self as Instructions<V3>>::$four(*vectors, $($a),*)
+                })*
+
+                $(#[inline(always)]
+                fn $eight($vectors8: V4, $($a8: Lane8<Self>),*) -> Lane8<Self> {
+                    $(let $a8: __m512d = must_cast($a8.0);)*
+                    Lane8(must_cast($wide))
                 })*
 
                 #[inline(always)]
-                fn load8<T: RealField + Copy>(self, values: &[T; 8]) -> Lane8<T> {
-                    at::<_, [f64; 8], __m512d>(values)
-                        .and_then(from_whole)
-                        .unwrap_or_else(|| V3::load8(*self, values))
+                fn splat(vectors: V4, value: Self) -> Lane4<Self> {
+                    <Self as Instructions<V3>>::splat(*vectors, value)
                 }
 
                 #[inline(always)]
-                fn splat8<T: RealField + Copy>(self, value: T) -> Lane8<T> {
-                    same(value)
-                        .and_then(|x: f64| from_whole(self.avx512f._mm512_set1_pd(x)))
-                        .unwrap_or_else(|| V3::splat8(*self, value))
+                fn splat8(vectors: V4, value: Self) -> Lane8<Self> {
+                    Lane8(must_cast(vectors.avx512f._mm512_set1_pd(value)))
+                }
+
+                #[inline(always)]
+                fn load(vectors: V4, values: &[Self; 4]) -> Lane4<Self> {
+                    <Self as Instructions<V3>>::load(*vectors, values)
+                }
+
+                #[inline(always)]
+                fn load8(_: V4, values: &[Self; 8]) -> Lane8<Self> {
+                    Lane8(must_cast(pod_read_unaligned::<__m512d>(bytes_of(values))))
+                }
+            }
+
+            impl Instructions<V4> for f32 {
+                $(#[inline(always)]
+                fn $four(vectors: V4, $($a: Lane4<Self>),*) -> Lane4<Self> {
+                    <Self as Instructions<V3>>::$four(*vectors, $($a),*)
+                })*
+
+                $(#[inline(always)]
+                fn $eight(vectors: V4, $($a8: Lane8<Self>),*) -> Lane8<Self> {
+                    <Self as Instructions<V3>>::$eight(*vectors, $($a8),*)
+                })*
+
+                #[inline(always)]
+                fn splat(vectors: V4, value: Self) -> Lane4<Self> {
+                    <Self as Instructions<V3>>::splat(*vectors, value)
+                }
+
+                #[inline(always)]
+                fn splat8(vectors: V4, value: Self) -> Lane8<Self> {
+                    <Self as Instructions<V3>>::splat8(*vectors, value)
+                }
+
+                #[inline(always)]
+                fn load(vectors: V4, values: &[Self; 4]) -> Lane4<Self> {
+                    <Self as Instructions<V3>>::load(*vectors, values)
+                }
+
+                #[inline(always)]
+                fn load8(vectors: V4, values: &[Self; 8]) -> Lane8<Self> {
+                    <Self as Instructions<V3>>::load8(*vectors, values)
+                }
+            }
+
+            instructions!(vectors V3: [$($four($($a),*))*] eight: [$($eight($($a8),*))*]);
+            instructions!(vectors V4: [$($four($($a),*))*] eight: [$($eight($($a8),*))*]);
+        };
+
+        (
+            vectors $V:ident: [$($four:ident($($a:ident),*))*] eight: [$($eight:ident($($a8:ident),*))*]
+        ) => {
+            impl Vectors for $V {
+                $(#[inline(always)]
+                fn $four<T: Lanes>(self, $($a: Lane4<T>),*) -> Lane4<T> {
+                    <T as Instructions<$V>>::$four(self, $($a),*)
+                })*
+
+                $(#[inline(always)]
+                fn $eight<T: Lanes>(self, $($a8: Lane8<T>),*) -> Lane8<T> {
+                    <T as Instructions<$V>>::$eight(self, $($a8),*)
+                })*
+
+                #[inline(always)]
+                fn splat<T: Lanes>(self, value: T) -> Lane4<T> {
+                    <T as Instructions<$V>>::splat(self, value)
+                }
+
+                #[inline(always)]
+                fn splat8<T: Lanes>(self, value: T) -> Lane8<T> {
+                    <T as Instructions<$V>>::splat8(self, value)
+                }
+
+                #[inline(always)]
+                fn load<T: Lanes>(self, values: &[T; 4]) -> Lane4<T> {
+                    <T as Instructions<$V>>::load(self, values)
+                }
+
+                #[inline(always)]
+                fn load8<T: Lanes>(self, values: &[T; 8]) -> Lane8<T> {
+                    <T as Instructions<$V>>::load8(self, values)
                 }
             }
         };
     }
 
     instructions! {
-        fn add(self, a, b) { self.avx._mm256_add_pd(a, b), self.sse._mm_add_ps(a, b) }
-        fn sub(self, a, b) { self.avx._mm256_sub_pd(a, b), self.sse._mm_sub_ps(a, b) }
-        fn mul(self, a, b) { self.avx._mm256_mul_pd(a, b), self.sse._mm_mul_ps(a, b) }
-        fn mul_add(self, a, b, c) { self.fma._mm256_fmadd_pd(a, b, c), self.fma._mm_fmadd_ps(a, b, c) }
-        fn mul_sub(self, a, b, c) { self.fma._mm256_fmsub_pd(a, b, c), self.fma._mm_fmsub_ps(a, b, c) }
-        fn even(self, a) { self.avx._mm256_movedup_pd(a), self.sse3._mm_moveldup_ps(a) }
-        fn odd(self, a) { self.avx._mm256_permute_pd::<0b1111>(a), self.sse3._mm_movehdup_ps(a) }
-        fn low_twice(self, a) {
-            self.avx._mm256_permute2f128_pd::<0x00>(a, a), self.sse._mm_movelh_ps(a, a)
+        fn add(vectors, a, b) { vectors.avx._mm256_add_pd(a, b), vectors.sse._mm_add_ps(a, b) }
+        fn sub(vectors, a, b) { vectors.avx._mm256_sub_pd(a, b), vectors.sse._mm_sub_ps(a, b) }
+        fn mul(vectors, a, b) { vectors.avx._mm256_mul_pd(a, b), vectors.sse._mm_mul_ps(a, b) }
+        fn mul_add(vectors, a, b, c) { vectors.fma._mm256_fmadd_pd(a, b, c), vectors.fma._mm_fmadd_ps(a, b, c) }
+        fn mul_sub(vectors, a, b, c) { vectors.fma._mm256_fmsub_pd(a, b, c), vectors.fma._mm_fmsub_ps(a, b, c) }
+        fn even(vectors, a) { vectors.avx._mm256_movedup_pd(a), vectors.sse3._mm_moveldup_ps(a) }
+        fn odd(vectors, a) { vectors.avx._mm256_permute_pd::<0b1111>(a), vectors.sse3._mm_movehdup_ps(a) }
+        fn low_twice(vectors, a) {
+            vectors.avx._mm256_permute2f128_pd::<0x00>(a, a), vectors.sse._mm_movelh_ps(a, a)
         }
-        fn low_to_high(self, a) {
-            self.avx._mm256_permute2f128_pd::<0x08>(a, a),
-            self.sse._mm_movelh_ps(self.sse._mm_setzero_ps(), a)
+        fn low_to_high(vectors, a) {
+            vectors.avx._mm256_permute2f128_pd::<0x08>(a, a),
+            vectors.sse._mm_movelh_ps(vectors.sse._mm_setzero_ps(), a)
         }
-        fn high_alone(self, a) {
-            self.avx._mm256_permute2f128_pd::<0x18>(a, a),
-            self.sse._mm_shuffle_ps::<0b11_10_01_00>(self.sse._mm_setzero_ps(), a)
+        fn high_alone(vectors, a) {
+            vectors.avx._mm256_permute2f128_pd::<0x18>(a, a),
+            vectors.sse._mm_shuffle_ps::<0b11_10_01_00>(vectors.sse._mm_setzero_ps(), a)
         }
-        fn high_and_low(self, a, b) {
-            self.avx._mm256_permute2f128_pd::<0x21>(a, b),
-            self.sse._mm_shuffle_ps::<0b01_00_11_10>(a, b)
+        fn high_and_low(vectors, a, b) {
+            vectors.avx._mm256_permute2f128_pd::<0x21>(a, b),
+            vectors.sse._mm_shuffle_ps::<0b01_00_11_10>(a, b)
         }
-        fn low_and_high(self, a, b) {
-            self.avx._mm256_blend_pd::<0b1100>(a, b), self.sse4_1._mm_blend_ps::<0b1100>(a, b)
+        fn low_and_high(vectors, a, b) {
+            vectors.avx._mm256_blend_pd::<0b1100>(a, b), vectors.sse4_1._mm_blend_ps::<0b1100>(a, b)
         }
         eight:
-        fn add8(self, a, b) {
-            self.avx512f._mm512_add_pd(a, b),
-            each half self.avx._mm256_add_pd(a, b),
-            self.avx._mm256_add_ps(a, b)
+        fn add8(vectors, a, b) {
+            vectors.avx512f._mm512_add_pd(a, b),
+            each half vectors.avx._mm256_add_pd(a, b),
+            vectors.avx._mm256_add_ps(a, b)
         }
-        fn mul8(self, a, b) {
-            self.avx512f._mm512_mul_pd(a, b),
-            each half self.avx._mm256_mul_pd(a, b),
-            self.avx._mm256_mul_ps(a, b)
+        fn mul8(vectors, a, b) {
+            vectors.avx512f._mm512_mul_pd(a, b),
+            each half vectors.avx._mm256_mul_pd(a, b),
+            vectors.avx._mm256_mul_ps(a, b)
         }
-        fn sub8(self, a, b) {
-            self.avx512f._mm512_sub_pd(a, b),
-            each half self.avx._mm256_sub_pd(a, b),
-            self.avx._mm256_sub_ps(a, b)
+        fn sub8(vectors, a, b) {
+            vectors.avx512f._mm512_sub_pd(a, b),
+            each half vectors.avx._mm256_sub_pd(a, b),
+            vectors.avx._mm256_sub_ps(a, b)
         }
-        fn div8(self, a, b) {
-            self.avx512f._mm512_div_pd(a, b),
-            each half self.avx._mm256_div_pd(a, b),
-            self.avx._mm256_div_ps(a, b)
+        fn div8(vectors, a, b) {
+            vectors.avx512f._mm512_div_pd(a, b),
+            each half vectors.avx._mm256_div_pd(a, b),
+            vectors.avx._mm256_div_ps(a, b)
         }
-        fn min8(self, a, b) {
-            self.avx512f._mm512_min_pd(a, b),
-            each half self.avx._mm256_min_pd(a, b),
-            self.avx._mm256_min_ps(a, b)
+        fn min8(vectors, a, b) {
+            vectors.avx512f._mm512_min_pd(a, b),
+            each half vectors.avx._mm256_min_pd(a, b),
+            vectors.avx._mm256_min_ps(a, b)
         }
-        fn max8(self, a, b) {
-            self.avx512f._mm512_max_pd(a, b),
-            each half self.avx._mm256_max_pd(a, b),
-            self.avx._mm256_max_ps(a, b)
+        fn max8(vectors, a, b) {
+            vectors.avx512f._mm512_max_pd(a, b),
+            each half vectors.avx._mm256_max_pd(a, b),
+            vectors.avx._mm256_max_ps(a, b)
         }
-        fn mul_add8(self, a, b, c) {
-            self.avx512f._mm512_fmadd_pd(a, b, c),
-            each half self.fma._mm256_fmadd_pd(a, b, c),
-            self.fma._mm256_fmadd_ps(a, b, c)
+        fn mul_add8(vectors, a, b, c) {
+            vectors.avx512f._mm512_fmadd_pd(a, b, c),
+            each half vectors.fma._mm256_fmadd_pd(a, b, c),
+            vectors.fma._mm256_fmadd_ps(a, b, c)
         }
     }
-
-    /// Loads a register from `a`, if `A` is `B`.
-    #[inline(always)]
-    fn at<A: 'static, B: NoUninit + 'static, R: AnyBitPattern>(a: &A) -> Option<R> {
-        (a as &dyn Any).downcast_ref::<B>().map(|b| pod_read_unaligned(bytes_of(b)))
-    }
-
-    #[inline(always)]
-    fn double<T: RealField + Copy>(a: Lane4<T>) -> Option<__m256d> {
-        same::<_, Lane4<f64>>(a).map(|Lane4(a)| must_cast(a))
-    }
-
-    #[inline(always)]
-    fn single<T: RealField + Copy>(a: Lane4<T>) -> Option<__m128> {
-        same::<_, Lane4<f32>>(a).map(|Lane4(a)| must_cast(a))
-    }
-
-    #[inline(always)]
-    fn from_double<T: RealField + Copy>(a: __m256d) -> Option<Lane4<T>> {
-        same(Lane4::<f64>(must_cast(a)))
-    }
-
-    #[inline(always)]
-    fn from_single<T: RealField + Copy>(a: __m128) -> Option<Lane4<T>> {
-        same(Lane4::<f32>(must_cast(a)))
-    }
-
-    #[inline(always)]
-    fn whole<T: RealField + Copy>(a: Lane8<T>) -> Option<__m512d> {
-        same::<_, Lane8<f64>>(a).map(|Lane8(a)| must_cast(a))
-    }
-
-    #[inline(always)]
-    fn halves<T: RealField + Copy>(a: Lane8<T>) -> Option<[__m256d; 2]> {
-        same::<_, Lane8<f64>>(a).map(|Lane8(a)| must_cast(a))
-    }
-
-    #[inline(always)]
-    fn single8<T: RealField + Copy>(a: Lane8<T>) -> Option<__m256> {
-        same::<_, Lane8<f32>>(a).map(|Lane8(a)| must_cast(a))
-    }
-
-    #[inline(always)]
-    fn from_whole<T: RealField + Copy>(a: __m512d) -> Option<Lane8<T>> {
-        same(Lane8::<f64>(must_cast(a)))
-    }
-
-    #[inline(always)]
-    fn from_halves<T: RealField + Copy>(a: [__m256d; 2]) -> Option<Lane8<T>> {
-        same(Lane8::<f64>(must_cast(a)))
-    }
-
-    #[inline(always)]
-    fn from_single8<T: RealField + Copy>(a: __m256) -> Option<Lane8<T>> {
-        same(Lane8::<f32>(must_cast(a)))
-    }
-}
-
-/// The value, if `A` is `B`; resolved at compile time.
-#[inline(always)]
-fn same<A: Copy + 'static, B: Copy + 'static>(a: A) -> Option<B> {
-    (&a as &dyn Any).downcast_ref().copied()
 }
 
 struct Instance<L, V>(L, V);
@@ -568,7 +615,7 @@ mod tests {
     }
 
     /// The state of a square or a cube after some steps, as bits, computed by some threads that all have the same instance.
-    fn bits<T: RealField + Copy, const D: usize>(
+    fn bits<T: Lanes, const D: usize>(
         level: Level,
         threads: usize,
         (shape, integrator, transfer): (Shape, Integrator, Transfer),
@@ -605,7 +652,7 @@ mod tests {
     }
 
     /// All operations on some numbers, one after the other.
-    fn operations<T: RealField + Copy>(vectors: impl Vectors) -> Vec<[T; 4]> {
+    fn operations<T: Lanes>(vectors: impl Vectors) -> Vec<[T; 4]> {
         let lanes = |from: f64| {
             Lane4(std::array::from_fn(|q| nalgebra::convert::<f64, T>((from + q as f64).sqrt())))
         };
@@ -631,7 +678,7 @@ mod tests {
     }
 
     /// The same for eight numbers.
-    fn operations8<T: RealField + Copy>(vectors: impl Vectors) -> Vec<[T; 8]> {
+    fn operations8<T: Lanes>(vectors: impl Vectors) -> Vec<[T; 8]> {
         let lanes = |from: f64| {
             Lane8(std::array::from_fn(|q| nalgebra::convert::<f64, T>((from + q as f64).sqrt())))
         };
@@ -696,7 +743,7 @@ mod tests {
         pairs.map(|(turn, shape, transfer)| (shape, INTEGRATORS[turn % 5], transfer))
     }
 
-    fn check_bits<T: RealField + Copy, const D: usize>() {
+    fn check_bits<T: Lanes, const D: usize>() {
         for scheme in schemes() {
             let plain = bits::<T, D>(Level::Scalar, 1, scheme);
             for (turn, level) in Level::all().into_iter().rev().enumerate() {

@@ -19,6 +19,7 @@ use crate::parallel::bins::Bins;
 use crate::particles::Particles;
 use crate::scheme::{Settings, Shape, Taken};
 use crate::shape_function::HALF_SIZE_LIMIT;
+use crate::simd::Lanes;
 use crate::state::State;
 use crate::step::{StepTimes, is_fused};
 use crate::support::Support;
@@ -34,7 +35,7 @@ pub struct Simulation<T, const D: usize> {
     failed: Option<StepError>,
 }
 
-impl<T: RealField + Copy, const D: usize> Simulation<T, D> {
+impl<T: Lanes, const D: usize> Simulation<T, D> {
     /// Sets up a simulation at time 0, of a [`Body`] or of [`Particles`] with boxes.
     ///
     /// # Errors
@@ -192,7 +193,7 @@ fn figure<T: RealField>(value: T) -> f64 {
 }
 
 /// The law, for blocks of particles.
-fn law<T: RealField + Copy, const D: usize>(material: &Material<T>) -> Box<dyn BlockLaw<T, D>> {
+fn law<T: Lanes, const D: usize>(material: &Material<T>) -> Box<dyn BlockLaw<T, D>> {
     let planted = crate::fault::Planted::here();
     match *material {
         Material::NeoHookean { lambda, mu } if lambda == T::zero() => {
@@ -203,7 +204,7 @@ fn law<T: RealField + Copy, const D: usize>(material: &Material<T>) -> Box<dyn B
     }
 }
 
-fn check<T: RealField + Copy, const D: usize>(
+fn check<T: Lanes, const D: usize>(
     grid: &Grid<T, D>,
     body: &Body<T, D>,
     settings: &Settings<T>,
@@ -305,7 +306,7 @@ fn check_corners<T, const D: usize>(mesh: &Mesh<T, D>) -> Result<(), SetupError>
 }
 
 /// Reserves all memory of a run.
-fn allocate<T: RealField + Copy, const D: usize>(
+fn allocate<T: Lanes, const D: usize>(
     grid: &Grid<T, D>,
     mut body: Body<T, D>,
     law: Box<dyn BlockLaw<T, D>>,
@@ -364,7 +365,7 @@ fn allocate<T: RealField + Copy, const D: usize>(
 }
 
 /// The error for an invalid particle, with the figures of its present state.
-fn describe<T: RealField + Copy, const D: usize>(
+fn describe<T: Lanes, const D: usize>(
     state: &State<T, D>,
     invalid: Invalid,
     particle: usize,

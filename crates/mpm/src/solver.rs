@@ -1,6 +1,6 @@
 //! Solvers of any scheme behind one door, compiled with this crate.
 
-use nalgebra::{RealField, SVector};
+use nalgebra::SVector;
 
 use crate::body::Body;
 use crate::body_force::BodyForce;
@@ -9,6 +9,7 @@ use crate::grid::Grid;
 use crate::material::Material;
 use crate::particles::Particles;
 use crate::scheme::Settings;
+use crate::simd::Lanes;
 use crate::simulation::Simulation;
 use crate::total_lagrangian::{self, BoundaryData, Scheme, TotalLagrangian};
 
@@ -57,7 +58,7 @@ struct DrivenBody<'a, const D: usize> {
 ///
 /// Steps are generic over precision and dimension. Here they are set up by functions that are not, so that they are compiled
 /// once, with this crate.
-pub trait Scalar<const D: usize>: RealField + Copy {
+pub trait Scalar<const D: usize>: Lanes {
     /// As [`Simulation::new`].
     ///
     /// # Errors

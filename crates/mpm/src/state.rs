@@ -1,6 +1,6 @@
 //! The state of a running simulation: particles, grid and bins.
 
-use nalgebra::{RealField, SMatrix, SVector};
+use nalgebra::{SMatrix, SVector};
 
 use crate::geometry::Constants;
 use crate::grid::Layout;
@@ -10,6 +10,7 @@ use crate::node::Node;
 use crate::parallel::bins::Bins;
 use crate::particles::Particles;
 use crate::scheme::Transfer;
+use crate::simd::Lanes;
 use crate::support::Support;
 
 /// Everything that a step reads and changes.
@@ -40,7 +41,7 @@ pub(crate) struct State<T, const D: usize> {
     pub(crate) of_time: Vec<T>,
 }
 
-impl<T: RealField + Copy, const D: usize> State<T, D> {
+impl<T: Lanes, const D: usize> State<T, D> {
     /// Sorts the particles into bins, if one of them left its bin in the last pass.
     pub(crate) fn resort_if(&mut self, outcome: Outcome) -> Outcome {
         if outcome.resort && outcome.failure.is_none() {

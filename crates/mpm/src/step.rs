@@ -3,11 +3,10 @@
 //! Integrators differ in the time at which F follows the grid: before forces are computed, after it, or both. To add one, say so
 //! in [`Integrator`](crate::Integrator).
 
-use nalgebra::RealField;
-
 use crate::body_force::BodyForce;
 use crate::health::Outcome;
 use crate::scheme::{Integrator, Taken, Transfer};
+use crate::simd::Lanes;
 use crate::state::State;
 use crate::support::Support;
 use crate::tensor::real;
@@ -33,7 +32,7 @@ pub(crate) fn is_fused<T, const D: usize>(
     stress_last && transfer == Transfer::Flip && matches!(support, Support::Product(_))
 }
 
-impl<T: RealField + Copy, const D: usize> State<T, D> {
+impl<T: Lanes, const D: usize> State<T, D> {
     /// Advances by a step.
     pub(crate) fn step(
         &mut self,

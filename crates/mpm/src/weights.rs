@@ -1,14 +1,15 @@
 //! Weights of one particle at its nodes, as products over the axes.
 
-use nalgebra::{RealField, SMatrix};
+use nalgebra::SMatrix;
 
 use crate::shape_function::{AxisWeights, EXTENDED, extended_axes, moment};
+use crate::simd::Lanes;
 use crate::tensor::real;
 
 /// The weights `S_ip` of one particle and their gradients `G_ip`, however they are stored.
 ///
 /// The particle's nodes form a box of `W` nodes along each axis; `place` counts them from 0 to `W - 1`.
-pub(crate) trait Weights<T: RealField + Copy, const D: usize, const W: usize> {
+pub(crate) trait Weights<T: Lanes, const D: usize, const W: usize> {
     /// Whether there are affine velocities (APIC), and weights `Z` for them.
     const AFFINE: bool;
     /// Index of the first node.
@@ -40,7 +41,7 @@ pub(crate) struct ExtendedWeights<T, const D: usize, const AFFINE: bool> {
     first_node: usize,
 }
 
-impl<T: RealField + Copy, const D: usize, const AFFINE: bool> ExtendedWeights<T, D, AFFINE> {
+impl<T: Lanes, const D: usize, const AFFINE: bool> ExtendedWeights<T, D, AFFINE> {
     #[inline(never)]
     pub(crate) fn new(xi: &[T; D], l: &[T; D], strides: &[usize; D]) -> Self {
         let axes = extended_axes(xi, l);
@@ -49,7 +50,7 @@ impl<T: RealField + Copy, const D: usize, const AFFINE: bool> ExtendedWeights<T,
     }
 }
 
-impl<T: RealField + Copy, const D: usize, const AFFINE: bool> Weights<T, D, EXTENDED>
+impl<T: Lanes, const D: usize, const AFFINE: bool> Weights<T, D, EXTENDED>
     for ExtendedWeights<T, D, AFFINE>
 {
     const AFFINE: bool = AFFINE;

@@ -6,19 +6,20 @@
 //!
 //! Source: Hammerquist and Nairn, CMAME 318 (2017) 724-738.
 
-use nalgebra::{RealField, SVector};
+use nalgebra::SVector;
 
 use crate::fault::Fault;
 use crate::node::Node;
 use crate::parallel::chunks::each_chunk;
 use crate::scheme::Filter;
+use crate::simd::Lanes;
 use crate::state::State;
 use crate::tensor::real;
 
 /// Nodes handed to a thread at a time.
 const CHUNK: usize = 1024;
 
-impl<T: RealField + Copy, const D: usize> State<T, D> {
+impl<T: Lanes, const D: usize> State<T, D> {
     /// From nodes with the velocity `v` at the start of the step and the acceleration `a` to nodes with `v + dt a` and
     /// `filtered v + dt a`.
     pub(crate) fn filter(&mut self, Filter { order }: Filter) {
@@ -55,6 +56,6 @@ impl<T: RealField + Copy, const D: usize> State<T, D> {
     }
 }
 
-fn velocity<T: RealField + Copy, const D: usize>(node: &Node<T, D>) -> SVector<T, D> {
+fn velocity<T: Lanes, const D: usize>(node: &Node<T, D>) -> SVector<T, D> {
     SVector::from_fn(|a, _| node.values[a])
 }

@@ -1,12 +1,12 @@
 //! P2G and G2P of one particle, in any dimension and for any support: row by row along axis 0.
 
-use nalgebra::{RealField, SMatrix, SVector};
+use nalgebra::{SMatrix, SVector};
 
 use crate::fault::Fault;
 use crate::geometry::Constants;
 use crate::node::{LANES, Node};
 use crate::shape_function::EXTENDED;
-use crate::simd::{Lane4, Lane8, Vectors};
+use crate::simd::{Lane4, Lane8, Lanes, Vectors};
 use crate::weights::Weights;
 
 /// Values of the grid at a particle, the result of G2P.
@@ -21,7 +21,7 @@ pub(crate) struct Interpolated<T, const D: usize> {
     pub(crate) affine: SMatrix<T, D, D>,
 }
 
-impl<T: RealField + Copy, const D: usize> Interpolated<T, D> {
+impl<T: Lanes, const D: usize> Interpolated<T, D> {
     /// From interpolated values and their slopes along each axis, `value[q]` and `slope[axis][q]`, with `q` as in [`Node`].
     #[inline(always)]
     pub(crate) fn new<const Q: usize, const R: usize, const W: usize, L: Weights<T, D, W>>(
@@ -70,7 +70,7 @@ pub(crate) trait Receive<T, const D: usize> {
         value: Lane4<T>,
         slope: [Lane4<T>; D],
     ) where
-        T: RealField + Copy,
+        T: Lanes,
     {
         let mut slopes = [[T::zero(); 4]; D];
         for (own, slope) in slopes.iter_mut().zip(slope) {
@@ -81,7 +81,7 @@ pub(crate) trait Receive<T, const D: usize> {
 }
 
 /// Stores the values.
-impl<T: RealField + Copy, const D: usize> Receive<T, D> for &mut [Interpolated<T, D>] {
+impl<T: Lanes, const D: usize> Receive<T, D> for &mut [Interpolated<T, D>] {
     #[inline(always)]
     fn receive(&mut self, k: usize, interpolated: &Interpolated<T, D>) {
         if let Some(own) = self.get_mut(k) {
@@ -108,7 +108,7 @@ pub(crate) struct Contributions<T, const D: usize, const N: usize> {
     pub(crate) affine: [SMatrix<T, D, D>; N],
 }
 
-impl<T: RealField + Copy, const D: usize, const N: usize> Contributions<T, D, N> {
+impl<T: Lanes, const D: usize, const N: usize> Contributions<T, D, N> {
     pub(crate) fn zero() -> Self {
         Self {
             mass: [T::zero(); N],
@@ -215,7 +215,7 @@ struct Factors<T> {
     Z: T,
 }
 
-impl<T: RealField + Copy> Factors<T> {
+impl<T: Lanes> Factors<T> {
     #[inline(always)]
     fn of<const D: usize, const W: usize, L: Weights<T, D, W>>(
         weights: &L,
@@ -257,7 +257,7 @@ fn rows<const D: usize, const W: usize>() -> usize {
 }
 
 #[inline(always)]
-fn row<T: RealField + Copy, const D: usize, const W: usize>(
+fn row<T: Lanes, const D: usize, const W: usize>(
     weights: &impl Weights<T, D, W>,
     first: usize,
     strides: &[usize; D],
@@ -286,7 +286,7 @@ fn row<T: RealField + Copy, const D: usize, const W: usize>(
 
 /// Contribution of a particle to a row of nodes, `value S + slope G` with the weights along axis 0.
 #[inline(always)]
-fn contributions_to_row<T: RealField + Copy, const D: usize>(
+fn contributions_to_row<T: Lanes, const D: usize>(
     value: &[T; LANES],
     slope: &[[T; LANES]; D],
     row: &Row<T, D>,
@@ -313,7 +313,7 @@ pub(crate) fn p2g<T, L, const D: usize, const W: usize, const N: usize>(
     first: usize,
     (given, k): (&Contributions<T, D, N>, usize),
 ) where
-    T: RealField + Copy,
+    T: Lanes,
     L: Weights<T, D, W>,
 {
     let start = weights.first_node() - first;
@@ -343,7 +343,7 @@ struct InterpolationSums<T, const D: usize> {
     slope: [[T; LANES]; D],
 }
 
-impl<T: RealField + Copy, const D: usize> InterpolationSums<T, D> {
+impl<T: Lanes, const D: usize> InterpolationSums<T, D> {
     #[inline(always)]
     fn zero() -> Self {
         Self { value: [T::zero(); LANES], slope: [[T::zero(); LANES]; D] }
@@ -393,7 +393,7 @@ pub(crate) fn g2p<T, L, const D: usize, const W: usize>(
     nodes: &[Node<T, D>],
 ) -> Interpolated<T, D>
 where
-    T: RealField + Copy,
+    T: Lanes,
     L: Weights<T, D, W>,
 {
     let mut sums = InterpolationSums::zero();

@@ -1,6 +1,6 @@
 //! Blocks of 64 particles: copies of their data, their stresses, and the kernels for P2G and G2P that serve a simulation.
 
-use nalgebra::{RealField, SMatrix, SVector};
+use nalgebra::{SMatrix, SVector};
 
 use crate::geometry::Constants;
 use crate::kernel::any::{Contributions, Interpolated, Receive};
@@ -8,7 +8,7 @@ use crate::kernel::corners::Corners;
 use crate::kernel::product::ProductWeights;
 use crate::material::Law;
 use crate::node::Node;
-use crate::simd::{Loop, Vectors, dispatch};
+use crate::simd::{Lanes, Loop, Vectors, dispatch};
 use crate::support::Support;
 
 /// Particles in a block: as many as keep all of it in the first-level cache.
@@ -35,7 +35,7 @@ pub(crate) trait BlockLaw<T, const D: usize>: Send + Sync {
     );
 }
 
-impl<T: RealField + Copy, L: Law<T>, const D: usize> BlockLaw<T, D> for L {
+impl<T: Lanes, L: Law<T>, const D: usize> BlockLaw<T, D> for L {
     fn stress(
         &self,
         c: &Constants<T, D>,
@@ -56,7 +56,7 @@ pub(crate) struct Copies<T, const D: usize> {
     pub(crate) F: [SMatrix<T, D, D>; BLOCK],
 }
 
-impl<T: RealField + Copy, const D: usize> Copies<T, D> {
+impl<T: Lanes, const D: usize> Copies<T, D> {
     pub(crate) fn new() -> Self {
         // The identity has a stress in every law.
         let zero = [SVector::zeros(); BLOCK];
@@ -113,7 +113,7 @@ pub(crate) enum Block<T, const D: usize> {
     Corners(Corners<T, D>),
 }
 
-impl<T: RealField + Copy, const D: usize> Block<T, D> {
+impl<T: Lanes, const D: usize> Block<T, D> {
     pub(crate) fn new(support: &Support<T, D>, is_affine: bool) -> Self {
         match support {
             Support::Product(shape) => Self::Product(ProductWeights::new(shape, is_affine)),
@@ -199,7 +199,7 @@ struct Stress<'a, T, L, const D: usize> {
     contributions: &'a mut Contributions<T, D, BLOCK>,
 }
 
-impl<T: RealField + Copy, L: Law<T>, const D: usize> Loop for Stress<'_, T, L, D> {
+impl<T: Lanes, L: Law<T>, const D: usize> Loop for Stress<'_, T, L, D> {
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self { F, c, law, contributions } = self;
@@ -212,7 +212,7 @@ impl<T: RealField + Copy, L: Law<T>, const D: usize> Loop for Stress<'_, T, L, D
 /// Sets `-V0 tau / h` for all particles of a block, by the short form of the law or the full one; returns whether the short
 /// form holds for all of them.
 #[inline(always)]
-fn stress_fluxes<const SHORT: bool, T: RealField + Copy, L: Law<T>, const D: usize>(
+fn stress_fluxes<const SHORT: bool, T: Lanes, L: Law<T>, const D: usize>(
     c: &Constants<T, D>,
     law: L,
     F: &[SMatrix<T, D, D>; BLOCK],

@@ -5,7 +5,7 @@
 
 use std::array;
 
-use nalgebra::{RealField, SMatrix, SVector};
+use nalgebra::{SMatrix, SVector};
 
 use crate::body::Mesh;
 use crate::domain::{
@@ -17,7 +17,7 @@ use crate::kernel::any::{Contributions, Interpolated};
 use crate::kernel::block::{BLOCK, Kinematics};
 use crate::node::Node;
 use crate::shape_function::{Hat, ShapeFunction, index, node_below};
-use crate::simd::{Eight, Lane8, Loop, Number, Vectors, dispatch};
+use crate::simd::{Eight, Lane8, Lanes, Loop, Number, Vectors, dispatch};
 use crate::support::HalfEdges;
 use crate::tensor::{product, real};
 
@@ -51,7 +51,7 @@ pub(crate) struct Corners<T, const D: usize> {
     centre: [PerParticle<T>; D],
 }
 
-impl<T: RealField + Copy, const D: usize> Corners<T, D> {
+impl<T: Lanes, const D: usize> Corners<T, D> {
     pub(crate) fn new(is_affine: bool) -> Self {
         let zero = [Lane8::zero(); BLOCK / GROUP];
         Self {
@@ -205,26 +205,18 @@ pub(crate) fn padded(ids: &[u32]) -> [usize; BLOCK] {
 }
 
 #[inline(always)]
-fn store<T: RealField + Copy, V: Vectors>(
-    array: &mut PerParticle<T>,
-    group: usize,
-    numbers: Eight<T, V>,
-) {
+fn store<T: Lanes, V: Vectors>(array: &mut PerParticle<T>, group: usize, numbers: Eight<T, V>) {
     array[group] = numbers.lanes;
 }
 
 #[inline(always)]
-fn load<T: RealField + Copy, V: Vectors>(
-    vectors: V,
-    array: &PerParticle<T>,
-    group: usize,
-) -> Eight<T, V> {
+fn load<T: Lanes, V: Vectors>(vectors: V, array: &PerParticle<T>, group: usize) -> Eight<T, V> {
     Eight { lanes: array[group], vectors }
 }
 
 /// One number of each particle of a group.
 #[inline(always)]
-pub(crate) fn gather<T: RealField + Copy, V: Vectors>(
+pub(crate) fn gather<T: Lanes, V: Vectors>(
     vectors: V,
     group: usize,
     number: impl Fn(usize) -> T,
@@ -244,7 +236,7 @@ struct Parallelograms<'a, T, const D: usize> {
     kinematics: Kinematics<'a, T, D>,
 }
 
-impl<T: RealField + Copy, const D: usize> Loop for Parallelograms<'_, T, D> {
+impl<T: Lanes, const D: usize> Loop for Parallelograms<'_, T, D> {
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self { corners, c, half_edges, ids, kinematics } = self;
@@ -271,7 +263,7 @@ pub(crate) struct OfGroup<T, V, const D: usize> {
 
 /// The parallelograms that F makes of those with these half-edges.
 #[inline(always)]
-pub(crate) fn parallelograms<T: RealField + Copy, V: Vectors, const D: usize>(
+pub(crate) fn parallelograms<T: Lanes, V: Vectors, const D: usize>(
     vectors: V,
     c: &Constants<T, D>,
     half_edges: &HalfEdges<T, D>,
@@ -302,7 +294,7 @@ struct Cells<'a, T, const D: usize> {
     ids: &'a [usize; BLOCK],
 }
 
-impl<T: RealField + Copy, const D: usize> Loop for Cells<'_, T, D> {
+impl<T: Lanes, const D: usize> Loop for Cells<'_, T, D> {
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self { corners, c, mesh, ids } = self;
@@ -316,7 +308,7 @@ impl<T: RealField + Copy, const D: usize> Loop for Cells<'_, T, D> {
 
 /// The corners of the domains of a group of particles, in cells from the lower corner of the grid.
 #[inline(always)]
-pub(crate) fn cells<T: RealField + Copy, V: Vectors, const D: usize>(
+pub(crate) fn cells<T: Lanes, V: Vectors, const D: usize>(
     vectors: V,
     c: &Constants<T, D>,
     Mesh { x, corners, .. }: &Mesh<T, D>,
@@ -348,7 +340,7 @@ struct GroupWeights<T, const D: usize> {
     of_row: [Lane8<T>; MOST_CORNERS],
 }
 
-impl<T: RealField + Copy, const D: usize> GroupWeights<T, D> {
+impl<T: Lanes, const D: usize> GroupWeights<T, D> {
     #[inline(always)]
     fn zero() -> Self {
         let zero = Lane8::zero();
@@ -457,7 +449,7 @@ struct P2g<'a, T, const D: usize, const AFFINE: bool> {
     count: usize,
 }
 
-impl<T: RealField + Copy, const D: usize, const AFFINE: bool> Loop for P2g<'_, T, D, AFFINE> {
+impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for P2g<'_, T, D, AFFINE> {
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self { corners, strides, band, first, contributions, count } = self;
@@ -533,7 +525,7 @@ struct G2p<'a, T, const D: usize, const AFFINE: bool> {
     receiver: &'a mut [Interpolated<T, D>],
 }
 
-impl<T: RealField + Copy, const D: usize, const AFFINE: bool> Loop for G2p<'_, T, D, AFFINE> {
+impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for G2p<'_, T, D, AFFINE> {
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self { corners, strides, nodes, receiver } = self;
@@ -616,7 +608,7 @@ struct Place<T, const D: usize> {
     arm: [T; D],
 }
 
-impl<T: RealField + Copy, const D: usize> Corners<T, D> {
+impl<T: Lanes, const D: usize> Corners<T, D> {
     /// Calls `visit` for each node around each corner of a particle.
     fn for_nodes(&self, strides: &[usize; D], k: usize, mut visit: impl FnMut(Place<T, D>)) {
         for corner in 0..1 << D {
@@ -652,7 +644,7 @@ struct Sums<T, const D: usize> {
     moments: [Lane8<T>; D],
 }
 
-impl<T: RealField + Copy, const D: usize> Sums<T, D> {
+impl<T: Lanes, const D: usize> Sums<T, D> {
     #[inline(always)]
     fn zero() -> Self {
         let zero = Lane8::zero();
@@ -684,7 +676,7 @@ impl<T: RealField + Copy, const D: usize> Sums<T, D> {
 
 /// P2G of particle `k`, whose domain need not be small.
 #[inline(never)]
-fn p2g_from_corners<T: RealField + Copy, const D: usize, const AFFINE: bool>(
+fn p2g_from_corners<T: Lanes, const D: usize, const AFFINE: bool>(
     corners: &Corners<T, D>,
     strides: &[usize; D],
     band: &mut [Node<T, D>],
@@ -716,7 +708,7 @@ fn p2g_from_corners<T: RealField + Copy, const D: usize, const AFFINE: bool>(
 
 /// G2P of particle `k`, whose domain need not be small.
 #[inline(never)]
-fn g2p_from_corners<T: RealField + Copy, const D: usize, const AFFINE: bool>(
+fn g2p_from_corners<T: Lanes, const D: usize, const AFFINE: bool>(
     corners: &Corners<T, D>,
     strides: &[usize; D],
     nodes: &[Node<T, D>],
@@ -745,7 +737,7 @@ fn g2p_from_corners<T: RealField + Copy, const D: usize, const AFFINE: bool>(
 
 /// The velocity of the grid at a point.
 #[inline(always)]
-pub(crate) fn velocity_at<T: RealField + Copy, const D: usize>(
+pub(crate) fn velocity_at<T: Lanes, const D: usize>(
     c: &Constants<T, D>,
     nodes: &[Node<T, D>],
     x: &SVector<T, D>,

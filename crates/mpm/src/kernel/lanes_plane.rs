@@ -1,15 +1,13 @@
 //! P2G and G2P in the plane and on a line: velocity and acceleration of a node fit one register of four lanes.
 
-use nalgebra::RealField;
-
 use crate::kernel::any::{Contributions, Receive};
 use crate::node::{LANES, Node};
-use crate::simd::{Lane4, Vectors};
-use crate::weights::{Weights, is_middle};
+use crate::simd::{Lane4, Lanes, Vectors};
+use crate::weights::Weights;
 
 /// The first four of a node's values: momentum and force in two dimensions; momentum, force and mass in one.
 #[inline(always)]
-fn half<T: RealField + Copy>(values: &[T; LANES]) -> Lane4<T> {
+fn half<T: Lanes>(values: &[T; LANES]) -> Lane4<T> {
     const { assert!(LANES >= 4) };
     // One load of four numbers even in builds with little optimisation.
     values.first_chunk().map_or(Lane4::zero(), |half| Lane4(*half))
@@ -22,7 +20,7 @@ struct Sum<T> {
     mass: T,
 }
 
-impl<T: RealField + Copy> Sum<T> {
+impl<T: Lanes> Sum<T> {
     #[inline(always)]
     fn zero() -> Self {
         Self { values: Lane4::zero(), mass: T::zero() }
@@ -44,7 +42,7 @@ fn slope_factor<T, V, L, const D: usize, const W: usize>(
     arms_first: bool,
 ) -> Lane4<T>
 where
-    T: RealField + Copy,
+    T: Lanes,
     V: Vectors,
     L: Weights<T, D, W>,
 {
@@ -59,7 +57,7 @@ where
 
 /// One number for the first vector of a node, and another for the second.
 #[inline(always)]
-fn of_both<T: RealField + Copy>(
+fn of_both<T: Lanes>(
     vectors: impl Vectors,
     dimension: usize,
     first: Lane4<T>,
@@ -87,7 +85,7 @@ fn rows<const D: usize, const W: usize>() -> usize {
 /// P2G of the first `count` particles, particle `k` with the weights `weights(k)`; as [`p2g`](crate::kernel::any::p2g).
 ///
 /// Successive particles with the same nodes form a run, whose contributions are summed in registers. Of three nodes in a
-/// row the [middle](is_middle) one needs no weight: it sums whole contributions, and the sums of the outer two are
+/// row the [middle](crate::weights::is_middle) one needs no weight: it sums whole contributions, and the sums of the outer two are
 /// subtracted at the end of the run.
 #[inline(always)]
 pub(crate) fn p2g_in_plane<T, L, V, const D: usize, const W: usize, const N: usize>(
@@ -99,7 +97,7 @@ pub(crate) fn p2g_in_plane<T, L, V, const D: usize, const W: usize, const N: usi
     contributions: &Contributions<T, D, N>,
     count: usize,
 ) where
-    T: RealField + Copy,
+    T: Lanes,
     V: Vectors,
     L: Weights<T, D, W>,
 {
@@ -110,34 +108,34 @@ pub(crate) fn p2g_in_plane<T, L, V, const D: usize, const W: usize, const N: usi
         let mut sums = [[Sum::zero(); W]; W];
         loop {
             let w = weights(k);
-            let value = half(&contributions.value[k].values);
             let gradient = slopes(vectors, contributions, k, L::AFFINE);
-            let mass = contributions.value[k].mass();
-            for j in 0..rows {
-                let (mut to_value, mut to_gradient, mut to_mass) = (value, gradient[0], mass);
-                if D > 1 && !is_middle::<W>(j) {
-                    let S = vectors.splat(w.S(1, j));
-                    let with_value = vectors.mul(value, S);
-                    to_value = vectors.mul_add(
-                        gradient[D - 1],
-                        slope_factor(vectors, &w, (1, j), true),
-                        with_value,
-                    );
-                    to_gradient = vectors.mul(to_gradient, S);
-                    to_mass *= w.S(1, j);
+            let (along, across) = (gradient[0], gradient[D - 1]);
+            let given = Given {
+                values: half(&contributions.value[k].values),
+                slope: along,
+                mass: contributions.value[k].mass(),
+            };
+            if D > 1 {
+                let mut j = 0;
+                while j < rows {
+                    let S = w.S(1, j);
+                    let scale = vectors.splat(S);
+                    let of_row = Given {
+                        values: vectors.mul_add(
+                            across,
+                            slope_factor(vectors, &w, (1, j), true),
+                            vectors.mul(given.values, scale),
+                        ),
+                        slope: vectors.mul(along, scale),
+                        mass: given.mass * S,
+                    };
+                    add_to_row(vectors, &w, of_row, &mut sums[j]);
+                    j += to_next_outer::<W>();
                 }
-                for i in 0..W {
-                    let sum = &mut sums[j][i];
-                    if is_middle::<W>(i) {
-                        sum.values = vectors.add(sum.values, to_value);
-                        sum.mass += to_mass;
-                        continue;
-                    }
-                    let (S, slope) = (w.S(0, i), slope_factor(vectors, &w, (0, i), true));
-                    let with_gradient = vectors.mul_add(to_gradient, slope, sum.values);
-                    sum.values = vectors.mul_add(to_value, vectors.splat(S), with_gradient);
-                    sum.mass = to_mass.mul_add(S, sum.mass);
-                }
+            }
+            if D == 1 || W == 3 {
+                let row = if D == 1 { 0 } else { W / 2 };
+                add_to_row(vectors, &w, given, &mut sums[row]);
             }
             k += 1;
             if k >= count || weights(k).first_node() != start {
@@ -171,12 +169,50 @@ pub(crate) fn p2g_in_plane<T, L, V, const D: usize, const W: usize, const N: usi
     }
 }
 
+/// A particle's contribution to a row of nodes.
+#[derive(Clone, Copy)]
+struct Given<T> {
+    values: Lane4<T>,
+    /// Along the row.
+    slope: Lane4<T>,
+    mass: T,
+}
+
+/// Nodes from one outer node to the next. A branch for the [middle](crate::weights::is_middle) one in the loop would keep the compiler from unrolling it.
+const fn to_next_outer<const W: usize>() -> usize {
+    if W == 3 { 2 } else { 1 }
+}
+
+/// Adds a contribution to the sums of a row, to that of a middle one as a whole.
+#[inline(always)]
+fn add_to_row<T, V, L, const D: usize, const W: usize>(
+    vectors: V,
+    weights: &L,
+    given: Given<T>,
+    sums: &mut [Sum<T>; W],
+) where
+    T: Lanes,
+    V: Vectors,
+    L: Weights<T, D, W>,
+{
+    let mut i = 0;
+    while i < W {
+        let (S, slope) = (weights.S(0, i), slope_factor(vectors, weights, (0, i), true));
+        let with_slope = vectors.mul_add(given.slope, slope, sums[i].values);
+        sums[i].values = vectors.mul_add(given.values, vectors.splat(S), with_slope);
+        sums[i].mass = given.mass.mul_add(S, sums[i].mass);
+        i += to_next_outer::<W>();
+    }
+    if W == 3 {
+        let middle = &mut sums[W / 2];
+        middle.values = vectors.add(middle.values, given.values);
+        middle.mass += given.mass;
+    }
+}
+
 /// Subtracts the sums of the outer nodes from the middle one, where there are three.
 #[inline(always)]
-fn subtract_outer<T: RealField + Copy, V: Vectors, const W: usize>(
-    vectors: V,
-    sums: &mut [Sum<T>; W],
-) {
+fn subtract_outer<T: Lanes, V: Vectors, const W: usize>(vectors: V, sums: &mut [Sum<T>; W]) {
     if let [first, all, last] = &mut sums[..] {
         *all = all.less(vectors, *first).less(vectors, *last);
     }
@@ -190,7 +226,7 @@ fn row_start<const D: usize>(start: usize, strides: &[usize; D], index: usize) -
 
 /// The factors of the slopes along all axes, in the order of a node's values.
 #[inline(always)]
-fn slopes<T: RealField + Copy, V: Vectors, const D: usize, const N: usize>(
+fn slopes<T: Lanes, V: Vectors, const D: usize, const N: usize>(
     vectors: V,
     contributions: &Contributions<T, D, N>,
     k: usize,
@@ -228,7 +264,7 @@ pub(crate) fn g2p_in_plane<T, L, V, const D: usize, const W: usize>(
     count: usize,
     receiver: &mut impl Receive<T, D>,
 ) where
-    T: RealField + Copy,
+    T: Lanes,
     V: Vectors,
     L: Weights<T, D, W>,
 {
@@ -283,9 +319,9 @@ pub(crate) fn g2p_in_plane<T, L, V, const D: usize, const W: usize>(
 }
 
 /// Replaces values at successive nodes of an axis by their differences; one value stays, that of the
-/// [middle](is_middle) one of three nodes or of the first of two.
+/// [middle](crate::weights::is_middle) one of three nodes or of the first of two.
 #[inline(always)]
-fn differ<T: RealField + Copy, V: Vectors, const W: usize>(vectors: V, values: &mut [Lane4<T>; W]) {
+fn differ<T: Lanes, V: Vectors, const W: usize>(vectors: V, values: &mut [Lane4<T>; W]) {
     match &mut values[..] {
         [first, last] => *last = vectors.sub(*last, *first),
         [first, middle, last] => {
@@ -301,7 +337,7 @@ fn differ<T: RealField + Copy, V: Vectors, const W: usize>(vectors: V, values: &
 /// Products that make up a value are rounded before they are added, not fused: those of a node and of its mirror image
 /// then cancel, and a particle on a wall stays there.
 #[inline(always)]
-fn interpolate<T: RealField + Copy, V: Vectors, const D: usize, const W: usize>(
+fn interpolate<T: Lanes, V: Vectors, const D: usize, const W: usize>(
     vectors: V,
     changes: &[Lane4<T>; W],
     weights: &impl Weights<T, D, W>,

@@ -2,11 +2,9 @@
 //!
 //! Loops, not closures: functions of the standard library that call one are compiled without the registers of the kernel.
 
-use nalgebra::RealField;
-
 use crate::kernel::any::{Contributions, Interpolated};
 use crate::node::{LANES, Node};
-use crate::simd::{Lane8, Vectors};
+use crate::simd::{Lane8, Lanes, Vectors};
 use crate::weights::Weights;
 
 /// The weights of a particle along an axis, each as a factor of eight numbers.
@@ -17,7 +15,7 @@ fn weights_on_axis<T, V, L, const D: usize, const W: usize>(
     axis: usize,
 ) -> [Lane8<T>; W]
 where
-    T: RealField + Copy,
+    T: Lanes,
     V: Vectors,
     L: Weights<T, D, W>,
 {
@@ -38,7 +36,7 @@ fn slopes_on_axis<T, V, L, const D: usize, const W: usize>(
     arms_first: bool,
 ) -> [Lane8<T>; W]
 where
-    T: RealField + Copy,
+    T: Lanes,
     V: Vectors,
     L: Weights<T, D, W>,
 {
@@ -66,7 +64,7 @@ pub(crate) fn p2g_in_space<T, L, V, const D: usize, const W: usize, const N: usi
     first: usize,
     (contributions, k): (&Contributions<T, D, N>, usize),
 ) where
-    T: RealField + Copy,
+    T: Lanes,
     V: Vectors,
     L: Weights<T, D, W>,
 {
@@ -109,12 +107,7 @@ fn places<const W: usize>() -> usize {
 
 /// Adds the sum over the places before this one; the first place has none.
 #[inline(always)]
-fn after<T: RealField + Copy>(
-    vectors: impl Vectors,
-    sum: Lane8<T>,
-    term: Lane8<T>,
-    place: usize,
-) -> Lane8<T> {
+fn after<T: Lanes>(vectors: impl Vectors, sum: Lane8<T>, term: Lane8<T>, place: usize) -> Lane8<T> {
     if place == 0 { term } else { vectors.add8(sum, term) }
 }
 
@@ -130,7 +123,7 @@ pub(crate) fn g2p_in_space<T, L, V, const D: usize, const W: usize>(
     nodes: &[Node<T, D>],
 ) -> Interpolated<T, D>
 where
-    T: RealField + Copy,
+    T: Lanes,
     V: Vectors,
     L: Weights<T, D, W>,
 {

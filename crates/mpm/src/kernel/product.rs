@@ -2,7 +2,7 @@
 
 use std::marker::PhantomData;
 
-use nalgebra::{RealField, SMatrix, SVector};
+use nalgebra::{SMatrix, SVector};
 
 use crate::fault::{Fault, Planted};
 use crate::geometry::Constants;
@@ -15,7 +15,7 @@ use crate::shape_function::{
     CubicSpline, Gimp, HalfSizes, Hat, OnAxis, ProductShape, QuadraticSpline, ShapeFunction, index,
     moment,
 };
-use crate::simd::{Loop, Vectors, dispatch};
+use crate::simd::{Lanes, Loop, Vectors, dispatch};
 use crate::tensor::real;
 use crate::weights::{ExtendedWeights, Weights, is_middle};
 
@@ -56,7 +56,7 @@ pub(crate) struct ProductWeights<T, const D: usize> {
     l: [PerParticle<T>; D],
 }
 
-impl<T: RealField + Copy, const D: usize> ProductWeights<T, D> {
+impl<T: Lanes, const D: usize> ProductWeights<T, D> {
     pub(crate) fn new(shape: &ProductShape<T, D>, is_affine: bool) -> Self {
         let zero = [T::zero(); BLOCK];
         Self {
@@ -204,7 +204,7 @@ struct ParticleWeights<'a, T, const D: usize, const W: usize, const AFFINE: bool
     k: usize,
 }
 
-impl<T: RealField + Copy, const D: usize, const W: usize, const AFFINE: bool> Weights<T, D, W>
+impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Weights<T, D, W>
     for ParticleWeights<'_, T, D, W, AFFINE>
 {
     const AFFINE: bool = AFFINE;
@@ -262,11 +262,7 @@ impl<T: RealField + Copy, const D: usize, const W: usize, const AFFINE: bool> We
 
 /// `F_aa` of a particle, which scales its box.
 #[inline(always)]
-fn stretch<T: RealField + Copy, const D: usize>(
-    planted: Planted,
-    F: &SMatrix<T, D, D>,
-    a: usize,
-) -> T {
+fn stretch<T: Lanes, const D: usize>(planted: Planted, F: &SMatrix<T, D, D>, a: usize) -> T {
     if planted.is(Fault::SizeFromJacobian) {
         let J = (0..D).fold(T::one(), |product, i| product * F[(i, i)]);
         return J.powf(real(1.0 / D as f64));
@@ -286,7 +282,7 @@ struct Compute<'a, T, R, const D: usize, const W: usize, const MOMENTS: bool> {
 impl<T, R, const D: usize, const W: usize, const MOMENTS: bool> Loop
     for Compute<'_, T, R, D, W, MOMENTS>
 where
-    T: RealField + Copy,
+    T: Lanes,
     R: ShapeFunction<W>,
 {
     #[inline(always)]
@@ -315,7 +311,7 @@ fn compute_weights<T, R, const D: usize, const W: usize>(
     G: &mut AtNodes<T, D>,
 ) -> bool
 where
-    T: RealField + Copy,
+    T: Lanes,
     R: ShapeFunction<W>,
 {
     let mut any_extended = false;
@@ -347,7 +343,7 @@ fn compute_moments<T, R, const D: usize, const W: usize>(
     Z: &mut AtNodes<T, D>,
     inverse_inertia: &mut [PerParticle<T>; D],
 ) where
-    T: RealField + Copy,
+    T: Lanes,
     R: ShapeFunction<W>,
 {
     for k in 0..BLOCK {
@@ -376,7 +372,7 @@ struct P2gOfBlock<'a, T, const D: usize> {
     count: usize,
 }
 
-impl<T: RealField + Copy, const D: usize, const W: usize, const AFFINE: bool> Loop
+impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
     for P2g<'_, T, D, W, AFFINE>
 {
     #[inline(always)]
@@ -402,7 +398,7 @@ impl<T: RealField + Copy, const D: usize, const W: usize, const AFFINE: bool> Lo
 }
 
 #[inline(never)]
-fn p2g_extended<T: RealField + Copy, const D: usize, const AFFINE: bool>(
+fn p2g_extended<T: Lanes, const D: usize, const AFFINE: bool>(
     xi: &[T; D],
     l: &[T; D],
     strides: &[usize; D],
@@ -426,7 +422,7 @@ struct G2pOfBlock<'a, T, A, const D: usize> {
 
 impl<T, A, const D: usize, const W: usize, const AFFINE: bool> Loop for G2p<'_, T, A, D, W, AFFINE>
 where
-    T: RealField + Copy,
+    T: Lanes,
     A: Receive<T, D>,
 {
     #[inline(always)]
@@ -450,7 +446,7 @@ where
 }
 
 #[inline(never)]
-fn g2p_extended<T: RealField + Copy, const D: usize, const AFFINE: bool>(
+fn g2p_extended<T: Lanes, const D: usize, const AFFINE: bool>(
     xi: &[T; D],
     l: &[T; D],
     strides: &[usize; D],

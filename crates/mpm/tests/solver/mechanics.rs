@@ -136,7 +136,7 @@ fn a_wall_is_a_mirror() {
 
 #[test]
 fn bits_do_not_depend_on_the_number_of_threads() {
-    fn run<T: nalgebra::RealField + Copy, const D: usize>(
+    fn run<T: mmsmith_mpm::Scalar<D>, const D: usize>(
         cells: usize,
         scheme: Settings<f64>,
         threads: usize,
@@ -181,7 +181,7 @@ fn bits_do_not_depend_on_the_number_of_threads() {
         assert!(p.x[0][D - 1] - p.X[0][D - 1] > simulation.grid().spacing * real(4.0));
         (p.clone(), simulation.mesh().cloned())
     }
-    fn check<T: nalgebra::RealField + Copy, const D: usize>(cells: usize) {
+    fn check<T: mmsmith_mpm::Scalar<D>, const D: usize>(cells: usize) {
         // Those of a single pass as well.
         let fused = |of: &Settings<f64>| matches!(of.integrator, Integrator::Usl | Integrator::Cd);
         let all = some_schemes().chain(flip_schemes().filter(fused));
