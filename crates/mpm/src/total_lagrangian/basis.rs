@@ -4,8 +4,8 @@
 
 use std::ops::Range;
 
-use super::PIECE;
 use super::axis::{Axis, End};
+use super::piece;
 use crate::fault::{Fault, Planted};
 use crate::parallel::chunks::each_chunk;
 
@@ -180,7 +180,7 @@ impl Basis {
     ) {
         let (rows, _) = self.weights(part).as_chunks::<W>();
         if inner == 1 {
-            let blocks = PIECE.div_ceil(self.points);
+            let blocks = piece(output.len()).div_ceil(self.points);
             each_chunk(output, blocks * self.points, &|piece, output| {
                 let input = input[piece * blocks * self.functions..].chunks_exact(self.functions);
                 for (input, output) in input.zip(output.chunks_exact_mut(self.points)) {
@@ -196,7 +196,7 @@ impl Basis {
             });
             return;
         }
-        let lines = PIECE.div_ceil(inner);
+        let lines = piece(output.len()).div_ceil(inner);
         each_chunk(output, lines * inner, &|piece, output| {
             for (line, output) in output.chunks_exact_mut(inner).enumerate() {
                 let (block, q) = divided(piece * lines + line, self.points);
@@ -224,7 +224,7 @@ impl Basis {
     ) {
         let (rows, _) = self.weights(part).as_chunks::<W>();
         if inner == 1 {
-            let blocks = PIECE.div_ceil(self.functions);
+            let blocks = piece(output.len()).div_ceil(self.functions);
             each_chunk(output, blocks * self.functions, &|piece, output| {
                 let input = input[piece * blocks * self.points..].chunks_exact(self.points);
                 for (input, output) in input.zip(output.chunks_exact_mut(self.functions)) {
@@ -234,7 +234,7 @@ impl Basis {
             return;
         }
         // Function by function, so that no two threads write to one; the order of its sum is that of the particles.
-        let lines = PIECE.div_ceil(inner);
+        let lines = piece(output.len()).div_ceil(inner);
         each_chunk(output, lines * inner, &|piece, output| {
             for (line, output) in output.chunks_exact_mut(inner).enumerate() {
                 let (block, j) = divided(piece * lines + line, self.functions);

@@ -3,9 +3,9 @@
 //! With particle masses that are products over the axes, the consistent mass matrix is the Kronecker product of one
 //! banded matrix for each axis, so that its inverse is applied axis after axis.
 
-use super::PIECE;
 use super::axis::{Axis, End};
 use super::basis::{Basis, Part};
+use super::piece;
 use crate::fault::{Fault, Planted};
 use crate::parallel::chunks::{each, each_chunk};
 
@@ -311,8 +311,9 @@ impl Ldl {
     }
 
     fn solve_of<const B: usize>(&self, inner: usize, values: &mut [f64]) {
+        let most = piece(values.len());
         if inner == 1 {
-            let groups = PIECE.div_ceil(LINES * self.size);
+            let groups = most.div_ceil(LINES * self.size);
             each_chunk(values, groups * LINES * self.size, &|_, values| {
                 let mut groups = values.chunks_exact_mut(LINES * self.size);
                 groups.by_ref().for_each(|lines| self.solve_lines::<B, LINES>(lines));
@@ -322,8 +323,8 @@ impl Ldl {
             return;
         }
         let size = self.size * inner;
-        if size <= PIECE {
-            each_chunk(values, PIECE / size * size, &|_, values| {
+        if size <= most {
+            each_chunk(values, most / size * size, &|_, values| {
                 for block in values.chunks_exact_mut(size) {
                     let mut lines: Vec<_> = block.chunks_exact_mut(inner).collect();
                     self.solve_columns::<B>(&mut lines);
@@ -332,7 +333,7 @@ impl Ldl {
             return;
         }
         // The lines of a block, each cut into columns that depend on no others.
-        let columns = (PIECE / self.size).max(LEAST_COLUMNS);
+        let columns = (most / self.size).max(LEAST_COLUMNS);
         let mut pieces = Vec::new();
         for block in values.chunks_exact_mut(size) {
             let mut of_block: Vec<Vec<&mut [f64]>> = Vec::new();

@@ -56,5 +56,13 @@ pub use composition::Composition;
 pub use coordinates::Coordinates;
 pub use simulation::{Grid, MassMatrix, Scheme, TotalLagrangian};
 
-/// Particles, or numbers of an array, that a thread is given at a time; fewer are done sooner than they are handed out.
-const PIECE: usize = 8192;
+/// How many of so many numbers a thread takes at a time: four pieces for each thread, so that none waits long for the last, but not so few
+/// that handing them out takes longer than the work. No sum is cut, so that the bits do not depend on it.
+fn piece(numbers: usize) -> usize {
+    const LEAST: usize = 1024;
+    const MOST: usize = 8192;
+    match rayon::current_num_threads() {
+        1 => MOST,
+        threads => numbers.div_ceil(4 * threads).clamp(LEAST, MOST),
+    }
+}

@@ -6,7 +6,6 @@ use std::{array, mem};
 use bytemuck::{bytes_of_mut, cast_slice_mut};
 use nalgebra::{SMatrix, SVector};
 
-use super::PIECE;
 use super::axis::{Axis, End, Layout};
 use super::basis::{Basis, MOST_DEGREE, Part};
 use super::boundary::{BoundaryData, Face, HeldBoundary, Quantity, Side};
@@ -14,6 +13,7 @@ use super::composition::Composition;
 use super::coordinates::{Coordinates, Row};
 use super::fit::{Fit, Line};
 use super::mass::{Band, Mass};
+use super::piece;
 use crate::body_force::BodyForce;
 use crate::error::{SetupError, StepError};
 use crate::fault::{Fault, Planted};
@@ -375,8 +375,9 @@ impl<const D: usize> TotalLagrangian<D> {
         }
         let Self { work: Work { values, .. }, particles, rows, .. } = self;
         let (values, rows) = (&*values, &rows[..]);
-        each_chunk(&mut particles.v, PIECE, &|piece, v| {
-            for (v, p) in v.iter_mut().zip(piece * PIECE..) {
+        let size = piece(particles.v.len());
+        each_chunk(&mut particles.v, size, &|piece, v| {
+            for (v, p) in v.iter_mut().zip(piece * size..) {
                 let local = SVector::from_fn(|i, _| values[i][p]);
                 *v = cartesian(rows, p / row, &local);
             }
@@ -389,9 +390,9 @@ impl<const D: usize> TotalLagrangian<D> {
         let reciprocal_radius = &self.reciprocal_radius[..];
         let Particles { X, x, F, .. } = particles;
         let X = &X[..];
-        let pieces = x.chunks_mut(PIECE).zip(F.chunks_mut(PIECE)).enumerate().collect();
+        let pieces = x.chunks_mut(size).zip(F.chunks_mut(size)).enumerate().collect();
         each(pieces, &|(piece, (x, F))| {
-            for ((x, F), p) in x.iter_mut().zip(F).zip(piece * PIECE..) {
+            for ((x, F), p) in x.iter_mut().zip(F).zip(piece * size..) {
                 let local = SVector::from_fn(|i, _| values[i][p]);
                 let mut H = SMatrix::from_fn(|i, k| slopes[i][k][p]);
                 if let Some(at) = rows.get(p / row) {
@@ -531,7 +532,7 @@ impl<const D: usize> TotalLagrangian<D> {
     ) -> bool {
         let row = self.row();
         let Self { work: Work { values, slopes, b, .. }, particles, .. } = self;
-        let size = PIECE.div_ceil(row) * row;
+        let size = piece(b[..].len()).div_ceil(row) * row;
         let mut values = values.each_mut().map(|array| array.chunks_mut(size));
         let mut slopes =
             slopes.each_mut().map(|arrays| arrays.each_mut().map(|array| array.chunks_mut(size)));
@@ -844,8 +845,9 @@ fn is_deformation<const D: usize>(F: &SMatrix<f64, D, D>) -> bool {
 /// `target += factor * source`, component by component.
 fn add<const D: usize>(target: &mut [Vec<f64>; D], factor: f64, source: &[Vec<f64>; D]) {
     for (target, source) in target.iter_mut().zip(source) {
-        each_chunk(target, PIECE, &|piece, target| {
-            let source = &source[piece * PIECE..];
+        let size = piece(target.len());
+        each_chunk(target, size, &|piece, target| {
+            let source = &source[piece * size..];
             target.iter_mut().zip(source).for_each(|(x, y)| *x += factor * y);
         });
     }
