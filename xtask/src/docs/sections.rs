@@ -26,6 +26,8 @@ enum Form {
     /// A table for each command with two lists `{a,b}`: rows for the first list, columns for the second, and in each cell the
     /// nanoseconds that a step of a particle takes in that run, and how many times those of `gimp` with `flip` that is.
     Pairs,
+    /// What a build into an empty folder takes, and a row for each crate that takes long.
+    Build,
     /// The picture that the command writes to its last word, a path of the repository.
     Picture,
 }
@@ -40,10 +42,11 @@ impl Form {
             "displacement" => Self::Displacement,
             "speed" => Self::Speed,
             "pairs" => Self::Pairs,
+            "build" => Self::Build,
             "picture" => Self::Picture,
             other => {
                 return Err(format!(
-                    "the form '{other}' is not known; known are exact, tables, orders, displacement, speed, pairs and picture"
+                    "the form '{other}' is not known; known are exact, tables, orders, displacement, speed, pairs, build and picture"
                 ));
             }
         })
@@ -56,7 +59,9 @@ impl Form {
             }
             Self::Displacement => &["L_inf of u (m)", "orders", "million particle-steps/s"],
             Self::Speed => &["particles", "steps", "stepping (s)", "million particle-steps/s"],
-            Self::Text | Self::Exact | Self::Tables | Self::Pairs | Self::Picture => &[],
+            Self::Text | Self::Exact | Self::Tables | Self::Pairs | Self::Build | Self::Picture => {
+                &[]
+            }
         }
     }
 }
@@ -64,7 +69,7 @@ impl Form {
 /// The lines that a section must have in this order, whatever its commands measure.
 fn skeleton(form: Form, section: &Section) -> Vec<String> {
     match form {
-        Form::Text | Form::Tables | Form::Pairs => {
+        Form::Text | Form::Tables | Form::Pairs | Form::Build => {
             section.commands.iter().map(|command| shown(command)).collect()
         }
         Form::Exact => Vec::new(),
@@ -265,9 +270,46 @@ fn content(form: Form, section: &Section, place: &Workplace) -> anyhow::Result<S
                 parts.push(pairs(command, place)?);
             }
         }
+        Form::Build => {
+            for command in &section.commands {
+                parts.push(build(command, place)?);
+            }
+        }
         Form::Picture => {}
     }
     Ok(parts.join("\n"))
+}
+
+/// What Cargo's timings of a build say.
+fn build(command: &str, place: &Workplace) -> anyhow::Result<String> {
+    /// Crates that take less are not told of, in seconds.
+    const LEAST: f64 = 3.0;
+    let script = format!(
+        "own=$PWD; cd \"$REPOSITORY\" && CARGO_TARGET_DIR=$own/build command {command} --quiet --timings && times"
+    );
+    let printed = succeed(place, &script)?;
+    let of_children = printed.lines().last().and_then(|line| line.split_whitespace().next());
+    let cpu = of_children.with_context(|| format!("'{command}' printed no times"))?;
+    let report = place.read("build/cargo-timings/cargo-timing.html")?;
+    succeed(place, "rm -r build")?;
+    let units = report
+        .lines()
+        .skip_while(|line| !line.starts_with("const UNIT_DATA = "))
+        .take_while(|line| !line.starts_with("];"));
+    let units = units.collect::<Vec<_>>().join("\n").replacen("const UNIT_DATA = ", "", 1) + "]";
+    let units: Vec<Value> = serde_json::from_str(&units).context("the timings of the build")?;
+    let seconds = |unit: &Value| unit["duration"].as_f64().unwrap_or(0.0);
+    let mut long: Vec<&Value> = units.iter().filter(|unit| seconds(unit) >= LEAST).collect();
+    long.sort_by(|a, b| seconds(b).total_cmp(&seconds(a)));
+    let rows = long.iter().map(|unit| {
+        format!("| `{}` | {:.0} |", unit["name"].as_str().unwrap_or("-"), seconds(unit))
+    });
+    let rows = rows.collect::<Vec<_>>().join("\n");
+    Ok(format!(
+        "`{command}` into an empty folder: {} units, {cpu} of user time. Those of {LEAST} s and more:\n\n\
+         | crate | s |\n|---|---:|\n{rows}\n",
+        units.len()
+    ))
 }
 
 /// A list `{a,b}` of a command: what is before it, its entries, and what is behind it.
