@@ -44,6 +44,7 @@
 mod axis;
 mod basis;
 mod boundary;
+mod component;
 mod composition;
 mod coordinates;
 mod fit;

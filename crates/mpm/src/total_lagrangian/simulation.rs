@@ -7,8 +7,9 @@ use bytemuck::{bytes_of_mut, cast_slice_mut};
 use nalgebra::{SMatrix, SVector};
 
 use super::axis::{Axis, End, Layout};
-use super::basis::{Basis, MOST_DEGREE, Part};
+use super::basis::{Basis, MOST_DEGREE};
 use super::boundary::{BoundaryData, Face, HeldBoundary, Quantity, Side};
+use super::component::{Component, Factors, Field, Operators, along, each_component, solve};
 use super::composition::Composition;
 use super::coordinates::{Coordinates, Row};
 use super::fit::{Fit, Line};
@@ -64,45 +65,20 @@ pub struct TotalLagrangian<const D: usize> {
     scheme: Scheme,
     material: Material<f64>,
     time_step: f64,
-    /// For each axis, the functions of components along it and of the others: `[across as usize]`.
-    bases: [[Basis; 2]; D],
-    /// Solves for accelerations, by axis as `bases`.
-    mass: [[Mass; 2]; D],
-    /// Fits coefficients to values, by axis as `bases`; or why the particles do not determine them.
-    fits: Result<[[Fit; 2]; D], SetupError>,
+    operators: Operators<D>,
     /// Sides whose motion or traction is given.
     faces: Vec<Face<D>>,
-    /// Coefficients by component, axis 0 fastest.
-    u: [Vec<f64>; D],
-    v: [Vec<f64>; D],
-    /// Accelerations at the current state, from the first step on; forces before the solution.
-    a: [Vec<f64>; D],
+    components: [Component<D>; D],
+    /// The body force at the particles.
+    b: Vec<SVector<f64, D>>,
     particles: Particles<f64, D>,
     density: f64,
     /// Curvilinear coordinates: reciprocal radius by place along axis 0, and what a row of places along it has in common.
     reciprocal_radius: Vec<f64>,
     rows: Vec<Row<D>>,
-    work: Work<D>,
     steps_done: usize,
     failed: Option<StepError>,
     planted: Planted,
-}
-
-/// Arrays that the force computation works in.
-#[derive(Clone, Debug)]
-struct Work<const D: usize> {
-    /// Values at the particles, by component; then the factors of the functions' values in the forces.
-    values: [Vec<f64>; D],
-    /// Slopes at the particles, by component and axis; then the factors of the functions' slopes.
-    slopes: [[Vec<f64>; D]; D],
-    /// For each axis but the last, values and slopes along axes so far, between the axes: particles up to that axis,
-    /// coefficients after it.
-    partial: Vec<Vec<Vec<f64>>>,
-    b: Vec<SVector<f64, D>>,
-    /// Coefficients of the acceleration on moved sides, and zero elsewhere.
-    given: [Vec<f64>; D],
-    /// Products of the mass matrix.
-    product: [Vec<f64>; 2],
 }
 
 impl<const D: usize> TotalLagrangian<D> {
@@ -162,10 +138,6 @@ impl<const D: usize> TotalLagrangian<D> {
         }
         let mass: [[Mass; 2]; D] = array::from_fn(|k| masses[k].clone());
         let particles = particles(&grid, &lines, density);
-        let zeros: [Vec<f64>; D] = array::from_fn(|component| {
-            let sizes = (0..D).map(|k| bases[k][usize::from(k == component)].functions);
-            vec![0.0; sizes.product()]
-        });
         Ok(Self {
             reciprocal_radius: match grid.coordinates.are_curvilinear() {
                 true => lines[0].points.iter().map(|R| R.recip()).collect(),
@@ -173,17 +145,13 @@ impl<const D: usize> TotalLagrangian<D> {
             },
             rows: rows(&grid, &lines),
             faces,
-            work: Work::new(&bases, particles.len(), &zeros),
-            u: zeros.clone(),
-            v: zeros.clone(),
-            a: zeros,
+            components: array::from_fn(|index| Component::new(index, &bases)),
+            b: vec![SVector::zeros(); particles.len()],
             grid,
             scheme,
             material,
             time_step,
-            bases,
-            mass,
-            fits,
+            operators: Operators { bases, mass, fits },
             particles,
             density,
             steps_done: 0,
@@ -229,43 +197,49 @@ impl<const D: usize> TotalLagrangian<D> {
                 return Err(SetupError::LengthMismatch { array, found, expected });
             }
         }
-        self.u = self.fit(u, boundary, Quantity::Displacement)?;
-        self.v = self.fit(v, boundary, Quantity::Velocity)?;
+        if let Err(error) = &self.operators.fits {
+            return Err(error.clone());
+        }
+        self.fit(u, boundary, Quantity::Displacement, |component| &mut component.u);
+        self.fit(v, boundary, Quantity::Velocity, |component| &mut component.v);
         self.steps_done = 0;
         self.failed = None;
         Ok(())
     }
 
-    /// The coefficients of the field nearest to given values, which is `quantity` on the sides at time 0.
+    /// Turns coefficients into those of the field nearest to given values, which is `quantity` on the sides at time 0.
     fn fit(
         &mut self,
         values: &[SVector<f64, D>],
         boundary: &dyn BoundaryData<D>,
         quantity: Quantity,
-    ) -> Result<[Vec<f64>; D], SetupError> {
-        let mut fitted: [Vec<f64>; D] = array::from_fn(|c| vec![0.0; self.u[c].len()]);
-        self.prescribe(boundary, quantity, 0.0, &mut fitted);
+        of: fn(&mut Component<D>) -> &mut Vec<f64>,
+    ) {
+        self.components.iter_mut().for_each(|component| of(component).fill(0.0));
+        self.prescribe(boundary, quantity, 0.0, of);
         let row = self.row();
         for (p, value) in values.iter().enumerate() {
-            let value = self.components(p / row, value);
-            for component in 0..D {
-                self.work.values[component][p] = value[component] * self.particles.volume[p];
+            let value = self.in_frame(p / row, value);
+            for component in &mut self.components {
+                component.values[p] = value[component.index] * self.particles.volume[p];
             }
         }
-        for (component, given) in fitted.iter_mut().enumerate() {
+        let Self { operators: Operators { bases, fits, .. }, faces, components, .. } = self;
+        let Ok(fits) = fits else { return };
+        for component in components {
+            let index = component.index;
+            let functions = component.functions(bases);
+            let given = mem::take(of(component));
             let mut sums = vec![0.0; given.len()];
-            self.integrate(component, Factors::Values, &mut sums);
-            let functions = self.functions(component);
-            let fits = self.fits.as_ref().map_err(Clone::clone)?;
-            let of = |k: usize| &fits[k][usize::from(k == component)];
-            self.work.subtract_product(&functions, |k| &of(k).matrix, 1.0, given, &mut sums);
-            solve(&functions, |k| &of(k).mass, &mut sums);
-            self.faces.iter().filter(|face| face.moved).for_each(|face| {
-                face.copy(&functions, given, &mut sums);
-            });
-            *given = sums;
+            component.integrate(bases, Factors::Values, &mut sums);
+            let matrix = |k: usize| &along(fits, k, index).matrix;
+            component.subtract_product(&functions, matrix, 1.0, &given, &mut sums);
+            solve(&functions, |k| &along(fits, k, index).mass, &mut sums);
+            for face in faces.iter().filter(|face| face.moved) {
+                face.copy(&functions, &given, &mut sums);
+            }
+            *of(component) = sums;
         }
-        Ok(fitted)
     }
 
     /// Advances by one time step as [`step_with_boundary`](Self::step_with_boundary) does, with sides that are held, and
@@ -313,8 +287,10 @@ impl<const D: usize> TotalLagrangian<D> {
         let stages = self.scheme.composition.stages();
         for (stage, &gamma) in stages.iter().enumerate() {
             let part = self.planted.stage(gamma) * self.time_step;
-            add(&mut self.v, 0.5 * part, &self.a);
-            add(&mut self.u, part, &self.v);
+            each_component(&mut self.components, &|component| {
+                component.kick(0.5 * part);
+                component.drift(part);
+            });
             let before = start + done * self.time_step;
             done += if self.planted.is(Fault::StagesAtOneTime) { 0.0 } else { gamma };
             let now = start + done * self.time_step;
@@ -322,79 +298,67 @@ impl<const D: usize> TotalLagrangian<D> {
             // On the way the sides are integrated like all the rest: beside a motion without the errors of the stages they
             // would leave a layer of order two in the velocities.
             if stage + 1 == stages.len() {
-                self.prescribe_motion(boundary, Quantity::Displacement, moved);
+                self.prescribe(boundary, Quantity::Displacement, moved, |of| &mut of.u);
             }
             self.accelerate(body_force, boundary, now)?;
-            add(&mut self.v, 0.5 * part, &self.a);
+            each_component(&mut self.components, &|component| component.kick(0.5 * part));
         }
-        self.prescribe_motion(boundary, Quantity::Velocity, start + done * self.time_step);
+        let end = start + done * self.time_step;
+        self.prescribe(boundary, Quantity::Velocity, end, |of| &mut of.v);
         self.steps_done += 1;
         Ok(())
     }
 
-    /// Writes the displacement or the velocity of moved sides over what was integrated there.
-    fn prescribe_motion(&mut self, boundary: &dyn BoundaryData<D>, of: Quantity, time: f64) {
-        let field = if of == Quantity::Velocity { &mut self.v } else { &mut self.u };
-        let mut coefficients = mem::replace(field, array::from_fn(|_| Vec::new()));
-        self.prescribe(boundary, of, time, &mut coefficients);
-        let field = if of == Quantity::Velocity { &mut self.v } else { &mut self.u };
-        *field = coefficients;
-    }
-
-    /// Writes what is given on moved sides over their coefficients.
+    /// Writes what is given on moved sides over coefficients.
     fn prescribe(
         &mut self,
         boundary: &dyn BoundaryData<D>,
         quantity: Quantity,
         time: f64,
-        coefficients: &mut [Vec<f64>; D],
+        of: fn(&mut Component<D>) -> &mut Vec<f64>,
     ) {
+        let Self { faces, operators: Operators { bases, fits, .. }, components, .. } = self;
         // Without fits there are no sides of that kind.
-        let Self { faces, fits: Ok(fits), bases, .. } = self else { return };
+        let Ok(fits) = fits else { return };
         for face in faces.iter_mut().filter(|face| face.moved) {
             face.ask(boundary, quantity, time);
-            for (component, coefficients) in coefficients.iter_mut().enumerate() {
-                let normal = |k: usize| usize::from(k == component);
-                let of_side = face.fit(component, |k| (&fits[k][normal(k)], &bases[k][normal(k)]));
-                let functions = array::from_fn(|k| bases[k][normal(k)].functions);
-                face.set(&functions, &of_side, coefficients);
+            for component in components.iter_mut() {
+                let index = component.index;
+                let axis = |k: usize| (along(fits, k, index), along(bases, k, index));
+                let of_side = face.fit(index, axis);
+                face.set(&component.functions(bases), &of_side, of(component));
             }
         }
-    }
-
-    /// The number of coefficients of a component along each axis.
-    fn functions(&self, component: usize) -> [usize; D] {
-        array::from_fn(|k| self.bases[k][usize::from(k == component)].functions)
     }
 
     /// The particles as they are now, with velocities of the same time; computed at each call.
     pub fn observe(&mut self) -> &Particles<f64, D> {
         let row = self.row();
-        for component in 0..D {
-            self.evaluate(component, Field::Velocity, true);
-        }
-        let Self { work: Work { values, .. }, particles, rows, .. } = self;
-        let (values, rows) = (&*values, &rows[..]);
+        let Self { components, operators, particles, rows, grid, reciprocal_radius, .. } = self;
+        let rows = &rows[..];
+        let evaluate = |components: &mut [Component<D>; D], field: Field| {
+            each_component(components, &|component| {
+                component.evaluate(&operators.bases, field, true);
+            });
+        };
+        evaluate(components, Field::Velocity);
         let size = piece(particles.v.len());
+        let at = &*components;
         each_chunk(&mut particles.v, size, &|piece, v| {
             for (v, p) in v.iter_mut().zip(piece * size..) {
-                let local = SVector::from_fn(|i, _| values[i][p]);
+                let local = SVector::from_fn(|i, _| at[i].values[p]);
                 *v = cartesian(rows, p / row, &local);
             }
         });
-        for component in 0..D {
-            self.evaluate(component, Field::Displacement, true);
-        }
-        let Self { work: Work { values, slopes, .. }, particles, rows, grid, .. } = self;
-        let (values, slopes, rows) = (&*values, &*slopes, &rows[..]);
-        let reciprocal_radius = &self.reciprocal_radius[..];
+        evaluate(components, Field::Displacement);
+        let at = &*components;
         let Particles { X, x, F, .. } = particles;
         let X = &X[..];
         let pieces = x.chunks_mut(size).zip(F.chunks_mut(size)).enumerate().collect();
         each(pieces, &|(piece, (x, F))| {
             for ((x, F), p) in x.iter_mut().zip(F).zip(piece * size..) {
-                let local = SVector::from_fn(|i, _| values[i][p]);
-                let mut H = SMatrix::from_fn(|i, k| slopes[i][k][p]);
+                let local = SVector::from_fn(|i, _| at[i].values[p]);
+                let mut H = SMatrix::from_fn(|i, k| at[i].slopes[k][p]);
                 if let Some(at) = rows.get(p / row) {
                     let reciprocal_radius = reciprocal_radius[p % row];
                     H = grid.coordinates.gradient(&local, &H, reciprocal_radius, at);
@@ -416,9 +380,15 @@ impl<const D: usize> TotalLagrangian<D> {
     ///
     /// A copy of these bytes, written over the state of a simulation with the same set-up, continues the run to the same bits.
     pub fn state(&mut self) -> Vec<&mut [u8]> {
-        let Self { u, v, a, steps_done, .. } = self;
-        let coefficients = u.iter_mut().chain(v).chain(a);
-        let mut state: Vec<&mut [u8]> = coefficients.map(|c| cast_slice_mut(c)).collect();
+        let Self { components, steps_done, .. } = self;
+        let [mut state, mut of_v, mut of_a] = [(); 3].map(|()| Vec::with_capacity(3 * D + 1));
+        for Component { u, v, a, .. } in components {
+            state.push(cast_slice_mut(u));
+            of_v.push(cast_slice_mut(v));
+            of_a.push(cast_slice_mut(a));
+        }
+        state.append(&mut of_v);
+        state.append(&mut of_a);
         state.push(bytes_of_mut(steps_done));
         state
     }
@@ -450,11 +420,11 @@ impl<const D: usize> TotalLagrangian<D> {
 
     /// Particles along axis 0.
     fn row(&self) -> usize {
-        self.bases[0][0].points
+        self.operators.bases[0][0].points
     }
 
     /// A vector's components that the unknowns stand for, in row `row` of particles.
-    fn components(&self, row: usize, vector: &SVector<f64, D>) -> SVector<f64, D> {
+    fn in_frame(&self, row: usize, vector: &SVector<f64, D>) -> SVector<f64, D> {
         self.rows.get(row).map_or(*vector, |row| row.frame.tr_mul(vector))
     }
 
@@ -466,9 +436,10 @@ impl<const D: usize> TotalLagrangian<D> {
         time: f64,
     ) -> Result<(), StepError> {
         let curvilinear = self.grid.coordinates.are_curvilinear();
-        for component in 0..D {
-            self.evaluate(component, Field::Displacement, curvilinear);
-        }
+        let Self { components, operators, .. } = self;
+        each_component(components, &|component| {
+            component.evaluate(&operators.bases, Field::Displacement, curvilinear);
+        });
         let forced = !body_force.is_absent() && !self.planted.is(Fault::NoBodyForce);
         let force = forced.then_some((body_force, time));
         let bad = match self.material {
@@ -485,42 +456,22 @@ impl<const D: usize> TotalLagrangian<D> {
         let factors = if curvilinear || forced { Factors::Both } else { Factors::Slopes };
         for face in self.faces.iter_mut().filter(|face| !face.moved) {
             face.ask(boundary, Quantity::Traction, time);
-        }
-        let mut given = mem::replace(&mut self.work.given, array::from_fn(|_| Vec::new()));
-        self.prescribe(boundary, Quantity::Acceleration, time, &mut given);
-        for component in 0..D {
-            let mut a = mem::take(&mut self.a[component]);
-            self.integrate(component, factors, &mut a);
-            self.finish(component, &given[component], &mut a);
-            self.a[component] = a;
-        }
-        self.work.given = given;
-        Ok(())
-    }
-
-    /// From a component's forces inside the body to accelerations, of which those on moved sides are given.
-    fn finish(&mut self, component: usize, given: &[f64], a: &mut [f64]) {
-        let functions = self.functions(component);
-        let normal = |k: usize| usize::from(k == component);
-        for face in self.faces.iter().filter(|face| !face.moved) {
-            let mut forces = face.load(component, |k| &self.bases[k][normal(k)]);
             if self.planted.is(Fault::TractionSign) {
-                forces.iter_mut().for_each(|force| *force = -*force);
+                face.values.iter_mut().for_each(|traction| *traction = -*traction);
             }
-            face.add(&functions, &forces, a);
         }
+        self.prescribe(boundary, Quantity::Acceleration, time, |of| &mut of.given);
         let moves = self.faces.iter().any(|face| face.moved);
-        if let (true, MassMatrix::Consistent, Ok(fits)) = (moves, self.scheme.mass, &self.fits)
-            && !self.planted.is(Fault::BoundaryInertiaDropped)
-        {
-            let matrix = |k: usize| &fits[k][normal(k)].matrix;
-            self.work.subtract_product(&functions, matrix, self.density, given, a);
-        }
-        solve(&functions, |k| &self.mass[k][normal(k)], a);
-        self.faces
-            .iter()
-            .filter(|face| face.moved)
-            .for_each(|face| face.copy(&functions, given, a));
+        let couples = moves
+            && self.scheme.mass == MassMatrix::Consistent
+            && !self.planted.is(Fault::BoundaryInertiaDropped);
+        let coupling = couples.then_some(self.density);
+        let Self { components, operators, faces, .. } = self;
+        let faces = &faces[..];
+        each_component(components, &|component| {
+            component.accelerate(operators, factors, faces, coupling);
+        });
+        Ok(())
     }
 
     /// Turns displacements and their slopes at the particles into the factors of the functions' values and slopes in the
@@ -531,19 +482,19 @@ impl<const D: usize> TotalLagrangian<D> {
         force: Option<(&dyn BodyForce<f64, D>, f64)>,
     ) -> bool {
         let row = self.row();
-        let Self { work: Work { values, slopes, b, .. }, particles, .. } = self;
-        let size = piece(b[..].len()).div_ceil(row) * row;
-        let mut values = values.each_mut().map(|array| array.chunks_mut(size));
-        let mut slopes =
-            slopes.each_mut().map(|arrays| arrays.each_mut().map(|array| array.chunks_mut(size)));
+        let Self { components, b, particles, .. } = self;
+        let size = piece(b.len()).div_ceil(row) * row;
+        let mut arrays = components.each_mut().map(|Component { values, slopes, .. }| {
+            (values.chunks_mut(size), slopes.each_mut().map(|array| array.chunks_mut(size)))
+        });
         let pieces: Vec<_> = b
             .chunks_mut(size)
             .enumerate()
             .map(|(piece, b)| Places {
                 first: piece * size,
-                values: values.each_mut().map(|chunks| chunks.next().unwrap_or_default()),
-                slopes: slopes.each_mut().map(|chunks| {
-                    chunks.each_mut().map(|chunks| chunks.next().unwrap_or_default())
+                values: arrays.each_mut().map(|(values, _)| values.next().unwrap_or_default()),
+                slopes: arrays.each_mut().map(|(_, slopes)| {
+                    slopes.each_mut().map(|chunks| chunks.next().unwrap_or_default())
                 }),
                 b,
             })
@@ -583,86 +534,6 @@ impl<const D: usize> TotalLagrangian<D> {
         } else {
             let position = position.iter().copied().collect();
             StepError::NotFinite { step, time, particle, position, J }
-        }
-    }
-
-    /// Evaluates a component and its slopes at the particles; its values only if they are needed.
-    fn evaluate(&mut self, component: usize, field: Field, with_values: bool) {
-        let coefficients = match field {
-            Field::Displacement => &self.u[component],
-            Field::Velocity => &self.v[component],
-        };
-        let Work { values, slopes, partial, .. } = &mut self.work;
-        let (mut inner, mut size) = (1, coefficients.len());
-        for k in 0..D {
-            let basis = &self.bases[k][usize::from(k == component)];
-            let next = size / basis.functions * basis.points;
-            let (before, after) = partial.split_at_mut(k);
-            let source = |part: usize| match before.last() {
-                Some(arrays) => &arrays[part][..size],
-                None => &coefficients[..],
-            };
-            match after.first_mut() {
-                Some(arrays) => {
-                    for part in 0..=k {
-                        basis.evaluate(Part::Value, inner, source(part), &mut arrays[part][..next]);
-                    }
-                    basis.evaluate(Part::Slope, inner, source(0), &mut arrays[k + 1][..next]);
-                }
-                None => {
-                    let slopes = &mut slopes[component];
-                    if with_values {
-                        basis.evaluate(Part::Value, inner, source(0), &mut values[component]);
-                    }
-                    for j in 0..k {
-                        basis.evaluate(Part::Value, inner, source(j + 1), &mut slopes[j]);
-                    }
-                    basis.evaluate(Part::Slope, inner, source(0), &mut slopes[k]);
-                }
-            }
-            (inner, size) = (inner * basis.points, next);
-        }
-    }
-
-    /// Integrates what stands at the particles, as factors of values or of slopes or of both, against the functions of a
-    /// component.
-    fn integrate(&mut self, component: usize, of: Factors, coefficients: &mut [f64]) {
-        let Work { values, slopes, partial, .. } = &mut self.work;
-        let (mut inner, mut size) = (values[component].len(), values[component].len());
-        for k in (0..D).rev() {
-            let basis = &self.bases[k][usize::from(k == component)];
-            inner /= basis.points;
-            let next = size / basis.points * basis.functions;
-            let (before, after) = partial.split_at_mut(k);
-            let is_first = k == D - 1;
-            // Values come first, then slopes by axis.
-            let source = |part: usize| match after.first() {
-                Some(arrays) => &arrays[part][..size],
-                None if part == 0 => &values[component][..],
-                None => &slopes[component][part - 1][..],
-            };
-            let mut target = |part: usize, terms: &[(Part, usize)]| {
-                let array = match before.last_mut() {
-                    Some(arrays) => &mut arrays[part][..next],
-                    None => &mut *coefficients,
-                };
-                array.fill(0.0);
-                for &(weights, part) in terms {
-                    basis.integrate(weights, inner, source(part), array);
-                }
-            };
-            let (of_values, of_slopes) = ((Part::Value, 0), (Part::Slope, k + 1));
-            match of {
-                Factors::Values => target(0, &[of_values]),
-                Factors::Slopes if is_first => target(0, &[of_slopes]),
-                Factors::Slopes | Factors::Both => target(0, &[of_values, of_slopes]),
-            }
-            if of != Factors::Values {
-                for j in 1..=k {
-                    target(j, &[(Part::Value, j)]);
-                }
-            }
-            size = next;
         }
     }
 }
@@ -754,78 +625,6 @@ impl<L: Law<f64>, const D: usize> Stress<'_, L, D> {
     }
 }
 
-/// Solves in place for coefficients, `functions` by axis, with one mass matrix for each axis.
-fn solve<'a, const D: usize>(
-    functions: &[usize; D],
-    mass: impl Fn(usize) -> &'a Mass,
-    coefficients: &mut [f64],
-) {
-    let mut inner = 1;
-    for (k, count) in functions.iter().enumerate() {
-        mass(k).solve(inner, coefficients);
-        inner *= count;
-    }
-}
-
-/// A field that coefficients stand for.
-#[derive(Clone, Copy)]
-enum Field {
-    Displacement,
-    Velocity,
-}
-
-/// The factors of an integrand: of values of the functions, of their slopes, or of both.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Factors {
-    Values,
-    Slopes,
-    Both,
-}
-
-impl<const D: usize> Work<D> {
-    fn new(bases: &[[Basis; 2]; D], particles: usize, zeros: &[Vec<f64>; D]) -> Self {
-        let size = |axis: usize| (0..D).map(|k| layer(&bases[k], k <= axis)).product::<usize>();
-        let stage = |axis: usize| vec![vec![0.0; size(axis)]; axis + 2];
-        let points = || vec![0.0; particles];
-        Self {
-            values: array::from_fn(|_| points()),
-            slopes: array::from_fn(|_| array::from_fn(|_| points())),
-            partial: (0..D - 1).map(stage).collect(),
-            b: vec![SVector::zeros(); particles],
-            given: zeros.clone(),
-            product: [Vec::new(), Vec::new()],
-        }
-    }
-
-    /// `sums -= factor * M * given`, `M` being the product of one matrix for each axis.
-    fn subtract_product<'a>(
-        &mut self,
-        functions: &[usize; D],
-        matrix: impl Fn(usize) -> &'a Band,
-        factor: f64,
-        given: &[f64],
-        sums: &mut [f64],
-    ) {
-        let [product, next] = &mut self.product;
-        product.clear();
-        product.extend_from_slice(given);
-        next.resize(given.len(), 0.0);
-        let mut inner = 1;
-        for (k, count) in functions.iter().enumerate() {
-            matrix(k).multiply(inner, product, next);
-            mem::swap(product, next);
-            inner *= count;
-        }
-        sums.iter_mut().zip(product).for_each(|(sum, part)| *sum -= factor * *part);
-    }
-}
-
-/// Places along an axis: particles, or at most so many coefficients.
-fn layer(bases: &[Basis; 2], of_particles: bool) -> usize {
-    let [even, odd] = bases;
-    if of_particles { even.points } else { even.functions.max(odd.functions) }
-}
-
 /// The Cartesian vector with these components in row `row` of particles.
 fn cartesian<const D: usize>(
     rows: &[Row<D>],
@@ -840,17 +639,6 @@ fn cartesian<const D: usize>(
 fn is_deformation<const D: usize>(F: &SMatrix<f64, D, D>) -> bool {
     let J = determinant(F);
     J > 0.0 && J < f64::INFINITY
-}
-
-/// `target += factor * source`, component by component.
-fn add<const D: usize>(target: &mut [Vec<f64>; D], factor: f64, source: &[Vec<f64>; D]) {
-    for (target, source) in target.iter_mut().zip(source) {
-        let size = piece(target.len());
-        each_chunk(target, size, &|piece, target| {
-            let source = &source[piece * size..];
-            target.iter_mut().zip(source).for_each(|(x, y)| *x += factor * y);
-        });
-    }
 }
 
 /// The particles along an axis.
@@ -1027,12 +815,12 @@ fn doubles<const D: usize>(grid: &Grid<D>, degree: usize) -> f64 {
     let count = |along: &dyn Fn(usize) -> f64| (0..D).map(along).product::<f64>();
     // Positions, velocities, values and the body force; gradients and slopes; masses and volumes.
     let mut doubles = count(&|k| points[k]) * (5.0 * in_vector + 2.0 * in_matrix + 2.0);
-    // Displacements, velocities, accelerations and given ones; two products of the mass matrix.
-    doubles += count(&|k| functions[k]) * (4.0 * in_vector + 2.0);
+    // Displacements, velocities, accelerations, given ones and two products of the mass matrix.
+    doubles += count(&|k| functions[k]) * (6.0 * in_vector);
     for axis in 0..D {
         if axis + 1 < D {
             let partial = count(&|k| if k <= axis { points[k] } else { functions[k] });
-            doubles += partial * (axis as f64 + 2.0);
+            doubles += partial * in_vector * (axis as f64 + 2.0);
         }
         // Of both kinds of components: values, slopes, the first function and the weight; three matrices.
         doubles += 2.0 * points[axis] * (2.0 * width + 2.0) + 2.0 * functions[axis] * 3.0 * width;
@@ -1054,15 +842,16 @@ mod tests {
 
     /// The numbers that a simulation holds, counted.
     fn held<const D: usize>(body: &TotalLagrangian<D>) -> usize {
-        let TotalLagrangian { particles, work, faces, .. } = body;
+        let TotalLagrangian { particles, components, b, faces, .. } = body;
         let Particles { X, x, v, F, mass, volume, .. } = particles;
-        let of_vectors = X.len() + x.len() + v.len() + work.b.len();
+        let of_vectors = X.len() + x.len() + v.len() + b.len();
         let of_particles = D * of_vectors + D * D * F.len() + mass.len() + volume.len();
-        let fields = [&body.u, &body.v, &body.a, &work.given];
-        let coefficients: usize = fields.into_iter().flatten().map(Vec::len).sum();
-        let values = work.values.iter().chain(work.slopes.iter().flatten());
-        let values: usize = values.chain(work.partial.iter().flatten()).map(Vec::len).sum();
-        let products: usize = work.product.iter().map(Vec::len).sum();
+        let of_component = |component: &Component<D>| -> usize {
+            let Component { u, v, a, given, values, slopes, partial, product, .. } = component;
+            let arrays = [u, v, a, given, values].into_iter().chain(slopes);
+            arrays.chain(partial.iter().flatten()).chain(product).map(Vec::len).sum()
+        };
+        let of_components: usize = components.iter().map(of_component).sum();
         let of_sides = |face: &Face<D>| {
             let vectors = face.X.len() + face.values.len() + D * face.frames.len();
             D * vectors + face.areas.len()
@@ -1073,9 +862,9 @@ mod tests {
         let along = |basis: &Basis| {
             basis.points * (2 * basis.width + 2) + 3 * basis.functions * basis.width
         };
-        let along: usize = body.bases.iter().flatten().map(along).sum();
+        let along: usize = body.operators.bases.iter().flatten().map(along).sum();
         let of_sides: usize = faces.iter().map(of_sides).sum();
-        of_particles + coefficients + values + products + of_sides + rows + along
+        of_particles + of_components + of_sides + rows + along
     }
 
     #[test]
