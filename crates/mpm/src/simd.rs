@@ -4,7 +4,9 @@
 //! instructions where the processor has no single one. All instances thus give the same bits.
 
 use std::ops::{Add, Mul, Sub};
+use std::sync::atomic::{AtomicU8, Ordering};
 
+use bytemuck::Pod;
 use nalgebra::RealField;
 use pulp::{Arch, Scalar, Simd, WithSimd};
 
@@ -237,13 +239,13 @@ impl<T: Lanes, V: Vectors> Number for Eight<T, V> {
 /// question would have to be answered for each call before anything else is compiled.
 #[cfg(target_arch = "x86_64")]
 pub trait Lanes:
-    RealField + Copy + x86::Instructions<pulp::x86::V3> + x86::Instructions<pulp::x86::V4>
+    RealField + Pod + x86::Instructions<pulp::x86::V3> + x86::Instructions<pulp::x86::V4>
 {
 }
 
 /// A number that registers hold several of: `f64` or `f32`.
 #[cfg(not(target_arch = "x86_64"))]
-pub trait Lanes: RealField + Copy {}
+pub trait Lanes: RealField + Pod {}
 
 impl Lanes for f64 {}
 impl Lanes for f32 {}
@@ -533,123 +535,65 @@ impl<L: Loop, V: Vectors> WithSimd for Instance<L, V> {
     }
 }
 
-/// Runs the widest instance that this processor supports.
-#[cfg(not(test))]
-#[inline(never)]
-pub(crate) fn dispatch(work: impl Loop) {
-    match Arch::new() {
-        #[cfg(target_arch = "x86_64")]
-        Arch::V4(simd) => Simd::vectorize(simd, Instance(work, simd)),
-        #[cfg(target_arch = "x86_64")]
-        Arch::V3(simd) => Simd::vectorize(simd, Instance(work, simd)),
-        arch => arch.dispatch(Instance(work, Scalar::new())),
+/// Vector registers, the narrowest first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Registers {
+    /// None: one number after the other.
+    Scalar,
+    /// Of four doubles (AVX2 with fused multiply-adds).
+    Avx2,
+    /// Of eight doubles (AVX-512).
+    Avx512,
+}
+
+/// The widest registers that kernels may use.
+static WIDEST: AtomicU8 = AtomicU8::new(Registers::Avx512 as u8);
+
+impl Registers {
+    /// Those that this processor has.
+    pub fn present() -> Vec<Self> {
+        match Arch::new() {
+            #[cfg(target_arch = "x86_64")]
+            Arch::V4(_) => vec![Self::Scalar, Self::Avx2, Self::Avx512],
+            #[cfg(target_arch = "x86_64")]
+            Arch::V3(_) => vec![Self::Scalar, Self::Avx2],
+            _ => vec![Self::Scalar],
+        }
+    }
+
+    /// Keeps all kernels of this process from wider registers than these. No result depends on it.
+    pub fn use_at_most(self) {
+        WIDEST.store(self as u8, Ordering::Relaxed);
     }
 }
 
-/// Runs the instance that a test chose on this thread, or else the widest one. One set of instances serves both, so that no
-/// kernel is compiled twice.
-#[cfg(test)]
+/// Runs the widest instance that this processor supports and that is [allowed](Registers::use_at_most).
 #[inline(never)]
 pub(crate) fn dispatch(work: impl Loop) {
-    tests::LEVEL.get().unwrap_or_else(tests::Level::widest).run(work);
+    #[cfg(target_arch = "x86_64")]
+    {
+        let widest = WIDEST.load(Ordering::Relaxed);
+        let avx2 = match Arch::new() {
+            Arch::V4(simd) if widest > Registers::Avx2 as u8 => {
+                return Simd::vectorize(simd, Instance(work, simd));
+            }
+            Arch::V4(simd) => Some(*simd),
+            Arch::V3(simd) => Some(simd),
+            _ => None,
+        };
+        match avx2.filter(|_| widest > Registers::Scalar as u8) {
+            Some(simd) => Simd::vectorize(simd, Instance(work, simd)),
+            None => Scalar::new().vectorize(Instance(work, Scalar::new())),
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    Arch::new().dispatch(Instance(work, Scalar::new()));
 }
 
 #[cfg(test)]
 mod tests {
-    use std::cell::Cell;
-
-    use nalgebra::SVector;
-    use pulp::Scalar;
-
     use super::*;
-    use crate::{
-        Body, Grid, Integrator, Material, NoBodyForce, Particles, Settings, Shape, Simulation,
-        Transfer,
-    };
-
-    thread_local! {
-        /// The instance that this thread has to take instead of the widest one.
-        pub(super) static LEVEL: Cell<Option<Level>> = const { Cell::new(None) };
-    }
-
-    #[derive(Clone, Copy, Debug)]
-    pub(super) enum Level {
-        Scalar,
-        #[cfg(target_arch = "x86_64")]
-        V3(pulp::x86::V3),
-        #[cfg(target_arch = "x86_64")]
-        V4(pulp::x86::V4),
-    }
-
-    impl Level {
-        pub(super) fn run(self, work: impl Loop) {
-            match self {
-                Self::Scalar => Scalar::new().vectorize(Instance(work, Scalar::new())),
-                #[cfg(target_arch = "x86_64")]
-                Self::V3(simd) => Simd::vectorize(simd, Instance(work, simd)),
-                #[cfg(target_arch = "x86_64")]
-                Self::V4(simd) => Simd::vectorize(simd, Instance(work, simd)),
-            }
-        }
-
-        pub(super) fn widest() -> Self {
-            match Arch::new() {
-                #[cfg(target_arch = "x86_64")]
-                Arch::V4(simd) => Self::V4(simd),
-                #[cfg(target_arch = "x86_64")]
-                Arch::V3(simd) => Self::V3(simd),
-                _ => Self::Scalar,
-            }
-        }
-
-        /// Those that this processor has.
-        fn all() -> Vec<Self> {
-            let mut all = vec![Self::Scalar];
-            #[cfg(target_arch = "x86_64")]
-            {
-                all.extend(pulp::x86::V3::try_new().map(Self::V3));
-                all.extend(pulp::x86::V4::try_new().map(Self::V4));
-            }
-            all
-        }
-    }
-
-    /// The state of a square or a cube after some steps, as bits, computed by some threads that all have the same instance.
-    fn bits<T: Lanes, const D: usize>(
-        level: Level,
-        threads: usize,
-        (shape, integrator, transfer): (Shape, Integrator, Transfer),
-    ) -> Vec<u64> {
-        let number = nalgebra::convert::<f64, T>;
-        // Of three bins in the plane, of two in space.
-        let cells = if D == 3 { 7 } else { 21 };
-        let spacing = number(1.0 / cells as f64);
-        let walls = [[true; 2]; D];
-        let grid = Grid { lower: SVector::zeros(), spacing, cells: [cells; D], walls };
-        let mut body = Body::lattice(&grid, 2, number(1.0), |_| true);
-        for (v, X) in body.particles.v.iter_mut().zip(&body.particles.X) {
-            let angle: SVector<T, D> = X * T::pi();
-            // Along each axis it changes with the next one too, for gradients off the diagonal.
-            *v = SVector::from_fn(|a, _| number(20.0) * angle[a].sin() * angle[(a + 1) % D].cos());
-        }
-        let material = Material::NeoHookean { lambda: number(5769.0), mu: number(3846.0) };
-        let time_step = number(2e-4);
-        let settings =
-            Settings { shape, integrator, transfer, time_step, halve_first_acceleration: false };
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .start_handler(move |_| LEVEL.set(Some(level)))
-            .build()
-            .unwrap();
-        pool.install(|| {
-            let mut simulation = Simulation::new(grid, body, material, settings).unwrap();
-            let steps = if D == 3 { 2 } else { 5 };
-            (0..steps).for_each(|_| simulation.step(&NoBodyForce).unwrap());
-            let Particles { x, v, F, .. } = simulation.particles();
-            let numbers = x.iter().chain(v).flatten().chain(F.iter().flatten());
-            numbers.map(|&value| nalgebra::convert_unchecked::<T, f64>(value).to_bits()).collect()
-        })
-    }
 
     /// All operations on some numbers, one after the other.
     fn operations<T: Lanes>(vectors: impl Vectors) -> Vec<[T; 4]> {
@@ -698,71 +642,18 @@ mod tests {
         .into()
     }
 
+    #[cfg(target_arch = "x86_64")]
+    fn check(simd: impl Vectors) {
+        assert_eq!(operations::<f64>(simd), operations::<f64>(Scalar::new()));
+        assert_eq!(operations::<f32>(simd), operations::<f32>(Scalar::new()));
+        assert_eq!(operations8::<f64>(simd), operations8::<f64>(Scalar::new()));
+        assert_eq!(operations8::<f32>(simd), operations8::<f32>(Scalar::new()));
+    }
+
+    #[cfg(target_arch = "x86_64")]
     #[test]
     fn instructions_do_what_is_written_out_for_processors_without_them() {
-        for level in Level::all() {
-            let (double, single): (Vec<[f64; 4]>, Vec<[f32; 4]>) = match level {
-                Level::Scalar => continue,
-                #[cfg(target_arch = "x86_64")]
-                Level::V3(simd) => (operations(simd), operations(simd)),
-                #[cfg(target_arch = "x86_64")]
-                Level::V4(simd) => (operations(simd), operations(simd)),
-            };
-            let (double8, single8): (Vec<[f64; 8]>, Vec<[f32; 8]>) = match level {
-                Level::Scalar => continue,
-                #[cfg(target_arch = "x86_64")]
-                Level::V3(simd) => (operations8(simd), operations8(simd)),
-                #[cfg(target_arch = "x86_64")]
-                Level::V4(simd) => (operations8(simd), operations8(simd)),
-            };
-            assert_eq!(double8, operations8(Scalar::new()), "{level:?}");
-            assert_eq!(single8, operations8(Scalar::new()), "{level:?}");
-            assert_eq!(double, operations(Scalar::new()), "{level:?}");
-            assert_eq!(single, operations(Scalar::new()), "{level:?}");
-        }
-    }
-
-    /// Every shape function with every transfer; integrators take turns, so that each meets each shape and each transfer.
-    fn schemes() -> impl Iterator<Item = (Shape, Integrator, Transfer)> {
-        const SHAPES: [Shape; 7] = [
-            Shape::Linear,
-            Shape::Ugimp,
-            Shape::Gimp,
-            Shape::Bspline2,
-            Shape::Bspline3,
-            Shape::Cpdi,
-            Shape::Cpdi2,
-        ];
-        const TRANSFERS: [Transfer; 4] =
-            [Transfer::Flip, Transfer::Pic, Transfer::Apic, Transfer::Xpic(3)];
-        const INTEGRATORS: [Integrator; 5] =
-            [Integrator::Usf, Integrator::Usl, Integrator::Musl, Integrator::Usavg, Integrator::Cd];
-        let pairs = SHAPES.into_iter().enumerate().flat_map(|(i, shape)| {
-            TRANSFERS.into_iter().enumerate().map(move |(j, transfer)| (i + 2 * j, shape, transfer))
-        });
-        pairs.map(|(turn, shape, transfer)| (shape, INTEGRATORS[turn % 5], transfer))
-    }
-
-    fn check_bits<T: Lanes, const D: usize>() {
-        for scheme in schemes() {
-            let plain = bits::<T, D>(Level::Scalar, 1, scheme);
-            for (turn, level) in Level::all().into_iter().rev().enumerate() {
-                // The widest registers with every number of threads, the others with some.
-                for threads in [1, 2, 3].into_iter().filter(|&n| turn == 0 || n == turn + 1) {
-                    let same = bits::<T, D>(level, threads, scheme) == plain;
-                    assert!(same, "{D} {scheme:?} {level:?} {threads} threads");
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn all_registers_and_numbers_of_threads_give_the_same_bits() {
-        check_bits::<f64, 1>();
-        check_bits::<f64, 2>();
-        check_bits::<f64, 3>();
-        check_bits::<f32, 1>();
-        check_bits::<f32, 2>();
-        check_bits::<f32, 3>();
+        pulp::x86::V3::try_new().into_iter().for_each(|simd| check(simd));
+        pulp::x86::V4::try_new().into_iter().for_each(|simd| check(simd));
     }
 }

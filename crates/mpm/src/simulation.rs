@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use bytemuck::{Pod, bytes_of_mut, cast_slice_mut};
+use bytemuck::{bytes_of_mut, cast_slice_mut};
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::body::{Body, Mesh};
@@ -20,6 +20,7 @@ use crate::particles::Particles;
 use crate::scheme::{Settings, Shape, Taken};
 use crate::shape_function::HALF_SIZE_LIMIT;
 use crate::simd::Lanes;
+use crate::solver::Scalar;
 use crate::state::State;
 use crate::step::{StepTimes, is_fused};
 use crate::support::Support;
@@ -35,7 +36,7 @@ pub struct Simulation<T, const D: usize> {
     failed: Option<StepError>,
 }
 
-impl<T: Lanes, const D: usize> Simulation<T, D> {
+impl<T: Scalar<D>, const D: usize> Simulation<T, D> {
     /// Sets up a simulation at time 0, of a [`Body`] or of [`Particles`] with boxes.
     ///
     /// # Errors
@@ -47,9 +48,24 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
         material: Material<T>,
         settings: Settings<T>,
     ) -> Result<Self, SetupError> {
-        Self::set_up(grid, body.into(), material, settings)
+        T::set_up(grid, body.into(), material, settings)
     }
 
+    /// Advances by one time step.
+    ///
+    /// All steps of a simulation are to be given the same body force: a step may evaluate it for the next one as well.
+    ///
+    /// # Errors
+    ///
+    /// Where a particle turns inside out, leaves the grid, grows too large or takes on values that are not finite. The
+    /// particles then keep the state in which that was found, and every further call returns the same error.
+    pub fn step(&mut self, body_force: &dyn BodyForce<T, D>) -> Result<(), StepError> {
+        T::step(self, body_force)
+    }
+}
+
+impl<T: Lanes, const D: usize> Simulation<T, D> {
+    /// See [`new`](Self::new).
     pub(crate) fn set_up(
         grid: Grid<T, D>,
         body: Body<T, D>,
@@ -72,15 +88,8 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
         Ok(Self { grid, material, settings, state, steps_done: 0, failed: None })
     }
 
-    /// Advances by one time step.
-    ///
-    /// All steps of a simulation are to be given the same body force: a step may evaluate it for the next one as well.
-    ///
-    /// # Errors
-    ///
-    /// Where a particle turns inside out, leaves the grid, grows too large or takes on values that are not finite. The
-    /// particles then keep the state in which that was found, and every further call returns the same error.
-    pub fn step(&mut self, body_force: &dyn BodyForce<T, D>) -> Result<(), StepError> {
+    /// See [`step`](Self::step).
+    pub(crate) fn advance(&mut self, body_force: &dyn BodyForce<T, D>) -> Result<(), StepError> {
         if let Some(error) = &self.failed {
             return Err(error.clone());
         }
@@ -153,7 +162,7 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
     }
 }
 
-impl<T: RealField + Pod, const D: usize> Simulation<T, D> {
+impl<T: Scalar<D>, const D: usize> Simulation<T, D> {
     /// The state between two steps, as slices of bytes in this machine's order; their number and lengths follow from the set-up.
     ///
     /// A copy of these bytes, written over the state of a simulation with the same set-up, continues the run to the same bits.

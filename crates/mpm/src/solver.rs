@@ -1,12 +1,12 @@
 //! Solvers of any scheme behind one door, compiled with this crate.
 
-use nalgebra::SVector;
+use nalgebra::{SMatrix, SVector};
 
 use crate::body::Body;
 use crate::body_force::BodyForce;
 use crate::error::{SetupError, StepError};
 use crate::grid::Grid;
-use crate::material::Material;
+use crate::material::{Material, SIDE_BY_SIDE};
 use crate::particles::Particles;
 use crate::scheme::Settings;
 use crate::simd::Lanes;
@@ -30,6 +30,24 @@ pub trait Solver<T, const D: usize> {
 
     /// The state between two steps, see [`Simulation::state`].
     fn state(&mut self) -> Vec<&mut [u8]>;
+}
+
+impl<T: Scalar<D>, const D: usize> Solver<T, D> for Simulation<T, D> {
+    fn step(&mut self, body_force: &dyn BodyForce<T, D>) -> Result<(), StepError> {
+        Simulation::step(self, body_force)
+    }
+
+    fn observe(&mut self) -> (&Particles<T, D>, &Material<T>) {
+        (self.particles(), self.material())
+    }
+
+    fn velocity_lag(&self) -> T {
+        Simulation::velocity_lag(self)
+    }
+
+    fn state(&mut self) -> Vec<&mut [u8]> {
+        Simulation::state(self)
+    }
 }
 
 /// A simulation in the total Lagrangian formulation, and its motion at time 0.
@@ -56,20 +74,47 @@ struct DrivenBody<'a, const D: usize> {
 
 /// The precisions of the solver: `f64` and `f32`.
 ///
-/// Steps are generic over precision and dimension. Here they are set up by functions that are not, so that they are compiled
-/// once, with this crate.
+/// Steps and stresses are generic over precision and dimension. The functions here are not, so that kernels are compiled once,
+/// with this crate, and not with each that uses it.
 pub trait Scalar<const D: usize>: Lanes {
-    /// As [`Simulation::new`].
-    ///
-    /// # Errors
-    ///
-    /// As [`Simulation::new`].
-    fn simulation(
+    /// [`Simulation::new`].
+    #[doc(hidden)]
+    fn set_up(
         grid: Grid<Self, D>,
         body: Body<Self, D>,
         material: Material<Self>,
         settings: Settings<Self>,
-    ) -> Result<Box<dyn Solver<Self, D>>, SetupError>;
+    ) -> Result<Simulation<Self, D>, SetupError>;
+
+    /// [`Simulation::step`].
+    #[doc(hidden)]
+    fn step(
+        simulation: &mut Simulation<Self, D>,
+        body_force: &dyn BodyForce<Self, D>,
+    ) -> Result<(), StepError>;
+
+    /// [`Material::kirchhoff`].
+    #[doc(hidden)]
+    fn kirchhoff(law: &Material<Self>, F: &SMatrix<Self, D, D>) -> Option<SMatrix<Self, D, D>>;
+
+    /// [`Material::first_piola_kirchhoff`].
+    #[doc(hidden)]
+    fn first_piola_kirchhoff(
+        law: &Material<Self>,
+        F: &SMatrix<Self, D, D>,
+    ) -> Option<SMatrix<Self, D, D>>;
+
+    /// [`Material::first_piola_kirchhoff_side_by_side`].
+    #[doc(hidden)]
+    fn first_piola_kirchhoff_side_by_side(
+        law: &Material<Self>,
+        F: &[[[Self; SIDE_BY_SIDE]; D]; D],
+        P: &mut [[[Self; SIDE_BY_SIDE]; D]; D],
+    );
+
+    /// [`Material::von_mises`].
+    #[doc(hidden)]
+    fn von_mises(law: &Material<Self>, F: &SMatrix<Self, D, D>) -> Option<Self>;
 
     /// A simulation in the total Lagrangian formulation.
     ///
@@ -85,32 +130,47 @@ pub trait Scalar<const D: usize>: Lanes {
 macro_rules! scalar {
     ($($T:tt: $($D:literal)*;)*) => {
         $($(
-            impl Solver<$T, $D> for Simulation<$T, $D> {
-                fn step(&mut self, body_force: &dyn BodyForce<$T, $D>) -> Result<(), StepError> {
-                    Simulation::step(self, body_force)
-                }
-
-                fn observe(&mut self) -> (&Particles<$T, $D>, &Material<$T>) {
-                    (self.particles(), self.material())
-                }
-
-                fn velocity_lag(&self) -> $T {
-                    Simulation::velocity_lag(self)
-                }
-
-                fn state(&mut self) -> Vec<&mut [u8]> {
-                    Simulation::state(self)
-                }
-            }
-
             impl Scalar<$D> for $T {
-                fn simulation(
+                fn set_up(
                     grid: Grid<Self, $D>,
                     body: Body<Self, $D>,
                     material: Material<Self>,
                     settings: Settings<Self>,
-                ) -> Result<Box<dyn Solver<Self, $D>>, SetupError> {
-                    Ok(Box::new(Simulation::new(grid, body, material, settings)?))
+                ) -> Result<Simulation<Self, $D>, SetupError> {
+                    Simulation::set_up(grid, body, material, settings)
+                }
+
+                fn step(
+                    simulation: &mut Simulation<Self, $D>,
+                    body_force: &dyn BodyForce<Self, $D>,
+                ) -> Result<(), StepError> {
+                    simulation.advance(body_force)
+                }
+
+                fn kirchhoff(
+                    law: &Material<Self>,
+                    F: &SMatrix<Self, $D, $D>,
+                ) -> Option<SMatrix<Self, $D, $D>> {
+                    law.kirchhoff_here(F)
+                }
+
+                fn first_piola_kirchhoff(
+                    law: &Material<Self>,
+                    F: &SMatrix<Self, $D, $D>,
+                ) -> Option<SMatrix<Self, $D, $D>> {
+                    law.first_piola_kirchhoff_here(F)
+                }
+
+                fn first_piola_kirchhoff_side_by_side(
+                    law: &Material<Self>,
+                    F: &[[[Self; SIDE_BY_SIDE]; $D]; $D],
+                    P: &mut [[[Self; SIDE_BY_SIDE]; $D]; $D],
+                ) {
+                    law.first_piola_kirchhoff_side_by_side_here(F, P);
+                }
+
+                fn von_mises(law: &Material<Self>, F: &SMatrix<Self, $D, $D>) -> Option<Self> {
+                    law.von_mises_here(F)
                 }
 
                 fn total_lagrangian<'a>(

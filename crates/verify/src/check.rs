@@ -5,7 +5,7 @@
 //! determinant of `F`, `P` with the solver's hand-written law, and `b` with `a - Div P / rho0`. `u` itself is the
 //! definition; nothing lies below it. Derivatives are extrapolated finite differences that know their own error.
 
-use mmsmith_mpm::Material;
+use mmsmith_mpm::{Material, Scalar};
 use mmsmith_runtime::{AnySolution, Boundary, Condition, Domain, Fields, Solution, Surface};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
@@ -260,7 +260,10 @@ const LEAST_VOLUME: f64 = 0.1;
 fn check_in<const D: usize>(
     solution: &dyn Solution<f64, D>,
     count: usize,
-) -> Result<CheckReport, CheckError> {
+) -> Result<CheckReport, CheckError>
+where
+    f64: Scalar<D>,
+{
     if count == 0 {
         return Err(CheckError::NoPoints);
     }
@@ -407,7 +410,10 @@ fn field_findings<const D: usize>(
     law: Option<&Material<f64>>,
     samples: &[(SVector<f64, D>, f64)],
     size: f64,
-) -> Vec<Finding> {
+) -> Vec<Finding>
+where
+    f64: Scalar<D>,
+{
     let (domain, period, density) = (solution.domain(), solution.period(), solution.density());
     let stiffness = match law {
         Some(law) => {

@@ -7,10 +7,10 @@
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-use mmsmith_mpm::Scalar;
-use mmsmith_runtime::{AnySolution, Real, Solution};
+use mmsmith_runtime::{AnySolution, Solution};
 
 use crate::case::{Arithmetic, Case};
+use crate::dimension::Precision;
 use crate::dimension::in_arithmetic;
 use crate::drive::Driven;
 use crate::error::CaseError;
@@ -63,7 +63,7 @@ pub fn time_steps(
     )
 }
 
-fn time_in<T: Real + Scalar<D>, const D: usize>(
+fn time_in<T: Precision<D>, const D: usize>(
     exact: &dyn Solution<f64, D>,
     model: &dyn Solution<T, D>,
     case: &Case,

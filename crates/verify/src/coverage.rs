@@ -3,7 +3,7 @@
 //! A mistake in a term that vanishes in a solution cannot be seen with it. The share of a part is measured over sample
 //! points and times: root mean squares, relative to those of what the part is a part of.
 
-use mmsmith_mpm::Material;
+use mmsmith_mpm::{Material, Scalar};
 use mmsmith_runtime::{AnySolution, Condition, Solution};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
@@ -130,7 +130,10 @@ struct Squares {
 fn coverage_in<const D: usize>(
     solution: &dyn Solution<f64, D>,
     count: usize,
-) -> Result<Vec<Share>, CheckError> {
+) -> Result<Vec<Share>, CheckError>
+where
+    f64: Scalar<D>,
+{
     if count == 0 {
         return Err(CheckError::NoPoints);
     }

@@ -5,11 +5,12 @@ use std::time::Instant;
 
 use cpu_time::ProcessTime;
 use mmsmith_mpm::fault::{Fault, Planted};
-use mmsmith_mpm::{AtTime, BodyForce, Scalar, Solver, StepError};
+use mmsmith_mpm::{AtTime, BodyForce, Solver, StepError};
 use mmsmith_runtime::{BodyForceAtPoints, Real, Solution};
 use nalgebra::SVector;
 
 use crate::case::Case;
+use crate::dimension::Precision;
 use crate::error::CaseError;
 use crate::scene::Scene;
 use crate::scheme::Scheme;
@@ -49,7 +50,7 @@ pub(crate) enum Outcome<R> {
 /// Whether stepping goes on, or what an observer leaves it with.
 pub(crate) type Seen<R> = Result<ControlFlow<R>, CaseError>;
 
-impl<'a, T: Real + Scalar<D>, const D: usize> Driven<'a, T, D> {
+impl<'a, T: Precision<D>, const D: usize> Driven<'a, T, D> {
     /// The solver of a case at time zero with steps of `time_step`, whatever its formulation.
     pub(crate) fn set_up(
         exact: &'a dyn Solution<f64, D>,

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use crate::dimension::Precision;
+
 use mmsmith_mpm::{Material, Particles};
 use mmsmith_runtime::{Real, Solution};
 use mmsmith_vtk::{Array, Error, Frame, Series, Values};
@@ -29,7 +31,7 @@ pub struct Snapshot {
 
 impl Snapshot {
     /// Keeps the state after a step, told with the number of all steps, if it is the one wanted.
-    pub(crate) fn take<T: Real, const D: usize>(
+    pub(crate) fn take<T: Precision<D>, const D: usize>(
         &mut self,
         state: (&Particles<T, D>, &Material<T>),
         exact: &dyn Solution<f64, D>,
@@ -71,7 +73,7 @@ impl FrameWriter {
     }
 
     /// Writes the state after `step` if it is one of those wanted.
-    pub(crate) fn write<T: Real, const D: usize>(
+    pub(crate) fn write<T: Precision<D>, const D: usize>(
         &mut self,
         state: (&Particles<T, D>, &Material<T>),
         exact: &dyn Solution<f64, D>,
@@ -104,7 +106,7 @@ pub(crate) fn step_of_frame(index: u64, count: u64, steps: u64) -> u64 {
 /// The velocity is the stored one, which centred differences hold half a step earlier. `stress` is Cauchy's. Both stresses are from the
 /// solver's law, with the component normal to the plane in two dimensions. `None` if a particle has no stress because it
 /// is inside out: no viewer reads numbers that are none.
-fn frame<T: Real, const D: usize>(
+fn frame<T: Precision<D>, const D: usize>(
     (particles, law): (&Particles<T, D>, &Material<T>),
     exact: &dyn Solution<f64, D>,
     step: u64,

@@ -8,6 +8,7 @@ use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
+use crate::dimension::Precision;
 use crate::norms::{PerField, PerNorm, Tallies, Tally, is_squarable, magnitude};
 
 /// Particles in a group that one thread works on; fixed, so that sums do not depend on the number of threads.
@@ -30,7 +31,7 @@ impl<'a, const D: usize> Comparison<'a, D> {
     }
 
     /// The errors of all particles at `time`, those of the velocity `lag` earlier.
-    pub(crate) fn measure<T: Real>(
+    pub(crate) fn measure<T: Precision<D>>(
         &self,
         observed: (&Particles<T, D>, &Material<T>),
         time: f64,
@@ -45,7 +46,7 @@ impl<'a, const D: usize> Comparison<'a, D> {
     }
 
     /// The particle of largest position error at `time`, the first one without a number if there is such.
-    pub(crate) fn worst_particle<T: Real>(
+    pub(crate) fn worst_particle<T: Precision<D>>(
         &self,
         observed: (&Particles<T, D>, &Material<T>),
         time: f64,
@@ -67,7 +68,7 @@ impl<'a, const D: usize> Comparison<'a, D> {
 
     /// The magnitudes of the errors of u, v, F and P, for runs of particles from number `first` on; `times` are those of
     /// positions and of velocities.
-    fn magnitudes<T: Real>(
+    fn magnitudes<T: Precision<D>>(
         &self,
         (particles, material): (&Particles<T, D>, &Material<T>),
         times: (f64, f64),

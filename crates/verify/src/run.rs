@@ -4,12 +4,13 @@ use std::fmt;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use mmsmith_mpm::{Scalar, StepError};
-use mmsmith_runtime::{AnySolution, Real, Solution};
+use mmsmith_mpm::StepError;
+use mmsmith_runtime::{AnySolution, Solution};
 use serde::{Serialize, Serializer};
 
 use crate::case::{Arithmetic, Case, law};
 use crate::checkpoint::{Checkpoints, Reached, TakenUp};
+use crate::dimension::Precision;
 use crate::dimension::in_arithmetic;
 use crate::drive::{Driven, Outcome, Stepped};
 use crate::error::CaseError;
@@ -209,7 +210,7 @@ pub fn run(
     )
 }
 
-fn run_in<T: Real + Scalar<D>, const D: usize>(
+fn run_in<T: Precision<D>, const D: usize>(
     exact: &dyn Solution<f64, D>,
     model: &dyn Solution<T, D>,
     case: &Case,
@@ -253,7 +254,7 @@ fn judged<const D: usize>(
 }
 
 /// Steps to the end and measures the errors on the way.
-fn follow<T: Real + Scalar<D>, const D: usize>(
+fn follow<T: Precision<D>, const D: usize>(
     driven: &mut Driven<'_, T, D>,
     exact: &dyn Solution<f64, D>,
     case: &Case,

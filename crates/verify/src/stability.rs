@@ -18,11 +18,12 @@
 
 use std::ops::ControlFlow;
 
-use mmsmith_mpm::{Material, Particles, Scalar, StepError};
+use mmsmith_mpm::{Material, Particles, StepError};
 use mmsmith_runtime::{AnySolution, Real, Solution};
 use serde::{Deserialize, Serialize};
 
 use crate::case::{Arithmetic, Case, CflSpeed, law};
+use crate::dimension::Precision;
 use crate::dimension::{in_arithmetic, in_dimension};
 use crate::drive::{Driven, Outcome, Stepped};
 use crate::error::CaseError;
@@ -409,7 +410,7 @@ fn scales<const D: usize>(
     Ok((unit, end.max(waves.time_step(LEAST_CELLS))))
 }
 
-fn run_in<T: Real + Scalar<D>, const D: usize>(
+fn run_in<T: Precision<D>, const D: usize>(
     exact: &dyn Solution<f64, D>,
     model: &dyn Solution<T, D>,
     case: &Case,
@@ -434,7 +435,7 @@ struct Run<'a, const D: usize> {
 }
 
 impl<const D: usize> Run<'_, D> {
-    fn follow<T: Real + Scalar<D>>(
+    fn follow<T: Precision<D>>(
         &self,
         driven: &mut Driven<'_, T, D>,
     ) -> Result<Observed, CaseError> {

@@ -10,12 +10,12 @@
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
-use mmsmith_mpm::Scalar;
 use mmsmith_runtime::{AnySolution, Real, Solution};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 
 use crate::case::{Arithmetic, Case};
+use crate::dimension::Precision;
 use crate::dimension::in_arithmetic;
 use crate::drive::{Driven, Outcome, Stepped};
 use crate::error::{CaseError, MOST_STEPS};
@@ -97,7 +97,7 @@ pub fn temporal(
     )
 }
 
-fn over<T: Real + Scalar<D>, const D: usize>(
+fn over<T: Precision<D>, const D: usize>(
     exact: &dyn Solution<f64, D>,
     model: &dyn Solution<T, D>,
     base: &Case,
@@ -167,7 +167,7 @@ struct State<const D: usize> {
 }
 
 /// The states at the common times of a run with `count` steps, or how it failed.
-fn observe<T: Real + Scalar<D>, const D: usize>(
+fn observe<T: Precision<D>, const D: usize>(
     mut driven: Driven<'_, T, D>,
     exact: &dyn Solution<f64, D>,
     scene: &Scene<D>,

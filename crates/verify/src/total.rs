@@ -4,12 +4,13 @@ use mmsmith_mpm::total_lagrangian::{
     Axis, BoundaryData, Composition, Coordinates, End, Grid, Layout, MassMatrix, Quantity, Scheme,
     Side,
 };
-use mmsmith_mpm::{Scalar, SetupError, Solver, TotalSetUp};
-use mmsmith_runtime::{AnySolution, Condition, Domain, Real, Solution, Surface};
+use mmsmith_mpm::{SetupError, Solver, TotalSetUp};
+use mmsmith_runtime::{AnySolution, Condition, Domain, Solution, Surface};
 use nalgebra::SVector;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
 use crate::case::{Case, CflSpeed, Extent, law};
+use crate::dimension::Precision;
 use crate::dimension::in_dimension;
 use crate::error::CaseError;
 use crate::scene::Scene;
@@ -241,7 +242,7 @@ impl<const D: usize> BoundaryData<D> for ExactBoundary<'_, D> {
 }
 
 /// The solver at time zero with steps of `time_step`.
-pub(crate) fn set_up<'a, T: Real + Scalar<D>, const D: usize>(
+pub(crate) fn set_up<'a, T: Precision<D>, const D: usize>(
     exact: &'a dyn Solution<f64, D>,
     total: &Total,
     case: &Case,

@@ -1,10 +1,11 @@
 //! Runs in the updated Lagrangian formulation: from a solution to a grid, particles with their domains, and their motion.
 
-use mmsmith_mpm::{Annulus, Body, Particles, Scalar, Settings, Shape, Solver};
+use mmsmith_mpm::{Annulus, Body, Particles, Settings, Shape, Simulation, Solver};
 use mmsmith_runtime::{Domain, Real, Solution};
 use nalgebra::SVector;
 
 use crate::case::{Case, Extent, law};
+use crate::dimension::Precision;
 use crate::error::{CaseError, SceneError};
 use crate::scene::Scene;
 use crate::scheme::{Placement, Start, Stepping, Updated};
@@ -77,7 +78,7 @@ fn body<T: Real, const D: usize>(
 }
 
 /// The simulation at time zero.
-pub(crate) fn set_up<T: Real + Scalar<D>, const D: usize>(
+pub(crate) fn set_up<T: Precision<D>, const D: usize>(
     exact: &dyn Solution<f64, D>,
     model: &dyn Solution<T, D>,
     updated: &Updated,
@@ -109,7 +110,7 @@ pub(crate) fn set_up<T: Real + Scalar<D>, const D: usize>(
         time_step,
         halve_first_acceleration: updated.stepping == Stepping::Cd(Start::Halved),
     };
-    Ok(T::simulation(scene.grid(), body, law(model.material())?, settings)?)
+    Ok(Box::new(Simulation::new(scene.grid(), body, law(model.material())?, settings)?))
 }
 
 /// Gives particles at rest the exact state at time zero, with the velocity that the integrator starts from.

@@ -3,8 +3,8 @@
 use nalgebra::{RealField, SMatrix};
 
 use super::{
-    Material, displacement_gradient, finger_minus_identity, green_twice, jacobian, log_jacobian,
-    plus_diagonal,
+    Hencky, Law, Material, displacement_gradient, finger_minus_identity, green_twice, jacobian,
+    log_jacobian, plus_diagonal,
 };
 use crate::tensor::real;
 
@@ -28,7 +28,7 @@ impl<T: RealField + Copy> Material<T> {
             Self::StVenantKirchhoff { lambda, mu } => quadratic(lambda, mu, green_twice(F) * half),
             Self::Hencky { lambda, mu } => {
                 // The law gives tau = lambda ln(J) I + 2 mu ln(V), and so the logarithm of V.
-                let tau = self.kirchhoff(F)?;
+                let tau = Hencky { lambda, mu }.kirchhoff(F);
                 let log_V = plus_diagonal(tau, -lambda * log_jacobian(F)) / (two * mu);
                 quadratic(lambda, mu, log_V)
             }

@@ -26,7 +26,8 @@ pub(crate) use neo_hookean::{NeoHookean, NeoHookeanNoLog};
 pub(crate) use st_venant_kirchhoff::StVenantKirchhoff;
 
 use crate::fault::Planted;
-use crate::simd::{Loop, Vectors, dispatch};
+use crate::simd::{Lanes, Loop, Vectors, dispatch};
+use crate::solver::Scalar;
 use crate::tensor::{det_minus_one, determinant, product, real};
 
 /// An elastic material.
@@ -113,15 +114,72 @@ macro_rules! with_law {
     };
 }
 
-impl<T: RealField + Copy> Material<T> {
+/// Particles whose stresses are computed side by side.
+pub const SIDE_BY_SIDE: usize = 16;
+
+impl<T: Copy> Material<T> {
     /// Kirchhoff stress `tau = J sigma = P F^T`.
-    pub fn kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> Option<SMatrix<T, D, D>> {
-        jacobian(F)?;
-        Some(with_law!(self, |law| law.kirchhoff(F)))
+    pub fn kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> Option<SMatrix<T, D, D>>
+    where
+        T: Scalar<D>,
+    {
+        T::kirchhoff(self, F)
     }
 
     /// First Piola-Kirchhoff stress `P = tau F^-T`: force per reference area, traction `P N`.
     pub fn first_piola_kirchhoff<const D: usize>(
+        &self,
+        F: &SMatrix<T, D, D>,
+    ) -> Option<SMatrix<T, D, D>>
+    where
+        T: Scalar<D>,
+    {
+        T::first_piola_kirchhoff(self, F)
+    }
+
+    /// First Piola-Kirchhoff stresses of particles side by side: `F[i][J][n]` is `F_iJ` of particle `n`, and so it is with
+    /// the stresses `P`. They are those of [`Material::first_piola_kirchhoff`] to the last bit, and not a number where F is no
+    /// deformation.
+    pub fn first_piola_kirchhoff_side_by_side<const D: usize>(
+        &self,
+        F: &[[[T; SIDE_BY_SIDE]; D]; D],
+        P: &mut [[[T; SIDE_BY_SIDE]; D]; D],
+    ) where
+        T: Scalar<D>,
+    {
+        T::first_piola_kirchhoff_side_by_side(self, F, P);
+    }
+
+    /// Cauchy (true) stress `sigma = tau / J`.
+    pub fn cauchy<const D: usize>(&self, F: &SMatrix<T, D, D>) -> Option<SMatrix<T, D, D>>
+    where
+        T: Scalar<D>,
+    {
+        let J = jacobian(F)?;
+        Some(self.kirchhoff(F)? / J)
+    }
+
+    /// Von Mises stress of the symmetric part of the Cauchy stress, with the normal stresses that act out of the plane
+    /// in 2D and across the axis in 1D.
+    pub fn von_mises<const D: usize>(&self, F: &SMatrix<T, D, D>) -> Option<T>
+    where
+        T: Scalar<D>,
+    {
+        T::von_mises(self, F)
+    }
+}
+
+/// What the functions of the same names do, compiled where it is called.
+impl<T: Lanes> Material<T> {
+    pub(crate) fn kirchhoff_here<const D: usize>(
+        &self,
+        F: &SMatrix<T, D, D>,
+    ) -> Option<SMatrix<T, D, D>> {
+        jacobian(F)?;
+        Some(with_law!(self, |law| law.kirchhoff(F)))
+    }
+
+    pub(crate) fn first_piola_kirchhoff_here<const D: usize>(
         &self,
         F: &SMatrix<T, D, D>,
     ) -> Option<SMatrix<T, D, D>> {
@@ -129,29 +187,18 @@ impl<T: RealField + Copy> Material<T> {
         Some(with_law!(self, |law| law.first_piola_kirchhoff(F)))
     }
 
-    /// First Piola-Kirchhoff stresses of `N` particles side by side: `F[i][J][n]` is `F_iJ` of particle `n`, and so it is with
-    /// the stresses `P`. They are those of [`Material::first_piola_kirchhoff`] to the last bit, and not a number where F is no
-    /// deformation.
-    pub fn first_piola_kirchhoff_side_by_side<const D: usize, const N: usize>(
+    pub(crate) fn first_piola_kirchhoff_side_by_side_here<const D: usize>(
         &self,
-        F: &[[[T; N]; D]; D],
-        P: &mut [[[T; N]; D]; D],
+        F: &[[[T; SIDE_BY_SIDE]; D]; D],
+        P: &mut [[[T; SIDE_BY_SIDE]; D]; D],
     ) {
         with_law!(self, |law| dispatch(SideBySide { law, F, P }));
     }
 
-    /// Cauchy (true) stress `sigma = tau / J`.
-    pub fn cauchy<const D: usize>(&self, F: &SMatrix<T, D, D>) -> Option<SMatrix<T, D, D>> {
-        let J = jacobian(F)?;
-        Some(self.kirchhoff(F)? / J)
-    }
-
-    /// Von Mises stress of the symmetric part of the Cauchy stress, with the normal stresses that act out of the plane
-    /// in 2D and across the axis in 1D.
-    pub fn von_mises<const D: usize>(&self, F: &SMatrix<T, D, D>) -> Option<T> {
+    pub(crate) fn von_mises_here<const D: usize>(&self, F: &SMatrix<T, D, D>) -> Option<T> {
         let J = jacobian(F)?;
         let across = with_law!(self, |law| law.kirchhoff_across(F)) / J;
-        let sigma = self.cauchy(F)?;
+        let sigma = self.kirchhoff_here(F)? / J;
         let normal = |i: usize| if i < D { sigma[(i, i)] } else { across };
         let mut sum = T::zero();
         for (i, j) in [(0, 1), (1, 2), (2, 0)] {
@@ -164,7 +211,9 @@ impl<T: RealField + Copy> Material<T> {
         }
         Some(sum.sqrt())
     }
+}
 
+impl<T: RealField + Copy> Material<T> {
     /// The Lame constants `(lambda_0, mu_0)` of the law at small strain; the speed of P-waves in the
     /// undeformed solid is `sqrt((lambda_0 + 2 mu_0) / rho0)`.
     pub fn small_strain_moduli(&self) -> (T, T) {
@@ -180,20 +229,18 @@ impl<T: RealField + Copy> Material<T> {
     }
 }
 
-struct SideBySide<'a, T, L, const D: usize, const N: usize> {
+struct SideBySide<'a, T, L, const D: usize> {
     law: L,
-    F: &'a [[[T; N]; D]; D],
-    P: &'a mut [[[T; N]; D]; D],
+    F: &'a [[[T; SIDE_BY_SIDE]; D]; D],
+    P: &'a mut [[[T; SIDE_BY_SIDE]; D]; D],
 }
 
-impl<T: RealField + Copy, L: Law<T>, const D: usize, const N: usize> Loop
-    for SideBySide<'_, T, L, D, N>
-{
+impl<T: RealField + Copy, L: Law<T>, const D: usize> Loop for SideBySide<'_, T, L, D> {
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self { law, F, P } = self;
-        if !stresses::<true, _, _, D, N>(law, F, P) {
-            stresses::<false, _, _, D, N>(law, F, P);
+        if !stresses::<true, _, _, D>(law, F, P) {
+            stresses::<false, _, _, D>(law, F, P);
         }
     }
 }
@@ -201,13 +248,13 @@ impl<T: RealField + Copy, L: Law<T>, const D: usize, const N: usize> Loop
 /// Computes the stresses by the short form of the law or the full one; returns whether the short form holds for all of them. A
 /// function of its own tells the compiler that `F` and `P` do not overlap.
 #[inline(always)]
-fn stresses<const SHORT: bool, T: RealField + Copy, L: Law<T>, const D: usize, const N: usize>(
+fn stresses<const SHORT: bool, T: RealField + Copy, L: Law<T>, const D: usize>(
     law: L,
-    F: &[[[T; N]; D]; D],
-    P: &mut [[[T; N]; D]; D],
+    F: &[[[T; SIDE_BY_SIDE]; D]; D],
+    P: &mut [[[T; SIDE_BY_SIDE]; D]; D],
 ) -> bool {
     let mut short = true;
-    for n in 0..N {
+    for n in 0..SIDE_BY_SIDE {
         let own = SMatrix::<T, D, D>::from_fn(|i, j| F[i][j][n]);
         let J = determinant(&own);
         // Without branches: zero times anything that is not finite is not a number.

@@ -49,7 +49,10 @@ fn energy<const D: usize>(law: &Material<f64>, F: &SMatrix<f64, D, D>) -> f64 {
     }
 }
 
-fn check_against_energy<const D: usize>(law: &Material<f64>, F: &SMatrix<f64, D, D>) {
+fn check_against_energy<const D: usize>(law: &Material<f64>, F: &SMatrix<f64, D, D>)
+where
+    f64: Scalar<D>,
+{
     let P = law.first_piola_kirchhoff(F).unwrap();
     let (stored, printed) = (law.strain_energy(F).unwrap(), energy(law, F));
     assert!((stored - printed).abs() < 1e-12 * (1.0 + printed), "{law:?} {stored} {printed}");
@@ -74,7 +77,7 @@ fn deformation() -> impl Strategy<Value = Matrix3<f64>> {
         .prop_map(|H| Matrix3::identity() + Matrix3::from_row_slice(&H))
 }
 
-fn check_side_by_side<T: RealField + Copy, const D: usize>(all: &[Matrix3<f64>]) {
+fn check_side_by_side<T: Scalar<D>, const D: usize>(all: &[Matrix3<f64>]) {
     let some: Vec<SMatrix<T, D, D>> =
         all.iter().map(|F| SMatrix::from_fn(|i, j| real(F[(i, j)]))).collect();
     for law in LAWS {
@@ -95,11 +98,11 @@ fn check_side_by_side<T: RealField + Copy, const D: usize>(all: &[Matrix3<f64>])
                 Material::LinearElastic { lambda: real(lambda), mu: real(mu) }
             }
         };
-        for five in some.chunks_exact(5) {
-            let rows = array::from_fn(|i| array::from_fn(|j| array::from_fn(|n| five[n][(i, j)])));
-            let mut P = [[[T::zero(); 5]; D]; D];
+        for group in some.chunks_exact(SIDE_BY_SIDE) {
+            let rows = array::from_fn(|i| array::from_fn(|j| array::from_fn(|n| group[n][(i, j)])));
+            let mut P = [[[T::zero(); SIDE_BY_SIDE]; D]; D];
             law.first_piola_kirchhoff_side_by_side(&rows, &mut P);
-            for (n, F) in five.iter().enumerate() {
+            for (n, F) in group.iter().enumerate() {
                 let found = SMatrix::<T, D, D>::from_fn(|i, j| P[i][j][n]);
                 match law.first_piola_kirchhoff(F) {
                     Some(P) => assert_eq!(found, P, "{law:?}, {F}"),
@@ -197,7 +200,10 @@ proptest! {
     }
 }
 
-fn check_in_space<const D: usize>(law: &Material<f64>, F: &SMatrix<f64, D, D>) {
+fn check_in_space<const D: usize>(law: &Material<f64>, F: &SMatrix<f64, D, D>)
+where
+    f64: Scalar<D> + Scalar<3>,
+{
     let (tau, in_3d) = (law.kirchhoff(F).unwrap(), law.kirchhoff(&in_space(F)).unwrap());
     assert!((tau - in_3d.fixed_view::<D, D>(0, 0)).norm() < 1e-13, "{law:?} {tau} {in_3d}");
     let (P, in_3d) =
@@ -223,7 +229,10 @@ fn at_small_strain_every_law_is_linear_elasticity_to_all_digits() {
     let H3 = Matrix3::from_fn(|i, j| bits[i][j] * 2f64.powi(-45));
     let H2 = H3.fixed_view::<2, 2>(0, 0).into_owned();
     let H1 = Matrix1::new(H3[(0, 0)]);
-    fn check<const D: usize>(law: &Material<f64>, H: &SMatrix<f64, D, D>) {
+    fn check<const D: usize>(law: &Material<f64>, H: &SMatrix<f64, D, D>)
+    where
+        f64: Scalar<D>,
+    {
         let F = SMatrix::identity() + H;
         let expected = small_strain_stress(law, H);
         for stress in [law.kirchhoff(&F), law.first_piola_kirchhoff(&F), law.cauchy(&F)] {

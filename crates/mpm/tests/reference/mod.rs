@@ -8,7 +8,7 @@ mod tests;
 mod weights;
 
 use mmsmith_mpm::{
-    Body, BodyForce, Grid, Integrator, Material, Particles, Settings, Shape, Transfer,
+    Body, BodyForce, Grid, Integrator, Material, Particles, Scalar, Settings, Shape, Transfer,
 };
 use nalgebra::{SMatrix, SVector};
 
@@ -37,7 +37,10 @@ pub(crate) struct Reference<const D: usize> {
     mass: Vec<f64>,
 }
 
-impl<const D: usize> Reference<D> {
+impl<const D: usize> Reference<D>
+where
+    f64: Scalar<D>,
+{
     /// Sets up at time 0. The scene must be one that the solver admits.
     pub(crate) fn new(
         grid: Grid<f64, D>,

@@ -21,11 +21,10 @@ fn grid<const D: usize>(walls: [[bool; 2]; D]) -> Grid<f64, D> {
 }
 
 /// Before the first step, with a lattice that fills the grid and is distorted except on the grid's faces.
-fn distorted<const D: usize>(
-    grid: &Grid<f64, D>,
-    shape: Shape,
-    transfer: Transfer,
-) -> Reference<D> {
+fn distorted<const D: usize>(grid: &Grid<f64, D>, shape: Shape, transfer: Transfer) -> Reference<D>
+where
+    f64: Scalar<D>,
+{
     let mut body = Body::lattice(grid, 2, 2.0, |_| true);
     let p = &mut body.particles;
     for k in 0..p.len() {
@@ -55,7 +54,10 @@ fn distorted<const D: usize>(
 
 #[test]
 fn weights_add_up_to_one_and_reproduce_linear_fields() {
-    fn check<const D: usize>(shape: Shape) {
+    fn check<const D: usize>(shape: Shape)
+    where
+        f64: Scalar<D>,
+    {
         let scene = distorted(&grid([[false; 2]; D]), shape, Transfer::Flip);
         let slope = SMatrix::<f64, D, D>::from_fn(|i, j| 1.0 + noise(5 * i + j));
         for (p, list) in scene.particles.iter().enumerate() {
@@ -79,7 +81,10 @@ fn weights_add_up_to_one_and_reproduce_linear_fields() {
 /// A field that vanishes across each wall on it: of linear fields walls admit no other. Along axis 1 there are none.
 #[test]
 fn next_to_walls_the_fields_that_walls_admit_are_reproduced() {
-    fn check<const D: usize>(shape: Shape, upper: bool) {
+    fn check<const D: usize>(shape: Shape, upper: bool)
+    where
+        f64: Scalar<D>,
+    {
         let mut walls = [[!upper, upper]; D];
         walls.iter_mut().skip(1).take(1).for_each(|walls| *walls = [false; 2]);
         let grid = grid(walls);

@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used)]
 
 use mmsmith_mpm::{
-    Annulus, Body, Grid, Integrator, Material, NoBodyForce, Particles, Settings, SetupError, Shape,
-    Simulation, StepError, Transfer,
+    Annulus, Body, Grid, Integrator, Material, NoBodyForce, Particles, Scalar, Settings,
+    SetupError, Shape, Simulation, StepError, Transfer,
 };
 use nalgebra::{SVector, Vector2};
 
@@ -36,7 +36,10 @@ fn with_and_without_edges<const D: usize>(body: Body<f64, D>) -> [Body<f64, D>; 
 fn refusals<const D: usize>(
     body: &Body<f64, D>,
     shape: Shape,
-) -> impl Iterator<Item = Option<StepError>> {
+) -> impl Iterator<Item = Option<StepError>>
+where
+    f64: Scalar<D>,
+{
     let settings = flip(shape, Integrator::Cd, 1e-3);
     with_and_without_edges(body.clone()).into_iter().map(move |body| {
         Simulation::new(grid(), body, SOFT, settings).err().map(|error| match error {
@@ -48,7 +51,10 @@ fn refusals<const D: usize>(
 
 #[test]
 fn initial_states_are_admitted_up_to_the_limits() {
-    fn check<const D: usize>() {
+    fn check<const D: usize>()
+    where
+        f64: Scalar<D>,
+    {
         let grid = grid::<D>();
         let fine = Body::lattice(&grid, 1, 2.0, |_| true);
         let particle = fine.particles.len() / 2;
@@ -199,7 +205,10 @@ fn long<const D: usize>(
 
 #[test]
 fn a_failed_step_names_the_first_particle_that_left_the_grid() {
-    fn check<const D: usize>() {
+    fn check<const D: usize>()
+    where
+        f64: Scalar<D>,
+    {
         for shape in [Shape::Linear, Shape::Gimp, Shape::Bspline3, Shape::Cpdi] {
             for integrator in INTEGRATORS {
                 for side in [1.0, -1.0] {
@@ -231,7 +240,10 @@ fn a_failed_step_names_the_first_particle_that_left_the_grid() {
 
 #[test]
 fn a_failed_step_names_the_first_particle_that_is_turned_inside_out() {
-    fn check<const D: usize>() {
+    fn check<const D: usize>()
+    where
+        f64: Scalar<D>,
+    {
         for shape in [Shape::Linear, Shape::Gimp, Shape::Bspline3, Shape::Cpdi] {
             for integrator in INTEGRATORS {
                 let (grid, mut particles, settings) = long::<D>(shape, integrator);
@@ -294,7 +306,10 @@ fn what_is_not_finite_is_named_before_what_left_the_grid() {
 
 #[test]
 fn a_domain_that_grows_too_wide_is_named_with_its_size() {
-    fn check<const D: usize>(shape: Shape, axis: usize) {
+    fn check<const D: usize>(shape: Shape, axis: usize)
+    where
+        f64: Scalar<D>,
+    {
         for integrator in INTEGRATORS {
             let grid = Grid { cells: [36; D], ..grid::<D>() };
             let middle = (grid.lower + grid.upper()) * 0.5;
@@ -476,7 +491,10 @@ fn arrays_of_another_length_are_named() {
 /// No machine has so much; the figures are those of the nodes, nine more than cells along each axis.
 #[test]
 fn a_grid_beyond_memory_is_refused_with_the_bytes_it_needs() {
-    fn check<const D: usize>(cells: [usize; D], of_node: u128) {
+    fn check<const D: usize>(cells: [usize; D], of_node: u128)
+    where
+        f64: Scalar<D>,
+    {
         let body = Body::lattice(&grid::<D>(), 1, 2.0, |_| true);
         let large = Grid { cells, ..grid::<D>() };
         let nodes: u128 = cells.iter().map(|&n| n as u128 + 9).product();
@@ -515,7 +533,10 @@ fn a_grid_beyond_memory_is_refused_with_the_bytes_it_needs() {
 
 #[test]
 fn a_failed_step_names_the_first_particle_that_left_the_grid_through_any_face() {
-    fn check<const D: usize>(shape: Shape) {
+    fn check<const D: usize>(shape: Shape)
+    where
+        f64: Scalar<D>,
+    {
         for axis in 0..D {
             for side in [1.0, -1.0] {
                 let grid = grid::<D>();
@@ -548,7 +569,10 @@ fn a_failed_step_names_the_first_particle_that_left_the_grid_through_any_face() 
 /// Domains between corners have a volume of their own, whatever F is.
 #[test]
 fn domains_between_corners_are_admitted_up_to_the_limits() {
-    fn check<const D: usize>() {
+    fn check<const D: usize>()
+    where
+        f64: Scalar<D>,
+    {
         let grid = grid::<D>();
         let settings = flip(Shape::Cpdi2, Integrator::Usl, 1e-3);
         let particle = 2;

@@ -6,6 +6,7 @@ mod mechanics;
 mod order;
 #[path = "../reference/mod.rs"]
 mod reference;
+mod registers;
 mod ring;
 mod schemes;
 mod state;

@@ -2,8 +2,8 @@
 //! number of threads; and how runs and set-ups fail.
 
 use mmsmith_mpm::{
-    Body, Grid, Integrator, Material, Mesh, NoBodyForce, Particles, Settings, SetupError, Shape,
-    Simulation, StepError, Transfer,
+    Body, Grid, Integrator, Material, Mesh, NoBodyForce, Particles, Scalar, Settings, SetupError,
+    Shape, Simulation, StepError, Transfer,
 };
 use nalgebra::{Matrix2, SMatrix, SVector, Vector1, Vector2, Vector3, vector};
 
@@ -25,7 +25,10 @@ fn settings(shape: Shape, integrator: Integrator, time_step: f64) -> Settings<f6
 
 #[test]
 fn a_free_body_flies_straight() {
-    fn check<const D: usize>() {
+    fn check<const D: usize>()
+    where
+        f64: Scalar<D>,
+    {
         for settings in flip_schemes() {
             let grid = open_grid::<D>(10);
             let mut body =

@@ -1,8 +1,8 @@
 //! Every scheme: the same results as those of a plain implementation, what it has to keep, and how its runs and set-ups fail.
 
 use mmsmith_mpm::{
-    Annulus, Body, BodyForce, Grid, Integrator, Material, Mesh, NoBodyForce, Particles, Settings,
-    SetupError, Shape, Simulation, StepError, Transfer,
+    Annulus, Body, BodyForce, Grid, Integrator, Material, Mesh, NoBodyForce, Particles, Scalar,
+    Settings, SetupError, Shape, Simulation, StepError, Transfer,
 };
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2, vector};
 
@@ -258,7 +258,10 @@ fn difference<const R: usize, const C: usize>(
 /// Two implementations that share no loop: weights, walls, forces, transfers and updates have to agree.
 #[test]
 fn results_are_those_of_the_plain_implementation() {
-    fn check<const D: usize>(steps: usize) {
+    fn check<const D: usize>(steps: usize)
+    where
+        f64: Scalar<D>,
+    {
         for (number, scene) in scenes::<D>().iter().enumerate() {
             let mut moved = 0.0_f64;
             for settings in schemes() {
@@ -316,7 +319,10 @@ fn told(error: &StepError) -> String {
 
 #[test]
 fn failed_runs_name_the_same_particle_and_reason_as_the_plain_implementation() {
-    fn check<const D: usize>(reasons: &mut Vec<String>) {
+    fn check<const D: usize>(reasons: &mut Vec<String>)
+    where
+        f64: Scalar<D>,
+    {
         let [_, _, scene, ..] = scenes::<D>();
         let scene = Scene { edges: Edges::Boxes, ..scene };
         let wide = Scene { overlap: 6.0, ..scene };
@@ -397,7 +403,10 @@ fn single_precision_differs_by_rounding() {
 
 #[test]
 fn momentum_changes_by_the_body_force_only() {
-    fn check<const D: usize>(cells: usize) {
+    fn check<const D: usize>(cells: usize)
+    where
+        f64: Scalar<D>,
+    {
         for settings in schemes() {
             let grid = open_grid::<D>(cells);
             let body = block(&grid);
@@ -420,7 +429,10 @@ fn momentum_changes_by_the_body_force_only() {
 
 #[test]
 fn a_body_at_rest_stays_exactly_at_rest() {
-    fn check<const D: usize>() {
+    fn check<const D: usize>()
+    where
+        f64: Scalar<D>,
+    {
         for settings in schemes() {
             let grid = Grid { walls: [[true, false]; D], ..open_grid::<D>(5) };
             let body = Body::lattice(&grid, 2, 2.0, |X| X.iter().all(|&x| x < 0.5));

@@ -7,8 +7,8 @@ use mmsmith_mpm::total_lagrangian::{
     MassMatrix, Quantity, Scheme, Side, TotalLagrangian,
 };
 use mmsmith_mpm::{
-    AtTime, Body, BodyForce, Grid, Integrator, Material, NoBodyForce, Particles, Settings, Shape,
-    Simulation, Transfer,
+    AtTime, Body, BodyForce, Grid, Integrator, Material, NoBodyForce, Particles, Scalar, Settings,
+    Shape, Simulation, Transfer,
 };
 use nalgebra::{SMatrix, SVector, Vector2};
 
@@ -140,7 +140,10 @@ fn updated_schemes() -> impl Iterator<Item = Settings<f64>> {
 }
 
 /// Set up with the body of unit [`ONE`].
-fn simulation<const D: usize>(settings: Settings<f64>) -> Simulation<f64, D> {
+fn simulation<const D: usize>(settings: Settings<f64>) -> Simulation<f64, D>
+where
+    f64: Scalar<D>,
+{
     Simulation::new(ONE.grid(), body::<D>(), ONE.material::<D>(), settings).unwrap()
 }
 
@@ -187,7 +190,10 @@ fn total_scene(
 
 #[test]
 fn runs_continue_from_their_state_to_the_same_bits() {
-    fn check<const D: usize>() {
+    fn check<const D: usize>()
+    where
+        f64: Scalar<D>,
+    {
         let force = ONE.body_force::<D>();
         for settings in updated_schemes() {
             let two = [simulation(settings), simulation(settings)];
@@ -269,7 +275,10 @@ fn are_same<const D: usize>(
 
 #[test]
 fn results_in_other_units_are_the_same_to_the_bit() {
-    fn check<const D: usize>() {
+    fn check<const D: usize>()
+    where
+        f64: Scalar<D>,
+    {
         for settings in updated_schemes() {
             let run = |units: Units| {
                 let settings = Settings { time_step: settings.time_step * units.time, ..settings };
