@@ -37,6 +37,7 @@ fn run_package(folder: &Path, main: &str) -> String {
 }
 
 #[test]
+#[ignore = "compiles a package of its own, with other features: a minute; .ci/long runs it"]
 fn a_new_solution_is_one_file() {
     let folder = tempfile::tempdir().unwrap();
     let spec = folder.path().join("my-shear.toml");
