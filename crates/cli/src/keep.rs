@@ -37,7 +37,7 @@ pub(crate) enum Order {
 impl Keep {
     /// Keeps the cases of a study of `solution` in the folder of `--out`, if one was given.
     ///
-    /// Cases are known again by the program that computed them as well: another build may compute another result.
+    /// Cases are known again by the build that computed them as well: another one may compute another result.
     pub(crate) fn open(folder: Option<&PathBuf>, solution: &str) -> Result<Self> {
         let Some(folder) = folder else { return Ok(Self(None)) };
         let ledger = Ledger::open(folder).context("--out")?;
@@ -132,16 +132,17 @@ pub(crate) fn decisive(settings: &Value) -> Value {
     settings
 }
 
-/// What results depend on beside their settings: the program, and a specification file's text.
+/// What tells this build from all that may compute other bits: a checksum of its sources, compiler and target.
+const BUILD: &str = env!("MMS_BUILD");
+
+/// What results depend on beside their settings: the build, and a specification file's text.
 pub(crate) fn origin(solution: &str) -> Result<Value> {
-    let program = std::env::current_exe().and_then(std::fs::read);
-    let program = sum(&program.context("cannot read the program itself")?);
-    // What was compiled in is part of the program.
+    // What was compiled in is part of the build.
     let specification = match locate(solution)? {
         Origin::BuiltIn(_) => None,
         Origin::File { text, .. } => Some(sum(text.as_bytes())),
     };
-    Ok(json!({ "program": program, "specification": specification }))
+    Ok(json!({ "build": BUILD, "specification": specification }))
 }
 
 /// What `work` makes of each of `cases`, in their order: on as many threads as there are here, each case on one.

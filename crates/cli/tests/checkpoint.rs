@@ -121,6 +121,47 @@ fn is_killed_and_goes_on(scheme: &str, kills: &dyn Fn(u64) -> Vec<u64>) {
     assert_eq!(names(&kept), ["checkpoint", "lock", "run.json"], "{scheme}");
 }
 
+/// Long before its first checkpoint is due, and again after it goes on; a run of days, so that it cannot end before.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_leaves_a_checkpoint_and_goes_on() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let kept = place.join("kept");
+    let run = "run bar --cells 8 --periods 1000000 --vtk frames --frames 1000000 --checkpoint kept --every 1000000";
+    let mut steps = 0;
+    for call in [run, "resume kept"] {
+        let frames = place.join("frames");
+        let written = || std::fs::read_dir(&frames).map_or(0, Iterator::count);
+        let before = written();
+        let mut run = UnderWay::start(place, call);
+        run.wait_for(|| written() > before + 2);
+        let (status, said) = run.interrupt();
+        assert_eq!(status, 130, "{said}");
+        assert!(reached(&kept) > steps, "{said}");
+        steps = reached(&kept);
+        let message = format!("kept goes on from there: interrupted after step {steps}, t = ");
+        assert!(said.contains(&message), "{said}");
+        assert_eq!(names(&kept), ["checkpoint", "lock", "run.json"]);
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_study_and_what_steps_nothing_can_be_interrupted() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let mut study =
+        UnderWay::start(place, "converge bar --cells 8,16 --periods 1000000 --out kept");
+    study.wait_for(|| place.join("kept").exists());
+    assert_eq!(study.interrupt().0, 130);
+    // The result goes to a pipe that nobody reads.
+    command::pipe(&place.join("result.json"));
+    let mut check = UnderWay::start(place, "run bar --cells 8 --json result.json --plot drift.svg");
+    check.wait_for(|| place.join("drift.svg").exists());
+    assert_eq!(check.interrupt().0, 130);
+}
+
 #[cfg(unix)]
 #[test]
 fn a_folder_belongs_to_its_run_while_that_lives() {

@@ -653,7 +653,7 @@ mod tests {
     #[cfg(target_arch = "x86_64")]
     #[test]
     fn instructions_do_what_is_written_out_for_processors_without_them() {
-        pulp::x86::V3::try_new().into_iter().for_each(|simd| check(simd));
-        pulp::x86::V4::try_new().into_iter().for_each(|simd| check(simd));
+        pulp::x86::V3::try_new().into_iter().for_each(check);
+        pulp::x86::V4::try_new().into_iter().for_each(check);
     }
 }

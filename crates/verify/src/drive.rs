@@ -12,6 +12,7 @@ use nalgebra::SVector;
 use crate::case::Case;
 use crate::dimension::Precision;
 use crate::error::CaseError;
+use crate::interrupt::Stepping;
 use crate::scene::Scene;
 use crate::scheme::Scheme;
 use crate::{total, updated};
@@ -35,6 +36,8 @@ pub(crate) struct Stepped<'a, T, const D: usize> {
     pub(crate) wall_s: f64,
     /// The same on all threads' processors.
     pub(crate) cpu_s: f64,
+    /// Whether stepping ends here because it was asked to.
+    pub(crate) is_interrupted: bool,
 }
 
 /// How stepping ended.
@@ -76,12 +79,13 @@ impl<T: Real, const D: usize> Driven<'_, T, D> {
     ///
     /// # Errors
     ///
-    /// Those of the observer; a solver that gives up is an outcome.
+    /// Those of the observer, and [`CaseError::Interrupted`]; a solver that gives up is an outcome.
     pub(crate) fn advance<R>(
         &mut self,
         steps: RangeInclusive<u64>,
         observer: &mut dyn FnMut(Stepped<'_, T, D>) -> Seen<R>,
     ) -> Result<Outcome<R>, CaseError> {
+        let stepping = Stepping::begin();
         for step in steps {
             let (computing, started) = (ProcessTime::now(), Instant::now());
             let outcome = self.solver.step(&self.body_force);
@@ -91,10 +95,14 @@ impl<T: Real, const D: usize> Driven<'_, T, D> {
                 return Ok(Outcome::Stopped(error));
             }
             let (time, solver) = (step as f64 * self.dt, self.solver.as_mut());
+            let is_interrupted = stepping.is_interrupted();
             if let ControlFlow::Break(found) =
-                observer(Stepped { step, time, solver, wall_s, cpu_s })?
+                observer(Stepped { step, time, solver, wall_s, cpu_s, is_interrupted })?
             {
                 return Ok(Outcome::Left(found));
+            }
+            if is_interrupted {
+                return Err(CaseError::Interrupted { step, time });
             }
         }
         Ok(Outcome::Done)

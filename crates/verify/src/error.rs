@@ -51,6 +51,14 @@ pub enum CaseError {
     /// A checkpoint could not be written or read.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
+    /// Somebody [asked](crate::interrupt) for the end.
+    #[error("interrupted after step {step}, t = {time:.6e}")]
+    Interrupted {
+        /// The last step done.
+        step: u64,
+        /// Its time.
+        time: f64,
+    },
 }
 
 impl CaseError {

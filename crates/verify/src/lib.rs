@@ -29,6 +29,7 @@ mod error;
 mod evaluate;
 mod frames;
 mod history;
+mod interrupt;
 mod measure;
 mod norms;
 mod order;
@@ -59,8 +60,8 @@ pub use coverage::{Part, Share, coverage, smallest_set};
 pub use error::{CaseError, SceneError};
 pub use evaluate::{FieldRow, WrongLength, evaluate};
 pub use frames::{FrameOutput, Snapshot};
-
 pub use history::{MOST_MOMENTS, Moment, Sums, energy_drift};
+pub use interrupt::interrupt;
 pub use mmsmith_mpm::StepError;
 pub use mmsmith_mpm::total_lagrangian::{Composition, Coordinates, Layout, MassMatrix};
 pub use mmsmith_mpm::{Integrator, Shape, Transfer};

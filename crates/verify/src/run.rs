@@ -309,10 +309,11 @@ fn follow<T: Precision<D>, const D: usize>(
             }
         };
     let outcome = driven.advance(done + 1..=steps.count, &mut |stepped| {
-        let Stepped { step, time, solver, wall_s: step_wall_s, cpu_s: step_cpu_s } = stepped;
+        let Stepped { step, time, solver, wall_s: of_step, cpu_s: cpu_of_step, is_interrupted } =
+            stepped;
         done = step;
-        wall_s += step_wall_s;
-        cpu_s += step_cpu_s;
+        wall_s += of_step;
+        cpu_s += cpu_of_step;
         let measured = comparison.measure(solver.observe(), time, lag);
         errors = PerField::combine(&errors, &measured, PerNorm::larger);
         let error = measured.u.linf;
@@ -340,7 +341,7 @@ fn follow<T: Precision<D>, const D: usize>(
             return Ok(ControlFlow::Break(end));
         }
         if let Some(checkpoints) = outputs.checkpoints
-            && step % checkpoints.every == 0
+            && (step % checkpoints.every == 0 || is_interrupted)
         {
             let history = recorder.as_ref().map_or(&[][..], Recorder::moments);
             let reached = Reached { step, wall_s, cpu_s, errors };

@@ -1,5 +1,6 @@
 //! `mms resume`: a run that wrote checkpoints, from the last of them on.
 
+use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -10,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-use super::run;
+use super::run::{self, Origin};
 use crate::arguments::{Arguments, Command, ResumeOptions, RunOptions};
 use crate::json::{self, Output};
 use crate::keep;
@@ -90,7 +91,7 @@ pub(crate) fn resume(options: &ResumeOptions) -> Result<bool> {
         format!("cannot enter {}, where the run was started", start.folder.display())
     })?;
     run.scheme.threads = options.threads.or(run.scheme.threads);
-    run::follow(&run, Some(Place { folder, resume: true }))
+    run::follow(&run, Origin::Checkpoint(Place { folder, resume: true }))
 }
 
 /// Where a run keeps its state, and whether it goes on from there.
@@ -99,8 +100,8 @@ pub(super) struct Place {
     resume: bool,
 }
 
-/// Takes the folder for this run, and writes down how it was started.
-pub(super) fn remember(folder: &Path) -> Result<Place> {
+/// Takes the folder for this run, and writes down how it was started: by the words of this command line.
+pub(super) fn remember(folder: &Path, line: &[OsString]) -> Result<Place> {
     let path = folder.join(FILE);
     if path.exists() {
         let shown = folder.display();
@@ -116,9 +117,9 @@ pub(super) fn remember(folder: &Path) -> Result<Place> {
     if path.exists() {
         bail!("--checkpoint: {} holds a run already", folder.display());
     }
-    let arguments = std::env::args_os().skip(1).map(|argument| {
-        let shown = argument.to_string_lossy().into_owned();
-        argument.into_string().ok().with_context(|| {
+    let arguments = line.iter().skip(1).map(|argument| {
+        argument.to_str().map(str::to_owned).with_context(|| {
+            let shown = argument.to_string_lossy();
             format!("--checkpoint: the argument {shown:?} is not valid Unicode and cannot be kept")
         })
     });

@@ -1,9 +1,12 @@
 //! `mms run`: one simulation.
 
+use std::ffi::OsString;
+
 use anyhow::{Context, Result};
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{
-    Case, FrameOutput, Moment, Outputs, Parts, Row, Scheme, Status, energy_drift, run as simulate,
+    Case, CaseError, Checkpoints, FrameOutput, Moment, Outputs, Parts, Row, Scheme, Status,
+    energy_drift, run as simulate,
 };
 use serde_json::{Value, json};
 
@@ -18,12 +21,21 @@ use crate::svg::{Course, Drift};
 use crate::table::{self, Table};
 use crate::{csv, number, terminal};
 
-pub(crate) fn run(options: &RunOptions) -> Result<bool> {
-    follow(options, None)
+/// A run, by the words of its command line.
+pub(crate) fn run(options: &RunOptions, line: &[OsString]) -> Result<bool> {
+    follow(options, Origin::Line(line))
 }
 
-/// The run, from its beginning or, where it has a place already, from the last checkpoint there.
-pub(super) fn follow(options: &RunOptions, place: Option<resume::Place>) -> Result<bool> {
+/// Where a run comes from.
+pub(super) enum Origin<'a> {
+    /// The words of a command line.
+    Line(&'a [OsString]),
+    /// The last checkpoint in a folder.
+    Checkpoint(resume::Place),
+}
+
+/// The run, from its beginning or from its last checkpoint.
+pub(super) fn follow(options: &RunOptions, origin: Origin<'_>) -> Result<bool> {
     let selection = Selection::new(&options.name, &options.scheme.parameters.set)?;
     let model = Model::new(&selection, options.scheme.precision)?;
     let settled = &Settled::settle(&options.scheme, &model.exact)?;
@@ -46,9 +58,10 @@ pub(super) fn follow(options: &RunOptions, place: Option<resume::Place>) -> Resu
     });
     let settings = || settings(&selection, settled, extent, cells, case.cfl);
     // Nothing is left in the folder of a run that cannot begin.
-    let place = match (place, &options.checkpoint) {
-        (None, Some(folder)) => Some(resume::remember(folder)?),
-        (place, _) => place,
+    let place = match (origin, &options.checkpoint) {
+        (Origin::Line(line), Some(folder)) => Some(resume::remember(folder, line)?),
+        (Origin::Line(_), None) => None,
+        (Origin::Checkpoint(place), _) => Some(place),
     };
     let checkpoints = match place {
         Some(place) => Some(resume::checkpoints(place, options, &settings())?),
@@ -67,7 +80,17 @@ pub(super) fn follow(options: &RunOptions, place: Option<resume::Place>) -> Resu
                 snapshot: picture.as_mut().map(Picture::snapshot),
                 ..Outputs::new(show)
             };
-            simulate(&model.exact, model.arithmetic(), &case, &mut outputs)?
+            let row = simulate(&model.exact, model.arithmetic(), &case, &mut outputs);
+            row.map_err(|error| match &checkpoints {
+                Some(Checkpoints { folder, .. })
+                    if matches!(error, CaseError::Interrupted { .. }) =>
+                {
+                    let folder = folder.path().display();
+                    anyhow::Error::new(error)
+                        .context(format!("mms resume {folder} goes on from there"))
+                }
+                _ => error.into(),
+            })?
         };
         terminal::say(&(settled.choice() + &caption(&selection, settled, extent) + &text(&row)))?;
         if let Some(frames) = &frames {

@@ -90,7 +90,7 @@ impl UnderWay {
             .current_dir(place)
             .args(arguments.split_whitespace())
             .stdout(Stdio::null())
-            .stderr(Stdio::null())
+            .stderr(Stdio::piped())
             .spawn();
         Self(child.expect("the binary starts"))
     }
@@ -109,6 +109,17 @@ impl UnderWay {
         assert!(self.0.try_wait().expect("its status").is_none(), "it has ended by itself");
         self.0.kill().expect("it can be killed");
         self.0.wait().expect("it has ended");
+    }
+
+    /// Interrupts it as Ctrl-C does; its exit status, and what it said.
+    #[cfg(unix)]
+    pub(crate) fn interrupt(self) -> (i32, String) {
+        let id = self.0.id().to_string();
+        let sent = Command::new("kill").args(["-INT", &id]).status().expect("kill starts");
+        assert!(sent.success());
+        let output = self.0.wait_with_output().expect("it has ended");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        (output.status.code().expect("it ends by itself"), said)
     }
 
     /// Its exit status, once it has ended.

@@ -1,5 +1,7 @@
 //! The same bits from all vector registers and from any number of threads.
 
+#![allow(clippy::unwrap_used)]
+
 use mmsmith_mpm::{
     Body, Grid, Integrator, Material, NoBodyForce, Particles, Registers, Scalar, Settings, Shape,
     Simulation, Transfer,

@@ -1,0 +1,42 @@
+//! An end from outside: what is stepping ends after its step.
+
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+static ASKED: AtomicBool = AtomicBool::new(false);
+/// Loops over steps that are under way.
+static STEPPING: AtomicUsize = AtomicUsize::new(0);
+
+/// Asks all runs and studies of this process that are stepping to end: each does so after its step, with
+/// [`CaseError::Interrupted`](crate::CaseError::Interrupted), and with a checkpoint where it keeps any. True where one is stepping;
+/// otherwise nothing is asked.
+///
+/// It may be called from any thread, such as one that handles signals.
+pub fn interrupt() -> bool {
+    let is_stepping = STEPPING.load(Ordering::SeqCst) > 0;
+    ASKED.fetch_or(is_stepping, Ordering::SeqCst);
+    is_stepping
+}
+
+/// A loop over steps, for as long as it lives.
+pub(crate) struct Stepping;
+
+impl Stepping {
+    pub(crate) fn begin() -> Self {
+        STEPPING.fetch_add(1, Ordering::SeqCst);
+        Self
+    }
+
+    /// Whether it was asked to end.
+    pub(crate) fn is_interrupted(&self) -> bool {
+        ASKED.load(Ordering::Relaxed)
+    }
+}
+
+impl Drop for Stepping {
+    fn drop(&mut self) {
+        // The last loop takes the wish with it: what begins later was not meant.
+        if STEPPING.fetch_sub(1, Ordering::SeqCst) == 1 {
+            ASKED.store(false, Ordering::SeqCst);
+        }
+    }
+}
