@@ -1,7 +1,7 @@
 //! Ctrl-C, and what a batch system sends before it kills: what is under way ends in order.
 
 use anyhow::Error;
-use mmsmith_verify::CaseError;
+use mmsmith_verify::{CaseError, StudyError};
 
 /// The exit status of an interrupted command, as of any program that a shell interrupts.
 pub(crate) const INTERRUPTED: u8 = 130;
@@ -23,5 +23,9 @@ pub fn end_on_signals() {
 
 /// Whether it is because of an interruption that a command failed.
 pub(crate) fn is_interrupted(error: &Error) -> bool {
-    error.chain().any(|cause| matches!(cause.downcast_ref(), Some(CaseError::Interrupted { .. })))
+    let cause = |study: &StudyError| matches!(study.cause, CaseError::Interrupted { .. });
+    error.chain().any(|error| {
+        matches!(error.downcast_ref(), Some(CaseError::Interrupted { .. }))
+            || error.downcast_ref().is_some_and(cause)
+    })
 }

@@ -7,14 +7,19 @@ static ASKED: AtomicBool = AtomicBool::new(false);
 static STEPPING: AtomicUsize = AtomicUsize::new(0);
 
 /// Asks all runs and studies of this process that are stepping to end: each does so after its step, with
-/// [`CaseError::Interrupted`](crate::CaseError::Interrupted), and with a checkpoint where it keeps any. True where one is stepping;
-/// otherwise nothing is asked.
+/// [`CaseError::Interrupted`](crate::CaseError::Interrupted), and with a checkpoint where it keeps any. So does whatever begins
+/// later, until [`allow`] is called. True where one is stepping; otherwise nothing is asked.
 ///
 /// It may be called from any thread, such as one that handles signals.
 pub fn interrupt() -> bool {
     let is_stepping = STEPPING.load(Ordering::SeqCst) > 0;
     ASKED.fetch_or(is_stepping, Ordering::SeqCst);
     is_stepping
+}
+
+/// Takes [`interrupt`] back, for a process that goes on with other work.
+pub fn allow() {
+    ASKED.store(false, Ordering::SeqCst);
 }
 
 /// A loop over steps, for as long as it lives.
@@ -34,9 +39,6 @@ impl Stepping {
 
 impl Drop for Stepping {
     fn drop(&mut self) {
-        // The last loop takes the wish with it: what begins later was not meant.
-        if STEPPING.fetch_sub(1, Ordering::SeqCst) == 1 {
-            ASKED.store(false, Ordering::SeqCst);
-        }
+        STEPPING.fetch_sub(1, Ordering::SeqCst);
     }
 }

@@ -61,7 +61,7 @@ pub use error::{CaseError, SceneError};
 pub use evaluate::{FieldRow, WrongLength, evaluate};
 pub use frames::{FrameOutput, Snapshot};
 pub use history::{MOST_MOMENTS, Moment, Sums, energy_drift};
-pub use interrupt::interrupt;
+pub use interrupt::{allow, interrupt};
 pub use mmsmith_mpm::StepError;
 pub use mmsmith_mpm::total_lagrangian::{Composition, Coordinates, Layout, MassMatrix};
 pub use mmsmith_mpm::{Integrator, Shape, Transfer};
