@@ -3,12 +3,42 @@
 //! Where a hat function is replaced by its interpolation between the corners `x_c`, its mean over the domain is
 //! `sum_c w_c phi_i(x_c)` and that of its gradient `sum_c g_c phi_i(x_c)`. Formulas are for one particle or for eight at once.
 
+use nalgebra::{RealField, SMatrix};
+
 use crate::simd::Number;
 
 // Loops are written out, as a closure would hide from the compiler that it may use vector instructions.
 
 /// Corners of a domain in three dimensions; those in fewer use the first of as many places.
 pub(crate) const MOST_CORNERS: usize = 8;
+
+/// Nodes that a domain within two cells reaches along an axis.
+pub(crate) const REACHED: usize = 3;
+
+/// The half-edges of the parallelograms of all particles in the reference configuration: columns of matrices, lengths.
+#[derive(Debug)]
+pub(crate) enum HalfEdges<T, const D: usize> {
+    /// As those of a lattice.
+    Same(SMatrix<T, D, D>),
+    Each(Vec<SMatrix<T, D, D>>),
+}
+
+impl<T: RealField + Copy, const D: usize> HalfEdges<T, D> {
+    pub(crate) fn new(each: Vec<SMatrix<T, D, D>>) -> Self {
+        match each.first() {
+            Some(first) if each.iter().all(|own| own == first) => Self::Same(*first),
+            _ => Self::Each(each),
+        }
+    }
+
+    /// Those of a particle.
+    pub(crate) fn of(&self, p: usize) -> &SMatrix<T, D, D> {
+        match self {
+            Self::Same(half_edges) => half_edges,
+            Self::Each(half_edges) => &half_edges[p],
+        }
+    }
+}
 
 /// The shares `w` of a mean and `g` of a mean gradient that the corners have.
 #[derive(Clone, Copy, Debug)]

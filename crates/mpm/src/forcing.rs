@@ -5,7 +5,7 @@ use nalgebra::{RealField, SVector};
 use crate::body_force::{AtTime, BodyForce};
 use crate::fault::Fault;
 use crate::geometry::Constants;
-use crate::kernel::block::BLOCK;
+use crate::kernel::copies::BLOCK;
 
 /// The body force on all particles at one time.
 pub(crate) struct Forcing<'a, T, const D: usize> {

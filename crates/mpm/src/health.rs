@@ -5,13 +5,15 @@ use std::sync::{Mutex, PoisonError};
 use nalgebra::{SMatrix, SVector};
 
 use crate::body::Mesh;
-use crate::domain::{self, MOST_CORNERS, corner_of_parallelogram, volume_of_cell};
+use crate::domain::{
+    self, HalfEdges, MOST_CORNERS, REACHED, corner_of_parallelogram, volume_of_cell,
+};
 use crate::geometry::Constants;
-use crate::kernel::block::{BLOCK, Kinematics};
-use crate::kernel::corners::{GROUP, OfGroup, REACHED, cells, gather, padded, parallelograms};
+use crate::kernel::copies::{BLOCK, Kinematics};
+use crate::kernel::corners::{GROUP, OfGroup, cells, gather, padded, parallelograms};
 use crate::shape_function::{EXTENDED, HALF_SIZE_LIMIT, ProductShape, node_below};
 use crate::simd::{Eight, Lanes, Loop, Vectors, dispatch};
-use crate::support::{HalfEdges, Rows, Support};
+use crate::support::{Rows, Support};
 use crate::tensor::{determinant, real};
 
 /// Reasons why a particle is invalid, worst first: where one particle is inverted, others may follow in the same step.
@@ -293,7 +295,7 @@ impl SharedOutcome {
 mod tests {
     use super::*;
     use crate::grid::{Grid, Layout};
-    use crate::kernel::block::Copies;
+    use crate::kernel::copies::Copies;
     use crate::parallel::bins::Bins;
     use crate::scheme::Shape;
     use nalgebra::{Matrix2, Vector2, vector};

@@ -17,7 +17,8 @@ use crate::grid_update::{
     Acceleration, GridUpdate, NodeVectors, Reprojection, Velocity, VelocityAndAcceleration,
 };
 use crate::kernel::any::{Contributions, Interpolated};
-use crate::kernel::block::{BLOCK, Block, Copies};
+use crate::kernel::block::Block;
+use crate::kernel::copies::{BLOCK, Copies};
 use crate::node::Node;
 use crate::particles::Particles;
 use crate::simd::Lanes;

@@ -13,14 +13,13 @@ use crate::geometry::Constants;
 use crate::grid::{Grid, Layout};
 use crate::health::Invalid;
 use crate::kernel::block::BlockLaw;
-use crate::material::{AnyLaw, Material, NeoHookean, NeoHookeanNoLog};
+use crate::material::{AnyLaw, Material, NeoHookean, NeoHookeanNoLog, Stressed};
 use crate::node::Node;
 use crate::parallel::bins::Bins;
 use crate::particles::Particles;
 use crate::scheme::{Settings, Shape, Taken};
 use crate::shape_function::HALF_SIZE_LIMIT;
 use crate::simd::Lanes;
-use crate::solver::Scalar;
 use crate::state::State;
 use crate::step::{StepTimes, is_fused};
 use crate::support::Support;
@@ -36,7 +35,55 @@ pub struct Simulation<T, const D: usize> {
     failed: Option<StepError>,
 }
 
-impl<T: Scalar<D>, const D: usize> Simulation<T, D> {
+/// Numbers whose steps are compiled with this crate: `f64` and `f32`.
+///
+/// Steps are generic over precision and dimension. The functions here are not, so that whoever uses them does not compile kernels.
+pub trait Stepped<const D: usize>: Stressed<D> {
+    /// [`Simulation::new`].
+    #[doc(hidden)]
+    fn set_up(
+        grid: Grid<Self, D>,
+        body: Body<Self, D>,
+        material: Material<Self>,
+        settings: Settings<Self>,
+    ) -> Result<Simulation<Self, D>, SetupError>;
+
+    /// [`Simulation::step`].
+    #[doc(hidden)]
+    fn step(
+        simulation: &mut Simulation<Self, D>,
+        body_force: &dyn BodyForce<Self, D>,
+    ) -> Result<(), StepError>;
+}
+
+macro_rules! stepped {
+    ($($T:ty: $($D:literal)*;)*) => {
+        $($(impl Stepped<$D> for $T {
+            fn set_up(
+                grid: Grid<Self, $D>,
+                body: Body<Self, $D>,
+                material: Material<Self>,
+                settings: Settings<Self>,
+            ) -> Result<Simulation<Self, $D>, SetupError> {
+                Simulation::set_up(grid, body, material, settings)
+            }
+
+            fn step(
+                simulation: &mut Simulation<Self, $D>,
+                body_force: &dyn BodyForce<Self, $D>,
+            ) -> Result<(), StepError> {
+                simulation.advance(body_force)
+            }
+        })*)*
+    };
+}
+
+stepped! {
+    f64: 1 2 3;
+    f32: 1 2 3;
+}
+
+impl<T: Stepped<D>, const D: usize> Simulation<T, D> {
     /// Sets up a simulation at time 0, of a [`Body`] or of [`Particles`] with boxes.
     ///
     /// # Errors
@@ -162,7 +209,7 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
     }
 }
 
-impl<T: Scalar<D>, const D: usize> Simulation<T, D> {
+impl<T: Lanes, const D: usize> Simulation<T, D> {
     /// The state between two steps, as slices of bytes in this machine's order; their number and lengths follow from the set-up.
     ///
     /// A copy of these bytes, written over the state of a simulation with the same set-up, continues the run to the same bits.

@@ -1,16 +1,12 @@
 //! Solvers of any scheme behind one door, compiled with this crate.
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SVector;
 
-use crate::body::Body;
 use crate::body_force::BodyForce;
 use crate::error::{SetupError, StepError};
-use crate::grid::Grid;
-use crate::material::{Material, SIDE_BY_SIDE};
+use crate::material::Material;
 use crate::particles::Particles;
-use crate::scheme::Settings;
-use crate::simd::Lanes;
-use crate::simulation::Simulation;
+use crate::simulation::{Simulation, Stepped};
 use crate::total_lagrangian::{self, BoundaryData, Scheme, TotalLagrangian};
 
 /// A solver that can be stepped and looked at.
@@ -73,49 +69,7 @@ struct DrivenBody<'a, const D: usize> {
 }
 
 /// The precisions of the solver: `f64` and `f32`.
-///
-/// Steps and stresses are generic over precision and dimension. The functions here are not, so that kernels are compiled once,
-/// with this crate, and not with each that uses it.
-pub trait Scalar<const D: usize>: Lanes {
-    /// [`Simulation::new`].
-    #[doc(hidden)]
-    fn set_up(
-        grid: Grid<Self, D>,
-        body: Body<Self, D>,
-        material: Material<Self>,
-        settings: Settings<Self>,
-    ) -> Result<Simulation<Self, D>, SetupError>;
-
-    /// [`Simulation::step`].
-    #[doc(hidden)]
-    fn step(
-        simulation: &mut Simulation<Self, D>,
-        body_force: &dyn BodyForce<Self, D>,
-    ) -> Result<(), StepError>;
-
-    /// [`Material::kirchhoff`].
-    #[doc(hidden)]
-    fn kirchhoff(law: &Material<Self>, F: &SMatrix<Self, D, D>) -> Option<SMatrix<Self, D, D>>;
-
-    /// [`Material::first_piola_kirchhoff`].
-    #[doc(hidden)]
-    fn first_piola_kirchhoff(
-        law: &Material<Self>,
-        F: &SMatrix<Self, D, D>,
-    ) -> Option<SMatrix<Self, D, D>>;
-
-    /// [`Material::first_piola_kirchhoff_side_by_side`].
-    #[doc(hidden)]
-    fn first_piola_kirchhoff_side_by_side(
-        law: &Material<Self>,
-        F: &[[[Self; SIDE_BY_SIDE]; D]; D],
-        P: &mut [[[Self; SIDE_BY_SIDE]; D]; D],
-    );
-
-    /// [`Material::von_mises`].
-    #[doc(hidden)]
-    fn von_mises(law: &Material<Self>, F: &SMatrix<Self, D, D>) -> Option<Self>;
-
+pub trait Scalar<const D: usize>: Stepped<D> {
     /// A simulation in the total Lagrangian formulation.
     ///
     /// # Errors
@@ -131,48 +85,6 @@ macro_rules! scalar {
     ($($T:tt: $($D:literal)*;)*) => {
         $($(
             impl Scalar<$D> for $T {
-                fn set_up(
-                    grid: Grid<Self, $D>,
-                    body: Body<Self, $D>,
-                    material: Material<Self>,
-                    settings: Settings<Self>,
-                ) -> Result<Simulation<Self, $D>, SetupError> {
-                    Simulation::set_up(grid, body, material, settings)
-                }
-
-                fn step(
-                    simulation: &mut Simulation<Self, $D>,
-                    body_force: &dyn BodyForce<Self, $D>,
-                ) -> Result<(), StepError> {
-                    simulation.advance(body_force)
-                }
-
-                fn kirchhoff(
-                    law: &Material<Self>,
-                    F: &SMatrix<Self, $D, $D>,
-                ) -> Option<SMatrix<Self, $D, $D>> {
-                    law.kirchhoff_here(F)
-                }
-
-                fn first_piola_kirchhoff(
-                    law: &Material<Self>,
-                    F: &SMatrix<Self, $D, $D>,
-                ) -> Option<SMatrix<Self, $D, $D>> {
-                    law.first_piola_kirchhoff_here(F)
-                }
-
-                fn first_piola_kirchhoff_side_by_side(
-                    law: &Material<Self>,
-                    F: &[[[Self; SIDE_BY_SIDE]; $D]; $D],
-                    P: &mut [[[Self; SIDE_BY_SIDE]; $D]; $D],
-                ) {
-                    law.first_piola_kirchhoff_side_by_side_here(F, P);
-                }
-
-                fn von_mises(law: &Material<Self>, F: &SMatrix<Self, $D, $D>) -> Option<Self> {
-                    law.von_mises_here(F)
-                }
-
                 fn total_lagrangian<'a>(
                     set_up: TotalSetUp<'_, $D>,
                     boundary: Box<dyn BoundaryData<$D> + 'a>,

@@ -5,9 +5,8 @@ use std::array;
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::body::{Body, Mesh};
-use crate::domain::volume_of_cell;
+use crate::domain::{HalfEdges, REACHED, volume_of_cell};
 use crate::geometry::Constants;
-use crate::kernel::corners::REACHED;
 use crate::scheme::Shape;
 use crate::shape_function::{EXTENDED, HALF_SIZE_LIMIT, ProductShape, first_layer, node_below};
 use crate::simd::One;
@@ -27,31 +26,6 @@ pub(crate) enum Support<T, const D: usize> {
         /// Buffer for the positions of the corners at the end of a step.
         next: Vec<SVector<T, D>>,
     },
-}
-
-/// The half-edges of all particles.
-#[derive(Debug)]
-pub(crate) enum HalfEdges<T, const D: usize> {
-    /// As those of a lattice.
-    Same(SMatrix<T, D, D>),
-    Each(Vec<SMatrix<T, D, D>>),
-}
-
-impl<T: RealField + Copy, const D: usize> HalfEdges<T, D> {
-    fn new(each: Vec<SMatrix<T, D, D>>) -> Self {
-        match each.first() {
-            Some(first) if each.iter().all(|own| own == first) => Self::Same(*first),
-            _ => Self::Each(each),
-        }
-    }
-
-    /// Those of a particle.
-    fn of(&self, p: usize) -> &SMatrix<T, D, D> {
-        match self {
-            Self::Same(half_edges) => half_edges,
-            Self::Each(half_edges) => &half_edges[p],
-        }
-    }
 }
 
 impl<T: RealField + Copy, const D: usize> Support<T, D> {

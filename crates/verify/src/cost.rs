@@ -10,12 +10,12 @@ use std::time::{Duration, Instant};
 use mmsmith_runtime::{AnySolution, Solution};
 
 use crate::case::{Arithmetic, Case};
-use crate::dimension::Precision;
 use crate::dimension::in_arithmetic;
 use crate::drive::Driven;
 use crate::error::CaseError;
 use crate::measure::Comparison;
 use crate::plan::{Plan, Prepared, plan, prepare};
+use crate::precision::Precision;
 
 /// Of how many steps the times are kept.
 const FIRST_STEPS: usize = 63;

@@ -2,8 +2,9 @@
 //!
 //! Central differences at steps from the reach down to a four-millionth of it, each half of the one before, are extrapolated
 //! in the manner of Richardson, four neighbours at a time: at any scale on which the function is smooth these agree. The error
-//! of a value is its largest disagreement with all values of finer steps, beyond what rounding explains there. Coarse steps
-//! may agree with each other by chance where the function oscillates between them; finer ones then contradict.
+//! of a value is its largest disagreement with values of finer steps, beyond what rounding explains there, that two of them in
+//! succession show: one alone may be an unlucky sum of rounding errors. Coarse steps may agree with each other by chance where the
+//! function oscillates between them; all finer ones then contradict.
 
 use nalgebra::SMatrix;
 
@@ -92,8 +93,10 @@ pub(crate) fn derivative_of_sum<const R: usize, const C: usize>(
     let mut best = nothing;
     for level in 0..last {
         let rounding = |level: usize| noise / finest_step(level);
-        let contradicted = (level + 1..=last)
-            .map(|finer| apart(level, finer) - 2.0 * rounding(finer))
+        let beyond_rounding = |finer: usize| apart(level, finer) - 2.0 * rounding(finer);
+        let contradicted = (level + 1..last)
+            .map(|finer| [beyond_rounding(finer), beyond_rounding(finer + 1)])
+            .map(|[one, two]| if two.is_nan() || two < one { two } else { one })
             .fold(apart(level, level + 1), |m, d| if d.is_nan() { f64::NAN } else { m.max(d) });
         let error = contradicted + rounding(level);
         if error < best.error {

@@ -1,13 +1,5 @@
 //! From solutions whose dimension and precision are known at run time to code that is generic over them.
 
-use mmsmith_mpm::Scalar;
-use mmsmith_runtime::Real;
-
-/// The numbers of runs in `D` dimensions: `f64` or `f32`. Files have stresses in space.
-pub(crate) trait Precision<const D: usize>: Real + Scalar<D> + Scalar<3> {}
-
-impl<T: Real + Scalar<D> + Scalar<3>, const D: usize> Precision<D> for T {}
-
 /// `$body` with `$s` bound to the solution in its dimension; `$otherwise` for a dimension that is not known here.
 macro_rules! in_dimension {
     ($exact:expr, |$s:ident| $body:expr, else $otherwise:expr) => {{

@@ -10,9 +10,9 @@ use mmsmith_runtime::{BodyForceAtPoints, Real, Solution};
 use nalgebra::SVector;
 
 use crate::case::Case;
-use crate::dimension::Precision;
 use crate::error::CaseError;
 use crate::interrupt::Stepping;
+use crate::precision::Precision;
 use crate::scene::Scene;
 use crate::scheme::Scheme;
 use crate::{total, updated};

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::dimension::Precision;
+use crate::precision::Precision;
 
 use mmsmith_mpm::{Material, Particles};
 use mmsmith_runtime::{Real, Solution};

@@ -35,6 +35,7 @@ mod norms;
 mod order;
 mod plan;
 mod points;
+mod precision;
 mod record;
 mod run;
 mod scene;

@@ -8,8 +8,8 @@ use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use crate::dimension::Precision;
 use crate::norms::{PerField, PerNorm, Tallies, Tally, is_squarable, magnitude};
+use crate::precision::Precision;
 
 /// Particles in a group that one thread works on; fixed, so that sums do not depend on the number of threads.
 const GROUP: usize = 1024;

@@ -10,7 +10,6 @@ use serde::{Serialize, Serializer};
 
 use crate::case::{Arithmetic, Case, law};
 use crate::checkpoint::{Checkpoints, Reached, TakenUp};
-use crate::dimension::Precision;
 use crate::dimension::in_arithmetic;
 use crate::drive::{Driven, Outcome, Stepped};
 use crate::error::CaseError;
@@ -20,6 +19,7 @@ use crate::measure::Comparison;
 use crate::norms::{Field, PerField, PerNorm, magnitude};
 use crate::plan::{Prepared, Steps, prepare};
 use crate::points;
+use crate::precision::Precision;
 use crate::scene::Scene;
 
 /// How far a run or a study is.

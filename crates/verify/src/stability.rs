@@ -23,12 +23,12 @@ use mmsmith_runtime::{AnySolution, Real, Solution};
 use serde::{Deserialize, Serialize};
 
 use crate::case::{Arithmetic, Case, CflSpeed, law};
-use crate::dimension::Precision;
 use crate::dimension::{in_arithmetic, in_dimension};
 use crate::drive::{Driven, Outcome, Stepped};
 use crate::error::CaseError;
 use crate::history::Totals;
 use crate::plan::{Prepared, plan, prepare, steps_to};
+use crate::precision::Precision;
 use crate::scene::Scene;
 
 /// When a run counts as unstable.

@@ -15,13 +15,13 @@ use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 
 use crate::case::{Arithmetic, Case};
-use crate::dimension::Precision;
 use crate::dimension::in_arithmetic;
 use crate::drive::{Driven, Outcome, Stepped};
 use crate::error::{CaseError, MOST_STEPS};
 use crate::norms::{PerField, PerNorm, Tallies, is_squarable, magnitude, scale_of};
 use crate::order::Order;
 use crate::plan::{Prepared, prepare};
+use crate::precision::Precision;
 use crate::run::{Progress, Status};
 use crate::scene::Scene;
 use crate::study::{StudyError, orders_of};

@@ -10,9 +10,9 @@ use nalgebra::SVector;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
 use crate::case::{Case, CflSpeed, Extent, law};
-use crate::dimension::Precision;
 use crate::dimension::in_dimension;
 use crate::error::CaseError;
+use crate::precision::Precision;
 use crate::scene::Scene;
 use crate::scheme::{Total, grid_name};
 

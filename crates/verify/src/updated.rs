@@ -5,8 +5,8 @@ use mmsmith_runtime::{Domain, Real, Solution};
 use nalgebra::SVector;
 
 use crate::case::{Case, Extent, law};
-use crate::dimension::Precision;
 use crate::error::{CaseError, SceneError};
+use crate::precision::Precision;
 use crate::scene::Scene;
 use crate::scheme::{Placement, Start, Stepping, Updated};
 

@@ -16,4 +16,5 @@ mod planted_solver_faults;
 #[path = "../../../crates/mpm/tests/reference/mod.rs"]
 mod reference;
 mod staged;
+mod structure;
 mod updated_frame;

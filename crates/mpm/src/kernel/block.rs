@@ -1,27 +1,16 @@
-//! Blocks of 64 particles: copies of their data, their stresses, and the kernels for P2G and G2P that serve a simulation.
+//! Blocks of 64 particles: their stresses, and the kernels for P2G and G2P that serve a simulation.
 
 use nalgebra::{SMatrix, SVector};
 
 use crate::geometry::Constants;
 use crate::kernel::any::{Contributions, Interpolated, Receive};
+use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::kernel::corners::Corners;
 use crate::kernel::product::ProductWeights;
 use crate::material::Law;
 use crate::node::Node;
 use crate::simd::{Lanes, Loop, Vectors, dispatch};
 use crate::support::Support;
-
-/// Particles in a block: as many as keep all of it in the first-level cache.
-pub(crate) const BLOCK: usize = 64;
-
-/// Positions and deformation gradients of the particles of a block.
-#[derive(Clone, Copy)]
-pub(crate) struct Kinematics<'a, T, const D: usize> {
-    /// Positions.
-    pub(crate) x: &'a [SVector<T, D>; BLOCK],
-    /// Deformation gradients.
-    pub(crate) F: &'a [SMatrix<T, D, D>; BLOCK],
-}
 
 /// A law for blocks of particles.
 pub(crate) trait BlockLaw<T, const D: usize>: Send + Sync {
@@ -43,62 +32,6 @@ impl<T: Lanes, L: Law<T>, const D: usize> BlockLaw<T, D> for L {
         contributions: &mut Contributions<T, D, BLOCK>,
     ) {
         dispatch(Stress { F, c, law: *self, contributions });
-    }
-}
-
-/// Copies of up to `BLOCK` particles from scattered places in memory.
-pub(crate) struct Copies<T, const D: usize> {
-    /// Positions.
-    pub(crate) x: [SVector<T, D>; BLOCK],
-    /// Velocities.
-    pub(crate) v: [SVector<T, D>; BLOCK],
-    /// Deformation gradients.
-    pub(crate) F: [SMatrix<T, D, D>; BLOCK],
-}
-
-impl<T: Lanes, const D: usize> Copies<T, D> {
-    pub(crate) fn new() -> Self {
-        // The identity has a stress in every law.
-        let zero = [SVector::zeros(); BLOCK];
-        Self { x: zero, v: zero, F: [SMatrix::identity(); BLOCK] }
-    }
-
-    pub(crate) fn kinematics(&self) -> Kinematics<'_, T, D> {
-        Kinematics { x: &self.x, F: &self.F }
-    }
-
-    /// Takes positions and deformation gradients of the particles `ids`.
-    pub(crate) fn pick(&mut self, ids: &[u32], x: &[SVector<T, D>], F: &[SMatrix<T, D, D>]) {
-        for (own, &p) in self.x.iter_mut().zip(ids) {
-            *own = x[p as usize];
-        }
-        self.pick_F(ids, F);
-    }
-
-    /// Replaces the deformation gradients by those of the particles `ids`.
-    pub(crate) fn pick_F(&mut self, ids: &[u32], F: &[SMatrix<T, D, D>]) {
-        for (own, &p) in self.F.iter_mut().zip(ids) {
-            *own = F[p as usize];
-        }
-    }
-
-    /// Particles that lie side by side: in place where they fill a block, else copied.
-    pub(crate) fn of_successive<'a>(
-        &'a mut self,
-        x: &'a [SVector<T, D>],
-        F: &'a [SMatrix<T, D, D>],
-    ) -> Kinematics<'a, T, D> {
-        if let (Some(x), Some(F)) = (x.first_chunk(), F.first_chunk()) {
-            return Kinematics { x, F };
-        }
-        self.copy(x, F);
-        self.kinematics()
-    }
-
-    /// Takes whole arrays, no longer than a block.
-    pub(crate) fn copy(&mut self, x: &[SVector<T, D>], F: &[SMatrix<T, D, D>]) {
-        self.x[..x.len()].copy_from_slice(x);
-        self.F[..F.len()].copy_from_slice(F);
     }
 }
 

@@ -9,16 +9,15 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::body::Mesh;
 use crate::domain::{
-    MOST_CORNERS, Shares, corner_of_parallelogram, deformed, inverse, shares_of_cell,
-    slopes_of_parallelogram,
+    HalfEdges, MOST_CORNERS, REACHED, Shares, corner_of_parallelogram, deformed, inverse,
+    shares_of_cell, slopes_of_parallelogram,
 };
 use crate::geometry::Constants;
 use crate::kernel::any::{Contributions, Interpolated};
-use crate::kernel::block::{BLOCK, Kinematics};
+use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::node::Node;
 use crate::shape_function::{Hat, ShapeFunction, index, node_below};
 use crate::simd::{Eight, Lane8, Lanes, Loop, Number, Vectors, dispatch};
-use crate::support::HalfEdges;
 use crate::tensor::{product, real};
 
 /// One number for every particle of a block, `[group].0[n]`; aligned with vector registers.
@@ -27,8 +26,7 @@ type PerParticle<T> = [Lane8<T>; BLOCK / GROUP];
 /// Particles whose weights are computed together.
 pub(crate) const GROUP: usize = 8;
 
-/// Nodes that a domain within two cells reaches along an axis, and in all.
-pub(crate) const REACHED: usize = 3;
+/// Nodes that a domain within two cells reaches in all.
 const MOST_REACHED: usize = 27;
 
 /// The corners of the domains of a block of particles; `[corner][k]` or `[corner][axis][k]` is of particle `k`.

@@ -7,7 +7,7 @@ use nalgebra::{SMatrix, SVector};
 use crate::fault::{Fault, Planted};
 use crate::geometry::Constants;
 use crate::kernel::any::{Contributions, Interpolated, Receive, g2p, p2g};
-use crate::kernel::block::{BLOCK, Kinematics};
+use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::kernel::lanes_plane::{g2p_in_plane, p2g_in_plane};
 use crate::kernel::lanes_space::{g2p_in_space, p2g_in_space};
 use crate::node::Node;

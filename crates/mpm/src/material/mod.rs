@@ -27,7 +27,6 @@ pub(crate) use st_venant_kirchhoff::StVenantKirchhoff;
 
 use crate::fault::Planted;
 use crate::simd::{Lanes, Loop, Vectors, dispatch};
-use crate::solver::Scalar;
 use crate::tensor::{det_minus_one, determinant, product, real};
 
 /// An elastic material.
@@ -117,11 +116,74 @@ macro_rules! with_law {
 /// Particles whose stresses are computed side by side.
 pub const SIDE_BY_SIDE: usize = 16;
 
+/// Numbers whose stresses are compiled with this crate: `f64` and `f32`; see [`Material`].
+pub trait Stressed<const D: usize>: Lanes {
+    /// [`Material::kirchhoff`].
+    #[doc(hidden)]
+    fn kirchhoff(law: &Material<Self>, F: &SMatrix<Self, D, D>) -> Option<SMatrix<Self, D, D>>;
+
+    /// [`Material::first_piola_kirchhoff`].
+    #[doc(hidden)]
+    fn first_piola_kirchhoff(
+        law: &Material<Self>,
+        F: &SMatrix<Self, D, D>,
+    ) -> Option<SMatrix<Self, D, D>>;
+
+    /// [`Material::first_piola_kirchhoff_side_by_side`].
+    #[doc(hidden)]
+    fn first_piola_kirchhoff_side_by_side(
+        law: &Material<Self>,
+        F: &[[[Self; SIDE_BY_SIDE]; D]; D],
+        P: &mut [[[Self; SIDE_BY_SIDE]; D]; D],
+    );
+
+    /// [`Material::von_mises`].
+    #[doc(hidden)]
+    fn von_mises(law: &Material<Self>, F: &SMatrix<Self, D, D>) -> Option<Self>;
+}
+
+macro_rules! stressed {
+    ($($T:ty: $($D:literal)*;)*) => {
+        $($(impl Stressed<$D> for $T {
+            fn kirchhoff(
+                law: &Material<Self>,
+                F: &SMatrix<Self, $D, $D>,
+            ) -> Option<SMatrix<Self, $D, $D>> {
+                law.kirchhoff_here(F)
+            }
+
+            fn first_piola_kirchhoff(
+                law: &Material<Self>,
+                F: &SMatrix<Self, $D, $D>,
+            ) -> Option<SMatrix<Self, $D, $D>> {
+                law.first_piola_kirchhoff_here(F)
+            }
+
+            fn first_piola_kirchhoff_side_by_side(
+                law: &Material<Self>,
+                F: &[[[Self; SIDE_BY_SIDE]; $D]; $D],
+                P: &mut [[[Self; SIDE_BY_SIDE]; $D]; $D],
+            ) {
+                law.first_piola_kirchhoff_side_by_side_here(F, P);
+            }
+
+            fn von_mises(law: &Material<Self>, F: &SMatrix<Self, $D, $D>) -> Option<Self> {
+                law.von_mises_here(F)
+            }
+        })*)*
+    };
+}
+
+stressed! {
+    f64: 1 2 3;
+    f32: 1 2 3;
+}
+
 impl<T: Copy> Material<T> {
     /// Kirchhoff stress `tau = J sigma = P F^T`.
     pub fn kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> Option<SMatrix<T, D, D>>
     where
-        T: Scalar<D>,
+        T: Stressed<D>,
     {
         T::kirchhoff(self, F)
     }
@@ -132,7 +194,7 @@ impl<T: Copy> Material<T> {
         F: &SMatrix<T, D, D>,
     ) -> Option<SMatrix<T, D, D>>
     where
-        T: Scalar<D>,
+        T: Stressed<D>,
     {
         T::first_piola_kirchhoff(self, F)
     }
@@ -145,7 +207,7 @@ impl<T: Copy> Material<T> {
         F: &[[[T; SIDE_BY_SIDE]; D]; D],
         P: &mut [[[T; SIDE_BY_SIDE]; D]; D],
     ) where
-        T: Scalar<D>,
+        T: Stressed<D>,
     {
         T::first_piola_kirchhoff_side_by_side(self, F, P);
     }
@@ -153,7 +215,7 @@ impl<T: Copy> Material<T> {
     /// Cauchy (true) stress `sigma = tau / J`.
     pub fn cauchy<const D: usize>(&self, F: &SMatrix<T, D, D>) -> Option<SMatrix<T, D, D>>
     where
-        T: Scalar<D>,
+        T: Stressed<D>,
     {
         let J = jacobian(F)?;
         Some(self.kirchhoff(F)? / J)
@@ -163,7 +225,7 @@ impl<T: Copy> Material<T> {
     /// in 2D and across the axis in 1D.
     pub fn von_mises<const D: usize>(&self, F: &SMatrix<T, D, D>) -> Option<T>
     where
-        T: Scalar<D>,
+        T: Stressed<D>,
     {
         T::von_mises(self, F)
     }

@@ -51,7 +51,7 @@ fn energy<const D: usize>(law: &Material<f64>, F: &SMatrix<f64, D, D>) -> f64 {
 
 fn check_against_energy<const D: usize>(law: &Material<f64>, F: &SMatrix<f64, D, D>)
 where
-    f64: Scalar<D>,
+    f64: Stressed<D>,
 {
     let P = law.first_piola_kirchhoff(F).unwrap();
     let (stored, printed) = (law.strain_energy(F).unwrap(), energy(law, F));
@@ -77,7 +77,7 @@ fn deformation() -> impl Strategy<Value = Matrix3<f64>> {
         .prop_map(|H| Matrix3::identity() + Matrix3::from_row_slice(&H))
 }
 
-fn check_side_by_side<T: Scalar<D>, const D: usize>(all: &[Matrix3<f64>]) {
+fn check_side_by_side<T: Stressed<D>, const D: usize>(all: &[Matrix3<f64>]) {
     let some: Vec<SMatrix<T, D, D>> =
         all.iter().map(|F| SMatrix::from_fn(|i, j| real(F[(i, j)]))).collect();
     for law in LAWS {
@@ -202,7 +202,7 @@ proptest! {
 
 fn check_in_space<const D: usize>(law: &Material<f64>, F: &SMatrix<f64, D, D>)
 where
-    f64: Scalar<D> + Scalar<3>,
+    f64: Stressed<D> + Stressed<3>,
 {
     let (tau, in_3d) = (law.kirchhoff(F).unwrap(), law.kirchhoff(&in_space(F)).unwrap());
     assert!((tau - in_3d.fixed_view::<D, D>(0, 0)).norm() < 1e-13, "{law:?} {tau} {in_3d}");
@@ -231,7 +231,7 @@ fn at_small_strain_every_law_is_linear_elasticity_to_all_digits() {
     let H1 = Matrix1::new(H3[(0, 0)]);
     fn check<const D: usize>(law: &Material<f64>, H: &SMatrix<f64, D, D>)
     where
-        f64: Scalar<D>,
+        f64: Stressed<D>,
     {
         let F = SMatrix::identity() + H;
         let expected = small_strain_stress(law, H);

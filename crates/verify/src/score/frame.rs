@@ -6,9 +6,10 @@ use mmsmith_runtime::{BLOCK, Domain, Solution, State, StateRun};
 use mmsmith_vtk::foreign::{ArrayHead, Snapshot};
 use nalgebra::{SMatrix, SVector};
 
-use super::arrays::{Chosen, Role, matrices, not_finite, vectors};
+use super::arrays::{Chosen, Role, matrices, vectors};
 use super::findings::Remarks;
 use super::reference::{Scheme, Traced};
+use super::vectors::{count_not_finite, judged, place, positions};
 use super::{ScoreError, ScoreOptions};
 use crate::measure::{RUNS, Row, over_particles};
 use crate::norms::{PerField, PerNorm};
@@ -16,61 +17,6 @@ use crate::points;
 
 /// Share of the body's size by which a reference position may lie outside before it is told.
 const OUTSIDE: f64 = 1e-6;
-
-/// The points of a frame in `D` dimensions.
-pub(super) fn positions<const D: usize>(
-    snapshot: &Snapshot,
-    remarks: &mut Remarks,
-) -> Result<Vec<SVector<f64, D>>, ScoreError> {
-    let path = || snapshot.path().to_owned();
-    let head = snapshot.points().ok_or_else(|| ScoreError::NoPositions { path: path() })?;
-    if head.components < D || head.components > 3 {
-        let found = head.components;
-        return Err(ScoreError::Coordinates { path: path(), found, expected: D });
-    }
-    if head.is_single {
-        let what =
-            "points are 32-bit floats: errors below about 1e-7 of their coordinates are rounding";
-        remarks.note("single-precision", false, what);
-    }
-    let flat = snapshot.positions()?;
-    Ok(judged(&flat, head.components, "position", snapshot, remarks))
-}
-
-/// Vectors from numbers, and what is to be said about them.
-fn judged<const D: usize>(
-    flat: &[f64],
-    components: usize,
-    what: &str,
-    snapshot: &Snapshot,
-    remarks: &mut Remarks,
-) -> Vec<SVector<f64, D>> {
-    count_not_finite(flat, components, what, snapshot, remarks);
-    let (vectors, beyond) = vectors(flat, components);
-    if let Some((count, first)) = beyond {
-        let kind = "out-of-plane";
-        let what =
-            format!("particle(s) whose {what} has a part beyond the solution's {D} dimension(s)");
-        remarks.met(kind, true, count, what, || place(first, snapshot));
-    }
-    vectors
-}
-
-fn count_not_finite(
-    flat: &[f64],
-    components: usize,
-    what: &str,
-    snapshot: &Snapshot,
-    remarks: &mut Remarks,
-) {
-    let (count, first) = not_finite(flat, components);
-    let what = format!("particle(s) whose {what} is not finite");
-    remarks.met("not-finite", true, count, what, || place(first, snapshot));
-}
-
-fn place(particle: usize, snapshot: &Snapshot) -> String {
-    format!("particle {particle} of {}", snapshot.path().display())
-}
 
 /// The particles of the first frame, by which later frames are judged.
 #[derive(Default)]

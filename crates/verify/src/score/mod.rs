@@ -9,6 +9,7 @@ mod error;
 mod findings;
 mod frame;
 mod reference;
+mod vectors;
 
 pub use arrays::Role;
 pub use error::ScoreError;

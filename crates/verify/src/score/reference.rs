@@ -8,7 +8,7 @@ use nalgebra::SVector;
 
 use super::arrays::{Chosen, Role, there};
 use super::findings::Remarks;
-use super::frame::positions;
+use super::vectors::positions;
 use super::{Points, ScoreError, ScoreOptions, Timed, open};
 
 /// Steps of Newton's method from a position back to its reference position.

@@ -1,0 +1,9 @@
+//! The numbers of runs.
+
+use mmsmith_mpm::{Scalar, Stressed};
+use mmsmith_runtime::Real;
+
+/// The numbers of runs in `D` dimensions: `f64` or `f32`. Files have stresses in space.
+pub(crate) trait Precision<const D: usize>: Real + Scalar<D> + Stressed<3> {}
+
+impl<T: Real + Scalar<D> + Stressed<3>, const D: usize> Precision<D> for T {}

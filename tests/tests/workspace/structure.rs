@@ -1,0 +1,171 @@
+//! The modules of the solver and of what measures it use each other in one direction: each can be read after those that it uses.
+
+#![allow(clippy::unwrap_used)]
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use mmsmith_tests::workspace;
+use proc_macro2::{TokenStream, TokenTree};
+use quote::ToTokens;
+use syn::{Attribute, Item, UseTree};
+
+/// The place of a module in its crate, from the root on.
+type Place = Vec<String>;
+
+/// The files of a crate by their modules, without the root and without tests.
+fn files(folder: &Path, place: &Place, files: &mut BTreeMap<Place, syn::File>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
+        let inner = || place.iter().cloned().chain([name.clone()]).collect();
+        if path.is_dir() {
+            self::files(&path, &inner(), files);
+            continue;
+        }
+        let module = match name.as_str() {
+            "lib" | "main" | "tests" => continue,
+            "mod" => place.clone(),
+            _ => inner(),
+        };
+        let text = std::fs::read_to_string(&path).unwrap();
+        files.insert(module, syn::parse_file(&text).unwrap());
+    }
+}
+
+fn is_test(attributes: &[Attribute]) -> bool {
+    let text = |attribute: &Attribute| attribute.to_token_stream().to_string().replace(' ', "");
+    attributes.iter().any(|attribute| text(attribute) == "#[cfg(test)]")
+}
+
+/// The paths that a module names, as it writes them.
+fn paths(file: &syn::File) -> Vec<Vec<String>> {
+    let mut paths = Vec::new();
+    for item in &file.items {
+        match item {
+            Item::Use(item) if !is_test(&item.attrs) => flatten(&item.tree, &[], &mut paths),
+            Item::Mod(item) if is_test(&item.attrs) => {}
+            Item::Use(_) => {}
+            item => scan(item.to_token_stream(), &mut paths),
+        }
+    }
+    paths
+}
+
+fn flatten(tree: &UseTree, before: &[String], paths: &mut Vec<Vec<String>>) {
+    let with = |last: String| before.iter().cloned().chain([last]).collect::<Vec<_>>();
+    match tree {
+        UseTree::Path(path) => flatten(&path.tree, &with(path.ident.to_string()), paths),
+        UseTree::Group(group) => group.items.iter().for_each(|tree| flatten(tree, before, paths)),
+        UseTree::Name(name) => paths.push(with(name.ident.to_string())),
+        UseTree::Rename(name) => paths.push(with(name.ident.to_string())),
+        _ => paths.push(before.to_vec()),
+    }
+}
+
+/// Paths of the form `crate::a::b` within other code.
+fn scan(tokens: TokenStream, paths: &mut Vec<Vec<String>>) {
+    let mut path: Vec<String> = Vec::new();
+    for token in tokens {
+        match token {
+            TokenTree::Ident(word) if path.is_empty() && word == "crate" => {
+                path = vec!["crate".into()];
+            }
+            TokenTree::Ident(word) if !path.is_empty() => path.push(word.to_string()),
+            TokenTree::Punct(punctuation) if punctuation.as_char() == ':' => continue,
+            TokenTree::Group(group) => {
+                paths.push(std::mem::take(&mut path));
+                scan(group.stream(), paths);
+            }
+            _ => paths.push(std::mem::take(&mut path)),
+        }
+    }
+    paths.push(path);
+}
+
+/// The module that a path of the module `own` leads to, if it is one of the same crate.
+fn target(own: &Place, path: &[String], files: &BTreeMap<Place, syn::File>) -> Option<Place> {
+    let ups = path.iter().take_while(|part| *part == "super").count();
+    let mut place: Place = match path.first()?.as_str() {
+        "crate" => path[1..].to_vec(),
+        "super" => own[..own.len() - ups].iter().chain(&path[ups..]).cloned().collect(),
+        "self" => own.iter().chain(&path[1..]).cloned().collect(),
+        _ => return None,
+    };
+    while !place.is_empty() {
+        if files.contains_key(&place) {
+            return Some(place);
+        }
+        place.pop();
+    }
+    None
+}
+
+/// A circle of modules that use each other; a folder's own file and those in the folder are taken for one.
+fn circle(uses: &BTreeMap<Place, Vec<Place>>) -> Option<Vec<Place>> {
+    fn follow(
+        at: &Place,
+        way: &mut Vec<Place>,
+        done: &mut Vec<Place>,
+        uses: &BTreeMap<Place, Vec<Place>>,
+    ) -> bool {
+        if let Some(start) = way.iter().position(|place| place == at) {
+            way.drain(..start);
+            return true;
+        }
+        if done.contains(at) {
+            return false;
+        }
+        way.push(at.clone());
+        if uses[at].iter().any(|next| follow(next, way, done, uses)) {
+            return true;
+        }
+        way.pop();
+        done.push(at.clone());
+        false
+    }
+    let mut done = Vec::new();
+    uses.keys().find_map(|at| {
+        let mut way = Vec::new();
+        follow(at, &mut way, &mut done, uses).then_some(way)
+    })
+}
+
+/// Who uses whom in a crate.
+fn uses(folder: &Path) -> BTreeMap<Place, Vec<Place>> {
+    let mut all = BTreeMap::new();
+    files(folder, &Vec::new(), &mut all);
+    let of = |(own, file): (&Place, &syn::File)| {
+        let targets = paths(file).into_iter().filter_map(|path| target(own, &path, &all));
+        let apart = |other: &Place| !other.starts_with(own) && !own.starts_with(other);
+        (own.clone(), targets.filter(apart).collect())
+    };
+    all.iter().map(of).collect()
+}
+
+#[test]
+fn modules_use_each_other_in_one_direction() {
+    for package in ["mpm", "verify"] {
+        let uses = uses(&workspace().join("crates").join(package).join("src"));
+        assert!(uses.len() > 30 && uses.values().any(|others| others.len() > 3), "{package}");
+        assert_eq!(
+            circle(&uses),
+            None,
+            "{package}: each of these uses the next, and the last the first"
+        );
+    }
+}
+
+#[test]
+fn a_circle_is_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("a.rs", "use crate::{b::{self, B}, d};\n#[cfg(test)] mod tests { use crate::a; }");
+    write("b.rs", "pub struct B;\nfn f() -> Option<u8> { crate::c::g(&[1]) }");
+    write("c.rs", "use super::d::D;");
+    write("d.rs", "pub struct D;");
+    assert_eq!(circle(&uses(folder.path())), None);
+    write("d.rs", "fn f(x: u8) { if x > 0 { crate::b::B; } }");
+    let names: Vec<_> = circle(&uses(folder.path())).unwrap().concat();
+    assert_eq!(names, ["b", "c", "d"]);
+}
