@@ -2,7 +2,7 @@
 
 use crate::graph::NumberMap;
 use crate::{Expr, Function, Graph, Node, Rational};
-use num_traits::One;
+use num_traits::{One, Signed};
 
 /// Partial derivatives of the expressions of one graph, each found once.
 ///
@@ -55,9 +55,19 @@ impl Derivatives {
                     let inner = self.of(graph, *base, variable);
                     if inner != Graph::ZERO {
                         let others = factors.iter().filter(|(b, _)| b != base).cloned();
-                        let lowered = (*base, exponent - Rational::one());
-                        let part: Vec<_> =
-                            others.chain([lowered, (inner, Rational::one())]).collect();
+                        let slope = match hyperbolic_cosine(graph, *base) {
+                            // `cosh' = tanh cosh`: where both sinh and cosh overflow, their quotient is none any more.
+                            Some(x) if exponent.is_negative() => {
+                                let tangent = graph.call(Function::Tanh, &[x]);
+                                let rate = self.of(graph, x, variable);
+                                [
+                                    (*base, exponent.clone()),
+                                    (graph.mul(tangent, rate), Rational::one()),
+                                ]
+                            }
+                            _ => [(*base, exponent - Rational::one()), (inner, Rational::one())],
+                        };
+                        let part: Vec<_> = others.chain(slope).collect();
                         parts.push((exponent.clone(), graph.product(part)));
                     }
                 }
@@ -98,6 +108,14 @@ impl Derivatives {
     }
 }
 
+/// The argument of a hyperbolic cosine.
+fn hyperbolic_cosine(graph: &Graph, expr: Expr) -> Option<Expr> {
+    match graph.node(expr) {
+        Node::Call(Function::Cosh, arguments) => Some(arguments[0]),
+        _ => None,
+    }
+}
+
 /// The derivative of a function of one argument, at `x`.
 fn outer_derivative(graph: &mut Graph, function: Function, x: Expr) -> Expr {
     let one = Graph::ONE;
@@ -115,8 +133,9 @@ fn outer_derivative(graph: &mut Graph, function: Function, x: Expr) -> Expr {
             graph.add(one, squared)
         }
         Function::Asin | Function::Acos => {
-            let inside = graph.sub(one, square);
-            let derivative = graph.product([(inside, half)]);
+            // The factors of `1 - x^2` are exact next to one.
+            let (below, above) = (graph.sub(one, x), graph.add(one, x));
+            let derivative = graph.product([(below, half.clone()), (above, half)]);
             if function == Function::Asin { derivative } else { graph.neg(derivative) }
         }
         Function::Atan => {
@@ -126,9 +145,9 @@ fn outer_derivative(graph: &mut Graph, function: Function, x: Expr) -> Expr {
         Function::Sinh => graph.call(Function::Cosh, &[x]),
         Function::Cosh => graph.call(Function::Sinh, &[x]),
         Function::Tanh => {
-            let tangent = graph.call(Function::Tanh, &[x]);
-            let squared = graph.powi(tangent, 2);
-            graph.sub(one, squared)
+            // `1 - tanh^2` has no digits left where the tangent is next to one.
+            let cosine = graph.call(Function::Cosh, &[x]);
+            graph.powi(cosine, -2)
         }
         Function::Exp | Function::Expm1 => graph.call(Function::Exp, &[x]),
         Function::Ln => graph.powi(x, -1),

@@ -191,9 +191,10 @@ impl<'a> Accuracy<'a> {
                     let findings = self.look(class, oracle, &inputs, judged);
                     step();
                     match findings {
-                        // Outside of the body a function such as exp may leave every range.
+                        // Outside of the body, and late in a motion that does not repeat, a function such as exp may leave
+                        // every range.
                         Err(AccuracyError::Oracle { error: OracleError::Range { .. }, .. })
-                            if class == Class::Far =>
+                            if matches!(class, Class::Far | Class::Late) =>
                         {
                             Ok(None)
                         }
@@ -247,7 +248,7 @@ impl<'a> Accuracy<'a> {
         let mut terms = terms.iter();
         let mut truth = truth.iter();
         let mut products = self.products.iter();
-        let may_underflow = matches!(class, Class::TinyAmplitude | Class::Far);
+        let may_underflow = matches!(class, Class::TinyAmplitude | Class::Far | Class::Late);
         let mut findings = Vec::new();
         // What was judged before at this point: stages often give a single call's bits.
         let mut seen: Vec<(Expr, u64, f64)> = Vec::new();

@@ -101,20 +101,16 @@ fn sums_of_coordinates_keep_their_digits_far_from_the_body() {
     assert!(failures.is_empty(), "beyond K = {LARGEST_FACTOR}:\n{}", failures.join("\n"));
 }
 
-/// Laws that no solution of the library has, by the programs alone.
-#[test]
-fn further_specifications() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/specs/materials");
+/// What goes beyond the bound in the specifications of a folder, by the programs alone.
+fn by_programs(folder: &str, classes: &[Class]) -> Vec<String> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/specs").join(folder);
     let mut files: Vec<_> = std::fs::read_dir(folder)
         .unwrap()
         .map(|file| file.unwrap().path())
         .filter(|f| f.extension().is_some_and(|e| e == "toml"))
         .collect();
     files.sort();
-    assert!(files.len() > 10, "{files:?}");
-    // Next to the origin these fields are subnormal numbers, with few digits to judge.
-    let classes: Vec<Class> =
-        Class::ALL.iter().copied().filter(|class| *class != Class::NearOrigin).collect();
+    assert!(files.len() > 3, "{files:?}");
     let mut failures = Vec::new();
     for file in files {
         let text = std::fs::read_to_string(&file).unwrap();
@@ -124,15 +120,26 @@ fn further_specifications() {
         let interpreted = |inputs: &[f64]| -> Result<Judged, String> {
             Ok(programs.iter().map(|(letter, p)| (*letter, p.evaluate(inputs))).collect())
         };
-        judge(
-            &spec,
-            "program",
-            &accuracy,
-            (&classes, POINTS_OF_FURTHER),
-            &interpreted,
-            &mut failures,
-        );
+        let drawn = (classes, POINTS_OF_FURTHER);
+        judge(&spec, "program", &accuracy, drawn, &interpreted, &mut failures);
     }
+    failures
+}
+
+/// Laws that no solution of the library has.
+#[test]
+fn further_specifications() {
+    // Next to the origin these fields are subnormal numbers, with few digits to judge.
+    let classes: Vec<Class> =
+        Class::ALL.iter().copied().filter(|class| *class != Class::NearOrigin).collect();
+    let failures = by_programs("materials", &classes);
+    assert!(failures.is_empty(), "beyond K = {LARGEST_FACTOR}:\n{}", failures.join("\n"));
+}
+
+/// Fronts that have passed, and volumes that do not change: K was 1e14 and 400 before the derivation knew of them.
+#[test]
+fn specifications_whose_terms_nearly_cancel() {
+    let failures = by_programs("digits", &Class::ALL);
     assert!(failures.is_empty(), "beyond K = {LARGEST_FACTOR}:\n{}", failures.join("\n"));
 }
 

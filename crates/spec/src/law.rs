@@ -87,6 +87,13 @@ impl Deformation {
         }
         Deformation { open, H, inverse_transpose, J, volume_change, log_J }
     }
+
+    /// Whether the volume is shown in symbols to be constant. A pressure that follows from `J` is then the same everywhere; between
+    /// the linear part of its divergence and the remainder it would cancel in digits only, and next to incompressibility `lambda/mu`
+    /// has no bound.
+    fn is_isochoric(&self) -> bool {
+        self.volume_change == Graph::ZERO
+    }
 }
 
 /// The stress of `material` at a deformation.

@@ -61,7 +61,7 @@ fn files_and_tables_without_end_are_refused_at_their_limit() {
         format!(
             "name = 'a'\ntitle = 'A'\ncoordinates = 'cartesian'\ndimension = 1\n[parameters]\n{lines}\
              [displacement]\nX = 'p0*X*t/9'\n[material]\nlaw = 'neo-hookean'\nlambda = 1\nmu = 1\ndensity = 1\n\
-             [domain]\nshape = 'box'\nlower = [0]\nupper = [1]\n[time]\nperiod = 1\n"
+             [domain]\nshape = 'box'\nlower = [0]\nupper = [1]\n[time]\nperiod = 1\nwave-speed = 1\n"
         )
     };
     assert!(Spec::parse(&parameters(1_000), "many.toml").is_ok());
@@ -240,6 +240,48 @@ fn an_energy_in_invariants_has_the_fields_of_the_law_that_it_is() {
         fields.b.iter().map(|&b| fields.graph.print(b)).collect::<Vec<_>>()
     });
     assert!(stated == named, "{stated:?}\nis not\n{named:?}");
+}
+
+/// Where the volume is constant, no field depends on how stiff it is: next to incompressibility nothing grows with `lambda / mu`.
+#[test]
+fn fields_of_motions_with_constant_volume_are_free_of_lambda() {
+    let materials = [
+        "law = 'neo-hookean'\nlambda = 'lambda'\nmu = 'c1'",
+        "law = 'hencky'\nlambda = 'lambda'\nmu = 'c1'",
+        "law = 'mooney-rivlin'\nc1 = 'c1'\nc2 = 'c2'\nlambda = 'lambda'",
+        "law = 'energy'\nW = 'c1*(I1 - 3 - 2*ln(J)) + lambda/4*(J^2 - 1 - 2*ln(J)) + c2*(I2/J - 3)^2'",
+        "law = 'energy'\nW = 'c1*(I1/J^(2/3) - 3)*(1 + ln(J)) + lambda/2*(J - 1)^2'",
+    ];
+    let motions = [
+        ("cartesian", 2, "X = 'A*sin(Pi*Y)*cos(t)'"),
+        ("cartesian", 3, "X = 'A*sin(Pi*Y)*cos(t)'\nY = 'A*sin(Pi*Z)*cos(t)'"),
+        ("polar", 2, "R = '-2*R*sin(A*R^2*t)^2'\ntheta = '2*R*sin(A*R^2*t)*cos(A*R^2*t)'"),
+    ];
+    for (coordinates, dimension, displacement) in motions {
+        let domain = match (coordinates, dimension) {
+            ("polar", _) => "shape = 'annulus'\ninner = '3/4'\nouter = '5/4'",
+            (_, 2) => "shape = 'box'\nlower = [0, 0]\nupper = [1, 1]",
+            _ => "shape = 'box'\nlower = [0, 0, 0]\nupper = [1, 1, 1]",
+        };
+        for material in materials {
+            let text = format!(
+                "name = 'sample'\ntitle = 'sample'\ncoordinates = '{coordinates}'\ndimension = {dimension}\n\
+                 [parameters]\nA = {{ default = 0.1 }}\nlambda = {{ default = 3 }}\nc1 = {{ default = 2 }}\n\
+                 c2 = {{ default = 1 }}\nrho0 = {{ default = 1 }}\n[displacement]\n{displacement}\n\
+                 [material]\n{material}\n[domain]\n{domain}\n[time]\nperiod = 1\nwave-speed = 1\n"
+            );
+            let derived = Spec::parse(&text, "sample.toml").unwrap().derive();
+            // In space this shear couples all three directions.
+            let Ok(mut fields) = derived else {
+                assert!(material.contains("hencky") && dimension == 3, "{text}");
+                continue;
+            };
+            let lambda = fields.graph.symbol("lambda");
+            let all = [&fields.b[..], &fields.P.concat()].concat();
+            assert_eq!(fields.J, Graph::ONE, "{text}");
+            assert!(!fields.graph.symbols_in(&all).contains(&lambda), "{text}");
+        }
+    }
 }
 
 #[test]

@@ -38,7 +38,7 @@ impl<T: crate::Real> Default for VortexParameters<T> {
 pub struct Vortex<T: crate::Real> {
     parameters: VortexParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 27],
+    fixed: [T; 22],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Vortex<T> {
@@ -124,30 +124,24 @@ impl<T: crate::Real> Vortex<T> {
         let t146 = parameters.nu + T::one();
         let t147 = T::nearest(0.5) * parameters.E;
         let t148 = t147 / t146;
-        let t203 = T::nearest(2.0) * parameters.nu;
-        let t204 = T::one() - t203;
-        let t222 = t203 / t204;
-        let t231 = parameters.A * t79;
-        let t235 = T::nearest(2.0) / t146;
-        let t262 = T::nearest(128.0) * parameters.A;
-        let t290 = parameters.E * parameters.nu;
-        let t291 = t146 * t204;
-        let t292 = t290 / t291;
-        let t295 = T::one() / parameters.rho0;
-        let t307 = T::nearest(32.0) / t146;
-        let t312 = t80 / parameters.rho0;
-        let t322 = T::nearest(2.0) / t5;
-        let t335 = T::one() + T::nearest(2.0);
-        let t336 = t148 + t292;
-        let t361 = t295 * t336;
-        let t368 = t148 * t295;
-        let t381 = t292 * t295;
-        let t385 = parameters.A * t4;
-        let t386 = t385 * t231;
-        let t390 = t4 * T::nearest(2.0);
-        let t391 = t390 * t231;
-        let t413 = t4 * t235;
-        let t420 = t71 * t79;
+        let t209 = parameters.A * t79;
+        let t213 = T::nearest(2.0) / t146;
+        let t241 = T::nearest(128.0) * parameters.A;
+        let t266 = t148 / parameters.rho0;
+        let t278 = T::nearest(32.0) / t146;
+        let t283 = t80 / parameters.rho0;
+        let t293 = T::nearest(2.0) / t5;
+        let t294 = T::nearest(2.0) * parameters.nu;
+        let t295 = T::one() - t294;
+        let t296 = parameters.E * parameters.nu;
+        let t297 = t146 * t295;
+        let t298 = t296 / t297;
+        let t351 = parameters.A * t4;
+        let t352 = t351 * t209;
+        let t356 = t4 * T::nearest(2.0);
+        let t357 = t356 * t209;
+        let t366 = t4 * t213;
+        let t373 = t71 * t79;
         Ok(Vortex {
             parameters,
             fixed: [
@@ -161,23 +155,18 @@ impl<T: crate::Real> Vortex<T> {
                 t92,
                 t102,
                 t148,
-                t222,
-                t231,
-                t235,
-                t262,
-                t292,
-                t295,
-                t307,
-                t312,
-                t322,
-                t335,
-                t361,
-                t368,
-                t381,
-                t386,
-                t391,
-                t413,
-                t420,
+                t209,
+                t213,
+                t241,
+                t266,
+                t278,
+                t283,
+                t293,
+                t298,
+                t352,
+                t357,
+                t366,
+                t373,
             ],
         })
     }
@@ -649,113 +638,90 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t200 = t198 * t199;
         let t201 = t25 * t197;
         let t202 = t200 + t201;
-        let t205 = self.fixed[8] * t7;
-        let t206 = t205 * t95;
-        let t207 = t206 * t26;
-        let t208 = t25 + t207;
-        let t209 = T::nearest(2.0) * t15;
-        let t210 = t13 - t209;
-        let t211 = t19 * t210;
-        let t212 = T::nearest(32.0) * t190;
-        let t213 = t212 - t211;
-        let t214 = t26 * t213;
-        let t215 = t205 * t194;
-        let t216 = t215 * t25;
-        let t217 = t214 - t216;
-        let t218 = t26 * t208;
-        let t219 = t198 * t218;
-        let t220 = t25 * t217;
-        let t221 = t219 + t220;
-        let t223 = self.fixed[10] * t221;
-        let t224 = t202 + t223;
-        let t225 = self.fixed[8] * t224;
-        let t226 = t7 * t225;
-        let t227 = t96 * t46;
-        let t228 = t13 * t114;
-        let t229 = t228 * t227;
-        let t230 = t226 + t229;
-        let t232 = t13 * t21;
-        let t233 = self.fixed[11] * t232;
-        let t234 = t233 * t69;
-        let t236 = self.fixed[12] * t230;
-        let t237 = t234 - t236;
-        let t238 = self.fixed[0] * t237;
-        let t239 = t93 * t198;
-        let t240 = t239 * t44;
-        let t241 = t13 - t15;
-        let t242 = t19 * t241;
-        let t243 = t212 - t242;
-        let t244 = t26 * t243;
-        let t245 = t244 - t196;
-        let t246 = t25 * t243;
-        let t247 = t195 * t26;
-        let t248 = t246 + t247;
-        let t249 = t198 * t44;
-        let t250 = t26 * t245;
-        let t251 = t25 * t248;
-        let t252 = t249 - t250;
-        let t253 = t252 + t251;
-        let t254 = t93 * t253;
-        let t255 = -t254;
-        let t256 = t93 * t202;
-        let t257 = -t256;
-        let t258 = t156 + T::one();
-        let t259 = t154 * t258;
-        let t260 = t158 - t259;
-        let t263 = self.fixed[13] * t7;
-        let t264 = t263 * t198;
-        let t265 = t264 * t46;
-        let t266 = -t265;
-        let t267 = t258 * t257;
-        let t268 = t151 * t240;
-        let t269 = t150 * t255;
-        let t270 = t154 * t266;
-        let t271 = t267 - t268;
-        let t272 = t271 - t269;
-        let t273 = t272 + t270;
-        let t274 = t154 + T::one();
-        let t275 = t156 * t274;
-        let t276 = t158 - t275;
-        let t277 = t154 * t260;
-        let t278 = t156 * t276;
-        let t279 = t277 - t278;
-        let t280 = t257 * t260;
-        let t281 = t154 * t273;
-        let t282 = t228 * t279;
-        let t283 = t268 + t269;
-        let t284 = t283 - t280;
-        let t285 = t284 + t281;
-        let t286 = t285 - t282;
-        let t287 = t266 * t276;
-        let t288 = t284 - t287;
-        let t289 = self.fixed[9] * t286;
-        let t293 = self.fixed[14] * t288;
-        let t294 = t289 + t293;
-        let t296 = self.fixed[15] * t294;
-        let t297 = t296 - t238;
-        let t298 = t13 - t187;
-        let t299 = t19 * t298;
-        let t300 = t212 - t299;
-        let t301 = t44 * t300;
-        let t302 = t263 * t194;
-        let t303 = t302 * t46;
-        let t304 = t301 + t303;
-        let t305 = self.fixed[5] * t232;
-        let t306 = t305 * t75;
-        let t308 = self.fixed[16] * t7;
-        let t309 = t308 * t304;
-        let t310 = t306 + t309;
-        let t311 = X[0] * t297;
-        let t313 = self.fixed[17] * X[1];
-        let t314 = t313 * t310;
-        let t315 = t311 - t314;
-        let t316 = t228 * t315;
-        let t317 = X[1] * t297;
-        let t318 = self.fixed[17] * X[0];
-        let t319 = t318 * t310;
-        let t320 = t317 + t319;
-        let t321 = t228 * t320;
-        crate::nalgebra::SVector::<T, 2>::new(t316, t321)
+        let t203 = t96 * t46;
+        let t204 = t13 * t114;
+        let t205 = t204 * t203;
+        let t206 = self.fixed[8] * t7;
+        let t207 = t206 * t202;
+        let t208 = t205 + t207;
+        let t210 = t13 * t21;
+        let t211 = self.fixed[10] * t210;
+        let t212 = t211 * t69;
+        let t214 = self.fixed[11] * t208;
+        let t215 = t212 - t214;
+        let t216 = self.fixed[0] * t215;
+        let t217 = t93 * t198;
+        let t218 = t217 * t44;
+        let t219 = t13 - t15;
+        let t220 = t19 * t219;
+        let t221 = T::nearest(32.0) * t190;
+        let t222 = t221 - t220;
+        let t223 = t26 * t222;
+        let t224 = t223 - t196;
+        let t225 = t25 * t222;
+        let t226 = t195 * t26;
+        let t227 = t225 + t226;
+        let t228 = t198 * t44;
+        let t229 = t26 * t224;
+        let t230 = t25 * t227;
+        let t231 = t228 - t229;
+        let t232 = t231 + t230;
+        let t233 = t93 * t232;
+        let t234 = -t233;
+        let t235 = t93 * t202;
+        let t236 = -t235;
+        let t237 = t156 + T::one();
+        let t238 = t154 * t237;
+        let t239 = t158 - t238;
+        let t242 = self.fixed[12] * t7;
+        let t243 = t242 * t198;
+        let t244 = t243 * t46;
+        let t245 = -t244;
+        let t246 = t237 * t236;
+        let t247 = t151 * t218;
+        let t248 = t150 * t234;
+        let t249 = t154 * t245;
+        let t250 = t246 - t247;
+        let t251 = t250 - t248;
+        let t252 = t251 + t249;
+        let t253 = t154 + T::one();
+        let t254 = t156 * t253;
+        let t255 = t158 - t254;
+        let t256 = t154 * t239;
+        let t257 = t156 * t255;
+        let t258 = t256 - t257;
+        let t259 = t236 * t239;
+        let t260 = t154 * t252;
+        let t261 = t204 * t258;
+        let t262 = t247 + t248;
+        let t263 = t262 - t259;
+        let t264 = t263 + t260;
+        let t265 = t264 - t261;
+        let t267 = self.fixed[13] * t265;
+        let t268 = t267 - t216;
+        let t269 = t13 - t187;
+        let t270 = t19 * t269;
+        let t271 = t221 - t270;
+        let t272 = t44 * t271;
+        let t273 = t242 * t194;
+        let t274 = t273 * t46;
+        let t275 = t272 + t274;
+        let t276 = self.fixed[5] * t210;
+        let t277 = t276 * t75;
+        let t279 = self.fixed[14] * t7;
+        let t280 = t279 * t275;
+        let t281 = t277 + t280;
+        let t282 = X[0] * t268;
+        let t284 = self.fixed[15] * X[1];
+        let t285 = t284 * t281;
+        let t286 = t282 - t285;
+        let t287 = t204 * t286;
+        let t288 = X[1] * t268;
+        let t289 = self.fixed[15] * X[0];
+        let t290 = t289 * t281;
+        let t291 = t288 + t290;
+        let t292 = t204 * t291;
+        crate::nalgebra::SVector::<T, 2>::new(t287, t292)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t6 = self.fixed[1] * t;
@@ -931,112 +897,89 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t200 = t198 * t199;
         let t201 = t25 * t197;
         let t202 = t200 + t201;
-        let t205 = self.fixed[8] * t7;
-        let t206 = t205 * t95;
-        let t207 = t206 * t26;
-        let t208 = t25 + t207;
-        let t209 = T::nearest(2.0) * t15;
-        let t210 = t13 - t209;
-        let t211 = t19 * t210;
-        let t212 = T::nearest(32.0) * t190;
-        let t213 = t212 - t211;
-        let t214 = t26 * t213;
-        let t215 = t205 * t194;
-        let t216 = t215 * t25;
-        let t217 = t214 - t216;
-        let t218 = t26 * t208;
-        let t219 = t198 * t218;
-        let t220 = t25 * t217;
-        let t221 = t219 + t220;
-        let t223 = self.fixed[10] * t221;
-        let t224 = t202 + t223;
-        let t225 = self.fixed[8] * t224;
-        let t226 = t7 * t225;
-        let t227 = t96 * t46;
-        let t228 = t13 * t114;
-        let t229 = t228 * t227;
-        let t230 = t226 + t229;
-        let t232 = t13 * t21;
-        let t233 = self.fixed[11] * t232;
-        let t234 = t233 * t69;
-        let t236 = self.fixed[12] * t230;
-        let t237 = t234 - t236;
-        let t238 = self.fixed[0] * t237;
-        let t239 = t93 * t198;
-        let t240 = t239 * t44;
-        let t241 = t13 - t15;
-        let t242 = t19 * t241;
-        let t243 = t212 - t242;
-        let t244 = t26 * t243;
-        let t245 = t244 - t196;
-        let t246 = t25 * t243;
-        let t247 = t195 * t26;
-        let t248 = t246 + t247;
-        let t249 = t198 * t44;
-        let t250 = t26 * t245;
-        let t251 = t25 * t248;
-        let t252 = t249 - t250;
-        let t253 = t252 + t251;
-        let t254 = t93 * t253;
-        let t255 = -t254;
-        let t256 = t93 * t202;
-        let t257 = -t256;
-        let t258 = t156 + T::one();
-        let t259 = t154 * t258;
-        let t260 = t158 - t259;
-        let t263 = self.fixed[13] * t7;
-        let t264 = t263 * t198;
-        let t265 = t264 * t46;
-        let t266 = -t265;
-        let t267 = t258 * t257;
-        let t268 = t151 * t240;
-        let t269 = t150 * t255;
-        let t270 = t154 * t266;
-        let t271 = t267 - t268;
-        let t272 = t271 - t269;
-        let t273 = t272 + t270;
-        let t274 = t154 + T::one();
-        let t275 = t156 * t274;
-        let t276 = t158 - t275;
-        let t277 = t154 * t260;
-        let t278 = t156 * t276;
-        let t279 = t277 - t278;
-        let t280 = t257 * t260;
-        let t281 = t154 * t273;
-        let t282 = t228 * t279;
-        let t283 = t268 + t269;
-        let t284 = t283 - t280;
-        let t285 = t284 + t281;
-        let t286 = t285 - t282;
-        let t287 = t266 * t276;
-        let t288 = t284 - t287;
-        let t289 = self.fixed[9] * t286;
-        let t293 = self.fixed[14] * t288;
-        let t294 = t289 + t293;
-        let t296 = self.fixed[15] * t294;
-        let t297 = t296 - t238;
-        let t298 = t13 - t187;
-        let t299 = t19 * t298;
-        let t300 = t212 - t299;
-        let t301 = t44 * t300;
-        let t302 = t263 * t194;
-        let t303 = t302 * t46;
-        let t304 = t301 + t303;
-        let t305 = self.fixed[5] * t232;
-        let t306 = t305 * t75;
-        let t308 = self.fixed[16] * t7;
-        let t309 = t308 * t304;
-        let t310 = t306 + t309;
-        let t311 = X[0] * t297;
-        let t313 = self.fixed[17] * X[1];
-        let t314 = t313 * t310;
-        let t315 = t311 - t314;
-        let t316 = t228 * t315;
-        let t317 = X[1] * t297;
-        let t318 = self.fixed[17] * X[0];
-        let t319 = t318 * t310;
-        let t320 = t317 + t319;
-        let t321 = t228 * t320;
+        let t203 = t96 * t46;
+        let t204 = t13 * t114;
+        let t205 = t204 * t203;
+        let t206 = self.fixed[8] * t7;
+        let t207 = t206 * t202;
+        let t208 = t205 + t207;
+        let t210 = t13 * t21;
+        let t211 = self.fixed[10] * t210;
+        let t212 = t211 * t69;
+        let t214 = self.fixed[11] * t208;
+        let t215 = t212 - t214;
+        let t216 = self.fixed[0] * t215;
+        let t217 = t93 * t198;
+        let t218 = t217 * t44;
+        let t219 = t13 - t15;
+        let t220 = t19 * t219;
+        let t221 = T::nearest(32.0) * t190;
+        let t222 = t221 - t220;
+        let t223 = t26 * t222;
+        let t224 = t223 - t196;
+        let t225 = t25 * t222;
+        let t226 = t195 * t26;
+        let t227 = t225 + t226;
+        let t228 = t198 * t44;
+        let t229 = t26 * t224;
+        let t230 = t25 * t227;
+        let t231 = t228 - t229;
+        let t232 = t231 + t230;
+        let t233 = t93 * t232;
+        let t234 = -t233;
+        let t235 = t93 * t202;
+        let t236 = -t235;
+        let t237 = t156 + T::one();
+        let t238 = t154 * t237;
+        let t239 = t158 - t238;
+        let t242 = self.fixed[12] * t7;
+        let t243 = t242 * t198;
+        let t244 = t243 * t46;
+        let t245 = -t244;
+        let t246 = t237 * t236;
+        let t247 = t151 * t218;
+        let t248 = t150 * t234;
+        let t249 = t154 * t245;
+        let t250 = t246 - t247;
+        let t251 = t250 - t248;
+        let t252 = t251 + t249;
+        let t253 = t154 + T::one();
+        let t254 = t156 * t253;
+        let t255 = t158 - t254;
+        let t256 = t154 * t239;
+        let t257 = t156 * t255;
+        let t258 = t256 - t257;
+        let t259 = t236 * t239;
+        let t260 = t154 * t252;
+        let t261 = t204 * t258;
+        let t262 = t247 + t248;
+        let t263 = t262 - t259;
+        let t264 = t263 + t260;
+        let t265 = t264 - t261;
+        let t267 = self.fixed[13] * t265;
+        let t268 = t267 - t216;
+        let t269 = t13 - t187;
+        let t270 = t19 * t269;
+        let t271 = t221 - t270;
+        let t272 = t44 * t271;
+        let t273 = t242 * t194;
+        let t274 = t273 * t46;
+        let t275 = t272 + t274;
+        let t276 = self.fixed[5] * t210;
+        let t277 = t276 * t75;
+        let t279 = self.fixed[14] * t7;
+        let t280 = t279 * t275;
+        let t281 = t277 + t280;
+        let t282 = X[0] * t268;
+        let t284 = self.fixed[15] * X[1];
+        let t285 = t284 * t281;
+        let t286 = t282 - t285;
+        let t287 = t204 * t286;
+        let t288 = X[1] * t268;
+        let t289 = self.fixed[15] * X[0];
+        let t290 = t289 * t281;
+        let t291 = t288 + t290;
+        let t292 = t204 * t291;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t33, t39),
             v: crate::nalgebra::SVector::<T, 2>::new(t55, t61),
@@ -1045,7 +988,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t143, t127, t135, t144),
             J: T::one(),
             P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t173, t179, t179, t184),
-            b: crate::nalgebra::SVector::<T, 2>::new(t316, t321),
+            b: crate::nalgebra::SVector::<T, 2>::new(t287, t292),
         }
     }
     fn traction(
@@ -1105,11 +1048,11 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
                 let t162 = t154 + T::nearest(2.0);
                 let t163 = t156 * t162;
                 let t164 = t158 - t163;
-                let t326 = t11 * t114;
-                let t327 = self.fixed[9] * t326;
-                let t328 = t327 * t164;
-                let t329 = t327 * t161;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t328, t329))
+                let t302 = t11 * t114;
+                let t303 = self.fixed[9] * t302;
+                let t304 = t303 * t164;
+                let t305 = t303 * t161;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t304, t305))
             }
             crate::Surface::Lower(1) => {
                 let t6 = self.fixed[1] * t;
@@ -1155,12 +1098,12 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
                 let t162 = t154 + T::nearest(2.0);
                 let t163 = t156 * t162;
                 let t164 = t158 - t163;
-                let t330 = t10 * t114;
-                let t331 = self.fixed[9] * t330;
-                let t332 = t331 * t161;
-                let t333 = -t332;
-                let t334 = t331 * t164;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t333, t334))
+                let t306 = t10 * t114;
+                let t307 = self.fixed[9] * t306;
+                let t308 = t307 * t161;
+                let t309 = -t308;
+                let t310 = t307 * t164;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t309, t310))
             }
             _ => None,
         }
@@ -1188,7 +1131,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
     }
     fn material(&self) -> crate::Material<T> {
         crate::Material::NeoHookean {
-            lambda: self.fixed[14],
+            lambda: self.fixed[17],
             mu: self.fixed[9],
         }
     }
@@ -1199,7 +1142,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         self.fixed[1]
     }
     fn period(&self) -> T {
-        self.fixed[18]
+        self.fixed[16]
     }
     fn body_force_at(
         &self,
@@ -1224,14 +1167,14 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 4> for Vortex<T> {
         let t41 = t6.cos_pi();
         let t62 = t41 * t41;
         let t93 = self.fixed[7] * t7;
-        let t205 = self.fixed[8] * t7;
-        let t263 = self.fixed[13] * t7;
-        let t308 = self.fixed[16] * t7;
-        let t387 = self.fixed[23] * t62;
-        let t392 = self.fixed[24] * t7;
-        let t418 = self.fixed[5] * t7;
-        let t421 = self.fixed[26] * t62;
-        [t23, t93, t205, t263, t308, t387, t392, t418, t421]
+        let t206 = self.fixed[8] * t7;
+        let t242 = self.fixed[12] * t7;
+        let t279 = self.fixed[14] * t7;
+        let t353 = self.fixed[18] * t62;
+        let t358 = self.fixed[19] * t7;
+        let t371 = self.fixed[5] * t7;
+        let t374 = self.fixed[21] * t62;
+        [t23, t93, t206, t242, t279, t353, t358, t371, t374]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 4] {
@@ -1240,8 +1183,8 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 4> for Vortex<T> {
         let t12 = t10 + t11;
         let t13 = t12.sqrt();
         let t114 = T::one() / t12;
-        let t228 = t13 * t114;
-        [X[0], X[1], t13, t228]
+        let t204 = t13 * t114;
+        [X[0], X[1], t13, t204]
     }
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
@@ -1277,121 +1220,101 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 4> for Vortex<T> {
         let t197 = t193 - t196;
         let t198 = t15 * t19;
         let t201 = t25 * t197;
-        let t212 = T::nearest(32.0) * t190;
-        let t215 = time[2] * t194;
-        let t216 = t215 * t25;
-        let t232 = point[2] * t21;
-        let t241 = point[2] - t15;
-        let t242 = t19 * t241;
-        let t243 = t212 - t242;
-        let t244 = t26 * t243;
-        let t245 = t244 - t196;
-        let t246 = t25 * t243;
-        let t247 = t195 * t26;
-        let t248 = t246 + t247;
-        let t249 = t198 * t44;
-        let t250 = t26 * t245;
-        let t251 = t25 * t248;
-        let t252 = t249 - t250;
-        let t253 = t252 + t251;
-        let t254 = time[1] * t253;
-        let t264 = time[3] * t198;
-        let t265 = t264 * t46;
-        let t298 = point[2] - t187;
-        let t299 = t19 * t298;
-        let t300 = t212 - t299;
-        let t301 = t44 * t300;
-        let t302 = time[3] * t194;
-        let t303 = t302 * t46;
-        let t304 = t301 + t303;
-        let t309 = time[4] * t304;
-        let t313 = self.fixed[17] * point[1];
-        let t318 = self.fixed[17] * point[0];
-        let t337 = point[2] * t198;
-        let t338 = time[2] * t337;
-        let t339 = t338 * t44;
-        let t340 = t46 - t339;
-        let t341 = T::nearest(2.0) * t340;
-        let t342 = time[1] * t341;
-        let t343 = t342 * t249;
-        let t344 = t254 * t149;
-        let t345 = t343 + t344;
-        let t346 = time[1] * t337;
-        let t347 = t26 * t346;
-        let t348 = t25 + t347;
-        let t349 = t198 * t26;
-        let t350 = t348 * t349;
-        let t351 = t350 + t201;
-        let t352 = time[1] * t351;
-        let t353 = t149 * t341;
-        let t354 = T::nearest(2.0) * t25;
-        let t355 = t354 * t348;
-        let t356 = T::one() - t155;
-        let t357 = t355 * t356;
-        let t358 = t357 - t353;
-        let t359 = t352 * t358;
-        let t360 = t345 + t359;
-        let t362 = self.fixed[20] * t360;
-        let t363 = t352 * t356;
-        let t364 = t363 + t343;
-        let t365 = t364 + t344;
-        let t366 = t355 * t265;
-        let t367 = t366 - t365;
-        let t369 = self.fixed[21] * t355;
-        let t370 = t369 * t367;
-        let t371 = t362 - t370;
-        let t372 = t355 * t358;
-        let t373 = T::one() - t355;
-        let t374 = t155 * t373;
-        let t375 = t374 - t353;
-        let t376 = t155 * t375;
-        let t377 = t376 - t372;
-        let t378 = self.fixed[21] * point[3];
-        let t379 = t378 * t377;
-        let t380 = t371 - t379;
-        let t382 = self.fixed[22] * t265;
-        let t383 = t382 * t375;
-        let t384 = t380 + t383;
-        let t388 = time[5] * t21;
-        let t389 = t388 * t44;
-        let t393 = time[6] * t46;
-        let t394 = t389 + t393;
-        let t395 = t232 * t394;
-        let t396 = t338 * t26;
-        let t397 = t25 + t396;
-        let t398 = t397 * t349;
-        let t399 = self.fixed[19] * point[2];
-        let t400 = t399 - T::nearest(2.0);
-        let t401 = t19 * t400;
-        let t402 = t212 - t401;
-        let t403 = t402 * t26;
-        let t404 = t403 - t216;
-        let t405 = t25 * t404;
-        let t406 = t398 + t405;
-        let t407 = self.fixed[10] * t406;
-        let t408 = t351 + t407;
-        let t409 = time[2] * t408;
-        let t410 = point[3] * t46;
-        let t411 = t410 * t346;
-        let t412 = t409 + t411;
-        let t414 = self.fixed[25] * t412;
-        let t415 = t395 + t414;
-        let t416 = t384 + t415;
-        let t417 = point[0] * t416;
-        let t419 = time[7] * t44;
-        let t422 = time[8] * t21;
-        let t423 = t422 * t46;
-        let t424 = t419 - t423;
-        let t425 = t232 * t424;
-        let t426 = t425 + t309;
-        let t427 = t313 * t426;
-        let t428 = t417 - t427;
-        let t429 = point[3] * t428;
-        let t430 = point[1] * t416;
-        let t431 = t318 * t426;
-        let t432 = t430 + t431;
-        let t433 = point[3] * t432;
-        crate::nalgebra::SVector::<T, 2>::new(t429, t433)
+        let t210 = point[2] * t21;
+        let t219 = point[2] - t15;
+        let t220 = t19 * t219;
+        let t221 = T::nearest(32.0) * t190;
+        let t222 = t221 - t220;
+        let t223 = t26 * t222;
+        let t224 = t223 - t196;
+        let t225 = t25 * t222;
+        let t226 = t195 * t26;
+        let t227 = t225 + t226;
+        let t228 = t198 * t44;
+        let t229 = t26 * t224;
+        let t230 = t25 * t227;
+        let t231 = t228 - t229;
+        let t232 = t231 + t230;
+        let t233 = time[1] * t232;
+        let t243 = time[3] * t198;
+        let t244 = t243 * t46;
+        let t269 = point[2] - t187;
+        let t270 = t19 * t269;
+        let t271 = t221 - t270;
+        let t272 = t44 * t271;
+        let t273 = time[3] * t194;
+        let t274 = t273 * t46;
+        let t275 = t272 + t274;
+        let t280 = time[4] * t275;
+        let t284 = self.fixed[15] * point[1];
+        let t289 = self.fixed[15] * point[0];
+        let t311 = point[2] * t198;
+        let t312 = time[2] * t311;
+        let t313 = t312 * t44;
+        let t314 = t46 - t313;
+        let t315 = T::nearest(2.0) * t314;
+        let t316 = time[1] * t315;
+        let t317 = t316 * t228;
+        let t318 = t233 * t149;
+        let t319 = t317 + t318;
+        let t320 = time[1] * t311;
+        let t321 = t26 * t320;
+        let t322 = t25 + t321;
+        let t323 = t198 * t26;
+        let t324 = t323 * t322;
+        let t325 = t324 + t201;
+        let t326 = time[1] * t325;
+        let t327 = t149 * t315;
+        let t328 = T::nearest(2.0) * t25;
+        let t329 = t328 * t322;
+        let t330 = T::one() - t155;
+        let t331 = t329 * t330;
+        let t332 = t331 - t327;
+        let t333 = t326 * t332;
+        let t334 = t319 + t333;
+        let t335 = t326 * t330;
+        let t336 = t335 + t317;
+        let t337 = t336 + t318;
+        let t338 = t244 * t329;
+        let t339 = t338 - t337;
+        let t340 = t329 * t339;
+        let t341 = t334 - t340;
+        let t342 = t329 * t332;
+        let t343 = T::one() - t329;
+        let t344 = t155 * t343;
+        let t345 = t344 - t327;
+        let t346 = t155 * t345;
+        let t347 = t346 - t342;
+        let t348 = point[3] * t347;
+        let t349 = t341 - t348;
+        let t350 = self.fixed[13] * t349;
+        let t354 = time[5] * t21;
+        let t355 = t354 * t44;
+        let t359 = time[6] * t46;
+        let t360 = t355 + t359;
+        let t361 = t210 * t360;
+        let t362 = point[3] * t46;
+        let t363 = t362 * t320;
+        let t364 = time[2] * t325;
+        let t365 = t363 + t364;
+        let t367 = self.fixed[20] * t365;
+        let t368 = t361 + t367;
+        let t369 = t350 + t368;
+        let t370 = point[0] * t369;
+        let t372 = time[7] * t44;
+        let t375 = time[8] * t21;
+        let t376 = t375 * t46;
+        let t377 = t372 - t376;
+        let t378 = t210 * t377;
+        let t379 = t378 + t280;
+        let t380 = t284 * t379;
+        let t381 = t370 - t380;
+        let t382 = point[3] * t381;
+        let t383 = point[1] * t369;
+        let t384 = t289 * t379;
+        let t385 = t383 + t384;
+        let t386 = point[3] * t385;
+        crate::nalgebra::SVector::<T, 2>::new(t382, t386)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

@@ -45,6 +45,7 @@ impl ComponentLaw {
     ) -> Self {
         let h = symbols(graph, deformation.H.len());
         let Components { replacement, known, simpler } = in_components(graph, &h, deformation);
+        let W = if deformation.is_isochoric() { linear_in_volume(graph, W) } else { W };
         let energy = graph.replace(W, &replacement);
         let mut derivatives = Derivatives::limited();
         let P = h
@@ -57,7 +58,10 @@ impl ComponentLaw {
     /// From the components of the stress.
     pub(super) fn of_stress(graph: &mut Graph, deformation: &Deformation, P: &Matrix) -> Self {
         let h = symbols(graph, deformation.H.len());
-        let Components { replacement, known, simpler } = in_components(graph, &h, deformation);
+        let Components { mut replacement, known, simpler } = in_components(graph, &h, deformation);
+        if deformation.is_isochoric() {
+            replacement.insert(graph.symbol("J"), Graph::ONE);
+        }
         let P = P
             .iter()
             .map(|row| row.iter().map(|&p| graph.replace(p, &replacement)).collect())
@@ -123,6 +127,17 @@ impl ComponentLaw {
         let anisotropic = P.clone();
         Stress { P, isotropic: Graph::ZERO, anisotropic, linear, remainder, energy }
     }
+}
+
+/// The energy up to first order in `J - 1`: of the same stress in every motion with `J = 1`, and so of the same divergence.
+fn linear_in_volume(graph: &mut Graph, W: Expr) -> Expr {
+    let J = graph.symbol("J");
+    let slope = Derivatives::limited().of(graph, W, J);
+    let at_one = BTreeMap::from([(J, Graph::ONE)]);
+    let (value, slope) = (graph.replace(W, &at_one), graph.replace(slope, &at_one));
+    let change = graph.sub(J, Graph::ONE);
+    let first = graph.mul(slope, change);
+    graph.add(value, first)
 }
 
 fn indices(n: usize) -> impl Iterator<Item = (usize, usize, usize)> {

@@ -23,6 +23,8 @@ pub(super) fn stress(
     lambda: Expr,
     mu: Expr,
 ) -> Stress {
+    // It multiplies `ln J` and its gradient alone.
+    let lambda = if deformation.is_isochoric() { Graph::ZERO } else { lambda };
     let linear = linear_divergence(derivation, &deformation.open, lambda, mu);
     let graph = &mut derivation.graph;
     let (lambda, mu) = (graph.whole(lambda), graph.whole(mu));
