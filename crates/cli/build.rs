@@ -1,6 +1,7 @@
 //! The checksum that tells this build from all that may compute other bits.
 
 use std::fs;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -15,26 +16,30 @@ fn main() -> io::Result<()> {
             collect(&source, &mut files)?;
         }
     }
-    let lock = crates.join("../Cargo.lock");
-    if lock.is_file() {
-        println!("cargo::rerun-if-changed={}", lock.display());
-        files.push(lock);
+    // Versions of dependencies, and the levels of optimisation.
+    for name in ["Cargo.lock", "Cargo.toml"] {
+        let file = crates.join("..").join(name);
+        if file.is_file() {
+            println!("cargo::rerun-if-changed={}", file.display());
+            files.push(file);
+        }
     }
     files.sort();
-    let mut sum = Fnv(0xcbf2_9ce4_8422_2325);
+    // Without random keys: the same for the same sources. Another release of the compiler may have another hash, and is another
+    // build anyway.
+    let mut sum = DefaultHasher::new();
     for file in files {
         let name = file.strip_prefix(&crates).unwrap_or(&file);
-        // The same on systems with other separators.
-        name.components().for_each(|part| sum.add(part.as_os_str().as_encoded_bytes()));
-        sum.add(&fs::read(&file)?);
+        name.hash(&mut sum);
+        fs::read(&file)?.hash(&mut sum);
     }
     let compiler = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".into());
-    sum.add(&Command::new(compiler).arg("--version").output()?.stdout);
+    Command::new(compiler).arg("--version").output()?.stdout.hash(&mut sum);
     for name in ["TARGET", "PROFILE", "OPT_LEVEL", "CARGO_ENCODED_RUSTFLAGS"] {
         println!("cargo::rerun-if-env-changed={name}");
-        sum.add(std::env::var(name).unwrap_or_default().as_bytes());
+        std::env::var(name).unwrap_or_default().hash(&mut sum);
     }
-    println!("cargo::rustc-env=MMS_BUILD={:016x}", sum.0);
+    println!("cargo::rustc-env=MMS_BUILD={:016x}", sum.finish());
     Ok(())
 }
 
@@ -48,16 +53,4 @@ fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> io::Result<()> {
         }
     }
     Ok(())
-}
-
-/// The checksum FNV-1a of 64 bits: against mistakes, not against attacks.
-struct Fnv(u64);
-
-impl Fnv {
-    fn add(&mut self, bytes: &[u8]) {
-        let length = (bytes.len() as u64).to_le_bytes();
-        for byte in length.iter().chain(bytes) {
-            self.0 = (self.0 ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
-        }
-    }
 }

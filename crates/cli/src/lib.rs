@@ -73,17 +73,13 @@ pub fn run(given: impl IntoIterator<Item = OsString>) -> ExitCode {
     match outcome {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(1),
-        Err(error) if is_interrupted(&error) => {
-            terminal::error(format_args!("{error:#}"));
-            ExitCode::from(INTERRUPTED)
-        }
         Err(error) => {
             // A diagnostic is laid out as a whole already.
             match error.downcast_ref::<mmsmith_spec::Diagnostic>() {
                 Some(diagnostic) => terminal::complain(&format!("{diagnostic}\n")),
                 None => terminal::error(format_args!("{error:#}")),
             }
-            ExitCode::from(2)
+            ExitCode::from(if is_interrupted(&error) { INTERRUPTED } else { 2 })
         }
     }
 }

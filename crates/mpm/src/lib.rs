@@ -103,5 +103,5 @@ pub use material::{Material, SIDE_BY_SIDE, Stressed};
 pub use particles::Particles;
 pub use scheme::{Integrator, Settings, Shape, Transfer, UnknownName};
 pub use simd::Registers;
-pub use simulation::{Simulation, Stepped};
+pub use simulation::{Simulated, Simulation};
 pub use solver::{Scalar, Solver, TotalSetUp};

@@ -38,7 +38,7 @@ pub struct Simulation<T, const D: usize> {
 /// Numbers whose steps are compiled with this crate: `f64` and `f32`.
 ///
 /// Steps are generic over precision and dimension. The functions here are not, so that whoever uses them does not compile kernels.
-pub trait Stepped<const D: usize>: Stressed<D> {
+pub trait Simulated<const D: usize>: Stressed<D> {
     /// [`Simulation::new`].
     #[doc(hidden)]
     fn set_up(
@@ -56,9 +56,9 @@ pub trait Stepped<const D: usize>: Stressed<D> {
     ) -> Result<(), StepError>;
 }
 
-macro_rules! stepped {
+macro_rules! simulated {
     ($($T:ty: $($D:literal)*;)*) => {
-        $($(impl Stepped<$D> for $T {
+        $($(impl Simulated<$D> for $T {
             fn set_up(
                 grid: Grid<Self, $D>,
                 body: Body<Self, $D>,
@@ -78,12 +78,12 @@ macro_rules! stepped {
     };
 }
 
-stepped! {
+simulated! {
     f64: 1 2 3;
     f32: 1 2 3;
 }
 
-impl<T: Stepped<D>, const D: usize> Simulation<T, D> {
+impl<T: Simulated<D>, const D: usize> Simulation<T, D> {
     /// Sets up a simulation at time 0, of a [`Body`] or of [`Particles`] with boxes.
     ///
     /// # Errors

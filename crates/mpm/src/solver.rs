@@ -6,7 +6,7 @@ use crate::body_force::BodyForce;
 use crate::error::{SetupError, StepError};
 use crate::material::Material;
 use crate::particles::Particles;
-use crate::simulation::{Simulation, Stepped};
+use crate::simulation::{Simulated, Simulation};
 use crate::total_lagrangian::{self, BoundaryData, Scheme, TotalLagrangian};
 
 /// A solver that can be stepped and looked at.
@@ -69,7 +69,7 @@ struct DrivenBody<'a, const D: usize> {
 }
 
 /// The precisions of the solver: `f64` and `f32`.
-pub trait Scalar<const D: usize>: Stepped<D> {
+pub trait Scalar<const D: usize>: Simulated<D> {
     /// A simulation in the total Lagrangian formulation.
     ///
     /// # Errors

@@ -11,7 +11,7 @@ use nalgebra::SVector;
 
 use crate::case::Case;
 use crate::error::CaseError;
-use crate::interrupt::Stepping;
+use crate::interrupt::StepLoop;
 use crate::precision::Precision;
 use crate::scene::Scene;
 use crate::scheme::Scheme;
@@ -85,7 +85,7 @@ impl<T: Real, const D: usize> Driven<'_, T, D> {
         steps: RangeInclusive<u64>,
         observer: &mut dyn FnMut(Stepped<'_, T, D>) -> Seen<R>,
     ) -> Result<Outcome<R>, CaseError> {
-        let stepping = Stepping::begin();
+        let step_loop = StepLoop::begin();
         for step in steps {
             let (computing, started) = (ProcessTime::now(), Instant::now());
             let outcome = self.solver.step(&self.body_force);
@@ -95,7 +95,7 @@ impl<T: Real, const D: usize> Driven<'_, T, D> {
                 return Ok(Outcome::Stopped(error));
             }
             let (time, solver) = (step as f64 * self.dt, self.solver.as_mut());
-            let is_interrupted = stepping.is_interrupted();
+            let is_interrupted = step_loop.is_interrupted();
             if let ControlFlow::Break(found) =
                 observer(Stepped { step, time, solver, wall_s, cpu_s, is_interrupted })?
             {

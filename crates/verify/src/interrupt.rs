@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 static ASKED: AtomicBool = AtomicBool::new(false);
 /// Loops over steps that are under way.
-static STEPPING: AtomicUsize = AtomicUsize::new(0);
+static UNDER_WAY: AtomicUsize = AtomicUsize::new(0);
 
 /// Asks all runs and studies of this process that are stepping to end: each does so after its step, with
 /// [`CaseError::Interrupted`](crate::CaseError::Interrupted), and with a checkpoint where it keeps any. So does whatever begins
@@ -12,7 +12,7 @@ static STEPPING: AtomicUsize = AtomicUsize::new(0);
 ///
 /// It may be called from any thread, such as one that handles signals.
 pub fn interrupt() -> bool {
-    let is_stepping = STEPPING.load(Ordering::SeqCst) > 0;
+    let is_stepping = UNDER_WAY.load(Ordering::SeqCst) > 0;
     ASKED.fetch_or(is_stepping, Ordering::SeqCst);
     is_stepping
 }
@@ -23,11 +23,11 @@ pub fn allow() {
 }
 
 /// A loop over steps, for as long as it lives.
-pub(crate) struct Stepping;
+pub(crate) struct StepLoop;
 
-impl Stepping {
+impl StepLoop {
     pub(crate) fn begin() -> Self {
-        STEPPING.fetch_add(1, Ordering::SeqCst);
+        UNDER_WAY.fetch_add(1, Ordering::SeqCst);
         Self
     }
 
@@ -37,8 +37,8 @@ impl Stepping {
     }
 }
 
-impl Drop for Stepping {
+impl Drop for StepLoop {
     fn drop(&mut self) {
-        STEPPING.fetch_sub(1, Ordering::SeqCst);
+        UNDER_WAY.fetch_sub(1, Ordering::SeqCst);
     }
 }

@@ -29,7 +29,7 @@ fn run_package(folder: &Path, main: &str) -> String {
     std::fs::write(folder.join("src/main.rs"), main).unwrap();
     let mut command = cargo();
     command.current_dir(folder).args(["run", "--quiet", "--offline"]);
-    // With the same profile most of what it needs is there already.
+    // Next to the workspace's own, so that what has the same features and profile is compiled once.
     command.env("CARGO_TARGET_DIR", workspace().join("target"));
     let (status, out, errors) = outcome(&mut command);
     assert_eq!(status, Some(0), "{errors}");

@@ -5,8 +5,8 @@ use std::ffi::OsString;
 use anyhow::{Context, Result};
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{
-    Case, CaseError, Checkpoints, FrameOutput, Moment, Outputs, Parts, Row, Scheme, Status,
-    energy_drift, run as simulate,
+    Case, Checkpoints, FrameOutput, Moment, Outputs, Parts, Row, Scheme, Status, energy_drift,
+    run as simulate,
 };
 use serde_json::{Value, json};
 
@@ -14,6 +14,7 @@ use super::picture::Picture;
 use super::scheme::Settled;
 use super::{Model, caption, resume, settings, with_threads};
 use crate::arguments::RunOptions;
+use crate::interruption::is_interrupted;
 use crate::json::{Output, prepare_folder};
 use crate::library::Selection;
 use crate::progress::Bar;
@@ -81,16 +82,14 @@ pub(super) fn follow(options: &RunOptions, origin: Origin<'_>) -> Result<bool> {
                 ..Outputs::new(show)
             };
             let row = simulate(&model.exact, model.arithmetic(), &case, &mut outputs);
-            row.map_err(|error| match &checkpoints {
-                Some(Checkpoints { folder, .. })
-                    if matches!(error, CaseError::Interrupted { .. }) =>
-                {
+            let row = row.map_err(anyhow::Error::new);
+            match &checkpoints {
+                Some(Checkpoints { folder, .. }) if row.as_ref().is_err_and(is_interrupted) => {
                     let folder = folder.path().display();
-                    anyhow::Error::new(error)
-                        .context(format!("mms resume {folder} goes on from there"))
+                    row.with_context(|| format!("mms resume {folder} goes on from there"))?
                 }
-                _ => error.into(),
-            })?
+                _ => row?,
+            }
         };
         terminal::say(&(settled.choice() + &caption(&selection, settled, extent) + &text(&row)))?;
         if let Some(frames) = &frames {

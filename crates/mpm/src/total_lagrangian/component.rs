@@ -101,10 +101,9 @@ impl<const D: usize> Component<D> {
             Field::Displacement => &self.u,
             Field::Velocity => &self.v,
         };
-        let (mut inner, mut size) = (1, coefficients.len());
+        let mut inner = 1;
         for k in 0..D {
             let basis = along(bases, k, self.index);
-            let next = size / basis.functions * basis.points;
             let (before, after) = partial.split_at_mut(k);
             let source = |part: usize| match before.last() {
                 Some(arrays) => &arrays[part][..],
@@ -127,7 +126,7 @@ impl<const D: usize> Component<D> {
                     basis.evaluate(Part::Slope, inner, source(0), &mut slopes[k]);
                 }
             }
-            (inner, size) = (inner * basis.points, next);
+            inner *= basis.points;
         }
     }
 

@@ -381,14 +381,8 @@ impl<const D: usize> TotalLagrangian<D> {
     /// A copy of these bytes, written over the state of a simulation with the same set-up, continues the run to the same bits.
     pub fn state(&mut self) -> Vec<&mut [u8]> {
         let Self { components, steps_done, .. } = self;
-        let [mut state, mut of_v, mut of_a] = [(); 3].map(|()| Vec::with_capacity(3 * D + 1));
-        for Component { u, v, a, .. } in components {
-            state.push(cast_slice_mut(u));
-            of_v.push(cast_slice_mut(v));
-            of_a.push(cast_slice_mut(a));
-        }
-        state.append(&mut of_v);
-        state.append(&mut of_a);
+        let coefficients = components.iter_mut().flat_map(|Component { u, v, a, .. }| [u, v, a]);
+        let mut state: Vec<&mut [u8]> = coefficients.map(|c| cast_slice_mut(c)).collect();
         state.push(bytes_of_mut(steps_done));
         state
     }
