@@ -3,7 +3,7 @@
 use crate::{read, write};
 use anyhow::{Context, anyhow, bail};
 use clap::ValueEnum;
-use mmsmith_codegen::{Names, Plan, registry_source};
+use mmsmith_codegen::{Code, Names, registry_source};
 use mmsmith_spec::Spec;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -41,10 +41,10 @@ impl Target {
         }
     }
 
-    fn source(self, plan: &Plan<'_>) -> String {
+    fn source(self, code: &Code<'_>) -> String {
         match self {
-            Target::Rust => plan.module_source(),
-            Target::C => plan.header_source(),
+            Target::Rust => code.module_source(),
+            Target::C => code.header_source(),
         }
     }
 }
@@ -170,11 +170,11 @@ fn generate(repository: &Path, path: &Path, targets: &[Target]) -> anyhow::Resul
         bail!("{shown} holds a solution called '{0}'; the file must be called {0}.toml", spec.name);
     }
     lap();
-    let plan = Plan::new(&spec).with_context(|| format!("cannot derive the fields of {shown}"))?;
+    let code = Code::new(&spec).with_context(|| format!("cannot derive the fields of {shown}"))?;
     lap();
     let mut texts = Vec::new();
     for target in targets {
-        texts.push(target.source(&plan));
+        texts.push(target.source(&code));
         lap();
     }
     Ok(Generated { name: spec.name.clone(), texts, times })

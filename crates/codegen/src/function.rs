@@ -1,8 +1,8 @@
 //! Blocks of operations as Rust statements.
 
-use crate::plan::{Block, Operand, Stage};
 use crate::text::{push_index, spell};
 use mmsmith_expr::{Function, Operation, Rational, nearest_f64};
+use mmsmith_stage::{Block, Operand, Stage};
 use num_traits::{One, Zero};
 use proc_macro2::{Ident, Literal, TokenStream};
 use quote::quote;

@@ -1,10 +1,11 @@
 //! The items of one solution, and the files that hold them.
 
+use crate::code::Code;
 use crate::function::{Translator, fill, float};
-use crate::plan::{Block, Measures, Plan, Shape, Stages};
 use crate::text::{meaning, one_line};
 use mmsmith_expr::Slot;
 use mmsmith_spec::{Boundary, Condition, DeriveError, Material, Spec, Surface};
+use mmsmith_stage::{Block, Measures, Shape, Staged, Stages};
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{format_ident, quote};
 use std::cell::RefCell;
@@ -45,10 +46,10 @@ impl Names {
 ///
 /// [`DeriveError`] where a field is nowhere defined.
 pub fn items(spec: &Spec, runtime: &TokenStream) -> Result<TokenStream, DeriveError> {
-    Ok(Plan::new(spec)?.items(runtime))
+    Ok(Code::new(spec)?.items(runtime))
 }
 
-impl Plan<'_> {
+impl Code<'_> {
     /// The items of the solution in Rust; `runtime` is the path to the crate `mmsmith_runtime`, or to one that has all of it.
     #[must_use]
     pub fn items(&self, runtime: &TokenStream) -> TokenStream {
@@ -62,7 +63,8 @@ impl Plan<'_> {
     ) -> TokenStream {
         let names = self.spec.parameters.iter().map(|p| identifier(&p.name)).collect();
         let translator = Translator::new("self.parameters", names, blocks);
-        Generator { plan: self, spec: self.spec, runtime, translator, blocks }.items()
+        Generator { code: self, staged: &self.staged, spec: self.spec, runtime, translator, blocks }
+            .items()
     }
 
     /// The text of the solution's module within the crate of the solutions.
@@ -186,7 +188,8 @@ fn pretty(items: TokenStream) -> String {
 }
 
 struct Generator<'a> {
-    plan: &'a Plan<'a>,
+    code: &'a Code<'a>,
+    staged: &'a Staged,
     spec: &'a Spec,
     runtime: &'a TokenStream,
     /// For functions of the solution itself.
@@ -226,7 +229,7 @@ impl Generator<'_> {
                 )
             }
         });
-        let count = Literal::usize_unsuffixed(self.plan.fixed_count());
+        let count = Literal::usize_unsuffixed(self.staged.fixed_count());
         let variant =
             format_ident!("{}", ["One", "Two", "Three"][self.spec.dimension.clamp(1, 3) - 1]);
         let title = doc_line(&self.spec.title);
@@ -234,10 +237,10 @@ impl Generator<'_> {
         let summary = format!(" {title}.");
         let source =
             if reference.is_empty() { String::new() } else { format!(" Source: {reference}.") };
-        let formulas: Vec<String> = ["```text"]
+        let formulas: Vec<String> = ["```text".to_owned()]
             .into_iter()
-            .chain(self.plan.formulas.iter().map(String::as_str))
-            .chain(["```"])
+            .chain(self.code.formulas())
+            .chain(["```".to_owned()])
             .map(|line| format!(" {line}"))
             .collect();
         quote! {
@@ -353,7 +356,7 @@ impl Generator<'_> {
         });
 
         let translator = Translator::new("parameters", names.clone(), self.blocks);
-        let (statements, values) = translator.statements(&self.plan.fixed_stage());
+        let (statements, values) = translator.statements(&self.staged.fixed_stage());
         let (sides, fixed_values) = values.split_at(2 * spec.requirements.len());
         let requirements =
             spec.requirements.iter().zip(sides.chunks(2)).map(|(requirement, side)| {
@@ -426,10 +429,10 @@ impl Generator<'_> {
     /// The functions of the trait `BodyForceStages`, and how many values there are of the time and of the point.
     fn body_force_stages(&self) -> (TokenStream, Literal, Literal) {
         let vector = self.vector();
-        let stages = &self.plan.body_force;
+        let stages = &self.staged.body_force;
         let (of_time, time) = self.time_stage("body_force_time", stages);
         let (of_point, point) = self.point_stage("body_force_point", stages);
-        let (statements, values) = self.translator.statements_if_near(&self.plan.staged(stages));
+        let (statements, values) = self.translator.statements_if_near(&self.staged.staged(stages));
         let result = self.shaped(Shape::Vector, &values);
         let items = quote! {
             #of_time
@@ -450,7 +453,7 @@ impl Generator<'_> {
     /// Where the body force has a form for lattices: the statement that takes it for points that are one, and the
     /// implementation of the trait `BodyForceOnLattice`.
     fn body_force_on_lattice(&self, solution: &Ident) -> Option<(TokenStream, TokenStream)> {
-        let lattice = self.plan.lattice.as_ref()?;
+        let lattice = self.staged.lattice.as_ref()?;
         let (runtime, vector) = (self.runtime, self.vector());
         let largest = |count: fn(&Stages) -> usize| -> usize {
             lattice.layers().iter().map(count).max().unwrap_or(0)
@@ -460,7 +463,7 @@ impl Generator<'_> {
         let dimension = Literal::usize_unsuffixed(self.spec.dimension);
         let of_time = lattice.layers().first()?;
         let (time_statements, time_values) =
-            self.translator.statements(&self.plan.time_stage(of_time));
+            self.translator.statements(&self.staged.time_stage(of_time));
         // One array type for all axes: what one has to spare is zero.
         let of_axes = |count: usize, blocks: Vec<Block<'_>>| {
             let arms = blocks.iter().enumerate().map(|(axis, block)| {
@@ -473,10 +476,12 @@ impl Generator<'_> {
             quote!(match axis { #(#arms)* _ => [T::zero(); #count] })
         };
         let layers = lattice.layers().iter();
-        let of_points =
-            of_axes(counts[1], layers.clone().map(|layer| self.plan.point_stage(layer)).collect());
-        let of_layers = of_axes(counts[2], layers.map(|layer| self.plan.staged(layer)).collect());
-        let (statements, values) = self.translator.statements(&self.plan.of_layers(lattice));
+        let of_points = of_axes(
+            counts[1],
+            layers.clone().map(|layer| self.staged.point_stage(layer)).collect(),
+        );
+        let of_layers = of_axes(counts[2], layers.map(|layer| self.staged.staged(layer)).collect());
+        let (statements, values) = self.translator.statements(&self.staged.of_layers(lattice));
         let b = self.shaped(Shape::Vector, &values);
         let choice = quote! {
             if let Some(lattice) = #runtime::Lattice::of(X) {
@@ -527,17 +532,17 @@ impl Generator<'_> {
     fn state_stages(&self) -> (TokenStream, Literal, Literal, Literal) {
         let runtime = self.runtime;
         let n = Literal::usize_unsuffixed(self.spec.dimension);
-        let Plan { state, velocity, .. } = self.plan;
+        let Staged { state, velocity, .. } = self.staged;
         let (of_time, time) = self.time_stage("state_time", state);
         let (of_velocity_time, velocity_time) = self.time_stage("velocity_time", velocity);
         let (of_point, point) = self.point_stage("state_point", state);
-        let (statements, values) = self.translator.statements_if_near(&self.plan.staged(state));
+        let (statements, values) = self.translator.statements_if_near(&self.staged.staged(state));
         let (u, tensors) = values.split_at(self.spec.dimension);
         let (F, P) = tensors.split_at(tensors.len() / 2);
         let u = self.shaped(Shape::Vector, u);
         let [F, P] = [F, P].map(|values| self.shaped(Shape::Matrix, values));
         let (v_statements, values) =
-            self.translator.statements_if_near(&self.plan.staged(velocity));
+            self.translator.statements_if_near(&self.staged.staged(velocity));
         let v = self.shaped(Shape::Vector, &values);
         let items = quote! {
             #of_time
@@ -567,7 +572,7 @@ impl Generator<'_> {
     fn time_stage(&self, name: &str, stages: &Stages) -> (TokenStream, Literal) {
         let (name, count) =
             (format_ident!("{name}"), Literal::usize_unsuffixed(stages.time_count()));
-        let (statements, values) = self.translator.statements(&self.plan.time_stage(stages));
+        let (statements, values) = self.translator.statements(&self.staged.time_stage(stages));
         let function = quote! {
             #[inline]
             fn #name(&self, t: T) -> [T; #count] {
@@ -583,7 +588,7 @@ impl Generator<'_> {
         let (name, count) =
             (format_ident!("{name}"), Literal::usize_unsuffixed(stages.point_count()));
         let vector = self.vector();
-        let (statements, values) = self.translator.statements(&self.plan.point_stage(stages));
+        let (statements, values) = self.translator.statements(&self.staged.point_stage(stages));
         let function = quote! {
             #[inline]
             fn #name(&self, X: &#vector) -> [T; #count] {
@@ -618,12 +623,12 @@ impl Generator<'_> {
         let vector = self.vector();
         let matrix = quote!(#runtime::nalgebra::SMatrix<T, #n, #n>);
         let mut items = TokenStream::new();
-        for field in &self.plan.fields {
-            let method = format_ident!("{}", field.name);
-            let block = self.plan.after_parameters(&field.outputs);
+        for field in &self.staged.fields {
+            let method = format_ident!("{}", field.name.in_code());
+            let block = self.staged.after_parameters(&field.outputs);
             let (statements, values) = self.translator.statements(&block);
-            let result = self.shaped(field.shape, &values);
-            let result_type = match field.shape {
+            let result = self.shaped(field.name.shape(), &values);
+            let result_type = match field.name.shape() {
                 Shape::Scalar => quote!(T),
                 Shape::Vector => vector.clone(),
                 Shape::Matrix => matrix.clone(),
@@ -636,17 +641,19 @@ impl Generator<'_> {
                 }
             });
         }
-        let (statements, values) = self.translator.statements(&self.plan.all_fields());
+        let (statements, values) = self.translator.statements(&self.staged.all_fields());
         let mut values = values.as_slice();
         let entries: Vec<TokenStream> = self
-            .plan
+            .staged
             .fields
             .iter()
             .map(|field| {
                 let (own, rest) = values.split_at(field.outputs.len());
                 values = rest;
-                let (letter, value) =
-                    (format_ident!("{}", field.letter), self.shaped(field.shape, own));
+                let (letter, value) = (
+                    format_ident!("{}", field.name.letter()),
+                    self.shaped(field.name.shape(), own),
+                );
                 quote!(#letter: #value)
             })
             .collect();
@@ -657,9 +664,9 @@ impl Generator<'_> {
             }
         });
 
-        if let Some(energy) = self.plan.energy {
+        if let Some(energy) = self.staged.energy {
             let (statements, values) =
-                self.translator.statements(&self.plan.after_parameters(&[energy]));
+                self.translator.statements(&self.staged.after_parameters(&[energy]));
             items.extend(quote! {
                 fn strain_energy(&self, X: &#vector, t: T) -> Option<T> {
                     #statements
@@ -668,7 +675,7 @@ impl Generator<'_> {
             });
         }
         items.extend(self.traction());
-        let constants = &self.plan.constants;
+        let constants = &self.staged.constants;
         let [cell_length, density, wave_speed, period] =
             [constants.cell_length, constants.density, constants.wave_speed, constants.period]
                 .map(|slot| self.constant(slot));
@@ -705,10 +712,10 @@ impl Generator<'_> {
         let runtime = self.runtime;
         let n = Literal::usize_unsuffixed(self.spec.dimension);
         let vector = quote!(#runtime::nalgebra::SVector<T, #n>);
-        let arms = self.plan.tractions.iter().map(|(surface, slots)| {
-            let pattern = surface_value(runtime, *surface);
+        let arms = self.staged.tractions.iter().map(|traction| {
+            let pattern = surface_value(runtime, traction.surface);
             let (statements, values) =
-                self.translator.statements(&self.plan.after_parameters(slots));
+                self.translator.statements(&self.staged.after_parameters(&traction.outputs));
             quote! {
                 #pattern => {
                     #statements
@@ -733,7 +740,8 @@ impl Generator<'_> {
 
     /// A parameter-only scalar as an expression: a number, a parameter or a kept value.
     fn constant(&self, slot: Slot) -> TokenStream {
-        let (statements, values) = self.translator.statements(&self.plan.after_parameters(&[slot]));
+        let (statements, values) =
+            self.translator.statements(&self.staged.after_parameters(&[slot]));
         if statements.is_empty() {
             quote!(#(#values)*)
         } else {
@@ -743,7 +751,7 @@ impl Generator<'_> {
 
     fn material(&self) -> TokenStream {
         let runtime = self.runtime;
-        let constants = self.plan.constants.material.iter();
+        let constants = self.staged.constants.material.iter();
         let (names, values): (Vec<Ident>, Vec<TokenStream>) =
             constants.map(|&(name, slot)| (format_ident!("{name}"), self.constant(slot))).unzip();
         let variant = match self.spec.material {
@@ -764,7 +772,7 @@ impl Generator<'_> {
         let constants = |slots: &[Slot]| -> Vec<TokenStream> {
             slots.iter().map(|slot| self.constant(*slot)).collect()
         };
-        match &self.plan.constants.domain {
+        match &self.staged.constants.domain {
             Measures::Box { lower, upper } => {
                 let (lower, upper) = (constants(lower), constants(upper));
                 quote! {

@@ -3,7 +3,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use mmsmith_codegen::Plan;
+use mmsmith_codegen::Code;
 use mmsmith_spec::Spec;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -23,7 +23,7 @@ fn specifications() -> Vec<PathBuf> {
 
 fn header(text: &str) -> String {
     let spec = Spec::parse(text, "test.toml").unwrap_or_else(|diagnostic| panic!("{diagnostic}"));
-    Plan::new(&spec).unwrap().header_source()
+    Code::new(&spec).unwrap().header_source()
 }
 
 /// The functions of this project that the text has before a parenthesis, each with whether it is defined there.

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use mmsmith_codegen::{Plan, items};
+use mmsmith_codegen::{Code, items};
 use mmsmith_spec::Spec;
 use quote::quote;
 use std::path::Path;
@@ -28,7 +28,7 @@ fn parameters_have_names_that_rust_takes() {
              [time]\nperiod = 1\n"
         );
         let spec = Spec::parse(&text, "test.toml").unwrap_or_else(|d| panic!("{d}"));
-        let source = Plan::new(&spec).unwrap().module_source();
+        let source = Code::new(&spec).unwrap().module_source();
         syn::parse_file(&source).unwrap_or_else(|e| panic!("{name}: {e}\n{source}"));
         assert!(source.contains(&format!("pub {identifier}: T,")), "{name}\n{source}");
         let bounds = "value > -f64::INFINITY && value < f64::INFINITY";
@@ -43,12 +43,12 @@ fn a_macro_puts_the_items_of_the_file() {
     for name in ["bar", "ring", "axis-aligned", "rigid-motion"] {
         let text = std::fs::read_to_string(folder.join(name).with_extension("toml")).unwrap();
         let spec = Spec::parse(&text, name).unwrap_or_else(|d| panic!("{d}"));
-        let plan = Plan::new(&spec).unwrap();
-        let mut file = syn::parse_file(&plan.module_source()).unwrap();
+        let code = Code::new(&spec).unwrap();
+        let mut file = syn::parse_file(&code.module_source()).unwrap();
         // What only the file says: where it comes from.
         file.attrs.clear();
         let expected = prettyplease::unparse(&file);
-        for found in [plan.items(&quote!(crate)), items(&spec, &quote!(crate)).unwrap()] {
+        for found in [code.items(&quote!(crate)), items(&spec, &quote!(crate)).unwrap()] {
             assert_eq!(prettyplease::unparse(&syn::parse2(found).unwrap()), expected, "{name}");
         }
     }

@@ -4,6 +4,7 @@ use crate::staged::{Row, Stage, coordinate};
 use mmsmith_expr::{Program, Slot};
 use mmsmith_runtime::nalgebra::SVector;
 use mmsmith_runtime::{BLOCK, BodyForceAtPoints, Lattice, Solution};
+use mmsmith_stage as stage;
 
 /// How the body force of points follows from their layers, and that of layers from their coordinates.
 pub(crate) struct LatticeStages {
@@ -20,17 +21,19 @@ struct LayerStage {
 }
 
 impl LatticeStages {
-    /// Of the outputs in their [separated](Program::with_separated_coordinates) form.
-    pub(crate) fn new<const D: usize>(program: &Program, outputs: &[Slot]) -> Self {
-        let slots = program.layers(outputs, D);
-        let layer = |(axis, slots): (usize, &Vec<Slot>)| {
+    /// Of the form that `lattice` says.
+    pub(crate) fn new(program: &Program, lattice: &stage::Lattice) -> Self {
+        let layers = lattice.layers();
+        let layer = |(axis, stages): (usize, &stage::Stages)| {
             let coordinate = coordinate(program, axis)?;
-            let stage = Stage::new(program, slots, &[coordinate]);
-            Some(LayerStage { axis, count: slots.len(), stage })
+            let stage = Stage::new(program, stages.outputs(), &[coordinate]);
+            Some(LayerStage { axis, count: stages.output_count(), stage })
         };
+        let of_layers: Vec<Slot> =
+            layers.iter().flat_map(|stages| stages.outputs()).copied().collect();
         LatticeStages {
-            layers: slots.iter().enumerate().filter_map(layer).collect(),
-            points: Stage::new(program, outputs, &slots.concat()),
+            layers: layers.iter().enumerate().filter_map(layer).collect(),
+            points: Stage::new(program, lattice.outputs(), &of_layers),
         }
     }
 

@@ -9,15 +9,16 @@ mod rounded;
 mod staged;
 
 use lattice::LatticeStages;
-use mmsmith_expr::{Drafts, Expr, MOST_KEPT_OF_STATES, Program, Slot, arrange};
+use mmsmith_expr::{Program, Slot};
 use mmsmith_runtime::nalgebra::{SMatrix, SVector};
 use mmsmith_runtime::{
     AnySolution, BodyForceAtPoints, Boundary, Condition, Domain, Fields, Lattice, Material,
     ParameterError, Solution, StateAtPoints, Surface,
 };
 use mmsmith_spec::{self as spec, DeriveError, Spec};
+use mmsmith_stage::{FieldName, Measures, Sides, Staged};
 use rounded::Rounded;
-use staged::Stages;
+use staged::PointStages;
 use thiserror::Error;
 
 /// Why a specification could not be interpreted.
@@ -145,11 +146,11 @@ struct Interpreted<const D: usize> {
     body_force: Program,
     strain_energy: Option<Program>,
     tractions: Vec<(Surface, Program)>,
-    body_force_stages: Stages<1>,
+    body_force_stages: PointStages<1>,
     /// The body force at the points of a lattice, where that has a form of its own.
     lattice_stages: Option<LatticeStages>,
     /// Of `u`, `F` and `P`, and of `v`.
-    state_stages: Stages<2>,
+    state_stages: PointStages<2>,
     domain: Domain<f64, D>,
     boundaries: Vec<Boundary>,
     cell_length: f64,
@@ -162,19 +163,19 @@ struct Interpreted<const D: usize> {
 impl<const D: usize> Interpreted<D> {
     fn new(
         spec: &Spec,
-        mut fields: spec::Fields,
+        fields: spec::Fields,
         parameters: Vec<f64>,
     ) -> Result<Self, InterpretError> {
-        let surfaces = std::mem::take(&mut fields.surfaces);
-        let mut constants = spec.constants();
-        for requirement in &spec.requirements {
-            constants.extend([requirement.left, requirement.right]);
-        }
-        let constants =
-            fields.program(&constants).evaluate(&inputs::<D>(&SVector::zeros(), 0.0, &parameters));
-        let sides = &constants[constants.len() - 2 * spec.requirements.len()..];
-        for (requirement, side) in spec.requirements.iter().zip(sides.chunks(2)) {
-            if !requirement.relation.holds(side[0], side[1]) {
+        let staged = Staged::of(spec, fields);
+        let program = staged.program();
+        let part = |slots: &[Slot]| program.part(slots);
+        let at_parameters = inputs::<D>(&SVector::zeros(), 0.0, &parameters);
+        let constants = |slots: &[Slot]| part(slots).evaluate(&at_parameters);
+        let constant = |slot: Slot| constants(&[slot])[0];
+        for (requirement, &Sides { left, right }) in
+            spec.requirements.iter().zip(&staged.requirements)
+        {
+            if !requirement.relation.holds(constant(left), constant(right)) {
                 let pairs = spec.parameters.iter().zip(&parameters);
                 let values: Vec<String> =
                     pairs.map(|(p, value)| format!("{} = {value:?}", p.name)).collect();
@@ -185,69 +186,46 @@ impl<const D: usize> Interpreted<D> {
                 }));
             }
         }
-        let (material_constants, measures) =
-            constants[4..].split_at(spec.material.constants().len());
-        let domain = match spec.domain {
-            spec::Domain::Box { .. } => Domain::Box {
-                lower: SVector::from_row_slice(&measures[..D]),
-                upper: SVector::from_row_slice(&measures[D..2 * D]),
+        let domain = match &staged.constants.domain {
+            Measures::Box { lower, upper } => Domain::Box {
+                lower: SVector::from_row_slice(&constants(lower)),
+                upper: SVector::from_row_slice(&constants(upper)),
             },
-            spec::Domain::Annulus { .. } => {
-                Domain::Annulus { inner: measures[0], outer: measures[1] }
+            &Measures::Annulus { inner, outer } => {
+                Domain::Annulus { inner: constant(inner), outer: constant(outer) }
             }
         };
-        // As generated code has it: one program, and the body force of points that stay in a form of its own.
-        let (inputs, definitions, b) = (&fields.inputs, &fields.definitions, &fields.b);
-        let staged = arrange(&mut fields.graph, inputs, definitions, &mut Drafts::default(), b);
-        let parts: [Vec<Expr>; 9] = [
-            fields.u.clone(),
-            fields.v.clone(),
-            fields.a.clone(),
-            fields.H.concat(),
-            fields.F.concat(),
-            vec![fields.J],
-            fields.P.concat(),
-            fields.b.clone(),
-            staged,
-        ];
-        let tractions = surfaces.iter().flat_map(|s| &s.traction).copied();
-        let outputs: Vec<Expr> =
-            parts.iter().flatten().copied().chain(fields.W).chain(tractions).collect();
-        let before_staged = parts[..8].iter().map(Vec::len).sum::<usize>();
-        let staged_places = before_staged..before_staged + parts[8].len();
-        let program = fields.program(&outputs).with_gathered_factors(staged_places.clone());
-        let program = program.with_separated_coordinates(staged_places, D).unwrap_or(program);
-        let separated = &program.outputs()[outputs.len()..];
-        let mut slots = program.outputs().iter().copied();
-        let mut take = |n: usize| slots.by_ref().take(n).collect::<Vec<Slot>>();
-        let [u, v, a, H, F, J, P, b, staged] = parts.map(|part| take(part.len()));
-        let part = |slots: &[Slot]| program.part(slots);
-        let state = [u.as_slice(), &F, &P].concat();
+        let of_material: Vec<f64> =
+            staged.constants.material.iter().map(|&(_, slot)| constant(slot)).collect();
+        let field = |name: FieldName| part(staged.field(name));
         Ok(Interpreted {
-            displacement: part(&u),
-            velocity: part(&v),
-            acceleration: part(&a),
-            displacement_gradient: part(&H),
-            deformation_gradient: part(&F),
-            jacobian: part(&J),
-            first_piola_kirchhoff: part(&P),
-            body_force: part(&b),
-            strain_energy: fields.W.map(|_| part(&take(1))),
-            tractions: surfaces
+            displacement: field(FieldName::Displacement),
+            velocity: field(FieldName::Velocity),
+            acceleration: field(FieldName::Acceleration),
+            displacement_gradient: field(FieldName::DisplacementGradient),
+            deformation_gradient: field(FieldName::DeformationGradient),
+            jacobian: field(FieldName::Jacobian),
+            first_piola_kirchhoff: field(FieldName::FirstPiolaKirchhoff),
+            body_force: field(FieldName::BodyForce),
+            strain_energy: staged.energy.map(|energy| part(&[energy])),
+            tractions: staged
+                .tractions
                 .iter()
-                .map(|s| (surface(s.surface), part(&take(s.traction.len()))))
+                .map(|traction| (surface(traction.surface), part(&traction.outputs)))
                 .collect(),
-            body_force_stages: Stages::new::<D>(&program, [&staged], usize::MAX),
-            lattice_stages: (!separated.is_empty())
-                .then(|| LatticeStages::new::<D>(&program, separated)),
-            state_stages: Stages::new::<D>(&program, [&state, &v], MOST_KEPT_OF_STATES),
+            body_force_stages: PointStages::new::<D>(program, [&staged.body_force]),
+            lattice_stages: staged
+                .lattice
+                .as_ref()
+                .map(|lattice| LatticeStages::new(program, lattice)),
+            state_stages: PointStages::new::<D>(program, [&staged.state, &staged.velocity]),
             domain,
             boundaries: spec.boundaries.iter().map(boundary).collect(),
-            cell_length: constants[0],
-            material: material(&spec.material, material_constants),
-            density: constants[1],
-            wave_speed: constants[2],
-            period: constants[3],
+            cell_length: constant(staged.constants.cell_length),
+            material: material(&spec.material, &of_material),
+            density: constant(staged.constants.density),
+            wave_speed: constant(staged.constants.wave_speed),
+            period: constant(staged.constants.period),
             parameters,
         })
     }

@@ -4,6 +4,7 @@ use crate::inputs;
 use mmsmith_expr::{Operation, Program, Section, Slot};
 use mmsmith_runtime::nalgebra::SVector;
 use mmsmith_runtime::{BLOCK, BodyForceAtPoints, StateAtPoints, StateRun};
+use mmsmith_stage::Stages;
 
 /// One number for each point of a block.
 pub(crate) type Row = [f64; BLOCK];
@@ -34,7 +35,7 @@ pub(crate) fn coordinate(program: &Program, axis: usize) -> Option<Slot> {
 
 /// How outputs are computed at points that stay: what is kept of a point once, and `N` groups of outputs from it, each
 /// group at a time of its own.
-pub(crate) struct Stages<const N: usize> {
+pub(crate) struct PointStages<const N: usize> {
     /// The coordinates that anything reads.
     axes: Vec<usize>,
     at_points: Stage,
@@ -42,21 +43,17 @@ pub(crate) struct Stages<const N: usize> {
     at_times: [Stage; N],
 }
 
-impl<const N: usize> Stages<N> {
-    /// Of a point at most `most` values are kept.
-    pub(crate) fn new<const D: usize>(
-        program: &Program,
-        outputs: [&[Slot]; N],
-        most: usize,
-    ) -> Self {
-        let kept = program.kept_at_points(&outputs.concat(), most);
+impl<const N: usize> PointStages<N> {
+    /// All groups keep the same values of a point.
+    pub(crate) fn new<const D: usize>(program: &Program, groups: [&Stages; N]) -> Self {
+        let kept = groups.first().map_or(&[][..], |stages| stages.point());
         let (axes, coordinates): (Vec<usize>, Vec<Slot>) =
             (0..D).filter_map(|axis| Some((axis, coordinate(program, axis)?))).unzip();
-        Stages {
+        PointStages {
             axes,
-            at_points: Stage::new(program, &kept, &coordinates),
+            at_points: Stage::new(program, kept, &coordinates),
             kept: kept.len(),
-            at_times: outputs.map(|outputs| Stage::new(program, outputs, &kept)),
+            at_times: groups.map(|stages| Stage::new(program, stages.outputs(), kept)),
         }
     }
 
@@ -82,7 +79,7 @@ impl<const N: usize> Stages<N> {
 
 /// What is kept of points.
 pub(crate) struct Points<'a, const N: usize> {
-    stages: &'a Stages<N>,
+    stages: &'a PointStages<N>,
     parameters: &'a [f64],
     /// Value `m` of point `n BLOCK + i` is number `i` of row `n kept + m`.
     blocks: Vec<Row>,

@@ -3,8 +3,9 @@
 use crate::{
     Class, Oracle, OracleError, Point, Sampler, Sensitivity, exact, scientific, worst_factor,
 };
-use mmsmith_expr::{Drafts, Expr, Program, Rational, arrange};
+use mmsmith_expr::{Expr, Program, Rational, Slot};
 use mmsmith_spec::{Fields, Spec};
+use mmsmith_stage::{FieldName, Staged};
 use rayon::prelude::*;
 use thiserror::Error;
 
@@ -132,26 +133,12 @@ impl<'a> Accuracy<'a> {
         }
     }
 
-    /// The programs that evaluate the specification without generated code, in the form that [`Accuracy::measure`]
-    /// judges.
+    /// The programs of which generated code is made, in the form that [`Accuracy::measure`] judges.
     #[must_use]
     pub fn programs(&self) -> Vec<(&'static str, Program)> {
-        let mut fields = self.fields.clone();
-        let mut programs: Vec<_> = self
-            .expressions
-            .iter()
-            .map(|(letter, expressions)| (*letter, fields.program(expressions)))
-            .collect();
-        let (inputs, definitions, b) = (&fields.inputs, &fields.definitions, &fields.b);
-        let staged = arrange(&mut fields.graph, inputs, definitions, &mut Drafts::default(), b);
-        programs.retain(|(letter, _)| !["b staged", "b lattice"].contains(letter));
-        let count = staged.len();
-        let staged = fields.program(&staged).with_gathered_factors(0..count);
-        let separated = staged.with_separated_coordinates(0..count, self.spec.dimension);
-        let on_lattice = separated.map(|program| program.part(&program.outputs()[count..]));
-        programs.push(("b lattice", on_lattice.unwrap_or_else(|| staged.clone())));
-        programs.push(("b staged", staged));
-        programs
+        let staged = Staged::of(self.spec, self.fields.clone());
+        let part = |judged: &JudgedField| staged.program().part(judged.slots(&staged));
+        JUDGED.iter().map(|judged| (judged.letter, part(judged))).collect()
     }
 
     /// Judges `points` points of `class`; `judged` gives the fields at inputs, and `step` is called after each point.
@@ -400,21 +387,55 @@ impl<'a> Accuracy<'a> {
     }
 }
 
+/// A field in one of the ways in which it is evaluated.
+struct JudgedField {
+    letter: &'static str,
+    name: FieldName,
+    way: Way,
+}
+
+/// How a field is evaluated.
+enum Way {
+    /// By a function of its own.
+    Single,
+    /// From values that are kept of times and points.
+    Staged,
+    /// From values of the layers of a lattice.
+    Lattice,
+}
+
+const JUDGED: [JudgedField; 14] = [
+    JudgedField { letter: "u", name: FieldName::Displacement, way: Way::Single },
+    JudgedField { letter: "v", name: FieldName::Velocity, way: Way::Single },
+    JudgedField { letter: "a", name: FieldName::Acceleration, way: Way::Single },
+    JudgedField { letter: "H", name: FieldName::DisplacementGradient, way: Way::Single },
+    JudgedField { letter: "F", name: FieldName::DeformationGradient, way: Way::Single },
+    JudgedField { letter: "J", name: FieldName::Jacobian, way: Way::Single },
+    JudgedField { letter: "P", name: FieldName::FirstPiolaKirchhoff, way: Way::Single },
+    JudgedField { letter: "b", name: FieldName::BodyForce, way: Way::Single },
+    JudgedField { letter: "b staged", name: FieldName::BodyForce, way: Way::Staged },
+    JudgedField { letter: "b lattice", name: FieldName::BodyForce, way: Way::Lattice },
+    JudgedField { letter: "u staged", name: FieldName::Displacement, way: Way::Staged },
+    JudgedField { letter: "v staged", name: FieldName::Velocity, way: Way::Staged },
+    JudgedField { letter: "F staged", name: FieldName::DeformationGradient, way: Way::Staged },
+    JudgedField { letter: "P staged", name: FieldName::FirstPiolaKirchhoff, way: Way::Staged },
+];
+
+impl JudgedField {
+    /// Where its entries are.
+    fn slots<'a>(&self, staged: &'a Staged) -> &'a [Slot] {
+        match (&self.way, self.name) {
+            (Way::Staged, FieldName::BodyForce) => staged.body_force.outputs(),
+            // Where there is no form for lattices, points in them are evaluated as others.
+            (Way::Lattice, _) => {
+                staged.lattice.as_ref().map_or(staged.body_force.outputs(), |l| l.outputs())
+            }
+            // Other stages keep values of single evaluations, and lead to the same bits.
+            (Way::Single | Way::Staged, name) => staged.field(name),
+        }
+    }
+}
+
 fn by_letter(fields: &Fields) -> Vec<(&'static str, Vec<Expr>)> {
-    vec![
-        ("u", fields.u.clone()),
-        ("v", fields.v.clone()),
-        ("a", fields.a.clone()),
-        ("H", fields.H.concat()),
-        ("F", fields.F.concat()),
-        ("J", vec![fields.J]),
-        ("P", fields.P.concat()),
-        ("b", fields.b.clone()),
-        ("b staged", fields.b.clone()),
-        ("b lattice", fields.b.clone()),
-        ("u staged", fields.u.clone()),
-        ("v staged", fields.v.clone()),
-        ("F staged", fields.F.concat()),
-        ("P staged", fields.P.concat()),
-    ]
+    JUDGED.iter().map(|judged| (judged.letter, judged.name.derived(fields))).collect()
 }

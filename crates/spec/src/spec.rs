@@ -431,19 +431,6 @@ impl Spec {
         Reader::new(&document, source)?.read(&document)
     }
 
-    /// The scalars that depend on parameters only: cell length, density, wave speed, period, those of
-    /// [`Material::constants`], and the measures of the domain (both corners of a box, or both radii), in this order.
-    #[must_use]
-    pub fn constants(&self) -> Vec<Expr> {
-        let mut constants = vec![self.cell_length, self.density, self.wave_speed, self.period];
-        constants.extend(self.material.constants().into_iter().map(|(_, value)| value));
-        match &self.domain {
-            Domain::Box { lower, upper } => constants.extend(lower.iter().chain(upper)),
-            Domain::Annulus { inner, outer } => constants.extend([inner, outer]),
-        }
-        constants
-    }
-
     /// Derives every field.
     ///
     /// # Errors

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use mmsmith_codegen::{Names, Plan};
+use mmsmith_codegen::{Code, Names};
 use mmsmith_solutions::nalgebra::{SMatrix, SVector};
 use mmsmith_solutions::{
     AnySolution, CATALOGUE, Description, Domain, Fields, Material, Parameter, ParameterError, Ring,
@@ -273,7 +273,7 @@ fn write_list(folder: &Path) {
         let file = Path::new("mmsmith").join(&name).with_extension("h");
         let header = std::fs::read_to_string(headers().join(&file)).unwrap_or_else(|_| {
             let spec = Spec::parse(description.specification, description.name).unwrap();
-            let header = Plan::new(&spec).unwrap().header_source();
+            let header = Code::new(&spec).unwrap().header_source();
             std::fs::write(folder.join(&file), &header).unwrap();
             header
         });

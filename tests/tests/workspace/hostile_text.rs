@@ -4,7 +4,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use mmsmith_codegen::{Plan, items};
+use mmsmith_codegen::{Code, items};
 use mmsmith_spec::Spec;
 use mmsmith_tests::{c_compiler, cpp_compiler, outcome};
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
@@ -177,7 +177,7 @@ fn c_skeleton(header: &str) -> String {
 }
 
 fn header(spec: &Spec) -> String {
-    let source = Plan::new(spec).unwrap().header_source();
+    let source = Code::new(spec).unwrap().header_source();
     for c in source.chars() {
         assert!(c == '\n' || !c.is_control(), "{c:?} in {}", spec.name);
         assert!(!DIRECTIONS.contains(&c), "{c:?} in {}", spec.name);
@@ -329,7 +329,7 @@ fn names_that_are_words_of_c_give_code() {
 
 /// The generated tokens and those of the module's text, after checking that the text parses.
 fn module(spec: &Spec) -> Vec<String> {
-    let source = Plan::new(spec).unwrap().module_source();
+    let source = Code::new(spec).unwrap().module_source();
     let shown: String = source.chars().take(2_000).collect();
     syn::parse_file(&source).unwrap_or_else(|e| panic!("{e}: {shown}"));
     let runtime: TokenStream = "crate".parse().unwrap();

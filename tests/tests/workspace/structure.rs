@@ -169,3 +169,29 @@ fn a_circle_is_found() {
     let names: Vec<_> = circle(&uses(folder.path())).unwrap().concat();
     assert_eq!(names, ["b", "c", "d"]);
 }
+
+/// What is judged is what is generated as long as all of it comes out of one pipeline.
+#[test]
+fn the_passes_over_a_program_are_called_from_one_place() {
+    fn callers(folder: &Path, found: &mut Vec<String>) {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                callers(&path, found);
+            } else if path.extension().is_some_and(|extension| extension == "rs")
+                && std::fs::read_to_string(&path).unwrap().contains(".with_gathered_factors(")
+            {
+                found.push(path.strip_prefix(workspace()).unwrap().display().to_string());
+            }
+        }
+    }
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(workspace().join("crates")).unwrap() {
+        let folder = entry.unwrap().path();
+        // The crate that has them calls them in its own tests.
+        if !folder.ends_with("expr") {
+            callers(&folder.join("src"), &mut found);
+        }
+    }
+    assert_eq!(found, ["crates/stage/src/staged.rs"]);
+}

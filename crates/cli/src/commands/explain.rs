@@ -3,9 +3,10 @@
 mod compare;
 
 use anyhow::{Result, bail};
-use mmsmith_expr::{Drafts, Expr, OperationCount, Program, arrange};
+use mmsmith_expr::{Expr, OperationCount};
 use mmsmith_solutions::CATALOGUE;
 use mmsmith_spec::{Domain, Fields, SolvedCondition, Spec};
+use mmsmith_stage::{BodyForceOperations, Staged};
 use mmsmith_verify::{Cost, Part, Plan, Share, coverage};
 use serde_json::{Value, json};
 
@@ -22,9 +23,9 @@ use compare::Comparison;
 pub(crate) fn explain(options: &ExplainOptions) -> Result<bool> {
     let output = Output::prepare_if(options.json.as_ref())?;
     let spec = specification(&options.name)?;
-    let mut fields = spec.derive()?;
+    let fields = spec.derive()?;
     let exercises = exercises(&options.name)?;
-    let cost = BodyForceCost::of(&mut fields, spec.dimension);
+    let cost = BodyForceCost::of(&spec, fields);
     let selection = Selection::new(&options.name, &[])?;
     let model = Model::new(&selection, Precision::F64)?;
     let settled = Settled::settle(&SchemeOptions::open(), &model.exact)?;
@@ -92,25 +93,20 @@ struct BodyForceCost {
 }
 
 impl BodyForceCost {
-    fn of(fields: &mut Fields, dimension: usize) -> Self {
-        let (inputs, definitions, b) = (&fields.inputs, &fields.definitions, &fields.b);
-        let b = arrange(&mut fields.graph, inputs, definitions, &mut Drafts::default(), b);
-        let program: Program = fields.program(&b).with_gathered_factors(0..b.len());
-        let kept = program.kept_at_points(program.outputs(), usize::MAX);
-        let count = program.operations_with_kept(program.outputs(), &kept);
+    fn of(spec: &Spec, fields: Fields) -> Self {
+        let BodyForceOperations { stages: count, lattice, kept } =
+            Staged::of(spec, fields).body_force_operations();
         let mut stages = vec![
             ("once a run", count.fixed),
             ("once a step", count.time),
             ("once a particle", count.point),
             ("each particle and step", count.both),
         ];
-        if let Some(program) = program.with_separated_coordinates(0..b.len(), dimension) {
-            let [layer, point] =
-                program.operations_in_lattice(&program.outputs()[b.len()..], dimension);
+        if let Some([layer, point]) = lattice {
             stages.push(("a layer an axis and step, in a lattice", layer));
             stages.push(("each particle and step, in a lattice", point));
         }
-        BodyForceCost { stages, kept: kept.len() }
+        BodyForceCost { stages, kept }
     }
 }
 

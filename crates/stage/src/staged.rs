@@ -1,0 +1,456 @@
+//! The pipeline from derived fields to one program in stages.
+
+use crate::block::{Block, Stage, is_computed, needed, numbered};
+use crate::field::{Field, FieldName};
+use crate::outputs::{Group, Outputs, Single};
+use mmsmith_expr::{
+    Dependence, Drafts, MOST_KEPT_OF_STATES, OperationCount, OperationsByStage, Program, Slot,
+    arrange, reuse,
+};
+use mmsmith_spec::{Domain, Fields, Spec, Surface};
+use std::collections::BTreeMap;
+
+/// The fields of a solution as one program, and which of its values are kept when.
+#[derive(Clone, Debug)]
+pub struct Staged {
+    program: Program,
+    dimension: usize,
+    /// The values that are kept for given parameters.
+    fixed: Vec<Slot>,
+    /// Every field for single evaluations, in the order of [`FieldName::ALL`].
+    pub fields: Vec<Field>,
+    /// The body force, arranged for evaluation in stages.
+    pub body_force: Stages,
+    /// The body force at the points of a lattice, where that has a form of its own.
+    pub lattice: Option<Lattice>,
+    /// Displacement, deformation gradient and stress, in this order; what is kept of a point serves [`Staged::velocity`] too.
+    pub state: Stages,
+    /// The velocity, which may belong to another time than the state.
+    pub velocity: Stages,
+    /// The scalars that depend on parameters only.
+    pub constants: Constants,
+    /// The strain energy, where the material is given by one.
+    pub energy: Option<Slot>,
+    /// The traction on each surface.
+    pub tractions: Vec<Traction>,
+    /// The two sides of each requirement of the specification.
+    pub requirements: Vec<Sides>,
+}
+
+/// Values that are computed in stages, and which values are kept for them.
+#[derive(Clone, Debug)]
+pub struct Stages {
+    outputs: Vec<Slot>,
+    time: Vec<Slot>,
+    point: Vec<Slot>,
+}
+
+/// Values at the points of a lattice, from values of its layers, in stages.
+#[derive(Clone, Debug)]
+pub struct Lattice {
+    outputs: Vec<Slot>,
+    /// For each axis the values of a layer, from what is kept of its coordinate and from values of the time, which are those
+    /// of all layers.
+    layers: Vec<Stages>,
+}
+
+/// The scalars that depend on parameters only.
+#[derive(Clone, Debug)]
+pub struct Constants {
+    /// The length that a number of cells divides.
+    pub cell_length: Slot,
+    /// Mass per reference volume.
+    pub density: Slot,
+    /// The speed that CFL numbers refer to.
+    pub wave_speed: Slot,
+    /// The time in which the motion repeats.
+    pub period: Slot,
+    /// Those of the law, by name.
+    pub material: Vec<(&'static str, Slot)>,
+    /// Those of the body.
+    pub domain: Measures,
+}
+
+/// The measures of the body.
+#[derive(Clone, Debug)]
+pub enum Measures {
+    /// The two corners of a box.
+    Box {
+        /// The corner of smallest coordinates.
+        lower: Vec<Slot>,
+        /// The corner of largest coordinates.
+        upper: Vec<Slot>,
+    },
+    /// The two radii of an annulus.
+    Annulus {
+        /// The smaller.
+        inner: Slot,
+        /// The larger.
+        outer: Slot,
+    },
+}
+
+/// The traction on a surface.
+#[derive(Clone, Debug)]
+pub struct Traction {
+    /// The surface.
+    pub surface: Surface,
+    /// Force per reference area, by component.
+    pub outputs: Vec<Slot>,
+}
+
+/// The sides of a relation between parameters.
+#[derive(Clone, Copy, Debug)]
+pub struct Sides {
+    /// What stands before the sign.
+    pub left: Slot,
+    /// What stands after it.
+    pub right: Slot,
+}
+
+/// How many operations the staged body force takes, by how often they are done.
+#[derive(Clone, Copy, Debug)]
+pub struct BodyForceOperations {
+    /// At points in any order.
+    pub stages: OperationsByStage,
+    /// In a lattice: for each layer of an axis at each time, and for each point at each time.
+    pub lattice: Option<[OperationCount; 2]>,
+    /// The values that are kept for each point.
+    pub kept: usize,
+}
+
+/// The constants among the outputs.
+struct ConstantOutputs {
+    cell_length: Single,
+    density: Single,
+    wave_speed: Single,
+    period: Single,
+    material: Vec<(&'static str, Single)>,
+    domain: DomainOutputs,
+}
+
+/// The measures of the body among the outputs.
+enum DomainOutputs {
+    Box { lower: Group, upper: Group },
+    Annulus { inner: Single, outer: Single },
+}
+
+impl Staged {
+    /// Stages `fields`, which are those of `spec`, or others on a graph that has grown from the specification's own.
+    #[must_use]
+    pub fn of(spec: &Spec, mut fields: Fields) -> Self {
+        let dimension = spec.dimension;
+        // Solvers sample the body force at the same points in every step; a single call does all the work each time.
+        let (inputs, definitions, b) = (&fields.inputs, &fields.definitions, &fields.b);
+        let drafts = &mut Drafts::default();
+        let single = reuse(&mut fields.graph, inputs, definitions, drafts, b);
+        let staged = arrange(&mut fields.graph, inputs, definitions, drafts, b);
+
+        let mut outputs = Outputs::default();
+        let parts = FieldName::ALL.map(|name| match name {
+            FieldName::BodyForce => (name, outputs.add(single.iter().copied())),
+            _ => (name, outputs.add(name.derived(&fields))),
+        });
+        let staged = outputs.add(staged);
+        let constants = ConstantOutputs::new(spec, &mut outputs);
+        let energy = fields.W.map(|energy| outputs.add_one(energy));
+        let requirements: Vec<(Single, Single)> = spec
+            .requirements
+            .iter()
+            .map(|r| (outputs.add_one(r.left), outputs.add_one(r.right)))
+            .collect();
+        let surfaces = std::mem::take(&mut fields.surfaces);
+        let tractions: Vec<(Surface, Group)> =
+            surfaces.iter().map(|s| (s.surface, outputs.add(s.traction.iter().copied()))).collect();
+
+        let program = fields.program(outputs.expressions()).with_gathered_factors(staged.places());
+        let separated = program.with_separated_coordinates(staged.places(), dimension);
+        let program = separated.unwrap_or(program);
+        let separated = program.outputs()[outputs.expressions().len()..].to_vec();
+
+        let fields = parts.map(|(name, group)| Field { name, outputs: group.slots(&program) });
+        let fixed = fixed_slots(&program);
+        let stages = |outputs: Vec<Slot>, point| {
+            let time = time_slots(&program, &fixed, &outputs);
+            Stages { outputs, time, point }
+        };
+        let staged = staged.slots(&program);
+        let at_points = program.kept_at_points(&staged, usize::MAX);
+        let body_force = stages(staged, at_points);
+        let lattice =
+            (!separated.is_empty()).then(|| Lattice::new(&program, &fixed, separated, dimension));
+        let of = |names: &[FieldName]| -> Vec<Slot> {
+            let fields = fields.iter().filter(|field| names.contains(&field.name));
+            fields.flat_map(|field| field.outputs.clone()).collect()
+        };
+        let state = of(&[
+            FieldName::Displacement,
+            FieldName::DeformationGradient,
+            FieldName::FirstPiolaKirchhoff,
+        ]);
+        let velocity = of(&[FieldName::Velocity]);
+        let mut both: Vec<Slot> = state.iter().chain(&velocity).copied().collect();
+        both.sort_unstable();
+        let at_points = program.kept_at_points(&both, MOST_KEPT_OF_STATES);
+        Staged {
+            state: stages(state, at_points.clone()),
+            velocity: stages(velocity, at_points),
+            body_force,
+            lattice,
+            constants: constants.slots(&program),
+            energy: energy.map(|energy| energy.slot(&program)),
+            requirements: requirements
+                .into_iter()
+                .map(|(left, right)| Sides {
+                    left: left.slot(&program),
+                    right: right.slot(&program),
+                })
+                .collect(),
+            tractions: tractions
+                .into_iter()
+                .map(|(surface, group)| Traction { surface, outputs: group.slots(&program) })
+                .collect(),
+            fields: fields.into(),
+            fixed,
+            program,
+            dimension,
+        }
+    }
+
+    /// All operations.
+    #[must_use]
+    pub fn program(&self) -> &Program {
+        &self.program
+    }
+
+    /// The entries of a field for single evaluations, row by row.
+    #[must_use]
+    pub fn field(&self, name: FieldName) -> &[Slot] {
+        let field = self.fields.iter().find(|field| field.name == name);
+        field.map_or(&[], |field| &field.outputs)
+    }
+
+    /// How many values the stage of the parameters keeps.
+    #[must_use]
+    pub fn fixed_count(&self) -> usize {
+        self.fixed.len()
+    }
+
+    /// The values that the stage of the parameters keeps, after the two sides of each requirement.
+    #[must_use]
+    pub fn fixed_stage(&self) -> Block<'_> {
+        let sides = self.requirements.iter().flat_map(|sides| [sides.left, sides.right]);
+        self.block(&[], sides.chain(self.fixed.iter().copied()).collect())
+    }
+
+    /// What `stages` keep of the time.
+    #[must_use]
+    pub fn time_stage(&self, stages: &Stages) -> Block<'_> {
+        self.after_parameters(&stages.time)
+    }
+
+    /// What `stages` keep of a point.
+    #[must_use]
+    pub fn point_stage(&self, stages: &Stages) -> Block<'_> {
+        self.after_parameters(&stages.point)
+    }
+
+    /// The values of `stages` from what all of them keep.
+    #[must_use]
+    pub fn staged(&self, stages: &Stages) -> Block<'_> {
+        let kept = [
+            (Stage::Fixed, self.fixed.as_slice()),
+            (Stage::Time, &stages.time),
+            (Stage::Point, &stages.point),
+        ];
+        self.block(&kept, stages.outputs.clone())
+    }
+
+    /// The body force at a point of a lattice from the values of its layers.
+    #[must_use]
+    pub fn of_layers(&self, lattice: &Lattice) -> Block<'_> {
+        let layers = lattice.layers.iter().enumerate();
+        let layers = layers.map(|(axis, stages)| (Stage::Layer(axis), stages.outputs.as_slice()));
+        let uniform = [(Stage::Fixed, self.fixed.as_slice()), (Stage::Time, lattice.time())];
+        let kept: Vec<_> = uniform.into_iter().chain(layers).collect();
+        self.block(&kept, lattice.outputs.clone())
+    }
+
+    /// `outputs` from the coordinates, the time, and what the stage of the parameters keeps.
+    #[must_use]
+    pub fn after_parameters(&self, outputs: &[Slot]) -> Block<'_> {
+        self.block(&[(Stage::Fixed, &self.fixed)], outputs.to_vec())
+    }
+
+    /// All fields, in their order.
+    #[must_use]
+    pub fn all_fields(&self) -> Block<'_> {
+        let outputs: Vec<Slot> = self.fields.iter().flat_map(|f| f.outputs.clone()).collect();
+        self.after_parameters(&outputs)
+    }
+
+    /// How many operations the staged body force takes.
+    #[must_use]
+    pub fn body_force_operations(&self) -> BodyForceOperations {
+        let Stages { outputs, point, .. } = &self.body_force;
+        let lattice = self.lattice.as_ref();
+        BodyForceOperations {
+            stages: self.program.operations_with_kept(outputs, point),
+            lattice: lattice
+                .map(|l| self.program.operations_in_lattice(&l.outputs, self.dimension)),
+            kept: point.len(),
+        }
+    }
+
+    fn block(&self, stages: &[(Stage, &[Slot])], outputs: Vec<Slot>) -> Block<'_> {
+        let kept = stages.iter().flat_map(|&(stage, slots)| numbered(stage, slots)).collect();
+        Block::new(&self.program, self.dimension, kept, outputs)
+    }
+}
+
+impl Lattice {
+    fn new(program: &Program, fixed: &[Slot], outputs: Vec<Slot>, dimension: usize) -> Self {
+        let layers = program.layers(&outputs, dimension);
+        let all: Vec<Slot> = layers.concat().into_iter().chain(outputs.iter().copied()).collect();
+        let time = time_slots(program, fixed, &all);
+        let of_axis = |outputs: Vec<Slot>| {
+            let point = program.kept_at_points(&outputs, usize::MAX);
+            Stages { outputs, time: time.clone(), point }
+        };
+        Lattice { outputs, layers: layers.into_iter().map(of_axis).collect() }
+    }
+
+    /// How the values of a layer are computed, for each axis.
+    #[must_use]
+    pub fn layers(&self) -> &[Stages] {
+        &self.layers
+    }
+
+    /// The body force at a point.
+    #[must_use]
+    pub fn outputs(&self) -> &[Slot] {
+        &self.outputs
+    }
+
+    fn time(&self) -> &[Slot] {
+        self.layers.first().map_or(&[], |layer| &layer.time)
+    }
+}
+
+impl Stages {
+    /// The values that are computed.
+    #[must_use]
+    pub fn outputs(&self) -> &[Slot] {
+        &self.outputs
+    }
+
+    /// The values that are kept of a point.
+    #[must_use]
+    pub fn point(&self) -> &[Slot] {
+        &self.point
+    }
+
+    /// How many values are computed.
+    #[must_use]
+    pub fn output_count(&self) -> usize {
+        self.outputs.len()
+    }
+
+    /// How many values are kept of the time.
+    #[must_use]
+    pub fn time_count(&self) -> usize {
+        self.time.len()
+    }
+
+    /// How many values are kept of a point.
+    #[must_use]
+    pub fn point_count(&self) -> usize {
+        self.point.len()
+    }
+}
+
+impl ConstantOutputs {
+    fn new(spec: &Spec, outputs: &mut Outputs) -> Self {
+        ConstantOutputs {
+            cell_length: outputs.add_one(spec.cell_length),
+            density: outputs.add_one(spec.density),
+            wave_speed: outputs.add_one(spec.wave_speed),
+            period: outputs.add_one(spec.period),
+            material: spec
+                .material
+                .constants()
+                .into_iter()
+                .map(|(name, value)| (name, outputs.add_one(value)))
+                .collect(),
+            domain: match &spec.domain {
+                Domain::Box { lower, upper } => DomainOutputs::Box {
+                    lower: outputs.add(lower.iter().copied()),
+                    upper: outputs.add(upper.iter().copied()),
+                },
+                Domain::Annulus { inner, outer } => DomainOutputs::Annulus {
+                    inner: outputs.add_one(*inner),
+                    outer: outputs.add_one(*outer),
+                },
+            },
+        }
+    }
+
+    fn slots(self, program: &Program) -> Constants {
+        Constants {
+            cell_length: self.cell_length.slot(program),
+            density: self.density.slot(program),
+            wave_speed: self.wave_speed.slot(program),
+            period: self.period.slot(program),
+            material: self
+                .material
+                .into_iter()
+                .map(|(name, of)| (name, of.slot(program)))
+                .collect(),
+            domain: match self.domain {
+                DomainOutputs::Box { lower, upper } => {
+                    Measures::Box { lower: lower.slots(program), upper: upper.slots(program) }
+                }
+                DomainOutputs::Annulus { inner, outer } => {
+                    Measures::Annulus { inner: inner.slot(program), outer: outer.slot(program) }
+                }
+            },
+        }
+    }
+}
+
+/// The values of the parameters that are worth keeping: they cost something, and are read by an operation that depends
+/// on more, or are results themselves.
+fn fixed_slots(program: &Program) -> Vec<Slot> {
+    let read_later = program
+        .slots()
+        .filter(|&slot| !program.dependence(slot).is_fixed())
+        .flat_map(|slot| program.operations()[slot.index()].operands());
+    let mut slots: Vec<Slot> = read_later
+        .chain(program.outputs().iter().copied())
+        .filter(|&slot| program.dependence(slot).is_fixed() && is_computed(program, slot))
+        .collect();
+    slots.sort_unstable();
+    slots.dedup();
+    slots
+}
+
+/// What `outputs` need of the time alone beside the values in `fixed`: what is read where time and position come together, or
+/// is a result.
+fn time_slots(program: &Program, fixed: &[Slot], outputs: &[Slot]) -> Vec<Slot> {
+    let fixed: BTreeMap<Slot, ()> = fixed.iter().map(|&slot| (slot, ())).collect();
+    let needed = needed(program, &fixed, outputs);
+    let of_time = |slot: &Slot| {
+        let Dependence { position, time } = program.dependence(*slot);
+        time && !position
+    };
+    let mut time: Vec<Slot> = program
+        .slots()
+        .filter(|slot| needed[slot.index()] && !of_time(slot))
+        .flat_map(|slot| program.operations()[slot.index()].operands())
+        .chain(outputs.iter().copied())
+        .filter(of_time)
+        .collect();
+    time.sort_unstable();
+    time.dedup();
+    time
+}
