@@ -21,6 +21,7 @@ mod converge;
 mod coverage;
 mod eval;
 mod explain;
+mod generate;
 mod list;
 mod reproduce;
 mod resume;
@@ -46,6 +47,7 @@ pub(crate) use converge::ConvergeOptions;
 pub(crate) use coverage::CoverageOptions;
 pub(crate) use eval::EvalOptions;
 pub(crate) use explain::ExplainOptions;
+pub(crate) use generate::{FaultName, GenerateOptions, Target};
 pub(crate) use list::ListOptions;
 pub(crate) use reproduce::ReproduceOptions;
 pub(crate) use resume::ResumeOptions;
@@ -121,6 +123,8 @@ pub(crate) enum Command {
     Explain(ExplainOptions),
     /// Measure which terms of the momentum balance each solution exercises, and name the fewest that test them all
     Coverage(CoverageOptions),
+    /// Write a solution as a C header or a Rust module, anywhere
+    Gen(GenerateOptions),
     /// Evaluate the exact fields at points of your own
     Eval(EvalOptions),
     /// Run one simulation and measure its errors

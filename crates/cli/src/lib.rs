@@ -5,7 +5,7 @@
 //! be written; 130 interrupted.
 //!
 //! The libraries under it, in the order in which a specification meets them: [`mmsmith_spec`] reads and derives it,
-//! [`mmsmith_expr`] holds its expressions, `mmsmith-codegen` writes code, [`mmsmith_solutions`] holds that code,
+//! [`mmsmith_expr`] holds its expressions, [`mmsmith_stage`] decides what is computed when, [`mmsmith_codegen`] writes code, [`mmsmith_solutions`] holds that code,
 //! [`mmsmith_interpret`] does without it, [`mmsmith_prove`] and [`mmsmith_oracle`] judge both, `mmsmith-mpm` simulates,
 //! [`mmsmith_verify`] measures, [`mmsmith_vtk`] and [`mmsmith_ledger`] read and write files. The book in `docs/` has a guide, a
 //! reference and a map of the code.
@@ -58,6 +58,7 @@ pub fn run(given: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Check(options) => commands::check(options),
         Command::Explain(options) => commands::explain(options),
         Command::Coverage(options) => commands::coverage(options),
+        Command::Gen(options) => commands::generate(options),
         Command::Eval(options) => commands::eval(options),
         Command::Run(options) => commands::run(options, &given),
         Command::Resume(options) => commands::resume(options),

@@ -73,6 +73,13 @@ impl Origin {
         }
     }
 
+    /// The file without its folders, which say where it lies here and nothing of the solution.
+    pub(crate) fn shown_file(&self) -> String {
+        let file = self.file();
+        let name = Path::new(&file).file_name().map(|name| name.to_string_lossy().into_owned());
+        name.unwrap_or(file)
+    }
+
     /// Where other files of the specification are, if it is a file itself.
     pub(crate) fn folder(&self) -> Option<&Path> {
         match self {

@@ -9,10 +9,12 @@
 //! numbers, and as string literals and comments, never as code.
 
 mod code;
+mod fault;
 mod function;
 mod header;
 mod module;
 mod text;
 
-pub use code::Code;
+pub use code::{Code, Origin};
+pub use fault::{Fault, NoEffect};
 pub use module::{NameClash, Names, items, registry_source};

@@ -3,6 +3,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+use mmsmith_codegen::Fault;
 use mmsmith_expr::{Derivatives, Expr, Function, Graph, Node, Rational};
 use mmsmith_interpret::interpret_fields;
 use mmsmith_spec::{Fields, Spec};
@@ -18,30 +19,14 @@ type Plant = fn(&Spec, &mut Fields);
 
 /// The name, the solution that it is planted in, and how.
 const FAULTS: &[(&str, &str, Plant)] = &[
-    ("b with the sign flipped", "skew-2d", |_, f| {
-        for i in 0..2 {
-            f.b[i] = f.graph.neg(f.b[i]);
-        }
-    }),
+    ("b with the sign flipped", "skew-2d", |s, f| published(Fault::BodyForceSign, s, f)),
     ("one component of b with the sign flipped", "skew-3d", |_, f| f.b[2] = f.graph.neg(f.b[2])),
-    ("components of b exchanged", "skew-2d", |_, f| f.b.swap(0, 1)),
-    ("b without inertia", "skew-2d", |_, f| {
-        for i in 0..2 {
-            f.b[i] = f.graph.sub(f.b[i], f.a[i]);
-        }
-    }),
-    ("b without the stress", "skew-2d", |_, f| f.b = f.a.clone()),
+    ("components of b exchanged", "skew-2d", |s, f| published(Fault::BodyForceExchanged, s, f)),
+    ("b without inertia", "skew-2d", |s, f| published(Fault::BodyForceWithoutInertia, s, f)),
+    ("b without the stress", "skew-2d", |s, f| published(Fault::BodyForceWithoutStress, s, f)),
     ("b never applied", "skew-2d", |_, f| f.b = vec![Graph::ZERO; 2]),
-    ("b per volume instead of mass", "skew-2d", |spec, f| {
-        for i in 0..2 {
-            f.b[i] = f.graph.mul(f.b[i], spec.density);
-        }
-    }),
-    ("b per current volume", "skew-2d", |_, f| {
-        for i in 0..2 {
-            f.b[i] = f.graph.div(f.b[i], f.J);
-        }
-    }),
+    ("b per volume instead of mass", "skew-2d", |s, f| published(Fault::BodyForcePerVolume, s, f)),
+    ("b per current volume", "skew-2d", |s, f| published(Fault::BodyForcePerCurrentVolume, s, f)),
     ("b a millionth too large", "skew-3d", |_, f| {
         for i in 0..3 {
             f.b[i] = scaled(&mut f.graph, f.b[i], (1_000_001, 1_000_000));
@@ -52,12 +37,8 @@ const FAULTS: &[(&str, &str, Plant)] = &[
             f.b[i] = later(&mut f.graph, f.b[i], (1, 1000));
         }
     }),
-    ("b at the current position instead of X", "skew-2d", |_, f| {
-        let (X, Y) = (f.graph.symbol("X"), f.graph.symbol("Y"));
-        let (x, y) = (f.graph.add(X, f.u[0]), f.graph.add(Y, f.u[1]));
-        for i in 0..2 {
-            f.b[i] = f.graph.replace(f.b[i], &BTreeMap::from([(X, x), (Y, y)]));
-        }
+    ("b at the current position instead of X", "skew-2d", |s, f| {
+        published(Fault::BodyForceAtCurrentPosition, s, f)
     }),
     ("the divergence over the first index of P", "skew-2d", wrong_divergence),
     ("one term of the divergence with the wrong derivative", "skew-3d", |spec, f| {
@@ -85,33 +66,11 @@ const FAULTS: &[(&str, &str, Plant)] = &[
             f.b[i] = f.graph.add(f.b[i], term);
         }
     }),
-    ("P transposed", "skew-2d", |_, f| {
-        let (xy, yx) = (f.P[0][1], f.P[1][0]);
-        (f.P[0][1], f.P[1][0]) = (yx, xy);
-    }),
-    ("P transposed in space", "skew-3d", |_, f| {
-        let P = f.P.clone();
-        for i in 0..3 {
-            for j in 0..3 {
-                f.P[i][j] = P[j][i];
-            }
-        }
-    }),
-    ("P with the sign flipped", "axis-aligned", |_, f| {
-        for entry in f.P.iter_mut().flatten() {
-            *entry = f.graph.neg(*entry);
-        }
-    }),
-    ("Kirchhoff stress for P", "skew-2d", |_, f| {
-        let (P, F) = (f.P.clone(), f.F.clone());
-        for i in 0..2 {
-            for j in 0..2 {
-                let terms: Vec<Expr> = (0..2).map(|m| f.graph.mul(P[i][m], F[j][m])).collect();
-                f.P[i][j] = f.graph.sum_of(terms);
-            }
-        }
-    }),
-    ("Cauchy stress for P", "axis-aligned-1d", |_, f| f.P[0][0] = f.graph.div(f.P[0][0], f.J)),
+    ("P transposed", "skew-2d", |s, f| published(Fault::StressTransposed, s, f)),
+    ("P transposed in space", "skew-3d", |s, f| published(Fault::StressTransposed, s, f)),
+    ("P with the sign flipped", "axis-aligned", |s, f| published(Fault::StressSign, s, f)),
+    ("Kirchhoff stress for P", "skew-2d", |s, f| published(Fault::StressKirchhoff, s, f)),
+    ("Cauchy stress for P", "skew-2d", |s, f| published(Fault::StressCauchy, s, f)),
     ("an entry of P dropped", "skew-3d", |_, f| f.P[2][0] = Graph::ZERO),
     ("J - 1 for ln J", "axis-aligned", |_, f| {
         for entry in f.P.iter_mut().flatten() {
@@ -165,11 +124,7 @@ const FAULTS: &[(&str, &str, Plant)] = &[
     }),
     ("u for v", "skew-2d", |_, f| f.v = f.u.clone()),
     ("v for a", "skew-2d", |_, f| f.a = f.v.clone()),
-    ("a with the sign flipped", "axis-aligned-3d", |_, f| {
-        for i in 0..3 {
-            f.a[i] = f.graph.neg(f.a[i]);
-        }
-    }),
+    ("a with the sign flipped", "axis-aligned-3d", |s, f| published(Fault::AccelerationSign, s, f)),
     ("v without the factor of the chain rule", "bar", |spec, f| {
         f.v[0] = f.graph.div(f.v[0], spec.wave_speed)
     }),
@@ -198,10 +153,13 @@ const FAULTS: &[(&str, &str, Plant)] = &[
         let (xz, zx) = (f.F[0][2], f.F[2][0]);
         (f.F[0][2], f.F[2][0]) = (zx, xz);
     }),
-    ("J linearised", "axis-aligned", |_, f| {
-        f.J = f.graph.sum_of([Graph::ONE, f.H[0][0], f.H[1][1]]);
-    }),
+    ("J linearised", "axis-aligned", |s, f| published(Fault::JacobianLinear, s, f)),
     ("J without the shear", "skew-2d", |_, f| f.J = f.graph.mul(f.F[0][0], f.F[1][1])),
+    ("b late by a hundredth of the period", "ring", |s, f| published(Fault::BodyForceLate, s, f)),
+    ("v late by a hundredth of the period", "bar", |s, f| published(Fault::VelocityLate, s, f)),
+    ("F and H transposed", "skew-3d", |s, f| published(Fault::GradientTransposed, s, f)),
+    ("tractions dropped", "skew-2d", |s, f| published(Fault::TractionDropped, s, f)),
+    ("tractions with the sign flipped", "skew-2d", |s, f| published(Fault::TractionSign, s, f)),
     ("a rim that is not free", "ring", |spec, f| {
         rederive(spec, f, "2*R + Ro - 3*Ri", "2.000001*R + Ro - 3*Ri")
     }),
@@ -209,6 +167,11 @@ const FAULTS: &[(&str, &str, Plant)] = &[
         rederive(spec, f, "A*sin(Pi*X)", "A*sin(Pi*X + A/100)")
     }),
 ];
+
+/// One of the faults that `mms gen` plants for users.
+fn published(fault: Fault, spec: &Spec, fields: &mut Fields) {
+    fault.plant(spec, fields).unwrap();
+}
 
 fn scaled(graph: &mut Graph, expr: Expr, (p, q): (i64, i64)) -> Expr {
     let factor = graph.number(Rational::new(p.into(), q.into()));

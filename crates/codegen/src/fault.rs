@@ -1,0 +1,289 @@
+//! Faults planted in the fields, for authors who test their own tests: code with a fault must fail them.
+//!
+//! Each fault is a mistake that published codes carry. It changes derived fields, so that generated Rust and C have the same one.
+
+use mmsmith_expr::{Expr, Graph, Rational};
+use mmsmith_spec::{Domain, Fields, Spec};
+use std::collections::BTreeMap;
+use std::fmt;
+use thiserror::Error;
+
+/// A mistake in the fields.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Fault {
+    /// `-b`.
+    BodyForceSign,
+    /// `rho0 b`, a force per volume where one per mass is asked for.
+    BodyForcePerVolume,
+    /// `b/J`, per current volume.
+    BodyForcePerCurrentVolume,
+    /// `b` at a time that is a hundredth of the period later.
+    BodyForceLate,
+    /// `b` at `x = X + u` in the place of `X`.
+    BodyForceAtCurrentPosition,
+    /// `b - a`.
+    BodyForceWithoutInertia,
+    /// `b = a`.
+    BodyForceWithoutStress,
+    /// The first two components of `b` exchanged.
+    BodyForceExchanged,
+    /// `-P`.
+    StressSign,
+    /// `P^T`.
+    StressTransposed,
+    /// The Cauchy stress `P F^T/J` for `P`.
+    StressCauchy,
+    /// The Kirchhoff stress `P F^T` for `P`.
+    StressKirchhoff,
+    /// Tractions that are zero.
+    TractionDropped,
+    /// Tractions with the sign turned.
+    TractionSign,
+    /// `v` at a time that is a hundredth of the period later.
+    VelocityLate,
+    /// `-a`.
+    AccelerationSign,
+    /// `F^T`, and `H^T`.
+    GradientTransposed,
+    /// `1 + tr H` for `J`.
+    JacobianLinear,
+}
+
+/// A fault that changes no field of a solution, so that no test can find it there.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error("the fault {fault} changes no field of {solution}: no test can find it with this solution")]
+pub struct NoEffect {
+    /// The fault.
+    pub fault: Fault,
+    /// The name of the solution.
+    pub solution: String,
+}
+
+impl Fault {
+    /// Every fault.
+    pub const ALL: [Fault; 18] = [
+        Fault::BodyForceSign,
+        Fault::BodyForcePerVolume,
+        Fault::BodyForcePerCurrentVolume,
+        Fault::BodyForceLate,
+        Fault::BodyForceAtCurrentPosition,
+        Fault::BodyForceWithoutInertia,
+        Fault::BodyForceWithoutStress,
+        Fault::BodyForceExchanged,
+        Fault::StressSign,
+        Fault::StressTransposed,
+        Fault::StressCauchy,
+        Fault::StressKirchhoff,
+        Fault::TractionDropped,
+        Fault::TractionSign,
+        Fault::VelocityLate,
+        Fault::AccelerationSign,
+        Fault::GradientTransposed,
+        Fault::JacobianLinear,
+    ];
+
+    /// The name on command lines.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Fault::BodyForceSign => "body-force-sign",
+            Fault::BodyForcePerVolume => "body-force-per-volume",
+            Fault::BodyForcePerCurrentVolume => "body-force-per-current-volume",
+            Fault::BodyForceLate => "body-force-late",
+            Fault::BodyForceAtCurrentPosition => "body-force-at-current-position",
+            Fault::BodyForceWithoutInertia => "body-force-without-inertia",
+            Fault::BodyForceWithoutStress => "body-force-without-stress",
+            Fault::BodyForceExchanged => "body-force-exchanged",
+            Fault::StressSign => "stress-sign",
+            Fault::StressTransposed => "stress-transposed",
+            Fault::StressCauchy => "stress-cauchy",
+            Fault::StressKirchhoff => "stress-kirchhoff",
+            Fault::TractionDropped => "traction-dropped",
+            Fault::TractionSign => "traction-sign",
+            Fault::VelocityLate => "velocity-late",
+            Fault::AccelerationSign => "acceleration-sign",
+            Fault::GradientTransposed => "gradient-transposed",
+            Fault::JacobianLinear => "jacobian-linear",
+        }
+    }
+
+    /// The mistake in a line.
+    #[must_use]
+    pub fn about(self) -> &'static str {
+        match self {
+            Fault::BodyForceSign => "-b",
+            Fault::BodyForcePerVolume => "rho0 b, a force per volume",
+            Fault::BodyForcePerCurrentVolume => "b/J",
+            Fault::BodyForceLate => "b a hundredth of the period late",
+            Fault::BodyForceAtCurrentPosition => "b at x = X + u in the place of X",
+            Fault::BodyForceWithoutInertia => "b - a",
+            Fault::BodyForceWithoutStress => "b = a",
+            Fault::BodyForceExchanged => "the first two components of b exchanged",
+            Fault::StressSign => "-P",
+            Fault::StressTransposed => "P transposed",
+            Fault::StressCauchy => "the Cauchy stress P F^T/J for P",
+            Fault::StressKirchhoff => "the Kirchhoff stress P F^T for P",
+            Fault::TractionDropped => "tractions of zero",
+            Fault::TractionSign => "tractions with the sign turned",
+            Fault::VelocityLate => "v a hundredth of the period late",
+            Fault::AccelerationSign => "-a",
+            Fault::GradientTransposed => "F and H transposed",
+            Fault::JacobianLinear => "J = 1 + tr H",
+        }
+    }
+
+    /// Plants the fault in the fields of `spec`.
+    ///
+    /// # Errors
+    ///
+    /// [`NoEffect`] where all fields stay as they are.
+    pub fn plant(self, spec: &Spec, fields: &mut Fields) -> Result<(), NoEffect> {
+        let before = outputs(fields);
+        self.change(spec, fields);
+        let after = outputs(fields);
+        if before == after || !is_noticed(spec, fields, &before, &after) {
+            return Err(NoEffect { fault: self, solution: spec.name.clone() });
+        }
+        Ok(())
+    }
+
+    fn change(self, spec: &Spec, f: &mut Fields) {
+        let n = spec.dimension;
+        let graph = &mut f.graph;
+        let stress = f.P.clone();
+        let kirchhoff = |graph: &mut Graph, i: usize, j: usize| {
+            let terms: Vec<Expr> = (0..n).map(|m| graph.mul(stress[i][m], f.F[j][m])).collect();
+            graph.sum_of(terms)
+        };
+        match self {
+            Fault::BodyForceSign => negate(graph, &mut f.b),
+            Fault::BodyForcePerVolume => {
+                f.b.iter_mut().for_each(|b| *b = graph.mul(*b, spec.density));
+            }
+            Fault::BodyForcePerCurrentVolume => {
+                f.b.iter_mut().for_each(|b| *b = graph.div(*b, f.J));
+            }
+            Fault::BodyForceLate => delay(graph, spec, &mut f.b),
+            Fault::BodyForceAtCurrentPosition => {
+                let coordinates: Vec<Expr> = f.inputs[..n].iter().map(|(X, _)| *X).collect();
+                let current: BTreeMap<Expr, Expr> =
+                    coordinates.iter().zip(&f.u).map(|(&X, &u)| (X, graph.add(X, u))).collect();
+                // First what other symbols mean, as the radius, so that it moves with the coordinates.
+                let definitions: BTreeMap<Expr, Expr> = f.definitions.iter().copied().collect();
+                for b in &mut f.b {
+                    let explicit = graph.replace(*b, &definitions);
+                    *b = graph.replace(explicit, &current);
+                }
+            }
+            Fault::BodyForceWithoutInertia => {
+                f.b.iter_mut().zip(&f.a).for_each(|(b, a)| *b = graph.sub(*b, *a));
+            }
+            Fault::BodyForceWithoutStress => f.b = f.a.clone(),
+            Fault::BodyForceExchanged => {
+                if let [first, second, ..] = &mut f.b[..] {
+                    std::mem::swap(first, second);
+                }
+            }
+            Fault::StressSign => f.P.iter_mut().for_each(|row| negate(graph, row)),
+            Fault::StressTransposed => f.P = transposed(&f.P),
+            Fault::StressKirchhoff => {
+                f.P = (0..n).map(|i| (0..n).map(|j| kirchhoff(graph, i, j)).collect()).collect();
+            }
+            Fault::StressCauchy => {
+                let cauchy = |graph: &mut Graph, i: usize, j: usize| {
+                    let kirchhoff = kirchhoff(graph, i, j);
+                    graph.div(kirchhoff, f.J)
+                };
+                f.P = (0..n).map(|i| (0..n).map(|j| cauchy(graph, i, j)).collect()).collect();
+            }
+            Fault::TractionDropped => {
+                f.surfaces.iter_mut().for_each(|surface| surface.traction.fill(Graph::ZERO));
+            }
+            Fault::TractionSign => {
+                f.surfaces.iter_mut().for_each(|surface| negate(graph, &mut surface.traction));
+            }
+            Fault::VelocityLate => delay(graph, spec, &mut f.v),
+            Fault::AccelerationSign => negate(graph, &mut f.a),
+            Fault::GradientTransposed => {
+                (f.F, f.H) = (transposed(&f.F), transposed(&f.H));
+            }
+            Fault::JacobianLinear => {
+                let terms = std::iter::once(Graph::ONE).chain((0..n).map(|i| f.H[i][i]));
+                f.J = graph.sum_of(terms);
+            }
+        }
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// All that generated code computes of position and time.
+fn outputs(fields: &Fields) -> Vec<Expr> {
+    let Fields { u, v, a, H, F, J, P, b, W, surfaces, .. } = fields;
+    let matrices = [H, F, P].into_iter().flatten().flatten();
+    let vectors = [u, v, a, b].into_iter().flatten();
+    let tractions = surfaces.iter().flat_map(|surface| &surface.traction);
+    matrices.chain(vectors).chain(tractions).chain([J]).chain(W).copied().collect()
+}
+
+/// Smaller differences, in units of the largest value, are rounding: the same value in another form.
+const NOTICED: f64 = 1e-9;
+
+/// Whether values differ at places within the body, with the defaults of the parameters.
+fn is_noticed(spec: &Spec, fields: &mut Fields, before: &[Expr], after: &[Expr]) -> bool {
+    let n = spec.dimension;
+    let defaults = spec.parameters.iter().map(|p| p.default);
+    let measures = match &spec.domain {
+        Domain::Box { lower, upper } => [lower.clone(), upper.clone()],
+        // Along the diagonal from the inner to the outer surface; the axis is as good as any other place.
+        Domain::Annulus { inner, outer } => {
+            let root = fields.graph.number(Rational::new(7.into(), 10.into()));
+            [inner, outer].map(|&radius| vec![fields.graph.mul(root, radius); n])
+        }
+    };
+    let corners = measures.concat();
+    let constants: Vec<Expr> = corners.into_iter().chain([spec.period]).collect();
+    let nowhere = vec![0.0; n + 1];
+    let at_defaults: Vec<f64> = nowhere.into_iter().chain(defaults.clone()).collect();
+    let constants = fields.program(&constants).evaluate(&at_defaults);
+    let (lower, rest) = constants.split_at(n);
+    let (upper, period) = rest.split_at(n);
+    let program = fields.program(&[before, after].concat());
+    [0.21, 0.46, 0.83].into_iter().any(|share| {
+        let place = (0..n).map(|i| {
+            // Not on a diagonal, where components may agree.
+            let share = (share + 0.17 * i as f64).fract();
+            lower[i] + share * (upper[i] - lower[i])
+        });
+        let time = period.iter().map(|period| 0.37 * share * period);
+        let inputs: Vec<f64> = place.chain(time).chain(defaults.clone()).collect();
+        let values = program.evaluate(&inputs);
+        let (before, after) = values.split_at(before.len());
+        before
+            .iter()
+            .zip(after)
+            .any(|(before, after)| (before - after).abs() > NOTICED * before.abs().max(after.abs()))
+    })
+}
+
+fn negate(graph: &mut Graph, vector: &mut [Expr]) {
+    vector.iter_mut().for_each(|entry| *entry = graph.neg(*entry));
+}
+
+fn transposed(matrix: &[Vec<Expr>]) -> Vec<Vec<Expr>> {
+    (0..matrix.len()).map(|i| matrix.iter().map(|row| row[i]).collect()).collect()
+}
+
+/// The entries at a time that is a hundredth of the period later.
+fn delay(graph: &mut Graph, spec: &Spec, vector: &mut [Expr]) {
+    let t = graph.symbol("t");
+    let hundredth = graph.number(Rational::new(1.into(), 100.into()));
+    let delay = graph.mul(hundredth, spec.period);
+    let late = graph.add(t, delay);
+    let later = BTreeMap::from([(t, late)]);
+    vector.iter_mut().for_each(|entry| *entry = graph.replace(*entry, &later));
+}
