@@ -1,7 +1,7 @@
 //! Blocks of operations as Rust statements.
 
 use crate::text::{push_index, spell};
-use mmsmith_expr::{Function, Operation, Rational, nearest_f64};
+use mmsmith_expr::{Operation, Rational, RustCall, nearest_f64};
 use mmsmith_stage::{Block, Operand, Stage};
 use num_traits::{One, Zero};
 use proc_macro2::{Ident, Literal, TokenStream};
@@ -20,6 +20,8 @@ pub(crate) struct Translator<'a> {
     /// Where the parameters are: `parameters` itself, or `self.parameters`.
     parameters: &'static str,
     names: Vec<Ident>,
+    /// The path to the crate `mmsmith_runtime`.
+    runtime: String,
     /// The blocks that placeholders stand for; `None` where tokens are wanted.
     blocks: Option<&'a RefCell<Vec<String>>>,
 }
@@ -28,21 +30,23 @@ impl<'a> Translator<'a> {
     pub(crate) fn new(
         parameters: &'static str,
         names: Vec<Ident>,
+        runtime: &TokenStream,
         blocks: Option<&'a RefCell<Vec<String>>>,
     ) -> Self {
-        Translator { parameters, names, blocks }
+        let runtime = runtime.to_string().replace(' ', "");
+        Translator { parameters, names, runtime, blocks }
     }
 
     /// The statements of a block, and its outputs as expressions.
     pub(crate) fn statements(&self, block: &Block<'_>) -> (TokenStream, Vec<TokenStream>) {
-        self.statements_with(block, template)
+        self.statements_with(block, |operation| self.template(operation))
     }
 
     /// The same where a constant `NEAR` tells whether logarithms of ratios may be the short ones.
     pub(crate) fn statements_if_near(&self, block: &Block<'_>) -> (TokenStream, Vec<TokenStream>) {
         self.statements_with(block, |operation| match operation {
             Operation::LnOfBoth(..) => "#.ln_of_both_if::<NEAR>(#)".into(),
-            other => template(other),
+            other => self.template(other),
         })
     }
 
@@ -78,6 +82,39 @@ impl<'a> Translator<'a> {
         (statements, block.outputs().map(output).collect())
     }
 
+    /// An operation in Rust, with `#` for each operand. Numbers and inputs are operands and no statements.
+    fn template(&self, operation: &Operation) -> Cow<'static, str> {
+        let fixed = match operation {
+            Operation::Number(value) => return number(value).into(),
+            Operation::Call(function, _) => {
+                return match function.rust() {
+                    RustCall::Method(name) => format!("#.{name}()"),
+                    RustCall::Library(name) => {
+                        let libm = format!("{}::libm", self.runtime);
+                        format!("#.apply({libm}::{name}, {libm}::{name}f)")
+                    }
+                }
+                .into();
+            }
+            Operation::Power(_, exponent) => return format!("#.powf({})", number(exponent)).into(),
+            Operation::Pi => "T::pi()",
+            Operation::Input(_) => "",
+            Operation::Add(..) => "# + #",
+            Operation::Sub(..) => "# - #",
+            Operation::Mul(..) => "# * #",
+            Operation::Div(..) => "# / #",
+            Operation::Neg(_) => "-#",
+            Operation::Sqrt(_) => "#.sqrt()",
+            Operation::SinPi(_) => "#.sin_pi()",
+            Operation::CosPi(_) => "#.cos_pi()",
+            Operation::Atan2(..) => "#.atan2(#)",
+            Operation::LnOfBoth(..) => "#.ln_of_both(#)",
+            Operation::SumError(..) => "#.sum_error(#)",
+            Operation::ProductError(..) => "#.product_error(#)",
+        };
+        fixed.into()
+    }
+
     fn operand(&self, text: &mut String, operand: Operand<'_>) {
         let (name, index) = match operand {
             Operand::Temporary(index) => {
@@ -106,30 +143,6 @@ impl<'a> Translator<'a> {
     }
 }
 
-/// An operation in Rust, with `#` for each operand. Numbers and inputs are operands and no statements.
-fn template(operation: &Operation) -> Cow<'static, str> {
-    let fixed = match operation {
-        Operation::Number(value) => return number(value).into(),
-        Operation::Call(function, _) => return format!("#.{}()", rust_name(*function)).into(),
-        Operation::Power(_, exponent) => return format!("#.powf({})", number(exponent)).into(),
-        Operation::Pi => "T::pi()",
-        Operation::Input(_) => "",
-        Operation::Add(..) => "# + #",
-        Operation::Sub(..) => "# - #",
-        Operation::Mul(..) => "# * #",
-        Operation::Div(..) => "# / #",
-        Operation::Neg(_) => "-#",
-        Operation::Sqrt(_) => "#.sqrt()",
-        Operation::SinPi(_) => "#.sin_pi()",
-        Operation::CosPi(_) => "#.cos_pi()",
-        Operation::Atan2(..) => "#.atan2(#)",
-        Operation::LnOfBoth(..) => "#.ln_of_both(#)",
-        Operation::SumError(..) => "#.sum_error(#)",
-        Operation::ProductError(..) => "#.product_error(#)",
-    };
-    fixed.into()
-}
-
 /// `text` with the lines of `blocks` in the places of their placeholders, as far to the right as these.
 ///
 /// Text from a specification is always within a comment or a literal, so that no line of it starts as a placeholder.
@@ -155,29 +168,6 @@ pub(crate) fn fill(text: &str, blocks: &[String]) -> String {
 /// Names and numbers with what joins them always are tokens.
 fn tokens(text: &str) -> TokenStream {
     text.parse().unwrap_or_default()
-}
-
-fn rust_name(function: Function) -> &'static str {
-    match function {
-        Function::Sin => "sin",
-        Function::Cos => "cos",
-        Function::Tan => "tan",
-        Function::Asin => "asin",
-        Function::Acos => "acos",
-        Function::Atan => "atan",
-        Function::Sinh => "sinh",
-        Function::Cosh => "cosh",
-        Function::Tanh => "tanh",
-        Function::Exp => "exp",
-        Function::Ln => "ln",
-        Function::Ln1p => "log_1p",
-        Function::Expm1 => "exp_m1",
-        Function::Atan2 => "atan2",
-        Function::LnOfBoth => "ln_of_both",
-        Function::LogRatioSquared => "log_ratio_squared",
-        Function::LogRatioSlope => "log_ratio_slope",
-        Function::LogRatioCurvature => "log_ratio_curvature",
-    }
 }
 
 /// A non-negative number as a value of the scalar type `T`.

@@ -4,7 +4,7 @@ use crate::code::Code;
 use crate::function::digits;
 use crate::module::Names;
 use crate::text::{c_string, comment, meaning, push_index, spell};
-use mmsmith_expr::{Function, Operation, Slot, nearest_f64};
+use mmsmith_expr::{CSupport, Operation, Slot, nearest_f64};
 use mmsmith_spec::{Boundary, Condition, Material, Parameter, Surface};
 use mmsmith_stage::{Block, Measures, Operand, Shape, Stage, Staged, Traction};
 use std::borrow::Cow;
@@ -227,11 +227,10 @@ impl Header<'_> {
         if self.code.forms_rounding_errors() {
             self.text += ROUNDING;
         }
-        if self.code.calls(|f| matches!(f, Function::Ln1p | Function::LnOfBoth)) {
-            self.text += LOGARITHM;
-        }
-        if self.code.calls(is_log_ratio) {
-            self.text += LOG_RATIO;
+        for (support, text) in [(CSupport::Logarithm, LOGARITHM), (CSupport::LogRatio, LOG_RATIO)] {
+            if self.code.calls(|function| function.c_support() == Some(support)) {
+                self.text += text;
+            }
         }
         self.line("");
         self.types();
@@ -731,7 +730,7 @@ fn template(operation: &Operation) -> Cow<'static, str> {
     let fixed = match operation {
         Operation::Number(value) => return literal(nearest_f64(value)).into(),
         Operation::Pi => return literal(std::f64::consts::PI).into(),
-        Operation::Call(function, _) => return format!("{}(#)", c_name(*function)).into(),
+        Operation::Call(function, _) => return format!("{}(#)", function.c()).into(),
         Operation::Power(_, exponent) => {
             return format!("pow(#, {})", literal(nearest_f64(exponent))).into();
         }
@@ -814,34 +813,6 @@ fn literal(value: f64) -> String {
     let sign = if value.is_sign_negative() { "-" } else { "" };
     let magnitude = if value.is_infinite() { "HUGE_VAL".into() } else { digits(value.abs()) };
     format!("{sign}{magnitude}")
-}
-
-fn is_log_ratio(function: Function) -> bool {
-    use Function::{LogRatioCurvature, LogRatioSlope, LogRatioSquared};
-    matches!(function, LogRatioSquared | LogRatioSlope | LogRatioCurvature)
-}
-
-fn c_name(function: Function) -> &'static str {
-    match function {
-        Function::Sin => "sin",
-        Function::Cos => "cos",
-        Function::Tan => "tan",
-        Function::Asin => "asin",
-        Function::Acos => "acos",
-        Function::Atan => "atan",
-        Function::Sinh => "sinh",
-        Function::Cosh => "cosh",
-        Function::Tanh => "tanh",
-        Function::Exp => "exp",
-        Function::Ln => "log",
-        Function::Ln1p => "mmsmith_log_1p",
-        Function::Expm1 => "expm1",
-        Function::Atan2 => "atan2",
-        Function::LnOfBoth => "mmsmith_ln_of_both",
-        Function::LogRatioSquared => "mmsmith_log_ratio_squared",
-        Function::LogRatioSlope => "mmsmith_log_ratio_slope",
-        Function::LogRatioCurvature => "mmsmith_log_ratio_curvature",
-    }
 }
 
 fn surface_name(surface: Surface) -> String {

@@ -62,7 +62,7 @@ impl Code<'_> {
         blocks: Option<&RefCell<Vec<String>>>,
     ) -> TokenStream {
         let names = self.spec.parameters.iter().map(|p| identifier(&p.name)).collect();
-        let translator = Translator::new("self.parameters", names, blocks);
+        let translator = Translator::new("self.parameters", names, runtime, blocks);
         Generator { code: self, staged: &self.staged, spec: self.spec, runtime, translator, blocks }
             .items()
     }
@@ -365,7 +365,7 @@ impl Generator<'_> {
             quote!(value.is_finite() #(#bounds)*)
         });
 
-        let translator = Translator::new("parameters", names.clone(), self.blocks);
+        let translator = Translator::new("parameters", names.clone(), self.runtime, self.blocks);
         let (statements, values) = translator.statements(&self.staged.fixed_stage());
         let (sides, fixed_values) = values.split_at(2 * spec.requirements.len());
         let requirements =

@@ -29,7 +29,7 @@ type Names<'a> = &'a mut dyn FnMut(&mut Graph, &str) -> Result<Expr, String>;
 impl Graph {
     /// The expression that `ast` stands for, with names resolved by `names`.
     ///
-    /// `Pi`, the functions of [`Function::NAMES`], `sqrt(x)` and `diff(f, x, ...)` are built in.
+    /// `Pi`, the functions of [`Function::names`], `sqrt(x)` and `diff(f, x, ...)` are built in.
     ///
     /// # Errors
     ///
@@ -147,7 +147,7 @@ impl Graph {
         }
         let function = Function::from_name(name);
         let Some(arity) = function.map(Function::arity).or((name == "sqrt").then_some(1)) else {
-            let known: Vec<&str> = Function::NAMES.iter().map(|(n, _)| *n).collect();
+            let known: Vec<&str> = Function::names().map(|(name, _)| name).collect();
             return fail(format!(
                 "no function is called '{name}'; there are sqrt, diff, {}",
                 known.join(", ")

@@ -4,6 +4,7 @@
 //! and factors common to all terms of a sum stand outside it; terms `k S1 + k S2` with sums `S1`, `S2` are
 //! merged into `k (S1 + S2)`. Products of sums are never multiplied out.
 
+use crate::function::Parity;
 use crate::rational::exact_root;
 use crate::{Expr, Function, Graph, Node, Rational};
 use num_integer::Integer;
@@ -313,44 +314,22 @@ impl Graph {
     /// `function(arguments)`, simplified at arguments where the value is known.
     pub fn call(&mut self, function: Function, arguments: &[Expr]) -> Expr {
         let x = arguments[0];
-        let odd = matches!(
-            function,
-            Function::Sin
-                | Function::Tan
-                | Function::Sinh
-                | Function::Tanh
-                | Function::Asin
-                | Function::Atan
-        );
-        let even = matches!(function, Function::Cos | Function::Cosh);
-        if (odd || even) && self.has_negative_sign(x) {
+        let parity = function.parity();
+        if parity != Parity::Neither && self.has_negative_sign(x) {
             let positive = self.neg(x);
             let value = self.call(function, &[positive]);
-            return if odd { self.neg(value) } else { value };
+            return if parity == Parity::Odd { self.neg(value) } else { value };
+        }
+        if x == Graph::ZERO
+            && let Some(value) = function.at_zero()
+        {
+            return self.number(value.clone());
         }
         match function {
             Function::Sin | Function::Cos => {
                 if let Some(value) = self.trigonometric_value(function, x) {
                     return value;
                 }
-            }
-            Function::Tan
-            | Function::Asin
-            | Function::Atan
-            | Function::Sinh
-            | Function::Tanh
-            | Function::Ln1p
-            | Function::LnOfBoth
-            | Function::Expm1
-            | Function::LogRatioSquared
-            | Function::LogRatioSlope
-                if x == Graph::ZERO =>
-            {
-                return Graph::ZERO;
-            }
-            Function::Cosh | Function::Exp if x == Graph::ZERO => return Graph::ONE,
-            Function::LogRatioCurvature if x == Graph::ZERO => {
-                return self.number(Rational::new((-1).into(), 3.into()));
             }
             Function::Ln if x == Graph::ONE => return Graph::ZERO,
             Function::Exp => {

@@ -1,6 +1,6 @@
 //! The hash-consed graph: nodes, symbols, and questions about them.
 
-use crate::{Rational, nearest_f64};
+use crate::{Function, Rational, nearest_f64};
 use num_traits::{One, Zero};
 use std::collections::{BTreeSet, HashMap};
 use std::hash::{BuildHasher, BuildHasherDefault, Hasher};
@@ -19,95 +19,6 @@ const CERTAIN: f64 = 1e-6;
 /// An expression: the handle of a node in a [`Graph`]. Equal handles of one graph mean equal expressions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Expr(pub(crate) u32);
-
-/// A function of one argument, or of two for [`Function::Atan2`] and [`Function::LnOfBoth`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Function {
-    /// Sine.
-    Sin,
-    /// Cosine.
-    Cos,
-    /// Tangent.
-    Tan,
-    /// Inverse sine.
-    Asin,
-    /// Inverse cosine.
-    Acos,
-    /// Inverse tangent.
-    Atan,
-    /// Hyperbolic sine.
-    Sinh,
-    /// Hyperbolic cosine.
-    Cosh,
-    /// Hyperbolic tangent.
-    Tanh,
-    /// Exponential.
-    Exp,
-    /// Natural logarithm.
-    Ln,
-    /// `ln(1 + x)`, accurate for small `x`.
-    Ln1p,
-    /// `ln(y)` of `y = 1 + x`, given as `(x, y)`: accurate next to one, where `x` has the digits, and next to zero,
-    /// where `y` has them.
-    LnOfBoth,
-    /// `exp(x) - 1`, accurate for small `x`.
-    Expm1,
-    /// `atan2(y, x)`, the polar angle of the point `(x, y)`.
-    Atan2,
-    /// `arcosh(1 + z)^2`: the squared logarithm of `a/b` for `z = (a - b)^2/(2 a b)`, smooth at zero.
-    LogRatioSquared,
-    /// Half the slope of [`Function::LogRatioSquared`] less one, `arcosh(1 + z)/sqrt(z (z + 2)) - 1`.
-    LogRatioSlope,
-    /// The derivative of [`Function::LogRatioSlope`].
-    LogRatioCurvature,
-}
-
-impl Function {
-    /// Every function, with the name that text uses for it.
-    pub const NAMES: &'static [(&'static str, Function)] = &[
-        ("sin", Function::Sin),
-        ("cos", Function::Cos),
-        ("tan", Function::Tan),
-        ("arcsin", Function::Asin),
-        ("arccos", Function::Acos),
-        ("arctan", Function::Atan),
-        ("sinh", Function::Sinh),
-        ("cosh", Function::Cosh),
-        ("tanh", Function::Tanh),
-        ("exp", Function::Exp),
-        ("ln", Function::Ln),
-        ("log1p", Function::Ln1p),
-        ("expm1", Function::Expm1),
-        ("atan2", Function::Atan2),
-        ("lnratio2", Function::LogRatioSquared),
-        ("lnboth", Function::LnOfBoth),
-        ("lnratio2_slope", Function::LogRatioSlope),
-        ("lnratio2_curvature", Function::LogRatioCurvature),
-        // Other usual spellings.
-        ("log", Function::Ln),
-        ("asin", Function::Asin),
-        ("acos", Function::Acos),
-        ("atan", Function::Atan),
-    ];
-
-    /// The function that text calls `name`.
-    #[must_use]
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::NAMES.iter().find(|(n, _)| *n == name).map(|&(_, f)| f)
-    }
-
-    /// The name that text uses for it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        Self::NAMES.iter().find(|&&(_, f)| f == self).map_or("?", |(n, _)| n)
-    }
-
-    /// The number of arguments.
-    #[must_use]
-    pub fn arity(self) -> usize {
-        if matches!(self, Function::Atan2 | Function::LnOfBoth) { 2 } else { 1 }
-    }
-}
 
 /// What a node holds.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -428,18 +339,8 @@ impl Graph {
             }
             Node::Call(function, arguments) => {
                 let (value, magnitude) = at(arguments[0]);
-                let (result, slope) = match function {
-                    Function::Sin => (value.sin(), 1.0),
-                    Function::Cos => (value.cos(), 1.0),
-                    Function::Exp => (value.exp(), value.exp()),
-                    Function::Ln => (value.ln(), 1.0 / value.abs()),
-                    Function::Ln1p | Function::LnOfBoth => {
-                        (value.ln_1p(), 1.0 / (1.0 + value).abs())
-                    }
-                    // The others are rare; nothing is said of them here.
-                    _ => (f64::NAN, f64::NAN),
-                };
-                (result, result.abs() + slope * magnitude)
+                let result = function.double(value);
+                (result, result.abs() + function.steepness(value) * magnitude)
             }
             Node::Whole(inner) => at(*inner),
         }

@@ -37,6 +37,7 @@ mod build;
 mod cancel;
 mod canonical;
 mod derivative;
+mod function;
 mod gather;
 mod graph;
 mod keep;
@@ -57,7 +58,8 @@ pub use arrange::arrange;
 pub use build::BuildError;
 pub use cancel::Term;
 pub use derivative::Derivatives;
-pub use graph::{Expr, Function, Graph, Node};
+pub use function::{CSupport, Function, RustCall};
+pub use graph::{Expr, Graph, Node};
 pub use keep::MOST_KEPT_OF_STATES;
 pub use parse::{Ast, AstKind, ParseError};
 pub use program::{

@@ -46,7 +46,7 @@ impl Splitting<'_> {
                 (self.graph.sum(values), self.graph.sum(rests))
             }
             Node::Product(factors) => self.product(expr, &factors),
-            Node::Call(function @ (Function::Atan2 | Function::LnOfBoth), arguments) => {
+            Node::Call(function, arguments) if function.arity() > 1 => {
                 let values: Vec<Expr> = arguments.iter().map(|&a| self.split(a).0).collect();
                 self.plain(expr, function, &values)
             }
@@ -136,43 +136,13 @@ impl Splitting<'_> {
         if rest == Graph::ZERO {
             return (expr, Graph::ZERO);
         }
-        let graph = &mut *self.graph;
-        let at_zero = graph.call(function, &[value]);
-        let two = graph.integer(2);
-        match function {
-            Function::Exp | Function::Expm1 => {
-                let factor = graph.call(Function::Exp, &[value]);
-                let relative = graph.call(Function::Expm1, &[rest]);
-                (at_zero, graph.mul(factor, relative))
-            }
-            Function::Ln | Function::Ln1p => {
-                let base =
-                    if function == Function::Ln { value } else { graph.add(Graph::ONE, value) };
-                let ratio = graph.div(rest, base);
-                (at_zero, graph.call(Function::Ln1p, &[ratio]))
-            }
-            Function::Sin | Function::Cos | Function::Sinh | Function::Cosh => {
-                // f(k + r) - f(k) = 2 g(k + r/2) s(r/2)
-                let (outer, inner, sign) = match function {
-                    Function::Sin => (Function::Cos, Function::Sin, 1),
-                    Function::Cos => (Function::Sin, Function::Sin, -1),
-                    Function::Sinh => (Function::Cosh, Function::Sinh, 1),
-                    _ => (Function::Sinh, Function::Sinh, 1),
-                };
-                if value == Graph::ZERO && matches!(function, Function::Sin | Function::Sinh) {
-                    return (Graph::ZERO, graph.call(function, &[rest]));
-                }
-                let half = graph.div(rest, two);
-                let middle = graph.add(value, half);
-                let outer = graph.call(outer, &[middle]);
-                let inner = graph.call(inner, &[half]);
-                let sign = graph.integer(2 * sign);
-                (at_zero, graph.product_of([sign, outer, inner]))
-            }
-            _ if value == Graph::ZERO && at_zero == Graph::ZERO => {
-                (Graph::ZERO, graph.call(function, &[rest]))
-            }
-            _ => self.plain(expr, function, &[value]),
+        let at_zero = self.graph.call(function, &[value]);
+        if value == Graph::ZERO && at_zero == Graph::ZERO {
+            return (Graph::ZERO, self.graph.call(function, &[rest]));
+        }
+        match function.difference() {
+            Some(rule) => (at_zero, rule.with(self.graph, &[value, rest])),
+            None => self.plain(expr, function, &[value]),
         }
     }
 

@@ -15,7 +15,6 @@ pub(crate) use error_bounds::SIDE;
 pub use section::Section;
 
 use crate::graph::NumberMap;
-use crate::log_ratio;
 use crate::{Expr, Function, Graph, Node, Rational, nearest_f64};
 use num_traits::{One, Signed, ToPrimitive, Zero};
 
@@ -386,29 +385,6 @@ fn sin_pi_shifted(x: f64, quarters: i64) -> f64 {
         1 => r.cos(),
         2 => -r.sin(),
         _ => -r.cos(),
-    }
-}
-
-fn call(function: Function, x: f64) -> f64 {
-    match function {
-        Function::Sin => x.sin(),
-        Function::Cos => x.cos(),
-        Function::Tan => x.tan(),
-        Function::Asin => x.asin(),
-        Function::Acos => x.acos(),
-        Function::Atan => x.atan(),
-        Function::Sinh => x.sinh(),
-        Function::Cosh => x.cosh(),
-        Function::Tanh => x.tanh(),
-        Function::Exp => x.exp(),
-        Function::Ln => x.ln(),
-        Function::Ln1p => x.ln_1p(),
-        Function::Expm1 => x.exp_m1(),
-        Function::LogRatioSquared => log_ratio::squared(x),
-        Function::LogRatioSlope => log_ratio::slope(x),
-        Function::LogRatioCurvature => log_ratio::curvature(x),
-        // These have operations of their own.
-        Function::Atan2 | Function::LnOfBoth => f64::NAN,
     }
 }
 

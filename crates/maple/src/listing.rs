@@ -1,7 +1,7 @@
 //! Tokens to assignments.
 
 use crate::token::{Placed, Token, tokens};
-use mmsmith_expr::{Ast, AstKind};
+use mmsmith_expr::{Ast, AstKind, Function};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use thiserror::Error;
@@ -10,25 +10,8 @@ use thiserror::Error;
 const DEEPEST: usize = 100;
 /// The longest listing accepted, in bytes.
 const LONGEST: usize = 1 << 18;
-/// The functions of C that listings may call, with the names that [`mmsmith_expr`] gives them; `pow` is a power.
-const FUNCTIONS: &[(&str, &str, usize)] = &[
-    ("pow", "pow", 2),
-    ("sqrt", "sqrt", 1),
-    ("sin", "sin", 1),
-    ("cos", "cos", 1),
-    ("tan", "tan", 1),
-    ("asin", "arcsin", 1),
-    ("acos", "arccos", 1),
-    ("atan", "arctan", 1),
-    ("atan2", "atan2", 2),
-    ("sinh", "sinh", 1),
-    ("cosh", "cosh", 1),
-    ("tanh", "tanh", 1),
-    ("exp", "exp", 1),
-    ("log", "ln", 1),
-    ("log1p", "log1p", 1),
-    ("expm1", "expm1", 1),
-];
+/// The operations of [`mmsmith_expr`] that are functions in C, with their number of arguments; `pow` is a power.
+const OPERATIONS: [(&str, usize); 2] = [("pow", 2), ("sqrt", 1)];
 /// Words that may stand in front of an assignment.
 const TYPES: [&str; 6] = ["const", "static", "double", "float", "long", "real"];
 
@@ -182,8 +165,17 @@ pub enum Problem {
     Empty,
 }
 
+/// The function that C calls `name`: its name in [`mmsmith_expr`], and its number of arguments.
+fn function(name: &str) -> Option<(&'static str, usize)> {
+    let mut functions = Function::ALL.iter().filter(|function| function.math_h() == Some(name));
+    let operation = OPERATIONS.iter().copied().find(|(operation, _)| *operation == name);
+    operation.or_else(|| functions.next().map(|function| (function.name(), function.arity())))
+}
+
 fn function_names() -> String {
-    FUNCTIONS.iter().map(|(name, ..)| *name).collect::<Vec<_>>().join(", ")
+    let functions = Function::ALL.iter().filter_map(|function| function.math_h());
+    let names = OPERATIONS.iter().map(|(name, _)| *name).chain(functions);
+    names.collect::<Vec<_>>().join(", ")
 }
 
 impl Listing {
@@ -495,7 +487,7 @@ impl Parser<'_> {
     fn call(&mut self) -> Result<Ast, ListingError> {
         let span = self.span();
         let name = self.written().to_owned();
-        let Some(&(_, function, arity)) = FUNCTIONS.iter().find(|(c, ..)| *c == name) else {
+        let Some((function, arity)) = function(&name) else {
             return Err(ListingError { problem: Problem::UnknownFunction { name }, span });
         };
         self.advance();

@@ -1,14 +1,15 @@
 //! Reading of listings: what is accepted, and what each mistake is called.
 #![allow(clippy::unwrap_used)]
 
-use mmsmith_expr::Graph;
+use mmsmith_expr::{Function, Graph};
 use mmsmith_maple::Listing;
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 
 const PRINTED: &str = include_str!("data/expanding-ring-as-printed.c");
 const JOINED: &str = include_str!("data/expanding-ring.c");
-/// Blocks `name | listing | message | marked text`, one a line; `\n` in a listing is a line break.
+/// Blocks `name | listing | message | marked text`, one a line; `\n` in a listing is a line break, and `{functions}` in a
+/// message stands for those of `math.h`.
 const MISTAKES: &str = include_str!("data/mistakes.txt");
 
 fn built(text: &str, target: &str) -> String {
@@ -32,10 +33,12 @@ fn what_is_accepted() {
 
 #[test]
 fn mistakes_are_named_and_placed() {
+    let functions: Vec<&str> = Function::ALL.iter().filter_map(|f| f.math_h()).collect();
     for block in MISTAKES.lines().filter(|line| !line.is_empty()) {
         let [name, text, message, marked] =
             <[&str; 4]>::try_from(block.split(" | ").collect::<Vec<_>>()).unwrap();
         let text = text.replace("\\n", "\n");
+        let message = message.replace("{functions}", &functions.join(", "));
         let error = Listing::parse(&text).expect_err(name);
         assert_eq!(error.to_string(), message, "{name}");
         assert_eq!(&text[error.span], marked.replace("\\n", "\n"), "{name}");

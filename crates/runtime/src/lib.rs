@@ -22,6 +22,8 @@ mod staged;
 
 pub use domain::{Boundary, Condition, Domain, Surface};
 pub use lattice::{BodyForceOnLattice, Lattice, LatticePoints};
+/// Functions that the standard library lacks, which [`Real::apply`] takes.
+pub use libm;
 /// The vectors and matrices of this crate's interface.
 pub use nalgebra;
 pub use parameters::{Description, Parameter, ParameterError};

@@ -15,6 +15,9 @@ pub trait Real: RealField + Copy {
     /// Whether this is a number, though it may be infinite.
     #[must_use]
     fn is_number(self) -> bool;
+    /// The value of a function that has a form for each precision, as those of [`libm`](crate::libm) do.
+    #[must_use]
+    fn apply(self, double: fn(f64) -> f64, single: fn(f32) -> f32) -> Self;
     /// `sin(pi x)`.
     fn sin_pi(self) -> Self;
     /// `cos(pi x)`.
@@ -125,6 +128,11 @@ impl Real for f64 {
     }
 
     #[inline]
+    fn apply(self, double: fn(f64) -> f64, _: fn(f32) -> f32) -> Self {
+        double(self)
+    }
+
+    #[inline]
     fn sin_pi(self) -> Self {
         sin_pi_shifted(self, 0)
     }
@@ -178,6 +186,11 @@ impl Real for f32 {
     #[inline(always)]
     fn is_number(self) -> bool {
         !self.is_nan()
+    }
+
+    #[inline]
+    fn apply(self, _: fn(f64) -> f64, single: fn(f32) -> f32) -> Self {
+        single(self)
     }
 
     #[inline]
@@ -428,6 +441,12 @@ mod tests {
         // 3 x for x near 1e8: what is lost is a whole number of units of the last place of x.
         let x = 123_456_789.123_456_78_f64;
         assert_eq!(3.0.product_error(x), (x.sum_error(2.0 * x)));
+    }
+
+    #[test]
+    fn each_precision_has_its_own_form_of_a_function() {
+        assert_eq!(27_f64.apply(libm::cbrt, |_| f32::NAN), 3.0);
+        assert_eq!(27_f32.apply(|_| f64::NAN, libm::cbrtf), 3.0);
     }
 
     #[test]

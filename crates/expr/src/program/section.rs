@@ -3,7 +3,7 @@
 //! Reading an operation takes longer than doing it for one point; so each is done for a row of points before the next one
 //! is read.
 
-use super::{Operation, Program, Slot, argument, call, sin_pi, sin_pi_shifted};
+use super::{Operation, Program, Slot, argument, sin_pi, sin_pi_shifted};
 use crate::nearest_f64;
 use std::array;
 
@@ -102,7 +102,7 @@ impl Operation {
             }
             Operation::SinPi(a) => of(a).map(sin_pi),
             Operation::CosPi(a) => of(a).map(|a| sin_pi_shifted(a, 1)),
-            Operation::Call(function, a) => of(a).map(|a| call(function, a)),
+            Operation::Call(function, a) => of(a).map(|a| function.double(a)),
             Operation::Atan2(y, x) => each(y, x, f64::atan2),
             Operation::LnOfBoth(x, y) => {
                 each(x, y, |x, y| if x < -0.5 { y.ln() } else { x.ln_1p() })

@@ -1,0 +1,534 @@
+//! The functions of the language, a row each: all that algebra, programs and generated code have to know of one.
+//!
+//! A new function is a row of this table and its value in arbitrary precision, in the crate `mmsmith-oracle`. What a
+//! few functions have beyond their rows stays with the algebra that makes use of it: the sine and the cosine of multiples
+//! of pi, the logarithm and the exponential as inverses, the functions of two arguments as operations of their own.
+
+use crate::{Ast, Expr, Graph, Node, Rational, log_ratio};
+use std::collections::BTreeSet;
+use std::sync::LazyLock;
+
+/// What a function's value does where the sign of its argument changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Parity {
+    Even,
+    Odd,
+    Neither,
+}
+
+/// A function as Rust calls it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RustCall {
+    /// A method of scalars, by its name.
+    Method(&'static str),
+    /// A function of the crate `libm`, by its name for doubles; the one for single precision has an `f` behind it.
+    Library(&'static str),
+}
+
+/// Functions that C lacks, or has with other bits than Rust: a header defines them where it calls them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CSupport {
+    /// Logarithms of sums with one.
+    Logarithm,
+    /// Squared logarithms of ratios.
+    LogRatio,
+}
+
+/// What is known of a function.
+struct Row {
+    /// What text calls it: the name that it is printed with, then other spellings.
+    names: &'static [&'static str],
+    /// What [`Row::differential`] calls the arguments.
+    arguments: &'static [&'static str],
+    /// The change of the value in terms of the arguments and of their changes, each called `d` and the argument's name.
+    differential: &'static str,
+    /// `f(a + b) - f(a)` in terms of `a` and `b`, in a form that keeps the digits of a small `b`; empty where none is known.
+    difference: &'static str,
+    parity: Parity,
+    /// The value where the first argument is zero; empty where text keeps the call.
+    at_zero: &'static str,
+    /// The value in double precision. Functions of two arguments have an operation of their own.
+    double: fn(f64) -> f64,
+    /// The size of the slope, to tell what the rounding of an argument does to the value; none where nothing is said.
+    steepness: Option<fn(f64) -> f64>,
+    rust: RustCall,
+    /// The function of `math.h`, if there is one; listings in C may call it.
+    math_h: Option<&'static str>,
+    /// What a header calls instead of it.
+    own: Option<(&'static str, CSupport)>,
+}
+
+impl Row {
+    /// What most have in common.
+    const ANY: Row = Row {
+        names: &[],
+        arguments: &["x"],
+        differential: "",
+        difference: "",
+        parity: Parity::Neither,
+        at_zero: "",
+        double: |_| f64::NAN,
+        steepness: None,
+        rust: RustCall::Method(""),
+        math_h: None,
+        own: None,
+    };
+}
+
+macro_rules! functions {
+    ($($(#[$about:meta])* $name:ident { $($key:ident: $value:expr,)* })*) => {
+        /// A function of one argument, or of two for [`Function::Atan2`] and [`Function::LnOfBoth`].
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub enum Function {
+            $($(#[$about])* $name,)*
+        }
+
+        impl Function {
+            /// Every function.
+            pub const ALL: &'static [Function] = &[$(Function::$name),*];
+        }
+
+        /// In the order of [`Function::ALL`].
+        const ROWS: &[Row] = &[$(Row { $($key: $value,)* ..Row::ANY }),*];
+    };
+}
+
+functions! {
+    /// Sine.
+    Sin {
+        names: &["sin"],
+        differential: "cos(x)*dx",
+        difference: "2*cos(a + b/2)*sin(b/2)",
+        parity: Parity::Odd,
+        at_zero: "0",
+        double: f64::sin,
+        steepness: Some(|_| 1.0),
+        rust: RustCall::Method("sin"),
+        math_h: Some("sin"),
+    }
+    /// Cosine.
+    Cos {
+        names: &["cos"],
+        differential: "-sin(x)*dx",
+        difference: "-2*sin(a + b/2)*sin(b/2)",
+        parity: Parity::Even,
+        at_zero: "1",
+        double: f64::cos,
+        steepness: Some(|_| 1.0),
+        rust: RustCall::Method("cos"),
+        math_h: Some("cos"),
+    }
+    /// Tangent.
+    Tan {
+        names: &["tan"],
+        differential: "(1 + tan(x)^2)*dx",
+        parity: Parity::Odd,
+        at_zero: "0",
+        double: f64::tan,
+        rust: RustCall::Method("tan"),
+        math_h: Some("tan"),
+    }
+    /// Inverse sine.
+    Asin {
+        names: &["arcsin", "asin"],
+        // The factors of 1 - x^2 are exact next to one.
+        differential: "(1 - x)^(-1/2)*(1 + x)^(-1/2)*dx",
+        parity: Parity::Odd,
+        at_zero: "0",
+        double: f64::asin,
+        rust: RustCall::Method("asin"),
+        math_h: Some("asin"),
+    }
+    /// Inverse cosine.
+    Acos {
+        names: &["arccos", "acos"],
+        differential: "-(1 - x)^(-1/2)*(1 + x)^(-1/2)*dx",
+        double: f64::acos,
+        rust: RustCall::Method("acos"),
+        math_h: Some("acos"),
+    }
+    /// Inverse tangent.
+    Atan {
+        names: &["arctan", "atan"],
+        differential: "dx/(1 + x^2)",
+        parity: Parity::Odd,
+        at_zero: "0",
+        double: f64::atan,
+        rust: RustCall::Method("atan"),
+        math_h: Some("atan"),
+    }
+    /// Hyperbolic sine.
+    Sinh {
+        names: &["sinh"],
+        differential: "cosh(x)*dx",
+        difference: "2*cosh(a + b/2)*sinh(b/2)",
+        parity: Parity::Odd,
+        at_zero: "0",
+        double: f64::sinh,
+        rust: RustCall::Method("sinh"),
+        math_h: Some("sinh"),
+    }
+    /// Hyperbolic cosine.
+    Cosh {
+        names: &["cosh"],
+        differential: "sinh(x)*dx",
+        difference: "2*sinh(a + b/2)*sinh(b/2)",
+        parity: Parity::Even,
+        at_zero: "1",
+        double: f64::cosh,
+        rust: RustCall::Method("cosh"),
+        math_h: Some("cosh"),
+    }
+    /// Hyperbolic tangent.
+    Tanh {
+        names: &["tanh"],
+        // 1 - tanh^2 has no digits left where the tangent is next to one.
+        differential: "cosh(x)^(-2)*dx",
+        parity: Parity::Odd,
+        at_zero: "0",
+        double: f64::tanh,
+        rust: RustCall::Method("tanh"),
+        math_h: Some("tanh"),
+    }
+    /// Exponential.
+    Exp {
+        names: &["exp"],
+        differential: "exp(x)*dx",
+        difference: "exp(a)*expm1(b)",
+        at_zero: "1",
+        double: f64::exp,
+        steepness: Some(f64::exp),
+        rust: RustCall::Method("exp"),
+        math_h: Some("exp"),
+    }
+    /// Natural logarithm.
+    Ln {
+        names: &["ln", "log"],
+        differential: "dx/x",
+        difference: "log1p(b/a)",
+        double: f64::ln,
+        steepness: Some(|x| 1.0 / x.abs()),
+        rust: RustCall::Method("ln"),
+        math_h: Some("log"),
+    }
+    /// `ln(1 + x)`, accurate for small `x`.
+    Ln1p {
+        names: &["log1p"],
+        differential: "dx/(1 + x)",
+        difference: "log1p(b/(1 + a))",
+        at_zero: "0",
+        double: f64::ln_1p,
+        steepness: Some(|x| 1.0 / (1.0 + x).abs()),
+        rust: RustCall::Method("log_1p"),
+        math_h: Some("log1p"),
+        own: Some(("mmsmith_log_1p", CSupport::Logarithm)),
+    }
+    /// `ln(y)` of `y = 1 + x`, given as `(x, y)`: accurate next to one, where `x` has the digits, and next to zero,
+    /// where `y` has them.
+    LnOfBoth {
+        names: &["lnboth"],
+        arguments: &["x", "y"],
+        differential: "dx/y",
+        at_zero: "0",
+        // By the first argument, of which the second is one more.
+        double: f64::ln_1p,
+        steepness: Some(|x| 1.0 / (1.0 + x).abs()),
+        rust: RustCall::Method("ln_of_both"),
+        own: Some(("mmsmith_ln_of_both", CSupport::Logarithm)),
+    }
+    /// `exp(x) - 1`, accurate for small `x`.
+    Expm1 {
+        names: &["expm1"],
+        differential: "exp(x)*dx",
+        difference: "exp(a)*expm1(b)",
+        at_zero: "0",
+        double: f64::exp_m1,
+        rust: RustCall::Method("exp_m1"),
+        math_h: Some("expm1"),
+    }
+    /// `atan2(y, x)`, the polar angle of the point `(x, y)`.
+    Atan2 {
+        names: &["atan2"],
+        arguments: &["y", "x"],
+        differential: "(x*dy - y*dx)/(x^2 + y^2)",
+        rust: RustCall::Method("atan2"),
+        math_h: Some("atan2"),
+    }
+    /// `arcosh(1 + z)^2`: the squared logarithm of `a/b` for `z = (a - b)^2/(2 a b)`, smooth at zero.
+    LogRatioSquared {
+        names: &["lnratio2"],
+        differential: "2*(1 + lnratio2_slope(x))*dx",
+        at_zero: "0",
+        double: log_ratio::squared,
+        rust: RustCall::Method("log_ratio_squared"),
+        own: Some(("mmsmith_log_ratio_squared", CSupport::LogRatio)),
+    }
+    /// Half the slope of [`Function::LogRatioSquared`] less one, `arcosh(1 + z)/sqrt(z (z + 2)) - 1`.
+    LogRatioSlope {
+        names: &["lnratio2_slope"],
+        differential: "lnratio2_curvature(x)*dx",
+        at_zero: "0",
+        double: log_ratio::slope,
+        rust: RustCall::Method("log_ratio_slope"),
+        own: Some(("mmsmith_log_ratio_slope", CSupport::LogRatio)),
+    }
+    /// The derivative of [`Function::LogRatioSlope`].
+    LogRatioCurvature {
+        names: &["lnratio2_curvature"],
+        // From z (z + 2) s' = 1 - (1 + z)(1 + s), differentiated once more.
+        differential: "-(1 + lnratio2_slope(x) + 3*(1 + x)*lnratio2_curvature(x))/(x*(x + 2))*dx",
+        at_zero: "-1/3",
+        double: log_ratio::curvature,
+        rust: RustCall::Method("log_ratio_curvature"),
+        own: Some(("mmsmith_log_ratio_curvature", CSupport::LogRatio)),
+    }
+}
+
+impl Function {
+    /// Every name that text has for a function, with the function: first those that are printed, then other spellings.
+    pub fn names() -> impl Iterator<Item = (&'static str, Function)> {
+        let pairs = || Function::ALL.iter().map(|&function| (function, function.row().names));
+        let own = pairs().filter_map(|(function, names)| Some((*names.first()?, function)));
+        let others = pairs()
+            .flat_map(|(function, names)| names.iter().skip(1).map(move |&name| (name, function)));
+        own.chain(others)
+    }
+
+    /// The function that text calls `name`.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|function| function.row().names.contains(&name))
+    }
+
+    /// The name that text uses for it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        self.row().names.first().copied().unwrap_or("?")
+    }
+
+    /// The number of arguments.
+    #[must_use]
+    pub fn arity(self) -> usize {
+        self.row().arguments.len()
+    }
+
+    /// How generated Rust calls it.
+    #[must_use]
+    pub fn rust(self) -> RustCall {
+        self.row().rust
+    }
+
+    /// The name by which generated C calls it.
+    #[must_use]
+    pub fn c(self) -> &'static str {
+        let row = self.row();
+        row.own.map(|(name, _)| name).or(row.math_h).unwrap_or_default()
+    }
+
+    /// What a header has to define to call it; `None` where `math.h` is enough.
+    #[must_use]
+    pub fn c_support(self) -> Option<CSupport> {
+        self.row().own.map(|(_, support)| support)
+    }
+
+    /// Its name in `math.h`, if it has one.
+    #[must_use]
+    pub fn math_h(self) -> Option<&'static str> {
+        self.row().math_h
+    }
+
+    /// The value in double precision, of the first argument if there are two; not a number where one is not enough.
+    pub(crate) fn double(self, x: f64) -> f64 {
+        (self.row().double)(x)
+    }
+
+    /// The size of the slope at `x`, of the same argument; not a number where the table says nothing of it.
+    pub(crate) fn steepness(self, x: f64) -> f64 {
+        self.row().steepness.map_or(f64::NAN, |steepness| steepness(x))
+    }
+
+    pub(crate) fn parity(self) -> Parity {
+        self.row().parity
+    }
+
+    /// The value where the first argument is zero, if text does not keep the call.
+    pub(crate) fn at_zero(self) -> Option<&'static Rational> {
+        AT_ZERO[self as usize].as_ref()
+    }
+
+    /// The change of the value, in terms of the arguments and of their changes, in this order.
+    pub(crate) fn differential(self) -> &'static Rule {
+        &DIFFERENTIALS[self as usize]
+    }
+
+    /// `f(a + b) - f(a)`, in terms of `a` and `b`, if a form is known that keeps the digits of a small `b`.
+    pub(crate) fn difference(self) -> Option<&'static Rule> {
+        DIFFERENCES[self as usize].as_ref()
+    }
+
+    fn row(self) -> &'static Row {
+        &ROWS[self as usize]
+    }
+}
+
+static AT_ZERO: LazyLock<Vec<Option<Rational>>> = LazyLock::new(|| {
+    let read = |row: &Row| {
+        let rule = (!row.at_zero.is_empty()).then(|| Rule::read(row.at_zero, &[]))?;
+        rule.graph.as_number(rule.root).cloned()
+    };
+    ROWS.iter().map(read).collect()
+});
+
+static DIFFERENTIALS: LazyLock<Vec<Rule>> = LazyLock::new(|| {
+    let read = |row: &Row| {
+        let changes = row.arguments.iter().map(|name| format!("d{name}"));
+        let names: Vec<String> = row.arguments.iter().map(|&n| n.into()).chain(changes).collect();
+        Rule::read(row.differential, &names)
+    };
+    ROWS.iter().map(read).collect()
+});
+
+static DIFFERENCES: LazyLock<Vec<Option<Rule>>> = LazyLock::new(|| {
+    let names = ["a", "b"].map(str::to_owned);
+    let read = |row: &Row| (!row.difference.is_empty()).then(|| Rule::read(row.difference, &names));
+    ROWS.iter().map(read).collect()
+});
+
+/// An expression with places to fill in, of a graph of its own.
+#[derive(Debug)]
+pub(crate) struct Rule {
+    graph: Graph,
+    root: Expr,
+    /// What stands for each place.
+    places: Vec<Expr>,
+    mentioned: BTreeSet<Expr>,
+}
+
+impl Rule {
+    /// A text of the table.
+    fn read(text: &str, names: &[String]) -> Self {
+        let mut graph = Graph::new();
+        let places: Vec<Expr> = names.iter().map(|name| graph.symbol(name)).collect();
+        let ast = Ast::parse(text).unwrap_or_else(|error| panic!("{text}: {error}"));
+        let place = |name: &str| names.iter().position(|known| known == name);
+        let root = graph.build(&ast, &mut |_, name| {
+            place(name)
+                .map(|index| places[index])
+                .ok_or_else(|| format!("no place is called {name}"))
+        });
+        let root = root.unwrap_or_else(|error| panic!("{text}: {error}"));
+        let mentioned = graph.symbols_in(&[root]);
+        Rule { graph, root, places, mentioned }
+    }
+
+    /// Whether it depends on what fills the place of this number.
+    pub(crate) fn mentions(&self, place: usize) -> bool {
+        self.mentioned.contains(&self.places[place])
+    }
+
+    /// With `values` in the places.
+    pub(crate) fn with(&self, graph: &mut Graph, values: &[Expr]) -> Expr {
+        self.part(graph, self.root, values)
+    }
+
+    fn part(&self, graph: &mut Graph, expr: Expr, values: &[Expr]) -> Expr {
+        let mut part = |inner: Expr| self.part(graph, inner, values);
+        match self.graph.node(expr) {
+            Node::Number(value) => graph.number(value.clone()),
+            Node::Pi => graph.pi(),
+            // Symbols are numbered in the order in which they were made.
+            Node::Symbol(place) => values[*place as usize],
+            Node::Sum { constant, terms } => {
+                let parts: Vec<_> = terms.iter().map(|(e, c)| (c.clone(), part(*e))).collect();
+                let constant = (constant.clone(), Graph::ONE);
+                graph.sum(std::iter::once(constant).chain(parts))
+            }
+            Node::Product(factors) => {
+                let parts: Vec<_> = factors.iter().map(|(e, n)| (part(*e), n.clone())).collect();
+                graph.product(parts)
+            }
+            Node::Call(function, arguments) => {
+                let parts: Vec<Expr> = arguments.iter().map(|&e| part(e)).collect();
+                graph.call(*function, &parts)
+            }
+            Node::Whole(inner) => {
+                let inner = part(*inner);
+                graph.whole(inner)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Dependence, Program};
+
+    /// The value of an expression of symbols.
+    fn value(graph: &mut Graph, expr: Expr, inputs: &[(Expr, f64)]) -> f64 {
+        let symbols: Vec<_> = inputs.iter().map(|&(e, _)| (e, Dependence::default())).collect();
+        let values: Vec<f64> = inputs.iter().map(|&(_, value)| value).collect();
+        Program::lower(graph, &symbols, &[], &[expr]).evaluate(&values)[0]
+    }
+
+    fn near(found: f64, expected: f64, error: f64) -> bool {
+        (found - expected).abs() <= error * (1.0 + expected.abs())
+    }
+
+    #[test]
+    fn names_lead_to_their_functions_and_no_name_to_two() {
+        let mut seen = BTreeSet::new();
+        for (name, function) in Function::names() {
+            assert!(seen.insert(name), "{name} twice");
+            assert_eq!(Function::from_name(name), Some(function));
+            assert!(!function.c().is_empty(), "{name} in C");
+        }
+        for &function in Function::ALL {
+            assert_eq!(Function::from_name(function.name()), Some(function));
+        }
+        assert_eq!(Function::from_name("log"), Some(Function::Ln));
+        assert_eq!(Function::from_name(""), None);
+    }
+
+    /// What rows say of a sign, of zero, of slopes and of differences is what their values in double precision do.
+    #[test]
+    fn rows_agree_with_their_values() {
+        // Those of two arguments have operations of their own, which other tests compare.
+        for &function in Function::ALL.iter().filter(|function| function.arity() == 1) {
+            let (name, f) = (function.name(), |x: f64| function.double(x));
+            for x in [0.1, 0.3, 0.6, 0.9] {
+                assert!(f(x).is_finite(), "{name} at {x}");
+                match function.parity() {
+                    Parity::Odd => assert_eq!(f(-x), -f(x), "{name} at {x}"),
+                    Parity::Even => assert_eq!(f(-x), f(x), "{name} at {x}"),
+                    Parity::Neither => assert!(f(-x).abs() != f(x).abs(), "{name} at {x}"),
+                }
+                let slope = (f(x + 1e-5) - f(x - 1e-5)) / 2e-5;
+                let mut graph = Graph::new();
+                let places = ["x", "dx"].map(|place| graph.symbol(place));
+                let change = function.differential().with(&mut graph, &places);
+                let found = value(&mut graph, change, &[(places[0], x), (places[1], 2.0)]);
+                assert!(near(found, 2.0 * slope, 1e-8), "{name} at {x}: {found}, {slope}");
+                // That of a bounded slope may be its bound.
+                let steepness = function.steepness(x);
+                let told =
+                    steepness >= slope.abs() * (1.0 - 1e-8) && steepness <= slope.abs() + 1.0;
+                assert!(steepness.is_nan() || told, "{name} at {x}: {steepness}, {slope}");
+                let Some(rule) = function.difference() else { continue };
+                let mut graph = Graph::new();
+                let places = ["a", "b"].map(|place| graph.symbol(place));
+                let difference = rule.with(&mut graph, &places);
+                for b in [0.05, -0.02] {
+                    let found = value(&mut graph, difference, &[(places[0], x), (places[1], b)]);
+                    assert!(near(found, f(x + b) - f(x), 1e-14), "{name} from {x} by {b}: {found}");
+                }
+                // Its digits are those of the small part.
+                let found = value(&mut graph, difference, &[(places[0], x), (places[1], 1e-30)]);
+                assert!((found / (1e-30 * slope) - 1.0).abs() < 1e-8, "{name} at {x}: {found:e}");
+            }
+            if let Some(at_zero) = function.at_zero() {
+                assert_eq!(f(0.0), crate::nearest_f64(at_zero), "{name} at zero");
+            }
+        }
+    }
+}
