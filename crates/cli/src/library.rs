@@ -52,7 +52,7 @@ impl Origin {
         matches!(self, Self::BuiltIn(_))
     }
 
-    /// How the fields are evaluated: `generated` code, or the specification `interpreted`. The two differ in last bits.
+    /// How the fields are evaluated: `generated` code, or the specification `interpreted`. Both have the same bits.
     pub(crate) fn evaluation(&self) -> &'static str {
         if self.is_generated() { "generated" } else { "interpreted" }
     }
@@ -317,7 +317,7 @@ impl Selection {
         }
     }
 
-    /// How its fields are evaluated: `generated` code, or the specification `interpreted`. The two differ in last bits.
+    /// How its fields are evaluated: `generated` code, or the specification `interpreted`. Both have the same bits.
     pub(crate) fn evaluation(&self) -> &'static str {
         match &self.source {
             Source::Library(_) => "generated",

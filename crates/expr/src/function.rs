@@ -4,7 +4,8 @@
 //! few functions have beyond their rows stays with the algebra that makes use of it: the sine and the cosine of multiples
 //! of pi, the logarithm and the exponential as inverses, the functions of two arguments as operations of their own.
 
-use crate::{Ast, Expr, Graph, Node, Rational, log_ratio};
+use crate::{Ast, Expr, Graph, Node, Rational};
+use mmsmith_scalar_functions::ScalarFunctions;
 use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
@@ -49,6 +50,8 @@ struct Row {
     at_zero: &'static str,
     /// The value in double precision. Functions of two arguments have an operation of their own.
     double: fn(f64) -> f64,
+    /// The value in single precision.
+    single: fn(f32) -> f32,
     /// The size of the slope, to tell what the rounding of an argument does to the value; none where nothing is said.
     steepness: Option<fn(f64) -> f64>,
     rust: RustCall,
@@ -68,6 +71,7 @@ impl Row {
         parity: Parity::Neither,
         at_zero: "",
         double: |_| f64::NAN,
+        single: |_| f32::NAN,
         steepness: None,
         rust: RustCall::Method(""),
         math_h: None,
@@ -102,6 +106,7 @@ functions! {
         parity: Parity::Odd,
         at_zero: "0",
         double: f64::sin,
+        single: f32::sin,
         steepness: Some(|_| 1.0),
         rust: RustCall::Method("sin"),
         math_h: Some("sin"),
@@ -114,6 +119,7 @@ functions! {
         parity: Parity::Even,
         at_zero: "1",
         double: f64::cos,
+        single: f32::cos,
         steepness: Some(|_| 1.0),
         rust: RustCall::Method("cos"),
         math_h: Some("cos"),
@@ -125,6 +131,7 @@ functions! {
         parity: Parity::Odd,
         at_zero: "0",
         double: f64::tan,
+        single: f32::tan,
         rust: RustCall::Method("tan"),
         math_h: Some("tan"),
     }
@@ -136,6 +143,7 @@ functions! {
         parity: Parity::Odd,
         at_zero: "0",
         double: f64::asin,
+        single: f32::asin,
         rust: RustCall::Method("asin"),
         math_h: Some("asin"),
     }
@@ -144,6 +152,7 @@ functions! {
         names: &["arccos", "acos"],
         differential: "-(1 - x)^(-1/2)*(1 + x)^(-1/2)*dx",
         double: f64::acos,
+        single: f32::acos,
         rust: RustCall::Method("acos"),
         math_h: Some("acos"),
     }
@@ -154,6 +163,7 @@ functions! {
         parity: Parity::Odd,
         at_zero: "0",
         double: f64::atan,
+        single: f32::atan,
         rust: RustCall::Method("atan"),
         math_h: Some("atan"),
     }
@@ -165,6 +175,7 @@ functions! {
         parity: Parity::Odd,
         at_zero: "0",
         double: f64::sinh,
+        single: f32::sinh,
         rust: RustCall::Method("sinh"),
         math_h: Some("sinh"),
     }
@@ -176,6 +187,7 @@ functions! {
         parity: Parity::Even,
         at_zero: "1",
         double: f64::cosh,
+        single: f32::cosh,
         rust: RustCall::Method("cosh"),
         math_h: Some("cosh"),
     }
@@ -187,6 +199,7 @@ functions! {
         parity: Parity::Odd,
         at_zero: "0",
         double: f64::tanh,
+        single: f32::tanh,
         rust: RustCall::Method("tanh"),
         math_h: Some("tanh"),
     }
@@ -197,6 +210,7 @@ functions! {
         difference: "exp(a)*expm1(b)",
         at_zero: "1",
         double: f64::exp,
+        single: f32::exp,
         steepness: Some(f64::exp),
         rust: RustCall::Method("exp"),
         math_h: Some("exp"),
@@ -207,6 +221,7 @@ functions! {
         differential: "dx/x",
         difference: "log1p(b/a)",
         double: f64::ln,
+        single: f32::ln,
         steepness: Some(|x| 1.0 / x.abs()),
         rust: RustCall::Method("ln"),
         math_h: Some("log"),
@@ -217,7 +232,8 @@ functions! {
         differential: "dx/(1 + x)",
         difference: "log1p(b/(1 + a))",
         at_zero: "0",
-        double: f64::ln_1p,
+        double: ScalarFunctions::log_1p,
+        single: ScalarFunctions::log_1p,
         steepness: Some(|x| 1.0 / (1.0 + x).abs()),
         rust: RustCall::Method("log_1p"),
         math_h: Some("log1p"),
@@ -231,7 +247,8 @@ functions! {
         differential: "dx/y",
         at_zero: "0",
         // By the first argument, of which the second is one more.
-        double: f64::ln_1p,
+        double: ScalarFunctions::log_1p,
+        single: ScalarFunctions::log_1p,
         steepness: Some(|x| 1.0 / (1.0 + x).abs()),
         rust: RustCall::Method("ln_of_both"),
         own: Some(("mmsmith_ln_of_both", CSupport::Logarithm)),
@@ -243,6 +260,7 @@ functions! {
         difference: "exp(a)*expm1(b)",
         at_zero: "0",
         double: f64::exp_m1,
+        single: f32::exp_m1,
         rust: RustCall::Method("exp_m1"),
         math_h: Some("expm1"),
     }
@@ -259,7 +277,8 @@ functions! {
         names: &["lnratio2"],
         differential: "2*(1 + lnratio2_slope(x))*dx",
         at_zero: "0",
-        double: log_ratio::squared,
+        double: ScalarFunctions::log_ratio_squared,
+        single: ScalarFunctions::log_ratio_squared,
         rust: RustCall::Method("log_ratio_squared"),
         own: Some(("mmsmith_log_ratio_squared", CSupport::LogRatio)),
     }
@@ -268,7 +287,8 @@ functions! {
         names: &["lnratio2_slope"],
         differential: "lnratio2_curvature(x)*dx",
         at_zero: "0",
-        double: log_ratio::slope,
+        double: ScalarFunctions::log_ratio_slope,
+        single: ScalarFunctions::log_ratio_slope,
         rust: RustCall::Method("log_ratio_slope"),
         own: Some(("mmsmith_log_ratio_slope", CSupport::LogRatio)),
     }
@@ -278,7 +298,8 @@ functions! {
         // From z (z + 2) s' = 1 - (1 + z)(1 + s), differentiated once more.
         differential: "-(1 + lnratio2_slope(x) + 3*(1 + x)*lnratio2_curvature(x))/(x*(x + 2))*dx",
         at_zero: "-1/3",
-        double: log_ratio::curvature,
+        double: ScalarFunctions::log_ratio_curvature,
+        single: ScalarFunctions::log_ratio_curvature,
         rust: RustCall::Method("log_ratio_curvature"),
         own: Some(("mmsmith_log_ratio_curvature", CSupport::LogRatio)),
     }
@@ -340,6 +361,11 @@ impl Function {
     /// The value in double precision, of the first argument if there are two; not a number where one is not enough.
     pub(crate) fn double(self, x: f64) -> f64 {
         (self.row().double)(x)
+    }
+
+    /// The value in single precision, as [`Function::double`].
+    pub(crate) fn single(self, x: f32) -> f32 {
+        (self.row().single)(x)
     }
 
     /// The size of the slope at `x`, of the same argument; not a number where the table says nothing of it.

@@ -41,7 +41,6 @@ mod function;
 mod gather;
 mod graph;
 mod keep;
-mod log_ratio;
 mod near_zero;
 mod parse;
 mod print;
@@ -63,7 +62,8 @@ pub use graph::{Expr, Graph, Node};
 pub use keep::MOST_KEPT_OF_STATES;
 pub use parse::{Ast, AstKind, ParseError};
 pub use program::{
-    Dependence, Drafts, Operation, OperationCount, OperationsByStage, Program, Section, Slot,
+    Dependence, Drafts, Operation, OperationCount, OperationsByStage, Program, Scalar, Section,
+    Slot,
 };
 pub use rational::{Rational, nearest_f64};
 pub use replacement::Replacement;

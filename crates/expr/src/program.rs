@@ -7,11 +7,13 @@
 
 mod argument;
 mod error_bounds;
+mod scalar;
 mod section;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use error_bounds::SIDE;
+pub use scalar::Scalar;
 pub use section::Section;
 
 use crate::graph::NumberMap;
@@ -350,41 +352,25 @@ impl Program {
         stages.time.cost() + stages.point.cost() + stages.both.cost()
     }
 
-    /// The outputs at the given input values, in double precision.
+    /// The outputs at the given input values, in the precision of these: the bits of generated code.
     ///
     /// An input that is not given counts as not-a-number.
     #[must_use]
-    pub fn evaluate(&self, inputs: &[f64]) -> Vec<f64> {
+    pub fn evaluate<T: Scalar>(&self, inputs: &[T]) -> Vec<T> {
         let values = self.values(inputs.as_chunks::<1>().0);
         self.outputs.iter().map(|slot| values[slot.index()][0]).collect()
     }
 
     /// The value of every operation at `N` places, which are given by the values of each input there.
-    pub(crate) fn values<const N: usize>(&self, inputs: &[[f64; N]]) -> Vec<[f64; N]> {
+    pub(crate) fn values<T: Scalar, const N: usize>(&self, inputs: &[[T; N]]) -> Vec<[T; N]> {
         let mut values = Vec::with_capacity(self.operations.len());
         for (operation, &number) in self.operations.iter().zip(&self.numbers) {
             values.push(match operation {
-                Operation::Number(_) => [number; N],
+                Operation::Number(_) => [T::rounded(number); N],
                 _ => operation.row(inputs, &values),
             });
         }
         values
-    }
-}
-
-fn sin_pi(x: f64) -> f64 {
-    sin_pi_shifted(x, 0)
-}
-
-/// `sin(pi (x + quarters/2))`, the argument reduced exactly before it is multiplied by pi.
-fn sin_pi_shifted(x: f64, quarters: i64) -> f64 {
-    let n = (2.0 * x).round();
-    let r = (x - n / 2.0) * std::f64::consts::PI;
-    match (n.rem_euclid(4.0) as i64 + quarters).rem_euclid(4) {
-        0 => r.sin(),
-        1 => r.cos(),
-        2 => -r.sin(),
-        _ => -r.cos(),
     }
 }
 

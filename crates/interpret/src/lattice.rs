@@ -1,5 +1,6 @@
 //! The body force at the points of a lattice, from values of its layers.
 
+use crate::Interpretable;
 use crate::staged::{Row, Stage, coordinate};
 use mmsmith_expr::{Program, Slot};
 use mmsmith_runtime::nalgebra::SVector;
@@ -38,33 +39,28 @@ impl LatticeStages {
     }
 
     /// At the points of a lattice.
-    pub(crate) fn at<'a, const D: usize>(
+    pub(crate) fn at<'a, T: Interpretable, const D: usize>(
         &'a self,
-        lattice: Lattice<f64, D>,
-        parameters: &'a [f64],
-        solution: &'a dyn Solution<f64, D>,
-    ) -> LatticePoints<'a, D> {
+        lattice: Lattice<T, D>,
+        parameters: &'a [T],
+        solution: &'a dyn Solution<T, D>,
+    ) -> LatticePoints<'a, T, D> {
         LatticePoints { stages: self, lattice, parameters, solution }
     }
 }
 
 /// The points of a lattice, by their layers.
-pub(crate) struct LatticePoints<'a, const D: usize> {
+pub(crate) struct LatticePoints<'a, T: Interpretable, const D: usize> {
     stages: &'a LatticeStages,
-    lattice: Lattice<f64, D>,
-    parameters: &'a [f64],
+    lattice: Lattice<T, D>,
+    parameters: &'a [T],
     /// For points where the values of layers lead to no number.
-    solution: &'a dyn Solution<f64, D>,
+    solution: &'a dyn Solution<T, D>,
 }
 
-impl<const D: usize> LatticePoints<'_, D> {
+impl<T: Interpretable, const D: usize> LatticePoints<'_, T, D> {
     /// The body force of the points that `number` tells for each place in `b`, from the values of a time.
-    fn of_numbers(
-        &self,
-        values: &[f64],
-        b: &mut [SVector<f64, D>],
-        number: impl Fn(usize) -> usize,
-    ) {
+    fn of_numbers(&self, values: &[T], b: &mut [SVector<T, D>], number: impl Fn(usize) -> usize) {
         let LatticeStages { layers, points } = self.stages;
         // First the time, then the values of the layers, axis by axis and layer by layer, then what all points share.
         let Some((&t, mut rest)) = values.split_first() else {
@@ -86,7 +82,7 @@ impl<const D: usize> LatticePoints<'_, D> {
             let number = |i: usize| number(chunk * BLOCK + i);
             for &(&LayerStage { axis, count, .. }, table) in &tables {
                 let first = given.len();
-                given.resize(first + count, [0.0; BLOCK]);
+                given.resize(first + count, [T::zero(); BLOCK]);
                 for i in 0..b.len() {
                     let layer = usize::from(self.lattice.layers()[number(i)][axis]);
                     let values = &table[layer * count..(layer + 1) * count];
@@ -97,7 +93,7 @@ impl<const D: usize> LatticePoints<'_, D> {
                 b.iter_mut().zip(row).for_each(|(b, value)| b[d] = *value);
             }
             for (i, b) in b.iter_mut().enumerate() {
-                if b.iter().any(|value| value.is_nan()) {
+                if b.iter().any(|value| !value.is_number()) {
                     *b = self.solution.body_force(&self.lattice.point(number(i)), t);
                 }
             }
@@ -105,34 +101,34 @@ impl<const D: usize> LatticePoints<'_, D> {
     }
 }
 
-impl<const D: usize> BodyForceAtPoints<f64, D> for LatticePoints<'_, D> {
-    fn evaluate(&self, t: f64, first: usize, b: &mut [SVector<f64, D>]) {
+impl<T: Interpretable, const D: usize> BodyForceAtPoints<T, D> for LatticePoints<'_, T, D> {
+    fn evaluate(&self, t: T, first: usize, b: &mut [SVector<T, D>]) {
         let mut values = Vec::new();
         self.of_time(t, &mut values);
         self.of_numbers(&values, b, |n| first + n);
     }
 
-    fn of_time(&self, t: f64, values: &mut Vec<f64>) {
+    fn of_time(&self, t: T, values: &mut Vec<T>) {
         let LatticeStages { layers, points } = self.stages;
         values.push(t);
         let mut rows = Vec::new();
         for LayerStage { axis, count, stage } in layers {
-            let uniform = stage.uniform::<D>(t, self.parameters);
+            let uniform = stage.uniform::<T, D>(t, self.parameters);
             for coordinates in self.lattice.coordinates(*axis).chunks(BLOCK) {
-                let mut row: Row = [0.0; BLOCK];
+                let mut row: Row<T> = [T::zero(); BLOCK];
                 row[..coordinates.len()].copy_from_slice(coordinates);
                 let first = values.len();
-                values.resize(first + coordinates.len() * count, 0.0);
+                values.resize(first + coordinates.len() * count, T::zero());
                 for (m, row) in stage.section.run(&uniform, &[row], &mut rows).enumerate() {
                     let places = values[first..].iter_mut().skip(m).step_by(*count);
                     places.zip(row).for_each(|(place, value)| *place = *value);
                 }
             }
         }
-        values.extend(points.uniform::<D>(t, self.parameters));
+        values.extend(points.uniform::<T, D>(t, self.parameters));
     }
 
-    fn evaluate_of(&self, time: &[f64], points: &[u32], b: &mut [SVector<f64, D>]) {
+    fn evaluate_of(&self, time: &[T], points: &[u32], b: &mut [SVector<T, D>]) {
         assert_eq!(points.len(), b.len(), "one body force a point");
         self.of_numbers(time, b, |n| points[n] as usize);
     }

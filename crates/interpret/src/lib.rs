@@ -1,23 +1,22 @@
 //! Manufactured solutions evaluated straight from their specifications, without generated code.
 //!
 //! [`interpret`] turns a specification into the same interface that [generated solutions](mmsmith_runtime) have, so that a file can
-//! be checked before anything is generated from it. It evaluates the straight-line programs that the generator
-//! translates, in double precision, and in the same stages; for work on many points the generated code is still faster.
+//! be checked before anything is generated from it. It evaluates the straight-line program that the generator
+//! translates, in the same stages, to the same bits in both precisions; for work on many points the generated code is
+//! faster.
 
 mod lattice;
-mod rounded;
 mod staged;
 
 use lattice::LatticeStages;
-use mmsmith_expr::{Program, Slot};
+use mmsmith_expr::{Program, Scalar, Slot};
 use mmsmith_runtime::nalgebra::{SMatrix, SVector};
 use mmsmith_runtime::{
     AnySolution, BodyForceAtPoints, Boundary, Condition, Domain, Fields, Lattice, Material,
-    ParameterError, Solution, StateAtPoints, Surface,
+    ParameterError, Real, Solution, StateAtPoints, Surface,
 };
 use mmsmith_spec::{self as spec, DeriveError, Spec};
 use mmsmith_stage::{FieldName, Measures, Sides, Staged};
-use rounded::Rounded;
 use staged::PointStages;
 use thiserror::Error;
 
@@ -58,21 +57,7 @@ pub fn interpret_fields<'a>(
     in_double(spec, fields, resolve(spec, overrides)?)
 }
 
-/// Not generic, so that [`Interpreted`] is compiled in this crate, and not in each that calls it.
-fn in_double(
-    spec: &Spec,
-    fields: spec::Fields,
-    values: Vec<f64>,
-) -> Result<AnySolution<f64>, InterpretError> {
-    Ok(match spec.dimension {
-        1 => AnySolution::One(Box::new(Interpreted::<1>::new(spec, fields, values)?)),
-        2 => AnySolution::Two(Box::new(Interpreted::<2>::new(spec, fields, values)?)),
-        _ => AnySolution::Three(Box::new(Interpreted::<3>::new(spec, fields, values)?)),
-    })
-}
-
-/// As [`interpret_fields`], for solvers in single precision: all is evaluated in double precision, and the results are
-/// rounded.
+/// As [`interpret_fields`], for solvers in single precision: all is evaluated in it, as generated code does.
 ///
 /// # Errors
 ///
@@ -85,24 +70,42 @@ pub fn interpret_fields_single<'a>(
     in_single(spec, fields, resolve(spec, overrides)?)
 }
 
+/// Not generic, so that [`Interpreted`] is compiled in this crate, and not in each that calls it.
+fn in_double(
+    spec: &Spec,
+    fields: spec::Fields,
+    values: Vec<f64>,
+) -> Result<AnySolution<f64>, InterpretError> {
+    build(spec, fields, values)
+}
+
 /// Not generic, as [`in_double`].
 fn in_single(
     spec: &Spec,
     fields: spec::Fields,
     values: Vec<f64>,
 ) -> Result<AnySolution<f32>, InterpretError> {
+    build(spec, fields, values)
+}
+
+/// The solution at admissible values of the parameters, in the precision that these are rounded to.
+fn build<T: Interpretable>(
+    spec: &Spec,
+    fields: spec::Fields,
+    values: Vec<f64>,
+) -> Result<AnySolution<T>, InterpretError> {
+    let values: Vec<T> = values.into_iter().map(T::nearest).collect();
     Ok(match spec.dimension {
-        1 => AnySolution::One(Box::new(Rounded {
-            exact: Interpreted::<1>::new(spec, fields, values)?,
-        })),
-        2 => AnySolution::Two(Box::new(Rounded {
-            exact: Interpreted::<2>::new(spec, fields, values)?,
-        })),
-        _ => AnySolution::Three(Box::new(Rounded {
-            exact: Interpreted::<3>::new(spec, fields, values)?,
-        })),
+        1 => AnySolution::One(Box::new(Interpreted::<T, 1>::new(spec, fields, values)?)),
+        2 => AnySolution::Two(Box::new(Interpreted::<T, 2>::new(spec, fields, values)?)),
+        _ => AnySolution::Three(Box::new(Interpreted::<T, 3>::new(spec, fields, values)?)),
     })
 }
+
+/// A precision in which solutions are interpreted: `f32` or `f64`.
+pub(crate) trait Interpretable: Real + Scalar {}
+
+impl<T: Real + Scalar> Interpretable for T {}
 
 fn resolve<'a>(
     spec: &Spec,
@@ -134,8 +137,8 @@ fn resolve<'a>(
 }
 
 /// The programs of one solution, with the values of its parameters.
-struct Interpreted<const D: usize> {
-    parameters: Vec<f64>,
+struct Interpreted<T: Interpretable, const D: usize> {
+    parameters: Vec<T>,
     displacement: Program,
     velocity: Program,
     acceleration: Program,
@@ -151,34 +154,30 @@ struct Interpreted<const D: usize> {
     lattice_stages: Option<LatticeStages>,
     /// Of `u`, `F` and `P`, and of `v`.
     state_stages: PointStages<2>,
-    domain: Domain<f64, D>,
+    domain: Domain<T, D>,
     boundaries: Vec<Boundary>,
-    cell_length: f64,
-    material: Material<f64>,
-    density: f64,
-    wave_speed: f64,
-    period: f64,
+    cell_length: T,
+    material: Material<T>,
+    density: T,
+    wave_speed: T,
+    period: T,
 }
 
-impl<const D: usize> Interpreted<D> {
-    fn new(
-        spec: &Spec,
-        fields: spec::Fields,
-        parameters: Vec<f64>,
-    ) -> Result<Self, InterpretError> {
+impl<T: Interpretable, const D: usize> Interpreted<T, D> {
+    fn new(spec: &Spec, fields: spec::Fields, parameters: Vec<T>) -> Result<Self, InterpretError> {
         let staged = Staged::of(spec, fields);
         let program = staged.program();
         let part = |slots: &[Slot]| program.part(slots);
-        let at_parameters = inputs::<D>(&SVector::zeros(), 0.0, &parameters);
+        let at_parameters = inputs::<T, D>(&SVector::zeros(), T::zero(), &parameters);
         let constants = |slots: &[Slot]| part(slots).evaluate(&at_parameters);
         let constant = |slot: Slot| constants(&[slot])[0];
         for (requirement, &Sides { left, right }) in
             spec.requirements.iter().zip(&staged.requirements)
         {
-            if !requirement.relation.holds(constant(left), constant(right)) {
+            if !requirement.relation.holds(constant(left).to_f64(), constant(right).to_f64()) {
                 let pairs = spec.parameters.iter().zip(&parameters);
                 let values: Vec<String> =
-                    pairs.map(|(p, value)| format!("{} = {value:?}", p.name)).collect();
+                    pairs.map(|(p, value)| format!("{} = {:?}", p.name, value.to_f64())).collect();
                 return Err(InterpretError::Parameter(ParameterError::Requirement {
                     solution: spec.name.clone(),
                     requirement: requirement.text.clone(),
@@ -195,7 +194,7 @@ impl<const D: usize> Interpreted<D> {
                 Domain::Annulus { inner: constant(inner), outer: constant(outer) }
             }
         };
-        let of_material: Vec<f64> =
+        let of_material: Vec<T> =
             staged.constants.material.iter().map(|&(_, slot)| constant(slot)).collect();
         let field = |name: FieldName| part(staged.field(name));
         Ok(Interpreted {
@@ -230,17 +229,17 @@ impl<const D: usize> Interpreted<D> {
         })
     }
 
-    fn vector(&self, program: &Program, X: &SVector<f64, D>, t: f64) -> SVector<f64, D> {
+    fn vector(&self, program: &Program, X: &SVector<T, D>, t: T) -> SVector<T, D> {
         SVector::from_row_slice(&program.evaluate(&inputs(X, t, &self.parameters)))
     }
 
-    fn matrix(&self, program: &Program, X: &SVector<f64, D>, t: f64) -> SMatrix<f64, D, D> {
+    fn matrix(&self, program: &Program, X: &SVector<T, D>, t: T) -> SMatrix<T, D, D> {
         SMatrix::from_row_slice(&program.evaluate(&inputs(X, t, &self.parameters)))
     }
 }
 
 /// Coordinates, time and parameters, in the order of the programs' inputs.
-fn inputs<const D: usize>(X: &SVector<f64, D>, t: f64, parameters: &[f64]) -> Vec<f64> {
+fn inputs<T: Interpretable, const D: usize>(X: &SVector<T, D>, t: T, parameters: &[T]) -> Vec<T> {
     X.iter().copied().chain([t]).chain(parameters.iter().copied()).collect()
 }
 
@@ -264,40 +263,40 @@ fn surface(surface: spec::Surface) -> Surface {
     }
 }
 
-impl<const D: usize> Solution<f64, D> for Interpreted<D> {
-    fn displacement(&self, X: &SVector<f64, D>, t: f64) -> SVector<f64, D> {
+impl<T: Interpretable, const D: usize> Solution<T, D> for Interpreted<T, D> {
+    fn displacement(&self, X: &SVector<T, D>, t: T) -> SVector<T, D> {
         self.vector(&self.displacement, X, t)
     }
 
-    fn velocity(&self, X: &SVector<f64, D>, t: f64) -> SVector<f64, D> {
+    fn velocity(&self, X: &SVector<T, D>, t: T) -> SVector<T, D> {
         self.vector(&self.velocity, X, t)
     }
 
-    fn acceleration(&self, X: &SVector<f64, D>, t: f64) -> SVector<f64, D> {
+    fn acceleration(&self, X: &SVector<T, D>, t: T) -> SVector<T, D> {
         self.vector(&self.acceleration, X, t)
     }
 
-    fn displacement_gradient(&self, X: &SVector<f64, D>, t: f64) -> SMatrix<f64, D, D> {
+    fn displacement_gradient(&self, X: &SVector<T, D>, t: T) -> SMatrix<T, D, D> {
         self.matrix(&self.displacement_gradient, X, t)
     }
 
-    fn deformation_gradient(&self, X: &SVector<f64, D>, t: f64) -> SMatrix<f64, D, D> {
+    fn deformation_gradient(&self, X: &SVector<T, D>, t: T) -> SMatrix<T, D, D> {
         self.matrix(&self.deformation_gradient, X, t)
     }
 
-    fn jacobian(&self, X: &SVector<f64, D>, t: f64) -> f64 {
+    fn jacobian(&self, X: &SVector<T, D>, t: T) -> T {
         self.jacobian.evaluate(&inputs(X, t, &self.parameters))[0]
     }
 
-    fn first_piola_kirchhoff(&self, X: &SVector<f64, D>, t: f64) -> SMatrix<f64, D, D> {
+    fn first_piola_kirchhoff(&self, X: &SVector<T, D>, t: T) -> SMatrix<T, D, D> {
         self.matrix(&self.first_piola_kirchhoff, X, t)
     }
 
-    fn body_force(&self, X: &SVector<f64, D>, t: f64) -> SVector<f64, D> {
+    fn body_force(&self, X: &SVector<T, D>, t: T) -> SVector<T, D> {
         self.vector(&self.body_force, X, t)
     }
 
-    fn body_force_at(&self, X: &[SVector<f64, D>]) -> Box<dyn BodyForceAtPoints<f64, D> + '_> {
+    fn body_force_at(&self, X: &[SVector<T, D>]) -> Box<dyn BodyForceAtPoints<T, D> + '_> {
         if let Some(stages) = &self.lattice_stages
             && let Some(lattice) = Lattice::of(X)
         {
@@ -306,16 +305,16 @@ impl<const D: usize> Solution<f64, D> for Interpreted<D> {
         Box::new(self.body_force_stages.at(X, &self.parameters))
     }
 
-    fn state_at(&self, X: &[SVector<f64, D>]) -> Box<dyn StateAtPoints<f64, D> + '_> {
+    fn state_at(&self, X: &[SVector<T, D>]) -> Box<dyn StateAtPoints<T, D> + '_> {
         Box::new(self.state_stages.at(X, &self.parameters))
     }
 
-    fn traction(&self, surface: Surface, X: &SVector<f64, D>, t: f64) -> Option<SVector<f64, D>> {
+    fn traction(&self, surface: Surface, X: &SVector<T, D>, t: T) -> Option<SVector<T, D>> {
         let (_, program) = self.tractions.iter().find(|(known, _)| *known == surface)?;
         Some(self.vector(program, X, t))
     }
 
-    fn fields(&self, X: &SVector<f64, D>, t: f64) -> Fields<f64, D> {
+    fn fields(&self, X: &SVector<T, D>, t: T) -> Fields<T, D> {
         Fields {
             u: self.displacement(X, t),
             v: self.velocity(X, t),
@@ -328,12 +327,12 @@ impl<const D: usize> Solution<f64, D> for Interpreted<D> {
         }
     }
 
-    fn strain_energy(&self, X: &SVector<f64, D>, t: f64) -> Option<f64> {
+    fn strain_energy(&self, X: &SVector<T, D>, t: T) -> Option<T> {
         let energy = self.strain_energy.as_ref()?;
         energy.evaluate(&inputs(X, t, &self.parameters)).first().copied()
     }
 
-    fn domain(&self) -> Domain<f64, D> {
+    fn domain(&self) -> Domain<T, D> {
         self.domain.clone()
     }
 
@@ -341,28 +340,28 @@ impl<const D: usize> Solution<f64, D> for Interpreted<D> {
         &self.boundaries
     }
 
-    fn cell_length(&self) -> f64 {
+    fn cell_length(&self) -> T {
         self.cell_length
     }
 
-    fn material(&self) -> Material<f64> {
+    fn material(&self) -> Material<T> {
         self.material
     }
 
-    fn density(&self) -> f64 {
+    fn density(&self) -> T {
         self.density
     }
 
-    fn wave_speed(&self) -> f64 {
+    fn wave_speed(&self) -> T {
         self.wave_speed
     }
 
-    fn period(&self) -> f64 {
+    fn period(&self) -> T {
         self.period
     }
 }
 
-fn material(material: &spec::Material, constants: &[f64]) -> Material<f64> {
+fn material<T: Interpretable>(material: &spec::Material, constants: &[T]) -> Material<T> {
     match (material, constants) {
         (spec::Material::NeoHookean { .. }, &[lambda, mu]) => Material::NeoHookean { lambda, mu },
         (spec::Material::StVenantKirchhoff { .. }, &[lambda, mu]) => {

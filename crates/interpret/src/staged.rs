@@ -1,13 +1,13 @@
 //! The body force, and what a simulation is compared with, at points that stay.
 
-use crate::inputs;
+use crate::{Interpretable, inputs};
 use mmsmith_expr::{Operation, Program, Section, Slot};
 use mmsmith_runtime::nalgebra::SVector;
 use mmsmith_runtime::{BLOCK, BodyForceAtPoints, StateAtPoints, StateRun};
 use mmsmith_stage::Stages;
 
 /// One number for each point of a block.
-pub(crate) type Row = [f64; BLOCK];
+pub(crate) type Row<T> = [T; BLOCK];
 
 /// A section with the program of what is the same at all points.
 pub(crate) struct Stage {
@@ -21,9 +21,13 @@ impl Stage {
         Stage { section, uniform }
     }
 
-    pub(crate) fn uniform<const D: usize>(&self, t: f64, parameters: &[f64]) -> Vec<f64> {
+    pub(crate) fn uniform<T: Interpretable, const D: usize>(
+        &self,
+        t: T,
+        parameters: &[T],
+    ) -> Vec<T> {
         // These values read no position.
-        self.uniform.evaluate(&inputs::<D>(&SVector::zeros(), t, parameters))
+        self.uniform.evaluate(&inputs::<T, D>(&SVector::zeros(), t, parameters))
     }
 }
 
@@ -58,19 +62,19 @@ impl<const N: usize> PointStages<N> {
     }
 
     /// With what is kept of the points `X`.
-    pub(crate) fn at<'a, const D: usize>(
+    pub(crate) fn at<'a, T: Interpretable, const D: usize>(
         &'a self,
-        X: &[SVector<f64, D>],
-        parameters: &'a [f64],
-    ) -> Points<'a, N> {
-        let uniform = self.at_points.uniform::<D>(f64::NAN, parameters);
+        X: &[SVector<T, D>],
+        parameters: &'a [T],
+    ) -> Points<'a, T, N> {
+        let uniform = self.at_points.uniform::<T, D>(T::rounded(f64::NAN), parameters);
         let mut rows = Vec::new();
         let mut blocks = Vec::with_capacity(X.len().div_ceil(BLOCK) * self.kept);
         for X in X.chunks(BLOCK) {
             // What a last block has to spare repeats its last point.
             let coordinate =
-                |axis: usize| -> Row { std::array::from_fn(|n| X[n.min(X.len() - 1)][axis]) };
-            let given: Vec<Row> = self.axes.iter().map(|&axis| coordinate(axis)).collect();
+                |axis: usize| -> Row<T> { std::array::from_fn(|n| X[n.min(X.len() - 1)][axis]) };
+            let given: Vec<Row<T>> = self.axes.iter().map(|&axis| coordinate(axis)).collect();
             blocks.extend(self.at_points.section.run(&uniform, &given, &mut rows));
         }
         Points { stages: self, parameters, blocks, len: X.len() }
@@ -78,43 +82,43 @@ impl<const N: usize> PointStages<N> {
 }
 
 /// What is kept of points.
-pub(crate) struct Points<'a, const N: usize> {
+pub(crate) struct Points<'a, T, const N: usize> {
     stages: &'a PointStages<N>,
-    parameters: &'a [f64],
+    parameters: &'a [T],
     /// Value `m` of point `n BLOCK + i` is number `i` of row `n kept + m`.
-    blocks: Vec<Row>,
+    blocks: Vec<Row<T>>,
     len: usize,
 }
 
-impl<const N: usize> Points<'_, N> {
+impl<T: Interpretable, const N: usize> Points<'_, T, N> {
     /// The rows of a block.
-    fn block(&self, number: usize) -> &[Row] {
+    fn block(&self, number: usize) -> &[Row<T>] {
         let kept = self.stages.kept;
         &self.blocks[number * kept..(number + 1) * kept]
     }
 
     fn bytes(&self) -> usize {
-        self.stages.kept * size_of::<f64>()
+        self.stages.kept * size_of::<T>()
     }
 }
 
-impl<const D: usize> BodyForceAtPoints<f64, D> for Points<'_, 1> {
-    fn evaluate(&self, t: f64, first: usize, b: &mut [SVector<f64, D>]) {
+impl<T: Interpretable, const D: usize> BodyForceAtPoints<T, D> for Points<'_, T, 1> {
+    fn evaluate(&self, t: T, first: usize, b: &mut [SVector<T, D>]) {
         assert!(
             first.checked_add(b.len()).is_some_and(|end| end <= self.len),
             "{} points from number {first} on were asked for; there are {}",
             b.len(),
             self.len
         );
-        let time = self.stages.at_times[0].uniform::<D>(t, self.parameters);
+        let time = self.stages.at_times[0].uniform::<T, D>(t, self.parameters);
         self.of_numbers(&time, b, |n| first + n);
     }
 
-    fn of_time(&self, t: f64, values: &mut Vec<f64>) {
-        values.extend(self.stages.at_times[0].uniform::<D>(t, self.parameters));
+    fn of_time(&self, t: T, values: &mut Vec<T>) {
+        values.extend(self.stages.at_times[0].uniform::<T, D>(t, self.parameters));
     }
 
-    fn evaluate_of(&self, time: &[f64], points: &[u32], b: &mut [SVector<f64, D>]) {
+    fn evaluate_of(&self, time: &[T], points: &[u32], b: &mut [SVector<T, D>]) {
         assert_eq!(points.len(), b.len(), "one body force a point");
         if let Some(&n) = points.iter().find(|&&n| n as usize >= self.len) {
             panic!("point {n} was asked for; there are {}", self.len);
@@ -131,17 +135,17 @@ impl<const D: usize> BodyForceAtPoints<f64, D> for Points<'_, 1> {
     }
 }
 
-impl Points<'_, 1> {
+impl<T: Interpretable> Points<'_, T, 1> {
     /// The body force of the points that `number` tells for each place in `b`.
     fn of_numbers<const D: usize>(
         &self,
-        uniform: &[f64],
-        b: &mut [SVector<f64, D>],
+        uniform: &[T],
+        b: &mut [SVector<T, D>],
         number: impl Fn(usize) -> usize,
     ) {
         let [stage] = &self.stages.at_times;
         let mut rows = Vec::new();
-        let mut given = vec![[0.0; BLOCK]; self.stages.kept];
+        let mut given = vec![[T::zero(); BLOCK]; self.stages.kept];
         for (chunk, b) in b.chunks_mut(BLOCK).enumerate() {
             for i in 0..b.len() {
                 let n = number(chunk * BLOCK + i);
@@ -156,11 +160,11 @@ impl Points<'_, 1> {
 }
 
 /// The first group is `u`, `F` and `P`, the second `v`.
-impl<const D: usize> StateAtPoints<f64, D> for Points<'_, 2> {
-    fn evaluate(&self, t: f64, velocity_time: f64, first: usize, runs: &mut [StateRun<f64, D>]) {
+impl<T: Interpretable, const D: usize> StateAtPoints<T, D> for Points<'_, T, 2> {
+    fn evaluate(&self, t: T, velocity_time: T, first: usize, runs: &mut [StateRun<T, D>]) {
         let [state, velocity] = &self.stages.at_times;
-        let uniform = state.uniform::<D>(t, self.parameters);
-        let of_velocity = velocity.uniform::<D>(velocity_time, self.parameters);
+        let uniform = state.uniform::<T, D>(t, self.parameters);
+        let of_velocity = velocity.uniform::<T, D>(velocity_time, self.parameters);
         let mut rows = Vec::new();
         for (number, run) in (first..).zip(runs) {
             assert!(number * BLOCK < self.len, "there are {} points", self.len);

@@ -24,6 +24,8 @@ pub use domain::{Boundary, Condition, Domain, Surface};
 pub use lattice::{BodyForceOnLattice, Lattice, LatticePoints};
 /// Functions that the standard library lacks, which [`Real::apply`] takes.
 pub use libm;
+/// The functions that [`Real`] has beyond those of a field.
+pub use mmsmith_scalar_functions::ScalarFunctions;
 /// The vectors and matrices of this crate's interface.
 pub use nalgebra;
 pub use parameters::{Description, Parameter, ParameterError};

@@ -3,7 +3,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use mmsmith_interpret::interpret;
+use mmsmith_interpret::{interpret, interpret_fields_single};
 use mmsmith_solutions::nalgebra::SVector;
 use mmsmith_solutions::{
     AnySolution, BLOCK, CATALOGUE, Description, Precision, Real, Solution, State, StateRun, build,
@@ -249,6 +249,85 @@ fn interpreted() {
         let spec = Spec::parse(specification, name).unwrap();
         let exact = build::<f64>(name, &[]).unwrap().unwrap();
         compare_both(name, interpret(&spec, []).unwrap(), exact);
+    }
+}
+
+/// Every value that a solution gives at points and times, as bits.
+fn all_bits<T: Real, const D: usize>(solution: &dyn Solution<T, D>) -> Vec<(String, Vec<u64>)> {
+    let bits = |values: &[T]| values.iter().map(|x| x.to_f64().to_bits()).collect::<Vec<_>>();
+    let mut all = vec![
+        ("wave speed".to_owned(), bits(&[solution.wave_speed()])),
+        ("period".to_owned(), bits(&[solution.period()])),
+        ("density".to_owned(), bits(&[solution.density()])),
+        ("cell length".to_owned(), bits(&[solution.cell_length()])),
+    ];
+    let period = solution.period().to_f64();
+    for t in [0.0, 0.3217, 1.0, 12.4, 1e6].map(|turns| T::nearest(turns * period)) {
+        for X in points::<T, D>(5 * BLOCK) {
+            let at = |letter: &str| format!("{letter} at {X}, t = {t}");
+            let fields = solution.fields(&X, t);
+            all.extend([
+                (at("u"), bits(solution.displacement(&X, t).as_slice())),
+                (at("v"), bits(solution.velocity(&X, t).as_slice())),
+                (at("a"), bits(solution.acceleration(&X, t).as_slice())),
+                (at("H"), bits(solution.displacement_gradient(&X, t).as_slice())),
+                (at("F"), bits(solution.deformation_gradient(&X, t).as_slice())),
+                (at("J"), bits(&[solution.jacobian(&X, t)])),
+                (at("P"), bits(solution.first_piola_kirchhoff(&X, t).as_slice())),
+                (at("b"), bits(solution.body_force(&X, t).as_slice())),
+                (at("b of all"), bits(fields.b.as_slice())),
+                (at("P of all"), bits(fields.P.as_slice())),
+                (at("W"), bits(&solution.strain_energy(&X, t).into_iter().collect::<Vec<_>>())),
+            ]);
+            for boundary in solution.boundaries() {
+                let traction = solution.traction(boundary.surface, &X, t);
+                let traction: Vec<T> = traction.iter().flatten().copied().collect();
+                all.push((at(&format!("traction on {:?}", boundary.surface)), bits(&traction)));
+            }
+        }
+        for (way, X) in [("points", points::<T, D>(7 * BLOCK + 3)), ("lattice", lattice())] {
+            let mut b = vec![SVector::zeros(); X.len()];
+            solution.body_force_at(&X).evaluate(t, 0, &mut b);
+            let b: Vec<T> = b.iter().flatten().copied().collect();
+            all.push((format!("b of {way}, t = {t}"), bits(&b)));
+        }
+        let X = points::<T, D>(BLOCK);
+        let mut run = [StateRun::zero()];
+        solution.state_at(&X).evaluate(t, t, 0, &mut run);
+        all.push((format!("u, t = {t}"), bits(run[0].u.as_flattened())));
+        all.push((format!("v, t = {t}"), bits(run[0].v.as_flattened())));
+        all.push((format!("F, t = {t}"), bits(run[0].F.as_flattened().as_flattened())));
+        all.push((format!("P, t = {t}"), bits(run[0].P.as_flattened().as_flattened())));
+    }
+    all
+}
+
+fn bits_of<T: Real>(solution: &AnySolution<T>) -> Vec<(String, Vec<u64>)> {
+    match solution {
+        AnySolution::One(solution) => all_bits(&**solution),
+        AnySolution::Two(solution) => all_bits(&**solution),
+        AnySolution::Three(solution) => all_bits(&**solution),
+        _ => panic!("an unknown dimension"),
+    }
+}
+
+/// One pipeline makes both, and both call the same functions.
+#[test]
+fn generated_and_interpreted_have_the_same_bits() {
+    fn compare(name: &str, generated: &[(String, Vec<u64>)], interpreted: &[(String, Vec<u64>)]) {
+        assert_eq!(generated.len(), interpreted.len());
+        for ((what, generated), (_, interpreted)) in generated.iter().zip(interpreted) {
+            assert_eq!(generated, interpreted, "{name}: {what}");
+        }
+    }
+    for Description { name, specification, .. } in CATALOGUE {
+        let spec = Spec::parse(specification, name).unwrap();
+        let generated = bits_of(&build::<f64>(name, &[]).unwrap().unwrap());
+        compare(name, &generated, &bits_of(&interpret(&spec, []).unwrap()));
+        let generated = bits_of(&build::<f32>(name, &[]).unwrap().unwrap());
+        let fields = spec.derive().unwrap();
+        let interpreted = interpret_fields_single(&spec, fields, []).unwrap();
+        compare(name, &generated, &bits_of(&interpreted));
     }
 }
 

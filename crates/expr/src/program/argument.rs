@@ -181,25 +181,6 @@ fn is_power_of_two(number: &Rational) -> bool {
     single(number.numer()) && single(number.denom())
 }
 
-/// `a + b` less its rounded value, exactly (D. E. Knuth, The Art of Computer Programming, vol. 2, 4.2.2).
-pub(super) fn sum_error(a: f64, b: f64) -> f64 {
-    let sum = a + b;
-    let b_in_sum = sum - a;
-    (a - (sum - b_in_sum)) + (b - b_in_sum)
-}
-
-/// `a b` less its rounded value, exactly up to sizes of 1e300 (T. J. Dekker, Numer. Math. 18, 1971).
-pub(super) fn product_error(a: f64, b: f64) -> f64 {
-    let split = |x: f64| {
-        let scaled = x * 134_217_729.0;
-        let high = scaled - (scaled - x);
-        (high, x - high)
-    };
-    let ((a_high, a_low), (b_high, b_low)) = (split(a), split(b));
-    let product = a * b;
-    (((a_high * b_high - product) + a_high * b_low) + a_low * b_high) + a_low * b_low
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

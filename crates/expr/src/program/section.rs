@@ -3,7 +3,7 @@
 //! Reading an operation takes longer than doing it for one point; so each is done for a row of points before the next one
 //! is read.
 
-use super::{Operation, Program, Slot, argument, sin_pi, sin_pi_shifted};
+use super::{Operation, Program, Scalar, Slot};
 use crate::nearest_f64;
 use std::array;
 
@@ -60,12 +60,12 @@ impl Section {
     /// # Panics
     ///
     /// Panics where there are not as many values as the section takes.
-    pub fn run<'a, const N: usize>(
+    pub fn run<'a, T: Scalar, const N: usize>(
         &self,
-        uniform: &[f64],
-        given: &[[f64; N]],
-        rows: &'a mut Vec<[f64; N]>,
-    ) -> impl Iterator<Item = &'a [f64; N]> {
+        uniform: &[T],
+        given: &[[T; N]],
+        rows: &'a mut Vec<[T; N]>,
+    ) -> impl Iterator<Item = &'a [T; N]> + use<'a, T, N> {
         assert_eq!((uniform.len(), given.len()), (self.uniform, self.given), "values of a section");
         rows.clear();
         rows.extend(uniform.iter().map(|&value| [value; N]));
@@ -73,42 +73,44 @@ impl Section {
         for operation in &self.operations {
             rows.push(operation.row(&[], rows));
         }
-        let rows: &'a [[f64; N]] = rows;
+        let rows: &'a [[T; N]] = rows;
         self.outputs.clone().into_iter().map(move |place| &rows[place])
     }
 }
 
 impl Operation {
     /// The values at `N` places, where `inputs` has those of the inputs and `rows` those of the operands.
-    pub(super) fn row<const N: usize>(&self, inputs: &[[f64; N]], rows: &[[f64; N]]) -> [f64; N] {
+    pub(super) fn row<T: Scalar, const N: usize>(
+        &self,
+        inputs: &[[T; N]],
+        rows: &[[T; N]],
+    ) -> [T; N] {
         let of = |slot: Slot| rows[slot.index()];
-        let each = |a: Slot, b: Slot, value: fn(f64, f64) -> f64| -> [f64; N] {
+        let each = |a: Slot, b: Slot, value: fn(T, T) -> T| -> [T; N] {
             let (a, b) = (of(a), of(b));
             array::from_fn(|n| value(a[n], b[n]))
         };
         match *self {
-            Operation::Number(ref value) => [nearest_f64(value); N],
-            Operation::Pi => [std::f64::consts::PI; N],
-            Operation::Input(index) => inputs.get(index).copied().unwrap_or([f64::NAN; N]),
+            Operation::Number(ref value) => [T::rounded(nearest_f64(value)); N],
+            Operation::Pi => [T::rounded(std::f64::consts::PI); N],
+            Operation::Input(index) => inputs.get(index).copied().unwrap_or([T::nan(); N]),
             Operation::Add(a, b) => each(a, b, |a, b| a + b),
             Operation::Sub(a, b) => each(a, b, |a, b| a - b),
             Operation::Mul(a, b) => each(a, b, |a, b| a * b),
             Operation::Div(a, b) => each(a, b, |a, b| a / b),
             Operation::Neg(a) => of(a).map(|a| -a),
-            Operation::Sqrt(a) => of(a).map(f64::sqrt),
+            Operation::Sqrt(a) => of(a).map(T::sqrt),
             Operation::Power(a, ref exponent) => {
-                let exponent = nearest_f64(exponent);
+                let exponent = T::rounded(nearest_f64(exponent));
                 of(a).map(|a| a.powf(exponent))
             }
-            Operation::SinPi(a) => of(a).map(sin_pi),
-            Operation::CosPi(a) => of(a).map(|a| sin_pi_shifted(a, 1)),
-            Operation::Call(function, a) => of(a).map(|a| function.double(a)),
-            Operation::Atan2(y, x) => each(y, x, f64::atan2),
-            Operation::LnOfBoth(x, y) => {
-                each(x, y, |x, y| if x < -0.5 { y.ln() } else { x.ln_1p() })
-            }
-            Operation::SumError(a, b) => each(a, b, argument::sum_error),
-            Operation::ProductError(a, b) => each(a, b, argument::product_error),
+            Operation::SinPi(a) => of(a).map(T::sin_pi),
+            Operation::CosPi(a) => of(a).map(T::cos_pi),
+            Operation::Call(function, a) => of(a).map(|a| T::call(function, a)),
+            Operation::Atan2(y, x) => each(y, x, T::atan2),
+            Operation::LnOfBoth(x, y) => each(x, y, T::ln_of_both),
+            Operation::SumError(a, b) => each(a, b, T::sum_error),
+            Operation::ProductError(a, b) => each(a, b, T::product_error),
         }
     }
 }

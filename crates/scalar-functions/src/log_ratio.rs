@@ -4,45 +4,54 @@
 //! `theta/sinh(theta) = (1 - y) sum_k y^k/(2k + 1)`, so that
 //! `theta/sinh(theta) - 1 = -sum_(k>=1) 2 y^k/(4k^2 - 1)`: all terms have one sign, and none is large where `z` is small.
 
-/// The series serves up to here; beyond, little cancels in the closed form.
+use num_traits::Float;
+
+/// The series in `y = z/(z + 2)` serves up to here; beyond, little cancels in the closed form.
 const LARGEST_IN_SERIES: f64 = 0.25;
-/// As many terms leave out less than half a unit in the last place at [`LARGEST_IN_SERIES`].
+/// As many terms leave out less than half a unit in the last place of a double there.
 const TERMS: u32 = 24;
 
-/// `arcosh(1 + z)`.
-fn logarithm(z: f64) -> f64 {
-    (z + (z * (z + 2.0)).sqrt()).ln_1p()
+/// The nearest value of the type; both types have one for every double.
+fn number<T: Float>(value: f64) -> T {
+    T::from(value).unwrap_or_else(T::nan)
 }
 
-pub(crate) fn squared(z: f64) -> f64 {
+/// `arcosh(1 + z)`.
+fn logarithm<T: Float>(z: T) -> T {
+    (z + (z * (z + number(2.0))).sqrt()).ln_1p()
+}
+
+pub(crate) fn squared<T: Float>(z: T) -> T {
     let theta = logarithm(z);
     theta * theta
 }
 
 /// `theta/sinh(theta) - 1`.
-pub(crate) fn slope(z: f64) -> f64 {
-    let y = z / (z + 2.0);
-    if y > LARGEST_IN_SERIES {
-        return logarithm(z) / (z * (z + 2.0)).sqrt() - 1.0;
+pub(crate) fn slope<T: Float>(z: T) -> T {
+    let two = number(2.0);
+    let y = z / (z + two);
+    if y > number(LARGEST_IN_SERIES) {
+        return logarithm(z) / (z * (z + two)).sqrt() - T::one();
     }
-    let sum = (1..=TERMS).rev().fold(0.0, |sum, k| {
+    let sum = (1..=TERMS).rev().fold(T::zero(), |sum, k| {
         let k = f64::from(k);
-        sum * y + 2.0 / (4.0 * k * k - 1.0)
+        sum * y + number(2.0 / (4.0 * k * k - 1.0))
     });
     -sum * y
 }
 
 /// The derivative of [`slope`], with `dy/dz = (1 - y)^2/2`.
-pub(crate) fn curvature(z: f64) -> f64 {
-    let y = z / (z + 2.0);
-    if y > LARGEST_IN_SERIES {
-        return -(z + (1.0 + z) * slope(z)) / (z * (z + 2.0));
+pub(crate) fn curvature<T: Float>(z: T) -> T {
+    let (one, two) = (T::one(), number(2.0));
+    let y = z / (z + two);
+    if y > number(LARGEST_IN_SERIES) {
+        return -(z + (one + z) * slope(z)) / (z * (z + two));
     }
-    let sum = (1..=TERMS).rev().fold(0.0, |sum, k| {
+    let sum = (1..=TERMS).rev().fold(T::zero(), |sum, k| {
         let k = f64::from(k);
-        sum * y + k / (4.0 * k * k - 1.0)
+        sum * y + number(k / (4.0 * k * k - 1.0))
     });
-    -sum * ((1.0 - y) * (1.0 - y))
+    -sum * ((one - y) * (one - y))
 }
 
 #[cfg(test)]

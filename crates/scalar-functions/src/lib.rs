@@ -1,0 +1,399 @@
+//! Functions of scalars that the language of specifications has and the standard library lacks, or has with other bits on other
+//! machines.
+//!
+//! Generated code calls them, and so does the evaluation of programs without it: both give the same bits.
+
+mod log_ratio;
+
+use std::ops::{Add, Sub};
+
+/// The functions, for both precisions.
+pub trait ScalarFunctions: Copy + Add<Output = Self> + Sub<Output = Self> {
+    /// `sin(pi x)`.
+    ///
+    /// The argument is reduced *before* it is multiplied by pi, which is exact, so that `sin_pi(1)` is zero and a phase of a
+    /// million periods loses no digits to the rounding of pi.
+    #[must_use]
+    fn sin_pi(self) -> Self;
+
+    /// `cos(pi x)`, as [`sin_pi`](Self::sin_pi).
+    #[must_use]
+    fn cos_pi(self) -> Self;
+
+    /// `ln(1 + x)`, within one unit in the last place.
+    ///
+    /// Unlike `ln_1p` it is no call into the system's library: loops over many points use vector instructions, and
+    /// all processors give the same bits.
+    #[must_use]
+    fn log_1p(self) -> Self;
+
+    /// `ln(y)` of `y = 1 + x`, where `x` is `self`: by `y` where `x < -1/2`, else by `x`.
+    ///
+    /// A ratio of volumes next to one has its digits in `x`, one next to zero, as a product of stretches, in `y`. Within
+    /// one and a half units in the last place, and without a call, as [`log_1p`](Self::log_1p).
+    #[must_use]
+    fn ln_of_both(self, y: Self) -> Self;
+
+    /// [`ln_of_both`](Self::ln_of_both) to the last bit, in half as many operations, where `x` is at least -1/2 and below one;
+    /// not a number elsewhere.
+    #[must_use]
+    fn ln_near_one(self) -> Self;
+
+    /// [`ln_near_one`](Self::ln_near_one) if `NEAR`, else [`ln_of_both`](Self::ln_of_both).
+    #[inline(always)]
+    #[must_use]
+    fn ln_of_both_if<const NEAR: bool>(self, y: Self) -> Self {
+        if NEAR { self.ln_near_one() } else { self.ln_of_both(y) }
+    }
+
+    /// What rounding takes from a sum: `self + other` less its rounded value, exactly (D. E. Knuth, The Art of Computer
+    /// Programming, vol. 2, 4.2.2).
+    #[inline]
+    #[must_use]
+    fn sum_error(self, other: Self) -> Self {
+        let sum = self + other;
+        let other_in_sum = sum - self;
+        (self - (sum - other_in_sum)) + (other - other_in_sum)
+    }
+
+    /// What rounding takes from a product: `self * other` less its rounded value, exactly while both and the product are
+    /// below 1e300 and what is lost is not below the normal numbers (T. J. Dekker, Numer. Math. 18, 1971).
+    #[must_use]
+    fn product_error(self, other: Self) -> Self;
+
+    /// `arcosh(1 + z)^2`: the squared logarithm of the ratio of two stretches `a`, `b` for `z = (a - b)^2/(2 a b)`.
+    #[must_use]
+    fn log_ratio_squared(self) -> Self;
+
+    /// `theta/sinh(theta) - 1` for `theta = arcosh(1 + z)`, half the derivative of
+    /// [`log_ratio_squared`](Self::log_ratio_squared) less one.
+    #[must_use]
+    fn log_ratio_slope(self) -> Self;
+
+    /// The derivative of [`log_ratio_slope`](Self::log_ratio_slope).
+    #[must_use]
+    fn log_ratio_curvature(self) -> Self;
+}
+
+impl ScalarFunctions for f64 {
+    #[inline]
+    fn sin_pi(self) -> Self {
+        sin_pi_shifted(self, 0)
+    }
+
+    #[inline]
+    fn cos_pi(self) -> Self {
+        sin_pi_shifted(self, 1)
+    }
+
+    #[inline(always)]
+    fn log_1p(self) -> Self {
+        logarithm(self, self, false)
+    }
+
+    #[inline(always)]
+    fn ln_of_both(self, y: Self) -> Self {
+        logarithm(self, y, self < -0.5)
+    }
+
+    #[inline(always)]
+    fn ln_near_one(self) -> Self {
+        let (half_square, tail) = parts_of_logarithm(self);
+        if is_near_one(self) { self - (half_square - tail) } else { f64::NAN }
+    }
+
+    #[inline]
+    fn product_error(self, other: Self) -> Self {
+        // Halves of 26 bits, whose products are exact.
+        let split = |x: f64| {
+            let scaled = x * 134_217_729.0;
+            let high = scaled - (scaled - x);
+            (high, x - high)
+        };
+        let ((a_high, a_low), (b_high, b_low)) = (split(self), split(other));
+        let product = self * other;
+        (((a_high * b_high - product) + a_high * b_low) + a_low * b_high) + a_low * b_low
+    }
+
+    fn log_ratio_squared(self) -> Self {
+        log_ratio::squared(self)
+    }
+
+    fn log_ratio_slope(self) -> Self {
+        log_ratio::slope(self)
+    }
+
+    fn log_ratio_curvature(self) -> Self {
+        log_ratio::curvature(self)
+    }
+}
+
+impl ScalarFunctions for f32 {
+    #[inline]
+    fn sin_pi(self) -> Self {
+        sin_pi_shifted(f64::from(self), 0) as f32
+    }
+
+    #[inline]
+    fn cos_pi(self) -> Self {
+        sin_pi_shifted(f64::from(self), 1) as f32
+    }
+
+    #[inline(always)]
+    fn log_1p(self) -> Self {
+        f64::from(self).log_1p() as f32
+    }
+
+    #[inline(always)]
+    fn ln_of_both(self, y: Self) -> Self {
+        f64::from(self).ln_of_both(f64::from(y)) as f32
+    }
+
+    #[inline(always)]
+    fn ln_near_one(self) -> Self {
+        f64::from(self).ln_near_one() as f32
+    }
+
+    #[inline]
+    fn product_error(self, other: Self) -> Self {
+        // The product of two of them is exact in double precision.
+        (f64::from(self) * f64::from(other) - f64::from(self * other)) as f32
+    }
+
+    fn log_ratio_squared(self) -> Self {
+        log_ratio::squared(self)
+    }
+
+    fn log_ratio_slope(self) -> Self {
+        log_ratio::slope(self)
+    }
+
+    fn log_ratio_curvature(self) -> Self {
+        log_ratio::curvature(self)
+    }
+}
+
+/// `sin(pi (x + quarters/2))`, within one unit in the last place.
+///
+/// Sums and products only, the same on every processor.
+#[inline]
+fn sin_pi_shifted(x: f64, quarters: u64) -> f64 {
+    // x = n/2 + r with |r| <= 1/4; n and r are exact. Adding one and a half times 2^51, from where on doubles are
+    // multiples of 1/2, rounds; the last two bits of the sum are those of n.
+    const SHIFT: f64 = 1.5 * 2_251_799_813_685_248.0;
+    let (nearest, quadrant) = if x.abs() < SHIFT / 3.0 {
+        let shifted = x + SHIFT;
+        (shifted - SHIFT, shifted.to_bits())
+    } else {
+        // Very large or not a number; both are rare.
+        let n = (2.0 * x).round();
+        (0.5 * n, n.rem_euclid(4.0) as u64)
+    };
+    let r = x - nearest;
+    let quadrant = quadrant.wrapping_add(quarters);
+    let value = if quadrant & 1 == 0 { sine(r) } else { cosine(r) };
+    if quadrant & 2 == 0 { value } else { -value }
+}
+
+/// `sin(pi x)` for `|x| <= 1/4`: the minimax polynomial of Sun's fdlibm for the sine, with the powers of pi in its
+/// coefficients.
+#[inline]
+fn sine(x: f64) -> f64 {
+    let z = x * x;
+    let square = z * z;
+    let low = -5.167_712_780_049_968_5 + z * 2.550_164_039_874_027;
+    let middle = -5.992_645_289_761_195e-1 + z * 8.214_587_016_569_905e-2;
+    let high = -7.370_034_319_852_937e-3 + z * 4.615_949_610_094_388e-4;
+    x * (std::f64::consts::PI + z * (low + square * (middle + square * high)))
+}
+
+/// `cos(pi x)` for `|x| <= 1/4`, as the sine.
+#[inline]
+fn cosine(x: f64) -> f64 {
+    let z = x * x;
+    let square = z * z;
+    let low = 4.058_712_126_416_762 + z * -1.335_262_768_853_168_6;
+    let middle = 2.353_306_302_439_816_5e-1 + z * -2.580_688_682_692_376_7e-2;
+    let high = 1.929_478_760_777_114_4e-3 + z * -1.036_246_495_865_416_4e-4;
+    (1.0 - 4.934_802_200_544_679 * z) + square * (low + square * (middle + square * high))
+}
+
+/// `ln(y)` where `by_y`, else `ln(1 + x)`, without branches. Reduced as in Sun's fdlibm, `s_log1p.c`, but for arguments near
+/// one, which are taken as they are.
+#[inline(always)]
+fn logarithm(x: f64, y: f64, by_y: bool) -> f64 {
+    const ONE: u64 = 0x3ff0_0000_0000_0000;
+    /// The bits of sqrt(1/2), to 32 bits.
+    const ROOT_HALF: u64 = 0x3fe6_a09e_0000_0000;
+    /// 2^52 as a double; with a whole number in its last bits it is 2^52 plus that number.
+    const WHOLE: u64 = 0x4330_0000_0000_0000;
+    /// 2^52 + 1023.
+    const WHOLE_ONE: f64 = 4_503_599_627_370_496.0 + 1023.0;
+    const LN2_HIGH: f64 = 6.931_471_803_691_238e-1;
+    const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
+    /// Smaller ones are multiplied by 2^54, so that their scale is a number.
+    const TINY: f64 = 1e-290;
+    const TWO_TO_54: f64 = 18_014_398_509_481_984.0;
+
+    let sum = 1.0 + x;
+    // What rounding took from the sum.
+    let lost = x - (sum - 1.0);
+    let (u, lost) = if by_y { (y, 0.0) } else { (sum, lost) };
+    let (normal, bias) = if u < TINY { (u * TWO_TO_54, WHOLE_ONE + 54.0) } else { (u, WHOLE_ONE) };
+    // u = 2^k m with m between sqrt(1/2) and sqrt(2).
+    let exponent = normal.to_bits().wrapping_add(ONE - ROOT_HALF) >> 52;
+    let k = f64::from_bits(exponent | WHOLE) - bias;
+    // 2^(2 - k), which is a normal number for the largest k as well.
+    let scale = f64::from_bits(2048_u64.wrapping_sub(exponent) << 52);
+    // m - 1, with the digits that the sum has lost.
+    let reduced = 0.25 * ((normal * scale - 4.0) + lost * scale);
+    let near = is_near_one(x);
+    let f = if near { x } else { reduced };
+    let (half_square, tail) = parts_of_logarithm(f);
+    let value = k * LN2_HIGH - (((half_square - tail) - k * LN2_LOW) - f);
+    let pole = if u == 0.0 { f64::NEG_INFINITY } else { f64::NAN };
+    let outside = if u > 0.0 { u } else { pole };
+    let value = if u > 0.0 && u < f64::INFINITY { value } else { outside };
+    if near { f - (half_square - tail) } else { value }
+}
+
+/// Whether `1 + x` is near enough to one to be taken as it is.
+#[inline(always)]
+fn is_near_one(x: f64) -> bool {
+    (-0.5..1.0).contains(&x)
+}
+
+/// `h = f^2/2` and `t` with `ln(1 + f) = f - (h - t)`, for f from -1/2 to 1.
+///
+/// `t = s (h + R)` with `s = f/(2 + f)` as in fdlibm. R is the polynomial of degree ten in `z = s^2` next to `2 artanh(s)/s - 2`
+/// for z up to 1/9 (E. Ya. Remez's exchange, in 60 digits): it changes the logarithm by 1.3e-18 of itself at most.
+#[inline(always)]
+fn parts_of_logarithm(f: f64) -> (f64, f64) {
+    let s = f / (2.0 + f);
+    let z = s * s;
+    let square = z * z;
+    let fourth = square * square;
+    let a = 6.666_666_666_666_631e-1 + z * 4.000_000_000_015_726_5e-1;
+    let b = 2.857_142_854_785_134e-1 + z * 2.222_222_396_988_407e-1;
+    let c = 1.818_174_391_978_506e-1 + z * 1.538_656_002_655_927e-1;
+    let d = 1.330_097_230_861_173_6e-1 + z * 1.210_609_573_668_486_5e-1;
+    let e = 8.340_062_622_941_338e-2 + z * 1.701_864_305_551_780_7e-1;
+    let R = z * ((a + square * b) + fourth * ((c + square * d) + fourth * e));
+    let half_square = 0.5 * f * f;
+    (half_square, s * (half_square + R))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exact_at_multiples_of_a_half() {
+        for n in -8..=8_i32 {
+            let x = f64::from(n) / 2.0;
+            let sine = [0.0, 1.0, 0.0, -1.0][n.rem_euclid(4) as usize];
+            let cosine = [1.0, 0.0, -1.0, 0.0][n.rem_euclid(4) as usize];
+            assert_eq!((x.sin_pi(), x.cos_pi()), (sine, cosine), "x = {x}");
+        }
+    }
+
+    #[test]
+    fn agrees_with_the_plain_functions_and_keeps_the_phase_of_large_arguments() {
+        for k in 0..1000 {
+            let x = f64::from(k) * 0.00731 - 3.0;
+            let phase = x * std::f64::consts::PI;
+            assert!((x.sin_pi() - phase.sin()).abs() < 2e-15, "sin_pi({x})");
+            assert!((x.cos_pi() - phase.cos()).abs() < 2e-15, "cos_pi({x})");
+        }
+        let far = 2.0 * 1e6 + 0.25;
+        assert_eq!(far.sin_pi(), 0.25_f64.sin_pi());
+        assert_eq!(far.cos_pi(), 0.25_f64.cos_pi());
+    }
+
+    #[test]
+    fn the_logarithm_is_within_an_ulp_of_the_library_function() {
+        let mut worst: f64 = 0.0;
+        for n in 1..200_000 {
+            let x = f64::from(n) * 1e-5;
+            for x in [x - 1.0, 10.0 * x, x * 1e-9, -x * 1e-9, (50.0 * x - 50.0).exp()] {
+                let expected = x.ln_1p();
+                let ulp = (expected.abs() * f64::EPSILON).max(f64::MIN_POSITIVE);
+                worst = worst.max((x.log_1p() - expected).abs() / ulp);
+            }
+        }
+        assert!(worst <= 1.0, "{worst} units in the last place");
+        for x in [0.0, 1e-20, -1e-300, f64::MIN_POSITIVE, f64::INFINITY] {
+            assert_eq!(x.log_1p(), x);
+        }
+        assert_eq!((-1.0_f64).log_1p(), f64::NEG_INFINITY);
+        assert_eq!(f64::MAX.log_1p(), f64::MAX.ln());
+        assert!((-1.5_f64).log_1p().is_nan() && f64::NAN.log_1p().is_nan());
+        assert!(f64::NEG_INFINITY.log_1p().is_nan());
+        assert_eq!(0.5_f32.log_1p(), 0.5_f32.ln_1p());
+    }
+
+    #[test]
+    fn the_logarithm_of_both_takes_the_one_that_has_the_digits() {
+        let mut worst: f64 = 0.0;
+        for n in 0..200_000 {
+            let x = f64::from(n) * 1e-5;
+            for x in [x - 0.5, 10.0 * x, x * 1e-9, -x * 1e-6] {
+                assert_eq!(x.ln_of_both(f64::NAN), x.log_1p());
+            }
+            let y = (-350.0 * x - 0.7).exp();
+            let expected = y.ln();
+            if y > 0.0 {
+                let error = ((y - 1.0).ln_of_both(y) - expected) / expected;
+                worst = worst.max(error.abs() / f64::EPSILON);
+            }
+        }
+        assert!(worst <= 1.5, "{worst} units in the last place");
+        assert_eq!((-1.0_f64).ln_of_both(0.0), f64::NEG_INFINITY);
+        assert!((-1.0_f64).ln_of_both(f64::NAN).is_nan() && (-1.0_f64).ln_of_both(-1e-9).is_nan());
+        assert!(f64::NAN.ln_of_both(1.0).is_nan());
+        assert_eq!((-0.75_f32).ln_of_both(0.25), 0.25_f32.ln());
+    }
+
+    #[test]
+    fn near_one_the_short_logarithm_has_the_same_bits() {
+        let mut near = 0;
+        for n in 0..400_000 {
+            let x = f64::from(n) * 5e-6 - 0.9;
+            for x in [x, x * 1e-9] {
+                if (-0.5..1.0).contains(&x) {
+                    near += 1;
+                    assert_eq!(x.ln_near_one().to_bits(), x.ln_of_both(f64::NAN).to_bits(), "{x}");
+                } else {
+                    assert!(x.ln_near_one().is_nan(), "{x}");
+                }
+            }
+        }
+        assert!((600_000..750_000).contains(&near), "{near}");
+        assert_eq!(0.0_f64.ln_near_one().to_bits(), 0.0_f64.to_bits());
+        assert!((-0.5_f64).ln_near_one() == -std::f64::consts::LN_2);
+        assert!(1.0_f64.ln_near_one().is_nan() && (-0.5 - 1e-16_f64).ln_near_one().is_nan());
+        assert!(f64::NAN.ln_near_one().is_nan() && f64::INFINITY.ln_near_one().is_nan());
+        assert_eq!(0.25_f32.ln_near_one(), 0.25_f32.ln_of_both(1.25));
+    }
+
+    #[test]
+    fn what_rounding_takes_is_exact_in_both_precisions() {
+        // (1 + 2^-30)(1 - 2^-30) = 1 - 2^-60, and 1 + 2^-60 is one.
+        let (a, b) = (1.0 + 2_f64.powi(-30), 1.0 - 2_f64.powi(-30));
+        assert_eq!((a * b, a.product_error(b)), (1.0, -(2_f64.powi(-60))));
+        assert_eq!(1.0_f64.sum_error(2_f64.powi(-60)), 2_f64.powi(-60));
+        assert_eq!((-(2_f64.powi(-60))).sum_error(1.0), -(2_f64.powi(-60)));
+        let (a, b) = (1.0 + 2_f32.powi(-15), 1.0 - 2_f32.powi(-15));
+        assert_eq!((a * b, a.product_error(b)), (1.0, -(2_f32.powi(-30))));
+        assert_eq!(1.0_f32.sum_error(2_f32.powi(-30)), 2_f32.powi(-30));
+        // 3 x for x near 1e8: what is lost is a whole number of units of the last place of x.
+        let x = 123_456_789.123_456_78_f64;
+        assert_eq!(3.0.product_error(x), (x.sum_error(2.0 * x)));
+    }
+
+    #[test]
+    fn not_a_number_stays_so() {
+        assert!(f64::NAN.sin_pi().is_nan());
+        assert!(f64::INFINITY.cos_pi().is_nan());
+    }
+}
