@@ -4,7 +4,7 @@ use crate::code::Code;
 use crate::function::digits;
 use crate::module::Names;
 use crate::text::{c_string, comment, meaning, push_index, spell};
-use mmsmith_expr::{CSupport, Operation, Slot, nearest_f64};
+use mmsmith_expr::{CSupport, Function, Operation, RustCall, Slot, nearest_f64};
 use mmsmith_spec::{Boundary, Condition, Material, Parameter, Surface};
 use mmsmith_stage::{Block, Measures, Operand, Shape, Stage, Staged, Traction};
 use std::borrow::Cow;
@@ -305,6 +305,17 @@ before. Results equal those of the Rust functions bit for bit where the compiler
 -ffp-contract=off where the processor fuses products and sums (nvcc: -fmad=false), and no -ffast-math."
         );
         lines.extend(conventions.lines().map(str::to_owned));
+        let foreign = |function: &Function| {
+            matches!(function.rust(), RustCall::Library(_)) && self.plan.calls(|f| f == *function)
+        };
+        let foreign: Vec<&str> =
+            Function::ALL.iter().copied().filter(foreign).map(Function::c).collect();
+        if !foreign.is_empty() {
+            let names = foreign.join(", ");
+            lines.push(format!(
+                "Of {names} the Rust functions have the last bits of another library."
+            ));
+        }
         self.comment(&lines);
     }
 

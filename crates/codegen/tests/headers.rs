@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 use mmsmith_codegen::Code;
+use mmsmith_expr::{Function, RustCall};
 use mmsmith_spec::Spec;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -94,6 +95,20 @@ fn constants_of_laws_are_explained() {
                 format!("/* {about} */\nMMSMITH_FN double test_{name}(const test_solution *s)\n{{");
             assert!(header.contains(&expected), "{law}: no {expected}");
         }
+    }
+}
+
+/// A header says of which functions C and Rust have different libraries, and calls every function by a name that C has.
+#[test]
+fn functions_of_another_library_are_named() {
+    for &function in Function::ALL.iter().filter(|f| f.arity() == 1 && f.math_h().is_some()) {
+        let text = specification(&["A"], "law = 'neo-hookean'\nlambda = 1\nmu = 1");
+        let field = format!("X = 'A*{}(X)*t'", function.name());
+        let header = header(&text.replace("X = 'A*X*t'", &field));
+        assert!(header.contains(&format!("{}(X[0])", function.c())), "{}", function.name());
+        let note = format!("Of {} the Rust functions", function.c());
+        let foreign = matches!(function.rust(), RustCall::Library(_));
+        assert_eq!(header.contains(&note), foreign, "{}", function.name());
     }
 }
 
