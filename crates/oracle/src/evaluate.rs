@@ -149,14 +149,15 @@ impl Oracle {
         point: &Point<'_>,
         expressions: &[Expr],
     ) -> Result<Vec<Rational>, OracleError> {
-        Ok(self.evaluate_in(point, expressions, self.bits)?.0)
+        Ok(self.evaluate_in(point, expressions, self.bits)?.values)
     }
 
     /// As [`Oracle::evaluate`], with the precision doubled until `digits` significant digits of every value stay the
     /// same.
     ///
     /// A value that has not settled at [`Oracle::MOST_BITS`] and is smaller than the largest intermediate result
-    /// by a factor of `2^-1024` is rounding error, and is taken for the zero that it approaches.
+    /// by a factor of `2^-1024` is rounding error, and is taken for the zero that it approaches. Nor is a zero settled
+    /// before where a sum of other numbers gave it, as `1 - tanh(x)` far from zero does in few bits.
     ///
     /// # Errors
     ///
@@ -169,17 +170,19 @@ impl Oracle {
     ) -> Result<Vec<Rational>, OracleError> {
         let tolerance = Rational::one() / Pow::pow(Rational::from_integer(10.into()), digits);
         let mut bits = self.bits;
-        let mut values = self.evaluate_in(point, expressions, bits)?.0;
+        let mut values = self.evaluate_in(point, expressions, bits)?.values;
         let mut moving: Vec<usize> = (0..expressions.len()).collect();
         while !moving.is_empty() && bits < Self::MOST_BITS {
             bits = (2 * bits).min(Self::MOST_BITS);
             let open: Vec<Expr> = moving.iter().map(|&i| expressions[i]).collect();
-            let (fine, largest) = self.evaluate_in(point, &open, bits)?;
+            let Evaluated { values: fine, largest, cancelled } =
+                self.evaluate_in(point, &open, bits)?;
             let mut still = Vec::new();
             for (i, fine) in moving.into_iter().zip(fine) {
                 let coarse = std::mem::replace(&mut values[i], fine);
                 let fine = &values[i];
-                if (fine - &coarse).abs() <= fine.abs() * &tolerance {
+                let may_be_lost = cancelled && fine.is_zero() && bits < Self::MOST_BITS;
+                if !may_be_lost && (fine - &coarse).abs() <= fine.abs() * &tolerance {
                     continue;
                 }
                 if bits < Self::MOST_BITS {
@@ -201,13 +204,12 @@ impl Oracle {
         Ok(values)
     }
 
-    /// The values, and a power of two at least as large as every intermediate result.
     fn evaluate_in(
         &mut self,
         point: &Point<'_>,
         expressions: &[Expr],
         bits: usize,
-    ) -> Result<(Vec<Rational>, Rational), OracleError> {
+    ) -> Result<Evaluated, OracleError> {
         let bits = bits + GUARD_BITS;
         let mut evaluation = Evaluation {
             graph: point.graph,
@@ -215,6 +217,7 @@ impl Oracle {
             values: point.values.iter().map(|(e, value)| (*e, to_float(value, bits))).collect(),
             bits,
             constants: &mut self.constants,
+            cancelled: false,
         };
         let mut values = Vec::new();
         for &expression in expressions {
@@ -224,8 +227,18 @@ impl Oracle {
         }
         let exponents = evaluation.values.values().filter_map(BigFloat::exponent);
         let largest = exponents.max().and_then(|e| usize::try_from(e).ok()).unwrap_or(0);
-        Ok((values, power_of_two(largest)))
+        let cancelled = evaluation.cancelled;
+        Ok(Evaluated { values, largest: power_of_two(largest), cancelled })
     }
+}
+
+/// Values in one precision.
+struct Evaluated {
+    values: Vec<Rational>,
+    /// A power of two at least as large as every intermediate result.
+    largest: Rational,
+    /// Whether any sum of numbers that are not zero came out as zero.
+    cancelled: bool,
 }
 
 /// The values found so far at one point.
@@ -235,6 +248,8 @@ struct Evaluation<'a> {
     values: HashMap<Expr, BigFloat>,
     bits: usize,
     constants: &'a mut Consts,
+    /// Whether any sum of numbers that are not zero came out as zero.
+    cancelled: bool,
 }
 
 impl Evaluation<'_> {
@@ -290,10 +305,13 @@ impl Evaluation<'_> {
             Node::Whole(inner) => self.value(*inner).cloned(),
             Node::Sum { constant, terms } => {
                 let mut sum = to_float(constant, bits);
+                let mut all_zero = sum.is_zero();
                 for (term, coefficient) in terms {
                     let scaled = scaled(self.value(*term)?, coefficient, bits);
+                    all_zero &= scaled.is_zero();
                     sum = sum.add(&scaled, bits, ROUNDING);
                 }
+                self.cancelled |= sum.is_zero() && !all_zero;
                 Ok(sum)
             }
             Node::Product(factors) => {

@@ -33,6 +33,8 @@ fn digits_survive() {
     assert_eq!(value("cos(-2*Pi*x/3)", "3e20 + 1"), "-5.00000000000000e-1");
     assert_eq!(value("tan(Pi*x)", "1e15 + 1/4"), "1.00000000000000");
     assert_eq!(value("x^(-2/3)", "8"), "2.50000000000000e-1");
+    // Less than the last bit of one in 640 bits.
+    assert_eq!(value("1 - tanh(x)", "400"), "7.33574916835537e-348");
     assert_eq!(value("atan2(x, -1)", "0"), "3.14159265358979");
     assert_eq!(value("atan2(x, -1)", "-1"), "-2.35619449019234");
 }
