@@ -264,6 +264,16 @@ functions! {
         rust: RustCall::Method("exp_m1"),
         math_h: Some("expm1"),
     }
+    /// Error function: `2/sqrt(Pi)` times the integral of `exp(-s^2)` from zero to `x`.
+    Erf {
+        names: &["erf"],
+        differential: "2/sqrt(Pi)*exp(-x^2)*dx",
+        parity: Parity::Odd,
+        at_zero: "0",
+        double: libm::erf,
+        rust: RustCall::Library("erf"),
+        math_h: Some("erf"),
+    }
     /// `atan2(y, x)`, the polar angle of the point `(x, y)`.
     Atan2 {
         names: &["atan2"],

@@ -410,6 +410,7 @@ impl Evaluation<'_> {
             Function::Tanh => x.tanh(bits, ROUNDING, constants),
             Function::Exp => x.exp(bits, ROUNDING, constants),
             Function::Ln => x.ln(bits, ROUNDING, constants),
+            Function::Erf => error_function(&x, bits, constants),
             Function::Ln1p | Function::Expm1 if x.is_zero() => x,
             Function::Ln1p | Function::LnOfBoth | Function::Expm1 => {
                 let smallness = smallness(&x);
@@ -594,6 +595,37 @@ fn log_ratio_slope(z: &BigFloat, bits: usize, constants: &mut Consts) -> BigFloa
     let root = squared_sinh(z, wide).sqrt(wide, ROUNDING);
     let ratio = log_ratio(z, wide, constants).div(&root, wide, ROUNDING);
     ratio.sub(&BigFloat::from_word(1, wide), bits, ROUNDING)
+}
+
+/// `erf(x) = 2/sqrt(pi) exp(-x^2) sum_n 2^n x^(2n+1)/(2n+1)!!` (NIST Digital Library of Mathematical Functions, 7.6.2): all
+/// terms have one sign, so that nothing cancels.
+fn error_function(x: &BigFloat, bits: usize, constants: &mut Consts) -> BigFloat {
+    if x.is_zero() {
+        return x.clone();
+    }
+    let wide = bits + GUARD_BITS;
+    let number = |n: usize| BigFloat::from_word(n as u64, wide);
+    let square = x.mul(x, wide, ROUNDING);
+    if square.cmp(&number(wide)).is_some_and(|c| c > 0) {
+        // One less this magnitude is above exp(-x^2), which is below the last bit.
+        let one = number(1);
+        return if x.is_negative() { one.neg() } else { one };
+    }
+    let double = square.add(&square, wide, ROUNDING);
+    let mut term = x.clone();
+    let mut sum = term.clone();
+    // Terms grow at first where x is large; by the first one below the last bit each is less than half of the one before.
+    for odd in (3..).step_by(2) {
+        term = term.mul(&double, wide, ROUNDING).div(&number(odd), wide, ROUNDING);
+        sum = sum.add(&term, wide, ROUNDING);
+        let ends = |(term, sum): (i32, i32)| i64::from(sum) - i64::from(term) > wide as i64;
+        if term.exponent().zip(sum.exponent()).is_none_or(ends) {
+            break;
+        }
+    }
+    let scale = number(2).div(&constants.pi(wide, ROUNDING).sqrt(wide, ROUNDING), wide, ROUNDING);
+    let bell = square.neg().exp(wide, ROUNDING, constants);
+    scale.mul(&bell, wide, ROUNDING).mul(&sum, bits, ROUNDING)
 }
 
 /// `value` times an exact number.

@@ -3,10 +3,10 @@
 #![allow(clippy::unwrap_used)]
 
 use mmsmith_codegen::Plan;
-use mmsmith_expr::{Expr, nearest_f64};
+use mmsmith_expr::{Ast, Expr, Graph, nearest_f64};
 use mmsmith_oracle::{
     Accuracy, Class, Judged, LARGEST_FACTOR, Oracle, OracleError, Point, Sampler, Sensitivity,
-    exact,
+    exact, scientific,
 };
 use mmsmith_solutions::nalgebra::SVector;
 use mmsmith_solutions::{AnySolution, Description, Solution};
@@ -43,6 +43,35 @@ macro_rules! fields {
 fields! {
     "../../../tests/data/specs/digits/front-tanh.toml" is FrontTanh,
     "../../../tests/data/specs/digits/front-arctan.toml" is FrontArctan,
+    "../../../tests/data/specs/digits/front-erf.toml" is FrontErf,
+}
+
+/// Values of functions to 40 digits, by another library of arbitrary precision (mpmath, in 80 digits).
+const VALUES: &[(&str, &str, &str)] = &[
+    ("erf(x)", "1/10", "1.124629160182848922032750717439683832217e-1"),
+    ("erf(x)", "1/2", "5.204998778130465376827466538919645287365e-1"),
+    ("erf(x)", "-1", "-8.427007929497148693412206350826092592961e-1"),
+    ("erf(x)", "2", "9.953222650189527341620692563672529286109e-1"),
+    ("erf(x)", "7/2", "9.999992569016276585872544763162439043643e-1"),
+    ("erf(x)", "1e-200", "1.128379167095512573896158903121545171688e-200"),
+    ("1 - erf(x)", "6", "2.151973671249891311659335039918738463048e-17"),
+    ("1 - erf(x)", "10", "2.088487583762544757000786294957788611561e-45"),
+    ("1 - erf(x)", "25", "8.300172571196522752044012769513722768714e-274"),
+];
+
+#[test]
+fn the_oracle_has_the_values_of_another_library() {
+    for (text, at, expected) in VALUES {
+        let mut graph = Graph::new();
+        let [expr, at] = [text, at].map(|text| {
+            graph.build(&Ast::parse(text).unwrap(), &mut |g, name| Ok(g.symbol(name))).unwrap()
+        });
+        let values = [(graph.symbol("x"), graph.as_number(at).unwrap().clone())];
+        let point = Point { graph: &graph, definitions: &[], values: &values };
+        let mut oracle = Oracle::new(Oracle::LEAST_BITS).unwrap();
+        let found = oracle.settle(&point, &[expr], 45).unwrap().remove(0);
+        assert_eq!(scientific(&found, 40), *expected, "{text} at {}", graph.print(at));
+    }
 }
 
 fn parse(description: &Description) -> Spec {
