@@ -12,8 +12,8 @@ use thiserror::Error;
 const SETTLED_DIGITS: usize = 60;
 /// Digits beyond which two values count as the same: those that [`Oracle::settle`] makes sure of.
 const MOST_DIGITS: f64 = SETTLED_DIGITS as f64;
-/// Agreement to this many digits is taken as proof.
-const PROOF_DIGITS: f64 = 40.0;
+/// Agreement to this many digits at every point verifies a component.
+const VERIFIED_DIGITS: f64 = 40.0;
 
 /// What is compared.
 #[derive(Clone, Copy, Debug)]
@@ -83,8 +83,10 @@ pub struct Report {
 impl Report {
     /// Whether every component is verified: agrees to 40 digits or more at every point.
     #[must_use]
-    pub fn proved(&self) -> bool {
-        self.components.iter().all(|component| matches!(component.verdict, Verdict::Proved { .. }))
+    pub fn verified(&self) -> bool {
+        self.components
+            .iter()
+            .all(|component| matches!(component.verdict, Verdict::Verified { .. }))
     }
 }
 
@@ -115,7 +117,7 @@ pub struct Component {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Verdict {
     /// They agree to 40 digits or more at every point.
-    Proved {
+    Verified {
         /// The digits at the worst point; 60 are computed.
         digits: f64,
     },
@@ -138,8 +140,8 @@ impl fmt::Display for Component {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Component { entry, points, verdict } = self;
         match verdict {
-            Verdict::Proved { digits } => {
-                write!(f, "{entry} verified: agrees to {digits:.0} digits at {points} points")
+            Verdict::Verified { digits } => {
+                write!(f, "{entry} verified to {digits:.0} digits at {points} points")
             }
             Verdict::Refuted { digits, differing, place, listing, derived } => {
                 let place: Vec<String> =
@@ -198,7 +200,7 @@ pub fn cross_check(
             let [listing, derived] = [found[0].clone(), found[1].clone()];
             let digits = digits_in_common(&listing, &derived);
             let differing = worst.as_ref().map_or(0, |w| w.differing);
-            let differing = differing + usize::from(digits < PROOF_DIGITS);
+            let differing = differing + usize::from(digits < VERIFIED_DIGITS);
             match worst {
                 Some(worst) if worst.digits <= digits => worst.differing = differing,
                 _ => {
@@ -214,7 +216,7 @@ pub fn cross_check(
     let components = check.targets.iter().zip(worst).filter_map(|(target, worst)| {
         let Worst { digits, differing, values, listing, derived } = worst?;
         let verdict = if differing == 0 {
-            Verdict::Proved { digits }
+            Verdict::Verified { digits }
         } else {
             let place = place(&graph, &values);
             Verdict::Refuted { digits, differing, place, listing, derived }

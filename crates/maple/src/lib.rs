@@ -31,7 +31,7 @@
 //!     targets: &[Target { entry: "b[0]".into(), derived }],
 //! };
 //! let report = cross_check(&check, sample(&[(x, [0.0, 1.0])], 20, 1)).unwrap();
-//! assert_eq!(report.to_string(), "b[0] verified: agrees to 60 digits at 20 points\n");
+//! assert_eq!(report.to_string(), "b[0] verified to 60 digits at 20 points\n");
 //! ```
 //!
 //! # The table of a specification
@@ -50,7 +50,7 @@
 //!
 //! Names that the table leaves out mean what they mean in the specification: parameters, `[let]` and coordinates.
 //! Entries are `u[i]`, `v[i]`, `a[i]` and `b[i]`, Cartesian components, and `H`, `F` and `P` as `F[i][j]` or
-//! `F[n*i + j]`. The check reports a line for each component, [`Component`]'s `Display`: `b[1] verified: agrees to 60 digits at 20 points`, or
+//! `F[n*i + j]`. The check reports a line for each component, [`Component`]'s `Display`: `b[1] verified to 60 digits at 20 points`, or
 //! `b[1] differs at X = ..., t = ...: the listing gives ..., the derivation ...`; a refuted component makes the check
 //! fail. The call is [`cross_check`] with the names built by the specification's scope and the field's entries as
 //! targets, made by the crate `mmsmith-prove`.

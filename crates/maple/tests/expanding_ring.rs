@@ -97,13 +97,13 @@ fn the_specification_has_this_listing() {
 }
 
 #[test]
-fn published_listing_is_proved() {
+fn published_listing_is_verified() {
     let report = ring().check(LISTING).unwrap();
     println!("{report}");
-    assert!(report.proved(), "{report}");
+    assert!(report.verified(), "{report}");
     assert_eq!(report.unchecked, Vec::<String>::new());
     for component in &report.components {
-        let Verdict::Proved { digits } = component.verdict else { panic!("{component}") };
+        let Verdict::Verified { digits } = component.verdict else { panic!("{component}") };
         assert!(digits >= 59.0, "{component}");
     }
 }

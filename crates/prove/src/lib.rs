@@ -14,4 +14,4 @@ pub use listings::Published;
 pub use mmsmith_maple::{Component, Report, Verdict as Equality};
 pub use parameters::admissible_value;
 pub use points::PointsError;
-pub use surfaces::{Outcome, SurfaceError, SurfaceProof, surfaces};
+pub use surfaces::{Outcome, SurfaceError, SurfaceFinding, surfaces};

@@ -10,11 +10,11 @@ use thiserror::Error;
 /// Points at which a claim is looked at that symbols do not show.
 const POINTS: usize = 20;
 /// A quantity that is smaller than its scale by this many digits at every point is zero.
-const PROOF_DIGITS: f64 = 40.0;
+const VERIFIED_DIGITS: f64 = 40.0;
 
 /// What became of a claim about a surface.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SurfaceProof {
+pub struct SurfaceFinding {
     /// Which surface.
     pub surface: Surface,
     /// What is said to be zero there.
@@ -27,9 +27,9 @@ pub struct SurfaceProof {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
     /// It is zero in symbols, for all parameters.
-    Symbolic,
+    Proved,
     /// It is zero to `digits` digits of the field's size, at so many points with random parameters.
-    Numerical {
+    Verified {
         /// The digits, 40 or more.
         digits: f64,
         /// The points.
@@ -46,7 +46,7 @@ pub enum Outcome {
     },
 }
 
-impl SurfaceProof {
+impl SurfaceFinding {
     /// Whether the claim holds.
     #[must_use]
     pub fn holds(&self) -> bool {
@@ -82,15 +82,15 @@ pub enum SurfaceError {
 /// # Errors
 ///
 /// [`SurfaceError`] where a quantity cannot be evaluated.
-pub fn surfaces(spec: &Spec, fields: &Fields) -> Result<Vec<SurfaceProof>, SurfaceError> {
-    let mut proofs = Vec::new();
+pub fn surfaces(spec: &Spec, fields: &Fields) -> Result<Vec<SurfaceFinding>, SurfaceError> {
+    let mut findings = Vec::new();
     for on_surface in &fields.surfaces {
         let surface = on_surface.surface;
         for claim in &on_surface.claims {
             let open: Vec<Expr> =
                 claim.quantities.iter().copied().filter(|&q| q != Graph::ZERO).collect();
             let outcome = if open.is_empty() {
-                Outcome::Symbolic
+                Outcome::Proved
             } else {
                 let field = match claim.what {
                     ClaimKind::Traction | ClaimKind::Shear => fields.P.concat(),
@@ -98,10 +98,10 @@ pub fn surfaces(spec: &Spec, fields: &Fields) -> Result<Vec<SurfaceProof>, Surfa
                 };
                 numerical(spec, fields, surface, &open, &field)?
             };
-            proofs.push(SurfaceProof { surface, claim: claim.what, outcome });
+            findings.push(SurfaceFinding { surface, claim: claim.what, outcome });
         }
     }
-    Ok(proofs)
+    Ok(findings)
 }
 
 fn numerical(
@@ -122,8 +122,8 @@ fn numerical(
     } else {
         (nearest_f64(&scale) / nearest_f64(&value)).log10()
     };
-    if digits >= PROOF_DIGITS {
-        return Ok(Outcome::Numerical { digits: digits.min(60.0), points: there.len() });
+    if digits >= VERIFIED_DIGITS {
+        return Ok(Outcome::Verified { digits: digits.min(60.0), points: there.len() });
     }
     let name = |input: &Expr| fields.graph.symbol_name(*input).unwrap_or_default().to_owned();
     let place = there[worst].iter().map(|(input, x)| (name(input), nearest_f64(x))).collect();

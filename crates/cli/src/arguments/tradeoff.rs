@@ -17,10 +17,10 @@ pub(crate) struct TradeoffOptions {
     /// Time for everything, such as 90s, 2m or 1h; it is used up, for timings repeated if for nothing better
     #[arg(long, value_name = "TIME", default_value = "2m", value_parser = seconds)]
     pub(crate) budget: f64,
-    /// Name the cheapest setting with at most this error, and run it once more to prove it; exit status 1 if there is none
+    /// Name the cheapest setting with at most this error, and run it once more to confirm it; exit status 1 if there is none
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) tolerance: Option<f64>,
-    /// Name the most accurate setting whose steps take at most this time, and run it once more to prove it; exit status 1
+    /// Name the most accurate setting whose steps take at most this time, and run it once more to confirm it; exit status 1
     /// if there is none
     #[arg(long, value_name = "TIME", value_parser = seconds)]
     pub(crate) time: Option<f64>,

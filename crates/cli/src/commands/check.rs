@@ -3,7 +3,7 @@
 use anyhow::{Result, bail};
 use mmsmith_expr::nearest_f64;
 use mmsmith_prove::{
-    Equality, Outcome, Published, Report, SurfaceProof, surfaces as prove_surfaces,
+    Equality, Outcome, Published, Report, SurfaceFinding, surfaces as judge_surfaces,
 };
 use mmsmith_spec::{ClaimKind, Spec};
 use mmsmith_verify::{
@@ -92,7 +92,7 @@ struct Comparison {
 impl Comparison {
     fn document(&self) -> Value {
         let components = self.report.components.iter().map(|component| match &component.verdict {
-            Equality::Proved { digits } => json!({
+            Equality::Verified { digits } => json!({
                 "entry": component.entry,
                 "points": component.points,
                 "verdict": "verified",
@@ -113,14 +113,14 @@ impl Comparison {
             "source": self.source,
             "components": components.collect::<Vec<_>>(),
             "not_compared": self.report.unchecked,
-            "proved": self.report.proved(),
+            "verified": self.report.verified(),
         })
     }
 }
 
 /// What a specification claims, and what became of it.
 struct Claims {
-    surfaces: Vec<SurfaceProof>,
+    surfaces: Vec<SurfaceFinding>,
     listings: Vec<Comparison>,
 }
 
@@ -132,30 +132,31 @@ impl Claims {
             Ok(Comparison { source, report: listing.compare(&fields)? })
         };
         Ok(Claims {
-            surfaces: prove_surfaces(spec, &fields)?,
+            surfaces: judge_surfaces(spec, &fields)?,
             listings: listings.iter().map(compare).collect::<Result<_>>()?,
         })
     }
 
     fn hold(&self) -> bool {
-        self.surfaces.iter().all(SurfaceProof::holds)
-            && self.listings.iter().all(|comparison| comparison.report.proved())
+        self.surfaces.iter().all(SurfaceFinding::holds)
+            && self.listings.iter().all(|comparison| comparison.report.verified())
     }
 
     fn text(&self) -> String {
         let mut text = String::new();
-        let name = |proof: &SurfaceProof| format!("{} on {}", claim(proof.claim), proof.surface);
-        let symbolic = self.surfaces.iter().filter(|p| p.outcome == Outcome::Symbolic).map(name);
+        let name =
+            |finding: &SurfaceFinding| format!("{} on {}", claim(finding.claim), finding.surface);
+        let symbolic = self.surfaces.iter().filter(|p| p.outcome == Outcome::Proved).map(name);
         let symbolic = symbolic.collect::<Vec<_>>().join(", ");
         if !symbolic.is_empty() {
             text += &format!("  proved, zero in symbols for all parameters: {symbolic}\n");
         }
-        for proof in &self.surfaces {
-            let outcome = match &proof.outcome {
-                Outcome::Symbolic => continue,
-                Outcome::Numerical { digits, points } => {
+        for finding in &self.surfaces {
+            let outcome = match &finding.outcome {
+                Outcome::Proved => continue,
+                Outcome::Verified { digits, points } => {
                     format!(
-                        "verified: zero to {digits:.0} digits at {points} points with random parameters"
+                        "zero, verified to {digits:.0} digits at {points} points with random parameters"
                     )
                 }
                 Outcome::Refuted { value, scale, place } => {
@@ -164,7 +165,7 @@ impl Claims {
                     format!("NOT zero: {value:e} of {scale:e} at {}", place.join(", "))
                 }
             };
-            text += &format!("  {}: {outcome}\n", name(proof));
+            text += &format!("  {}: {outcome}\n", name(finding));
         }
         for Comparison { source, report } in &self.listings {
             text += &format!("  listing '{source}'\n");
@@ -185,11 +186,11 @@ fn claim(kind: ClaimKind) -> &'static str {
     }
 }
 
-fn surface_document(proof: &SurfaceProof) -> Value {
-    let what = format!("{} on {}", claim(proof.claim), proof.surface);
-    match &proof.outcome {
-        Outcome::Symbolic => json!({ "what": what, "verdict": "proved", "by": "symbols" }),
-        Outcome::Numerical { digits, points } => json!({
+fn surface_document(finding: &SurfaceFinding) -> Value {
+    let what = format!("{} on {}", claim(finding.claim), finding.surface);
+    match &finding.outcome {
+        Outcome::Proved => json!({ "what": what, "verdict": "proved", "by": "symbols" }),
+        Outcome::Verified { digits, points } => json!({
             "what": what,
             "verdict": "verified",
             "by": "digits",

@@ -16,7 +16,7 @@ use crate::terminal;
 pub(super) fn section(out: &Path, budget: f64, agenda: &Agenda) -> Result<Section> {
     let said = format!(
         "All schemes that fit a problem, from cheap to dear, for {budget} s each, as mms tradeoff NAME --budget {budget}s \
-         measures them. With more time the front goes further down, and more settings are proved on neighbouring cell \
+         measures them. With more time the front goes further down, and more settings are confirmed on neighbouring cell \
          counts."
     );
     let mut section = Section::new("cost", "Speed against accuracy", &said);
