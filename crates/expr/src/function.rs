@@ -271,6 +271,7 @@ functions! {
         parity: Parity::Odd,
         at_zero: "0",
         double: libm::erf,
+        single: libm::erff,
         rust: RustCall::Library("erf"),
         math_h: Some("erf"),
     }
