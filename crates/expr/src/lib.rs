@@ -36,6 +36,7 @@ mod arrange;
 mod build;
 mod cancel;
 mod canonical;
+mod constant;
 mod derivative;
 mod function;
 mod gather;

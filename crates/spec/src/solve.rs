@@ -6,8 +6,10 @@
 //! a condition into several, one for each function of them. The linear system is solved by elimination over fractions
 //! of polynomials in the parameters, kept in lowest terms.
 
+mod factored;
 mod polynomial;
 
+use self::factored::{Along, Solution, factored};
 use self::polynomial::{Fraction, Polynomial};
 use crate::derivation::Derivation;
 use crate::diagnostic::nearest;
@@ -72,6 +74,8 @@ struct Solver<'a> {
     /// Fields in the specification's own components, by their names in conditions.
     fields: BTreeMap<String, Expr>,
     has_lambda: bool,
+    /// Where conditions hold, by coordinate.
+    places: BTreeMap<Expr, BTreeSet<Expr>>,
 }
 
 impl Spec {
@@ -111,17 +115,21 @@ impl Spec {
             conditions.push(condition);
             equations.extend(own);
         }
-        let values = solver.eliminate(equations, table)?;
+        let solution = solver.eliminate(equations, table)?;
         let mut replacement = BTreeMap::new();
         let mut found = Vec::new();
-        for ((name, symbol), value) in solver.unknowns.iter().zip(values) {
+        for ((name, symbol), value) in solver.unknowns.iter().zip(&solution.values) {
+            let value = expression(&mut solver.graph, value, &solution.atoms);
             let value = transfer(&solver.graph, &mut self.graph, value);
             replacement.insert(*symbol, value);
             found.push((name.clone(), value));
         }
         self.check_defaults(&found, scope, table)?;
         for component in &mut self.displacement {
-            *component = self.graph.replace(*component, &replacement);
+            *component = match solver.factored(*component, &solution) {
+                Some(factored) => transfer(&solver.graph, &mut self.graph, factored),
+                None => self.graph.replace(*component, &replacement),
+            };
         }
         for meaning in self.cross_checks.iter_mut().flat_map(|check| check.names.values_mut()) {
             *meaning = self.graph.replace(*meaning, &replacement);
@@ -199,7 +207,8 @@ impl<'a> Solver<'a> {
         };
         let Derivation { graph, geometry, variables, .. } = derivation;
         let coordinates = geometry.coordinates;
-        Ok(Solver { scope, graph, coordinates, variables, unknowns, fields, has_lambda })
+        let places = BTreeMap::new();
+        Ok(Solver { scope, graph, coordinates, variables, unknowns, fields, has_lambda, places })
     }
 
     /// The linear equations that a condition comes to.
@@ -388,6 +397,9 @@ impl<'a> Solver<'a> {
                 let message = "a place may depend on parameters only".to_owned();
                 return Err((message, argument.span.clone(), None));
             }
+            if value != *coordinate {
+                self.places.entry(*coordinate).or_default().insert(value);
+            }
             place.insert(*coordinate, value);
         }
         let value = self.fields.get(name).copied().unwrap_or(Graph::ZERO);
@@ -486,7 +498,7 @@ impl<'a> Solver<'a> {
         &mut self,
         equations: Vec<Equation>,
         table: &Spanned<SolveTable>,
-    ) -> Result<Vec<Expr>, Diagnostic> {
+    ) -> Result<Solution, Diagnostic> {
         let source = &self.scope.source;
         let fail = |message: String, span: Range<usize>, help: &str| {
             Err(source.error(message, span, Some(help.to_owned())))
@@ -555,15 +567,19 @@ impl<'a> Solver<'a> {
                 format!("{} more condition(s) are needed that depend on them", undetermined.len());
             return fail(message, table.span(), &help);
         }
-        let values: Vec<Fraction> =
-            rows.into_iter().take(count).filter_map(|(_, mut row)| row.pop()).collect();
-        Ok(values
-            .iter()
-            .map(|value| {
-                let value = expression(&mut self.graph, value, &atoms);
-                self.graph.neg(value)
-            })
-            .collect())
+        let constants = rows.into_iter().take(count).filter_map(|(_, mut row)| row.pop());
+        let values = constants.map(|constant| constant.negated()).collect();
+        Ok(Solution { atoms, values })
+    }
+
+    /// A component of the displacement with its unknowns put in, where the conditions hold at places along one coordinate and
+    /// digits are to be kept between them.
+    fn factored(&mut self, component: Expr, solution: &Solution) -> Option<Expr> {
+        let mut along = self.places.iter();
+        let (Some((&coordinate, places)), None) = (along.next(), along.next()) else { return None };
+        let unknowns: Vec<Expr> = self.unknowns.iter().map(|(_, symbol)| *symbol).collect();
+        let along = Along { coordinate, places, variables: &self.variables };
+        factored(&mut self.graph, component, &unknowns, solution, &along)
     }
 
     fn shown(&self, expr: Expr) -> String {
@@ -605,19 +621,22 @@ fn fraction(terms: &[Term], atoms: &[Expr]) -> Fraction {
 
 /// The fraction as an expression.
 fn expression(graph: &mut Graph, fraction: &Fraction, atoms: &[Expr]) -> Expr {
-    let mut sum = |polynomial: &Polynomial| {
-        let terms: Vec<(Rational, Expr)> = polynomial
-            .terms()
-            .map(|(exponents, coefficient)| {
-                let factors = atoms.iter().zip(exponents);
-                let factors = factors.map(|(&atom, &n)| (atom, Rational::from_integer(n.into())));
-                (coefficient.clone(), graph.product(factors.collect::<Vec<_>>()))
-            })
-            .collect();
-        graph.sum(terms)
-    };
-    let (numerator, denominator) = (sum(&fraction.numerator), sum(&fraction.denominator));
+    let numerator = sum_of_terms(graph, &fraction.numerator, atoms);
+    let denominator = sum_of_terms(graph, &fraction.denominator, atoms);
     graph.div(numerator, denominator)
+}
+
+/// The polynomial as an expression, of what its variables mean.
+fn sum_of_terms(graph: &mut Graph, polynomial: &Polynomial, meanings: &[Expr]) -> Expr {
+    let terms: Vec<(Rational, Expr)> = polynomial
+        .terms()
+        .map(|(exponents, coefficient)| {
+            let factors = meanings.iter().zip(exponents);
+            let factors = factors.map(|(&atom, &n)| (atom, Rational::from_integer(n.into())));
+            (coefficient.clone(), graph.product(factors.collect::<Vec<_>>()))
+        })
+        .collect();
+    graph.sum(terms)
 }
 
 /// Whether the fraction is zero, also where its atoms are not independent, such as `sqrt(E)` and `E`.

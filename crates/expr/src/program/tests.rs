@@ -298,7 +298,10 @@ fn operations_and_their_order() {
             "(cosh((2 - x)) + (sumerror(2, -x)*(sinh((2 - x)) + ((1/2*sumerror(2, -x))*cosh((2 - x))))))",
         ),
         ("tan(x + y)", "tan((x + y))"),
-        ("sin(x + t)", "sin((t + x))"),
+        (
+            "sin(x + t)",
+            "(sin((t + x)) + (sumerror(t, x)*(cos((t + x)) - ((1/2*sumerror(t, x))*sin((t + x))))))",
+        ),
         (
             "sin(Pi*(x + y))",
             "(sin(Pi (x + y)) + ((Pi*sumerror(x, y))*(cos(Pi (x + y)) - ((1/2*(Pi*sumerror(x, y)))*sin(Pi (x + y))))))",

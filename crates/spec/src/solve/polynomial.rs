@@ -32,6 +32,10 @@ impl Polynomial {
         self.0.is_empty()
     }
 
+    pub(super) fn is_constant(&self) -> bool {
+        self.0.keys().all(|monomial| monomial.iter().all(|n| *n == 0))
+    }
+
     fn add_term(&mut self, monomial: Vec<u32>, coefficient: &Rational) {
         let total = self.0.remove(&monomial).unwrap_or_default() + coefficient;
         if !total.is_zero() {
@@ -45,6 +49,36 @@ impl Polynomial {
             difference.add_term(monomial.clone(), &-coefficient);
         }
         difference
+    }
+
+    pub(super) fn plus(&self, other: &Self) -> Self {
+        let mut sum = self.clone();
+        for (monomial, coefficient) in &other.0 {
+            sum.add_term(monomial.clone(), coefficient);
+        }
+        sum
+    }
+
+    /// With the sum of variable `v` and `shift` in the place of `v`.
+    pub(super) fn with_sum(&self, v: usize, shift: &Self) -> Option<Self> {
+        // Horner's rule.
+        let mut total = Self::default();
+        for n in (0..=self.degree(v)).rev() {
+            let (shifted, raised) = (total.times(shift)?, total.shifted(v, 1));
+            total = shifted.plus(&raised).plus(&self.coefficient(v, n));
+        }
+        total.of_reasonable_size()
+    }
+
+    /// Quotient by variable `v` less `place`, in which it does not occur, and rest, by Horner's rule.
+    pub(super) fn divided_by_distance(&self, v: usize, place: &Self) -> Option<(Self, Self)> {
+        let mut quotient = Self::default();
+        let mut rest = Self::default();
+        for n in (0..=self.degree(v)).rev() {
+            quotient = quotient.plus(&rest.shifted(v, n));
+            rest = rest.times(place)?.plus(&self.coefficient(v, n));
+        }
+        Some((quotient.of_reasonable_size()?, rest.of_reasonable_size()?))
     }
 
     /// The product; `None` where it grows too large.
@@ -70,7 +104,7 @@ impl Polynomial {
     }
 
     /// Times the power `n` of variable `v`.
-    fn shifted(&self, v: usize, n: u32) -> Self {
+    pub(super) fn shifted(&self, v: usize, n: u32) -> Self {
         Self::of(self.0.iter().map(|(monomial, c)| {
             let mut monomial = monomial.clone();
             monomial[v] += n;
@@ -79,19 +113,19 @@ impl Polynomial {
     }
 
     /// The leading coefficient made one.
-    fn monic(&self) -> Self {
+    pub(super) fn monic(&self) -> Self {
         match self.0.last_key_value() {
             Some((_, leading)) => self.scaled(&(Rational::one() / leading)),
             None => Self::default(),
         }
     }
 
-    fn degree(&self, v: usize) -> u32 {
+    pub(super) fn degree(&self, v: usize) -> u32 {
         self.0.keys().map(|monomial| monomial[v]).max().unwrap_or(0)
     }
 
     /// The coefficient of the power `n` of variable `v`.
-    fn coefficient(&self, v: usize, n: u32) -> Self {
+    pub(super) fn coefficient(&self, v: usize, n: u32) -> Self {
         let of_degree = self.0.iter().filter(|(monomial, _)| monomial[v] == n);
         Self::of(of_degree.map(|(monomial, c)| {
             let mut monomial = monomial.clone();
@@ -191,6 +225,11 @@ impl Fraction {
 
     pub(super) fn is_zero(&self) -> bool {
         self.numerator.is_zero()
+    }
+
+    pub(super) fn negated(mut self) -> Self {
+        self.numerator = Polynomial::default().minus(&self.numerator);
+        self
     }
 
     pub(super) fn minus(&self, other: &Self) -> Option<Self> {
