@@ -27,6 +27,15 @@ struct Fraction {
     denominator: Monomial,
 }
 
+/// Symbols that stand for square roots.
+#[derive(Default)]
+struct Roots {
+    /// The square of each.
+    squares: BTreeMap<Expr, Expr>,
+    /// Expressions with such symbols.
+    done: NumberMap<Expr, Expr>,
+}
+
 impl Graph {
     /// `expr` with every sum whose parameter-only parts cancel identically brought to the shorter form.
     ///
@@ -92,7 +101,8 @@ impl Graph {
         self.reachable(&[expr]).iter().any(|e| variables.contains(e))
     }
 
-    /// Whether `expr` is identically zero, as far as multiplying out and `cos^2 = 1 - sin^2` show.
+    /// Whether `expr` is identically zero, as far as multiplying out, `cos^2 = 1 - sin^2`, `sqrt(x)^2 = x` and
+    /// `exp(x + y) = exp(x) exp(y)` show.
     ///
     /// Quantities kept in one piece are looked into. False where that is not so, or where it grows too large to tell.
     pub fn vanishes(&mut self, expr: Expr) -> bool {
@@ -101,13 +111,100 @@ impl Graph {
             return false;
         }
         let open = self.open(expr);
+        let open = self.in_powers_of_exponentials(open);
         // What is not zero modulo a prime is not zero; what is zero there is still to be proved so.
         if self.residue(open).is_some_and(|residue| residue != 0) {
             return false;
         }
+        let mut roots = Roots::default();
+        let open = self.with_roots_as_symbols(open, &mut roots);
         self.fraction(open).is_some_and(|fraction| {
-            self.without_cosine_squares(fraction.numerator).is_some_and(|n| n.is_empty())
+            self.without_squares(fraction.numerator, &roots.squares).is_some_and(|n| n.is_empty())
         })
+    }
+
+    /// Exponential functions, hyperbolic ones included, as powers of symbols: one for the exponential of each term of the
+    /// arguments.
+    fn in_powers_of_exponentials(&mut self, expr: Expr) -> Expr {
+        let is_exponential = |function: &Function| {
+            matches!(
+                function,
+                Function::Exp | Function::Expm1 | Function::Sinh | Function::Cosh | Function::Tanh
+            )
+        };
+        let reachable = self.reachable(&[expr]);
+        let has_one = reachable.iter().any(
+            |part| matches!(self.node(*part), Node::Call(function, _) if is_exponential(function)),
+        );
+        if !has_one {
+            return expr;
+        }
+        // Children come before their parents.
+        let mut done: NumberMap<Expr, Expr> = NumberMap::default();
+        for part in reachable {
+            let mapped = self.map_children(part, &mut |_, child| done[&child]);
+            let result = match self.node(mapped).clone() {
+                Node::Call(function, arguments) if is_exponential(&function) => {
+                    self.hyperbolic(function, arguments[0])
+                }
+                _ => mapped,
+            };
+            done.insert(part, result);
+        }
+        done[&expr]
+    }
+
+    /// An exponential function by powers of symbols.
+    fn hyperbolic(&mut self, function: Function, argument: Expr) -> Expr {
+        let (constant, terms) = match self.node(argument).clone() {
+            Node::Sum { constant, terms } => (constant, terms.into_vec()),
+            _ => (Rational::zero(), vec![(argument, Rational::one())]),
+        };
+        let mut factors = Vec::new();
+        for (term, coefficient) in terms.into_iter().chain([(Graph::ONE, constant)]) {
+            factors.push((self.symbol(&format!("exp #{}", term.0)), coefficient));
+        }
+        let above = self.product(factors.clone());
+        let below = self.product(factors.into_iter().map(|(base, power)| (base, -power)));
+        let half = Rational::new(1.into(), 2.into());
+        match function {
+            Function::Exp => above,
+            Function::Expm1 => self.sub(above, Graph::ONE),
+            Function::Cosh => self.sum([(half.clone(), above), (half, below)]),
+            Function::Sinh => self.sum([(half.clone(), above), (-half, below)]),
+            _ => {
+                let (sum, difference) = (self.add(above, below), self.sub(above, below));
+                self.div(difference, sum)
+            }
+        }
+    }
+
+    /// Square roots as symbols, which `roots` knows.
+    fn with_roots_as_symbols(&mut self, expr: Expr, roots: &mut Roots) -> Expr {
+        if let Some(&known) = roots.done.get(&expr) {
+            return known;
+        }
+        let result = match self.node(expr).clone() {
+            Node::Product(factors) => {
+                let mut mapped = Vec::new();
+                for (base, exponent) in factors {
+                    let own = self.with_roots_as_symbols(base, roots);
+                    let twice = &exponent * Rational::from(2);
+                    if exponent.is_integer() || !twice.is_integer() {
+                        mapped.push((own, exponent));
+                        continue;
+                    }
+                    let root = self.symbol(&format!("sqrt #{}", own.0));
+                    roots.squares.insert(root, own);
+                    mapped.push((root, twice));
+                }
+                self.product(mapped)
+            }
+            _ => self
+                .map_children(expr, &mut |graph, child| graph.with_roots_as_symbols(child, roots)),
+        };
+        roots.done.insert(expr, result);
+        result
     }
 
     /// `expr` with nothing kept in one piece.
@@ -138,13 +235,32 @@ impl Graph {
         result
     }
 
-    /// The polynomial with `cos(x)^2` replaced by `1 - sin(x)^2` until no cosine is squared.
-    fn without_cosine_squares(&mut self, polynomial: Polynomial) -> Option<Polynomial> {
+    /// The polynomial with `cos(x)^2` replaced by `1 - sin(x)^2` until no cosine is squared, and squares of the keys of `squares`
+    /// by what these are.
+    fn without_squares(
+        &mut self,
+        polynomial: Polynomial,
+        squares: &BTreeMap<Expr, Expr>,
+    ) -> Option<Polynomial> {
         let mut result = Polynomial::new();
         let mut pending: Vec<(Monomial, Rational)> = polynomial.into_iter().collect();
         while let Some((mut monomial, coefficient)) = pending.pop() {
             if result.len() + pending.len() > MOST_TERMS {
                 return None;
+            }
+            let is_square = |(root, power): (&Expr, &u32)| {
+                squares.get(root).filter(|_| *power > 1).map(|square| (*root, *square))
+            };
+            if let Some((root, square)) = monomial.iter().find_map(is_square) {
+                let power = monomial.remove(&root).unwrap_or(2) - 2;
+                if power > 0 {
+                    monomial.insert(root, power);
+                }
+                let square =
+                    self.fraction(square).filter(|square| square.denominator.is_empty())?;
+                let rest = Polynomial::from([(monomial, coefficient)]);
+                pending.extend(multiply(&rest, &square.numerator)?);
+                continue;
             }
             let Some((cosine, argument)) = self.squared_cosine(&monomial) else {
                 add_to(&mut result, monomial, &coefficient);
@@ -362,6 +478,25 @@ mod tests {
         assert!(!vanishes("-4*sin(a)^2 + 4*sin(a)^4 + 4*sin(a)^2*cos(b)^2"));
     }
 
+    /// Determinants of motions that keep the volume, less one.
+    #[test]
+    fn stretches_that_keep_the_volume() {
+        let mut graph = Graph::new();
+        let mut vanishes = |text: &str| {
+            let expr = build(&mut graph, text);
+            graph.vanishes(expr)
+        };
+        assert!(vanishes("expm1(a*b) + expm1(-a*b) + expm1(a*b)*expm1(-a*b)"));
+        assert!(vanishes("exp(a)*exp(b - a)*exp(1 - b) - exp(1)"));
+        assert!(vanishes("cosh(a)^2 - sinh(a)^2 - 1"));
+        assert!(vanishes("exp(a/2)*exp(-a) - 1/sqrt(exp(a))"));
+        assert!(vanishes("tanh(a) - 1 + 2/(1 + exp(2*a))"));
+        assert!(!vanishes("expm1(a*b) + expm1(-a) + expm1(a*b)*expm1(-a)"));
+        // A ring that is widened, by its two stretches.
+        assert!(vanishes("(r/sqrt(r^2 + a))*(1 + a/(r*(r + sqrt(r^2 + a)))) - 1"));
+        assert!(!vanishes("(r/sqrt(r^2 + a))*(1 + a/(r*(r + sqrt(r^2 + b)))) - 1"));
+    }
+
     /// What is zero modulo a prime, where it has no value in floating point, is decided by polynomials.
     #[test]
     fn multiples_of_the_prime_do_not_vanish() {
@@ -406,7 +541,7 @@ mod tests {
         ] {
             let mut polynomial = powers(others);
             polynomial.insert(Monomial::from([(cosine, power)]), Rational::one());
-            let found = graph.without_cosine_squares(polynomial);
+            let found = graph.without_squares(polynomial, &BTreeMap::new());
             if let Some(found) = &found {
                 assert!(found.contains_key(&Monomial::from([(sine, power)])));
             }

@@ -101,8 +101,19 @@ impl Splitting<'_> {
             return exponent.is_positive().then_some((Graph::ZERO, rest));
         }
         let at_zero = self.graph.product([(value, exponent.clone())]);
-        let small_integer = exponent.abs().to_integer().to_u32().filter(|&n| n <= 16);
-        if let (true, Some(n)) = (exponent.is_integer(), small_integer) {
+        // With roots of both, the difference of half powers is one of whole powers.
+        let twice = exponent * Rational::from(2);
+        let half = Rational::new(1.into(), 2.into());
+        let (base, value, rest, whole) = if !exponent.is_integer() && twice.is_integer() {
+            let root = self.graph.product([(base, half.clone())]);
+            let root_of_value = self.graph.product([(value, half)]);
+            let sum = self.graph.add(root, root_of_value);
+            (root, root_of_value, self.graph.div(rest, sum), twice)
+        } else {
+            (base, value, rest, exponent.clone())
+        };
+        let small_integer = whole.abs().to_integer().to_u32().filter(|&n| n <= 16);
+        if let (true, Some(n)) = (whole.is_integer(), small_integer) {
             // f^n - k^n = r (f^(n-1) + f^(n-2) k + ... + k^(n-1))
             let terms: Vec<Expr> = (0..n)
                 .map(|m| {

@@ -1,7 +1,7 @@
 //! Values modulo a prime, which tell at once that most expressions do not vanish.
 //!
 //! To [vanish](Graph::vanishes) is to be zero whatever the values of symbols, function values and broken powers, but
-//! that `sin^2 + cos^2 = 1`. With values in the integers modulo a prime, chosen without a pattern, an expression that
+//! that `sin^2 + cos^2 = 1` and `sqrt(x)^2 = x`. With values in the integers modulo a prime, chosen without a pattern, an expression that
 //! vanishes is zero; one that is not zero there is refuted without rounding. Where it is zero, polynomials decide.
 
 use crate::{Expr, Function, Graph, Node, Rational};
@@ -39,8 +39,11 @@ impl Graph {
             Node::Product(factors) => {
                 let mut product = 1;
                 for (base, exponent) in &factors {
+                    let twice = exponent * Rational::from(2);
                     let factor = if exponent.is_integer() {
                         of_power(self.residue(*base)?, exponent)?
+                    } else if twice.is_integer() {
+                        of_power(square_root(self.residue(*base)?)?, &twice)?
                     } else {
                         at_random((base, exponent))
                     };
@@ -58,7 +61,11 @@ impl Graph {
                 };
                 Some(times(above, inverse(add(1, square))?))
             }
-            Node::Pi | Node::Symbol(_) | Node::Call(..) => Some(at_random(expr)),
+            Node::Pi | Node::Symbol(_) | Node::Call(..) => {
+                // A square, so that it has a root.
+                let root = at_random(expr);
+                Some(times(root, root))
+            }
             Node::Whole(inner) => self.residue(inner),
         }
     }
@@ -90,6 +97,12 @@ fn raised(base: u64, mut exponent: u64) -> u64 {
         exponent >>= 1;
     }
     power
+}
+
+/// A root of the number, where it is a square: the prime is three more than a multiple of four.
+fn square_root(a: u64) -> Option<u64> {
+    let root = raised(a, PRIME.div_ceil(4));
+    (times(root, root) == a).then_some(root)
 }
 
 /// By Fermat's little theorem.
@@ -156,6 +169,8 @@ mod tests {
             "1/(1 + a/(b + c)) - (b + c)/(b + c + a)",
             "cos(a)^4 - sin(a)^4 - cos(a)^2 + sin(a)^2",
             "(ln(a) + ln(b))^2 - ln(a)^2 - 2*ln(a)*ln(b) - ln(b)^2",
+            "(sqrt(a) + sqrt(b))*(sqrt(a) - sqrt(b)) - a + b",
+            "1/(sqrt(a) + 1) + 1/sqrt(a)^3 - (sqrt(a)^3 + sqrt(a) + 1)/(a^2 + sqrt(a)^3)",
         ] {
             assert_eq!(residue(text), Some(0), "{text}");
         }

@@ -1,5 +1,6 @@
 //! Reading a specification: from the document to checked names, numbers and expressions.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use crate::coordinates::CARTESIAN;
@@ -9,7 +10,7 @@ use crate::law::energy::{INVARIANTS, component_names};
 use crate::read::LONGEST_FILE;
 use crate::scope::{Scope, Source};
 use crate::{Coordinates, CrossCheck, DeriveError, Diagnostic, Fields, Rotation, Solved};
-use mmsmith_expr::{Expr, Graph, Program};
+use mmsmith_expr::{Expr, Function, Graph, Node, Program};
 use toml::Spanned;
 
 /// A specification that has been read and checked.
@@ -401,6 +402,51 @@ const TAKEN_WORDS: &[&str] = &[
 ];
 
 impl Spec {
+    /// Forms displacements that vanish with a parameter, as `X*(cos(A*t) - 1)` does with `A`, from what is small with it: the
+    /// difference of two large terms is left to no rounding.
+    fn form_from_amplitude(&mut self) {
+        let graph = &mut self.graph;
+        let mut symbols: Vec<Expr> =
+            self.parameters.iter().map(|p| graph.symbol(&p.name)).collect();
+        // The usual name first.
+        symbols.sort_by_key(|symbol| graph.symbol_name(*symbol) != Some("A"));
+        let mut positive = BTreeMap::new();
+        if self.coordinates != Coordinates::Cartesian {
+            let radius = graph.symbol("R");
+            let square = graph.powi(radius, 2);
+            positive.insert(graph.sqrt(square), radius);
+        }
+        for component in &mut self.displacement {
+            let formed = symbols.iter().find_map(|symbol| {
+                let (value, rest) = graph.split_at_zero(*component, &BTreeSet::from([*symbol]));
+                let value = graph.replace(value, &positive);
+                (value == Graph::ZERO).then(|| graph.replace(rest, &positive))
+            });
+            *component = formed.unwrap_or(*component);
+        }
+        // `cos(a) - 1` has become `-2 sin(a/2)^2`; beside it `sin(a)` hides what the two have in common.
+        let two = graph.integer(2);
+        let mut by_half = BTreeMap::new();
+        let reachable = graph.reachable(&self.displacement);
+        for &part in &reachable {
+            let Node::Call(Function::Sin, arguments) = graph.node(part) else { continue };
+            let half = arguments[0];
+            let whole = graph.mul(two, half);
+            let (sine, cosine) =
+                (graph.call(Function::Sin, &[whole]), graph.call(Function::Cos, &[whole]));
+            if reachable.contains(&sine) || reachable.contains(&cosine) {
+                let cosine_of_half = graph.call(Function::Cos, &[half]);
+                by_half.insert(sine, graph.product_of([two, part, cosine_of_half]));
+                let square = graph.powi(part, 2);
+                let doubled = graph.mul(two, square);
+                by_half.insert(cosine, graph.sub(Graph::ONE, doubled));
+            }
+        }
+        for component in &mut self.displacement {
+            *component = graph.replace(*component, &by_half);
+        }
+    }
+
     /// Reads the text of a specification; `file` is what messages call it.
     ///
     /// # Errors
@@ -534,6 +580,7 @@ impl<'a> Reader<'a> {
         if let Some(table) = solve {
             spec.solve(&self.scope, table)?;
         }
+        spec.form_from_amplitude();
         Ok(spec)
     }
 
