@@ -1,5 +1,6 @@
 //! The worst factor of the acceptance rule, by field and class of inputs.
 
+use crate::double_double::QuickTruth;
 use crate::{
     Class, Oracle, OracleError, Point, Sampler, Sensitivity, exact, scientific, worst_factor,
 };
@@ -17,7 +18,7 @@ const DIGITS: usize = 40;
 /// The precision of the first look at a point.
 const QUICK_BITS: usize = 192;
 /// From this factor on the first look is not believed.
-const DOUBTFUL_FACTOR: f64 = 3.0;
+pub(crate) const DOUBTFUL_FACTOR: f64 = 3.0;
 
 /// Where amplitudes are tiny, so that squares of them are next to the smallest doubles, and far from the body, where
 /// exponentials are, what is smaller than this is not judged: its parts have lost their digits to the range of the format,
@@ -29,6 +30,9 @@ const FIRST_DRAWS: u64 = 8;
 
 /// The fields that are judged: each with its letter and its entries, row by row.
 pub type Judged = Vec<(&'static str, Vec<f64>)>;
+
+/// The code under test: the fields at inputs.
+pub type JudgedCode<'a> = &'a (dyn Fn(&[f64]) -> Result<Judged, String> + Sync);
 
 /// Why accuracy could not be measured.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -51,6 +55,15 @@ pub enum AccuracyError {
     },
 }
 
+/// How a point came to be judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Found {
+    /// Drawn at random.
+    Draw,
+    /// By a [`Search`](crate::Search) for the largest factor.
+    Search,
+}
+
 /// The worst factor of one field in one class.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Worst {
@@ -62,6 +75,10 @@ pub struct Worst {
     pub factor: f64,
     /// The inputs: position, time, parameters.
     pub inputs: Vec<f64>,
+    /// How the point was found.
+    pub found: Found,
+    /// Whether the point is outside of the body.
+    pub outside: bool,
     /// What the code gave.
     pub result: f64,
     /// The exact value, to 20 digits.
@@ -75,8 +92,10 @@ pub struct Worst {
 pub struct ClassAccuracy {
     /// The class.
     pub class: Class,
-    /// The points that were judged.
+    /// The points that were drawn and judged.
     pub points: usize,
+    /// The evaluations of a search.
+    pub searched: u64,
     /// Why there are none, or fewer than were asked for.
     pub remark: Option<&'static str>,
     /// The worst of each field.
@@ -99,15 +118,16 @@ pub struct Accuracy<'a> {
     inputs: Vec<Expr>,
     sensitivity: Sensitivity,
     quick_sensitivity: Program,
+    quick_truth: QuickTruth,
     /// How many products [`Sensitivity`] has for each expression.
     products: Vec<usize>,
 }
 
 /// One entry at one point.
-struct Finding {
-    field: usize,
-    entry: usize,
-    factor: f64,
+pub(crate) struct Finding {
+    pub(crate) field: usize,
+    pub(crate) entry: usize,
+    pub(crate) factor: f64,
 }
 
 impl<'a> Accuracy<'a> {
@@ -120,6 +140,7 @@ impl<'a> Accuracy<'a> {
         let sampler = Sampler::new(spec, &mut fields);
         let sensitivity = Sensitivity::new(&fields.graph, &fields.definitions, &inputs, &flat);
         let (quick_sensitivity, products) = sensitivity.in_doubles(&inputs);
+        let quick_truth = QuickTruth::new(fields.program(&flat));
         Accuracy {
             fields,
             sampler,
@@ -129,6 +150,7 @@ impl<'a> Accuracy<'a> {
             inputs,
             sensitivity,
             quick_sensitivity,
+            quick_truth,
             products,
         }
     }
@@ -152,11 +174,16 @@ impl<'a> Accuracy<'a> {
         &self,
         class: Class,
         points: usize,
-        judged: &(dyn Fn(&[f64]) -> Result<Judged, String> + Sync),
+        judged: JudgedCode<'_>,
         step: &(dyn Fn() + Sync),
     ) -> Result<ClassAccuracy, AccuracyError> {
-        let none =
-            |remark| ClassAccuracy { class, points: 0, remark: Some(remark), worst: Vec::new() };
+        let none = |remark| ClassAccuracy {
+            class,
+            points: 0,
+            searched: 0,
+            remark: Some(remark),
+            worst: Vec::new(),
+        };
         if let Some(remark) = self.sampler.not_applicable(class) {
             return Ok(none(remark));
         }
@@ -212,10 +239,10 @@ impl<'a> Accuracy<'a> {
         let mut confirmed: Vec<Worst> = Vec::new();
         for (index, finding) in worst.into_iter().flatten() {
             let inputs = self.sampler.draw(class, index).unwrap_or_default();
-            let worst = self.confirm(&inputs, &finding, &confirmed, judged)?;
+            let worst = self.confirm(&inputs, &finding, Found::Draw, &confirmed, judged)?;
             confirmed.push(worst);
         }
-        Ok(ClassAccuracy { class, points: count, remark, worst: confirmed })
+        Ok(ClassAccuracy { class, points: count, searched: 0, remark, worst: confirmed })
     }
 
     /// The worst entry of each field at one point.
@@ -224,7 +251,7 @@ impl<'a> Accuracy<'a> {
         class: Class,
         oracle: &mut Oracle,
         inputs: &[f64],
-        judged: &(dyn Fn(&[f64]) -> Result<Judged, String> + Sync),
+        judged: JudgedCode<'_>,
     ) -> Result<Vec<Finding>, AccuracyError> {
         let results = self.results(inputs, judged)?;
         let values = self.exact_inputs(inputs);
@@ -235,7 +262,7 @@ impl<'a> Accuracy<'a> {
         let mut terms = terms.iter();
         let mut truth = truth.iter();
         let mut products = self.products.iter();
-        let may_underflow = matches!(class, Class::TinyAmplitude | Class::Far | Class::Late);
+        let may_underflow = class.may_underflow();
         let mut findings = Vec::new();
         // What was judged before at this point: stages often give a single call's bits.
         let mut seen: Vec<(Expr, u64, f64)> = Vec::new();
@@ -267,8 +294,68 @@ impl<'a> Accuracy<'a> {
         Ok(findings)
     }
 
+    /// The sum `|q dy/dq|` for every entry of every field, in double precision.
+    pub(crate) fn quick_sensitivities(&self, inputs: &[f64]) -> Vec<f64> {
+        let terms = self.quick_sensitivity.evaluate(inputs);
+        let mut terms = terms.iter();
+        let sum = |&count: &usize| terms.by_ref().take(count).map(|term| term.abs()).sum();
+        self.products.iter().map(sum).collect()
+    }
+
+    /// The worst entry of each field at one point, in some 100 bits, with sensitivities that were computed there or within a few
+    /// units in the last place. The factor is infinite where nothing can be said without the oracle.
+    pub(crate) fn quick_look(
+        &self,
+        class: Class,
+        inputs: &[f64],
+        sensitivities: &[f64],
+        judged: JudgedCode<'_>,
+    ) -> Result<Vec<Finding>, AccuracyError> {
+        let results = self.results(inputs, judged)?;
+        let truth = self.quick_truth.evaluate(inputs);
+        let mut all = truth.iter().zip(sensitivities);
+        let mut findings = Vec::with_capacity(results.len());
+        for (field, results) in results.iter().enumerate() {
+            let mut worst = Finding { field, entry: 0, factor: -1.0 };
+            for (entry, (&result, (truth, &sens))) in results.iter().zip(&mut all).enumerate() {
+                let error = ((result - truth.high) - truth.low).abs();
+                let bound = 0.5 * f64::EPSILON * (sens + truth.high.abs());
+                let factor = if class.may_underflow() && sens < SMALLEST_JUDGED || error == 0.0 {
+                    0.0
+                } else if bound.is_finite() && !error.is_nan() {
+                    error / bound.max(f64::from_bits(1))
+                } else if class.may_underflow() {
+                    // What left the range of the format on the way is the commonest cause there.
+                    0.0
+                } else {
+                    f64::INFINITY
+                };
+                if factor > worst.factor {
+                    worst = Finding { field, entry, factor };
+                }
+            }
+            findings.push(worst);
+        }
+        Ok(findings)
+    }
+
+    /// What points are drawn from.
+    pub(crate) fn sampler(&self) -> &Sampler<'a> {
+        &self.sampler
+    }
+
+    /// The number of fields that are judged, each in one form.
+    pub(crate) fn field_count(&self) -> usize {
+        self.expressions.len()
+    }
+
+    /// The place of a field among those that are judged.
+    pub(crate) fn field_index(&self, letter: &str) -> Option<usize> {
+        self.expressions.iter().position(|(known, _)| *known == letter)
+    }
+
     /// The factor of one entry, its exact value and its sensitivity, in arbitrary precision.
-    fn settled(
+    pub(crate) fn settled(
         &self,
         inputs: &[f64],
         field: usize,
@@ -292,12 +379,13 @@ impl<'a> Accuracy<'a> {
     }
 
     /// The finding in arbitrary precision, unless one of those `known` is the same number at the same place.
-    fn confirm(
+    pub(crate) fn confirm(
         &self,
         inputs: &[f64],
         finding: &Finding,
+        found: Found,
         known: &[Worst],
-        judged: &(dyn Fn(&[f64]) -> Result<Judged, String> + Sync),
+        judged: JudgedCode<'_>,
     ) -> Result<Worst, AccuracyError> {
         let result = self.results(inputs, judged)?[finding.field][finding.entry];
         let (field, entries) = &self.expressions[finding.field];
@@ -320,6 +408,8 @@ impl<'a> Accuracy<'a> {
             entry: finding.entry,
             factor,
             inputs: inputs.to_vec(),
+            found,
+            outside: self.sampler.is_outside(inputs),
             result,
             exact: scientific(&truth, 20),
             sensitivity: scientific(&sens, 4),
@@ -327,10 +417,10 @@ impl<'a> Accuracy<'a> {
     }
 
     /// What the code under test gives, in the order of the fields and of the size that they have.
-    fn results(
+    pub(crate) fn results(
         &self,
         inputs: &[f64],
-        judged: &(dyn Fn(&[f64]) -> Result<Judged, String> + Sync),
+        judged: JudgedCode<'_>,
     ) -> Result<Vec<Vec<f64>>, AccuracyError> {
         let fail = |reason: String| AccuracyError::Evaluation { place: self.place(inputs), reason };
         let given = judged(inputs).map_err(fail)?;

@@ -7,7 +7,7 @@
 //! - [`worst_factor`] is the factor `K` of the acceptance rule `|r - g| <= K 2^-53 (sens + |g|)` for a
 //!   double-precision result `r` of the exact value `g`.
 //! - [`Accuracy`] measures the largest such factor over many points of a specification, by field and by [`Class`] of
-//!   inputs.
+//!   inputs; a [`Search`] goes from the worst of them to worse ones.
 //!
 //! Inputs and results are exact rationals; every finite double is one ([`exact`]).
 //!
@@ -29,15 +29,20 @@
 mod acceptance;
 mod accuracy;
 mod convert;
+mod double_double;
 mod evaluate;
 mod sample;
 mod scientific;
+mod search;
 mod sensitivity;
 
 pub use acceptance::worst_factor;
-pub use accuracy::{Accuracy, AccuracyError, ClassAccuracy, Judged, LARGEST_FACTOR, Worst};
+pub use accuracy::{
+    Accuracy, AccuracyError, ClassAccuracy, Found, Judged, JudgedCode, LARGEST_FACTOR, Worst,
+};
 pub use convert::exact;
 pub use evaluate::{Oracle, OracleError, Point};
 pub use sample::{Class, Sampler};
 pub use scientific::scientific;
+pub use search::{ROUND, Search};
 pub use sensitivity::Sensitivity;

@@ -1,14 +1,18 @@
 //! Points at which accuracy is measured, by class of inputs.
 
 use mmsmith_expr::{Expr, Graph, Program};
-use mmsmith_spec::{Domain, Fields, Spec};
+use mmsmith_spec::{Bound, Domain, Fields, Parameter, Relation, Spec};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
 /// How inputs are drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize,
+)]
+#[serde(rename_all = "kebab-case")]
 pub enum Class {
-    /// Parameters within 40 % of their defaults, a place in the body, a time within the period.
+    /// A place in the body, a time within the period. Of four sets of parameters three are within 40 % of their defaults, in
+    /// this class and in the others, and one is further away, by a factor of 10 at most or next to a bound.
     Ordinary,
     /// Amplitude smaller by a factor of 1e-4 to 1e-200.
     TinyAmplitude,
@@ -20,7 +24,7 @@ pub enum Class {
     NearInversion,
     /// Coordinates down to 1e-300; for a body around a hole, places next to the inner surface.
     NearOrigin,
-    /// Coordinates up to 1e8, outside of the body, where the functions go on.
+    /// Outside of the body, where the functions go on: coordinates up to 1e8, distances from a hole up to 1e3 radii, the hole.
     Far,
 }
 
@@ -35,6 +39,11 @@ impl Class {
         Class::NearOrigin,
         Class::Far,
     ];
+
+    /// Whether numbers leave the range of the format at these inputs.
+    pub(crate) fn may_underflow(self) -> bool {
+        matches!(self, Class::TinyAmplitude | Class::Far | Class::Late)
+    }
 
     /// The name in tables and files.
     #[must_use]
@@ -57,26 +66,68 @@ const MOST_DRAWS: usize = 100;
 const LARGEST_GRADIENT: f64 = 10.0;
 /// Below this ratio of volumes ordinary points count as inverted.
 const LEAST_JACOBIAN: f64 = 0.1;
+/// Parameters are at most so much larger or smaller than their defaults.
+const LARGEST_RATIO: f64 = 10.0;
+/// Next to a bound that it must not meet, a parameter keeps this distance: Poisson's ratio is at most 1/2 - 1e-8.
+const NEAREST_TO_BOUND: f64 = 1e-8;
+/// An amplitude counts as tiny below this share of its default, and has this share at least.
+const TINY: f64 = 1.4e-4;
+const TINIEST: f64 = 1e-201;
+/// What is next to the boundary is within this share of the body's size.
+const NEXT_TO: f64 = 1e-9;
+/// Late times end at so many periods.
+const MOST_PERIODS: f64 = 1e6;
+/// How far from the body coordinates go, and distances from a hole in outer radii.
+const FARTHEST: f64 = 1e8;
+const FARTHEST_RADII: f64 = 1e3;
+/// The smallest stretches of bodies that count as near inversion.
+const NEAR_INVERSION: std::ops::RangeInclusive<f64> = 0.5e-8..=2e-2;
 
 /// The same numbers on every machine.
-struct Random(SplitMix64);
+pub(crate) struct Random(SplitMix64);
 
 impl Random {
-    fn new(seed: u64) -> Self {
+    pub(crate) fn new(seed: u64) -> Self {
         Random(SplitMix64::seed_from_u64(seed))
     }
 
-    fn bits(&mut self) -> u64 {
+    /// The numbers of a stream that three numbers name.
+    pub(crate) fn of_three(one: u64, two: u64, three: u64) -> Self {
+        let mut random = Random::new(one);
+        for number in [two, three] {
+            // Neighbouring seeds begin alike.
+            random = Random::new(random.bits() ^ number);
+            random.bits();
+        }
+        random
+    }
+
+    /// A whole number below `n`, which is not zero.
+    pub(crate) fn below(&mut self, n: usize) -> usize {
+        (self.bits() % n as u64) as usize
+    }
+
+    pub(crate) fn bits(&mut self) -> u64 {
         self.0.next_u64()
     }
 
-    fn between(&mut self, low: f64, high: f64) -> f64 {
+    pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    fn one_in(&mut self, n: u64) -> bool {
+    pub(crate) fn one_in(&mut self, n: u64) -> bool {
         self.bits().is_multiple_of(n)
     }
+}
+
+/// How one input may be changed.
+pub(crate) struct Scale {
+    /// The size that a change has at most.
+    pub(crate) size: f64,
+    /// Values at which terms vanish or coincide.
+    pub(crate) special: Vec<f64>,
+    /// Both bounds of a parameter that has two.
+    pub(crate) bounds: Option<(f64, f64)>,
 }
 
 /// Draws points of one specification.
@@ -121,9 +172,6 @@ impl<'a> Sampler<'a> {
                 Some("there is no amplitude A")
             }
             (Class::NearInversion, _) if self.isochoric => Some("J = 1 for every amplitude"),
-            (Class::Far, Domain::Annulus { .. }) => {
-                Some("the profile over the radius is meant for the body only")
-            }
             _ => None,
         }
     }
@@ -144,35 +192,201 @@ impl<'a> Sampler<'a> {
             if class == Class::NearInversion {
                 return self.nearly_inverted(inputs, &mut random);
             }
-            let moderate = |h: &f64| h.abs() < LARGEST_GRADIENT;
-            let suits = self.jacobian.evaluate(&inputs)[0] > LEAST_JACOBIAN
-                && self.gradient.evaluate(&inputs).iter().all(moderate);
-            suits.then_some(inputs)
+            self.is_moderate(&inputs).then_some(inputs)
         })
+    }
+
+    fn is_moderate(&self, inputs: &[f64]) -> bool {
+        let moderate = |h: &f64| h.abs() < LARGEST_GRADIENT;
+        self.jacobian.evaluate(inputs)[0] > LEAST_JACOBIAN
+            && self.gradient.evaluate(inputs).iter().all(moderate)
+    }
+
+    /// Whether inputs that were not drawn are such as [`Sampler::draw`] may give for `class`, but for the deformation, which
+    /// [`Sampler::deformation_suits`] judges.
+    pub(crate) fn belongs(&self, class: Class, inputs: &[f64]) -> bool {
+        let n = self.spec.dimension;
+        let (position, rest) = inputs.split_at(n);
+        let (time, parameters) = (rest[0], &rest[1..]);
+        let Some((period, measures)) = self.admitted(parameters) else { return false };
+        let last = if class == Class::Late { MOST_PERIODS * period } else { period };
+        let mut all = self.spec.parameters.iter().zip(parameters).enumerate();
+        (0.0..=last).contains(&time)
+            && all.all(|(place, (parameter, &value))| {
+                self.parameter_belongs(class, place, parameter, value)
+            })
+            && self.position_belongs(class, position, &measures)
+    }
+
+    /// Whether the deformation at the inputs is one of `class`.
+    pub(crate) fn deformation_suits(&self, class: Class, inputs: &[f64]) -> bool {
+        match class {
+            Class::NearInversion => NEAR_INVERSION.contains(&self.smallest_stretch(inputs)),
+            _ => self.is_moderate(inputs),
+        }
+    }
+
+    fn parameter_belongs(
+        &self,
+        class: Class,
+        place: usize,
+        parameter: &Parameter,
+        value: f64,
+    ) -> bool {
+        let is_strict = |bound: &&Bound| {
+            matches!(bound.relation, Relation::Less | Relation::Greater) && bound.limit != 0.0
+        };
+        if parameter
+            .bounds
+            .iter()
+            .filter(is_strict)
+            .any(|bound| (value - bound.limit).abs() < NEAREST_TO_BOUND)
+        {
+            return false;
+        }
+        let ratio = (value / parameter.default).abs();
+        let is_amplitude = self.amplitude == Some(place);
+        match class {
+            Class::TinyAmplitude if is_amplitude => (TINIEST..=TINY).contains(&ratio),
+            // The amplitude at which the body is inverted may be any.
+            Class::NearInversion if is_amplitude => value.is_finite(),
+            _ if between_bounds(parameter).is_some() || value == 0.0 => true,
+            _ => (1.0 / LARGEST_RATIO..=LARGEST_RATIO).contains(&ratio),
+        }
+    }
+
+    fn position_belongs(&self, class: Class, position: &[f64], measures: &[f64]) -> bool {
+        let n = self.spec.dimension;
+        match &self.spec.domain {
+            Domain::Box { .. } => {
+                let inside = |i: usize| {
+                    let (low, high) = (measures[i], measures[n + i]);
+                    let x = position[i];
+                    match class {
+                        Class::Far => x.abs() <= FARTHEST * low.abs().max(high.abs()),
+                        Class::NearOrigin => (low.min(0.0)..=high.max(0.0)).contains(&x),
+                        _ => (low..=high).contains(&x),
+                    }
+                };
+                let at_end = |i: usize| {
+                    let (low, high) = (measures[i], measures[n + i]);
+                    let x = position[i];
+                    (x - low).abs().min((high - x).abs()) <= NEXT_TO * (high - low)
+                };
+                (0..n).all(inside) && (class != Class::Boundary || (0..n).any(at_end))
+            }
+            Domain::Annulus { .. } => {
+                let (inner, outer) = (measures[0], measures[1]);
+                let radius = length(position);
+                let near = |x: f64| (radius - x).abs() <= NEXT_TO * (outer - inner);
+                let in_body = radius_is_between(radius, inner, outer);
+                let in_class = match class {
+                    Class::Far => radius > 0.0 && radius <= FARTHEST_RADII * outer,
+                    Class::NearOrigin => in_body && radius - inner <= 0.1 * (outer - inner),
+                    Class::Boundary => {
+                        in_body
+                            && (near(inner)
+                                || near(outer)
+                                || position.iter().any(|&x| x <= NEXT_TO * radius))
+                    }
+                    _ => in_body,
+                };
+                in_class && position.iter().all(|&x| x >= 0.0)
+            }
+        }
+    }
+
+    /// Whether the position is outside of the body.
+    #[must_use]
+    pub fn is_outside(&self, inputs: &[f64]) -> bool {
+        let n = self.spec.dimension;
+        let zeros = vec![0.0; n + 1];
+        let constants = self.constants.evaluate(&[&zeros, &inputs[n + 1..]].concat());
+        let measures = &constants[2 * self.spec.requirements.len() + 1..];
+        match &self.spec.domain {
+            Domain::Box { .. } => {
+                (0..n).any(|i| !(measures[i]..=measures[n + i]).contains(&inputs[i]))
+            }
+            Domain::Annulus { .. } => {
+                !radius_is_between(length(&inputs[..n]), measures[0], measures[1])
+            }
+        }
+    }
+
+    /// For each input the size that a change of it has at most, and values that are worth a try.
+    pub(crate) fn scales(&self, class: Class, inputs: &[f64]) -> Vec<Scale> {
+        let n = self.spec.dimension;
+        let Some((period, measures)) = self.admitted(&inputs[n + 1..]) else {
+            return Vec::new();
+        };
+        let mut scales = Vec::new();
+        for i in 0..n {
+            let (low, high) = match &self.spec.domain {
+                Domain::Box { .. } => (measures[i], measures[n + i]),
+                Domain::Annulus { .. } => (0.0, measures[1]),
+            };
+            let far = if class == Class::Far { inputs[i].abs() } else { 0.0 };
+            let middle = low + 0.5 * (high - low);
+            scales.push(Scale {
+                size: (high - low).max(far),
+                special: vec![low, high, middle, 0.0, -inputs[i]],
+                bounds: None,
+            });
+        }
+        let late = if class == Class::Late { inputs[n].abs() } else { 0.0 };
+        scales.push(Scale {
+            size: period.max(late),
+            special: (0..=8).map(|eighth| period * f64::from(eighth) / 8.0).collect(),
+            bounds: None,
+        });
+        for (parameter, &value) in self.spec.parameters.iter().zip(&inputs[n + 1..]) {
+            let inclusive =
+                |b: &&Bound| matches!(b.relation, Relation::LessOrEqual | Relation::GreaterOrEqual);
+            let limits = parameter.bounds.iter().filter(inclusive).map(|bound| bound.limit);
+            let usual = [0.0, -value, 0.5 * value, 2.0 * value, parameter.default];
+            scales.push(Scale {
+                size: value.abs().max(0.1 * parameter.default.abs()),
+                special: usual.into_iter().chain(limits).collect(),
+                bounds: between_bounds(parameter),
+            });
+        }
+        scales
     }
 
     fn attempt(&self, class: Class, random: &mut Random) -> Option<Vec<f64>> {
         let spec = self.spec;
         let mut parameters: Vec<f64> = Vec::new();
+        let is_wide = random.one_in(4);
         for (place, parameter) in spec.parameters.iter().enumerate() {
             let mut value = parameter.default * random.between(0.6, 1.4);
+            if is_wide {
+                value = wide(parameter, random);
+            }
             if self.amplitude == Some(place) {
-                if class == Class::Ordinary && random.one_in(4) {
+                if random.one_in(4) {
                     value = -value;
                 }
                 if class == Class::TinyAmplitude {
                     value *= 10_f64.powf(-random.between(4.0, 200.0));
                 }
             }
-            if parameter.name == "nu" && random.one_in(3) {
-                value = 0.0;
+            if parameter.name == "nu" {
+                if random.one_in(3) {
+                    value = 0.0;
+                } else if random.one_in(4) {
+                    value = 0.5 - 10_f64.powf(-random.between(1.1, 8.0));
+                }
             }
             parameters.push(value);
         }
         let (period, measures) = self.admitted(&parameters)?;
         let mut inputs = self.position(class, &measures, random);
         let late = if class == Class::Late { 10_f64.powf(random.between(2.0, 6.0)) } else { 1.0 };
-        inputs.push(period * random.between(0.0, 1.0) * late);
+        let share = random.between(0.0, 1.0);
+        // Now and then where the phase is a multiple of an eighth, zero among them.
+        let share =
+            if random.one_in(8) { (8.0 * share * late).round() / 8.0 } else { share * late };
+        inputs.push(period * share);
         inputs.extend(parameters);
         Some(inputs)
     }
@@ -225,7 +439,7 @@ impl<'a> Sampler<'a> {
         };
         let share = bisect(0.0, 1.0, |share| self.smallest_stretch(&between(share)) > wanted);
         let found = between(share);
-        let suits = (0.5e-8..=2e-2).contains(&self.smallest_stretch(&found));
+        let suits = NEAR_INVERSION.contains(&self.smallest_stretch(&found));
         (suits && self.admits(&found)).then_some(found)
     }
 
@@ -337,15 +551,64 @@ impl<'a> Sampler<'a> {
                         let x = random.between(inner, outer);
                         inner + (x - inner) * 10_f64.powf(-random.between(1.0, 15.0))
                     }
+                    Class::Far if random.one_in(4) => {
+                        inner * 10_f64.powf(-random.between(0.0, 2.0))
+                    }
+                    // Most profiles grow fast: the nearer places are those that suit.
+                    Class::Far => {
+                        outer * (1.0 + FARTHEST_RADII * 10_f64.powf(-random.between(0.0, 6.0)))
+                    }
                     _ => place(inner, outer, random),
                 };
-                let angle = place(0.0, std::f64::consts::FRAC_PI_2, random);
-                let mut X = vec![radius * angle.cos(), radius * angle.sin()];
-                X.extend((2..n).map(|_| random.between(0.0, 1.0)));
-                X
+                let quarter = std::f64::consts::FRAC_PI_2;
+                let angle = place(0.0, quarter, random);
+                // On a plane of symmetry the coordinate is zero.
+                let cosine = if angle == quarter { 0.0 } else { angle.cos() };
+                if n == 2 {
+                    return vec![radius * cosine, radius * angle.sin()];
+                }
+                let polar = place(0.0, quarter, random);
+                let height = if polar == quarter { 0.0 } else { polar.cos() };
+                let distance = radius * polar.sin();
+                vec![distance * cosine, distance * angle.sin(), radius * height]
             }
         }
     }
+}
+
+/// A parameter away from its default: by a factor of 2 to 10, or next to one of its bounds, or on it.
+fn wide(parameter: &Parameter, random: &mut Random) -> f64 {
+    if let Some((low, high)) = between_bounds(parameter).filter(|_| random.one_in(2)) {
+        let distance = (high - low) * 10_f64.powf(-random.between(0.5, 7.0));
+        return if random.one_in(2) { low + distance } else { high - distance };
+    }
+    let inclusive = parameter
+        .bounds
+        .iter()
+        .find(|b| matches!(b.relation, Relation::LessOrEqual | Relation::GreaterOrEqual));
+    if let Some(bound) = inclusive.filter(|_| random.one_in(4)) {
+        return bound.limit;
+    }
+    let factor = 10_f64.powf(random.between(2_f64.log10(), LARGEST_RATIO.log10()));
+    if random.one_in(2) { parameter.default * factor } else { parameter.default / factor }
+}
+
+/// Both limits of a parameter that has two.
+fn between_bounds(parameter: &Parameter) -> Option<(f64, f64)> {
+    match parameter.bounds[..] {
+        [one, other] => Some((one.limit.min(other.limit), one.limit.max(other.limit))),
+        _ => None,
+    }
+}
+
+fn length(x: &[f64]) -> f64 {
+    x.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// To the rounding of the radius itself.
+fn radius_is_between(radius: f64, inner: f64, outer: f64) -> bool {
+    let slack = 8.0 * f64::EPSILON * outer;
+    (inner - slack..=outer + slack).contains(&radius)
 }
 
 /// The last number from `low` to `high` for which `holds`, which does for `low` and does not for `high`.

@@ -1,29 +1,58 @@
-//! `mms check --thorough`: how large are the rounding errors of the field code?
+//! `mms check --thorough`: how large do the rounding errors of the field code become?
+
+mod state;
 
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, anyhow, bail};
-use mmsmith_oracle::{Accuracy, Class, ClassAccuracy, Judged, LARGEST_FACTOR};
+use mmsmith_oracle::{
+    Accuracy, Class, ClassAccuracy, Found, Judged, JudgedCode, LARGEST_FACTOR, Search, Worst,
+};
 use mmsmith_solutions::build;
 use mmsmith_spec::Spec;
 use serde_json::{Value, json};
 
 use crate::arguments::CheckOptions;
-use crate::json::Output;
+use crate::json::{Output, prepare_folder};
 use crate::library::{locate, names};
 use crate::progress::Bar;
 use crate::table::Table;
 use crate::terminal;
+use state::State;
 
-/// Points in each class where the caller does not say.
-const POINTS: usize = 10_000;
+/// Points that are drawn in each class where the caller does not say, and where the search has a time to itself.
+const POINTS: usize = 300;
+const POINTS_BEFORE_TIMED_SEARCH: usize = 30;
+/// So many points drawn give the search one round, where it has no time to itself.
+const POINTS_OF_ROUND: usize = 4;
 /// Points between two moves of the bar.
 const STRIDE: usize = 16;
+/// A kept state is never older than this.
+const KEPT_EVERY: Duration = Duration::from_secs(10);
+/// As many of the worst points are shown with all of their inputs.
+const SHOWN: usize = 4;
+
+/// How much is searched in each solution.
+#[derive(Clone, Copy)]
+enum Budget {
+    Rounds(usize),
+    Time(Duration),
+}
 
 pub(crate) fn thorough(options: &CheckOptions) -> Result<bool> {
     let output = Output::prepare_if(options.json.as_ref())?;
-    let points = options.points.unwrap_or(POINTS);
+    let usual = if options.seconds.is_some() { POINTS_BEFORE_TIMED_SEARCH } else { POINTS };
+    let points = options.points.unwrap_or(usual);
+    let budget = match options.seconds {
+        Some(seconds) => Budget::Time(Duration::from_secs_f64(seconds)),
+        None => Budget::Rounds(points.div_ceil(POINTS_OF_ROUND)),
+    };
+    if let Some(folder) = &options.state {
+        prepare_folder(folder).context("--state")?;
+    }
     let names = if options.solutions.is_empty() { names() } else { options.solutions.clone() };
     if names.is_empty() {
         bail!("there is no solution to check");
@@ -37,11 +66,16 @@ pub(crate) fn thorough(options: &CheckOptions) -> Result<bool> {
         })
         .collect::<Result<Vec<(&str, Spec, bool)>>>()?;
     let mut results = Vec::new();
+    let mut all: Vec<Shown> = Vec::new();
     let mut passed = true;
     for (name, spec, is_generated) in &specs {
         let fields = spec.derive().with_context(|| (*name).to_owned())?;
         let accuracy = Accuracy::new(spec, fields);
-        let classes = measure(name, *is_generated, spec, &accuracy, points)?;
+        let begun = Instant::now();
+        let subject =
+            Subject { name, is_generated: *is_generated, spec, folder: options.state.as_deref() };
+        let classes = subject.measure(&accuracy, points, budget, begun)?;
+        all.extend(shown(&spec.name, &accuracy, &classes));
         let good = classes.iter().flat_map(|c| &c.worst).all(|w| w.factor <= LARGEST_FACTOR);
         terminal::say(&text(&spec.name, good, &accuracy, &classes))?;
         passed &= good;
@@ -49,6 +83,7 @@ pub(crate) fn thorough(options: &CheckOptions) -> Result<bool> {
             "solution": spec.name,
             "code": if *is_generated { "generated" } else { "interpreted" },
             "points": classes.iter().map(|c| (c.class.name(), c.points)).collect::<BTreeMap<_, _>>(),
+            "searched": classes.iter().map(|c| (c.class.name(), c.searched)).collect::<BTreeMap<_, _>>(),
             "remarks": classes
                 .iter()
                 .filter_map(|c| Some((c.class.name(), c.remark?)))
@@ -57,6 +92,7 @@ pub(crate) fn thorough(options: &CheckOptions) -> Result<bool> {
             "passed": good,
         }));
     }
+    terminal::say(&worst_of_all(all))?;
     terminal::say(&format!(
         "K is the least factor in |result - exact| <= K 2^-53 (sens + |exact|), sens the sum of |q dy/dq| over all inputs q. \
          Allowed: {LARGEST_FACTOR}.\n"
@@ -69,6 +105,7 @@ pub(crate) fn thorough(options: &CheckOptions) -> Result<bool> {
                 "solutions": names,
                 "thorough": true,
                 "points": points,
+                "seconds": options.seconds,
                 "largest_factor": LARGEST_FACTOR,
             },
             "results": results,
@@ -78,44 +115,170 @@ pub(crate) fn thorough(options: &CheckOptions) -> Result<bool> {
     Ok(passed)
 }
 
-/// Every class in turn: the generated functions of a solution of the library, the interpreted programs of a file.
-fn measure(
-    name: &str,
+/// The code whose rounding errors are measured.
+struct Subject<'a> {
+    name: &'a str,
     is_generated: bool,
-    spec: &Spec,
-    accuracy: &Accuracy<'_>,
-    points: usize,
-) -> Result<Vec<ClassAccuracy>> {
-    let n = accuracy.dimension();
-    let programs = if is_generated { Vec::new() } else { accuracy.programs() };
-    let judged = |inputs: &[f64]| -> Result<Judged, String> {
-        if !programs.is_empty() {
-            return Ok(programs.iter().map(|(letter, p)| (*letter, p.evaluate(inputs))).collect());
+    spec: &'a Spec,
+    /// Where the state of the search is kept, if anywhere.
+    folder: Option<&'a Path>,
+}
+
+impl Subject<'_> {
+    /// Every class: the generated functions of a solution of the library, the interpreted programs of a file.
+    fn measure(
+        &self,
+        accuracy: &Accuracy<'_>,
+        points: usize,
+        budget: Budget,
+        begun: Instant,
+    ) -> Result<Vec<ClassAccuracy>> {
+        let n = accuracy.dimension();
+        let name = self.name;
+        let programs = if self.is_generated { Vec::new() } else { accuracy.programs() };
+        let judged = |inputs: &[f64]| -> Result<Judged, String> {
+            if !programs.is_empty() {
+                let values = programs.iter().map(|(letter, p)| (*letter, p.evaluate(inputs)));
+                return Ok(values.collect());
+            }
+            let solution = build::<f64>(name, &inputs[n + 1..])
+                .ok_or_else(|| format!("there is no solution '{name}'"))?
+                .map_err(|error| error.to_string())?;
+            solution
+                .each_field(&inputs[..n], inputs[n])
+                .ok_or_else(|| format!("the solution '{name}' does not have {n} dimensions"))
+        };
+        // Whether it can go on is known before any work.
+        let state = match self.folder {
+            Some(folder) => State::read(folder, self.spec, accuracy, self.is_generated, &judged)?,
+            None => None,
+        };
+        let bar = Bar::new(&self.spec.name);
+        let drawn = self.draw(accuracy, points, &judged, &bar.part(0.0, 0.3))?;
+        let mut search = state.unwrap_or_else(|| Search::new(accuracy));
+        for class in &drawn {
+            search.begin_at(accuracy, class);
         }
-        let solution = build::<f64>(name, &inputs[n + 1..])
-            .ok_or_else(|| format!("there is no solution '{name}'"))?
-            .map_err(|error| error.to_string())?;
-        solution
-            .each_field(&inputs[..n], inputs[n])
-            .ok_or_else(|| format!("the solution '{name}' does not have {n} dimensions"))
-    };
-    let bar = Bar::new(&spec.name);
-    Class::ALL
-        .into_iter()
-        .map(|class| {
-            let done = AtomicUsize::new(0);
-            let step = || {
-                let step = 1 + done.fetch_add(1, Ordering::Relaxed);
-                if step.is_multiple_of(STRIDE) {
-                    let what = || format!("{}, {}", spec.name, class.name());
-                    bar.show_share(what, step as f64 / points as f64);
-                }
+        self.search(accuracy, &mut search, budget, begun, &judged, &bar.part(0.3, 1.0))?;
+        let worst = drawn.into_iter().map(|class| search.worst(accuracy, class, &judged));
+        worst.collect::<Result<_, _>>().with_context(|| self.spec.name.clone())
+    }
+
+    fn draw(
+        &self,
+        accuracy: &Accuracy<'_>,
+        points: usize,
+        judged: JudgedCode<'_>,
+        bar: &Bar,
+    ) -> Result<Vec<ClassAccuracy>> {
+        let classes = Class::ALL.into_iter().enumerate();
+        classes
+            .map(|(number, class)| {
+                let done = AtomicUsize::new(0);
+                let step = || {
+                    let step = 1 + done.fetch_add(1, Ordering::Relaxed);
+                    if step.is_multiple_of(STRIDE) {
+                        let what = || format!("{}, {}", self.spec.name, class.name());
+                        let share = number as f64 + step as f64 / points as f64;
+                        bar.show_share(what, share / Class::ALL.len() as f64);
+                    }
+                };
+                accuracy
+                    .measure(class, points, judged, &step)
+                    .map_err(|error| anyhow!("{}: {}: {error}", self.spec.name, class.name()))
+            })
+            .collect()
+    }
+
+    /// Searches as long as the budget says, a round at least, and keeps the state.
+    fn search(
+        &self,
+        accuracy: &Accuracy<'_>,
+        search: &mut Search,
+        budget: Budget,
+        begun: Instant,
+        judged: JudgedCode<'_>,
+        bar: &Bar,
+    ) -> Result<()> {
+        let first = search.rounds();
+        let keep = |search: &Search| match self.folder {
+            Some(folder) => State::write(folder, self.spec, self.is_generated, search),
+            None => Ok(()),
+        };
+        let mut kept = Instant::now();
+        loop {
+            search.advance(accuracy, judged).with_context(|| self.spec.name.clone())?;
+            let share = match budget {
+                Budget::Rounds(rounds) => (search.rounds() - first) as f64 / rounds as f64,
+                Budget::Time(time) => begun.elapsed().as_secs_f64() / time.as_secs_f64(),
             };
-            accuracy
-                .measure(class, points, &judged, &step)
-                .map_err(|error| anyhow!("{}: {}: {error}", spec.name, class.name()))
+            if share >= 1.0 {
+                return keep(search);
+            }
+            if kept.elapsed() > KEPT_EVERY {
+                keep(search)?;
+                kept = Instant::now();
+            }
+            let what = || format!("{}, {} searched", self.spec.name, search.evaluations());
+            bar.show_share(what, share);
+        }
+    }
+}
+
+/// One of the worst points, as it is printed.
+struct Shown {
+    factor: f64,
+    text: String,
+}
+
+fn shown(name: &str, accuracy: &Accuracy<'_>, classes: &[ClassAccuracy]) -> Vec<Shown> {
+    let all = classes.iter().flat_map(|class| class.worst.iter().map(move |worst| (class, worst)));
+    let mut all: Vec<_> = all.collect();
+    all.sort_by(|a, b| b.1.factor.total_cmp(&a.1.factor));
+    // Stages and single calls often give the same bits at the same place, which are one point.
+    let mut distinct: Vec<(&ClassAccuracy, &Worst)> = Vec::new();
+    for (class, worst) in all {
+        let is_known = |known: &&(&ClassAccuracy, &Worst)| {
+            known.1.inputs == worst.inputs && known.1.result.to_bits() == worst.result.to_bits()
+        };
+        if distinct.iter().find(is_known).is_none() {
+            distinct.push((class, worst));
+        }
+    }
+    distinct
+        .into_iter()
+        .take(SHOWN)
+        .map(|(class, worst)| Shown {
+            factor: worst.factor,
+            text: format!(
+                "{name}, {}{}: {}[{}] = {:?}, exact {}, found by {}, at {}",
+                class.class.name(),
+                if worst.outside { ", outside of the body" } else { "" },
+                worst.field,
+                worst.entry,
+                worst.result,
+                worst.exact,
+                found(worst.found),
+                accuracy.place(&worst.inputs)
+            ),
         })
         .collect()
+}
+
+fn worst_of_all(mut all: Vec<Shown>) -> String {
+    all.sort_by(|a, b| b.factor.total_cmp(&a.factor));
+    let mut text = "The worst of all:\n".to_owned();
+    for shown in all.into_iter().take(SHOWN) {
+        text += &format!("  K = {:.3}, {}\n", shown.factor, shown.text);
+    }
+    text
+}
+
+fn found(found: Found) -> &'static str {
+    match found {
+        Found::Draw => "draw",
+        Found::Search => "search",
+    }
 }
 
 fn text(name: &str, passed: bool, accuracy: &Accuracy<'_>, classes: &[ClassAccuracy]) -> String {
@@ -126,11 +289,12 @@ fn text(name: &str, passed: bool, accuracy: &Accuracy<'_>, classes: &[ClassAccur
         .max_by_key(|c| c.worst.len())
         .map(|c| c.worst.iter().map(|w| w.field).collect())
         .unwrap_or_default();
-    let mut table = Table::new(1, ["class", "points"].into_iter().chain(letters));
+    let mut table = Table::new(1, ["class", "drawn", "searched"].into_iter().chain(letters));
     for class in classes {
         let factors = class.worst.iter().map(|worst| factor(worst.factor));
-        let row = [class.class.name().to_owned(), class.points.to_string()];
-        table.row(row.into_iter().chain(factors));
+        let counts = [class.points.to_string(), class.searched.to_string()];
+        let row = [class.class.name().to_owned()].into_iter().chain(counts);
+        table.row(row.chain(factors));
     }
     text += &table.text();
     for class in classes {
@@ -143,13 +307,15 @@ fn text(name: &str, passed: bool, accuracy: &Accuracy<'_>, classes: &[ClassAccur
     let beyond = all.filter(|(_, worst)| worst.factor > LARGEST_FACTOR);
     for (class, worst) in worst.into_iter().filter(|w| w.1.factor <= LARGEST_FACTOR).chain(beyond) {
         text += &format!(
-            "  worst, {}: {}[{}] = {:?} has K = {:.3}, exact {}, at {}\n",
+            "  worst, {}{}: {}[{}] = {:?} has K = {:.3}, exact {}, found by {}, at {}\n",
             class.class.name(),
+            if worst.outside { ", outside of the body" } else { "" },
             worst.field,
             worst.entry,
             worst.result,
             worst.factor,
             worst.exact,
+            found(worst.found),
             accuracy.place(&worst.inputs)
         );
     }
@@ -175,6 +341,10 @@ fn rows(solution: &str, accuracy: &Accuracy<'_>, classes: &[ClassAccuracy]) -> V
                 "field": worst.field,
                 "entry": worst.entry,
                 "K": worst.factor,
+                "found": found(worst.found),
+                "outside": worst.outside,
+                "drawn": class.points,
+                "searched": class.searched,
                 "worst": {
                     "X": worst.inputs[..n],
                     "t": worst.inputs[n],
