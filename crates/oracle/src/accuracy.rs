@@ -8,6 +8,7 @@ use mmsmith_expr::{Expr, Program, Rational, Slot};
 use mmsmith_spec::{Fields, Spec};
 use mmsmith_stage::{FieldName, Staged};
 use rayon::prelude::*;
+use std::sync::OnceLock;
 use thiserror::Error;
 
 /// The factor `K` that every field of every solution keeps.
@@ -121,6 +122,8 @@ pub struct Accuracy<'a> {
     quick_truth: QuickTruth,
     /// How many products [`Sensitivity`] has for each expression.
     products: Vec<usize>,
+    /// Why there are no points of each class, once it is known.
+    not_applicable: [OnceLock<Option<&'static str>>; Class::ALL.len()],
 }
 
 /// One entry at one point.
@@ -152,6 +155,7 @@ impl<'a> Accuracy<'a> {
             quick_sensitivity,
             quick_truth,
             products,
+            not_applicable: Default::default(),
         }
     }
 
@@ -184,16 +188,8 @@ impl<'a> Accuracy<'a> {
             remark: Some(remark),
             worst: Vec::new(),
         };
-        if let Some(remark) = self.sampler.not_applicable(class) {
+        if let Some(remark) = self.not_applicable(class) {
             return Ok(none(remark));
-        }
-        if (0..FIRST_DRAWS).into_par_iter().all(|index| self.sampler.draw(class, index).is_none()) {
-            return Ok(none(match class {
-                Class::NearInversion => {
-                    "the bounds of the parameters keep the smallest stretch above 1e-2"
-                }
-                _ => "the body would be inverted there",
-            }));
         }
         let found: Vec<Result<Option<Vec<Finding>>, AccuracyError>> = (0..points as u64)
             .into_par_iter()
@@ -337,6 +333,26 @@ impl<'a> Accuracy<'a> {
             findings.push(worst);
         }
         Ok(findings)
+    }
+
+    /// Why there are no points of this class; `None` where there are some.
+    #[must_use]
+    pub fn not_applicable(&self, class: Class) -> Option<&'static str> {
+        let find = || {
+            let remark = self.sampler.not_applicable(class);
+            if remark.is_some() {
+                return remark;
+            }
+            let fails = |index| self.sampler.draw(class, index).is_none();
+            (0..FIRST_DRAWS).into_par_iter().all(fails).then_some(match class {
+                Class::NearInversion => {
+                    "the bounds of the parameters keep the smallest stretch above 1e-2"
+                }
+                _ => "the body would be inverted there",
+            })
+        };
+        // Draws that fail take long.
+        *self.not_applicable[class as usize].get_or_init(find)
     }
 
     /// What points are drawn from.

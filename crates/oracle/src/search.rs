@@ -76,7 +76,7 @@ impl Search {
     /// The search that knows nothing yet.
     #[must_use]
     pub fn new(accuracy: &Accuracy<'_>) -> Self {
-        let applies = |class: &Class| accuracy.sampler().not_applicable(*class).is_none();
+        let applies = |class: &Class| accuracy.not_applicable(*class).is_none();
         let fields = accuracy.field_count();
         let classes = Class::ALL
             .into_iter()
