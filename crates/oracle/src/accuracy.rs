@@ -23,7 +23,7 @@ pub(crate) const DOUBTFUL_FACTOR: f64 = 3.0;
 
 /// Where amplitudes are tiny, so that squares of them are next to the smallest doubles, and far from the body, where
 /// exponentials are, what is smaller than this is not judged: its parts have lost their digits to the range of the format,
-/// whatever the formula.
+/// whatever the formula. Elsewhere it is judged where the result is larger.
 const SMALLEST_JUDGED: f64 = 1e-280;
 
 /// Where so many draws in a row find nothing that suits, a class is given up.
@@ -276,7 +276,11 @@ impl<'a> Accuracy<'a> {
                 let known = seen.iter().find(|s| (s.0, s.1) == (expression, result.to_bits()));
                 let factor = match quick {
                     _ if known.is_some() => known.map_or(f64::NAN, |known| known.2),
-                    _ if may_underflow && sens < SMALLEST_JUDGED => 0.0,
+                    _ if sens < SMALLEST_JUDGED
+                        && (may_underflow || result.abs() < SMALLEST_JUDGED) =>
+                    {
+                        0.0
+                    }
                     Some(factor) if factor < DOUBTFUL_FACTOR => factor,
                     _ => self.settled(inputs, field, entry, result)?.0,
                 };
@@ -316,7 +320,8 @@ impl<'a> Accuracy<'a> {
             for (entry, (&result, (truth, &sens))) in results.iter().zip(&mut all).enumerate() {
                 let error = ((result - truth.high) - truth.low).abs();
                 let bound = 0.5 * f64::EPSILON * (sens + truth.high.abs());
-                let factor = if class.may_underflow() && sens < SMALLEST_JUDGED || error == 0.0 {
+                let is_small = class.may_underflow() || result.abs() < SMALLEST_JUDGED;
+                let factor = if is_small && sens < SMALLEST_JUDGED || error == 0.0 {
                     0.0
                 } else if bound.is_finite() && !error.is_nan() {
                     error / bound.max(f64::from_bits(1))

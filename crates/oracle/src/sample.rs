@@ -24,7 +24,7 @@ pub enum Class {
     NearInversion,
     /// Coordinates down to 1e-300; for a body around a hole, places next to the inner surface.
     NearOrigin,
-    /// Outside of the body, where the functions go on: coordinates up to 1e8, distances from a hole up to 1e3 radii, the hole.
+    /// Outside of the body, where the functions go on: coordinates up to 1e8, around a hole radii from a tenth of the inner one to 1e3 outer ones.
     Far,
 }
 
@@ -80,6 +80,8 @@ const MOST_PERIODS: f64 = 1e6;
 /// How far from the body coordinates go, and distances from a hole in outer radii.
 const FARTHEST: f64 = 1e8;
 const FARTHEST_RADII: f64 = 1e3;
+/// How far into a hole places go, as a share of the inner radius: on the axis few profiles have a value.
+const INNERMOST: f64 = 0.1;
 /// The smallest stretches of bodies that count as near inversion.
 const NEAR_INVERSION: std::ops::RangeInclusive<f64> = 0.5e-8..=2e-2;
 
@@ -281,7 +283,7 @@ impl<'a> Sampler<'a> {
                 let near = |x: f64| (radius - x).abs() <= NEXT_TO * (outer - inner);
                 let in_body = radius_is_between(radius, inner, outer);
                 let in_class = match class {
-                    Class::Far => radius > 0.0 && radius <= FARTHEST_RADII * outer,
+                    Class::Far => (INNERMOST * inner..=FARTHEST_RADII * outer).contains(&radius),
                     Class::NearOrigin => in_body && radius - inner <= 0.1 * (outer - inner),
                     Class::Boundary => {
                         in_body
@@ -552,7 +554,7 @@ impl<'a> Sampler<'a> {
                         inner + (x - inner) * 10_f64.powf(-random.between(1.0, 15.0))
                     }
                     Class::Far if random.one_in(4) => {
-                        inner * 10_f64.powf(-random.between(0.0, 2.0))
+                        inner * INNERMOST.powf(random.between(0.0, 1.0))
                     }
                     // Most profiles grow fast: the nearer places are those that suit.
                     Class::Far => {
