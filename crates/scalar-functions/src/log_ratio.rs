@@ -16,9 +16,20 @@ fn number<T: Float>(value: f64) -> T {
     T::from(value).unwrap_or_else(T::nan)
 }
 
-/// `arcosh(1 + z)`.
+/// `arcosh(1 + z)`, for every finite `z` from 0 on.
 fn logarithm<T: Float>(z: T) -> T {
-    (z + (z * (z + number(2.0))).sqrt()).ln_1p()
+    if z + number(2.0) == z {
+        // ln(2 z), whose argument may be beyond the largest number.
+        return z.ln() + number(std::f64::consts::LN_2);
+    }
+    (z + hyperbolic_sine(z)).ln_1p()
+}
+
+/// `sinh(arcosh(1 + z)) = sqrt(z (z + 2))`, for every finite `z` from 0 on.
+fn hyperbolic_sine<T: Float>(z: T) -> T {
+    let sum = z + number(2.0);
+    // The square of so large a number may be beyond the largest one.
+    if sum == z { z } else { (z * sum).sqrt() }
 }
 
 pub(crate) fn squared<T: Float>(z: T) -> T {
@@ -28,10 +39,9 @@ pub(crate) fn squared<T: Float>(z: T) -> T {
 
 /// `theta/sinh(theta) - 1`.
 pub(crate) fn slope<T: Float>(z: T) -> T {
-    let two = number(2.0);
-    let y = z / (z + two);
+    let y = z / (z + number(2.0));
     if y > number(LARGEST_IN_SERIES) {
-        return logarithm(z) / (z * (z + two)).sqrt() - T::one();
+        return logarithm(z) / hyperbolic_sine(z) - T::one();
     }
     let sum = (1..=TERMS).rev().fold(T::zero(), |sum, k| {
         let k = f64::from(k);
@@ -45,7 +55,9 @@ pub(crate) fn curvature<T: Float>(z: T) -> T {
     let (one, two) = (T::one(), number(2.0));
     let y = z / (z + two);
     if y > number(LARGEST_IN_SERIES) {
-        return -(z + (one + z) * slope(z)) / (z * (z + two));
+        // theta coth(theta) - 1, in which nothing cancels, over sinh(theta)^2, whose parts stay within the range.
+        let numerator = logarithm(z) * ((one + z) / hyperbolic_sine(z)) - one;
+        return -(numerator / z) / (z + two);
     }
     let sum = (1..=TERMS).rev().fold(T::zero(), |sum, k| {
         let k = f64::from(k);
