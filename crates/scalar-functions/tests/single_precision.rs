@@ -1,9 +1,9 @@
 //! The library's own functions of one number in single precision, at every one of the 2^32 numbers.
 //!
-//! Run in release mode: `cargo test --release -p mmsmith-runtime --test single_precision -- --ignored`.
+//! Run in release mode: `cargo test --release -p mmsmith-scalar-functions --test single_precision -- --ignored`.
 #![allow(clippy::unwrap_used)]
 
-use mmsmith_runtime::Real;
+use mmsmith_scalar_functions::ScalarFunctions;
 use std::f64::consts::PI;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::thread;
