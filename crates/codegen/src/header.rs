@@ -306,7 +306,7 @@ before. Results equal those of the Rust functions bit for bit where the compiler
         );
         lines.extend(conventions.lines().map(str::to_owned));
         let foreign = |function: &Function| {
-            matches!(function.rust(), RustCall::Library(_)) && self.plan.calls(|f| f == *function)
+            matches!(function.rust(), RustCall::Library(_)) && self.code.calls(|f| f == *function)
         };
         let foreign: Vec<&str> =
             Function::ALL.iter().copied().filter(foreign).map(Function::c).collect();

@@ -356,8 +356,8 @@ impl DoubleDouble {
             }
             Function::LogRatioSlope => self.log_ratio_slope(),
             Function::LogRatioCurvature => self.log_ratio_curvature(),
-            // These have operations of their own.
-            Function::Atan2 | Function::LnOfBoth => Self::from(f64::NAN),
+            // The others have operations of their own, or no value here: the oracle is asked where this is not a number.
+            _ => Self::from(f64::NAN),
         }
     }
 

@@ -2,7 +2,7 @@
 //! oracle.
 #![allow(clippy::unwrap_used)]
 
-use mmsmith_codegen::Plan;
+use mmsmith_codegen::Code;
 use mmsmith_expr::{Ast, Expr, Graph, nearest_f64};
 use mmsmith_oracle::{
     Accuracy, Class, Judged, LARGEST_FACTOR, Oracle, OracleError, Point, Sampler, Sensitivity,
@@ -129,7 +129,7 @@ fn compiled(description: &Description) -> PathBuf {
     std::fs::create_dir_all(&folder).unwrap();
     let spec = parse(description);
     assert!(matches!(spec.domain, Domain::Box { .. }), "{module}");
-    let header = Plan::new(&spec).unwrap().header_source();
+    let header = Code::new(&spec).unwrap().header_source();
     let energy =
         if header.contains(&format!(" {module}_W(const")) { "ENERGY" } else { "NO_ENERGY" };
     std::fs::write(folder.join(format!("{module}.h")), header).unwrap();
