@@ -445,7 +445,7 @@ mod tests {
     use crate::{Ast, AstKind, Expr, Function, Graph, Rational};
     use num_traits::{One, Pow, ToPrimitive, Zero};
     use proptest::prelude::*;
-    use std::collections::BTreeSet;
+    use std::collections::{BTreeMap, BTreeSet};
 
     fn cancelled(text: &str) -> String {
         let mut graph = Graph::new();

@@ -13,11 +13,11 @@
 //! only where it costs less, keeps no more values of a point, and where the bound of its rounding errors, by running
 //! error analysis at sample points, is not clearly larger.
 
+use crate::Rational;
 use crate::accuracy::Samples;
 use crate::graph::NumberMap;
 use crate::keep::KEPT_NUMBER;
-use crate::program::{Operation, OperationCount, Program, Slot, intern};
-use crate::{Dependence, Rational};
+use crate::program::{Builder, Operation, OperationCount, Program, Slot, power};
 use num_traits::One;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
@@ -197,9 +197,7 @@ impl Node {
 struct Gathering<'a> {
     program: &'a Program,
     /// The operations of the program, and after them the new ones.
-    operations: Vec<Operation>,
-    dependence: Vec<Dependence>,
-    interned: NumberMap<Operation, Slot>,
+    builder: Builder,
     nodes: Vec<Node>,
     /// For each node whether more than one operation of the program uses it.
     shared: Vec<bool>,
@@ -214,15 +212,9 @@ struct Gathering<'a> {
 
 impl<'a> Gathering<'a> {
     fn new(program: &'a Program) -> Self {
-        let mut interned = NumberMap::default();
-        for slot in program.slots() {
-            interned.entry(program.operations()[slot.index()].clone()).or_insert(slot);
-        }
         Gathering {
             program,
-            operations: program.operations().to_vec(),
-            dependence: program.slots().map(|slot| program.dependence(slot)).collect(),
-            interned,
+            builder: Builder::of(program),
             nodes: Vec::new(),
             shared: Vec::new(),
             numbers: NumberMap::default(),
@@ -240,13 +232,13 @@ impl<'a> Gathering<'a> {
         self.share_pairs(&mut products);
         self.count_uses(&products);
         for (product, slot) in products.iter_mut().zip(outputs) {
-            if self.dependence[slot.index()].position {
+            if self.builder.dependence(*slot).position {
                 self.turn(product);
                 let (negative, value) = self.product(product, &[]);
                 *slot = self.with_sign(negative, value);
             }
         }
-        Some(Program::from_parts(self.operations, self.dependence, all))
+        Some(self.builder.program(all))
     }
 
     /// What `outputs` are as products of nodes; `None` where they are nested too deeply.
@@ -318,8 +310,8 @@ impl<'a> Gathering<'a> {
         let mut product = Product::default();
         let mut stack = vec![slot];
         while let Some(factor) = stack.pop() {
-            match self.operations[factor.index()] {
-                Operation::Mul(a, b) if self.dependence[factor.index()].time => {
+            match *self.builder.operation(factor) {
+                Operation::Mul(a, b) if self.builder.dependence(factor).time => {
                     stack.extend([a, b]);
                 }
                 Operation::Neg(a) => {
@@ -551,10 +543,10 @@ impl<'a> Gathering<'a> {
             let inside = if Some(equal[0]) == absorbing { coefficient.as_slice() } else { &[] };
             let (turned, value) = self.node_value(equal[0], inside);
             negative ^= turned && equal.len() % 2 == 1;
-            values.push(self.power(value, equal.len()));
+            values.push(power(value, equal.len() as u32, &mut |a, b| self.times(a, b)));
         }
         // What depends on the position only is multiplied first.
-        values.sort_by_key(|slot| self.dependence[slot.index()].time);
+        values.sort_by_key(|&slot| self.builder.dependence(slot).time);
         if absorbing.is_none() && !coefficient.is_empty() {
             let coefficient = self.coefficient_value(&coefficient);
             let at_hand =
@@ -608,11 +600,11 @@ impl<'a> Gathering<'a> {
     /// First the factors that depend on parameters only.
     fn coefficient_value(&mut self, factors: &[Slot]) -> Slot {
         let one = self.push(Operation::Number(Rational::one()));
-        let minus_one = self.interned.get(&Operation::Neg(one)).copied();
+        let minus_one = self.builder.find(&Operation::Neg(one));
         let (signs, factors): (Vec<Slot>, Vec<Slot>) =
             factors.iter().copied().partition(|&factor| Some(factor) == minus_one);
         let (fixed, of_time): (Vec<Slot>, Vec<Slot>) =
-            factors.into_iter().partition(|factor| self.dependence[factor.index()].is_fixed());
+            factors.into_iter().partition(|&factor| self.builder.dependence(factor).is_fixed());
         let mut product = |factors: Vec<Slot>| factors.into_iter().reduce(|a, b| self.times(a, b));
         let (fixed, of_time) = (product(fixed), product(of_time));
         let value = match (fixed, of_time) {
@@ -622,17 +614,8 @@ impl<'a> Gathering<'a> {
         self.with_sign(signs.len() % 2 == 1, value)
     }
 
-    fn power(&mut self, base: Slot, exponent: usize) -> Slot {
-        if exponent <= 1 {
-            return base;
-        }
-        let half = self.power(base, exponent / 2);
-        let square = self.times(half, half);
-        if exponent.is_multiple_of(2) { square } else { self.times(square, base) }
-    }
-
     fn known_product(&self, a: Slot, b: Slot) -> Option<Slot> {
-        let known = |operation| self.interned.get(&operation).copied();
+        let known = |operation| self.builder.find(&operation);
         known(Operation::Mul(a, b)).or_else(|| known(Operation::Mul(b, a)))
     }
 
@@ -647,7 +630,7 @@ impl<'a> Gathering<'a> {
                 (false, self.push(Operation::Sub(a, b)))
             }
             ((negative, a), (_, b)) => {
-                let known = self.interned.get(&Operation::Add(b, a)).copied();
+                let known = self.builder.find(&Operation::Add(b, a));
                 (negative, known.unwrap_or_else(|| self.push(Operation::Add(a, b))))
             }
         }
@@ -658,14 +641,14 @@ impl<'a> Gathering<'a> {
     }
 
     fn push(&mut self, operation: Operation) -> Slot {
-        let parts = (&mut self.operations, &mut self.dependence);
-        intern(operation, Dependence::default(), parts, &mut self.interned)
+        self.builder.push(operation)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Dependence;
     use crate::program::SIDE;
     use crate::{Ast, AstKind, Function};
     use proptest::prelude::*;

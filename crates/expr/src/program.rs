@@ -6,12 +6,14 @@
 //! combined before those that depend on time or on position, so that the slow parts are computed rarely.
 
 mod argument;
+mod builder;
 mod error_bounds;
 mod scalar;
 mod section;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use builder::{Builder, power};
 pub(crate) use error_bounds::SIDE;
 pub use scalar::Scalar;
 pub use section::Section;
@@ -237,14 +239,13 @@ impl Program {
     ) -> Self {
         let mut lowering = Lowering {
             graph,
-            program: Program::default(),
-            interned: NumberMap::default(),
+            builder: Builder::default(),
             lowered: NumberMap::default(),
             inputs,
             definitions,
         };
         let outputs: Vec<Slot> = outputs.iter().map(|&output| lowering.lower(output)).collect();
-        Program { outputs, ..lowering.program }.with_shared_reciprocals()
+        lowering.builder.program(outputs).with_shared_reciprocals()
     }
 
     /// A program of operations in order, with what each depends on.
@@ -264,23 +265,7 @@ impl Program {
     /// The operations that `outputs` need.
     #[must_use]
     pub fn part(&self, outputs: &[Slot]) -> Self {
-        let needed = self.needed(outputs);
-        let mut places: Vec<Slot> = Vec::with_capacity(self.operations.len());
-        let mut program = Program::default();
-        for (index, operation) in self.operations.iter().enumerate() {
-            places.push(Slot::at(program.operations.len()));
-            if needed[index] {
-                program.operations.push(operation.with_operands(|slot| places[slot.index()]));
-                program.dependence.push(self.dependence[index]);
-            }
-        }
-        program.outputs = outputs.iter().map(|slot| places[slot.index()]).collect();
-        let number = |operation: &Operation| match operation {
-            Operation::Number(value) => nearest_f64(value),
-            _ => 0.0,
-        };
-        program.numbers = program.operations.iter().map(number).collect();
-        program
+        part(&self.operations, &self.dependence, outputs)
     }
 
     /// The operations, each after those that it reads.
@@ -318,15 +303,7 @@ impl Program {
     /// For each operation, whether `outputs` need it.
     #[must_use]
     pub fn needed(&self, outputs: &[Slot]) -> Vec<bool> {
-        let mut needed = vec![false; self.operations.len()];
-        let mut stack = outputs.to_vec();
-        while let Some(slot) = stack.pop() {
-            if !needed[slot.index()] {
-                needed[slot.index()] = true;
-                stack.extend(self.operations[slot.index()].operands());
-            }
-        }
-        needed
+        needed(&self.operations, outputs)
     }
 
     /// The operations that `outputs` need, by what they depend on.
@@ -352,11 +329,17 @@ impl Program {
         stages.time.cost() + stages.point.cost() + stages.both.cost()
     }
 
-    /// The outputs at the given input values, in the precision of these: the bits of generated code.
+    /// The outputs at the given input values, in double precision: the bits of generated code.
     ///
     /// An input that is not given counts as not-a-number.
     #[must_use]
-    pub fn evaluate<T: Scalar>(&self, inputs: &[T]) -> Vec<T> {
+    pub fn evaluate(&self, inputs: &[f64]) -> Vec<f64> {
+        self.evaluate_in(inputs)
+    }
+
+    /// As [`Program::evaluate`], in the precision of the inputs.
+    #[must_use]
+    pub fn evaluate_in<T: Scalar>(&self, inputs: &[T]) -> Vec<T> {
         let values = self.values(inputs.as_chunks::<1>().0);
         self.outputs.iter().map(|slot| values[slot.index()][0]).collect()
     }
@@ -374,12 +357,45 @@ impl Program {
     }
 }
 
+/// For each operation, whether `outputs` need it.
+fn needed(operations: &[Operation], outputs: &[Slot]) -> Vec<bool> {
+    let mut needed = vec![false; operations.len()];
+    let mut stack = outputs.to_vec();
+    while let Some(slot) = stack.pop() {
+        if !needed[slot.index()] {
+            needed[slot.index()] = true;
+            stack.extend(operations[slot.index()].operands());
+        }
+    }
+    needed
+}
+
+/// The operations that `outputs` need, and their numbers, rounded.
+fn part(operations: &[Operation], dependence: &[Dependence], outputs: &[Slot]) -> Program {
+    let needed = needed(operations, outputs);
+    let mut places: Vec<Slot> = Vec::with_capacity(operations.len());
+    let mut program = Program::default();
+    for (index, operation) in operations.iter().enumerate() {
+        places.push(Slot::at(program.operations.len()));
+        if needed[index] {
+            program.operations.push(operation.with_operands(|slot| places[slot.index()]));
+            program.dependence.push(dependence[index]);
+        }
+    }
+    program.outputs = outputs.iter().map(|slot| places[slot.index()]).collect();
+    let number = |operation: &Operation| match operation {
+        Operation::Number(value) => nearest_f64(value),
+        _ => 0.0,
+    };
+    program.numbers = program.operations.iter().map(number).collect();
+    program
+}
+
 /// Programs of expressions that are tried and compared, of one graph with one set of inputs and definitions: what they have in
 /// common is lowered once.
 #[derive(Debug, Default)]
 pub struct Drafts {
-    program: Program,
-    interned: NumberMap<Operation, Slot>,
+    builder: Builder,
     lowered: NumberMap<Expr, Slot>,
 }
 
@@ -392,19 +408,18 @@ impl Drafts {
         definitions: &[(Expr, Expr)],
         outputs: &[Expr],
     ) -> Program {
-        let Drafts { program, interned, lowered } = std::mem::take(self);
-        let mut lowering = Lowering { graph, program, interned, lowered, inputs, definitions };
+        let Drafts { builder, lowered } = std::mem::take(self);
+        let mut lowering = Lowering { graph, builder, lowered, inputs, definitions };
         let slots: Vec<Slot> = outputs.iter().map(|&output| lowering.lower(output)).collect();
-        let Lowering { program, interned, lowered, .. } = lowering;
-        *self = Drafts { program, interned, lowered };
-        self.program.part(&slots).with_shared_reciprocals()
+        let Lowering { builder, lowered, .. } = lowering;
+        *self = Drafts { builder, lowered };
+        self.builder.part(&slots).with_shared_reciprocals()
     }
 }
 
 struct Lowering<'a> {
     graph: &'a mut Graph,
-    program: Program,
-    interned: NumberMap<Operation, Slot>,
+    builder: Builder,
     lowered: NumberMap<Expr, Slot>,
     inputs: &'a [(Expr, Dependence)],
     definitions: &'a [(Expr, Expr)],
@@ -429,35 +444,13 @@ struct Group {
     term: (Expr, Rational),
 }
 
-/// Where an operation is, which is put after the others unless it is there already. It depends on what its operands do, and an
-/// input, which has none, on `of_input`.
-pub(crate) fn intern(
-    operation: Operation,
-    of_input: Dependence,
-    (operations, dependence): (&mut Vec<Operation>, &mut Vec<Dependence>),
-    interned: &mut NumberMap<Operation, Slot>,
-) -> Slot {
-    if let Some(&slot) = interned.get(&operation) {
-        return slot;
-    }
-    let own = operation.operands().map(|slot| dependence[slot.index()]);
-    let own = own.fold(of_input, Dependence::join);
-    let slot = Slot::at(operations.len());
-    operations.push(operation.clone());
-    dependence.push(own);
-    interned.insert(operation, slot);
-    slot
-}
-
 impl Lowering<'_> {
     fn push(&mut self, operation: Operation) -> Slot {
         let of_input = match operation {
             Operation::Input(index) => self.inputs.get(index).map(|(_, dependence)| *dependence),
             _ => None,
         };
-        let Program { operations, dependence, .. } = &mut self.program;
-        let parts = (operations, dependence);
-        intern(operation, of_input.unwrap_or_default(), parts, &mut self.interned)
+        self.builder.push_input(operation, of_input.unwrap_or_default())
     }
 
     fn lower(&mut self, expr: Expr) -> Slot {
@@ -563,7 +556,7 @@ impl Lowering<'_> {
                     (negative, self.push(Operation::Mul(factor, inner)))
                 }
             };
-            by_rate.push((self.program.dependence(part.1), part));
+            by_rate.push((self.builder.dependence(part.1), part));
         }
         by_rate.sort_by_key(|(dependence, _)| *dependence);
         let mut groups = Vec::new();
@@ -642,7 +635,7 @@ impl Lowering<'_> {
         for (term, _) in terms {
             for factor in self.factors(*term) {
                 let slot = self.lower(factor.0);
-                if self.program.dependence(slot).is_fixed() {
+                if self.builder.dependence(slot).is_fixed() {
                     continue;
                 }
                 match counts.iter_mut().find(|(known, _)| *known == factor) {
@@ -684,7 +677,7 @@ impl Lowering<'_> {
             .iter()
             .map(|(base, _)| {
                 let slot = self.lower(*base);
-                self.program.dependence(slot)
+                self.builder.dependence(slot)
             })
             .collect();
         let rate = dependence.iter().fold(Dependence::default(), |all, one| all.join(*one));
@@ -716,7 +709,7 @@ impl Lowering<'_> {
     }
 
     fn with_sign(&mut self, negative: bool, slot: Slot) -> Slot {
-        if negative { self.push(Operation::Neg(slot)) } else { slot }
+        self.builder.with_sign(negative, slot)
     }
 
     fn scaled(&mut self, term: Expr, coefficient: &Rational) -> Slot {
@@ -735,7 +728,7 @@ impl Lowering<'_> {
         }
         for (base, exponent) in factors {
             let power = self.power_of(*base, &exponent.abs());
-            parts.push((self.program.dependence(power), exponent.is_negative(), power));
+            parts.push((self.builder.dependence(power), exponent.is_negative(), power));
         }
         parts.sort_by_key(|(dependence, divides, _)| (*dependence, *divides));
         let mut total: Option<Slot> = None;
@@ -786,7 +779,7 @@ impl Lowering<'_> {
     /// `base ^ exponent` for a positive exponent.
     fn power(&mut self, base: Slot, exponent: &Rational) -> Slot {
         if let Some(whole) = exponent.to_i64().and_then(|n| u32::try_from(n).ok()) {
-            return self.whole_power(base, whole);
+            return self.builder.power(base, whole);
         }
         let whole = exponent.to_integer().to_u32().unwrap_or(0);
         let rest = exponent - Rational::from(i64::from(whole));
@@ -797,16 +790,7 @@ impl Lowering<'_> {
         if whole == 0 {
             return root;
         }
-        let power = self.whole_power(base, whole);
+        let power = self.builder.power(base, whole);
         self.push(Operation::Mul(power, root))
-    }
-
-    fn whole_power(&mut self, base: Slot, exponent: u32) -> Slot {
-        if exponent == 1 {
-            return base;
-        }
-        let half = self.whole_power(base, exponent / 2);
-        let square = self.push(Operation::Mul(half, half));
-        if exponent.is_multiple_of(2) { square } else { self.push(Operation::Mul(square, base)) }
     }
 }

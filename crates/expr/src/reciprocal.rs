@@ -8,8 +8,8 @@
 //! In the same way a product whose logarithm is taken, as J is, serves for the reciprocals of its factors, as the stretches along
 //! axes are: `1/a = b/(a b)`. That it neither overflows nor vanishes its logarithm asks for already.
 
-use crate::graph::NumberMap;
-use crate::{Dependence, Operation, Program, Rational, Slot};
+use crate::program::Builder;
+use crate::{Operation, Program, Rational, Slot};
 use num_integer::Integer;
 use num_traits::One;
 use std::collections::{BTreeMap, BTreeSet};
@@ -49,40 +49,35 @@ impl Program {
             let place = |slot: Slot| places[slot.index()].unwrap_or(slot);
             let moved = match (quotient, operation) {
                 (Some((base, n, unit)), &Operation::Div(numerator, _)) => {
-                    let rate = self.dependence(base);
                     let factor = match (unit, &self.operations()[base.index()]) {
                         (Unit::Slot(divisor, power), _) => {
-                            let reciprocal = builder.reciprocal(place(divisor), rate);
-                            builder.power(reciprocal, n / power, rate)
+                            let reciprocal = reciprocal_of(&mut builder, place(divisor));
+                            builder.power(reciprocal, n / power)
                         }
                         // R/R^2 is ready sooner than 1/R, as the quotient need not wait for the root.
                         (Unit::Root, &Operation::Sqrt(square)) => {
                             let square = place(square);
-                            let reciprocal = builder.reciprocal(square, rate);
-                            let even = builder.power(reciprocal, n / 2, rate);
+                            let reciprocal = reciprocal_of(&mut builder, square);
+                            let even = builder.power(reciprocal, n / 2);
                             if n.is_multiple_of(2) {
                                 even
                             } else {
-                                let root = builder.push(Operation::Sqrt(square), rate);
-                                let odd = builder.push(Operation::Mul(root, reciprocal), rate);
-                                if n == 1 {
-                                    odd
-                                } else {
-                                    builder.push(Operation::Mul(even, odd), rate)
-                                }
+                                let root = builder.push(Operation::Sqrt(square));
+                                let odd = builder.times(root, reciprocal);
+                                if n == 1 { odd } else { builder.times(even, odd) }
                             }
                         }
-                        (Unit::Root, _) => builder.reciprocal(place(base), rate),
+                        (Unit::Root, _) => reciprocal_of(&mut builder, place(base)),
                     };
                     let is_one = self.is_one(numerator);
-                    builder.times(place(numerator), is_one, factor, self.dependence(slot))
+                    times_reciprocal(&mut builder, place(numerator), is_one, factor)
                 }
-                _ => builder.push(operation.with_operands(place), self.dependence(slot)),
+                _ => builder.push_input(operation.with_operands(place), self.dependence(slot)),
             };
             places[slot.index()] = Some(moved);
         }
         let outputs = self.outputs().iter().filter_map(|slot| places[slot.index()]).collect();
-        builder.finish(outputs)
+        builder.program(outputs).compacted()
     }
 
     fn is_one(&self, slot: Slot) -> bool {
@@ -104,7 +99,6 @@ impl Program {
 
     /// `None` where quotients divide by fewer than two of the product and its factors.
     fn with_reciprocals_of_factors_of(&self, whole: Slot) -> Option<Program> {
-        let rate = self.dependence(whole);
         let factors = self.factors(whole);
         let divisors: BTreeSet<Slot> =
             factors.iter().map(|(factor, ..)| *factor).chain([whole]).collect();
@@ -133,21 +127,21 @@ impl Program {
             let own = self.dependence(slot);
             let moved = if let Some((numerator, factor)) = quotient(slot) {
                 if reciprocals.is_empty() {
-                    reciprocals.insert(whole, builder.reciprocal(place(whole), rate));
+                    reciprocals.insert(whole, reciprocal_of(&mut builder, place(whole)));
                     for &(factor, product, other) in &factors {
                         let of_factor = Operation::Mul(place(other), *reciprocals.get(&product)?);
-                        reciprocals.insert(factor, builder.push(of_factor, rate));
+                        reciprocals.insert(factor, builder.push(of_factor));
                     }
                 }
                 let reciprocal = *reciprocals.get(&factor)?;
-                builder.times(place(numerator), self.is_one(numerator), reciprocal, own)
+                times_reciprocal(&mut builder, place(numerator), self.is_one(numerator), reciprocal)
             } else {
-                builder.push(operation.with_operands(place), own)
+                builder.push_input(operation.with_operands(place), own)
             };
             places[slot.index()] = Some(moved);
         }
         let outputs = self.outputs().iter().filter_map(|slot| places[slot.index()]).collect();
-        Some(builder.finish(outputs))
+        Some(builder.program(outputs).compacted())
     }
 
     /// The factors of a product, and theirs, as far as they have its rate: each with the product that it is a factor of, which
@@ -223,51 +217,17 @@ impl Program {
     }
 }
 
-/// A program in the making.
-#[derive(Default)]
-struct Builder {
-    operations: Vec<Operation>,
-    dependence: Vec<Dependence>,
-    known: NumberMap<Operation, Slot>,
+/// A quotient as the product of its numerator with a reciprocal.
+fn times_reciprocal(
+    builder: &mut Builder,
+    numerator: Slot,
+    is_one: bool,
+    reciprocal: Slot,
+) -> Slot {
+    if is_one { reciprocal } else { builder.times(numerator, reciprocal) }
 }
 
-impl Builder {
-    fn push(&mut self, operation: Operation, dependence: Dependence) -> Slot {
-        if let Some(&slot) = self.known.get(&operation) {
-            return slot;
-        }
-        let slot = Slot::at(self.operations.len());
-        self.operations.push(operation.clone());
-        self.dependence.push(dependence);
-        self.known.insert(operation, slot);
-        slot
-    }
-
-    /// The program of what was pushed, without operations that no output needs.
-    fn finish(self, outputs: Vec<Slot>) -> Program {
-        Program::from_parts(self.operations, self.dependence, outputs).compacted()
-    }
-
-    /// A quotient as the product of its numerator with a reciprocal.
-    fn times(&mut self, numerator: Slot, is_one: bool, reciprocal: Slot, rate: Dependence) -> Slot {
-        if is_one { reciprocal } else { self.push(Operation::Mul(numerator, reciprocal), rate) }
-    }
-
-    fn reciprocal(&mut self, slot: Slot, rate: Dependence) -> Slot {
-        let one = self.push(Operation::Number(Rational::one()), Dependence::default());
-        self.push(Operation::Div(one, slot), rate)
-    }
-
-    fn power(&mut self, base: Slot, exponent: u32, rate: Dependence) -> Slot {
-        if exponent <= 1 {
-            return base;
-        }
-        let half = self.power(base, exponent / 2, rate);
-        let square = self.push(Operation::Mul(half, half), rate);
-        if exponent.is_multiple_of(2) {
-            square
-        } else {
-            self.push(Operation::Mul(square, base), rate)
-        }
-    }
+fn reciprocal_of(builder: &mut Builder, slot: Slot) -> Slot {
+    let one = builder.one();
+    builder.push(Operation::Div(one, slot))
 }

@@ -10,9 +10,8 @@
 //! number: then two factors may have been negative.
 
 use crate::accuracy::Samples;
-use crate::graph::NumberMap;
 use crate::keep::KEPT_NUMBER;
-use crate::program::{Operation, OperationCount, Program, Slot, intern};
+use crate::program::{Builder, Operation, OperationCount, Program, Slot, power};
 use crate::{Dependence, Function, Rational};
 use num_traits::One;
 use std::collections::BTreeMap;
@@ -176,25 +175,17 @@ struct Separating<'a> {
     program: &'a Program,
     dimension: usize,
     /// The operations of the program, and after them the new ones.
-    operations: Vec<Operation>,
-    dependence: Vec<Dependence>,
+    builder: Builder,
     coordinates: Vec<Coordinates>,
-    interned: NumberMap<Operation, Slot>,
 }
 
 impl<'a> Separating<'a> {
     fn new(program: &'a Program, dimension: usize) -> Self {
-        let mut interned = NumberMap::default();
-        for slot in program.slots() {
-            interned.entry(program.operations()[slot.index()].clone()).or_insert(slot);
-        }
         Separating {
             program,
             dimension,
-            operations: program.operations().to_vec(),
-            dependence: program.slots().map(|slot| program.dependence(slot)).collect(),
+            builder: Builder::of(program),
             coordinates: program.coordinates(dimension),
-            interned,
         }
     }
 
@@ -207,7 +198,7 @@ impl<'a> Separating<'a> {
         }
         let mut all = self.program.outputs().to_vec();
         all.extend(outputs.iter().map(|slot| self.sum(&sums[slot.index()])));
-        Some(Program::from_parts(self.operations, self.dependence, all))
+        Some(self.builder.program(all))
     }
 
     /// A value as a sum of products, from those of its operands.
@@ -263,7 +254,7 @@ impl<'a> Separating<'a> {
         let logarithm = |separating: &mut Self, part: Term| {
             let y = separating.product(&part);
             let one = separating.push(Operation::Number(Rational::one()));
-            let beside_one = match separating.operations[y.index()] {
+            let beside_one = match *separating.builder.operation(y) {
                 Operation::Add(x, unit) | Operation::Add(unit, x) if unit == one => Some(x),
                 Operation::Sub(unit, x) if unit == one => Some(separating.push(Operation::Neg(x))),
                 _ => None,
@@ -377,14 +368,15 @@ impl<'a> Separating<'a> {
     fn product(&mut self, product: &Term) -> Slot {
         let mut by_rate: BTreeMap<Dependence, [Vec<(Slot, u32)>; 2]> = BTreeMap::new();
         for (&slot, &power) in &product.powers {
-            let own = by_rate.entry(self.dependence[slot.index()]).or_default();
+            let own = by_rate.entry(self.builder.dependence(slot)).or_default();
             own[usize::from(power < 0)].push((slot, power.unsigned_abs()));
         }
         let one = self.push(Operation::Number(Rational::one()));
         let mut total = one;
         for [above, below] in by_rate.into_values() {
             let [above, below] = [above, below].map(|powers| {
-                let powers = powers.into_iter().map(|(slot, n)| self.power(slot, n));
+                let mut times = |a, b| self.push(Operation::Mul(a, b));
+                let powers = powers.into_iter().map(|(slot, n)| power(slot, n, &mut times));
                 let powers: Vec<Slot> = powers.collect();
                 powers.into_iter().reduce(|a, b| self.push(Operation::Mul(a, b)))
             });
@@ -398,18 +390,9 @@ impl<'a> Separating<'a> {
         total
     }
 
-    fn power(&mut self, base: Slot, exponent: u32) -> Slot {
-        if exponent <= 1 {
-            return base;
-        }
-        let half = self.power(base, exponent / 2);
-        let square = self.push(Operation::Mul(half, half));
-        if exponent.is_multiple_of(2) { square } else { self.push(Operation::Mul(square, base)) }
-    }
-
     /// The sum of signed values; negative only where both are.
     fn add(&mut self, a: (bool, Slot), b: (bool, Slot)) -> (bool, Slot) {
-        let number = |slot: Slot| match &self.operations[slot.index()] {
+        let number = |slot: Slot| match self.builder.operation(slot) {
             Operation::Number(value) => Some(value.clone()),
             _ => None,
         };
@@ -428,8 +411,7 @@ impl<'a> Separating<'a> {
 
     fn push(&mut self, operation: Operation) -> Slot {
         let coordinates = Coordinates::of(&operation, &self.coordinates, self.dimension);
-        let parts = (&mut self.operations, &mut self.dependence);
-        let slot = intern(operation, Dependence::default(), parts, &mut self.interned);
+        let slot = self.builder.push(operation);
         if slot.index() == self.coordinates.len() {
             self.coordinates.push(coordinates);
         }

@@ -169,7 +169,7 @@ impl<T: Interpretable, const D: usize> Interpreted<T, D> {
         let program = staged.program();
         let part = |slots: &[Slot]| program.part(slots);
         let at_parameters = inputs::<T, D>(&SVector::zeros(), T::zero(), &parameters);
-        let constants = |slots: &[Slot]| part(slots).evaluate(&at_parameters);
+        let constants = |slots: &[Slot]| part(slots).evaluate_in(&at_parameters);
         let constant = |slot: Slot| constants(&[slot])[0];
         for (requirement, &Sides { left, right }) in
             spec.requirements.iter().zip(&staged.requirements)
@@ -230,11 +230,11 @@ impl<T: Interpretable, const D: usize> Interpreted<T, D> {
     }
 
     fn vector(&self, program: &Program, X: &SVector<T, D>, t: T) -> SVector<T, D> {
-        SVector::from_row_slice(&program.evaluate(&inputs(X, t, &self.parameters)))
+        SVector::from_row_slice(&program.evaluate_in(&inputs(X, t, &self.parameters)))
     }
 
     fn matrix(&self, program: &Program, X: &SVector<T, D>, t: T) -> SMatrix<T, D, D> {
-        SMatrix::from_row_slice(&program.evaluate(&inputs(X, t, &self.parameters)))
+        SMatrix::from_row_slice(&program.evaluate_in(&inputs(X, t, &self.parameters)))
     }
 }
 
@@ -285,7 +285,7 @@ impl<T: Interpretable, const D: usize> Solution<T, D> for Interpreted<T, D> {
     }
 
     fn jacobian(&self, X: &SVector<T, D>, t: T) -> T {
-        self.jacobian.evaluate(&inputs(X, t, &self.parameters))[0]
+        self.jacobian.evaluate_in(&inputs(X, t, &self.parameters))[0]
     }
 
     fn first_piola_kirchhoff(&self, X: &SVector<T, D>, t: T) -> SMatrix<T, D, D> {
@@ -329,7 +329,7 @@ impl<T: Interpretable, const D: usize> Solution<T, D> for Interpreted<T, D> {
 
     fn strain_energy(&self, X: &SVector<T, D>, t: T) -> Option<T> {
         let energy = self.strain_energy.as_ref()?;
-        energy.evaluate(&inputs(X, t, &self.parameters)).first().copied()
+        energy.evaluate_in(&inputs(X, t, &self.parameters)).first().copied()
     }
 
     fn domain(&self) -> Domain<T, D> {

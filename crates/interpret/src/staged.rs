@@ -27,7 +27,7 @@ impl Stage {
         parameters: &[T],
     ) -> Vec<T> {
         // These values read no position.
-        self.uniform.evaluate(&inputs::<T, D>(&SVector::zeros(), t, parameters))
+        self.uniform.evaluate_in(&inputs::<T, D>(&SVector::zeros(), t, parameters))
     }
 }
 

@@ -117,8 +117,8 @@ fn logarithms_of_both_lose_no_digits() {
         assert!((at(x, y) / expected - 1.0).abs() < 1e-15, "{x}, {y}: {}", at(x, y));
     }
     // Down to -1/2 only the first is looked at, below only the second.
-    assert_eq!(at(-0.5, f64::NAN), (-0.5_f64).ln_1p());
-    assert_eq!(at((-0.5_f64).next_down(), 3.0), 3.0_f64.ln());
+    assert!((at(-0.5, f64::NAN) / (-0.5_f64).ln_1p() - 1.0).abs() < 1e-15);
+    assert!((at((-0.5_f64).next_down(), 3.0) / 3.0_f64.ln() - 1.0).abs() < 1e-15);
 }
 
 /// Sines and cosines of what contains `Pi` as a factor are taken of the rest, of which the argument is reduced exactly.
