@@ -4,6 +4,7 @@
 //! Generated code calls them, and so does the evaluation of programs without it: both give the same bits.
 
 mod log_ratio;
+pub mod logarithm;
 
 use std::ops::{Add, Sub};
 
@@ -88,18 +89,18 @@ impl ScalarFunctions for f64 {
 
     #[inline(always)]
     fn log_1p(self) -> Self {
-        logarithm(self, self, false)
+        logarithm::ln_1p(self)
     }
 
     #[inline(always)]
     fn ln_of_both(self, y: Self) -> Self {
-        logarithm(self, y, self < -0.5)
+        logarithm::ln_of_both(self, y)
     }
 
     #[inline(always)]
     fn ln_near_one(self) -> Self {
-        let (half_square, tail) = parts_of_logarithm(self);
-        if is_near_one(self) { self - (half_square - tail) } else { f64::NAN }
+        let value = logarithm::ln_near_one(self);
+        if logarithm::is_near_one(self) { value } else { f64::NAN }
     }
 
     #[inline]
@@ -216,71 +217,6 @@ fn cosine(x: f64) -> f64 {
     let middle = 2.353_306_302_439_816_5e-1 + z * -2.580_688_682_692_376_7e-2;
     let high = 1.929_478_760_777_114_4e-3 + z * -1.036_246_495_865_416_4e-4;
     (1.0 - 4.934_802_200_544_679 * z) + square * (low + square * (middle + square * high))
-}
-
-/// `ln(y)` where `by_y`, else `ln(1 + x)`, without branches. Reduced as in Sun's fdlibm, `s_log1p.c`, but for arguments near
-/// one, which are taken as they are.
-#[inline(always)]
-fn logarithm(x: f64, y: f64, by_y: bool) -> f64 {
-    const ONE: u64 = 0x3ff0_0000_0000_0000;
-    /// The bits of sqrt(1/2), to 32 bits.
-    const ROOT_HALF: u64 = 0x3fe6_a09e_0000_0000;
-    /// 2^52 as a double; with a whole number in its last bits it is 2^52 plus that number.
-    const WHOLE: u64 = 0x4330_0000_0000_0000;
-    /// 2^52 + 1023.
-    const WHOLE_ONE: f64 = 4_503_599_627_370_496.0 + 1023.0;
-    const LN2_HIGH: f64 = 6.931_471_803_691_238e-1;
-    const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
-    /// Smaller ones are multiplied by 2^54, so that their scale is a number.
-    const TINY: f64 = 1e-290;
-    const TWO_TO_54: f64 = 18_014_398_509_481_984.0;
-
-    let sum = 1.0 + x;
-    // What rounding took from the sum.
-    let lost = x - (sum - 1.0);
-    let (u, lost) = if by_y { (y, 0.0) } else { (sum, lost) };
-    let (normal, bias) = if u < TINY { (u * TWO_TO_54, WHOLE_ONE + 54.0) } else { (u, WHOLE_ONE) };
-    // u = 2^k m with m between sqrt(1/2) and sqrt(2).
-    let exponent = normal.to_bits().wrapping_add(ONE - ROOT_HALF) >> 52;
-    let k = f64::from_bits(exponent | WHOLE) - bias;
-    // 2^(2 - k), which is a normal number for the largest k as well.
-    let scale = f64::from_bits(2048_u64.wrapping_sub(exponent) << 52);
-    // m - 1, with the digits that the sum has lost.
-    let reduced = 0.25 * ((normal * scale - 4.0) + lost * scale);
-    let near = is_near_one(x);
-    let f = if near { x } else { reduced };
-    let (half_square, tail) = parts_of_logarithm(f);
-    let value = k * LN2_HIGH - (((half_square - tail) - k * LN2_LOW) - f);
-    let pole = if u == 0.0 { f64::NEG_INFINITY } else { f64::NAN };
-    let outside = if u > 0.0 { u } else { pole };
-    let value = if u > 0.0 && u < f64::INFINITY { value } else { outside };
-    if near { f - (half_square - tail) } else { value }
-}
-
-/// Whether `1 + x` is near enough to one to be taken as it is.
-#[inline(always)]
-fn is_near_one(x: f64) -> bool {
-    (-0.5..1.0).contains(&x)
-}
-
-/// `h = f^2/2` and `t` with `ln(1 + f) = f - (h - t)`, for f from -1/2 to 1.
-///
-/// `t = s (h + R)` with `s = f/(2 + f)` as in fdlibm. R is the polynomial of degree ten in `z = s^2` next to `2 artanh(s)/s - 2`
-/// for z up to 1/9 (E. Ya. Remez's exchange, in 60 digits): it changes the logarithm by 1.3e-18 of itself at most.
-#[inline(always)]
-fn parts_of_logarithm(f: f64) -> (f64, f64) {
-    let s = f / (2.0 + f);
-    let z = s * s;
-    let square = z * z;
-    let fourth = square * square;
-    let a = 6.666_666_666_666_631e-1 + z * 4.000_000_000_015_726_5e-1;
-    let b = 2.857_142_854_785_134e-1 + z * 2.222_222_396_988_407e-1;
-    let c = 1.818_174_391_978_506e-1 + z * 1.538_656_002_655_927e-1;
-    let d = 1.330_097_230_861_173_6e-1 + z * 1.210_609_573_668_486_5e-1;
-    let e = 8.340_062_622_941_338e-2 + z * 1.701_864_305_551_780_7e-1;
-    let R = z * ((a + square * b) + fourth * ((c + square * d) + fourth * e));
-    let half_square = 0.5 * f * f;
-    (half_square, s * (half_square + R))
 }
 
 #[cfg(test)]

@@ -9,18 +9,17 @@
 mod energy;
 mod hencky;
 mod linear_elastic;
-mod logarithm;
 mod mooney_rivlin;
 mod neo_hookean;
 mod st_venant_kirchhoff;
 #[cfg(test)]
 mod tests;
 
+use mmsmith_scalar_functions::logarithm::{is_near_one, ln_near_one, ln_of_both_in_range};
 use nalgebra::{RealField, SMatrix};
 
 pub(crate) use hencky::Hencky;
 pub(crate) use linear_elastic::LinearElastic;
-use logarithm::{is_near_one, log_near_one, log_of_ratio};
 pub(crate) use mooney_rivlin::MooneyRivlin;
 pub(crate) use neo_hookean::{NeoHookean, NeoHookeanNoLog};
 pub(crate) use st_venant_kirchhoff::StVenantKirchhoff;
@@ -413,7 +412,7 @@ fn displacement_gradient<T: RealField + Copy, const D: usize>(
 #[inline(always)]
 fn log_jacobian<T: RealField + Copy, const D: usize>(F: &SMatrix<T, D, D>) -> T {
     let growth = det_minus_one(&displacement_gradient(F));
-    let logarithm = log_of_ratio(
+    let logarithm = ln_of_both_in_range(
         nalgebra::convert_unchecked(growth),
         nalgebra::convert_unchecked(determinant(F)),
     );
@@ -430,7 +429,7 @@ fn log_jacobian_is_short<T: RealField + Copy, const D: usize>(F: &SMatrix<T, D, 
 #[inline(always)]
 fn log_jacobian_short<T: RealField + Copy, const D: usize>(F: &SMatrix<T, D, D>) -> T {
     let growth = det_minus_one(&displacement_gradient(F));
-    real(log_near_one(nalgebra::convert_unchecked(growth)))
+    real(ln_near_one(nalgebra::convert_unchecked(growth)))
 }
 
 /// `F F^T - I`, to full relative accuracy at small strain.
