@@ -2,8 +2,9 @@
 
 use crate::{Function, Rational, nearest_f64};
 use num_traits::{One, Zero};
-use std::collections::{BTreeSet, HashMap};
-use std::hash::{BuildHasher, BuildHasherDefault, Hasher};
+use rustc_hash::{FxBuildHasher, FxHashMap};
+use std::collections::BTreeSet;
+use std::hash::BuildHasher;
 
 /// The most nodes and references that text may make.
 pub(crate) const LARGEST_SIZE: usize = 1 << 21;
@@ -72,47 +73,7 @@ pub struct Graph {
 }
 
 /// A map whose keys are small numbers. Nothing may depend on the order of its entries.
-pub(crate) type NumberMap<K, V> = HashMap<K, V, BuildHasherDefault<NodeHasher>>;
-
-/// Hashes nodes, which are small numbers, by a multiplication each.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct NodeHasher(u64);
-
-impl Hasher for NodeHasher {
-    fn finish(&self) -> u64 {
-        // The table takes the lowest bits, which a product leaves the poorest.
-        self.0 ^ self.0 >> 32
-    }
-
-    fn write(&mut self, bytes: &[u8]) {
-        for part in bytes.chunks(8) {
-            let mut word = [0; 8];
-            word[..part.len()].copy_from_slice(part);
-            self.write_u64(u64::from_le_bytes(word));
-        }
-    }
-
-    fn write_u32(&mut self, word: u32) {
-        self.write_u64(word.into());
-    }
-
-    fn write_u64(&mut self, word: u64) {
-        // An odd constant without a pattern: 2^64 by the golden ratio.
-        self.0 = (self.0.rotate_left(29) ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    }
-
-    fn write_usize(&mut self, word: usize) {
-        self.write_u64(word as u64);
-    }
-
-    fn write_i64(&mut self, word: i64) {
-        self.write_u64(word as u64);
-    }
-
-    fn write_isize(&mut self, word: isize) {
-        self.write_u64(word as u64);
-    }
-}
+pub(crate) type NumberMap<K, V> = FxHashMap<K, V>;
 
 impl Default for Graph {
     fn default() -> Self {
@@ -132,7 +93,7 @@ impl Graph {
         let mut graph = Graph {
             nodes: Vec::new(),
             depth: Vec::new(),
-            index: HashMap::default(),
+            index: FxHashMap::default(),
             earlier: Vec::new(),
             symbols: Vec::new(),
             size: 0,
@@ -140,8 +101,8 @@ impl Graph {
             has_powers_of_zero: false,
             work: 0,
             samples: Vec::new(),
-            open: HashMap::default(),
-            residues: HashMap::default(),
+            open: FxHashMap::default(),
+            residues: FxHashMap::default(),
         };
         graph.intern(Node::Number(Rational::zero()));
         graph.intern(Node::Number(Rational::one()));
@@ -150,7 +111,7 @@ impl Graph {
 
     /// The handle of `node`; canonical form is the caller's duty.
     pub(crate) fn intern(&mut self, node: Node) -> Expr {
-        let hash = BuildHasherDefault::<NodeHasher>::default().hash_one(&node);
+        let hash = FxBuildHasher.hash_one(&node);
         let mut known = self.index.get(&hash).copied();
         while let Some(expr) = known {
             if *self.node(expr) == node {
@@ -487,31 +448,6 @@ mod tests {
             let expr = build(&mut graph, text);
             assert!(!graph.differs_from_zero(expr) && !graph.vanishes(expr), "{text}");
             assert!(!graph.sum_is_sampled(&[Graph::ONE, expr]), "{text}");
-        }
-    }
-
-    /// Hashes of handles and of other numbers, consecutive or with zeros at their ends, take about as many values in
-    /// the lowest bits as random numbers would, which is 63 of a hundred.
-    #[test]
-    fn hashes_spread_over_the_lowest_bits() {
-        let build = BuildHasherDefault::<NodeHasher>::default();
-        for shift in [0, 3, 12, 20] {
-            let hashes = |of: &dyn Fn(u64) -> u64| {
-                let lowest: BTreeSet<u64> = (0..4096).map(|n| of(n << shift) & 4095).collect();
-                lowest.len()
-            };
-            for different in [
-                hashes(&|n| build.hash_one(n)),
-                hashes(&|n| build.hash_one(n as i64)),
-                hashes(&|n| build.hash_one((n as usize, 7_u8))),
-                hashes(&|n| build.hash_one((n as isize, 7_u8))),
-                hashes(&|n| build.hash_one((Expr((n >> shift) as u32), "name"))),
-                hashes(&|n| build.hash_one(n.to_string())),
-                hashes(&|n| build.hash_one(Rational::from(n as i64))),
-                hashes(&|n| build.hash_one(Rational::new(1.into(), ((n >> shift) + 1).into()))),
-            ] {
-                assert!(different > 2000, "{different} of 4096, shifted by {shift}");
-            }
         }
     }
 

@@ -10,6 +10,8 @@ use mmsmith_solutions::{
 };
 use mmsmith_spec::Spec;
 use mmsmith_tests::{c_compiler, cpp_compiler, outcome, workspace};
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::Path;
@@ -66,18 +68,13 @@ const SURFACES: [(Surface, &str); 8] = [
     (Surface::Outer, "outer"),
 ];
 
-/// A generator of numbers that are the same in every run.
-struct Random(u64);
+/// Numbers that are the same in every run.
+struct Random(SplitMix64);
 
 impl Random {
     /// Between 0 and 1.
     fn number(&mut self) -> f64 {
-        // Steele, Lea and Flood's SplitMix.
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+        (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }
 }
 
@@ -94,7 +91,7 @@ struct Case {
 }
 
 fn cases() -> Vec<Case> {
-    let mut random = Random(1);
+    let mut random = Random(SplitMix64::seed_from_u64(1));
     let mut cases = Vec::new();
     for (description, build) in solutions() {
         let defaults: Vec<f64> = description.parameters.iter().map(|p| p.default).collect();
