@@ -70,6 +70,51 @@ fn thorough_check_states_the_worst_factor_of_each_field_in_each_class() {
     }
 }
 
+#[test]
+fn the_search_for_rounding_errors_goes_on_from_its_state() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let command = "check --thorough bar --points 3 --state kept --json out.json";
+    let called = mms(place, command);
+    assert_eq!(called.status, 0, "{}{}", called.stdout, called.stderr);
+    assert!(called.stdout.contains("searched"), "{}", called.stdout);
+    let worst: Vec<&str> =
+        called.stdout.lines().skip_while(|line| *line != "The worst of all:").collect();
+    // Four lines, each with every input, and the meaning of K.
+    assert_eq!(worst.len(), 6, "{}", called.stdout);
+    assert!(worst[1..5].iter().all(|line| line.contains("found by ") && line.contains(" rho0 = ")));
+    let read = |name: &str| read_json(&place.join(name));
+    let rows = read("out.json")["results"][0]["accuracy"].as_array().unwrap().clone();
+    assert!(rows.iter().all(|row| row["drawn"] == 3 && row["searched"].as_u64().unwrap() > 300));
+    assert!(rows.iter().all(|row| row["found"] == "draw" || row["found"] == "search"));
+    assert!(rows.iter().any(|row| row["found"] == "search"));
+    for row in &rows {
+        let outside = row["outside"] == true;
+        assert!(!outside || row["class"] == "far" || row["class"] == "near origin", "{row}");
+    }
+    assert!(rows.iter().any(|row| row["outside"] == true));
+    let first = read("kept/bar.json");
+    assert_eq!(
+        (&first["schema"], &first["search"]["rounds"]),
+        (&"mmsmith.search/1".into(), &1.into())
+    );
+    let called = mms(place, command);
+    assert_eq!(called.status, 0, "{}{}", called.stdout, called.stderr);
+    assert_eq!(read("kept/bar.json")["search"]["rounds"], 2);
+
+    // Of another text, and of something else altogether.
+    let spec = include_str!("../../../mms-specs/bar.toml");
+    fs::create_dir(place.join("mms-specs")).unwrap();
+    fs::write(place.join("mms-specs/bar.toml"), spec.replace("0.01", "0.02")).unwrap();
+    refuses(place, command, &["kept", "bar.json", "another text", "remove the file"]);
+    fs::remove_dir_all(place.join("mms-specs")).unwrap();
+    fs::write(place.join("kept/bar.json"), "{}").unwrap();
+    refuses(place, command, &["kept", "bar.json", "no state of a search", "remove the file"]);
+    refuses(place, "check bar --seconds 20", &["--thorough"]);
+    refuses(place, "check bar --state kept", &["--thorough"]);
+    refuses(place, "check --thorough bar --seconds 0", &["--seconds"]);
+}
+
 /// A displacement written as a difference of numbers near one has no digits where it is small.
 #[test]
 fn thorough_check_fails_what_loses_digits() {

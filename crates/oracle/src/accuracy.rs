@@ -16,6 +16,8 @@ pub const LARGEST_FACTOR: f64 = 8.0;
 
 /// Digits that the truth has at a place that is reported or doubtful.
 const DIGITS: usize = 40;
+/// Digits of the truth that are enough for two digits of the factor.
+const QUICK_DIGITS: usize = 20;
 /// The precision of the first look at a point.
 const QUICK_BITS: usize = 192;
 /// From this factor on the first look is not believed.
@@ -241,6 +243,25 @@ impl<'a> Accuracy<'a> {
         Ok(ClassAccuracy { class, points: count, searched: 0, remark, worst: confirmed })
     }
 
+    /// Judges one point: the worst entry of each field there, in arbitrary precision.
+    ///
+    /// # Errors
+    ///
+    /// As [`Accuracy::measure`].
+    pub fn at(&self, inputs: &[f64], judged: JudgedCode<'_>) -> Result<Vec<Worst>, AccuracyError> {
+        let results = self.results(inputs, judged)?;
+        let mut all: Vec<Worst> = Vec::new();
+        for (field, results) in results.iter().enumerate() {
+            let mut entries = Vec::new();
+            for entry in 0..results.len() {
+                let finding = Finding { field, entry, factor: 0.0 };
+                entries.push(self.confirm(inputs, &finding, Found::Draw, &all, judged)?);
+            }
+            all.extend(entries.into_iter().max_by(|a, b| a.factor.total_cmp(&b.factor)));
+        }
+        Ok(all)
+    }
+
     /// The worst entry of each field at one point.
     fn look(
         &self,
@@ -358,6 +379,33 @@ impl<'a> Accuracy<'a> {
         };
         // Draws that fail take long.
         *self.not_applicable[class as usize].get_or_init(find)
+    }
+
+    /// The factor of one entry with enough digits of the truth for it and the sensitivity in double precision; `None` where there is
+    /// no value.
+    pub(crate) fn looked_up(
+        &self,
+        inputs: &[f64],
+        finding: &Finding,
+        judged: JudgedCode<'_>,
+    ) -> Result<Option<f64>, AccuracyError> {
+        let result = self.results(inputs, judged)?[finding.field][finding.entry];
+        let before: usize = self.expressions[..finding.field].iter().map(|(_, e)| e.len()).sum();
+        let place = before + finding.entry;
+        let values = self.exact_inputs(inputs);
+        let truth = Oracle::new(QUICK_BITS).and_then(|mut oracle| {
+            oracle.settle(&self.point(&values), &self.flat[place..=place], QUICK_DIGITS)
+        });
+        // Far from the body, late, and in an inverted body a function may have no value.
+        let Ok(truth) = truth else { return Ok(None) };
+        let sens = self.quick_sensitivities(inputs)[place];
+        Ok(match exact(sens) {
+            Some(sens) => Some(worst_factor(result, &truth[0], &sens)),
+            None => match self.settled(inputs, finding.field, finding.entry, result) {
+                Ok((factor, ..)) => Some(factor),
+                Err(_) => None,
+            },
+        })
     }
 
     /// What points are drawn from.

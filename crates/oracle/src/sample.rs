@@ -1,7 +1,7 @@
 //! Points at which accuracy is measured, by class of inputs.
 
 use mmsmith_expr::{Expr, Graph, Program};
-use mmsmith_spec::{Bound, Domain, Fields, Parameter, Relation, Spec};
+use mmsmith_spec::{Bound, Coordinates, Domain, Fields, Parameter, Relation, Spec};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
@@ -22,7 +22,8 @@ pub enum Class {
     Boundary,
     /// The smallest principal stretch between 1e-2 and 1e-8, by choice of the amplitude.
     NearInversion,
-    /// Coordinates down to 1e-300; for a body around a hole, places next to the inner surface.
+    /// Coordinates down to 1e-300; where the coordinates have an axis and the body is away from it, places next to the surface
+    /// that faces it.
     NearOrigin,
     /// Outside of the body, where the functions go on: coordinates up to 1e8, around a hole radii from a tenth of the inner one to 1e3 outer ones.
     Far,
@@ -266,6 +267,7 @@ impl<'a> Sampler<'a> {
                     let x = position[i];
                     match class {
                         Class::Far => x.abs() <= FARTHEST * low.abs().max(high.abs()),
+                        Class::NearOrigin if self.has_axis() => (low..=high).contains(&x),
                         Class::NearOrigin => (low.min(0.0)..=high.max(0.0)).contains(&x),
                         _ => (low..=high).contains(&x),
                     }
@@ -313,6 +315,11 @@ impl<'a> Sampler<'a> {
                 !radius_is_between(length(&inputs[..n]), measures[0], measures[1])
             }
         }
+    }
+
+    /// Whether the coordinates have an axis, on which most fields have no value: places stay in the body then.
+    fn has_axis(&self) -> bool {
+        self.spec.coordinates != Coordinates::Cartesian
     }
 
     /// For each input the size that a change of it has at most, and values that are worth a try.
@@ -537,6 +544,10 @@ impl<'a> Sampler<'a> {
                     match class {
                         // Now and then one coordinate stays where it was.
                         Class::NearOrigin | Class::Far if n > 1 && random.one_in(3) => x,
+                        Class::NearOrigin if self.has_axis() && measures[i] != 0.0 => {
+                            let low = measures[i];
+                            low + (x - low) * 10_f64.powf(-random.between(1.0, 15.0))
+                        }
                         Class::NearOrigin => x * 10_f64.powf(-random.between(1.0, 300.0)),
                         Class::Far => {
                             let sign = if random.one_in(2) { 1.0 } else { -1.0 };

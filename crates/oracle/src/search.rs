@@ -204,7 +204,11 @@ impl Search {
             .map(|(field, places)| {
                 let Some(known) = places.first() else { return Ok(None) };
                 let finding = Finding { field, entry: known.entry, factor: known.factor };
-                accuracy.confirm(&known.inputs, &finding, Found::Search, &[], judged).map(Some)
+                match accuracy.confirm(&known.inputs, &finding, Found::Search, &[], judged) {
+                    // Digits that do not settle say nothing against the code.
+                    Err(AccuracyError::Oracle { .. }) => Ok(None),
+                    worst => worst.map(Some),
+                }
             })
             .collect::<Result<Vec<_>, AccuracyError>>()?;
         let mut worst = drawn.worst.clone();
@@ -409,7 +413,8 @@ impl ClassSearch {
     }
 }
 
-/// The factor of a finding as it counts: by the oracle where it is doubtful, and none where the oracle has no value.
+/// The factor of a finding as it counts: by the oracle where it is doubtful, and none where the oracle has no value. What
+/// remains the worst at the end is confirmed in arbitrary precision.
 fn confirmed(
     accuracy: &Accuracy<'_>,
     finding: &Finding,
@@ -419,14 +424,8 @@ fn confirmed(
     if finding.factor <= DOUBTFUL_FACTOR {
         return Ok(Some(finding.factor));
     }
-    let results = accuracy.results(inputs, judged)?;
-    let result = results[finding.field][finding.entry];
-    match accuracy.settled(inputs, finding.field, finding.entry, result) {
-        Ok((factor, ..)) => Ok(Some(factor.min(f64::MAX))),
-        // Far from the body, late, and in an inverted body a function may have no value.
-        Err(AccuracyError::Oracle { .. }) => Ok(None),
-        Err(error) => Err(error),
-    }
+    let factor = accuracy.looked_up(inputs, finding, judged)?;
+    Ok(factor.map(|factor| factor.min(f64::MAX)))
 }
 
 impl Scale {
