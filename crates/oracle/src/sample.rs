@@ -25,7 +25,7 @@ pub enum Class {
     /// Coordinates down to 1e-300; where the coordinates have an axis and the body is away from it, places next to the surface
     /// that faces it.
     NearOrigin,
-    /// Outside of the body, where the functions go on: coordinates up to 1e8, around a hole radii from a tenth of the inner one to 1e3 outer ones.
+    /// Outside of the body, where the functions go on: coordinates up to 1e8, around a hole radii from half of the inner one to 1e3 outer ones.
     Far,
 }
 
@@ -82,7 +82,7 @@ const MOST_PERIODS: f64 = 1e6;
 const FARTHEST: f64 = 1e8;
 const FARTHEST_RADII: f64 = 1e3;
 /// How far into a hole places go, as a share of the inner radius: on the axis few profiles have a value.
-const INNERMOST: f64 = 0.1;
+const INNERMOST: f64 = 0.5;
 /// The smallest stretches of bodies that count as near inversion.
 const NEAR_INVERSION: std::ops::RangeInclusive<f64> = 0.5e-8..=2e-2;
 

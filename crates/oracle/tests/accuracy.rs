@@ -300,12 +300,54 @@ fn points_are_of_their_class() {
         let text = std::fs::read_to_string(folder.join(name).with_extension("toml")).unwrap();
         let spec = Spec::parse(&text, name).unwrap();
         let mut fields = spec.derive().unwrap();
-        let jacobian = fields.program(&[fields.J]);
+        let gradient = fields.program(&fields.F.concat());
         let sampler = mmsmith_oracle::Sampler::new(&spec, &mut fields);
-        let J: Vec<f64> = (0..40)
-            .map(|index| jacobian.evaluate(&sampler.draw(class, index).unwrap())[0])
-            .collect();
-        assert!(J.iter().all(|&J| J > 0.0 && J < 0.2), "{name}: {J:?}");
-        assert!(J.iter().any(|&J| J < 1e-5), "{name}: {J:?}");
+        // In the plane: s1 s2 = J and s1^2 + s2^2 = F : F.
+        let smallest_stretch = |index| {
+            let F = gradient.evaluate(&sampler.draw(class, index).unwrap());
+            let J = F[0] * F[3] - F[1] * F[2];
+            let square: f64 = F.iter().map(|entry| entry * entry).sum();
+            J / (0.5 * (square + (square * square - 4.0 * J * J).max(0.0).sqrt())).sqrt()
+        };
+        let stretches: Vec<f64> = (0..40).map(smallest_stretch).collect();
+        assert!(stretches.iter().all(|&s| s > 0.0 && s < 2e-2), "{name}: {stretches:?}");
+        assert!(stretches.iter().any(|&s| s < 1e-5), "{name}: {stretches:?}");
+    }
+}
+
+/// A quarter of the draws is far from the defaults, in every class; those outside of the body are said to be.
+#[test]
+fn draws_reach_the_ends_of_what_is_admitted() {
+    for name in ["vortex", "ring-nu", "sphere-shell", "skew-2d"] {
+        let spec = of_library(name);
+        let mut fields = spec.derive().unwrap();
+        let sampler = mmsmith_oracle::Sampler::new(&spec, &mut fields);
+        let n = spec.dimension;
+        let place =
+            |name: &str| n + 1 + spec.parameters.iter().position(|p| p.name == name).unwrap();
+        let (nu, E, A) = (place("nu"), place("E"), place("A"));
+        let default = spec.parameters[E - n - 1].default;
+        for class in
+            [Class::Ordinary, Class::TinyAmplitude, Class::Late, Class::Boundary, Class::Far]
+        {
+            let drawn: Vec<Vec<f64>> =
+                (0..300).filter_map(|index| sampler.draw(class, index)).collect();
+            let some = |holds: &dyn Fn(&Vec<f64>) -> bool| {
+                assert!(drawn.iter().any(holds), "{name}, {class:?}");
+            };
+            some(&|inputs| inputs[nu] > 0.5 - 1e-6);
+            some(&|inputs| inputs[nu] < 0.0);
+            some(&|inputs| inputs[nu] == 0.0);
+            some(&|inputs| inputs[E] > 5.0 * default);
+            some(&|inputs| inputs[E] < default / 5.0);
+            some(&|inputs| inputs[A] < 0.0);
+            assert!(drawn.iter().all(|inputs| inputs[nu] <= 0.5 - 0.99e-8), "{name}, {class:?}");
+            let outside = drawn.iter().filter(|inputs| sampler.is_outside(inputs)).count();
+            if class == Class::Far {
+                assert!(outside > drawn.len() / 2, "{name}: {outside} of {}", drawn.len());
+            } else {
+                assert_eq!(outside, 0, "{name}, {class:?}");
+            }
+        }
     }
 }
