@@ -51,7 +51,13 @@ pub fn arrange(
         last: None,
         fractions: NumberMap::default(),
     };
-    outputs.iter().map(|&output| arranging.arrange(output)).collect()
+    let arrange = |&output: &Expr| {
+        if arranging.graph.divides_by_exponentials(output) {
+            return output;
+        }
+        arranging.arrange(output)
+    };
+    outputs.iter().map(arrange).collect()
 }
 
 /// A product of quantities that depend on time, each to a positive power.

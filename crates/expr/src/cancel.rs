@@ -156,13 +156,21 @@ impl Graph {
 
     /// An exponential function by powers of symbols.
     fn hyperbolic(&mut self, function: Function, argument: Expr) -> Expr {
-        let (constant, terms) = match self.node(argument).clone() {
-            Node::Sum { constant, terms } => (constant, terms.into_vec()),
-            _ => (Rational::zero(), vec![(argument, Rational::one())]),
-        };
+        let mut open = vec![(argument, Rational::one())];
         let mut factors = Vec::new();
-        for (term, coefficient) in terms.into_iter().chain([(Graph::ONE, constant)]) {
-            factors.push((self.symbol(&format!("exp #{}", term.0)), coefficient));
+        while let Some((term, coefficient)) = open.pop() {
+            match self.node(term).clone() {
+                Node::Number(value) => {
+                    let base = self.symbol("exp #1");
+                    factors.push((base, value * coefficient));
+                }
+                Node::Sum { constant, terms } => {
+                    open.extend(terms.iter().map(|(term, own)| (*term, own * &coefficient)));
+                    let constant = self.number(constant);
+                    open.push((constant, coefficient));
+                }
+                _ => factors.push((self.symbol(&format!("exp #{}", term.0)), coefficient)),
+            }
         }
         let above = self.product(factors.clone());
         let below = self.product(factors.into_iter().map(|(base, power)| (base, -power)));

@@ -2,7 +2,8 @@
 //!
 //! Rules: nested sums and products are flattened; like terms and equal bases are collected; a numeric content
 //! and factors common to all terms of a sum stand outside it; terms `k S1 + k S2` with sums `S1`, `S2` are
-//! merged into `k (S1 + S2)`. Products of sums are never multiplied out.
+//! merged into `k (S1 + S2)`. Products of sums are never multiplied out. Exponential functions of one argument meet
+//! in sums and products by rules of their own.
 
 use crate::function::Parity;
 use crate::rational::exact_root;
@@ -155,6 +156,11 @@ impl Graph {
 
     fn sum_of_collected(&mut self, constant: Rational, collected: Collected) -> Expr {
         let mut terms = collected.into_sorted();
+        if self.has_exponentials
+            && let Some(sum) = self.sum_of_exponentials(&constant, &terms)
+        {
+            return sum;
+        }
         match (terms.len(), constant.is_zero()) {
             (0, _) => return self.number(constant),
             (1, true) => {
@@ -262,6 +268,13 @@ impl Graph {
             return Graph::ZERO;
         }
         let collected = collected.into_sorted();
+        if self.has_exponentials
+            && collected.len() > 1
+            && let Some((number, factors)) = self.product_of_exponentials(&collected)
+        {
+            let product = self.product(factors);
+            return self.sum([(coefficient * number, product)]);
+        }
         let term = match &collected[..] {
             [] => return self.number(coefficient),
             // To the first power nothing is left closed that has a coefficient of its own.
@@ -336,6 +349,11 @@ impl Graph {
                 if let Node::Call(Function::Ln, inner) = self.node(x) {
                     return inner[0];
                 }
+            }
+            Function::Ln if self.logistic(x).is_some() => {
+                // `ln(1 + exp(y))` of a `y` far below zero has its digits in the exponential.
+                let exponential = self.sub(x, Graph::ONE);
+                return self.call(Function::Ln1p, &[exponential]);
             }
             Function::Ln => {
                 if let Node::Call(Function::Exp, inner) = self.node(x) {

@@ -62,6 +62,8 @@ pub struct Graph {
     bits: u64,
     /// Whether any product has a power of zero.
     pub(crate) has_powers_of_zero: bool,
+    /// Whether there are any exponential functions, hyperbolic ones included.
+    pub(crate) has_exponentials: bool,
     /// Operands that sums and products have been made of, time and again.
     pub(crate) work: usize,
     /// The values of the first nodes at one place, each with the magnitude of what it was summed up from.
@@ -99,6 +101,7 @@ impl Graph {
             size: 0,
             bits: 0,
             has_powers_of_zero: false,
+            has_exponentials: false,
             work: 0,
             samples: Vec::new(),
             open: FxHashMap::default(),
@@ -126,6 +129,13 @@ impl Graph {
         // Factors are sorted by their bases, and zero is the first node.
         self.has_powers_of_zero |=
             matches!(&node, Node::Product(factors) if factors[0].0 == Graph::ZERO);
+        self.has_exponentials |= matches!(
+            &node,
+            Node::Call(
+                Function::Exp | Function::Expm1 | Function::Sinh | Function::Cosh | Function::Tanh,
+                _
+            )
+        );
         self.earlier.push(self.index.insert(hash, expr));
         self.nodes.push(node);
         self.depth.push(depth);

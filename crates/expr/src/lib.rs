@@ -38,6 +38,7 @@ mod cancel;
 mod canonical;
 mod constant;
 mod derivative;
+mod exponential;
 mod function;
 mod gather;
 mod graph;

@@ -495,6 +495,11 @@ impl Lowering<'_> {
     }
 
     fn call(&mut self, function: Function, argument: Expr) -> Slot {
+        if let (Function::Ln1p, Node::Call(Function::Exp, arguments)) =
+            (function, self.graph.node(argument))
+        {
+            return self.log_of_one_and_exponential(arguments[0]);
+        }
         if matches!(function, Function::Sin | Function::Cos) {
             let pi = self.graph.pi();
             let turns = self.graph.div(argument, pi);
@@ -503,6 +508,20 @@ impl Lowering<'_> {
             }
         }
         self.applied(function, argument, false)
+    }
+
+    /// `ln(1 + exp(x)) = max(x, 0) + log1p(exp(-|x|))`, which no exponential leaves its range in.
+    fn log_of_one_and_exponential(&mut self, exponent: Expr) -> Slot {
+        let x = self.lower(exponent);
+        let square = self.push(Operation::Mul(x, x));
+        let size = self.push(Operation::Sqrt(square));
+        let twice_positive = self.push(Operation::Add(x, size));
+        let half = self.push(Operation::Number(Rational::new(1.into(), 2.into())));
+        let positive = self.push(Operation::Mul(half, twice_positive));
+        let opposite = self.push(Operation::Neg(size));
+        let decaying = self.push(Operation::Call(Function::Exp, opposite));
+        let rest = self.push(Operation::Call(Function::Ln1p, decaying));
+        self.push(Operation::Add(positive, rest))
     }
 
     /// Whether a power of pi stands in the product `expr`: then dividing by pi did not take it away.

@@ -5,7 +5,7 @@
 //! as a whole answers to `X` little, and then the rounding of one argument is far more than that of the inputs may
 //! cause. The same holds of phases in time, `cos(c Pi t + Pi/3)` beside `sin(c Pi t)`, at late times. So the sum `a` is
 //! formed together with what rounding took from it, `e`, by error-free transformations, and the function is
-//! `f(a) + e (f'(a) + e f''(a)/2)`.
+//! `f(a) + e (f'(a) + e f''(a)/2)`, or that over `f(a)` times `f(a)`.
 //!
 //! The parts of a sum are numbers and products, such as `c t`, with constant coefficients, such as `3/Pi`. What rounding does
 //! to `c t` itself is left: every argument with this part has the same rounding in it, which an error of `t` might have caused.
@@ -67,7 +67,11 @@ impl Lowering<'_> {
             return self.push(call(function, argument));
         };
         let value = self.push(call(function, total));
-        let slope = self.push(call(slope, total));
+        let relative_slope = match function {
+            Function::Exp => Some(self.push(Operation::Number(Rational::one()))),
+            Function::Cosh => Some(self.push(Operation::Call(Function::Tanh, total))),
+            _ => None,
+        };
         let lost = if in_turns {
             let pi = self.push(Operation::Pi);
             self.push(Operation::Mul(pi, lost))
@@ -76,6 +80,15 @@ impl Lowering<'_> {
         };
         let half = self.push(Operation::Number(Rational::new(1.into(), 2.into())));
         let half = self.push(Operation::Mul(half, lost));
+        if let Some(relative_slope) = relative_slope {
+            // Where the function overflows, a product stays infinite and a sum of two infinities may be no number.
+            let slope = self.push(Operation::Add(relative_slope, half));
+            let correction = self.push(Operation::Mul(lost, slope));
+            let one = self.push(Operation::Number(Rational::one()));
+            let factor = self.push(Operation::Add(correction, one));
+            return self.push(Operation::Mul(value, factor));
+        }
+        let slope = self.push(call(slope, total));
         let second = self.push(Operation::Mul(half, value));
         // With f' = -g the correction is -e (g - e f''/2).
         let slope = self.push(if falls != turns_back {

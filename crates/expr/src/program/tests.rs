@@ -285,17 +285,14 @@ fn operations_and_their_order() {
             "sin(1/3*x)",
             "(sin((1/3*x)) + (((1/54043195528445952*x) + producterror(1/3, x))*(cos((1/3*x)) - ((1/2*((1/54043195528445952*x) + producterror(1/3, x)))*sin((1/3*x))))))",
         ),
-        (
-            "exp(x + 1)",
-            "(exp((1 + x)) + (sumerror(1, x)*(exp((1 + x)) + ((1/2*sumerror(1, x))*exp((1 + x))))))",
-        ),
+        ("exp(x + 1)", "(exp((1 + x))*((sumerror(1, x)*(1 + (1/2*sumerror(1, x)))) + 1))"),
         (
             "sinh(-x + y)",
             "-(sinh((x - y)) + (sumerror(x, -y)*(cosh((x - y)) + ((1/2*sumerror(x, -y))*sinh((x - y))))))",
         ),
         (
             "cosh(2 - x)",
-            "(cosh((2 - x)) + (sumerror(2, -x)*(sinh((2 - x)) + ((1/2*sumerror(2, -x))*cosh((2 - x))))))",
+            "(cosh((2 - x))*((sumerror(2, -x)*(tanh((2 - x)) + (1/2*sumerror(2, -x)))) + 1))",
         ),
         ("tan(x + y)", "tan((x + y))"),
         (
@@ -310,10 +307,7 @@ fn operations_and_their_order() {
             "cos(Pi*(1 - x/3))",
             "(cos(Pi (1 - (1/3*x))) - ((Pi*((sumerror(1, -(1/3*x)) - (1/54043195528445952*x)) - producterror(1/3, x)))*(sin(Pi (1 - (1/3*x))) + ((1/2*(Pi*((sumerror(1, -(1/3*x)) - (1/54043195528445952*x)) - producterror(1/3, x))))*cos(Pi (1 - (1/3*x)))))))",
         ),
-        (
-            "exp(-x - y)",
-            "(exp((-x - y)) + (sumerror(-x, -y)*(exp((-x - y)) + ((1/2*sumerror(-x, -y))*exp((-x - y))))))",
-        ),
+        ("exp(-x - y)", "(exp((-x - y))*((sumerror(-x, -y)*(1 + (1/2*sumerror(-x, -y)))) + 1))"),
         ("x*(1 + y)", "(x*(y + 1))"),
         ("2*(1 + y)", "(2*(y + 1))"),
         ("(1 + y)/2", "(1/2*(y + 1))"),
