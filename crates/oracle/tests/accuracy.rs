@@ -344,7 +344,8 @@ fn draws_reach_the_ends_of_what_is_admitted() {
             assert!(drawn.iter().all(|inputs| inputs[nu] <= 0.5 - 0.99e-8), "{name}, {class:?}");
             let outside = drawn.iter().filter(|inputs| sampler.is_outside(inputs)).count();
             if class == Class::Far {
-                assert!(outside > drawn.len() / 2, "{name}: {outside} of {}", drawn.len());
+                // Where displacements grow fast, only those next to the body suit.
+                assert!(outside > drawn.len() / 5, "{name}: {outside} of {}", drawn.len());
             } else {
                 assert_eq!(outside, 0, "{name}, {class:?}");
             }
