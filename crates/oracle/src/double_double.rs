@@ -173,7 +173,7 @@ impl DoubleDouble {
 
     /// `exp(x) - 1`.
     fn expm1(self) -> Self {
-        if !(self.high.abs() < 700.0) {
+        if self.high.is_nan() || self.high.abs() >= 700.0 {
             return Self::from(self.high.exp_m1());
         }
         match self.reduced_exponential() {
@@ -183,7 +183,7 @@ impl DoubleDouble {
     }
 
     fn exp(self) -> Self {
-        if !(self.high.abs() < 700.0) {
+        if self.high.is_nan() || self.high.abs() >= 700.0 {
             return Self::from(self.high.exp());
         }
         let (value, whole) = self.reduced_exponential();
@@ -237,7 +237,7 @@ impl DoubleDouble {
     /// `sin(x + quarters pi/2)`.
     fn sin_shifted(self, quarters: f64) -> Self {
         let n = (self.high * FRAC_2_PI).round();
-        if !(n.abs() < MOST_QUARTERS) {
+        if n.is_nan() || n.abs() >= MOST_QUARTERS {
             return Self::from(f64::NAN);
         }
         let mut rest = self;
