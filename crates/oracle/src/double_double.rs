@@ -429,7 +429,7 @@ mod tests {
     fn every_function_has_thirty_digits_or_nearly() {
         let small = [1e-9, -3.7e-5, 0.013];
         let moderate = [0.31, -0.29, 0.77, 0.49999];
-        let large = [1.7, 3.141_592_653_589_793, 12.3, -7.1, 31.4];
+        let large = [1.7, std::f64::consts::PI, 12.3, -7.1, 31.4];
         let all: Vec<f64> = [&small[..], &moderate, &large].concat();
         let positive: Vec<f64> = all.iter().map(|x| x.abs()).collect();
         let turns = [all.clone(), vec![1e6 + 0.1, 123_456.789, -12_345_678.9]].concat();
