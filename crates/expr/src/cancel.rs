@@ -13,6 +13,9 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Numerators with more terms than this are not worth the search.
 const MOST_TERMS: usize = 512;
 
+/// Expressions of more parts than this are not multiplied out on the way of a derivative.
+const MOST_PARTS: usize = 20;
+
 /// A monomial, as atoms to positive powers, and its coefficient.
 pub type Term = (Vec<(Expr, u32)>, Rational);
 
@@ -293,6 +296,16 @@ impl Graph {
             Node::Call(Function::Cos, arguments) if power >= 2 => Some((atom, arguments[0])),
             _ => None,
         })
+    }
+
+    /// The expression as one product or zero, where multiplying out makes it one and nothing is kept in one piece.
+    pub(crate) fn single_term(&mut self, expr: Expr) -> Option<Expr> {
+        let is_whole = |part: &Expr| matches!(self.node(*part), Node::Whole(_));
+        let reachable = self.reachable(&[expr]);
+        if reachable.len() > MOST_PARTS || reachable.iter().any(is_whole) {
+            return None;
+        }
+        self.collapse(expr)
     }
 
     /// The sum as one product or zero, where it is one.

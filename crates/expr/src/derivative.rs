@@ -55,6 +55,16 @@ impl Derivatives {
                     let inner = self.of(graph, *base, variable);
                     if inner != Graph::ZERO {
                         let others = factors.iter().filter(|(b, _)| b != base).cloned();
+                        if let Some(whole) = self.of_quotient(
+                            graph,
+                            (*base, exponent),
+                            inner,
+                            others.clone(),
+                            variable,
+                        ) {
+                            self.known.insert((expr, variable), whole);
+                            return whole;
+                        }
                         let slope = match hyperbolic_cosine(graph, *base) {
                             // `cosh' = tanh cosh`: where both sinh and cosh overflow, their quotient is none any more.
                             Some(x) if exponent.is_negative() => {
@@ -101,6 +111,33 @@ impl Derivatives {
             return Graph::ZERO;
         }
         rule.with(graph, &values)
+    }
+
+    /// The derivative of `f S^p` for a sum `S` whose root is divided by, as `S^(p - 1) (S f' + p S' f)` where the bracket is one term,
+    /// as in `x/sqrt(1 + x^2)`: far away the two parts of it nearly cancel. `None` where it is not.
+    fn of_quotient(
+        &mut self,
+        graph: &mut Graph,
+        (base, exponent): (Expr, &Rational),
+        slope: Expr,
+        others: impl Iterator<Item = (Expr, Rational)>,
+        variable: Expr,
+    ) -> Option<Expr> {
+        let divides_by_root = exponent.is_negative() && !exponent.is_integer();
+        if !divides_by_root || !matches!(graph.node(base), Node::Sum { .. }) {
+            return None;
+        }
+        let others = graph.product(others);
+        let slope_of_others = self.of(graph, others, variable);
+        if slope_of_others == Graph::ZERO {
+            return None;
+        }
+        let first = graph.mul(base, slope_of_others);
+        let second = graph.mul(slope, others);
+        let bracket = graph.sum([(Rational::one(), first), (exponent.clone(), second)]);
+        let single = graph.single_term(bracket)?;
+        let power = graph.product([(base, exponent - Rational::one())]);
+        Some(graph.mul(power, single))
     }
 }
 

@@ -405,7 +405,10 @@ impl Spec {
     /// Forms displacements that vanish with a parameter, as `X*(cos(A*t) - 1)` does with `A`, from what is small with it: the
     /// difference of two large terms is left to no rounding.
     fn form_from_amplitude(&mut self) {
-        let graph = &mut self.graph;
+        // Nothing is left in the graph of forms that are not taken.
+        let mut changed = self.graph.clone();
+        let graph = &mut changed;
+        let before = self.displacement.clone();
         let mut symbols: Vec<Expr> =
             self.parameters.iter().map(|p| graph.symbol(&p.name)).collect();
         // The usual name first.
@@ -423,6 +426,9 @@ impl Spec {
                 (value == Graph::ZERO).then(|| graph.replace(rest, &positive))
             });
             *component = formed.unwrap_or(*component);
+        }
+        if self.displacement == before {
+            return;
         }
         // `cos(a) - 1` has become `-2 sin(a/2)^2`; beside it `sin(a)` hides what the two have in common.
         let two = graph.integer(2);
@@ -445,6 +451,7 @@ impl Spec {
         for component in &mut self.displacement {
             *component = graph.replace(*component, &by_half);
         }
+        self.graph = changed;
     }
 
     /// Reads the text of a specification; `file` is what messages call it.

@@ -300,3 +300,62 @@ fn fields_that_are_nowhere_defined_are_refused() {
     let error = sample("A", "-X").unwrap().derive().unwrap_err();
     assert!(matches!(error, DeriveError::DivisionByZero { .. }), "{error}");
 }
+
+/// A displacement that vanishes with its amplitude is formed of nothing that does not: values at an amplitude of 1e-20 from the first
+/// term of their series, and J = 1 is known.
+#[test]
+fn small_displacements_have_no_large_terms() {
+    let cases = [
+        ("cartesian", "X*(cos(A*Y) - 1) - 2*sin(A*Y)", "0", -2e-20 * 0.4),
+        ("cartesian", "X*(exp(A*t) - 1)", "Y*(exp(-A*t) - 1)", 0.3e-20 * 0.7),
+        ("cartesian", "X*(1/(1 + A*t) - 1)", "Y*A*t", -0.3e-20 * 0.7),
+        ("cartesian", "ln(Y + A) - ln(Y)", "0", 1e-20 / 0.4),
+        ("polar", "sqrt(R^2 + A*t) - R", "0", 0.5e-20 * 0.7 / (0.3 * 0.3 + 0.4 * 0.4) * 0.3),
+    ];
+    for (coordinates, first, second, expected) in cases {
+        let names = if coordinates == "polar" { ["R", "theta"] } else { ["X", "Y"] };
+        let domain = if coordinates == "polar" {
+            "shape = 'annulus'\ninner = 1\nouter = 2"
+        } else {
+            "shape = 'box'\nlower = [1, 1]\nupper = [2, 2]"
+        };
+        let text = format!(
+            "name = 'small'\ntitle = 'small'\ncoordinates = '{coordinates}'\ndimension = 2\n\
+             [parameters]\nA = {{ default = 0.1 }}\n\
+             [displacement]\n{} = '{first}'\n{} = '{second}'\n\
+             [material]\nlaw = 'neo-hookean'\nlambda = 1\nmu = 1\ndensity = 1\n\
+             [domain]\n{domain}\n[time]\nperiod = 1\nwave-speed = 1\n",
+            names[0], names[1]
+        );
+        let spec = Spec::parse(&text, "small.toml").unwrap_or_else(|error| panic!("{error}"));
+        let mut fields = spec.derive().unwrap();
+        let program = fields.program(&[fields.u[0]]);
+        let value = program.evaluate(&[0.3, 0.4, 0.7, 1e-20])[0];
+        assert!((value / expected - 1.0).abs() < 1e-15, "{first}: {value:e}, not {expected:e}");
+        let keeps_volume = ["exp", "ln", "R^2", "1/("].iter().any(|part| first.contains(part));
+        assert_eq!(fields.J == Graph::ONE, keeps_volume, "{first}");
+    }
+}
+
+/// The form of a solved displacement that keeps digits is the displacement: at both faces and between them it is what the conditions
+/// say, of faces next to each other too.
+#[test]
+fn solved_displacements_meet_their_conditions() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let spec = parse(&root.join("tests/data/specs/digits/solved-slab.toml")).unwrap();
+    let mut fields = spec.derive().unwrap();
+    let program = fields.program(&[fields.u[0], fields.H[0][0]]);
+    for thickness in [0.5, 1e-2, 1e-6] {
+        let (A, E, t, L) = (1e-3 * thickness, 10.0, 0.4, 0.9);
+        let at = |X: f64| program.evaluate(&[X, t, A, E, 0.2, 1.0, L, thickness]);
+        let T = A * (E.sqrt() * t + 1.0 / 3.0_f64).sin();
+        let (held, free) = (at(L), at(L * (1.0 + thickness)));
+        assert!(held[0].abs() < 1e-15 * T && held[1].abs() < 1e-14 * T / thickness, "{held:?}");
+        assert!((free[0] / T - 1.0).abs() < 1e-14, "{free:?}");
+        assert!((free[1] - T / L).abs() < 1e-14 * T / (thickness * thickness), "{free:?}");
+        // Between them it is the polynomial of third degree with these values and slopes, h = 1/2.
+        let half = at(L * (1.0 + 0.5 * thickness))[0];
+        let hermite = 0.5 * T - 0.125 * thickness * L * (T / L);
+        assert!((half / hermite - 1.0).abs() < 1e-9, "{half:e}, not {hermite:e}");
+    }
+}

@@ -72,6 +72,8 @@ impl Lowering<'_> {
             Function::Cosh => Some(self.push(Operation::Call(Function::Tanh, total))),
             _ => None,
         };
+        let is_relative = relative_slope.is_some();
+        let slope = relative_slope.unwrap_or_else(|| self.push(call(slope, total)));
         let lost = if in_turns {
             let pi = self.push(Operation::Pi);
             self.push(Operation::Mul(pi, lost))
@@ -80,15 +82,14 @@ impl Lowering<'_> {
         };
         let half = self.push(Operation::Number(Rational::new(1.into(), 2.into())));
         let half = self.push(Operation::Mul(half, lost));
-        if let Some(relative_slope) = relative_slope {
+        if is_relative {
             // Where the function overflows, a product stays infinite and a sum of two infinities may be no number.
-            let slope = self.push(Operation::Add(relative_slope, half));
+            let slope = self.push(Operation::Add(slope, half));
             let correction = self.push(Operation::Mul(lost, slope));
             let one = self.push(Operation::Number(Rational::one()));
             let factor = self.push(Operation::Add(correction, one));
             return self.push(Operation::Mul(value, factor));
         }
-        let slope = self.push(call(slope, total));
         let second = self.push(Operation::Mul(half, value));
         // With f' = -g the correction is -e (g - e f''/2).
         let slope = self.push(if falls != turns_back {
