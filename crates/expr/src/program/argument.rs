@@ -66,6 +66,9 @@ impl Lowering<'_> {
             let argument = self.lower(argument);
             return self.push(call(function, argument));
         };
+        if function == Function::Sinh {
+            return self.sinh_of_sum(total, lost);
+        }
         let value = self.push(call(function, total));
         let relative_slope = match function {
             Function::Exp => Some(self.push(Operation::Number(Rational::one()))),
@@ -103,6 +106,20 @@ impl Lowering<'_> {
         } else {
             Operation::Add(value, correction)
         })
+    }
+
+    /// `sinh(a + e) = cosh(a) (tanh(a) + e (1 + e tanh(a)/2))`, to second order: infinite where it overflows.
+    fn sinh_of_sum(&mut self, total: Slot, lost: Slot) -> Slot {
+        let cosine = self.push(Operation::Call(Function::Cosh, total));
+        let tangent = self.push(Operation::Call(Function::Tanh, total));
+        let half = self.push(Operation::Number(Rational::new(1.into(), 2.into())));
+        let half = self.push(Operation::Mul(half, lost));
+        let second = self.push(Operation::Mul(half, tangent));
+        let one = self.push(Operation::Number(Rational::one()));
+        let slope = self.push(Operation::Add(one, second));
+        let correction = self.push(Operation::Mul(lost, slope));
+        let relative = self.push(Operation::Add(tangent, correction));
+        self.push(Operation::Mul(cosine, relative))
     }
 
     /// The sum of products with constant coefficients that `argument` is, rounded, and what rounding took from it.
@@ -444,6 +461,22 @@ mod tests {
         ("sinh(Y + X/10^6)", 4.424546671737787e42),
         ("cosh(X/10^6 - k)", 1.4423823122947754e41),
     ];
+
+    /// What is beyond the largest number is infinite, whatever the sum has lost.
+    #[test]
+    fn what_overflows_is_infinite() {
+        for X in [98_765_432.123_456_79, -98_765_431.987_654_3, 987_654_321.123_456] {
+            let at = [X, 0.123_456_789, 7e5, 3.3];
+            for text in ["cosh(3*X + Y)", "sinh(X/3 - t/7)", "exp(-X/3 + t/7)"] {
+                let (_, value) = lowered(text, at);
+                assert!(!value.is_nan(), "{text}");
+            }
+            assert_eq!(lowered("cosh(3*X + Y)", at).1, f64::INFINITY);
+            assert_eq!(lowered("sinh(3*X + Y)", at).1, f64::INFINITY.copysign(X));
+            let exponential = if X > 0.0 { f64::INFINITY } else { 0.0 };
+            assert_eq!(lowered("exp(3*X + Y)", at).1, exponential);
+        }
+    }
 
     /// `k t` and `k X` are rounded, as an error of `t` or `X` might have it, and everything else is exact. Values from 60 digits
     /// (mpmath), at the rounded products.

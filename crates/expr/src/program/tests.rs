@@ -288,7 +288,7 @@ fn operations_and_their_order() {
         ("exp(x + 1)", "(exp((1 + x))*((sumerror(1, x)*(1 + (1/2*sumerror(1, x)))) + 1))"),
         (
             "sinh(-x + y)",
-            "-(sinh((x - y)) + (sumerror(x, -y)*(cosh((x - y)) + ((1/2*sumerror(x, -y))*sinh((x - y))))))",
+            "-(cosh((x - y))*(tanh((x - y)) + (sumerror(x, -y)*(1 + ((1/2*sumerror(x, -y))*tanh((x - y)))))))",
         ),
         (
             "cosh(2 - x)",
