@@ -113,8 +113,8 @@ impl Derivatives {
         rule.with(graph, &values)
     }
 
-    /// The derivative of `f S^p` for a sum `S` whose root is divided by, as `S^(p - 1) (S f' + p S' f)` where the bracket is one term,
-    /// as in `x/sqrt(1 + x^2)`: far away the two parts of it nearly cancel. `None` where it is not.
+    /// The derivative of `f S^p` for a sum `S` whose root is divided by, as `S^(p - 1) (S f' + p S' f)` where the bracket is
+    /// one term, as in `x/sqrt(1 + x^2)`: far away the two parts of it nearly cancel. `None` where it is not.
     fn of_quotient(
         &mut self,
         graph: &mut Graph,

@@ -1,9 +1,10 @@
 //! Exponential and hyperbolic functions in sums and products, in forms that keep digits and do not overflow.
 //!
 //! Text has fronts such as `1/(1 + exp(-x))` and `1 - tanh(x)`, and derivatives have `exp(x)/(1 + exp(x))^2`: at one side
-//! of a front these are differences of nearly equal numbers, or quotients of numbers that overflow, where their value is harmless. With
-//! the logistic function in both directions, `1/(1 + exp(x))` and `1/(1 + exp(-x))`, and with `tanh`, `cosh`, `sinh` and `expm1`, neither
-//! happens. Exponentials of different arguments stay apart, as what depends on place does from what depends on time.
+//! of a front these are differences of nearly equal numbers, or quotients of numbers that overflow, where their value is
+//! harmless. With the logistic function in both directions, `1/(1 + exp(x))` and `1/(1 + exp(-x))`, and with `tanh`, `cosh`,
+//! `sinh` and `expm1`, neither happens. Exponentials of different arguments stay apart, as what depends on place does from
+//! what depends on time.
 
 use crate::{Expr, Function, Graph, Node, Rational};
 use num_traits::{One, Signed, ToPrimitive, Zero};

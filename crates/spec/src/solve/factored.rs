@@ -2,7 +2,8 @@
 //!
 //! `c1 R + c2 R^2 + c3 R^3` with coefficients from conditions at `Ri` and `Ro` is an interpolation. Where the two are next to
 //! each other the coefficients are huge and nearly cancel, and so do the terms of each. The digits are in the differences
-//! `R - Ri` and `Ro - Ri`, which are almost exact, so the whole displacement is brought over one denominator and written in them:
+//! `R - Ri` and `Ro - Ri`, which are almost exact, so the whole displacement is brought over one denominator and written
+//! in them:
 //!
 //! - factors `R - Ri` and the like, at which it vanishes, are set apart, as are factors such as `Ro - Ri`;
 //! - the rest is in Newton's form, `C_0 + (R - Ri) (C_1 + (R - Ro) (C_2 + ...))`, so that next to the places, where conditions make
