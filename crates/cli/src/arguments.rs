@@ -16,6 +16,7 @@ macro_rules! choices {
     };
 }
 
+mod certify;
 mod check;
 mod converge;
 mod coverage;
@@ -42,6 +43,7 @@ use clap::{Arg, Args, CommandFactory, Parser, Subcommand, ValueEnum};
 
 use crate::terminal::{Color, Verbosity};
 
+pub(crate) use certify::CertifyOptions;
 pub(crate) use check::CheckOptions;
 pub(crate) use converge::ConvergeOptions;
 pub(crate) use coverage::CoverageOptions;
@@ -119,6 +121,8 @@ pub(crate) enum Command {
     List(ListOptions),
     /// Compare every field of a solution with the field below it; all solutions when none is named
     Check(CheckOptions),
+    /// Prove the accuracy of every field over a whole range of inputs, with a certificate; or check one (--check FILE)
+    Certify(CertifyOptions),
     /// Tell what a solution models, what it exercises, and what its body force costs
     Explain(ExplainOptions),
     /// Measure which terms of the momentum balance each solution exercises, and name the fewest that test them all

@@ -1,5 +1,6 @@
 //! The commands, each in its own module.
 
+mod certify;
 mod check;
 mod converge;
 mod coverage;
@@ -19,6 +20,7 @@ mod texts;
 mod thorough;
 mod tradeoff;
 
+pub(crate) use certify::certify;
 pub(crate) use check::check;
 pub(crate) use converge::converge;
 pub(crate) use coverage::coverage;

@@ -56,6 +56,7 @@ pub fn run(given: impl IntoIterator<Item = OsString>) -> ExitCode {
     let outcome = match &arguments.command {
         Command::List(options) => commands::list(options),
         Command::Check(options) => commands::check(options),
+        Command::Certify(options) => commands::certify(options),
         Command::Explain(options) => commands::explain(options),
         Command::Coverage(options) => commands::coverage(options),
         Command::Gen(options) => commands::generate(options),

@@ -92,6 +92,18 @@ pub(super) fn assignment(text: &str) -> Result<(String, f64), String> {
     }
 }
 
+/// A range of an input.
+pub(super) fn range(text: &str) -> Result<(String, f64, f64), String> {
+    let form = "expected NAME=FROM:TO, such as A=-0.05:0.05";
+    let (name, range) = text.split_once('=').ok_or(form)?;
+    let (from, to) = range.split_once(':').ok_or(form)?;
+    let (from, to) = (finite_number(from)?, finite_number(to)?);
+    if name.trim().is_empty() || from > to {
+        return Err(form.into());
+    }
+    Ok((name.trim().to_owned(), from, to))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -107,6 +119,10 @@ mod tests {
         for text in ["A", "=1", "A=", "A=x", "A=nan", "A=inf"] {
             assert!(assignment(text).is_err(), "{text}");
         }
+        for text in ["A", "A=1", "=0:1", "A=1:0", "A=0:nan", "A=0:", "A=0:1:2"] {
+            assert!(range(text).is_err(), "{text}");
+        }
+        assert_eq!(range("A=-0.5:1e-1"), Ok(("A".into(), -0.5, 0.1)));
         assert_eq!(assignment("A = 5e-2"), Ok(("A".into(), 0.05)));
     }
 }
