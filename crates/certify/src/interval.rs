@@ -136,8 +136,11 @@ impl Interval {
     fn wave(ends: Self, from: f64, to: f64, first: f64) -> Self {
         // The units are formed by a division: a little is added so that no extremum is missed.
         let slack = 1e-9;
-        if !(to - from < 2.0) {
-            return if (to - from).is_nan() { Self::NONE } else { Self::new(-1.0, 1.0) };
+        if from.is_nan() || to.is_nan() {
+            return Self::NONE;
+        }
+        if to - from >= 2.0 {
+            return Self::new(-1.0, 1.0);
         }
         let has = |place: f64| {
             ((to - place + slack) / 2.0).floor() >= ((from - place - slack) / 2.0).ceil()
@@ -202,7 +205,7 @@ impl Interval {
     /// `sin(x)/x`, of which the greatest value is one at zero, for `|x| <= 2`, where it falls to both sides.
     #[must_use]
     pub fn sine_ratio(self) -> Self {
-        if !(self.magnitude() <= 2.0) {
+        if self.magnitude().is_nan() || self.magnitude() > 2.0 {
             return Self::NONE;
         }
         let far = self.magnitude();

@@ -173,7 +173,9 @@ impl Search<'_> {
         if self.tree.len() >= 2 * self.limits.boxes {
             return Err(open(bounds));
         }
-        let Some((input, halves)) = self.best_halves(&bounds) else { return Err(open(bounds)) };
+        let Some(Halving { input, halves, .. }) = self.best_halves(&bounds) else {
+            return Err(open(bounds));
+        };
         let _ = write!(self.tree, "{input}");
         for half in halves {
             self.part(half, 0.5 * share)?;
@@ -181,36 +183,45 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// The input along which halving helps most: after which the worse half is best, and of equal ones the better half.
-    /// Where no half has a bound, the input whose range is the largest share of the whole.
-    fn best_halves(&self, bounds: &[Interval]) -> Option<(usize, [Vec<Interval>; 2])> {
+    /// The halving that helps most: after which least is missing on both halves together. An input that changes nothing comes
+    /// last, and of equal ones that whose range is the largest share of the whole comes first.
+    fn best_halves(&self, bounds: &[Interval]) -> Option<Halving> {
         let parent = bound_over(self.judgement, bounds).min(MOST_TOLD);
-        let mut best: Option<(Option<f64>, f64, usize, [Vec<Interval>; 2])> = None;
         let width = |b: Interval| b.high - b.low;
         let share_of = |input: usize| width(bounds[input]) / width(self.root[input]);
         let widest = self.inputs.iter().map(|&n| share_of(n)).fold(0.0, f64::max);
+        let mut best: Option<Halving> = None;
         for &input in self.inputs {
             let share = share_of(input);
-            // Parts that are long beside their width say little of how far they are from their bound.
-            if !(share * self.slender >= widest) {
+            // Parts that are long beside their width say little of how far they are from their bound. An input of one value
+            // has no share.
+            if share.is_nan() || share * self.slender < widest {
                 continue;
             }
             let Some(halves) = halves(bounds, input) else { continue };
             let [low, high] = [0, 1].map(|n| bound_over(self.judgement, &halves[n]).min(MOST_TOLD));
-            // A sum of penalties that grows with what is missing, so that one finished half counts.
             let missing = |factor: f64| (factor / self.limits.factor).max(1.0).ln();
             let gain = 2.0 * missing(parent) - missing(low) - missing(high);
-            // An input that changes nothing, such as an amplitude that multiplies all, comes last.
-            let merit = (gain > LEAST_GAIN).then_some(gain);
+            let gain = if gain > LEAST_GAIN { gain } else { 0.0 };
             let better = best
                 .as_ref()
-                .is_none_or(|(known, of, ..)| merit > *known || (merit == *known && share > *of));
+                .is_none_or(|best| gain > best.gain || (gain == best.gain && share > best.share));
             if better {
-                best = Some((merit, share, input, halves));
+                best = Some(Halving { input, gain, share, halves });
             }
         }
-        best.map(|(_, _, input, halves)| (input, halves))
+        best
     }
+}
+
+/// A box halved along an input.
+struct Halving {
+    input: usize,
+    /// By how much the logarithms of both factors are nearer to what is to hold.
+    gain: f64,
+    /// The range of the input as a share of the whole.
+    share: f64,
+    halves: [Vec<Interval>; 2],
 }
 
 /// Both halves of a box along an input; `None` where the middle is one of the ends.

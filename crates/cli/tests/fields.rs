@@ -245,3 +245,36 @@ fn eval_names_the_entry_that_is_wrong() {
     refuses(place, "eval ring --points in.json", &["expected a list of points"]);
     refuses(place, "eval ring --points nowhere.json", &["nowhere.json"]);
 }
+
+/// A proof, its certificate, one altered by hand, and a field that no proof closes for.
+#[test]
+fn certificates_are_written_and_checked() {
+    let place = tempfile::tempdir().unwrap();
+    let box_of = "--range nu=0:0.45 --range A=-1:1";
+    let called = mms(place.path(), &format!("certify shear-wave {box_of} --out wave.json"));
+    assert_eq!(called.status, 0, "{}{}", called.stdout, called.stderr);
+    assert!(called.stdout.contains("A L^-1 in [-1, 1]"), "{}", called.stdout);
+    assert!(called.stdout.contains("b[1]"), "{}", called.stdout);
+    let called = mms(place.path(), "certify shear-wave --check wave.json");
+    assert_eq!(called.status, 0, "{}{}", called.stdout, called.stderr);
+    assert!(called.stdout.contains("holds on all"), "{}", called.stdout);
+    let called = mms(place.path(), "certify bar --check wave.json");
+    assert_eq!(called.status, 1, "{}{}", called.stdout, called.stderr);
+    assert!(called.stdout.contains("is refused: it is about shear-wave"), "{}", called.stdout);
+    let mut altered = read_json(&place.path().join("wave.json"));
+    altered["fields"][0]["factor"] = 1.0.into();
+    fs::write(place.path().join("altered.json"), altered.to_string()).unwrap();
+    let called = mms(place.path(), "certify shear-wave --check altered.json");
+    assert_eq!(called.status, 1, "{}{}", called.stdout, called.stderr);
+    assert!(called.stdout.contains("is refused"), "{}", called.stdout);
+    let called = mms(
+        place.path(),
+        &format!("certify shear-wave {box_of} --factor 2 --boxes 5 --out no.json"),
+    );
+    assert_eq!(called.status, 1, "{}{}", called.stdout, called.stderr);
+    assert!(called.stdout.contains("u[0] is open: the bound of K is"), "{}", called.stdout);
+    assert!(!place.path().join("no.json").exists());
+    let called = mms(place.path(), "certify shear-wave --range B=0:1");
+    assert_eq!(called.status, 2, "{}", called.stderr);
+    assert!(called.stderr.contains("there is no input B"), "{}", called.stderr);
+}
