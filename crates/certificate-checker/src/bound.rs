@@ -56,7 +56,7 @@ impl Line {
             "cos_pi" => (wave(true, true)?, 2),
             "sin" => (wave(false, false)?, 2),
             "cos" => (wave(true, false)?, 2),
-            "ln_1p" => (Self::Logarithm(line(1)?), 2),
+            "log1p" => (Self::Logarithm(line(1)?), 2),
             _ => return None,
         };
         (words.len() == count).then_some(read)

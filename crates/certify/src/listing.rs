@@ -1,6 +1,6 @@
 //! Programs as text: one operation a line, its operands by their line numbers from 0.
 
-use mmsmith_expr::{Function, Operation, Program};
+use mmsmith_expr::{Operation, Program};
 
 /// The word for an operation.
 pub(crate) fn name(operation: &Operation) -> &'static str {
@@ -21,26 +21,7 @@ pub(crate) fn name(operation: &Operation) -> &'static str {
         Operation::LnOfBoth(..) => "ln_of_both",
         Operation::SumError(..) => "sum_error",
         Operation::ProductError(..) => "product_error",
-        Operation::Call(function, _) => match function {
-            Function::Sin => "sin",
-            Function::Cos => "cos",
-            Function::Tan => "tan",
-            Function::Asin => "asin",
-            Function::Acos => "acos",
-            Function::Atan => "atan",
-            Function::Sinh => "sinh",
-            Function::Cosh => "cosh",
-            Function::Tanh => "tanh",
-            Function::Exp => "exp",
-            Function::Ln => "ln",
-            Function::Ln1p => "ln_1p",
-            Function::Expm1 => "expm1",
-            Function::LogRatioSquared => "log_ratio_squared",
-            Function::LogRatioSlope => "log_ratio_slope",
-            Function::LogRatioCurvature => "log_ratio_curvature",
-            Function::Atan2 => "atan2",
-            Function::LnOfBoth => "ln_of_both",
-        },
+        Operation::Call(function, _) => function.name(),
     }
 }
 

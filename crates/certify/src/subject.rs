@@ -4,8 +4,9 @@ use crate::interval::Interval;
 use crate::propagate::Judgement;
 use crate::scaling::{Scaling, scalings};
 use crate::{CertifyError, Roundings};
-use mmsmith_expr::{Drafts, Expr, Program, Slot, reuse};
+use mmsmith_expr::{Program, Slot};
 use mmsmith_spec::{Domain, Fields, Relation, Spec};
+use mmsmith_stage::{Measures, Staged};
 
 /// Parameters without bounds on both sides go as far from their defaults, as points of `mms check --thorough` do.
 const SHARE_OF_DEFAULT: f64 = 0.4;
@@ -143,35 +144,26 @@ impl Subject {
     }
 }
 
-/// The one program of all fields in the form that a single evaluation has in generated code, its outputs by name, and the
-/// program of the period and the measures of the body.
-fn program(spec: &Spec, mut fields: Fields) -> (Program, Vec<Judged>, Program) {
-    let (inputs, definitions) = (&fields.inputs, &fields.definitions);
-    let b = reuse(&mut fields.graph, inputs, definitions, &mut Drafts::default(), &fields.b);
-    let parts: [(&'static str, Vec<Expr>); 8] = [
-        ("u", fields.u.clone()),
-        ("v", fields.v.clone()),
-        ("a", fields.a.clone()),
-        ("H", fields.H.concat()),
-        ("F", fields.F.concat()),
-        ("J", vec![fields.J]),
-        ("P", fields.P.concat()),
-        ("b", b),
-    ];
-    let outputs: Vec<Expr> = parts.iter().flat_map(|(_, part)| part.clone()).collect();
-    let program = fields.program(&outputs);
-    let names = parts.iter().flat_map(|(field, part)| (0..part.len()).map(|n| (*field, n)));
+/// The program of all fields in the form that a single evaluation has in generated code, its outputs by name, and the program
+/// of the period and the measures of the body.
+fn program(spec: &Spec, fields: Fields) -> (Program, Vec<Judged>, Program) {
+    let staged = Staged::of(spec, fields);
+    let slots: Vec<Slot> = staged.fields.iter().flat_map(|f| f.outputs.clone()).collect();
+    let program = staged.program().part(&slots);
+    let names = staged
+        .fields
+        .iter()
+        .flat_map(|field| (0..field.outputs.len()).map(|entry| (field.name.letter(), entry)));
     let judged = names
         .zip(program.outputs())
         .map(|((field, entry), &slot)| Judged { field, entry, slot })
         .collect();
-    let mut measures = vec![spec.period];
-    match &spec.domain {
-        Domain::Box { lower, upper } => measures.extend(lower.iter().chain(upper)),
-        Domain::Annulus { inner, outer } => measures.extend([inner, outer]),
+    let mut measures = vec![staged.constants.period];
+    match &staged.constants.domain {
+        Measures::Box { lower, upper } => measures.extend(lower.iter().chain(upper)),
+        Measures::Annulus { inner, outer } => measures.extend([inner, outer]),
     }
-    let measures = fields.program(&measures);
-    (program, judged, measures)
+    (program, judged, staged.program().part(&measures))
 }
 
 fn usual_range(parameter: &mmsmith_spec::Parameter) -> Interval {
