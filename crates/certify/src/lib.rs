@@ -32,7 +32,7 @@ pub enum CertifyError {
     #[error("the operation {0} has no enclosure in intervals yet")]
     Unsupported(String),
     /// The proof does not close.
-    #[error("the bound of K is {} on a box that is not halved further", .0.factor)]
+    #[error("the bound of K is {} on the worst of the boxes that are left", .0.factor)]
     Open(search::Open),
     /// The fields could not be derived.
     #[error("{0}")]

@@ -3,6 +3,8 @@
 use crate::CertifyError;
 use crate::interval::Interval;
 use crate::propagate::Judgement;
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
 use std::fmt::Write;
 
 /// Bounds of factors are multiples of one part in as many.
@@ -25,12 +27,12 @@ pub struct Proof {
     pub factor: f64,
 }
 
-/// Where a proof did not close.
+/// Where a proof did not close: the part of the largest bound of those that are left.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Open {
     /// The range of each input.
     pub bounds: Vec<Interval>,
-    /// The bound of the factor there; infinite where there is none.
+    /// The bound of the factor there, and so everywhere; infinite where there is none.
     pub factor: f64,
 }
 
@@ -45,6 +47,11 @@ pub fn letter(quarters: u32) -> Option<char> {
     }
 }
 
+/// The factor of the last letter.
+pub const LARGEST_WRITTEN: f64 = 13.0;
+/// A tree names inputs by one digit.
+const MOST_INPUTS: usize = 10;
+
 /// A smaller decrease of the logarithms of both halves' factors is none.
 const LEAST_GAIN: f64 = 1e-6;
 /// No input is halved whose range is a smaller share of the whole than one part in as many of the largest share. Each is tried
@@ -56,7 +63,7 @@ const FEW: usize = 50;
 /// When a search ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// The factor that is to hold.
+    /// The factor that is to hold; a tree cannot tell of more than [`LARGEST_WRITTEN`].
     pub factor: f64,
     /// The most boxes.
     pub boxes: usize,
@@ -75,6 +82,7 @@ pub fn prove(
     step: &mut dyn FnMut(f64),
 ) -> Result<Proof, CertifyError> {
     let inputs = effective(judgement, bounds);
+    let limits = Limits { factor: limits.factor.min(LARGEST_WRITTEN), ..limits };
     let mut found: Result<Proof, CertifyError> = Err(CertifyError::Unsupported(String::new()));
     for slender in SLENDER {
         let boxes = found.as_ref().map_or(limits.boxes, |proof| proof.leaves);
@@ -84,19 +92,16 @@ pub fn prove(
             inputs: &inputs,
             limits: Limits { boxes, ..limits },
             slender,
-            tree: String::new(),
-            leaves: 0,
-            worst: 0.0,
-            done: 0.0,
+            parts: Vec::new(),
             step: &mut *step,
         };
-        let outcome = search.part(bounds.to_vec(), 1.0);
-        let proof = Proof { tree: search.tree, leaves: search.leaves, factor: search.worst };
+        let outcome = search.whole();
         match (outcome, &found) {
-            (Ok(()), Ok(known)) if known.leaves <= proof.leaves => {}
-            (Ok(()), _) => found = Ok(proof),
+            (Ok(proof), Ok(known)) if known.leaves <= proof.leaves => {}
+            (Ok(proof), _) => found = Ok(proof),
             (Err(_), Ok(_)) => {}
-            (Err(error), Err(_)) => found = Err(error),
+            (Err(open), Err(CertifyError::Open(known))) if known.factor <= open.factor => {}
+            (Err(open), Err(_)) => found = Err(CertifyError::Open(open)),
         }
         if found.as_ref().is_ok_and(|proof| proof.leaves <= FEW) {
             break;
@@ -112,10 +117,8 @@ struct Search<'a> {
     inputs: &'a [usize],
     limits: Limits,
     slender: f64,
-    tree: String,
-    leaves: usize,
-    worst: f64,
-    done: f64,
+    /// The box and the parts of it, each with its place among these.
+    parts: Vec<Part>,
     step: &'a mut dyn FnMut(f64),
 }
 
@@ -140,8 +143,10 @@ fn effective(judgement: &Judgement, bounds: &[Interval]) -> Vec<usize> {
             bound_over(judgement, &part) != before
         })
     };
-    let matter: Vec<usize> = judgement.inputs().iter().copied().filter(matters).collect();
-    if matter.is_empty() { judgement.inputs().to_vec() } else { matter }
+    let named: Vec<usize> =
+        judgement.inputs().iter().copied().filter(|input| *input < MOST_INPUTS).collect();
+    let matter: Vec<usize> = named.iter().copied().filter(matters).collect();
+    if matter.is_empty() { named } else { matter }
 }
 
 /// How far a box is from its bound: none has it, or by which factor.
@@ -152,35 +157,100 @@ fn bound_over(judgement: &Judgement, bounds: &[Interval]) -> f64 {
         .unwrap_or(f64::INFINITY)
 }
 
+/// A part of the box.
+enum Part {
+    /// The factor is at most as many quarters.
+    Closed(u32),
+    /// It is halved along an input; where its halves are.
+    Halved(usize, [usize; 2]),
+    /// Its bound does not hold yet.
+    Open,
+}
+
+/// A part whose bound does not hold yet, those of the largest bound first.
+struct Pending {
+    factor: f64,
+    place: usize,
+    bounds: Vec<Interval>,
+    /// Its share of the volume.
+    share: f64,
+}
+
+impl Ord for Pending {
+    fn cmp(&self, other: &Self) -> Ordering {
+        // Of equal bounds the larger part, and then the one that came first, so that the order is definite.
+        self.factor
+            .total_cmp(&other.factor)
+            .then(self.share.total_cmp(&other.share))
+            .then(other.place.cmp(&self.place))
+    }
+}
+
+impl PartialOrd for Pending {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Pending {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Pending {}
+
 impl Search<'_> {
-    fn part(&mut self, bounds: Vec<Interval>, share: f64) -> Result<(), CertifyError> {
+    /// Halves the part of the largest bound until none is left, or there are too many.
+    fn whole(&mut self) -> Result<Proof, Open> {
+        let mut pending = BinaryHeap::new();
+        let (mut leaves, mut done) = (1, 0.0);
+        pending.extend(self.judged(self.root.to_vec(), 1.0, &mut done));
+        while let Some(part) = pending.pop() {
+            let halving =
+                (leaves < self.limits.boxes).then(|| self.best_halves(&part.bounds)).flatten();
+            let Some(Halving { input, halves, .. }) = halving else {
+                return Err(Open { bounds: part.bounds, factor: part.factor });
+            };
+            leaves += 1;
+            let first = self.parts.len();
+            self.parts[part.place] = Part::Halved(input, [first, first + 1]);
+            for half in halves {
+                pending.extend(self.judged(half, 0.5 * part.share, &mut done));
+            }
+        }
+        let quarters = |part: &Part| if let Part::Closed(n) = part { *n } else { 0 };
+        let worst = self.parts.iter().map(quarters).max().unwrap_or(0);
+        let mut tree = String::new();
+        self.write(0, &mut tree);
+        Ok(Proof { tree, leaves, factor: f64::from(worst) / STEPS_OF_FACTOR })
+    }
+
+    /// Adds a part: closed where its bound holds, else it is given back.
+    fn judged(&mut self, bounds: Vec<Interval>, share: f64, done: &mut f64) -> Option<Pending> {
         let sides = self.judgement.over(&bounds);
-        if let Some(factor) =
-            sides.and_then(|sides| sides.factor(self.limits.factor, STEPS_OF_FACTOR))
-        {
-            let quarters = (factor * STEPS_OF_FACTOR) as u32;
-            self.tree.extend(letter(quarters));
-            self.leaves += 1;
-            self.worst = self.worst.max(factor);
-            self.done += share;
-            (self.step)(self.done);
-            return Ok(());
+        let place = self.parts.len();
+        if let Some(factor) = sides.and_then(|s| s.factor(self.limits.factor, STEPS_OF_FACTOR)) {
+            self.parts.push(Part::Closed(((factor * STEPS_OF_FACTOR) as u32).max(1)));
+            *done += share;
+            (self.step)(*done);
+            return None;
         }
-        let open = |bounds: Vec<Interval>| {
-            let factor = bound_over(self.judgement, &bounds);
-            CertifyError::Open(Open { bounds, factor })
-        };
-        if self.tree.len() >= 2 * self.limits.boxes {
-            return Err(open(bounds));
+        self.parts.push(Part::Open);
+        let factor = bound_over(self.judgement, &bounds);
+        Some(Pending { factor, place, bounds, share })
+    }
+
+    /// Writes a part and its parts in pre-order.
+    fn write(&self, place: usize, tree: &mut String) {
+        match self.parts[place] {
+            Part::Closed(quarters) => tree.extend(letter(quarters)),
+            Part::Halved(input, halves) => {
+                let _ = write!(tree, "{input}");
+                halves.into_iter().for_each(|half| self.write(half, tree));
+            }
+            Part::Open => {}
         }
-        let Some(Halving { input, halves, .. }) = self.best_halves(&bounds) else {
-            return Err(open(bounds));
-        };
-        let _ = write!(self.tree, "{input}");
-        for half in halves {
-            self.part(half, 0.5 * share)?;
-        }
-        Ok(())
     }
 
     /// The halving that helps most: after which least is missing on both halves together. An input that changes nothing comes

@@ -14,7 +14,7 @@ pub(crate) struct CertifyOptions {
     /// Prove it where an input is in this range, instead of the usual one; repeatable
     #[arg(long = "range", value_name = "NAME=FROM:TO", value_parser = range)]
     pub(crate) ranges: Vec<(String, f64, f64)>,
-    /// The factor K that is to hold
+    /// The factor K that is to hold, up to 13; certificates are accepted up to 8
     #[arg(long, value_name = "K", default_value = "8", value_parser = positive_number)]
     pub(crate) factor: f64,
     /// Give a field up after so many boxes
