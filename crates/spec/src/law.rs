@@ -6,7 +6,9 @@ mod neo_hookean;
 mod st_venant_kirchhoff;
 
 use crate::derivation::Derivation;
-use crate::tensor::{Matrix, Vector, cofactor, determinant, principal_minors};
+use crate::tensor::{
+    Matrix, Vector, cofactor, determinant, matrix_product, principal_minors, transpose,
+};
 use crate::{DeriveError, Material};
 use energy::ComponentLaw;
 use mmsmith_expr::{Expr, Function, Graph, Node};
@@ -86,6 +88,11 @@ impl Deformation {
             derivation.derivatives.define(log_J, q, derivative);
         }
         Deformation { open, H, inverse_transpose, J, volume_change, log_J }
+    }
+
+    /// `H^T F^-T`.
+    fn transposed_gradient_times_inverse(&self, graph: &mut Graph) -> Matrix {
+        matrix_product(graph, &transpose(&self.H), &self.inverse_transpose)
     }
 
     /// Whether the volume is shown in symbols to be constant. A pressure that follows from `J` is then the same everywhere; between

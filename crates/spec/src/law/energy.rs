@@ -124,9 +124,56 @@ impl ComponentLaw {
             remainder.push(derivation.graph.sum_of(second));
         }
         let energy = self.energy.map(|energy| derivation.graph.replace(energy, &actual));
-        let anisotropic = P.clone();
-        Stress { P, isotropic: Graph::ZERO, anisotropic, linear, remainder, energy }
+        let (isotropic, anisotropic) = if derivation.geometry.is_cartesian() || n < 2 {
+            (Graph::ZERO, P.clone())
+        } else {
+            let cross = derivatives.of(&mut derivation.graph, general[0][0], self.h[1][1]);
+            let (lambda, _) = derivation.graph.split_at_zero(cross, &small);
+            isotropic_and_rest(&mut derivation.graph, deformation, lambda, &P)
+        };
+        Stress { P, isotropic, anisotropic, linear, remainder, energy }
     }
+}
+
+/// `lambda ln J` and `P - lambda ln J I`, for a `P` that is linear in `ln J`: with its slope `c` this is
+/// `P(ln J = 0) + (c - lambda F^-T) ln J - lambda ln J H^T F^-T`. The modulus `lambda` of a change of volume, which next to
+/// incompressibility is large, then leaves nothing of its size in differences of diagonal entries. Zero and `P` for others.
+fn isotropic_and_rest(
+    graph: &mut Graph,
+    deformation: &Deformation,
+    lambda: Expr,
+    P: &Matrix,
+) -> (Expr, Matrix) {
+    let lambda = zero_if_vanishing(graph, lambda);
+    let pressure = graph.mul(lambda, deformation.log_J);
+    if pressure == Graph::ZERO {
+        return (Graph::ZERO, P.clone());
+    }
+    let log_J = graph.symbol("ln J");
+    let with_symbol = BTreeMap::from([(deformation.log_J, log_J)]);
+    let without = BTreeMap::from([(log_J, Graph::ZERO)]);
+    let once = deformation.transposed_gradient_times_inverse(graph);
+    let mut derivatives = Derivatives::limited();
+    let mut rest = P.clone();
+    for (i, row) in rest.iter_mut().enumerate() {
+        for (j, entry) in row.iter_mut().enumerate() {
+            let of_symbol = graph.replace(*entry, &with_symbol);
+            let slope = derivatives.of(graph, of_symbol, log_J);
+            if derivatives.of(graph, slope, log_J) != Graph::ZERO {
+                return (Graph::ZERO, P.clone());
+            }
+            let normal = graph.mul(lambda, deformation.inverse_transpose[i][j]);
+            let slope = graph.sub(slope, normal);
+            let slope = zero_if_vanishing(graph, slope);
+            let value = graph.replace(of_symbol, &without);
+            let normal = graph.mul(slope, deformation.log_J);
+            let turned = graph.mul(pressure, once[i][j]);
+            let turned = graph.neg(turned);
+            *entry = graph.sum_of([value, normal, turned]);
+            *entry = zero_if_vanishing(graph, *entry);
+        }
+    }
+    (pressure, rest)
 }
 
 /// The energy up to first order in `J - 1`: of the same stress in every motion with `J = 1`, and so of the same divergence.

@@ -76,7 +76,7 @@ impl NeoHookean<'_> {
     /// `mu (H + H^T F^-T) + lambda ln J F^-T`.
     fn by_gradient(&self, graph: &mut Graph) -> Matrix {
         let pressure = graph.mul(self.lambda, self.deformation.log_J);
-        let once = self.transposed_gradient_times_inverse(graph);
+        let once = self.deformation.transposed_gradient_times_inverse(graph);
         let mut P = once.clone();
         for (i, row) in P.iter_mut().enumerate() {
             for (j, entry) in row.iter_mut().enumerate() {
@@ -138,7 +138,7 @@ impl NeoHookean<'_> {
             }
             rest = matrix_product(graph, &rest, &self.deformation.inverse_transpose);
         } else {
-            let once = self.transposed_gradient_times_inverse(graph);
+            let once = self.deformation.transposed_gradient_times_inverse(graph);
             for i in 0..n {
                 for j in 0..n {
                     let shear = graph.add(H[i][j], once[i][j]);
@@ -168,7 +168,7 @@ impl NeoHookean<'_> {
     /// `lambda` times the derivative of `ln J - tr H` along `e_k`: `-lambda (H^T F^-T) : dH`.
     fn isotropic_remainder(&self, derivation: &mut Derivation, k: usize) -> Expr {
         let n = self.deformation.H.len();
-        let product = self.transposed_gradient_times_inverse(&mut derivation.graph);
+        let product = self.deformation.transposed_gradient_times_inverse(&mut derivation.graph);
         let mut terms = Vec::new();
         for i in 0..n {
             for j in 0..n {
@@ -185,7 +185,7 @@ impl NeoHookean<'_> {
     /// `lambda ln J (F^-T - I) - mu (H^T)^2 F^-T`, with `F^-T - I = -H^T F^-T`.
     fn remainder_without_isotropic_part(&self, graph: &mut Graph) -> Matrix {
         let n = self.deformation.H.len();
-        let once = self.transposed_gradient_times_inverse(graph);
+        let once = self.deformation.transposed_gradient_times_inverse(graph);
         let twice = matrix_product(graph, &transpose(&self.deformation.H), &once);
         let pressure = graph.mul(self.lambda, self.deformation.log_J);
         let mut remainder = vec![vec![Graph::ZERO; n]; n];
@@ -198,10 +198,5 @@ impl NeoHookean<'_> {
             }
         }
         remainder
-    }
-
-    /// `H^T F^-T`.
-    fn transposed_gradient_times_inverse(&self, graph: &mut Graph) -> Matrix {
-        matrix_product(graph, &transpose(&self.deformation.H), &self.deformation.inverse_transpose)
     }
 }
