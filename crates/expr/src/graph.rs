@@ -1,6 +1,21 @@
 //! The hash-consed graph: nodes, symbols, and questions about them.
 
-use crate::{Function, Rational, nearest_f64};
+mod build;
+mod canonical;
+mod derivative;
+pub(crate) mod function;
+mod parse;
+mod print;
+pub(crate) mod rational;
+mod replacement;
+
+pub use build::BuildError;
+pub use derivative::Derivatives;
+pub use function::{CSupport, Function, RustCall};
+pub use parse::{Ast, AstKind, ParseError};
+pub use rational::{Rational, nearest_f64};
+pub use replacement::Replacement;
+
 use num_traits::{One, Zero};
 use rustc_hash::{FxBuildHasher, FxHashMap};
 use std::collections::BTreeSet;

@@ -31,42 +31,16 @@
 //! assert_eq!(program.evaluate(&[0.5]), [1.0]);
 //! ```
 
-mod accuracy;
-mod arrange;
-mod build;
-mod cancel;
-mod canonical;
-mod constant;
-mod derivative;
-mod exponential;
-mod function;
-mod gather;
 mod graph;
-mod keep;
-mod near_zero;
-mod parse;
-mod print;
 mod program;
-mod pythagoras;
-mod rational;
-mod reciprocal;
-mod replacement;
-mod residue;
-mod reuse;
-mod separate;
+mod rewrite;
 
-pub use arrange::arrange;
-pub use build::BuildError;
-pub use cancel::Term;
-pub use derivative::Derivatives;
-pub use function::{CSupport, Function, RustCall};
-pub use graph::{Expr, Graph, Node};
-pub use keep::MOST_KEPT_OF_STATES;
-pub use parse::{Ast, AstKind, ParseError};
-pub use program::{
-    Dependence, Drafts, Operation, OperationCount, OperationsByStage, Program, Scalar, Section,
-    Slot,
+pub use graph::{
+    Ast, AstKind, BuildError, CSupport, Derivatives, Expr, Function, Graph, Node, ParseError,
+    Rational, Replacement, RustCall, nearest_f64,
 };
-pub use rational::{Rational, nearest_f64};
-pub use replacement::Replacement;
-pub use reuse::reuse;
+pub use program::{
+    Dependence, Drafts, MOST_KEPT_OF_STATES, Operation, OperationCount, OperationsByStage, Program,
+    Scalar, Section, Slot,
+};
+pub use rewrite::{Term, arrange, reuse};

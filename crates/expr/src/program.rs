@@ -8,13 +8,18 @@
 mod argument;
 mod builder;
 mod error_bounds;
+mod gather;
+pub(crate) mod keep;
+mod reciprocal;
 mod scalar;
 mod section;
+mod separate;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use builder::{Builder, power};
 pub(crate) use error_bounds::SIDE;
+pub use keep::MOST_KEPT_OF_STATES;
 pub use scalar::Scalar;
 pub use section::Section;
 

@@ -11,7 +11,7 @@
 //! to `c t` itself is left: every argument with this part has the same rounding in it, which an error of `t` might have caused.
 
 use super::{Dependence, Lowering, Operation, Slot};
-use crate::constant::{CIRCLE_NUMBER, square_root};
+use crate::rewrite::constant::{CIRCLE_NUMBER, square_root};
 use crate::{Expr, Function, Node, Rational, nearest_f64};
 use num_bigint::BigInt;
 use num_traits::{One, Signed, ToPrimitive, Zero};

@@ -5,6 +5,7 @@
 //! small strain. [`Graph::without_vanishing_part`] drops such terms; [`Graph::shortened`] multiplies out what contains
 //! sines and cosines, and keeps the result where terms cancel and it is the shorter form.
 
+use super::polynomial::{Monomial, add_to, product};
 use crate::{Expr, Function, Graph, Node, Rational};
 use num_traits::{One, Signed, ToPrimitive};
 use std::collections::{BTreeMap, BTreeSet};
@@ -16,10 +17,8 @@ const MOST_TERMS: usize = 64;
 /// Powers beyond this are not multiplied out.
 const LARGEST_POWER: u32 = 8;
 
-/// A product of sines and cosines, each to a positive power.
-type Monomial = BTreeMap<Expr, u32>;
-/// A sum of monomials, each with a coefficient that is not multiplied out.
-type Polynomial = BTreeMap<Monomial, Expr>;
+/// A polynomial in sines and cosines, with coefficients that are not multiplied out.
+type Polynomial = super::polynomial::Polynomial<Expr>;
 
 impl Graph {
     /// The terms without the largest part of them whose sum [vanishes](Graph::vanishes).
@@ -141,12 +140,12 @@ impl Shortening<'_> {
             Node::Sum { constant, terms } => {
                 let mut total = Polynomial::new();
                 let constant = self.graph.number(constant);
-                self.add_to(&mut total, Monomial::new(), constant);
+                add_to(self.graph, &mut total, Monomial::new(), &constant);
                 for (term, coefficient) in terms {
                     let coefficient = self.graph.number(coefficient);
                     for (monomial, factor) in self.polynomial(term)? {
                         let factor = self.graph.mul(coefficient, factor);
-                        self.add_to(&mut total, monomial, factor);
+                        add_to(self.graph, &mut total, monomial, &factor);
                     }
                 }
                 (total.len() <= MOST_TERMS).then_some(total)
@@ -179,26 +178,8 @@ impl Shortening<'_> {
         if a.len() * b.len() > 4 * MOST_TERMS {
             return None;
         }
-        let mut product = Polynomial::new();
-        for (m, &c) in a {
-            for (n, &d) in b {
-                let mut monomial = m.clone();
-                for (&atom, &power) in n {
-                    *monomial.entry(atom).or_insert(0) += power;
-                }
-                let coefficient = self.graph.mul(c, d);
-                self.add_to(&mut product, monomial, coefficient);
-            }
-        }
+        let product = product(self.graph, a, b);
         (product.len() <= MOST_TERMS).then_some(product)
-    }
-
-    fn add_to(&mut self, polynomial: &mut Polynomial, monomial: Monomial, coefficient: Expr) {
-        let known = polynomial.remove(&monomial).unwrap_or(Graph::ZERO);
-        let total = self.graph.add(known, coefficient);
-        if total != Graph::ZERO {
-            polynomial.insert(monomial, total);
-        }
     }
 
     fn without_cosine_squares(&mut self, polynomial: Polynomial) -> Option<Polynomial> {
@@ -209,7 +190,7 @@ impl Shortening<'_> {
                 return None;
             }
             let Some((cosine, argument)) = self.graph.squared_cosine(&monomial) else {
-                self.add_to(&mut result, monomial, coefficient);
+                add_to(self.graph, &mut result, monomial, &coefficient);
                 continue;
             };
             let power = monomial.remove(&cosine).unwrap_or(2) - 2;

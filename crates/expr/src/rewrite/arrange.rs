@@ -14,7 +14,8 @@
 //! a small remainder is never mixed with the large part that it corrects. A form is taken only where it costs less
 //! and where the bound of its rounding errors, by running error analysis at sample points, is not clearly larger.
 
-use crate::accuracy::Samples;
+use super::accuracy::Samples;
+use super::polynomial::{Monomial, add_to, product, product_of_monomials};
 use crate::graph::NumberMap;
 use crate::{Dependence, Drafts, Expr, Graph, Node, Program, Rational};
 use num_traits::{One, Signed, ToPrimitive, Zero};
@@ -60,10 +61,8 @@ pub fn arrange(
     outputs.iter().map(arrange).collect()
 }
 
-/// A product of quantities that depend on time, each to a positive power.
-type Monomial = BTreeMap<Expr, u32>;
-/// A sum of monomials, each with a coefficient that does not depend on time.
-type Polynomial = BTreeMap<Monomial, Expr>;
+/// A polynomial in quantities that depend on time, with coefficients that do not.
+type Polynomial = super::polynomial::Polynomial<Expr>;
 
 /// A polynomial over a product of quantities that depend on both.
 #[derive(Clone)]
@@ -328,7 +327,7 @@ impl Arranging<'_> {
         }
         let mut numerator = self.over(a, &denominator)?;
         for (monomial, coefficient) in self.over(b, &denominator)? {
-            self.add_to(&mut numerator, monomial, coefficient);
+            add_to(self.graph, &mut numerator, monomial, &coefficient);
         }
         Some(Fraction { numerator, denominator })
     }
@@ -349,34 +348,13 @@ impl Arranging<'_> {
     }
 
     fn times(&mut self, a: &Fraction, b: &Fraction) -> Option<Fraction> {
-        let mut denominator = a.denominator.clone();
-        for (&base, &n) in &b.denominator {
-            *denominator.entry(base).or_insert(0) += n;
-        }
+        let denominator = product_of_monomials(&a.denominator, &b.denominator);
         self.products += a.numerator.len() * b.numerator.len();
         if self.products > MOST_PRODUCTS {
             return None;
         }
-        let mut numerator = Polynomial::new();
-        for (m, c) in &a.numerator {
-            for (n, d) in &b.numerator {
-                let mut monomial = m.clone();
-                for (&atom, &power) in n {
-                    *monomial.entry(atom).or_insert(0) += power;
-                }
-                let coefficient = self.graph.mul(*c, *d);
-                self.add_to(&mut numerator, monomial, coefficient);
-            }
-        }
+        let numerator = product(self.graph, &a.numerator, &b.numerator);
         (numerator.len() <= MOST_TERMS).then_some(Fraction { numerator, denominator })
-    }
-
-    fn add_to(&mut self, polynomial: &mut Polynomial, monomial: Monomial, coefficient: Expr) {
-        let present = polynomial.remove(&monomial).unwrap_or(Graph::ZERO);
-        let total = self.graph.add(present, coefficient);
-        if total != Graph::ZERO {
-            polynomial.insert(monomial, total);
-        }
     }
 
     fn rebuild(&mut self, fraction: &Fraction) -> Expr {

@@ -5,8 +5,8 @@
 //! merged into `k (S1 + S2)`. Products of sums are never multiplied out. Exponential functions of one argument meet
 //! in sums and products by rules of their own.
 
-use crate::function::Parity;
-use crate::rational::exact_root;
+use crate::graph::function::Parity;
+use crate::graph::rational::exact_root;
 use crate::{Expr, Function, Graph, Node, Rational};
 use num_integer::Integer;
 use num_traits::{One, Signed, ToPrimitive, Zero};

@@ -5,7 +5,7 @@
 //! power that fits, and what the components of a vector share; it makes each of them one quantity. That lowers the
 //! number of operations of a single evaluation. (It mixes rates of change, so it is not for evaluation in stages.)
 
-use crate::accuracy::Samples;
+use crate::rewrite::accuracy::Samples;
 use crate::{Dependence, Drafts, Expr, Graph, Node, Rational};
 use num_traits::{One, Signed, ToPrimitive};
 use std::collections::{BTreeMap, BTreeSet};

@@ -14,10 +14,10 @@
 //! error analysis at sample points, is not clearly larger.
 
 use crate::Rational;
-use crate::accuracy::Samples;
 use crate::graph::NumberMap;
-use crate::keep::KEPT_NUMBER;
+use crate::program::keep::KEPT_NUMBER;
 use crate::program::{Builder, Operation, OperationCount, Program, Slot, power};
+use crate::rewrite::accuracy::Samples;
 use num_traits::One;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};

@@ -5,6 +5,7 @@
 //! parameter-only coefficients of a sum are brought over their common denominator; where the numerator turns out
 //! to be zero or one single product, that form replaces the sum.
 
+use super::polynomial::{Monomial, Numbers, add_to, product, product_of_monomials};
 use crate::graph::NumberMap;
 use crate::{Expr, Function, Graph, Node, Rational};
 use num_traits::{One, Signed, ToPrimitive, Zero};
@@ -19,10 +20,8 @@ const MOST_PARTS: usize = 20;
 /// A monomial, as atoms to positive powers, and its coefficient.
 pub type Term = (Vec<(Expr, u32)>, Rational);
 
-/// A product of atoms, each to a positive power.
-type Monomial = BTreeMap<Expr, u32>;
-/// A sum of monomials.
-type Polynomial = BTreeMap<Monomial, Rational>;
+/// A polynomial with numbers for coefficients.
+type Polynomial = super::polynomial::Polynomial<Rational>;
 
 /// A polynomial over a product of atoms.
 struct Fraction {
@@ -274,7 +273,7 @@ impl Graph {
                 continue;
             }
             let Some((cosine, argument)) = self.squared_cosine(&monomial) else {
-                add_to(&mut result, monomial, &coefficient);
+                add_to(&mut Numbers, &mut result, monomial, &coefficient);
                 continue;
             };
             let power = monomial.remove(&cosine).unwrap_or(2) - 2;
@@ -399,7 +398,7 @@ impl Graph {
         }
         let mut numerator = self.over(a, &denominator)?;
         for (monomial, coefficient) in self.over(b, &denominator)? {
-            add_to(&mut numerator, monomial, &(coefficient * scale));
+            add_to(&mut Numbers, &mut numerator, monomial, &(coefficient * scale));
         }
         Some(Fraction { numerator, denominator })
     }
@@ -426,37 +425,19 @@ impl Graph {
 impl Fraction {
     fn of(monomial: Monomial, coefficient: Rational) -> Self {
         let mut numerator = Polynomial::new();
-        add_to(&mut numerator, monomial, &coefficient);
+        add_to(&mut Numbers, &mut numerator, monomial, &coefficient);
         Fraction { numerator, denominator: Monomial::new() }
     }
 
     fn times(&self, other: &Fraction) -> Option<Self> {
-        let mut denominator = self.denominator.clone();
-        for (&atom, &n) in &other.denominator {
-            *denominator.entry(atom).or_insert(0) += n;
-        }
+        let denominator = product_of_monomials(&self.denominator, &other.denominator);
         Some(Fraction { numerator: multiply(&self.numerator, &other.numerator)?, denominator })
     }
 }
 
-fn add_to(polynomial: &mut Polynomial, monomial: Monomial, coefficient: &Rational) {
-    let total = polynomial.remove(&monomial).unwrap_or_else(Rational::zero) + coefficient;
-    if !total.is_zero() {
-        polynomial.insert(monomial, total);
-    }
-}
-
+/// The product, unless it has too many terms.
 fn multiply(a: &Polynomial, b: &Polynomial) -> Option<Polynomial> {
-    let mut product = Polynomial::new();
-    for (m, c) in a {
-        for (n, d) in b {
-            let mut monomial = m.clone();
-            for (&atom, &power) in n {
-                *monomial.entry(atom).or_insert(0) += power;
-            }
-            add_to(&mut product, monomial, &(c * d));
-        }
-    }
+    let product = product(&mut Numbers, a, b);
     (product.len() <= MOST_TERMS).then_some(product)
 }
 

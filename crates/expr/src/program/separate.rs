@@ -9,9 +9,9 @@
 //! Logarithms and roots exist for positive factors only. Whoever evaluates the form has to take another one where it gives no
 //! number: then two factors may have been negative.
 
-use crate::accuracy::Samples;
-use crate::keep::KEPT_NUMBER;
+use crate::program::keep::KEPT_NUMBER;
 use crate::program::{Builder, Operation, OperationCount, Program, Slot, power};
+use crate::rewrite::accuracy::Samples;
 use crate::{Dependence, Function, Rational};
 use num_traits::One;
 use std::collections::BTreeMap;

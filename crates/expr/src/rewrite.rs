@@ -1,0 +1,16 @@
+//! Expressions of the same value in other forms: shorter ones, such that keep digits, and such that leave less to compute.
+
+pub(crate) mod accuracy;
+mod arrange;
+mod cancel;
+pub(crate) mod constant;
+mod exponential;
+mod near_zero;
+mod polynomial;
+mod pythagoras;
+mod residue;
+mod reuse;
+
+pub use arrange::arrange;
+pub use cancel::Term;
+pub use reuse::reuse;
