@@ -411,9 +411,20 @@ impl<'a> Sampler<'a> {
         let constants = self.constants.evaluate(&[&zeros, parameters].concat());
         let (sides, rest) = constants.split_at(2 * spec.requirements.len());
         let mut holds = spec.requirements.iter().zip(sides.chunks(2));
-        holds
-            .all(|(r, side)| r.relation.holds(side[0], side[1]))
-            .then(|| (rest[0], rest[1..].to_vec()))
+        let (period, measures) = rest.split_first()?;
+        (holds.all(|(r, side)| r.relation.holds(side[0], side[1])) && self.has_volume(measures))
+            .then(|| (*period, measures.to_vec()))
+    }
+
+    /// Whether there is a body: parameters without bounds may exchange its surfaces.
+    fn has_volume(&self, measures: &[f64]) -> bool {
+        match &self.spec.domain {
+            Domain::Box { lower, .. } => {
+                let (lower, upper) = measures.split_at(lower.len());
+                lower.iter().zip(upper).all(|(lower, upper)| lower < upper)
+            }
+            Domain::Annulus { .. } => 0.0 <= measures[0] && measures[0] < measures[1],
+        }
     }
 
     /// The inputs with an amplitude at which the smallest principal stretch is between 1e-2 and 1e-8. Where the

@@ -162,15 +162,15 @@ impl ScalarFunctions for f32 {
     }
 
     fn log_ratio_squared(self) -> Self {
-        log_ratio::squared(self)
+        log_ratio::squared(f64::from(self)) as f32
     }
 
     fn log_ratio_slope(self) -> Self {
-        log_ratio::slope(self)
+        log_ratio::slope(f64::from(self)) as f32
     }
 
     fn log_ratio_curvature(self) -> Self {
-        log_ratio::curvature(self)
+        log_ratio::curvature(f64::from(self)) as f32
     }
 }
 

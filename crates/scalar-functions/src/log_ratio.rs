@@ -4,66 +4,58 @@
 //! `theta/sinh(theta) = (1 - y) sum_k y^k/(2k + 1)`, so that
 //! `theta/sinh(theta) - 1 = -sum_(k>=1) 2 y^k/(4k^2 - 1)`: all terms have one sign, and none is large where `z` is small.
 
-use num_traits::Float;
-
 /// The series in `y = z/(z + 2)` serves up to here; beyond, little cancels in the closed form.
 const LARGEST_IN_SERIES: f64 = 0.25;
 /// As many terms leave out less than half a unit in the last place of a double there.
 const TERMS: u32 = 24;
 
-/// The nearest value of the type; both types have one for every double.
-fn number<T: Float>(value: f64) -> T {
-    T::from(value).unwrap_or_else(T::nan)
-}
-
 /// `arcosh(1 + z)`, for every finite `z` from 0 on.
-fn logarithm<T: Float>(z: T) -> T {
-    if z + number(2.0) == z {
+fn logarithm(z: f64) -> f64 {
+    if z + 2.0 == z {
         // ln(2 z), whose argument may be beyond the largest number.
-        return z.ln() + number(std::f64::consts::LN_2);
+        return z.ln() + std::f64::consts::LN_2;
     }
     (z + hyperbolic_sine(z)).ln_1p()
 }
 
 /// `sinh(arcosh(1 + z)) = sqrt(z (z + 2))`, for every finite `z` from 0 on.
-fn hyperbolic_sine<T: Float>(z: T) -> T {
-    let sum = z + number(2.0);
+fn hyperbolic_sine(z: f64) -> f64 {
+    let sum = z + 2.0;
     // The square of so large a number may be beyond the largest one.
     if sum == z { z } else { (z * sum).sqrt() }
 }
 
-pub(crate) fn squared<T: Float>(z: T) -> T {
+pub(crate) fn squared(z: f64) -> f64 {
     let theta = logarithm(z);
     theta * theta
 }
 
 /// `theta/sinh(theta) - 1`.
-pub(crate) fn slope<T: Float>(z: T) -> T {
-    let y = z / (z + number(2.0));
-    if y > number(LARGEST_IN_SERIES) {
-        return logarithm(z) / hyperbolic_sine(z) - T::one();
+pub(crate) fn slope(z: f64) -> f64 {
+    let y = z / (z + 2.0);
+    if y > LARGEST_IN_SERIES {
+        return logarithm(z) / hyperbolic_sine(z) - 1.0;
     }
-    let sum = (1..=TERMS).rev().fold(T::zero(), |sum, k| {
+    let sum = (1..=TERMS).rev().fold(0.0, |sum, k| {
         let k = f64::from(k);
-        sum * y + number(2.0 / (4.0 * k * k - 1.0))
+        sum * y + 2.0 / (4.0 * k * k - 1.0)
     });
     -sum * y
 }
 
 /// The derivative of [`slope`], with `dy/dz = (1 - y)^2/2`.
-pub(crate) fn curvature<T: Float>(z: T) -> T {
-    let (one, two) = (T::one(), number(2.0));
-    let y = z / (z + two);
-    if y > number(LARGEST_IN_SERIES) {
+pub(crate) fn curvature(z: f64) -> f64 {
+    let y = z / (z + 2.0);
+    if y > LARGEST_IN_SERIES {
         // theta coth(theta) - 1, in which nothing cancels, over sinh(theta)^2, whose parts stay within the range.
-        let numerator = logarithm(z) * ((one + z) / hyperbolic_sine(z)) - one;
-        return -(numerator / z) / (z + two);
+        let numerator = logarithm(z) * ((1.0 + z) / hyperbolic_sine(z)) - 1.0;
+        return -(numerator / z) / (z + 2.0);
     }
-    let sum = (1..=TERMS).rev().fold(T::zero(), |sum, k| {
+    let sum = (1..=TERMS).rev().fold(0.0, |sum, k| {
         let k = f64::from(k);
-        sum * y + number(k / (4.0 * k * k - 1.0))
+        sum * y + k / (4.0 * k * k - 1.0)
     });
-    -sum * ((one - y) * (one - y))
+    -sum * ((1.0 - y) * (1.0 - y))
 }
 
 #[cfg(test)]

@@ -82,6 +82,8 @@ fn assert_none(wrong: &[Wrong]) {
 
 /// The nearest number, but for results within this of the middle between two.
 const ROUNDED: f64 = 0.5 + 1e-6;
+/// The same where the truth is a formula in doubles that loses a few digits itself.
+const NEARLY_ROUNDED: f64 = 0.5 + 1e-3;
 
 #[test]
 #[ignore = "a minute and more in release mode"]
@@ -124,7 +126,7 @@ fn sines_of_multiples_of_pi_are_the_nearest_numbers() {
 /// Of numbers from zero on: others are no `z = (a - b)^2/(2 a b)`.
 #[test]
 #[ignore = "a minute and more in release mode"]
-fn logarithms_of_ratios_are_within_a_few_units() {
+fn logarithms_of_ratios_are_the_nearest_numbers() {
     assert_none(&at_every_number(|z, found| {
         if !(z >= 0.0 && z.is_finite()) {
             return;
@@ -144,8 +146,8 @@ fn logarithms_of_ratios_are_within_a_few_units() {
             let slope = theta / sinh - 1.0;
             (slope, (1.0 - theta * (1.0 + wide) / sinh) / (wide * (wide + 2.0)))
         };
-        found("log_ratio_squared", z.log_ratio_squared(), squared, 5.0);
-        found("log_ratio_slope", z.log_ratio_slope(), slope, 5.0);
-        found("log_ratio_curvature", z.log_ratio_curvature(), curvature, 8.0);
+        found("log_ratio_squared", z.log_ratio_squared(), squared, NEARLY_ROUNDED);
+        found("log_ratio_slope", z.log_ratio_slope(), slope, NEARLY_ROUNDED);
+        found("log_ratio_curvature", z.log_ratio_curvature(), curvature, NEARLY_ROUNDED);
     }));
 }
