@@ -49,7 +49,7 @@ pub(crate) use converge::ConvergeOptions;
 pub(crate) use coverage::CoverageOptions;
 pub(crate) use eval::EvalOptions;
 pub(crate) use explain::ExplainOptions;
-pub(crate) use generate::{FaultName, GenerateOptions, Target};
+pub(crate) use generate::{GenerateOptions, Target};
 pub(crate) use list::ListOptions;
 pub(crate) use reproduce::ReproduceOptions;
 pub(crate) use resume::ResumeOptions;

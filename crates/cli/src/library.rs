@@ -13,10 +13,11 @@ use std::path::{Component, Path, PathBuf, is_separator};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use anyhow::{Context, Result, bail};
-use mmsmith_interpret::{interpret_fields, interpret_fields_single};
+use mmsmith_interpret::{interpret_staged, interpret_staged_single};
 use mmsmith_prove::admissible_value;
 use mmsmith_solutions::{AnySolution, CATALOGUE, Description, Precision, build};
-use mmsmith_spec::{Fields, Parameter, Spec, nearest};
+use mmsmith_spec::{Parameter, Spec, nearest};
+use mmsmith_stage::Staged;
 use mmsmith_verify::{body_of, has_body};
 
 use crate::input;
@@ -233,7 +234,7 @@ enum Source {
     /// Code generated from the library's specifications.
     Library(&'static Description),
     /// A specification that is interpreted; nothing needs to have been generated from it.
-    File(Arc<(Spec, Fields)>),
+    File(Arc<(Spec, Staged)>),
 }
 
 impl Selection {
@@ -255,7 +256,8 @@ impl Selection {
                 let fields = spec.derive().with_context(|| origin.file())?;
                 let pairs = spec.parameters.iter().map(|p| (p.name.clone(), p.default));
                 let defaults = pairs.collect();
-                (Source::File(Arc::new((spec, fields))), defaults)
+                let staged = Staged::of(&spec, fields);
+                (Source::File(Arc::new((spec, staged))), defaults)
             }
             Origin::BuiltIn(description) => {
                 let parameters = description.parameters.iter();
@@ -281,7 +283,7 @@ impl Selection {
                 build::<f64>(description.name, &description.resolve(pairs)?).transpose()?;
             }
             Source::File(source) => {
-                interpret_fields(&source.0, source.1.clone(), pairs)?;
+                interpret_staged(&source.0, &source.1, pairs)?;
             }
         }
         Ok(changed)
@@ -301,7 +303,7 @@ impl Selection {
             Source::Library(description) => self.generated(description),
             Source::File(source) => {
                 let pairs = self.parameters.iter().map(|(name, value)| (name.as_str(), *value));
-                Ok(interpret_fields(&source.0, source.1.clone(), pairs)?)
+                Ok(interpret_staged(&source.0, &source.1, pairs)?)
             }
         }
     }
@@ -312,7 +314,7 @@ impl Selection {
             Source::Library(description) => self.generated(description),
             Source::File(source) => {
                 let pairs = self.parameters.iter().map(|(name, value)| (name.as_str(), *value));
-                Ok(interpret_fields_single(&source.0, source.1.clone(), pairs)?)
+                Ok(interpret_staged_single(&source.0, &source.1, pairs)?)
             }
         }
     }

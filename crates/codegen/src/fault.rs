@@ -6,6 +6,7 @@ use mmsmith_expr::{Expr, Graph, Rational};
 use mmsmith_spec::{Domain, Fields, Spec};
 use std::collections::BTreeMap;
 use std::fmt;
+use std::str::FromStr;
 use thiserror::Error;
 
 /// A mistake in the fields.
@@ -212,6 +213,20 @@ impl Fault {
                 f.J = graph.sum_of(terms);
             }
         }
+    }
+}
+
+/// A word that names no fault.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error("there is no fault '{0}'")]
+pub struct UnknownFault(String);
+
+impl FromStr for Fault {
+    type Err = UnknownFault;
+
+    fn from_str(name: &str) -> Result<Self, UnknownFault> {
+        let known = Fault::ALL.into_iter().find(|fault| fault.name() == name);
+        known.ok_or_else(|| UnknownFault(name.to_owned()))
     }
 }
 

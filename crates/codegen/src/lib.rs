@@ -16,5 +16,5 @@ mod module;
 mod text;
 
 pub use code::{Code, Origin};
-pub use fault::{Fault, NoEffect};
+pub use fault::{Fault, NoEffect, UnknownFault};
 pub use module::{NameClash, Names, items, registry_source};

@@ -54,51 +54,64 @@ pub fn interpret_fields<'a>(
     fields: spec::Fields,
     overrides: impl IntoIterator<Item = (&'a str, f64)>,
 ) -> Result<AnySolution<f64>, InterpretError> {
-    in_double(spec, fields, resolve(spec, overrides)?)
+    interpret_staged(spec, &Staged::of(spec, fields), overrides)
 }
 
-/// As [`interpret_fields`], for solvers in single precision: all is evaluated in it, as generated code does.
+/// As [`interpret`], where the fields of `spec` are staged already: one `staged` serves any number of parameter values.
 ///
 /// # Errors
 ///
 /// [`InterpretError`] where a parameter is unknown or not admissible.
-pub fn interpret_fields_single<'a>(
+pub fn interpret_staged<'a>(
     spec: &Spec,
-    fields: spec::Fields,
+    staged: &Staged,
+    overrides: impl IntoIterator<Item = (&'a str, f64)>,
+) -> Result<AnySolution<f64>, InterpretError> {
+    in_double(spec, staged, resolve(spec, overrides)?)
+}
+
+/// As [`interpret_staged`], for solvers in single precision: all is evaluated in it, as generated code does.
+///
+/// # Errors
+///
+/// [`InterpretError`] where a parameter is unknown or not admissible.
+pub fn interpret_staged_single<'a>(
+    spec: &Spec,
+    staged: &Staged,
     overrides: impl IntoIterator<Item = (&'a str, f64)>,
 ) -> Result<AnySolution<f32>, InterpretError> {
-    in_single(spec, fields, resolve(spec, overrides)?)
+    in_single(spec, staged, resolve(spec, overrides)?)
 }
 
 /// Not generic, so that [`Interpreted`] is compiled in this crate, and not in each that calls it.
 fn in_double(
     spec: &Spec,
-    fields: spec::Fields,
+    staged: &Staged,
     values: Vec<f64>,
 ) -> Result<AnySolution<f64>, InterpretError> {
-    build(spec, fields, values)
+    build(spec, staged, values)
 }
 
 /// Not generic, as [`in_double`].
 fn in_single(
     spec: &Spec,
-    fields: spec::Fields,
+    staged: &Staged,
     values: Vec<f64>,
 ) -> Result<AnySolution<f32>, InterpretError> {
-    build(spec, fields, values)
+    build(spec, staged, values)
 }
 
 /// The solution at admissible values of the parameters, in the precision that these are rounded to.
 fn build<T: Interpretable>(
     spec: &Spec,
-    fields: spec::Fields,
+    staged: &Staged,
     values: Vec<f64>,
 ) -> Result<AnySolution<T>, InterpretError> {
     let values: Vec<T> = values.into_iter().map(T::nearest).collect();
     Ok(match spec.dimension {
-        1 => AnySolution::One(Box::new(Interpreted::<T, 1>::new(spec, fields, values)?)),
-        2 => AnySolution::Two(Box::new(Interpreted::<T, 2>::new(spec, fields, values)?)),
-        _ => AnySolution::Three(Box::new(Interpreted::<T, 3>::new(spec, fields, values)?)),
+        1 => AnySolution::One(Box::new(Interpreted::<T, 1>::new(spec, staged, values)?)),
+        2 => AnySolution::Two(Box::new(Interpreted::<T, 2>::new(spec, staged, values)?)),
+        _ => AnySolution::Three(Box::new(Interpreted::<T, 3>::new(spec, staged, values)?)),
     })
 }
 
@@ -164,8 +177,7 @@ struct Interpreted<T: Interpretable, const D: usize> {
 }
 
 impl<T: Interpretable, const D: usize> Interpreted<T, D> {
-    fn new(spec: &Spec, fields: spec::Fields, parameters: Vec<T>) -> Result<Self, InterpretError> {
-        let staged = Staged::of(spec, fields);
+    fn new(spec: &Spec, staged: &Staged, parameters: Vec<T>) -> Result<Self, InterpretError> {
         let program = staged.program();
         let part = |slots: &[Slot]| program.part(slots);
         let at_parameters = inputs::<T, D>(&SVector::zeros(), T::zero(), &parameters);

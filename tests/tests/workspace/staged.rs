@@ -3,12 +3,13 @@
 
 #![allow(clippy::unwrap_used)]
 
-use mmsmith_interpret::{interpret, interpret_fields_single};
+use mmsmith_interpret::{interpret, interpret_staged_single};
 use mmsmith_solutions::nalgebra::SVector;
 use mmsmith_solutions::{
     AnySolution, BLOCK, CATALOGUE, Description, Precision, Real, Solution, State, StateRun, build,
 };
 use mmsmith_spec::Spec;
+use mmsmith_stage::Staged;
 
 /// Points in the unit cube, off its faces; a body force is defined there for every solution.
 fn points<T: Real, const D: usize>(count: usize) -> Vec<SVector<T, D>> {
@@ -325,8 +326,8 @@ fn generated_and_interpreted_have_the_same_bits() {
         let generated = bits_of(&build::<f64>(name, &[]).unwrap().unwrap());
         compare(name, &generated, &bits_of(&interpret(&spec, []).unwrap()));
         let generated = bits_of(&build::<f32>(name, &[]).unwrap().unwrap());
-        let fields = spec.derive().unwrap();
-        let interpreted = interpret_fields_single(&spec, fields, []).unwrap();
+        let staged = Staged::of(&spec, spec.derive().unwrap());
+        let interpreted = interpret_staged_single(&spec, &staged, []).unwrap();
         compare(name, &generated, &bits_of(&interpreted));
     }
 }

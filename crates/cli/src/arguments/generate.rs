@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::builder::PossibleValue;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use mmsmith_codegen::Fault;
 
@@ -18,8 +18,8 @@ pub(crate) struct GenerateOptions {
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
     /// Plant this mistake in the fields, so that you can see whether your tests find it
-    #[arg(long, value_enum, value_name = "NAME")]
-    pub(crate) fault: Option<FaultName>,
+    #[arg(long, value_name = "NAME", value_parser = faults())]
+    pub(crate) fault: Option<Fault>,
 }
 
 /// A language that code is written in.
@@ -31,25 +31,8 @@ pub(crate) enum Target {
     C,
 }
 
-/// A fault as the command line names it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct FaultName(pub(crate) Fault);
-
-impl ValueEnum for FaultName {
-    fn value_variants<'a>() -> &'a [Self] {
-        const NAMES: [FaultName; Fault::ALL.len()] = {
-            let mut names = [FaultName(Fault::ALL[0]); Fault::ALL.len()];
-            let mut n = 0;
-            while n < names.len() {
-                names[n] = FaultName(Fault::ALL[n]);
-                n += 1;
-            }
-            names
-        };
-        &NAMES
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(PossibleValue::new(self.0.name()).help(self.0.about()))
-    }
+/// Faults, with a line about each.
+fn faults() -> impl TypedValueParser<Value = Fault> {
+    let values = Fault::ALL.map(|own| PossibleValue::new(own.name()).help(own.about()));
+    PossibleValuesParser::new(values).try_map(|name| name.parse::<Fault>())
 }

@@ -3,7 +3,7 @@
 use anyhow::{Context, Result};
 use mmsmith_codegen::{Code, Names, Origin};
 
-use crate::arguments::{FaultName, GenerateOptions, Target};
+use crate::arguments::{GenerateOptions, Target};
 use crate::json::{self, Output};
 use crate::library::locate;
 use crate::terminal;
@@ -15,7 +15,7 @@ pub(crate) fn generate(options: &GenerateOptions) -> Result<bool> {
     let origin = Origin { command: "mms gen".into(), file: found.shown_file() };
     let code = match options.fault {
         None => Code::of(&spec, fields, origin),
-        Some(FaultName(fault)) => Code::with_fault(&spec, fields, origin, fault)
+        Some(fault) => Code::with_fault(&spec, fields, origin, fault)
             .context("--fault: choose another solution or another fault")?,
     };
     let (text, extension) = match options.target {

@@ -313,6 +313,22 @@ fn exchange(first: &Factor, second: &Factor) -> Option<Exchange> {
     let least = if p.abs() < q.abs() { p.abs() } else { q.abs() };
     let with_sign =
         |size: &Rational, of: &Rational| if of.is_negative() { -size } else { size.clone() };
+    // A whole power of the first, beside one of the second of the same argument that multiplies or divides.
+    let is_whole = |multiplies: bool| {
+        ratio.is_one()
+            && p.is_positive()
+            && q.is_positive() == multiplies
+            && p.is_integer()
+            && q.is_integer()
+    };
+    // One function for both, of which the second loses the power `of_second`.
+    let into = |kind: Kind, scale: Rational, of_second: Rational| {
+        Some(Exchange {
+            taken: [least.clone(), of_second],
+            number: Rational::one(),
+            instead: Some((kind, scale, least.clone())),
+        })
+    };
     let power_of_two = |exponent: &Rational| {
         let whole = exponent.is_integer().then(|| exponent.to_integer().to_i32()).flatten()?;
         (whole.abs() <= 64).then(|| num_traits::Pow::pow(&Rational::from(2), whole))
@@ -376,45 +392,15 @@ fn exchange(first: &Factor, second: &Factor) -> Option<Exchange> {
                 instead: Some((Kind::Expm1, -&second.scale, taken)),
             })
         }
-        (Kind::Sinh, Kind::Cosh)
-            if ratio.is_one()
-                && p.is_positive()
-                && q.is_negative()
-                && p.is_integer()
-                && q.is_integer() =>
-        {
-            Some(Exchange {
-                taken: [least.clone(), -&least],
-                number: Rational::one(),
-                instead: Some((Kind::Tanh, second.scale.clone(), least)),
-            })
+        (Kind::Sinh, Kind::Cosh) if is_whole(false) => {
+            into(Kind::Tanh, second.scale.clone(), -&least)
         }
-        (Kind::Tanh, Kind::Cosh)
-            if ratio.is_one()
-                && p.is_positive()
-                && q.is_positive()
-                && p.is_integer()
-                && q.is_integer() =>
-        {
-            Some(Exchange {
-                taken: [least.clone(), least.clone()],
-                number: Rational::one(),
-                instead: Some((Kind::Sinh, second.scale.clone(), least)),
-            })
+        (Kind::Tanh, Kind::Cosh) if is_whole(true) => {
+            into(Kind::Sinh, second.scale.clone(), least.clone())
         }
         // (exp(x) - 1)/(exp(x) + 1) = tanh(x/2).
-        (Kind::Expm1, Kind::Logistic)
-            if ratio.is_one()
-                && p.is_positive()
-                && q.is_negative()
-                && p.is_integer()
-                && q.is_integer() =>
-        {
-            Some(Exchange {
-                taken: [least.clone(), -&least],
-                number: Rational::one(),
-                instead: Some((Kind::Tanh, &second.scale / Rational::from(2), least)),
-            })
+        (Kind::Expm1, Kind::Logistic) if is_whole(false) => {
+            into(Kind::Tanh, &second.scale / Rational::from(2), -&least)
         }
         _ => None,
     }
