@@ -5,6 +5,7 @@ use anyhow::{Context, anyhow, bail};
 use clap::ValueEnum;
 use mmsmith_codegen::{Code, Names, registry_source};
 use mmsmith_spec::Spec;
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -77,8 +78,10 @@ pub(crate) fn run(
 
     let mut sources: BTreeMap<String, Vec<String>> = BTreeMap::new();
     let mut times = vec!["milliseconds: read, derive and stage, write down (Rust, C)".to_owned()];
-    for path in &chosen {
-        let Generated { name, texts, times: spent } = generate(repository, path, targets)?;
+    let generated: Vec<_> =
+        chosen.par_iter().map(|path| generate(repository, path, targets)).collect();
+    for (path, generated) in chosen.iter().zip(generated) {
+        let Generated { name, texts, times: spent } = generated?;
         let spent: Vec<String> = spent.iter().map(|t| format!("{:7.1}", 1e3 * t)).collect();
         times.push(format!("{name:<18} {}", spent.join(" ")));
         if sources.insert(name.clone(), texts).is_some() {
