@@ -50,9 +50,9 @@ pub(crate) struct ProductWeights<T, const D: usize> {
     any_extended: bool,
     /// Half-size beyond which it is.
     extended_above: T,
-    /// Positions in cells from the lower corner, `xi[axis][k]`; valid where `any_extended`.
+    /// Positions in cells from the lower corner, `xi[axis][k]`; valid where `any_extended`, and in single precision.
     xi: [PerParticle<T>; D],
-    /// Half-sizes in cells, `l[axis][k]`; valid where `any_extended`.
+    /// Half-sizes in cells, `l[axis][k]`; valid where positions are.
     l: [PerParticle<T>; D],
 }
 
@@ -88,15 +88,6 @@ impl<T: Lanes, const D: usize> ProductWeights<T, D> {
                 self.compute_on_axes::<QuadraticSpline, 3>(c, half_sizes, kinematics);
             }
             OnAxis::Cubic => self.compute_on_axes::<CubicSpline, 4>(c, half_sizes, kinematics),
-        }
-        if self.any_extended {
-            for k in 0..BLOCK {
-                let xi = c.in_cells(&kinematics.x[k]);
-                for a in 0..D {
-                    self.xi[a][k] = xi[a];
-                    self.l[a][k] = half_sizes.along(a, stretch(c.planted, &kinematics.F[k], a));
-                }
-            }
         }
     }
 
@@ -289,23 +280,59 @@ where
     fn run<V: Vectors>(self, _: V) {
         let Self { weights, c, kinematics, half_sizes, .. } = self;
         let ProductWeights { first_node, S, G, Z, inverse_inertia, extended_above, .. } = weights;
-        if MOMENTS {
-            compute_moments::<T, R, D, W>(c, half_sizes, kinematics, Z, inverse_inertia);
+        let ProductWeights { any_extended, xi, l, .. } = weights;
+        let of_particle = |k: usize, a: usize| {
+            let Kinematics { x, F } = kinematics;
+            (c.in_cells(&x[k])[a], half_sizes.along(a, stretch(c.planted, &F[k], a)))
+        };
+        let above = *extended_above;
+        // In single precision the loop is vectorised only where the numbers of an axis lie side by side; in double precision it is
+        // vectorised either way, and laying them so would cost 1 to 3 % of a step.
+        if const { size_of::<T>() > size_of::<f32>() } {
+            if MOMENTS {
+                compute_moments::<T, R, D, W>(of_particle, Z, inverse_inertia);
+            } else {
+                *any_extended =
+                    compute_weights::<T, R, D, W>(of_particle, above, c, first_node, S, G);
+                if *any_extended {
+                    lay_side_by_side(of_particle, xi, l);
+                }
+            }
             return;
         }
-        let half_sizes = (half_sizes, *extended_above);
-        weights.any_extended =
-            compute_weights::<T, R, D, W>(c, half_sizes, kinematics, first_node, S, G);
+        if !MOMENTS {
+            lay_side_by_side(of_particle, xi, l);
+        }
+        let of_particle = |k: usize, a: usize| (xi[a][k], l[a][k]);
+        if MOMENTS {
+            compute_moments::<T, R, D, W>(of_particle, Z, inverse_inertia);
+        } else {
+            *any_extended = compute_weights::<T, R, D, W>(of_particle, above, c, first_node, S, G);
+        }
     }
 }
 
-/// Computes weights; returns whether any box has extended support. A function of its own tells the compiler that the arrays
-/// do not overlap.
+/// Writes position and half-size of every particle, `of_particle(k, axis)`, axis by axis.
+#[inline(always)]
+fn lay_side_by_side<T: Lanes, const D: usize>(
+    of_particle: impl Fn(usize, usize) -> (T, T),
+    xi: &mut [PerParticle<T>; D],
+    l: &mut [PerParticle<T>; D],
+) {
+    for k in 0..BLOCK {
+        for a in 0..D {
+            (xi[a][k], l[a][k]) = of_particle(k, a);
+        }
+    }
+}
+
+/// Computes weights from position and half-size of every particle, `of_particle(k, axis)`; returns whether any box has extended
+/// support, a half-size above `extended_above`. A function of its own tells the compiler that the arrays do not overlap.
 #[inline(always)]
 fn compute_weights<T, R, const D: usize, const W: usize>(
+    of_particle: impl Fn(usize, usize) -> (T, T),
+    extended_above: T,
     c: &Constants<T, D>,
-    (half_sizes, extended_above): (&HalfSizes<T, D>, T),
-    Kinematics { x, F }: Kinematics<'_, T, D>,
     first_node: &mut [usize; BLOCK],
     S: &mut AtNodes<T, D>,
     G: &mut AtNodes<T, D>,
@@ -316,12 +343,11 @@ where
 {
     let mut any_extended = false;
     for k in 0..BLOCK {
-        let xi = c.in_cells(&x[k]);
         let mut first = 0.0;
         for a in 0..D {
-            let l = half_sizes.along(a, stretch(c.planted, &F[k], a));
+            let (xi, l) = of_particle(k, a);
             any_extended |= l > extended_above;
-            let weights = R::axis_weights(xi[a], l);
+            let weights = R::axis_weights(xi, l);
             first += weights.base * c.strides[a] as f64;
             for i in 0..W {
                 if !is_middle::<W>(i) {
@@ -337,9 +363,7 @@ where
 
 #[inline(always)]
 fn compute_moments<T, R, const D: usize, const W: usize>(
-    c: &Constants<T, D>,
-    half_sizes: &HalfSizes<T, D>,
-    Kinematics { x, F }: Kinematics<'_, T, D>,
+    of_particle: impl Fn(usize, usize) -> (T, T),
     Z: &mut AtNodes<T, D>,
     inverse_inertia: &mut [PerParticle<T>; D],
 ) where
@@ -347,10 +371,10 @@ fn compute_moments<T, R, const D: usize, const W: usize>(
     R: ShapeFunction<W>,
 {
     for k in 0..BLOCK {
-        let xi = c.in_cells(&x[k]);
         for a in 0..D {
-            let weights = R::axis_weights(xi[a], half_sizes.along(a, stretch(c.planted, &F[k], a)));
-            let place = weights.after_first(xi[a]);
+            let (xi, l) = of_particle(k, a);
+            let weights = R::axis_weights(xi, l);
+            let place = weights.after_first(xi);
             for i in 0..W {
                 if !is_middle::<W>(i) {
                     Z[a][i][k] = weights.S[i] * (real::<T>(i as f64) - place);
