@@ -5,8 +5,9 @@ use crate::function::digits;
 use crate::module::Names;
 use crate::text::{c_string, comment, meaning, push_index, spell};
 use mmsmith_expr::{CSupport, Function, Operation, RustCall, Slot, nearest_f64};
-use mmsmith_spec::{Boundary, Condition, Material, Parameter, Surface};
+use mmsmith_spec::{Boundary, Condition, Parameter, Surface};
 use mmsmith_stage::{Block, Measures, Operand, Shape, Stage, Staged, Traction};
+use mmsmith_vocabulary::Law;
 use std::borrow::Cow;
 
 /// What every header needs: macros, and `sin(pi x)` as the crate of the solutions computes it.
@@ -618,15 +619,11 @@ before. Results equal those of the Rust functions bit for bit where the compiler
         ] {
             self.scalar(name, about, slot);
         }
-        for &(name, slot) in &constants.material {
-            let about = match (&self.code.spec.material, name) {
-                (Material::MooneyRivlin { .. }, "lambda") => "the factor of (ln J)^2/2",
-                (_, "lambda") => "first Lame constant",
-                (_, "mu") => "shear modulus",
-                (_, "c1") => "the factor of I1 in the strain energy",
-                _ => "the factor of I2 in the strain energy",
-            };
-            self.scalar(name, about, slot);
+        // A host that runs a stated law has its own constants for it.
+        if let Law::Library(material) = &constants.law {
+            for (constant, slot) in material.row().constants.iter().zip(material.values()) {
+                self.scalar(constant.name, constant.meaning, slot);
+            }
         }
         match &constants.domain {
             Measures::Box { lower, upper } => {

@@ -4,8 +4,9 @@ use crate::code::Code;
 use crate::function::{Translator, fill, float};
 use crate::text::{meaning, one_line};
 use mmsmith_expr::Slot;
-use mmsmith_spec::{Boundary, Condition, DeriveError, Material, Spec, Surface};
+use mmsmith_spec::{Boundary, Condition, DeriveError, Spec, Surface};
 use mmsmith_stage::{Block, Measures, Shape, Staged, Stages};
+use mmsmith_vocabulary::{Law, Response, Stated};
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{format_ident, quote};
 use std::cell::RefCell;
@@ -689,7 +690,7 @@ impl Generator<'_> {
         let [cell_length, density, wave_speed, period] =
             [constants.cell_length, constants.density, constants.wave_speed, constants.period]
                 .map(|slot| self.constant(slot));
-        let material = self.material();
+        let law = self.law();
         let domain = self.domain();
         let boundaries = self.spec.boundaries.iter().map(|b| boundary(runtime, b));
         items.extend(quote! {
@@ -702,8 +703,8 @@ impl Generator<'_> {
             fn cell_length(&self) -> T {
                 #cell_length
             }
-            fn material(&self) -> #runtime::Material<T> {
-                #material
+            fn law(&self) -> #runtime::Law<T> {
+                #law
             }
             fn density(&self) -> T {
                 #density
@@ -759,22 +760,45 @@ impl Generator<'_> {
         }
     }
 
-    fn material(&self) -> TokenStream {
+    fn law(&self) -> TokenStream {
         let runtime = self.runtime;
-        let constants = self.staged.constants.material.iter();
-        let (names, values): (Vec<Ident>, Vec<TokenStream>) =
-            constants.map(|&(name, slot)| (format_ident!("{name}"), self.constant(slot))).unzip();
-        let variant = match self.spec.material {
-            Material::NeoHookean { .. } => quote!(NeoHookean),
-            Material::StVenantKirchhoff { .. } => quote!(StVenantKirchhoff),
-            Material::Hencky { .. } => quote!(Hencky),
-            Material::LinearElastic { .. } => quote!(LinearElastic),
-            Material::MooneyRivlin { .. } => quote!(MooneyRivlin),
-            Material::Energy { .. } | Material::Stress { .. } => {
-                return quote!(#runtime::Material::Custom);
+        match &self.staged.constants.law {
+            Law::Library(material) => {
+                let row = material.row();
+                let variant = format_ident!("{}", row.variant);
+                let constants = row.constants.iter().zip(material.values());
+                let constants = constants.map(|(constant, slot)| {
+                    let (name, value) = (format_ident!("{}", constant.name), self.constant(slot));
+                    quote!(#name: #value,)
+                });
+                let volumetric = material.volumetric().map(|chosen| {
+                    let chosen = format_ident!("{}", chosen.variant());
+                    quote!(volumetric: #runtime::Volumetric::#chosen,)
+                });
+                quote! {
+                    #runtime::Law::Library(#runtime::Material::#variant { #(#constants)* #volumetric })
+                }
             }
-        };
-        quote!(#runtime::Material::#variant { #(#names: #values),* })
+            Law::Stated(Stated { response, constants }) => {
+                let response = match response {
+                    Response::Energy(W) => quote!(Energy(#W.to_owned())),
+                    Response::Stress(P) => {
+                        let rows = P.iter().map(|row| quote!(vec![#(#row.to_owned()),*]));
+                        quote!(Stress(vec![#(#rows),*]))
+                    }
+                };
+                let constants = constants.iter().map(|(name, slot)| {
+                    let value = self.constant(*slot);
+                    quote!((#name.to_owned(), #value))
+                });
+                quote! {
+                    #runtime::Law::Stated(#runtime::Stated {
+                        response: #runtime::Response::#response,
+                        constants: vec![#(#constants),*],
+                    })
+                }
+            }
+        }
     }
 
     fn domain(&self) -> TokenStream {

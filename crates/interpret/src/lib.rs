@@ -12,7 +12,7 @@ use lattice::LatticeStages;
 use mmsmith_expr::{Program, Scalar, Slot};
 use mmsmith_runtime::nalgebra::{SMatrix, SVector};
 use mmsmith_runtime::{
-    AnySolution, BodyForceAtPoints, Boundary, Condition, Domain, Fields, Lattice, Material,
+    AnySolution, BodyForceAtPoints, Boundary, Condition, Domain, Fields, Lattice, Law,
     ParameterError, Real, Solution, StateAtPoints, Surface,
 };
 use mmsmith_spec::{self as spec, DeriveError, Spec};
@@ -170,7 +170,7 @@ struct Interpreted<T: Interpretable, const D: usize> {
     domain: Domain<T, D>,
     boundaries: Vec<Boundary>,
     cell_length: T,
-    material: Material<T>,
+    law: Law<T>,
     density: T,
     wave_speed: T,
     period: T,
@@ -206,8 +206,6 @@ impl<T: Interpretable, const D: usize> Interpreted<T, D> {
                 Domain::Annulus { inner: constant(inner), outer: constant(outer) }
             }
         };
-        let of_material: Vec<T> =
-            staged.constants.material.iter().map(|&(_, slot)| constant(slot)).collect();
         let field = |name: FieldName| part(staged.field(name));
         Ok(Interpreted {
             displacement: field(FieldName::Displacement),
@@ -233,7 +231,7 @@ impl<T: Interpretable, const D: usize> Interpreted<T, D> {
             domain,
             boundaries: spec.boundaries.iter().map(boundary).collect(),
             cell_length: constant(staged.constants.cell_length),
-            material: material(&spec.material, &of_material),
+            law: staged.constants.law.clone().map(constant),
             density: constant(staged.constants.density),
             wave_speed: constant(staged.constants.wave_speed),
             period: constant(staged.constants.period),
@@ -356,8 +354,8 @@ impl<T: Interpretable, const D: usize> Solution<T, D> for Interpreted<T, D> {
         self.cell_length
     }
 
-    fn material(&self) -> Material<T> {
-        self.material
+    fn law(&self) -> Law<T> {
+        self.law.clone()
     }
 
     fn density(&self) -> T {
@@ -370,22 +368,5 @@ impl<T: Interpretable, const D: usize> Solution<T, D> for Interpreted<T, D> {
 
     fn period(&self) -> T {
         self.period
-    }
-}
-
-fn material<T: Interpretable>(material: &spec::Material, constants: &[T]) -> Material<T> {
-    match (material, constants) {
-        (spec::Material::NeoHookean { .. }, &[lambda, mu]) => Material::NeoHookean { lambda, mu },
-        (spec::Material::StVenantKirchhoff { .. }, &[lambda, mu]) => {
-            Material::StVenantKirchhoff { lambda, mu }
-        }
-        (spec::Material::Hencky { .. }, &[lambda, mu]) => Material::Hencky { lambda, mu },
-        (spec::Material::LinearElastic { .. }, &[lambda, mu]) => {
-            Material::LinearElastic { lambda, mu }
-        }
-        (spec::Material::MooneyRivlin { .. }, &[c1, c2, lambda]) => {
-            Material::MooneyRivlin { c1, c2, lambda }
-        }
-        _ => Material::Custom,
     }
 }

@@ -13,7 +13,7 @@ use crate::geometry::Constants;
 use crate::grid::{Grid, Layout};
 use crate::health::Invalid;
 use crate::kernel::block::BlockLaw;
-use crate::material::{AnyLaw, Material, NeoHookean, NeoHookeanNoLog, Stressed};
+use crate::material::{AnyLaw, Law, Material, NeoHookean, NeoHookeanNoLog, OwnBlocks, Stressed};
 use crate::node::Node;
 use crate::parallel::bins::Bins;
 use crate::particles::Particles;
@@ -28,7 +28,7 @@ use crate::tensor::{determinant, real};
 /// A running simulation.
 pub struct Simulation<T, const D: usize> {
     grid: Grid<T, D>,
-    material: Material<T>,
+    law: Law<T, D>,
     settings: Settings<T>,
     state: State<T, D>,
     steps_done: usize,
@@ -44,7 +44,7 @@ pub trait Simulated<const D: usize>: Stressed<D> {
     fn set_up(
         grid: Grid<Self, D>,
         body: Body<Self, D>,
-        material: Material<Self>,
+        law: Law<Self, D>,
         settings: Settings<Self>,
     ) -> Result<Simulation<Self, D>, SetupError>;
 
@@ -62,10 +62,10 @@ macro_rules! simulated {
             fn set_up(
                 grid: Grid<Self, $D>,
                 body: Body<Self, $D>,
-                material: Material<Self>,
+                law: Law<Self, $D>,
                 settings: Settings<Self>,
             ) -> Result<Simulation<Self, $D>, SetupError> {
-                Simulation::set_up(grid, body, material, settings)
+                Simulation::set_up(grid, body, law, settings)
             }
 
             fn step(
@@ -92,10 +92,10 @@ impl<T: Simulated<D>, const D: usize> Simulation<T, D> {
     pub fn new(
         grid: Grid<T, D>,
         body: impl Into<Body<T, D>>,
-        material: Material<T>,
+        law: impl Into<Law<T, D>>,
         settings: Settings<T>,
     ) -> Result<Self, SetupError> {
-        T::set_up(grid, body.into(), material, settings)
+        T::set_up(grid, body.into(), law.into(), settings)
     }
 
     /// Advances by one time step.
@@ -116,12 +116,12 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
     pub(crate) fn set_up(
         grid: Grid<T, D>,
         body: Body<T, D>,
-        material: Material<T>,
+        law: Law<T, D>,
         settings: Settings<T>,
     ) -> Result<Self, SetupError> {
         const { assert!(1 <= D && D <= 3, "one, two or three dimensions") };
         check(&grid, &body, &settings)?;
-        let mut state = allocate(&grid, body, law(&material), &settings)?;
+        let mut state = allocate(&grid, body, of_blocks(&law), &settings)?;
         let Particles { x, F, .. } = &state.particles;
         let worst = (0..x.len())
             .filter_map(|p| Some((state.support.invalidity(&state.constants, p, &x[p], &F[p])?, p)))
@@ -132,7 +132,7 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
         }
         state.sort();
         state.start_affine();
-        Ok(Self { grid, material, settings, state, steps_done: 0, failed: None })
+        Ok(Self { grid, law, settings, state, steps_done: 0, failed: None })
     }
 
     /// See [`step`](Self::step).
@@ -182,9 +182,9 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
         self.settings.time_step * real(self.steps_done as f64)
     }
 
-    /// The material.
-    pub fn material(&self) -> &Material<T> {
-        &self.material
+    /// The law.
+    pub fn law(&self) -> &Law<T, D> {
+        &self.law
     }
 
     /// The grid.
@@ -234,7 +234,7 @@ impl<T: RealField, const D: usize> fmt::Debug for Simulation<T, D> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Simulation")
             .field("grid", &self.grid)
-            .field("material", &self.material)
+            .field("law", &self.law)
             .field("settings", &self.settings)
             .field("particles", &self.state.particles.X.len())
             .field("steps_done", &self.steps_done)
@@ -249,9 +249,13 @@ fn figure<T: RealField>(value: T) -> f64 {
 }
 
 /// The law, for blocks of particles.
-fn law<T: Lanes, const D: usize>(material: &Material<T>) -> Box<dyn BlockLaw<T, D>> {
+fn of_blocks<T: Lanes, const D: usize>(law: &Law<T, D>) -> Box<dyn BlockLaw<T, D>> {
     let planted = crate::fault::Planted::here();
-    match *material {
+    let material = match law {
+        Law::Library(material) => *material,
+        Law::Own(law) => return Box::new(OwnBlocks(law.clone())),
+    };
+    match material {
         Material::NeoHookean { lambda, mu } if lambda == T::zero() => {
             Box::new(NeoHookeanNoLog { mu })
         }

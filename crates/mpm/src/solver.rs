@@ -4,7 +4,7 @@ use nalgebra::SVector;
 
 use crate::body_force::BodyForce;
 use crate::error::{SetupError, StepError};
-use crate::material::Material;
+use crate::material::Law;
 use crate::particles::Particles;
 use crate::simulation::{Simulated, Simulation};
 use crate::total_lagrangian::{self, BoundaryData, Scheme, TotalLagrangian};
@@ -19,7 +19,7 @@ pub trait Solver<T, const D: usize> {
     fn step(&mut self, body_force: &dyn BodyForce<T, D>) -> Result<(), StepError>;
 
     /// The particles as they are now, and their law.
-    fn observe(&mut self) -> (&Particles<T, D>, &Material<T>);
+    fn observe(&mut self) -> (&Particles<T, D>, &Law<T, D>);
 
     /// How far velocities lag behind positions, a time.
     fn velocity_lag(&self) -> T;
@@ -33,8 +33,8 @@ impl<T: Scalar<D>, const D: usize> Solver<T, D> for Simulation<T, D> {
         Simulation::step(self, body_force)
     }
 
-    fn observe(&mut self) -> (&Particles<T, D>, &Material<T>) {
-        (self.particles(), self.material())
+    fn observe(&mut self) -> (&Particles<T, D>, &Law<T, D>) {
+        (self.particles(), self.law())
     }
 
     fn velocity_lag(&self) -> T {
@@ -53,7 +53,7 @@ pub struct TotalSetUp<'a, const D: usize> {
     /// Degree, mass matrix, composition in time.
     pub scheme: Scheme,
     /// The law.
-    pub material: Material<f64>,
+    pub law: Law<f64, D>,
     /// The reference density.
     pub density: f64,
     /// Time step dt.
@@ -95,8 +95,8 @@ macro_rules! scalar {
         )*)*
     };
     (@total f64, $D:literal, $set_up:ident, $boundary:ident) => {{
-        let TotalSetUp { grid, scheme, material, density, time_step, motion } = $set_up;
-        let mut body = TotalLagrangian::<$D>::new(grid, scheme, material, density, time_step)?;
+        let TotalSetUp { grid, scheme, law, density, time_step, motion } = $set_up;
+        let mut body = TotalLagrangian::<$D>::new(grid, scheme, law, density, time_step)?;
         let (u, v): (Vec<_>, Vec<_>) =
             body.positions().iter().map(motion).map(|[u, v]| (u, v)).unzip();
         body.start_with_boundary(&u, &v, $boundary.as_ref())?;
@@ -120,9 +120,9 @@ macro_rules! driven {
                 self.body.step_with_boundary(body_force, self.boundary.as_ref())
             }
 
-            fn observe(&mut self) -> (&Particles<f64, $D>, &Material<f64>) {
+            fn observe(&mut self) -> (&Particles<f64, $D>, &Law<f64, $D>) {
                 self.body.observe();
-                (self.body.particles(), self.body.material())
+                (self.body.particles(), self.body.law())
             }
 
             fn velocity_lag(&self) -> f64 {

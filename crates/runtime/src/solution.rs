@@ -2,78 +2,10 @@
 
 use crate::lattice::POINTS_A_LAYER;
 use crate::staged::PlainPoints;
-use crate::{BLOCK, BodyForceAtPoints, Boundary, Domain, Real, StateAtPoints, StateRun, Surface};
+use crate::{
+    BLOCK, BodyForceAtPoints, Boundary, Domain, Law, Real, StateAtPoints, StateRun, Surface,
+};
 use nalgebra::{SMatrix, SVector};
-
-/// The constitutive law of a solution, with its constants; what a solver needs to model the same material.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Material<T> {
-    /// `tau = lambda ln(J) I + mu (F F^T - I)`, plane strain in two dimensions.
-    NeoHookean {
-        /// First Lamé constant, a stress.
-        lambda: T,
-        /// Shear modulus, a stress.
-        mu: T,
-    },
-    /// `S = lambda tr(E) I + 2 mu E` with Green's strain `E = (F^T F - I)/2`, `P = F S`.
-    StVenantKirchhoff {
-        /// First Lamé constant, a stress.
-        lambda: T,
-        /// Shear modulus, a stress.
-        mu: T,
-    },
-    /// `tau = lambda ln(J) I + 2 mu ln V` with the left stretch `V`.
-    Hencky {
-        /// First Lamé constant, a stress.
-        lambda: T,
-        /// Shear modulus, a stress.
-        mu: T,
-    },
-    /// `P = lambda tr(H) I + mu (H + H^T)`, geometrically linear.
-    LinearElastic {
-        /// First Lamé constant, a stress.
-        lambda: T,
-        /// Shear modulus, a stress.
-        mu: T,
-    },
-    /// `W = c1 (I1 - 3 - 2 ln J) + c2 (I2 - 3 - 4 ln J) + lambda/2 (ln J)^2`, `P = dW/dF`.
-    MooneyRivlin {
-        /// Half the part of the shear modulus that goes with `I1`, a stress.
-        c1: T,
-        /// Half the part of the shear modulus that goes with `I2`, a stress.
-        c2: T,
-        /// The factor of `(ln J)^2/2`, a stress.
-        lambda: T,
-    },
-    /// A law that only the specification states, as an energy or a stress of its own; a solver needs its own model of it.
-    Custom,
-}
-
-impl<T> Material<T> {
-    /// The same law with `change` applied to each constant.
-    #[must_use]
-    pub fn map<U>(self, change: impl Fn(T) -> U) -> Material<U> {
-        match self {
-            Self::NeoHookean { lambda, mu } => {
-                Material::NeoHookean { lambda: change(lambda), mu: change(mu) }
-            }
-            Self::StVenantKirchhoff { lambda, mu } => {
-                Material::StVenantKirchhoff { lambda: change(lambda), mu: change(mu) }
-            }
-            Self::Hencky { lambda, mu } => {
-                Material::Hencky { lambda: change(lambda), mu: change(mu) }
-            }
-            Self::LinearElastic { lambda, mu } => {
-                Material::LinearElastic { lambda: change(lambda), mu: change(mu) }
-            }
-            Self::MooneyRivlin { c1, c2, lambda } => {
-                Material::MooneyRivlin { c1: change(c1), c2: change(c2), lambda: change(lambda) }
-            }
-            Self::Custom => Material::Custom,
-        }
-    }
-}
 
 /// Every field of a solution at one point, in Cartesian components.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -152,7 +84,7 @@ pub trait Solution<T: Real, const D: usize>: Send + Sync {
     /// The length that a cell count divides: the grid spacing is this length over the number of cells.
     fn cell_length(&self) -> T;
     /// The constitutive law and its constants.
-    fn material(&self) -> Material<T>;
+    fn law(&self) -> Law<T>;
     /// Mass per reference volume.
     fn density(&self) -> T;
     /// The speed that CFL numbers refer to, `sqrt(E/rho0)` unless the specification says otherwise.

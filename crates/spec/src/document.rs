@@ -106,21 +106,12 @@ pub(crate) struct ParameterTable {
     pub(crate) description: String,
 }
 
-#[derive(serde::Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    rename_all = "kebab-case",
-    expecting = "a table, as in [material] and below it law = 'neo-hookean'"
-)]
 pub(crate) struct MaterialTable {
     pub(crate) law: Spanned<String>,
-    pub(crate) lambda: Option<Text>,
-    pub(crate) mu: Option<Text>,
-    pub(crate) c1: Option<Text>,
-    pub(crate) c2: Option<Text>,
-    #[serde(rename = "W")]
+    /// Constants of laws of the library.
+    pub(crate) constants: Entries<Text>,
+    pub(crate) volumetric: Option<Spanned<String>>,
     pub(crate) W: Option<Text>,
-    #[serde(rename = "P")]
     pub(crate) P: Option<Entries<Text>>,
     pub(crate) density: Option<Text>,
 }
@@ -418,6 +409,12 @@ impl<'de> Deserialize<'de> for Scalar {
 /// A table with free keys, in the order of the file.
 pub(crate) struct Entries<V>(pub(crate) Vec<(Spanned<String>, V)>);
 
+impl<V> Entries<V> {
+    pub(crate) fn get(&self, key: &str) -> Option<&V> {
+        self.0.iter().find(|(name, _)| name.get_ref() == key).map(|(_, value)| value)
+    }
+}
+
 impl<V> Default for Entries<V> {
     fn default() -> Self {
         Entries(Vec::new())
@@ -444,5 +441,38 @@ impl<'de, V: Deserialize<'de>> Deserialize<'de> for Entries<V> {
             }
         }
         deserializer.deserialize_map(EntriesVisitor(PhantomData))
+    }
+}
+
+impl<'de> Deserialize<'de> for MaterialTable {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct MaterialVisitor;
+        impl<'de> Visitor<'de> for MaterialVisitor {
+            type Value = MaterialTable;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a table, as in [material] and below it law = 'neo-hookean'")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<MaterialTable, A::Error> {
+                let mut law = None;
+                let mut constants = Entries::default();
+                let (mut volumetric, mut W, mut P, mut density) = (None, None, None, None);
+                while let Some(key) = map.next_key::<Spanned<String>>()? {
+                    match key.get_ref().as_str() {
+                        "law" => law = Some(map.next_value()?),
+                        "volumetric" => volumetric = Some(map.next_value()?),
+                        "W" => W = Some(map.next_value()?),
+                        "P" => P = Some(map.next_value()?),
+                        "density" => density = Some(map.next_value()?),
+                        _ => constants.0.push((key, map.next_value()?)),
+                    }
+                }
+                constants.0.sort_by_key(|(key, _)| key.span().start);
+                let law = law.ok_or_else(|| serde::de::Error::missing_field("law"))?;
+                Ok(MaterialTable { law, constants, volumetric, W, P, density })
+            }
+        }
+        deserializer.deserialize_map(MaterialVisitor)
     }
 }

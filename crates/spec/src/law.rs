@@ -1,17 +1,18 @@
 //! What the momentum balance needs of a material: the first Piola-Kirchhoff stress and its divergence.
 
 pub(crate) mod energy;
-mod hencky;
 mod neo_hookean;
+mod principal_stretches;
 mod st_venant_kirchhoff;
 
 use crate::derivation::Derivation;
 use crate::tensor::{
     Matrix, Vector, cofactor, determinant, matrix_product, principal_minors, transpose,
 };
-use crate::{DeriveError, Material};
+use crate::{DeriveError, Law};
 use energy::ComponentLaw;
 use mmsmith_expr::{Expr, Function, Graph, Node};
+use mmsmith_vocabulary::{Derivation as Formulas, Volumetric};
 
 /// The deformation of one solution, in physical components.
 pub(crate) struct Deformation {
@@ -103,45 +104,46 @@ impl Deformation {
     }
 }
 
-/// The stress of `material` at a deformation.
+/// The stress of a law at a deformation.
 pub(crate) fn stress(
     derivation: &mut Derivation,
     deformation: &Deformation,
-    material: &Material,
+    law: &Law,
 ) -> Result<Stress, DeriveError> {
-    Ok(match material {
-        Material::NeoHookean { lambda, mu } => {
-            neo_hookean::stress(derivation, deformation, *lambda, *mu)
+    let (W, isotropic) = match law {
+        Law::Stress { P } => {
+            return Ok(ComponentLaw::of_stress(&mut derivation.graph, deformation, P)
+                .stress(derivation, deformation));
         }
-        Material::StVenantKirchhoff { lambda, mu } => {
-            st_venant_kirchhoff::stress(derivation, deformation, *lambda, *mu)
+        Law::Energy { W } => {
+            let n = deformation.H.len();
+            (*W, energy::uses_invariants_only(&mut derivation.graph, *W, n))
         }
-        Material::LinearElastic { lambda, mu } => {
-            linear_elastic(derivation, deformation, *lambda, *mu)
+        Law::Library(material) => {
+            let (text, isotropic) = match material.derivation() {
+                Formulas::NeoHookean { lambda, mu } => {
+                    return Ok(neo_hookean::stress(derivation, deformation, lambda, mu));
+                }
+                Formulas::StVenantKirchhoff { lambda, mu } => {
+                    return Ok(st_venant_kirchhoff::stress(derivation, deformation, lambda, mu));
+                }
+                Formulas::LinearElastic { lambda, mu } => {
+                    return Ok(linear_elastic(derivation, deformation, lambda, mu));
+                }
+                Formulas::Energy { W } => (W.to_owned(), material.row().is_isotropic),
+                Formulas::PrincipalStretches(parts) => {
+                    principal_stretches::energy(&derivation.graph, &deformation.H, &parts)?
+                }
+            };
+            let volume = material.volumetric().map(Volumetric::energy);
+            let volume = volume.map(|U| format!(" + kappa*({U})")).unwrap_or_default();
+            let constants = law.constants();
+            let W = energy::named(&mut derivation.graph, &(text + &volume), &constants);
+            (W, isotropic)
         }
-        Material::MooneyRivlin { c1, c2, lambda } => {
-            let text = "c1*(I1-3-2*ln(J)) + c2*(I2-3-4*ln(J)) + lambda/2*ln(J)^2";
-            let constants = [("c1", *c1), ("c2", *c2), ("lambda", *lambda)];
-            let W = energy::named(&mut derivation.graph, text, &constants);
-            ComponentLaw::of_energy(&mut derivation.graph, deformation, W, true)
-                .stress(derivation, deformation)
-        }
-        Material::Hencky { lambda, mu } => {
-            let (text, isotropic) = hencky::energy(&derivation.graph, &deformation.H)?;
-            let constants = [("lambda", *lambda), ("mu", *mu)];
-            let W = energy::named(&mut derivation.graph, &text, &constants);
-            ComponentLaw::of_energy(&mut derivation.graph, deformation, W, isotropic)
-                .stress(derivation, deformation)
-        }
-        Material::Energy { W } => {
-            let isotropic =
-                energy::uses_invariants_only(&mut derivation.graph, *W, deformation.H.len());
-            ComponentLaw::of_energy(&mut derivation.graph, deformation, *W, isotropic)
-                .stress(derivation, deformation)
-        }
-        Material::Stress { P } => ComponentLaw::of_stress(&mut derivation.graph, deformation, P)
-            .stress(derivation, deformation),
-    })
+    };
+    Ok(ComponentLaw::of_energy(&mut derivation.graph, deformation, W, isotropic)
+        .stress(derivation, deformation))
 }
 
 /// `P = lambda tr(H) I + mu (H + H^T)`.

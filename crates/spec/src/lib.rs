@@ -31,6 +31,6 @@ pub use read::{LONGEST_FILE, ReadError, read_text};
 pub use rotation::Rotation;
 pub use solve::{Solved, SolvedCondition};
 pub use spec::{
-    Bound, Boundary, Condition, Domain, Material, Parameter, Relation, Requirement, Spec, Surface,
+    Bound, Boundary, Condition, Domain, Law, Parameter, Relation, Requirement, Spec, Surface,
 };
 pub use surface::{Claim, ClaimKind, SurfaceFields};

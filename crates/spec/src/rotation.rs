@@ -10,7 +10,7 @@ use crate::document::{BoundaryTable, RotationTable};
 use crate::law::energy::component_names;
 use crate::scope::Scope;
 use crate::tensor::Matrix;
-use crate::{Boundary, Condition, Diagnostic, Material};
+use crate::{Boundary, Condition, Diagnostic, Law};
 use mmsmith_expr::{Derivatives, Expr, Function, Graph};
 use std::collections::BTreeSet;
 use toml::Spanned;
@@ -63,7 +63,7 @@ impl Rotation {
     pub(crate) fn check(
         scope: &Scope<'_>,
         table: &Spanned<RotationTable>,
-        material: &Material,
+        material: &Law,
         boundaries: &[Boundary],
         boundary_tables: &[BoundaryTable],
     ) -> Result<(), Diagnostic> {
@@ -82,14 +82,14 @@ impl Rotation {
             return Err(scope.source.error(message, keys.condition.span(), Some(help.into())));
         }
         let indifferent = match material {
-            Material::LinearElastic { .. } | Material::Stress { .. } => false,
-            Material::Energy { W, .. } => {
+            Law::Library(material) => material.row().is_objective,
+            Law::Stress { .. } => false,
+            Law::Energy { W } => {
                 let symbols = scope.graph.symbols_in(&[*W]);
                 let components = component_names("F", scope.coordinates.len()).concat();
                 let mut names = symbols.iter().filter_map(|s| scope.graph.symbol_name(*s));
                 !names.any(|name| components.iter().any(|component| component == name))
             }
-            _ => true,
         };
         if !indifferent {
             let message = "this law is not known to be indifferent to rotations, so that P' = Q P need not hold";

@@ -16,7 +16,7 @@ use crate::diagnostic::nearest;
 use crate::document::{SolveTable, Text};
 use crate::law::{self, Deformation};
 use crate::scope::Scope;
-use crate::{Diagnostic, Material, Spec};
+use crate::{Diagnostic, Spec};
 use mmsmith_expr::{Ast, AstKind, Expr, Function, Graph, Node, Program, Rational, Term};
 use num_traits::{Signed, Zero};
 use std::collections::{BTreeMap, BTreeSet};
@@ -199,12 +199,11 @@ impl<'a> Solver<'a> {
                 }
             }
         }
-        let has_lambda = match spec.material {
-            Material::NeoHookean { lambda, .. }
-            | Material::Hencky { lambda, .. }
-            | Material::MooneyRivlin { lambda, .. } => lambda != Graph::ZERO,
-            _ => false,
-        };
+        let has_lambda = spec
+            .material
+            .constants()
+            .iter()
+            .any(|(constant, value)| constant.name == "lambda" && *value != Graph::ZERO);
         let Derivation { graph, geometry, variables, .. } = derivation;
         let coordinates = geometry.coordinates;
         let places = BTreeMap::new();

@@ -11,6 +11,9 @@ use crate::read::LONGEST_FILE;
 use crate::scope::{Scope, Source};
 use crate::{Coordinates, CrossCheck, DeriveError, Diagnostic, Fields, Rotation, Solved};
 use mmsmith_expr::{Expr, Function, Graph, Node, Program};
+use mmsmith_vocabulary::{
+    Constant, Material, Moduli, Response, Stated, Term, UnknownLaw, Volumetric,
+};
 use toml::Spanned;
 
 /// A specification that has been read and checked.
@@ -37,7 +40,7 @@ pub struct Spec {
     /// Physical components of the displacement.
     pub displacement: Vec<Expr>,
     /// The constitutive law.
-    pub material: Material,
+    pub material: Law,
     /// Mass per reference volume.
     pub density: Expr,
     /// The body's shape.
@@ -146,44 +149,9 @@ pub struct Requirement {
 
 /// A constitutive law with its constants as expressions of the parameters.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Material {
-    /// `tau = lambda ln(J) I + mu (F F^T - I)`.
-    NeoHookean {
-        /// First Lamé constant.
-        lambda: Expr,
-        /// Shear modulus.
-        mu: Expr,
-    },
-    /// St. Venant-Kirchhoff, `S = lambda tr(E) I + 2 mu E` with Green's strain `E = (F^T F - I)/2`, `P = F S`.
-    StVenantKirchhoff {
-        /// First Lamé constant.
-        lambda: Expr,
-        /// Shear modulus.
-        mu: Expr,
-    },
-    /// Hencky, `tau = lambda ln(J) I + 2 mu ln V`.
-    Hencky {
-        /// First Lamé constant.
-        lambda: Expr,
-        /// Shear modulus.
-        mu: Expr,
-    },
-    /// Linear elasticity, `P = lambda tr(H) I + mu (H + H^T)`, not invariant under rotation.
-    LinearElastic {
-        /// First Lamé constant.
-        lambda: Expr,
-        /// Shear modulus.
-        mu: Expr,
-    },
-    /// Mooney-Rivlin, compressible: `W = c1 (I1 - 3 - 2 ln J) + c2 (I2 - 3 - 4 ln J) + lambda/2 (ln J)^2`.
-    MooneyRivlin {
-        /// Half the part of the shear modulus that goes with `I1`.
-        c1: Expr,
-        /// Half the part of the shear modulus that goes with `I2`.
-        c2: Expr,
-        /// The factor of `(ln J)^2/2`.
-        lambda: Expr,
-    },
+pub enum Law {
+    /// A law of the library.
+    Library(Material<Expr>),
     /// A strain energy per reference volume, `P = dW/dF`.
     Energy {
         /// In the symbols `F11`, `C11`, ..., `J`, `I1` and `I2`.
@@ -196,44 +164,33 @@ pub enum Material {
     },
 }
 
-impl Material {
-    /// The laws by the names that specifications use.
-    pub const NAMES: [&'static str; 7] = [
-        "neo-hookean",
-        "st-venant-kirchhoff",
-        "hencky",
-        "linear-elastic",
-        "mooney-rivlin",
-        "energy",
-        "stress",
-    ];
+impl Law {
+    /// The laws that a specification states by itself, by their names.
+    const STATED: [&'static str; 2] = ["energy", "stress"];
+
+    /// Every law by the name that specifications use.
+    pub fn names() -> impl Iterator<Item = &'static str> {
+        Material::<Expr>::ROWS.iter().map(|row| row.name).chain(Self::STATED)
+    }
 
     /// The name that specifications use.
     #[must_use]
     pub fn name(&self) -> &'static str {
-        Self::NAMES[match self {
-            Material::NeoHookean { .. } => 0,
-            Material::StVenantKirchhoff { .. } => 1,
-            Material::Hencky { .. } => 2,
-            Material::LinearElastic { .. } => 3,
-            Material::MooneyRivlin { .. } => 4,
-            Material::Energy { .. } => 5,
-            Material::Stress { .. } => 6,
-        }]
+        match self {
+            Law::Library(material) => material.row().name,
+            Law::Energy { .. } => Self::STATED[0],
+            Law::Stress { .. } => Self::STATED[1],
+        }
     }
 
-    /// The constants that a solver needs, by name; none for a law that only the specification states.
+    /// The constants of a law of the library, with their values; none for a law that only the specification states.
     #[must_use]
-    pub fn constants(&self) -> Vec<(&'static str, Expr)> {
-        match *self {
-            Material::NeoHookean { lambda, mu }
-            | Material::StVenantKirchhoff { lambda, mu }
-            | Material::Hencky { lambda, mu }
-            | Material::LinearElastic { lambda, mu } => vec![("lambda", lambda), ("mu", mu)],
-            Material::MooneyRivlin { c1, c2, lambda } => {
-                vec![("c1", c1), ("c2", c2), ("lambda", lambda)]
+    pub fn constants(&self) -> Vec<(&'static Constant, Expr)> {
+        match self {
+            Law::Library(material) => {
+                material.row().constants.iter().zip(material.values()).collect()
             }
-            Material::Energy { .. } | Material::Stress { .. } => Vec::new(),
+            Law::Energy { .. } | Law::Stress { .. } => Vec::new(),
         }
     }
 
@@ -241,17 +198,13 @@ impl Material {
     #[must_use]
     pub fn formulas(&self, graph: &Graph) -> Vec<String> {
         let law = match self {
-            Material::NeoHookean { .. } => "tau = lambda ln(J) I + mu (F F^T - I)".into(),
-            Material::StVenantKirchhoff { .. } => {
-                "P = F (lambda tr(E) I + 2 mu E), E = (F^T F - I)/2".into()
+            Law::Library(material) => {
+                let chosen = material.volumetric().map(Volumetric::energy);
+                let volume = chosen.map(|U| format!(", U = {U}")).unwrap_or_default();
+                format!("{}{volume}", material.row().formula)
             }
-            Material::Hencky { .. } => "tau = lambda ln(J) I + 2 mu ln V".into(),
-            Material::LinearElastic { .. } => "P = lambda tr(H) I + mu (H + H^T)".into(),
-            Material::MooneyRivlin { .. } => {
-                "W = c1 (I1 - 3 - 2 ln J) + c2 (I2 - 3 - 4 ln J) + lambda/2 (ln J)^2".into()
-            }
-            Material::Energy { W } => format!("P = dW/dF, W = {}", graph.print(*W)),
-            Material::Stress { P } => {
+            Law::Energy { W } => format!("P = dW/dF, W = {}", graph.print(*W)),
+            Law::Stress { P } => {
                 let name = |i, j| format!("P{}{}", i + 1, j + 1);
                 let rows = P.iter().enumerate();
                 let entries = rows.flat_map(|(i, row)| {
@@ -263,9 +216,31 @@ impl Material {
             }
         };
         let constants = self.constants();
-        let values =
-            constants.iter().map(|(name, value)| format!("{name} = {}", graph.print(*value)));
+        let values = constants
+            .iter()
+            .map(|(constant, value)| format!("{} = {}", constant.name, graph.print(*value)));
         std::iter::once(law).chain(values).collect()
+    }
+
+    /// The law as a solver needs it: one that the specification states in text, with the parameters in it.
+    #[must_use]
+    pub fn for_solver(&self, graph: &Graph) -> mmsmith_vocabulary::Law<Expr> {
+        let (response, of_response) = match self {
+            Law::Library(material) => return mmsmith_vocabulary::Law::Library(*material),
+            Law::Energy { W } => (Response::Energy(graph.print(*W)), vec![*W]),
+            Law::Stress { P } => {
+                let row = |row: &Vec<Expr>| row.iter().map(|&entry| graph.print(entry)).collect();
+                (Response::Stress(P.iter().map(row).collect()), P.concat())
+            }
+        };
+        let names = ["F", "C"].map(|letter| component_names(letter, 3).concat()).concat();
+        let constants = graph
+            .symbols_in(&of_response)
+            .into_iter()
+            .filter_map(|symbol| Some((graph.symbol_name(symbol)?.to_owned(), symbol)))
+            .filter(|(name, _)| !INVARIANTS.contains(&name.as_str()) && !names.contains(name))
+            .collect();
+        mmsmith_vocabulary::Law::Stated(Stated { response, constants })
     }
 }
 
@@ -726,57 +701,39 @@ impl<'a> Reader<'a> {
         Ok(components)
     }
 
-    fn material(&mut self, document: &Document) -> Result<Material, Diagnostic> {
+    fn material(&mut self, document: &Document) -> Result<Law, Diagnostic> {
         let table = document.material.get_ref();
-        let law = self.choice(&table.law, "law", Material::NAMES.map(|name| (name, name)))?;
-        let keys: &[&str] = match law {
-            "mooney-rivlin" => &["c1", "c2", "lambda"],
-            "energy" => &["W"],
-            "stress" => &["P"],
-            _ => &["lambda", "mu"],
+        let law = self.choice(&table.law, "law", Law::names().map(|name| (name, name)))?;
+        let row = Material::<Expr>::ROWS.iter().find(|row| row.name == law);
+        let mut keys: Vec<&str> = match row {
+            Some(row) => row.constants.iter().map(|constant| constant.name).collect(),
+            None if law == "energy" => vec!["W"],
+            None => vec!["P"],
         };
-        let given = [
-            ("lambda", table.lambda.as_ref().map(|text| text.span.clone())),
-            ("mu", table.mu.as_ref().map(|text| text.span.clone())),
-            ("c1", table.c1.as_ref().map(|text| text.span.clone())),
-            ("c2", table.c2.as_ref().map(|text| text.span.clone())),
-            ("W", table.W.as_ref().map(|text| text.span.clone())),
-            ("P", table.P.as_ref().map(|_| table.law.span())),
-        ];
+        if row.is_some_and(|row| row.chooses_volumetric) {
+            keys.push("volumetric");
+        }
+        let given = table.constants.0.iter().map(|(key, _)| (key.get_ref().as_str(), key.span()));
+        let given = given.chain(table.W.iter().map(|text| ("W", text.span.clone())));
+        let given = given.chain(table.P.iter().map(|_| ("P", table.law.span())));
+        let volumetric = table.volumetric.as_ref();
+        let given = given.chain(volumetric.map(|word| ("volumetric", word.span())));
         for (key, span) in given {
-            if let (Some(span), false) = (span, keys.contains(&key)) {
+            if !keys.contains(&key) {
                 let message = format!("the law '{law}' has no '{key}'");
-                let help = format!("it takes {}", keys.join(", "));
+                let mut help = format!("it takes {}", keys.join(", "));
+                if let Some(near) = nearest(key, keys.iter().copied().chain(["law", "density"])) {
+                    help = format!("did you mean '{near}'? {help}");
+                }
                 return Err(self.scope.source.error(message, span, Some(help)));
             }
         }
-        let span = document.material.span();
         let missing = |scope: &Scope<'_>, key: &str, help: &str| {
             let message = format!("the law '{law}' needs '{key}'");
             scope.source.error(message, table.law.span(), Some(help.into()))
         };
-        let mut required = |text: &Option<Text>, key: &str| match text {
-            Some(text) => self.scope.constant(text, key),
-            None => Err(missing(&self.scope, key, &format!("give {key} = '...' here"))),
-        };
-        match law {
-            "mooney-rivlin" => {
-                return Ok(Material::MooneyRivlin {
-                    c1: required(&table.c1, "c1")?,
-                    c2: required(&table.c2, "c2")?,
-                    lambda: required(&table.lambda, "lambda")?,
-                });
-            }
-            "energy" => {
-                let Some(text) = &table.W else {
-                    let help = "give it in J, I1, I2, F11, ..., C11, ..., for example \
-                                W = 'mu/2*(I1 - 3 - 2*ln(J)) + lambda/2*ln(J)^2'";
-                    return Err(missing(&self.scope, "W", help));
-                };
-                let names = self.response_names();
-                return Ok(Material::Energy { W: self.scope.response(text, "an energy", &names)? });
-            }
-            "stress" => {
+        let Some(row) = row else {
+            if law == "stress" {
                 let Some(entries) = &table.P else {
                     let help =
                         "give its components, as P = { 11 = 'mu*(F11 - 1/F11)', 12 = '...' }";
@@ -784,18 +741,45 @@ impl<'a> Reader<'a> {
                 };
                 return self.stress_components(entries);
             }
-            _ => {}
+            let Some(text) = &table.W else {
+                let help = "give it in J, I1, I2, F11, ..., C11, ..., for example \
+                            W = 'mu/2*(I1 - 3 - 2*ln(J)) + lambda/2*ln(J)^2'";
+                return Err(missing(&self.scope, "W", help));
+            };
+            let names = self.response_names();
+            return Ok(Law::Energy { W: self.scope.response(text, "an energy", &names)? });
+        };
+        let volumetric = match volumetric {
+            Some(word) => self.choice(word, "volumetric part", Volumetric::NAMES)?,
+            None => Volumetric::default(),
+        };
+        if !row.is_isotropic && self.coordinates != Coordinates::Cartesian {
+            let message = format!("the law '{law}' has directions, along Cartesian axes");
+            let help = "it needs coordinates = 'cartesian'";
+            return Err(self.scope.source.error(message, table.law.span(), Some(help.into())));
         }
-        let usual = "E*nu/((1 + nu)*(1 - 2*nu))";
-        let lambda =
-            self.scope.constant_or(table.lambda.as_ref(), usual, "lambda", span.clone())?;
-        let mu = self.scope.constant_or(table.mu.as_ref(), "E/(2*(1 + nu))", "mu", span)?;
-        Ok(match law {
-            "st-venant-kirchhoff" => Material::StVenantKirchhoff { lambda, mu },
-            "hencky" => Material::Hencky { lambda, mu },
-            "linear-elastic" => Material::LinearElastic { lambda, mu },
-            _ => Material::NeoHookean { lambda, mu },
-        })
+        let span = document.material.span();
+        let mut values = Vec::with_capacity(row.constants.len());
+        for Constant { name, usual, .. } in row.constants {
+            let text = table.constants.get(name);
+            // One constant may stand for another.
+            let other = row.constants.iter().any(|constant| constant.name == *usual);
+            let text = text.or_else(|| table.constants.get(usual).filter(|_| other));
+            values.push(match text {
+                None if usual.is_empty() || other => {
+                    let key = if other { usual } else { name };
+                    return Err(missing(&self.scope, key, &format!("give {key} = '...' here")));
+                }
+                text => self.scope.constant_or(text, usual, name, span.clone())?,
+            });
+        }
+        let mut values = values.into_iter();
+        let material = Material::from_constants(law, volumetric, |constant| {
+            values.next().ok_or(UnknownLaw { name: constant.name.to_owned() })
+        });
+        let unknown =
+            |error: UnknownLaw| self.scope.source.error(error.to_string(), table.law.span(), None);
+        Ok(Law::Library(material.map_err(unknown)?))
     }
 
     /// The names that a material's response may use.
@@ -805,7 +789,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Components that are left out are zero.
-    fn stress_components(&mut self, entries: &Entries<Text>) -> Result<Material, Diagnostic> {
+    fn stress_components(&mut self, entries: &Entries<Text>) -> Result<Law, Diagnostic> {
         let n = self.dimension;
         let names = self.response_names();
         let keys = component_names("", n);
@@ -822,35 +806,41 @@ impl<'a> Reader<'a> {
             };
             P[i][j] = self.scope.response(text, "a stress", &names)?;
         }
-        Ok(Material::Stress { P })
+        Ok(Law::Stress { P })
     }
 
     /// `sqrt(E/rho0)` with `E = mu (3 lambda + 2 mu)/(lambda + mu)`, from the moduli at small strain.
     fn bar_speed(
         &mut self,
-        material: &Material,
+        material: &Law,
         density: Expr,
         table: std::ops::Range<usize>,
     ) -> Result<Expr, Diagnostic> {
         let graph = &mut self.scope.graph;
-        let (lambda, mu) = match *material {
-            Material::NeoHookean { lambda, mu }
-            | Material::StVenantKirchhoff { lambda, mu }
-            | Material::Hencky { lambda, mu }
-            | Material::LinearElastic { lambda, mu } => (lambda, mu),
-            Material::MooneyRivlin { c1, c2, lambda } => {
-                let (two, four) = (graph.integer(2), graph.integer(4));
-                let sum = graph.add(c1, c2);
-                let stiffening = graph.mul(four, c2);
-                (graph.add(lambda, stiffening), graph.mul(two, sum))
-            }
-            Material::Energy { .. } | Material::Stress { .. } => {
-                let message =
-                    format!("the law '{}' does not tell the speed of waves", material.name());
-                let help = "give wave-speed = '...' here, the speed that CFL numbers refer to";
-                return Err(self.scope.source.error(message, table, Some(help.into())));
-            }
+        let moduli = match material {
+            Law::Library(material) => material.moduli(),
+            Law::Energy { .. } | Law::Stress { .. } => None,
         };
+        let Some(Moduli { lambda, mu }) = moduli else {
+            let message = format!("the law '{}' does not tell the speed of waves", material.name());
+            let help = "give wave-speed = '...' here, the speed that CFL numbers refer to";
+            return Err(self.scope.source.error(message, table, Some(help.into())));
+        };
+        let mut sum = |terms: Vec<Term<Expr>>| {
+            let mut summands = Vec::with_capacity(terms.len());
+            for Term { factor: [numerator, denominator], powers } in terms {
+                let (numerator, denominator) =
+                    (graph.integer(numerator), graph.integer(denominator));
+                let mut product = graph.div(numerator, denominator);
+                for (constant, exponent) in powers {
+                    let power = graph.powi(constant, exponent.into());
+                    product = graph.mul(product, power);
+                }
+                summands.push(product);
+            }
+            graph.sum_of(summands)
+        };
+        let (lambda, mu) = (sum(lambda), sum(mu));
         let (three, two) = (graph.integer(3), graph.integer(2));
         let (three_lambda, two_mu) = (graph.mul(three, lambda), graph.mul(two, mu));
         let upper = graph.add(three_lambda, two_mu);

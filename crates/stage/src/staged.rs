@@ -8,6 +8,7 @@ use mmsmith_expr::{
     arrange, reuse,
 };
 use mmsmith_spec::{Domain, Fields, Spec, Surface};
+use mmsmith_vocabulary::Law;
 use std::collections::BTreeMap;
 
 /// The fields of a solution as one program, and which of its values are kept when.
@@ -65,8 +66,8 @@ pub struct Constants {
     pub wave_speed: Slot,
     /// The time in which the motion repeats.
     pub period: Slot,
-    /// Those of the law, by name.
-    pub material: Vec<(&'static str, Slot)>,
+    /// The law with its constants, or the parameters in one that the specification states.
+    pub law: Law<Slot>,
     /// Those of the body.
     pub domain: Measures,
 }
@@ -125,7 +126,7 @@ struct ConstantOutputs {
     density: Single,
     wave_speed: Single,
     period: Single,
-    material: Vec<(&'static str, Single)>,
+    law: Law<Single>,
     domain: DomainOutputs,
 }
 
@@ -376,12 +377,7 @@ impl ConstantOutputs {
             density: outputs.add_one(spec.density),
             wave_speed: outputs.add_one(spec.wave_speed),
             period: outputs.add_one(spec.period),
-            material: spec
-                .material
-                .constants()
-                .into_iter()
-                .map(|(name, value)| (name, outputs.add_one(value)))
-                .collect(),
+            law: spec.material.for_solver(&spec.graph).map(|value| outputs.add_one(value)),
             domain: match &spec.domain {
                 Domain::Box { lower, upper } => DomainOutputs::Box {
                     lower: outputs.add(lower.iter().copied()),
@@ -401,11 +397,7 @@ impl ConstantOutputs {
             density: self.density.slot(program),
             wave_speed: self.wave_speed.slot(program),
             period: self.period.slot(program),
-            material: self
-                .material
-                .into_iter()
-                .map(|(name, of)| (name, of.slot(program)))
-                .collect(),
+            law: self.law.map(|of| of.slot(program)),
             domain: match self.domain {
                 DomainOutputs::Box { lower, upper } => {
                     Measures::Box { lower: lower.slots(program), upper: upper.slots(program) }

@@ -8,12 +8,10 @@
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use mmsmith_mpm::{
-    AtTime, BodyForce, Grid, Integrator, Material, NoBodyForce, Particles, Settings, Shape,
-    Simulation, Transfer,
+    AtTime, BodyForce, Grid, Integrator, NoBodyForce, Particles, Settings, Shape, Simulation,
+    Transfer,
 };
-use mmsmith_solutions::{
-    AxisAligned, AxisAlignedParameters, BodyForceAtPoints, Material as Law, Solution,
-};
+use mmsmith_solutions::{AxisAligned, AxisAlignedParameters, BodyForceAtPoints, Law, Solution};
 use nalgebra::Vector2;
 use rayon::ThreadPoolBuilder;
 
@@ -98,6 +96,6 @@ fn simulation((shape, integrator): (Shape, Integrator)) -> Simulation<f64, 2> {
     let transfer = Transfer::Flip;
     let settings =
         Settings { shape, integrator, transfer, time_step, halve_first_acceleration: false };
-    let Law::NeoHookean { lambda, mu } = exact.material() else { unreachable!() };
-    Simulation::new(grid, particles, Material::NeoHookean { lambda, mu }, settings).unwrap()
+    let Law::Library(material) = exact.law() else { unreachable!() };
+    Simulation::new(grid, particles, material, settings).unwrap()
 }

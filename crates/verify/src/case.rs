@@ -2,9 +2,9 @@
 
 use std::fmt;
 
-use mmsmith_mpm::Shape;
 use mmsmith_mpm::fault::{Fault, Planted};
-use mmsmith_runtime::{AnySolution, Material, Real, Solution};
+use mmsmith_mpm::{Law, Material, Shape, Stressed};
+use mmsmith_runtime::{AnySolution, Real, Solution};
 
 use crate::error::{CaseError, SceneError};
 use crate::scheme::{Placement, Scheme, Updated};
@@ -64,12 +64,15 @@ impl fmt::Display for CflSpeed {
 }
 
 impl CflSpeed {
-    pub(crate) fn of<const D: usize>(self, exact: &dyn Solution<f64, D>) -> Result<f64, CaseError> {
+    pub(crate) fn of<const D: usize>(self, exact: &dyn Solution<f64, D>) -> Result<f64, CaseError>
+    where
+        f64: Stressed<D>,
+    {
         match self {
             Self::Bar => Ok(exact.wave_speed()),
             Self::PWave => {
-                let (lambda, mu) = law::<f64>(exact.material())?.small_strain_moduli();
-                Ok(((lambda + 2.0 * mu) / exact.density()).sqrt())
+                let law = law::<f64, D>(exact.law())?;
+                Ok((law.p_wave_modulus() / exact.density()).sqrt())
             }
         }
     }
@@ -142,28 +145,24 @@ impl Case {
     }
 }
 
-/// The solver's hand-written law with the constants of the solution's material.
-pub(crate) fn law<T: Real>(material: Material<T>) -> Result<mmsmith_mpm::Material<T>, SceneError> {
-    use mmsmith_mpm::Material as Law;
+/// The solver's own law for a solution's.
+pub(crate) fn law<T: Real, const D: usize>(
+    law: mmsmith_runtime::Law<T>,
+) -> Result<Law<T, D>, SceneError> {
+    let material = match law {
+        mmsmith_runtime::Law::Library(material) => material,
+        mmsmith_runtime::Law::Stated(_) => return Err(SceneError::NoLaw),
+    };
     let planted = Planted::here();
-    Ok(match material {
+    Ok(Law::from(match material {
         Material::NeoHookean { lambda, mu } if planted.is(Fault::LambdaForMu) => {
-            Law::NeoHookean { lambda: mu, mu: lambda }
+            Material::NeoHookean { lambda: mu, mu: lambda }
         }
-        Material::NeoHookean { lambda, mu } if planted.is(Fault::StiffnessOff) => {
-            let factor = T::nearest(1.0 + 1e-6);
-            Law::NeoHookean { lambda: lambda * factor, mu: mu * factor }
+        material if planted.is(Fault::StiffnessOff) => {
+            material.map(|constant| constant * T::nearest(1.0 + 1e-6))
         }
-        Material::NeoHookean { lambda, mu } => Law::NeoHookean { lambda, mu },
-        Material::StVenantKirchhoff { lambda, mu } => Law::StVenantKirchhoff { lambda, mu },
-        Material::Hencky { lambda, mu } => Law::Hencky { lambda, mu },
-        Material::LinearElastic { lambda, mu } => Law::LinearElastic { lambda, mu },
-        Material::MooneyRivlin { c1, c2, lambda } => Law::MooneyRivlin { c1, c2, lambda },
-        Material::Custom => return Err(SceneError::NoLaw),
-        other => {
-            return Err(SceneError::Unknown { what: "material", value: format!("{other:?}") });
-        }
-    })
+        material => material,
+    }))
 }
 
 /// A number with its fraction, even where that is zero.

@@ -5,7 +5,7 @@
 //! determinant of `F`, `P` with the solver's hand-written law, and `b` with `a - Div P / rho0`. `u` itself is the
 //! definition; nothing lies below it. Derivatives are extrapolated finite differences that know their own error.
 
-use mmsmith_mpm::{Material, Scalar};
+use mmsmith_mpm::{Law, Scalar};
 use mmsmith_runtime::{AnySolution, Boundary, Condition, Domain, Fields, Solution, Surface};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
@@ -268,7 +268,7 @@ where
         return Err(CheckError::NoPoints);
     }
     let domain = solution.domain();
-    let law = match law(solution.material()) {
+    let law = match law(solution.law()) {
         Err(SceneError::NoLaw) => None,
         known => Some(known?),
     };
@@ -407,7 +407,7 @@ pub(crate) fn with<const D: usize>(
 
 fn field_findings<const D: usize>(
     solution: &dyn Solution<f64, D>,
-    law: Option<&Material<f64>>,
+    law: Option<&Law<f64, D>>,
     samples: &[(SVector<f64, D>, f64)],
     size: f64,
 ) -> Vec<Finding>
@@ -416,10 +416,10 @@ where
 {
     let (domain, period, density) = (solution.domain(), solution.period(), solution.density());
     let stiffness = match law {
-        Some(law) => {
-            let (lambda, mu) = law.small_strain_moduli();
-            lambda.abs() + 2.0 * mu.abs()
-        }
+        Some(law) => match law.lame_constants() {
+            Some((lambda, mu)) => lambda.abs() + 2.0 * mu.abs(),
+            None => law.p_wave_modulus().abs(),
+        },
         None => density * solution.wave_speed().powi(2),
     };
     let mut v = Comparison::new("v", "du/dt");

@@ -4,6 +4,7 @@
 //! each scheme, solution and number of threads would need its own. A few steps on some grids take a tenth of a second
 //! and have all of that in them. Between grids the time of a step goes by a power of the number of particles.
 
+use mmsmith_mpm::Stressed;
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
@@ -69,7 +70,10 @@ fn time_in<T: Precision<D>, const D: usize>(
     case: &Case,
     most: u64,
     until: Option<Instant>,
-) -> Result<Timing, CaseError> {
+) -> Result<Timing, CaseError>
+where
+    f64: Stressed<D>,
+{
     let started = Instant::now();
     let Prepared { scene, steps, .. } = prepare(exact, case)?;
     let mut driven = Driven::set_up(exact, model, case, &scene, steps.dt)?;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::precision::Precision;
 
-use mmsmith_mpm::{Material, Particles};
+use mmsmith_mpm::{Law, Particles};
 use mmsmith_runtime::{Real, Solution};
 use mmsmith_vtk::{Array, Error, Frame, Series, Values};
 use nalgebra::{Matrix3, SMatrix, SVector};
@@ -33,7 +33,7 @@ impl Snapshot {
     /// Keeps the state after a step, told with the number of all steps, if it is the one wanted.
     pub(crate) fn take<T: Precision<D>, const D: usize>(
         &mut self,
-        state: (&Particles<T, D>, &Material<T>),
+        state: (&Particles<T, D>, &Law<T, D>),
         exact: &dyn Solution<f64, D>,
         (step, steps): (u64, u64),
         time: f64,
@@ -75,7 +75,7 @@ impl FrameWriter {
     /// Writes the state after `step` if it is one of those wanted.
     pub(crate) fn write<T: Precision<D>, const D: usize>(
         &mut self,
-        state: (&Particles<T, D>, &Material<T>),
+        state: (&Particles<T, D>, &Law<T, D>),
         exact: &dyn Solution<f64, D>,
         step: u64,
         time: f64,
@@ -107,7 +107,7 @@ pub(crate) fn step_of_frame(index: u64, count: u64, steps: u64) -> u64 {
 /// solver's law, with the component normal to the plane in two dimensions. `None` if a particle has no stress because it
 /// is inside out: no viewer reads numbers that are none.
 fn frame<T: Precision<D>, const D: usize>(
-    (particles, law): (&Particles<T, D>, &Material<T>),
+    (particles, law): (&Particles<T, D>, &Law<T, D>),
     exact: &dyn Solution<f64, D>,
     step: u64,
     time: f64,
@@ -136,16 +136,11 @@ fn frame<T: Precision<D>, const D: usize>(
         velocity.push(padded(&particles.v[p].map(Real::to_f64)));
         let F_3D = in_space(&F);
         gradient.push(by_rows(&F_3D));
-        // In three dimensions, which gives the stress normal to the plane as well.
-        let F_solver = F_3D.map(Real::nearest);
-        stress.push(by_rows(&law.cauchy(&F_solver)?.map(Real::to_f64)));
-        // In the solver's own dimension, as errors are measured; only the rest is taken from three dimensions.
-        let mut P = law.first_piola_kirchhoff(&F_solver)?.map(Real::to_f64);
-        let in_plane = law.first_piola_kirchhoff(&particles.F[p])?.map(Real::to_f64);
-        P.fixed_view_mut::<D, D>(0, 0).copy_from(&in_plane);
-        first_piola_kirchhoff.push(by_rows(&P));
+        let stresses = law.in_space(&particles.F[p])?;
+        stress.push(by_rows(&stresses.cauchy.map(Real::to_f64)));
+        first_piola_kirchhoff.push(by_rows(&stresses.first_piola_kirchhoff.map(Real::to_f64)));
         reference_position.push(padded(&X));
-        von_mises.push(law.von_mises(&F_solver)?.to_f64());
+        von_mises.push(stresses.von_mises.to_f64());
         exact_displacement.push(padded(&u));
         error.push(padded(&delta));
         error_magnitude.push(delta.norm());

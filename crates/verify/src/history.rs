@@ -3,7 +3,7 @@
 //! The body force of a manufactured solution does work, so that the energy of the exact motion is not constant. What a scheme
 //! gains or loses is the difference between the two.
 
-use mmsmith_mpm::{Material, Particles};
+use mmsmith_mpm::{Law, Particles, Stressed};
 use mmsmith_runtime::{Real, Solution};
 use serde::Serialize;
 
@@ -114,11 +114,14 @@ impl<const D: usize> Totals<D> {
     /// Those of all particles at `time`, with velocities of `velocity_time`.
     pub(crate) fn of<T: Real>(
         particles: &Particles<T, D>,
-        material: &Material<f64>,
+        law: &Law<f64, D>,
         exact: &dyn Solution<f64, D>,
         time: f64,
         velocity_time: f64,
-    ) -> Self {
+    ) -> Self
+    where
+        f64: Stressed<D>,
+    {
         let group = |g: usize| {
             let mut totals = Self::of_none(g * GROUP);
             for p in g * GROUP..particles.len().min((g + 1) * GROUP) {
@@ -137,7 +140,7 @@ impl<const D: usize> Totals<D> {
                     [(&mut totals.computed, v, F), (&mut totals.exact, exact_v, exact_F)]
                 {
                     // A particle that is inside out has no energy; the solver stops at its next step.
-                    let strain = volume * material.strain_energy(&F).unwrap_or(f64::NAN);
+                    let strain = volume * law.strain_energy(&F).unwrap_or(f64::NAN);
                     let kinetic = 0.5 * mass * v.norm_squared();
                     let momentum = std::array::from_fn(|axis| mass * v[axis]);
                     motion.add(&Motion { kinetic, strain, momentum });
@@ -164,7 +167,7 @@ impl<const D: usize> Totals<D> {
 pub(crate) struct Recorder<'a, const D: usize> {
     moments: &'a mut Vec<Moment>,
     exact: &'a dyn Solution<f64, D>,
-    material: Material<f64>,
+    law: Law<f64, D>,
     count: u64,
     steps: u64,
 }
@@ -173,12 +176,12 @@ impl<'a, const D: usize> Recorder<'a, D> {
     pub(crate) fn new(
         moments: &'a mut Vec<Moment>,
         exact: &'a dyn Solution<f64, D>,
-        material: Material<f64>,
+        law: Law<f64, D>,
         steps: u64,
     ) -> Self {
         moments.clear();
         let count = MOST_MOMENTS.min(steps + 1);
-        Self { moments, exact, material, count, steps }
+        Self { moments, exact, law, count, steps }
     }
 
     /// Puts down what was taken down before the run was stopped.
@@ -199,12 +202,14 @@ impl<'a, const D: usize> Recorder<'a, D> {
         (step, is_last): (u64, bool),
         (time, velocity_time): (f64, f64),
         u: PerNorm<f64>,
-    ) {
+    ) where
+        f64: Stressed<D>,
+    {
         let next = crate::frames::step_of_frame(self.moments.len() as u64, self.count, self.steps);
         if step < next && !is_last {
             return;
         }
-        let totals = Totals::of(particles, &self.material, self.exact, time, velocity_time);
+        let totals = Totals::of(particles, &self.law, self.exact, time, velocity_time);
         let (computed, exact) = (totals.computed.into(), totals.exact.into());
         self.moments.push(Moment { step, time, velocity_time, u, computed, exact });
     }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use mmsmith_mpm::{Material, Particles};
+use mmsmith_mpm::{Law, Particles};
 use mmsmith_runtime::{BLOCK, Real, Solution, StateAtPoints, StateRun};
 use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
@@ -33,7 +33,7 @@ impl<'a, const D: usize> Comparison<'a, D> {
     /// The errors of all particles at `time`, those of the velocity `lag` earlier.
     pub(crate) fn measure<T: Precision<D>>(
         &self,
-        observed: (&Particles<T, D>, &Material<T>),
+        observed: (&Particles<T, D>, &Law<T, D>),
         time: f64,
         lag: f64,
     ) -> PerField<PerNorm<f64>> {
@@ -48,7 +48,7 @@ impl<'a, const D: usize> Comparison<'a, D> {
     /// The particle of largest position error at `time`, the first one without a number if there is such.
     pub(crate) fn worst_particle<T: Precision<D>>(
         &self,
-        observed: (&Particles<T, D>, &Material<T>),
+        observed: (&Particles<T, D>, &Law<T, D>),
         time: f64,
     ) -> usize {
         let count = observed.0.len();
@@ -70,7 +70,7 @@ impl<'a, const D: usize> Comparison<'a, D> {
     /// positions and of velocities.
     fn magnitudes<T: Precision<D>>(
         &self,
-        (particles, material): (&Particles<T, D>, &Material<T>),
+        (particles, law): (&Particles<T, D>, &Law<T, D>),
         times: (f64, f64),
         room: &mut Room<T, D>,
         first: usize,
@@ -84,7 +84,7 @@ impl<'a, const D: usize> Comparison<'a, D> {
             let places = first..particles.len().min(first + BLOCK);
             run.pick(particles, places);
             // A particle that is inside out has no stress; the solver stops at its next step.
-            material.first_piola_kirchhoff_side_by_side(&run.F, &mut run.P);
+            law.first_piola_kirchhoff_side_by_side(&run.F, &mut run.P);
             Arch::new().dispatch(Errors { run, exact, magnitudes });
         }
     }
@@ -319,7 +319,7 @@ mod tests {
     #[test]
     fn every_particle_is_compared_once() {
         let exact = AxisAligned::<f64>::new(AxisAlignedParameters::default()).unwrap();
-        let material = Material::NeoHookean { lambda: 3.0, mu: 2.0 };
+        let law = Law::from(mmsmith_mpm::Material::NeoHookean { lambda: 3.0, mu: 2.0 });
         for count in [1, BLOCK, CHUNK + 5, GROUP, 2 * GROUP + CHUNK + BLOCK + 3] {
             let X: Vec<_> = (0..count).map(|n| [0.3, n as f64 / count as f64].into()).collect();
             let mut particles = Particles {
@@ -334,7 +334,7 @@ mod tests {
             let u: Vec<_> = particles.X.iter().map(|X| exact.displacement(X, 0.0)).collect();
             particles.x.iter_mut().zip(&u).for_each(|(x, u)| *x += u);
             let comparison = Comparison::new(&exact, &particles.X);
-            let measure = |particles: &_| comparison.measure((particles, &material), 0.0, 0.0);
+            let measure = |particles: &_| comparison.measure((particles, &law), 0.0, 0.0);
             assert!(measure(&particles).u.linf < 1e-15);
             for p in [0, count / 2, count - 1] {
                 let x = particles.x[p];
@@ -344,12 +344,12 @@ mod tests {
                 assert!((norms.linf - 3.0).abs() < 1e-14, "{count} {p}");
                 assert!((norms.l1 / mean - 1.0).abs() < 1e-13, "{count} {p}");
                 assert!((norms.l2 / root - 1.0).abs() < 1e-13, "{count} {p}");
-                assert_eq!(comparison.worst_particle((&particles, &material), 0.0), p);
+                assert_eq!(comparison.worst_particle((&particles, &law), 0.0), p);
                 let first = particles.x[0];
                 particles.x[0].y += 5.0;
                 particles.x[p].y = f64::NAN;
                 assert!(measure(&particles).u.linf.is_nan());
-                assert_eq!(comparison.worst_particle((&particles, &material), 0.0), p);
+                assert_eq!(comparison.worst_particle((&particles, &law), 0.0), p);
                 particles.x[0] = first;
                 particles.x[p] = x;
             }

@@ -1,5 +1,6 @@
 //! What a case comes to, judged before it is run: its steps, its size.
 
+use mmsmith_mpm::Stressed;
 use mmsmith_runtime::{AnySolution, Solution};
 
 use crate::case::{Arithmetic, Case, CflSpeed, Extent};
@@ -74,7 +75,10 @@ fn plan_in<const D: usize>(
     scalar: usize,
     unit: f64,
     case: &Case,
-) -> Result<Plan, CaseError> {
+) -> Result<Plan, CaseError>
+where
+    f64: Stressed<D>,
+{
     let Prepared { scene, steps, .. } = prepare(exact, case)?;
     let per_cell = case.per_cell;
     let kept = Scene::bytes_of_exact(exact, scalar);
@@ -113,7 +117,10 @@ pub(crate) struct Prepared<const D: usize> {
 pub(crate) fn prepare<const D: usize>(
     exact: &dyn Solution<f64, D>,
     case: &Case,
-) -> Result<Prepared<D>, CaseError> {
+) -> Result<Prepared<D>, CaseError>
+where
+    f64: Stressed<D>,
+{
     case.validate()?;
     let end = case.periods * exact.period();
     let scene = Scene::new(exact, case, end)?;

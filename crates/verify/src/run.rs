@@ -4,7 +4,7 @@ use std::fmt;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use mmsmith_mpm::StepError;
+use mmsmith_mpm::{StepError, Stressed};
 use mmsmith_runtime::{AnySolution, Solution};
 use serde::{Serialize, Serializer};
 
@@ -215,7 +215,10 @@ fn run_in<T: Precision<D>, const D: usize>(
     model: &dyn Solution<T, D>,
     case: &Case,
     outputs: &mut Outputs<'_>,
-) -> Result<Row, CaseError> {
+) -> Result<Row, CaseError>
+where
+    f64: Stressed<D>,
+{
     let Prepared { scene, steps, .. } = prepare(exact, case)?;
     let mut driven = Driven::set_up(exact, model, case, &scene, steps.dt)?;
     let mut row = follow(&mut driven, exact, case, &scene, steps, outputs)?;
@@ -261,7 +264,10 @@ fn follow<T: Precision<D>, const D: usize>(
     scene: &Scene<D>,
     steps: Steps,
     outputs: &mut Outputs<'_>,
-) -> Result<Row, CaseError> {
+) -> Result<Row, CaseError>
+where
+    f64: Stressed<D>,
+{
     let dt = driven.dt;
     let solver = driven.solver.as_mut();
     let lag = solver.velocity_lag().to_f64();
@@ -271,7 +277,7 @@ fn follow<T: Precision<D>, const D: usize>(
         None => None,
     };
     let mut recorder = match &mut outputs.history {
-        Some(moments) => Some(Recorder::new(moments, exact, law(exact.material())?, steps.count)),
+        Some(moments) => Some(Recorder::new(moments, exact, law(exact.law())?, steps.count)),
         None => None,
     };
     let resumed = match outputs.checkpoints.filter(|checkpoints| checkpoints.resume) {

@@ -18,7 +18,7 @@
 
 use std::ops::ControlFlow;
 
-use mmsmith_mpm::{Material, Particles, StepError};
+use mmsmith_mpm::{Law, Particles, StepError, Stressed};
 use mmsmith_runtime::{AnySolution, Real, Solution};
 use serde::{Deserialize, Serialize};
 
@@ -404,7 +404,10 @@ impl<'a> Bench<'a> {
 fn scales<const D: usize>(
     exact: &dyn Solution<f64, D>,
     case: &Case,
-) -> Result<(f64, f64), CaseError> {
+) -> Result<(f64, f64), CaseError>
+where
+    f64: Stressed<D>,
+{
     let Prepared { waves, end, .. } = prepare(exact, case)?;
     let unit = waves.speed / CflSpeed::PWave.of(exact)?;
     Ok((unit, end.max(waves.time_step(LEAST_CELLS))))
@@ -416,7 +419,10 @@ fn run_in<T: Precision<D>, const D: usize>(
     case: &Case,
     end: f64,
     limits: Option<&Limits>,
-) -> Result<Observed, CaseError> {
+) -> Result<Observed, CaseError>
+where
+    f64: Stressed<D>,
+{
     let Prepared { scene, waves, .. } = prepare(exact, case)?;
     let time_step = waves.time_step(case.cfl);
     // In the solver's precision, which is what it steps with.
@@ -435,20 +441,20 @@ struct Run<'a, const D: usize> {
 }
 
 impl<const D: usize> Run<'_, D> {
-    fn follow<T: Precision<D>>(
-        &self,
-        driven: &mut Driven<'_, T, D>,
-    ) -> Result<Observed, CaseError> {
+    fn follow<T: Precision<D>>(&self, driven: &mut Driven<'_, T, D>) -> Result<Observed, CaseError>
+    where
+        f64: Stressed<D>,
+    {
         let lag = driven.solver.velocity_lag().to_f64();
-        let material = law::<f64>(self.exact.material())?;
-        let scales = self.largest(driven.solver.observe().0, &material);
+        let law = law::<f64, D>(self.exact.law())?;
+        let scales = self.largest(driven.solver.observe().0, &law);
         let (mut error, mut energy, mut momentum) = (0.0_f64, 0.0_f64, 0.0_f64);
         let mut steps = 0;
         let outcome = driven.advance(1..=self.count, &mut |stepped| {
             let Stepped { step, time, solver, .. } = stepped;
             steps = step;
             let particles = solver.observe().0;
-            let totals = Totals::of(particles, &material, self.exact, time, time - lag);
+            let totals = Totals::of(particles, &law, self.exact, time, time - lag);
             error = error.max(totals.error);
             let gain = (totals.computed.energy() - totals.exact.energy()) / scales.0;
             energy = energy.max(gain.abs());
@@ -480,7 +486,10 @@ impl<const D: usize> Run<'_, D> {
         totals: &Totals<D>,
         gain: f64,
         largest_energy: f64,
-    ) -> Option<Failure> {
+    ) -> Option<Failure>
+    where
+        f64: Stressed<D>,
+    {
         let failure = |kind, particle, value: f64, limit: f64| {
             let (value, limit) = (finite(value), finite(limit));
             Some(Failure { kind, step, time, particle, value, limit })
@@ -492,9 +501,9 @@ impl<const D: usize> Run<'_, D> {
         }
         let limits = self.limits?;
         let strain = limits.strain_floor / self.scene.spacing;
-        let (lambda, mu) = law::<f64>(self.exact.material()).ok()?.small_strain_moduli();
+        let modulus = law::<f64, D>(self.exact.law()).ok()?.p_wave_modulus();
         let volume = self.scene.size.powi(D as i32);
-        let counts = largest_energy > (lambda + 2.0 * mu) * volume * strain * strain;
+        let counts = largest_energy > modulus * volume * strain * strain;
         let most = limits.energy_drift + limits.energy_rate * (time / limits.period).max(1.0);
         if counts && gain > most {
             return failure(FailureKind::Energy, None, gain, most);
@@ -503,16 +512,15 @@ impl<const D: usize> Run<'_, D> {
     }
 
     /// The largest energy of the exact motion, and the largest sum of its momenta's magnitudes.
-    fn largest<T: Real>(
-        &self,
-        particles: &Particles<T, D>,
-        material: &Material<f64>,
-    ) -> (f64, f64) {
+    fn largest<T: Real>(&self, particles: &Particles<T, D>, law: &Law<f64, D>) -> (f64, f64)
+    where
+        f64: Stressed<D>,
+    {
         let period = self.exact.period();
         let mut largest = (0.0_f64, 0.0_f64);
         for moment in 0..MOMENTS {
             let time = period * moment as f64 / MOMENTS as f64;
-            let totals = Totals::of(particles, material, self.exact, time, time);
+            let totals = Totals::of(particles, law, self.exact, time, time);
             largest.0 = largest.0.max(totals.exact.energy());
             largest.1 = largest.1.max(totals.exact_momenta);
         }

@@ -7,6 +7,7 @@
 //! for. A run with a very small time step as the reference would bend that slope, by a tenth for `p = 1` and a
 //! reference 16 times finer.
 
+use mmsmith_mpm::Stressed;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
@@ -103,7 +104,10 @@ fn over<T: Precision<D>, const D: usize>(
     base: &Case,
     cfls: &[f64],
     progress: &mut dyn FnMut(Progress),
-) -> Result<Temporal, StudyError> {
+) -> Result<Temporal, StudyError>
+where
+    f64: Stressed<D>,
+{
     let end = base.periods * exact.period();
     let mut counts = Vec::with_capacity(cfls.len());
     for (index, &cfl) in cfls.iter().enumerate() {

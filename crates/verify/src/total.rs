@@ -253,7 +253,7 @@ pub(crate) fn set_up<'a, T: Precision<D>, const D: usize>(
     let set_up = TotalSetUp {
         grid: total.grid(scene, case.per_cell)?,
         scheme: Scheme { degree, mass, composition },
-        material: law(exact.material())?,
+        law: law(exact.law())?,
         density: exact.density(),
         time_step: time_step.to_f64(),
         motion: &|X| [exact.displacement(X, 0.0), exact.velocity(X, 0.0)],

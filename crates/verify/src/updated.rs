@@ -110,7 +110,7 @@ pub(crate) fn set_up<T: Precision<D>, const D: usize>(
         time_step,
         halve_first_acceleration: updated.stepping == Stepping::Cd(Start::Halved),
     };
-    Ok(Box::new(Simulation::new(scene.grid(), body, law(model.material())?, settings)?))
+    Ok(Box::new(Simulation::new(scene.grid(), body, law(model.law())?, settings)?))
 }
 
 /// Gives particles at rest the exact state at time zero, with the velocity that the integrator starts from.

@@ -7,7 +7,7 @@ use crate::kernel::any::{Contributions, Interpolated, Receive};
 use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::kernel::corners::Corners;
 use crate::kernel::product::ProductWeights;
-use crate::material::Law;
+use crate::material::LibraryLaw;
 use crate::node::Node;
 use crate::simd::{Lanes, Loop, Vectors, dispatch};
 use crate::support::Support;
@@ -24,7 +24,7 @@ pub(crate) trait BlockLaw<T, const D: usize>: Send + Sync {
     );
 }
 
-impl<T: Lanes, L: Law<T>, const D: usize> BlockLaw<T, D> for L {
+impl<T: Lanes, L: LibraryLaw<T>, const D: usize> BlockLaw<T, D> for L {
     fn stress(
         &self,
         c: &Constants<T, D>,
@@ -132,7 +132,7 @@ struct Stress<'a, T, L, const D: usize> {
     contributions: &'a mut Contributions<T, D, BLOCK>,
 }
 
-impl<T: Lanes, L: Law<T>, const D: usize> Loop for Stress<'_, T, L, D> {
+impl<T: Lanes, L: LibraryLaw<T>, const D: usize> Loop for Stress<'_, T, L, D> {
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self { F, c, law, contributions } = self;
@@ -145,7 +145,7 @@ impl<T: Lanes, L: Law<T>, const D: usize> Loop for Stress<'_, T, L, D> {
 /// Sets `-V0 tau / h` for all particles of a block, by the short form of the law or the full one; returns whether the short
 /// form holds for all of them.
 #[inline(always)]
-fn stress_fluxes<const SHORT: bool, T: Lanes, L: Law<T>, const D: usize>(
+fn stress_fluxes<const SHORT: bool, T: Lanes, L: LibraryLaw<T>, const D: usize>(
     c: &Constants<T, D>,
     law: L,
     F: &[SMatrix<T, D, D>; BLOCK],

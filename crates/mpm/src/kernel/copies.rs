@@ -5,7 +5,7 @@ use nalgebra::{SMatrix, SVector};
 use crate::simd::Lanes;
 
 /// Particles in a block: as many as keep all of it in the first-level cache.
-pub(crate) const BLOCK: usize = 64;
+pub const BLOCK: usize = 64;
 
 /// Positions and deformation gradients of the particles of a block.
 #[derive(Clone, Copy)]

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, RealField, SMatrix};
 
-use super::{Law, finger_minus_identity, log_jacobian, plus_diagonal};
+use super::{LibraryLaw, finger_minus_identity, log_jacobian, plus_diagonal, quadratic_energy};
 use crate::tensor::{determinant, inverse_transpose, product, real};
 
 /// Hencky's law, `W = lambda/2 (ln J)^2 + mu |ln V|^2`.
@@ -12,7 +12,7 @@ pub(crate) struct Hencky<T> {
     pub(crate) mu: T,
 }
 
-impl<T: RealField + Copy> Law<T> for Hencky<T> {
+impl<T: RealField + Copy> LibraryLaw<T> for Hencky<T> {
     fn kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         let two_log_V = match D {
             1 => SMatrix::repeat(log_jacobian(F) * real(2.0)),
@@ -28,6 +28,13 @@ impl<T: RealField + Copy> Law<T> for Hencky<T> {
 
     fn first_piola_kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         product(&self.kirchhoff(F), &inverse_transpose(F, determinant(F)))
+    }
+
+    fn strain_energy<const D: usize>(&self, F: &SMatrix<T, D, D>) -> T {
+        // The law gives tau = lambda ln(J) I + 2 mu ln(V), and so the logarithm of V.
+        let tau = self.kirchhoff(F);
+        let log_V = plus_diagonal(tau, -self.kirchhoff_across(F)) / (self.mu * real(2.0));
+        quadratic_energy(self.lambda, self.mu, &log_V)
     }
 }
 

@@ -2,8 +2,8 @@
 
 use nalgebra::{RealField, SMatrix};
 
-use super::{Law, displacement_gradient, plus_diagonal};
-use crate::tensor::product;
+use super::{LibraryLaw, displacement_gradient, plus_diagonal, quadratic_energy};
+use crate::tensor::{product, real};
 
 /// Linear elasticity, `W = lambda/2 (tr e)^2 + mu e:e` with `e = (H + H^T)/2`.
 #[derive(Clone, Copy)]
@@ -12,7 +12,7 @@ pub(crate) struct LinearElastic<T> {
     pub(crate) mu: T,
 }
 
-impl<T: RealField + Copy> Law<T> for LinearElastic<T> {
+impl<T: RealField + Copy> LibraryLaw<T> for LinearElastic<T> {
     fn kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         product(&self.first_piola_kirchhoff(F), &F.transpose())
     }
@@ -24,5 +24,10 @@ impl<T: RealField + Copy> Law<T> for LinearElastic<T> {
     fn first_piola_kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         let H = displacement_gradient(F);
         plus_diagonal((H + H.transpose()) * self.mu, self.lambda * H.trace())
+    }
+
+    fn strain_energy<const D: usize>(&self, F: &SMatrix<T, D, D>) -> T {
+        let H = displacement_gradient(F);
+        quadratic_energy(self.lambda, self.mu, &((H + H.transpose()) * real::<T>(0.5)))
     }
 }

@@ -3,7 +3,8 @@
 use nalgebra::{RealField, SMatrix};
 
 use super::{
-    Law, displacement_gradient, finger_minus_identity, green_twice, log_jacobian, plus_diagonal,
+    LibraryLaw, displacement_gradient, finger_minus_identity, green_twice, log_jacobian,
+    plus_diagonal,
 };
 use crate::tensor::{inverse_transpose_minus_identity, product, real};
 
@@ -26,7 +27,7 @@ impl<T: RealField + Copy> MooneyRivlin<T> {
     }
 }
 
-impl<T: RealField + Copy> Law<T> for MooneyRivlin<T> {
+impl<T: RealField + Copy> LibraryLaw<T> for MooneyRivlin<T> {
     fn kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         let B = finger_minus_identity(F);
         let (trace, two) = (B.trace(), real::<T>(2.0));
@@ -48,5 +49,16 @@ impl<T: RealField + Copy> Law<T> for MooneyRivlin<T> {
         let volume = self.lambda * log_jacobian(F);
         let P = (H - K) * ((self.c1 + self.c2 * two) * two) + from_c2 * (self.c2 * two);
         plus_diagonal(P + K * volume, volume)
+    }
+
+    fn strain_energy<const D: usize>(&self, F: &SMatrix<T, D, D>) -> T {
+        // I1 = 3 + tr B and I2 = 3 + 2 tr B + (tr(B)^2 - tr(B^2))/2, where B = b - I.
+        let (half, two) = (real::<T>(0.5), real::<T>(2.0));
+        let log_J = log_jacobian(F);
+        let B = finger_minus_identity(F);
+        let trace = B.trace();
+        let second = (trace * trace - B.norm_squared()) * half;
+        let first = trace - two * log_J;
+        self.c1 * first + self.c2 * (two * first + second) + self.lambda * log_J * log_J * half
     }
 }

@@ -3,11 +3,11 @@
 use nalgebra::{RealField, SMatrix};
 
 use super::{
-    Law, displacement_gradient, finger_minus_identity, log_jacobian, log_jacobian_is_short,
+    LibraryLaw, displacement_gradient, finger_minus_identity, log_jacobian, log_jacobian_is_short,
     log_jacobian_short, plus_diagonal,
 };
 use crate::fault::{Fault, Planted};
-use crate::tensor::{det_minus_one, inverse_transpose_minus_identity};
+use crate::tensor::{det_minus_one, inverse_transpose_minus_identity, real};
 
 /// The neo-Hookean law, `W = mu/2 (I1 - 3 - 2 ln J) + lambda/2 (ln J)^2`.
 #[derive(Clone, Copy)]
@@ -41,7 +41,7 @@ impl<T: RealField + Copy> NeoHookean<T> {
     }
 }
 
-impl<T: RealField + Copy> Law<T> for NeoHookean<T> {
+impl<T: RealField + Copy> LibraryLaw<T> for NeoHookean<T> {
     #[inline(always)]
     fn kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         plus_diagonal(finger_minus_identity(F) * self.mu, self.pressure(F))
@@ -73,6 +73,13 @@ impl<T: RealField + Copy> Law<T> for NeoHookean<T> {
     ) -> SMatrix<T, D, D> {
         self.first_piola_kirchhoff_at(F, self.lambda * log_jacobian_short(F))
     }
+
+    fn strain_energy<const D: usize>(&self, F: &SMatrix<T, D, D>) -> T {
+        let log_J = log_jacobian(F);
+        let trace = finger_minus_identity(F).trace();
+        let (half, two) = (real::<T>(0.5), real::<T>(2.0));
+        self.lambda * log_J * log_J * half + self.mu * half * (trace - two * log_J)
+    }
 }
 
 /// The neo-Hookean law with lambda = 0.
@@ -81,7 +88,7 @@ pub(crate) struct NeoHookeanNoLog<T> {
     pub(crate) mu: T,
 }
 
-impl<T: RealField + Copy> Law<T> for NeoHookeanNoLog<T> {
+impl<T: RealField + Copy> LibraryLaw<T> for NeoHookeanNoLog<T> {
     #[inline(always)]
     fn kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         finger_minus_identity(F) * self.mu
@@ -95,5 +102,10 @@ impl<T: RealField + Copy> Law<T> for NeoHookeanNoLog<T> {
     fn first_piola_kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         let H = displacement_gradient(F);
         (H - inverse_transpose_minus_identity(F)) * self.mu
+    }
+
+    fn strain_energy<const D: usize>(&self, F: &SMatrix<T, D, D>) -> T {
+        let trace = finger_minus_identity(F).trace();
+        self.mu * real(0.5) * (trace - real::<T>(2.0) * log_jacobian(F))
     }
 }

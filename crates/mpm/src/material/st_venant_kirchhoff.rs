@@ -2,7 +2,7 @@
 
 use nalgebra::{RealField, SMatrix};
 
-use super::{Law, green_twice, plus_diagonal};
+use super::{LibraryLaw, green_twice, plus_diagonal, quadratic_energy};
 use crate::tensor::{product, real};
 
 /// The St. Venant-Kirchhoff law, `W = lambda/2 (tr E)^2 + mu E:E`.
@@ -19,7 +19,7 @@ impl<T: RealField + Copy> StVenantKirchhoff<T> {
     }
 }
 
-impl<T: RealField + Copy> Law<T> for StVenantKirchhoff<T> {
+impl<T: RealField + Copy> LibraryLaw<T> for StVenantKirchhoff<T> {
     fn kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         product(&self.first_piola_kirchhoff(F), &F.transpose())
     }
@@ -31,5 +31,9 @@ impl<T: RealField + Copy> Law<T> for StVenantKirchhoff<T> {
     fn first_piola_kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         let E2 = green_twice(F);
         product(F, &plus_diagonal(E2 * self.mu, self.pressure(&E2)))
+    }
+
+    fn strain_energy<const D: usize>(&self, F: &SMatrix<T, D, D>) -> T {
+        quadratic_energy(self.lambda, self.mu, &(green_twice(F) * real::<T>(0.5)))
     }
 }

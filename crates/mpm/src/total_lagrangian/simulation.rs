@@ -1,5 +1,6 @@
 //! The simulation: coefficients of displacement and velocity, and the forces on them.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::{array, mem};
 
@@ -18,7 +19,11 @@ use super::piece;
 use crate::body_force::BodyForce;
 use crate::error::{SetupError, StepError};
 use crate::fault::{Fault, Planted};
-use crate::material::{AnyLaw, Law, Material, NeoHookean, NeoHookeanNoLog};
+use crate::kernel::copies::BLOCK;
+use crate::material::{
+    AnyLaw, BlockOfStresses, ConstitutiveLaw, Law, LibraryLaw, Material, NeoHookean,
+    NeoHookeanNoLog,
+};
 use crate::parallel::chunks::{each, each_chunk};
 use crate::particles::Particles;
 use crate::tensor::determinant;
@@ -63,7 +68,7 @@ pub struct Scheme {
 pub struct TotalLagrangian<const D: usize> {
     grid: Grid<D>,
     scheme: Scheme,
-    material: Material<f64>,
+    law: Law<f64, D>,
     time_step: f64,
     operators: Operators<D>,
     /// Sides whose motion or traction is given.
@@ -90,7 +95,7 @@ impl<const D: usize> TotalLagrangian<D> {
     pub fn new(
         grid: Grid<D>,
         scheme: Scheme,
-        material: Material<f64>,
+        law: impl Into<Law<f64, D>>,
         density: f64,
         time_step: f64,
     ) -> Result<Self, SetupError> {
@@ -149,7 +154,7 @@ impl<const D: usize> TotalLagrangian<D> {
             b: vec![SVector::zeros(); particles.len()],
             grid,
             scheme,
-            material,
+            law: law.into(),
             time_step,
             operators: Operators { bases, mass, fits },
             particles,
@@ -397,9 +402,9 @@ impl<const D: usize> TotalLagrangian<D> {
         self.time_step * self.steps_done as f64
     }
 
-    /// The material.
-    pub fn material(&self) -> &Material<f64> {
-        &self.material
+    /// The law.
+    pub fn law(&self) -> &Law<f64, D> {
+        &self.law
     }
 
     /// The grid.
@@ -436,13 +441,16 @@ impl<const D: usize> TotalLagrangian<D> {
         });
         let forced = !body_force.is_absent() && !self.planted.is(Fault::NoBodyForce);
         let force = forced.then_some((body_force, time));
-        let bad = match self.material {
-            Material::NeoHookean { lambda: 0.0, mu } => self.stress(NeoHookeanNoLog { mu }, force),
-            Material::NeoHookean { lambda, mu } => {
+        let bad = match self.law.clone() {
+            Law::Library(Material::NeoHookean { lambda: 0.0, mu }) => {
+                self.stress(NeoHookeanNoLog { mu }, force)
+            }
+            Law::Library(Material::NeoHookean { lambda, mu }) => {
                 let planted = self.planted;
                 self.stress(NeoHookean { lambda, mu, planted }, force)
             }
-            other => self.stress(AnyLaw(other), force),
+            Law::Library(other) => self.stress(AnyLaw(other), force),
+            Law::Own(law) => self.stress(OwnRows(law), force),
         };
         if bad {
             return Err(self.describe());
@@ -470,7 +478,7 @@ impl<const D: usize> TotalLagrangian<D> {
 
     /// Turns displacements and their slopes at the particles into the factors of the functions' values and slopes in the
     /// forces, with the body force at a time if there is one. True where a particle has no stress.
-    fn stress<L: Law<f64>>(
+    fn stress<L: LawOfRows<D>>(
         &mut self,
         law: L,
         force: Option<(&dyn BodyForce<f64, D>, f64)>,
@@ -556,9 +564,9 @@ struct Stress<'a, L, const D: usize> {
     planted: Planted,
 }
 
-impl<L: Law<f64>, const D: usize> Stress<'_, L, D> {
+impl<L: LawOfRows<D>, const D: usize> Stress<'_, L, D> {
     /// See [`TotalLagrangian::stress`].
-    fn at(&self, Places { first, values, slopes, b }: Places<'_, D>) -> bool {
+    fn at(&self, Places { first, mut values, mut slopes, b }: Places<'_, D>) -> bool {
         let Self { row, planted, coordinates, reciprocal_radius, .. } = *self;
         if let Some((body_force, time)) = self.force {
             body_force.evaluate(first, &self.particles.X[first..first + b.len()], time, b);
@@ -568,40 +576,20 @@ impl<L: Law<f64>, const D: usize> Stress<'_, L, D> {
         for (index, volume) in volumes.chunks_exact(row).enumerate() {
             let start = index * row;
             let at = self.rows.get(first / row + index);
-            for i in 0..row {
-                let place = start + i;
-                let mut H = SMatrix::<f64, D, D>::from_fn(|c, k| slopes[c][k][place]);
-                if let Some(at) = at {
-                    let u = SVector::from_fn(|c, _| values[c][place]);
-                    H = coordinates.gradient(&u, &H, reciprocal_radius[i], at);
-                }
-                let F = SMatrix::identity() + H;
-                bad |= !is_deformation(&F);
-                let P = planted.piola_in_forces(self.law.first_piola_kirchhoff(&F), &F);
-                let mut force = P * -volume[i];
-                if let Some(at) = at {
-                    let of_values;
-                    (of_values, force) =
-                        coordinates.transposed_gradient(&force, reciprocal_radius[i], at);
-                    for c in 0..D {
-                        values[c][place] = of_values[c];
-                    }
-                    if planted.is(Fault::HoopStressDropped) {
-                        values[0][place] = 0.0;
-                    }
-                    if planted.is(Fault::HoopShearDropped) {
-                        values[1][place] = 0.0;
-                    }
-                    if planted.is(Fault::CotangentDropped) && D == 3 {
-                        values[1][place] -= force[(2, 2)] * at.cotangent * reciprocal_radius[i];
-                    }
-                }
-                for c in 0..D {
-                    for k in 0..D {
-                        slopes[c][k][place] = force[(c, k)];
-                    }
-                }
-            }
+            let (values, slopes) = (&mut values, &mut slopes);
+            let mut places = RowOfPlaces {
+                start,
+                volume,
+                values,
+                slopes,
+                at,
+                coordinates,
+                reciprocal_radius,
+                planted,
+                is_bad: false,
+            };
+            self.law.stresses(&mut places);
+            bad |= places.is_bad;
             if self.force.is_some() {
                 for (i, b) in b[start..start + row].iter().enumerate() {
                     let mut b = b * (volume[i] * self.density);
@@ -616,6 +604,103 @@ impl<L: Law<f64>, const D: usize> Stress<'_, L, D> {
             }
         }
         bad
+    }
+}
+
+/// A row of particles along axis 0: displacements and their slopes, and then the factors of values and slopes in the forces.
+struct RowOfPlaces<'a, 'b, const D: usize> {
+    start: usize,
+    volume: &'a [f64],
+    values: &'a mut [&'b mut [f64]; D],
+    slopes: &'a mut [[&'b mut [f64]; D]; D],
+    at: Option<&'a Row<D>>,
+    coordinates: Coordinates,
+    reciprocal_radius: &'a [f64],
+    planted: Planted,
+    /// Whether any F is no deformation gradient.
+    is_bad: bool,
+}
+
+impl<const D: usize> RowOfPlaces<'_, '_, D> {
+    /// The deformation gradient of particle `i` of the row.
+    #[inline(always)]
+    fn deformation_gradient(&mut self, i: usize) -> SMatrix<f64, D, D> {
+        let place = self.start + i;
+        let mut H = SMatrix::<f64, D, D>::from_fn(|c, k| self.slopes[c][k][place]);
+        if let Some(at) = self.at {
+            let u = SVector::from_fn(|c, _| self.values[c][place]);
+            H = self.coordinates.gradient(&u, &H, self.reciprocal_radius[i], at);
+        }
+        let F = SMatrix::identity() + H;
+        self.is_bad |= !is_deformation(&F);
+        F
+    }
+
+    /// Puts the factors of the forces in place of what they follow from.
+    #[inline(always)]
+    fn set_stress(&mut self, i: usize, F: &SMatrix<f64, D, D>, P: SMatrix<f64, D, D>) {
+        let Self { planted, coordinates, reciprocal_radius, .. } = *self;
+        let place = self.start + i;
+        let mut force = planted.piola_in_forces(P, F) * -self.volume[i];
+        if let Some(at) = self.at {
+            let of_values;
+            (of_values, force) = coordinates.transposed_gradient(&force, reciprocal_radius[i], at);
+            for c in 0..D {
+                self.values[c][place] = of_values[c];
+            }
+            if planted.is(Fault::HoopStressDropped) {
+                self.values[0][place] = 0.0;
+            }
+            if planted.is(Fault::HoopShearDropped) {
+                self.values[1][place] = 0.0;
+            }
+            if planted.is(Fault::CotangentDropped) && D == 3 {
+                self.values[1][place] -= force[(2, 2)] * at.cotangent * reciprocal_radius[i];
+            }
+        }
+        for c in 0..D {
+            for k in 0..D {
+                self.slopes[c][k][place] = force[(c, k)];
+            }
+        }
+    }
+}
+
+/// A law for rows of particles.
+trait LawOfRows<const D: usize>: Sync {
+    /// Replaces the displacements of a row by its stresses.
+    fn stresses(&self, row: &mut RowOfPlaces<'_, '_, D>);
+}
+
+impl<L: LibraryLaw<f64>, const D: usize> LawOfRows<D> for L {
+    #[inline(always)]
+    fn stresses(&self, row: &mut RowOfPlaces<'_, '_, D>) {
+        for i in 0..row.volume.len() {
+            let F = row.deformation_gradient(i);
+            row.set_stress(i, &F, self.first_piola_kirchhoff(&F));
+        }
+    }
+}
+
+/// A law that the caller brings.
+struct OwnRows<const D: usize>(Arc<dyn ConstitutiveLaw<f64, D>>);
+
+impl<const D: usize> LawOfRows<D> for OwnRows<D> {
+    fn stresses(&self, row: &mut RowOfPlaces<'_, '_, D>) {
+        let mut block = BlockOfStresses::new();
+        let count = row.volume.len();
+        for first in (0..count).step_by(BLOCK) {
+            let here = BLOCK.min(count - first);
+            let mut F = [SMatrix::identity(); BLOCK];
+            for (n, F) in F[..here].iter_mut().enumerate() {
+                *F = row.deformation_gradient(first + n);
+                block.set(n, F);
+            }
+            block.evaluate(self.0.as_ref());
+            for (n, F) in F[..here].iter().enumerate() {
+                row.set_stress(first + n, F, block.stress(n));
+            }
+        }
     }
 }
 

@@ -8,7 +8,7 @@ mod tests;
 mod weights;
 
 use mmsmith_mpm::{
-    Body, BodyForce, Grid, Integrator, Material, Particles, Scalar, Settings, Shape, Transfer,
+    Body, BodyForce, Grid, Integrator, Law, Material, Particles, Scalar, Settings, Shape, Transfer,
 };
 use nalgebra::{SMatrix, SVector};
 
@@ -175,7 +175,8 @@ where
             body_force.evaluate(0, X, self.time(), &mut b);
         }
         // The check admits deformations alone.
-        let stress = |F| self.material.kirchhoff(F).unwrap_or_else(SMatrix::zeros);
+        let stress =
+            |F| Law::<f64, D>::from(self.material).kirchhoff(F).unwrap_or_else(SMatrix::zeros);
         let stresses: Vec<_> = F.iter().map(stress).collect();
         self.p2g(|p, entry| b[p] * (mass[p] * entry.S) - stresses[p] * entry.G * volume[p])
     }

@@ -7,8 +7,8 @@ use mmsmith_mpm::total_lagrangian::{
     MassMatrix, Quantity, Scheme, Side, TotalLagrangian,
 };
 use mmsmith_mpm::{
-    AtTime, Body, BodyForce, Grid, Integrator, Material, NoBodyForce, Particles, Scalar, Settings,
-    Shape, Simulation, Transfer,
+    AtTime, Body, BodyForce, Grid, Integrator, Law, Material, NoBodyForce, Particles, Scalar,
+    Settings, Shape, Simulation, Transfer,
 };
 use nalgebra::{SMatrix, SVector, Vector2};
 
@@ -324,7 +324,7 @@ fn runs_tell_what_they_were_set_up_with_and_how_far_they_are() {
         let mut run = simulation::<2>(settings);
         (0..3).for_each(|_| run.step(&force).unwrap());
         assert_eq!((run.grid(), run.settings()), (&ONE.grid(), &settings));
-        assert_eq!(run.material(), &ONE.material::<2>());
+        assert!(matches!(run.law(), Law::Library(law) if *law == ONE.material::<2>()));
         let lag = if settings.integrator == Integrator::Cd { 1.0 / 1024.0 } else { 0.0 };
         assert_eq!((run.velocity_lag(), run.time(), run.steps_done()), (lag, 3.0 / 512.0, 3));
         let has_corners = settings.shape == Shape::Cpdi2;
@@ -341,7 +341,7 @@ fn runs_tell_what_they_were_set_up_with_and_how_far_they_are() {
         assert_eq!((run.grid().coordinates, run.scheme()), (scene.0, scene.2));
         // Four particles in each of four cells, along half a unit and along one.
         assert_eq!(run.particles().half_size.as_slice(), [1.0 / 64.0, 1.0 / 32.0]);
-        assert_eq!(run.material(), &ONE.material::<2>());
+        assert!(matches!(run.law(), Law::Library(law) if *law == ONE.material::<2>()));
         assert_eq!((run.time(), run.steps_done()), (3.0 / 512.0, 3));
     }
     let names = [Transfer::Flip, Transfer::Pic, Transfer::Apic, Transfer::Xpic(5)];

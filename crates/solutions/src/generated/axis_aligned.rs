@@ -663,11 +663,11 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
     fn cell_length(&self) -> T {
         T::one()
     }
-    fn material(&self) -> crate::Material<T> {
-        crate::Material::NeoHookean {
+    fn law(&self) -> crate::Law<T> {
+        crate::Law::Library(crate::Material::NeoHookean {
             lambda: self.fixed[6],
             mu: self.fixed[4],
-        }
+        })
     }
     fn density(&self) -> T {
         self.parameters.rho0

@@ -473,11 +473,11 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
     fn cell_length(&self) -> T {
         T::one()
     }
-    fn material(&self) -> crate::Material<T> {
-        crate::Material::NeoHookean {
+    fn law(&self) -> crate::Law<T> {
+        crate::Law::Library(crate::Material::NeoHookean {
             lambda: self.fixed[7],
             mu: self.fixed[5],
-        }
+        })
     }
     fn density(&self) -> T {
         self.parameters.rho0

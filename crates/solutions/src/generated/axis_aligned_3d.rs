@@ -1083,11 +1083,11 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
     fn cell_length(&self) -> T {
         T::one()
     }
-    fn material(&self) -> crate::Material<T> {
-        crate::Material::NeoHookean {
+    fn law(&self) -> crate::Law<T> {
+        crate::Law::Library(crate::Material::NeoHookean {
             lambda: self.fixed[12],
             mu: self.fixed[10],
-        }
+        })
     }
     fn density(&self) -> T {
         self.parameters.rho0

@@ -807,11 +807,11 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
     fn cell_length(&self) -> T {
         T::one()
     }
-    fn material(&self) -> crate::Material<T> {
-        crate::Material::NeoHookean {
+    fn law(&self) -> crate::Law<T> {
+        crate::Law::Library(crate::Material::NeoHookean {
             lambda: T::zero(),
             mu: self.fixed[9],
-        }
+        })
     }
     fn density(&self) -> T {
         self.parameters.rho0

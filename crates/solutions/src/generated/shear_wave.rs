@@ -401,11 +401,11 @@ impl<T: crate::Real> crate::Solution<T, 2> for ShearWave<T> {
     fn cell_length(&self) -> T {
         self.parameters.L
     }
-    fn material(&self) -> crate::Material<T> {
-        crate::Material::NeoHookean {
+    fn law(&self) -> crate::Law<T> {
+        crate::Law::Library(crate::Material::NeoHookean {
             lambda: self.fixed[8],
             mu: self.fixed[5],
-        }
+        })
     }
     fn density(&self) -> T {
         self.parameters.rho0

@@ -3885,11 +3885,11 @@ impl<T: crate::Real> crate::Solution<T, 3> for Skew3d<T> {
     fn cell_length(&self) -> T {
         T::one()
     }
-    fn material(&self) -> crate::Material<T> {
-        crate::Material::NeoHookean {
+    fn law(&self) -> crate::Law<T> {
+        crate::Law::Library(crate::Material::NeoHookean {
             lambda: self.fixed[18],
             mu: self.fixed[17],
-        }
+        })
     }
     fn density(&self) -> T {
         self.parameters.rho0

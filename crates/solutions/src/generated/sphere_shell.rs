@@ -1223,11 +1223,11 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
     fn cell_length(&self) -> T {
         T::one()
     }
-    fn material(&self) -> crate::Material<T> {
-        crate::Material::NeoHookean {
+    fn law(&self) -> crate::Law<T> {
+        crate::Law::Library(crate::Material::NeoHookean {
             lambda: self.fixed[12],
             mu: self.fixed[11],
-        }
+        })
     }
     fn density(&self) -> T {
         self.parameters.rho0

@@ -658,11 +658,11 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
     fn cell_length(&self) -> T {
         T::one()
     }
-    fn material(&self) -> crate::Material<T> {
-        crate::Material::NeoHookean {
+    fn law(&self) -> crate::Law<T> {
+        crate::Law::Library(crate::Material::NeoHookean {
             lambda: self.fixed[10],
             mu: self.fixed[4],
-        }
+        })
     }
     fn density(&self) -> T {
         self.parameters.rho0

@@ -9,6 +9,7 @@ use super::{Deformation, Stress, zero_if_vanishing};
 use crate::derivation::Derivation;
 use crate::tensor::{Matrix, Vector, cofactor, determinant, principal_minors};
 use mmsmith_expr::{Ast, Derivatives, Expr, Function, Graph, Node};
+use mmsmith_vocabulary::Constant;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The names that an energy may use, and the components of `F` and `C` with two indices after them.
@@ -199,10 +200,14 @@ fn symbols(graph: &mut Graph, dimension: usize) -> Matrix {
 }
 
 /// The energy that `text` states, its constants in one piece.
-pub(super) fn named(graph: &mut Graph, text: &str, constants: &[(&str, Expr)]) -> Expr {
+pub(super) fn named(
+    graph: &mut Graph,
+    text: &str,
+    constants: &[(&'static Constant, Expr)],
+) -> Expr {
     let Ok(ast) = Ast::parse(text) else { return Graph::ZERO };
     let energy = graph.build(&ast, &mut |graph, name| {
-        let constant = constants.iter().find(|(known, _)| *known == name);
+        let constant = constants.iter().find(|(known, _)| known.name == name);
         Ok(match constant {
             Some(&(_, value)) => graph.whole(value),
             None => graph.symbol(name),
@@ -249,6 +254,13 @@ fn in_components(graph: &mut Graph, h: &Matrix, deformation: &Deformation) -> Co
                 let diagonal = if k == l { Graph::ONE } else { Graph::ZERO };
                 replacement.insert(graph.symbol(name), graph.add(diagonal, small[k][l]));
             }
+        }
+    }
+    // Nothing stretches along the directions left out.
+    for (k, row) in component_names("C", 3).iter().enumerate() {
+        for (l, name) in row.iter().enumerate().filter(|(l, _)| k.max(*l) >= n) {
+            let entry = if k == l { Graph::ONE } else { Graph::ZERO };
+            replacement.insert(graph.symbol(name), entry);
         }
     }
     let minors = principal_minors(graph, h);

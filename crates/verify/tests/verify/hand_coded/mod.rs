@@ -2,7 +2,9 @@
 //! for planted faults.
 #![allow(dead_code)] // Each test file uses some of them.
 
-use mmsmith_solutions::{Boundary, Condition, Domain, Fields, Material, Real, Solution, Surface};
+use mmsmith_solutions::{
+    Boundary, Condition, Domain, Fields, Law, Material, Real, Solution, Surface,
+};
 use nalgebra::{SMatrix, SVector, matrix, vector};
 use std::f64::consts::PI;
 
@@ -91,10 +93,10 @@ impl<T: Real, S: Plane> Solution<T, 2> for Coded<S> {
     fn cell_length(&self) -> T {
         T::one()
     }
-    fn material(&self) -> Material<T> {
+    fn law(&self) -> Law<T> {
         let [E, nu, _] = self.0.constants();
         let (lambda, mu) = lame(E, nu);
-        Material::NeoHookean { lambda: Real::nearest(lambda), mu: Real::nearest(mu) }
+        Law::Library(Material::NeoHookean { lambda: Real::nearest(lambda), mu: Real::nearest(mu) })
     }
     fn density(&self) -> T {
         Real::nearest(self.0.constants()[2])

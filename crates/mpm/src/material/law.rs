@@ -1,0 +1,357 @@
+//! The law of a simulation: one of the library, or one that the caller brings.
+
+use std::sync::Arc;
+use std::{array, fmt};
+
+use mmsmith_vocabulary::{Material, Moduli, Term};
+use nalgebra::{Matrix3, RealField, SMatrix};
+
+use super::{SIDE_BY_SIDE, Stressed, jacobian};
+use crate::geometry::Constants;
+use crate::kernel::any::Contributions;
+use crate::kernel::block::BlockLaw;
+use crate::kernel::copies::BLOCK;
+use crate::simd::Lanes;
+use crate::tensor::{product, real};
+
+/// The stress of a law that the caller brings, for particles in blocks.
+///
+/// A law is a function of the deformation gradient alone, with P = 0 where F = I. To keep the digits of small strains, form
+/// stresses from `F - I`. In 2D the deformation is plane strain (`F_zz = 1`), in 1D uniaxial strain.
+/// [`Law::check`](Law::check) compares an implementation with itself: energy, objectivity, symmetry.
+///
+/// ```
+/// use mmsmith_mpm::{BLOCK, ConstitutiveLaw, Law};
+///
+/// /// A bar's `P = k (F - F^-3)`.
+/// #[derive(Debug)]
+/// struct Rubber {
+///     k: f64,
+/// }
+///
+/// impl ConstitutiveLaw<f64, 1> for Rubber {
+///     fn first_piola_kirchhoff(
+///         &self,
+///         F: &[[[f64; BLOCK]; 1]; 1],
+///         P: &mut [[[f64; BLOCK]; 1]; 1],
+///     ) {
+///         for (P, F) in P[0][0].iter_mut().zip(F[0][0]) {
+///             let H = F - 1.0;
+///             // F^4 - 1 without the difference.
+///             *P = self.k * H * (F + 1.0) * (F * F + 1.0) / F.powi(3);
+///         }
+///     }
+/// }
+///
+/// let law = Law::from_constitutive(Rubber { k: 2.0 });
+/// // The slope at rest is 4 k.
+/// assert!((law.p_wave_modulus() - 8.0).abs() < 1e-6);
+/// ```
+pub trait ConstitutiveLaw<T, const D: usize>: fmt::Debug + Send + Sync {
+    /// First Piola-Kirchhoff stresses of particles side by side: `F[i][J][n]` is `F_iJ` of particle `n`, and so it is with the
+    /// stresses `P`. Stresses of particles whose F is no deformation (J <= 0) are not looked at.
+    ///
+    /// The stress of a particle must not depend on its place in the block, nor on the others.
+    fn first_piola_kirchhoff(&self, F: &[[[T; BLOCK]; D]; D], P: &mut [[[T; BLOCK]; D]; D]);
+
+    /// Strain energy per reference volume, zero at rest; `None` where there is none or it is not known.
+    fn strain_energy(&self, _F: &SMatrix<T, D, D>) -> Option<T> {
+        None
+    }
+
+    /// The normal Kirchhoff stress along the axes that F leaves out, where the stretch is one; `None` where it is not known.
+    fn kirchhoff_across(&self, _F: &SMatrix<T, D, D>) -> Option<T> {
+        None
+    }
+}
+
+/// Stresses with the components along axes that a deformation leaves out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StressInSpace<T> {
+    /// Cauchy stress.
+    pub cauchy: Matrix3<T>,
+    /// First Piola-Kirchhoff stress.
+    pub first_piola_kirchhoff: Matrix3<T>,
+    /// See [`Law::von_mises`].
+    pub von_mises: T,
+}
+
+/// A constitutive law.
+#[derive(Clone, Debug)]
+pub enum Law<T, const D: usize> {
+    /// A law of the library.
+    Library(Material<T>),
+    /// A law that the caller brings.
+    Own(Arc<dyn ConstitutiveLaw<T, D>>),
+}
+
+impl<T, const D: usize> From<Material<T>> for Law<T, D> {
+    fn from(material: Material<T>) -> Self {
+        Self::Library(material)
+    }
+}
+
+impl<T, const D: usize> Law<T, D> {
+    /// A law that the caller brings.
+    pub fn from_constitutive(law: impl ConstitutiveLaw<T, D> + 'static) -> Self {
+        Self::Own(Arc::new(law))
+    }
+}
+
+/// Every function takes the deformation gradient F and returns `None` where it is not a deformation: J <= 0, or an entry that is
+/// not finite.
+impl<T: Stressed<D>, const D: usize> Law<T, D> {
+    /// Kirchhoff stress `tau = J sigma = P F^T`.
+    pub fn kirchhoff(&self, F: &SMatrix<T, D, D>) -> Option<SMatrix<T, D, D>> {
+        match self {
+            Self::Library(material) => T::kirchhoff(material, F),
+            Self::Own(_) => Some(product(&self.first_piola_kirchhoff(F)?, &F.transpose())),
+        }
+    }
+
+    /// First Piola-Kirchhoff stress `P = tau F^-T`: force per reference area, traction `P N`.
+    pub fn first_piola_kirchhoff(&self, F: &SMatrix<T, D, D>) -> Option<SMatrix<T, D, D>> {
+        match self {
+            Self::Library(material) => T::first_piola_kirchhoff(material, F),
+            Self::Own(law) => {
+                jacobian(F)?;
+                let block = array::from_fn(|i| array::from_fn(|j| [F[(i, j)]; BLOCK]));
+                let mut P = [[[T::zero(); BLOCK]; D]; D];
+                law.first_piola_kirchhoff(&block, &mut P);
+                Some(SMatrix::from_fn(|i, j| P[i][j][0]))
+            }
+        }
+    }
+
+    /// First Piola-Kirchhoff stresses of particles side by side: `F[i][J][n]` is `F_iJ` of particle `n`, and so it is with
+    /// the stresses `P`. They are those of [`Law::first_piola_kirchhoff`] to the last bit, and not a number where F is no
+    /// deformation.
+    pub fn first_piola_kirchhoff_side_by_side(
+        &self,
+        F: &[[[T; SIDE_BY_SIDE]; D]; D],
+        P: &mut [[[T; SIDE_BY_SIDE]; D]; D],
+    ) {
+        match self {
+            Self::Library(material) => T::first_piola_kirchhoff_side_by_side(material, F, P),
+            Self::Own(law) => {
+                let mut block = BlockOfStresses::new();
+                for n in 0..SIDE_BY_SIDE {
+                    block.set(n, &SMatrix::from_fn(|i, j| F[i][j][n]));
+                }
+                block.evaluate(law.as_ref());
+                for n in 0..SIDE_BY_SIDE {
+                    let stress = block.stress(n);
+                    for i in 0..D {
+                        for j in 0..D {
+                            P[i][j][n] = stress[(i, j)];
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Cauchy (true) stress `sigma = tau / J`.
+    pub fn cauchy(&self, F: &SMatrix<T, D, D>) -> Option<SMatrix<T, D, D>> {
+        let J = jacobian(F)?;
+        Some(self.kirchhoff(F)? / J)
+    }
+
+    /// Von Mises stress of the symmetric part of the Cauchy stress, with the normal stresses that act out of the plane
+    /// in 2D and across the axis in 1D; without these where the law does not tell them.
+    pub fn von_mises(&self, F: &SMatrix<T, D, D>) -> Option<T> {
+        let J = jacobian(F)?;
+        let across = match self {
+            Self::Library(material) => Some(T::kirchhoff_across(material, F)),
+            Self::Own(law) => law.kirchhoff_across(F),
+        };
+        let across = across.unwrap_or_else(T::zero) / J;
+        let sigma = self.kirchhoff(F)? / J;
+        let normal = |i: usize| if i < D { sigma[(i, i)] } else { across };
+        let mut sum = T::zero();
+        for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+            let difference = normal(i) - normal(j);
+            sum += difference * difference * real(0.5);
+            if i < D && j < D {
+                let shear = (sigma[(i, j)] + sigma[(j, i)]) * real(0.5);
+                sum += shear * shear * real(3.0);
+            }
+        }
+        Some(sum.sqrt())
+    }
+
+    /// The stresses in three dimensions, with those that act out of the plane in 2D and across the axis in 1D; zero in their place
+    /// where the law does not tell them.
+    pub fn in_space(&self, F: &SMatrix<T, D, D>) -> Option<StressInSpace<T>>
+    where
+        T: Stressed<3>,
+    {
+        let law = match self {
+            Self::Library(material) => {
+                let law = Law::<T, 3>::Library(*material);
+                let inside = |i: usize, j: usize| i < D && j < D;
+                let rest = Matrix3::identity();
+                let F_3D =
+                    Matrix3::from_fn(|i, j| if inside(i, j) { F[(i, j)] } else { rest[(i, j)] });
+                // In the law's own dimension, as errors are measured; only the rest is taken from three dimensions.
+                let mut P = law.first_piola_kirchhoff(&F_3D)?;
+                P.fixed_view_mut::<D, D>(0, 0).copy_from(&self.first_piola_kirchhoff(F)?);
+                return Some(StressInSpace {
+                    cauchy: law.cauchy(&F_3D)?,
+                    first_piola_kirchhoff: P,
+                    von_mises: law.von_mises(&F_3D)?,
+                });
+            }
+            Self::Own(law) => law,
+        };
+        let across = law.kirchhoff_across(F).unwrap_or_else(T::zero);
+        let with = |A: SMatrix<T, D, D>, across: T| {
+            let mut in_space = Matrix3::from_diagonal_element(across);
+            in_space.fixed_view_mut::<D, D>(0, 0).copy_from(&A);
+            in_space
+        };
+        Some(StressInSpace {
+            cauchy: with(self.cauchy(F)?, across / jacobian(F)?),
+            first_piola_kirchhoff: with(self.first_piola_kirchhoff(F)?, across),
+            von_mises: self.von_mises(F)?,
+        })
+    }
+
+    /// Strain energy per reference volume; zero where F is the identity, and `None` where it is no deformation or the law tells no
+    /// energy.
+    ///
+    /// At small strain `H = F - I` it is of second order, and rounded to about `eps/|H|` of itself.
+    pub fn strain_energy(&self, F: &SMatrix<T, D, D>) -> Option<T> {
+        match self {
+            Self::Library(material) => T::strain_energy(material, F),
+            Self::Own(law) => {
+                jacobian(F)?;
+                law.strain_energy(F)
+            }
+        }
+    }
+
+    /// The tangent moduli at rest applied to a displacement gradient, `A_iJkL H_kL` with `A = dP/dF` at `F = I`: exact for an
+    /// isotropic law of the library, by central differences of the stress for others.
+    pub fn stress_at_small_strain(&self, H: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
+        if let Some((lambda, mu)) = self.lame_constants() {
+            return super::plus_diagonal((H + H.transpose()) * mu, lambda * H.trace());
+        }
+        let size = H.norm();
+        if size == T::zero() {
+            return SMatrix::zeros();
+        }
+        // The truncation of the difference is of second order, its rounding of eps over the step.
+        let step = T::default_epsilon().cbrt() / size;
+        let P = |sign: T| {
+            let F = SMatrix::identity() + H * (step * sign);
+            self.first_piola_kirchhoff(&F).unwrap_or_else(|| SMatrix::repeat(real(f64::NAN)))
+        };
+        (P(T::one()) - P(-T::one())) / (step * real(2.0))
+    }
+
+    /// The Lame constants at small strain, where the law is isotropic and tells them.
+    pub fn lame_constants(&self) -> Option<(T, T)> {
+        match self {
+            Self::Library(material) => material.moduli().map(values),
+            Self::Own(_) => None,
+        }
+    }
+
+    /// The largest modulus `A_iiii` of waves along the axes at rest: their speed is the root of its quotient by the density. It is
+    /// `lambda + 2 mu` for isotropic laws.
+    pub fn p_wave_modulus(&self) -> T {
+        if let Some((lambda, mu)) = self.lame_constants() {
+            return lambda + mu * real(2.0);
+        }
+        (0..D).fold(T::zero(), |largest, i| {
+            let mut H = SMatrix::zeros();
+            H[(i, i)] = T::one();
+            largest.max(self.stress_at_small_strain(&H)[(i, i)])
+        })
+    }
+}
+
+/// Deformation gradients of a block of particles, and their stresses by a law that the caller brings.
+pub(crate) struct BlockOfStresses<T, const D: usize> {
+    F: [[[T; BLOCK]; D]; D],
+    P: [[[T; BLOCK]; D]; D],
+    is_deformation: [bool; BLOCK],
+}
+
+impl<T: RealField + Copy, const D: usize> BlockOfStresses<T, D> {
+    /// All particles at rest.
+    pub(crate) fn new() -> Self {
+        let of = |value: T| [value; BLOCK];
+        let identity = |i, j| if i == j { of(T::one()) } else { of(T::zero()) };
+        Self {
+            F: array::from_fn(|i| array::from_fn(|j| identity(i, j))),
+            P: [[of(T::zero()); D]; D],
+            is_deformation: [true; BLOCK],
+        }
+    }
+
+    /// Sets the deformation gradient of particle `n` of the block. Laws are asked for deformations alone.
+    #[inline(always)]
+    pub(crate) fn set(&mut self, n: usize, F: &SMatrix<T, D, D>) {
+        self.is_deformation[n] = jacobian(F).is_some();
+        for i in 0..D {
+            for j in 0..D {
+                let rest = if i == j { T::one() } else { T::zero() };
+                self.F[i][j][n] = if self.is_deformation[n] { F[(i, j)] } else { rest };
+            }
+        }
+    }
+
+    pub(crate) fn evaluate(&mut self, law: &dyn ConstitutiveLaw<T, D>) {
+        law.first_piola_kirchhoff(&self.F, &mut self.P);
+    }
+
+    /// The stress of particle `n` of the block, not a number where F is no deformation.
+    #[inline(always)]
+    pub(crate) fn stress(&self, n: usize) -> SMatrix<T, D, D> {
+        match self.is_deformation[n] {
+            true => SMatrix::from_fn(|i, j| self.P[i][j][n]),
+            false => SMatrix::repeat(real(f64::NAN)),
+        }
+    }
+}
+
+/// A law that the caller brings, for blocks of particles in the updated frame.
+pub(crate) struct OwnBlocks<T, const D: usize>(pub(crate) Arc<dyn ConstitutiveLaw<T, D>>);
+
+impl<T: Lanes, const D: usize> BlockLaw<T, D> for OwnBlocks<T, D> {
+    fn stress(
+        &self,
+        c: &Constants<T, D>,
+        F: &[SMatrix<T, D, D>; BLOCK],
+        contributions: &mut Contributions<T, D, BLOCK>,
+    ) {
+        let mut block = BlockOfStresses::new();
+        for (n, F) in F.iter().enumerate() {
+            block.set(n, F);
+        }
+        block.evaluate(self.0.as_ref());
+        for (n, F) in F.iter().enumerate() {
+            let tau = product(&block.stress(n), &F.transpose());
+            let tau = c.planted.stress_in_forces(tau, F);
+            contributions.stress_flux[n] = tau * -(contributions.volume[n] * c.inverse_spacing);
+        }
+    }
+}
+
+/// The values of Lame constants.
+fn values<T: RealField + Copy>(Moduli { lambda, mu }: Moduli<T>) -> (T, T) {
+    let sum = |terms: Vec<Term<T>>| {
+        terms.into_iter().fold(
+            T::zero(),
+            |sum, Term { factor: [numerator, denominator], powers }| {
+                let factor = real::<T>(numerator as f64) / real(denominator as f64);
+                sum + powers
+                    .into_iter()
+                    .fold(factor, |product, (constant, exponent)| product * constant.powi(exponent))
+            },
+        )
+    };
+    (sum(lambda), sum(mu))
+}

@@ -1,0 +1,15 @@
+//! The words that specifications, solutions and the solver share.
+//!
+//! [`Material`] is generic over its constants: expressions in a specification, numbers in a solution and in the solver. A law of
+//! the library is one row of the table in the module `material`; from it follow the names in files and messages, the
+//! constants with their meaning, and the moduli at small strain.
+
+#![forbid(unsafe_code)]
+
+mod law;
+mod material;
+
+pub use law::{Law, Response, Stated};
+pub use material::{
+    Constant, Derivation, InStretches, Material, Moduli, Row, Term, UnknownLaw, Volumetric,
+};

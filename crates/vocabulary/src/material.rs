@@ -1,0 +1,402 @@
+//! The laws of the library, a row each.
+//!
+//! To add a law: a row here, and the solver's own implementation, a file in `mmsmith-mpm` and its line in the table there. The
+//! symbolic side follows from the energy in the row; the two share no formula.
+
+use std::fmt;
+
+/// A constant of a law.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Constant {
+    /// The key in specifications, and the name in formulas.
+    pub name: &'static str,
+    /// The meaning, in words.
+    pub meaning: &'static str,
+    /// The usual expression where a specification does not give it; empty where it has to.
+    pub usual: &'static str,
+}
+
+/// All that is known of a law but the values of its constants.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Row {
+    /// The name that specifications use.
+    pub name: &'static str,
+    /// The variant of [`Material`].
+    pub variant: &'static str,
+    /// The law in a line for people.
+    pub formula: &'static str,
+    /// The constants, in the order of the variant's fields.
+    pub constants: &'static [Constant],
+    /// Whether specifications choose the volumetric part, see [`Volumetric`].
+    pub chooses_volumetric: bool,
+    /// Whether the stress turns with the body.
+    pub is_objective: bool,
+    /// Whether no direction of the reference configuration differs from another.
+    pub is_isotropic: bool,
+}
+
+/// The stored energy of a change of volume, per bulk modulus; `U''(1) = 1` for each.
+///
+/// Sources: Holzapfel, "Nonlinear Solid Mechanics" (2000), section 6.5; Doll & Schweizerhof, J. Appl. Mech. 67 (2000) 17-21.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Volumetric {
+    /// `U = (ln J)^2/2`.
+    #[default]
+    Logarithmic,
+    /// `U = (J - 1)^2/2`.
+    Quadratic,
+    /// `U = (J^2 - 1 - 2 ln J)/4`.
+    Mixed,
+}
+
+impl Volumetric {
+    /// Each by the name that specifications use.
+    pub const NAMES: [(&'static str, Self); 3] = [
+        ("logarithmic", Self::Logarithmic),
+        ("quadratic", Self::Quadratic),
+        ("mixed", Self::Mixed),
+    ];
+
+    /// The energy as an expression of `J`.
+    #[must_use]
+    pub fn energy(self) -> &'static str {
+        match self {
+            Self::Logarithmic => "ln(J)^2/2",
+            Self::Quadratic => "(J - 1)^2/2",
+            Self::Mixed => "(J^2 - 1 - 2*ln(J))/4",
+        }
+    }
+
+    /// The name of the variant.
+    #[must_use]
+    pub fn variant(self) -> &'static str {
+        match self {
+            Self::Logarithmic => "Logarithmic",
+            Self::Quadratic => "Quadratic",
+            Self::Mixed => "Mixed",
+        }
+    }
+}
+
+/// How the fields of a specification with a law are derived.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Derivation<T> {
+    /// From the strain energy but for the volumetric part that is chosen, in `J`, `I1`, `I2`, `C11`, ... and the constants by their
+    /// names. Components are those in space: along directions that are left out nothing stretches.
+    Energy {
+        /// The energy per reference volume.
+        W: &'static str,
+    },
+    /// From formulas of the neo-Hookean law.
+    NeoHookean {
+        /// First Lame constant.
+        lambda: T,
+        /// Shear modulus.
+        mu: T,
+    },
+    /// From formulas of St. Venant and Kirchhoff's law.
+    StVenantKirchhoff {
+        /// First Lame constant.
+        lambda: T,
+        /// Shear modulus.
+        mu: T,
+    },
+    /// From formulas of linear elasticity.
+    LinearElastic {
+        /// First Lame constant.
+        lambda: T,
+        /// Shear modulus.
+        mu: T,
+    },
+    /// From the strain energy in principal stretches, where these have a closed form.
+    PrincipalStretches(InStretches),
+}
+
+/// A strain energy in principal stretches: a sum of a part in `J`, and of parts for principal directions that are known and for
+/// a plane of two that are not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct InStretches {
+    /// The part in `J`; a chosen volumetric part comes to it.
+    pub volume: &'static str,
+    /// The part of a direction that is known, in `stretch` and `J`.
+    pub alone: &'static str,
+    /// The part of two directions in a plane with the stretches `a` and `b`, in `J`, in `area`, `a b`, and in `ratio`,
+    /// `(a - b)^2/(2 a b)`.
+    pub pair: &'static str,
+}
+
+impl<T> Derivation<T> {
+    const fn energy(W: &'static str) -> Self {
+        Self::Energy { W }
+    }
+}
+
+/// A rational number times powers of constants.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Term<T> {
+    /// The numerator and the denominator of the number.
+    pub factor: [i64; 2],
+    /// The constants with their exponents.
+    pub powers: Vec<(T, i32)>,
+}
+
+/// The Lame constants of a law at small strain, as sums of terms.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Moduli<T> {
+    /// First Lame constant.
+    pub lambda: Vec<Term<T>>,
+    /// Shear modulus.
+    pub mu: Vec<Term<T>>,
+}
+
+/// A name that no law of the library has.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UnknownLaw {
+    /// The name.
+    pub name: String,
+}
+
+impl fmt::Display for UnknownLaw {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let names: Vec<&str> = ROWS.iter().map(|row| row.name).collect();
+        write!(f, "the law '{}' is not one of {}", self.name, names.join(", "))
+    }
+}
+
+impl std::error::Error for UnknownLaw {}
+
+macro_rules! materials {
+    ($(
+        $(#[$about:meta])*
+        $Variant:ident as $name:literal {
+            $($constant:ident: $meaning:literal $(or $usual:literal)?,)*
+            $([$volumetric:ident])?
+        }
+        stress: $formula:literal,
+        derivation: $derivation:expr,
+        objective: $objective:literal,
+        at_rest: [$(
+            lambda: $(($n:literal $(/ $d:literal)? $(, $c:ident ^ $p:literal)*))+,
+            mu: $(($n2:literal $(/ $d2:literal)? $(, $c2:ident ^ $p2:literal)*))+
+        )?],
+    )*) => {
+        /// An elastic material: a law of the library with its constants.
+        ///
+        /// In two dimensions the deformation is plane strain, in one uniaxial strain. Formulas are those of Bonet & Wood,
+        /// "Nonlinear Continuum Mechanics for Finite Element Analysis", 2nd ed. (2008), chapter 6, of Ciarlet, "Mathematical
+        /// Elasticity" I (1988), chapter 4, and of the sources named with the laws.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub enum Material<T> {
+            $(
+                $(#[$about])*
+                $Variant {
+                    $(
+                        #[doc = $meaning]
+                        $constant: T,
+                    )*
+                    $(
+                        /// The stored energy of a change of volume.
+                        $volumetric: Volumetric,
+                    )?
+                },
+            )*
+        }
+
+        /// Every law of the library.
+        const ROWS: &[Row] = &[$(
+            Row {
+                name: $name,
+                variant: stringify!($Variant),
+                formula: $formula,
+                constants: &[$(Constant {
+                    name: stringify!($constant),
+                    meaning: $meaning,
+                    usual: concat!($($usual)?),
+                },)*],
+                chooses_volumetric: {
+                    let chosen: &[&str] = &[$(stringify!($volumetric),)?];
+                    !chosen.is_empty()
+                },
+                is_objective: $objective,
+                is_isotropic: {
+                    let moduli: &[&str] = &[$($(stringify!($n),)+)?];
+                    !moduli.is_empty()
+                },
+            },
+        )*];
+
+        impl<T> Material<T> {
+            /// Every law of the library.
+            pub const ROWS: &'static [Row] = ROWS;
+
+            /// The law of a name, each constant as `value` gives it.
+            ///
+            /// # Errors
+            ///
+            /// Those of `value`, and [`UnknownLaw`].
+            pub fn from_constants<E: From<UnknownLaw>>(
+                name: &str,
+                volumetric: Volumetric,
+                mut value: impl FnMut(&'static Constant) -> Result<T, E>,
+            ) -> Result<Self, E> {
+                let unknown = || UnknownLaw { name: name.to_owned() };
+                let row = ROWS.iter().find(|row| row.name == name).ok_or_else(unknown)?;
+                let mut constants = row.constants.iter();
+                let mut next = || match constants.next() {
+                    Some(constant) => value(constant),
+                    None => Err(unknown().into()),
+                };
+                match name {
+                    $($name => Ok(Self::$Variant {
+                        $($constant: next()?,)*
+                        $($volumetric: volumetric,)?
+                    }),)*
+                    _ => Err(unknown().into()),
+                }
+            }
+
+            /// The same law with `change` applied to each constant.
+            #[must_use]
+            pub fn map<U>(self, mut change: impl FnMut(T) -> U) -> Material<U> {
+                self.map_named(|_, value| change(value))
+            }
+
+            /// The same law with `change` applied to each constant, by its name.
+            #[must_use]
+            pub fn map_named<U>(
+                self,
+                mut change: impl FnMut(&'static str, T) -> U,
+            ) -> Material<U> {
+                match self {
+                    $(Self::$Variant { $($constant,)* $($volumetric,)? } => Material::$Variant {
+                        $($constant: change(stringify!($constant), $constant),)*
+                        $($volumetric,)?
+                    },)*
+                }
+            }
+
+            /// What is known of the law but for the values of its constants.
+            #[must_use]
+            pub fn row(&self) -> &'static Row {
+                let name = match self {
+                    $(Self::$Variant { .. } => $name,)*
+                };
+                // Every variant has its row.
+                ROWS.iter().find(|row| row.name == name).unwrap_or(&ROWS[0])
+            }
+
+            /// The volumetric part, where it is chosen.
+            #[must_use]
+            pub fn volumetric(&self) -> Option<Volumetric> {
+                match self {
+                    $(Self::$Variant { $($volumetric,)? .. } => {
+                        let chosen: &[Volumetric] = &[$(*$volumetric,)?];
+                        chosen.first().copied()
+                    })*
+                }
+            }
+        }
+
+        impl<T: Copy> Material<T> {
+            /// The values of the constants, in the order of their [rows](Row::constants).
+            #[must_use]
+            pub fn values(&self) -> Vec<T> {
+                match *self {
+                    $(Self::$Variant { $($constant,)* .. } => vec![$($constant,)*],)*
+                }
+            }
+
+            /// How the fields of a specification with this law are derived.
+            #[must_use]
+            #[allow(unused_variables, reason = "energies name the constants themselves")]
+            pub fn derivation(&self) -> Derivation<T> {
+                match *self {
+                    $(Self::$Variant { $($constant,)* .. } => $derivation,)*
+                }
+            }
+
+            /// The Lame constants at small strain; none for a law that is not isotropic.
+            #[must_use]
+            #[allow(unused_variables, reason = "not every constant counts at small strain")]
+            pub fn moduli(&self) -> Option<Moduli<T>> {
+                match *self {
+                    $(Self::$Variant { $($constant,)* .. } => {
+                        let moduli: &[Moduli<T>] = &[$(Moduli {
+                            lambda: vec![$(Term {
+                                factor: [$n, [$($d,)? 1][0]],
+                                powers: vec![$(($c, $p)),*],
+                            }),+],
+                            mu: vec![$(Term {
+                                factor: [$n2, [$($d2,)? 1][0]],
+                                powers: vec![$(($c2, $p2)),*],
+                            }),+],
+                        })?];
+                        moduli.first().cloned()
+                    })*
+                }
+            }
+        }
+    };
+}
+
+materials! {
+    /// Compressible neo-Hookean solid.
+    ///
+    /// With `lambda == 0` the solver uses a law that computes no logarithm.
+    NeoHookean as "neo-hookean" {
+        lambda: "first Lame constant" or "E*nu/((1 + nu)*(1 - 2*nu))",
+        mu: "shear modulus" or "E/(2*(1 + nu))",
+    }
+    stress: "tau = lambda ln(J) I + mu (F F^T - I)",
+    derivation: Derivation::NeoHookean { lambda, mu },
+    objective: true,
+    at_rest: [lambda: (1, lambda ^ 1), mu: (1, mu ^ 1)],
+
+    /// St. Venant-Kirchhoff solid.
+    ///
+    /// It softens without limit in compression; for small and moderate strain.
+    StVenantKirchhoff as "st-venant-kirchhoff" {
+        lambda: "first Lame constant" or "E*nu/((1 + nu)*(1 - 2*nu))",
+        mu: "shear modulus" or "E/(2*(1 + nu))",
+    }
+    stress: "P = F (lambda tr(E) I + 2 mu E), E = (F^T F - I)/2",
+    derivation: Derivation::StVenantKirchhoff { lambda, mu },
+    objective: true,
+    at_rest: [lambda: (1, lambda ^ 1), mu: (1, mu ^ 1)],
+
+    /// Hencky's solid, with the left stretch `V = sqrt(F F^T)`.
+    Hencky as "hencky" {
+        lambda: "first Lame constant" or "E*nu/((1 + nu)*(1 - 2*nu))",
+        mu: "shear modulus" or "E/(2*(1 + nu))",
+    }
+    stress: "tau = lambda ln(J) I + 2 mu ln V",
+    derivation: Derivation::PrincipalStretches(InStretches {
+        volume: "lambda/2*ln(J)^2",
+        alone: "mu*ln(stretch)^2",
+        pair: "mu/2*(ln(area)^2 + lnratio2(ratio))",
+    }),
+    objective: true,
+    at_rest: [lambda: (1, lambda ^ 1), mu: (1, mu ^ 1)],
+
+    /// Linear elasticity, `H = F - I`: linear in displacements of any size, and not invariant under rotation. Its Kirchhoff
+    /// stress `P F^T` is symmetric to first order only.
+    LinearElastic as "linear-elastic" {
+        lambda: "first Lame constant" or "E*nu/((1 + nu)*(1 - 2*nu))",
+        mu: "shear modulus" or "E/(2*(1 + nu))",
+    }
+    stress: "P = lambda tr(H) I + mu (H + H^T)",
+    derivation: Derivation::LinearElastic { lambda, mu },
+    objective: false,
+    at_rest: [lambda: (1, lambda ^ 1), mu: (1, mu ^ 1)],
+
+    /// Compressible Mooney-Rivlin solid, with the invariants of the three-dimensional `C = F^T F`.
+    MooneyRivlin as "mooney-rivlin" {
+        c1: "the factor of I1 in the strain energy",
+        c2: "the factor of I2 in the strain energy",
+        lambda: "the factor of (ln J)^2/2",
+    }
+    stress: "W = c1 (I1 - 3 - 2 ln J) + c2 (I2 - 3 - 4 ln J) + lambda/2 (ln J)^2",
+    derivation: Derivation::energy("c1*(I1-3-2*ln(J)) + c2*(I2-3-4*ln(J)) + lambda/2*ln(J)^2"),
+    objective: true,
+    at_rest: [lambda: (1, lambda ^ 1) (4, c2 ^ 1), mu: (2, c1 ^ 1) (2, c2 ^ 1)],
+}
