@@ -135,7 +135,7 @@ pub(crate) fn stress(
                     principal_stretches::energy(&derivation.graph, &deformation.H, &parts)?
                 }
             };
-            let volume = material.volumetric().map(Volumetric::energy);
+            let volume = material.volumetric().map(Volumetric::formula);
             let volume = volume.map(|U| format!(" + kappa*({U})")).unwrap_or_default();
             let constants = law.constants();
             let W = energy::named(&mut derivation.graph, &(text + &volume), &constants);

@@ -199,7 +199,7 @@ impl Law {
     pub fn formulas(&self, graph: &Graph) -> Vec<String> {
         let law = match self {
             Law::Library(material) => {
-                let chosen = material.volumetric().map(Volumetric::energy);
+                let chosen = material.volumetric().map(Volumetric::formula);
                 let volume = chosen.map(|U| format!(", U = {U}")).unwrap_or_default();
                 format!("{}{volume}", material.row().formula)
             }

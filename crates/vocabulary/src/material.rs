@@ -59,7 +59,7 @@ impl Volumetric {
 
     /// The energy as an expression of `J`.
     #[must_use]
-    pub fn energy(self) -> &'static str {
+    pub fn formula(self) -> &'static str {
         match self {
             Self::Logarithmic => "ln(J)^2/2",
             Self::Quadratic => "(J - 1)^2/2",
@@ -399,4 +399,21 @@ materials! {
     derivation: Derivation::energy("c1*(I1-3-2*ln(J)) + c2*(I2-3-4*ln(J)) + lambda/2*ln(J)^2"),
     objective: true,
     at_rest: [lambda: (1, lambda ^ 1) (4, c2 ^ 1), mu: (2, c1 ^ 1) (2, c2 ^ 1)],
+
+    /// Yeoh's solid: rubber in moderate and large strain, `I1b = J^(-2/3) I1`.
+    ///
+    /// Source: Yeoh, Rubber Chem. Technol. 66 (1993) 754-771.
+    Yeoh as "yeoh" {
+        c1: "the factor of I1b - 3 in the strain energy",
+        c2: "the factor of (I1b - 3)^2",
+        c3: "the factor of (I1b - 3)^3" or "0",
+        kappa: "bulk modulus",
+        [volumetric]
+    }
+    stress: "W = c1 (I1b - 3) + c2 (I1b - 3)^2 + c3 (I1b - 3)^3 + kappa U(J), I1b = J^(-2/3) I1",
+    derivation: Derivation::energy(
+        "c1*(J^(-2/3)*I1 - 3) + c2*(J^(-2/3)*I1 - 3)^2 + c3*(J^(-2/3)*I1 - 3)^3"
+    ),
+    objective: true,
+    at_rest: [lambda: (1, kappa ^ 1) (-4 / 3, c1 ^ 1), mu: (2, c1 ^ 1)],
 }

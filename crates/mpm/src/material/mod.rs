@@ -7,6 +7,7 @@
 //! from H = F - I, so that small strains keep their digits.
 
 mod hencky;
+mod isochoric;
 mod law;
 mod linear_elastic;
 mod mooney_rivlin;
@@ -14,18 +15,16 @@ mod neo_hookean;
 mod st_venant_kirchhoff;
 #[cfg(test)]
 mod tests;
+mod volumetric;
+mod yeoh;
 
 use mmsmith_scalar_functions::logarithm::{is_near_one, ln_near_one, ln_of_both_in_range};
 use nalgebra::{RealField, SMatrix};
 
-use hencky::Hencky;
 pub(crate) use law::{BlockOfStresses, OwnBlocks};
 pub use law::{ConstitutiveLaw, Law, StressInSpace};
-use linear_elastic::LinearElastic;
-pub use mmsmith_vocabulary::Material;
-use mooney_rivlin::MooneyRivlin;
+pub use mmsmith_vocabulary::{Material, Volumetric};
 pub(crate) use neo_hookean::{NeoHookean, NeoHookeanNoLog};
-use st_venant_kirchhoff::StVenantKirchhoff;
 
 use crate::fault::Planted;
 use crate::simd::{Lanes, Loop, Vectors, dispatch};
@@ -40,19 +39,23 @@ macro_rules! with_law {
                 $body
             }
             Material::StVenantKirchhoff { lambda, mu } => {
-                let $law = StVenantKirchhoff { lambda, mu };
+                let $law = st_venant_kirchhoff::StVenantKirchhoff { lambda, mu };
                 $body
             }
             Material::Hencky { lambda, mu } => {
-                let $law = Hencky { lambda, mu };
+                let $law = hencky::Hencky { lambda, mu };
                 $body
             }
             Material::MooneyRivlin { c1, c2, lambda } => {
-                let $law = MooneyRivlin { c1, c2, lambda };
+                let $law = mooney_rivlin::MooneyRivlin { c1, c2, lambda };
                 $body
             }
             Material::LinearElastic { lambda, mu } => {
-                let $law = LinearElastic { lambda, mu };
+                let $law = linear_elastic::LinearElastic { lambda, mu };
+                $body
+            }
+            Material::Yeoh { c1, c2, c3, kappa, volumetric } => {
+                let $law = yeoh::Yeoh { c1, c2, c3, kappa, volumetric };
                 $body
             }
         }
