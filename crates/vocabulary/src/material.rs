@@ -416,4 +416,18 @@ materials! {
     ),
     objective: true,
     at_rest: [lambda: (1, kappa ^ 1) (-4 / 3, c1 ^ 1), mu: (2, c1 ^ 1)],
+
+    /// Gent's solid, whose chains have a largest stretch: `I1b - 3` stays below `Jm`.
+    ///
+    /// Source: Gent, Rubber Chem. Technol. 69 (1996) 59-61.
+    Gent as "gent" {
+        mu: "shear modulus" or "E/(2*(1 + nu))",
+        Jm: "the limit of I1b - 3",
+        kappa: "bulk modulus" or "E/(3*(1 - 2*nu))",
+        [volumetric]
+    }
+    stress: "W = -mu Jm/2 ln(1 - (I1b - 3)/Jm) + kappa U(J), I1b = J^(-2/3) I1",
+    derivation: Derivation::energy("-mu*Jm/2*ln(1 - (J^(-2/3)*I1 - 3)/Jm)"),
+    objective: true,
+    at_rest: [lambda: (1, kappa ^ 1) (-2 / 3, mu ^ 1), mu: (1, mu ^ 1)],
 }

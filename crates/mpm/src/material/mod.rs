@@ -6,6 +6,7 @@
 //! All are hyperelastic but for [`Material::LinearElastic`], whose stress ignores how the body turns. Stresses are formed
 //! from H = F - I, so that small strains keep their digits.
 
+mod gent;
 mod hencky;
 mod isochoric;
 mod law;
@@ -56,6 +57,10 @@ macro_rules! with_law {
             }
             Material::Yeoh { c1, c2, c3, kappa, volumetric } => {
                 let $law = yeoh::Yeoh { c1, c2, c3, kappa, volumetric };
+                $body
+            }
+            Material::Gent { mu, Jm, kappa, volumetric } => {
+                let $law = gent::Gent { mu, limit: Jm, kappa, volumetric };
                 $body
             }
         }
