@@ -430,4 +430,27 @@ materials! {
     derivation: Derivation::energy("-mu*Jm/2*ln(1 - (J^(-2/3)*I1 - 3)/Jm)"),
     objective: true,
     at_rest: [lambda: (1, kappa ^ 1) (-2 / 3, mu ^ 1), mu: (1, mu ^ 1)],
+
+    /// Arruda and Boyce's solid of eight chains, five terms of its series; `N` is the square of the locking stretch.
+    ///
+    /// Source: Arruda & Boyce, J. Mech. Phys. Solids 41 (1993) 389-412.
+    ArrudaBoyce as "arruda-boyce" {
+        mu: "rubbery modulus",
+        N: "links of a chain",
+        kappa: "bulk modulus",
+        [volumetric]
+    }
+    stress: "W = mu (1/2 (I1b - 3) + 1/(20 N) (I1b^2 - 9) + 11/(1050 N^2) (I1b^3 - 27) + 19/(7000 N^3) (I1b^4 - 81) \
+             + 519/(673750 N^4) (I1b^5 - 243)) + kappa U(J), I1b = J^(-2/3) I1",
+    derivation: Derivation::energy(
+        "mu*((J^(-2/3)*I1 - 3)/2 + ((J^(-2/3)*I1)^2 - 9)/(20*N) + 11*((J^(-2/3)*I1)^3 - 27)/(1050*N^2) \
+         + 19*((J^(-2/3)*I1)^4 - 81)/(7000*N^3) + 519*((J^(-2/3)*I1)^5 - 243)/(673750*N^4))"
+    ),
+    objective: true,
+    at_rest: [
+        lambda: (1, kappa ^ 1) (-2 / 3, mu ^ 1) (-2 / 5, mu ^ 1, N ^ -1) (-66 / 175, mu ^ 1, N ^ -2)
+            (-342 / 875, mu ^ 1, N ^ -3) (-28026 / 67375, mu ^ 1, N ^ -4),
+        mu: (1, mu ^ 1) (3 / 5, mu ^ 1, N ^ -1) (99 / 175, mu ^ 1, N ^ -2)
+            (513 / 875, mu ^ 1, N ^ -3) (42039 / 67375, mu ^ 1, N ^ -4)
+    ],
 }

@@ -6,6 +6,7 @@
 //! All are hyperelastic but for [`Material::LinearElastic`], whose stress ignores how the body turns. Stresses are formed
 //! from H = F - I, so that small strains keep their digits.
 
+mod arruda_boyce;
 mod gent;
 mod hencky;
 mod isochoric;
@@ -61,6 +62,10 @@ macro_rules! with_law {
             }
             Material::Gent { mu, Jm, kappa, volumetric } => {
                 let $law = gent::Gent { mu, limit: Jm, kappa, volumetric };
+                $body
+            }
+            Material::ArrudaBoyce { mu, N, kappa, volumetric } => {
+                let $law = arruda_boyce::ArrudaBoyce { mu, links: N, kappa, volumetric };
                 $body
             }
         }
