@@ -453,4 +453,27 @@ materials! {
         mu: (1, mu ^ 1) (3 / 5, mu ^ 1, N ^ -1) (99 / 175, mu ^ 1, N ^ -2)
             (513 / 875, mu ^ 1, N ^ -3) (42039 / 67375, mu ^ 1, N ^ -4)
     ],
+
+    /// Orthotropic elasticity in Green's strain `E`, along Cartesian axes: linear elasticity where strains are small, and it turns
+    /// with the body. Moduli in Voigt's notation, 4 for 23, 5 for 13, 6 for 12.
+    ///
+    /// Source: Bonet & Burton, Comput. Methods Appl. Mech. Engrg. 162 (1998) 151-164, section 2.
+    Orthotropic as "orthotropic" {
+        c11: "modulus of S11 for E11",
+        c22: "modulus of S22 for E22",
+        c33: "modulus of S33 for E33" or "c22",
+        c12: "modulus of S11 for E22",
+        c13: "modulus of S11 for E33" or "c12",
+        c23: "modulus of S22 for E33" or "c12",
+        c44: "modulus of S23 for 2 E23" or "c66",
+        c55: "modulus of S13 for 2 E13" or "c66",
+        c66: "modulus of S12 for 2 E12",
+    }
+    stress: "P = F S, S11 = c11 E11 + c12 E22 + c13 E33, ..., S12 = 2 c66 E12, ..., E = (F^T F - I)/2",
+    derivation: Derivation::energy(
+        "c11*(C11 - 1)^2/8 + c22*(C22 - 1)^2/8 + c33*(C33 - 1)^2/8 + c12*(C11 - 1)*(C22 - 1)/4 \
+         + c13*(C11 - 1)*(C33 - 1)/4 + c23*(C22 - 1)*(C33 - 1)/4 + c44*C23^2/2 + c55*C13^2/2 + c66*C12^2/2"
+    ),
+    objective: true,
+    at_rest: [],
 }

@@ -14,6 +14,7 @@ mod law;
 mod linear_elastic;
 mod mooney_rivlin;
 mod neo_hookean;
+mod orthotropic;
 mod st_venant_kirchhoff;
 #[cfg(test)]
 mod tests;
@@ -66,6 +67,10 @@ macro_rules! with_law {
             }
             Material::ArrudaBoyce { mu, N, kappa, volumetric } => {
                 let $law = arruda_boyce::ArrudaBoyce { mu, links: N, kappa, volumetric };
+                $body
+            }
+            Material::Orthotropic { c11, c22, c33, c12, c13, c23, c44, c55, c66 } => {
+                let $law = orthotropic::Orthotropic { c11, c22, c33, c12, c13, c23, c44, c55, c66 };
                 $body
             }
         }
