@@ -15,6 +15,8 @@ mod linear_elastic;
 mod mooney_rivlin;
 mod neo_hookean;
 mod orthotropic;
+#[cfg(test)]
+mod printed_energies;
 mod st_venant_kirchhoff;
 #[cfg(test)]
 mod tests;
