@@ -312,6 +312,8 @@ fn in_components(graph: &mut Graph, h: &Matrix, deformation: &Deformation) -> Co
         (J, deformation.J),
         (volume_change, deformation.volume_change),
         (log_J, deformation.log_J),
+        // Where nothing is split at zero, as in shear stresses, the logarithm stands as it was written.
+        (graph.call(Function::Ln, &[J]), deformation.log_J),
     ];
     let known = known.map(|(of_components, own)| (graph.replace(of_components, &simpler), own));
     Components { replacement, known: known.into(), simpler }
