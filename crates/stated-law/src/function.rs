@@ -1,0 +1,220 @@
+//! The functions of one number that laws may use: their values, and their deviations from the value at rest without the
+//! difference.
+
+use crate::tape::{Tape, Value};
+use mmsmith_scalar_functions::ScalarFunctions;
+
+/// A function of one number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Function {
+    Sin,
+    Cos,
+    Tan,
+    Asin,
+    Acos,
+    Atan,
+    Sinh,
+    Cosh,
+    Tanh,
+    Exp,
+    Ln,
+    Sqrt,
+    Erf,
+    /// `arcosh(1 + z)^2`.
+    LogRatioSquared,
+    /// Half its slope less one.
+    LogRatioSlope,
+    /// The slope of the latter.
+    LogRatioCurvature,
+}
+
+/// A number by its value at rest, its deviation from there, and its value.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Parts {
+    pub(crate) rest: f64,
+    pub(crate) deviation: f64,
+    pub(crate) value: f64,
+}
+
+impl Function {
+    pub(crate) fn value(self, x: f64) -> f64 {
+        match self {
+            Self::Sin => x.sin(),
+            Self::Cos => x.cos(),
+            Self::Tan => x.tan(),
+            Self::Asin => x.asin(),
+            Self::Acos => x.acos(),
+            Self::Atan => x.atan(),
+            Self::Sinh => x.sinh(),
+            Self::Cosh => x.cosh(),
+            Self::Tanh => x.tanh(),
+            Self::Exp => x.exp(),
+            Self::Ln => (x - 1.0).ln_of_both(x),
+            Self::Sqrt => x.sqrt(),
+            Self::Erf => libm::erf(x),
+            Self::LogRatioSquared => x.log_ratio_squared(),
+            Self::LogRatioSlope => x.log_ratio_slope(),
+            Self::LogRatioCurvature => x.log_ratio_curvature(),
+        }
+    }
+
+    /// `f(r + d) - f(r)`, where `f(r)` is a finite number.
+    pub(crate) fn deviation(self, x: Parts) -> f64 {
+        let Parts { rest: r, deviation: d, value: v } = x;
+        if r == 0.0 && !matches!(self, Self::Cos | Self::Acos | Self::Cosh | Self::Exp) {
+            // f(0) = 0, or the third of a curvature, which no law adds up.
+            let at_rest = if self == Self::LogRatioCurvature { self.value(0.0) } else { 0.0 };
+            return self.value(d) - at_rest;
+        }
+        match self {
+            Self::Sin => 2.0 * (r + 0.5 * d).cos() * (0.5 * d).sin(),
+            Self::Cos => -2.0 * (r + 0.5 * d).sin() * (0.5 * d).sin(),
+            Self::Tan => d.sin() / (r.cos() * v.cos()),
+            Self::Asin => arcsine(x),
+            Self::Acos => -arcsine(x),
+            Self::Atan if 1.0 + v * r > 0.0 => (d / (1.0 + v * r)).atan(),
+            Self::Atan => v.atan() - r.atan(),
+            Self::Sinh => 2.0 * (r + 0.5 * d).cosh() * (0.5 * d).sinh(),
+            Self::Cosh => 2.0 * (r + 0.5 * d).sinh() * (0.5 * d).sinh(),
+            // Far from rest the quotient may be one of infinite numbers.
+            Self::Tanh if d.abs() < 1.0 => d.sinh() / (r.cosh() * v.cosh()),
+            Self::Tanh => v.tanh() - r.tanh(),
+            Self::Exp => r.exp() * d.exp_m1(),
+            Self::Ln => (d / r).ln_of_both(v / r),
+            Self::Sqrt => d / (v.sqrt() + r.sqrt()),
+            Self::Erf => {
+                let slope = |s: f64| std::f64::consts::FRAC_2_SQRT_PI * (-s * s).exp();
+                self.by_slope(x, 0.5 / (1.0 + r.abs()), slope)
+            }
+            Self::LogRatioSquared => self.by_slope(x, 0.25, |s| 2.0 * (1.0 + s.log_ratio_slope())),
+            Self::LogRatioSlope => self.by_slope(x, 0.25, f64::log_ratio_curvature),
+            Self::LogRatioCurvature => self.by_slope(x, 0.25 * r.abs().min(1.0), |s| {
+                let (slope, curvature) = (s.log_ratio_slope(), s.log_ratio_curvature());
+                -(1.0 + slope + 3.0 * (1.0 + s) * curvature) / (s * (s + 2.0))
+            }),
+        }
+    }
+
+    /// The deviation as the integral of the slope, by Gauss's rule of eight points, up to a width; beyond, as a difference.
+    fn by_slope(self, x: Parts, widest: f64, slope: impl Fn(f64) -> f64) -> f64 {
+        if x.deviation.abs() > widest || !x.deviation.is_finite() {
+            return self.value(x.value) - self.value(x.rest);
+        }
+        let sum: f64 =
+            GAUSS.iter().map(|&[at, weight]| weight * slope(x.rest + at * x.deviation)).sum();
+        x.deviation * sum
+    }
+
+    /// The derivative at `x`, where the function is `value`.
+    pub(crate) fn slope(self, tape: &mut Tape, x: Value, value: Value) -> Value {
+        let one_and = |tape: &mut Tape, factor, x| tape.sum(&[(1.0, Value::ONE), (factor, x)]);
+        match self {
+            Self::Sin => tape.call(Self::Cos, x),
+            Self::Cos => {
+                let sine = tape.call(Self::Sin, x);
+                tape.sum(&[(-1.0, sine)])
+            }
+            Self::Tan => {
+                let square = tape.product(value, value);
+                one_and(tape, 1.0, square)
+            }
+            Self::Asin | Self::Acos => {
+                // The factors of 1 - x^2 are exact next to one.
+                let (below, above) = (one_and(tape, -1.0, x), one_and(tape, 1.0, x));
+                let product = tape.product(below, above);
+                let root = tape.call(Self::Sqrt, product);
+                let slope = tape.reciprocal(root);
+                tape.sum(&[(if self == Self::Asin { 1.0 } else { -1.0 }, slope)])
+            }
+            Self::Atan => {
+                let square = tape.product(x, x);
+                let sum = one_and(tape, 1.0, square);
+                tape.reciprocal(sum)
+            }
+            Self::Sinh => tape.call(Self::Cosh, x),
+            Self::Cosh => tape.call(Self::Sinh, x),
+            Self::Tanh => {
+                // 1 - tanh^2 has no digits left where the tangent is next to one.
+                let cosine = tape.call(Self::Cosh, x);
+                let reciprocal = tape.reciprocal(cosine);
+                tape.product(reciprocal, reciprocal)
+            }
+            Self::Exp => value,
+            Self::Ln => tape.reciprocal(x),
+            Self::Sqrt => {
+                let reciprocal = tape.reciprocal(value);
+                tape.sum(&[(0.5, reciprocal)])
+            }
+            Self::Erf => {
+                let square = tape.product(x, x);
+                let exponent = tape.sum(&[(-1.0, square)]);
+                let bell = tape.call(Self::Exp, exponent);
+                tape.sum(&[(std::f64::consts::FRAC_2_SQRT_PI, bell)])
+            }
+            Self::LogRatioSquared => {
+                let slope = tape.call(Self::LogRatioSlope, x);
+                tape.sum(&[(2.0, Value::ONE), (2.0, slope)])
+            }
+            Self::LogRatioSlope => tape.call(Self::LogRatioCurvature, x),
+            Self::LogRatioCurvature => {
+                // From z (z + 2) s' = 1 - (1 + z)(1 + s) for the slope s, differentiated once more.
+                let slope = tape.call(Self::LogRatioSlope, x);
+                let ratio = one_and(tape, 1.0, x);
+                let product = tape.product(ratio, value);
+                let numerator = tape.sum(&[(-1.0, Value::ONE), (-1.0, slope), (-3.0, product)]);
+                let sum = tape.sum(&[(2.0, Value::ONE), (1.0, x)]);
+                let denominator = tape.product(x, sum);
+                let reciprocal = tape.reciprocal(denominator);
+                tape.product(numerator, reciprocal)
+            }
+        }
+    }
+}
+
+/// Deviation of the inverse sine: `sin(a - b)` with `a = arcsin(v)`, `b = arcsin(r)`, times the sum of its two products over itself.
+fn arcsine(x: Parts) -> f64 {
+    let Parts { rest: r, deviation: d, value: v } = x;
+    if d.abs() > 0.5 * r.abs() {
+        return v.asin() - r.asin();
+    }
+    // 1 - v^2 from the deviation, which has the digits next to one.
+    let root = (((1.0 - r) - d) * ((1.0 + r) + d)).sqrt();
+    let root_at_rest = ((1.0 - r) * (1.0 + r)).sqrt();
+    let sum = v * root_at_rest + r * root;
+    // Both at the end of the range.
+    if sum == 0.0 { 0.0 } else { (d * (v + r) / sum).asin() }
+}
+
+/// `x^exponent` less its value at rest `power`, which is a finite number, and `x^exponent`.
+pub(crate) fn power(x: Parts, exponent: f64, power: f64) -> (f64, f64) {
+    let relative = x.deviation / x.rest;
+    if power != 0.0 && relative > -0.5 && relative < 1.0 {
+        let deviation = power * (exponent * relative.log_1p()).exp_m1();
+        if deviation / power > -0.5 {
+            return (deviation, power + deviation);
+        }
+    }
+    let value = x.value.powf(exponent);
+    (value - power, value)
+}
+
+/// `atan2(y, x)` less its value at rest.
+pub(crate) fn angle_deviation(y: Parts, x: Parts) -> f64 {
+    let difference = y.value.atan2(x.value) - y.rest.atan2(x.rest);
+    let cross = x.rest * y.deviation - y.rest * x.deviation;
+    let turn = cross.atan2(x.rest * x.value + y.rest * y.value);
+    // Where both differ it is by a full turn.
+    if (turn - difference).abs() < 1.0 { turn } else { difference }
+}
+
+/// Gauss's rule for the integral from zero to one: points and weights.
+pub(crate) const GAUSS: [[f64; 2]; 8] = [
+    [0.019_855_071_751_231_884, 0.050_614_268_145_188_13],
+    [0.101_666_761_293_186_63, 0.111_190_517_226_687_23],
+    [0.237_233_795_041_835_5, 0.156_853_322_938_943_64],
+    [0.408_282_678_752_175_1, 0.181_341_891_689_180_99],
+    [0.591_717_321_247_824_9, 0.181_341_891_689_180_99],
+    [0.762_766_204_958_164_5, 0.156_853_322_938_943_64],
+    [0.898_333_238_706_813_4, 0.111_190_517_226_687_23],
+    [0.980_144_928_248_768_1, 0.050_614_268_145_188_13],
+];
