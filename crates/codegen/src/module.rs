@@ -6,7 +6,7 @@ use crate::text::{meaning, one_line};
 use mmsmith_expr::Slot;
 use mmsmith_spec::{Boundary, Condition, DeriveError, Spec, Surface};
 use mmsmith_stage::{Block, Measures, Shape, Staged, Stages};
-use mmsmith_vocabulary::{Law, Response, Stated};
+use mmsmith_vocabulary::{Components, Law, Response, Stated};
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{format_ident, quote};
 use std::cell::RefCell;
@@ -779,13 +779,17 @@ impl Generator<'_> {
                     #runtime::Law::Library(#runtime::Material::#variant { #(#constants)* #volumetric })
                 }
             }
-            Law::Stated(Stated { response, constants }) => {
+            Law::Stated(Stated { response, components, constants }) => {
                 let response = match response {
                     Response::Energy(W) => quote!(Energy(#W.to_owned())),
                     Response::Stress(P) => {
                         let rows = P.iter().map(|row| quote!(vec![#(#row.to_owned()),*]));
                         quote!(Stress(vec![#(#rows),*]))
                     }
+                };
+                let components = match components {
+                    Components::Cartesian => quote!(Cartesian),
+                    Components::Curvilinear => quote!(Curvilinear),
                 };
                 let constants = constants.iter().map(|(name, slot)| {
                     let value = self.constant(*slot);
@@ -794,6 +798,7 @@ impl Generator<'_> {
                 quote! {
                     #runtime::Law::Stated(#runtime::Stated {
                         response: #runtime::Response::#response,
+                        components: #runtime::Components::#components,
                         constants: vec![#(#constants),*],
                     })
                 }

@@ -12,7 +12,7 @@ use crate::scope::{Scope, Source};
 use crate::{Coordinates, CrossCheck, DeriveError, Diagnostic, Fields, Rotation, Solved};
 use mmsmith_expr::{Expr, Function, Graph, Node, Program};
 use mmsmith_vocabulary::{
-    Constant, Material, Moduli, Response, Stated, Term, UnknownLaw, Volumetric,
+    Components, Constant, Material, Moduli, Response, Stated, Term, UnknownLaw, Volumetric,
 };
 use toml::Spanned;
 
@@ -224,7 +224,11 @@ impl Law {
 
     /// The law as a solver needs it: one that the specification states in text, with the parameters in it.
     #[must_use]
-    pub fn for_solver(&self, graph: &Graph) -> mmsmith_vocabulary::Law<Expr> {
+    pub fn for_solver(
+        &self,
+        graph: &Graph,
+        coordinates: Coordinates,
+    ) -> mmsmith_vocabulary::Law<Expr> {
         let (response, of_response) = match self {
             Law::Library(material) => return mmsmith_vocabulary::Law::Library(*material),
             Law::Energy { W } => (Response::Energy(graph.print(*W)), vec![*W]),
@@ -234,13 +238,20 @@ impl Law {
             }
         };
         let names = ["F", "C"].map(|letter| component_names(letter, 3).concat()).concat();
-        let constants = graph
-            .symbols_in(&of_response)
-            .into_iter()
+        let symbols = graph.symbols_in(&of_response).into_iter();
+        let (in_components, others): (Vec<_>, Vec<_>) = symbols
             .filter_map(|symbol| Some((graph.symbol_name(symbol)?.to_owned(), symbol)))
-            .filter(|(name, _)| !INVARIANTS.contains(&name.as_str()) && !names.contains(name))
-            .collect();
-        mmsmith_vocabulary::Law::Stated(Stated { response, constants })
+            .partition(|(name, _)| names.contains(name));
+        let is_stress = matches!(self, Law::Stress { .. });
+        let has_components = is_stress || !in_components.is_empty();
+        let components = match coordinates {
+            Coordinates::Cartesian => Components::Cartesian,
+            _ if has_components => Components::Curvilinear,
+            _ => Components::Cartesian,
+        };
+        let constants =
+            others.into_iter().filter(|(name, _)| !INVARIANTS.contains(&name.as_str())).collect();
+        mmsmith_vocabulary::Law::Stated(Stated { response, components, constants })
     }
 }
 

@@ -377,7 +377,10 @@ impl ConstantOutputs {
             density: outputs.add_one(spec.density),
             wave_speed: outputs.add_one(spec.wave_speed),
             period: outputs.add_one(spec.period),
-            law: spec.material.for_solver(&spec.graph).map(|value| outputs.add_one(value)),
+            law: spec
+                .material
+                .for_solver(&spec.graph, spec.coordinates)
+                .map(|value| outputs.add_one(value)),
             domain: match &spec.domain {
                 Domain::Box { lower, upper } => DomainOutputs::Box {
                     lower: outputs.add(lower.iter().copied()),

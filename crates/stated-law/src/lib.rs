@@ -35,6 +35,7 @@ mod stress;
 mod tape;
 mod text;
 
+pub use mmsmith_vocabulary::Response;
 pub use moduli::ModuliAtRest;
 
 use function::GAUSS;
@@ -49,18 +50,6 @@ use thiserror::Error;
 /// Deformations of a block in the usual calls: enough to make up for what each operation takes to look up, and few enough for
 /// their numbers to stay in the cache nearest to the processor.
 pub const LANES: usize = 64;
-
-/// The response of a material to a deformation as text.
-///
-/// Texts may use `J = det F`, the invariants `I1` and `I2` of the three-dimensional `C = F^T F`, the components `F11`, `C12` and so on,
-/// named constants, and all operators and functions of the language of specifications.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Response {
-    /// The strain energy per reference volume, a stress.
-    Energy(String),
-    /// The components `P_iJ` of the first Piola-Kirchhoff stress, by rows.
-    Stress(Vec<Vec<String>>),
-}
 
 /// Why a text is no law.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]

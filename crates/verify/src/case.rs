@@ -8,6 +8,7 @@ use mmsmith_runtime::{AnySolution, Real, Solution};
 
 use crate::error::{CaseError, SceneError};
 use crate::scheme::{Placement, Scheme, Updated};
+use crate::stated_law;
 
 /// The settings of one simulation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -151,7 +152,7 @@ pub(crate) fn law<T: Real, const D: usize>(
 ) -> Result<Law<T, D>, SceneError> {
     let material = match law {
         mmsmith_runtime::Law::Library(material) => material,
-        mmsmith_runtime::Law::Stated(_) => return Err(SceneError::NoLaw),
+        mmsmith_runtime::Law::Stated(stated) => return stated_law::read(stated),
     };
     let planted = Planted::here();
     Ok(Law::from(match material {

@@ -269,7 +269,7 @@ where
     }
     let domain = solution.domain();
     let law = match law(solution.law()) {
-        Err(SceneError::NoLaw) => None,
+        Err(SceneError::CurvilinearComponents) => None,
         known => Some(known?),
     };
     let size = points::size(&domain)

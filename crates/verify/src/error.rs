@@ -2,6 +2,7 @@
 
 use mmsmith_mpm::SetupError;
 use mmsmith_runtime::{Condition, Surface};
+use mmsmith_stated_law::StatedLawError;
 use thiserror::Error;
 
 use crate::checkpoint::CheckpointError;
@@ -117,12 +118,15 @@ pub enum SceneError {
         /// Its debug form.
         value: String,
     },
-    /// A material that the solver has no law of its own for.
+    /// A stated law in components along directions that turn from place to place.
     #[error(
-        "only the specification states this material; the solver's laws are written by hand, and it has none to run it \
-         with (mms check and mms eval serve it all the same)"
+        "this law is stated in components along curvilinear coordinates, and the solver's components are Cartesian: state it in J, \
+         I1 and I2, or the solution in Cartesian coordinates (mms check and mms eval serve it all the same)"
     )]
-    NoLaw,
+    CurvilinearComponents,
+    /// A stated law that cannot be read.
+    #[error("the law that the specification states: {0}")]
+    StatedLaw(#[from] StatedLawError),
     /// An extent was asked for that the body does not have.
     #[error("{0}")]
     Extent(&'static str),

@@ -42,6 +42,7 @@ mod scene;
 mod scheme;
 mod score;
 mod stability;
+mod stated_law;
 mod study;
 mod temporal;
 mod total;

@@ -16,8 +16,19 @@ pub enum Law<T> {
 pub struct Stated<T> {
     /// The energy or the stress, as text.
     pub response: Response,
+    /// The directions that indices in the text refer to.
+    pub components: Components,
     /// The parameters that the text may use, by name.
     pub constants: Vec<(String, T)>,
+}
+
+/// Directions of components.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Components {
+    /// Cartesian axes, or there are no components.
+    Cartesian,
+    /// The unit vectors of curvilinear coordinates, which turn from place to place.
+    Curvilinear,
 }
 
 /// The response of a material to its deformation, as text in `F11`, `C11`, ..., `J`, `I1`, `I2` and parameters. `I1` and `I2`
@@ -36,10 +47,10 @@ impl<T> Law<T> {
     pub fn map<U>(self, mut change: impl FnMut(T) -> U) -> Law<U> {
         match self {
             Self::Library(material) => Law::Library(material.map(change)),
-            Self::Stated(Stated { response, constants }) => {
+            Self::Stated(Stated { response, components, constants }) => {
                 let constants =
                     constants.into_iter().map(|(name, value)| (name, change(value))).collect();
-                Law::Stated(Stated { response, constants })
+                Law::Stated(Stated { response, components, constants })
             }
         }
     }

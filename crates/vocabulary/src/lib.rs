@@ -9,7 +9,7 @@
 mod law;
 mod material;
 
-pub use law::{Law, Response, Stated};
+pub use law::{Components, Law, Response, Stated};
 pub use material::{
     Constant, Derivation, InStretches, Material, Moduli, Row, Term, UnknownLaw, Volumetric,
 };
