@@ -136,11 +136,15 @@ fn frame<T: Precision<D>, const D: usize>(
         velocity.push(padded(&particles.v[p].map(Real::to_f64)));
         let F_3D = in_space(&F);
         gradient.push(by_rows(&F_3D));
-        let stresses = law.in_space(&particles.F[p])?;
-        stress.push(by_rows(&stresses.cauchy.map(Real::to_f64)));
-        first_piola_kirchhoff.push(by_rows(&stresses.first_piola_kirchhoff.map(Real::to_f64)));
+        stress.push(by_rows(&law.cauchy_in_space(&particles.F[p])?.map(Real::to_f64)));
+        let mut P = law.kirchhoff_in_space(&particles.F[p])?.map(Real::to_f64)
+            * F_3D.try_inverse()?.transpose();
+        // As errors are measured; only the rest is taken from three dimensions.
+        let in_plane = law.first_piola_kirchhoff(&particles.F[p])?.map(Real::to_f64);
+        P.fixed_view_mut::<D, D>(0, 0).copy_from(&in_plane);
+        first_piola_kirchhoff.push(by_rows(&P));
         reference_position.push(padded(&X));
-        von_mises.push(stresses.von_mises.to_f64());
+        von_mises.push(law.von_mises(&particles.F[p])?.to_f64());
         exact_displacement.push(padded(&u));
         error.push(padded(&delta));
         error_magnitude.push(delta.norm());

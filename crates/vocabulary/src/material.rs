@@ -476,4 +476,54 @@ materials! {
     ),
     objective: true,
     at_rest: [],
+
+    /// Ogden's solid, a sum over powers of the isochoric principal stretches `lb = J^(-1/3) lambda`.
+    ///
+    /// Source: Ogden, Proc. R. Soc. Lond. A 328 (1972) 567-583.
+    Ogden as "ogden" {
+        mu1: "the modulus of the first power",
+        alpha1: "the first power of isochoric stretches",
+        mu2: "the modulus of the second power" or "0",
+        alpha2: "the second power" or "2",
+        mu3: "the modulus of the third power" or "0",
+        alpha3: "the third power" or "2",
+        kappa: "bulk modulus",
+        [volumetric]
+    }
+    stress: "W = sum mu_p/alpha_p (lb1^alpha_p + lb2^alpha_p + lb3^alpha_p - 3) + kappa U(J), lb = J^(-1/3) lambda",
+    derivation: Derivation::PrincipalStretches(InStretches {
+        volume: "0",
+        alone: "mu1/alpha1*expm1(alpha1*(ln(stretch) - ln(J)/3)) + mu2/alpha2*expm1(alpha2*(ln(stretch) - ln(J)/3)) \
+                + mu3/alpha3*expm1(alpha3*(ln(stretch) - ln(J)/3))",
+        pair: "2*mu1/alpha1*(exp(alpha1*(ln(area)/2 - ln(J)/3))*(1 + cosh_sqrt_m1(alpha1^2/4*lnratio2(ratio))) - 1) \
+               + 2*mu2/alpha2*(exp(alpha2*(ln(area)/2 - ln(J)/3))*(1 + cosh_sqrt_m1(alpha2^2/4*lnratio2(ratio))) - 1) \
+               + 2*mu3/alpha3*(exp(alpha3*(ln(area)/2 - ln(J)/3))*(1 + cosh_sqrt_m1(alpha3^2/4*lnratio2(ratio))) - 1)",
+    }),
+    objective: true,
+    at_rest: [
+        lambda: (1, kappa ^ 1) (-1 / 3, mu1 ^ 1, alpha1 ^ 1) (-1 / 3, mu2 ^ 1, alpha2 ^ 1)
+            (-1 / 3, mu3 ^ 1, alpha3 ^ 1),
+        mu: (1 / 2, mu1 ^ 1, alpha1 ^ 1) (1 / 2, mu2 ^ 1, alpha2 ^ 1) (1 / 2, mu3 ^ 1, alpha3 ^ 1)
+    ],
+
+    /// Soft tissue with one family of fibres along `a = (cos angle, sin angle, 0)`, which carry tension alone:
+    /// `I4 = a . C a`, and the positive part of `I4 - 1`.
+    ///
+    /// Sources: Holzapfel, Gasser & Ogden, J. Elasticity 61 (2000) 1-48; Nolan et al., J. Mech. Behav. Biomed. Mater. 39 (2014)
+    /// 48-60, who leave the volume in `I4`.
+    HolzapfelGasserOgden as "holzapfel-gasser-ogden" {
+        mu: "shear modulus of the matrix",
+        k1: "modulus of the fibres",
+        k2: "the factor of (I4 - 1)^2 in the exponential",
+        angle: "angle of the fibres to the first axis, in radians" or "0",
+        kappa: "bulk modulus",
+        [volumetric]
+    }
+    stress: "W = mu/2 (I1b - 3) + k1/(2 k2) (exp(k2 <I4 - 1>^2) - 1) + kappa U(J), I1b = J^(-2/3) I1, I4 = a . C a",
+    derivation: Derivation::energy(
+        "mu/2*(J^(-2/3)*I1 - 3) + k1/(2*k2)*expm1(k2*positive_part(cos(angle)^2*(C11 - 1) \
+         + 2*cos(angle)*sin(angle)*C12 + sin(angle)^2*(C22 - 1))^2)"
+    ),
+    objective: true,
+    at_rest: [],
 }

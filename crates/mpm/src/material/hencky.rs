@@ -1,6 +1,6 @@
 //! Hencky's law.
 
-use nalgebra::{Matrix3, RealField, SMatrix};
+use nalgebra::{Matrix3, RealField, SMatrix, Vector3};
 
 use super::{LibraryLaw, finger_minus_identity, log_jacobian, plus_diagonal, quadratic_energy};
 use crate::tensor::{determinant, inverse_transpose, product, real};
@@ -12,6 +12,13 @@ pub(crate) struct Hencky<T> {
     pub(crate) mu: T,
 }
 
+impl<T: RealField + Copy> Hencky<T> {
+    /// `lambda ln J`.
+    fn pressure<const D: usize>(&self, F: &SMatrix<T, D, D>) -> T {
+        self.lambda * log_jacobian(F)
+    }
+}
+
 impl<T: RealField + Copy> LibraryLaw<T> for Hencky<T> {
     fn kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         let two_log_V = match D {
@@ -19,11 +26,7 @@ impl<T: RealField + Copy> LibraryLaw<T> for Hencky<T> {
             2 => two_log_stretch_in_the_plane(F),
             _ => two_log_stretch_in_space(F),
         };
-        plus_diagonal(two_log_V * self.mu, self.kirchhoff_across(F))
-    }
-
-    fn kirchhoff_across<const D: usize>(&self, F: &SMatrix<T, D, D>) -> T {
-        self.lambda * log_jacobian(F)
+        plus_diagonal(two_log_V * self.mu, self.pressure(F))
     }
 
     fn first_piola_kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
@@ -33,7 +36,7 @@ impl<T: RealField + Copy> LibraryLaw<T> for Hencky<T> {
     fn strain_energy<const D: usize>(&self, F: &SMatrix<T, D, D>) -> T {
         // The law gives tau = lambda ln(J) I + 2 mu ln(V), and so the logarithm of V.
         let tau = self.kirchhoff(F);
-        let log_V = plus_diagonal(tau, -self.kirchhoff_across(F)) / (self.mu * real(2.0));
+        let log_V = plus_diagonal(tau, -self.pressure(F)) / (self.mu * real(2.0));
         quadratic_energy(self.lambda, self.mu, &log_V)
     }
 }
@@ -56,14 +59,25 @@ fn two_log_stretch_in_the_plane<T: RealField + Copy, const D: usize>(
 }
 
 /// `2 ln V` in three dimensions, from principal stretches and directions.
-///
-/// `NaN` where they cannot be found, which no finite deformation gradient has been seen to bring about.
 fn two_log_stretch_in_space<T: RealField + Copy, const D: usize>(
     F: &SMatrix<T, D, D>,
 ) -> SMatrix<T, D, D> {
+    let (directions, logarithms) = principal_logarithms(F);
+    SMatrix::from_fn(|i, j| {
+        (0..3)
+            .fold(T::zero(), |sum, k| sum + directions[(i, k)] * logarithms[k] * directions[(j, k)])
+    })
+}
+
+/// The principal directions of b, in columns, and the logarithms of the squared stretches along them, in three dimensions.
+///
+/// `NaN` where they cannot be found, which no finite deformation gradient has been seen to bring about.
+pub(super) fn principal_logarithms<T: RealField + Copy, const D: usize>(
+    F: &SMatrix<T, D, D>,
+) -> (Matrix3<T>, Vector3<T>) {
     const MOST_ITERATIONS: usize = 1000;
     let B = finger_minus_identity(F);
-    let (directions, logarithms) = if B.norm() < real(0.5) {
+    if B.norm() < real(0.5) {
         // The eigenvalues of b - I are small differences, which b itself would not keep.
         Matrix3::from_fn(|i, j| B[(i, j)])
             .try_symmetric_eigen(T::default_epsilon(), MOST_ITERATIONS)
@@ -74,9 +88,5 @@ fn two_log_stretch_in_space<T: RealField + Copy, const D: usize>(
             .try_svd(true, false, T::default_epsilon(), MOST_ITERATIONS)
             .and_then(|svd| Some((svd.u?, svd.singular_values.map(|s| s.ln() * real(2.0)))))
     }
-    .unwrap_or((Matrix3::identity(), SMatrix::repeat(real(f64::NAN))));
-    SMatrix::from_fn(|i, j| {
-        (0..3)
-            .fold(T::zero(), |sum, k| sum + directions[(i, k)] * logarithms[k] * directions[(j, k)])
-    })
+    .unwrap_or((Matrix3::identity(), Vector3::repeat(real(f64::NAN))))
 }

@@ -110,11 +110,6 @@ impl<L: OfFirstInvariant> LibraryLaw<L::Scalar> for L {
         isochoric.kirchhoff(self.slope(isochoric.excess()), self.pressure(F))
     }
 
-    fn kirchhoff_across<const D: usize>(&self, F: &SMatrix<L::Scalar, D, D>) -> L::Scalar {
-        let isochoric = Isochoric::of(F);
-        isochoric.kirchhoff_across(self.slope(isochoric.excess()), self.pressure(F))
-    }
-
     #[inline(always)]
     fn first_piola_kirchhoff<const D: usize>(
         &self,

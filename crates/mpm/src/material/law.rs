@@ -65,17 +65,6 @@ pub trait ConstitutiveLaw<T, const D: usize>: fmt::Debug + Send + Sync {
     }
 }
 
-/// Stresses with the components along axes that a deformation leaves out.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StressInSpace<T> {
-    /// Cauchy stress.
-    pub cauchy: Matrix3<T>,
-    /// First Piola-Kirchhoff stress.
-    pub first_piola_kirchhoff: Matrix3<T>,
-    /// See [`Law::von_mises`].
-    pub von_mises: T,
-}
-
 /// A constitutive law.
 #[derive(Clone, Debug)]
 pub enum Law<T, const D: usize> {
@@ -160,61 +149,34 @@ impl<T: Stressed<D>, const D: usize> Law<T, D> {
     /// Von Mises stress of the symmetric part of the Cauchy stress, with the normal stresses that act out of the plane
     /// in 2D and across the axis in 1D; without these where the law does not tell them.
     pub fn von_mises(&self, F: &SMatrix<T, D, D>) -> Option<T> {
-        let J = jacobian(F)?;
-        let across = match self {
-            Self::Library(material) => Some(T::kirchhoff_across(material, F)),
-            Self::Own(law) => law.kirchhoff_across(F),
-        };
-        let across = across.unwrap_or_else(T::zero) / J;
-        let sigma = self.kirchhoff(F)? / J;
-        let normal = |i: usize| if i < D { sigma[(i, i)] } else { across };
+        let sigma = self.kirchhoff_in_space(F)? / jacobian(F)?;
         let mut sum = T::zero();
         for (i, j) in [(0, 1), (1, 2), (2, 0)] {
-            let difference = normal(i) - normal(j);
-            sum += difference * difference * real(0.5);
-            if i < D && j < D {
-                let shear = (sigma[(i, j)] + sigma[(j, i)]) * real(0.5);
-                sum += shear * shear * real(3.0);
-            }
+            let difference = sigma[(i, i)] - sigma[(j, j)];
+            let shear = (sigma[(i, j)] + sigma[(j, i)]) * real(0.5);
+            sum += difference * difference * real(0.5) + shear * shear * real(3.0);
         }
         Some(sum.sqrt())
     }
 
-    /// The stresses in three dimensions, with those that act out of the plane in 2D and across the axis in 1D; zero in their place
-    /// where the law does not tell them.
-    pub fn in_space(&self, F: &SMatrix<T, D, D>) -> Option<StressInSpace<T>>
-    where
-        T: Stressed<3>,
-    {
-        let law = match self {
-            Self::Library(material) => {
-                let law = Law::<T, 3>::Library(*material);
-                let inside = |i: usize, j: usize| i < D && j < D;
-                let rest = Matrix3::identity();
-                let F_3D =
-                    Matrix3::from_fn(|i, j| if inside(i, j) { F[(i, j)] } else { rest[(i, j)] });
-                // In the law's own dimension, as errors are measured; only the rest is taken from three dimensions.
-                let mut P = law.first_piola_kirchhoff(&F_3D)?;
-                P.fixed_view_mut::<D, D>(0, 0).copy_from(&self.first_piola_kirchhoff(F)?);
-                return Some(StressInSpace {
-                    cauchy: law.cauchy(&F_3D)?,
-                    first_piola_kirchhoff: P,
-                    von_mises: law.von_mises(&F_3D)?,
-                });
+    /// Kirchhoff stress in three dimensions, with the components that act out of the plane in 2D and across the axis in 1D; zero in
+    /// their place where the law does not tell them.
+    pub fn kirchhoff_in_space(&self, F: &SMatrix<T, D, D>) -> Option<Matrix3<T>> {
+        jacobian(F)?;
+        match self {
+            Self::Library(material) => Some(T::kirchhoff_in_space(material, F)),
+            Self::Own(law) => {
+                let across = law.kirchhoff_across(F).unwrap_or_else(T::zero);
+                let mut in_space = Matrix3::from_diagonal_element(across);
+                in_space.fixed_view_mut::<D, D>(0, 0).copy_from(&self.kirchhoff(F)?);
+                Some(in_space)
             }
-            Self::Own(law) => law,
-        };
-        let across = law.kirchhoff_across(F).unwrap_or_else(T::zero);
-        let with = |A: SMatrix<T, D, D>, across: T| {
-            let mut in_space = Matrix3::from_diagonal_element(across);
-            in_space.fixed_view_mut::<D, D>(0, 0).copy_from(&A);
-            in_space
-        };
-        Some(StressInSpace {
-            cauchy: with(self.cauchy(F)?, across / jacobian(F)?),
-            first_piola_kirchhoff: with(self.first_piola_kirchhoff(F)?, across),
-            von_mises: self.von_mises(F)?,
-        })
+        }
+    }
+
+    /// Cauchy stress in three dimensions, see [`kirchhoff_in_space`](Self::kirchhoff_in_space).
+    pub fn cauchy_in_space(&self, F: &SMatrix<T, D, D>) -> Option<Matrix3<T>> {
+        Some(self.kirchhoff_in_space(F)? / jacobian(F)?)
     }
 
     /// Strain energy per reference volume; zero where F is the identity, and `None` where it is no deformation or the law tells no
@@ -232,7 +194,8 @@ impl<T: Stressed<D>, const D: usize> Law<T, D> {
     }
 
     /// The tangent moduli at rest applied to a displacement gradient, `A_iJkL H_kL` with `A = dP/dF` at `F = I`: exact for an
-    /// isotropic law of the library, by central differences of the stress for others.
+    /// isotropic law of the library, by differences of the stress for others. Fibres that carry tension alone have another stress for
+    /// `-H`.
     pub fn stress_at_small_strain(&self, H: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         if let Some((lambda, mu)) = self.lame_constants() {
             return super::plus_diagonal((H + H.transpose()) * mu, lambda * H.trace());
@@ -241,13 +204,14 @@ impl<T: Stressed<D>, const D: usize> Law<T, D> {
         if size == T::zero() {
             return SMatrix::zeros();
         }
-        // The truncation of the difference is of second order, its rounding of eps over the step.
+        // One-sided, since fibres carry tension alone. The truncation of the difference is of second order, its rounding of eps
+        // over the step.
         let step = T::default_epsilon().cbrt() / size;
-        let P = |sign: T| {
-            let F = SMatrix::identity() + H * (step * sign);
+        let P = |times: f64| {
+            let F = SMatrix::identity() + H * (step * real(times));
             self.first_piola_kirchhoff(&F).unwrap_or_else(|| SMatrix::repeat(real(f64::NAN)))
         };
-        (P(T::one()) - P(-T::one())) / (step * real(2.0))
+        (P(1.0) * real::<T>(4.0) - P(2.0)) / (step * real(2.0))
     }
 
     /// The Lame constants at small strain, where the law is isotropic and tells them.
@@ -258,17 +222,18 @@ impl<T: Stressed<D>, const D: usize> Law<T, D> {
         }
     }
 
-    /// The largest modulus `A_iiii` of waves along the axes at rest: their speed is the root of its quotient by the density. It is
+    /// The largest modulus `A_iiii` of waves along the axes at rest, in tension or compression: their speed is the root of its quotient by the density. It is
     /// `lambda + 2 mu` for isotropic laws.
     pub fn p_wave_modulus(&self) -> T {
         if let Some((lambda, mu)) = self.lame_constants() {
             return lambda + mu * real(2.0);
         }
-        (0..D).fold(T::zero(), |largest, i| {
+        let moduli = (0..D).flat_map(|i| [(i, T::one()), (i, -T::one())]).map(|(i, sign)| {
             let mut H = SMatrix::zeros();
-            H[(i, i)] = T::one();
-            largest.max(self.stress_at_small_strain(&H)[(i, i)])
-        })
+            H[(i, i)] = sign;
+            self.stress_at_small_strain(&H)[(i, i)] * sign
+        });
+        moduli.fold(T::zero(), |largest, modulus| largest.max(modulus))
     }
 }
 

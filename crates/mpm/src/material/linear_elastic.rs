@@ -17,10 +17,6 @@ impl<T: RealField + Copy> LibraryLaw<T> for LinearElastic<T> {
         product(&self.first_piola_kirchhoff(F), &F.transpose())
     }
 
-    fn kirchhoff_across<const D: usize>(&self, F: &SMatrix<T, D, D>) -> T {
-        self.lambda * displacement_gradient(F).trace()
-    }
-
     fn first_piola_kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         let H = displacement_gradient(F);
         plus_diagonal((H + H.transpose()) * self.mu, self.lambda * H.trace())

@@ -9,11 +9,13 @@
 mod arruda_boyce;
 mod gent;
 mod hencky;
+mod holzapfel_gasser_ogden;
 mod isochoric;
 mod law;
 mod linear_elastic;
 mod mooney_rivlin;
 mod neo_hookean;
+mod ogden;
 mod orthotropic;
 #[cfg(test)]
 mod printed_energies;
@@ -24,10 +26,10 @@ mod volumetric;
 mod yeoh;
 
 use mmsmith_scalar_functions::logarithm::{is_near_one, ln_near_one, ln_of_both_in_range};
-use nalgebra::{RealField, SMatrix};
+use nalgebra::{Matrix3, RealField, SMatrix};
 
 pub(crate) use law::{BlockOfStresses, OwnBlocks};
-pub use law::{ConstitutiveLaw, Law, StressInSpace};
+pub use law::{ConstitutiveLaw, Law};
 pub use mmsmith_vocabulary::{Material, Volumetric};
 pub(crate) use neo_hookean::{NeoHookean, NeoHookeanNoLog};
 
@@ -75,6 +77,22 @@ macro_rules! with_law {
                 let $law = orthotropic::Orthotropic { c11, c22, c33, c12, c13, c23, c44, c55, c66 };
                 $body
             }
+            Material::Ogden { mu1, alpha1, mu2, alpha2, mu3, alpha3, kappa, volumetric } => {
+                let $law =
+                    ogden::Ogden { mu1, alpha1, mu2, alpha2, mu3, alpha3, kappa, volumetric };
+                $body
+            }
+            Material::HolzapfelGasserOgden { mu, k1, k2, angle, kappa, volumetric } => {
+                let $law = holzapfel_gasser_ogden::HolzapfelGasserOgden {
+                    mu,
+                    k1,
+                    k2,
+                    angle,
+                    kappa,
+                    volumetric,
+                };
+                $body
+            }
         }
     };
 }
@@ -104,9 +122,9 @@ pub trait Stressed<const D: usize>: Lanes {
         P: &mut [[[Self; SIDE_BY_SIDE]; D]; D],
     );
 
-    /// The normal Kirchhoff stress along the axes that F leaves out.
+    /// Kirchhoff stress in three dimensions, with unit stretch along the axes that F leaves out.
     #[doc(hidden)]
-    fn kirchhoff_across(material: &Material<Self>, F: &SMatrix<Self, D, D>) -> Self;
+    fn kirchhoff_in_space(material: &Material<Self>, F: &SMatrix<Self, D, D>) -> Matrix3<Self>;
 
     /// [`Law::strain_energy`].
     #[doc(hidden)]
@@ -140,8 +158,13 @@ macro_rules! stressed {
                 with_law!(material, |law| dispatch(SideBySide { law, F, P }));
             }
 
-            fn kirchhoff_across(material: &Material<Self>, F: &SMatrix<Self, $D, $D>) -> Self {
-                with_law!(material, |law| law.kirchhoff_across(F))
+            fn kirchhoff_in_space(
+                material: &Material<Self>,
+                F: &SMatrix<Self, $D, $D>,
+            ) -> Matrix3<Self> {
+                let mut in_space = Matrix3::identity();
+                in_space.fixed_view_mut::<$D, $D>(0, 0).copy_from(F);
+                with_law!(material, |law| law.kirchhoff(&in_space))
             }
 
             fn strain_energy(
@@ -236,9 +259,6 @@ pub(crate) trait LibraryLaw<T: RealField + Copy>: Copy + Send + Sync + 'static {
         self.kirchhoff(F)
     }
 
-    /// The normal Kirchhoff stress along the axes that F leaves out, where the stretch is one.
-    fn kirchhoff_across<const D: usize>(&self, F: &SMatrix<T, D, D>) -> T;
-
     /// First Piola-Kirchhoff stress.
     fn first_piola_kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D>;
 
@@ -263,10 +283,6 @@ impl<T: RealField + Copy> LibraryLaw<T> for AnyLaw<T> {
     #[inline(never)]
     fn kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         with_law!(&self.0, |law| law.kirchhoff(F))
-    }
-
-    fn kirchhoff_across<const D: usize>(&self, F: &SMatrix<T, D, D>) -> T {
-        with_law!(&self.0, |law| law.kirchhoff_across(F))
     }
 
     fn first_piola_kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {

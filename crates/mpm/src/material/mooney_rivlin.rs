@@ -35,10 +35,6 @@ impl<T: RealField + Copy> LibraryLaw<T> for MooneyRivlin<T> {
         plus_diagonal(tau, self.pressure(F, trace))
     }
 
-    fn kirchhoff_across<const D: usize>(&self, F: &SMatrix<T, D, D>) -> T {
-        self.pressure(F, finger_minus_identity(F).trace())
-    }
-
     fn first_piola_kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         let two = real::<T>(2.0);
         let H = displacement_gradient(F);

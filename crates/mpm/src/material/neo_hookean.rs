@@ -57,10 +57,6 @@ impl<T: RealField + Copy> LibraryLaw<T> for NeoHookean<T> {
         plus_diagonal(finger_minus_identity(F) * self.mu, self.lambda * log_jacobian_short(F))
     }
 
-    fn kirchhoff_across<const D: usize>(&self, F: &SMatrix<T, D, D>) -> T {
-        self.pressure(F)
-    }
-
     #[inline(always)]
     fn first_piola_kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         self.first_piola_kirchhoff_at(F, self.pressure(F))
@@ -92,10 +88,6 @@ impl<T: RealField + Copy> LibraryLaw<T> for NeoHookeanNoLog<T> {
     #[inline(always)]
     fn kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         finger_minus_identity(F) * self.mu
-    }
-
-    fn kirchhoff_across<const D: usize>(&self, _F: &SMatrix<T, D, D>) -> T {
-        T::zero()
     }
 
     #[inline(always)]

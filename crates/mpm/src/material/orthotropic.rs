@@ -70,11 +70,6 @@ impl<T: RealField + Copy> LibraryLaw<T> for Orthotropic<T> {
         product(&self.first_piola_kirchhoff(F), &F.transpose())
     }
 
-    /// That along the third axis; in one dimension the one along the second axis differs where `c12` is not `c13`.
-    fn kirchhoff_across<const D: usize>(&self, F: &SMatrix<T, D, D>) -> T {
-        self.normal_stress(&green_twice(F), 2)
-    }
-
     fn first_piola_kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         product(F, &self.second_piola_kirchhoff(&green_twice(F)))
     }

@@ -24,10 +24,6 @@ impl<T: RealField + Copy> LibraryLaw<T> for StVenantKirchhoff<T> {
         product(&self.first_piola_kirchhoff(F), &F.transpose())
     }
 
-    fn kirchhoff_across<const D: usize>(&self, F: &SMatrix<T, D, D>) -> T {
-        self.pressure(&green_twice(F))
-    }
-
     fn first_piola_kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         let E2 = green_twice(F);
         product(F, &plus_diagonal(E2 * self.mu, self.pressure(&E2)))

@@ -41,9 +41,12 @@ pub(super) fn energy(
         let pair = parts.pair.replace("(ratio)", &ratio).replace("area", &area);
         text += &format!(" + ({pair})");
     }
+    let along = |stretch: &str| format!(" + ({})", parts.alone.replace("stretch", stretch));
     for k in alone {
         let k = k + 1;
-        text += &format!(" + ({})", parts.alone.replace("stretch", &format!("F{k}{k}")));
+        text += &along(&format!("F{k}{k}"));
     }
+    // Nothing stretches along the directions left out.
+    text.extend((n..3).map(|_| along("1")));
     Ok((text, n == 2 && pairs.len() == 1))
 }
