@@ -22,6 +22,12 @@ const LOGARITHM: &str = include_str!("logarithm.h");
 /// What laws need that have the logarithm of the stretch.
 const LOG_RATIO: &str = include_str!("log_ratio.h");
 
+/// What laws need that have powers of the stretches.
+const COSH_SQRT: &str = include_str!("cosh_sqrt.h");
+
+/// What laws need whose fibres carry no compression.
+const POSITIVE_PART: &str = include_str!("positive_part.h");
+
 /// The width of comments.
 const WIDTH: usize = 115;
 
@@ -228,7 +234,12 @@ impl Header<'_> {
         if self.code.forms_rounding_errors() {
             self.text += ROUNDING;
         }
-        for (support, text) in [(CSupport::Logarithm, LOGARITHM), (CSupport::LogRatio, LOG_RATIO)] {
+        for (support, text) in [
+            (CSupport::Logarithm, LOGARITHM),
+            (CSupport::LogRatio, LOG_RATIO),
+            (CSupport::CoshSqrt, COSH_SQRT),
+            (CSupport::PositivePart, POSITIVE_PART),
+        ] {
             if self.code.calls(|function| function.c_support() == Some(support)) {
                 self.text += text;
             }

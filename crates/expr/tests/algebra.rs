@@ -194,6 +194,8 @@ fn texts_that_are_the_same_expression() {
         ("sin(Pi/2) + sin(Pi) + sin(3*Pi/2) + sin(5*Pi/2)", "1"),
         ("cos(Pi/2) + cos(Pi) + cos(2*Pi) + cos(-7*Pi)", "-1"),
         ("lnratio2(0) + lnratio2_slope(0) - 3*lnratio2_curvature(0)", "1"),
+        ("cosh_sqrt_m1(0) + cosh_sqrt_m1_slope(0) + 6*cosh_sqrt_m1_curvature(0)", "1"),
+        ("positive_part(0) + positive_part_slope(0)", "0"),
         ("x^0", "1"),
         ("0^2*x", "0"),
     ] {

@@ -36,6 +36,9 @@ const HALVINGS: i32 = 9;
 /// As [`log ratios`](mmsmith_expr::Function::LogRatioSlope) in doubles: the series in `y = z/(z + 2)` up to 1/4.
 const RATIO_TERMS: u32 = 56;
 const LARGEST_RATIO_IN_SERIES: f64 = 0.25;
+/// As [`hyperbolic cosines of roots`](mmsmith_expr::Function::CoshSqrtM1) in doubles: the series in `y` up to 9.
+const ROOT_TERMS: u32 = 28;
+const LARGEST_ROOT_IN_SERIES: f64 = 9.0;
 
 /// `1/n!`.
 static INVERSE_FACTORIALS: LazyLock<Vec<DoubleDouble>> = LazyLock::new(|| {
@@ -323,6 +326,45 @@ impl DoubleDouble {
         Self::ratio_series(y, |k| k) * (rest * rest)
     }
 
+    /// `1 + y/d(1) (1 + y/d(2) (1 + ...))`.
+    fn root_series(self, divisor: impl Fn(f64) -> f64) -> Self {
+        (1..=ROOT_TERMS)
+            .rev()
+            .fold(Self::ONE, |sum, k| Self::ONE + self * sum / Self::from(divisor(f64::from(k))))
+    }
+
+    /// `cosh(s)` and `sinh(s)/s` for `s = sqrt(y)`.
+    fn hyperbolic_of_root(self) -> (Self, Self) {
+        let root = self.sqrt();
+        let e = root.exp();
+        let inverse = Self::ONE / e;
+        ((e + inverse).scaled(0.5), (e - inverse).scaled(0.5) / root)
+    }
+
+    fn cosh_sqrt_m1(self) -> Self {
+        if self.high.abs() <= LARGEST_ROOT_IN_SERIES {
+            let series = self.root_series(|k| (2.0 * k + 1.0) * (2.0 * k + 2.0));
+            return (self * series).scaled(0.5);
+        }
+        self.hyperbolic_of_root().0 - Self::ONE
+    }
+
+    fn cosh_sqrt_m1_slope(self) -> Self {
+        if self.high.abs() <= LARGEST_ROOT_IN_SERIES {
+            let series = self.root_series(|k| (2.0 * k + 2.0) * (2.0 * k + 3.0));
+            return self * series / Self::from(6.0);
+        }
+        self.hyperbolic_of_root().1 - Self::ONE
+    }
+
+    fn cosh_sqrt_m1_curvature(self) -> Self {
+        if self.high.abs() <= LARGEST_ROOT_IN_SERIES {
+            return self.root_series(|k| 2.0 * k * (2.0 * k + 3.0)) / Self::from(6.0);
+        }
+        let (cosh, ratio) = self.hyperbolic_of_root();
+        (cosh - ratio) / self.scaled(2.0)
+    }
+
     fn call(self, function: Function) -> Self {
         match function {
             Function::Sin => self.sin_shifted(0.0),
@@ -356,6 +398,13 @@ impl DoubleDouble {
             }
             Function::LogRatioSlope => self.log_ratio_slope(),
             Function::LogRatioCurvature => self.log_ratio_curvature(),
+            Function::CoshSqrtM1 => self.cosh_sqrt_m1(),
+            Function::CoshSqrtM1Slope => self.cosh_sqrt_m1_slope(),
+            Function::CoshSqrtM1Curvature => self.cosh_sqrt_m1_curvature(),
+            Function::PositivePart if self.high <= 0.0 => Self::from(0.0),
+            Function::PositivePart => self,
+            Function::PositivePartSlope if self.high > 0.0 => Self::ONE,
+            Function::PositivePartSlope if self.high <= 0.0 => Self::from(0.0),
             // The others have operations of their own, or no value here: the oracle is asked where this is not a number.
             _ => Self::from(f64::NAN),
         }
@@ -434,7 +483,7 @@ mod tests {
         let positive: Vec<f64> = all.iter().map(|x| x.abs()).collect();
         let turns = [all.clone(), vec![1e6 + 0.1, 123_456.789, -12_345_678.9]].concat();
         let inner = [&small[..], &moderate, &[0.999_999, -0.999_9]].concat();
-        let cases: [(&str, &[f64]); 24] = [
+        let cases: [(&str, &[f64]); 29] = [
             ("sin(x)", &turns),
             ("cos(x)", &turns),
             ("tan(x)", &turns),
@@ -459,6 +508,11 @@ mod tests {
             ("lnratio2(x)", &positive),
             ("lnratio2_slope(x)", &positive),
             ("lnratio2_curvature(x)", &positive),
+            ("cosh_sqrt_m1(x)", &positive),
+            ("cosh_sqrt_m1_slope(x)", &positive),
+            ("cosh_sqrt_m1_curvature(x)", &positive),
+            ("positive_part(x)", &positive),
+            ("positive_part_slope(x) + positive_part(-x)", &positive),
         ];
         let mut oracle = Oracle::new(Oracle::USUAL_BITS).unwrap();
         for (text, places) in cases {

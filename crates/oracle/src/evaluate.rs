@@ -382,13 +382,25 @@ impl Evaluation<'_> {
         let defined = match function {
             Function::Ln => x.is_positive() && !x.is_zero(),
             Function::Ln1p => x.cmp(&minus_one).is_some_and(|c| c > 0),
-            Function::LogRatioSquared | Function::LogRatioSlope | Function::LogRatioCurvature => {
-                !x.is_negative()
+            Function::LogRatioSquared
+            | Function::LogRatioSlope
+            | Function::LogRatioCurvature
+            | Function::CoshSqrtM1
+            | Function::CoshSqrtM1Slope
+            | Function::CoshSqrtM1Curvature
+                if x.is_negative() =>
+            {
+                x.is_zero()
             }
             Function::Asin | Function::Acos => x.abs_cmp(&one).is_some_and(|c| c <= 0),
             // Beyond this the result would be out of range, and finding that out would take long.
             Function::Exp | Function::Expm1 | Function::Sinh | Function::Cosh
                 if x.exponent().is_some_and(|e| e > 17) =>
+            {
+                return Err(self.range(expression));
+            }
+            Function::CoshSqrtM1 | Function::CoshSqrtM1Slope | Function::CoshSqrtM1Curvature
+                if x.exponent().is_some_and(|e| e > 34) =>
             {
                 return Err(self.range(expression));
             }
@@ -455,6 +467,20 @@ impl Evaluation<'_> {
                 let numerator = x.add(&product, wide, ROUNDING);
                 numerator.div(&squared_sinh(&x, wide), bits, ROUNDING).neg()
             }
+            Function::CoshSqrtM1 => {
+                // 2 sinh(s/2)^2, in which nothing cancels.
+                let quarter = scaled(&x, &Rational::new(1.into(), 4.into()), bits + GUARD_BITS);
+                let half = quarter.sqrt(bits + GUARD_BITS, ROUNDING);
+                let sinh = half.sinh(bits + GUARD_BITS, ROUNDING, constants);
+                let square = sinh.mul(&sinh, bits + GUARD_BITS, ROUNDING);
+                square.add(&square, bits, ROUNDING)
+            }
+            Function::CoshSqrtM1Slope => cosh_sqrt_slope(&x, bits, constants),
+            Function::CoshSqrtM1Curvature => cosh_sqrt_curvature(&x, bits, constants),
+            Function::PositivePart if x.is_positive() => x,
+            Function::PositivePart => BigFloat::from_word(0, bits),
+            Function::PositivePartSlope if x.is_positive() && !x.is_zero() => one,
+            Function::PositivePartSlope => BigFloat::from_word(0, bits),
             Function::Atan2 => {
                 let abscissa = self.value(arguments[1])?.clone();
                 return self.polar_angle(expression, &x, &abscissa);
@@ -595,6 +621,39 @@ fn log_ratio_slope(z: &BigFloat, bits: usize, constants: &mut Consts) -> BigFloa
     let root = squared_sinh(z, wide).sqrt(wide, ROUNDING);
     let ratio = log_ratio(z, wide, constants).div(&root, wide, ROUNDING);
     ratio.sub(&BigFloat::from_word(1, wide), bits, ROUNDING)
+}
+
+/// `sinh(s)/s - 1` for `s = sqrt(y)`.
+fn cosh_sqrt_slope(y: &BigFloat, bits: usize, constants: &mut Consts) -> BigFloat {
+    if y.is_zero() {
+        return y.clone();
+    }
+    if smallness(y) > bits {
+        // y/6 + y^2/120: what is left out is below 2^-2bits of the sum.
+        let square = y.mul(y, bits, ROUNDING);
+        let first = scaled(y, &Rational::new(1.into(), 6.into()), bits);
+        let second = scaled(&square, &Rational::new(1.into(), 120.into()), bits);
+        return first.add(&second, bits, ROUNDING);
+    }
+    // As many bits more as the difference with one takes away.
+    let wide = bits + smallness(y) + GUARD_BITS;
+    let root = y.sqrt(wide, ROUNDING);
+    let ratio = root.sinh(wide, ROUNDING, constants).div(&root, wide, ROUNDING);
+    ratio.sub(&BigFloat::from_word(1, wide), bits, ROUNDING)
+}
+
+/// `(cosh(s) - sinh(s)/s)/(2 y)` for `s = sqrt(y)`.
+fn cosh_sqrt_curvature(y: &BigFloat, bits: usize, constants: &mut Consts) -> BigFloat {
+    if y.is_zero() || smallness(y) > bits {
+        // 1/6 + y/60: what is left out is below 2^-2bits.
+        let first = to_float(&Rational::new(1.into(), 6.into()), bits);
+        return first.add(&scaled(y, &Rational::new(1.into(), 60.into()), bits), bits, ROUNDING);
+    }
+    let wide = bits + smallness(y) + GUARD_BITS;
+    let root = y.sqrt(wide, ROUNDING);
+    let ratio = root.sinh(wide, ROUNDING, constants).div(&root, wide, ROUNDING);
+    let difference = root.cosh(wide, ROUNDING, constants).sub(&ratio, wide, ROUNDING);
+    difference.div(&y.add(y, wide, ROUNDING), bits, ROUNDING)
 }
 
 /// `erf(x) = 2/sqrt(pi) exp(-x^2) sum_n 2^n x^(2n+1)/(2n+1)!!` (NIST Digital Library of Mathematical Functions, 7.6.2): all

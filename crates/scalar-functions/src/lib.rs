@@ -3,6 +3,7 @@
 //!
 //! Generated code calls them, and so does the evaluation of programs without it: both give the same bits.
 
+mod cosh_sqrt;
 mod log_ratio;
 pub mod logarithm;
 
@@ -74,6 +75,27 @@ pub trait ScalarFunctions: Copy + Add<Output = Self> + Sub<Output = Self> {
     /// The derivative of [`log_ratio_slope`](Self::log_ratio_slope).
     #[must_use]
     fn log_ratio_curvature(self) -> Self;
+
+    /// `cosh(sqrt(y)) - 1` for `y` from 0 on, accurate for small `y` and smooth at zero. Within four units in the last place, up
+    /// to where it is beyond the largest number.
+    #[must_use]
+    fn cosh_sqrt_m1(self) -> Self;
+
+    /// `sinh(s)/s - 1` for `s = sqrt(y)`, twice the derivative of [`cosh_sqrt_m1`](Self::cosh_sqrt_m1) less one, and as accurate.
+    #[must_use]
+    fn cosh_sqrt_m1_slope(self) -> Self;
+
+    /// The derivative of [`cosh_sqrt_m1_slope`](Self::cosh_sqrt_m1_slope), and as accurate.
+    #[must_use]
+    fn cosh_sqrt_m1_curvature(self) -> Self;
+
+    /// `max(x, 0)`, and not a number where `x` is none.
+    #[must_use]
+    fn positive_part(self) -> Self;
+
+    /// The derivative of [`positive_part`](Self::positive_part): one where `x > 0`, else zero, and not a number where `x` is none.
+    #[must_use]
+    fn positive_part_slope(self) -> Self;
 }
 
 impl ScalarFunctions for f64 {
@@ -127,6 +149,30 @@ impl ScalarFunctions for f64 {
     fn log_ratio_curvature(self) -> Self {
         log_ratio::curvature(self)
     }
+
+    fn cosh_sqrt_m1(self) -> Self {
+        cosh_sqrt::minus_one(self)
+    }
+
+    fn cosh_sqrt_m1_slope(self) -> Self {
+        cosh_sqrt::slope(self)
+    }
+
+    fn cosh_sqrt_m1_curvature(self) -> Self {
+        cosh_sqrt::curvature(self)
+    }
+
+    #[inline(always)]
+    fn positive_part(self) -> Self {
+        // Comparisons with what is no number are false.
+        if self <= 0.0 { 0.0 } else { self }
+    }
+
+    #[inline(always)]
+    fn positive_part_slope(self) -> Self {
+        let beyond = if self <= 0.0 { 0.0 } else { self };
+        if self > 0.0 { 1.0 } else { beyond }
+    }
 }
 
 impl ScalarFunctions for f32 {
@@ -171,6 +217,30 @@ impl ScalarFunctions for f32 {
 
     fn log_ratio_curvature(self) -> Self {
         log_ratio::curvature(f64::from(self)) as f32
+    }
+
+    fn cosh_sqrt_m1(self) -> Self {
+        cosh_sqrt::minus_one(f64::from(self)) as f32
+    }
+
+    fn cosh_sqrt_m1_slope(self) -> Self {
+        cosh_sqrt::slope(f64::from(self)) as f32
+    }
+
+    fn cosh_sqrt_m1_curvature(self) -> Self {
+        cosh_sqrt::curvature(f64::from(self)) as f32
+    }
+
+    #[inline(always)]
+    fn positive_part(self) -> Self {
+        // Comparisons with what is no number are false.
+        if self <= 0.0 { 0.0 } else { self }
+    }
+
+    #[inline(always)]
+    fn positive_part_slope(self) -> Self {
+        let beyond = if self <= 0.0 { 0.0 } else { self };
+        if self > 0.0 { 1.0 } else { beyond }
     }
 }
 
@@ -325,6 +395,35 @@ mod tests {
         // 3 x for x near 1e8: what is lost is a whole number of units of the last place of x.
         let x = 123_456_789.123_456_78_f64;
         assert_eq!(3.0.product_error(x), (x.sum_error(2.0 * x)));
+    }
+
+    #[test]
+    fn positive_parts() {
+        for (x, part, slope) in [
+            (2.5, 2.5, 1.0),
+            (-2.5, 0.0, 0.0),
+            (0.0, 0.0, 0.0),
+            (f64::INFINITY, f64::INFINITY, 1.0),
+        ] {
+            assert_eq!((x.positive_part(), x.positive_part_slope()), (part, slope), "{x}");
+            let single = x as f32;
+            assert_eq!(f64::from(single.positive_part()), part, "{x}");
+            assert_eq!(f64::from(single.positive_part_slope()), slope, "{x}");
+        }
+        assert_eq!(f64::MIN_POSITIVE.positive_part_slope(), 1.0);
+        assert_eq!((-0.0_f64).positive_part().to_bits(), 0.0_f64.to_bits());
+        assert!(f64::NAN.positive_part().is_nan() && f64::NAN.positive_part_slope().is_nan());
+        assert!(f32::NAN.positive_part().is_nan() && f32::NAN.positive_part_slope().is_nan());
+    }
+
+    #[test]
+    fn hyperbolic_functions_of_roots_in_single_precision_are_rounded_once() {
+        for y in [0.0_f32, 1e-9, 0.3, 8.0, 30.0, 1e3] {
+            let wide = f64::from(y);
+            assert_eq!(y.cosh_sqrt_m1(), wide.cosh_sqrt_m1() as f32);
+            assert_eq!(y.cosh_sqrt_m1_slope(), wide.cosh_sqrt_m1_slope() as f32);
+            assert_eq!(y.cosh_sqrt_m1_curvature(), wide.cosh_sqrt_m1_curvature() as f32);
+        }
     }
 
     #[test]

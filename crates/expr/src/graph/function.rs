@@ -33,6 +33,10 @@ pub enum CSupport {
     Logarithm,
     /// Squared logarithms of ratios.
     LogRatio,
+    /// Hyperbolic cosines of roots.
+    CoshSqrt,
+    /// Positive parts.
+    PositivePart,
 }
 
 /// What is known of a function.
@@ -313,6 +317,59 @@ functions! {
         single: ScalarFunctions::log_ratio_curvature,
         rust: RustCall::Method("log_ratio_curvature"),
         own: Some(("mmsmith_log_ratio_curvature", CSupport::LogRatio)),
+    }
+    /// `cosh(sqrt(y)) - 1` for `y` from zero on, smooth at zero: for `y = n^2 lnratio2(z)` it is `((a/b)^n + (b/a)^n)/2 - 1`.
+    CoshSqrtM1 {
+        names: &["cosh_sqrt_m1"],
+        differential: "(1 + cosh_sqrt_m1_slope(x))/2*dx",
+        at_zero: "0",
+        double: ScalarFunctions::cosh_sqrt_m1,
+        single: ScalarFunctions::cosh_sqrt_m1,
+        rust: RustCall::Method("cosh_sqrt_m1"),
+        own: Some(("mmsmith_cosh_sqrt_m1", CSupport::CoshSqrt)),
+    }
+    /// Twice the slope of [`Function::CoshSqrtM1`] less one, `sinh(sqrt(y))/sqrt(y) - 1`.
+    CoshSqrtM1Slope {
+        names: &["cosh_sqrt_m1_slope"],
+        differential: "cosh_sqrt_m1_curvature(x)*dx",
+        at_zero: "0",
+        double: ScalarFunctions::cosh_sqrt_m1_slope,
+        single: ScalarFunctions::cosh_sqrt_m1_slope,
+        rust: RustCall::Method("cosh_sqrt_m1_slope"),
+        own: Some(("mmsmith_cosh_sqrt_m1_slope", CSupport::CoshSqrt)),
+    }
+    /// The derivative of [`Function::CoshSqrtM1Slope`].
+    CoshSqrtM1Curvature {
+        names: &["cosh_sqrt_m1_curvature"],
+        // From 2 y s' = cosh(sqrt(y)) - 1 - s, differentiated once more.
+        differential: "(1 + cosh_sqrt_m1_slope(x) - 6*cosh_sqrt_m1_curvature(x))/(4*x)*dx",
+        at_zero: "1/6",
+        double: ScalarFunctions::cosh_sqrt_m1_curvature,
+        single: ScalarFunctions::cosh_sqrt_m1_curvature,
+        rust: RustCall::Method("cosh_sqrt_m1_curvature"),
+        own: Some(("mmsmith_cosh_sqrt_m1_curvature", CSupport::CoshSqrt)),
+    }
+    /// `max(x, 0)`.
+    PositivePart {
+        names: &["positive_part"],
+        differential: "positive_part_slope(x)*dx",
+        at_zero: "0",
+        double: ScalarFunctions::positive_part,
+        single: ScalarFunctions::positive_part,
+        steepness: Some(|_| 1.0),
+        rust: RustCall::Method("positive_part"),
+        own: Some(("mmsmith_positive_part", CSupport::PositivePart)),
+    }
+    /// The derivative of [`Function::PositivePart`]: one for `x > 0`, else zero.
+    PositivePartSlope {
+        names: &["positive_part_slope"],
+        // But for zero itself, where it has none.
+        differential: "0",
+        at_zero: "0",
+        double: ScalarFunctions::positive_part_slope,
+        single: ScalarFunctions::positive_part_slope,
+        rust: RustCall::Method("positive_part_slope"),
+        own: Some(("mmsmith_positive_part_slope", CSupport::PositivePart)),
     }
 }
 
