@@ -151,3 +151,31 @@ fn logarithms_of_ratios_are_the_nearest_numbers() {
         found("log_ratio_curvature", z.log_ratio_curvature(), curvature, NEARLY_ROUNDED);
     }));
 }
+
+/// Of numbers from zero to where the values leave single precision.
+#[test]
+#[ignore = "a minute and more in release mode"]
+fn hyperbolic_cosines_of_roots_are_the_nearest_numbers() {
+    assert_none(&at_every_number(|y, found| {
+        if !(0.0..7.5e3).contains(&y) {
+            return;
+        }
+        let wide = f64::from(y);
+        let root = wide.sqrt();
+        let half = (0.5 * root).sinh();
+        let (slope, curvature) = if wide < 0.1 {
+            // sum of y^k/(2 k + 1)!, and its derivative.
+            let terms = [1.0 / 6.0, 1.0 / 120.0, 1.0 / 5040.0, 1.0 / 362_880.0, 1.0 / 39_916_800.0];
+            let slope = terms.iter().rev().fold(0.0, |sum, term| (sum + term) * wide);
+            let derivative =
+                (1..=terms.len()).rev().fold(0.0, |sum, n| sum * wide + n as f64 * terms[n - 1]);
+            (slope, derivative)
+        } else {
+            let ratio = root.sinh() / root;
+            (ratio - 1.0, (root.cosh() - ratio) / (2.0 * wide))
+        };
+        found("cosh_sqrt_m1", y.cosh_sqrt_m1(), 2.0 * half * half, NEARLY_ROUNDED);
+        found("cosh_sqrt_m1_slope", y.cosh_sqrt_m1_slope(), slope, NEARLY_ROUNDED);
+        found("cosh_sqrt_m1_curvature", y.cosh_sqrt_m1_curvature(), curvature, NEARLY_ROUNDED);
+    }));
+}
