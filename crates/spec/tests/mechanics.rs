@@ -6,7 +6,7 @@
 
 use mmsmith_expr::{Expr, Program};
 use mmsmith_spec::{Domain, Fields, Law, Spec, Surface};
-use mmsmith_vocabulary::Material;
+use mmsmith_vocabulary::{Derivation, Material};
 use std::path::{Path, PathBuf};
 
 type Tensor = [[f64; 3]; 3];
@@ -56,7 +56,7 @@ fn logarithm(a: &Tensor) -> Tensor {
     tensor(|i, j| (0..3).map(|k| axes[i][k] * a[k][k].ln() * axes[j][k]).sum())
 }
 
-/// The first Piola-Kirchhoff stress of a law with these constants; `None` for a law that only the specification states.
+/// The first Piola-Kirchhoff stress of a law with these constants; `None` for a law that is stated by its energy alone.
 fn stress(law: &Law, constants: &[f64], F: &Tensor) -> Option<Tensor> {
     let Law::Library(material) = law else { return None };
     let mut values = constants.iter();
@@ -65,35 +65,37 @@ fn stress(law: &Law, constants: &[f64], F: &Tensor) -> Option<Tensor> {
     let inverse_transposed = tensor(|i, j| cofactor(F, i, j) / J);
     let C = times(&transposed(F), F);
     let of_kirchhoff = |tau: Tensor| Some(times(&tau, &inverse_transposed));
-    match material {
-        Material::NeoHookean { lambda, mu } => {
+    if let Material::Hencky { lambda, mu } = material {
+        let doubled = logarithm(&times(F, &transposed(F)));
+        return of_kirchhoff(tensor(|i, j| lambda * J.ln() * identity(i, j) + mu * doubled[i][j]));
+    }
+    if let Material::MooneyRivlin { c1, c2, lambda } = material {
+        let FC = times(F, &C);
+        return Some(tensor(|i, j| {
+            2.0 * c1 * (F[i][j] - inverse_transposed[i][j])
+                + 2.0 * c2 * (trace(&C) * F[i][j] - FC[i][j] - 2.0 * inverse_transposed[i][j])
+                + lambda * J.ln() * inverse_transposed[i][j]
+        }));
+    }
+    match material.derivation() {
+        Derivation::NeoHookean { lambda, mu } => {
             let b = times(F, &transposed(F));
             of_kirchhoff(tensor(|i, j| {
                 lambda * J.ln() * identity(i, j) + mu * (b[i][j] - identity(i, j))
             }))
         }
-        Material::Hencky { lambda, mu } => {
-            let doubled = logarithm(&times(F, &transposed(F)));
-            of_kirchhoff(tensor(|i, j| lambda * J.ln() * identity(i, j) + mu * doubled[i][j]))
-        }
-        Material::StVenantKirchhoff { lambda, mu } => {
+        Derivation::StVenantKirchhoff { lambda, mu } => {
             let strain = tensor(|i, j| 0.5 * (C[i][j] - identity(i, j)));
             let second =
                 tensor(|i, j| lambda * trace(&strain) * identity(i, j) + 2.0 * mu * strain[i][j]);
             Some(times(F, &second))
         }
-        Material::LinearElastic { lambda, mu } => {
+        Derivation::LinearElastic { lambda, mu } => {
             let H = tensor(|i, j| F[i][j] - identity(i, j));
             Some(tensor(|i, j| lambda * trace(&H) * identity(i, j) + mu * (H[i][j] + H[j][i])))
         }
-        Material::MooneyRivlin { c1, c2, lambda } => {
-            let FC = times(F, &C);
-            Some(tensor(|i, j| {
-                2.0 * c1 * (F[i][j] - inverse_transposed[i][j])
-                    + 2.0 * c2 * (trace(&C) * F[i][j] - FC[i][j] - 2.0 * inverse_transposed[i][j])
-                    + lambda * J.ln() * inverse_transposed[i][j]
-            }))
-        }
+        // The other laws that are stated by their energies are compared with these in `mmsmith-mpm`, in 77 digits.
+        Derivation::Energy { .. } | Derivation::PrincipalStretches(_) => None,
     }
 }
 

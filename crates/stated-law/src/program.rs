@@ -220,12 +220,6 @@ impl Program {
         Place { rest: 0.0, deviation: row, value }
     }
 
-    /// The number of steps.
-    #[cfg(test)]
-    pub(crate) fn steps(&self) -> usize {
-        self.steps.len()
-    }
-
     /// The results for deformations side by side, in registers as wide as this processor has them; not a number where F is no
     /// deformation.
     pub(crate) fn run<'a, T: RealField + Copy, const D: usize, const N: usize>(

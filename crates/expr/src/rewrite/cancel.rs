@@ -298,7 +298,7 @@ impl Graph {
     }
 
     /// The expression as one product or zero, where multiplying out makes it one and nothing is kept in one piece.
-    pub(crate) fn single_term(&mut self, expr: Expr) -> Option<Expr> {
+    pub fn single_term(&mut self, expr: Expr) -> Option<Expr> {
         let is_whole = |part: &Expr| matches!(self.node(*part), Node::Whole(_));
         let reachable = self.reachable(&[expr]);
         if reachable.len() > MOST_PARTS || reachable.iter().any(is_whole) {

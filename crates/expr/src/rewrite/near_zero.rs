@@ -73,7 +73,11 @@ impl Splitting<'_> {
             let Some((value, rest)) = self.power(*base, exponent) else {
                 return (Graph::ZERO, expr);
             };
-            let factor = self.graph.product([(*base, exponent.clone())]);
+            // As it is written, a factor that is zero at zero may be a difference of large terms.
+            let factor = match value == Graph::ZERO {
+                true => rest,
+                false => self.graph.product([(*base, exponent.clone())]),
+            };
             parts.push((factor, value, rest));
         }
         // With a factor that is zero at zero in front, only the first of the sum's terms is left.

@@ -113,7 +113,7 @@ impl ComponentLaw {
                     derivatives.of(graph, stress[i][J], h)
                 };
                 let (value, rest) = graph.split_at_zero(modulus, &small);
-                let value = zero_if_vanishing(graph, value);
+                let value = modulus_at_rest(graph, value);
                 first.push(graph.mul(value, open[k][L][J]));
                 let rest = graph.replace(rest, &actual);
                 second.push(graph.mul(rest, whole[k][L][J]));
@@ -134,6 +134,15 @@ impl ComponentLaw {
         };
         Stress { P, isotropic, anisotropic, linear, remainder, energy }
     }
+}
+
+/// A modulus at rest with its constants as they are written, so that identities among them cancel in symbols, here and against the
+/// inertia: `kappa - 2 mu/3` is `lambda` where bulk and shear modulus are stated in Young's modulus and Poisson's ratio, and rounding
+/// would keep something where that vanishes.
+fn modulus_at_rest(graph: &mut Graph, modulus: Expr) -> Expr {
+    let modulus = zero_if_vanishing(graph, modulus);
+    let open = graph.open(modulus);
+    graph.single_term(open).unwrap_or(open)
 }
 
 /// `lambda ln J` and `P - lambda ln J I`, for a `P` that is linear in `ln J`: with its slope `c` this is
