@@ -87,9 +87,16 @@ fn what_cannot_be_swept_is_refused() {
     let place = tempfile::tempdir().expect("a folder");
     let place = place.path();
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
-    let lawless = format!("{root}/tests/data/specs/materials/skew-2d-energy.toml");
-    let call = format!("tradeoff {lawless} --budget 1s --json a.json");
-    refuses(place, &call, &["solver's laws are written by hand, and it has none"]);
+    let turning = std::fs::read_to_string(format!(
+        "{root}/tests/data/specs/materials/anisotropic-polar.toml"
+    ));
+    let moved = ["inner", "outer"].map(|surface| {
+        format!("[[boundary]]\nsurface = '{surface}'\ncondition = 'prescribed-motion'\n")
+    });
+    let turning = turning.expect("a specification") + &moved.concat();
+    std::fs::write(place.join("turning.toml"), turning).expect("a file");
+    let call = "tradeoff turning.toml --budget 1s --json a.json";
+    refuses(place, call, &["stated in components along curvilinear coordinates"]);
     refuses(place, "tradeoff ring --budget 2x", &["--budget", "90s, 2m or 1h"]);
     refuses(place, "tradeoff ring --budget=-1s", &["--budget", "90s, 2m or 1h"]);
     refuses(place, "tradeoff rings --budget 1s", &["did you mean 'ring'"]);

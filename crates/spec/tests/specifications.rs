@@ -5,6 +5,7 @@
 
 use mmsmith_expr::{Ast, Function, Graph};
 use mmsmith_spec::{DeriveError, Diagnostic, LONGEST_FILE, ListingText, Spec, Surface};
+use mmsmith_vocabulary::Material;
 use std::path::{Path, PathBuf};
 
 fn cases(folder: &str) -> Vec<PathBuf> {
@@ -24,10 +25,12 @@ fn parse(path: &Path) -> Result<Spec, Diagnostic> {
     Spec::parse(&std::fs::read_to_string(path).unwrap(), file)
 }
 
-/// Compares with the file of expected output beside the input, in which `{functions}` stands for the names of all of them.
+/// Compares with the file of expected output beside the input, in which `{functions}` and `{laws}` stand for the names of all of them.
 fn expect(path: &Path, found: &str, failures: &mut Vec<String>) {
     let functions: Vec<&str> = Function::names().map(|(name, _)| name).collect();
-    let found = &found.replace(&functions.join(", "), "{functions}");
+    let laws: Vec<&str> = Material::<f64>::ROWS.iter().map(|row| row.name).collect();
+    let found =
+        &found.replace(&functions.join(", "), "{functions}").replace(&laws.join(", "), "{laws}");
     let expected_path = path.with_extension("txt");
     if std::env::var_os("UPDATE_EXPECT").is_some() {
         std::fs::write(&expected_path, found).unwrap();

@@ -3,7 +3,7 @@
 use mmsmith_mpm::Stressed;
 use mmsmith_runtime::{AnySolution, Solution};
 
-use crate::case::{Arithmetic, Case, CflSpeed, Extent};
+use crate::case::{Arithmetic, Case, CflSpeed, Extent, law};
 use crate::dimension::in_dimension;
 use crate::error::{CaseError, MOST_STEPS};
 use crate::norms::PerField;
@@ -124,6 +124,8 @@ where
     case.validate()?;
     let end = case.periods * exact.period();
     let scene = Scene::new(exact, case, end)?;
+    // A law that no scheme runs is refused before any is tried.
+    law::<f64, D>(exact.law())?;
     let waves = Waves { speed: case.cfl_speed.of(exact)?, spacing: scene.spacing };
     let steps = Steps::new(case.cfl, end, waves)?;
     if let Scheme::Updated(updated) = &case.scheme {
