@@ -123,9 +123,9 @@ where
 {
     case.validate()?;
     let end = case.periods * exact.period();
-    let scene = Scene::new(exact, case, end)?;
-    // A law that no scheme runs is refused before any is tried.
+    // First, since no other scheme would mend it.
     law::<f64, D>(exact.law())?;
+    let scene = Scene::new(exact, case, end)?;
     let waves = Waves { speed: case.cfl_speed.of(exact)?, spacing: scene.spacing };
     let steps = Steps::new(case.cfl, end, waves)?;
     if let Scheme::Updated(updated) = &case.scheme {
