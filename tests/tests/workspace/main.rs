@@ -8,6 +8,7 @@ mod golden;
 mod high_order;
 mod hostile_text;
 mod kept_runs;
+mod laws;
 mod library;
 mod new_solution;
 mod orders;
