@@ -193,7 +193,6 @@ fn assert_order(series: &[Series], scheme: &str, expected: f64) {
             let words = ["converge", file.to_str().unwrap()].into_iter();
             let result = json(&words.chain(call.split_whitespace()).collect::<Vec<_>>());
             let fit = at(&result, &["orders", "u", "l2", "fit"]);
-            println!("{motion}, {}: {fit:.2}", law.about);
             if fit.is_nan() || fit < expected - TOLERANCE {
                 let errors = column(&result, &["errors", "u", "l2"]);
                 missed.push(format!("{motion} {call}, {}: {fit:.2}, {errors:?}", law.about));
