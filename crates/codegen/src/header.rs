@@ -630,11 +630,14 @@ before. Results equal those of the Rust functions bit for bit where the compiler
         ] {
             self.scalar(name, about, slot);
         }
-        // A host that runs a stated law has its own constants for it.
-        if let Law::Library(material) = &constants.law {
-            for (constant, slot) in material.row().constants.iter().zip(material.values()) {
-                self.scalar(constant.name, constant.meaning, slot);
+        match &constants.law {
+            Law::Library(material) => {
+                for (constant, slot) in material.row().constants.iter().zip(material.values()) {
+                    self.scalar(constant.name, constant.meaning, slot);
+                }
             }
+            // A host that runs a stated law has its own constants for it.
+            Law::Stated(_) => {}
         }
         match &constants.domain {
             Measures::Box { lower, upper } => {

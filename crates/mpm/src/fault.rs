@@ -4,6 +4,7 @@
 //! in no other: simulations beside it and tests on other threads stay sound. Without the feature no fault can be planted,
 //! [`Planted`] has no size, and all its questions are constants.
 
+use mmsmith_vocabulary::Material;
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::tensor::{determinant, inverse_transpose};
@@ -93,6 +94,87 @@ pub enum Fault {
     AffinePartDropped,
     /// The terms of XPIC all with the same sign.
     XpicSign,
+    /// Yeoh's law: the derivative of the second power without its 2.
+    YeohFactor,
+    /// Yeoh's law: the third power with the opposite sign.
+    YeohSign,
+    /// Gent's law: the slope of the energy without its half.
+    GentFactor,
+    /// Gent's law: the logarithm with the opposite sign.
+    GentSign,
+    /// Arruda and Boyce's law: the locking stretch for its square.
+    ArrudaBoyceFactor,
+    /// Arruda and Boyce's law: the pressure with the opposite sign.
+    ArrudaBoyceSign,
+    /// Orthotropic elasticity: shears of the strain for those of engineers, which are twice as large.
+    OrthotropicFactor,
+    /// Orthotropic elasticity: a normal stress from the strain across with the opposite sign.
+    OrthotropicSign,
+    /// Ogden's law: powers of squared stretches for those of stretches.
+    OgdenFactor,
+    /// Ogden's law: the first power with the opposite sign.
+    OgdenSign,
+    /// Holzapfel, Gasser and Ogden's law: the derivative of the square in the exponential without its 2.
+    HolzapfelGasserOgdenFactor,
+    /// Holzapfel, Gasser and Ogden's law: fibres at the opposite angle.
+    HolzapfelGasserOgdenSign,
+    /// A law that the specification states: shear stresses without the part that symmetric components of C share.
+    StatedFactor,
+    /// A law that the specification states: the first normal stress with the opposite sign.
+    StatedSign,
+}
+
+/// A fault in a law of the library, as what it makes of constants.
+#[cfg(feature = "planted-faults")]
+struct InLaw {
+    fault: Fault,
+    /// The law's name in specifications.
+    law: &'static str,
+    constants: &'static [&'static str],
+    change: Change,
+}
+
+/// What becomes of a constant.
+#[cfg(feature = "planted-faults")]
+enum Change {
+    Times(f64),
+    Root,
+}
+
+#[cfg(feature = "planted-faults")]
+const IN_LAWS: &[InLaw] = &[
+    in_law(Fault::YeohFactor, "yeoh", &["c2"], Change::Times(0.5)),
+    in_law(Fault::YeohSign, "yeoh", &["c3"], Change::Times(-1.0)),
+    in_law(Fault::GentFactor, "gent", &["mu"], Change::Times(2.0)),
+    in_law(Fault::GentSign, "gent", &["mu"], Change::Times(-1.0)),
+    in_law(Fault::ArrudaBoyceFactor, "arruda-boyce", &["N"], Change::Root),
+    in_law(Fault::ArrudaBoyceSign, "arruda-boyce", &["kappa"], Change::Times(-1.0)),
+    in_law(Fault::OrthotropicFactor, "orthotropic", &["c44", "c55", "c66"], Change::Times(0.5)),
+    in_law(Fault::OrthotropicSign, "orthotropic", &["c12"], Change::Times(-1.0)),
+    in_law(Fault::OgdenFactor, "ogden", &["alpha1", "alpha2", "alpha3"], Change::Times(2.0)),
+    in_law(Fault::OgdenSign, "ogden", &["alpha1"], Change::Times(-1.0)),
+    in_law(
+        Fault::HolzapfelGasserOgdenFactor,
+        "holzapfel-gasser-ogden",
+        &["k1"],
+        Change::Times(0.5),
+    ),
+    in_law(
+        Fault::HolzapfelGasserOgdenSign,
+        "holzapfel-gasser-ogden",
+        &["angle"],
+        Change::Times(-1.0),
+    ),
+];
+
+#[cfg(feature = "planted-faults")]
+const fn in_law(
+    fault: Fault,
+    law: &'static str,
+    constants: &'static [&'static str],
+    change: Change,
+) -> InLaw {
+    InLaw { fault, law, constants, change }
 }
 
 /// The fault of one simulation, if it has one.
@@ -139,6 +221,21 @@ impl Planted {
     pub fn is_any(self) -> bool {
         self.0.is_some()
     }
+
+    /// The law as stresses are formed of it; energies keep their own.
+    pub(crate) fn law_in_stresses<T: RealField + Copy>(self, material: Material<T>) -> Material<T> {
+        if !self.is_any() {
+            return material;
+        }
+        let name = material.row().name;
+        let here = |fault: &&InLaw| self.is(fault.fault) && fault.law == name;
+        let Some(fault) = IN_LAWS.iter().find(here) else { return material };
+        material.map_named(|name, value| match (fault.constants.contains(&name), &fault.change) {
+            (false, _) => value,
+            (true, Change::Times(factor)) => value * nalgebra::convert::<f64, T>(*factor),
+            (true, Change::Root) => value.sqrt(),
+        })
+    }
 }
 
 #[cfg(not(feature = "planted-faults"))]
@@ -162,6 +259,12 @@ impl Planted {
     #[must_use]
     pub const fn is_any(self) -> bool {
         false
+    }
+
+    /// The same law.
+    #[inline(always)]
+    pub(crate) fn law_in_stresses<T>(self, material: Material<T>) -> Material<T> {
+        material
     }
 }
 

@@ -255,13 +255,15 @@ fn of_blocks<T: Lanes, const D: usize>(law: &Law<T, D>) -> Box<dyn BlockLaw<T, D
         Law::Library(material) => *material,
         Law::Own(law) => return Box::new(OwnBlocks(law.clone())),
     };
-    match material {
-        Material::NeoHookean { lambda, mu } if lambda == T::zero() => {
+    // One law has kernels of its own; those of `AnyLaw` serve every law.
+    if let Material::NeoHookean { lambda, mu } = material {
+        return if lambda == T::zero() {
             Box::new(NeoHookeanNoLog { mu })
-        }
-        Material::NeoHookean { lambda, mu } => Box::new(NeoHookean { lambda, mu, planted }),
-        other => Box::new(AnyLaw(other)),
+        } else {
+            Box::new(NeoHookean { lambda, mu, planted })
+        };
     }
+    Box::new(AnyLaw(planted.law_in_stresses(material)))
 }
 
 fn check<T: Lanes, const D: usize>(

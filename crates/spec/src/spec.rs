@@ -12,7 +12,7 @@ use crate::scope::{Scope, Source};
 use crate::{Coordinates, CrossCheck, DeriveError, Diagnostic, Fields, Rotation, Solved};
 use mmsmith_expr::{Expr, Function, Graph, Node, Program};
 use mmsmith_vocabulary::{
-    Components, Constant, Material, Moduli, Response, Stated, Term, UnknownLaw, Volumetric,
+    Components, Constant, Material, Moduli, Response, Row, Stated, Term, UnknownLaw, Volumetric,
 };
 use toml::Spanned;
 
@@ -164,23 +164,60 @@ pub enum Law {
     },
 }
 
+/// What the key `law` of a specification names.
+#[derive(Clone, Copy)]
+enum Kind {
+    Library(&'static Row),
+    Energy,
+    Stress,
+}
+
+impl Kind {
+    fn all() -> impl Iterator<Item = Kind> {
+        let rows = Material::<Expr>::ROWS.iter().map(Kind::Library);
+        rows.chain([Kind::Energy, Kind::Stress])
+    }
+
+    /// The name that specifications use.
+    fn name(self) -> &'static str {
+        match self {
+            Kind::Library(row) => row.name,
+            Kind::Energy => "energy",
+            Kind::Stress => "stress",
+        }
+    }
+
+    /// The keys that belong to the law.
+    fn keys(self) -> Vec<&'static str> {
+        match self {
+            Kind::Library(row) => {
+                let volumetric = row.chooses_volumetric.then_some("volumetric");
+                row.constants.iter().map(|constant| constant.name).chain(volumetric).collect()
+            }
+            Kind::Energy => vec!["W"],
+            Kind::Stress => vec!["P"],
+        }
+    }
+}
+
 impl Law {
-    /// The laws that a specification states by itself, by their names.
-    const STATED: [&'static str; 2] = ["energy", "stress"];
+    fn kind(&self) -> Kind {
+        match self {
+            Law::Library(material) => Kind::Library(material.row()),
+            Law::Energy { .. } => Kind::Energy,
+            Law::Stress { .. } => Kind::Stress,
+        }
+    }
 
     /// Every law by the name that specifications use.
     pub fn names() -> impl Iterator<Item = &'static str> {
-        Material::<Expr>::ROWS.iter().map(|row| row.name).chain(Self::STATED)
+        Kind::all().map(Kind::name)
     }
 
     /// The name that specifications use.
     #[must_use]
     pub fn name(&self) -> &'static str {
-        match self {
-            Law::Library(material) => material.row().name,
-            Law::Energy { .. } => Self::STATED[0],
-            Law::Stress { .. } => Self::STATED[1],
-        }
+        self.kind().name()
     }
 
     /// The constants of a law of the library, with their values; none for a law that only the specification states.
@@ -229,12 +266,12 @@ impl Law {
         graph: &Graph,
         coordinates: Coordinates,
     ) -> mmsmith_vocabulary::Law<Expr> {
-        let (response, of_response) = match self {
+        let (response, of_response, is_stress) = match self {
             Law::Library(material) => return mmsmith_vocabulary::Law::Library(*material),
-            Law::Energy { W } => (Response::Energy(graph.print(*W)), vec![*W]),
+            Law::Energy { W } => (Response::Energy(graph.print(*W)), vec![*W], false),
             Law::Stress { P } => {
                 let row = |row: &Vec<Expr>| row.iter().map(|&entry| graph.print(entry)).collect();
-                (Response::Stress(P.iter().map(row).collect()), P.concat())
+                (Response::Stress(P.iter().map(row).collect()), P.concat(), true)
             }
         };
         let names = ["F", "C"].map(|letter| component_names(letter, 3).concat()).concat();
@@ -242,7 +279,6 @@ impl Law {
         let (in_components, others): (Vec<_>, Vec<_>) = symbols
             .filter_map(|symbol| Some((graph.symbol_name(symbol)?.to_owned(), symbol)))
             .partition(|(name, _)| names.contains(name));
-        let is_stress = matches!(self, Law::Stress { .. });
         let has_components = is_stress || !in_components.is_empty();
         let components = match coordinates {
             Coordinates::Cartesian => Components::Cartesian,
@@ -714,16 +750,8 @@ impl<'a> Reader<'a> {
 
     fn material(&mut self, document: &Document) -> Result<Law, Diagnostic> {
         let table = document.material.get_ref();
-        let law = self.choice(&table.law, "law", Law::names().map(|name| (name, name)))?;
-        let row = Material::<Expr>::ROWS.iter().find(|row| row.name == law);
-        let mut keys: Vec<&str> = match row {
-            Some(row) => row.constants.iter().map(|constant| constant.name).collect(),
-            None if law == "energy" => vec!["W"],
-            None => vec!["P"],
-        };
-        if row.is_some_and(|row| row.chooses_volumetric) {
-            keys.push("volumetric");
-        }
+        let kind = self.choice(&table.law, "law", Kind::all().map(|kind| (kind.name(), kind)))?;
+        let (law, keys) = (kind.name(), kind.keys());
         let given = table.constants.0.iter().map(|(key, _)| (key.get_ref().as_str(), key.span()));
         let given = given.chain(table.W.iter().map(|text| ("W", text.span.clone())));
         let given = given.chain(table.P.iter().map(|_| ("P", table.law.span())));
@@ -743,8 +771,9 @@ impl<'a> Reader<'a> {
             let message = format!("the law '{law}' needs '{key}'");
             scope.source.error(message, table.law.span(), Some(help.into()))
         };
-        let Some(row) = row else {
-            if law == "stress" {
+        let row = match kind {
+            Kind::Library(row) => row,
+            Kind::Stress => {
                 let Some(entries) = &table.P else {
                     let help =
                         "give its components, as P = { 11 = 'mu*(F11 - 1/F11)', 12 = '...' }";
@@ -752,13 +781,15 @@ impl<'a> Reader<'a> {
                 };
                 return self.stress_components(entries);
             }
-            let Some(text) = &table.W else {
-                let help = "give it in J, I1, I2, F11, ..., C11, ..., for example \
-                            W = 'mu/2*(I1 - 3 - 2*ln(J)) + lambda/2*ln(J)^2'";
-                return Err(missing(&self.scope, "W", help));
-            };
-            let names = self.response_names();
-            return Ok(Law::Energy { W: self.scope.response(text, "an energy", &names)? });
+            Kind::Energy => {
+                let Some(text) = &table.W else {
+                    let help = "give it in J, I1, I2, F11, ..., C11, ..., for example \
+                                W = 'mu/2*(I1 - 3 - 2*ln(J)) + lambda/2*ln(J)^2'";
+                    return Err(missing(&self.scope, "W", help));
+                };
+                let names = self.response_names();
+                return Ok(Law::Energy { W: self.scope.response(text, "an energy", &names)? });
+            }
         };
         let volumetric = match volumetric {
             Some(word) => self.choice(word, "volumetric part", Volumetric::NAMES)?,

@@ -155,15 +155,15 @@ pub(crate) fn law<T: Real, const D: usize>(
         mmsmith_runtime::Law::Stated(stated) => return stated_law::read(stated),
     };
     let planted = Planted::here();
-    Ok(Law::from(match material {
-        Material::NeoHookean { lambda, mu } if planted.is(Fault::LambdaForMu) => {
-            Material::NeoHookean { lambda: mu, mu: lambda }
-        }
-        material if planted.is(Fault::StiffnessOff) => {
-            material.map(|constant| constant * T::nearest(1.0 + 1e-6))
-        }
-        material => material,
-    }))
+    if planted.is(Fault::LambdaForMu)
+        && let Material::NeoHookean { lambda, mu } = material
+    {
+        return Ok(Law::from(Material::NeoHookean { lambda: mu, mu: lambda }));
+    }
+    if planted.is(Fault::StiffnessOff) {
+        return Ok(Law::from(material.map(|constant| constant * T::nearest(1.0 + 1e-6))));
+    }
+    Ok(Law::from(material))
 }
 
 /// A number with its fraction, even where that is zero.

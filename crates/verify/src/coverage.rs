@@ -215,13 +215,14 @@ fn skew<const D: usize>(A: &SMatrix<f64, D, D>) -> f64 {
     ((A - A.transpose()) * 0.5).norm_squared()
 }
 
-/// The law without the modulus of a change of volume.
+/// The law without the modulus of a change of volume, where it has one of its own.
 fn without_pressure(law: Law<f64>) -> Law<f64> {
     match law {
-        Law::Library(material) => Law::Library(material.map_named(|name, value| match name {
-            "lambda" | "kappa" => 0.0,
-            _ => value,
-        })),
+        Law::Library(material) => {
+            let modulus = material.row().volume;
+            let keep = |name, value| if modulus == Some(name) { 0.0 } else { value };
+            Law::Library(material.map_named(keep))
+        }
         stated @ Law::Stated(_) => stated,
     }
 }

@@ -1,5 +1,6 @@
 //! Laws that specifications state, as the solver runs them.
 
+use mmsmith_mpm::fault::{Fault, Planted};
 use mmsmith_mpm::{BLOCK, ConstitutiveLaw, Law};
 use mmsmith_runtime::{Components, Real, Stated};
 use mmsmith_stated_law::StatedLaw;
@@ -19,22 +20,36 @@ pub(crate) fn read<T: Real, const D: usize>(stated: Stated<T>) -> Result<Law<T, 
     }
     let constants: Vec<(String, f64)> =
         constants.into_iter().map(|(name, value)| (name, value.to_f64())).collect();
-    Ok(Law::from_constitutive(OfText(StatedLaw::new(D, &response, &constants)?)))
+    let law = StatedLaw::new(D, &response, &constants)?;
+    Ok(Law::from_constitutive(OfText { law, planted: Planted::here() }))
 }
 
 #[derive(Debug)]
-struct OfText<T>(StatedLaw<T>);
+struct OfText<T> {
+    law: StatedLaw<T>,
+    planted: Planted,
+}
 
 impl<T: Real, const D: usize> ConstitutiveLaw<T, D> for OfText<T> {
     fn first_piola_kirchhoff(&self, F: &[[[T; BLOCK]; D]; D], P: &mut [[[T; BLOCK]; D]; D]) {
-        self.0.first_piola_kirchhoff(F, P);
+        self.law.first_piola_kirchhoff(F, P);
+        if self.planted.is(Fault::StatedFactor) {
+            for i in 0..D {
+                for j in (0..D).filter(|j| *j != i) {
+                    P[i][j].iter_mut().for_each(|shear| *shear *= T::nearest(0.5));
+                }
+            }
+        }
+        if self.planted.is(Fault::StatedSign) {
+            P[0][0].iter_mut().for_each(|normal| *normal = -*normal);
+        }
     }
 
     fn strain_energy(&self, F: &SMatrix<T, D, D>) -> Option<T> {
-        self.0.strain_energy(F)
+        self.law.strain_energy(F)
     }
 
     fn kirchhoff_across(&self, F: &SMatrix<T, D, D>) -> Option<T> {
-        self.0.kirchhoff_across(F)
+        self.law.kirchhoff_across(F)
     }
 }

@@ -27,6 +27,8 @@ pub struct Row {
     pub formula: &'static str,
     /// The constants, in the order of the variant's fields.
     pub constants: &'static [Constant],
+    /// The constant that is the modulus of a change of volume alone, if one is.
+    pub volume: Option<&'static str>,
     /// Whether specifications choose the volumetric part, see [`Volumetric`].
     pub chooses_volumetric: bool,
     /// Whether the stress turns with the body.
@@ -173,6 +175,7 @@ macro_rules! materials {
             $([$volumetric:ident])?
         }
         stress: $formula:literal,
+        volume: [$($modulus:ident)?],
         derivation: $derivation:expr,
         objective: $objective:literal,
         at_rest: [$(
@@ -213,6 +216,13 @@ macro_rules! materials {
                     meaning: $meaning,
                     usual: concat!($($usual)?),
                 },)*],
+                volume: {
+                    let modulus: &[&str] = &[$(stringify!($modulus))?];
+                    match modulus {
+                        [] => None,
+                        [name, ..] => Some(name),
+                    }
+                },
                 chooses_volumetric: {
                     let chosen: &[&str] = &[$(stringify!($volumetric),)?];
                     !chosen.is_empty()
@@ -348,6 +358,7 @@ materials! {
         mu: "shear modulus" or "E/(2*(1 + nu))",
     }
     stress: "tau = lambda ln(J) I + mu (F F^T - I)",
+    volume: [lambda],
     derivation: Derivation::NeoHookean { lambda, mu },
     objective: true,
     at_rest: [lambda: (1, lambda ^ 1), mu: (1, mu ^ 1)],
@@ -360,6 +371,7 @@ materials! {
         mu: "shear modulus" or "E/(2*(1 + nu))",
     }
     stress: "P = F (lambda tr(E) I + 2 mu E), E = (F^T F - I)/2",
+    volume: [lambda],
     derivation: Derivation::StVenantKirchhoff { lambda, mu },
     objective: true,
     at_rest: [lambda: (1, lambda ^ 1), mu: (1, mu ^ 1)],
@@ -370,6 +382,7 @@ materials! {
         mu: "shear modulus" or "E/(2*(1 + nu))",
     }
     stress: "tau = lambda ln(J) I + 2 mu ln V",
+    volume: [lambda],
     derivation: Derivation::PrincipalStretches(InStretches {
         volume: "lambda/2*ln(J)^2",
         alone: "mu*ln(stretch)^2",
@@ -385,6 +398,7 @@ materials! {
         mu: "shear modulus" or "E/(2*(1 + nu))",
     }
     stress: "P = lambda tr(H) I + mu (H + H^T)",
+    volume: [lambda],
     derivation: Derivation::LinearElastic { lambda, mu },
     objective: false,
     at_rest: [lambda: (1, lambda ^ 1), mu: (1, mu ^ 1)],
@@ -396,6 +410,7 @@ materials! {
         lambda: "the factor of (ln J)^2/2",
     }
     stress: "W = c1 (I1 - 3 - 2 ln J) + c2 (I2 - 3 - 4 ln J) + lambda/2 (ln J)^2",
+    volume: [lambda],
     derivation: Derivation::energy("c1*(I1-3-2*ln(J)) + c2*(I2-3-4*ln(J)) + lambda/2*ln(J)^2"),
     objective: true,
     at_rest: [lambda: (1, lambda ^ 1) (4, c2 ^ 1), mu: (2, c1 ^ 1) (2, c2 ^ 1)],
@@ -411,6 +426,7 @@ materials! {
         [volumetric]
     }
     stress: "W = c1 (I1b - 3) + c2 (I1b - 3)^2 + c3 (I1b - 3)^3 + kappa U(J), I1b = J^(-2/3) I1",
+    volume: [kappa],
     derivation: Derivation::energy(
         "c1*(J^(-2/3)*I1 - 3) + c2*(J^(-2/3)*I1 - 3)^2 + c3*(J^(-2/3)*I1 - 3)^3"
     ),
@@ -427,6 +443,7 @@ materials! {
         [volumetric]
     }
     stress: "W = -mu Jm/2 ln(1 - (I1b - 3)/Jm) + kappa U(J), I1b = J^(-2/3) I1",
+    volume: [kappa],
     derivation: Derivation::energy("-mu*Jm/2*ln(1 - (J^(-2/3)*I1 - 3)/Jm)"),
     objective: true,
     at_rest: [lambda: (1, kappa ^ 1) (-2 / 3, mu ^ 1), mu: (1, mu ^ 1)],
@@ -442,6 +459,7 @@ materials! {
     }
     stress: "W = mu (1/2 (I1b - 3) + 1/(20 N) (I1b^2 - 9) + 11/(1050 N^2) (I1b^3 - 27) + 19/(7000 N^3) (I1b^4 - 81) \
              + 519/(673750 N^4) (I1b^5 - 243)) + kappa U(J), I1b = J^(-2/3) I1",
+    volume: [kappa],
     derivation: Derivation::energy(
         "mu*((J^(-2/3)*I1 - 3)/2 + ((J^(-2/3)*I1)^2 - 9)/(20*N) + 11*((J^(-2/3)*I1)^3 - 27)/(1050*N^2) \
          + 19*((J^(-2/3)*I1)^4 - 81)/(7000*N^3) + 519*((J^(-2/3)*I1)^5 - 243)/(673750*N^4))"
@@ -470,6 +488,7 @@ materials! {
         c66: "modulus of S12 for 2 E12",
     }
     stress: "P = F S, S11 = c11 E11 + c12 E22 + c13 E33, ..., S12 = 2 c66 E12, ..., E = (F^T F - I)/2",
+    volume: [],
     derivation: Derivation::energy(
         "c11*(C11 - 1)^2/8 + c22*(C22 - 1)^2/8 + c33*(C33 - 1)^2/8 + c12*(C11 - 1)*(C22 - 1)/4 \
          + c13*(C11 - 1)*(C33 - 1)/4 + c23*(C22 - 1)*(C33 - 1)/4 + c44*C23^2/2 + c55*C13^2/2 + c66*C12^2/2"
@@ -491,6 +510,7 @@ materials! {
         [volumetric]
     }
     stress: "W = sum mu_p/alpha_p (lb1^alpha_p + lb2^alpha_p + lb3^alpha_p - 3) + kappa U(J), lb = J^(-1/3) lambda",
+    volume: [kappa],
     derivation: Derivation::PrincipalStretches(InStretches {
         volume: "0",
         alone: "mu1/alpha1*expm1(alpha1*(ln(stretch) - ln(J)/3)) + mu2/alpha2*expm1(alpha2*(ln(stretch) - ln(J)/3)) \
@@ -520,6 +540,7 @@ materials! {
         [volumetric]
     }
     stress: "W = mu/2 (I1b - 3) + k1/(2 k2) (exp(k2 <I4 - 1>^2) - 1) + kappa U(J), I1b = J^(-2/3) I1, I4 = a . C a",
+    volume: [kappa],
     derivation: Derivation::energy(
         "mu/2*(J^(-2/3)*I1 - 3) + k1/(2*k2)*expm1(k2*positive_part(cos(angle)^2*(C11 - 1) \
          + 2*cos(angle)*sin(angle)*C12 + sin(angle)^2*(C22 - 1))^2)"

@@ -8,10 +8,12 @@ mod golden;
 mod high_order;
 mod hostile_text;
 mod kept_runs;
+mod laws;
 mod library;
 mod new_solution;
 mod orders;
 mod planted_faults;
+mod planted_law_faults;
 mod planted_solver_faults;
 #[path = "../../../crates/mpm/tests/reference/mod.rs"]
 mod reference;

@@ -856,12 +856,13 @@ fn faults_are_planted_in_the_simulations_meant_and_in_no_others() {
     assert_eq!(run(), sound);
 }
 
+/// Those in laws, after them, are in `planted_law_faults.rs`.
 #[test]
 fn every_fault_is_listed_once() {
     assert_eq!(
         FAULTS.len(),
         Fault::XpicSign as usize + 1,
-        "the last fault is the last of the list"
+        "the last fault outside of laws is the last of the list"
     );
     for (k, (fault, _)) in FAULTS.iter().enumerate() {
         assert_eq!(*fault as usize, k, "{fault:?}");

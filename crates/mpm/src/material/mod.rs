@@ -131,6 +131,12 @@ pub trait Stressed<const D: usize>: Lanes {
     fn strain_energy(material: &Material<Self>, F: &SMatrix<Self, D, D>) -> Option<Self>;
 }
 
+/// The law as stresses are formed of it: another with a planted fault alone.
+#[inline(always)]
+fn in_stresses<T: RealField + Copy>(material: &Material<T>) -> Material<T> {
+    Planted::here().law_in_stresses(*material)
+}
+
 macro_rules! stressed {
     ($($T:ty: $($D:literal)*;)*) => {
         $($(impl Stressed<$D> for $T {
@@ -139,7 +145,7 @@ macro_rules! stressed {
                 F: &SMatrix<Self, $D, $D>,
             ) -> Option<SMatrix<Self, $D, $D>> {
                 jacobian(F)?;
-                Some(with_law!(material, |law| law.kirchhoff(F)))
+                Some(with_law!(&in_stresses(material), |law| law.kirchhoff(F)))
             }
 
             fn first_piola_kirchhoff(
@@ -147,7 +153,7 @@ macro_rules! stressed {
                 F: &SMatrix<Self, $D, $D>,
             ) -> Option<SMatrix<Self, $D, $D>> {
                 jacobian(F)?;
-                Some(with_law!(material, |law| law.first_piola_kirchhoff(F)))
+                Some(with_law!(&in_stresses(material), |law| law.first_piola_kirchhoff(F)))
             }
 
             fn first_piola_kirchhoff_side_by_side(
@@ -155,7 +161,7 @@ macro_rules! stressed {
                 F: &[[[Self; SIDE_BY_SIDE]; $D]; $D],
                 P: &mut [[[Self; SIDE_BY_SIDE]; $D]; $D],
             ) {
-                with_law!(material, |law| dispatch(SideBySide { law, F, P }));
+                with_law!(&in_stresses(material), |law| dispatch(SideBySide { law, F, P }));
             }
 
             fn kirchhoff_in_space(
@@ -164,7 +170,7 @@ macro_rules! stressed {
             ) -> Matrix3<Self> {
                 let mut in_space = Matrix3::identity();
                 in_space.fixed_view_mut::<$D, $D>(0, 0).copy_from(F);
-                with_law!(material, |law| law.kirchhoff(&in_space))
+                with_law!(&in_stresses(material), |law| law.kirchhoff(&in_space))
             }
 
             fn strain_energy(

@@ -441,15 +441,20 @@ impl<const D: usize> TotalLagrangian<D> {
         });
         let forced = !body_force.is_absent() && !self.planted.is(Fault::NoBodyForce);
         let force = forced.then_some((body_force, time));
+        let planted = self.planted;
         let bad = match self.law.clone() {
-            Law::Library(Material::NeoHookean { lambda: 0.0, mu }) => {
-                self.stress(NeoHookeanNoLog { mu }, force)
+            // One law has kernels of its own; those of `AnyLaw` serve every law.
+            Law::Library(material) => {
+                if let Material::NeoHookean { lambda, mu } = material {
+                    if lambda == 0.0 {
+                        self.stress(NeoHookeanNoLog { mu }, force)
+                    } else {
+                        self.stress(NeoHookean { lambda, mu, planted }, force)
+                    }
+                } else {
+                    self.stress(AnyLaw(planted.law_in_stresses(material)), force)
+                }
             }
-            Law::Library(Material::NeoHookean { lambda, mu }) => {
-                let planted = self.planted;
-                self.stress(NeoHookean { lambda, mu, planted }, force)
-            }
-            Law::Library(other) => self.stress(AnyLaw(other), force),
             Law::Own(law) => self.stress(OwnRows(law), force),
         };
         if bad {
