@@ -100,7 +100,7 @@ pub use body_force::{AtTime, BodyForce, NoBodyForce};
 pub use error::{SetupError, StepError};
 pub use grid::Grid;
 pub use kernel::copies::BLOCK;
-pub use material::{ConstitutiveLaw, Law, Material, SIDE_BY_SIDE, Stressed, Volumetric};
+pub use material::{ConstitutiveLaw, Law, LawCheck, Material, SIDE_BY_SIDE, Stressed, Volumetric};
 pub use particles::Particles;
 pub use scheme::{Integrator, Settings, Shape, Transfer, UnknownName};
 pub use simd::Registers;

@@ -127,9 +127,11 @@ fn sums_of_coordinates_keep_their_digits_far_from_the_body() {
     assert!(failures.is_empty(), "beyond K = {LARGEST_FACTOR}:\n{}", failures.join("\n"));
 }
 
-/// Where a specification loses digits until it is mended: K is 16 of the stress along the axis, beside a stretch of 1e-5 in a sheared
-/// plane, of which the law takes the logarithm by the ratio of both.
-const OPEN: [(&str, Class); 1] = [("tube-hencky", Class::NearInversion)];
+/// Where a specification loses digits until it is mended. K is 16 of the stress along the axis of the tube, beside a stretch of 1e-5 in a
+/// sheared plane, of which the law takes the logarithm by the ratio of both; and 9 of the body force by Gent's law, where a flat
+/// particle is next to the largest stretch of the chains.
+const OPEN: [(&str, Class); 2] =
+    [("tube-hencky", Class::NearInversion), ("axis-aligned-3d-gent", Class::NearInversion)];
 
 /// What goes beyond the bound in the specifications of a folder, by the programs alone.
 fn by_programs(folder: &str, classes: &[Class], rounds: usize) -> Vec<String> {
@@ -161,10 +163,7 @@ fn by_programs(folder: &str, classes: &[Class], rounds: usize) -> Vec<String> {
 /// Laws that no solution of the library has.
 #[test]
 fn further_specifications() {
-    // Next to the origin these fields are subnormal numbers, with few digits to judge.
-    let classes: Vec<Class> =
-        Class::ALL.iter().copied().filter(|class| *class != Class::NearOrigin).collect();
-    let failures = by_programs("materials", &classes, 0);
+    let failures = by_programs("materials", &Class::ALL, 0);
     assert!(failures.is_empty(), "beyond K = {LARGEST_FACTOR}:\n{}", failures.join("\n"));
 }
 

@@ -29,7 +29,7 @@ use mmsmith_scalar_functions::logarithm::{is_near_one, ln_near_one, ln_of_both_i
 use nalgebra::{Matrix3, RealField, SMatrix};
 
 pub(crate) use law::{BlockOfStresses, OwnBlocks};
-pub use law::{ConstitutiveLaw, Law};
+pub use law::{ConstitutiveLaw, Law, LawCheck};
 pub use mmsmith_vocabulary::{Material, Volumetric};
 pub(crate) use neo_hookean::{NeoHookean, NeoHookeanNoLog};
 

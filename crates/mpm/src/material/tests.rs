@@ -1,4 +1,5 @@
 use super::*;
+use crate::kernel::copies::BLOCK;
 use nalgebra::{Matrix1, Matrix2, Matrix3, Rotation3};
 use proptest::prelude::*;
 use std::array;
@@ -330,4 +331,104 @@ fn the_short_way_to_the_stress_is_taken_near_volumes_as_they_were_and_has_the_sa
     check::<1>();
     check::<2>();
     check::<3>();
+}
+
+/// Laws of the library beyond [`LAWS`], of moduli of like size.
+const FURTHER_LAWS: [Material<f64>; 6] = [
+    Material::Yeoh { c1: 1.3, c2: -0.2, c3: 0.05, kappa: 5.0, volumetric: Volumetric::Logarithmic },
+    Material::Gent { mu: 2.6, Jm: 30.0, kappa: 5.0, volumetric: Volumetric::Quadratic },
+    Material::ArrudaBoyce { mu: 2.6, N: 8.0, kappa: 5.0, volumetric: Volumetric::Mixed },
+    Material::Ogden {
+        mu1: 2.1,
+        alpha1: 1.3,
+        mu2: 0.1,
+        alpha2: 5.0,
+        mu3: -0.1,
+        alpha3: -2.0,
+        kappa: 5.0,
+        volumetric: Volumetric::Logarithmic,
+    },
+    Material::HolzapfelGasserOgden {
+        mu: 2.6,
+        k1: 1.7,
+        k2: 0.8,
+        angle: 0.4,
+        kappa: 5.0,
+        volumetric: Volumetric::Quadratic,
+    },
+    Material::Orthotropic {
+        c11: 9.0,
+        c22: 7.0,
+        c33: 6.0,
+        c12: 2.0,
+        c13: 1.5,
+        c23: 1.2,
+        c44: 2.5,
+        c55: 2.2,
+        c66: 3.0,
+    },
+];
+
+#[test]
+fn laws_of_the_library_agree_with_themselves() {
+    fn check<T: Stressed<D>, const D: usize>(material: Material<f64>) {
+        let found = Law::<T, D>::from(material.map(real)).check(real(0.2));
+        assert!(found.passed(), "{material:?} in {D} dimensions: {found:?}");
+        assert!(found.energy.is_some());
+    }
+    for material in LAWS[..5].iter().chain(&FURTHER_LAWS) {
+        check::<f64, 1>(*material);
+        check::<f64, 2>(*material);
+        check::<f64, 3>(*material);
+    }
+    for material in &LAWS[..5] {
+        check::<f32, 2>(*material);
+        check::<f32, 3>(*material);
+    }
+}
+
+/// A law of the library with a mistake.
+#[derive(Debug)]
+struct Mistaken {
+    /// Stress that it has at rest.
+    at_rest: f64,
+    /// Whether its P is the nominal stress.
+    is_transposed: bool,
+    /// What its energy is multiplied by.
+    energy: f64,
+}
+
+impl ConstitutiveLaw<f64, 2> for Mistaken {
+    fn first_piola_kirchhoff(&self, F: &[[[f64; BLOCK]; 2]; 2], P: &mut [[[f64; BLOCK]; 2]; 2]) {
+        let law = Law::<f64, 2>::from(LAWS[4]);
+        for n in 0..BLOCK {
+            let F = Matrix2::from_fn(|i, j| F[i][j][n]);
+            let stress = law.first_piola_kirchhoff(&F).unwrap();
+            let stress = if self.is_transposed { stress.transpose() } else { stress };
+            let stress = plus_diagonal(stress, self.at_rest);
+            for i in 0..2 {
+                for j in 0..2 {
+                    P[i][j][n] = stress[(i, j)];
+                }
+            }
+        }
+    }
+
+    fn strain_energy(&self, F: &Matrix2<f64>) -> Option<f64> {
+        Some(self.energy * Law::<f64, 2>::from(LAWS[4]).strain_energy(F)?)
+    }
+}
+
+#[test]
+fn a_law_from_outside_that_contradicts_itself_is_found() {
+    let right = Mistaken { at_rest: 0.0, is_transposed: false, energy: 1.0 };
+    let check = |law: Mistaken| Law::from_constitutive(law).check(0.2);
+    let found = check(Mistaken { at_rest: 0.1, ..right });
+    assert!(!found.passed() && found.stress_at_rest > 1e-3, "{found:?}");
+    let found = check(Mistaken { is_transposed: true, ..right });
+    assert!(!found.passed() && found.asymmetry > 1e-3 && found.turned > 1e-3, "{found:?}");
+    let found = check(Mistaken { energy: 1.01, ..right });
+    assert!(!found.passed() && found.energy.unwrap() > 1e-3, "{found:?}");
+    assert!(found.asymmetry < 1e-14 && found.turned < 1e-14, "{found:?}");
+    assert!(check(right).passed());
 }
