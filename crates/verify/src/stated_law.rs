@@ -2,7 +2,7 @@
 
 use mmsmith_mpm::{BLOCK, ConstitutiveLaw, Law};
 use mmsmith_runtime::{Components, Real, Stated};
-use mmsmith_stated_law::StatedLaw;
+use mmsmith_stated_law::{Compiled, StatedLaw};
 use nalgebra::SMatrix;
 
 use crate::error::SceneError;
@@ -12,7 +12,9 @@ use crate::error::SceneError;
 /// # Errors
 ///
 /// Where it is stated along directions that turn from place to place, or is no law.
-pub(crate) fn read<T: Real, const D: usize>(stated: Stated<T>) -> Result<Law<T, D>, SceneError> {
+pub(crate) fn read<T: Real + Compiled<D>, const D: usize>(
+    stated: Stated<T>,
+) -> Result<Law<T, D>, SceneError> {
     let Stated { response, components, constants } = stated;
     if components == Components::Curvilinear {
         return Err(SceneError::CurvilinearComponents);
@@ -25,16 +27,16 @@ pub(crate) fn read<T: Real, const D: usize>(stated: Stated<T>) -> Result<Law<T, 
 #[derive(Debug)]
 struct OfText<T>(StatedLaw<T>);
 
-impl<T: Real, const D: usize> ConstitutiveLaw<T, D> for OfText<T> {
+impl<T: Real + Compiled<D>, const D: usize> ConstitutiveLaw<T, D> for OfText<T> {
     fn first_piola_kirchhoff(&self, F: &[[[T; BLOCK]; D]; D], P: &mut [[[T; BLOCK]; D]; D]) {
-        self.0.first_piola_kirchhoff(F, P);
+        T::stress_of_block(&self.0, F, P);
     }
 
     fn strain_energy(&self, F: &SMatrix<T, D, D>) -> Option<T> {
-        self.0.strain_energy(F)
+        T::energy(&self.0, F)
     }
 
     fn kirchhoff_across(&self, F: &SMatrix<T, D, D>) -> Option<T> {
-        self.0.kirchhoff_across(F)
+        T::across(&self.0, F)
     }
 }
