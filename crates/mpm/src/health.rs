@@ -173,6 +173,8 @@ struct CheckBoxes<'a, 'b, T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> Loop for CheckBoxes<'_, '_, T, D> {
+    const WIDE: bool = D > 1;
+
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self { of_block, shape, all_valid } = self;
@@ -208,6 +210,8 @@ struct CheckParallelograms<'a, 'b, T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> Loop for CheckParallelograms<'_, '_, T, D> {
+    const WIDE: bool = D > 1;
+
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self { of_block, half_edges, ids, all_valid } = self;
@@ -233,6 +237,8 @@ struct CheckCells<'a, 'b, T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> Loop for CheckCells<'_, '_, T, D> {
+    const WIDE: bool = D > 1;
+
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self { of_block, mesh, ids, all_valid } = self;

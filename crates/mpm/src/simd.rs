@@ -14,6 +14,9 @@ use crate::tensor::real;
 
 /// A loop for vector instructions. `run` and all functions that it calls have to be `#[inline(always)]`.
 pub(crate) trait Loop {
+    /// Whether it has an instance for registers of 512 bits. On a line, where no run takes long, those of 256 bits do.
+    const WIDE: bool;
+
     fn run<V: Vectors>(self, vectors: V);
 }
 
@@ -570,14 +573,17 @@ impl Registers {
 
 /// Runs the widest instance that this processor supports and that is [allowed](Registers::use_at_most).
 #[inline(never)]
-pub(crate) fn dispatch(work: impl Loop) {
+pub(crate) fn dispatch<L: Loop>(work: L) {
     #[cfg(target_arch = "x86_64")]
     {
-        let widest = WIDEST.load(Ordering::Relaxed);
-        let avx2 = match Arch::new() {
-            Arch::V4(simd) if widest > Registers::Avx2 as u8 => {
-                return Simd::vectorize(simd, Instance(work, simd));
-            }
+        let (arch, widest) = (Arch::new(), WIDEST.load(Ordering::Relaxed));
+        if L::WIDE
+            && let Arch::V4(simd) = arch
+            && widest > Registers::Avx2 as u8
+        {
+            return Simd::vectorize(simd, Instance(work, simd));
+        }
+        let avx2 = match arch {
             Arch::V4(simd) => Some(*simd),
             Arch::V3(simd) => Some(simd),
             _ => None,

@@ -115,21 +115,22 @@ pub enum StatedLawError {
 #[derive(Clone, Debug)]
 pub struct StatedLaw<T> {
     dimension: usize,
+    programs: Programs,
+    number: PhantomData<fn() -> T>,
+}
+
+/// What a law comes to, whatever the numbers are.
+#[derive(Clone, Debug)]
+struct Programs {
     stress: Program,
     energy: Option<Program>,
     /// The normal stress along the axes left out.
     across: Option<Program>,
     moduli: Option<ModuliAtRest>,
-    number: PhantomData<fn() -> T>,
 }
 
-impl<T: RealField + Copy> StatedLaw<T> {
-    /// The law of `response` in a dimension, with the values of its constants.
-    ///
-    /// # Errors
-    ///
-    /// [`StatedLawError`] where a text is no law.
-    pub fn new(
+impl Programs {
+    fn new(
         dimension: usize,
         response: &Response,
         constants: &[(String, f64)],
@@ -174,7 +175,23 @@ impl<T: RealField + Copy> StatedLaw<T> {
             2 => ModuliAtRest::of::<2>(&stress, across.as_ref()),
             _ => ModuliAtRest::of::<3>(&stress, across.as_ref()),
         };
-        Ok(StatedLaw { dimension, stress, energy, across, moduli, number: PhantomData })
+        Ok(Self { stress, energy, across, moduli })
+    }
+}
+
+impl<T: RealField + Copy> StatedLaw<T> {
+    /// The law of `response` in a dimension, with the values of its constants.
+    ///
+    /// # Errors
+    ///
+    /// [`StatedLawError`] where a text is no law.
+    pub fn new(
+        dimension: usize,
+        response: &Response,
+        constants: &[(String, f64)],
+    ) -> Result<Self, StatedLawError> {
+        let programs = Programs::new(dimension, response, constants)?;
+        Ok(Self { dimension, programs, number: PhantomData })
     }
 
     /// The number of dimensions.
@@ -199,7 +216,7 @@ impl<T: RealField + Copy> StatedLaw<T> {
     ) {
         self.assert_dimension(D);
         let results = P.iter_mut().flatten();
-        self.stress.run(Given::Deformation(F), Part::Whole, results);
+        self.programs.stress.run(Given::Deformation(F), Part::Whole, results);
     }
 
     /// The strain energy per reference volume above that at rest, a stress; `None` for a law that states its stress, and where F
@@ -216,7 +233,7 @@ impl<T: RealField + Copy> StatedLaw<T> {
         /// Up to here the rule of Gauss leaves less than rounding, unless a law changes within a hundredth of this.
         const SMALL: f64 = 1e-3;
         self.assert_dimension(D);
-        let energy = self.energy.as_ref()?;
+        let energy = self.programs.energy.as_ref()?;
         let F = F.map(nalgebra::convert_unchecked::<T, f64>);
         let direct = single(energy, &F, Part::Deviation)?;
         let H = F - SMatrix::identity();
@@ -226,7 +243,7 @@ impl<T: RealField + Copy> StatedLaw<T> {
                 matrix(|i, j| GAUSS.map(|[at, _]| at * H[(i, j)]));
             let mut P = on_the_way;
             let results = P.iter_mut().flatten();
-            self.stress.run(Given::Displacement(&on_the_way), Part::Whole, results);
+            self.programs.stress.run(Given::Displacement(&on_the_way), Part::Whole, results);
             work = 0.0;
             for (n, [_, weight]) in GAUSS.iter().enumerate() {
                 for i in 0..D {
@@ -250,18 +267,61 @@ impl<T: RealField + Copy> StatedLaw<T> {
     pub fn kirchhoff_across<const D: usize>(&self, F: &SMatrix<T, D, D>) -> Option<T> {
         self.assert_dimension(D);
         let F = F.map(nalgebra::convert_unchecked::<T, f64>);
-        single(self.across.as_ref()?, &F, Part::Whole).map(nalgebra::convert)
+        single(self.programs.across.as_ref()?, &F, Part::Whole).map(nalgebra::convert)
     }
 
     /// The moduli of small strains; `None` where the stress has no derivative at rest.
     #[must_use]
     pub fn moduli_at_rest(&self) -> Option<&ModuliAtRest> {
-        self.moduli.as_ref()
+        self.programs.moduli.as_ref()
     }
 
     fn assert_dimension(&self, D: usize) {
         assert_eq!(D, self.dimension, "a law in {} dimension(s)", self.dimension);
     }
+}
+
+/// The numbers of laws in `D` dimensions, `f64` and `f32`: what a solver asks of a law, compiled with this crate.
+pub trait Compiled<const D: usize>: RealField + Copy {
+    /// [`StatedLaw::first_piola_kirchhoff`] of as many particles as a block has.
+    fn stress_of_block(
+        law: &StatedLaw<Self>,
+        F: &[[[Self; LANES]; D]; D],
+        P: &mut [[[Self; LANES]; D]; D],
+    );
+
+    /// [`StatedLaw::strain_energy`].
+    fn energy(law: &StatedLaw<Self>, F: &SMatrix<Self, D, D>) -> Option<Self>;
+
+    /// [`StatedLaw::kirchhoff_across`].
+    fn across(law: &StatedLaw<Self>, F: &SMatrix<Self, D, D>) -> Option<Self>;
+}
+
+macro_rules! compiled {
+    ($($T:ty: $($D:literal)*;)*) => {
+        $($(impl Compiled<$D> for $T {
+            fn stress_of_block(
+                law: &StatedLaw<Self>,
+                F: &[[[Self; LANES]; $D]; $D],
+                P: &mut [[[Self; LANES]; $D]; $D],
+            ) {
+                law.first_piola_kirchhoff(F, P);
+            }
+
+            fn energy(law: &StatedLaw<Self>, F: &SMatrix<Self, $D, $D>) -> Option<Self> {
+                law.strain_energy(F)
+            }
+
+            fn across(law: &StatedLaw<Self>, F: &SMatrix<Self, $D, $D>) -> Option<Self> {
+                law.kirchhoff_across(F)
+            }
+        })*)*
+    };
+}
+
+compiled! {
+    f64: 1 2 3;
+    f32: 1 2 3;
 }
 
 /// The one result of a program; `None` where F is no deformation.

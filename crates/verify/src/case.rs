@@ -3,10 +3,12 @@
 use std::fmt;
 
 use mmsmith_mpm::fault::{Fault, Planted};
-use mmsmith_mpm::{Law, Material, Shape, Stressed};
+use mmsmith_mpm::{Law, Material, Shape};
 use mmsmith_runtime::{AnySolution, Real, Solution};
+use mmsmith_stated_law::Compiled;
 
 use crate::error::{CaseError, SceneError};
+use crate::precision::Precision;
 use crate::scheme::{Placement, Scheme, Updated};
 use crate::stated_law;
 
@@ -67,7 +69,7 @@ impl fmt::Display for CflSpeed {
 impl CflSpeed {
     pub(crate) fn of<const D: usize>(self, exact: &dyn Solution<f64, D>) -> Result<f64, CaseError>
     where
-        f64: Stressed<D>,
+        f64: Precision<D>,
     {
         match self {
             Self::Bar => Ok(exact.wave_speed()),
@@ -147,7 +149,7 @@ impl Case {
 }
 
 /// The solver's own law for a solution's.
-pub(crate) fn law<T: Real, const D: usize>(
+pub(crate) fn law<T: Real + Compiled<D>, const D: usize>(
     law: mmsmith_runtime::Law<T>,
 ) -> Result<Law<T, D>, SceneError> {
     let material = match law {

@@ -5,7 +5,7 @@
 //! determinant of `F`, `P` with the solver's hand-written law, and `b` with `a - Div P / rho0`. `u` itself is the
 //! definition; nothing lies below it. Derivatives are extrapolated finite differences that know their own error.
 
-use mmsmith_mpm::{Law, Scalar};
+use mmsmith_mpm::Law;
 use mmsmith_runtime::{AnySolution, Boundary, Condition, Domain, Fields, Solution, Surface};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
@@ -16,6 +16,7 @@ use crate::difference::{derivative, derivative_of_sum};
 use crate::dimension::in_dimension;
 use crate::error::SceneError;
 use crate::points;
+use crate::precision::Precision;
 
 /// A difference up to this multiple of the check's own estimated error is no evidence against a field.
 pub const OWN_ERROR_FACTOR: f64 = 8.0;
@@ -262,7 +263,7 @@ fn check_in<const D: usize>(
     count: usize,
 ) -> Result<CheckReport, CheckError>
 where
-    f64: Scalar<D>,
+    f64: Precision<D>,
 {
     if count == 0 {
         return Err(CheckError::NoPoints);
@@ -412,7 +413,7 @@ fn field_findings<const D: usize>(
     size: f64,
 ) -> Vec<Finding>
 where
-    f64: Scalar<D>,
+    f64: Precision<D>,
 {
     let (domain, period, density) = (solution.domain(), solution.period(), solution.density());
     let stiffness = match law {

@@ -8,11 +8,11 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, BufReader, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
+use mmsmith_measure::norms::{PerField, PerNorm};
 use sha2::{Digest, Sha256};
 use thiserror::Error;
 
 use crate::history::{Moment, Sums};
-use crate::norms::{PerField, PerNorm};
 use crate::whole_file::WholeFile;
 
 /// How every checkpoint begins.

@@ -4,17 +4,16 @@
 //! each scheme, solution and number of threads would need its own. A few steps on some grids take a tenth of a second
 //! and have all of that in them. Between grids the time of a step goes by a power of the number of particles.
 
-use mmsmith_mpm::Stressed;
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
+use mmsmith_measure::Comparison;
 use mmsmith_runtime::{AnySolution, Solution};
 
 use crate::case::{Arithmetic, Case};
 use crate::dimension::in_arithmetic;
 use crate::drive::Driven;
 use crate::error::CaseError;
-use crate::measure::Comparison;
 use crate::plan::{Plan, Prepared, plan, prepare};
 use crate::precision::Precision;
 
@@ -72,7 +71,7 @@ fn time_in<T: Precision<D>, const D: usize>(
     until: Option<Instant>,
 ) -> Result<Timing, CaseError>
 where
-    f64: Stressed<D>,
+    f64: Precision<D>,
 {
     let started = Instant::now();
     let Prepared { scene, steps, .. } = prepare(exact, case)?;

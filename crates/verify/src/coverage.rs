@@ -3,7 +3,6 @@
 //! A mistake in a term that vanishes in a solution cannot be seen with it. The share of a part is measured over sample
 //! points and times: root mean squares, relative to those of what the part is a part of.
 
-use mmsmith_mpm::Scalar;
 use mmsmith_runtime::Law;
 use mmsmith_runtime::{AnySolution, Condition, Solution};
 use nalgebra::{SMatrix, SVector};
@@ -16,6 +15,7 @@ use crate::difference::derivative;
 use crate::dimension::in_dimension;
 use crate::error::SceneError;
 use crate::points;
+use crate::precision::Precision;
 
 /// A part of the balance, or of what a solver must model, in which a mistake may be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -133,7 +133,7 @@ fn coverage_in<const D: usize>(
     count: usize,
 ) -> Result<Vec<Share>, CheckError>
 where
-    f64: Scalar<D>,
+    f64: Precision<D>,
 {
     if count == 0 {
         return Err(CheckError::NoPoints);

@@ -61,7 +61,10 @@ impl<'a, T: Precision<D>, const D: usize> Driven<'a, T, D> {
         case: &Case,
         scene: &Scene<D>,
         time_step: f64,
-    ) -> Result<Self, CaseError> {
+    ) -> Result<Self, CaseError>
+    where
+        f64: Precision<D>,
+    {
         let time_step: T = Real::nearest(time_step);
         let mut solver = match &case.scheme {
             Scheme::Updated(updated) => {

@@ -2,12 +2,13 @@
 
 use std::path::PathBuf;
 
-use crate::precision::Precision;
-
 use mmsmith_mpm::{Law, Particles};
 use mmsmith_runtime::{Real, Solution};
 use mmsmith_vtk::{Array, Error, Frame, Series, Values};
 use nalgebra::{Matrix3, SMatrix, SVector};
+
+use crate::inverse::inverse;
+use crate::precision::Precision;
 
 /// Where and how often particle files are written.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -138,7 +139,7 @@ fn frame<T: Precision<D>, const D: usize>(
         gradient.push(by_rows(&F_3D));
         stress.push(by_rows(&law.cauchy_in_space(&particles.F[p])?.map(Real::to_f64)));
         let mut P = law.kirchhoff_in_space(&particles.F[p])?.map(Real::to_f64)
-            * F_3D.try_inverse()?.transpose();
+            * inverse(&F_3D)?.transpose();
         // As errors are measured; only the rest is taken from three dimensions.
         let in_plane = law.first_piola_kirchhoff(&particles.F[p])?.map(Real::to_f64);
         P.fixed_view_mut::<D, D>(0, 0).copy_from(&in_plane);

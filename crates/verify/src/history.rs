@@ -3,12 +3,13 @@
 //! The body force of a manufactured solution does work, so that the energy of the exact motion is not constant. What a scheme
 //! gains or loses is the difference between the two.
 
-use mmsmith_mpm::{Law, Particles, Stressed};
+use mmsmith_measure::each_group;
+use mmsmith_measure::norms::PerNorm;
+use mmsmith_mpm::{Law, Particles};
 use mmsmith_runtime::{Real, Solution};
 use serde::Serialize;
 
-use crate::measure::each_group;
-use crate::norms::PerNorm;
+use crate::precision::Precision;
 
 /// Particles in a group that one thread works on; fixed, so that sums do not depend on the number of threads.
 const GROUP: usize = 512;
@@ -120,7 +121,7 @@ impl<const D: usize> Totals<D> {
         velocity_time: f64,
     ) -> Self
     where
-        f64: Stressed<D>,
+        f64: Precision<D>,
     {
         let group = |g: usize| {
             let mut totals = Self::of_none(g * GROUP);
@@ -203,7 +204,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         (time, velocity_time): (f64, f64),
         u: PerNorm<f64>,
     ) where
-        f64: Stressed<D>,
+        f64: Precision<D>,
     {
         let next = crate::frames::step_of_frame(self.moments.len() as u64, self.count, self.steps);
         if step < next && !is_last {

@@ -1,12 +1,12 @@
 //! What a case comes to, judged before it is run: its steps, its size.
 
-use mmsmith_mpm::Stressed;
+use mmsmith_measure::norms::PerField;
 use mmsmith_runtime::{AnySolution, Solution};
 
 use crate::case::{Arithmetic, Case, CflSpeed, Extent, law};
 use crate::dimension::in_dimension;
 use crate::error::{CaseError, MOST_STEPS};
-use crate::norms::PerField;
+use crate::precision::Precision;
 use crate::scene::Scene;
 use crate::scheme::Scheme;
 use crate::updated;
@@ -77,7 +77,7 @@ fn plan_in<const D: usize>(
     case: &Case,
 ) -> Result<Plan, CaseError>
 where
-    f64: Stressed<D>,
+    f64: Precision<D>,
 {
     let Prepared { scene, steps, .. } = prepare(exact, case)?;
     let per_cell = case.per_cell;
@@ -119,7 +119,7 @@ pub(crate) fn prepare<const D: usize>(
     case: &Case,
 ) -> Result<Prepared<D>, CaseError>
 where
-    f64: Stressed<D>,
+    f64: Precision<D>,
 {
     case.validate()?;
     let end = case.periods * exact.period();

@@ -18,7 +18,8 @@ pub(crate) fn quasirandom(n: usize, j: usize, dimension: usize) -> f64 {
     for _ in 0..64 {
         ratio = (1.0 + ratio).powf(1.0 / (dimension as f64 + 1.0));
     }
-    (0.5 + (n as f64 + 1.0) * ratio.powi(-(j as i32 + 1))).fract()
+    // A whole power would be rounded otherwise where the compiler knows it.
+    (0.5 + (n as f64 + 1.0) * ratio.powf(-(j as f64 + 1.0))).fract()
 }
 
 /// `q` in `[0, 1)` moved into `[MARGIN, 1 - MARGIN)`.

@@ -3,11 +3,11 @@
 //! What people read has a status in words, and `null` for numbers that JSON does not know. A record has every field of
 //! the status by itself, and the bits of such numbers.
 
+use mmsmith_measure::norms::{Field, PerField, PerNorm};
 use mmsmith_mpm::StepError;
 use serde::de::{Error, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::norms::{Field, PerField, PerNorm};
 use crate::run::{Row, Status};
 use crate::temporal::{Temporal, TemporalRow};
 

@@ -4,7 +4,9 @@ use std::fmt;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use mmsmith_mpm::{StepError, Stressed};
+use mmsmith_measure::Comparison;
+use mmsmith_measure::norms::{Field, PerField, PerNorm, magnitude};
+use mmsmith_mpm::StepError;
 use mmsmith_runtime::{AnySolution, Solution};
 use serde::{Serialize, Serializer};
 
@@ -15,8 +17,6 @@ use crate::drive::{Driven, Outcome, Stepped};
 use crate::error::CaseError;
 use crate::frames::{FrameOutput, FrameWriter, Snapshot};
 use crate::history::{Moment, Recorder};
-use crate::measure::Comparison;
-use crate::norms::{Field, PerField, PerNorm, magnitude};
 use crate::plan::{Prepared, Steps, prepare};
 use crate::points;
 use crate::precision::Precision;
@@ -217,7 +217,7 @@ fn run_in<T: Precision<D>, const D: usize>(
     outputs: &mut Outputs<'_>,
 ) -> Result<Row, CaseError>
 where
-    f64: Stressed<D>,
+    f64: Precision<D>,
 {
     let Prepared { scene, steps, .. } = prepare(exact, case)?;
     let mut driven = Driven::set_up(exact, model, case, &scene, steps.dt)?;
@@ -266,7 +266,7 @@ fn follow<T: Precision<D>, const D: usize>(
     outputs: &mut Outputs<'_>,
 ) -> Result<Row, CaseError>
 where
-    f64: Stressed<D>,
+    f64: Precision<D>,
 {
     let dt = driven.dt;
     let solver = driven.solver.as_mut();

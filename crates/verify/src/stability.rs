@@ -18,7 +18,7 @@
 
 use std::ops::ControlFlow;
 
-use mmsmith_mpm::{Law, Particles, StepError, Stressed};
+use mmsmith_mpm::{Law, Particles, StepError};
 use mmsmith_runtime::{AnySolution, Real, Solution};
 use serde::{Deserialize, Serialize};
 
@@ -406,7 +406,7 @@ fn scales<const D: usize>(
     case: &Case,
 ) -> Result<(f64, f64), CaseError>
 where
-    f64: Stressed<D>,
+    f64: Precision<D>,
 {
     let Prepared { waves, end, .. } = prepare(exact, case)?;
     let unit = waves.speed / CflSpeed::PWave.of(exact)?;
@@ -421,7 +421,7 @@ fn run_in<T: Precision<D>, const D: usize>(
     limits: Option<&Limits>,
 ) -> Result<Observed, CaseError>
 where
-    f64: Stressed<D>,
+    f64: Precision<D>,
 {
     let Prepared { scene, waves, .. } = prepare(exact, case)?;
     let time_step = waves.time_step(case.cfl);
@@ -443,7 +443,7 @@ struct Run<'a, const D: usize> {
 impl<const D: usize> Run<'_, D> {
     fn follow<T: Precision<D>>(&self, driven: &mut Driven<'_, T, D>) -> Result<Observed, CaseError>
     where
-        f64: Stressed<D>,
+        f64: Precision<D>,
     {
         let lag = driven.solver.velocity_lag().to_f64();
         let law = law::<f64, D>(self.exact.law())?;
@@ -488,7 +488,7 @@ impl<const D: usize> Run<'_, D> {
         largest_energy: f64,
     ) -> Option<Failure>
     where
-        f64: Stressed<D>,
+        f64: Precision<D>,
     {
         let failure = |kind, particle, value: f64, limit: f64| {
             let (value, limit) = (finite(value), finite(limit));
@@ -514,7 +514,7 @@ impl<const D: usize> Run<'_, D> {
     /// The largest energy of the exact motion, and the largest sum of its momenta's magnitudes.
     fn largest<T: Real>(&self, particles: &Particles<T, D>, law: &Law<f64, D>) -> (f64, f64)
     where
-        f64: Stressed<D>,
+        f64: Precision<D>,
     {
         let period = self.exact.period();
         let mut largest = (0.0_f64, 0.0_f64);

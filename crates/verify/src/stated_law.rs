@@ -3,7 +3,7 @@
 use mmsmith_mpm::fault::{Fault, Planted};
 use mmsmith_mpm::{BLOCK, ConstitutiveLaw, Law};
 use mmsmith_runtime::{Components, Real, Stated};
-use mmsmith_stated_law::StatedLaw;
+use mmsmith_stated_law::{Compiled, StatedLaw};
 use nalgebra::SMatrix;
 
 use crate::error::SceneError;
@@ -13,7 +13,9 @@ use crate::error::SceneError;
 /// # Errors
 ///
 /// Where it is stated along directions that turn from place to place, or is no law.
-pub(crate) fn read<T: Real, const D: usize>(stated: Stated<T>) -> Result<Law<T, D>, SceneError> {
+pub(crate) fn read<T: Real + Compiled<D>, const D: usize>(
+    stated: Stated<T>,
+) -> Result<Law<T, D>, SceneError> {
     let Stated { response, components, constants } = stated;
     if components == Components::Curvilinear {
         return Err(SceneError::CurvilinearComponents);
@@ -30,9 +32,9 @@ struct OfText<T> {
     planted: Planted,
 }
 
-impl<T: Real, const D: usize> ConstitutiveLaw<T, D> for OfText<T> {
+impl<T: Real + Compiled<D>, const D: usize> ConstitutiveLaw<T, D> for OfText<T> {
     fn first_piola_kirchhoff(&self, F: &[[[T; BLOCK]; D]; D], P: &mut [[[T; BLOCK]; D]; D]) {
-        self.law.first_piola_kirchhoff(F, P);
+        T::stress_of_block(&self.law, F, P);
         if self.planted.is(Fault::StatedFactor) {
             for i in 0..D {
                 for j in (0..D).filter(|j| *j != i) {
@@ -46,10 +48,10 @@ impl<T: Real, const D: usize> ConstitutiveLaw<T, D> for OfText<T> {
     }
 
     fn strain_energy(&self, F: &SMatrix<T, D, D>) -> Option<T> {
-        self.law.strain_energy(F)
+        T::energy(&self.law, F)
     }
 
     fn kirchhoff_across(&self, F: &SMatrix<T, D, D>) -> Option<T> {
-        self.law.kirchhoff_across(F)
+        T::across(&self.law, F)
     }
 }

@@ -1,12 +1,12 @@
 //! Convergence studies: the same case on several grids or with several time steps.
 
+use mmsmith_measure::norms::{Field, Norm, PerField, PerNorm};
 use mmsmith_runtime::AnySolution;
 use serde::Serialize;
 use thiserror::Error;
 
 use crate::case::{Arithmetic, Case};
 use crate::error::CaseError;
-use crate::norms::{Field, Norm, PerField, PerNorm};
 use crate::order::Order;
 use crate::plan::plan;
 use crate::run::{Outputs, Progress, Row, Status, run};

@@ -7,10 +7,10 @@
 //! for. A run with a very small time step as the reference would bend that slope, by a tenth for `p = 1` and a
 //! reference 16 times finer.
 
-use mmsmith_mpm::Stressed;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
+use mmsmith_measure::norms::{PerField, PerNorm, Tallies, is_squarable, magnitude, scale_of};
 use mmsmith_runtime::{AnySolution, Real, Solution};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
@@ -19,7 +19,6 @@ use crate::case::{Arithmetic, Case};
 use crate::dimension::in_arithmetic;
 use crate::drive::{Driven, Outcome, Stepped};
 use crate::error::{CaseError, MOST_STEPS};
-use crate::norms::{PerField, PerNorm, Tallies, is_squarable, magnitude, scale_of};
 use crate::order::Order;
 use crate::plan::{Prepared, prepare};
 use crate::precision::Precision;
@@ -106,7 +105,7 @@ fn over<T: Precision<D>, const D: usize>(
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Temporal, StudyError>
 where
-    f64: Stressed<D>,
+    f64: Precision<D>,
 {
     let end = base.periods * exact.period();
     let mut counts = Vec::with_capacity(cfls.len());

@@ -248,7 +248,10 @@ pub(crate) fn set_up<'a, T: Precision<D>, const D: usize>(
     case: &Case,
     scene: &Scene<D>,
     time_step: T,
-) -> Result<Box<dyn Solver<T, D> + 'a>, CaseError> {
+) -> Result<Box<dyn Solver<T, D> + 'a>, CaseError>
+where
+    f64: Precision<D>,
+{
     let Total { degree, mass, composition, .. } = *total;
     let set_up = TotalSetUp {
         grid: total.grid(scene, case.per_cell)?,

@@ -1,6 +1,7 @@
 //! What a series of errors shows: its order on the finest grids, from where on that order holds, and whether it is
 //! the expected one.
 
+use mmsmith_measure::norms::{PerField, PerNorm};
 use mmsmith_mpm::total_lagrangian::{Layout, MassMatrix};
 use mmsmith_mpm::{Shape, Transfer};
 use mmsmith_runtime::{AnySolution, Domain, Solution};
@@ -8,7 +9,6 @@ use serde::Serialize;
 
 use crate::case::Case;
 use crate::dimension::in_dimension;
-use crate::norms::{PerField, PerNorm};
 use crate::points;
 use crate::scheme::{Placement, Scheme, Stepping, Total, Updated};
 

@@ -235,6 +235,8 @@ struct Parallelograms<'a, T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> Loop for Parallelograms<'_, T, D> {
+    const WIDE: bool = D > 1;
+
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self { corners, c, half_edges, ids, kinematics } = self;
@@ -293,6 +295,8 @@ struct Cells<'a, T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> Loop for Cells<'_, T, D> {
+    const WIDE: bool = D > 1;
+
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self { corners, c, mesh, ids } = self;
@@ -448,6 +452,8 @@ struct P2g<'a, T, const D: usize, const AFFINE: bool> {
 }
 
 impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for P2g<'_, T, D, AFFINE> {
+    const WIDE: bool = D > 1;
+
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self { corners, strides, band, first, contributions, count } = self;
@@ -524,6 +530,8 @@ struct G2p<'a, T, const D: usize, const AFFINE: bool> {
 }
 
 impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for G2p<'_, T, D, AFFINE> {
+    const WIDE: bool = D > 1;
+
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self { corners, strides, nodes, receiver } = self;

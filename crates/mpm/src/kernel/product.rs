@@ -276,6 +276,8 @@ where
     T: Lanes,
     R: ShapeFunction<W>,
 {
+    const WIDE: bool = D > 1;
+
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self { weights, c, kinematics, half_sizes, .. } = self;
@@ -399,6 +401,8 @@ struct P2gOfBlock<'a, T, const D: usize> {
 impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
     for P2g<'_, T, D, W, AFFINE>
 {
+    const WIDE: bool = D > 1;
+
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self(P2gOfBlock { weights, strides, band, first, contributions, count }) = self;
@@ -449,6 +453,8 @@ where
     T: Lanes,
     A: Receive<T, D>,
 {
+    const WIDE: bool = D > 1;
+
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self(G2pOfBlock { weights, strides, nodes, count, mut receiver }) = self;

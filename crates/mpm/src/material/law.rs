@@ -491,11 +491,24 @@ fn values<T: RealField + Copy>(Moduli { lambda, mu }: Moduli<T>) -> (T, T) {
             T::zero(),
             |sum, Term { factor: [numerator, denominator], powers }| {
                 let factor = real::<T>(numerator as f64) / real(denominator as f64);
-                sum + powers
-                    .into_iter()
-                    .fold(factor, |product, (constant, exponent)| product * constant.powi(exponent))
+                sum + powers.into_iter().fold(factor, |product, (constant, exponent)| {
+                    product * power(constant, exponent)
+                })
             },
         )
     };
     (sum(lambda), sum(mu))
+}
+
+/// A whole power by squaring, as the compiler's own, which is not what nalgebra has for it without the standard library.
+fn power<T: RealField + Copy>(base: T, exponent: i32) -> T {
+    let (mut square, mut left, mut product) = (base, exponent.unsigned_abs(), T::one());
+    while left > 0 {
+        if left % 2 == 1 {
+            product *= square;
+        }
+        square *= square;
+        left /= 2;
+    }
+    if exponent < 0 { T::one() / product } else { product }
 }

@@ -196,10 +196,12 @@ struct SideBySide<'a, T, L, const D: usize> {
 }
 
 impl<T: RealField + Copy, L: LibraryLaw<T>, const D: usize> Loop for SideBySide<'_, T, L, D> {
+    const WIDE: bool = D > 1;
+
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self { law, F, P } = self;
-        if !stresses::<true, _, _, D>(law, F, P) {
+        if !L::HAS_SHORT || !stresses::<true, _, _, D>(law, F, P) {
             stresses::<false, _, _, D>(law, F, P);
         }
     }
@@ -251,6 +253,9 @@ fn jacobian<T: RealField + Copy, const D: usize>(F: &SMatrix<T, D, D>) -> Option
 pub(crate) trait LibraryLaw<T: RealField + Copy>: Copy + Send + Sync + 'static {
     /// Kirchhoff stress.
     fn kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D>;
+
+    /// Whether there is a shorter form for some F; a law without one needs no loops of its own for it.
+    const HAS_SHORT: bool = false;
 
     /// Whether [`kirchhoff_short`](Self::kirchhoff_short) and
     /// [`first_piola_kirchhoff_short`](Self::first_piola_kirchhoff_short) are right for this F.

@@ -42,6 +42,8 @@ impl<T: RealField + Copy> NeoHookean<T> {
 }
 
 impl<T: RealField + Copy> LibraryLaw<T> for NeoHookean<T> {
+    const HAS_SHORT: bool = true;
+
     #[inline(always)]
     fn kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         plus_diagonal(finger_minus_identity(F) * self.mu, self.pressure(F))

@@ -74,7 +74,8 @@ impl<T: RealField + Copy> Ogden<T> {
             let quotient = if sinh == T::zero() { alpha * real(0.5) } else { half.sinh() / sinh };
             let growth = (alpha * log_J / real(6.0)).exp_m1();
             // cosh(half) - 1.
-            let rise = (half * real(0.5)).sinh().powi(2) * real(2.0);
+            let sine = (half * real(0.5)).sinh();
+            let rise = sine * sine * real(2.0);
             let across = (-alpha * log_J / real(3.0)).exp_m1();
             sum.factor += mu * (growth + T::one()) * quotient / J;
             sum.within += mu * (growth * (rise + T::one()) + rise - across) / real(3.0);

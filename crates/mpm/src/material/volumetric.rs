@@ -28,7 +28,7 @@ impl VolumetricEnergy for Volumetric {
     fn energy<T: RealField + Copy, const D: usize>(self, F: &SMatrix<T, D, D>) -> T {
         let growth = det_minus_one(&displacement_gradient(F));
         match self {
-            Self::Logarithmic => log_jacobian(F).powi(2) * real(0.5),
+            Self::Logarithmic => log_jacobian(F) * log_jacobian(F) * real(0.5),
             Self::Quadratic => growth * growth * real(0.5),
             // J^2 - 1 = g^2 + 2 g, where g = J - 1.
             Self::Mixed => {

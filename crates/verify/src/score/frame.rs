@@ -2,18 +2,19 @@
 
 use std::collections::HashSet;
 
+use mmsmith_measure::norms::{PerField, PerNorm};
+use mmsmith_measure::{RUNS, Row, over_particles};
 use mmsmith_runtime::{BLOCK, Domain, Solution, State, StateRun};
 use mmsmith_vtk::foreign::{ArrayHead, Snapshot};
 use nalgebra::{SMatrix, SVector};
+
+use crate::points;
 
 use super::arrays::{Chosen, Role, matrices, vectors};
 use super::findings::Remarks;
 use super::reference::{Scheme, Traced};
 use super::vectors::{count_not_finite, judged, place, positions};
 use super::{ScoreError, ScoreOptions};
-use crate::measure::{RUNS, Row, over_particles};
-use crate::norms::{PerField, PerNorm};
-use crate::points;
 
 /// Share of the body's size by which a reference position may lie outside before it is told.
 const OUTSIDE: f64 = 1e-6;

@@ -18,18 +18,18 @@ pub use findings::Remark;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use mmsmith_runtime::{AnySolution, Solution};
-use mmsmith_vtk::foreign::{FrameFile, Snapshot, frames};
-use nalgebra::SVector;
-use serde::Serialize;
-
-use crate::norms::{Field, PerField, PerNorm};
-use crate::order::Order;
-use crate::study::orders_of;
 use arrays::Chosen;
 use findings::Remarks;
 use frame::{FrameReader, Identities};
+use mmsmith_measure::norms::{Field, PerField, PerNorm};
+use mmsmith_runtime::{AnySolution, Solution};
+use mmsmith_vtk::foreign::{FrameFile, Snapshot, frames};
+use nalgebra::SVector;
 use reference::{Scheme, scheme};
+use serde::Serialize;
+
+use crate::order::Order;
+use crate::study::orders_of;
 
 /// Share of the time span by which a frame may lie outside before it is told.
 const TIME_SLACK: f64 = 1e-6;

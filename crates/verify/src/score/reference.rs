@@ -6,6 +6,8 @@ use mmsmith_runtime::Solution;
 use mmsmith_vtk::foreign::Snapshot;
 use nalgebra::SVector;
 
+use crate::inverse::inverse;
+
 use super::arrays::{Chosen, Role, there};
 use super::findings::Remarks;
 use super::vectors::positions;
@@ -142,7 +144,7 @@ fn reference_position<const D: usize>(
     let mut X = x - exact.displacement(x, time);
     for _ in 0..MOST_ITERATIONS {
         let miss = X + exact.displacement(&X, time) - x;
-        let step = exact.deformation_gradient(&X, time).try_inverse()? * miss;
+        let step = inverse(&exact.deformation_gradient(&X, time))? * miss;
         X -= step;
         if step.norm() <= 4.0 * f64::EPSILON * X.norm().max(x.norm()) {
             return Some(X);

@@ -1,9 +1,9 @@
 use std::cell::{Cell, RefCell};
 
+use mmsmith_measure::norms::{PerField, PerNorm};
 use proptest::prelude::*;
 
 use super::*;
-use crate::norms::{PerField, PerNorm};
 
 /// A machine whose errors and times are formulas; its clock goes on by the times.
 struct Formula {

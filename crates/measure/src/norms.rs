@@ -144,12 +144,12 @@ impl<N> PerField<N> {
     }
 
     /// Field by field, what `f` makes of the value.
-    pub(crate) fn map<M>(&self, f: impl Fn(&N) -> M) -> PerField<M> {
+    pub fn map<M>(&self, f: impl Fn(&N) -> M) -> PerField<M> {
         PerField::from_fn(|field| f(&self[field]))
     }
 
     /// Field by field, what `f` makes of two values.
-    pub(crate) fn combine<A, B>(a: &PerField<A>, b: &PerField<B>, f: impl Fn(&A, &B) -> N) -> Self {
+    pub fn combine<A, B>(a: &PerField<A>, b: &PerField<B>, f: impl Fn(&A, &B) -> N) -> Self {
         Self::from_fn(|field| f(&a[field], &b[field]))
     }
 }
@@ -167,7 +167,7 @@ impl<V> PerNorm<V> {
     }
 
     /// Norm by norm, what `f` makes of the value.
-    pub(crate) fn map<M>(&self, f: impl Fn(&V) -> M) -> PerNorm<M> {
+    pub fn map<M>(&self, f: impl Fn(&V) -> M) -> PerNorm<M> {
         PerNorm::from_fn(|norm| f(&self[norm]))
     }
 }
@@ -183,7 +183,7 @@ const SQUARABLE: std::ops::RangeInclusive<f64> = 1e-140..=1e140;
 
 /// The power of two that magnitudes are divided by before they are squared, where the largest of them is `max`: one unless
 /// their squares would vanish or overflow.
-pub(crate) fn scale_of(max: f64) -> f64 {
+pub fn scale_of(max: f64) -> f64 {
     if max == 0.0 || !max.is_finite() || SQUARABLE.contains(&max) {
         return 1.0;
     }
@@ -192,7 +192,7 @@ pub(crate) fn scale_of(max: f64) -> f64 {
 }
 
 /// The root of the sum of the squares of components, whatever their size.
-pub(crate) fn magnitude(components: impl Iterator<Item = f64> + Clone) -> f64 {
+pub fn magnitude(components: impl Iterator<Item = f64> + Clone) -> f64 {
     let largest = components.clone().fold(0.0, |largest, c: f64| larger(largest, c.abs()));
     let scale = scale_of(largest);
     scale * components.fold(0.0, |sum, c| sum + (c / scale) * (c / scale)).sqrt()
@@ -200,13 +200,13 @@ pub(crate) fn magnitude(components: impl Iterator<Item = f64> + Clone) -> f64 {
 
 /// Whether squares have served well for a magnitude; for zero they may have vanished.
 #[inline(always)]
-pub(crate) fn is_squarable(magnitude: f64) -> bool {
+pub fn is_squarable(magnitude: f64) -> bool {
     SQUARABLE.contains(&magnitude)
 }
 
 /// Sums over one group of particles at one step, of magnitudes divided by a power of two.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Tally {
+pub struct Tally {
     max: f64,
     square: f64,
     sum: f64,
@@ -221,7 +221,7 @@ impl Default for Tally {
 
 impl Tally {
     /// Appends the sums of the next group.
-    pub(crate) fn join(&self, next: &Self) -> Self {
+    pub fn join(&self, next: &Self) -> Self {
         if self.scale != next.scale {
             // What has no magnitude has no scale.
             let scale = match (self.max == 0.0, next.max == 0.0) {
@@ -251,17 +251,17 @@ impl Tally {
     }
 
     /// Sums of magnitudes that had been divided by `scale`.
-    pub(crate) fn divided_by(self, scale: f64) -> Self {
+    pub fn divided_by(self, scale: f64) -> Self {
         Self { scale, ..self }
     }
 
     /// The power of two that these magnitudes have to be divided by before they are squared.
-    pub(crate) fn scale_to_take(&self) -> f64 {
+    pub fn scale_to_take(&self) -> f64 {
         scale_of(self.max)
     }
 
     /// The norms over `count` particles.
-    pub(crate) fn norms(&self, count: usize) -> PerNorm<f64> {
+    pub fn norms(&self, count: usize) -> PerNorm<f64> {
         let count = count as f64;
         PerNorm {
             linf: self.scale * self.max,
@@ -273,7 +273,7 @@ impl Tally {
 
 /// The tallies of `N` sequences of particles side by side: every `N`-th particle belongs to the same one.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Tallies<const N: usize> {
+pub struct Tallies<const N: usize> {
     max: [f64; N],
     square: [f64; N],
     sum: [f64; N],
@@ -289,7 +289,7 @@ impl<const N: usize> Default for Tallies<N> {
 impl<const N: usize> Tallies<N> {
     /// Adds one magnitude to each.
     #[inline(always)]
-    pub(crate) fn add(&mut self, magnitudes: &[f64; N]) {
+    pub fn add(&mut self, magnitudes: &[f64; N]) {
         for n in 0..N {
             self.max[n] = larger(self.max[n], magnitudes[n]);
             self.square[n] += magnitudes[n] * magnitudes[n];
@@ -298,7 +298,7 @@ impl<const N: usize> Tallies<N> {
     }
 
     /// The sums of all sequences, one after the other.
-    pub(crate) fn joined(&self) -> Tally {
+    pub fn joined(&self) -> Tally {
         let own =
             |n| Tally { max: self.max[n], square: self.square[n], sum: self.sum[n], scale: 1.0 };
         (0..N).map(own).fold(Tally::default(), |all, next| all.join(&next))
@@ -307,7 +307,7 @@ impl<const N: usize> Tallies<N> {
 
 impl PerNorm<f64> {
     /// Norm by norm, the larger of the two.
-    pub(crate) fn larger(&self, other: &Self) -> Self {
+    pub fn larger(&self, other: &Self) -> Self {
         Self::from_fn(|norm| larger(self[norm], other[norm]))
     }
 }

@@ -2,42 +2,48 @@
 
 use std::ops::Range;
 
-use mmsmith_mpm::{Law, Particles};
+use mmsmith_mpm::{Law, Particles, Stressed};
 use mmsmith_runtime::{BLOCK, Real, Solution, StateAtPoints, StateRun};
 use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use crate::norms::{PerField, PerNorm, Tallies, Tally, is_squarable, magnitude};
-use crate::precision::Precision;
 
 /// Particles in a group that one thread works on; fixed, so that sums do not depend on the number of threads.
 const GROUP: usize = 1024;
 /// Runs of particles for which what depends on the time alone is computed once.
-pub(crate) const RUNS: usize = 8;
+pub const RUNS: usize = 8;
 /// Particles in as many runs; what is compared of them fits into the first-level cache.
 const CHUNK: usize = RUNS * BLOCK;
 
 /// Compares particles with the exact solution; what that needs of their reference positions alone is kept.
-pub(crate) struct Comparison<'a, const D: usize> {
+pub struct Comparison<'a, const D: usize> {
     exact: Box<dyn StateAtPoints<f64, D> + 'a>,
 }
 
 impl<'a, const D: usize> Comparison<'a, D> {
     /// For particles that started at `X`.
-    pub(crate) fn new<T: Real>(exact: &'a dyn Solution<f64, D>, X: &[SVector<T, D>]) -> Self {
+    pub fn new<T: Real>(exact: &'a dyn Solution<f64, D>, X: &[SVector<T, D>]) -> Self {
         let X: Vec<_> = X.iter().map(|X| X.map(Real::to_f64)).collect();
         Self { exact: exact.state_at(&X) }
     }
 
     /// The errors of all particles at `time`, those of the velocity `lag` earlier.
-    pub(crate) fn measure<T: Precision<D>>(
+    pub fn measure<T: Compared<D>>(
         &self,
         observed: (&Particles<T, D>, &Law<T, D>),
         time: f64,
         lag: f64,
     ) -> PerField<PerNorm<f64>> {
-        let times = (time, time - lag);
+        T::errors(self, observed, (time, time - lag))
+    }
+
+    fn errors<T: Compared<D>>(
+        &self,
+        observed: (&Particles<T, D>, &Law<T, D>),
+        times: (f64, f64),
+    ) -> PerField<PerNorm<f64>> {
         let [u, v, F, P] =
             over_particles(observed.0.len(), Room::zero, |room, first, magnitudes| {
                 self.magnitudes(observed, times, room, first, magnitudes)
@@ -46,11 +52,15 @@ impl<'a, const D: usize> Comparison<'a, D> {
     }
 
     /// The particle of largest position error at `time`, the first one without a number if there is such.
-    pub(crate) fn worst_particle<T: Precision<D>>(
+    pub fn worst_particle<T: Compared<D>>(
         &self,
         observed: (&Particles<T, D>, &Law<T, D>),
         time: f64,
     ) -> usize {
+        T::worst_particle(self, observed, time)
+    }
+
+    fn worst<T: Compared<D>>(&self, observed: (&Particles<T, D>, &Law<T, D>), time: f64) -> usize {
         let count = observed.0.len();
         let mut room = Room::zero();
         let mut magnitudes = [[[0.0; BLOCK]; 4]];
@@ -68,7 +78,7 @@ impl<'a, const D: usize> Comparison<'a, D> {
 
     /// The magnitudes of the errors of u, v, F and P, for runs of particles from number `first` on; `times` are those of
     /// positions and of velocities.
-    fn magnitudes<T: Precision<D>>(
+    fn magnitudes<T: Compared<D>>(
         &self,
         (particles, law): (&Particles<T, D>, &Law<T, D>),
         times: (f64, f64),
@@ -90,6 +100,50 @@ impl<'a, const D: usize> Comparison<'a, D> {
     }
 }
 
+/// The numbers of the particles, `f64` or `f32`, in `D` dimensions. The comparison of each is compiled with this crate.
+pub trait Compared<const D: usize>: Real + Stressed<D> {
+    /// The errors of all particles; `times` are those of positions and of velocities.
+    fn errors(
+        comparison: &Comparison<'_, D>,
+        observed: (&Particles<Self, D>, &Law<Self, D>),
+        times: (f64, f64),
+    ) -> PerField<PerNorm<f64>>;
+
+    /// The particle of largest position error at `time`.
+    fn worst_particle(
+        comparison: &Comparison<'_, D>,
+        observed: (&Particles<Self, D>, &Law<Self, D>),
+        time: f64,
+    ) -> usize;
+}
+
+macro_rules! compared {
+    ($($T:ty: $($D:literal)*;)*) => {
+        $($(impl Compared<$D> for $T {
+            fn errors(
+                comparison: &Comparison<'_, $D>,
+                observed: (&Particles<Self, $D>, &Law<Self, $D>),
+                times: (f64, f64),
+            ) -> PerField<PerNorm<f64>> {
+                comparison.errors(observed, times)
+            }
+
+            fn worst_particle(
+                comparison: &Comparison<'_, $D>,
+                observed: (&Particles<Self, $D>, &Law<Self, $D>),
+                time: f64,
+            ) -> usize {
+                comparison.worst(observed, time)
+            }
+        })*)*
+    };
+}
+
+compared! {
+    f64: 1 2 3;
+    f32: 1 2 3;
+}
+
 /// Room for what is compared.
 struct Room<T, const D: usize> {
     exact: [StateRun<f64, D>; RUNS],
@@ -103,7 +157,7 @@ impl<T: Real, const D: usize> Room<T, D> {
 }
 
 /// One number for each particle of a run.
-pub(crate) type Row<T> = [T; BLOCK];
+pub type Row<T> = [T; BLOCK];
 
 /// What is compared of `BLOCK` particles, side by side.
 struct Run<T, const D: usize> {
@@ -239,7 +293,7 @@ fn backwards(count: usize, runs: usize) -> impl Fn(usize) -> usize {
 
 /// What `group` makes of each number below `count`, on the threads of the pool; through a reference, so that their
 /// machinery is compiled once for each kind of result.
-pub(crate) fn each_group<R: Send>(count: usize, group: &(dyn Fn(usize) -> R + Sync)) -> Vec<R> {
+pub fn each_group<R: Send>(count: usize, group: &(dyn Fn(usize) -> R + Sync)) -> Vec<R> {
     (0..count).into_par_iter().map(group).collect()
 }
 
@@ -247,7 +301,7 @@ pub(crate) fn each_group<R: Send>(count: usize, group: &(dyn Fn(usize) -> R + Sy
 ///
 /// `magnitudes` is given some room, the number of a first particle, and the rows to write their magnitudes to, at most `RUNS`
 /// times `BLOCK` of them; what the last row has to spare does not matter. The result does not depend on the number of threads.
-pub(crate) fn over_particles<R, const N: usize>(
+pub fn over_particles<R, const N: usize>(
     count: usize,
     room: impl Fn() -> R + Sync,
     magnitudes: impl Fn(&mut R, usize, &mut [[Row<f64>; N]]) + Sync,
