@@ -16,6 +16,7 @@ use crate::kernel::block::BlockLaw;
 use crate::material::{AnyLaw, Law, Material, NeoHookean, NeoHookeanNoLog, OwnBlocks, Stressed};
 use crate::node::Node;
 use crate::parallel::bins::Bins;
+use crate::parallel::pool::Pool;
 use crate::particles::Particles;
 use crate::scheme::{Settings, Shape, Taken};
 use crate::shape_function::HALF_SIZE_LIMIT;
@@ -415,6 +416,7 @@ fn allocate<T: Lanes, const D: usize>(
         next,
         is_ahead: false,
         filtered: if filtered { vec![SVector::zeros(); layout.nodes] } else { Vec::new() },
+        buffers: Pool::new(),
         of_time: Vec::new(),
         affine: Vec::new(),
         particles,

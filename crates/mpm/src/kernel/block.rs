@@ -46,6 +46,12 @@ pub(crate) enum Block<T, const D: usize> {
     Corners(Corners<T, D>),
 }
 
+/// Weights and contributions of a block. Entries beyond the particles of a block are left from another block, and not read.
+pub(crate) struct Buffers<T, const D: usize> {
+    pub(crate) block: Block<T, D>,
+    pub(crate) contributions: Contributions<T, D, BLOCK>,
+}
+
 impl<T: Lanes, const D: usize> Block<T, D> {
     pub(crate) fn new(support: &Support<T, D>, is_affine: bool) -> Self {
         match support {
