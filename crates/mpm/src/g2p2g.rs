@@ -15,11 +15,11 @@ use crate::geometry::Constants;
 use crate::grid_update::{GridUpdate, NodeVectors, VelocityAndAcceleration};
 use crate::health::{Outcome, SharedOutcome};
 use crate::kernel::any::{Contributions, Interpolated, Receive};
-use crate::kernel::block::{Block, BlockLaw, Buffers};
+use crate::kernel::block::BlockLaw;
+use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Copies, Kinematics};
 use crate::node::Node;
 use crate::parallel::disjoint::PartElements;
-use crate::parallel::pool::Pool;
 use crate::particles::Particles;
 use crate::prefetch::prefetch;
 use crate::simd::{Lane4, Lanes, Vectors};
@@ -66,7 +66,7 @@ struct G2p2g<'a, T, const D: usize> {
     uniform: Option<(T, T)>,
     /// The body force at the start of the next step.
     forcing: Forcing<'a, T, D>,
-    buffers: &'a Pool<Buffers<T, D>>,
+    buffers: &'a BufferPool<T, D>,
 }
 
 impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
@@ -80,13 +80,10 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
         mut elements: Elements<'_, T, D>,
     ) -> Outcome {
         let mut outcome = Outcome::default();
-        let mut buffers = self.buffers.take(|| Buffers {
-            block: Block::new(self.support, false),
-            contributions: match self.uniform {
-                Some((mass, volume)) => Contributions::uniform(mass, volume),
-                None => Contributions::zero(),
-            },
-        });
+        let mut buffers = self.buffers.take(self.support, false);
+        if let Some((mass, volume)) = self.uniform {
+            buffers.contributions.set_uniform(mass, volume);
+        }
         let mut copies = None;
         for (index, ids) in elements.indices().chunks(BLOCK).enumerate() {
             let place = index * BLOCK;
@@ -118,7 +115,7 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
     /// The same for a block of particles.
     fn advance_block(
         &self,
-        Buffers { block, contributions }: &mut Buffers<T, D>,
+        Buffers { block, contributions, .. }: &mut Buffers<T, D>,
         band: &mut [Node<T, D>],
         (first, bin): (usize, u32),
         ids: &[u32],

@@ -13,10 +13,10 @@ use crate::geometry::Constants;
 use crate::grid::{Grid, Layout};
 use crate::health::Invalid;
 use crate::kernel::block::BlockLaw;
+use crate::kernel::buffers::BufferPool;
 use crate::material::{AnyLaw, Law, Material, NeoHookean, NeoHookeanNoLog, OwnBlocks, Stressed};
 use crate::node::Node;
 use crate::parallel::bins::Bins;
-use crate::parallel::pool::Pool;
 use crate::particles::Particles;
 use crate::scheme::{Settings, Shape, Taken};
 use crate::shape_function::HALF_SIZE_LIMIT;
@@ -416,7 +416,7 @@ fn allocate<T: Lanes, const D: usize>(
         next,
         is_ahead: false,
         filtered: if filtered { vec![SVector::zeros(); layout.nodes] } else { Vec::new() },
-        buffers: Pool::new(),
+        buffers: BufferPool::new(),
         of_time: Vec::new(),
         affine: Vec::new(),
         particles,

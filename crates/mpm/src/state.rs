@@ -5,10 +5,10 @@ use nalgebra::{SMatrix, SVector};
 use crate::geometry::Constants;
 use crate::grid::Layout;
 use crate::health::Outcome;
-use crate::kernel::block::{BlockLaw, Buffers};
+use crate::kernel::block::BlockLaw;
+use crate::kernel::buffers::BufferPool;
 use crate::node::Node;
 use crate::parallel::bins::Bins;
-use crate::parallel::pool::Pool;
 use crate::particles::Particles;
 use crate::scheme::Transfer;
 use crate::simd::Lanes;
@@ -38,8 +38,8 @@ pub(crate) struct State<T, const D: usize> {
     pub(crate) is_ahead: bool,
     /// XPIC: the filtered velocity at each node.
     pub(crate) filtered: Vec<SVector<T, D>>,
-    /// The fused pass: buffers for blocks of particles.
-    pub(crate) buffers: Pool<Buffers<T, D>>,
+    /// Buffers for blocks of particles.
+    pub(crate) buffers: BufferPool<T, D>,
     /// Buffer for the part of the body force that depends on time alone.
     pub(crate) of_time: Vec<T>,
 }

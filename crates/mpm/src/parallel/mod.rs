@@ -4,10 +4,8 @@
 //! - [`coloring`]: the two-colour schedule of overlapping rows.
 //! - [`disjoint`]: mutable access to the particles of each bin.
 //! - [`chunks`]: plain loops over chunks of arrays.
-//! - [`pool`]: buffers of threads.
 
 pub(crate) mod bins;
 pub(crate) mod chunks;
 mod coloring;
 pub(crate) mod disjoint;
-pub(crate) mod pool;
