@@ -44,21 +44,20 @@ struct FromKept {
 }
 
 impl FromKept {
-    fn new(program: &Program, kept: &[Slot], fields: &[(FieldName, &[Slot])]) -> Self {
-        let (_, coordinates) = coordinates(program);
+    fn new(
+        program: &Program,
+        coordinates: &[Slot],
+        kept: &[Slot],
+        fields: &[(FieldName, &[Slot])],
+    ) -> Self {
         let stage =
             |&(name, outputs): &(FieldName, &[Slot])| (name, Stage::new(program, outputs, kept));
         FromKept {
             kept: kept.len(),
-            at_points: Stage::new(program, kept, &coordinates),
+            at_points: Stage::new(program, kept, coordinates),
             fields: fields.iter().map(stage).collect(),
         }
     }
-}
-
-/// The axes that a program reads coordinates of, and where.
-fn coordinates(program: &Program) -> (Vec<usize>, Vec<Slot>) {
-    (0..3).filter_map(|axis| Some((axis, coordinate(program, axis)?))).unzip()
 }
 
 impl Arrays {
@@ -74,13 +73,14 @@ impl Arrays {
         overrides: impl IntoIterator<Item = (&'a str, f64)>,
     ) -> Result<Self, InterpretError> {
         let program = staged.program();
-        let (axes, coordinates) = coordinates(program);
+        let n = spec.dimension;
+        let (axes, coordinates): (Vec<usize>, Vec<Slot>) =
+            (0..n).filter_map(|axis| Some((axis, coordinate(program, axis)?))).unzip();
         let fields = FieldName::ALL.map(|name| (Quantity::Field(name), staged.field(name)));
         let tractions = staged
             .tractions
             .iter()
             .map(|traction| (Quantity::Traction(surface(traction.surface)), &traction.outputs[..]));
-        let n = spec.dimension;
         let (u, rest) = staged.state.outputs().split_at(n);
         let (F, P) = rest.split_at(n * n);
         let state = [
@@ -99,8 +99,13 @@ impl Arrays {
                 .chain(tractions)
                 .map(|(quantity, outputs)| (quantity, Stage::new(program, outputs, &coordinates)))
                 .collect(),
-            body_force: FromKept::new(program, staged.body_force.point(), &body_force),
-            state: FromKept::new(program, staged.state.point(), &state),
+            body_force: FromKept::new(
+                program,
+                &coordinates,
+                staged.body_force.point(),
+                &body_force,
+            ),
+            state: FromKept::new(program, &coordinates, staged.state.point(), &state),
         })
     }
 
