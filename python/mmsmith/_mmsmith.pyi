@@ -1,15 +1,19 @@
 """The part in Rust. Arrays are C-contiguous and of float64."""
 
 from collections.abc import Sequence
+from typing import final
 
 import numpy
 from numpy.typing import NDArray
+
+__all__ = ["__version__", "Error", "NoEffect", "Fields", "FieldsAtPoints", "faults", "solutions", "main", "call"]
 
 __version__: str
 
 class Error(ValueError): ...
 class NoEffect(Error): ...
 
+@final
 class Fields:
     def __new__(cls, name: str, parameters: dict[str, float]) -> Fields: ...
     def with_fault(self, name: str) -> Fields: ...
@@ -45,6 +49,7 @@ class Fields:
     @property
     def cell_length(self) -> float: ...
 
+@final
 class FieldsAtPoints:
     def evaluate(self, letter: str, t: float, out: NDArray[numpy.float64]) -> None: ...
 

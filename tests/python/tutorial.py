@@ -17,9 +17,14 @@ BLOCK = re.compile(r"(?:<!-- file: (?P<file>\S+) -->\n)?```(?P<language>\w+)\n(?
 
 def main(pages):
     failed = False
-    for page in map(Path.resolve, map(Path, pages)):
-        blocks = list(BLOCK.finditer(page.read_text(encoding="utf-8")))
-        program = "\n".join(block["text"] for block in blocks if block["language"] == "python")
+    for page in [Path(page).resolve() for page in pages]:
+        text = page.read_text(encoding="utf-8")
+        blocks = list(BLOCK.finditer(text))
+        program = ""
+        for block in blocks:
+            if block["language"] == "python":
+                # On the lines that it has in the page, for what is said of errors.
+                program += "\n" * (text.count("\n", 0, block.start("text")) - program.count("\n")) + block["text"]
         assert program, f"{page} has no Python"
         with tempfile.TemporaryDirectory() as folder:
             os.chdir(folder)
