@@ -6,11 +6,10 @@ marks a test for pytest is run by pytest as well.
 
 import os
 import re
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
-
-import pytest
 
 BLOCK = re.compile(r"(?:<!-- file: (?P<file>\S+) -->\n)?```(?P<language>\w+)\n(?P<text>.*?)^```$", re.DOTALL | re.MULTILINE)
 
@@ -35,7 +34,7 @@ def main(pages):
             Path("test_page.py").write_text(program, encoding="utf-8")
             exec(compile(program, str(page), "exec"), {"__name__": "page"})
             if "def test_" in program:
-                failed |= pytest.main(["-q", "test_page.py"]) != 0
+                failed |= subprocess.run([sys.executable, "-m", "pytest", "--quiet", "test_page.py"], check=False).returncode != 0
             os.chdir("/")
     return 1 if failed else 0
 
