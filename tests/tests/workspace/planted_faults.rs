@@ -67,7 +67,9 @@ const FAULTS: &[(&str, &str, Plant)] = &[
         }
     }),
     ("b of P transposed", "skew-2d", |s, f| published(Fault::BodyForceOfTransposedStress, s, f)),
-    ("b of the Kirchhoff stress", "ring-nu", |s, f| published(Fault::BodyForceOfKirchhoffStress, s, f)),
+    ("b of the Kirchhoff stress", "ring-nu", |s, f| {
+        published(Fault::BodyForceOfKirchhoffStress, s, f)
+    }),
     ("b of density one", "ring-nu", |s, f| published(Fault::BodyForceOfDensityOne, s, f)),
     ("lambda for mu", "vortex", |s, f| published(Fault::LameExchanged, s, f)),
     ("lambda of plane stress", "skew-2d", |s, f| published(Fault::LameOfPlaneStress, s, f)),
