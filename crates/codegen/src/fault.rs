@@ -262,8 +262,13 @@ pub struct UnknownFault(String);
 impl FromStr for Fault {
     type Err = UnknownFault;
 
+    /// By its name, in which `b-` may stand for `body-force-`.
     fn from_str(name: &str) -> Result<Self, UnknownFault> {
-        let known = Fault::ALL.into_iter().find(|fault| fault.name() == name);
+        let is_named = |fault: &Fault| {
+            let of_b = fault.name().strip_prefix("body-force-");
+            fault.name() == name || of_b.is_some_and(|rest| name.strip_prefix("b-") == Some(rest))
+        };
+        let known = Fault::ALL.into_iter().find(is_named);
         known.ok_or_else(|| UnknownFault(name.to_owned()))
     }
 }
@@ -393,6 +398,14 @@ mod tests {
     use super::*;
     use std::fs;
     use std::path::Path;
+
+    #[test]
+    fn faults_of_b_have_two_names() {
+        assert_eq!("b-sign".parse::<Fault>().unwrap().name(), "body-force-sign");
+        for name in ["sign", "b-", "b-b-sign", "body-force"] {
+            assert!(name.parse::<Fault>().is_err(), "{name}");
+        }
+    }
 
     /// What the right stress balances is the body force, in every kind of coordinates.
     #[test]
