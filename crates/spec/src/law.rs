@@ -42,6 +42,8 @@ pub(crate) struct Stress {
     pub(crate) linear: Vector,
     /// The divergence of the rest, small where `H` is small.
     pub(crate) remainder: Vector,
+    /// The whole divergence in a form of its own, where there is one. At large gradients the two parts may cancel.
+    pub(crate) whole: Option<Vector>,
     /// The strain energy, where the material is given by one.
     pub(crate) energy: Option<Expr>,
 }
@@ -55,7 +57,12 @@ impl Stress {
         fn matrices(graph: &mut Graph, A: Matrix, B: Matrix) -> Matrix {
             A.into_iter().zip(B).map(|(x, y)| vectors(graph, x, y)).collect()
         }
+        let whole = self.whole.map(|whole| {
+            let sum = vectors(graph, whole, other.linear.clone());
+            vectors(graph, sum, other.remainder.clone())
+        });
         Stress {
+            whole,
             P: matrices(graph, self.P, other.P),
             isotropic: graph.add(self.isotropic, other.isotropic),
             anisotropic: matrices(graph, self.anisotropic, other.anisotropic),
@@ -215,7 +222,7 @@ fn linear_elastic(
             P[i][j] = zero_if_vanishing(graph, entry);
         }
     }
-    Stress { P, isotropic: pressure, anisotropic, linear, remainder, energy: None }
+    Stress { P, isotropic: pressure, anisotropic, linear, remainder, whole: None, energy: None }
 }
 
 /// The divergence of `lambda tr(H) I + mu (H + H^T)`, with the constants as they are written.

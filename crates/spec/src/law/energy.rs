@@ -137,7 +137,7 @@ impl ComponentLaw {
             let (lambda, _) = derivation.graph.split_at_zero(cross, &small);
             isotropic_and_rest(&mut derivation.graph, deformation, lambda, &P)
         };
-        Stress { P, isotropic, anisotropic, linear, remainder, energy }
+        Stress { P, isotropic, anisotropic, linear, remainder, whole: None, energy }
     }
 }
 

@@ -32,27 +32,42 @@ pub(super) fn stress(
     volumetric: Expr,
 ) -> Stress {
     let law = Invariants::new(&mut derivation.graph, deformation, isochoric, volumetric);
-    let (linear, remainder) = law.divergence(derivation, deformation);
+    let Divergence { linear, remainder, whole } = law.divergence(derivation, deformation);
     let graph = &mut derivation.graph;
     let scale = graph.product_of([law.doubled, law.power, law.slope]);
     let scale = graph.whole(scale);
-    let isotropic = zero_if_vanishing(graph, law.pressure);
-    let pressure = graph.whole(isotropic);
+    let pressure = zero_if_vanishing(graph, law.pressure);
+    // All that multiplies F^-T.
+    let of_trace = graph.product_of([scale, law.trace]);
+    let of_trace = graph.sum([(Rational::new((-1).into(), 3.into()), of_trace)]);
+    let normal = graph.add(pressure, of_trace);
+    let normal = graph.whole(normal);
+    let off_diagonal = graph.sub(normal, scale);
+    let off_diagonal = graph.whole(off_diagonal);
+    let strain = law.strain.is_some();
     let n = deformation.H.len();
     let mut P = vec![vec![Graph::ZERO; n]; n];
     let mut anisotropic = P.clone();
     for i in 0..n {
         for j in 0..n {
-            let shear = graph.mul(scale, law.K[i][j]);
-            let normal = graph.mul(pressure, deformation.inverse_transpose[i][j]);
-            let entry = graph.add(shear, normal);
+            let f = deformation.inverse_transpose[i][j];
+            let (first, factor) = match i == j || strain {
+                true => (law.difference[i][j], normal),
+                // H^T F^-T is -F^-T there.
+                false => (deformation.H[i][j], off_diagonal),
+            };
+            let terms = [graph.mul(scale, first), graph.mul(factor, f)];
+            let entry = graph.sum_of(terms);
             P[i][j] = zero_if_vanishing(graph, entry);
+            let shear = graph.mul(scale, law.K[i][j]);
             let turned = graph.mul(pressure, law.M[i][j]);
             let entry = graph.sub(shear, turned);
             anisotropic[i][j] = zero_if_vanishing(graph, entry);
         }
     }
-    Stress { P, isotropic: pressure, anisotropic, linear, remainder, energy: Some(law.energy) }
+    let energy = Some(law.energy);
+    let whole = Some(whole);
+    Stress { P, isotropic: pressure, anisotropic, linear, remainder, whole, energy }
 }
 
 /// The invariants of a deformation, and the derivatives of both energies there.
@@ -64,6 +79,10 @@ struct Invariants {
     power_change: Expr,
     /// `tr(C - I)`.
     trace: Expr,
+    /// `F F^T - I`, where a turn drops out of it.
+    strain: Option<Matrix>,
+    /// `F - F^-T`.
+    difference: Matrix,
     /// `F - I1/3 F^-T`.
     K: Matrix,
     /// `H^T F^-T = I - F^-T`.
@@ -112,18 +131,23 @@ impl Invariants {
         };
         let trace = graph.whole(trace);
         let third = graph.div(trace, three);
-        let M = deformation.transposed_gradient_times_inverse(graph);
-        let turned = strain.map(|B| matrix_product(graph, &B, &deformation.inverse_transpose));
+        let f = &deformation.inverse_transpose;
+        let mut M = deformation.transposed_gradient_times_inverse(graph);
+        let turned = strain.as_ref().map(|B| matrix_product(graph, B, f));
+        let mut difference = M.clone();
         let mut K = M.clone();
         for i in 0..n {
             for j in 0..n {
+                if i != j {
+                    M[i][j] = graph.neg(f[i][j]);
+                }
                 // F - F^-T = (F F^T - I) F^-T
-                let difference = match &turned {
+                difference[i][j] = match &turned {
                     Some(turned) => turned[i][j],
                     None => graph.add(H[i][j], M[i][j]),
                 };
-                let mean = graph.mul(third, deformation.inverse_transpose[i][j]);
-                let entry = graph.sub(difference, mean);
+                let mean = graph.mul(third, f[i][j]);
+                let entry = graph.sub(difference[i][j], mean);
                 let entry = zero_if_vanishing(graph, entry);
                 K[i][j] = graph.whole(entry);
             }
@@ -171,6 +195,8 @@ impl Invariants {
             power,
             power_change,
             trace,
+            strain,
+            difference,
             K,
             M,
             slope: at(graph, slope, &actual),
@@ -184,9 +210,7 @@ impl Invariants {
         }
     }
 
-    /// The divergence of the part of `P` that is linear in `H`,
-    /// `mu Div H + (lambda + mu) grad tr H`, and of the rest.
-    fn divergence(&self, derivation: &mut Derivation, deformation: &Deformation) -> (Vector, Vector) {
+    fn divergence(&self, derivation: &mut Derivation, deformation: &Deformation) -> Divergence {
         let H = &deformation.H;
         let n = H.len();
         let graph = &mut derivation.graph;
@@ -213,6 +237,13 @@ impl Invariants {
         let ninths = graph.sum([(Rational::new(2.into(), 9.into()), sum)]);
         let modulus_change = graph.add(ninths, self.stiffness_change);
         let modulus_change = graph.whole(modulus_change);
+        let ninths = graph.sum([
+            (Rational::new(2.into(), 9.into()), of_trace),
+            (Rational::new(2.into(), 3.into()), scaled),
+        ]);
+        let whole_modulus =
+            graph.sum_of([ninths, self.stiffness_at_rest, self.stiffness_change]);
+        let whole_modulus = graph.whole(whole_modulus);
         let second = graph.product_of([self.curvature, self.power, self.power]);
         let second = graph.whole(second);
 
@@ -240,8 +271,8 @@ impl Invariants {
                 .collect(),
         };
         let open = derivation.divergence(&deformation.open);
-        let whole = derivation.divergence(H);
-        let (mut linear, mut remainder) = (Vector::new(), Vector::new());
+        let of_H = derivation.divergence(H);
+        let (mut linear, mut remainder, mut whole) = (Vector::new(), Vector::new(), Vector::new());
         for i in 0..n {
             let dilation = derivation.along(trace, i);
             let graph = &mut derivation.graph;
@@ -257,16 +288,31 @@ impl Invariants {
             let fk = times(graph, &deformation.inverse_transpose, &of_K);
             let fg = times(graph, &deformation.inverse_transpose, &g);
             let of_volume = graph.add(of_M[i], Mg);
-            let products = [
-                (2.into(), graph.mul(slope_change, whole[i])),
-                (1.into(), graph.mul(modulus_change, fg)),
-                ((-1).into(), graph.mul(modulus, of_volume)),
+            let second = [
                 (Rational::new((-4).into(), 3.into()), graph.mul(scaled, Kg)),
                 (Rational::new((-4).into(), 3.into()), graph.mul(scaled, fk)),
                 (4.into(), graph.mul(second, Kk)),
             ];
-            remainder.push(graph.sum(products));
+            let rest = [
+                (2.into(), graph.mul(slope_change, of_H[i])),
+                (1.into(), graph.mul(modulus_change, fg)),
+                ((-1).into(), graph.mul(modulus, of_volume)),
+            ];
+            let first = [
+                (2.into(), graph.mul(scaled, of_H[i])),
+                (1.into(), graph.mul(whole_modulus, fg)),
+            ];
+            remainder.push(graph.sum(rest.into_iter().chain(second.clone())));
+            whole.push(graph.sum(first.into_iter().chain(second)));
         }
-        (linear, remainder)
+        Divergence { linear, remainder, whole }
     }
+}
+
+/// The divergence of `P` in two parts, see [`Stress`], and whole.
+struct Divergence {
+    /// `mu Div H + (lambda + mu) grad tr H`.
+    linear: Vector,
+    remainder: Vector,
+    whole: Vector,
 }

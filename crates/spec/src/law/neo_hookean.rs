@@ -40,7 +40,7 @@ pub(super) fn stress(
         law.isotropic_and_rest(graph, strain.as_ref(), &P)
     };
     let remainder = law.remainder_divergence(derivation);
-    Stress { P, isotropic, anisotropic, linear, remainder, energy: None }
+    Stress { P, isotropic, anisotropic, linear, remainder, whole: None, energy: None }
 }
 
 struct NeoHookean<'a> {
