@@ -15,6 +15,7 @@ use crate::law::{self, Deformation, Stress, inside, zero_if_vanishing};
 use crate::surface::{Components, SurfaceFields, surface_fields};
 use crate::tensor::{Matrix, Vector};
 use mmsmith_expr::{Dependence, Expr, Graph, Node, Program};
+use num_traits::Zero;
 use std::collections::BTreeSet;
 use thiserror::Error;
 
@@ -169,7 +170,7 @@ fn body_force(derivation: &mut Derivation, a: &Vector, stress: &Stress, density:
         let bracket = graph.sub(a[i], force);
         let bracket = graph.cancel(bracket, variables);
         let (bracket, rest) = match &stress.whole {
-            Some(whole) if !is_joined(graph, bracket, a[i], variables) => (a[i], whole[i]),
+            Some(whole) if !is_joined(graph, bracket, [a[i], force], variables) => (a[i], whole[i]),
             _ => (bracket, stress.remainder[i]),
         };
         let bracket = graph.whole(bracket);
@@ -181,17 +182,39 @@ fn body_force(derivation: &mut Derivation, a: &Vector, stress: &Stress, density:
     b
 }
 
-/// Whether terms of `a` were joined with others in `sum`.
-fn is_joined(graph: &mut Graph, sum: Expr, a: Expr, variables: &BTreeSet<Expr>) -> bool {
-    let a = graph.cancel(a, variables);
+/// Whether terms of `a` and `-b` were joined in `sum`, which is `a - b` after cancellation.
+fn is_joined(
+    graph: &mut Graph,
+    sum: Expr,
+    [a, b]: [Expr; 2],
+    variables: &BTreeSet<Expr>,
+) -> bool {
+    let (a, b) = (graph.cancel(a, variables), graph.cancel(b, variables));
     let others = graph.sub(sum, a);
-    terms(graph, sum) != terms(graph, others) + terms(graph, a)
+    let own = match graph.node(a) {
+        Node::Sum { terms, .. } => terms.len(),
+        _ => usize::from(a != Graph::ZERO),
+    };
+    // Terms of equal factors are grouped; where they are joined, the whole is shorter.
+    terms(graph, sum) != terms(graph, others) + own
+        && graph.reachable(&[sum]).len() < graph.reachable(&[a, b]).len()
 }
 
-/// How many terms an expression has.
+/// How many terms an expression has, common factors apart.
 fn terms(graph: &Graph, expr: Expr) -> usize {
     match graph.node(expr) {
+        // A product with a number in front of it.
+        Node::Sum { constant, terms: one } if one.len() == 1 && constant.is_zero() => {
+            terms(graph, one[0].0)
+        }
         Node::Sum { terms, .. } => terms.len(),
+        Node::Product(factors) => {
+            let sums = factors.iter().filter_map(|(base, _)| match graph.node(*base) {
+                Node::Sum { terms, .. } => Some(terms.len()),
+                _ => None,
+            });
+            sums.max().unwrap_or(1)
+        }
         _ => usize::from(expr != Graph::ZERO),
     }
 }
