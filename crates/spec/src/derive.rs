@@ -183,12 +183,7 @@ fn body_force(derivation: &mut Derivation, a: &Vector, stress: &Stress, density:
 }
 
 /// Whether terms of `a` and `-b` were joined in `sum`, which is `a - b` after cancellation.
-fn is_joined(
-    graph: &mut Graph,
-    sum: Expr,
-    [a, b]: [Expr; 2],
-    variables: &BTreeSet<Expr>,
-) -> bool {
+fn is_joined(graph: &mut Graph, sum: Expr, [a, b]: [Expr; 2], variables: &BTreeSet<Expr>) -> bool {
     let (a, b) = (graph.cancel(a, variables), graph.cancel(b, variables));
     let others = graph.sub(sum, a);
     let own = match graph.node(a) {

@@ -241,8 +241,7 @@ impl Invariants {
             (Rational::new(2.into(), 9.into()), of_trace),
             (Rational::new(2.into(), 3.into()), scaled),
         ]);
-        let whole_modulus =
-            graph.sum_of([ninths, self.stiffness_at_rest, self.stiffness_change]);
+        let whole_modulus = graph.sum_of([ninths, self.stiffness_at_rest, self.stiffness_change]);
         let whole_modulus = graph.whole(whole_modulus);
         let second = graph.product_of([self.curvature, self.power, self.power]);
         let second = graph.whole(second);
@@ -298,10 +297,8 @@ impl Invariants {
                 (1.into(), graph.mul(modulus_change, fg)),
                 ((-1).into(), graph.mul(modulus, of_volume)),
             ];
-            let first = [
-                (2.into(), graph.mul(scaled, of_H[i])),
-                (1.into(), graph.mul(whole_modulus, fg)),
-            ];
+            let first =
+                [(2.into(), graph.mul(scaled, of_H[i])), (1.into(), graph.mul(whole_modulus, fg))];
             remainder.push(graph.sum(rest.into_iter().chain(second.clone())));
             whole.push(graph.sum(first.into_iter().chain(second)));
         }
