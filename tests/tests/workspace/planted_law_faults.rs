@@ -140,7 +140,7 @@ struct Run {
     order_with_fault: f64,
 }
 
-const RUNS: [Run; 2] = [
+const RUNS: [Run; 1] = [
     Run {
         frame: "total",
         motion: "skew-2d",
@@ -159,15 +159,6 @@ const RUNS: [Run; 2] = [
         cells: [4, 8],
         least_order: 3.5,
         order_with_fault: 2.0,
-    },
-    Run {
-        frame: "updated",
-        // Its grid has walls that do not move.
-        motion: "swirl",
-        case: || Case { periods: 0.25, ..Case::default() },
-        cells: [8, 16],
-        least_order: 1.5,
-        order_with_fault: 1.0,
     },
 ];
 
