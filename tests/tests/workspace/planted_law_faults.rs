@@ -140,27 +140,25 @@ struct Run {
     order_with_fault: f64,
 }
 
-const RUNS: [Run; 1] = [
-    Run {
-        frame: "total",
-        motion: "skew-2d",
-        case: || Case {
-            scheme: Scheme::Total(Total {
-                composition: Composition::Order4,
-                layout: Layout::Gauss,
-                ..Total::of_degree(3)
-            }),
-            cfl_speed: CflSpeed::PWave,
-            cfl: 0.3,
-            per_cell: 4,
-            periods: 0.25,
-            ..Case::default()
-        },
-        cells: [4, 8],
-        least_order: 3.5,
-        order_with_fault: 2.0,
+const RUNS: [Run; 1] = [Run {
+    frame: "total",
+    motion: "skew-2d",
+    case: || Case {
+        scheme: Scheme::Total(Total {
+            composition: Composition::Order4,
+            layout: Layout::Gauss,
+            ..Total::of_degree(3)
+        }),
+        cfl_speed: CflSpeed::PWave,
+        cfl: 0.3,
+        per_cell: 4,
+        periods: 0.25,
+        ..Case::default()
     },
-];
+    cells: [4, 8],
+    least_order: 3.5,
+    order_with_fault: 2.0,
+}];
 
 /// The order of the displacement; `None` where a run fails.
 fn order(exact: &AnySolution<f64>, run: &Run) -> Option<f64> {
