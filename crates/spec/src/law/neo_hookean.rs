@@ -29,7 +29,7 @@ pub(super) fn stress(
     let graph = &mut derivation.graph;
     let (lambda, mu) = (graph.whole(lambda), graph.whole(mu));
     let law = NeoHookean { deformation, lambda, mu };
-    let strain = law.strain_without_turn(graph);
+    let strain = strain_without_turn(graph, &deformation.H);
     let P = match &strain {
         Some(strain) => law.by_strain(graph, strain),
         None => law.by_gradient(graph),
@@ -40,7 +40,7 @@ pub(super) fn stress(
         law.isotropic_and_rest(graph, strain.as_ref(), &P)
     };
     let remainder = law.remainder_divergence(derivation);
-    Stress { P, isotropic, anisotropic, linear, remainder, energy: None }
+    Stress { P, isotropic, anisotropic, linear, remainder, whole: None, energy: None }
 }
 
 struct NeoHookean<'a> {
@@ -51,28 +51,6 @@ struct NeoHookean<'a> {
 }
 
 impl NeoHookean<'_> {
-    /// `H + H^T + H H^T = F F^T - I` where a turn drops out of it in symbols.
-    fn strain_without_turn(&self, graph: &mut Graph) -> Option<Matrix> {
-        let H = &self.deformation.H;
-        let n = H.len();
-        let mut strain = vec![vec![Graph::ZERO; n]; n];
-        let mut turns = false;
-        for i in 0..n {
-            for j in 0..n {
-                let mut terms = vec![H[i][j], H[j][i]];
-                terms.extend((0..n).map(|m| graph.mul(H[i][m], H[j][m])));
-                let left = graph.without_vanishing_part(&terms);
-                let sum = graph.sum_of(left.iter().copied());
-                strain[i][j] = graph.shortened(sum);
-                // A turn takes the parts of first order away with those of second order.
-                let first = [H[i][j], H[j][i]];
-                let lost = |h: &Expr| *h != Graph::ZERO && !left.contains(h);
-                turns |= first.iter().any(lost) || strain[i][j] != sum;
-            }
-        }
-        turns.then_some(strain)
-    }
-
     /// `mu (H + H^T F^-T) + lambda ln J F^-T`.
     fn by_gradient(&self, graph: &mut Graph) -> Matrix {
         let pressure = graph.mul(self.lambda, self.deformation.log_J);
@@ -199,4 +177,25 @@ impl NeoHookean<'_> {
         }
         remainder
     }
+}
+
+/// `H + H^T + H H^T = F F^T - I` where a turn drops out of it in symbols.
+pub(super) fn strain_without_turn(graph: &mut Graph, H: &Matrix) -> Option<Matrix> {
+    let n = H.len();
+    let mut strain = vec![vec![Graph::ZERO; n]; n];
+    let mut turns = false;
+    for i in 0..n {
+        for j in 0..n {
+            let mut terms = vec![H[i][j], H[j][i]];
+            terms.extend((0..n).map(|m| graph.mul(H[i][m], H[j][m])));
+            let left = graph.without_vanishing_part(&terms);
+            let sum = graph.sum_of(left.iter().copied());
+            strain[i][j] = graph.shortened(sum);
+            // A turn takes the parts of first order away with those of second order.
+            let first = [H[i][j], H[j][i]];
+            let lost = |h: &Expr| *h != Graph::ZERO && !left.contains(h);
+            turns |= first.iter().any(lost) || strain[i][j] != sum;
+        }
+    }
+    turns.then_some(strain)
 }
