@@ -153,7 +153,8 @@ fn compiled(description: &Description) -> PathBuf {
     std::fs::write(folder.join(format!("{module}.h")), header).unwrap();
     let list = format!(
         "#include \"{module}.h\"\n#define TRACTIONS_{module}\n\
-         #define SOLUTIONS SOLUTION({module}, BOX, LAME, {energy})\n"
+         #define CONSTANTS_{module} WRITE_CONSTANT({module}, lambda) WRITE_CONSTANT({module}, mu)\n\
+         #define SOLUTIONS SOLUTION({module}, BOX, {energy})\n"
     );
     std::fs::write(folder.join("headers.h"), list).unwrap();
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/c/compare.c");
