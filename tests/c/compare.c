@@ -4,8 +4,8 @@
  * a line "refused MESSAGE", or "values" and the bits: defaults, constants, measures of the domain, then for each point
  * u, v, a, H, F, J, P, b from one function each, the same from one call, the strain energy where there is one, the
  * tractions, b in stages, and b from the array. headers.h includes the headers and defines SOLUTIONS, a list of what each offers:
- * SOLUTION(name, BOX or ANNULUS, LAME or MOONEY_RIVLIN or CUSTOM, ENERGY or NO_ENERGY),
- * and TRACTIONS_name, a list of WRITE_TRACTION(name, surface).
+ * SOLUTION(name, BOX or ANNULUS, ENERGY or NO_ENERGY), CONSTANTS_name, a list of WRITE_CONSTANT(name, constant) for those of its
+ * law, and TRACTIONS_name, a list of WRITE_TRACTION(name, surface).
  */
 #include "headers.h"
 #include <stdio.h>
@@ -62,16 +62,7 @@ static double *numbers(size_t n)
     write_double(name##_inner(&s));                                                                \
     write_double(name##_outer(&s));
 
-#define WRITE_LAME(name)                                                                           \
-    write_double(name##_lambda(&s));                                                               \
-    write_double(name##_mu(&s));
-
-#define WRITE_MOONEY_RIVLIN(name)                                                                  \
-    write_double(name##_c1(&s));                                                                   \
-    write_double(name##_c2(&s));                                                                   \
-    write_double(name##_lambda(&s));
-
-#define WRITE_CUSTOM(name)
+#define WRITE_CONSTANT(name, constant) write_double(name##_##constant(&s));
 
 #define WRITE_ENERGY(name) write_double(name##_W(&s, Xp, t));
 
@@ -81,7 +72,7 @@ static double *numbers(size_t n)
     name##_##surface##_traction(&s, Xp, t, vector);                                                \
     write_doubles(vector, d);
 
-#define SOLUTION(name, domain, law, energy)                                                        \
+#define SOLUTION(name, domain, energy)                                                             \
     static void run_##name(void)                                                                   \
     {                                                                                              \
         const size_t d = name##_dimension;                                                         \
@@ -122,7 +113,7 @@ static double *numbers(size_t n)
             write_double(name##_density(&s));                                                      \
             write_double(name##_wave_speed(&s));                                                   \
             write_double(name##_period(&s));                                                       \
-            WRITE_##law(name)                                                                      \
+            CONSTANTS_##name                                                                       \
             WRITE_##domain(name)                                                                   \
             name##_point_array(&s, n, X, point);                                                   \
             /* In two parts, as threads would. */                                                  \
@@ -177,7 +168,7 @@ static double *numbers(size_t n)
 SOLUTIONS
 #undef SOLUTION
 
-#define SOLUTION(name, domain, law, energy)                                                        \
+#define SOLUTION(name, domain, energy)                                                             \
     if (strcmp(given, #name) == 0) {                                                               \
         run_##name();                                                                              \
         continue;                                                                                  \

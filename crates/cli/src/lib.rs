@@ -30,7 +30,6 @@ mod table;
 mod terminal;
 
 use std::ffi::OsString;
-use std::process::ExitCode;
 
 use clap::FromArgMatches;
 
@@ -39,21 +38,87 @@ use interruption::{INTERRUPTED, is_interrupted};
 
 pub use interruption::end_on_signals;
 
-/// Does what a command line asks for; its first word is the program's name.
+/// Does what a command line asks for; its first word is the program's name. Gives the exit status.
 ///
 /// Results go to standard output, messages to standard error. A command line that makes no sense, and one that asks for help, ends
 /// the process.
 #[must_use]
-pub fn run(given: impl IntoIterator<Item = OsString>) -> ExitCode {
+pub fn run(given: impl IntoIterator<Item = OsString>) -> u8 {
     let given: Vec<_> = given.into_iter().collect();
-    let arguments = line()
-        .color(color_of(&given).into())
-        .try_get_matches_from(given.clone())
-        .and_then(|matches| Arguments::from_arg_matches(&matches))
-        .unwrap_or_else(|refusal| refusal.exit());
+    let arguments = read(&given).unwrap_or_else(|refusal| refusal.exit());
     terminal::settle(arguments.talk.verbosity(), arguments.talk.color);
     terminal::detail(format_args!("mms {}", env!("CARGO_PKG_VERSION")));
-    let outcome = match &arguments.command {
+    match perform(&arguments, &given) {
+        Ok(true) => 0,
+        Ok(false) => 1,
+        Err(error) => {
+            // A diagnostic is laid out as a whole already.
+            match error.downcast_ref::<mmsmith_spec::Diagnostic>() {
+                Some(diagnostic) => terminal::complain(&format!("{diagnostic}\n")),
+                None => terminal::error(format_args!("{error:#}")),
+            }
+            if is_interrupted(&error) { INTERRUPTED } else { 2 }
+        }
+    }
+}
+
+/// As [`run`], for programs that call it as a function: nothing is printed from then on, and the process goes on. Results are in
+/// the files that the command line names. True unless a check failed.
+///
+/// # Errors
+///
+/// [`Refusal`] where [`run`] would end with the status 2 or 130.
+pub fn call(given: impl IntoIterator<Item = OsString>) -> Result<bool, Refusal> {
+    terminal::silence();
+    let given: Vec<_> = given.into_iter().collect();
+    let arguments = read(&given).map_err(|refusal| {
+        let text = refusal.render().to_string();
+        Refusal::Failed(text.trim_start_matches("error: ").trim_end().to_owned())
+    })?;
+    perform(&arguments, &given).map_err(|error| match is_interrupted(&error) {
+        true => Refusal::Interrupted,
+        false => Refusal::Failed(message(&error)),
+    })
+}
+
+/// Why [`call`] did not do what was asked for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Refusal {
+    /// The message that [`run`] prints.
+    Failed(String),
+    /// [`mmsmith_verify::interrupt`] was called.
+    Interrupted,
+}
+
+/// The specification of the solution called `name`, or the one in the file `name`: looked for where all commands look.
+///
+/// # Errors
+///
+/// The message where there is none, or it cannot be read.
+pub fn specification(name: &str) -> Result<mmsmith_spec::Spec, String> {
+    library::specification(name).map_err(|error| message(&error))
+}
+
+/// The names of all solutions that can be found without a path.
+#[must_use]
+pub fn solutions() -> Vec<String> {
+    library::names()
+}
+
+/// An error with its causes, or a diagnostic as it is laid out.
+fn message(error: &anyhow::Error) -> String {
+    format!("{error:#}").trim_start_matches("error: ").to_owned()
+}
+
+fn read(given: &[OsString]) -> Result<Arguments, clap::Error> {
+    line()
+        .color(color_of(given).into())
+        .try_get_matches_from(given)
+        .and_then(|matches| Arguments::from_arg_matches(&matches))
+}
+
+fn perform(arguments: &Arguments, given: &[OsString]) -> anyhow::Result<bool> {
+    match &arguments.command {
         Command::List(options) => commands::list(options),
         Command::Check(options) => commands::check(options),
         Command::Certify(options) => commands::certify(options),
@@ -61,7 +126,7 @@ pub fn run(given: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Coverage(options) => commands::coverage(options),
         Command::Gen(options) => commands::generate(options),
         Command::Eval(options) => commands::eval(options),
-        Command::Run(options) => commands::run(options, &given),
+        Command::Run(options) => commands::run(options, given),
         Command::Resume(options) => commands::resume(options),
         Command::Converge(options) => commands::converge(options),
         Command::Stability(options) => commands::stability(options),
@@ -71,17 +136,5 @@ pub fn run(given: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Completions(options) => commands::completions(options),
         Command::Man(options) => commands::man(options),
         Command::Reference => commands::reference(),
-    };
-    match outcome {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::from(1),
-        Err(error) => {
-            // A diagnostic is laid out as a whole already.
-            match error.downcast_ref::<mmsmith_spec::Diagnostic>() {
-                Some(diagnostic) => terminal::complain(&format!("{diagnostic}\n")),
-                None => terminal::error(format_args!("{error:#}")),
-            }
-            ExitCode::from(if is_interrupted(&error) { INTERRUPTED } else { 2 })
-        }
     }
 }

@@ -59,6 +59,12 @@ pub(crate) fn settle(verbosity: Verbosity, color: Color) {
     let _ = MANNER.set(Manner { verbosity, color });
 }
 
+/// Nothing is said from now on, by a process that has other uses for its terminal.
+pub(crate) fn silence() {
+    settle(Verbosity::Quiet, Color::Never);
+    RESERVED.store(true, Ordering::Relaxed);
+}
+
 fn manner() -> Manner {
     *MANNER.get().unwrap_or(&Manner { verbosity: Verbosity::Usual, color: Color::Auto })
 }

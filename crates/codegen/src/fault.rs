@@ -2,8 +2,8 @@
 //!
 //! Each fault is a mistake that published codes carry. It changes derived fields, so that generated Rust and C have the same one.
 
-use mmsmith_expr::{Expr, Graph, Rational};
-use mmsmith_spec::{Domain, Fields, Spec};
+use mmsmith_expr::{Derivatives, Expr, Graph, Rational};
+use mmsmith_spec::{Domain, Fields, Law, Spec};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
@@ -28,6 +28,16 @@ pub enum Fault {
     BodyForceWithoutStress,
     /// The first two components of `b` exchanged.
     BodyForceExchanged,
+    /// `b` from the divergence of `P^T`.
+    BodyForceOfTransposedStress,
+    /// `b` from the divergence of `J P`: the Kirchhoff stress taken for the Cauchy stress.
+    BodyForceOfKirchhoffStress,
+    /// `b` of a body whose density is one.
+    BodyForceOfDensityOne,
+    /// `lambda` and `mu` exchanged in `P`, `b` and tractions.
+    LameExchanged,
+    /// `lambda` of plane stress, which means another Poisson's ratio, in `P`, `b` and tractions.
+    LameOfPlaneStress,
     /// `-P`.
     StressSign,
     /// `P^T`.
@@ -62,7 +72,7 @@ pub struct NoEffect {
 
 impl Fault {
     /// Every fault.
-    pub const ALL: [Fault; 18] = [
+    pub const ALL: [Fault; 23] = [
         Fault::BodyForceSign,
         Fault::BodyForcePerVolume,
         Fault::BodyForcePerCurrentVolume,
@@ -71,6 +81,11 @@ impl Fault {
         Fault::BodyForceWithoutInertia,
         Fault::BodyForceWithoutStress,
         Fault::BodyForceExchanged,
+        Fault::BodyForceOfTransposedStress,
+        Fault::BodyForceOfKirchhoffStress,
+        Fault::BodyForceOfDensityOne,
+        Fault::LameExchanged,
+        Fault::LameOfPlaneStress,
         Fault::StressSign,
         Fault::StressTransposed,
         Fault::StressCauchy,
@@ -95,6 +110,11 @@ impl Fault {
             Fault::BodyForceWithoutInertia => "body-force-without-inertia",
             Fault::BodyForceWithoutStress => "body-force-without-stress",
             Fault::BodyForceExchanged => "body-force-exchanged",
+            Fault::BodyForceOfTransposedStress => "body-force-of-transposed-stress",
+            Fault::BodyForceOfKirchhoffStress => "body-force-of-kirchhoff-stress",
+            Fault::BodyForceOfDensityOne => "body-force-of-density-one",
+            Fault::LameExchanged => "lame-exchanged",
+            Fault::LameOfPlaneStress => "lame-of-plane-stress",
             Fault::StressSign => "stress-sign",
             Fault::StressTransposed => "stress-transposed",
             Fault::StressCauchy => "stress-cauchy",
@@ -120,6 +140,11 @@ impl Fault {
             Fault::BodyForceWithoutInertia => "b - a",
             Fault::BodyForceWithoutStress => "b = a",
             Fault::BodyForceExchanged => "the first two components of b exchanged",
+            Fault::BodyForceOfTransposedStress => "b from the divergence of P^T",
+            Fault::BodyForceOfKirchhoffStress => "b from the divergence of J P",
+            Fault::BodyForceOfDensityOne => "b of a body whose density is one",
+            Fault::LameExchanged => "lambda and mu exchanged in P, b and tractions",
+            Fault::LameOfPlaneStress => "lambda of plane stress in P, b and tractions",
             Fault::StressSign => "-P",
             Fault::StressTransposed => "P transposed",
             Fault::StressCauchy => "the Cauchy stress P F^T/J for P",
@@ -185,6 +210,19 @@ impl Fault {
                     std::mem::swap(first, second);
                 }
             }
+            Fault::BodyForceOfTransposedStress => balance(f, &transposed(&stress), spec.density),
+            Fault::BodyForceOfKirchhoffStress => {
+                let row = |row: &Vec<Expr>| row.iter().map(|&P| graph.mul(f.J, P)).collect();
+                let stress: Vec<Vec<Expr>> = stress.iter().map(row).collect();
+                balance(f, &stress, spec.density);
+            }
+            Fault::BodyForceOfDensityOne => balance(f, &stress, Graph::ONE),
+            Fault::LameExchanged => with_constants(spec, f, |_, lambda, mu| (mu, lambda)),
+            Fault::LameOfPlaneStress => with_constants(spec, f, |graph, lambda, mu| {
+                let [twice, sum] = [graph.sum_of([mu, mu]), graph.sum_of([lambda, mu, mu])];
+                let product = graph.mul(lambda, twice);
+                (graph.div(product, sum), mu)
+            }),
             Fault::StressSign => f.P.iter_mut().for_each(|row| negate(graph, row)),
             Fault::StressTransposed => f.P = transposed(&f.P),
             Fault::StressKirchhoff => {
@@ -224,8 +262,13 @@ pub struct UnknownFault(String);
 impl FromStr for Fault {
     type Err = UnknownFault;
 
+    /// By its name, in which `b-` may stand for `body-force-`.
     fn from_str(name: &str) -> Result<Self, UnknownFault> {
-        let known = Fault::ALL.into_iter().find(|fault| fault.name() == name);
+        let is_named = |fault: &Fault| {
+            let of_b = fault.name().strip_prefix("body-force-");
+            fault.name() == name || of_b.is_some_and(|rest| name.strip_prefix("b-") == Some(rest))
+        };
+        let known = Fault::ALL.into_iter().find(is_named);
         known.ok_or_else(|| UnknownFault(name.to_owned()))
     }
 }
@@ -287,6 +330,51 @@ fn is_noticed(spec: &Spec, fields: &mut Fields, before: &[Expr], after: &[Expr])
     })
 }
 
+/// Takes for `b` what balances a stress: `a - Div P/rho0`.
+fn balance(fields: &mut Fields, stress: &[Vec<Expr>], density: Expr) {
+    let Fields { graph, definitions, inputs, a, b, .. } = fields;
+    // In the coordinates alone, so that derivatives see all of it.
+    let definitions: BTreeMap<Expr, Expr> = definitions.iter().copied().collect();
+    let mut derivatives = Derivatives::default();
+    for (i, row) in stress.iter().enumerate() {
+        let terms: Vec<Expr> = row
+            .iter()
+            .zip(inputs.iter())
+            .map(|(&P, &(X, _))| {
+                let explicit = graph.replace(P, &definitions);
+                derivatives.of(graph, explicit, X)
+            })
+            .collect();
+        let divergence = graph.sum_of(terms);
+        let by_mass = graph.div(divergence, density);
+        b[i] = graph.sub(a[i], by_mass);
+    }
+}
+
+/// Derives the fields with other Lame constants; those of a law without them, and of one that has no such fields, stay.
+fn with_constants(
+    spec: &Spec,
+    fields: &mut Fields,
+    change: impl Fn(&mut Graph, Expr, Expr) -> (Expr, Expr),
+) {
+    let Law::Library(material) = spec.material else { return };
+    let constants = spec.material.constants();
+    let named =
+        |name: &str| constants.iter().find(|(own, _)| own.name == name).map(|(_, value)| *value);
+    let (Some(lambda), Some(mu)) = (named("lambda"), named("mu")) else { return };
+    // In the same graph, so that fields can be compared.
+    let mut changed = Spec { graph: fields.graph.clone(), ..spec.clone() };
+    let (other_lambda, other_mu) = change(&mut changed.graph, lambda, mu);
+    changed.material = Law::Library(material.map_named(|name, value| match name {
+        "lambda" => other_lambda,
+        "mu" => other_mu,
+        _ => value,
+    }));
+    if let Ok(derived) = changed.derive() {
+        *fields = derived;
+    }
+}
+
 fn negate(graph: &mut Graph, vector: &mut [Expr]) {
     vector.iter_mut().for_each(|entry| *entry = graph.neg(*entry));
 }
@@ -303,4 +391,35 @@ fn delay(graph: &mut Graph, spec: &Spec, vector: &mut [Expr]) {
     let late = graph.add(t, delay);
     let later = BTreeMap::from([(t, late)]);
     vector.iter_mut().for_each(|entry| *entry = graph.replace(*entry, &later));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+    use std::path::Path;
+
+    #[test]
+    fn faults_of_b_have_two_names() {
+        assert_eq!("b-sign".parse::<Fault>().unwrap().name(), "body-force-sign");
+        for name in ["sign", "b-", "b-b-sign", "body-force"] {
+            assert!(name.parse::<Fault>().is_err(), "{name}");
+        }
+    }
+
+    /// What the right stress balances is the body force, in every kind of coordinates.
+    #[test]
+    fn the_balance_of_the_right_stress_is_the_body_force() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../mms-specs");
+        for name in ["skew-2d", "vortex", "ring-nu", "torsion", "sphere-shell"] {
+            let text = fs::read_to_string(folder.join(name).with_extension("toml")).unwrap();
+            let spec = Spec::parse(&text, name).unwrap();
+            let mut fields = spec.derive().unwrap();
+            let (before, stress) = (outputs(&fields), fields.P.clone());
+            balance(&mut fields, &stress, spec.density);
+            let after = outputs(&fields);
+            assert_ne!(before, after, "{name}: another form");
+            assert!(!is_noticed(&spec, &mut fields, &before, &after), "{name}");
+        }
+    }
 }

@@ -113,7 +113,7 @@ impl<T: Interpretable, const D: usize> BodyForceAtPoints<T, D> for LatticePoints
         values.push(t);
         let mut rows = Vec::new();
         for LayerStage { axis, count, stage } in layers {
-            let uniform = stage.uniform::<T, D>(t, self.parameters);
+            let uniform = stage.uniform(D, t, self.parameters);
             for coordinates in self.lattice.coordinates(*axis).chunks(BLOCK) {
                 let mut row: Row<T> = [T::zero(); BLOCK];
                 row[..coordinates.len()].copy_from_slice(coordinates);
@@ -125,7 +125,7 @@ impl<T: Interpretable, const D: usize> BodyForceAtPoints<T, D> for LatticePoints
                 }
             }
         }
-        values.extend(points.uniform::<T, D>(t, self.parameters));
+        values.extend(points.uniform(D, t, self.parameters));
     }
 
     fn evaluate_of(&self, time: &[T], points: &[u32], b: &mut [SVector<T, D>]) {

@@ -5,8 +5,11 @@
 //! translates, in the same stages, to the same bits in both precisions; for work on many points the generated code is
 //! faster.
 
+mod arrays;
 mod lattice;
 mod staged;
+
+pub use arrays::{Arrays, ArraysAtPoints, Quantity};
 
 use lattice::LatticeStages;
 use mmsmith_expr::{Program, Scalar, Slot};
@@ -180,7 +183,7 @@ impl<T: Interpretable, const D: usize> Interpreted<T, D> {
     fn new(spec: &Spec, staged: &Staged, parameters: Vec<T>) -> Result<Self, InterpretError> {
         let program = staged.program();
         let part = |slots: &[Slot]| program.part(slots);
-        let at_parameters = inputs::<T, D>(&SVector::zeros(), T::zero(), &parameters);
+        let at_parameters = inputs(&[T::zero(); D], T::zero(), &parameters);
         let constants = |slots: &[Slot]| part(slots).evaluate_in(&at_parameters);
         let constant = |slot: Slot| constants(&[slot])[0];
         for (requirement, &Sides { left, right }) in
@@ -240,16 +243,16 @@ impl<T: Interpretable, const D: usize> Interpreted<T, D> {
     }
 
     fn vector(&self, program: &Program, X: &SVector<T, D>, t: T) -> SVector<T, D> {
-        SVector::from_row_slice(&program.evaluate_in(&inputs(X, t, &self.parameters)))
+        SVector::from_row_slice(&program.evaluate_in(&inputs(X.as_slice(), t, &self.parameters)))
     }
 
     fn matrix(&self, program: &Program, X: &SVector<T, D>, t: T) -> SMatrix<T, D, D> {
-        SMatrix::from_row_slice(&program.evaluate_in(&inputs(X, t, &self.parameters)))
+        SMatrix::from_row_slice(&program.evaluate_in(&inputs(X.as_slice(), t, &self.parameters)))
     }
 }
 
 /// Coordinates, time and parameters, in the order of the programs' inputs.
-fn inputs<T: Interpretable, const D: usize>(X: &SVector<T, D>, t: T, parameters: &[T]) -> Vec<T> {
+fn inputs<T: Interpretable>(X: &[T], t: T, parameters: &[T]) -> Vec<T> {
     X.iter().copied().chain([t]).chain(parameters.iter().copied()).collect()
 }
 
@@ -295,7 +298,7 @@ impl<T: Interpretable, const D: usize> Solution<T, D> for Interpreted<T, D> {
     }
 
     fn jacobian(&self, X: &SVector<T, D>, t: T) -> T {
-        self.jacobian.evaluate_in(&inputs(X, t, &self.parameters))[0]
+        self.jacobian.evaluate_in(&inputs(X.as_slice(), t, &self.parameters))[0]
     }
 
     fn first_piola_kirchhoff(&self, X: &SVector<T, D>, t: T) -> SMatrix<T, D, D> {
@@ -339,7 +342,7 @@ impl<T: Interpretable, const D: usize> Solution<T, D> for Interpreted<T, D> {
 
     fn strain_energy(&self, X: &SVector<T, D>, t: T) -> Option<T> {
         let energy = self.strain_energy.as_ref()?;
-        energy.evaluate_in(&inputs(X, t, &self.parameters)).first().copied()
+        energy.evaluate_in(&inputs(X.as_slice(), t, &self.parameters)).first().copied()
     }
 
     fn domain(&self) -> Domain<T, D> {

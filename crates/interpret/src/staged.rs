@@ -21,13 +21,14 @@ impl Stage {
         Stage { section, uniform }
     }
 
-    pub(crate) fn uniform<T: Interpretable, const D: usize>(
+    /// The values of the program of what is the same at all points, of which none reads a position.
+    pub(crate) fn uniform<T: Interpretable>(
         &self,
+        dimension: usize,
         t: T,
         parameters: &[T],
     ) -> Vec<T> {
-        // These values read no position.
-        self.uniform.evaluate_in(&inputs::<T, D>(&SVector::zeros(), t, parameters))
+        self.uniform.evaluate_in(&inputs(&[T::zero(); 3][..dimension], t, parameters))
     }
 }
 
@@ -67,7 +68,7 @@ impl<const N: usize> PointStages<N> {
         X: &[SVector<T, D>],
         parameters: &'a [T],
     ) -> Points<'a, T, N> {
-        let uniform = self.at_points.uniform::<T, D>(T::rounded(f64::NAN), parameters);
+        let uniform = self.at_points.uniform(D, T::rounded(f64::NAN), parameters);
         let mut rows = Vec::new();
         let mut blocks = Vec::with_capacity(X.len().div_ceil(BLOCK) * self.kept);
         for X in X.chunks(BLOCK) {
@@ -110,12 +111,12 @@ impl<T: Interpretable, const D: usize> BodyForceAtPoints<T, D> for Points<'_, T,
             b.len(),
             self.len
         );
-        let time = self.stages.at_times[0].uniform::<T, D>(t, self.parameters);
+        let time = self.stages.at_times[0].uniform(D, t, self.parameters);
         self.of_numbers(&time, b, |n| first + n);
     }
 
     fn of_time(&self, t: T, values: &mut Vec<T>) {
-        values.extend(self.stages.at_times[0].uniform::<T, D>(t, self.parameters));
+        values.extend(self.stages.at_times[0].uniform(D, t, self.parameters));
     }
 
     fn evaluate_of(&self, time: &[T], points: &[u32], b: &mut [SVector<T, D>]) {
@@ -163,8 +164,8 @@ impl<T: Interpretable> Points<'_, T, 1> {
 impl<T: Interpretable, const D: usize> StateAtPoints<T, D> for Points<'_, T, 2> {
     fn evaluate(&self, t: T, velocity_time: T, first: usize, runs: &mut [StateRun<T, D>]) {
         let [state, velocity] = &self.stages.at_times;
-        let uniform = state.uniform::<T, D>(t, self.parameters);
-        let of_velocity = velocity.uniform::<T, D>(velocity_time, self.parameters);
+        let uniform = state.uniform(D, t, self.parameters);
+        let of_velocity = velocity.uniform(D, velocity_time, self.parameters);
         let mut rows = Vec::new();
         for (number, run) in (first..).zip(runs) {
             assert!(number * BLOCK < self.len, "there are {} points", self.len);

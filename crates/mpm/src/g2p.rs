@@ -13,6 +13,7 @@ use crate::geometry::Constants;
 use crate::health::{Outcome, SharedOutcome};
 use crate::kernel::any::Interpolated;
 use crate::kernel::block::Block;
+use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Copies};
 use crate::kernel::corners::velocity_at;
 use crate::node::Node;
@@ -30,13 +31,14 @@ const CHUNK: usize = 1024;
 impl<T: Lanes, const D: usize> State<T, D> {
     /// F follows the velocity at the start of the step for a time, before forces are computed; stored beside the old F.
     pub(crate) fn g2p_stretch(&mut self, time: T) -> Outcome {
-        let Self { particles, constants, nodes, F_early, support, .. } = self;
+        let Self { particles, constants, nodes, F_early, support, buffers, .. } = self;
         let (nodes, c) = (&nodes[..], *constants);
         let Particles { x, F, .. } = &*particles;
-        let (support, found) = (&*support, SharedOutcome::default());
+        let (support, buffers) = (&*support, &*buffers);
+        let found = SharedOutcome::default();
         each_chunk(F_early, CHUNK, &|chunk, F_early| {
             let mut outcome = Outcome::default();
-            let mut grid = FromGrid::new(&c, support, nodes, false);
+            let mut grid = FromGrid::new(&c, support, nodes, buffers.take(support, false));
             let (x, F) = (&x[chunk * CHUNK..], &F[chunk * CHUNK..]);
             let blocks = F_early.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK));
             for (index, ((F_early, x), F)) in blocks.enumerate() {
@@ -52,6 +54,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
                     }
                 }
             }
+            buffers.give_back(grid.buffers);
             found.add(outcome);
         });
         found.all()
@@ -61,9 +64,10 @@ impl<T: Lanes, const D: usize> State<T, D> {
     pub(crate) fn g2p(&mut self, late: T) -> Outcome {
         let Self { particles, constants, nodes, bins, F_early, support, affine, transfer, .. } =
             self;
+        let buffers = &self.buffers;
         let (nodes, c, transfer) = (&nodes[..], *constants, *transfer);
         let arrays = (particles, affine);
-        g2p(arrays, bins, c, support, transfer, |block, interpolated, first, of_block| {
+        g2p(arrays, bins, c, support, buffers, transfer, |block, interpolated, first, of_block| {
             let OfBlock { x, v, F, affine } = of_block;
             block.g2p(&c.strides, nodes, interpolated);
             take_velocity(&c, transfer, interpolated, v, affine);
@@ -76,33 +80,45 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// MUSL, first G2P: velocity alone.
     pub(crate) fn g2p_velocity(&mut self) {
-        let Self { particles, constants, nodes, support, affine, transfer, .. } = self;
+        let Self { particles, constants, nodes, support, affine, transfer, buffers, .. } = self;
         let (nodes, c, support, transfer) = (&nodes[..], *constants, &*support, *transfer);
+        let buffers = &*buffers;
         let Particles { x, v, F, .. } = particles;
         each_chunk_of_four((x, v, F, affine), CHUNK, &|chunk| {
-            let mut grid = FromGrid::new(&c, support, nodes, transfer.is_affine());
+            let own = buffers.take(support, transfer.is_affine());
+            let mut grid = FromGrid::new(&c, support, nodes, own);
             for_blocks(chunk, |first, OfBlock { x, v, F, affine }| {
                 take_velocity(&c, transfer, grid.g2p(first, x, F), v, affine);
             });
+            buffers.give_back(grid.buffers);
         });
     }
 
     /// MUSL, second G2P: position by the grid velocity, and F, for a time `late`, by the reprojected one.
     pub(crate) fn g2p_reprojected(&mut self, late: T) -> Outcome {
         let Self { particles, constants, nodes, bins, reprojected, support, F_early, .. } = self;
+        let buffers = &self.buffers;
         let (nodes, c) = (&nodes[..], *constants);
         let reprojected =
             if c.planted.is(Fault::NoReprojection) { nodes } else { &reprojected[..] };
         let arrays = (particles, &mut Vec::new());
-        g2p(arrays, bins, c, support, Transfer::Flip, |block, interpolated, first, of_block| {
-            let OfBlock { x, F, .. } = of_block;
-            block.g2p(&c.strides, nodes, interpolated);
-            for (x, interpolated) in x.iter_mut().zip(&*interpolated) {
-                *x += interpolated.velocity * c.time_step;
-            }
-            block.g2p(&c.strides, reprojected, interpolated);
-            stretch(&c, late, F_early.get(first..first + F.len()), interpolated, F);
-        })
+        g2p(
+            arrays,
+            bins,
+            c,
+            support,
+            buffers,
+            Transfer::Flip,
+            |block, interpolated, first, of_block| {
+                let OfBlock { x, F, .. } = of_block;
+                block.g2p(&c.strides, nodes, interpolated);
+                for (x, interpolated) in x.iter_mut().zip(&*interpolated) {
+                    *x += interpolated.velocity * c.time_step;
+                }
+                block.g2p(&c.strides, reprojected, interpolated);
+                stretch(&c, late, F_early.get(first..first + F.len()), interpolated, F);
+            },
+        )
     }
 
     /// APIC: the affine velocities of particles that have none yet are those of their velocities on the grid.
@@ -115,9 +131,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
         for node in &mut self.nodes {
             node.values.copy_within(..D, D);
         }
-        let Self { particles, constants, nodes, support, affine, .. } = self;
+        let Self { particles, constants, nodes, support, affine, buffers, .. } = self;
         let Particles { x, F, .. } = &*particles;
-        let mut grid = FromGrid::new(constants, support, nodes, true);
+        let mut grid = FromGrid::new(constants, support, nodes, buffers.take(support, true));
         let blocks = affine.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK));
         for (index, ((affine, x), F)) in blocks.enumerate() {
             let interpolated = grid.g2p(index * BLOCK, x, F);
@@ -154,8 +170,7 @@ struct FromGrid<'a, T, const D: usize> {
     support: &'a Support<T, D>,
     nodes: &'a [Node<T, D>],
     copies: Copies<T, D>,
-    block: Block<T, D>,
-    interpolated: [Interpolated<T, D>; BLOCK],
+    buffers: Box<Buffers<T, D>>,
 }
 
 impl<'a, T: Lanes, const D: usize> FromGrid<'a, T, D> {
@@ -163,10 +178,9 @@ impl<'a, T: Lanes, const D: usize> FromGrid<'a, T, D> {
         c: &'a Constants<T, D>,
         support: &'a Support<T, D>,
         nodes: &'a [Node<T, D>],
-        is_affine: bool,
+        buffers: Box<Buffers<T, D>>,
     ) -> Self {
-        let (copies, block) = (Copies::new(), Block::new(support, is_affine));
-        Self { c, support, nodes, copies, block, interpolated: [Interpolated::zero(); BLOCK] }
+        Self { c, support, nodes, copies: Copies::new(), buffers }
     }
 
     /// Of the particles from the id `first` on, no more than a block.
@@ -176,7 +190,8 @@ impl<'a, T: Lanes, const D: usize> FromGrid<'a, T, D> {
         x: &[SVector<T, D>],
         F: &[SMatrix<T, D, D>],
     ) -> &[Interpolated<T, D>] {
-        let Self { c, support, nodes, copies, block, interpolated } = self;
+        let Self { c, support, nodes, copies, buffers } = self;
+        let Buffers { block, interpolated, .. } = &mut **buffers;
         let interpolated = &mut interpolated[..x.len()];
         block.compute_weights(c, support, &ids(first)[..x.len()], copies.of_successive(x, F));
         block.g2p(&c.strides, nodes, interpolated);
@@ -262,16 +277,18 @@ fn g2p<T: Lanes, const D: usize>(
     bins: &Bins,
     c: Constants<T, D>,
     support: &mut Support<T, D>,
+    buffers: &BufferPool<T, D>,
     transfer: Transfer,
-    update: impl Fn(&Block<T, D>, &mut [Interpolated<T, D>], usize, &mut OfBlock<'_, T, D>) + Sync,
+    update: impl Fn(&mut Block<T, D>, &mut [Interpolated<T, D>], usize, &mut OfBlock<'_, T, D>) + Sync,
 ) -> Outcome {
     let Particles { x, v, F, .. } = particles;
     let (bin_of, found) = (bins.bin_of(), SharedOutcome::default());
     let at_start = &*support;
     each_chunk_of_four((x, v, F, affine), CHUNK, &|chunk| {
         let mut outcome = Outcome::default();
-        let (mut copies, mut block) = (Copies::new(), Block::new(at_start, transfer.is_affine()));
-        let mut interpolated = [Interpolated::zero(); BLOCK];
+        let mut copies = Copies::new();
+        let mut own = buffers.take(at_start, transfer.is_affine());
+        let Buffers { block, interpolated, .. } = &mut *own;
         for_blocks(chunk, |first, mut of_block| {
             copies.copy(of_block.x, of_block.F);
             if c.planted.is(Fault::WeightsOfNewPosition) {
@@ -281,7 +298,7 @@ fn g2p<T: Lanes, const D: usize>(
             }
             let count = of_block.x.len();
             block.compute_weights(&c, at_start, &ids(first)[..count], copies.kinematics());
-            update(&block, &mut interpolated[..count], first, &mut of_block);
+            update(block, &mut interpolated[..count], first, &mut of_block);
             if let Support::Cpdi2 { .. } = at_start {
                 // Checked below, when all corners are at their new places.
                 return;
@@ -289,6 +306,7 @@ fn g2p<T: Lanes, const D: usize>(
             let OfBlock { x, F, .. } = of_block;
             outcome = outcome.merge(check(&c, at_start, &mut copies, first, bin_of, x, F));
         });
+        buffers.give_back(own);
         found.add(outcome);
     });
     let Support::Cpdi2 { mesh, next } = support else { return found.all() };

@@ -15,7 +15,8 @@ use crate::geometry::Constants;
 use crate::grid_update::{GridUpdate, NodeVectors, VelocityAndAcceleration};
 use crate::health::{Outcome, SharedOutcome};
 use crate::kernel::any::{Contributions, Interpolated, Receive};
-use crate::kernel::block::{Block, BlockLaw};
+use crate::kernel::block::BlockLaw;
+use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Copies, Kinematics};
 use crate::node::Node;
 use crate::parallel::disjoint::PartElements;
@@ -35,10 +36,12 @@ impl<T: Lanes, const D: usize> State<T, D> {
     pub(crate) fn g2p2g(&mut self, body_force: &dyn BodyForce<T, D>, t_next: T) -> Outcome {
         let Self { particles, constants: c, layout, bins, nodes, next, uniform, of_time, .. } =
             self;
+        let buffers = &self.buffers;
         let (support, law) = (&self.support, &*self.law);
         let Particles { X, x, v, F, mass, volume, .. } = particles;
         let forcing = Forcing::new(body_force, X, t_next, c, of_time);
-        let step = G2p2g { c, support, law, nodes, mass, volume, uniform: *uniform, forcing };
+        let uniform = *uniform;
+        let step = G2p2g { c, support, law, nodes, mass, volume, uniform, forcing, buffers };
         let found = SharedOutcome::default();
         let vectors = NodeVectors::VelocityAndAcceleration;
         let update =
@@ -63,6 +66,7 @@ struct G2p2g<'a, T, const D: usize> {
     uniform: Option<(T, T)>,
     /// The body force at the start of the next step.
     forcing: Forcing<'a, T, D>,
+    buffers: &'a BufferPool<T, D>,
 }
 
 impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
@@ -76,41 +80,42 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
         mut elements: Elements<'_, T, D>,
     ) -> Outcome {
         let mut outcome = Outcome::default();
-        let mut copies = Copies::new();
-        let contributions = match self.uniform {
-            Some((mass, volume)) => Contributions::uniform(mass, volume),
-            None => Contributions::zero(),
-        };
-        let mut scratch = (Block::new(self.support, false), contributions);
+        let mut buffers = self.buffers.take(self.support, false);
+        if let Some((mass, volume)) = self.uniform {
+            buffers.contributions.set_uniform(mass, volume);
+        }
+        let mut copies = None;
         for (index, ids) in elements.indices().chunks(BLOCK).enumerate() {
             let place = index * BLOCK;
             if self.uniform.is_none() {
-                scratch.1.take(ids, self.mass, self.volume);
+                buffers.contributions.take(ids, self.mass, self.volume);
             }
             if let Some((x, v, F)) = elements.contiguous::<BLOCK>(place) {
-                let found = self.advance_block(&mut scratch, band, (first, bin), ids, (x, v, F));
+                let found = self.advance_block(&mut buffers, band, (first, bin), ids, (x, v, F));
                 outcome = outcome.merge(found);
                 continue;
             }
+            let copies = copies.get_or_insert_with(Copies::new);
             for k in 0..ids.len() {
                 let (x, v, F) = elements.get(place + k);
                 (copies.x[k], copies.v[k], copies.F[k]) = (*x, *v, *F);
             }
-            let Copies { x, v, F } = &mut copies;
-            let found = self.advance_block(&mut scratch, band, (first, bin), ids, (x, v, F));
+            let Copies { x, v, F } = copies;
+            let found = self.advance_block(&mut buffers, band, (first, bin), ids, (x, v, F));
             outcome = outcome.merge(found);
             for k in 0..ids.len() {
                 let (x, v, F) = elements.get(place + k);
                 (*x, *v, *F) = (copies.x[k], copies.v[k], copies.F[k]);
             }
         }
+        self.buffers.give_back(buffers);
         outcome
     }
 
     /// The same for a block of particles.
     fn advance_block(
         &self,
-        (block, contributions): &mut (Block<T, D>, Contributions<T, D, BLOCK>),
+        Buffers { block, contributions, .. }: &mut Buffers<T, D>,
         band: &mut [Node<T, D>],
         (first, bin): (usize, u32),
         ids: &[u32],

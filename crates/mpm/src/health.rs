@@ -11,7 +11,9 @@ use crate::domain::{
 use crate::geometry::Constants;
 use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::kernel::corners::{GROUP, OfGroup, cells, gather, padded, parallelograms};
-use crate::shape_function::{EXTENDED, HALF_SIZE_LIMIT, ProductShape, node_below};
+use crate::shape_function::{
+    EXTENDED, HALF_SIZE_LIMIT, OnAxis, ProductShape, half_size, node_below,
+};
 use crate::simd::{Eight, Lanes, Loop, Vectors, dispatch};
 use crate::support::{Rows, Support};
 use crate::tensor::{determinant, real};
@@ -87,7 +89,12 @@ impl<T: Lanes, const D: usize> Support<T, D> {
         let of_block = OfBlock { c, kinematics, bins, count: ids.len().min(BLOCK) };
         let all = &mut all_valid;
         match self {
-            Self::Product(shape) => dispatch(CheckBoxes { of_block, shape, all_valid: all }),
+            Self::Product(shape) if shape.on_axis == OnAxis::StretchingBox => {
+                dispatch(CheckBoxes::<_, D, true> { of_block, shape, all_valid: all });
+            }
+            Self::Product(shape) => {
+                dispatch(CheckBoxes::<_, D, false> { of_block, shape, all_valid: all });
+            }
             Self::Cpdi { half_edges } => {
                 let ids = &padded(ids);
                 dispatch(CheckParallelograms { of_block, half_edges, ids, all_valid: all });
@@ -166,39 +173,56 @@ impl<T: Lanes, const D: usize> OfBlock<'_, T, D> {
 /// Half-size of a domain, in cells, that is below [`HALF_SIZE_LIMIT`] however it is rounded.
 const SMALL: f64 = HALF_SIZE_LIMIT - 0.125;
 
-struct CheckBoxes<'a, 'b, T, const D: usize> {
+struct CheckBoxes<'a, 'b, T, const D: usize, const STRETCHING: bool> {
     of_block: OfBlock<'a, T, D>,
     shape: &'a ProductShape<T, D>,
     all_valid: &'b mut bool,
 }
 
-impl<T: Lanes, const D: usize> Loop for CheckBoxes<'_, '_, T, D> {
+impl<T: Lanes, const D: usize, const STRETCHING: bool> Loop
+    for CheckBoxes<'_, '_, T, D, STRETCHING>
+{
     const WIDE: bool = D > 1;
 
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self { of_block, shape, all_valid } = self;
         let OfBlock { c, kinematics: Kinematics { x, F }, bins, count } = of_block;
-        let (half_sizes, width, above) = (shape.half_sizes, shape.width(), shape.extended_above());
-        let mut all = true;
-        for k in 0..count.min(BLOCK) {
-            let (x, F) = (&x[k], &F[k]);
-            let mut valid = determinant(F) > T::zero();
-            let mut extended = false;
-            let mut last = T::zero();
+        let (width, above) = (shape.width(), shape.extended_above());
+        let more_rows: T = real((EXTENDED - width) as f64);
+        let half_size = |k: usize, a: usize| half_size::<_, STRETCHING>(shape.l[a], F[k][(a, a)]);
+        // The lower edge, and the same where it would be for the last row of a box with extended support.
+        let edges = |k: usize, is_extended: bool| {
+            let a = D - 1;
+            let edge = (x[k][a] - c.lower[a]) * c.inverse_spacing - half_size(k, a);
+            (edge, if is_extended { edge + more_rows } else { edge })
+        };
+        let is_inside = |(first, end): (f64, f64), (low, high): (T, T)| {
+            (low >= real(first)) & (high < real(end))
+        };
+        let bins = &bins[..count.min(BLOCK)];
+        let Some((&bin, others)) = bins.split_first() else { return };
+        let range = c.bins.range(bin, width);
+        let (mut all, mut all_inside) = (true, true);
+        for k in 0..bins.len() {
+            let mut valid = determinant(&F[k]) > T::zero();
+            let mut is_extended = false;
             for a in 0..D {
-                let l = half_sizes.along(a, F[(a, a)]);
-                valid &= (x[a] >= c.lower[a]) & (x[a] <= c.upper[a]) & (l <= real(HALF_SIZE_LIMIT));
-                extended |= l > above;
-                last = l;
+                let (x, l) = (x[k][a], half_size(k, a));
+                valid &= (x >= c.lower[a]) & (x <= c.upper[a]) & (l <= real(HALF_SIZE_LIMIT));
+                is_extended |= l > above;
             }
-            let edge = (x[D - 1] - c.lower[D - 1]) * c.inverse_spacing - last;
-            let (first, end) = c.bins.range(bins[k], width);
-            let (_, end_of_extended) = c.bins.range(bins[k], EXTENDED);
-            let end = if extended { end_of_extended } else { end };
-            all &= valid & (edge >= real(first)) & (edge < real(end));
+            all &= valid;
+            all_inside &= is_inside(range, edges(k, is_extended));
         }
-        *all_valid = all;
+        // Blocks with particles of several bins are rare.
+        if others.iter().any(|other| *other != bin) {
+            all_inside = bins.iter().enumerate().all(|(k, &bin)| {
+                let is_extended = (0..D).any(|a| half_size(k, a) > above);
+                is_inside(c.bins.range(bin, width), edges(k, is_extended))
+            });
+        }
+        *all_valid = all && all_inside;
     }
 }
 

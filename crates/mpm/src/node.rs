@@ -53,13 +53,6 @@ impl<T: RealField + Copy, const D: usize> Node<T, D> {
         self
     }
 
-    #[inline(always)]
-    pub(crate) fn set_acceleration(&mut self, acceleration: &SVector<T, D>) {
-        for a in 0..D {
-            self.values[D + a] = acceleration[a];
-        }
-    }
-
     pub(crate) fn add_acceleration(&mut self, other: &Self) {
         for a in 0..D {
             self.values[D + a] += other.values[D + a];

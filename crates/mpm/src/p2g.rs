@@ -16,8 +16,7 @@ use crate::geometry::Constants;
 use crate::grid_update::{
     Acceleration, GridUpdate, NodeVectors, Reprojection, Velocity, VelocityAndAcceleration,
 };
-use crate::kernel::any::{Contributions, Interpolated};
-use crate::kernel::block::Block;
+use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Copies};
 use crate::node::Node;
 use crate::particles::Particles;
@@ -32,15 +31,16 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let Self { particles, constants, layout, bins, nodes, of_time, .. } = self;
         let (support, law, affine, transfer) =
             (&self.support, &self.law, &self.affine, self.transfer);
+        let buffers = &self.buffers;
         let Particles { X, x, v, F, mass, volume, .. } = &*particles;
         let c = *constants;
         let forcing = Forcing::new(body_force, X, times.start, &c, of_time);
         let vectors = NodeVectors::of(transfer);
         let update =
             GridUpdate::new(layout, &c, VelocityAndAcceleration { scale: times.scale, vectors });
-        let p2g = P2g { c: &c, support, is_affine: transfer.is_affine(), x, F };
+        let p2g = P2g { c: &c, support, buffers, is_affine: transfer.is_affine(), x, F };
         update.p2g(bins, nodes, &|band, first, ids| {
-            p2g.bin(band, first, ids, |_, copies, ids, contributions| {
+            p2g.bin(band, first, ids, |Buffers { contributions, .. }, copies, ids| {
                 forcing.evaluate(ids, &copies.x, &mut contributions.b);
                 contributions.take(ids, mass, volume);
                 for (k, &p) in ids.iter().enumerate() {
@@ -57,10 +57,11 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let Self { particles, constants, layout, bins, nodes, support, affine, transfer, .. } =
             self;
         let transfer = *transfer;
+        let buffers = &self.buffers;
         let Particles { x, v, F, mass, .. } = &*particles;
         let c = *constants;
         let update = GridUpdate::new(layout, &c, Velocity);
-        let p2g = P2g { c: &c, support, is_affine: transfer.is_affine(), x, F };
+        let p2g = P2g { c: &c, support, buffers, is_affine: transfer.is_affine(), x, F };
         update.p2g(bins, nodes, &|band, first, ids| {
             p2g.momenta_of_bin(band, first, ids, (mass, v, affine));
         });
@@ -71,14 +72,15 @@ impl<T: Lanes, const D: usize> State<T, D> {
     pub(crate) fn p2g_force(&mut self, body_force: &dyn BodyForce<T, D>, times: StepTimes<T>) {
         let Self { particles, constants, layout, bins, nodes, F_early, of_time, .. } = self;
         let (support, law, transfer) = (&self.support, &self.law, self.transfer);
+        let buffers = &self.buffers;
         let Particles { X, x, F, mass, volume, .. } = &*particles;
         let (c, F_early) = (*constants, &F_early[..]);
         let forcing = Forcing::new(body_force, X, times.start, &c, of_time);
         let vectors = NodeVectors::of(transfer);
         let update = GridUpdate::new(layout, &c, Acceleration { scale: times.scale, vectors });
-        let p2g = P2g { c: &c, support, is_affine: false, x, F };
+        let p2g = P2g { c: &c, support, buffers, is_affine: false, x, F };
         update.p2g(bins, nodes, &|band, first, ids| {
-            p2g.bin(band, first, ids, |_, copies, ids, contributions| {
+            p2g.bin(band, first, ids, |Buffers { contributions, .. }, copies, ids| {
                 forcing.evaluate(ids, &copies.x, &mut contributions.b);
                 contributions.take(ids, mass, volume);
                 (0..ids.len()).for_each(|k| contributions.set_force(&c, k));
@@ -94,10 +96,11 @@ impl<T: Lanes, const D: usize> State<T, D> {
     pub(crate) fn p2g_updated_momentum(&mut self) {
         let Self { particles, constants, layout, bins, nodes, reprojected, support, .. } = self;
         let (affine, transfer) = (&self.affine, self.transfer);
+        let buffers = &self.buffers;
         let Particles { x, v, F, mass, .. } = &*particles;
         let c = *constants;
         let update = GridUpdate::new(layout, &c, Reprojection { nodes: &nodes[..] });
-        let p2g = P2g { c: &c, support, is_affine: transfer.is_affine(), x, F };
+        let p2g = P2g { c: &c, support, buffers, is_affine: transfer.is_affine(), x, F };
         update.p2g(bins, reprojected, &|band, first, ids| {
             p2g.momenta_of_bin(band, first, ids, (mass, v, affine));
         });
@@ -107,22 +110,29 @@ impl<T: Lanes, const D: usize> State<T, D> {
     pub(crate) fn p2g_g2p_velocity(&mut self, is_first: bool) {
         let Self { particles, constants, layout, bins, nodes, reprojected, next, support, .. } =
             self;
+        let buffers = &self.buffers;
         let Particles { x, F, mass, .. } = &*particles;
         let c = *constants;
         let from = if is_first { &nodes[..] } else { &reprojected[..] };
         let update = GridUpdate::new(layout, &c, Reprojection { nodes: &nodes[..] });
-        let p2g = P2g { c: &c, support, is_affine: false, x, F };
+        let p2g = P2g { c: &c, support, buffers, is_affine: false, x, F };
         update.p2g(bins, next, &|band, first, ids| {
-            p2g.bin(band, first, ids, |block, _, ids, contributions| {
-                let interpolated = &mut [Interpolated::zero(); BLOCK][..ids.len()];
-                block.g2p(&c.strides, from, interpolated);
-                for (value, (interpolated, &p)) in
-                    contributions.value.iter_mut().zip(interpolated.iter().zip(ids))
-                {
-                    let m = mass[p as usize];
-                    *value = Node::new(&(interpolated.velocity * m), &SVector::zeros(), m);
-                }
-            });
+            p2g.bin(
+                band,
+                first,
+                ids,
+                |Buffers { block, contributions, interpolated, .. }, _, ids| {
+                    let interpolated = &mut interpolated[..ids.len()];
+                    block.g2p(&c.strides, from, interpolated);
+                    contributions.without_stress();
+                    for (value, (interpolated, &p)) in
+                        contributions.value.iter_mut().zip(interpolated.iter().zip(ids))
+                    {
+                        let m = mass[p as usize];
+                        *value = Node::new(&(interpolated.velocity * m), &SVector::zeros(), m);
+                    }
+                },
+            );
         });
     }
 }
@@ -131,6 +141,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
 struct P2g<'a, T, const D: usize> {
     c: &'a Constants<T, D>,
     support: &'a Support<T, D>,
+    buffers: &'a BufferPool<T, D>,
     is_affine: bool,
     x: &'a [SVector<T, D>],
     F: &'a [SMatrix<T, D, D>],
@@ -146,33 +157,34 @@ impl<T: Lanes, const D: usize> P2g<'_, T, D> {
         ids: &[u32],
         (mass, v, affine): (&[T], &[SVector<T, D>], &[SMatrix<T, D, D>]),
     ) {
-        self.bin(band, first, ids, |_, _, ids, contributions| {
+        self.bin(band, first, ids, |Buffers { contributions, .. }, _, ids| {
             contributions.take_momenta(ids, mass, v);
             contributions.take_affine(ids, mass, affine);
         });
     }
 
     /// Adds the particles `ids`, block by block, to the band of nodes that starts at node `first`.
-    /// `set(weights, copies, ids, contributions)` sets the contributions of a block.
+    /// `set(buffers, copies, ids)` sets the contributions of a block.
     fn bin(
         &self,
         band: &mut [Node<T, D>],
         first: usize,
         ids: &[u32],
-        set: impl Fn(&Block<T, D>, &mut Copies<T, D>, &[u32], &mut Contributions<T, D, BLOCK>),
+        set: impl Fn(&mut Buffers<T, D>, &mut Copies<T, D>, &[u32]),
     ) {
-        let &Self { c, support, is_affine, x, F } = self;
+        let &Self { c, support, buffers: pool, is_affine, x, F } = self;
         let mut copies = Copies::new();
-        let mut block = Block::new(support, is_affine);
-        let mut contributions = Contributions::zero();
+        let mut buffers = pool.take(support, is_affine);
         for ids in ids.chunks(BLOCK) {
             copies.pick(ids, x, F);
-            block.compute_weights(c, support, ids, copies.kinematics());
+            buffers.block.compute_weights(c, support, ids, copies.kinematics());
             if c.planted.is(Fault::LastNodeSkipped) {
-                block.skip_last_node(c, &copies.x);
+                buffers.block.skip_last_node(c, &copies.x);
             }
-            set(&block, &mut copies, ids, &mut contributions);
-            block.p2g(&c.strides, band, first, &contributions, ids.len());
+            set(&mut buffers, &mut copies, ids);
+            let Buffers { block, contributions, .. } = &mut *buffers;
+            block.p2g(&c.strides, band, first, contributions, ids.len());
         }
+        pool.give_back(buffers);
     }
 }

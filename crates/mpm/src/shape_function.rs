@@ -137,39 +137,14 @@ impl ShapeFunction<4> for CubicSpline {
     }
 }
 
-/// The half-size of a particle's box along each axis, in cells: `fixed + |stretching F_aa|`, and no less than `least`.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct HalfSizes<T, const D: usize> {
-    fixed: SVector<T, D>,
-    stretching: SVector<T, D>,
-    least: T,
-}
-
-impl<T: RealField + Copy, const D: usize> HalfSizes<T, D> {
-    /// The same for all particles at all times.
-    pub(crate) fn fixed(l: SVector<T, D>) -> Self {
-        Self { fixed: l, stretching: SVector::zeros(), least: T::zero() }
-    }
-
-    /// Stretched by the diagonal of F.
-    pub(crate) fn stretching(l: SVector<T, D>) -> Self {
-        // A quarter turn makes F_aa zero, and the weights divide by l.
-        Self { fixed: SVector::zeros(), stretching: l, least: real(1e-6) }
-    }
-
-    /// Along an axis, for the diagonal entry `F_aa` of the deformation gradient.
-    #[inline(always)]
-    pub(crate) fn along(&self, axis: usize, F_aa: T) -> T {
-        let l = self.fixed[axis] + (self.stretching[axis] * F_aa).abs();
-        if l > self.least { l } else { self.least }
-    }
-}
-
 /// Shape functions on one axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum OnAxis {
     Hat,
-    Gimp,
+    /// Means over boxes that keep their sizes.
+    FixedBox,
+    /// Means over boxes that the diagonal of F stretches.
+    StretchingBox,
     Quadratic,
     Cubic,
 }
@@ -178,30 +153,39 @@ pub(crate) enum OnAxis {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ProductShape<T, const D: usize> {
     pub(crate) on_axis: OnAxis,
-    pub(crate) half_sizes: HalfSizes<T, D>,
+    /// Half-sizes of the particles' boxes in the reference configuration, in cells.
+    pub(crate) l: SVector<T, D>,
 }
 
 impl<T: RealField + Copy, const D: usize> ProductShape<T, D> {
     /// That of this name, for particles with reference half-sizes `l` in cells; none where weights are no products.
     pub(crate) fn new(shape: Shape, l: SVector<T, D>) -> Option<Self> {
-        let box_of = |cells: f64| HalfSizes::fixed(SVector::repeat(real(cells)));
-        let (on_axis, half_sizes) = match shape {
+        let box_of = |cells: f64| SVector::repeat(real(cells));
+        let (on_axis, l) = match shape {
             Shape::Linear => (OnAxis::Hat, box_of(0.0)),
-            Shape::Ugimp => (OnAxis::Gimp, HalfSizes::fixed(l)),
+            Shape::Ugimp => (OnAxis::FixedBox, l),
             // Contiguous particles.
-            Shape::Gimp => (OnAxis::Gimp, HalfSizes::stretching(l)),
+            Shape::Gimp => (OnAxis::StretchingBox, l),
             Shape::Bspline2 => (OnAxis::Quadratic, box_of(0.5)),
             Shape::Bspline3 => (OnAxis::Cubic, box_of(1.0)),
             Shape::Cpdi | Shape::Cpdi2 => return None,
         };
-        Some(Self { on_axis, half_sizes })
+        Some(Self { on_axis, l })
+    }
+
+    /// Half-size of a box along an axis, in cells, for the diagonal entry `F_aa` of the deformation gradient.
+    pub(crate) fn half_size(&self, axis: usize, F_aa: T) -> T {
+        match self.on_axis {
+            OnAxis::StretchingBox => half_size::<_, true>(self.l[axis], F_aa),
+            _ => half_size::<_, false>(self.l[axis], F_aa),
+        }
     }
 
     /// Nodes along each axis, except for a box with extended support.
     pub(crate) fn width(&self) -> usize {
         match self.on_axis {
             OnAxis::Hat => 2,
-            OnAxis::Gimp | OnAxis::Quadratic => 3,
+            OnAxis::FixedBox | OnAxis::StretchingBox | OnAxis::Quadratic => 3,
             OnAxis::Cubic => 4,
         }
     }
@@ -209,10 +193,21 @@ impl<T: RealField + Copy, const D: usize> ProductShape<T, D> {
     /// Half-size beyond which the support is extended.
     pub(crate) fn extended_above(&self) -> T {
         match self.on_axis {
-            OnAxis::Gimp => real(0.5),
+            OnAxis::FixedBox | OnAxis::StretchingBox => real(0.5),
             OnAxis::Hat | OnAxis::Quadratic | OnAxis::Cubic => real(HALF_SIZE_LIMIT),
         }
     }
+}
+
+/// Half-size of a box with the reference half-size `l`, for the diagonal entry `F_aa` of the deformation gradient where boxes stretch.
+#[inline(always)]
+pub(crate) fn half_size<T: RealField + Copy, const STRETCHING: bool>(l: T, F_aa: T) -> T {
+    if !STRETCHING {
+        return l;
+    }
+    // A quarter turn makes F_aa zero, and the weights divide by l.
+    let (l, least): (T, T) = ((l * F_aa).abs(), real(1e-6));
+    if l > least { l } else { least }
 }
 
 /// 2^52: a double of this size is a whole number, stored in its last 52 bits.
@@ -405,9 +400,9 @@ mod tests {
 
     #[test]
     fn a_stretching_box_follows_the_diagonal_of_F() {
-        let shape = HalfSizes::stretching(SVector::<f64, 2>::new(0.25, 0.125));
-        assert_eq!(shape.along(0, 1.5), 0.375);
-        assert_eq!(shape.along(1, -1.5), 0.1875);
-        assert_eq!(shape.along(1, 0.0), 1e-6);
+        assert_eq!(half_size::<_, true>(0.25, 1.5), 0.375);
+        assert_eq!(half_size::<_, true>(0.125, -1.5), 0.1875);
+        assert_eq!(half_size::<_, true>(0.125, 0.0), 1e-6);
+        assert_eq!(half_size::<_, false>(0.125, 1.5), 0.125);
     }
 }

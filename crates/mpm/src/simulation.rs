@@ -13,6 +13,7 @@ use crate::geometry::Constants;
 use crate::grid::{Grid, Layout};
 use crate::health::Invalid;
 use crate::kernel::block::BlockLaw;
+use crate::kernel::buffers::BufferPool;
 use crate::material::{AnyLaw, Law, Material, NeoHookean, NeoHookeanNoLog, OwnBlocks, Stressed};
 use crate::node::Node;
 use crate::parallel::bins::Bins;
@@ -415,6 +416,7 @@ fn allocate<T: Lanes, const D: usize>(
         next,
         is_ahead: false,
         filtered: if filtered { vec![SVector::zeros(); layout.nodes] } else { Vec::new() },
+        buffers: BufferPool::new(),
         of_time: Vec::new(),
         affine: Vec::new(),
         particles,

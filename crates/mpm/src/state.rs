@@ -6,6 +6,7 @@ use crate::geometry::Constants;
 use crate::grid::Layout;
 use crate::health::Outcome;
 use crate::kernel::block::BlockLaw;
+use crate::kernel::buffers::BufferPool;
 use crate::node::Node;
 use crate::parallel::bins::Bins;
 use crate::particles::Particles;
@@ -37,6 +38,8 @@ pub(crate) struct State<T, const D: usize> {
     pub(crate) is_ahead: bool,
     /// XPIC: the filtered velocity at each node.
     pub(crate) filtered: Vec<SVector<T, D>>,
+    /// Buffers for blocks of particles.
+    pub(crate) buffers: BufferPool<T, D>,
     /// Buffer for the part of the body force that depends on time alone.
     pub(crate) of_time: Vec<T>,
 }

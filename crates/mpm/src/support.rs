@@ -58,7 +58,7 @@ impl<T: RealField + Copy, const D: usize> Support<T, D> {
         F: &SMatrix<T, D, D>,
     ) -> SVector<T, D> {
         match self {
-            Self::Product(shape) => SVector::from_fn(|a, _| shape.half_sizes.along(a, F[(a, a)])),
+            Self::Product(shape) => SVector::from_fn(|a, _| shape.half_size(a, F[(a, a)])),
             Self::Cpdi { half_edges } => extent(&product(F, half_edges.of(p))) * c.inverse_spacing,
             Self::Cpdi2 { mesh, .. } => {
                 let mut l = SVector::zeros();

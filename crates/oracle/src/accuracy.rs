@@ -4,11 +4,13 @@ use crate::double_double::QuickTruth;
 use crate::{
     Class, Oracle, OracleError, Point, Sampler, Sensitivity, exact, scientific, worst_factor,
 };
-use mmsmith_expr::{Expr, Program, Rational, Slot};
+use mmsmith_expr::{Expr, Function, Node, Program, Rational, Slot};
 use mmsmith_spec::{Fields, Spec};
 use mmsmith_stage::{FieldName, Staged};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU64, Ordering};
 use thiserror::Error;
 
 /// The factor `K` that every field of every solution keeps.
@@ -99,6 +101,9 @@ pub struct ClassAccuracy {
     pub points: usize,
     /// The evaluations of a search.
     pub searched: u64,
+    /// The points that were drawn or searched and left out, as they lie within rounding of the switch of a positive part, where
+    /// its slope jumps and nothing tells which side is meant.
+    pub at_switch: u64,
     /// Why there are none, or fewer than were asked for.
     pub remark: Option<&'static str>,
     /// The worst of each field.
@@ -122,6 +127,8 @@ pub struct Accuracy<'a> {
     sensitivity: Sensitivity,
     quick_sensitivity: Program,
     quick_truth: QuickTruth,
+    /// What positive parts are taken of, and the products of [`Sensitivity`] for it with their number.
+    switches: (Program, Program, Vec<usize>),
     /// How many products [`Sensitivity`] has for each expression.
     products: Vec<usize>,
     /// Why there are no points of each class, once it is known.
@@ -146,6 +153,18 @@ impl<'a> Accuracy<'a> {
         let sensitivity = Sensitivity::new(&fields.graph, &fields.definitions, &inputs, &flat);
         let (quick_sensitivity, products) = sensitivity.in_doubles(&inputs);
         let quick_truth = QuickTruth::new(fields.program(&flat));
+        let parts = fields.graph.reachable(&flat);
+        let switched: BTreeSet<Expr> = parts
+            .into_iter()
+            .filter_map(|part| match fields.graph.node(part) {
+                Node::Call(Function::PositivePart | Function::PositivePartSlope, x) => Some(x[0]),
+                _ => None,
+            })
+            .collect();
+        let switched: Vec<Expr> = switched.into_iter().collect();
+        let of_switches = Sensitivity::new(&fields.graph, &fields.definitions, &inputs, &switched);
+        let (of_switches, counts) = of_switches.in_doubles(&inputs);
+        let switches = (fields.program(&switched), of_switches, counts);
         Accuracy {
             fields,
             sampler,
@@ -156,6 +175,7 @@ impl<'a> Accuracy<'a> {
             sensitivity,
             quick_sensitivity,
             quick_truth,
+            switches,
             products,
             not_applicable: Default::default(),
         }
@@ -187,18 +207,24 @@ impl<'a> Accuracy<'a> {
             class,
             points: 0,
             searched: 0,
+            at_switch: 0,
             remark: Some(remark),
             worst: Vec::new(),
         };
         if let Some(remark) = self.not_applicable(class) {
             return Ok(none(remark));
         }
+        let at_switch = AtomicU64::new(0);
         let found: Vec<Result<Option<Vec<Finding>>, AccuracyError>> = (0..points as u64)
             .into_par_iter()
             .map_init(
                 || Oracle::new(QUICK_BITS),
                 |oracle, index| {
                     let Some(inputs) = self.sampler.draw(class, index) else { return Ok(None) };
+                    if self.is_at_switch(&inputs) {
+                        at_switch.fetch_add(1, Ordering::Relaxed);
+                        return Ok(None);
+                    }
                     let oracle = oracle.as_mut().map_err(|e| self.no_value(&inputs, e.clone()))?;
                     let findings = self.look(class, oracle, &inputs, judged);
                     step();
@@ -240,7 +266,8 @@ impl<'a> Accuracy<'a> {
             let worst = self.confirm(&inputs, &finding, Found::Draw, &confirmed, judged)?;
             confirmed.push(worst);
         }
-        Ok(ClassAccuracy { class, points: count, searched: 0, remark, worst: confirmed })
+        let at_switch = at_switch.into_inner();
+        Ok(ClassAccuracy { class, points: count, searched: 0, at_switch, remark, worst: confirmed })
     }
 
     /// Judges one point: the worst entry of each field there, in arbitrary precision.
@@ -313,6 +340,17 @@ impl<'a> Accuracy<'a> {
             findings.push(worst);
         }
         Ok(findings)
+    }
+
+    /// Whether what a positive part is taken of is no larger than the rounding that the acceptance rule allows it.
+    pub(crate) fn is_at_switch(&self, inputs: &[f64]) -> bool {
+        let (values, sensitivities, counts) = &self.switches;
+        let (values, terms) = (values.evaluate(inputs), sensitivities.evaluate(inputs));
+        let mut terms = terms.iter();
+        values.iter().zip(counts).any(|(value, &count)| {
+            let sens: f64 = terms.by_ref().take(count).map(|term| term.abs()).sum();
+            value.abs() < LARGEST_FACTOR * 0.5 * f64::EPSILON * (sens + value.abs())
+        })
     }
 
     /// The sum `|q dy/dq|` for every entry of every field, in double precision.
@@ -597,4 +635,63 @@ impl JudgedField {
 
 fn by_letter(fields: &Fields) -> Vec<(&'static str, Vec<Expr>)> {
     JUDGED.iter().map(|judged| (judged.letter, judged.name.derived(fields))).collect()
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    /// A bar whose strain `A (2 X - 1) cos(t)` changes its sign at `X = 1/2`.
+    const SLACK: &str = "
+name = 'slack'
+title = 'A bar that carries tension alone'
+coordinates = 'cartesian'
+dimension = 1
+
+[parameters]
+A = { default = 0.1, range = '> -1, < 1', description = 'amplitude' }
+
+[displacement]
+X = 'A*(X^2 - X)*cos(t)'
+
+[material]
+law = 'energy'
+W = 'positive_part(F11 - 1)^2/2'
+density = '1'
+
+[domain]
+shape = 'box'
+lower = [0]
+upper = [1]
+
+[[boundary]]
+surface = 'X-lower'
+condition = 'prescribed-motion'
+
+[[boundary]]
+surface = 'X-upper'
+condition = 'prescribed-motion'
+
+[time]
+period = '2*Pi'
+wave-speed = '1'
+";
+
+    #[test]
+    fn points_within_rounding_of_a_switch_are_told() {
+        let spec = Spec::parse(SLACK, "slack").unwrap();
+        let accuracy = Accuracy::new(&spec, spec.derive().unwrap());
+        for (X, t, A, expected) in [
+            (0.5, 0.0, 0.1, true),
+            (0.5 + 2.0 * f64::EPSILON, 0.3, 0.1, true),
+            (0.5 + 20.0 * f64::EPSILON, 0.3, 0.1, false),
+            (0.6, 0.3, 0.1, false),
+            (0.6, 0.3, 1e-200, false),
+            // No motion at all, and nothing that rounding could change.
+            (0.6, 0.3, 0.0, false),
+        ] {
+            assert_eq!(accuracy.is_at_switch(&[X, t, A]), expected, "{X} {t} {A}");
+        }
+    }
 }

@@ -44,6 +44,9 @@ struct Known {
 struct ClassSearch {
     class: Class,
     evaluations: u64,
+    /// Points left out, see [`ClassAccuracy::at_switch`].
+    #[serde(default)]
+    at_switch: u64,
     /// For each field the worst place first, then those that compete with it.
     known: Vec<Vec<Known>>,
 }
@@ -69,6 +72,7 @@ struct Place {
     /// Field and number of the known place that was changed; `None` for a draw.
     origin: Option<(usize, usize)>,
     evaluations: u64,
+    at_switch: u64,
     found: Vec<(Finding, Vec<f64>)>,
 }
 
@@ -81,7 +85,12 @@ impl Search {
         let classes = Class::ALL
             .into_iter()
             .filter(applies)
-            .map(|class| ClassSearch { class, evaluations: 0, known: vec![Vec::new(); fields] })
+            .map(|class| ClassSearch {
+                class,
+                evaluations: 0,
+                at_switch: 0,
+                known: vec![Vec::new(); fields],
+            })
             .collect();
         Search { rounds: 0, classes }
     }
@@ -177,6 +186,7 @@ impl Search {
                 .map(|number| search.try_place(accuracy, round, number, judged))
                 .collect::<Result<Vec<Place>, AccuracyError>>()?;
             search.evaluations += places.iter().map(|place| place.evaluations).sum::<u64>();
+            search.at_switch += places.iter().map(|place| place.at_switch).sum::<u64>();
             search.learn(accuracy, round, &places, judged)?;
         }
         Ok(())
@@ -221,7 +231,8 @@ impl Search {
         }
         let in_order = |field: &str| accuracy.field_index(field);
         worst.sort_by_key(|worst| in_order(worst.field));
-        Ok(ClassAccuracy { searched: search.evaluations, worst, ..drawn })
+        let at_switch = drawn.at_switch + search.at_switch;
+        Ok(ClassAccuracy { searched: search.evaluations, at_switch, worst, ..drawn })
     }
 }
 
@@ -263,7 +274,7 @@ impl ClassSearch {
             }
             Some((field, which)) => self.changed(sampler, field, which, &mut random),
         };
-        let mut place = Place { origin, evaluations: 0, found: Vec::new() };
+        let mut place = Place { origin, evaluations: 0, at_switch: 0, found: Vec::new() };
         let Some(base) = base else { return Ok(place) };
         let sens = accuracy.quick_sensitivities(&base);
         for neighbour in 0..NEIGHBOURS {
@@ -273,6 +284,10 @@ impl ClassSearch {
                 if !sampler.belongs(self.class, &inputs) {
                     continue;
                 }
+            }
+            if accuracy.is_at_switch(&inputs) {
+                place.at_switch += 1;
+                continue;
             }
             let found = accuracy.quick_look(self.class, &inputs, &sens, judged)?;
             place.evaluations += 1;

@@ -14,7 +14,9 @@ use crate::derivation::Derivation;
 use crate::law::{self, Deformation, Stress, inside, zero_if_vanishing};
 use crate::surface::{Components, SurfaceFields, surface_fields};
 use crate::tensor::{Matrix, Vector};
-use mmsmith_expr::{Dependence, Expr, Graph, Program};
+use mmsmith_expr::{Dependence, Expr, Graph, Node, Program};
+use num_traits::Zero;
+use std::collections::BTreeSet;
 use thiserror::Error;
 
 /// Every field of a solution, in Cartesian components, as expressions of the graph.
@@ -156,7 +158,8 @@ impl Fields {
     }
 }
 
-/// `b = [a - Div P_linear / rho0] - Div P_remainder / rho0`, the bracket joined in symbols.
+/// `b = [a - Div P_linear / rho0] - Div P_remainder / rho0`, the bracket joined in symbols. Where nothing of it joins, the divergence
+/// is not split, if it has a form of its own.
 fn body_force(derivation: &mut Derivation, a: &Vector, stress: &Stress, density: Expr) -> Vector {
     let Derivation { graph, variables, .. } = derivation;
     let density = graph.whole(density);
@@ -166,13 +169,49 @@ fn body_force(derivation: &mut Derivation, a: &Vector, stress: &Stress, density:
         let force = graph.div(stress.linear[i], open_density);
         let bracket = graph.sub(a[i], force);
         let bracket = graph.cancel(bracket, variables);
+        let (bracket, rest) = match &stress.whole {
+            Some(whole) if !is_joined(graph, bracket, [a[i], force], variables) => (a[i], whole[i]),
+            _ => (bracket, stress.remainder[i]),
+        };
         let bracket = graph.whole(bracket);
-        let rest = zero_if_vanishing(graph, stress.remainder[i]);
+        let rest = zero_if_vanishing(graph, rest);
         let rest = graph.div(rest, density);
         let component = graph.sub(bracket, rest);
         b.push(zero_if_vanishing(graph, component));
     }
     b
+}
+
+/// Whether terms of `a` and `-b` were joined in `sum`, which is `a - b` after cancellation.
+fn is_joined(graph: &mut Graph, sum: Expr, [a, b]: [Expr; 2], variables: &BTreeSet<Expr>) -> bool {
+    let (a, b) = (graph.cancel(a, variables), graph.cancel(b, variables));
+    let others = graph.sub(sum, a);
+    let own = match graph.node(a) {
+        Node::Sum { terms, .. } => terms.len(),
+        _ => usize::from(a != Graph::ZERO),
+    };
+    // Terms of equal factors are grouped; where they are joined, the whole is shorter.
+    terms(graph, sum) != terms(graph, others) + own
+        && graph.reachable(&[sum]).len() < graph.reachable(&[a, b]).len()
+}
+
+/// How many terms an expression has, common factors apart.
+fn terms(graph: &Graph, expr: Expr) -> usize {
+    match graph.node(expr) {
+        // A product with a number in front of it.
+        Node::Sum { constant, terms: one } if one.len() == 1 && constant.is_zero() => {
+            terms(graph, one[0].0)
+        }
+        Node::Sum { terms, .. } => terms.len(),
+        Node::Product(factors) => {
+            let sums = factors.iter().filter_map(|(base, _)| match graph.node(*base) {
+                Node::Sum { terms, .. } => Some(terms.len()),
+                _ => None,
+            });
+            sums.max().unwrap_or(1)
+        }
+        _ => usize::from(expr != Graph::ZERO),
+    }
 }
 
 /// Physical components to Cartesian ones: `x_i = sum_a Q_ia x_a`.

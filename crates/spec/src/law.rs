@@ -1,6 +1,7 @@
 //! What the momentum balance needs of a material: the first Piola-Kirchhoff stress and its divergence.
 
 pub(crate) mod energy;
+mod isochoric;
 mod neo_hookean;
 mod principal_stretches;
 mod st_venant_kirchhoff;
@@ -41,8 +42,43 @@ pub(crate) struct Stress {
     pub(crate) linear: Vector,
     /// The divergence of the rest, small where `H` is small.
     pub(crate) remainder: Vector,
+    /// The whole divergence in a form of its own, where there is one. At large gradients the two parts may cancel.
+    pub(crate) whole: Option<Vector>,
     /// The strain energy, where the material is given by one.
     pub(crate) energy: Option<Expr>,
+}
+
+/// The divergence of `P` in two parts, see [`Stress`], and whole.
+struct Divergence {
+    /// `mu Div H + (lambda + mu) grad tr H`.
+    linear: Vector,
+    remainder: Vector,
+    whole: Vector,
+}
+
+impl Stress {
+    /// The sum of the stresses of two energies.
+    fn plus(self, graph: &mut Graph, other: Self) -> Self {
+        fn vectors(graph: &mut Graph, x: Vector, y: Vector) -> Vector {
+            x.into_iter().zip(y).map(|(x, y)| graph.add(x, y)).collect()
+        }
+        fn matrices(graph: &mut Graph, A: Matrix, B: Matrix) -> Matrix {
+            A.into_iter().zip(B).map(|(x, y)| vectors(graph, x, y)).collect()
+        }
+        let whole = self.whole.map(|whole| {
+            let sum = vectors(graph, whole, other.linear.clone());
+            vectors(graph, sum, other.remainder.clone())
+        });
+        Stress {
+            whole,
+            P: matrices(graph, self.P, other.P),
+            isotropic: graph.add(self.isotropic, other.isotropic),
+            anisotropic: matrices(graph, self.anisotropic, other.anisotropic),
+            linear: vectors(graph, self.linear, other.linear),
+            remainder: vectors(graph, self.remainder, other.remainder),
+            energy: self.energy.zip(other.energy).map(|(W, other)| graph.add(W, other)),
+        }
+    }
 }
 
 impl Deformation {
@@ -131,6 +167,27 @@ pub(crate) fn stress(
                     return Ok(linear_elastic(derivation, deformation, lambda, mu));
                 }
                 Formulas::Energy { W } => (W.to_owned(), material.row().is_isotropic),
+                Formulas::Isochoric { W, others } => {
+                    let constants = law.constants();
+                    let U = material.volumetric().map_or("0", Volumetric::formula);
+                    let graph = &mut derivation.graph;
+                    let isochoric = energy::named(graph, W, &constants);
+                    let volumetric = energy::named(graph, &format!("kappa*({U})"), &constants);
+                    let others = energy::named(graph, others, &constants);
+                    let stress = isochoric::stress(derivation, deformation, isochoric, volumetric);
+                    if others == Graph::ZERO {
+                        return Ok(stress);
+                    }
+                    let isotropic = material.row().is_isotropic;
+                    let others = ComponentLaw::of_energy(
+                        &mut derivation.graph,
+                        deformation,
+                        others,
+                        isotropic,
+                    )
+                    .stress(derivation, deformation);
+                    return Ok(stress.plus(&mut derivation.graph, others));
+                }
                 Formulas::PrincipalStretches(parts) => {
                     principal_stretches::energy(&derivation.graph, &deformation.H, &parts)?
                 }
@@ -173,7 +230,7 @@ fn linear_elastic(
             P[i][j] = zero_if_vanishing(graph, entry);
         }
     }
-    Stress { P, isotropic: pressure, anisotropic, linear, remainder, energy: None }
+    Stress { P, isotropic: pressure, anisotropic, linear, remainder, whole: None, energy: None }
 }
 
 /// The divergence of `lambda tr(H) I + mu (H + H^T)`, with the constants as they are written.

@@ -2,7 +2,7 @@
 //!
 //! Every field is compared with one that follows from the field below it, by a route that shares no formula with
 //! it: `v` with the rate of `u`, `a` with the rate of `v`, `H` and `F` with the gradient of `u`, `J` with the
-//! determinant of `F`, `P` with the solver's hand-written law, and `b` with `a - Div P / rho0`. `u` itself is the
+//! determinant of `F`, `P` and the strain energy with the solver's hand-written law, and `b` with `a - Div P / rho0`. `u` itself is the
 //! definition; nothing lies below it. Derivatives are extrapolated finite differences that know their own error.
 
 use mmsmith_mpm::Law;
@@ -430,6 +430,7 @@ where
     let mut F = Comparison::new("F", "I + du/dX");
     let mut J = Comparison::new("J", "det F");
     let mut P = Comparison::new("P", "solver's law of F");
+    let mut W = Comparison::new("W", "solver's energy of F");
     let mut in_time = Comparison::new("P : dF/dt", "dW/dt");
     let mut in_space = Comparison::new("P : dF/dR", "dW/dR");
     let mut b = Comparison::new("b", "a - Div P / rho0");
@@ -464,6 +465,17 @@ where
             let expected = law.first_piola_kirchhoff(&own.F);
             let difference = expected.map_or(f64::NAN, |expected| (own.P - expected).amax());
             P.add(at, difference, rounding, strain);
+            if let (Some(energy), Some(expected)) =
+                (solution.strain_energy(X, *t), law.strain_energy(&own.F))
+            {
+                // Energies of the library are formed from H; text may take a difference of large terms.
+                let terms = match law {
+                    Law::Library(_) => own.H.amax(),
+                    Law::Own(_) => 1.0 + own.H.amax(),
+                };
+                let difference = (energy - expected).abs();
+                W.add(at, difference, rounding * terms, strain * own.H.amax());
+            }
         }
         // Where the energy is known: P does the work that it stores, in time and along the ray from the origin. A law in
         // components may differ from place to place, since unit vectors turn; they do not along these two.
@@ -515,7 +527,7 @@ where
         let all = solution.fields(X, *t);
         together.add(at, disagreement(&all, &own, stiffness, terms), 0.0, 1.0);
     }
-    [v, a, H, F, J, P, in_time, in_space, b, together]
+    [v, a, H, F, J, P, W, in_time, in_space, b, together]
         .into_iter()
         .filter(|comparison| !comparison.points.is_empty())
         .map(Comparison::finding)

@@ -89,6 +89,13 @@ pub enum Derivation<T> {
         /// The energy per reference volume.
         W: &'static str,
     },
+    /// From an isochoric energy, the volumetric part that is chosen, and what further energy there is.
+    Isochoric {
+        /// The isochoric energy, in `excess`, `J^(-2/3) I1 - 3`.
+        W: &'static str,
+        /// Further energy, as [`Derivation::Energy`] has it.
+        others: &'static str,
+    },
     /// From formulas of the neo-Hookean law.
     NeoHookean {
         /// First Lame constant.
@@ -130,6 +137,10 @@ pub struct InStretches {
 impl<T> Derivation<T> {
     const fn energy(W: &'static str) -> Self {
         Self::Energy { W }
+    }
+
+    const fn isochoric(W: &'static str) -> Self {
+        Self::Isochoric { W, others: "0" }
     }
 }
 
@@ -427,9 +438,7 @@ materials! {
     }
     stress: "W = c1 (I1b - 3) + c2 (I1b - 3)^2 + c3 (I1b - 3)^3 + kappa U(J), I1b = J^(-2/3) I1",
     volume: [kappa],
-    derivation: Derivation::energy(
-        "c1*(J^(-2/3)*I1 - 3) + c2*(J^(-2/3)*I1 - 3)^2 + c3*(J^(-2/3)*I1 - 3)^3"
-    ),
+    derivation: Derivation::isochoric("c1*excess + c2*excess^2 + c3*excess^3"),
     objective: true,
     at_rest: [lambda: (1, kappa ^ 1) (-4 / 3, c1 ^ 1), mu: (2, c1 ^ 1)],
 
@@ -444,7 +453,7 @@ materials! {
     }
     stress: "W = -mu Jm/2 ln(1 - (I1b - 3)/Jm) + kappa U(J), I1b = J^(-2/3) I1",
     volume: [kappa],
-    derivation: Derivation::energy("-mu*Jm/2*ln(1 - (J^(-2/3)*I1 - 3)/Jm)"),
+    derivation: Derivation::isochoric("-mu*Jm/2*log1p(-excess/Jm)"),
     objective: true,
     at_rest: [lambda: (1, kappa ^ 1) (-2 / 3, mu ^ 1), mu: (1, mu ^ 1)],
 
@@ -460,9 +469,9 @@ materials! {
     stress: "W = mu (1/2 (I1b - 3) + 1/(20 N) (I1b^2 - 9) + 11/(1050 N^2) (I1b^3 - 27) + 19/(7000 N^3) (I1b^4 - 81) \
              + 519/(673750 N^4) (I1b^5 - 243)) + kappa U(J), I1b = J^(-2/3) I1",
     volume: [kappa],
-    derivation: Derivation::energy(
-        "mu*((J^(-2/3)*I1 - 3)/2 + ((J^(-2/3)*I1)^2 - 9)/(20*N) + 11*((J^(-2/3)*I1)^3 - 27)/(1050*N^2) \
-         + 19*((J^(-2/3)*I1)^4 - 81)/(7000*N^3) + 519*((J^(-2/3)*I1)^5 - 243)/(673750*N^4))"
+    derivation: Derivation::isochoric(
+        "mu*(excess/2 + ((3 + excess)^2 - 9)/(20*N) + 11*((3 + excess)^3 - 27)/(1050*N^2) \
+         + 19*((3 + excess)^4 - 81)/(7000*N^3) + 519*((3 + excess)^5 - 243)/(673750*N^4))"
     ),
     objective: true,
     at_rest: [
@@ -541,10 +550,11 @@ materials! {
     }
     stress: "W = mu/2 (I1b - 3) + k1/(2 k2) (exp(k2 <I4 - 1>^2) - 1) + kappa U(J), I1b = J^(-2/3) I1, I4 = a . C a",
     volume: [kappa],
-    derivation: Derivation::energy(
-        "mu/2*(J^(-2/3)*I1 - 3) + k1/(2*k2)*expm1(k2*positive_part(cos(angle)^2*(C11 - 1) \
-         + 2*cos(angle)*sin(angle)*C12 + sin(angle)^2*(C22 - 1))^2)"
-    ),
+    derivation: Derivation::Isochoric {
+        W: "mu/2*excess",
+        others: "k1/(2*k2)*expm1(k2*positive_part(cos(angle)^2*(C11 - 1) \
+                 + 2*cos(angle)*sin(angle)*C12 + sin(angle)^2*(C22 - 1))^2)",
+    },
     objective: true,
     at_rest: [],
 }

@@ -32,6 +32,18 @@ mod others {
     );
     mmsmith_macros::manufactured_solution!("../../data/specs/materials/skew-2d-stress.toml");
     mmsmith_macros::manufactured_solution!("../../data/specs/materials/tube-hencky.toml");
+    mmsmith_macros::manufactured_solution!("../../data/specs/materials/axis-aligned-3d-ogden.toml");
+    mmsmith_macros::manufactured_solution!("../../data/specs/materials/skew-2d-arruda-boyce.toml");
+    mmsmith_macros::manufactured_solution!("../../data/specs/materials/skew-2d-gent.toml");
+    mmsmith_macros::manufactured_solution!(
+        "../../data/specs/materials/skew-2d-holzapfel-gasser-ogden.toml"
+    );
+    mmsmith_macros::manufactured_solution!("../../data/specs/materials/skew-2d-ogden.toml");
+    mmsmith_macros::manufactured_solution!("../../data/specs/materials/skew-2d-orthotropic.toml");
+    mmsmith_macros::manufactured_solution!("../../data/specs/materials/skew-2d-yeoh.toml");
+    mmsmith_macros::manufactured_solution!(
+        "../../data/specs/materials/skew-3d-holzapfel-gasser-ogden.toml"
+    );
 }
 
 type Build = Box<dyn Fn(&[f64]) -> Result<AnySolution<f64>, ParameterError>>;
@@ -52,7 +64,8 @@ fn solutions() -> Vec<(&'static Description, Build)> {
         )*};
     }
     add!(RingHencky ShellHencky Skew2dEnergy Skew2dHencky Skew2dLinearElastic Skew2dMooneyRivlin);
-    add!(Skew2dStVenantKirchhoff Skew2dStress TubeHencky);
+    add!(Skew2dStVenantKirchhoff Skew2dStress TubeHencky AxisAligned3dOgden Skew2dArrudaBoyce Skew2dGent);
+    add!(Skew2dHolzapfelGasserOgden Skew2dOgden Skew2dOrthotropic Skew2dYeoh Skew3dHolzapfelGasserOgden);
     solutions
 }
 
@@ -262,31 +275,33 @@ fn write_list(folder: &Path) {
     for (description, _) in solutions() {
         let name = Names::of(description.name).module;
         let file = Path::new("mmsmith").join(&name).with_extension("h");
+        let spec = Spec::parse(description.specification, description.name).unwrap();
         let header = std::fs::read_to_string(headers().join(&file)).unwrap_or_else(|_| {
-            let spec = Spec::parse(description.specification, description.name).unwrap();
             let header = Code::new(&spec).unwrap().header_source();
             std::fs::write(folder.join(&file), &header).unwrap();
             header
         });
         let offers = |what: &str| header.contains(&format!(" {name}_{what}(const"));
         let domain = if offers("inner") { "ANNULUS" } else { "BOX" };
-        let law = match (offers("c1"), offers("mu")) {
-            (true, _) => "MOONEY_RIVLIN",
-            (_, true) => "LAME",
-            _ => "CUSTOM",
-        };
         let energy = if offers("W") { "ENERGY" } else { "NO_ENERGY" };
         writeln!(text, "#include \"mmsmith/{name}.h\"").unwrap();
-        write!(text, "#define TRACTIONS_{name}").unwrap();
+        write!(text, "#define CONSTANTS_{name}").unwrap();
+        if let mmsmith_spec::Law::Library(material) = &spec.material {
+            for constant in material.row().constants {
+                write!(text, " WRITE_CONSTANT({name}, {})", constant.name).unwrap();
+            }
+        }
+        write!(text, "\n#define TRACTIONS_{name}").unwrap();
         for (_, surface) in SURFACES {
             if offers(&format!("{surface}_traction")) {
                 write!(text, " WRITE_TRACTION({name}, {surface})").unwrap();
             }
         }
         text.push('\n');
-        write!(list, " SOLUTION({name}, {domain}, {law}, {energy})").unwrap();
+        write!(list, " SOLUTION({name}, {domain}, {energy})").unwrap();
     }
-    assert!(list.contains("MOONEY_RIVLIN") && list.contains("CUSTOM, ENERGY"), "{list}");
+    assert!(list.contains("BOX, ENERGY") && list.contains("ANNULUS, NO_ENERGY"), "{list}");
+    assert!(text.contains("_gent, Jm)") && text.contains("_ogden, alpha3)"), "{text}");
     assert!(text.contains("(ring, inner)") && text.contains("(bar, X_upper)"), "{text}");
     std::fs::write(folder.join("headers.h"), text + &list + "\n").unwrap();
 }

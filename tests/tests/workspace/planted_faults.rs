@@ -66,6 +66,13 @@ const FAULTS: &[(&str, &str, Plant)] = &[
             f.b[i] = f.graph.add(f.b[i], term);
         }
     }),
+    ("b of P transposed", "skew-2d", |s, f| published(Fault::BodyForceOfTransposedStress, s, f)),
+    ("b of the Kirchhoff stress", "ring-nu", |s, f| {
+        published(Fault::BodyForceOfKirchhoffStress, s, f)
+    }),
+    ("b of density one", "ring-nu", |s, f| published(Fault::BodyForceOfDensityOne, s, f)),
+    ("lambda for mu", "vortex", |s, f| published(Fault::LameExchanged, s, f)),
+    ("lambda of plane stress", "skew-2d", |s, f| published(Fault::LameOfPlaneStress, s, f)),
     ("P transposed", "skew-2d", |s, f| published(Fault::StressTransposed, s, f)),
     ("P transposed in space", "skew-3d", |s, f| published(Fault::StressTransposed, s, f)),
     ("P with the sign flipped", "axis-aligned", |s, f| published(Fault::StressSign, s, f)),

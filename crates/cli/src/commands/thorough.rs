@@ -84,6 +84,7 @@ pub(crate) fn thorough(options: &CheckOptions) -> Result<bool> {
             "code": if *is_generated { "generated" } else { "interpreted" },
             "points": classes.iter().map(|c| (c.class.name(), c.points)).collect::<BTreeMap<_, _>>(),
             "searched": classes.iter().map(|c| (c.class.name(), c.searched)).collect::<BTreeMap<_, _>>(),
+            "at_switch": classes.iter().map(|c| (c.class.name(), c.at_switch)).collect::<BTreeMap<_, _>>(),
             "remarks": classes
                 .iter()
                 .filter_map(|c| Some((c.class.name(), c.remark?)))
@@ -300,6 +301,13 @@ fn text(name: &str, passed: bool, accuracy: &Accuracy<'_>, classes: &[ClassAccur
     for class in classes {
         if let Some(remark) = class.remark {
             text += &format!("  {}: {remark}\n", class.class.name());
+        }
+        if class.at_switch > 0 {
+            text += &format!(
+                "  {}: {} points within rounding of a switch were left out\n",
+                class.class.name(),
+                class.at_switch
+            );
         }
     }
     let all = classes.iter().flat_map(|class| class.worst.iter().map(move |worst| (class, worst)));

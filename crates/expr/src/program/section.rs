@@ -55,6 +55,12 @@ impl Program {
 }
 
 impl Section {
+    /// The number of outputs.
+    #[must_use]
+    pub fn output_count(&self) -> usize {
+        self.outputs.len()
+    }
+
     /// The outputs of `N` points, from the uniform values and those given of each point. `rows` is room to work in.
     ///
     /// # Panics

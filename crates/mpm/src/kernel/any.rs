@@ -120,9 +120,9 @@ impl<T: Lanes, const D: usize, const N: usize> Contributions<T, D, N> {
         }
     }
 
-    /// For particles of uniform mass and volume.
-    pub(crate) fn uniform(mass: T, volume: T) -> Self {
-        Self { mass: [mass; N], volume: [volume; N], ..Self::zero() }
+    /// Sets masses and volumes to those that all particles have.
+    pub(crate) fn set_uniform(&mut self, mass: T, volume: T) {
+        (self.mass, self.volume) = ([mass; N], [volume; N]);
     }
 
     /// Copies masses and volumes of the particles `ids`.
@@ -132,8 +132,14 @@ impl<T: Lanes, const D: usize, const N: usize> Contributions<T, D, N> {
         }
     }
 
+    /// No particle has a stress.
+    pub(crate) fn without_stress(&mut self) {
+        self.stress_flux = [SMatrix::zeros(); N];
+    }
+
     /// Sets momenta and masses of the particles `ids`, with no force.
     pub(crate) fn take_momenta(&mut self, ids: &[u32], mass: &[T], v: &[SVector<T, D>]) {
+        self.without_stress();
         for (value, &p) in self.value.iter_mut().zip(ids) {
             let m = mass[p as usize];
             *value = Node::new(&(v[p as usize] * m), &SVector::zeros(), m);
@@ -166,10 +172,10 @@ impl<T: Lanes, const D: usize, const N: usize> Contributions<T, D, N> {
         values[4] = m;
     }
 
-    /// Sets the body force of a particle alone.
+    /// Sets the body force of a particle, with neither momentum nor mass.
     #[inline(always)]
     pub(crate) fn set_force(&mut self, c: &Constants<T, D>, k: usize) {
-        self.value[k].set_acceleration(&self.force(c, k));
+        self.value[k] = Node::new(&SVector::zeros(), &self.force(c, k), T::zero());
     }
 
     #[inline(always)]

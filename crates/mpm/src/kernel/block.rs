@@ -5,7 +5,7 @@ use nalgebra::{SMatrix, SVector};
 use crate::geometry::Constants;
 use crate::kernel::any::{Contributions, Interpolated, Receive};
 use crate::kernel::copies::{BLOCK, Kinematics};
-use crate::kernel::corners::Corners;
+use crate::kernel::corners::CornerWeights;
 use crate::kernel::product::ProductWeights;
 use crate::material::LibraryLaw;
 use crate::node::Node;
@@ -43,14 +43,16 @@ pub(crate) enum Block<T, const D: usize> {
     /// Products over the axes.
     Product(ProductWeights<T, D>),
     /// Means over domains with corners, for CPDI and CPDI2.
-    Corners(Corners<T, D>),
+    Corners(CornerWeights<T, D>),
 }
 
 impl<T: Lanes, const D: usize> Block<T, D> {
     pub(crate) fn new(support: &Support<T, D>, is_affine: bool) -> Self {
         match support {
             Support::Product(shape) => Self::Product(ProductWeights::new(shape, is_affine)),
-            Support::Cpdi { .. } | Support::Cpdi2 { .. } => Self::Corners(Corners::new(is_affine)),
+            Support::Cpdi { .. } | Support::Cpdi2 { .. } => {
+                Self::Corners(CornerWeights::new(is_affine))
+            }
         }
     }
 
@@ -66,10 +68,12 @@ impl<T: Lanes, const D: usize> Block<T, D> {
             (Self::Product(weights), Support::Product(shape)) => {
                 weights.compute(c, shape, kinematics);
             }
-            (Self::Corners(corners), Support::Cpdi { half_edges }) => {
-                corners.of_parallelograms(c, half_edges, ids, kinematics);
+            (Self::Corners(weights), Support::Cpdi { half_edges }) => {
+                weights.corners.of_parallelograms(c, half_edges, ids, kinematics);
             }
-            (Self::Corners(corners), Support::Cpdi2 { mesh, .. }) => corners.of_mesh(c, mesh, ids),
+            (Self::Corners(weights), Support::Cpdi2 { mesh, .. }) => {
+                weights.corners.of_mesh(c, mesh, ids);
+            }
             _ => debug_assert!(false, "a block for another shape function"),
         }
     }
@@ -83,7 +87,7 @@ impl<T: Lanes, const D: usize> Block<T, D> {
 
     /// P2G of the first `count` particles, to the band of nodes that starts at node `first`.
     pub(crate) fn p2g(
-        &self,
+        &mut self,
         strides: &[usize; D],
         band: &mut [Node<T, D>],
         first: usize,
@@ -92,7 +96,7 @@ impl<T: Lanes, const D: usize> Block<T, D> {
     ) {
         match self {
             Self::Product(weights) => weights.p2g(strides, band, first, contributions, count),
-            Self::Corners(corners) => corners.p2g(strides, band, first, contributions, count),
+            Self::Corners(weights) => weights.p2g(strides, band, first, contributions, count),
         }
     }
 
@@ -113,14 +117,14 @@ impl<T: Lanes, const D: usize> Block<T, D> {
 
     /// G2P of the first particles, as many as `receiver` has places.
     pub(crate) fn g2p(
-        &self,
+        &mut self,
         strides: &[usize; D],
         nodes: &[Node<T, D>],
         receiver: &mut [Interpolated<T, D>],
     ) {
         match self {
             Self::Product(weights) => weights.g2p(strides, nodes, receiver),
-            Self::Corners(corners) => corners.g2p(strides, nodes, receiver),
+            Self::Corners(weights) => weights.g2p(strides, nodes, receiver),
         }
     }
 }

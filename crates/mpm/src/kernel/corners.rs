@@ -160,38 +160,66 @@ impl<T: Lanes, const D: usize> Corners<T, D> {
         }
         inverse(&inertia)
     }
+}
+
+/// The weights of a block of particles, and a buffer for those of a group.
+pub(crate) struct CornerWeights<T, const D: usize> {
+    pub(crate) corners: Corners<T, D>,
+    of_group: GroupWeights<T, D>,
+}
+
+impl<T: Lanes, const D: usize> CornerWeights<T, D> {
+    pub(crate) fn new(is_affine: bool) -> Self {
+        Self { corners: Corners::new(is_affine), of_group: GroupWeights::zero() }
+    }
 
     /// P2G of the first `count` particles, to the band of nodes that starts at node `first`.
     pub(crate) fn p2g(
-        &self,
+        &mut self,
         strides: &[usize; D],
         band: &mut [Node<T, D>],
         first: usize,
         contributions: &Contributions<T, D, BLOCK>,
         count: usize,
     ) {
-        if self.is_affine {
-            let work =
-                P2g::<_, D, true> { corners: self, strides, band, first, contributions, count };
-            dispatch(work);
+        let Self { corners, of_group: weights } = self;
+        let corners = &*corners;
+        if corners.is_affine {
+            dispatch(P2g::<_, D, true> {
+                corners,
+                weights,
+                strides,
+                band,
+                first,
+                contributions,
+                count,
+            });
         } else {
-            let work =
-                P2g::<_, D, false> { corners: self, strides, band, first, contributions, count };
-            dispatch(work);
+            dispatch(P2g::<_, D, false> {
+                corners,
+                weights,
+                strides,
+                band,
+                first,
+                contributions,
+                count,
+            });
         }
     }
 
-    /// G2P of the first `count` particles.
+    /// G2P of the first particles, as many as `receiver` has places.
     pub(crate) fn g2p(
-        &self,
+        &mut self,
         strides: &[usize; D],
         nodes: &[Node<T, D>],
         receiver: &mut [Interpolated<T, D>],
     ) {
-        if self.is_affine {
-            dispatch(G2p::<_, D, true> { corners: self, strides, nodes, receiver });
+        let Self { corners, of_group: weights } = self;
+        let corners = &*corners;
+        if corners.is_affine {
+            dispatch(G2p::<_, D, true> { corners, weights, strides, nodes, receiver });
         } else {
-            dispatch(G2p::<_, D, false> { corners: self, strides, nodes, receiver });
+            dispatch(G2p::<_, D, false> { corners, weights, strides, nodes, receiver });
         }
     }
 }
@@ -444,6 +472,7 @@ impl<T: Lanes, const D: usize> GroupWeights<T, D> {
 
 struct P2g<'a, T, const D: usize, const AFFINE: bool> {
     corners: &'a Corners<T, D>,
+    weights: &'a mut GroupWeights<T, D>,
     strides: &'a [usize; D],
     band: &'a mut [Node<T, D>],
     first: usize,
@@ -456,9 +485,8 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for P2g<'_, T, D, AFFINE
 
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
-        let Self { corners, strides, band, first, contributions, count } = self;
+        let Self { corners, weights, strides, band, first, contributions, count } = self;
         let count = count.min(BLOCK);
-        let mut weights = GroupWeights::<T, D>::zero();
         for group in 0..count.div_ceil(GROUP) {
             weights.compute(vectors, corners, group);
             for n in 0..GROUP.min(count - group * GROUP) {
@@ -524,6 +552,7 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for P2g<'_, T, D, AFFINE
 
 struct G2p<'a, T, const D: usize, const AFFINE: bool> {
     corners: &'a Corners<T, D>,
+    weights: &'a mut GroupWeights<T, D>,
     strides: &'a [usize; D],
     nodes: &'a [Node<T, D>],
     receiver: &'a mut [Interpolated<T, D>],
@@ -534,9 +563,8 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for G2p<'_, T, D, AFFINE
 
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
-        let Self { corners, strides, nodes, receiver } = self;
+        let Self { corners, weights, strides, nodes, receiver } = self;
         let count = receiver.len().min(BLOCK);
-        let mut weights = GroupWeights::<T, D>::zero();
         for group in 0..count.div_ceil(GROUP) {
             weights.compute(vectors, corners, group);
             let mut inverse_inertia = [[Lane8::zero(); D]; D];

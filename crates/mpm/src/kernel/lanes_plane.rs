@@ -3,7 +3,7 @@
 use crate::kernel::any::{Contributions, Receive};
 use crate::node::{LANES, Node};
 use crate::simd::{Lane4, Lanes, Vectors};
-use crate::weights::Weights;
+use crate::weights::{Weights, is_middle};
 
 /// The first four of a node's values: momentum and force in two dimensions; momentum, force and mass in one.
 #[inline(always)]
@@ -13,22 +13,27 @@ fn half<T: Lanes>(values: &[T; LANES]) -> Lane4<T> {
     values.first_chunk().map_or(Lane4::zero(), |half| Lane4(*half))
 }
 
-/// Sum of contributions to a node; the mass is used in two dimensions alone.
+/// Sums of contributions to a row of nodes. Masses have a vector of their own in two dimensions alone, node by node: one number
+/// of each node would not leave enough registers for the others.
 #[derive(Clone, Copy)]
-struct Sum<T> {
-    values: Lane4<T>,
-    mass: T,
+struct RowSums<T, const W: usize> {
+    values: [Lane4<T>; W],
+    masses: Lane4<T>,
 }
 
-impl<T: Lanes> Sum<T> {
+impl<T: Lanes, const W: usize> RowSums<T, W> {
     #[inline(always)]
     fn zero() -> Self {
-        Self { values: Lane4::zero(), mass: T::zero() }
+        Self { values: [Lane4::zero(); W], masses: Lane4::zero() }
     }
 
     #[inline(always)]
-    fn less(self, vectors: impl Vectors, other: Self) -> Self {
-        Self { values: vectors.sub(self.values, other.values), mass: self.mass - other.mass }
+    fn less(mut self, vectors: impl Vectors, other: &Self) -> Self {
+        for i in 0..W {
+            self.values[i] = vectors.sub(self.values[i], other.values[i]);
+        }
+        self.masses = vectors.sub(self.masses, other.masses);
+        self
     }
 }
 
@@ -105,7 +110,7 @@ pub(crate) fn p2g_in_plane<T, L, V, const D: usize, const W: usize, const N: usi
     let mut k = 0;
     while k < count {
         let start = weights(k).first_node();
-        let mut sums = [[Sum::zero(); W]; W];
+        let mut sums = [RowSums::<T, W>::zero(); W];
         loop {
             let w = weights(k);
             let gradient = slopes(vectors, contributions, k, L::AFFINE);
@@ -113,13 +118,12 @@ pub(crate) fn p2g_in_plane<T, L, V, const D: usize, const W: usize, const N: usi
             let given = Given {
                 values: half(&contributions.value[k].values),
                 slope: along,
-                mass: contributions.value[k].mass(),
+                mass: vectors.splat(contributions.value[k].mass()),
             };
             if D > 1 {
                 let mut j = 0;
                 while j < rows {
-                    let S = w.S(1, j);
-                    let scale = vectors.splat(S);
+                    let scale = vectors.splat(w.S(1, j));
                     let of_row = Given {
                         values: vectors.mul_add(
                             across,
@@ -127,7 +131,7 @@ pub(crate) fn p2g_in_plane<T, L, V, const D: usize, const W: usize, const N: usi
                             vectors.mul(given.values, scale),
                         ),
                         slope: vectors.mul(along, scale),
-                        mass: given.mass * S,
+                        mass: vectors.mul(given.mass, scale),
                     };
                     add_to_row(vectors, &w, of_row, &mut sums[j]);
                     j += to_next_outer::<W>();
@@ -142,16 +146,16 @@ pub(crate) fn p2g_in_plane<T, L, V, const D: usize, const W: usize, const N: usi
                 break;
             }
         }
-        for i in 0..W {
-            if D > 1 {
-                let mut column = [sums[0][i]; W];
-                (1..W).for_each(|j| column[j] = sums[j][i]);
-                subtract_outer::<_, _, W>(vectors, &mut column);
-                (0..W).for_each(|j| sums[j][i] = column[j]);
-            }
+        if D > 1 && W == 3 {
+            sums[W / 2] = sums[W / 2].less(vectors, &sums[0]).less(vectors, &sums[W - 1]);
         }
         for j in 0..rows {
-            subtract_outer(vectors, &mut sums[j]);
+            let RowSums { values: sums, masses } = &mut sums[j];
+            if W == 3 {
+                let outer = (sums[0], sums[W - 1]);
+                sums[W / 2] = vectors.sub(vectors.sub(sums[W / 2], outer.0), outer.1);
+                masses.0[W / 2] = masses.0[W / 2] - masses.0[0] - masses.0[W - 1];
+            }
             let place = row_start(start - first, strides, j);
             let Some(nodes) = band.get_mut(place..).and_then(|n| n.first_chunk_mut::<W>()) else {
                 debug_assert!(false, "a stencil beyond its band");
@@ -159,10 +163,10 @@ pub(crate) fn p2g_in_plane<T, L, V, const D: usize, const W: usize, const N: usi
             };
             for i in 0..W {
                 let Node { values } = &mut nodes[i];
-                let sum = vectors.add(half(values), sums[j][i].values);
+                let sum = vectors.add(half(values), sums[i]);
                 values[..4].copy_from_slice(&sum.0);
                 if D == 2 {
-                    values[2 * D] += sums[j][i].mass;
+                    values[2 * D] += masses.0[i];
                 }
             }
         }
@@ -175,7 +179,20 @@ struct Given<T> {
     values: Lane4<T>,
     /// Along the row.
     slope: Lane4<T>,
-    mass: T,
+    /// In every lane.
+    mass: Lane4<T>,
+}
+
+/// The weights along axis 0, one for [middle](crate::weights::is_middle) nodes.
+#[inline(always)]
+fn weights_along_row<T: Lanes, const D: usize, const W: usize>(
+    weights: &impl Weights<T, D, W>,
+) -> Lane4<T> {
+    let mut lanes = Lane4::zero();
+    for i in 0..W {
+        lanes.0[i] = if is_middle::<W>(i) { T::one() } else { weights.S(0, i) };
+    }
+    lanes
 }
 
 /// Nodes from one outer node to the next. A branch for the [middle](crate::weights::is_middle) one in the loop would keep the compiler from unrolling it.
@@ -189,7 +206,7 @@ fn add_to_row<T, V, L, const D: usize, const W: usize>(
     vectors: V,
     weights: &L,
     given: Given<T>,
-    sums: &mut [Sum<T>; W],
+    sums: &mut RowSums<T, W>,
 ) where
     T: Lanes,
     V: Vectors,
@@ -198,23 +215,15 @@ fn add_to_row<T, V, L, const D: usize, const W: usize>(
     let mut i = 0;
     while i < W {
         let (S, slope) = (weights.S(0, i), slope_factor(vectors, weights, (0, i), true));
-        let with_slope = vectors.mul_add(given.slope, slope, sums[i].values);
-        sums[i].values = vectors.mul_add(given.values, vectors.splat(S), with_slope);
-        sums[i].mass = given.mass.mul_add(S, sums[i].mass);
+        let with_slope = vectors.mul_add(given.slope, slope, sums.values[i]);
+        sums.values[i] = vectors.mul_add(given.values, vectors.splat(S), with_slope);
         i += to_next_outer::<W>();
     }
     if W == 3 {
-        let middle = &mut sums[W / 2];
-        middle.values = vectors.add(middle.values, given.values);
-        middle.mass += given.mass;
+        sums.values[W / 2] = vectors.add(sums.values[W / 2], given.values);
     }
-}
-
-/// Subtracts the sums of the outer nodes from the middle one, where there are three.
-#[inline(always)]
-fn subtract_outer<T: Lanes, V: Vectors, const W: usize>(vectors: V, sums: &mut [Sum<T>; W]) {
-    if let [first, all, last] = &mut sums[..] {
-        *all = all.less(vectors, *first).less(vectors, *last);
+    if D == 2 {
+        sums.masses = vectors.mul_add(given.mass, weights_along_row(weights), sums.masses);
     }
 }
 

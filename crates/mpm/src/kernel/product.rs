@@ -12,7 +12,7 @@ use crate::kernel::lanes_plane::{g2p_in_plane, p2g_in_plane};
 use crate::kernel::lanes_space::{g2p_in_space, p2g_in_space};
 use crate::node::Node;
 use crate::shape_function::{
-    CubicSpline, Gimp, HalfSizes, Hat, OnAxis, ProductShape, QuadraticSpline, ShapeFunction, index,
+    CubicSpline, Gimp, Hat, OnAxis, ProductShape, QuadraticSpline, ShapeFunction, half_size, index,
     moment,
 };
 use crate::simd::{Lanes, Loop, Vectors, dispatch};
@@ -80,29 +80,36 @@ impl<T: Lanes, const D: usize> ProductWeights<T, D> {
         shape: &ProductShape<T, D>,
         kinematics: Kinematics<'_, T, D>,
     ) {
-        let half_sizes = &shape.half_sizes;
+        let l = &shape.l;
         match shape.on_axis {
-            OnAxis::Hat => self.compute_on_axes::<Hat, 2>(c, half_sizes, kinematics),
-            OnAxis::Gimp => self.compute_on_axes::<Gimp, 3>(c, half_sizes, kinematics),
+            OnAxis::Hat => self.compute_on_axes::<Hat, 2, false>(c, l, kinematics),
+            OnAxis::FixedBox => self.compute_on_axes::<Gimp, 3, false>(c, l, kinematics),
+            OnAxis::StretchingBox => self.compute_on_axes::<Gimp, 3, true>(c, l, kinematics),
             OnAxis::Quadratic => {
-                self.compute_on_axes::<QuadraticSpline, 3>(c, half_sizes, kinematics);
+                self.compute_on_axes::<QuadraticSpline, 3, false>(c, l, kinematics);
             }
-            OnAxis::Cubic => self.compute_on_axes::<CubicSpline, 4>(c, half_sizes, kinematics),
+            OnAxis::Cubic => self.compute_on_axes::<CubicSpline, 4, false>(c, l, kinematics),
         }
     }
 
-    fn compute_on_axes<R: ShapeFunction<W>, const W: usize>(
+    fn compute_on_axes<R: ShapeFunction<W>, const W: usize, const STRETCHING: bool>(
         &mut self,
         c: &Constants<T, D>,
-        half_sizes: &HalfSizes<T, D>,
+        l: &SVector<T, D>,
         kinematics: Kinematics<'_, T, D>,
     ) {
         let (is_affine, on_axis) = (self.is_affine, PhantomData::<R>);
         let weights = &mut *self;
-        dispatch(Compute::<_, _, D, W, false> { weights, c, kinematics, half_sizes, on_axis });
+        dispatch(Compute::<_, _, D, W, STRETCHING, false> { weights, c, kinematics, l, on_axis });
         if is_affine {
             let weights = self;
-            dispatch(Compute::<_, _, D, W, true> { weights, c, kinematics, half_sizes, on_axis });
+            dispatch(Compute::<_, _, D, W, STRETCHING, true> {
+                weights,
+                c,
+                kinematics,
+                l,
+                on_axis,
+            });
         }
     }
 
@@ -262,16 +269,25 @@ fn stretch<T: Lanes, const D: usize>(planted: Planted, F: &SMatrix<T, D, D>, a: 
 }
 
 /// Computes weights and gradients, or else `MOMENTS`: weights times arms, and one over the inertia.
-struct Compute<'a, T, R, const D: usize, const W: usize, const MOMENTS: bool> {
+struct Compute<
+    'a,
+    T,
+    R,
+    const D: usize,
+    const W: usize,
+    const STRETCHING: bool,
+    const MOMENTS: bool,
+> {
     weights: &'a mut ProductWeights<T, D>,
     c: &'a Constants<T, D>,
     kinematics: Kinematics<'a, T, D>,
-    half_sizes: &'a HalfSizes<T, D>,
+    /// Half-sizes in the reference configuration, which F scales where boxes are `STRETCHING`.
+    l: &'a SVector<T, D>,
     on_axis: PhantomData<R>,
 }
 
-impl<T, R, const D: usize, const W: usize, const MOMENTS: bool> Loop
-    for Compute<'_, T, R, D, W, MOMENTS>
+impl<T, R, const D: usize, const W: usize, const STRETCHING: bool, const MOMENTS: bool> Loop
+    for Compute<'_, T, R, D, W, STRETCHING, MOMENTS>
 where
     T: Lanes,
     R: ShapeFunction<W>,
@@ -280,12 +296,13 @@ where
 
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
-        let Self { weights, c, kinematics, half_sizes, .. } = self;
+        let Self { weights, c, kinematics, l: reference, .. } = self;
         let ProductWeights { first_node, S, G, Z, inverse_inertia, extended_above, .. } = weights;
         let ProductWeights { any_extended, xi, l, .. } = weights;
         let of_particle = |k: usize, a: usize| {
             let Kinematics { x, F } = kinematics;
-            (c.in_cells(&x[k])[a], half_sizes.along(a, stretch(c.planted, &F[k], a)))
+            let F_aa = stretch(c.planted, &F[k], a);
+            (c.in_cells(&x[k])[a], half_size::<_, STRETCHING>(reference[a], F_aa))
         };
         let above = *extended_above;
         // In single precision the loop is vectorised only where the numbers of an axis lie side by side; in double precision it is

@@ -124,7 +124,12 @@ impl ComponentLaw {
             linear.push(derivation.graph.sum_of(first));
             remainder.push(derivation.graph.sum_of(second));
         }
-        let energy = self.energy.map(|energy| derivation.graph.replace(energy, &actual));
+        let energy = self.energy.map(|energy| {
+            let (value, rest) = derivation.graph.split_at_zero(energy, &small);
+            let value = zero_if_vanishing(&mut derivation.graph, value);
+            let energy = derivation.graph.add(value, rest);
+            derivation.graph.replace(energy, &actual)
+        });
         let (isotropic, anisotropic) = if derivation.geometry.is_cartesian() || n < 2 {
             (Graph::ZERO, P.clone())
         } else {
@@ -132,14 +137,14 @@ impl ComponentLaw {
             let (lambda, _) = derivation.graph.split_at_zero(cross, &small);
             isotropic_and_rest(&mut derivation.graph, deformation, lambda, &P)
         };
-        Stress { P, isotropic, anisotropic, linear, remainder, energy }
+        Stress { P, isotropic, anisotropic, linear, remainder, whole: None, energy }
     }
 }
 
 /// A modulus at rest with its constants as they are written, so that identities among them cancel in symbols, here and against the
 /// inertia: `kappa - 2 mu/3` is `lambda` where bulk and shear modulus are stated in Young's modulus and Poisson's ratio, and rounding
 /// would keep something where that vanishes.
-fn modulus_at_rest(graph: &mut Graph, modulus: Expr) -> Expr {
+pub(super) fn modulus_at_rest(graph: &mut Graph, modulus: Expr) -> Expr {
     let modulus = zero_if_vanishing(graph, modulus);
     let open = graph.open(modulus);
     graph.single_term(open).unwrap_or(open)

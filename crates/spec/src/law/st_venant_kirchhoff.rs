@@ -48,7 +48,7 @@ pub(super) fn stress(
     }
     let remainder = derivation.divergence(&remainder);
     let anisotropic = P.clone();
-    Stress { P, isotropic: Graph::ZERO, anisotropic, linear, remainder, energy: None }
+    Stress { P, isotropic: Graph::ZERO, anisotropic, linear, remainder, whole: None, energy: None }
 }
 
 /// `lambda/2 tr(G) I + mu G`.

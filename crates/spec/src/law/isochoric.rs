@@ -1,0 +1,307 @@
+//! Laws of an isochoric part `W(x)` in `x = J^(-2/3) I1 - 3` and of a volumetric part `U(J)`.
+//!
+//! The chain rule is applied to the two invariants and not to the components of `F`. With
+//! `K = F - I1/3 F^-T`, `g = grad ln J`, `k = K : grad F` and `s = J^(-2/3)` it gives
+//!
+//! - `P = 2 s W' K + J U' F^-T`,
+//! - `Div P = 2 s W' [Div F + I1/9 F^-T g - 2/3 (K g + F^-T k)] + 4 s^2 W'' K k + J^2 U'' F^-T g`.
+//!
+//! The divergence of `J F^-T` is zero (Piola's identity), and no term of it is left to rounding. In components these terms are some
+//! hundred, and a small sum of them kept a hundredth of its digits' worth of roundings.
+//!
+//! - At rest `K`, `g` and `k` are zero. What is left is formed from `H`: `K = H + H^T F^-T - tr(C - I)/3 F^-T`.
+//! - Cube roots replace the power: with `c = J^(1/3)` it is `s - 1 = -(J - 1) (c + 1)/(c^2 (c^2 + c + 1))`, which keeps its digits for
+//!   every `J`. An exponential of `-2/3 ln J` loses them where a stretch almost vanishes.
+
+use super::energy::modulus_at_rest;
+use super::neo_hookean::strain_without_turn;
+use super::{Deformation, Divergence, Stress, zero_if_vanishing};
+use crate::derivation::Derivation;
+use crate::tensor::{Matrix, Vector, matrix_product};
+use mmsmith_expr::{Derivatives, Expr, Function, Graph, Rational};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The symbol of `I1b - 3` in isochoric energies.
+const EXCESS: &str = "excess";
+
+/// The stress of `isochoric`, an energy in `excess`, and `volumetric`, one in `J`.
+pub(super) fn stress(
+    derivation: &mut Derivation,
+    deformation: &Deformation,
+    isochoric: Expr,
+    volumetric: Expr,
+) -> Stress {
+    let law = Invariants::new(&mut derivation.graph, deformation, isochoric, volumetric);
+    let Divergence { linear, remainder, whole } = law.divergence(derivation, deformation);
+    let graph = &mut derivation.graph;
+    let scale = graph.product_of([law.doubled, law.power, law.slope]);
+    let scale = graph.whole(scale);
+    let pressure = zero_if_vanishing(graph, law.pressure);
+    // All that multiplies F^-T.
+    let of_trace = graph.product_of([scale, law.trace]);
+    let of_trace = graph.sum([(Rational::new((-1).into(), 3.into()), of_trace)]);
+    let normal = graph.add(pressure, of_trace);
+    let normal = graph.whole(normal);
+    let off_diagonal = graph.sub(normal, scale);
+    let off_diagonal = graph.whole(off_diagonal);
+    let strain = law.strain.is_some();
+    let n = deformation.H.len();
+    let mut P = vec![vec![Graph::ZERO; n]; n];
+    let mut anisotropic = P.clone();
+    for i in 0..n {
+        for j in 0..n {
+            let f = deformation.inverse_transpose[i][j];
+            let (first, factor) = match i == j || strain {
+                true => (law.difference[i][j], normal),
+                // H^T F^-T is -F^-T there.
+                false => (deformation.H[i][j], off_diagonal),
+            };
+            let terms = [graph.mul(scale, first), graph.mul(factor, f)];
+            let entry = graph.sum_of(terms);
+            P[i][j] = zero_if_vanishing(graph, entry);
+            let shear = graph.mul(scale, law.K[i][j]);
+            let turned = graph.mul(pressure, law.M[i][j]);
+            let entry = graph.sub(shear, turned);
+            anisotropic[i][j] = zero_if_vanishing(graph, entry);
+        }
+    }
+    let energy = Some(law.energy);
+    let whole = Some(whole);
+    Stress { P, isotropic: pressure, anisotropic, linear, remainder, whole, energy }
+}
+
+/// The invariants of a deformation, and the derivatives of both energies there.
+struct Invariants {
+    /// The number 2.
+    doubled: Expr,
+    /// `J^(-2/3)`, and what it is more than one.
+    power: Expr,
+    power_change: Expr,
+    /// `tr(C - I)`.
+    trace: Expr,
+    /// `F F^T - I`, where a turn drops out of it.
+    strain: Option<Matrix>,
+    /// `F - F^-T`.
+    difference: Matrix,
+    /// `F - I1/3 F^-T`.
+    K: Matrix,
+    /// `H^T F^-T = I - F^-T`.
+    M: Matrix,
+    /// `W'` with its value at rest and the rest, and `W''`.
+    slope: Expr,
+    slope_at_rest: Expr,
+    slope_change: Expr,
+    curvature: Expr,
+    /// `J U'`, and `J^2 U''` as its value at rest and the rest.
+    pressure: Expr,
+    stiffness_at_rest: Expr,
+    stiffness_change: Expr,
+    energy: Expr,
+}
+
+impl Invariants {
+    fn new(
+        graph: &mut Graph,
+        deformation: &Deformation,
+        isochoric: Expr,
+        volumetric: Expr,
+    ) -> Self {
+        let H = &deformation.H;
+        let n = H.len();
+        let (one, two, three) = (Graph::ONE, graph.integer(2), graph.integer(3));
+        let root = graph.product([(deformation.J, Rational::new(1.into(), 3.into()))]);
+        let root = graph.whole(root);
+        let square = graph.powi(root, 2);
+        let power = graph.powi(root, -2);
+        let above = graph.add(one, root);
+        let below = graph.sum_of([one, root, square]);
+        let below = graph.mul(below, square);
+        let change = graph.mul(deformation.volume_change, above);
+        let change = graph.div(change, below);
+        let power_change = graph.neg(change);
+        let power_change = graph.whole(power_change);
+
+        let strain = strain_without_turn(graph, H);
+        let trace = match &strain {
+            Some(B) => graph.sum_of((0..n).map(|i| B[i][i])),
+            None => {
+                let squares: Vec<Expr> = H.iter().flatten().map(|&h| graph.powi(h, 2)).collect();
+                graph.sum_of((0..n).flat_map(|i| [H[i][i]; 2]).chain(squares))
+            }
+        };
+        let trace = graph.whole(trace);
+        let third = graph.div(trace, three);
+        let f = &deformation.inverse_transpose;
+        let mut M = deformation.transposed_gradient_times_inverse(graph);
+        let turned = strain.as_ref().map(|B| matrix_product(graph, B, f));
+        let mut difference = M.clone();
+        let mut K = M.clone();
+        for i in 0..n {
+            for j in 0..n {
+                if i != j {
+                    M[i][j] = graph.neg(f[i][j]);
+                }
+                // F - F^-T = (F F^T - I) F^-T
+                difference[i][j] = match &turned {
+                    Some(turned) => turned[i][j],
+                    None => graph.add(H[i][j], M[i][j]),
+                };
+                let mean = graph.mul(third, f[i][j]);
+                let entry = graph.sub(difference[i][j], mean);
+                let entry = zero_if_vanishing(graph, entry);
+                K[i][j] = graph.whole(entry);
+            }
+        }
+
+        let excess = graph.symbol(EXCESS);
+        let part = graph.mul(power, trace);
+        let value = graph.mul(three, power_change);
+        let value = graph.add(part, value);
+        let value = zero_if_vanishing(graph, value);
+        let actual = BTreeMap::from([(excess, graph.whole(value))]);
+        let small = BTreeSet::from([excess]);
+        let mut derivatives = Derivatives::limited();
+        let of_excess = derivatives.of(graph, isochoric, excess);
+        let of_slope = derivatives.of(graph, of_excess, excess);
+        let (slope_at_rest, slope_change) = graph.split_at_zero(of_excess, &small);
+        let slope = graph.add(slope_at_rest, slope_change);
+        let (_, isochoric) = graph.split_at_zero(isochoric, &small);
+
+        // In v = J - 1, of which the pressure is small.
+        let (J, v) = (graph.symbol("J"), graph.symbol("J - 1"));
+        let sum = graph.add(one, v);
+        let volumetric = graph.replace(volumetric, &BTreeMap::from([(J, sum)]));
+        let small = BTreeSet::from([v]);
+        let of_volume = derivatives.of(graph, volumetric, v);
+        let of_slope_of_volume = derivatives.of(graph, of_volume, v);
+        let pressure = graph.mul(sum, of_volume);
+        let (_, pressure) = graph.split_at_zero(pressure, &small);
+        let stiffness = graph.product_of([sum, sum, of_slope_of_volume]);
+        let (stiffness_at_rest, stiffness_change) = graph.split_at_zero(stiffness, &small);
+        let (_, volumetric) = graph.split_at_zero(volumetric, &small);
+        let of_volume = BTreeMap::from([
+            (sum, deformation.J),
+            (v, deformation.volume_change),
+            (graph.call(Function::Ln1p, &[v]), deformation.log_J),
+            (graph.call(Function::Ln, &[sum]), deformation.log_J),
+        ]);
+        let at = |graph: &mut Graph, expr, values: &BTreeMap<Expr, Expr>| {
+            let value = graph.replace(expr, values);
+            graph.whole(value)
+        };
+        let energies = [at(graph, isochoric, &actual), at(graph, volumetric, &of_volume)];
+        Invariants {
+            doubled: two,
+            power,
+            power_change,
+            trace,
+            strain,
+            difference,
+            K,
+            M,
+            slope: at(graph, slope, &actual),
+            slope_at_rest,
+            slope_change: at(graph, slope_change, &actual),
+            curvature: at(graph, of_slope, &actual),
+            pressure: at(graph, pressure, &of_volume),
+            stiffness_at_rest,
+            stiffness_change: at(graph, stiffness_change, &of_volume),
+            energy: graph.sum_of(energies),
+        }
+    }
+
+    fn divergence(&self, derivation: &mut Derivation, deformation: &Deformation) -> Divergence {
+        let H = &deformation.H;
+        let n = H.len();
+        let graph = &mut derivation.graph;
+        let mu = graph.mul(self.doubled, self.slope_at_rest);
+        let three = graph.integer(3);
+        let shear = graph.div(mu, three);
+        // With J = 1 everywhere, what belongs to the change of volume adds up to zero.
+        let modulus = match deformation.is_isochoric() {
+            true => Graph::ZERO,
+            false => graph.add(shear, self.stiffness_at_rest),
+        };
+        let (open_mu, open_modulus) = (modulus_at_rest(graph, mu), modulus_at_rest(graph, modulus));
+        let trace = graph.sum_of((0..n).map(|i| deformation.open[i][i]));
+
+        // s W' - W'(0), and of the factor of F^-T g what it is more than at rest.
+        let of_power = graph.mul(self.power_change, self.slope);
+        let slope_change = graph.add(of_power, self.slope_change);
+        let slope_change = graph.whole(slope_change);
+        let scaled = graph.mul(self.power, self.slope);
+        let scaled = graph.whole(scaled);
+        let of_trace = graph.mul(scaled, self.trace);
+        let of_slope = graph.mul(three, slope_change);
+        let sum = graph.add(of_trace, of_slope);
+        let ninths = graph.sum([(Rational::new(2.into(), 9.into()), sum)]);
+        let modulus_change = graph.add(ninths, self.stiffness_change);
+        let modulus_change = graph.whole(modulus_change);
+        let ninths = graph.sum([
+            (Rational::new(2.into(), 9.into()), of_trace),
+            (Rational::new(2.into(), 3.into()), scaled),
+        ]);
+        let whole_modulus = graph.sum_of([ninths, self.stiffness_at_rest, self.stiffness_change]);
+        let whole_modulus = graph.whole(whole_modulus);
+        let second = graph.product_of([self.curvature, self.power, self.power]);
+        let second = graph.whole(second);
+
+        let contracted = |derivation: &mut Derivation, A: &Matrix, k: usize| {
+            let mut terms = Vec::new();
+            for i in 0..n {
+                for j in 0..n {
+                    let derivative = derivation.along(H[i][j], k);
+                    terms.push(derivation.graph.mul(A[i][j], derivative));
+                }
+            }
+            let sum = derivation.graph.sum_of(terms);
+            let sum = zero_if_vanishing(&mut derivation.graph, sum);
+            derivation.graph.whole(sum)
+        };
+        let of_K: Vector = (0..n).map(|k| contracted(derivation, &self.K, k)).collect();
+        let of_M: Vector = (0..n).map(|k| contracted(derivation, &self.M, k)).collect();
+        let g: Vector = match deformation.is_isochoric() {
+            true => vec![Graph::ZERO; n],
+            false => (0..n)
+                .map(|k| {
+                    let along = derivation.along(deformation.log_J, k);
+                    derivation.graph.whole(along)
+                })
+                .collect(),
+        };
+        let open = derivation.divergence(&deformation.open);
+        let of_H = derivation.divergence(H);
+        let (mut linear, mut remainder, mut whole) = (Vector::new(), Vector::new(), Vector::new());
+        for i in 0..n {
+            let dilation = derivation.along(trace, i);
+            let graph = &mut derivation.graph;
+            let first = [graph.mul(open_modulus, dilation), graph.mul(open_mu, open[i])];
+            linear.push(graph.sum_of(first));
+            let times = |graph: &mut Graph, A: &Matrix, x: &Vector| {
+                let terms: Vec<Expr> = (0..n).map(|j| graph.mul(A[i][j], x[j])).collect();
+                graph.sum_of(terms)
+            };
+            let Kg = times(graph, &self.K, &g);
+            let Kk = times(graph, &self.K, &of_K);
+            let Mg = times(graph, &self.M, &g);
+            let fk = times(graph, &deformation.inverse_transpose, &of_K);
+            let fg = times(graph, &deformation.inverse_transpose, &g);
+            let of_volume = graph.add(of_M[i], Mg);
+            let second = [
+                (Rational::new((-4).into(), 3.into()), graph.mul(scaled, Kg)),
+                (Rational::new((-4).into(), 3.into()), graph.mul(scaled, fk)),
+                (4.into(), graph.mul(second, Kk)),
+            ];
+            let rest = [
+                (2.into(), graph.mul(slope_change, of_H[i])),
+                (1.into(), graph.mul(modulus_change, fg)),
+                ((-1).into(), graph.mul(modulus, of_volume)),
+            ];
+            let first =
+                [(2.into(), graph.mul(scaled, of_H[i])), (1.into(), graph.mul(whole_modulus, fg))];
+            remainder.push(graph.sum(rest.into_iter().chain(second.clone())));
+            whole.push(graph.sum(first.into_iter().chain(second)));
+        }
+        Divergence { linear, remainder, whole }
+    }
+}

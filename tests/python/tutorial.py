@@ -1,0 +1,43 @@
+"""Runs the Python of Markdown pages, as a reader would: python tutorial.py PAGE...
+
+The blocks of a page are one program, run in an empty folder that has the files which the page saves (<!-- file: NAME -->). A block that
+marks a test for pytest is run by pytest as well.
+"""
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+BLOCK = re.compile(r"(?:<!-- file: (?P<file>\S+) -->\n)?```(?P<language>\w+)\n(?P<text>.*?)^```$", re.DOTALL | re.MULTILINE)
+
+
+def main(pages):
+    failed = False
+    for page in [Path(page).resolve() for page in pages]:
+        text = page.read_text(encoding="utf-8")
+        blocks = list(BLOCK.finditer(text))
+        program = ""
+        for block in blocks:
+            if block["language"] == "python":
+                # On the lines that it has in the page, for what is said of errors.
+                program += "\n" * (text.count("\n", 0, block.start("text")) - program.count("\n")) + block["text"]
+        assert program, f"{page} has no Python"
+        with tempfile.TemporaryDirectory() as folder:
+            os.chdir(folder)
+            for block in blocks:
+                if block["file"] and block["language"] == "toml":
+                    Path(block["file"]).parent.mkdir(parents=True, exist_ok=True)
+                    Path(block["file"]).write_text(block["text"], encoding="utf-8")
+            Path("test_page.py").write_text(program, encoding="utf-8")
+            exec(compile(program, str(page), "exec"), {"__name__": "page"})
+            if "def test_" in program:
+                failed |= subprocess.run([sys.executable, "-m", "pytest", "--quiet", "test_page.py"], check=False).returncode != 0
+            os.chdir("/")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
