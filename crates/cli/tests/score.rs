@@ -299,7 +299,8 @@ fn one_frame_for_a_whole_run_and_another_amplitude_are_told() {
     let place = tempfile::tempdir().unwrap();
     let place = place.path();
     for frames in [2, 3] {
-        let run = format!("run axis-aligned --cells 8 --set A=0.05 --vtk f{frames} --frames {frames}");
+        let run =
+            format!("run axis-aligned --cells 8 --set A=0.05 --vtk f{frames} --frames {frames}");
         assert_eq!(mms(place, &run).status, 0);
         let called = mms(place, &format!("score axis-aligned f{frames} --cells 8 --set A=0.05"));
         assert_eq!(called.stdout.contains("one frame after t = 0"), frames == 2, "{frames}");
@@ -309,7 +310,8 @@ fn one_frame_for_a_whole_run_and_another_amplitude_are_told() {
     assert!(called.stdout.contains("with A = 0.05 in place of 0.1"), "{}", called.stdout);
     assert!(called.stdout.contains("--set A=0.05"), "{}", called.stdout);
     // No value of a parameter explains these displacements.
-    let text = "t,X,Y,ux,uy\n0.004,0.2,0.3,0.1,-0.2\n0.004,0.7,0.6,-0.3,0.1\n0.004,0.4,0.9,0.2,0.2\n";
+    let text =
+        "t,X,Y,ux,uy\n0.004,0.2,0.3,0.1,-0.2\n0.004,0.7,0.6,-0.3,0.1\n0.004,0.4,0.9,0.2,0.2\n";
     fs::write(place.join("other.csv"), text).unwrap();
     let called = mms(place, "score axis-aligned other.csv");
     assert!(called.stdout.contains("one frame after t = 0"), "{}", called.stdout);
@@ -344,11 +346,7 @@ fn recordings_compared_with_each_other_have_the_orders_in_time_of_converge() {
     assert!((order(&scored) - order(&study)).abs() < 1e-9);
     refuses(place, &format!("{compared} 4,2,1.5"), &["another ratio than 2.0"]);
     refuses(place, &format!("{compared} 4,2"), &["2 time step(s) for 3 recording(s)"]);
-    refuses(
-        place,
-        "score axis-aligned-1d of0.4 f --differences 2,1",
-        &["f"],
-    );
+    refuses(place, "score axis-aligned-1d of0.4 f --differences 2,1", &["f"]);
 }
 
 #[test]
@@ -374,11 +372,7 @@ fn a_run_beside_a_recording_of_its_own_scheme_has_its_errors_to_the_last_digit()
         &["own", "--cfl 0.3 should be the one"],
     );
     refuses(place, &format!("score {call} mms:linear"), &["such as mms:linear,usl"]);
-    refuses(
-        place,
-        "score axis-aligned own --against mms:linear,usl",
-        &["--cells"],
-    );
+    refuses(place, "score axis-aligned own --against mms:linear,usl", &["--cells"]);
 }
 
 #[test]

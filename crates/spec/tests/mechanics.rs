@@ -95,7 +95,9 @@ fn stress(law: &Law, constants: &[f64], F: &Tensor) -> Option<Tensor> {
             Some(tensor(|i, j| lambda * trace(&H) * identity(i, j) + mu * (H[i][j] + H[j][i])))
         }
         // The other laws that are stated by their energies are compared with these in `mmsmith-mpm`, in 77 digits.
-        Derivation::Energy { .. } | Derivation::PrincipalStretches(_) => None,
+        Derivation::Energy { .. }
+        | Derivation::Isochoric { .. }
+        | Derivation::PrincipalStretches(_) => None,
     }
 }
 

@@ -213,11 +213,12 @@ pub fn score(
     Ok(Score { orders: orders(&errors.collect::<Vec<_>>()), rows })
 }
 
+/// The errors of a recording, by quantity and norm.
+type Errors = BTreeMap<Quantity, PerNorm<f64>>;
+
 /// The orders of the fields that any row has, where there are several rows: each a step and the errors, unless they are of
 /// no use.
-fn orders(
-    rows: &[(f64, Option<&BTreeMap<Quantity, PerNorm<f64>>>)],
-) -> Option<BTreeMap<Quantity, PerNorm<Order>>> {
+fn orders(rows: &[(f64, Option<&Errors>)]) -> Option<BTreeMap<Quantity, PerNorm<Order>>> {
     let steps: Vec<f64> = rows.iter().map(|(step, _)| *step).collect();
     let fields: BTreeSet<_> =
         rows.iter().filter_map(|(_, errors)| *errors).flat_map(BTreeMap::keys).collect();
