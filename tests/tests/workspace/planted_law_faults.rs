@@ -174,7 +174,6 @@ const OF_ENERGY: &str = "W against solver's energy of F";
 /// Fails unless the error does not shrink with the grid as it does without a fault.
 fn assert_shown(exact: &AnySolution<f64>, run: &Run, about: &str) {
     let (order, frame) = (order(exact, run), run.frame);
-    println!("{about}, {frame}: order {order:.2?}");
     assert!(
         order.is_none_or(|order| order < run.order_with_fault),
         "{about}, {frame}: {order:.2?}"
