@@ -144,7 +144,6 @@ impl NeoHookean<'_> {
         let graph = &mut derivation.graph;
         let modulus = graph.add(lambda, mu);
         let modulus = graph.whole(modulus);
-        let open_modulus = graph.add(open_lambda, open_mu);
         let trace = graph.sum_of((0..n).map(|i| deformation.open[i][i]));
         let pressure = graph.mul(lambda, deformation.log_J);
         let factor = graph.sub(modulus, pressure);
@@ -177,8 +176,8 @@ impl NeoHookean<'_> {
                 whole.push(shear);
                 continue;
             }
-            let dilation = graph.mul(open_modulus, dilation);
-            linear.push(graph.add(dilation, shear));
+            let terms = [graph.mul(open_lambda, dilation), graph.mul(open_mu, dilation), shear];
+            linear.push(graph.sum_of(terms));
             let times = |graph: &mut Graph, A: &Matrix| {
                 let terms: Vec<Expr> = (0..n).map(|j| graph.mul(A[i][j], g[j])).collect();
                 graph.sum_of(terms)
