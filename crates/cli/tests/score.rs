@@ -202,9 +202,10 @@ fn findings_are_in_the_json_and_a_row_with_a_problem_has_no_part_in_orders() {
     let good = data("ok").join("vtk-base64-64");
     let (bad, good) = (bad.display(), good.display());
     let scored = score(place.path(), &format!("ring {good} {bad} {good} --h 0.4,0.2,0.1"));
-    let finding = &scored["findings"][0];
+    let findings = scored["findings"].as_array().unwrap();
+    let finding = findings.iter().find(|finding| finding["kind"] == "not-finite").unwrap();
     assert_eq!(keys(finding), "count file frames kind message problem row");
-    assert_eq!((&finding["kind"], &finding["count"]), (&"not-finite".into(), &2.into()));
+    assert_eq!(finding["count"], 2);
     assert_eq!((&finding["row"], &finding["problem"]), (&1.into(), &true.into()));
     let status = scored["rows"][1]["status"].as_str().unwrap();
     assert!(status.contains("2 particle(s)"), "{status}");
@@ -307,8 +308,10 @@ fn one_frame_for_a_whole_run_and_another_amplitude_are_told() {
         assert!(!called.stdout.contains("is another value meant"), "{}", called.stdout);
     }
     let called = mms(place, "score axis-aligned f3 --cells 8");
-    assert!(called.stdout.contains("with A = 0.05 in place of 0.1"), "{}", called.stdout);
-    assert!(called.stdout.contains("--set A=0.05"), "{}", called.stdout);
+    // On so coarse a grid the nearest amplitude is not that of the run to more than a digit.
+    for part in ["% with A near 0.05", "in place of 0.1", "--set A=0.05"] {
+        assert!(called.stdout.contains(part), "{part}: {}", called.stdout);
+    }
     // No value of a parameter explains these displacements.
     let text =
         "t,X,Y,ux,uy\n0.004,0.2,0.3,0.1,-0.2\n0.004,0.7,0.6,-0.3,0.1\n0.004,0.4,0.9,0.2,0.2\n";
@@ -329,7 +332,7 @@ fn recordings_compared_with_each_other_have_the_orders_in_time_of_converge() {
         assert_eq!(mms(place, &run).status, 0);
     }
     assert_eq!(mms(place, &format!("converge {base} --cfls 0.4,0.2 --json study.json")).status, 0);
-    let study = read_json(&place.join("study.json"));
+    let study = read_json(&place.join("study.json"))["temporal"].clone();
     let compared = "score axis-aligned-1d of0.4 of0.2 of0.1 --differences";
     let called = mms(place, &format!("{compared} 4e-4,2e-4,1e-4 --json score.json"));
     assert_eq!(called.status, 0, "{}", called.stderr);

@@ -58,8 +58,9 @@ pub(crate) fn score(options: &ScoreOptions) -> Result<bool> {
         if let Some((row, remark)) = suggestion(&selection, &inputs, &how, &score) {
             score.rows[row].findings.push(remark);
         }
-        terminal::say(&text(&selection, &score))?;
+        // Before anything is said: what cannot be compared is refused.
         let agreements = agreements(options, &exact, &score, &how)?;
+        terminal::say(&text(&selection, &score))?;
         for (row, agreement) in score.rows.iter().zip(&agreements) {
             terminal::say(&text_of_agreement(options, row, agreement))?;
         }
@@ -118,7 +119,9 @@ fn text_of_agreement(options: &ScoreOptions, row: &ScoreRow, agreement: &Agreeme
 }
 
 /// A relative error that a solver that converges does not have on any grid worth scoring.
-const SUSPICIOUS: f64 = 0.1;
+const SUSPICIOUS: f64 = 0.3;
+/// The share of the error that is left where another value explains it, on coarse grids too.
+const EXPLAINED: f64 = 0.25;
 /// Below this order the grid is not what the error is from.
 const NO_ORDER: f64 = 0.5;
 /// More numbers than are read anew for every trial.
@@ -158,9 +161,9 @@ fn suggestion(
         })
         .min_by(|one, other| one.0.total_cmp(&other.0))?;
     let told = number::rounded(value, 3);
-    (error < SUSPICIOUS * u(row)).then(|| {
+    (error < EXPLAINED * u(row)).then(|| {
         let message = format!(
-            "the error of u is {:.0} % of u, but {} % with {name} = {told} in place of {}: is another value meant? --set \
+            "the error of u is {:.0} % of u, but {} % with {name} near {told} in place of {}: is another value meant? --set \
              {name}={told}",
             100.0 * relative,
             number::rounded(100.0 * error / row.exact_displacement, 2),
