@@ -9,7 +9,8 @@ use mmsmith_solutions::CATALOGUE;
 use std::fs;
 
 /// Those that the updated frame models, whose scheme stays the usual one.
-const UPDATED: [&str; 5] = ["axis-aligned-1d", "axis-aligned", "axis-aligned-3d", "bar", "ring"];
+const UPDATED: [&str; 6] =
+    ["axis-aligned-1d", "axis-aligned", "axis-aligned-3d", "bar", "ring", "swirl"];
 
 /// A box whose faces move as the solution says.
 const SHEAR: &str = "

@@ -93,17 +93,24 @@ fn several_recordings_have_the_orders_of_converge() {
     assert_eq!(mms(place, "converge axis-aligned --cells 8,16 --json study.json").status, 0);
     let study = read_json(&place.join("study.json"));
     let scored = score(place, "axis-aligned of8 of16 --cells 8,16");
-    assert_eq!(scored["orders"], study["orders"]);
+    for field in FIELDS {
+        assert_eq!(scored["orders"][field], study["orders"][field]);
+    }
     assert_eq!(keys(&scored), "findings orders rows schema settings");
     assert_eq!(scored["schema"], "mmsmith.score/1");
     for (row, expected) in
         scored["rows"].as_array().unwrap().iter().zip(study["rows"].as_array().unwrap())
     {
-        assert_eq!((&row["h"], &row["errors"]), (&expected["h"], &expected["errors"]));
+        assert_eq!(row["h"], expected["h"]);
+        for field in FIELDS {
+            assert_eq!(row["errors"][field], expected["errors"][field]);
+        }
+        // Particle files of mms hold Cauchy stress as well.
+        assert_eq!(keys(&row["errors"]), "F P cauchy u v");
         assert_eq!(
             keys(row),
-            "cells displacements errors fields file first_time frames h last_time particles \
-             reference_positions status"
+            "cells displacements errors exact_displacement fields file first_time frames h last_time \
+             particles reference_positions status"
         );
     }
     // Only the ratio of h matters: an estimate from the particles gives nearly the same, and says so.
@@ -195,9 +202,10 @@ fn findings_are_in_the_json_and_a_row_with_a_problem_has_no_part_in_orders() {
     let good = data("ok").join("vtk-base64-64");
     let (bad, good) = (bad.display(), good.display());
     let scored = score(place.path(), &format!("ring {good} {bad} {good} --h 0.4,0.2,0.1"));
-    let finding = &scored["findings"][0];
+    let findings = scored["findings"].as_array().unwrap();
+    let finding = findings.iter().find(|finding| finding["kind"] == "not-finite").unwrap();
     assert_eq!(keys(finding), "count file frames kind message problem row");
-    assert_eq!((&finding["kind"], &finding["count"]), (&"not-finite".into(), &2.into()));
+    assert_eq!(finding["count"], 2);
     assert_eq!((&finding["row"], &finding["problem"]), (&1.into(), &true.into()));
     let status = scored["rows"][1]["status"].as_str().unwrap();
     assert!(status.contains("2 particle(s)"), "{status}");
@@ -234,6 +242,140 @@ fn a_specification_file_and_transposed_tensors() {
     assert!(scored["findings"].to_string().contains("transpose of F"), "{}", scored["findings"]);
     assert_eq!(row["fields"], serde_json::json!(["u", "F"]));
     assert!(row["errors"]["P"]["l2"].is_null());
+}
+
+#[test]
+fn other_stresses_j_and_density_are_compared_with_what_f_and_p_say() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    fs::write(place.join("points.json"), r#"[{ "X": [0.3, 0.4], "t": 0.1 }]"#).unwrap();
+    assert_eq!(mms(place, "eval skew-2d --points points.json --json exact.json").status, 0);
+    let exact = &read_json(&place.join("exact.json"))["rows"][0];
+    let matrix = |name: &str| {
+        let at = |i: usize, j: usize| exact[name][i][j].as_f64().unwrap();
+        [[at(0, 0), at(0, 1)], [at(1, 0), at(1, 1)]]
+    };
+    let (u, F, P) = (&exact["u"], matrix("F"), matrix("P"));
+    let J = F[0][0] * F[1][1] - F[0][1] * F[1][0];
+    let tau = |i: usize, j: usize| P[i][0] * F[j][0] + P[i][1] * F[j][1];
+    // Kirchhoff stress by its three different components, Cauchy stress row by row.
+    let head = "t,X,Y,ux,uy,J,rho,tau:0,tau:1,tau:2,cauchy_xx,cauchy_xy,cauchy_yx,cauchy_yy";
+    let line = |off: f64| {
+        let values = [
+            J + off,
+            1.0 / J - off,
+            tau(0, 0) + off,
+            tau(1, 1),
+            tau(0, 1),
+            tau(0, 0) / J,
+            tau(0, 1) / J,
+            tau(1, 0) / J,
+            tau(1, 1) / J + off,
+        ];
+        let values: String = values.iter().map(|value| format!(",{value:?}")).collect();
+        format!("{head}\n0.1,0.3,0.4,{},{}{values}\n", u[0], u[1])
+    };
+    for off in [0.0, 0.25] {
+        fs::write(place.join("others.csv"), line(off)).unwrap();
+        let scored = score(place, "skew-2d others.csv --periods 1000");
+        let row = &scored["rows"][0];
+        assert_eq!(row["fields"], serde_json::json!(["u", "cauchy", "kirchhoff", "J", "density"]));
+        for field in ["cauchy", "kirchhoff", "J", "density"] {
+            let error = row["errors"][field]["linf"].as_f64().unwrap();
+            assert!((error - off).abs() < 1e-9, "{field}: {error}");
+        }
+    }
+    let text = line(0.0).replace(&format!(",{:?},", 1.0 / J), ",1,");
+    fs::write(place.join("others.csv"), text).unwrap();
+    let called = mms(place, "score skew-2d others.csv --periods 1000");
+    assert!(called.stdout.contains("density is that of the undeformed body"), "{}", called.stdout);
+    let text = line(0.0).replace("tau:2", "other");
+    fs::write(place.join("others.csv"), text).unwrap();
+    let called = mms(place, "score skew-2d others.csv --periods 1000");
+    assert!(called.stdout.contains("kirchhoff, which has 3, 4, 6 or 9"), "{}", called.stdout);
+}
+
+#[test]
+fn one_frame_for_a_whole_run_and_another_amplitude_are_told() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    for frames in [2, 3] {
+        let run =
+            format!("run axis-aligned --cells 8 --set A=0.05 --vtk f{frames} --frames {frames}");
+        assert_eq!(mms(place, &run).status, 0);
+        let called = mms(place, &format!("score axis-aligned f{frames} --cells 8 --set A=0.05"));
+        assert_eq!(called.stdout.contains("one frame after t = 0"), frames == 2, "{frames}");
+        assert!(!called.stdout.contains("is another value meant"), "{}", called.stdout);
+    }
+    let called = mms(place, "score axis-aligned f3 --cells 8");
+    // On so coarse a grid the nearest amplitude is not that of the run to more than a digit.
+    for part in ["% with A near 0.05", "in place of 0.1", "--set A=0.05"] {
+        assert!(called.stdout.contains(part), "{part}: {}", called.stdout);
+    }
+    // No value of a parameter explains these displacements.
+    let text =
+        "t,X,Y,ux,uy\n0.004,0.2,0.3,0.1,-0.2\n0.004,0.7,0.6,-0.3,0.1\n0.004,0.4,0.9,0.2,0.2\n";
+    fs::write(place.join("other.csv"), text).unwrap();
+    let called = mms(place, "score axis-aligned other.csv");
+    assert!(called.stdout.contains("one frame after t = 0"), "{}", called.stdout);
+    assert!(!called.stdout.contains("is another value meant"), "{}", called.stdout);
+}
+
+#[test]
+fn recordings_compared_with_each_other_have_the_orders_in_time_of_converge() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let base = "axis-aligned-1d --cells 8 --integrator usl";
+    for cfl in ["0.4", "0.2", "0.1"] {
+        // At the start and the five times at which converge compares.
+        let run = format!("run {base} --cfl {cfl} --vtk of{cfl} --frames 6");
+        assert_eq!(mms(place, &run).status, 0);
+    }
+    assert_eq!(mms(place, &format!("converge {base} --cfls 0.4,0.2 --json study.json")).status, 0);
+    let study = read_json(&place.join("study.json"))["temporal"].clone();
+    let compared = "score axis-aligned-1d of0.4 of0.2 of0.1 --differences";
+    let called = mms(place, &format!("{compared} 4e-4,2e-4,1e-4 --json score.json"));
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    let scored = read_json(&place.join("score.json"));
+    assert_eq!(scored["differences"].as_array().unwrap().len(), 2);
+    for (row, expected) in [0, 1].map(|n| (&scored["differences"][n], &study["rows"][n])) {
+        for (field, norm) in FIELDS.iter().flat_map(|field| NORMS.map(|norm| (field, norm))) {
+            let number = |value: &Value| value[field][norm].as_f64().unwrap();
+            let ratio = number(&row["differences"]) / number(&expected["differences"]);
+            assert!((ratio - 1.0).abs() < 1e-9, "{field} {norm}: {ratio}");
+        }
+    }
+    let order = |scored: &Value| scored["orders"]["u"]["l2"]["local"][0].as_f64().unwrap();
+    assert!((order(&scored) - order(&study)).abs() < 1e-9);
+    refuses(place, &format!("{compared} 4,2,1.5"), &["another ratio than 2.0"]);
+    refuses(place, &format!("{compared} 4,2"), &["2 time step(s) for 3 recording(s)"]);
+    refuses(place, "score axis-aligned-1d of0.4 f --differences 2,1", &["f"]);
+}
+
+#[test]
+fn a_run_beside_a_recording_of_its_own_scheme_has_its_errors_to_the_last_digit() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let run = "run axis-aligned --shape linear --integrator usl --cells 8 --set A=0.001 --vtk own --frames 11";
+    assert_eq!(mms(place, run).status, 0);
+    let call = "axis-aligned own --cells 8 --set A=0.001 --against";
+    let scored = score(place, &format!("{call} mms:linear,usl"));
+    assert_eq!(scored["settings"]["against"]["integrator"], "usl");
+    let digits = |scored: &Value, field: &str, norm: &str| {
+        scored["against"][0]["digits"][field][norm].as_f64().unwrap()
+    };
+    for (field, norm) in FIELDS.iter().flat_map(|field| NORMS.map(|norm| (field, norm))) {
+        assert_eq!(digits(&scored, field, norm), 16.0, "{field} {norm}");
+    }
+    let scored = score(place, &format!("{call} mms:linear,usf"));
+    assert!(digits(&scored, "u", "l2") < 1.0, "{}", scored["against"]);
+    refuses(
+        place,
+        &format!("score {call} mms:linear,usl --cfl 0.3"),
+        &["own", "--cfl 0.3 should be the one"],
+    );
+    refuses(place, &format!("score {call} mms:linear"), &["such as mms:linear,usl"]);
+    refuses(place, "score axis-aligned own --against mms:linear,usl", &["--cells"]);
 }
 
 #[test]

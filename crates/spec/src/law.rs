@@ -48,6 +48,14 @@ pub(crate) struct Stress {
     pub(crate) energy: Option<Expr>,
 }
 
+/// The divergence of `P` in two parts, see [`Stress`], and whole.
+struct Divergence {
+    /// `mu Div H + (lambda + mu) grad tr H`.
+    linear: Vector,
+    remainder: Vector,
+    whole: Vector,
+}
+
 impl Stress {
     /// The sum of the stresses of two energies.
     fn plus(self, graph: &mut Graph, other: Self) -> Self {

@@ -15,6 +15,7 @@ use crate::case::law;
 use crate::difference::{derivative, derivative_of_sum};
 use crate::dimension::in_dimension;
 use crate::error::SceneError;
+use crate::inverse::determinant;
 use crate::points;
 use crate::precision::Precision;
 
@@ -636,33 +637,5 @@ fn boundary_findings<const D: usize>(
         }
         // The solution's own motion or traction is imposed: there is nothing to prove.
         Condition::PrescribedTraction | Condition::PrescribedMotion => Vec::new(),
-    }
-}
-
-/// The determinant of a matrix of at most three rows.
-fn determinant<const D: usize>(m: &SMatrix<f64, D, D>) -> f64 {
-    match D {
-        1 => m[(0, 0)],
-        2 => m[(0, 0)] * m[(1, 1)] - m[(0, 1)] * m[(1, 0)],
-        _ => (0..3)
-            .map(|j| {
-                let (k, l) = ((j + 1) % 3, (j + 2) % 3);
-                m[(0, j)] * (m[(1, k)] * m[(2, l)] - m[(1, l)] * m[(2, k)])
-            })
-            .sum(),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use nalgebra::matrix;
-
-    #[test]
-    fn determinants() {
-        assert_eq!(determinant(&matrix![3.0]), 3.0);
-        assert_eq!(determinant(&matrix![1.0, 2.0; 3.0, 4.0]), -2.0);
-        let m = matrix![2.0, 0.0, 1.0; 1.0, 3.0, 2.0; 1.0, 1.0, 4.0];
-        assert!((determinant(&m) - m.determinant()).abs() < 1e-14);
     }
 }

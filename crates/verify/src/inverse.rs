@@ -1,4 +1,4 @@
-//! Inverses of matrices of up to three rows. The library's are for any number, and are long: one of four rows alone has six thousand
+//! Inverses and determinants of matrices of up to three rows. The library's are for any number, and are long: one of four rows alone has six thousand
 //! lines of the compiler's code.
 
 use nalgebra::SMatrix;
@@ -37,10 +37,32 @@ pub(crate) fn inverse<const D: usize>(F: &SMatrix<f64, D, D>) -> Option<SMatrix<
     }))
 }
 
+/// The determinant of a matrix of at most three rows.
+pub(crate) fn determinant<const D: usize>(m: &SMatrix<f64, D, D>) -> f64 {
+    match D {
+        1 => m[(0, 0)],
+        2 => m[(0, 0)] * m[(1, 1)] - m[(0, 1)] * m[(1, 0)],
+        _ => (0..3)
+            .map(|j| {
+                let (k, l) = ((j + 1) % 3, (j + 2) % 3);
+                m[(0, j)] * (m[(1, k)] * m[(2, l)] - m[(1, l)] * m[(2, k)])
+            })
+            .sum(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{Matrix1, Matrix2, Matrix3};
+    use nalgebra::{Matrix1, Matrix2, Matrix3, matrix};
+
+    #[test]
+    fn determinants() {
+        assert_eq!(determinant(&matrix![3.0]), 3.0);
+        assert_eq!(determinant(&matrix![1.0, 2.0; 3.0, 4.0]), -2.0);
+        let m = matrix![2.0, 0.0, 1.0; 1.0, 3.0, 2.0; 1.0, 1.0, 4.0];
+        assert!((determinant(&m) - m.determinant()).abs() < 1e-14);
+    }
 
     #[test]
     fn inverses_are_those_of_the_library_to_the_last_digit() {

@@ -74,8 +74,9 @@ pub use run::{Outputs, Progress, Row, Status, run};
 pub use scene::needs_total_frame;
 pub use scheme::{Parts, Placement, Scheme, Start, Stepping, Total, Updated};
 pub use score::{
-    Input, Points, Remark, Resolution, Role, Score, ScoreError, ScoreOptions, ScoreRow, Source,
-    score,
+    AgainstError, Agreement, DifferenceRow, Differences, Input, Points, Quantity, Remark,
+    Resolution, Role, Score, ScoreError, ScoreOptions, ScoreRow, Source, against,
+    compare_recordings, score,
 };
 pub use stability::{
     Criteria, Failure, FailureKind, Observed, Search, SearchProgress, StabilityRow, is_stable,

@@ -119,6 +119,16 @@ fn displacement<D: Number>(
             let factor = R * (R * (-2.0 / Ro) + 3.0) / (Ro * Ro) * (t * (c * PI)).cos() * A;
             [factor * x, factor * y, factor * z]
         }
+        "swirl" => {
+            let alpha = (x * PI).sin().powi(4) * (y * PI).sin().powi(4) * (t * (c * PI)).sin() * A;
+            let (sine, cosine) = alpha.sin_cos();
+            let (from_x, from_y) = (x - 0.5, y - 0.5);
+            [
+                from_x * cosine - from_y * sine - from_x,
+                from_x * sine + from_y * cosine - from_y,
+                zero,
+            ]
+        }
         "torsion" => {
             let [turned_x, turned_y] = turned(z * (t * (c * PI)).sin() * A);
             [turned_x - x, turned_y - y, zero]

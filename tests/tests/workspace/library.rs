@@ -72,6 +72,11 @@ const SERIES: &[Series] = &[
     },
     Series { name: "skew-2d-rotating", options: "--cells 8,16,24 --cfl 0.3", expected: SMOOTH },
     Series {
+        name: "swirl",
+        options: "--cells 48,64,80 --cfl 0.5 --periods 0.25",
+        expected: "u.l2=4,u.l1=4,v.l2=4,v.l1=4,F=3,P=3",
+    },
+    Series {
         name: "torsion",
         options: "--cells 4,6,8 --cfl 0.1 --periods 0.25",
         expected: "u.linf=4,u.l2=4,v.linf=4,v.l2=4,F=3,P=3",

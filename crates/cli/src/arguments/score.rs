@@ -7,7 +7,7 @@ use mmsmith_verify as verify;
 use serde::Serialize;
 
 use super::shared::ParameterOptions;
-use super::values::{finite_number, positive_count, positive_number, role, thread_count};
+use super::values::{finite_number, peer, positive_count, positive_number, role, thread_count};
 
 /// Where another solver's output is, and how it is to be read.
 #[derive(Args)]
@@ -23,7 +23,7 @@ pub(crate) struct ScoreOptions {
     #[arg(long)]
     pub(crate) each: bool,
     /// What an array is that has no usual name; repeatable. Roles: displacement, velocity, deformation_gradient,
-    /// first_piola_kirchhoff, reference_position, id
+    /// first_piola_kirchhoff, cauchy, kirchhoff, J, density, reference_position, id
     #[arg(long, value_name = "ROLE=NAME", value_parser = role)]
     pub(crate) map: Vec<(verify::Role, String)>,
     /// What the points of the files are
@@ -44,6 +44,16 @@ pub(crate) struct ScoreOptions {
     /// Mesh sizes, one for each recording; estimated from the particles when neither is given
     #[arg(long, value_name = "H,...", value_delimiter = ',', allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) h: Vec<f64>,
+    /// Compare each recording with the next one instead of the exact solution, for orders in time: they differ in nothing but
+    /// the time steps, which these are, each the same part of the one before
+    #[arg(long, value_name = "DT,...", value_delimiter = ',', allow_negative_numbers = true, value_parser = positive_number, conflicts_with_all = ["cells", "h", "against"])]
+    pub(crate) differences: Vec<f64>,
+    /// Run mms itself with this shape function and integrator on the same grids, and compare the errors digit by digit
+    #[arg(long, value_name = "mms:SHAPE,INTEGRATOR", value_parser = peer, requires = "cells")]
+    pub(crate) against: Option<(verify::Shape, verify::Integrator)>,
+    /// Time step times wave speed over grid spacing of those runs, as of the recordings
+    #[arg(long, value_name = "X", default_value_t = 0.4, allow_negative_numbers = true, value_parser = positive_number, requires = "against")]
+    pub(crate) cfl: f64,
     #[command(flatten)]
     pub(crate) parameters: ParameterOptions,
     /// Number of threads; all cores when left out

@@ -69,6 +69,18 @@ pub(super) fn role(text: &str) -> Result<(verify::Role, String), String> {
     }
 }
 
+/// A scheme of the solver here to hold a recording against: its weights and its time integrator.
+pub(super) fn peer(text: &str) -> Result<(verify::Shape, verify::Integrator), String> {
+    let form = || "expected mms:SHAPE,INTEGRATOR, such as mms:linear,usl".to_owned();
+    let (shape, integrator) =
+        text.strip_prefix("mms:").and_then(|pair| pair.split_once(',')).ok_or_else(form)?;
+    let shape: verify::Shape =
+        shape.trim().parse().map_err(|cause| format!("{}; {cause}", form()))?;
+    let integrator: verify::Integrator =
+        integrator.trim().parse().map_err(|cause| format!("{}; {cause}", form()))?;
+    Ok((shape, integrator))
+}
+
 pub(super) fn variation(text: &str) -> Result<(String, Vec<String>), String> {
     let form = || "expected NAME=VALUE,VALUE,..., such as nu=0,0.3,0.49".to_owned();
     let (name, values) = text.split_once('=').ok_or_else(form)?;

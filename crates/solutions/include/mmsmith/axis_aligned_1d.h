@@ -220,7 +220,7 @@ typedef struct axis_aligned_1d_parameters {
 /* The parameters, and the values that depend on them only. */
 typedef struct axis_aligned_1d_solution {
     axis_aligned_1d_parameters par;
-    double fixed[15];
+    double fixed[16];
 } axis_aligned_1d_solution;
 
 /* What the body force needs of the time alone. */
@@ -283,32 +283,33 @@ MMSMITH_FN const char *axis_aligned_1d_prepare(axis_aligned_1d_solution *s, cons
     const double t46 = p->E * p->nu;
     const double t47 = t32 * t40;
     const double t48 = t46 / t47;
-    const double t52 = p->nu * p->nu;
-    const double t53 = 2.0 * p->A;
-    const double t54 = t53 * t19;
-    const double t55 = t54 * p->E;
-    const double t56 = t55 * t52;
+    const double t54 = p->nu * p->nu;
+    const double t55 = 2.0 * p->E;
+    const double t56 = t55 * t54;
     const double t57 = p->rho0 * t32;
     const double t58 = t57 * t40;
     const double t59 = t56 / t58;
-    const double t68 = 2.0 * t35;
-    const double t69 = t48 + t68;
-    const double t81 = t14 / p->rho0;
-    const double t86 = t48 + t35;
-    const double t87 = p->A * p->A;
-    const double t88 = t87 * p->A;
-    const double t89 = t19 * t19;
-    const double t90 = t88 * t89;
-    const double t91 = t90 * t86;
-    const double t92 = t91 / p->rho0;
-    const double t93 = t19 * 3.141592653589793;
-    const double t94 = 2.0 * t87;
-    const double t95 = t94 * t93;
-    const double t96 = t95 * t86;
-    const double t97 = t96 / p->rho0;
-    const double t98 = t21 * p->nu;
-    const double t99 = t98 / t58;
-    const double t101 = 2.0 / t7;
+    const double t61 = t48 + t35;
+    const double t70 = 1.0 / p->rho0;
+    const double t74 = 2.0 * p->A;
+    const double t75 = t74 * t19;
+    const double t76 = t75 * p->E;
+    const double t77 = t76 * t54;
+    const double t78 = t77 / t58;
+    const double t79 = p->A * p->A;
+    const double t80 = t79 * p->A;
+    const double t81 = t19 * t19;
+    const double t82 = t80 * t81;
+    const double t83 = t82 * t61;
+    const double t84 = t83 / p->rho0;
+    const double t85 = t19 * 3.141592653589793;
+    const double t86 = 2.0 * t79;
+    const double t87 = t86 * t85;
+    const double t88 = t87 * t61;
+    const double t89 = t88 / p->rho0;
+    const double t90 = t21 * p->nu;
+    const double t91 = t90 / t58;
+    const double t93 = 2.0 / t7;
     s->par = *p;
     s->fixed[0] = t7;
     s->fixed[1] = t14;
@@ -319,12 +320,13 @@ MMSMITH_FN const char *axis_aligned_1d_prepare(axis_aligned_1d_solution *s, cons
     s->fixed[6] = t42;
     s->fixed[7] = t48;
     s->fixed[8] = t59;
-    s->fixed[9] = t69;
-    s->fixed[10] = t81;
-    s->fixed[11] = t92;
-    s->fixed[12] = t97;
-    s->fixed[13] = t99;
-    s->fixed[14] = t101;
+    s->fixed[9] = t61;
+    s->fixed[10] = t70;
+    s->fixed[11] = t78;
+    s->fixed[12] = t84;
+    s->fixed[13] = t89;
+    s->fixed[14] = t91;
+    s->fixed[15] = t93;
     return 0;
 }
 
@@ -431,32 +433,21 @@ MMSMITH_FN void axis_aligned_1d_b(const axis_aligned_1d_solution *s, const doubl
     const double t30 = t28 + 1.0;
     const double t36 = 1.0 / t30;
     const double t41 = mmsmith_log_1p(t28);
-    const double t43 = s->fixed[6] * t9;
-    const double t44 = t43 * t26;
-    const double t60 = s->fixed[8] * t9;
-    const double t61 = t60 * t2;
-    const double t62 = s->fixed[7] * t41;
-    const double t63 = t62 + t44;
-    const double t64 = s->fixed[3] * t9;
-    const double t65 = t64 * t2;
-    const double t66 = -t65;
-    const double t67 = s->fixed[7] * t36;
-    const double t70 = s->fixed[9] + t67;
-    const double t71 = s->fixed[1] * t26;
-    const double t72 = t71 * t70;
-    const double t73 = t9 * t72;
-    const double t74 = t73 + t62;
-    const double t75 = 3.141592653589793 * t74;
-    const double t76 = t2 * t75;
-    const double t77 = t63 * t66;
-    const double t78 = t77 * t36;
-    const double t79 = t26 * t78;
-    const double t80 = t76 + t79;
-    const double t82 = s->fixed[10] * t9;
-    const double t83 = t80 * t36;
-    const double t84 = t82 * t83;
-    const double t85 = t61 - t84;
-    b[0] = t85;
+    const double t52 = s->fixed[3] * t9;
+    const double t53 = t52 * t2;
+    const double t60 = s->fixed[8] * t53;
+    const double t62 = t53 * t36;
+    const double t63 = -t62;
+    const double t64 = t53 + t62;
+    const double t65 = t28 * t64;
+    const double t66 = s->fixed[9] * t65;
+    const double t67 = t41 * t63;
+    const double t68 = s->fixed[7] * t67;
+    const double t69 = t66 - t68;
+    const double t71 = t69 * t36;
+    const double t72 = s->fixed[10] * t71;
+    const double t73 = t60 - t72;
+    b[0] = t73;
 }
 
 /* traction on the surface X-lower, force per reference area */
@@ -467,17 +458,17 @@ MMSMITH_FN void axis_aligned_1d_X_lower_traction(const axis_aligned_1d_solution 
     const double t8 = s->fixed[0] * t;
     const double t9 = mmsmith_cos_pi(t8);
     const double t27 = s->fixed[1] * t9;
-    const double t103 = t27 + 1.0;
-    const double t104 = 1.0 / t103;
-    const double t105 = t104 + 1.0;
-    const double t106 = mmsmith_log_1p(t27);
-    const double t107 = t9 * t105;
-    const double t108 = s->fixed[6] * t107;
-    const double t109 = t106 * t104;
-    const double t110 = s->fixed[7] * t109;
-    const double t111 = t108 + t110;
-    const double t112 = -t111;
-    traction[0] = t112;
+    const double t95 = t27 + 1.0;
+    const double t96 = 1.0 / t95;
+    const double t97 = t96 + 1.0;
+    const double t98 = mmsmith_log_1p(t27);
+    const double t99 = t9 * t97;
+    const double t100 = s->fixed[6] * t99;
+    const double t101 = t98 * t96;
+    const double t102 = s->fixed[7] * t101;
+    const double t103 = t100 + t102;
+    const double t104 = -t103;
+    traction[0] = t104;
 }
 
 /* traction on the surface X-upper, force per reference area */
@@ -488,18 +479,18 @@ MMSMITH_FN void axis_aligned_1d_X_upper_traction(const axis_aligned_1d_solution 
     const double t8 = s->fixed[0] * t;
     const double t9 = mmsmith_cos_pi(t8);
     const double t27 = s->fixed[1] * t9;
-    const double t113 = 1.0 - t27;
-    const double t114 = 1.0 / t113;
-    const double t115 = t114 + 1.0;
-    const double t116 = -t27;
-    const double t117 = mmsmith_log_1p(t116);
-    const double t118 = t9 * t115;
-    const double t119 = s->fixed[6] * t118;
-    const double t120 = t117 * t114;
-    const double t121 = s->fixed[7] * t120;
-    const double t122 = t119 - t121;
-    const double t123 = -t122;
-    traction[0] = t123;
+    const double t105 = 1.0 - t27;
+    const double t106 = 1.0 / t105;
+    const double t107 = t106 + 1.0;
+    const double t108 = -t27;
+    const double t109 = mmsmith_log_1p(t108);
+    const double t110 = t9 * t107;
+    const double t111 = s->fixed[6] * t110;
+    const double t112 = t109 * t106;
+    const double t113 = s->fixed[7] * t112;
+    const double t114 = t111 - t113;
+    const double t115 = -t114;
+    traction[0] = t115;
 }
 
 /* all fields */
@@ -530,29 +521,20 @@ MMSMITH_FN void axis_aligned_1d_fields(const axis_aligned_1d_solution *s, const 
     const double t49 = t41 * t36;
     const double t50 = s->fixed[7] * t49;
     const double t51 = t45 + t50;
-    const double t60 = s->fixed[8] * t9;
-    const double t61 = t60 * t2;
-    const double t62 = s->fixed[7] * t41;
-    const double t63 = t62 + t44;
-    const double t64 = s->fixed[3] * t9;
-    const double t65 = t64 * t2;
-    const double t66 = -t65;
-    const double t67 = s->fixed[7] * t36;
-    const double t70 = s->fixed[9] + t67;
-    const double t71 = s->fixed[1] * t26;
-    const double t72 = t71 * t70;
-    const double t73 = t9 * t72;
-    const double t74 = t73 + t62;
-    const double t75 = 3.141592653589793 * t74;
-    const double t76 = t2 * t75;
-    const double t77 = t63 * t66;
-    const double t78 = t77 * t36;
-    const double t79 = t26 * t78;
-    const double t80 = t76 + t79;
-    const double t82 = s->fixed[10] * t9;
-    const double t83 = t80 * t36;
-    const double t84 = t82 * t83;
-    const double t85 = t61 - t84;
+    const double t52 = s->fixed[3] * t9;
+    const double t53 = t52 * t2;
+    const double t60 = s->fixed[8] * t53;
+    const double t62 = t53 * t36;
+    const double t63 = -t62;
+    const double t64 = t53 + t62;
+    const double t65 = t28 * t64;
+    const double t66 = s->fixed[9] * t65;
+    const double t67 = t41 * t63;
+    const double t68 = s->fixed[7] * t67;
+    const double t69 = t66 - t68;
+    const double t71 = t69 * t36;
+    const double t72 = s->fixed[10] * t71;
+    const double t73 = t60 - t72;
     out->u[0] = t11;
     out->v[0] = t18;
     out->a[0] = t25;
@@ -560,7 +542,7 @@ MMSMITH_FN void axis_aligned_1d_fields(const axis_aligned_1d_solution *s, const 
     out->F[0] = t30;
     out->J = t30;
     out->P[0] = t51;
-    out->b[0] = t85;
+    out->b[0] = t73;
 }
 
 /* What the body force needs of the time alone. */
@@ -570,17 +552,17 @@ MMSMITH_FN axis_aligned_1d_time_values axis_aligned_1d_at_time(const axis_aligne
     const double t8 = s->fixed[0] * t;
     const double t9 = mmsmith_cos_pi(t8);
     const double t27 = s->fixed[1] * t9;
-    const double t60 = s->fixed[8] * t9;
-    const double t124 = t9 * t9;
-    const double t125 = t124 * t9;
-    const double t126 = s->fixed[11] * t125;
-    const double t128 = s->fixed[12] * t124;
-    const double t131 = s->fixed[13] * t9;
+    const double t116 = s->fixed[11] * t9;
+    const double t117 = t9 * t9;
+    const double t118 = t117 * t9;
+    const double t119 = s->fixed[12] * t118;
+    const double t121 = s->fixed[13] * t117;
+    const double t124 = s->fixed[14] * t9;
     time.values[0] = t27;
-    time.values[1] = t60;
-    time.values[2] = t126;
-    time.values[3] = t128;
-    time.values[4] = t131;
+    time.values[1] = t116;
+    time.values[2] = t119;
+    time.values[3] = t121;
+    time.values[4] = t124;
     return time;
 }
 
@@ -605,16 +587,16 @@ MMSMITH_FN void axis_aligned_1d_b_staged(const axis_aligned_1d_solution *s, cons
     const double t30 = t28 + 1.0;
     const double t36 = 1.0 / t30;
     const double t41 = mmsmith_log_1p(t28);
-    const double t100 = t36 * t36;
-    const double t127 = time->values[2] * point[stride];
-    const double t129 = t127 + time->values[3];
-    const double t130 = point[stride] * t129;
-    const double t132 = time->values[4] * t41;
-    const double t133 = t130 + t132;
-    const double t134 = t100 * t133;
-    const double t135 = time->values[1] - t134;
-    const double t136 = point[0] * t135;
-    b[0] = t136;
+    const double t92 = t36 * t36;
+    const double t120 = time->values[2] * point[stride];
+    const double t122 = t120 + time->values[3];
+    const double t123 = point[stride] * t122;
+    const double t125 = time->values[4] * t41;
+    const double t126 = t123 + t125;
+    const double t127 = t92 * t126;
+    const double t128 = time->values[1] - t127;
+    const double t129 = point[0] * t128;
+    b[0] = t129;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -649,16 +631,16 @@ MMSMITH_FN void axis_aligned_1d_b_array(const axis_aligned_1d_solution *s, doubl
         const double t30 = t28 + 1.0;
         const double t36 = 1.0 / t30;
         const double t41 = mmsmith_log_1p(t28);
-        const double t100 = t36 * t36;
-        const double t127 = time.values[2] * point1[p];
-        const double t129 = t127 + time.values[3];
-        const double t130 = point1[p] * t129;
-        const double t132 = time.values[4] * t41;
-        const double t133 = t130 + t132;
-        const double t134 = t100 * t133;
-        const double t135 = time.values[1] - t134;
-        const double t136 = point0[p] * t135;
-        b[p * 1 + 0] = t136;
+        const double t92 = t36 * t36;
+        const double t120 = time.values[2] * point1[p];
+        const double t122 = t120 + time.values[3];
+        const double t123 = point1[p] * t122;
+        const double t125 = time.values[4] * t41;
+        const double t126 = t123 + t125;
+        const double t127 = t92 * t126;
+        const double t128 = time.values[1] - t127;
+        const double t129 = point0[p] * t128;
+        b[p * 1 + 0] = t129;
     }
 }
 
@@ -684,7 +666,7 @@ MMSMITH_FN double axis_aligned_1d_wave_speed(const axis_aligned_1d_solution *s)
 /* the time in which the motion repeats */
 MMSMITH_FN double axis_aligned_1d_period(const axis_aligned_1d_solution *s)
 {
-    return s->fixed[14];
+    return s->fixed[15];
 }
 
 /* first Lame constant */

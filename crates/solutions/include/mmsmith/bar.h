@@ -202,7 +202,7 @@ MMSMITH_FN double mmsmith_ln_of_both(double x, double y)
 enum {
     bar_dimension = 1,
     bar_parameter_count = 5,
-    bar_time_count = 5,
+    bar_time_count = 6,
     bar_point_count = 2
 };
 
@@ -217,12 +217,12 @@ typedef struct bar_parameters {
 /* The parameters, and the values that depend on them only. */
 typedef struct bar_solution {
     bar_parameters par;
-    double fixed[17];
+    double fixed[18];
 } bar_solution;
 
 /* What the body force needs of the time alone. */
 typedef struct bar_time_values {
-    double values[5];
+    double values[6];
 } bar_time_values;
 
 typedef struct bar_field_values {
@@ -291,47 +291,43 @@ MMSMITH_FN const char *bar_prepare(bar_solution *s, const bar_parameters *p)
     const double t54 = p->E * p->nu;
     const double t55 = t43 * t50;
     const double t56 = t54 / t55;
-    const double t60 = p->nu / t50;
-    const double t61 = t60 + 1.0;
-    const double t63 = 4.0 * t61;
-    const double t64 = t63 / t43;
-    const double t65 = 1.0 - t64;
-    const double t66 = t28 * t65;
-    const double t67 = t66 / t29;
-    const double t70 = 4.0 * p->A;
-    const double t71 = t70 * t26;
-    const double t72 = t71 / t25;
-    const double t88 = 1.0 / p->rho0;
-    const double t93 = t56 + t46;
-    const double t95 = p->A * p->A;
-    const double t96 = t95 * p->A;
-    const double t97 = t25 * t25;
-    const double t98 = t26 * t26;
-    const double t99 = 16.0 * t96;
-    const double t100 = t99 * t98;
-    const double t101 = t100 * t93;
-    const double t102 = p->rho0 * t97;
-    const double t103 = t101 / t102;
-    const double t104 = t25 * p->L;
-    const double t105 = t26 * 3.141592653589793;
-    const double t106 = 16.0 * t95;
-    const double t107 = t106 * t105;
-    const double t108 = t107 * t93;
-    const double t109 = p->rho0 * t104;
-    const double t110 = t108 / t109;
-    const double t111 = t70 * p->E;
-    const double t112 = t111 * p->nu;
-    const double t113 = t112 * t26;
-    const double t114 = t29 * t43;
-    const double t115 = t114 * t50;
-    const double t116 = t113 / t115;
-    const double t118 = 2.0 * p->L;
-    const double t119 = t118 / t11;
-    const double t121 = -t36;
+    const double t61 = 4.0 * p->A;
+    const double t62 = t61 * t26;
+    const double t63 = t62 / t25;
+    const double t67 = t56 + t46;
+    const double t74 = 1.0 / p->rho0;
+    const double t80 = p->A * p->A;
+    const double t81 = t80 * p->A;
+    const double t82 = t25 * t25;
+    const double t83 = t26 * t26;
+    const double t84 = 16.0 * t81;
+    const double t85 = t84 * t83;
+    const double t86 = t85 * t46;
+    const double t87 = p->rho0 * t82;
+    const double t88 = t86 / t87;
+    const double t89 = t25 * p->L;
+    const double t90 = t26 * 3.141592653589793;
+    const double t91 = 16.0 * t80;
+    const double t92 = t91 * t90;
+    const double t93 = t92 * t46;
+    const double t94 = p->rho0 * t89;
+    const double t95 = t93 / t94;
+    const double t96 = t61 * p->E;
+    const double t97 = t96 * p->nu;
+    const double t98 = t97 * t26;
+    const double t99 = t29 * t43;
+    const double t100 = t99 * t50;
+    const double t101 = t98 / t100;
+    const double t102 = t46 + t67;
+    const double t103 = t62 * t102;
+    const double t104 = t103 / t29;
+    const double t105 = 2.0 * p->L;
+    const double t106 = t105 / t11;
+    const double t108 = -t36;
     if (!(t36 < p->L)) {
         return "the parameters of bar must satisfy 2*Pi*A < L";
     }
-    if (!(t121 < p->L)) {
+    if (!(t108 < p->L)) {
         return "the parameters of bar must satisfy -2*Pi*A < L";
     }
     s->par = *p;
@@ -344,14 +340,15 @@ MMSMITH_FN const char *bar_prepare(bar_solution *s, const bar_parameters *p)
     s->fixed[6] = t37;
     s->fixed[7] = t46;
     s->fixed[8] = t56;
-    s->fixed[9] = t67;
-    s->fixed[10] = t72;
-    s->fixed[11] = t88;
-    s->fixed[12] = t103;
-    s->fixed[13] = t110;
-    s->fixed[14] = t116;
-    s->fixed[15] = t119;
-    s->fixed[16] = t121;
+    s->fixed[9] = t63;
+    s->fixed[10] = t67;
+    s->fixed[11] = t74;
+    s->fixed[12] = t88;
+    s->fixed[13] = t95;
+    s->fixed[14] = t101;
+    s->fixed[15] = t104;
+    s->fixed[16] = t106;
+    s->fixed[17] = t108;
     return 0;
 }
 
@@ -459,34 +456,28 @@ MMSMITH_FN void bar_b(const bar_solution *s, const double X[1], double t, double
     const double t6 = mmsmith_sin_pi(t5);
     const double t13 = s->fixed[2] * t;
     const double t14 = mmsmith_cos_pi(t13);
+    const double t31 = s->fixed[4] * t14;
+    const double t32 = t31 * t6;
     const double t34 = mmsmith_cos_pi(t5);
     const double t38 = s->fixed[6] * t14;
     const double t39 = t38 * t34;
     const double t41 = t39 + 1.0;
     const double t47 = 1.0 / t41;
     const double t51 = mmsmith_log_1p(t39);
-    const double t68 = s->fixed[9] * t14;
-    const double t69 = t68 * t6;
-    const double t73 = s->fixed[10] * t14;
-    const double t74 = t73 * t6;
-    const double t75 = -t74;
-    const double t76 = s->fixed[8] * t51;
-    const double t77 = s->fixed[7] * t39;
-    const double t78 = t76 + t77;
-    const double t79 = s->fixed[8] * t47;
-    const double t80 = s->fixed[7] + t79;
-    const double t81 = t39 + t51;
-    const double t82 = s->fixed[8] * t81;
-    const double t83 = t78 * t47;
-    const double t84 = t80 - t83;
-    const double t85 = s->fixed[7] + t84;
-    const double t86 = t39 * t85;
-    const double t87 = t82 + t86;
-    const double t89 = t75 * t87;
-    const double t90 = t89 * t47;
-    const double t91 = s->fixed[11] * t90;
-    const double t92 = t91 - t69;
-    b[0] = t92;
+    const double t64 = s->fixed[9] * t14;
+    const double t65 = t64 * t6;
+    const double t66 = -t65;
+    const double t68 = s->fixed[8] * t51;
+    const double t69 = t68 - s->fixed[10];
+    const double t70 = -t69;
+    const double t71 = t47 * t47;
+    const double t72 = t70 * t71;
+    const double t73 = s->fixed[7] + t72;
+    const double t75 = t66 * t73;
+    const double t76 = s->fixed[11] * t75;
+    const double t77 = t32 + t76;
+    const double t78 = -t77;
+    b[0] = t78;
 }
 
 /* traction on the surface X-lower, force per reference area */
@@ -497,17 +488,17 @@ MMSMITH_FN void bar_X_lower_traction(const bar_solution *s, const double X[1], d
     const double t13 = s->fixed[2] * t;
     const double t14 = mmsmith_cos_pi(t13);
     const double t38 = s->fixed[6] * t14;
-    const double t122 = t38 + 1.0;
-    const double t123 = 1.0 / t122;
-    const double t124 = t123 + 1.0;
-    const double t125 = mmsmith_log_1p(t38);
-    const double t126 = t38 * t124;
-    const double t127 = s->fixed[7] * t126;
-    const double t128 = t125 * t123;
-    const double t129 = s->fixed[8] * t128;
-    const double t130 = t127 + t129;
-    const double t131 = -t130;
-    traction[0] = t131;
+    const double t109 = t38 + 1.0;
+    const double t110 = 1.0 / t109;
+    const double t111 = t110 + 1.0;
+    const double t112 = mmsmith_log_1p(t38);
+    const double t113 = t38 * t111;
+    const double t114 = s->fixed[7] * t113;
+    const double t115 = t112 * t110;
+    const double t116 = s->fixed[8] * t115;
+    const double t117 = t114 + t116;
+    const double t118 = -t117;
+    traction[0] = t118;
 }
 
 /* traction on the surface X-upper, force per reference area */
@@ -518,16 +509,16 @@ MMSMITH_FN void bar_X_upper_traction(const bar_solution *s, const double X[1], d
     const double t13 = s->fixed[2] * t;
     const double t14 = mmsmith_cos_pi(t13);
     const double t38 = s->fixed[6] * t14;
-    const double t122 = t38 + 1.0;
-    const double t123 = 1.0 / t122;
-    const double t124 = t123 + 1.0;
-    const double t125 = mmsmith_log_1p(t38);
-    const double t126 = t38 * t124;
-    const double t127 = s->fixed[7] * t126;
-    const double t128 = t125 * t123;
-    const double t129 = s->fixed[8] * t128;
-    const double t130 = t127 + t129;
-    traction[0] = t130;
+    const double t109 = t38 + 1.0;
+    const double t110 = 1.0 / t109;
+    const double t111 = t110 + 1.0;
+    const double t112 = mmsmith_log_1p(t38);
+    const double t113 = t38 * t111;
+    const double t114 = s->fixed[7] * t113;
+    const double t115 = t112 * t110;
+    const double t116 = s->fixed[8] * t115;
+    const double t117 = t114 + t116;
+    traction[0] = t117;
 }
 
 /* all fields */
@@ -558,27 +549,19 @@ MMSMITH_FN void bar_fields(const bar_solution *s, const double X[1], double t, b
     const double t57 = t51 * t47;
     const double t58 = s->fixed[8] * t57;
     const double t59 = t53 + t58;
-    const double t68 = s->fixed[9] * t14;
-    const double t69 = t68 * t6;
-    const double t73 = s->fixed[10] * t14;
-    const double t74 = t73 * t6;
-    const double t75 = -t74;
-    const double t76 = s->fixed[8] * t51;
-    const double t77 = s->fixed[7] * t39;
-    const double t78 = t76 + t77;
-    const double t79 = s->fixed[8] * t47;
-    const double t80 = s->fixed[7] + t79;
-    const double t81 = t39 + t51;
-    const double t82 = s->fixed[8] * t81;
-    const double t83 = t78 * t47;
-    const double t84 = t80 - t83;
-    const double t85 = s->fixed[7] + t84;
-    const double t86 = t39 * t85;
-    const double t87 = t82 + t86;
-    const double t89 = t75 * t87;
-    const double t90 = t89 * t47;
-    const double t91 = s->fixed[11] * t90;
-    const double t92 = t91 - t69;
+    const double t64 = s->fixed[9] * t14;
+    const double t65 = t64 * t6;
+    const double t66 = -t65;
+    const double t68 = s->fixed[8] * t51;
+    const double t69 = t68 - s->fixed[10];
+    const double t70 = -t69;
+    const double t71 = t47 * t47;
+    const double t72 = t70 * t71;
+    const double t73 = s->fixed[7] + t72;
+    const double t75 = t66 * t73;
+    const double t76 = s->fixed[11] * t75;
+    const double t77 = t32 + t76;
+    const double t78 = -t77;
     out->u[0] = t16;
     out->v[0] = t24;
     out->a[0] = t33;
@@ -586,7 +569,7 @@ MMSMITH_FN void bar_fields(const bar_solution *s, const double X[1], double t, b
     out->F[0] = t41;
     out->J = t41;
     out->P[0] = t59;
-    out->b[0] = t92;
+    out->b[0] = t78;
 }
 
 /* What the body force needs of the time alone. */
@@ -595,22 +578,20 @@ MMSMITH_FN bar_time_values bar_at_time(const bar_solution *s, double t)
     bar_time_values time;
     const double t13 = s->fixed[2] * t;
     const double t14 = mmsmith_cos_pi(t13);
+    const double t31 = s->fixed[4] * t14;
     const double t38 = s->fixed[6] * t14;
-    const double t68 = s->fixed[9] * t14;
-    const double t132 = t14 * t14;
-    const double t133 = t132 * t14;
-    const double t134 = s->fixed[12] * t133;
-    const double t135 = -t134;
-    const double t137 = s->fixed[13] * t132;
-    const double t138 = -t137;
-    const double t141 = s->fixed[14] * t14;
-    const double t142 = -t141;
-    const double t146 = -t68;
-    time.values[0] = t38;
-    time.values[1] = t135;
-    time.values[2] = t138;
-    time.values[3] = t142;
-    time.values[4] = t146;
+    const double t119 = s->fixed[15] * t14;
+    const double t120 = t14 * t14;
+    const double t121 = s->fixed[13] * t120;
+    const double t122 = t120 * t14;
+    const double t123 = s->fixed[12] * t122;
+    const double t127 = s->fixed[14] * t14;
+    time.values[0] = t31;
+    time.values[1] = t38;
+    time.values[2] = t119;
+    time.values[3] = t121;
+    time.values[4] = t123;
+    time.values[5] = t127;
     return time;
 }
 
@@ -631,20 +612,21 @@ MMSMITH_FN void bar_b_staged(const bar_solution *s, const bar_time_values *time,
     const double *point, size_t stride, double b[1])
 {
     (void)s;
-    const double t39 = time->values[0] * point[stride];
+    const double t39 = time->values[1] * point[stride];
     const double t41 = t39 + 1.0;
     const double t47 = 1.0 / t41;
     const double t51 = mmsmith_log_1p(t39);
-    const double t117 = t47 * t47;
-    const double t136 = time->values[1] * point[stride];
-    const double t139 = t136 + time->values[2];
-    const double t140 = point[stride] * t139;
-    const double t143 = time->values[3] * t51;
-    const double t144 = t140 + t143;
-    const double t145 = t117 * t144;
-    const double t147 = t145 + time->values[4];
-    const double t148 = point[0] * t147;
-    b[0] = t148;
+    const double t71 = t47 * t47;
+    const double t124 = time->values[4] * point[stride];
+    const double t125 = time->values[3] + t124;
+    const double t126 = point[stride] * t125;
+    const double t128 = time->values[5] * t51;
+    const double t129 = t126 - t128;
+    const double t130 = time->values[2] + t129;
+    const double t131 = t71 * t130;
+    const double t132 = t131 - time->values[0];
+    const double t133 = point[0] * t132;
+    b[0] = t133;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -675,20 +657,21 @@ MMSMITH_FN void bar_b_array(const bar_solution *s, double t, size_t n,
     const size_t end = first + count;
     size_t p;
     for (p = first; p < end; ++p) {
-        const double t39 = time.values[0] * point1[p];
+        const double t39 = time.values[1] * point1[p];
         const double t41 = t39 + 1.0;
         const double t47 = 1.0 / t41;
         const double t51 = mmsmith_log_1p(t39);
-        const double t117 = t47 * t47;
-        const double t136 = time.values[1] * point1[p];
-        const double t139 = t136 + time.values[2];
-        const double t140 = point1[p] * t139;
-        const double t143 = time.values[3] * t51;
-        const double t144 = t140 + t143;
-        const double t145 = t117 * t144;
-        const double t147 = t145 + time.values[4];
-        const double t148 = point0[p] * t147;
-        b[p * 1 + 0] = t148;
+        const double t71 = t47 * t47;
+        const double t124 = time.values[4] * point1[p];
+        const double t125 = time.values[3] + t124;
+        const double t126 = point1[p] * t125;
+        const double t128 = time.values[5] * t51;
+        const double t129 = t126 - t128;
+        const double t130 = time.values[2] + t129;
+        const double t131 = t71 * t130;
+        const double t132 = t131 - time.values[0];
+        const double t133 = point0[p] * t132;
+        b[p * 1 + 0] = t133;
     }
 }
 
@@ -713,7 +696,7 @@ MMSMITH_FN double bar_wave_speed(const bar_solution *s)
 /* the time in which the motion repeats */
 MMSMITH_FN double bar_period(const bar_solution *s)
 {
-    return s->fixed[15];
+    return s->fixed[16];
 }
 
 /* first Lame constant */

@@ -143,7 +143,7 @@ enum {
     ring_dimension = 2,
     ring_parameter_count = 5,
     ring_time_count = 3,
-    ring_point_count = 8
+    ring_point_count = 4
 };
 
 typedef struct ring_parameters {
@@ -157,7 +157,7 @@ typedef struct ring_parameters {
 /* The parameters, and the values that depend on them only. */
 typedef struct ring_solution {
     ring_parameters par;
-    double fixed[22];
+    double fixed[14];
 } ring_solution;
 
 /* What the body force needs of the time alone. */
@@ -225,33 +225,10 @@ MMSMITH_FN const char *ring_prepare(ring_solution *s, const ring_parameters *p)
     const double t88 = 6.0 * p->A;
     const double t89 = t88 / t26;
     const double t97 = 0.5 * p->E;
-    const double t119 = p->Ri + p->Ro;
-    const double t127 = t51 / p->rho0;
-    const double t141 = t97 / p->rho0;
-    const double t153 = p->A * p->A;
-    const double t154 = t153 * t153;
-    const double t155 = t15 * t15;
-    const double t156 = t19 * t19;
-    const double t158 = 36.0 * t154;
-    const double t159 = t158 * t97;
-    const double t160 = p->rho0 * t155;
-    const double t161 = t160 * t156;
-    const double t162 = t159 / t161;
-    const double t168 = t155 * t156;
-    const double t169 = 36.0 / t168;
-    const double t178 = 3.0 / t26;
-    const double t183 = 12.0 / t26;
-    const double t187 = t153 * p->A;
-    const double t188 = 6.0 * t187;
-    const double t189 = t188 * t97;
-    const double t190 = p->rho0 * t15;
-    const double t191 = t190 * t19;
-    const double t192 = t189 / t191;
-    const double t198 = 72.0 / t168;
-    const double t203 = t153 * t97;
-    const double t204 = t203 / p->rho0;
-    const double t217 = 2.0 / t11;
-    const double t219 = p->A * t97;
+    const double t120 = p->Ri + p->Ro;
+    const double t138 = t97 / p->rho0;
+    const double t161 = 2.0 / t11;
+    const double t163 = p->A * t97;
     if (!(p->Ri < p->Ro)) {
         return "the parameters of ring must satisfy Ri < Ro";
     }
@@ -264,23 +241,15 @@ MMSMITH_FN const char *ring_prepare(ring_solution *s, const ring_parameters *p)
     s->fixed[2] = t24;
     s->fixed[3] = t28;
     s->fixed[4] = t44;
-    s->fixed[5] = t50;
-    s->fixed[6] = t53;
-    s->fixed[7] = t61;
+    s->fixed[5] = t53;
+    s->fixed[6] = t61;
+    s->fixed[7] = t88;
     s->fixed[8] = t89;
     s->fixed[9] = t97;
-    s->fixed[10] = t119;
-    s->fixed[11] = t127;
-    s->fixed[12] = t141;
-    s->fixed[13] = t162;
-    s->fixed[14] = t169;
-    s->fixed[15] = t178;
-    s->fixed[16] = t183;
-    s->fixed[17] = t192;
-    s->fixed[18] = t198;
-    s->fixed[19] = t204;
-    s->fixed[20] = t217;
-    s->fixed[21] = t219;
+    s->fixed[10] = t120;
+    s->fixed[11] = t138;
+    s->fixed[12] = t161;
+    s->fixed[13] = t163;
     return 0;
 }
 
@@ -366,7 +335,7 @@ MMSMITH_FN void ring_a(const ring_solution *s, const double X[2], double t, doub
     const double t36 = t33 * t35;
     const double t38 = t31 * X[1];
     const double t39 = t38 * t35;
-    const double t54 = s->fixed[6] * t13;
+    const double t54 = s->fixed[5] * t13;
     const double t55 = t54 * t36;
     const double t56 = -t55;
     const double t57 = t54 * t39;
@@ -397,14 +366,14 @@ MMSMITH_FN void ring_H(const ring_solution *s, const double X[2], double t, doub
     const double t59 = t5 - s->par.Ri;
     const double t62 = t20 * t2;
     const double t63 = t62 * t59;
-    const double t64 = s->fixed[7] * t63;
+    const double t64 = s->fixed[6] * t63;
     const double t65 = t31 * t3;
     const double t66 = t65 * t35;
     const double t67 = t64 + t66;
     const double t68 = t67 * t34;
     const double t69 = t32 * t68;
     const double t70 = t20 * t59;
-    const double t71 = s->fixed[7] * t70;
+    const double t71 = s->fixed[6] * t70;
     const double t72 = t31 * t35;
     const double t73 = t71 - t72;
     const double t74 = X[0] * X[1];
@@ -413,7 +382,7 @@ MMSMITH_FN void ring_H(const ring_solution *s, const double X[2], double t, doub
     const double t77 = t32 * t76;
     const double t78 = t20 * t3;
     const double t79 = t78 * t59;
-    const double t80 = s->fixed[7] * t79;
+    const double t80 = s->fixed[6] * t79;
     const double t81 = t31 * t2;
     const double t82 = t81 * t35;
     const double t83 = t80 + t82;
@@ -447,14 +416,14 @@ MMSMITH_FN void ring_F(const ring_solution *s, const double X[2], double t, doub
     const double t59 = t5 - s->par.Ri;
     const double t62 = t20 * t2;
     const double t63 = t62 * t59;
-    const double t64 = s->fixed[7] * t63;
+    const double t64 = s->fixed[6] * t63;
     const double t65 = t31 * t3;
     const double t66 = t65 * t35;
     const double t67 = t64 + t66;
     const double t68 = t67 * t34;
     const double t69 = t32 * t68;
     const double t70 = t20 * t59;
-    const double t71 = s->fixed[7] * t70;
+    const double t71 = s->fixed[6] * t70;
     const double t72 = t31 * t35;
     const double t73 = t71 - t72;
     const double t74 = X[0] * X[1];
@@ -463,7 +432,7 @@ MMSMITH_FN void ring_F(const ring_solution *s, const double X[2], double t, doub
     const double t77 = t32 * t76;
     const double t78 = t20 * t3;
     const double t79 = t78 * t59;
-    const double t80 = s->fixed[7] * t79;
+    const double t80 = s->fixed[6] * t79;
     const double t81 = t31 * t2;
     const double t82 = t81 * t35;
     const double t83 = t80 + t82;
@@ -586,43 +555,42 @@ MMSMITH_FN void ring_b(const ring_solution *s, const double X[2], double t, doub
     const double t32 = s->par.A * t13;
     const double t34 = 1.0 / t4;
     const double t35 = t5 * t34;
+    const double t54 = s->fixed[5] * t13;
     const double t59 = t5 - s->par.Ri;
     const double t70 = t20 * t59;
+    const double t71 = s->fixed[6] * t70;
     const double t72 = t31 * t35;
+    const double t73 = t71 - t72;
     const double t90 = s->fixed[8] * t13;
-    const double t91 = t90 * t70;
-    const double t92 = t91 + 1.0;
     const double t93 = t32 * t72;
     const double t94 = t93 + 1.0;
-    const double t98 = 1.0 / t92;
     const double t100 = 1.0 / t94;
-    const double t120 = t23 - s->fixed[10];
-    const double t121 = t70 * t35;
-    const double t122 = t121 + t120;
-    const double t123 = s->fixed[7] * t122;
-    const double t124 = t34 - s->fixed[5];
-    const double t125 = t31 * t124;
-    const double t126 = t123 - t125;
-    const double t128 = s->fixed[11] * t13;
-    const double t129 = t128 * t126;
-    const double t130 = t91 * t98;
-    const double t131 = t90 * t120;
-    const double t132 = 2.0 - t130;
-    const double t133 = t91 * t130;
-    const double t134 = t93 * t93;
-    const double t135 = t134 * t100;
-    const double t136 = t133 - t135;
-    const double t137 = t35 * t136;
-    const double t138 = t131 * t132;
-    const double t139 = t138 * t130;
-    const double t140 = t137 + t139;
-    const double t142 = s->fixed[12] * t140;
-    const double t143 = t142 - t129;
-    const double t144 = t35 * t143;
-    const double t145 = X[0] * t144;
-    const double t146 = X[1] * t144;
-    b[0] = t145;
-    b[1] = t146;
+    const double t119 = t54 * t31;
+    const double t121 = t23 - s->fixed[10];
+    const double t122 = t90 * t121;
+    const double t123 = s->fixed[3] * t70;
+    const double t124 = s->fixed[7] * t13;
+    const double t125 = t124 * t123;
+    const double t126 = t125 + 1.0;
+    const double t127 = 1.0 / t126;
+    const double t128 = t122 * t127;
+    const double t129 = t73 * t35;
+    const double t130 = t32 * t129;
+    const double t131 = t130 * t100;
+    const double t132 = t128 + t131;
+    const double t133 = t93 - t125;
+    const double t134 = t35 * t133;
+    const double t135 = t132 * t127;
+    const double t136 = t122 - t134;
+    const double t137 = t136 + t135;
+    const double t139 = s->fixed[11] * t137;
+    const double t140 = t119 + t139;
+    const double t141 = -t140;
+    const double t142 = t35 * t141;
+    const double t143 = X[0] * t142;
+    const double t144 = X[1] * t142;
+    b[0] = t143;
+    b[1] = t144;
 }
 
 /* traction on the surface inner, force per reference area */
@@ -673,13 +641,13 @@ MMSMITH_FN void ring_X_lower_traction(const ring_solution *s, const double X[2],
     const double t94 = t93 + 1.0;
     const double t100 = 1.0 / t94;
     const double t101 = t100 + 1.0;
-    const double t220 = s->fixed[21] * t13;
-    const double t221 = t34 * t35;
-    const double t222 = t65 * t221;
-    const double t223 = t220 * t222;
-    const double t224 = t223 * t101;
-    const double t225 = -t224;
-    traction[0] = t225;
+    const double t164 = s->fixed[13] * t13;
+    const double t165 = t34 * t35;
+    const double t166 = t65 * t165;
+    const double t167 = t164 * t166;
+    const double t168 = t167 * t101;
+    const double t169 = -t168;
+    traction[0] = t169;
     traction[1] = 0.0;
 }
 
@@ -709,14 +677,14 @@ MMSMITH_FN void ring_Y_lower_traction(const ring_solution *s, const double X[2],
     const double t94 = t93 + 1.0;
     const double t100 = 1.0 / t94;
     const double t101 = t100 + 1.0;
-    const double t220 = s->fixed[21] * t13;
-    const double t221 = t34 * t35;
-    const double t226 = t81 * t221;
-    const double t227 = t220 * t226;
-    const double t228 = t227 * t101;
-    const double t229 = -t228;
+    const double t164 = s->fixed[13] * t13;
+    const double t165 = t34 * t35;
+    const double t170 = t81 * t165;
+    const double t171 = t164 * t170;
+    const double t172 = t171 * t101;
+    const double t173 = -t172;
     traction[0] = 0.0;
-    traction[1] = t229;
+    traction[1] = t173;
 }
 
 /* all fields */
@@ -750,7 +718,7 @@ MMSMITH_FN void ring_fields(const ring_solution *s, const double X[2], double t,
     const double t47 = -t46;
     const double t48 = t45 * t39;
     const double t49 = -t48;
-    const double t54 = s->fixed[6] * t13;
+    const double t54 = s->fixed[5] * t13;
     const double t55 = t54 * t36;
     const double t56 = -t55;
     const double t57 = t54 * t39;
@@ -758,14 +726,14 @@ MMSMITH_FN void ring_fields(const ring_solution *s, const double X[2], double t,
     const double t59 = t5 - s->par.Ri;
     const double t62 = t20 * t2;
     const double t63 = t62 * t59;
-    const double t64 = s->fixed[7] * t63;
+    const double t64 = s->fixed[6] * t63;
     const double t65 = t31 * t3;
     const double t66 = t65 * t35;
     const double t67 = t64 + t66;
     const double t68 = t67 * t34;
     const double t69 = t32 * t68;
     const double t70 = t20 * t59;
-    const double t71 = s->fixed[7] * t70;
+    const double t71 = s->fixed[6] * t70;
     const double t72 = t31 * t35;
     const double t73 = t71 - t72;
     const double t74 = X[0] * X[1];
@@ -774,7 +742,7 @@ MMSMITH_FN void ring_fields(const ring_solution *s, const double X[2], double t,
     const double t77 = t32 * t76;
     const double t78 = t20 * t3;
     const double t79 = t78 * t59;
-    const double t80 = s->fixed[7] * t79;
+    const double t80 = s->fixed[6] * t79;
     const double t81 = t31 * t2;
     const double t82 = t81 * t35;
     const double t83 = t80 + t82;
@@ -809,31 +777,30 @@ MMSMITH_FN void ring_fields(const ring_solution *s, const double X[2], double t,
     const double t116 = t115 * t101;
     const double t117 = t114 + t116;
     const double t118 = t107 * t117;
-    const double t120 = t23 - s->fixed[10];
-    const double t121 = t70 * t35;
-    const double t122 = t121 + t120;
-    const double t123 = s->fixed[7] * t122;
-    const double t124 = t34 - s->fixed[5];
-    const double t125 = t31 * t124;
-    const double t126 = t123 - t125;
-    const double t128 = s->fixed[11] * t13;
-    const double t129 = t128 * t126;
-    const double t130 = t91 * t98;
-    const double t131 = t90 * t120;
-    const double t132 = 2.0 - t130;
-    const double t133 = t91 * t130;
-    const double t134 = t93 * t93;
-    const double t135 = t134 * t100;
-    const double t136 = t133 - t135;
-    const double t137 = t35 * t136;
-    const double t138 = t131 * t132;
-    const double t139 = t138 * t130;
-    const double t140 = t137 + t139;
-    const double t142 = s->fixed[12] * t140;
-    const double t143 = t142 - t129;
-    const double t144 = t35 * t143;
-    const double t145 = X[0] * t144;
-    const double t146 = X[1] * t144;
+    const double t119 = t54 * t31;
+    const double t121 = t23 - s->fixed[10];
+    const double t122 = t90 * t121;
+    const double t123 = s->fixed[3] * t70;
+    const double t124 = s->fixed[7] * t13;
+    const double t125 = t124 * t123;
+    const double t126 = t125 + 1.0;
+    const double t127 = 1.0 / t126;
+    const double t128 = t122 * t127;
+    const double t129 = t73 * t35;
+    const double t130 = t32 * t129;
+    const double t131 = t130 * t100;
+    const double t132 = t128 + t131;
+    const double t133 = t93 - t125;
+    const double t134 = t35 * t133;
+    const double t135 = t132 * t127;
+    const double t136 = t122 - t134;
+    const double t137 = t136 + t135;
+    const double t139 = s->fixed[11] * t137;
+    const double t140 = t119 + t139;
+    const double t141 = -t140;
+    const double t142 = t35 * t141;
+    const double t143 = X[0] * t142;
+    const double t144 = X[1] * t142;
     out->u[0] = t37;
     out->u[1] = t40;
     out->v[0] = t47;
@@ -853,8 +820,8 @@ MMSMITH_FN void ring_fields(const ring_solution *s, const double X[2], double t,
     out->P[1] = t113;
     out->P[2] = t113;
     out->P[3] = t118;
-    out->b[0] = t145;
-    out->b[1] = t146;
+    out->b[0] = t143;
+    out->b[1] = t144;
 }
 
 /* What the body force needs of the time alone. */
@@ -864,82 +831,27 @@ MMSMITH_FN ring_time_values ring_at_time(const ring_solution *s, double t)
     const double t12 = s->fixed[0] * t;
     const double t13 = mmsmith_cos_pi(t12);
     const double t32 = s->par.A * t13;
+    const double t54 = s->fixed[5] * t13;
     const double t90 = s->fixed[8] * t13;
-    time.values[0] = t13;
-    time.values[1] = t32;
+    time.values[0] = t32;
+    time.values[1] = t54;
     time.values[2] = t90;
     return time;
 }
 
-/* What the body force needs of the position alone, 8 values. */
-MMSMITH_FN void ring_at_point(const ring_solution *s, const double X[2], double point[8])
+/* What the body force needs of the position alone, 4 values. */
+MMSMITH_FN void ring_at_point(const ring_solution *s, const double X[2], double point[4])
 {
+    (void)s;
     const double t2 = X[0] * X[0];
     const double t3 = X[1] * X[1];
     const double t4 = t2 + t3;
     const double t5 = sqrt(t4);
-    const double t20 = t5 - s->par.Ro;
-    const double t21 = t20 * t20;
-    const double t23 = 2.0 * t5;
-    const double t25 = s->fixed[2] + t23;
-    const double t29 = t21 * t25;
-    const double t30 = s->fixed[3] * t29;
-    const double t31 = t30 + 1.0;
     const double t34 = 1.0 / t4;
-    const double t35 = t5 * t34;
-    const double t59 = t5 - s->par.Ri;
-    const double t70 = t20 * t59;
-    const double t71 = s->fixed[7] * t70;
-    const double t72 = t31 * t35;
-    const double t73 = t71 - t72;
-    const double t120 = t23 - s->fixed[10];
-    const double t121 = t70 * t35;
-    const double t122 = t121 + t120;
-    const double t123 = s->fixed[7] * t122;
-    const double t124 = t34 - s->fixed[5];
-    const double t125 = t31 * t124;
-    const double t126 = t123 - t125;
-    const double t147 = X[0] * t35;
-    const double t148 = s->fixed[11] * t126;
-    const double t149 = s->fixed[7] * t120;
-    const double t150 = t73 * t35;
-    const double t151 = t149 + t150;
-    const double t157 = t59 * t59;
-    const double t163 = t21 * t31;
-    const double t164 = t163 * t157;
-    const double t165 = t164 * t151;
-    const double t166 = t165 * t35;
-    const double t167 = s->fixed[13] * t166;
-    const double t170 = t21 * t157;
-    const double t171 = s->fixed[14] * t170;
-    const double t172 = t31 * t31;
-    const double t173 = t172 * t34;
-    const double t174 = t31 * t73;
-    const double t175 = t174 * t35;
-    const double t176 = t171 - t173;
-    const double t177 = t176 + t175;
-    const double t179 = s->fixed[15] * t70;
-    const double t180 = t179 + t72;
-    const double t181 = t177 * t35;
-    const double t184 = t120 * t180;
-    const double t185 = s->fixed[16] * t184;
-    const double t186 = t181 + t185;
-    const double t193 = t70 * t186;
-    const double t194 = s->fixed[17] * t193;
-    const double t199 = t70 * t120;
-    const double t200 = s->fixed[18] * t199;
-    const double t201 = t176 * t35;
-    const double t202 = t200 + t201;
-    const double t205 = s->fixed[19] * t202;
-    const double t215 = X[1] * t35;
-    point[0] = t70;
-    point[1] = t72;
-    point[2] = t147;
-    point[3] = t148;
-    point[4] = t167;
-    point[5] = t194;
-    point[6] = t205;
-    point[7] = t215;
+    point[0] = X[0];
+    point[1] = X[1];
+    point[2] = t5;
+    point[3] = t34;
 }
 
 /* The body force from the values of one time and of one point. Value m of the point is point[m*stride]:
@@ -948,25 +860,49 @@ MMSMITH_FN void ring_at_point(const ring_solution *s, const double X[2], double 
 MMSMITH_FN void ring_b_staged(const ring_solution *s, const ring_time_values *time,
     const double *point, size_t stride, double b[2])
 {
-    (void)s;
-    const double t91 = time->values[2] * point[0];
+    const double t20 = point[2 * stride] - s->par.Ro;
+    const double t21 = t20 * t20;
+    const double t23 = 2.0 * point[2 * stride];
+    const double t25 = s->fixed[2] + t23;
+    const double t29 = t21 * t25;
+    const double t30 = s->fixed[3] * t29;
+    const double t31 = t30 + 1.0;
+    const double t35 = point[2 * stride] * point[3 * stride];
+    const double t59 = point[2 * stride] - s->par.Ri;
+    const double t70 = t20 * t59;
+    const double t71 = s->fixed[6] * t70;
+    const double t72 = t31 * t35;
+    const double t73 = t71 - t72;
+    const double t91 = time->values[2] * t70;
     const double t92 = t91 + 1.0;
-    const double t93 = time->values[1] * point[stride];
+    const double t93 = time->values[0] * t72;
     const double t94 = t93 + 1.0;
-    const double t195 = time->values[0] * point[4 * stride];
-    const double t196 = point[5 * stride] + t195;
-    const double t206 = time->values[0] * t196;
-    const double t207 = point[6 * stride] + t206;
-    const double t208 = t92 * t92;
-    const double t209 = t208 * t94;
-    const double t210 = t207 / t209;
-    const double t211 = time->values[0] * t210;
-    const double t212 = t211 - point[3 * stride];
-    const double t213 = time->values[0] * t212;
-    const double t214 = point[2 * stride] * t213;
-    const double t216 = point[7 * stride] * t213;
-    b[0] = t214;
-    b[1] = t216;
+    const double t98 = 1.0 / t92;
+    const double t100 = 1.0 / t94;
+    const double t119 = time->values[1] * t31;
+    const double t121 = t23 - s->fixed[10];
+    const double t122 = time->values[2] * t121;
+    const double t129 = t73 * t35;
+    const double t130 = time->values[0] * t129;
+    const double t131 = t130 * t100;
+    const double t145 = point[0] * t35;
+    const double t146 = t122 * t98;
+    const double t147 = t146 + t131;
+    const double t148 = t31 * point[3 * stride];
+    const double t149 = time->values[0] * t148;
+    const double t150 = t35 * t91;
+    const double t151 = t147 * t98;
+    const double t152 = t122 - t149;
+    const double t153 = t152 + t150;
+    const double t154 = t153 + t151;
+    const double t155 = s->fixed[11] * t154;
+    const double t156 = t119 + t155;
+    const double t157 = -t156;
+    const double t158 = t145 * t157;
+    const double t159 = point[stride] * t35;
+    const double t160 = t159 * t157;
+    b[0] = t158;
+    b[1] = t160;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -977,9 +913,9 @@ MMSMITH_FN void ring_point_array(const ring_solution *s, size_t n, const double 
 {
     size_t p, m;
     for (p = 0; p < n; ++p) {
-        double values[8];
+        double values[4];
         ring_at_point(s, X + p * 2, values);
-        for (m = 0; m < 8; ++m) {
+        for (m = 0; m < 4; ++m) {
             point[m * n + p] = values[m];
         }
     }
@@ -996,31 +932,52 @@ MMSMITH_FN void ring_b_array(const ring_solution *s, double t, size_t n,
     const double *const point1 = point + 1 * n;
     const double *const point2 = point + 2 * n;
     const double *const point3 = point + 3 * n;
-    const double *const point4 = point + 4 * n;
-    const double *const point5 = point + 5 * n;
-    const double *const point6 = point + 6 * n;
-    const double *const point7 = point + 7 * n;
     const size_t end = first + count;
     size_t p;
     for (p = first; p < end; ++p) {
-        const double t91 = time.values[2] * point0[p];
+        const double t20 = point2[p] - s->par.Ro;
+        const double t21 = t20 * t20;
+        const double t23 = 2.0 * point2[p];
+        const double t25 = s->fixed[2] + t23;
+        const double t29 = t21 * t25;
+        const double t30 = s->fixed[3] * t29;
+        const double t31 = t30 + 1.0;
+        const double t35 = point2[p] * point3[p];
+        const double t59 = point2[p] - s->par.Ri;
+        const double t70 = t20 * t59;
+        const double t71 = s->fixed[6] * t70;
+        const double t72 = t31 * t35;
+        const double t73 = t71 - t72;
+        const double t91 = time.values[2] * t70;
         const double t92 = t91 + 1.0;
-        const double t93 = time.values[1] * point1[p];
+        const double t93 = time.values[0] * t72;
         const double t94 = t93 + 1.0;
-        const double t195 = time.values[0] * point4[p];
-        const double t196 = point5[p] + t195;
-        const double t206 = time.values[0] * t196;
-        const double t207 = point6[p] + t206;
-        const double t208 = t92 * t92;
-        const double t209 = t208 * t94;
-        const double t210 = t207 / t209;
-        const double t211 = time.values[0] * t210;
-        const double t212 = t211 - point3[p];
-        const double t213 = time.values[0] * t212;
-        const double t214 = point2[p] * t213;
-        const double t216 = point7[p] * t213;
-        b[p * 2 + 0] = t214;
-        b[p * 2 + 1] = t216;
+        const double t98 = 1.0 / t92;
+        const double t100 = 1.0 / t94;
+        const double t119 = time.values[1] * t31;
+        const double t121 = t23 - s->fixed[10];
+        const double t122 = time.values[2] * t121;
+        const double t129 = t73 * t35;
+        const double t130 = time.values[0] * t129;
+        const double t131 = t130 * t100;
+        const double t145 = point0[p] * t35;
+        const double t146 = t122 * t98;
+        const double t147 = t146 + t131;
+        const double t148 = t31 * point3[p];
+        const double t149 = time.values[0] * t148;
+        const double t150 = t35 * t91;
+        const double t151 = t147 * t98;
+        const double t152 = t122 - t149;
+        const double t153 = t152 + t150;
+        const double t154 = t153 + t151;
+        const double t155 = s->fixed[11] * t154;
+        const double t156 = t119 + t155;
+        const double t157 = -t156;
+        const double t158 = t145 * t157;
+        const double t159 = point1[p] * t35;
+        const double t160 = t159 * t157;
+        b[p * 2 + 0] = t158;
+        b[p * 2 + 1] = t160;
     }
 }
 
@@ -1046,7 +1003,7 @@ MMSMITH_FN double ring_wave_speed(const ring_solution *s)
 /* the time in which the motion repeats */
 MMSMITH_FN double ring_period(const ring_solution *s)
 {
-    return s->fixed[20];
+    return s->fixed[12];
 }
 
 /* first Lame constant */

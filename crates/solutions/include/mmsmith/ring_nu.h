@@ -208,7 +208,7 @@ enum {
     ring_nu_dimension = 2,
     ring_nu_parameter_count = 6,
     ring_nu_time_count = 3,
-    ring_nu_point_count = 10
+    ring_nu_point_count = 4
 };
 
 typedef struct ring_nu_parameters {
@@ -223,7 +223,7 @@ typedef struct ring_nu_parameters {
 /* The parameters, and the values that depend on them only. */
 typedef struct ring_nu_solution {
     ring_nu_parameters par;
-    double fixed[30];
+    double fixed[22];
 } ring_nu_solution;
 
 /* What the body force needs of the time alone. */
@@ -302,57 +302,27 @@ MMSMITH_FN const char *ring_nu_prepare(ring_nu_solution *s, const ring_nu_parame
     const double t112 = p->E * p->nu;
     const double t113 = t97 * t99;
     const double t114 = t112 / t113;
-    const double t143 = p->Ri + p->Ro;
-    const double t152 = p->nu / t99;
-    const double t157 = 1.0 / t97;
-    const double t160 = t63 / p->rho0;
-    const double t201 = 1.0 / p->rho0;
-    const double t217 = t114 + t107;
-    const double t219 = p->A * p->A;
-    const double t220 = t219 * t219;
-    const double t221 = t15 * t15;
-    const double t222 = t19 * t19;
-    const double t224 = 36.0 * t220;
-    const double t225 = t224 * t217;
-    const double t226 = p->rho0 * t221;
-    const double t227 = t226 * t222;
-    const double t228 = t225 / t227;
-    const double t237 = 3.0 / t26;
-    const double t246 = t221 * t222;
-    const double t247 = 36.0 / t246;
-    const double t270 = t219 * p->A;
-    const double t271 = 6.0 * t270;
-    const double t272 = p->rho0 * t15;
-    const double t273 = t272 * t19;
-    const double t274 = t271 / t273;
-    const double t279 = 6.0 * t219;
-    const double t280 = t279 * p->E;
-    const double t281 = t280 * p->nu;
-    const double t282 = t273 * t97;
-    const double t283 = t282 * t99;
-    const double t284 = t281 / t283;
-    const double t288 = 12.0 * t107;
-    const double t289 = t288 / t26;
-    const double t301 = t219 / p->rho0;
-    const double t304 = t63 * p->nu;
-    const double t305 = p->rho0 * t97;
-    const double t306 = t305 * t99;
-    const double t307 = t304 / t306;
-    const double t310 = 2.0 / t11;
-    const double t311 = p->Ri - p->Ro;
-    const double t312 = t311 * t311;
-    const double t313 = t312 * t311;
-    const double t314 = t313 / t26;
-    const double t315 = 1.0 - t314;
-    const double t316 = p->A * t315;
-    const double t317 = t316 / p->Ri;
-    const double t321 = p->Ri * t97;
-    const double t322 = t321 * t99;
-    const double t323 = t112 / t322;
-    const double t329 = p->A / p->Ro;
-    const double t333 = p->Ro * t97;
-    const double t334 = t333 * t99;
-    const double t335 = t112 / t334;
+    const double t144 = p->Ri + p->Ro;
+    const double t154 = t114 + t107;
+    const double t171 = 1.0 / p->rho0;
+    const double t179 = 2.0 / t11;
+    const double t180 = p->Ri - p->Ro;
+    const double t181 = t180 * t180;
+    const double t182 = t181 * t180;
+    const double t183 = t182 / t26;
+    const double t184 = 1.0 - t183;
+    const double t185 = p->A * t184;
+    const double t186 = t185 / p->Ri;
+    const double t190 = p->Ri * t97;
+    const double t191 = t190 * t99;
+    const double t192 = t112 / t191;
+    const double t198 = p->A / p->Ro;
+    const double t202 = p->Ro * t97;
+    const double t203 = t202 * t99;
+    const double t204 = t112 / t203;
+    const double t228 = t107 * t171;
+    const double t239 = t114 * t171;
+    const double t241 = t154 * t171;
     if (!(p->Ri < p->Ro)) {
         return "the parameters of ring-nu must satisfy Ri < Ro";
     }
@@ -367,29 +337,21 @@ MMSMITH_FN const char *ring_nu_prepare(ring_nu_solution *s, const ring_nu_parame
     s->fixed[4] = t39;
     s->fixed[5] = t40;
     s->fixed[6] = t56;
-    s->fixed[7] = t62;
-    s->fixed[8] = t65;
-    s->fixed[9] = t71;
-    s->fixed[10] = t107;
-    s->fixed[11] = t114;
-    s->fixed[12] = t143;
-    s->fixed[13] = t152;
-    s->fixed[14] = t157;
-    s->fixed[15] = t160;
-    s->fixed[16] = t201;
-    s->fixed[17] = t228;
-    s->fixed[18] = t237;
-    s->fixed[19] = t247;
-    s->fixed[20] = t274;
-    s->fixed[21] = t284;
-    s->fixed[22] = t289;
-    s->fixed[23] = t301;
-    s->fixed[24] = t307;
-    s->fixed[25] = t310;
-    s->fixed[26] = t317;
-    s->fixed[27] = t323;
-    s->fixed[28] = t329;
-    s->fixed[29] = t335;
+    s->fixed[7] = t65;
+    s->fixed[8] = t71;
+    s->fixed[9] = t107;
+    s->fixed[10] = t114;
+    s->fixed[11] = t144;
+    s->fixed[12] = t154;
+    s->fixed[13] = t171;
+    s->fixed[14] = t179;
+    s->fixed[15] = t186;
+    s->fixed[16] = t192;
+    s->fixed[17] = t198;
+    s->fixed[18] = t204;
+    s->fixed[19] = t228;
+    s->fixed[20] = t239;
+    s->fixed[21] = t241;
     return 0;
 }
 
@@ -475,7 +437,7 @@ MMSMITH_FN void ring_nu_a(const ring_nu_solution *s, const double X[2], double t
     const double t48 = t47 * t34;
     const double t50 = t31 * X[1];
     const double t51 = t50 * t34;
-    const double t66 = s->fixed[8] * t13;
+    const double t66 = s->fixed[7] * t13;
     const double t67 = t66 * t48;
     const double t68 = -t67;
     const double t69 = t66 * t51;
@@ -508,13 +470,13 @@ MMSMITH_FN void ring_nu_H(const ring_nu_solution *s, const double X[2], double t
     const double t38 = t31 * t34;
     const double t72 = t20 * t2;
     const double t73 = t72 * t35;
-    const double t74 = s->fixed[9] * t73;
+    const double t74 = s->fixed[8] * t73;
     const double t75 = t31 * t3;
     const double t76 = t75 * t34;
     const double t77 = t74 + t76;
     const double t78 = t77 * t33;
     const double t79 = t32 * t78;
-    const double t80 = s->fixed[9] * t37;
+    const double t80 = s->fixed[8] * t37;
     const double t81 = t80 - t38;
     const double t82 = X[0] * X[1];
     const double t83 = t82 * t81;
@@ -522,7 +484,7 @@ MMSMITH_FN void ring_nu_H(const ring_nu_solution *s, const double X[2], double t
     const double t85 = t32 * t84;
     const double t86 = t20 * t3;
     const double t87 = t86 * t35;
-    const double t88 = s->fixed[9] * t87;
+    const double t88 = s->fixed[8] * t87;
     const double t89 = t31 * t2;
     const double t90 = t89 * t34;
     const double t91 = t88 + t90;
@@ -558,13 +520,13 @@ MMSMITH_FN void ring_nu_F(const ring_nu_solution *s, const double X[2], double t
     const double t38 = t31 * t34;
     const double t72 = t20 * t2;
     const double t73 = t72 * t35;
-    const double t74 = s->fixed[9] * t73;
+    const double t74 = s->fixed[8] * t73;
     const double t75 = t31 * t3;
     const double t76 = t75 * t34;
     const double t77 = t74 + t76;
     const double t78 = t77 * t33;
     const double t79 = t32 * t78;
-    const double t80 = s->fixed[9] * t37;
+    const double t80 = s->fixed[8] * t37;
     const double t81 = t80 - t38;
     const double t82 = X[0] * X[1];
     const double t83 = t82 * t81;
@@ -572,7 +534,7 @@ MMSMITH_FN void ring_nu_F(const ring_nu_solution *s, const double X[2], double t
     const double t85 = t32 * t84;
     const double t86 = t20 * t3;
     const double t87 = t86 * t35;
-    const double t88 = s->fixed[9] * t87;
+    const double t88 = s->fixed[8] * t87;
     const double t89 = t31 * t2;
     const double t90 = t89 * t34;
     const double t91 = t88 + t90;
@@ -660,20 +622,20 @@ MMSMITH_FN void ring_nu_P(const ring_nu_solution *s, const double X[2], double t
     const double t110 = t43 * t108;
     const double t111 = t109 + 1.0;
     const double t115 = t104 * t109;
-    const double t116 = s->fixed[11] * t115;
-    const double t117 = s->fixed[10] * t111;
+    const double t116 = s->fixed[10] * t115;
+    const double t117 = s->fixed[9] * t111;
     const double t118 = t116 - t117;
     const double t119 = t110 + 1.0;
     const double t120 = t104 * t110;
-    const double t121 = s->fixed[11] * t120;
-    const double t122 = s->fixed[10] * t119;
+    const double t121 = s->fixed[10] * t120;
+    const double t122 = s->fixed[9] * t119;
     const double t123 = t121 - t122;
     const double t124 = t42 * t118;
     const double t125 = t2 * t124;
     const double t126 = t32 * t76;
     const double t127 = t126 * t123;
     const double t128 = t125 + t127;
-    const double t129 = s->fixed[11] * t104;
+    const double t129 = s->fixed[10] * t104;
     const double t130 = t33 * t128;
     const double t131 = t129 - t130;
     const double t132 = t44 * t123;
@@ -721,71 +683,45 @@ MMSMITH_FN void ring_nu_b(const ring_nu_solution *s, const double X[2], double t
     const double t44 = t32 * t38;
     const double t45 = t44 + 1.0;
     const double t46 = t43 * t45;
-    const double t80 = s->fixed[9] * t37;
+    const double t66 = s->fixed[7] * t13;
+    const double t80 = s->fixed[8] * t37;
     const double t81 = t80 - t38;
     const double t108 = 1.0 / t46;
     const double t110 = t43 * t108;
-    const double t144 = t23 - s->fixed[12];
-    const double t145 = s->fixed[9] * t144;
-    const double t146 = t81 * t34;
-    const double t147 = t145 + t146;
-    const double t148 = s->fixed[3] * t37;
-    const double t149 = 6.0 * t148;
-    const double t150 = t38 - t149;
+    const double t143 = t66 * t31;
+    const double t145 = t23 - s->fixed[11];
+    const double t146 = t41 * t145;
+    const double t147 = s->fixed[3] * t37;
+    const double t148 = s->fixed[4] * t13;
+    const double t149 = t148 * t147;
+    const double t150 = t44 - t149;
     const double t151 = t34 * t150;
-    const double t153 = s->fixed[13] * t147;
-    const double t154 = t145 - t151;
-    const double t155 = t154 + t153;
-    const double t156 = s->fixed[7] * t31;
-    const double t158 = s->fixed[14] * t155;
-    const double t159 = t156 + t158;
-    const double t161 = s->fixed[15] * t13;
-    const double t162 = t161 * t159;
-    const double t163 = s->fixed[4] * t13;
-    const double t164 = t163 * t148;
-    const double t165 = t164 + 1.0;
-    const double t166 = t164 * t45;
-    const double t167 = t166 + t44;
-    const double t168 = t165 * t45;
-    const double t169 = mmsmith_ln_of_both(t167, t168);
-    const double t170 = s->fixed[11] * t169;
-    const double t171 = s->fixed[10] * t164;
-    const double t172 = t170 + t171;
-    const double t173 = s->fixed[10] * t44;
-    const double t174 = t170 + t173;
-    const double t175 = t41 * t144;
-    const double t176 = 1.0 / t165;
-    const double t177 = t175 * t176;
-    const double t178 = t164 * t177;
-    const double t179 = t32 * t146;
-    const double t180 = t179 * t110;
-    const double t181 = t177 + t180;
-    const double t182 = s->fixed[10] * t175;
-    const double t183 = s->fixed[11] * t181;
-    const double t184 = t182 + t183;
-    const double t185 = t175 - t178;
-    const double t186 = t172 * t185;
-    const double t187 = t164 * t184;
-    const double t188 = t186 + t187;
-    const double t189 = t44 * t180;
-    const double t190 = t178 + t189;
-    const double t191 = t164 * t172;
-    const double t192 = t191 * t176;
-    const double t193 = t44 * t174;
-    const double t194 = t193 * t110;
-    const double t195 = t192 - t194;
-    const double t196 = t34 * t195;
-    const double t197 = t188 * t176;
-    const double t198 = s->fixed[11] * t190;
-    const double t199 = t196 + t197;
-    const double t200 = t199 + t198;
-    const double t202 = s->fixed[16] * t200;
-    const double t203 = t202 - t162;
-    const double t204 = t34 * t203;
-    const double t205 = X[0] * t204;
-    const double t206 = X[1] * t204;
-    b[0] = t205;
-    b[1] = t206;
+    const double t152 = t146 - t151;
+    const double t153 = t149 + 1.0;
+    const double t155 = t149 * t45;
+    const double t156 = t155 + t44;
+    const double t157 = t153 * t45;
+    const double t158 = mmsmith_ln_of_both(t156, t157);
+    const double t159 = s->fixed[10] * t158;
+    const double t160 = s->fixed[12] - t159;
+    const double t161 = 1.0 / t153;
+    const double t162 = t146 * t161;
+    const double t163 = t81 * t34;
+    const double t164 = t32 * t163;
+    const double t165 = t164 * t110;
+    const double t166 = t162 + t165;
+    const double t167 = s->fixed[9] * t152;
+    const double t168 = t160 * t166;
+    const double t169 = t168 * t161;
+    const double t170 = t167 + t169;
+    const double t172 = s->fixed[13] * t170;
+    const double t173 = t143 + t172;
+    const double t174 = -t173;
+    const double t175 = t34 * t174;
+    const double t176 = X[0] * t175;
+    const double t177 = X[1] * t175;
+    b[0] = t176;
+    b[1] = t177;
 }
 
 /* traction on the surface inner, force per reference area */
@@ -794,16 +730,16 @@ MMSMITH_FN void ring_nu_inner_traction(const ring_nu_solution *s, const double X
 {
     const double t12 = s->fixed[0] * t;
     const double t13 = mmsmith_cos_pi(t12);
-    const double t318 = s->fixed[26] * t13;
-    const double t319 = t318 + 1.0;
-    const double t320 = mmsmith_ln_of_both(t318, t319);
-    const double t324 = s->fixed[27] * t320;
-    const double t325 = t324 * X[0];
-    const double t326 = -t325;
-    const double t327 = t324 * X[1];
-    const double t328 = -t327;
-    traction[0] = t326;
-    traction[1] = t328;
+    const double t187 = s->fixed[15] * t13;
+    const double t188 = t187 + 1.0;
+    const double t189 = mmsmith_ln_of_both(t187, t188);
+    const double t193 = s->fixed[16] * t189;
+    const double t194 = t193 * X[0];
+    const double t195 = -t194;
+    const double t196 = t193 * X[1];
+    const double t197 = -t196;
+    traction[0] = t195;
+    traction[1] = t197;
 }
 
 /* traction on the surface outer, force per reference area */
@@ -812,14 +748,14 @@ MMSMITH_FN void ring_nu_outer_traction(const ring_nu_solution *s, const double X
 {
     const double t12 = s->fixed[0] * t;
     const double t13 = mmsmith_cos_pi(t12);
-    const double t330 = s->fixed[28] * t13;
-    const double t331 = t330 + 1.0;
-    const double t332 = mmsmith_ln_of_both(t330, t331);
-    const double t336 = s->fixed[29] * t332;
-    const double t337 = t336 * X[0];
-    const double t338 = t336 * X[1];
-    traction[0] = t337;
-    traction[1] = t338;
+    const double t199 = s->fixed[17] * t13;
+    const double t200 = t199 + 1.0;
+    const double t201 = mmsmith_ln_of_both(t199, t200);
+    const double t205 = s->fixed[18] * t201;
+    const double t206 = t205 * X[0];
+    const double t207 = t205 * X[1];
+    traction[0] = t206;
+    traction[1] = t207;
 }
 
 /* traction on the surface X-lower, force per reference area */
@@ -861,17 +797,17 @@ MMSMITH_FN void ring_nu_X_lower_traction(const ring_nu_solution *s, const double
     const double t110 = t43 * t108;
     const double t119 = t110 + 1.0;
     const double t120 = t104 * t110;
-    const double t121 = s->fixed[11] * t120;
-    const double t122 = s->fixed[10] * t119;
+    const double t121 = s->fixed[10] * t120;
+    const double t122 = s->fixed[9] * t119;
     const double t123 = t121 - t122;
-    const double t129 = s->fixed[11] * t104;
-    const double t339 = t33 * t34;
-    const double t340 = t75 * t339;
-    const double t341 = t32 * t340;
-    const double t342 = t341 * t123;
-    const double t343 = t129 - t342;
-    const double t344 = -t343;
-    traction[0] = t344;
+    const double t129 = s->fixed[10] * t104;
+    const double t208 = t33 * t34;
+    const double t209 = t75 * t208;
+    const double t210 = t32 * t209;
+    const double t211 = t210 * t123;
+    const double t212 = t129 - t211;
+    const double t213 = -t212;
+    traction[0] = t213;
     traction[1] = 0.0;
 }
 
@@ -914,18 +850,18 @@ MMSMITH_FN void ring_nu_Y_lower_traction(const ring_nu_solution *s, const double
     const double t110 = t43 * t108;
     const double t119 = t110 + 1.0;
     const double t120 = t104 * t110;
-    const double t121 = s->fixed[11] * t120;
-    const double t122 = s->fixed[10] * t119;
+    const double t121 = s->fixed[10] * t120;
+    const double t122 = s->fixed[9] * t119;
     const double t123 = t121 - t122;
-    const double t129 = s->fixed[11] * t104;
-    const double t339 = t33 * t34;
-    const double t346 = t89 * t339;
-    const double t347 = t32 * t346;
-    const double t348 = t347 * t123;
-    const double t349 = t129 - t348;
-    const double t350 = -t349;
+    const double t129 = s->fixed[10] * t104;
+    const double t208 = t33 * t34;
+    const double t215 = t89 * t208;
+    const double t216 = t32 * t215;
+    const double t217 = t216 * t123;
+    const double t218 = t129 - t217;
+    const double t219 = -t218;
     traction[0] = 0.0;
-    traction[1] = t350;
+    traction[1] = t219;
 }
 
 /* all fields */
@@ -968,20 +904,20 @@ MMSMITH_FN void ring_nu_fields(const ring_nu_solution *s, const double X[2], dou
     const double t59 = -t58;
     const double t60 = t57 * t51;
     const double t61 = -t60;
-    const double t66 = s->fixed[8] * t13;
+    const double t66 = s->fixed[7] * t13;
     const double t67 = t66 * t48;
     const double t68 = -t67;
     const double t69 = t66 * t51;
     const double t70 = -t69;
     const double t72 = t20 * t2;
     const double t73 = t72 * t35;
-    const double t74 = s->fixed[9] * t73;
+    const double t74 = s->fixed[8] * t73;
     const double t75 = t31 * t3;
     const double t76 = t75 * t34;
     const double t77 = t74 + t76;
     const double t78 = t77 * t33;
     const double t79 = t32 * t78;
-    const double t80 = s->fixed[9] * t37;
+    const double t80 = s->fixed[8] * t37;
     const double t81 = t80 - t38;
     const double t82 = X[0] * X[1];
     const double t83 = t82 * t81;
@@ -989,7 +925,7 @@ MMSMITH_FN void ring_nu_fields(const ring_nu_solution *s, const double X[2], dou
     const double t85 = t32 * t84;
     const double t86 = t20 * t3;
     const double t87 = t86 * t35;
-    const double t88 = s->fixed[9] * t87;
+    const double t88 = s->fixed[8] * t87;
     const double t89 = t31 * t2;
     const double t90 = t89 * t34;
     const double t91 = t88 + t90;
@@ -1007,20 +943,20 @@ MMSMITH_FN void ring_nu_fields(const ring_nu_solution *s, const double X[2], dou
     const double t110 = t43 * t108;
     const double t111 = t109 + 1.0;
     const double t115 = t104 * t109;
-    const double t116 = s->fixed[11] * t115;
-    const double t117 = s->fixed[10] * t111;
+    const double t116 = s->fixed[10] * t115;
+    const double t117 = s->fixed[9] * t111;
     const double t118 = t116 - t117;
     const double t119 = t110 + 1.0;
     const double t120 = t104 * t110;
-    const double t121 = s->fixed[11] * t120;
-    const double t122 = s->fixed[10] * t119;
+    const double t121 = s->fixed[10] * t120;
+    const double t122 = s->fixed[9] * t119;
     const double t123 = t121 - t122;
     const double t124 = t42 * t118;
     const double t125 = t2 * t124;
     const double t126 = t32 * t76;
     const double t127 = t126 * t123;
     const double t128 = t125 + t127;
-    const double t129 = s->fixed[11] * t104;
+    const double t129 = s->fixed[10] * t104;
     const double t130 = t33 * t128;
     const double t131 = t129 - t130;
     const double t132 = t44 * t123;
@@ -1034,65 +970,38 @@ MMSMITH_FN void ring_nu_fields(const ring_nu_solution *s, const double X[2], dou
     const double t140 = t137 + t139;
     const double t141 = t33 * t140;
     const double t142 = t129 - t141;
-    const double t144 = t23 - s->fixed[12];
-    const double t145 = s->fixed[9] * t144;
-    const double t146 = t81 * t34;
-    const double t147 = t145 + t146;
-    const double t148 = s->fixed[3] * t37;
-    const double t149 = 6.0 * t148;
-    const double t150 = t38 - t149;
+    const double t143 = t66 * t31;
+    const double t145 = t23 - s->fixed[11];
+    const double t146 = t41 * t145;
+    const double t147 = s->fixed[3] * t37;
+    const double t148 = s->fixed[4] * t13;
+    const double t149 = t148 * t147;
+    const double t150 = t44 - t149;
     const double t151 = t34 * t150;
-    const double t153 = s->fixed[13] * t147;
-    const double t154 = t145 - t151;
-    const double t155 = t154 + t153;
-    const double t156 = s->fixed[7] * t31;
-    const double t158 = s->fixed[14] * t155;
-    const double t159 = t156 + t158;
-    const double t161 = s->fixed[15] * t13;
-    const double t162 = t161 * t159;
-    const double t163 = s->fixed[4] * t13;
-    const double t164 = t163 * t148;
-    const double t165 = t164 + 1.0;
-    const double t166 = t164 * t45;
-    const double t167 = t166 + t44;
-    const double t168 = t165 * t45;
-    const double t169 = mmsmith_ln_of_both(t167, t168);
-    const double t170 = s->fixed[11] * t169;
-    const double t171 = s->fixed[10] * t164;
-    const double t172 = t170 + t171;
-    const double t173 = s->fixed[10] * t44;
-    const double t174 = t170 + t173;
-    const double t175 = t41 * t144;
-    const double t176 = 1.0 / t165;
-    const double t177 = t175 * t176;
-    const double t178 = t164 * t177;
-    const double t179 = t32 * t146;
-    const double t180 = t179 * t110;
-    const double t181 = t177 + t180;
-    const double t182 = s->fixed[10] * t175;
-    const double t183 = s->fixed[11] * t181;
-    const double t184 = t182 + t183;
-    const double t185 = t175 - t178;
-    const double t186 = t172 * t185;
-    const double t187 = t164 * t184;
-    const double t188 = t186 + t187;
-    const double t189 = t44 * t180;
-    const double t190 = t178 + t189;
-    const double t191 = t164 * t172;
-    const double t192 = t191 * t176;
-    const double t193 = t44 * t174;
-    const double t194 = t193 * t110;
-    const double t195 = t192 - t194;
-    const double t196 = t34 * t195;
-    const double t197 = t188 * t176;
-    const double t198 = s->fixed[11] * t190;
-    const double t199 = t196 + t197;
-    const double t200 = t199 + t198;
-    const double t202 = s->fixed[16] * t200;
-    const double t203 = t202 - t162;
-    const double t204 = t34 * t203;
-    const double t205 = X[0] * t204;
-    const double t206 = X[1] * t204;
+    const double t152 = t146 - t151;
+    const double t153 = t149 + 1.0;
+    const double t155 = t149 * t45;
+    const double t156 = t155 + t44;
+    const double t157 = t153 * t45;
+    const double t158 = mmsmith_ln_of_both(t156, t157);
+    const double t159 = s->fixed[10] * t158;
+    const double t160 = s->fixed[12] - t159;
+    const double t161 = 1.0 / t153;
+    const double t162 = t146 * t161;
+    const double t163 = t81 * t34;
+    const double t164 = t32 * t163;
+    const double t165 = t164 * t110;
+    const double t166 = t162 + t165;
+    const double t167 = s->fixed[9] * t152;
+    const double t168 = t160 * t166;
+    const double t169 = t168 * t161;
+    const double t170 = t167 + t169;
+    const double t172 = s->fixed[13] * t170;
+    const double t173 = t143 + t172;
+    const double t174 = -t173;
+    const double t175 = t34 * t174;
+    const double t176 = X[0] * t175;
+    const double t177 = X[1] * t175;
     out->u[0] = t49;
     out->u[1] = t52;
     out->v[0] = t59;
@@ -1112,8 +1021,8 @@ MMSMITH_FN void ring_nu_fields(const ring_nu_solution *s, const double X[2], dou
     out->P[1] = t136;
     out->P[2] = t136;
     out->P[3] = t142;
-    out->b[0] = t205;
-    out->b[1] = t206;
+    out->b[0] = t176;
+    out->b[1] = t177;
 }
 
 /* What the body force needs of the time alone. */
@@ -1124,116 +1033,26 @@ MMSMITH_FN ring_nu_time_values ring_nu_at_time(const ring_nu_solution *s, double
     const double t13 = mmsmith_cos_pi(t12);
     const double t32 = s->par.A * t13;
     const double t41 = s->fixed[5] * t13;
-    time.values[0] = t13;
-    time.values[1] = t32;
-    time.values[2] = t41;
+    const double t66 = s->fixed[7] * t13;
+    time.values[0] = t32;
+    time.values[1] = t41;
+    time.values[2] = t66;
     return time;
 }
 
-/* What the body force needs of the position alone, 10 values. */
-MMSMITH_FN void ring_nu_at_point(const ring_nu_solution *s, const double X[2], double point[10])
+/* What the body force needs of the position alone, 4 values. */
+MMSMITH_FN void ring_nu_at_point(const ring_nu_solution *s, const double X[2], double point[4])
 {
+    (void)s;
     const double t2 = X[0] * X[0];
     const double t3 = X[1] * X[1];
     const double t4 = t2 + t3;
     const double t5 = sqrt(t4);
-    const double t20 = t5 - s->par.Ro;
-    const double t21 = t20 * t20;
-    const double t23 = 2.0 * t5;
-    const double t25 = s->fixed[2] + t23;
-    const double t29 = t21 * t25;
-    const double t30 = s->fixed[3] * t29;
-    const double t31 = t30 + 1.0;
     const double t33 = 1.0 / t4;
-    const double t34 = t5 * t33;
-    const double t35 = t5 - s->par.Ri;
-    const double t37 = t20 * t35;
-    const double t38 = t31 * t34;
-    const double t80 = s->fixed[9] * t37;
-    const double t81 = t80 - t38;
-    const double t144 = t23 - s->fixed[12];
-    const double t145 = s->fixed[9] * t144;
-    const double t146 = t81 * t34;
-    const double t147 = t145 + t146;
-    const double t153 = s->fixed[13] * t147;
-    const double t156 = s->fixed[7] * t31;
-    const double t207 = X[0] * t34;
-    const double t208 = t37 * t34;
-    const double t209 = t208 + t144;
-    const double t210 = s->fixed[9] * t209;
-    const double t211 = t31 * t33;
-    const double t212 = t210 - t211;
-    const double t213 = t212 + t153;
-    const double t214 = s->fixed[14] * t213;
-    const double t215 = t156 + t214;
-    const double t216 = s->fixed[15] * t215;
-    const double t223 = t35 * t35;
-    const double t229 = t21 * t31;
-    const double t230 = t229 * t223;
-    const double t231 = t230 * t147;
-    const double t232 = t231 * t34;
-    const double t233 = s->fixed[17] * t232;
-    const double t234 = t31 * t144;
-    const double t235 = t37 * t81;
-    const double t236 = t234 + t235;
-    const double t238 = s->fixed[18] * t37;
-    const double t239 = t238 + t38;
-    const double t240 = t144 * t239;
-    const double t241 = 2.0 * t240;
-    const double t242 = s->fixed[10] * t241;
-    const double t243 = t236 * t34;
-    const double t244 = s->fixed[11] * t243;
-    const double t245 = t242 + t244;
-    const double t248 = t21 * t223;
-    const double t249 = s->fixed[19] * t248;
-    const double t250 = t31 * t31;
-    const double t251 = t250 * t33;
-    const double t252 = t31 * t81;
-    const double t253 = t252 * t34;
-    const double t254 = t249 - t251;
-    const double t255 = t254 + t253;
-    const double t256 = s->fixed[18] * t144;
-    const double t257 = t256 + t146;
-    const double t258 = t257 * t34;
-    const double t259 = 2.0 * t258;
-    const double t260 = t31 * t259;
-    const double t261 = t37 * t144;
-    const double t262 = s->fixed[19] * t261;
-    const double t263 = t260 + t262;
-    const double t264 = s->fixed[9] * t245;
-    const double t265 = t255 * t34;
-    const double t266 = s->fixed[10] * t265;
-    const double t267 = s->fixed[11] * t263;
-    const double t268 = t264 + t266;
-    const double t269 = t268 + t267;
-    const double t275 = t37 * t269;
-    const double t276 = s->fixed[20] * t275;
-    const double t285 = s->fixed[21] * t243;
-    const double t286 = s->fixed[11] * t147;
-    const double t290 = s->fixed[22] * t144;
-    const double t291 = t286 + t290;
-    const double t292 = t252 * t33;
-    const double t293 = t262 + t292;
-    const double t294 = t37 * t291;
-    const double t295 = s->fixed[9] * t294;
-    const double t296 = t254 * t34;
-    const double t297 = s->fixed[10] * t296;
-    const double t298 = s->fixed[11] * t293;
-    const double t299 = t295 + t297;
-    const double t300 = t299 + t298;
-    const double t302 = s->fixed[23] * t300;
-    const double t308 = s->fixed[24] * t147;
-    const double t309 = X[1] * t34;
-    point[0] = t37;
-    point[1] = t38;
-    point[2] = t207;
-    point[3] = t216;
-    point[4] = t233;
-    point[5] = t276;
-    point[6] = t285;
-    point[7] = t302;
-    point[8] = t308;
-    point[9] = t309;
+    point[0] = X[0];
+    point[1] = X[1];
+    point[2] = t5;
+    point[3] = t33;
 }
 
 /* The body force from the values of one time and of one point. Value m of the point is point[m*stride]:
@@ -1242,32 +1061,57 @@ MMSMITH_FN void ring_nu_at_point(const ring_nu_solution *s, const double X[2], d
 MMSMITH_FN void ring_nu_b_staged(const ring_nu_solution *s, const ring_nu_time_values *time,
     const double *point, size_t stride, double b[2])
 {
-    (void)s;
-    const double t42 = time->values[2] * point[0];
+    const double t20 = point[2 * stride] - s->par.Ro;
+    const double t21 = t20 * t20;
+    const double t23 = 2.0 * point[2 * stride];
+    const double t25 = s->fixed[2] + t23;
+    const double t34 = point[2 * stride] * point[3 * stride];
+    const double t35 = point[2 * stride] - s->par.Ri;
+    const double t37 = t20 * t35;
+    const double t42 = time->values[1] * t37;
     const double t43 = t42 + 1.0;
-    const double t44 = time->values[1] * point[stride];
-    const double t45 = t44 + 1.0;
-    const double t46 = t43 * t45;
-    const double t277 = time->values[0] * point[4 * stride];
-    const double t278 = point[5 * stride] + t277;
-    const double t303 = time->values[0] * t278;
-    const double t351 = t44 * t43;
-    const double t352 = t351 + t42;
-    const double t353 = mmsmith_ln_of_both(t352, t46);
-    const double t354 = point[6 * stride] * t353;
-    const double t355 = t303 + t354;
-    const double t356 = point[7 * stride] + t355;
-    const double t357 = time->values[0] * t356;
-    const double t358 = point[8 * stride] * t353;
-    const double t359 = t357 + t358;
-    const double t360 = t43 * t46;
-    const double t361 = t359 / t360;
-    const double t362 = t361 - point[3 * stride];
-    const double t363 = time->values[0] * t362;
-    const double t364 = point[2 * stride] * t363;
-    const double t365 = point[9 * stride] * t363;
-    b[0] = t364;
-    b[1] = t365;
+    const double t80 = s->fixed[8] * t37;
+    const double t145 = t23 - s->fixed[11];
+    const double t146 = time->values[1] * t145;
+    const double t178 = t34 * t42;
+    const double t220 = s->fixed[3] * t21;
+    const double t221 = t220 * t25;
+    const double t222 = t221 + 1.0;
+    const double t223 = time->values[2] * t222;
+    const double t224 = time->values[0] * t222;
+    const double t225 = t224 * point[3 * stride];
+    const double t226 = t146 - t225;
+    const double t227 = t226 + t178;
+    const double t229 = s->fixed[19] * t227;
+    const double t230 = t222 * t34;
+    const double t231 = time->values[0] * t230;
+    const double t232 = t231 + 1.0;
+    const double t233 = t43 * t232;
+    const double t234 = 1.0 / t233;
+    const double t235 = t232 * t234;
+    const double t236 = t231 * t43;
+    const double t237 = t236 + t42;
+    const double t238 = mmsmith_ln_of_both(t237, t233);
+    const double t240 = s->fixed[20] * t238;
+    const double t242 = t240 - s->fixed[21];
+    const double t243 = t235 * t146;
+    const double t244 = t80 - t230;
+    const double t245 = time->values[0] * t34;
+    const double t246 = t245 * t244;
+    const double t247 = t246 * t43;
+    const double t248 = t247 * t234;
+    const double t249 = t243 + t248;
+    const double t250 = t235 * t242;
+    const double t251 = t250 * t249;
+    const double t252 = t229 - t251;
+    const double t253 = t223 + t252;
+    const double t254 = t34 * t253;
+    const double t255 = point[0] * t254;
+    const double t256 = -t255;
+    const double t257 = point[stride] * t254;
+    const double t258 = -t257;
+    b[0] = t256;
+    b[1] = t258;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -1278,9 +1122,9 @@ MMSMITH_FN void ring_nu_point_array(const ring_nu_solution *s, size_t n, const d
 {
     size_t p, m;
     for (p = 0; p < n; ++p) {
-        double values[10];
+        double values[4];
         ring_nu_at_point(s, X + p * 2, values);
-        for (m = 0; m < 10; ++m) {
+        for (m = 0; m < 4; ++m) {
             point[m * n + p] = values[m];
         }
     }
@@ -1297,40 +1141,60 @@ MMSMITH_FN void ring_nu_b_array(const ring_nu_solution *s, double t, size_t n,
     const double *const point1 = point + 1 * n;
     const double *const point2 = point + 2 * n;
     const double *const point3 = point + 3 * n;
-    const double *const point4 = point + 4 * n;
-    const double *const point5 = point + 5 * n;
-    const double *const point6 = point + 6 * n;
-    const double *const point7 = point + 7 * n;
-    const double *const point8 = point + 8 * n;
-    const double *const point9 = point + 9 * n;
     const size_t end = first + count;
     size_t p;
     for (p = first; p < end; ++p) {
-        const double t42 = time.values[2] * point0[p];
+        const double t20 = point2[p] - s->par.Ro;
+        const double t21 = t20 * t20;
+        const double t23 = 2.0 * point2[p];
+        const double t25 = s->fixed[2] + t23;
+        const double t34 = point2[p] * point3[p];
+        const double t35 = point2[p] - s->par.Ri;
+        const double t37 = t20 * t35;
+        const double t42 = time.values[1] * t37;
         const double t43 = t42 + 1.0;
-        const double t44 = time.values[1] * point1[p];
-        const double t45 = t44 + 1.0;
-        const double t46 = t43 * t45;
-        const double t277 = time.values[0] * point4[p];
-        const double t278 = point5[p] + t277;
-        const double t303 = time.values[0] * t278;
-        const double t351 = t44 * t43;
-        const double t352 = t351 + t42;
-        const double t353 = mmsmith_ln_of_both(t352, t46);
-        const double t354 = point6[p] * t353;
-        const double t355 = t303 + t354;
-        const double t356 = point7[p] + t355;
-        const double t357 = time.values[0] * t356;
-        const double t358 = point8[p] * t353;
-        const double t359 = t357 + t358;
-        const double t360 = t43 * t46;
-        const double t361 = t359 / t360;
-        const double t362 = t361 - point3[p];
-        const double t363 = time.values[0] * t362;
-        const double t364 = point2[p] * t363;
-        const double t365 = point9[p] * t363;
-        b[p * 2 + 0] = t364;
-        b[p * 2 + 1] = t365;
+        const double t80 = s->fixed[8] * t37;
+        const double t145 = t23 - s->fixed[11];
+        const double t146 = time.values[1] * t145;
+        const double t178 = t34 * t42;
+        const double t220 = s->fixed[3] * t21;
+        const double t221 = t220 * t25;
+        const double t222 = t221 + 1.0;
+        const double t223 = time.values[2] * t222;
+        const double t224 = time.values[0] * t222;
+        const double t225 = t224 * point3[p];
+        const double t226 = t146 - t225;
+        const double t227 = t226 + t178;
+        const double t229 = s->fixed[19] * t227;
+        const double t230 = t222 * t34;
+        const double t231 = time.values[0] * t230;
+        const double t232 = t231 + 1.0;
+        const double t233 = t43 * t232;
+        const double t234 = 1.0 / t233;
+        const double t235 = t232 * t234;
+        const double t236 = t231 * t43;
+        const double t237 = t236 + t42;
+        const double t238 = mmsmith_ln_of_both(t237, t233);
+        const double t240 = s->fixed[20] * t238;
+        const double t242 = t240 - s->fixed[21];
+        const double t243 = t235 * t146;
+        const double t244 = t80 - t230;
+        const double t245 = time.values[0] * t34;
+        const double t246 = t245 * t244;
+        const double t247 = t246 * t43;
+        const double t248 = t247 * t234;
+        const double t249 = t243 + t248;
+        const double t250 = t235 * t242;
+        const double t251 = t250 * t249;
+        const double t252 = t229 - t251;
+        const double t253 = t223 + t252;
+        const double t254 = t34 * t253;
+        const double t255 = point0[p] * t254;
+        const double t256 = -t255;
+        const double t257 = point1[p] * t254;
+        const double t258 = -t257;
+        b[p * 2 + 0] = t256;
+        b[p * 2 + 1] = t258;
     }
 }
 
@@ -1356,19 +1220,19 @@ MMSMITH_FN double ring_nu_wave_speed(const ring_nu_solution *s)
 /* the time in which the motion repeats */
 MMSMITH_FN double ring_nu_period(const ring_nu_solution *s)
 {
-    return s->fixed[25];
+    return s->fixed[14];
 }
 
 /* first Lame constant */
 MMSMITH_FN double ring_nu_lambda(const ring_nu_solution *s)
 {
-    return s->fixed[11];
+    return s->fixed[10];
 }
 
 /* shear modulus */
 MMSMITH_FN double ring_nu_mu(const ring_nu_solution *s)
 {
-    return s->fixed[10];
+    return s->fixed[9];
 }
 
 /* the body's inner radius */

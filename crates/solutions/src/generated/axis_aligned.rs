@@ -38,7 +38,7 @@ impl<T: crate::Real> Default for AxisAlignedParameters<T> {
 pub struct AxisAligned<T: crate::Real> {
     parameters: AxisAlignedParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 13],
+    fixed: [T; 16],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> AxisAligned<T> {
@@ -130,33 +130,53 @@ impl<T: crate::Real> AxisAligned<T> {
         let t68 = parameters.E * parameters.nu;
         let t69 = t47 * t57;
         let t70 = t68 / t69;
-        let t81 = parameters.nu * parameters.nu;
-        let t82 = T::nearest(2.0) * parameters.A;
-        let t83 = t82 * t35;
-        let t84 = t83 * parameters.E;
-        let t85 = t84 * t81;
+        let t83 = parameters.nu * parameters.nu;
+        let t84 = T::nearest(2.0) * parameters.E;
+        let t85 = t84 * t83;
         let t86 = parameters.rho0 * t47;
         let t87 = t86 * t57;
         let t88 = t85 / t87;
-        let t115 = t36 / parameters.rho0;
-        let t140 = t70 + t50;
-        let t141 = parameters.A * parameters.A;
-        let t142 = t141 * parameters.A;
-        let t143 = t35 * t35;
-        let t144 = t142 * t143;
-        let t145 = t144 * t140;
-        let t146 = t145 / parameters.rho0;
-        let t147 = t35 * T::pi();
-        let t148 = T::nearest(2.0) * t141;
-        let t149 = t148 * t147;
-        let t150 = t149 * t140;
-        let t151 = t150 / parameters.rho0;
-        let t152 = t37 * parameters.nu;
-        let t153 = t152 / t87;
-        let t156 = T::nearest(2.0) / t6;
+        let t93 = t70 + t50;
+        let t111 = T::one() / parameters.rho0;
+        let t130 = T::nearest(2.0) * parameters.A;
+        let t131 = t130 * t35;
+        let t132 = t131 * parameters.E;
+        let t133 = t132 * t83;
+        let t134 = t133 / t87;
+        let t135 = parameters.A * parameters.A;
+        let t136 = t135 * parameters.A;
+        let t137 = t35 * t35;
+        let t138 = t136 * t137;
+        let t139 = t138 * t93;
+        let t140 = t139 / parameters.rho0;
+        let t141 = t35 * T::pi();
+        let t142 = T::nearest(2.0) * t135;
+        let t143 = t142 * t141;
+        let t144 = t143 * t93;
+        let t145 = t144 / parameters.rho0;
+        let t146 = t37 * parameters.nu;
+        let t147 = t146 / t87;
+        let t150 = T::nearest(2.0) / t6;
         Ok(AxisAligned {
             parameters,
-            fixed: [t6, t12, t29, t38, t50, t64, t70, t88, t115, t146, t151, t153, t156],
+            fixed: [
+                t6,
+                t12,
+                t29,
+                t36,
+                t38,
+                t50,
+                t64,
+                t70,
+                t88,
+                t93,
+                t111,
+                t134,
+                t140,
+                t145,
+                t147,
+                t150,
+            ],
         })
     }
     /// The solution with parameter values in the order of the description; missing ones take their
@@ -235,10 +255,10 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t10 = t7.sin_pi();
         let t23 = X[0].sin_pi();
         let t26 = X[1].sin_pi();
-        let t39 = self.fixed[3] * t8;
+        let t39 = self.fixed[4] * t8;
         let t40 = t39 * t23;
         let t41 = -t40;
-        let t42 = self.fixed[3] * t10;
+        let t42 = self.fixed[4] * t10;
         let t43 = t42 * t26;
         let t44 = -t43;
         crate::nalgebra::SVector::<T, 2>::new(t41, t44)
@@ -323,18 +343,18 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t61 = t59 + t60;
         let t62 = self.fixed[1] * t61;
         let t63 = t62.ln_of_both(t22);
-        let t65 = self.fixed[5] * t8;
+        let t65 = self.fixed[6] * t8;
         let t66 = t65 * t13;
         let t67 = t66 * t54;
         let t71 = t63 * t52;
-        let t72 = self.fixed[6] * t71;
+        let t72 = self.fixed[7] * t71;
         let t73 = t67 + t72;
         let t74 = t53 + T::one();
-        let t75 = self.fixed[5] * t10;
+        let t75 = self.fixed[6] * t10;
         let t76 = t75 * t16;
         let t77 = t76 * t74;
         let t78 = t63 * t53;
-        let t79 = self.fixed[6] * t78;
+        let t79 = self.fixed[7] * t78;
         let t80 = t77 + t79;
         crate::nalgebra::SMatrix::<T, 2, 2>::new(t73, T::zero(), T::zero(), t80)
     }
@@ -352,57 +372,48 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t23 = X[0].sin_pi();
         let t26 = X[1].sin_pi();
         let t60 = t10 * t16;
-        let t89 = self.fixed[7] * t8;
-        let t90 = t89 * t23;
-        let t91 = t8 * t13;
-        let t92 = self.fixed[1] * t91;
-        let t93 = t92 + T::one();
-        let t94 = t16 * t93;
-        let t95 = t10 * t94;
-        let t96 = t95 + t91;
-        let t97 = self.fixed[1] * t96;
-        let t98 = self.fixed[1] * t60;
-        let t99 = t98 + T::one();
-        let t100 = t93 * t99;
-        let t101 = t97.ln_of_both(t100);
-        let t102 = self.fixed[6] * t101;
-        let t103 = self.fixed[4] * t92;
-        let t104 = t102 + t103;
-        let t105 = T::one() / t93;
-        let t106 = self.fixed[6] * t105;
-        let t107 = self.fixed[4] + t106;
-        let t108 = t92 + t101;
-        let t109 = self.fixed[6] * t108;
-        let t110 = t104 * t105;
-        let t111 = t107 - t110;
-        let t112 = self.fixed[4] + t111;
-        let t113 = t92 * t112;
-        let t114 = t109 + t113;
-        let t116 = self.fixed[8] * t8;
-        let t117 = t116 * t23;
-        let t118 = t114 * t105;
-        let t119 = t117 * t118;
-        let t120 = t90 - t119;
-        let t121 = self.fixed[7] * t10;
-        let t122 = t121 * t26;
-        let t123 = self.fixed[4] * t98;
-        let t124 = t102 + t123;
-        let t125 = T::one() / t99;
-        let t126 = self.fixed[6] * t125;
-        let t127 = self.fixed[4] + t126;
-        let t128 = t101 + t98;
-        let t129 = self.fixed[6] * t128;
-        let t130 = t124 * t125;
-        let t131 = t127 - t130;
-        let t132 = self.fixed[4] + t131;
-        let t133 = t98 * t132;
-        let t134 = t129 + t133;
-        let t135 = self.fixed[8] * t10;
-        let t136 = t135 * t26;
-        let t137 = t134 * t125;
-        let t138 = t136 * t137;
-        let t139 = t122 - t138;
-        crate::nalgebra::SVector::<T, 2>::new(t120, t139)
+        let t81 = self.fixed[3] * t8;
+        let t82 = t81 * t23;
+        let t89 = self.fixed[8] * t82;
+        let t90 = t8 * t13;
+        let t91 = self.fixed[1] * t90;
+        let t92 = t91 + T::one();
+        let t94 = T::one() / t92;
+        let t95 = t82 * t94;
+        let t96 = -t95;
+        let t97 = t82 + t95;
+        let t98 = t16 * t92;
+        let t99 = t10 * t98;
+        let t100 = t99 + t90;
+        let t101 = self.fixed[1] * t100;
+        let t102 = self.fixed[1] * t60;
+        let t103 = t102 + T::one();
+        let t104 = t92 * t103;
+        let t105 = t101.ln_of_both(t104);
+        let t106 = t91 * t97;
+        let t107 = self.fixed[9] * t106;
+        let t108 = t96 * t105;
+        let t109 = self.fixed[7] * t108;
+        let t110 = t107 - t109;
+        let t112 = t110 * t94;
+        let t113 = self.fixed[10] * t112;
+        let t114 = t89 - t113;
+        let t115 = self.fixed[3] * t10;
+        let t116 = t115 * t26;
+        let t117 = self.fixed[8] * t116;
+        let t118 = T::one() / t103;
+        let t119 = t116 * t118;
+        let t120 = -t119;
+        let t121 = t116 + t119;
+        let t122 = t102 * t121;
+        let t123 = self.fixed[9] * t122;
+        let t124 = t105 * t120;
+        let t125 = self.fixed[7] * t124;
+        let t126 = t123 - t125;
+        let t127 = t126 * t118;
+        let t128 = self.fixed[10] * t127;
+        let t129 = t117 - t128;
+        crate::nalgebra::SVector::<T, 2>::new(t114, t129)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t7 = self.fixed[0] * t;
@@ -428,10 +439,10 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t32 = -t31;
         let t33 = self.fixed[2] * t8;
         let t34 = t33 * t26;
-        let t39 = self.fixed[3] * t8;
+        let t39 = self.fixed[4] * t8;
         let t40 = t39 * t23;
         let t41 = -t40;
-        let t42 = self.fixed[3] * t10;
+        let t42 = self.fixed[4] * t10;
         let t43 = t42 * t26;
         let t44 = -t43;
         let t51 = T::one() / t22;
@@ -444,69 +455,60 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t61 = t59 + t60;
         let t62 = self.fixed[1] * t61;
         let t63 = t62.ln_of_both(t22);
-        let t65 = self.fixed[5] * t8;
+        let t65 = self.fixed[6] * t8;
         let t66 = t65 * t13;
         let t67 = t66 * t54;
         let t71 = t63 * t52;
-        let t72 = self.fixed[6] * t71;
+        let t72 = self.fixed[7] * t71;
         let t73 = t67 + t72;
         let t74 = t53 + T::one();
-        let t75 = self.fixed[5] * t10;
+        let t75 = self.fixed[6] * t10;
         let t76 = t75 * t16;
         let t77 = t76 * t74;
         let t78 = t63 * t53;
-        let t79 = self.fixed[6] * t78;
+        let t79 = self.fixed[7] * t78;
         let t80 = t77 + t79;
-        let t89 = self.fixed[7] * t8;
-        let t90 = t89 * t23;
-        let t91 = t8 * t13;
-        let t92 = self.fixed[1] * t91;
-        let t93 = t92 + T::one();
-        let t94 = t16 * t93;
-        let t95 = t10 * t94;
-        let t96 = t95 + t91;
-        let t97 = self.fixed[1] * t96;
-        let t98 = self.fixed[1] * t60;
-        let t99 = t98 + T::one();
-        let t100 = t93 * t99;
-        let t101 = t97.ln_of_both(t100);
-        let t102 = self.fixed[6] * t101;
-        let t103 = self.fixed[4] * t92;
-        let t104 = t102 + t103;
-        let t105 = T::one() / t93;
-        let t106 = self.fixed[6] * t105;
-        let t107 = self.fixed[4] + t106;
-        let t108 = t92 + t101;
-        let t109 = self.fixed[6] * t108;
-        let t110 = t104 * t105;
-        let t111 = t107 - t110;
-        let t112 = self.fixed[4] + t111;
-        let t113 = t92 * t112;
-        let t114 = t109 + t113;
-        let t116 = self.fixed[8] * t8;
-        let t117 = t116 * t23;
-        let t118 = t114 * t105;
-        let t119 = t117 * t118;
-        let t120 = t90 - t119;
-        let t121 = self.fixed[7] * t10;
-        let t122 = t121 * t26;
-        let t123 = self.fixed[4] * t98;
-        let t124 = t102 + t123;
-        let t125 = T::one() / t99;
-        let t126 = self.fixed[6] * t125;
-        let t127 = self.fixed[4] + t126;
-        let t128 = t101 + t98;
-        let t129 = self.fixed[6] * t128;
-        let t130 = t124 * t125;
-        let t131 = t127 - t130;
-        let t132 = self.fixed[4] + t131;
-        let t133 = t98 * t132;
-        let t134 = t129 + t133;
-        let t135 = self.fixed[8] * t10;
-        let t136 = t135 * t26;
-        let t137 = t134 * t125;
-        let t138 = t136 * t137;
-        let t139 = t122 - t138;
+        let t81 = self.fixed[3] * t8;
+        let t82 = t81 * t23;
+        let t89 = self.fixed[8] * t82;
+        let t90 = t8 * t13;
+        let t91 = self.fixed[1] * t90;
+        let t92 = t91 + T::one();
+        let t94 = T::one() / t92;
+        let t95 = t82 * t94;
+        let t96 = -t95;
+        let t97 = t82 + t95;
+        let t98 = t16 * t92;
+        let t99 = t10 * t98;
+        let t100 = t99 + t90;
+        let t101 = self.fixed[1] * t100;
+        let t102 = self.fixed[1] * t60;
+        let t103 = t102 + T::one();
+        let t104 = t92 * t103;
+        let t105 = t101.ln_of_both(t104);
+        let t106 = t91 * t97;
+        let t107 = self.fixed[9] * t106;
+        let t108 = t96 * t105;
+        let t109 = self.fixed[7] * t108;
+        let t110 = t107 - t109;
+        let t112 = t110 * t94;
+        let t113 = self.fixed[10] * t112;
+        let t114 = t89 - t113;
+        let t115 = self.fixed[3] * t10;
+        let t116 = t115 * t26;
+        let t117 = self.fixed[8] * t116;
+        let t118 = T::one() / t103;
+        let t119 = t116 * t118;
+        let t120 = -t119;
+        let t121 = t116 + t119;
+        let t122 = t102 * t121;
+        let t123 = self.fixed[9] * t122;
+        let t124 = t105 * t120;
+        let t125 = self.fixed[7] * t124;
+        let t126 = t123 - t125;
+        let t127 = t126 * t118;
+        let t128 = self.fixed[10] * t127;
+        let t129 = t117 - t128;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t25, t28),
             v: crate::nalgebra::SVector::<T, 2>::new(t32, t34),
@@ -515,7 +517,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t20, T::zero(), T::zero(), t21),
             J: t22,
             P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t73, T::zero(), T::zero(), t80),
-            b: crate::nalgebra::SVector::<T, 2>::new(t120, t139),
+            b: crate::nalgebra::SVector::<T, 2>::new(t114, t129),
         }
     }
     fn traction(
@@ -535,21 +537,21 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t18 = t17 * t16;
                 let t21 = t18 + T::one();
                 let t60 = t10 * t16;
-                let t157 = t14 + T::one();
-                let t158 = T::one() / t157;
-                let t159 = t158 + T::one();
-                let t160 = t8 * t21;
-                let t161 = t160 + t60;
-                let t162 = self.fixed[1] * t161;
-                let t163 = t157 * t21;
-                let t164 = t162.ln_of_both(t163);
-                let t165 = t8 * t159;
-                let t166 = self.fixed[5] * t165;
-                let t167 = self.fixed[6] * t158;
-                let t168 = t167 * t164;
-                let t169 = t166 + t168;
-                let t170 = -t169;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t170, T::zero()))
+                let t151 = t14 + T::one();
+                let t152 = T::one() / t151;
+                let t153 = t152 + T::one();
+                let t154 = t8 * t21;
+                let t155 = t154 + t60;
+                let t156 = self.fixed[1] * t155;
+                let t157 = t151 * t21;
+                let t158 = t156.ln_of_both(t157);
+                let t159 = t8 * t153;
+                let t160 = self.fixed[6] * t159;
+                let t161 = self.fixed[7] * t152;
+                let t162 = t161 * t158;
+                let t163 = t160 + t162;
+                let t164 = -t163;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t164, T::zero()))
             }
             crate::Surface::Upper(0) => {
                 let t7 = self.fixed[0] * t;
@@ -561,22 +563,22 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t18 = t17 * t16;
                 let t21 = t18 + T::one();
                 let t60 = t10 * t16;
-                let t160 = t8 * t21;
-                let t171 = T::one() - t14;
-                let t172 = T::one() / t171;
-                let t173 = t172 + T::one();
-                let t174 = t160 - t60;
-                let t175 = self.fixed[1] * t174;
-                let t176 = -t175;
-                let t177 = t171 * t21;
-                let t178 = t176.ln_of_both(t177);
-                let t179 = t8 * t173;
-                let t180 = self.fixed[5] * t179;
-                let t181 = self.fixed[6] * t172;
-                let t182 = t181 * t178;
-                let t183 = t180 - t182;
-                let t184 = -t183;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t184, T::zero()))
+                let t154 = t8 * t21;
+                let t165 = T::one() - t14;
+                let t166 = T::one() / t165;
+                let t167 = t166 + T::one();
+                let t168 = t154 - t60;
+                let t169 = self.fixed[1] * t168;
+                let t170 = -t169;
+                let t171 = t165 * t21;
+                let t172 = t170.ln_of_both(t171);
+                let t173 = t8 * t167;
+                let t174 = self.fixed[6] * t173;
+                let t175 = self.fixed[7] * t166;
+                let t176 = t175 * t172;
+                let t177 = t174 - t176;
+                let t178 = -t177;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t178, T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t7 = self.fixed[0] * t;
@@ -587,22 +589,22 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t15 = t14 * t13;
                 let t17 = self.fixed[1] * t10;
                 let t20 = t15 + T::one();
-                let t91 = t8 * t13;
-                let t185 = t17 + T::one();
-                let t186 = T::one() / t185;
-                let t187 = t186 + T::one();
-                let t188 = t10 * t20;
-                let t189 = t188 + t91;
-                let t190 = self.fixed[1] * t189;
-                let t191 = t185 * t20;
-                let t192 = t190.ln_of_both(t191);
-                let t193 = t10 * t187;
-                let t194 = self.fixed[5] * t193;
-                let t195 = self.fixed[6] * t186;
-                let t196 = t195 * t192;
-                let t197 = t194 + t196;
-                let t198 = -t197;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t198))
+                let t90 = t8 * t13;
+                let t179 = t17 + T::one();
+                let t180 = T::one() / t179;
+                let t181 = t180 + T::one();
+                let t182 = t10 * t20;
+                let t183 = t182 + t90;
+                let t184 = self.fixed[1] * t183;
+                let t185 = t179 * t20;
+                let t186 = t184.ln_of_both(t185);
+                let t187 = t10 * t181;
+                let t188 = self.fixed[6] * t187;
+                let t189 = self.fixed[7] * t180;
+                let t190 = t189 * t186;
+                let t191 = t188 + t190;
+                let t192 = -t191;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t192))
             }
             crate::Surface::Upper(1) => {
                 let t7 = self.fixed[0] * t;
@@ -613,23 +615,23 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t15 = t14 * t13;
                 let t17 = self.fixed[1] * t10;
                 let t20 = t15 + T::one();
-                let t91 = t8 * t13;
-                let t188 = t10 * t20;
-                let t199 = T::one() - t17;
-                let t200 = T::one() / t199;
-                let t201 = t200 + T::one();
-                let t202 = t188 - t91;
-                let t203 = self.fixed[1] * t202;
-                let t204 = -t203;
-                let t205 = t199 * t20;
-                let t206 = t204.ln_of_both(t205);
-                let t207 = t10 * t201;
-                let t208 = self.fixed[5] * t207;
-                let t209 = self.fixed[6] * t200;
-                let t210 = t209 * t206;
-                let t211 = t208 - t210;
-                let t212 = -t211;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t212))
+                let t90 = t8 * t13;
+                let t182 = t10 * t20;
+                let t193 = T::one() - t17;
+                let t194 = T::one() / t193;
+                let t195 = t194 + T::one();
+                let t196 = t182 - t90;
+                let t197 = self.fixed[1] * t196;
+                let t198 = -t197;
+                let t199 = t193 * t20;
+                let t200 = t198.ln_of_both(t199);
+                let t201 = t10 * t195;
+                let t202 = self.fixed[6] * t201;
+                let t203 = self.fixed[7] * t194;
+                let t204 = t203 * t200;
+                let t205 = t202 - t204;
+                let t206 = -t205;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t206))
             }
             _ => None,
         }
@@ -665,8 +667,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
     }
     fn law(&self) -> crate::Law<T> {
         crate::Law::Library(crate::Material::NeoHookean {
-            lambda: self.fixed[6],
-            mu: self.fixed[4],
+            lambda: self.fixed[7],
+            mu: self.fixed[5],
         })
     }
     fn density(&self) -> T {
@@ -676,7 +678,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[12]
+        self.fixed[15]
     }
     fn body_force_at(
         &self,
@@ -705,19 +707,19 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 10, 4> for AxisAligned<T> {
         let t10 = t7.sin_pi();
         let t14 = self.fixed[1] * t8;
         let t17 = self.fixed[1] * t10;
-        let t89 = self.fixed[7] * t8;
-        let t121 = self.fixed[7] * t10;
-        let t213 = t8 * t8;
-        let t214 = t213 * t8;
-        let t215 = self.fixed[9] * t214;
-        let t217 = self.fixed[10] * t213;
-        let t223 = self.fixed[11] * t8;
-        let t229 = t10 * t10;
-        let t230 = t229 * t10;
-        let t231 = self.fixed[9] * t230;
-        let t233 = self.fixed[10] * t229;
-        let t236 = self.fixed[11] * t10;
-        [t14, t17, t89, t121, t215, t217, t223, t231, t233, t236]
+        let t207 = self.fixed[11] * t8;
+        let t208 = t8 * t8;
+        let t209 = t208 * t8;
+        let t210 = self.fixed[12] * t209;
+        let t212 = self.fixed[13] * t208;
+        let t218 = self.fixed[14] * t8;
+        let t224 = self.fixed[11] * t10;
+        let t225 = t10 * t10;
+        let t226 = t225 * t10;
+        let t227 = self.fixed[12] * t226;
+        let t229 = self.fixed[13] * t225;
+        let t232 = self.fixed[14] * t10;
+        [t14, t17, t207, t210, t212, t218, t224, t227, t229, t232]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 4] {
@@ -741,28 +743,28 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 10, 4> for AxisAligned<T> {
         let t51 = T::one() / t22;
         let t52 = t21 * t51;
         let t53 = t20 * t51;
-        let t154 = t52 * t52;
-        let t155 = t53 * t53;
-        let t216 = time[4] * point[0];
-        let t218 = t216 + time[5];
-        let t219 = point[0] * t218;
-        let t220 = t15 * t21;
-        let t221 = t220 + t18;
-        let t222 = t221.ln_of_both_if::<NEAR>(t22);
-        let t224 = time[6] * t222;
-        let t225 = t219 + t224;
-        let t226 = t154 * t225;
-        let t227 = time[2] - t226;
-        let t228 = point[2] * t227;
-        let t232 = time[7] * point[1];
-        let t234 = t232 + time[8];
-        let t235 = point[1] * t234;
-        let t237 = time[9] * t222;
-        let t238 = t235 + t237;
-        let t239 = t155 * t238;
-        let t240 = time[3] - t239;
-        let t241 = point[3] * t240;
-        crate::nalgebra::SVector::<T, 2>::new(t228, t241)
+        let t148 = t52 * t52;
+        let t149 = t53 * t53;
+        let t211 = time[3] * point[0];
+        let t213 = t211 + time[4];
+        let t214 = point[0] * t213;
+        let t215 = t15 * t21;
+        let t216 = t215 + t18;
+        let t217 = t216.ln_of_both_if::<NEAR>(t22);
+        let t219 = time[5] * t217;
+        let t220 = t214 + t219;
+        let t221 = t148 * t220;
+        let t222 = time[2] - t221;
+        let t223 = point[2] * t222;
+        let t228 = time[7] * point[1];
+        let t230 = t228 + time[8];
+        let t231 = point[1] * t230;
+        let t233 = time[9] * t217;
+        let t234 = t231 + t233;
+        let t235 = t149 * t234;
+        let t236 = time[6] - t235;
+        let t237 = point[3] * t236;
+        crate::nalgebra::SVector::<T, 2>::new(t223, t237)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
@@ -774,19 +776,19 @@ impl<T: crate::Real> crate::BodyForceOnLattice<T, 2, 10, 2, 3> for AxisAligned<T
         let t10 = t7.sin_pi();
         let t14 = self.fixed[1] * t8;
         let t17 = self.fixed[1] * t10;
-        let t89 = self.fixed[7] * t8;
-        let t121 = self.fixed[7] * t10;
-        let t213 = t8 * t8;
-        let t214 = t213 * t8;
-        let t215 = self.fixed[9] * t214;
-        let t217 = self.fixed[10] * t213;
-        let t223 = self.fixed[11] * t8;
-        let t229 = t10 * t10;
-        let t230 = t229 * t10;
-        let t231 = self.fixed[9] * t230;
-        let t233 = self.fixed[10] * t229;
-        let t236 = self.fixed[11] * t10;
-        [t14, t17, t89, t121, t215, t217, t223, t231, t233, t236]
+        let t207 = self.fixed[11] * t8;
+        let t208 = t8 * t8;
+        let t209 = t208 * t8;
+        let t210 = self.fixed[12] * t209;
+        let t212 = self.fixed[13] * t208;
+        let t218 = self.fixed[14] * t8;
+        let t224 = self.fixed[11] * t10;
+        let t225 = t10 * t10;
+        let t226 = t225 * t10;
+        let t227 = self.fixed[12] * t226;
+        let t229 = self.fixed[13] * t225;
+        let t232 = self.fixed[14] * t10;
+        [t14, t17, t207, t210, t212, t218, t224, t227, t229, t232]
     }
     #[inline]
     fn lattice_coordinate(
@@ -814,36 +816,36 @@ impl<T: crate::Real> crate::BodyForceOnLattice<T, 2, 10, 2, 3> for AxisAligned<T
             0 => {
                 let t15 = time[0] * point[0];
                 let t20 = t15 + T::one();
-                let t216 = time[4] * point[0];
-                let t218 = t216 + time[5];
-                let t219 = point[0] * t218;
-                let t242 = t15.ln_of_both(t20);
-                let t244 = time[6] * t242;
-                let t245 = t219 + t244;
-                let t246 = t20 * t20;
-                let t247 = t245 / t246;
-                let t248 = time[2] - t247;
-                let t254 = point[1] * t248;
-                let t255 = time[6] * point[1];
-                let t256 = t255 / t246;
-                let t259 = time[9] * t242;
-                [t254, t256, t259]
+                let t211 = time[3] * point[0];
+                let t213 = t211 + time[4];
+                let t214 = point[0] * t213;
+                let t238 = t15.ln_of_both(t20);
+                let t240 = time[5] * t238;
+                let t241 = t214 + t240;
+                let t242 = t20 * t20;
+                let t243 = t241 / t242;
+                let t244 = time[2] - t243;
+                let t250 = point[1] * t244;
+                let t251 = time[5] * point[1];
+                let t252 = t251 / t242;
+                let t255 = time[9] * t238;
+                [t250, t252, t255]
             }
             1 => {
                 let t18 = time[1] * point[0];
                 let t21 = t18 + T::one();
-                let t232 = time[7] * point[0];
-                let t234 = t232 + time[8];
-                let t235 = point[0] * t234;
-                let t243 = t18.ln_of_both(t21);
-                let t249 = time[9] * t243;
-                let t250 = t235 + t249;
-                let t251 = t21 * t21;
-                let t252 = t250 / t251;
-                let t253 = time[3] - t252;
-                let t260 = point[1] / t251;
-                let t262 = point[1] * t253;
-                [t243, t260, t262]
+                let t228 = time[7] * point[0];
+                let t230 = t228 + time[8];
+                let t231 = point[0] * t230;
+                let t239 = t18.ln_of_both(t21);
+                let t245 = time[9] * t239;
+                let t246 = t231 + t245;
+                let t247 = t21 * t21;
+                let t248 = t246 / t247;
+                let t249 = time[6] - t248;
+                let t256 = point[1] / t247;
+                let t258 = point[1] * t249;
+                [t239, t256, t258]
             }
             _ => [T::zero(); 3],
         }
@@ -854,11 +856,11 @@ impl<T: crate::Real> crate::BodyForceOnLattice<T, 2, 10, 2, 3> for AxisAligned<T
         time: &[T; 10],
         layers: [&[T; 3]; 2],
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t257 = layers[0][1] * layers[1][0];
-        let t258 = layers[0][0] - t257;
-        let t261 = layers[0][2] * layers[1][1];
-        let t263 = layers[1][2] - t261;
-        crate::nalgebra::SVector::<T, 2>::new(t258, t263)
+        let t253 = layers[0][1] * layers[1][0];
+        let t254 = layers[0][0] - t253;
+        let t257 = layers[0][2] * layers[1][1];
+        let t259 = layers[1][2] - t257;
+        crate::nalgebra::SVector::<T, 2>::new(t254, t259)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
@@ -872,8 +874,8 @@ impl<T: crate::Real> crate::StateStages<T, 2, 8, 2, 4> for AxisAligned<T> {
         let t17 = self.fixed[1] * t10;
         let t24 = self.parameters.A * t8;
         let t27 = self.parameters.A * t10;
-        let t65 = self.fixed[5] * t8;
-        let t75 = self.fixed[5] * t10;
+        let t65 = self.fixed[6] * t8;
+        let t75 = self.fixed[6] * t10;
         [t8, t10, t14, t17, t24, t27, t65, t75]
     }
     #[inline]
@@ -927,13 +929,13 @@ impl<T: crate::Real> crate::StateStages<T, 2, 8, 2, 4> for AxisAligned<T> {
         let t66 = time[6] * point[0];
         let t67 = t66 * t54;
         let t71 = t63 * t52;
-        let t72 = self.fixed[6] * t71;
+        let t72 = self.fixed[7] * t71;
         let t73 = t67 + t72;
         let t74 = t53 + T::one();
         let t76 = time[7] * point[1];
         let t77 = t76 * t74;
         let t78 = t63 * t53;
-        let t79 = self.fixed[6] * t78;
+        let t79 = self.fixed[7] * t78;
         let t80 = t77 + t79;
         crate::State {
             u: crate::nalgebra::SVector::<T, 2>::new(t25, t28),

@@ -37,7 +37,7 @@ impl<T: crate::Real> Default for AxisAligned1dParameters<T> {
 pub struct AxisAligned1d<T: crate::Real> {
     parameters: AxisAligned1dParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 15],
+    fixed: [T; 16],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> AxisAligned1d<T> {
@@ -129,32 +129,33 @@ impl<T: crate::Real> AxisAligned1d<T> {
         let t46 = parameters.E * parameters.nu;
         let t47 = t32 * t40;
         let t48 = t46 / t47;
-        let t52 = parameters.nu * parameters.nu;
-        let t53 = T::nearest(2.0) * parameters.A;
-        let t54 = t53 * t19;
-        let t55 = t54 * parameters.E;
-        let t56 = t55 * t52;
+        let t54 = parameters.nu * parameters.nu;
+        let t55 = T::nearest(2.0) * parameters.E;
+        let t56 = t55 * t54;
         let t57 = parameters.rho0 * t32;
         let t58 = t57 * t40;
         let t59 = t56 / t58;
-        let t68 = T::nearest(2.0) * t35;
-        let t69 = t48 + t68;
-        let t81 = t14 / parameters.rho0;
-        let t86 = t48 + t35;
-        let t87 = parameters.A * parameters.A;
-        let t88 = t87 * parameters.A;
-        let t89 = t19 * t19;
-        let t90 = t88 * t89;
-        let t91 = t90 * t86;
-        let t92 = t91 / parameters.rho0;
-        let t93 = t19 * T::pi();
-        let t94 = T::nearest(2.0) * t87;
-        let t95 = t94 * t93;
-        let t96 = t95 * t86;
-        let t97 = t96 / parameters.rho0;
-        let t98 = t21 * parameters.nu;
-        let t99 = t98 / t58;
-        let t101 = T::nearest(2.0) / t7;
+        let t61 = t48 + t35;
+        let t70 = T::one() / parameters.rho0;
+        let t74 = T::nearest(2.0) * parameters.A;
+        let t75 = t74 * t19;
+        let t76 = t75 * parameters.E;
+        let t77 = t76 * t54;
+        let t78 = t77 / t58;
+        let t79 = parameters.A * parameters.A;
+        let t80 = t79 * parameters.A;
+        let t81 = t19 * t19;
+        let t82 = t80 * t81;
+        let t83 = t82 * t61;
+        let t84 = t83 / parameters.rho0;
+        let t85 = t19 * T::pi();
+        let t86 = T::nearest(2.0) * t79;
+        let t87 = t86 * t85;
+        let t88 = t87 * t61;
+        let t89 = t88 / parameters.rho0;
+        let t90 = t21 * parameters.nu;
+        let t91 = t90 / t58;
+        let t93 = T::nearest(2.0) / t7;
         Ok(AxisAligned1d {
             parameters,
             fixed: [
@@ -167,12 +168,13 @@ impl<T: crate::Real> AxisAligned1d<T> {
                 t42,
                 t48,
                 t59,
-                t69,
-                t81,
-                t92,
-                t97,
-                t99,
-                t101,
+                t61,
+                t70,
+                t78,
+                t84,
+                t89,
+                t91,
+                t93,
             ],
         })
     }
@@ -322,32 +324,21 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         let t30 = t28 + T::one();
         let t36 = T::one() / t30;
         let t41 = t28.log_1p();
-        let t43 = self.fixed[6] * t9;
-        let t44 = t43 * t26;
-        let t60 = self.fixed[8] * t9;
-        let t61 = t60 * t2;
-        let t62 = self.fixed[7] * t41;
-        let t63 = t62 + t44;
-        let t64 = self.fixed[3] * t9;
-        let t65 = t64 * t2;
-        let t66 = -t65;
-        let t67 = self.fixed[7] * t36;
-        let t70 = self.fixed[9] + t67;
-        let t71 = self.fixed[1] * t26;
-        let t72 = t71 * t70;
-        let t73 = t9 * t72;
-        let t74 = t73 + t62;
-        let t75 = T::pi() * t74;
-        let t76 = t2 * t75;
-        let t77 = t63 * t66;
-        let t78 = t77 * t36;
-        let t79 = t26 * t78;
-        let t80 = t76 + t79;
-        let t82 = self.fixed[10] * t9;
-        let t83 = t80 * t36;
-        let t84 = t82 * t83;
-        let t85 = t61 - t84;
-        crate::nalgebra::SVector::<T, 1>::new(t85)
+        let t52 = self.fixed[3] * t9;
+        let t53 = t52 * t2;
+        let t60 = self.fixed[8] * t53;
+        let t62 = t53 * t36;
+        let t63 = -t62;
+        let t64 = t53 + t62;
+        let t65 = t28 * t64;
+        let t66 = self.fixed[9] * t65;
+        let t67 = t41 * t63;
+        let t68 = self.fixed[7] * t67;
+        let t69 = t66 - t68;
+        let t71 = t69 * t36;
+        let t72 = self.fixed[10] * t71;
+        let t73 = t60 - t72;
+        crate::nalgebra::SVector::<T, 1>::new(t73)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 1>, t: T) -> crate::Fields<T, 1> {
         let t2 = X[0].sin_pi();
@@ -375,29 +366,20 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         let t49 = t41 * t36;
         let t50 = self.fixed[7] * t49;
         let t51 = t45 + t50;
-        let t60 = self.fixed[8] * t9;
-        let t61 = t60 * t2;
-        let t62 = self.fixed[7] * t41;
-        let t63 = t62 + t44;
-        let t64 = self.fixed[3] * t9;
-        let t65 = t64 * t2;
-        let t66 = -t65;
-        let t67 = self.fixed[7] * t36;
-        let t70 = self.fixed[9] + t67;
-        let t71 = self.fixed[1] * t26;
-        let t72 = t71 * t70;
-        let t73 = t9 * t72;
-        let t74 = t73 + t62;
-        let t75 = T::pi() * t74;
-        let t76 = t2 * t75;
-        let t77 = t63 * t66;
-        let t78 = t77 * t36;
-        let t79 = t26 * t78;
-        let t80 = t76 + t79;
-        let t82 = self.fixed[10] * t9;
-        let t83 = t80 * t36;
-        let t84 = t82 * t83;
-        let t85 = t61 - t84;
+        let t52 = self.fixed[3] * t9;
+        let t53 = t52 * t2;
+        let t60 = self.fixed[8] * t53;
+        let t62 = t53 * t36;
+        let t63 = -t62;
+        let t64 = t53 + t62;
+        let t65 = t28 * t64;
+        let t66 = self.fixed[9] * t65;
+        let t67 = t41 * t63;
+        let t68 = self.fixed[7] * t67;
+        let t69 = t66 - t68;
+        let t71 = t69 * t36;
+        let t72 = self.fixed[10] * t71;
+        let t73 = t60 - t72;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 1>::new(t11),
             v: crate::nalgebra::SVector::<T, 1>::new(t18),
@@ -406,7 +388,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
             F: crate::nalgebra::SMatrix::<T, 1, 1>::new(t30),
             J: t30,
             P: crate::nalgebra::SMatrix::<T, 1, 1>::new(t51),
-            b: crate::nalgebra::SVector::<T, 1>::new(t85),
+            b: crate::nalgebra::SVector::<T, 1>::new(t73),
         }
     }
     fn traction(
@@ -420,34 +402,34 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
                 let t8 = self.fixed[0] * t;
                 let t9 = t8.cos_pi();
                 let t27 = self.fixed[1] * t9;
-                let t103 = t27 + T::one();
-                let t104 = T::one() / t103;
-                let t105 = t104 + T::one();
-                let t106 = t27.log_1p();
-                let t107 = t9 * t105;
-                let t108 = self.fixed[6] * t107;
-                let t109 = t106 * t104;
-                let t110 = self.fixed[7] * t109;
-                let t111 = t108 + t110;
-                let t112 = -t111;
-                Some(crate::nalgebra::SVector::<T, 1>::new(t112))
+                let t95 = t27 + T::one();
+                let t96 = T::one() / t95;
+                let t97 = t96 + T::one();
+                let t98 = t27.log_1p();
+                let t99 = t9 * t97;
+                let t100 = self.fixed[6] * t99;
+                let t101 = t98 * t96;
+                let t102 = self.fixed[7] * t101;
+                let t103 = t100 + t102;
+                let t104 = -t103;
+                Some(crate::nalgebra::SVector::<T, 1>::new(t104))
             }
             crate::Surface::Upper(0) => {
                 let t8 = self.fixed[0] * t;
                 let t9 = t8.cos_pi();
                 let t27 = self.fixed[1] * t9;
-                let t113 = T::one() - t27;
-                let t114 = T::one() / t113;
-                let t115 = t114 + T::one();
-                let t116 = -t27;
-                let t117 = t116.log_1p();
-                let t118 = t9 * t115;
-                let t119 = self.fixed[6] * t118;
-                let t120 = t117 * t114;
-                let t121 = self.fixed[7] * t120;
-                let t122 = t119 - t121;
-                let t123 = -t122;
-                Some(crate::nalgebra::SVector::<T, 1>::new(t123))
+                let t105 = T::one() - t27;
+                let t106 = T::one() / t105;
+                let t107 = t106 + T::one();
+                let t108 = -t27;
+                let t109 = t108.log_1p();
+                let t110 = t9 * t107;
+                let t111 = self.fixed[6] * t110;
+                let t112 = t109 * t106;
+                let t113 = self.fixed[7] * t112;
+                let t114 = t111 - t113;
+                let t115 = -t114;
+                Some(crate::nalgebra::SVector::<T, 1>::new(t115))
             }
             _ => None,
         }
@@ -486,7 +468,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[14]
+        self.fixed[15]
     }
     fn body_force_at(
         &self,
@@ -508,13 +490,13 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 5, 2> for AxisAligned1d<T> {
         let t8 = self.fixed[0] * t;
         let t9 = t8.cos_pi();
         let t27 = self.fixed[1] * t9;
-        let t60 = self.fixed[8] * t9;
-        let t124 = t9 * t9;
-        let t125 = t124 * t9;
-        let t126 = self.fixed[11] * t125;
-        let t128 = self.fixed[12] * t124;
-        let t131 = self.fixed[13] * t9;
-        [t27, t60, t126, t128, t131]
+        let t116 = self.fixed[11] * t9;
+        let t117 = t9 * t9;
+        let t118 = t117 * t9;
+        let t119 = self.fixed[12] * t118;
+        let t121 = self.fixed[13] * t117;
+        let t124 = self.fixed[14] * t9;
+        [t27, t116, t119, t121, t124]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 1>) -> [T; 2] {
@@ -532,16 +514,16 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 5, 2> for AxisAligned1d<T> {
         let t30 = t28 + T::one();
         let t36 = T::one() / t30;
         let t41 = t28.log_1p();
-        let t100 = t36 * t36;
-        let t127 = time[2] * point[1];
-        let t129 = t127 + time[3];
-        let t130 = point[1] * t129;
-        let t132 = time[4] * t41;
-        let t133 = t130 + t132;
-        let t134 = t100 * t133;
-        let t135 = time[1] - t134;
-        let t136 = point[0] * t135;
-        crate::nalgebra::SVector::<T, 1>::new(t136)
+        let t92 = t36 * t36;
+        let t120 = time[2] * point[1];
+        let t122 = t120 + time[3];
+        let t123 = point[1] * t122;
+        let t125 = time[4] * t41;
+        let t126 = t123 + t125;
+        let t127 = t92 * t126;
+        let t128 = time[1] - t127;
+        let t129 = point[0] * t128;
+        crate::nalgebra::SVector::<T, 1>::new(t129)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

@@ -39,7 +39,7 @@ impl<T: crate::Real> Default for AxisAligned3dParameters<T> {
 pub struct AxisAligned3d<T: crate::Real> {
     parameters: AxisAligned3dParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 25],
+    fixed: [T; 26],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> AxisAligned3d<T> {
@@ -146,36 +146,35 @@ impl<T: crate::Real> AxisAligned3d<T> {
         let t135 = parameters.rho0 * t88;
         let t136 = t135 * t98;
         let t137 = t134 / t136;
-        let t147 = t114 + t90;
-        let t148 = t20 * t147;
-        let t153 = t64 / parameters.rho0;
-        let t159 = t65 * t130;
-        let t160 = t159 / t136;
-        let t176 = T::one() / parameters.rho0;
-        let t200 = parameters.A * parameters.A;
-        let t201 = t200 * parameters.A;
-        let t202 = t63 * t63;
-        let t203 = t201 * t202;
-        let t204 = t203 * t147;
-        let t205 = t204 / parameters.rho0;
-        let t206 = t63 * T::pi();
-        let t207 = T::nearest(2.0) * t200;
-        let t208 = t207 * t206;
-        let t209 = t208 * t147;
-        let t210 = t209 / parameters.rho0;
-        let t211 = t65 * parameters.nu;
-        let t212 = t211 / t136;
-        let t214 = T::nearest(0.125) * t201;
-        let t215 = t214 * t202;
-        let t216 = t215 * t147;
-        let t217 = t216 / parameters.rho0;
-        let t218 = T::nearest(0.5) * t200;
-        let t219 = t218 * t206;
-        let t220 = t219 * t147;
-        let t221 = t220 / parameters.rho0;
-        let t222 = t71 * parameters.nu;
-        let t223 = t222 / t136;
-        let t224 = T::nearest(2.0) / t6;
+        let t140 = t114 + t90;
+        let t146 = t20 * t140;
+        let t153 = T::one() / parameters.rho0;
+        let t157 = t65 * t130;
+        let t158 = t157 / t136;
+        let t179 = parameters.A * parameters.A;
+        let t180 = t179 * parameters.A;
+        let t181 = t63 * t63;
+        let t182 = t180 * t181;
+        let t183 = t182 * t140;
+        let t184 = t183 / parameters.rho0;
+        let t185 = t63 * T::pi();
+        let t186 = T::nearest(2.0) * t179;
+        let t187 = t186 * t185;
+        let t188 = t187 * t140;
+        let t189 = t188 / parameters.rho0;
+        let t190 = t65 * parameters.nu;
+        let t191 = t190 / t136;
+        let t193 = T::nearest(0.125) * t180;
+        let t194 = t193 * t181;
+        let t195 = t194 * t140;
+        let t196 = t195 / parameters.rho0;
+        let t197 = T::nearest(0.5) * t179;
+        let t198 = t197 * t185;
+        let t199 = t198 * t140;
+        let t200 = t199 / parameters.rho0;
+        let t201 = t71 * parameters.nu;
+        let t202 = t201 / t136;
+        let t203 = T::nearest(2.0) / t6;
         Ok(AxisAligned3d {
             parameters,
             fixed: [
@@ -186,6 +185,7 @@ impl<T: crate::Real> AxisAligned3d<T> {
                 t21,
                 t50,
                 t55,
+                t64,
                 t66,
                 t70,
                 t72,
@@ -193,17 +193,17 @@ impl<T: crate::Real> AxisAligned3d<T> {
                 t108,
                 t114,
                 t137,
-                t148,
+                t140,
+                t146,
                 t153,
-                t160,
-                t176,
-                t205,
-                t210,
-                t212,
-                t217,
-                t221,
-                t223,
-                t224,
+                t158,
+                t184,
+                t189,
+                t191,
+                t196,
+                t200,
+                t202,
+                t203,
             ],
         })
     }
@@ -302,12 +302,12 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t39 = X[0].sin_pi();
         let t42 = X[1].sin_pi();
         let t46 = X[2].sin_pi();
-        let t67 = self.fixed[7] * t8;
+        let t67 = self.fixed[8] * t8;
         let t68 = t67 * t39;
         let t69 = -t68;
-        let t73 = self.fixed[9] * t14;
+        let t73 = self.fixed[10] * t14;
         let t74 = t73 * t42;
-        let t75 = self.fixed[9] * t18;
+        let t75 = self.fixed[10] * t18;
         let t76 = t75 * t46;
         crate::nalgebra::SVector::<T, 3>::new(t69, t74, t76)
     }
@@ -461,23 +461,23 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t105 = t104 + t99;
         let t106 = t105 - t31;
         let t107 = t106.ln_of_both(t38);
-        let t109 = self.fixed[11] * t8;
+        let t109 = self.fixed[12] * t8;
         let t110 = t109 * t22;
         let t111 = t110 * t96;
         let t115 = t107 * t94;
-        let t116 = self.fixed[12] * t115;
+        let t116 = self.fixed[13] * t115;
         let t117 = t111 + t116;
         let t118 = t95 + T::one();
         let t119 = t28 * t118;
-        let t120 = self.fixed[10] * t119;
+        let t120 = self.fixed[11] * t119;
         let t121 = t107 * t95;
-        let t122 = self.fixed[12] * t121;
+        let t122 = self.fixed[13] * t121;
         let t123 = t120 + t122;
         let t124 = t93 + T::one();
         let t125 = t32 * t124;
-        let t126 = self.fixed[10] * t125;
+        let t126 = self.fixed[11] * t125;
         let t127 = t107 * t93;
-        let t128 = self.fixed[12] * t127;
+        let t128 = self.fixed[13] * t127;
         let t129 = t126 + t128;
         crate::nalgebra::SMatrix::<
             T,
@@ -540,65 +540,51 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t105 = t104 + t99;
         let t106 = t105 - t31;
         let t107 = t106.ln_of_both(t38);
-        let t109 = self.fixed[11] * t8;
-        let t110 = t109 * t22;
-        let t138 = self.fixed[13] * t8;
+        let t118 = t95 + T::one();
+        let t119 = t28 * t118;
+        let t121 = t107 * t95;
+        let t122 = self.fixed[13] * t121;
+        let t124 = t93 + T::one();
+        let t125 = t32 * t124;
+        let t127 = t107 * t93;
+        let t128 = self.fixed[13] * t127;
+        let t138 = self.fixed[14] * t8;
         let t139 = t138 * t39;
-        let t140 = self.fixed[12] * t107;
-        let t141 = t140 + t110;
-        let t142 = self.fixed[12] - t141;
-        let t143 = t94 * t142;
-        let t144 = self.fixed[10] + t143;
-        let t145 = t102 * t144;
-        let t146 = self.fixed[3] * t145;
-        let t149 = self.fixed[14] * t22;
-        let t150 = t8 * t149;
-        let t151 = t146 + t150;
-        let t152 = t151 + t140;
-        let t154 = self.fixed[15] * t8;
-        let t155 = t154 * t39;
-        let t156 = t152 * t94;
-        let t157 = t155 * t156;
-        let t158 = t139 - t157;
-        let t161 = self.fixed[16] * t14;
+        let t141 = self.fixed[7] * t8;
+        let t142 = t141 * t39;
+        let t143 = t142 * t94;
+        let t144 = -t143;
+        let t145 = t142 + t143;
+        let t147 = self.fixed[16] * t8;
+        let t148 = t147 * t22;
+        let t149 = t148 * t145;
+        let t150 = t107 * t144;
+        let t151 = self.fixed[13] * t150;
+        let t152 = t149 - t151;
+        let t154 = t152 * t94;
+        let t155 = self.fixed[17] * t154;
+        let t156 = t139 - t155;
+        let t159 = self.fixed[18] * t14;
+        let t160 = t159 * t42;
+        let t161 = self.fixed[9] * t14;
         let t162 = t161 * t42;
-        let t163 = self.fixed[8] * t14;
-        let t164 = t163 * t42;
-        let t165 = self.fixed[10] * t28;
-        let t166 = t140 + t165;
-        let t167 = self.fixed[12] * t95;
-        let t168 = self.fixed[10] + t167;
-        let t169 = t107 - t27;
-        let t170 = self.fixed[12] * t169;
-        let t171 = t166 * t95;
-        let t172 = t168 - t171;
-        let t173 = self.fixed[10] + t172;
-        let t174 = t28 * t173;
-        let t175 = t170 + t174;
-        let t177 = t164 * t175;
-        let t178 = t177 * t95;
-        let t179 = self.fixed[17] * t178;
-        let t180 = t179 - t162;
-        let t181 = self.fixed[16] * t18;
-        let t182 = t181 * t46;
-        let t183 = self.fixed[8] * t18;
-        let t184 = t183 * t46;
-        let t185 = self.fixed[10] * t32;
-        let t186 = t140 + t185;
-        let t187 = self.fixed[12] * t93;
-        let t188 = self.fixed[10] + t187;
-        let t189 = t107 - t31;
-        let t190 = self.fixed[12] * t189;
-        let t191 = t186 * t93;
-        let t192 = t188 - t191;
-        let t193 = self.fixed[10] + t192;
-        let t194 = t32 * t193;
-        let t195 = t190 + t194;
-        let t196 = t184 * t195;
-        let t197 = t196 * t93;
-        let t198 = self.fixed[17] * t197;
-        let t199 = t198 - t182;
-        crate::nalgebra::SVector::<T, 3>::new(t158, t180, t199)
+        let t163 = self.fixed[15] * t119;
+        let t164 = t122 + t163;
+        let t165 = t162 * t164;
+        let t166 = t165 * t95;
+        let t167 = self.fixed[17] * t166;
+        let t168 = t167 - t160;
+        let t169 = self.fixed[18] * t18;
+        let t170 = t169 * t46;
+        let t171 = self.fixed[9] * t18;
+        let t172 = t171 * t46;
+        let t173 = self.fixed[15] * t125;
+        let t174 = t128 + t173;
+        let t175 = t172 * t174;
+        let t176 = t175 * t93;
+        let t177 = self.fixed[17] * t176;
+        let t178 = t177 - t170;
+        crate::nalgebra::SVector::<T, 3>::new(t156, t168, t178)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> crate::Fields<T, 3> {
         let t7 = self.fixed[0] * t;
@@ -645,12 +631,12 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t60 = self.fixed[6] * t59;
         let t61 = t60 * t46;
         let t62 = -t61;
-        let t67 = self.fixed[7] * t8;
+        let t67 = self.fixed[8] * t8;
         let t68 = t67 * t39;
         let t69 = -t68;
-        let t73 = self.fixed[9] * t14;
+        let t73 = self.fixed[10] * t14;
         let t74 = t73 * t42;
-        let t75 = self.fixed[9] * t18;
+        let t75 = self.fixed[10] * t18;
         let t76 = t75 * t46;
         let t78 = self.fixed[3] * t14;
         let t79 = t78 * t25;
@@ -675,80 +661,60 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t105 = t104 + t99;
         let t106 = t105 - t31;
         let t107 = t106.ln_of_both(t38);
-        let t109 = self.fixed[11] * t8;
+        let t109 = self.fixed[12] * t8;
         let t110 = t109 * t22;
         let t111 = t110 * t96;
         let t115 = t107 * t94;
-        let t116 = self.fixed[12] * t115;
+        let t116 = self.fixed[13] * t115;
         let t117 = t111 + t116;
         let t118 = t95 + T::one();
         let t119 = t28 * t118;
-        let t120 = self.fixed[10] * t119;
+        let t120 = self.fixed[11] * t119;
         let t121 = t107 * t95;
-        let t122 = self.fixed[12] * t121;
+        let t122 = self.fixed[13] * t121;
         let t123 = t120 + t122;
         let t124 = t93 + T::one();
         let t125 = t32 * t124;
-        let t126 = self.fixed[10] * t125;
+        let t126 = self.fixed[11] * t125;
         let t127 = t107 * t93;
-        let t128 = self.fixed[12] * t127;
+        let t128 = self.fixed[13] * t127;
         let t129 = t126 + t128;
-        let t138 = self.fixed[13] * t8;
+        let t138 = self.fixed[14] * t8;
         let t139 = t138 * t39;
-        let t140 = self.fixed[12] * t107;
-        let t141 = t140 + t110;
-        let t142 = self.fixed[12] - t141;
-        let t143 = t94 * t142;
-        let t144 = self.fixed[10] + t143;
-        let t145 = t102 * t144;
-        let t146 = self.fixed[3] * t145;
-        let t149 = self.fixed[14] * t22;
-        let t150 = t8 * t149;
-        let t151 = t146 + t150;
-        let t152 = t151 + t140;
-        let t154 = self.fixed[15] * t8;
-        let t155 = t154 * t39;
-        let t156 = t152 * t94;
-        let t157 = t155 * t156;
-        let t158 = t139 - t157;
-        let t161 = self.fixed[16] * t14;
+        let t141 = self.fixed[7] * t8;
+        let t142 = t141 * t39;
+        let t143 = t142 * t94;
+        let t144 = -t143;
+        let t145 = t142 + t143;
+        let t147 = self.fixed[16] * t8;
+        let t148 = t147 * t22;
+        let t149 = t148 * t145;
+        let t150 = t107 * t144;
+        let t151 = self.fixed[13] * t150;
+        let t152 = t149 - t151;
+        let t154 = t152 * t94;
+        let t155 = self.fixed[17] * t154;
+        let t156 = t139 - t155;
+        let t159 = self.fixed[18] * t14;
+        let t160 = t159 * t42;
+        let t161 = self.fixed[9] * t14;
         let t162 = t161 * t42;
-        let t163 = self.fixed[8] * t14;
-        let t164 = t163 * t42;
-        let t165 = self.fixed[10] * t28;
-        let t166 = t140 + t165;
-        let t167 = self.fixed[12] * t95;
-        let t168 = self.fixed[10] + t167;
-        let t169 = t107 - t27;
-        let t170 = self.fixed[12] * t169;
-        let t171 = t166 * t95;
-        let t172 = t168 - t171;
-        let t173 = self.fixed[10] + t172;
-        let t174 = t28 * t173;
-        let t175 = t170 + t174;
-        let t177 = t164 * t175;
-        let t178 = t177 * t95;
-        let t179 = self.fixed[17] * t178;
-        let t180 = t179 - t162;
-        let t181 = self.fixed[16] * t18;
-        let t182 = t181 * t46;
-        let t183 = self.fixed[8] * t18;
-        let t184 = t183 * t46;
-        let t185 = self.fixed[10] * t32;
-        let t186 = t140 + t185;
-        let t187 = self.fixed[12] * t93;
-        let t188 = self.fixed[10] + t187;
-        let t189 = t107 - t31;
-        let t190 = self.fixed[12] * t189;
-        let t191 = t186 * t93;
-        let t192 = t188 - t191;
-        let t193 = self.fixed[10] + t192;
-        let t194 = t32 * t193;
-        let t195 = t190 + t194;
-        let t196 = t184 * t195;
-        let t197 = t196 * t93;
-        let t198 = self.fixed[17] * t197;
-        let t199 = t198 - t182;
+        let t163 = self.fixed[15] * t119;
+        let t164 = t122 + t163;
+        let t165 = t162 * t164;
+        let t166 = t165 * t95;
+        let t167 = self.fixed[17] * t166;
+        let t168 = t167 - t160;
+        let t169 = self.fixed[18] * t18;
+        let t170 = t169 * t46;
+        let t171 = self.fixed[9] * t18;
+        let t172 = t171 * t46;
+        let t173 = self.fixed[15] * t125;
+        let t174 = t128 + t173;
+        let t175 = t172 * t174;
+        let t176 = t175 * t93;
+        let t177 = self.fixed[17] * t176;
+        let t178 = t177 - t170;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 3>::new(t41, t45, t49),
             v: crate::nalgebra::SVector::<T, 3>::new(t52, t58, t62),
@@ -799,7 +765,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 T::zero(),
                 t129,
             ),
-            b: crate::nalgebra::SVector::<T, 3>::new(t158, t180, t199),
+            b: crate::nalgebra::SVector::<T, 3>::new(t156, t168, t178),
         }
     }
     fn traction(
@@ -829,24 +795,24 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t36 = t32 + T::one();
                 let t99 = t28 * t36;
                 let t100 = t99 - t31;
-                let t225 = t23 + T::one();
-                let t226 = T::one() / t225;
-                let t227 = t226 + T::one();
-                let t228 = t8 * t100;
-                let t229 = self.fixed[3] * t228;
-                let t230 = t229 + t99;
-                let t231 = t230 - t31;
-                let t232 = t23 + t231;
-                let t233 = t35 * t36;
-                let t234 = t225 * t233;
-                let t235 = t232.ln_of_both(t234);
-                let t236 = t8 * t227;
-                let t237 = self.fixed[11] * t236;
-                let t238 = self.fixed[12] * t226;
-                let t239 = t238 * t235;
-                let t240 = t237 + t239;
-                let t241 = -t240;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t241, T::zero(), T::zero()))
+                let t204 = t23 + T::one();
+                let t205 = T::one() / t204;
+                let t206 = t205 + T::one();
+                let t207 = t8 * t100;
+                let t208 = self.fixed[3] * t207;
+                let t209 = t208 + t99;
+                let t210 = t209 - t31;
+                let t211 = t23 + t210;
+                let t212 = t35 * t36;
+                let t213 = t204 * t212;
+                let t214 = t211.ln_of_both(t213);
+                let t215 = t8 * t206;
+                let t216 = self.fixed[12] * t215;
+                let t217 = self.fixed[13] * t205;
+                let t218 = t217 * t214;
+                let t219 = t216 + t218;
+                let t220 = -t219;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t220, T::zero(), T::zero()))
             }
             crate::Surface::Upper(0) => {
                 let t7 = self.fixed[0] * t;
@@ -868,24 +834,24 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t36 = t32 + T::one();
                 let t99 = t28 * t36;
                 let t100 = t99 - t31;
-                let t228 = t8 * t100;
-                let t229 = self.fixed[3] * t228;
-                let t233 = t35 * t36;
-                let t242 = T::one() - t23;
-                let t243 = T::one() / t242;
-                let t244 = t243 + T::one();
-                let t245 = t99 - t229;
-                let t246 = t245 - t31;
-                let t247 = t246 - t23;
-                let t248 = t242 * t233;
-                let t249 = t247.ln_of_both(t248);
-                let t250 = t8 * t244;
-                let t251 = self.fixed[11] * t250;
-                let t252 = self.fixed[12] * t243;
-                let t253 = t252 * t249;
-                let t254 = t251 - t253;
-                let t255 = -t254;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t255, T::zero(), T::zero()))
+                let t207 = t8 * t100;
+                let t208 = self.fixed[3] * t207;
+                let t212 = t35 * t36;
+                let t221 = T::one() - t23;
+                let t222 = T::one() / t221;
+                let t223 = t222 + T::one();
+                let t224 = t99 - t208;
+                let t225 = t224 - t31;
+                let t226 = t225 - t23;
+                let t227 = t221 * t212;
+                let t228 = t226.ln_of_both(t227);
+                let t229 = t8 * t223;
+                let t230 = self.fixed[12] * t229;
+                let t231 = self.fixed[13] * t222;
+                let t232 = t231 * t228;
+                let t233 = t230 - t232;
+                let t234 = -t233;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t234, T::zero(), T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t7 = self.fixed[0] * t;
@@ -905,27 +871,27 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t34 = t24 + T::one();
                 let t36 = t32 + T::one();
                 let t102 = t8 * t22;
-                let t256 = -t26;
-                let t257 = t256 + T::one();
-                let t258 = T::one() / t257;
-                let t259 = t258 + T::one();
-                let t260 = t32 * t257;
-                let t261 = t260 - t26;
-                let t262 = t261 + T::one();
-                let t263 = t102 * t262;
-                let t264 = self.fixed[3] * t263;
-                let t265 = t264 + t260;
-                let t266 = t265 - t26;
-                let t267 = t34 * t36;
-                let t268 = t257 * t267;
-                let t269 = t266.ln_of_both(t268);
-                let t270 = t256 * t259;
-                let t271 = self.fixed[10] * t270;
-                let t272 = self.fixed[12] * t258;
-                let t273 = t272 * t269;
-                let t274 = t271 + t273;
-                let t275 = -t274;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t275, T::zero()))
+                let t235 = -t26;
+                let t236 = t235 + T::one();
+                let t237 = T::one() / t236;
+                let t238 = t237 + T::one();
+                let t239 = t32 * t236;
+                let t240 = t239 - t26;
+                let t241 = t240 + T::one();
+                let t242 = t102 * t241;
+                let t243 = self.fixed[3] * t242;
+                let t244 = t243 + t239;
+                let t245 = t244 - t26;
+                let t246 = t34 * t36;
+                let t247 = t236 * t246;
+                let t248 = t245.ln_of_both(t247);
+                let t249 = t235 * t238;
+                let t250 = self.fixed[11] * t249;
+                let t251 = self.fixed[13] * t237;
+                let t252 = t251 * t248;
+                let t253 = t250 + t252;
+                let t254 = -t253;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t254, T::zero()))
             }
             crate::Surface::Upper(1) => {
                 let t7 = self.fixed[0] * t;
@@ -945,25 +911,25 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t34 = t24 + T::one();
                 let t36 = t32 + T::one();
                 let t102 = t8 * t22;
-                let t267 = t34 * t36;
-                let t276 = t26 + T::one();
-                let t277 = T::one() / t276;
-                let t278 = t277 + T::one();
-                let t279 = t32 * t276;
-                let t280 = t26 + t279;
-                let t281 = t280 + T::one();
-                let t282 = t102 * t281;
-                let t283 = self.fixed[3] * t282;
-                let t284 = t283 + t279;
-                let t285 = t26 + t284;
-                let t286 = t276 * t267;
-                let t287 = t285.ln_of_both(t286);
-                let t288 = t26 * t278;
-                let t289 = self.fixed[10] * t288;
-                let t290 = self.fixed[12] * t277;
-                let t291 = t290 * t287;
-                let t292 = t289 + t291;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t292, T::zero()))
+                let t246 = t34 * t36;
+                let t255 = t26 + T::one();
+                let t256 = T::one() / t255;
+                let t257 = t256 + T::one();
+                let t258 = t32 * t255;
+                let t259 = t26 + t258;
+                let t260 = t259 + T::one();
+                let t261 = t102 * t260;
+                let t262 = self.fixed[3] * t261;
+                let t263 = t262 + t258;
+                let t264 = t26 + t263;
+                let t265 = t255 * t246;
+                let t266 = t264.ln_of_both(t265);
+                let t267 = t26 * t257;
+                let t268 = self.fixed[11] * t267;
+                let t269 = self.fixed[13] * t256;
+                let t270 = t269 * t266;
+                let t271 = t268 + t270;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t271, T::zero()))
             }
             crate::Surface::Lower(2) => {
                 let t7 = self.fixed[0] * t;
@@ -984,26 +950,26 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t35 = t28 + T::one();
                 let t37 = t34 * t35;
                 let t102 = t8 * t22;
-                let t293 = -t30;
-                let t294 = t293 + T::one();
-                let t295 = T::one() / t294;
-                let t296 = t295 + T::one();
-                let t297 = t28 * t294;
-                let t298 = t297 - t30;
-                let t299 = t298 + T::one();
-                let t300 = t102 * t299;
-                let t301 = self.fixed[3] * t300;
-                let t302 = t301 + t297;
-                let t303 = t302 - t30;
-                let t304 = t294 * t37;
-                let t305 = t303.ln_of_both(t304);
-                let t306 = t293 * t296;
-                let t307 = self.fixed[10] * t306;
-                let t308 = self.fixed[12] * t295;
-                let t309 = t308 * t305;
-                let t310 = t307 + t309;
-                let t311 = -t310;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t311))
+                let t272 = -t30;
+                let t273 = t272 + T::one();
+                let t274 = T::one() / t273;
+                let t275 = t274 + T::one();
+                let t276 = t28 * t273;
+                let t277 = t276 - t30;
+                let t278 = t277 + T::one();
+                let t279 = t102 * t278;
+                let t280 = self.fixed[3] * t279;
+                let t281 = t280 + t276;
+                let t282 = t281 - t30;
+                let t283 = t273 * t37;
+                let t284 = t282.ln_of_both(t283);
+                let t285 = t272 * t275;
+                let t286 = self.fixed[11] * t285;
+                let t287 = self.fixed[13] * t274;
+                let t288 = t287 * t284;
+                let t289 = t286 + t288;
+                let t290 = -t289;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t290))
             }
             crate::Surface::Upper(2) => {
                 let t7 = self.fixed[0] * t;
@@ -1024,24 +990,24 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t35 = t28 + T::one();
                 let t37 = t34 * t35;
                 let t102 = t8 * t22;
-                let t312 = t30 + T::one();
-                let t313 = T::one() / t312;
-                let t314 = t313 + T::one();
-                let t315 = t28 * t312;
-                let t316 = t30 + t315;
-                let t317 = t316 + T::one();
-                let t318 = t102 * t317;
-                let t319 = self.fixed[3] * t318;
-                let t320 = t319 + t315;
-                let t321 = t30 + t320;
-                let t322 = t312 * t37;
-                let t323 = t321.ln_of_both(t322);
-                let t324 = t30 * t314;
-                let t325 = self.fixed[10] * t324;
-                let t326 = self.fixed[12] * t313;
-                let t327 = t326 * t323;
-                let t328 = t325 + t327;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t328))
+                let t291 = t30 + T::one();
+                let t292 = T::one() / t291;
+                let t293 = t292 + T::one();
+                let t294 = t28 * t291;
+                let t295 = t30 + t294;
+                let t296 = t295 + T::one();
+                let t297 = t102 * t296;
+                let t298 = self.fixed[3] * t297;
+                let t299 = t298 + t294;
+                let t300 = t30 + t299;
+                let t301 = t291 * t37;
+                let t302 = t300.ln_of_both(t301);
+                let t303 = t30 * t293;
+                let t304 = self.fixed[11] * t303;
+                let t305 = self.fixed[13] * t292;
+                let t306 = t305 * t302;
+                let t307 = t304 + t306;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t307))
             }
             _ => None,
         }
@@ -1085,8 +1051,8 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
     }
     fn law(&self) -> crate::Law<T> {
         crate::Law::Library(crate::Material::NeoHookean {
-            lambda: self.fixed[12],
-            mu: self.fixed[10],
+            lambda: self.fixed[13],
+            mu: self.fixed[11],
         })
     }
     fn density(&self) -> T {
@@ -1096,7 +1062,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[24]
+        self.fixed[25]
     }
     fn body_force_at(
         &self,
@@ -1129,40 +1095,40 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 15, 6> for AxisAligned3d<T> {
         let t23 = self.fixed[3] * t8;
         let t26 = self.fixed[4] * t14;
         let t30 = self.fixed[4] * t18;
-        let t138 = self.fixed[13] * t8;
-        let t161 = self.fixed[16] * t14;
-        let t181 = self.fixed[16] * t18;
-        let t337 = t8 * t8;
-        let t338 = t337 * t8;
-        let t339 = self.fixed[18] * t338;
-        let t341 = self.fixed[19] * t337;
-        let t351 = self.fixed[20] * t8;
-        let t359 = t14 * t14;
-        let t360 = t359 * t14;
-        let t361 = self.fixed[21] * t360;
-        let t363 = self.fixed[22] * t359;
-        let t366 = self.fixed[23] * t14;
-        let t374 = t18 * t18;
-        let t375 = t374 * t18;
-        let t376 = self.fixed[21] * t375;
-        let t378 = self.fixed[22] * t374;
-        let t381 = self.fixed[23] * t18;
+        let t138 = self.fixed[14] * t8;
+        let t159 = self.fixed[18] * t14;
+        let t169 = self.fixed[18] * t18;
+        let t316 = t8 * t8;
+        let t317 = t316 * t8;
+        let t318 = self.fixed[19] * t317;
+        let t320 = self.fixed[20] * t316;
+        let t330 = self.fixed[21] * t8;
+        let t338 = t14 * t14;
+        let t339 = t338 * t14;
+        let t340 = self.fixed[22] * t339;
+        let t342 = self.fixed[23] * t338;
+        let t345 = self.fixed[24] * t14;
+        let t353 = t18 * t18;
+        let t354 = t353 * t18;
+        let t355 = self.fixed[22] * t354;
+        let t357 = self.fixed[23] * t353;
+        let t360 = self.fixed[24] * t18;
         [
             t23,
             t26,
             t30,
             t138,
-            t161,
-            t181,
-            t339,
-            t341,
-            t351,
-            t361,
-            t363,
-            t366,
-            t376,
-            t378,
-            t381,
+            t159,
+            t169,
+            t318,
+            t320,
+            t330,
+            t340,
+            t342,
+            t345,
+            t355,
+            t357,
+            t360,
         ]
     }
     #[inline]
@@ -1185,50 +1151,50 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 15, 6> for AxisAligned3d<T> {
         let t27 = time[1] * point[1];
         let t31 = time[2] * point[2];
         let t34 = t24 + T::one();
-        let t329 = T::one() - t27;
-        let t330 = T::one() - t31;
-        let t331 = t34 * t329;
-        let t332 = t330 * t331;
-        let t333 = T::one() / t332;
-        let t334 = t330 * t333;
-        let t335 = t329 * t334;
-        let t336 = t335 * t335;
-        let t340 = time[6] * point[0];
-        let t342 = t340 + time[7];
-        let t343 = point[0] * t342;
-        let t344 = t27 * t330;
-        let t345 = t344 + t31;
-        let t346 = T::one() - t345;
-        let t347 = t24 * t346;
-        let t348 = t347 - t344;
-        let t349 = t348 - t31;
-        let t350 = t349.ln_of_both_if::<NEAR>(t332);
-        let t352 = time[8] * t350;
-        let t353 = t343 + t352;
-        let t354 = t336 * t353;
-        let t355 = time[3] - t354;
-        let t356 = point[3] * t355;
-        let t357 = t34 * t334;
-        let t358 = t357 * t357;
-        let t362 = time[9] * point[1];
-        let t364 = t362 - time[10];
-        let t365 = point[1] * t364;
-        let t367 = time[11] * t350;
-        let t368 = t365 + t367;
-        let t369 = t358 * t368;
-        let t370 = t369 - time[4];
-        let t371 = point[4] * t370;
-        let t372 = t331 * t333;
-        let t373 = t372 * t372;
-        let t377 = time[12] * point[2];
-        let t379 = t377 - time[13];
-        let t380 = point[2] * t379;
-        let t382 = time[14] * t350;
-        let t383 = t380 + t382;
-        let t384 = t373 * t383;
-        let t385 = t384 - time[5];
-        let t386 = point[5] * t385;
-        crate::nalgebra::SVector::<T, 3>::new(t356, t371, t386)
+        let t308 = T::one() - t27;
+        let t309 = T::one() - t31;
+        let t310 = t34 * t308;
+        let t311 = t309 * t310;
+        let t312 = T::one() / t311;
+        let t313 = t309 * t312;
+        let t314 = t308 * t313;
+        let t315 = t314 * t314;
+        let t319 = time[6] * point[0];
+        let t321 = t319 + time[7];
+        let t322 = point[0] * t321;
+        let t323 = t27 * t309;
+        let t324 = t323 + t31;
+        let t325 = T::one() - t324;
+        let t326 = t24 * t325;
+        let t327 = t326 - t323;
+        let t328 = t327 - t31;
+        let t329 = t328.ln_of_both_if::<NEAR>(t311);
+        let t331 = time[8] * t329;
+        let t332 = t322 + t331;
+        let t333 = t315 * t332;
+        let t334 = time[3] - t333;
+        let t335 = point[3] * t334;
+        let t336 = t34 * t313;
+        let t337 = t336 * t336;
+        let t341 = time[9] * point[1];
+        let t343 = t341 - time[10];
+        let t344 = point[1] * t343;
+        let t346 = time[11] * t329;
+        let t347 = t344 + t346;
+        let t348 = t337 * t347;
+        let t349 = t348 - time[4];
+        let t350 = point[4] * t349;
+        let t351 = t310 * t312;
+        let t352 = t351 * t351;
+        let t356 = time[12] * point[2];
+        let t358 = t356 - time[13];
+        let t359 = point[2] * t358;
+        let t361 = time[14] * t329;
+        let t362 = t359 + t361;
+        let t363 = t352 * t362;
+        let t364 = t363 - time[5];
+        let t365 = point[5] * t364;
+        crate::nalgebra::SVector::<T, 3>::new(t335, t350, t365)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
@@ -1244,40 +1210,40 @@ impl<T: crate::Real> crate::BodyForceOnLattice<T, 3, 15, 2, 5> for AxisAligned3d
         let t23 = self.fixed[3] * t8;
         let t26 = self.fixed[4] * t14;
         let t30 = self.fixed[4] * t18;
-        let t138 = self.fixed[13] * t8;
-        let t161 = self.fixed[16] * t14;
-        let t181 = self.fixed[16] * t18;
-        let t337 = t8 * t8;
-        let t338 = t337 * t8;
-        let t339 = self.fixed[18] * t338;
-        let t341 = self.fixed[19] * t337;
-        let t351 = self.fixed[20] * t8;
-        let t359 = t14 * t14;
-        let t360 = t359 * t14;
-        let t361 = self.fixed[21] * t360;
-        let t363 = self.fixed[22] * t359;
-        let t366 = self.fixed[23] * t14;
-        let t374 = t18 * t18;
-        let t375 = t374 * t18;
-        let t376 = self.fixed[21] * t375;
-        let t378 = self.fixed[22] * t374;
-        let t381 = self.fixed[23] * t18;
+        let t138 = self.fixed[14] * t8;
+        let t159 = self.fixed[18] * t14;
+        let t169 = self.fixed[18] * t18;
+        let t316 = t8 * t8;
+        let t317 = t316 * t8;
+        let t318 = self.fixed[19] * t317;
+        let t320 = self.fixed[20] * t316;
+        let t330 = self.fixed[21] * t8;
+        let t338 = t14 * t14;
+        let t339 = t338 * t14;
+        let t340 = self.fixed[22] * t339;
+        let t342 = self.fixed[23] * t338;
+        let t345 = self.fixed[24] * t14;
+        let t353 = t18 * t18;
+        let t354 = t353 * t18;
+        let t355 = self.fixed[22] * t354;
+        let t357 = self.fixed[23] * t353;
+        let t360 = self.fixed[24] * t18;
         [
             t23,
             t26,
             t30,
             t138,
-            t161,
-            t181,
-            t339,
-            t341,
-            t351,
-            t361,
-            t363,
-            t366,
-            t376,
-            t378,
-            t381,
+            t159,
+            t169,
+            t318,
+            t320,
+            t330,
+            t340,
+            t342,
+            t345,
+            t355,
+            t357,
+            t360,
         ]
     }
     #[inline]
@@ -1311,58 +1277,58 @@ impl<T: crate::Real> crate::BodyForceOnLattice<T, 3, 15, 2, 5> for AxisAligned3d
             0 => {
                 let t24 = time[0] * point[0];
                 let t34 = t24 + T::one();
-                let t340 = time[6] * point[0];
-                let t342 = t340 + time[7];
-                let t343 = point[0] * t342;
-                let t387 = t24.ln_of_both(t34);
-                let t390 = time[8] * t387;
-                let t391 = t343 + t390;
-                let t392 = t34 * t34;
-                let t393 = t391 / t392;
-                let t394 = time[3] - t393;
-                let t405 = point[1] * t394;
-                let t406 = time[8] * point[1];
-                let t407 = t406 / t392;
-                let t412 = time[11] * t387;
-                let t421 = time[14] * t387;
-                [t405, t407, t412, t421, T::zero()]
+                let t319 = time[6] * point[0];
+                let t321 = t319 + time[7];
+                let t322 = point[0] * t321;
+                let t366 = t24.ln_of_both(t34);
+                let t369 = time[8] * t366;
+                let t370 = t322 + t369;
+                let t371 = t34 * t34;
+                let t372 = t370 / t371;
+                let t373 = time[3] - t372;
+                let t384 = point[1] * t373;
+                let t385 = time[8] * point[1];
+                let t386 = t385 / t371;
+                let t391 = time[11] * t366;
+                let t400 = time[14] * t366;
+                [t384, t386, t391, t400, T::zero()]
             }
             1 => {
                 let t27 = time[1] * point[0];
                 let t28 = -t27;
-                let t329 = T::one() - t27;
-                let t362 = time[9] * point[0];
-                let t364 = t362 - time[10];
-                let t365 = point[0] * t364;
-                let t388 = t28.ln_of_both(t329);
-                let t395 = time[11] * t388;
-                let t396 = t365 + t395;
-                let t397 = t329 * t329;
-                let t398 = t396 / t397;
-                let t399 = t398 - time[4];
-                let t413 = point[1] / t397;
-                let t415 = time[11] * point[1];
-                let t416 = t415 / t397;
-                let t418 = point[1] * t399;
-                let t424 = time[14] * t388;
-                [t388, t413, t416, t418, t424]
+                let t308 = T::one() - t27;
+                let t341 = time[9] * point[0];
+                let t343 = t341 - time[10];
+                let t344 = point[0] * t343;
+                let t367 = t28.ln_of_both(t308);
+                let t374 = time[11] * t367;
+                let t375 = t344 + t374;
+                let t376 = t308 * t308;
+                let t377 = t375 / t376;
+                let t378 = t377 - time[4];
+                let t392 = point[1] / t376;
+                let t394 = time[11] * point[1];
+                let t395 = t394 / t376;
+                let t397 = point[1] * t378;
+                let t403 = time[14] * t367;
+                [t367, t392, t395, t397, t403]
             }
             2 => {
                 let t31 = time[2] * point[0];
                 let t32 = -t31;
-                let t330 = T::one() - t31;
-                let t377 = time[12] * point[0];
-                let t379 = t377 - time[13];
-                let t380 = point[0] * t379;
-                let t389 = t32.ln_of_both(t330);
-                let t400 = time[14] * t389;
-                let t401 = t380 + t400;
-                let t402 = t330 * t330;
-                let t403 = t401 / t402;
-                let t404 = t403 - time[5];
-                let t422 = point[1] / t402;
-                let t426 = point[1] * t404;
-                [t389, t422, t426, T::zero(), T::zero()]
+                let t309 = T::one() - t31;
+                let t356 = time[12] * point[0];
+                let t358 = t356 - time[13];
+                let t359 = point[0] * t358;
+                let t368 = t32.ln_of_both(t309);
+                let t379 = time[14] * t368;
+                let t380 = t359 + t379;
+                let t381 = t309 * t309;
+                let t382 = t380 / t381;
+                let t383 = t382 - time[5];
+                let t401 = point[1] / t381;
+                let t405 = point[1] * t383;
+                [t368, t401, t405, T::zero(), T::zero()]
             }
             _ => [T::zero(); 5],
         }
@@ -1373,19 +1339,19 @@ impl<T: crate::Real> crate::BodyForceOnLattice<T, 3, 15, 2, 5> for AxisAligned3d
         time: &[T; 15],
         layers: [&[T; 5]; 3],
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t408 = layers[0][1] * layers[1][0];
-        let t409 = layers[0][1] * layers[2][0];
-        let t410 = layers[0][0] - t408;
-        let t411 = t410 - t409;
-        let t414 = layers[0][2] * layers[1][1];
-        let t417 = layers[1][2] * layers[2][0];
-        let t419 = t414 + t417;
-        let t420 = t419 + layers[1][3];
-        let t423 = layers[0][3] * layers[2][1];
-        let t425 = layers[1][4] * layers[2][1];
-        let t427 = t423 + t425;
-        let t428 = t427 + layers[2][2];
-        crate::nalgebra::SVector::<T, 3>::new(t411, t420, t428)
+        let t387 = layers[0][1] * layers[1][0];
+        let t388 = layers[0][1] * layers[2][0];
+        let t389 = layers[0][0] - t387;
+        let t390 = t389 - t388;
+        let t393 = layers[0][2] * layers[1][1];
+        let t396 = layers[1][2] * layers[2][0];
+        let t398 = t393 + t396;
+        let t399 = t398 + layers[1][3];
+        let t402 = layers[0][3] * layers[2][1];
+        let t404 = layers[1][4] * layers[2][1];
+        let t406 = t402 + t404;
+        let t407 = t406 + layers[2][2];
+        crate::nalgebra::SVector::<T, 3>::new(t390, t399, t407)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
@@ -1406,7 +1372,7 @@ impl<T: crate::Real> crate::StateStages<T, 3, 10, 3, 6> for AxisAligned3d<T> {
         let t47 = self.fixed[2] * t18;
         let t78 = self.fixed[3] * t14;
         let t83 = self.fixed[3] * t18;
-        let t109 = self.fixed[11] * t8;
+        let t109 = self.fixed[12] * t8;
         [t8, t23, t26, t30, t40, t43, t47, t78, t83, t109]
     }
     #[inline]
@@ -1487,19 +1453,19 @@ impl<T: crate::Real> crate::StateStages<T, 3, 10, 3, 6> for AxisAligned3d<T> {
         let t110 = time[9] * point[0];
         let t111 = t110 * t96;
         let t115 = t107 * t94;
-        let t116 = self.fixed[12] * t115;
+        let t116 = self.fixed[13] * t115;
         let t117 = t111 + t116;
         let t118 = t95 + T::one();
         let t119 = t28 * t118;
-        let t120 = self.fixed[10] * t119;
+        let t120 = self.fixed[11] * t119;
         let t121 = t107 * t95;
-        let t122 = self.fixed[12] * t121;
+        let t122 = self.fixed[13] * t121;
         let t123 = t120 + t122;
         let t124 = t93 + T::one();
         let t125 = t32 * t124;
-        let t126 = self.fixed[10] * t125;
+        let t126 = self.fixed[11] * t125;
         let t127 = t107 * t93;
-        let t128 = self.fixed[12] * t127;
+        let t128 = self.fixed[13] * t127;
         let t129 = t126 + t128;
         crate::State {
             u: crate::nalgebra::SVector::<T, 3>::new(t41, t45, t49),

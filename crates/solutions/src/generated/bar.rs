@@ -40,7 +40,7 @@ impl<T: crate::Real> Default for BarParameters<T> {
 pub struct Bar<T: crate::Real> {
     parameters: BarParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 17],
+    fixed: [T; 18],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Bar<T> {
@@ -147,47 +147,43 @@ impl<T: crate::Real> Bar<T> {
         let t54 = parameters.E * parameters.nu;
         let t55 = t43 * t50;
         let t56 = t54 / t55;
-        let t60 = parameters.nu / t50;
-        let t61 = t60 + T::one();
-        let t63 = T::nearest(4.0) * t61;
-        let t64 = t63 / t43;
-        let t65 = T::one() - t64;
-        let t66 = t28 * t65;
-        let t67 = t66 / t29;
-        let t70 = T::nearest(4.0) * parameters.A;
-        let t71 = t70 * t26;
-        let t72 = t71 / t25;
-        let t88 = T::one() / parameters.rho0;
-        let t93 = t56 + t46;
-        let t95 = parameters.A * parameters.A;
-        let t96 = t95 * parameters.A;
-        let t97 = t25 * t25;
-        let t98 = t26 * t26;
-        let t99 = T::nearest(16.0) * t96;
-        let t100 = t99 * t98;
-        let t101 = t100 * t93;
-        let t102 = parameters.rho0 * t97;
-        let t103 = t101 / t102;
-        let t104 = t25 * parameters.L;
-        let t105 = t26 * T::pi();
-        let t106 = T::nearest(16.0) * t95;
-        let t107 = t106 * t105;
-        let t108 = t107 * t93;
-        let t109 = parameters.rho0 * t104;
-        let t110 = t108 / t109;
-        let t111 = t70 * parameters.E;
-        let t112 = t111 * parameters.nu;
-        let t113 = t112 * t26;
-        let t114 = t29 * t43;
-        let t115 = t114 * t50;
-        let t116 = t113 / t115;
-        let t118 = T::nearest(2.0) * parameters.L;
-        let t119 = t118 / t11;
-        let t121 = -t36;
+        let t61 = T::nearest(4.0) * parameters.A;
+        let t62 = t61 * t26;
+        let t63 = t62 / t25;
+        let t67 = t56 + t46;
+        let t74 = T::one() / parameters.rho0;
+        let t80 = parameters.A * parameters.A;
+        let t81 = t80 * parameters.A;
+        let t82 = t25 * t25;
+        let t83 = t26 * t26;
+        let t84 = T::nearest(16.0) * t81;
+        let t85 = t84 * t83;
+        let t86 = t85 * t46;
+        let t87 = parameters.rho0 * t82;
+        let t88 = t86 / t87;
+        let t89 = t25 * parameters.L;
+        let t90 = t26 * T::pi();
+        let t91 = T::nearest(16.0) * t80;
+        let t92 = t91 * t90;
+        let t93 = t92 * t46;
+        let t94 = parameters.rho0 * t89;
+        let t95 = t93 / t94;
+        let t96 = t61 * parameters.E;
+        let t97 = t96 * parameters.nu;
+        let t98 = t97 * t26;
+        let t99 = t29 * t43;
+        let t100 = t99 * t50;
+        let t101 = t98 / t100;
+        let t102 = t46 + t67;
+        let t103 = t62 * t102;
+        let t104 = t103 / t29;
+        let t105 = T::nearest(2.0) * parameters.L;
+        let t106 = t105 / t11;
+        let t108 = -t36;
         if !(t36 < parameters.L) {
             return Err(Self::DESCRIPTION.requirement_broken("2*Pi*A < L", &values));
         }
-        if !(t121 < parameters.L) {
+        if !(t108 < parameters.L) {
             return Err(Self::DESCRIPTION.requirement_broken("-2*Pi*A < L", &values));
         }
         Ok(Bar {
@@ -202,14 +198,15 @@ impl<T: crate::Real> Bar<T> {
                 t37,
                 t46,
                 t56,
+                t63,
                 t67,
-                t72,
+                t74,
                 t88,
-                t103,
-                t110,
-                t116,
-                t119,
-                t121,
+                t95,
+                t101,
+                t104,
+                t106,
+                t108,
             ],
         })
     }
@@ -363,34 +360,28 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
         let t6 = t5.sin_pi();
         let t13 = self.fixed[2] * t;
         let t14 = t13.cos_pi();
+        let t31 = self.fixed[4] * t14;
+        let t32 = t31 * t6;
         let t34 = t5.cos_pi();
         let t38 = self.fixed[6] * t14;
         let t39 = t38 * t34;
         let t41 = t39 + T::one();
         let t47 = T::one() / t41;
         let t51 = t39.log_1p();
-        let t68 = self.fixed[9] * t14;
-        let t69 = t68 * t6;
-        let t73 = self.fixed[10] * t14;
-        let t74 = t73 * t6;
-        let t75 = -t74;
-        let t76 = self.fixed[8] * t51;
-        let t77 = self.fixed[7] * t39;
-        let t78 = t76 + t77;
-        let t79 = self.fixed[8] * t47;
-        let t80 = self.fixed[7] + t79;
-        let t81 = t39 + t51;
-        let t82 = self.fixed[8] * t81;
-        let t83 = t78 * t47;
-        let t84 = t80 - t83;
-        let t85 = self.fixed[7] + t84;
-        let t86 = t39 * t85;
-        let t87 = t82 + t86;
-        let t89 = t75 * t87;
-        let t90 = t89 * t47;
-        let t91 = self.fixed[11] * t90;
-        let t92 = t91 - t69;
-        crate::nalgebra::SVector::<T, 1>::new(t92)
+        let t64 = self.fixed[9] * t14;
+        let t65 = t64 * t6;
+        let t66 = -t65;
+        let t68 = self.fixed[8] * t51;
+        let t69 = t68 - self.fixed[10];
+        let t70 = -t69;
+        let t71 = t47 * t47;
+        let t72 = t70 * t71;
+        let t73 = self.fixed[7] + t72;
+        let t75 = t66 * t73;
+        let t76 = self.fixed[11] * t75;
+        let t77 = t32 + t76;
+        let t78 = -t77;
+        crate::nalgebra::SVector::<T, 1>::new(t78)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 1>, t: T) -> crate::Fields<T, 1> {
         let t5 = self.fixed[0] * X[0];
@@ -418,27 +409,19 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
         let t57 = t51 * t47;
         let t58 = self.fixed[8] * t57;
         let t59 = t53 + t58;
-        let t68 = self.fixed[9] * t14;
-        let t69 = t68 * t6;
-        let t73 = self.fixed[10] * t14;
-        let t74 = t73 * t6;
-        let t75 = -t74;
-        let t76 = self.fixed[8] * t51;
-        let t77 = self.fixed[7] * t39;
-        let t78 = t76 + t77;
-        let t79 = self.fixed[8] * t47;
-        let t80 = self.fixed[7] + t79;
-        let t81 = t39 + t51;
-        let t82 = self.fixed[8] * t81;
-        let t83 = t78 * t47;
-        let t84 = t80 - t83;
-        let t85 = self.fixed[7] + t84;
-        let t86 = t39 * t85;
-        let t87 = t82 + t86;
-        let t89 = t75 * t87;
-        let t90 = t89 * t47;
-        let t91 = self.fixed[11] * t90;
-        let t92 = t91 - t69;
+        let t64 = self.fixed[9] * t14;
+        let t65 = t64 * t6;
+        let t66 = -t65;
+        let t68 = self.fixed[8] * t51;
+        let t69 = t68 - self.fixed[10];
+        let t70 = -t69;
+        let t71 = t47 * t47;
+        let t72 = t70 * t71;
+        let t73 = self.fixed[7] + t72;
+        let t75 = t66 * t73;
+        let t76 = self.fixed[11] * t75;
+        let t77 = t32 + t76;
+        let t78 = -t77;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 1>::new(t16),
             v: crate::nalgebra::SVector::<T, 1>::new(t24),
@@ -447,7 +430,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
             F: crate::nalgebra::SMatrix::<T, 1, 1>::new(t41),
             J: t41,
             P: crate::nalgebra::SMatrix::<T, 1, 1>::new(t59),
-            b: crate::nalgebra::SVector::<T, 1>::new(t92),
+            b: crate::nalgebra::SVector::<T, 1>::new(t78),
         }
     }
     fn traction(
@@ -461,32 +444,32 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
                 let t13 = self.fixed[2] * t;
                 let t14 = t13.cos_pi();
                 let t38 = self.fixed[6] * t14;
-                let t122 = t38 + T::one();
-                let t123 = T::one() / t122;
-                let t124 = t123 + T::one();
-                let t125 = t38.log_1p();
-                let t126 = t38 * t124;
-                let t127 = self.fixed[7] * t126;
-                let t128 = t125 * t123;
-                let t129 = self.fixed[8] * t128;
-                let t130 = t127 + t129;
-                let t131 = -t130;
-                Some(crate::nalgebra::SVector::<T, 1>::new(t131))
+                let t109 = t38 + T::one();
+                let t110 = T::one() / t109;
+                let t111 = t110 + T::one();
+                let t112 = t38.log_1p();
+                let t113 = t38 * t111;
+                let t114 = self.fixed[7] * t113;
+                let t115 = t112 * t110;
+                let t116 = self.fixed[8] * t115;
+                let t117 = t114 + t116;
+                let t118 = -t117;
+                Some(crate::nalgebra::SVector::<T, 1>::new(t118))
             }
             crate::Surface::Upper(0) => {
                 let t13 = self.fixed[2] * t;
                 let t14 = t13.cos_pi();
                 let t38 = self.fixed[6] * t14;
-                let t122 = t38 + T::one();
-                let t123 = T::one() / t122;
-                let t124 = t123 + T::one();
-                let t125 = t38.log_1p();
-                let t126 = t38 * t124;
-                let t127 = self.fixed[7] * t126;
-                let t128 = t125 * t123;
-                let t129 = self.fixed[8] * t128;
-                let t130 = t127 + t129;
-                Some(crate::nalgebra::SVector::<T, 1>::new(t130))
+                let t109 = t38 + T::one();
+                let t110 = T::one() / t109;
+                let t111 = t110 + T::one();
+                let t112 = t38.log_1p();
+                let t113 = t38 * t111;
+                let t114 = self.fixed[7] * t113;
+                let t115 = t112 * t110;
+                let t116 = self.fixed[8] * t115;
+                let t117 = t114 + t116;
+                Some(crate::nalgebra::SVector::<T, 1>::new(t117))
             }
             _ => None,
         }
@@ -525,13 +508,13 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
         self.fixed[1]
     }
     fn period(&self) -> T {
-        self.fixed[15]
+        self.fixed[16]
     }
     fn body_force_at(
         &self,
         X: &[crate::nalgebra::SVector<T, 1>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 1> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 5, 2>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 6, 2>::new(*self, X))
     }
     fn state_at(
         &self,
@@ -541,23 +524,20 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 1, 5, 2> for Bar<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 1, 6, 2> for Bar<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 5] {
+    fn body_force_time(&self, t: T) -> [T; 6] {
         let t13 = self.fixed[2] * t;
         let t14 = t13.cos_pi();
+        let t31 = self.fixed[4] * t14;
         let t38 = self.fixed[6] * t14;
-        let t68 = self.fixed[9] * t14;
-        let t132 = t14 * t14;
-        let t133 = t132 * t14;
-        let t134 = self.fixed[12] * t133;
-        let t135 = -t134;
-        let t137 = self.fixed[13] * t132;
-        let t138 = -t137;
-        let t141 = self.fixed[14] * t14;
-        let t142 = -t141;
-        let t146 = -t68;
-        [t38, t135, t138, t142, t146]
+        let t119 = self.fixed[15] * t14;
+        let t120 = t14 * t14;
+        let t121 = self.fixed[13] * t120;
+        let t122 = t120 * t14;
+        let t123 = self.fixed[12] * t122;
+        let t127 = self.fixed[14] * t14;
+        [t31, t38, t119, t121, t123, t127]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 1>) -> [T; 2] {
@@ -569,23 +549,24 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 5, 2> for Bar<T> {
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
-        time: &[T; 5],
+        time: &[T; 6],
         point: &[T; 2],
     ) -> crate::nalgebra::SVector<T, 1> {
-        let t39 = time[0] * point[1];
+        let t39 = time[1] * point[1];
         let t41 = t39 + T::one();
         let t47 = T::one() / t41;
         let t51 = t39.log_1p();
-        let t117 = t47 * t47;
-        let t136 = time[1] * point[1];
-        let t139 = t136 + time[2];
-        let t140 = point[1] * t139;
-        let t143 = time[3] * t51;
-        let t144 = t140 + t143;
-        let t145 = t117 * t144;
-        let t147 = t145 + time[4];
-        let t148 = point[0] * t147;
-        crate::nalgebra::SVector::<T, 1>::new(t148)
+        let t71 = t47 * t47;
+        let t124 = time[4] * point[1];
+        let t125 = time[3] + t124;
+        let t126 = point[1] * t125;
+        let t128 = time[5] * t51;
+        let t129 = t126 - t128;
+        let t130 = time[2] + t129;
+        let t131 = t71 * t130;
+        let t132 = t131 - time[0];
+        let t133 = point[0] * t132;
+        crate::nalgebra::SVector::<T, 1>::new(t133)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

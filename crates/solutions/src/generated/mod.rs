@@ -25,6 +25,8 @@ mod skew_3d;
 pub use skew_3d::{Skew3d, Skew3dParameters};
 mod sphere_shell;
 pub use sphere_shell::{SphereShell, SphereShellParameters};
+mod swirl;
+pub use swirl::{Swirl, SwirlParameters};
 mod torsion;
 pub use torsion::{Torsion, TorsionParameters};
 mod vortex;
@@ -43,6 +45,7 @@ pub const CATALOGUE: &[&Description] = &[
     &Skew2dRotating::<f64>::DESCRIPTION,
     &Skew3d::<f64>::DESCRIPTION,
     &SphereShell::<f64>::DESCRIPTION,
+    &Swirl::<f64>::DESCRIPTION,
     &Torsion::<f64>::DESCRIPTION,
     &Vortex::<f64>::DESCRIPTION,
 ];
@@ -108,6 +111,7 @@ fn build_in<T: Real>(
             }
             "skew-3d" => Skew3d::from_values(values).map(AnySolution::from),
             "sphere-shell" => SphereShell::from_values(values).map(AnySolution::from),
+            "swirl" => Swirl::from_values(values).map(AnySolution::from),
             "torsion" => Torsion::from_values(values).map(AnySolution::from),
             "vortex" => Vortex::from_values(values).map(AnySolution::from),
             _ => return None,

@@ -41,7 +41,7 @@ impl<T: crate::Real> Default for RingParameters<T> {
 pub struct Ring<T: crate::Real> {
     parameters: RingParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 22],
+    fixed: [T; 14],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Ring<T> {
@@ -142,33 +142,10 @@ impl<T: crate::Real> Ring<T> {
         let t88 = T::nearest(6.0) * parameters.A;
         let t89 = t88 / t26;
         let t97 = T::nearest(0.5) * parameters.E;
-        let t119 = parameters.Ri + parameters.Ro;
-        let t127 = t51 / parameters.rho0;
-        let t141 = t97 / parameters.rho0;
-        let t153 = parameters.A * parameters.A;
-        let t154 = t153 * t153;
-        let t155 = t15 * t15;
-        let t156 = t19 * t19;
-        let t158 = T::nearest(36.0) * t154;
-        let t159 = t158 * t97;
-        let t160 = parameters.rho0 * t155;
-        let t161 = t160 * t156;
-        let t162 = t159 / t161;
-        let t168 = t155 * t156;
-        let t169 = T::nearest(36.0) / t168;
-        let t178 = T::nearest(3.0) / t26;
-        let t183 = T::nearest(12.0) / t26;
-        let t187 = t153 * parameters.A;
-        let t188 = T::nearest(6.0) * t187;
-        let t189 = t188 * t97;
-        let t190 = parameters.rho0 * t15;
-        let t191 = t190 * t19;
-        let t192 = t189 / t191;
-        let t198 = T::nearest(72.0) / t168;
-        let t203 = t153 * t97;
-        let t204 = t203 / parameters.rho0;
-        let t217 = T::nearest(2.0) / t11;
-        let t219 = parameters.A * t97;
+        let t120 = parameters.Ri + parameters.Ro;
+        let t138 = t97 / parameters.rho0;
+        let t161 = T::nearest(2.0) / t11;
+        let t163 = parameters.A * t97;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -183,23 +160,15 @@ impl<T: crate::Real> Ring<T> {
                 t24,
                 t28,
                 t44,
-                t50,
                 t53,
                 t61,
+                t88,
                 t89,
                 t97,
-                t119,
-                t127,
-                t141,
-                t162,
-                t169,
-                t178,
-                t183,
-                t192,
-                t198,
-                t204,
-                t217,
-                t219,
+                t120,
+                t138,
+                t161,
+                t163,
             ],
         })
     }
@@ -323,7 +292,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t36 = t33 * t35;
         let t38 = t31 * X[1];
         let t39 = t38 * t35;
-        let t54 = self.fixed[6] * t13;
+        let t54 = self.fixed[5] * t13;
         let t55 = t54 * t36;
         let t56 = -t55;
         let t57 = t54 * t39;
@@ -355,14 +324,14 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t59 = t5 - self.parameters.Ri;
         let t62 = t20 * t2;
         let t63 = t62 * t59;
-        let t64 = self.fixed[7] * t63;
+        let t64 = self.fixed[6] * t63;
         let t65 = t31 * t3;
         let t66 = t65 * t35;
         let t67 = t64 + t66;
         let t68 = t67 * t34;
         let t69 = t32 * t68;
         let t70 = t20 * t59;
-        let t71 = self.fixed[7] * t70;
+        let t71 = self.fixed[6] * t70;
         let t72 = t31 * t35;
         let t73 = t71 - t72;
         let t74 = X[0] * X[1];
@@ -371,7 +340,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t77 = t32 * t76;
         let t78 = t20 * t3;
         let t79 = t78 * t59;
-        let t80 = self.fixed[7] * t79;
+        let t80 = self.fixed[6] * t79;
         let t81 = t31 * t2;
         let t82 = t81 * t35;
         let t83 = t80 + t82;
@@ -404,14 +373,14 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t59 = t5 - self.parameters.Ri;
         let t62 = t20 * t2;
         let t63 = t62 * t59;
-        let t64 = self.fixed[7] * t63;
+        let t64 = self.fixed[6] * t63;
         let t65 = t31 * t3;
         let t66 = t65 * t35;
         let t67 = t64 + t66;
         let t68 = t67 * t34;
         let t69 = t32 * t68;
         let t70 = t20 * t59;
-        let t71 = self.fixed[7] * t70;
+        let t71 = self.fixed[6] * t70;
         let t72 = t31 * t35;
         let t73 = t71 - t72;
         let t74 = X[0] * X[1];
@@ -420,7 +389,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t77 = t32 * t76;
         let t78 = t20 * t3;
         let t79 = t78 * t59;
-        let t80 = self.fixed[7] * t79;
+        let t80 = self.fixed[6] * t79;
         let t81 = t31 * t2;
         let t82 = t81 * t35;
         let t83 = t80 + t82;
@@ -539,42 +508,41 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t32 = self.parameters.A * t13;
         let t34 = T::one() / t4;
         let t35 = t5 * t34;
+        let t54 = self.fixed[5] * t13;
         let t59 = t5 - self.parameters.Ri;
         let t70 = t20 * t59;
+        let t71 = self.fixed[6] * t70;
         let t72 = t31 * t35;
+        let t73 = t71 - t72;
         let t90 = self.fixed[8] * t13;
-        let t91 = t90 * t70;
-        let t92 = t91 + T::one();
         let t93 = t32 * t72;
         let t94 = t93 + T::one();
-        let t98 = T::one() / t92;
         let t100 = T::one() / t94;
-        let t120 = t23 - self.fixed[10];
-        let t121 = t70 * t35;
-        let t122 = t121 + t120;
-        let t123 = self.fixed[7] * t122;
-        let t124 = t34 - self.fixed[5];
-        let t125 = t31 * t124;
-        let t126 = t123 - t125;
-        let t128 = self.fixed[11] * t13;
-        let t129 = t128 * t126;
-        let t130 = t91 * t98;
-        let t131 = t90 * t120;
-        let t132 = T::nearest(2.0) - t130;
-        let t133 = t91 * t130;
-        let t134 = t93 * t93;
-        let t135 = t134 * t100;
-        let t136 = t133 - t135;
-        let t137 = t35 * t136;
-        let t138 = t131 * t132;
-        let t139 = t138 * t130;
-        let t140 = t137 + t139;
-        let t142 = self.fixed[12] * t140;
-        let t143 = t142 - t129;
-        let t144 = t35 * t143;
-        let t145 = X[0] * t144;
-        let t146 = X[1] * t144;
-        crate::nalgebra::SVector::<T, 2>::new(t145, t146)
+        let t119 = t54 * t31;
+        let t121 = t23 - self.fixed[10];
+        let t122 = t90 * t121;
+        let t123 = self.fixed[3] * t70;
+        let t124 = self.fixed[7] * t13;
+        let t125 = t124 * t123;
+        let t126 = t125 + T::one();
+        let t127 = T::one() / t126;
+        let t128 = t122 * t127;
+        let t129 = t73 * t35;
+        let t130 = t32 * t129;
+        let t131 = t130 * t100;
+        let t132 = t128 + t131;
+        let t133 = t93 - t125;
+        let t134 = t35 * t133;
+        let t135 = t132 * t127;
+        let t136 = t122 - t134;
+        let t137 = t136 + t135;
+        let t139 = self.fixed[11] * t137;
+        let t140 = t119 + t139;
+        let t141 = -t140;
+        let t142 = t35 * t141;
+        let t143 = X[0] * t142;
+        let t144 = X[1] * t142;
+        crate::nalgebra::SVector::<T, 2>::new(t143, t144)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t2 = X[0] * X[0];
@@ -605,7 +573,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t47 = -t46;
         let t48 = t45 * t39;
         let t49 = -t48;
-        let t54 = self.fixed[6] * t13;
+        let t54 = self.fixed[5] * t13;
         let t55 = t54 * t36;
         let t56 = -t55;
         let t57 = t54 * t39;
@@ -613,14 +581,14 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t59 = t5 - self.parameters.Ri;
         let t62 = t20 * t2;
         let t63 = t62 * t59;
-        let t64 = self.fixed[7] * t63;
+        let t64 = self.fixed[6] * t63;
         let t65 = t31 * t3;
         let t66 = t65 * t35;
         let t67 = t64 + t66;
         let t68 = t67 * t34;
         let t69 = t32 * t68;
         let t70 = t20 * t59;
-        let t71 = self.fixed[7] * t70;
+        let t71 = self.fixed[6] * t70;
         let t72 = t31 * t35;
         let t73 = t71 - t72;
         let t74 = X[0] * X[1];
@@ -629,7 +597,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t77 = t32 * t76;
         let t78 = t20 * t3;
         let t79 = t78 * t59;
-        let t80 = self.fixed[7] * t79;
+        let t80 = self.fixed[6] * t79;
         let t81 = t31 * t2;
         let t82 = t81 * t35;
         let t83 = t80 + t82;
@@ -664,31 +632,30 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t116 = t115 * t101;
         let t117 = t114 + t116;
         let t118 = t107 * t117;
-        let t120 = t23 - self.fixed[10];
-        let t121 = t70 * t35;
-        let t122 = t121 + t120;
-        let t123 = self.fixed[7] * t122;
-        let t124 = t34 - self.fixed[5];
-        let t125 = t31 * t124;
-        let t126 = t123 - t125;
-        let t128 = self.fixed[11] * t13;
-        let t129 = t128 * t126;
-        let t130 = t91 * t98;
-        let t131 = t90 * t120;
-        let t132 = T::nearest(2.0) - t130;
-        let t133 = t91 * t130;
-        let t134 = t93 * t93;
-        let t135 = t134 * t100;
-        let t136 = t133 - t135;
-        let t137 = t35 * t136;
-        let t138 = t131 * t132;
-        let t139 = t138 * t130;
-        let t140 = t137 + t139;
-        let t142 = self.fixed[12] * t140;
-        let t143 = t142 - t129;
-        let t144 = t35 * t143;
-        let t145 = X[0] * t144;
-        let t146 = X[1] * t144;
+        let t119 = t54 * t31;
+        let t121 = t23 - self.fixed[10];
+        let t122 = t90 * t121;
+        let t123 = self.fixed[3] * t70;
+        let t124 = self.fixed[7] * t13;
+        let t125 = t124 * t123;
+        let t126 = t125 + T::one();
+        let t127 = T::one() / t126;
+        let t128 = t122 * t127;
+        let t129 = t73 * t35;
+        let t130 = t32 * t129;
+        let t131 = t130 * t100;
+        let t132 = t128 + t131;
+        let t133 = t93 - t125;
+        let t134 = t35 * t133;
+        let t135 = t132 * t127;
+        let t136 = t122 - t134;
+        let t137 = t136 + t135;
+        let t139 = self.fixed[11] * t137;
+        let t140 = t119 + t139;
+        let t141 = -t140;
+        let t142 = t35 * t141;
+        let t143 = X[0] * t142;
+        let t144 = X[1] * t142;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t37, t40),
             v: crate::nalgebra::SVector::<T, 2>::new(t47, t49),
@@ -697,7 +664,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t86, t77, t77, t87),
             J: t95,
             P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t108, t113, t113, t118),
-            b: crate::nalgebra::SVector::<T, 2>::new(t145, t146),
+            b: crate::nalgebra::SVector::<T, 2>::new(t143, t144),
         }
     }
     fn traction(
@@ -736,13 +703,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
                 let t94 = t93 + T::one();
                 let t100 = T::one() / t94;
                 let t101 = t100 + T::one();
-                let t220 = self.fixed[21] * t13;
-                let t221 = t34 * t35;
-                let t222 = t65 * t221;
-                let t223 = t220 * t222;
-                let t224 = t223 * t101;
-                let t225 = -t224;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t225, T::zero()))
+                let t164 = self.fixed[13] * t13;
+                let t165 = t34 * t35;
+                let t166 = t65 * t165;
+                let t167 = t164 * t166;
+                let t168 = t167 * t101;
+                let t169 = -t168;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t169, T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t2 = X[0] * X[0];
@@ -767,13 +734,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
                 let t94 = t93 + T::one();
                 let t100 = T::one() / t94;
                 let t101 = t100 + T::one();
-                let t220 = self.fixed[21] * t13;
-                let t221 = t34 * t35;
-                let t226 = t81 * t221;
-                let t227 = t220 * t226;
-                let t228 = t227 * t101;
-                let t229 = -t228;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t229))
+                let t164 = self.fixed[13] * t13;
+                let t165 = t34 * t35;
+                let t170 = t81 * t165;
+                let t171 = t164 * t170;
+                let t172 = t171 * t101;
+                let t173 = -t172;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t173))
             }
             _ => None,
         }
@@ -820,13 +787,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[20]
+        self.fixed[12]
     }
     fn body_force_at(
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 3, 8>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 3, 4>::new(*self, X))
     }
     fn state_at(
         &self,
@@ -836,100 +803,73 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 8> for Ring<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 4> for Ring<T> {
     #[inline]
     fn body_force_time(&self, t: T) -> [T; 3] {
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
         let t32 = self.parameters.A * t13;
+        let t54 = self.fixed[5] * t13;
         let t90 = self.fixed[8] * t13;
-        [t13, t32, t90]
+        [t32, t54, t90]
     }
     #[inline]
-    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 8] {
+    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 4] {
         let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
         let t4 = t2 + t3;
         let t5 = t4.sqrt();
-        let t20 = t5 - self.parameters.Ro;
-        let t21 = t20 * t20;
-        let t23 = T::nearest(2.0) * t5;
-        let t25 = self.fixed[2] + t23;
-        let t29 = t21 * t25;
-        let t30 = self.fixed[3] * t29;
-        let t31 = t30 + T::one();
         let t34 = T::one() / t4;
-        let t35 = t5 * t34;
-        let t59 = t5 - self.parameters.Ri;
-        let t70 = t20 * t59;
-        let t71 = self.fixed[7] * t70;
-        let t72 = t31 * t35;
-        let t73 = t71 - t72;
-        let t120 = t23 - self.fixed[10];
-        let t121 = t70 * t35;
-        let t122 = t121 + t120;
-        let t123 = self.fixed[7] * t122;
-        let t124 = t34 - self.fixed[5];
-        let t125 = t31 * t124;
-        let t126 = t123 - t125;
-        let t147 = X[0] * t35;
-        let t148 = self.fixed[11] * t126;
-        let t149 = self.fixed[7] * t120;
-        let t150 = t73 * t35;
-        let t151 = t149 + t150;
-        let t157 = t59 * t59;
-        let t163 = t21 * t31;
-        let t164 = t163 * t157;
-        let t165 = t164 * t151;
-        let t166 = t165 * t35;
-        let t167 = self.fixed[13] * t166;
-        let t170 = t21 * t157;
-        let t171 = self.fixed[14] * t170;
-        let t172 = t31 * t31;
-        let t173 = t172 * t34;
-        let t174 = t31 * t73;
-        let t175 = t174 * t35;
-        let t176 = t171 - t173;
-        let t177 = t176 + t175;
-        let t179 = self.fixed[15] * t70;
-        let t180 = t179 + t72;
-        let t181 = t177 * t35;
-        let t184 = t120 * t180;
-        let t185 = self.fixed[16] * t184;
-        let t186 = t181 + t185;
-        let t193 = t70 * t186;
-        let t194 = self.fixed[17] * t193;
-        let t199 = t70 * t120;
-        let t200 = self.fixed[18] * t199;
-        let t201 = t176 * t35;
-        let t202 = t200 + t201;
-        let t205 = self.fixed[19] * t202;
-        let t215 = X[1] * t35;
-        [t70, t72, t147, t148, t167, t194, t205, t215]
+        [X[0], X[1], t5, t34]
     }
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
         time: &[T; 3],
-        point: &[T; 8],
+        point: &[T; 4],
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t91 = time[2] * point[0];
+        let t20 = point[2] - self.parameters.Ro;
+        let t21 = t20 * t20;
+        let t23 = T::nearest(2.0) * point[2];
+        let t25 = self.fixed[2] + t23;
+        let t29 = t21 * t25;
+        let t30 = self.fixed[3] * t29;
+        let t31 = t30 + T::one();
+        let t35 = point[2] * point[3];
+        let t59 = point[2] - self.parameters.Ri;
+        let t70 = t20 * t59;
+        let t71 = self.fixed[6] * t70;
+        let t72 = t31 * t35;
+        let t73 = t71 - t72;
+        let t91 = time[2] * t70;
         let t92 = t91 + T::one();
-        let t93 = time[1] * point[1];
+        let t93 = time[0] * t72;
         let t94 = t93 + T::one();
-        let t195 = time[0] * point[4];
-        let t196 = point[5] + t195;
-        let t206 = time[0] * t196;
-        let t207 = point[6] + t206;
-        let t208 = t92 * t92;
-        let t209 = t208 * t94;
-        let t210 = t207 / t209;
-        let t211 = time[0] * t210;
-        let t212 = t211 - point[3];
-        let t213 = time[0] * t212;
-        let t214 = point[2] * t213;
-        let t216 = point[7] * t213;
-        crate::nalgebra::SVector::<T, 2>::new(t214, t216)
+        let t98 = T::one() / t92;
+        let t100 = T::one() / t94;
+        let t119 = time[1] * t31;
+        let t121 = t23 - self.fixed[10];
+        let t122 = time[2] * t121;
+        let t129 = t73 * t35;
+        let t130 = time[0] * t129;
+        let t131 = t130 * t100;
+        let t145 = point[0] * t35;
+        let t146 = t122 * t98;
+        let t147 = t146 + t131;
+        let t148 = t31 * point[3];
+        let t149 = time[0] * t148;
+        let t150 = t35 * t91;
+        let t151 = t147 * t98;
+        let t152 = t122 - t149;
+        let t153 = t152 + t150;
+        let t154 = t153 + t151;
+        let t155 = self.fixed[11] * t154;
+        let t156 = t119 + t155;
+        let t157 = -t156;
+        let t158 = t145 * t157;
+        let t159 = point[1] * t35;
+        let t160 = t159 * t157;
+        crate::nalgebra::SVector::<T, 2>::new(t158, t160)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
@@ -971,13 +911,13 @@ impl<T: crate::Real> crate::StateStages<T, 2, 2, 1, 13> for Ring<T> {
         let t59 = t5 - self.parameters.Ri;
         let t62 = t20 * t2;
         let t63 = t62 * t59;
-        let t64 = self.fixed[7] * t63;
+        let t64 = self.fixed[6] * t63;
         let t65 = t31 * t3;
         let t66 = t65 * t35;
         let t67 = t64 + t66;
         let t68 = t67 * t34;
         let t70 = t20 * t59;
-        let t71 = self.fixed[7] * t70;
+        let t71 = self.fixed[6] * t70;
         let t72 = t31 * t35;
         let t73 = t71 - t72;
         let t74 = X[0] * X[1];
@@ -985,7 +925,7 @@ impl<T: crate::Real> crate::StateStages<T, 2, 2, 1, 13> for Ring<T> {
         let t76 = t75 * t34;
         let t78 = t20 * t3;
         let t79 = t78 * t59;
-        let t80 = self.fixed[7] * t79;
+        let t80 = self.fixed[6] * t79;
         let t81 = t31 * t2;
         let t82 = t81 * t35;
         let t83 = t80 + t82;

@@ -44,7 +44,7 @@ impl<T: crate::Real> Default for RingNuParameters<T> {
 pub struct RingNu<T: crate::Real> {
     parameters: RingNuParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 30],
+    fixed: [T; 22],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> RingNu<T> {
@@ -164,57 +164,27 @@ impl<T: crate::Real> RingNu<T> {
         let t112 = parameters.E * parameters.nu;
         let t113 = t97 * t99;
         let t114 = t112 / t113;
-        let t143 = parameters.Ri + parameters.Ro;
-        let t152 = parameters.nu / t99;
-        let t157 = T::one() / t97;
-        let t160 = t63 / parameters.rho0;
-        let t201 = T::one() / parameters.rho0;
-        let t217 = t114 + t107;
-        let t219 = parameters.A * parameters.A;
-        let t220 = t219 * t219;
-        let t221 = t15 * t15;
-        let t222 = t19 * t19;
-        let t224 = T::nearest(36.0) * t220;
-        let t225 = t224 * t217;
-        let t226 = parameters.rho0 * t221;
-        let t227 = t226 * t222;
-        let t228 = t225 / t227;
-        let t237 = T::nearest(3.0) / t26;
-        let t246 = t221 * t222;
-        let t247 = T::nearest(36.0) / t246;
-        let t270 = t219 * parameters.A;
-        let t271 = T::nearest(6.0) * t270;
-        let t272 = parameters.rho0 * t15;
-        let t273 = t272 * t19;
-        let t274 = t271 / t273;
-        let t279 = T::nearest(6.0) * t219;
-        let t280 = t279 * parameters.E;
-        let t281 = t280 * parameters.nu;
-        let t282 = t273 * t97;
-        let t283 = t282 * t99;
-        let t284 = t281 / t283;
-        let t288 = T::nearest(12.0) * t107;
-        let t289 = t288 / t26;
-        let t301 = t219 / parameters.rho0;
-        let t304 = t63 * parameters.nu;
-        let t305 = parameters.rho0 * t97;
-        let t306 = t305 * t99;
-        let t307 = t304 / t306;
-        let t310 = T::nearest(2.0) / t11;
-        let t311 = parameters.Ri - parameters.Ro;
-        let t312 = t311 * t311;
-        let t313 = t312 * t311;
-        let t314 = t313 / t26;
-        let t315 = T::one() - t314;
-        let t316 = parameters.A * t315;
-        let t317 = t316 / parameters.Ri;
-        let t321 = parameters.Ri * t97;
-        let t322 = t321 * t99;
-        let t323 = t112 / t322;
-        let t329 = parameters.A / parameters.Ro;
-        let t333 = parameters.Ro * t97;
-        let t334 = t333 * t99;
-        let t335 = t112 / t334;
+        let t144 = parameters.Ri + parameters.Ro;
+        let t154 = t114 + t107;
+        let t171 = T::one() / parameters.rho0;
+        let t179 = T::nearest(2.0) / t11;
+        let t180 = parameters.Ri - parameters.Ro;
+        let t181 = t180 * t180;
+        let t182 = t181 * t180;
+        let t183 = t182 / t26;
+        let t184 = T::one() - t183;
+        let t185 = parameters.A * t184;
+        let t186 = t185 / parameters.Ri;
+        let t190 = parameters.Ri * t97;
+        let t191 = t190 * t99;
+        let t192 = t112 / t191;
+        let t198 = parameters.A / parameters.Ro;
+        let t202 = parameters.Ro * t97;
+        let t203 = t202 * t99;
+        let t204 = t112 / t203;
+        let t228 = t107 * t171;
+        let t239 = t114 * t171;
+        let t241 = t154 * t171;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -231,29 +201,21 @@ impl<T: crate::Real> RingNu<T> {
                 t39,
                 t40,
                 t56,
-                t62,
                 t65,
                 t71,
                 t107,
                 t114,
-                t143,
-                t152,
-                t157,
-                t160,
-                t201,
+                t144,
+                t154,
+                t171,
+                t179,
+                t186,
+                t192,
+                t198,
+                t204,
                 t228,
-                t237,
-                t247,
-                t274,
-                t284,
-                t289,
-                t301,
-                t307,
-                t310,
-                t317,
-                t323,
-                t329,
-                t335,
+                t239,
+                t241,
             ],
         })
     }
@@ -380,7 +342,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t48 = t47 * t34;
         let t50 = t31 * X[1];
         let t51 = t50 * t34;
-        let t66 = self.fixed[8] * t13;
+        let t66 = self.fixed[7] * t13;
         let t67 = t66 * t48;
         let t68 = -t67;
         let t69 = t66 * t51;
@@ -414,13 +376,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t38 = t31 * t34;
         let t72 = t20 * t2;
         let t73 = t72 * t35;
-        let t74 = self.fixed[9] * t73;
+        let t74 = self.fixed[8] * t73;
         let t75 = t31 * t3;
         let t76 = t75 * t34;
         let t77 = t74 + t76;
         let t78 = t77 * t33;
         let t79 = t32 * t78;
-        let t80 = self.fixed[9] * t37;
+        let t80 = self.fixed[8] * t37;
         let t81 = t80 - t38;
         let t82 = X[0] * X[1];
         let t83 = t82 * t81;
@@ -428,7 +390,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t85 = t32 * t84;
         let t86 = t20 * t3;
         let t87 = t86 * t35;
-        let t88 = self.fixed[9] * t87;
+        let t88 = self.fixed[8] * t87;
         let t89 = t31 * t2;
         let t90 = t89 * t34;
         let t91 = t88 + t90;
@@ -463,13 +425,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t38 = t31 * t34;
         let t72 = t20 * t2;
         let t73 = t72 * t35;
-        let t74 = self.fixed[9] * t73;
+        let t74 = self.fixed[8] * t73;
         let t75 = t31 * t3;
         let t76 = t75 * t34;
         let t77 = t74 + t76;
         let t78 = t77 * t33;
         let t79 = t32 * t78;
-        let t80 = self.fixed[9] * t37;
+        let t80 = self.fixed[8] * t37;
         let t81 = t80 - t38;
         let t82 = X[0] * X[1];
         let t83 = t82 * t81;
@@ -477,7 +439,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t85 = t32 * t84;
         let t86 = t20 * t3;
         let t87 = t86 * t35;
-        let t88 = self.fixed[9] * t87;
+        let t88 = self.fixed[8] * t87;
         let t89 = t31 * t2;
         let t90 = t89 * t34;
         let t91 = t88 + t90;
@@ -562,20 +524,20 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t110 = t43 * t108;
         let t111 = t109 + T::one();
         let t115 = t104 * t109;
-        let t116 = self.fixed[11] * t115;
-        let t117 = self.fixed[10] * t111;
+        let t116 = self.fixed[10] * t115;
+        let t117 = self.fixed[9] * t111;
         let t118 = t116 - t117;
         let t119 = t110 + T::one();
         let t120 = t104 * t110;
-        let t121 = self.fixed[11] * t120;
-        let t122 = self.fixed[10] * t119;
+        let t121 = self.fixed[10] * t120;
+        let t122 = self.fixed[9] * t119;
         let t123 = t121 - t122;
         let t124 = t42 * t118;
         let t125 = t2 * t124;
         let t126 = t32 * t76;
         let t127 = t126 * t123;
         let t128 = t125 + t127;
-        let t129 = self.fixed[11] * t104;
+        let t129 = self.fixed[10] * t104;
         let t130 = t33 * t128;
         let t131 = t129 - t130;
         let t132 = t44 * t123;
@@ -622,70 +584,44 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t44 = t32 * t38;
         let t45 = t44 + T::one();
         let t46 = t43 * t45;
-        let t80 = self.fixed[9] * t37;
+        let t66 = self.fixed[7] * t13;
+        let t80 = self.fixed[8] * t37;
         let t81 = t80 - t38;
         let t108 = T::one() / t46;
         let t110 = t43 * t108;
-        let t144 = t23 - self.fixed[12];
-        let t145 = self.fixed[9] * t144;
-        let t146 = t81 * t34;
-        let t147 = t145 + t146;
-        let t148 = self.fixed[3] * t37;
-        let t149 = T::nearest(6.0) * t148;
-        let t150 = t38 - t149;
+        let t143 = t66 * t31;
+        let t145 = t23 - self.fixed[11];
+        let t146 = t41 * t145;
+        let t147 = self.fixed[3] * t37;
+        let t148 = self.fixed[4] * t13;
+        let t149 = t148 * t147;
+        let t150 = t44 - t149;
         let t151 = t34 * t150;
-        let t153 = self.fixed[13] * t147;
-        let t154 = t145 - t151;
-        let t155 = t154 + t153;
-        let t156 = self.fixed[7] * t31;
-        let t158 = self.fixed[14] * t155;
-        let t159 = t156 + t158;
-        let t161 = self.fixed[15] * t13;
-        let t162 = t161 * t159;
-        let t163 = self.fixed[4] * t13;
-        let t164 = t163 * t148;
-        let t165 = t164 + T::one();
-        let t166 = t164 * t45;
-        let t167 = t166 + t44;
-        let t168 = t165 * t45;
-        let t169 = t167.ln_of_both(t168);
-        let t170 = self.fixed[11] * t169;
-        let t171 = self.fixed[10] * t164;
-        let t172 = t170 + t171;
-        let t173 = self.fixed[10] * t44;
-        let t174 = t170 + t173;
-        let t175 = t41 * t144;
-        let t176 = T::one() / t165;
-        let t177 = t175 * t176;
-        let t178 = t164 * t177;
-        let t179 = t32 * t146;
-        let t180 = t179 * t110;
-        let t181 = t177 + t180;
-        let t182 = self.fixed[10] * t175;
-        let t183 = self.fixed[11] * t181;
-        let t184 = t182 + t183;
-        let t185 = t175 - t178;
-        let t186 = t172 * t185;
-        let t187 = t164 * t184;
-        let t188 = t186 + t187;
-        let t189 = t44 * t180;
-        let t190 = t178 + t189;
-        let t191 = t164 * t172;
-        let t192 = t191 * t176;
-        let t193 = t44 * t174;
-        let t194 = t193 * t110;
-        let t195 = t192 - t194;
-        let t196 = t34 * t195;
-        let t197 = t188 * t176;
-        let t198 = self.fixed[11] * t190;
-        let t199 = t196 + t197;
-        let t200 = t199 + t198;
-        let t202 = self.fixed[16] * t200;
-        let t203 = t202 - t162;
-        let t204 = t34 * t203;
-        let t205 = X[0] * t204;
-        let t206 = X[1] * t204;
-        crate::nalgebra::SVector::<T, 2>::new(t205, t206)
+        let t152 = t146 - t151;
+        let t153 = t149 + T::one();
+        let t155 = t149 * t45;
+        let t156 = t155 + t44;
+        let t157 = t153 * t45;
+        let t158 = t156.ln_of_both(t157);
+        let t159 = self.fixed[10] * t158;
+        let t160 = self.fixed[12] - t159;
+        let t161 = T::one() / t153;
+        let t162 = t146 * t161;
+        let t163 = t81 * t34;
+        let t164 = t32 * t163;
+        let t165 = t164 * t110;
+        let t166 = t162 + t165;
+        let t167 = self.fixed[9] * t152;
+        let t168 = t160 * t166;
+        let t169 = t168 * t161;
+        let t170 = t167 + t169;
+        let t172 = self.fixed[13] * t170;
+        let t173 = t143 + t172;
+        let t174 = -t173;
+        let t175 = t34 * t174;
+        let t176 = X[0] * t175;
+        let t177 = X[1] * t175;
+        crate::nalgebra::SVector::<T, 2>::new(t176, t177)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t2 = X[0] * X[0];
@@ -725,20 +661,20 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t59 = -t58;
         let t60 = t57 * t51;
         let t61 = -t60;
-        let t66 = self.fixed[8] * t13;
+        let t66 = self.fixed[7] * t13;
         let t67 = t66 * t48;
         let t68 = -t67;
         let t69 = t66 * t51;
         let t70 = -t69;
         let t72 = t20 * t2;
         let t73 = t72 * t35;
-        let t74 = self.fixed[9] * t73;
+        let t74 = self.fixed[8] * t73;
         let t75 = t31 * t3;
         let t76 = t75 * t34;
         let t77 = t74 + t76;
         let t78 = t77 * t33;
         let t79 = t32 * t78;
-        let t80 = self.fixed[9] * t37;
+        let t80 = self.fixed[8] * t37;
         let t81 = t80 - t38;
         let t82 = X[0] * X[1];
         let t83 = t82 * t81;
@@ -746,7 +682,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t85 = t32 * t84;
         let t86 = t20 * t3;
         let t87 = t86 * t35;
-        let t88 = self.fixed[9] * t87;
+        let t88 = self.fixed[8] * t87;
         let t89 = t31 * t2;
         let t90 = t89 * t34;
         let t91 = t88 + t90;
@@ -764,20 +700,20 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t110 = t43 * t108;
         let t111 = t109 + T::one();
         let t115 = t104 * t109;
-        let t116 = self.fixed[11] * t115;
-        let t117 = self.fixed[10] * t111;
+        let t116 = self.fixed[10] * t115;
+        let t117 = self.fixed[9] * t111;
         let t118 = t116 - t117;
         let t119 = t110 + T::one();
         let t120 = t104 * t110;
-        let t121 = self.fixed[11] * t120;
-        let t122 = self.fixed[10] * t119;
+        let t121 = self.fixed[10] * t120;
+        let t122 = self.fixed[9] * t119;
         let t123 = t121 - t122;
         let t124 = t42 * t118;
         let t125 = t2 * t124;
         let t126 = t32 * t76;
         let t127 = t126 * t123;
         let t128 = t125 + t127;
-        let t129 = self.fixed[11] * t104;
+        let t129 = self.fixed[10] * t104;
         let t130 = t33 * t128;
         let t131 = t129 - t130;
         let t132 = t44 * t123;
@@ -791,65 +727,38 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t140 = t137 + t139;
         let t141 = t33 * t140;
         let t142 = t129 - t141;
-        let t144 = t23 - self.fixed[12];
-        let t145 = self.fixed[9] * t144;
-        let t146 = t81 * t34;
-        let t147 = t145 + t146;
-        let t148 = self.fixed[3] * t37;
-        let t149 = T::nearest(6.0) * t148;
-        let t150 = t38 - t149;
+        let t143 = t66 * t31;
+        let t145 = t23 - self.fixed[11];
+        let t146 = t41 * t145;
+        let t147 = self.fixed[3] * t37;
+        let t148 = self.fixed[4] * t13;
+        let t149 = t148 * t147;
+        let t150 = t44 - t149;
         let t151 = t34 * t150;
-        let t153 = self.fixed[13] * t147;
-        let t154 = t145 - t151;
-        let t155 = t154 + t153;
-        let t156 = self.fixed[7] * t31;
-        let t158 = self.fixed[14] * t155;
-        let t159 = t156 + t158;
-        let t161 = self.fixed[15] * t13;
-        let t162 = t161 * t159;
-        let t163 = self.fixed[4] * t13;
-        let t164 = t163 * t148;
-        let t165 = t164 + T::one();
-        let t166 = t164 * t45;
-        let t167 = t166 + t44;
-        let t168 = t165 * t45;
-        let t169 = t167.ln_of_both(t168);
-        let t170 = self.fixed[11] * t169;
-        let t171 = self.fixed[10] * t164;
-        let t172 = t170 + t171;
-        let t173 = self.fixed[10] * t44;
-        let t174 = t170 + t173;
-        let t175 = t41 * t144;
-        let t176 = T::one() / t165;
-        let t177 = t175 * t176;
-        let t178 = t164 * t177;
-        let t179 = t32 * t146;
-        let t180 = t179 * t110;
-        let t181 = t177 + t180;
-        let t182 = self.fixed[10] * t175;
-        let t183 = self.fixed[11] * t181;
-        let t184 = t182 + t183;
-        let t185 = t175 - t178;
-        let t186 = t172 * t185;
-        let t187 = t164 * t184;
-        let t188 = t186 + t187;
-        let t189 = t44 * t180;
-        let t190 = t178 + t189;
-        let t191 = t164 * t172;
-        let t192 = t191 * t176;
-        let t193 = t44 * t174;
-        let t194 = t193 * t110;
-        let t195 = t192 - t194;
-        let t196 = t34 * t195;
-        let t197 = t188 * t176;
-        let t198 = self.fixed[11] * t190;
-        let t199 = t196 + t197;
-        let t200 = t199 + t198;
-        let t202 = self.fixed[16] * t200;
-        let t203 = t202 - t162;
-        let t204 = t34 * t203;
-        let t205 = X[0] * t204;
-        let t206 = X[1] * t204;
+        let t152 = t146 - t151;
+        let t153 = t149 + T::one();
+        let t155 = t149 * t45;
+        let t156 = t155 + t44;
+        let t157 = t153 * t45;
+        let t158 = t156.ln_of_both(t157);
+        let t159 = self.fixed[10] * t158;
+        let t160 = self.fixed[12] - t159;
+        let t161 = T::one() / t153;
+        let t162 = t146 * t161;
+        let t163 = t81 * t34;
+        let t164 = t32 * t163;
+        let t165 = t164 * t110;
+        let t166 = t162 + t165;
+        let t167 = self.fixed[9] * t152;
+        let t168 = t160 * t166;
+        let t169 = t168 * t161;
+        let t170 = t167 + t169;
+        let t172 = self.fixed[13] * t170;
+        let t173 = t143 + t172;
+        let t174 = -t173;
+        let t175 = t34 * t174;
+        let t176 = X[0] * t175;
+        let t177 = X[1] * t175;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t49, t52),
             v: crate::nalgebra::SVector::<T, 2>::new(t59, t61),
@@ -858,7 +767,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t94, t85, t85, t95),
             J: t46,
             P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t131, t136, t136, t142),
-            b: crate::nalgebra::SVector::<T, 2>::new(t205, t206),
+            b: crate::nalgebra::SVector::<T, 2>::new(t176, t177),
         }
     }
     fn traction(
@@ -871,26 +780,26 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
             crate::Surface::Inner => {
                 let t12 = self.fixed[0] * t;
                 let t13 = t12.cos_pi();
-                let t318 = self.fixed[26] * t13;
-                let t319 = t318 + T::one();
-                let t320 = t318.ln_of_both(t319);
-                let t324 = self.fixed[27] * t320;
-                let t325 = t324 * X[0];
-                let t326 = -t325;
-                let t327 = t324 * X[1];
-                let t328 = -t327;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t326, t328))
+                let t187 = self.fixed[15] * t13;
+                let t188 = t187 + T::one();
+                let t189 = t187.ln_of_both(t188);
+                let t193 = self.fixed[16] * t189;
+                let t194 = t193 * X[0];
+                let t195 = -t194;
+                let t196 = t193 * X[1];
+                let t197 = -t196;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t195, t197))
             }
             crate::Surface::Outer => {
                 let t12 = self.fixed[0] * t;
                 let t13 = t12.cos_pi();
-                let t330 = self.fixed[28] * t13;
-                let t331 = t330 + T::one();
-                let t332 = t330.ln_of_both(t331);
-                let t336 = self.fixed[29] * t332;
-                let t337 = t336 * X[0];
-                let t338 = t336 * X[1];
-                Some(crate::nalgebra::SVector::<T, 2>::new(t337, t338))
+                let t199 = self.fixed[17] * t13;
+                let t200 = t199 + T::one();
+                let t201 = t199.ln_of_both(t200);
+                let t205 = self.fixed[18] * t201;
+                let t206 = t205 * X[0];
+                let t207 = t205 * X[1];
+                Some(crate::nalgebra::SVector::<T, 2>::new(t206, t207))
             }
             crate::Surface::Lower(0) => {
                 let t2 = X[0] * X[0];
@@ -928,17 +837,17 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
                 let t110 = t43 * t108;
                 let t119 = t110 + T::one();
                 let t120 = t104 * t110;
-                let t121 = self.fixed[11] * t120;
-                let t122 = self.fixed[10] * t119;
+                let t121 = self.fixed[10] * t120;
+                let t122 = self.fixed[9] * t119;
                 let t123 = t121 - t122;
-                let t129 = self.fixed[11] * t104;
-                let t339 = t33 * t34;
-                let t340 = t75 * t339;
-                let t341 = t32 * t340;
-                let t342 = t341 * t123;
-                let t343 = t129 - t342;
-                let t344 = -t343;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t344, T::zero()))
+                let t129 = self.fixed[10] * t104;
+                let t208 = t33 * t34;
+                let t209 = t75 * t208;
+                let t210 = t32 * t209;
+                let t211 = t210 * t123;
+                let t212 = t129 - t211;
+                let t213 = -t212;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t213, T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t2 = X[0] * X[0];
@@ -976,17 +885,17 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
                 let t110 = t43 * t108;
                 let t119 = t110 + T::one();
                 let t120 = t104 * t110;
-                let t121 = self.fixed[11] * t120;
-                let t122 = self.fixed[10] * t119;
+                let t121 = self.fixed[10] * t120;
+                let t122 = self.fixed[9] * t119;
                 let t123 = t121 - t122;
-                let t129 = self.fixed[11] * t104;
-                let t339 = t33 * t34;
-                let t346 = t89 * t339;
-                let t347 = t32 * t346;
-                let t348 = t347 * t123;
-                let t349 = t129 - t348;
-                let t350 = -t349;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t350))
+                let t129 = self.fixed[10] * t104;
+                let t208 = t33 * t34;
+                let t215 = t89 * t208;
+                let t216 = t32 * t215;
+                let t217 = t216 * t123;
+                let t218 = t129 - t217;
+                let t219 = -t218;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t219))
             }
             _ => None,
         }
@@ -1022,8 +931,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
     }
     fn law(&self) -> crate::Law<T> {
         crate::Law::Library(crate::Material::NeoHookean {
-            lambda: self.fixed[11],
-            mu: self.fixed[10],
+            lambda: self.fixed[10],
+            mu: self.fixed[9],
         })
     }
     fn density(&self) -> T {
@@ -1033,13 +942,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[25]
+        self.fixed[14]
     }
     fn body_force_at(
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 3, 10>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 3, 4>::new(*self, X))
     }
     fn state_at(
         &self,
@@ -1049,140 +958,81 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 10> for RingNu<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 4> for RingNu<T> {
     #[inline]
     fn body_force_time(&self, t: T) -> [T; 3] {
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
         let t32 = self.parameters.A * t13;
         let t41 = self.fixed[5] * t13;
-        [t13, t32, t41]
+        let t66 = self.fixed[7] * t13;
+        [t32, t41, t66]
     }
     #[inline]
-    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 10] {
+    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 4] {
         let t2 = X[0] * X[0];
         let t3 = X[1] * X[1];
         let t4 = t2 + t3;
         let t5 = t4.sqrt();
-        let t20 = t5 - self.parameters.Ro;
-        let t21 = t20 * t20;
-        let t23 = T::nearest(2.0) * t5;
-        let t25 = self.fixed[2] + t23;
-        let t29 = t21 * t25;
-        let t30 = self.fixed[3] * t29;
-        let t31 = t30 + T::one();
         let t33 = T::one() / t4;
-        let t34 = t5 * t33;
-        let t35 = t5 - self.parameters.Ri;
-        let t37 = t20 * t35;
-        let t38 = t31 * t34;
-        let t80 = self.fixed[9] * t37;
-        let t81 = t80 - t38;
-        let t144 = t23 - self.fixed[12];
-        let t145 = self.fixed[9] * t144;
-        let t146 = t81 * t34;
-        let t147 = t145 + t146;
-        let t153 = self.fixed[13] * t147;
-        let t156 = self.fixed[7] * t31;
-        let t207 = X[0] * t34;
-        let t208 = t37 * t34;
-        let t209 = t208 + t144;
-        let t210 = self.fixed[9] * t209;
-        let t211 = t31 * t33;
-        let t212 = t210 - t211;
-        let t213 = t212 + t153;
-        let t214 = self.fixed[14] * t213;
-        let t215 = t156 + t214;
-        let t216 = self.fixed[15] * t215;
-        let t223 = t35 * t35;
-        let t229 = t21 * t31;
-        let t230 = t229 * t223;
-        let t231 = t230 * t147;
-        let t232 = t231 * t34;
-        let t233 = self.fixed[17] * t232;
-        let t234 = t31 * t144;
-        let t235 = t37 * t81;
-        let t236 = t234 + t235;
-        let t238 = self.fixed[18] * t37;
-        let t239 = t238 + t38;
-        let t240 = t144 * t239;
-        let t241 = T::nearest(2.0) * t240;
-        let t242 = self.fixed[10] * t241;
-        let t243 = t236 * t34;
-        let t244 = self.fixed[11] * t243;
-        let t245 = t242 + t244;
-        let t248 = t21 * t223;
-        let t249 = self.fixed[19] * t248;
-        let t250 = t31 * t31;
-        let t251 = t250 * t33;
-        let t252 = t31 * t81;
-        let t253 = t252 * t34;
-        let t254 = t249 - t251;
-        let t255 = t254 + t253;
-        let t256 = self.fixed[18] * t144;
-        let t257 = t256 + t146;
-        let t258 = t257 * t34;
-        let t259 = T::nearest(2.0) * t258;
-        let t260 = t31 * t259;
-        let t261 = t37 * t144;
-        let t262 = self.fixed[19] * t261;
-        let t263 = t260 + t262;
-        let t264 = self.fixed[9] * t245;
-        let t265 = t255 * t34;
-        let t266 = self.fixed[10] * t265;
-        let t267 = self.fixed[11] * t263;
-        let t268 = t264 + t266;
-        let t269 = t268 + t267;
-        let t275 = t37 * t269;
-        let t276 = self.fixed[20] * t275;
-        let t285 = self.fixed[21] * t243;
-        let t286 = self.fixed[11] * t147;
-        let t290 = self.fixed[22] * t144;
-        let t291 = t286 + t290;
-        let t292 = t252 * t33;
-        let t293 = t262 + t292;
-        let t294 = t37 * t291;
-        let t295 = self.fixed[9] * t294;
-        let t296 = t254 * t34;
-        let t297 = self.fixed[10] * t296;
-        let t298 = self.fixed[11] * t293;
-        let t299 = t295 + t297;
-        let t300 = t299 + t298;
-        let t302 = self.fixed[23] * t300;
-        let t308 = self.fixed[24] * t147;
-        let t309 = X[1] * t34;
-        [t37, t38, t207, t216, t233, t276, t285, t302, t308, t309]
+        [X[0], X[1], t5, t33]
     }
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
         time: &[T; 3],
-        point: &[T; 10],
+        point: &[T; 4],
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t42 = time[2] * point[0];
+        let t20 = point[2] - self.parameters.Ro;
+        let t21 = t20 * t20;
+        let t23 = T::nearest(2.0) * point[2];
+        let t25 = self.fixed[2] + t23;
+        let t34 = point[2] * point[3];
+        let t35 = point[2] - self.parameters.Ri;
+        let t37 = t20 * t35;
+        let t42 = time[1] * t37;
         let t43 = t42 + T::one();
-        let t44 = time[1] * point[1];
-        let t45 = t44 + T::one();
-        let t46 = t43 * t45;
-        let t277 = time[0] * point[4];
-        let t278 = point[5] + t277;
-        let t303 = time[0] * t278;
-        let t351 = t44 * t43;
-        let t352 = t351 + t42;
-        let t353 = t352.ln_of_both_if::<NEAR>(t46);
-        let t354 = point[6] * t353;
-        let t355 = t303 + t354;
-        let t356 = point[7] + t355;
-        let t357 = time[0] * t356;
-        let t358 = point[8] * t353;
-        let t359 = t357 + t358;
-        let t360 = t43 * t46;
-        let t361 = t359 / t360;
-        let t362 = t361 - point[3];
-        let t363 = time[0] * t362;
-        let t364 = point[2] * t363;
-        let t365 = point[9] * t363;
-        crate::nalgebra::SVector::<T, 2>::new(t364, t365)
+        let t80 = self.fixed[8] * t37;
+        let t145 = t23 - self.fixed[11];
+        let t146 = time[1] * t145;
+        let t178 = t34 * t42;
+        let t220 = self.fixed[3] * t21;
+        let t221 = t220 * t25;
+        let t222 = t221 + T::one();
+        let t223 = time[2] * t222;
+        let t224 = time[0] * t222;
+        let t225 = t224 * point[3];
+        let t226 = t146 - t225;
+        let t227 = t226 + t178;
+        let t229 = self.fixed[19] * t227;
+        let t230 = t222 * t34;
+        let t231 = time[0] * t230;
+        let t232 = t231 + T::one();
+        let t233 = t43 * t232;
+        let t234 = T::one() / t233;
+        let t235 = t232 * t234;
+        let t236 = t231 * t43;
+        let t237 = t236 + t42;
+        let t238 = t237.ln_of_both_if::<NEAR>(t233);
+        let t240 = self.fixed[20] * t238;
+        let t242 = t240 - self.fixed[21];
+        let t243 = t235 * t146;
+        let t244 = t80 - t230;
+        let t245 = time[0] * t34;
+        let t246 = t245 * t244;
+        let t247 = t246 * t43;
+        let t248 = t247 * t234;
+        let t249 = t243 + t248;
+        let t250 = t235 * t242;
+        let t251 = t250 * t249;
+        let t252 = t229 - t251;
+        let t253 = t223 + t252;
+        let t254 = t34 * t253;
+        let t255 = point[0] * t254;
+        let t256 = -t255;
+        let t257 = point[1] * t254;
+        let t258 = -t257;
+        crate::nalgebra::SVector::<T, 2>::new(t256, t258)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
@@ -1267,13 +1117,13 @@ impl<T: crate::Real> crate::StateStages<T, 2, 3, 1, 2> for RingNu<T> {
         let t52 = time[1] * t51;
         let t72 = t20 * t2;
         let t73 = t72 * t35;
-        let t74 = self.fixed[9] * t73;
+        let t74 = self.fixed[8] * t73;
         let t75 = t31 * t3;
         let t76 = t75 * t34;
         let t77 = t74 + t76;
         let t78 = t77 * t33;
         let t79 = time[1] * t78;
-        let t80 = self.fixed[9] * t37;
+        let t80 = self.fixed[8] * t37;
         let t81 = t80 - t38;
         let t82 = point[0] * point[1];
         let t83 = t82 * t81;
@@ -1281,7 +1131,7 @@ impl<T: crate::Real> crate::StateStages<T, 2, 3, 1, 2> for RingNu<T> {
         let t85 = time[1] * t84;
         let t86 = t20 * t3;
         let t87 = t86 * t35;
-        let t88 = self.fixed[9] * t87;
+        let t88 = self.fixed[8] * t87;
         let t89 = t31 * t2;
         let t90 = t89 * t34;
         let t91 = t88 + t90;
@@ -1299,20 +1149,20 @@ impl<T: crate::Real> crate::StateStages<T, 2, 3, 1, 2> for RingNu<T> {
         let t110 = t43 * t108;
         let t111 = t109 + T::one();
         let t115 = t104 * t109;
-        let t116 = self.fixed[11] * t115;
-        let t117 = self.fixed[10] * t111;
+        let t116 = self.fixed[10] * t115;
+        let t117 = self.fixed[9] * t111;
         let t118 = t116 - t117;
         let t119 = t110 + T::one();
         let t120 = t104 * t110;
-        let t121 = self.fixed[11] * t120;
-        let t122 = self.fixed[10] * t119;
+        let t121 = self.fixed[10] * t120;
+        let t122 = self.fixed[9] * t119;
         let t123 = t121 - t122;
         let t124 = t42 * t118;
         let t125 = t2 * t124;
         let t126 = time[1] * t76;
         let t127 = t126 * t123;
         let t128 = t125 + t127;
-        let t129 = self.fixed[11] * t104;
+        let t129 = self.fixed[10] * t104;
         let t130 = t33 * t128;
         let t131 = t129 - t130;
         let t132 = t44 * t123;

@@ -38,7 +38,7 @@ impl<T: crate::Real> Default for Skew2dParameters<T> {
 pub struct Skew2d<T: crate::Real> {
     parameters: Skew2dParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 72],
+    fixed: [T; 66],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Skew2d<T> {
@@ -134,117 +134,129 @@ impl<T: crate::Real> Skew2d<T> {
         let t119 = t117 / t118;
         let t134 = t59 * parameters.nu;
         let t135 = t134 / t118;
-        let t161 = t111 / t112;
-        let t165 = T::nearest(10.0) * t58;
-        let t168 = T::one() / t103;
-        let t171 = t65 / parameters.rho0;
-        let t174 = T::nearest(9.0) * parameters.A;
-        let t179 = T::nearest(0.8) * parameters.A;
-        let t184 = T::nearest(0.2) * parameters.A;
-        let t228 = T::nearest(0.05) * parameters.A;
-        let t267 = T::one() / parameters.rho0;
-        let t284 = parameters.nu / t112;
-        let t288 = T::nearest(2.0) * t58;
-        let t293 = t228 * parameters.E;
-        let t294 = t293 / parameters.rho0;
-        let t346 = T::nearest(3.0) * T::pi();
-        let t352 = t119 + t105;
-        let t354 = parameters.A * parameters.A;
-        let t355 = t354 * t354;
-        let t356 = t355 * parameters.A;
-        let t359 = T::nearest(0.09) * t356;
-        let t360 = t359 * t352;
+        let t150 = parameters.E * t58;
+        let t151 = t150 / parameters.rho0;
+        let t154 = T::nearest(9.0) * parameters.A;
+        let t161 = t119 + t105;
+        let t172 = T::nearest(0.2) * parameters.A;
+        let t179 = T::nearest(0.05) * parameters.A;
+        let t190 = T::nearest(0.8) * parameters.A;
+        let t210 = T::one() / parameters.rho0;
+        let t227 = T::nearest(3.0) * T::pi();
+        let t233 = parameters.A * parameters.A;
+        let t234 = t233 * t233;
+        let t235 = t234 * parameters.A;
+        let t238 = T::nearest(0.1) * t235;
+        let t239 = t238 * t105;
+        let t240 = t239 / parameters.rho0;
+        let t242 = T::nearest(6.0) * t234;
+        let t243 = t242 * t105;
+        let t244 = t243 / parameters.rho0;
+        let t245 = T::nearest(0.2) * t234;
+        let t246 = t245 * t105;
+        let t247 = t246 / parameters.rho0;
+        let t249 = T::nearest(6.0) * T::pi();
+        let t255 = t233 * parameters.A;
+        let t256 = T::nearest(2.0) * t255;
+        let t257 = t256 * t105;
+        let t258 = t257 / parameters.rho0;
+        let t261 = T::nearest(4.0) * T::pi();
+        let t263 = T::nearest(3.0) * t58;
+        let t284 = T::nearest(0.005) * t255;
+        let t285 = t284 * parameters.E;
+        let t286 = t285 * parameters.nu;
+        let t287 = parameters.rho0 * t103;
+        let t288 = t287 * t112;
+        let t289 = t286 / t288;
+        let t295 = T::nearest(20.0) * t105;
+        let t299 = t284 / parameters.rho0;
+        let t307 = T::nearest(0.2) * t233;
+        let t308 = t307 * parameters.E;
+        let t309 = t308 * parameters.nu;
+        let t310 = t309 / t288;
+        let t313 = T::nearest(10.0) * t105;
+        let t317 = t307 / parameters.rho0;
+        let t320 = T::nearest(90.0) * t255;
+        let t321 = t320 * t105;
+        let t322 = t321 / parameters.rho0;
+        let t324 = T::nearest(60.0) * t233;
+        let t325 = t324 * t105;
+        let t326 = t325 / parameters.rho0;
+        let t327 = t154 * parameters.E;
+        let t328 = t327 * parameters.nu;
+        let t329 = t328 / t288;
+        let t330 = T::nearest(9.0) * t161;
+        let t331 = t313 + t330;
+        let t332 = parameters.A * t331;
+        let t333 = t332 / parameters.rho0;
+        let t335 = T::nearest(0.005) * t233;
+        let t336 = t335 * parameters.E;
+        let t337 = t336 * parameters.nu;
+        let t338 = t337 / t288;
+        let t339 = t335 * t161;
+        let t340 = t339 / parameters.rho0;
+        let t341 = t172 * parameters.E;
+        let t342 = t341 * parameters.nu;
+        let t343 = t342 / t288;
+        let t344 = t172 * t161;
+        let t345 = t344 / parameters.rho0;
+        let t349 = t58 + T::nearest(16.0);
+        let t354 = T::nearest(0.0005) * t235;
+        let t355 = t354 * t105;
+        let t356 = t355 / parameters.rho0;
+        let t359 = T::nearest(0.03) * t234;
+        let t360 = t359 * t105;
         let t361 = t360 / parameters.rho0;
-        let t364 = T::nearest(0.002) * t356;
-        let t365 = t364 * t352;
-        let t366 = t365 / parameters.rho0;
-        let t402 = T::nearest(12.0) * t105;
-        let t407 = T::nearest(0.01) * t355;
-        let t408 = t407 / parameters.rho0;
-        let t412 = T::nearest(0.004) * t355;
-        let t413 = t412 * t352;
+        let t362 = T::nearest(9.0) * t58;
+        let t363 = t362 + T::nearest(16.0);
+        let t370 = T::nearest(24.0) * T::pi();
+        let t375 = T::nearest(0.05) * t255;
+        let t376 = t375 * parameters.E;
+        let t377 = t376 * parameters.nu;
+        let t378 = t377 / t288;
+        let t379 = T::nearest(9.0) * t105;
+        let t380 = t375 / parameters.rho0;
+        let t382 = T::nearest(0.001) * t234;
+        let t383 = t382 * t105;
+        let t384 = t383 / parameters.rho0;
+        let t386 = T::nearest(0.01) * t255;
+        let t387 = t386 * t105;
+        let t388 = t387 / parameters.rho0;
+        let t391 = T::nearest(0.1) * t233;
+        let t392 = t391 * parameters.E;
+        let t393 = t392 * parameters.nu;
+        let t394 = t393 / t288;
+        let t395 = T::nearest(3.0) * t105;
+        let t396 = t391 / parameters.rho0;
+        let t397 = T::nearest(0.0005) * t255;
+        let t398 = t397 * t105;
+        let t399 = t398 / parameters.rho0;
+        let t403 = T::nearest(0.01) * t233;
+        let t404 = t403 * t105;
+        let t405 = t404 / parameters.rho0;
+        let t406 = t179 * parameters.E;
+        let t407 = t406 * parameters.nu;
+        let t408 = t407 / t288;
+        let t409 = t179 / parameters.rho0;
+        let t410 = t75 * parameters.E;
+        let t411 = t410 * parameters.nu;
+        let t412 = t411 / t288;
+        let t413 = t75 * t161;
         let t414 = t413 / parameters.rho0;
-        let t422 = T::nearest(4.0) * T::pi();
-        let t424 = T::nearest(3.0) * t58;
-        let t437 = t354 * parameters.A;
-        let t438 = T::nearest(0.005) * t437;
-        let t439 = t438 * parameters.E;
-        let t440 = t439 * parameters.nu;
-        let t441 = parameters.rho0 * t103;
-        let t442 = t441 * t112;
-        let t443 = t440 / t442;
-        let t445 = T::nearest(9.0) * T::pi();
-        let t452 = T::nearest(6.0) * T::pi();
-        let t458 = T::nearest(2.0) * T::pi();
-        let t467 = T::nearest(2.0) * t105;
-        let t481 = T::nearest(4.0) * t105;
-        let t483 = T::nearest(3.0) * t105;
-        let t487 = T::nearest(4.0) * parameters.E;
-        let t488 = t487 * parameters.nu;
-        let t489 = t488 / t118;
-        let t492 = T::nearest(2.0) * parameters.E;
-        let t493 = t492 * parameters.nu;
-        let t494 = t493 / t118;
-        let t500 = t438 / parameters.rho0;
-        let t505 = T::nearest(5.4) * t355;
-        let t506 = t505 * t352;
-        let t507 = t506 / parameters.rho0;
-        let t516 = T::nearest(0.6) * t437;
-        let t517 = t516 / parameters.rho0;
-        let t520 = T::nearest(0.2) * t354;
-        let t521 = t520 * parameters.E;
-        let t522 = t521 * parameters.nu;
-        let t523 = t522 / t442;
-        let t525 = T::nearest(6.0) * t352;
-        let t529 = T::nearest(3.0) * t352;
-        let t533 = T::nearest(0.1) * t354;
-        let t534 = t533 / parameters.rho0;
-        let t538 = T::nearest(0.002) * t437;
-        let t539 = t538 * t352;
-        let t540 = t539 / parameters.rho0;
-        let t545 = T::nearest(0.005) * t354;
-        let t546 = t545 * parameters.E;
-        let t547 = t546 * parameters.nu;
-        let t548 = t547 / t442;
-        let t551 = T::nearest(4.0) * t352;
-        let t556 = t545 / parameters.rho0;
-        let t559 = t184 * parameters.E;
-        let t560 = t559 * parameters.nu;
-        let t561 = t560 / t442;
-        let t563 = T::nearest(81.0) * t437;
-        let t564 = t563 * t352;
-        let t565 = t564 / parameters.rho0;
-        let t567 = T::nearest(54.0) * t354;
-        let t568 = t567 * t352;
-        let t569 = t568 / parameters.rho0;
-        let t570 = t174 * parameters.E;
-        let t571 = t570 * parameters.nu;
-        let t572 = t571 / t442;
-        let t574 = T::nearest(2.0) / t21;
-        let t579 = t42 * T::pi();
-        let t621 = T::nearest(2.0).cos();
-        let t622 = T::pi() * t621;
-        let t627 = T::nearest(2.0).sin();
-        let t628 = T::nearest(4.0) * t627;
-        let t663 = parameters.A * t105;
-        let t723 = T::nearest(45.0) * t161;
-        let t726 = T::one() + t161;
-        let t731 = T::nearest(60.0) * t284;
-        let t785 = t168 * t171;
-        let t786 = t785 * t726;
-        let t791 = t288 * t294;
-        let t795 = t168 * T::nearest(8.0);
-        let t796 = t795 * t294;
-        let t800 = t168 * t294;
-        let t813 = t119 * t267;
-        let t814 = -t813;
-        let t823 = t267 * t352;
-        let t824 = -t823;
-        let t832 = t105 * t267;
-        let t833 = -t832;
-        let t845 = parameters.A * t119;
-        let t846 = t845 * t267;
-        let t850 = t663 * t267;
+        let t416 = T::nearest(2.0) / t21;
+        let t421 = t42 * T::pi();
+        let t463 = T::nearest(2.0).cos();
+        let t465 = T::pi() * t463;
+        let t470 = T::nearest(2.0).sin();
+        let t471 = T::nearest(4.0) * t470;
+        let t506 = parameters.A * t105;
+        let t586 = parameters.A * t42;
+        let t647 = t161 * t380;
+        let t650 = t379 * t380;
+        let t670 = t161 * t396;
+        let t673 = t395 * t396;
+        let t689 = t105 * t409;
+        let t692 = t161 * t409;
         Ok(Skew2d {
             parameters,
             fixed: [
@@ -259,67 +271,61 @@ impl<T: crate::Real> Skew2d<T> {
                 t105,
                 t119,
                 t135,
+                t151,
+                t154,
                 t161,
-                t165,
-                t168,
-                t171,
-                t174,
+                t172,
                 t179,
-                t184,
-                t228,
-                t267,
-                t284,
-                t288,
-                t294,
-                t346,
-                t352,
+                t190,
+                t210,
+                t227,
+                t240,
+                t244,
+                t247,
+                t249,
+                t258,
+                t261,
+                t263,
+                t289,
+                t295,
+                t299,
+                t310,
+                t313,
+                t317,
+                t322,
+                t326,
+                t329,
+                t333,
+                t338,
+                t340,
+                t343,
+                t345,
+                t349,
+                t356,
                 t361,
-                t366,
-                t402,
+                t363,
+                t370,
+                t378,
+                t384,
+                t388,
+                t394,
+                t399,
+                t405,
                 t408,
+                t412,
                 t414,
-                t422,
-                t424,
-                t443,
-                t445,
-                t452,
-                t458,
-                t467,
-                t481,
-                t483,
-                t489,
-                t494,
-                t500,
-                t507,
-                t517,
-                t523,
-                t525,
-                t529,
-                t534,
-                t540,
-                t548,
-                t551,
-                t556,
-                t561,
-                t565,
-                t569,
-                t572,
-                t574,
-                t579,
-                t622,
-                t628,
-                t663,
-                t723,
-                t731,
-                t786,
-                t791,
-                t796,
-                t800,
-                t814,
-                t824,
-                t833,
-                t846,
-                t850,
+                t416,
+                t421,
+                t465,
+                t471,
+                t506,
+                t586,
+                t647,
+                t650,
+                t670,
+                t673,
+                t689,
+                t692,
             ],
         })
     }
@@ -733,6 +739,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t22 = self.fixed[0] * t;
         let t23 = t22.cos_pi();
         let t24 = self.parameters.A * t23;
+        let t25 = t24 * t16;
         let t27 = T::nearest(2.0) * X[0];
         let t28 = t27.cos();
         let t29 = T::nearest(0.5) * X[1];
@@ -740,13 +747,12 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t31 = t28 * t30;
         let t32 = T::nearest(2.0) * t31;
         let t33 = X[1] * X[1];
-        let t34 = X[0] * t33;
-        let t35 = t32 + t34;
         let t36 = t22.sin_pi();
         let t37 = T::nearest(3.0) * t23;
         let t39 = T::nearest(4.0) * t36;
         let t40 = t37 + t39;
         let t43 = self.fixed[1] * t40;
+        let t68 = self.fixed[6] * t40;
         let t71 = t12 * t10;
         let t72 = t9 + t71;
         let t73 = t8 * t72;
@@ -769,191 +775,74 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t92 = t77 + T::one();
         let t98 = t90 + T::one();
         let t99 = t92 * t98;
-        let t100 = t78 * t83;
-        let t101 = t99 - t100;
         let t106 = t77 * t98;
-        let t107 = t100 - t106;
-        let t108 = T::one() / t101;
         let t113 = t106 + t90;
-        let t114 = t113 - t100;
-        let t115 = t114.log_1p();
-        let t141 = t90 * t92;
-        let t142 = t100 - t141;
-        let t150 = t79 * t84;
-        let t151 = T::pi() * t150;
-        let t152 = X[1] - t151;
-        let t154 = T::nearest(45.0) * t23;
-        let t155 = t154 * t16;
-        let t156 = t40 * t152;
-        let t157 = t155 - t156;
-        let t159 = T::nearest(95.0) * t23;
-        let t160 = t159 * t16;
-        let t162 = self.fixed[11] * t157;
-        let t163 = t160 - t156;
-        let t164 = t163 + t162;
-        let t166 = self.fixed[12] * t23;
-        let t167 = t166 * t16;
-        let t169 = self.fixed[13] * t164;
-        let t170 = t167 - t169;
-        let t172 = self.fixed[14] * t170;
-        let t175 = self.fixed[15] * t23;
-        let t176 = t175 * t16;
-        let t177 = -t176;
-        let t180 = self.fixed[16] * t40;
-        let t181 = t180 * t31;
-        let t182 = -t181;
-        let t185 = self.fixed[17] * t40;
-        let t186 = t185 * t152;
-        let t187 = T::nearest(3.0) * t16;
-        let t188 = t187 * t83;
-        let t189 = t74 * t182;
-        let t190 = t188 - t189;
-        let t191 = self.parameters.A * t190;
-        let t192 = t23 * t191;
-        let t193 = t98 * t177;
-        let t194 = t92 * t186;
-        let t195 = t192 + t193;
-        let t196 = t195 + t194;
-        let t197 = t24 * t190;
-        let t198 = t77 * t186;
-        let t199 = t193 + t197;
-        let t200 = t199 + t198;
-        let t201 = t196 * t107;
-        let t202 = t201 * t108;
-        let t203 = t115 * t200;
-        let t204 = t202 - t203;
-        let t205 = t177 * t107;
-        let t206 = t77 * t200;
-        let t207 = t197 + t205;
-        let t208 = t207 - t206;
-        let t209 = t77 * t107;
-        let t210 = t100 - t209;
-        let t211 = t115 * t107;
-        let t212 = self.fixed[9] * t211;
-        let t213 = self.fixed[8] * t210;
-        let t214 = t212 - t213;
-        let t215 = t193 + t194;
-        let t216 = t215 + t197;
-        let t217 = t77 - t100;
-        let t218 = t217 + t141;
-        let t219 = self.fixed[9] * t115;
-        let t220 = self.fixed[8] * t218;
-        let t221 = t219 + t220;
-        let t222 = t76 * t16;
-        let t223 = -t222;
-        let t224 = T::nearest(4.0) * X[0];
-        let t225 = self.fixed[4] * t31;
-        let t226 = t224 - t225;
-        let t229 = self.fixed[18] * t40;
-        let t230 = t229 * t226;
-        let t231 = t16 * t83;
-        let t232 = t74 * t186;
-        let t233 = t231 - t232;
-        let t234 = t98 * t223;
-        let t235 = t92 * t230;
-        let t236 = t24 * t233;
-        let t237 = t234 + t235;
-        let t238 = t237 + t236;
-        let t239 = t23 * t233;
-        let t240 = self.parameters.A * t239;
-        let t241 = t240 + t234;
-        let t242 = t241 + t235;
-        let t243 = t223 * t98;
-        let t244 = t243 + t235;
-        let t245 = t244 + t236;
-        let t246 = t242 * t108;
-        let t247 = self.fixed[9] * t246;
-        let t248 = self.fixed[8] * t245;
-        let t249 = t247 + t248;
-        let t250 = t186 * t142;
-        let t251 = t192 + t205;
-        let t252 = t251 + t250;
-        let t253 = t204 + t252;
-        let t254 = self.fixed[9] * t253;
-        let t255 = t214 * t216;
-        let t256 = t83 * t221;
-        let t257 = t256 * t238;
-        let t258 = t255 - t257;
-        let t259 = t108 * t258;
-        let t260 = self.fixed[8] * t208;
-        let t261 = t186 * t221;
-        let t262 = t83 * t249;
-        let t263 = t254 - t259;
-        let t264 = t263 + t260;
-        let t265 = t264 - t261;
-        let t266 = t265 - t262;
-        let t268 = t266 * t108;
-        let t269 = self.fixed[19] * t268;
-        let t270 = t172 + t269;
-        let t271 = -t270;
-        let t273 = T::nearest(60.0) * t23;
-        let t274 = t273 * t16;
-        let t275 = t40 * t226;
-        let t276 = t274 - t275;
-        let t278 = T::nearest(8.0) * t31;
-        let t279 = t278 - t226;
-        let t280 = t40 * t279;
-        let t282 = T::nearest(30.0) * t23;
-        let t283 = t282 * t16;
-        let t285 = self.fixed[20] * t276;
-        let t286 = t280 + t283;
-        let t287 = t286 + t285;
-        let t289 = self.fixed[21] * t40;
-        let t290 = t289 * t35;
-        let t291 = self.fixed[13] * t287;
-        let t292 = t290 - t291;
-        let t295 = self.fixed[22] * t292;
-        let t296 = t90 * t223;
-        let t297 = t235 + t236;
-        let t298 = t297 + t296;
-        let t299 = t242 * t142;
-        let t300 = t299 * t108;
-        let t301 = t115 * t298;
-        let t302 = t300 - t301;
-        let t303 = t230 * t142;
-        let t304 = t90 * t298;
-        let t305 = t236 + t303;
-        let t306 = t305 - t304;
-        let t307 = t90 * t142;
-        let t308 = t100 - t307;
-        let t309 = t115 * t142;
-        let t310 = self.fixed[9] * t309;
-        let t311 = self.fixed[8] * t308;
-        let t312 = t310 - t311;
-        let t313 = t90 - t100;
-        let t314 = t313 + t106;
-        let t315 = self.fixed[8] * t314;
-        let t316 = t219 + t315;
-        let t317 = t186 * t92;
-        let t318 = t317 + t193;
-        let t319 = t318 + t197;
-        let t320 = t196 * t108;
-        let t321 = self.fixed[9] * t320;
-        let t322 = self.fixed[8] * t319;
-        let t323 = t321 + t322;
-        let t324 = t216 * t108;
-        let t325 = t74 * t324;
-        let t326 = t187 + t325;
-        let t327 = t316 * t326;
-        let t328 = t74 * t323;
-        let t329 = t327 - t328;
-        let t330 = t223 * t107;
-        let t331 = t240 + t303;
-        let t332 = t331 + t330;
-        let t333 = t302 + t332;
-        let t334 = self.fixed[9] * t333;
-        let t335 = self.fixed[8] * t306;
-        let t336 = t312 * t238;
-        let t337 = t336 * t108;
-        let t338 = t24 * t329;
-        let t339 = t334 + t335;
-        let t340 = t339 - t337;
-        let t341 = t340 + t338;
-        let t342 = t341 * t108;
-        let t343 = self.fixed[19] * t342;
-        let t344 = t295 + t343;
-        let t345 = -t344;
-        crate::nalgebra::SVector::<T, 2>::new(t271, t345)
+        let t152 = self.fixed[11] * t25;
+        let t155 = self.fixed[12] * t23;
+        let t156 = t155 * t16;
+        let t157 = -t156;
+        let t158 = t25 + t156;
+        let t159 = t83 * t78;
+        let t160 = t99 - t159;
+        let t162 = t113 - t159;
+        let t163 = t162.log_1p();
+        let t164 = self.fixed[9] * t163;
+        let t165 = self.fixed[13] - t164;
+        let t166 = t76 * t16;
+        let t167 = -t166;
+        let t168 = t79 * t84;
+        let t169 = T::pi() * t168;
+        let t170 = X[1] - t169;
+        let t173 = self.fixed[14] * t40;
+        let t174 = t173 * t170;
+        let t175 = T::nearest(4.0) * X[0];
+        let t176 = self.fixed[4] * t31;
+        let t177 = t175 - t176;
+        let t180 = self.fixed[15] * t40;
+        let t181 = t180 * t177;
+        let t182 = t98 * t167;
+        let t183 = t83 * t25;
+        let t184 = t174 * t78;
+        let t185 = t92 * t181;
+        let t186 = t182 + t183;
+        let t187 = t186 - t184;
+        let t188 = t187 + t185;
+        let t191 = self.fixed[16] * t40;
+        let t192 = t191 * t31;
+        let t193 = -t192;
+        let t194 = t98 * t157;
+        let t195 = t92 * t174;
+        let t196 = T::nearest(3.0) * t183;
+        let t197 = t78 * t193;
+        let t198 = t194 + t195;
+        let t199 = t198 + t196;
+        let t200 = t199 - t197;
+        let t201 = t83 * t188;
+        let t202 = t98 * t200;
+        let t203 = t201 - t202;
+        let t204 = self.fixed[8] * t158;
+        let t205 = t160 * t160;
+        let t206 = t165 * t203;
+        let t207 = T::one() / t205;
+        let t208 = t206 * t207;
+        let t209 = t204 + t208;
+        let t211 = self.fixed[17] * t209;
+        let t212 = t211 - t152;
+        let t213 = X[1] * t87;
+        let t214 = t32 + t213;
+        let t215 = t68 * t214;
+        let t216 = t181 - t192;
+        let t217 = t78 * t200;
+        let t218 = t92 * t188;
+        let t219 = t217 - t218;
+        let t220 = self.fixed[8] * t216;
+        let t221 = t165 * t219;
+        let t222 = t221 * t207;
+        let t223 = t220 - t222;
+        let t224 = self.fixed[17] * t223;
+        let t225 = t215 + t224;
+        let t226 = -t225;
+        crate::nalgebra::SVector::<T, 2>::new(t212, t226)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t3 = T::nearest(3.0).product_error(X[0]);
@@ -1066,180 +955,71 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t147 = t146 * t108;
         let t148 = self.fixed[9] * t147;
         let t149 = t145 + t148;
-        let t150 = t79 * t84;
-        let t151 = T::pi() * t150;
-        let t152 = X[1] - t151;
-        let t154 = T::nearest(45.0) * t23;
-        let t155 = t154 * t16;
-        let t156 = t40 * t152;
-        let t157 = t155 - t156;
-        let t159 = T::nearest(95.0) * t23;
-        let t160 = t159 * t16;
-        let t162 = self.fixed[11] * t157;
-        let t163 = t160 - t156;
-        let t164 = t163 + t162;
-        let t166 = self.fixed[12] * t23;
-        let t167 = t166 * t16;
-        let t169 = self.fixed[13] * t164;
-        let t170 = t167 - t169;
-        let t172 = self.fixed[14] * t170;
-        let t175 = self.fixed[15] * t23;
-        let t176 = t175 * t16;
-        let t177 = -t176;
-        let t180 = self.fixed[16] * t40;
-        let t181 = t180 * t31;
-        let t182 = -t181;
-        let t185 = self.fixed[17] * t40;
-        let t186 = t185 * t152;
-        let t187 = T::nearest(3.0) * t16;
-        let t188 = t187 * t83;
-        let t189 = t74 * t182;
-        let t190 = t188 - t189;
-        let t191 = self.parameters.A * t190;
-        let t192 = t23 * t191;
-        let t193 = t98 * t177;
-        let t194 = t92 * t186;
-        let t195 = t192 + t193;
-        let t196 = t195 + t194;
-        let t197 = t24 * t190;
-        let t198 = t77 * t186;
-        let t199 = t193 + t197;
-        let t200 = t199 + t198;
-        let t201 = t196 * t107;
-        let t202 = t201 * t108;
-        let t203 = t115 * t200;
-        let t204 = t202 - t203;
-        let t205 = t177 * t107;
-        let t206 = t77 * t200;
-        let t207 = t197 + t205;
-        let t208 = t207 - t206;
-        let t209 = t77 * t107;
-        let t210 = t100 - t209;
-        let t211 = t115 * t107;
-        let t212 = self.fixed[9] * t211;
-        let t213 = self.fixed[8] * t210;
-        let t214 = t212 - t213;
-        let t215 = t193 + t194;
-        let t216 = t215 + t197;
-        let t217 = t77 - t100;
-        let t218 = t217 + t141;
-        let t219 = self.fixed[9] * t115;
-        let t220 = self.fixed[8] * t218;
-        let t221 = t219 + t220;
-        let t222 = t76 * t16;
-        let t223 = -t222;
-        let t224 = T::nearest(4.0) * X[0];
-        let t225 = self.fixed[4] * t31;
-        let t226 = t224 - t225;
-        let t229 = self.fixed[18] * t40;
-        let t230 = t229 * t226;
-        let t231 = t16 * t83;
-        let t232 = t74 * t186;
-        let t233 = t231 - t232;
-        let t234 = t98 * t223;
-        let t235 = t92 * t230;
-        let t236 = t24 * t233;
-        let t237 = t234 + t235;
-        let t238 = t237 + t236;
-        let t239 = t23 * t233;
-        let t240 = self.parameters.A * t239;
-        let t241 = t240 + t234;
-        let t242 = t241 + t235;
-        let t243 = t223 * t98;
-        let t244 = t243 + t235;
-        let t245 = t244 + t236;
-        let t246 = t242 * t108;
-        let t247 = self.fixed[9] * t246;
-        let t248 = self.fixed[8] * t245;
-        let t249 = t247 + t248;
-        let t250 = t186 * t142;
-        let t251 = t192 + t205;
-        let t252 = t251 + t250;
-        let t253 = t204 + t252;
-        let t254 = self.fixed[9] * t253;
-        let t255 = t214 * t216;
-        let t256 = t83 * t221;
-        let t257 = t256 * t238;
-        let t258 = t255 - t257;
-        let t259 = t108 * t258;
-        let t260 = self.fixed[8] * t208;
-        let t261 = t186 * t221;
-        let t262 = t83 * t249;
-        let t263 = t254 - t259;
-        let t264 = t263 + t260;
-        let t265 = t264 - t261;
-        let t266 = t265 - t262;
-        let t268 = t266 * t108;
-        let t269 = self.fixed[19] * t268;
-        let t270 = t172 + t269;
-        let t271 = -t270;
-        let t273 = T::nearest(60.0) * t23;
-        let t274 = t273 * t16;
-        let t275 = t40 * t226;
-        let t276 = t274 - t275;
-        let t278 = T::nearest(8.0) * t31;
-        let t279 = t278 - t226;
-        let t280 = t40 * t279;
-        let t282 = T::nearest(30.0) * t23;
-        let t283 = t282 * t16;
-        let t285 = self.fixed[20] * t276;
-        let t286 = t280 + t283;
-        let t287 = t286 + t285;
-        let t289 = self.fixed[21] * t40;
-        let t290 = t289 * t35;
-        let t291 = self.fixed[13] * t287;
-        let t292 = t290 - t291;
-        let t295 = self.fixed[22] * t292;
-        let t296 = t90 * t223;
-        let t297 = t235 + t236;
-        let t298 = t297 + t296;
-        let t299 = t242 * t142;
-        let t300 = t299 * t108;
-        let t301 = t115 * t298;
-        let t302 = t300 - t301;
-        let t303 = t230 * t142;
-        let t304 = t90 * t298;
-        let t305 = t236 + t303;
-        let t306 = t305 - t304;
-        let t307 = t90 * t142;
-        let t308 = t100 - t307;
-        let t309 = t115 * t142;
-        let t310 = self.fixed[9] * t309;
-        let t311 = self.fixed[8] * t308;
-        let t312 = t310 - t311;
-        let t313 = t90 - t100;
-        let t314 = t313 + t106;
-        let t315 = self.fixed[8] * t314;
-        let t316 = t219 + t315;
-        let t317 = t186 * t92;
-        let t318 = t317 + t193;
-        let t319 = t318 + t197;
-        let t320 = t196 * t108;
-        let t321 = self.fixed[9] * t320;
-        let t322 = self.fixed[8] * t319;
-        let t323 = t321 + t322;
-        let t324 = t216 * t108;
-        let t325 = t74 * t324;
-        let t326 = t187 + t325;
-        let t327 = t316 * t326;
-        let t328 = t74 * t323;
-        let t329 = t327 - t328;
-        let t330 = t223 * t107;
-        let t331 = t240 + t303;
-        let t332 = t331 + t330;
-        let t333 = t302 + t332;
-        let t334 = self.fixed[9] * t333;
-        let t335 = self.fixed[8] * t306;
-        let t336 = t312 * t238;
-        let t337 = t336 * t108;
-        let t338 = t24 * t329;
-        let t339 = t334 + t335;
-        let t340 = t339 - t337;
-        let t341 = t340 + t338;
-        let t342 = t341 * t108;
-        let t343 = self.fixed[19] * t342;
-        let t344 = t295 + t343;
-        let t345 = -t344;
+        let t152 = self.fixed[11] * t25;
+        let t155 = self.fixed[12] * t23;
+        let t156 = t155 * t16;
+        let t157 = -t156;
+        let t158 = t25 + t156;
+        let t159 = t83 * t78;
+        let t160 = t99 - t159;
+        let t162 = t113 - t159;
+        let t163 = t162.log_1p();
+        let t164 = self.fixed[9] * t163;
+        let t165 = self.fixed[13] - t164;
+        let t166 = t76 * t16;
+        let t167 = -t166;
+        let t168 = t79 * t84;
+        let t169 = T::pi() * t168;
+        let t170 = X[1] - t169;
+        let t173 = self.fixed[14] * t40;
+        let t174 = t173 * t170;
+        let t175 = T::nearest(4.0) * X[0];
+        let t176 = self.fixed[4] * t31;
+        let t177 = t175 - t176;
+        let t180 = self.fixed[15] * t40;
+        let t181 = t180 * t177;
+        let t182 = t98 * t167;
+        let t183 = t83 * t25;
+        let t184 = t174 * t78;
+        let t185 = t92 * t181;
+        let t186 = t182 + t183;
+        let t187 = t186 - t184;
+        let t188 = t187 + t185;
+        let t191 = self.fixed[16] * t40;
+        let t192 = t191 * t31;
+        let t193 = -t192;
+        let t194 = t98 * t157;
+        let t195 = t92 * t174;
+        let t196 = T::nearest(3.0) * t183;
+        let t197 = t78 * t193;
+        let t198 = t194 + t195;
+        let t199 = t198 + t196;
+        let t200 = t199 - t197;
+        let t201 = t83 * t188;
+        let t202 = t98 * t200;
+        let t203 = t201 - t202;
+        let t204 = self.fixed[8] * t158;
+        let t205 = t160 * t160;
+        let t206 = t165 * t203;
+        let t207 = T::one() / t205;
+        let t208 = t206 * t207;
+        let t209 = t204 + t208;
+        let t211 = self.fixed[17] * t209;
+        let t212 = t211 - t152;
+        let t213 = X[1] * t87;
+        let t214 = t32 + t213;
+        let t215 = t68 * t214;
+        let t216 = t181 - t192;
+        let t217 = t78 * t200;
+        let t218 = t92 * t188;
+        let t219 = t217 - t218;
+        let t220 = self.fixed[8] * t216;
+        let t221 = t165 * t219;
+        let t222 = t221 * t207;
+        let t223 = t220 - t222;
+        let t224 = self.fixed[17] * t223;
+        let t225 = t215 + t224;
+        let t226 = -t225;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t25, t44),
             v: crate::nalgebra::SVector::<T, 2>::new(t50, t57),
@@ -1248,7 +1028,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t92, t78, t83, t97),
             J: t101,
             P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t123, t130, t140, t149),
-            b: crate::nalgebra::SVector::<T, 2>::new(t271, t345),
+            b: crate::nalgebra::SVector::<T, 2>::new(t212, t226),
         }
     }
     fn traction(
@@ -1272,40 +1052,40 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t76 = self.fixed[7] * t23;
                 let t84 = t29.cos_pi();
                 let t136 = self.fixed[10] * t23;
-                let t576 = X[1].cos();
-                let t577 = t76 * t576;
-                let t578 = t577 + T::one();
-                let t580 = self.fixed[57] * t40;
-                let t581 = t580 * t84;
-                let t582 = t581 + T::one();
-                let t583 = t43 * t33;
-                let t584 = t578 * t582;
-                let t585 = t24 * t576;
-                let t586 = t585 * t583;
-                let t587 = t584 - t586;
-                let t588 = t577 * t582;
-                let t589 = t586 - t588;
-                let t590 = T::one() / t587;
-                let t591 = t589 * t590;
-                let t592 = t577 - t591;
-                let t593 = t588 + t581;
-                let t594 = t593 - t586;
-                let t595 = t594.log_1p();
-                let t596 = self.fixed[8] * t592;
-                let t597 = t582 * t595;
-                let t598 = t597 * t590;
-                let t599 = self.fixed[9] * t598;
-                let t600 = t596 + t599;
-                let t601 = -t600;
-                let t602 = t585 * t590;
-                let t603 = t583 + t602;
-                let t604 = self.fixed[8] * t603;
-                let t605 = t136 * t576;
-                let t606 = t595 * t590;
-                let t607 = t605 * t606;
-                let t608 = t604 - t607;
-                let t609 = -t608;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t601, t609))
+                let t418 = X[1].cos();
+                let t419 = t76 * t418;
+                let t420 = t419 + T::one();
+                let t422 = self.fixed[55] * t40;
+                let t423 = t422 * t84;
+                let t424 = t423 + T::one();
+                let t425 = t43 * t33;
+                let t426 = t420 * t424;
+                let t427 = t24 * t418;
+                let t428 = t427 * t425;
+                let t429 = t426 - t428;
+                let t430 = t419 * t424;
+                let t431 = t428 - t430;
+                let t432 = T::one() / t429;
+                let t433 = t431 * t432;
+                let t434 = t419 - t433;
+                let t435 = t430 + t423;
+                let t436 = t435 - t428;
+                let t437 = t436.log_1p();
+                let t438 = self.fixed[8] * t434;
+                let t439 = t424 * t437;
+                let t440 = t439 * t432;
+                let t441 = self.fixed[9] * t440;
+                let t442 = t438 + t441;
+                let t443 = -t442;
+                let t444 = t427 * t432;
+                let t445 = t425 + t444;
+                let t446 = self.fixed[8] * t445;
+                let t447 = t136 * t418;
+                let t448 = t437 * t432;
+                let t449 = t447 * t448;
+                let t450 = t446 - t449;
+                let t451 = -t450;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t443, t451))
             }
             crate::Surface::Upper(0) => {
                 let t22 = self.fixed[0] * t;
@@ -1322,50 +1102,50 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t76 = self.fixed[7] * t23;
                 let t84 = t29.cos_pi();
                 let t136 = self.fixed[10] * t23;
-                let t457 = T::nearest(2.0) * X[1];
-                let t610 = T::nearest(3.0).sum_error(X[1]);
-                let t611 = T::nearest(3.0) + X[1];
-                let t612 = t611.cos();
-                let t613 = t611.sin();
-                let t614 = T::nearest(0.5) * t610;
-                let t615 = t614 * t612;
-                let t616 = t613 + t615;
-                let t617 = t610 * t616;
-                let t618 = t612 - t617;
-                let t619 = t76 * t618;
-                let t620 = t619 + T::one();
-                let t623 = self.fixed[58] * t84;
-                let t624 = t457 + t623;
-                let t625 = t43 * t624;
-                let t626 = t625 + T::one();
-                let t629 = self.fixed[59] * t30;
-                let t630 = t33 - t629;
-                let t631 = t43 * t630;
-                let t632 = t620 * t626;
-                let t633 = t24 * t618;
-                let t634 = t633 * t631;
-                let t635 = t632 - t634;
-                let t636 = t619 * t626;
-                let t637 = t634 - t636;
-                let t638 = T::one() / t635;
-                let t639 = t637 * t638;
-                let t640 = t619 - t639;
-                let t641 = t636 + t625;
-                let t642 = t641 - t634;
-                let t643 = t642.log_1p();
-                let t644 = self.fixed[8] * t640;
-                let t645 = t626 * t643;
-                let t646 = t645 * t638;
-                let t647 = self.fixed[9] * t646;
-                let t648 = t644 + t647;
-                let t649 = t633 * t638;
-                let t650 = t631 + t649;
-                let t651 = self.fixed[8] * t650;
-                let t652 = t136 * t618;
-                let t653 = t643 * t638;
-                let t654 = t652 * t653;
-                let t655 = t651 - t654;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t648, t655))
+                let t452 = T::nearest(3.0).sum_error(X[1]);
+                let t453 = T::nearest(3.0) + X[1];
+                let t454 = t453.cos();
+                let t455 = t453.sin();
+                let t456 = T::nearest(0.5) * t452;
+                let t457 = t456 * t454;
+                let t458 = t455 + t457;
+                let t459 = t452 * t458;
+                let t460 = t454 - t459;
+                let t461 = t76 * t460;
+                let t462 = t461 + T::one();
+                let t464 = T::nearest(2.0) * X[1];
+                let t466 = self.fixed[56] * t84;
+                let t467 = t464 + t466;
+                let t468 = t43 * t467;
+                let t469 = t468 + T::one();
+                let t472 = self.fixed[57] * t30;
+                let t473 = t33 - t472;
+                let t474 = t43 * t473;
+                let t475 = t462 * t469;
+                let t476 = t24 * t460;
+                let t477 = t476 * t474;
+                let t478 = t475 - t477;
+                let t479 = t461 * t469;
+                let t480 = t477 - t479;
+                let t481 = T::one() / t478;
+                let t482 = t480 * t481;
+                let t483 = t461 - t482;
+                let t484 = t479 + t468;
+                let t485 = t484 - t477;
+                let t486 = t485.log_1p();
+                let t487 = self.fixed[8] * t483;
+                let t488 = t469 * t486;
+                let t489 = t488 * t481;
+                let t490 = self.fixed[9] * t489;
+                let t491 = t487 + t490;
+                let t492 = t476 * t481;
+                let t493 = t474 + t492;
+                let t494 = self.fixed[8] * t493;
+                let t495 = t136 * t460;
+                let t496 = t486 * t481;
+                let t497 = t495 * t496;
+                let t498 = t494 - t497;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t491, t498))
             }
             crate::Surface::Lower(1) => {
                 let t3 = T::nearest(3.0).product_error(X[0]);
@@ -1379,32 +1159,32 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t39 = T::nearest(4.0) * t36;
                 let t40 = t37 + t39;
                 let t76 = self.fixed[7] * t23;
-                let t580 = self.fixed[57] * t40;
-                let t656 = t4.cos();
-                let t657 = t4.sin();
-                let t658 = T::nearest(0.5) * t3;
-                let t659 = t658 * t656;
-                let t660 = t657 + t659;
-                let t661 = t3 * t660;
-                let t662 = t656 - t661;
-                let t664 = self.fixed[60] * t23;
-                let t665 = t664 * t662;
-                let t666 = -t665;
-                let t667 = t580 * t28;
-                let t668 = t667 + T::one();
-                let t669 = T::one() / t668;
-                let t670 = t669 + T::one();
-                let t671 = t76 * t662;
-                let t672 = t671 * t668;
-                let t673 = t672 + t667;
-                let t674 = t673.log_1p();
-                let t675 = t667 * t670;
-                let t676 = self.fixed[8] * t675;
-                let t677 = t674 * t669;
-                let t678 = self.fixed[9] * t677;
-                let t679 = t676 + t678;
-                let t680 = -t679;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t666, t680))
+                let t422 = self.fixed[55] * t40;
+                let t499 = t4.cos();
+                let t500 = t4.sin();
+                let t501 = T::nearest(0.5) * t3;
+                let t502 = t501 * t499;
+                let t503 = t500 + t502;
+                let t504 = t3 * t503;
+                let t505 = t499 - t504;
+                let t507 = self.fixed[58] * t23;
+                let t508 = t507 * t505;
+                let t509 = -t508;
+                let t510 = t422 * t28;
+                let t511 = t510 + T::one();
+                let t512 = T::one() / t511;
+                let t513 = t512 + T::one();
+                let t514 = t76 * t505;
+                let t515 = t514 * t511;
+                let t516 = t515 + t510;
+                let t517 = t516.log_1p();
+                let t518 = t510 * t513;
+                let t519 = self.fixed[8] * t518;
+                let t520 = t517 * t512;
+                let t521 = self.fixed[9] * t520;
+                let t522 = t519 + t521;
+                let t523 = -t522;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t509, t523))
             }
             crate::Surface::Upper(1) => {
                 let t3 = T::nearest(3.0).product_error(X[0]);
@@ -1420,50 +1200,50 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t43 = self.fixed[1] * t40;
                 let t76 = self.fixed[7] * t23;
                 let t79 = t27.sin();
-                let t185 = self.fixed[17] * t40;
-                let t681 = T::one().sum_error(t4);
-                let t682 = T::one() + t4;
-                let t683 = t3 + t681;
-                let t684 = t682.cos();
-                let t685 = t682.sin();
-                let t686 = T::nearest(0.5) * t683;
-                let t687 = t686 * t684;
-                let t688 = t685 + t687;
-                let t689 = t683 * t688;
-                let t690 = t684 - t689;
-                let t691 = T::nearest(4.0) * t79;
-                let t692 = T::one() - t691;
-                let t693 = t43 * t692;
-                let t694 = t76 * t690;
-                let t695 = t694 + T::one();
-                let t696 = t185 * X[0];
-                let t697 = t696 + T::one();
-                let t698 = t695 * t697;
-                let t699 = t24 * t690;
-                let t700 = t699 * t693;
-                let t701 = t698 - t700;
-                let t702 = T::one() / t701;
-                let t703 = t693 * t702;
-                let t704 = t699 + t703;
-                let t705 = t694 * t697;
-                let t706 = t705 + t696;
-                let t707 = t706 - t700;
-                let t708 = t707.log_1p();
-                let t709 = self.fixed[8] * t704;
-                let t710 = t693 * t708;
-                let t711 = t710 * t702;
-                let t712 = self.fixed[9] * t711;
-                let t713 = t709 - t712;
-                let t714 = t695 * t696;
-                let t715 = t700 - t714;
-                let t716 = t715 * t702;
-                let t717 = t696 - t716;
-                let t718 = self.fixed[8] * t717;
-                let t719 = t695 * t708;
-                let t720 = t719 * t702;
-                let t721 = self.fixed[9] * t720;
-                let t722 = t718 + t721;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t713, t722))
+                let t173 = self.fixed[14] * t40;
+                let t524 = T::one().sum_error(t4);
+                let t525 = T::one() + t4;
+                let t526 = t3 + t524;
+                let t527 = t525.cos();
+                let t528 = t525.sin();
+                let t529 = T::nearest(0.5) * t526;
+                let t530 = t529 * t527;
+                let t531 = t528 + t530;
+                let t532 = t526 * t531;
+                let t533 = t527 - t532;
+                let t534 = T::nearest(4.0) * t79;
+                let t535 = T::one() - t534;
+                let t536 = t43 * t535;
+                let t537 = t76 * t533;
+                let t538 = t537 + T::one();
+                let t539 = t173 * X[0];
+                let t540 = t539 + T::one();
+                let t541 = t538 * t540;
+                let t542 = t24 * t533;
+                let t543 = t542 * t536;
+                let t544 = t541 - t543;
+                let t545 = T::one() / t544;
+                let t546 = t536 * t545;
+                let t547 = t542 + t546;
+                let t548 = t537 * t540;
+                let t549 = t548 + t539;
+                let t550 = t549 - t543;
+                let t551 = t550.log_1p();
+                let t552 = self.fixed[8] * t547;
+                let t553 = t536 * t551;
+                let t554 = t553 * t545;
+                let t555 = self.fixed[9] * t554;
+                let t556 = t552 - t555;
+                let t557 = t538 * t539;
+                let t558 = t543 - t557;
+                let t559 = t558 * t545;
+                let t560 = t539 - t559;
+                let t561 = self.fixed[8] * t560;
+                let t562 = t538 * t551;
+                let t563 = t562 * t545;
+                let t564 = self.fixed[9] * t563;
+                let t565 = t561 + t564;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t556, t565))
             }
             _ => None,
         }
@@ -1510,13 +1290,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[56]
+        self.fixed[54]
     }
     fn body_force_at(
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 27, 18>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 35, 17>::new(*self, X))
     }
     fn state_at(
         &self,
@@ -1526,91 +1306,97 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 2, 27, 18> for Skew2d<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 2, 35, 17> for Skew2d<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 27] {
+    fn body_force_time(&self, t: T) -> [T; 35] {
         let t22 = self.fixed[0] * t;
         let t23 = t22.cos_pi();
-        let t24 = self.parameters.A * t23;
         let t36 = t22.sin_pi();
         let t37 = T::nearest(3.0) * t23;
         let t39 = T::nearest(4.0) * t36;
         let t40 = t37 + t39;
         let t43 = self.fixed[1] * t40;
+        let t62 = self.fixed[5] * t23;
         let t76 = self.fixed[7] * t23;
-        let t159 = T::nearest(95.0) * t23;
-        let t166 = self.fixed[12] * t23;
-        let t175 = self.fixed[15] * t23;
-        let t180 = self.fixed[16] * t40;
-        let t185 = self.fixed[17] * t40;
-        let t229 = self.fixed[18] * t40;
-        let t282 = T::nearest(30.0) * t23;
-        let t724 = self.fixed[61] * t23;
-        let t725 = t159 + t724;
-        let t727 = self.fixed[13] * t725;
-        let t728 = t166 - t727;
-        let t729 = self.fixed[20] * t40;
-        let t730 = t40 + t729;
-        let t732 = self.fixed[62] * t23;
-        let t733 = t282 + t732;
-        let t734 = self.fixed[25] * t23;
-        let t736 = self.fixed[26] * t40;
-        let t747 = self.fixed[42] * t23;
-        let t755 = t23 * t40;
-        let t757 = self.fixed[48] * t40;
-        let t762 = t40 * t40;
-        let t765 = self.fixed[52] * t40;
-        let t769 = t23 * t23;
-        let t770 = t769 * t23;
-        let t771 = self.fixed[53] * t770;
-        let t773 = self.fixed[54] * t769;
-        let t777 = self.fixed[55] * t23;
-        let t783 = self.fixed[14] * t728;
-        let t787 = self.fixed[63] * t40;
-        let t792 = self.fixed[64] * t40;
-        let t793 = -t792;
-        let t797 = self.fixed[65] * t40;
-        let t798 = -t797;
-        let t801 = self.fixed[66] * t730;
-        let t802 = -t801;
-        let t805 = self.fixed[66] * t733;
-        let t806 = -t805;
-        let t847 = self.fixed[70] * t23;
-        let t848 = -t847;
-        let t851 = self.fixed[71] * t23;
-        let t852 = -t851;
+        let t566 = self.fixed[35] * t23;
+        let t568 = t23 * t23;
+        let t569 = t568 * t40;
+        let t570 = self.fixed[19] * t569;
+        let t572 = self.fixed[20] * t568;
+        let t577 = t23 * t40;
+        let t578 = self.fixed[21] * t577;
+        let t582 = self.fixed[23] * t23;
+        let t587 = self.fixed[59] * t577;
+        let t600 = self.fixed[33] * t568;
+        let t602 = t568 * t23;
+        let t603 = self.fixed[32] * t602;
+        let t607 = self.fixed[34] * t23;
+        let t615 = t40 * t40;
+        let t616 = self.fixed[37] * t615;
+        let t617 = self.fixed[36] * t615;
+        let t621 = self.fixed[38] * t40;
+        let t625 = self.fixed[39] * t40;
+        let t634 = t569 * t40;
+        let t635 = self.fixed[42] * t634;
+        let t637 = t634 * t40;
+        let t638 = self.fixed[41] * t637;
+        let t642 = self.fixed[45] * t569;
+        let t648 = self.fixed[60] * t569;
+        let t651 = self.fixed[61] * t569;
+        let t656 = t577 * t40;
+        let t657 = self.fixed[47] * t656;
+        let t660 = t656 * t40;
+        let t661 = self.fixed[46] * t660;
+        let t666 = self.fixed[48] * t577;
+        let t671 = self.fixed[62] * t577;
+        let t674 = self.fixed[63] * t577;
+        let t678 = t615 * t40;
+        let t680 = self.fixed[50] * t615;
+        let t685 = self.fixed[51] * t40;
+        let t690 = self.fixed[64] * t40;
+        let t693 = self.fixed[65] * t40;
+        let t697 = self.fixed[53] * t23;
+        let t698 = self.fixed[52] * t23;
         [
-            t23,
-            t24,
             t40,
             t43,
+            t62,
             t76,
-            t175,
-            t180,
-            t185,
-            t229,
-            t734,
-            t736,
-            t747,
-            t755,
-            t757,
-            t762,
-            t765,
-            t771,
-            t773,
-            t777,
-            t783,
-            t787,
-            t793,
-            t798,
-            t802,
-            t806,
-            t848,
-            t852,
+            t566,
+            t570,
+            t572,
+            t577,
+            t578,
+            t582,
+            t587,
+            t600,
+            t603,
+            t607,
+            t616,
+            t617,
+            t621,
+            t625,
+            t635,
+            t638,
+            t642,
+            t648,
+            t651,
+            t657,
+            t661,
+            t666,
+            t671,
+            t674,
+            t678,
+            t680,
+            t685,
+            t690,
+            t693,
+            t697,
+            t698,
         ]
     }
     #[inline]
-    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 18] {
+    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 17] {
         let t3 = T::nearest(3.0).product_error(X[0]);
         let t4 = T::nearest(3.0) * X[0];
         let t6 = t4.sum_error(X[1]);
@@ -1646,320 +1432,215 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 27, 18> for Skew2d<T> {
         let t87 = X[0] * X[1];
         let t88 = T::nearest(2.0) * t87;
         let t89 = t86 + t88;
-        let t150 = t79 * t84;
-        let t151 = T::pi() * t150;
-        let t152 = X[1] - t151;
-        let t224 = T::nearest(4.0) * X[0];
-        let t225 = self.fixed[4] * t31;
-        let t226 = t224 - t225;
-        let t347 = self.fixed[23] * t85;
-        let t349 = T::nearest(6.0) * t87;
-        let t350 = t82 - t347;
-        let t351 = t350 - t349;
-        let t367 = T::nearest(4.0) * t31;
-        let t368 = T::nearest(3.0) * t152;
-        let t369 = t367 + t368;
-        let t370 = T::nearest(2.0) * t369;
-        let t371 = t74 * t370;
-        let t372 = t16 * t351;
-        let t373 = T::nearest(3.0) * t372;
-        let t374 = t371 + t373;
-        let t375 = t16 * t82;
-        let t376 = T::nearest(3.0) * t375;
-        let t377 = t31 * t74;
-        let t378 = T::nearest(8.0) * t377;
-        let t379 = t376 + t378;
-        let t380 = t74 * t152;
-        let t381 = t380 + t372;
-        let t382 = T::nearest(3.0) * t381;
-        let t383 = T::nearest(4.0) * t377;
-        let t384 = t382 + t383;
-        let t385 = t380 * t351;
-        let t386 = t89 * t384;
-        let t387 = t385 + t386;
-        let t388 = T::nearest(6.0) * t387;
-        let t389 = t82 * t374;
-        let t390 = t379 * t351;
-        let t391 = t389 - t388;
-        let t392 = t391 - t390;
-        let t393 = T::nearest(2.0) * t380;
-        let t394 = t16 * t89;
-        let t395 = T::nearest(3.0) * t394;
-        let t396 = t393 - t395;
-        let t397 = t351 * t396;
-        let t398 = T::nearest(6.0) * t397;
-        let t399 = self.fixed[9] * t398;
-        let t400 = self.fixed[8] * t392;
-        let t403 = self.fixed[27] * t385;
-        let t404 = t399 + t400;
-        let t405 = t404 + t403;
-        let t409 = t74 * t405;
-        let t410 = self.fixed[28] * t409;
-        let t415 = t74 * t89;
-        let t416 = t415 * t152;
-        let t417 = t416 * t351;
-        let t418 = self.fixed[29] * t417;
-        let t419 = -t418;
-        let t420 = T::nearest(12.0) * X[0];
-        let t421 = T::nearest(4.0) * X[1];
-        let t423 = self.fixed[30] * t150;
-        let t425 = self.fixed[31] * t31;
-        let t426 = t420 - t421;
-        let t427 = t426 + t423;
-        let t428 = t427 - t425;
-        let t429 = T::nearest(2.0) * t372;
-        let t430 = t74 * t428;
-        let t431 = t429 + t430;
-        let t432 = t89 * t374;
-        let t433 = T::nearest(2.0) * t432;
-        let t434 = t82 * t431;
-        let t435 = t433 - t434;
-        let t444 = self.fixed[32] * t435;
-        let t446 = self.fixed[33] * t85;
-        let t448 = T::nearest(18.0) * t87;
-        let t449 = T::nearest(2.0) * t394;
-        let t450 = t74 * t226;
-        let t451 = t449 - t450;
-        let t453 = self.fixed[34] * t85;
-        let t454 = T::nearest(12.0) * t87;
-        let t455 = t82 - t453;
-        let t456 = t455 - t454;
-        let t457 = T::nearest(2.0) * X[1];
-        let t459 = self.fixed[35] * t150;
-        let t460 = t420 - t457;
-        let t461 = t460 + t459;
-        let t462 = t461 - t425;
-        let t463 = t16 * t456;
-        let t464 = t74 * t462;
-        let t465 = t463 + t464;
-        let t466 = self.fixed[9] * t431;
-        let t468 = self.fixed[36] * t465;
-        let t469 = t466 + t468;
-        let t470 = t152 * t456;
-        let t471 = T::nearest(2.0) * t470;
-        let t472 = t74 * t471;
-        let t473 = t89 * t379;
-        let t474 = t472 + t473;
-        let t475 = T::nearest(2.0) * t33;
-        let t476 = T::nearest(8.0) * t80;
-        let t477 = t475 - t476;
-        let t478 = t477 - t446;
-        let t479 = t478 - t448;
-        let t480 = t380 * t479;
-        let t482 = self.fixed[37] * t480;
-        let t484 = self.fixed[38] * t451;
-        let t485 = t484 + t469;
-        let t486 = t82 * t485;
-        let t490 = self.fixed[39] * t385;
-        let t491 = self.fixed[36] * t473;
-        let t495 = self.fixed[40] * t474;
-        let t496 = t482 - t486;
-        let t497 = t496 + t490;
-        let t498 = t497 + t491;
-        let t499 = t498 + t495;
-        let t501 = self.fixed[41] * t499;
-        let t508 = T::nearest(9.0) * t394;
-        let t509 = t383 + t508;
-        let t510 = t384 - t509;
-        let t511 = self.fixed[9] * t510;
-        let t512 = t380 + t463;
-        let t513 = self.fixed[38] * t512;
-        let t514 = t511 + t513;
-        let t518 = t74 * t514;
-        let t519 = self.fixed[43] * t518;
-        let t524 = self.fixed[44] * t384;
-        let t526 = self.fixed[45] * t152;
-        let t527 = t74 * t526;
-        let t528 = t379 * self.fixed[24];
-        let t530 = self.fixed[46] * t375;
-        let t531 = t527 - t528;
-        let t532 = t531 - t530;
-        let t535 = self.fixed[47] * t532;
-        let t541 = t82 * t226;
-        let t542 = t89 * t152;
-        let t543 = T::nearest(4.0) * t542;
-        let t544 = t541 - t543;
-        let t549 = self.fixed[49] * t544;
-        let t550 = -t549;
-        let t552 = self.fixed[50] * t152;
-        let t553 = t89 * t552;
-        let t554 = self.fixed[24] * t541;
-        let t555 = t553 + t554;
-        let t557 = self.fixed[51] * t555;
+        let t168 = t79 * t84;
+        let t169 = T::pi() * t168;
+        let t170 = X[1] - t169;
+        let t175 = T::nearest(4.0) * X[0];
+        let t176 = self.fixed[4] * t31;
+        let t177 = t175 - t176;
+        let t228 = self.fixed[18] * t85;
+        let t230 = T::nearest(6.0) * t87;
+        let t231 = t82 - t228;
+        let t232 = t231 - t230;
+        let t250 = self.fixed[22] * t85;
+        let t252 = T::nearest(12.0) * t87;
+        let t253 = t82 - t250;
+        let t254 = t253 - t252;
+        let t259 = T::nearest(12.0) * X[0];
+        let t260 = T::nearest(4.0) * X[1];
+        let t262 = self.fixed[24] * t168;
+        let t264 = self.fixed[25] * t31;
+        let t265 = t259 - t260;
+        let t266 = t265 + t262;
+        let t267 = t266 - t264;
+        let t268 = t16 * t232;
+        let t269 = T::nearest(2.0) * t268;
+        let t270 = t74 * t267;
+        let t271 = t269 + t270;
+        let t272 = T::nearest(4.0) * t31;
+        let t273 = T::nearest(3.0) * t170;
+        let t274 = t272 + t273;
+        let t275 = T::nearest(2.0) * t274;
+        let t276 = t74 * t275;
+        let t277 = T::nearest(3.0) * t268;
+        let t278 = t276 + t277;
+        let t279 = t82 * t271;
+        let t280 = t89 * t278;
+        let t281 = T::nearest(2.0) * t280;
+        let t282 = t279 - t281;
+        let t290 = self.fixed[26] * t282;
+        let t291 = -t290;
+        let t292 = self.fixed[13] * t282;
+        let t294 = t89 * t89;
+        let t296 = t16 * t294;
+        let t297 = self.fixed[27] * t296;
+        let t298 = t292 + t297;
+        let t300 = self.fixed[28] * t298;
+        let t301 = t74 * t170;
+        let t302 = t301 + t268;
+        let t303 = T::nearest(3.0) * t302;
+        let t304 = t31 * t74;
+        let t305 = T::nearest(4.0) * t304;
+        let t306 = t303 + t305;
+        let t311 = self.fixed[29] * t306;
+        let t312 = self.fixed[13] * t306;
+        let t314 = t16 * t89;
+        let t315 = self.fixed[30] * t314;
+        let t316 = t312 - t315;
+        let t318 = self.fixed[31] * t316;
+        let t346 = self.fixed[6] * t35;
+        let t347 = -t346;
+        let t350 = self.fixed[40] * t30;
+        let t351 = t28 * t350;
+        let t352 = t175 - t351;
+        let t364 = self.fixed[43] * t30;
+        let t365 = t28 * t364;
+        let t367 = T::nearest(36.0) * X[0];
+        let t369 = T::nearest(24.0) * X[1];
+        let t371 = self.fixed[44] * t168;
+        let t372 = t367 - t365;
+        let t373 = t372 - t369;
+        let t374 = t373 + t371;
+        let t390 = t268 + t270;
+        let t400 = t294 * t352;
+        let t401 = self.fixed[49] * t400;
+        let t402 = -t401;
         [
             t16,
-            t31,
-            t35,
             t74,
             t82,
             t89,
-            t152,
-            t226,
-            t351,
-            t410,
-            t419,
-            t444,
-            t501,
-            t519,
-            t524,
-            t535,
-            t550,
-            t557,
+            t170,
+            t177,
+            t232,
+            t254,
+            t291,
+            t300,
+            t311,
+            t318,
+            t347,
+            t352,
+            t374,
+            t390,
+            t402,
         ]
     }
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
-        time: &[T; 27],
-        point: &[T; 18],
+        time: &[T; 35],
+        point: &[T; 17],
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t77 = time[4] * point[3];
-        let t78 = time[1] * point[3];
-        let t83 = time[3] * point[4];
-        let t90 = time[3] * point[5];
+        let t63 = time[2] * point[0];
+        let t77 = time[3] * point[1];
+        let t90 = time[1] * point[3];
         let t92 = t77 + T::one();
         let t98 = t90 + T::one();
         let t99 = t92 * t98;
-        let t100 = t78 * t83;
-        let t101 = t99 - t100;
         let t106 = t77 * t98;
-        let t107 = t100 - t106;
-        let t108 = T::one() / t101;
         let t113 = t106 + t90;
-        let t114 = t113 - t100;
-        let t115 = t114.log_1p();
-        let t141 = t90 * t92;
-        let t142 = t100 - t141;
-        let t176 = time[5] * point[0];
-        let t181 = time[6] * point[1];
-        let t186 = time[7] * point[6];
-        let t187 = T::nearest(3.0) * point[0];
-        let t188 = t187 * t83;
-        let t194 = t92 * t186;
-        let t222 = time[4] * point[0];
-        let t230 = time[8] * point[7];
-        let t231 = point[0] * t83;
-        let t232 = point[3] * t186;
-        let t233 = t231 - t232;
-        let t235 = t92 * t230;
-        let t236 = time[1] * t233;
-        let t297 = t235 + t236;
-        let t303 = t230 * t142;
-        let t307 = t90 * t142;
-        let t308 = t100 - t307;
-        let t313 = t90 - t100;
-        let t314 = t313 + t106;
-        let t357 = point[3] * point[3];
-        let t358 = point[8] * point[8];
-        let t362 = point[0] * t357;
-        let t502 = time[2] * point[10];
-        let t503 = point[11] * t115;
-        let t536 = point[14] * t115;
-        let t537 = point[5] * point[5];
-        let t558 = point[16] * t115;
-        let t573 = t108 * t108;
-        let t735 = time[9] * t362;
-        let t737 = time[10] * point[6];
-        let t738 = t737 * t357;
-        let t739 = t738 - t735;
-        let t740 = t358 * t739;
-        let t741 = t740 - point[9];
-        let t742 = time[0] * t741;
-        let t743 = t742 + t502;
-        let t744 = t743 + t503;
-        let t745 = t744 - point[12];
-        let t746 = time[2] * t745;
-        let t748 = time[11] * point[8];
-        let t749 = t748 * t362;
-        let t750 = point[13] + t749;
-        let t751 = time[0] * t750;
-        let t752 = t746 + t751;
-        let t753 = t752 + t536;
-        let t754 = point[15] + t753;
-        let t756 = time[12] * t754;
-        let t758 = time[13] * t537;
-        let t759 = t758 * point[6];
-        let t760 = t759 + t558;
-        let t761 = point[17] + t760;
-        let t763 = time[14] * t761;
-        let t764 = t756 + t763;
-        let t766 = time[15] * point[6];
-        let t767 = t766 * t115;
-        let t768 = t764 + t767;
-        let t772 = time[16] * t362;
-        let t774 = time[17] * point[0];
-        let t775 = t774 * point[3];
-        let t776 = t772 + t775;
-        let t778 = time[18] * point[0];
-        let t779 = t778 * t115;
-        let t780 = t776 + t779;
-        let t781 = t768 - t780;
-        let t782 = t573 * t781;
-        let t784 = time[19] * point[0];
-        let t788 = time[20] * point[6];
-        let t789 = t784 + t788;
-        let t790 = t782 - t789;
-        let t794 = time[21] * point[2];
-        let t799 = time[22] * point[1];
-        let t803 = time[23] * point[7];
-        let t804 = t799 - t803;
-        let t807 = time[24] * point[0];
-        let t808 = t804 + t807;
-        let t809 = t794 - t808;
-        let t810 = t98 * t222;
-        let t811 = t236 - t810;
-        let t812 = t811 + t235;
-        let t815 = self.fixed[67] * t108;
-        let t816 = t815 * t142;
-        let t817 = t816 * t812;
-        let t818 = t90 * t222;
-        let t819 = t297 - t818;
-        let t820 = self.fixed[67] * t115;
-        let t821 = t820 * t819;
-        let t822 = t817 - t821;
-        let t825 = self.fixed[68] * t236;
-        let t826 = t822 + t825;
-        let t827 = self.fixed[68] * t303;
-        let t828 = t826 + t827;
-        let t829 = self.fixed[67] * t107;
-        let t830 = t829 * t222;
-        let t831 = t828 - t830;
-        let t834 = self.fixed[69] * t90;
-        let t835 = t834 * t819;
-        let t836 = t831 - t835;
-        let t837 = t235 - t810;
-        let t838 = t837 + t236;
-        let t839 = t820 * t142;
-        let t840 = self.fixed[69] * t308;
-        let t841 = t839 - t840;
-        let t842 = t108 * t838;
-        let t843 = t842 * t841;
-        let t844 = t836 - t843;
-        let t849 = time[25] * t115;
-        let t853 = time[26] * t314;
-        let t854 = t849 + t853;
-        let t855 = t176 * t98;
-        let t856 = t194 - t855;
-        let t857 = t181 * point[3];
-        let t858 = t188 + t857;
-        let t859 = time[1] * t858;
-        let t860 = t856 + t859;
-        let t861 = point[3] * t108;
-        let t862 = t861 * t860;
-        let t863 = t187 + t862;
-        let t864 = t854 * t863;
-        let t865 = t859 - t855;
-        let t866 = t865 + t194;
-        let t867 = time[25] * t108;
-        let t868 = t867 * t866;
-        let t869 = time[26] * t860;
-        let t870 = t868 + t869;
-        let t871 = point[3] * t870;
-        let t872 = t864 - t871;
-        let t873 = t844 + t872;
-        let t874 = t108 * t873;
-        let t875 = t809 + t874;
-        crate::nalgebra::SVector::<T, 2>::new(t790, t875)
+        let t236 = point[1] * point[1];
+        let t237 = point[6] * point[6];
+        let t241 = point[0] * t236;
+        let t248 = point[0] * point[1];
+        let t334 = point[2] * point[5];
+        let t357 = t236 * point[13];
+        let t389 = point[1] * point[13];
+        let t415 = time[0] * point[12];
+        let t567 = time[4] * point[0];
+        let t571 = time[5] * t237;
+        let t573 = time[6] * point[6];
+        let t574 = t571 - t573;
+        let t575 = t241 * t574;
+        let t576 = point[3] * point[6];
+        let t579 = time[8] * t248;
+        let t580 = t579 * t576;
+        let t581 = t575 - t580;
+        let t583 = time[9] * t248;
+        let t584 = t583 * point[7];
+        let t585 = t581 - t584;
+        let t588 = time[10] * point[1];
+        let t589 = t588 * point[2];
+        let t590 = t113 - t589;
+        let t591 = t590.log_1p();
+        let t592 = point[8] * t591;
+        let t593 = point[9] + t592;
+        let t594 = time[0] * t593;
+        let t595 = t585 + t594;
+        let t596 = point[10] * t591;
+        let t597 = t595 + t596;
+        let t598 = t597 - point[11];
+        let t599 = time[7] * t598;
+        let t601 = time[11] * t248;
+        let t604 = time[12] * t241;
+        let t605 = t601 + t604;
+        let t606 = t599 + t605;
+        let t608 = time[13] * point[0];
+        let t609 = t608 * t591;
+        let t610 = t606 - t609;
+        let t611 = t567 + t610;
+        let t612 = T::nearest(4.0) * point[3];
+        let t613 = t612 * point[4];
+        let t614 = t334 - t613;
+        let t618 = time[15] * t591;
+        let t619 = time[14] - t618;
+        let t620 = t614 * t619;
+        let t622 = time[16] * point[4];
+        let t623 = t622 * t591;
+        let t624 = t620 + t623;
+        let t626 = time[17] * point[4];
+        let t627 = t624 - t626;
+        let t628 = t611 + t627;
+        let t629 = t99 - t589;
+        let t630 = T::one() / t629;
+        let t631 = t630 * t630;
+        let t632 = t628 * t631;
+        let t633 = t632 - t63;
+        let t636 = time[18] * point[6];
+        let t639 = time[19] * t237;
+        let t640 = t636 - t639;
+        let t641 = t357 * t640;
+        let t643 = time[20] * t236;
+        let t644 = t643 * point[14];
+        let t645 = t644 * t591;
+        let t646 = t641 + t645;
+        let t649 = time[21] * point[14];
+        let t652 = time[22] * point[13];
+        let t653 = t649 + t652;
+        let t654 = t236 * t653;
+        let t655 = t646 - t654;
+        let t658 = time[23] * point[7];
+        let t659 = t658 * t389;
+        let t662 = time[24] * t389;
+        let t663 = t662 * t576;
+        let t664 = t659 + t663;
+        let t665 = t655 + t664;
+        let t667 = time[25] * point[15];
+        let t668 = t667 * t591;
+        let t669 = t665 + t668;
+        let t672 = time[26] * point[15];
+        let t675 = time[27] * t389;
+        let t676 = t672 + t675;
+        let t677 = t669 - t676;
+        let t679 = time[28] * point[16];
+        let t681 = time[29] * point[3];
+        let t682 = t681 * point[13];
+        let t683 = t679 - t682;
+        let t684 = t677 + t683;
+        let t686 = time[30] * point[5];
+        let t687 = t686 * t591;
+        let t688 = t684 + t687;
+        let t691 = time[31] * point[13];
+        let t694 = time[32] * point[5];
+        let t695 = t691 + t694;
+        let t696 = t688 - t695;
+        let t699 = time[34] * t591;
+        let t700 = time[33] - t699;
+        let t701 = point[0] * t700;
+        let t702 = t696 + t701;
+        let t703 = t631 * t702;
+        let t704 = t415 + t703;
+        crate::nalgebra::SVector::<T, 2>::new(t633, t704)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

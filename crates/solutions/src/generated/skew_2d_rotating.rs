@@ -42,7 +42,7 @@ impl<T: crate::Real> Default for Skew2dRotatingParameters<T> {
 pub struct Skew2dRotating<T: crate::Real> {
     parameters: Skew2dRotatingParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 49],
+    fixed: [T; 33],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Skew2dRotating<T> {
@@ -151,52 +151,39 @@ impl<T: crate::Real> Skew2dRotating<T> {
         let t218 = t216 / t217;
         let t226 = t124 * parameters.nu;
         let t227 = t226 / t217;
-        let t272 = t210 / t211;
-        let t277 = T::one() / t202;
-        let t279 = T::nearest(10.0) * t123;
-        let t282 = t192 * parameters.E;
-        let t283 = t282 / parameters.rho0;
-        let t288 = T::nearest(9.0) * parameters.A;
-        let t294 = T::nearest(0.8) * parameters.A;
-        let t298 = T::nearest(0.2) * parameters.A;
-        let t348 = T::nearest(0.05) * parameters.A;
-        let t388 = T::one() / parameters.rho0;
-        let t404 = parameters.nu / t211;
-        let t408 = T::nearest(2.0) * t123;
-        let t413 = t348 * parameters.E;
-        let t414 = t413 / parameters.rho0;
-        let t523 = T::nearest(2.0) / t27;
-        let t528 = t192 * T::pi();
-        let t576 = T::nearest(2.0).cos();
-        let t578 = T::pi() * t576;
-        let t583 = T::nearest(2.0).sin();
-        let t584 = T::nearest(4.0) * t583;
-        let t638 = parameters.A * t204;
-        let t697 = parameters.Omega * parameters.A;
-        let t698 = t697 * T::nearest(10.0);
-        let t700 = T::nearest(10.0) * t120;
-        let t712 = T::nearest(45.0) * t272;
-        let t715 = T::one() + t272;
-        let t719 = t123 * t404;
-        let t723 = T::nearest(4.0) * t404;
-        let t726 = T::nearest(60.0) * t404;
-        let t731 = t218 + t204;
-        let t734 = t277 * t283;
-        let t735 = t734 * t715;
-        let t769 = T::nearest(4.0) * t348;
-        let t772 = t123 * t348;
-        let t800 = T::nearest(10.0) * T::nearest(0.1);
-        let t803 = t408 * t414;
-        let t806 = t277 * t414;
-        let t816 = t218 * t388;
-        let t825 = t388 * t731;
-        let t834 = t204 * t388;
-        let t854 = parameters.A * t388;
-        let t863 = parameters.Omega * parameters.Omega;
-        let t864 = t863 * T::nearest(10.0);
-        let t865 = t864 * T::nearest(0.1);
-        let t868 = parameters.Omega * T::nearest(0.1);
-        let t872 = t863 * T::nearest(0.1);
+        let t261 = parameters.E * t123;
+        let t262 = t261 / parameters.rho0;
+        let t265 = T::nearest(9.0) * parameters.A;
+        let t272 = t218 + t204;
+        let t283 = T::nearest(0.2) * parameters.A;
+        let t290 = T::nearest(0.05) * parameters.A;
+        let t301 = T::nearest(0.8) * parameters.A;
+        let t321 = T::one() / parameters.rho0;
+        let t327 = T::nearest(0.1) * parameters.E;
+        let t328 = t327 * t123;
+        let t329 = t328 / parameters.rho0;
+        let t376 = t192 * parameters.E;
+        let t377 = t376 * t123;
+        let t378 = t377 / parameters.rho0;
+        let t381 = T::nearest(2.0) / t27;
+        let t386 = t192 * T::pi();
+        let t434 = T::nearest(2.0).cos();
+        let t436 = T::pi() * t434;
+        let t441 = T::nearest(2.0).sin();
+        let t442 = T::nearest(4.0) * t441;
+        let t496 = parameters.A * t204;
+        let t555 = parameters.Omega * parameters.A;
+        let t565 = T::nearest(4.0) * t290;
+        let t568 = t123 * t290;
+        let t592 = T::nearest(10.0) * T::nearest(0.1);
+        let t607 = parameters.Omega * parameters.Omega;
+        let t608 = t607 * T::nearest(10.0);
+        let t609 = t608 * T::nearest(0.1);
+        let t612 = t607 * T::nearest(0.1);
+        let t616 = parameters.Omega * T::nearest(0.1);
+        let t620 = parameters.Omega * T::nearest(10.0);
+        let t621 = t620 * T::nearest(0.1);
+        let t622 = t621 * t120;
         Ok(Skew2dRotating {
             parameters,
             fixed: [
@@ -211,44 +198,28 @@ impl<T: crate::Real> Skew2dRotating<T> {
                 t204,
                 t218,
                 t227,
+                t262,
+                t265,
                 t272,
-                t277,
-                t279,
                 t283,
-                t288,
-                t294,
-                t298,
-                t348,
-                t388,
-                t404,
-                t408,
-                t414,
-                t523,
-                t528,
-                t578,
-                t584,
-                t638,
-                t697,
-                t698,
-                t700,
-                t712,
-                t719,
-                t723,
-                t726,
-                t731,
-                t735,
-                t769,
-                t772,
-                t800,
-                t803,
-                t806,
-                t816,
-                t825,
-                t834,
-                t854,
-                t865,
-                t868,
-                t872,
+                t290,
+                t301,
+                t321,
+                t329,
+                t378,
+                t381,
+                t386,
+                t436,
+                t442,
+                t496,
+                t555,
+                t565,
+                t568,
+                t592,
+                t609,
+                t612,
+                t616,
+                t622,
             ],
         })
     }
@@ -884,8 +855,11 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
         let t45 = t42 + t44;
         let t57 = T::nearest(10.0) * t9;
         let t77 = self.parameters.A * t29;
+        let t78 = t77 * t23;
+        let t79 = X[0] + t78;
         let t80 = T::nearest(10.0) * X[1];
         let t81 = self.parameters.A * t45;
+        let t84 = t57 * t79;
         let t88 = T::nearest(4.0) * t29;
         let t89 = T::nearest(3.0) * t41;
         let t90 = t88 - t89;
@@ -894,6 +868,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
         let t93 = t92 * t23;
         let t94 = t90 * t9;
         let t104 = T::nearest(10.0) * t30;
+        let t105 = t104 * t79;
         let t108 = t41 * t9;
         let t109 = T::nearest(10.0) * t108;
         let t110 = t109 * t23;
@@ -923,224 +898,102 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
         let t198 = t77 * t142;
         let t205 = t189 * t195;
         let t212 = t205 + t194;
-        let t243 = t194 * t191;
-        let t261 = t143 * t156;
-        let t262 = T::pi() * t261;
-        let t263 = X[1] - t262;
-        let t265 = T::nearest(45.0) * t29;
-        let t266 = t265 * t23;
-        let t267 = t45 * t263;
-        let t268 = t266 - t267;
-        let t270 = T::nearest(95.0) * t29;
-        let t271 = t270 * t23;
-        let t273 = self.fixed[11] * t268;
-        let t274 = t271 - t267;
-        let t275 = t274 + t273;
-        let t276 = t29 * t23;
-        let t278 = self.fixed[12] * t275;
-        let t280 = self.fixed[13] * t276;
-        let t281 = t278 - t280;
-        let t284 = self.fixed[14] * t281;
-        let t285 = t196 * t198;
-        let t286 = t197 - t285;
-        let t289 = self.fixed[15] * t276;
-        let t290 = -t289;
-        let t291 = self.parameters.A * t276;
-        let t292 = t45 * t36;
-        let t295 = self.fixed[16] * t292;
-        let t296 = -t295;
-        let t299 = self.fixed[17] * t267;
-        let t300 = t195 * t290;
-        let t301 = t196 * t291;
-        let t302 = T::nearest(3.0) * t301;
-        let t303 = t198 * t296;
-        let t304 = t191 * t299;
-        let t305 = t300 + t302;
-        let t306 = t305 - t303;
-        let t307 = t306 + t304;
-        let t308 = t205 - t285;
-        let t309 = t212 - t285;
-        let t310 = t309.log_1p();
-        let t311 = T::nearest(3.0) * t23;
-        let t312 = t311 * t196;
-        let t313 = t142 * t296;
+        let t263 = self.fixed[11] * t78;
+        let t266 = self.fixed[12] * t29;
+        let t267 = t266 * t23;
+        let t268 = -t267;
+        let t269 = t78 + t267;
+        let t270 = t196 * t198;
+        let t271 = t197 - t270;
+        let t273 = t212 - t270;
+        let t274 = t273.log_1p();
+        let t275 = self.fixed[9] * t274;
+        let t276 = self.fixed[13] - t275;
+        let t277 = t188 * t23;
+        let t278 = -t277;
+        let t279 = t143 * t156;
+        let t280 = T::pi() * t279;
+        let t281 = X[1] - t280;
+        let t284 = self.fixed[14] * t45;
+        let t285 = t284 * t281;
+        let t286 = T::nearest(4.0) * X[0];
+        let t287 = self.fixed[4] * t36;
+        let t288 = t286 - t287;
+        let t291 = self.fixed[15] * t45;
+        let t292 = t291 * t288;
+        let t293 = t195 * t278;
+        let t294 = t196 * t78;
+        let t295 = t285 * t198;
+        let t296 = t191 * t292;
+        let t297 = t293 + t294;
+        let t298 = t297 - t295;
+        let t299 = t298 + t296;
+        let t302 = self.fixed[16] * t45;
+        let t303 = t302 * t36;
+        let t304 = -t303;
+        let t305 = t195 * t268;
+        let t306 = t191 * t285;
+        let t307 = T::nearest(3.0) * t294;
+        let t308 = t198 * t304;
+        let t309 = t305 + t306;
+        let t310 = t309 + t307;
+        let t311 = t310 - t308;
+        let t312 = t196 * t299;
+        let t313 = t195 * t311;
         let t314 = t312 - t313;
-        let t315 = t77 * t314;
-        let t316 = t189 * t299;
-        let t317 = t300 + t315;
-        let t318 = t317 + t316;
-        let t319 = t307 * t308;
-        let t320 = T::one() / t286;
-        let t321 = t319 * t320;
-        let t322 = t310 * t318;
-        let t323 = t321 + t322;
-        let t324 = t290 * t308;
-        let t325 = t189 * t318;
-        let t326 = t315 - t324;
-        let t327 = t326 - t325;
-        let t328 = t189 * t308;
-        let t329 = t285 + t328;
-        let t330 = t308 * t310;
-        let t331 = self.fixed[9] * t330;
-        let t332 = self.fixed[8] * t329;
-        let t333 = t331 + t332;
-        let t334 = t300 + t304;
-        let t335 = t334 + t315;
-        let t336 = t189 + t243;
-        let t337 = t336 - t285;
-        let t338 = self.fixed[9] * t310;
-        let t339 = self.fixed[8] * t337;
-        let t340 = t338 + t339;
-        let t341 = self.fixed[6] * t276;
-        let t342 = -t341;
-        let t343 = T::nearest(4.0) * X[0];
-        let t344 = self.fixed[4] * t36;
-        let t345 = t343 - t344;
-        let t346 = t45 * t345;
-        let t349 = self.fixed[18] * t346;
-        let t350 = t23 * t196;
-        let t351 = t142 * t299;
+        let t315 = self.fixed[8] * t269;
+        let t316 = t271 * t271;
+        let t317 = t276 * t314;
+        let t318 = T::one() / t316;
+        let t319 = t317 * t318;
+        let t320 = t315 + t319;
+        let t322 = self.fixed[17] * t320;
+        let t323 = t322 - t263;
+        let t324 = X[1] * t159;
+        let t325 = t37 + t324;
+        let t326 = t81 * t325;
+        let t330 = self.fixed[18] * t326;
+        let t331 = t292 - t303;
+        let t332 = t198 * t311;
+        let t333 = t191 * t299;
+        let t334 = t332 - t333;
+        let t335 = self.fixed[8] * t331;
+        let t336 = t276 * t334;
+        let t337 = t336 * t318;
+        let t338 = t335 - t337;
+        let t339 = self.fixed[17] * t338;
+        let t340 = t330 + t339;
+        let t341 = -t340;
+        let t342 = t80 + t326;
+        let t343 = t9 * t342;
+        let t344 = t105 - t343;
+        let t345 = t111 * t325;
+        let t346 = t110 - t345;
+        let t347 = self.parameters.Omega * t344;
+        let t348 = self.fixed[3] * t346;
+        let t349 = t347 - t348;
+        let t350 = t30 * t323;
+        let t351 = t9 * t341;
         let t352 = t350 - t351;
-        let t353 = t195 * t342;
-        let t354 = t191 * t349;
-        let t355 = t77 * t352;
-        let t356 = t353 + t354;
-        let t357 = t356 + t355;
-        let t358 = t198 * t299;
-        let t359 = t301 + t353;
-        let t360 = t359 + t354;
-        let t361 = t360 - t358;
-        let t362 = t342 * t195;
-        let t363 = t362 + t354;
-        let t364 = t363 + t355;
-        let t365 = t361 * t320;
-        let t366 = self.fixed[9] * t365;
-        let t367 = self.fixed[8] * t364;
-        let t368 = t366 + t367;
-        let t369 = t243 - t285;
-        let t370 = t299 * t369;
-        let t371 = t302 - t303;
-        let t372 = t371 - t324;
-        let t373 = t372 - t370;
-        let t374 = t323 - t373;
-        let t375 = self.fixed[9] * t374;
-        let t376 = t333 * t335;
-        let t377 = t196 * t340;
-        let t378 = t377 * t357;
-        let t379 = t376 + t378;
-        let t380 = t320 * t379;
-        let t381 = self.fixed[8] * t327;
-        let t382 = t299 * t340;
-        let t383 = t196 * t368;
-        let t384 = t375 - t380;
-        let t385 = t384 - t381;
-        let t386 = t385 + t382;
-        let t387 = t386 + t383;
-        let t389 = t387 * t320;
-        let t390 = self.fixed[19] * t389;
-        let t391 = t284 + t390;
-        let t392 = X[1] * t159;
-        let t393 = t37 + t392;
-        let t395 = T::nearest(60.0) * t29;
-        let t396 = t395 * t23;
-        let t397 = t396 - t346;
-        let t399 = T::nearest(8.0) * t36;
-        let t400 = t399 - t345;
-        let t401 = t45 * t400;
-        let t402 = T::nearest(30.0) * t29;
-        let t403 = t402 * t23;
-        let t405 = self.fixed[20] * t397;
-        let t406 = t401 + t403;
-        let t407 = t406 + t405;
-        let t409 = self.fixed[21] * t45;
-        let t410 = t409 * t393;
-        let t411 = self.fixed[12] * t407;
-        let t412 = t410 - t411;
-        let t415 = self.fixed[22] * t412;
-        let t416 = t194 * t342;
-        let t417 = t354 + t355;
-        let t418 = t417 + t416;
-        let t419 = t361 * t369;
-        let t420 = t419 * t320;
-        let t421 = t310 * t418;
-        let t422 = t420 + t421;
-        let t423 = t349 * t369;
-        let t424 = t194 * t418;
-        let t425 = t355 - t423;
-        let t426 = t425 - t424;
-        let t427 = t194 * t369;
-        let t428 = t285 + t427;
-        let t429 = t310 * t369;
-        let t430 = self.fixed[9] * t429;
-        let t431 = self.fixed[8] * t428;
-        let t432 = t430 + t431;
-        let t433 = t194 + t205;
-        let t434 = t433 - t285;
-        let t435 = self.fixed[8] * t434;
-        let t436 = t338 + t435;
-        let t437 = t299 * t191;
-        let t438 = t437 + t300;
-        let t439 = t438 + t315;
-        let t440 = t307 * t320;
-        let t441 = self.fixed[9] * t440;
-        let t442 = self.fixed[8] * t439;
-        let t443 = t441 + t442;
-        let t444 = t335 * t320;
-        let t445 = t142 * t444;
-        let t446 = t311 + t445;
-        let t447 = t436 * t446;
-        let t448 = t142 * t443;
-        let t449 = t447 - t448;
-        let t450 = t308 * t342;
-        let t451 = t301 - t358;
-        let t452 = t451 - t423;
-        let t453 = t452 - t450;
-        let t454 = t422 - t453;
-        let t455 = self.fixed[9] * t454;
-        let t456 = self.fixed[8] * t426;
-        let t457 = t357 * t432;
-        let t458 = t457 * t320;
-        let t459 = t77 * t449;
-        let t460 = t455 - t456;
-        let t461 = t460 - t458;
-        let t462 = t461 - t459;
-        let t463 = t462 * t320;
-        let t464 = self.fixed[19] * t463;
-        let t465 = t464 - t415;
-        let t466 = X[0] + t291;
-        let t467 = t81 * t393;
-        let t468 = t80 + t467;
-        let t469 = t104 * t466;
-        let t470 = t9 * t468;
-        let t471 = t469 - t470;
-        let t472 = t111 * t393;
-        let t473 = t110 - t472;
-        let t474 = self.parameters.Omega * t471;
-        let t475 = self.fixed[3] * t473;
-        let t476 = t474 - t475;
-        let t477 = t30 * t391;
-        let t478 = t9 * t465;
-        let t479 = t477 - t478;
-        let t480 = T::nearest(10.0) * t479;
-        let t481 = self.parameters.Omega * t476;
-        let t482 = t480 - t481;
-        let t483 = T::nearest(0.1) * t482;
-        let t484 = t57 * t466;
-        let t485 = t30 * t468;
-        let t486 = t484 + t485;
-        let t487 = t94 * t393;
-        let t488 = t93 + t487;
-        let t489 = self.parameters.Omega * t486;
-        let t490 = self.fixed[3] * t488;
-        let t491 = t489 + t490;
-        let t492 = t9 * t391;
-        let t493 = t30 * t465;
-        let t494 = t492 + t493;
-        let t495 = T::nearest(10.0) * t494;
-        let t496 = self.parameters.Omega * t491;
-        let t497 = t495 - t496;
-        let t498 = T::nearest(0.1) * t497;
-        crate::nalgebra::SVector::<T, 2>::new(t483, t498)
+        let t353 = T::nearest(10.0) * t352;
+        let t354 = self.parameters.Omega * t349;
+        let t355 = t353 - t354;
+        let t356 = T::nearest(0.1) * t355;
+        let t357 = t30 * t342;
+        let t358 = t84 + t357;
+        let t359 = t94 * t325;
+        let t360 = t93 + t359;
+        let t361 = self.parameters.Omega * t358;
+        let t362 = self.fixed[3] * t360;
+        let t363 = t361 + t362;
+        let t364 = t9 * t323;
+        let t365 = t30 * t341;
+        let t366 = t364 + t365;
+        let t367 = T::nearest(10.0) * t366;
+        let t368 = self.parameters.Omega * t363;
+        let t369 = t367 - t368;
+        let t370 = T::nearest(0.1) * t369;
+        crate::nalgebra::SVector::<T, 2>::new(t356, t370)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t5 = self.fixed[0] * t;
@@ -1362,222 +1215,101 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
         let t258 = t9 * t242;
         let t259 = t30 * t251;
         let t260 = t258 + t259;
-        let t261 = t143 * t156;
-        let t262 = T::pi() * t261;
-        let t263 = X[1] - t262;
-        let t265 = T::nearest(45.0) * t29;
-        let t266 = t265 * t23;
-        let t267 = t45 * t263;
-        let t268 = t266 - t267;
-        let t270 = T::nearest(95.0) * t29;
-        let t271 = t270 * t23;
-        let t273 = self.fixed[11] * t268;
-        let t274 = t271 - t267;
-        let t275 = t274 + t273;
-        let t276 = t29 * t23;
-        let t278 = self.fixed[12] * t275;
-        let t280 = self.fixed[13] * t276;
-        let t281 = t278 - t280;
-        let t284 = self.fixed[14] * t281;
-        let t285 = t196 * t198;
-        let t286 = t197 - t285;
-        let t289 = self.fixed[15] * t276;
-        let t290 = -t289;
-        let t291 = self.parameters.A * t276;
-        let t292 = t45 * t36;
-        let t295 = self.fixed[16] * t292;
-        let t296 = -t295;
-        let t299 = self.fixed[17] * t267;
-        let t300 = t195 * t290;
-        let t301 = t196 * t291;
-        let t302 = T::nearest(3.0) * t301;
-        let t303 = t198 * t296;
-        let t304 = t191 * t299;
-        let t305 = t300 + t302;
-        let t306 = t305 - t303;
-        let t307 = t306 + t304;
-        let t308 = t205 - t285;
-        let t309 = t212 - t285;
-        let t310 = t309.log_1p();
-        let t311 = T::nearest(3.0) * t23;
-        let t312 = t311 * t196;
-        let t313 = t142 * t296;
+        let t263 = self.fixed[11] * t78;
+        let t266 = self.fixed[12] * t29;
+        let t267 = t266 * t23;
+        let t268 = -t267;
+        let t269 = t78 + t267;
+        let t270 = t196 * t198;
+        let t271 = t197 - t270;
+        let t273 = t212 - t270;
+        let t274 = t273.log_1p();
+        let t275 = self.fixed[9] * t274;
+        let t276 = self.fixed[13] - t275;
+        let t277 = t188 * t23;
+        let t278 = -t277;
+        let t279 = t143 * t156;
+        let t280 = T::pi() * t279;
+        let t281 = X[1] - t280;
+        let t284 = self.fixed[14] * t45;
+        let t285 = t284 * t281;
+        let t286 = T::nearest(4.0) * X[0];
+        let t287 = self.fixed[4] * t36;
+        let t288 = t286 - t287;
+        let t291 = self.fixed[15] * t45;
+        let t292 = t291 * t288;
+        let t293 = t195 * t278;
+        let t294 = t196 * t78;
+        let t295 = t285 * t198;
+        let t296 = t191 * t292;
+        let t297 = t293 + t294;
+        let t298 = t297 - t295;
+        let t299 = t298 + t296;
+        let t302 = self.fixed[16] * t45;
+        let t303 = t302 * t36;
+        let t304 = -t303;
+        let t305 = t195 * t268;
+        let t306 = t191 * t285;
+        let t307 = T::nearest(3.0) * t294;
+        let t308 = t198 * t304;
+        let t309 = t305 + t306;
+        let t310 = t309 + t307;
+        let t311 = t310 - t308;
+        let t312 = t196 * t299;
+        let t313 = t195 * t311;
         let t314 = t312 - t313;
-        let t315 = t77 * t314;
-        let t316 = t189 * t299;
-        let t317 = t300 + t315;
-        let t318 = t317 + t316;
-        let t319 = t307 * t308;
-        let t320 = T::one() / t286;
-        let t321 = t319 * t320;
-        let t322 = t310 * t318;
-        let t323 = t321 + t322;
-        let t324 = t290 * t308;
-        let t325 = t189 * t318;
-        let t326 = t315 - t324;
-        let t327 = t326 - t325;
-        let t328 = t189 * t308;
-        let t329 = t285 + t328;
-        let t330 = t308 * t310;
-        let t331 = self.fixed[9] * t330;
-        let t332 = self.fixed[8] * t329;
-        let t333 = t331 + t332;
-        let t334 = t300 + t304;
-        let t335 = t334 + t315;
-        let t336 = t189 + t243;
-        let t337 = t336 - t285;
-        let t338 = self.fixed[9] * t310;
-        let t339 = self.fixed[8] * t337;
-        let t340 = t338 + t339;
-        let t341 = self.fixed[6] * t276;
-        let t342 = -t341;
-        let t343 = T::nearest(4.0) * X[0];
-        let t344 = self.fixed[4] * t36;
-        let t345 = t343 - t344;
-        let t346 = t45 * t345;
-        let t349 = self.fixed[18] * t346;
-        let t350 = t23 * t196;
-        let t351 = t142 * t299;
+        let t315 = self.fixed[8] * t269;
+        let t316 = t271 * t271;
+        let t317 = t276 * t314;
+        let t318 = T::one() / t316;
+        let t319 = t317 * t318;
+        let t320 = t315 + t319;
+        let t322 = self.fixed[17] * t320;
+        let t323 = t322 - t263;
+        let t324 = X[1] * t159;
+        let t325 = t37 + t324;
+        let t326 = t81 * t325;
+        let t330 = self.fixed[18] * t326;
+        let t331 = t292 - t303;
+        let t332 = t198 * t311;
+        let t333 = t191 * t299;
+        let t334 = t332 - t333;
+        let t335 = self.fixed[8] * t331;
+        let t336 = t276 * t334;
+        let t337 = t336 * t318;
+        let t338 = t335 - t337;
+        let t339 = self.fixed[17] * t338;
+        let t340 = t330 + t339;
+        let t341 = -t340;
+        let t342 = t80 + t326;
+        let t343 = t9 * t342;
+        let t344 = t105 - t343;
+        let t345 = t111 * t325;
+        let t346 = t110 - t345;
+        let t347 = self.parameters.Omega * t344;
+        let t348 = self.fixed[3] * t346;
+        let t349 = t347 - t348;
+        let t350 = t30 * t323;
+        let t351 = t9 * t341;
         let t352 = t350 - t351;
-        let t353 = t195 * t342;
-        let t354 = t191 * t349;
-        let t355 = t77 * t352;
-        let t356 = t353 + t354;
-        let t357 = t356 + t355;
-        let t358 = t198 * t299;
-        let t359 = t301 + t353;
-        let t360 = t359 + t354;
-        let t361 = t360 - t358;
-        let t362 = t342 * t195;
-        let t363 = t362 + t354;
-        let t364 = t363 + t355;
-        let t365 = t361 * t320;
-        let t366 = self.fixed[9] * t365;
-        let t367 = self.fixed[8] * t364;
-        let t368 = t366 + t367;
-        let t369 = t243 - t285;
-        let t370 = t299 * t369;
-        let t371 = t302 - t303;
-        let t372 = t371 - t324;
-        let t373 = t372 - t370;
-        let t374 = t323 - t373;
-        let t375 = self.fixed[9] * t374;
-        let t376 = t333 * t335;
-        let t377 = t196 * t340;
-        let t378 = t377 * t357;
-        let t379 = t376 + t378;
-        let t380 = t320 * t379;
-        let t381 = self.fixed[8] * t327;
-        let t382 = t299 * t340;
-        let t383 = t196 * t368;
-        let t384 = t375 - t380;
-        let t385 = t384 - t381;
-        let t386 = t385 + t382;
-        let t387 = t386 + t383;
-        let t389 = t387 * t320;
-        let t390 = self.fixed[19] * t389;
-        let t391 = t284 + t390;
-        let t392 = X[1] * t159;
-        let t393 = t37 + t392;
-        let t395 = T::nearest(60.0) * t29;
-        let t396 = t395 * t23;
-        let t397 = t396 - t346;
-        let t399 = T::nearest(8.0) * t36;
-        let t400 = t399 - t345;
-        let t401 = t45 * t400;
-        let t402 = T::nearest(30.0) * t29;
-        let t403 = t402 * t23;
-        let t405 = self.fixed[20] * t397;
-        let t406 = t401 + t403;
-        let t407 = t406 + t405;
-        let t409 = self.fixed[21] * t45;
-        let t410 = t409 * t393;
-        let t411 = self.fixed[12] * t407;
-        let t412 = t410 - t411;
-        let t415 = self.fixed[22] * t412;
-        let t416 = t194 * t342;
-        let t417 = t354 + t355;
-        let t418 = t417 + t416;
-        let t419 = t361 * t369;
-        let t420 = t419 * t320;
-        let t421 = t310 * t418;
-        let t422 = t420 + t421;
-        let t423 = t349 * t369;
-        let t424 = t194 * t418;
-        let t425 = t355 - t423;
-        let t426 = t425 - t424;
-        let t427 = t194 * t369;
-        let t428 = t285 + t427;
-        let t429 = t310 * t369;
-        let t430 = self.fixed[9] * t429;
-        let t431 = self.fixed[8] * t428;
-        let t432 = t430 + t431;
-        let t433 = t194 + t205;
-        let t434 = t433 - t285;
-        let t435 = self.fixed[8] * t434;
-        let t436 = t338 + t435;
-        let t437 = t299 * t191;
-        let t438 = t437 + t300;
-        let t439 = t438 + t315;
-        let t440 = t307 * t320;
-        let t441 = self.fixed[9] * t440;
-        let t442 = self.fixed[8] * t439;
-        let t443 = t441 + t442;
-        let t444 = t335 * t320;
-        let t445 = t142 * t444;
-        let t446 = t311 + t445;
-        let t447 = t436 * t446;
-        let t448 = t142 * t443;
-        let t449 = t447 - t448;
-        let t450 = t308 * t342;
-        let t451 = t301 - t358;
-        let t452 = t451 - t423;
-        let t453 = t452 - t450;
-        let t454 = t422 - t453;
-        let t455 = self.fixed[9] * t454;
-        let t456 = self.fixed[8] * t426;
-        let t457 = t357 * t432;
-        let t458 = t457 * t320;
-        let t459 = t77 * t449;
-        let t460 = t455 - t456;
-        let t461 = t460 - t458;
-        let t462 = t461 - t459;
-        let t463 = t462 * t320;
-        let t464 = self.fixed[19] * t463;
-        let t465 = t464 - t415;
-        let t466 = X[0] + t291;
-        let t467 = t81 * t393;
-        let t468 = t80 + t467;
-        let t469 = t104 * t466;
-        let t470 = t9 * t468;
-        let t471 = t469 - t470;
-        let t472 = t111 * t393;
-        let t473 = t110 - t472;
-        let t474 = self.parameters.Omega * t471;
-        let t475 = self.fixed[3] * t473;
-        let t476 = t474 - t475;
-        let t477 = t30 * t391;
-        let t478 = t9 * t465;
-        let t479 = t477 - t478;
-        let t480 = T::nearest(10.0) * t479;
-        let t481 = self.parameters.Omega * t476;
-        let t482 = t480 - t481;
-        let t483 = T::nearest(0.1) * t482;
-        let t484 = t57 * t466;
-        let t485 = t30 * t468;
-        let t486 = t484 + t485;
-        let t487 = t94 * t393;
-        let t488 = t93 + t487;
-        let t489 = self.parameters.Omega * t486;
-        let t490 = self.fixed[3] * t488;
-        let t491 = t489 + t490;
-        let t492 = t9 * t391;
-        let t493 = t30 * t465;
-        let t494 = t492 + t493;
-        let t495 = T::nearest(10.0) * t494;
-        let t496 = self.parameters.Omega * t491;
-        let t497 = t495 - t496;
-        let t498 = T::nearest(0.1) * t497;
+        let t353 = T::nearest(10.0) * t352;
+        let t354 = self.parameters.Omega * t349;
+        let t355 = t353 - t354;
+        let t356 = T::nearest(0.1) * t355;
+        let t357 = t30 * t342;
+        let t358 = t84 + t357;
+        let t359 = t94 * t325;
+        let t360 = t93 + t359;
+        let t361 = self.parameters.Omega * t358;
+        let t362 = self.fixed[3] * t360;
+        let t363 = t361 + t362;
+        let t364 = t9 * t323;
+        let t365 = t30 * t341;
+        let t366 = t364 + t365;
+        let t367 = T::nearest(10.0) * t366;
+        let t368 = self.parameters.Omega * t363;
+        let t369 = t367 - t368;
+        let t370 = T::nearest(0.1) * t369;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t64, t76),
             v: crate::nalgebra::SVector::<T, 2>::new(t103, t117),
@@ -1586,7 +1318,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t184, t168, t175, t186),
             J: t200,
             P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t235, t254, t257, t260),
-            b: crate::nalgebra::SVector::<T, 2>::new(t483, t498),
+            b: crate::nalgebra::SVector::<T, 2>::new(t356, t370),
         }
     }
     fn traction(
@@ -1613,46 +1345,46 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
                 let t188 = self.fixed[6] * t29;
                 let t193 = self.fixed[7] * t45;
                 let t228 = self.fixed[10] * t29;
-                let t525 = X[1].cos();
-                let t526 = t188 * t525;
-                let t527 = t526 + T::one();
-                let t529 = self.fixed[24] * t45;
-                let t530 = t529 * t156;
-                let t531 = t530 + T::one();
-                let t532 = t193 * t38;
-                let t533 = t527 * t531;
-                let t534 = t77 * t525;
-                let t535 = t534 * t532;
-                let t536 = t533 - t535;
-                let t537 = t526 * t531;
-                let t538 = t535 - t537;
-                let t539 = T::one() / t536;
-                let t540 = t538 * t539;
-                let t541 = t526 - t540;
-                let t542 = t537 + t530;
-                let t543 = t542 - t535;
-                let t544 = t543.log_1p();
-                let t545 = self.fixed[8] * t541;
-                let t546 = t531 * t544;
-                let t547 = t546 * t539;
-                let t548 = self.fixed[9] * t547;
-                let t549 = t545 + t548;
-                let t550 = t534 * t539;
-                let t551 = t532 + t550;
-                let t552 = self.fixed[8] * t551;
-                let t553 = t228 * t525;
-                let t554 = t544 * t539;
-                let t555 = t553 * t554;
-                let t556 = t552 - t555;
-                let t557 = t30 * t549;
-                let t558 = t9 * t556;
-                let t559 = t557 - t558;
-                let t560 = -t559;
-                let t561 = t9 * t549;
-                let t562 = t30 * t556;
-                let t563 = t561 + t562;
-                let t564 = -t563;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t560, t564))
+                let t383 = X[1].cos();
+                let t384 = t188 * t383;
+                let t385 = t384 + T::one();
+                let t387 = self.fixed[21] * t45;
+                let t388 = t387 * t156;
+                let t389 = t388 + T::one();
+                let t390 = t193 * t38;
+                let t391 = t385 * t389;
+                let t392 = t77 * t383;
+                let t393 = t392 * t390;
+                let t394 = t391 - t393;
+                let t395 = t384 * t389;
+                let t396 = t393 - t395;
+                let t397 = T::one() / t394;
+                let t398 = t396 * t397;
+                let t399 = t384 - t398;
+                let t400 = t395 + t388;
+                let t401 = t400 - t393;
+                let t402 = t401.log_1p();
+                let t403 = self.fixed[8] * t399;
+                let t404 = t389 * t402;
+                let t405 = t404 * t397;
+                let t406 = self.fixed[9] * t405;
+                let t407 = t403 + t406;
+                let t408 = t392 * t397;
+                let t409 = t390 + t408;
+                let t410 = self.fixed[8] * t409;
+                let t411 = t228 * t383;
+                let t412 = t402 * t397;
+                let t413 = t411 * t412;
+                let t414 = t410 - t413;
+                let t415 = t30 * t407;
+                let t416 = t9 * t414;
+                let t417 = t415 - t416;
+                let t418 = -t417;
+                let t419 = t9 * t407;
+                let t420 = t30 * t414;
+                let t421 = t419 + t420;
+                let t422 = -t421;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t418, t422))
             }
             crate::Surface::Upper(0) => {
                 let t8 = self.parameters.Omega * t;
@@ -1672,56 +1404,56 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
                 let t188 = self.fixed[6] * t29;
                 let t193 = self.fixed[7] * t45;
                 let t228 = self.fixed[10] * t29;
-                let t565 = T::nearest(3.0).sum_error(X[1]);
-                let t566 = T::nearest(3.0) + X[1];
-                let t567 = t566.cos();
-                let t568 = t566.sin();
-                let t569 = T::nearest(0.5) * t565;
-                let t570 = t569 * t567;
-                let t571 = t568 + t570;
-                let t572 = t565 * t571;
-                let t573 = t567 - t572;
-                let t574 = t188 * t573;
-                let t575 = t574 + T::one();
-                let t577 = T::nearest(2.0) * X[1];
-                let t579 = self.fixed[25] * t156;
-                let t580 = t577 + t579;
-                let t581 = t193 * t580;
-                let t582 = t581 + T::one();
-                let t585 = self.fixed[26] * t35;
-                let t586 = t38 - t585;
-                let t587 = t193 * t586;
-                let t588 = t575 * t582;
-                let t589 = t77 * t573;
-                let t590 = t589 * t587;
-                let t591 = t588 - t590;
-                let t592 = t574 * t582;
-                let t593 = t590 - t592;
-                let t594 = T::one() / t591;
-                let t595 = t593 * t594;
-                let t596 = t574 - t595;
-                let t597 = t592 + t581;
-                let t598 = t597 - t590;
-                let t599 = t598.log_1p();
-                let t600 = self.fixed[8] * t596;
-                let t601 = t582 * t599;
-                let t602 = t601 * t594;
-                let t603 = self.fixed[9] * t602;
-                let t604 = t600 + t603;
-                let t605 = t589 * t594;
-                let t606 = t587 + t605;
-                let t607 = self.fixed[8] * t606;
-                let t608 = t228 * t573;
-                let t609 = t599 * t594;
-                let t610 = t608 * t609;
-                let t611 = t607 - t610;
-                let t612 = t30 * t604;
-                let t613 = t9 * t611;
-                let t614 = t612 - t613;
-                let t615 = t9 * t604;
-                let t616 = t30 * t611;
-                let t617 = t615 + t616;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t614, t617))
+                let t423 = T::nearest(3.0).sum_error(X[1]);
+                let t424 = T::nearest(3.0) + X[1];
+                let t425 = t424.cos();
+                let t426 = t424.sin();
+                let t427 = T::nearest(0.5) * t423;
+                let t428 = t427 * t425;
+                let t429 = t426 + t428;
+                let t430 = t423 * t429;
+                let t431 = t425 - t430;
+                let t432 = t188 * t431;
+                let t433 = t432 + T::one();
+                let t435 = T::nearest(2.0) * X[1];
+                let t437 = self.fixed[22] * t156;
+                let t438 = t435 + t437;
+                let t439 = t193 * t438;
+                let t440 = t439 + T::one();
+                let t443 = self.fixed[23] * t35;
+                let t444 = t38 - t443;
+                let t445 = t193 * t444;
+                let t446 = t433 * t440;
+                let t447 = t77 * t431;
+                let t448 = t447 * t445;
+                let t449 = t446 - t448;
+                let t450 = t432 * t440;
+                let t451 = t448 - t450;
+                let t452 = T::one() / t449;
+                let t453 = t451 * t452;
+                let t454 = t432 - t453;
+                let t455 = t450 + t439;
+                let t456 = t455 - t448;
+                let t457 = t456.log_1p();
+                let t458 = self.fixed[8] * t454;
+                let t459 = t440 * t457;
+                let t460 = t459 * t452;
+                let t461 = self.fixed[9] * t460;
+                let t462 = t458 + t461;
+                let t463 = t447 * t452;
+                let t464 = t445 + t463;
+                let t465 = self.fixed[8] * t464;
+                let t466 = t228 * t431;
+                let t467 = t457 * t452;
+                let t468 = t466 * t467;
+                let t469 = t465 - t468;
+                let t470 = t30 * t462;
+                let t471 = t9 * t469;
+                let t472 = t470 - t471;
+                let t473 = t9 * t462;
+                let t474 = t30 * t469;
+                let t475 = t473 + t474;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t472, t475))
             }
             crate::Surface::Lower(1) => {
                 let t8 = self.parameters.Omega * t;
@@ -1740,38 +1472,38 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
                 let t47 = t29 * t30;
                 let t65 = t29 * t9;
                 let t188 = self.fixed[6] * t29;
-                let t529 = self.fixed[24] * t45;
-                let t618 = t13.cos();
-                let t619 = t13.sin();
-                let t620 = T::nearest(0.5) * t12;
-                let t621 = t620 * t618;
-                let t622 = t619 + t621;
-                let t623 = t12 * t622;
-                let t624 = t618 - t623;
-                let t625 = t529 * t33;
-                let t626 = t625 + T::one();
-                let t627 = T::one() / t626;
-                let t628 = t627 + T::one();
-                let t629 = t188 * t624;
-                let t630 = t629 * t626;
-                let t631 = t630 + t625;
-                let t632 = t631.log_1p();
-                let t633 = t625 * t628;
-                let t634 = self.fixed[8] * t633;
-                let t635 = t632 * t627;
-                let t636 = self.fixed[9] * t635;
-                let t637 = t634 + t636;
-                let t639 = self.fixed[27] * t47;
-                let t640 = t639 * t624;
-                let t641 = t9 * t637;
-                let t642 = t640 - t641;
-                let t643 = -t642;
-                let t644 = self.fixed[27] * t65;
-                let t645 = t644 * t624;
-                let t646 = t30 * t637;
-                let t647 = t645 + t646;
-                let t648 = -t647;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t643, t648))
+                let t387 = self.fixed[21] * t45;
+                let t476 = t13.cos();
+                let t477 = t13.sin();
+                let t478 = T::nearest(0.5) * t12;
+                let t479 = t478 * t476;
+                let t480 = t477 + t479;
+                let t481 = t12 * t480;
+                let t482 = t476 - t481;
+                let t483 = t387 * t33;
+                let t484 = t483 + T::one();
+                let t485 = T::one() / t484;
+                let t486 = t485 + T::one();
+                let t487 = t188 * t482;
+                let t488 = t487 * t484;
+                let t489 = t488 + t483;
+                let t490 = t489.log_1p();
+                let t491 = t483 * t486;
+                let t492 = self.fixed[8] * t491;
+                let t493 = t490 * t485;
+                let t494 = self.fixed[9] * t493;
+                let t495 = t492 + t494;
+                let t497 = self.fixed[24] * t47;
+                let t498 = t497 * t482;
+                let t499 = t9 * t495;
+                let t500 = t498 - t499;
+                let t501 = -t500;
+                let t502 = self.fixed[24] * t65;
+                let t503 = t502 * t482;
+                let t504 = t30 * t495;
+                let t505 = t503 + t504;
+                let t506 = -t505;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t501, t506))
             }
             crate::Surface::Upper(1) => {
                 let t8 = self.parameters.Omega * t;
@@ -1790,56 +1522,56 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
                 let t143 = t32.sin();
                 let t188 = self.fixed[6] * t29;
                 let t193 = self.fixed[7] * t45;
-                let t504 = self.fixed[17] * t45;
-                let t649 = T::one().sum_error(t13);
-                let t650 = T::one() + t13;
-                let t651 = t12 + t649;
-                let t652 = t650.cos();
-                let t653 = t650.sin();
-                let t654 = T::nearest(0.5) * t651;
-                let t655 = t654 * t652;
-                let t656 = t653 + t655;
-                let t657 = t651 * t656;
-                let t658 = t652 - t657;
-                let t659 = T::nearest(4.0) * t143;
-                let t660 = T::one() - t659;
-                let t661 = t193 * t660;
-                let t662 = t188 * t658;
-                let t663 = t662 + T::one();
-                let t664 = t504 * X[0];
-                let t665 = t664 + T::one();
-                let t666 = t663 * t665;
-                let t667 = t77 * t658;
-                let t668 = t667 * t661;
-                let t669 = t666 - t668;
-                let t670 = T::one() / t669;
-                let t671 = t661 * t670;
-                let t672 = t667 + t671;
-                let t673 = t662 * t665;
-                let t674 = t673 + t664;
-                let t675 = t674 - t668;
-                let t676 = t675.log_1p();
-                let t677 = self.fixed[8] * t672;
-                let t678 = t661 * t676;
-                let t679 = t678 * t670;
-                let t680 = self.fixed[9] * t679;
-                let t681 = t677 - t680;
-                let t682 = t663 * t664;
-                let t683 = t668 - t682;
-                let t684 = t683 * t670;
-                let t685 = t664 - t684;
-                let t686 = self.fixed[8] * t685;
-                let t687 = t663 * t676;
-                let t688 = t687 * t670;
-                let t689 = self.fixed[9] * t688;
-                let t690 = t686 + t689;
-                let t691 = t30 * t681;
-                let t692 = t9 * t690;
-                let t693 = t691 - t692;
-                let t694 = t9 * t681;
-                let t695 = t30 * t690;
-                let t696 = t694 + t695;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t693, t696))
+                let t284 = self.fixed[14] * t45;
+                let t507 = T::one().sum_error(t13);
+                let t508 = T::one() + t13;
+                let t509 = t12 + t507;
+                let t510 = t508.cos();
+                let t511 = t508.sin();
+                let t512 = T::nearest(0.5) * t509;
+                let t513 = t512 * t510;
+                let t514 = t511 + t513;
+                let t515 = t509 * t514;
+                let t516 = t510 - t515;
+                let t517 = T::nearest(4.0) * t143;
+                let t518 = T::one() - t517;
+                let t519 = t193 * t518;
+                let t520 = t188 * t516;
+                let t521 = t520 + T::one();
+                let t522 = t284 * X[0];
+                let t523 = t522 + T::one();
+                let t524 = t521 * t523;
+                let t525 = t77 * t516;
+                let t526 = t525 * t519;
+                let t527 = t524 - t526;
+                let t528 = T::one() / t527;
+                let t529 = t519 * t528;
+                let t530 = t525 + t529;
+                let t531 = t520 * t523;
+                let t532 = t531 + t522;
+                let t533 = t532 - t526;
+                let t534 = t533.log_1p();
+                let t535 = self.fixed[8] * t530;
+                let t536 = t519 * t534;
+                let t537 = t536 * t528;
+                let t538 = self.fixed[9] * t537;
+                let t539 = t535 - t538;
+                let t540 = t521 * t522;
+                let t541 = t526 - t540;
+                let t542 = t541 * t528;
+                let t543 = t522 - t542;
+                let t544 = self.fixed[8] * t543;
+                let t545 = t521 * t534;
+                let t546 = t545 * t528;
+                let t547 = self.fixed[9] * t546;
+                let t548 = t544 + t547;
+                let t549 = t30 * t539;
+                let t550 = t9 * t548;
+                let t551 = t549 - t550;
+                let t552 = t9 * t539;
+                let t553 = t30 * t548;
+                let t554 = t552 + t553;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t551, t554))
             }
             _ => None,
         }
@@ -1886,13 +1618,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
         self.fixed[1]
     }
     fn period(&self) -> T {
-        self.fixed[23]
+        self.fixed[20]
     }
     fn body_force_at(
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 27, 9>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 20, 9>::new(*self, X))
     }
     fn state_at(
         &self,
@@ -1902,9 +1634,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 2, 27, 9> for Skew2dRotating<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 2, 20, 9> for Skew2dRotating<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 27] {
+    fn body_force_time(&self, t: T) -> [T; 20] {
         let t8 = self.parameters.Omega * t;
         let t9 = t8.sin();
         let t28 = self.fixed[1] * t;
@@ -1914,9 +1646,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 27, 9> for Skew2dRotating<T> {
         let t42 = T::nearest(3.0) * t29;
         let t44 = T::nearest(4.0) * t41;
         let t45 = t42 + t44;
-        let t47 = t29 * t30;
         let t50 = t45 * t9;
-        let t65 = t29 * t9;
         let t68 = t45 * t30;
         let t77 = self.parameters.A * t29;
         let t88 = T::nearest(4.0) * t29;
@@ -1928,91 +1658,50 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 27, 9> for Skew2dRotating<T> {
         let t111 = t90 * t30;
         let t188 = self.fixed[6] * t29;
         let t193 = self.fixed[7] * t45;
-        let t270 = T::nearest(95.0) * t29;
-        let t402 = T::nearest(30.0) * t29;
-        let t499 = self.fixed[13] * t29;
-        let t500 = self.fixed[15] * t29;
-        let t502 = self.fixed[16] * t45;
-        let t504 = self.fixed[17] * t45;
-        let t699 = self.fixed[29] * t47;
-        let t701 = self.fixed[30] * t108;
-        let t702 = t699 - t701;
-        let t703 = self.fixed[28] * t50;
-        let t704 = self.fixed[3] * t111;
-        let t705 = t704 - t703;
-        let t706 = self.fixed[29] * t65;
-        let t707 = self.fixed[30] * t91;
-        let t708 = t706 + t707;
-        let t709 = self.fixed[28] * t68;
-        let t710 = self.fixed[3] * t94;
-        let t711 = t709 + t710;
-        let t713 = self.fixed[31] * t29;
-        let t714 = t270 + t713;
-        let t716 = T::nearest(8.0) * t45;
-        let t717 = self.fixed[4] * t45;
-        let t718 = t716 + t717;
-        let t720 = self.fixed[32] * t45;
-        let t721 = t718 + t720;
-        let t722 = T::nearest(4.0) * t45;
-        let t724 = self.fixed[33] * t45;
-        let t725 = t722 + t724;
-        let t727 = self.fixed[34] * t29;
-        let t728 = t402 + t727;
-        let t729 = self.fixed[12] * t714;
-        let t730 = t499 - t729;
-        let t732 = self.fixed[14] * t730;
-        let t736 = self.fixed[36] * t45;
-        let t770 = self.fixed[37] * t45;
-        let t773 = self.fixed[38] * t45;
-        let t801 = self.fixed[39] * t30;
-        let t804 = self.fixed[40] * t45;
-        let t807 = self.fixed[41] * t721;
-        let t809 = self.fixed[41] * t725;
-        let t812 = self.fixed[41] * t728;
-        let t855 = self.fixed[45] * t29;
-        let t860 = self.fixed[39] * t9;
-        let t866 = self.fixed[46] * t30;
-        let t869 = self.fixed[47] * t702;
-        let t873 = self.fixed[48] * t9;
-        let t876 = self.fixed[47] * t705;
-        let t880 = -t860;
-        let t882 = -t801;
-        let t885 = self.fixed[46] * t9;
-        let t886 = -t885;
-        let t888 = self.fixed[47] * t708;
-        let t889 = -t888;
-        let t892 = self.fixed[48] * t30;
-        let t893 = -t892;
-        let t896 = self.fixed[47] * t711;
-        let t897 = -t896;
+        let t266 = self.fixed[12] * t29;
+        let t284 = self.fixed[14] * t45;
+        let t302 = self.fixed[16] * t45;
+        let t371 = self.fixed[5] * t29;
+        let t379 = self.fixed[19] * t45;
+        let t556 = self.fixed[25] * t50;
+        let t557 = self.fixed[3] * t111;
+        let t558 = t557 - t556;
+        let t559 = self.fixed[25] * t68;
+        let t560 = self.fixed[3] * t94;
+        let t561 = t559 + t560;
+        let t566 = self.fixed[26] * t45;
+        let t569 = self.fixed[27] * t45;
+        let t593 = self.fixed[28] * t30;
+        let t604 = self.fixed[28] * t9;
+        let t610 = self.fixed[29] * t30;
+        let t613 = self.fixed[30] * t9;
+        let t617 = self.fixed[31] * t558;
+        let t623 = self.fixed[32] * t108;
+        let t630 = self.fixed[29] * t9;
+        let t632 = self.fixed[30] * t30;
+        let t635 = self.fixed[31] * t561;
+        let t638 = self.fixed[32] * t91;
         [
             t77,
             t188,
             t193,
-            t500,
-            t502,
-            t504,
-            t732,
-            t736,
-            t770,
-            t773,
-            t801,
-            t804,
-            t807,
-            t809,
-            t812,
-            t855,
-            t860,
-            t866,
-            t869,
-            t873,
-            t876,
-            t880,
-            t882,
-            t886,
-            t889,
-            t893,
-            t897,
+            t266,
+            t284,
+            t302,
+            t371,
+            t379,
+            t566,
+            t569,
+            t593,
+            t604,
+            t610,
+            t613,
+            t617,
+            t623,
+            t630,
+            t632,
+            t635,
+            t638,
         ]
     }
     #[inline]
@@ -2053,17 +1742,19 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 27, 9> for Skew2dRotating<T> {
         let t159 = X[0] * X[1];
         let t160 = T::nearest(2.0) * t159;
         let t161 = t158 + t160;
-        let t261 = t143 * t156;
-        let t262 = T::pi() * t261;
-        let t263 = X[1] - t262;
-        [X[0], t23, t36, t40, t80, t142, t146, t161, t263]
+        let t279 = t143 * t156;
+        let t280 = T::pi() * t279;
+        let t281 = X[1] - t280;
+        [X[0], t23, t36, t40, t80, t142, t146, t161, t281]
     }
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
-        time: &[T; 27],
+        time: &[T; 20],
         point: &[T; 9],
     ) -> crate::nalgebra::SVector<T, 2> {
+        let t78 = time[0] * point[1];
+        let t79 = point[0] + t78;
         let t189 = time[1] * point[5];
         let t191 = t189 + T::one();
         let t194 = time[2] * point[7];
@@ -2071,166 +1762,83 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 27, 9> for Skew2dRotating<T> {
         let t196 = time[2] * point[6];
         let t197 = t191 * t195;
         let t198 = time[0] * point[5];
-        let t199 = t198 * t196;
-        let t200 = t197 - t199;
         let t205 = t189 * t195;
-        let t206 = t199 - t205;
-        let t207 = T::one() / t200;
-        let t243 = t194 * t191;
-        let t244 = t199 - t243;
-        let t311 = T::nearest(3.0) * point[1];
-        let t312 = t311 * t196;
-        let t350 = point[1] * t196;
-        let t433 = t194 + t205;
-        let t501 = time[3] * point[1];
-        let t503 = time[4] * point[2];
-        let t505 = time[5] * point[8];
-        let t506 = t191 * t505;
-        let t507 = t189 * t505;
-        let t508 = t189 * t206;
-        let t509 = t199 - t508;
-        let t510 = self.fixed[8] * t509;
-        let t511 = t189 - t199;
-        let t512 = t511 + t243;
-        let t513 = self.fixed[8] * t512;
-        let t514 = time[1] * point[1];
-        let t515 = point[5] * t505;
-        let t516 = t350 - t515;
-        let t517 = time[0] * t516;
-        let t518 = t194 * t244;
-        let t519 = t199 - t518;
-        let t520 = t194 - t199;
-        let t521 = t520 + t205;
-        let t522 = self.fixed[8] * t521;
-        let t733 = time[6] * point[1];
-        let t737 = time[7] * point[8];
-        let t738 = t733 + t737;
-        let t739 = t503 * point[5];
-        let t740 = t312 + t739;
-        let t741 = time[0] * t740;
-        let t742 = t195 * t501;
-        let t743 = t741 - t742;
-        let t744 = t743 + t506;
-        let t745 = t207 * t744;
-        let t746 = self.fixed[9] * t206;
-        let t747 = t746 * t745;
-        let t748 = t433 - t199;
-        let t749 = t748.log_1p();
-        let t750 = t743 + t507;
-        let t751 = self.fixed[9] * t749;
-        let t752 = t751 * t750;
-        let t753 = t747 - t752;
-        let t754 = self.fixed[35] * t741;
-        let t755 = t753 + t754;
-        let t756 = t206 * t501;
-        let t757 = self.fixed[35] * t756;
-        let t758 = t755 - t757;
-        let t759 = self.fixed[9] * t244;
-        let t760 = t759 * t505;
-        let t761 = t758 + t760;
-        let t762 = t746 * t749;
-        let t763 = t762 - t510;
-        let t764 = t506 - t742;
-        let t765 = t764 + t741;
-        let t766 = t763 * t765;
-        let t767 = t751 + t513;
-        let t768 = t195 * t514;
-        let t771 = time[8] * point[0];
-        let t774 = time[9] * point[2];
-        let t775 = t771 - t774;
-        let t776 = t191 * t775;
-        let t777 = t776 - t768;
-        let t778 = t777 + t517;
-        let t779 = t196 * t767;
-        let t780 = t779 * t778;
-        let t781 = t766 - t780;
-        let t782 = t207 * t781;
-        let t783 = t761 - t782;
-        let t784 = self.fixed[8] * t189;
-        let t785 = t784 * t750;
-        let t786 = t783 - t785;
-        let t787 = t505 * t767;
-        let t788 = t786 - t787;
-        let t789 = t517 - t768;
-        let t790 = t789 + t776;
-        let t791 = t207 * t790;
-        let t792 = self.fixed[9] * t791;
-        let t793 = self.fixed[8] * t778;
-        let t794 = t792 + t793;
-        let t795 = t196 * t794;
-        let t796 = t788 - t795;
-        let t797 = self.fixed[19] * t207;
-        let t798 = t797 * t796;
-        let t799 = t738 + t798;
-        let t802 = time[10] * t799;
-        let t805 = time[11] * point[3];
-        let t808 = time[12] * point[2];
-        let t810 = time[13] * point[0];
-        let t811 = t808 - t810;
-        let t813 = time[14] * point[1];
-        let t814 = t811 + t813;
-        let t815 = t805 - t814;
-        let t817 = self.fixed[42] * t244;
-        let t818 = t817 * t791;
-        let t819 = t776 + t517;
-        let t820 = t194 * t514;
-        let t821 = t819 - t820;
-        let t822 = self.fixed[42] * t749;
-        let t823 = t822 * t821;
-        let t824 = t818 - t823;
-        let t826 = self.fixed[43] * t517;
-        let t827 = t824 + t826;
-        let t828 = t244 * t775;
-        let t829 = self.fixed[43] * t828;
-        let t830 = t827 + t829;
-        let t831 = self.fixed[42] * t206;
-        let t832 = t831 * t514;
-        let t833 = t830 - t832;
-        let t835 = self.fixed[44] * t194;
-        let t836 = t835 * t821;
-        let t837 = t833 - t836;
-        let t838 = t822 * t244;
-        let t839 = self.fixed[44] * t519;
-        let t840 = t838 - t839;
-        let t841 = t207 * t778;
-        let t842 = t841 * t840;
-        let t843 = t837 - t842;
-        let t844 = t751 + t522;
-        let t845 = point[5] * t207;
-        let t846 = t845 * t765;
-        let t847 = t311 + t846;
-        let t848 = t844 * t847;
-        let t849 = self.fixed[9] * t745;
-        let t850 = self.fixed[8] * t765;
-        let t851 = t849 + t850;
-        let t852 = point[5] * t851;
-        let t853 = t848 - t852;
-        let t856 = time[15] * t853;
-        let t857 = t843 + t856;
-        let t858 = t207 * t857;
-        let t859 = t815 + t858;
-        let t861 = time[16] * t859;
-        let t862 = t861 - t802;
-        let t867 = time[17] * point[0];
-        let t870 = time[18] * point[1];
-        let t871 = t867 + t870;
-        let t874 = time[19] * point[4];
-        let t875 = t871 - t874;
-        let t877 = time[20] * point[3];
-        let t878 = t875 + t877;
-        let t879 = t862 - t878;
-        let t881 = time[21] * t799;
-        let t883 = time[22] * t859;
-        let t884 = t881 + t883;
-        let t887 = time[23] * point[0];
-        let t890 = time[24] * point[1];
-        let t891 = t887 + t890;
-        let t894 = time[25] * point[4];
-        let t895 = t891 + t894;
-        let t898 = time[26] * point[3];
-        let t899 = t895 + t898;
-        let t900 = t884 + t899;
-        crate::nalgebra::SVector::<T, 2>::new(t879, t900)
+        let t212 = t205 + t194;
+        let t267 = time[3] * point[1];
+        let t269 = t78 + t267;
+        let t270 = t196 * t198;
+        let t271 = t197 - t270;
+        let t273 = t212 - t270;
+        let t274 = t273.log_1p();
+        let t275 = self.fixed[9] * t274;
+        let t277 = time[1] * point[1];
+        let t285 = time[4] * point[8];
+        let t303 = time[5] * point[2];
+        let t306 = t191 * t285;
+        let t315 = self.fixed[8] * t269;
+        let t372 = time[6] * point[1];
+        let t373 = point[1] * t196;
+        let t374 = point[5] * t285;
+        let t375 = t373 - t374;
+        let t380 = time[7] * point[3];
+        let t562 = time[0] * t375;
+        let t563 = t277 * t195;
+        let t564 = t562 - t563;
+        let t567 = time[8] * point[0];
+        let t570 = time[9] * point[2];
+        let t571 = t567 - t570;
+        let t572 = t191 * t571;
+        let t573 = t564 + t572;
+        let t574 = t196 * t573;
+        let t575 = T::nearest(3.0) * t373;
+        let t576 = point[5] * t303;
+        let t577 = t575 + t576;
+        let t578 = time[0] * t577;
+        let t579 = t195 * t267;
+        let t580 = t578 - t579;
+        let t581 = t580 + t306;
+        let t582 = t195 * t581;
+        let t583 = t574 - t582;
+        let t584 = t275 - self.fixed[13];
+        let t585 = T::one() / t271;
+        let t586 = t585 * t585;
+        let t587 = t584 * t586;
+        let t588 = t583 * t587;
+        let t589 = t315 - t588;
+        let t590 = self.fixed[17] * t589;
+        let t591 = t590 - t372;
+        let t594 = time[10] * t591;
+        let t595 = t571 - t303;
+        let t596 = self.fixed[8] * t595;
+        let t597 = t198 * t581;
+        let t598 = t191 * t573;
+        let t599 = t597 - t598;
+        let t600 = t599 * t587;
+        let t601 = t596 + t600;
+        let t602 = self.fixed[17] * t601;
+        let t603 = t380 + t602;
+        let t605 = time[11] * t603;
+        let t606 = t594 + t605;
+        let t611 = time[12] * t79;
+        let t614 = time[13] * point[4];
+        let t615 = t611 - t614;
+        let t618 = time[14] * point[3];
+        let t619 = t615 + t618;
+        let t624 = time[15] * point[1];
+        let t625 = t619 - t624;
+        let t626 = t606 - t625;
+        let t627 = time[11] * t591;
+        let t628 = time[10] * t603;
+        let t629 = t627 - t628;
+        let t631 = time[16] * t79;
+        let t633 = time[17] * point[4];
+        let t634 = t631 + t633;
+        let t636 = time[18] * point[3];
+        let t637 = t634 + t636;
+        let t639 = time[19] * point[1];
+        let t640 = t637 + t639;
+        let t641 = t629 - t640;
+        crate::nalgebra::SVector::<T, 2>::new(t626, t641)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

@@ -45,7 +45,7 @@ impl<T: crate::Real> Default for SphereShellParameters<T> {
 pub struct SphereShell<T: crate::Real> {
     parameters: SphereShellParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 32],
+    fixed: [T; 33],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> SphereShell<T> {
@@ -172,70 +172,70 @@ impl<T: crate::Real> SphereShell<T> {
         let t139 = parameters.E * parameters.nu;
         let t140 = t114 * t116;
         let t141 = t139 / t140;
-        let t189 = T::nearest(5.0) / parameters.Ro;
-        let t192 = parameters.nu / t116;
-        let t193 = t192 + T::one();
-        let t196 = T::nearest(4.0) * t193;
-        let t197 = t196 / t114;
-        let t200 = t46 / t48;
-        let t248 = T::one() / parameters.rho0;
-        let t257 = t141 + t136;
-        let t260 = t127 * t127;
-        let t261 = t128 * t128;
-        let t263 = T::nearest(144.0) * t260;
-        let t264 = t263 * t257;
-        let t265 = parameters.rho0 * t261;
-        let t266 = t264 / t265;
-        let t290 = T::nearest(3.0) * t136;
-        let t292 = T::nearest(3.0) * parameters.E;
-        let t293 = t292 * parameters.nu;
-        let t294 = t293 / t140;
-        let t302 = t127 * parameters.A;
-        let t303 = t11 * parameters.Ro;
-        let t304 = t303 * t303;
-        let t305 = T::nearest(12.0) * t302;
-        let t306 = parameters.rho0 * t304;
-        let t307 = t305 / t306;
-        let t313 = T::nearest(6.0) * t127;
-        let t314 = t313 * parameters.E;
-        let t315 = t314 * parameters.nu;
-        let t316 = parameters.rho0 * t128;
-        let t317 = t316 * t114;
-        let t318 = t317 * t116;
-        let t319 = t315 / t318;
-        let t333 = T::nearest(2.0) * t127;
-        let t334 = t333 / t316;
-        let t338 = T::nearest(4.0) * parameters.A;
-        let t339 = t338 * parameters.E;
-        let t340 = t339 * parameters.nu;
-        let t341 = t48 * t114;
-        let t342 = t341 * t116;
-        let t343 = t340 / t342;
-        let t347 = T::nearest(2.0) / t16;
-        let t349 = parameters.Ri / parameters.Ro;
-        let t350 = T::one() - t349;
-        let t351 = t103 * parameters.Ri;
-        let t352 = t351 * t350;
-        let t353 = t352 / t11;
-        let t358 = T::nearest(2.0) * parameters.Ri;
-        let t359 = t358 / parameters.Ro;
-        let t360 = T::nearest(3.0) - t359;
-        let t362 = t119 * parameters.Ri;
-        let t363 = t362 * t360;
-        let t364 = t363 / t11;
-        let t367 = parameters.Ri * parameters.Ri;
-        let t368 = t360 * t360;
-        let t369 = t127 * t367;
-        let t370 = t369 * t368;
-        let t371 = t370 / t128;
-        let t375 = parameters.A * parameters.Ri;
-        let t376 = t375 * t360;
-        let t377 = t376 / t11;
-        let t388 = T::one() / parameters.Ri;
-        let t396 = parameters.A / parameters.Ro;
-        let t404 = parameters.Ro * t114;
-        let t405 = t404 * t116;
-        let t406 = t139 / t405;
+        let t189 = parameters.E * t45;
+        let t190 = t189 / parameters.rho0;
+        let t201 = t141 + t136;
+        let t224 = T::one() / parameters.rho0;
+        let t236 = T::nearest(5.0) / parameters.Ro;
+        let t241 = t127 * t127;
+        let t242 = t128 * t128;
+        let t244 = T::nearest(144.0) * t241;
+        let t245 = t244 * t136;
+        let t246 = parameters.rho0 * t242;
+        let t247 = t245 / t246;
+        let t255 = t127 * parameters.A;
+        let t256 = t11 * parameters.Ro;
+        let t257 = t256 * t256;
+        let t258 = T::nearest(48.0) * t255;
+        let t259 = t258 * t136;
+        let t260 = parameters.rho0 * t257;
+        let t261 = t259 / t260;
+        let t272 = T::nearest(6.0) * t127;
+        let t273 = t272 * parameters.E;
+        let t274 = t273 * parameters.nu;
+        let t275 = parameters.rho0 * t128;
+        let t276 = t275 * t114;
+        let t277 = t276 * t116;
+        let t278 = t274 / t277;
+        let t282 = T::nearest(14.0) / parameters.Ro;
+        let t286 = T::nearest(3.0) * t201;
+        let t288 = T::nearest(2.0) * t136;
+        let t292 = T::nearest(2.0) * t127;
+        let t293 = t292 / t275;
+        let t297 = T::nearest(4.0) * parameters.A;
+        let t298 = t297 * parameters.E;
+        let t299 = t298 * parameters.nu;
+        let t300 = t48 * t114;
+        let t301 = t300 * t116;
+        let t302 = t299 / t301;
+        let t304 = t136 + t201;
+        let t305 = t297 * t304;
+        let t306 = t305 / t48;
+        let t310 = T::nearest(2.0) / t16;
+        let t312 = parameters.Ri / parameters.Ro;
+        let t313 = T::one() - t312;
+        let t314 = t103 * parameters.Ri;
+        let t315 = t314 * t313;
+        let t316 = t315 / t11;
+        let t321 = T::nearest(2.0) * parameters.Ri;
+        let t322 = t321 / parameters.Ro;
+        let t323 = T::nearest(3.0) - t322;
+        let t325 = t119 * parameters.Ri;
+        let t326 = t325 * t323;
+        let t327 = t326 / t11;
+        let t330 = parameters.Ri * parameters.Ri;
+        let t331 = t323 * t323;
+        let t332 = t127 * t330;
+        let t333 = t332 * t331;
+        let t334 = t333 / t128;
+        let t338 = parameters.A * parameters.Ri;
+        let t339 = t338 * t323;
+        let t340 = t339 / t11;
+        let t351 = T::one() / parameters.Ri;
+        let t359 = parameters.A / parameters.Ro;
+        let t367 = parameters.Ro * t114;
+        let t368 = t367 * t116;
+        let t369 = t139 / t368;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -246,7 +246,6 @@ impl<T: crate::Real> SphereShell<T> {
                 t20,
                 t24,
                 t37,
-                t45,
                 t49,
                 t58,
                 t71,
@@ -255,25 +254,27 @@ impl<T: crate::Real> SphereShell<T> {
                 t129,
                 t136,
                 t141,
-                t189,
-                t197,
-                t200,
-                t248,
-                t266,
-                t290,
-                t294,
-                t307,
-                t319,
+                t190,
+                t201,
+                t224,
+                t236,
+                t247,
+                t261,
+                t278,
+                t282,
+                t286,
+                t288,
+                t293,
+                t302,
+                t306,
+                t310,
+                t316,
+                t327,
                 t334,
-                t343,
-                t347,
-                t353,
-                t364,
-                t371,
-                t377,
-                t388,
-                t396,
-                t406,
+                t340,
+                t351,
+                t359,
+                t369,
             ],
         })
     }
@@ -388,7 +389,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t27 = t26 * X[0];
         let t29 = t26 * X[1];
         let t31 = t26 * X[2];
-        let t50 = self.fixed[5] * t18;
+        let t50 = self.fixed[4] * t18;
         let t51 = t50 * t27;
         let t52 = -t51;
         let t53 = t50 * t29;
@@ -414,7 +415,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t21 = self.fixed[1] * t8;
         let t23 = T::nearest(3.0) - t21;
         let t25 = self.fixed[2] * t18;
-        let t59 = self.fixed[6] * t8;
+        let t59 = self.fixed[5] * t8;
         let t60 = T::one() - t59;
         let t62 = t5 * t60;
         let t63 = T::nearest(6.0) * t62;
@@ -424,7 +425,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t67 = t8 * t66;
         let t68 = t65 * t67;
         let t69 = t25 * t68;
-        let t72 = self.fixed[7] * t8;
+        let t72 = self.fixed[6] * t8;
         let t73 = T::nearest(3.0) - t72;
         let t74 = X[0] * X[1];
         let t75 = t74 * t73;
@@ -475,7 +476,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t21 = self.fixed[1] * t8;
         let t23 = T::nearest(3.0) - t21;
         let t25 = self.fixed[2] * t18;
-        let t59 = self.fixed[6] * t8;
+        let t59 = self.fixed[5] * t8;
         let t60 = T::one() - t59;
         let t62 = t5 * t60;
         let t63 = T::nearest(6.0) * t62;
@@ -485,7 +486,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t67 = t8 * t66;
         let t68 = t65 * t67;
         let t69 = t25 * t68;
-        let t72 = self.fixed[7] * t8;
+        let t72 = self.fixed[6] * t8;
         let t73 = T::nearest(3.0) - t72;
         let t74 = X[0] * X[1];
         let t75 = t74 * t73;
@@ -536,9 +537,9 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t23 = T::nearest(3.0) - t21;
         let t25 = self.fixed[2] * t18;
         let t26 = t8 * t23;
-        let t59 = self.fixed[6] * t8;
+        let t59 = self.fixed[5] * t8;
         let t60 = T::one() - t59;
-        let t105 = self.fixed[8] * t18;
+        let t105 = self.fixed[7] * t18;
         let t106 = t8 * t60;
         let t107 = t105 * t106;
         let t108 = t107 + T::one();
@@ -566,7 +567,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t23 = T::nearest(3.0) - t21;
         let t25 = self.fixed[2] * t18;
         let t26 = t8 * t23;
-        let t59 = self.fixed[6] * t8;
+        let t59 = self.fixed[5] * t8;
         let t60 = T::one() - t59;
         let t64 = t23 * t6;
         let t66 = T::one() / t7;
@@ -578,7 +579,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t89 = X[1] * X[2];
         let t93 = t3 + t5;
         let t96 = t23 * t93;
-        let t105 = self.fixed[8] * t18;
+        let t105 = self.fixed[7] * t18;
         let t106 = t8 * t60;
         let t107 = t105 * t106;
         let t108 = t107 + T::one();
@@ -588,27 +589,27 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t112 = t108 * t111;
         let t117 = t18 * t26;
         let t118 = t117 * t108;
-        let t121 = self.fixed[9] * t118;
+        let t121 = self.fixed[8] * t118;
         let t122 = t18 * t18;
         let t123 = t23 * t23;
         let t124 = t7 * t123;
         let t125 = t122 * t124;
         let t126 = t125 * t108;
-        let t130 = self.fixed[10] * t126;
+        let t130 = self.fixed[9] * t126;
         let t131 = t121 + t130;
         let t132 = t131 + t107;
         let t133 = t132.ln_of_both(t112);
         let t137 = T::one() / t108;
         let t138 = t137 + T::one();
         let t142 = t133 * t137;
-        let t143 = self.fixed[12] * t142;
-        let t144 = self.fixed[11] * t138;
+        let t143 = self.fixed[11] * t142;
+        let t144 = self.fixed[10] * t138;
         let t145 = t143 - t144;
         let t146 = T::one() / t110;
         let t147 = t146 + T::one();
         let t148 = t133 * t146;
-        let t149 = self.fixed[12] * t148;
-        let t150 = self.fixed[11] * t147;
+        let t149 = self.fixed[11] * t148;
+        let t150 = self.fixed[10] * t147;
         let t151 = t149 - t150;
         let t152 = t5 * t67;
         let t153 = t107 * t145;
@@ -616,7 +617,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t155 = t25 * t64;
         let t156 = t155 * t151;
         let t157 = t154 + t156;
-        let t158 = self.fixed[12] * t133;
+        let t158 = self.fixed[11] * t133;
         let t159 = t67 * t157;
         let t160 = t158 - t159;
         let t161 = t67 * t153;
@@ -670,83 +671,60 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t23 = T::nearest(3.0) - t21;
         let t25 = self.fixed[2] * t18;
         let t26 = t8 * t23;
-        let t59 = self.fixed[6] * t8;
+        let t59 = self.fixed[5] * t8;
         let t60 = T::one() - t59;
         let t66 = T::one() / t7;
         let t67 = t8 * t66;
-        let t72 = self.fixed[7] * t8;
+        let t72 = self.fixed[6] * t8;
         let t73 = T::nearest(3.0) - t72;
-        let t105 = self.fixed[8] * t18;
+        let t105 = self.fixed[7] * t18;
         let t106 = t8 * t60;
         let t107 = t105 * t106;
         let t108 = t107 + T::one();
         let t109 = t25 * t26;
-        let t110 = t109 + T::one();
-        let t111 = t110 * t110;
-        let t112 = t108 * t111;
         let t137 = T::one() / t108;
-        let t146 = T::one() / t110;
         let t162 = t25 * t23;
-        let t190 = self.fixed[13] * t8;
-        let t191 = T::nearest(3.0) - t190;
-        let t194 = t7 * t23;
-        let t195 = self.fixed[4] * t194;
-        let t198 = self.fixed[14] * t191;
-        let t199 = t195 + t198;
-        let t201 = self.fixed[15] * t18;
-        let t202 = t201 * t199;
-        let t203 = t107 * t109;
-        let t204 = t203 + T::nearest(2.0);
-        let t205 = t162 * t204;
-        let t206 = t8 * t205;
-        let t207 = T::nearest(2.0) * t109;
-        let t208 = t207 + T::one();
-        let t209 = t107 * t208;
-        let t210 = t109 * t109;
-        let t211 = t206 + t209;
-        let t212 = t211 + t210;
-        let t213 = t212.ln_of_both(t112);
-        let t214 = self.fixed[11] * t107;
-        let t215 = self.fixed[12] * t213;
-        let t216 = t214 + t215;
-        let t217 = self.fixed[11] * t109;
-        let t218 = t215 + t217;
-        let t219 = T::one() - t21;
-        let t220 = t105 * t219;
-        let t221 = t220 * t137;
-        let t222 = self.fixed[9] * t18;
-        let t223 = t222 * t73;
-        let t224 = t223 * t146;
-        let t225 = t221 + t224;
-        let t226 = self.fixed[12] * t225;
-        let t227 = self.fixed[11] * t220;
-        let t228 = t226 + t227;
-        let t229 = t107 * t221;
-        let t230 = t220 - t229;
-        let t231 = t216 * t230;
-        let t232 = t107 * t228;
-        let t233 = t231 + t232;
-        let t234 = t109 * t146;
-        let t235 = t223 * t234;
-        let t236 = t229 + t235;
-        let t237 = T::nearest(2.0) * t67;
-        let t238 = t107 * t216;
-        let t239 = t237 * t238;
-        let t240 = t239 + t233;
-        let t241 = t137 * t240;
-        let t242 = t222 * t23;
-        let t243 = t218 * t146;
-        let t244 = t242 * t243;
-        let t245 = self.fixed[12] * t236;
-        let t246 = t241 - t244;
-        let t247 = t246 + t245;
-        let t249 = self.fixed[16] * t247;
-        let t250 = t249 - t202;
-        let t251 = t67 * t250;
-        let t252 = X[0] * t251;
-        let t253 = X[1] * t251;
-        let t254 = X[2] * t251;
-        crate::nalgebra::SVector::<T, 3>::new(t252, t253, t254)
+        let t188 = t8 * t162;
+        let t191 = self.fixed[12] * t8;
+        let t192 = t191 * t188;
+        let t193 = T::one() - t21;
+        let t194 = t105 * t193;
+        let t195 = self.fixed[8] * t18;
+        let t196 = t195 * t23;
+        let t197 = T::nearest(2.0) * t67;
+        let t198 = t197 * t107;
+        let t199 = t194 - t196;
+        let t200 = t199 + t198;
+        let t202 = t107 * t188;
+        let t203 = t188 + t202;
+        let t204 = T::nearest(2.0) * t203;
+        let t205 = t188 * t188;
+        let t206 = t109 * t202;
+        let t207 = t204 + t107;
+        let t208 = t207 + t205;
+        let t209 = t208 + t206;
+        let t210 = t188 + T::one();
+        let t211 = t210 * t210;
+        let t212 = t108 * t211;
+        let t213 = t209.ln_of_both(t212);
+        let t214 = self.fixed[11] * t213;
+        let t215 = self.fixed[13] - t214;
+        let t216 = t194 * t137;
+        let t217 = t195 * t73;
+        let t218 = t217 / t210;
+        let t219 = t216 + t218;
+        let t220 = self.fixed[10] * t200;
+        let t221 = t215 * t219;
+        let t222 = t221 * t137;
+        let t223 = t220 + t222;
+        let t225 = self.fixed[14] * t223;
+        let t226 = t192 + t225;
+        let t227 = -t226;
+        let t228 = t67 * t227;
+        let t229 = X[0] * t228;
+        let t230 = X[1] * t228;
+        let t231 = X[2] * t228;
+        crate::nalgebra::SVector::<T, 3>::new(t229, t230, t231)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> crate::Fields<T, 3> {
         let t3 = X[1] * X[1];
@@ -775,14 +753,14 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t42 = -t41;
         let t43 = t38 * t31;
         let t44 = -t43;
-        let t50 = self.fixed[5] * t18;
+        let t50 = self.fixed[4] * t18;
         let t51 = t50 * t27;
         let t52 = -t51;
         let t53 = t50 * t29;
         let t54 = -t53;
         let t55 = t50 * t31;
         let t56 = -t55;
-        let t59 = self.fixed[6] * t8;
+        let t59 = self.fixed[5] * t8;
         let t60 = T::one() - t59;
         let t62 = t5 * t60;
         let t63 = T::nearest(6.0) * t62;
@@ -792,7 +770,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t67 = t8 * t66;
         let t68 = t65 * t67;
         let t69 = t25 * t68;
-        let t72 = self.fixed[7] * t8;
+        let t72 = self.fixed[6] * t8;
         let t73 = T::nearest(3.0) - t72;
         let t74 = X[0] * X[1];
         let t75 = t74 * t73;
@@ -823,7 +801,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t100 = t69 + T::one();
         let t101 = t88 + T::one();
         let t102 = t99 + T::one();
-        let t105 = self.fixed[8] * t18;
+        let t105 = self.fixed[7] * t18;
         let t106 = t8 * t60;
         let t107 = t105 * t106;
         let t108 = t107 + T::one();
@@ -833,27 +811,27 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t112 = t108 * t111;
         let t117 = t18 * t26;
         let t118 = t117 * t108;
-        let t121 = self.fixed[9] * t118;
+        let t121 = self.fixed[8] * t118;
         let t122 = t18 * t18;
         let t123 = t23 * t23;
         let t124 = t7 * t123;
         let t125 = t122 * t124;
         let t126 = t125 * t108;
-        let t130 = self.fixed[10] * t126;
+        let t130 = self.fixed[9] * t126;
         let t131 = t121 + t130;
         let t132 = t131 + t107;
         let t133 = t132.ln_of_both(t112);
         let t137 = T::one() / t108;
         let t138 = t137 + T::one();
         let t142 = t133 * t137;
-        let t143 = self.fixed[12] * t142;
-        let t144 = self.fixed[11] * t138;
+        let t143 = self.fixed[11] * t142;
+        let t144 = self.fixed[10] * t138;
         let t145 = t143 - t144;
         let t146 = T::one() / t110;
         let t147 = t146 + T::one();
         let t148 = t133 * t146;
-        let t149 = self.fixed[12] * t148;
-        let t150 = self.fixed[11] * t147;
+        let t149 = self.fixed[11] * t148;
+        let t150 = self.fixed[10] * t147;
         let t151 = t149 - t150;
         let t152 = t5 * t67;
         let t153 = t107 * t145;
@@ -861,7 +839,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t155 = t25 * t64;
         let t156 = t155 * t151;
         let t157 = t154 + t156;
-        let t158 = self.fixed[12] * t133;
+        let t158 = self.fixed[11] * t133;
         let t159 = t67 * t157;
         let t160 = t158 - t159;
         let t161 = t67 * t153;
@@ -891,65 +869,46 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t185 = t182 + t184;
         let t186 = t67 * t185;
         let t187 = t158 - t186;
-        let t190 = self.fixed[13] * t8;
-        let t191 = T::nearest(3.0) - t190;
-        let t194 = t7 * t23;
-        let t195 = self.fixed[4] * t194;
-        let t198 = self.fixed[14] * t191;
-        let t199 = t195 + t198;
-        let t201 = self.fixed[15] * t18;
-        let t202 = t201 * t199;
-        let t203 = t107 * t109;
-        let t204 = t203 + T::nearest(2.0);
-        let t205 = t162 * t204;
-        let t206 = t8 * t205;
-        let t207 = T::nearest(2.0) * t109;
-        let t208 = t207 + T::one();
-        let t209 = t107 * t208;
-        let t210 = t109 * t109;
-        let t211 = t206 + t209;
-        let t212 = t211 + t210;
-        let t213 = t212.ln_of_both(t112);
-        let t214 = self.fixed[11] * t107;
-        let t215 = self.fixed[12] * t213;
-        let t216 = t214 + t215;
-        let t217 = self.fixed[11] * t109;
-        let t218 = t215 + t217;
-        let t219 = T::one() - t21;
-        let t220 = t105 * t219;
-        let t221 = t220 * t137;
-        let t222 = self.fixed[9] * t18;
-        let t223 = t222 * t73;
-        let t224 = t223 * t146;
-        let t225 = t221 + t224;
-        let t226 = self.fixed[12] * t225;
-        let t227 = self.fixed[11] * t220;
-        let t228 = t226 + t227;
-        let t229 = t107 * t221;
-        let t230 = t220 - t229;
-        let t231 = t216 * t230;
-        let t232 = t107 * t228;
-        let t233 = t231 + t232;
-        let t234 = t109 * t146;
-        let t235 = t223 * t234;
-        let t236 = t229 + t235;
-        let t237 = T::nearest(2.0) * t67;
-        let t238 = t107 * t216;
-        let t239 = t237 * t238;
-        let t240 = t239 + t233;
-        let t241 = t137 * t240;
-        let t242 = t222 * t23;
-        let t243 = t218 * t146;
-        let t244 = t242 * t243;
-        let t245 = self.fixed[12] * t236;
-        let t246 = t241 - t244;
-        let t247 = t246 + t245;
-        let t249 = self.fixed[16] * t247;
-        let t250 = t249 - t202;
-        let t251 = t67 * t250;
-        let t252 = X[0] * t251;
-        let t253 = X[1] * t251;
-        let t254 = X[2] * t251;
+        let t188 = t8 * t162;
+        let t191 = self.fixed[12] * t8;
+        let t192 = t191 * t188;
+        let t193 = T::one() - t21;
+        let t194 = t105 * t193;
+        let t195 = self.fixed[8] * t18;
+        let t196 = t195 * t23;
+        let t197 = T::nearest(2.0) * t67;
+        let t198 = t197 * t107;
+        let t199 = t194 - t196;
+        let t200 = t199 + t198;
+        let t202 = t107 * t188;
+        let t203 = t188 + t202;
+        let t204 = T::nearest(2.0) * t203;
+        let t205 = t188 * t188;
+        let t206 = t109 * t202;
+        let t207 = t204 + t107;
+        let t208 = t207 + t205;
+        let t209 = t208 + t206;
+        let t210 = t188 + T::one();
+        let t211 = t210 * t210;
+        let t212 = t108 * t211;
+        let t213 = t209.ln_of_both(t212);
+        let t214 = self.fixed[11] * t213;
+        let t215 = self.fixed[13] - t214;
+        let t216 = t194 * t137;
+        let t217 = t195 * t73;
+        let t218 = t217 / t210;
+        let t219 = t216 + t218;
+        let t220 = self.fixed[10] * t200;
+        let t221 = t215 * t219;
+        let t222 = t221 * t137;
+        let t223 = t220 + t222;
+        let t225 = self.fixed[14] * t223;
+        let t226 = t192 + t225;
+        let t227 = -t226;
+        let t228 = t67 * t227;
+        let t229 = X[0] * t228;
+        let t230 = X[1] * t228;
+        let t231 = X[2] * t228;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 3>::new(t28, t30, t32),
             v: crate::nalgebra::SVector::<T, 3>::new(t40, t42, t44),
@@ -970,7 +929,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 3,
                 3,
             >::new(t160, t167, t170, t167, t177, t180, t170, t180, t187),
-            b: crate::nalgebra::SVector::<T, 3>::new(t252, t253, t254),
+            b: crate::nalgebra::SVector::<T, 3>::new(t229, t230, t231),
         }
     }
     fn traction(
@@ -984,50 +943,50 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t17 = self.fixed[0] * t;
                 let t18 = t17.cos_pi();
                 let t122 = t18 * t18;
-                let t354 = self.fixed[25] * t18;
-                let t355 = t354 + T::one();
-                let t356 = T::one() / t355;
-                let t357 = t356 + T::one();
-                let t361 = t18 * t355;
-                let t365 = self.fixed[26] * t361;
-                let t366 = t122 * t355;
-                let t372 = self.fixed[27] * t366;
-                let t373 = t365 + t372;
-                let t374 = t373 + t354;
-                let t378 = self.fixed[28] * t18;
-                let t379 = t378 + T::one();
-                let t380 = t379 * t379;
-                let t381 = t355 * t380;
-                let t382 = t374.ln_of_both(t381);
-                let t383 = t354 * t357;
-                let t384 = self.fixed[11] * t383;
-                let t385 = t382 * t356;
-                let t386 = self.fixed[12] * t385;
-                let t387 = t384 + t386;
-                let t389 = self.fixed[29] * t387;
-                let t390 = t389 * X[0];
-                let t391 = -t390;
-                let t392 = t389 * X[1];
-                let t393 = -t392;
-                let t394 = t389 * X[2];
-                let t395 = -t394;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t391, t393, t395))
+                let t317 = self.fixed[26] * t18;
+                let t318 = t317 + T::one();
+                let t319 = T::one() / t318;
+                let t320 = t319 + T::one();
+                let t324 = t18 * t318;
+                let t328 = self.fixed[27] * t324;
+                let t329 = t122 * t318;
+                let t335 = self.fixed[28] * t329;
+                let t336 = t328 + t335;
+                let t337 = t336 + t317;
+                let t341 = self.fixed[29] * t18;
+                let t342 = t341 + T::one();
+                let t343 = t342 * t342;
+                let t344 = t318 * t343;
+                let t345 = t337.ln_of_both(t344);
+                let t346 = t317 * t320;
+                let t347 = self.fixed[10] * t346;
+                let t348 = t345 * t319;
+                let t349 = self.fixed[11] * t348;
+                let t350 = t347 + t349;
+                let t352 = self.fixed[30] * t350;
+                let t353 = t352 * X[0];
+                let t354 = -t353;
+                let t355 = t352 * X[1];
+                let t356 = -t355;
+                let t357 = t352 * X[2];
+                let t358 = -t357;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t354, t356, t358))
             }
             crate::Surface::Outer => {
                 let t17 = self.fixed[0] * t;
                 let t18 = t17.cos_pi();
-                let t397 = self.fixed[30] * t18;
-                let t398 = t397 + T::nearest(2.0);
-                let t399 = t18 * t398;
-                let t400 = self.fixed[30] * t399;
-                let t401 = t397 + T::one();
-                let t402 = t401 * t401;
-                let t403 = t400.ln_of_both(t402);
-                let t407 = self.fixed[31] * t403;
-                let t408 = t407 * X[0];
-                let t409 = t407 * X[1];
-                let t410 = t407 * X[2];
-                Some(crate::nalgebra::SVector::<T, 3>::new(t408, t409, t410))
+                let t360 = self.fixed[31] * t18;
+                let t361 = t360 + T::nearest(2.0);
+                let t362 = t18 * t361;
+                let t363 = self.fixed[31] * t362;
+                let t364 = t360 + T::one();
+                let t365 = t364 * t364;
+                let t366 = t363.ln_of_both(t365);
+                let t370 = self.fixed[32] * t366;
+                let t371 = t370 * X[0];
+                let t372 = t370 * X[1];
+                let t373 = t370 * X[2];
+                Some(crate::nalgebra::SVector::<T, 3>::new(t371, t372, t373))
             }
             crate::Surface::Lower(0) => {
                 let t3 = X[1] * X[1];
@@ -1042,12 +1001,12 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t23 = T::nearest(3.0) - t21;
                 let t25 = self.fixed[2] * t18;
                 let t26 = t8 * t23;
-                let t59 = self.fixed[6] * t8;
+                let t59 = self.fixed[5] * t8;
                 let t60 = T::one() - t59;
                 let t64 = t23 * t6;
                 let t66 = T::one() / t7;
                 let t67 = t8 * t66;
-                let t105 = self.fixed[8] * t18;
+                let t105 = self.fixed[7] * t18;
                 let t106 = t8 * t60;
                 let t107 = t105 * t106;
                 let t108 = t107 + T::one();
@@ -1057,29 +1016,29 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t112 = t108 * t111;
                 let t117 = t18 * t26;
                 let t118 = t117 * t108;
-                let t121 = self.fixed[9] * t118;
+                let t121 = self.fixed[8] * t118;
                 let t122 = t18 * t18;
                 let t123 = t23 * t23;
                 let t124 = t7 * t123;
                 let t125 = t122 * t124;
                 let t126 = t125 * t108;
-                let t130 = self.fixed[10] * t126;
+                let t130 = self.fixed[9] * t126;
                 let t131 = t121 + t130;
                 let t132 = t131 + t107;
                 let t133 = t132.ln_of_both(t112);
                 let t146 = T::one() / t110;
                 let t147 = t146 + T::one();
                 let t148 = t133 * t146;
-                let t149 = self.fixed[12] * t148;
-                let t150 = self.fixed[11] * t147;
+                let t149 = self.fixed[11] * t148;
+                let t150 = self.fixed[10] * t147;
                 let t151 = t149 - t150;
-                let t158 = self.fixed[12] * t133;
-                let t411 = t64 * t67;
-                let t412 = t25 * t411;
-                let t413 = t412 * t151;
-                let t414 = t158 - t413;
-                let t415 = -t414;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t415, T::zero(), T::zero()))
+                let t158 = self.fixed[11] * t133;
+                let t374 = t64 * t67;
+                let t375 = t25 * t374;
+                let t376 = t375 * t151;
+                let t377 = t158 - t376;
+                let t378 = -t377;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t378, T::zero(), T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t3 = X[1] * X[1];
@@ -1094,13 +1053,13 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t23 = T::nearest(3.0) - t21;
                 let t25 = self.fixed[2] * t18;
                 let t26 = t8 * t23;
-                let t59 = self.fixed[6] * t8;
+                let t59 = self.fixed[5] * t8;
                 let t60 = T::one() - t59;
                 let t66 = T::one() / t7;
                 let t67 = t8 * t66;
                 let t82 = t4 + t5;
                 let t85 = t23 * t82;
-                let t105 = self.fixed[8] * t18;
+                let t105 = self.fixed[7] * t18;
                 let t106 = t8 * t60;
                 let t107 = t105 * t106;
                 let t108 = t107 + T::one();
@@ -1110,29 +1069,29 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t112 = t108 * t111;
                 let t117 = t18 * t26;
                 let t118 = t117 * t108;
-                let t121 = self.fixed[9] * t118;
+                let t121 = self.fixed[8] * t118;
                 let t122 = t18 * t18;
                 let t123 = t23 * t23;
                 let t124 = t7 * t123;
                 let t125 = t122 * t124;
                 let t126 = t125 * t108;
-                let t130 = self.fixed[10] * t126;
+                let t130 = self.fixed[9] * t126;
                 let t131 = t121 + t130;
                 let t132 = t131 + t107;
                 let t133 = t132.ln_of_both(t112);
                 let t146 = T::one() / t110;
                 let t147 = t146 + T::one();
                 let t148 = t133 * t146;
-                let t149 = self.fixed[12] * t148;
-                let t150 = self.fixed[11] * t147;
+                let t149 = self.fixed[11] * t148;
+                let t150 = self.fixed[10] * t147;
                 let t151 = t149 - t150;
-                let t158 = self.fixed[12] * t133;
-                let t417 = t85 * t67;
-                let t418 = t25 * t417;
-                let t419 = t418 * t151;
-                let t420 = t158 - t419;
-                let t421 = -t420;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t421, T::zero()))
+                let t158 = self.fixed[11] * t133;
+                let t380 = t85 * t67;
+                let t381 = t25 * t380;
+                let t382 = t381 * t151;
+                let t383 = t158 - t382;
+                let t384 = -t383;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t384, T::zero()))
             }
             crate::Surface::Lower(2) => {
                 let t3 = X[1] * X[1];
@@ -1147,13 +1106,13 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t23 = T::nearest(3.0) - t21;
                 let t25 = self.fixed[2] * t18;
                 let t26 = t8 * t23;
-                let t59 = self.fixed[6] * t8;
+                let t59 = self.fixed[5] * t8;
                 let t60 = T::one() - t59;
                 let t66 = T::one() / t7;
                 let t67 = t8 * t66;
                 let t93 = t3 + t5;
                 let t96 = t23 * t93;
-                let t105 = self.fixed[8] * t18;
+                let t105 = self.fixed[7] * t18;
                 let t106 = t8 * t60;
                 let t107 = t105 * t106;
                 let t108 = t107 + T::one();
@@ -1163,29 +1122,29 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t112 = t108 * t111;
                 let t117 = t18 * t26;
                 let t118 = t117 * t108;
-                let t121 = self.fixed[9] * t118;
+                let t121 = self.fixed[8] * t118;
                 let t122 = t18 * t18;
                 let t123 = t23 * t23;
                 let t124 = t7 * t123;
                 let t125 = t122 * t124;
                 let t126 = t125 * t108;
-                let t130 = self.fixed[10] * t126;
+                let t130 = self.fixed[9] * t126;
                 let t131 = t121 + t130;
                 let t132 = t131 + t107;
                 let t133 = t132.ln_of_both(t112);
                 let t146 = T::one() / t110;
                 let t147 = t146 + T::one();
                 let t148 = t133 * t146;
-                let t149 = self.fixed[12] * t148;
-                let t150 = self.fixed[11] * t147;
+                let t149 = self.fixed[11] * t148;
+                let t150 = self.fixed[10] * t147;
                 let t151 = t149 - t150;
-                let t158 = self.fixed[12] * t133;
-                let t422 = t96 * t67;
-                let t423 = t25 * t422;
-                let t424 = t423 * t151;
-                let t425 = t158 - t424;
-                let t426 = -t425;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t426))
+                let t158 = self.fixed[11] * t133;
+                let t385 = t96 * t67;
+                let t386 = t25 * t385;
+                let t387 = t386 * t151;
+                let t388 = t158 - t387;
+                let t389 = -t388;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t389))
             }
             _ => None,
         }
@@ -1225,8 +1184,8 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
     }
     fn law(&self) -> crate::Law<T> {
         crate::Law::Library(crate::Material::NeoHookean {
-            lambda: self.fixed[12],
-            mu: self.fixed[11],
+            lambda: self.fixed[11],
+            mu: self.fixed[10],
         })
     }
     fn density(&self) -> T {
@@ -1236,7 +1195,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[24]
+        self.fixed[25]
     }
     fn body_force_at(
         &self,
@@ -1258,11 +1217,11 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 5, 12> for SphereShell<T> {
         let t17 = self.fixed[0] * t;
         let t18 = t17.cos_pi();
         let t25 = self.fixed[2] * t18;
-        let t105 = self.fixed[8] * t18;
+        let t105 = self.fixed[7] * t18;
         let t122 = t18 * t18;
-        let t222 = self.fixed[9] * t18;
-        let t428 = self.fixed[10] * t122;
-        [t18, t25, t105, t222, t428]
+        let t195 = self.fixed[8] * t18;
+        let t391 = self.fixed[9] * t122;
+        [t18, t25, t105, t195, t391]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 12] {
@@ -1275,76 +1234,50 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 5, 12> for SphereShell<T> {
         let t21 = self.fixed[1] * t8;
         let t23 = T::nearest(3.0) - t21;
         let t26 = t8 * t23;
-        let t59 = self.fixed[6] * t8;
+        let t59 = self.fixed[5] * t8;
         let t60 = T::one() - t59;
         let t66 = T::one() / t7;
         let t67 = t8 * t66;
-        let t72 = self.fixed[7] * t8;
+        let t72 = self.fixed[6] * t8;
         let t73 = T::nearest(3.0) - t72;
         let t106 = t8 * t60;
         let t123 = t23 * t23;
         let t124 = t7 * t123;
-        let t190 = self.fixed[13] * t8;
-        let t191 = T::nearest(3.0) - t190;
-        let t194 = t7 * t23;
-        let t195 = self.fixed[4] * t194;
-        let t198 = self.fixed[14] * t191;
-        let t199 = t195 + t198;
-        let t219 = T::one() - t21;
-        let t255 = X[0] * t67;
-        let t256 = self.fixed[15] * t199;
-        let t259 = t7 * t8;
-        let t262 = t60 * t60;
-        let t267 = t259 * t23;
-        let t268 = t267 * t262;
-        let t269 = t268 * t191;
-        let t270 = self.fixed[17] * t269;
-        let t271 = t23 * t219;
-        let t272 = t60 * t73;
-        let t273 = T::nearest(2.0) * t272;
-        let t274 = t271 + t273;
-        let t275 = t23 * t73;
-        let t277 = T::nearest(36.0) * t262;
-        let t278 = t275 + t277;
-        let t279 = t278 - t123;
-        let t280 = T::nearest(2.0) * t191;
-        let t281 = t73 + t280;
-        let t282 = t23 * t281;
-        let t284 = t60 * t219;
-        let t285 = T::nearest(18.0) * t284;
-        let t286 = t282 + t285;
-        let t287 = T::nearest(6.0) - t190;
-        let t288 = t287 * t219;
-        let t289 = T::nearest(2.0) * t288;
-        let t291 = self.fixed[18] * t289;
-        let t295 = self.fixed[19] * t274;
-        let t296 = self.fixed[11] * t279;
-        let t297 = self.fixed[12] * t286;
-        let t298 = t291 + t295;
-        let t299 = t298 + t296;
-        let t300 = t299 + t297;
-        let t308 = t7 * t60;
-        let t309 = t308 * t300;
-        let t310 = self.fixed[20] * t309;
-        let t320 = t8 * t274;
-        let t321 = self.fixed[21] * t320;
-        let t322 = self.fixed[12] * t191;
-        let t323 = self.fixed[18] * t219;
-        let t324 = t322 + t323;
-        let t325 = t277 - t123;
-        let t326 = t285 + t275;
-        let t327 = t60 * t324;
-        let t328 = T::nearest(12.0) * t327;
-        let t329 = self.fixed[11] * t325;
-        let t330 = self.fixed[12] * t326;
-        let t331 = t328 + t329;
-        let t332 = t331 + t330;
-        let t335 = t8 * t332;
-        let t336 = self.fixed[22] * t335;
-        let t344 = self.fixed[23] * t191;
-        let t345 = X[1] * t67;
-        let t346 = X[2] * t67;
-        [t26, t106, t124, t255, t256, t270, t310, t321, t336, t344, t345, t346]
+        let t193 = T::one() - t21;
+        let t232 = X[0] * t67;
+        let t233 = t7 * t23;
+        let t234 = self.fixed[4] * t233;
+        let t237 = self.fixed[15] * t8;
+        let t238 = T::nearest(3.0) - t237;
+        let t240 = t7 * t8;
+        let t243 = t60 * t60;
+        let t248 = t240 * t23;
+        let t249 = t248 * t243;
+        let t250 = t249 * t238;
+        let t251 = self.fixed[16] * t250;
+        let t252 = -t251;
+        let t253 = T::nearest(6.0) - t237;
+        let t262 = t7 * t60;
+        let t263 = t262 * t253;
+        let t264 = t263 * t238;
+        let t265 = self.fixed[17] * t264;
+        let t268 = t23 * t193;
+        let t269 = t60 * t73;
+        let t270 = T::nearest(2.0) * t269;
+        let t271 = t268 + t270;
+        let t279 = t8 * t271;
+        let t280 = self.fixed[18] * t279;
+        let t283 = self.fixed[19] * t8;
+        let t285 = T::nearest(15.0) - t283;
+        let t287 = self.fixed[20] * t271;
+        let t289 = t238 * t285;
+        let t290 = self.fixed[21] * t289;
+        let t291 = t287 + t290;
+        let t294 = t8 * t291;
+        let t295 = self.fixed[22] * t294;
+        let t308 = X[1] * t67;
+        let t309 = X[2] * t67;
+        [t26, t106, t124, t232, t234, t238, t252, t265, t280, t295, t308, t309]
     }
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
@@ -1356,31 +1289,34 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 5, 12> for SphereShell<T> {
         let t108 = t107 + T::one();
         let t109 = time[1] * point[0];
         let t110 = t109 + T::one();
-        let t311 = time[0] * point[5];
-        let t312 = point[6] + t311;
-        let t337 = time[0] * t312;
-        let t427 = time[3] * point[0];
-        let t429 = time[4] * point[2];
-        let t430 = t427 + t429;
-        let t431 = t108 * t430;
-        let t432 = t431 + t107;
-        let t433 = t108 * t110;
-        let t434 = t110 * t433;
-        let t435 = t432.ln_of_both_if::<NEAR>(t434);
-        let t436 = point[7] * t435;
-        let t437 = t337 + t436;
-        let t438 = point[8] + t437;
-        let t439 = time[0] * t438;
-        let t440 = point[9] * t435;
-        let t441 = t439 + t440;
-        let t442 = t108 * t433;
-        let t443 = t441 / t442;
-        let t444 = t443 - point[4];
-        let t445 = time[0] * t444;
-        let t446 = point[3] * t445;
-        let t447 = point[10] * t445;
-        let t448 = point[11] * t445;
-        crate::nalgebra::SVector::<T, 3>::new(t446, t447, t448)
+        let t266 = time[0] * point[6];
+        let t267 = t266 - point[7];
+        let t296 = time[0] * t267;
+        let t303 = self.fixed[23] * point[5];
+        let t307 = self.fixed[24] * point[5];
+        let t390 = time[3] * point[0];
+        let t392 = time[4] * point[2];
+        let t393 = t390 + t392;
+        let t394 = t108 * t393;
+        let t395 = t394 + t107;
+        let t396 = t108 * t110;
+        let t397 = t110 * t396;
+        let t398 = t395.ln_of_both_if::<NEAR>(t397);
+        let t399 = point[8] * t398;
+        let t400 = t296 + t399;
+        let t401 = t400 - point[9];
+        let t402 = time[0] * t401;
+        let t403 = t303 * t398;
+        let t404 = t402 + t403;
+        let t405 = t404 - t307;
+        let t406 = t108 * t396;
+        let t407 = t405 / t406;
+        let t408 = t407 - point[4];
+        let t409 = time[0] * t408;
+        let t410 = point[3] * t409;
+        let t411 = point[10] * t409;
+        let t412 = point[11] * t409;
+        crate::nalgebra::SVector::<T, 3>::new(t410, t411, t412)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
@@ -1390,7 +1326,7 @@ impl<T: crate::Real> crate::StateStages<T, 3, 4, 1, 3> for SphereShell<T> {
         let t17 = self.fixed[0] * t;
         let t18 = t17.cos_pi();
         let t25 = self.fixed[2] * t18;
-        let t105 = self.fixed[8] * t18;
+        let t105 = self.fixed[7] * t18;
         let t122 = t18 * t18;
         [t18, t25, t105, t122]
     }
@@ -1449,7 +1385,7 @@ impl<T: crate::Real> crate::StateStages<T, 3, 4, 1, 3> for SphereShell<T> {
         let t30 = time[1] * t29;
         let t31 = t26 * point[1];
         let t32 = time[1] * t31;
-        let t59 = self.fixed[6] * t8;
+        let t59 = self.fixed[5] * t8;
         let t60 = T::one() - t59;
         let t62 = t5 * t60;
         let t63 = T::nearest(6.0) * t62;
@@ -1459,7 +1395,7 @@ impl<T: crate::Real> crate::StateStages<T, 3, 4, 1, 3> for SphereShell<T> {
         let t67 = t8 * t66;
         let t68 = t65 * t67;
         let t69 = time[1] * t68;
-        let t72 = self.fixed[7] * t8;
+        let t72 = self.fixed[6] * t8;
         let t73 = T::nearest(3.0) - t72;
         let t74 = point[2] * point[0];
         let t75 = t74 * t73;
@@ -1499,26 +1435,26 @@ impl<T: crate::Real> crate::StateStages<T, 3, 4, 1, 3> for SphereShell<T> {
         let t112 = t108 * t111;
         let t117 = time[0] * t26;
         let t118 = t117 * t108;
-        let t121 = self.fixed[9] * t118;
+        let t121 = self.fixed[8] * t118;
         let t123 = t23 * t23;
         let t124 = t7 * t123;
         let t125 = time[3] * t124;
         let t126 = t125 * t108;
-        let t130 = self.fixed[10] * t126;
+        let t130 = self.fixed[9] * t126;
         let t131 = t121 + t130;
         let t132 = t131 + t107;
         let t133 = t132.ln_of_both_if::<NEAR>(t112);
         let t137 = T::one() / t108;
         let t138 = t137 + T::one();
         let t142 = t133 * t137;
-        let t143 = self.fixed[12] * t142;
-        let t144 = self.fixed[11] * t138;
+        let t143 = self.fixed[11] * t142;
+        let t144 = self.fixed[10] * t138;
         let t145 = t143 - t144;
         let t146 = T::one() / t110;
         let t147 = t146 + T::one();
         let t148 = t133 * t146;
-        let t149 = self.fixed[12] * t148;
-        let t150 = self.fixed[11] * t147;
+        let t149 = self.fixed[11] * t148;
+        let t150 = self.fixed[10] * t147;
         let t151 = t149 - t150;
         let t152 = t5 * t67;
         let t153 = t107 * t145;
@@ -1526,7 +1462,7 @@ impl<T: crate::Real> crate::StateStages<T, 3, 4, 1, 3> for SphereShell<T> {
         let t155 = time[1] * t64;
         let t156 = t155 * t151;
         let t157 = t154 + t156;
-        let t158 = self.fixed[12] * t133;
+        let t158 = self.fixed[11] * t133;
         let t159 = t67 * t157;
         let t160 = t158 - t159;
         let t161 = t67 * t153;

@@ -38,7 +38,7 @@ impl<T: crate::Real> Default for VortexParameters<T> {
 pub struct Vortex<T: crate::Real> {
     parameters: VortexParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 22],
+    fixed: [T; 20],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Vortex<T> {
@@ -124,24 +124,23 @@ impl<T: crate::Real> Vortex<T> {
         let t146 = parameters.nu + T::one();
         let t147 = T::nearest(0.5) * parameters.E;
         let t148 = t147 / t146;
-        let t209 = parameters.A * t79;
-        let t213 = T::nearest(2.0) / t146;
-        let t241 = T::nearest(128.0) * parameters.A;
-        let t266 = t148 / parameters.rho0;
-        let t278 = T::nearest(32.0) / t146;
-        let t283 = t80 / parameters.rho0;
-        let t293 = T::nearest(2.0) / t5;
-        let t294 = T::nearest(2.0) * parameters.nu;
-        let t295 = T::one() - t294;
-        let t296 = parameters.E * parameters.nu;
-        let t297 = t146 * t295;
-        let t298 = t296 / t297;
-        let t351 = parameters.A * t4;
-        let t352 = t351 * t209;
-        let t356 = t4 * T::nearest(2.0);
-        let t357 = t356 * t209;
-        let t366 = t4 * t213;
-        let t373 = t71 * t79;
+        let t212 = parameters.rho0 * t146;
+        let t213 = parameters.E / t212;
+        let t234 = parameters.A * t79;
+        let t237 = T::one() / t146;
+        let t250 = T::nearest(2.0) / t5;
+        let t251 = T::nearest(2.0) * parameters.nu;
+        let t252 = T::one() - t251;
+        let t253 = parameters.E * parameters.nu;
+        let t254 = t146 * t252;
+        let t255 = t253 / t254;
+        let t268 = T::nearest(2.0) + T::nearest(3.0);
+        let t269 = T::one() - T::one();
+        let t292 = parameters.A * t82;
+        let t296 = T::nearest(2.0) * t82;
+        let t305 = t71 * t234;
+        let t311 = t237 * t269;
+        let t313 = t102 * t237;
         Ok(Vortex {
             parameters,
             fixed: [
@@ -150,23 +149,21 @@ impl<T: crate::Real> Vortex<T> {
                 t22,
                 t51,
                 t71,
-                t79,
                 t82,
                 t92,
                 t102,
                 t148,
-                t209,
                 t213,
-                t241,
-                t266,
-                t278,
-                t283,
-                t293,
-                t298,
-                t352,
-                t357,
-                t366,
-                t373,
+                t234,
+                t237,
+                t250,
+                t255,
+                t268,
+                t292,
+                t296,
+                t305,
+                t311,
+                t313,
             ],
         })
     }
@@ -319,7 +316,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t76 = X[0] * t69;
         let t77 = X[1] * t75;
         let t78 = t76 + t77;
-        let t83 = self.fixed[6] * t21;
+        let t83 = self.fixed[5] * t21;
         let t84 = t83 * t78;
         let t85 = -t84;
         let t86 = X[1] * t69;
@@ -356,7 +353,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t43 = t26 * t26;
         let t44 = t42 - t43;
         let t46 = t25 * t26;
-        let t93 = self.fixed[7] * t7;
+        let t93 = self.fixed[6] * t7;
         let t94 = t13 * t15;
         let t95 = t94 * t19;
         let t96 = t93 * t95;
@@ -364,7 +361,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t98 = t25 + t97;
         let t99 = t7 * t95;
         let t100 = t99 * t44;
-        let t103 = self.fixed[8] * t100;
+        let t103 = self.fixed[7] * t100;
         let t104 = t46 - t103;
         let t105 = X[0] * t98;
         let t106 = t28 - t105;
@@ -433,7 +430,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t43 = t26 * t26;
         let t44 = t42 - t43;
         let t46 = t25 * t26;
-        let t93 = self.fixed[7] * t7;
+        let t93 = self.fixed[6] * t7;
         let t94 = t13 * t15;
         let t95 = t94 * t19;
         let t96 = t93 * t95;
@@ -441,7 +438,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t98 = t25 + t97;
         let t99 = t7 * t95;
         let t100 = t99 * t44;
-        let t103 = self.fixed[8] * t100;
+        let t103 = self.fixed[7] * t100;
         let t104 = t46 - t103;
         let t105 = X[0] * t98;
         let t106 = t28 - t105;
@@ -512,7 +509,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t43 = t26 * t26;
         let t44 = t42 - t43;
         let t46 = t25 * t26;
-        let t93 = self.fixed[7] * t7;
+        let t93 = self.fixed[6] * t7;
         let t94 = t13 * t15;
         let t95 = t94 * t19;
         let t96 = t93 * t95;
@@ -520,7 +517,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t98 = t25 + t97;
         let t99 = t7 * t95;
         let t100 = t99 * t44;
-        let t103 = self.fixed[8] * t100;
+        let t103 = self.fixed[7] * t100;
         let t104 = t46 - t103;
         let t109 = X[0] * X[1];
         let t114 = T::one() / t12;
@@ -546,7 +543,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t168 = t11 * t164;
         let t169 = t165 + t167;
         let t170 = t169 + t168;
-        let t171 = self.fixed[9] * t114;
+        let t171 = self.fixed[8] * t114;
         let t172 = t171 * t170;
         let t173 = -t172;
         let t174 = t159 - t163;
@@ -601,7 +598,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t73 = t72 * t21;
         let t74 = t73 * t46;
         let t75 = t70 - t74;
-        let t93 = self.fixed[7] * t7;
+        let t93 = self.fixed[6] * t7;
         let t94 = t13 * t15;
         let t95 = t94 * t19;
         let t96 = t93 * t95;
@@ -609,18 +606,9 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t98 = t25 + t97;
         let t99 = t7 * t95;
         let t100 = t99 * t44;
-        let t103 = self.fixed[8] * t100;
+        let t103 = self.fixed[7] * t100;
         let t104 = t46 - t103;
         let t114 = T::one() / t12;
-        let t149 = T::nearest(2.0) * t46;
-        let t150 = -t149;
-        let t151 = T::nearest(2.0) * t104;
-        let t152 = t25 * t98;
-        let t153 = T::nearest(2.0) * t152;
-        let t154 = -t153;
-        let t155 = T::nearest(2.0) * t42;
-        let t156 = -t155;
-        let t158 = t150 * t151;
         let t185 = T::nearest(2.0) * t13;
         let t187 = T::nearest(3.0) * t15;
         let t188 = t185 - t187;
@@ -641,87 +629,47 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t203 = t96 * t46;
         let t204 = t13 * t114;
         let t205 = t204 * t203;
-        let t206 = self.fixed[8] * t7;
+        let t206 = self.fixed[7] * t7;
         let t207 = t206 * t202;
         let t208 = t205 + t207;
-        let t210 = t13 * t21;
-        let t211 = self.fixed[10] * t210;
-        let t212 = t211 * t69;
-        let t214 = self.fixed[11] * t208;
-        let t215 = t212 - t214;
-        let t216 = self.fixed[0] * t215;
-        let t217 = t93 * t198;
-        let t218 = t217 * t44;
-        let t219 = t13 - t15;
-        let t220 = t19 * t219;
-        let t221 = T::nearest(32.0) * t190;
-        let t222 = t221 - t220;
-        let t223 = t26 * t222;
-        let t224 = t223 - t196;
-        let t225 = t25 * t222;
-        let t226 = t195 * t26;
-        let t227 = t225 + t226;
-        let t228 = t198 * t44;
-        let t229 = t26 * t224;
-        let t230 = t25 * t227;
-        let t231 = t228 - t229;
-        let t232 = t231 + t230;
-        let t233 = t93 * t232;
-        let t234 = -t233;
-        let t235 = t93 * t202;
-        let t236 = -t235;
-        let t237 = t156 + T::one();
-        let t238 = t154 * t237;
-        let t239 = t158 - t238;
-        let t242 = self.fixed[12] * t7;
-        let t243 = t242 * t198;
-        let t244 = t243 * t46;
-        let t245 = -t244;
-        let t246 = t237 * t236;
-        let t247 = t151 * t218;
-        let t248 = t150 * t234;
-        let t249 = t154 * t245;
-        let t250 = t246 - t247;
-        let t251 = t250 - t248;
-        let t252 = t251 + t249;
-        let t253 = t154 + T::one();
-        let t254 = t156 * t253;
-        let t255 = t158 - t254;
-        let t256 = t154 * t239;
-        let t257 = t156 * t255;
-        let t258 = t256 - t257;
-        let t259 = t236 * t239;
-        let t260 = t154 * t252;
-        let t261 = t204 * t258;
-        let t262 = t247 + t248;
-        let t263 = t262 - t259;
-        let t264 = t263 + t260;
-        let t265 = t264 - t261;
-        let t267 = self.fixed[13] * t265;
-        let t268 = t267 - t216;
-        let t269 = t13 - t187;
-        let t270 = t19 * t269;
-        let t271 = t221 - t270;
-        let t272 = t44 * t271;
-        let t273 = t242 * t194;
-        let t274 = t273 * t46;
-        let t275 = t272 + t274;
-        let t276 = self.fixed[5] * t210;
-        let t277 = t276 * t75;
-        let t279 = self.fixed[14] * t7;
-        let t280 = t279 * t275;
-        let t281 = t277 + t280;
-        let t282 = X[0] * t268;
-        let t284 = self.fixed[15] * X[1];
-        let t285 = t284 * t281;
-        let t286 = t282 - t285;
-        let t287 = t204 * t286;
-        let t288 = X[1] * t268;
-        let t289 = self.fixed[15] * X[0];
-        let t290 = t289 * t281;
-        let t291 = t288 + t290;
-        let t292 = t204 * t291;
-        crate::nalgebra::SVector::<T, 2>::new(t287, t292)
+        let t209 = t13 * t21;
+        let t210 = self.fixed[5] * t209;
+        let t211 = t210 * t69;
+        let t214 = self.fixed[9] * t208;
+        let t215 = t214 - t211;
+        let t216 = t13 - t15;
+        let t217 = t19 * t216;
+        let t218 = T::nearest(32.0) * t190;
+        let t219 = t218 - t217;
+        let t220 = t26 * t219;
+        let t221 = t220 - t196;
+        let t222 = t25 * t219;
+        let t223 = t195 * t26;
+        let t224 = t222 + t223;
+        let t225 = t198 * t44;
+        let t226 = t26 * t221;
+        let t227 = t25 * t224;
+        let t228 = t225 - t226;
+        let t229 = t228 + t227;
+        let t230 = t46 - t104;
+        let t231 = t204 * t230;
+        let t232 = t206 * t229;
+        let t233 = t231 + t232;
+        let t235 = self.fixed[10] * t209;
+        let t236 = t235 * t75;
+        let t238 = self.fixed[11] * t233;
+        let t239 = t236 + t238;
+        let t240 = X[0] * t215;
+        let t241 = self.fixed[0] * X[1];
+        let t242 = t241 * t239;
+        let t243 = t240 - t242;
+        let t244 = t204 * t243;
+        let t245 = X[1] * t215;
+        let t246 = self.fixed[0] * X[0];
+        let t247 = t246 * t239;
+        let t248 = t245 + t247;
+        let t249 = t204 * t248;
+        crate::nalgebra::SVector::<T, 2>::new(t244, t249)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t6 = self.fixed[1] * t;
@@ -786,7 +734,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t76 = X[0] * t69;
         let t77 = X[1] * t75;
         let t78 = t76 + t77;
-        let t83 = self.fixed[6] * t21;
+        let t83 = self.fixed[5] * t21;
         let t84 = t83 * t78;
         let t85 = -t84;
         let t86 = X[1] * t69;
@@ -794,7 +742,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t88 = t86 - t87;
         let t89 = t83 * t88;
         let t90 = -t89;
-        let t93 = self.fixed[7] * t7;
+        let t93 = self.fixed[6] * t7;
         let t94 = t13 * t15;
         let t95 = t94 * t19;
         let t96 = t93 * t95;
@@ -802,7 +750,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t98 = t25 + t97;
         let t99 = t7 * t95;
         let t100 = t99 * t44;
-        let t103 = self.fixed[8] * t100;
+        let t103 = self.fixed[7] * t100;
         let t104 = t46 - t103;
         let t105 = X[0] * t98;
         let t106 = t28 - t105;
@@ -866,7 +814,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t168 = t11 * t164;
         let t169 = t165 + t167;
         let t170 = t169 + t168;
-        let t171 = self.fixed[9] * t114;
+        let t171 = self.fixed[8] * t114;
         let t172 = t171 * t170;
         let t173 = -t172;
         let t174 = t159 - t163;
@@ -900,86 +848,46 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t203 = t96 * t46;
         let t204 = t13 * t114;
         let t205 = t204 * t203;
-        let t206 = self.fixed[8] * t7;
+        let t206 = self.fixed[7] * t7;
         let t207 = t206 * t202;
         let t208 = t205 + t207;
-        let t210 = t13 * t21;
-        let t211 = self.fixed[10] * t210;
-        let t212 = t211 * t69;
-        let t214 = self.fixed[11] * t208;
-        let t215 = t212 - t214;
-        let t216 = self.fixed[0] * t215;
-        let t217 = t93 * t198;
-        let t218 = t217 * t44;
-        let t219 = t13 - t15;
-        let t220 = t19 * t219;
-        let t221 = T::nearest(32.0) * t190;
-        let t222 = t221 - t220;
-        let t223 = t26 * t222;
-        let t224 = t223 - t196;
-        let t225 = t25 * t222;
-        let t226 = t195 * t26;
-        let t227 = t225 + t226;
-        let t228 = t198 * t44;
-        let t229 = t26 * t224;
-        let t230 = t25 * t227;
-        let t231 = t228 - t229;
-        let t232 = t231 + t230;
-        let t233 = t93 * t232;
-        let t234 = -t233;
-        let t235 = t93 * t202;
-        let t236 = -t235;
-        let t237 = t156 + T::one();
-        let t238 = t154 * t237;
-        let t239 = t158 - t238;
-        let t242 = self.fixed[12] * t7;
-        let t243 = t242 * t198;
-        let t244 = t243 * t46;
-        let t245 = -t244;
-        let t246 = t237 * t236;
-        let t247 = t151 * t218;
-        let t248 = t150 * t234;
-        let t249 = t154 * t245;
-        let t250 = t246 - t247;
-        let t251 = t250 - t248;
-        let t252 = t251 + t249;
-        let t253 = t154 + T::one();
-        let t254 = t156 * t253;
-        let t255 = t158 - t254;
-        let t256 = t154 * t239;
-        let t257 = t156 * t255;
-        let t258 = t256 - t257;
-        let t259 = t236 * t239;
-        let t260 = t154 * t252;
-        let t261 = t204 * t258;
-        let t262 = t247 + t248;
-        let t263 = t262 - t259;
-        let t264 = t263 + t260;
-        let t265 = t264 - t261;
-        let t267 = self.fixed[13] * t265;
-        let t268 = t267 - t216;
-        let t269 = t13 - t187;
-        let t270 = t19 * t269;
-        let t271 = t221 - t270;
-        let t272 = t44 * t271;
-        let t273 = t242 * t194;
-        let t274 = t273 * t46;
-        let t275 = t272 + t274;
-        let t276 = self.fixed[5] * t210;
-        let t277 = t276 * t75;
-        let t279 = self.fixed[14] * t7;
-        let t280 = t279 * t275;
-        let t281 = t277 + t280;
-        let t282 = X[0] * t268;
-        let t284 = self.fixed[15] * X[1];
-        let t285 = t284 * t281;
-        let t286 = t282 - t285;
-        let t287 = t204 * t286;
-        let t288 = X[1] * t268;
-        let t289 = self.fixed[15] * X[0];
-        let t290 = t289 * t281;
-        let t291 = t288 + t290;
-        let t292 = t204 * t291;
+        let t209 = t13 * t21;
+        let t210 = self.fixed[5] * t209;
+        let t211 = t210 * t69;
+        let t214 = self.fixed[9] * t208;
+        let t215 = t214 - t211;
+        let t216 = t13 - t15;
+        let t217 = t19 * t216;
+        let t218 = T::nearest(32.0) * t190;
+        let t219 = t218 - t217;
+        let t220 = t26 * t219;
+        let t221 = t220 - t196;
+        let t222 = t25 * t219;
+        let t223 = t195 * t26;
+        let t224 = t222 + t223;
+        let t225 = t198 * t44;
+        let t226 = t26 * t221;
+        let t227 = t25 * t224;
+        let t228 = t225 - t226;
+        let t229 = t228 + t227;
+        let t230 = t46 - t104;
+        let t231 = t204 * t230;
+        let t232 = t206 * t229;
+        let t233 = t231 + t232;
+        let t235 = self.fixed[10] * t209;
+        let t236 = t235 * t75;
+        let t238 = self.fixed[11] * t233;
+        let t239 = t236 + t238;
+        let t240 = X[0] * t215;
+        let t241 = self.fixed[0] * X[1];
+        let t242 = t241 * t239;
+        let t243 = t240 - t242;
+        let t244 = t204 * t243;
+        let t245 = X[1] * t215;
+        let t246 = self.fixed[0] * X[0];
+        let t247 = t246 * t239;
+        let t248 = t245 + t247;
+        let t249 = t204 * t248;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t33, t39),
             v: crate::nalgebra::SVector::<T, 2>::new(t55, t61),
@@ -988,7 +896,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t143, t127, t135, t144),
             J: T::one(),
             P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t173, t179, t179, t184),
-            b: crate::nalgebra::SVector::<T, 2>::new(t287, t292),
+            b: crate::nalgebra::SVector::<T, 2>::new(t244, t249),
         }
     }
     fn traction(
@@ -1024,7 +932,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
                 let t43 = t26 * t26;
                 let t44 = t42 - t43;
                 let t46 = t25 * t26;
-                let t93 = self.fixed[7] * t7;
+                let t93 = self.fixed[6] * t7;
                 let t94 = t13 * t15;
                 let t95 = t94 * t19;
                 let t96 = t93 * t95;
@@ -1032,7 +940,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
                 let t98 = t25 + t97;
                 let t99 = t7 * t95;
                 let t100 = t99 * t44;
-                let t103 = self.fixed[8] * t100;
+                let t103 = self.fixed[7] * t100;
                 let t104 = t46 - t103;
                 let t114 = T::one() / t12;
                 let t149 = T::nearest(2.0) * t46;
@@ -1048,11 +956,11 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
                 let t162 = t154 + T::nearest(2.0);
                 let t163 = t156 * t162;
                 let t164 = t158 - t163;
-                let t302 = t11 * t114;
-                let t303 = self.fixed[9] * t302;
-                let t304 = t303 * t164;
-                let t305 = t303 * t161;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t304, t305))
+                let t259 = t11 * t114;
+                let t260 = self.fixed[8] * t259;
+                let t261 = t260 * t164;
+                let t262 = t260 * t161;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t261, t262))
             }
             crate::Surface::Lower(1) => {
                 let t6 = self.fixed[1] * t;
@@ -1074,7 +982,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
                 let t43 = t26 * t26;
                 let t44 = t42 - t43;
                 let t46 = t25 * t26;
-                let t93 = self.fixed[7] * t7;
+                let t93 = self.fixed[6] * t7;
                 let t94 = t13 * t15;
                 let t95 = t94 * t19;
                 let t96 = t93 * t95;
@@ -1082,7 +990,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
                 let t98 = t25 + t97;
                 let t99 = t7 * t95;
                 let t100 = t99 * t44;
-                let t103 = self.fixed[8] * t100;
+                let t103 = self.fixed[7] * t100;
                 let t104 = t46 - t103;
                 let t114 = T::one() / t12;
                 let t149 = T::nearest(2.0) * t46;
@@ -1098,12 +1006,12 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
                 let t162 = t154 + T::nearest(2.0);
                 let t163 = t156 * t162;
                 let t164 = t158 - t163;
-                let t306 = t10 * t114;
-                let t307 = self.fixed[9] * t306;
-                let t308 = t307 * t161;
-                let t309 = -t308;
-                let t310 = t307 * t164;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t309, t310))
+                let t263 = t10 * t114;
+                let t264 = self.fixed[8] * t263;
+                let t265 = t264 * t161;
+                let t266 = -t265;
+                let t267 = t264 * t164;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t266, t267))
             }
             _ => None,
         }
@@ -1131,8 +1039,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
     }
     fn law(&self) -> crate::Law<T> {
         crate::Law::Library(crate::Material::NeoHookean {
-            lambda: self.fixed[17],
-            mu: self.fixed[9],
+            lambda: self.fixed[13],
+            mu: self.fixed[8],
         })
     }
     fn density(&self) -> T {
@@ -1142,13 +1050,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         self.fixed[1]
     }
     fn period(&self) -> T {
-        self.fixed[16]
+        self.fixed[12]
     }
     fn body_force_at(
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 9, 4>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 8, 4>::new(*self, X))
     }
     fn state_at(
         &self,
@@ -1158,23 +1066,22 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 4> for Vortex<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 2, 8, 4> for Vortex<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 9] {
+    fn body_force_time(&self, t: T) -> [T; 8] {
         let t6 = self.fixed[1] * t;
         let t7 = t6.sin_pi();
         let t23 = self.fixed[2] * t7;
         let t41 = t6.cos_pi();
         let t62 = t41 * t41;
-        let t93 = self.fixed[7] * t7;
-        let t206 = self.fixed[8] * t7;
-        let t242 = self.fixed[12] * t7;
-        let t279 = self.fixed[14] * t7;
-        let t353 = self.fixed[18] * t62;
-        let t358 = self.fixed[19] * t7;
-        let t371 = self.fixed[5] * t7;
-        let t374 = self.fixed[21] * t62;
-        [t23, t93, t206, t242, t279, t353, t358, t371, t374]
+        let t93 = self.fixed[6] * t7;
+        let t206 = self.fixed[7] * t7;
+        let t293 = self.fixed[15] * t62;
+        let t297 = self.fixed[16] * t7;
+        let t303 = self.fixed[10] * t7;
+        let t306 = self.fixed[17] * t62;
+        let t314 = self.fixed[19] * t7;
+        [t23, t93, t206, t293, t297, t303, t306, t314]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 4] {
@@ -1189,7 +1096,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 4> for Vortex<T> {
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
-        time: &[T; 9],
+        time: &[T; 8],
         point: &[T; 4],
     ) -> crate::nalgebra::SVector<T, 2> {
         let t15 = T::one() - point[2];
@@ -1204,117 +1111,76 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 4> for Vortex<T> {
         let t43 = t26 * t26;
         let t44 = t42 - t43;
         let t46 = t25 * t26;
-        let t149 = T::nearest(2.0) * t46;
-        let t155 = T::nearest(2.0) * t42;
-        let t185 = T::nearest(2.0) * point[2];
-        let t187 = T::nearest(3.0) * t15;
-        let t188 = t185 - t187;
-        let t189 = t19 * t188;
         let t190 = point[2] * t17;
         let t191 = T::nearest(64.0) * t190;
-        let t192 = t191 - t189;
-        let t193 = t26 * t192;
-        let t194 = t190 * t21;
-        let t195 = time[1] * t194;
-        let t196 = t195 * t25;
-        let t197 = t193 - t196;
         let t198 = t15 * t19;
-        let t201 = t25 * t197;
-        let t210 = point[2] * t21;
-        let t219 = point[2] - t15;
-        let t220 = t19 * t219;
-        let t221 = T::nearest(32.0) * t190;
-        let t222 = t221 - t220;
-        let t223 = t26 * t222;
-        let t224 = t223 - t196;
-        let t225 = t25 * t222;
-        let t226 = t195 * t26;
-        let t227 = t225 + t226;
-        let t228 = t198 * t44;
-        let t229 = t26 * t224;
-        let t230 = t25 * t227;
-        let t231 = t228 - t229;
-        let t232 = t231 + t230;
-        let t233 = time[1] * t232;
-        let t243 = time[3] * t198;
-        let t244 = t243 * t46;
-        let t269 = point[2] - t187;
-        let t270 = t19 * t269;
-        let t271 = t221 - t270;
-        let t272 = t44 * t271;
-        let t273 = time[3] * t194;
-        let t274 = t273 * t46;
-        let t275 = t272 + t274;
-        let t280 = time[4] * t275;
-        let t284 = self.fixed[15] * point[1];
-        let t289 = self.fixed[15] * point[0];
-        let t311 = point[2] * t198;
-        let t312 = time[2] * t311;
-        let t313 = t312 * t44;
-        let t314 = t46 - t313;
-        let t315 = T::nearest(2.0) * t314;
-        let t316 = time[1] * t315;
-        let t317 = t316 * t228;
-        let t318 = t233 * t149;
-        let t319 = t317 + t318;
-        let t320 = time[1] * t311;
-        let t321 = t26 * t320;
-        let t322 = t25 + t321;
-        let t323 = t198 * t26;
-        let t324 = t323 * t322;
-        let t325 = t324 + t201;
-        let t326 = time[1] * t325;
-        let t327 = t149 * t315;
-        let t328 = T::nearest(2.0) * t25;
-        let t329 = t328 * t322;
-        let t330 = T::one() - t155;
-        let t331 = t329 * t330;
-        let t332 = t331 - t327;
-        let t333 = t326 * t332;
-        let t334 = t319 + t333;
-        let t335 = t326 * t330;
-        let t336 = t335 + t317;
-        let t337 = t336 + t318;
-        let t338 = t244 * t329;
-        let t339 = t338 - t337;
-        let t340 = t329 * t339;
-        let t341 = t334 - t340;
-        let t342 = t329 * t332;
-        let t343 = T::one() - t329;
-        let t344 = t155 * t343;
-        let t345 = t344 - t327;
-        let t346 = t155 * t345;
-        let t347 = t346 - t342;
-        let t348 = point[3] * t347;
-        let t349 = t341 - t348;
-        let t350 = self.fixed[13] * t349;
-        let t354 = time[5] * t21;
-        let t355 = t354 * t44;
-        let t359 = time[6] * t46;
-        let t360 = t355 + t359;
-        let t361 = t210 * t360;
-        let t362 = point[3] * t46;
-        let t363 = t362 * t320;
-        let t364 = time[2] * t325;
-        let t365 = t363 + t364;
-        let t367 = self.fixed[20] * t365;
-        let t368 = t361 + t367;
-        let t369 = t350 + t368;
-        let t370 = point[0] * t369;
-        let t372 = time[7] * t44;
-        let t375 = time[8] * t21;
-        let t376 = t375 * t46;
-        let t377 = t372 - t376;
-        let t378 = t210 * t377;
-        let t379 = t378 + t280;
-        let t380 = t284 * t379;
-        let t381 = t370 - t380;
-        let t382 = point[3] * t381;
-        let t383 = point[1] * t369;
-        let t384 = t289 * t379;
-        let t385 = t383 + t384;
-        let t386 = point[3] * t385;
-        crate::nalgebra::SVector::<T, 2>::new(t382, t386)
+        let t209 = point[2] * t21;
+        let t216 = point[2] - t15;
+        let t217 = t19 * t216;
+        let t218 = T::nearest(32.0) * t190;
+        let t219 = t218 - t217;
+        let t220 = t26 * t219;
+        let t222 = t25 * t219;
+        let t225 = t198 * t44;
+        let t241 = self.fixed[0] * point[1];
+        let t246 = self.fixed[0] * point[0];
+        let t270 = point[2] * t198;
+        let t271 = time[1] * t270;
+        let t272 = point[3] * t46;
+        let t273 = t272 * t271;
+        let t274 = t26 * t271;
+        let t275 = t25 + t274;
+        let t276 = t198 * t26;
+        let t277 = t276 * t275;
+        let t278 = self.fixed[14] * point[2];
+        let t279 = t278 - T::nearest(3.0);
+        let t280 = t19 * t279;
+        let t281 = t191 - t280;
+        let t282 = t281 * t26;
+        let t283 = time[1] * t21;
+        let t284 = t283 * t190;
+        let t285 = t25 * t284;
+        let t286 = t282 - t285;
+        let t287 = t25 * t286;
+        let t288 = t277 + t287;
+        let t289 = time[2] * t288;
+        let t290 = t273 + t289;
+        let t291 = self.fixed[9] * t290;
+        let t294 = time[3] * t21;
+        let t295 = t294 * t44;
+        let t298 = time[4] * t46;
+        let t299 = t295 + t298;
+        let t300 = t209 * t299;
+        let t301 = t291 + t300;
+        let t302 = point[0] * t301;
+        let t304 = time[5] * t44;
+        let t307 = time[6] * t21;
+        let t308 = t307 * t46;
+        let t309 = t304 - t308;
+        let t310 = t209 * t309;
+        let t312 = self.fixed[18] * t46;
+        let t315 = time[7] * t270;
+        let t316 = t315 * t44;
+        let t317 = t312 + t316;
+        let t318 = point[3] * t317;
+        let t319 = t220 - t285;
+        let t320 = t26 * t319;
+        let t321 = t225 - t320;
+        let t322 = t26 * t284;
+        let t323 = t222 + t322;
+        let t324 = t25 * t323;
+        let t325 = t321 + t324;
+        let t326 = time[7] * t325;
+        let t327 = t318 + t326;
+        let t328 = t310 + t327;
+        let t329 = t241 * t328;
+        let t330 = t302 - t329;
+        let t331 = point[3] * t330;
+        let t332 = point[1] * t301;
+        let t333 = t246 * t328;
+        let t334 = t332 + t333;
+        let t335 = point[3] * t334;
+        crate::nalgebra::SVector::<T, 2>::new(t331, t335)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
@@ -1324,7 +1190,7 @@ impl<T: crate::Real> crate::StateStages<T, 2, 3, 2, 7> for Vortex<T> {
         let t6 = self.fixed[1] * t;
         let t7 = t6.sin_pi();
         let t23 = self.fixed[2] * t7;
-        let t93 = self.fixed[7] * t7;
+        let t93 = self.fixed[6] * t7;
         [t7, t23, t93]
     }
     #[inline]
@@ -1407,7 +1273,7 @@ impl<T: crate::Real> crate::StateStages<T, 2, 3, 2, 7> for Vortex<T> {
         let t98 = t25 + t97;
         let t99 = time[0] * point[5];
         let t100 = t99 * t44;
-        let t103 = self.fixed[8] * t100;
+        let t103 = self.fixed[7] * t100;
         let t104 = t46 - t103;
         let t105 = point[0] * t98;
         let t106 = t28 - t105;
@@ -1468,7 +1334,7 @@ impl<T: crate::Real> crate::StateStages<T, 2, 3, 2, 7> for Vortex<T> {
         let t168 = point[3] * t164;
         let t169 = t165 + t167;
         let t170 = t169 + t168;
-        let t171 = self.fixed[9] * point[6];
+        let t171 = self.fixed[8] * point[6];
         let t172 = t171 * t170;
         let t173 = -t172;
         let t174 = t159 - t163;

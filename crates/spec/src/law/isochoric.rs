@@ -15,7 +15,7 @@
 
 use super::energy::modulus_at_rest;
 use super::neo_hookean::strain_without_turn;
-use super::{Deformation, Stress, zero_if_vanishing};
+use super::{Deformation, Divergence, Stress, zero_if_vanishing};
 use crate::derivation::Derivation;
 use crate::tensor::{Matrix, Vector, matrix_product};
 use mmsmith_expr::{Derivatives, Expr, Function, Graph, Rational};
@@ -304,12 +304,4 @@ impl Invariants {
         }
         Divergence { linear, remainder, whole }
     }
-}
-
-/// The divergence of `P` in two parts, see [`Stress`], and whole.
-struct Divergence {
-    /// `mu Div H + (lambda + mu) grad tr H`.
-    linear: Vector,
-    remainder: Vector,
-    whole: Vector,
 }

@@ -7,14 +7,14 @@
 //! - Where the motion turns as it goes, `H` is large next to the strain, and the turn drops out of the sum
 //!   `F F^T - I = H + H^T + H H^T` alone, in symbols: there `P = tau F^-T` with
 //!   `tau = lambda log1p(J - 1) I + mu (F F^T - I)`.
-//! - `P` is the part linear in `H` and a remainder of second order,
-//!   `P = lambda tr(H) I + mu (H + H^T) + [lambda (ln J - tr H) I + lambda ln J (F^-T - I) - mu (H^T)^2 F^-T]`.
-//! - `d ln J = F^-T : dH` (Jacobi's formula), so that the gradient of `ln J - tr H` is `-(H^T F^-T) : dH`, exactly of
-//!   second order.
+//! - With `g = grad ln J = F^-T : grad F` (Jacobi's formula) and `Div (J F^-T) = 0` (Piola's identity) the divergence is
+//!   `Div P = mu Div H + (mu + lambda (1 - ln J)) F^-T g`. In two parts, of which the first may join with the inertia, it is
+//!   `mu Div H + (lambda + mu) grad tr H` and, with `M = H^T F^-T` and `g = grad tr H - m`, a remainder of second order,
+//!   `-(lambda + mu) (m + M g) - lambda ln J F^-T g`, where `m = M : grad H`.
 
-use super::{Deformation, Stress, linear_divergence, zero_if_vanishing};
+use super::{Deformation, Divergence, Stress, zero_if_vanishing};
 use crate::derivation::Derivation;
-use crate::tensor::{Matrix, Vector, matrix_product, transpose};
+use crate::tensor::{Matrix, Vector, matrix_product};
 use mmsmith_expr::{Expr, Graph};
 
 pub(super) fn stress(
@@ -25,7 +25,7 @@ pub(super) fn stress(
 ) -> Stress {
     // It multiplies `ln J` and its gradient alone.
     let lambda = if deformation.is_isochoric() { Graph::ZERO } else { lambda };
-    let linear = linear_divergence(derivation, &deformation.open, lambda, mu);
+    let open = (lambda, mu);
     let graph = &mut derivation.graph;
     let (lambda, mu) = (graph.whole(lambda), graph.whole(mu));
     let law = NeoHookean { deformation, lambda, mu };
@@ -39,8 +39,8 @@ pub(super) fn stress(
     } else {
         law.isotropic_and_rest(graph, strain.as_ref(), &P)
     };
-    let remainder = law.remainder_divergence(derivation);
-    Stress { P, isotropic, anisotropic, linear, remainder, whole: None, energy: None }
+    let Divergence { linear, remainder, whole } = law.divergence(derivation, open);
+    Stress { P, isotropic, anisotropic, linear, remainder, whole: Some(whole), energy: None }
 }
 
 struct NeoHookean<'a> {
@@ -132,50 +132,68 @@ impl NeoHookean<'_> {
         (pressure, rest)
     }
 
-    fn remainder_divergence(&self, derivation: &mut Derivation) -> Vector {
-        let remainder = self.remainder_without_isotropic_part(&mut derivation.graph);
-        let divergence = derivation.divergence(&remainder);
-        (0..divergence.len())
-            .map(|i| {
-                let isotropic = self.isotropic_remainder(derivation, i);
-                derivation.graph.add(isotropic, divergence[i])
-            })
-            .collect()
-    }
-
-    /// `lambda` times the derivative of `ln J - tr H` along `e_k`: `-lambda (H^T F^-T) : dH`.
-    fn isotropic_remainder(&self, derivation: &mut Derivation, k: usize) -> Expr {
-        let n = self.deformation.H.len();
-        let product = self.deformation.transposed_gradient_times_inverse(&mut derivation.graph);
-        let mut terms = Vec::new();
-        for i in 0..n {
-            for j in 0..n {
-                let derivative = derivation.along(self.deformation.H[i][j], k);
-                terms.push(derivation.graph.mul(product[i][j], derivative));
-            }
-        }
+    /// With the constants as they are written for what may join with the inertia.
+    fn divergence(
+        &self,
+        derivation: &mut Derivation,
+        (open_lambda, open_mu): (Expr, Expr),
+    ) -> Divergence {
+        let &Self { deformation, lambda, mu } = self;
+        let H = &deformation.H;
+        let n = H.len();
         let graph = &mut derivation.graph;
-        let sum = graph.sum_of(terms);
-        let scaled = graph.mul(self.lambda, sum);
-        graph.neg(scaled)
-    }
-
-    /// `lambda ln J (F^-T - I) - mu (H^T)^2 F^-T`, with `F^-T - I = -H^T F^-T`.
-    fn remainder_without_isotropic_part(&self, graph: &mut Graph) -> Matrix {
-        let n = self.deformation.H.len();
-        let once = self.deformation.transposed_gradient_times_inverse(graph);
-        let twice = matrix_product(graph, &transpose(&self.deformation.H), &once);
-        let pressure = graph.mul(self.lambda, self.deformation.log_J);
-        let mut remainder = vec![vec![Graph::ZERO; n]; n];
-        for i in 0..n {
-            for j in 0..n {
-                let dilation = graph.mul(pressure, once[i][j]);
-                let shear = graph.mul(self.mu, twice[i][j]);
-                let sum = graph.add(dilation, shear);
-                remainder[i][j] = graph.neg(sum);
+        let modulus = graph.add(lambda, mu);
+        let modulus = graph.whole(modulus);
+        let trace = graph.sum_of((0..n).map(|i| deformation.open[i][i]));
+        let pressure = graph.mul(lambda, deformation.log_J);
+        let factor = graph.sub(modulus, pressure);
+        let factor = graph.whole(factor);
+        let M = deformation.transposed_gradient_times_inverse(graph);
+        let is_isochoric = deformation.is_isochoric();
+        let (mut g, mut m) = (Vector::new(), Vector::new());
+        for k in 0..n {
+            let along = derivation.along(deformation.log_J, k);
+            g.push(derivation.graph.whole(along));
+            let mut terms = Vec::new();
+            for i in 0..n {
+                for j in 0..n {
+                    let derivative = derivation.along(H[i][j], k);
+                    terms.push(derivation.graph.mul(M[i][j], derivative));
+                }
             }
+            let sum = derivation.graph.sum_of(terms);
+            m.push(zero_if_vanishing(&mut derivation.graph, sum));
         }
-        remainder
+        let (open, of_H) = (derivation.divergence(&deformation.open), derivation.divergence(H));
+        let (mut linear, mut remainder, mut whole) = (Vector::new(), Vector::new(), Vector::new());
+        for i in 0..n {
+            let dilation = derivation.along(trace, i);
+            let graph = &mut derivation.graph;
+            let shear = graph.mul(open_mu, open[i]);
+            if is_isochoric {
+                linear.push(shear);
+                remainder.push(Graph::ZERO);
+                whole.push(shear);
+                continue;
+            }
+            let terms = [graph.mul(open_lambda, dilation), graph.mul(open_mu, dilation), shear];
+            linear.push(graph.sum_of(terms));
+            let times = |graph: &mut Graph, A: &Matrix| {
+                let terms: Vec<Expr> = (0..n).map(|j| graph.mul(A[i][j], g[j])).collect();
+                graph.sum_of(terms)
+            };
+            let Mg = times(graph, &M);
+            let fg = times(graph, &deformation.inverse_transpose);
+            let second = graph.add(m[i], Mg);
+            let second = graph.mul(modulus, second);
+            let of_pressure = graph.mul(pressure, fg);
+            let sum = graph.add(second, of_pressure);
+            remainder.push(graph.neg(sum));
+            let shear = graph.mul(mu, of_H[i]);
+            let rest = graph.mul(factor, fg);
+            whole.push(graph.add(shear, rest));
+        }
+        Divergence { linear, remainder, whole }
     }
 }
 

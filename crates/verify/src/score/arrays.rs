@@ -22,6 +22,14 @@ pub enum Role {
     DeformationGradient,
     /// First Piola-Kirchhoff stress `P[i][J]`, row by row.
     FirstPiolaKirchhoff,
+    /// Cauchy stress, row by row, or its six components XX, YY, ZZ, XY, YZ, XZ; in the plane also XX, YY, XY.
+    Cauchy,
+    /// Kirchhoff stress `J` times Cauchy stress, as that.
+    Kirchhoff,
+    /// `J = det F`.
+    VolumeRatio,
+    /// Mass per current volume.
+    Density,
     /// Reference position `X`.
     ReferencePosition,
     /// Identity of the particle, a whole number.
@@ -30,11 +38,15 @@ pub enum Role {
 
 impl Role {
     /// All of them.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 10] = [
         Self::Displacement,
         Self::Velocity,
         Self::DeformationGradient,
         Self::FirstPiolaKirchhoff,
+        Self::Cauchy,
+        Self::Kirchhoff,
+        Self::VolumeRatio,
+        Self::Density,
         Self::ReferencePosition,
         Self::Id,
     ];
@@ -59,8 +71,11 @@ impl Role {
                 "Disp",
                 "u",
                 "U",
+                "MP_DISPLACEMENT",
             ],
-            Self::Velocity => &["velocity", "Velocity", "velocities", "VELOCITY", "vel", "v", "V"],
+            Self::Velocity => {
+                &["velocity", "Velocity", "velocities", "VELOCITY", "vel", "v", "V", "MP_VELOCITY"]
+            }
             Self::DeformationGradient => &[
                 "deformation_gradient",
                 "DeformationGradient",
@@ -77,6 +92,21 @@ impl Role {
                 "pk1",
                 "P",
             ],
+            Self::Cauchy => &[
+                "cauchy",
+                "cauchy_stress",
+                "CauchyStress",
+                "Cauchy_Stress",
+                "stress",
+                "Stress",
+                "sigma",
+                "MP_CAUCHY_STRESS_VECTOR",
+            ],
+            Self::Kirchhoff => {
+                &["kirchhoff", "kirchhoff_stress", "KirchhoffStress", "Kirchhoff_Stress", "tau"]
+            }
+            Self::VolumeRatio => &["J", "jacobian", "Jacobian", "detF", "volume_ratio"],
+            Self::Density => &["density", "Density", "DENSITY", "rho", "MP_DENSITY"],
             Self::ReferencePosition => &[
                 "reference_position",
                 "initial_position",
@@ -101,13 +131,19 @@ impl Role {
             Self::DeformationGradient | Self::FirstPiolaKirchhoff => {
                 components == D * D || components == 9
             }
-            Self::Id => components == 1,
+            Self::Cauchy | Self::Kirchhoff => {
+                [D * D, 6, 9].contains(&components) || (D, components) == (2, 3)
+            }
+            Self::VolumeRatio | Self::Density | Self::Id => components == 1,
         }
     }
 
     pub(super) fn admissible<const D: usize>(self) -> String {
         match self {
-            Self::Id => "1".into(),
+            Self::VolumeRatio | Self::Density | Self::Id => "1".into(),
+            Self::Cauchy | Self::Kirchhoff if D == 3 => "6 or 9".into(),
+            Self::Cauchy | Self::Kirchhoff if D == 2 => "3, 4, 6 or 9".into(),
+            Self::Cauchy | Self::Kirchhoff => "1, 6 or 9".into(),
             Self::DeformationGradient | Self::FirstPiolaKirchhoff if D == 3 => "9".into(),
             Self::DeformationGradient | Self::FirstPiolaKirchhoff => format!("{} or 9", D * D),
             _ if D == 3 => "3".into(),
@@ -193,10 +229,13 @@ impl Chosen {
                 remarks.note("few-digits", false, what);
             }
         }
+        let has_stress =
+            [Role::Cauchy, Role::Kirchhoff].iter().any(|role| chosen.contains_key(role));
         let missing: Vec<_> =
             [Role::Velocity, Role::DeformationGradient, Role::FirstPiolaKirchhoff]
                 .into_iter()
                 .filter(|role| !chosen.contains_key(role))
+                .filter(|role| !(has_stress && *role == Role::FirstPiolaKirchhoff))
                 .collect();
         let taken: BTreeSet<_> = chosen.values().map(|array| array.name.as_str()).collect();
         let left: Vec<_> = snapshot
@@ -259,10 +298,18 @@ pub(super) fn vectors<const D: usize>(
     (vectors, beyond)
 }
 
-/// One matrix a particle from its rows; of nine components the first `D` rows and columns.
+/// One matrix a particle from its rows, or from the different components of a symmetric one; of three dimensions the first `D`
+/// rows and columns.
 pub(super) fn matrices<const D: usize>(flat: &[f64], components: usize) -> Vec<SMatrix<f64, D, D>> {
-    let width = if components == 9 { 3 } else { D };
-    flat.chunks_exact(components).map(|row| SMatrix::from_fn(|i, j| row[width * i + j])).collect()
+    let place = |i: usize, j: usize| match (components, i.min(j), i.max(j)) {
+        (9, ..) => 3 * i + j,
+        (3 | 6, i, j) if i == j => i,
+        (3, ..) => 2,
+        // XY, XZ and YZ, whose indices have the sums 1, 2 and 3.
+        (6, i, j) => [3, 5, 4][i + j - 1],
+        _ => D * i + j,
+    };
+    flat.chunks_exact(components).map(|row| SMatrix::from_fn(|i, j| row[place(i, j)])).collect()
 }
 
 /// How many of the particles have a number that is none, and the first of them.
@@ -295,6 +342,15 @@ mod tests {
         let nine = [1.0, 2.0, 0.0, 3.0, 4.0, 0.0, 0.0, 0.0, 1.0];
         assert_eq!(matrices::<2>(&nine, 9), [expected]);
         assert_eq!(matrices::<1>(&nine, 9), [matrix![1.0]]);
+    }
+
+    #[test]
+    fn symmetric_matrices_are_read_from_their_different_components() {
+        assert_eq!(matrices::<2>(&[1.0, 2.0, 3.0], 3), [matrix![1.0, 3.0; 3.0, 2.0]]);
+        let six = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
+        let full = matrix![1.0, 4.0, 6.0; 4.0, 2.0, 5.0; 6.0, 5.0, 3.0];
+        assert_eq!(matrices::<3>(&six, 6), [full]);
+        assert_eq!(matrices::<2>(&six, 6), [matrix![1.0, 4.0; 4.0, 2.0]]);
     }
 
     #[test]

@@ -140,6 +140,51 @@ pub enum ScoreError {
         /// That end in periods.
         periods: f64,
     },
+    /// Recordings are compared with each other, each with a time step.
+    #[error(
+        "there are {steps} time step(s) for {recordings} recording(s): two recordings at least, each with one, such as --dt \
+         1e-4,5e-5"
+    )]
+    Steps {
+        /// Time steps.
+        steps: usize,
+        /// Recordings.
+        recordings: usize,
+    },
+    /// Time steps do not fall by one ratio.
+    #[error(
+        "the time steps {coarse:?} and {fine:?} have another ratio than {ratio:?}, that of the first two: differences have the order \
+         of the scheme only where each time step is the same part of the one before"
+    )]
+    Ratio {
+        /// A time step.
+        coarse: f64,
+        /// The next.
+        fine: f64,
+        /// The ratio of the first two.
+        ratio: f64,
+    },
+    /// Two recordings are of other particles.
+    #[error(
+        "{} and {} hold other particles at t = {time:?}: to be compared with each other, recordings need the same reference \
+         positions, in one order or with identities (--map id=NAME)", path.display(), other.display()
+    )]
+    Apart {
+        /// The file.
+        path: PathBuf,
+        /// The other one.
+        other: PathBuf,
+        /// The time.
+        time: f64,
+    },
+    /// Two recordings have no time in common.
+    #[error("{} and {} have no time in common", path.display(), other.display())]
+    NoCommonTime {
+        /// The file.
+        path: PathBuf,
+        /// The other one.
+        other: PathBuf,
+    },
     /// A number that makes no sense.
     #[error("{what} = {value:?}: it must be {admissible}")]
     Setting {

@@ -2,12 +2,13 @@
 
 use std::collections::HashSet;
 
-use mmsmith_measure::norms::{PerField, PerNorm};
+use mmsmith_measure::norms::PerNorm;
 use mmsmith_measure::{RUNS, Row, over_particles};
 use mmsmith_runtime::{BLOCK, Domain, Solution, State, StateRun};
 use mmsmith_vtk::foreign::{ArrayHead, Snapshot};
 use nalgebra::{SMatrix, SVector};
 
+use crate::inverse::determinant;
 use crate::points;
 
 use super::arrays::{Chosen, Role, matrices, vectors};
@@ -28,35 +29,68 @@ pub(super) struct Identities {
 
 /// What a frame gives for the comparison.
 pub(super) struct FrameData<const D: usize> {
+    pub(super) ids: Option<Vec<i64>>,
     pub(super) X: Vec<SVector<f64, D>>,
     pub(super) u: Vec<SVector<f64, D>>,
     /// With the time to which they belong.
     pub(super) v: Option<(Vec<SVector<f64, D>>, f64)>,
-    pub(super) F: Option<Vec<SMatrix<f64, D, D>>>,
-    pub(super) P: Option<Vec<SMatrix<f64, D, D>>>,
+    /// F, P, Cauchy and Kirchhoff stress.
+    pub(super) tensors: [Option<Vec<SMatrix<f64, D, D>>>; 4],
+    /// J and density.
+    pub(super) scalars: [Option<Vec<f64>>; 2],
+}
+
+/// The error norms of a frame.
+pub(super) struct FrameErrors {
+    /// In the order of [`Quantity::ALL`]; zero for what the frame lacks.
+    pub(super) errors: [PerNorm<f64>; 8],
+    /// Those of F and P if they were transposed.
+    pub(super) transposed: [PerNorm<f64>; 2],
+    /// The difference of the given density from that at rest.
+    pub(super) density_from_rest: PerNorm<f64>,
+    /// The norms of the exact displacement.
+    pub(super) displacement: PerNorm<f64>,
 }
 
 impl<const D: usize> FrameData<D> {
-    /// The error norms of the frame, zero for fields that it lacks; and those of F and P if they were transposed.
-    pub(super) fn errors(
-        &self,
-        exact: &dyn Solution<f64, D>,
-        time: f64,
-    ) -> (PerField<PerNorm<f64>>, [PerNorm<f64>; 2]) {
+    /// Which fields the frame has, in the order of [`Quantity::ALL`].
+    pub(super) fn fields(&self) -> [bool; 8] {
+        let [F, P, cauchy, kirchhoff] = self.tensors.each_ref().map(Option::is_some);
+        let [J, density] = self.scalars.each_ref().map(Option::is_some);
+        [true, self.v.is_some(), F, P, cauchy, kirchhoff, J, density]
+    }
+
+    /// The error norms of the frame.
+    pub(super) fn errors(&self, exact: &dyn Solution<f64, D>, time: f64) -> FrameErrors {
+        let density = exact.density();
         let of_particle = |p: usize, exact: &State<f64, D>| {
             let v = self.v.as_ref().map_or(0.0, |(v, _)| (v[p] - exact.v).norm());
-            let tensor = |given: &Option<Vec<SMatrix<f64, D, D>>>, exact: SMatrix<f64, D, D>| {
-                given.as_ref().map_or((0.0, 0.0), |given| {
-                    ((given[p] - exact).norm(), (given[p].transpose() - exact).norm())
-                })
+            let J = determinant(&exact.F);
+            let kirchhoff = exact.P * exact.F.transpose();
+            let tensor = |n: usize, exact: SMatrix<f64, D, D>| {
+                self.tensors[n].as_ref().map_or(0.0, |given| (given[p] - exact).norm())
             };
-            let (F, F_turned) = tensor(&self.F, exact.F);
-            let (P, P_turned) = tensor(&self.P, exact.P);
-            [(self.u[p] - exact.u).norm(), v, F, P, F_turned, P_turned]
+            let scalar = |n: usize, exact: f64| {
+                self.scalars[n].as_ref().map_or(0.0, |given| (given[p] - exact).abs())
+            };
+            [
+                (self.u[p] - exact.u).norm(),
+                v,
+                tensor(0, exact.F),
+                tensor(1, exact.P),
+                tensor(2, kirchhoff / J),
+                tensor(3, kirchhoff),
+                scalar(0, J),
+                scalar(1, density / J),
+                tensor(0, exact.F.transpose()),
+                tensor(1, exact.P.transpose()),
+                scalar(1, density),
+                exact.u.norm(),
+            ]
         };
         let velocity_time = self.v.as_ref().map_or(time, |(_, time)| *time);
         let room = || [StateRun::zero(); RUNS];
-        let magnitudes = |runs: &mut [_; RUNS], first: usize, magnitudes: &mut [[Row<f64>; 6]]| {
+        let magnitudes = |runs: &mut [_; RUNS], first: usize, magnitudes: &mut [[Row<f64>; 12]]| {
             let runs = &mut runs[..magnitudes.len()];
             let count = (runs.len() * BLOCK).min(self.X.len() - first);
             // Other frames may have their particles in another order, or others: nothing is worth keeping.
@@ -69,8 +103,14 @@ impl<const D: usize> FrameData<D> {
                 }
             }
         };
-        let [u, v, F, P, F_turned, P_turned] = over_particles(self.X.len(), room, magnitudes);
-        (PerField { u, v, F, P }, [F_turned, P_turned])
+        let [u, v, F, P, cauchy, kirchhoff, J, of_density, F_turned, P_turned, from_rest, size] =
+            over_particles(self.X.len(), room, magnitudes);
+        FrameErrors {
+            errors: [u, v, F, P, cauchy, kirchhoff, J, of_density],
+            transposed: [F_turned, P_turned],
+            density_from_rest: from_rest,
+            displacement: size,
+        }
     }
 }
 
@@ -162,9 +202,15 @@ impl<const D: usize> FrameReader<'_, D> {
                 self.vector(Role::Velocity, snapshot)?.map(|v| (v, own))
             }
         };
-        let F = self.tensor(Role::DeformationGradient, snapshot)?;
-        let P = self.tensor(Role::FirstPiolaKirchhoff, snapshot)?;
-        Ok(FrameData { X, u, v, F, P })
+        let tensors = [
+            self.tensor(Role::DeformationGradient, snapshot)?,
+            self.tensor(Role::FirstPiolaKirchhoff, snapshot)?,
+            self.tensor(Role::Cauchy, snapshot)?,
+            self.tensor(Role::Kirchhoff, snapshot)?,
+        ];
+        let scalars =
+            [self.scalar(Role::VolumeRatio, snapshot)?, self.scalar(Role::Density, snapshot)?];
+        Ok(FrameData { ids, X, u, v, tensors, scalars })
     }
 
     /// Holds the particles against those of the first frame.
@@ -292,6 +338,12 @@ impl<const D: usize> FrameReader<'_, D> {
         let Some((flat, components)) = self.array(role, snapshot)? else { return Ok(None) };
         count_not_finite(&flat, components, role.name(), snapshot, self.remarks);
         Ok(Some(matrices(&flat, components)))
+    }
+
+    fn scalar(&mut self, role: Role, snapshot: &Snapshot) -> Result<Option<Vec<f64>>, ScoreError> {
+        let Some((flat, components)) = self.array(role, snapshot)? else { return Ok(None) };
+        count_not_finite(&flat, components, role.name(), snapshot, self.remarks);
+        Ok(Some(flat))
     }
 
     /// The numbers of an array and how many a particle has.

@@ -1,27 +1,34 @@
 //! Errors and orders of what another solver wrote, particles or nodes, against the exact solution.
 //!
 //! The errors are those of [`run`](crate::run): `u` is compared as given, or as position minus reference position, with
-//! `u(X, t)`; `v`, `F` and `P` where the files hold them. L_inf, L2 and L1 are taken over the particles of a frame, then
+//! `u(X, t)`; `v`, `F`, `P`, other stresses, `J` and density where the files hold them. L_inf, L2 and L1 are taken over the particles of a frame, then
 //! their maxima over the frames. For frames that `run` wrote at every step they are its errors to the bit.
 
+mod against;
 mod arrays;
+mod differences;
 mod error;
 mod findings;
 mod frame;
+mod quantity;
 mod reference;
 mod vectors;
 
+pub use against::{AgainstError, Agreement, against};
 pub use arrays::Role;
+pub use differences::{DifferenceRow, Differences, compare_recordings};
 pub use error::ScoreError;
 pub use findings::Remark;
+pub use quantity::Quantity;
 
-use std::collections::BTreeMap;
+use std::array;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use arrays::Chosen;
 use findings::Remarks;
 use frame::{FrameReader, Identities};
-use mmsmith_measure::norms::{Field, PerField, PerNorm};
+use mmsmith_measure::norms::PerNorm;
 use mmsmith_runtime::{AnySolution, Solution};
 use mmsmith_vtk::foreign::{FrameFile, Snapshot, frames};
 use nalgebra::SVector;
@@ -29,7 +36,6 @@ use reference::{Scheme, scheme};
 use serde::Serialize;
 
 use crate::order::Order;
-use crate::study::orders_of;
 
 /// Share of the time span by which a frame may lie outside before it is told.
 const TIME_SLACK: f64 = 1e-6;
@@ -93,6 +99,13 @@ pub struct Input {
     pub resolution: Resolution,
 }
 
+impl Input {
+    /// What messages call it.
+    fn path(&self) -> &Path {
+        self.paths.first().map_or(Path::new(""), PathBuf::as_path)
+    }
+}
+
 /// Where reference positions and displacements are from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -144,12 +157,15 @@ pub struct ScoreRow {
     pub reference_positions: Source,
     /// Where displacements are from.
     pub displacements: Source,
-    /// The fields, of u, v, F and P, that the files hold.
-    pub fields: Vec<Field>,
+    /// The fields that the files hold.
+    pub fields: Vec<Quantity>,
     /// `ok`, or what is wrong with the recording.
     pub status: String,
-    /// The errors; not a number for fields that are not there, and where a number of the files is none.
-    pub errors: PerField<PerNorm<f64>>,
+    /// The errors of u, v, F and P, and of other fields that are there; not a number for those that are not, and where a
+    /// number of the files is none.
+    pub errors: BTreeMap<Quantity, PerNorm<f64>>,
+    /// The exact displacement, as the root of its mean square, the largest over the frames; a length.
+    pub exact_displacement: f64,
     /// Everything else that has to be known; problems first.
     #[serde(skip)]
     pub findings: Vec<Remark>,
@@ -169,7 +185,7 @@ pub struct Score {
     /// One row for each recording, in order.
     pub rows: Vec<ScoreRow>,
     /// The orders with respect to `h`, where there are several rows.
-    pub orders: Option<PerField<PerNorm<Order>>>,
+    pub orders: Option<BTreeMap<Quantity, PerNorm<Order>>>,
 }
 
 /// Scores recordings against the exact solution, with the orders over them.
@@ -193,17 +209,81 @@ pub fn score(
         _ => Err(ScoreError::Dimension),
     };
     let rows = inputs.iter().map(row).collect::<Result<Vec<_>, _>>()?;
-    let orders = (rows.len() > 1).then(|| {
-        let errors = rows.iter().map(|row| (row.h, row.is_ok().then_some(&row.errors)));
-        orders_of(&errors.collect::<Vec<_>>())
-    });
-    Ok(Score { rows, orders })
+    let errors = rows.iter().map(|row| (row.h, row.is_ok().then_some(&row.errors)));
+    Ok(Score { orders: orders(&errors.collect::<Vec<_>>()), rows })
+}
+
+/// The errors of a recording, by quantity and norm.
+type Errors = BTreeMap<Quantity, PerNorm<f64>>;
+
+/// The orders of the fields that any row has, where there are several rows: each a step and the errors, unless they are of
+/// no use.
+fn orders(rows: &[(f64, Option<&Errors>)]) -> Option<BTreeMap<Quantity, PerNorm<Order>>> {
+    let steps: Vec<f64> = rows.iter().map(|(step, _)| *step).collect();
+    let fields: BTreeSet<_> =
+        rows.iter().filter_map(|(_, errors)| *errors).flat_map(BTreeMap::keys).collect();
+    let order = |field: &Quantity| {
+        let of_norm = |norm| {
+            let errors = rows.iter().map(|(_, errors)| Some(errors.as_ref()?.get(field)?[norm]));
+            Order::of(&steps, &errors.collect::<Vec<_>>())
+        };
+        (*field, PerNorm::from_fn(of_norm))
+    };
+    (rows.len() > 1).then(|| fields.into_iter().map(order).collect())
 }
 
 /// One frame with its time.
-struct Timed<'a> {
-    file: &'a FrameFile,
+struct Timed {
+    file: FrameFile,
     time: f64,
+}
+
+/// A recording, and how its frames are read.
+struct Opened<const D: usize> {
+    /// At least one.
+    timed: Vec<Timed>,
+    first: Snapshot,
+    chosen: Chosen,
+    scheme: Scheme<D>,
+    has_velocity_times: bool,
+}
+
+impl<const D: usize> Opened<D> {
+    fn new(
+        exact: &dyn Solution<f64, D>,
+        input: &Input,
+        options: &ScoreOptions,
+        remarks: &mut Remarks,
+    ) -> Result<Self, ScoreError> {
+        let mut files = vec![];
+        for path in &input.paths {
+            files.extend(frames(path)?);
+        }
+        let timed = times(exact, files, input.path(), options, remarks)?;
+        let first = open(&timed[0].file)?;
+        let chosen = Chosen::find::<D>(&first, &options.map, remarks)?;
+        let scheme = scheme(exact, &timed, &first, &chosen, options, remarks)?;
+        let has_velocity_times =
+            chosen.name(Role::Velocity).is_some() && any_velocity_time(&timed, &first)?;
+        Ok(Self { timed, first, chosen, scheme, has_velocity_times })
+    }
+
+    fn reader<'a>(
+        &'a self,
+        exact: &'a dyn Solution<f64, D>,
+        options: &'a ScoreOptions,
+        remarks: &'a mut Remarks,
+    ) -> FrameReader<'a, D> {
+        FrameReader {
+            exact,
+            chosen: &self.chosen,
+            scheme: &self.scheme,
+            options,
+            has_velocity_times: self.has_velocity_times,
+            remarks,
+            first: Identities::default(),
+        }
+    }
 }
 
 fn recording<const D: usize>(
@@ -212,34 +292,17 @@ fn recording<const D: usize>(
     options: &ScoreOptions,
 ) -> Result<ScoreRow, ScoreError> {
     let mut remarks = Remarks::default();
-    let mut files = vec![];
-    for path in &input.paths {
-        files.extend(frames(path)?);
-    }
-    let path = input.paths.first().map_or(Path::new(""), PathBuf::as_path);
-    let timed = times(exact, &files, path, options, &mut remarks)?;
-
-    let first = open(timed[0].file)?;
-    let chosen = Chosen::find::<D>(&first, &options.map, &mut remarks)?;
-    let scheme = scheme(exact, &timed, &first, &chosen, options, &mut remarks)?;
-    let has_velocity_times =
-        chosen.name(Role::Velocity).is_some() && any_velocity_time(&timed, &first)?;
-
-    let mut reader = FrameReader {
-        exact,
-        chosen: &chosen,
-        scheme: &scheme,
-        options,
-        has_velocity_times,
-        remarks: &mut remarks,
-        first: Identities::default(),
-    };
-    let mut errors: Option<PerField<PerNorm<f64>>> = None;
+    let opened = Opened::new(exact, input, options, &mut remarks)?;
+    let Opened { timed, first, chosen, scheme, .. } = &opened;
+    let mut reader = opened.reader(exact, options, &mut remarks);
+    let mut largest = [PerNorm::<f64>::default(); 8];
     let mut transposed = [PerNorm::<f64>::default(); 2];
-    let mut compared = [0_usize; 4];
+    let mut density_from_rest = PerNorm::<f64>::default();
+    let mut displacement = PerNorm::<f64>::default();
+    let mut compared = [0_usize; 8];
     let mut h = f64::NAN;
     for (index, frame) in timed.iter().enumerate() {
-        let snapshot = open(frame.file)?;
+        let snapshot = open(&frame.file)?;
         let data = reader.frame(&snapshot, frame.time, index)?;
         if index == 0 {
             h = match input.resolution {
@@ -248,45 +311,37 @@ fn recording<const D: usize>(
                 Resolution::Estimated => spacing(&data.X),
             };
         }
-        let (norms, of_transposed) = data.errors(exact, frame.time);
-        for (count, is_there) in
-            compared.iter_mut().zip([true, data.v.is_some(), data.F.is_some(), data.P.is_some()])
-        {
+        let of_frame = data.errors(exact, frame.time);
+        for (count, is_there) in compared.iter_mut().zip(data.fields()) {
             *count += usize::from(is_there);
         }
-        errors = Some(match errors {
-            None => norms,
-            Some(errors) => PerField::combine(&errors, &norms, PerNorm::larger),
-        });
-        transposed = [0, 1].map(|k| transposed[k].larger(&of_transposed[k]));
+        largest = array::from_fn(|n| largest[n].larger(&of_frame.errors[n]));
+        transposed = array::from_fn(|n| transposed[n].larger(&of_frame.transposed[n]));
+        density_from_rest = density_from_rest.larger(&of_frame.density_from_rest);
+        displacement = displacement.larger(&of_frame.displacement);
     }
 
-    let mut errors = errors.unwrap_or_default();
     let absent = PerNorm { linf: f64::NAN, l2: f64::NAN, l1: f64::NAN };
-    let roles =
-        [Role::Displacement, Role::Velocity, Role::DeformationGradient, Role::FirstPiolaKirchhoff];
+    let mut errors = BTreeMap::new();
     let mut fields = vec![];
-    for ((field, role), count) in Field::ALL.into_iter().zip(roles).zip(compared) {
+    for ((field, norms), count) in Quantity::ALL.into_iter().zip(largest).zip(compared) {
         if count > 0 {
             fields.push(field);
+            errors.insert(field, norms);
+        } else if Quantity::OF_RUNS.contains(&field) {
+            errors.insert(field, absent);
         }
-        let frames = timed.len();
+        let (frames, role) = (timed.len(), field.role());
         // Velocities without a time, as in the first state of a staggered scheme, are told of elsewhere.
-        if count < frames && chosen.name(role).is_some() && role != Role::Velocity {
+        let is_told = [Role::Displacement, Role::Velocity].contains(&role);
+        if count < frames && chosen.name(role).is_some() && !is_told {
             let what = format!("{} of {frames} frames have no array for {role}", frames - count);
             remarks.note("array-missing", true, what);
         }
-        if count == 0 {
-            match role {
-                Role::Velocity => errors.v = absent,
-                Role::DeformationGradient => errors.F = absent,
-                Role::FirstPiolaKirchhoff => errors.P = absent,
-                _ => (),
-            }
-        }
     }
-    for (field, turned) in [Field::DeformationGradient, Field::Stress].into_iter().zip(transposed) {
-        let given = errors[field].l2;
+    let turning = [Quantity::DeformationGradient, Quantity::FirstPiolaKirchhoff];
+    for (field, turned) in turning.into_iter().zip(transposed) {
+        let given = errors[&field].l2;
         if turned.l2 < 0.5 * given {
             let what = format!(
                 "the transpose of {field} has the L2 error {:.3e} instead of {given:.3e}: is {field} written column by \
@@ -296,8 +351,24 @@ fn recording<const D: usize>(
             remarks.note("transposed", false, what);
         }
     }
-    for (field, norms) in errors.iter() {
-        let is_compared = fields.contains(&field);
+    if let Some(of_density) = errors.get(&Quantity::Density)
+        && density_from_rest.linf < 1e-6 * of_density.linf
+    {
+        let what = "the density is that of the undeformed body throughout: it is compared with mass per current volume";
+        remarks.note("reference-density", false, what);
+    }
+    let slack = TIME_SLACK * options.periods * exact.period();
+    let later = timed.iter().filter(|frame| frame.time > slack).count();
+    if later == 1 {
+        let what = format!(
+            "one frame after t = 0 stands for the whole time: at t = {:?} errors may be much smaller than between. Ten frames, \
+             evenly spread, tell more",
+            timed[timed.len() - 1].time
+        );
+        remarks.note("one-frame", false, what);
+    }
+    for (field, norms) in &errors {
+        let is_compared = fields.contains(field);
         // What is not finite in the files has been told.
         if is_compared
             && !remarks.has("not-finite")
@@ -326,7 +397,7 @@ fn recording<const D: usize>(
     let problems: Vec<_> = problems.map(|finding| finding.message.as_str()).collect();
     let span = timed.iter().map(|frame| frame.time);
     Ok(ScoreRow {
-        file: path.display().to_string(),
+        file: input.path().display().to_string(),
         cells: match input.resolution {
             Resolution::Cells(cells) => Some(cells),
             _ => None,
@@ -341,6 +412,7 @@ fn recording<const D: usize>(
         fields,
         status: if problems.is_empty() { "ok".into() } else { problems.join("; ") },
         errors,
+        exact_displacement: displacement.l2,
         findings,
     })
 }
@@ -354,23 +426,24 @@ fn open(file: &FrameFile) -> Result<Snapshot, ScoreError> {
 }
 
 /// The frames with their times; those without a finite one are left out, which is told.
-fn times<'a, const D: usize>(
+fn times<const D: usize>(
     exact: &dyn Solution<f64, D>,
-    files: &'a [FrameFile],
+    files: Vec<FrameFile>,
     path: &Path,
     options: &ScoreOptions,
     remarks: &mut Remarks,
-) -> Result<Vec<Timed<'a>>, ScoreError> {
+) -> Result<Vec<Timed>, ScoreError> {
     if options.time.is_some() && files.len() != 1 {
         return Err(ScoreError::OneTime { path: path.to_owned(), frames: files.len() });
     }
     let mut timed = vec![];
     let mut first_bad = None;
+    let count = files.len();
     for file in files {
         let time = match (options.time, file.time) {
             (Some(time), _) | (None, Some(time)) => time,
             (None, None) => {
-                let snapshot = open(file)?;
+                let snapshot = open(&file)?;
                 let names = ["TimeValue", "TIME", "Time", "time"];
                 let told = names.iter().find_map(|name| snapshot.field(name));
                 told.ok_or_else(|| ScoreError::NoTime { path: file.path.clone() })?
@@ -392,11 +465,11 @@ fn times<'a, const D: usize>(
     let path = || path.to_owned();
     if timed.is_empty() {
         let first = first_bad.unwrap_or(f64::NAN);
-        return Err(ScoreError::TimesNotFinite { path: path(), frames: files.len(), first });
+        return Err(ScoreError::TimesNotFinite { path: path(), frames: count, first });
     }
     let end = options.periods * exact.period();
     let slack = TIME_SLACK * end;
-    let is_outside = |frame: &&Timed<'_>| !(-slack..=end + slack).contains(&frame.time);
+    let is_outside = |frame: &&Timed| !(-slack..=end + slack).contains(&frame.time);
     let outside = timed.iter().filter(is_outside).count();
     if outside == timed.len() {
         let times = timed.iter().map(|frame| frame.time);
@@ -429,12 +502,12 @@ fn times<'a, const D: usize>(
 }
 
 /// Whether any frame tells a time of its own for velocities; of those, others cannot be taken to hold for their frame's.
-fn any_velocity_time(timed: &[Timed<'_>], first: &Snapshot) -> Result<bool, ScoreError> {
+fn any_velocity_time(timed: &[Timed], first: &Snapshot) -> Result<bool, ScoreError> {
     if first.field("VelocityTime").is_some() {
         return Ok(true);
     }
     match timed.last() {
-        Some(last) if timed.len() > 1 => Ok(open(last.file)?.field("VelocityTime").is_some()),
+        Some(last) if timed.len() > 1 => Ok(open(&last.file)?.field("VelocityTime").is_some()),
         _ => Ok(false),
     }
 }

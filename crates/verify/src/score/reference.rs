@@ -38,7 +38,7 @@ pub(super) struct Traced<const D: usize> {
 /// Decides how reference positions and displacements come about.
 pub(super) fn scheme<const D: usize>(
     exact: &dyn Solution<f64, D>,
-    timed: &[Timed<'_>],
+    timed: &[Timed],
     first: &Snapshot,
     chosen: &Chosen,
     options: &ScoreOptions,
@@ -74,7 +74,7 @@ pub(super) fn scheme<const D: usize>(
 
 /// Whether points stay where they are, to the bit, while displacements change.
 fn points_are_at_rest(
-    timed: &[Timed<'_>],
+    timed: &[Timed],
     first: &Snapshot,
     chosen: &Chosen,
 ) -> Result<bool, ScoreError> {
@@ -82,7 +82,7 @@ fn points_are_at_rest(
     let positions = first.positions()?;
     let displacement = first.floats(name)?;
     for frame in &timed[1..] {
-        let snapshot = open(frame.file)?;
+        let snapshot = open(&frame.file)?;
         if snapshot.floats(name)? != displacement {
             return Ok(snapshot.positions()? == positions);
         }
@@ -93,7 +93,7 @@ fn points_are_at_rest(
 /// Finds the reference positions behind the positions of the first frame.
 fn trace<const D: usize>(
     exact: &dyn Solution<f64, D>,
-    frame: &Timed<'_>,
+    frame: &Timed,
     first: &Snapshot,
     chosen: &Chosen,
     remarks: &mut Remarks,
