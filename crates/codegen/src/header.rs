@@ -3,8 +3,9 @@
 use crate::code::Code;
 use crate::function::digits;
 use crate::module::Names;
-use crate::text::{c_string, comment, meaning, push_index, spell};
-use mmsmith_expr::{CSupport, Function, Operation, RustCall, Slot, nearest_f64};
+use crate::target::{Called, Target, Written};
+use crate::text::{c_string, comment, meaning, push_index};
+use mmsmith_expr::{CSupport, Function, RustCall, Slot};
 use mmsmith_spec::{Boundary, Condition, Parameter, Surface};
 use mmsmith_stage::{Block, Measures, Operand, Shape, Stage, Staged, Traction};
 use mmsmith_vocabulary::Law;
@@ -180,7 +181,7 @@ const C_FAMILIES: &[&str] = &[
 
 /// The names of parameters as members of a structure: what is no name in C gets an underscore at its end, and more
 /// where another parameter is called so.
-fn members(parameters: &[Parameter]) -> Vec<String> {
+pub(crate) fn members(parameters: &[Parameter]) -> Vec<String> {
     let is_taken = |name: &str| {
         C_WORDS.contains(&name) || C_FAMILIES.iter().any(|family| name.starts_with(family))
     };
@@ -206,7 +207,8 @@ impl Code<'_> {
         let prefix = Names::of(&self.spec.name).module;
         let members = members(&self.spec.parameters);
         let dimension = self.spec.dimension;
-        Header { code: self, staged: &self.staged, prefix, members, dimension, text: String::new() }
+        let language = C { members };
+        Header { code: self, staged: &self.staged, prefix, language, dimension, text: String::new() }
             .write()
     }
 }
@@ -216,8 +218,7 @@ struct Header<'a> {
     staged: &'a Staged,
     /// What all names begin with.
     prefix: String,
-    /// The names of the parameters.
-    members: Vec<String>,
+    language: C,
     dimension: usize,
     text: String,
 }
@@ -334,7 +335,7 @@ before. Results equal those of the Rust functions bit for bit where the compiler
     fn types(&mut self) {
         let (prefix, d) = (self.prefix.clone(), self.dimension);
         let (parameters, fixed, time, point) = (
-            self.members.len(),
+            self.language.members.len(),
             self.staged.fixed_count(),
             self.staged.body_force.time_count(),
             self.staged.body_force.point_count(),
@@ -345,12 +346,12 @@ before. Results equal those of the Rust functions bit for bit where the compiler
              {prefix}_time_count = {time},\n    {prefix}_point_count = {point}\n}};\n"
         ));
         self.line(&format!("typedef struct {prefix}_parameters {{"));
-        for (parameter, member) in self.code.spec.parameters.iter().zip(self.members.clone()) {
+        for (parameter, member) in self.code.spec.parameters.iter().zip(self.language.members.clone()) {
             let Parameter { name, description, unit, range, .. } = parameter;
             let about = comment(&meaning(name, description, unit, range));
             self.line(&format!("    double {member}; /* {about} */"));
         }
-        if self.members.is_empty() {
+        if self.language.members.is_empty() {
             self.line("    double unused; /* there are no parameters */");
         }
         self.line(&format!("}} {prefix}_parameters;\n"));
@@ -381,10 +382,10 @@ before. Results equal those of the Rust functions bit for bit where the compiler
         let spec = self.code.spec;
         self.line(&format!("MMSMITH_FN {prefix}_parameters {prefix}_defaults(void)\n{{"));
         self.line(&format!("    {prefix}_parameters p;"));
-        for (parameter, member) in spec.parameters.iter().zip(self.members.clone()) {
+        for (parameter, member) in spec.parameters.iter().zip(self.language.members.clone()) {
             self.line(&format!("    p.{member} = {};", literal(parameter.default)));
         }
-        if self.members.is_empty() {
+        if self.language.members.is_empty() {
             self.line("    p.unused = 0.0;");
         }
         self.line("    return p;\n}\n");
@@ -395,7 +396,7 @@ before. Results equal those of the Rust functions bit for bit where the compiler
         self.line(&format!(
             "MMSMITH_FN const char *{prefix}_prepare({prefix}_solution *s, const {prefix}_parameters *p)\n{{"
         ));
-        for (parameter, member) in spec.parameters.iter().zip(self.members.clone()) {
+        for (parameter, member) in spec.parameters.iter().zip(self.language.members.clone()) {
             let bounds: String = parameter
                 .bounds
                 .iter()
@@ -422,7 +423,7 @@ before. Results equal those of the Rust functions bit for bit where the compiler
             self.line(&format!("    if (!({} {sign} {})) {{", side[0], side[1]));
             self.line(&format!("        return {};\n    }}", c_string(&message)));
         }
-        if self.members.is_empty() {
+        if self.language.members.is_empty() {
             self.line("    (void)p;");
         }
         self.line("    s->par = *p;");
@@ -697,35 +698,43 @@ before. Results equal those of the Rust functions bit for bit where the compiler
     }
 
     /// Writes the statements of a block; returns its outputs as expressions.
-    fn statements(&mut self, block: &Block<'_>, indent: &str, places: Places) -> Vec<String> {
-        let mut text = std::mem::take(&mut self.text);
-        for (index, operation) in block.steps() {
-            text.extend([indent, "const double t"]);
-            push_index(&mut text, index);
-            text.push_str(" = ");
-            spell(&mut text, &template(operation), operation, |text, slot| {
-                self.operand(text, block.operand(slot), places);
-            });
-            text.push_str(";\n");
-        }
-        self.text = text;
-        let output = |operand| {
-            let mut text = String::new();
-            self.operand(&mut text, operand, places);
-            text
+    fn statements(&mut self, block: &Block<'_>, margin: &str, places: Places) -> Vec<String> {
+        let Written { lines, outputs } = self.language.block(block, margin, places);
+        self.text += &lines;
+        outputs
+    }
+}
+
+/// C, given what the parameters are called.
+struct C {
+    members: Vec<String>,
+}
+
+impl Target for C {
+    type Places = Places;
+
+    const STATEMENT: [&'static str; 2] = ["const double ", ";\n"];
+
+    fn literal(&self, value: f64) -> String {
+        literal(value)
+    }
+
+    fn function(&self, function: Called) -> Cow<'static, str> {
+        let (family, name) = match function {
+            Called::Library(name) => ("", name),
+            Called::Support(name) => ("mmsmith_", name),
         };
-        block.outputs().map(output).collect()
+        let arguments = if function.takes_two() { "#, #" } else { "#" };
+        format!("{family}{name}({arguments})").into()
     }
 
     fn operand(&self, text: &mut String, operand: Operand<'_>, places: Places) {
         let (before, index, after) = match operand {
-            Operand::Number(value) => return text.push_str(&literal(nearest_f64(value))),
-            Operand::Pi => return text.push_str(&literal(std::f64::consts::PI)),
+            Operand::Temporary(_) | Operand::Number(_) | Operand::Pi => return,
             Operand::Time => return text.push('t'),
             Operand::Parameter(index) => {
                 return text.extend([places.parameters, &self.members[index]]);
             }
-            Operand::Temporary(index) => ("t", index, ""),
             Operand::Coordinate(index) => ("X[", index, "]"),
             Operand::Kept(Stage::Fixed, index) => ("s->fixed[", index, "]"),
             Operand::Kept(Stage::Time, index) => {
@@ -745,32 +754,6 @@ before. Results equal those of the Rust functions bit for bit where the compiler
         push_index(text, index);
         text.push_str(after);
     }
-}
-
-/// An operation in C, with `#` for each operand. Numbers and inputs are operands and no statements.
-fn template(operation: &Operation) -> Cow<'static, str> {
-    let fixed = match operation {
-        Operation::Number(value) => return literal(nearest_f64(value)).into(),
-        Operation::Pi => return literal(std::f64::consts::PI).into(),
-        Operation::Call(function, _) => return format!("{}(#)", function.c()).into(),
-        Operation::Power(_, exponent) => {
-            return format!("pow(#, {})", literal(nearest_f64(exponent))).into();
-        }
-        Operation::Input(_) => "",
-        Operation::Add(..) => "# + #",
-        Operation::Sub(..) => "# - #",
-        Operation::Mul(..) => "# * #",
-        Operation::Div(..) => "# / #",
-        Operation::Neg(_) => "-#",
-        Operation::Sqrt(_) => "sqrt(#)",
-        Operation::SinPi(_) => "mmsmith_sin_pi(#)",
-        Operation::CosPi(_) => "mmsmith_cos_pi(#)",
-        Operation::Atan2(..) => "atan2(#, #)",
-        Operation::LnOfBoth(..) => "mmsmith_ln_of_both(#, #)",
-        Operation::SumError(..) => "mmsmith_sum_error(#, #)",
-        Operation::ProductError(..) => "mmsmith_product_error(#, #)",
-    };
-    fixed.into()
 }
 
 /// How a function refers to what is not computed in it.
@@ -837,7 +820,7 @@ fn literal(value: f64) -> String {
     format!("{sign}{magnitude}")
 }
 
-fn surface_name(surface: Surface) -> String {
+pub(crate) fn surface_name(surface: Surface) -> String {
     let axis = |axis: usize| ["X", "Y", "Z"].get(axis).copied().unwrap_or_default();
     match surface {
         Surface::Lower(i) => format!("{}-lower", axis(i)),
@@ -847,7 +830,7 @@ fn surface_name(surface: Surface) -> String {
     }
 }
 
-fn condition(boundary: &Boundary) -> &'static str {
+pub(crate) fn condition(boundary: &Boundary) -> &'static str {
     match boundary.condition {
         Condition::Sliding => "sliding",
         Condition::Symmetry => "symmetry",

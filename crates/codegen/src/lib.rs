@@ -12,9 +12,15 @@ mod code;
 mod fault;
 mod function;
 mod header;
+mod listing;
 mod module;
+mod runtime;
+mod target;
+mod targets;
 mod text;
 
 pub use code::{Code, Origin};
 pub use fault::{Fault, NoEffect, UnknownFault};
 pub use module::{NameClash, Names, items, registry_source};
+pub use target::{Host, Unwritable};
+pub use targets::HOSTS;

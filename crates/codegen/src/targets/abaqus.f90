@@ -1,0 +1,144 @@
+
+module MODULE_host
+  use MODULE
+  implicit none
+  private
+  public :: reference_position, force, force_at_reference, traction_at, per_current_volume
+
+  ! Whether the host's body loads are per current volume instead of per reference volume.
+  logical :: per_current_volume = .false.
+
+  type(solution), save :: s
+  logical, save :: is_ready = .false.
+
+contains
+
+  subroutine make_ready()
+    type(parameters) :: p
+    character(:), allocatable :: message
+    if (is_ready) return
+    call prepare(s, p, message)
+    if (len(message) > 0) then
+      write (*, "(a)") message
+      error stop 2
+    end if
+    is_ready = .true.
+  end subroutine
+
+  ! The X of x = X + u(X, t), by Newton's method; steps that bring no progress are halved.
+  function reference_position(x_now, t) result(X)
+    real(dp), intent(in) :: x_now(DIMENSION), t
+    real(dp) :: X(DIMENSION), step(DIMENSION), miss(DIMENSION), next(DIMENSION), tolerance, share
+    integer :: round, halving
+    call make_ready()
+    tolerance = 4.0_dp * epsilon(1.0_dp) * max(maxval(abs(x_now)), tiny(1.0_dp))
+    X = x_now
+    miss = (X + u(s, X, t)) - x_now
+    do round = 1, 50
+      if (maxval(abs(miss)) <= tolerance) return
+      step = solved(F(s, X, t), miss)
+      share = 1.0_dp
+      do halving = 1, 30
+        next = X - share * step
+        if (sum(((next + u(s, next, t)) - x_now)**2) < sum(miss**2)) exit
+        share = 0.5_dp * share
+      end do
+      ! Rounding is all that is left.
+      if (halving > 30) exit
+      X = next
+      miss = (X + u(s, X, t)) - x_now
+    end do
+    if (.not. maxval(abs(miss)) <= 100.0_dp * tolerance) then
+      write (*, *) "no reference position belongs to x =", x_now, "at t =", t, &
+        "; nearest: X =", X, ". Is x in the deformed body, and t the time of the motion?"
+      error stop 2
+    end if
+  end function
+
+  ! The y of A y = r by Gauss's elimination with the largest pivots.
+  pure function solved(A, r) result(y)
+    real(dp), intent(in) :: A(DIMENSION, DIMENSION), r(DIMENSION)
+    real(dp) :: y(DIMENSION), M(DIMENSION, DIMENSION + 1), row(DIMENSION + 1)
+    integer :: i, k, largest
+    M(:, 1:DIMENSION) = A
+    M(:, DIMENSION + 1) = r
+    do k = 1, DIMENSION
+      largest = k - 1 + maxloc(abs(M(k:, k)), dim=1)
+      row = M(largest, :)
+      M(largest, :) = M(k, :)
+      M(k, :) = row / row(k)
+      do i = 1, DIMENSION
+        if (i /= k) M(i, :) = M(i, :) - M(i, k) * M(k, :)
+      end do
+    end do
+    y = M(:, DIMENSION + 1)
+  end function
+
+  ! Component i of the force per volume at the reference position X.
+  real(dp) function force_at_reference(X, t, i)
+    real(dp), intent(in) :: X(DIMENSION), t
+    integer, intent(in) :: i
+    real(dp) :: values(DIMENSION)
+    call make_ready()
+    values = rho0_b(s, X, t)
+    if (per_current_volume) values = values / J(s, X, t)
+    force_at_reference = values(i)
+  end function
+
+  ! Component i of the force per volume at the current position.
+  real(dp) function force(x_now, t, i)
+    real(dp), intent(in) :: x_now(DIMENSION), t
+    integer, intent(in) :: i
+    force = force_at_reference(reference_position(x_now, t), t, i)
+  end function
+
+  ! The traction per reference area at the current position, on the surface whose name is a part of `surface`.
+  function traction_at(surface, x_now, t) result(traction)
+    character(*), intent(in) :: surface
+    real(dp), intent(in) :: x_now(DIMENSION), t
+    real(dp) :: traction(DIMENSION), X(DIMENSION)
+    traction = 0.0_dp
+    X = reference_position(x_now, t)
+    TRACTIONS
+  end function
+end module MODULE_host
+
+subroutine dload(f, kstep, kinc, time, noel, npt, layer, kspt, coords, jltyp, sname)
+  use MODULE, only: dp
+  use MODULE_host, only: force
+  implicit none
+  real(dp) :: f, time(2), coords(3)
+  integer :: kstep, kinc, noel, npt, layer, kspt, jltyp
+  character(80) :: sname
+  ! BXNU, BYNU and BZNU have the types 1, 2 and 3.
+  if (jltyp >= 1 .and. jltyp <= DIMENSION) f = force(coords(1:DIMENSION), time(2), jltyp)
+end subroutine
+
+subroutine vdload(nblock, ndim, steptime, totaltime, amplitude, curcoords, velocity, dircos, jltyp, sname, value)
+  use MODULE, only: dp
+  use MODULE_host, only: force
+  implicit none
+  integer :: nblock, ndim, jltyp, k
+  real(dp) :: steptime, totaltime, amplitude(nblock), curcoords(nblock, ndim), velocity(nblock, ndim)
+  real(dp) :: dircos(nblock, ndim, ndim), value(nblock)
+  character(80) :: sname
+  if (jltyp < 1 .or. jltyp > DIMENSION) return
+  do k = 1, nblock
+    value(k) = force(curcoords(k, 1:DIMENSION), totaltime, jltyp)
+  end do
+end subroutine
+
+subroutine utracload(alpha, t_user, kstep, kinc, time, noel, npt, coords, dircos, jltyp, sname)
+  use MODULE, only: dp
+  use MODULE_host, only: traction_at
+  implicit none
+  real(dp) :: alpha, t_user(3), time(2), coords(3), dircos(3, 3)
+  integer :: kstep, kinc, noel, npt, jltyp
+  character(80) :: sname
+  real(dp) :: traction(DIMENSION)
+  traction = traction_at(sname, coords(1:DIMENSION), time(2))
+  alpha = norm2(traction)
+  t_user = 0.0_dp
+  t_user(1) = 1.0_dp
+  if (alpha > 0.0_dp) t_user(1:DIMENSION) = traction / alpha
+end subroutine

@@ -1,0 +1,350 @@
+//! Fortran 2008 source: a module, and the user subroutines of Abaqus around it.
+
+use crate::code::Code;
+use crate::function::digits;
+use crate::listing::{Given, Item, commented};
+use crate::module::Names;
+use crate::runtime::{Primitive, Routine, WithRuntime};
+use crate::target::{Called, Target, Unwritable, Written};
+use crate::text::one_line;
+use mmsmith_spec::Parameter;
+use mmsmith_stage::{Operand, Shape};
+use std::borrow::Cow;
+
+const REMARKS: &str = "\
+Fortran 2008, this file alone. use MODULE, only: solution, parameters, prepare, b; then type(solution) :: s; p%A = 0.1; call prepare(s, p, message), \
+whose message is empty where the parameters are admissible; values = b(s, X, t). All functions are pure and can be renamed where they are used: \
+only: ring_b => b. Matrices have rows first: P(i, J).
+Results are those of the C header bit for bit where the compiler keeps every rounding (gfortran: -ffp-contract=off where the processor fuses \
+products and sums, and neither -ffast-math nor -Ofast).";
+
+const ABAQUS_REMARKS: &str = "\
+User subroutines: DLOAD for *DLOAD with BXNU, BYNU and BZNU, VDLOAD for Abaqus/Explicit, UTRACLOAD for *DSLOAD with TRVECNU and CONSTANT RESULTANT=YES \
+on surfaces whose names hold X_LOWER, X_UPPER, ..., INNER or OUTER.
+Abaqus hands over CURRENT coordinates x; the force is a function of X. The subroutines solve x = X + u(X, t) for X by Newton's method with the \
+solution's own F, so that the displacement of the host does not matter: the force is that of the exact motion, which carries X to the same x. As the host's \
+own x is X + u + error, the force is taken at a place that is off by that error, which has the order of the method.
+In CalculiX the routine dload.f has other arguments: put f = force(coords, time(2), i) into it, or force_at_reference(X, t, i) with X from co.
+The force is rho0_b, per reference volume; set per_current_volume = .true. where the host's loads are per current volume.
+Parameters are those of the type `parameters`; change the defaults there, or write the file anew with --set.";
+
+/// Fortran, given what the components of the type of the parameters are called.
+struct Fortran {
+    members: Vec<String>,
+}
+
+impl Target for Fortran {
+    type Places = ();
+
+    const STATEMENT: [&'static str; 2] = ["", "\n"];
+
+    fn literal(&self, value: f64) -> String {
+        let size = value.abs();
+        let text = if size.is_infinite() { "infinity".into() } else { format!("{}_dp", digits(size)) };
+        if value.is_sign_negative() { format!("(-{text})") } else { text }
+    }
+
+    fn function(&self, function: Called) -> Cow<'static, str> {
+        match function {
+            Called::Library("pow") => "#**#".into(),
+            Called::Library("log1p") => "c_log1p(#)".into(),
+            Called::Library("expm1") => "c_expm1(#)".into(),
+            Called::Library(name) | Called::Support(name) => {
+                format!("{name}({})", if function.takes_two() { "#, #" } else { "#" }).into()
+            }
+        }
+    }
+
+    fn operand(&self, text: &mut String, operand: Operand<'_>, (): ()) {
+        match operand {
+            Operand::Time => text.push('t'),
+            Operand::Parameter(index) => text.extend(["s%par%", &self.members[index]]),
+            // Array indices count from one.
+            Operand::Coordinate(index) => *text += &format!("X({})", index + 1),
+            Operand::Kept(_, index) => *text += &format!("s%fixed({})", index + 1),
+            _ => {}
+        }
+    }
+}
+
+impl WithRuntime for Fortran {
+    fn primitive(&self, primitive: Primitive) -> &'static str {
+        match primitive {
+            Primitive::Choose => "choose(#, #, #)",
+            Primitive::Less => "(# < #)",
+            Primitive::AtMost => "(# <= #)",
+            Primitive::Equal => "(# == #)",
+            Primitive::Abs => "abs(#)",
+            Primitive::Nearest => "nearest_whole(#)",
+            Primitive::Exponent => "real(exponent(#), dp)",
+            Primitive::Scaled => "scale(#, int(#))",
+        }
+    }
+}
+
+/// Names of components: small and capital letters are the same, and a name starts with a letter.
+fn members(parameters: &[Parameter]) -> Vec<String> {
+    let mut taken: Vec<String> = Vec::new();
+    for parameter in parameters {
+        let start = if parameter.name.starts_with('_') { "p" } else { "" };
+        let mut member: String = start.chars().chain(parameter.name.chars()).take(55).collect();
+        while taken.iter().any(|other| other.eq_ignore_ascii_case(&member)) {
+            member.push('_');
+        }
+        taken.push(member);
+    }
+    taken
+}
+
+/// A string in pieces that fit into lines.
+fn string(text: &str) -> String {
+    let safe: Vec<char> = one_line(text)
+        .chars()
+        .take(500)
+        .map(|c| if (' '..='~').contains(&c) && c != '\\' { c } else { '_' })
+        .collect();
+    let pieces = safe.chunks(50).map(|piece| format!("\"{}\"", String::from_iter(piece).replace('"', "\"\"")));
+    pieces.collect::<Vec<_>>().join(" // &\n            ")
+}
+
+fn module_name(code: &Code<'_>) -> String {
+    format!("mms_{}", Names::of(&code.spec.name).module).chars().take(50).collect()
+}
+
+pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
+    let remarks = REMARKS.replace("MODULE", &module_name(code));
+    Ok(with_head(code, &remarks, "") + &module(code))
+}
+
+fn with_head(code: &Code<'_>, remarks: &str, start: &str) -> String {
+    let remarks: Vec<String> = remarks.lines().map(str::to_owned).collect();
+    start.to_owned() + &commented(&code.head_for_host(&remarks), "!", 110)
+}
+
+/// The module of the fields.
+fn module(code: &Code<'_>) -> String {
+    let (spec, name) = (code.spec, module_name(code));
+    let fortran = Fortran { members: members(&spec.parameters) };
+    let items = code.functions();
+    let mut text = format!(
+        "module {name}
+  use, intrinsic :: iso_fortran_env, only: dp => real64, int64
+  implicit none
+  private
+  public :: dp, parameters, solution, prepare, rho0_b, sigma
+"
+    );
+    text += &items.iter().map(|item| format!("  public :: {}\n", item.name)).collect::<String>();
+    text += &format!(
+        "
+  integer, parameter, public :: dimension_of_space = {}
+  real(dp), parameter :: infinity = transfer(9218868437227405312_int64, 1.0_dp)
+
+  type :: parameters
+",
+        spec.dimension
+    );
+    for (parameter, (member, about)) in
+        spec.parameters.iter().zip(fortran.members.iter().zip(code.parameter_lines()))
+    {
+        text += &commented(&[about], "    !", 110);
+        text += &format!("    real(dp) :: {member} = {}\n", fortran.literal(parameter.default));
+    }
+    text += &format!(
+        "  end type
+
+  type :: solution
+    type(parameters) :: par
+    real(dp) :: fixed({}) = 0.0_dp
+  end type
+",
+        code.staged.fixed_count().max(1)
+    );
+    let body = fortran.body(code, &items);
+    for name in ["log1p", "expm1"] {
+        if body.contains(&format!("c_{name}(")) {
+            text += &format!(
+                "
+  interface
+    pure real(c_double) function c_{name}(x) bind(c, name=\"{name}\")
+      use, intrinsic :: iso_c_binding, only: c_double
+      real(c_double), value, intent(in) :: x
+    end function
+  end interface
+"
+            );
+        }
+    }
+    text + "\ncontains\n" + &body + &format!("end module {name}\n")
+}
+
+impl Fortran {
+    fn body(&self, code: &Code<'_>, items: &[Item]) -> String {
+        let (spec, d) = (code.spec, code.spec.dimension);
+        let mut text = String::from(
+            "
+  elemental real(dp) function choose(first, a, b)
+    logical, intent(in) :: first
+    real(dp), intent(in) :: a, b
+    if (first) then
+      choose = a
+    else
+      choose = b
+    end if
+  end function
+
+  ! The nearest whole number, of two the even one: from 1.5 times 2**52 on doubles are whole numbers.
+  elemental real(dp) function nearest_whole(x)
+    real(dp), intent(in) :: x
+    real(dp), parameter :: shift = 6755399441055744.0_dp
+    nearest_whole = anint(x)
+    if (abs(x) < 2251799813685248.0_dp) nearest_whole = (x + shift) - shift
+  end function
+",
+        );
+        for routine in code.routines(self) {
+            text += &self.routine(&routine);
+        }
+        text += "
+  ! Checks the parameters and computes what depends on them only; the message is empty where they are admissible.
+  pure subroutine prepare(s, p, message)
+    type(solution), intent(inout) :: s
+    type(parameters), intent(in) :: p
+    character(:), allocatable, intent(out) :: message
+";
+        let block = code.staged.fixed_stage();
+        text += &temporaries(&block);
+        text += "    message = \"\"\n    s%par = p\n";
+        for (parameter, member) in spec.parameters.iter().zip(&self.members) {
+            // Bounds hold for infinite numbers, and none for what is no number.
+            let bounds = parameter.bounds.iter().map(|b| format!(" .and. p%{member} {} {}", b.relation.sign(), self.literal(b.limit)));
+            text += &format!(
+                "    if (.not. (abs(p%{member}) <= huge(1.0_dp){})) then\n      message = {}\n      return\n    end if\n",
+                bounds.collect::<String>(),
+                string(&code.refusal(parameter))
+            );
+        }
+        let Written { lines, outputs } = self.block(&block, "    ", ());
+        text += &lines;
+        let (sides, fixed) = outputs.split_at(2 * spec.requirements.len());
+        for (requirement, side) in spec.requirements.iter().zip(sides.chunks(2)) {
+            let message = string(&format!("the parameters of {} must satisfy {}", spec.name, requirement.text));
+            let sign = requirement.relation.sign();
+            text += &format!(
+                "    if (.not. ({} {sign} {})) then\n      message = {message}\n      return\n    end if\n",
+                side[0], side[1]
+            );
+        }
+        for (index, value) in fixed.iter().enumerate() {
+            text += &format!("    s%fixed({}) = {value}\n", index + 1);
+        }
+        text += "  end subroutine\n";
+        for item in items {
+            text += &self.item(code, item);
+        }
+        text + &format!(
+            "
+  ! body force per unit reference volume
+  pure function rho0_b(s, X, t) result(values)
+    type(solution), intent(in) :: s
+    real(dp), intent(in) :: X({d}), t
+    real(dp) :: values({d})
+    values = density(s) * b(s, X, t)
+  end function
+
+  ! Cauchy stress
+  pure function sigma(s, X, t) result(values)
+    type(solution), intent(in) :: s
+    real(dp), intent(in) :: X({d}), t
+    real(dp) :: values({d}, {d})
+    values = matmul(P(s, X, t), transpose(F(s, X, t))) / J(s, X, t)
+  end function
+"
+        )
+    }
+
+    fn routine(&self, routine: &Routine) -> String {
+        let mut text = format!("\n  ! {}\n  elemental real(dp) function {}({})\n", routine.about, routine.name, routine.arguments.join(", "));
+        text += &format!("    real(dp), intent(in) :: {}\n", routine.arguments.join(", "));
+        for step in &routine.steps {
+            text += &format!("    {} :: {}\n", if step.is_condition { "logical" } else { "real(dp)" }, step.name);
+        }
+        for step in &routine.steps {
+            text += &broken(&format!("    {} = {}\n", step.name, step.value));
+        }
+        text + &broken(&format!("    {} = {}\n", routine.name, routine.result)) + "  end function\n"
+    }
+
+    fn item(&self, code: &Code<'_>, item: &Item) -> String {
+        let (d, name) = (code.spec.dimension, &item.name);
+        let at_points = item.given == Given::PositionAndTime;
+        let mut text = format!(
+            "\n  ! {}\n  pure function {name}(s{}) result(values)\n    type(solution), intent(in) :: s\n",
+            item.about,
+            if at_points { ", X, t" } else { "" }
+        );
+        if at_points {
+            text += &format!("    real(dp), intent(in) :: X({d}), t\n");
+        }
+        text += &match item.shape {
+            Shape::Scalar => "    real(dp) :: values\n".to_owned(),
+            Shape::Vector => format!("    real(dp) :: values({d})\n"),
+            Shape::Matrix => format!("    real(dp) :: values({d}, {d})\n"),
+        };
+        let block = item.block(code);
+        text += &temporaries(&block);
+        let Written { lines, outputs } = self.block(&block, "    ", ());
+        text += &lines;
+        for (index, value) in outputs.iter().enumerate() {
+            text += &match item.shape {
+                Shape::Scalar => format!("    values = {value}\n"),
+                Shape::Vector => format!("    values({}) = {value}\n", index + 1),
+                Shape::Matrix => format!("    values({}, {}) = {value}\n", index / d + 1, index % d + 1),
+            };
+        }
+        text + "  end function\n"
+    }
+}
+
+/// The declarations of the values of a block.
+fn temporaries(block: &mmsmith_stage::Block<'_>) -> String {
+    let names: Vec<String> = block.steps().map(|(index, _)| format!("t{index}")).collect();
+    names.chunks(12).map(|some| format!("    real(dp) :: {}\n", some.join(", "))).collect()
+}
+
+/// A statement, continued in further lines where it is long.
+fn broken(statement: &str) -> String {
+    let mut text = String::new();
+    let mut length = 0;
+    for word in statement.split_inclusive(' ') {
+        if length + word.len() > 110 {
+            text += "&\n      ";
+            length = 6;
+        }
+        text += word;
+        length += word.len();
+    }
+    text
+}
+
+/// The module with the user subroutines of Abaqus.
+pub(crate) fn abaqus(code: &Code<'_>) -> Result<String, Unwritable> {
+    let d = code.spec.dimension;
+    let tractions: String = code
+        .staged
+        .tractions
+        .iter()
+        .map(|traction| {
+            let surface = crate::header::surface_name(traction.surface).replace('-', "_");
+            let capital = surface.to_ascii_uppercase();
+            format!("    if (index(surface, \"{capital}\") > 0) traction = {surface}_traction(s, X, t)\n")
+        })
+        .collect();
+    let shim = include_str!("abaqus.f90")
+        .replace("MODULE", &module_name(code))
+        .replace("DIMENSION", &d.to_string())
+        .replace("    TRACTIONS\n", &tractions);
+    // The first line tells Intel's compiler that lines are free.
+    Ok(with_head(code, ABAQUS_REMARKS, "!DIR$ FREEFORM\n") + &module(code) + &shim)
+}
+
