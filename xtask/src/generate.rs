@@ -56,7 +56,10 @@ pub(crate) fn run(
 ) -> anyhow::Result<Outcome> {
     let of_library = |host: &&&Host| folder(host).is_none() && out.is_none();
     if let Some(host) = hosts.iter().find(of_library) {
-        bail!("the repository keeps no files for --target {0}: add --out DIR, as in `cargo xtask gen --target {0} --out code`", host.name);
+        bail!(
+            "the repository keeps no files for --target {0}: add --out DIR, as in `cargo xtask gen --target {0} --out code`",
+            host.name
+        );
     }
     let library = repository.join("mms-specs");
     let all = library_specs(&library)?;
@@ -104,7 +107,9 @@ pub(crate) fn run(
         listed.dedup();
         let listed: Vec<&str> = listed.iter().map(String::as_str).collect();
         let registry = registry_source(&listed)?;
-        if let Some(own) = hosts.iter().find(|host| host.name == "rust").and_then(|host| folder(host)) {
+        if let Some(own) =
+            hosts.iter().find(|host| host.name == "rust").and_then(|host| folder(host))
+        {
             files.insert(repository.join(own).join("mod.rs"), Some(registry));
         }
     }

@@ -179,12 +179,19 @@ const C_FAMILIES: &[&str] = &[
     "MMSMITH_", "M_", "SCHAR_", "SHRT_", "SIZE_", "UCHAR_", "UINT", "ULLONG_", "ULONG_", "USHRT_",
 ];
 
+/// Whether C takes it for a word of its own, or may have a macro of that name.
+fn is_taken(name: &str) -> bool {
+    C_WORDS.contains(&name) || C_FAMILIES.iter().any(|family| name.starts_with(family))
+}
+
+/// A name with an underscore at its end where C has it already.
+pub(crate) fn c_name(name: &str) -> String {
+    if is_taken(name) { format!("{name}_") } else { name.to_owned() }
+}
+
 /// The names of parameters as members of a structure: what is no name in C gets an underscore at its end, and more
 /// where another parameter is called so.
 pub(crate) fn members(parameters: &[Parameter]) -> Vec<String> {
-    let is_taken = |name: &str| {
-        C_WORDS.contains(&name) || C_FAMILIES.iter().any(|family| name.starts_with(family))
-    };
     let plain = |name: &str| parameters.iter().any(|p| p.name == name && !is_taken(name));
     // No two become one: what the one passes over is plain, so that the other is not it.
     let member = |parameter: &Parameter| {
@@ -208,8 +215,15 @@ impl Code<'_> {
         let members = members(&self.spec.parameters);
         let dimension = self.spec.dimension;
         let language = C { members };
-        Header { code: self, staged: &self.staged, prefix, language, dimension, text: String::new() }
-            .write()
+        Header {
+            code: self,
+            staged: &self.staged,
+            prefix,
+            language,
+            dimension,
+            text: String::new(),
+        }
+        .write()
     }
 }
 
@@ -346,7 +360,9 @@ before. Results equal those of the Rust functions bit for bit where the compiler
              {prefix}_time_count = {time},\n    {prefix}_point_count = {point}\n}};\n"
         ));
         self.line(&format!("typedef struct {prefix}_parameters {{"));
-        for (parameter, member) in self.code.spec.parameters.iter().zip(self.language.members.clone()) {
+        for (parameter, member) in
+            self.code.spec.parameters.iter().zip(self.language.members.clone())
+        {
             let Parameter { name, description, unit, range, .. } = parameter;
             let about = comment(&meaning(name, description, unit, range));
             self.line(&format!("    double {member}; /* {about} */"));

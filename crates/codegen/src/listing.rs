@@ -96,10 +96,15 @@ impl Code<'_> {
             given: Given::Nothing,
             outputs: slots.to_vec(),
         };
-        let corner = |name, about, slots| Item { shape: Shape::Vector, ..constant(name, about, slots) };
+        let corner =
+            |name, about, slots| Item { shape: Shape::Vector, ..constant(name, about, slots) };
         let mut all: Vec<Item> = fields.chain(energy).chain(tractions).collect();
         all.extend([
-            constant("cell_length", "the length that a cell count divides", &[constants.cell_length]),
+            constant(
+                "cell_length",
+                "the length that a cell count divides",
+                &[constants.cell_length],
+            ),
             constant("density", "mass per reference volume", &[constants.density]),
             constant("wave_speed", "the speed that CFL numbers refer to", &[constants.wave_speed]),
             constant("period", "the time in which the motion repeats", &[constants.period]),
@@ -151,7 +156,11 @@ impl Code<'_> {
         lines.push(String::new());
         lines.extend(self.formulas());
         for boundary in &spec.boundaries {
-            lines.push(format!("surface {}: {}", surface_name(boundary.surface), condition(boundary)));
+            lines.push(format!(
+                "surface {}: {}",
+                surface_name(boundary.surface),
+                condition(boundary)
+            ));
         }
         if !spec.reference.is_empty() {
             lines.push(format!("Source: {}.", spec.reference));

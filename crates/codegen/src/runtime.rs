@@ -143,7 +143,10 @@ impl Term {
         match self {
             Term::Number(_) | Term::Name(_) => &[],
             Term::Negative(part) => std::slice::from_ref(part),
-            Term::Sum(parts) | Term::Difference(parts) | Term::Product(parts) | Term::Quotient(parts) => &parts[..],
+            Term::Sum(parts)
+            | Term::Difference(parts)
+            | Term::Product(parts)
+            | Term::Quotient(parts) => &parts[..],
             Term::Primitive(_, parts) | Term::Library(_, parts) | Term::Support(_, parts) => parts,
         }
     }
@@ -186,8 +189,12 @@ impl Term {
             Term::Product(parts) => infix("*", parts, 2),
             Term::Quotient(parts) => infix("/", parts, 2),
             Term::Primitive(primitive, parts) => fill(target, target.primitive(*primitive), parts),
-            Term::Library(name, parts) => fill(target, &target.function(Called::Library(name)), parts),
-            Term::Support(name, parts) => fill(target, &target.function(Called::Support(name)), parts),
+            Term::Library(name, parts) => {
+                fill(target, &target.function(Called::Library(name)), parts)
+            }
+            Term::Support(name, parts) => {
+                fill(target, &target.function(Called::Support(name)), parts)
+            }
         }
     }
 }
@@ -263,10 +270,18 @@ impl Term {
         match self {
             Term::Name(name) if name == "k" => Term::Number(f64::from(k)),
             Term::Name(name) if name == before => Term::Name(format!("{before}{}", k + 1)),
-            Term::Sum(parts) => folded(parts, |a, b| a + b).unwrap_or_else(|| Term::Sum(both(parts))),
-            Term::Difference(parts) => folded(parts, |a, b| a - b).unwrap_or_else(|| Term::Difference(both(parts))),
-            Term::Product(parts) => folded(parts, |a, b| a * b).unwrap_or_else(|| Term::Product(both(parts))),
-            Term::Quotient(parts) => folded(parts, |a, b| a / b).unwrap_or_else(|| Term::Quotient(both(parts))),
+            Term::Sum(parts) => {
+                folded(parts, |a, b| a + b).unwrap_or_else(|| Term::Sum(both(parts)))
+            }
+            Term::Difference(parts) => {
+                folded(parts, |a, b| a - b).unwrap_or_else(|| Term::Difference(both(parts)))
+            }
+            Term::Product(parts) => {
+                folded(parts, |a, b| a * b).unwrap_or_else(|| Term::Product(both(parts)))
+            }
+            Term::Quotient(parts) => {
+                folded(parts, |a, b| a / b).unwrap_or_else(|| Term::Quotient(both(parts)))
+            }
             other => other.clone(),
         }
     }
@@ -364,8 +379,12 @@ mod tests {
 
     fn value(name: &str, arguments: &[f64]) -> f64 {
         let function = &FUNCTIONS[name];
-        let mut known: BTreeMap<String, f64> =
-            function.arguments.iter().map(|name| (*name).to_owned()).zip(arguments.iter().copied()).collect();
+        let mut known: BTreeMap<String, f64> = function
+            .arguments
+            .iter()
+            .map(|name| (*name).to_owned())
+            .zip(arguments.iter().copied())
+            .collect();
         for (name, term) in &function.steps {
             let value = evaluate(term, &known);
             known.insert(name.clone(), value);
@@ -389,7 +408,13 @@ mod tests {
             (Term::Library("exp", _), [a]) => a.exp(),
             (Term::Library("log", _), [a]) => a.ln(),
             (Term::Library("log1p", _), [a]) => a.ln_1p(),
-            (Term::Primitive(Primitive::Choose, _), [c, a, b]) => if *c == 1.0 { *a } else { *b },
+            (Term::Primitive(Primitive::Choose, _), [c, a, b]) => {
+                if *c == 1.0 {
+                    *a
+                } else {
+                    *b
+                }
+            }
             (Term::Primitive(Primitive::Less, _), [a, b]) => f64::from(u8::from(a < b)),
             (Term::Primitive(Primitive::AtMost, _), [a, b]) => f64::from(u8::from(a <= b)),
             (Term::Primitive(Primitive::Equal, _), [a, b]) => f64::from(u8::from(a == b)),
@@ -405,8 +430,10 @@ mod tests {
     #[test]
     fn the_file_says_the_functions_of_the_crate() {
         use mmsmith_scalar_functions::ScalarFunctions as S;
-        let arguments: Vec<f64> =
-            (0..400).map(|k| 0.013 * f64::from(k)).chain([1e-9, 0.999, 37.5, 1e4, 0.25, 0.5, 1.0]).collect();
+        let arguments: Vec<f64> = (0..400)
+            .map(|k| 0.013 * f64::from(k))
+            .chain([1e-9, 0.999, 37.5, 1e4, 0.25, 0.5, 1.0])
+            .collect();
         let cases: [(&str, fn(f64) -> f64, bool); 12] = [
             ("sin_pi", S::sin_pi, true),
             ("cos_pi", S::cos_pi, true),
@@ -423,9 +450,16 @@ mod tests {
         ];
         for (name, expected, signed) in cases {
             for x in arguments.iter().flat_map(|x| [*x, -*x]).filter(|x| signed || *x >= 0.0) {
-                let found = if name == "ln_of_both" { value(name, &[x, f64::NAN]) } else { value(name, &[x]) };
+                let found = if name == "ln_of_both" {
+                    value(name, &[x, f64::NAN])
+                } else {
+                    value(name, &[x])
+                };
                 let expected = expected(x);
-                assert!(found.to_bits() == expected.to_bits() || found == expected && x == 0.0, "{name}({x}) = {found}, not {expected}");
+                assert!(
+                    found.to_bits() == expected.to_bits() || found == expected && x == 0.0,
+                    "{name}({x}) = {found}, not {expected}"
+                );
             }
         }
         for y in [1e-9, 0.03, 0.2, 0.49, 1e-300] {

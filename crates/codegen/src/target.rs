@@ -33,7 +33,8 @@ pub(crate) trait Target {
     fn power(&self, exponent: &Rational) -> String {
         let call = self.function(Called::Library("pow"));
         let exponent = self.number(exponent);
-        call.rsplit_once('#').map_or_else(String::new, |(before, after)| before.to_owned() + &exponent + after)
+        call.rsplit_once('#')
+            .map_or_else(String::new, |(before, after)| before.to_owned() + &exponent + after)
     }
 
     /// An operation, with `#` for each operand. Numbers and inputs are operands and no statements.

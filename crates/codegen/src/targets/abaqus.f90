@@ -25,17 +25,52 @@ contains
     is_ready = .true.
   end subroutine
 
-  ! The X of x = X + u(X, t), by Newton's method; steps that bring no progress are halved.
+  ! The X of the body with x = X + u(X, t): by Newton's method from x itself, and where that leads nowhere or out of the body, where the
+  ! formulas may reach the same x again, from the place of a lattice that is carried next to x.
   function reference_position(x_now, t) result(X)
     real(dp), intent(in) :: x_now(DIMENSION), t
-    real(dp) :: X(DIMENSION), step(DIMENSION), miss(DIMENSION), next(DIMENSION), tolerance, share
-    integer :: round, halving
+    real(dp) :: X(DIMENSION), place(DIMENSION), low(DIMENSION), high(DIMENSION), nearest, distance
+    integer, parameter :: intervals = merge(24, 12, DIMENSION < 3)
+    integer :: k, axis, rest
+    logical :: found
     call make_ready()
-    tolerance = 4.0_dp * epsilon(1.0_dp) * max(maxval(abs(x_now)), tiny(1.0_dp))
     X = x_now
+    call solve_motion(x_now, t, X, found)
+    if (found) return
+    call corners(low, high)
+    nearest = huge(nearest)
+    X = x_now
+    do k = 0, (intervals + 1)**DIMENSION - 1
+      rest = k
+      do axis = 1, DIMENSION
+        place(axis) = low(axis) + mod(rest, intervals + 1) * (high(axis) - low(axis)) / intervals
+        rest = rest / (intervals + 1)
+      end do
+      if (.not. is_inside(place)) cycle
+      distance = norm2((place + u(s, place, t)) - x_now)
+      if (distance < nearest) then
+        nearest = distance
+        X = place
+      end if
+    end do
+    call solve_motion(x_now, t, X, found)
+    if (.not. found) then
+      write (*, *) "no place of the body is carried to x =", x_now, "at t =", t, "; is that the time of the motion?"
+      error stop 2
+    end if
+  end function
+
+  ! Newton's method for X; steps that bring no progress are halved.
+  subroutine solve_motion(x_now, t, X, found)
+    real(dp), intent(in) :: x_now(DIMENSION), t
+    real(dp), intent(inout) :: X(DIMENSION)
+    logical, intent(out) :: found
+    real(dp) :: step(DIMENSION), miss(DIMENSION), next(DIMENSION), tolerance, share
+    integer :: round, halving
+    tolerance = 4.0_dp * epsilon(1.0_dp) * max(maxval(abs(x_now)), tiny(1.0_dp))
     miss = (X + u(s, X, t)) - x_now
     do round = 1, 50
-      if (maxval(abs(miss)) <= tolerance) return
+      if (maxval(abs(miss)) <= tolerance) exit
       step = solved(F(s, X, t), miss)
       share = 1.0_dp
       do halving = 1, 30
@@ -48,11 +83,23 @@ contains
       X = next
       miss = (X + u(s, X, t)) - x_now
     end do
-    if (.not. maxval(abs(miss)) <= 100.0_dp * tolerance) then
-      write (*, *) "no reference position belongs to x =", x_now, "at t =", t, &
-        "; nearest: X =", X, ". Is x in the deformed body, and t the time of the motion?"
-      error stop 2
-    end if
+    found = maxval(abs(miss)) <= 100.0_dp * tolerance .and. is_inside(X)
+  end subroutine
+
+  ! The corners of a box around the body.
+  subroutine corners(low, high)
+    real(dp), intent(out) :: low(DIMENSION), high(DIMENSION)
+    low = CORNER_LOW
+    high = CORNER_HIGH
+  end subroutine
+
+  ! Whether X is in the body, or next to it: the host's positions are not exact.
+  logical function is_inside(X)
+    real(dp), intent(in) :: X(DIMENSION)
+    real(dp) :: low(DIMENSION), high(DIMENSION), slack
+    call corners(low, high)
+    slack = 0.05_dp * maxval(high - low)
+    is_inside = INSIDE
   end function
 
   ! The y of A y = r by Gauss's elimination with the largest pivots.

@@ -2,7 +2,7 @@
 
 use crate::code::Code;
 use crate::function::digits;
-use crate::header::members;
+use crate::header::{c_name, members};
 use crate::listing::{Given, Item, commented};
 use crate::module::Names;
 use crate::runtime::{Primitive, Routine, WithRuntime};
@@ -119,7 +119,11 @@ impl Target for Cpp {
     fn literal(&self, value: f64) -> String {
         let sign = if value.is_sign_negative() { "-" } else { "" };
         let size = value.abs();
-        if size.is_infinite() { format!("{sign}HUGE_VAL") } else { format!("{sign}{}", digits(size)) }
+        if size.is_infinite() {
+            format!("{sign}HUGE_VAL")
+        } else {
+            format!("{sign}{}", digits(size))
+        }
     }
 
     fn function(&self, function: Called) -> Cow<'static, str> {
@@ -158,17 +162,19 @@ impl WithRuntime for Cpp {
 
 pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
     let spec = code.spec;
-    let space = Names::of(&spec.name).module;
+    let space = c_name(&Names::of(&spec.name).module);
     let guard = format!("MMSMITH_{}_HPP", space.to_ascii_uppercase());
     let cpp = Cpp { members: members(&spec.parameters) };
     let remarks = REMARKS.replace("NAME", &space);
     let remarks: Vec<String> = remarks.lines().map(str::to_owned).collect();
     let mut text = commented(&code.head_for_host(&remarks), "//", 118);
-    text += &format!("#ifndef {guard}\n#define {guard} 1\n{SUPPORT}\nnamespace mms {{\nnamespace {space} {{\n\n");
+    text += &format!(
+        "#ifndef {guard}\n#define {guard} 1\n{SUPPORT}\nnamespace mms {{\nnamespace {space} {{\n\n"
+    );
     // Beside those that argument-dependent look-up finds for types of a host.
     let library = [
-        "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "cos", "cosh", "erf", "exp", "expm1", "log", "log1p", "pow",
-        "sin", "sinh", "sqrt", "tan", "tanh",
+        "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "cos", "cosh", "erf", "exp",
+        "expm1", "log", "log1p", "pow", "sin", "sinh", "sqrt", "tan", "tanh",
     ];
     for name in library {
         text += &format!("using std::{name};\n");
@@ -183,10 +189,16 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
         text += &commented(&[about], "    //", 118);
         text += &format!("    double {member} = {};\n", cpp.literal(parameter.default));
     }
-    text += &format!("}};\n\nclass Solution {{\npublic:\n    static constexpr int dimension = {};\n\n", spec.dimension);
+    text += &format!(
+        "}};\n\nclass Solution {{\npublic:\n    static constexpr int dimension = {};\n\n",
+        spec.dimension
+    );
     text += "    explicit Solution(const Parameters &parameters = Parameters()) : par(parameters), fixed()\n    {\n";
     for (parameter, member) in spec.parameters.iter().zip(&cpp.members) {
-        let bounds = parameter.bounds.iter().map(|b| format!(" && par.{member} {} {}", b.relation.sign(), cpp.literal(b.limit)));
+        let bounds = parameter
+            .bounds
+            .iter()
+            .map(|b| format!(" && par.{member} {} {}", b.relation.sign(), cpp.literal(b.limit)));
         text += &format!(
             "        if (!(std::isfinite(par.{member}){})) {{\n            throw std::invalid_argument({});\n        }}\n",
             bounds.collect::<String>(),
@@ -263,11 +275,23 @@ private:
 
 impl Cpp {
     fn routine(&self, routine: &Routine) -> String {
-        let types: Vec<String> = routine.arguments.iter().map(|name| format!("class {}_", name.to_ascii_uppercase())).collect();
-        let arguments: Vec<String> =
-            routine.arguments.iter().map(|name| format!("const {}_ &{name}", name.to_ascii_uppercase())).collect();
-        let mut text =
-            format!("\n// {}\ntemplate <{}>\nauto {}({})\n{{\n", routine.about, types.join(", "), routine.name, arguments.join(", "));
+        let types: Vec<String> = routine
+            .arguments
+            .iter()
+            .map(|name| format!("class {}_", name.to_ascii_uppercase()))
+            .collect();
+        let arguments: Vec<String> = routine
+            .arguments
+            .iter()
+            .map(|name| format!("const {}_ &{name}", name.to_ascii_uppercase()))
+            .collect();
+        let mut text = format!(
+            "\n// {}\ntemplate <{}>\nauto {}({})\n{{\n",
+            routine.about,
+            types.join(", "),
+            routine.name,
+            arguments.join(", ")
+        );
         for step in &routine.steps {
             text += &format!("    const auto {} = {};\n", step.name, step.value);
         }
@@ -299,12 +323,14 @@ impl Cpp {
         text += &format!("    {returned} {name}({given}) const\n    {{\n");
         let Written { lines, outputs } = self.block(&block, "        ", ());
         text += &lines;
-        let made: Vec<String> = outputs.iter().map(|entry| format!("support::make<{scalar}>({entry})")).collect();
+        let made: Vec<String> =
+            outputs.iter().map(|entry| format!("support::make<{scalar}>({entry})")).collect();
         let value = match item.shape {
             Shape::Scalar => made.concat(),
             Shape::Vector => format!("{returned}{{{{{}}}}}", made.join(", ")),
             Shape::Matrix => {
-                let rows: Vec<String> = made.chunks(d).map(|row| format!("{{{{{}}}}}", row.join(", "))).collect();
+                let rows: Vec<String> =
+                    made.chunks(d).map(|row| format!("{{{{{}}}}}", row.join(", "))).collect();
                 format!("{returned}{{{{{}}}}}", rows.join(", "))
             }
         };

@@ -14,8 +14,20 @@ const FEBIO: Strings = Strings {
     host: "febio",
     coordinates: ["X", "Y", "Z"],
     functions: &[
-        ("sin", "sin"), ("cos", "cos"), ("tan", "tan"), ("asin", "asin"), ("acos", "acos"), ("atan", "atan"), ("atan2", "atan2"),
-        ("sinh", "sinh"), ("cosh", "cosh"), ("tanh", "tanh"), ("exp", "exp"), ("log", "ln"), ("sqrt", "sqrt"), ("erf", "erf"),
+        ("sin", "sin"),
+        ("cos", "cos"),
+        ("tan", "tan"),
+        ("asin", "asin"),
+        ("acos", "acos"),
+        ("atan", "atan"),
+        ("atan2", "atan2"),
+        ("sinh", "sinh"),
+        ("cosh", "cosh"),
+        ("tanh", "tanh"),
+        ("exp", "exp"),
+        ("log", "ln"),
+        ("sqrt", "sqrt"),
+        ("erf", "erf"),
     ],
     names_values: false,
 };
@@ -28,9 +40,13 @@ fn escaped(text: &str) -> String {
 }
 
 pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
-    let about: Vec<String> = head(code, REMARKS).iter().map(|line| format!("  {}\n", escaped(line))).collect();
+    let about: Vec<String> =
+        head(code, REMARKS).iter().map(|line| format!("  {}\n", escaped(line))).collect();
     let fields = FEBIO.fields(code)?;
-    let mut text = format!("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<!--\n{}-->\n<mmsmith>\n", about.concat());
+    let mut text = format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<!--\n{}-->\n<mmsmith>\n",
+        about.concat()
+    );
     let load = fields.iter().find(|(name, ..)| name == "b");
     text += "  <body_load type=\"non-const\">\n";
     for (index, axis) in ["x", "y", "z"].iter().enumerate() {

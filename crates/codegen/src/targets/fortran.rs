@@ -1,4 +1,4 @@
-//! Fortran 2008 source: a module, and the user subroutines of Abaqus around it.
+//! Fortran 2008 source: a module.
 
 use crate::code::Code;
 use crate::function::digits;
@@ -18,16 +18,6 @@ only: ring_b => b. Matrices have rows first: P(i, J).
 Results are those of the C header bit for bit where the compiler keeps every rounding (gfortran: -ffp-contract=off where the processor fuses \
 products and sums, and neither -ffast-math nor -Ofast).";
 
-const ABAQUS_REMARKS: &str = "\
-User subroutines: DLOAD for *DLOAD with BXNU, BYNU and BZNU, VDLOAD for Abaqus/Explicit, UTRACLOAD for *DSLOAD with TRVECNU and CONSTANT RESULTANT=YES \
-on surfaces whose names hold X_LOWER, X_UPPER, ..., INNER or OUTER.
-Abaqus hands over CURRENT coordinates x; the force is a function of X. The subroutines solve x = X + u(X, t) for X by Newton's method with the \
-solution's own F, so that the displacement of the host does not matter: the force is that of the exact motion, which carries X to the same x. As the host's \
-own x is X + u + error, the force is taken at a place that is off by that error, which has the order of the method.
-In CalculiX the routine dload.f has other arguments: put f = force(coords, time(2), i) into it, or force_at_reference(X, t, i) with X from co.
-The force is rho0_b, per reference volume; set per_current_volume = .true. where the host's loads are per current volume.
-Parameters are those of the type `parameters`; change the defaults there, or write the file anew with --set.";
-
 /// Fortran, given what the components of the type of the parameters are called.
 struct Fortran {
     members: Vec<String>,
@@ -40,7 +30,8 @@ impl Target for Fortran {
 
     fn literal(&self, value: f64) -> String {
         let size = value.abs();
-        let text = if size.is_infinite() { "infinity".into() } else { format!("{}_dp", digits(size)) };
+        let text =
+            if size.is_infinite() { "infinity".into() } else { format!("{}_dp", digits(size)) };
         if value.is_sign_negative() { format!("(-{text})") } else { text }
     }
 
@@ -103,11 +94,13 @@ fn string(text: &str) -> String {
         .take(500)
         .map(|c| if (' '..='~').contains(&c) && c != '\\' { c } else { '_' })
         .collect();
-    let pieces = safe.chunks(50).map(|piece| format!("\"{}\"", String::from_iter(piece).replace('"', "\"\"")));
+    let pieces = safe
+        .chunks(50)
+        .map(|piece| format!("\"{}\"", String::from_iter(piece).replace('"', "\"\"")));
     pieces.collect::<Vec<_>>().join(" // &\n            ")
 }
 
-fn module_name(code: &Code<'_>) -> String {
+pub(super) fn module_name(code: &Code<'_>) -> String {
     format!("mms_{}", Names::of(&code.spec.name).module).chars().take(50).collect()
 }
 
@@ -116,13 +109,14 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
     Ok(with_head(code, &remarks, "") + &module(code))
 }
 
-fn with_head(code: &Code<'_>, remarks: &str, start: &str) -> String {
+/// The head of a file, after a line `start`.
+pub(super) fn with_head(code: &Code<'_>, remarks: &str, start: &str) -> String {
     let remarks: Vec<String> = remarks.lines().map(str::to_owned).collect();
     start.to_owned() + &commented(&code.head_for_host(&remarks), "!", 110)
 }
 
 /// The module of the fields.
-fn module(code: &Code<'_>) -> String {
+pub(super) fn module(code: &Code<'_>) -> String {
     let (spec, name) = (code.spec, module_name(code));
     let fortran = Fortran { members: members(&spec.parameters) };
     let items = code.functions();
@@ -217,7 +211,9 @@ impl Fortran {
         text += "    message = \"\"\n    s%par = p\n";
         for (parameter, member) in spec.parameters.iter().zip(&self.members) {
             // Bounds hold for infinite numbers, and none for what is no number.
-            let bounds = parameter.bounds.iter().map(|b| format!(" .and. p%{member} {} {}", b.relation.sign(), self.literal(b.limit)));
+            let bounds = parameter.bounds.iter().map(|b| {
+                format!(" .and. p%{member} {} {}", b.relation.sign(), self.literal(b.limit))
+            });
             text += &format!(
                 "    if (.not. (abs(p%{member}) <= huge(1.0_dp){})) then\n      message = {}\n      return\n    end if\n",
                 bounds.collect::<String>(),
@@ -228,7 +224,10 @@ impl Fortran {
         text += &lines;
         let (sides, fixed) = outputs.split_at(2 * spec.requirements.len());
         for (requirement, side) in spec.requirements.iter().zip(sides.chunks(2)) {
-            let message = string(&format!("the parameters of {} must satisfy {}", spec.name, requirement.text));
+            let message = string(&format!(
+                "the parameters of {} must satisfy {}",
+                spec.name, requirement.text
+            ));
             let sign = requirement.relation.sign();
             text += &format!(
                 "    if (.not. ({} {sign} {})) then\n      message = {message}\n      return\n    end if\n",
@@ -256,18 +255,29 @@ impl Fortran {
   pure function sigma(s, X, t) result(values)
     type(solution), intent(in) :: s
     real(dp), intent(in) :: X({d}), t
-    real(dp) :: values({d}, {d})
-    values = matmul(P(s, X, t), transpose(F(s, X, t))) / J(s, X, t)
+    real(dp) :: values({d}, {d}), stress({d}, {d}), gradient({d}, {d})
+    stress = P(s, X, t)
+    gradient = F(s, X, t)
+    values = matmul(stress, transpose(gradient)) / J(s, X, t)
   end function
 "
         )
     }
 
     fn routine(&self, routine: &Routine) -> String {
-        let mut text = format!("\n  ! {}\n  elemental real(dp) function {}({})\n", routine.about, routine.name, routine.arguments.join(", "));
+        let mut text = format!(
+            "\n  ! {}\n  elemental real(dp) function {}({})\n",
+            routine.about,
+            routine.name,
+            routine.arguments.join(", ")
+        );
         text += &format!("    real(dp), intent(in) :: {}\n", routine.arguments.join(", "));
         for step in &routine.steps {
-            text += &format!("    {} :: {}\n", if step.is_condition { "logical" } else { "real(dp)" }, step.name);
+            text += &format!(
+                "    {} :: {}\n",
+                if step.is_condition { "logical" } else { "real(dp)" },
+                step.name
+            );
         }
         for step in &routine.steps {
             text += &broken(&format!("    {} = {}\n", step.name, step.value));
@@ -299,7 +309,9 @@ impl Fortran {
             text += &match item.shape {
                 Shape::Scalar => format!("    values = {value}\n"),
                 Shape::Vector => format!("    values({}) = {value}\n", index + 1),
-                Shape::Matrix => format!("    values({}, {}) = {value}\n", index / d + 1, index % d + 1),
+                Shape::Matrix => {
+                    format!("    values({}, {}) = {value}\n", index / d + 1, index % d + 1)
+                }
             };
         }
         text + "  end function\n"
@@ -326,25 +338,3 @@ fn broken(statement: &str) -> String {
     }
     text
 }
-
-/// The module with the user subroutines of Abaqus.
-pub(crate) fn abaqus(code: &Code<'_>) -> Result<String, Unwritable> {
-    let d = code.spec.dimension;
-    let tractions: String = code
-        .staged
-        .tractions
-        .iter()
-        .map(|traction| {
-            let surface = crate::header::surface_name(traction.surface).replace('-', "_");
-            let capital = surface.to_ascii_uppercase();
-            format!("    if (index(surface, \"{capital}\") > 0) traction = {surface}_traction(s, X, t)\n")
-        })
-        .collect();
-    let shim = include_str!("abaqus.f90")
-        .replace("MODULE", &module_name(code))
-        .replace("DIMENSION", &d.to_string())
-        .replace("    TRACTIONS\n", &tractions);
-    // The first line tells Intel's compiler that lines are free.
-    Ok(with_head(code, ABAQUS_REMARKS, "!DIR$ FREEFORM\n") + &module(code) + &shim)
-}
-

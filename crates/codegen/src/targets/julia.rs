@@ -28,7 +28,11 @@ impl Target for Julia {
     fn literal(&self, value: f64) -> String {
         let sign = if value.is_sign_negative() { "-" } else { "" };
         let size = value.abs();
-        let text = if size.is_infinite() { format!("{sign}Inf") } else { format!("{sign}{}", digits(size)) };
+        let text = if size.is_infinite() {
+            format!("{sign}Inf")
+        } else {
+            format!("{sign}{}", digits(size))
+        };
         if sign.is_empty() { text } else { format!("({text})") }
     }
 
@@ -40,7 +44,8 @@ impl Target for Julia {
             Called::Library("atan2") => "atan(#, #)".into(),
             Called::Library(name) => format!("{name}(#)").into(),
             Called::Support(name) => {
-                format!("mmsmith_{name}({})", if function.takes_two() { "#, #" } else { "#" }).into()
+                format!("mmsmith_{name}({})", if function.takes_two() { "#, #" } else { "#" })
+                    .into()
             }
         }
     }
@@ -93,19 +98,27 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
     let spec = code.spec;
     let names = Names::of(&spec.name);
     let module = format!("Mms{}", names.solution);
-    let remarks = REMARKS.replace("MODULE", &module).replace("FILE", &format!("{}.jl", names.module));
+    let remarks =
+        REMARKS.replace("MODULE", &module).replace("FILE", &format!("{}.jl", names.module));
     let remarks: Vec<String> = remarks.lines().map(str::to_owned).collect();
     let mut text = commented(&code.head_for_host(&remarks), "#", 118);
-    text += &format!("\nmodule {module}\n\nmmsmith_log(x) = x > 0 ? log(x) : x == 0 ? oftype(float(x), -Inf) : oftype(float(x), NaN)\n");
+    text += &format!(
+        "\nmodule {module}\n\nmmsmith_log(x) = x > 0 ? log(x) : x == 0 ? oftype(float(x), -Inf) : oftype(float(x), NaN)\n"
+    );
     for routine in code.routines(&Julia) {
         text += &julia_routine(&routine);
     }
     text += "\n# The fields for given parameters:\n";
     text += &commented(&code.parameter_lines(), "#", 118);
     let (count, kept) = (spec.parameters.len(), code.staged.fixed_count());
-    text += &format!("struct Solution\n    par::NTuple{{{count},Float64}}\n    fixed::NTuple{{{kept},Float64}}\nend\n");
-    let named: Vec<String> =
-        spec.parameters.iter().map(|p| format!("{} => {}", string(&p.name), Julia.literal(p.default))).collect();
+    text += &format!(
+        "struct Solution\n    par::NTuple{{{count},Float64}}\n    fixed::NTuple{{{kept},Float64}}\nend\n"
+    );
+    let named: Vec<String> = spec
+        .parameters
+        .iter()
+        .map(|p| format!("{} => {}", string(&p.name), Julia.literal(p.default)))
+        .collect();
     text += &format!(
         "
 const DIMENSION = {}
@@ -124,7 +137,10 @@ function Solution(given::Pair...)
     );
     for (index, parameter) in spec.parameters.iter().enumerate() {
         let own = format!("s.par[{}]", index + 1);
-        let bounds = parameter.bounds.iter().map(|b| format!(" && {own} {} {}", b.relation.sign(), Julia.literal(b.limit)));
+        let bounds = parameter
+            .bounds
+            .iter()
+            .map(|b| format!(" && {own} {} {}", b.relation.sign(), Julia.literal(b.limit)));
         text += &format!(
             "    (isfinite({own}){}) || throw(ArgumentError({}))\n",
             bounds.collect::<String>(),
@@ -170,7 +186,12 @@ fn tuple(entries: &[String]) -> String {
 }
 
 fn julia_routine(routine: &Routine) -> String {
-    let mut text = format!("\n# {}\nfunction mmsmith_{}({})\n", routine.about, routine.name, routine.arguments.join(", "));
+    let mut text = format!(
+        "\n# {}\nfunction mmsmith_{}({})\n",
+        routine.about,
+        routine.name,
+        routine.arguments.join(", ")
+    );
     for step in &routine.steps {
         text += &format!("    {} = {}\n", step.name, step.value);
     }

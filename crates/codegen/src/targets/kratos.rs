@@ -14,8 +14,19 @@ const KRATOS: Strings = Strings {
     host: "kratos",
     coordinates: ["X", "Y", "Z"],
     functions: &[
-        ("sin", "sin"), ("cos", "cos"), ("tan", "tan"), ("asin", "asin"), ("acos", "acos"), ("atan", "atan"), ("atan2", "atan2"),
-        ("sinh", "sinh"), ("cosh", "cosh"), ("tanh", "tanh"), ("exp", "exp"), ("log", "ln"), ("sqrt", "sqrt"),
+        ("sin", "sin"),
+        ("cos", "cos"),
+        ("tan", "tan"),
+        ("asin", "asin"),
+        ("acos", "acos"),
+        ("atan", "atan"),
+        ("atan2", "atan2"),
+        ("sinh", "sinh"),
+        ("cosh", "cosh"),
+        ("tanh", "tanh"),
+        ("exp", "exp"),
+        ("log", "ln"),
+        ("sqrt", "sqrt"),
     ],
     names_values: false,
 };
@@ -27,7 +38,10 @@ fn string(text: &str) -> String {
         match c {
             '"' | '\\' => literal.extend(['\\', c]),
             ' '..='~' => literal.push(c),
-            _ => c.encode_utf16(&mut [0; 2]).iter().for_each(|unit| literal += &format!("\\u{unit:04x}")),
+            _ => c
+                .encode_utf16(&mut [0; 2])
+                .iter()
+                .for_each(|unit| literal += &format!("\\u{unit:04x}")),
         }
     }
     literal + "\""
@@ -41,12 +55,14 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
     let about: Vec<String> = head(code, REMARKS).iter().map(|line| string(line)).collect();
     let mut text = format!("{{\n  \"about\": {}", list(&about));
     for (name, about, entries) in KRATOS.fields(code)? {
-        let expressions: Vec<String> = entries.iter().map(|Entry { text, .. }| string(text)).collect();
+        let expressions: Vec<String> =
+            entries.iter().map(|Entry { text, .. }| string(text)).collect();
         text += &format!(",\n  {}: {}", string(&format!("about {name}")), string(&about));
         text += &format!(",\n  {}: {}", string(&name), list(&expressions));
     }
     text += ",\n  \"constants\": {";
     let names = ["density", "period", "wave_speed", "cell_length"];
-    let values = names.map(|name| format!("\n    {}: {}", string(name), KRATOS.constant(code, name)));
+    let values =
+        names.map(|name| format!("\n    {}: {}", string(name), KRATOS.constant(code, name)));
     Ok(text + &values.join(",") + "\n  }\n}\n")
 }

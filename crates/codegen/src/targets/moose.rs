@@ -17,9 +17,22 @@ const MOOSE: Strings = Strings {
     host: "moose",
     coordinates: ["x", "y", "z"],
     functions: &[
-        ("sin", "sin"), ("cos", "cos"), ("tan", "tan"), ("asin", "asin"), ("acos", "acos"), ("atan", "atan"), ("atan2", "atan2"),
-        ("sinh", "sinh"), ("cosh", "cosh"), ("tanh", "tanh"), ("asinh", "asinh"), ("acosh", "acosh"), ("atanh", "atanh"), ("exp", "exp"),
-        ("log", "log"), ("sqrt", "sqrt"),
+        ("sin", "sin"),
+        ("cos", "cos"),
+        ("tan", "tan"),
+        ("asin", "asin"),
+        ("acos", "acos"),
+        ("atan", "atan"),
+        ("atan2", "atan2"),
+        ("sinh", "sinh"),
+        ("cosh", "cosh"),
+        ("tanh", "tanh"),
+        ("asinh", "asinh"),
+        ("acosh", "acosh"),
+        ("atanh", "atanh"),
+        ("exp", "exp"),
+        ("log", "log"),
+        ("sqrt", "sqrt"),
     ],
     names_values: true,
 };
@@ -59,11 +72,15 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
     }
     text += "[]\n\n[Kernels]\n";
     for (i, axis) in axes.iter().enumerate() {
-        text += &format!("  [{prefix}_force_{axis}]\n    type = BodyForce\n    variable = disp_{axis}\n    function = {prefix}_rho0_b_{i}\n  []\n");
+        text += &format!(
+            "  [{prefix}_force_{axis}]\n    type = BodyForce\n    variable = disp_{axis}\n    function = {prefix}_rho0_b_{i}\n  []\n"
+        );
     }
     text += "[]\n\n[Postprocessors]\n";
     for (i, axis) in axes.iter().enumerate() {
-        text += &format!("  [{prefix}_error_{axis}]\n    type = ElementL2Error\n    variable = disp_{axis}\n    function = {prefix}_u_{i}\n  []\n");
+        text += &format!(
+            "  [{prefix}_error_{axis}]\n    type = ElementL2Error\n    variable = disp_{axis}\n    function = {prefix}_u_{i}\n  []\n"
+        );
     }
     Ok(text + "[]\n")
 }

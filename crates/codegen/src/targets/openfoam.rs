@@ -19,6 +19,8 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
     let remarks = REMARKS.replace("NAME", &code.spec.name);
     let remarks: Vec<String> = remarks.lines().map(str::to_owned).collect();
     let head = commented(&code.head_for_host(&remarks), "//", 118);
-    let fragments = include_str!("openfoam.template").replace("MODULE", &module).replace("DIMENSION", &code.spec.dimension.to_string());
+    let fragments = include_str!("openfoam.template")
+        .replace("MODULE", &module)
+        .replace("DIMENSION", &code.spec.dimension.to_string());
     Ok(head + &fragments)
 }

@@ -1,8 +1,8 @@
 //! Python source; its hosts differ in the library that they compute with.
 
 use crate::code::Code;
-use crate::listing::{Given, Item, commented};
 use crate::function::digits;
+use crate::listing::{Given, Item, commented};
 use crate::runtime::{Primitive, Routine, WithRuntime};
 use crate::target::{Called, Target, Written};
 use crate::text::{one_line, push_index};
@@ -34,7 +34,11 @@ impl Target for Python {
     fn literal(&self, value: f64) -> String {
         let sign = if value.is_sign_negative() { "-" } else { "" };
         let size = value.abs();
-        if size.is_infinite() { format!("{sign}math.inf") } else { format!("{sign}{}", digits(size)) }
+        if size.is_infinite() {
+            format!("{sign}math.inf")
+        } else {
+            format!("{sign}{}", digits(size))
+        }
     }
 
     fn function(&self, function: Called) -> Cow<'static, str> {
@@ -84,15 +88,20 @@ impl Python {
     pub(crate) fn source(&self, code: &Code<'_>) -> String {
         let spec = code.spec;
         let remarks: Vec<String> = self.remarks.lines().map(str::to_owned).collect();
-        let mut text = commented(&code.head_for_host(&remarks), "#", 118);
+        // A first line without text of the specification: one of the first two lines may name another encoding.
+        let mut text = String::from("# -*- coding: utf-8 -*-\n");
+        text += &commented(&code.head_for_host(&remarks), "#", 118);
         text += self.preamble;
         for routine in code.routines(self) {
             text += &self.routine(&routine);
         }
         text += "\n\nclass Solution:\n    # The fields for given parameters:\n";
         text += &commented(&code.parameter_lines(), "    #", 118);
-        let defaults: Vec<String> =
-            spec.parameters.iter().map(|p| format!("{}: {}", string(&p.name), self.literal(p.default))).collect();
+        let defaults: Vec<String> = spec
+            .parameters
+            .iter()
+            .map(|p| format!("{}: {}", string(&p.name), self.literal(p.default)))
+            .collect();
         text += &format!(
             "    NAME = {}\n    DIMENSION = {}\n    DEFAULTS = {{{}}}\n\n    def __init__(self, **parameters):\n{}",
             string(&spec.name),
@@ -106,7 +115,9 @@ impl Python {
         par = [float(x) for x in {**self.DEFAULTS, **parameters}.values()]
         self.par, self.fixed = par, []\n";
         for (index, parameter) in spec.parameters.iter().enumerate() {
-            let bounds = parameter.bounds.iter().map(|b| format!(" and par[{index}] {} {}", b.relation.sign(), self.literal(b.limit)));
+            let bounds = parameter.bounds.iter().map(|b| {
+                format!(" and par[{index}] {} {}", b.relation.sign(), self.literal(b.limit))
+            });
             text += &format!(
                 "        if not (math.isfinite(par[{index}]){}):\n            raise ValueError({})\n",
                 bounds.collect::<String>(),
@@ -122,7 +133,10 @@ impl Python {
                 side[0],
                 requirement.relation.sign(),
                 side[1],
-                string(&format!("the parameters of {} must satisfy {}", spec.name, requirement.text))
+                string(&format!(
+                    "the parameters of {} must satisfy {}",
+                    spec.name, requirement.text
+                ))
             );
         }
         text += &format!("        self.fixed = [{}]\n", fixed.join(", "));
@@ -135,7 +149,13 @@ impl Python {
     }
 
     fn routine(&self, routine: &Routine) -> String {
-        let mut text = format!("\n\n{}def _{}({}):\n    # {}\n", self.decorator, routine.name, routine.arguments.join(", "), routine.about);
+        let mut text = format!(
+            "\n\n{}def _{}({}):\n    # {}\n",
+            self.decorator,
+            routine.name,
+            routine.arguments.join(", "),
+            routine.about
+        );
         for step in &routine.steps {
             text += &format!("    {} = {}\n", step.name, step.value);
         }
@@ -168,8 +188,10 @@ impl Python {
             (_, Shape::Scalar) => format!("        return _scalar(X0, t, {entries})\n"),
             (_, Shape::Vector) => format!("        return _vector(X0, t, [{entries}])\n"),
             (_, Shape::Matrix) => {
-                let rows: Vec<String> =
-                    outputs.chunks(code.spec.dimension).map(|row| format!("[{}]", row.join(", "))).collect();
+                let rows: Vec<String> = outputs
+                    .chunks(code.spec.dimension)
+                    .map(|row| format!("[{}]", row.join(", ")))
+                    .collect();
                 format!("        return _matrix(X0, t, [{}])\n", rows.join(", "))
             }
         }

@@ -37,7 +37,10 @@ pub(crate) struct Entry {
 
 impl Strings {
     /// The fields, the tractions and `rho0_b`, with a word about each.
-    pub(crate) fn fields(&self, code: &Code<'_>) -> Result<Vec<(String, String, Vec<Entry>)>, Unwritable> {
+    pub(crate) fn fields(
+        &self,
+        code: &Code<'_>,
+    ) -> Result<Vec<(String, String, Vec<Entry>)>, Unwritable> {
         let mut all = Vec::new();
         let density = self.constant(code, "density");
         for item in code.functions().iter().filter(|item| item.given == Given::PositionAndTime) {
@@ -48,7 +51,11 @@ impl Strings {
                     place: entry.place.clone(),
                     text: self.scaled(&entry.text, density),
                 });
-                all.push(("rho0_b".to_owned(), "body force per unit reference volume".to_owned(), scaled.collect()));
+                all.push((
+                    "rho0_b".to_owned(),
+                    "body force per unit reference volume".to_owned(),
+                    scaled.collect(),
+                ));
             }
             all.push((item.name.clone(), item.about.clone(), entries));
         }
@@ -64,7 +71,8 @@ impl Strings {
 
     /// The last expression times a number.
     pub(crate) fn scaled(&self, text: &str, factor: f64) -> String {
-        let (before, last) = text.rsplit_once("; ").map_or(("", text), |(before, last)| (before, last));
+        let (before, last) =
+            text.rsplit_once("; ").map_or(("", text), |(before, last)| (before, last));
         let joint = if before.is_empty() { "" } else { "; " };
         format!("{before}{joint}{}*({last})", number(factor))
     }
@@ -87,7 +95,12 @@ impl Strings {
     }
 
     /// One output of a function.
-    fn expression(&self, code: &Code<'_>, item: &Item, output: usize) -> Result<String, Unwritable> {
+    fn expression(
+        &self,
+        code: &Code<'_>,
+        item: &Item,
+        output: usize,
+    ) -> Result<String, Unwritable> {
         let block = code.staged.after_parameters(&item.outputs()[output..=output]);
         let fixed = code.fixed_values();
         let mut texts: BTreeMap<usize, String> = BTreeMap::new();
@@ -102,7 +115,8 @@ impl Strings {
             Operand::Kept(_, index) => number(fixed[index]),
         };
         for (index, operation) in block.steps() {
-            let operands: Vec<String> = operation.operands().map(|slot| value(&texts, block.operand(slot))).collect();
+            let operands: Vec<String> =
+                operation.operands().map(|slot| value(&texts, block.operand(slot))).collect();
             let text = self.operation(code, operation, &operands)?;
             let text = if self.names_values {
                 statements += &format!("t{index} := {text}; ");
@@ -117,23 +131,40 @@ impl Strings {
     }
 
     /// An operation with its operands, in parentheses.
-    fn operation(&self, code: &Code<'_>, operation: &Operation, operands: &[String]) -> Result<String, Unwritable> {
+    fn operation(
+        &self,
+        code: &Code<'_>,
+        operation: &Operation,
+        operands: &[String],
+    ) -> Result<String, Unwritable> {
         let one = || operands.first().map_or("", String::as_str);
         let other = || operands.get(1).map_or("", String::as_str);
         Ok(match operation {
-            Operation::Power(_, exponent) => format!("({}^{})", one(), number(nearest_f64(exponent))),
-            Operation::Sqrt(_) => self.call(code, Called::Library("sqrt"), Function::Exp, operands)?,
+            Operation::Power(_, exponent) => {
+                format!("({}^{})", one(), number(nearest_f64(exponent)))
+            }
+            Operation::Sqrt(_) => {
+                self.call(code, Called::Library("sqrt"), Function::Exp, operands)?
+            }
             Operation::SinPi(_) => format!("sin({}*{})", number(std::f64::consts::PI), one()),
             Operation::CosPi(_) => format!("cos({}*{})", number(std::f64::consts::PI), one()),
-            Operation::Atan2(..) => self.call(code, Called::Library("atan2"), Function::Atan2, operands)?,
+            Operation::Atan2(..) => {
+                self.call(code, Called::Library("atan2"), Function::Atan2, operands)?
+            }
             Operation::LnOfBoth(..) => self.logarithm(code, one())?,
             // What rounding takes is less than what these expressions lose.
             Operation::SumError(..) | Operation::ProductError(..) => "0.0".to_owned(),
             Operation::Call(Function::Ln1p, _) => self.logarithm(code, one())?,
             Operation::Call(Function::PositivePart, _) => format!("(0.5*({0} + abs({0})))", one()),
-            Operation::Call(Function::PositivePartSlope, _) => format!("(0.5 + 0.5*{0}/(abs({0}) + 1e-300))", one()),
-            Operation::Call(Function::Expm1, _) => format!("(2.0*sinh(0.5*{0})*exp(0.5*{0}))", one()),
-            Operation::Call(function, _) => self.call(code, Called::of(*function), *function, operands)?,
+            Operation::Call(Function::PositivePartSlope, _) => {
+                format!("(0.5 + 0.5*{0}/(abs({0}) + 1e-300))", one())
+            }
+            Operation::Call(Function::Expm1, _) => {
+                format!("(2.0*sinh(0.5*{0})*exp(0.5*{0}))", one())
+            }
+            Operation::Call(function, _) => {
+                self.call(code, Called::of(*function), *function, operands)?
+            }
             other_operation => {
                 let mut operands = [one(), other()].into_iter();
                 let mut text = String::from("(");
@@ -152,7 +183,13 @@ impl Strings {
         Ok(format!("({ln}*(({x} + 1e-300)/(({y} - 1.0) + 1e-300)))"))
     }
 
-    fn call(&self, code: &Code<'_>, called: Called, function: Function, operands: &[String]) -> Result<String, Unwritable> {
+    fn call(
+        &self,
+        code: &Code<'_>,
+        called: Called,
+        function: Function,
+        operands: &[String],
+    ) -> Result<String, Unwritable> {
         let name = match called {
             Called::Library(name) => self.functions.iter().find(|(own, _)| *own == name),
             Called::Support(_) => None,
@@ -177,7 +214,8 @@ pub(crate) fn number(value: f64) -> String {
 /// A remark and the head of a file, in lines.
 pub(crate) fn head(code: &Code<'_>, remarks: &str) -> Vec<String> {
     let remarks: Vec<String> = remarks.lines().chain([ACCURACY]).map(str::to_owned).collect();
-    let values = code.spec.parameters.iter().map(|p| format!("{} = {}", p.name, digits_of(p.default)));
+    let values =
+        code.spec.parameters.iter().map(|p| format!("{} = {}", p.name, digits_of(p.default)));
     let mut lines = code.head_for_host(&remarks);
     lines.push(format!("Parameters: {}.", values.collect::<Vec<_>>().join(", ")));
     lines

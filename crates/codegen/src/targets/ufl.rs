@@ -52,10 +52,18 @@ fn function(called: Called) -> Cow<'static, str> {
         Called::Library("pow") => return "(#)**#".into(),
         Called::Library("log1p") => return "_log_1p(#)".into(),
         // Functions that UFL lacks, by those of a half so that small arguments keep their digits.
-        Called::Library("expm1") => return "(lambda x: 2.0 * ufl.sinh(x / 2.0) * ufl.exp(x / 2.0))(#)".into(),
-        Called::Library("asinh") => return "(lambda x: ufl.sign(x) * ufl.ln(abs(x) + ufl.sqrt(x * x + 1.0)))(#)".into(),
-        Called::Library("acosh") => return "(lambda x: ufl.ln(x + ufl.sqrt(x * x - 1.0)))(#)".into(),
-        Called::Library("atanh") => return "(lambda x: ufl.ln((1.0 + x) / (1.0 - x)) / 2.0)(#)".into(),
+        Called::Library("expm1") => {
+            return "(lambda x: 2.0 * ufl.sinh(x / 2.0) * ufl.exp(x / 2.0))(#)".into();
+        }
+        Called::Library("asinh") => {
+            return "(lambda x: ufl.sign(x) * ufl.ln(abs(x) + ufl.sqrt(x * x + 1.0)))(#)".into();
+        }
+        Called::Library("acosh") => {
+            return "(lambda x: ufl.ln(x + ufl.sqrt(x * x - 1.0)))(#)".into();
+        }
+        Called::Library("atanh") => {
+            return "(lambda x: ufl.ln((1.0 + x) / (1.0 - x)) / 2.0)(#)".into();
+        }
         Called::Library("log") => "ln",
         Called::Library("atan2") => return "ufl.atan2(#, #)".into(),
         Called::Library(name) => name,
