@@ -1,5 +1,5 @@
 // Evaluates a generated C++ header at the points of a file of doubles: the number of points, then for each X and t. Writes u, v, a, H, F,
-// J, P, b, rho0_b and sigma of each point. Compiled with -DHEADER, -DSPACE.
+// J, P, b, rho0_b, static_force and sigma of each point. Compiled with -DHEADER, -DSPACE.
 #include HEADER
 
 #include <cstdio>
@@ -86,6 +86,7 @@ int main()
         write(s.P(point, t));
         write(s.b(point, t));
         write(s.rho0_b(point, t));
+        write(s.static_force(point, t));
         write(s.sigma(point, t));
 #ifdef DUALS
         // The derivatives of u are H.
@@ -96,8 +97,8 @@ int main()
                 X[i] = Dual{point[i], i == j ? 1.0 : 0.0};
             }
             const auto u = s.u(X, t);
-            s.P(X, t);
-            s.b(X, t);
+            s.static_force(X, t);
+            s.sigma(X, t);
             for (int i = 0; i < d; ++i) {
                 if (!(std::abs(u[i].slope - H[i][j]) <= 1e-12 * (1.0 + std::abs(H[i][j])))) {
                     std::fprintf(stderr, "du_%d/dX_%d by dual numbers is %.17g, H is %.17g\n", i, j, u[i].slope, H[i][j]);

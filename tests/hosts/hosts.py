@@ -1,6 +1,6 @@
 """Files of `mms gen` in the hands of their hosts, at 1,000 points a solution, beside `mms eval`.
 
-    python hosts.py MMS FOLDER [--solutions NAME,NAME|all] HOST...
+    python hosts.py MMS FOLDER [--solutions NAME|FILE,...] HOST...
 
 Hosts: cpp, fortran, abaqus, numpy, jax, ufl, moose, kratos, febio, julia, openfoam. Exit status: 0 where all agree, 1 where any does not.
 
@@ -25,11 +25,17 @@ HERE = Path(__file__).resolve().parent
 SPECS = HERE.parents[1] / "mms-specs"
 FIELDS = {"u": 1, "v": 1, "a": 1, "H": 2, "F": 2, "J": 0, "P": 2, "b": 1}
 POINTS = 1000
-LARGEST = {"cpp": 0, "fortran": 0, "numpy": 16, "jax": 64, "ufl": 64, "moose": 64, "kratos": 64, "febio": 64}
+LARGEST = {"cpp": 0, "fortran": 0, "numpy": 16, "jax": 16, "ufl": 32, "moose": 32, "kratos": 32, "febio": 32}
+
+
+class Refused(Exception):
+    """The host has no words for the solution, and `mms gen` says so by the name of the function."""
 
 
 def call(command, **options):
     done = subprocess.run([str(word) for word in command], capture_output=True, **options)
+    if done.returncode != 0 and b" have no form of " in done.stderr:
+        raise Refused(done.stderr.decode())
     if done.returncode != 0:
         raise SystemExit(f"{' '.join(str(word) for word in command)}: {done.stderr.decode()[-3000:]}{done.stdout.decode()[-500:]}")
     return done.stdout
@@ -46,22 +52,27 @@ class Case:
     """A solution with points of its body, and its fields there by `mms eval`."""
 
     def __init__(self, mms, folder, name):
-        self.mms, self.folder, self.name = mms, folder / name, name
+        # A specification by its name or by its file.
+        self.mms, self.given, name = mms, name, Path(name).stem
+        self.folder, self.name = folder / name, name
         self.module = name.replace("-", "_")
         self.folder.mkdir(parents=True, exist_ok=True)
-        solution = loaded(self.generate("numpy", "_numpy.py")).Solution()
+        module = self.generate("numpy", "_numpy.py")
+        self.calls_erf = "math.erf" in module.read_text()
+        solution = loaded(module).Solution()
         self.dimension, self.density = solution.DIMENSION, solution.density()
         self.X, self.t = self.points(solution)
         rows = [{"X": list(X), "t": t} for X, t in zip(self.X, self.t)]
-        out = call([mms, "eval", name, "--points", "-", "--json", "-"], input=json.dumps(rows).encode())
+        out = call([mms, "eval", self.given, "--points", "-", "--json", "-"], input=json.dumps(rows).encode())
         rows = json.loads(out)["rows"]
         self.exact = {field: np.array([row[field] for row in rows], dtype=float) for field in FIELDS}
         self.exact["rho0_b"] = self.density * self.exact["b"]
+        self.exact["static_force"] = self.density * (self.exact["b"] - self.exact["a"])
         P, F, J = (self.exact[field] for field in "PFJ")
         self.exact["sigma"] = np.einsum("nik,njk->nij", P, F) / J[:, None, None]
 
     def generate(self, target, ending):
-        call([self.mms, "gen", self.name, "--target", target, "--out", self.folder])
+        call([self.mms, "gen", self.given, "--target", target, "--out", self.folder])
         return self.folder / (self.module + ending)
 
     def points(self, solution):
@@ -84,7 +95,7 @@ class Case:
             exact = self.exact[field]
             values = np.asarray(values, dtype=float).reshape(exact.shape)
             if not np.array_equal(np.isnan(values), np.isnan(exact)):
-                return math.inf, field
+                return math.inf
             scale = np.max(np.abs(exact)) * 2.0**-52
             largest = np.max(np.abs(values - exact))
             if field == "sigma":
@@ -105,7 +116,7 @@ class Case:
         return found
 
 
-ALL = {**FIELDS, "rho0_b": 1, "sigma": 2}
+ALL = {**FIELDS, "rho0_b": 1, "static_force": 1, "sigma": 2}
 
 
 def cpp(case):
@@ -355,23 +366,41 @@ def openfoam(case):
     return {}
 
 
+def tried(run):
+    """The same, with nothing where the host has no words for the solution."""
+
+    def of_case(case):
+        try:
+            return run(case)
+        except Refused:
+            return None
+
+    return of_case
+
+
 def main():
     arguments = sys.argv[1:]
     mms, folder = Path(arguments[0]).resolve(), Path(arguments[1]).resolve()
     hosts = arguments[2:]
     names = sorted(path.stem for path in SPECS.glob("*.toml"))
     if hosts[0] == "--solutions":
-        names, hosts = (names if hosts[1] == "all" else hosts[1].split(",")), hosts[2:]
+        names, hosts = hosts[1].split(","), hosts[2:]
     with ThreadPoolExecutor(2) as pool:
         cases = list(pool.map(lambda name: Case(mms, folder, name), names))
         failed = False
         for host in hosts:
             if host == "moose":
                 moose_program(folder)
-            run = globals()[host]
-            chosen = [case for case in cases if host != "abaqus" or case.name in ("vortex", "skew-3d")]
+            run = tried(globals()[host])
+            chosen = cases
             compiled = host in ("cpp", "fortran", "openfoam", "abaqus", "moose")
             results = list((pool.map if compiled else map)(run, chosen))
+            refused = [case.name for case, found in zip(chosen, results) if found is None]
+            chosen, results = [c for c, f in zip(chosen, results) if f is not None], [f for f in results if f is not None]
+            if refused:
+                print(f"{host:8}refuses {len(refused)} solutions: {' '.join(refused)}")
+            if not chosen:
+                continue
             if host not in LARGEST:
                 print(f"{host:8}{len(chosen)} solutions")
                 continue
@@ -379,9 +408,12 @@ def main():
             name = max(worst, key=lambda name: worst[name])
             same = sum(1 for value in worst.values() if value == 0)
             print(f"{host:8}{len(chosen)} solutions, {POINTS} points each: {same} to the bit; largest difference {worst[name]:.3g} units ({name})")
-            if not worst[name] <= LARGEST[host]:
-                failed = True
-                print(f"{host}: more than {LARGEST[host]} units of 2^-52 of the largest entry: {worst}")
+            for case in chosen:
+                # The Rust functions have another library's error function.
+                allowed = LARGEST[host] + (1 if case.calls_erf else 0)
+                if not worst[case.name] <= allowed:
+                    failed = True
+                    print(f"{host}: {case.name}: {worst[case.name]} units of 2^-52 of the largest entry, more than {allowed}")
     sys.exit(1 if failed else 0)
 
 

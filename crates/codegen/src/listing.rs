@@ -175,7 +175,8 @@ coordinates: X is the REFERENCE position, in Cartesian components. A host that g
 stress: P is the first Piola-Kirchhoff stress, P[i][J] with i spatial and J reference, and the traction P N is per reference area. The nominal \
 stress is P transposed; the Cauchy stress is P F^T/J.
 time: t is the time of the state whose accelerations the force causes: the old time of an explicit step with centred differences, the new \
-time of an implicit step, and for generalised-alpha schemes the time at which they balance momentum.
+time of an implicit step, and for generalised-alpha schemes the time at which they balance momentum. A static problem has the deformation of a time t that stays, with the force -Div P = rho0 (b - a), static_force; a load \
+factor is that time.
 In two dimensions the deformation is plane strain. Units are those of the parameters; with SI units: u, X in m, P in Pa, b in m/s^2."
                 .lines()
                 .map(str::to_owned),

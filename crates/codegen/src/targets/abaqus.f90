@@ -3,10 +3,12 @@ module MODULE_host
   use MODULE
   implicit none
   private
-  public :: reference_position, force, force_at_reference, traction_at, per_current_volume
+  public :: reference_position, force, force_at_reference, traction_at, per_current_volume, is_static
 
   ! Whether the host's body loads are per current volume instead of per reference volume.
   logical :: per_current_volume = .false.
+  ! Whether the host solves a static problem, with the time as a load factor.
+  logical :: is_static = .false.
 
   type(solution), save :: s
   logical, save :: is_ready = .false.
@@ -127,7 +129,11 @@ contains
     integer, intent(in) :: i
     real(dp) :: values(DIMENSION)
     call make_ready()
-    values = rho0_b(s, X, t)
+    if (is_static) then
+      values = static_force(s, X, t)
+    else
+      values = rho0_b(s, X, t)
+    end if
     if (per_current_volume) values = values / J(s, X, t)
     force_at_reference = values(i)
   end function

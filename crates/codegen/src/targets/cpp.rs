@@ -239,6 +239,18 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
         return force;
     }}
 
+    // -Div P, the force per reference volume that holds the deformation of time t at rest
+    template <class Point>
+    std::array<support::Scalar<Point>, {d}> static_force(const Point &X, double t) const
+    {{
+        auto force = b(X, t);
+        const auto acceleration = a(X, t);
+        for (int i = 0; i < {d}; ++i) {{
+            force[i] = density() * (force[i] - acceleration[i]);
+        }}
+        return force;
+    }}
+
     // Cauchy stress
     template <class Point>
     std::array<std::array<support::Scalar<Point>, {d}>, {d}> sigma(const Point &X, double t) const

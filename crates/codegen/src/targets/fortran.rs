@@ -125,7 +125,7 @@ pub(super) fn module(code: &Code<'_>) -> String {
   use, intrinsic :: iso_fortran_env, only: dp => real64, int64
   implicit none
   private
-  public :: dp, parameters, solution, prepare, rho0_b, sigma
+  public :: dp, parameters, solution, prepare, rho0_b, static_force, sigma
 "
     );
     text += &items.iter().map(|item| format!("  public :: {}\n", item.name)).collect::<String>();
@@ -249,6 +249,14 @@ impl Fortran {
     real(dp), intent(in) :: X({d}), t
     real(dp) :: values({d})
     values = density(s) * b(s, X, t)
+  end function
+
+  ! -Div P, the force per reference volume that holds the deformation of time t at rest
+  pure function static_force(s, X, t) result(values)
+    type(solution), intent(in) :: s
+    real(dp), intent(in) :: X({d}), t
+    real(dp) :: values({d})
+    values = density(s) * (b(s, X, t) - a(s, X, t))
   end function
 
   ! Cauchy stress

@@ -169,6 +169,9 @@ function Solution(given::Pair...)
 # body force per unit reference volume
 rho0_b(s, X, t) = density(s) .* b(s, X, t)
 
+# -Div P, the force per reference volume that holds the deformation of time t at rest
+static_force(s, X, t) = density(s) .* (b(s, X, t) .- a(s, X, t))
+
 # Cauchy stress
 function sigma(s, X, t)
     gradient, volume, stress = F(s, X, t), J(s, X, t), P(s, X, t)

@@ -144,6 +144,8 @@ impl Python {
             text += &self.item(code, &item);
         }
         text += "\n    def rho0_b(self, X, t):\n        # body force per unit reference volume\n        return self.density() * self.b(X, t)\n";
+        text += "\n    def static_force(self, X, t):\n        # -Div P, the force per reference volume that holds the \
+                 deformation of time t at rest\n        return self.density() * (self.b(X, t) - self.a(X, t))\n";
         text += "\n    def sigma(self, X, t):\n        # Cauchy stress\n        F, J, P = self.F(X, t), self.J(X, t), self.P(X, t)\n";
         text + self.cauchy
     }
