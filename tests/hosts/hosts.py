@@ -96,7 +96,11 @@ class Case:
             values = np.asarray(values, dtype=float).reshape(exact.shape)
             if not np.array_equal(np.isnan(values), np.isnan(exact)):
                 return math.inf
-            scale = np.max(np.abs(exact)) * 2.0**-52
+            size = np.max(np.abs(exact))
+            if field == "static_force":
+                # A difference of two forces.
+                size = max(size, np.max(np.abs(self.density * self.exact["a"])))
+            scale = size * 2.0**-52
             largest = np.max(np.abs(values - exact))
             if field == "sigma":
                 # A product of results, in an order of the host's own.
@@ -157,7 +161,7 @@ def abaqus(case):
     found = np.frombuffer(flat, dtype=float).reshape(POINTS, 2, case.dimension)
     scale = np.max(np.abs(case.exact["rho0_b"]))
     largest = np.max(np.abs(found - case.exact["rho0_b"][:, None, :]))
-    print(f"abaqus  {case.name:18} b(X) from x = X + u: {largest / scale if scale else largest:.1e} of the largest")
+    print(f"abaqus   {case.name:18} b(X) from x = X + u: {largest / scale if scale else largest:.1e} of the largest")
     if not largest <= 1e-12 * scale:
         raise SystemExit(f"abaqus: {case.name}: the force at current positions is off by {largest}")
     return {}
@@ -398,16 +402,16 @@ def main():
             refused = [case.name for case, found in zip(chosen, results) if found is None]
             chosen, results = [c for c, f in zip(chosen, results) if f is not None], [f for f in results if f is not None]
             if refused:
-                print(f"{host:8}refuses {len(refused)} solutions: {' '.join(refused)}")
+                print(f"{host:9}refuses {len(refused)} solutions: {' '.join(refused)}")
             if not chosen:
                 continue
             if host not in LARGEST:
-                print(f"{host:8}{len(chosen)} solutions")
+                print(f"{host:9}{len(chosen)} solutions")
                 continue
             worst = {case.name: case.compare(found) for case, found in zip(chosen, results)}
             name = max(worst, key=lambda name: worst[name])
             same = sum(1 for value in worst.values() if value == 0)
-            print(f"{host:8}{len(chosen)} solutions, {POINTS} points each: {same} to the bit; largest difference {worst[name]:.3g} units ({name})")
+            print(f"{host:9}{len(chosen)} solutions, {POINTS} points each: {same} to the bit; largest difference {worst[name]:.3g} units ({name})")
             for case in chosen:
                 # The Rust functions have another library's error function.
                 allowed = LARGEST[host] + (1 if case.calls_erf else 0)
