@@ -148,7 +148,8 @@ fn check_compares_with_another_folder_and_writes_nothing() {
     assert_eq!(status, Some(0));
     assert_eq!(check(folder.path()).0, Some(0));
     let header = folder.path().join("ring.h");
-    let changed = std::fs::read_to_string(&header).unwrap().replacen("const double t", "const double  t", 1);
+    let changed =
+        std::fs::read_to_string(&header).unwrap().replacen("const double t", "const double  t", 1);
     std::fs::write(&header, changed).unwrap();
     let (status, out, _) = check(folder.path());
     assert_eq!(status, Some(1));

@@ -139,7 +139,7 @@ impl Python {
                 ))
             );
         }
-        text += &format!("        self.fixed = [{}]\n", fixed.join(", "));
+        text += &format!("        self.fixed = [float(x) for x in [{}]]\n", fixed.join(", "));
         for item in code.functions() {
             text += &self.item(code, &item);
         }
