@@ -52,7 +52,6 @@ fn every_host_writes_or_says_which_function_it_lacks() {
                         host.name,
                         spec.name
                     );
-                    assert!(!text.contains('#') || host.name != "fortran", "a placeholder is left");
                 }
                 Err(error) => {
                     let Unwritable::Function { target, function, solution } = &error;
@@ -138,10 +137,9 @@ fn names_of_parameters_are_the_specifications_business() {
         ("cpp", &["namespace class_ {", "double lambda = 2.0;"]),
         ("numpy", &["\"lambda\": 2.0", "def lambda_(self)"]),
         ("julia", &["\"end\" => (-1e-9)", "function lambda(s)"]),
-        ("kratos", &["(0.1*1.0)"]),
     ];
     for (name, parts) in cases {
-        let text = host(name).source(&code).unwrap().replace("0.1 * 1.0", "0.1*1.0");
+        let text = host(name).source(&code).unwrap();
         for part in parts {
             assert!(text.contains(part), "{name}: no {part} in\n{text}");
         }

@@ -27,8 +27,8 @@ contains
     is_ready = .true.
   end subroutine
 
-  ! The X of the body with x = X + u(X, t): by Newton's method from x itself, and where that leads nowhere or out of the body, where the
-  ! formulas may reach the same x again, from the place of a lattice that is carried next to x.
+  ! The X of the body with x = X + u(X, t): by Newton's method from x itself; where that leads nowhere, or out of the
+  ! body, where the formulas may reach the same x again, from the place of a lattice that is carried next to x.
   function reference_position(x_now, t) result(X)
     real(dp), intent(in) :: x_now(DIMENSION), t
     real(dp) :: X(DIMENSION), place(DIMENSION), low(DIMENSION), high(DIMENSION), nearest, distance

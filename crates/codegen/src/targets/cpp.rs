@@ -1,8 +1,8 @@
 //! C++17 source: a header for any scalar type.
 
+use crate::c_names::{c_name, members};
 use crate::code::Code;
 use crate::function::digits;
-use crate::header::{c_name, members};
 use crate::listing::{Given, Item, commented};
 use crate::module::Names;
 use crate::runtime::{Primitive, Routine, WithRuntime};
