@@ -41,6 +41,7 @@ Dual sqrt(Dual x) { return {std::sqrt(x.value), 0.5 / std::sqrt(x.value) * x.slo
 Dual exp(Dual x) { return {std::exp(x.value), std::exp(x.value) * x.slope}; }
 Dual log(Dual x) { return {std::log(x.value), x.slope / x.value}; }
 Dual log1p(Dual x) { return {std::log1p(x.value), x.slope / (1.0 + x.value)}; }
+Dual expm1(Dual x) { return {std::expm1(x.value), std::exp(x.value) * x.slope}; }
 Dual atan2(Dual y, Dual x)
 {
     const double square = x.value * x.value + y.value * y.value;

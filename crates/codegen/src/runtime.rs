@@ -434,7 +434,8 @@ mod tests {
             .map(|k| 0.013 * f64::from(k))
             .chain([1e-9, 0.999, 37.5, 1e4, 0.25, 0.5, 1.0])
             .collect();
-        let cases: [(&str, fn(f64) -> f64, bool); 12] = [
+        type Case = (&'static str, fn(f64) -> f64, bool);
+        let cases: [Case; 12] = [
             ("sin_pi", S::sin_pi, true),
             ("cos_pi", S::cos_pi, true),
             ("log_1p", S::log_1p, false),

@@ -1,6 +1,6 @@
 //! Expressions for FEBio, as XML.
 
-use super::strings::{Strings, head};
+use super::strings::{Field, Strings, head};
 use crate::code::Code;
 use crate::target::Unwritable;
 
@@ -47,15 +47,15 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<!--\n{}-->\n<mmsmith>\n",
         about.concat()
     );
-    let load = fields.iter().find(|(name, ..)| name == "b");
+    let load = fields.iter().find(|field| field.name == "b");
     text += "  <body_load type=\"non-const\">\n";
     for (index, axis) in ["x", "y", "z"].iter().enumerate() {
-        let component = load.and_then(|(_, _, entries)| entries.get(index));
+        let component = load.and_then(|field| field.entries.get(index));
         let force = component.map_or("0".to_owned(), |entry| format!("0-{}", entry.text));
         text += &format!("    <{axis}>{force}</{axis}>\n");
     }
     text += "  </body_load>\n";
-    for (name, about, entries) in &fields {
+    for Field { name, about, entries } in &fields {
         text += &format!("  <field name=\"{name}\"> <!-- {} -->\n", escaped(about));
         for entry in entries {
             text += &format!("    <entry name=\"{}\">{}</entry>\n", entry.name, entry.text);

@@ -1,6 +1,6 @@
 //! Expressions for Kratos, as JSON.
 
-use super::strings::{Entry, Strings, head};
+use super::strings::{Entry, Field, Strings, head};
 use crate::code::Code;
 use crate::target::Unwritable;
 use crate::text::one_line;
@@ -54,7 +54,7 @@ fn list(entries: &[String]) -> String {
 pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
     let about: Vec<String> = head(code, REMARKS).iter().map(|line| string(line)).collect();
     let mut text = format!("{{\n  \"about\": {}", list(&about));
-    for (name, about, entries) in KRATOS.fields(code)? {
+    for Field { name, about, entries } in KRATOS.fields(code)? {
         let expressions: Vec<String> =
             entries.iter().map(|Entry { text, .. }| string(text)).collect();
         text += &format!(",\n  {}: {}", string(&format!("about {name}")), string(&about));

@@ -1,6 +1,6 @@
 //! Input blocks for MOOSE.
 
-use super::strings::{Strings, head};
+use super::strings::{Field, Strings, head};
 use crate::code::Code;
 use crate::listing::commented;
 use crate::module::Names;
@@ -60,7 +60,7 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
         text += &format!("{prefix}_{name} = {}\n", MOOSE.constant(code, name));
     }
     text += "\n[Functions]\n";
-    for (_, about, entries) in MOOSE.fields(code)? {
+    for Field { about, entries, .. } in MOOSE.fields(code)? {
         text += &format!("  # {about}\n");
         for entry in entries {
             text += &format!(

@@ -26,21 +26,25 @@ pub(crate) struct Strings {
     pub(crate) names_values: bool,
 }
 
+/// A field as expressions.
+pub(crate) struct Field {
+    pub(crate) name: String,
+    /// What it is, in words.
+    pub(crate) about: String,
+    /// Row by row.
+    pub(crate) entries: Vec<Entry>,
+}
+
 /// An entry of a field.
 pub(crate) struct Entry {
     /// The field's letter and the indices, as `P_01`.
     pub(crate) name: String,
-    /// The indices.
-    pub(crate) place: Vec<usize>,
     pub(crate) text: String,
 }
 
 impl Strings {
     /// The fields, the tractions and `rho0_b`, with a word about each.
-    pub(crate) fn fields(
-        &self,
-        code: &Code<'_>,
-    ) -> Result<Vec<(String, String, Vec<Entry>)>, Unwritable> {
+    pub(crate) fn fields(&self, code: &Code<'_>) -> Result<Vec<Field>, Unwritable> {
         let mut all = Vec::new();
         let density = self.constant(code, "density");
         for item in code.functions().iter().filter(|item| item.given == Given::PositionAndTime) {
@@ -48,16 +52,15 @@ impl Strings {
             if item.name == "b" {
                 let scaled = entries.iter().map(|entry| Entry {
                     name: format!("rho0_{}", entry.name),
-                    place: entry.place.clone(),
                     text: self.scaled(&entry.text, density),
                 });
-                all.push((
-                    "rho0_b".to_owned(),
-                    "body force per unit reference volume".to_owned(),
-                    scaled.collect(),
-                ));
+                all.push(Field {
+                    name: "rho0_b".to_owned(),
+                    about: "body force per unit reference volume".to_owned(),
+                    entries: scaled.collect(),
+                });
             }
-            all.push((item.name.clone(), item.about.clone(), entries));
+            all.push(Field { name: item.name.clone(), about: item.about.clone(), entries });
         }
         Ok(all)
     }
@@ -89,7 +92,7 @@ impl Strings {
                 let places: String = place.iter().map(usize::to_string).collect();
                 let joint = if places.is_empty() { "" } else { "_" };
                 let text = self.expression(code, item, index)?;
-                Ok(Entry { name: format!("{}{joint}{places}", item.name), place, text })
+                Ok(Entry { name: format!("{}{joint}{places}", item.name), text })
             })
             .collect()
     }
@@ -179,7 +182,8 @@ impl Strings {
     /// `ln(1 + x)`.
     fn logarithm(&self, code: &Code<'_>, x: &str) -> Result<String, Unwritable> {
         let y = format!("(1.0 + {x})");
-        let ln = self.call(code, Called::Library("log"), Function::Ln1p, &[y.clone()])?;
+        let ln =
+            self.call(code, Called::Library("log"), Function::Ln1p, std::slice::from_ref(&y))?;
         Ok(format!("({ln}*(({x} + 1e-300)/(({y} - 1.0) + 1e-300)))"))
     }
 
