@@ -1,5 +1,5 @@
 // Evaluates a generated C++ header at the points of a file of doubles: the number of points, then for each X and t. Writes u, v, a, H, F,
-// J, P, b, rho0_b, static_force and sigma of each point. Compiled with -DHEADER, -DSPACE.
+// J, P, b, rho0_b, static_force, sigma and S of each point. Compiled with -DHEADER, -DSPACE.
 #include HEADER
 
 #include <cstdio>
@@ -89,6 +89,7 @@ int main()
         write(s.rho0_b(point, t));
         write(s.static_force(point, t));
         write(s.sigma(point, t));
+        write(s.S(point, t));
 #ifdef DUALS
         // The derivatives of u are H.
         const auto H = s.H(point, t);
@@ -100,6 +101,7 @@ int main()
             const auto u = s.u(X, t);
             s.static_force(X, t);
             s.sigma(X, t);
+            s.S(X, t);
             for (int i = 0; i < d; ++i) {
                 if (!(std::abs(u[i].slope - H[i][j]) <= 1e-12 * (1.0 + std::abs(H[i][j])))) {
                     std::fprintf(stderr, "du_%d/dX_%d by dual numbers is %.17g, H is %.17g\n", i, j, u[i].slope, H[i][j]);

@@ -19,6 +19,7 @@ program fields
     X = point(1:d)
     t = point(d + 1)
     write (output) u(s, X, t), v(s, X, t), a(s, X, t), transpose(H(s, X, t)), transpose(F(s, X, t)), J(s, X, t), &
-      transpose(P(s, X, t)), b(s, X, t), rho0_b(s, X, t), static_force(s, X, t), transpose(sigma(s, X, t))
+      transpose(P(s, X, t)), b(s, X, t), rho0_b(s, X, t), static_force(s, X, t), transpose(sigma(s, X, t)), &
+      transpose(pk2(s, X, t))
   end do
 end program

@@ -104,25 +104,6 @@ contains
     is_inside = INSIDE
   end function
 
-  ! The y of A y = r by Gauss's elimination with the largest pivots.
-  pure function solved(A, r) result(y)
-    real(dp), intent(in) :: A(DIMENSION, DIMENSION), r(DIMENSION)
-    real(dp) :: y(DIMENSION), M(DIMENSION, DIMENSION + 1), row(DIMENSION + 1)
-    integer :: i, k, largest
-    M(:, 1:DIMENSION) = A
-    M(:, DIMENSION + 1) = r
-    do k = 1, DIMENSION
-      largest = k - 1 + maxloc(abs(M(k:, k)), dim=1)
-      row = M(largest, :)
-      M(largest, :) = M(k, :)
-      M(k, :) = row / row(k)
-      do i = 1, DIMENSION
-        if (i /= k) M(i, :) = M(i, :) - M(i, k) * M(k, :)
-      end do
-    end do
-    y = M(:, DIMENSION + 1)
-  end function
-
   ! Component i of the force per volume at the reference position X.
   real(dp) function force_at_reference(X, t, i)
     real(dp), intent(in) :: X(DIMENSION), t

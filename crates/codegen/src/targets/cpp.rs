@@ -12,7 +12,7 @@ use mmsmith_stage::{Operand, Shape};
 use std::borrow::Cow;
 
 const REMARKS: &str = "\
-C++17, this header alone. mms::NAME::Solution s(p); with mms::NAME::Parameters p; p.A = 0.1; has u, v, a, H, F, J, P, b, rho0_b, sigma and tractions as \
+C++17, this header alone. mms::NAME::Solution s(p); with mms::NAME::Parameters p; p.A = 0.1; has u, v, a, H, F, J, P, b, rho0_b, static_force, sigma, S and tractions as \
 s.u(X, t), and constants as s.density(). It throws std::invalid_argument for parameters that are not admissible. X is anything that X[i] reads: \
 an array, a pointer, a Point of deal.II, a Vector of MFEM, a tensor of smith; results are std::array, of rows for matrices, of X's scalar type. \
 That may be a dual number: it needs arithmetic with double, comparisons, functions that argument-dependent look-up finds, and a conversion to \
@@ -25,6 +25,7 @@ const SUPPORT: &str = r#"
 #include <cmath>
 #include <stdexcept>
 #include <type_traits>
+#include <utility>
 
 #ifndef MMSMITH_CPP
 #define MMSMITH_CPP 1
@@ -99,6 +100,33 @@ template <class T>
 T size(const T &x)
 {
     return x < 0.0 ? T(-x) : x;
+}
+
+// The Y of A Y = R by Gauss's elimination with the largest pivots.
+template <class T, std::size_t d>
+std::array<std::array<T, d>, d> solved(std::array<std::array<T, d>, d> A, std::array<std::array<T, d>, d> R)
+{
+    for (std::size_t k = 0; k < d; ++k) {
+        std::size_t largest = k;
+        for (std::size_t i = k + 1; i < d; ++i) {
+            largest = std::abs(plain(A[i][k])) > std::abs(plain(A[largest][k])) ? i : largest;
+        }
+        std::swap(A[k], A[largest]);
+        std::swap(R[k], R[largest]);
+        for (std::size_t i = 0; i < d; ++i) {
+            const T share = A[i][k] / A[k][k];
+            for (std::size_t j = 0; j < d && i != k; ++j) {
+                A[i][j] = A[i][j] - share * A[k][j];
+                R[i][j] = R[i][j] - share * R[k][j];
+            }
+        }
+    }
+    for (std::size_t i = 0; i < d; ++i) {
+        for (std::size_t j = 0; j < d; ++j) {
+            R[i][j] = R[i][j] / A[i][i];
+        }
+    }
+    return R;
 }
 
 }  // namespace support
@@ -268,6 +296,13 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
             }}
         }}
         return product;
+    }}
+
+    // second Piola-Kirchhoff stress
+    template <class Point>
+    std::array<std::array<support::Scalar<Point>, {d}>, {d}> S(const Point &X, double t) const
+    {{
+        return support::solved(F(X, t), P(X, t));
     }}
 
 private:

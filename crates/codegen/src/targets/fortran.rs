@@ -125,7 +125,7 @@ pub(super) fn module(code: &Code<'_>) -> String {
   use, intrinsic :: iso_fortran_env, only: dp => real64, int64
   implicit none
   private
-  public :: dp, parameters, solution, prepare, rho0_b, static_force, sigma
+  public :: dp, parameters, solution, prepare, rho0_b, static_force, sigma, pk2, solved
 "
     );
     text += &items.iter().map(|item| format!("  public :: {}\n", item.name)).collect::<String>();
@@ -267,6 +267,38 @@ impl Fortran {
     stress = P(s, X, t)
     gradient = F(s, X, t)
     values = matmul(stress, transpose(gradient)) / J(s, X, t)
+  end function
+
+  ! second Piola-Kirchhoff stress (S and s are one name in Fortran)
+  pure function pk2(s, X, t) result(values)
+    type(solution), intent(in) :: s
+    real(dp), intent(in) :: X({d}), t
+    real(dp) :: values({d}, {d}), stress({d}, {d}), gradient({d}, {d})
+    integer :: column
+    stress = P(s, X, t)
+    gradient = F(s, X, t)
+    do column = 1, {d}
+      values(:, column) = solved(gradient, stress(:, column))
+    end do
+  end function
+
+  ! The y of A y = r by Gauss's elimination with the largest pivots.
+  pure function solved(A, r) result(y)
+    real(dp), intent(in) :: A({d}, {d}), r({d})
+    real(dp) :: y({d}), M({d}, {d} + 1), row({d} + 1)
+    integer :: i, k, largest
+    M(:, 1:{d}) = A
+    M(:, {d} + 1) = r
+    do k = 1, {d}
+      largest = k - 1 + maxloc(abs(M(k:, k)), dim=1)
+      row = M(largest, :)
+      M(largest, :) = M(k, :)
+      M(k, :) = row / row(k)
+      do i = 1, {d}
+        if (i /= k) M(i, :) = M(i, :) - M(i, k) * M(k, :)
+      end do
+    end do
+    y = M(:, {d} + 1)
   end function
 "
         )

@@ -11,7 +11,7 @@ const JAX: Python = Python {
     primitive,
     remarks: "\
 Python with JAX alone, in double precision: call jax.config.update(\"jax_enable_x64\", True) first. s = Solution(A=0.1) has u, v, a, H, F, J, P, b, \
-rho0_b, sigma and tractions as s.u(X, t), and constants as s.density(). X has the shape (..., dimension); results have the shapes (..., dimension), \
+rho0_b, static_force, sigma, S and tractions as s.u(X, t), and constants as s.density(). X has the shape (..., dimension); results have the shapes (..., dimension), \
 (..., dimension, dimension) or (...). All of them can be traced, mapped and differentiated: jax.jacfwd(s.u)(X, t) at a point is s.H(X, t).
 JAX's functions differ from the C library's in last bits, and XLA may fuse a product with a sum.",
     preamble: "
@@ -43,6 +43,7 @@ def _matrix(x, t, rows):
     demands: "        if not jax.config.jax_enable_x64:
             raise RuntimeError('JAX computes in single precision; call jax.config.update(\"jax_enable_x64\", True) first')\n",
     cauchy: "        return jnp.einsum(\"...ik,...jk->...ij\", P, F) / J[..., None, None]\n",
+    second: "        return jnp.linalg.solve(F, P)\n",
 };
 
 fn function(called: Called) -> Cow<'static, str> {

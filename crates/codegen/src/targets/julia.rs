@@ -12,7 +12,7 @@ use mmsmith_stage::{Operand, Shape};
 use std::borrow::Cow;
 
 const REMARKS: &str = "\
-Julia, this file alone: include(\"FILE\"); s = MODULE.Solution(\"A\" => 0.1); MODULE.u(s, X, t), and so v, a, H, F, J, P, b, rho0_b, sigma and tractions; \
+Julia, this file alone: include(\"FILE\"); s = MODULE.Solution(\"A\" => 0.1); MODULE.u(s, X, t), and so v, a, H, F, J, P, b, rho0_b, static_force, sigma, S and tractions; \
 constants as MODULE.density(s). X is anything that X[1] reads: a Point or VectorValue of Gridap, a Vec of Ferrite, an SVector, a tuple. Vectors are \
 tuples, matrices tuples of rows: VectorValue(MODULE.b(s, X, t)...), Vec(MODULE.b(s, X, t)). Numbers of any type that has Julia's functions serve, dual \
 numbers among them.
@@ -176,6 +176,13 @@ static_force(s, X, t) = density(s) .* (b(s, X, t) .- a(s, X, t))
 function sigma(s, X, t)
     gradient, volume, stress = F(s, X, t), J(s, X, t), P(s, X, t)
     return ntuple(i -> ntuple(j -> sum(stress[i][k] * gradient[j][k] for k in 1:{d}) / volume, {d}), {d})
+end
+
+# second Piola-Kirchhoff stress
+function S(s, X, t)
+    gradient, stress = F(s, X, t), P(s, X, t)
+    second = [gradient[i][j] for i in 1:{d}, j in 1:{d}] \\ [stress[i][j] for i in 1:{d}, j in 1:{d}]
+    return ntuple(i -> ntuple(j -> second[i, j], {d}), {d})
 end
 
 end # module

@@ -10,7 +10,7 @@ const NUMPY: Python = Python {
     function,
     primitive,
     remarks: "\
-Python with NumPy alone. s = Solution(A=0.1) has u, v, a, H, F, J, P, b, rho0_b, sigma and tractions as s.u(X, t), and constants as s.density().
+Python with NumPy alone. s = Solution(A=0.1) has u, v, a, H, F, J, P, b, rho0_b, static_force, sigma, S and tractions as s.u(X, t), and constants as s.density().
 X has the shape (..., dimension) and t is a number or an array of the shape (...); results have the shapes (..., dimension), (..., dimension, \
 dimension) or (...). Hosts that give points as columns, such as scikit-fem and dolfinx, take lambda x: s.u(x.T, t).T for a table of points.
 NumPy's functions differ from the C library's in last bits.",
@@ -42,6 +42,7 @@ def _matrix(x, t, rows):
     decorator: "@np.errstate(all=\"ignore\")\n",
     demands: "",
     cauchy: "        return np.einsum(\"...ik,...jk->...ij\", P, F) / J[..., None, None]\n",
+    second: "        return np.linalg.solve(F, P)\n",
 };
 
 fn function(called: Called) -> Cow<'static, str> {

@@ -24,6 +24,8 @@ pub(crate) struct Python {
     pub(crate) demands: &'static str,
     /// The Cauchy stress from `F`, `J` and `P`.
     pub(crate) cauchy: &'static str,
+    /// The second Piola-Kirchhoff stress from `F` and `P`.
+    pub(crate) second: &'static str,
 }
 
 impl Target for Python {
@@ -147,7 +149,9 @@ impl Python {
         text += "\n    def static_force(self, X, t):\n        # -Div P, the force per reference volume that holds the \
                  deformation of time t at rest\n        return self.density() * (self.b(X, t) - self.a(X, t))\n";
         text += "\n    def sigma(self, X, t):\n        # Cauchy stress\n        F, J, P = self.F(X, t), self.J(X, t), self.P(X, t)\n";
-        text + self.cauchy
+        text += self.cauchy;
+        text += "\n    def S(self, X, t):\n        # second Piola-Kirchhoff stress\n        F, P = self.F(X, t), self.P(X, t)\n";
+        text + self.second
     }
 
     fn routine(&self, routine: &Routine) -> String {

@@ -10,7 +10,7 @@ const UFL: Python = Python {
     function,
     primitive,
     remarks: "\
-Python with UFL alone. s = Solution(A=0.1) has u, v, a, H, F, J, P, b, rho0_b, sigma and tractions as expressions, s.u(X, t) with \
+Python with UFL alone. s = Solution(A=0.1) has u, v, a, H, F, J, P, b, rho0_b, static_force, sigma, S and tractions as expressions, s.u(X, t) with \
 X = ufl.SpatialCoordinate(mesh) on the REFERENCE mesh and t a number or a Constant, and constants as s.density().
 P[i, J] is what inner(P, grad(v)) takes with UFL's grad, whose last index is that of the derivative: no transpose. The form of the body force is \
 inner(s.rho0_b(X, t), v)*dx. Raise the quadrature degree: expressions have an estimated degree that is large.
@@ -41,6 +41,7 @@ def _matrix(x, t, rows):
     decorator: "",
     demands: "",
     cauchy: "        return P * ufl.transpose(F) / J\n",
+    second: "        return ufl.inv(F) * P\n",
 };
 
 fn function(called: Called) -> Cow<'static, str> {
