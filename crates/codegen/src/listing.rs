@@ -234,3 +234,28 @@ pub(crate) fn commented(lines: &[String], sign: &str, width: usize) -> String {
     }
     text
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Every line of a comment begins as one, and has no more characters than it may.
+        #[test]
+        fn no_text_leaves_a_comment(
+            text in r#"([-*/!#"\\\n\r =<>$&']|\PC){0,300}"#,
+            sign in prop::sample::select(vec!["!", "#", "//", "    !"]),
+        ) {
+            let lines = commented(&[comment(&text), comment(&text)], sign, 60);
+            for line in lines.lines() {
+                prop_assert!(line.starts_with(sign), "{line:?}");
+                let rest = &line[sign.len()..];
+                // What follows the sign directly may be a directive.
+                prop_assert!(rest.is_empty() || rest.starts_with(' '), "{line:?}");
+                prop_assert!(line.len() <= 64 && !line.ends_with('\\'), "{line:?}");
+            }
+            prop_assert!(!lines.contains('\r'));
+        }
+    }
+}

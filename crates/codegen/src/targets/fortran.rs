@@ -94,6 +94,9 @@ fn string(text: &str) -> String {
         .take(500)
         .map(|c| if (' '..='~').contains(&c) && c != '\\' { c } else { '_' })
         .collect();
+    if safe.is_empty() {
+        return "\"\"".into();
+    }
     let pieces = safe
         .chunks(50)
         .map(|piece| format!("\"{}\"", String::from_iter(piece).replace('"', "\"\"")));
@@ -377,4 +380,23 @@ fn broken(statement: &str) -> String {
         length += word.len();
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn no_text_ends_a_string(text in r#"(["\\\n\r $%'&]|\PC){0,200}"#) {
+            for line in string(&text).split('\n') {
+                let piece = line.trim_start().trim_end_matches(" // &");
+                let inner = piece.strip_prefix('"').and_then(|rest| rest.strip_suffix('"'));
+                let marks = inner.map(|inner| inner.replace("\"\"", ""));
+                prop_assert!(marks.is_some_and(|rest| !rest.contains(['"', '\\'])), "{line}");
+                prop_assert!(line.is_ascii() && line.len() <= 132, "{line}");
+            }
+        }
+    }
 }

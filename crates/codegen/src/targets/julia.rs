@@ -220,3 +220,26 @@ fn julia_item(code: &Code<'_>, item: &Item) -> String {
     };
     text + &format!("    return {value}\nend\n")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn no_text_ends_a_string(text in r#"(["\\\n\r $%'&]|\PC){0,200}"#) {
+            let literal = string(&text);
+            let inner = &literal[1..literal.len() - 1];
+            prop_assert!(inner.is_ascii() && !inner.contains('\n'));
+            let mut characters = inner.chars();
+            while let Some(c) = characters.next() {
+                // Quotation marks and dollar signs are escaped, and the last backslash escapes something.
+                prop_assert!(!['"', '$'].contains(&c), "{literal}");
+                if c == '\\' {
+                    prop_assert!(characters.next().is_some(), "{literal}");
+                }
+            }
+        }
+    }
+}

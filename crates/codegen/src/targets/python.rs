@@ -203,3 +203,26 @@ impl Python {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn no_text_ends_a_string(text in r#"(["\\\n\r $%'&]|\PC){0,200}"#) {
+            let literal = string(&text);
+            let inner = &literal[1..literal.len() - 1];
+            prop_assert!(inner.is_ascii() && !inner.contains('\n'));
+            let mut characters = inner.chars();
+            while let Some(c) = characters.next() {
+                // Quotation marks are escaped, and the last backslash escapes something.
+                prop_assert!(!['"'].contains(&c), "{literal}");
+                if c == '\\' {
+                    prop_assert!(characters.next().is_some(), "{literal}");
+                }
+            }
+        }
+    }
+}
