@@ -149,7 +149,7 @@ impl Code<'_> {
 
     /// The head of a file, a line each: the solution, where it comes from, what `host` adds, and the conventions that decide
     /// whether a run agrees.
-    pub(crate) fn head_for_host(&self, host: &[String]) -> Vec<String> {
+    pub(crate) fn head_for_host(&self, host: &str) -> Vec<String> {
         let spec = self.spec;
         let mut lines = vec![format!("{}.", spec.title)];
         lines.extend(self.head());
@@ -166,7 +166,7 @@ impl Code<'_> {
             lines.push(format!("Source: {}.", spec.reference));
         }
         lines.push(String::new());
-        lines.extend(host.iter().cloned());
+        lines.extend(host.lines().map(str::to_owned));
         lines.extend(
             "
 force: b is per unit MASS; rho0_b = density b is per unit REFERENCE volume; per unit current volume it is rho0_b/J. The balance \

@@ -194,7 +194,6 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
     let guard = format!("MMSMITH_{}_HPP", space.to_ascii_uppercase());
     let cpp = Cpp { members: members(&spec.parameters) };
     let remarks = REMARKS.replace("NAME", &space);
-    let remarks: Vec<String> = remarks.lines().map(str::to_owned).collect();
     let mut text = commented(&code.head_for_host(&remarks), "//", 118);
     text += &format!(
         "#ifndef {guard}\n#define {guard} 1\n{SUPPORT}\nnamespace mms {{\nnamespace {space} {{\n\n"

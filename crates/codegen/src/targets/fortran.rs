@@ -89,11 +89,8 @@ fn members(parameters: &[Parameter]) -> Vec<String> {
 
 /// A string in pieces that fit into lines.
 fn string(text: &str) -> String {
-    let safe: Vec<char> = one_line(text)
-        .chars()
-        .take(500)
-        .map(|c| if (' '..='~').contains(&c) && c != '\\' { c } else { '_' })
-        .collect();
+    let safe = |c| if (' '..='~').contains(&c) && c != '\\' { c } else { '_' };
+    let safe: Vec<char> = one_line(text).chars().take(500).map(safe).collect();
     if safe.is_empty() {
         return "\"\"".into();
     }
@@ -114,8 +111,7 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
 
 /// The head of a file, after a line `start`.
 pub(super) fn with_head(code: &Code<'_>, remarks: &str, start: &str) -> String {
-    let remarks: Vec<String> = remarks.lines().map(str::to_owned).collect();
-    start.to_owned() + &commented(&code.head_for_host(&remarks), "!", 110)
+    start.to_owned() + &commented(&code.head_for_host(remarks), "!", 110)
 }
 
 /// The module of the fields.

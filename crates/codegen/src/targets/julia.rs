@@ -100,7 +100,6 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
     let module = format!("Mms{}", names.solution);
     let remarks =
         REMARKS.replace("MODULE", &module).replace("FILE", &format!("{}.jl", names.module));
-    let remarks: Vec<String> = remarks.lines().map(str::to_owned).collect();
     let mut text = commented(&code.head_for_host(&remarks), "#", 118);
     text += &format!(
         "\nmodule {module}\n\nmmsmith_log(x) = x > 0 ? log(x) : x == 0 ? oftype(float(x), -Inf) : oftype(float(x), NaN)\n"

@@ -17,7 +17,6 @@ The source is rho0_b, a force per reference volume, for equations that have rho 
 pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
     let module = Names::of(&code.spec.name).module;
     let remarks = REMARKS.replace("NAME", &code.spec.name);
-    let remarks: Vec<String> = remarks.lines().map(str::to_owned).collect();
     let head = commented(&code.head_for_host(&remarks), "//", 118);
     let fragments = include_str!("openfoam.template")
         .replace("MODULE", &module)

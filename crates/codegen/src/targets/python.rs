@@ -89,10 +89,9 @@ impl Python {
     /// The text of a module.
     pub(crate) fn source(&self, code: &Code<'_>) -> String {
         let spec = code.spec;
-        let remarks: Vec<String> = self.remarks.lines().map(str::to_owned).collect();
         // A first line without text of the specification: one of the first two lines may name another encoding.
         let mut text = String::from("# -*- coding: utf-8 -*-\n");
-        text += &commented(&code.head_for_host(&remarks), "#", 118);
+        text += &commented(&code.head_for_host(self.remarks), "#", 118);
         text += self.preamble;
         for routine in code.routines(self) {
             text += &self.routine(&routine);

@@ -217,10 +217,9 @@ pub(crate) fn number(value: f64) -> String {
 
 /// A remark and the head of a file, in lines.
 pub(crate) fn head(code: &Code<'_>, remarks: &str) -> Vec<String> {
-    let remarks: Vec<String> = remarks.lines().chain([ACCURACY]).map(str::to_owned).collect();
     let values =
         code.spec.parameters.iter().map(|p| format!("{} = {}", p.name, digits_of(p.default)));
-    let mut lines = code.head_for_host(&remarks);
+    let mut lines = code.head_for_host(&format!("{remarks}\n{ACCURACY}"));
     lines.push(format!("Parameters: {}.", values.collect::<Vec<_>>().join(", ")));
     lines
 }
