@@ -1,9 +1,8 @@
-//! `cargo xtask gen`: specifications to Rust modules and C headers.
+//! `cargo xtask gen`: specifications to Rust modules, C headers and the files of other hosts.
 
 use crate::{read, write};
 use anyhow::{Context, anyhow, bail};
-use clap::ValueEnum;
-use mmsmith_codegen::{Code, Names, registry_source};
+use mmsmith_codegen::{Code, HOSTS, Host, Names, Unwritable, registry_source};
 use mmsmith_spec::Spec;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -16,38 +15,24 @@ pub(crate) struct Outcome {
     pub(crate) stale: bool,
 }
 
-/// A language that solutions are generated in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
-pub(crate) enum Target {
-    /// Modules of the crate of the solutions.
-    Rust,
-    /// C99 headers, for C, C++ and CUDA.
-    C,
+/// The folder of the repository that holds a host's files, if any.
+fn folder(host: &Host) -> Option<&'static str> {
+    match host.name {
+        "rust" => Some("crates/solutions/src/generated"),
+        // A folder of its own, so that with its parent among the include paths no header hides one of the system.
+        "c" => Some("crates/solutions/include/mmsmith"),
+        _ => None,
+    }
 }
 
-impl Target {
-    /// Where the files of the library are.
-    fn folder(self, repository: &Path) -> PathBuf {
-        repository.join(match self {
-            Target::Rust => "crates/solutions/src/generated",
-            // A folder of its own, so that with its parent among the include paths no header hides one of the system.
-            Target::C => "crates/solutions/include/mmsmith",
-        })
-    }
+/// The hosts whose files are in the repository.
+pub(crate) fn kept() -> Vec<&'static Host> {
+    HOSTS.iter().filter(|host| folder(host).is_some()).collect()
+}
 
-    fn extension(self) -> &'static str {
-        match self {
-            Target::Rust => "rs",
-            Target::C => "h",
-        }
-    }
-
-    fn source(self, code: &Code<'_>) -> String {
-        match self {
-            Target::Rust => code.module_source(),
-            Target::C => code.header_source(),
-        }
-    }
+/// The text of a file; a module is one of the crate of the solutions.
+fn source(host: &Host, code: &Code<'_>) -> Result<String, Unwritable> {
+    if host.name == "rust" { Ok(code.module_source()) } else { host.source(code) }
 }
 
 /// How the generator is run.
@@ -65,10 +50,17 @@ pub(crate) struct Options {
 pub(crate) fn run(
     repository: &Path,
     given: &[PathBuf],
-    targets: &[Target],
+    hosts: &[&Host],
     out: Option<&Path>,
     Options { check, times: tell_times }: Options,
 ) -> anyhow::Result<Outcome> {
+    let of_library = |host: &&&Host| folder(host).is_none() && out.is_none();
+    if let Some(host) = hosts.iter().find(of_library) {
+        bail!(
+            "the repository keeps no files for --target {0}: add --out DIR, as in `cargo xtask gen --target {0} --out code`",
+            host.name
+        );
+    }
     let library = repository.join("mms-specs");
     let all = library_specs(&library)?;
     let chosen = match given {
@@ -79,7 +71,7 @@ pub(crate) fn run(
     let mut sources: BTreeMap<String, Vec<String>> = BTreeMap::new();
     let mut times = vec!["milliseconds: read, derive and stage, write down (Rust, C)".to_owned()];
     let generated: Vec<_> =
-        chosen.par_iter().map(|path| generate(repository, path, targets)).collect();
+        chosen.par_iter().map(|path| generate(repository, path, hosts)).collect();
     for (path, generated) in chosen.iter().zip(generated) {
         let Generated { name, texts, times: spent } = generated?;
         let spent: Vec<String> = spent.iter().map(|t| format!("{:7.1}", 1e3 * t)).collect();
@@ -90,9 +82,9 @@ pub(crate) fn run(
     }
     let mut files: BTreeMap<PathBuf, Option<String>> = BTreeMap::new();
     for (name, texts) in &sources {
-        for (target, text) in targets.iter().zip(texts) {
-            let folder = out.map_or_else(|| target.folder(repository), Path::to_path_buf);
-            let file = folder.join(Names::of(name).module).with_extension(target.extension());
+        for (host, text) in hosts.iter().zip(texts) {
+            let own = repository.join(folder(host).unwrap_or_default());
+            let file = out.unwrap_or(&own).join(host.file_name(&Names::of(name).module));
             files.insert(file, Some(text.clone()));
         }
     }
@@ -101,12 +93,13 @@ pub(crate) fn run(
             all.iter().filter_map(|path| Some(path.file_stem()?.to_str()?.to_owned())).collect();
         names.extend(sources.keys().cloned());
         let mut listed = names.clone();
-        for &target in targets {
-            let orphans = orphans(&target.folder(repository), target.extension(), &names)?;
+        for host in hosts {
+            let own = repository.join(folder(host).unwrap_or_default());
+            let orphans = orphans(&own, host.ending, &names)?;
             if given.is_empty() {
                 // A file without a specification cannot be kept up to date.
                 files.extend(orphans.into_iter().map(|(path, _)| (path, None)));
-            } else if target == Target::Rust {
+            } else if host.name == "rust" {
                 listed.extend(orphans.into_iter().map(|(_, name)| name));
             }
         }
@@ -114,8 +107,10 @@ pub(crate) fn run(
         listed.dedup();
         let listed: Vec<&str> = listed.iter().map(String::as_str).collect();
         let registry = registry_source(&listed)?;
-        if targets.contains(&Target::Rust) {
-            files.insert(Target::Rust.folder(repository).join("mod.rs"), Some(registry));
+        if let Some(own) =
+            hosts.iter().find(|host| host.name == "rust").and_then(|host| folder(host))
+        {
+            files.insert(repository.join(own).join("mod.rs"), Some(registry));
         }
     }
     let mut outcome =
@@ -154,13 +149,13 @@ fn locate(library: &Path, given: &Path) -> anyhow::Result<PathBuf> {
 /// The code of one specification.
 struct Generated {
     name: String,
-    /// For each target.
+    /// For each host.
     texts: Vec<String>,
     /// Seconds for reading, for deriving and staging, and for each text.
     times: Vec<f64>,
 }
 
-fn generate(repository: &Path, path: &Path, targets: &[Target]) -> anyhow::Result<Generated> {
+fn generate(repository: &Path, path: &Path, hosts: &[&Host]) -> anyhow::Result<Generated> {
     let shown = path.strip_prefix(repository).unwrap_or(path).display().to_string();
     let mut started = Instant::now();
     let mut times = Vec::new();
@@ -176,8 +171,8 @@ fn generate(repository: &Path, path: &Path, targets: &[Target]) -> anyhow::Resul
     let code = Code::new(&spec).with_context(|| format!("cannot derive the fields of {shown}"))?;
     lap();
     let mut texts = Vec::new();
-    for target in targets {
-        texts.push(target.source(&code));
+    for host in hosts {
+        texts.push(source(host, &code)?);
         lap();
     }
     Ok(Generated { name: spec.name.clone(), texts, times })
@@ -186,7 +181,7 @@ fn generate(repository: &Path, path: &Path, targets: &[Target]) -> anyhow::Resul
 /// Generated files that belong to none of `names`, with the names that they stand for.
 fn orphans(
     folder: &Path,
-    extension: &str,
+    ending: &str,
     names: &[String],
 ) -> anyhow::Result<Vec<(PathBuf, String)>> {
     let known: Vec<String> = names.iter().map(|name| Names::of(name).module).collect();
@@ -197,9 +192,9 @@ fn orphans(
     }
     for entry in std::fs::read_dir(folder).with_context(context)? {
         let path = entry.with_context(context)?.path();
-        let Some(stem) = path.file_stem().and_then(|stem| stem.to_str()) else { continue };
-        let is_generated = path.extension().is_some_and(|found| found == extension);
-        if is_generated && stem != "mod" && !known.iter().any(|module| module == stem) {
+        let file = path.file_name().and_then(|name| name.to_str());
+        let Some(stem) = file.and_then(|name| name.strip_suffix(ending)) else { continue };
+        if stem != "mod" && !known.iter().any(|module| module == stem) {
             orphans.push((path.clone(), stem.replace('_', "-")));
         }
     }

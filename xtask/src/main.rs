@@ -1,8 +1,10 @@
 //! Tasks of the repository itself, behind the alias `cargo xtask`.
 
 use anyhow::{Context, bail};
-use clap::{Parser, Subcommand, ValueEnum};
-use generate::{Options, Target};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::{Parser, Subcommand};
+use generate::Options;
+use mmsmith_codegen::{HOSTS, Host};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -27,9 +29,9 @@ enum Task {
         /// Tell how long each specification took.
         #[arg(long)]
         times: bool,
-        /// Generate for this language only.
-        #[arg(long, value_enum)]
-        target: Option<Target>,
+        /// Generate for this language or host only; those but rust and c need --out.
+        #[arg(long, value_parser = hosts())]
+        target: Option<&'static Host>,
         /// Write the files into this folder instead, or check those there, and no list of solutions.
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
@@ -68,9 +70,9 @@ fn main() -> ExitCode {
 fn run(task: Task) -> anyhow::Result<ExitCode> {
     let (lines, failed) = match task {
         Task::Gen { check, times, target, out, specs } => {
-            let targets = target.map_or(Target::value_variants().to_vec(), |target| vec![target]);
+            let hosts = target.map_or_else(generate::kept, |host| vec![host]);
             let options = Options { check, times };
-            let outcome = generate::run(&repository(), &specs, &targets, out.as_deref(), options)?;
+            let outcome = generate::run(&repository(), &specs, &hosts, out.as_deref(), options)?;
             (outcome.lines, outcome.stale)
         }
         Task::Docs { write: true, mms, pages, .. } => {
@@ -86,6 +88,12 @@ fn run(task: Task) -> anyhow::Result<ExitCode> {
         say(line);
     }
     Ok(if failed { ExitCode::from(1) } else { ExitCode::SUCCESS })
+}
+
+/// Hosts, with a line about each.
+fn hosts() -> impl TypedValueParser<Value = &'static Host> {
+    let values = HOSTS.iter().map(|own| PossibleValue::new(own.name).help(own.about));
+    PossibleValuesParser::new(values).try_map(|name| Host::named(&name).ok_or(name))
 }
 
 /// The folder of the workspace.

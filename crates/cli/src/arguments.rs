@@ -49,7 +49,7 @@ pub(crate) use converge::ConvergeOptions;
 pub(crate) use coverage::CoverageOptions;
 pub(crate) use eval::EvalOptions;
 pub(crate) use explain::ExplainOptions;
-pub(crate) use generate::{GenerateOptions, Target};
+pub(crate) use generate::GenerateOptions;
 pub(crate) use list::ListOptions;
 pub(crate) use reproduce::ReproduceOptions;
 pub(crate) use resume::ResumeOptions;
@@ -127,7 +127,7 @@ pub(crate) enum Command {
     Explain(ExplainOptions),
     /// Measure which terms of the momentum balance each solution exercises, and name the fewest that test them all
     Coverage(CoverageOptions),
-    /// Write a solution as a C header or a Rust module, anywhere
+    /// Write a solution in the language of a host, anywhere
     Gen(GenerateOptions),
     /// Evaluate the exact fields at points of your own
     Eval(EvalOptions),

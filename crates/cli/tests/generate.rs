@@ -88,3 +88,24 @@ fn faults_are_planted_where_they_show() {
     );
     refuses(blind.path(), "gen ring --target c --out wrong --fault none", &["stress-transposed"]);
 }
+
+/// Other defaults, checked, in the file of any host.
+#[test]
+fn values_that_are_set_become_the_defaults_of_the_file() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    for (target, file, part) in [
+        ("c", "skew_2d.h", "p.A = 0.0625;"),
+        ("numpy", "skew_2d_numpy.py", "\"A\": 0.0625"),
+        ("fortran", "skew_2d.f90", ":: A = 0.0625_dp"),
+        ("kratos", "skew_2d_kratos.json", "0.0625"),
+    ] {
+        let called = mms(place, &format!("gen skew-2d --target {target} --out . --set A=0.0625"));
+        assert_eq!(called.status, 0, "{}", called.stderr);
+        assert!(fs::read_to_string(place.join(file)).unwrap().contains(part), "{file}");
+    }
+    let empty = tempfile::tempdir().unwrap();
+    refuses(empty.path(), "gen skew-2d --target c --out code --set nu=0.5", &["nu", "1/2"]);
+    refuses(empty.path(), "gen skew-2d --target c --out code --set B=1", &["--set", "B"]);
+    refuses(empty.path(), "gen skew-2d --target cobol --out code", &["fortran", "febio"]);
+}

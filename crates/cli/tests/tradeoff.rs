@@ -102,6 +102,18 @@ fn what_cannot_be_swept_is_refused() {
     refuses(place, "tradeoff rings --budget 1s", &["did you mean 'ring'"]);
 }
 
+/// Elements that hold the displacement show no order.
+#[test]
+fn explain_warns_of_displacements_that_elements_represent_exactly() {
+    let place = tempfile::tempdir().unwrap();
+    let called = mms(place.path(), "explain rigid-motion --json told.json");
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    assert!(called.stdout.contains("u is a polynomial of degree 1"), "{}", called.stdout);
+    let told = std::fs::read_to_string(place.path().join("told.json")).unwrap();
+    assert!(told.contains("\"polynomial_degree\": 1"), "{told}");
+    assert!(!mms(place.path(), "explain ring").stdout.contains("polynomial"));
+}
+
 #[test]
 fn explain_predicts_runs_of_every_grid() {
     let place = tempfile::tempdir().expect("a folder");

@@ -1,6 +1,6 @@
 //! Faults planted in the fields, for authors who test their own tests: code with a fault must fail them.
 //!
-//! Each fault is a mistake that published codes carry. It changes derived fields, so that generated Rust and C have the same one.
+//! Each fault is a mistake that published codes carry. It changes derived fields, so that generated code has the same one in every language.
 
 use mmsmith_expr::{Derivatives, Expr, Graph, Rational};
 use mmsmith_spec::{Domain, Fields, Law, Spec};

@@ -1,6 +1,7 @@
 //! Blocks of operations as Rust statements.
 
-use crate::text::{push_index, spell};
+use crate::target::{Called, Target, Written, arithmetic};
+use crate::text::push_index;
 use mmsmith_expr::{Operation, Rational, RustCall, nearest_f64};
 use mmsmith_stage::{Block, Operand, Stage};
 use num_traits::{One, Zero};
@@ -16,6 +17,7 @@ const PLACEHOLDER: &str = "let statements_of_block = ";
 ///
 /// Blocks are by far the largest part of a solution, and simple; formatting them as tokens would take longer than
 /// to derive them. So they are written as lines, of checked names and numbers alone.
+#[derive(Clone)]
 pub(crate) struct Translator<'a> {
     /// Where the parameters are: `parameters` itself, or `self.parameters`.
     parameters: &'static str,
@@ -24,6 +26,8 @@ pub(crate) struct Translator<'a> {
     runtime: String,
     /// The blocks that placeholders stand for; `None` where tokens are wanted.
     blocks: Option<&'a RefCell<Vec<String>>>,
+    /// Whether a constant `NEAR` tells if logarithms of ratios may be the short ones.
+    tells_near: bool,
 }
 
 impl<'a> Translator<'a> {
@@ -34,37 +38,12 @@ impl<'a> Translator<'a> {
         blocks: Option<&'a RefCell<Vec<String>>>,
     ) -> Self {
         let runtime = runtime.to_string().replace(' ', "");
-        Translator { parameters, names, runtime, blocks }
+        Translator { parameters, names, runtime, blocks, tells_near: false }
     }
 
     /// The statements of a block, and its outputs as expressions.
     pub(crate) fn statements(&self, block: &Block<'_>) -> (TokenStream, Vec<TokenStream>) {
-        self.statements_with(block, |operation| self.template(operation))
-    }
-
-    /// The same where a constant `NEAR` tells whether logarithms of ratios may be the short ones.
-    pub(crate) fn statements_if_near(&self, block: &Block<'_>) -> (TokenStream, Vec<TokenStream>) {
-        self.statements_with(block, |operation| match operation {
-            Operation::LnOfBoth(..) => "#.ln_of_both_if::<NEAR>(#)".into(),
-            other => self.template(other),
-        })
-    }
-
-    fn statements_with(
-        &self,
-        block: &Block<'_>,
-        template: impl Fn(&Operation) -> Cow<'static, str>,
-    ) -> (TokenStream, Vec<TokenStream>) {
-        let mut lines = String::new();
-        for (index, operation) in block.steps() {
-            lines.push_str("let t");
-            push_index(&mut lines, index);
-            lines.push_str(" = ");
-            spell(&mut lines, &template(operation), operation, |text, slot| {
-                self.operand(text, block.operand(slot));
-            });
-            lines.push_str(";\n");
-        }
+        let Written { lines, outputs } = self.block(block, "", ());
         let statements = match self.blocks {
             _ if lines.is_empty() => TokenStream::new(),
             Some(blocks) => {
@@ -74,18 +53,48 @@ impl<'a> Translator<'a> {
             }
             None => tokens(&lines),
         };
-        let output = |operand| {
-            let mut text = String::new();
-            self.operand(&mut text, operand);
-            tokens(&text)
-        };
-        (statements, block.outputs().map(output).collect())
+        (statements, outputs.iter().map(|output| tokens(output)).collect())
     }
 
-    /// An operation in Rust, with `#` for each operand. Numbers and inputs are operands and no statements.
-    fn template(&self, operation: &Operation) -> Cow<'static, str> {
+    /// The same where a constant `NEAR` tells whether logarithms of ratios may be the short ones.
+    pub(crate) fn statements_if_near(&self, block: &Block<'_>) -> (TokenStream, Vec<TokenStream>) {
+        Translator { tells_near: true, ..self.clone() }.statements(block)
+    }
+}
+
+impl Target for Translator<'_> {
+    type Places = ();
+
+    const STATEMENT: [&'static str; 2] = ["let ", ";\n"];
+
+    /// A non-negative number as a value of the scalar type `T`.
+    fn literal(&self, value: f64) -> String {
+        if value.is_infinite() {
+            return "T::nearest(f64::INFINITY)".into();
+        }
+        format!("T::nearest({})", digits(value))
+    }
+
+    fn number(&self, value: &Rational) -> String {
+        if value.is_one() {
+            return "T::one()".into();
+        }
+        if value.is_zero() {
+            return "T::zero()".into();
+        }
+        self.literal(nearest_f64(value))
+    }
+
+    fn function(&self, function: Called) -> Cow<'static, str> {
+        let (Called::Library(name) | Called::Support(name)) = function;
+        let name = if function == Called::Library("pow") { "powf" } else { name };
+        let other = if function.takes_two() { "#" } else { "" };
+        format!("#.{name}({other})").into()
+    }
+
+    fn operation(&self, operation: &Operation) -> Cow<'static, str> {
         let fixed = match operation {
-            Operation::Number(value) => return number(value).into(),
+            Operation::Number(value) => return self.number(value).into(),
             Operation::Call(function, _) => {
                 return match function.rust() {
                     RustCall::Method(name) => format!("#.{name}()"),
@@ -96,33 +105,24 @@ impl<'a> Translator<'a> {
                 }
                 .into();
             }
-            Operation::Power(_, exponent) => return format!("#.powf({})", number(exponent)).into(),
+            Operation::Power(_, exponent) => return self.power(exponent).into(),
             Operation::Pi => "T::pi()",
-            Operation::Input(_) => "",
-            Operation::Add(..) => "# + #",
-            Operation::Sub(..) => "# - #",
-            Operation::Mul(..) => "# * #",
-            Operation::Div(..) => "# / #",
-            Operation::Neg(_) => "-#",
-            Operation::Sqrt(_) => "#.sqrt()",
-            Operation::SinPi(_) => "#.sin_pi()",
-            Operation::CosPi(_) => "#.cos_pi()",
-            Operation::Atan2(..) => "#.atan2(#)",
-            Operation::LnOfBoth(..) => "#.ln_of_both(#)",
-            Operation::SumError(..) => "#.sum_error(#)",
-            Operation::ProductError(..) => "#.product_error(#)",
+            Operation::Sqrt(_) => return self.function(Called::Library("sqrt")),
+            Operation::SinPi(_) => return self.function(Called::Support("sin_pi")),
+            Operation::CosPi(_) => return self.function(Called::Support("cos_pi")),
+            Operation::Atan2(..) => return self.function(Called::Library("atan2")),
+            Operation::LnOfBoth(..) if self.tells_near => "#.ln_of_both_if::<NEAR>(#)",
+            Operation::LnOfBoth(..) => return self.function(Called::Support("ln_of_both")),
+            Operation::SumError(..) => return self.function(Called::Support("sum_error")),
+            Operation::ProductError(..) => return self.function(Called::Support("product_error")),
+            other => arithmetic(other),
         };
         fixed.into()
     }
 
-    fn operand(&self, text: &mut String, operand: Operand<'_>) {
+    fn operand(&self, text: &mut String, operand: Operand<'_>, (): ()) {
         let (name, index) = match operand {
-            Operand::Temporary(index) => {
-                text.push('t');
-                return push_index(text, index);
-            }
-            Operand::Number(value) => return text.push_str(&number(value)),
-            Operand::Pi => return text.push_str("T::pi()"),
+            Operand::Temporary(_) | Operand::Number(_) | Operand::Pi => return,
             Operand::Time => return text.push('t'),
             Operand::Parameter(index) => {
                 return text.extend([self.parameters, ".", &self.names[index].to_string()]);
@@ -168,21 +168,6 @@ pub(crate) fn fill(text: &str, blocks: &[String]) -> String {
 /// Names and numbers with what joins them always are tokens.
 fn tokens(text: &str) -> TokenStream {
     text.parse().unwrap_or_default()
-}
-
-/// A non-negative number as a value of the scalar type `T`.
-fn number(value: &Rational) -> String {
-    if value.is_one() {
-        return "T::one()".into();
-    }
-    if value.is_zero() {
-        return "T::zero()".into();
-    }
-    let value = nearest_f64(value);
-    if value.is_infinite() {
-        return "T::nearest(f64::INFINITY)".into();
-    }
-    format!("T::nearest({})", digits(value))
 }
 
 /// A literal for any double; negative ones with a minus sign before it.

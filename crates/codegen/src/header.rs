@@ -1,13 +1,15 @@
 //! The C header of a solution.
 
+use crate::c_names::members;
 use crate::code::Code;
 use crate::function::digits;
+use crate::listing::{self, Item};
 use crate::module::Names;
-use crate::text::{c_string, comment, meaning, push_index, spell};
-use mmsmith_expr::{CSupport, Function, Operation, RustCall, Slot, nearest_f64};
+use crate::target::{Called, Target, Written};
+use crate::text::{c_string, comment, meaning, push_index};
+use mmsmith_expr::{CSupport, Function, RustCall};
 use mmsmith_spec::{Boundary, Condition, Parameter, Surface};
-use mmsmith_stage::{Block, Measures, Operand, Shape, Stage, Staged, Traction};
-use mmsmith_vocabulary::Law;
+use mmsmith_stage::{Block, Operand, Shape, Stage, Staged};
 use std::borrow::Cow;
 
 /// What every header needs: macros, and `sin(pi x)` as the crate of the solutions computes it.
@@ -31,174 +33,6 @@ const POSITIVE_PART: &str = include_str!("positive_part.h");
 /// The width of comments.
 const WIDTH: usize = 115;
 
-/// Words of C, C++ and CUDA, and macros of their usual headers, that cannot name a member of a structure.
-const C_WORDS: &[&str] = &[
-    "BUFSIZ",
-    "CHAR_BIT",
-    "DOMAIN",
-    "EDOM",
-    "EILSEQ",
-    "EOF",
-    "ERANGE",
-    "FILENAME_MAX",
-    "HUGE",
-    "HUGE_VAL",
-    "HUGE_VALF",
-    "HUGE_VALL",
-    "I",
-    "INFINITY",
-    "MAXFLOAT",
-    "NAN",
-    "NULL",
-    "OVERFLOW",
-    "PLOSS",
-    "RAND_MAX",
-    "SING",
-    "TLOSS",
-    "UNDERFLOW",
-    "alignas",
-    "alignof",
-    "and",
-    "and_eq",
-    "asm",
-    "assert",
-    "auto",
-    "bitand",
-    "bitor",
-    "bool",
-    "break",
-    "case",
-    "catch",
-    "char",
-    "char16_t",
-    "char32_t",
-    "char8_t",
-    "class",
-    "co_await",
-    "co_return",
-    "co_yield",
-    "compl",
-    "complex",
-    "concept",
-    "const",
-    "const_cast",
-    "consteval",
-    "constexpr",
-    "constinit",
-    "continue",
-    "decltype",
-    "default",
-    "delete",
-    "do",
-    "double",
-    "dynamic_cast",
-    "else",
-    "enum",
-    "errno",
-    "explicit",
-    "export",
-    "extern",
-    "false",
-    "far",
-    "float",
-    "for",
-    "fortran",
-    "friend",
-    "goto",
-    "i386",
-    "if",
-    "imaginary",
-    "inline",
-    "int",
-    "interface",
-    "linux",
-    "long",
-    "math_errhandling",
-    "max",
-    "min",
-    "mutable",
-    "namespace",
-    "near",
-    "new",
-    "noexcept",
-    "noreturn",
-    "not",
-    "not_eq",
-    "nullptr",
-    "operator",
-    "or",
-    "or_eq",
-    "private",
-    "protected",
-    "public",
-    "register",
-    "reinterpret_cast",
-    "requires",
-    "restrict",
-    "return",
-    "short",
-    "signed",
-    "sizeof",
-    "small",
-    "static",
-    "static_assert",
-    "static_cast",
-    "stderr",
-    "stdin",
-    "stdout",
-    "struct",
-    "switch",
-    "template",
-    "this",
-    "thread_local",
-    "throw",
-    "true",
-    "try",
-    "typedef",
-    "typeid",
-    "typename",
-    "typeof",
-    "typeof_unqual",
-    "union",
-    "unix",
-    "unsigned",
-    "using",
-    "virtual",
-    "void",
-    "volatile",
-    "wchar_t",
-    "while",
-    "xor",
-    "xor_eq",
-];
-
-/// Beginnings of families of macros.
-const C_FAMILIES: &[&str] = &[
-    "CHAR_", "DBL_", "DECIMAL_", "FE_", "FLT_", "FP_", "INT", "LDBL_", "LLONG_", "LONG_", "MATH_",
-    "MMSMITH_", "M_", "SCHAR_", "SHRT_", "SIZE_", "UCHAR_", "UINT", "ULLONG_", "ULONG_", "USHRT_",
-];
-
-/// The names of parameters as members of a structure: what is no name in C gets an underscore at its end, and more
-/// where another parameter is called so.
-fn members(parameters: &[Parameter]) -> Vec<String> {
-    let is_taken = |name: &str| {
-        C_WORDS.contains(&name) || C_FAMILIES.iter().any(|family| name.starts_with(family))
-    };
-    let plain = |name: &str| parameters.iter().any(|p| p.name == name && !is_taken(name));
-    // No two become one: what the one passes over is plain, so that the other is not it.
-    let member = |parameter: &Parameter| {
-        let mut member = parameter.name.clone();
-        if is_taken(&member) {
-            member.push('_');
-            while plain(&member) {
-                member.push('_');
-            }
-        }
-        member
-    };
-    parameters.iter().map(member).collect()
-}
-
 impl Code<'_> {
     /// The text of the solution's C header.
     #[must_use]
@@ -206,8 +40,16 @@ impl Code<'_> {
         let prefix = Names::of(&self.spec.name).module;
         let members = members(&self.spec.parameters);
         let dimension = self.spec.dimension;
-        Header { code: self, staged: &self.staged, prefix, members, dimension, text: String::new() }
-            .write()
+        let language = C { members };
+        Header {
+            code: self,
+            staged: &self.staged,
+            prefix,
+            language,
+            dimension,
+            text: String::new(),
+        }
+        .write()
     }
 }
 
@@ -216,8 +58,7 @@ struct Header<'a> {
     staged: &'a Staged,
     /// What all names begin with.
     prefix: String,
-    /// The names of the parameters.
-    members: Vec<String>,
+    language: C,
     dimension: usize,
     text: String,
 }
@@ -247,9 +88,15 @@ impl Header<'_> {
         self.line("");
         self.types();
         self.prepare();
-        self.fields();
+        let (fields, constants): (Vec<Item>, Vec<Item>) = self
+            .code
+            .functions()
+            .into_iter()
+            .partition(|item| item.given == listing::Given::PositionAndTime);
+        fields.iter().for_each(|item| self.function(item));
+        self.all_fields();
         self.stages();
-        self.constants();
+        constants.iter().for_each(|item| self.function(item));
         self.line("#if defined(__clang__)\n#pragma STDC FP_CONTRACT DEFAULT\n#endif\n");
         self.line(&format!("#endif /* {guard} */"));
         self.text
@@ -334,7 +181,7 @@ before. Results equal those of the Rust functions bit for bit where the compiler
     fn types(&mut self) {
         let (prefix, d) = (self.prefix.clone(), self.dimension);
         let (parameters, fixed, time, point) = (
-            self.members.len(),
+            self.language.members.len(),
             self.staged.fixed_count(),
             self.staged.body_force.time_count(),
             self.staged.body_force.point_count(),
@@ -345,12 +192,14 @@ before. Results equal those of the Rust functions bit for bit where the compiler
              {prefix}_time_count = {time},\n    {prefix}_point_count = {point}\n}};\n"
         ));
         self.line(&format!("typedef struct {prefix}_parameters {{"));
-        for (parameter, member) in self.code.spec.parameters.iter().zip(self.members.clone()) {
+        for (parameter, member) in
+            self.code.spec.parameters.iter().zip(self.language.members.clone())
+        {
             let Parameter { name, description, unit, range, .. } = parameter;
             let about = comment(&meaning(name, description, unit, range));
             self.line(&format!("    double {member}; /* {about} */"));
         }
-        if self.members.is_empty() {
+        if self.language.members.is_empty() {
             self.line("    double unused; /* there are no parameters */");
         }
         self.line(&format!("}} {prefix}_parameters;\n"));
@@ -381,10 +230,10 @@ before. Results equal those of the Rust functions bit for bit where the compiler
         let spec = self.code.spec;
         self.line(&format!("MMSMITH_FN {prefix}_parameters {prefix}_defaults(void)\n{{"));
         self.line(&format!("    {prefix}_parameters p;"));
-        for (parameter, member) in spec.parameters.iter().zip(self.members.clone()) {
+        for (parameter, member) in spec.parameters.iter().zip(self.language.members.clone()) {
             self.line(&format!("    p.{member} = {};", literal(parameter.default)));
         }
-        if self.members.is_empty() {
+        if self.language.members.is_empty() {
             self.line("    p.unused = 0.0;");
         }
         self.line("    return p;\n}\n");
@@ -395,7 +244,7 @@ before. Results equal those of the Rust functions bit for bit where the compiler
         self.line(&format!(
             "MMSMITH_FN const char *{prefix}_prepare({prefix}_solution *s, const {prefix}_parameters *p)\n{{"
         ));
-        for (parameter, member) in spec.parameters.iter().zip(self.members.clone()) {
+        for (parameter, member) in spec.parameters.iter().zip(self.language.members.clone()) {
             let bounds: String = parameter
                 .bounds
                 .iter()
@@ -422,7 +271,7 @@ before. Results equal those of the Rust functions bit for bit where the compiler
             self.line(&format!("    if (!({} {sign} {})) {{", side[0], side[1]));
             self.line(&format!("        return {};\n    }}", c_string(&message)));
         }
-        if self.members.is_empty() {
+        if self.language.members.is_empty() {
             self.line("    (void)p;");
         }
         self.line("    s->par = *p;");
@@ -435,62 +284,42 @@ before. Results equal those of the Rust functions bit for bit where the compiler
         self.line("    return 0;\n}\n");
     }
 
-    fn fields(&mut self) {
+    /// A function of the solution, and of a position and a time where its values depend on them.
+    fn function(&mut self, item: &Item) {
+        let (prefix, d, name) = (&self.prefix, self.dimension, &item.name);
+        // Results go to an argument that is called as the quantity.
+        let result = name.rsplit('_').next().unwrap_or(name);
+        let joint = if result == name { ", " } else { ",\n    " };
+        let (given, read) = match item.given {
+            listing::Given::Nothing => (String::new(), &[Given::Solution][..]),
+            listing::Given::PositionAndTime => (
+                format!(", const double X[{d}], double t"),
+                &[Given::Solution, Given::Position, Given::Time][..],
+            ),
+        };
+        let (returned, argument) = match item.shape {
+            Shape::Scalar => ("double", String::new()),
+            shape => ("void", format!("{joint}double {result}{}", self.shape(shape))),
+        };
+        let head = format!(
+            "/* {} */\nMMSMITH_FN {returned} {prefix}_{name}(const {prefix}_solution *s{given}{argument})\n{{",
+            item.about
+        );
+        self.line(&head);
+        let code = self.code;
+        let block = item.block(code);
+        self.unread(&block, read);
+        for (index, value) in self.statements(&block, "    ", Places::SINGLE).iter().enumerate() {
+            self.line(&match item.shape {
+                Shape::Scalar => format!("    return {value};"),
+                _ => format!("    {result}[{index}] = {value};"),
+            });
+        }
+        self.line("}\n");
+    }
+
+    fn all_fields(&mut self) {
         let (prefix, d, staged) = (self.prefix.clone(), self.dimension, self.staged);
-        for field in &staged.fields {
-            let letter = field.name.letter();
-            let block = staged.after_parameters(&field.outputs);
-            let given = format!("const {prefix}_solution *s, const double X[{d}], double t");
-            self.line(&format!("/* {} */", field.name.in_words()));
-            if field.name.shape() == Shape::Scalar {
-                self.line(&format!("MMSMITH_FN double {prefix}_{letter}({given})\n{{"));
-            } else {
-                let shape = self.shape(field.name.shape());
-                self.line(&format!(
-                    "MMSMITH_FN void {prefix}_{letter}({given}, double {letter}{shape})\n{{"
-                ));
-            }
-            self.unread(&block, &[Given::Solution, Given::Position, Given::Time]);
-            let outputs = self.statements(&block, "    ", Places::SINGLE);
-            for (index, value) in outputs.iter().enumerate() {
-                self.line(&match field.name.shape() {
-                    Shape::Scalar => format!("    return {value};"),
-                    _ => format!("    {letter}[{index}] = {value};"),
-                });
-            }
-            self.line("}\n");
-        }
-
-        if let Some(energy) = staged.energy {
-            self.line("/* strain energy per reference volume */");
-            self.line(&format!(
-                "MMSMITH_FN double {prefix}_W(const {prefix}_solution *s, const double X[{d}], double t)\n{{"
-            ));
-            let block = staged.after_parameters(&[energy]);
-            self.unread(&block, &[Given::Solution, Given::Position, Given::Time]);
-            for value in self.statements(&block, "    ", Places::SINGLE) {
-                self.line(&format!("    return {value};"));
-            }
-            self.line("}\n");
-        }
-
-        for Traction { surface, outputs } in &staged.tractions {
-            let name = surface_name(*surface);
-            self.line(&format!("/* traction on the surface {name}, force per reference area */"));
-            self.line(&format!(
-                "MMSMITH_FN void {prefix}_{}_traction(const {prefix}_solution *s, const double X[{d}], double t,\n    \
-                 double traction[{d}])\n{{",
-                name.replace('-', "_")
-            ));
-            let block = staged.after_parameters(outputs);
-            self.unread(&block, &[Given::Solution, Given::Position, Given::Time]);
-            for (index, value) in self.statements(&block, "    ", Places::SINGLE).iter().enumerate()
-            {
-                self.line(&format!("    traction[{index}] = {value};"));
-            }
-            self.line("}\n");
-        }
-
         self.line("/* all fields */");
         self.line(&format!(
             "MMSMITH_FN void {prefix}_fields(const {prefix}_solution *s, const double X[{d}], double t, \
@@ -620,65 +449,6 @@ before. Results equal those of the Rust functions bit for bit where the compiler
         self.line("            point[m * n + p] = values[m];\n        }\n    }\n}\n");
     }
 
-    fn constants(&mut self) {
-        let constants = &self.staged.constants;
-        for (name, about, slot) in [
-            ("cell_length", "the length that a cell count divides", constants.cell_length),
-            ("density", "mass per reference volume", constants.density),
-            ("wave_speed", "the speed that CFL numbers refer to", constants.wave_speed),
-            ("period", "the time in which the motion repeats", constants.period),
-        ] {
-            self.scalar(name, about, slot);
-        }
-        match &constants.law {
-            Law::Library(material) => {
-                for (constant, slot) in material.row().constants.iter().zip(material.values()) {
-                    self.scalar(constant.name, constant.meaning, slot);
-                }
-            }
-            // A host that runs a stated law has its own constants for it.
-            Law::Stated(_) => {}
-        }
-        match &constants.domain {
-            Measures::Box { lower, upper } => {
-                self.corner("lower", "the body's corner of smallest coordinates", lower);
-                self.corner("upper", "the body's corner of largest coordinates", upper);
-            }
-            Measures::Annulus { inner, outer } => {
-                self.scalar("inner", "the body's inner radius", *inner);
-                self.scalar("outer", "the body's outer radius", *outer);
-            }
-        }
-    }
-
-    fn scalar(&mut self, name: &str, about: &str, slot: Slot) {
-        let prefix = self.prefix.clone();
-        self.line(&format!("/* {about} */"));
-        self.line(&format!("MMSMITH_FN double {prefix}_{name}(const {prefix}_solution *s)\n{{"));
-        let staged = self.staged;
-        let block = staged.after_parameters(&[slot]);
-        self.unread(&block, &[Given::Solution]);
-        for value in self.statements(&block, "    ", Places::SINGLE) {
-            self.line(&format!("    return {value};"));
-        }
-        self.line("}\n");
-    }
-
-    fn corner(&mut self, name: &str, about: &str, slots: &[Slot]) {
-        let (prefix, d) = (self.prefix.clone(), self.dimension);
-        self.line(&format!("/* {about} */"));
-        self.line(&format!(
-            "MMSMITH_FN void {prefix}_{name}(const {prefix}_solution *s, double {name}[{d}])\n{{"
-        ));
-        let staged = self.staged;
-        let block = staged.after_parameters(slots);
-        self.unread(&block, &[Given::Solution]);
-        for (index, value) in self.statements(&block, "    ", Places::SINGLE).iter().enumerate() {
-            self.line(&format!("    {name}[{index}] = {value};"));
-        }
-        self.line("}\n");
-    }
-
     fn shape(&self, shape: Shape) -> String {
         match shape {
             Shape::Scalar => String::new(),
@@ -697,35 +467,43 @@ before. Results equal those of the Rust functions bit for bit where the compiler
     }
 
     /// Writes the statements of a block; returns its outputs as expressions.
-    fn statements(&mut self, block: &Block<'_>, indent: &str, places: Places) -> Vec<String> {
-        let mut text = std::mem::take(&mut self.text);
-        for (index, operation) in block.steps() {
-            text.extend([indent, "const double t"]);
-            push_index(&mut text, index);
-            text.push_str(" = ");
-            spell(&mut text, &template(operation), operation, |text, slot| {
-                self.operand(text, block.operand(slot), places);
-            });
-            text.push_str(";\n");
-        }
-        self.text = text;
-        let output = |operand| {
-            let mut text = String::new();
-            self.operand(&mut text, operand, places);
-            text
+    fn statements(&mut self, block: &Block<'_>, margin: &str, places: Places) -> Vec<String> {
+        let Written { lines, outputs } = self.language.block(block, margin, places);
+        self.text += &lines;
+        outputs
+    }
+}
+
+/// C, given what the parameters are called.
+struct C {
+    members: Vec<String>,
+}
+
+impl Target for C {
+    type Places = Places;
+
+    const STATEMENT: [&'static str; 2] = ["const double ", ";\n"];
+
+    fn literal(&self, value: f64) -> String {
+        literal(value)
+    }
+
+    fn function(&self, function: Called) -> Cow<'static, str> {
+        let (family, name) = match function {
+            Called::Library(name) => ("", name),
+            Called::Support(name) => ("mmsmith_", name),
         };
-        block.outputs().map(output).collect()
+        let arguments = if function.takes_two() { "#, #" } else { "#" };
+        format!("{family}{name}({arguments})").into()
     }
 
     fn operand(&self, text: &mut String, operand: Operand<'_>, places: Places) {
         let (before, index, after) = match operand {
-            Operand::Number(value) => return text.push_str(&literal(nearest_f64(value))),
-            Operand::Pi => return text.push_str(&literal(std::f64::consts::PI)),
+            Operand::Temporary(_) | Operand::Number(_) | Operand::Pi => return,
             Operand::Time => return text.push('t'),
             Operand::Parameter(index) => {
                 return text.extend([places.parameters, &self.members[index]]);
             }
-            Operand::Temporary(index) => ("t", index, ""),
             Operand::Coordinate(index) => ("X[", index, "]"),
             Operand::Kept(Stage::Fixed, index) => ("s->fixed[", index, "]"),
             Operand::Kept(Stage::Time, index) => {
@@ -745,32 +523,6 @@ before. Results equal those of the Rust functions bit for bit where the compiler
         push_index(text, index);
         text.push_str(after);
     }
-}
-
-/// An operation in C, with `#` for each operand. Numbers and inputs are operands and no statements.
-fn template(operation: &Operation) -> Cow<'static, str> {
-    let fixed = match operation {
-        Operation::Number(value) => return literal(nearest_f64(value)).into(),
-        Operation::Pi => return literal(std::f64::consts::PI).into(),
-        Operation::Call(function, _) => return format!("{}(#)", function.c()).into(),
-        Operation::Power(_, exponent) => {
-            return format!("pow(#, {})", literal(nearest_f64(exponent))).into();
-        }
-        Operation::Input(_) => "",
-        Operation::Add(..) => "# + #",
-        Operation::Sub(..) => "# - #",
-        Operation::Mul(..) => "# * #",
-        Operation::Div(..) => "# / #",
-        Operation::Neg(_) => "-#",
-        Operation::Sqrt(_) => "sqrt(#)",
-        Operation::SinPi(_) => "mmsmith_sin_pi(#)",
-        Operation::CosPi(_) => "mmsmith_cos_pi(#)",
-        Operation::Atan2(..) => "atan2(#, #)",
-        Operation::LnOfBoth(..) => "mmsmith_ln_of_both(#, #)",
-        Operation::SumError(..) => "mmsmith_sum_error(#, #)",
-        Operation::ProductError(..) => "mmsmith_product_error(#, #)",
-    };
-    fixed.into()
 }
 
 /// How a function refers to what is not computed in it.
@@ -837,7 +589,7 @@ fn literal(value: f64) -> String {
     format!("{sign}{magnitude}")
 }
 
-fn surface_name(surface: Surface) -> String {
+pub(crate) fn surface_name(surface: Surface) -> String {
     let axis = |axis: usize| ["X", "Y", "Z"].get(axis).copied().unwrap_or_default();
     match surface {
         Surface::Lower(i) => format!("{}-lower", axis(i)),
@@ -847,7 +599,7 @@ fn surface_name(surface: Surface) -> String {
     }
 }
 
-fn condition(boundary: &Boundary) -> &'static str {
+pub(crate) fn condition(boundary: &Boundary) -> &'static str {
     match boundary.condition {
         Condition::Sliding => "sliding",
         Condition::Symmetry => "symmetry",

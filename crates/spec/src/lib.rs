@@ -14,6 +14,7 @@ mod derive;
 mod diagnostic;
 mod document;
 mod law;
+mod polynomial;
 mod read;
 mod rotation;
 mod scope;

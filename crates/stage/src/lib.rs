@@ -1,6 +1,6 @@
 //! The fields of a specification as one straight-line program in stages: what is computed when, before any language comes in.
 //!
-//! [`Staged::of`] is the only way from derived fields to what is computed. Generated Rust and C are two renderings of its
+//! [`Staged::of`] is the only way from derived fields to what is computed. Generated code, of whatever language, is a rendering of its
 //! result, the interpreter evaluates it, `mms check --thorough` judges it and `mms explain` counts it; so what is judged is
 //! what is generated.
 //!

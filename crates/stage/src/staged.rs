@@ -231,6 +231,12 @@ impl Staged {
         field.map_or(&[], |field| &field.outputs)
     }
 
+    /// The values that the stage of the parameters keeps.
+    #[must_use]
+    pub fn fixed(&self) -> &[Slot] {
+        &self.fixed
+    }
+
     /// How many values the stage of the parameters keeps.
     #[must_use]
     pub fn fixed_count(&self) -> usize {

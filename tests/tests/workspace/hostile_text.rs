@@ -4,7 +4,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use mmsmith_codegen::{Code, items};
+use mmsmith_codegen::{Code, HOSTS, items};
 use mmsmith_spec::Spec;
 use mmsmith_tests::{c_compiler, cpp_compiler, outcome};
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
@@ -234,6 +234,138 @@ fn free_text_stays_text_in_c() {
         headers.push(renamed(&header, &format!("text{number}")));
     }
     compile(&headers);
+}
+
+/// What is text in the files of a host.
+struct Syntax {
+    host: &'static str,
+    /// How comments begin and end.
+    comments: &'static [[&'static str; 2]],
+    strings: Strings,
+}
+
+/// How a quotation mark is written within quotation marks.
+#[derive(PartialEq)]
+enum Strings {
+    /// After a backslash.
+    Escaped,
+    /// Twice; pieces of one string are joined by `// &`.
+    Doubled,
+    /// There are no strings of free text.
+    None,
+}
+
+const LINE: [&str; 2] = ["//", "\n"];
+const BLOCK: [&str; 2] = ["/*", "*/"];
+const HASH: [&str; 2] = ["#", "\n"];
+const EXCLAMATION: [&str; 2] = ["!", "\n"];
+
+/// All hosts but Rust, whose tokens are compared.
+const SYNTAX: &[Syntax] = &[
+    Syntax { host: "c", comments: &[BLOCK], strings: Strings::Escaped },
+    Syntax { host: "cpp", comments: &[LINE, BLOCK], strings: Strings::Escaped },
+    Syntax { host: "fortran", comments: &[EXCLAMATION], strings: Strings::Doubled },
+    Syntax { host: "abaqus", comments: &[EXCLAMATION], strings: Strings::Doubled },
+    Syntax { host: "numpy", comments: &[HASH], strings: Strings::Escaped },
+    Syntax { host: "jax", comments: &[HASH], strings: Strings::Escaped },
+    Syntax { host: "ufl", comments: &[HASH], strings: Strings::Escaped },
+    Syntax { host: "julia", comments: &[HASH], strings: Strings::Escaped },
+    Syntax { host: "moose", comments: &[HASH], strings: Strings::None },
+    Syntax { host: "openfoam", comments: &[LINE], strings: Strings::Escaped },
+    Syntax { host: "kratos", comments: &[], strings: Strings::Escaped },
+    Syntax { host: "febio", comments: &[["<!--", "-->"]], strings: Strings::None },
+];
+
+/// The text without comments, and with every string literal empty.
+fn without_text(text: &str, syntax: &Syntax) -> String {
+    let mut code = String::new();
+    let mut rest = text;
+    while !rest.is_empty() {
+        let comment = syntax.comments.iter().find(|[start, _]| rest.starts_with(start));
+        if let Some([start, end]) = comment {
+            let (inner, after) = rest[start.len()..].split_once(end).expect("the comment ends");
+            assert!(*end != "-->" || !inner.contains("--"), "{}: {inner}", syntax.host);
+            code.push('\n');
+            rest = after;
+        } else if rest.starts_with('"') && syntax.strings != Strings::None {
+            let literal = &rest[1..];
+            let mut end = 0;
+            loop {
+                let c = literal[end..].chars().next().expect("the literal ends");
+                assert!(c != '\n', "{}: {literal:.100}", syntax.host);
+                if c == '"'
+                    && syntax.strings == Strings::Doubled
+                    && literal[end..].starts_with("\"\"")
+                {
+                    end += 2;
+                } else if c == '\\' && syntax.strings == Strings::Escaped {
+                    end += 1 + literal[end + 1..].chars().next().map_or(0, char::len_utf8);
+                } else if c == '"' {
+                    break;
+                } else {
+                    end += c.len_utf8();
+                }
+            }
+            code.push_str("\"\"");
+            rest = &literal[end + 1..];
+        } else {
+            let c = rest.chars().next().expect("there is more");
+            code.push(c);
+            rest = &rest[c.len_utf8()..];
+        }
+    }
+    code.split_whitespace().collect::<Vec<_>>().join(" ").replace("\"\" // & \"\"", "\"\"")
+}
+
+#[test]
+fn free_text_stays_text_for_every_host() {
+    let named: Vec<&str> = SYNTAX.iter().map(|syntax| syntax.host).collect();
+    let missing: Vec<&str> =
+        HOSTS.iter().map(|host| host.name).filter(|name| !named.contains(name)).collect();
+    assert_eq!(missing, ["rust"], "no syntax for a host");
+    let specs: Vec<(String, Spec)> = std::iter::once("harmless".to_owned())
+        .chain(hostile())
+        .chain(
+            [
+                "coding: utf-7",
+                "-*- coding: latin-1 -*-",
+                "$(run) ${HOME} #{ #} #calc",
+                "-->",
+                "--",
+                "& <x/> ]]>",
+                "!DIR$ x",
+                "!$omp",
+            ]
+            .map(str::to_owned),
+        )
+        .map(|text| {
+            let spec = Spec::parse(&specification(&text, "nu"), "hostile.toml").unwrap();
+            (text, spec)
+        })
+        .collect();
+    let mut codes = specs.iter().map(|(text, spec)| (text, Code::new(spec).unwrap()));
+    let (_, harmless) = codes.next().unwrap();
+    let host = |name: &str| HOSTS.iter().find(|host| host.name == name).unwrap();
+    let harmless: Vec<String> = SYNTAX
+        .iter()
+        .map(|syntax| without_text(&host(syntax.host).source(&harmless).unwrap(), syntax))
+        .collect();
+    for (text, code) in codes {
+        let shown: String = text.chars().take(60).collect();
+        for (syntax, harmless) in SYNTAX.iter().zip(&harmless) {
+            let source = host(syntax.host).source(&code).unwrap();
+            for c in source.chars() {
+                assert!(c == '\n' || !c.is_control(), "{}: {c:?}", syntax.host);
+                assert!(!DIRECTIONS.contains(&c), "{}: {c:?}", syntax.host);
+            }
+            // Lines that are joined, and what C reads as another sign.
+            assert!(!source.contains("\\\n"), "{}: {shown:?}", syntax.host);
+            let of_c = matches!(syntax.host, "c" | "cpp" | "openfoam");
+            assert!(!of_c || !source.contains("??"), "{}: {shown:?}", syntax.host);
+            let found = without_text(&source, syntax);
+            assert!(found == *harmless, "{}: {shown:?} changes the code", syntax.host);
+        }
+    }
 }
 
 /// Names that parameters may have, and that are no names in C or C++, or macros of their headers.

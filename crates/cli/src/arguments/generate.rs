@@ -2,18 +2,22 @@
 
 use std::path::PathBuf;
 
+use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use clap::{Args, ValueEnum};
-use mmsmith_codegen::Fault;
+use mmsmith_codegen::{Fault, HOSTS, Host};
+
+use super::shared::ParameterOptions;
 
 #[derive(Args)]
 pub(crate) struct GenerateOptions {
     /// The solution, by name, or a specification file (SPEC.toml); mms --help says where names are looked for
     #[arg(value_name = "NAME|SPEC.toml")]
     pub(crate) name: String,
-    /// The language: a C99 header that needs nothing else, or a Rust module for a crate that depends on mmsmith-runtime
-    #[arg(long, value_enum)]
-    pub(crate) target: Target,
+    /// The language or the host; the file's head says how it is used
+    #[arg(long, value_parser = hosts())]
+    pub(crate) target: &'static Host,
+    #[command(flatten)]
+    pub(crate) parameters: ParameterOptions,
     /// Write the file into this folder, which is made where there is none
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
@@ -22,13 +26,10 @@ pub(crate) struct GenerateOptions {
     pub(crate) fault: Option<Fault>,
 }
 
-/// A language that code is written in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Target {
-    /// A module
-    Rust,
-    /// A C99 header, for C, C++ and CUDA
-    C,
+/// Hosts, with a line about each.
+fn hosts() -> impl TypedValueParser<Value = &'static Host> {
+    let values = HOSTS.iter().map(|own| PossibleValue::new(own.name).help(own.about));
+    PossibleValuesParser::new(values).try_map(|name| Host::named(&name).ok_or(name))
 }
 
 /// Faults, with a line about each.

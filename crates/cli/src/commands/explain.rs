@@ -25,13 +25,16 @@ pub(crate) fn explain(options: &ExplainOptions) -> Result<bool> {
     let spec = specification(&options.name)?;
     let fields = spec.derive()?;
     let exercises = exercises(&options.name)?;
+    let degree = fields.polynomial_degree(MOST_COMMON_DEGREE);
     let cost = BodyForceCost::of(&spec, fields);
     let selection = Selection::new(&options.name, &[])?;
     let model = Model::new(&selection, Precision::F64)?;
     let settled = Settled::settle(&SchemeOptions::open(), &model.exact)?;
     let predicted = predict::on_grids(&model, &settled.case).map_err(|error| error.to_string());
     let words = settled.choice();
-    terminal::say(&(text(&spec, &exercises, &cost) + &runs(&predicted, &words)))?;
+    terminal::say(
+        &(text(&spec, &exercises, &cost) + &exact_elements(degree) + &runs(&predicted, &words)),
+    )?;
     let compared = match options.compare {
         true => Some(Comparison::measure(&model)?),
         false => None,
@@ -40,7 +43,7 @@ pub(crate) fn explain(options: &ExplainOptions) -> Result<bool> {
         terminal::say(&compared.text())?;
     }
     if let Some(output) = output {
-        let mut document = document(&spec, &exercises, &cost, &predicted);
+        let mut document = document(&spec, degree, &exercises, &cost, &predicted);
         if let Some(compared) = &compared {
             document["compared"] = json!(compared);
         }
@@ -182,6 +185,20 @@ fn text(spec: &Spec, exercises: &[Exercise], cost: &BodyForceCost) -> String {
     text
 }
 
+/// Elements of higher degrees are rare.
+const MOST_COMMON_DEGREE: usize = 3;
+
+/// A warning where elements represent the displacement exactly.
+fn exact_elements(degree: Option<usize>) -> String {
+    degree.map_or_else(String::new, |degree| {
+        format!(
+            "\nwarning: u is a polynomial of degree {degree} in the coordinates. Finite elements of degree {} and more represent \
+             it exactly:\n  no order in space shows with them, and what is left is the error in time and of the quadrature\n",
+            degree.max(1)
+        )
+    })
+}
+
 /// What runs of the usual scheme are predicted to take, or why there are none.
 type Predicted = Result<Vec<(usize, Plan, Cost)>, String>;
 
@@ -224,6 +241,7 @@ fn domain(spec: &Spec) -> String {
 
 fn document(
     spec: &Spec,
+    degree: Option<usize>,
     exercises: &[Exercise],
     cost: &BodyForceCost,
     predicted: &Predicted,
@@ -281,6 +299,7 @@ fn document(
         "rotation": spec.rotation.map(|rotation| rotation.formula(&spec.graph)),
         "solved": solved,
         "domain": domain(spec),
+        "polynomial_degree": degree,
         "exercises": exercised,
         "shares": shares,
         "runs": runs.as_ref().ok(),

@@ -3,14 +3,23 @@
 use anyhow::{Context, Result};
 use mmsmith_codegen::{Code, Names, Origin};
 
-use crate::arguments::{GenerateOptions, Target};
+use crate::arguments::GenerateOptions;
 use crate::json::{self, Output};
-use crate::library::locate;
+use crate::library::{Selection, locate};
 use crate::terminal;
 
 pub(crate) fn generate(options: &GenerateOptions) -> Result<bool> {
     let found = locate(&options.name)?;
-    let spec = found.specification()?;
+    let mut spec = found.specification()?;
+    let set = &options.parameters.set;
+    if !set.is_empty() {
+        // Refuses what the solution does not admit.
+        Selection::new(&options.name, set)?;
+        for parameter in &mut spec.parameters {
+            let given = set.iter().find(|(name, _)| *name == parameter.name);
+            parameter.default = given.map_or(parameter.default, |(_, value)| *value);
+        }
+    }
     let fields = spec.derive().with_context(|| found.file())?;
     let origin = Origin { command: "mms gen".into(), file: found.shown_file() };
     let code = match options.fault {
@@ -18,12 +27,9 @@ pub(crate) fn generate(options: &GenerateOptions) -> Result<bool> {
         Some(fault) => Code::with_fault(&spec, fields, origin, fault)
             .context("--fault: choose another solution or another fault")?,
     };
-    let (text, extension) = match options.target {
-        Target::Rust => (code.standalone_source(), "rs"),
-        Target::C => (code.header_source(), "h"),
-    };
+    let text = options.target.source(&code)?;
     json::prepare_folder(&options.out)?;
-    let path = options.out.join(Names::of(&spec.name).module).with_extension(extension);
+    let path = options.out.join(options.target.file_name(&Names::of(&spec.name).module));
     Output::prepare(&path)?.write_text(&text)?;
     terminal::say(&format!("wrote {}\n", path.display()))?;
     Ok(true)

@@ -1,0 +1,261 @@
+//! Files in languages that have functions: what they hold, and the text at their heads.
+
+use crate::code::Code;
+use crate::header::{condition, surface_name};
+use crate::runtime::{Routine, WithRuntime, routines};
+use crate::target::Called;
+use crate::text::{comment, meaning};
+use mmsmith_expr::{Operation, Slot};
+use mmsmith_spec::Parameter;
+use mmsmith_stage::{Block, Measures, Shape};
+use mmsmith_vocabulary::Law;
+use std::collections::BTreeSet;
+
+/// A function of a file.
+pub(crate) struct Item {
+    pub(crate) name: String,
+    /// Its value in words.
+    pub(crate) about: String,
+    pub(crate) shape: Shape,
+    pub(crate) given: Given,
+    outputs: Vec<Slot>,
+}
+
+/// The arguments of a function, beside the solution.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Given {
+    /// None.
+    Nothing,
+    /// A position and a time.
+    PositionAndTime,
+}
+
+impl Item {
+    /// Its operations.
+    pub(crate) fn block<'a>(&self, code: &'a Code<'_>) -> Block<'a> {
+        code.staged.after_parameters(&self.outputs)
+    }
+}
+
+impl Item {
+    /// Where its entries are, row by row.
+    pub(crate) fn outputs(&self) -> &[Slot] {
+        &self.outputs
+    }
+
+    /// Its entries for the defaults of the parameters, of a function that depends on these alone.
+    pub(crate) fn values(&self, code: &Code<'_>) -> Vec<f64> {
+        code.values(&self.outputs)
+    }
+}
+
+impl Code<'_> {
+    /// The values of the stage of the parameters, for their defaults.
+    pub(crate) fn fixed_values(&self) -> Vec<f64> {
+        self.values(self.staged.fixed())
+    }
+
+    /// Values of the parameters alone, for their defaults.
+    fn values(&self, slots: &[Slot]) -> Vec<f64> {
+        // The coordinates and the time, which nobody reads.
+        let nowhere = vec![0.0; self.spec.dimension + 1];
+        let defaults = self.spec.parameters.iter().map(|p| p.default);
+        let inputs: Vec<f64> = nowhere.into_iter().chain(defaults).collect();
+        self.staged.program().part(slots).evaluate(&inputs)
+    }
+
+    /// Fields, strain energy, tractions and constants, in the order of files.
+    pub(crate) fn functions(&self) -> Vec<Item> {
+        let staged = &self.staged;
+        let at_points = |name: String, about: String, shape, outputs| Item {
+            name,
+            about,
+            shape,
+            given: Given::PositionAndTime,
+            outputs,
+        };
+        let fields = staged.fields.iter().map(|field| {
+            let (letter, about) = (field.name.letter(), field.name.in_words());
+            at_points(letter.into(), about.into(), field.name.shape(), field.outputs.clone())
+        });
+        let energy = staged.energy.map(|energy| {
+            let about = "strain energy per reference volume";
+            at_points("W".into(), about.into(), Shape::Scalar, vec![energy])
+        });
+        let tractions = staged.tractions.iter().map(|traction| {
+            let surface = surface_name(traction.surface);
+            let about = format!("traction on the surface {surface}, force per reference area");
+            let name = format!("{}_traction", surface.replace('-', "_"));
+            at_points(name, about, Shape::Vector, traction.outputs.clone())
+        });
+        let constants = &staged.constants;
+        let constant = |name: &str, about: &str, slots: &[Slot]| Item {
+            name: name.into(),
+            about: about.into(),
+            shape: if slots.len() == 1 { Shape::Scalar } else { Shape::Vector },
+            given: Given::Nothing,
+            outputs: slots.to_vec(),
+        };
+        let corner =
+            |name, about, slots| Item { shape: Shape::Vector, ..constant(name, about, slots) };
+        let mut all: Vec<Item> = fields.chain(energy).chain(tractions).collect();
+        all.extend([
+            constant(
+                "cell_length",
+                "the length that a cell count divides",
+                &[constants.cell_length],
+            ),
+            constant("density", "mass per reference volume", &[constants.density]),
+            constant("wave_speed", "the speed that CFL numbers refer to", &[constants.wave_speed]),
+            constant("period", "the time in which the motion repeats", &[constants.period]),
+        ]);
+        // A host that runs a stated law has its own constants for it.
+        if let Law::Library(material) = &constants.law {
+            let named = material.row().constants.iter().zip(material.values());
+            all.extend(named.map(|(own, slot)| constant(own.name, own.meaning, &[slot])));
+        }
+        match &constants.domain {
+            Measures::Box { lower, upper } => all.extend([
+                corner("lower", "the body's corner of smallest coordinates", lower),
+                corner("upper", "the body's corner of largest coordinates", upper),
+            ]),
+            Measures::Annulus { inner, outer } => all.extend([
+                constant("inner", "the body's inner radius", &[*inner]),
+                constant("outer", "the body's outer radius", &[*outer]),
+            ]),
+        }
+        all
+    }
+
+    /// The functions that the solution's operations call and that the host lacks.
+    pub(crate) fn routines(&self, target: &impl WithRuntime) -> Vec<Routine> {
+        let mut roots = BTreeSet::new();
+        for operation in self.staged.program().operations() {
+            let called = match operation {
+                Operation::Call(function, _) => Called::of(*function),
+                Operation::SinPi(_) => Called::Support("sin_pi"),
+                Operation::CosPi(_) => Called::Support("cos_pi"),
+                Operation::LnOfBoth(..) => Called::Support("ln_of_both"),
+                Operation::SumError(..) => Called::Support("sum_error"),
+                Operation::ProductError(..) => Called::Support("product_error"),
+                _ => continue,
+            };
+            if let Called::Support(name) = called {
+                roots.insert(name);
+            }
+        }
+        routines(target, &roots.into_iter().collect::<Vec<_>>())
+    }
+
+    /// The head of a file, a line each: the solution, where it comes from, what `host` adds, and the conventions that decide
+    /// whether a run agrees.
+    pub(crate) fn head_for_host(&self, host: &str) -> Vec<String> {
+        let spec = self.spec;
+        let mut lines = vec![format!("{}.", spec.title)];
+        lines.extend(self.head());
+        lines.push(String::new());
+        lines.extend(self.formulas());
+        for boundary in &spec.boundaries {
+            lines.push(format!(
+                "surface {}: {}",
+                surface_name(boundary.surface),
+                condition(boundary)
+            ));
+        }
+        if !spec.reference.is_empty() {
+            lines.push(format!("Source: {}.", spec.reference));
+        }
+        lines.push(String::new());
+        lines.extend(host.lines().map(str::to_owned));
+        lines.extend(
+            "
+force: b is per unit MASS; rho0_b = density b is per unit REFERENCE volume; per unit current volume it is rho0_b/J. The balance \
+is rho0 a = Div P + rho0 b, so that it stands on the side of the stresses, with a plus sign.
+coordinates: X is the REFERENCE position, in Cartesian components. A host that gives the current position x = X + u has to find X first.
+stress: P is the first Piola-Kirchhoff stress, P[i][J] with i spatial and J reference, and the traction P N is per reference area. The nominal \
+stress is P transposed; the Cauchy stress is P F^T/J.
+time: t is the time of the state whose accelerations the force causes: the old time of an explicit step with centred differences, the new \
+time of an implicit step, and for generalised-alpha schemes the time at which they balance momentum. A static problem has the deformation of a time t that stays, with the force -Div P = rho0 (b - a), static_force; a load \
+factor is that time.
+In two dimensions the deformation is plane strain. Units are those of the parameters; with SI units: u, X in m, P in Pa, b in m/s^2."
+                .lines()
+                .map(str::to_owned),
+        );
+        lines.iter().map(|line| comment(line)).collect()
+    }
+
+    /// What parameters mean, a line each.
+    pub(crate) fn parameter_lines(&self) -> Vec<String> {
+        let about = |p: &Parameter| {
+            let meaning = meaning(&p.name, &p.description, &p.unit, &p.range);
+            comment(&format!("{}: {meaning}", p.name))
+        };
+        self.spec.parameters.iter().map(about).collect()
+    }
+
+    /// What is wrong with a parameter that is not admissible.
+    pub(crate) fn refusal(&self, parameter: &Parameter) -> String {
+        let mut text = format!("{} of {} must be a finite number", parameter.name, self.spec.name);
+        if !parameter.range.is_empty() {
+            text += &format!(" {}", parameter.range);
+        }
+        text
+    }
+}
+
+/// Lines broken between words, each with a sign before it.
+pub(crate) fn commented(lines: &[String], sign: &str, width: usize) -> String {
+    let mut text = String::new();
+    for line in lines {
+        let mut own = sign.to_owned();
+        for word in line.split(' ').filter(|word| !word.is_empty()) {
+            if own.len() + 1 + word.len() > width && own.len() > sign.len() + 3 {
+                text += &own;
+                text.push('\n');
+                own = format!("{sign}  ");
+            }
+            // A word that is longer than a line is cut.
+            let mut rest = word;
+            own.push(' ');
+            while own.len() + rest.len() > width {
+                let mut cut = width.saturating_sub(own.len());
+                while !rest.is_char_boundary(cut) {
+                    cut += 1;
+                }
+                let (now, later) = rest.split_at(cut);
+                text.extend([own.as_str(), now, "\n"]);
+                own = format!("{sign}   ");
+                rest = later;
+            }
+            own += rest;
+        }
+        text += own.trim_end();
+        text.push('\n');
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Every line of a comment begins as one, and has no more characters than it may.
+        #[test]
+        fn no_text_leaves_a_comment(
+            text in r#"([-*/!#"\\\n\r =<>$&']|\PC){0,300}"#,
+            sign in prop::sample::select(vec!["!", "#", "//", "    !"]),
+        ) {
+            let lines = commented(&[comment(&text), comment(&text)], sign, 60);
+            for line in lines.lines() {
+                prop_assert!(line.starts_with(sign), "{line:?}");
+                let rest = &line[sign.len()..];
+                // What follows the sign directly may be a directive.
+                prop_assert!(rest.is_empty() || rest.starts_with(' '), "{line:?}");
+                prop_assert!(line.len() <= 64 && !line.ends_with('\\'), "{line:?}");
+            }
+            prop_assert!(!lines.contains('\r'));
+        }
+    }
+}

@@ -1,0 +1,492 @@
+//! The functions of `runtime.txt`, for every language.
+
+use crate::target::{Called, Target};
+use std::collections::{BTreeMap, BTreeSet};
+use std::iter::Peekable;
+use std::str::Chars;
+use std::sync::LazyLock;
+
+/// What functions are made of beside sums, products and calls of `math.h`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Primitive {
+    /// The second where the first holds, else the third.
+    Choose,
+    /// Whether the first is less than the second.
+    Less,
+    /// Whether the first is at most the second.
+    AtMost,
+    /// Whether both are equal.
+    Equal,
+    /// The size.
+    Abs,
+    /// The nearest whole number, of two the even one.
+    Nearest,
+    /// The `e` of `m 2^e` with `m` from 1/2 to 1, as a number.
+    Exponent,
+    /// `x 2^e`.
+    Scaled,
+}
+
+/// A language that has functions of its own, or into whose expressions they are put.
+pub(crate) trait WithRuntime: Target {
+    /// How the language spells it, with `#` for each operand.
+    fn primitive(&self, primitive: Primitive) -> &'static str;
+}
+
+/// An expression of a function.
+#[derive(Clone, Debug)]
+enum Term {
+    Number(f64),
+    Name(String),
+    Negative(Box<Term>),
+    Sum(Box<[Term; 2]>),
+    Difference(Box<[Term; 2]>),
+    Product(Box<[Term; 2]>),
+    Quotient(Box<[Term; 2]>),
+    Primitive(Primitive, Vec<Term>),
+    Library(&'static str, Vec<Term>),
+    Support(&'static str, Vec<Term>),
+}
+
+/// A function of `runtime.txt`.
+#[derive(Debug)]
+struct Function {
+    about: &'static str,
+    arguments: Vec<&'static str>,
+    steps: Vec<(String, Term)>,
+    result: Term,
+}
+
+/// A function in a language.
+pub(crate) struct Routine {
+    /// Its name.
+    pub(crate) name: &'static str,
+    /// Its value in words.
+    pub(crate) about: &'static str,
+    /// The names of its arguments.
+    pub(crate) arguments: Vec<&'static str>,
+    /// Its statements.
+    pub(crate) steps: Vec<Step>,
+    /// Its value.
+    pub(crate) result: String,
+}
+
+/// A statement that names a value.
+pub(crate) struct Step {
+    /// The name.
+    pub(crate) name: String,
+    /// The value.
+    pub(crate) value: String,
+    /// Whether the value is true or false instead of a number.
+    pub(crate) is_condition: bool,
+}
+
+static FUNCTIONS: LazyLock<BTreeMap<&'static str, Function>> =
+    LazyLock::new(|| read(include_str!("runtime.txt")));
+
+/// The functions that `roots` and those that these call, each after those that it calls. Those for which the language has a
+/// call of its own are left out.
+pub(crate) fn routines<T: WithRuntime>(target: &T, roots: &[&'static str]) -> Vec<Routine> {
+    let (mut done, mut routines) = (BTreeSet::new(), Vec::new());
+    for root in roots {
+        visit(target, root, &mut done, &mut routines);
+    }
+    routines
+}
+
+fn visit<T: WithRuntime>(
+    target: &T,
+    name: &'static str,
+    done: &mut BTreeSet<&'static str>,
+    routines: &mut Vec<Routine>,
+) {
+    // The language's own call does not have the name of the project's function.
+    let own = !target.function(Called::Support(name)).contains(name);
+    let Some(function) = FUNCTIONS.get(name).filter(|_| !own && done.insert(name)) else { return };
+    let mut called = Vec::new();
+    let log1p = target.function(Called::Library("log1p")).contains("log_1p").then_some("log_1p");
+    function.steps.iter().for_each(|(_, term)| term.calls(log1p, &mut called));
+    function.result.calls(log1p, &mut called);
+    for name in called {
+        visit(target, name, done, routines);
+    }
+    let step = |(name, term): &(String, Term)| Step {
+        name: name.clone(),
+        value: term.spell(target),
+        is_condition: matches!(term, Term::Primitive(p, _) if p.is_condition()),
+    };
+    routines.push(Routine {
+        name,
+        about: function.about,
+        arguments: function.arguments.clone(),
+        steps: function.steps.iter().map(step).collect(),
+        result: function.result.spell(target),
+    });
+}
+
+impl Primitive {
+    const NAMED: [(&'static str, Primitive); 5] = [
+        ("choose", Primitive::Choose),
+        ("abs", Primitive::Abs),
+        ("nearest", Primitive::Nearest),
+        ("exponent", Primitive::Exponent),
+        ("scaled", Primitive::Scaled),
+    ];
+
+    fn is_condition(self) -> bool {
+        matches!(self, Primitive::Less | Primitive::AtMost | Primitive::Equal)
+    }
+}
+
+impl Term {
+    fn parts(&self) -> &[Term] {
+        match self {
+            Term::Number(_) | Term::Name(_) => &[],
+            Term::Negative(part) => std::slice::from_ref(part),
+            Term::Sum(parts)
+            | Term::Difference(parts)
+            | Term::Product(parts)
+            | Term::Quotient(parts) => &parts[..],
+            Term::Primitive(_, parts) | Term::Library(_, parts) | Term::Support(_, parts) => parts,
+        }
+    }
+
+    /// The functions of the file that it calls; `log1p` is the one by which the language calls that of `math.h`, if any.
+    fn calls(&self, log1p: Option<&'static str>, names: &mut Vec<&'static str>) {
+        match self {
+            Term::Support(name, _) => names.push(name),
+            Term::Library("log1p", _) => names.extend(log1p),
+            _ => {}
+        }
+        self.parts().iter().for_each(|part| part.calls(log1p, names));
+    }
+
+    /// How strongly it binds.
+    fn rank(&self) -> u8 {
+        match self {
+            Term::Sum(_) | Term::Difference(_) => 1,
+            Term::Product(_) | Term::Quotient(_) => 2,
+            Term::Negative(_) => 0,
+            Term::Number(_) | Term::Name(_) | Term::Library(..) | Term::Support(..) => 3,
+            Term::Primitive(..) => 3,
+        }
+    }
+
+    fn spell<T: WithRuntime>(&self, target: &T) -> String {
+        let within = |part: &Term, least: u8| {
+            let text = part.spell(target);
+            if part.rank() < least { format!("({text})") } else { text }
+        };
+        let infix = |sign: &str, [left, right]: &[Term; 2], rank: u8| {
+            format!("{} {sign} {}", within(left, rank), within(right, rank + 1))
+        };
+        match self {
+            Term::Number(value) => target.literal(*value),
+            Term::Name(name) => name.clone(),
+            Term::Negative(part) => format!("-{}", within(part, 3)),
+            Term::Sum(parts) => infix("+", parts, 1),
+            Term::Difference(parts) => infix("-", parts, 1),
+            Term::Product(parts) => infix("*", parts, 2),
+            Term::Quotient(parts) => infix("/", parts, 2),
+            Term::Primitive(primitive, parts) => fill(target, target.primitive(*primitive), parts),
+            Term::Library(name, parts) => {
+                fill(target, &target.function(Called::Library(name)), parts)
+            }
+            Term::Support(name, parts) => {
+                fill(target, &target.function(Called::Support(name)), parts)
+            }
+        }
+    }
+}
+
+/// `template` with a part in the place of each `#`.
+fn fill<T: WithRuntime>(target: &T, template: &str, parts: &[Term]) -> String {
+    let mut pieces = template.split('#');
+    let mut text = pieces.next().unwrap_or_default().to_owned();
+    for (piece, part) in pieces.zip(parts) {
+        text += &part.spell(target);
+        text += piece;
+    }
+    text
+}
+
+/// Reads `runtime.txt`; what is wrong in it is left out, which the tests notice.
+fn read(text: &'static str) -> BTreeMap<&'static str, Function> {
+    let mut functions = BTreeMap::new();
+    let mut own: Option<(&'static str, Function)> = None;
+    for line in text.lines() {
+        let statement = line.trim();
+        if let Some(result) = statement.strip_prefix("return ") {
+            if let Some((name, mut function)) = own.take() {
+                function.result = term(result);
+                functions.insert(name, function);
+            }
+        } else if line.starts_with(' ') {
+            let Some((_, function)) = &mut own else { continue };
+            match statement.strip_prefix("for k from ").and_then(|rest| rest.split_once(": ")) {
+                Some((count, body)) => function.repeat(count.parse().unwrap_or(0), body),
+                None => function.step(statement),
+            }
+        } else if let Some((head, about)) = line.split_once("): ")
+            && let Some((name, arguments)) = head.split_once('(')
+        {
+            let arguments = arguments.split(", ").collect();
+            let result = Term::Number(f64::NAN);
+            own = Some((name, Function { about, arguments, steps: Vec::new(), result }));
+        }
+    }
+    functions
+}
+
+impl Function {
+    fn step(&mut self, statement: &str) {
+        if let Some((name, value)) = statement.split_once(" = ") {
+            self.steps.push((name.to_owned(), term(value)));
+        }
+    }
+
+    /// The statement for `k = count, ..., 1`; all values but the last have a number at their names.
+    fn repeat(&mut self, count: u32, statement: &str) {
+        let Some((name, value)) = statement.split_once(" = ") else { return };
+        if let Some((first, _)) = self.steps.last_mut().filter(|(last, _)| last == name) {
+            *first = format!("{name}{}", count + 1);
+        }
+        let value = term(value);
+        for k in (1..=count).rev() {
+            let named = if k == 1 { name.to_owned() } else { format!("{name}{k}") };
+            self.steps.push((named, value.at(k, name)));
+        }
+    }
+}
+
+impl Term {
+    /// The same for a value of `k`, with the value before by its number.
+    fn at(&self, k: u32, before: &str) -> Term {
+        let both = |parts: &[Term; 2]| Box::new([parts[0].at(k, before), parts[1].at(k, before)]);
+        let folded = |parts: &[Term; 2], of: fn(f64, f64) -> f64| match &*both(parts) {
+            [Term::Number(a), Term::Number(b)] => Some(Term::Number(of(*a, *b))),
+            _ => None,
+        };
+        match self {
+            Term::Name(name) if name == "k" => Term::Number(f64::from(k)),
+            Term::Name(name) if name == before => Term::Name(format!("{before}{}", k + 1)),
+            Term::Sum(parts) => {
+                folded(parts, |a, b| a + b).unwrap_or_else(|| Term::Sum(both(parts)))
+            }
+            Term::Difference(parts) => {
+                folded(parts, |a, b| a - b).unwrap_or_else(|| Term::Difference(both(parts)))
+            }
+            Term::Product(parts) => {
+                folded(parts, |a, b| a * b).unwrap_or_else(|| Term::Product(both(parts)))
+            }
+            Term::Quotient(parts) => {
+                folded(parts, |a, b| a / b).unwrap_or_else(|| Term::Quotient(both(parts)))
+            }
+            other => other.clone(),
+        }
+    }
+}
+
+/// A term from its text.
+fn term(text: &str) -> Term {
+    let packed: String = text.chars().filter(|c| *c != ' ').collect();
+    comparison(&mut packed.chars().peekable())
+}
+
+fn comparison(rest: &mut Peekable<Chars<'_>>) -> Term {
+    let left = sum(rest);
+    let primitive = match rest.peek() {
+        Some('<') => {
+            rest.next();
+            if rest.next_if_eq(&'=').is_some() { Primitive::AtMost } else { Primitive::Less }
+        }
+        Some('=') => {
+            rest.nth(1);
+            Primitive::Equal
+        }
+        _ => return left,
+    };
+    Term::Primitive(primitive, vec![left, sum(rest)])
+}
+
+fn sum(rest: &mut Peekable<Chars<'_>>) -> Term {
+    let mut left = product(rest);
+    loop {
+        left = match rest.next_if(|c| "+-".contains(*c)) {
+            Some('+') => Term::Sum(Box::new([left, product(rest)])),
+            Some(_) => Term::Difference(Box::new([left, product(rest)])),
+            None => return left,
+        };
+    }
+}
+
+fn product(rest: &mut Peekable<Chars<'_>>) -> Term {
+    let mut left = factor(rest);
+    loop {
+        left = match rest.next_if(|c| "*/".contains(*c)) {
+            Some('*') => Term::Product(Box::new([left, factor(rest)])),
+            Some(_) => Term::Quotient(Box::new([left, factor(rest)])),
+            None => return left,
+        };
+    }
+}
+
+fn factor(rest: &mut Peekable<Chars<'_>>) -> Term {
+    if rest.next_if_eq(&'-').is_some() {
+        return match factor(rest) {
+            Term::Number(value) => Term::Number(-value),
+            other => Term::Negative(Box::new(other)),
+        };
+    }
+    if rest.next_if_eq(&'(').is_some() {
+        let inner = comparison(rest);
+        rest.next();
+        return inner;
+    }
+    let mut word = String::new();
+    while let Some(c) = rest.next_if(|c| c.is_ascii_alphanumeric() || "._".contains(*c)) {
+        word.push(c);
+        // The sign of an exponent.
+        if c == 'e' && word.starts_with(|c: char| c.is_ascii_digit()) {
+            word.extend(rest.next_if_eq(&'-'));
+        }
+    }
+    if let Ok(value) = word.parse() {
+        return Term::Number(value);
+    }
+    if rest.next_if_eq(&'(').is_none() {
+        return Term::Name(word);
+    }
+    let mut parts = vec![comparison(rest)];
+    while rest.next_if_eq(&',').is_some() {
+        parts.push(comparison(rest));
+    }
+    rest.next();
+    if let Some((_, primitive)) = Primitive::NAMED.iter().find(|(name, _)| *name == word) {
+        return Term::Primitive(*primitive, parts);
+    }
+    match ["sqrt", "exp", "log", "log1p"].into_iter().find(|name| *name == word) {
+        Some(name) => Term::Library(name, parts),
+        None => Term::Support(String::leak(word), parts),
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use mmsmith_expr::Function as Named;
+
+    fn value(name: &str, arguments: &[f64]) -> f64 {
+        let function = &FUNCTIONS[name];
+        let mut known: BTreeMap<String, f64> = function
+            .arguments
+            .iter()
+            .map(|name| (*name).to_owned())
+            .zip(arguments.iter().copied())
+            .collect();
+        for (name, term) in &function.steps {
+            let value = evaluate(term, &known);
+            known.insert(name.clone(), value);
+        }
+        evaluate(&function.result, &known)
+    }
+
+    /// Conditions are one or zero.
+    fn evaluate(term: &Term, known: &BTreeMap<String, f64>) -> f64 {
+        let parts: Vec<f64> = term.parts().iter().map(|part| evaluate(part, known)).collect();
+        match (term, parts.as_slice()) {
+            (Term::Number(value), _) => *value,
+            (Term::Name(name), _) => known[name],
+            (Term::Negative(_), [a]) => -a,
+            (Term::Sum(_), [a, b]) => a + b,
+            (Term::Difference(_), [a, b]) => a - b,
+            (Term::Product(_), [a, b]) => a * b,
+            (Term::Quotient(_), [a, b]) => a / b,
+            (Term::Support(name, _), parts) => value(name, parts),
+            (Term::Library("sqrt", _), [a]) => a.sqrt(),
+            (Term::Library("exp", _), [a]) => a.exp(),
+            (Term::Library("log", _), [a]) => a.ln(),
+            (Term::Library("log1p", _), [a]) => a.ln_1p(),
+            (Term::Primitive(Primitive::Choose, _), [c, a, b]) => {
+                if *c == 1.0 {
+                    *a
+                } else {
+                    *b
+                }
+            }
+            (Term::Primitive(Primitive::Less, _), [a, b]) => f64::from(u8::from(a < b)),
+            (Term::Primitive(Primitive::AtMost, _), [a, b]) => f64::from(u8::from(a <= b)),
+            (Term::Primitive(Primitive::Equal, _), [a, b]) => f64::from(u8::from(a == b)),
+            (Term::Primitive(Primitive::Abs, _), [a]) => a.abs(),
+            (Term::Primitive(Primitive::Nearest, _), [a]) => a.round_ties_even(),
+            (Term::Primitive(Primitive::Exponent, _), [a]) => a.abs().log2().floor() + 1.0,
+            (Term::Primitive(Primitive::Scaled, _), [a, e]) => a * e.exp2(),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// Each function gives the bits of the crate of scalar functions.
+    #[test]
+    fn the_file_says_the_functions_of_the_crate() {
+        use mmsmith_scalar_functions::ScalarFunctions as S;
+        let arguments: Vec<f64> = (0..400)
+            .map(|k| 0.013 * f64::from(k))
+            .chain([1e-9, 0.999, 37.5, 1e4, 0.25, 0.5, 1.0])
+            .collect();
+        type Case = (&'static str, fn(f64) -> f64, bool);
+        let cases: [Case; 12] = [
+            ("sin_pi", S::sin_pi, true),
+            ("cos_pi", S::cos_pi, true),
+            ("log_1p", S::log_1p, false),
+            ("log_ratio_squared", S::log_ratio_squared, false),
+            ("log_ratio_slope", S::log_ratio_slope, false),
+            ("log_ratio_curvature", S::log_ratio_curvature, false),
+            ("cosh_sqrt_m1", S::cosh_sqrt_m1, false),
+            ("cosh_sqrt_m1_slope", S::cosh_sqrt_m1_slope, false),
+            ("cosh_sqrt_m1_curvature", S::cosh_sqrt_m1_curvature, false),
+            ("positive_part", S::positive_part, true),
+            ("positive_part_slope", S::positive_part_slope, true),
+            ("ln_of_both", |x| S::log_1p(x), false),
+        ];
+        for (name, expected, signed) in cases {
+            for x in arguments.iter().flat_map(|x| [*x, -*x]).filter(|x| signed || *x >= 0.0) {
+                let found = if name == "ln_of_both" {
+                    value(name, &[x, f64::NAN])
+                } else {
+                    value(name, &[x])
+                };
+                let expected = expected(x);
+                assert!(
+                    found.to_bits() == expected.to_bits() || found == expected && x == 0.0,
+                    "{name}({x}) = {found}, not {expected}"
+                );
+            }
+        }
+        for y in [1e-9, 0.03, 0.2, 0.49, 1e-300] {
+            assert_eq!(value("ln_of_both", &[y - 1.0, y]), (y - 1.0).ln_of_both(y), "{y}");
+        }
+        for (a, b) in [(0.1, 0.7), (1e9, -1e-7), (-3.3, 1.0 / 3.0)] {
+            assert_eq!(value("sum_error", &[a, b]), a.sum_error(b));
+            assert_eq!(value("product_error", &[a, b]), a.product_error(b));
+        }
+        assert_eq!(value("log_1p", &[-1.0]), f64::NEG_INFINITY);
+        assert!(value("log_1p", &[f64::NAN]).is_nan());
+    }
+
+    /// Whatever generated code calls, the file has.
+    #[test]
+    fn no_function_is_missing() {
+        for function in Named::ALL {
+            if let Called::Support(name) = Called::of(*function) {
+                assert!(FUNCTIONS.contains_key(name), "{name}");
+            }
+        }
+        for function in FUNCTIONS.values() {
+            let mut called = Vec::new();
+            function.steps.iter().for_each(|(_, term)| term.calls(None, &mut called));
+            function.result.calls(None, &mut called);
+            assert!(called.iter().all(|name| FUNCTIONS.contains_key(name)), "{called:?}");
+        }
+    }
+}

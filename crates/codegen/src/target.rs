@@ -1,0 +1,193 @@
+//! How languages spell programs, and the hosts that files are written for.
+
+use crate::code::Code;
+use crate::text::{push_index, spell};
+use mmsmith_expr::{Function, Operation, Rational, nearest_f64};
+use mmsmith_stage::{Block, Operand};
+use std::borrow::Cow;
+use thiserror::Error;
+
+/// A language that solutions are written in: how it spells each part of a program.
+pub(crate) trait Target {
+    /// Where a function finds what is not computed in it.
+    type Places: Copy;
+
+    /// What stands before the index of a value in a statement that names it, and what ends the statement.
+    const STATEMENT: [&'static str; 2];
+
+    /// A double; negative ones so that they can stand after a sign.
+    fn literal(&self, value: f64) -> String;
+
+    /// A call of a function, with `#` for each argument.
+    fn function(&self, function: Called) -> Cow<'static, str>;
+
+    /// Where a value is found that is not computed in the same block.
+    fn operand(&self, text: &mut String, operand: Operand<'_>, places: Self::Places);
+
+    /// A number of the specification.
+    fn number(&self, value: &Rational) -> String {
+        self.literal(nearest_f64(value))
+    }
+
+    /// A power with a constant exponent, with `#` for the base.
+    fn power(&self, exponent: &Rational) -> String {
+        let call = self.function(Called::Library("pow"));
+        let exponent = self.number(exponent);
+        call.rsplit_once('#')
+            .map_or_else(String::new, |(before, after)| before.to_owned() + &exponent + after)
+    }
+
+    /// An operation, with `#` for each operand. Numbers and inputs are operands and no statements.
+    fn operation(&self, operation: &Operation) -> Cow<'static, str> {
+        let call = match operation {
+            Operation::Number(value) => return self.number(value).into(),
+            Operation::Pi => return self.literal(std::f64::consts::PI).into(),
+            Operation::Power(_, exponent) => return self.power(exponent).into(),
+            Operation::Call(function, _) => Called::of(*function),
+            Operation::Sqrt(_) => Called::Library("sqrt"),
+            Operation::Atan2(..) => Called::Library("atan2"),
+            Operation::SinPi(_) => Called::Support("sin_pi"),
+            Operation::CosPi(_) => Called::Support("cos_pi"),
+            Operation::LnOfBoth(..) => Called::Support("ln_of_both"),
+            Operation::SumError(..) => Called::Support("sum_error"),
+            Operation::ProductError(..) => Called::Support("product_error"),
+            other => return arithmetic(other).into(),
+        };
+        self.function(call)
+    }
+
+    /// The statements of a block, a line each, and its outputs as expressions.
+    fn block(&self, block: &Block<'_>, margin: &str, places: Self::Places) -> Written {
+        let [before, after] = Self::STATEMENT;
+        let mut lines = String::new();
+        for (index, operation) in block.steps() {
+            lines.extend([margin, before, "t"]);
+            push_index(&mut lines, index);
+            lines.push_str(" = ");
+            spell(&mut lines, &self.operation(operation), operation, |text, slot| {
+                self.value(text, block.operand(slot), places);
+            });
+            lines.push_str(after);
+        }
+        let output = |operand| {
+            let mut text = String::new();
+            self.value(&mut text, operand, places);
+            text
+        };
+        Written { lines, outputs: block.outputs().map(output).collect() }
+    }
+
+    /// A value of the same block, a number or [`Target::operand`].
+    fn value(&self, text: &mut String, operand: Operand<'_>, places: Self::Places) {
+        match operand {
+            Operand::Temporary(index) => {
+                text.push('t');
+                push_index(text, index);
+            }
+            Operand::Number(value) => text.push_str(&self.number(value)),
+            Operand::Pi => text.push_str(&self.operation(&Operation::Pi)),
+            other => self.operand(text, other, places),
+        }
+    }
+}
+
+/// Sums, products and what else is written the same in every language; nothing for other operations.
+pub(crate) fn arithmetic(operation: &Operation) -> &'static str {
+    match operation {
+        Operation::Add(..) => "# + #",
+        Operation::Sub(..) => "# - #",
+        Operation::Mul(..) => "# * #",
+        Operation::Div(..) => "# / #",
+        Operation::Neg(_) => "-#",
+        _ => "",
+    }
+}
+
+/// A block in a language.
+pub(crate) struct Written {
+    /// The statements.
+    pub(crate) lines: String,
+    /// The outputs.
+    pub(crate) outputs: Vec<String>,
+}
+
+/// A function that generated code calls.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Called {
+    /// One of `math.h`, by its name there.
+    Library(&'static str),
+    /// One that the project defines, by its name in the file `runtime.txt`.
+    Support(&'static str),
+}
+
+impl Called {
+    pub(crate) fn of(function: Function) -> Self {
+        match function.c_support() {
+            Some(_) => Called::Support(function.c().strip_prefix("mmsmith_").unwrap_or_default()),
+            None => Called::Library(function.c()),
+        }
+    }
+
+    /// Whether it has two arguments.
+    pub(crate) fn takes_two(self) -> bool {
+        matches!(
+            self,
+            Called::Library("atan2" | "pow")
+                | Called::Support("ln_of_both" | "sum_error" | "product_error" | "far_logarithm")
+        )
+    }
+}
+
+/// A host that a solution can be written for.
+#[derive(Debug)]
+pub struct Host {
+    /// What `--target` calls it.
+    pub name: &'static str,
+    /// What is written.
+    pub about: &'static str,
+    /// What a file's name ends with, after the name of the module.
+    pub ending: &'static str,
+    /// The text of the file.
+    pub(crate) write: fn(&Code<'_>) -> Result<String, Unwritable>,
+}
+
+impl Host {
+    /// The host that `--target` calls `name`.
+    #[must_use]
+    pub fn named(name: &str) -> Option<&'static Host> {
+        crate::targets::HOSTS.iter().find(|host| host.name == name)
+    }
+
+    /// The name of the file of a solution.
+    #[must_use]
+    pub fn file_name(&self, module: &str) -> String {
+        format!("{module}{}", self.ending)
+    }
+
+    /// The text of the file.
+    ///
+    /// # Errors
+    ///
+    /// [`Unwritable`] where the solution needs what the host has no words for.
+    pub fn source(&self, code: &Code<'_>) -> Result<String, Unwritable> {
+        (self.write)(code)
+    }
+}
+
+/// A host has no words for a solution.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum Unwritable {
+    /// A function that its expressions lack.
+    #[error(
+        "--target {target}: the expressions of {target} have no form of {function}, which {solution} calls; choose a target \
+         with functions of its own, such as cpp, fortran or numpy"
+    )]
+    Function {
+        /// The host.
+        target: &'static str,
+        /// The function, as specifications call it.
+        function: String,
+        /// The solution.
+        solution: String,
+    },
+}

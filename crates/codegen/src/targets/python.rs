@@ -1,0 +1,227 @@
+//! Python source; its hosts differ in the library that they compute with.
+
+use crate::code::Code;
+use crate::function::digits;
+use crate::listing::{Given, Item, commented};
+use crate::runtime::{Primitive, Routine, WithRuntime};
+use crate::target::{Called, Target, Written};
+use crate::text::{one_line, push_index};
+use mmsmith_stage::{Operand, Shape, Stage};
+use std::borrow::Cow;
+
+/// Python with a library.
+pub(crate) struct Python {
+    /// Calls of functions, with `#` for each argument.
+    pub(crate) function: fn(Called) -> Cow<'static, str>,
+    pub(crate) primitive: fn(Primitive) -> &'static str,
+    /// What the host's user has to know.
+    pub(crate) remarks: &'static str,
+    /// Imports, and the functions `_position`, `_scalar`, `_vector` and `_matrix`, which shape results.
+    pub(crate) preamble: &'static str,
+    /// What stands before a function of the runtime.
+    pub(crate) decorator: &'static str,
+    /// The first statements of the constructor.
+    pub(crate) demands: &'static str,
+    /// The Cauchy stress from `F`, `J` and `P`.
+    pub(crate) cauchy: &'static str,
+    /// The second Piola-Kirchhoff stress from `F` and `P`.
+    pub(crate) second: &'static str,
+}
+
+impl Target for Python {
+    type Places = ();
+
+    const STATEMENT: [&'static str; 2] = ["", "\n"];
+
+    fn literal(&self, value: f64) -> String {
+        let sign = if value.is_sign_negative() { "-" } else { "" };
+        let size = value.abs();
+        if size.is_infinite() {
+            format!("{sign}math.inf")
+        } else {
+            format!("{sign}{}", digits(size))
+        }
+    }
+
+    fn function(&self, function: Called) -> Cow<'static, str> {
+        (self.function)(function)
+    }
+
+    fn operand(&self, text: &mut String, operand: Operand<'_>, (): ()) {
+        let (name, index, after) = match operand {
+            Operand::Time => return text.push('t'),
+            Operand::Coordinate(index) => ("X", index, ""),
+            Operand::Parameter(index) => ("par[", index, "]"),
+            Operand::Kept(_, index) => ("fixed[", index, "]"),
+            _ => return,
+        };
+        text.push_str(name);
+        push_index(text, index);
+        text.push_str(after);
+    }
+}
+
+impl WithRuntime for Python {
+    fn primitive(&self, primitive: Primitive) -> &'static str {
+        (self.primitive)(primitive)
+    }
+}
+
+/// A call of a function of the file's own.
+pub(crate) fn own_call(function: Called, name: &str) -> Cow<'static, str> {
+    format!("_{name}({})", if function.takes_two() { "#, #" } else { "#" }).into()
+}
+
+/// A string literal.
+fn string(text: &str) -> String {
+    let mut literal = String::from("\"");
+    for c in one_line(text).chars() {
+        match c {
+            '"' | '\\' => literal.extend(['\\', c]),
+            ' '..='~' => literal.push(c),
+            _ => literal += &format!("\\U{:08x}", u32::from(c)),
+        }
+    }
+    literal + "\""
+}
+
+impl Python {
+    /// The text of a module.
+    pub(crate) fn source(&self, code: &Code<'_>) -> String {
+        let spec = code.spec;
+        // A first line without text of the specification: one of the first two lines may name another encoding.
+        let mut text = String::from("# -*- coding: utf-8 -*-\n");
+        text += &commented(&code.head_for_host(self.remarks), "#", 118);
+        text += self.preamble;
+        for routine in code.routines(self) {
+            text += &self.routine(&routine);
+        }
+        text += "\n\nclass Solution:\n    # The fields for given parameters:\n";
+        text += &commented(&code.parameter_lines(), "    #", 118);
+        let defaults: Vec<String> = spec
+            .parameters
+            .iter()
+            .map(|p| format!("{}: {}", string(&p.name), self.literal(p.default)))
+            .collect();
+        text += &format!(
+            "    NAME = {}\n    DIMENSION = {}\n    DEFAULTS = {{{}}}\n\n    def __init__(self, **parameters):\n{}",
+            string(&spec.name),
+            spec.dimension,
+            defaults.join(", "),
+            self.demands,
+        );
+        text += "        for name in parameters:
+            if name not in self.DEFAULTS:
+                raise TypeError(f\"{self.NAME} has no parameter {name!r}; it has {', '.join(self.DEFAULTS)}\")
+        par = [float(x) for x in {**self.DEFAULTS, **parameters}.values()]
+        self.par, self.fixed = par, []\n";
+        for (index, parameter) in spec.parameters.iter().enumerate() {
+            let bounds = parameter.bounds.iter().map(|b| {
+                format!(" and par[{index}] {} {}", b.relation.sign(), self.literal(b.limit))
+            });
+            text += &format!(
+                "        if not (math.isfinite(par[{index}]){}):\n            raise ValueError({})\n",
+                bounds.collect::<String>(),
+                string(&code.refusal(parameter))
+            );
+        }
+        let Written { lines, outputs } = self.block(&code.staged.fixed_stage(), "        ", ());
+        text += &lines;
+        let (sides, fixed) = outputs.split_at(2 * spec.requirements.len());
+        for (requirement, side) in spec.requirements.iter().zip(sides.chunks(2)) {
+            text += &format!(
+                "        if not (float({}) {} float({})):\n            raise ValueError({})\n",
+                side[0],
+                requirement.relation.sign(),
+                side[1],
+                string(&format!(
+                    "the parameters of {} must satisfy {}",
+                    spec.name, requirement.text
+                ))
+            );
+        }
+        text += &format!("        self.fixed = [float(x) for x in [{}]]\n", fixed.join(", "));
+        for item in code.functions() {
+            text += &self.item(code, &item);
+        }
+        text += "\n    def rho0_b(self, X, t):\n        # body force per unit reference volume\n        return self.density() * self.b(X, t)\n";
+        text += "\n    def static_force(self, X, t):\n        # -Div P, the force per reference volume that holds the \
+                 deformation of time t at rest\n        return self.density() * (self.b(X, t) - self.a(X, t))\n";
+        text += "\n    def sigma(self, X, t):\n        # Cauchy stress\n        F, J, P = self.F(X, t), self.J(X, t), self.P(X, t)\n";
+        text += self.cauchy;
+        text += "\n    def S(self, X, t):\n        # second Piola-Kirchhoff stress\n        F, P = self.F(X, t), self.P(X, t)\n";
+        text + self.second
+    }
+
+    fn routine(&self, routine: &Routine) -> String {
+        let mut text = format!(
+            "\n\n{}def _{}({}):\n    # {}\n",
+            self.decorator,
+            routine.name,
+            routine.arguments.join(", "),
+            routine.about
+        );
+        for step in &routine.steps {
+            text += &format!("    {} = {}\n", step.name, step.value);
+        }
+        text + &format!("    return {}\n", routine.result)
+    }
+
+    fn item(&self, code: &Code<'_>, item: &Item) -> String {
+        // A word of Python.
+        let name = if item.name == "lambda" { "lambda_" } else { &item.name };
+        let given = if item.given == Given::Nothing { "self" } else { "self, X, t" };
+        let mut text = format!("\n    def {name}({given}):\n        # {}\n", item.about);
+        let block = item.block(code);
+        let reads = |such: fn(&Operand<'_>) -> bool| block.reads(|operand| such(&operand));
+        if reads(|o| matches!(o, Operand::Parameter(_))) {
+            text += "        par = self.par\n";
+        }
+        if reads(|o| matches!(o, Operand::Kept(Stage::Fixed, _))) {
+            text += "        fixed = self.fixed\n";
+        }
+        if item.given == Given::PositionAndTime {
+            let names: Vec<String> = (0..code.spec.dimension).map(|i| format!("X{i}")).collect();
+            text += &format!("        {}, = _position(X, {})\n", names.join(", "), names.len());
+        }
+        let Written { lines, outputs } = self.block(&block, "        ", ());
+        text += &lines;
+        let entries = outputs.join(", ");
+        text + &match (item.given, item.shape) {
+            (Given::Nothing, Shape::Scalar) => format!("        return {entries}\n"),
+            (Given::Nothing, _) => format!("        return [{entries}]\n"),
+            (_, Shape::Scalar) => format!("        return _scalar(X0, t, {entries})\n"),
+            (_, Shape::Vector) => format!("        return _vector(X0, t, [{entries}])\n"),
+            (_, Shape::Matrix) => {
+                let rows: Vec<String> = outputs
+                    .chunks(code.spec.dimension)
+                    .map(|row| format!("[{}]", row.join(", ")))
+                    .collect();
+                format!("        return _matrix(X0, t, [{}])\n", rows.join(", "))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn no_text_ends_a_string(text in r#"(["\\\n\r $%'&]|\PC){0,200}"#) {
+            let literal = string(&text);
+            let inner = &literal[1..literal.len() - 1];
+            prop_assert!(inner.is_ascii() && !inner.contains('\n'));
+            let mut characters = inner.chars();
+            while let Some(c) = characters.next() {
+                // Quotation marks are escaped, and the last backslash escapes something.
+                prop_assert!(!['"'].contains(&c), "{literal}");
+                if c == '\\' {
+                    prop_assert!(characters.next().is_some(), "{literal}");
+                }
+            }
+        }
+    }
+}
